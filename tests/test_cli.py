@@ -207,7 +207,7 @@ def test_a_failure_half_way_leaves_nothing(undrawn, tmp_path, monkeypatch):
 
     monkeypatch.setattr(plots, "displacement_figure", fail)
     small = scenes.load("three-link-viscous").with_numerics(grid=5)
-    with pytest.raises(ValueError, match="half way"), files.whole_folder(tmp_path / "out") as folder:
+    with pytest.raises(ValueError, match="half way"), files.atomic_folder(tmp_path / "out") as folder:
         report.write(Report(small).ask(), folder)
     assert list(tmp_path.iterdir()) == []
 

@@ -13,7 +13,7 @@ from geomech.scene.frames import framed
 from geomech.study import cost, effort, fields
 from geomech.study.results import Displacements
 from geomech.systems import NoSlipSnake, Swimmer, Table
-from geomech.systems.capabilities import driven
+from geomech.systems.capabilities import velocity_and_power
 from rft import BodyInertia, Chain, DisturbedGround, Granular, Serpenoid, SkinFriction, Transient, Viscous
 from rft.balance.listening import listening
 from rft.refusal import Refusal
@@ -47,8 +47,8 @@ def test_power_is_that_of_every_frame(medium):
     system = framed(inner, NUMERICS)
     rng = np.random.default_rng(0)
     alpha, rate = rng.uniform(-1.5, 1.5, (30, 2)), rng.normal(size=(30, 2))
-    xi, power = driven(system, alpha, rate)
-    assert power == pytest.approx(driven(inner, alpha, rate)[1], rel=1e-12)
+    xi, power = velocity_and_power(system, alpha, rate)
+    assert power == pytest.approx(velocity_and_power(inner, alpha, rate)[1], rel=1e-12)
     assert xi == pytest.approx(system.velocity(alpha, rate), abs=1e-14)
 
 

@@ -17,13 +17,13 @@ import os, signal, sys
 from pathlib import Path
 from geomech.io import files
 with getattr(files, sys.argv[1])(sys.argv[2]) as path:
-    (path / "a.txt" if sys.argv[1] == "whole_folder" else path).write_text("half")
+    (path / "a.txt" if sys.argv[1] == "atomic_folder" else path).write_text("half")
     if sys.argv[3] == "wait":
         print("ready", flush=True)
         sys.stdin.read()
     os.kill(os.getpid(), getattr(signal, sys.argv[3]))
 """
-WRITERS = ["whole_file", "whole_folder"]
+WRITERS = ["atomic_file", "atomic_folder"]
 
 
 def start(writer, target, how, **options):
@@ -32,8 +32,8 @@ def start(writer, target, how, **options):
 
 def write(writer, target, text="new"):
     with getattr(files, writer)(target) as path:
-        (path / "a.txt" if writer == "whole_folder" else path).write_text(text)
-    return target / "a.txt" if writer == "whole_folder" else target
+        (path / "a.txt" if writer == "atomic_folder" else path).write_text(text)
+    return target / "a.txt" if writer == "atomic_folder" else target
 
 
 @pytest.mark.parametrize("writer", WRITERS)
@@ -47,10 +47,10 @@ def test_strays_of_a_kill_are_swept_by_the_next_writer(writer, tmp_path):
 
 
 def test_a_stray_beside_a_folder_that_now_is_there(tmp_path):
-    start("whole_folder", tmp_path / "out", "SIGKILL").wait()
+    start("atomic_folder", tmp_path / "out", "SIGKILL").wait()
     (tmp_path / "out").mkdir()
-    start("whole_folder", tmp_path / "out", "SIGKILL").wait()
-    write("whole_folder", tmp_path / "out")
+    start("atomic_folder", tmp_path / "out", "SIGKILL").wait()
+    write("atomic_folder", tmp_path / "out")
     assert [p.name for p in tmp_path.rglob("*")] == ["out", "a.txt"]
 
 
@@ -73,7 +73,7 @@ def test_what_is_not_ours_stays(tmp_path):
         if words is not None:
             (tmp_path / (prefix + name) / files.MARK).write_bytes(words)
     (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "elsewhere" / files.MARK).write_bytes(files._words(target))
+    (tmp_path / "elsewhere" / files.MARK).write_bytes(files._mark_text(target))
     (tmp_path / (prefix + "link")).symlink_to(tmp_path / "elsewhere")
     (tmp_path / (prefix + "file")).write_text("precious")
     (tmp_path / (prefix + "young")).mkdir()
@@ -93,7 +93,7 @@ def test_a_failure_leaves_what_was_there(writer, error, tmp_path):
 
     def fail():
         with getattr(files, writer)(tmp_path / "out") as path:
-            (path / "a.txt" if writer == "whole_folder" else path).write_text("half")
+            (path / "a.txt" if writer == "atomic_folder" else path).write_text("half")
             raise error
 
     with pytest.raises(error):
@@ -111,13 +111,13 @@ def test_any_name_that_the_file_system_takes(writer, name, tmp_path):
 
 def test_modes_are_the_usual_ones(tmp_path):
     (tmp_path / "plain").write_text("")
-    assert write("whole_file", tmp_path / "out").stat().st_mode == (tmp_path / "plain").stat().st_mode
+    assert write("atomic_file", tmp_path / "out").stat().st_mode == (tmp_path / "plain").stat().st_mode
 
 
 def test_a_link_is_written_through(tmp_path):
     (tmp_path / "there").mkdir()
     (tmp_path / "link").symlink_to(tmp_path / "there" / "file")
-    write("whole_file", tmp_path / "link")
+    write("atomic_file", tmp_path / "link")
     assert (tmp_path / "link").is_symlink()
     assert (tmp_path / "there" / "file").read_text() == "new"
 
@@ -126,7 +126,7 @@ def test_a_link_is_written_through(tmp_path):
 def test_a_folder_goes_where_few_files_can_be_open(writer, tmp_path, monkeypatch):
     monkeypatch.setattr(files.shutil, "rmtree", lambda *_, **__: None)  # as it ends where none can be opened
     with contextlib.suppress(KeyError), getattr(files, writer)(tmp_path / "out") as path:
-        (path / "b.txt" if writer == "whole_folder" else path).write_text("half")
+        (path / "b.txt" if writer == "atomic_folder" else path).write_text("half")
         raise KeyError
     assert not any(tmp_path.iterdir())
 
@@ -139,13 +139,13 @@ def test_a_folder_replaces_files_alone(kind, tmp_path):
     else:
         (tmp_path / "out" / "a.txt").mkdir()
     with pytest.raises(Refusal, match=r"a\.txt: it is no ordinary file"):
-        write("whole_folder", tmp_path / "out")
+        write("atomic_folder", tmp_path / "out")
 
 
 def test_a_folder_does_not_replace_an_input(tmp_path):
-    file, source = write("whole_folder", tmp_path / "out", "input"), tmp_path / "input"
+    file, source = write("atomic_folder", tmp_path / "out", "input"), tmp_path / "input"
     source.hardlink_to(file)
-    with pytest.raises(Refusal, match="it is an input"), files.whole_folder(tmp_path / "out", [source]) as new:
+    with pytest.raises(Refusal, match="it is an input"), files.atomic_folder(tmp_path / "out", [source]) as new:
         (new / "a.txt").write_text("new")
     assert file.read_text() == "input"
 
@@ -190,7 +190,7 @@ from geomech.io import files
 resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 try:
     with getattr(files, sys.argv[1])(sys.argv[2]) as path:
-        (path / "a.txt" if sys.argv[1] == "whole_folder" else path).write_text("x" * 5000)
+        (path / "a.txt" if sys.argv[1] == "atomic_folder" else path).write_text("x" * 5000)
 except files.Refusal as error:
     print(error)
 """
@@ -213,10 +213,10 @@ def test_where_nothing_can_be_written(bad, tmp_path):
     (tmp_path / "file").write_text("")
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     with pytest.raises(Refusal, match="cannot write"):
-        write("whole_file", tmp_path / bad)
+        write("atomic_file", tmp_path / bad)
     if bad != "missing/out":
         with pytest.raises(Refusal, match="cannot write the folder"):
-            write("whole_folder", tmp_path / bad)
+            write("atomic_folder", tmp_path / bad)
 
 
 def test_reading_stops_at_the_limit(tmp_path):

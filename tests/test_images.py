@@ -9,7 +9,7 @@ from registry import BODIES, GAITS
 
 from geomech.gaits import Butterfly, Circle, Fourier, Sine
 from geomech.geometry import connection, harmonics
-from geomech.geometry.images import around, images, solved_count, to_solve
+from geomech.geometry.images import cycle_images, images, solved_count, to_solve
 from geomech.geometry.traits import NOTHING, Traits
 from geomech.systems.swimmer import Swimmer
 from rft import CATALOGUE, Chain, EndCaps, GrainInertia, SkinFriction
@@ -152,7 +152,7 @@ def cycles():
 def test_gaits_are_those_of_all_phases(name):
     body, effects, gait, amplitudes, phases, count = cycles()[name]
     swimmer, (alpha, alphadot) = Swimmer(GLASS, body, effects), gait.cycle(phases, amplitudes)
-    assert around(alpha, alphadot, swimmer.traits).count == count
+    assert cycle_images(alpha, alphadot, swimmer.traits).count == count
     run, xi = swimmer.run(alpha, alphadot, work=True), swimmer.velocity(alpha, alphadot)
     size = np.abs(xi).max((-1, -2), keepdims=True) + 1e-300
     np.testing.assert_allclose(run.xi / size, xi / size, rtol=0, atol=1e-10)
@@ -203,7 +203,7 @@ def test_few_phases_tell_how_many_are_solved(name, monkeypatch):
             late = Late(cos=gait.cos, sin=gait.sin)
             object.__setattr__(late, "start", 2 * np.pi * start)
             for phases in range(8, 201):
-                solved = around(*late.cycle(phases), traits).count
+                solved = cycle_images(*late.cycle(phases), traits).count
                 assert solved_count(late, phases, traits) == solved, (start, phases)
                 share = max(share, round(phases / solved))
         shares.append(share)
@@ -219,7 +219,7 @@ def test_a_million_phases_are_counted_at_once():
 
 def test_what_is_nearly_an_image_is_none():
     """Neither shapes nor rates, neither of a large gait nor of a small one beside it; nor gaits that differ in their images."""
-    count = lambda *cycle: around(*cycle, BOTH).count
+    count = lambda *cycle: cycle_images(*cycle, BOTH).count
     both = Circle().cycle(32, [1.0, 1e-6])
     assert count(*both) == 9
     for part in (0, 1):
@@ -230,8 +230,8 @@ def test_what_is_nearly_an_image_is_none():
                 assert count(*moved) == 32, (part, where)
     circle, butterfly = Circle().cycle(32), Butterfly().cycle(32)
     assert count(*map(np.stack, zip(circle, butterfly))) == 16
-    backwards = around(*circle, BACKWARDS)
-    assert around(*circle, NOTHING).count == 32 and backwards.count == 17
+    backwards = cycle_images(*circle, BACKWARDS)
+    assert cycle_images(*circle, NOTHING).count == 32 and backwards.count == 17
     assert {*map(tuple, backwards.factor.tolist())} == {(1.0, 1.0, 1.0), (1.0, 1.0, -1.0)}
 
 
@@ -241,7 +241,7 @@ def test_gaits_side_by_side_have_their_own_parameters(monkeypatch):
     effect = GrainInertia(frequency=1.0, length=0.3, depth=0.07)
     both = Swimmer(GLASS, body, (effect.with_parameters(frequency=frequencies),))
     alpha, alphadot = Circle().cycle(32, [0.5, 0.9])
-    assert around(alpha, alphadot, both.traits).count == 16
+    assert cycle_images(alpha, alphadot, both.traits).count == 16
     run = both.run(alpha, alphadot)
     for k in range(2):
         own = Swimmer(GLASS, body, (dataclasses.replace(effect, frequency=frequencies[k]),))

@@ -143,7 +143,11 @@ def test_intrude_gives_what_the_python_door_gives(name, geomech, tmp_path):
     assert (code, err) == (0, "")
     found = json.loads(out)
     place, error = ["angle"] if "leg" in name else ["x", "z"], found.pop("estimate")
-    assert error == {"force": error["force"], "moment": error["moment"], "from_elements": scene.used(2 * scene.count)}
+    assert error == {
+        "force": error["force"],
+        "moment": error["moment"],
+        "from_elements": scene.actual_count(2 * scene.count),
+    }
     assert list(found) == ["t", *place, "force_x", "force_z", "moment"]
     _, pose, twist = scene.motion.trajectory(scene.outline)
     wanted = loads(scene.medium, scene.outline, pose, twist, backend="numpy")
@@ -179,7 +183,7 @@ def test_the_error_of_the_elements_is_told(name, tension, elements):
         <= (4.0 if tension == "keep" else 15.0) * force + 1e-12
     )
     assert (0.6 if tension == "keep" else 0.3) * np.abs(found.moment - exact.moment).max() <= told.moment
-    assert told.count == scene.used((2 if tension == "keep" else 3) * scene.count)
+    assert told.count == scene.actual_count((2 if tension == "keep" else 3) * scene.count)
     if (name, tension, elements) == ("reversed-c-leg", "cut", 100):
         assert 0.01 < force / np.linalg.norm(exact.force, axis=1).max() < 0.03
 

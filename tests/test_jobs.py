@@ -370,7 +370,7 @@ def test_a_walk_resumes_where_it_was(engine, tmp_path):
 
 def test_gaits_are_kept_group_by_group(tmp_path, monkeypatch):
     amplitudes = np.array([0.4, 0.9, 1.3])
-    monkeypatch.setattr(estimate, "at_once", lambda system, phases: 1)
+    monkeypatch.setattr(estimate, "gaits_per_batch", lambda system, phases: 1)
     ask = lambda: estimate.direct(GLASS, GLASS.gait, amplitudes, 32)
     whole = ask()
     stopped(tmp_path / "p", 2, ask)

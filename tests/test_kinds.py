@@ -17,7 +17,7 @@ from commands import geomech
 from registry import EFFECTS
 
 from geomech import cli
-from geomech.core.entry_points import offered
+from geomech.core.entry_points import installed_entries
 from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Circle, Gait, Sine
 from geomech.geometry.traits import Traits
@@ -45,10 +45,10 @@ class Bare:
     """A law that supplies its traction and nothing else."""
 
     def __init__(self, law):
-        self.of = law
+        self.law = law
 
     def traction(self, v_t, v_n, eps=0.0):
-        return self.of.traction(v_t, v_n, eps)
+        return self.law.traction(v_t, v_n, eps)
 
 
 LAW = """
@@ -442,7 +442,7 @@ def test_a_package_offers_a_law_that_is_loaded_when_asked_for(package):
     package("raise RuntimeError('loaded unasked')", "other", dist="broken")
     assert load("three-link-viscous")
     assert "sands_laws" not in sys.modules
-    assert "thick" in offered(REGISTRIES["geomech.media"])
+    assert "thick" in installed_entries(REGISTRIES["geomech.media"])
     scene = parse(SCENE)
     assert type(scene.system.medium).__module__ == "sands_laws"
     assert parse(toml(scene)) == scene

@@ -22,7 +22,7 @@ from geomech.core.errors import UnitWarning
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
 from geomech.geometry.curvature import ccf
-from geomech.geometry.plane import looked_up
+from geomech.geometry.plane import interpolated_plane
 from geomech.geometry.reconstruct import displacement
 from geomech.geometry.tube import Loop, Tube, series, waves
 from geomech.io import tables
@@ -202,7 +202,9 @@ def test_where_A_jumps_its_error_is_told():
     t = 2 * np.pi * np.arange(128) / 128
     found, told_off = f.along(t)
     off = np.abs(found - true_A(f, corner, t))[:, 2, 1]
-    scatter = dataclasses.replace(f, known=dataclasses.replace(f.known, off=0 * f.known.off)).along(t)[1]
+    scatter = dataclasses.replace(
+        f, known=dataclasses.replace(f.known, standard_error=0 * f.known.standard_error)
+    ).along(t)[1]
     assert np.mean(off <= told_off[:, 2, 1]) > 0.92 > 0.82 > np.mean(off <= scatter[:, 2, 1])
     wider = (told_off - scatter).max(0)
     assert wider[2, 1] > 0.05 and wider[0].max() < 0.01  # which does not jump
@@ -234,7 +236,9 @@ def test_every_entry_of_A_and_its_slope_is_the_truth_without_noise(viscous):
     shape, far = f.known.loop.shape(t), 0.05 * n
     A = lambda alpha: np.stack([viscous(alpha, x) for x in np.eye(2)], -1)
     slope = (A(shape + far) - A(shape - far)) / 0.1
-    assert np.abs((f.known.of(shape + far) - f.known.of(shape - far)) / 0.1 - slope).max() < 0.02  # of 0.2
+    assert (
+        np.abs((f.known.connection(shape + far) - f.known.connection(shape - far)) / 0.1 - slope).max() < 0.02
+    )  # of 0.2
     np.testing.assert_allclose(f.displacement[0], true_net(f, viscous), atol=3e-5)
 
 
@@ -266,7 +270,7 @@ def test_a_backward_log_has_the_same_connection(viscous):
     back = made._replace(t=made.t[-1] - made.t[::-1], alpha=made.alpha[::-1], pose=made.pose[::-1])
     one, other = (measured.fit_log(log_of(x), harmonics=5) for x in (made, back))
     shape = one.known.loop.shape(np.arange(5.0))
-    np.testing.assert_allclose(other.known.of(shape), one.known.of(shape), atol=0.02)
+    np.testing.assert_allclose(other.known.connection(shape), one.known.connection(shape), atol=0.02)
     for k in (0, 2):
         np.testing.assert_allclose(other.displacement[0][k], -one.displacement[0][k], atol=2e-3)
 
@@ -390,13 +394,13 @@ def test_three_joints(tmp_path):
     alpha = np.broadcast_to(there, (*plane.connection.A.shape[2:], 3)).copy()
     alpha[..., 0], alpha[..., 2] = np.meshgrid(*plane.connection.axes, indexing="ij")
     reached, A = f.known.reach(alpha) <= 1, np.moveaxis(plane.connection.A, (0, 1), (-2, -1))
-    np.testing.assert_allclose(A[reached], f.known.of(alpha[reached])[..., [0, 2]], rtol=1e-9)
+    np.testing.assert_allclose(A[reached], f.known.connection(alpha[reached])[..., [0, 2]], rtol=1e-9)
     assert np.isnan(A[~reached]).all() and 0 < reached.sum() < reached.size / 4
-    thin = dataclasses.replace(f.tube, known=dataclasses.replace(f.known, spread=1e-9 * f.known.spread))
+    thin = dataclasses.replace(f.tube, taylor=dataclasses.replace(f.known, spread=1e-9 * f.known.spread))
     with pytest.raises(
         ValueError, match="do not reach the plane of alpha_2 = 0.1: slice it at a shape of the mean gait, --"
     ):
-        looked_up(thin, (0, 2), [0.0, 0.1, 0.0])
+        interpolated_plane(thin, (0, 2), [0.0, 0.1, 0.0])
 
 
 def travelling(joints, harmonics=1):
@@ -527,8 +531,8 @@ def test_the_ccf_near_the_gait_is_that_of_differences(usual):
     known, h = usual.known, 1e-5
     t = np.linspace(0.3, 6, 7)
     alpha = known.loop.shape(t) + 0.04 * known.loop.normals(t)[..., 0]
-    d = [(known.of(alpha + h * e) - known.of(alpha - h * e)) / (2 * h) for e in np.eye(2)]
-    A = known.of(alpha)
+    d = [(known.connection(alpha + h * e) - known.connection(alpha - h * e)) / (2 * h) for e in np.eye(2)]
+    A = known.connection(alpha)
     np.testing.assert_allclose(
         known.ccf(alpha), d[0][..., 1] - d[1][..., 0] + se2.bracket(A[..., 0], A[..., 1]), atol=1e-7
     )
@@ -551,7 +555,7 @@ def test_a_field_is_read_back_as_a_system(usual, field):
     file = xarray.open_dataset(field / "field.nc", engine="scipy")
     assert (file.A_error.isnull() == file.A.isnull()).all() and (file.A_error > 0).sum() == file.A.notnull().sum()
     t = np.arange(4.0)
-    np.testing.assert_allclose(usual.known.of_error(usual.known.loop.shape(t)), usual.along(t)[1], rtol=1e-6)
+    np.testing.assert_allclose(usual.known.connection_error(usual.known.loop.shape(t)), usual.along(t)[1], rtol=1e-6)
     scene = load(field / "mine.toml")
     np.testing.assert_allclose(scene.gait.cycle(64), usual.gait.cycle(64), atol=1e-12)
     assert math.isclose(scene.frequency, usual.frequency)
@@ -599,18 +603,18 @@ def test_a_field_written_before_it_had_what_is_left_is_read(field, tmp_path):
     """Its other errors are the same, and its A_error less."""
     raw = (field / "field.nc").read_bytes()
     (tmp_path / "old.nc").write_bytes(raw.replace(b"gait_off", b"old_gait"))
-    old, now = (Connection.load(x).known for x in (tmp_path / "old.nc", field / "field.nc"))
+    old, now = (Connection.load(x).taylor for x in (tmp_path / "old.nc", field / "field.nc"))
     alpha = now.loop.shape(np.arange(6.0))
-    np.testing.assert_array_equal(old.of(alpha), now.of(alpha))
-    less = old.of_error(alpha) ** 2 + (now.factor * now.off_at(np.arange(6.0))) ** 2
-    np.testing.assert_allclose(now.of_error(alpha) ** 2, less, rtol=1e-5)
-    assert (now.off > 0).any()
+    np.testing.assert_array_equal(old.connection(alpha), now.connection(alpha))
+    less = old.connection_error(alpha) ** 2 + (now.factor * now.standard_error_at(np.arange(6.0))) ** 2
+    np.testing.assert_allclose(now.connection_error(alpha) ** 2, less, rtol=1e-5)
+    assert (now.standard_error > 0).any()
 
 
 def test_a_field_written_again_keeps_every_digit(field, tmp_path):
     study = Study(load(field / "mine.toml"))
     fields.save_connection(tmp_path / "again.nc", study)
-    one, other = (Connection.load(x).known for x in (field / "field.nc", tmp_path / "again.nc"))
+    one, other = (Connection.load(x).taylor for x in (field / "field.nc", tmp_path / "again.nc"))
     for f in dataclasses.fields(one):
         a, b = (getattr(x, f.name) for x in (one, other))
         np.testing.assert_array_equal(*((a.coefficients, b.coefficients) if f.name == "loop" else (a, b)))
@@ -643,7 +647,7 @@ def test_errors_of_A_go_with_it_into_a_mat_file(field, tmp_path, sign, order):
 def test_what_an_older_file_does_not_have_is_told_all_the_same(field, tmp_path):
     (tmp_path / "old.nc").write_bytes((field / "field.nc").read_bytes().replace(b"A_error", b"a_error"))
     old, now = Table(tmp_path / "old.nc"), Table(field / "field.nc")
-    assert old.held.A_error is None
+    assert old.stored.A_error is None
     np.testing.assert_allclose(old.table("A_error"), now.table("A_error"), rtol=1e-12)
 
 
@@ -654,7 +658,7 @@ def test_lengths_and_signs_of_a_field(usual, field, tmp_path):
     two = Table(field / "field.nc", body_length=2.0)
     cycle = usual.gait.cycle(64)
     np.testing.assert_allclose(two.run(*cycle).net * [2, 2, 1], Table(field / "field.nc").run(*cycle).net, rtol=1e-9)
-    np.testing.assert_allclose(two.own_error(*cycle), Table(field / "field.nc").own_error(*cycle) * [0.5, 1])
+    np.testing.assert_allclose(two.table_error(*cycle), Table(field / "field.nc").table_error(*cycle) * [0.5, 1])
     metres = measured.fit_log(usual.log, body_length=0.3, harmonics=4)
     save_field(tmp_path / "m.nc", metres)
     table = Table(tmp_path / "m.nc")
@@ -733,7 +737,7 @@ def test_cycles_that_differ_in_size_alone_tell_the_slope_along_the_gait(viscous,
     net, off = f.displacement
     assert not f.across and (np.abs(net - true_net(f, viscous)) <= off).all() and off.max() < 4e-3
     alpha, alphadot = f.gait.cycle(12, 1.1)
-    found = np.einsum("tij,tj->ti", f.known.of(alpha), alphadot)
+    found = np.einsum("tij,tj->ti", f.known.connection(alpha), alphadot)
     at_the_gait = np.einsum("tij,tj->ti", f.along(2 * np.pi * np.arange(12) / 12)[0], alphadot)
     true = viscous(alpha, alphadot)
     assert np.square(found - true).sum() < 0.35 * np.square(at_the_gait - true).sum()

@@ -188,7 +188,7 @@ def test_what_was_loaded_is_in_its_registry_and_in_scenes(folder):
         assert library.toml(parse(again)) == again
         study = Study(scene)
         assert np.isfinite(study.study([0.3], study.methods)["direct"]).all() and "leading" in study.tiers
-    assert library.load(folder / "skate.toml").changed(grip=0.7).system.given.grip == 0.7
+    assert library.load(folder / "skate.toml").changed(grip=0.7).system.wrapped.grip == 0.7
     assert tables.load(folder / "own.json").length == 0.5
 
 

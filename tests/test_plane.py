@@ -10,7 +10,7 @@ from commands import geomech
 from geomech import Numerics, Scene, Study
 from geomech.gaits import Circle, Fourier, Wave
 from geomech.geometry import connection
-from geomech.geometry.plane import Plane, Seen, looked_up, plane
+from geomech.geometry.plane import Plane, ProjectedGait, interpolated_plane, plane
 from geomech.geometry.traits import Traits
 from geomech.geometry.two_form import spanned, spanned_by, two_form
 from geomech.output import plots
@@ -19,7 +19,7 @@ from geomech.study.choose import cheapest
 from geomech.study.shape_space import through as _held
 from geomech.systems import Swimmer
 from geomech.tiers import TIERS
-from geomech.tiers.fitted import fits, is_too_large
+from geomech.tiers.fitted import finest_grid, is_too_large
 from rft import CATALOGUE, Chain, Viscous, se2
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
@@ -87,8 +87,8 @@ def test_planes_have_the_curvature_of_the_pair(pair):
     right = system.ccf(shapes, i, j) if i < j else -system.ccf(shapes, j, i)
     np.testing.assert_allclose(np.moveaxis(cut.ccf.values, 0, -1), right, atol=1e-12)
     np.testing.assert_allclose(study.two_form.slice(i, j, at).values, cut.ccf.values, atol=1e-12)
-    np.testing.assert_allclose(looked_up(study.fitted, pair, at).connection.A, cut.connection.A, atol=1e-12)
-    assert study.plane(pair, at) is cut and cut.held == [k for k in range(3) if k not in pair]
+    np.testing.assert_allclose(interpolated_plane(study.fitted, pair, at).connection.A, cut.connection.A, atol=1e-12)
+    assert study.plane(pair, at) is cut and cut.fixed == [k for k in range(3) if k not in pair]
 
 
 def test_a_plane_is_that_of_the_whole_field_in_sand():
@@ -201,7 +201,7 @@ def test_rows_of_planes_say_what_is_held_and_gaits_cast_shadows():
     flat = Fourier(cos=((0.5,), (0.0,), (0.0,)), sin=((0.0,), (0.0,), (0.4,)), centre=(0.1, -0.2, 0.15))
     for at, lies in ((-0.2, True), (-0.1, False)):
         cut = Plane((0, 2), (0.0, at, 0.0), study.plane((0, 2)).connection)
-        assert Seen(flat, cut).lies == lies
+        assert ProjectedGait(flat, cut).lies_in_plane == lies
         fig = plots.planes_figure([cut], flat)
         assert bool(fig.get_supxlabel()) != lies
 
@@ -242,8 +242,8 @@ def test_beyond_the_field_tiers_solve_around_the_gait(monkeypatch):
         centre=(0.1, 0.2, 0.0, -0.1),
     )
     scene = Scene(Sandy(), gait, Numerics(grid=10, extent=1.0, interpolation=5, directions=64))
-    looked_up, asked = Study(scene), ([0.5, 0.9], ["area", "path", "direct"])
-    found = looked_up.study(*asked)
+    tabulated, asked = Study(scene), ([0.5, 0.9], ["area", "path", "direct"])
+    found = tabulated.study(*asked)
     assert "field" in found["seconds"]
     monkeypatch.setattr("geomech.tiers.fitted.FIELD", 9_999)
     study = Study(scene)
@@ -298,7 +298,7 @@ def test_what_hangs_on_the_surface_is_part_of_every_estimate(monkeypatch):
     assert table["estimate"]["area"][0] == 0.3 and 1e-6 < table["estimate"]["area"][1] < 0.3
     assert table["estimate_heading"]["area"] == [0.2, 0.4] == table["surface_spread_heading"]["area"]
     monkeypatch.setitem(TIERS._parts, "adapted", planned(TIERS["adapted"], balances=lambda *asked: 10**8))
-    monkeypatch.setattr("geomech.study.choose.solved", lambda *asked: 10**9)
+    monkeypatch.setattr("geomech.study.choose.solved_phases", lambda *asked: 10**9)
     assert cheapest(scene, [0.4, 0.5], 0.02)["tier"] != "area"
     monkeypatch.setitem(TIERS._parts, "area", planned(TIERS["area"], spread=lambda *asked: np.full((2, 2), 0.01)))
     found = cheapest(scene, [0.4, 0.5], 0.02)
@@ -313,7 +313,11 @@ def planned(tier, **changes):
 def test_three_joints_keep_their_field_and_more_have_one_that_fits():
     three, four = Cubic(), Sandy()
     assert not any(is_too_large(three, Numerics(grid=n)) for n in (31, 61))
-    assert [is_too_large(four, Numerics(grid=n)) for n in (13, 15)] == [False, True] and fits(4) == 13 and fits(5) == 7
+    assert (
+        [is_too_large(four, Numerics(grid=n)) for n in (13, 15)] == [False, True]
+        and finest_grid(4) == 13
+        and finest_grid(5) == 7
+    )
     chain = Swimmer(Viscous(2.0), Chain((1,) * 5))
     with pytest.raises(ValueError, match=r"a frame on a grid of 15\^4 shapes is too large: lower \[numerics\] grid"):
         framed(chain, Numerics(grid=15))
@@ -337,8 +341,8 @@ def test_a_surface_says_what_its_shades_mean():
     study = Study(Scene(Cubic(), LOOP, Numerics(grid=6, extent=1.2)))
     flat = Fourier(cos=((0.5,), (0.0,), (0.0,)), sin=((0.0,), (0.0,), (0.4,)), centre=(0.1, -0.2, 0.15))
     cut = study.plane((0, 2))
-    drawn = plots.ccf_surface(cut.ccf, 1, [Seen(flat, cut)])
-    signs = np.sign(cut.ccf(Seen(flat, cut).shape(np.linspace(0, 6, 50), np.linspace(0, 1, 9)))[..., 1])
+    drawn = plots.ccf_surface(cut.ccf, 1, [ProjectedGait(flat, cut)])
+    signs = np.sign(cut.ccf(ProjectedGait(flat, cut).shape(np.linspace(0, 6, 50), np.linspace(0, 1, 9)))[..., 1])
     found = [text.get_text() for text in drawn.get_legend().get_texts()]
     assert found == [way for sign, way in ((1, "to the left"), (-1, "to the right")) if (sign * signs > 0).any()]
 

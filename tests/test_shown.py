@@ -267,9 +267,9 @@ class Kept:
 
     kind, joints, length = "kept", 2, 0.42
 
-    near = ""
+    near_gait = ""
 
-    def own_error(self, alpha, alphadot):
+    def table_error(self, alpha, alphadot):
         return np.zeros((*alpha.shape[:-2], 2))
 
     def table(self, name):

@@ -12,7 +12,7 @@ from geomech import scene as scenes
 from geomech import symbolic
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection, coordinates
-from geomech.geometry.connection import crossed
+from geomech.geometry.connection import sign_changes
 from geomech.geometry.traits import Traits
 from geomech.scene import Scene
 from geomech.study import cost, estimate, fields
@@ -20,7 +20,7 @@ from geomech.study.single import single
 from geomech.study.study import Study
 from geomech.systems import KINDS, NoSlipSnake, Swimmer
 from geomech.systems.base import kind_of, length_unit
-from geomech.systems.capabilities import stored
+from geomech.systems.capabilities import stored_table
 from geomech.systems.framed import in_frame
 from geomech.systems.swimmer import Solver, is_three_link
 from geomech.text.explain import explain
@@ -182,7 +182,9 @@ def test_what_a_system_says_of_itself_holds(name):
     linear = np.abs(np.einsum("bij,bj->bi", columns, alphadot) - xi).max() < 1e-9 * np.abs(columns).max()
     assert linear == system.traits.linear
     assert length_unit(system) == "m"
-    if system.traits.mirror and not stored(system, "connection"):  # a cart has one frame, a table that it was made in
+    if system.traits.mirror and not stored_table(
+        system, "connection"
+    ):  # a cart has one frame, a table that it was made in
         assert in_frame(system, "link-2").traits.frame == "link-2"
     assert KINDS[kind_of(system)] is type(system)
     scene = Scene(system, AWAY)
@@ -219,9 +221,9 @@ def test_three_links_are_a_chain_of_three_and_nothing_else():
 
 
 def test_points_on_either_side_of_a_change_of_sign_are_crossed():
-    assert crossed(np.array([-2.0, -1.0, 1.0, 2.0, 0.0, 3.0])).tolist() == [False, True, True, False, True, False]
+    assert sign_changes(np.array([-2.0, -1.0, 1.0, 2.0, 0.0, 3.0])).tolist() == [False, True, True, False, True, False]
     plane = np.array([[1.0, 2.0, 3.0], [1.0, -2.0, 3.0], [1.0, 2.0, 3.0]])
-    assert crossed(plane).tolist() == [[False, True, False], [True, True, True], [False, True, False]]
+    assert sign_changes(plane).tolist() == [[False, True, False], [True, True, True], [False, True, False]]
 
 
 @pytest.mark.parametrize(

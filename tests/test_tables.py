@@ -68,7 +68,7 @@ def test_netcdf_gives_back_every_digit(made):
     held = tables.load(folder / "a.nc")
     np.testing.assert_array_equal(held.harmonics.coefficients, s.table("harmonic").coefficients)
     np.testing.assert_array_equal(held.harmonics.residual, s.table("harmonic").residual)
-    assert (held.length, held.unit, held.frame, held.sign, held.said) == (0.3, "m", "link-1", "+", ())
+    assert (held.length, held.unit, held.frame, held.sign, held.assumptions) == (0.3, "m", "link-1", "+", ())
     assert held.mirror and not tables.load(folder / "a.mat").harmonics
 
 
@@ -163,10 +163,10 @@ def test_intervals_of_a_table_of_ones_own_are_kept_and_part_of_its_error(ending,
         np.testing.assert_array_equal(again.A_error, error)
         assert again.level == 0.9
     cycle = GAIT.cycle(64, 0.7)
-    plain = dataclasses.replace(table.scene.system.held, A_error=None)
-    whole = table.scene.system.own_error(*cycle)
-    object.__setattr__(table.scene.system, "held", plain)
-    more = whole - table.scene.system.own_error(*cycle)
+    plain = dataclasses.replace(table.scene.system.stored, A_error=None)
+    whole = table.scene.system.table_error(*cycle)
+    object.__setattr__(table.scene.system, "stored", plain)
+    more = whole - table.scene.system.table_error(*cycle)
     path_length = 2 * np.pi * np.linalg.norm(cycle[1], axis=-1).mean()
     low, high = (
         np.sqrt(2) * 0.01 * k * path_length for k in (1.0, 2.0)
@@ -204,12 +204,12 @@ def test_the_sign_of_a_bare_mat_file_is_made_out(frame, medium, tmp_path):
         plain_mat(tmp_path / "a.mat", c, sign, order)
         held = tables.load(tmp_path / "a.mat")
         assert (held.sign, held.order) == ("+" if sign > 0 else "-", order)
-        assert "its sign is made out as xi = " + held.sign in held.said[-1]
+        assert "its sign is made out as xi = " + held.sign in held.assumptions[-1]
         np.testing.assert_array_equal(held.connection.A, c.A)
-        assert np.isnan(held.connection.residual).all() and not held.told
+        assert np.isnan(held.connection.residual).all() and not held.has_residual
         told = tables.load(tmp_path / "a.mat", sign="+")
         np.testing.assert_array_equal(told.connection.A, sign * c.A)
-        assert not [line for line in told.said if "sign" in line]
+        assert not [line for line in told.assumptions if "sign" in line]
 
 
 @pytest.mark.parametrize(
@@ -358,9 +358,9 @@ def test_a_bare_mat_file_becomes_netcdf_that_says_what_it_does_not_know(made, tm
     fields.save_connection(tmp_path / "a.nc", bare)
     held = tables.load(tmp_path / "a.nc")
     np.testing.assert_array_equal(held.connection.A, made[1].fitted.A)
-    assert not held.told and "fit residual unknown" in repr(held.connection)
+    assert not held.has_residual and "fit residual unknown" in repr(held.connection)
     mat.save_connection(tmp_path / "b.mat", bare)
-    assert not tables.load(tmp_path / "b.mat").told
+    assert not tables.load(tmp_path / "b.mat").has_residual
 
 
 def test_every_command_works_on_a_table_or_says_why_not(made, tmp_path, monkeypatch):
@@ -438,15 +438,15 @@ def test_lengths_that_a_file_does_not_tell_are_assumed_in_a_note(made, tmp_path,
         told = [line for line in bare.assumed if "body_length" in line]
         assert told == [LENGTHS] and LENGTHS in described(bare)
         assert (length_unit(bare), bare.length) == ("BL", 1.0)
-        assert (bare.held.connection.unit, bare.held.connection.length) == ("BL", 1.0)
+        assert (bare.stored.connection.unit, bare.stored.connection.length) == ("BL", 1.0)
         assert (Connection.load(file).unit, Connection.load(file).length) == ("length", None)
         for length in (1.0, 3.0):
             said = Table(file, body_length=length)
             assert not [line for line in said.assumed if "body_length" in line] and LENGTHS not in described(said)
-            np.testing.assert_allclose(said.held.connection.A[0] * length, bare.held.connection.A[0], rtol=1e-13)
+            np.testing.assert_allclose(said.stored.connection.A[0] * length, bare.stored.connection.A[0], rtol=1e-13)
     for file in ("a.nc", "a.mat"):
         whole = Table(folder / file)
-        assert whole.assumed == () and (whole.held.connection.unit, whole.held.connection.length) == ("m", 0.3)
+        assert whole.assumed == () and (whole.stored.connection.unit, whole.stored.connection.length) == ("m", 0.3)
     (tmp_path / "a.toml").write_text('[system]\nkind = "table"\nfile = "a.mat"\n[gait]\nkind = "circle"\n')
     assert scenes.load(tmp_path / "a.toml").system.body_length is None
     noted = capsys.readouterr().err.splitlines()
@@ -667,7 +667,7 @@ def test_what_accuracy_costs_includes_the_tables_own_error(made, monkeypatch):
     monkeypatch.setattr(tiered, "KNOBS", [k for k in tiered.KNOBS if k.label == "direct: phases"])
     found = accuracy.study(scene, runs=1)
     amplitudes = np.array(found["amplitudes"])
-    own = scene.system.own_error(*GAIT.cycle(64, amplitudes))[:, 0].max()
+    own = scene.system.table_error(*GAIT.cycle(64, amplitudes))[:, 0].max()
     assert found["own_error"] == own and 1e-4 < own < 0.1
     assert {c["tier"] is None for c in found["cheapest"] if c["tolerance"] < own} == {True}
     assert all(own < c["error"] <= c["tolerance"] for c in found["cheapest"] if c["tier"])

@@ -35,10 +35,10 @@ def load_scene(name: str | Scene, grid: int | None = None, extent: float | None 
     """Return the scene of that name, or one that is loaded, with the options of its field, in the medium of a file if one is
     given."""
     from geomech.scene import in_medium
-    from geomech.systems.capabilities import stored
+    from geomech.systems.capabilities import stored_table
 
     scene = load_with_gait(name)
-    file_field = stored(scene.system, "connection")
+    file_field = stored_table(scene.system, "connection")
     if (grid, extent) != (None, None) and file_field:
         raise Refusal(
             "the field of a table has its file's own grid", where=scene.name, instead="drop --grid and --extent"

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from geomech import terminal
 from geomech.core.errors import Note
-from geomech.io.files import note, refuse_inputs, whole_file, whole_folder
+from geomech.io.files import atomic_file, atomic_folder, note, refuse_inputs
 from rft.refusal import Refusal
 
 if TYPE_CHECKING:  # commands start without NumPy
@@ -113,12 +113,12 @@ def _check_outputs(outputs: list[Output], inputs: list[Path]) -> None:
     refuse_inputs(files, inputs)
     for k, path in enumerate(files):
         refuse_inputs([path], files[:k])
-        with contextlib.suppress(_Unused), whole_file(path):
+        with contextlib.suppress(_Unused), atomic_file(path):
             raise _Unused
 
 
 class _Unused(Exception):
-    """Leaves `whole_file` without writing."""
+    """Leaves `atomic_file` without writing."""
 
 
 @contextlib.contextmanager
@@ -160,7 +160,7 @@ def storing(question: Question, output: Path | None, inputs: list[Path]) -> Iter
 
 def _place(output: Output, inputs: list[Path], stack: contextlib.ExitStack) -> Path:
     """Return the path to write to: a folder is filled elsewhere, and appears whole or not at all."""
-    return stack.enter_context(whole_folder(output.path, inputs)) if output.folder else output.path
+    return stack.enter_context(atomic_folder(output.path, inputs)) if output.folder else output.path
 
 
 def _print(result: Result, outputs: list[Output], as_json: bool) -> None:

@@ -1,1 +1,1 @@
-"""What all of geomech rests on, and nothing of its subject."""
+"""Foundations of geomech that know nothing of mechanics: refusals, notes, parts, results."""

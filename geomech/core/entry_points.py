@@ -10,27 +10,27 @@ from rft.refusal import Refusal, located
 from rft.registry import Registry
 
 
-def offered(registry: Registry) -> dict[str, list[EntryPoint]]:
-    """Return what installed packages offer, by name, not loaded."""
-    found: dict[str, list] = {}
+def installed_entries(registry: Registry) -> dict[str, list[EntryPoint]]:
+    """Return the entry points that installed packages declare for a registry, by name, not loaded."""
+    entries: dict[str, list] = {}
     for entry in importlib.metadata.entry_points(group=registry.group):
-        found.setdefault(entry.name, []).append(entry)
-    return found
+        entries.setdefault(entry.name, []).append(entry)
+    return entries
 
 
 def unloaded(registry: Registry) -> tuple[dict[str, str], dict[str, str]]:
-    """Return names that installed packages offer and nobody has asked for yet, with their packages: new ones, and those
-    that are refused because one of that name is built in."""
-    packages = {name: " and ".join(map(_package, entries)) for name, entries in offered(registry).items()}
+    """Return parts of installed packages that are not loaded yet, by name, with their packages: new ones, and those
+    that are refused because a built-in part has their name."""
+    packages = {name: " and ".join(map(_package, entries)) for name, entries in installed_entries(registry).items()}
     new = {name: package for name, package in packages.items() if name not in registry}
     return new, {name: package for name, package in packages.items() if name in registry.built_in}
 
 
 def choose_part(registry: Registry, where: str, word: object) -> str:
-    """Return word if it names a part, or one that an installed package offers, which is then loaded; else Refusal."""
+    """Return word if it names a part, or one of an installed package, which is then loaded; else raise Refusal."""
     if isinstance(word, str) and word in registry:
         return word
-    packages = offered(registry)
+    packages = installed_entries(registry)
     try:
         name = choose(where, word, [*registry, *packages])
     except Refusal as error:
@@ -42,16 +42,16 @@ def choose_part(registry: Registry, where: str, word: object) -> str:
 
 
 def _load(registry: Registry, where: str, name: str, entries: list[EntryPoint]) -> None:
-    who = " and ".join(map(_package, entries))
+    packages = " and ".join(map(_package, entries))
     if len(entries) > 1:
-        raise Refusal(f"{name!r} is offered by {who}", where=where, instead="uninstall one")
+        raise Refusal(f"{name!r} is offered by {packages}", where=where, instead="uninstall one")
     try:
         part = entries[0].load()
     except (Exception, SystemExit) as error:
         raise Refusal(
-            f"{name!r} of {who} cannot be loaded", where=where, because=f"{type(error).__name__}: {error}"
+            f"{name!r} of {packages} cannot be loaded", where=where, because=f"{type(error).__name__}: {error}"
         ) from error
-    with located(where), located(f"{name!r} of {who}"):
+    with located(where), located(f"{name!r} of {packages}"):
         if not registry.admits(part):
             raise Refusal(f"{getattr(part, '__name__', part)} is not {registry.noun}")
         if getattr(part, registry.key, name) != name:

@@ -11,7 +11,7 @@ from rft.refusal import Refusal, formatted
 
 
 class Note(UserWarning):
-    """Something that is done as asked and is likely not meant; on the command line a line on standard error."""
+    """A warning that something is likely not meant, though it is done; on the command line a line on standard error."""
 
 
 class UnitWarning(Note):
@@ -19,28 +19,28 @@ class UnitWarning(Note):
 
 
 class VelocityWarning(Note):
-    """A velocity that lacks what a local connection rests on."""
+    """A velocity lacks a premise of a local connection."""
 
 
 FULL_TURN = 2 * math.pi * (1 + 1e-9)
 
 
-def check_angle(what: str, largest: float) -> None:
-    """UnitWarning if an angle in rad is beyond a full turn."""
+def check_angle(name: str, largest: float) -> None:
+    """Warn (`UnitWarning`) if an angle in rad is beyond a full turn."""
     if largest > FULL_TURN:
         warnings.warn(
-            f"{what} of {largest:.4g} rad is beyond a full turn, 2 pi: if that is in degrees, give {largest:.4g}deg on "
+            f"{name} of {largest:.4g} rad is beyond a full turn, 2 pi: if that is in degrees, give {largest:.4g}deg on "
             f"the command line, a key that ends in _deg in a scene, or {math.radians(largest):.4g} rad",
             UnitWarning,
             stacklevel=3,
         )
 
 
-def choose(place: str, word: object, known: Iterable[str]) -> str:
-    """Return word if it is one of the known; Refusal with the nearest if not."""
-    known = list(known)
-    if isinstance(word, str) and word in known:
+def choose(place: str, word: object, choices: Iterable[str]) -> str:
+    """Return word if it is one of the choices; else raise Refusal with the nearest."""
+    choices = list(choices)
+    if isinstance(word, str) and word in choices:
         return word
-    near = difflib.get_close_matches(str(word), known, 1, 0.5)
-    instead = f"did you mean {near[0]!r}?" if near else f"use one of {', '.join(known)}"
+    nearest = difflib.get_close_matches(str(word), choices, 1, 0.5)
+    instead = f"did you mean {nearest[0]!r}?" if nearest else f"use one of {', '.join(choices)}"
     raise Refusal(f"{formatted(word)} is unknown", where=place, instead=instead)

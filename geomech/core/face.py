@@ -1,6 +1,7 @@
-"""Methods of values that their classes do not need to know: how they are shown, saved and loaded.
+"""Methods that other modules add to values: how a notebook shows them, how they are saved and loaded.
 
-`geomech.face` registers them as the package is imported, before any value's class exists; the classes know none of them.
+`geomech.face` registers them as the package is imported, before the classes of the values exist; the classes do not
+depend on them.
 """
 
 from __future__ import annotations
@@ -10,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 METHODS: dict[str, dict[str, Any]] = {}  # by the name of a class
 
 
-class Faced:
-    """Base of a value whose class takes the methods that are registered under its name."""
+class Extensible:
+    """Base of a value whose class receives the methods that are registered under its name."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)

@@ -10,9 +10,10 @@ ROUNDING = 1e-13  # errors below this are rounding, and say nothing about a knob
 
 @dataclass(frozen=True)
 class Knob:
-    """One approximation. order: of the error in 1/value, in value where that falls, as theory gives it. buys: what turning it
-    up buys, to complete a sentence. against: "truth", or "limit" of the knob alone. setting: the name of an entry of
-    [numerics], where that is not the knob's; loads for rules, whose prefix is ``rule``. tier: whose it is."""
+    """A numerical setting that an error study varies from coarse to fine. order: of the error in 1/value, or in value
+    where that falls, as theory gives it. buys: what a finer value improves, to complete a sentence. against: "truth",
+    or "limit" of the setting alone. setting: the name of an entry of [numerics], where that is not the knob's; loads
+    for rules, whose prefix is ``rule``. tier: to which it belongs."""
 
     name: str
     values: tuple

@@ -1,4 +1,4 @@
-"""What a value says of itself in a line: shapes, ranges, units, and what a fit left."""
+"""One-line descriptions of values: shapes, ranges, units, and residuals of fits."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ ROWS = ("x", "y", "theta")
 
 
 def part(kind: str, thing) -> str:
-    """Return a part of a scene with its numbers, as a scene has them; a covariance only where there is one."""
+    """Return the kind and the numbers of a part of a scene, as a scene has them; a covariance only where there is
+    one."""
     names = [f.name for f in dataclasses.fields(thing)] if dataclasses.is_dataclass(thing) else []
     given = [name for name in names if name != "covariance" or thing.covariance is not None]
     values = [f"{name} = {formatted(getattr(thing, name))}" for name in given]
@@ -21,17 +22,17 @@ def part(kind: str, thing) -> str:
 
 
 def grid(axes: Sequence[np.ndarray]) -> str:
-    """Its shapes and their ranges."""
+    """Return the shape of a grid and the ranges of its axes."""
     ranges = [f"{a[0]:.4g} to {a[-1]:.4g}" for a in axes]
-    alike = len(set(ranges)) == 1 and len(ranges) > 1
+    equal = len(set(ranges)) == 1 and len(ranges) > 1
     names = [f"alpha_{k + 1}" for k in range(len(axes))]
-    told = f"{names[0]}{' and ' if len(names) == 2 else ' to '}{names[-1]} from {ranges[0]}" if alike else ""
-    told = told or ", ".join(f"{name} from {r}" for name, r in zip(names, ranges))
-    return f"{' x '.join(str(len(a)) for a in axes)} shapes, {told} rad"
+    described = f"{names[0]}{' and ' if len(names) == 2 else ' to '}{names[-1]} from {ranges[0]}" if equal else ""
+    described = described or ", ".join(f"{name} from {r}" for name, r in zip(names, ranges))
+    return f"{' x '.join(str(len(a)) for a in axes)} shapes, {described} rad"
 
 
 def span(values) -> str:
-    """Smallest and largest of the numbers; "nothing" without any."""
+    """Return the smallest and the largest of the numbers; "nothing" without any."""
     values = np.asarray(values, float)
     values = values[np.isfinite(values)]
     if not values.size:
@@ -41,18 +42,18 @@ def span(values) -> str:
 
 
 def spans(values) -> str:
-    """`span` of each of x, y and theta, on the first axis."""
+    """Return `span` of each of x, y and theta, on the first axis."""
     return ", ".join(f"{row} {span(v)}" for row, v in zip(ROWS, values))
 
 
 def masked(values) -> str:
-    """How many shapes are singular, to be added; empty if none is."""
+    """Return the number of singular shapes as an addition to a line; empty if none is."""
     count = int(np.isnan(np.asarray(values)).any(0).sum())
     return f"; {count} singular" if count else ""
 
 
-def left(residual, speed) -> str:
-    """What a fit left of each component, rms over all shapes, over the rms of xi."""
+def fit_residual(residual, speed) -> str:
+    """Return the residual of a fit by component, rms over all shapes, over the rms of xi."""
     if np.isnan(residual).all():
         return "fit residual unknown"
     parts = [np.sqrt(np.nanmean(r**2) / max(np.nanmean(s**2), 1e-300)) for r, s in zip(residual, speed)]
@@ -64,12 +65,12 @@ def _percent(x: float) -> str:
 
 
 def lengths(unit: str, length: float | None) -> str:
-    """The unit of lengths and the body's length, to be added; empty where nothing says them."""
+    """Return the unit of lengths and the body's length as an addition to a line; empty where they are unknown."""
     if length is None:
         return ""
     return f"; lengths in {unit}" + (f", the body's {length:g}" if unit != "BL" else "")
 
 
 def poses(values) -> str:
-    """The ranges of x, y and theta of poses or velocities (..., 3)."""
+    """Return the ranges of x, y and theta of poses or velocities (..., 3)."""
     return spans(np.moveaxis(np.round(np.asarray(values, float).reshape(-1, 3), 12) + 0.0, -1, 0))

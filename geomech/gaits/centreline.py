@@ -19,12 +19,12 @@ from rft.refusal import Refusal
 
 LARGEST_GAP = 0.25  # of the period, between neighbouring frames
 UNEQUAL = 0.05  # spread of the frames' spacing, over its mean, that still counts as equal
-ALIKE = 0.1  # share of the headings' squares that differ, below which the body does the same again; noise is less
+REPEATED = 0.1  # share of the headings' squares that differ, below which the body does the same again; noise is less
 PLACES = 240  # of the period, at which that is looked for
 LONGEST = 0.75  # of the period: what repeats later has too little left to compare
 FURTHER = 1.5  # times the largest move between neighbouring frames, that a last one beyond the period is from the first
 BACKWARDS = 1.0  # rad of phase along the body, by which a wave surely runs from the tail to the head
-OFF = 0.05  # of a period, by which the frequency may contradict the file
+FREQUENCY_TOLERANCE = 0.05  # of a period, by which the frequency may contradict the file
 
 
 @GAITS.register
@@ -110,26 +110,26 @@ class Centreline(Gait):
 
     @property
     def harmonics(self) -> int:
-        """The highest kept; 1 for a spline, which has no highest."""
+        """The highest harmonic of the series; 1 for a spline, which has no highest."""
         return max(1, self.keep_harmonics)
 
     def _through(self, data: frames.Frames, phase: np.ndarray, bends: np.ndarray):
-        """Function of phases (T...) and the order of derivative that gives the bends (T..., joints)."""
+        """Return a function of phases (T...) and the order of derivative that gives the bends (T..., joints)."""
         from scipy.interpolate import CubicSpline
 
-        _check_turned(data, bends)
+        _check_order(data, bends)
         # Two frames a wave, in the widest gap too: then the least squares are well posed.
         most = min((len(bends) - 1) // 2, int(np.pi / np.diff(phase).max() * (1 + 1e-9)))
         if self.keep_harmonics not in range(most + 1):
-            told = f"keep_harmonics must be a whole number from 0 to {most} for these {len(bends)} frames"
-            raise data.wrong(told, value=self.keep_harmonics)
+            message = f"keep_harmonics must be a whole number from 0 to {most} for these {len(bends)} frames"
+            raise data.wrong(message, value=self.keep_harmonics)
         if not self.keep_harmonics:
             return CubicSpline(phase, np.concatenate([bends, bends[:1]]), bc_type="periodic")
         return partial(_series, np.linalg.lstsq(_waves(phase[:-1], self.keep_harmonics, 0), bends, rcond=None)[0])
 
     def _note(self, data: frames.Frames, period: float, phase: np.ndarray, bends: np.ndarray) -> None:
         """Warn of a wave that runs to the head, and of a period that is not that of the frequency."""
-        if self.frequency and data.timed and abs(period * self.frequency - 1) > OFF:
+        if self.frequency and data.timed and abs(period * self.frequency - 1) > FREQUENCY_TOLERANCE:
             warnings.warn(
                 f"{data.name}: the period is {period:.4g} in t, and frequency = {self.frequency:g} Hz makes it "
                 f"{1 / self.frequency:.4g} s: mend one if t is in s, or call the column frame or phase",
@@ -165,7 +165,7 @@ def _series(fitted: np.ndarray, t: np.ndarray, order: int) -> np.ndarray:
 
 
 def _waves(t: np.ndarray, harmonics: int, order: int) -> np.ndarray:
-    """1, cos t, cos 2t, ..., sin t, sin 2t, ... or, order 1, their derivatives: (..., 2 harmonics + 1)."""
+    """Return 1, cos t, cos 2t, ..., sin t, sin 2t, ... or, order 1, their derivatives: (..., 2 harmonics + 1)."""
     k = np.arange(1, harmonics + 1)
     kt = t[..., None] * k
     one = np.full((*t.shape, 1), 1.0 - order)
@@ -174,13 +174,13 @@ def _waves(t: np.ndarray, harmonics: int, order: int) -> np.ndarray:
 
 
 def one_period(data: frames.Frames, bends: np.ndarray, period: float | None) -> tuple[np.ndarray, np.ndarray]:
-    """Phases (N + 1,) from 0 to 2 pi and the bends (N, joints) at all but the last; ValueError if the frames do not
+    """Return phases (N + 1,) from 0 to 2 pi and the bends (N, joints) at all but the last; Refusal if the frames do not
     make up one period. A frame that repeats the first is left out."""
     t, moves = data.t - data.t[0], np.abs(np.diff(bends, axis=0)).max(1)
-    back = np.abs(bends[-1] - bends[0]).max()
+    closing_gap = np.abs(bends[-1] - bends[0]).max()
     if period is None:
-        repeats = back <= 0.1 * np.median(moves)
-        period = t[-1] if repeats else _inferred(data, t, moves, back)
+        repeats = closing_gap <= 0.1 * np.median(moves)
+        period = t[-1] if repeats else _inferred(data, t, moves, closing_gap)
     else:
         repeats = abs(t[-1] - period) <= 1e-6 * period
         if t[-1] > period and not repeats:
@@ -192,10 +192,10 @@ def one_period(data: frames.Frames, bends: np.ndarray, period: float | None) -> 
     gaps = np.diff(t, append=period) / period
     _check_gaps(data, gaps)
     allowed = moves.max() if repeats else 3 * moves.max() * max(1.0, gaps[-1] / gaps[:-1].max())
-    if back > allowed + 1e-9:
+    if closing_gap > allowed + 1e-9:
         raise data.wrong(
             "the gait does not close",
-            because=f"bends of the first and the last frame differ by up to {back:.2g} rad, those of neighbouring "
+            because=f"bends of the first and the last frame differ by up to {closing_gap:.2g} rad, those of neighbouring "
             f"frames by up to {moves.max():.2g}",
             instead="keep just one period, or give the right period",
         )
@@ -203,13 +203,14 @@ def one_period(data: frames.Frames, bends: np.ndarray, period: float | None) -> 
 
 
 def _headings(bends: np.ndarray) -> np.ndarray:
-    """(N, joints + 1): headings of the elements from bends (N, joints), less their mean, in which noise is far less."""
+    """Return (N, joints + 1): headings of the elements from bends (N, joints), less their mean, in which noise is far
+    less."""
     heading = np.cumsum(np.pad(bends, ((0, 0), (1, 0))), 1)
     return heading - heading.mean(1, keepdims=True)
 
 
 def _check_once(data: frames.Frames, period: float, phase: np.ndarray, bends: np.ndarray) -> None:
-    """ValueError if the body does the same again within the period."""
+    """Raise Refusal if the body repeats its motion within the period."""
     from scipy.interpolate import CubicSpline
 
     heading = _headings(bends)
@@ -221,18 +222,18 @@ def _check_once(data: frames.Frames, period: float, phase: np.ndarray, bends: np
         ends = square[k:].mean(), square[:-k].mean()
         if min(ends) > 0.5 * square.mean():  # neither is a pause
             differ[k] = ((shape[k:] - shape[:-k]) ** 2).sum(1).mean() / sum(ends)
-    again = np.flatnonzero((differ < ALIKE) & (np.maximum.accumulate(differ) > 0.5))
-    if again.size:
-        lag = (again[0] + int((np.diff(differ[again[0] :]) > 0).argmax())) / PLACES
+    repeats = np.flatnonzero((differ < REPEATED) & (np.maximum.accumulate(differ) > 0.5))
+    if repeats.size:
+        lag = (repeats[0] + int((np.diff(differ[repeats[0] :]) > 0).argmax())) / PLACES
         raise data.wrong(
             f"the body does the same again after {lag * period:.3g} in t, {1 / lag:.2g} times in the period of {period:.4g}",
             instead="give the frames of just one period",
         )
-    off, moves = _size(heading - heading[0]), _size(np.diff(heading, axis=0))
-    near = int(off.argmax()) + int(off[off.argmax() :].argmin())
-    if off[near] < 0.5 * off[-1] and off[-1] > FURTHER * moves.max():
+    distance, moves = _size(heading - heading[0]), _size(np.diff(heading, axis=0))
+    closest = int(distance.argmax()) + int(distance[distance.argmax() :].argmin())
+    if distance[closest] < 0.5 * distance[-1] and distance[-1] > FURTHER * moves.max():
         raise data.wrong(
-            f"the frame at t = {data.t[near]:g} repeats the first, and {len(off) - 1 - near} more come after it",
+            f"the frame at t = {data.t[closest]:g} repeats the first, and {len(distance) - 1 - closest} more come after it",
             instead="give the frames of just one period",
         )
 
@@ -241,26 +242,27 @@ def _size(heading: np.ndarray) -> np.ndarray:
     return np.sqrt((heading**2).mean(1))
 
 
-def _inferred(data: frames.Frames, t, moves, back) -> float:
-    """The period of equally spaced frames of which the last is one spacing before the first comes again."""
+def _inferred(data: frames.Frames, t, moves, closing_gap) -> float:
+    """Return the period of equally spaced frames of which the last is one spacing before the first repeats."""
     if np.ptp(np.diff(t)) > UNEQUAL * t[-1] / (len(t) - 1):
         raise data.wrong(
             "the last frame does not repeat the first, and they are not equally spaced in t", instead="give period"
         )
-    if back < moves.min() / 3:
+    if closing_gap < moves.min() / 3:
         raise data.wrong(
-            f"the last frame all but repeats the first (bends differ by up to {back:.2g} rad, "
+            f"the last frame all but repeats the first (bends differ by up to {closing_gap:.2g} rad, "
             f"those of neighbouring frames by {moves.min():.2g} or more)",
             instead="give period",
         )
     return t[-1] * len(t) / (len(t) - 1)
 
 
-def _check_turned(data: frames.Frames, bends: np.ndarray) -> None:
-    """A frame whose points run from the head to the tail has the bends of its neighbours in reverse, with the other sign."""
+def _check_order(data: frames.Frames, bends: np.ndarray) -> None:
+    """Raise Refusal for a frame whose points run from the head to the tail: it has the bends of its neighbours in
+    reverse, with the other sign."""
     between = (np.roll(bends, 1, 0) + np.roll(bends, -1, 0)) / 2
-    off, off_turned = (np.abs(x - between).max(1) for x in (bends, -bends[:, ::-1]))
-    if (bad := np.flatnonzero(3 * off_turned < off)).size:
+    distance, reversed_distance = (np.abs(x - between).max(1) for x in (bends, -bends[:, ::-1]))
+    if (bad := np.flatnonzero(3 * reversed_distance < distance)).size:
         raise data.wrong(
             f"the frame at t = {data.t[bad[0]]:g} seems to run from head to tail", instead="turn its rows round"
         )

@@ -18,7 +18,7 @@ class Series(Gait):
     """unit_j(t) = sum_k cos_jk cos(k t) + sin_jk sin(k t), k = 1, 2 ...; subclasses give `coefficients`."""
 
     def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
-        """(cos, sin), each (joints, K)."""
+        """Return the coefficients (cos, sin), each (joints, K)."""
         raise TypeError(f"{type(self).__name__} gives no coefficients")
 
     @property
@@ -27,7 +27,7 @@ class Series(Gait):
 
     @property
     def harmonics(self) -> int:
-        """The highest."""
+        """The highest harmonic of the series."""
         return self.coefficients()[0].shape[1]
 
     def unit(self, t) -> np.ndarray:

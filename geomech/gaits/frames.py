@@ -39,17 +39,17 @@ class Frames:
     timed: bool = True
 
     def wrong(self, what: str, row: int | None = None, **facts: Any) -> Refusal:
-        """Return what to raise if something is wrong in a row, or in the whole file. facts: as `Refusal` has them."""
+        """Return the refusal of a row, or of the whole file. facts: as of `Refusal`."""
         return Refusal(what, where=self.name if row is None else f"{self.name}, line {self.lines[row]}", **facts)
 
     @property
     def counts(self) -> np.ndarray:
-        """Rows of each frame, (F,)."""
+        """Numbers of rows of each frame, (F,)."""
         return np.diff(self.starts, append=len(self.rows))
 
 
 def read(path: str | Path) -> Frames:
-    """The frames of a CSV file; ValueError, one line, if it has none that can be used."""
+    """Return the frames of a CSV file; Refusal if it has none that can be used."""
     source = read_rows(path, LARGEST_FILE, "file must be a CSV file of one period")
     columns = _header(source)
     rows = source.numbers(columns)
@@ -66,15 +66,15 @@ def read(path: str | Path) -> Frames:
 
 
 def _header(rows: Rows) -> tuple[str, ...]:
-    """The columns, with t for what stands there for it. What is found instead is quoted only if it has two of their names:
-    another file's first line may be nobody's business."""
+    """Return the columns, with t for the column in its place. A wrong header is quoted only if it has two of their
+    names: another file's first line may be private."""
     line, columns = rows.header
     columns = ("t", *columns[1:]) if columns[0] in UNTIMED else columns
     if columns not in HEADERS:
-        known = " or ".join(",".join(h) for h in HEADERS)
+        headers = " or ".join(",".join(h) for h in HEADERS)
         quoted = rows.filled[0][1][:40] if rows.filled else ""
-        found = f", got {quoted!r}" if len(set(itertools.chain(*HEADERS)) & set(columns)) > 1 else ""
-        raise Refusal(f"the header must be {known}{found}", where=f"{rows.name}, line {line}")
+        received = f", got {quoted!r}" if len(set(itertools.chain(*HEADERS)) & set(columns)) > 1 else ""
+        raise Refusal(f"the header must be {headers}{received}", where=f"{rows.name}, line {line}")
     return columns
 
 
@@ -83,13 +83,13 @@ def _check_counts(frames: Frames) -> None:
         raise frames.wrong(f"one period must have {FEWEST} to {MOST_FRAMES} frames (values of t)", value=len(frames.t))
     if (frames.counts < FEWEST).any():
         k = int(frames.counts.argmin())
-        what = "values of s" if frames.columns[1] == "s" else "points"
-        told = f"the frame at t = {frames.t[k]:g} has {frames.counts[k]} {what}: give at least {FEWEST}"
-        raise frames.wrong(told, frames.starts[k])
+        items = "values of s" if frames.columns[1] == "s" else "points"
+        message = f"the frame at t = {frames.t[k]:g} has {frames.counts[k]} {items}: give at least {FEWEST}"
+        raise frames.wrong(message, frames.starts[k])
 
 
 def _check_grid(frames: Frames) -> None:
-    """Every frame has every s or point, once."""
+    """Raise Refusal unless every frame has every s or point, once."""
     key, keys = frames.columns[1], frames.rows[:, 1]
     twice = np.flatnonzero((np.diff(frames.rows[:, :2], axis=0) == 0).all(1))
     if twice.size:
@@ -97,9 +97,11 @@ def _check_grid(frames: Frames) -> None:
         raise frames.wrong(
             f"t = {frames.rows[row, 0]:g}, {key} = {keys[row]:g} is given twice", row, instead="keep one"
         )
-    known = np.unique(keys)
-    if (frames.counts != len(known)).any():
+    places = np.unique(keys)
+    if (frames.counts != len(places)).any():
         k = int(frames.counts.argmin())
-        lacking = np.setdiff1d(known, keys[frames.starts[k] :][: frames.counts[k]])[0]
-        told = f"the frame at t = {frames.t[k]:g} has no {key} = {lacking:g}: give every {key} at every t, or at none"
-        raise frames.wrong(told, frames.starts[k])
+        missing = np.setdiff1d(places, keys[frames.starts[k] :][: frames.counts[k]])[0]
+        message = (
+            f"the frame at t = {frames.t[k]:g} has no {key} = {missing:g}: give every {key} at every t, or at none"
+        )
+        raise frames.wrong(message, frames.starts[k])

@@ -13,20 +13,20 @@ PASSES = 3  # of making a spline's parameter its own arc length; 1e-7 rad is lef
 
 
 def bends(frames: Frames, elements: int, modes: int) -> np.ndarray:
-    """Heading of each element minus that of the one before, (F, elements - 1), rad. modes: Legendre modes of the
-    curvature along the body that are kept, by least squares; 0: splines through the data."""
+    """Return the heading of each element minus that of the one before, (F, elements - 1), rad. modes: Legendre modes of
+    the curvature along the body, fitted by least squares; 0: splines through the data."""
     _check_modes(frames, modes)
     centres = (np.arange(elements) + 0.5) / elements
     heading = (_from_curvature if "curvature" in frames.columns else _from_points)(frames, centres, modes)
-    found = np.diff(heading)
-    worst = np.unravel_index(np.abs(found).argmax(), found.shape)
-    if not abs(found[worst]) <= LARGEST_BEND:
+    angles = np.diff(heading)
+    worst = np.unravel_index(np.abs(angles).argmax(), angles.shape)
+    if not abs(angles[worst]) <= LARGEST_BEND:
         raise frames.wrong(
             f"at t = {frames.t[worst[0]]:g} and s = {(worst[1] + 1) / elements:.3g} neighbouring "
-            f"elements bend by {abs(found[worst]):.3g} rad, more than {LARGEST_BEND:.3g}",
+            f"elements bend by {abs(angles[worst]):.3g} rad, more than {LARGEST_BEND:.3g}",
             instead="mend that frame, or take more elements",
         )
-    return found
+    return angles
 
 
 def _check_modes(frames: Frames, modes: int) -> None:
@@ -38,7 +38,7 @@ def _check_modes(frames: Frames, modes: int) -> None:
 
 
 def _from_curvature(frames: Frames, centres, modes: int) -> np.ndarray:
-    """Headings (F, elements) up to a constant each: the exact integral of the spline, or of the modes."""
+    """Return headings (F, elements) up to a constant each: the exact integral of the spline, or of the modes."""
     from scipy.interpolate import CubicSpline
 
     curvature = frames.rows[:, 2].reshape(len(frames.t), -1)
@@ -52,7 +52,7 @@ def _from_curvature(frames: Frames, centres, modes: int) -> np.ndarray:
 
 
 def _from_points(frames: Frames, centres, modes: int) -> np.ndarray:
-    """Headings (F, elements) of the splines through the points of each frame."""
+    """Return headings (F, elements) of the splines through the points of each frame."""
     from scipy.interpolate import CubicSpline
 
     heading, lengths = np.empty((len(frames.t), len(centres))), np.empty(len(frames.t))
@@ -70,8 +70,8 @@ def _from_points(frames: Frames, centres, modes: int) -> np.ndarray:
 
 
 def _arc(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Of the spline through points (P,), complex: the shares s (P,) of its arc length at which it passes them, its
-    headings there, rad, and its length. Of order 4 in the spacing, but of order 3 at the ends."""
+    """Return, of the spline through points (P,), complex, the shares s (P,) of its arc length at which it passes them,
+    its headings at these, rad, and its length. Of order 4 in the spacing, but of order 3 at the ends."""
     from scipy.interpolate import CubicSpline
 
     node, weight = legendre.leggauss(5)

@@ -49,8 +49,9 @@ class Wave(Series):
         return np.cos(phase)[:, None], -np.sin(phase)[:, None]
 
     def wavelength(self, amplitudes=None) -> np.ndarray:
-        """lambda over the body's length (...,), of an endless chain of equal links without offset: the arc length of a
-        wave, 1 / waves, times the mean cosine of headings, which swing as a sine: J_0 of their amplitude."""
+        """Return lambda over the body's length (...,), of an endless chain of equal links without offset: the arc
+        length of a wave, 1 / waves, times the mean cosine of headings, which oscillate as a sine: J_0 of their
+        amplitude."""
         from scipy.special import j0
 
         links = self.joints + 1
@@ -58,7 +59,8 @@ class Wave(Series):
         return np.abs(j0(swing)) / abs(self.waves)
 
     def relative_curvature(self, amplitudes=None) -> np.ndarray:
-        """Mean of |joint angle| over a wave and a link's length, times the wave's arc length (...,); without offset."""
+        """Return mean of |joint angle| over a wave and a link's length, times the wave's arc length (...,); without
+        offset."""
         return 2 / np.pi * self._sizes(amplitudes) * (self.joints + 1) / abs(self.waves)
 
     def _sizes(self, amplitudes) -> np.ndarray:
@@ -70,7 +72,8 @@ class Wave(Series):
 
 
 def arc_to_phase(u: np.ndarray, slope: np.ndarray) -> np.ndarray:
-    """p at which the sine y = sin, of largest slope ``slope``, has run the share u / 2 pi of its length per wave.
+    """Return p at which the sine y = sin, of largest slope ``slope``, has covered the share u / 2 pi of its length per
+    wave.
 
     The length up to p is proportional to E(p | m), m = slope^2 / (1 + slope^2); Newton from u, which converges
     quadratically because E is monotone with a slope between sqrt(1 - m) and 1.
@@ -130,7 +133,7 @@ class Sine(Gait):
         return 2 * np.pi * a
 
     def _headings(self, t, amplitudes):
-        """Headings of the elements and their rates of change with the wave's phase, (B..., T..., elements)."""
+        """Return headings of the elements and their rates of change with the wave's phase, (B..., T..., elements)."""
         from scipy.special import ellipe
 
         t = real_array("t", t) * (-1.0 if self.reverse else 1.0)
@@ -143,7 +146,7 @@ class Sine(Gait):
         return np.arctan(rise), -slope * np.sin(p) / (1 + rise**2) * speed
 
     def headings(self, t, amplitudes=None) -> np.ndarray:
-        """Of the elements against the wave's axis, (B..., T..., elements), rad."""
+        """Return headings of the elements against the wave's axis, (B..., T..., elements), rad."""
         return self._headings(t, amplitudes)[0]
 
     def shape(self, t, amplitudes=None) -> np.ndarray:
@@ -157,7 +160,7 @@ class Sine(Gait):
         return np.diff(headings, axis=-1), np.diff(rates, axis=-1) * (-1.0 if self.reverse else 1.0)
 
     def largest(self, amplitudes=None) -> float:
-        """At most: headings stay between -pi/2 and pi/2."""
+        """Return an upper bound of the joint angles, rad: headings stay between -pi/2 and pi/2."""
         return np.pi
 
     def unit(self, t) -> np.ndarray:
@@ -167,7 +170,7 @@ class Sine(Gait):
         return self.rate(t)
 
     def wavelength(self, amplitudes=None) -> np.ndarray:
-        """lambda over the body's length (...,): the arc length of a wave, 1 / waves, laid out straight."""
+        """Return lambda over the body's length (...,): the arc length of a wave, 1 / waves, laid out straight."""
         from scipy.special import ellipe
 
         slope = self._slopes(amplitudes)
@@ -175,7 +178,7 @@ class Sine(Gait):
         return 1 / (self.waves * arc)
 
     def relative_curvature(self, amplitudes=None) -> np.ndarray:
-        """Mean of |curvature| over a wave, times the wave's arc length (...,): 4 atan(2 pi A / lambda)."""
+        """Return mean of |curvature| over a wave, times the wave's arc length (...,): 4 atan(2 pi A / lambda)."""
         return 4 * np.arctan(np.abs(self._slopes(amplitudes)))
 
     @classmethod

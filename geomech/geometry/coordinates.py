@@ -14,24 +14,27 @@ from rft import se2
 
 
 def frame_velocity(h, hdot) -> np.ndarray:
-    """h^-1 dh/dt (..., 3): the second frame's velocity in the first, told in the second. h, hdot (..., 3)."""
+    """Return h^-1 dh/dt (..., 3): the second frame's velocity relative to the first, in the second. h, hdot: (...,
+    3)."""
     h, hdot = np.asarray(h, float), np.asarray(hdot, float)
     x, y = se2.rotated(-h[..., 2], hdot[..., 0], hdot[..., 1])
     return np.stack([x, y, hdot[..., 2]], -1)
 
 
 def change_velocity(xi, h, hdot) -> np.ndarray:
-    """Body velocity (..., 3) of the frame g h from that of the frame g."""
+    """Return the body velocity (..., 3) of the frame g h from that of the frame g."""
     carried = np.einsum("...ij,...j->...i", se2.adjoint(se2.inverse(h)), np.asarray(xi, float))
     return carried + frame_velocity(h, hdot)
 
 
 def change_connection(A, h, dh) -> np.ndarray:
-    """Connection (..., 3, d) of the frame g h. A: (..., 3, d); h: (..., 3); dh = d h / d alpha: (..., 3, d)."""
+    """Return the connection (..., 3, d) of the frame g h. A: (..., 3, d); h: (..., 3); dh = d h / d alpha: (..., 3,
+    d)."""
     columns = [change_velocity(A[..., k], h, dh[..., k]) for k in range(np.shape(A)[-1])]
     return np.stack(columns, -1)
 
 
 def in_frame(velocity: Velocity, frame: Callable) -> Velocity:
-    """The velocity of another frame. frame(alpha, alphadot) -> (h, hdot), the frame's pose in the first and its rate."""
+    """Return the velocity of another frame. frame(alpha, alphadot) -> (h, hdot): the frame's pose in the first, and its
+    rate."""
     return lambda alpha, alphadot: change_velocity(velocity(alpha, alphadot), *frame(alpha, alphadot))

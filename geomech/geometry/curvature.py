@@ -23,7 +23,7 @@ from rft.refusal import Refusal, formatted
 
 
 def _checked(connection, i, j) -> None:
-    """ValueError for no connection, or no two of its joints."""
+    """Raise Refusal for no connection, or for no two of its joints."""
     if not isinstance(connection, Connection):
         raise Refusal("a CCF is that of a Connection, such as connection.fit gives", value=connection)
     joints = connection.field.joints
@@ -32,34 +32,35 @@ def _checked(connection, i, j) -> None:
 
 
 def exterior_derivative(connection: Connection, i: int = 0, j: int = 1) -> np.ndarray:
-    """d_i A_j - d_j A_i on the grid, (3, N_1, ..., N_d)."""
+    """Return d_i A_j - d_j A_i on the grid, (3, N_1, ..., N_d)."""
     _checked(connection, i, j)
     field = connection.field
     return field.derivative(i)[:, j] - field.derivative(j)[:, i]
 
 
 def lie_bracket(connection: Connection, i: int = 0, j: int = 1) -> np.ndarray:
-    """[A_i, A_j] on the grid, (3, N_1, ..., N_d)."""
+    """Return [A_i, A_j] on the grid, (3, N_1, ..., N_d)."""
     _checked(connection, i, j)
     columns = np.moveaxis(connection.A, 0, -1)
     return np.moveaxis(se2.bracket(columns[i], columns[j]), -1, 0)
 
 
 def ccf(connection: Connection, i: int = 0, j: int = 1) -> Field:
-    """CCF_ij on the grid, values (3, N_1, ..., N_d): displacement per rad^2, in the connection's length unit and rad."""
+    """Return CCF_ij on the grid, values (3, N_1, ..., N_d): displacement per rad^2, in the connection's length unit and
+    rad."""
     _checked(connection, i, j)
     if connection.field.joints < 2:
         raise Refusal("a CCF needs at least two joints", because="a loop of one joint encloses no area")
     if isinstance(connection, Tube) and connection.field.joints == 2:
-        known = connection.known.ccf if (i, j) == (0, 1) else lambda shapes: -connection.known.ccf(shapes)
-        return Field(connection.axes, connection.at_grid(known), connection.degree, **connection.size)
+        taylor_ccf = connection.taylor.ccf if (i, j) == (0, 1) else lambda shapes: -connection.taylor.ccf(shapes)
+        return Field(connection.axes, connection.at_grid(taylor_ccf), connection.degree, **connection.size)
     values = exterior_derivative(connection, i, j) + lie_bracket(connection, i, j)
     return Field(connection.axes, values, connection.degree, **connection.size)
 
 
 def error(connection: Connection, i: int = 0, j: int = 1) -> Field:
-    """Estimated error of `ccf`, values (3, N_1, ..., N_d) in its units, from the grid against its halves: no solve. Of a
-    connection near a measured gait it is what the log leaves open.
+    """Return the estimated error of `ccf`, values (3, N_1, ..., N_d) in its units, from the grid against its halves,
+    without a solve. For a connection near a measured gait it is the uncertainty that the log leaves.
 
     The halves are every second point of each axis, from the first and from the second, with both ends kept. The estimate
     is the largest difference of either half's CCF from the whole grid's, at a shape and its neighbours: near a kink one
@@ -68,25 +69,26 @@ def error(connection: Connection, i: int = 0, j: int = 1) -> Field:
     """
     from scipy.ndimage import maximum_filter
 
-    whole = ccf(connection, i, j)  # refuses what has none
+    full = ccf(connection, i, j)  # refuses what has none
     if isinstance(connection, Tube) and connection.field.joints == 2:
-        return replace(whole, values=connection.at_grid(connection.known.ccf_error))
-    if whole.masked:
-        return _at_halves(connection, whole, i, j)
+        return replace(full, values=connection.at_grid(connection.taylor.ccf_error))
+    if full.masked:
+        return _masked_error(connection, full, i, j)
     shapes = np.stack(np.meshgrid(*connection.axes, indexing="ij"), -1)
     halves = (np.moveaxis(ccf(connection.half(first), i, j)(shapes), -1, 0) for first in (0, 1))
-    apart = np.maximum(*(np.abs(half - whole.values) for half in halves))
-    return replace(whole, values=maximum_filter(apart, (1, *(3,) * len(connection.axes))))
+    difference = np.maximum(*(np.abs(half - full.values) for half in halves))
+    return replace(full, values=maximum_filter(difference, (1, *(3,) * len(connection.axes))))
 
 
-def _at_halves(connection: Connection, whole: Field, i: int, j: int) -> Field:
-    """`error` where there are singular shapes: the halves, of which nothing is looked up, count at their own points."""
+def _masked_error(connection: Connection, full: Field, i: int, j: int) -> Field:
+    """Return `error` where there are singular shapes: nothing is interpolated between them, so the halves count at
+    their own points."""
     from scipy.ndimage import maximum_filter
 
-    apart = np.zeros(whole.values.shape)
+    difference = np.zeros(full.values.shape)
     for first in (0, 1):
         picks = (..., *np.ix_(*(every_second(axis, first) for axis in connection.axes)))
-        off = np.abs(ccf(connection.half(first), i, j).values - whole.values[picks])
-        apart[picks] = np.fmax(apart[picks], off)
-    worst = maximum_filter(apart, (1, *(3,) * len(connection.axes)))
-    return replace(whole, values=np.where(np.isnan(whole.values), np.nan, worst))
+        half_difference = np.abs(ccf(connection.half(first), i, j).values - full.values[picks])
+        difference[picks] = np.fmax(difference[picks], half_difference)
+    worst = maximum_filter(difference, (1, *(3,) * len(connection.axes)))
+    return replace(full, values=np.where(np.isnan(full.values), np.nan, worst))

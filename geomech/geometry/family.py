@@ -33,9 +33,9 @@ from rft.refusal import Refusal
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Velocities along the curves of a family. gait: its curve. amplitudes: (M,), ascending, 0 among them. xi: (M, N, 3),
-    body velocity with respect to phase at N equally spaced phases. Either side of 0 has a spline of its own: rates that
-    turn round kink the velocity there."""
+    """Velocities along the curves of a family. gait: its curve. amplitudes: (M,), ascending, 0 among them. xi: (M, N,
+    3), body velocity with respect to phase at N equally spaced phases. Either side of 0 has a spline of its own,
+    because the velocity has a kink where rates change sign."""
 
     gait: Gait
     amplitudes: np.ndarray
@@ -47,12 +47,12 @@ class Family:
 
     @cached_property
     def phases(self) -> np.ndarray:
-        """(N,): of the velocities, rad."""
+        """Phases (N,) of the velocities, rad."""
         return 2 * np.pi * np.arange(self.xi.shape[1]) / self.xi.shape[1]
 
     @cached_property
     def heading(self) -> np.ndarray:
-        """(M, N): of the body in the family's frame, rad; of zero mean over each curve from phase 0 to 2 pi."""
+        """Heading (M, N) of the body in the family's frame, rad; of zero mean over each curve from phase 0 to 2 pi."""
         return turning(self.xi) + self.xi[..., 2].mean(-1, keepdims=True) * (self.phases - np.pi)
 
     @cached_property
@@ -62,7 +62,7 @@ class Family:
         return np.stack([x, y, np.broadcast_to(self.xi[..., 2].mean(-1, keepdims=True), x.shape)], -1)
 
     def _sides(self, values: np.ndarray):
-        """(sign, nodes, spline through values (M, ...) in |amplitude|) on each side of 0 that has curves."""
+        """Yield (sign, nodes, spline through values (M, ...) in |amplitude|) on each side of 0 that has curves."""
         from scipy.interpolate import make_interp_spline
 
         for sign in (-1, 1):
@@ -71,7 +71,7 @@ class Family:
                 yield sign, nodes, make_interp_spline(np.abs(self.amplitudes[nodes]), values[nodes], 3)
 
     def ccf(self) -> tuple[np.ndarray, np.ndarray]:
-        """(alpha (M, N, 2), CCF (M, N, 3)) per rad^2 of shape space for a two-joint family, nan where its curves
+        """Return (alpha (M, N, 2), CCF (M, N, 3)) per rad^2 of shape space for a two-joint family, nan where its curves
         fold; for maps. Its sign is that of `curvature.ccf`: positive for counter-clockwise loops."""
         t = self.phases
         unit, rate = self.gait.shape(t, [1.0])[0] - self.gait.shape(t, [0.0])[0], self.gait.rate(t, [1.0])[0]
@@ -84,8 +84,8 @@ class Family:
         return self.gait.shape(t, self.amplitudes), values
 
     def area(self, amplitudes) -> np.ndarray:
-        """Net pose (..., 3) over a cycle from phase 0, in the body frame at the start: the CCF's integral, of which the
-        table has the exact value at each of its curves. ValueError for amplitudes off the table."""
+        """Return net pose (..., 3) over a cycle from phase 0, in the body frame at the start: the CCF's integral, of
+        which the table has the exact value at each of its curves. ValueError for amplitudes off the table."""
         a = real_array("amplitudes", amplitudes)
         low, high = self.amplitudes[[0, -1]]
         if not ((a >= low * (1 + 1e-12)) & (a <= high * (1 + 1e-12))).all():
@@ -109,8 +109,8 @@ def fit(
     least: float = 0.0,
     map: Map = each,
 ) -> Family:
-    """The family of ``gait`` up to the amplitude ``largest`` (> 0), from ``count`` curves of ``phases`` shapes; with a
-    negative ``least`` as many down to that, reflected through the centre. largest may then be 0.
+    """Fit the family of ``gait`` up to the amplitude ``largest`` (> 0), from ``count`` curves of ``phases`` shapes;
+    with a negative ``least`` as many down to that, reflected through the centre. largest may then be 0.
 
     Order 4 in 1/count and spectral in phases where the velocity is smooth; about order 2 in both across kinks.
     map: of some curves after others, as the builtin.
@@ -126,11 +126,11 @@ def fit(
     xi, moving = np.zeros((len(amplitudes), phases, 3)), np.flatnonzero(amplitudes)
     step = max(1, SAMPLES_TOGETHER // phases)
     groups = [moving[k : k + step] for k in range(0, len(moving), step)]
-    cycles = [gait.cycle(phases, amplitudes[some]) for some in groups]
-    for some, found in zip(groups, map(partial(_along, velocity), cycles)):
-        xi[some] = found
+    cycles = [gait.cycle(phases, amplitudes[group]) for group in groups]
+    for group, velocities in zip(groups, map(partial(_along, velocity), cycles)):
+        xi[group] = velocities
         if progress:
-            progress((some[-1] + 1) / (moving[-1] + 1))
+            progress((group[-1] + 1) / (moving[-1] + 1))
     return Family(gait, amplitudes, xi)
 
 

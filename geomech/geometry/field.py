@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from geomech.core import summary
-from geomech.core.face import Faced
+from geomech.core.face import Extensible
 from rft.checks import in_range, real_array
 from rft.refusal import Refusal
 
-UNTOLD = "length"  # stands for the unit of lengths where nothing says it
+UNKNOWN_UNIT = "length"  # stands for the unit of lengths where nothing says it
 
 
 @dataclass(frozen=True, eq=False)
-class Field(Faced):
+class Field(Extensible):
     """Values (..., N_1, ..., N_d) on the grid spanned by d axes of shape angles (rad), all ascending. nan in all
     components masks a grid point: derivatives come from the points between masks, and nothing is looked up.
 
@@ -31,7 +31,7 @@ class Field(Faced):
     values: np.ndarray
     degree: int = 3
     _: KW_ONLY
-    unit: str = UNTOLD
+    unit: str = UNKNOWN_UNIT
     length: float | None = None
 
     def __post_init__(self):
@@ -48,13 +48,13 @@ class Field(Faced):
         lead = self.values.shape[: -self.joints]
         flat = self.values.reshape(-1, *self.values.shape[len(lead) :])
         size = summary.spans(self.values) if lead == (3,) else summary.span(self.values)
-        what = "x".join(map(str, lead)) or "one"
-        told = f"values {size}{summary.lengths(**self.size)}"
-        return f"Field({what} components on {summary.grid(self.axes)}{summary.masked(flat)}; {told})"
+        components = "x".join(map(str, lead)) or "one"
+        described = f"values {size}{summary.lengths(**self.size)}"
+        return f"Field({components} components on {summary.grid(self.axes)}{summary.masked(flat)}; {described})"
 
     @property
     def size(self) -> dict:
-        """Its unit and length, as arguments of another field."""
+        """Unit of lengths and length of the body, as arguments of another field."""
         return {"unit": self.unit, "length": self.length}
 
     @property
@@ -62,14 +62,14 @@ class Field(Faced):
         return len(self.axes)
 
     def _along(self, axis: int):
-        """The one-dimensional spline along a grid axis; that axis comes first."""
+        """Return the one-dimensional spline along a grid axis; that axis comes first."""
         from scipy.interpolate import make_interp_spline
 
         rows = np.moveaxis(self.values, axis - self.joints, 0)
         return make_interp_spline(self.axes[axis], rows, self.degree)
 
     def derivative(self, axis: int) -> np.ndarray:
-        """d values / d alpha_axis on the grid, of the spline."""
+        """Return d values / d alpha_axis on the grid, of the spline."""
         in_range("axis", axis, 0, self.joints - 1, whole=True)
         if self.masked:
             return self._between_masks(axis)
@@ -77,11 +77,11 @@ class Field(Faced):
 
     @property
     def masked(self) -> bool:
-        """Whether some grid points are."""
+        """Whether some grid points are masked."""
         return bool(np.isnan(self.values).any())
 
     def _between_masks(self, axis: int) -> np.ndarray:
-        """`derivative`, of a spline through each run of points without a mask; nan for a run of one."""
+        """Return `derivative` by a spline through each run of points without a mask; nan for a run of one."""
         from scipy.interpolate import make_interp_spline
 
         x, out = self.axes[axis], np.full(self.values.shape, np.nan)
@@ -102,12 +102,13 @@ class Field(Faced):
         return _tensor_spline(self)
 
     def antiderivative(self, axis: int) -> Any:
-        """The spline whose derivative along ``axis`` is this field's: alpha (..., d) -> (..., components)."""
+        """Return the spline whose derivative along ``axis`` is this field's: alpha (..., d) -> (..., components)."""
         self._refuse_masks()
         return _tensor_spline(self, integrate=axis)
 
     def __call__(self, alpha) -> np.ndarray:
-        """Values at shapes alpha (..., d), with the components last: (..., *components). ValueError outside the grid."""
+        """Return values at shapes alpha (..., d), with the components last: (..., *components). ValueError outside the
+        grid."""
         return self.spline(self.inside(alpha))
 
     def _refuse_masks(self) -> None:
@@ -117,12 +118,12 @@ class Field(Faced):
             )
 
     def inside(self, alpha) -> np.ndarray:
-        """alpha as an array, or ValueError naming the first angle that leaves the grid."""
+        """Return alpha as an array; Refusal names the first angle that leaves the grid."""
         return inside(self.axes, alpha)
 
 
 def as_axes(axes) -> tuple[np.ndarray, ...]:
-    """Axes as arrays of angles, or ValueError."""
+    """Return axes as arrays of angles; Refusal for anything else."""
     try:
         arrays = tuple(real_array("an axis", a) for a in axes)
     except TypeError:
@@ -133,8 +134,8 @@ def as_axes(axes) -> tuple[np.ndarray, ...]:
 
 
 def inside(axes, alpha, names: Sequence[str] = ()) -> np.ndarray:
-    """alpha (..., d) as an array, or ValueError naming the first angle that leaves the grid of these axes, by one of
-    ``names`` where these are given."""
+    """Return alpha (..., d) as an array; Refusal names the first angle that leaves the grid of these axes, by one of
+    ``names`` where given."""
     alpha = real_array("alpha", alpha)
     if alpha.ndim == 0 or alpha.shape[-1] != len(axes) or not np.isfinite(alpha).all():
         raise Refusal(f"alpha must be finite and of shape (..., {len(axes)})", value=alpha.shape)
@@ -152,20 +153,22 @@ def inside(axes, alpha, names: Sequence[str] = ()) -> np.ndarray:
 
 
 def every_second(axis: np.ndarray, first: int) -> np.ndarray:
-    """Indices of every second point of an axis from ``first``, and of both ends: half a grid, to estimate errors by."""
+    """Return indices of every second point of an axis from ``first``, and of both ends: half a grid, to estimate errors
+    by."""
     return np.unique([0, *range(first, len(axis), 2), len(axis) - 1])
 
 
-def half_of(axes, arrays, degree: int, first: int):
-    """(axes, arrays (..., N_1, ..., N_d), degree) on `every_second` point of each axis; of a lower degree where that
-    leaves too few points for the spline."""
+def half_grid(axes, arrays, degree: int, first: int):
+    """Return (axes, arrays (..., N_1, ..., N_d), degree) on `every_second` point of each axis; of a lower degree where
+    that leaves too few points for the spline."""
     picks = [every_second(axis, first) for axis in axes]
-    some = tuple(axis[pick] for axis, pick in zip(axes, picks))
-    return some, [x[(..., *np.ix_(*picks))] for x in arrays], min(degree, min(map(len, picks)) - 1)
+    coarse = tuple(axis[pick] for axis, pick in zip(axes, picks))
+    return coarse, [x[(..., *np.ix_(*picks))] for x in arrays], min(degree, min(map(len, picks)) - 1)
 
 
 def _tensor_spline(field: Field, integrate: int | None = None):
-    """Tensor-product spline through a field; along the axis ``integrate``, its antiderivative from the lower end."""
+    """Return the tensor-product spline through a field; along the axis ``integrate``, its antiderivative from the lower
+    end."""
     from scipy.interpolate import BSpline, NdBSpline, make_interp_spline
 
     d = field.joints

@@ -73,7 +73,7 @@ class Gait:
 
     @property
     def amplitude_label(self) -> str:
-        """For an axis of amplitudes."""
+        """Label of an axis of amplitudes."""
         return f"amplitude of the {type(self).__name__.lower()} (scale)"
 
     def unit(self, t) -> np.ndarray:
@@ -83,15 +83,15 @@ class Gait:
         raise TypeError(f"{type(self).__name__} gives no curve: define unit_rate(t)")
 
     def shape(self, t, amplitudes=None) -> np.ndarray:
-        """alpha at phases t (T...), for amplitudes (B...) or the gait's own: (B..., T..., joints), rad."""
+        """Return alpha at phases t (T...), for amplitudes (B...) or the gait's own: (B..., T..., joints), rad."""
         return self.middle + self._times(amplitudes, self.unit((-1.0 if self.reverse else 1.0) * real_array("t", t)))
 
     def largest(self, amplitudes=None) -> float:
-        """The largest of its shape variables in size, at 32 phases, for amplitudes (B...) or the gait's own."""
+        """Return the largest of its shape variables in size, at 32 phases, for amplitudes (B...) or the gait's own."""
         return float(np.abs(self.shape(np.linspace(0.0, 2 * np.pi, 32), amplitudes)).max(initial=0.0))
 
     def rate(self, t, amplitudes=None) -> np.ndarray:
-        """d alpha / dt, shaped like `shape`."""
+        """Return d alpha / dt, shaped like `shape`."""
         sign = -1.0 if self.reverse else 1.0
         return self._times(amplitudes, sign * self.unit_rate(sign * real_array("t", t)))
 
@@ -102,7 +102,7 @@ class Gait:
         return a[(..., *([None] * curve.ndim))] * curve
 
     def cycle(self, phases: int, amplitudes=None) -> tuple[np.ndarray, np.ndarray]:
-        """(alpha, alphadot) at ``phases`` equally spaced phases from 0, each (B..., phases, joints)."""
+        """Return (alpha, alphadot) at ``phases`` equally spaced phases from 0, each (B..., phases, joints)."""
         least = max(4, 2 * self.harmonics + 1)
         if not (is_whole(phases) and phases >= least):
             raise Refusal(f"phases must be a whole number of at least {least} for this gait", value=phases)
@@ -117,7 +117,7 @@ GAITS = Registry("geomech.gaits", "kind", "a gait", subclasses(Gait))
 
 
 def finite_array(name: str, values: Sequence, ndim: int) -> np.ndarray:
-    """values as a float array of that many dimensions, or ValueError naming it."""
+    """Return values as a float array of ``ndim`` dimensions; Refusal by ``name`` if they are none."""
     array = real_array(name, values)
     if array.ndim != ndim or not array.size or not (np.abs(array) <= LARGEST).all():
         raise Refusal(f"{name} must be {ndim}-dimensional, finite and not empty", value=values)
@@ -125,7 +125,7 @@ def finite_array(name: str, values: Sequence, ndim: int) -> np.ndarray:
 
 
 def checked_gait(gait) -> Gait:
-    """gait, or ValueError if it is nothing of the kind."""
+    """Return the gait; Refusal if it is none."""
     if isinstance(gait, type) or not (hasattr(gait, "joints") and hasattr(gait, "cycle")):
         raise Refusal("gait must be a gait such as Circle(amplitude=0.5)", value=gait)
     return gait

@@ -25,8 +25,8 @@ import numpy as np
 
 from geomech.core import summary
 from geomech.core.work import Map, each
-from geomech.geometry.connection import Velocity, check_knobs, directions, sampled
-from geomech.geometry.field import Field, as_axes, half_of
+from geomech.geometry.connection import Velocity, check_fit_options, directions, sampled
+from geomech.geometry.field import Field, as_axes, half_grid
 from geomech.geometry.traits import NOTHING, Traits
 from rft.checks import in_range, is_whole, real_array
 from rft.refusal import Refusal
@@ -47,7 +47,7 @@ class Harmonics:
 
     def __repr__(self) -> str:
         speed = np.sqrt((self.coefficients**2).sum(1) / 2)
-        return f"Harmonics({summary.grid(self.axes)}; odd, up to {self.highest}; {summary.left(self.residual, speed)})"
+        return f"Harmonics({summary.grid(self.axes)}; odd, up to {self.highest}; {summary.fit_residual(self.residual, speed)})"
 
     @cached_property
     def field(self) -> Field:
@@ -59,56 +59,56 @@ class Harmonics:
         return count - 1 if d == 2 else next(k for k in range(1, count + 1) if terms(d, k) == count)
 
     def half(self, first: int) -> Harmonics:
-        """As `Connection.half`."""
-        axes, arrays, degree = half_of(self.axes, (self.coefficients, self.residual), self.degree, first)
+        """Return the harmonics on half of the grid, as `Connection.half` does."""
+        axes, arrays, degree = half_grid(self.axes, (self.coefficients, self.residual), self.degree, first)
         return Harmonics(axes, *arrays, degree)
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
-        """xi (..., 3) at alpha, alphadot (..., d); ValueError outside the grid."""
+        """Return xi (..., 3) at alpha, alphadot (..., d); ValueError outside the grid."""
         alpha, alphadot = np.broadcast_arrays(self.field.inside(alpha), real_array("alphadot", alphadot))
         points = [x.reshape(-1, len(self.axes)) for x in (alpha, alphadot)]
         step = max(1, VALUES_TOGETHER // self.coefficients.shape[1])
-        parts = [self._at(*(x[k : k + step] for x in points)) for k in range(0, len(points[0]), step)]
+        parts = [self._velocity(*(x[k : k + step] for x in points)) for k in range(0, len(points[0]), step)]
         return np.concatenate(parts or [np.zeros((0, 3))]).reshape(*alpha.shape[:-1], 3)
 
-    def _at(self, alpha, alphadot) -> np.ndarray:
+    def _velocity(self, alpha, alphadot) -> np.ndarray:
         speed = np.linalg.norm(alphadot, axis=-1)
         unit = alphadot / np.where(speed > 0, speed, 1.0)[..., None]
         return np.einsum("...ij,...j->...i", self.field(alpha), basis(unit, self.highest)) * speed[..., None]
 
 
 def terms(joints: int, highest: int) -> int:
-    """Coefficients of the odd harmonics up to ``highest`` of so many joint rates."""
+    """Return the number of coefficients of the odd harmonics up to ``highest`` of so many joint rates."""
     return comb(highest + joints - 1, joints - 1)
 
 
 @lru_cache(maxsize=16)
 def powers(joints: int, degree: int) -> tuple[np.ndarray, np.ndarray]:
-    """(powers (terms, d) of the products, the roots (terms,) of their multinomial coefficients)."""
+    """Return (powers (terms, d) of the products, roots (terms,) of their multinomial coefficients)."""
     bars = np.array(list(combinations(range(degree + joints - 1), joints - 1)))
     ends = np.full((len(bars), 1), degree + joints - 1)
-    found = np.diff(np.concatenate([-np.ones_like(ends), bars, ends], 1)) - 1
-    return found, np.array([np.sqrt(factorial(degree) / prod(map(factorial, map(int, row)))) for row in found])
+    exponents = np.diff(np.concatenate([-np.ones_like(ends), bars, ends], 1)) - 1
+    return exponents, np.array([np.sqrt(factorial(degree) / prod(map(factorial, map(int, row)))) for row in exponents])
 
 
 def basis(unit: np.ndarray, highest: int) -> np.ndarray:
-    """At directions (..., d): (..., terms)."""
+    """Return the basis functions (..., terms) at directions (..., d)."""
     if unit.shape[-1] == 2:
         return _basis(np.arctan2(unit[..., 1], unit[..., 0]), highest)
-    each, roots = powers(unit.shape[-1], highest)
-    ladder = np.cumprod(np.concatenate([np.ones((1, *unit.shape)), np.repeat(unit[None], highest, 0)]), 0)
-    found = (
-        roots * ladder[each[:, 0], ..., 0].T
+    exponents, roots = powers(unit.shape[-1], highest)
+    powers_of_unit = np.cumprod(np.concatenate([np.ones((1, *unit.shape)), np.repeat(unit[None], highest, 0)]), 0)
+    products = (
+        roots * powers_of_unit[exponents[:, 0], ..., 0].T
         if unit.ndim == 1
-        else roots * np.moveaxis(ladder[each[:, 0], ..., 0], 0, -1)
+        else roots * np.moveaxis(powers_of_unit[exponents[:, 0], ..., 0], 0, -1)
     )
     for k in range(1, unit.shape[-1]):
-        found = found * np.moveaxis(ladder[each[:, k], ..., k], 0, -1)
-    return found
+        products = products * np.moveaxis(powers_of_unit[exponents[:, k], ..., k], 0, -1)
+    return products
 
 
 def _basis(beta: np.ndarray, highest: int) -> np.ndarray:
-    """cos beta, sin beta, cos 3 beta, sin 3 beta ... up to ``highest``: (..., highest + 1)."""
+    """Return cos beta, sin beta, cos 3 beta, sin 3 beta ... up to ``highest``: (..., highest + 1)."""
     k = np.arange(1, highest + 1, 2)
     waves = np.exp(1j * k * np.asarray(beta)[..., None])
     return np.stack([waves.real, waves.imag], -1).reshape(*np.shape(beta), -1)
@@ -125,8 +125,8 @@ def fit(
     traits: Traits = NOTHING,
     map: Map = each,
 ) -> Harmonics:
-    """Odd harmonics up to ``highest`` from ``count`` uniform directions at each shape; other arguments, and their order,
-    as in `connection.fit`.
+    """Fit odd harmonics up to ``highest`` from ``count`` uniform directions at each shape; other arguments, and their
+    order, as in `connection.fit`.
 
     The series through ``count`` directions is exact up to the harmonic ``count`` - 1, and those above fold back onto
     it (k onto 2 count - k); so keep ``highest`` well below. Of more than two joints a fit takes as many directions as it has
@@ -136,7 +136,7 @@ def fit(
     if not is_whole(highest) or highest % 2 == 0 or not 1 <= highest < count:
         raise Refusal(f"harmonics must be odd and below the number of directions ({count})", value=highest)
     axes = as_axes(axes)
-    check_knobs(degree, progress)
+    check_fit_options(degree, progress)
     d = len(axes)
     if d < 2:
         raise Refusal("harmonics are those of two joint rates or more, got 1 joint")
@@ -145,15 +145,17 @@ def fit(
             f"harmonics of {d} joints up to {highest} take {terms(d, highest)} directions or more, got {count}"
         )
     unit = directions(d, count)
-    at = basis(unit, highest)
-    inverse = at.T * (2.0 / count) if d == 2 else np.linalg.pinv(at)
-    unseen = (
-        1.0 if d == 2 else count / max(1, count - at.shape[1])
+    sampled_basis = basis(unit, highest)
+    inverse = sampled_basis.T * (2.0 / count) if d == 2 else np.linalg.pinv(sampled_basis)
+    residual_scale = (
+        1.0 if d == 2 else count / max(1, count - sampled_basis.shape[1])
     )  # what the fit leaves of directions that it has not seen
 
-    def keep(xi):
+    def reduce(xi):
         coefficients = np.einsum("jc,sci->ijs", inverse, xi)
-        return coefficients, unseen * np.sqrt(((xi - np.einsum("cj,ijs->sci", at, coefficients)) ** 2).mean(1)).T
+        return coefficients, residual_scale * np.sqrt(
+            ((xi - np.einsum("cj,ijs->sci", sampled_basis, coefficients)) ** 2).mean(1)
+        ).T
 
-    found = sampled(velocity, axes, unit, keep, degree, progress, traits, map)
-    return Harmonics(axes, *found, degree)
+    fields = sampled(velocity, axes, unit, reduce, degree, progress, traits, map)
+    return Harmonics(axes, *fields, degree)

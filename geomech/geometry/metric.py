@@ -43,13 +43,13 @@ class Metric:
         return Field(self.axes, self.M, self.degree)
 
     def norm(self, alpha, alphadot) -> np.ndarray:
-        """F (...,) at alpha, alphadot (..., d); ValueError outside the grid."""
+        """Return F (...,) at alpha, alphadot (..., d); ValueError outside the grid."""
         alphadot = real_array("alphadot", alphadot)
         square = np.einsum("...i,...ij,...j->...", alphadot, self.field(alpha), alphadot)
         return np.sqrt(np.maximum(square, 0.0))
 
     def indicatrix(self, alpha, count: int = 64) -> np.ndarray:
-        """(..., count, 2): alphadot of unit cost in every direction of the plane of two joints; an ellipse."""
+        """Return (..., count, 2): alphadot of unit cost in every direction of the plane of two joints; an ellipse."""
         return _indicatrix(self, alpha, count)
 
 
@@ -68,13 +68,13 @@ class Finsler:
         return Field(self.axes, self.coefficients, self.degree)
 
     def norm(self, alpha, alphadot) -> np.ndarray:
-        """F (...,) at alpha, alphadot (..., 2); ValueError outside the grid."""
+        """Return F (...,) at alpha, alphadot (..., 2); ValueError outside the grid."""
         alphadot = real_array("alphadot", alphadot)
         basis = _even(np.arctan2(alphadot[..., 1], alphadot[..., 0]), len(self.coefficients) - 1)
         return np.maximum((self.field(alpha) * basis).sum(-1), 0.0) * np.hypot(alphadot[..., 0], alphadot[..., 1])
 
     def indicatrix(self, alpha, count: int = 64) -> np.ndarray:
-        """(..., count, 2): alphadot of unit cost in every direction."""
+        """Return (..., count, 2): alphadot of unit cost in every direction."""
         return _indicatrix(self, alpha, count)
 
 
@@ -87,7 +87,7 @@ def _indicatrix(metric, alpha, count: int) -> np.ndarray:
 
 
 def _even(beta, highest: int) -> np.ndarray:
-    """1, cos 2 beta, sin 2 beta, ... up to ``highest``, (..., highest + 1)."""
+    """Return 1, cos 2 beta, sin 2 beta, ... up to ``highest``: (..., highest + 1)."""
     k = np.arange(2, highest + 1, 2)
     waves = np.exp(1j * k * np.asarray(beta)[..., None])
     pairs = np.stack([waves.real, waves.imag], -1).reshape(*np.shape(beta), -1)
@@ -95,8 +95,8 @@ def _even(beta, highest: int) -> np.ndarray:
 
 
 def fit(power: Power, axes, degree: int = 3, progress: Callable | None = None, map: Map = each) -> Metric:
-    """M on the grid spanned by ``axes`` from powers (...,) that are quadratic in alphadot, exactly, by d (d + 1) / 2 of
-    them at each shape."""
+    """Fit M on the grid spanned by ``axes`` exactly, from d (d + 1) / 2 powers at each shape. power: (...,), quadratic
+    in alphadot."""
     axes = as_axes(axes)
     d = len(axes)
     i, j = np.triu_indices(d)
@@ -120,18 +120,18 @@ def fit_norm(
     highest: int = 14,
     map: Map = each,
 ) -> Finsler:
-    """Even harmonics up to ``highest`` of a norm (...,), from ``count`` directions at each shape of two joints."""
+    """Fit even harmonics up to ``highest`` of a norm (...,), from ``count`` directions at each shape of two joints."""
     if not is_whole(highest) or highest % 2 or not 0 <= highest < count:
         raise Refusal(f"harmonics must be even and below the number of directions ({count})", value=highest)
     axes = as_axes(axes)
     if len(axes) != 2:
         raise Refusal(f"harmonics are those of a plane of two joint rates, got {len(axes)} joints")
     unit = directions(2, count)
-    return of_samples(_sampled(norm, axes, unit, progress, map), axes, unit, degree, highest=highest)
+    return norm_from_samples(_sampled(norm, axes, unit, progress, map), axes, unit, degree, highest=highest)
 
 
-def of_samples(F: np.ndarray, axes, unit: np.ndarray, degree: int = 3, *, highest: int = 14) -> Finsler:
-    """As `fit_norm`, of norms F (C, N_1, N_2) of the rates ``unit`` (C, 2) that are known already."""
+def norm_from_samples(F: np.ndarray, axes, unit: np.ndarray, degree: int = 3, *, highest: int = 14) -> Finsler:
+    """Return the series of `fit_norm` from norms F (C, N_1, N_2) of the rates ``unit`` (C, 2)."""
     basis = _even(np.arctan2(unit[:, 1], unit[:, 0]), highest)
     onto = np.linalg.pinv(basis)
     coefficients = np.tensordot(onto, F, 1)
@@ -140,27 +140,27 @@ def of_samples(F: np.ndarray, axes, unit: np.ndarray, degree: int = 3, *, highes
 
 
 def _sampled(power: Power, axes, unit: np.ndarray, progress: Callable | None, map: Map) -> np.ndarray:
-    """(C, N_1, ..., N_d): powers at every shape for the rates ``unit`` (C, d)."""
+    """Return (C, N_1, ..., N_d): powers at every shape for the rates ``unit`` (C, d)."""
     alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 1, len(axes))
     out, step = np.empty((len(unit), len(alpha))), max(1, SAMPLES_TOGETHER // len(unit))
     parts = [slice(k, min(k + step, len(alpha))) for k in range(0, len(alpha), step)]
-    for here, found in zip(parts, map(partial(_powers, (power, unit)), [alpha[x] for x in parts])):
-        out[:, here] = found.T
+    for part, powers in zip(parts, map(partial(_powers, (power, unit)), [alpha[x] for x in parts])):
+        out[:, part] = powers.T
         if progress:
-            progress(here.stop / len(alpha))
+            progress(part.stop / len(alpha))
     return out.reshape(len(unit), *map(len, axes))
 
 
-def _powers(asked: tuple, alpha: np.ndarray) -> np.ndarray:
-    """Of (power, unit) at some shapes."""
-    power, unit = asked
-    found = np.asarray(power(alpha, unit))
-    if found.shape != (len(alpha), len(unit)) or not np.isfinite(found).all():
-        raise Refusal(f"power must be finite, of shape {(len(alpha), len(unit))} for these rates", value=found.shape)
-    return found
+def _powers(shared: tuple, alpha: np.ndarray) -> np.ndarray:
+    """Return the powers (s, C) at some shapes. shared: (power, unit)."""
+    power, unit = shared
+    powers = np.asarray(power(alpha, unit))
+    if powers.shape != (len(alpha), len(unit)) or not np.isfinite(powers).all():
+        raise Refusal(f"power must be finite, of shape {(len(alpha), len(unit))} for these rates", value=powers.shape)
+    return powers
 
 
 def path_length(norm: Power, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
-    """Length of a gait's cycle, for amplitudes (...,) or the gait's own. norm: F(alpha, alphadot) -> (...,)."""
+    """Return length of a gait's cycle, for amplitudes (...,) or the gait's own. norm: F(alpha, alphadot) -> (...,)."""
     alpha, alphadot = checked_gait(gait).cycle(phases, amplitudes)
     return np.asarray(norm(alpha, alphadot)).mean(-1) * 2 * np.pi

@@ -38,22 +38,23 @@ class Frame:
     residual: float = 0.0
 
     def __call__(self, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
-        """(h, dh/dt), (..., 3) each, for alpha, alphadot (..., d), as `geomech.geometry.coordinates.in_frame` takes them;
-        ValueError outside the grid."""
+        """Return (h, dh/dt), (..., 3) each, for alpha, alphadot (..., d), as `geomech.geometry.coordinates.in_frame`
+        takes them; ValueError outside the grid."""
         slopes = np.einsum("...ij,...j->...i", self.slopes(alpha), real_array("alphadot", alphadot))
         return np.broadcast_arrays(self.pose(alpha), slopes)
 
     def pose(self, alpha) -> np.ndarray:
-        """h (..., 3) at shapes alpha (..., d)."""
+        """Return h (..., 3) at shapes alpha (..., d)."""
         return self.field(alpha)
 
     def slopes(self, alpha) -> np.ndarray:
-        """dh / d alpha (..., 3, d) at shapes alpha (..., d)."""
+        """Return dh / d alpha (..., 3, d) at shapes alpha (..., d)."""
         alpha = self.field.inside(alpha)
         return np.stack([self.field.spline(alpha, nu=nu) for nu in np.eye(self.field.joints, dtype=int)], -1)
 
     def net(self, g, alpha) -> np.ndarray:
-        """Displacement (..., 3) of this frame over a cycle from shape alpha (..., d), from that of the first frame."""
+        """Return displacement (..., 3) of this frame over a cycle from shape alpha (..., d), from that of the first
+        frame."""
         h = self.pose(alpha)
         return se2.compose(se2.inverse(h), se2.compose(real_array("g", g), h))
 
@@ -63,13 +64,13 @@ class Frame:
         return np.stack([np.moveaxis(self.field.derivative(k), 0, -1) for k in range(self.field.joints)], -1)
 
     def connection(self, first: Connection) -> np.ndarray:
-        """A (3, d, N_1, ..., N_d) in this frame on its grid, from the connection in the first frame."""
+        """Return A (3, d, N_1, ..., N_d) in this frame on its grid, from the connection in the first frame."""
         h, A = np.moveaxis(self.field.values, 0, -1), np.moveaxis(first.A, (0, 1), (-2, -1))
         return np.moveaxis(change_connection(A, h, self.grid_slopes), (-2, -1), (0, 1))
 
 
 def minimum_perturbation(connection: Connection) -> Frame:
-    """The frame in which ``connection`` is smallest, parallel to the connection's own in the middle of the grid.
+    """Return the frame in which ``connection`` is smallest, parallel to the connection's own in the middle of the grid.
 
     h is a spline on the connection's grid and of its degree, and converges as that spline does. ValueError if the grid has
     singular shapes, RuntimeError if a linear system is not solved.
@@ -81,21 +82,21 @@ def minimum_perturbation(connection: Connection) -> Frame:
     basis = Basis(connection.axes, connection.degree)
     w = connection.A[0] + 1j * connection.A[1], connection.A[2]
     flat, a = (basis.at_nodes(basis.coefficients(x)) for x in w)  # (d, nodes)
-    beta, off_turn = basis.least(a, np.zeros_like(a))
+    beta, turn_residual = basis.least(a, np.zeros_like(a))
     beta = beta - _middle(connection, basis.on_grid(beta))
-    left = a + basis.gradient(beta)
+    remainder = a + basis.gradient(beta)
     a = (
-        left if np.abs(left).max() > ROUNDING * np.abs(a).max() else np.zeros_like(a)
+        remainder if np.abs(remainder).max() > ROUNDING * np.abs(a).max() else np.zeros_like(a)
     )  # of a pure gradient nothing is left
-    z, off_shift = basis.least(np.exp(-1j * basis.at_nodes(beta)) * flat, a)
+    z, shift_residual = basis.least(np.exp(-1j * basis.at_nodes(beta)) * flat, a)
     beta, z = basis.on_grid(beta), basis.on_grid(z)
     z = np.exp(1j * beta) * z
     h = np.stack([z.real, z.imag, beta])
-    return Frame(replace(connection.field, values=h), max(off_turn, off_shift))
+    return Frame(replace(connection.field, values=h), max(turn_residual, shift_residual))
 
 
 def _middle(connection: Connection, values: np.ndarray) -> float:
-    """The value of a function on the grid at the grid's middle."""
+    """Return the value of a function on the grid at the grid's middle."""
     return replace(connection.field, values=values)(np.array([(a[0] + a[-1]) / 2 for a in connection.axes]))
 
 
@@ -121,7 +122,7 @@ class Basis:
             self.knots_to_grid.append(BSpline.design_matrix(axis, t, degree))
 
     def coefficients(self, values: np.ndarray) -> np.ndarray:
-        """Of the spline through values (..., N_1, ..., N_d) on the grid."""
+        """Return the spline coefficients of values (..., N_1, ..., N_d) on the grid."""
         from scipy.interpolate import make_interp_spline
 
         for k, axis in enumerate(self.axes):
@@ -130,27 +131,27 @@ class Basis:
         return values
 
     def on_grid(self, c: np.ndarray) -> np.ndarray:
-        """Values on the grid of splines with coefficients c (..., N_1, ..., N_d)."""
+        """Return values on the grid of splines with coefficients c (..., N_1, ..., N_d)."""
         return self._along(c, self.knots_to_grid)
 
     def at_nodes(self, c: np.ndarray) -> np.ndarray:
-        """Values at the nodes."""
+        """Return values at the nodes."""
         return self._along(c, self.values)
 
     def gradient(self, c: np.ndarray) -> np.ndarray:
-        """Derivatives along the axes at the nodes, (d, Q_1, ..., Q_d), of one spline."""
+        """Return derivatives along the axes at the nodes, (d, Q_1, ..., Q_d), of one spline."""
         return np.stack([self._along(c, self._slope(k)) for k in range(self.d)])
 
     def load(self, f: np.ndarray) -> np.ndarray:
-        """Integrals of every basis function times f, given at the nodes."""
+        """Return integrals of every basis function times f, given at the nodes."""
         return self._along(self.weighted(f), [v.T for v in self.values])
 
     def flux(self, f: np.ndarray) -> np.ndarray:
-        """Integrals of every basis function's gradient times the vector field f (d, Q_1, ..., Q_d)."""
+        """Return integrals of every basis function's gradient times the vector field f (d, Q_1, ..., Q_d)."""
         return sum(self._along(self.weighted(f[k]), [v.T for v in self._slope(k)]) for k in range(self.d))
 
     def weighted(self, f: np.ndarray) -> np.ndarray:
-        """f at the nodes times the weights of the rule."""
+        """Return f at the nodes times the weights of the rule."""
         for k, w in enumerate(self.weights):
             f = f * w.reshape(-1, *(1,) * (self.d - 1 - k))
         return f
@@ -159,7 +160,7 @@ class Basis:
         return [*self.values[:k], self.slopes[k], *self.values[k + 1 :]]
 
     def _along(self, x: np.ndarray, matrices: list) -> np.ndarray:
-        """Each axis of the grid multiplied by its matrix."""
+        """Return x with each axis of the grid multiplied by its matrix."""
         for k, matrix in enumerate(matrices):
             rows = np.moveaxis(x, k - self.d, 0)
             out = (matrix @ rows.reshape(len(rows), -1)).reshape(-1, *rows.shape[1:])
@@ -182,8 +183,9 @@ class Basis:
         return vectors, total
 
     def least(self, w: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, float]:
-        """Coefficients of the z that makes the integral of |w + dz + i a z|^2 least, w and a (d, Q_1, ..., Q_d) at the nodes,
-        and the residual of the linear system over its right side. Where a = 0, z is real if w is, and of mean zero.
+        """Return coefficients of the z that makes the integral of |w + dz + i a z|^2 least, w and a (d, Q_1, ..., Q_d)
+        at the nodes, and the residual of the linear system over its right side. Where a = 0, z is real if w is, and of
+        mean zero.
 
         Conjugate gradients on the normal equations, preconditioned by those with the mean of |a|^2 in place of a, which
         separate by axes."""
@@ -198,15 +200,15 @@ class Basis:
             e = self.gradient(z) + 1j * a * self.at_nodes(z) if bent else self.gradient(z)
             return self._adjoint(e, a, bent).ravel()
 
-        def near(r):
+        def precondition(r):
             return self._along(inverse * self._along(r.reshape(shape), onto), vectors).ravel()
 
         from scipy.sparse.linalg import LinearOperator, cg
 
         right = -self._adjoint(w, a, bent).ravel()
         size, kind = np.linalg.norm(right), complex if bent or np.iscomplexobj(w) else float
-        operator, nearly = (LinearOperator(2 * (right.size,), f, dtype=kind) for f in (normal, near))
-        z, failed = cg(operator, right, rtol=TOLERANCE, maxiter=STEPS, M=nearly)
+        operator, preconditioner = (LinearOperator(2 * (right.size,), f, dtype=kind) for f in (normal, precondition))
+        z, failed = cg(operator, right, rtol=TOLERANCE, maxiter=STEPS, M=preconditioner)
         if failed:
             raise RuntimeError("the minimum-perturbation frame did not converge: lower the grid or the extent")
         return z.reshape(shape), float(np.linalg.norm(normal(z) - right) / size) if size else 0.0

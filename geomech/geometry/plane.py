@@ -12,7 +12,7 @@ import numpy as np
 from geomech.core.work import Map, each
 from geomech.geometry.connection import Connection, Velocity, as_axes, directions, least_squares, sampled_on
 from geomech.geometry.curvature import ccf, error
-from geomech.geometry.field import UNTOLD, Field
+from geomech.geometry.field import UNKNOWN_UNIT, Field
 from geomech.geometry.gait import Gait
 from geomech.geometry.images import mirrored
 from geomech.geometry.traits import NOTHING, Traits
@@ -25,8 +25,8 @@ IN_PLANE = 1e-9  # rad that the joints which are held may move
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """pair: the joints that move, from 0, the first on the first axis. at: (d,), a shape that it goes through, rad. connection:
-    of these two joints, columns of the least-squares A of all d."""
+    """A plane of shape space. pair: the joints that move, from 0, the first on the first axis. at: (d,), a shape that
+    it goes through, rad. connection: of these two joints, columns of the least-squares A of all d."""
 
     pair: tuple[int, int]
     at: tuple[float, ...]
@@ -39,38 +39,38 @@ class Plane:
 
     @cached_property
     def error(self) -> Field:
-        """Of `ccf`, as `curvature.error` has it."""
+        """Estimated error of `ccf` (`curvature.error`), values (3, N, N)."""
         return error(self.connection)
 
     @property
-    def held(self) -> list[int]:
+    def fixed(self) -> list[int]:
         """The joints that do not move, from 0."""
         return [k for k in range(len(self.at)) if k not in self.pair]
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
-    """A gait of many joints as it is seen on a plane, along the joints that are held there."""
+class ProjectedGait:
+    """A gait of many joints projected on a plane, along the joints that are fixed there."""
 
     gait: Gait
     plane: Plane
 
     def shape(self, t, amplitudes=None) -> np.ndarray:
-        """(..., 2), as `Gait.shape`."""
+        """Return shapes (..., 2) on the plane, as `Gait.shape`."""
         return self.gait.shape(t, amplitudes)[..., list(self.plane.pair)]
 
     @property
-    def lies(self) -> bool:
+    def lies_in_plane(self) -> bool:
         """Whether it moves on the plane itself."""
-        off = (
-            self.gait.shape(np.linspace(0.0, 2 * np.pi, 64))[..., self.plane.held]
-            - np.array(self.plane.at)[self.plane.held]
+        distance = (
+            self.gait.shape(np.linspace(0.0, 2 * np.pi, 64))[..., self.plane.fixed]
+            - np.array(self.plane.at)[self.plane.fixed]
         )
-        return bool(np.abs(off).max(initial=0.0) <= IN_PLANE)
+        return bool(np.abs(distance).max(initial=0.0) <= IN_PLANE)
 
 
 def checked_pair(pair: Sequence[int], joints: int) -> tuple[int, int]:
-    """pair as two different joints from 0; ValueError, which counts them from 1, for any other."""
+    """Return pair as two different joints from 0; Refusal, which counts them from 1, for any other."""
     if len(pair) != 2 or not all(is_whole(k) and 0 <= k < joints for k in pair) or pair[0] == pair[1]:
         raise Refusal(
             f"a pair must be two of the joints 1 to {joints}, got {', '.join(formatted(k + 1) for k in pair)}"
@@ -78,7 +78,7 @@ def checked_pair(pair: Sequence[int], joints: int) -> tuple[int, int]:
     return int(pair[0]), int(pair[1])
 
 
-def shapes_of(axes, pair: tuple[int, int], at: np.ndarray) -> np.ndarray:
+def plane_shapes(axes, pair: tuple[int, int], at: np.ndarray) -> np.ndarray:
     """Return the shapes (N_i, N_j, d) of the plane of two joints, ``axes`` of each, through the shape ``at`` (d,)."""
     alpha = np.broadcast_to(at, (len(axes[0]), len(axes[1]), len(at))).copy()
     alpha[..., pair[0]], alpha[..., pair[1]] = np.meshgrid(*axes, indexing="ij")
@@ -95,45 +95,45 @@ def plane(
     progress: Callable | None = None,
     *,
     traits: Traits = NOTHING,
-    unit: str = UNTOLD,
+    unit: str = UNKNOWN_UNIT,
     length: float | None = None,
     map: Map = each,
 ) -> Plane:
-    """The plane of two joints, ``axes`` of each, through the shape ``at`` (d,). Other arguments as in `connection.fit`, whose A
-    it has: fitted over all directions of alphadot, the others' too."""
+    """Return the plane of two joints, ``axes`` of each, through the shape ``at`` (d,). Other arguments as in
+    `connection.fit`, whose A it has: fitted over all directions of alphadot, not only of the two."""
     at, axes = real_array("at", at), as_axes(axes)
     if at.ndim != 1 or not np.isfinite(at).all():
         raise Refusal("at must be one finite shape", value=at.tolist())
     pair = checked_pair(pair, len(at))
-    alpha = shapes_of(axes, pair, at)
+    alpha = plane_shapes(axes, pair, at)
     rates = directions(len(at), count)
-    alike = mirrored(alpha.reshape(-1, len(at)), count) if traits.halved else ()
+    symmetries = mirrored(alpha.reshape(-1, len(at)), count) if traits.halved else ()
     A, residual, speed = sampled_on(
-        velocity, alpha, rates, least_squares(rates), progress, alike, traits.singularity, map
+        velocity, alpha, rates, least_squares(rates), progress, symmetries, traits.singularity, map
     )
-    found = Connection(axes, A[:, list(pair)], residual, speed, degree, unit=unit, length=length)
-    return Plane(pair, tuple(at.tolist()), found)
+    fitted = Connection(axes, A[:, list(pair)], residual, speed, degree, unit=unit, length=length)
+    return Plane(pair, tuple(at.tolist()), fitted)
 
 
-def looked_up(fitted: Connection, pair: tuple[int, int], at) -> Plane:
-    """The plane in a field of all joints, on its axes, interpolated between its points; near one gait nan where the data do not
-    reach. ValueError off the field, or for a plane that meets nothing of it."""
+def interpolated_plane(fitted: Connection, pair: tuple[int, int], at) -> Plane:
+    """Return the plane in a field of all joints, on its axes, interpolated between its points; near a measured gait nan
+    where the data do not reach. Refusal off the field, or for a plane that meets nothing of it."""
     at, pair = fitted.field.inside(real_array("at", at)), checked_pair(pair, len(fitted.axes))
     axes = tuple(fitted.axes[k] for k in pair)
-    alpha = shapes_of(axes, pair, at)
-    A = fitted.known.reached(alpha) if isinstance(fitted, Tube) else fitted(alpha)
+    alpha = plane_shapes(axes, pair, at)
+    A = fitted.taylor.connection_within_reach(alpha) if isinstance(fitted, Tube) else fitted(alpha)
     if np.isnan(A).all():
-        held = ", ".join(f"alpha_{k + 1} = {x:.3g}" for k, x in enumerate(at) if k not in pair)
-        there = ",".join(f"{x:.3f}" for x in fitted.known.loop.shape(np.array(0.0)))
+        fixed = ", ".join(f"alpha_{k + 1} = {x:.3g}" for k, x in enumerate(at) if k not in pair)
+        start = ",".join(f"{x:.3f}" for x in fitted.taylor.loop.shape(np.array(0.0)))
         raise Refusal(
-            f"the data do not reach the plane of {held}",
-            instead=f"slice it at a shape of the mean gait, --slice {there}",
+            f"the data do not reach the plane of {fixed}",
+            instead=f"slice it at a shape of the mean gait, --slice {start}",
         )
     A = np.moveaxis(A, (-2, -1), (0, 1))[:, list(pair)]
-    told = np.isfinite(fitted.residual).all()  # files from elsewhere tell nothing of their fit
-    left = [
-        Field(fitted.axes, x, 1) if told else lambda a: np.full(a.shape, np.nan)
+    has_residual = np.isfinite(fitted.residual).all()  # files from elsewhere tell nothing of their fit
+    fit_fields = [
+        Field(fitted.axes, x, 1) if has_residual else lambda a: np.full(a.shape, np.nan)
         for x in (fitted.residual, fitted.speed)
     ]
-    residual, speed = (np.moveaxis(f(alpha)[..., :3], -1, 0) for f in left)
+    residual, speed = (np.moveaxis(f(alpha)[..., :3], -1, 0) for f in fit_fields)
     return Plane(pair, tuple(at.tolist()), Connection(axes, A, residual, speed, fitted.degree, **fitted.size))

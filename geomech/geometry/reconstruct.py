@@ -18,17 +18,17 @@ from rft.refusal import Refusal
 
 
 class _Waves(NamedTuple):
-    """What n equally spaced samples tell apart. k: (M,), wave numbers -K .. K. place: (M,), where they are in a Fourier
-    transform, share: (M,), of what is there; the highest of an even n is shared by +-K. integral: (M,), factors of a
-    function's coefficients in those of its integral of zero mean."""
+    """Fourier terms of n equally spaced samples. k: (M,), wave numbers -K .. K. place: (M,), their indices in a Fourier
+    transform. share: (M,), of the coefficient at that index: the highest of an even n is shared by +-K. integral: (M,),
+    factors from a function's coefficients to those of its integral of zero mean."""
 
     k: np.ndarray
     place: np.ndarray
     share: np.ndarray
     integral: np.ndarray
 
-    def of(self, f: np.ndarray) -> np.ndarray:
-        """Fourier coefficients (..., M) of samples (..., n)."""
+    def coefficients(self, f: np.ndarray) -> np.ndarray:
+        """Return Fourier coefficients (..., M) of samples (..., n)."""
         return np.fft.fft(f)[..., self.place] * self.share
 
 
@@ -42,7 +42,8 @@ def _waves(n: int) -> _Waves:
 
 
 def turning(xi) -> np.ndarray:
-    """Heading (..., N) gained at the phases, less its mean growth, of zero mean over the cycle; xi as in `displacement`."""
+    """Return the heading (..., N) gained at the phases, less its mean growth, of zero mean over the cycle; xi as in
+    `displacement`."""
     xi = real_array("xi", xi)
     if xi.ndim < 2 or xi.shape[-1] != 3:
         raise Refusal("xi must be of shape (..., N, 3)", value=xi.shape)
@@ -57,7 +58,7 @@ class _Spectrum(NamedTuple):
 
 
 def displacement(xi) -> np.ndarray:
-    """Net pose (..., 3) after one cycle, in the frame at its start.
+    """Return the net pose (..., 3) after one cycle, in the frame at its start.
 
     xi: (..., N, 3), body velocity with respect to phase at t = 2 pi n / N, N >= 3.
     """
@@ -67,7 +68,7 @@ def displacement(xi) -> np.ndarray:
 
 
 def trajectory(xi, phases) -> np.ndarray:
-    """Poses (..., P, 3) at phases t (P,) from the start of the cycle; arguments as in `displacement`."""
+    """Return poses (..., P, 3) at phases t (P,) from the start of the cycle; arguments as in `displacement`."""
     s, t = _spectrum(xi), real_array("phases", phases)
     if t.ndim != 1 or not np.isfinite(t).all():
         raise Refusal("phases must be a list of finite numbers", value=t)
@@ -76,13 +77,14 @@ def trajectory(xi, phases) -> np.ndarray:
     reach = span * np.exp(0.5j * turns * span) * np.sinc(turns * span / (2 * np.pi))
     z = (s.wave[..., None, :] * reach).sum(-1)
     waves = _waves(np.shape(xi)[-2])
-    swing = waves.integral * waves.of(np.asarray(xi, float)[..., 2])
+    swing = waves.integral * waves.coefficients(np.asarray(xi, float)[..., 2])
     swing = (swing[..., None, :] * np.expm1(1j * s.k * span)).sum(-1).real
     return np.stack([z.real, z.imag, s.mean_turn * t + swing], -1)
 
 
 def poses(xi) -> np.ndarray:
-    """Poses (..., N + 1, 3) at the phases of the samples and at the cycle's end: `trajectory` there, in time N log N."""
+    """Return poses (..., N + 1, 3) at the phases of the samples and at the cycle's end: `trajectory` there, in time N
+    log N."""
     s, n = _spectrum(xi), np.shape(xi)[-2]
     span = 2 * np.pi * np.arange(n + 1) / n
     closed = lambda x: np.take(x, np.arange(n + 1) % n, -1)
@@ -98,12 +100,12 @@ def poses(xi) -> np.ndarray:
 
 
 def repeated(path: np.ndarray, cycles: int) -> np.ndarray:
-    """Poses (cycles N + 1, 3) of so many cycles that are all like one, (N + 1, 3)."""
+    """Return the poses (cycles N + 1, 3) of several equal cycles from those of one, (N + 1, 3)."""
     starts, net = np.zeros((1, 3)), path[-1]
     while len(starts) <= cycles:
         starts = np.concatenate([starts, se2.compose(se2.compose(starts[-1], net), starts)])
-    rest = se2.compose(starts[:cycles, None], path[:-1]).reshape(-1, 3)
-    return np.concatenate([rest, starts[cycles : cycles + 1]])
+    earlier = se2.compose(starts[:cycles, None], path[:-1]).reshape(-1, 3)
+    return np.concatenate([earlier, starts[cycles : cycles + 1]])
 
 
 def _spectrum(xi) -> _Spectrum:
@@ -113,31 +115,32 @@ def _spectrum(xi) -> _Spectrum:
     if not np.isfinite(xi).all():
         raise Refusal("xi must be finite")
     waves, swing = _waves(xi.shape[-2]), turning(xi)
-    wave = waves.of(np.exp(1j * (swing - swing[..., :1])) * (xi[..., 0] + 1j * xi[..., 1]))
+    wave = waves.coefficients(np.exp(1j * (swing - swing[..., :1])) * (xi[..., 0] + 1j * xi[..., 1]))
     return _Spectrum(xi[..., 2].mean(-1, keepdims=True), waves.k, wave)
 
 
 def _values(c: np.ndarray, k: np.ndarray, n: int) -> np.ndarray:
-    """sum_k c_k e^(i k t) at the n phases: the inverse of `_Waves.of`."""
-    folded = np.zeros((*c.shape[:-1], n), complex)
-    np.add.at(folded, (..., k % n), c)
-    return np.fft.ifft(folded, axis=-1) * n
+    """Return sum_k c_k e^(i k t) at the n phases: the inverse of `_Waves.coefficients`."""
+    spectrum = np.zeros((*c.shape[:-1], n), complex)
+    np.add.at(spectrum, (..., k % n), c)
+    return np.fft.ifft(spectrum, axis=-1) * n
 
 
 def slopes(xi) -> tuple[np.ndarray, np.ndarray]:
-    """(net pose (3,) of `displacement`, its derivatives (3, N, 3) by the body velocities) for one cycle xi (N, 3)."""
+    """Return (net pose (3,) of `displacement`, its derivatives (3, N, 3) by the body velocities) for one cycle xi (N,
+    3)."""
     xi, n = real_array("xi", xi), np.shape(xi)[-2]
     s = _spectrum(xi)
     turns = s.mean_turn + s.k
     reach, step = _reach(turns), 1e-5
     net = np.array([*_parts((s.wave * reach).sum()), 2 * np.pi * s.mean_turn[0]])
     share = np.where((n % 2 == 0) & (np.abs(s.k) == n // 2), 0.5, 1.0)
-    seen = _seen(n) @ (share * reach) / n  # of e^(i theta) (xi_x + i xi_y) at each phase
+    factors = _phase_factors(n) @ (share * reach) / n  # of e^(i theta) (xi_x + i xi_y) at each phase
     heading = turning(xi) - turning(xi)[0]
-    wave, way = np.exp(1j * heading) * seen, xi[:, 0] + 1j * xi[:, 1]
-    turned = (s.wave * (_reach(turns + step) - _reach(turns - step)) / (2 * step)).sum() / n
-    spread = _turning_of(n)  # heading at one phase by the turning velocity at another
-    dz = np.stack([wave, 1j * wave, (1j * wave * way) @ (spread - spread[0]) + turned], -1)
+    wave, velocity = np.exp(1j * heading) * factors, xi[:, 0] + 1j * xi[:, 1]
+    rotation_slope = (s.wave * (_reach(turns + step) - _reach(turns - step)) / (2 * step)).sum() / n
+    spread = _turning_response(n)  # heading at one phase by the turning velocity at another
+    dz = np.stack([wave, 1j * wave, (1j * wave * velocity) @ (spread - spread[0]) + rotation_slope], -1)
     return net, np.stack([dz.real, dz.imag, np.broadcast_to([0.0, 0.0, 2 * np.pi / n], (n, 3))])
 
 
@@ -146,19 +149,19 @@ def _parts(z: complex) -> tuple[float, float]:
 
 
 def _reach(turns: np.ndarray) -> np.ndarray:
-    """Integral of e^(i turns t) over a cycle."""
+    """Return integral of e^(i turns t) over a cycle."""
     return 2 * np.pi * np.exp(1j * np.pi * turns) * np.sinc(turns)
 
 
 @functools.lru_cache(maxsize=8)
-def _seen(n: int) -> np.ndarray:
-    """(N, M): e^(-i k t) at each phase, for every wave number of `_waves`."""
+def _phase_factors(n: int) -> np.ndarray:
+    """Return (N, M): e^(-i k t) at each phase, for every wave number of `_waves`."""
     return np.exp(-1j * np.outer(2 * np.pi * np.arange(n) / n, _waves(n).k))
 
 
 @functools.lru_cache(maxsize=8)
-def _turning_of(n: int) -> np.ndarray:
-    """(N, N): `turning` at the phases (rows) by the turning velocity at each of them (columns)."""
+def _turning_response(n: int) -> np.ndarray:
+    """Return (N, N): `turning` at the phases (rows) per unit of xi_theta at each of them (columns)."""
     unit = np.zeros((n, n, 3))
     unit[..., 2] = np.eye(n)
     return turning(unit).T

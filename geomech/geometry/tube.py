@@ -29,8 +29,8 @@ SHAPES_TOGETHER = 4096  # whose distances from all places are held at a time
 def waves(t, harmonics: int, order: int = 0) -> np.ndarray:
     """(..., 2 harmonics + 1): 1, cos t, sin t, cos 2t, sin 2t ... or their derivatives of that order."""
     k = np.arange(1, harmonics + 1)
-    turned = np.asarray(t, float)[..., None] * k + order * np.pi / 2  # each derivative is a quarter turn on
-    both = np.stack([np.cos(turned), np.sin(turned)], -1) * (k.astype(float) ** order)[:, None]
+    angle = np.asarray(t, float)[..., None] * k + order * np.pi / 2  # each derivative is a quarter turn on
+    both = np.stack([np.cos(angle), np.sin(angle)], -1) * (k.astype(float) ** order)[:, None]
     one = np.full((*np.shape(t), 1), float(order == 0))
     return np.concatenate([one, both.reshape(*np.shape(t), 2 * harmonics)], -1)
 
@@ -56,24 +56,25 @@ class Loop:
 
     @cached_property
     def _places(self) -> tuple[np.ndarray, np.ndarray]:
-        """(phases (P,), shapes (P, d))."""
+        """Phases (P,) and shapes (P, d) at which the nearest point is first looked for."""
         t = 2 * np.pi * np.arange(PLACES) / PLACES
         return t, self.shape(t)
 
     @cached_property
     def _normals(self) -> np.ndarray:
-        """(P + 1, d, d - 1) of more than two joints, at the places and at the first once more. They turn about the curve as
-        little as they can and close after a cycle: parallel transport, whose holonomy is spread over all of it."""
+        """Normals (P + 1, d, d - 1) of more than two joints, at the places and at the first once more. They rotate about
+        the curve as little as they can and close after a cycle: parallel transport, whose holonomy is spread over all of
+        it."""
         from scipy.linalg import expm, logm
 
         rate = self.shape(self._places[0], 1)
         tangent = rate / np.linalg.norm(rate, axis=1, keepdims=True)
-        found = [_complement(tangent[0])]
+        frames_along = [_complement(tangent[0])]
         for t in [*tangent[1:], tangent[0]]:
-            u, _, v = np.linalg.svd(found[-1] - np.outer(t, t @ found[-1]), full_matrices=False)
-            found.append(u @ v)
-        back = np.real(logm(found[0].T @ found[-1]))
-        return np.array([n @ expm(-k / PLACES * back) for k, n in enumerate(found)])
+            u, _, v = np.linalg.svd(frames_along[-1] - np.outer(t, t @ frames_along[-1]), full_matrices=False)
+            frames_along.append(u @ v)
+        holonomy = np.real(logm(frames_along[0].T @ frames_along[-1]))
+        return np.array([n @ expm(-k / PLACES * holonomy) for k, n in enumerate(frames_along)])
 
     def normals(self, t) -> np.ndarray:
         """(..., d, d - 1): orthonormal, and normal to the curve, at phases t (...)."""
@@ -91,19 +92,19 @@ class Loop:
         flat = np.reshape(alpha, (-1, np.shape(alpha)[-1]))
         t, places = self._places
         rows = [flat[k : k + SHAPES_TOGETHER] for k in range(0, len(flat), SHAPES_TOGETHER)]
-        off = lambda some: (places**2).sum(1) - 2 * some @ places.T  # + |some|^2, the same for all
-        start = np.concatenate([t[off(some).argmin(1)] for some in rows]) if rows else np.zeros(0)
+        squared_distance = lambda shapes: (places**2).sum(1) - 2 * shapes @ places.T  # + |some|^2, the same for all
+        start = np.concatenate([t[squared_distance(shapes).argmin(1)] for shapes in rows]) if rows else np.zeros(0)
         return self.projected(alpha, start.reshape(np.shape(alpha)[:-1]), np.pi / PLACES)
 
     def projected(self, alpha, t, step: float = 0.1) -> np.ndarray:
         """Phases (...,) near t at which alpha - theta is normal to the curve: Newton, at most ``step`` rad at a time."""
         for _ in range(NEWTON):
-            off, rate, bend = alpha - self.shape(t), self.shape(t, 1), self.shape(t, 2)
+            deviation, rate, bend = alpha - self.shape(t), self.shape(t, 1), self.shape(t, 2)
             square = (rate**2).sum(-1)
             slope = np.maximum(
-                square - (off * bend).sum(-1), 0.2 * square
+                square - (deviation * bend).sum(-1), 0.2 * square
             )  # beyond the centre of curvature Gauss-Newton
-            t = t + np.clip((off * rate).sum(-1) / slope, -step, step)
+            t = t + np.clip((deviation * rate).sum(-1) / slope, -step, step)
         return t
 
 
@@ -112,8 +113,8 @@ def _between(values: np.ndarray, t) -> np.ndarray:
     count = values.shape[-1]
     places = 2 * np.pi * np.arange(count + 1) / count
     closed = np.concatenate([values, values[..., :1]], -1).reshape(-1, count + 1)
-    at = np.stack([np.interp(np.asarray(t) % (2 * np.pi), places, row) for row in closed], -1)
-    return at.reshape(*np.shape(t), *values.shape[:-1])
+    values_at = np.stack([np.interp(np.asarray(t) % (2 * np.pi), places, row) for row in closed], -1)
+    return values_at.reshape(*np.shape(t), *values.shape[:-1])
 
 
 def _complement(unit: np.ndarray) -> np.ndarray:
@@ -125,15 +126,15 @@ def _complement(unit: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
-    """What is known along a gait, coefficients of Fourier series in its phase.
+class TaylorSeries:
+    """The Taylor series of a connection about a gait, coefficients of Fourier series in its phase.
 
     A: (3, d, 2 K + 1). slope: (3, d, d - 1, 2 K + 1), dA/dn_k. errors: (E, 3, d, d, 2 K + 1), of A and then of its slopes,
     independent: the squares of what each does to a result add up to its variance. spread: (d, d, P), at equally spaced
     phases: the data reach a shape where delta . spread^-1 delta <= 1. beyond: (3,), of a net pose: what the variation of the
     cycles changes in it beyond the first order; where links begin and cease to stick, a Taylor series may be off by as much.
-    off: (3, 2, P), at equally spaced phases: standard errors of A along the gait, and across it, for what is left of xi and
-    what the series cut off.
+    standard_error: (3, 2, P), at equally spaced phases, of A along the gait and across it: for the residual of xi and for the
+    harmonics that the series omit.
     factor: an error is this many standard deviations. level: share of cases in which it is meant to cover the truth."""
 
     loop: Loop
@@ -142,107 +143,111 @@ class Known:
     errors: np.ndarray
     spread: np.ndarray
     beyond: np.ndarray
-    off: np.ndarray
+    standard_error: np.ndarray
     factor: float
     level: float
 
     def _deviation(self, alpha) -> tuple[np.ndarray, np.ndarray]:
-        """(phases (...,), deviations (..., d)) of shapes (..., d)."""
+        """Return the phases (...,) of the nearest points and the deviations (..., d) of shapes (..., d)."""
         t = self.loop.nearest(alpha)
         return t, alpha - self.loop.shape(t)
 
     def spread_at(self, t) -> np.ndarray:
-        """(..., d, d) at phases t (...)."""
+        """Return the spread (..., d, d) at phases t (...)."""
         return _between(self.spread, t)
 
-    def off_at(self, t) -> np.ndarray:
-        """(..., 3, d): standard errors of A at phases t (...), as `off`."""
+    def standard_error_at(self, t) -> np.ndarray:
+        """Return the standard errors (..., 3, d) of A at phases t (...), as `standard_error`."""
         rate = self.loop.shape(t, 1)
         along = rate**2 / (rate**2).sum(-1, keepdims=True)
-        return np.sqrt(_between(self.off**2, t) @ np.stack([along, 1 - along], -2))
+        return np.sqrt(_between(self.standard_error**2, t) @ np.stack([along, 1 - along], -2))
 
     def reach(self, alpha) -> np.ndarray:
-        """(...,): how far shapes (..., d) are from the gait, 1 where the data end."""
+        """Return the distances (...,) of shapes (..., d) from the gait, 1 where the data end."""
         t, delta = self._deviation(real_array("alpha", alpha))
         return np.sqrt(np.einsum("...i,...ij,...j->...", delta, np.linalg.inv(self.spread_at(t)), delta))
 
     def terms(self, t, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
-        """(waves (..., 2 K + 1), terms (..., d, d)), such that xi_i = sum of whole_i,j,m,k terms_j,m waves_k with `whole`, at
-        shapes and rates (..., d), the nearest points to which have phases t (...)."""
+        """Return (waves (..., 2 K + 1), terms (..., d, d)), such that xi_i = sum of combined_i,j,m,k terms_j,m waves_k,
+        at shapes and rates (..., d) whose nearest points of the gait have phases t (...)."""
         normal = np.einsum("...ik,...i->...k", self.loop.normals(t), alpha - self.loop.shape(t))
         one = np.concatenate([np.ones((*normal.shape[:-1], 1)), normal], -1)
         return waves(t, self.A.shape[-1] // 2), alphadot[..., :, None] * one[..., None, :]
 
     @cached_property
-    def whole(self) -> np.ndarray:
-        """(3, d, d, 2 K + 1): A, and then its slopes."""
+    def combined(self) -> np.ndarray:
+        """Coefficients (3, d, d, 2 K + 1) of A and then of its slopes."""
         return np.concatenate([self.A[:, :, None], self.slope], 2)
 
-    def of(self, alpha) -> np.ndarray:
+    def connection(self, alpha) -> np.ndarray:
         """A (..., 3, d) at shapes (..., d), wherever these are."""
         w, terms = self.terms(self.loop.nearest(alpha), alpha, np.ones(np.shape(alpha)))
-        return np.einsum("ijmk,...k,...jm->...ij", self.whole, w, terms)
+        return np.einsum("ijmk,...k,...jm->...ij", self.combined, w, terms)
 
-    def reached(self, alpha) -> np.ndarray:
+    def connection_within_reach(self, alpha) -> np.ndarray:
         """A (..., 3, d) at shapes (..., d); nan where the data do not reach."""
         near = self.reach(alpha) <= 1
         found = np.full((*near.shape, *self.A.shape[:2]), np.nan)
-        found[near] = self.of(alpha[near])
+        found[near] = self.connection(alpha[near])
         return found
 
-    def of_error(self, alpha) -> np.ndarray:
-        """(..., 3, d): of `of`."""
+    def connection_error(self, alpha) -> np.ndarray:
+        """Return the errors (..., 3, d) of `connection`."""
         t = self.loop.nearest(alpha)
         w, terms = self.terms(t, alpha, np.ones(np.shape(alpha)))
         squares = (np.einsum("ijmk,...k,...jm->...ij", x, w, terms) ** 2 for x in self.errors)
-        return self.factor * np.sqrt(sum(squares) + self.off_at(t) ** 2)
+        return self.factor * np.sqrt(sum(squares) + self.standard_error_at(t) ** 2)
 
-    def ccf(self, alpha, whole: np.ndarray | None = None) -> np.ndarray:
-        """(..., 3): the CCF of two joints at shapes (..., 2), of this connection or another ``whole`` along the same gait.
-        alpha = theta(phi) + s n(phi) has d alpha / d phi = theta' (1 - curvature s), and dA/ds is the slope."""
-        whole = self.whole if whole is None else whole
+    def ccf(self, alpha, combined: np.ndarray | None = None) -> np.ndarray:
+        """Return the CCF (..., 3) of two joints at shapes (..., 2), of this connection or another ``combined`` along
+        the same gait. alpha = theta(phi) + s n(phi) has d alpha / d phi = theta' (1 - curvature s), and dA/ds is the
+        slope."""
+        combined = self.combined if combined is None else combined
         t, delta = self._deviation(alpha)
         rate, bend, n = self.loop.shape(t, 1), self.loop.shape(t, 2), self.loop.normals(t)[..., 0]
         speed, s = np.linalg.norm(rate, axis=-1), (n * delta).sum(-1)
         ahead = speed - s * (bend * n).sum(-1) / speed  # |d alpha / d phi|
-        (A, slope), (A_on, slope_on) = ([series(whole[:, :, m], t, order) for m in (0, 1)] for order in (0, 1))
+        (A, slope), (A_on, slope_on) = ([series(combined[:, :, m], t, order) for m in (0, 1)] for order in (0, 1))
         along = (A_on + slope_on * s[..., None, None]) / ahead[..., None, None]
-        turned = np.einsum("...ij,...j->...i", along, n) - np.einsum("...ij,...j->...i", slope, rate / speed[..., None])
-        here = A + slope * s[..., None, None]
-        return turned + se2.bracket(here[..., 0], here[..., 1])
+        derivative = np.einsum("...ij,...j->...i", along, n) - np.einsum(
+            "...ij,...j->...i", slope, rate / speed[..., None]
+        )
+        A_here = A + slope * s[..., None, None]
+        return derivative + se2.bracket(A_here[..., 0], A_here[..., 1])
 
     def ccf_error(self, alpha) -> np.ndarray:
-        """(..., 3): of `ccf`."""
-        found = self.ccf(alpha)
-        return self.factor * np.sqrt(sum((self.ccf(alpha, self.whole + x) - found) ** 2 for x in self.errors))
+        """Return the errors (..., 3) of `ccf`."""
+        value = self.ccf(alpha)
+        return self.factor * np.sqrt(sum((self.ccf(alpha, self.combined + x) - value) ** 2 for x in self.errors))
 
     def error(self, alpha, alphadot) -> np.ndarray:
-        """(..., 3): of the net pose of gaits alpha, alphadot (..., N, d)."""
+        """Return the errors (..., 3) of the net pose of gaits alpha, alphadot (..., N, d)."""
         w, terms = self.terms(self.loop.nearest(alpha), alpha, alphadot)
-        of = lambda x: np.einsum("ijmk,...nk,...njm->...ni", x, w, terms)
-        net = displacement(of(self.whole))
-        apart = [displacement(of(self.whole + x)) - net for x in self.errors]
-        return np.hypot(self.factor * np.sqrt(np.sum(np.square(apart), 0)), self.beyond)
+        velocity = lambda x: np.einsum("ijmk,...nk,...njm->...ni", x, w, terms)
+        net = displacement(velocity(self.combined))
+        differences = [displacement(velocity(self.combined + x)) - net for x in self.errors]
+        return np.hypot(self.factor * np.sqrt(np.sum(np.square(differences), 0)), self.beyond)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Tube(Connection):
-    """A connection that is looked up near a gait; its grid, nan where the data do not reach, is for pictures and files."""
+    """A connection that is evaluated near a gait; its grid, nan where the data do not reach, is for pictures and
+    files."""
 
-    known: Known | None = None
+    taylor: TaylorSeries | None = None
 
     def reach(self, alpha) -> np.ndarray:
-        """As `Known.reach`."""
-        return self.known.reach(alpha)
+        """Return the distances (...,) of shapes from the gait, as `TaylorSeries.reach`."""
+        return self.taylor.reach(alpha)
 
     def checked(self, alpha) -> np.ndarray:
-        """alpha, or ValueError naming the first shape that the data do not reach."""
+        """Return alpha; Refusal names the first shape that the data do not reach."""
         alpha = inside(self.axes, alpha)
-        far = self.reach(alpha)
-        if (far > 1 + 1e-9).any():
-            shape = ", ".join(f"{x:.3g}" for x in alpha[far > 1 + 1e-9][0])
+        reach = self.reach(alpha)
+        if (reach > 1 + 1e-9).any():
+            shape = ", ".join(f"{x:.3g}" for x in alpha[reach > 1 + 1e-9][0])
             raise Refusal(
-                f"the data do not reach alpha = ({shape}), {far.max():.2g} times as far from the mean gait as they go",
+                f"the data do not reach alpha = ({shape}), {reach.max():.2g} times as far from the mean gait as they go",
                 instead="keep near that gait, or measure more varied cycles",
             )
         return alpha
@@ -252,31 +257,31 @@ class Tube(Connection):
         shapes = np.stack(np.meshgrid(*self.axes, indexing="ij"), -1)
         reached, d = ~np.isnan(self.A[0, 0]), len(self.axes)
         values = function(shapes[reached])
-        found = np.full((*reached.shape, *values.shape[1:]), np.nan)
-        found[reached] = values
-        return np.moveaxis(found, range(d), range(-d, 0))
+        fields = np.full((*reached.shape, *values.shape[1:]), np.nan)
+        fields[reached] = values
+        return np.moveaxis(fields, range(d), range(-d, 0))
 
     def __call__(self, alpha) -> np.ndarray:
         """A (..., 3, d) at shapes alpha (..., d); ValueError where the data do not reach."""
-        return self.known.of(self.checked(alpha))
+        return self.taylor.connection(self.checked(alpha))
 
 
-def grid_of(known: Known, points: int) -> tuple[np.ndarray, ...]:
-    """Axes, of so many points, that span all that the data reach."""
+def covering_grid(taylor: TaylorSeries, points: int) -> tuple[np.ndarray, ...]:
+    """Return axes of ``points`` points each that span all that the data reach."""
     t = 2 * np.pi * np.arange(PLACES) / PLACES
-    step = np.abs(known.loop.shape(t, 2)).max(0) * (np.pi / PLACES) ** 2 / 2  # what a curve may do between two places
-    wide = np.sqrt(np.einsum("tii->ti", known.spread_at(t))) + step
-    low, high = (known.loop.shape(t) - wide).min(0), (known.loop.shape(t) + wide).max(0)
+    step = np.abs(taylor.loop.shape(t, 2)).max(0) * (np.pi / PLACES) ** 2 / 2  # what a curve may do between two places
+    wide = np.sqrt(np.einsum("tii->ti", taylor.spread_at(t))) + step
+    low, high = (taylor.loop.shape(t) - wide).min(0), (taylor.loop.shape(t) + wide).max(0)
     return tuple(np.linspace(a, b, points) for a, b in zip(low, high))
 
 
-def tube(known: Known, axes: Sequence[np.ndarray], residual: np.ndarray, unit: str, length: float) -> Tube:
-    """On a grid, nan where the data do not reach. residual: (3,), what the fit leaves of xi for |alphadot| = 1. unit, length:
-    as of `Connection`."""
+def tube(taylor: TaylorSeries, axes: Sequence[np.ndarray], residual: np.ndarray, unit: str, length: float) -> Tube:
+    """Return the connection on a grid, nan where the data do not reach. residual: (3,), of the fit of xi for |alphadot|
+    = 1. unit, length: as of `Connection`."""
     axes = tuple(axes)
     shapes = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
-    A = np.moveaxis(known.reached(shapes), (-2, -1), (0, 1))
+    A = np.moveaxis(taylor.connection_within_reach(shapes), (-2, -1), (0, 1))
     masked = np.isnan(A[:, 0])
-    left = np.where(masked, np.nan, residual.reshape(3, *[1] * len(axes)))
-    speed, degree = np.sqrt((A**2).mean(1) + left**2), min(3, min(map(len, axes)) - 1)
-    return Tube(axes, A, left, speed, degree, known, unit=unit, length=length)
+    masked_residual = np.where(masked, np.nan, residual.reshape(3, *[1] * len(axes)))
+    speed, degree = np.sqrt((A**2).mean(1) + masked_residual**2), min(3, min(map(len, axes)) - 1)
+    return Tube(axes, A, masked_residual, speed, degree, taylor, unit=unit, length=length)

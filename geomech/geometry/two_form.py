@@ -45,7 +45,7 @@ class TwoForm:
         return f"TwoForm({len(self.pairs)} pairs of {self.field.joints} joints; {self.field!r})"
 
     def pair(self, i: int, j: int) -> Field:
-        """CCF_ij, values (3, N_1, ..., N_d); that of (j, i) has the other sign."""
+        """Return CCF_ij, values (3, N_1, ..., N_d); that of (j, i) has the other sign."""
         if {i, j} not in map(set, self.pairs) or i == j:
             raise Refusal(f"i and j must be two of the joints 0 to {self.field.joints - 1}, got {i} and {j}")
         sign = 1.0 if i < j else -1.0
@@ -53,7 +53,8 @@ class TwoForm:
         return replace(self.field, values=values)
 
     def slice(self, i: int, j: int, at) -> Field:
-        """CCF_ij over the plane of joints i and j through the shape ``at`` (d,): a field of two joints, to be drawn."""
+        """Return CCF_ij over the plane of joints i and j through the shape ``at`` (d,): a field of two joints, to be
+        drawn."""
         at = self.field.inside(real_array("at", at))
         axes = self.field.axes[i], self.field.axes[j]
         shapes = np.broadcast_to(at, (len(axes[0]), len(axes[1]), len(at))).copy()
@@ -65,92 +66,97 @@ class TwoForm:
         return self.field.joints
 
     def inside(self, alpha) -> np.ndarray:
-        """As `Field.inside`."""
+        """Return alpha as an array; Refusal outside the grid (`Field.inside`)."""
         return self.field.inside(alpha)
 
     def __call__(self, alpha, u, v) -> np.ndarray:
-        """CCF(u, v) (..., 3) at shapes alpha (..., d), for changes of shape u, v (..., d)."""
+        """Return CCF(u, v) (..., 3) at shapes alpha (..., d), for changes of shape u, v (..., d)."""
         i, j = np.array(self.pairs).T
         area = u[..., i] * v[..., j] - u[..., j] * v[..., i]
         return np.einsum("...pc,...p->...c", self.field(alpha), area)
 
 
 def two_form(connection: Connection) -> TwoForm:
-    """The CCF of all pairs of joints, of order `Connection.degree` in the spacing."""
-    return _of_pairs(ccf, connection)
+    """Return the CCF of all pairs of joints, of order `Connection.degree` in the spacing."""
+    return _from_pairs(ccf, connection)
 
 
 def error(connection: Connection) -> TwoForm:
-    """Its estimated error, that of each pair (`geomech.geometry.curvature.error`)."""
-    return _of_pairs(ccf_error, connection)
+    """Return the estimated error of `two_form`, that of each pair (`geomech.geometry.curvature.error`)."""
+    return _from_pairs(ccf_error, connection)
 
 
-def _of_pairs(made: Callable, connection: Connection) -> TwoForm:
+def _from_pairs(component: Callable, connection: Connection) -> TwoForm:
     pairs = tuple(combinations(range(len(connection.axes)), 2))
     if not pairs:
         raise Refusal("a CCF needs at least two joints", because="a loop of one joint encloses no area")
-    values = np.stack([made(connection, i, j).values for i, j in pairs])
+    values = np.stack([component(connection, i, j).values for i, j in pairs])
     return TwoForm(replace(connection.field, values=values), pairs)
 
 
 class Spanned(NamedTuple):
-    """Displacement (B, 3) by the integral over a cone from the mean of the loop. other: by cones from shapes on the loop,
-    (B, tips, 3). spread: (B, 2), the largest distance between them, of positions in the form's unit of length and of headings
-    in rad: what hangs on the surface."""
+    """Displacement (B, 3) by the integral over a cone from the mean of the loop. others: by cones from shapes on the
+    loop, (B, tips, 3). spread: (B, 2), the largest distance between them, of positions in the form's unit of length and
+    of headings in rad: the part that depends on the surface."""
 
     net: np.ndarray
-    other: np.ndarray
+    others: np.ndarray
     spread: np.ndarray
 
 
 def spanned(form: TwoForm, gait: Gait, amplitudes=None, phases: int = 256, tips: int = 4) -> Spanned:
-    """The area tier of a gait of any number of joints, for amplitudes (B,) or its own, and how much hangs on the surface, by
-    ``tips`` others. ValueError where the gait leaves the field, whose box holds every cone over a loop in it."""
+    """Return the displacements by the area tier of a gait of any number of joints, for amplitudes (B,) or its own, and
+    how much depends on the surface, by ``tips`` others. Refusal where the gait leaves the field, whose box holds every
+    cone over a loop in it."""
     in_range("phases", phases, 8, 1e6, whole=True)
     in_range("tips", tips, 0, phases, whole=True)
     if checked_gait(gait).joints != form.joints:
         raise Refusal(f"the gait moves {gait.joints} joints, the field has {form.joints}")
     amplitudes = np.atleast_1d(real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes))
-    at_once = max(1, SAMPLES_TOGETHER // int(phases))
-    groups = [amplitudes[k : k + at_once] for k in range(0, max(1, len(amplitudes)), at_once)]
-    net, other = map(np.concatenate, zip(*(_cones(form, gait, some, int(phases), int(tips)) for some in groups)))
-    return _apart(net, other)
+    batch = max(1, SAMPLES_TOGETHER // int(phases))
+    groups = [amplitudes[k : k + batch] for k in range(0, max(1, len(amplitudes)), batch)]
+    net, others = map(np.concatenate, zip(*(_cones(form, gait, group, int(phases), int(tips)) for group in groups)))
+    return _with_spread(net, others)
 
 
 def spanned_by(A: Callable, gait: Gait, amplitudes=None, phases: int = 256, tips: int = 2, around: int = 64) -> Spanned:
-    """`spanned` without a field: A (..., 3, d) is asked for at shapes (..., d) of the cones. By Stokes's theorem the integral
-    of dA is that of A along the loop, of ``phases``, whatever the surface; left on each cone is [A, A], at ``around``."""
+    """Return `spanned` without a field: A (..., 3, d) is evaluated at shapes (..., d) of the cones. By Stokes's theorem
+    the integral of dA is that of A along the loop, of ``phases``, whatever the surface; only [A, A] is integrated over
+    each cone, at ``around`` phases."""
     in_range("phases", phases, 8, 1e6, whole=True)
     in_range("tips", tips, 0, around, whole=True)
     amplitudes = np.atleast_1d(real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes))
     alpha, alphadot = checked_gait(gait).cycle(int(phases), amplitudes)
     along = np.einsum("...ij,...j->...i", A(alpha), alphadot).mean(1)
     alpha, alphadot = gait.cycle(max(int(around), 4 * gait.harmonics + 2), amplitudes)
-    at = [alpha.mean(1, keepdims=True), *(alpha[:, k * alpha.shape[1] // max(1, tips), None] for k in range(tips))]
-    net, *others = (se2.exp(2 * np.pi * (along + _brackets(A, alpha, alphadot, tip))) for tip in at)
-    return _apart(net, np.stack(others, 1) if others else np.zeros((len(net), 0, 3)))
+    tips_at = [alpha.mean(1, keepdims=True), *(alpha[:, k * alpha.shape[1] // max(1, tips), None] for k in range(tips))]
+    net, *others = (se2.exp(2 * np.pi * (along + _brackets(A, alpha, alphadot, tip))) for tip in tips_at)
+    return _with_spread(net, np.stack(others, 1) if others else np.zeros((len(net), 0, 3)))
 
 
 def _brackets(A: Callable, alpha, alphadot, tip) -> np.ndarray:
-    """Integral (B, 3) of [A, A] over tip + s (alpha - tip), over 2 pi."""
+    """Return integral (B, 3) of [A, A] over tip + s (alpha - tip), over 2 pi."""
     nodes, weights = np.polynomial.legendre.leggauss(RADII)
     total = 0.0
     for s, w in zip((nodes + 1) / 2, weights / 2):
-        there = A(tip + s * (alpha - tip))
-        u, v = (np.einsum("...ij,...j->...i", there, x) for x in (alpha - tip, s * alphadot))
+        A_cone = A(tip + s * (alpha - tip))
+        u, v = (np.einsum("...ij,...j->...i", A_cone, x) for x in (alpha - tip, s * alphadot))
         total = total + w * se2.bracket(u, v).mean(1)
     return total
 
 
-def _apart(net: np.ndarray, other: np.ndarray) -> Spanned:
-    """With the spread of poses (B, tips, 3) from net (B, 3)."""
-    apart = other - net[:, None]
-    spread = np.stack([np.hypot(apart[..., 0], apart[..., 1]), np.abs(apart[..., 2])], -1).max(1, initial=0.0)
-    return Spanned(net, other, spread)
+def _with_spread(net: np.ndarray, others: np.ndarray) -> Spanned:
+    """Return the displacement with the spread of poses (B, tips, 3) from net (B, 3)."""
+    difference = others - net[:, None]
+    spread = np.stack([np.hypot(difference[..., 0], difference[..., 1]), np.abs(difference[..., 2])], -1).max(
+        1, initial=0.0
+    )
+    return Spanned(net, others, spread)
 
 
 def _cones(form: TwoForm, gait: Gait, amplitudes, phases: int, tips: int) -> tuple[np.ndarray, np.ndarray]:
-    """exp of the integrals over the cone from the mean shape (B, 3), and over those from shapes on the loop (B, tips, 3)."""
+    """Return exp of the integrals over the cone from the mean shape (B, 3), and over those from shapes on the loop (B,
+    tips, 3)."""
     alpha, alphadot = gait.cycle(phases, amplitudes)  # (B, N, d)
     form.inside(alpha)
     on_loop = [alpha[:, k * phases // tips, None] for k in range(tips)]
@@ -159,7 +165,7 @@ def _cones(form: TwoForm, gait: Gait, amplitudes, phases: int, tips: int) -> tup
 
 
 def _cone(form: TwoForm, alpha, alphadot, tip) -> np.ndarray:
-    """exp of the integral (B, 3) over tip + s (alpha - tip), s from 0 to 1."""
+    """Return exp of the integral (B, 3) over tip + s (alpha - tip), s from 0 to 1."""
     nodes, weights = np.polynomial.legendre.leggauss(RADII)
     total = 0.0
     for s, w in zip((nodes + 1) / 2, weights / 2):

@@ -1,4 +1,4 @@
-"""What a local connection asks of a velocity, tried at a few shapes and rates before thousands are asked for."""
+"""What a local connection requires of a velocity, checked at a few shapes and rates before thousands are computed."""
 
 from __future__ import annotations
 
@@ -15,51 +15,52 @@ Velocity = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 SHAPES = 11  # tried, scattered over the grid; more than a body of a field has joints, so that none is taken for one
 RATES = 13  # at each
-OFF = 1e-3  # of the velocity's rms: more than solvers and roundings leave
+TOLERANCE = 1e-3  # of the velocity's rms: more than solvers and roundings leave
 SAME = 1e-12  # of it: what does not depend on the shape at all
 
 
-def tried(velocity: Callable, axes, masked: bool) -> Callable:
-    """The velocity, as `geomech.geometry.connection.evaluate` takes it. One that is written for a single shape is asked for
-    one at a time. VelocityWarning, one for all that it lacks, if it is not odd or not homogeneous in alphadot, or ignores
-    alpha.
-    """
+def checked_velocity(velocity: Callable, axes, masked: bool) -> Callable:
+    """Return the velocity, as `geomech.geometry.connection.evaluate` takes it; one for a single shape is called one by
+    one. Warn (`VelocityWarning`, once for all reasons) if it is not odd or not homogeneous in alphadot, or ignores
+    alpha."""
     rng = np.random.default_rng(0)
     alpha = np.stack([rng.uniform(a[0], a[-1], SHAPES) for a in axes], -1)[:, None]
     alpha, rates = np.broadcast_arrays(alpha, rng.normal(size=(RATES, len(axes))))
     velocity = in_batches(velocity, alpha, rates)
-    ask = lambda rates: np.broadcast_to(np.asarray(velocity(alpha, rates), float), (SHAPES, RATES, 3))
+    values = lambda rates: np.broadcast_to(np.asarray(velocity(alpha, rates), float), (SHAPES, RATES, 3))
     try:
-        xi, back, twice = ask(rates), ask(-rates), ask(2 * rates)
+        xi, backwards, twice = values(rates), values(-rates), values(2 * rates)
     except ValueError:  # of another shape, or refused at these shapes: told in full where the grid is asked for
         return velocity
-    good = np.isfinite(xi + back + twice).all(-1)
+    good = np.isfinite(xi + backwards + twice).all(-1)
     if (masked or good.all()) and good.any() and (scale := np.sqrt((xi[good] ** 2).mean())) > 0:
-        lacks = _lacking(xi, back, twice, good, scale)
+        lacks = _lacking(xi, backwards, twice, good, scale)
         if lacks:
             warnings.warn(f"this velocity {'; it '.join(lacks)}", VelocityWarning, stacklevel=3)
     return velocity
 
 
-def _lacking(xi, back, twice, good, scale) -> list[str]:
-    off = lambda difference: np.abs(difference[good]).max() / scale
+def _lacking(xi, backwards, twice, good, scale) -> list[str]:
+    difference_over_size = lambda difference: np.abs(difference[good]).max() / scale
     lacks = []
-    if (by := off(back + xi)) > OFF:
+    if (deviation := difference_over_size(backwards + xi)) > TOLERANCE:
         lacks.append(
-            f"is not odd in alphadot (off by {by:.2g} of its size): a connection tells one direction of each two"
+            f"is not odd in alphadot (off by {deviation:.2g} of its size): a connection tells one direction of each two"
         )
-    if (by := off(twice - 2 * xi) / 2) > OFF:
-        lacks.append(f"is not homogeneous in alphadot (off by {by:.2g}): a connection holds at |alphadot| = 1 only")
+    if (deviation := difference_over_size(twice - 2 * xi) / 2) > TOLERANCE:
+        lacks.append(
+            f"is not homogeneous in alphadot (off by {deviation:.2g}): a connection holds at |alphadot| = 1 only"
+        )
     if np.ptp(np.where(good[..., None], xi, xi[good][0]), axis=0).max() <= SAME * scale and good.all():
         lacks.append("ignores alpha: is it asked for at the shape that is passed?")
     return lacks
 
 
 def in_batches(velocity: Callable, alpha, rates) -> Callable:
-    """The velocity if it takes shapes and rates (S, C, d) at once, else, if it takes a single shape and rate, one that
-    asks for each in turn."""
+    """Return the velocity if it takes shapes and rates (S, C, d) at once; else, if it takes a single shape and rate,
+    one that calls it for each."""
     try:
-        if fits(velocity(alpha, rates), (*alpha.shape[:-2], *rates.shape[:-1], 3)):
+        if broadcasts_to(velocity(alpha, rates), (*alpha.shape[:-2], *rates.shape[:-1], 3)):
             return velocity
     except (TypeError, ValueError, IndexError):
         pass
@@ -71,16 +72,16 @@ def in_batches(velocity: Callable, alpha, rates) -> Callable:
     return each
 
 
-def fits(xi, shape) -> bool:
-    """Whether xi broadcasts to velocities of that shape, (..., 3)."""
-    found = np.shape(xi)
+def broadcasts_to(xi, shape) -> bool:
+    """Return whether xi broadcasts to velocities of that shape, (..., 3)."""
+    given = np.shape(xi)
     return (
-        found[-1:] == (3,) and len(found) <= len(shape) and all(n in (1, m) for n, m in zip(found[::-1], shape[::-1]))
+        given[-1:] == (3,) and len(given) <= len(shape) and all(n in (1, m) for n, m in zip(given[::-1], shape[::-1]))
     )
 
 
 def one_by_one(velocity: Callable) -> Callable:
-    """A velocity of a single shape (d,) and rate (d,) as one of many."""
+    """Return a velocity of many shapes from one of a single shape (d,) and rate (d,)."""
 
     def each(alpha, alphadot):
         alpha, alphadot = np.broadcast_arrays(alpha, alphadot)
@@ -93,22 +94,22 @@ def one_by_one(velocity: Callable) -> Callable:
     return each
 
 
-class Telling:
-    """A velocity that tells more than xi, wherever it is asked: both(alpha, alphadot) gives xi and more, which is heard(more)
-    in the order of the shapes."""
+class Reporting:
+    """A velocity that reports more than xi: with_report(alpha, alphadot) returns xi and the report, and receive(report)
+    is called in the order of the shapes."""
 
     def __call__(self, alpha, alphadot) -> np.ndarray:
-        return self.both(alpha, alphadot)[0]
+        return self.with_report(alpha, alphadot)[0]
 
 
 def evaluate(velocity: Velocity, alpha, alphadot, masked: bool = False) -> np.ndarray:
-    """velocity(alpha, alphadot), or ValueError if that is not of shape (..., 3), and does not broadcast to it, or not finite
-    unless ``masked``."""
+    """Return velocity(alpha, alphadot); Refusal if that does not broadcast to (..., 3), or is not finite unless
+    ``masked``."""
     shape = (*np.broadcast_shapes(alpha.shape, alphadot.shape)[:-1], 3)
     if not callable(velocity):
         raise Refusal("velocity must be a function of alpha and alphadot", value=velocity)
     xi = real_array("what velocity returns", velocity(*np.broadcast_arrays(alpha, alphadot)))
-    if xi.shape != shape and fits(xi, shape):
+    if xi.shape != shape and broadcasts_to(xi, shape):
         xi = np.broadcast_to(xi, shape).copy()
     if xi.shape != shape:
         raise Refusal(f"velocity must return shape {shape} for these alpha and alphadot", value=xi.shape)

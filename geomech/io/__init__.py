@@ -1,1 +1,1 @@
-"""Files: read as what strangers wrote, written whole, and the formats of plain values."""
+"""Files: read within limits, written atomically, and the formats of plain values."""

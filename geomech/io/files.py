@@ -1,4 +1,4 @@
-"""Files on disk: read within limits, written whole or not at all, never over an input, and nothing left behind."""
+"""Files on disk: read within limits, written whole or not at all, never over an input, and without leftovers."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ except ImportError:  # no such locks on Windows: what a kill leaves there is lef
 MARK = "owner"  # in a folder of ours, locked while its owner lives
 NEW = "new"  # beside the mark: what is being written
 ABANDONED = 60.0  # seconds after which a folder of ours without a mark has no owner who is about to set one
-ROOM = 24  # bytes of a name left for what is added to it
-FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+NAME_MARGIN = 24  # bytes of a name left for what is added to it
+DISK_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 
 def note(text: str) -> None:
-    """A line on standard error that is no failure."""
+    """Print a note on standard error."""
     print("note: " + printable(" ".join(text.split())), file=sys.stderr)
 
 
 def read(path: str | Path, largest: int, pipes: bool = False) -> bytes:
-    """The bytes of an ordinary file of at most ``largest``; OSError or ValueError otherwise, before anything is read. pipes:
-    or of a pipe that somebody writes to."""
+    """Return the bytes of an ordinary file of at most ``largest`` bytes; OSError or ValueError otherwise, before
+    anything is read. pipes: take a pipe that somebody writes to, too."""
     path = Path(path)
     if path.stat() and not (path.is_file() or (pipes and path.is_fifo())):
         raise OSError(errno.EINVAL, "it is no ordinary file")
@@ -47,26 +47,27 @@ def read(path: str | Path, largest: int, pipes: bool = False) -> bytes:
 
 
 def _opened(path: str, flags: int) -> int:
-    """A pipe; nobody waits for one that nobody writes to."""
+    """Return a descriptor of a pipe, without waiting for a writer."""
     pipe = os.open(path, flags | os.O_NONBLOCK)
     os.set_blocking(pipe, True)
     return pipe
 
 
 def read_text(path: str | Path, largest: int, pipes: bool = False) -> str:
-    """The text of an ordinary file, or a pipe, in UTF-8, as `read`, line ends made equal."""
+    """Return the text of an ordinary file, or a pipe, in UTF-8, as `read`, with equal line ends."""
     return read(path, largest, pipes).decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
 
 
-def why(error: Exception) -> str:
-    """What an error of the file system says."""
+def reason_of(error: Exception) -> str:
+    """Return the message of an error of the file system."""
     return getattr(error, "strerror", None) or str(error)
 
 
 def hidden(path: Path, ending: str) -> Path:
-    """A hidden name beside ``path`` that is its own; short where the file system would not take the long one."""
+    """Return a hidden name beside ``path`` that depends on it alone; short where the file system would refuse the long
+    one."""
     name = f".{path.name}{ending}"
-    if len(os.fsencode(name)) + ROOM > _longest_name(path.parent):
+    if len(os.fsencode(name)) + NAME_MARGIN > _longest_name(path.parent):
         name = f".geomech-{_key(Path(path.name))}{ending}"
     return path.with_name(name)
 
@@ -79,7 +80,7 @@ def _longest_name(folder: Path) -> int:
 
 
 def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
-    """Refusal if an output is the same file as an input, by whatever name or link."""
+    """Raise Refusal if an output is the same file as an input, by whatever name or link."""
     inputs = list(inputs)
     for output in outputs:
         for source in inputs:
@@ -91,46 +92,46 @@ def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
 
 
 @contextlib.contextmanager
-def whole_file(path: str | Path) -> Iterator[Path]:
-    """A path to write to, of the same name; moved to ``path`` on success, removed on failure. Refusal if nothing can
-    be written there."""
-    refused = lambda error: Refusal(f"cannot write {path}", because=why(error), instead="choose another output")
+def atomic_file(path: str | Path) -> Iterator[Path]:
+    """Yield a path to write to, of the same name; moved to ``path`` on success, removed on failure. Refusal if nothing
+    can be written there."""
+    refused = lambda error: Refusal(f"cannot write {path}", because=reason_of(error), instead="choose another output")
     try:
         target = Path(path).resolve()
         if target.exists() and not target.is_file():
             raise OSError("it is no ordinary file")
-        shown = target.name if target.parent.name == NEW else path
+        displayed = target.name if target.parent.name == NEW else path
     except (OSError, RuntimeError, ValueError) as error:
         raise refused(error) from None
-    with _Workshop(target, target.parent, refused) as new:
+    with _StagingFolder(target, target.parent, refused) as new:
         try:
             yield new / target.name
             os.replace(new / target.name, target)
         except OSError as error:
-            raise _unwritten(shown, error) from None
+            raise _unwritten(displayed, error) from None
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write text in UTF-8, what is none of it escaped; the file appears whole or not at all."""
-    with whole_file(path) as part:
+    """Write text in UTF-8, other characters escaped; the file appears whole or not at all."""
+    with atomic_file(path) as part:
         part.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 @contextlib.contextmanager
-def whole_folder(path: str | Path, inputs: Iterable[Path] = ()) -> Iterator[Path]:
-    """A folder to fill; its files move to ``path`` on success, with a note of what they replace, and vanish on failure.
-    Refusal if that cannot be, or if one would replace an input."""
+def atomic_folder(path: str | Path, inputs: Iterable[Path] = ()) -> Iterator[Path]:
+    """Yield a folder to fill; its files move to ``path`` on success, with a note of the files they replace, and vanish
+    on failure. Refusal if that is impossible, or if one would replace an input."""
     refused = lambda error: Refusal(
-        f"cannot write the folder {path}", because=why(error), instead="choose another with -o"
+        f"cannot write the folder {path}", because=reason_of(error), instead="choose another with -o"
     )
     try:
         target = Path(path).resolve()
         if os.path.lexists(target) and not target.is_dir():
             raise OSError("it is not a folder")
-        there = next(p for p in (target, *target.parents) if p.exists())
+        existing = next(p for p in (target, *target.parents) if p.exists())
     except (OSError, RuntimeError, ValueError) as error:
         raise refused(error) from None
-    with _Workshop(target, there, refused) as new:
+    with _StagingFolder(target, existing, refused) as new:
         try:
             yield new
             _move(sorted(new.iterdir()), target, Path(path), inputs)
@@ -153,32 +154,32 @@ def _move(files: list[Path], target: Path, path: Path, inputs: Iterable[Path]) -
 
 
 def _unwritten(what: object, error: OSError) -> Exception:
-    """A full disk, with the name of what does not fit; other errors as they are."""
-    if error.errno not in FULL:
+    """Return the error to raise: for a full disk a Refusal with the file's name; others unchanged."""
+    if error.errno not in DISK_FULL:
         return error
     return Refusal(f"cannot write {what}", because=error.strerror, instead="make room, or choose another output")
 
 
-class _Workshop:
-    """A hidden folder in ``there`` in which what is meant for ``target`` is made; gone at the end.
+class _StagingFolder:
+    """A hidden folder in ``parent`` in which the files for ``target`` are made; removed at the end.
 
-    Its owner holds a lock on a mark in it. A kill leaves the folder and frees the lock: that is how the next writer to the
-    same target knows it for a stray, and sweeps it. The name is chosen before anything is there, and a signal may come at
-    any moment: then the folder goes all the same. refused: what to raise for an error of the file system at the start.
+    Its owner holds a lock on a mark in it. A kill leaves the folder and frees the lock: that is how the next writer to
+    the same target recognises a stray, and removes it. The name is chosen before the folder exists, so a signal at any
+    moment removes it, too. refused: returns the exception for an error of the file system at the start.
     """
 
-    def __init__(self, target: Path, there: Path, refused: Callable[[Exception], Exception]):
-        self.target, self.there, self.refused = target, there, refused
-        self.folder = there / f"{_prefix(target)}{secrets.token_hex(8)}"
+    def __init__(self, target: Path, parent: Path, refused: Callable[[Exception], Exception]):
+        self.target, self.parent, self.refused = target, parent, refused
+        self.folder = parent / f"{_prefix(target)}{secrets.token_hex(8)}"
         self.mark = None
 
     def __enter__(self) -> Path:
         try:
-            sweep_strays(self.target, self.there)
+            sweep_strays(self.target, self.parent)
             self.folder.mkdir(0o700)
             self.mark = (self.folder / MARK).open("wb", buffering=0)
             if _locked(self.mark):
-                self.mark.write(_words(self.target))
+                self.mark.write(_mark_text(self.target))
             (self.folder / NEW).mkdir()
         except BaseException as error:
             self.__exit__()
@@ -208,12 +209,12 @@ def _prefix(target: Path) -> str:
     return f".geomech-{_key(target)}-"
 
 
-def _words(target: Path) -> bytes:
+def _mark_text(target: Path) -> bytes:
     return b"geomech is writing " + os.fsencode(target)
 
 
 def _locked(file) -> bool:
-    """Whether the file is now locked by this process; False if another's, or if there are no locks here."""
+    """Return whether the file is now locked by this process; False if by another, or on a system without locks."""
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except (AttributeError, OSError):
@@ -222,7 +223,7 @@ def _locked(file) -> bool:
 
 
 def _discard(folder: Path) -> None:
-    """Remove a folder of ours, its mark after all that it stands for."""
+    """Remove a folder of ours, its mark last."""
     shutil.rmtree(folder / NEW, ignore_errors=True)
     with contextlib.suppress(OSError):
         (folder / MARK).unlink(missing_ok=True)
@@ -232,8 +233,8 @@ def _discard(folder: Path) -> None:
 def _discard_plainly(folder: Path) -> None:
     """Remove a folder of ours, with one open file at a time."""
     for place, folders, names in os.walk(folder, topdown=False):
-        for remove, found in ((os.unlink, names), (os.rmdir, folders)):
-            for name in found:
+        for remove, entries in ((os.unlink, names), (os.rmdir, folders)):
+            for name in entries:
                 with contextlib.suppress(OSError):
                     remove(os.path.join(place, name))
     with contextlib.suppress(OSError):
@@ -241,7 +242,7 @@ def _discard_plainly(folder: Path) -> None:
 
 
 def sweep_strays(target: Path, *more: Path) -> None:
-    """Remove the folders of killed writers to ``target``, and nobody else's, from its folder and ``more``."""
+    """Remove the folders of killed writers to ``target``, and no others, from its folder and ``more``."""
     for place in {target.parent, *more}:
         with contextlib.suppress(OSError, ValueError):
             for path in [p for p in place.iterdir() if p.name.startswith(_prefix(target))]:
@@ -257,5 +258,5 @@ def _sweep(path: Path, target: Path) -> None:
                 path.rmdir()
             return
         with (path / MARK).open("r+b") as mark:
-            if _locked(mark) and mark.read() == _words(target):
+            if _locked(mark) and mark.read() == _mark_text(target):
                 _discard(path)

@@ -12,19 +12,19 @@ from typing import Any
 import numpy as np
 
 from geomech.core.variables import Result, Variable
-from geomech.io.files import whole_file, write_text
+from geomech.io.files import atomic_file, write_text
 
 UNITS = {"BL": "body length"}  # of lengths, as files name them
 ENDINGS = "_error", "_spread"  # of the names under which files have errors and spreads
 
 
-def units_of(unit: str) -> str:
-    """Return a unit of lengths as files name it."""
+def unit_name(unit: str) -> str:
+    """Return a unit of lengths as it is written in files."""
     return UNITS.get(unit, unit)
 
 
-def stored(result: Result) -> Iterator[Variable]:
-    """Yield the variables that files have: errors and spreads follow their values as NAME_error and NAME_spread."""
+def file_variables(result: Result) -> Iterator[Variable]:
+    """Yield the variables of a file: errors and spreads follow their values as NAME_error and NAME_spread."""
     for v in result.variables:
         yield replace(v, error=None, spread=None)
         labels = v.error_label or f"estimated error of {v.name}", f"standard deviation of {v.name}"
@@ -37,12 +37,12 @@ def write_netcdf(path: str | Path, result: Result) -> None:
     """Write a result; the file appears whole or not at all."""
     from scipy.io import netcdf_file
 
-    with whole_file(path) as part, netcdf_file(part, "w", version=2) as file:
+    with atomic_file(path) as part, netcdf_file(part, "w", version=2) as file:
         for key, value in result.attributes.items():
             # SciPy keeps but seven digits of a float of Python's
             number = np.float64(value) if isinstance(value, float) else value
             setattr(file, key, _encoded(value) if isinstance(value, str) else number)
-        for v in stored(result):
+        for v in file_variables(result):
             for dim, size in zip(v.dims, v.values.shape):
                 if dim not in file.dimensions:
                     file.createDimension(dim, size)
@@ -68,7 +68,7 @@ def _described(v: Variable) -> dict[str, str]:
 
 
 def _encoded(text: str) -> bytes:
-    """Return text in UTF-8; what is none in a file name is escaped."""
+    """Return text in UTF-8; bytes of file names that are no text are escaped."""
     return text.encode("utf-8", "backslashreplace")
 
 
@@ -82,7 +82,7 @@ def write_csv(path: str | Path, result: Result) -> None:
 
 
 def xarray() -> Any:
-    """Return the package; ImportError that says how to get it."""
+    """Return the package; ImportError that says how to install it."""
     try:
         import xarray
     except ImportError:
@@ -91,11 +91,11 @@ def xarray() -> Any:
 
 
 def to_xarray(result: Result) -> Any:
-    """Return a Dataset, whose coordinates are those that some variable has a dimension of."""
-    found = list(stored(result))
-    arrays = {v.name: (v.dims, np.array(v.values), _described(v)) for v in found}
-    used = {dim for v in found if not v.is_coordinate for dim in v.dims}
-    axes = {v.name for v in found if v.is_coordinate}
+    """Return a Dataset. Its coordinates are those whose dimension some variable has."""
+    variables = list(file_variables(result))
+    arrays = {v.name: (v.dims, np.array(v.values), _described(v)) for v in variables}
+    used = {dim for v in variables if not v.is_coordinate for dim in v.dims}
+    axes = {v.name for v in variables if v.is_coordinate}
     return xarray().Dataset(
         {name: x for name, x in arrays.items() if name not in axes},
         {name: x for name, x in arrays.items() if name in axes & used},

@@ -17,8 +17,8 @@ LARGEST_NUMBER = 1e12
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """What a file holds. name, sha256: of the file. filled: (line number, text) of what is neither comment nor empty, the
-    header first. comments: what stands after #, line by line."""
+    """Contents of a CSV file. name, sha256: of the file. filled: (line number, text) of lines that are neither comment
+    nor empty, the header first. comments: texts after #, line by line."""
 
     name: str
     sha256: str
@@ -27,25 +27,27 @@ class Rows:
 
     @property
     def header(self) -> tuple[int, tuple[str, ...]]:
-        """(its line number, the words of the first line that is no comment), in small letters, without quotes."""
+        """Line number and words of the first line that is no comment, in small letters, without quotes."""
         line, text = self.filled[0] if self.filled else (1, "")
         return line, tuple(word.strip().strip('"').strip().lower() for word in text.split(","))
 
-    def numbers(self, columns: tuple[str, ...], wanted: tuple[str, ...] | None = None) -> np.ndarray:
-        """(N, columns), or those wanted: the numbers under the header; ValueError naming the line of a row that has others."""
-        wanted = columns if wanted is None else wanted
-        picks = [columns.index(name) for name in wanted]
+    def numbers(self, columns: tuple[str, ...], selected: tuple[str, ...] | None = None) -> np.ndarray:
+        """Return the numbers under the header (N, columns), or in ``selected`` columns; Refusal naming the line of a
+        row with anything else."""
+        selected = columns if selected is None else selected
+        picks = [columns.index(name) for name in selected]
         rows = [_row(self.name, k, line, columns, picks) for k, line in self.filled[1:]]
-        return np.array(rows).reshape(-1, len(wanted))
+        return np.array(rows).reshape(-1, len(selected))
 
     @property
     def lines(self) -> np.ndarray:
-        """(N,), the rows' line numbers."""
+        """Line numbers (N,) of the rows."""
         return np.array([k for k, _ in self.filled[1:]], int)
 
 
 def read(path: str | Path, largest: int, what: str) -> Rows:
-    """The rows of a CSV file of at most so many bytes; ValueError saying what it should be (``what``) if it is no text."""
+    """Return the rows of a CSV file of at most ``largest`` bytes; Refusal with what the file should be (``what``) if it
+    is no text."""
     try:
         raw = files.read(path, largest)
         text = raw.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
@@ -66,15 +68,17 @@ def _row(name: str, line: int, text: str, columns: tuple[str, ...], picks: list[
         row = [_cell(cells[k]) for k in picks]
         if all(abs(x) <= LARGEST_NUMBER for x in row):
             return row
-    said = f"{len(columns)} finite numbers ({','.join(columns)}), at most {LARGEST_NUMBER:g}"
-    at = next(
+    expected = f"{len(columns)} finite numbers ({','.join(columns)}), at most {LARGEST_NUMBER:g}"
+    column = next(
         (columns[k] for k in picks if len(cells) == len(columns) and not abs(_cell(cells[k])) <= LARGEST_NUMBER), ""
     )
-    raise Refusal(f"a row must be {said}" + f", column {at}" * bool(at), value=text[:40], where=f"{name}, line {line}")
+    raise Refusal(
+        f"a row must be {expected}" + f", column {column}" * bool(column), value=text[:40], where=f"{name}, line {line}"
+    )
 
 
 def _cell(text: str) -> float:
-    """nan for what is no number."""
+    """Return the number in a cell; nan if it has none."""
     try:
         return float(text.strip(' "'))
     except ValueError:

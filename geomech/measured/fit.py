@@ -11,7 +11,7 @@ import numpy as np
 
 from geomech.gaits import Fourier
 from geomech.geometry.reconstruct import displacement
-from geomech.geometry.tube import Known, Loop, Tube, grid_of, series, tube
+from geomech.geometry.tube import Loop, TaylorSeries, Tube, covering_grid, series, tube
 from geomech.io.tables.base import LARGEST_ENTRY
 from geomech.measured import cycles, plausibility, regression, smooth, unknowns
 from geomech.measured.log import Log, read
@@ -40,7 +40,7 @@ class Fitted:
     why they do not. length: of the body in m; 1 for a log in body lengths."""
 
     log: Log
-    known: Known
+    known: TaylorSeries
     times: np.ndarray
     measured: np.ndarray
     predicted: np.ndarray
@@ -79,23 +79,23 @@ class Fitted:
     def tube(self) -> Tube:
         """Connection near the mean gait, with a grid for pictures and files."""
         wide = float(np.sqrt(np.einsum("iip->pi", self.known.spread).min()))
-        extent = max(np.ptp(a) for a in grid_of(self.known, 2))
+        extent = max(np.ptp(a) for a in covering_grid(self.known, 2))
         joints = len(self.log.joints)
         most = min(MOST_POINTS, int(MOST_SHAPES ** (1 / joints)))
         points = int(np.clip(np.ceil(3 * extent / wide), min(31, most), most))
-        return tube(self.known, grid_of(self.known, points), self.residual, self.unit, self.length)
+        return tube(self.known, covering_grid(self.known, points), self.residual, self.unit, self.length)
 
     def along(self, t) -> tuple[np.ndarray, np.ndarray]:
         """Return A (T, 3, d) at phases t of the mean gait, and half widths of its interval."""
         known = self.known
-        variance = (series(known.errors[:, :, :, 0], t) ** 2).sum(-3) + known.off_at(t) ** 2
+        variance = (series(known.errors[:, :, :, 0], t) ** 2).sum(-3) + known.standard_error_at(t) ** 2
         return series(known.A, t), known.factor * np.sqrt(variance)
 
     @property
     def misfit(self) -> np.ndarray:
         """Rms (3,) over the phase of the error of A along the gait, from the misfit of xi beyond noise and the
         truncation of the series."""
-        return np.sqrt((self.known.off[:, 0] ** 2).mean(-1))
+        return np.sqrt((self.known.standard_error[:, 0] ** 2).mean(-1))
 
 
 def fit_log(
@@ -162,11 +162,11 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
     A, errors = (equations.split(x, loop) for x in (coefficients, errors))
     if not across:
         errors = np.concatenate([errors, regression.unknown(loop, A, varies)])
-    known = Known(
+    known = TaylorSeries(
         loop, A[:, :, 0], A[:, :, 1:], errors, spread(loop, samples, within, varies > regression.NOTHING), np.zeros(3),
         np.zeros((3, 2, 1)), regression.factor(len(equations.square), level), level,
     )  # fmt: skip
-    if (largest := max(np.abs(known.whole).max(), np.abs(known.errors).max())) > LARGEST_ENTRY:
+    if (largest := max(np.abs(known.combined).max(), np.abs(known.errors).max())) > LARGEST_ENTRY:
         raise log.wrong(
             f"entries of A come out as large as {largest:.1g}",
             instead="give x and y in body lengths or m, and joints that move",
@@ -176,7 +176,7 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
     square = (_net(known)[0] - mean) ** 2 - mean_error**2  # less the error of the mean
     beyond = SAFETY * np.sqrt(np.maximum(square, 0.0))
     residual = residual_of(known, samples, varies)
-    known = replace(known, beyond=beyond, off=residual.standard_error)
+    known = replace(known, beyond=beyond, standard_error=residual.standard_error)
     frequency = (len(times) - 1) / (times[-1] - times[0])
     uniform = np.interp(log.t, times, np.interp(times, log.t, phase))
     return Fitted(
@@ -198,14 +198,14 @@ def mean_of(poses: np.ndarray, level: float) -> tuple[np.ndarray, np.ndarray]:
     return poses.mean(0), regression.factor(len(poses), level) * np.sqrt((errors**2).sum(0))
 
 
-def _net(known: Known) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _net(known: TaylorSeries) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the net pose (3,) of the mean gait, its shapes and their rates (PHASES, d)."""
     t = 2 * np.pi * np.arange(PHASES) / PHASES
     alpha, alphadot = known.loop.shape(t), known.loop.shape(t, 1)
-    return displacement(np.einsum("nij,nj->ni", known.of(alpha), alphadot)), alpha, alphadot
+    return displacement(np.einsum("nij,nj->ni", known.connection(alpha), alphadot)), alpha, alphadot
 
 
-def _cycles(log: Log, known: Known, phase, count, joints, pose):
+def _cycles(log: Log, known: TaylorSeries, phase, count, joints, pose):
     """Return times (C + 1,), measured (C, 3) and predicted (C, 3) of `Fitted`."""
     from scipy.interpolate import CubicSpline
 
@@ -214,7 +214,7 @@ def _cycles(log: Log, known: Known, phase, count, joints, pose):
     growing = np.maximum.accumulate(phase)
     times = np.interp(marks, growing, log.t)
     w, terms = known.terms(known.loop.projected(joints.values, phase), joints.values, joints.rates)
-    xi = np.einsum("ijmk,nk,njm->ni", known.whole, w, terms)
+    xi = np.einsum("ijmk,nk,njm->ni", known.combined, w, terms)
     heading = CubicSpline(log.t, xi[:, 2]).antiderivative()(log.t)
     path = CubicSpline(log.t, np.exp(1j * heading) * (xi[:, 0] + 1j * xi[:, 1])).antiderivative()(log.t)
     poses = (pose.values, np.stack([path.real, path.imag, heading], -1))

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech.geometry.tube import Known, series
+from geomech.geometry.tube import TaylorSeries, series
 from geomech.measured.regression import RATES, Samples
 from geomech.measured.spread import PLACES, WIDTH
 
@@ -32,16 +32,18 @@ class Residual(NamedTuple):
     """Misfit of a fit.
 
     residual: (3,), rms misfit of xi, over that of the joint rates. explained: (3,), share of the squares of xi that the
-    fit explains. standard_error: (3, 2, PLACES), errors of A as in `geomech.geometry.tube.Known`."""
+    fit explains. standard_error: (3, 2, PLACES), errors of A as in `geomech.geometry.tube.TaylorSeries`."""
 
     residual: np.ndarray
     explained: np.ndarray
     standard_error: np.ndarray
 
 
-def residual_of(known: Known, samples: Samples, varies: int) -> Residual:
+def residual_of(known: TaylorSeries, samples: Samples, varies: int) -> Residual:
     """Return the misfit of ``known`` on the samples, with the error of the truncated series."""
-    predicted = lambda alpha, rate: np.einsum("ijmk,nk,njm->ni", known.whole, *known.terms(samples.phase, alpha, rate))
+    predicted = lambda alpha, rate: np.einsum(
+        "ijmk,nk,njm->ni", known.combined, *known.terms(samples.phase, alpha, rate)
+    )
     misfit = samples.xi - predicted(samples.alpha, samples.rate)
     residual = np.sqrt((misfit**2).mean(0) / (samples.rate**2).sum(-1).mean())
     explained = 1 - (misfit**2).mean(0) / samples.xi.var(0).clip(1e-300)
@@ -59,7 +61,7 @@ def residual_of(known: Known, samples: Samples, varies: int) -> Residual:
     return Residual(residual, explained, np.sqrt(square).transpose(2, 0, 1))
 
 
-def _truncation(known: Known) -> np.ndarray:
+def _truncation(known: TaylorSeries) -> np.ndarray:
     """Return (2, PLACES, 3): squares of the upper harmonics of A along the gait and across it, less those of their
     noise."""
     t = 2 * np.pi * np.arange(PLACES) / PLACES

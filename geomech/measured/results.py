@@ -12,7 +12,7 @@ from geomech.core.variables import Result, Variable
 from geomech.geometry.curvature import ccf
 from geomech.geometry.curvature import error as curvature_error
 from geomech.geometry.tube import BEYOND
-from geomech.io.results import units_of
+from geomech.io.results import unit_name
 from geomech.measured.fit import Fitted, fit_log
 from geomech.scene.write import gait_table, table
 from geomech.study import fields
@@ -83,8 +83,8 @@ def of_fit(fit: Fitted) -> Result:
 
     `Connection.load` and [system] kind = "table" read it from NetCDF."""
     tube, unit = fit.tube, fit.unit
-    error = tube.at_grid(tube.known.of_error)
-    variables = [*fields.of_connection(tube, error), *fields.of_known(tube.known, unit), fields.of_reach(tube)]
+    error = tube.at_grid(tube.taylor.connection_error)
+    variables = [*fields.of_connection(tube, error), *fields.of_known(tube.taylor, unit), fields.of_reach(tube)]
     if len(tube.axes) == 2:
         variables.append(fields.of_ccf(ccf(tube), curvature_error(tube), INTERVAL_OF_CCF))
     axes = fields.coordinates(tube.axes, [(name, "rad") for name in angles_of(tube.axes)])
@@ -100,7 +100,7 @@ def _about(fit: Fitted) -> dict:
         "frame": "that of the log",
         "frame_meaning": "body frame: the one whose x, y and heading were logged",
         "body_length": float(fit.length),
-        "length_unit": units_of(fit.unit),
+        "length_unit": unit_name(fit.unit),
         "components": "x, y, theta of the body velocity xi: along the heading, to the left, counter-clockwise",
         "sign_of_A": "xi = + A alphadot",
         "sign_of_ccf": "CCF = dA + [A, A] with [X, Y] = XY - YX, positive for counter-clockwise loops",

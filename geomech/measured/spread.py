@@ -14,7 +14,7 @@ LEAST = 0.02  # of the gait's size: range of A at the gait where cycles do not v
 
 
 def spread(loop: Loop, samples: Samples, within: float | None, varied: bool) -> np.ndarray:
-    """Return the spread (d, d, P) of `tube.Known`: DEVIATIONS^2 times the covariance of deviations without noise, by
+    """Return the spread (d, d, P) of `tube.TaylorSeries`: DEVIATIONS^2 times the covariance of deviations without noise, by
     phase; or the square of ``within``, rad, in all directions.
 
     Along the gait, where nothing deviates, it is the mean of the spread across it."""

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from geomech.gaits import Gait
-from geomech.io.files import whole_file
+from geomech.io.files import atomic_file
 from rft.checks import in_range
 
 FINER = 4  # steps of the integration between two rows
@@ -81,5 +81,5 @@ def save(path: str | Path, log: SyntheticLog) -> None:
     """Write a log as CSV: t, alpha_1 ..., x, y, heading."""
     names = ["t", *(f"alpha_{k + 1}" for k in range(log.alpha.shape[1])), "x", "y", "heading"]
     rows = np.column_stack([log.t, log.alpha, log.pose])
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         np.savetxt(part, rows, "%.9g", ",", header=",".join(names), comments="")

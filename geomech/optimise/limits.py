@@ -9,7 +9,7 @@ import numpy as np
 from geomech.core.errors import check_angle
 from geomech.scene.model import Scene
 from geomech.systems.base import System
-from geomech.systems.capabilities import stored
+from geomech.systems.capabilities import stored_table
 from geomech.systems.framed import Framed
 from rft.checks import in_range, is_number, real_array
 from rft.refusal import Refusal, formatted
@@ -28,7 +28,7 @@ def limits(scene: Scene, within: WithinArgument, phases: int) -> Within:
     system = scene.system
     low, high = edges(system)
     if within is None:
-        if stored(system, "connection"):
+        if stored_table(system, "connection"):
             return _simplified(low, high)
         n = scene.numerics
         within = min(
@@ -50,7 +50,7 @@ def limits(scene: Scene, within: WithinArgument, phases: int) -> Within:
 
 def edges(system: System) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest and highest shapes, (joints,) each, of the field of a table or a frame; infinite without one."""
-    own = stored(system, "connection")
+    own = stored_table(system, "connection")
     axes = own.axes if own else system.axes if isinstance(system, Framed) else [(-np.inf, np.inf)] * system.joints
     return np.array([a[0] for a in axes]), np.array([a[-1] for a in axes])
 

@@ -10,7 +10,7 @@ import numpy as np
 from geomech.gaits import Gait, Sine
 from geomech.optimise.request import Request
 from geomech.scene.model import Scene
-from geomech.systems.capabilities import stored
+from geomech.systems.capabilities import stored_table
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,7 @@ class Optimum:
         """Scene with the best gait, and with a field that is large enough for it."""
         scene, gait = self.request.scene, self.best.gait
         scene = scene.changed(gait=gait)
-        if isinstance(gait, Sine) or stored(scene.system, "connection"):
+        if isinstance(gait, Sine) or stored_table(scene.system, "connection"):
             return scene
         largest = np.abs(gait.shape(np.linspace(0, 2 * np.pi, 721))).max()
         return scene.with_numerics(extent=max(scene.numerics.extent, 1.0001 * float(largest)))

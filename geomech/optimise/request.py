@@ -20,7 +20,7 @@ from geomech.optimise.undulations import Undulations
 from geomech.scene.model import Scene, checked_scene
 from geomech.study import cost
 from geomech.systems.base import System, kind_of
-from geomech.systems.capabilities import Dissipative, OwnMetric, capability, near, stored
+from geomech.systems.capabilities import Dissipative, OwnMetric, capability, near_gait, stored_table
 from geomech.systems.framed import Framed, in_frame
 from geomech.systems.premises import listed, refuse
 from rft.checks import in_range
@@ -73,7 +73,7 @@ class Request:
         and self.system.traits.singularity is None,
         doc="Whether the search begins with tables.",
     )  # fmt: skip
-    stored = property(lambda self: stored(self.system, "connection"))
+    stored = property(lambda self: stored_table(self.system, "connection"))
 
     @cached_property
     def power(self) -> Callable | None:
@@ -81,7 +81,7 @@ class Request:
         speed for a system with its own metric; None where the cost of moving is not known."""
         system = self.system
         if self.stored:
-            metric, degree, box = stored(system, "metric"), system.traits.power_degree or 2.0, self.loops.box
+            metric, degree, box = stored_table(system, "metric"), system.traits.power_degree or 2.0, self.loops.box
             return metric and (lambda alpha, alphadot, xi: metric.norm(np.clip(alpha, *box), alphadot) ** degree)
         if own := capability(system, OwnMetric):
             return lambda alpha, alphadot, xi: own.squared_speed(alpha, alphadot)
@@ -178,10 +178,10 @@ def checked(
         in_range("--starts", 1 if starts is None else starts, 1, 1000, whole=True)
         system, limits = scene.system, {"rate": rate, "power": power}
         towards = "" if direction is None else direction
-        if near(system):
+        if near_gait(system):
             raise Refusal(
                 "no gait but one to search",
-                because=f"A is known near {near(system)} alone",
+                because=f"A is known near {near_gait(system)} alone",
                 instead="measure more varied cycles",
             )
         objective = Aim(aim, towards, system.length, **limits)
@@ -217,7 +217,7 @@ def checked(
         if objective.name == "turning" and _never_turns(request):
             whose = (
                 f"{source_name(system)} tells a body whose"
-                if stored(system, "connection")
+                if stored_table(system, "connection")
                 else f"the {kind_of(system)}'s"
             )
             raise Refusal(
@@ -230,7 +230,7 @@ def checked(
 
 def source_name(system: System) -> str:
     """Return the name of a system, or of its file."""
-    return "the table's file" if stored(system, "connection") else f"the {kind_of(system)}"
+    return "the table's file" if stored_table(system, "connection") else f"the {kind_of(system)}"
 
 
 def _in_mirror(request: Request) -> bool:
@@ -240,7 +240,7 @@ def _in_mirror(request: Request) -> bool:
 
 def _stays(system: System) -> bool:
     """Return whether no change of shape moves its mean frame, or its own if it has none, tested at a few shapes."""
-    if system.traits.steps or not system.traits.linear or stored(system, "connection"):
+    if system.traits.steps or not system.traits.linear or stored_table(system, "connection"):
         return False
     with contextlib.suppress(ValueError, TypeError):
         system = in_frame(system, "mean")

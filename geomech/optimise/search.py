@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from geomech.gaits import Gait
-from geomech.geometry.connection import check_knobs
+from geomech.geometry.connection import check_fit_options
 from geomech.geometry.gait import FASTEST
 from geomech.geometry.reconstruct import turning
 from geomech.io.files import note
@@ -68,7 +68,7 @@ def optimise(
 
 def search(request: Request, progress: Callable | None = None) -> Optimum:
     """Return the result of `optimise` for a checked request."""
-    check_knobs(1, progress)
+    check_fit_options(1, progress)
     with located(request.scene.name):
         return _Search(request, progress).optimum()
 

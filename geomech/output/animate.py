@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from geomech.core.variables import Result
-from geomech.io.files import whole_file
+from geomech.io.files import atomic_file
 from geomech.output import plots
 from geomech.output.plots.style import styled
 from geomech.run.cost import Cost
@@ -78,7 +78,7 @@ def save(path: Path, motion: Motion, field=None, error=None, progress: Callable 
         return
     drawn = rows(motion.scene.numerics.phases, motion.cycles)
     film = counted(_frames(motion, drawn, field, error), len(drawn), progress)
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         (_gif if path.suffix.lower() == ".gif" else _mp4)(part, film)
 
 

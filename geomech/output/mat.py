@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.io.files import whole_file
+from geomech.io.files import atomic_file
 from geomech.io.tables.mat import ABOUT, ENTRIES, ERROR, RESIDUAL
 from geomech.study.fields import recorded
 from geomech.study.shape_space import check_two_joints
 from geomech.study.study import Study
 from geomech.systems.base import length_unit, shape_labels
-from geomech.systems.capabilities import stored
+from geomech.systems.capabilities import stored_table
 
 
 def save_connection(path: str | Path, study: Study, sign: str = "+", order: str = "ndgrid") -> None:
@@ -32,7 +32,7 @@ def save_connection(path: str | Path, study: Study, sign: str = "+", order: str 
     even = study.even_part  # counts at half of all directions
     residual = fitted.residual if even is None else np.sqrt(fitted.residual**2 + even**2 / 2)
     extra = {} if np.isnan(residual[:, ~np.isnan(fitted.A).any((0, 1))]).any() else {RESIDUAL: residual}
-    if (error := stored(scene.system, "A_error")) is not None:
+    if (error := stored_table(scene.system, "A_error")) is not None:
         extra[ERROR] = error
     factor = 1.0 if sign == "+" else -1.0
     shapes = dict(zip(("alpha1", "alpha2"), np.meshgrid(*fitted.axes, indexing="ij")))
@@ -48,5 +48,5 @@ def save_connection(path: str | Path, study: Study, sign: str = "+", order: str 
         **{key: value for key, value in recorded(s).items() if key in ("singular_shapes", "level")},
     }  # fmt: skip
     arrays = {name: np.array(ordered(x)) for name, x in {**shapes, **entries, **extra}.items()}
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         savemat(part, {**arrays, ABOUT: json.dumps(about)}, appendmat=False)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from geomech.core.variables import Result
-from geomech.io.files import whole_file
+from geomech.io.files import atomic_file
 from geomech.run.progress import progress as progress_bar
 from geomech.study.motion import Motion
 from geomech.systems.base import length_unit, shape_labels
@@ -21,7 +21,7 @@ def write(result: Result, path: Path) -> None:
 def save(path: Path, motion: Motion, progress: Callable | None = None) -> None:
     """Write names of the columns, their meaning and units behind '#', then a row for each phase, with every digit."""
     written = 0
-    with whole_file(path) as part, part.open("w", encoding="utf-8", newline="\n") as file:
+    with atomic_file(path) as part, part.open("w", encoding="utf-8", newline="\n") as file:
         file.write("\n".join([",".join(motion.columns), *(f"# {line}" for line in about(motion))]) + "\n")
         for table in motion.tables():
             for row in table.tolist():

@@ -11,7 +11,7 @@ from matplotlib.colors import to_rgba
 
 from geomech import text
 from geomech.core.variables import Result
-from geomech.io.files import whole_file, write_text
+from geomech.io.files import atomic_file, write_text
 from geomech.io.results import write_csv
 from geomech.output import animate, plots
 from geomech.scene.walker import WalkerScene
@@ -56,7 +56,7 @@ def film(result: Result, path: Path) -> None:
         plots.save(strip(scene, found), path)
         return
     frames = _frames(scene, found)
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         (animate._gif if path.suffix.lower() == ".gif" else animate._mp4)(part, frames)
 
 

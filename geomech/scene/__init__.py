@@ -22,8 +22,9 @@ _OTHER = {"IntruderScene": "intruder", "Intruding": "intruding", "MeshScene": "s
 
 
 def __getattr__(name: str) -> type:
-    """Scenes without a gait, whose mechanics takes as long to load as that of all others, when they are asked for."""
+    """Return a class of scenes without a gait; its mechanics takes as long to load as that of all others, and is loaded
+    here."""
     if name not in _OTHER:
         raise AttributeError(f"module 'geomech.scene' has no attribute {name!r}")
-    globals()[name] = found = getattr(import_module(f"geomech.scene.{_OTHER[name]}"), name)
-    return found
+    globals()[name] = kind = getattr(import_module(f"geomech.scene.{_OTHER[name]}"), name)
+    return kind

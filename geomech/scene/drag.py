@@ -22,7 +22,7 @@ ANGLE, ALONG, ACROSS, WEIGHT = "psi_deg", "F_parallel_N", "F_perpendicular_N", "
 NEEDED = (ANGLE, ALONG, ACROSS)
 SAMPLES = {"dem-rod-drag": "dem_rod_drag.csv"}  # that ship with the package
 
-NUMBER, SAID = r"((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)", r"\s*(?:of|is|=|:|about)?\s*"
+NUMBER, CONNECTIVE = r"((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)", r"\s*(?:of|is|=|:|about)?\s*"
 LENGTHS = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "": 1.0}
 DENSITIES = {"kg/m": 1.0, "kg m": 1.0, "g/c": 1000.0, "": 1.0}
 LENGTH, PER_VOLUME = NUMBER + r"\s*(um|mm|cm|m)\b", r"\s*\(?(kg/m|kg m|g/c)\^?[^\s,;:=)]*\)?"
@@ -37,12 +37,12 @@ OWNERS = {  # what a size belongs to, by the nearest of these words
     "grain": r"\b(?:grain|particle|bead|sphere)s?\b",
     "box": r"\b(?:bed|box|tank|container)s?\b",
 }
-NOT_OF = {"radius": ("grain", "box"), "length": ("grain", "box"), "depth": ("box",)}
+EXCLUDED_OWNERS = {"radius": ("grain", "box"), "length": ("grain", "box"), "depth": ("box",)}
 
 
 class Measured(NamedTuple):
-    """rows: psi (degrees), forces along and across (N), weight, (4, N). sizes: of radius, length, depth (m) and density
-    (kg/m^3, of the bed), those that the header lines give. name: of the file."""
+    """Measured drag on a rod. rows: psi (degrees), forces along and across (N), weight, (4, N). sizes: of radius,
+    length, depth (m) and density (kg/m^3, of the bed), those in the header lines. name: of the file."""
 
     rows: np.ndarray
     sizes: dict[str, float]
@@ -50,7 +50,7 @@ class Measured(NamedTuple):
 
 
 def read(path: str | Path) -> Measured:
-    """The drag in a CSV file, or in one of `SAMPLES`; ValueError, one line, if it holds none.
+    """Return the drag in a CSV file, or in one of `SAMPLES`; Refusal if it has none.
 
     Columns, by the header line and in any order: psi_deg, F_parallel_N, F_perpendicular_N and, if wanted, weight (of the
     squares; 1 where left out); others are ignored. Lines that begin with # may give the rod's diameter or radius, length and
@@ -79,46 +79,48 @@ def _measured(source: Rows) -> Measured:
 
 
 def header(source: Rows, needed: tuple[str, ...]) -> tuple[str, ...]:
-    """The columns of a file, in small letters; ValueError if one that is needed lacks, or is there twice."""
+    """Return the columns of a file, in small letters; Refusal if one that is needed is missing, or occurs twice."""
     line, columns = source.header
     for name in needed:
         if (count := columns.count(name.lower())) != 1:
             # What is found is quoted only if it is near: another file's first line may be nobody's business.
-            near = any(word.startswith(("psi", "f_")) for word in columns)
-            found = f", got {source.filled[0][1][:60]!r}" if near and source.filled else ""
-            told = f"has no column {name}" if not count else f"has {count} columns {name}"
+            resembles = any(word.startswith(("psi", "f_")) for word in columns)
+            received = f", got {source.filled[0][1][:60]!r}" if resembles and source.filled else ""
+            problem = f"has no column {name}" if not count else f"has {count} columns {name}"
             raise Refusal(
-                f"the header {told}",
+                f"the header {problem}",
                 where=f"{source.name}, line {line}",
-                because=f"it must have {','.join(needed)}{found}",
+                because=f"it must have {','.join(needed)}{received}",
             )
     return columns
 
 
 def sizes(source: Rows) -> dict[str, float]:
-    """Of radius, length, depth and density, those that the comments give; ValueError if they give two values of one."""
-    found: dict[str, set[float]] = {}
+    """Return the radius, length, depth and density that the comments give, by name; Refusal if they give two values of
+    one."""
+    values_by_name: dict[str, set[float]] = {}
     bulk = False
     for part, before in _parts([line[:LONGEST_COMMENT] for line in source.comments[:MOST_COMMENTS]]):
         for name, value, place in _lengths(part):
-            if _owner(part, place, before) not in NOT_OF[name]:
-                found.setdefault(name, set()).add(value)
+            if _owner(part, place, before) not in EXCLUDED_OWNERS[name]:
+                values_by_name.setdefault(name, set()).add(value)
         if "rod density" not in part and "density of the rod" not in part:
-            found.setdefault("density", set()).update(_densities(part))
+            values_by_name.setdefault("density", set()).update(_densities(part))
             bulk |= "density" in part and bool(re.search("bulk|effective", part))
-        for number, percent in re.findall(PACKING + SAID + NUMBER + r"\s*(%?)", part):
-            found.setdefault("packing", set()).add(float(number) / (100 if percent else 1))
-    for name, values in found.items():
+        for number, percent in re.findall(PACKING + CONNECTIVE + NUMBER + r"\s*(%?)", part):
+            values_by_name.setdefault("packing", set()).add(float(number) / (100 if percent else 1))
+    for name, values in values_by_name.items():
         if len(values) > 1:
-            told = " and ".join(f"{x:g}" for x in sorted(values))
-            raise Refusal(f"the header lines give {name} = {told}", where=source.name, instead="keep one")
-    out = {name: value for name, values in found.items() for value in values}
+            listed = " and ".join(f"{x:g}" for x in sorted(values))
+            raise Refusal(f"the header lines give {name} = {listed}", where=source.name, instead="keep one")
+    out = {name: value for name, values in values_by_name.items() for value in values}
     packing = out.pop("packing", 1.0)
     return {name: x * packing if name == "density" and not bulk else x for name, x in out.items()}
 
 
 def _parts(comments: list[str]):
-    """(words between commas, whose sizes they are if they do not say: of what was named last in the sentence, or "")."""
+    """Yield (words between commas, the object whose sizes they are unless they name another: the one named last in the
+    sentence, or "")."""
     text = re.sub(r"(?<=\d),(?=\d{3}\b)", "", "\n".join(comments).lower())  # 1,030
     for sentence in re.split(r";|\n|\. ", text):
         before = ""
@@ -128,34 +130,34 @@ def _parts(comments: list[str]):
 
 
 def _owner(part: str, place: int, before: str) -> str:
-    near = [(abs(m.start() - place), who) for who, words in OWNERS.items() for m in re.finditer(words, part)]
-    return min(near)[1] if near else before
+    candidates = [(abs(m.start() - place), owner) for owner, words in OWNERS.items() for m in re.finditer(words, part)]
+    return min(candidates)[1] if candidates else before
 
 
 def _lengths(part: str):
-    """(name, m, place) of all lengths that are named in some words."""
+    """Yield (name, m, place) of all lengths that are named in some words."""
     for name, words in SIZES.items():
         for word, share in words:
-            beside = rf"\b{word}\b"
-            found = [(*m.groups(), m.start()) for m in re.finditer(LENGTH + r"\s*(?:in\s+)?" + beside, part)]
-            found += [(*m.groups(), m.start()) for m in re.finditer(beside + SAID + LENGTH, part)]
+            pattern = rf"\b{word}\b"
+            matches = [(*m.groups(), m.start()) for m in re.finditer(LENGTH + r"\s*(?:in\s+)?" + pattern, part)]
+            matches += [(*m.groups(), m.start()) for m in re.finditer(pattern + CONNECTIVE + LENGTH, part)]
             # radius_mm = 8, radius = 0.008
-            in_unit = rf"{beside}\s*\(?(um|mm|cm|m|)\)?\s*[=:]\s*{NUMBER}\s*(?![\s\d.e]*[cmu]?m)"
-            found += [(m[2], m[1], m.start()) for m in re.finditer(in_unit, part)]
-            yield from ((name, _rounded(float(x) * LENGTHS[unit] * share), place) for x, unit, place in found)
+            in_unit = rf"{pattern}\s*\(?(um|mm|cm|m|)\)?\s*[=:]\s*{NUMBER}\s*(?![\s\d.e]*[cmu]?m)"
+            matches += [(m[2], m[1], m.start()) for m in re.finditer(in_unit, part)]
+            yield from ((name, _rounded(float(x) * LENGTHS[unit] * share), place) for x, unit, place in matches)
     for m in re.finditer(r"(?:diameter|radius)\s*(?:x|by|times)\s*" + LENGTH, part):
         yield "length", _rounded(float(m[1]) * LENGTHS[m[2]]), m.start()
 
 
 def _densities(part: str) -> set[float]:
-    """kg/m^3."""
-    found = re.findall(DENSITY + SAID + NUMBER + PER_VOLUME, part)
-    found += re.findall(NUMBER + PER_VOLUME + r"\s+density", part)
-    found += [(x, per) for per, x in re.findall(DENSITY + PER_VOLUME + SAID + NUMBER, part)]
-    found = found or [(x, "") for x in re.findall(DENSITY + SAID + NUMBER, part)]
-    return {_rounded(float(x) * DENSITIES[per]) for x, per in found}
+    """Return densities, kg/m^3."""
+    matches = re.findall(DENSITY + CONNECTIVE + NUMBER + PER_VOLUME, part)
+    matches += re.findall(NUMBER + PER_VOLUME + r"\s+density", part)
+    matches += [(x, per) for per, x in re.findall(DENSITY + PER_VOLUME + CONNECTIVE + NUMBER, part)]
+    matches = matches or [(x, "") for x in re.findall(DENSITY + CONNECTIVE + NUMBER, part)]
+    return {_rounded(float(x) * DENSITIES[per]) for x, per in matches}
 
 
 def _rounded(x: float) -> float:
-    """Without the digits that a change of units adds."""
+    """Return x without the digits that a change of units adds."""
     return float(f"{x:.12g}") if math.isfinite(x) else x

@@ -1,4 +1,4 @@
-"""Frames that are made for a scene: one that depends on how finely its tiers compute."""
+"""Frames that are computed for a scene: they depend on its numerics."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from rft.refusal import Refusal
 
 
 def framed(system: System, numerics: Numerics) -> Framed:
-    """A system in its minimum-perturbation frame, on the grid of the numerics; the same one where these change nothing."""
+    """Return a system in its minimum-perturbation frame, on the grid of the numerics; the same object where these
+    change nothing."""
     inner = system.inner if isinstance(system, Framed) else system
     if (count := numerics.grid**inner.joints) > LARGEST_GRID or (inner.joints > 3 and count > FIELD):
         raise Refusal(
@@ -26,5 +27,5 @@ def framed(system: System, numerics: Numerics) -> Framed:
 
 
 def reframed(system: System, numerics: Numerics) -> System:
-    """A system whose frame depends on the numerics, on those; any other as it is."""
+    """Return a system whose frame depends on the numerics, computed with these; any other unchanged."""
     return framed(system, numerics) if isinstance(system, Framed) else system

@@ -8,7 +8,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from geomech.core import summary
-from geomech.scene.columns import rows_of, series
+from geomech.scene.columns import columns_reader, rows_reader
 from geomech.scene.intruding import Intruding
 from geomech.scene.sections import Each, FromFile, Keys, OneOf, Within
 from geomech.scene.stress import StressKeys
@@ -18,9 +18,9 @@ from rft.plates import MOTIONS, SHAPES, Loads, Motion, Outline, PlateStress, Sha
 from rft.plates.loads import ORDER
 from rft.refusal import located
 
-POINTS = FromFile(rows_of("points", ("x", "z")), "CSV with the header x,z (m), in place of points", ("points",))
+POINTS = FromFile(rows_reader("points", ("x", "z")), "CSV with the header x,z (m), in place of points", ("points",))
 COURSE = FromFile(
-    series(("t", "x", "z"), ("angle",)),
+    columns_reader(("t", "x", "z"), ("angle",)),
     "CSV with the header t,x,z or t,x,z,angle (s, m, rad); velocities are differences of order 2 in the spacing of t",
 )
 ELEMENTS = "of the outline, about, 1 to 5000; the error is of order 2 in their number, 1 with tension cut"
@@ -62,7 +62,7 @@ class IntruderScene(Intruding):
     files: tuple[str, ...] = field(default=(), repr=False, compare=False)
 
     parts = "elements"
-    takes = {
+    field_types = {
         "medium": (PlateStress, "a stress map such as StressMap(zeta=0.24)"),
         "intruder": (Shape, "a body such as RoundRod(radius=0.0127, width=0.1)"),
         "motion": (Motion, "a motion such as Drag(depth=0.05)"),
@@ -82,7 +82,7 @@ class IntruderScene(Intruding):
     def count(self) -> int:
         return self.outline.elements
 
-    def used(self, count: int) -> int:
+    def actual_count(self, count: int) -> int:
         return self.intruder.outline(count).elements
 
     @property
@@ -95,7 +95,8 @@ class IntruderScene(Intruding):
 
     @property
     def finer(self) -> tuple[int, ...]:
-        """Twice as many; of first order also three times, for what one changes alone may be small by chance."""
+        """Factors of refinement. Of first order also three, because the change by one factor alone may be small by
+        chance."""
         return (2,) if self.order == 2 else (2, 3)
 
     @property
@@ -103,14 +104,15 @@ class IntruderScene(Intruding):
         return ORDER[self.medium.tension]
 
     def run(self, elements: int | None = None) -> Intrusion:
-        """Forces along the motion, with as many elements if told so."""
+        """Return forces along the motion, with the scene's number of elements or another."""
         outline = self.outline if elements is None else self.intruder.outline(elements)
         t, pose, twist = self.motion.trajectory(outline)
-        found: Loads = loads(self.medium, outline, pose, twist, self.effects)
-        return Intrusion(t, pose, twist, self.weighed(found.force), found.moment, found.power(twist))
+        result: Loads = loads(self.medium, outline, pose, twist, self.effects)
+        return Intrusion(t, pose, twist, self.weighed(result.force), result.moment, result.power(twist))
 
-    def table(self, found: Intrusion) -> dict[str, np.ndarray]:
-        """The columns of a result: t, angle (or x and z, if the body does not turn about a hub), force_x, force_z, moment."""
-        place = {"angle": found.pose[:, 2]} if self.motion.turns else {"x": found.pose[:, 0], "z": found.pose[:, 1]}
-        force = {"force_x": found.force[:, 0], "force_z": found.force[:, 1]}
-        return {"t": found.t, **place, **force, "moment": found.moment}
+    def table(self, result: Intrusion) -> dict[str, np.ndarray]:
+        """Return the columns of a result: t, angle (or x and z, if the body does not turn about a hub), force_x,
+        force_z, moment."""
+        place = {"angle": result.pose[:, 2]} if self.motion.turns else {"x": result.pose[:, 0], "z": result.pose[:, 1]}
+        force = {"force_x": result.force[:, 0], "force_z": result.force[:, 1]}
+        return {"t": result.t, **place, **force, "moment": result.moment}

@@ -1,4 +1,4 @@
-"""What scenes of bodies that move in a prescribed way through grains have in common, of outlines and of meshes."""
+"""The base of scenes of bodies that move through grains in a prescribed way, of outlines and of meshes."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from rft.refusal import Refusal, located
 
 
 class Intruding:
-    """Base of such scenes. parts: what the body is made of, in the plural. finer: times as many, that tell
-    the error. takes: {field: (class, what to give instead)}. per_part: s for a part at a pose, measured."""
+    """Base of such scenes. parts: name of the body's parts, in the plural. finer: factors of refinement that yield the
+    error. field_types: {field: (class, what to give instead)}. per_part: s for a part at a pose, measured."""
 
     parts = "parts"
     finer: tuple[int, ...] = (2,)
-    takes: Mapping[str, tuple[type, str]] = {}
+    field_types: Mapping[str, tuple[type, str]] = {}
     per_part = 0.0
     example: ClassVar[str] = "c-leg"
     effects: tuple[GroundEffect, ...]
     files: tuple[str, ...]
 
     def _check(self) -> None:
-        """ValueError for fields of wrong types."""
-        for what, (kind, such) in {**self.takes, "name": (str, "text"), "text": (str, "text")}.items():
-            if not isinstance(getattr(self, what), kind):
-                raise Refusal(f"{what} must be {such}", value=getattr(self, what))
+        """Raise Refusal for fields of wrong types."""
+        for name, (kind, example) in {**self.field_types, "name": (str, "text"), "text": (str, "text")}.items():
+            if not isinstance(getattr(self, name), kind):
+                raise Refusal(f"{name} must be {example}", value=getattr(self, name))
         if not (isinstance(self.files, tuple) and all(isinstance(x, str) for x in self.files)):
             raise Refusal("files must be a tuple of names", value=self.files)
         check_numbers(self)
@@ -38,34 +38,34 @@ class Intruding:
 
     @property
     def count(self) -> int:
-        """Of the body's parts."""
+        """Number of the body's parts."""
         raise NotImplementedError
 
-    def used(self, count: int) -> int:
-        """Of the parts that it has where so many are asked for."""
+    def actual_count(self, count: int) -> int:
+        """Return the number of parts of the body when ``count`` are requested."""
         raise NotImplementedError
 
     @property
     def ladder(self) -> tuple[int, ...]:
-        """Numbers of parts to ask for where one asks how many are enough; the last is the truth."""
+        """Numbers of parts for a study of refinement; the last counts as the truth."""
         raise NotImplementedError
 
     @property
     def size(self) -> float:
-        """The body's largest, m."""
+        """The body's largest extent, m."""
         raise NotImplementedError
 
     @property
     def order(self) -> int:
-        """Of the error, in 1 / parts."""
+        """Order of the error in 1 / parts."""
         raise NotImplementedError
 
     def changed(self, **parts) -> Intruding:
-        """The scene with other parts."""
+        """Return the scene with other parts."""
         return dataclasses.replace(self, **parts)
 
     def weighed(self, force: np.ndarray) -> np.ndarray:
-        """Forces (T, k) along x, (y,) z with those that are not the grains'."""
+        """Return forces (T, k) along x, (y,) z with those of effects that are not the grains'."""
         x, z = weight(self.effects)
         if not (x or z):
             return force

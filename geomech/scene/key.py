@@ -1,8 +1,9 @@
-"""What a class that a section of a scene file is read from says of the section's keys.
+"""Keys of a section of a scene file, from the class that the section is read into.
 
-A class says it in the annotations of its fields (`rft.checks.Number`, `Word`), else in its docstring: ``name (unit): meaning``,
-or ``name, other (unit): meaning``, up to the next key or the end of the paragraph. The unit is - where there is none; a key in
-rad may be given in degrees, as ``name_deg``. Types and defaults are those of its fields.
+A class declares them in the annotations of its fields (`rft.checks.Number`, `Word`), else in its docstring: ``name
+(unit): meaning``, or ``name, other (unit): meaning``, up to the next key or the end of the paragraph. The unit is -
+where there is none; a key in rad may be given in degrees, as ``name_deg``. Types and defaults are those of its
+fields.
 """
 
 from __future__ import annotations
@@ -23,15 +24,15 @@ MARK = re.compile(r"(?<![\w`.])((?:[A-Za-z_]\w*, )*[A-Za-z_]\w*) \(([^()]*)\):\s
 
 
 class Word(NamedTuple):
-    """A text in a field: one of those that are known. meaning: for lists of keys."""
+    """A field whose text is one of several choices. meaning: for lists of keys."""
 
-    known: Collection[str]
+    choices: Collection[str]
     meaning: str
 
 
 class Key(NamedTuple):
-    """One key of a section. schema: JSON Schema of its values. default: None where it may be left out for want of a value.
-    degrees: it may be given as ``name``_deg. alias: another name of it."""
+    """One key of a section. schema: JSON Schema of its values. default: None where it has no value by default. degrees:
+    it may be given as ``name``_deg. alias: another name of it."""
 
     name: str
     schema: dict[str, Any]
@@ -62,7 +63,7 @@ def text_key(name: str, meaning: str, required: bool = False) -> Key:
 
 def keys_of(kind: type) -> list[Key]:
     """Return the keys of a section that a class is read from."""
-    schemas, shown, words, numbers = _schemas(kind), aliases(kind), words_of(kind), number_fields(kind)
+    schemas, names, words, numbers = _schemas(kind), aliases(kind), words_of(kind), number_fields(kind)
     keys = []
     for field in dataclasses.fields(kind):
         if field.init and field.name != "solver":
@@ -72,21 +73,21 @@ def keys_of(kind: type) -> list[Key]:
             if number := numbers.get(field.name):
                 schema = schema | {"minimum": number.low, "maximum": number.high}
             if word := words.get(field.name):
-                schema, unit, meaning = schema | {"enum": [*word.known]}, "-", word.meaning
-            name, alias = (shown[field.name], field.name) if field.name in shown else (field.name, "")
+                schema, unit, meaning = schema | {"enum": [*word.choices]}, "-", word.meaning
+            name, alias = (names[field.name], field.name) if field.name in names else (field.name, "")
             degrees = field.name in angles_of(kind)
             keys.append(Key(name, schema, unit, meaning, required, default, degrees, alias))
     return keys
 
 
 def aliases(kind: type) -> Mapping[str, str]:
-    """Return, by field, the names under which files have keys that are no names in Python."""
+    """Return, by field, the names in files of keys that are no names in Python."""
     return getattr(kind, "aliases", {})
 
 
 @functools.cache
 def angles_of(kind: type) -> frozenset[str]:
-    """Return the fields in rad, which a file may give in degrees; none of what is no dataclass."""
+    """Return the fields in rad, which a file may give in degrees; none for a class that is no dataclass."""
     if not dataclasses.is_dataclass(kind):
         return frozenset()
     return frozenset(name for name, (unit, _) in meanings(kind).items() if unit == "rad")
@@ -94,10 +95,10 @@ def angles_of(kind: type) -> frozenset[str]:
 
 @functools.cache
 def spellings(kind: type) -> dict[str, tuple[str, bool]]:
-    """Return, by key as a file may have it, the field of a class and whether it is in degrees."""
+    """Return, by key in a file, the field of a class and whether it is in degrees."""
     names = [field.name for field in dataclasses.fields(kind) if field.init and field.name != "solver"]
     fields = {name: (name, False) for name in names}
-    fields |= {shown: (name, False) for name, shown in aliases(kind).items()}
+    fields |= {spelling: (name, False) for name, spelling in aliases(kind).items()}
     return fields | {f"{name}_deg": (name, True) for name in names if name in angles_of(kind)}
 
 
@@ -109,11 +110,11 @@ def words_of(kind: type) -> dict[str, Word]:
     except (NameError, TypeError):  # of a class of a user's, whose annotations name what is not there
         return {}
     marked = {name: [x for x in get_args(hint) if isinstance(x, Word)] for name, hint in hints.items()}
-    return {name: found[0] for name, found in marked.items() if found}
+    return {name: words[0] for name, words in marked.items() if words}
 
 
 def _schemas(kind: type) -> dict[str, dict]:
-    """Return JSON Schema of the fields; empty for types that no scene file can hold, and for a class of one's own with
+    """Return JSON Schema of the fields; empty for types that no scene file can hold, and for a custom class with
     such."""
     try:
         return msgspec.json.schema(kind, schema_hook=lambda other: {"type": "object"})["$defs"][kind.__name__][
@@ -124,7 +125,7 @@ def _schemas(kind: type) -> dict[str, dict]:
 
 
 def _plain(schema: dict) -> dict[str, Any]:
-    """Return it without default, and without null, which TOML has not."""
+    """Return a schema without default, and without null, which TOML lacks."""
     values = [x for x in schema.get("anyOf", ()) if x.get("type") != "null"]
     return values[0] if len(values) == 1 else {k: v for k, v in schema.items() if k != "default"}
 
@@ -135,17 +136,18 @@ def _default(field: dataclasses.Field) -> Any:
 
 @functools.cache
 def meanings(kind: type) -> dict[str, tuple[str, str]]:
-    """Return (unit, meaning) of the fields, as annotations and docstrings of the class and of those it is derived from
-    say."""
+    """Return (unit, meaning) of the fields, from annotations and docstrings of the class and its bases."""
     names = {f.name for f in dataclasses.fields(kind)}
-    found: dict[str, tuple[str, str]] = {}
+    meanings_by_name: dict[str, tuple[str, str]] = {}
     for base in reversed(kind.__mro__):
         for paragraph in inspect.cleandoc(vars(base).get("__doc__") or "").split("\n\n"):
             marks = [m for m in MARK.finditer(paragraph) if {*m[1].split(", ")} <= names]
             for mark, after in zip(marks, [*marks[1:], None]):
                 meaning = " ".join(paragraph[mark.end() : after.start() if after else None].split())
-                found |= dict.fromkeys(mark[1].split(", "), (mark[2], meaning.rstrip(" .;").replace("`", "")))
-    return found | {name: (number.unit, number.meaning) for name, number in number_fields(kind).items()}
+                meanings_by_name |= dict.fromkeys(
+                    mark[1].split(", "), (mark[2], meaning.rstrip(" .;").replace("`", ""))
+                )
+    return meanings_by_name | {name: (number.unit, number.meaning) for name, number in number_fields(kind).items()}
 
 
 def first_sentence(kind: type) -> str:

@@ -26,7 +26,7 @@ WIDTH = 120
 
 
 class Part(NamedTuple):
-    """What a section may be, as it is listed."""
+    """One kind of a section, as it is listed."""
 
     title: str
     about: str
@@ -34,7 +34,7 @@ class Part(NamedTuple):
 
 
 def sections() -> dict[str, list[Part]]:
-    """Return what every section of a scene file may be: a class that several kinds of scene have is listed once."""
+    """Return the kinds of every section of a scene file; a class that several kinds of scene have is listed once."""
     parts_of: dict[str, list[Part]] = {"frame": []}
     listed = set()
     for scene in SCENES.values():
@@ -52,12 +52,12 @@ def sections() -> dict[str, list[Part]]:
                 if (name, variant.label, variant.kind) not in listed:
                     parts.append(_part(name, section, variant))
                     listed.add((name, variant.label, variant.kind))
-            parts += _of_packages(section)
+            parts += _package_parts(section)
     return parts_of
 
 
 def all_variants(section: Section) -> list[Variant]:
-    """Return what a section may be; [numerics] is of the tiers and of systems' solvers at once."""
+    """Return the variants of a section; [numerics] has those of the tiers and of systems' solvers together."""
     kinds = [Numerics, *solvers()] if isinstance(section, Keys) and section.kind is Numerics else []
     return [Variant({}, kind) for kind in kinds] or [*variants(section)]
 
@@ -77,19 +77,19 @@ def _part(name: str, section: Section, variant: Variant) -> Part:
     return Part(f"{head} {variant.label}".strip() + owner, "\n".join(about).strip(), keys_in(variant))
 
 
-def _of_packages(section: Section) -> Iterator[Part]:
-    """Yield what installed packages offer."""
+def _package_parts(section: Section) -> Iterator[Part]:
+    """Yield the parts of installed packages."""
     if (registry := registry_of(section)) is not None:
         new, refused = unloaded(registry)
         for name, package in new.items():
             yield Part(f'{section.key} = "{name}"', f"Of {package}, which is loaded when a scene asks for it.", [])
         for name, package in refused.items():
-            why = f"Not that of {package}, which is refused: the one that is built in has this name."
-            yield Part(f'{section.key} = "{name}"', why, [])
+            reason = f"Not that of {package}, which is refused: the one that is built in has this name."
+            yield Part(f'{section.key} = "{name}"', reason, [])
 
 
 def registry_of(section: Section) -> Registry | None:
-    """Return the registry of what a section may name, None if that is fixed."""
+    """Return the registry of the names that a section may have, None if these are fixed."""
     return section.kinds if isinstance(section, OneOf) and isinstance(section.kinds, Registry) else None
 
 
@@ -99,7 +99,7 @@ def names() -> list[str]:
 
 
 def text(section: str | None = None) -> str:
-    """Return all keys, or those of one section, to be read."""
+    """Return the text of all keys, or of those of one section."""
     parts = sections()
     names = [*parts] if section is None else [choose("SECTION", section, parts)]
     return "\n\n".join(_lines(part) for name in names for part in parts[name]) + "\n"
@@ -120,7 +120,7 @@ def _lines(part: Part) -> str:
 
 
 def worded(schema: dict[str, Any], several: bool = False) -> str:
-    """Return what a JSON Schema takes, in words."""
+    """Return the values that a JSON Schema admits, in words."""
     if "anyOf" in schema:
         return " or ".join(worded(x, several) for x in schema["anyOf"] if x.get("type") != "null")
     if schema.get("type") == "array":

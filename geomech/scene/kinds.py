@@ -1,8 +1,8 @@
-"""Parts of one's own in all registries: laws, bodies, gaits, effects, systems, tiers, ways to draw, file formats.
+"""Custom parts in all registries: laws, bodies, gaits, effects, systems, tiers, ways to draw, file formats.
 
-They come in by `register`, by a file that the person at the keyboard names (`--plugin FILE.py`, `load_file`), or by an
-installed package, whose entry point of that name in the group of a registry is loaded when somebody first asks for it
-(`geomech.core.entry_points`). What a scene file says never runs code by itself.
+They are added by `register`, by a file that the person at the keyboard names (`--plugin FILE.py`, `load_file`), or by
+an installed package, whose entry point in the group of a registry is loaded when its name is first used
+(`geomech.core.entry_points`). A scene file never runs code by itself.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 from geomech import gaits, systems, tiers  # noqa: F401  which have registries
 from geomech.io.files import read_text
 from geomech.scene import sources
-from geomech.systems.functions import class_of
+from geomech.systems.functions import class_from_function
 from rft.refusal import Refusal, formatted, located
 from rft.registry import REGISTRIES, Registry, home, place
 
@@ -40,13 +40,13 @@ def register(part: Any = None, /, **members: Any) -> Any:
         return lambda function: register(function, **members)
     for name, value in members.items():
         setattr(part, name, value)
-    registered = class_of(part) if isinstance(part, types.FunctionType) and hasattr(part, "joints") else part
+    registered = class_from_function(part) if isinstance(part, types.FunctionType) and hasattr(part, "joints") else part
     registry_of(registered).register(registered)
     return part
 
 
 def registry_of(part: Any) -> Registry:
-    """Return the registry that a part is for; ValueError if there is none."""
+    """Return the registry that a part is for; Refusal if there is none."""
     for registry in REGISTRIES.values():
         if registry.admits(part):
             return registry
@@ -61,8 +61,8 @@ def registry_of(part: Any) -> Registry:
 
 
 def load_file(path: str | Path) -> list[str]:
-    """Run a Python file and register the classes in it that have a ``law`` or ``kind`` of their own; their names. Refusal,
-    one line, if it cannot be run, has none, or one cannot be registered; then none is."""
+    """Run a Python file, register the classes in it that have a ``law`` or ``kind`` of their own, and return their
+    names. Refusal if it cannot be run, has none, or one cannot be registered; then none is."""
     if not isinstance(path, (str, Path)):
         raise Refusal("a file of one's own is named by text", value=path)
     path = Path(path)
@@ -76,19 +76,20 @@ def load_file(path: str | Path) -> list[str]:
     return _load(path, str(path.resolve()), text)
 
 
-def load_text(whole: str, text: str) -> None:
-    """`load_file` of a file that need not be on this machine, by its whole name and its text, as `files` has them."""
-    if _files.get(whole) != text:
-        _load(Path(whole), whole, text)
+def load_text(full_name: str, text: str) -> None:
+    """Load a file as `load_file` does from its full name and its text, as in `files`; it need not be on this
+    machine."""
+    if _files.get(full_name) != text:
+        _load(Path(full_name), full_name, text)
 
 
-def _module(whole: str) -> str:
-    """Name of the module made of a file."""
-    return f"{PLUGIN}{Path(whole).stem}_{hashlib.sha256(whole.encode()).hexdigest()[:8]}"
+def _module(full_name: str) -> str:
+    """Return the name of the module made of a file."""
+    return f"{PLUGIN}{Path(full_name).stem}_{hashlib.sha256(full_name.encode()).hexdigest()[:8]}"
 
 
-def _load(path: Path, whole: str, text: str) -> list[str]:
-    place, name = f"--plugin {path}", _module(whole)
+def _load(path: Path, full_name: str, text: str) -> list[str]:
+    place, name = f"--plugin {path}", _module(full_name)
     module = types.ModuleType(name)
     module.__file__ = str(path)
     with _all_or_none(name, module):
@@ -98,11 +99,13 @@ def _load(path: Path, whole: str, text: str) -> list[str]:
             if isinstance(part, type) and part.__module__ == name and {"law", "kind"} & {*vars(part)}:
                 with located(place):
                     register(part)
-        own = [n for (_, n), part in _named().items() if home(part) == name and before.get((_, n)) is not part]
-        if not own:
+        registered_names = [
+            n for (_, n), part in _named().items() if home(part) == name and before.get((_, n)) is not part
+        ]
+        if not registered_names:
             raise Refusal('no class in it has a law = "..." (a force law) or kind = "..." (all else)', where=place)
-    _texts[name], _files[whole] = text.encode(), text
-    return sorted(own)
+    _texts[name], _files[full_name] = text.encode(), text
+    return sorted(registered_names)
 
 
 def _named() -> dict[tuple[str, str], Any]:
@@ -111,7 +114,7 @@ def _named() -> dict[tuple[str, str], Any]:
 
 @contextlib.contextmanager
 def _all_or_none(name: str, module: types.ModuleType) -> Iterator[None]:
-    """The module is known while it is used; if it fails everything is as before."""
+    """Add the module to `sys.modules` while it is used; on failure restore it and all registries."""
     before, parts = sys.modules.get(name), {group: dict(registry) for group, registry in REGISTRIES.items()}
     sys.modules[name] = module  # where dataclasses look their types up
     try:
@@ -141,20 +144,21 @@ def _frames(error: BaseException):
 
 
 def code() -> dict[str, str]:
-    """Return digests of the sources of classes of one's own, and of modules beside them, by module."""
-    return sources.digests({home(part) for part in _own()}, _texts)
+    """Return digests of the sources of custom classes, by module, and of modules that these use. Results computed by
+    other code are not resumed."""
+    return sources.digests({home(part) for part in _custom_parts()}, _texts)
 
 
 def files() -> tuple[tuple[str, str], ...]:
-    """(whole name, text) of the files of one's own whose classes scenes may name."""
-    modules = {home(part) for part in _own()}
-    return tuple((whole, text) for whole, text in _files.items() if _module(whole) in modules)
+    """Return (full name, text) of the custom files whose classes scenes may name."""
+    modules = {home(part) for part in _custom_parts()}
+    return tuple((full_name, text) for full_name, text in _files.items() if _module(full_name) in modules)
 
 
 def registered() -> tuple[tuple[str, str], ...]:
-    """(module, name) of the parts of one's own from elsewhere."""
-    return tuple(place(part) for part in _own() if not home(part).startswith(PLUGIN))
+    """Return (module, name) of the custom parts that come from no such file."""
+    return tuple(place(part) for part in _custom_parts() if not home(part).startswith(PLUGIN))
 
 
-def _own() -> list[Any]:
+def _custom_parts() -> list[Any]:
     return [part for registry in REGISTRIES.values() for part in registry.own]

@@ -53,7 +53,7 @@ class MediumFile:
 
 
 def _medium(place: str, path: Path) -> dict:
-    """The table of a medium's TOML file, which may stand under [medium] or alone."""
+    """Return the table of a medium's TOML file, which may stand under [medium] or alone."""
     try:
         tables = tomllib.loads(read_text(path, LARGEST))
     except tomllib.TOMLDecodeError as error:
@@ -90,10 +90,10 @@ def _rows(place: str, file: str) -> dict[str, list]:
 
 
 def _columns(source: Rows) -> tuple[str, tuple[str, str]]:
-    """Which of the names that are known a file uses."""
-    there = source.header[1]
-    angle = "psi" if "psi" in there and "psi_deg" not in there else "psi_deg"
-    return angle, next((names for names in FORCES if names[0].lower() in there), FORCES[0])
+    """Return the names of the angle and the forces that a file uses."""
+    names = source.header[1]
+    angle = "psi" if "psi" in names and "psi_deg" not in names else "psi_deg"
+    return angle, next((names for names in FORCES if names[0].lower() in names), FORCES[0])
 
 
 DRAG = FromFile(_rows, "CSV with the header psi_deg,f_t,f_n, in place of psi, f_t and f_n", ("psi", "f_t", "f_n"))

@@ -1,4 +1,5 @@
-"""A scene: what is simulated and how finely. A value; what is computed for one, `geomech.study.study.Study` remembers."""
+"""A scene: what is simulated and how finely. It is a value; `geomech.study.bench.Study` stores what is computed for
+one."""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ from geomech.scene.medium import MEDIUM
 from geomech.scene.sections import Each, Keys, OneOf
 from geomech.scene.sizes import Physical
 from geomech.systems import KINDS as SYSTEMS
-from geomech.systems.base import Cycle, System, as_system, given, kind_of, note_angles
+from geomech.systems.base import Cycle, System, as_system, kind_of, note_angles, unwrapped
 from geomech.systems.capabilities import solver_of, with_solver
 from geomech.systems.swimmer import PARTS
 from geomech.tiers.base import Numerics
@@ -36,15 +37,15 @@ SWIMMER = {
 }
 
 
-class Told:
-    """How a scene shows itself: its name and its parts, in a line of readable length."""
+class Displayed:
+    """The `repr` of a scene: its name and its parts, in a line of readable length."""
 
     def __repr__(self) -> str:
         return f"Scene({printable(self.name)}: {formatted(self.system, 160)}, {formatted(self.gait, 100)}, {self.numerics!r})"
 
 
 @dataclass(frozen=True, repr=False)
-class Scene(Told):
+class Scene(Displayed):
     """A system and a gait. numerics: the tiers'; the system has its own. name: a built-in one's, or its file's. text: the
     TOML it was read from, if it was; `geomech.scene.write` says whether it still holds. files: others it was read from."""
 
@@ -59,9 +60,9 @@ class Scene(Told):
 
     def __post_init__(self):
         with located(self.name):
-            for what, kind in (("name", str), ("text", str), ("files", tuple), ("numerics", Numerics)):
-                if not isinstance(getattr(self, what), kind):
-                    raise Refusal(f"{what} must be {kind.__name__}", value=getattr(self, what))
+            for name, kind in (("name", str), ("text", str), ("files", tuple), ("numerics", Numerics)):
+                if not isinstance(getattr(self, name), kind):
+                    raise Refusal(f"{name} must be {kind.__name__}", value=getattr(self, name))
             gait = checked_gait(self.gait)
             object.__setattr__(self, "system", as_system(self.system, gait.joints))
             _check_joints(self.system, gait)
@@ -70,7 +71,7 @@ class Scene(Told):
             self.note_turns(self.gait)
 
     def note_turns(self, gait: Gait, amplitudes=None) -> None:
-        """UnitWarning if a gait turns a joint by more than a full turn."""
+        """Warn (`UnitWarning`) if a gait turns a joint by more than a full turn."""
         if hasattr(gait, "largest"):
             note_angles(self.system, gait.largest(amplitudes))
 
@@ -78,30 +79,30 @@ class Scene(Told):
     frequency = property(lambda self: frequency_of(self.system, self.gait), doc="Hz; None where nothing says one.")
 
     def with_numerics(self, **changes) -> Scene:
-        """This scene with some of its [numerics] changed, the system's own among them; None keeps a value."""
-        own = {f.name for f in _fields(solver_of(self.system))}
+        """Return the scene with some of its [numerics], or of its system's, changed; None leaves an entry."""
+        own_keys = {f.name for f in _fields(solver_of(self.system))}
         changes = {k: v for k, v in changes.items() if v is not None}
         with located(self.name):
-            system = with_solver(self.system, {k: v for k, v in changes.items() if k in own})
-            rest = {k: v for k, v in changes.items() if k not in own}
-            for name in rest:
-                choose("numerics", name, [*own, *self.numerics.__dataclass_fields__])
-            return dataclasses.replace(self, system=system, numerics=dataclasses.replace(self.numerics, **rest))
+            system = with_solver(self.system, {k: v for k, v in changes.items() if k in own_keys})
+            tier_changes = {k: v for k, v in changes.items() if k not in own_keys}
+            for name in tier_changes:
+                choose("numerics", name, [*own_keys, *self.numerics.__dataclass_fields__])
+            return dataclasses.replace(self, system=system, numerics=dataclasses.replace(self.numerics, **tier_changes))
 
     def changed(self, **changes) -> Scene:
-        """This scene with some of its parts changed, or of its system's."""
-        own = {k: v for k, v in changes.items() if k in ("system", "gait", "numerics", "name", "text", "files")}
+        """Return the scene with some of its parts, or of its system's, changed."""
+        parts = {k: v for k, v in changes.items() if k in ("system", "gait", "numerics", "name", "text", "files")}
         with located(self.name):
-            of_system = {k: v for k, v in changes.items() if k not in own}
-            system = given(own.get("system", self.system))
-            for name in of_system:
+            system_changes = {k: v for k, v in changes.items() if k not in parts}
+            system = unwrapped(parts.get("system", self.system))
+            for name in system_changes:
                 choose("part", name, ["system", "gait", "numerics", "name", *(f.name for f in _fields(system))])
-            if of_system:
-                own["system"] = dataclasses.replace(system, **of_system)
-            return dataclasses.replace(self, **own)
+            if system_changes:
+                parts["system"] = dataclasses.replace(system, **system_changes)
+            return dataclasses.replace(self, **parts)
 
     def cycle(self, gait: Gait | None = None, amplitudes=None, phases: int | None = None, work: bool = False) -> Cycle:
-        """A gait, or the scene's own, run for amplitudes (...,), all at once."""
+        """Run a gait, or the scene's own, for amplitudes (...,), all at once."""
         gait = checked_gait(self.gait if gait is None else gait)
         return self.system.run(*gait.cycle(phases or self.numerics.phases, amplitudes), work)
 
@@ -112,30 +113,31 @@ def _fields(thing) -> tuple:
 
 def _check_joints(system: System, gait: Gait) -> None:
     if gait.joints != system.joints:
-        whose, cure = (
+        owner, cure = (
             "[body]",
             "give the body one link more than the gait has joints, or as many modes, or another gait",
         )
         if not hasattr(system, "body"):
-            whose, cure = f"the {kind_of(system)}", "give it another gait"
-        told = f"[gait] {type(gait).__name__.lower()} moves {gait.joints} joints but {whose} has {system.joints}"
-        raise Refusal(told, instead=cure)
+            owner, cure = f"the {kind_of(system)}", "give it another gait"
+        message = f"[gait] {type(gait).__name__.lower()} moves {gait.joints} joints but {owner} has {system.joints}"
+        raise Refusal(message, instead=cure)
 
 
 def checked_scene(scene) -> Scene:
-    """scene, or ValueError if it is none."""
+    """Return the scene; Refusal if it is none."""
     if not isinstance(scene, Scene):
         raise Refusal("scene must be a Scene, such as geomech.scene.load gives", value=scene)
     return scene
 
 
 def frequency_of(system: System, gait: Gait) -> float | None:
-    """Cycles per second of a system that runs a gait: the gait's, or that of effects which have one; None where neither says.
-    ValueError if the two contradict each other."""
-    own, others = getattr(gait, "frequency", None), system.traits.frequency
-    if own is None or others is None:
-        return others if own is None else own
-    if np.any(np.asarray(others) != own):
-        told = f"[gait] frequency = {own:g}, but the effects of the {kind_of(system)} have {formatted(others)}"
-        raise Refusal(told, because="it is one swimmer, keep one")
-    return own
+    """Return the cycles per second of a system that runs a gait: the gait's, or that of effects which have one; None
+    without either. Refusal if the two contradict each other."""
+    gait_frequency, effect_frequency = getattr(gait, "frequency", None), system.traits.frequency
+    if gait_frequency is None or effect_frequency is None:
+        return effect_frequency if gait_frequency is None else gait_frequency
+    if np.any(np.asarray(effect_frequency) != gait_frequency):
+        message = f"[gait] frequency = {gait_frequency:g}, but the effects of the {kind_of(system)} have "
+        message += formatted(effect_frequency)
+        raise Refusal(message, because="it is one swimmer, keep one")
+    return gait_frequency

@@ -1,4 +1,4 @@
-"""How the TOML file of a scene is read; those that ship with the toolkit are in builtin/."""
+"""The reader of a scene's TOML file; scenes that ship with the toolkit are in builtin/."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from geomech.core.errors import choose
 from geomech.io.files import note, read_text
-from geomech.scene import reader, slips, swimming
+from geomech.scene import hints, reader, swimming
 from geomech.scene.medium import MEDIUM
 from geomech.scene.model import Scene, checked_scene
 from geomech.systems.base import kind_of
@@ -58,8 +58,8 @@ def builtin_text(name: str) -> str | None:
 
 
 def load(scene: str | Path) -> Scene | Any:
-    """The scene of a built-in name or a TOML file, an intruder scene if it has an [intruder], a `WalkerScene` if a [robot]
-    (Any, so that no type checker asks which); Refusal, one line, if it is not one."""
+    """Return the scene of a built-in name or a TOML file: an intruder scene if it has an [intruder], a `WalkerScene` if
+    a [robot] (Any, so that no type checker asks which). Refusal if there is none."""
     if not isinstance(scene, (str, Path)):
         raise Refusal("scene must be a name or a TOML file", value=scene)
     if (text := builtin_text(str(scene))) is not None:
@@ -79,16 +79,17 @@ def load(scene: str | Path) -> Scene | Any:
             because=reason,
             instead=f"give a TOML file or one of {', '.join(names)}",
         ) from None
-    made = parse(text, str(scene))
-    system = getattr(made, "system", None)
+    result = parse(text, str(scene))
+    system = getattr(result, "system", None)
     for line in getattr(system, "assumed", ()):
         note(f"{system.file}: {line}")
-    return made
+    return result
 
 
 def in_medium(scene: Scene, file: str | Path) -> Scene:
-    """The scene in another medium, from a file as ``[medium] file`` takes it, or a table of drag if its name ends in .csv;
-    relative to the current folder. Refusal if that holds none, or the scene's system takes none."""
+    """Return the scene in another medium, from a file as ``[medium] file`` takes it, or a table of drag if its name
+    ends in .csv; relative to the current folder. Refusal if the file has no medium, or the scene's system takes
+    none."""
     if not isinstance(scene.system, Swimmer):
         raise Refusal(f"a {kind_of(scene.system)} takes no medium", where=scene.name)
     table = {"file": str(Path(file).absolute())}
@@ -99,21 +100,21 @@ def in_medium(scene: Scene, file: str | Path) -> Scene:
 
 
 def inputs(scene: Scene | Intruding | WalkerScene) -> list[Path]:
-    """The files that a scene was read from: its own, unless it is built in or came through a pipe, and those of its medium,
-    gait and system, or of an intruder scene's parts."""
+    """Return the files that a scene was read from: its own, unless it is built in or came through a pipe, and those of
+    its medium, gait and system, or of an intruder scene's parts."""
     parts = () if hasattr(scene, "intruder") or hasattr(scene, "robot") else (checked_scene(scene).gait, scene.system)
-    own = [] if scene.name in [PIPE, *builtin_names(), *intruder_names(), *walker_names()] else [scene.name]
-    return [Path(x) for x in (*own, *scene.files, *(getattr(part, "file", None) for part in parts)) if x]
+    own_file = [] if scene.name in [PIPE, *builtin_names(), *intruder_names(), *walker_names()] else [scene.name]
+    return [Path(x) for x in (*own_file, *scene.files, *(getattr(part, "file", None) for part in parts)) if x]
 
 
 def parse(text: str, name: str = "scene") -> Scene | Any:
-    """The scene of a TOML text; Refusal if it is not one."""
+    """Return the scene of a TOML text; Refusal if it is none."""
     if not isinstance(text, str):
         raise Refusal("a scene is a TOML text", value=text, where=formatted(name))
     try:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # a ValueError may be an integer of too many digits
-        raise Refusal(f"{name} is not TOML", because=f"{error}{slips.at_line(text, error)}") from None
+        raise Refusal(f"{name} is not TOML", because=f"{error}{hints.line_hint(text, error)}") from None
     return from_tables(tables, name, text)
 
 
@@ -130,7 +131,7 @@ def _intruding(tables: Mapping, name: str) -> type[Intruding]:
 
 
 def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | Any:
-    """The scene of the tables of a TOML text; Refusal if they make none."""
+    """Return the scene of the tables of a TOML text; Refusal if they make none."""
     if not isinstance(tables, Mapping):
         raise Refusal("a scene is a dict of tables", value=tables, where=formatted(name))
     if "robot" in tables:

@@ -1,4 +1,4 @@
-"""The reader of scene files: tables, as TOML has them, become what a scene declares of its sections."""
+"""The reader of scene files: tables of TOML become the parts of a scene that its declarations name."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import msgspec
 
 from geomech.core.entry_points import choose_part
 from geomech.core.errors import UnitWarning, choose
-from geomech.scene import slips
+from geomech.scene import hints
 from geomech.scene.key import Key, spellings, words_of
 from geomech.scene.sections import Each, Keys, OneOf, Section, Variant, file_sections, sections_of, variant_of
 from geomech.scene.sizes import Sizes
@@ -27,8 +27,9 @@ Built = TypeVar("Built")
 
 @dataclass
 class Source:
-    """A scene file as it is read. name: its own. example: a built-in scene that has all that is needed. files: those that it
-    names, which reading adds. sizes: given once for all its parts. folder: in which files are looked for, its own if none."""
+    """A scene file that is being read. name: its own. example: a built-in scene with all that is needed. files: names
+    of further files, which reading adds. sizes: given once for all its parts. folder: in which files are looked for,
+    its own if none."""
 
     name: str
     example: str = "NAME"
@@ -41,7 +42,7 @@ class Source:
         return f"see 'geomech scenes --show {self.example}'"
 
     def located(self, table: Mapping) -> dict:
-        """Return a table with its file, if it names one, looked for from the scene's folder, and noted."""
+        """Return a table whose file, if it names one, is a path from the scene's folder; add that to ``files``."""
         table = dict(table)
         for key in FILES:
             if isinstance(table.get(key), str):
@@ -82,7 +83,7 @@ def _check_form(source: Source, path: str, table: Any, section: Section | Key) -
 
 
 def read_sections(scene: type, tables: Mapping, source: Source) -> dict[str, Any]:
-    """Return the fields of a scene that its sections make; those of a section that is left out have their defaults."""
+    """Return the fields of a scene that its sections make; those of a missing section have their defaults."""
     parts = {}
     for name, (section, *_) in sections_of(scene).items():
         if name in tables:
@@ -133,11 +134,11 @@ def _chosen(place: str, table: dict, section: Keys | OneOf) -> tuple[Variant, di
             return variant_of(section, name), table
         variant, table = _chosen(place, table, section.kinds[name])
         return variant._replace(named={section.key: name} | dict(variant.named)), table
-    others = {dataclasses.fields(kind)[0].name: kind for kind in section.otherwise}
-    for key, kind in others.items():
+    alternatives = {dataclasses.fields(kind)[0].name: kind for kind in section.otherwise}
+    for key, kind in alternatives.items():
         if key in table:
             return Variant({}, kind), table
-    instead = "".join(f", or {key}" for key in others)
+    instead = "".join(f", or {key}" for key in alternatives)
     raise Refusal(
         f"has no {section.key!r}",
         where=place,
@@ -146,7 +147,7 @@ def _chosen(place: str, table: dict, section: Keys | OneOf) -> tuple[Variant, di
 
 
 def _from_file(place: str, table: dict, variant: Variant) -> dict:
-    """Return the keys of a section with what its file has in place of the file."""
+    """Return the keys of a section with those of its file in place of the file."""
     if not variant.file.keys and {*table} != {"file"}:
         raise Refusal(
             f"{variant.label} takes 'file' and nothing else", where=place, because=f"a {variant.file.meaning}"
@@ -169,7 +170,15 @@ def build(
     inner: Mapping[str, Any] | None = None,
     label: str = "",
 ) -> Built:
-    """Return a part of a class, or what a form of its keys makes, from a table of keys; else Refusal.
+    """Return a part of a class, or the part that a form of its keys makes, from a table of keys; else raise Refusal.
+
+    inner: fields that are already read. label: how the table names the class.
+
+    inner: fields that are already read. label: how the table names the class.
+
+    inner: fields that are already read. label: how the table names the class.
+
+    inner: fields that are already read. label: how the table names the class.
 
     inner: fields that are read already. label: how the table names the class."""
     _check_keys(place, table, kind, label)
@@ -186,7 +195,7 @@ def build(
         alternatives.check(place, values)
     for field, word in words_of(kind).items():
         if field in values:
-            choose(f"{place} {field}", values[field], word.known)
+            choose(f"{place} {field}", values[field], word.choices)
     if inner and {f.name for f in dataclasses.fields(kind) if f.default is f.default_factory} <= {*inner}:
         return kind(**inner | values)  # a swimmer, of types that msgspec does not know
     try:
@@ -196,11 +205,11 @@ def build(
         raise refusal.within(place) from None
     except (ValueError, OverflowError) as error:
         if isinstance(refusal := error.__cause__, Refusal):  # of a class that checks its own values
-            refusal.instead = refusal.instead or slips.cure_of_value(refusal.what, table, kind)
+            refusal.instead = refusal.instead or hints.value_hint(refusal.what, table, kind)
             raise refusal.within(place) from None
         reason = str(error).replace(" - at `$", " - at `").replace(" - at ``", "")
-        told = reason.replace("Object missing required field", "has no")  # msgspec's words
-        raise Refusal(told, where=place, instead=slips.cure_of_value(reason, table, kind)) from None
+        message = reason.replace("Object missing required field", "has no")  # msgspec's words
+        raise Refusal(message, where=place, instead=hints.value_hint(reason, table, kind)) from None
 
 
 def _check_keys(place: str, table: Mapping, kind: type, label: str) -> None:
@@ -214,14 +223,14 @@ def _check_keys(place: str, table: Mapping, kind: type, label: str) -> None:
 
 
 def _check_degrees(place: str, value) -> None:
-    """UnitWarning for an angle of grains below a degree: measured ones are of ten to twenty."""
+    """Warn (`UnitWarning`) of an angle of grains below a degree: measured ones are ten to twenty."""
     if isinstance(value, (int, float)) and 0 < value < 1:
         text = f"{place} = {value:g} is less than a degree: if that is in rad, write gamma0 = {value:g}"
         warnings.warn(text, UnitWarning, stacklevel=2)
 
 
 def _radians(degrees):
-    """Numbers, and numbers in lists, from degrees; anything else as it is, to be refused for what it is."""
+    """Return numbers, and numbers in lists, converted from degrees; other values unchanged, to be refused later."""
     if isinstance(degrees, list):
         return [_radians(x) for x in degrees]
     if isinstance(degrees, (int, float)) and not isinstance(degrees, bool) and abs(degrees) < 1e300:

@@ -17,36 +17,44 @@ from geomech.scene.solid import KINDS as SOLIDS
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema of a scene file, with a gait, an intruder or a robot that walks, its classes those known now."""
+    """Return the JSON Schema of a scene file, with a gait, an intruder or a robot that walks; its classes are those
+    registered now."""
     declared = {group: file_sections(scene) for group, scene in SCENES.items()}
-    groups = {group: {name: _section(section) for name, (section, *_) in of.items()} for group, of in declared.items()}
-    named = {group: {name: {"$ref": f"#/$defs/{group}/{name}"} for name in of} for group, of in groups.items()}
-    whole = {group: _whole(named[group], declared[group]) for group in groups}
+    groups = {
+        group: {name: _section(section) for name, (section, *_) in sections.items()}
+        for group, sections in declared.items()
+    }
+    named = {
+        group: {name: {"$ref": f"#/$defs/{group}/{name}"} for name in sections} for group, sections in groups.items()
+    }
+    schemas = {group: _scene_schema(named[group], declared[group]) for group in groups}
     solid = {"required": ["kind"], "properties": {"kind": {"enum": [*SOLIDS]}}}
-    every_name = dict.fromkeys(name for of in named.values() for name in of)
+    all_names = dict.fromkeys(name for sections in named.values() for name in sections)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "geomech scene",
         "type": "object",
-        "properties": {name: {"anyOf": [of[name] for of in named.values() if name in of]} for name in every_name},
+        "properties": {
+            name: {"anyOf": [sections[name] for sections in named.values() if name in sections]} for name in all_names
+        },
         "additionalProperties": False,
         "if": {"required": ["robot"]},
-        "then": whole["walkers"],
+        "then": schemas["walkers"],
         "else": {
             "if": {"anyOf": [{"required": ["intruder"]}, {"required": ["motion"]}]},
             "then": {
                 "if": {"required": ["intruder"], "properties": {"intruder": solid}},
-                "then": whole["meshes"],
-                "else": whole["outlines"],
+                "then": schemas["meshes"],
+                "else": schemas["outlines"],
             },
-            "else": whole["gaits"],
+            "else": schemas["gaits"],
         },
         "$defs": groups,
     }
 
 
-def _whole(named: dict[str, Any], declared: dict[str, Declared]) -> dict[str, Any]:
-    """Return the schema of a scene of sections, by the names that they have here."""
+def _scene_schema(named: dict[str, Any], declared: dict[str, Declared]) -> dict[str, Any]:
+    """Return the schema of a scene of sections, by their names in ``named``."""
     scene = _table("", named, [name for name, (_, required, instead) in declared.items() if required and not instead])
     for name in {each.instead for each in declared.values() if each.instead}:
         parts = [part for part, (_, required, instead) in declared.items() if required and instead == name]

@@ -40,8 +40,8 @@ class FromFile(NamedTuple):
 
 @dataclass(frozen=True)
 class Keys:
-    """A section whose keys are the fields of a class. owner: whose section it is, for lists of keys, where scenes of several
-    kinds have one."""
+    """A section whose keys are the fields of a class. owner: the kind of scene to which it belongs, for lists of keys,
+    where several kinds have one."""
 
     kind: type
     owner: str = ""
@@ -94,10 +94,10 @@ class Alternatives:
 
     def check(self, place: str, given: Collection[str]) -> None:
         """Raise Refusal unless the keys given make one of the groups."""
-        own = self.keys & {*given}
-        if any(needed <= own <= needed | allowed for needed, allowed in self.groups):
+        present = self.keys & {*given}
+        if any(needed <= present <= needed | allowed for needed, allowed in self.groups):
             return
-        lacking = [sorted(needed - own) for needed, allowed in self.groups if own <= needed | allowed]
+        lacking = [sorted(needed - present) for needed, allowed in self.groups if present <= needed | allowed]
         reason = f" has no {', '.join(lacking[0])}" if len(lacking) == 1 else ""
         raise Refusal(f"{place}{reason}", instead=self.cure)
 
@@ -110,7 +110,7 @@ class Within(NamedTuple):
 
 
 class Variant(NamedTuple):
-    """What a section may be: keys that name it, with their values, and the class of its other keys."""
+    """One kind of a section: keys that name it, with their values, and the class of its other keys."""
 
     named: Mapping[str, str]
     kind: type
@@ -141,7 +141,7 @@ class Declared(NamedTuple):
 
 
 def variants(section: Keys | OneOf) -> Iterator[Variant]:
-    """Yield what a section may be."""
+    """Yield the variants of a section."""
     if isinstance(section, Keys):
         yield Variant({}, section.kind)
         return
@@ -156,7 +156,7 @@ def variants(section: Keys | OneOf) -> Iterator[Variant]:
 
 
 def variant_of(section: OneOf, name: str) -> Variant:
-    """Return the variant of a section that a name stands for."""
+    """Return the variant of a section that a name selects."""
     more = section.inner.get(name, {}), section.files.get(name), name in section.implied
     return Variant({section.key: name}, section.kinds[name], *more)
 
@@ -193,8 +193,8 @@ def sections_of(scene: type) -> dict[str, Declared]:
 
 
 def file_sections(scene: type) -> dict[str, Declared]:
-    """Return the sections that a scene's file may have: those of its fields, those that may stand in place of another one,
-    and those that hold for the whole scene (``once``)."""
+    """Return the sections that a scene's file may have: those of its fields, those that replace another one, and those
+    that apply to the whole scene (``once``)."""
     declared: dict[str, Declared] = {}
     for name, (section, required, _) in sections_of(scene).items():
         parts = section.inner[section.short] if isinstance(section, OneOf) and section.short else {}

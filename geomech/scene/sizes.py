@@ -25,7 +25,8 @@ class Physical:
 
 
 class Sizes:
-    """What stands once for the whole scene: [physical], the frame, and the frequency, which may stand in [gait] as well."""
+    """Values that apply to the whole scene: [physical], the frame, and the frequency, which may stand in [gait] as
+    well."""
 
     def __init__(self, name: str, tables: Mapping):
         physical, frame, frequency = tables.get("physical", {}), tables.get("frame"), tables["gait"].get("frequency")
@@ -48,7 +49,7 @@ class Sizes:
             )
 
     def fill(self, place: str, table: dict, kind: type) -> dict:
-        """The table with the sizes that its class has; Refusal if it says otherwise itself."""
+        """Return the table with the sizes that its class has; Refusal if the table contradicts them."""
         names = [f.name for f in dataclasses.fields(kind)]
         for key, value in self.given.items():
             if key not in names or getattr(kind, "kind", "") in NOT_OF_THE_BODY.get(key, ()):

@@ -9,7 +9,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from geomech.core import summary
-from geomech.scene.columns import series
+from geomech.scene.columns import columns_reader
 from geomech.scene.intruding import Intruding
 from geomech.scene.sections import Each, FromFile, Keys, OneOf, Within
 from geomech.scene.stress import MatchedKeys
@@ -37,7 +37,7 @@ KINDS = {
     "mesh": OneOf(SOLIDS, "shape", otherwise=(MeshFile,)),
 }
 COURSE = FromFile(
-    series(("t", "x", "y", "z"), ("rx", "ry", "rz")),
+    columns_reader(("t", "x", "y", "z"), ("rx", "ry", "rz")),
     "CSV with the header t,x,y,z or t,x,y,z,rx,ry,rz (rotation vector) (s, m, rad); velocities are differences of order 2 in "
     "the spacing of t",
 )
@@ -45,8 +45,8 @@ TRIANGLES = "of the mesh, about, 1 to 2,000,000; a mesh from a file has at least
 
 
 class Passed(NamedTuple):
-    """Forces along a motion. force, moment (T, 3), N and N m about the mesh's origin, told in the world; power (T,) W of the
-    grains on the body. With effects that have a weight the force is that of both."""
+    """Forces along a motion. force, moment (T, 3), N and N m about the mesh's origin, in the world frame; power (T,) W
+    of the grains on the body. With effects that have a weight the force is that of both."""
 
     trajectory: Trajectory
     force: np.ndarray
@@ -60,8 +60,8 @@ class Passed(NamedTuple):
     def __repr__(self) -> str:
         span = summary.span
         force, moment = (", ".join(f"{a} {span(f)}" for a, f in zip("xyz", x.T)) for x in (self.force, self.moment))
-        told = f"force {force} N; moment {moment} N m; power {span(self.power)} W"
-        return f"Passed({len(self.t)} poses, t {span(self.t)} s; {told})"
+        described = f"force {force} N; moment {moment} N m; power {span(self.power)} W"
+        return f"Passed({len(self.t)} poses, t {span(self.t)} s; {described})"
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class MeshScene(Intruding):
     parts, finer = "triangles", (4,)
     order = 1  # 2 in their size
     per_part = 1.5e-7
-    takes = {
+    field_types = {
         "medium": (Spatial, "a medium such as Spatial(xi_n=3e5)"),
         "intruder": (Solid, "a solid such as Sphere(radius=0.02)"),
         "motion": (tuple(MOTIONS.values()), "a motion of rft.meshes such as Drag(depth=0.05)"),
@@ -106,7 +106,7 @@ class MeshScene(Intruding):
     def count(self) -> int:
         return len(self.mesh.faces)
 
-    def used(self, count: int) -> int:
+    def actual_count(self, count: int) -> int:
         return len(self.intruder.mesh(count).faces)
 
     @property
@@ -118,24 +118,24 @@ class MeshScene(Intruding):
         return float(np.ptp(self.mesh.vertices, axis=0).max())
 
     def run(self, triangles: int | None = None) -> Passed:
-        """Forces along the motion, with as many triangles if told so."""
+        """Return forces along the motion, with the scene's number of triangles or another."""
         mesh = self.mesh if triangles is None else self.intruder.mesh(triangles)
         trajectory = self.motion.trajectory(mesh)
-        found = wrench(self.medium, mesh, *trajectory[2:0:-1], *trajectory[3:5], self.effects)
-        return Passed(trajectory, self.weighed(found.force), found.moment, found.power)
+        result = wrench(self.medium, mesh, *trajectory[2:0:-1], *trajectory[3:5], self.effects)
+        return Passed(trajectory, self.weighed(result.force), result.moment, result.power)
 
-    def faces(self, found: Passed, k: int) -> tuple[Faces, np.ndarray]:
-        """What each face below the surface bears at step k; and the triangles (Q, 3, 3) above it."""
-        _, place, rotation, velocity, spin, _ = (x[k] for x in found.trajectory)
+    def faces(self, result: Passed, k: int) -> tuple[Faces, np.ndarray]:
+        """Return the loads on each face below the surface at step k, and the triangles (Q, 3, 3) above it."""
+        _, place, rotation, velocity, spin, _ = (x[k] for x in result.trajectory)
         world = (self.mesh.vertices @ rotation.T + place)[self.mesh.faces]
         above = below(world, -world[..., 2])[0]
         return bearing(self.medium, self.mesh, rotation, place, velocity, spin, self.effects), above
 
-    def table(self, found: Passed) -> dict[str, np.ndarray]:
-        """The columns of a result: t, angle (or x, y, z, if the body does not turn about a hub), force_x, force_y, force_z,
-        moment_x, moment_y, moment_z, and once more the one about y as moment."""
-        trajectory = found.trajectory
+    def table(self, result: Passed) -> dict[str, np.ndarray]:
+        """Return the columns of a result: t, angle (or x, y, z, if the body does not turn about a hub), force_x,
+        force_y, force_z, moment_x, moment_y, moment_z, and once more the one about y as moment."""
+        trajectory = result.trajectory
         place = {"angle": trajectory.angle} if self.motion.turns else dict(zip("xyz", trajectory.place.T))
-        force = {f"force_{a}": f for a, f in zip("xyz", found.force.T)}
-        moment = {f"moment_{a}": m for a, m in zip("xyz", found.moment.T)}
-        return {"t": trajectory.t, **place, **force, **moment, "moment": found.moment[:, 1]}
+        force = {f"force_{a}": f for a, f in zip("xyz", result.force.T)}
+        moment = {f"moment_{a}": m for a, m in zip("xyz", result.moment.T)}
+        return {"t": trajectory.t, **place, **force, **moment, "moment": result.moment[:, 1]}

@@ -29,8 +29,8 @@ RADIANS = 3.2  # a table of angles within this is likely not in degrees
 Named = Annotated[str | None, Word(VERTICAL, f"{', '.join(VERTICAL)}; 'geomech scenes --show NAME' prints one")]
 
 
-def _left_out(kind: type, name: str):
-    """Return the type of a field of a class, as it stands in a form where it may be left out."""
+def _optional_field(kind: type, name: str):
+    """Return the type of a field of a class in a form that may leave it out."""
     hint = get_type_hints(kind, include_extras=True)[name]
     return Annotated[(get_args(hint)[0] | None, *hint.__metadata__)]
 
@@ -42,7 +42,10 @@ def _strengths(*groups: Collection[str], more: Collection[str] = (), cure: str) 
 
 
 _Coefficients = dataclasses.make_dataclass(
-    "_Coefficients", [(key, _left_out(StressMap, key), None) for key in COEFFICIENTS], bases=(StressMap,), frozen=True
+    "_Coefficients",
+    [(key, _optional_field(StressMap, key), None) for key in COEFFICIENTS],
+    bases=(StressMap,),
+    frozen=True,
 )
 
 
@@ -69,7 +72,7 @@ class StressKeys(_Coefficients):
         """Return the stress map. What is given beside its name, file or coefficients takes the place of its own."""
         base = StressMap(**{key: getattr(self, key) for key in COEFFICIENTS if key in given})
         if {"name", "file"} & {*given}:
-            base = VERTICAL[self.name].stress if self.name else _of_file(source, place, self.file)
+            base = VERTICAL[self.name].stress if self.name else _read_stress(source, place, self.file)
         changed = {key: getattr(self, key) for key in ("grazing", "tension") if key in given}
         return dataclasses.replace(base, zeta=base.zeta * self.zeta, **changed)
 
@@ -82,7 +85,7 @@ class SpatialKeys(Spatial):
     beta,gamma,alpha_x,alpha_z (degrees, N/cm^3).
     """
 
-    xi_n: _left_out(Spatial, "xi_n") = None  # type: ignore[valid-type]
+    xi_n: _optional_field(Spatial, "xi_n") = None  # type: ignore[valid-type]
     name: Named = None
     file: str | None = None
     zeta: Annotated[float, Number(0, 1e6, "-", "times the strength of the name or file")] = 1.0
@@ -122,16 +125,16 @@ class MatchedKeys(SpatialKeys):
     def to_part(self, source: Source, place: str, given: Collection[str]) -> dict:
         """Return the medium, and what its strength was matched to, if to a map of the vertical plane."""
         medium = super().to_part(source, place, given)
-        of = self.name or Path(self.file or "").name
+        source_name = self.name or Path(self.file or "").name
         times = f"{self.zeta:g} times " if self.zeta != 1.0 else ""
-        match = (
-            f"xi_n = {medium.xi_n:.4g} N/m^3, matched to {times}alpha_z(0, 90 degrees) of {of} in the vertical plane"
-        )
-        return {"medium": medium, "matched": match if of else ""}
+        vertical = f"{times}alpha_z(0, 90 degrees) of {source_name} in the vertical plane"
+        match = f"xi_n = {medium.xi_n:.4g} N/m^3, matched to {vertical}"
+        return {"medium": medium, "matched": match if source_name else ""}
 
 
 def matched_strength(stress: PlateStress) -> float:
-    """Return xi_n, N/m^3, with which a flat plate pushed straight down bears what it does by a map of the vertical plane."""
+    """Return xi_n, N/m^3, with which a flat plate pushed straight down bears the load that a map of the vertical plane
+    gives."""
     flat, down = (0.0, -1.0), (0.0, -1.0)
     return 1e6 * float(stress.alpha(flat, down)[1]) / Spatial(1.0).plate
 
@@ -163,10 +166,10 @@ def load_medium(medium: str) -> PlateStress:
         return VERTICAL[medium].stress
     if Path(medium).suffix not in (".toml", ".csv") and not Path(medium).exists():
         choose("medium", medium, VERTICAL)
-    return _of_file(Source("medium"), "medium", medium)
+    return _read_stress(Source("medium"), "medium", medium)
 
 
-def _of_file(source: Source, place: str, file: str) -> PlateStress:
+def _read_stress(source: Source, place: str, file: str) -> PlateStress:
     """Return the stress map of a TOML file, if its name does not end in .csv, or of a CSV file of plate drags."""
     path = Path(file)
     if path.suffix == ".csv":

@@ -1,4 +1,4 @@
-"""How scenes with a gait are read: what their files say once for the whole scene, and in the short form of a swimmer."""
+"""The reader of scenes with a gait: values that apply to the whole scene, and the short form of a swimmer."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ def from_tables(tables: Mapping, name: str, text: str) -> Scene:
 
 
 def _system(tables: Mapping, name: str) -> dict:
-    """Return the table of the system. [medium], [body] and [[effects]] are short for a swimmer, whose they may also be in
-    its own table."""
+    """Return the table of the system. [medium], [body] and [[effects]] are short for a swimmer, in whose own table they
+    may also stand."""
     table = tables.get("system", {"kind": SHORT})
     short, kind = {part: tables[part] for part in SWIMMER if part in tables}, table.get("kind")
     if short and isinstance(kind, str) and kind in {*SYSTEMS} - {SHORT}:
@@ -53,18 +53,18 @@ def _system(tables: Mapping, name: str) -> dict:
 
 
 def _with_numerics(system: System, given: Mapping, source: reader.Source) -> tuple[System, Numerics]:
-    """Return a system with its part of [numerics], and the rest, which is the tiers'."""
+    """Return a system with its part of [numerics], and the rest, for the tiers."""
     place = f"{source.name}: [numerics]"
-    own = NoSolver if (solver := solver_of(system)) is None else type(solver)
-    names = [field.name for kind in (Numerics, own) for field in dataclasses.fields(kind)]
-    of = {True: {}, False: {}}
+    solver_class = NoSolver if (solver := solver_of(system)) is None else type(solver)
+    names = [field.name for kind in (Numerics, solver_class) for field in dataclasses.fields(kind)]
+    by_solver = {True: {}, False: {}}
     for key, value in given.items():
-        if key not in spellings(Numerics) and key not in spellings(own):
+        if key not in spellings(Numerics) and key not in spellings(solver_class):
             choose(f"{place} key", key, names)
-        of[key in spellings(own)][key] = value
-    if of[True]:
-        system = system.with_solver(reader.build(source, place, of[True], own))
-    return system, reader.build(source, place, of[False], Numerics)
+        by_solver[key in spellings(solver_class)][key] = value
+    if by_solver[True]:
+        system = system.with_solver(reader.build(source, place, by_solver[True], solver_class))
+    return system, reader.build(source, place, by_solver[False], Numerics)
 
 
 def solvers() -> list[type]:
@@ -73,9 +73,9 @@ def solvers() -> list[type]:
 
 
 def _without_fitted(tables: Mapping, name: str) -> tuple[dict, bool]:
-    """Return the tables without the frame that is fitted to the whole system on the grid, and whether one asks for it: it
-    stands above all tables, in [body] or in [system], as any other."""
-    own, places = tables.get("frame"), []
+    """Return the tables without the minimum-perturbation frame, and whether they request it: above all tables, in
+    [body] or in [system]."""
+    scene_frame, places = tables.get("frame"), []
 
     def plain(place: str, table):
         if not isinstance(table, Mapping) or table.get("frame") != FITTED:
@@ -86,8 +86,8 @@ def _without_fitted(tables: Mapping, name: str) -> tuple[dict, bool]:
     tables = {k: plain(k, v) if k in ("body", "system") else v for k, v in plain("", tables).items()}
     if "body" in tables.get("system", {}):
         tables["system"] = {**tables["system"], "body": plain("system.body", tables["system"]["body"])}
-    if places and own not in (None, FITTED):
+    if places and scene_frame not in (None, FITTED):
         raise Refusal(
-            f"[{places[0]}] frame = {FITTED!r}, but the scene's frame = {own!r}", where=name, instead="keep one"
+            f"[{places[0]}] frame = {FITTED!r}, but the scene's frame = {scene_frame!r}", where=name, instead="keep one"
         )
     return tables, bool(places)

@@ -45,9 +45,9 @@ class WalkerScene:
 
     def __post_init__(self):
         with located(self.name):
-            for what, kind in (("numerics", Fineness), ("name", str), ("text", str)):
-                if not isinstance(getattr(self, what), kind):
-                    raise Refusal(f"{what} must be {kind.__name__}", value=getattr(self, what))
+            for name, kind in (("numerics", Fineness), ("name", str), ("text", str)):
+                if not isinstance(getattr(self, name), kind):
+                    raise Refusal(f"{name} must be {kind.__name__}", value=getattr(self, name))
             if not (isinstance(self.files, tuple) and all(isinstance(x, str) for x in self.files)):
                 raise Refusal("files must be a tuple of names", value=self.files)
             object.__setattr__(self, "effects", self.walker.effects)
@@ -55,7 +55,7 @@ class WalkerScene:
 
     @property
     def engine(self) -> str:
-        """What computes it, where nothing else is asked for."""
+        """The engine that computes it by default."""
         spatial = isinstance(self.robot, Mjcf | Screws) or isinstance(self.medium, Spatial)
         return self.numerics.engine or ("mujoco" if spatial else "planar")
 
@@ -65,7 +65,7 @@ class WalkerScene:
 
 
 def spelled_out(tables: Mapping, name: str) -> dict:
-    """Return the tables of a scene with the names that they leave out: those of the robot's kind, its screw, and the law."""
+    """Return the tables of a scene with the names that they omit: those of the robot's kind, its screw, and the law."""
     tables = {key: dict(table) if isinstance(table, Mapping) else table for key, table in tables.items()}
     medium, robot = (tables.get(key) if isinstance(tables.get(key), dict) else {} for key in ("medium", "robot"))
     if "mjcf" in robot and robot.setdefault("kind", "mjcf") != "mjcf":

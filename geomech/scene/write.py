@@ -1,4 +1,4 @@
-"""The TOML of a scene, however it was made: reading it gives the same scene."""
+"""The writer of a scene's TOML: reading it gives the same scene."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from geomech.scene.medium import MEDIUM
 from geomech.scene.model import SWIMMER, Scene, checked_scene
 from geomech.scene.read import from_tables
 from geomech.scene.sections import Each, Keys, Section, sections_of, variants
-from geomech.systems.base import given
+from geomech.systems.base import unwrapped
 from geomech.systems.capabilities import solver_of
 from geomech.systems.framed import Framed
 from geomech.systems.swimmer import Swimmer, name_in
@@ -28,39 +28,39 @@ if TYPE_CHECKING:
 
 
 def toml(scene: Scene | Intruding | WalkerScene) -> str:
-    """The text it was read from where that still holds by itself and in any folder, comments and all; else a new one, in
-    which a medium that came from a file stands, and other files with their folders. Refusal if it has a part that no
-    scene file can name."""
-    alone = not isinstance(_checked(scene), Scene) or not (scene.files or _beside(scene.text))
-    if scene.text and alone and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene:
+    """Return the text that the scene was read from where it is valid by itself and in any folder, comments and all;
+    else a new one, which spells out a medium that came from a file, and names other files with their folders. Refusal
+    if it has a part that no scene file can name."""
+    self_contained = not isinstance(_checked(scene), Scene) or not (scene.files or _names_relative_file(scene.text))
+    if scene.text and self_contained and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene:
         return scene.text
-    return _text(_anew(scene))
+    return _text(_written_tables(scene))
 
 
 def _checked(scene: Scene | Intruding | WalkerScene) -> Scene | Intruding | WalkerScene:
-    """Return a scene of any kind; ValueError if it is none."""
+    """Return a scene of any kind; Refusal if it is none."""
     return scene if hasattr(type(scene), "example") else checked_scene(scene)
 
 
-def _beside(text: str) -> bool:
-    """Whether a scene's text names a file by its place beside the scene's own."""
+def _names_relative_file(text: str) -> bool:
+    """Return whether a scene's text names a file by its place relative to the scene's own."""
     tables = tomllib.loads(text)
     files = [tables.get(place, {}).get("file", "") for place in ("gait", "system")]
     return any(file and not Path(file).is_absolute() for file in files)
 
 
 def table(name: str, values: dict) -> str:
-    """One table as TOML."""
+    """Return one table as TOML."""
     return _text({name: values})
 
 
 def gait_table(gait: Gait) -> dict:
-    """Return what stands in [gait]."""
+    """Return the table [gait] of a gait."""
     return _section(gait, sections_of(Scene)["gait"].section)
 
 
 def medium_toml(name: str, entry) -> str:
-    """The table of a medium of the catalogue (`rft.laws.catalogue.Entry`), with its source above."""
+    """Return the table of a medium of the catalogue (`rft.laws.catalogue.Entry`), with its source above."""
     lines = textwrap.wrap(f"{name}: {entry.source}", 110)
     if entry.axial_stress is not None:
         lines.append(f"axial drag over projected area at 7.62 cm depth: {entry.axial_stress:g} Pa")
@@ -72,32 +72,37 @@ def medium_toml(name: str, entry) -> str:
 
 
 def vertical_toml(name: str, entry) -> str:
-    """The table of a medium of intruder scenes (`rft.plates.VerticalEntry`), with its source above."""
+    """Return the table of a medium of intruder scenes (`rft.plates.VerticalEntry`), with its source above."""
     head = "".join(f"# {line}\n" for line in textwrap.wrap(f"{name}: {entry.source}", 110))
     from rft.plates.stress import COEFFICIENTS
 
-    told = dataclasses.asdict(entry.stress)
-    values = {**{key.replace("m", "-"): told[key] for key in COEFFICIENTS}, "zeta": told["zeta"]}
+    stress = dataclasses.asdict(entry.stress)
+    values = {**{key.replace("m", "-"): stress[key] for key in COEFFICIENTS}, "zeta": stress["zeta"]}
     return f"{head}# coefficients in N/cm^3, times zeta\n{table('medium', values)}"
 
 
 def tables(scene: Scene | Intruding | WalkerScene) -> dict:
-    """Return the tables of a scene's text, with the numerics of now, where these make the scene; else those written anew."""
+    """Return the tables of a scene's text, with its present numerics, where these make the scene; else newly written
+    ones."""
     read = tomllib.loads(_checked(scene).text)
     if isinstance(scene, Scene):
         read["numerics"] = _numerics(scene)
-    alone = not (isinstance(scene, Scene) and scene.files)  # whose medium can be swept only where it stands
-    return read if scene.text and alone and from_tables(read, scene.name, scene.text) == scene else _anew(scene)
+    self_contained = not (isinstance(scene, Scene) and scene.files)  # whose medium can be swept only where it stands
+    return (
+        read
+        if scene.text and self_contained and from_tables(read, scene.name, scene.text) == scene
+        else _written_tables(scene)
+    )
 
 
 def spelled_out(tables: dict, scene: Scene) -> dict:
-    """The scene's tables with the law and its parameters in place of the name of its medium."""
+    """Return the scene's tables with the law and its parameters in place of the name of its medium."""
     if "name" not in tables.get("medium", {}):
         return tables
     return {**tables, "medium": _section(scene.system.medium, MEDIUM)}
 
 
-def _anew(scene: Scene | Intruding | WalkerScene) -> dict:
+def _written_tables(scene: Scene | Intruding | WalkerScene) -> dict:
     """Return the tables that a scene's parts make; Refusal if a file cannot name one of them."""
     with located(scene.name):
         out = {}
@@ -113,7 +118,7 @@ def _anew(scene: Scene | Intruding | WalkerScene) -> dict:
 
 
 def section_tables(part: Any, section: Section) -> dict | list[dict]:
-    """Return the table of a section, or the tables of one for each part; ValueError if no file can name the part."""
+    """Return the table of a section, or the tables of one for each part; Refusal if no file can name the part."""
     return [_section(each, section) for each in part] if isinstance(section, Each) else _section(part, section)
 
 
@@ -132,7 +137,7 @@ def _section(part: Any, section: Section) -> dict:
 
 
 def _short(tables: dict, scene: Scene) -> dict:
-    """Return tables with a swimmer's parts in place of [system], and once what holds for the whole scene."""
+    """Return tables with a swimmer's parts in place of [system], and once the values that apply to the whole scene."""
     system, effects = tables.pop("system"), []
     if isinstance(_named(scene.system), Swimmer):
         tables = {part: system[part] for part in SWIMMER if system[part]} | tables
@@ -154,7 +159,7 @@ def _named(part: Any) -> Any:
     """Return the object inside a system that a scene file can name."""
     if isinstance(part, Framed):
         return _named(part.inner)
-    return given(part)
+    return unwrapped(part)
 
 
 def _numerics(scene: Scene) -> dict:
@@ -163,13 +168,13 @@ def _numerics(scene: Scene) -> dict:
 
 
 def _fields(part: Any, kind: type) -> dict:
-    """Return the keys of a class, as a file has them, that a part has a value for."""
-    names = [f.name for f in dataclasses.fields(kind) if f.init and f.name != "solver"]
-    return {name: _plain(value) for name in names if (value := getattr(part, name, None)) is not None}
+    """Return the keys of a class, as in a file, for which a part has a value."""
+    keys = [f.name for f in dataclasses.fields(kind) if f.init and f.name != "solver"]
+    return {name: _plain(value) for name in keys if (value := getattr(part, name, None)) is not None}
 
 
 def _plain(value):
-    """NumPy's numbers and rows as Python's own."""
+    """Return NumPy's numbers and rows as Python's own."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     return [_plain(x) for x in value] if isinstance(value, (tuple, list)) else value
@@ -185,7 +190,7 @@ def _text(tables: dict) -> str:
 
 
 def _value(x) -> str:
-    """As TOML; its strings and lists are JSON's, its numbers Python's."""
+    """Return a value as TOML; its strings and lists are JSON's, its numbers Python's."""
     if isinstance(x, list):
         return f"[{', '.join(map(_value, x))}]"
     if isinstance(x, dict):

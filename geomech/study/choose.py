@@ -14,8 +14,8 @@ from geomech.study import cost, tables, uncertainty
 from geomech.study.estimate import CHECKED, FEWEST_STEPS, against_direct, in_groups, pose_distance
 from geomech.study.results import Displacements
 from geomech.study.study import Study
-from geomech.systems.capabilities import pieces_of, settling, solver_of
-from geomech.tiers.base import solved
+from geomech.systems.capabilities import pieces_per_length, settling, solver_of
+from geomech.tiers.base import solved_phases
 from geomech.tiers.direct import DIRECT
 from rft.checks import is_number, real_array
 from rft.refusal import Refusal
@@ -61,7 +61,7 @@ def cheapest(
         pilot, settings = _refined(scene, gait, amplitudes[sampled], tol / 4, phases, ask)
         phases = settings["phases"]
     balances = {m: cost.balances(plan, len(amplitudes), phases) for m, plan in plans.items()}
-    enough = len(amplitudes) * solved(system, gait, phases)  # of the system itself
+    enough = len(amplitudes) * solved_phases(system, gait, phases)  # of the system itself
     for method in sorted(plans, key=balances.get):
         if balances[method] >= enough:
             break
@@ -102,11 +102,11 @@ def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask:
         if (2 * pieces > FINEST_PIECES) if coarse_pieces else (2 * phases > MOST_PHASES):
             break
         pieces, phases = (2 * pieces, phases) if coarse_pieces else (pieces, 2 * phases)
-        finer_scene = scene.with_numerics(pieces=pieces) if pieces_of(scene.system) else scene
+        finer_scene = scene.with_numerics(pieces=pieces) if pieces_per_length(scene.system) else scene
         ask(cost.direct(finer_scene, gait, len(worse), phases))
         finer, finer_error, finer_pieces = in_groups(finer_scene, gait, amplitudes[worse], phases)
         stalled = (finer_error + finer_pieces > 0.9 * error[worse])[:, 0].all() and phases > 1024
         poses[worse], error[worse], of_pieces[worse], open_ = finer, finer_error + finer_pieces, finer_pieces, worse
         if stalled:
             break
-    return (poses, error), {"phases": phases, **({"pieces": pieces} if pieces_of(scene.system) else {})}
+    return (poses, error), {"phases": phases, **({"pieces": pieces} if pieces_per_length(scene.system) else {})}

@@ -20,10 +20,18 @@ from geomech.run.cost import BASE, Cost, assumed
 from geomech.scene.model import Scene
 from geomech.study import effort, estimate, uncertainty
 from geomech.systems.base import System
-from geomech.systems.capabilities import at_once, balance_size, pieces_of, refined, settling, solver_of, stored
+from geomech.systems.capabilities import (
+    balance_size,
+    gaits_per_batch,
+    pieces_per_length,
+    refined,
+    settling,
+    solver_of,
+    stored_table,
+)
 from geomech.systems.framed import Framed
 from geomech.tiers import fitted, harmonic
-from geomech.tiers.base import Plan, Table, solved
+from geomech.tiers.base import Plan, Table, solved_phases
 
 CLOSED = 1e-6  # s of a velocity without balance of forces, measured for built-in systems, assumed for others
 LOOK, READ = 2.2e-7, 1.1e-9  # s for each look-up in a table, and for each number that it sums; measured
@@ -131,11 +139,11 @@ def direct(
     system, stepping = scene.system, scene.system.traits.steps
     if checked:
         phases = max(estimate.FEWEST_STEPS if stepping else 32, 8 * -(-phases // 8))
-    group = min(max(1, count), together, at_once(system, phases))
+    group = min(max(1, count), together, gaits_per_batch(system, phases))
     size = balance_size(system)
     stored = group * (60 * size.elements + size.memory) if stepping else 0
     memory = BASE + 8 * (COPIES * group * phases * (system.joints + 6) + stored) + count * ROW
-    solves = (lambda n: n) if all_phases else (lambda n: solved(system, gait, n))
+    solves = (lambda n: n) if all_phases else (lambda n: solved_phases(system, gait, n))
     runs = _runs(scene, phases) if checked else [(phases, 1.0)]
     groups, cycles = -(-count // group), cycles_of(system)
     jobs = [
@@ -160,7 +168,7 @@ def _runs(scene: Scene, phases: int) -> list[tuple[int, float]]:
     quarter, system = phases // 4, scene.system
     runs = [(phases, 1.0)]
     runs += [(phases // k, 1.0) for k in (2, 4, 8)] if system.traits.steps else []
-    runs += [(quarter, 2.0), (phases, 0.5), (phases, 0.25)] if pieces_of(system) else []
+    runs += [(quarter, 2.0), (phases, 0.5), (phases, 0.25)] if pieces_per_length(system) else []
     return runs + ([(quarter, 1.0)] if refined(system) else [])
 
 
@@ -185,7 +193,7 @@ def of_even_part(scene: Scene) -> list[Job]:
     """Return the jobs of the even part of the velocity (`Study.even_part`): at a few shapes, and at all where it is not
     odd."""
     system = scene.system
-    if stored(system, "connection"):
+    if stored_table(system, "connection"):
         return []
     shapes = math.prod(len(a) for a in fitted.axes(system, scene.numerics))
     looked_at = EVEN_SHAPES + (0 if system.traits.odd else shapes)
@@ -194,14 +202,14 @@ def of_even_part(scene: Scene) -> list[Job]:
 
 def of_planes(scene: Scene, pairs: Sequence[tuple[int, int]], at: Sequence) -> list[Job]:
     """Return the jobs of planes of pairs of joints through shapes (`Study.plane`)."""
-    balances = [fitted.balances_of_plane(scene.system, scene.numerics, *one) for one in zip(pairs, at)]
+    balances = [fitted.plane_balances(scene.system, scene.numerics, *one) for one in zip(pairs, at)]
     return [job for count in balances for job in _spread_out(scene, count, BASE)]
 
 
 def of_metric(scene: Scene) -> list[Job]:
     """Return the jobs of the metric, with the harmonic table where they share velocities (`Study.compute_metric`)."""
     system, n = scene.system, scene.numerics
-    if stored(system, "metric"):
+    if stored_table(system, "metric"):
         return []
     if effort.shared(system):
         return built(scene, effort.shared_table(system, n))
@@ -217,4 +225,4 @@ def of_effort(scene: Scene, count: int, gait: Gait | None = None) -> list[Job]:
     once = lambda n: direct(scene, gait or scene.gait, count, n, checked=False)
     jobs = once(phases)
     jobs += once(phases // 2) + once(phases // 4) if system.traits.steps else []
-    return jobs + ([job._replace(weight=2.0) for job in once(phases // 4)] if pieces_of(system) else [])
+    return jobs + ([job._replace(weight=2.0) for job in once(phases // 4)] if pieces_per_length(system) else [])

@@ -10,7 +10,7 @@ import numpy as np
 
 from geomech.core.summary import poses
 from geomech.core.variables import Result, Variable
-from geomech.io.results import units_of
+from geomech.io.results import unit_name
 from geomech.run.cost import Cost
 from geomech.scene import write as written
 from geomech.scene.model import Scene, checked_scene
@@ -19,7 +19,7 @@ from geomech.study.batch import kind, side_by_side
 from geomech.study.cost import direct, of_medium, price
 from geomech.study.grid import Grid, at_points
 from geomech.systems.base import length_unit
-from geomech.systems.capabilities import at_once
+from geomech.systems.capabilities import gaits_per_batch
 
 POINT_BYTES = 200  # bytes of a point: its row, and copies of it on the way to a file
 MAKING = 6e-4  # s to build a scene from its tables, measured
@@ -46,7 +46,7 @@ class Cycles:
         return grid
 
     def together(self, scene: Scene) -> int:
-        return min(SAMPLES_TOGETHER, at_once(scene.system, scene.numerics.phases))
+        return min(SAMPLES_TOGETHER, gaits_per_batch(scene.system, scene.numerics.phases))
 
     def rows(self, scenes: list[Scene], amplitudes: list[float] | None) -> np.ndarray:
         """Return x, y, theta, errors of position and heading, and standard deviations of QUANTITIES where the medium is
@@ -91,7 +91,7 @@ class Cycles:
     def as_stored(self, result: Result) -> Result:
         """Return a sweep as data for a file."""
         variables = tables.poses_as_stored(result)
-        unit = units_of(result["length"].unit)
+        unit = unit_name(result["length"].unit)
         variables.append(
             Variable("length", result["length"].dims, result["length"].values, unit, result["length"].label)
         )

@@ -24,7 +24,16 @@ from geomech.scene.model import Scene
 from geomech.study import tables
 from geomech.study.estimate import MOST_PIECES
 from geomech.systems.base import System, kind_of
-from geomech.systems.capabilities import Dissipative, OwnMetric, at_once, capability, driven, pieces_of, power, stored
+from geomech.systems.capabilities import (
+    Dissipative,
+    OwnMetric,
+    capability,
+    gaits_per_batch,
+    pieces_per_length,
+    power,
+    stored_table,
+    velocity_and_power,
+)
 from geomech.systems.premises import because, listed
 from geomech.tiers import harmonic
 from geomech.tiers.base import Numerics, Table, in_groups
@@ -44,8 +53,8 @@ def why_none(system: System) -> str:
     """Return why a system has no metric, in words that follow its name; "" if it has one."""
     if parts := because(system, SHAPE_ALONE):
         return f"no metric with {parts}: its power does not follow from shape alone"
-    if stored(system, "connection"):
-        return "" if stored(system, "metric") else "no metric with this table: its file tells no power"
+    if stored_table(system, "connection"):
+        return "" if stored_table(system, "metric") else "no metric with this table: its file tells no power"
     if capability(system, OwnMetric) is not None:
         return ""
     if system.traits.power_degree is None:
@@ -81,7 +90,7 @@ def table(system: System, numerics: Numerics, progress: Callable | None = None) 
     """Return the metric on the field's grid: quadratic where xi = A alphadot, else a norm. Refusal if there is none."""
     if reason := why_none(system):
         raise Refusal(reason)
-    if own := stored(system, "metric"):
+    if own := stored_table(system, "metric"):
         return own
     grid, degree = axes(system, numerics), numerics.interpolation
     own = capability(system, OwnMetric)
@@ -94,7 +103,7 @@ def table(system: System, numerics: Numerics, progress: Callable | None = None) 
 
 def shared(system: System) -> bool:
     """Return whether the metric can be computed from the velocities of the harmonic table."""
-    of_its_own = system.traits.linear or capability(system, OwnMetric) is not None or stored(system, "connection")
+    of_its_own = system.traits.linear or capability(system, OwnMetric) is not None or stored_table(system, "connection")
     return not of_its_own and HARMONIC.is_offered(system)
 
 
@@ -115,7 +124,7 @@ def with_harmonics(
     P = np.concatenate([P, P[: size - len(P)][::-1]])  # with mirror symmetry half of the grid is solved
     F = _norm(P, system.traits.power_degree).T.reshape(-1, *map(len, harmonics.axes))
     unit = connection.directions(2, len(F))
-    return harmonics, metric.of_samples(F, harmonics.axes, unit, harmonics.degree, highest=HIGHEST)
+    return harmonics, metric.norm_from_samples(F, harmonics.axes, unit, harmonics.degree, highest=HIGHEST)
 
 
 class _Watched:
@@ -133,14 +142,14 @@ class _Watched:
         return _Driven(self.system, self.powers)
 
 
-class _Driven(connection.Telling):
+class _Driven(connection.Reporting):
     """The velocity of a system, which also passes on the power."""
 
     def __init__(self, system: System, powers: list):
-        self.both, self.heard = partial(driven, system), powers.append
+        self.with_report, self.receive = partial(velocity_and_power, system), powers.append
 
     def __reduce__(self) -> tuple:
-        return _Driven, (self.both.args[0], [])
+        return _Driven, (self.with_report.args[0], [])
 
 
 def _norm_of(system: System, alpha, alphadot) -> np.ndarray:
@@ -155,7 +164,7 @@ def refuse_costless(scene: Scene) -> None:
     """Refuse a scene whose cost of moving is not known."""
     system = scene.system
     if not any(capability(system, kind) for kind in (Dissipative, OwnMetric)):
-        what = "its file does not tell it" if stored(system, "connection") else "nothing says what moving costs"
+        what = "its file does not tell it" if stored_table(system, "connection") else "nothing says what moving costs"
         raise Refusal(f"no path length or work with the {kind_of(system)}", where=scene.name, instead=what)
 
 
@@ -171,7 +180,11 @@ def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int 
     amplitudes = real_array("amplitudes", [gait.amplitude] if amplitudes is None else amplitudes).ravel()
     in_range("phases", phases or 8, 8, 1e6, whole=True)
     phases = phases_of(scene, phases)
-    finer = scene.with_numerics(pieces=min(2 * pieces_of(system), MOST_PIECES)).system if pieces_of(system) else None
+    finer = (
+        scene.with_numerics(pieces=min(2 * pieces_per_length(system), MOST_PIECES)).system
+        if pieces_per_length(system)
+        else None
+    )
 
     integral = lambda rates: 2 * np.pi * rates.mean(-1)
 
@@ -191,7 +204,7 @@ def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int 
         return np.concatenate([fine, error], 1)
 
     names = ("path_length", "work", "path_length_error", "work_error")
-    return dict(zip(names, in_groups(integrals, amplitudes, at_once(system, phases))[:, :4].T))
+    return dict(zip(names, in_groups(integrals, amplitudes, gaits_per_batch(system, phases))[:, :4].T))
 
 
 def phases_of(scene: Scene, phases: int | None = None) -> int:

@@ -2,7 +2,7 @@
 
 Every estimate is a refinement, never a constant: the direct tier against itself at half, a quarter and an eighth of the
 phases and, on the quarter, with the regularisation ten times smaller and exact link integrals, or with pieces of half
-the length; a table against half of its grid, and by the residual of its fit (`System.own_error`); every other tier
+the length; a table against half of its grid, and by the residual of its fit (`System.table_error`); every other tier
 against the direct tier. Errors come in pairs: the distance between net positions, in body lengths, and between net
 headings, in rad."""
 
@@ -16,7 +16,7 @@ from geomech.gaits import Gait
 from geomech.geometry.reconstruct import displacement
 from geomech.run.jobs import runner
 from geomech.scene.model import Scene
-from geomech.systems.capabilities import at_once, is_closed, own_error, pieces_of, refined
+from geomech.systems.capabilities import gaits_per_batch, is_closed, pieces_per_length, refined, table_error
 from rft.refusal import located
 
 CHECKED = (
@@ -55,7 +55,7 @@ def direct(scene: Scene, gait: Gait, amplitudes: np.ndarray, phases: int) -> tup
 def in_groups(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int) -> tuple[np.ndarray, ...]:
     """Return poses, errors without those of the pieces of body, and errors of these, of the direct tier. amplitudes:
     None for the gait's own."""
-    size = at_once(scene.system, phases)
+    size = gaits_per_batch(scene.system, phases)
     groups = (
         [None] if amplitudes is None else [amplitudes[k : k + size] for k in range(0, max(1, len(amplitudes)), size)]
     )
@@ -92,7 +92,7 @@ def _direct(
             if is_closed(system)
             else SEEN_BY_RULES * np.maximum(difference, difference.max(-1, keepdims=True) / 2)
         )
-    error += np.asarray(run.to_come)[..., None] + own_error(system, *strided[2])
+    error += np.asarray(run.to_come)[..., None] + table_error(system, *strided[2])
     return full, error, pieces_error(scene, shapes, strided[1], coarse)
 
 
@@ -113,7 +113,7 @@ def pieces_error(scene: Scene, shapes, fewer, coarse: np.ndarray) -> np.ndarray:
     fewer: a quarter of the phases of ``shapes``, where pieces of half the length are compared with ``coarse``, the
     poses there. Which pieces the pivots lie in is chance, so the error is of order 2 on average only: half of the
     pieces against a quarter, at all phases, shows how large this scatter is."""
-    cut = pieces_of(scene.system)
+    cut = pieces_per_length(scene.system)
     if not cut:
         return np.zeros((*coarse.shape[:-1], 2))
     net = lambda n, cycle: scene.with_numerics(pieces=min(max(1, n), MOST_PIECES)).system.run(*cycle).net

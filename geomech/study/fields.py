@@ -13,9 +13,9 @@ from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
 from geomech.geometry.harmonics import Harmonics
 from geomech.geometry.metric import Finsler, Metric
-from geomech.geometry.tube import Known, Tube
+from geomech.geometry.tube import TaylorSeries, Tube
 from geomech.geometry.two_form import TwoForm
-from geomech.io.results import units_of, write_netcdf
+from geomech.io.results import unit_name, write_netcdf
 from geomech.io.tables.netcdf import SHAPE
 from geomech.scene.model import Scene
 from geomech.scene.write import toml
@@ -23,7 +23,7 @@ from geomech.study import effort
 from geomech.study.study import Study
 from geomech.study.tables import COMPONENTS
 from geomech.systems.base import System, length_unit, shape_labels
-from geomech.systems.capabilities import OwnMetric, Recorded, capability, solver_of, stored
+from geomech.systems.capabilities import OwnMetric, Recorded, capability, solver_of, stored_table
 from geomech.systems.framed import Framed
 
 ERROR_OF_CCF = "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
@@ -70,9 +70,9 @@ def attributes(study: Study) -> dict:
 def variables(study: Study) -> list[Variable]:
     """Return the fields of a study, without their coordinates."""
     unit = length_unit(study.scene.system)
-    variables = of_connection(study.fitted, stored(study.scene.system, "A_error"))
+    variables = of_connection(study.fitted, stored_table(study.scene.system, "A_error"))
     if isinstance(study.fitted, Tube):
-        variables += [*of_known(study.fitted.known, unit), of_reach(study.fitted)]
+        variables += [*of_known(study.fitted.taylor, unit), of_reach(study.fitted)]
     if len(study.fitted.axes) == 2:
         what = INTERVAL_OF_CCF if isinstance(study.fitted, Tube) else ERROR_OF_CCF
         variables.append(of_ccf(study.curvature, study.curvature_error, what))
@@ -87,7 +87,7 @@ def variables(study: Study) -> list[Variable]:
     if (harmonics := study.harmonics) is not None:
         variables += of_harmonics(harmonics, unit)
     if (even := study.even_part) is not None:
-        units = f"{units_of(unit)} rad-1 (x, y), rad rad-1 (theta)"
+        units = f"{unit_name(unit)} rad-1 (x, y), rad rad-1 (theta)"
         name = "rms over directions of xi(alphadot) + xi(-alphadot), |alphadot| = 1, which A takes for 0"
         variables.append(Variable("even_part", ("component", *angles_of(study.fitted.axes)), even, units, name))
     return variables
@@ -96,7 +96,7 @@ def variables(study: Study) -> list[Variable]:
 def of_connection(fitted: Connection, error: np.ndarray | None = None) -> list[Variable]:
     """Return A, its fit residual, and the rms of xi. error: half widths (3, d, N_1, ...) of intervals of A."""
     angles = angles_of(fitted.axes)
-    units = f"{units_of(fitted.unit)} rad-1 (x, y), rad rad-1 (theta)"
+    units = f"{unit_name(fitted.unit)} rad-1 (x, y), rad rad-1 (theta)"
     residual = "rms of xi - A alphadot over directions of alphadot, |alphadot| = 1"
     speed = "rms of xi over directions of alphadot, |alphadot| = 1"
     return [
@@ -115,10 +115,10 @@ def of_reach(tube: Tube) -> Variable:
     return Variable("reach", angles_of(tube.axes), tube.reach(shapes), "1", label)
 
 
-def of_known(known: Known, unit: str) -> list[Variable]:
+def of_known(known: TaylorSeries, unit: str) -> list[Variable]:
     """Return the arrays of a connection near one gait (`geomech.geometry.tube`)."""
     units, order = (
-        f"{units_of(unit)} rad-1 (x, y), rad rad-1 (theta)",
+        f"{unit_name(unit)} rad-1 (x, y), rad rad-1 (theta)",
         "Fourier coefficients, 1, cos t, sin t, cos 2t ..., of",
     )
     lead, row = ("component", "joint"), "harmonic_of_A"
@@ -138,11 +138,11 @@ def of_known(known: Known, unit: str) -> list[Variable]:
             "at equally spaced phases: the data reach deviations d with d . inverse . d up to 1",
         ),
         Variable(
-            "gait_beyond", ("component",), known.beyond, f"{units_of(unit)} (x, y), rad (theta)",
+            "gait_beyond", ("component",), known.beyond, f"{unit_name(unit)} (x, y), rad (theta)",
             "what the variation of the cycles changes in the net pose beyond the first order, part of its error",
         ),
         Variable(
-            "gait_off", ("component", "along_and_across", "place"), known.off, units,
+            "gait_off", ("component", "along_and_across", "place"), known.standard_error, units,
             "at equally spaced phases: standard errors of A along the mean gait, and across it, for what is left of xi",
         ),
     ]  # fmt: skip
@@ -150,14 +150,14 @@ def of_known(known: Known, unit: str) -> list[Variable]:
 
 def of_ccf(field: Field, error: Field | None = None, what: str = ERROR_OF_CCF, name: str = "ccf") -> Variable:
     """Return a CCF as a variable. what: text on the kind of its error."""
-    units = f"{units_of(field.unit)} rad-2 (x, y), rad rad-2 (theta)"
+    units = f"{unit_name(field.unit)} rad-2 (x, y), rad rad-2 (theta)"
     label, dims = "curvature constraint function of joints 1 and 2", ("component", *angles_of(field.axes))
     return Variable(name, dims, field.values, units, label, None if error is None else error.values, error_label=what)
 
 
 def of_pairs(form: TwoForm, error: TwoForm) -> list[Variable]:
     """Return the CCF of all pairs of joints, its error, and the pairs."""
-    units = f"{units_of(form.field.unit)} rad-2 (x, y), rad rad-2 (theta)"
+    units = f"{unit_name(form.field.unit)} rad-2 (x, y), rad rad-2 (theta)"
     pairs, over = np.array(form.pairs) + 1.0, ("pair", "component", *angles_of(form.field.axes))
     order = ", ".join(f"{i:g} {j:g}" for i, j in pairs)
     label = f"curvature constraint function of joints {order}, in this order"
@@ -177,7 +177,7 @@ def of_pairs(form: TwoForm, error: TwoForm) -> list[Variable]:
 
 def of_frame(pose: Field) -> Variable:
     """Return the pose of a minimum-perturbation frame in the original frame."""
-    units = f"{units_of(pose.unit)} (x, y), rad (theta)"
+    units = f"{unit_name(pose.unit)} (x, y), rad (theta)"
     name = "pose of this frame in the mean frame of the body, h with g_this = g_mean h"
     return Variable("frame_pose", ("component", *angles_of(pose.axes)), pose.values, units, name)
 
@@ -185,7 +185,7 @@ def of_frame(pose: Field) -> Variable:
 def of_harmonics(table: Harmonics, unit: str) -> list[Variable]:
     """Return the coefficients of the odd harmonics of xi, and their residual."""
     angles = angles_of(table.axes)
-    units = f"{units_of(unit)} rad-1 (x, y), rad rad-1 (theta)"
+    units = f"{unit_name(unit)} rad-1 (x, y), rad rad-1 (theta)"
     name = "coefficients of cos(k beta), sin(k beta), k = 1, 3, 5 ..., of xi for alphadot = (cos beta, sin beta)"
     residual = "rms over directions of alphadot of what the harmonics leave of xi, |alphadot| = 1"
     return [
@@ -236,7 +236,9 @@ def coordinates(axes: Sequence[np.ndarray], labels: Sequence[tuple[str, str]]) -
 
 def of_fitted(fitted: Connection, shapes: Sequence[str] = ()) -> Result:
     """Return A, its fit residual and the rms of xi. shapes: names of the shape variables, where these are no joint angles."""
-    sized = {} if fitted.length is None else {"body_length": float(fitted.length), "length_unit": units_of(fitted.unit)}
+    sized = (
+        {} if fitted.length is None else {"body_length": float(fitted.length), "length_unit": unit_name(fitted.unit)}
+    )
     variables = (*coordinates(fitted.axes, _labels(fitted.axes, shapes)), *of_connection(fitted))
     return Result("connection", variables, {"sign_of_A": "xi = + A alphadot", **sized}, fitted)
 
@@ -271,7 +273,7 @@ def about(scene: Scene) -> dict:
         "frame": scene.frame,
         "frame_meaning": f"body frame: {meaning}",
         "body_length": float(system.length),
-        "length_unit": units_of(length_unit(system)),
+        "length_unit": unit_name(length_unit(system)),
         **recorded(system),
         "components": "x, y, theta of the body velocity xi: forward (tail to head), to the left, counter-clockwise",
         "sign_of_A": "xi = + A alphadot",

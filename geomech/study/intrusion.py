@@ -56,7 +56,7 @@ def estimate(scene: Intruding, run) -> Estimate:
     """Return the largest change of a run with finer parts, extrapolated by the order of the error."""
     change, counts = np.zeros(2), [times * scene.count for times in scene.finer]
     try:
-        counts = [scene.used(count) for count in counts]
+        counts = [scene.actual_count(count) for count in counts]
     except ValueError:
         counts = [scene.count]
     if counts[0] == scene.count:
@@ -95,7 +95,7 @@ class Settings:
 
     def knobs(self) -> list[Knob]:
         """Return the number of parts as a knob; a shape may have more than the number given."""
-        values = tuple(self.scene.used(n) for n in self.scene.ladder[:-1])
+        values = tuple(self.scene.actual_count(n) for n in self.scene.ladder[:-1])
         return [Knob(self.scene.parts, values, self.scene.order, against="limit")]
 
     def numbers(self, knob: Knob | None, value: Any) -> list[np.ndarray]:
@@ -127,7 +127,7 @@ class Settings:
 
     def facts(self) -> dict[str, Any]:
         scene = self.scene
-        finest = scene.used(scene.ladder[-1])
+        finest = scene.actual_count(scene.ladder[-1])
         return {"scene": scene.name, "parts": scene.parts, "poses": scene.motion.samples, "finest": finest}
 
 

@@ -19,7 +19,7 @@ from geomech.study.cost import study as jobs
 from geomech.study.question import Allow, Progress, Question
 from geomech.study.study import Study
 from geomech.systems.base import System, refuse_singular
-from geomech.systems.capabilities import near
+from geomech.systems.capabilities import near_gait
 from geomech.systems.swimmer import is_three_link
 from geomech.tiers.area import AREA
 from geomech.tiers.fitted import axes as field_axes
@@ -117,7 +117,7 @@ def reachable(scene: Scene, gait: Gait) -> list[float]:
         raise Refusal("[gait] does not move", where=scene.name, instead="give it a size")
     if own:
         size = abs(gait.amplitude)
-        if near(scene.system):
+        if near_gait(scene.system):
             return _near(scene, gait)
         amplitudes = [a for a in steps(size) if a < size * (1 - 1e-9)] + [size]
         return [float(np.copysign(a, gait.amplitude)) for a in amplitudes]

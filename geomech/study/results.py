@@ -3,14 +3,14 @@ xarray."""
 
 from __future__ import annotations
 
-from geomech.core.face import Faced
+from geomech.core.face import Extensible
 from geomech.core.variables import Result
 from geomech.gaits import Gait
 from geomech.scene.model import Scene
 from geomech.study import tables
 
 
-class Displacements(Faced, dict):
+class Displacements(Extensible, dict):
     """Net displacement per cycle by amplitude and tier (`tables.table`) of a gait of a scene. result: the numbers with
     their units and errors (`tables.result`), which this dict renders."""
 

@@ -23,8 +23,8 @@ from geomech.study.effort import shared, why_none
 from geomech.study.question import Allow, Progress, Question
 from geomech.study.study import Study, refuse_outside
 from geomech.systems.base import shape_labels
-from geomech.systems.capabilities import stored
-from geomech.tiers.fitted import fits, refuse
+from geomech.systems.capabilities import stored_table
+from geomech.tiers.fitted import finest_grid, refuse
 from geomech.tiers.harmonic import is_looked_up
 from rft.refusal import Refusal, located
 
@@ -74,7 +74,7 @@ class ShapeSpace(Question):
     @property
     def less(self) -> str:
         joints = self.scene.system.joints
-        return f"lower --grid, to {fits(joints)} or less" if joints > 2 and self.field else "ask for less"
+        return f"lower --grid, to {finest_grid(joints)} or less" if joints > 2 and self.field else "ask for less"
 
     @cached_property
     def study(self) -> Study:
@@ -197,7 +197,7 @@ def through(scene: Scene, pair: tuple[int, int], angles: tuple[float, ...] | Non
     if angles is None:
         return at
     extent = scene.numerics.extent
-    if not (stored(scene.system, "connection") or all(abs(a) <= extent for a in angles)):
+    if not (stored_table(scene.system, "connection") or all(abs(a) <= extent for a in angles)):
         raise Refusal(
             f"the angles must lie within the field's {extent:g} rad",
             where="--slice",

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from geomech.core.errors import choose
-from geomech.core.face import Faced
+from geomech.core.face import Extensible
 from geomech.gaits import Gait
 from geomech.geometry.connection import Connection, even_part
 from geomech.geometry.curvature import ccf
@@ -29,7 +29,7 @@ from geomech.study.available import METHODS as METHODS
 from geomech.study.available import methods, tiers
 from geomech.study.results import Displacements
 from geomech.systems.base import refuse_singular, shape_labels
-from geomech.systems.capabilities import at_once, stored
+from geomech.systems.capabilities import gaits_per_batch, stored_table
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.systems.framed import in_frame
 from geomech.tiers import TIERS, fitted, harmonic
@@ -40,7 +40,7 @@ from rft.refusal import Refusal, located
 SAMPLES = 64, 4096  # amplitudes and phases that `cost` checks; `study` checks all
 
 
-class Study(Faced):
+class Study(Extensible):
     """A scene and the tables computed for it so far, each stored under its name, the system and all other data that it
     depends on. `turned` returns a study with other numerics that shares them."""
 
@@ -185,8 +185,8 @@ class Study(Faced):
         """Part of the velocity that is even in alphadot, as with skin friction (`connection.even_part`); None if there
         is none."""
         system = self.scene.system
-        if stored(system, "connection"):
-            return stored(system, "even part")
+        if stored_table(system, "connection"):
+            return stored_table(system, "even part")
         build = lambda: even_part(system.velocity, self.fitted.axes, system.traits)
         return self._stored("even part", fitted.key(self.scene.numerics, ("grid", "extent")), build)[0]
 
@@ -317,7 +317,7 @@ def refuse_outside(scene: Scene, gait: Gait | None = None, amplitudes=None, phas
     field, chosen = fitted.axes(system, n), gait.amplitude if amplitudes is None else amplitudes
     names, phases = [name for name, _ in shape_labels(system)], phases or n.phases
     shapes = lambda group: inside(field, gait.cycle(phases, group)[0], names)[:, 0]
-    in_groups(shapes, chosen, at_once(system, phases))
+    in_groups(shapes, chosen, gaits_per_batch(system, phases))
 
 
 def _tier(name: str) -> Tier:

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from geomech.core.face import Faced
+from geomech.core.face import Extensible
 from geomech.core.summary import span
 from geomech.core.variables import Result, Variable
 from geomech.run.cost import Cost
@@ -24,7 +24,7 @@ from geomech.study.question import Allow, Progress, Question
 from rft.refusal import Refusal, printable
 
 
-class Swept(Faced, dict):
+class Swept(Extensible, dict):
     """Result of a sweep as a table that users index: {"over": {parameter: values}, name: array (N_1, ...)}."""
 
     def __init__(self, result: Result):

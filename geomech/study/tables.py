@@ -9,8 +9,8 @@ import numpy as np
 
 from geomech.core.variables import Result, Variable
 from geomech.gaits import Gait
-from geomech.geometry.field import UNTOLD
-from geomech.io.results import units_of
+from geomech.geometry.field import UNKNOWN_UNIT
+from geomech.io.results import unit_name
 from geomech.scene.model import Scene, frequency_of
 from geomech.systems.base import length_unit
 
@@ -171,7 +171,7 @@ def poses_as_stored(result: Result) -> list[Variable]:
     estimate_heading, the standard deviations by the medium as medium_error and medium_error_heading, and, where there
     is a frequency, speeds."""
     net, heading = result["net_distance"], result["heading"]
-    unit, dims = units_of(net.unit), net.dims
+    unit, dims = unit_name(net.unit), net.dims
     poses = np.stack([result[name].values for name in ("x", "y", "heading")], -1)
     both = f"{unit} (x, y), rad (theta)"
     variables = [
@@ -196,7 +196,7 @@ def poses_as_stored(result: Result) -> list[Variable]:
 
 def as_stored(result: Result) -> Result:
     """Return net displacements by tier and amplitude as data for a file."""
-    facts, unit = result.attributes, units_of(result["net_distance"].unit)
+    facts, unit = result.attributes, unit_name(result["net_distance"].unit)
     attributes = {"title": f"Net displacement per cycle of the scene {facts['name']}", "frame": facts["frame"]}
     attributes |= {"body_length": facts["body_length"], "length_unit": unit}
     attributes |= {"frequency": float(facts["frequency"]), "frequency_unit": "Hz"} if "frequency" in facts else {}
@@ -211,4 +211,4 @@ def error_of(table: Mapping, quantity: str, tier: str) -> np.ndarray:
 
 def unit_of(table: Mapping, quantity: str) -> str:
     """Return the unit of one of QUANTITIES, of a table that may be a user's own."""
-    return "rad" if quantity == "heading" else table.get("units", {}).get(quantity, UNTOLD)
+    return "rad" if quantity == "heading" else table.get("units", {}).get(quantity, UNKNOWN_UNIT)

@@ -17,7 +17,7 @@ from geomech.study import cost as foretold
 from geomech.study import estimate
 from geomech.study.available import tiers
 from geomech.study.study import Study, refuse_outside
-from geomech.systems.capabilities import is_closed, own_error, pieces_of, solver_of, stored
+from geomech.systems.capabilities import is_closed, pieces_per_length, solver_of, stored_table, table_error
 from geomech.tiers import TIERS
 from geomech.tiers.base import Plan
 from geomech.tiers.direct import DIRECT
@@ -92,7 +92,7 @@ class Settings:
         scene = self.scene
         if knob is None:
             finest = scene.with_numerics(loads="exact", regularisation=1e-9) if is_closed(scene.system) else scene
-            finest = finest.with_numerics(pieces=FINE_PIECES) if pieces_of(scene.system) else finest
+            finest = finest.with_numerics(pieces=FINE_PIECES) if pieces_per_length(scene.system) else finest
             return finest.with_numerics(phases=_truth_phases(scene))
         setting = knob.setting or knob.name
         if value is not None:
@@ -124,7 +124,7 @@ class Settings:
     def own_error(self) -> float:
         """Largest error of the system itself, body lengths, which no setting reduces; the cheapest settings include it."""
         shapes = self.scene.gait.cycle(self.scene.numerics.phases, self.amplitudes)
-        return float(own_error(self.scene.system, *shapes)[..., 0].max())
+        return float(table_error(self.scene.system, *shapes)[..., 0].max())
 
     def cheapest(self, lines: list[dict], tolerance: float) -> dict[str, Any]:
         return cheapest(lines, tolerance, self.own_error)
@@ -146,10 +146,10 @@ def applies(knob: Knob, scene: Scene) -> bool:
     if knob.tier not in tiers(system):
         return False
     if knob.tier != DIRECT.name:
-        of_a_field = TIERS[knob.tier].common and (stored(system, "connection") or system.joints > 2)
+        of_a_field = TIERS[knob.tier].common and (stored_table(system, "connection") or system.joints > 2)
         if of_a_field or _plan(scene, knob.tier).exact:  # from 7 to 61 points per joint: hours
             return False
-    return setting != "pieces" or pieces_of(system) > 0
+    return setting != "pieces" or pieces_per_length(system) > 0
 
 
 def _plan(scene: Scene, tier: str) -> Plan:

@@ -19,7 +19,7 @@ from geomech.gaits import Gait
 from geomech.scene.model import Scene
 from geomech.study.tables import QUANTITIES, of_pose
 from geomech.systems import System
-from geomech.systems.capabilities import Uncertain, at_once, capability
+from geomech.systems.capabilities import Uncertain, capability, gaits_per_batch
 from geomech.tiers.base import in_groups
 from rft.refusal import Refusal, located
 
@@ -118,4 +118,4 @@ def _moved(system: System, gait: Gait, amplitudes) -> np.ndarray:
     run = lambda amplitudes: system.run(*gait.cycle(phases, amplitudes)).net
     if amplitudes is None:
         return run(None)
-    return in_groups(run, amplitudes, at_once(system, phases))
+    return in_groups(run, amplitudes, gaits_per_batch(system, phases))

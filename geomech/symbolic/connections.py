@@ -23,9 +23,9 @@ def exact(x) -> Any:
     """
     if not isinstance(x, float):
         return sp.sympify(x)
-    near = Fraction(x).limit_denominator(1000)
-    near = near if float(near) == x else Fraction(repr(x))
-    return sp.Rational(near.numerator, near.denominator)
+    fraction = Fraction(x).limit_denominator(1000)
+    fraction = fraction if float(fraction) == x else Fraction(repr(x))
+    return sp.Rational(fraction.numerator, fraction.denominator)
 
 
 def shape_angles(count: int) -> tuple[sp.Symbol, ...]:
@@ -34,7 +34,7 @@ def shape_angles(count: int) -> tuple[sp.Symbol, ...]:
 
 
 class Link(NamedTuple):
-    """A link seen from another: heading, centre (2, 1), J (3, 3) and B (3, joints).
+    """A link in the frame of another: heading, centre (2, 1), J (3, 3) and B (3, joints).
 
     J xi + B alphadot is its velocity along itself, across, and about its centre.
     """
@@ -45,32 +45,32 @@ class Link(NamedTuple):
     B: Any
 
 
-def links(lengths, seen_from: int) -> list[Link]:
-    """Return the links of a chain of length 1 in the frame of link ``seen_from``, counted from 1 at the tail.
+def links(lengths, reference: int) -> list[Link]:
+    """Return the links of a chain of length 1 in the frame of link ``reference``, counted from 1 at the tail.
 
     lengths: of the links, divided by their sum here.
     """
     alpha = shape_angles(len(lengths) - 1)
     lengths = [exact(x) / sum(map(exact, lengths)) for x in lengths]
-    headings = [sp.Add(*alpha[:k]) - sp.Add(*alpha[: seen_from - 1]) for k in range(len(lengths))]
+    headings = [sp.Add(*alpha[:k]) - sp.Add(*alpha[: reference - 1]) for k in range(len(lengths))]
     halves = [x / 2 * sp.Matrix([sp.cos(h), sp.sin(h)]) for x, h in zip(lengths, headings)]
     places = [sp.zeros(2, 1)]
     for tail, head in itertools.pairwise(halves):
         places.append(places[-1] + tail + head)
-    made = []
-    for heading, place in zip(headings, [p - places[seen_from - 1] for p in places]):
+    result = []
+    for heading, place in zip(headings, [p - places[reference - 1] for p in places]):
         c, s = sp.cos(heading), sp.sin(heading)
-        into = sp.Matrix([[c, s], [-s, c]])
+        to_link = sp.Matrix([[c, s], [-s, c]])
         J, B = sp.eye(3), sp.zeros(3, len(alpha))
-        J[:2, :2], J[:2, 2] = into, into * quarter_turn() * place
-        B[:2, :] = into * place.jacobian(alpha)
+        J[:2, :2], J[:2, 2] = to_link, to_link * quarter_turn() * place
+        B[:2, :] = to_link * place.jacobian(alpha)
         B[2, :] = sp.Matrix([heading]).jacobian(alpha)
-        made.append(Link(heading, place, J, B))
-    return made
+        result.append(Link(heading, place, J, B))
+    return result
 
 
-def in_units_of(length, A) -> sp.Matrix:
-    """Return A (3, joints) of body lengths in the unit in which the body is ``length`` long."""
+def in_length(length, A) -> sp.Matrix:
+    """Return A (3, joints) in the unit in which the body is ``length`` long, from A in body lengths."""
     return sp.diag(exact(length), exact(length), 1) * A
 
 
@@ -79,25 +79,25 @@ def quarter_turn() -> sp.Matrix:
     return sp.Matrix([[0, -1], [1, 0]])
 
 
-def solved(lengths, frame: str, weights, equations: Callable) -> Formula:
+def solve_chain(lengths, frame: str, weights, equations: Callable) -> Formula:
     """Solve M xi + C alphadot = 0 for the connection of a chain, ``equations(links) -> (M, C)``.
 
     frame: "link-1", "link-2" ... or "mean", the mean of places and headings of all links by weights, the lengths if left out.
     The equations are solved in the frame of a link in any case, where they are short.
     """
     alpha, mean = shape_angles(len(lengths) - 1), frame == "mean"
-    some = links(lengths, (len(lengths) + 1) // 2 if mean else int(frame.removeprefix("link-")))
-    M, C = equations(some)
+    chain = links(lengths, (len(lengths) + 1) // 2 if mean else int(frame.removeprefix("link-")))
+    M, C = equations(chain)
     A = -M.LUsolve(C)
     if mean:
         weights = list(map(exact, weights or lengths))
         parts = [w / sum(weights) for w in weights]
-        heading = sp.expand(sum(w * link.heading for w, link in zip(parts, some)))
-        place = sum((w * link.place for w, link in zip(parts, some)), sp.zeros(2, 1))
-        moved = A[:2, :] + quarter_turn() * place * A[2, :] + place.jacobian(alpha)
+        heading = sp.expand(sum(w * link.heading for w, link in zip(parts, chain)))
+        place = sum((w * link.place for w, link in zip(parts, chain)), sp.zeros(2, 1))
+        shifted = A[:2, :] + quarter_turn() * place * A[2, :] + place.jacobian(alpha)
         c, s = sp.cos(heading), sp.sin(heading)
-        turned = sp.Matrix([[c, s], [-s, c]]) * moved
-        A = sp.Matrix.vstack(turned, A[2, :] + sp.Matrix([heading]).jacobian(alpha))
+        rotated = sp.Matrix([[c, s], [-s, c]]) * shifted
+        A = sp.Matrix.vstack(rotated, A[2, :] + sp.Matrix([heading]).jacobian(alpha))
     return A, alpha
 
 
@@ -107,21 +107,21 @@ def chain_connection(lengths, resistances, frame: str = "mean", weights=None) ->
     R_i v_i is drag or momentum, and adds up to zero over the body.
 
     resistances: (along, across, about the centre) of each link, in any unit and body lengths. lengths, frame, weights: as
-    in `solved`.
+    in `solve_chain`.
     """
 
-    def balance(some):
+    def balance(chain):
         R = [sp.diag(*map(exact, x)) for x in resistances]
-        grand = sum((link.J.T * r * link.J for link, r in zip(some, R)), sp.zeros(3, 3))
-        return grand, sum((link.J.T * r * link.B for link, r in zip(some, R)), sp.zeros(3, len(some) - 1))
+        total = sum((link.J.T * r * link.J for link, r in zip(chain, R)), sp.zeros(3, 3))
+        return total, sum((link.J.T * r * link.B for link, r in zip(chain, R)), sp.zeros(3, len(chain) - 1))
 
-    return solved(lengths, frame, weights, balance)
+    return solve_chain(lengths, frame, weights, balance)
 
 
 def viscous_chain(lengths=(1, 1, 1), ratio=2, frame: str = "link-2") -> Formula:
     """Return the connection of a chain of links in a linear medium.
 
-    lengths: of the links, divided by their sum. ratio: drag across over drag along. frame: as in `solved`.
+    lengths: of the links, divided by their sum. ratio: drag across over drag along. frame: as in `solve_chain`.
     """
     ratio, body = exact(ratio), sum(map(exact, lengths))
     parts = [exact(x) / body for x in lengths]
@@ -131,8 +131,8 @@ def viscous_chain(lengths=(1, 1, 1), ratio=2, frame: str = "link-2") -> Formula:
 
 def no_slip_snake(lengths=(1, 1, 1), frame: str = "mean") -> Formula:
     """Return the connection of three links on wheels: the velocity across each link's centre is zero."""
-    rolling = lambda some: tuple(sp.Matrix.vstack(*(x[1, :] for x in each)) for each in zip(*(x[2:] for x in some)))
-    return solved(lengths, frame, None, rolling)
+    rolling = lambda chain: tuple(sp.Matrix.vstack(*(x[1, :] for x in each)) for each in zip(*(x[2:] for x in chain)))
+    return solve_chain(lengths, frame, None, rolling)
 
 
 def differential_drive(radius=None, track=None) -> Formula:

@@ -11,18 +11,18 @@ from geomech.symbolic.waves import Waves
 
 
 def bracket(X: sp.Matrix, Y: sp.Matrix) -> sp.Matrix:
-    """[X, Y] on se(2), columns (x, y, theta), as `rft.se2.bracket`."""
+    """Return [X, Y] on se(2), columns (x, y, theta), as `rft.se2.bracket`."""
     return sp.Matrix([Y[2] * X[1] - X[2] * Y[1], X[2] * Y[0] - Y[2] * X[0], 0])
 
 
 def ccf(A: sp.Matrix, alpha, i: int = 0, j: int = 1) -> sp.Matrix:
-    """d_i A_j - d_j A_i + [A_i, A_j] of a connection A (3, d), a column of three."""
+    """Return d_i A_j - d_j A_i + [A_i, A_j] of a connection A (3, d), a column of three."""
     return A[:, j].diff(alpha[i]) - A[:, i].diff(alpha[j]) + bracket(A[:, i], A[:, j])
 
 
 def velocity(A: sp.Matrix, alpha) -> Callable[..., Any]:
-    """The callable velocity(alpha, alphadot) -> xi that `geomech.geometry.connection.fit` and `geomech.tiers.direct.direct`
-    take."""
+    """Return a function velocity(alpha, alphadot) -> xi, as `geomech.geometry.connection.fit` and
+    `geomech.tiers.direct.direct` take it."""
     import numpy as np
 
     entries = sp.lambdify(alpha, list(A), "numpy", cse=True)
@@ -38,20 +38,21 @@ def velocity(A: sp.Matrix, alpha) -> Callable[..., Any]:
 
 
 def simplified(A: sp.Matrix, alpha) -> sp.Matrix:
-    """The matrix with every entry one fraction in lowest terms, whose parts are sums of cosines and sines of sums of angles:
-    two formulas of one function come out alike. An entry that is no rational function of sines and cosines, or neither even
-    nor odd in alpha, stays as it is."""
+    """Return the matrix with every entry one fraction in lowest terms, of sums of cosines and sines of sums of angles.
+    Two formulas of one function come out equal. An entry that is no rational function of sines and cosines, or neither
+    even nor odd in alpha, is unchanged."""
     waves = Waves(A, alpha)
     return A.applyfunc(waves.reduced)
 
 
 def latex(A: sp.Matrix, name: str = "A") -> str:
-    """LaTeX of a matrix, with its denominator in front if all entries have the same, up to a number. It needs amsmath."""
+    """Return LaTeX of a matrix, with its denominator in front if all entries have the same, up to a number. It needs
+    amsmath."""
     below = lambda x: sp.Mul(*(f for f in sp.Mul.make_args(x) if f.is_Pow and f.exp.is_negative and not f.is_number))
     common = {below(x) for x in A if x != 0}
-    written = lambda M: sp.latex(M, mat_str="pmatrix", mat_delim="")
+    printed = lambda M: sp.latex(M, mat_str="pmatrix", mat_delim="")
     if len(common) != 1 or common == {1}:
-        return f"{name} = {written(A)}"
+        return f"{name} = {printed(A)}"
     (one_over,) = common
     above = A.applyfunc(lambda x: sp.Mul(*(f for f in sp.Mul.make_args(x) if f not in one_over.args and f != one_over)))
-    return f"{name} = \\frac{{1}}{{D}} {written(above)}, \\qquad D = {sp.latex(1 / one_over)}"
+    return f"{name} = \\frac{{1}}{{D}} {printed(above)}, \\qquad D = {sp.latex(1 / one_over)}"

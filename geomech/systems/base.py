@@ -1,4 +1,4 @@
-"""What a system is: five members, and how whatever has fewer is made one."""
+"""The interface of a system: five members, and adapters for objects that have fewer."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class System(Protocol):
 
     @property
     def traits(self) -> Traits:
-        """What algorithms may use to save work."""
+        """Facts that algorithms may use to save work."""
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
         """Return xi (..., 3) at shapes and rates (..., d), in the body frame; nan at singular shapes."""
@@ -70,7 +70,13 @@ class System(Protocol):
 
 
 def integrated(system: System, alpha, alphadot, work: bool = False) -> Cycle:
-    """Return the cycle of a velocity that follows from shape alone: its integral. Classes take this as their ``run``.
+    """Return the cycle of a velocity that follows from shape alone, by integration. Classes take this as their ``run``.
+
+    Refusal at a singular shape.
+
+    Refusal at a singular shape.
+
+    Refusal at a singular shape.
 
     ValueError at a singular shape."""
     refuse_singular(system, alpha)
@@ -79,12 +85,18 @@ def integrated(system: System, alpha, alphadot, work: bool = False) -> Cycle:
 
 
 @dataclass(frozen=True)
-class Given:
-    """A system of a velocity alone, or of an object that lacks some of the five members. `as_system` makes one.
+class WrappedSystem:
+    """A system made by `as_system` from a velocity alone, or from an object that lacks some of the five members.
+
+    wrapped: the function, or the object. joints, length, traits: as of `System`.
+
+    wrapped: the function, or the object. joints, length, traits: as of `System`.
+
+    wrapped: the function, or the object. joints, length, traits: as of `System`.
 
     given: the function, or the object. joints, length, traits: as of `System`."""
 
-    given: Any
+    wrapped: Any
     joints: int
     length: float = 1.0
     traits: Traits = NOTHING
@@ -94,20 +106,20 @@ class Given:
         in_range("length", self.length, 1e-9, 1e9)
         if not isinstance(self.traits, Traits):
             raise Refusal("traits must be Traits(...)", value=self.traits)
-        if not _takes_two(self._velocity):
+        if not _accepts_two(self._velocity):
             raise Refusal(f"the velocity of {self.kind} must take (alpha, alphadot)")
 
     @property
     def kind(self) -> str:
-        return kind_of(self.given)
+        return kind_of(self.wrapped)
 
     @property
     def _velocity(self) -> Callable:
-        return getattr(self.given, "velocity", self.given)
+        return getattr(self.wrapped, "velocity", self.wrapped)
 
     @cached_property
     def _batched(self) -> Callable:
-        """The velocity for many shapes at once, whichever it takes."""
+        """The velocity for many shapes at once, whether or not the wrapped one takes them."""
         alpha, rates = np.random.default_rng(0).normal(size=(2, 3, self.joints))
         return in_batches(self._velocity, *np.broadcast_arrays(alpha[:, None], rates))
 
@@ -116,18 +128,18 @@ class Given:
         return evaluate(self._batched, alpha, alphadot, masked=self.traits.singularity is not None)
 
     def run(self, alpha, alphadot, work: bool = False) -> Cycle:
-        own = getattr(self.given, "run", None)
-        return integrated(self, alpha, alphadot) if own is None else own(alpha, alphadot)
+        method = getattr(self.wrapped, "run", None)
+        return integrated(self, alpha, alphadot) if method is None else method(alpha, alphadot)
 
     def __reduce__(self) -> tuple:
-        return Given, (self.given, self.joints, self.length, self.traits)
+        return WrappedSystem, (self.wrapped, self.joints, self.length, self.traits)
 
     def capability(self, kind: type) -> Any:
-        """Return the object given, if it has the ability."""
-        return self.given if isinstance(self.given, kind) else None
+        """Return the wrapped object, if it has the ability."""
+        return self.wrapped if isinstance(self.wrapped, kind) else None
 
 
-def _takes_two(function: Callable) -> bool:
+def _accepts_two(function: Callable) -> bool:
     try:
         inspect.signature(function).bind(None, None)
     except TypeError:
@@ -137,28 +149,28 @@ def _takes_two(function: Callable) -> bool:
     return True
 
 
-def as_system(given: Any, joints: int | None = None) -> System:
-    """Return a system from whatever has a velocity: itself where it has the five members, else with defaults for those it
-    lacks. joints: of a function that does not say them. ValueError, one line, for anything else."""
-    if not isinstance(given, type) and all(hasattr(given, name) for name in MEMBERS):
-        refuse_mutable(given)
-        if not isinstance(given.traits, Traits):
-            raise Refusal(f"traits of the {kind_of(given)} must be Traits(...)", value=given.traits)
-        return given
-    function = getattr(given, "velocity", given)
-    joints = getattr(given, "joints", joints)
-    if isinstance(given, type) or not callable(function) or joints is None:
+def as_system(system: Any, joints: int | None = None) -> System:
+    """Return a system from an object with a velocity: the object itself where it has the five members, else with
+    defaults for those it lacks. joints: of a function without an attribute ``joints``. Refusal for anything else."""
+    if not isinstance(system, type) and all(hasattr(system, name) for name in MEMBERS):
+        refuse_mutable(system)
+        if not isinstance(system.traits, Traits):
+            raise Refusal(f"traits of the {kind_of(system)} must be Traits(...)", value=system.traits)
+        return system
+    function = getattr(system, "velocity", system)
+    joints = getattr(system, "joints", joints)
+    if isinstance(system, type) or not callable(function) or joints is None:
         raise Refusal(
             "system must be a system such as Swimmer(medium, body), or a function velocity(alpha, alphadot)",
-            value=given,
+            value=system,
         )
-    refuse_mutable(given)
-    return Given(given, joints, getattr(given, "length", 1.0), getattr(given, "traits", NOTHING))
+    refuse_mutable(system)
+    return WrappedSystem(system, joints, getattr(system, "length", 1.0), getattr(system, "traits", NOTHING))
 
 
-def given(system: Any) -> Any:
-    """Return what `as_system` was given."""
-    return system.given if isinstance(system, Given) else system
+def unwrapped(system: Any) -> Any:
+    """Return the object that `as_system` received."""
+    return system.wrapped if isinstance(system, WrappedSystem) else system
 
 
 def kind_of(system: Any) -> str:
@@ -167,7 +179,7 @@ def kind_of(system: Any) -> str:
 
 
 def note_angles(system: System, largest: float) -> None:
-    """UnitWarning if the largest of some shape variables is a joint angle beyond a full turn."""
+    """Warn (`UnitWarning`) if the largest of some shape variables is a joint angle beyond a full turn."""
     if system.traits.joint_angles:
         check_angle("a joint angle", largest)
 
@@ -186,17 +198,17 @@ def shape_labels(system: System) -> tuple[tuple[str, str], ...]:
 
 
 def refuse_singular(system: System, alpha) -> None:
-    """ValueError naming the first shape at which a closed path alpha (..., N, joints) meets a singular one."""
-    if own := getattr(system, "refuse_singular", None):
-        own(alpha)
+    """Raise Refusal naming the first shape at which a closed path alpha (..., N, joints) meets a singular one."""
+    if method := getattr(system, "refuse_singular", None):
+        method(alpha)
         return
     singularity = system.traits.singularity
     if singularity is None:
         return
     d = singularity(alpha)
-    met = (d == 0) | (d * np.roll(d, -1, -1) < 0)
-    if met.any():
-        shape = ", ".join(f"{x:.3g}" for x in np.asarray(alpha)[met][0])
+    singular = (d == 0) | (d * np.roll(d, -1, -1) < 0)
+    if singular.any():
+        shape = ", ".join(f"{x:.3g}" for x in np.asarray(alpha)[singular][0])
         raise Refusal(
             f"the gait meets the singular shape near alpha = ({shape}), where {system.traits.singular}",
             instead="move its centre, or lower the amplitude",
@@ -204,7 +216,7 @@ def refuse_singular(system: System, alpha) -> None:
 
 
 def refuse_mutable(*parts) -> None:
-    """ValueError for a part of a class that has no hash: tables are kept under the system that they are of."""
+    """Raise Refusal for a part of a class without a hash: tables are stored under the system that they belong to."""
     for part in parts:
         if type(part).__hash__ is None:
             raise Refusal(

@@ -26,14 +26,14 @@ STEPPED_TOGETHER = 1 << 22  # likewise of time steps, each of which takes its ti
 
 def capability(system: System, kind: type[T]) -> T | None:
     """Return the object with which a system has an ability, a protocol of this module; None if it has not."""
-    if own := getattr(system, "capability", None):
-        return own(kind)
+    if method := getattr(system, "capability", None):
+        return method(kind)
     return system if isinstance(system, kind) else None
 
 
 @runtime_checkable
 class Refinable(Protocol):
-    """A velocity that is computed nearly; read by `geomech.study.estimate` to see by how much."""
+    """A velocity with a numerical error; read by `geomech.study.estimate`, which estimates it."""
 
     closed: bool  # whether the refined one has exact integrals over elements, else a finer rule
 
@@ -70,30 +70,31 @@ class Drawable(Protocol):
 
 @runtime_checkable
 class Tabulated(Protocol):
-    """A velocity that is looked up in tables of its own; read wherever a table would be computed."""
+    """A velocity that is interpolated in tables of its own; read wherever a table would be computed."""
 
-    near: str  # the one gait near which alone it is known, in words; "" where it is known everywhere
+    near_gait: str  # the one gait near which alone it is known, in words; "" where it is known everywhere
 
     def table(self, name: str) -> Any:
         """Return the table "connection", "harmonics", "metric", "even part" or "A_error"; None without it."""
 
-    def own_error(self, alpha, alphadot) -> np.ndarray:
-        """Return (..., 2), body lengths and rad: what the tables leave of the net pose of cycles (..., N, d)."""
+    def table_error(self, alpha, alphadot) -> np.ndarray:
+        """Return the errors (..., 2), body lengths and rad, of the net pose of cycles (..., N, d) that the tables
+        cause."""
 
 
 @runtime_checkable
 class Uncertain(Protocol):
-    """Parameters that are not known for certain; read by `geomech.study.uncertainty`."""
+    """Parameters with a covariance; read by `geomech.study.uncertainty`."""
 
     covariance: Any  # (n, n)
 
     def varied(self, step) -> System:
-        """Return the system with parameters off by ``step`` (n,); ValueError if that is none."""
+        """Return the system with parameters changed by ``step`` (n,); Refusal if there is no such system."""
 
 
 @runtime_checkable
 class Stepped(Protocol):
-    """Cycles that are not all alike; read by `geomech.study.motion` and `choose`."""
+    """Cycles that differ from one another; read by `geomech.study.motion` and `choose`."""
 
     settling: float  # change of displacement at which cycles count as repeating, body lengths or rad; 0 if they are not run on
 
@@ -168,17 +169,18 @@ class Recorded(Protocol):
     """Attributes for a file of its connection; read by `geomech.output`."""
 
     def about(self) -> Mapping[str, Any]:
-        """Return them by name."""
+        """Return the attributes by name."""
 
 
-def stored(system: System, name: str) -> Any:
-    """Return the table of that name that a system looks up; None where tables are computed."""
+def stored_table(system: System, name: str) -> Any:
+    """Return the table of that name that a system interpolates; None where tables are computed."""
     tabulated = capability(system, Tabulated)
     return None if tabulated is None else tabulated.table(name)
 
 
-def pieces_of(system: System) -> int:
-    """Return the pieces to a body length that effects which vary along elements see; 0 without such effects."""
+def pieces_per_length(system: System) -> int:
+    """Return the pieces per body length into which effects that vary along elements cut the body; 0 without such
+    effects."""
     return balance_size(system).pieces
 
 
@@ -189,12 +191,13 @@ def refined(system: System) -> System | None:
 
 
 def power(system: System, alpha, alphadot) -> np.ndarray:
-    """Return the power (...) of a dissipative system at shapes and rates (..., d), as `Dissipative` has it."""
-    return driven(system, alpha, alphadot)[1]
+    """Return the power (...) of a dissipative system at shapes and rates (..., d), in the unit of
+    `Dissipative.power`."""
+    return velocity_and_power(system, alpha, alphadot)[1]
 
 
-def driven(system: System, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
-    """Return xi (..., 3) and power (...) of the same solutions; ValueError for a system that says no power."""
+def velocity_and_power(system: System, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
+    """Return xi (..., 3) and power (...) of the same solutions; Refusal for a system without a power."""
     dissipative = capability(system, Dissipative)
     if dissipative is None:
         raise Refusal(f"no power with the {kind_of(system)}", because="nothing says what a change of shape costs it")
@@ -219,8 +222,8 @@ def with_solver(system: System, changes: Mapping[str, Any]) -> System:
     return system.with_solver(replace(solver_of(system), **changes)) if changes else system
 
 
-def at_once(system: System, phases: int) -> int:
-    """Return how many amplitudes of a gait are run side by side, at least one: more take more memory and no less time."""
+def gaits_per_batch(system: System, phases: int) -> int:
+    """Return how many amplitudes of a gait are run at a time, at least one: more take more memory and no less time."""
     size = balance_size(system)
     if size.batched:
         return sys.maxsize
@@ -230,20 +233,21 @@ def at_once(system: System, phases: int) -> int:
     return max(1, STEPPED_TOGETHER // max(phases * (system.joints + 6), 4 * size.elements + size.memory // 8))
 
 
-def near(system: System) -> str:
-    """Return the one gait near which alone a system is known, in words; "" where it is known everywhere."""
+def near_gait(system: System) -> str:
+    """Return the one gait near which alone a system is valid, in words; "" where it is valid everywhere."""
     tabulated = capability(system, Tabulated)
-    return "" if tabulated is None else tabulated.near
+    return "" if tabulated is None else tabulated.near_gait
 
 
-def own_error(system: System, alpha, alphadot) -> np.ndarray:
-    """Return (..., 2), body lengths and rad: what tables leave of the net pose of cycles (..., N, d); 0 without tables."""
+def table_error(system: System, alpha, alphadot) -> np.ndarray:
+    """Return the errors (..., 2), body lengths and rad, of the net pose of cycles (..., N, d) that tables cause; 0
+    without tables."""
     tabulated = capability(system, Tabulated)
-    return np.zeros((*np.shape(alpha)[:-2], 2)) if tabulated is None else tabulated.own_error(alpha, alphadot)
+    return np.zeros((*np.shape(alpha)[:-2], 2)) if tabulated is None else tabulated.table_error(alpha, alphadot)
 
 
 def is_closed(system: System) -> bool:
-    """Return whether a system computes its velocity nearly, and `refined` has exact integrals."""
+    """Return whether a system computes its velocity with an error, and `refined` has exact integrals."""
     refinable = capability(system, Refinable)
     return refinable is not None and refinable.closed
 

@@ -50,12 +50,12 @@ class DifferentialDrive:
         return np.array([[half, half], [0.0, 0.0], [-turn, turn]])
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
-        """xi (..., 3), (track/time, track/time, rad/time): (r (w_1 + w_2) / 2, 0, r (w_2 - w_1) / track)."""
+        """Return xi (..., 3), (track/time, track/time, rad/time): (r (w_1 + w_2) / 2, 0, r (w_2 - w_1) / track)."""
         _, rates = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
         return rates @ self._matrix.T
 
     def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
-        """A (3, 2) as a sympy Matrix, and the wheels' angles (`geomech.symbolic`)."""
+        """Return A (3, 2) as a sympy Matrix, and the wheels' angles (`geomech.symbolic`)."""
         from geomech.symbolic import connections
 
         return connections.differential_drive(self.wheel_radius, self.track)

@@ -30,18 +30,18 @@ class FloatingChain(Momentum):
 
     def __post_init__(self):
         super().__post_init__()
-        self.of_links("masses", 1e-9, 1e9)
-        self.of_links("inertias", 1e-6, 1e6)
+        self.check_per_link("masses", 1e-9, 1e9)
+        self.check_per_link("inertias", 1e-6, 1e6)
 
     def inertia(self, number=float) -> tuple[list[Any], list[list[Any]]]:
-        """Masses are parts of the whole."""
+        """Return masses, as shares of the whole chain's, and inertias of the links (`Momentum.inertia`)."""
         lengths = [number(x) for x in self.lengths]
         masses = [number(x) for x in self.masses] or lengths
         rod = number(1) / 12
-        about = [number(x) for x in self.inertias] or [rod] * len(lengths)
-        body, whole = sum(lengths), sum(masses)
-        masses = [m / whole for m in masses]
-        return masses, [[m, m, k * m * (x / body) ** 2] for m, k, x in zip(masses, about, lengths)]
+        inertias = [number(x) for x in self.inertias] or [rod] * len(lengths)
+        body, total = sum(lengths), sum(masses)
+        masses = [m / total for m in masses]
+        return masses, [[m, m, k * m * (x / body) ** 2] for m, k, x in zip(masses, inertias, lengths)]
 
     @classmethod
     def examples(cls) -> dict[str, FloatingChain]:

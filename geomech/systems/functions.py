@@ -11,8 +11,9 @@ from geomech.geometry.traits import NOTHING
 from geomech.systems.base import SYSTEMS
 
 
-def class_of(function: Callable) -> type:
-    """Return the class of systems that a function with ``joints`` makes. Parameters after alpha and alphadot are its fields."""
+def class_from_function(function: Callable) -> type:
+    """Return a class of systems from a function that has an attribute ``joints``. Parameters after alpha and alphadot
+    are its fields."""
     _, _, *more = inspect.signature(function, eval_str=True).parameters.values()
     unset = inspect.Parameter.empty
     fields = [
@@ -30,14 +31,14 @@ def class_of(function: Callable) -> type:
         "length": getattr(function, "length", 1.0),
         "traits": getattr(function, "traits", NOTHING),
         "velocity": velocity,
-        "__reduce__": lambda self: (_again, (self.kind, {p.name: getattr(self, p.name) for p in more})),
+        "__reduce__": lambda self: (_rebuild, (self.kind, {p.name: getattr(self, p.name) for p in more})),
         "__doc__": function.__doc__,
     }
-    made = dataclasses.make_dataclass(function.__name__, fields, namespace=members, frozen=True)
-    made.__module__, made.__qualname__ = function.__module__, function.__qualname__
-    return made
+    built = dataclasses.make_dataclass(function.__name__, fields, namespace=members, frozen=True)
+    built.__module__, built.__qualname__ = function.__module__, function.__qualname__
+    return built
 
 
-def _again(kind: str, values: dict[str, Any]) -> Any:
-    """Return a system as it was sent to another process, where its function is registered, too."""
+def _rebuild(kind: str, values: dict[str, Any]) -> Any:
+    """Return a system that was sent to another process, in which its function is registered, too."""
     return SYSTEMS[kind](**values)

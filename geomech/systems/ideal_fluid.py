@@ -37,19 +37,21 @@ class IdealFluidSwimmer(Momentum):
 
     def __post_init__(self):
         super().__post_init__()
-        self.of_links("masses", 1e-9, 1e9)
-        self.of_links("inertias", 1e-6, 1e6)
+        self.check_per_link("masses", 1e-9, 1e9)
+        self.check_per_link("inertias", 1e-6, 1e6)
 
     def inertia(self, number=float) -> tuple[list[Any], list[list[Any]]]:
-        """In units of pi rho times the square of the body's length, per unit depth."""
+        """Return masses and inertias of the links (`Momentum.inertia`), in units of pi rho times the square of the
+        body's length, per unit depth."""
         body, aspect = sum(number(x) for x in self.lengths), number(self.aspect)
         a = [number(x) / body / 2 for x in self.lengths]
         b = [aspect * x for x in a]
-        over = [number(x) for x in self.masses] or [number(1)] * len(a)
-        about = [number(x) for x in self.inertias] or [(1 + aspect**2) / 16] * len(a)
-        masses = [k * x * y for k, x, y in zip(over, a, b)]
+        relative_masses = [number(x) for x in self.masses] or [number(1)] * len(a)
+        inertias = [number(x) for x in self.inertias] or [(1 + aspect**2) / 16] * len(a)
+        masses = [k * x * y for k, x, y in zip(relative_masses, a, b)]
         return masses, [
-            [m + y**2, m + x**2, k * m * 4 * x**2 + (x**2 - y**2) ** 2 / 8] for m, k, x, y in zip(masses, about, a, b)
+            [m + y**2, m + x**2, k * m * 4 * x**2 + (x**2 - y**2) ** 2 / 8]
+            for m, k, x, y in zip(masses, inertias, a, b)
         ]
 
     @classmethod

@@ -54,8 +54,8 @@ class Momentum:
         check_numbers(self)
         object.__setattr__(self, "lengths", Chain(self.lengths, self.length, self.frame).lengths)
 
-    def of_links(self, name: str, least: float, most: float) -> None:
-        """ValueError if the field of this name is not empty, nor a number from least to most for each link."""
+    def check_per_link(self, name: str, least: float, most: float) -> None:
+        """Raise Refusal if the field of this name is neither empty nor a number from least to most for each link."""
         x = real_array(name, getattr(self, name))
         if x.shape not in ((0,), (len(self.lengths),)) or not ((least <= x) & (x <= most)).all():
             raise Refusal(
@@ -65,8 +65,9 @@ class Momentum:
         object.__setattr__(self, name, tuple(x.tolist()))
 
     def inertia(self, number=float) -> tuple[list[Any], list[list[Any]]]:
-        """Masses of the links, and [along, across, about the centre] of each: the mass that it moves, in any one unit and
-        body lengths, of its own or of the fluid. number: `float`, or `geomech.symbolic.connections.exact` for formulas."""
+        """Return masses of the links, and [along, across, about the centre] of each: the mass that it moves, its own
+        and the fluid's, in any one unit and body lengths. number: `float`, or `geomech.symbolic.connections.exact` for
+        formulas."""
         raise NotImplementedError
 
     @property
@@ -82,20 +83,20 @@ class Momentum:
         return Linkage(self.lengths, self.length, self.frame, masses=tuple(self.inertia()[0]))
 
     def points(self, alpha, pose=(0.0, 0.0, 0.0)) -> np.ndarray:
-        """As `rft.Chain.points`."""
+        """Return the ends of the links in the world, as `rft.Chain.points`."""
         return self._chain.points(alpha, pose)
 
     def frame_pose(self, frame: str, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
-        """As `rft.Chain.frame_pose`."""
+        """Return the pose of a frame and its rate, as `rft.Chain.frame_pose`."""
         return self._chain.frame_pose(frame, alpha, alphadot)
 
     def _weights(self, motion: Elements) -> np.ndarray:
-        """G (3, n, 1) for velocities (v_t, v_n, spin), spin being the turning rate times half the length."""
+        """Return G (3, n, 1) for velocities (v_t, v_n, v_w); v_w is the rotation rate times half the length."""
         along, across, about = np.array(self.inertia()[1]).T
         return np.stack([along, across, about / motion.half[:, 0] ** 2])[..., None]
 
     def _moving(self, alpha, alphadot) -> tuple[Elements, np.ndarray, np.ndarray]:
-        """The links, G, and xi (3, B) in body lengths, for shapes (B, joints)."""
+        """Return the links, G, and xi (3, B) in body lengths, for shapes (B, joints)."""
         motion = self._chain.motion(alpha.T, alphadot.T)
         weights = self._weights(motion)
         zero, one = np.zeros_like(motion.c), np.ones_like(motion.c)
@@ -116,12 +117,12 @@ class Momentum:
         return alpha.reshape(-1, self.joints), alphadot.reshape(-1, self.joints), alpha.shape[:-1]
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
-        """xi (..., 3) in the frame, (length/time, length/time, rad/time)."""
+        """Return xi (..., 3) in the frame, (length/time, length/time, rad/time)."""
         alpha, alphadot, shape = self._flat(alpha, alphadot)
         return self._moving(alpha, alphadot)[2].T.reshape(*shape, 3) * [self.length, self.length, 1.0]
 
     def squared_speed(self, alpha, alphadot) -> np.ndarray:
-        """alphadot^T M alphadot (...,): twice the kinetic energy, in the unit of `inertia` and body lengths."""
+        """Return alphadot^T M alphadot (...,): twice the kinetic energy, in the unit of `inertia` and body lengths."""
         alpha, alphadot, shape = self._flat(alpha, alphadot)
         motion, weights, xi = self._moving(alpha, alphadot)
         return (
@@ -131,9 +132,9 @@ class Momentum:
         )
 
     def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
-        """A (3, joints) as a sympy Matrix, and its angles (`geomech.symbolic`)."""
+        """Return A (3, joints) as a sympy Matrix, and its angles (`geomech.symbolic`)."""
         from geomech.symbolic import connections
 
         masses, inertia = self.inertia(connections.exact)
         A, alpha = connections.chain_connection(self.lengths, inertia, self.frame, masses)
-        return connections.in_units_of(self.length, A), alpha
+        return connections.in_length(self.length, A), alpha

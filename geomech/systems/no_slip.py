@@ -53,11 +53,12 @@ class NoSlipSnake:
         return Chain(self.lengths, self.length, self.frame)
 
     def points(self, alpha, pose=(0.0, 0.0, 0.0)) -> np.ndarray:
-        """As `rft.Chain.points`."""
+        """Return the ends of the links in the world, as `rft.Chain.points`."""
         return self._chain.points(alpha, pose)
 
     def _rolling(self, alpha, alphadot):
-        """Rows (..., 3, 3) and sides (..., 3) of: velocity across each link's centre = row . xi + side, body lengths."""
+        """Return rows (..., 3, 3) and sides (..., 3): velocity across each link's centre = row . xi + side, body
+        lengths."""
         alpha, alphadot = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
         m = self._chain.motion(*(x.reshape(-1, 2).T for x in (alpha, alphadot)))
         rows, shape = np.stack([-m.s, m.c, m.r_n], -1).swapaxes(0, 1), alpha.shape[:-1]
@@ -69,12 +70,12 @@ class NoSlipSnake:
         }
 
     def _determinant(self, alpha) -> np.ndarray:
-        """The determinant of the three equations (...,), 0 at singular shapes; no unit."""
+        """Return the determinant of the three equations (...,), 0 at singular shapes; no unit."""
         det = np.linalg.det(self._rolling(alpha, np.zeros(2))[0])
         return np.where(np.abs(det) < 1e-14, 0.0, det)
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
-        """xi (..., 3) in the frame, (length/time, length/time, rad/time); nan at singular shapes."""
+        """Return xi (..., 3) in the frame, (length/time, length/time, rad/time); nan at singular shapes."""
         rows, side = self._rolling(alpha, alphadot)
         good = np.abs(np.linalg.det(rows)) >= 1e-14
         xi = np.linalg.solve(np.where(good[..., None, None], rows, np.eye(3)), -side[..., None])[..., 0]
@@ -84,7 +85,7 @@ class NoSlipSnake:
         from geomech.symbolic import connections
 
         A, alpha = connections.no_slip_snake(self.lengths, self.frame)
-        return connections.in_units_of(self.length, A), alpha
+        return connections.in_length(self.length, A), alpha
 
     @classmethod
     def examples(cls) -> dict[str, NoSlipSnake]:

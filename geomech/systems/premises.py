@@ -1,4 +1,4 @@
-"""Who lacks the premises of a result, and the one sentence that refuses it."""
+"""Which parts of a system break the premises of a result, and the sentence that refuses it."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def listed(system: System, premises: Premise) -> str:
 
 
 def refuse(system: System, what: str, premises: Premise, instead: str) -> None:
-    """ValueError, one line, if there is no such result because a premise of it does not hold."""
+    """Raise Refusal if there is no such result because a premise of it does not hold."""
     if system.traits.lacks & premises:
         parts = broken(system, premises)
         raise Refusal(f"no {what} with {because(system, premises)}", instead=f"{instead}{CURES.get(parts[0].role, '')}")

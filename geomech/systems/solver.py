@@ -49,8 +49,8 @@ class Solver:
         check_numbers(self)
 
     def computed(self, compilable: bool, law: str) -> str:
-        """Return by what balances are solved, and why not by compiled code. compilable: whether it knows the law of
-        that name."""
+        """Return what solves the balances, in words, and why not compiled code. compilable: whether compiled code has
+        the law of that name."""
         if self.backend == "numpy":
             return "NumPy, as asked for"
         if not compilable:

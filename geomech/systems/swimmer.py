@@ -11,7 +11,7 @@ import numpy as np
 
 import rft
 from geomech.core.work import iterate
-from geomech.geometry.images import around
+from geomech.geometry.images import cycle_images
 from geomech.geometry.reconstruct import displacement, poses, repeated
 from geomech.geometry.traits import MEAN, Traits
 from geomech.systems.base import SYSTEMS, Cycle, System, refuse_mutable
@@ -69,14 +69,15 @@ class Swimmer:
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}  # not what is cached
 
     def _agree(self) -> None:
-        """ValueError if effects, or the body, say different things of the same swimmer."""
+        """Raise Refusal if effects, or the body, contradict each other about the swimmer's frequency or length."""
         sized = self.body.length != 1.0
-        for what, said in (("frequency", []), ("length", [("[body]", self.body.length)] if sized else [])):
-            said += [(e.kind, getattr(e, what)) for e in self.effects if hasattr(e, what)]
-            for name, value in said[1:]:
-                if np.any(np.asarray(value) != said[0][1]):
+        for quantity, values in (("frequency", []), ("length", [("[body]", self.body.length)] if sized else [])):
+            values += [(e.kind, getattr(e, quantity)) for e in self.effects if hasattr(e, quantity)]
+            for name, value in values[1:]:
+                if np.any(np.asarray(value) != values[0][1]):
                     raise Refusal(
-                        f"{said[0][0]} gives {what} = {said[0][1]!r} and {name} {value!r}", because="it is one swimmer"
+                        f"{values[0][0]} gives {quantity} = {values[0][1]!r} and {name} {value!r}",
+                        because="it is one swimmer",
                     )
 
     joints = property(lambda self: self.body.joints)
@@ -103,7 +104,7 @@ class Swimmer:
         )
 
     def capability(self, kind: type) -> Any:
-        """Return itself, or its body to draw, if it has the ability, which depends on medium, body and effects."""
+        """Return itself if it has the ability, which depends on its medium, its body and its effects."""
         medium = self.medium
         if kind is Drawable:
             return self.body if isinstance(self.body, Drawable) else None
@@ -115,7 +116,7 @@ class Swimmer:
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """What breaks premises: the law whose drag is of no one power of the speed, and effects."""
+        """Parts that break premises: the law whose drag is of no one power of the speed, and effects."""
         law = () if is_rate_independent(self.medium) else (Part("law", name_in(LAWS, self.medium), RATES),)
         return law + tuple(Part("effect", e.kind, e.breaks) for e in self.effects)
 
@@ -133,7 +134,8 @@ class Swimmer:
         return self.medium.covariance
 
     def varied(self, step) -> Swimmer:
-        """The same in a medium whose uncertain parameters are off by ``step`` (n,); ValueError if that is no medium."""
+        """Return the swimmer in a medium whose uncertain parameters are changed by ``step`` (n,); Refusal if that is no
+        medium."""
         changed = {name: getattr(self.medium, name) + float(d) for name, d in zip(self.medium.uncertain, step)}
         try:
             return dataclasses.replace(self, medium=dataclasses.replace(self.medium, covariance=None, **changed))
@@ -167,27 +169,28 @@ class Swimmer:
         return dataclasses.replace(self, body=dataclasses.replace(self.body, frame=frame))
 
     def _settings(self, *names: str) -> dict:
-        """Of the solver, and the effects, as rft takes them."""
+        """Return settings of the solver, and the effects, as arguments of rft's functions."""
         names = ("loads", "regularisation", "pieces", *names)
         return {"effects": self.effects, **{name: getattr(self.solver, name) for name in names}}
 
     def solve(self, alpha, alphadot, start=None) -> rft.Solution:
-        """Body velocities with residual and status for alpha, alphadot (..., joints), begun from ``start`` (..., 3) where
-        that is known; see `rft.body_velocity`. ValueError if shape alone does not settle them."""
+        """Return body velocities with residual and status for alpha, alphadot (..., joints), begun from ``start`` (...,
+        3) where given; see `rft.body_velocity`. Refusal if they do not follow from shape alone."""
         refuse(self, "body velocity from shape alone", SHAPE_ALONE, "run a whole gait by the direct tier")
-        asked = self._settings("tolerance", "backend")
-        return rft.body_velocity(self.medium, self.body, alpha, alphadot, start=start, **asked)
+        settings = self._settings("tolerance", "backend")
+        return rft.body_velocity(self.medium, self.body, alpha, alphadot, start=start, **settings)
 
     def velocity(self, alpha, alphadot, start=None) -> np.ndarray:
-        """xi (..., 3) in the body's frame, begun from ``start`` as in `solve`; RuntimeError if any sample did not converge."""
+        """Return xi (..., 3) in the body's frame, begun from ``start`` as in `solve`; RuntimeError if any sample did
+        not converge."""
         return self.solve(alpha, alphadot, start).checked().xi
 
     def diagnosed(self, alpha, alphadot) -> dict:
         s = self.solve(alpha, alphadot)
         if str(s.status) == "unconverged":
             raise Refusal("the force balance did not converge", instead="raise [numerics] regularisation")
-        told = {"status": str(s.status), "residual": float(s.residual), "iterations": int(s.iterations)}
-        return {"xi": s.xi.tolist(), **told}
+        status = {"status": str(s.status), "residual": float(s.residual), "iterations": int(s.iterations)}
+        return {"xi": s.xi.tolist(), **status}
 
     def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
         from geomech.symbolic import connections
@@ -196,65 +199,66 @@ class Swimmer:
         if not (self.traits.linear and plain and type(self.medium) is rft.Viscous):
             raise Refusal("a formula is that of a chain of links in a viscous medium without effects")
         A, alpha = connections.viscous_chain(self.body.lengths, self.medium.ratio, self.body.frame)
-        return connections.in_units_of(self.body.length, A), alpha
+        return connections.in_length(self.body.length, A), alpha
 
     def power(self, alpha, alphadot, xi) -> np.ndarray:
         return self.work(alpha, alphadot, xi).power / self.length
 
     def work(self, alpha, alphadot, xi) -> rft.Work:
-        """Power, internal moments and slip of a solution of `solve`; see `rft.work_done`."""
+        """Return power, internal moments and slip of a solution of `solve`; see `rft.work_done`."""
         return rft.work_done(self.medium, self.body, alpha, alphadot, xi, **self._settings())
 
     def time_steps(self, alpha, alphadot, cycles: int | None, work: bool = False, path: bool = False) -> rft.TimeSteps:
-        """The gait phase after phase (`rft.time_steps`), unchecked."""
-        asked = {"cycles": cycles, "with_work": work, "with_path": path, **self._settings("tolerance", "backend")}
-        of = Swimmer.time_steps, self, alpha, alphadot, cycles is None
+        """Return the gait computed phase after phase (`rft.time_steps`), without checking convergence."""
+        settings = {"cycles": cycles, "with_work": work, "with_path": path, **self._settings("tolerance", "backend")}
+        context = Swimmer.time_steps, self, alpha, alphadot, cycles is None
 
         def advance(stepping: Stepping, state: State, count: int, with_work: bool) -> tuple[State, list[Row]]:
             step = partial(stepping.step, with_work=with_work)
-            return iterate(step, state, count, (*of, with_work), Row)
+            return iterate(step, state, count, (*context, with_work), Row)
 
-        return rft.time_steps(self.medium, self.body, alpha, alphadot, advance=advance, **asked)
+        return rft.time_steps(self.medium, self.body, alpha, alphadot, advance=advance, **settings)
 
     def run(self, alpha, alphadot, work: bool = False, start=None) -> Cycle:
-        """A gait given by alpha, alphadot (..., N, joints) at N equally spaced phases, run by the cheapest engine that is
-        right; balances begin from ``start`` as in `solve`, steps of time from the step before. RuntimeError if a force
-        balance did not converge or cycles did not become periodic."""
+        """Run a gait given by alpha, alphadot (..., N, joints) at N equally spaced phases, by the cheapest engine that
+        is right. Balances begin from ``start`` as in `solve`, steps of time from the step before. RuntimeError if a
+        force balance did not converge or cycles did not become periodic."""
         rates = alphadot.reshape(-1, self.joints).T
         speed = joint_speed(self.body, rates).reshape(alphadot.shape[:-1]).mean(-1)
         if not self.traits.steps:
-            images = around(alpha, alphadot, self.traits)
-            asked = (images.some(x) for x in (alpha, alphadot, start))
-            solution = self._of_gaits(speed.size, images.count).solve(*asked).checked()
-            xi = images.whole(solution.xi)
-            done = self._of_gaits(speed.size, alpha.shape[-2]).work(alpha, alphadot, xi) if work else None
-            return Cycle(xi, displacement(xi), solution.residual.max(-1), speed, done, 1, 0.0 * speed)
+            images = cycle_images(alpha, alphadot, self.traits)
+            samples = (images.select(x) for x in (alpha, alphadot, start))
+            solution = self._for_gaits(speed.size, images.count).solve(*samples).checked()
+            xi = images.expand(solution.xi)
+            work_done = self._for_gaits(speed.size, alpha.shape[-2]).work(alpha, alphadot, xi) if work else None
+            return Cycle(xi, displacement(xi), solution.residual.max(-1), speed, work_done, 1, 0.0 * speed)
         steps = self.time_steps(alpha, alphadot, self.solver.cycles, work).checked()
         net = displacement(steps.xi) if self._repeats(steps) else steps.displacement
         to_come = steps.drift if self.settling else 0.0 * speed
         return Cycle(steps.xi, net, steps.residual, speed, steps.work, steps.cycles, to_come)
 
-    def _of_gaits(self, count: int, phases: int) -> Swimmer:
-        """This swimmer for so many gaits of so many phases each, where effects have a parameter for each gait."""
+    def _for_gaits(self, count: int, phases: int) -> Swimmer:
+        """Return the swimmer for ``count`` gaits of ``phases`` phases each, where effects have a parameter for each
+        gait."""
         effects = tuple(e.take(np.repeat(np.arange(count), phases)) for e in self.effects)
-        same = all(a is b for a, b in zip(effects, self.effects))
-        return self if same else dataclasses.replace(self, effects=effects)
+        unchanged = all(a is b for a, b in zip(effects, self.effects))
+        return self if unchanged else dataclasses.replace(self, effects=effects)
 
     def _repeats(self, steps: rft.TimeSteps) -> bool:
-        """Whether one cycle is like another: the velocity is then periodic, and its integral exact for the series
-        through it."""
+        """Return whether cycles are equal: the velocity is then periodic, and its integral exact for the series through
+        it."""
         return not self.traits.lacks & Premise.SE2_SYMMETRIC and (steps.status == "periodic").all()
 
     def path(self, alpha, alphadot, cycles: int = 1) -> np.ndarray:
-        """Return poses of the limit cycle; where cycles do not repeat, from the one that `run` gives."""
+        """Return poses of the limit cycle; where cycles do not repeat, from the cycle that `run` returns."""
         before = (self.solver.cycles or 1) - 1
         if not self.traits.lacks & Premise.SE2_SYMMETRIC:
             steps = self.time_steps(alpha, alphadot, self.solver.cycles).checked()
             if self._repeats(steps):
                 return repeated(poses(steps.xi), cycles)
         steps = self.time_steps(alpha, alphadot, before + cycles, path=True).checked()
-        own = steps.path[before * len(alpha) :]
-        return rft.se2.compose(rft.se2.inverse(own[:1]), own)
+        poses_after = steps.path[before * len(alpha) :]
+        return rft.se2.compose(rft.se2.inverse(poses_after[:1]), poses_after)
 
     def refined(self) -> Swimmer | None:
         rule, count = rule_for(self.medium, self.solver.loads)
@@ -269,7 +273,8 @@ class Swimmer:
 
 
 def _has_joint_angles(body: rft.Body) -> bool:
-    """Whether shape variables are angles of joints: bodies of a few have amplitudes of bends, or of modes, in their place."""
+    """Return whether shape variables are angles of joints; bodies with few have amplitudes of bends, or of modes,
+    instead."""
     plain = isinstance(body, (rft.Chain, rft.Backbone)) and getattr(body, "bends", None) is None
     return plain and getattr(body, "modes", None) is None
 

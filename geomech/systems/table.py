@@ -1,4 +1,4 @@
-"""A table of the connection read from a file: what another run, another program or an experiment found.
+"""A table of the connection read from a file: the result of another run, another program or an experiment.
 
 Where the file has the odd harmonics of the velocity beside A (`geomech.geometry.harmonics`), xi depends on the direction of
 alphadot as in the scene it came from, and A is its linear part; else xi = A alphadot.
@@ -69,49 +69,52 @@ class Table:
             if not isinstance(getattr(self, name), str):
                 raise Refusal(f"{name} must be text", value=getattr(self, name))
         check_numbers(self)
-        held = tables.load(self.file, self.sign, self.order)
-        if self.sha256.lower() not in ("", held.sha256):
+        stored = tables.load(self.file, self.sign, self.order)
+        if self.sha256.lower() not in ("", stored.sha256):
             raise Refusal(
                 f"{self.file} is not the file whose sha256 is given", instead="restore it, or leave sha256 out"
             )
-        if held.connection.field.masked and not isinstance(held.connection, Tube):
-            cure = "" if held.A_error is None else ": give the .nc file of the measured gait, which has what lies there"
-            raise Refusal(f"{self.file} has singular shapes (nan), and nothing is looked up between those{cure}")
-        if self.body_length is not None and (held.unit, held.length) != ("BL", 1.0):
-            raise Refusal(
-                f"{self.file} says the body's length itself, {held.length:g} {held.unit}", instead="drop body_length"
+        if stored.connection.field.masked and not isinstance(stored.connection, Tube):
+            cure = (
+                "" if stored.A_error is None else ": give the .nc file of the measured gait, which has what lies there"
             )
-        object.__setattr__(self, "sha256", held.sha256)
-        object.__setattr__(self, "held", tables.scaled(held, 1.0 / (self.body_length or 1.0)))
+            raise Refusal(f"{self.file} has singular shapes (nan), and nothing is looked up between those{cure}")
+        if self.body_length is not None and (stored.unit, stored.length) != ("BL", 1.0):
+            raise Refusal(
+                f"{self.file} says the body's length itself, {stored.length:g} {stored.unit}",
+                instead="drop body_length",
+            )
+        object.__setattr__(self, "sha256", stored.sha256)
+        object.__setattr__(self, "stored", tables.scaled(stored, 1.0 / (self.body_length or 1.0)))
 
     def __reduce__(self):
         return Table, (self.file, self.sign, self.order, self.body_length, self.sha256)
 
-    tube = property(lambda self: self.held.connection if isinstance(self.held.connection, Tube) else None)
-    near = property(lambda self: f"the mean gait that {self.file} was measured at" if self.tube else "")
-    joints = property(lambda self: len(self.held.connection.axes))
-    length = property(lambda self: self.held.length)
+    tube = property(lambda self: self.stored.connection if isinstance(self.stored.connection, Tube) else None)
+    near_gait = property(lambda self: f"the mean gait that {self.file} was measured at" if self.tube else "")
+    joints = property(lambda self: len(self.stored.connection.axes))
+    length = property(lambda self: self.stored.length)
 
     @property
     def traits(self) -> Traits:
-        held = self.held
-        near = {"singularity": self._beyond, "singular": "the data of the log do not reach"} if self.tube else {}
+        stored = self.stored
+        limits = {"singularity": self._beyond, "singular": "the data of the log do not reach"} if self.tube else {}
         return Traits(
-            linear=held.harmonics is None, mirror=held.mirror, smooth=False, power_degree=held.power_degree,
-            frame=held.frame, unit=held.unit, labels=tuple((name, "rad") for name in held.shapes), **near,
+            linear=stored.harmonics is None, mirror=stored.mirror, smooth=False, power_degree=stored.power_degree,
+            frame=stored.frame, unit=stored.unit, labels=tuple((name, "rad") for name in stored.shapes), **limits,
         )  # fmt: skip
 
     def capability(self, kind: type) -> Table | None:
-        """Return itself if it has the ability: power or a metric of its own where the file tells them."""
-        metric, degree = self.held.metric, self.held.power_degree
+        """Return itself if it has the ability: power or a metric of its own where the file has them."""
+        metric, degree = self.stored.metric, self.stored.power_degree
         absent = {Dissipative: metric is None or degree is None, OwnMetric: metric is None or degree is not None}
         return self if isinstance(self, kind) and not absent.get(kind) else None
 
     def squared_speed(self, alpha, alphadot) -> np.ndarray:
-        return self.held.metric.norm(alpha, alphadot) ** 2
+        return self.stored.metric.norm(alpha, alphadot) ** 2
 
     def power(self, alpha, alphadot, xi=None) -> np.ndarray:
-        return self.held.metric.norm(alpha, alphadot) ** self.held.power_degree
+        return self.stored.metric.norm(alpha, alphadot) ** self.stored.power_degree
 
     def _beyond(self, alpha) -> np.ndarray:
         """Return (...), which passes through 0 where the data of a measured gait end."""
@@ -119,79 +122,98 @@ class Table:
 
     def in_frame(self, frame: str) -> Table:
         raise Refusal(
-            f"a table has the frame it was made in, {self.held.frame!r}", instead=f"make it anew in the frame {frame!r}"
+            f"a table has the frame it was made in, {self.stored.frame!r}",
+            instead=f"make it anew in the frame {frame!r}",
         )
 
     def refuse_singular(self, alpha) -> None:
-        """ValueError for shapes that the data of a measured gait do not reach, and how far off they are."""
+        """Raise Refusal for shapes that the data of a measured gait do not reach; it says how far away they are."""
         if self.tube is not None:
             self.tube.checked(alpha)
 
     def table(self, name: str) -> Any:
-        held = self.held
-        own = {"connection": held.connection, "harmonics": held.harmonics, "even part": held.even}
-        return self.A_error if name == "A_error" else {**own, "metric": held.metric}.get(name)
+        stored = self.stored
+        tables = {"connection": stored.connection, "harmonics": stored.harmonics, "even part": stored.even}
+        return self.A_error if name == "A_error" else {**tables, "metric": stored.metric}.get(name)
 
     @cached_property
     def A_error(self) -> np.ndarray | None:
-        """(3, joints, N_1, ...), half widths of intervals of A on the file's grid, as the file has them, else of what is known
-        near a measured gait; None where nothing tells them."""
-        if self.held.A_error is None and self.tube is not None:
-            return self.tube.at_grid(self.tube.known.of_error)
-        return self.held.A_error
+        """Half widths (3, joints, N_1, ...) of intervals of A on the file's grid, from the file, else from the Taylor
+        series about a measured gait; None where there are none."""
+        if self.stored.A_error is None and self.tube is not None:
+            return self.tube.at_grid(self.tube.taylor.connection_error)
+        return self.stored.A_error
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
-        """xi (..., 3) looked up; ValueError outside the table's grid."""
-        return self.held.table.velocity(alpha, alphadot)
+        """Return the interpolated xi (..., 3); Refusal outside the table's grid."""
+        return self.stored.table.velocity(alpha, alphadot)
 
     def diagnosed(self, alpha, alphadot) -> dict:
-        """Return {"xi", "status", "residual"}: the length of the vector of what the fit leaves, rms over directions, None if
-        that is unknown."""
-        left = np.linalg.norm(self._times(self.held.table.residual, alpha, alphadot)) if self.held.told else None
+        """Return {"xi", "status", "residual"}: the residual is the norm of that of the fit, rms over directions; None
+        if the file has none."""
+        residual = (
+            np.linalg.norm(self._times(self.stored.table.residual, alpha, alphadot))
+            if self.stored.has_residual
+            else None
+        )
         xi = evaluate(self.velocity, alpha, alphadot).tolist()
-        return {"xi": xi, "status": "looked up", "residual": left if left is None else float(left)}
+        return {"xi": xi, "status": "looked up", "residual": residual if residual is None else float(residual)}
 
     def _times(self, values, alpha, alphadot) -> np.ndarray:
-        """(..., 3): values (3, N_1, ...) at a shape times |alphadot|; near one gait they are the same everywhere."""
+        """Return values (3, N_1, ...) at a shape times |alphadot|: (..., 3); near one gait they are the same
+        everywhere."""
         if self.tube is not None:
-            there = values[:, np.isfinite(values[0])]  # nowhere, where the data reach no point of the grid
-            return (there[:, 0] if there.size else np.zeros(3)) * np.linalg.norm(alphadot, axis=-1)[..., None]
-        return Field(self.held.table.axes, values, 1)(alpha) * np.linalg.norm(alphadot, axis=-1)[..., None]
+            known = values[:, np.isfinite(values[0])]  # nowhere, where the data reach no point of the grid
+            return (known[:, 0] if known.size else np.zeros(3)) * np.linalg.norm(alphadot, axis=-1)[..., None]
+        return Field(self.stored.table.axes, values, 1)(alpha) * np.linalg.norm(alphadot, axis=-1)[..., None]
 
-    def own_error(self, alpha, alphadot) -> np.ndarray:
-        """(..., 2), body lengths and rad: the fit's residual summed up along the gait, what is left of the heading with its
-        lever, and the larger change with half the grid. What harmonics up to k leave swings k times as fast as A's, and
-        sums up like a random walk of k steps; what is even in alphadot does not, and a gait may keep to directions where it is
-        largest, sqrt(2) times the rms of one harmonic. Nor do intervals of A, which may be off the same way all along."""
+    def table_error(self, alpha, alphadot) -> np.ndarray:
+        """Return (..., 2), body lengths and rad: the fit's residual summed along the gait, the error of the heading
+        times its lever, and the larger change with half the grid.
+
+        The residual of harmonics up to k oscillates k times as fast as that of A, and adds up like a random walk of k
+        steps. The part that is even in alphadot does not: a gait may stay in directions where it is largest, sqrt(2)
+        times the rms of one harmonic. Nor do intervals of A, whose errors may have one sign along the whole gait.
+
+        The residual of harmonics up to k oscillates k times as fast as that of A, and adds up like a random walk of k
+        steps. The part that is even in alphadot does not: a gait may stay in directions where it is largest, sqrt(2)
+        times the rms of one harmonic. Nor do intervals of A, whose errors may have one sign along the whole gait.
+        """
         if self.tube is not None:
-            x, y, theta = np.moveaxis(self.tube.known.error(alpha, alphadot), -1, 0)
+            x, y, theta = np.moveaxis(self.tube.taylor.error(alpha, alphadot), -1, 0)
             return np.stack([np.hypot(x, y) / self.length, theta], -1)
         xi, phases = self.velocity(alpha, alphadot), np.shape(alpha)[-2]
         net = displacement(xi)
-        halves = [displacement(half.velocity(alpha, alphadot)) for half in self.held.halves]
-        apart = [np.stack([np.hypot(*np.moveaxis(h - net, -1, 0)[:2]), np.abs(h - net)[..., 2]], -1) for h in halves]
-        error, held = np.maximum(*apart), self.held
+        halves = [displacement(half.velocity(alpha, alphadot)) for half in self.stored.halves]
+        differences = [
+            np.stack([np.hypot(*np.moveaxis(h - net, -1, 0)[:2]), np.abs(h - net)[..., 2]], -1) for h in halves
+        ]
+        error, stored = np.maximum(*differences), self.stored
         pose = trajectory(xi, 2 * np.pi * np.arange(phases) / phases)
         lever = np.hypot(*np.moveaxis(net[..., None, :] - pose, -1, 0)[:2])
-        left = [(held.table.residual, 1 / np.sqrt(held.highest))] if held.told else []
-        left += [(held.even, np.sqrt(2))] if held.even is not None else []
-        left += [(np.linalg.norm(held.A_error, axis=1), 1.0)] if held.A_error is not None else []
-        for values, factor in left:
+        contributions = [(stored.table.residual, 1 / np.sqrt(stored.highest))] if stored.has_residual else []
+        contributions += [(stored.even, np.sqrt(2))] if stored.even is not None else []
+        contributions += [(np.linalg.norm(stored.A_error, axis=1), 1.0)] if stored.A_error is not None else []
+        for values, factor in contributions:
             x, y, theta = np.moveaxis(self._times(values, alpha, alphadot), -1, 0)
             error += 2 * np.pi * factor * np.stack([np.hypot(x, y) + lever * theta, theta], -1).mean(-2)
         return error / [self.length, 1.0]
 
     def about(self) -> dict:
-        own = {"table": self.file, "table_sha256": self.sha256}
+        attributes = {"table": self.file, "table_sha256": self.sha256}
         if self.tube is None:
-            return own if self.held.level is None else {**own, "level": self.held.level}
-        known = self.tube.known
-        return {**own, "singular_shapes": BEYOND, "level": known.level, "error_factor": known.factor}
+            return attributes if self.stored.level is None else {**attributes, "level": self.stored.level}
+        taylor = self.tube.taylor
+        return {**attributes, "singular_shapes": BEYOND, "level": taylor.level, "error_factor": taylor.factor}
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """Lines on what the file does not say, and how it is taken."""
-        return self.held.said if self.held.sized or self.body_length is not None else (*self.held.said, LENGTHS)
+        """Assumptions about facts that the file does not state, one a line."""
+        return (
+            self.stored.assumptions
+            if self.stored.sized or self.body_length is not None
+            else (*self.stored.assumptions, LENGTHS)
+        )
 
     @classmethod
     def examples(cls) -> dict[str, Table]:

@@ -11,7 +11,7 @@ from geomech.systems.premises import listed
 from geomech.text import grains
 from geomech.text.system import described, engine
 from geomech.tiers import TIERS
-from geomech.tiers.base import solved
+from geomech.tiers.base import solved_phases
 from rft.premise import ALL
 from rft.refusal import printable
 
@@ -35,7 +35,7 @@ def explain(scene: Scene | Intruding | WalkerScene) -> str:
     lines = [f"{scene.name}: {first}, {gait} gait{timed}", *rest]
     lines.append(f"engine: {engine(system)}")
     phases = scene.numerics.phases
-    if (count := solved(system, scene.gait, phases)) < phases:
+    if (count := solved_phases(system, scene.gait, phases)) < phases:
         lines.append(f"by symmetry: {count} of {phases} phases of the gait are solved, the others are images of these")
     by_name = [m for m, tier in TIERS.items() if tier.is_possible(system) and not tier.is_offered(system)]
     lines.append("tiers: " + ", ".join(tiers(system)) + f"; by name: {', '.join(by_name)}" * bool(by_name))

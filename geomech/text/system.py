@@ -7,7 +7,7 @@ import dataclasses
 from geomech.core import summary
 from geomech.io.tables.base import SIGNS
 from geomech.systems import Swimmer, Table
-from geomech.systems.base import Given, System, kind_of
+from geomech.systems.base import System, WrappedSystem, kind_of
 from geomech.systems.framed import NAME, Framed
 from geomech.systems.swimmer import name_in
 from rft.bodies import BODIES
@@ -27,8 +27,8 @@ def described(system: System) -> list[str]:
     if isinstance(system, Framed):
         first, *rest = described(system.inner)
         return [f"{first}, seen from its {NAME} frame", *rest]
-    if isinstance(system, Given):
-        return described(system.given)
+    if isinstance(system, WrappedSystem):
+        return described(system.wrapped)
     if isinstance(system, Swimmer):
         return _swimmer(system)
     if isinstance(system, Table):
@@ -84,19 +84,19 @@ def _swimmer(system: Swimmer) -> list[str]:
 
 
 def _table(system: Table) -> list[str]:
-    held = system.held
+    held = system.stored
     lines = [f"table ({system.file}: {held.connection!r})"]
     if system.tube is not None:
-        lines.append(f"known near a measured gait alone; errors are those of {system.tube.known.level:.3g} of cases")
+        lines.append(f"known near a measured gait alone; errors are those of {system.tube.taylor.level:.3g} of cases")
     elif held.harmonics:
         lines.append(f"with the odd harmonics of xi in the direction of alphadot to {held.highest}: {held.harmonics!r}")
     else:
-        lines.append("A alone: xi = A alphadot" + ", and what the fit left is part of every error" * held.told)
+        lines.append("A alone: xi = A alphadot" + ", and what the fit left is part of every error" * held.has_residual)
     if held.even is not None:
         lines.append("xi is not odd in alphadot: what is even is part of every error")
     if held.A_error is not None and system.tube is None:
         lines.append("its file tells intervals of A: they are part of every error")
-    if not held.told:
+    if not held.has_residual:
         lines.append("the file does not tell what its fit left: errors are those of the grid alone")
     lines.append(f"stored as {SIGNS[held.sign]}, arrays as {held.order}, lengths in {held.unit}, frame {held.frame}")
     return [

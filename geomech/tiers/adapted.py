@@ -10,13 +10,13 @@ import numpy as np
 from geomech.core.knob import Knob
 from geomech.geometry import family
 from geomech.geometry.family import Family
-from geomech.tiers.base import Plan, Table, Tier, solved
+from geomech.tiers.base import Plan, Table, Tier, solved_phases
 from rft.checks import real_array
 from rft.premise import SHAPE_ALONE
 
 
 def table(system, numerics, gait, amplitudes) -> Table:
-    """Return the scaled copies of a gait that reach so far, and no other, as a table to build."""
+    """Return the family of scaled copies of a gait up to these amplitudes, as a table to build."""
     a = real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes)
     least, largest = float(a.min(initial=0.0)), float(a.max(initial=0.0))
     count, phases = numerics.curves, numerics.phases // 2
@@ -24,7 +24,7 @@ def table(system, numerics, gait, amplitudes) -> Table:
     return Table(
         "family",
         (numerics.curves, numerics.phases, gait, least, largest),
-        len(sides) * count * solved(system, gait, phases),
+        len(sides) * count * solved_phases(system, gait, phases),
         len(sides) * count * phases * 3,
         partial(_build, system, gait, least, largest, count, phases),
         amplitudes=np.outer(sides, np.arange(1, count + 1) / count).ravel(),
@@ -42,7 +42,7 @@ def _run(system, alpha, alphadot) -> np.ndarray:
 
 
 def _plan(system, numerics, gait, amplitudes) -> Plan:
-    area = lambda held, some: held.area(np.asarray(gait.amplitude if some is None else some, float))
+    area = lambda curves, batch: curves.area(np.asarray(gait.amplitude if batch is None else batch, float))
     return Plan(area, table(system, numerics, gait, amplitudes))
 
 

@@ -1,5 +1,5 @@
-"""The area tier: exp of the CCF's integral over the area enclosed; winding numbers count, so figure-eights cancel. A loop of
-three and more joints encloses no area but spans surfaces, and what depends on their choice is told."""
+"""The area tier: exp of the CCF's integral over the area enclosed; winding numbers count, so figure-eights cancel. A
+loop of three and more joints encloses no area but spans surfaces; how much depends on their choice is reported."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ TIPS, AROUND = 2, 64  # surfaces besides the one that is taken; phases on one wh
 
 
 def area(field: Field, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
-    """exp of the integral of a CCF (joints 1 and 2), for amplitudes (..., ) or the gait's own. ValueError off the grid.
+    """Return exp of the integral of a CCF (joints 1 and 2), (..., 3), for amplitudes (...,) or the gait's own. Refusal
+    off the grid.
 
     By Green's theorem the integral is that of P d(alpha_2) along the gait, dP/d(alpha_1) = CCF. Order 3 in the gait's
     size in a generic frame, 4 where A vanishes at its centre.
@@ -35,8 +36,8 @@ def area(field: Field, gait: Gait, amplitudes=None, phases: int = 256) -> np.nda
         raise Refusal(f"the area tier needs two joints, got a field of {field.joints} and a gait of {gait.joints}")
     potential = field.antiderivative(0)
 
-    def enclosed(some):
-        alpha, alphadot = gait.cycle(phases, some)
+    def enclosed(batch):
+        alpha, alphadot = gait.cycle(phases, batch)
         return se2.exp((potential(field.inside(alpha)) * alphadot[..., 1:]).mean(-2) * 2 * np.pi)
 
     return in_groups(enclosed, gait.amplitude if amplitudes is None else amplitudes, SAMPLES_TOGETHER // phases)
@@ -45,32 +46,32 @@ def area(field: Field, gait: Gait, amplitudes=None, phases: int = 256) -> np.nda
 def _plan(system, numerics, gait, amplitudes) -> Plan:
     d, phases = system.joints, numerics.phases
     read = 3 * (d * (d - 1) // 2) * (numerics.interpolation + 1) ** d * (1 if d == 2 else RADII)
-    held = {"numbers": 3 * (d * (d - 1) // 2) * numerics.grid**d, "read": read}
+    memory = {"numbers": 3 * (d * (d - 1) // 2) * numerics.grid**d, "read": read}
     if d == 2:
-        enclosed = lambda table, some: area(ccf(table), gait, some, phases)
-        return Plan(enclosed, fitted.table(system, numerics), **held)
+        enclosed = lambda table, batch: area(ccf(table), gait, batch, phases)
+        return Plan(enclosed, fitted.table(system, numerics), **memory)
     if not fitted.is_too_large(system, numerics):
-        surfaces = lambda table, some, tips: spanned(two_form(table), gait, some, phases, tips)
-        return _of_surfaces(surfaces, gait, table=fitted.table(system, numerics), **held)
-    A = fitted.at_shapes(system, numerics)
+        surfaces = lambda table, batch, tips: spanned(two_form(table), gait, batch, phases, tips)
+        return _surface_plan(surfaces, gait, table=fitted.table(system, numerics), **memory)
+    A = fitted.without_field(system, numerics)
 
     def balances(count, phases):
         on_cones = RADII * max(AROUND, 4 * gait.harmonics + 2)
         shapes = 2 * phases + (2 + TIPS) * on_cones  # for the displacement, and once more with its spread
-        return count * shapes * fitted.solved_at(system, numerics)
+        return count * shapes * fitted.balances_per_shape(system, numerics)
 
-    surfaces = lambda table, some, tips: spanned_by(A, gait, some, phases, tips, AROUND)
-    return _of_surfaces(surfaces, gait, balances=balances)
+    surfaces = lambda table, batch, tips: spanned_by(A, gait, batch, phases, tips, AROUND)
+    return _surface_plan(surfaces, gait, balances=balances)
 
 
-def _of_surfaces(surfaces, gait, **plan) -> Plan:
-    """Return the plan of a loop of three and more joints. surfaces: of (table, amplitudes, tips)."""
+def _surface_plan(surfaces, gait, **plan) -> Plan:
+    """Return the plan of a loop of three and more joints. surfaces: function of (table, amplitudes, tips)."""
 
     def net(table, amplitudes):
         shape = np.shape(gait.amplitude if amplitudes is None else amplitudes)
         return surfaces(table, amplitudes, 0).net.reshape(*shape, 3)
 
-    return Plan(net, spread=lambda table, some: surfaces(table, some, TIPS).spread, **plan)
+    return Plan(net, spread=lambda table, batch: surfaces(table, batch, TIPS).spread, **plan)
 
 
 AREA = Tier(

@@ -1,7 +1,8 @@
-"""What a tier is: a way to predict the net pose (..., 3) of a gait's cycle from phase t = 0, in the frame at the start.
+"""A tier predicts the net pose (..., 3) of a gait's cycle from phase t = 0, in the frame at the start.
 
-A tier is one expression, `Tier(...)`. Its plan says for one system and gait what is computed once and looked up, what is
-solved besides, and how both give the displacement."""
+A tier is one expression, `Tier(...)`. Its plan for one system and gait names the table that is computed once, the
+balances that are solved besides, and the function that gives the displacement.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ from geomech.core.knob import Knob
 from geomech.gaits import Gait
 from geomech.geometry.images import solved_count
 from geomech.systems.base import System, kind_of
-from geomech.systems.capabilities import Costed, capability, near
+from geomech.systems.capabilities import Costed, capability, near_gait
 from geomech.systems.premises import refuse
 from rft.checks import Number, check_numbers, real_array
 from rft.premise import ALL, Premise
@@ -25,7 +26,7 @@ from rft.registry import Registry
 
 @dataclass(frozen=True)
 class Numerics:
-    """How finely tiers compute; all optional, and part of [numerics] beside the system's own."""
+    """Numerical settings of the tiers, all optional: the part of [numerics] beside the system's own."""
 
     directions: Annotated[
         int | None,
@@ -58,7 +59,17 @@ class Numerics:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """What is computed once for a system, and looked up from then on.
+    """Data that are computed once for a system and interpolated from then on.
+
+    name: of its kind. key: all that it depends on besides the system. balances: velocities that building it takes.
+    numbers: in it. build: table(progress), which calls progress with the fraction done. axes: function that returns the
+    axes of a field of shapes, which gaits must not leave, and refuses one too large; None for no field. amplitudes: of
+    the gait from whose cycles it is built, None where it is built from no gait.
+
+    name: of its kind. key: all that it depends on besides the system. balances: velocities that building it takes.
+    numbers: in it. build: table(progress), which calls progress with the fraction done. axes: function that returns the
+    axes of a field of shapes, which gaits must not leave, and refuses one too large; None for no field. amplitudes: of
+    the gait from whose cycles it is built, None where it is built from no gait.
 
     name: of its kind. key: all that it depends on beside the system. balances: velocities that building it takes. numbers:
     that it holds. build: table(progress), which calls progress with the fraction done. axes: of a field of shapes, which
@@ -75,18 +86,18 @@ class Table:
     amplitudes: np.ndarray | None = None
 
 
-def nothing(count: int, phases: int) -> int:
-    """Return 0, the balances of a prediction that looks all up."""
+def no_balances(count: int, phases: int) -> int:
+    """Return 0, the balances of a prediction that only interpolates."""
     return 0
 
 
-def undecided(table: Any, amplitudes) -> None:
-    """Return None, the spread of a prediction that leaves no choice."""
+def no_spread(table: Any, amplitudes) -> None:
+    """Return None, the spread of a prediction without a choice."""
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """How a tier predicts displacements of one gait of one system.
+    """The prediction of displacements of one gait of one system by a tier.
 
     predict: net poses (..., 3) by the table, or None, for amplitudes (...,) or the gait's own, None. table: None where
     nothing is looked up. balances: velocities of a prediction at ``count`` amplitudes and so many phases, beside the
@@ -98,9 +109,9 @@ class Plan:
 
     predict: Callable[[Any, Any], np.ndarray]
     table: Table | None = None
-    balances: Callable[[int, int], int] = nothing
+    balances: Callable[[int, int], int] = no_balances
     exact: bool = False
-    spread: Callable[[Any, Any], np.ndarray | None] = undecided
+    spread: Callable[[Any, Any], np.ndarray | None] = no_spread
     numbers: int = 0
     read: int = 0
 
@@ -133,7 +144,7 @@ class Tier:
 
     @property
     def colour(self) -> str:
-        """Of its markers and error bars."""
+        """Colour of its markers and error bars."""
         return self.markers or self.style["color"]
 
     @property
@@ -142,34 +153,34 @@ class Tier:
         return self.plan.__module__
 
     def refuse(self, system: System) -> None:
-        """ValueError if it says nothing of this system."""
+        """Raise Refusal if the tier does not apply to this system."""
         refuse(system, self.result, self.rests_on, "use the direct tier")
         if system.joints not in self.joints:
             raise Refusal(f"the {self.name} tier {self.takes}, this body has {system.joints}", instead=self.instead)
         if self.meets_singular_shapes(system):
-            gait = near(system)
-            why = f"A is known near {gait} alone" if gait else f"the {kind_of(system)} has singular shapes"
-            raise Refusal(f"the {self.name} tier sums a field up, and {why}", instead="use path or direct")
+            gait = near_gait(system)
+            reason = f"A is known near {gait} alone" if gait else f"the {kind_of(system)} has singular shapes"
+            raise Refusal(f"the {self.name} tier sums a field up, and {reason}", instead="use path or direct")
 
     def meets_singular_shapes(self, system: System) -> bool:
-        """Return whether singular shapes keep it from saying anything of this system."""
+        """Return whether singular shapes keep the tier from applying to this system."""
         return self.regular and system.traits.singularity is not None
 
     def is_possible(self, system: System) -> bool:
-        """Return whether it says something of this system."""
+        """Return whether the tier applies to this system."""
         possible = system.joints in self.joints and not system.traits.lacks & self.rests_on
         return possible and not self.meets_singular_shapes(system)
 
     def is_offered(self, system: System) -> bool:
-        """Return whether it says something of this system, and takes no longer than others that say more."""
+        """Return whether the tier applies to this system and takes no longer than more accurate ones."""
         return system.joints in self.offered and self.is_possible(system)
 
 
 TIERS = Registry("geomech.tiers", "name", "a tier", lambda part: isinstance(part, Tier))  # cheapest look-up first
 
 
-def solved(system: System, gait: Gait, phases: int) -> int:
-    """Of a gait's phases, those at which a system that runs it is asked for its velocity: the others are images of these."""
+def solved_phases(system: System, gait: Gait, phases: int) -> int:
+    """Return at how many phases of a gait the system's velocity is solved; the others are images of these."""
     if system.traits.steps or phases < max(4, 2 * gait.harmonics + 1):  # the least that show a gait
         return phases
     costed = capability(system, Costed)
@@ -177,8 +188,9 @@ def solved(system: System, gait: Gait, phases: int) -> int:
 
 
 def in_groups(f: Callable, amplitudes, size: int) -> np.ndarray:
-    """f(some) (b, ...) for amplitudes (...,), at most ``size`` (or one) at a time, so that memory is bounded: (..., ...)."""
+    """Return f(batch) (b, ...) for amplitudes (...,), at most ``size`` (or one) at a time, so that memory is bounded:
+    (..., ...)."""
     amplitudes = real_array("amplitudes", amplitudes)
     flat, size = amplitudes.reshape(-1), max(1, size)
-    found = [f(flat[k : k + size]) for k in range(0, flat.size, size)]
-    return np.concatenate(found).reshape(*amplitudes.shape, -1) if found else np.zeros((*amplitudes.shape, 3))
+    results = [f(flat[k : k + size]) for k in range(0, flat.size, size)]
+    return np.concatenate(results).reshape(*amplitudes.shape, -1) if results else np.zeros((*amplitudes.shape, 3))

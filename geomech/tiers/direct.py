@@ -9,8 +9,8 @@ from geomech.gaits import Gait
 from geomech.geometry.connection import SAMPLES_TOGETHER, Velocity, evaluate
 from geomech.geometry.gait import checked_gait
 from geomech.geometry.reconstruct import displacement
-from geomech.systems.capabilities import at_once
-from geomech.tiers.base import Plan, Tier, in_groups, solved
+from geomech.systems.capabilities import gaits_per_batch
+from geomech.tiers.base import Plan, Tier, in_groups, solved_phases
 from rft.checks import in_range
 from rft.premise import NONE
 
@@ -19,12 +19,13 @@ NOTHING = "nothing that exact link integrals do not give for less"
 
 
 def direct(velocity: Velocity, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
-    """The velocity integrated along the gait, for amplitudes (...,) or the gait's own, many phases in one batch."""
+    """Return the net poses (..., 3) by the velocity integrated along the gait, for amplitudes (...,) or the gait's own,
+    many phases in one batch."""
     checked_gait(gait)
     amplitudes = gait.amplitude if amplitudes is None else amplitudes
     in_range("phases", phases, 1, 1e9, whole=True)
     step = SAMPLES_TOGETHER // int(phases)
-    return in_groups(lambda some: _cycle(velocity, gait, some, phases), amplitudes, step)
+    return in_groups(lambda batch: _cycle(velocity, gait, batch, phases), amplitudes, step)
 
 
 def _cycle(velocity: Velocity, gait: Gait, amplitudes, phases: int) -> np.ndarray:
@@ -33,21 +34,24 @@ def _cycle(velocity: Velocity, gait: Gait, amplitudes, phases: int) -> np.ndarra
     return displacement(np.concatenate([evaluate(velocity, alpha[:, p], alphadot[:, p]) for p in parts], -2))
 
 
-def itself(system, numerics, gait: Gait) -> Plan:
-    """Return the plan of a tier that integrates the system's own velocity, and looks nothing up."""
-    predict = lambda table, some: direct(system.velocity, gait, some, numerics.phases)
+def direct_plan(system, numerics, gait: Gait) -> Plan:
+    """Return the plan of a tier that integrates the system's own velocity, without a table."""
+    predict = lambda table, batch: direct(system.velocity, gait, batch, numerics.phases)
     return Plan(predict, balances=_balances(system, gait), exact=True)
 
 
 def _balances(system, gait: Gait):
-    return lambda count, phases: count * solved(system, gait, phases)
+    return lambda count, phases: count * solved_phases(system, gait, phases)
 
 
 def _plan(system, numerics, gait: Gait, amplitudes) -> Plan:
-    """The system runs the gait (`System.run`), by symmetry from as few of its phases as tell the others."""
+    """Return the plan by which the system runs the gait (`System.run`), from as few of its phases as symmetry
+    allows."""
     phases = numerics.phases
-    run = lambda some: system.run(*gait.cycle(phases, some)).net
-    predict = lambda table, some: run(None) if some is None else in_groups(run, some, at_once(system, phases))
+    run = lambda batch: system.run(*gait.cycle(phases, batch)).net
+    predict = lambda table, batch: (
+        run(None) if batch is None else in_groups(run, batch, gaits_per_batch(system, phases))
+    )
     return Plan(predict, balances=_balances(system, gait), exact=True)
 
 

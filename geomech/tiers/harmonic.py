@@ -10,10 +10,10 @@ import numpy as np
 from geomech.core.knob import Knob
 from geomech.geometry import harmonics
 from geomech.geometry.harmonics import Harmonics
-from geomech.systems.capabilities import stored
+from geomech.systems.capabilities import stored_table
 from geomech.tiers import fitted
 from geomech.tiers.base import Plan, Table, Tier
-from geomech.tiers.direct import itself
+from geomech.tiers.direct import direct_plan
 from geomech.tiers.path import path
 from rft.refusal import Refusal
 
@@ -23,12 +23,12 @@ DEPENDS_ON = ("grid", "extent", "harmonics", "interpolation")  # of [numerics]
 
 
 def highest(system, numerics) -> int:
-    """Return the highest of the harmonics that are kept."""
+    """Return the highest harmonic of the series."""
     return numerics.harmonics or HIGHEST.get(system.joints, FEW)
 
 
 def directions(system, numerics) -> int:
-    """Return the number of directions of alphadot at each shape: enough above the highest harmonic for folding to stay
+    """Return the number of directions of alphadot at each shape: enough above the highest harmonic for aliasing to stay
     small."""
     most = highest(system, numerics)
     return max(24, (8 * most) // 5) if system.joints == 2 else 2 * harmonics.terms(system.joints, most)
@@ -52,25 +52,26 @@ def _axes(system, numerics) -> tuple[np.ndarray, ...]:
     if fitted.is_too_large(system, numerics):
         raise Refusal(
             f"harmonics of {d} joint rates need a field, and one of {n}^{d} shapes is too large",
-            instead=f"lower [numerics] grid, to {fitted.fits(d)} or less, or use path, adapted or direct, which need none",
+            instead=f"lower [numerics] grid, to {fitted.finest_grid(d)} or less, "
+            "or use path, adapted or direct, which need none",
         )
     return fitted.axes(system, numerics)
 
 
 def _build(system, numerics, progress: Callable | None) -> Harmonics:
-    if own := stored(system, "harmonics"):
-        return own
+    if stored := stored_table(system, "harmonics"):
+        return stored
     count, degree = directions(system, numerics), numerics.interpolation
-    known = {"highest": highest(system, numerics), "traits": system.traits}
-    return harmonics.fit(system.velocity, _axes(system, numerics), count, degree, progress, **known)
+    options = {"highest": highest(system, numerics), "traits": system.traits}
+    return harmonics.fit(system.velocity, _axes(system, numerics), count, degree, progress, **options)
 
 
 def _plan(system, numerics, gait, amplitudes) -> Plan:
     if system.traits.linear:  # there are none beyond the first
-        return itself(system, numerics, gait)
+        return direct_plan(system, numerics, gait)
     d = system.joints
     read = 3 * harmonics.terms(d, highest(system, numerics)) * (numerics.interpolation + 1) ** d
-    predict = lambda held, some: path(held.velocity, gait, some, numerics.phases)
+    predict = lambda fitted, batch: path(fitted.velocity, gait, batch, numerics.phases)
     return Plan(predict, table(system, numerics), read=read)
 
 

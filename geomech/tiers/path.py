@@ -9,7 +9,7 @@ from geomech.gaits import Gait
 from geomech.geometry.connection import Connection, Velocity
 from geomech.tiers import fitted
 from geomech.tiers.base import Plan, Tier
-from geomech.tiers.direct import direct, itself
+from geomech.tiers.direct import direct, direct_plan
 
 
 def path(A: Connection | Velocity, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
@@ -19,14 +19,14 @@ def path(A: Connection | Velocity, gait: Gait, amplitudes=None, phases: int = 25
 
 def _plan(system, numerics, gait, amplitudes) -> Plan:
     if system.traits.linear:  # xi = A alphadot holds exactly
-        return itself(system, numerics, gait)
+        return direct_plan(system, numerics, gait)
     if fitted.is_too_large(system, numerics):
-        A = fitted.at_shapes(system, numerics)
+        A = fitted.without_field(system, numerics)
         xi = lambda alpha, alphadot: np.einsum("...ij,...j->...i", A(alpha), alphadot)
-        balances = lambda count, phases: count * phases * fitted.solved_at(system, numerics)
-        return Plan(lambda table, some: path(xi, gait, some, numerics.phases), balances=balances)
+        balances = lambda count, phases: count * phases * fitted.balances_per_shape(system, numerics)
+        return Plan(lambda table, batch: path(xi, gait, batch, numerics.phases), balances=balances)
     read = 3 * system.joints * (numerics.interpolation + 1) ** system.joints
-    predict = lambda table, some: path(table, gait, some, numerics.phases)
+    predict = lambda table, batch: path(table, gait, batch, numerics.phases)
     return Plan(predict, fitted.table(system, numerics), read=read)
 
 

@@ -1,4 +1,4 @@
-"""What a file of a connection holds, and how it is checked."""
+"""The contents of a file of a connection, and their checks."""
 
 from __future__ import annotations
 
@@ -28,15 +28,16 @@ ROUNDING = 1e-9  # of the largest velocity: a displacement below it has no sign
 
 @dataclass(frozen=True, eq=False)
 class Stored:
-    """A connection as a file has it, turned to xi = + A alphadot and to axes (alpha_1, alpha_2, ...).
+    """A connection read from a file, converted to xi = + A alphadot and to axes (alpha_1, alpha_2, ...).
 
-    harmonics: the odd harmonics of xi beside A, where the file has them. even: (3, N_1, ...), rms of
-    xi(alphadot) + xi(-alphadot), if that is not 0. metric: what a change of shape costs, where the file has it, in body
-    lengths, power being its norm to power_degree. length: of the body, in ``unit``, "BL" or "m".
-    frame: of xi, in words. sign, order: as in the file. said: what the file does not say and was made out. sha256: of
-    the file. shapes: names of the shape variables, alpha_k where none are told. A_error: (3, d, N_1, ...), half widths of
-    intervals of A, which cover it in a share ``level`` of cases, where the file has them. sized: whether the file says length
-    and unit; body lengths are assumed where it does not."""
+    harmonics: the odd harmonics of xi, where the file has them. even: (3, N_1, ...), rms of xi(alphadot) +
+    xi(-alphadot), if that is not 0. metric: of shape space, where the file has it, in body lengths; power is its norm
+    to power_degree. length: of the body, in ``unit``, "BL" or "m". frame: of xi, in words. sign, order: as in the file.
+    assumptions: facts inferred because the file does not state them. sha256: of the file. shapes: names of the shape
+    variables, alpha_k where the file has none. A_error: (3, d, N_1, ...), half widths of intervals of A, which cover it
+    in a share ``level`` of cases, where the file has them. sized: whether the file states length and unit; body lengths
+    are assumed where it does not.
+    """
 
     connection: Connection
     harmonics: Harmonics | None = None
@@ -46,7 +47,7 @@ class Stored:
     frame: str = "that of the table"
     sign: str = "+"
     order: str = "ndgrid"
-    said: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
     sha256: str = ""
     shapes: tuple[str, ...] = ()
     metric: Metric | Finsler | None = None
@@ -60,17 +61,17 @@ class Stored:
 
     @property
     def table(self) -> Connection | Harmonics:
-        """What the velocity is looked up in."""
+        """The table in which the velocity is interpolated."""
         return self.harmonics or self.connection
 
     @property
     def highest(self) -> int:
-        """Harmonic that is kept; 1 for A alone."""
+        """The highest harmonic; 1 for A alone."""
         return self.harmonics.highest if self.harmonics else 1
 
     @property
-    def told(self) -> bool:
-        """Whether the file tells what its fit left of the velocity."""
+    def has_residual(self) -> bool:
+        """Whether the file has the residual of its fit."""
         return bool(np.isfinite(self.table.residual).any())
 
     @cached_property
@@ -84,29 +85,31 @@ class Stored:
         c = self.connection
         if not all(np.allclose(a, -a[::-1], rtol=0, atol=1e-12) for a in c.axes):
             return False
-        there = np.flip(c.A, tuple(range(2, c.A.ndim))) * np.array([-1.0, 1.0, 1.0]).reshape(3, 1, *[1] * len(c.axes))
-        return bool(np.abs(there - c.A).max() <= 1e-9 * np.abs(c.A).max())
+        mirrored = np.flip(c.A, tuple(range(2, c.A.ndim))) * np.array([-1.0, 1.0, 1.0]).reshape(
+            3, 1, *[1] * len(c.axes)
+        )
+        return bool(np.abs(mirrored - c.A).max() <= 1e-9 * np.abs(c.A).max())
 
 
-def scaled(held: Stored, factor: float) -> Stored:
-    """The same with all lengths times ``factor``, then in the unit that ``held`` has."""
-    if factor == 1.0 and held.sized:
-        return held
+def scaled(stored: Stored, factor: float) -> Stored:
+    """Return the table with all lengths times ``factor``, then in the unit that ``stored`` has."""
+    if factor == 1.0 and stored.sized:
+        return stored
     by = np.array([factor, factor, 1.0])
     times = lambda x: x * by.reshape(3, *[1] * (x.ndim - 1))
-    c, h = held.connection, held.harmonics
-    more = {"unit": held.unit, "length": held.length}
+    c, h = stored.connection, stored.harmonics
+    size = {"unit": stored.unit, "length": stored.length}
     if isinstance(c, Tube):
-        known = {name: times(getattr(c.known, name)) for name in ("A", "slope", "beyond", "off")}
-        more["known"] = replace(c.known, errors=c.known.errors * by[:, None, None, None], **known)
-    c = type(c)(c.axes, times(c.A), times(c.residual), times(c.speed), c.degree, **more)
+        series = {name: times(getattr(c.taylor, name)) for name in ("A", "slope", "beyond", "standard_error")}
+        size["taylor"] = replace(c.taylor, errors=c.taylor.errors * by[:, None, None, None], **series)
+    c = type(c)(c.axes, times(c.A), times(c.residual), times(c.speed), c.degree, **size)
     h = h and Harmonics(h.axes, times(h.coefficients), times(h.residual), h.degree)
-    even, error = (x if x is None else times(x) for x in (held.even, held.A_error))
-    return replace(held, connection=c, harmonics=h, even=even, A_error=error)
+    even, error = (x if x is None else times(x) for x in (stored.even, stored.A_error))
+    return replace(stored, connection=c, harmonics=h, even=even, A_error=error)
 
 
 def checked_axis(name: str, values: np.ndarray, largest: float = LARGEST_ANGLE) -> np.ndarray:
-    """values (N,) as ascending angles, or ValueError."""
+    """Return values (N,) as ascending angles; Refusal if they are none."""
     axis = numbers(name, values)
     if axis.ndim != 1 or len(axis) < 4 or not (np.diff(axis) > 0).all():
         raise Refusal("has no grid", instead=f"{name} must be at least 4 ascending angles in rad")
@@ -118,15 +121,15 @@ def checked_axis(name: str, values: np.ndarray, largest: float = LARGEST_ANGLE) 
     return axis
 
 
-def checked_names(told, plain: list[str]) -> tuple[str, ...]:
-    """Names of shape variables as a file tells them, or ``plain`` ones where that makes no sense."""
-    words = isinstance(told, list) and all(isinstance(x, str) for x in told) and len({*told}) == len(plain)
-    good = words and all(x.isprintable() and 0 < len(x) <= LONGEST_NAME and "$" not in x for x in told)
-    return tuple(told if good else plain)
+def checked_names(names, defaults: list[str]) -> tuple[str, ...]:
+    """Return names of shape variables from a file, or ``defaults`` where they make no sense."""
+    words = isinstance(names, list) and all(isinstance(x, str) for x in names) and len({*names}) == len(defaults)
+    good = words and all(x.isprintable() and 0 < len(x) <= LONGEST_NAME and "$" not in x for x in names)
+    return tuple(names if good else defaults)
 
 
 def numbers(name: str, values) -> np.ndarray:
-    """values as floats in the machine's order of bytes; ValueError if they are none, or not finite."""
+    """Return values as floats in the machine's order of bytes; Refusal if they are none, or not finite."""
     array = np.asarray(values)
     if array.dtype.kind not in "iuf":
         raise Refusal(f"has {name} that is no array of real numbers")
@@ -140,29 +143,29 @@ def numbers(name: str, values) -> np.ndarray:
     return array
 
 
-def masks(name: str, values: np.ndarray, masked: np.ndarray, told: Mapping) -> None:
-    """ValueError where values (..., N_1, ...) are nan elsewhere than at ``masked`` shapes (N_1, ...), of which the file must
-    speak in what it has ``told``, or not all there."""
-    if masked.any() and "singular_shapes" not in told:
+def masks(name: str, values: np.ndarray, masked: np.ndarray, attributes: Mapping) -> None:
+    """Raise Refusal where values (..., N_1, ...) are nan elsewhere than at ``masked`` shapes (N_1, ...), or not at all
+    of them. The file must have singular shapes among its ``attributes``."""
+    if masked.any() and "singular_shapes" not in attributes:
         numbers(name, values)
     if not np.isnan(values[..., masked]).all():
         raise Refusal(f"has {name} at singular shapes, where A is nan", instead="write it anew")
     numbers(name, np.where(masked, 0.0, values))
 
 
-def checked_error(name: str, error: np.ndarray, A: np.ndarray, told: Mapping) -> np.ndarray:
-    """Half widths of intervals of A, both (3, d, N_1, ...) and nan at the same shapes; or ValueError."""
+def checked_error(name: str, error: np.ndarray, A: np.ndarray, attributes: Mapping) -> np.ndarray:
+    """Return half widths of intervals of A, both (3, d, N_1, ...) and nan at the same shapes; Refusal otherwise."""
     if error.shape != A.shape:
         raise Refusal(f"has {name} of shape {error.shape} where A has {A.shape}")
-    masks(name, error, np.isnan(A).any((0, 1)), told)
+    masks(name, error, np.isnan(A).any((0, 1)), attributes)
     if (error < 0).any():
         raise Refusal(f"has {name} below 0 where it is half of an interval of A")
     return error.astype(float)
 
 
-def checked_level(told: Mapping) -> float | None:
-    """The share of cases that intervals cover, as a file has told it; None where that makes no sense."""
-    level = told.get("level")
+def checked_level(attributes: Mapping) -> float | None:
+    """Return the share of cases that intervals cover, from a file's attributes; None where it makes no sense."""
+    level = attributes.get("level")
     good = np.ndim(level) == 0 and np.asarray(level).dtype.kind in "iuf" and 0 < level < 1
     return float(level) if good else None
 
@@ -172,12 +175,14 @@ def _first(bad: np.ndarray) -> str:
 
 
 def rms(A: np.ndarray, residual: np.ndarray | None = None) -> np.ndarray:
-    """(3, N_1, ...): rms of xi over uniform directions of alphadot, from A (3, d, N_1, ...) and its fit residual."""
+    """Return the rms (3, N_1, ...) of xi over uniform directions of alphadot, from A (3, d, N_1, ...) and its fit
+    residual."""
     return np.sqrt((A**2).mean(1) + (0.0 if residual is None else residual**2))
 
 
 def detected_sign(connection: Connection) -> str:
-    """ "+" if xi = + A alphadot, "-" if xi = - A alphadot, for a body of two joints that meets more drag across than along.
+    """Return "+" if xi = + A alphadot, "-" if xi = - A alphadot, for a body of two joints with more drag across than
+    along.
 
     With alpha_k the heading of link k+1 minus that of link k, a counter-clockwise circle then carries it backwards, as
     its CCF_x is negative about the straight shape, in every frame of the body (Hatton et al., PRL 110, 078101 (2013)).

@@ -41,51 +41,51 @@ SAVE = "save it in MATLAB by save(FILE, ..., '-v7')"
 
 @FORMATS.register(suffix=".mat")
 def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
-    """The table in the bytes of a file; ValueError, to follow the file's name, if there is none."""
-    found = _variables(raw)
-    axes, order = _axes(found, order)
-    about = _about(found)
-    A = _entries(found, axes, order, about)
+    """Return the table in the bytes of a file; Refusal, to follow the file's name, if there is none."""
+    variables = _variables(raw)
+    axes, order = _axes(variables, order)
+    about = _about(variables)
+    A = _entries(variables, axes, order, about)
     if not A.any():
         raise Refusal("has a connection that is zero everywhere")
-    residual, error = _residual(found, A, order, about), _error(found, A, order, about)
+    residual, error = _residual(variables, A, order, about), _error(variables, A, order, about)
     degree = about.get("interpolation", 3)
     degree = degree if degree in (1, 2, 3, 4, 5) and min(map(len, axes)) > degree else 3
     sized = about.get("unit") in ("BL", "m") and isinstance(about.get("length"), float) and 0 < about["length"] < 1e9
     length, unit = (about["length"], about["unit"]) if sized else (1.0, "BL")
     size = {"unit": unit, "length": length} if sized else {}
     plain = Connection(axes, A, residual, rms(A, np.nan_to_num(residual)), degree, **size)
-    said = () if found[ANGLES[0]].ndim == 1 or order == "ndgrid" else ("its arrays run as meshgrid's",)
+    assumptions = () if variables[ANGLES[0]].ndim == 1 or order == "ndgrid" else ("its arrays run as meshgrid's",)
     if not sign and about.get("sign") not in SIGNS:
-        said += (f"its sign is made out as {SIGNS[detected_sign(plain)]}; say sign = '+' or '-' if you know it",)
+        assumptions += (f"its sign is made out as {SIGNS[detected_sign(plain)]}; say sign = '+' or '-' if you know it",)
     sign = sign or (about["sign"] if about.get("sign") in SIGNS else detected_sign(plain))
     frame = about["frame"] if isinstance(about.get("frame"), str) else "that of the table"
-    turned = plain if sign == "+" else replace(plain, A=-A)
+    connection = plain if sign == "+" else replace(plain, A=-A)
     shapes = checked_names(about.get("shapes"), ["alpha_1", "alpha_2"])
-    known = {"A_error": error, "level": checked_level(about), "sized": sized}
-    return Stored(turned, None, None, length, unit, frame, sign, order, said, sha256, shapes, **known)
+    optional = {"A_error": error, "level": checked_level(about), "sized": sized}
+    return Stored(connection, None, None, length, unit, frame, sign, order, assumptions, sha256, shapes, **optional)
 
 
 def _variables(raw: bytes) -> dict[str, np.ndarray]:
-    """Those of the layout, arrays of real numbers, and what else there is; ValueError if one is missing."""
+    """Return the variables of the file, those of the layout as arrays of real numbers; Refusal if one is missing."""
     if raw[:4] == b"\x89HDF" or raw[:10] == b"MATLAB 7.3":
         raise Refusal("is a MATLAB 7.3 (HDF5) file", instead=SAVE)
     if raw[:3] == b"CDF":
         raise Refusal("is no MATLAB file, but a NetCDF one", instead="end its name in .nc")
     try:
-        found = _of_version_4(raw) if raw[:4] and 0 in raw[:4] else matlab.arrays(raw)
+        variables = _read_version_4(raw) if raw[:4] and 0 in raw[:4] else matlab.arrays(raw)
     except ValueError:
         raise Refusal("is damaged, cut short, or no MATLAB file", instead=SAVE) from None
     for name in (*ANGLES, *ENTRIES):
-        if name not in found:
+        if name not in variables:
             raise Refusal(f"has no {name}", because=f"a connection is {', '.join((*ANGLES, *ENTRIES))}")
-        if not isinstance(found[name], np.ndarray):
+        if not isinstance(variables[name], np.ndarray):
             raise Refusal(f"has {name} that is no array of real numbers")
-    return found
+    return variables
 
 
-def _of_version_4(raw: bytes) -> dict[str, np.ndarray]:
-    """The variables of a file of that version, which SciPy reads in Python; ValueError for a damaged one."""
+def _read_version_4(raw: bytes) -> dict[str, np.ndarray]:
+    """Return the variables of a file of version 4, which SciPy reads in Python; Refusal for a damaged one."""
     from scipy.io import loadmat
 
     try:  # what is damaged makes SciPy raise whatever comes first
@@ -96,10 +96,10 @@ def _of_version_4(raw: bytes) -> dict[str, np.ndarray]:
         raise Refusal("damaged") from None
 
 
-def _axes(found: dict, order: str) -> tuple[tuple[np.ndarray, np.ndarray], str]:
-    """(the angles of both axes, the order in which arrays run over them)."""
-    angles = functools.partial(checked_axis, largest=LARGEST_ANGLE if ABOUT in found else 2 * np.pi)
-    first, second = (numbers(name, found[name]) for name in ANGLES)
+def _axes(variables: dict, order: str) -> tuple[tuple[np.ndarray, np.ndarray], str]:
+    """Return the angles of both axes, and the order in which arrays run over them."""
+    angles = functools.partial(checked_axis, largest=LARGEST_ANGLE if ABOUT in variables else 2 * np.pi)
+    first, second = (numbers(name, variables[name]) for name in ANGLES)
     if first.ndim == second.ndim == 2 and min(*first.shape, *second.shape) == 1:
         if not order:
             raise Refusal(
@@ -119,45 +119,45 @@ def _axes(found: dict, order: str) -> tuple[tuple[np.ndarray, np.ndarray], str]:
     )
 
 
-def _about(found: dict) -> dict:
-    """What a file of our own says of itself; nothing if that makes no sense."""
+def _about(variables: dict) -> dict:
+    """Return the attributes of a file that geomech wrote; {} if they make no sense."""
     try:
-        told = json.loads(str(found.get(ABOUT, "")))
+        attributes = json.loads(str(variables.get(ABOUT, "")))
     except (ValueError, RecursionError):
         return {}
-    return told if isinstance(told, dict) else {}
+    return attributes if isinstance(attributes, dict) else {}
 
 
-def _entries(found: dict, axes, order: str, about: dict) -> np.ndarray:
-    """A (3, 2, N, M); nan at singular shapes, if the file speaks of such, and there in all entries."""
+def _entries(variables: dict, axes, order: str, about: dict) -> np.ndarray:
+    """Return A (3, 2, N, M); nan in all entries at singular shapes, if the file declares any."""
     arrays, expected = {}, tuple(len(a) for a in (axes if order == "ndgrid" else axes[::-1]))
     for name in ENTRIES:
-        values = found[name] if found[name].dtype.kind == "f" else numbers(name, found[name])
+        values = variables[name] if variables[name].dtype.kind == "f" else numbers(name, variables[name])
         if values.shape != expected:
             raise Refusal(f"has {name} of shape {values.shape} where alpha1 and alpha2 make it {expected}")
-        arrays[name] = _of_ndgrid(values, order).astype(float)
+        arrays[name] = _as_ndgrid(values, order).astype(float)
     masked = np.isnan([*arrays.values()]).any(0)
     for name, values in arrays.items():
         masks(name, values, masked, about)
     return np.array([*arrays.values()]).reshape(3, 2, *masked.shape)
 
 
-def _of_ndgrid(values: np.ndarray, order: str) -> np.ndarray:
-    """(..., N, M) of arrays that run as ``order``'s."""
+def _as_ndgrid(values: np.ndarray, order: str) -> np.ndarray:
+    """Return values (..., N, M) from arrays in the given order."""
     return values if order == "ndgrid" else values.swapaxes(-1, -2)
 
 
-def _residual(found: dict, A: np.ndarray, order: str, about: dict) -> np.ndarray:
-    """(3, N, M): rms of what the fit leaves, nan where the file does not say."""
-    values = found.get(RESIDUAL)
-    if not isinstance(values, np.ndarray) or _of_ndgrid(values, order).shape != (3, *A.shape[2:]):
+def _residual(variables: dict, A: np.ndarray, order: str, about: dict) -> np.ndarray:
+    """Return the rms residual of the fit (3, N, M), nan where the file has none."""
+    values = variables.get(RESIDUAL)
+    if not isinstance(values, np.ndarray) or _as_ndgrid(values, order).shape != (3, *A.shape[2:]):
         return np.full((3, *A.shape[2:]), np.nan)
-    values = _of_ndgrid(values, order)
+    values = _as_ndgrid(values, order)
     masks(RESIDUAL, values, np.isnan(A).any((0, 1)), about)
     return values.astype(float)
 
 
-def _error(found: dict, A: np.ndarray, order: str, about: dict) -> np.ndarray | None:
-    """(3, 2, N, M): half widths of intervals of A, None where the file does not say."""
-    values = found.get(ERROR)
-    return checked_error(ERROR, _of_ndgrid(values, order), A, about) if isinstance(values, np.ndarray) else None
+def _error(variables: dict, A: np.ndarray, order: str, about: dict) -> np.ndarray | None:
+    """Return half widths of intervals of A (3, 2, N, M), None where the file has none."""
+    values = variables.get(ERROR)
+    return checked_error(ERROR, _as_ndgrid(values, order), A, about) if isinstance(values, np.ndarray) else None

@@ -25,30 +25,31 @@ MOST_DIMENSIONS = 32
 
 
 def arrays(raw: bytes) -> dict[str, np.ndarray | str | None]:
-    """Variables by name: arrays of real numbers, lines of text, None for anything else. ValueError for a damaged file."""
+    """Return variables by name: arrays of real numbers, lines of text, None for anything else. Refusal for a damaged
+    file."""
     marks = {b"\x00\x01IM": "<", b"\x01\x00MI": ">"}
     if (order := marks.get(raw[124:HEADER])) is None:
         raise Refusal("no MATLAB file of version 5 to 7")
-    found, left = {}, LARGEST
+    variables, bytes_left = {}, LARGEST
     for kind, data in _elements(raw[HEADER:], order):
         if kind == COMPRESSED:
             stream = zlib.decompressobj()
             try:
-                data = stream.decompress(data, left)
+                data = stream.decompress(data, bytes_left)
             except zlib.error:
                 raise Refusal("damaged") from None
-            left -= len(data)
-            if not stream.eof or left <= 0:
+            bytes_left -= len(data)
+            if not stream.eof or bytes_left <= 0:
                 raise Refusal("cut short, or too large")
             ((kind, data),) = _elements(data, order)
         if kind == MATRIX and data:
             name, values = _matrix(data, order)
-            found[name] = values
-    return found
+            variables[name] = values
+    return variables
 
 
 def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
-    """(type, bytes) of the elements that fill ``data``; ValueError if one is longer than what is left."""
+    """Yield (type, bytes) of the elements that fill ``data``; Refusal if one is longer than the rest of it."""
     k = 0
     while k < len(data):
         if k + 8 > len(data):
@@ -66,7 +67,7 @@ def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
 
 
 def _matrix(data: bytes, order: str) -> tuple[str, np.ndarray | str | None]:
-    """(name, values) of one; ValueError if its parts do not fit each other."""
+    """Return (name, values) of a matrix; Refusal if its parts do not fit each other."""
     parts = list(_elements(data, order))
     if len(parts) < 3 or len(parts[0][1]) != 8 or len(parts[1][1]) % 4:
         raise Refusal("damaged")

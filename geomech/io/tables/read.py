@@ -1,4 +1,4 @@
-"""The connection in a file, whichever of the formats it has."""
+"""The connection in a file of any of the formats."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import hashlib
 from pathlib import Path
 
 from geomech.core.errors import choose
-from geomech.io.files import read, why
+from geomech.io.files import read, reason_of
 from geomech.io.tables.base import FORMATS, ORDERS, SIGNS, Stored
 from rft.refusal import Refusal
 
@@ -14,7 +14,7 @@ LARGEST = 2_000_000_000  # bytes of a file: the finest field there is
 
 
 def load(path: str | Path, sign: str = "", order: str = "") -> Stored:
-    """The connection in a file of `geomech connection`, .nc or .mat; Refusal, one line, if it holds none.
+    """Return the connection in a file of `geomech connection`, .nc or .mat; Refusal if it has none.
 
     sign: "+" or "-" for xi = + or - A alphadot; if left out as the file says, or made out (`detected_sign`). order:
     "ndgrid" or "meshgrid", the way arrays of a .mat file run; if left out as alpha1 and alpha2 in it run."""
@@ -23,13 +23,13 @@ def load(path: str | Path, sign: str = "", order: str = "") -> Stored:
     path = Path(path)
     if path.suffix.lower() not in FORMATS:
         raise Refusal(f"cannot read the table {path}", instead=f"end the name in {' or '.join(FORMATS)}")
-    for what, word, known in (("sign", sign, SIGNS), ("order", order, ORDERS)):
-        if word != "":
-            choose(what, word, known)
+    for key, value, choices in (("sign", sign, SIGNS), ("order", order, ORDERS)):
+        if value != "":
+            choose(key, value, choices)
     try:
         raw = read(path, LARGEST)
     except (OSError, ValueError) as error:
-        raise Refusal(f"cannot read the table {path}", because=why(error)) from None
+        raise Refusal(f"cannot read the table {path}", because=reason_of(error)) from None
     try:
         return FORMATS[path.suffix.lower()](raw, sign, order, hashlib.sha256(raw).hexdigest())
     except Refusal as refusal:

@@ -12,7 +12,7 @@ from geomech.gaits import Gait
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
 from geomech.geometry.metric import Finsler, Metric
-from geomech.geometry.plane import Plane, Seen
+from geomech.geometry.plane import Plane, ProjectedGait
 from geomech.geometry.two_form import TwoForm
 from geomech.output.plots.maps import ANGLES, PHASES, TITLES, Labels, ccf_map, draw_gait, largest
 from geomech.output.plots.style import blank, figure, quantity, styled
@@ -106,8 +106,8 @@ def planes_figure(
     names: of the two frames."""
     labels, rows = labels or _angles(planes), []
     for one in [*planes, *([] if beside is None else [beside])]:
-        seen = [] if gait is None else [Seen(gait, one)]
-        on_plane, shadows = ([x for x in seen if x.lies == lies] for lies in (True, False))
+        seen = [] if gait is None else [ProjectedGait(gait, one)]
+        on_plane, shadows = ([x for x in seen if x.lies_in_plane == lies] for lies in (True, False))
         rows.append(Row(one.ccf, one.error, on_plane, [labels[k] for k in one.pair], shadows))
     titles = [f"{plane_title(one, labels)}; frame {name}" for one, name in zip([planes[0], beside], names)]
     return _ccf_rows(rows, style, None, titles or [plane_title(one, labels) for one in planes], same=beside is not None)
@@ -136,8 +136,8 @@ def _angles(planes: Sequence[Plane]) -> Labels:
 
 def plane_title(plane: Plane, labels: Labels) -> str:
     """Return the angles of the fixed joints of a plane as a title."""
-    angles = ", ".join(f"{quantity(labels[k][0])} = {plane.at[k]:.3g}".replace("-", MINUS_SIGN) for k in plane.held)
-    return f"{angles} {labels[plane.held[0]][1]}" if plane.held else ""
+    angles = ", ".join(f"{quantity(labels[k][0])} = {plane.at[k]:.3g}".replace("-", MINUS_SIGN) for k in plane.fixed)
+    return f"{angles} {labels[plane.fixed[0]][1]}" if plane.fixed else ""
 
 
 def _ccf_rows(rows: Sequence[Row], style: str, metric, names: Sequence[str], same: bool):

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
-from geomech.io.files import whole_file
+from geomech.io.files import atomic_file
 from rft.refusal import Refusal
 
 GREEK = ("alpha", "gamma", "theta")  # letters that names of shape variables and parameters begin with
@@ -102,7 +102,7 @@ def save(fig, *paths: str | Path) -> None:
     canvas, engine, dpi = fig.canvas, fig.get_layout_engine(), fig.dpi
     try:
         for path in map(check_format, paths):
-            with whole_file(path) as part:
+            with atomic_file(path) as part:
                 fig.dpi = STYLE["savefig.dpi"]
                 _print(fig, path.suffix.lower(), part)
             fig.set_layout_engine("none")
