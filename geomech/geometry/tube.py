@@ -27,7 +27,7 @@ SHAPES_TOGETHER = 4096  # whose distances from all places are held at a time
 
 
 def waves(t, harmonics: int, order: int = 0) -> np.ndarray:
-    """(..., 2 harmonics + 1): 1, cos t, sin t, cos 2t, sin 2t ... or their derivatives of that order."""
+    """Return (..., 2 harmonics + 1): 1, cos t, sin t, cos 2t, sin 2t ... or their derivatives of that order."""
     k = np.arange(1, harmonics + 1)
     angle = np.asarray(t, float)[..., None] * k + order * np.pi / 2  # each derivative is a quarter turn on
     both = np.stack([np.cos(angle), np.sin(angle)], -1) * (k.astype(float) ** order)[:, None]
@@ -36,7 +36,8 @@ def waves(t, harmonics: int, order: int = 0) -> np.ndarray:
 
 
 def series(coefficients: np.ndarray, t, order: int = 0) -> np.ndarray:
-    """(..., *lead): a Fourier series with coefficients (*lead, 2 K + 1) as in `waves`, or a derivative, at phases t (...)."""
+    """Return (..., *lead): a Fourier series with coefficients (*lead, 2 K + 1) as in `waves`, or a derivative, at
+    phases t (...)."""
     return np.tensordot(waves(t, coefficients.shape[-1] // 2, order), coefficients, (-1, -1))
 
 
@@ -51,7 +52,7 @@ class Loop:
         return self.coefficients.shape[1] // 2
 
     def shape(self, t, order: int = 0) -> np.ndarray:
-        """(..., d) at phases t (...), or its derivative."""
+        """Return (..., d) at phases t (...), or its derivative."""
         return series(self.coefficients, t, order)
 
     @cached_property
@@ -77,7 +78,7 @@ class Loop:
         return np.array([n @ expm(-k / PLACES * holonomy) for k, n in enumerate(frames_along)])
 
     def normals(self, t) -> np.ndarray:
-        """(..., d, d - 1): orthonormal, and normal to the curve, at phases t (...)."""
+        """Return (..., d, d - 1): orthonormal, and normal to the curve, at phases t (...)."""
         rate = self.shape(t, 1)
         if rate.shape[-1] == 2:
             tangent = rate / np.linalg.norm(rate, axis=-1, keepdims=True)
@@ -88,7 +89,7 @@ class Loop:
         return (1 - part) * self._normals[k] + part * self._normals[k + 1]
 
     def nearest(self, alpha) -> np.ndarray:
-        """Phases (...,) of the points of the curve nearest to shapes alpha (..., d)."""
+        """Return phases (...,) of the points of the curve nearest to shapes alpha (..., d)."""
         flat = np.reshape(alpha, (-1, np.shape(alpha)[-1]))
         t, places = self._places
         rows = [flat[k : k + SHAPES_TOGETHER] for k in range(0, len(flat), SHAPES_TOGETHER)]
@@ -97,7 +98,8 @@ class Loop:
         return self.projected(alpha, start.reshape(np.shape(alpha)[:-1]), np.pi / PLACES)
 
     def projected(self, alpha, t, step: float = 0.1) -> np.ndarray:
-        """Phases (...,) near t at which alpha - theta is normal to the curve: Newton, at most ``step`` rad at a time."""
+        """Return phases (...,) near t at which alpha - theta is normal to the curve: Newton, at most ``step`` rad at a
+        time."""
         for _ in range(NEWTON):
             deviation, rate, bend = alpha - self.shape(t), self.shape(t, 1), self.shape(t, 2)
             square = (rate**2).sum(-1)
@@ -109,7 +111,7 @@ class Loop:
 
 
 def _between(values: np.ndarray, t) -> np.ndarray:
-    """(..., *lead): values (*lead, P) at equally spaced phases, at phases t (...) between them."""
+    """Return (..., *lead): values (*lead, P) at equally spaced phases, at phases t (...) between them."""
     count = values.shape[-1]
     places = 2 * np.pi * np.arange(count + 1) / count
     closed = np.concatenate([values, values[..., :1]], -1).reshape(-1, count + 1)
@@ -118,7 +120,7 @@ def _between(values: np.ndarray, t) -> np.ndarray:
 
 
 def _complement(unit: np.ndarray) -> np.ndarray:
-    """(d, d - 1): orthonormal and normal to a unit vector, by a reflection that takes the first axis there."""
+    """Return (d, d - 1): orthonormal and normal to a unit vector, by a reflection that takes the first axis there."""
     first = np.zeros_like(unit)
     first[0] = -1.0 if unit[0] > 0 else 1.0
     v = unit - first
@@ -180,16 +182,16 @@ class TaylorSeries:
         return np.concatenate([self.A[:, :, None], self.slope], 2)
 
     def connection(self, alpha) -> np.ndarray:
-        """A (..., 3, d) at shapes (..., d), wherever these are."""
+        """Return A (..., 3, d) at shapes (..., d), wherever these are."""
         w, terms = self.terms(self.loop.nearest(alpha), alpha, np.ones(np.shape(alpha)))
         return np.einsum("ijmk,...k,...jm->...ij", self.combined, w, terms)
 
     def connection_within_reach(self, alpha) -> np.ndarray:
-        """A (..., 3, d) at shapes (..., d); nan where the data do not reach."""
-        near = self.reach(alpha) <= 1
-        found = np.full((*near.shape, *self.A.shape[:2]), np.nan)
-        found[near] = self.connection(alpha[near])
-        return found
+        """Return A (..., 3, d) at shapes (..., d); nan where the data do not reach."""
+        within = self.reach(alpha) <= 1
+        A = np.full((*within.shape, *self.A.shape[:2]), np.nan)
+        A[within] = self.connection(alpha[within])
+        return A
 
     def connection_error(self, alpha) -> np.ndarray:
         """Return the errors (..., 3, d) of `connection`."""
@@ -253,7 +255,8 @@ class Tube(Connection):
         return alpha
 
     def at_grid(self, function: Callable) -> np.ndarray:
-        """(..., N_1, ..., N_d): a function of shapes (n, d), which gives (n, ...), on the grid; nan where A is."""
+        """Return (..., N_1, ..., N_d): a function of shapes (n, d), which gives (n, ...), on the grid; nan where A
+        is."""
         shapes = np.stack(np.meshgrid(*self.axes, indexing="ij"), -1)
         reached, d = ~np.isnan(self.A[0, 0]), len(self.axes)
         values = function(shapes[reached])
@@ -262,7 +265,7 @@ class Tube(Connection):
         return np.moveaxis(fields, range(d), range(-d, 0))
 
     def __call__(self, alpha) -> np.ndarray:
-        """A (..., 3, d) at shapes alpha (..., d); ValueError where the data do not reach."""
+        """Return A (..., 3, d) at shapes alpha (..., d); ValueError where the data do not reach."""
         return self.taylor.connection(self.checked(alpha))
 
 

@@ -91,9 +91,9 @@ def _rows(place: str, file: str) -> dict[str, list]:
 
 def _columns(source: Rows) -> tuple[str, tuple[str, str]]:
     """Return the names of the angle and the forces that a file uses."""
-    names = source.header[1]
-    angle = "psi" if "psi" in names and "psi_deg" not in names else "psi_deg"
-    return angle, next((names for names in FORCES if names[0].lower() in names), FORCES[0])
+    present = source.header[1]
+    angle = "psi" if "psi" in present and "psi_deg" not in present else "psi_deg"
+    return angle, next((names for names in FORCES if names[0].lower() in present), FORCES[0])
 
 
 DRAG = FromFile(_rows, "CSV with the header psi_deg,f_t,f_n, in place of psi, f_t and f_n", ("psi", "f_t", "f_n"))

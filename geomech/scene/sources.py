@@ -21,16 +21,16 @@ def digests(modules: Iterable[str], texts: dict[str, bytes]) -> dict[str, str]:
 
     texts: of modules as they were first read, to which this adds. A module counts wherever it is imported: its functions may
     stand in containers, its constants in formulas, and a function may import it only when it is called."""
-    found: dict[str, str] = {}
-    own = {name.partition(".")[0] for name in modules}
-    left = sorted(modules)
-    while left:
-        for name in left:
+    result: dict[str, str] = {}
+    packages = {name.partition(".")[0] for name in modules}
+    remaining = sorted(modules)
+    while remaining:
+        for name in remaining:
             text = texts.get(name) or texts.setdefault(name, _text(name))
-            found[name] = hashlib.sha256(text).hexdigest() if text else UNKNOWN
-        imported = {other for name in left for other in _imported(name, texts[name])}
-        left = sorted(name for name in imported - {*found} if _is_own(name, own))
-    return found
+            result[name] = hashlib.sha256(text).hexdigest() if text else UNKNOWN
+        imported = {other for name in remaining for other in _imported(name, texts[name])}
+        remaining = sorted(name for name in imported - {*result} if _is_own(name, packages))
+    return result
 
 
 def _imported(module: str, text: bytes) -> Iterator[str]:

@@ -110,7 +110,7 @@ class Framed:
         return self._frame_and_connection[1]
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
-        """xi (..., 3) in the frame; ValueError outside its grid."""
+        """Return xi (..., 3) in the frame; ValueError outside its grid."""
         return change_velocity(self.inner.velocity(alpha, alphadot), *self.field(alpha, alphadot))
 
     def power(self, alpha, alphadot, xi) -> np.ndarray:
