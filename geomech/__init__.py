@@ -8,6 +8,7 @@ Study, tiers, workers                   connection, CCF, cost, displacements, er
 media, bodies, gaits, effects, systems  the parts of scenes; `register` adds custom ones
 connection, curvature, reconstruct      the geometry of any velocity(alpha, alphadot)
 optimise, undulation, fit_log, plots    the best gait; swimmers that undulate; measured gaits; figures
+Refusal                                 the error for whatever makes no sense: a ValueError with its facts
 On the command line: `geomech --help`; every key of a scene file: `geomech keys`.
 """
 
@@ -42,6 +43,7 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from rft import bodies as bodies
     from rft import effects as effects
     from rft import laws as _laws
+    from rft.refusal import Refusal as Refusal
 
     media = _laws
 
@@ -62,6 +64,7 @@ _OBJECTS = {
     "Swimmer": "geomech.systems",
     "fit_log": "geomech.measured",
     "register": "geomech.scene.kinds",
+    "Refusal": "rft.refusal",
 }
 
 

@@ -148,7 +148,7 @@ def _run_noting(app: typer.Typer, argv: list[str], notes: dict[str, str]) -> int
     except BrokenPipeError:
         return _pipe_closed()
     except Exception as error:
-        text = error.format_message() if hasattr(error, "format_message") else str(error)
+        text = line(error.format_message()) if hasattr(error, "format_message") else str(error)
         if not isinstance(error, (ValueError, OSError, RuntimeError)) and not hasattr(error, "format_message"):
             raise
         if isinstance(error, OSError):

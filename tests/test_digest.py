@@ -74,7 +74,7 @@ def test_what_an_object_remembers_is_no_part_of_it():
     body, fresh = Body(2.0), Body(2.0)
     assert body.area == 4.0 and digest(body) == digest(fresh)
     driven = _Driven(VISCOUS.system, [])
-    driven.heard(A)
+    driven.receive(A)
     assert digest(driven) == digest(_Driven(VISCOUS.system, []))
     request = checked(VISCOUS, "displacement")
     before = digest(request)

@@ -202,7 +202,7 @@ def test_a_machine_is_known_by_what_it_includes_too(cart):
 
 def test_machines_that_may_take_long_say_so_before_they_walk(cart, geomech):
     (cart / "long.toml").write_text(
-        SCENE.replace("steps = 8", "steps = 32").replace("duration = 1.0", "duration = 100.0")
+        SCENE.replace("steps = 8", "steps = 32").replace("duration = 1.0", "duration = 1000.0")
     )
     code, out, err = geomech("walk", "long.toml")
     assert (code, out) == (2, "") and err.count("\n") == 1 and "say --yes" in err, err
