@@ -82,7 +82,8 @@ def rod_drag(psi_deg, along, across, weight=None) -> RodDrag:
     require(
         not 0 < np.abs(psi).max() <= LARGEST_IN_RADIANS,
         f"psi_deg reaches only {np.abs(psi).max():.3g}",
-        because="angles look like radians, give degrees from 0 to 90",
+        because="angles look like radians",
+        instead="give degrees from 0 to 90",
     )
     angle = np.arctan2(np.abs(np.sin(np.radians(psi))), np.abs(np.cos(np.radians(psi))))
     data = RodDrag(angle, _opposing(psi, forces), weight / weight[weight > 0].mean())

@@ -847,7 +847,7 @@ def test_bad_logs_get_one_line(name, short, tmp_path):
 @pytest.mark.parametrize(
     ("names", "columns", "said"),
     [
-        (("t", "alpha_1", "alpha_2", "x", "y", "course"), (), "no column heading; it has"),
+        (("t", "alpha_1", "alpha_2", "x", "y", "course"), (), "no column heading: it has"),
         (("t", "alpha_1", "bend", "x", "y", "heading"), (), "one column of joint angles, and a gait is a loop"),
         (("t", "alpha_1", "alpha_1", "x", "y", "heading"), (), "column 'alpha_1' is there twice"),
         (NAMES, ("t", "alpha_1", "alpha_3", "x", "y", "heading"), "no column 'alpha_3'"),

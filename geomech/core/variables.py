@@ -49,17 +49,6 @@ class Result(Mapping[str, Variable]):
     kind: the question that they answer; `geomech.text` has a module of that name, which puts them in words. attributes:
     facts about all variables, by name. subject: the object from which they were computed, for pictures that show more
     than the variables.
-
-    kind: the question that they answer; `geomech.text` has a module of that name, which puts them in words. attributes:
-    facts about all variables, by name. subject: the object from which they were computed, for pictures that show more
-    than the variables.
-
-    kind: the question that they answer; `geomech.text` has a module of that name, which puts them in words. attributes:
-    facts about all variables, by name. subject: the object from which they were computed, for pictures that show more
-    than the variables.
-
-    kind: what they answer; `geomech.text` has a module of that name, which puts them in words. attributes: what holds of
-    all, by name. subject: what they were computed from, for pictures that show more than the variables.
     """
 
     kind: str

@@ -46,15 +46,7 @@ def iterate(step: Callable, state: Any, count: int, context: tuple, row: Any = A
     """Return the state after ``count`` times step(state) -> (state, row), and the rows.
 
     context: everything besides the state on which steps depend; the state consists of arrays and numbers. row: the type
-    of a row.
-
-    context: everything besides the state on which steps depend; the state consists of arrays and numbers. row: the type
-    of a row.
-
-    context: everything besides the state on which steps depend; the state consists of arrays and numbers. row: the type
-    of a row.
-
-    of: all that steps follow from besides the state, which consists of arrays and numbers. row: the type of a row."""
+    of a row."""
     return _worker.get().iterate(step, state, count, context, row)
 
 

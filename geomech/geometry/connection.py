@@ -183,14 +183,7 @@ def sampled_at(
     alphadot.
 
     ``reduce`` takes xi (s, C, 3) at some shapes and returns arrays (..., s). symmetries: images of shapes among
-    themselves, of which one is solved. masked: xi may be nan. map: as the builtin, over batches of shapes.
-
-    ``reduce`` takes xi (s, C, 3) at some shapes and returns arrays (..., s). symmetries: images of shapes among
-    themselves, of which one is solved. masked: xi may be nan. map: as the builtin, over batches of shapes.
-
-    ``reduce`` takes xi (s, C, 3) at some shapes and returns arrays (..., s). symmetries: images of shapes among
-    themselves, of which one is solved. masked: xi may be nan. map: as the builtin, over batches of shapes.
-    """
+    themselves, of which one is solved. masked: xi may be nan. map: as the builtin, over batches of shapes."""
     solved = to_solve(symmetries, len(alpha))
     to_compute = np.flatnonzero(solved)
     step = max(1, SAMPLES_TOGETHER // len(unit))

@@ -37,7 +37,8 @@ def period(log: Log) -> float:
         if first and last and max(first, last) > PERIOD_RATIO * min(first, last):
             raise log.wrong(
                 f"the joints repeat every {first:.3g} in the first quarter of the log and every {last:.3g} in the last",
-                because="two gaits are in it, give each a file",
+                because="two gaits are in it",
+                instead="give each a file",
             )
     count = (log.t[-1] - log.t[0]) / repeat if repeat else 0.0
     if count < FEWEST + 1:

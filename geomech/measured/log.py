@@ -116,7 +116,8 @@ def _picked(name: str, line: int, header: tuple[str, ...], columns: list[str]) -
         few = f"{'one column' if joints else 'no columns'} of joint angles, and a gait is a loop of two or more"
         what = f"no column {missing[0]}" if missing else few
         cure = "name them t,alpha_1,alpha_2,x,y,heading, or say --columns"
-        raise Refusal(f"{what}; it has {formatted(', '.join(header), 120)}", where=f"{name}, line {line}", instead=cure)
+        known = f"it has {formatted(', '.join(header), 120)}"
+        raise Refusal(what, where=f"{name}, line {line}", because=known, instead=cure)
     return _of_joints(name, [roles["t"], *joints, roles["x"], roles["y"], roles["heading"]])
 
 

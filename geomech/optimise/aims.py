@@ -40,7 +40,7 @@ class Aim:
         if not (isinstance(self.direction, str) and self.direction == ""):
             choose("--direction", self.direction, DIRECTIONS)
             if self.name == "turning":
-                raise Refusal("--direction is that of a displacement", because="turning takes none, drop it")
+                raise Refusal("--direction is that of a displacement", because="turning takes none", instead="drop it")
         for name in ("rate", "power"):
             if getattr(self, name) is not None:
                 in_range(f"--{name}", getattr(self, name), 1e-9, 1e9)

@@ -139,5 +139,5 @@ def frequency_of(system: System, gait: Gait) -> float | None:
     if np.any(np.asarray(effect_frequency) != gait_frequency):
         message = f"[gait] frequency = {gait_frequency:g}, but the effects of the {kind_of(system)} have "
         message += formatted(effect_frequency)
-        raise Refusal(message, because="it is one swimmer, keep one")
+        raise Refusal(message, because="it is one swimmer", instead="keep one")
     return gait_frequency

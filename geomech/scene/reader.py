@@ -172,15 +172,7 @@ def build(
 ) -> Built:
     """Return a part of a class, or the part that a form of its keys makes, from a table of keys; else raise Refusal.
 
-    inner: fields that are already read. label: how the table names the class.
-
-    inner: fields that are already read. label: how the table names the class.
-
-    inner: fields that are already read. label: how the table names the class.
-
-    inner: fields that are already read. label: how the table names the class.
-
-    inner: fields that are read already. label: how the table names the class."""
+    inner: fields that are already read. label: how the table names the class."""
     _check_keys(place, table, kind, label)
     values: dict[str, Any] = {}
     for key, value in table.items():

@@ -72,13 +72,7 @@ class System(Protocol):
 def integrated(system: System, alpha, alphadot, work: bool = False) -> Cycle:
     """Return the cycle of a velocity that follows from shape alone, by integration. Classes take this as their ``run``.
 
-    Refusal at a singular shape.
-
-    Refusal at a singular shape.
-
-    Refusal at a singular shape.
-
-    ValueError at a singular shape."""
+    Refusal at a singular shape."""
     refuse_singular(system, alpha)
     xi, speed = evaluate(system.velocity, alpha, alphadot), np.sqrt((alphadot**2).sum(-1)).mean(-1)
     return Cycle(xi, displacement(xi), 0.0 * speed, speed, None, 1, 0.0 * speed)
@@ -88,13 +82,7 @@ def integrated(system: System, alpha, alphadot, work: bool = False) -> Cycle:
 class WrappedSystem:
     """A system made by `as_system` from a velocity alone, or from an object that lacks some of the five members.
 
-    wrapped: the function, or the object. joints, length, traits: as of `System`.
-
-    wrapped: the function, or the object. joints, length, traits: as of `System`.
-
-    wrapped: the function, or the object. joints, length, traits: as of `System`.
-
-    given: the function, or the object. joints, length, traits: as of `System`."""
+    wrapped: the function, or the object. joints, length, traits: as of `System`."""
 
     wrapped: Any
     joints: int

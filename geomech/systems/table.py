@@ -173,12 +173,7 @@ class Table:
 
         The residual of harmonics up to k oscillates k times as fast as that of A, and adds up like a random walk of k
         steps. The part that is even in alphadot does not: a gait may stay in directions where it is largest, sqrt(2)
-        times the rms of one harmonic. Nor do intervals of A, whose errors may have one sign along the whole gait.
-
-        The residual of harmonics up to k oscillates k times as fast as that of A, and adds up like a random walk of k
-        steps. The part that is even in alphadot does not: a gait may stay in directions where it is largest, sqrt(2)
-        times the rms of one harmonic. Nor do intervals of A, whose errors may have one sign along the whole gait.
-        """
+        times the rms of one harmonic. Nor do intervals of A, whose errors may have one sign along the whole gait."""
         if self.tube is not None:
             x, y, theta = np.moveaxis(self.tube.taylor.error(alpha, alphadot), -1, 0)
             return np.stack([np.hypot(x, y) / self.length, theta], -1)

@@ -65,16 +65,6 @@ class Table:
     numbers: in it. build: table(progress), which calls progress with the fraction done. axes: function that returns the
     axes of a field of shapes, which gaits must not leave, and refuses one too large; None for no field. amplitudes: of
     the gait from whose cycles it is built, None where it is built from no gait.
-
-    name: of its kind. key: all that it depends on besides the system. balances: velocities that building it takes.
-    numbers: in it. build: table(progress), which calls progress with the fraction done. axes: function that returns the
-    axes of a field of shapes, which gaits must not leave, and refuses one too large; None for no field. amplitudes: of
-    the gait from whose cycles it is built, None where it is built from no gait.
-
-    name: of its kind. key: all that it depends on beside the system. balances: velocities that building it takes. numbers:
-    that it holds. build: table(progress), which calls progress with the fraction done. axes: of a field of shapes, which
-    gaits must not leave, ValueError for one too large; None for no field. amplitudes: of the gait whose cycles it is built
-    of, None for those of no gait.
     """
 
     name: str

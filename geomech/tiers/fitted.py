@@ -117,13 +117,7 @@ def plane(system: System, numerics: Numerics, pair: tuple[int, int], at, progres
     """Return the plane of shape space on which two joints move (`geomech.geometry.plane`), interpolated in a stored
     field.
 
-    Refusal if there is no connection, or if the plane lies outside the field.
-
-    Refusal if there is no connection, or if the plane lies outside the field.
-
-    Refusal if there is no connection, or if the plane lies outside the field.
-
-    ValueError if there is no connection, or if the plane lies outside the field."""
+    Refusal if there is no connection, or if the plane lies outside the field."""
     refuse(system)
     if stored := stored_table(system, "connection"):
         return interpolated_plane(stored, pair, at)

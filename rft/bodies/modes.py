@@ -55,10 +55,11 @@ def _require_independent(rows: np.ndarray) -> None:
     )
     size = np.linalg.norm(rows, axis=1)
     if size.min() <= ROUNDOFF * size.max():
-        raise Refusal(f"mode {size.argmin() + 1} is zero", because="it moves no joint, drop it")
+        raise Refusal(f"mode {size.argmin() + 1} is zero", because="it moves no joint", instead="drop it")
     singular = np.linalg.svd(rows / size[:, None], compute_uv=False)
     require(
         singular[-1] > DEPENDENT * singular[0],
         f"the {count} modes are linearly dependent",
-        because="one is made of the others, drop it or change waves",
+        because="one is made of the others",
+        instead="drop it or change waves",
     )

@@ -208,7 +208,8 @@ def require_drag(medium: Medium) -> None:
     require(
         cosine[worst] > -1e-09,
         f"{name} pushes instead of drags at velocity ({v_t[worst]:.3g}, {v_n[worst]:.3g}) along and across the body",
-        because="drag is positive in the direction of the motion it opposes, change its sign there",
+        because="drag is positive in the direction of the motion it opposes",
+        instead="change its sign there",
     )
 
 
