@@ -84,7 +84,7 @@ def test_nothing_heavy_is_loaded_to_start():
 def test_the_version_is_told_once_and_the_same_everywhere():
     assert run("--version")[:2] == (0, f"geomech {geomech.__version__}\n")
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())
-    assert project["project"]["dynamic"] == ["version"]
+    assert "version" in project["project"]["dynamic"]
     assert project["tool"]["hatch"]["version"] == {"path": "geomech/core/version.py"}
     assert importlib.metadata.version("geomech") == geomech.__version__
     assert not re.search(r"^version: ", (ROOT / "CITATION.cff").read_text(), re.M)
