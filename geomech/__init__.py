@@ -9,7 +9,7 @@ media, bodies, gaits, effects, systems  the parts of scenes; `register` adds cus
 connection, curvature, reconstruct      the geometry of any velocity(alpha, alphadot)
 optimise, undulation, fit_log, plots    the best gait; swimmers that undulate; measured gaits; figures
 Refusal                                 the error for whatever makes no sense: a ValueError with its facts
-On the command line: `geomech --help`; every key of a scene file: `geomech keys`.
+On the command line: `geomech --help`; every key of a scene file: `geomech reference`.
 """
 
 from __future__ import annotations

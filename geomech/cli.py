@@ -11,11 +11,14 @@ import typer
 
 from geomech import __version__, terminal
 from geomech.commands import COMMANDS
+from geomech.commands.group import Group
 from geomech.commands.options import PluginOption, load_plugins, with_plugins
 
-app = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode=None)
-for name in COMMANDS:
-    app.command()(with_plugins(getattr(import_module(f"geomech.commands.{name}"), name)))
+app = typer.Typer(cls=Group, pretty_exceptions_enable=False, rich_markup_mode=None)
+for heading, names in COMMANDS.items():
+    for name in names:
+        function = getattr(import_module(f"geomech.commands.{name}"), name)
+        app.command(name.replace("_", "-"), rich_help_panel=heading)(with_plugins(function))
 
 
 def _version(requested: bool) -> None:

@@ -37,9 +37,9 @@ FOLDER, COMMANDS, REFUSALS, KEYS = DATA / "frozen", DATA / "commands.txt", DATA 
 FILES = {
     "field.nc": "connection swim.toml --grid 5 -o field.nc",
     "field.mat": "connection swim.toml --grid 5 -o field.mat --sign - --order meshgrid",
-    "sand.toml": "calibrate dem-rod-drag -o sand.toml",
-    "grains.toml": "calibrate plates.csv -o grains.toml",
-    "best.toml": "optimize three-link-viscous --for efficiency --harmonics 1 -o best.toml",
+    "sand.toml": "fit-medium dem-rod-drag -o sand.toml",
+    "grains.toml": "fit-medium plates.csv -o grains.toml",
+    "best.toml": "optimize three-link-viscous --objective efficiency --harmonics 1 -o best.toml",
 }
 
 
@@ -82,7 +82,7 @@ def ran(line: str) -> list[str]:
     code, out, err = geomech(*shlex.split(line))
     told = []
     if line.endswith("--help"):
-        told += [f"= {x}" for x in re.findall(r"^  (-\S.*?|[\[{A-Z]\S*|[a-z]+)(?: <|  |$)", out, re.M)]
+        told += [f"= {x}" for x in re.findall(r"^  (-\S.*?|[\[{A-Z]\S*|[a-z][a-z-]*)(?: <|  |$)", out, re.M)]
     else:
         try:
             told += [f"= {x}" for x in flat(json.loads(out))]
@@ -290,7 +290,7 @@ def keys() -> Iterator[str]:
     import geomech as top
 
     table = ""
-    for line in geomech("keys")[1].splitlines():
+    for line in geomech("reference")[1].splitlines():
         if line.startswith("  ") and (found := re.match(r"  (\w+)  +(\S.*?)  +(\S.*?)  +(\S.*?)(?:  |$)", line)):
             yield f"key {table}: {' | '.join(found.groups())}"
         elif line.startswith("["):
@@ -298,7 +298,8 @@ def keys() -> Iterator[str]:
         elif line == "above all tables":
             table = "[]"
     yield from (
-        f"schema {line}".replace("/$defs/", "/") for line in of_schema(json.loads(geomech("keys", "--json-schema")[1]))
+        f"schema {line}".replace("/$defs/", "/")
+        for line in of_schema(json.loads(geomech("reference", "--json-schema")[1]))
     )
     yield from (f"geomech.{name}" for name in sorted(dir(top)) if not name.startswith("_"))
 

@@ -532,7 +532,7 @@ def test_a_command_outlives_the_cache(damage, tmp_path, compiled_code):
     """Of the true code, in a process of its own; 20 s each. compiled_code: numba is there."""
     (tmp_path / "s.toml").write_text(scenes.load("three-link-glass").text + '[numerics]\nbackend = "numba"\n')
     env = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONWARNINGS": "error"}
-    args = ["-m", "geomech", "displacement", "s.toml", "--amplitudes", "1", "--methods", "direct", "--json"]
+    args = ["-m", "geomech", "displacement", "s.toml", "--amplitudes", "1", "--tiers", "direct", "--json"]
 
     def run(limit=resource.RLIM_INFINITY):
         small_files = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))

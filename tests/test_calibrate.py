@@ -31,7 +31,7 @@ def noisy(seed=0, psi=PSI, size=0.03, medium=Granular(1.8, 0.24)):  # noqa: B008
 
 
 def test_the_sample_has_its_published_fit():
-    code, out, err = geomech("calibrate", "dem-rod-drag", "--json")
+    code, out, err = geomech("fit-medium", "dem-rod-drag", "--json")
     found = json.loads(out)
     assert (code, err) == (0, "")
     assert list(found)[:6] == ["law", "C", "gamma0_deg", "k", "covariance", "rms"]
@@ -270,7 +270,7 @@ def test_bad_files_get_one_line(name, tmp_path):
     text, said = BAD[name]
     file, out = tmp_path / "drag.csv", tmp_path / "m.toml"
     file.write_bytes(text if isinstance(text, bytes) else text.encode())
-    code, printed_out, err = geomech("calibrate", file, "-o", out, "--plot", tmp_path / "m.png")
+    code, printed_out, err = geomech("fit-medium", file, "-o", out, "--plot", tmp_path / "m.png")
     assert (code, printed_out, err.count("\n")) == (2, "", 1), err
     assert err.startswith("error: ") and said in err and "drag.csv" in err
     assert [p.name for p in tmp_path.iterdir()] == ["drag.csv"]
@@ -285,16 +285,16 @@ def test_files_that_cannot_be_read(tmp_path, monkeypatch):
         (tmp_path, "no ordinary file"),
         (tmp_path / "x.csv", "No such file"),
     ):
-        code, _, err = geomech("calibrate", path)
+        code, _, err = geomech("fit-medium", path)
         assert code == 2 and said in err and err.count("\n") == 1
-    code, _, err = geomech("calibrate", "dem-rod-dragg")
+    code, _, err = geomech("fit-medium", "dem-rod-dragg")
     assert code == 2 and "did you mean 'dem-rod-drag'" in err
 
 
 def test_other_spellings_of_a_good_file(tmp_path):
     plain = tmp_path / "plain.csv"
     plain.write_text(GOOD)
-    want = json.loads(geomech("calibrate", plain, "--json")[1])
+    want = json.loads(geomech("fit-medium", plain, "--json")[1])
     assert (want["C"], want["gamma0_deg"]) == pytest.approx((1.8, math.degrees(0.24)), rel=1e-3)
     assert (
         want["k"] is None and want["axial_stress_Pa"] is None and want["axial_force_N"] == pytest.approx(3.7, rel=1e-3)
@@ -310,7 +310,7 @@ def test_other_spellings_of_a_good_file(tmp_path):
     ):
         file = tmp_path / "other.csv"
         file.write_bytes(text.encode())
-        found = json.loads(geomech("calibrate", file, "--json")[1])
+        found = json.loads(geomech("fit-medium", file, "--json")[1])
         assert (found["C"], found["rms"]) == (want["C"], want["rms"])
 
 
@@ -320,7 +320,7 @@ def test_weights_of_a_file(tmp_path):
     rows = GOOD.split()
     for extra in (["45,9.0,0.5,0"], []):
         file.write_text("\n".join([rows[0] + ",weight", *(f"{row},2" for row in rows[1:]), *extra]))
-        found.append(json.loads(geomech("calibrate", file, "--json")[1]))
+        found.append(json.loads(geomech("fit-medium", file, "--json")[1]))
     for key in ("C", "covariance", "axial_force_N", "rms"):
         np.testing.assert_allclose(found[0][key], found[1][key], rtol=1e-5, atol=1e-15)
     assert len(found[0]["residuals"]["psi_deg"]) == len(found[1]["residuals"]["psi_deg"]) + 1
@@ -351,22 +351,22 @@ def test_sizes_of_header_lines(lines, sizes):
 
 
 def test_options_overrule_the_header():
-    found = json.loads(geomech("calibrate", "dem-rod-drag", "--json", "--depth", "0.06", "--density", "600")[1])
+    found = json.loads(geomech("fit-medium", "dem-rod-drag", "--json", "--depth", "0.06", "--density", "600")[1])
     assert found["rod"] == {"radius": 0.008, "length": 0.08, "depth": 0.06, "density": 600.0}
-    base = json.loads(geomech("calibrate", "dem-rod-drag", "--json")[1])
+    base = json.loads(geomech("fit-medium", "dem-rod-drag", "--json")[1])
     assert found["k"] * 0.06 * 600 == pytest.approx(base["k"] * 0.03 * 0.588 * 1030)
-    text = geomech("calibrate", "dem-rod-drag", "--law", "viscous")[1]
+    text = geomech("fit-medium", "dem-rod-drag", "--law", "viscous")[1]
     assert "ratio" in text and "psi_deg  F_parallel_N" in text and "k is not known" not in text
-    assert geomech("calibrate", "dem-rod-drag", "--depth", "-1")[0] == 2
-    code, _, err = geomech("calibrate", "dem-rod-drag", "--density", "0.6")
+    assert geomech("fit-medium", "dem-rod-drag", "--depth", "-1")[0] == 2
+    code, _, err = geomech("fit-medium", "dem-rod-drag", "--density", "0.6")
     assert code == 2 and "dem_rod_drag.csv: k must be a number from 0.001 to 1000" in err
-    assert "neither left-out, fitted nor a number" in geomech("calibrate", "dem-rod-drag", "--end-caps", "flat")[2]
+    assert "neither left-out, fitted nor a number" in geomech("fit-medium", "dem-rod-drag", "--end-caps", "flat")[2]
 
 
 def test_the_medium_written_is_the_one_fitted(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for law, kind in (("granular", Granular), ("viscous", Viscous), ("coulomb", Coulomb)):
-        assert geomech("calibrate", "dem-rod-drag", "-o", "M.toml", "--law", law)[0] == 0
+        assert geomech("fit-medium", "dem-rod-drag", "-o", "M.toml", "--law", law)[0] == 0
         read = scene.parse(
             '[medium]\nfile = "M.toml"\n[body]\nkind = "chain"\n[gait]\nkind = "circle"\n', str(tmp_path / "s.toml")
         ).system.medium
@@ -383,10 +383,10 @@ def test_outputs_never_replace_the_data(tmp_path):
         name = file if option == "-o" else tmp_path / "link.png"
         if option == "--plot":
             name.hardlink_to(file)
-        code, _, err = geomech("calibrate", file, option, name)
+        code, _, err = geomech("fit-medium", file, option, name)
         assert code == 2 and "it is an input" in err
     assert file.read_text() == GOOD
-    code, _, err = geomech("calibrate", file, "-o", tmp_path / "x.png", "--plot", tmp_path / "x.png")
+    code, _, err = geomech("fit-medium", file, "-o", tmp_path / "x.png", "--plot", tmp_path / "x.png")
     assert code == 2 and "cannot write" in err and not (tmp_path / "x.png").exists()
 
 

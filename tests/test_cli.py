@@ -78,7 +78,7 @@ def test_displacement_by_every_tier(tmp_path):
     assert math.hypot(*table["direct"][1][:2]) == pytest.approx(0.0638, rel=0.01)
     assert {m: len(e) for m, e in table["estimate_heading"].items()} == dict.fromkeys(table["estimate"], 2)
     assert plot.stat().st_size > 10_000
-    code, out, _ = geomech("displacement", "three-link-glass", "--amplitudes", "3.0", "--methods", "direct")
+    code, out, _ = geomech("displacement", "three-link-glass", "--amplitudes", "3.0", "--tiers", "direct")
     assert code == 0
     assert "direct" in out
     assert "area" not in out
@@ -90,7 +90,7 @@ def test_displacement_to_a_tolerance():
     answer = json.loads(out)
     assert max(answer["estimate"][answer["tier"]]) <= 1e-3
     assert {len(answer[key][answer["tier"]]) for key in ("estimate", "estimate_heading", "net_distance")} == {2}
-    plain = ("displacement", "three-link-glass", "--amplitudes", "0.5,1.0", "--methods", "direct", "--json")
+    plain = ("displacement", "three-link-glass", "--amplitudes", "0.5,1.0", "--tiers", "direct", "--json")
     without = json.loads(geomech(*plain)[1])  # of one form, whether a tolerance is asked for or not
     assert set(answer) - set(without) == {"tier", "settings"} and set(without) - set(answer) == {"kept"}
     assert all(type(answer[k]) is type(without[k]) for k in without if k != "kept")
@@ -216,7 +216,7 @@ def test_without_arguments_the_help():
     code, out, err = geomech()
     assert (code, err) == (0, "")
     assert out == geomech("--help")[1]
-    assert "Commands:" in out
+    assert "Analyse:" in out
 
 
 BACKBONE = '[medium]\nname = "coulomb"\n[body]\nkind = "backbone"\nelements = 8\n[gait]\nkind = "sine"\nelements = 8\n'
@@ -327,7 +327,7 @@ def test_names_that_are_not_text_are_kept(tmp_path):
             os.fsdecode(b"\xe9.png"),
         ),
         ("connection", name, *SMALL, "-o", "a.nc"),
-        ("displacement", name, "--amplitudes", "0.5", "--methods", "direct", "--plot", "d.pdf"),
+        ("displacement", name, "--amplitudes", "0.5", "--tiers", "direct", "--plot", "d.pdf"),
         ("displacement", name, "--amplitudes", "0.5", "--tol", "0.1", "--json"),
         ("explain", name),
     ):
@@ -419,7 +419,7 @@ def test_commands_load_what_they_use_and_no_more(tmp_path):
         ["velocity", "three-link-glass", "--alpha", "0.5,0.3", "--alphadot", "1,0"],
         ["explain", "three-link-glass"],
         ["scenes"],
-        ["displacement", "three-link-viscous", "--amplitudes", "0.5", "--methods", "direct"],
+        ["displacement", "three-link-viscous", "--amplitudes", "0.5", "--tiers", "direct"],
         ["trajectory", "three-link-viscous", "-o", "t.csv"],
         ["sweep", "three-link-viscous", "--over", "gait.amplitude=0.5,1", "-o", "s.nc"],
     ]

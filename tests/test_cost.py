@@ -40,10 +40,14 @@ LARGE = {
     "amplitudes of a sweep": ["sweep", "sandfish-loose", "--over", "gait.amplitude=0.1:2:99999", "-o", "out.nc"],
     "a grid": ["connection", "three-link-glass", "--grid", "1414", "-o", "out.nc"],
     "a field of four joints": ["connection", "five.toml", "-o", "out.nc"],
+<<<<<<< HEAD
     "a connection around a gait": ["displacement", "five.toml", "--amplitudes", "0.1:0.5:99999", "--methods", "path"],
+=======
+    "a connection around a gait": ["displacement", "five.toml", "--amplitudes", "0.1:0.5:2999", "--tiers", "path"],
+>>>>>>> commands
     "a map": ["ccf", "directions.toml", "--grid", "301", "--plot", "out.png"],
     "directions": ["connection", "directions.toml", "-o", "out.nc", "--grid", "301"],
-    "harmonics": ["displacement", "harmonics.toml", "--amplitudes", "1", "--methods", "harmonic", "--grid", "201"],
+    "harmonics": ["displacement", "harmonics.toml", "--amplitudes", "1", "--tiers", "harmonic", "--grid", "201"],
     "phases": ["run", "phases.toml", "-o", "out"],
     "phases of many amplitudes": ["displacement", "phases.toml", "--amplitudes", "0.1:1:1000"],
     "elements": ["displacement", "elements.toml", "--amplitudes", "0.1:0.2:2000"],
@@ -83,7 +87,7 @@ def test_large_requests_are_refused_without_yes(name, large, monkeypatch):
 def test_yes_computes_and_says_what_is_to_come(large, monkeypatch):
     monkeypatch.setattr(run_cost, "LONGEST", 0.0)
     monkeypatch.setattr(run_cost, "WORTH_SAYING", 0.0)
-    args = ["displacement", "three-link-viscous", "--amplitudes", "1", "--methods", "direct", "--json"]
+    args = ["displacement", "three-link-viscous", "--amplitudes", "1", "--tiers", "direct", "--json"]
     assert run(*args)[0] == 2
     code, out, err = run(*args, "--yes")
     assert code == 0
@@ -248,7 +252,7 @@ def test_a_terminal_without_letters_and_a_home_without_folders(tmp_path):
         from geomech import cli
         for args in (
             ["ccf", "sch\\u00f6n \\u2603.toml", "--plot", "\\u2603.png", "--grid", "5"],
-            ["displacement", "sch\\u00f6n \\u2603.toml", "--amplitudes", "1", "--methods", "direct"],
+            ["displacement", "sch\\u00f6n \\u2603.toml", "--amplitudes", "1", "--tiers", "direct"],
             ["explain", "\\u2603.toml"],
         ):
             try:
@@ -304,7 +308,7 @@ def test_nobody_need_listen(tmp_path):
         *(LARGE[n] for n in ("a grid", "a map", "phases", "directions")),
         ["displacement", "three-link-viscous", "--amplitudes", "0.1:2:99999"],
         ["displacement", "elements.toml", "--amplitudes", "0.1:0.2:20"],
-        ["displacement", "harmonics.toml", "--amplitudes", "1", "--methods", "harmonic"],
+        ["displacement", "harmonics.toml", "--amplitudes", "1", "--tiers", "harmonic"],
     ],
     ids=lambda args: " ".join(args[:2]),
 )

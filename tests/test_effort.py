@@ -193,14 +193,14 @@ def test_by_command(capsys):
     from geomech.cli import main
 
     with pytest.raises(SystemExit) as ended:
-        main(["displacement", "three-link-viscous", "--amplitudes", "0,1", "--methods", "direct", "--cost", "--json"])
+        main(["displacement", "three-link-viscous", "--amplitudes", "0,1", "--tiers", "direct", "--effort", "--json"])
     told = json.loads(capsys.readouterr().out)
     assert ended.value.code == 0
     assert told["path_length"] == pytest.approx([0.0, 0.512235], abs=1e-6)
     assert told["efficiency"]["direct"] == [None, pytest.approx(0.1001, abs=6e-5)]
     assert told["cost_of_transport"]["direct"][0] is None
     with pytest.raises(SystemExit) as ended:
-        main(["displacement", "no-slip-snake", "--amplitudes", "1", "--cost"])
+        main(["displacement", "no-slip-snake", "--amplitudes", "1", "--effort"])
     assert ended.value.code == 2 and "nothing says what moving costs" in capsys.readouterr().err
 
 
@@ -215,6 +215,6 @@ def test_a_metric_of_the_systems_own_has_lengths_and_no_work(name, capsys):
     assert found["path_length"] == pytest.approx([length], rel=1e-12) and np.isnan(found["work"]).all()
     assert metric.path_length(study.metric.norm, study.scene.gait, [0.8]) == pytest.approx([length], rel=1e-4)
     with pytest.raises(SystemExit) as ended:
-        main(["displacement", name, "--amplitudes", "0.8", "--methods", "direct", "--cost"])
+        main(["displacement", name, "--amplitudes", "0.8", "--tiers", "direct", "--effort"])
     assert ended.value.code == 0 and f"path length: {effort.METRIC}" in capsys.readouterr().out
     assert "metric" in study.to_xarray()

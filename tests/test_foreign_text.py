@@ -138,7 +138,11 @@ def test_keys_and_strings_of_a_scene(geomech, tmp_path):
 def test_words_in_headers_of_csv_files(geomech, tmp_path):
     (tmp_path / "a.csv").write_text(f"{LONG},speed\n1,2\n")
     (tmp_path / "s.toml").write_text(SWIM)
-    for command in (("fit", "a.csv", "-o", "a.nc"), ("calibrate", "a.csv"), ("explain", "s.toml", "--medium", "a.csv")):
+    for command in (
+        ("fit-gait", "a.csv", "-o", "a.nc"),
+        ("fit-medium", "a.csv"),
+        ("explain", "s.toml", "--medium", "a.csv"),
+    ):
         code, out, err = geomech(*command)
         assert (code, out) == (2, "")
         shown(err)

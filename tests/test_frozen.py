@@ -38,7 +38,7 @@ def test_keys_and_schema_are_what_they_were():
     assert len(new) > 600
 
 
-BASES = {  # a scene that has such a table, by what `geomech keys` says of it
+BASES = {  # a scene that has such a table, by what `geomech reference` says of it
     "of a mesh": "ball.toml", "of an intruder": "leg.toml", "of a robot": "robot.toml", "mjcf": "cart.toml",
     "[intruder] kind = \"(mesh|sphere|cylinder|screw|extruded)": "ball.toml", "[intruder]": "leg.toml", "[motion]": "leg.toml",
     "[robot]": "robot.toml", "": "plain.toml",

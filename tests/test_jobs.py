@@ -399,13 +399,13 @@ COMMANDS = {
     "displacement march.toml": ["--amplitudes", "0.2", "--tol", "0.1", "--json"],
     "displacement s.toml": ["--amplitudes", "0.5", "--plot", "out.png"],
     "trajectory march.toml": ["--cycles", "2", "-o", "out.csv"],
-    "animate march.toml": ["-o", "out.png"],
+    "trajectory march.toml --cycles 1": ["-o", "out.png"],
     "walk walk.toml": ["-o", "out"],
     "accuracy rod.toml": ["-o", "out"],
     "accuracy s.toml": ["-o", "out"],
     "ccf s.toml": ["--plot", "out.png"],
     "optimize s.toml": [
-        "--for",
+        "--objective",
         "displacement",
         "--starts",
         "3",
@@ -477,7 +477,7 @@ def test_results_stay_until_they_are_saved(small, monkeypatch):
 
 
 def test_what_is_printed_is_kept_in_the_cache_and_not_where_the_command_runs(small, own_cache):
-    args = ["displacement", "march.toml", "--amplitudes", "0.2", "--methods", "direct"]
+    args = ["displacement", "march.toml", "--amplitudes", "0.2", "--tiers", "direct"]
     with counted(20):
         assert geomech(*args, cwd=small)[0] == 143
     with counted(3):

@@ -97,7 +97,7 @@ def test_keys_are_told_as_they_are():
 @pytest.fixture(scope="module")
 def printed():
     """What the command prints of each section; of "" of all."""
-    ended = {section: geomech(*["keys", section][: 1 + bool(section)]) for section in ("", *sections())}
+    ended = {section: geomech(*["reference", section][: 1 + bool(section)]) for section in ("", *sections())}
     assert {(code, err) for code, _, err in ended.values()} == {(0, "")}
     return {section: out for section, (_, out, _) in ended.items()}
 
@@ -117,9 +117,9 @@ def test_the_command_prints_them_all_or_a_section(printed):
     granular = text("medium").partition('law = "granular"')[2].partition("\n\n")[0]
     assert re.search(r"\n +C +number +- +required +the extra normal force", granular)
     assert re.search(r"\n +gamma0 +number +rad +required [^:]*as\s+gamma0_deg", granular)
-    code, out, err = geomech("keys", "bdy")
+    code, out, err = geomech("reference", "bdy")
     assert (code, out, err) == (2, "", "error: SECTION: 'bdy' is unknown: did you mean 'body'?\n")
-    assert geomech("keys", "body", "--json-schema")[:2] == (2, "")
+    assert geomech("reference", "body", "--json-schema")[:2] == (2, "")
 
 
 def test_keys_of_ones_own_classes_are_told(tmp_path, monkeypatch):
@@ -128,10 +128,10 @@ def test_keys_of_ones_own_classes_are_told(tmp_path, monkeypatch):
     path = tmp_path / "power.py"
     path.write_text(re.search(r"```python\n(.*?)```", section, re.S)[1])
     try:
-        code, out, _ = geomech("keys", "medium", "--plugin", str(path))
+        code, out, _ = geomech("reference", "medium", "--plugin", str(path))
         assert code == 0
         assert re.search(r'law = "power"\n  power +number +- +required +of the speed.*\n.*ratio +number +- +3.0', out)
-        made = json.loads(geomech("keys", "--json-schema", "--plugin", str(path))[1])
+        made = json.loads(geomech("reference", "--json-schema", "--plugin", str(path))[1])
         assert {"const": "power"} in [x["properties"].get("law") for x in made["$defs"]["gaits"]["medium"]["oneOf"]]
     finally:
         LAWS.restore({name: law for name, law in LAWS.items() if name != "power"})

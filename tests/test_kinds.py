@@ -73,15 +73,15 @@ def test_the_law_of_the_page_runs_as_it_stands_there(tmp_path, monkeypatch):
     (tmp_path / "power.py").write_text(law)
     (tmp_path / "power.toml").write_text(scene)
     command = re.search(r"`geomech (displacement power\.toml .*?)`", section)[1]
-    code, out, err = geomech(*command.split(), "--json", "--methods", "direct")
+    code, out, err = geomech(*command.split(), "--json", "--tiers", "direct")
     assert code == 0
     assert err.count("\n") == 1
     assert "power has no closed form" in err and "gauss:24" in err and "five times" in err
     for amplitudes, wanted in (("0.5", 0), ("2.6", 2)):  # said once by a search that asks often, and beside an error
         args = "displacement", "power.toml", "--plugin", "power.py", "--amplitudes", amplitudes
-        code, out, err = geomech(*args, "--tol", "1e-2") if wanted == 0 else geomech(*args, "--methods", "path")
+        code, out, err = geomech(*args, "--tol", "1e-2") if wanted == 0 else geomech(*args, "--tiers", "path")
         assert (code, err.count("\n"), err.count("no closed form")) == (wanted, 1, int(wanted == 0))
-    code, out, err = geomech(*command.split(), "--json", "--methods", "direct")
+    code, out, err = geomech(*command.split(), "--json", "--tiers", "direct")
     module = {}
     exec(law, module)
     shear = Swimmer(module["Power"](0.4), Chain())
@@ -285,7 +285,7 @@ def test_a_file_registers_what_is_in_it_and_a_scene_alone_does_not(tmp_path, mon
 def test_every_command_that_takes_a_scene_takes_plugins():
     for command in cli.app.registered_commands:
         takes = set(inspect.signature(command.callback).parameters)
-        assert ("plugin" in takes) == ("name" in takes or command.callback.__name__ == "keys"), command.callback
+        assert ("plugin" in takes) == ("name" in takes or command.callback.__name__ == "reference"), command.callback
 
 
 @pytest.mark.parametrize(

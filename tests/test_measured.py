@@ -972,7 +972,7 @@ def test_the_command_tells_what_the_fit_does(usual, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     log = usual.log
     synthetic.save("log.csv", synthetic.SyntheticLog(log.t, log.alpha, log.pose, log.t))
-    code, out, _ = command("fit", "log.csv", "-o", "field.nc", "--scene", "mine.toml", "--json")
+    code, out, _ = command("fit-gait", "log.csv", "-o", "field.nc", "--scene", "mine.toml", "--json")
     assert code == 0
     found = json.loads(out)
     np.testing.assert_allclose(found["displacement_predicted"], usual.displacement[0], atol=1e-7)

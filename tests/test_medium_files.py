@@ -240,7 +240,7 @@ def test_every_command_takes_a_table(folder):
     plain = scene.parse('[medium]\nlaw = "granular"\nC = 1.8\ngamma0_deg = 13.8\n' + REST + GAUSS)
     for args in (
         ["velocity", "--alpha", "0.5,0.3", "--alphadot", "1,0", "--json"],
-        ["displacement", "--amplitudes", "0.5,0.9", "--json", "--methods", "direct,path,area"],
+        ["displacement", "--amplitudes", "0.5,0.9", "--json", "--tiers", "direct,path,area"],
         ["explain"],
     ):
         code, out, err = geomech(args[0], file, *args[1:])

@@ -31,7 +31,7 @@ from rft.refusal import Refusal
 pytestmark = pytest.mark.usefixtures("fastest")
 VISCOUS, GLASS = scenes.load("three-link-viscous"), MEDIA["glass-0.3mm-loose"]
 PLAIN = '[medium]\nlaw = "granular"\nC = 1.8\ngamma0_deg = 13.8\n[body]\nkind = "chain"\n[gait]\nkind = "circle"\n'
-DIRECT = ["--methods", "direct", "--json"]
+DIRECT = ["--tiers", "direct", "--json"]
 
 
 def test_effects_in_a_list_are_those_in_a_tuple():
@@ -163,8 +163,8 @@ def test_degrees_are_taken_wherever_angles_are(tmp_path):
     for degrees, plain in (
         (["velocity", name, "--alpha", "30deg,0.5", "--alphadot", "-90deg,1"],
          ["velocity", name, "--alpha", f"{rad[0]},0.5", "--alphadot", f"-{rad[1]},1"]),
-        (["displacement", name, "--amplitudes", "30deg:90deg:3", "--methods", "direct"],
-         ["displacement", name, "--amplitudes", f"{rad[0]}:{rad[1]}:3", "--methods", "direct"]),
+        (["displacement", name, "--amplitudes", "30deg:90deg:3", "--tiers", "direct"],
+         ["displacement", name, "--amplitudes", f"{rad[0]}:{rad[1]}:3", "--tiers", "direct"]),
     ):  # fmt: skip
         found, wanted = (ask(*args, "--json") for args in (degrees, plain))
         assert found[::2] == wanted[::2] == (0, "")

@@ -419,11 +419,11 @@ def test_a_rate_that_no_gait_can_keep_is_refused_before_the_search():
 @pytest.mark.parametrize(
     ("name", "asked", "said"),
     [
-        ("three-link-viscous", {"aim": "distance"}, "--for: 'distance' is unknown"),
+        ("three-link-viscous", {"aim": "distance"}, "--objective: 'distance' is unknown"),
         ("three-link-viscous", {"direction": "z"}, "--direction: 'z' is unknown"),
         ("three-link-viscous", {"aim": "turning", "direction": "x"}, "turning takes none"),
         ("three-link-viscous", {"harmonics": 0}, "--harmonics must be"),
-        ("three-link-viscous", {"within": 0.0}, "--within must be"),
+        ("three-link-viscous", {"within": 0.0}, "--limits must be"),
         ("three-link-viscous", {"starts": 0}, "--starts must be"),
         ("three-link-viscous", {"rate": 1.0}, "limits speed"),
         ("three-link-viscous", {"aim": "speed", "power": -1.0}, "--power must be"),
@@ -628,7 +628,7 @@ def test_limits_as_they_are_typed(text, limits):
     found = joint_limits(text, viscous())
     assert found == limits if limits is None else np.asarray(found) == pytest.approx(np.asarray(limits))
     for wrong in ("", "x", "1:2:3", "1:", ":2"):
-        with pytest.raises(Refusal, match="--within"):
+        with pytest.raises(Refusal, match="--limits"):
             joint_limits(wrong, viscous())
 
 

@@ -62,7 +62,7 @@ def commands(page):
     inline = re.findall(r"`([^`]+)`", re.sub(r"(?ms)^```.*?^```$", "", text(page)))
     for line in code + [" ".join(x.split()).replace("\\|", "|") for x in inline]:
         line = line.removeprefix("$ ")
-        if re.match(r"(\.venv/bin/)?geomech [a-z]+( |$)", line):
+        if re.match(r"(\.venv/bin/)?geomech [a-z][a-z-]*( |$)", line):
             for one in re.split(r" && ", line):
                 yield shlex.split(one.partition(" > ")[0], comments=True)[1:]
 
@@ -106,7 +106,7 @@ def test_the_readme_is_short_and_begins_with_what_installs_and_what_tests():
     assert "pip install -q . &&" in install and "geomech run -o results" in install
     assert "pip install -q -e '.[test]' &&" in suite and suite.endswith("-m pytest -q\n")
     assert len(install.splitlines()) == len(suite.splitlines()) == 1
-    assert [line.split()[1] for line in tries.splitlines()] == ["displacement", "ccf", "animate", "scenes"]
+    assert [line.split()[1] for line in tries.splitlines()] == ["displacement", "ccf", "trajectory", "scenes"]
 
 
 def test_commands_on_all_pages_exist_with_their_options_and_names():
@@ -118,18 +118,18 @@ def test_commands_on_all_pages_exist_with_their_options_and_names():
         for word in words:
             for option in re.findall(r"(?:^|(?<=[\[|]))--?[a-z][\w-]*", word):
                 assert option in options, (page, name, word)
-        if name not in ("scenes", "keys") and words and re.fullmatch(r"[a-z][\w-]+", words[0]):
+        if name not in ("scenes", "reference") and words and re.fullmatch(r"[a-z][\w-]+", words[0]):
             assert words[0] in SHIPPED, (page, name, words)
 
 
 # They draw for seconds each: test_cli.py runs them; their options and names are looked up above.
-DRAWN = {"run", "ccf", "animate"}
+DRAWN = {"run", "ccf", "trajectory"}
 TYPED = {" ".join(line): line for line in commands(README) if len(line) > 1 and line[0] not in DRAWN
          and not any(re.search(r"\b[A-Z]{3,}\b", word) for word in line)}  # fmt: skip
 
 
 def test_most_of_what_the_readme_says_to_type_is_run():
-    some = {"displacement", "calibrate", "connection", "optimize", "symbolic", "intrude", "walk", "explain", "sweep"}
+    some = {"displacement", "fit-medium", "connection", "optimize", "symbolic", "intrude", "walk", "explain", "sweep"}
     assert len(TYPED) > 10 and some <= {line[0] for line in TYPED.values()}
 
 
@@ -149,7 +149,7 @@ def test_the_scene_of_the_readme_runs(tmp_path, monkeypatch):
     assert len([line for line in scene.splitlines() if line]) <= 10
     parse(scene)
     (tmp_path / "mine.toml").write_text(scene)
-    code, out, _ = geomech("displacement", "mine.toml", "--amplitudes", "1", "--methods", "direct")
+    code, out, _ = geomech("displacement", "mine.toml", "--amplitudes", "1", "--tiers", "direct")
     assert code == 0
     assert "speed (BL/s) at 0.5 Hz" in out
 

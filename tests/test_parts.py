@@ -159,7 +159,7 @@ PLUGINS = [word for name in FILES for word in ("--plugin", f"own_{name}.py")]
 
 @pytest.mark.parametrize("name", ["swims", "trike", "skate", "table"])
 def test_commands_use_one_of_each(name):
-    argv = ["displacement", f"{name}.toml", "--amplitudes", "0.2,0.4", "--methods", "leading,path,direct", "--json"]
+    argv = ["displacement", f"{name}.toml", "--amplitudes", "0.2,0.4", "--tiers", "leading,path,direct", "--json"]
     code, _, err = geomech(*argv)
     assert code == 2 and "unknown" in err  # a scene alone runs no code
     code, out, err = geomech(*argv, *PLUGINS)

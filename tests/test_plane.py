@@ -148,7 +148,7 @@ def test_the_spread_is_that_of_another_surface():
 
 def test_commands_tell_the_surface_and_draw_slices(tmp_path):
     (tmp_path / "s.toml").write_text(SCENE)
-    args = ("displacement", "s.toml", "--amplitudes", "0.5,1", "--methods")
+    args = ("displacement", "s.toml", "--amplitudes", "0.5,1", "--tiers")
     code, out, err = geomech(*args, "area,direct", "--json", cwd=tmp_path)
     table = json.loads(out)
     assert (code, err) == (0, "") and table["units"]["surface_spread"] == "m"
@@ -174,7 +174,7 @@ def test_commands_tell_the_surface_and_draw_slices(tmp_path):
         (["--slice", "1.3"], "s.toml: --slice: the angles must lie within the field's 1.2 rad: give others, or raise --extent"),
         (["--slice", "x"], "--slice: 'x' is not a list of numbers such as 0.5,0.3 or 30deg,20deg"),
         (["--metric"], "--metric and --stretch are those of two joints: drop them for slices"),
-        (["--beside", "link-1"], "--beside draws one pair of joints: say which with --pair"),
+        (["--compare-frame", "link-1"], "--compare-frame draws one pair of joints: say which with --pair"),
     ],
 )  # fmt: skip
 def test_what_is_no_slice_is_refused(args, said, tmp_path):
@@ -283,7 +283,7 @@ def test_six_links_have_area_and_path_and_a_field_is_refused(tmp_path):
     )
     four = chain.replace(", 0.8]", "]") + '[gait]\nkind = "wave"\njoints = 4\n'
     (tmp_path / "five.toml").write_text(four.replace('law = "viscous"\nratio = 2.3', 'name = "glass-0.3mm-loose"'))
-    code, _, err = geomech("connection", "five.toml", "-o", "a.nc", cwd=tmp_path)
+    code, _, err = geomech("connection", "five.toml", "--grid", "36", "-o", "a.nc", cwd=tmp_path)
     assert (
         code == 2 and err.endswith("say --yes, or lower --grid, to 13 or less\n") and not (tmp_path / "a.nc").exists()
     )

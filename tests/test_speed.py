@@ -187,7 +187,7 @@ def test_performance_speaks_the_scenes_own_unit():
 
 def test_the_command_gives_it(tmp_path):
     (tmp_path / "s.toml").write_text(CHAIN)
-    args = ("--amplitudes", "1", "--methods", "direct", "--json")
+    args = ("--amplitudes", "1", "--tiers", "direct", "--json")
     table = json.loads(geomech("displacement", "s.toml", *args, cwd=tmp_path)[1])
     assert table["speed"]["direct"][0] == pytest.approx(2.5 * table["net_distance"]["direct"][0])
 

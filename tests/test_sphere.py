@@ -100,7 +100,7 @@ def test_too_many_are_refused(tmp_path):
         ),
     ):
         (tmp_path / "s.toml").write_text(chain.format(more) + f'[gait]\nkind = "wave"\njoints = {joints}\n')
-        code, _, err = geomech("displacement", "s.toml", "--amplitudes", "1", "--methods", "harmonic", cwd=tmp_path)
+        code, _, err = geomech("displacement", "s.toml", "--amplitudes", "1", "--tiers", "harmonic", cwd=tmp_path)
         assert code == 2 and said in err and len(err.splitlines()) == 1
     told = geomech("explain", "s.toml", cwd=tmp_path)[1]
     assert "tiers: adapted, direct; by name: area, path\n" in told and "harmonic tier" in told

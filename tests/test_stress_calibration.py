@@ -259,7 +259,7 @@ def test_what_makes_no_sense_is_refused_with_one_line(said):
 
 def test_plate_drags_become_a_medium_that_commands_read(tmp_path):
     file, out = plates(tmp_path), tmp_path / "m.toml"
-    code, text, err = geomech("calibrate", file, "-o", out, "--plot", tmp_path / "map.svg", "--json")
+    code, text, err = geomech("fit-medium", file, "-o", out, "--plot", tmp_path / "map.svg", "--json")
     found = json.loads(text)
     assert (code, err, found["law"], found["status"]) == (0, "", "stress-map", "converged")
     close = VERTICAL["poppy-seeds-close"].stress
@@ -287,12 +287,12 @@ def test_plate_drags_become_a_medium_that_commands_read(tmp_path):
 def test_what_is_not_determined_is_noted(tmp_path):
     level = np.stack([np.arange(-75, 91, 15) * RAD, np.zeros(12)])
     file, out = plates(tmp_path, angles=level), tmp_path / "m.toml"
-    code, text, err = geomech("calibrate", file, "-o", out, "--plot", tmp_path / "map.svg")
+    code, text, err = geomech("fit-medium", file, "-o", out, "--plot", tmp_path / "map.svg")
     assert code == 0 and err.count("\n") == 1
     assert err.startswith("note: plates.csv: these drags do not determine ") and "B01" in err
     assert "A00" not in err and "D10" not in err and "A10" not in err  # at gamma = 0 they stand alone
     assert "generic shape" in out.read_text() and "B01" in text
-    assert json.loads(geomech("calibrate", file, "--json")[1])["undetermined"][:2] == ["B11", "B01"]
+    assert json.loads(geomech("fit-medium", file, "--json")[1])["undetermined"][:2] == ["B11", "B01"]
     assert "not determined" in (tmp_path / "map.svg").read_text()
 
 
@@ -354,7 +354,9 @@ def test_a_plate_that_the_package_pushes_down_has_its_zeta(tmp_path):
     plate = '[intruder]\nkind = "plate"\nlength = 0.038\nwidth = 0.025\n[motion]\nkind = "penetrate"\ndepth = 0.05\n'
     written(tmp_path / "s.toml", '[medium]\nname = "glass-3mm"\n' + plate)
     assert geomech("intrude", tmp_path / "s.toml", "-o", tmp_path / "down.csv")[0] == 0
-    code, text, err = geomech("calibrate", tmp_path / "down.csv", "--area", 9.5e-4, "-o", tmp_path / "m.toml", "--json")
+    code, text, err = geomech(
+        "fit-medium", tmp_path / "down.csv", "--area", 9.5e-4, "-o", tmp_path / "m.toml", "--json"
+    )
     found = json.loads(text)
     assert (code, err, found["law"], found["area"]) == (0, "", "zeta", 9.5e-4)
     assert found["zeta"] == pytest.approx(0.224, rel=1e-9)
@@ -369,7 +371,7 @@ def test_zeta_as_text_and_picture(tmp_path):
     depth, force = penetrated(np.random.default_rng(2))
     rows_ = [f"{1e3 * d:.6g},{f:.6g}" for d, f in zip(depth, force)]
     file = written(tmp_path / "p.csv", "# plate 38 x 25 mm", "depth_mm,force_N", *rows_)
-    code, text, err = geomech("calibrate", file, "-o", tmp_path / "m.toml", "--plot", tmp_path / "p.png")
+    code, text, err = geomech("fit-medium", file, "-o", tmp_path / "m.toml", "--plot", tmp_path / "p.png")
     assert (code, err) == (0, "")
     assert text.startswith("zeta fitted to p.csv: 40 depths to 6 cm\nzeta        0.3")
     assert (tmp_path / "p.png").stat().st_size > 10_000
@@ -385,7 +387,7 @@ def test_a_surface_that_is_elsewhere_is_noted(tmp_path):
         file = written(
             tmp_path / "p.csv", "depth,force", *(f"{d + shift:.8f},{f:.6g}" for d, f in zip(depth, measured))
         )
-        code, _, err = geomech("calibrate", file, "--area", "9.5e-4")
+        code, _, err = geomech("fit-medium", file, "--area", "9.5e-4")
         assert (code, err.count("\n")) == (0, notes)
         assert not notes or f"is zero at a depth of {1e3 * shift:.1f}"[:-1] in err
 
@@ -456,7 +458,7 @@ BAD = {
 @pytest.mark.parametrize("kind", BAD)
 def test_bad_files_get_one_line(kind, tmp_path):
     lines, said = BAD[kind]
-    code, out, err = geomech("calibrate", written(tmp_path / "p.csv", *lines), "-o", tmp_path / "m.toml")
+    code, out, err = geomech("fit-medium", written(tmp_path / "p.csv", *lines), "-o", tmp_path / "m.toml")
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert said.replace("plates: ", "") in err
     assert not (tmp_path / "m.toml").exists()
@@ -475,7 +477,7 @@ def test_slips_of_units_get_one_line(tmp_path):
         file = written(tmp_path / name, f"# area = {area:g}", "depth,force", *lines)
         refused.append((file, "check the units, depth in m, force in N, area in m^2"))
     for file, said in refused:
-        code, out, err = geomech("calibrate", file)
+        code, out, err = geomech("fit-medium", file)
         assert (code, out, err.count("\n")) == (2, "", 1)
         assert said in err and file.name in err
 
@@ -494,15 +496,15 @@ def test_the_law_is_that_of_the_columns_or_the_one_asked_for(tmp_path):
         ("granular", "the header has no column psi_deg"), ("zeta", "the header has no column depth"),
         ("stres-map", "--law: 'stres-map' is unknown: did you mean 'stress-map'?"),
     ):  # fmt: skip
-        code, _, err = geomech("calibrate", file, "--law", law)
+        code, _, err = geomech("fit-medium", file, "--law", law)
         assert code == 2 and said in err and err.count("\n") == 1
     for option in (("--area", "1e-3"), ("--radius", "0.01"), ("--end-caps", "fitted")):
-        code, _, err = geomech("calibrate", file, *option)
+        code, _, err = geomech("fit-medium", file, *option)
         assert code == 2 and f"{option[0]} belongs to another measurement: leave it out for --law stress-map" in err
     for option in ("--radius", "--length", "--depth", "--density"):
-        code, _, err = geomech("calibrate", tmp_path / "p.csv", "--area", "1e-3", option, "0.01")
+        code, _, err = geomech("fit-medium", tmp_path / "p.csv", "--area", "1e-3", option, "0.01")
         assert code == 2 and f"{option} belongs to another measurement: leave it out for --law zeta" in err
-    code, _, err = geomech("calibrate", "dem-rod-drag", "--area", "1e-3")
+    code, _, err = geomech("fit-medium", "dem-rod-drag", "--area", "1e-3")
     assert code == 2 and "--area belongs to another measurement" in err
 
 

@@ -235,7 +235,7 @@ def test_the_command_gives_it(tmp_path):
         '[medium]\nlaw = "granular"\nC = 1.49\ngamma0_deg = 12.6\ncovariance = [[0.012, -0.0012], [-0.0012, 0.0004]]\n'
         '[body]\nkind = "chain"\n[gait]\nkind = "circle"\n[numerics]\nphases = 64\n'
     )
-    args = ("displacement", "s.toml", "--amplitudes", "1.0", "--methods", "direct", "--json", "--plot", "d.svg")
+    args = ("displacement", "s.toml", "--amplitudes", "1.0", "--tiers", "direct", "--json", "--plot", "d.svg")
     code, out, err = geomech(*args, cwd=tmp_path)
     assert (code, err) == (0, "")
     table, loaded = json.loads(out), scenes.load(tmp_path / "s.toml")

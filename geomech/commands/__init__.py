@@ -1,7 +1,10 @@
-"""The commands, one file each: ``geomech NAME`` is the function NAME of the module NAME. A new one is a file and its name
-here; `geomech.commands.options` and `loading` have what they share."""
+"""The commands, one file each: ``geomech NAME`` is the function of that name, with _ for -, in the module of that name. A new
+one is a file and its name here; `geomech.commands.options` and `loading` have what they share."""
 
-COMMANDS = (
-    "run", "velocity", "connection", "ccf", "displacement", "trajectory", "animate", "accuracy", "sweep", "optimize",
-    "fit", "calibrate", "stress", "intrude", "walk", "explain", "symbolic", "scenes", "keys",
-)  # fmt: skip
+COMMANDS = {  # by the headings of `geomech --help`, in its order
+    "Analyse": ("run", "displacement", "ccf", "connection", "velocity", "symbolic", "sweep", "accuracy"),
+    "Gaits": ("trajectory", "optimize"),
+    "Grains and robots": ("stress", "intrude", "walk"),
+    "Your own data": ("fit_medium", "fit_gait"),
+    "Reference": ("scenes", "reference", "explain"),
+}

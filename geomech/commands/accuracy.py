@@ -16,8 +16,8 @@ def accuracy(
     as_json: JsonOption = False,
     yes: YesOption = False,
 ):
-    """Measure the cost of accuracy in a scene: error against time for every tier and knob, and the cheapest settings; of an
-    intruder scene, for the number of elements or triangles; of a walking robot, for steps, elements and rounding."""
+    """Measure error against time for every tier and setting. The cheapest settings that meet an error are
+    listed. The settings of an intruder scene are numbers of elements or triangles; of a robot, steps, elements and rounding."""
     from geomech.output import report
     from geomech.study.accuracy import Accuracy
 

@@ -38,7 +38,7 @@ def ccf(
     other_frame: OtherFrameOption = None,
     yes: YesOption = False,
 ):
-    """Draw the CCF map with the scene's gait on it. Of three and more joints: a slice for each pair, or for one, with the
+    """Draw the CCF with the scene's gait on it. Of three and more joints: a slice for each pair, or for one, with the
     others fixed."""
     from geomech.output import pictures
     from geomech.study.shape_space import ccf

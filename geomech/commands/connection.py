@@ -39,8 +39,8 @@ def connection(
     other_frame: OtherFrameOption = None,
     yes: YesOption = False,
 ):
-    """Write the local connection on a grid, with its fit residual and CCF, as NetCDF; or A alone in sysplotter's layout, as
-    .mat."""
+    """Compute the local connection on a grid, as a file. A NetCDF file has the fit residual and the CCF, too; a .mat
+    file has A alone, in sysplotter's layout."""
     from geomech.output import parts, pictures
     from geomech.study.shape_space import connection
 

@@ -25,21 +25,22 @@ from geomech.commands.pipeline import Output, drawing, execute
 def displacement(
     name: SceneArgument,
     amplitudes: Annotated[str, typer.Option(help="0.5,1.0,1.75 or START:STOP:COUNT; angles also as 30deg")],
-    methods: Annotated[Optional[str], typer.Option(help="any of area,adapted,path,harmonic,direct")] = None,
+    tiers: Annotated[Optional[str], typer.Option(help="any of area,adapted,path,harmonic,direct")] = None,
     grid: GridOption = None,
     extent: ExtentOption = None,
     tol: Annotated[Optional[float], typer.Option(help="error in body lengths that the cheapest tier must meet")] = None,
-    effort: Annotated[bool, typer.Option("--cost", help="add path length, work and cost of transport")] = False,
+    effort: Annotated[bool, typer.Option("--effort", help="add path length, work and cost of transport")] = False,
     as_json: JsonOption = False,
     plot: PlotOption = None,
     yes: YesOption = False,
 ):
-    """Compute the net displacement per cycle (x, y, theta), from phase t = 0, by each tier, with an estimate of its error."""
+    """Compute the displacement of a gait by each tier. x, y and theta after a cycle from phase t = 0, each with an
+    estimated error."""
     from geomech.study.displacement import displacement
 
     scene = load_scene(name, grid, extent)
     values = spread("--amplitudes", amplitudes, amplitude_kind(scene))
-    question = displacement(scene, values, methods, tol, effort)
+    question = displacement(scene, values, tiers, tol, effort)
     execute(
         question, Output(plot, drawing("pictures.displacement"), drawing("pictures.check")), as_json=as_json, yes=yes
     )

@@ -7,7 +7,7 @@ from geomech.commands.pipeline import show
 
 
 def explain(name: SceneArgument):
-    """Print the effects of a scene, the engine that follows, their costs, and the results that they rule out."""
+    """Print effects and engine of a scene, and what they cost. Results that the effects rule out are listed."""
     from geomech.scene import load
     from geomech.text.explain import explain
 

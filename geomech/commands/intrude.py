@@ -19,8 +19,8 @@ def intrude(
     out: Annotated[Optional[Path], typer.Option("-o", "--output", metavar="FILE.csv", help="table to write")] = None,
     plot: PlotOption = None,
 ):
-    """Compute force and moment of the grains on a body, an outline in the vertical plane or a mesh, along its motion. SI
-    units."""
+    """Compute force and moment of grains on a moving body. The body is an outline in the vertical plane or a
+    mesh. SI units."""
     from geomech.io.results import write_csv
     from geomech.study.intrusion import Intrusion
 

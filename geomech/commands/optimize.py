@@ -16,10 +16,10 @@ from geomech.commands.pipeline import Output, execute
 @with_workers
 def optimize(
     name: SceneArgument,
-    aim: Annotated[str, typer.Option("--for", help="displacement, efficiency, turning or speed")],
+    objective: Annotated[str, typer.Option("--objective", help="displacement, efficiency, turning or speed")],
     direction: Annotated[Optional[str], typer.Option(help="x or y: displacement along that axis of the body")] = None,
     harmonics: Annotated[Optional[int], typer.Option(help="of the Fourier series; 5 if left out")] = None,
-    within: Annotated[
+    limits: Annotated[
         Optional[str],
         typer.Option(metavar="EXTENT", help="of joints, in rad: 2.5, 120deg, -0.5:2, or 1,2 for each; else the field's"),
     ] = None,
@@ -34,13 +34,15 @@ def optimize(
     as_json: JsonOption = False,
     yes: YesOption = False,
 ):  # fmt: skip
-    """Find the best gait of a scene for an aim: its value with an error, as a scene, and its loop on the CCF map."""
+    """Find the best gait for an objective. Its value has an error; -o writes it as a scene, --plot draws its loop on
+    the CCF."""
     from geomech.optimise.question import Optimize
     from geomech.output import parts, pictures
 
     scene = load_scene(name)
-    limits = joint_limits(within, scene)
     drawn = pictures.Optimum(stretch, plot)
     file, figure = Output(out, parts.write_best, formats.toml), Output(plot, drawn, pictures.check)
-    question = Optimize(scene, aim, direction, harmonics, limits, starts, rate, power, stretch)
+    question = Optimize(
+        scene, objective, direction, harmonics, joint_limits(limits, scene), starts, rate, power, stretch
+    )
     execute(question, file, figure, as_json=as_json, yes=yes)

@@ -30,7 +30,7 @@ PlotOption = Annotated[Optional[Path], typer.Option("--plot", metavar="FILE", he
 MediumOption = Annotated[
     Optional[Path],
     typer.Option(
-        "--medium", metavar="FILE", help="what 'geomech calibrate' wrote, or a CSV of drag, in place of the scene's"
+        "--medium", metavar="FILE", help="what 'geomech fit-medium' wrote, or a CSV of drag, in place of the scene's"
     ),
 ]
 
@@ -46,12 +46,12 @@ FolderOption = Annotated[
     Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results", parser=folder)
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON and nothing else")]
-CyclesOption = Annotated[int, typer.Option("--cycles", metavar="N", help="cycles of the gait")]
 YesOption = Annotated[bool, typer.Option("--yes", help="compute even for more than a minute, or in more than 2 GB")]
 
 
 OtherFrameOption = Annotated[
-    Optional[str], typer.Option("--beside", metavar="FRAME", help="draw another body frame below, on the same scales")
+    Optional[str],
+    typer.Option("--compare-frame", metavar="FRAME", help="draw another body frame below, on the same scales"),
 ]
 PairOption = Annotated[
     Optional[str],
@@ -67,9 +67,7 @@ SliceOption = Annotated[
 ]
 PluginOption = Annotated[
     Optional[list[Path]],
-    typer.Option(
-        "--plugin", metavar="FILE.py", help="Python file with laws, bodies, gaits, effects, systems of your own"
-    ),
+    typer.Option("--plugin", metavar="FILE.py", help="Python file with parts of your own, such as laws"),
 ]
 
 
@@ -175,15 +173,15 @@ def angles(scene, option: str, text: str | None) -> tuple[float, ...] | None:
 
 
 def joint_limits(text: str | None, scene) -> float | list[tuple[float, float]] | None:
-    """Return the limits of --within, rad: 2.5 or 120deg for all joints, -0.5:2 from low to high, or one of these for each,
+    """Return the limits of --limits, rad: 2.5 or 120deg for all joints, -0.5:2 from low to high, or one of these for each,
     1,-0.5:2."""
     if text is None:
         return None
     pairs = []
     for part in text.split(","):
-        ends = [number for end in part.split(":") for number in numbers("--within", end, 1, None)]
+        ends = [number for end in part.split(":") for number in numbers("--limits", end, 1, None)]
         if len(ends) > 2:
-            raise Refusal(f"{part!r} is no limit", where="--within", instead="give one such as 2.5, 120deg or -0.5:2")
+            raise Refusal(f"{part!r} is no limit", where="--limits", instead="give one such as 2.5, 120deg or -0.5:2")
         pairs.append((-ends[0], ends[0]) if len(ends) == 1 else tuple(ends))
     if len(pairs) == 1:
         return pairs[0][1] if ":" not in text else pairs * scene.system.joints

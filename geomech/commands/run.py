@@ -26,7 +26,7 @@ def run(
     medium: MediumOption = None,
     yes: YesOption = False,
 ):
-    """Compute everything: connection, CCF map and displacement against amplitude, as figures and numbers, into DIR."""
+    """Compute connection, CCF and displacements into a folder. Displacements are drawn against amplitude."""
     from geomech.output import report
     from geomech.study.report import Report
 

@@ -16,7 +16,7 @@ def scenes(
         typer.Option(metavar="NAME", help="print this scene's or medium's TOML", autocompletion=printable_names),
     ] = None,
 ):
-    """List the scenes that ship with the toolkit, and the named media."""
+    """List the built-in scenes and the named media."""
     from geomech.text.scenes import lines
 
     print_lines(lines(show))

@@ -25,8 +25,8 @@ def stress(
     as_json: JsonOption = False,
     plot: PlotOption = None,
 ):
-    """Compute the stress of the grains on a plate per unit depth, N/cm^3: backwards (alpha_x) and upwards (alpha_z) (Fig.
-    7)."""
+    """Compute the stress of grains on a plate per unit depth. In N/cm^3, backwards (alpha_x) and upwards (alpha_z), as
+    in Fig. 7."""
     from geomech.study.stress import Stress
 
     figure = Output(plot, drawing("pictures.stress"), drawing("pictures.check"))

@@ -21,7 +21,7 @@ def sweep(
     plot: PlotOption = None,
     yes: YesOption = False,
 ):
-    """Compute the net displacement, or the speed of a robot that walks, over a grid of the scene's parameters. A repeated
+    """Compute displacement or speed over a grid of parameters. Speeds are those of walking robots. A repeated
     command resumes an interrupted one."""
     from geomech.io.results import write_netcdf
     from geomech.study.sweep import Sweep, as_stored

@@ -16,7 +16,7 @@ def symbolic(
     latex: Annotated[bool, typer.Option("--latex", help="LaTeX, for a paper")] = False,
     ccf: Annotated[bool, typer.Option(help="the CCF of every two joints, too")] = True,
 ):
-    """Print the connection in closed form, and its CCF: of chains in a viscous or ideal fluid, afloat, on wheels."""
+    """Print connection and CCF in closed form. Chains in a viscous or ideal fluid, afloat and on wheels have one."""
     from geomech.text.formulas import formulas
 
     show(formulas(load_scene(name), ccf, latex))

@@ -3,28 +3,27 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands import formats
 from geomech.commands.loading import load_scene
-from geomech.commands.options import CyclesOption, SceneArgument, YesOption
-from geomech.commands.pipeline import Output, execute, path_message
+from geomech.commands.options import SceneArgument, YesOption
+from geomech.commands.pipeline import Output, execute
 
 
 def trajectory(
     name: SceneArgument,
-    out: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.csv", help="table to write")],
-    cycles: CyclesOption = 1,
+    out: Annotated[
+        Optional[Path],
+        typer.Option("-o", "--output", metavar="FILE", help="table: .csv; film: .gif, .mp4; strip: .png, .pdf, .svg"),
+    ] = None,
+    cycles: Annotated[Optional[int], typer.Option(metavar="N", help="of the gait; 3 in a film, else 1")] = None,
     yes: YesOption = False,
 ):
-    """Write pose, joint angles and ends of all links at every phase of the scene's gait, as CSV."""
+    """Follow the body through its gait: table, film or strip. A table has pose, joint angles and ends of all links at every
+    phase; a film or a strip of pictures for a page shows the body on its track beside its shape on the CCF."""
     from geomech.output import trajectories
-    from geomech.study.motion import Trajectory
 
-    execute(
-        Trajectory(load_scene(name), cycles),
-        Output(out, trajectories.write, formats.csv, path_message("table in")),
-        yes=yes,
-    )
+    question = trajectories.question(load_scene(name), out, cycles)
+    execute(question, Output(out, trajectories.write, trajectories.check_format, trajectories.message), yes=yes)

@@ -17,7 +17,7 @@ def velocity(
     alphadot: Annotated[str, typer.Option(help="joint rates in rad per unit time, such as 1,0, or in deg")],
     as_json: JsonOption = False,
 ):
-    """Compute the body velocity for one shape and its rate of change, with its residual and status."""
+    """Compute the body velocity of one shape and its rate. The answer has a residual and a status."""
     from geomech.study.velocity import Velocity
 
     scene = load_with_gait(name)

@@ -26,7 +26,7 @@ def walk(
     ] = None,
     yes: YesOption = False,
 ):
-    """Compute how a robot walks on grains: mean speed with its error, and its motion from rest. SI units, pitch in rad, nose
+    """Compute how a robot walks on grains. The mean speed has an error; the motion begins at rest. SI units, pitch in rad, nose
     down."""
     from geomech.study.walking import Walking
 

@@ -113,7 +113,7 @@ def fit_log(
     if harmonics is not None:
         in_range("--harmonics", harmonics, 1, HARMONICS, whole=True)
     if within is not None:
-        in_range("--within", within, 1e-6, 10)
+        in_range("--limits", within, 1e-6, 10)
     log = log if isinstance(log, Log) else read(log, columns, degrees)
     period = cycles.period(log)
     joints, pose = (smooth.smoothed(log.t, x, period) for x in (log.alpha, log.pose))

@@ -36,7 +36,7 @@ class Aim:
     power: float | None = None
 
     def __post_init__(self):
-        choose("--for", self.name, AIMS)
+        choose("--objective", self.name, AIMS)
         if not (isinstance(self.direction, str) and self.direction == ""):
             choose("--direction", self.direction, DIRECTIONS)
             if self.name == "turning":
@@ -45,7 +45,7 @@ class Aim:
             if getattr(self, name) is not None:
                 in_range(f"--{name}", getattr(self, name), 1e-9, 1e9)
                 if self.name != "speed":
-                    raise Refusal(f"--{name} limits speed", instead="say --for speed, or drop it")
+                    raise Refusal(f"--{name} limits speed", instead="say --objective speed, or drop it")
 
     straight = property(lambda self: self.name != "turning", doc="Whether the aim is a distance, not an angle.")
     costs = property(

@@ -35,7 +35,7 @@ def limits(scene: Scene, within: WithinArgument, phases: int) -> Within:
             max(n.extent, float(np.abs(scene.gait.cycle(phases)[0]).max())), float(np.minimum(-low, high).min())
         )
     if is_number(within):
-        in_range("--within", within, LEAST, MOST)
+        in_range("--limits", within, LEAST, MOST)
         pairs = np.array([[-float(within), float(within)]] * system.joints)
     else:
         pairs = _pairs(within, system.joints)
@@ -44,7 +44,9 @@ def limits(scene: Scene, within: WithinArgument, phases: int) -> Within:
     slack = 1e-9 * (1 + np.abs(pairs))
     if (pairs[:, 0] < low - slack[:, 0]).any() or (pairs[:, 1] > high + slack[:, 1]).any():
         field = ", ".join(f"{a:g} to {b:g}" for a, b in zip(low, high))
-        raise Refusal(f"--within {_text(within)} lies outside the field that the scene has", instead=field)
+        raise Refusal(
+            f"--limits {_text(within)} lies outside the field that the scene has", instead=f"{field}; keep to it"
+        )
     return _simplified(np.maximum(pairs[:, 0], low), np.minimum(pairs[:, 1], high))
 
 
@@ -57,12 +59,12 @@ def edges(system: System) -> tuple[np.ndarray, np.ndarray]:
 
 def _pairs(within, joints: int) -> np.ndarray:
     """Return (joints, 2) from pairs, or from one number for each joint."""
-    x = real_array("--within", within)
+    x = real_array("--limits", within)
     x = np.stack([-x, x], -1) if x.ndim == 1 else x
     good = x.shape == (joints, 2) and (np.abs(x) <= MOST).all() and (x[:, 1] - x[:, 0] >= LEAST).all()
     if not good:
         raise Refusal(
-            f"--within takes a number, one for each of {joints} joints, or as many from low to high", value=within
+            f"--limits takes a number, one for each of {joints} joints, or as many from low to high", value=within
         )
     return x
 

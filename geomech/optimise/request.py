@@ -95,7 +95,7 @@ class Request:
         if self.power is None:
             instead = "say --rate" if aim.timed else "optimize for displacement, turning or speed"
             raise Refusal(
-                f"--for {aim.name} asks for power, which {source_name(system)} does not tell", instead=instead
+                f"--objective {aim.name} asks for power, which {source_name(system)} does not tell", instead=instead
             )
         if capability(system, OwnMetric) is not None:
             if aim.power is not None:
@@ -195,7 +195,7 @@ def checked(
         loops = _loops(scene, harmonics, within)
         if isinstance(loops, Undulations) and not objective.straight:
             raise Refusal(
-                "a sine along a straight axis does not turn", because="--for turning takes a gait of few joints"
+                "a sine along a straight axis does not turn", because="--objective turning takes a gait of few joints"
             )
         if isinstance(loops, Undulations) and objective.direction == "y" and system.traits.mirror:
             raise Refusal("a sine along a straight axis brings nothing across it", instead="drop --direction, or say x")
@@ -279,7 +279,7 @@ def _loops(scene: Scene, harmonics: int | None, within: WithinArgument) -> Loops
         for name, value in (("harmonics", harmonics), ("within", within)):
             if value is not None:
                 raise Refusal(
-                    f"--{name} is that of joints",
+                    f"--{'limits' if name == 'within' else name} is that of joints",
                     because="of a sine, amplitude and waves are sought",
                     instead="drop it",
                 )

@@ -16,8 +16,7 @@ from geomech.output.plots.style import styled
 from geomech.run.cost import Cost
 from geomech.run.progress import counted
 from geomech.run.progress import progress as progress_bar
-from geomech.scene.model import Scene
-from geomech.study.motion import Motion, Picture
+from geomech.study.motion import Motion
 from rft.refusal import Refusal
 
 FILMS, STRIPS = (".gif", ".mp4"), (".png", ".pdf", ".svg")
@@ -28,13 +27,13 @@ DRAWING = 0.012  # s a frame takes, some two times what it took
 FRAME = 4e5  # bytes a frame holds until the film is written
 
 
-def check_format(path: Path) -> None:
-    """Refuse a name that does not end as a film or a figure, or a film that nothing here can write."""
+def check_format(path: Path, *others: str) -> None:
+    """Refuse a name that does not end as a film or a figure, or a film that nothing here can write. others: endings of other
+    outputs, such as .csv for a table."""
     ending = path.suffix.lower()
     if ending not in FILMS + STRIPS:
-        raise Refusal(
-            f"cannot draw {path}", instead="end the name in .gif or .mp4 for a film, .png, .pdf or .svg for a strip"
-        )
+        endings = [".gif or .mp4 for a film", ".png, .pdf or .svg for a strip", *others]
+        raise Refusal(f"cannot draw {path}", instead=f"end the name in {', '.join(endings)}")
     if ending == ".mp4" and shutil.which("ffmpeg") is None:
         raise Refusal(
             f"cannot write {path}",
@@ -59,15 +58,9 @@ def cost(phases: int, cycles: int) -> Cost:
     return Cost(0, DRAWING * frames, FRAME * frames, DRAWING * frames)
 
 
-def picture(scene: Scene, path: Path, cycles: int | None) -> Picture:
-    """Return the question of a film or a strip of so many cycles, by default 3 or 1."""
-    count = (3 if is_film(path) else 1) if cycles is None else cycles
-    return Picture(scene, count, cost(scene.numerics.phases, count) if is_film(path) else None)
-
-
 def write(result: Result, path: Path) -> None:
     """Write the film or strip of a motion."""
-    with progress_bar(f"film of {result.subject[0].scene.name}") as bar:
+    with progress_bar(f"film of {result.subject.motion.scene.name}") as bar:
         save(path, *result.subject, progress=bar)
 
 

@@ -82,7 +82,9 @@ class Connection:
 
     def __post_init__(self) -> None:
         if self.plot is None and not (self.style, self.pair, self.slice_, self.other_frame) == (None,) * 4:
-            raise Refusal("--style, --pair, --slice and --beside are those of a figure", instead="say --plot FILE")
+            raise Refusal(
+                "--style, --pair, --slice and --compare-frame are those of a figure", instead="say --plot FILE"
+            )
         if self.style is not None:
             choose("--style", self.style, plots.CONNECTION_STYLES)
 
@@ -111,7 +113,7 @@ class Ccf:
         if self.style is not None:
             choose("--style", self.style, plots.CCF_STYLES)
         if self.stretch and (self.metric or self.other_frame or self.style not in (None, "map")):
-            raise Refusal("--stretch is a map of its own", instead="drop --style, --metric and --beside")
+            raise Refusal("--stretch is a map of its own", instead="drop --style, --metric and --compare-frame")
         if self.metric and self.style not in (None, "map"):
             raise Refusal("--metric draws on a map", instead=f"drop --style {self.style}")
 

@@ -1,4 +1,4 @@
-"""A motion as a table, CSV that pandas and NumPy read."""
+"""A motion as a table, CSV that pandas and NumPy read, or as a film or a strip of pictures, by the ending of its file."""
 
 from __future__ import annotations
 
@@ -7,15 +7,43 @@ from pathlib import Path
 
 from geomech.core.variables import Result
 from geomech.io.files import atomic_file
+from geomech.output import animate
 from geomech.run.progress import progress as progress_bar
-from geomech.study.motion import Motion
+from geomech.scene.model import Scene
+from geomech.study.motion import Motion, Trajectory
 from geomech.systems.base import length_unit, shape_labels
 
 
+def question(scene: Scene, path: Path | None, cycles: int | None) -> Trajectory:
+    """Return the question of so many cycles of a scene, by default 3 for a film, else 1."""
+    film = path is not None and animate.is_film(path)
+    count = (3 if film else 1) if cycles is None else cycles
+    drawing = animate.cost(scene.numerics.phases, count) if film else None
+    return Trajectory(scene, count, path is not None and not is_table(path), drawing)
+
+
+def is_table(path: Path) -> bool:
+    return path.suffix.lower() == ".csv"
+
+
+def check_format(path: Path) -> None:
+    """Refuse a name that ends neither as a table nor as a film or a figure."""
+    if not is_table(path):
+        animate.check_format(path, ".csv for a table")
+
+
+def message(result: Result, path: Path) -> str:
+    """Return the line that names the file."""
+    return f"{'table' if is_table(path) else 'film' if animate.is_film(path) else 'pictures'} in {path}"
+
+
 def write(result: Result, path: Path) -> None:
-    """Write the table of a motion with a progress bar."""
-    with progress_bar(f"table of {result.subject.scene.name}") as bar:
-        save(path, result.subject, bar)
+    """Write the table, the film or the pictures of a motion with a progress bar."""
+    if not is_table(path):
+        animate.write(result, path)
+        return
+    with progress_bar(f"table of {result.subject.motion.scene.name}") as bar:
+        save(path, result.subject.motion, bar)
 
 
 def save(path: Path, motion: Motion, progress: Callable | None = None) -> None:

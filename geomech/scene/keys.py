@@ -70,7 +70,7 @@ def _part(name: str, section: Section, variant: Variant) -> Part:
         about.append(f"Its tables, {inner}, may as well stand by themselves.")
     elif variant.inner:
         inner = " and ".join(f"[{name}.{part}]" for part in variant.inner)
-        about.append(f"'geomech keys intruder' has the keys of {inner}.")
+        about.append(f"'geomech reference intruder' has the keys of {inner}.")
     if variant.implied:
         about.append(f"It need not say its {section.key}.")
     owner = f" of {section.owner}" if section.owner else ""

@@ -1,4 +1,4 @@
-"""Media that a scene takes from files: one that `geomech calibrate` wrote, or a table of measured drag."""
+"""Media that a scene takes from files: one that `geomech fit-medium` wrote, or a table of measured drag."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class NamedMedium:
 class MediumFile:
     """From a file.
 
-    file (-): TOML of a medium, as geomech calibrate writes it, with no key beside it.
+    file (-): TOML of a medium, as geomech fit-medium writes it, with no key beside it.
     """
 
     file: str
@@ -65,7 +65,7 @@ def _medium(place: str, path: Path) -> dict:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is not text"
         raise Refusal(
-            f"cannot read {path.name!r}", where=place, because=reason, instead="geomech calibrate writes such files"
+            f"cannot read {path.name!r}", where=place, because=reason, instead="geomech fit-medium writes such files"
         ) from None
     table = tables.get("medium", tables)
     if not isinstance(table, dict) or (table is not tables and len(tables) > 1):

@@ -88,9 +88,9 @@ def displacement(
     effort: bool = False,
 ) -> Question:
     """Return the question of a command. tiers: their names, with commas between them."""
-    chosen = () if tiers is None else tuple(choose("--methods", name.strip(), METHODS) for name in tiers.split(","))
+    chosen = () if tiers is None else tuple(choose("--tiers", name.strip(), METHODS) for name in tiers.split(","))
     if tolerance is None:
         return Displacement(scene, tuple(amplitudes), chosen, effort)
     if chosen:
-        raise Refusal("--tol chooses the tier", instead="drop --methods")
+        raise Refusal("--tol chooses the tier", instead="drop --tiers")
     return Cheapest(scene, tuple(amplitudes), tolerance, effort)

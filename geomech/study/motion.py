@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from geomech.core.variables import Result, Variable
+from geomech.geometry.field import Field
 from geomech.geometry.reconstruct import poses, repeated
 from geomech.run.cost import Cost
 from geomech.scene.model import Scene
@@ -76,43 +78,27 @@ class Motion:
             yield np.concatenate(parts + ([] if ends is None else [ends.reshape(len(ends), -1)]), 1)
 
 
+class Drawn(NamedTuple):
+    """A motion, and the CCF of its scene with its error where that is drawn beside it."""
+
+    motion: Motion
+    ccf: Field | None = None
+    ccf_error: Field | None = None
+
+
 @dataclass(frozen=True)
 class Trajectory(Question):
-    """Pose of the body at every phase of the scene's gait."""
+    """Pose of the body at every phase of the scene's gait. drawn: whether beside the CCF, where that is a map. drawing: cost
+    of drawing a film."""
 
     scene: Scene
     cycles: int = 1
+    drawn: bool = False
+    drawing: Cost | None = None
 
     @property
     def title(self) -> str:
         return f"motion of {self.scene.name}"
-
-    def cost(self) -> Cost:
-        return cost(self.scene, self.cycles)
-
-    def answer(self, progress: Progress, allow: Allow) -> Result:
-        return of_motion(motion(self.scene, self.cycles))
-
-
-def of_motion(motion: Motion) -> Result:
-    """Return pose and shape by phase; the ends of the links, which are many, are in the subject."""
-    columns, dims = motion.columns, ("phase",)
-    times = {} if motion.time is None else {"time": motion.time}
-    arrays = {"phase": motion.phase, **times, **dict(zip(("x", "y", "theta"), motion.pose.T))}
-    arrays |= {f"alpha_{k + 1}": x for k, x in enumerate(motion.alpha.T)}
-    return Result("motion", tuple(Variable(n, dims, x, columns[n]) for n, x in arrays.items()), {}, motion)
-
-
-@dataclass(frozen=True)
-class Picture(Question):
-    """A motion beside the CCF of its scene, if that is drawn as a map: a strip of pictures, or a film. drawing: cost of
-    drawing the film."""
-
-    scene: Scene
-    cycles: int
-    drawing: Cost | None = None
-
-    title = Trajectory.title
 
     @cached_property
     def study(self) -> Study:
@@ -120,7 +106,7 @@ class Picture(Question):
 
     @property
     def _mapped(self) -> bool:
-        return self.scene.system.joints == 2 and PATH.is_offered(self.scene.system)
+        return self.drawn and self.scene.system.joints == 2 and PATH.is_offered(self.scene.system)
 
     def cost(self) -> Cost:
         costs = [cost(self.scene, self.cycles), *([price(connection(self.scene))] if self._mapped else [])]
@@ -129,11 +115,20 @@ class Picture(Question):
         return Cost(sum(balances), sum(seconds), max(memory), sum(besides), sum(steps))
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        result = of_motion(motion(self.scene, self.cycles))
+        moved = motion(self.scene, self.cycles)
         if self._mapped:
             self.study.compute_field()
         maps = (self.study.curvature, self.study.curvature_error) if self._mapped else ()
-        return replace(result, kind="film", subject=(result.subject, *maps))
+        return _result(Drawn(moved, *maps))
+
+
+def _result(drawn: Drawn) -> Result:
+    """Return pose and shape by phase; the ends of the links, which are many, are in the subject."""
+    motion, dims = drawn.motion, ("phase",)
+    times = {} if motion.time is None else {"time": motion.time}
+    arrays = {"phase": motion.phase, **times, **dict(zip(("x", "y", "theta"), motion.pose.T))}
+    arrays |= {f"alpha_{k + 1}": x for k, x in enumerate(motion.alpha.T)}
+    return Result("motion", tuple(Variable(n, dims, x, motion.columns[n]) for n, x in arrays.items()), {}, drawn)
 
 
 def motion(scene: Scene, cycles: int = 1) -> Motion:

@@ -119,7 +119,7 @@ class ShapeSpace(Question):
             if self.metric and (reason := why_none(system)):
                 raise Refusal(reason, where=name)
             if self.other_frame is not None and len(self._at) > 1:
-                raise Refusal("--beside draws one pair of joints", instead="say which with --pair")
+                raise Refusal("--compare-frame draws one pair of joints", instead="say which with --pair")
         _ = self.other
 
     def cost(self) -> Cost:
@@ -246,7 +246,7 @@ def connection(
         check_two_joints(scene)
     sliced = drawn and (scene.system.joints > 2 or pair is not None or slice_angles is not None)
     if sliced and other_frame is not None:
-        raise Refusal("--beside draws maps of two joints", instead="drop it, or see 'geomech ccf --pair'")
+        raise Refusal("--compare-frame draws maps of two joints", instead="drop it, or see 'geomech ccf --pair'")
     picture = {
         "map": drawn and not sliced,
         "planes": sliced,

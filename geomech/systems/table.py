@@ -39,7 +39,8 @@ class Table:
     (`tables.load`). sha256 (-): of the file, filled in if left out;
     given, the file must have it.
 
-    A file of `geomech fit` holds A near a mean gait alone: gaits that leave the data are refused, and there is no area tier.
+    A file of `geomech fit-gait` holds A near a mean gait alone: gaits that leave the data are refused, and no area tier
+    exists.
 
     The file is read once, when the system is made.
     Its field has the file's own grid; [numerics] grid, extent, directions, harmonics and interpolation say nothing here.

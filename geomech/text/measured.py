@@ -13,7 +13,7 @@ from geomech.scene.write import gait_table
 
 
 def numbers(result: Result) -> dict[str, Any]:
-    """Return a measured gait as `geomech fit --json` prints it."""
+    """Return a measured gait as `geomech fit-gait --json` prints it."""
     return fit_numbers(result.subject)
 
 

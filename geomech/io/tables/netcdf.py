@@ -29,7 +29,7 @@ from geomech.io.tables.base import (
 from rft.refusal import Refusal
 
 SOURCE = "write it anew with 'geomech connection SCENE -o FILE.nc'"
-FITTED = "write it anew with 'geomech fit LOG.csv -o FILE.nc'"
+FITTED = "write it anew with 'geomech fit-gait LOG.csv -o FILE.nc'"
 UNITS = {"body length": "BL", "m": "m"}
 ANGLES = ("rad", "radian", "radians")
 SHAPE = "shape variable "  # before the name of one that is no angle between links

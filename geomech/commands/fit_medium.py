@@ -1,4 +1,4 @@
-"""geomech calibrate."""
+"""geomech fit-medium."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from geomech.commands.pipeline import Output, execute
 Size = Optional[float]
 
 
-def calibrate(
+def fit_medium(
     drag: Annotated[str, typer.Argument(metavar="DRAG.csv", help="a CSV file, or dem-rod-drag, the sample that ships")],
     out: Annotated[
         Optional[Path], typer.Option("-o", "--output", metavar="MEDIUM.toml", help="medium to write")
@@ -35,9 +35,9 @@ def calibrate(
     area: Annotated[Size, typer.Option(help="of the plate in m^2, in place of the file's")] = None,
     as_json: JsonOption = False,
 ):
-    """Fit a medium of your own: a force law to the drag on a rod, columns psi_deg, F_parallel_N, F_perpendicular_N; or, in the
-    vertical plane, nine coefficients to plate drags, columns beta, gamma, alpha_x, alpha_z (degrees, N/cm^3), or zeta to a
-    plate pushed straight down, columns depth_m, force_N."""
+    """Fit a medium to your own drag data. Rods, with the columns psi_deg, F_parallel_N, F_perpendicular_N, give a force law;
+    plates in the vertical plane, with beta, gamma, alpha_x, alpha_z (degrees, N/cm^3), nine coefficients; a plate that is
+    pushed straight down, with depth_m, force_N, the factor zeta."""
     from geomech.output import parts, pictures
     from geomech.study.calibration import Calibration
 

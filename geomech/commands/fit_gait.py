@@ -1,4 +1,4 @@
-"""geomech fit."""
+"""geomech fit-gait."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from geomech.commands.options import JsonOption, PlotOption, an_angle, column_na
 from geomech.commands.pipeline import Output, execute
 
 
-def fit(
+def fit_gait(
     log: Annotated[
         Path, typer.Argument(metavar="LOG.csv", help="t, joint angles, x, y, heading of many cycles of a gait")
     ],
@@ -32,7 +32,7 @@ def fit(
     harmonics: Annotated[
         Optional[int], typer.Option(help="of the connection in the phase; by cross-validation if left out")
     ] = None,
-    within: Annotated[
+    limits: Annotated[
         Optional[float],
         typer.Option(
             metavar="ANGLE",
@@ -45,11 +45,11 @@ def fit(
     ] = 1.0,
     as_json: JsonOption = False,
 ):
-    """Fit the connection near a measured gait: phase, mean gait, A by regression with intervals, and the predicted
-    displacement against the log's."""
+    """Fit the connection near a measured gait. The regression gives phase, mean gait and A with intervals; the
+    predicted displacement is compared with the log's."""
     from geomech.measured.results import Fit
     from geomech.output import parts, pictures
 
-    question = Fit(log, column_names(columns), degrees, level, harmonics, within, body_length)
+    question = Fit(log, column_names(columns), degrees, level, harmonics, limits, body_length)
     field, figure = Output(out, parts.write_tube, formats.netcdf), Output(plot, pictures.measured, pictures.check)
     execute(question, field, Output(scene, *parts.mean_gait(out)), figure, as_json=as_json)

@@ -1,4 +1,4 @@
-"""geomech keys."""
+"""geomech reference."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from geomech.commands.options import PluginOption, load_plugins
 from geomech.commands.pipeline import show
 
 
-def keys(
+def reference(
     section: Annotated[
         Optional[str],
         typer.Argument(metavar="[SECTION]", help="medium, body, gait, ... or all", autocompletion=section_names),
@@ -19,8 +19,8 @@ def keys(
     json_schema: Annotated[bool, typer.Option("--json-schema", help="print a JSON Schema of scene files")] = False,
     plugin: PluginOption = None,
 ):
-    """Print every key of a scene file: type, unit, default and meaning; or a JSON Schema for editors."""
-    from geomech.text.keys import reference
+    """Print every key of a scene file. Each has its type, unit, default and meaning."""
+    from geomech.text import keys
 
     load_plugins(plugin)
-    show([reference(section, json_schema)])
+    show([keys.reference(section, json_schema)])

@@ -1,0 +1,32 @@
+"""Commands and options that were renamed in version 0.1: the old spellings work until the next version, with a note."""
+
+from __future__ import annotations
+
+import warnings
+
+from geomech.core.errors import Note
+
+COMMANDS = {"fit": "fit-gait", "calibrate": "fit-medium", "keys": "reference", "animate": "trajectory"}
+OPTIONS = {
+    "--for": "--objective",
+    "--within": "--limits",
+    "--beside": "--compare-frame",
+    "--methods": "--tiers",
+    "--cost": "--effort",
+}
+
+
+def current(words: list[str]) -> list[str]:
+    """Return a command's name and its arguments in the current spelling; `Note` for each old one."""
+    name, *arguments = words
+    options = arguments[: arguments.index("--")] if "--" in arguments else arguments
+    return [_current(name, COMMANDS), *(_current(x, OPTIONS) for x in options), *arguments[len(options) :]]
+
+
+def _current(word: str, renamed: dict[str, str]) -> str:
+    """Return a command, or an option such as --for or --for=speed, in the current spelling."""
+    old, equals, value = word.partition("=")
+    if old not in renamed:
+        return word
+    warnings.warn(f"{old} is now {renamed[old]}: the old spelling goes with the next version", Note, stacklevel=3)
+    return renamed[old] + equals + value
