@@ -26,6 +26,8 @@ class Readme(MetadataHookInterface):
     def update(self, metadata: dict) -> None:
         """Set `metadata["readme"]` from README.md, project.urls and the version."""
         text = (pathlib.Path(self.root) / "README.md").read_text(encoding="utf-8")
-        version = re.search(r'^VERSION = "(.*)"', (pathlib.Path(self.root) / "geomech/core/version.py").read_text(), re.M)[1]
+        version = re.search(
+            r'^VERSION = "(.*)"', (pathlib.Path(self.root) / "geomech/core/version.py").read_text(), re.M
+        )[1]
         text = absolute(text, metadata["urls"]["Repository"], version)
         metadata["readme"] = {"content-type": "text/markdown", "text": text}

@@ -40,11 +40,7 @@ LARGE = {
     "amplitudes of a sweep": ["sweep", "sandfish-loose", "--over", "gait.amplitude=0.1:2:99999", "-o", "out.nc"],
     "a grid": ["connection", "three-link-glass", "--grid", "1414", "-o", "out.nc"],
     "a field of four joints": ["connection", "five.toml", "-o", "out.nc"],
-<<<<<<< HEAD
-    "a connection around a gait": ["displacement", "five.toml", "--amplitudes", "0.1:0.5:99999", "--methods", "path"],
-=======
-    "a connection around a gait": ["displacement", "five.toml", "--amplitudes", "0.1:0.5:2999", "--tiers", "path"],
->>>>>>> commands
+    "a connection around a gait": ["displacement", "five.toml", "--amplitudes", "0.1:0.5:99999", "--tiers", "path"],
     "a map": ["ccf", "directions.toml", "--grid", "301", "--plot", "out.png"],
     "directions": ["connection", "directions.toml", "-o", "out.nc", "--grid", "301"],
     "harmonics": ["displacement", "harmonics.toml", "--amplitudes", "1", "--tiers", "harmonic", "--grid", "201"],
