@@ -39,7 +39,7 @@ LARGE = {
     "values of a sweep": ["sweep", "sandfish-transient", "--over", "medium.C=1:2:99999", "-o", "out.nc"],
     "amplitudes of a sweep": ["sweep", "sandfish-loose", "--over", "gait.amplitude=0.1:2:99999", "-o", "out.nc"],
     "a grid": ["connection", "three-link-glass", "--grid", "1414", "-o", "out.nc"],
-    "a field of four joints": ["connection", "five.toml", "-o", "out.nc"],
+    "a field of four joints": ["connection", "five.toml", "--grid", "36", "-o", "out.nc"],
     "a connection around a gait": ["displacement", "five.toml", "--amplitudes", "0.1:0.5:99999", "--tiers", "path"],
     "a map": ["ccf", "directions.toml", "--grid", "301", "--plot", "out.png"],
     "directions": ["connection", "directions.toml", "-o", "out.nc", "--grid", "301"],
