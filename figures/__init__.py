@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 def main(name: str, compute: Callable, draw: Callable, table: Callable | None = None) -> None:
     """Compute, draw and save to the file named on the command line, or to <name>.png; print the table if there is one."""
-    from geomech.output import plots
+    from geomech import plots
 
     try:
         path = plots.check_format(sys.argv[1] if len(sys.argv) > 1 else f"{name}.png")

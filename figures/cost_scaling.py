@@ -11,9 +11,9 @@ import numpy as np
 from scipy.optimize import fsolve
 
 from figures import main, style
+from geomech import plots
 from geomech.gaits import Circle
 from geomech.geometry import connection
-from geomech.output import plots
 from geomech.tiers.direct import direct
 from rft import CATALOGUE, Chain, body_velocity
 from rft.balance import backend

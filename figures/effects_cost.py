@@ -12,8 +12,8 @@ import numpy as np
 
 import rft
 from figures import main, style
-from geomech.output import plots
-from geomech.scene import load
+from geomech import plots
+from geomech.scenes import load
 from rft import BodyInertia, DepthProfile, DisturbedGround, EndCaps, GrainInertia, SkinFriction, Transient
 
 ALGEBRAIC = {

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from figures import main, style
-from geomech.output import plots
-from geomech.study.calibration import Calibration
+from geomech import plots
+from geomech.studies.calibration import Calibration
 from rft import CATALOGUE, Viscous
 
 

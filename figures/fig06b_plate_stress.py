@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from figures import main, style
-from geomech.output import plots
+from geomech import plots
 from rft.plates import VERTICAL, Plate, loads
 
 LENGTH, WIDTH = 0.038, 0.025  # m, assumed

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from figures import main, style
-from geomech.output import plots
+from geomech import plots
 from rft.plates import VERTICAL, survey
 from rft.plates.stress import COEFFICIENTS
 

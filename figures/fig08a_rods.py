@@ -23,7 +23,7 @@ from dataclasses import replace
 import numpy as np
 
 from figures import main, style
-from geomech.output import plots
+from geomech import plots
 from rft.plates import VERTICAL, HalfCylinder, RoundRod, SquareRod, loads, parts
 
 RADIUS, WIDTH = 0.0127, 0.1  # m, assumed

@@ -19,8 +19,8 @@ from dataclasses import replace
 import numpy as np
 
 from figures import main, style
-from geomech.output import plots
-from geomech.scene import load
+from geomech import plots
+from geomech.scenes import load
 
 LEGS = ("c-leg", "flat-leg", "reversed-c-leg")
 HUBS = (-0.01, 0.0, 0.01)  # m, added to the scene's height

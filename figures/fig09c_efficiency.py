@@ -21,10 +21,10 @@ import functools
 import numpy as np
 
 from figures import main, style
+from geomech import plots
 from geomech.gaits import Sine
-from geomech.output import plots
-from geomech.scene import load
-from geomech.study import undulation
+from geomech.scenes import load
+from geomech.studies import undulation
 
 SCENES = {"sandfish-loose": style.LOOSE, "sandfish-close": style.CLOSE, "shovel-nosed-snake": style.GREEN}
 ROUGHER = "shovel-nosed-snake, rod 0.2"  # the snake, if the law's rod had that friction, not the 0.15 of Fig. 5

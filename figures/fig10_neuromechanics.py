@@ -1,6 +1,6 @@
 """Fig. 10: muscle activation of a swimming sandfish, predicted by the internal moment that holds against the sand.
 
-The sign of the moment is taken for the side that works, as in Sec. III C (`geomech.study.undulation.activation`), for a
+The sign of the moment is taken for the side that works, as in Sec. III C (`geomech.studies.undulation.activation`), for a
 plain body at the animal's amplitude in loose glass; dashed in (d), with the sandfish's head drag.
 
 (a) As Fig. 10(c): lines where the right side starts and stops to work, over the shaded part of the cycle in which
@@ -24,10 +24,10 @@ from __future__ import annotations
 import numpy as np
 
 from figures import main, style
+from geomech import plots
 from geomech.gaits import Sine
-from geomech.output import plots
-from geomech.scene import load
-from geomech.study import undulation
+from geomech.scenes import load
+from geomech.studies import undulation
 from rft import Backbone
 
 WAVES = np.linspace(0.5, 1.8, 27)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from figures import main, style
-from geomech.output import plots
-from geomech.scene import load
-from geomech.study.study import Study
+from geomech import plots
+from geomech.scenes import load
+from geomech.studies.study import Study
 
 
 def compute(scene: str = "three-link-glass", **numerics) -> dict:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from figures import main
+from geomech import plots
 from geomech.gaits import Butterfly
-from geomech.output import plots
-from geomech.scene import load
-from geomech.study.study import Study
+from geomech.scenes import load
+from geomech.studies.study import Study
 
 
 def compute(scene: str = "three-link-glass", **numerics) -> dict:

@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 
 from figures import main
+from geomech import plots
 from geomech.gaits import Butterfly, Circle
-from geomech.output import plots
-from geomech.scene import load
-from geomech.study.study import Study
+from geomech.scenes import load
+from geomech.studies.study import Study
 from geomech.tiers import TIERS
 
 GAITS = {"circle": Circle(reverse=True), "butterfly": Butterfly()}

@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 
 from figures import main, style
-from geomech.output import plots
-from geomech.output.plots import curves
-from geomech.scene import load
-from geomech.study import walking
-from geomech.study.sweep import sweep
+from geomech import plots
+from geomech.plots import curves
+from geomech.scenes import load
+from geomech.studies import walking
+from geomech.studies.sweep import sweep
 
 CURVATURES = np.linspace(-1.0, 1.0, 9).tolist()
 FREQUENCIES = [1.0, 2.0, 3.0, 4.0]
@@ -23,7 +23,7 @@ AIR = np.linspace(0.0, 0.24, 9).tolist()  # m/s
 
 
 def compute(curvatures=CURVATURES, frequencies=FREQUENCIES, rates=RATES, air=AIR) -> dict:
-    """Return the walk of Xplorer as it is built in, and legs and flow as `geomech.study.sweep.sweep` gives them."""
+    """Return the walk of Xplorer as it is built in, and legs and flow as `geomech.studies.sweep.sweep` gives them."""
     xplorer, sandbot = load("xplorer"), load("sandbot")
     over = {"robot.legs.relative_curvature": curvatures, "gait.frequency": frequencies}
     flows = {"effects.aeration.air_speed": air, "gait.frequency": (np.asarray(rates) / (2 * np.pi)).tolist()}

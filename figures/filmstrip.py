@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from figures import main
-from geomech.output import plots
-from geomech.scene import load
-from geomech.study.motion import motion
-from geomech.study.study import Study
+from geomech import plots
+from geomech.scenes import load
+from geomech.studies.motion import motion
+from geomech.studies.study import Study
 
 
 def compute(scene: str = "butterfly-glass", cycles: int = 1, **numerics) -> dict:
-    """Return the motion (`geomech.study.motion.Motion`), and the CCF with its error."""
+    """Return the motion (`geomech.studies.motion.Motion`), and the CCF with its error."""
     study = Study(load(scene).with_numerics(**numerics))
     return {"motion": motion(study.scene, cycles), "ccf": study.curvature, "error": study.curvature_error}
 

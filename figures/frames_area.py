@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 
 from figures import main, style
+from geomech import plots
 from geomech.gaits import Butterfly, Circle
-from geomech.output import plots
-from geomech.scene import load
-from geomech.study.study import Study
+from geomech.scenes import load
+from geomech.studies.study import Study
 
 FRAMES = "mean", "link-2", "minimum-perturbation"
 GAITS = {

@@ -13,8 +13,8 @@ import dataclasses
 import numpy as np
 
 from figures import main, style
-from geomech.output import plots
-from geomech.scene import load
+from geomech import plots
+from geomech.scenes import load
 from rft.ground import Aeration, DisturbedGround, GrainInertia, Slope
 from rft.ground.slope import REPOSE
 

@@ -11,9 +11,9 @@ import functools
 import numpy as np
 
 from figures import main
+from geomech import plots
 from geomech.geometry import connection, harmonics
-from geomech.output import plots
-from geomech.scene import load
+from geomech.scenes import load
 
 
 def compute(scene: str = "three-link-glass", grid: int = 51, directions: int = 48) -> dict:

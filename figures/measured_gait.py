@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from figures import main
+from geomech import plots
 from geomech.gaits import Ellipse
 from geomech.measured import Fitted, Log, fit_log, synthetic
-from geomech.output import plots
-from geomech.scene import load
+from geomech.scenes import load
 from geomech.text import measured
 
 GAIT = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.2, -0.1))

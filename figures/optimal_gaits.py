@@ -17,10 +17,10 @@ from __future__ import annotations
 import numpy as np
 
 from figures import main, style
-from geomech.optimise import optimise
-from geomech.optimise.gain import PHASES, gained_ccf
-from geomech.output import plots
-from geomech.scene import load
+from geomech import plots
+from geomech.optimisation import optimise
+from geomech.optimisation.gain import PHASES, gained_ccf
+from geomech.scenes import load
 
 SCENES = {"viscous fluid, ratio 2": "three-link-viscous", "loose 0.3 mm glass": "three-link-glass"}
 AIMS = {"displacement": (style.BLACK, "-"), "efficiency": (style.GREEN, "--")}

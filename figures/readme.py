@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from figures import fig11d_ccf, fig11e_displacement, main
-from geomech.output import plots
+from geomech import plots
 
 
 def compute() -> dict:

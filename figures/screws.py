@@ -12,8 +12,8 @@ import dataclasses
 import numpy as np
 
 from figures import main, style
-from geomech.output import plots
-from geomech.scene import load
+from geomech import plots
+from geomech.scenes import load
 from rft import se2
 from rft.walking import Fineness, Walker, cruise, engine, turning
 from rft.walking.craft import PER_SQUARE

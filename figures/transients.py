@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from figures import main, style
+from geomech import plots
 from geomech.gaits import Sine
-from geomech.output import plots
-from geomech.scene import load
-from geomech.study.batch import side_by_side
+from geomech.scenes import load
+from geomech.studies.batch import side_by_side
 from rft import Backbone, Transient
 
 AMPLITUDES = (0.1, 0.22, 0.4)  # A / lambda

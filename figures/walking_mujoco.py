@@ -11,8 +11,8 @@ import dataclasses
 import numpy as np
 
 from figures import main, style
-from geomech.output import plots
-from geomech.scene import load
+from geomech import plots
+from geomech.scenes import load
 from rft.walking import Tripod, Walker, engine
 
 STEPS = {"implicit": (12, 16, 24, 32, 48, 64, 96, 128), "held": (128, 256, 512, 1024, 2048, 4096)}

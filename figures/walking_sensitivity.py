@@ -13,9 +13,9 @@ import dataclasses
 import numpy as np
 
 from figures import main, style
-from geomech.output import plots
-from geomech.scene import load
-from geomech.study import walking
+from geomech import plots
+from geomech.scenes import load
+from geomech.studies import walking
 from rft.ground import Aeration
 from rft.plates import Polygon
 from rft.plates.outline import Outline

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from figures import main, style
-from geomech.output import plots
-from geomech.scene import load
+from geomech import plots
+from geomech.scenes import load
 from rft.walking import Tripod, Walker
 from rft.walking.march import step
 from rft.walking.planar import State

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from figures import main, style
-from geomech.output import plots
+from geomech import plots
 from rft.ground import GrainInertia
 from rft.plates import VERTICAL, Wheel
 from rft.walking import rolling

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from figures import main
-from geomech.output import plots
-from geomech.scene import load
-from geomech.study import accuracy
+from geomech import plots
+from geomech.scenes import load
+from geomech.studies import accuracy
 
 
 def compute(scene: str = "three-link-glass", runs: int = 2) -> dict:

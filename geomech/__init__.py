@@ -7,7 +7,8 @@ load, Scene, Swimmer, Numerics, toml    scenes: read, built and written
 Study, tiers, workers                   connection, CCF, cost, displacements, errors; processes
 media, bodies, gaits, effects, systems  the parts of scenes; `register` adds custom ones
 connection, curvature, reconstruct      the geometry of any velocity(alpha, alphadot)
-optimise, undulation, fit_log, plots    the best gait; swimmers that undulate; measured gaits; figures
+optimise (or optimize), undulation      the best gait; swimmers that undulate
+fit_log, plots                          measured gaits; figures
 Refusal                                 the error for whatever makes no sense: a ValueError with its facts
 On the command line: `geomech --help`; every key of a scene file: `geomech reference`.
 """
@@ -23,22 +24,23 @@ from geomech.core import version as _version
 if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech import gaits as gaits
     from geomech import measured as measured
-    from geomech import optimise as optimise
+    from geomech import plots as plots
     from geomech import systems as systems
     from geomech import tiers as tiers
     from geomech.geometry import connection as connection
     from geomech.geometry import curvature as curvature
     from geomech.geometry import reconstruct as reconstruct
     from geomech.measured import fit_log as fit_log
-    from geomech.output import plots as plots
+    from geomech.optimisation import optimise as optimise
+    from geomech.optimisation import optimize as optimize
     from geomech.run import workers as workers
-    from geomech.scene import Numerics as Numerics
-    from geomech.scene import Scene as Scene
-    from geomech.scene import load as load
-    from geomech.scene import toml as toml
-    from geomech.scene.kinds import register as register
-    from geomech.study import undulation as undulation
-    from geomech.study.study import Study as Study
+    from geomech.scenes import Numerics as Numerics
+    from geomech.scenes import Scene as Scene
+    from geomech.scenes import load as load
+    from geomech.scenes import toml as toml
+    from geomech.scenes.kinds import register as register
+    from geomech.studies import undulation as undulation
+    from geomech.studies.study import Study as Study
     from geomech.systems import Swimmer as Swimmer
     from rft import bodies as bodies
     from rft import effects as effects
@@ -51,19 +53,19 @@ __version__ = _version.VERSION
 
 _MODULES = {  # by their names here; none is imported before its first use
     **{name: f"geomech.geometry.{name}" for name in ("connection", "curvature", "reconstruct")},
-    **{name: f"geomech.{name}" for name in ("gaits", "measured", "optimise", "systems", "tiers")},
+    **{name: f"geomech.{name}" for name in ("gaits", "measured", "plots", "systems", "tiers")},
     **{name: f"rft.{name}" for name in ("bodies", "effects")},
     "media": "rft.laws",
-    "plots": "geomech.output.plots",
-    "undulation": "geomech.study.undulation",
+    "undulation": "geomech.studies.undulation",
     "workers": "geomech.run.workers",
 }
 _OBJECTS = {
-    **dict.fromkeys(("load", "toml", "Scene", "Numerics"), "geomech.scene"),
-    "Study": "geomech.study.study",
+    **dict.fromkeys(("load", "toml", "Scene", "Numerics"), "geomech.scenes"),
+    "Study": "geomech.studies.study",
     "Swimmer": "geomech.systems",
+    **dict.fromkeys(("optimise", "optimize"), "geomech.optimisation"),
     "fit_log": "geomech.measured",
-    "register": "geomech.scene.kinds",
+    "register": "geomech.scenes.kinds",
     "Refusal": "rft.refusal",
 }
 

@@ -21,7 +21,7 @@ class Connection:
 
         shapes: names of the shape variables, where these are no joint angles. ImportError without the package xarray."""
         from geomech.io.results import to_xarray
-        from geomech.study.fields import of_fitted
+        from geomech.studies.fields import of_fitted
 
         return to_xarray(of_fitted(self, shapes))
 
@@ -47,7 +47,7 @@ class Field:
 
         shapes: names of the shape variables, where these are no joint angles. ImportError without the package xarray."""
         from geomech.io.results import to_xarray
-        from geomech.study.fields import of_field
+        from geomech.studies.fields import of_field
 
         return to_xarray(of_field(self, name, shapes))[name]
 
@@ -61,7 +61,7 @@ class Study:
     def to_xarray(self) -> Any:
         """Return a Dataset with all that the file of `geomech connection` has. ImportError without the package xarray."""
         from geomech.io.results import to_xarray
-        from geomech.study.fields import of_study
+        from geomech.studies.fields import of_study
 
         return to_xarray(of_study(self))
 
@@ -81,7 +81,7 @@ class Displacements:
     def to_xarray(self) -> Any:
         """Return a Dataset over tier, amplitude and component, with units and error estimates."""
         from geomech.io.results import to_xarray
-        from geomech.study.tables import as_stored
+        from geomech.studies.tables import as_stored
 
         return to_xarray(as_stored(self.result))
 
@@ -95,7 +95,7 @@ class Swept:
     def to_xarray(self) -> Any:
         """Return a Dataset over the parameters and component, as the file of `geomech sweep`."""
         from geomech.io.results import to_xarray
-        from geomech.study.sweep import as_stored
+        from geomech.studies.sweep import as_stored
 
         return to_xarray(as_stored(self.result))
 

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.collections import QuadMesh
 
-from geomech.output import plots
+from geomech import plots
 
 
 def drawn(module, numbers, folder):

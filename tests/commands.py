@@ -12,7 +12,7 @@ import pytest
 import typer.main
 
 from geomech import cli
-from geomech.scene import kinds
+from geomech.scenes import kinds
 from rft.registry import REGISTRIES
 
 PARSER = functools.cache(typer.main.get_command)  # it takes 20 ms, and is the same each time

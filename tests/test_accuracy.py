@@ -5,11 +5,11 @@ import pytest
 from artists import curve, drawn
 
 from figures import cost_scaling, work_precision
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection
-from geomech.study import accuracy, tiered
-from geomech.study.study import Study
+from geomech.studies import accuracy, tiered
+from geomech.studies.study import Study
 from geomech.text import accuracy as text
 from geomech.tiers.direct import direct
 from rft import Chain, Viscous, body_velocity

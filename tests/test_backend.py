@@ -19,7 +19,7 @@ from commands import geomech
 from registry import EFFECTS, MEDIA
 from test_hard_cases import GLASS, apart
 
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.gaits import Ellipse
 from geomech.systems import solver
 from geomech.text.explain import explain

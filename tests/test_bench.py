@@ -8,11 +8,11 @@ import pytest
 from registry import BODIES, EFFECTS, GAITS, MEDIA, SYSTEMS
 
 import rft
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.gaits import Circle, Fourier, Sine
 from geomech.geometry import connection
-from geomech.scene import Numerics, Scene
-from geomech.study.study import Study
+from geomech.scenes import Numerics, Scene
+from geomech.studies.study import Study
 from geomech.systems import Solver, Swimmer
 from geomech.systems.base import length_unit
 from geomech.systems.capabilities import solver_of

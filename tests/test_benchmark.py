@@ -12,8 +12,8 @@ import pytest
 from figures.cost_scaling import NAMES, backends, one_scipy_solve, quickest
 from geomech.gaits import Butterfly, Circle, Sine
 from geomech.geometry import connection
-from geomech.scene import load
-from geomech.study.study import Study
+from geomech.scenes import load
+from geomech.studies.study import Study
 from geomech.systems import Solver, Swimmer
 from geomech.tiers.direct import direct
 from rft import CATALOGUE, Backbone, Chain, Transient, body_velocity, time_steps

@@ -6,8 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from geomech import scene as scenes
-from geomech.study.study import Study
+from geomech import scenes
+from geomech.studies.study import Study
 from rft import CATALOGUE
 
 pytestmark = pytest.mark.usefixtures("fastest")

@@ -9,10 +9,10 @@ import pytest
 from commands import geomech
 from scipy.stats import norm, qmc
 
-from geomech import scene
+from geomech import scenes as scene
 from geomech.io.rows import Rows
-from geomech.scene import drag
-from geomech.study import calibration
+from geomech.scenes import drag
+from geomech.studies import calibration
 from rft import Coulomb, Granular, Viscous
 from rft.calibrate import Fit, fit
 from rft.drag import Rod, rod_drag
@@ -391,7 +391,7 @@ def test_outputs_never_replace_the_data(tmp_path):
 
 
 def test_the_picture_shows_data_law_band_and_residuals():
-    from geomech.output import plots
+    from geomech import plots
 
     result = calibration.Calibration("dem-rod-drag", "granular").ask()
     psi, force, residual, law = (result[name].values for name in ("psi", "force", "residual", "law"))

@@ -8,12 +8,12 @@ import pytest
 from commands import geomech
 from scipy.special import ellipe
 
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.core.errors import Note, UnitWarning
 from geomech.gaits import Centreline, Sine
 from geomech.gaits.waves import arc_to_phase
-from geomech.study.study import Study
-from geomech.study.sweep import Sweep
+from geomech.studies.study import Study
+from geomech.studies.sweep import Sweep
 from rft import Backbone
 from rft.refusal import Refusal
 
@@ -266,7 +266,7 @@ def test_file_lies_beside_the_scene(tmp_path, monkeypatch):
 
 
 def test_sweeps_are_taken_up_only_with_the_same_file(tmp_path, monkeypatch):
-    from geomech.study import cycles, sweep
+    from geomech.studies import cycles, sweep
 
     toml, partial = scene_in(tmp_path, 12), tmp_path / "partial"
     write(tmp_path / "data", "points", count=12, places=20)

@@ -13,13 +13,13 @@ import pytest
 import xarray
 from commands import as_process, geomech
 
-from geomech import scene as scenes
+from geomech import plots, scenes
 from geomech.core.variables import Result
 from geomech.geometry import curvature
 from geomech.io import files
-from geomech.output import plots, report
-from geomech.study.report import Report
-from geomech.study.study import Study
+from geomech.output import report
+from geomech.studies.report import Report
+from geomech.studies.study import Study
 from geomech.text import accuracy
 
 SMALL = ["--grid", "9"]
@@ -200,7 +200,7 @@ def test_letters_of_any_alphabet_are_kept(tmp_path):
 
 
 def test_a_failure_half_way_leaves_nothing(undrawn, tmp_path, monkeypatch):
-    from geomech.output import plots
+    from geomech import plots
 
     def fail(*args, **kwargs):
         raise ValueError("half way")
@@ -424,7 +424,7 @@ def test_commands_load_what_they_use_and_no_more(tmp_path):
         ["sweep", "three-link-viscous", "--over", "gait.amplitude=0.5,1", "-o", "s.nc"],
     ]
     heavy = ("matplotlib", "scipy.interpolate", "scipy.optimize", "scipy.spatial", "sympy", "numba", "distributed")
-    heavy += ("rft.walking", "rft.meshes", "geomech.scene.walker", "concurrent.futures.process", "rich.progress")
+    heavy += ("rft.walking", "rft.meshes", "geomech.scenes.walker", "concurrent.futures.process", "rich.progress")
     code = f"""if True:
         import os, sys
         from geomech import cli

@@ -12,12 +12,12 @@ from commands import geomech
 from tasks import always_dies, dies, fails
 from test_workers import OVER, power  # noqa: F401  power is a fixture
 
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.run import executors
 from geomech.run.executors import Cluster
 from geomech.run.jobs import runner
 from geomech.run.workers import using
-from geomech.study import cycles, sweep
+from geomech.studies import cycles, sweep
 from rft.refusal import Refusal
 
 distributed = pytest.importorskip("distributed", reason="the extra 'distributed' is not installed")

@@ -13,14 +13,12 @@ import pytest
 from commands import geomech as run
 from scipy.io import netcdf_file
 
-from geomech import scene as scenes
-from geomech import terminal
+from geomech import plots, scenes, terminal
 from geomech.geometry import connection, harmonics
 from geomech.geometry.field import Field
-from geomech.output import plots
 from geomech.run import cost as run_cost
-from geomech.study import cycles, estimate, sweep
-from geomech.study.study import Study
+from geomech.studies import cycles, estimate, sweep
+from geomech.studies.study import Study
 
 GLASS = scenes.load("three-link-glass")
 VISCOUS = scenes.load("three-link-viscous")
@@ -95,7 +93,7 @@ def test_yes_computes_and_says_what_is_to_come(large, monkeypatch):
 
 def test_a_field_of_four_joints_is_written(large, monkeypatch):
     """Said before it begins once it takes a second; least squares over the same directions at one of its shapes."""
-    monkeypatch.setattr("geomech.study.shape_space.ShapeSpace.worth_saying", 0.0)
+    monkeypatch.setattr("geomech.studies.shape_space.ShapeSpace.worth_saying", 0.0)
     code, out, err = run("connection", "five.toml", "--grid", "4", "--extent", "1.2", "-o", "out.nc")
     assert (code, out) == (0, "")
     assert err.startswith("five.toml: 8,704 force balances, about 1 s of computing and 16")

@@ -4,10 +4,10 @@ import dataclasses
 
 import pytest
 
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.gaits import Fourier
-from geomech.study import accuracy, cost, effort, motion, sweep
-from geomech.study.study import Study
+from geomech.studies import accuracy, cost, effort, motion, sweep
+from geomech.studies.study import Study
 from rft.balance.listening import listening
 from rft.effects import SkinFriction, Slope
 

@@ -7,11 +7,10 @@ import pytest
 import sympy as sp
 import xarray
 
-from geomech import scene as scenes
-from geomech import symbolic
+from geomech import scenes, symbolic
 from geomech.geometry import connection, curvature
-from geomech.study import fields
-from geomech.study.study import Study
+from geomech.studies import fields
+from geomech.studies.study import Study
 from geomech.tiers import fitted
 from rft import se2
 

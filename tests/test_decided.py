@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import tasks
 
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.run import cost as run_cost
 from geomech.run import jobs
-from geomech.study import sweep
-from geomech.study.study import Study
+from geomech.studies import sweep
+from geomech.studies.study import Study
 from rft.balance.backend import preferring
 from rft.balance.listening import listener, listening, nobody
 from rft.refusal import Refusal

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geomech import scene as scenes
-from geomech.optimise import checked
+from geomech import scenes
+from geomech.optimisation import checked
 from geomech.run.digest import Undigestible, digest
-from geomech.study.effort import _Driven
-from geomech.study.study import Study
+from geomech.studies.effort import _Driven
+from geomech.studies.study import Study
 from geomech.systems.solver import Solver
 
 VISCOUS = scenes.load("three-link-viscous")

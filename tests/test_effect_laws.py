@@ -9,7 +9,7 @@ from loads import as_array, element_load
 from registry import BODIES
 from scipy import optimize
 
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.gaits import Circle, Sine
 from rft import (
     CATALOGUE,

@@ -10,9 +10,9 @@ import pytest
 from artists import curve, drawn
 from registry import EFFECTS
 
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.gaits import Circle, Ellipse, Sine
-from geomech.study.study import Study
+from geomech.studies.study import Study
 from geomech.text.explain import explain
 from rft import (
     CATALOGUE,

@@ -9,9 +9,9 @@ import geomech
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import metric
 from geomech.geometry.connection import Connection
-from geomech.scene.frames import framed
-from geomech.study import cost, effort, fields
-from geomech.study.results import Displacements
+from geomech.scenes.frames import framed
+from geomech.studies import cost, effort, fields
+from geomech.studies.results import Displacements
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from geomech.systems.capabilities import velocity_and_power
 from rft import BodyInertia, Chain, DisturbedGround, Granular, Serpenoid, SkinFriction, Transient, Viscous

@@ -23,9 +23,9 @@ from figures import (
     optimal_gaits,
     style,
 )
-from geomech.output import plots
-from geomech.scene import load
-from geomech.study.study import Study
+from geomech import plots
+from geomech.scenes import load
+from geomech.studies.study import Study
 from rft import CATALOGUE, Granular
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -177,7 +177,7 @@ def test_a_table_has_its_cells_under_their_heads():
 def test_figures_load_nothing_when_imported():
     """A figure reads and computes when it is asked to."""
     code = (
-        "import importlib, pathlib, figures, rft, geomech.scene as s\n"
+        "import importlib, pathlib, figures, rft, geomech.scenes as s\n"
         "def refuse(*args, **kwargs): raise AssertionError('loaded on import')\n"
         "s.load = s.parse = rft.body_velocity = refuse\n"
         "[importlib.import_module(f'figures.{p.stem}') for p in pathlib.Path(figures.__file__).parent.glob('*.py')]"

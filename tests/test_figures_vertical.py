@@ -8,7 +8,7 @@ import pytest
 from artists import curve, curves, drawn
 
 from figures import fig06b_plate_stress, fig07_stress_maps, fig08a_rods, fig08b_legs
-from geomech.scene import load
+from geomech.scenes import load
 
 
 def test_fig06b(tmp_path):

@@ -10,14 +10,14 @@ from scipy.io import netcdf_file
 from test_mjcf import CART
 from test_mjcf import SCENE as WALKER
 
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.io import files, tables
 from geomech.io.tables.mat import ABOUT
 from geomech.output import display, mat
 from geomech.run import progress
-from geomech.scene import Numerics, Scene
-from geomech.study import fields, sweep
-from geomech.study.study import Study
+from geomech.scenes import Numerics, Scene
+from geomech.studies import fields, sweep
+from geomech.studies.study import Study
 from geomech.text.explain import explain
 from rft import refusal as errors
 

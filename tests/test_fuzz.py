@@ -6,8 +6,8 @@ import re
 import numpy as np
 import pytest
 
-from geomech import scene as scenes
-from geomech.study.study import Study
+from geomech import scenes
+from geomech.studies.study import Study
 
 pytestmark = [pytest.mark.usefixtures("fastest"), pytest.mark.filterwarnings("ignore::geomech.core.errors.UnitWarning")]
 

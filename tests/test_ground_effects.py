@@ -10,7 +10,7 @@ from artists import curve, drawn
 from registry import GROUND_EFFECTS, OUTLINES, STRESSES
 
 from figures import ground_effects
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.text.explain import explain
 from rft.ground import GROUND_EFFECTS as KINDS
 from rft.ground import Aeration, DisturbedGround, GrainInertia, Slope, ground_of

@@ -101,7 +101,7 @@ def test_axes_and_directions_that_do_not_match():
 
 def test_the_table_says_what_it_took():
     """Foreseen balances are those that are solved."""
-    from geomech import scene as scenes
+    from geomech import scenes
     from geomech.tiers import fitted, harmonic
 
     for name in ("three-link-glass", "butterfly-glass"):

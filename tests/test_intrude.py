@@ -10,12 +10,12 @@ import pytest
 from registry import OUTLINES, STRESSES
 from test_fuzz import VALUES, mutated
 
-import geomech.scene as scenes
-from geomech.output import plots
-from geomech.scene.intruder import IntruderScene
-from geomech.scene.stress import load_medium
-from geomech.study.intrusion import estimate
-from geomech.study.study import Study
+import geomech.scenes as scenes
+from geomech import plots
+from geomech.scenes.intruder import IntruderScene
+from geomech.scenes.stress import load_medium
+from geomech.studies.intrusion import estimate
+from geomech.studies.study import Study
 from rft.plates import VERTICAL, CLeg, Drag, Outline, Penetrate, PlateDrags, Rotate, StressMap, loads
 from rft.refusal import Refusal
 

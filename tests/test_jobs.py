@@ -14,23 +14,21 @@ from commands import geomech
 from tasks import doubled, who
 from test_store import HARD, same
 
-from geomech import scene as scenes
-from geomech import terminal, text
+from geomech import plots, scenes, terminal, text
 from geomech.commands.pipeline import allow, storing
 from geomech.core.knob import Knob
 from geomech.geometry import connection
-from geomech.optimise import checked, search
-from geomech.optimise.question import result_of
-from geomech.output import plots
+from geomech.optimisation import checked, search
+from geomech.optimisation.question import result_of
 from geomech.run import jobs, store
 from geomech.run.digest import Undigestible
 from geomech.run.jobs import Runner, context_of, runner
 from geomech.run.store import Store
 from geomech.run.workers import using
-from geomech.scene import inputs, kinds
-from geomech.study import accuracy, cost, estimate, tiered, walking
-from geomech.study.motion import Trajectory
-from geomech.study.study import Study
+from geomech.scenes import inputs, kinds
+from geomech.studies import accuracy, cost, estimate, tiered, walking
+from geomech.studies.motion import Trajectory
+from geomech.studies.study import Study
 from geomech.systems.capabilities import with_solver
 from rft import Backbone, DisturbedGround, Granular, Transient
 from rft import BodyInertia as Heavy

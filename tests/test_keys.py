@@ -10,7 +10,7 @@ import tomllib
 import pytest
 from commands import geomech
 
-from geomech.scene import (
+from geomech.scenes import (
     builtin_names,
     from_tables,
     intruder_names,
@@ -20,11 +20,11 @@ from geomech.scene import (
     solid,
     walker_names,
 )
-from geomech.scene.key import Key, aliases, keys_of, meanings
-from geomech.scene.keys import SCENES, all_variants, sections, text, worded
-from geomech.scene.model import Scene
-from geomech.scene.schema import schema
-from geomech.scene.sections import file_sections, keys_in
+from geomech.scenes.key import Key, aliases, keys_of, meanings
+from geomech.scenes.keys import SCENES, all_variants, sections, text, worded
+from geomech.scenes.model import Scene
+from geomech.scenes.schema import schema
+from geomech.scenes.sections import file_sections, keys_in
 from rft import CATALOGUE
 from rft.laws import LAWS
 from rft.plates import VERTICAL
@@ -124,7 +124,7 @@ def test_the_command_prints_them_all_or_a_section(printed):
 
 def test_keys_of_ones_own_classes_are_told(tmp_path, monkeypatch):
     monkeypatch.setattr(kinds, "_texts", {})
-    section = (ROOT / "geomech" / "scene" / "README.md").read_text().partition("## Laws, bodies")[2]
+    section = (ROOT / "geomech" / "scenes" / "README.md").read_text().partition("## Laws, bodies")[2]
     path = tmp_path / "power.py"
     path.write_text(re.search(r"```python\n(.*?)```", section, re.S)[1])
     try:

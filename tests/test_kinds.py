@@ -21,12 +21,12 @@ from geomech.core.entry_points import installed_entries
 from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Circle, Gait, Sine
 from geomech.geometry.traits import Traits
-from geomech.scene import Numerics, Scene, kinds, load, parse, toml
-from geomech.scene.keys import text
-from geomech.scene.kinds import load_file, register
-from geomech.scene.schema import schema
-from geomech.study import estimate
-from geomech.study.study import Study
+from geomech.scenes import Numerics, Scene, kinds, load, parse, toml
+from geomech.scenes.keys import text
+from geomech.scenes.kinds import load_file, register
+from geomech.scenes.schema import schema
+from geomech.studies import estimate
+from geomech.studies.study import Study
 from geomech.systems import Premise, Solver, Swimmer
 from geomech.text.explain import explain
 from geomech.text.system import notes
@@ -36,7 +36,7 @@ from rft.laws.base import TermLaw, is_rate_independent
 from rft.refusal import Refusal
 from rft.registry import REGISTRIES
 
-PAGE = (pathlib.Path(__file__).parents[1] / "geomech" / "scene" / "README.md").read_text()
+PAGE = (pathlib.Path(__file__).parents[1] / "geomech" / "scenes" / "README.md").read_text()
 SMALL = Numerics(grid=7, phases=32)
 pytestmark = pytest.mark.usefixtures("own_parts")
 
@@ -379,8 +379,8 @@ SCRIPT = """
 import sys
 import numpy as np
 from geomech.gaits import Circle
-from geomech.scene import Scene, kinds
-from geomech.study import cycles, sweep
+from geomech.scenes import Scene, kinds
+from geomech.studies import cycles, sweep
 from geomech.systems import SYSTEMS
 
 def drift(alpha, alphadot):

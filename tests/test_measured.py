@@ -30,10 +30,10 @@ from geomech.io.results import write_netcdf
 from geomech.io.tables.mat import ERROR
 from geomech.measured import cycles, phase, regression, results, smooth, synthetic, unknowns
 from geomech.output import mat
-from geomech.scene import Scene, load
-from geomech.study import fields
-from geomech.study.single import single
-from geomech.study.study import Study
+from geomech.scenes import Scene, load
+from geomech.studies import fields
+from geomech.studies.single import single
+from geomech.studies.study import Study
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import length_unit
 from geomech.text import measured as texts
@@ -579,7 +579,7 @@ def test_what_the_data_do_not_reach_is_refused(field):
     with pytest.raises(Refusal, match="the area tier sums a field up, and A is known near the mean gait"):
         study.displacement("area")
     with pytest.raises(Refusal, match="no gait but one to search"):
-        geomech.optimise.optimise(scene, "displacement")
+        geomech.optimisation.optimise(scene, "displacement")
     tube = study.fitted
     shapes = np.stack(np.meshgrid(*tube.axes, indexing="ij"), -1)
     np.testing.assert_array_equal(np.isnan(tube.A[0, 0]), tube.reach(shapes) > 1)

@@ -9,7 +9,7 @@ import pytest
 from registry import DRY, MEDIA
 
 from geomech.gaits import Circle
-from geomech.study.undulation import endless_efficiency
+from geomech.studies.undulation import endless_efficiency
 from rft import CATALOGUE, Chain, Coulomb, Granular, Serpenoid, Surface, Viscous, body_velocity, time_steps
 from rft.balance.arrays import solve
 from rft.balance.newton import RESIDUAL, Limits

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from commands import geomech
 
-from geomech import scene
-from geomech.study.study import Study
-from geomech.study.sweep import sweep
+from geomech import scenes as scene
+from geomech.studies.study import Study
+from geomech.studies.sweep import sweep
 from rft import Chain, Granular, Table, body_velocity
 from rft.laws.base import require_drag
 from rft.refusal import Refusal

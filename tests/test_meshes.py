@@ -15,10 +15,10 @@ from scipy.spatial.transform import Rotation
 from test_fuzz import VALUES, mutated
 from test_intrude import outcome, refused
 
-import geomech.scene as scenes
+import geomech.scenes as scenes
 from figures import meshes
-from geomech.output import plots
-from geomech.scene import MeshScene
+from geomech import plots
+from geomech.scenes import MeshScene
 from geomech.text.explain import explain
 from rft.meshes import (
     SOLIDS,

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from commands import geomech
 
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection, coordinates, curvature
 from geomech.geometry.field import Field
 from geomech.geometry.minimum_perturbation import Basis, minimum_perturbation
-from geomech.study.study import Study
+from geomech.studies.study import Study
 from geomech.systems import NoSlipSnake, Swimmer
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
@@ -232,8 +232,8 @@ def test_no_such_frame_where_there_is_none():
 def test_its_file_and_pictures(tmp_path):
     from scipy.io import netcdf_file
 
-    from geomech.output import plots
-    from geomech.study import fields
+    from geomech import plots
+    from geomech.studies import fields
 
     scene = scenes.parse(SCENE.format(law="viscous", numbers=LAWS["viscous"]))
     fields.save_connection(tmp_path / "c.nc", Study(scene))

@@ -14,15 +14,15 @@ from commands import geomech
 from registry import MEDIA
 
 import geomech as geomech_package
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.core.errors import UnitWarning, VelocityWarning
 from geomech.gaits import Circle, Ellipse, Sine
 from geomech.geometry import connection, curvature
 from geomech.geometry.stretch import stretch
-from geomech.scene import Numerics, Scene
-from geomech.study.choose import cheapest
-from geomech.study.single import single as single_of
-from geomech.study.study import Study
+from geomech.scenes import Numerics, Scene
+from geomech.studies.choose import cheapest
+from geomech.studies.single import single as single_of
+from geomech.studies.study import Study
 from geomech.systems import NoSlipSnake, Swimmer
 from geomech.text.explain import explain
 from rft import Backbone, Chain, Coulomb, EndCaps, Serpenoid, Viscous

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from matplotlib import image
 
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.core.knob import Knob
-from geomech.study import accuracy, walking
-from geomech.study.sweep import sweep
+from geomech.studies import accuracy, walking
+from geomech.studies.sweep import sweep
 from rft.meshes import Spatial
 from rft.refusal import Refusal
 from rft.walking import Fineness, Mjcf, Tripod, Walker, engine

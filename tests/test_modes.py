@@ -8,15 +8,15 @@ from commands import geomech
 from scipy.io import netcdf_file
 
 import rft
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.gaits import Circle, Fourier, Wave
 from geomech.geometry import connection, curvature
 from geomech.geometry.coordinates import change_velocity
 from geomech.output import mat
-from geomech.scene import Scene
-from geomech.study import fields, sweep
-from geomech.study.available import tiers
-from geomech.study.study import Study, refuse_outside
+from geomech.scenes import Scene
+from geomech.studies import fields, sweep
+from geomech.studies.available import tiers
+from geomech.studies.study import Study, refuse_outside
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import shape_labels
 from geomech.systems.swimmer import is_three_link

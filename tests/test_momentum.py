@@ -8,9 +8,9 @@ from registry import SYSTEMS
 
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import coordinates, metric
-from geomech.scene import Scene
-from geomech.study import motion as moving
-from geomech.study.study import Study
+from geomech.scenes import Scene
+from geomech.studies import motion as moving
+from geomech.studies.study import Study
 from geomech.systems import DifferentialDrive, FloatingChain, IdealFluidSwimmer
 from geomech.systems.capabilities import OwnMetric, capability
 from geomech.systems.framed import in_frame

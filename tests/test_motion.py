@@ -10,14 +10,14 @@ from matplotlib.collections import QuadMesh
 from PIL import Image
 from registry import BODIES, SYSTEMS
 
-from geomech import scene as scenes
+from geomech import plots, scenes
 from geomech.commands import formats
 from geomech.gaits import Circle, Ellipse, Fourier, Sine
 from geomech.geometry import reconstruct
-from geomech.output import animate, plots, trajectories
-from geomech.scene import Numerics, Scene
-from geomech.study import motion as moving
-from geomech.study.study import Study
+from geomech.output import animate, trajectories
+from geomech.scenes import Numerics, Scene
+from geomech.studies import motion as moving
+from geomech.studies.study import Study
 from geomech.systems import NoSlipSnake, Solver, Swimmer
 from geomech.systems.capabilities import solver_of
 from rft import (

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from artists import curve
 
-from geomech import scene as scenes
-from geomech.scene import WalkerScene
-from geomech.study.walking import walked
+from geomech import scenes
+from geomech.scenes import WalkerScene
+from geomech.studies.walking import walked
 from rft.ground import Aeration, GrainInertia
 from rft.meshes import Spatial, wrench
 from rft.metres import GRAVITY

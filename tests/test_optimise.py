@@ -10,17 +10,17 @@ import geomech
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Sine
 from geomech.geometry.reconstruct import displacement, slopes
 from geomech.geometry.traits import Traits
-from geomech.optimise import checked, optimise
-from geomech.optimise import loops as series
-from geomech.optimise.aims import Aim
-from geomech.optimise.constraints import Constraints
-from geomech.optimise.cycles import Phases, Runs, cycle_values
-from geomech.optimise.loops import Loops
-from geomech.optimise.question import result_of
-from geomech.optimise.stroke import Stroke
-from geomech.scene import Scene, parse
-from geomech.study import fields
-from geomech.study.study import Study
+from geomech.optimisation import checked, optimise
+from geomech.optimisation import loops as series
+from geomech.optimisation.aims import Aim
+from geomech.optimisation.constraints import Constraints
+from geomech.optimisation.cycles import Phases, Runs, cycle_values
+from geomech.optimisation.loops import Loops
+from geomech.optimisation.question import result_of
+from geomech.optimisation.stroke import Stroke
+from geomech.scenes import Scene, parse
+from geomech.studies import fields
+from geomech.studies.study import Study
 from geomech.systems import Swimmer, Table
 from geomech.systems.capabilities import OwnMetric, capability
 from geomech.text import optimum as optima
@@ -511,8 +511,8 @@ def test_wrong_types_are_refused(wrong):
 
 def test_the_loop_on_the_map(stroke, cheap, short, tmp_path):
     """For displacement it follows the zero line, for efficiency the path's length holds it back, and a limit is a limit."""
-    from geomech.optimise.gain import gained_ccf, limiting
-    from geomech.output import plots
+    from geomech import plots
+    from geomech.optimisation.gain import gained_ccf, limiting
 
     share = lambda found, kind: (limiting(found, gained_ccf(found)) == kind).mean()
     assert share(stroke, "zero") > 0.95
@@ -647,7 +647,7 @@ def test_chains_without_drag_cost_what_their_metric_says():
 
 @pytest.mark.parametrize("name", ["three-link-viscous", "three-link-ideal-fluid"])
 def test_a_table_is_searched_like_its_scene(name, tmp_path):
-    from geomech.study.fields import save_connection
+    from geomech.studies.fields import save_connection
 
     scene = geomech.load(name).with_numerics(grid=21)
     save_connection(tmp_path / "field.nc", Study(scene))
@@ -700,7 +700,7 @@ def test_all_starts_keep_off_singular_shapes():
 
 def test_a_loop_that_cannot_be_run_ends_no_search():
     """A velocity that fails beyond 1.1 rad: the best is at its edge."""
-    from geomech.optimise.ascent import ascend
+    from geomech.optimisation.ascent import ascend
 
     system = Swimmer(FLUID, Chain())
 
@@ -742,8 +742,8 @@ def test_loops_on_maps_of_all_kinds(stroke):
     """Singular shapes leave the scene's own frame, time stepping no CCF, and a metric stretches the map."""
     import dataclasses
 
-    from geomech.optimise.gain import gained_ccf, limiting
-    from geomech.output import plots
+    from geomech import plots
+    from geomech.optimisation.gain import gained_ccf, limiting
     from rft.effects import Transient
 
     snake = optimise(geomech.load("no-slip-snake"), harmonics=1)

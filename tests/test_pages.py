@@ -13,7 +13,7 @@ from frozen import read_commands
 
 from geomech import cli
 from geomech.commands import names
-from geomech.scene import parse
+from geomech.scenes import parse
 from rft.laws import CATALOGUE
 from rft.plates import VERTICAL
 

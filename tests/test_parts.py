@@ -11,15 +11,15 @@ import pytest
 from commands import geomech
 
 import geomech as library
+from geomech import plots
 from geomech.core.errors import VelocityWarning
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry.traits import Traits
 from geomech.io import tables
-from geomech.optimise import optimise
-from geomech.output import plots
-from geomech.scene import Numerics, Scene, kinds, parse
-from geomech.study.single import single
-from geomech.study.study import Study
+from geomech.optimisation import optimise
+from geomech.scenes import Numerics, Scene, kinds, parse
+from geomech.studies.single import single
+from geomech.studies.study import Study
 from geomech.systems.base import Cycle, integrated
 from geomech.text.explain import explain
 from rft.refusal import Refusal

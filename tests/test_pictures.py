@@ -6,15 +6,14 @@ from artists import mesh, only
 from matplotlib.collections import QuadMesh
 from matplotlib.quiver import Quiver
 
-from geomech import scene as scenes
+from geomech import plots, scenes
 from geomech.gaits import Ellipse
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
-from geomech.output import plots
-from geomech.output.plots.precision import KNOBS as PRECISION
-from geomech.output.plots.precision import PANELS
-from geomech.study.study import Study
-from geomech.study.tiered import KNOBS
+from geomech.plots.precision import KNOBS as PRECISION
+from geomech.plots.precision import PANELS
+from geomech.studies.study import Study
+from geomech.studies.tiered import KNOBS
 from geomech.systems.base import shape_labels
 from geomech.tiers import TIERS
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 import xarray
 
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.commands import pipeline
 from geomech.core.variables import Result, Variable
 from geomech.io.results import to_xarray, write_csv, write_netcdf
 from geomech.run import jobs
 from geomech.run.cost import Cost
-from geomech.study.accuracy import slope
-from geomech.study.question import Question
+from geomech.studies.accuracy import slope
+from geomech.studies.question import Question
 from rft.refusal import Refusal
 
 PHASE = Variable("phase", ("phase",), np.array([0.0, 1.5, 3.0]), "rad", "of the gait")

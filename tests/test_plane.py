@@ -7,16 +7,15 @@ import numpy as np
 import pytest
 from commands import geomech
 
-from geomech import Numerics, Scene, Study
+from geomech import Numerics, Scene, Study, plots
 from geomech.gaits import Circle, Fourier, Wave
 from geomech.geometry import connection
 from geomech.geometry.plane import Plane, ProjectedGait, interpolated_plane, plane
 from geomech.geometry.traits import Traits
 from geomech.geometry.two_form import spanned, spanned_by, two_form
-from geomech.output import plots
-from geomech.scene.frames import framed
-from geomech.study.choose import cheapest
-from geomech.study.shape_space import through as _held
+from geomech.scenes.frames import framed
+from geomech.studies.choose import cheapest
+from geomech.studies.shape_space import through as _held
 from geomech.systems import Swimmer
 from geomech.tiers import TIERS
 from geomech.tiers.fitted import finest_grid, is_too_large
@@ -298,7 +297,7 @@ def test_what_hangs_on_the_surface_is_part_of_every_estimate(monkeypatch):
     assert table["estimate"]["area"][0] == 0.3 and 1e-6 < table["estimate"]["area"][1] < 0.3
     assert table["estimate_heading"]["area"] == [0.2, 0.4] == table["surface_spread_heading"]["area"]
     monkeypatch.setitem(TIERS._parts, "adapted", planned(TIERS["adapted"], balances=lambda *asked: 10**8))
-    monkeypatch.setattr("geomech.study.choose.solved_phases", lambda *asked: 10**9)
+    monkeypatch.setattr("geomech.studies.choose.solved_phases", lambda *asked: 10**9)
     assert cheapest(scene, [0.4, 0.5], 0.02)["tier"] != "area"
     monkeypatch.setitem(TIERS._parts, "area", planned(TIERS["area"], spread=lambda *asked: np.full((2, 2), 0.01)))
     found = cheapest(scene, [0.4, 0.5], 0.02)
@@ -349,7 +348,7 @@ def test_a_surface_says_what_its_shades_mean():
 
 def test_a_run_of_three_joints_has_its_field_and_all_slices(tmp_path, monkeypatch):
     from geomech.output import report
-    from geomech.study.report import Report
+    from geomech.studies.report import Report
 
     system = Swimmer(Viscous(2.3), Chain((0.7, 1.4, 0.9, 0.6)))
     drawn, scene = {}, Scene(system, LOOP, Numerics(grid=5, extent=1.2, phases=32))

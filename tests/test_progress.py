@@ -7,11 +7,10 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
-from geomech import scene as scenes
-from geomech import terminal
+from geomech import scenes, terminal
 from geomech.run import progress
 from geomech.run.progress import EVERY, Computation
-from geomech.study.study import Study
+from geomech.studies.study import Study
 from geomech.systems import Swimmer
 
 VISCOUS = scenes.load("three-link-viscous").with_numerics(grid=5)

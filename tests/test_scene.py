@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import rft
-from geomech import scene as scenes
-from geomech.study.study import Study
+from geomech import scenes
+from geomech.studies.study import Study
 from geomech.systems.base import length_unit
 from rft import Chain, Granular, Viscous
 from rft.refusal import Refusal

@@ -10,9 +10,8 @@ import pytest
 from artists import curve, curves, drawn
 from scipy.spatial.transform import Rotation
 
-from geomech import scene as scenes
-from geomech.output import plots
-from geomech.study.grid import changed
+from geomech import plots, scenes
+from geomech.studies.grid import changed
 from rft.plates import StressMap
 from rft.refusal import Refusal
 from rft.walking import Fineness, Screws, Tripod, Walker, cruise

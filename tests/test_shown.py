@@ -14,15 +14,15 @@ import xarray
 from registry import SYSTEMS
 
 import rft
+from geomech import plots
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection, curvature
 from geomech.io.results import write_netcdf
-from geomech.output import plots
-from geomech.scene import Numerics, Scene, load
-from geomech.study import fields, sweep, tables
-from geomech.study.choose import cheapest
-from geomech.study.results import Displacements
-from geomech.study.study import Study
+from geomech.scenes import Numerics, Scene, load
+from geomech.studies import fields, sweep, tables
+from geomech.studies.choose import cheapest
+from geomech.studies.results import Displacements
+from geomech.studies.study import Study
 from geomech.systems import NoSlipSnake, Swimmer
 from rft.laws import CATALOGUE
 

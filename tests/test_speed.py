@@ -10,11 +10,11 @@ import xarray
 from commands import geomech
 from registry import GAITS
 
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.gaits import Circle
-from geomech.study import report, sweep, undulation
-from geomech.study.choose import cheapest
-from geomech.study.study import Study
+from geomech.studies import report, sweep, undulation
+from geomech.studies.choose import cheapest
+from geomech.studies.study import Study
 from geomech.systems import Swimmer
 from geomech.text import displacement
 from rft import BodyInertia, GrainInertia

@@ -9,8 +9,8 @@ from commands import geomech
 from geomech.gaits import Fourier
 from geomech.geometry import connection, harmonics
 from geomech.geometry.traits import Traits
-from geomech.scene import Numerics, Scene
-from geomech.study.study import Study
+from geomech.scenes import Numerics, Scene
+from geomech.studies.study import Study
 from geomech.systems import Swimmer
 from geomech.tiers import harmonic
 from rft import CATALOGUE, Chain

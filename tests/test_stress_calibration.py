@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from commands import geomech
 
-from geomech import scene
+from geomech import scenes as scene
 from geomech import text as texts
 from geomech.io import rows
-from geomech.scene import penetration
-from geomech.study import stress_calibration
-from geomech.study.calibration import Calibration
+from geomech.scenes import penetration
+from geomech.studies import stress_calibration
+from geomech.studies.calibration import Calibration
 from rft.plates import VERTICAL, StressMap, calibrate
 from rft.plates.calibrate import COEFFICIENTS, GENERIC, MISTAKES, SPREAD, fit_stress, fit_zeta
 from rft.plates.survey import survey
@@ -321,7 +321,7 @@ def test_numbers_of_text_and_picture(tmp_path):
 
 
 def test_drags_are_drawn_where_the_same_plate_moves_ahead():
-    from geomech.output.plots.plates import _ahead
+    from geomech.plots.plates import _ahead
 
     beta, gamma = np.random.default_rng(8).uniform(-360, 360, (2, 400))
     b, g, side = _ahead(beta, gamma)

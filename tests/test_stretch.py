@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from geomech import plots
 from geomech.gaits import Circle
 from geomech.geometry import connection, curvature, metric
 from geomech.geometry.field import Field
 from geomech.geometry.stretch import _first, stretch
-from geomech.output import plots
 
 
 def constant(M, points=9, extent=1.5):

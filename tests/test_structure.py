@@ -16,9 +16,9 @@ ROOT = pathlib.Path(__file__).parents[1]
 # of stress is written by its coefficients. Workers tell the
 # solver to take one thread, and by which back end.
 KNOW_MECHANICS = {
-    "__init__.py", "text/grains.py", "text/scenes.py", "text/system.py", "study/stress.py", "scene/intruder.py",
-    "scene/intruding.py", "scene/solid.py", "scene/stress.py", "scene/walker.py", "scene/write.py", "study/batch.py",
-    "study/calibration.py", "run/backend.py", "study/stress_calibration.py", "study/walking.py",
+    "__init__.py", "text/grains.py", "text/scenes.py", "text/system.py", "studies/stress.py", "scenes/intruder.py",
+    "scenes/intruding.py", "scenes/solid.py", "scenes/stress.py", "scenes/walker.py", "scenes/write.py", "studies/batch.py",
+    "studies/calibration.py", "run/backend.py", "studies/stress_calibration.py", "studies/walking.py",
 }  # fmt: skip
 
 
@@ -102,7 +102,7 @@ def test_modules_import_from_their_own_layer_or_a_lower_one():
 
 
 def test_a_scene_is_a_small_class():
-    tree = ast.parse((ROOT / "geomech" / "scene" / "model.py").read_text())
+    tree = ast.parse((ROOT / "geomech" / "scenes" / "model.py").read_text())
     (scene,) = (node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == "Scene")
     assert scene.end_lineno - scene.lineno < 60
 

@@ -5,9 +5,9 @@ import pytest
 import xarray
 from commands import geomech
 
-from geomech import scene as scenes
-from geomech.study import cycles, estimate, sweep
-from geomech.study.study import Study
+from geomech import scenes
+from geomech.studies import cycles, estimate, sweep
+from geomech.studies.study import Study
 from rft import CATALOGUE, Granular
 from rft.refusal import Refusal
 

@@ -6,11 +6,10 @@ import sympy as sp
 from commands import geomech
 from registry import SYSTEMS
 
-from geomech import scene as scenes
-from geomech import symbolic
+from geomech import scenes, symbolic
 from geomech.gaits import Circle
-from geomech.scene import Scene
-from geomech.study.study import Study
+from geomech.scenes import Scene
+from geomech.studies.study import Study
 from geomech.symbolic import connections
 from geomech.systems import DifferentialDrive, FloatingChain, IdealFluidSwimmer, NoSlipSnake, Swimmer
 from geomech.systems.framed import formula

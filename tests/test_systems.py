@@ -8,16 +8,15 @@ import sympy as sp
 import xarray
 from registry import GAITS, SYSTEMS
 
-from geomech import scene as scenes
-from geomech import symbolic
+from geomech import scenes, symbolic
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection, coordinates
 from geomech.geometry.connection import sign_changes
 from geomech.geometry.traits import Traits
-from geomech.scene import Scene
-from geomech.study import cost, estimate, fields
-from geomech.study.single import single
-from geomech.study.study import Study
+from geomech.scenes import Scene
+from geomech.studies import cost, estimate, fields
+from geomech.studies.single import single
+from geomech.studies.study import Study
 from geomech.systems import KINDS, NoSlipSnake, Swimmer
 from geomech.systems.base import kind_of, length_unit
 from geomech.systems.capabilities import stored_table

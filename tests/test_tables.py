@@ -16,17 +16,17 @@ from registry import SYSTEMS
 from scipy.io import loadmat, netcdf_file, savemat
 
 import rft
-from geomech import scene as scenes
+from geomech import plots, scenes
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
 from geomech.io import tables
 from geomech.io.tables import matlab
-from geomech.output import mat, plots
-from geomech.scene import Numerics, Scene
-from geomech.study import accuracy, choose, estimate, fields, tiered
-from geomech.study.single import single
-from geomech.study.study import Study
+from geomech.output import mat
+from geomech.scenes import Numerics, Scene
+from geomech.studies import accuracy, choose, estimate, fields, tiered
+from geomech.studies.single import single
+from geomech.studies.study import Study
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from geomech.systems.base import length_unit
 from geomech.systems.table import LENGTHS

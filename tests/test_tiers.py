@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from registry import GAITS, MEDIA
 
-from geomech import scene as scenes
+from geomech import plots, scenes
 from geomech.gaits import Butterfly, Circle, Fourier, Wave
 from geomech.geometry import connection, family, harmonics
-from geomech.output import plots
-from geomech.scene import Numerics, Scene
-from geomech.study import estimate
-from geomech.study.choose import cheapest
-from geomech.study.study import METHODS, Study
+from geomech.scenes import Numerics, Scene
+from geomech.studies import estimate
+from geomech.studies.choose import cheapest
+from geomech.studies.study import METHODS, Study
 from geomech.systems import Swimmer
 from geomech.tiers import TIERS, Plan, Tier, fitted
 from geomech.tiers.direct import direct
@@ -358,7 +357,7 @@ def test_the_map_of_a_family_gives_each_shape_its_own_value():
 
 def test_every_amplitude_must_meet_the_tolerance(monkeypatch):
     """The refinement goes on to the largest number of phases that is allowed, for the worst of the amplitudes."""
-    monkeypatch.setattr("geomech.study.choose.MOST_PHASES", 128)
+    monkeypatch.setattr("geomech.studies.choose.MOST_PHASES", 128)
     with pytest.raises(Refusal, match="no tier gets to 1e-09 body lengths .* with 128 phases"):
         cheapest(GLASS, [0.0, 1.0], 1e-9)
 

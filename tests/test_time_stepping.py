@@ -5,14 +5,14 @@ import pytest
 from registry import BODIES, MEDIA
 from scipy.integrate import solve_ivp
 
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.gaits import Butterfly, Circle, Ellipse, Sine
 from geomech.geometry.reconstruct import displacement
-from geomech.scene import Scene
-from geomech.study import estimate, tiered, undulation
-from geomech.study.batch import side_by_side
-from geomech.study.choose import cheapest
-from geomech.study.study import Study
+from geomech.scenes import Scene
+from geomech.studies import estimate, tiered, undulation
+from geomech.studies.batch import side_by_side
+from geomech.studies.choose import cheapest
+from geomech.studies.study import Study
 from geomech.systems import Swimmer
 from rft import (
     CATALOGUE,
@@ -368,7 +368,7 @@ def test_estimates_cover_what_pieces_leave(kind, seeds, truths):
 @pytest.mark.soak
 @pytest.mark.timeout(3000)
 def test_estimates_cover_what_pieces_leave_of_many_random_chains():
-    """60 scenes of three amplitudes; the row in geomech/study/README.md has the first four of each kind."""
+    """60 scenes of three amplitudes; the row in geomech/studies/README.md has the first four of each kind."""
     found, at_once = {}, lambda _, compute, *question: compute(*question)
     for kind in ("transient", "disturbed", "depth"):
         for k in range(20):
@@ -392,7 +392,7 @@ def test_a_tolerance_refines_pieces_or_is_refused(monkeypatch):
     off = estimate.distance(np.array(found[found["tier"]]), truth)
     assert (off <= found["estimate"][found["tier"]]).all()
     assert max(found["estimate"][found["tier"]]) <= 1e-5
-    monkeypatch.setattr("geomech.study.choose.FINEST_PIECES", 40)
+    monkeypatch.setattr("geomech.studies.choose.FINEST_PIECES", 40)
     with pytest.raises(Refusal, match="no tier gets to 1e-08 body lengths .* with .* phases and 40 pieces"):
         cheapest(scene, [1.2], 1e-8)
 

@@ -18,7 +18,7 @@ from commands import geomech as run
 import geomech
 import rft
 from geomech.commands import names
-from geomech.scene.keys import sections
+from geomech.scenes.keys import sections
 
 ROOT = pathlib.Path(__file__).parents[1]
 
@@ -32,8 +32,8 @@ def python(code, **env):
 
 
 def test_parts_are_reached_from_the_top():
-    from geomech.scene import Numerics, Scene, load, toml
-    from geomech.study.study import Study
+    from geomech.scenes import Numerics, Scene, load, toml
+    from geomech.studies.study import Study
 
     assert (geomech.load, geomech.toml, geomech.Scene, geomech.Numerics, geomech.Study) == (
         load,

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.run.store import Store
 
 pytestmark = pytest.mark.skipif(not Path("/proc").is_dir(), reason="sees by /proc what is left of a process")
@@ -24,7 +24,7 @@ COMMAND = """
 import sys
 from geomech import cli, connection
 from geomech.run import jobs, store
-from geomech.study import cycles
+from geomech.studies import cycles
 store.CHECKPOINT = jobs.CHECKPOINT = 0.05
 jobs.WORTH = 0.2
 connection.SAMPLES_TOGETHER, cycles.SAMPLES_TOGETHER = 400, 8

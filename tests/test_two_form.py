@@ -9,7 +9,7 @@ from geomech.gaits import Circle, Fourier
 from geomech.geometry import connection, curvature
 from geomech.geometry.connection import Connection
 from geomech.geometry.two_form import spanned, two_form
-from geomech.study import fields
+from geomech.studies import fields
 from geomech.systems import Swimmer, Table
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
@@ -94,7 +94,7 @@ def test_what_spans_nothing_is_refused(form):
 
 
 def test_pairs_are_drawn(form):
-    from geomech.output import plots
+    from geomech import plots
 
     fig = plots.pairs_figure(form, at=[0.2, -0.1, 0.3], component=2)
     titles = [ax.get_title() for ax in fig.axes if ax.get_title()]

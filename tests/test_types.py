@@ -10,15 +10,15 @@ import pytest
 from registry import GAITS, OUTLINES, STRESSES, SYSTEMS
 
 import rft
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.gaits import KINDS, Centreline, Circle, Sine
 from geomech.geometry import connection, curvature, family, harmonics, reconstruct
 from geomech.geometry.field import Field
-from geomech.scene import IntruderScene, MeshScene, Numerics, Scene, WalkerScene, kinds
-from geomech.study import accuracy, sweep, undulation
-from geomech.study.choose import cheapest
-from geomech.study.single import single
-from geomech.study.study import Study
+from geomech.scenes import IntruderScene, MeshScene, Numerics, Scene, WalkerScene, kinds
+from geomech.studies import accuracy, sweep, undulation
+from geomech.studies.choose import cheapest
+from geomech.studies.single import single
+from geomech.studies.study import Study
 from geomech.systems import Solver, Swimmer
 from geomech.text.explain import explain
 from geomech.tiers.area import area

@@ -8,15 +8,14 @@ import pytest
 import xarray
 from commands import geomech
 
-from geomech import scene as scenes
+from geomech import plots, scenes
 from geomech.gaits import Butterfly, Ellipse
 from geomech.io.results import write_netcdf
-from geomech.output import plots
-from geomech.scene import Scene
-from geomech.study import sweep, uncertainty
-from geomech.study.choose import cheapest
-from geomech.study.study import Study
-from geomech.study.tables import QUANTITIES, of_pose
+from geomech.scenes import Scene
+from geomech.studies import sweep, uncertainty
+from geomech.studies.choose import cheapest
+from geomech.studies.study import Study
+from geomech.studies.tables import QUANTITIES, of_pose
 from geomech.systems import Swimmer
 from geomech.text import displacement
 from rft import Chain, Granular, SkinFriction, Transient, Viscous

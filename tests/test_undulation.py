@@ -9,12 +9,12 @@ from scipy.optimize import brentq
 
 import rft
 from figures import fig09c_efficiency, fig10_neuromechanics
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.gaits import Circle, Sine, Wave
 from geomech.geometry.reconstruct import displacement
-from geomech.scene import Scene
-from geomech.study import undulation
-from geomech.study.study import Study
+from geomech.scenes import Scene
+from geomech.studies import undulation
+from geomech.studies.study import Study
 from geomech.systems import Swimmer
 from rft import (
     CATALOGUE,

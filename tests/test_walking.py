@@ -11,10 +11,10 @@ from artists import curve, drawn
 from scipy.io import netcdf_file
 
 from figures.walking_sensitivity import Sheet
-from geomech import scene as scenes
+from geomech import scenes
 from geomech.output import walks
-from geomech.scene import WalkerScene
-from geomech.study import walking
+from geomech.scenes import WalkerScene
+from geomech.studies import walking
 from geomech.text import walk as walk_text
 from geomech.text.explain import explain
 from rft.balance.backend import preferring
@@ -698,7 +698,7 @@ def test_explain_tells_the_robot_its_engine_and_effects():
 
 
 def test_axes_of_a_sweep_have_units():
-    from geomech.output import plots
+    from geomech import plots
 
     many = {"speed": np.ones((2, 3)), "estimate": np.zeros((2, 3)), "status": np.full((2, 3), "walking")}
     over = {"gait.frequency": [1.0, 2.0], "robot.mass": [0.1, 0.2, 0.3]}

@@ -16,18 +16,17 @@ import numpy as np
 import pytest
 from tasks import always_dies, dies, doubled, fails, fails_oddly, meets, notes, waits, who
 
-from geomech import scene as scenes
-from geomech import terminal, text
+from geomech import scenes, terminal, text
 from geomech.core.errors import Note, UnitWarning
 from geomech.geometry import connection, metric
-from geomech.optimise import checked, search
-from geomech.optimise.question import result_of
+from geomech.optimisation import checked, search
+from geomech.optimisation.question import result_of
 from geomech.run import executors, jobs
 from geomech.run.jobs import Runner, runner, running
 from geomech.run.workers import using
-from geomech.scene import kinds
-from geomech.study import accuracy, cycles, sweep, tiered
-from geomech.study.study import Study
+from geomech.scenes import kinds
+from geomech.studies import accuracy, cycles, sweep, tiered
+from geomech.studies.study import Study
 from rft import threads as threaded
 from rft.balance import backend
 from rft.laws import LAWS

@@ -8,16 +8,15 @@ import numpy.typing as npt
 
 import geomech
 import rft
-from geomech import connection, curvature, reconstruct, symbolic
+from geomech import connection, curvature, plots, reconstruct, symbolic
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Gait, Points, Sine
 from geomech.geometry import family, harmonics
 from geomech.geometry.traits import Traits
-from geomech.output import plots
-from geomech.scene import Numerics, Scene, from_tables, inputs, load, parse, tables, toml
-from geomech.study import accuracy, cost, undulation
-from geomech.study.choose import cheapest
-from geomech.study.study import Study
-from geomech.study.sweep import sweep
+from geomech.scenes import Numerics, Scene, from_tables, inputs, load, parse, tables, toml
+from geomech.studies import accuracy, cost, undulation
+from geomech.studies.choose import cheapest
+from geomech.studies.study import Study
+from geomech.studies.sweep import sweep
 from geomech.systems import NoSlipSnake, Swimmer
 from geomech.systems.base import integrated
 from geomech.tiers.area import area

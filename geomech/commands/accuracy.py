@@ -19,7 +19,7 @@ def accuracy(
     """Measure error against time for every tier and setting. The cheapest settings that meet an error are
     listed. The settings of an intruder scene are numbers of elements or triangles; of a robot, steps, elements and rounding."""
     from geomech.output import report
-    from geomech.study.accuracy import Accuracy
+    from geomech.studies.accuracy import Accuracy
 
     folder = Output(out, report.write_accuracy, message=report.files, folder=True)
     execute(Accuracy(load_any(name)), folder, as_json=as_json, yes=yes)

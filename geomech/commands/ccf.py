@@ -41,7 +41,7 @@ def ccf(
     """Draw the CCF with the scene's gait on it. Of three and more joints: a slice for each pair, or for one, with the
     others fixed."""
     from geomech.output import pictures
-    from geomech.study.shape_space import ccf
+    from geomech.studies.shape_space import ccf
 
     scene = load_scene(name, grid, extent)
     drawn = pictures.Ccf(style, metric, stretch, other_frame)

@@ -42,7 +42,7 @@ def connection(
     """Compute the local connection on a grid, as a file. A NetCDF file has the fit residual and the CCF, too; a .mat
     file has A alone, in sysplotter's layout."""
     from geomech.output import parts, pictures
-    from geomech.study.shape_space import connection
+    from geomech.studies.shape_space import connection
 
     file = parts.Connection(out.suffix, sign, order)
     drawn = pictures.Connection(style, plot, pair, slice_, other_frame)

@@ -36,7 +36,7 @@ def displacement(
 ):
     """Compute the displacement of a gait by each tier. x, y and theta after a cycle from phase t = 0, each with an
     estimated error."""
-    from geomech.study.displacement import displacement
+    from geomech.studies.displacement import displacement
 
     scene = load_scene(name, grid, extent)
     values = spread("--amplitudes", amplitudes, amplitude_kind(scene))

@@ -39,7 +39,7 @@ def fit_medium(
     plates in the vertical plane, with beta, gamma, alpha_x, alpha_z (degrees, N/cm^3), nine coefficients; a plate that is
     pushed straight down, with depth_m, force_N, the factor zeta."""
     from geomech.output import parts, pictures
-    from geomech.study.calibration import Calibration
+    from geomech.studies.calibration import Calibration
 
     sizes = {"radius": radius, "length": length, "depth": depth, "density": density, "area": area}
     known = tuple((key, x) for key, x in sizes.items() if x is not None)

@@ -22,7 +22,7 @@ def intrude(
     """Compute force and moment of grains on a moving body. The body is an outline in the vertical plane or a
     mesh. SI units."""
     from geomech.io.results import write_csv
-    from geomech.study.intrusion import Intrusion
+    from geomech.studies.intrusion import Intrusion
 
     table = Output(out, lambda result, path: write_csv(path, result), formats.csv)
     figure = Output(plot, drawing("pictures.intrusion"), drawing("pictures.check"))

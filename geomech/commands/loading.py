@@ -9,12 +9,12 @@ from geomech.core.errors import check_angle
 from rft.refusal import Refusal
 
 if TYPE_CHECKING:
-    from geomech.scene import Intruding, Scene, WalkerScene
+    from geomech.scenes import Intruding, Scene, WalkerScene
 
 
 def load_with_gait(name: str | Scene) -> Scene:
     """Return the scene of that name, or one that is loaded; Refusal for one without a gait."""
-    from geomech.scene import Scene, load
+    from geomech.scenes import Scene, load
 
     scene = load(name) if isinstance(name, str) else name
     name = name if isinstance(name, str) else scene.name
@@ -34,7 +34,7 @@ def load_with_gait(name: str | Scene) -> Scene:
 def load_scene(name: str | Scene, grid: int | None = None, extent: float | None = None, medium: Path | None = None):
     """Return the scene of that name, or one that is loaded, with the options of its field, in the medium of a file if one is
     given."""
-    from geomech.scene import in_medium
+    from geomech.scenes import in_medium
     from geomech.systems.capabilities import stored_table
 
     scene = load_with_gait(name)
@@ -51,7 +51,7 @@ def load_scene(name: str | Scene, grid: int | None = None, extent: float | None 
 
 def load_intruder(name: str):
     """Return the intruder scene of that name; Refusal for one with a gait."""
-    from geomech.scene import Scene, WalkerScene, load
+    from geomech.scenes import Scene, WalkerScene, load
 
     scene = load(name)
     if isinstance(scene, (Scene, WalkerScene)):
@@ -63,7 +63,7 @@ def load_intruder(name: str):
 
 def load_walker(name: str):
     """Return the scene of that name; Refusal for one without a robot."""
-    from geomech.scene import WalkerScene, load
+    from geomech.scenes import WalkerScene, load
 
     scene = load(name)
     if not isinstance(scene, WalkerScene):
@@ -75,7 +75,7 @@ def load_walker(name: str):
 
 def load_moving(name: str) -> Scene | WalkerScene:
     """Return the scene of that name; Refusal for one with neither a gait nor a robot."""
-    from geomech.scene import load
+    from geomech.scenes import load
 
     scene = load(name)  # once: it may come through a pipe
     return scene if hasattr(scene, "robot") else load_scene(scene)
@@ -83,7 +83,7 @@ def load_moving(name: str) -> Scene | WalkerScene:
 
 def load_any(name: str) -> Scene | Intruding | WalkerScene:
     """Return the scene of that name."""
-    from geomech.scene import Scene, load
+    from geomech.scenes import Scene, load
 
     scene = load(name)
     return load_scene(scene) if isinstance(scene, Scene) else scene

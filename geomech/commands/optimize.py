@@ -36,7 +36,7 @@ def optimize(
 ):  # fmt: skip
     """Find the best gait for an objective. Its value has an error; -o writes it as a scene, --plot draws its loop on
     the CCF."""
-    from geomech.optimise.question import Optimize
+    from geomech.optimisation.question import Optimize
     from geomech.output import parts, pictures
 
     scene = load_scene(name)

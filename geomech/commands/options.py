@@ -72,9 +72,9 @@ PluginOption = Annotated[
 
 
 def load_plugins(files: list[Path] | None) -> None:
-    """Let scenes name what is in the files; see `geomech.scene.kinds.load_file`."""
+    """Let scenes name what is in the files; see `geomech.scenes.kinds.load_file`."""
     for path in files or ():
-        from geomech.scene.kinds import load_file
+        from geomech.scenes.kinds import load_file
 
         load_file(path)
 
@@ -196,7 +196,7 @@ ExtentOption = Annotated[
 
 def amplitude_kind(scene) -> str | None:
     """Return the ``angle`` of `numbers` for an amplitude of the scene's gait."""
-    from geomech.scene.key import angles_of
+    from geomech.scenes.key import angles_of
 
     if "amplitude" in angles_of(type(scene.gait)):
         return None
@@ -204,8 +204,8 @@ def amplitude_kind(scene) -> str | None:
 
 
 def parameter_kind(scene, parameter: str) -> str | None:
-    """Return the ``angle`` of `numbers` for a scene's parameter (`geomech.study.sweep`)."""
-    from geomech.scene.key import angles_of
+    """Return the ``angle`` of `numbers` for a scene's parameter (`geomech.studies.sweep`)."""
+    from geomech.scenes.key import angles_of
 
     section, *_, key = parameter.split(".") if "." in parameter else (parameter, "")
     if hasattr(scene, "robot"):

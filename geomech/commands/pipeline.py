@@ -19,7 +19,7 @@ from rft.refusal import Refusal
 if TYPE_CHECKING:  # commands start without NumPy
     from geomech.core.variables import Result
     from geomech.run.cost import Cost
-    from geomech.study.question import Question
+    from geomech.studies.question import Question
 
 
 @dataclass(frozen=True)

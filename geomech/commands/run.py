@@ -28,7 +28,7 @@ def run(
 ):
     """Compute connection, CCF and displacements into a folder. Displacements are drawn against amplitude."""
     from geomech.output import report
-    from geomech.study.report import Report
+    from geomech.studies.report import Report
 
     question = Report(load_scene(name, medium=medium))
     folder = Output(out, report.write, lambda path: report.refuse_folder(question.scene, path), report.files, True)

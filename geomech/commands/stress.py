@@ -27,7 +27,7 @@ def stress(
 ):
     """Compute the stress of grains on a plate per unit depth. In N/cm^3, backwards (alpha_x) and upwards (alpha_z), as
     in Fig. 7."""
-    from geomech.study.stress import Stress
+    from geomech.studies.stress import Stress
 
     figure = Output(plot, drawing("pictures.stress"), drawing("pictures.check"))
     execute(Stress(medium, beta, gamma, plot is not None), figure, as_json=as_json)

@@ -24,7 +24,7 @@ def sweep(
     """Compute displacement or speed over a grid of parameters. Speeds are those of walking robots. A repeated
     command resumes an interrupted one."""
     from geomech.io.results import write_netcdf
-    from geomech.study.sweep import Sweep, as_stored
+    from geomech.studies.sweep import Sweep, as_stored
 
     scene = load_moving(name)
     axes = parameters(over, scene, drawn=plot is not None)

@@ -18,7 +18,7 @@ def velocity(
     as_json: JsonOption = False,
 ):
     """Compute the body velocity of one shape and its rate. The answer has a residual and a status."""
-    from geomech.study.velocity import Velocity
+    from geomech.studies.velocity import Velocity
 
     scene = load_with_gait(name)
     question = Velocity(scene, angles(scene, "--alpha", alpha), angles(scene, "--alphadot", alphadot))

@@ -28,7 +28,7 @@ def walk(
 ):
     """Compute how a robot walks on grains. The mean speed has an error; the motion begins at rest. SI units, pitch in rad, nose
     down."""
-    from geomech.study.walking import Walking
+    from geomech.studies.walking import Walking
 
     question = Walking(load_walker(name), engine, limited=not yes)
     results = Output(out, drawing("walks.write"), folder=True)

@@ -14,11 +14,11 @@ from geomech.geometry.curvature import error as curvature_error
 from geomech.geometry.tube import BEYOND
 from geomech.io.results import unit_name
 from geomech.measured.fit import Fitted, fit_log
-from geomech.scene.write import gait_table, table
-from geomech.study import fields
-from geomech.study.fields import INTERVAL_OF_CCF, angles_of
-from geomech.study.question import Allow, Progress, Question
-from geomech.study.tables import COMPONENTS
+from geomech.scenes.write import gait_table, table
+from geomech.studies import fields
+from geomech.studies.fields import INTERVAL_OF_CCF, angles_of
+from geomech.studies.question import Allow, Progress, Question
+from geomech.studies.tables import COMPONENTS
 
 ALONG = "fitted along the gait alone"
 

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
+from geomech import plots
 from geomech.core.variables import Result
 from geomech.io.files import atomic_file
-from geomech.output import plots
-from geomech.output.plots.style import styled
+from geomech.plots.style import styled
 from geomech.run.cost import Cost
 from geomech.run.progress import counted
 from geomech.run.progress import progress as progress_bar
-from geomech.study.motion import Motion
+from geomech.studies.motion import Motion
 from rft.refusal import Refusal
 
 FILMS, STRIPS = (".gif", ".mp4"), (".png", ".pdf", ".svg")

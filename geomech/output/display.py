@@ -9,13 +9,13 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from geomech import plots
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
-from geomech.output import plots
-from geomech.study.results import Displacements
-from geomech.study.study import Study
-from geomech.study.sweep import Swept
-from geomech.study.tables import position_spread
+from geomech.studies.results import Displacements
+from geomech.studies.study import Study
+from geomech.studies.sweep import Swept
+from geomech.studies.tables import position_spread
 from geomech.text.system import described
 from rft.refusal import printable
 

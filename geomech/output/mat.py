@@ -9,9 +9,9 @@ import numpy as np
 
 from geomech.io.files import atomic_file
 from geomech.io.tables.mat import ABOUT, ENTRIES, ERROR, RESIDUAL
-from geomech.study.fields import recorded
-from geomech.study.shape_space import check_two_joints
-from geomech.study.study import Study
+from geomech.studies.fields import recorded
+from geomech.studies.shape_space import check_two_joints
+from geomech.studies.study import Study
 from geomech.systems.base import length_unit, shape_labels
 from geomech.systems.capabilities import stored_table
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from geomech import plots
 from geomech.core.errors import choose
 from geomech.core.variables import Result
-from geomech.output import plots
-from geomech.study import tables
-from geomech.study.shape_space import Space
+from geomech.studies import tables
+from geomech.studies.shape_space import Space
 from geomech.systems.base import shape_labels
 from rft.refusal import Refusal
 
@@ -30,7 +30,7 @@ def displacement(result: Result, path: Path) -> None:
 
 def sweep(result: Result, path: Path) -> None:
     """Draw a sweep over one parameter or two."""
-    from geomech.study.sweep import Swept
+    from geomech.studies.sweep import Swept
 
     plots.save(plots.sweep_figure(result.subject, Swept(result)), path)
 

@@ -7,16 +7,15 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from geomech import text
+from geomech import plots, text
 from geomech.core.variables import Result
 from geomech.io.files import read, refuse_inputs
 from geomech.io.results import write_netcdf
-from geomech.output import plots
-from geomech.scene import inputs
-from geomech.scene.model import Scene
-from geomech.scene.write import toml
-from geomech.study import accuracy, fields, tables
-from geomech.study.report import Reported
+from geomech.scenes import inputs
+from geomech.scenes.model import Scene
+from geomech.scenes.write import toml
+from geomech.studies import accuracy, fields, tables
+from geomech.studies.report import Reported
 from geomech.systems.base import shape_labels
 from geomech.systems.framed import Framed
 from rft.refusal import Refusal

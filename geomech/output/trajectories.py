@@ -9,8 +9,8 @@ from geomech.core.variables import Result
 from geomech.io.files import atomic_file
 from geomech.output import animate
 from geomech.run.progress import progress as progress_bar
-from geomech.scene.model import Scene
-from geomech.study.motion import Motion, Trajectory
+from geomech.scenes.model import Scene
+from geomech.studies.motion import Motion, Trajectory
 from geomech.systems.base import length_unit, shape_labels
 
 

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 from matplotlib.colors import to_rgba
 
-from geomech import text
+from geomech import plots, text
 from geomech.core.variables import Result
 from geomech.io.files import atomic_file, write_text
 from geomech.io.results import write_csv
-from geomech.output import animate, plots
-from geomech.scene.walker import WalkerScene
-from geomech.study import walking
-from geomech.study.walking import Walked
+from geomech.output import animate
+from geomech.scenes.walker import WalkerScene
+from geomech.studies import walking
+from geomech.studies.walking import Walked
 
 TRIPODS = ("0.2", "C0")  # colours of the legs in step
 FRAMES, STRIP = 100, 6  # pictures of a film, at most, and of a strip

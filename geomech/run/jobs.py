@@ -314,7 +314,7 @@ def unaided() -> contextlib.AbstractContextManager[Runner]:
 
 def context_of(files: Iterable[Path]) -> tuple:
     """Return all data that results depend on besides tasks and arguments: plug-ins, and files."""
-    from geomech.scene.kinds import code
+    from geomech.scenes.kinds import code
 
     return code(), [hashlib.sha256(path.read_bytes()).hexdigest() for path in files if path.is_file()]
 

@@ -49,7 +49,7 @@ class Alone(Exception):
 
 def packed(task: Callable, common: Any, back_end: str) -> Order:
     """Return the order of a task; `Alone` for one that no other process could load."""
-    from geomech.scene import kinds
+    from geomech.scenes import kinds
 
     classes = kinds.registered()
     if own := [name for module, name in classes if module == "__main__" or "<locals>" in name]:
@@ -81,7 +81,7 @@ def _known(order: Order) -> tuple[Callable, Any]:
 
 def _learn(order: Order) -> None:
     """Register the classes of plug-ins."""
-    from geomech.scene import kinds
+    from geomech.scenes import kinds
 
     for name, text in order.plugins:
         kinds.load_text(name, text)

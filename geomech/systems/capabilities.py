@@ -33,7 +33,7 @@ def capability(system: System, kind: type[T]) -> T | None:
 
 @runtime_checkable
 class Refinable(Protocol):
-    """A velocity with a numerical error; read by `geomech.study.estimate`, which estimates it."""
+    """A velocity with a numerical error; read by `geomech.studies.estimate`, which estimates it."""
 
     closed: bool  # whether the refined one has exact integrals over elements, else a finer rule
 
@@ -44,7 +44,7 @@ class Refinable(Protocol):
 
 @runtime_checkable
 class Dissipative(Protocol):
-    """A body that does work against its medium; read by `geomech.study.effort` and `geomech.optimise`."""
+    """A body that does work against its medium; read by `geomech.studies.effort` and `geomech.optimisation`."""
 
     def power(self, alpha, alphadot, xi) -> np.ndarray:
         """Return the rate of work (...) at shapes, rates (..., d) and the velocity (..., 3) that they lead to, in axial drags
@@ -53,7 +53,7 @@ class Dissipative(Protocol):
 
 @runtime_checkable
 class OwnMetric(Protocol):
-    """A shape space whose metric M is not one of drag but, say, of kinetic energy; read by `geomech.study.effort`."""
+    """A shape space whose metric M is not one of drag but, say, of kinetic energy; read by `geomech.studies.effort`."""
 
     def squared_speed(self, alpha, alphadot) -> np.ndarray:
         """Return alphadot^T M(alpha) alphadot (...) at shapes and rates (..., d)."""
@@ -61,7 +61,7 @@ class OwnMetric(Protocol):
 
 @runtime_checkable
 class Drawable(Protocol):
-    """A body to draw; read by `geomech.study.motion`."""
+    """A body to draw; read by `geomech.studies.motion`."""
 
     def points(self, alpha, pose) -> np.ndarray:
         """Return the ends of the links (..., links + 1, 2) in the world, tail to head, at shapes (..., d) and poses of the
@@ -84,7 +84,7 @@ class Tabulated(Protocol):
 
 @runtime_checkable
 class Uncertain(Protocol):
-    """Parameters with a covariance; read by `geomech.study.uncertainty`."""
+    """Parameters with a covariance; read by `geomech.studies.uncertainty`."""
 
     covariance: Any  # (n, n)
 
@@ -94,7 +94,7 @@ class Uncertain(Protocol):
 
 @runtime_checkable
 class Stepped(Protocol):
-    """Cycles that differ from one another; read by `geomech.study.motion` and `choose`."""
+    """Cycles that differ from one another; read by `geomech.studies.motion` and `choose`."""
 
     settling: float  # change of displacement at which cycles count as repeating, body lengths or rad; 0 if they are not run on
 
@@ -118,14 +118,14 @@ class BalanceSize(NamedTuple):
 
 @runtime_checkable
 class Costed(System, Protocol):
-    """A velocity that takes a balance of forces; read by `geomech.study.cost`."""
+    """A velocity that takes a balance of forces; read by `geomech.studies.cost`."""
 
     balance_size: BalanceSize
 
 
 @runtime_checkable
 class Tunable(Protocol):
-    """[numerics] of its own; read by `geomech.scene`."""
+    """[numerics] of its own; read by `geomech.scenes`."""
 
     solver: Any  # a dataclass
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from geomech.core.variables import Result
-from geomech.study import accuracy
+from geomech.studies import accuracy
 
 numbers = accuracy.table
 SCALES = {  # of an error, by what only a study of that kind has

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from geomech.core.variables import Result, Variable
-from geomech.study import tables, uncertainty
+from geomech.studies import tables, uncertainty
 
 numbers = tables.table
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from geomech.gaits import KINDS as GAITS
-from geomech.scene.model import Scene, checked_scene
-from geomech.study.available import tiers
+from geomech.scenes.model import Scene, checked_scene
+from geomech.studies.available import tiers
 from geomech.systems.premises import listed
 from geomech.text import grains
 from geomech.text.system import described, engine
@@ -16,8 +16,8 @@ from rft.premise import ALL
 from rft.refusal import printable
 
 if TYPE_CHECKING:
-    from geomech.scene.intruding import Intruding
-    from geomech.scene.walker import WalkerScene
+    from geomech.scenes.intruding import Intruding
+    from geomech.scenes.walker import WalkerScene
 
 MOST_JOINTS = 5  # of which all pairs are drawn side by side
 

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterator
 
 from geomech import symbolic
-from geomech.scene.model import Scene
+from geomech.scenes.model import Scene
 from geomech.systems.framed import formula
 from rft.refusal import located
 

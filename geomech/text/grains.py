@@ -10,8 +10,8 @@ from rft.ground import GROUND_EFFECTS, GroundEffect
 from rft.premise import negated
 
 if TYPE_CHECKING:
-    from geomech.scene.intruding import Intruding
-    from geomech.scene.walker import WalkerScene
+    from geomech.scenes.intruding import Intruding
+    from geomech.scenes.walker import WalkerScene
 
 
 def described(scene: Intruding | WalkerScene) -> list[str]:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from geomech.core.variables import Result
-from geomech.study.intrusion import Estimate
+from geomech.studies.intrusion import Estimate
 from geomech.text.grains import effect_lines
 
 UNITS = {"t": "s", "angle": "degrees", "x": "m", "y": "m", "z": "m"}

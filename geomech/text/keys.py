@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 
-from geomech.scene import keys
-from geomech.scene.schema import schema
+from geomech.scenes import keys
+from geomech.scenes.schema import schema
 from rft.refusal import Refusal
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from geomech.core.variables import Result
 from geomech.measured.fit import PRINTED_PHASES, Fitted
 from geomech.measured.results import status
-from geomech.scene.write import gait_table
+from geomech.scenes.write import gait_table
 
 
 def numbers(result: Result) -> dict[str, Any]:

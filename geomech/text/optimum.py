@@ -6,9 +6,9 @@ import textwrap
 from typing import Any
 
 from geomech.core.variables import Result
-from geomech.optimise import Optimum
-from geomech.scene.write import gait_table, toml
-from geomech.study.effort import METRIC
+from geomech.optimisation import Optimum
+from geomech.scenes.write import gait_table, toml
+from geomech.studies.effort import METRIC
 
 SHOWN = 6  # answers that a table led to, of those that nobody finished
 

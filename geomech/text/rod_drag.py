@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from geomech.core.variables import Result
-from geomech.scene.write import table
+from geomech.scenes.write import table
 
 UNITS = {"axial_stress": "Pa", "axial_force": "N", "gamma0_deg": "degrees"}
 SIZES = {"radius": "m", "length": "m", "depth": "m", "density": "kg/m^3"}

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import rft
 from geomech.core.errors import choose
-from geomech.scene import builtin_names, intruder_names, walker_names
-from geomech.scene.read import builtin_text
-from geomech.scene.write import medium_toml, vertical_toml
+from geomech.scenes import builtin_names, intruder_names, walker_names
+from geomech.scenes.read import builtin_text
+from geomech.scenes.write import medium_toml, vertical_toml
 from rft.plates import VERTICAL
 
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from geomech.core.variables import Result
-from geomech.study import walking
-from geomech.study.walking import Walked
+from geomech.studies import walking
+from geomech.studies.walking import Walked
 
 SERIES = "t", "x", "z", "pitch"  # of the table, that JSON has
 

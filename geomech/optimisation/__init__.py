@@ -1,0 +1,9 @@
+"""Search for the gaits of a scene with the largest displacement, efficiency, turning or speed."""
+
+from geomech.optimisation.optimum import Optimum
+from geomech.optimisation.request import Request, checked
+from geomech.optimisation.search import optimise, search
+
+optimize = optimise  # both spellings are in use
+
+__all__ = ["Optimum", "Request", "checked", "optimise", "optimize", "search"]

@@ -1,0 +1,70 @@
+"""The CCF whose area an aim gains, and what limits the best loop on it, phase by phase."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from geomech.geometry.connection import Connection
+from geomech.geometry.curvature import ccf
+from geomech.geometry.field import Field
+from geomech.geometry.minimum_perturbation import minimum_perturbation
+from geomech.optimisation.loops import TOUCHING
+from geomech.optimisation.optimum import Optimum
+from geomech.studies.study import Study
+
+NEAR_ZERO = 0.15  # of the CCF's largest value inside the loop's box: below it a loop runs along the line of zeros
+NEAR_SINGULAR = 0.05  # of the least distance from singular shapes: a loop that is so near is limited by them
+PHASES = 721
+
+
+def gained_ccf(optimum: Optimum, study: Study | None = None) -> Field:
+    """Return the CCF whose area the aim gains, values (1, N_1, N_2): along the displacement, or of the heading for turning, in
+    the minimum-perturbation frame, or, where singular shapes leave none, in the scene's own."""
+    fitted, best = (study or Study(optimum.scene)).fitted, optimum.best
+    connection, (x, y, _) = fitted, best.displacement
+    if not fitted.field.masked:
+        frame = minimum_perturbation(fitted)
+        A = frame.connection(fitted)
+        connection = Connection(fitted.axes, A, fitted.residual, fitted.speed, fitted.degree, **fitted.size)
+        x, y, _ = frame.net(best.displacement, best.gait.shape(0.0))
+    field = ccf(connection)
+    turning = optimum.request.aim.name == "turning"
+    share = np.array([0, 0, 1] if turning else [x, y, 0]) / (np.hypot(x, y) or 1.0)
+    values = np.tensordot(share, field.values, 1)[None]
+    return replace(field, values=values, unit="rad" if turning else field.unit)
+
+
+def limiting(optimum: Optimum, field: Field | None) -> np.ndarray:
+    """Return what limits the best loop at each of PHASES phases, as words (PHASES,).
+
+    "limit": a joint limit; "singular": singular shapes; "zero": it runs along the zero line of ``field``, that of
+    `gained_ccf`; "length": it is off that line for the sake of path length; "else": off that line; "loop": not known,
+    where ``field`` is None."""
+    alpha = optimum.gait.shape(np.linspace(0, 2 * np.pi, PHASES))
+    rest = "length" if optimum.request.aim.name == "efficiency" else "else"
+    causes = np.full(PHASES, rest if field is not None else "loop", dtype="<U8")
+    if field is not None:
+        value = np.abs(_nearest_values(field, alpha))
+        inside = [(a >= lo) & (a <= hi) for a, lo, hi in zip(field.axes, alpha.min(0), alpha.max(0))]
+        around = np.abs(field.values[0][np.ix_(*inside)])
+        # next to singular shapes the largest value may be any
+        top = np.nanmedian(around) if field.masked else around.max(initial=value.max())
+        causes = np.where(value <= NEAR_ZERO * top, "zero", causes)
+    if "singular shapes" in optimum.active:
+        distance = np.abs(optimum.scene.system.traits.singularity(alpha))
+        causes = np.where(distance <= distance.min() * (1 + NEAR_SINGULAR), "singular", causes)
+    box = getattr(optimum.request.loops, "box", np.array([[-np.inf], [np.inf]]))
+    near = TOUCHING * (box[1] - box[0]) / 2 if np.isfinite(box).all() else 0.0
+    return np.where(((alpha <= box[0] + near) | (alpha >= box[1] - near)).any(-1), "limit", causes)
+
+
+def _nearest_values(field: Field, alpha) -> np.ndarray:
+    """Return the field at shapes, for those beyond it at its edge; next to singular shapes from its nearest points, or nan."""
+    from scipy.interpolate import RegularGridInterpolator
+
+    alpha = np.clip(alpha, [a[0] for a in field.axes], [a[-1] for a in field.axes])
+    if field.masked:
+        return RegularGridInterpolator(field.axes, field.values[0])(alpha)
+    return field(alpha)[..., 0]

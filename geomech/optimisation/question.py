@@ -1,0 +1,74 @@
+"""The best gait of a scene for an aim, as a question."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from geomech.core.variables import Result, Variable
+from geomech.optimisation.limits import WithinArgument
+from geomech.optimisation.optimum import Optimum
+from geomech.optimisation.request import Request, checked
+from geomech.optimisation.search import search
+from geomech.run.cost import Cost
+from geomech.scenes.model import Scene
+from geomech.studies.effort import why_none
+from geomech.studies.question import Allow, Progress, Question
+from geomech.systems.base import length_unit
+from rft.refusal import Refusal
+
+
+@dataclass(frozen=True)
+class Optimize(Question):
+    """The best gait of a scene, see `optimise`. stretch: it is also drawn in coordinates where equal lengths have equal
+    costs."""
+
+    scene: Scene
+    aim: str
+    direction: str | None = None
+    harmonics: int | None = None
+    within: WithinArgument = None
+    starts: int | None = None
+    rate: float | None = None
+    power: float | None = None
+    stretch: bool = False
+
+    @property
+    def title(self) -> str:
+        return f"{self.aim} of {self.scene.name}"
+
+    @cached_property
+    def request(self) -> Request:
+        return checked(
+            self.scene, self.aim, self.direction, self.harmonics, self.within, self.starts, self.rate, self.power
+        )
+
+    def check(self) -> None:
+        _ = self.request  # refuses what makes no sense
+        name, joints = self.scene.name, self.scene.system.joints
+        if self.stretch and joints != 2:
+            raise Refusal(f"--stretch takes two joints, this one has {joints}", where=name, instead="drop it")
+        if self.stretch and (reason := why_none(self.scene.system)):
+            raise Refusal(reason, where=name, instead="drop --stretch")
+
+    def cost(self) -> Cost:
+        return self.request.cost()
+
+    def answer(self, progress: Progress, allow: Allow) -> Result:
+        return result_of(search(self.request, progress))
+
+
+def result_of(optimum: Optimum) -> Result:
+    """Return an optimum as variables; the value of a distance is over the body's length, the displacement is not."""
+    best, aim, unit = optimum.best, optimum.request.aim, length_unit(optimum.scene.system)
+    variables = [
+        Variable("value", (), best.value, aim.unit, aim.name, best.error),
+        Variable(
+            "start_value", (), optimum.start.value, aim.unit, f"{aim.name} of the scene's gait", optimum.start.error
+        ),
+    ]
+    for name, x, u in zip(("x", "y", "theta"), best.displacement, (unit, unit, "rad")):
+        variables.append(Variable(name, (), x, u, "net displacement per cycle"))
+    for name, x in (("path_length", best.length), ("work", best.work)):
+        variables += [] if x is None else [Variable(name, (), x)]
+    return Result("optimum", tuple(variables), {"active": optimum.active, "evaluations": optimum.evaluations}, optimum)

@@ -1,0 +1,107 @@
+"""Plots: each draws on the Axes that it is given and returns it; without any on pyplot's current Axes if a figure of pyplot
+is open, else on a new one, which a notebook shows. Nothing here imports pyplot or changes its state.
+"""
+
+from geomech.plots.displacements import displacement, displacement_figure, medium_band, net
+from geomech.plots.drag import drag_figure
+from geomech.plots.figures import (
+    ccf_figure,
+    connection_figure,
+    pairs_figure,
+    plane_connection_figure,
+    planes_figure,
+)
+from geomech.plots.maps import (
+    COMPONENTS,
+    FINEST,
+    HATCHED,
+    RINGS,
+    ccf_map,
+    certain,
+    draw_gait,
+    drawable,
+    frame_figure,
+    indicatrices,
+    largest,
+    shape_space,
+    unknown,
+    vector_field,
+)
+from geomech.plots.measured import measured_figure
+from geomech.plots.motion import LINES, filmstrip, stage
+from geomech.plots.optimum import optimum_figure, optimum_map
+from geomech.plots.plates import penetration_figure, plates_figure
+from geomech.plots.precision import KNOB_MARKER, walk_accuracy_figure, work_precision, work_precision_figure
+from geomech.plots.stretched import stretched_figure, stretched_map
+from geomech.plots.style import MARKED, STYLE, check_format, figure, quantity, save, styled
+from geomech.plots.styles import CCF_STYLES, CONNECTION_STYLES, ccf_contours, ccf_surface, streamlines, winding
+from geomech.plots.sweeps import curves, sweep_figure
+from geomech.plots.terradynamics import (
+    draw_stress,
+    elements_figure,
+    intrusion_figure,
+    square_of_angles,
+    stress_figure,
+    stress_map,
+)
+
+__all__ = [
+    "CCF_STYLES",
+    "COMPONENTS",
+    "CONNECTION_STYLES",
+    "FINEST",
+    "HATCHED",
+    "KNOB_MARKER",
+    "LINES",
+    "MARKED",
+    "RINGS",
+    "STYLE",
+    "ccf_contours",
+    "ccf_figure",
+    "ccf_map",
+    "ccf_surface",
+    "certain",
+    "check_format",
+    "connection_figure",
+    "curves",
+    "displacement",
+    "displacement_figure",
+    "drag_figure",
+    "draw_gait",
+    "draw_stress",
+    "drawable",
+    "elements_figure",
+    "figure",
+    "filmstrip",
+    "frame_figure",
+    "indicatrices",
+    "intrusion_figure",
+    "largest",
+    "measured_figure",
+    "medium_band",
+    "net",
+    "optimum_figure",
+    "optimum_map",
+    "pairs_figure", "penetration_figure",
+    "plane_connection_figure",
+    "planes_figure",
+    "plates_figure",
+    "quantity",
+    "save",
+    "shape_space",
+    "square_of_angles",
+    "stage",
+    "streamlines",
+    "stress_figure",
+    "stress_map",
+    "stretched_figure",
+    "stretched_map",
+    "styled",
+    "sweep_figure",
+    "unknown",
+    "vector_field",
+    "walk_accuracy_figure",
+    "winding",
+    "work_precision",
+    "work_precision_figure",
+]  # fmt: skip

@@ -1,0 +1,37 @@
+"""Drag on a rod and the law fitted to it."""
+
+from __future__ import annotations
+
+from geomech.core.variables import Result
+from geomech.plots.style import figure, styled
+
+PARTS = (("across", "#D55E00", "o"), ("along", "#0072B2", "s"))
+
+
+@styled
+def drag_figure(result: Result):
+    """Draw forces against the attack angle with the fitted law and its 95 % band, and the residuals below."""
+    fig, axes = figure(4.4, 4.6, 1, 2)
+    (top,), (bottom,) = axes
+    angle, psi, forces, residuals = (result[name].values for name in ("angle", "folded_psi", "force", "residual"))
+    for name, colour, marker in PARTS:
+        k = 1 if name == "across" else 0
+        law, band = result["law"].values[k], result["law"].error[k]
+        top.fill_between(angle, law - band, law + band, color=colour, alpha=0.2, lw=0)
+        top.plot(angle, law, color=colour, lw=1.2)
+        top.plot(psi, forces[k], marker, color=colour, ms=4, label=f"{name} the rod")
+        bottom.plot(psi, residuals[k], marker, color=colour, ms=4)
+    bottom.axhline(0.0, color="0.7", lw=0.6, zorder=0)
+    largest = 1.15 * max(abs(residuals).max(), 1e-6 * abs(forces).max())
+    low = min(0.0, forces.min()) - 0.03 * forces.max()
+    top.set(ylabel="drag (N)", xlim=(-2, 92), ylim=(low, None))
+    top.plot([], [], color="0.3", lw=1.2, label=f"{result.subject.law} law,\n95 % band")
+    top.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    bottom.set(
+        xlabel=r"attack angle $\psi$ (degrees)", ylabel="data minus law (N)", xlim=(-2, 92), ylim=(-largest, largest),
+    )  # fmt: skip
+    bottom.set_title(f"rms {result.subject.rms:.3g} N", loc="left", fontsize=8)
+    for ax in (top, bottom):
+        ax.set_xticks(range(0, 91, 15))
+    fig.get_layout_engine().set(hspace=0.06)
+    return fig

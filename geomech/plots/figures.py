@@ -1,0 +1,174 @@
+"""Whole figures of a connection and of a CCF: three components side by side, two body frames one above the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from geomech.core.errors import choose
+from geomech.gaits import Gait
+from geomech.geometry.connection import Connection
+from geomech.geometry.field import Field
+from geomech.geometry.metric import Finsler, Metric
+from geomech.geometry.plane import Plane, ProjectedGait
+from geomech.geometry.two_form import TwoForm
+from geomech.plots.maps import ANGLES, PHASES, TITLES, Labels, ccf_map, draw_gait, largest
+from geomech.plots.style import blank, figure, quantity, styled
+from geomech.plots.styles import (
+    CCF_STYLES,
+    CONNECTION_STYLES,
+    MINUS_SIGN,
+)
+
+SHADOW = "dashed: the gait, seen along the joints that are held here"
+
+
+@styled
+def connection_figure(
+    connection: Connection, *, labels: Labels = ANGLES, style: str = "quiver",
+    beside: Connection | None = None, names: Sequence[str] = (),
+):  # fmt: skip
+    """Draw all three rows of A side by side, as arrows ("quiver") or "streamlines".
+
+    beside: the connection in another body frame, drawn below on the same scales. names: of the two frames."""
+    draw = CONNECTION_STYLES[choose("style", style, CONNECTION_STYLES)]
+    rows = [connection] if beside is None else [connection, beside]
+    fig, axes = figure(10.8, 3.0 + 2.7 * (len(rows) - 1), 3, len(rows), layout="compressed")
+    for component in range(3):
+        sizes = [largest(np.hypot(*c.A[component])) for c in rows]
+        top = None if beside is None else max(sizes)
+        for c, ax in zip(rows, axes[:, component]):
+            draw(c, component, ax=ax, labels=labels, top=top)
+    _name(axes, names)
+    return fig
+
+
+@styled
+def pairs_figure(form: TwoForm, at: Sequence[float], component: int = 0, *, labels: Labels | None = None):
+    """Draw one component of the CCF of all pairs of joints, on the planes through the shape ``at`` (d,), on one scale.
+
+    labels: (name, unit) of each shape variable."""
+    labels = labels or [(f"alpha_{k + 1}", "rad") for k in range(form.field.joints)]
+    fields = [form.slice(i, j, at) for i, j in form.pairs]
+    columns = min(3, len(fields))
+    rows = -(-len(fields) // columns)
+    fig, axes = figure(3.6 * columns, 3.2 * rows, columns, rows, layout="compressed")
+    top = max(largest(f.values[component]) for f in fields)
+    for (i, j), field, ax in zip(form.pairs, fields, axes.ravel()):
+        ccf_map(field, component, ax=ax, labels=(labels[i], labels[j]), top=top)
+        fixed = ", ".join(
+            f"{quantity(labels[k][0])} = {at[k]:g}".replace("-", MINUS_SIGN)
+            for k in range(len(labels))
+            if k not in (i, j)
+        )
+        ax.set_title(f"{ax.get_title()}, {i + 1}{j + 1}" + f"; {fixed}" * bool(fixed), fontsize=8)
+    for ax in axes.ravel()[len(fields) :]:
+        ax.set_axis_off()
+    return fig
+
+
+class Row(NamedTuple):
+    """A row of maps of a CCF. error: of the field, or None. shadows: curves of gaits that move elsewhere, seen on the
+    plane."""
+
+    field: Field
+    error: Field | None
+    gaits: Sequence = ()
+    labels: Labels = ANGLES
+    shadows: Sequence = ()
+
+
+@styled
+def ccf_figure(
+    field: Field, gaits: Sequence[Gait] = (), *, error: Field | None = None, labels: Labels = ANGLES,
+    style: str = "map", metric: Metric | Finsler | None = None, beside: tuple[Field, Field | None] | None = None,
+    names: Sequence[str] = (),
+):  # fmt: skip
+    """Draw all three components of the CCF side by side with gaits on them, as colours ("map"), "contours" or a "surface".
+
+    metric: its rings on a map. beside: (CCF, error) in another body frame, drawn below on the same scales. names: of the two
+    frames."""
+    rows = [Row(field, error, gaits, labels)] + ([] if beside is None else [Row(*beside, gaits, labels)])
+    return _ccf_rows(rows, style, metric, names, same=True)
+
+
+@styled
+def planes_figure(
+    planes: Sequence[Plane], gait: Gait | None = None, *, labels: Labels | None = None, style: str = "map",
+    beside: Plane | None = None, names: Sequence[str] = (),
+):  # fmt: skip
+    """Draw the CCF of pairs of joints on planes of shape space, a row for each pair, as `ccf_figure` does.
+
+    gait: of all joints; where it leaves the plane it is dashed, as it is seen along the fixed joints, and has no area. labels:
+    (name, unit) of all shape variables. beside: the plane of a single pair in another body frame, below on the same scales.
+    names: of the two frames."""
+    labels, rows = labels or _angles(planes), []
+    for one in [*planes, *([] if beside is None else [beside])]:
+        seen = [] if gait is None else [ProjectedGait(gait, one)]
+        on_plane, shadows = ([x for x in seen if x.lies_in_plane == lies] for lies in (True, False))
+        rows.append(Row(one.ccf, one.error, on_plane, [labels[k] for k in one.pair], shadows))
+    titles = [f"{plane_title(one, labels)}; frame {name}" for one, name in zip([planes[0], beside], names)]
+    return _ccf_rows(rows, style, None, titles or [plane_title(one, labels) for one in planes], same=beside is not None)
+
+
+@styled
+def plane_connection_figure(planes: Sequence[Plane], *, labels: Labels | None = None, style: str = "quiver"):
+    """Draw the rows of A of the two joints that move, on planes of shape space, a row for each pair, as `connection_figure`
+    does.
+
+    labels: as for `planes_figure`."""
+    draw = CONNECTION_STYLES[choose("style", style, CONNECTION_STYLES)]
+    labels = labels or _angles(planes)
+    fig, axes = figure(10.8, 3.0 + 2.7 * (len(planes) - 1), 3, len(planes), layout="compressed")
+    for one, row in zip(planes, axes):
+        for component, ax in enumerate(row):
+            draw(one.connection, component, ax=ax, labels=[labels[k] for k in one.pair])
+    _name(axes, [plane_title(one, labels) for one in planes])
+    return fig
+
+
+def _angles(planes: Sequence[Plane]) -> Labels:
+    """Return the labels of shape variables that are joint angles."""
+    return [(f"alpha_{k + 1}", "rad") for k in range(len(planes[0].at))]
+
+
+def plane_title(plane: Plane, labels: Labels) -> str:
+    """Return the angles of the fixed joints of a plane as a title."""
+    angles = ", ".join(f"{quantity(labels[k][0])} = {plane.at[k]:.3g}".replace("-", MINUS_SIGN) for k in plane.fixed)
+    return f"{angles} {labels[plane.fixed[0]][1]}" if plane.fixed else ""
+
+
+def _ccf_rows(rows: Sequence[Row], style: str, metric, names: Sequence[str], same: bool):
+    """Draw maps of the three components, a line of them for each row. same: on the same scales."""
+    draw = CCF_STYLES[choose("style", style, CCF_STYLES)]
+    solid = getattr(draw, "projection", "") == "3d"
+    if solid:
+        fig = blank(11.8, 3.6 * len(rows))
+        axes = fig.subplots(len(rows), 3, squeeze=False, subplot_kw={"projection": "3d"})
+        fig.get_layout_engine().set(w_pad=0.25)
+    else:
+        fig, axes = figure(10.8, 3.2 + 2.75 * (len(rows) - 1), 3, len(rows), layout="compressed")
+    more = {"metric": metric} if style == "map" else {}
+    for component in range(len(TITLES)):
+        top = max(largest(r.field.values[component]) for r in rows) if same and len(rows) > 1 else None
+        for r, ax in zip(rows, axes[:, component]):
+            draw(r.field, component, r.gaits, ax=ax, error=r.error, labels=r.labels, top=top, **more)
+            for shadow in r.shadows:
+                if solid:
+                    ax.plot(*shadow.shape(PHASES).T, ax.get_zlim()[0], "--", color="black", lw=1.0)
+                else:
+                    draw_gait(shadow, ax, within=r.field.axes, line="--")
+    if any(r.shadows for r in rows):
+        fig.supxlabel(SHADOW, fontsize=8)
+    _name(axes, names)
+    return fig
+
+
+def _name(axes, names: Sequence[str]) -> None:
+    """Write the frame of each row at its left."""
+    for row, name in zip(axes, names):
+        options = {"transform": row[0].transAxes, "rotation": 90, "ha": "center", "va": "center", "fontsize": 10}
+        write = row[0].text2D if hasattr(row[0], "text2D") else row[0].text
+        write(-0.33 if write.__name__ == "text" else 0.03, 0.5, name, in_layout=write.__name__ == "text", **options)

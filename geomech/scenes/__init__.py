@@ -1,0 +1,30 @@
+"""Scenes: what is simulated and how finely. `load` reads one by its name or from a TOML file, `write` gives its TOML."""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from geomech.scenes.model import Numerics, Scene
+from geomech.scenes.read import builtin_names, from_tables, in_medium, inputs, intruder_names, load, parse, walker_names
+from geomech.scenes.write import tables, toml
+
+if TYPE_CHECKING:
+    from geomech.scenes.intruder import IntruderScene
+    from geomech.scenes.intruding import Intruding
+    from geomech.scenes.solid import MeshScene
+    from geomech.scenes.walker import WalkerScene
+
+__all__ = [
+    "IntruderScene", "Intruding", "MeshScene", "Numerics", "Scene", "WalkerScene", "builtin_names", "from_tables", "in_medium",
+    "inputs", "intruder_names", "load", "parse", "tables", "toml", "walker_names",
+]  # fmt: skip
+
+_OTHER = {"IntruderScene": "intruder", "Intruding": "intruding", "MeshScene": "solid", "WalkerScene": "walker"}
+
+
+def __getattr__(name: str) -> type:
+    """Return a class of scenes without a gait; its mechanics takes as long to load as that of all others, and is loaded
+    here."""
+    if name not in _OTHER:
+        raise AttributeError(f"module 'geomech.scenes' has no attribute {name!r}")
+    globals()[name] = kind = getattr(import_module(f"geomech.scenes.{_OTHER[name]}"), name)
+    return kind

@@ -1,0 +1,118 @@
+"""Intruder scenes: a body of given outline that moves in a given way through the vertical plane."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated, NamedTuple
+
+import numpy as np
+
+from geomech.core import summary
+from geomech.scenes.columns import columns_reader, rows_reader
+from geomech.scenes.intruding import Intruding
+from geomech.scenes.sections import Each, FromFile, Keys, OneOf, Within
+from geomech.scenes.stress import StressKeys
+from rft.checks import Number
+from rft.ground import GROUND_EFFECTS, GroundEffect
+from rft.plates import MOTIONS, SHAPES, Loads, Motion, Outline, PlateStress, Shape, loads
+from rft.plates.loads import ORDER
+from rft.refusal import located
+
+POINTS = FromFile(rows_reader("points", ("x", "z")), "CSV with the header x,z (m), in place of points", ("points",))
+COURSE = FromFile(
+    columns_reader(("t", "x", "z"), ("angle",)),
+    "CSV with the header t,x,z or t,x,z,angle (s, m, rad); velocities are differences of order 2 in the spacing of t",
+)
+ELEMENTS = "of the outline, about, 1 to 5000; the error is of order 2 in their number, 1 with tension cut"
+OUTLINES = OneOf(SHAPES, files={"polygon": POINTS, "spline": POINTS})
+
+
+class Intrusion(NamedTuple):
+    """Forces along a motion. t (T,) s; pose and twist (T, 3) as `rft.plates.loads` has them; force (T, 2) N; moment (T,) N m
+    about the frame's origin; power (T,) W of the grains on the body. With effects that have a weight the
+    force is that of both."""
+
+    t: np.ndarray
+    pose: np.ndarray
+    twist: np.ndarray
+    force: np.ndarray
+    moment: np.ndarray
+    power: np.ndarray
+
+    def __repr__(self) -> str:
+        (x, z), span = self.force.T, summary.span
+        forces = f"force x {span(x)} N, z {span(z)} N; moment {span(self.moment)} N m; power {span(self.power)} W"
+        return f"Intrusion({len(self.t)} poses, t {span(self.t)} s; {forces})"
+
+
+@dataclass(frozen=True)
+class IntruderScene(Intruding):
+    """A stress map, a body and its motion, and effects. elements: of the outline. files: those that the scene names. text: its
+    TOML."""
+
+    medium: Annotated[PlateStress, Keys(StressKeys, owner="an intruder scene")]
+    intruder: Annotated[Shape, OUTLINES]
+    motion: Annotated[Motion, OneOf(MOTIONS, files={"csv": COURSE})]
+    elements: Annotated[
+        int, Within("numerics", owner="an intruder scene"), Number(1, 5000, "-", ELEMENTS, whole=True)
+    ] = 100
+    effects: Annotated[tuple[GroundEffect, ...], Each(GROUND_EFFECTS, owner="an intruder scene")] = ()
+    name: str = "scene"
+    text: str = field(default="", repr=False, compare=False)
+    files: tuple[str, ...] = field(default=(), repr=False, compare=False)
+
+    parts = "elements"
+    field_types = {
+        "medium": (PlateStress, "a stress map such as StressMap(zeta=0.24)"),
+        "intruder": (Shape, "a body such as RoundRod(radius=0.0127, width=0.1)"),
+        "motion": (Motion, "a motion such as Drag(depth=0.05)"),
+    }
+    ladder = (12, 25, 50, 100, 200, 400, 3200)
+
+    def __post_init__(self):
+        with located(self.name):
+            self._check()
+            _ = self.outline
+
+    @property
+    def outline(self) -> Outline:
+        return self.intruder.outline(self.elements)
+
+    @property
+    def count(self) -> int:
+        return self.outline.elements
+
+    def actual_count(self, count: int) -> int:
+        return self.intruder.outline(count).elements
+
+    @property
+    def size(self) -> float:
+        return float(np.ptp(self.outline.points, axis=0).max())
+
+    @property
+    def per_part(self) -> float:
+        return 6e-8 * (2 if self.medium.tension == "cut" and not self.outline.closed else 1)
+
+    @property
+    def finer(self) -> tuple[int, ...]:
+        """Factors of refinement. Of first order also three, because the change by one factor alone may be small by
+        chance."""
+        return (2,) if self.order == 2 else (2, 3)
+
+    @property
+    def order(self) -> int:
+        return ORDER[self.medium.tension]
+
+    def run(self, elements: int | None = None) -> Intrusion:
+        """Return forces along the motion, with the scene's number of elements or another."""
+        outline = self.outline if elements is None else self.intruder.outline(elements)
+        t, pose, twist = self.motion.trajectory(outline)
+        result: Loads = loads(self.medium, outline, pose, twist, self.effects)
+        return Intrusion(t, pose, twist, self.weighed(result.force), result.moment, result.power(twist))
+
+    def table(self, result: Intrusion) -> dict[str, np.ndarray]:
+        """Return the columns of a result: t, angle (or x and z, if the body does not turn about a hub), force_x,
+        force_z, moment."""
+        place = {"angle": result.pose[:, 2]} if self.motion.turns else {"x": result.pose[:, 0], "z": result.pose[:, 1]}
+        force = {"force_x": result.force[:, 0], "force_z": result.force[:, 1]}
+        return {"t": result.t, **place, **force, "moment": result.moment}

@@ -1,0 +1,143 @@
+"""The reader of a scene's TOML file; scenes that ship with the toolkit are in builtin/."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from geomech.core.errors import choose
+from geomech.io.files import note, read_text
+from geomech.scenes import hints, reader, swimming
+from geomech.scenes.medium import MEDIUM
+from geomech.scenes.model import Scene, checked_scene
+from geomech.systems.base import kind_of
+from geomech.systems.swimmer import Swimmer
+from rft.refusal import Refusal, formatted
+
+if TYPE_CHECKING:
+    from geomech.scenes.intruding import Intruding
+    from geomech.scenes.walker import WalkerScene
+
+LARGEST = 10_000_000  # bytes of a scene file
+PIPE = "pipe"  # name of a scene that comes through one, as from /dev/stdin or <(...)
+
+
+def builtin_names() -> list[str]:
+    """Return the names of the scenes with a gait that ship with the package."""
+    return _names("")
+
+
+def intruder_names() -> list[str]:
+    """Return the names of the intruder scenes that ship with the package."""
+    return _names("intruders")
+
+
+def walker_names() -> list[str]:
+    """Return the names of the scenes of walking robots that ship with the package."""
+    return _names("walkers")
+
+
+def _folder(name: str) -> Traversable:
+    return resources.files("geomech.scenes") / "builtin" / name
+
+
+def _names(folder: str) -> list[str]:
+    return sorted(p.name.removesuffix(".toml") for p in _folder(folder).iterdir() if p.name.endswith(".toml"))
+
+
+def builtin_text(name: str) -> str | None:
+    """Return the TOML of a built-in scene; None if there is none of that name."""
+    for folder in ("", "intruders", "walkers"):
+        if name in _names(folder):
+            return (_folder(folder) / f"{name}.toml").read_text(encoding="utf-8")
+    return None
+
+
+def load(scene: str | Path) -> Scene | Any:
+    """Return the scene of a built-in name or a TOML file: an intruder scene if it has an [intruder], a `WalkerScene` if
+    a [robot] (Any, so that no type checker asks which). Refusal if there is none."""
+    if not isinstance(scene, (str, Path)):
+        raise Refusal("scene must be a name or a TOML file", value=scene)
+    if (text := builtin_text(str(scene))) is not None:
+        return parse(text, str(scene))
+    path, names = Path(scene), builtin_names()
+    try:
+        if path.suffix != ".toml" and not path.exists():
+            choose("scene", str(scene), names + intruder_names() + walker_names())
+        text = read_text(path, LARGEST, pipes=True)
+        scene = PIPE if path.is_fifo() else scene  # files that it names are looked for from here
+    except Refusal:
+        raise
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "it is not text"
+        raise Refusal(
+            f"cannot read scene {str(scene)!r}",
+            because=reason,
+            instead=f"give a TOML file or one of {', '.join(names)}",
+        ) from None
+    result = parse(text, str(scene))
+    system = getattr(result, "system", None)
+    for line in getattr(system, "assumed", ()):
+        note(f"{system.file}: {line}")
+    return result
+
+
+def in_medium(scene: Scene, file: str | Path) -> Scene:
+    """Return the scene in another medium, from a file as ``[medium] file`` takes it, or a table of drag if its name
+    ends in .csv; relative to the current folder. Refusal if the file has no medium, or the scene's system takes
+    none."""
+    if not isinstance(scene.system, Swimmer):
+        raise Refusal(f"a {kind_of(scene.system)} takes no medium", where=scene.name)
+    table = {"file": str(Path(file).absolute())}
+    if Path(file).suffix.lower() == ".csv":
+        table["law"] = "table"
+    source = reader.Source(scene.name)
+    return scene.changed(medium=reader.read_section(source, "medium", table, MEDIUM), files=tuple(source.files))
+
+
+def inputs(scene: Scene | Intruding | WalkerScene) -> list[Path]:
+    """Return the files that a scene was read from: its own, unless it is built in or came through a pipe, and those of
+    its medium, gait and system, or of an intruder scene's parts."""
+    parts = () if hasattr(scene, "intruder") or hasattr(scene, "robot") else (checked_scene(scene).gait, scene.system)
+    own_file = [] if scene.name in [PIPE, *builtin_names(), *intruder_names(), *walker_names()] else [scene.name]
+    return [Path(x) for x in (*own_file, *scene.files, *(getattr(part, "file", None) for part in parts)) if x]
+
+
+def parse(text: str, name: str = "scene") -> Scene | Any:
+    """Return the scene of a TOML text; Refusal if it is none."""
+    if not isinstance(text, str):
+        raise Refusal("a scene is a TOML text", value=text, where=formatted(name))
+    try:
+        tables = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # a ValueError may be an integer of too many digits
+        raise Refusal(f"{name} is not TOML", because=f"{error}{hints.line_hint(text, error)}") from None
+    return from_tables(tables, name, text)
+
+
+def _intruding(tables: Mapping, name: str) -> type[Intruding]:
+    """Return the class of an intruder scene, by the kind of its body."""
+    from geomech.scenes.intruder import OUTLINES, IntruderScene
+    from geomech.scenes.solid import KINDS, MeshScene
+
+    body = tables.get("intruder")
+    kind = body.get("kind") if isinstance(body, Mapping) else None
+    if kind is not None:
+        choose(f"{name}: [intruder] kind", kind, [*OUTLINES.kinds, *KINDS])
+    return MeshScene if kind in KINDS else IntruderScene
+
+
+def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | Any:
+    """Return the scene of the tables of a TOML text; Refusal if they make none."""
+    if not isinstance(tables, Mapping):
+        raise Refusal("a scene is a dict of tables", value=tables, where=formatted(name))
+    if "robot" in tables:
+        from geomech.scenes.walker import WalkerScene, spelled_out
+
+        return reader.read(WalkerScene, spelled_out(tables, name), name, text)
+    if {"intruder", "motion"} & {*tables}:
+        return reader.read(_intruding(tables, name), tables, name, text)
+    return swimming.from_tables(tables, name, text)

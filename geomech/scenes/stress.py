@@ -1,0 +1,194 @@
+"""The [medium] of scenes without a swimmer: stress maps of the vertical plane and the law of three dimensions, by name, by
+their numbers, or from files."""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, get_args, get_type_hints
+
+import numpy as np
+
+from geomech.core.errors import choose
+from geomech.io.files import read_text
+from geomech.scenes.columns import columns
+from geomech.scenes.key import Word
+from geomech.scenes.reader import Source, build
+from geomech.scenes.sections import Alternatives
+from rft.checks import Number
+from rft.meshes import Spatial
+from rft.plates import VERTICAL, PlateDrags, PlateStress, StressMap
+from rft.plates.stress import COEFFICIENTS
+from rft.refusal import Refusal, located
+
+LARGEST = 10_000_000  # bytes of a TOML file
+RADIANS = 3.2  # a table of angles within this is likely not in degrees
+Named = Annotated[str | None, Word(VERTICAL, f"{', '.join(VERTICAL)}; 'geomech scenes --show NAME' prints one")]
+
+
+def _optional_field(kind: type, name: str):
+    """Return the type of a field of a class in a form that may leave it out."""
+    hint = get_type_hints(kind, include_extras=True)[name]
+    return Annotated[(get_args(hint)[0] | None, *hint.__metadata__)]
+
+
+def _strengths(*groups: Collection[str], more: Collection[str] = (), cure: str) -> Alternatives:
+    """Return the keys that a strength is given by: a name or a file, either with ``more``, or one of the groups."""
+    by_name = [({key}, {*more}) for key in ("name", "file")]
+    return Alternatives((*by_name, *(({*group}, set()) for group in groups)), cure)
+
+
+_Coefficients = dataclasses.make_dataclass(
+    "_Coefficients",
+    [(key, _optional_field(StressMap, key), None) for key in COEFFICIENTS],
+    bases=(StressMap,),
+    frozen=True,
+)
+
+
+@dataclass(frozen=True)
+class StressKeys(_Coefficients):
+    """Give one of name, file and all nine coefficients, or zeta alone, which is that of the generic set.
+
+    file (-): TOML with such a table, or CSV of plate drags with the header beta,gamma,alpha_x,alpha_z (degrees, N/cm^3).
+    tension (-): "keep", or "cut" for no stress on faces that the map pulls on.
+    """
+
+    zeta: Annotated[float, Number(0, 1e6, "-", "strength of the medium, which multiplies what its other keys say")] = (
+        1.0
+    )
+    name: Named = None
+    file: str | None = None
+    aliases = {key: key.replace("m", "-") for key in COEFFICIENTS if "m" in key}
+    makes = StressMap
+    alternatives = _strengths(
+        COEFFICIENTS, (), cure="keep one of 'name', 'file' and the nine coefficients, in N/cm^3; or give zeta alone"
+    )
+
+    def to_part(self, source: Source, place: str, given: Collection[str]) -> PlateStress:
+        """Return the stress map. What is given beside its name, file or coefficients takes the place of its own."""
+        base = StressMap(**{key: getattr(self, key) for key in COEFFICIENTS if key in given})
+        if {"name", "file"} & {*given}:
+            base = VERTICAL[self.name].stress if self.name else _read_stress(source, place, self.file)
+        changed = {key: getattr(self, key) for key in ("grazing", "tension") if key in given}
+        return dataclasses.replace(base, zeta=base.zeta * self.zeta, **changed)
+
+
+@dataclass(frozen=True)
+class SpatialKeys(Spatial):
+    """Give one of name, file (either with zeta, if wanted), xi_n, and density with internal_friction.
+
+    file (-): TOML with a table [medium] of the vertical plane, or CSV of plate drags with the header
+    beta,gamma,alpha_x,alpha_z (degrees, N/cm^3).
+    """
+
+    xi_n: _optional_field(Spatial, "xi_n") = None  # type: ignore[valid-type]
+    name: Named = None
+    file: str | None = None
+    zeta: Annotated[float, Number(0, 1e6, "-", "times the strength of the name or file")] = 1.0
+    density: Annotated[
+        float | None,
+        Number(1, 1e5, "kg/m^3", "critical density of the grains, 1 to 1e5; with internal_friction, in place of xi_n"),
+    ] = None
+    internal_friction: Annotated[
+        float | None,
+        Number(
+            0.05, 1.5, "-",
+            "mu, tan of the angle of repose of the grains, 0.05 to 1.5; with density, in place of xi_n",
+        ),
+    ] = None  # fmt: skip
+    makes = Spatial
+    alternatives = _strengths(
+        ["xi_n"],
+        ["density", "internal_friction"],
+        more=["zeta"],
+        cure="give 'xi_n' (N/m^3), or 'density' and 'internal_friction', or 'name' or 'file' and, if wanted, 'zeta'",
+    )
+
+    def to_part(self, source: Source, place: str, given: Collection[str]) -> Spatial:
+        """Return the medium, as strong as the grains, or as a map of the vertical plane on a plate pushed down."""
+        more = {key: getattr(self, key) for key in ("surface_friction", "tension", "grazing")}
+        if self.density is not None:
+            return Spatial.from_grains(self.density, self.internal_friction, **more)
+        if strength := {*given} & {"name", "file", "zeta"}:
+            vertical = build(source, place, {key: getattr(self, key) for key in strength}, StressKeys)
+            return Spatial(matched_strength(vertical), **more)
+        return Spatial(self.xi_n, **more)
+
+
+class MatchedKeys(SpatialKeys):
+    __doc__ = SpatialKeys.__doc__
+
+    def to_part(self, source: Source, place: str, given: Collection[str]) -> dict:
+        """Return the medium, and what its strength was matched to, if to a map of the vertical plane."""
+        medium = super().to_part(source, place, given)
+        source_name = self.name or Path(self.file or "").name
+        times = f"{self.zeta:g} times " if self.zeta != 1.0 else ""
+        vertical = f"{times}alpha_z(0, 90 degrees) of {source_name} in the vertical plane"
+        match = f"xi_n = {medium.xi_n:.4g} N/m^3, matched to {vertical}"
+        return {"medium": medium, "matched": match if source_name else ""}
+
+
+def matched_strength(stress: PlateStress) -> float:
+    """Return xi_n, N/m^3, with which a flat plate pushed straight down bears the load that a map of the vertical plane
+    gives."""
+    flat, down = (0.0, -1.0), (0.0, -1.0)
+    return 1e6 * float(stress.alpha(flat, down)[1]) / Spatial(1.0).plate
+
+
+def plate_rows(place: str, file) -> np.ndarray:
+    """Return plate drags of a CSV file, (4, N): beta, gamma in degrees, alpha_x, alpha_z in N/cm^3."""
+    drags = columns(place, file, (("beta", "beta_deg"), ("gamma", "gamma_deg"), "alpha_x", "alpha_z"))
+    rows = np.stack(list(drags.values()))
+    if rows.size and np.abs(rows[:2]).max() < RADIANS:
+        raise Refusal("beta and gamma look like radians", where=(place, Path(file).name), instead="give degrees")
+    if rows.size and (largest := np.abs(rows[:2]).max()) > 360:
+        raise Refusal(
+            f"beta and gamma must be from -360 to 360 degrees, got {largest:g}", where=(place, Path(file).name)
+        )
+    return rows
+
+
+def plate_drags(place: str, file) -> PlateDrags:
+    """Return the stress map through the plate drags of a CSV file (`plate_rows`)."""
+    beta, gamma, a_x, a_z = plate_rows(place, file)
+    with located(f"{place}: {Path(file).name}"):
+        return PlateDrags(*map(tuple, (np.radians(beta), np.radians(gamma), a_x, a_z)))
+
+
+def load_medium(medium: str) -> PlateStress:
+    """Return the stress map of a name of the catalogue, a TOML file with a table [medium] (or nothing but one), or a CSV
+    file of plate drags."""
+    if medium in VERTICAL:
+        return VERTICAL[medium].stress
+    if Path(medium).suffix not in (".toml", ".csv") and not Path(medium).exists():
+        choose("medium", medium, VERTICAL)
+    return _read_stress(Source("medium"), "medium", medium)
+
+
+def _read_stress(source: Source, place: str, file: str) -> PlateStress:
+    """Return the stress map of a TOML file, if its name does not end in .csv, or of a CSV file of plate drags."""
+    path = Path(file)
+    if path.suffix == ".csv":
+        return plate_drags(place, file)
+    try:
+        tables = tomllib.loads(read_text(path, LARGEST))
+    except (OSError, ValueError, RecursionError) as error:
+        reason = getattr(error, "strerror", None) or "it is not TOML"
+        cure = f"give a TOML or CSV file or one of {', '.join(VERTICAL)}"
+        raise Refusal(f"cannot read {file!r}", where=place, because=reason, instead=cure) from None
+    table = tables.get("medium", tables)
+    if not isinstance(table, Mapping):
+        raise Refusal(f"medium must be a table [medium], got {type(table).__name__}", where=(place, path.name))
+    if isinstance(table.get("file"), str):
+        table = {**table, "file": str(path.absolute().parent / table["file"])}
+        if not table["file"].endswith(".csv"):
+            raise Refusal(
+                f"{path.name} names another file, {Path(table['file']).name}",
+                where=place,
+                instead="copy the coefficients",
+            )
+    return build(source, f"{place}: {path.name}:", table, StressKeys)

@@ -1,0 +1,164 @@
+"""Net displacements of the gaits of many scenes, by the direct tier with its errors: the question of a sweep."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from geomech.core.summary import poses
+from geomech.core.variables import Result, Variable
+from geomech.io.results import unit_name
+from geomech.run.cost import Cost
+from geomech.scenes import write as written
+from geomech.scenes.model import Scene, checked_scene
+from geomech.studies import estimate, tables, uncertainty
+from geomech.studies.batch import kind, side_by_side
+from geomech.studies.cost import direct, of_medium, price
+from geomech.studies.grid import Grid, at_points
+from geomech.systems.base import length_unit
+from geomech.systems.capabilities import gaits_per_batch
+
+POINT_BYTES = 200  # bytes of a point: its row, and copies of it on the way to a file
+MAKING = 6e-4  # s to build a scene from its tables, measured
+SAMPLES_TOGETHER = 64  # gaits of a batch: enough to fill the solver, few enough to lose little when stopped
+WIDTH = 5  # numbers of a point: x, y, theta and the errors of position and heading
+AMPLITUDE = "gait.amplitude"
+FREQUENCIES = "gait", "physical", "effects", "frequency"  # sections that have one, and its key
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """Net displacement per cycle, as a question of sweeps."""
+
+    def grid(self, scene: Scene, over: Mapping[str, list[float]]) -> Grid:
+        """Return the grid; amplitudes of one scene make one batch. Refusal if a corner makes no scene."""
+        tables_ = written.tables(checked_scene(scene))
+        if any(name.startswith("medium.") for name in over):
+            tables_ = written.spelled_out(tables_, scene)
+        grid = Grid(scene, over, tables_, AMPLITUDE, _idle(scene, over))
+        for corner in grid.corners():
+            corner_scene = grid.at(corner)
+            if uncertainty.uncertain(corner_scene.system):
+                uncertainty.sigma_points(corner_scene)
+        return grid
+
+    def together(self, scene: Scene) -> int:
+        return min(SAMPLES_TOGETHER, gaits_per_batch(scene.system, scene.numerics.phases))
+
+    def rows(self, scenes: list[Scene], amplitudes: list[float] | None) -> np.ndarray:
+        """Return x, y, theta, errors of position and heading, and standard deviations of QUANTITIES where the medium is
+        uncertain. x and y are in the scene's unit, other lengths in body lengths."""
+        rows = np.array(_rows(scenes, amplitudes))
+        if uncertainty.uncertain(scenes[0].system):
+            rows = np.column_stack([rows, _together(scenes, amplitudes, _doubt)])
+        return rows
+
+    def cost(self, grid: Grid) -> Cost:
+        """Return a forecast from some of the points."""
+        points, at, total = grid.points, grid.at, grid.total
+        first = [at(points[k]) for k in range(min(points.total, SAMPLES_TOGETHER))]
+        together = max(1, min(SAMPLES_TOGETHER, total // points.total * len(first) // len(set(map(kind, first)))))
+        samples = [at(points[k]) for k in {0, points.total // 2, points.total - 1}]
+        requests = [(s, s.gait, total, s.numerics.phases) for s in samples]
+        jobs = [direct(*one, together) + of_medium(*one[:3], together) for one in requests]
+        balances, seconds, _, besides, steps = np.mean(list(map(price, jobs)), 0).tolist()
+        memory = [direct(s, s.gait, min(total, SAMPLES_TOGETHER), s.numerics.phases)[0].memory for s in samples]
+        making = MAKING * points.total
+        return Cost(round(balances), seconds + making, max(memory) + POINT_BYTES * total, besides + making, steps)
+
+    def variables(self, grid: Grid, rows: np.ndarray, dims: tuple[str, ...]) -> tuple[list[Variable], dict]:
+        """Return net poses with their errors, the body's length, and frequency and speed where there is a frequency."""
+        scene, length = grid.scene, _lengths(grid)
+        unit = (
+            length_unit(scene.system) if np.all(length == scene.system.length) else "m"
+        )  # BL where no point has a size
+        errors = np.stack([length * rows[..., 3], rows[..., 4]], -1)
+        sizes = [length, length, np.ones_like(length), length]
+        spread = {
+            name: x * size for name, x, size in zip(tables.QUANTITIES, np.moveaxis(rows[..., WIDTH:], -1, 0), sizes)
+        }
+        frequency = at_points(grid.over, FREQUENCIES, scene.frequency)
+        out = tables.pose_variables(dims, rows[..., :3], errors, unit, spread or None, frequency)
+        out.append(Variable("length", dims, length, unit, "of the body"))
+        out += [] if frequency is None else [Variable("frequency", dims, frequency, "Hz")]
+        note = getattr(scene.gait, "estimate_is", "")
+        title = {"title": f"Net displacement per cycle of the scene {scene.name}", "scene": written.toml(scene)}
+        return out, {**title, **({"estimate_is": note} if note else {})}
+
+    def as_stored(self, result: Result) -> Result:
+        """Return a sweep as data for a file."""
+        variables = tables.poses_as_stored(result)
+        unit = unit_name(result["length"].unit)
+        variables.append(
+            Variable("length", result["length"].dims, result["length"].values, unit, result["length"].label)
+        )
+        variables += [result["frequency"]] if "frequency" in result else []
+        return Result(result.kind, tuple(variables), result.attributes, result.subject)
+
+    def table(self, result: Result) -> dict:
+        """Return {"displacement": (N_1, ..., 3), "estimate": (N_1, ...), "estimate_heading": (N_1, ...)}, with
+        estimates of `estimate.direct` in the unit of the displacement and rad, "length": (N_1, ...), of the body, and
+        "units": {key: unit}.
+
+        Where the swimmer has a frequency also "frequency", Hz, and "speed", the net distance times it; where the medium
+        is uncertain "medium_error", of the position, and "medium_error_heading", rad (`geomech.studies.uncertainty`)."""
+        unit, variables = result["net_distance"].unit, {v.name: v for v in self.as_stored(result).variables}
+        units = {"displacement": [unit, unit, "rad"], "estimate": unit, "estimate_heading": "rad", "length": unit}
+        units |= {"frequency": "Hz", "speed": f"{unit}/s", "medium_error": unit, "medium_error_heading": "rad"}
+        units = {key: unit for key, unit in units.items() if key in variables}
+        return {**{key: variables[key].values for key in units}, "units": units}
+
+    def summary(self, table: Mapping) -> str:
+        unit, worst = table["units"]["estimate"], np.max(table["estimate"], initial=0.0)
+        return f"net {poses(table['displacement'])} ({unit}, rad); estimated error up to {worst:.1e} {unit}"
+
+
+def _lengths(grid: Grid) -> np.ndarray:
+    """Return the body's length (N_1, ...) at the points of a grid. Each parameter either multiplies it or does not
+    change it."""
+    values = grid.values
+    first = {name: x[0] for name, x in values.items()}
+    of = lambda name, x: grid.at([*{**first, name: x}.values()]).system.length
+    length = grid.at([*first.values()]).system.length
+    lengths = np.array(length)
+    for name in grid.over:
+        other = next((x for x in values[name] if x != first[name]), first[name])
+        fixed = name == AMPLITUDE or of(name, other) == length
+        along = np.ones(len(values[name])) if fixed else np.array([of(name, x) for x in values[name]]) / length
+        lengths = lengths[..., None] * along
+    return lengths
+
+
+def _idle(scene: Scene, names) -> tuple[str, ...]:
+    """Return the parameters that change no displacement: the frequency, where no effect has one."""
+    timed = [f"{section}.frequency" for section in ("gait", "physical")]
+    return tuple(name for name in names if name in timed and scene.system.traits.frequency is None)
+
+
+def _rows(scenes: list[Scene], amplitudes) -> list:
+    """Return [[x, y, theta, error, error of theta], ...] for all amplitudes of every scene, solved in batches; errors
+    in body lengths and rad."""
+    solve = lambda joined: np.column_stack(estimate.direct(joined, joined.gait, None, joined.numerics.phases))
+    return _together(scenes, amplitudes, solve)
+
+
+def _together(scenes: list[Scene], amplitudes, solve: Callable) -> list:
+    """Return rows of solve(scenes side by side), one for each amplitude of every scene."""
+    groups: dict = {}
+    for k, scene in enumerate(scenes):
+        groups.setdefault(kind(scene), []).append(k)
+    rows: list = [None] * len(scenes)
+    for members in groups.values():
+        numbers = solve(side_by_side([scenes[k] for k in members], amplitudes))
+        for k, part in zip(members, np.split(numbers, len(members))):
+            rows[k] = part.tolist()
+    return list(itertools.chain(*rows))
+
+
+def _doubt(joined: Scene) -> np.ndarray:
+    """Return the standard deviations of QUANTITIES by the medium's uncertainty, (N, 4), body lengths and rad."""
+    deviations, length = uncertainty.of_medium(joined, joined.gait, None), joined.system.length
+    return np.column_stack([deviations[q] / (1.0 if q == "heading" else length) for q in tables.QUANTITIES])

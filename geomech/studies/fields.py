@@ -1,0 +1,282 @@
+"""Connections, CCFs and other fields of a study over shape space, as variables of results."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from geomech.core.variables import Result, Variable
+from geomech.geometry import two_form
+from geomech.geometry.connection import Connection
+from geomech.geometry.field import Field
+from geomech.geometry.harmonics import Harmonics
+from geomech.geometry.metric import Finsler, Metric
+from geomech.geometry.tube import TaylorSeries, Tube
+from geomech.geometry.two_form import TwoForm
+from geomech.io.results import unit_name, write_netcdf
+from geomech.io.tables.netcdf import SHAPE
+from geomech.scenes.model import Scene
+from geomech.scenes.write import toml
+from geomech.studies import effort
+from geomech.studies.study import Study
+from geomech.studies.tables import COMPONENTS
+from geomech.systems.base import System, length_unit, shape_labels
+from geomech.systems.capabilities import OwnMetric, Recorded, capability, solver_of, stored_table
+from geomech.systems.framed import Framed
+
+ERROR_OF_CCF = "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
+INTERVAL_OF_CCF = "half width of the interval of ccf"
+INTERVAL_OF_A = "half width of the interval of A"
+
+
+def of_study(study: Study) -> Result:
+    """Return A (component, joint, alpha_1, ...), its fit residual, the rms of xi, and the CCF with its estimated error,
+    of each pair of joints; for two joints, where xi is not linear in alphadot, its odd harmonics; the metric, where
+    there is one.
+
+    With units, conventions (`about`) and the scene's text. `Connection.load` and [system] kind = "table" read it from a
+    file."""
+    labels = shape_labels(study.scene.system)
+    return Result("connection", (*coordinates(study.fitted.axes, labels), *variables(study)), attributes(study), study)
+
+
+def save_connection(path: str | Path, study: Study) -> None:
+    """Write the result of `of_study` as NetCDF; the file appears whole or not at all."""
+    write_netcdf(path, of_study(study))
+
+
+def attributes(study: Study) -> dict:
+    """Return title, conventions, numerics and text of a scene, as attributes of a file of its connection."""
+    scene = study.scene
+    numerics = (
+        repr(scene.numerics) if solver_of(scene.system) is None else f"{scene.numerics}, {solver_of(scene.system)}"
+    )
+    return {
+        "title": f"Local connection and curvature constraint function of the scene {scene.name}",
+        **about(scene),
+        "scene": toml(scene),
+        "numerics": numerics,
+        "interpolation": int(study.fitted.degree),
+        **(
+            {}
+            if (degree := scene.system.traits.power_degree) is None or effort.why_none(scene.system)
+            else {"power_degree": degree}
+        ),
+    }
+
+
+def variables(study: Study) -> list[Variable]:
+    """Return the fields of a study, without their coordinates."""
+    unit = length_unit(study.scene.system)
+    variables = of_connection(study.fitted, stored_table(study.scene.system, "A_error"))
+    if isinstance(study.fitted, Tube):
+        variables += [*of_known(study.fitted.taylor, unit), of_reach(study.fitted)]
+    if len(study.fitted.axes) == 2:
+        what = INTERVAL_OF_CCF if isinstance(study.fitted, Tube) else ERROR_OF_CCF
+        variables.append(of_ccf(study.curvature, study.curvature_error, what))
+    elif len(study.fitted.axes) > 2:
+        variables += of_pairs(study.two_form, two_form.error(study.fitted))
+    if isinstance(study.scene.system, Framed):
+        variables.append(of_frame(study.scene.system.field.field))
+    if not effort.why_none(study.scene.system):
+        variables += of_metric(
+            study.metric, capability(study.scene.system, OwnMetric) is None
+        )  # before the harmonics, as they may share velocities
+    if (harmonics := study.harmonics) is not None:
+        variables += of_harmonics(harmonics, unit)
+    if (even := study.even_part) is not None:
+        units = f"{unit_name(unit)} rad-1 (x, y), rad rad-1 (theta)"
+        name = "rms over directions of xi(alphadot) + xi(-alphadot), |alphadot| = 1, which A takes for 0"
+        variables.append(Variable("even_part", ("component", *angles_of(study.fitted.axes)), even, units, name))
+    return variables
+
+
+def of_connection(fitted: Connection, error: np.ndarray | None = None) -> list[Variable]:
+    """Return A, its fit residual, and the rms of xi. error: half widths (3, d, N_1, ...) of intervals of A."""
+    angles = angles_of(fitted.axes)
+    units = f"{unit_name(fitted.unit)} rad-1 (x, y), rad rad-1 (theta)"
+    residual = "rms of xi - A alphadot over directions of alphadot, |alphadot| = 1"
+    speed = "rms of xi over directions of alphadot, |alphadot| = 1"
+    return [
+        Variable(
+            "A", ("component", "joint", *angles), fitted.A, units, "local connection", error, error_label=INTERVAL_OF_A
+        ),
+        Variable("fit_residual", ("component", *angles), fitted.residual, units, residual),
+        Variable("speed", ("component", *angles), fitted.speed, units, speed),
+    ]
+
+
+def of_reach(tube: Tube) -> Variable:
+    """Return the distance of the grid of a connection near one gait from it."""
+    shapes = np.stack(np.meshgrid(*tube.axes, indexing="ij"), -1)
+    label = "distance from the mean gait over that which the data reach: A is nan beyond 1"
+    return Variable("reach", angles_of(tube.axes), tube.reach(shapes), "1", label)
+
+
+def of_known(known: TaylorSeries, unit: str) -> list[Variable]:
+    """Return the arrays of a connection near one gait (`geomech.geometry.tube`)."""
+    units, order = (
+        f"{unit_name(unit)} rad-1 (x, y), rad rad-1 (theta)",
+        "Fourier coefficients, 1, cos t, sin t, cos 2t ..., of",
+    )
+    lead, row = ("component", "joint"), "harmonic_of_A"
+    return [
+        Variable("gait", ("joint", "harmonic_of_gait"), known.loop.coefficients, "rad", f"{order} the mean gait"),
+        Variable("gait_A", (*lead, row), known.A, units, f"{order} A at the mean gait"),
+        Variable(
+            "gait_slope", (*lead, "normal", row), known.slope, f"{units}, per rad",
+            f"{order} the derivative of A along normals of the mean gait; to its left in the plane of two joints",
+        ),
+        Variable(
+            "gait_errors", ("error", *lead, "A_and_normals", row), known.errors, units,
+            "independent errors of gait_A, and of gait_slope: the squares of what each does add up to a variance",
+        ),
+        Variable(
+            "gait_spread", ("joint", "other_joint", "place"), known.spread, "rad2",
+            "at equally spaced phases: the data reach deviations d with d . inverse . d up to 1",
+        ),
+        Variable(
+            "gait_beyond", ("component",), known.beyond, f"{unit_name(unit)} (x, y), rad (theta)",
+            "what the variation of the cycles changes in the net pose beyond the first order, part of its error",
+        ),
+        Variable(
+            "gait_off", ("component", "along_and_across", "place"), known.standard_error, units,
+            "at equally spaced phases: standard errors of A along the mean gait, and across it, for what is left of xi",
+        ),
+    ]  # fmt: skip
+
+
+def of_ccf(field: Field, error: Field | None = None, what: str = ERROR_OF_CCF, name: str = "ccf") -> Variable:
+    """Return a CCF as a variable. what: text on the kind of its error."""
+    units = f"{unit_name(field.unit)} rad-2 (x, y), rad rad-2 (theta)"
+    label, dims = "curvature constraint function of joints 1 and 2", ("component", *angles_of(field.axes))
+    return Variable(name, dims, field.values, units, label, None if error is None else error.values, error_label=what)
+
+
+def of_pairs(form: TwoForm, error: TwoForm) -> list[Variable]:
+    """Return the CCF of all pairs of joints, its error, and the pairs."""
+    units = f"{unit_name(form.field.unit)} rad-2 (x, y), rad rad-2 (theta)"
+    pairs, over = np.array(form.pairs) + 1.0, ("pair", "component", *angles_of(form.field.axes))
+    order = ", ".join(f"{i:g} {j:g}" for i, j in pairs)
+    label = f"curvature constraint function of joints {order}, in this order"
+    return [
+        Variable("pair_joints", ("pair", "first_and_second"), pairs, "1", "joints i < j of each pair"),
+        Variable(
+            "ccf_pairs",
+            over,
+            form.field.values,
+            units,
+            label,
+            error.field.values,
+            error_label=ERROR_OF_CCF.replace("ccf", "ccf_pairs", 1),
+        ),
+    ]
+
+
+def of_frame(pose: Field) -> Variable:
+    """Return the pose of a minimum-perturbation frame in the original frame."""
+    units = f"{unit_name(pose.unit)} (x, y), rad (theta)"
+    name = "pose of this frame in the mean frame of the body, h with g_this = g_mean h"
+    return Variable("frame_pose", ("component", *angles_of(pose.axes)), pose.values, units, name)
+
+
+def of_harmonics(table: Harmonics, unit: str) -> list[Variable]:
+    """Return the coefficients of the odd harmonics of xi, and their residual."""
+    angles = angles_of(table.axes)
+    units = f"{unit_name(unit)} rad-1 (x, y), rad rad-1 (theta)"
+    name = "coefficients of cos(k beta), sin(k beta), k = 1, 3, 5 ..., of xi for alphadot = (cos beta, sin beta)"
+    residual = "rms over directions of alphadot of what the harmonics leave of xi, |alphadot| = 1"
+    return [
+        Variable("harmonics", ("component", "coefficient", *angles), table.coefficients, units, name),
+        Variable("harmonics_residual", ("component", *angles), table.residual, units, residual),
+    ]
+
+
+def of_metric(metric: Metric | Finsler, power: bool = True) -> list[Variable]:
+    """Return M, or the coefficients of a norm and their residual. power: it is the power of drag, not the system's own
+    metric."""
+    angles, size = angles_of(metric.axes), "drag that of the whole body along itself, lengths those of the body"
+    if isinstance(metric, Metric):
+        if not power:
+            own = "metric M of the system itself: alphadot . M alphadot is what it costs to change shape"
+            return [Variable("metric", ("joint", "other_joint", *angles), metric.M, effort.METRIC, own)]
+        name = f"dissipation metric M, power = alphadot . M alphadot; {size}"
+        units = "axial drag at 1 body length per time x body length x time rad-2"
+        return [Variable("metric", ("joint", "other_joint", *angles), metric.M, units, name)]
+    name = "coefficients of 1, cos(k beta), sin(k beta), k = 2, 4 ..., of F = power^(1 / power_degree) for alphadot = "
+    units = "(axial drag x body length)^(1 / power_degree) rad-1"
+    residual = "rms over directions of alphadot of what the coefficients leave of F, |alphadot| = 1"
+    return [
+        Variable(
+            "norm", ("norm_coefficient", *angles), metric.coefficients, units, f"{name}(cos beta, sin beta); {size}"
+        ),
+        Variable("norm_residual", angles, metric.residual, units, residual),
+    ]
+
+
+def angles_of(axes) -> tuple[str, ...]:
+    """Return the names of the axes of shape space."""
+    return tuple(f"alpha_{k + 1}" for k in range(len(axes)))
+
+
+def coordinates(axes: Sequence[np.ndarray], labels: Sequence[tuple[str, str]]) -> list[Variable]:
+    """Return components, joints and the axes of shape space; labels: (name, unit) of each shape variable, alpha_k for an
+    angle between links."""
+    variables = [
+        Variable("component", ("component",), np.array(COMPONENTS)),
+        Variable("joint", ("joint",), np.arange(1, len(axes) + 1, dtype="i4")),
+    ]
+    for k, (name, axis, (label, unit)) in enumerate(zip(angles_of(axes), axes, labels)):
+        joint = f"angle of joint {k + 1}, heading of link {k + 2} minus link {k + 1}"
+        variables.append(Variable(name, (name,), axis, unit, joint if label == name else f"{SHAPE}{label}"))
+    return variables
+
+
+def of_fitted(fitted: Connection, shapes: Sequence[str] = ()) -> Result:
+    """Return A, its fit residual and the rms of xi. shapes: names of the shape variables, where these are no joint angles."""
+    sized = (
+        {} if fitted.length is None else {"body_length": float(fitted.length), "length_unit": unit_name(fitted.unit)}
+    )
+    variables = (*coordinates(fitted.axes, _labels(fitted.axes, shapes)), *of_connection(fitted))
+    return Result("connection", variables, {"sign_of_A": "xi = + A alphadot", **sized}, fitted)
+
+
+def of_field(values: Field, name: str, shapes: Sequence[str] = ()) -> Result:
+    """Return a field; with rows x, y and theta it is a CCF, in its units."""
+    lead = values.values.shape[: -values.joints]
+    dims = (*(f"dimension_{k}" for k in range(len(lead))), *angles_of(values.axes))
+    field = of_ccf(values, name=name) if lead == (3,) else Variable(name, dims, values.values)
+    return Result("field", (*coordinates(values.axes, _labels(values.axes, shapes)), field), {}, values)
+
+
+def _labels(axes, names: Sequence[str]) -> list[tuple[str, str]]:
+    return [(name, "rad") for name in names or angles_of(axes)]
+
+
+def recorded(system: System) -> dict:
+    """Return the system's own attributes for files of its connection."""
+    recorded = capability(system, Recorded)
+    return {} if recorded is None else dict(recorded.about())
+
+
+def about(scene: Scene) -> dict:
+    """Return the conventions of a connection as attributes of a file: frame, length, forces and signs."""
+    system = scene.system
+    meanings = {"mean": "centre of mass, length-weighted mean heading", "that of the table": "not told by its file"}
+    meanings["minimum-perturbation"] = "the one in which the squares of A, integrated over the grid, are least"
+    meanings["that of the log"] = "the one whose x, y and heading were logged"
+    meaning = meanings.get(scene.frame, "centre and heading of that link, 1 the tail")
+    return {
+        "Conventions": "xi = + A alphadot; CCF = dA + [A, A], positive for counter-clockwise loops",
+        "frame": scene.frame,
+        "frame_meaning": f"body frame: {meaning}",
+        "body_length": float(system.length),
+        "length_unit": unit_name(length_unit(system)),
+        **recorded(system),
+        "components": "x, y, theta of the body velocity xi: forward (tail to head), to the left, counter-clockwise",
+        "sign_of_A": "xi = + A alphadot",
+        "sign_of_ccf": "CCF = dA + [A, A] with [X, Y] = XY - YX, positive for counter-clockwise loops",
+        "pair_of_ccf": "CCF_12 = dA_2 / dalpha_1 - dA_1 / dalpha_2 + [A_1, A_2]",
+    }

@@ -1,0 +1,159 @@
+"""Forces and moments on a body that is moved through grains, with errors, and the accuracy study of these: error
+against the number of elements or triangles, and time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from geomech.core.knob import ROUNDING, Knob
+from geomech.core.variables import Result, Variable
+from geomech.run.cost import BASE, Cost
+from geomech.scenes.intruding import Intruding
+from geomech.studies.question import Allow, Progress, Question
+
+UNITS = {
+    "t": "s",
+    "angle": "rad",
+    "x": "m",
+    "y": "m",
+    "z": "m",
+    "force": "N",
+    "moment": "N m",
+}  # by the first part of names
+MARGIN = 1.125  # factor on the extrapolation by order: covers the error of 95 of 100 motions of outlines, measured
+
+
+@dataclass(frozen=True)
+class Intrusion(Question):
+    """Force and moment along a scene's motion, with errors from finer parts."""
+
+    scene: Intruding
+
+    def cost(self) -> Elements:
+        return price(self.scene, sum((1, *self.scene.finer)) * self.scene.count)
+
+    def answer(self, progress: Progress, allow: Allow) -> Result:
+        scene = self.scene
+        run = scene.run()
+        error, columns = estimate(scene, run), scene.table(run)
+        table = [Variable(name, ("t",), values, UNITS[name.partition("_")[0]]) for name, values in columns.items()]
+        return Result("intrusion", tuple(table), {"name": scene.name, "error": error}, (scene, run))
+
+
+class Estimate(NamedTuple):
+    """Largest errors of force, N, and moment, N m, along the motion, from finer parts, at most ``count``; nan where a
+    body does not allow so many."""
+
+    force: float
+    moment: float
+    count: int
+
+
+def estimate(scene: Intruding, run) -> Estimate:
+    """Return the largest change of a run with finer parts, extrapolated by the order of the error."""
+    change, counts = np.zeros(2), [times * scene.count for times in scene.finer]
+    try:
+        counts = [scene.actual_count(count) for count in counts]
+    except ValueError:
+        counts = [scene.count]
+    if counts[0] == scene.count:
+        return Estimate(np.nan, np.nan, scene.count)
+    for times, count in zip(scene.finer, counts):
+        finer, factor = scene.run(times * scene.count), MARGIN / (1.0 - (scene.count / count) ** scene.order)
+        pairs = ((x.reshape(len(x), -1), y.reshape(len(y), -1)) for x, y in zip(_loads(finer), _loads(run)))
+        change = np.maximum(change, [factor * np.linalg.norm(x - y, axis=1).max() for x, y in pairs])
+    return Estimate(*change.tolist(), counts[-1])
+
+
+def _loads(run) -> tuple[np.ndarray, np.ndarray]:
+    return run.force, run.moment
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Force and moment along a motion by numbers of parts. Errors are rms over the motion, over the largest value,
+    against the finest of the scene's ladder."""
+
+    scene: Intruding
+    runs: int = 3
+
+    measures: ClassVar[tuple[str, ...]] = ("force", "moment")
+    tolerances: ClassVar[np.ndarray] = 10.0 ** -np.arange(1, 7)
+    picture: ClassVar[str] = "elements_figure"
+
+    def check(self) -> None: ...
+
+    def cost(self) -> Elements:
+        *counts, finest = self.scene.ladder
+        return price(self.scene, finest + self.runs * sum(counts))
+
+    def prepared(self) -> Settings:
+        return self
+
+    def knobs(self) -> list[Knob]:
+        """Return the number of parts as a knob; a shape may have more than the number given."""
+        values = tuple(self.scene.actual_count(n) for n in self.scene.ladder[:-1])
+        return [Knob(self.scene.parts, values, self.scene.order, against="limit")]
+
+    def numbers(self, knob: Knob | None, value: Any) -> list[np.ndarray]:
+        """Return force (T, 2 or 3), N, and moment (T,) or (T, 3), N m, along the motion."""
+        *counts, finest = self.scene.ladder
+        run = self.scene.run(finest if value is None else counts[self.knobs()[0].values.index(value)])
+        return [run.force, run.moment]
+
+    def errors(self, numbers: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
+        """Return the error of force and moment; a moment that is only roundoff is compared to the force times the
+        body's size."""
+        errors, most = {}, np.abs(truth[0]).max()
+        for what, arm, one, exact in zip(self.measures, (1.0, self.scene.size), numbers, truth):
+            largest, bound = np.abs(exact).max(), arm * most
+            largest = largest if largest > ROUNDING * bound else bound or 1.0
+            errors[what] = float(np.sqrt(np.mean((one - exact) ** 2)) / largest)
+        return errors
+
+    def describe(self, knob: Knob, measure: str) -> dict[str, Any]:
+        return {"label": measure, "order": knob.order}
+
+    def cheapest(self, lines: list[dict], tolerance: float) -> dict[str, Any]:
+        """Return the fewest of the tried parts that meet a tolerance in force and moment."""
+        parts = self.scene.parts
+        for k, count in enumerate(lines[0]["value"]):
+            if (error := max(line["error"][k] for line in lines)) <= tolerance:
+                return {"tolerance": tolerance, parts: count, "error": error, "seconds": lines[0]["seconds"][k]}
+        return {"tolerance": tolerance, parts: None}
+
+    def facts(self) -> dict[str, Any]:
+        scene = self.scene
+        finest = scene.actual_count(scene.ladder[-1])
+        return {"scene": scene.name, "parts": scene.parts, "poses": scene.motion.samples, "finest": finest}
+
+
+class Elements(Cost):
+    """Cost of forces along a motion; balances counts the elements, at every pose."""
+
+    parts = "elements"
+
+    @property
+    def as_balances(self) -> float:
+        """Number of balances that take NumPy as long: 150 elements count as one; triangles are never compiled."""
+        return self.balances / 150 if self.parts == "elements" else 0.0
+
+    def __str__(self) -> str:
+        return f"{self.balances:,} {self.parts} at a pose, about {max(1.0, self.seconds):.0f} s of computing"
+
+
+class Triangles(Elements):
+    """Cost of forces on a mesh along a motion."""
+
+    parts = "triangles"
+
+
+def price(scene: Intruding, count: int | None = None) -> Elements:
+    """Return the cost of runs with so many parts in all, or of one with the scene's own."""
+    parts = scene.motion.samples * (count or scene.count)
+    kind = next(kind for kind in (Elements, Triangles) if kind.parts == scene.parts)
+    seconds = parts * scene.per_part
+    return kind(parts, seconds, BASE, seconds)

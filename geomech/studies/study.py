@@ -1,0 +1,331 @@
+"""The study of a scene: displacements by every tier, with a store of the tables computed so far."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from geomech.core.errors import choose
+from geomech.core.face import Extensible
+from geomech.gaits import Gait
+from geomech.geometry.connection import Connection, even_part
+from geomech.geometry.curvature import ccf
+from geomech.geometry.curvature import error as ccf_error
+from geomech.geometry.field import Field, inside
+from geomech.geometry.gait import checked_gait
+from geomech.geometry.harmonics import Harmonics
+from geomech.geometry.metric import Finsler, Metric
+from geomech.geometry.plane import Plane
+from geomech.geometry.two_form import TwoForm, two_form
+from geomech.run.progress import progress as shown
+from geomech.scenes.frames import framed
+from geomech.scenes.model import Scene, frequency_of
+from geomech.studies import cost, effort, estimate, tables, uncertainty
+from geomech.studies.available import METHODS as METHODS
+from geomech.studies.available import methods, tiers
+from geomech.studies.results import Displacements
+from geomech.systems.base import refuse_singular, shape_labels
+from geomech.systems.capabilities import gaits_per_batch, stored_table
+from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
+from geomech.systems.framed import in_frame
+from geomech.tiers import TIERS, fitted, harmonic
+from geomech.tiers.base import Plan, Table, Tier, in_groups
+from rft.checks import real_array
+from rft.refusal import Refusal, located
+
+SAMPLES = 64, 4096  # amplitudes and phases that `cost` checks; `study` checks all
+
+
+class Study(Extensible):
+    """A scene and the tables computed for it so far, each stored under its name, the system and all other data that it
+    depends on. `turned` returns a study with other numerics that shares them."""
+
+    def __init__(self, scene: Scene, tables: dict | None = None):
+        if not isinstance(scene, Scene):
+            raise Refusal("a study is that of a Scene", value=scene)
+        self.scene, self._tables = scene, {} if tables is None else tables
+
+    def __repr__(self) -> str:
+        names = sorted({str(key[0]) for key in self.computed})
+        return f"Study({self.scene!r}; tiers {', '.join(self.tiers)}; computed: {', '.join(names) or 'nothing yet'})"
+
+    @property
+    def computed(self) -> tuple:
+        """Keys (name, system, key) of the tables computed so far."""
+        return tuple(self._tables)
+
+    def turned(self, **numerics) -> Study:
+        """Return the study with other [numerics] and the same stored tables; an entry given as None stays as it is."""
+        return Study(self.scene.with_numerics(**numerics), self._tables)
+
+    def in_frame(self, frame: str) -> Study:
+        """Return the study in another body frame; Refusal for an unknown one, or the scene's own."""
+        s = self.scene
+        with located(s.name):
+            if frame == s.frame:
+                raise Refusal(f"the frame is {frame!r} already", instead="name another")
+            system = framed(s.system, s.numerics) if frame == MINIMUM_PERTURBATION else in_frame(s.system, frame)
+            return Study(s.changed(system=system), self._tables)
+
+    methods = property(lambda self: methods(self.scene.system))
+    tiers = property(lambda self: tiers(self.scene.system))
+
+    def _stored(self, name: str, key: tuple, build: Callable):
+        """Return the value of build(), the seconds that it took, and whether it was stored before."""
+        key = name, self.scene.system, key
+        if not (exists := key in self._tables):
+            import scipy.interpolate  # noqa: F401  loaded here, so that no look-up is charged for it
+
+            self._tables[key] = timed(build)
+        return *self._tables[key], exists
+
+    def _built(self, table: Table, progress: Callable | None = None):
+        """Return what `_stored` returns, for a table. Without ``progress`` a line shows it where it takes long."""
+
+        def build():
+            if progress:
+                return table.build(progress)
+            with shown(f"{table.name} of {self.scene.name}, {table.balances:,} force balances", bar=False) as bar:
+                return table.build(bar)
+
+        return self._stored(table.name, table.key, build)
+
+    def _connection(self) -> Table:
+        return fitted.table(self.scene.system, self.scene.numerics)
+
+    def plan(self, tier: str, gait: Gait | None = None, amplitudes=None) -> Plan:
+        """Return how a tier predicts displacements of a gait, or of the scene's own; Refusal if it is not available."""
+        with located(self.scene.name):
+            chosen = _tier(tier)
+            chosen.refuse(self.scene.system)
+            return self._plan(chosen, self.scene.gait if gait is None else checked_gait(gait), amplitudes)
+
+    def _plan(self, tier: Tier, gait: Gait, amplitudes) -> Plan:
+        return tier.plan(self.scene.system, self.scene.numerics, gait, amplitudes)
+
+    def table(self, tier: str, gait: Gait | None = None, amplitudes=None, progress: Callable | None = None) -> Any:
+        """Return the table of a tier, computed once: a Connection, Harmonics or a Family; None for a tier without one.
+        Refusal if the tier is not available."""
+        return self._table_of(self.plan(tier, gait, amplitudes), progress)
+
+    def _table_of(self, plan: Plan, progress: Callable | None = None) -> Any:
+        with located(self.scene.name):
+            return self._built(plan.table, progress)[0] if plan.table else None
+
+    @property
+    def fitted(self) -> Connection:
+        """Least-squares connection on the scene's grid."""
+        return self.compute_field()
+
+    def compute_field(self, progress: Callable | None = None) -> Connection:
+        """Return `fitted`. progress: called with the fraction done."""
+        with located(self.scene.name):
+            fitted.refuse(self.scene.system)
+            return self._built(self._connection(), progress)[0]
+
+    def compute_harmonics(self, progress: Callable | None = None) -> Harmonics:
+        """Return the odd harmonics of the velocity on the scene's grid. progress: called with the fraction done."""
+        with located(self.scene.name):
+            return self._built(harmonic.table(self.scene.system, self.scene.numerics), progress)[0]
+
+    @property
+    def harmonics(self) -> Harmonics | None:
+        """Harmonics of the velocity in a plain study; None where it is linear, or has too many joints."""
+        return self.compute_harmonics() if harmonic.is_looked_up(self.scene.system) else None
+
+    def plane(self, pair: Sequence[int], at=None, progress: Callable | None = None) -> Plane:
+        """Return a plane of shape space in which two joints move, counted from 0, through a shape or the gait's middle:
+        the CCF of that pair, without a field of all joints (`geomech.geometry.plane`)."""
+        s, at = self.scene, self.scene.gait.middle if at is None else at
+        with located(s.name):
+            build = lambda: fitted.plane(s.system, s.numerics, tuple(pair), at, progress)
+            return self._stored("plane", (*self._connection().key, *pair, *at), build)[0]
+
+    @property
+    def two_form(self) -> TwoForm:
+        """CCF of all pairs of joints, of any number (`geomech.geometry.two_form`)."""
+        return self._stored("two-form", self._connection().key, lambda: two_form(self.fitted))[0]
+
+    def compute_metric(self, progress: Callable | None = None) -> Metric | Finsler:
+        """Return `metric`. progress: called with the fraction done. Where it needs the velocities of the harmonic
+        table, that table is stored, too."""
+        s = self.scene
+        with located(s.name):
+            key = fitted.key(s.numerics, effort.DEPENDS_ON)
+            return self._stored("metric", key, lambda: self._new_metric(progress))[0]
+
+    def _new_metric(self, progress: Callable | None) -> Metric | Finsler:
+        system, n = self.scene.system, self.scene.numerics
+        shared = harmonic.table(system, n)
+        if not effort.shared(system) or (shared.name, system, shared.key) in self._tables:
+            return effort.table(system, n, progress)
+        (harmonics, norm), took = timed(lambda: effort.with_harmonics(system, n, progress))
+        self._tables[shared.name, system, shared.key] = harmonics, took
+        return norm
+
+    @property
+    def metric(self) -> Metric | Finsler:
+        """Cost of changes of shape on the field's grid (`geomech.geometry.metric`): a quadratic form where xi = A
+        alphadot, else a norm. Refusal if the system has none."""
+        return self.compute_metric()
+
+    def effort(self, gait: Gait | None = None, amplitudes=None) -> dict[str, np.ndarray]:
+        """Return path length and work of a gait, or the scene's own, with their errors: see
+        `geomech.studies.effort.effort`."""
+        with located(self.scene.name):
+            self.scene.note_turns(self.scene.gait if gait is None else checked_gait(gait), amplitudes)
+            return effort.effort(self.scene, gait, amplitudes)
+
+    @property
+    def even_part(self) -> np.ndarray | None:
+        """Part of the velocity that is even in alphadot, as with skin friction (`connection.even_part`); None if there
+        is none."""
+        system = self.scene.system
+        if stored_table(system, "connection"):
+            return stored_table(system, "even part")
+        build = lambda: even_part(system.velocity, self.fitted.axes, system.traits)
+        return self._stored("even part", fitted.key(self.scene.numerics, ("grid", "extent")), build)[0]
+
+    @property
+    def curvature(self) -> Field:
+        """CCF of `fitted`, for joints 1 and 2."""
+        return self._stored("ccf", self._connection().key, lambda: ccf(self.fitted))[0]
+
+    @property
+    def curvature_error(self) -> Field:
+        """Estimated error of `curvature`."""
+        return self._stored("error of the ccf", self._connection().key, lambda: ccf_error(self.fitted))[0]
+
+    def displacement(self, method: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray:
+        """Return the net pose per cycle (..., 3) by one tier of TIERS for amplitudes (...,), of a gait or the scene's
+        own."""
+        scene, gait = self.scene, self.scene.gait if gait is None else checked_gait(gait)
+        with located(scene.name):
+            plan = self.plan(method, gait, amplitudes)
+            scene.note_turns(gait, amplitudes)
+            self._refuse_singular(plan, gait, amplitudes)
+            return plan.predict(self._table_of(plan), amplitudes)
+
+    def spread(self, method: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray | None:
+        """Return how far `displacement` depends on an arbitrary choice of the tier, such as a surface spanned by the
+        loop: (B, 2), in the system's unit and rad; None without one. Estimates include it."""
+        plan = self.plan(method, gait, amplitudes)
+        return plan.spread(self._table_of(plan), amplitudes)
+
+    def _refuse_singular(self, plan: Plan, gait: Gait, amplitudes, phases: int | None = None) -> None:
+        """Refuse a gait, or a curve of the family of the table, that meets a singular shape."""
+        system, phases = self.scene.system, phases or self.scene.numerics.phases
+        if system.traits.singularity is not None:
+            a = real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes)
+            if plan.table and plan.table.amplitudes is not None:
+                a = plan.table.amplitudes
+            refuse_singular(system, gait.cycle(phases, a)[0])
+
+    def study(
+        self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, progress=None
+    ) -> dict:
+        """Return a table (`geomech.studies.tables.table`) of the net poses by tiers of TIERS, with their errors, and
+        {"seconds": {...}, "kept": [...]} besides.
+
+        estimate, estimate_heading: errors (`geomech.studies.estimate`), in the unit of the poses, and rad. seconds: time
+        to build each table, by its name ("field", "harmonic table" ...), even if it was built before, and time of each
+        tier from there, of the direct one with its errors; "errors" of the others, without the direct tier; "medium" of
+        the errors of an uncertain one. kept: the tables that were stored before, whose seconds are not part of this
+        call."""
+        gait, amplitudes, chosen = self._checked(gait, amplitudes, methods)
+        medium, took = timed(lambda: uncertainty.of_medium(self.scene, gait, amplitudes))  # first, as it may refuse
+        seconds, stored = self._build_all(chosen, progress)
+        if medium:
+            seconds["medium"] = took
+        poses, errors, spreads, reference = {}, {}, {}, None
+        size = [self.scene.system.length, 1.0]  # estimates are in body lengths
+        order = [*TIERS]
+        for method in sorted(
+            chosen, key=lambda m: (not chosen[m].exact, -order.index(m))
+        ):  # the direct tier first, as the reference of others
+            if chosen[method].exact:
+                direct = lambda: estimate.direct(self.scene, gait, amplitudes, self.scene.numerics.phases)
+                reference, seconds[method] = timed(direct)
+                poses[method], errors[method] = reference
+            else:
+                poses[method], seconds[method] = timed(lambda m=method: self.displacement(m, gait, amplitudes))
+                check = lambda m=method: estimate.against_direct(self.scene, poses[m], gait, amplitudes, reference)
+                errors[method], took = timed(check)
+                if (spread := self.spread(method, gait, amplitudes)) is not None:
+                    spreads[method], errors[method] = spread, np.maximum(errors[method], spread / size)
+                if reference is None:
+                    seconds["errors"] = seconds.get("errors", 0.0) + took
+        poses, errors = ({m: x[m] for m in methods} for x in (poses, errors))
+        facts = {"seconds": seconds, "kept": stored}
+        return Displacements(tables.result(self.scene, gait, amplitudes, poses, errors, medium, spreads, **facts))
+
+    def _build_all(self, chosen: dict[str, Plan], progress) -> tuple[dict[str, float], list[str]]:
+        """Build the tables of tiers; return the seconds that each took, even if before, and the names of those that
+        were stored."""
+        field, seconds, stored = self._connection(), {}, []
+        tables = {m: plan.table for m, plan in chosen.items() if plan.table}
+        of_field = lambda m: tables[m].name == field.name
+        for method in sorted(tables, key=of_field, reverse=True):  # the field first, as it is also drawn
+            name = "field" if of_field(method) else f"{method} table"
+            if name not in seconds:
+                with located(self.scene.name):
+                    _, seconds[name], exists = self._built(tables[method], progress)
+                stored += [name] * exists
+        return seconds, stored
+
+    def cost(self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, more=()) -> cost.Cost:
+        """Return the cost of `study`, and of ``more`` jobs: force balances, seconds on this machine and memory; see
+        `geomech.studies.cost`."""
+        gait, amplitudes, plans = self._checked(gait, amplitudes, methods, *SAMPLES)
+        with located(self.scene.name):
+            return cost.price([*cost.study(self.scene, plans, len(amplitudes), gait), *more])
+
+    def _checked(self, gait, amplitudes, methods, samples: int = sys.maxsize, phases: int = sys.maxsize):
+        """Return the gait, or the scene's own, amplitudes (B,) and plans by tier of a request.
+
+        Refusal for one that makes no sense, such as a gait that leaves the field at one of ``samples`` amplitudes, at so
+        many phases."""
+        scene = self.scene
+        gait, amplitudes = checked_gait(scene.gait if gait is None else gait), real_array("amplitudes", amplitudes)
+        if amplitudes.ndim != 1:
+            raise Refusal("amplitudes must be a list of numbers", value=amplitudes, where=scene.name)
+        if isinstance(methods, str) or not isinstance(methods, Sequence):
+            raise Refusal(f"methods must be a list of {', '.join(TIERS)}", value=methods, where=scene.name)
+        with located(scene.name):
+            frequency_of(scene.system, gait)
+            scene.note_turns(gait, amplitudes)
+            sampled = np.sort(amplitudes)[
+                np.linspace(0, len(amplitudes) - 1, min(len(amplitudes), samples)).astype(int)
+            ]
+            phases, chosen = min(scene.numerics.phases, max(phases, 4 * gait.harmonics)), {}
+            for tier in [_tier(m) for m in methods]:
+                tier.refuse(scene.system)
+                chosen[tier.name] = plan = self._plan(tier, gait, amplitudes)
+                self._refuse_singular(plan, gait, sampled, phases)
+            if any(plan.table and plan.table.axes for plan in chosen.values()):
+                refuse_outside(scene, gait, sampled, phases)
+        return gait, amplitudes, chosen
+
+
+def refuse_outside(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int | None = None) -> None:
+    """Refuse a gait, or the scene's own, that leaves the field of the tables. phases: the scene's if None."""
+    system, n, gait = scene.system, scene.numerics, scene.gait if gait is None else gait
+    field, chosen = fitted.axes(system, n), gait.amplitude if amplitudes is None else amplitudes
+    names, phases = [name for name, _ in shape_labels(system)], phases or n.phases
+    shapes = lambda group: inside(field, gait.cycle(phases, group)[0], names)[:, 0]
+    in_groups(shapes, chosen, gaits_per_batch(system, phases))
+
+
+def _tier(name: str) -> Tier:
+    return TIERS[choose("methods", name, TIERS)]
+
+
+def timed(f: Callable) -> tuple[Any, float]:
+    """Return (value, seconds)."""
+    start = time.perf_counter()
+    value = f()
+    return value, time.perf_counter() - start

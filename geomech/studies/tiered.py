@@ -1,0 +1,184 @@
+"""Accuracy study of a scene with a gait: the displacement by every tier, at settings from coarse to fine.
+
+Errors are distances between net positions in body lengths, rms over a few amplitudes up to the gait's own; the truth is
+the direct tier, far finer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from geomech.core.knob import Knob
+from geomech.run.cost import Cost
+from geomech.scenes.model import Scene, checked_scene
+from geomech.studies import cost as foretold
+from geomech.studies import estimate
+from geomech.studies.available import tiers
+from geomech.studies.study import Study, refuse_outside
+from geomech.systems.capabilities import is_closed, pieces_per_length, solver_of, stored_table, table_error
+from geomech.tiers import TIERS
+from geomech.tiers.base import Plan
+from geomech.tiers.direct import DIRECT
+from rft.refusal import Refusal, located
+
+FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
+TRUTH_PHASES = 4096
+TRUTH_STEPS = 1024  # of time stepping, which is sequential
+FINE_PIECES = 320  # of body, where effects cut it
+FINEST = {"loads": "exact", "regularisation": 1e-9, "directions": 192, "pieces": FINE_PIECES}
+KNOBS = tuple(
+    replace(knob, tier=tier.name)
+    for tier in sorted(TIERS.values(), key=lambda tier: (tier is not DIRECT, tier.common, -[*TIERS].index(tier.name)))
+    for knob in tier.knobs
+)  # the direct tier's first, then those of one gait's family, then those of fields
+
+
+@dataclass(frozen=True)
+class Settings:
+    """A gait at fractions of its amplitude. runs: of each setting; time stepping takes long enough to be timed in one."""
+
+    scene: Scene
+    runs: int = 2
+
+    measures: ClassVar[tuple[str, ...]] = ("error",)
+    tolerances: ClassVar[np.ndarray] = 10.0 ** -np.arange(1, 7)
+    picture: ClassVar[str] = "work_precision_figure"
+
+    def __post_init__(self) -> None:
+        if checked_scene(self.scene).system.traits.steps:
+            object.__setattr__(self, "runs", 1)
+
+    @property
+    def amplitudes(self) -> np.ndarray:
+        return self.scene.gait.amplitude * FRACTIONS
+
+    def check(self) -> None:
+        """Refuse a gait that does not move, or leaves a field that a knob changes."""
+        scene = self.scene
+        if np.ptp(scene.gait.cycle(_truth_phases(scene))[0], axis=0).max() == 0:
+            raise Refusal("[gait] does not move", where=scene.name, instead="give it a size")
+        tables = [_plan(scene, knob.tier).table for knob in self.knobs()]
+        if any(table and table.axes for table in tables):
+            with located(scene.name):
+                refuse_outside(scene)
+
+    def cost(self) -> Cost:
+        scene = self.scene
+        jobs = foretold.direct(scene, scene.gait, len(FRACTIONS), _truth_phases(scene), checked=False)
+        for knob in self.knobs():
+            jobs += [job for value in knob.values for job in self.runs * self._jobs(knob, value)]
+            jobs += self._jobs(knob, None) if knob.against == "limit" else []
+        return foretold.price(jobs)
+
+    def _jobs(self, knob: Knob, value: Any) -> list[foretold.Job]:
+        """Return the jobs of a displacement at a setting."""
+        scene = self.at(knob, value)
+        plan = _plan(scene, knob.tier)
+        if not plan.exact:
+            return foretold.predicted(scene, plan, len(FRACTIONS))
+        return foretold.direct(scene, scene.gait, len(FRACTIONS), scene.numerics.phases, checked=False)
+
+    def prepared(self) -> Settings:
+        return self
+
+    def knobs(self) -> list[Knob]:
+        return [k for k in KNOBS if applies(k, self.scene) and not (k.rule and not is_closed(self.scene.system))]
+
+    def at(self, knob: Knob | None, value: Any) -> Scene:
+        """Return the scene at a setting; for a value of None at the limit of the knob, without a knob at the settings
+        of the truth."""
+        scene = self.scene
+        if knob is None:
+            finest = scene.with_numerics(loads="exact", regularisation=1e-9) if is_closed(scene.system) else scene
+            finest = finest.with_numerics(pieces=FINE_PIECES) if pieces_per_length(scene.system) else finest
+            return finest.with_numerics(phases=_truth_phases(scene))
+        setting = knob.setting or knob.name
+        if value is not None:
+            return scene.with_numerics(**{setting: f"{knob.rule}:{value}" if knob.rule else value})
+        if setting == "interpolation":  # an exact fit at the gait's own shapes would cost more than a far finer grid
+            return scene.with_numerics(interpolation=5, grid=4 * scene.numerics.grid - 3)
+        return scene.with_numerics(**{setting: FINEST[setting]})
+
+    def numbers(self, knob: Knob | None, value: Any) -> list[np.ndarray]:
+        """Return net poses (B, 3), with tables built anew so that their cost is counted."""
+        tier = knob.tier if knob else DIRECT.name
+        return [Study(self.at(knob, value)).displacement(tier, None, self.amplitudes)]
+
+    def errors(self, numbers: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
+        distances = estimate.distance(numbers[0], truth[0]) / self.scene.system.length
+        return {"error": float(np.sqrt(np.mean(distances**2)))}
+
+    def describe(self, knob: Knob, measure: str) -> dict[str, Any]:
+        entry = {
+            "label": knob.label,
+            "tier": knob.tier,
+            "knob": knob.name,
+            "order": knob.order,
+            "against": knob.against,
+        }
+        return {**entry, "buys": knob.buys}
+
+    @property
+    def own_error(self) -> float:
+        """Largest error of the system itself, body lengths, which no setting reduces; the cheapest settings include it."""
+        shapes = self.scene.gait.cycle(self.scene.numerics.phases, self.amplitudes)
+        return float(table_error(self.scene.system, *shapes)[..., 0].max())
+
+    def cheapest(self, lines: list[dict], tolerance: float) -> dict[str, Any]:
+        return cheapest(lines, tolerance, self.own_error)
+
+    def facts(self) -> dict[str, Any]:
+        own = self.own_error
+        units = {"error": "BL", "tolerance": "BL", "own_error": "BL", "seconds": "s"}
+        facts = {"scene": self.scene.name, "amplitudes": self.amplitudes.tolist(), "units": units}
+        return {**facts, **({"own_error": own} if own else {})}
+
+
+def applies(knob: Knob, scene: Scene) -> bool:
+    """Return whether a knob applies to a scene."""
+    system, setting = scene.system, knob.setting or knob.name
+    if system.traits.linear and setting in ("regularisation", "directions"):
+        return False
+    if setting == "regularisation" and solver_of(system) is None:
+        return False
+    if knob.tier not in tiers(system):
+        return False
+    if knob.tier != DIRECT.name:
+        of_a_field = TIERS[knob.tier].common and (stored_table(system, "connection") or system.joints > 2)
+        if of_a_field or _plan(scene, knob.tier).exact:  # from 7 to 61 points per joint: hours
+            return False
+    return setting != "pieces" or pieces_per_length(system) > 0
+
+
+def _plan(scene: Scene, tier: str) -> Plan:
+    """Return the plan of a tier for the amplitudes of the study."""
+    return TIERS[tier].plan(scene.system, scene.numerics, scene.gait, scene.gait.amplitude * FRACTIONS)
+
+
+def _truth_phases(scene: Scene) -> int:
+    return TRUTH_STEPS if scene.system.traits.steps else TRUTH_PHASES
+
+
+def cheapest(lines: list[dict], tol: float, own: float = 0.0) -> dict[str, Any]:
+    """Return the quickest measured setting whose error against the truth, with the system's own, is at most ``tol``; no
+    tier if there is none."""
+    choices = [
+        (t, line, v, e + own)
+        for line in lines
+        if line["against"] == "truth"
+        for v, e, t in zip(line["value"], line["error"], line["seconds"])
+        if e + own <= tol
+    ]
+    if not choices:
+        return {"tolerance": float(tol), "tier": None}
+    seconds, line, value, error = min(choices, key=lambda f: f[0])
+    return {
+        "tolerance": float(tol),
+        "tier": line["tier"],
+        "knob": line["knob"],
+        "value": value,
+        "error": error,
+        "seconds": seconds,
+    }

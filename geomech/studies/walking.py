@@ -1,0 +1,331 @@
+"""Questions about scenes of walking robots: a walk with the error of its speed, and the sweeps and accuracy studies of
+walks."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from geomech.core.knob import Knob
+from geomech.core.summary import span
+from geomech.core.variables import Result, Variable
+from geomech.run import jobs
+from geomech.run.backend import suiting
+from geomech.run.cost import BASE, LONGEST, Cost, duration
+from geomech.scenes import write as written
+from geomech.scenes.walker import WalkerScene
+from geomech.studies.grid import Grid
+from geomech.studies.question import Allow, Progress, Question
+from rft.metres import GRAVITY
+from rft.refusal import Refusal, located
+from rft.walking import Mjcf, Rhex, Roller, Walk, engine
+from rft.walking.stride import MOST_STRIDES
+from rft.walking.stride import NEAR as NEAR
+
+PILOT = 0.05  # s of time steps that are timed
+STATUSES = ("walking", "stuck", "sunk", "flipped", "airborne")
+TOGETHER = 32  # robots in a batch
+SETTLING = 3  # cycles from rest in a sweep, before the limit cycle is looked for
+STEP = 200.0  # balances that take NumPy as long as a time step
+HARD = 30.0  # evaluations of forces in a step; the first steps of the built-in robots take 7 to 14
+PUSHED = 0.2  # acceleration of a body by much faster legs over gravity, measured
+IN_VAIN = 40  # cycles of a failing search for a limit cycle with its errors, many at once
+TO_COME = 1.5  # error over the change with twice the elements; up to 1.49 measured, 4/3 for order 2
+WALKING = 0.7  # share of the time before the errors are computed
+UNITS = {  # of a walk's table; a positive pitch is nose down
+    "t": "s", "x": "m", "z": "m", "pitch": "rad", "v_x": "m/s", "v_z": "m/s", "rate": "rad/s", "work": "J", "loss": "J",
+    "energy": "J", "y": "m", "roll": "rad", "yaw": "rad",
+}  # fmt: skip
+LIMIT = 3  # cycles up to the limit cycle, and half as many for each of two errors
+KNOBS = (
+    Knob("steps", (12, 16, 24, 32, 48, 64, 96), 2, against="limit"),
+    Knob("elements", (6, 8, 12, 16, 24, 32), 2, against="limit"),
+    Knob("rounding", (8e-3, 4e-3, 2e-3, 1e-3, 5e-4), 1, against="limit"),
+)
+FINEST = {"steps": 256, "elements": 96, "rounding": 6.25e-5}
+
+
+class Walked(NamedTuple):
+    """A walk with the errors of its means.
+
+    walk: as computed by rft. estimate: error of its speed, m/s: the larger of the changes with half and with three
+    quarters of the steps, as one alone may be small by chance; `TO_COME` times the change with twice the elements; the
+    distance from the limit cycle; and the effect of unsolved steps. lateral, turning: errors of the lateral speed, m/s,
+    and of the yaw rate, rad/s, by the changes alone. elements: m/s, the part of the estimate that comes from twice the
+    elements."""
+
+    walk: Walk
+    estimate: float
+    lateral: float = 0.0
+    turning: float = 0.0
+    elements: float = 0.0
+
+
+def walked(
+    scenes: Sequence[WalkerScene], by: str | None = None, settling: bool = False, progress: Callable | None = None
+) -> list[Walked]:
+    """Return the walks of scenes with equal numerics and engines, computed in batches. settling: a few cycles from rest
+    suffice. progress: called with the fraction done."""
+    numerics, chosen, walkers = scenes[0].numerics, engine(by or scenes[0].engine), [s.walker for s in scenes]
+    callback = {"progress": lambda done: progress(WALKING * done)} if progress else {}
+    walks = chosen.walk(walkers, numerics, SETTLING if settling else None, advance=jobs.runner().call, **callback)
+    refinements = [("steps", max(8, numerics.steps // 2)), ("steps", max(8, 3 * numerics.steps // 4))]
+    refinements += [("elements", min(1000, 2 * numerics.elements))]
+    changes = []
+    for k, (name, other) in enumerate(refinements):
+        finer = dataclasses.replace(numerics, **{name: other})
+        rerun = chosen.rerun(walkers, finer, walks, SETTLING if settling else None, advance=jobs.runner().call)
+        changes.append(np.abs([np.subtract(_means(a), _means(b)) for a, b in zip(rerun, walks)]))
+        if progress:
+            progress(WALKING + (1.0 - WALKING) * (k + 1) / len(refinements))
+    half, three_quarters, finer = changes
+    error = np.maximum(half, three_quarters) + TO_COME * finer
+    error[:, 0] += [w.drift + w.unsolved_error for w in walks]
+    return [Walked(w, *e, TO_COME * float(x)) for w, e, x in zip(walks, error.tolist(), finer[:, 0])]
+
+
+def _means(walk: Walk) -> tuple[float, float, float]:
+    """Return the means of a walk that have an error: speed, lateral speed, yaw rate."""
+    return walk.speed, walk.lateral_speed, walk.yaw_rate
+
+
+def cost_of_transport(scene: WalkerScene, walk: Walk) -> float:
+    """Return the work of the motors over weight times distance, from rest to the end; the distance is the sum of the
+    chords of the cycles. inf for a robot that does not move."""
+    at = np.append(np.arange(0.0, walk.t[-1], 1 / scene.gait.frequency), walk.t[-1])
+    y = walk.spatial["y"] if walk.spatial else np.zeros_like(walk.t)
+    path = np.hypot(*(np.diff(np.interp(at, walk.t, x)) for x in (walk.pose[:, 0], y))).sum()
+    return float(walk.work[-1] / (scene.robot.mass * GRAVITY * path)) if path > 0.0 else math.inf
+
+
+def run(
+    scene: WalkerScene, by: str | None = None, progress: Callable | None = None, longest: float = math.inf
+) -> Walked:
+    """Return the walk of one scene.
+
+    longest: seconds of computing, after which it is refused if the start from rest is not done yet: that time depends
+    on whether a cycle repeats itself, which is not known beforehand."""
+    begin = time.process_time()
+
+    def report(done: float) -> None:
+        if time.process_time() - begin > longest and done < WALKING:
+            cure = "lower [numerics] duration, or say --yes"
+            raise Refusal(
+                f"after {longest:.0f} s of computing {done:.0%} is done, and no cycle repeats itself", instead=cure
+            )
+        if progress:
+            progress(done)
+
+    with located(scene.name):
+        return walked([scene], by, progress=report)[0]
+
+
+@dataclass(frozen=True)
+class Walking(Question):
+    """The walk of a robot. engine: in place of the scene's. limited: with at most `LONGEST` seconds of computing, see `run`."""
+
+    scene: WalkerScene
+    engine: str | None = None
+    limited: bool = field(default=False, compare=False)
+
+    @property
+    def title(self) -> str:
+        return f"walk of {self.scene.name}"
+
+    def check(self) -> None:
+        refuse_engine(self.scene, self.engine)
+
+    def cost(self) -> Steps:
+        return price(self.scene, by=self.engine)
+
+    def answer(self, progress: Progress, allow: Allow) -> Result:
+        return of_walk(self.scene, run(self.scene, self.engine, progress, LONGEST if self.limited else math.inf))
+
+
+def of_walk(scene: WalkerScene, run: Walked) -> Result:
+    """Return the table of a walk, and its speed, drift and turning with their errors."""
+    w, over = run.walk, ("t",)
+    more = {name: values for name, values in (w.spatial or {}).items() if values.ndim == 1}
+    columns = dict(zip(UNITS, (w.t, *w.pose.T, *w.twist.T, w.work, w.loss, w.energy))) | more
+    table = [Variable(name, over, values, UNITS.get(name, "")) for name, values in columns.items()]
+    table += [
+        Variable("speed", (), w.speed, "m/s", "mean speed", run.estimate),
+        Variable("aside", (), w.lateral_speed, "m/s", "to the left of its heading", run.lateral),
+        Variable("turning", (), w.yaw_rate, "rad/s", "to the left", run.turning),
+    ]
+    return Result("walk", tuple(table), {"name": scene.name}, (scene, run))
+
+
+class Steps(Cost):
+    """Cost of walking; balances counts the time steps."""
+
+    @property
+    def as_balances(self) -> float:
+        """Number of balances that take NumPy as long: some 200 for each time step."""
+        return STEP * self.balances
+
+    def __str__(self) -> str:
+        return f"{self.balances:,} time steps, about {duration(self.seconds)} of computing"
+
+
+def price(scene: WalkerScene, count: int = 1, settling: bool = False, by: str | None = None) -> Steps:
+    """Return the cost of ``count`` scenes like this one, estimated from its first time steps.
+
+    Where these take many times as many evaluations as usual, as for robots so light that they bounce or stick at every
+    step, the search for a limit cycle is assumed to fail."""
+    numerics, engine_name = scene.numerics, by or scene.engine
+    planar = engine_name == "planar"
+    together = min(count, TOGETHER if planar else 1)
+    own = isinstance(scene.robot, Mjcf)  # custom machines may have no limit cycle
+    most = SETTLING if settling else numerics.duration * scene.gait.frequency
+    cycles = min(most, 2 * LIMIT + _speeding_up(scene))
+    least = (cycles + 2.75 * LIMIT) * numerics.steps * count
+    with located(scene.name), suiting(STEP * least if planar else 0.0):
+        step_seconds, tries = engine(engine_name).step_cost([scene.walker] * together, numerics, PILOT)
+    vain = IN_VAIN if tries > HARD else MOST_STRIDES if own else 0
+    cycles = most + vain if vain else cycles
+    steps = (cycles + 2.75 * LIMIT) * numerics.steps
+    seconds = step_seconds * steps * -(-count // together)
+    return Steps(round(steps * count), seconds, BASE, seconds)
+
+
+def _speeding_up(scene: WalkerScene) -> float:
+    """Return the number of cycles in which legs bring a body to their speed, at a fraction of gravity."""
+    if not isinstance(scene.robot, Rhex | Roller):
+        return 0.0
+    radius, f = np.abs(scene.robot.leg(scene.numerics.elements).points).max(), scene.gait.frequency
+    return float(2 * np.pi * radius * f**2 / (PUSHED * 9.81))
+
+
+@dataclass(frozen=True)
+class Walks:
+    """Speed of robots, as a question of sweeps."""
+
+    def grid(self, scene: WalkerScene, over: Mapping[str, list[float]]) -> Grid:
+        """Return the grid; Refusal if one of some 200 of its points makes no scene, or one that no engine here
+        computes."""
+        grid = Grid(scene, over, written.tables(scene))
+        last = grid.total - 1
+        for k in {*range(0, grid.total, max(1, grid.total // 200)), last}:
+            scene_ = grid.at(grid.points[k])
+            if k in (0, last):
+                refuse_engine(scene_)
+        return grid
+
+    def together(self, scene: WalkerScene) -> int:
+        # Other engines walk one robot after the other, which also shows progress.
+        return TOGETHER if scene.engine == "planar" else 1
+
+    def rows(self, scenes: list[WalkerScene], inner_values: None) -> np.ndarray:
+        """Return speed, its error, status and cycles."""
+        groups = itertools.groupby(scenes, key=lambda s: (s.numerics, s.engine))
+        walks = [one for _, group in groups for one in walked(list(group), settling=True)]
+        return np.array([[w.walk.speed, w.estimate, STATUSES.index(w.walk.status), w.walk.cycles] for w in walks])
+
+    def cost(self, grid: Grid) -> Steps:
+        ends = (grid.at(grid.points[k]) for k in (0, grid.total - 1))
+        return max((price(s, grid.total, settling=True) for s in ends), key=lambda c: c.seconds)
+
+    def variables(self, grid: Grid, rows: np.ndarray, dims: tuple[str, ...]) -> tuple[list[Variable], dict]:
+        speed, estimate, kinds, cycles = np.moveaxis(rows, -1, 0)
+        variables = [
+            Variable("speed", dims, speed, "m/s", "mean speed", estimate),
+            Variable("status", dims, np.array(STATUSES)[kinds.astype(int)]),
+            Variable("cycles", dims, cycles, "1"),
+        ]
+        title = f"Mean speed of the walking robot {grid.scene.name}"
+        return variables, {"title": title, "scene": written.toml(grid.scene)}
+
+    def as_stored(self, result: Result) -> Result:
+        """Return a sweep as data for a file: the error as estimate, the status as a number explained by its label."""
+        speed, status = result["speed"], result["status"]
+        meanings = ", ".join(f"{k}: {name}" for k, name in enumerate(STATUSES))
+        index = np.argmax(np.array(STATUSES) == status.values[..., None], -1).astype(float)
+        stored = [v for v in result.variables if v.is_coordinate]
+        stored += [dataclasses.replace(speed, error=None), Variable("estimate", speed.dims, speed.error, "m/s")]
+        stored += [result["cycles"], Variable("status", speed.dims, index, "1", meanings)]
+        return dataclasses.replace(result, variables=tuple(stored))
+
+    def table(self, result: Result) -> dict:
+        """Return {"speed", "estimate": (N_1, ...), m/s, "status": (N_1, ...), "cycles": (N_1, ...)}."""
+        arrays = {name: result[name].values for name in ("speed", "status", "cycles")}
+        return {"speed": arrays["speed"], "estimate": result["speed"].error, **arrays}
+
+    def summary(self, table: Mapping) -> str:
+        worst = np.max(table["estimate"], initial=0.0)
+        return f"speed {span(table['speed'])} m/s; estimated error up to {worst:.1e} m/s"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The speed of a robot, m/s, near a walk of its scene. For every knob the reference has that knob at `FINEST`."""
+
+    scene: WalkerScene
+    runs: int = 1
+    near: Walk | None = field(default=None, repr=False)
+
+    measures: ClassVar[tuple[str, ...]] = ("error",)
+    tolerances: ClassVar[np.ndarray] = 10.0 ** -np.arange(1, 5)
+    picture: ClassVar[str] = "walk_accuracy_figure"
+
+    def check(self) -> None:
+        refuse_engine(self.scene)
+
+    def cost(self) -> Steps:
+        finest = {knob.name: (*knob.values, FINEST[knob.name]) for knob in KNOBS}
+        shares = sum(v / self.scene.numerics.steps for v in finest["steps"])
+        shares += sum(0.5 + v / 32 for v in finest["elements"]) + 2 * (len(finest["rounding"]) - 1)
+        one = price(self.scene, settling=True)
+        seconds = one.seconds * shares / 2
+        return Steps(round(one.balances * shares / 2), seconds, BASE, seconds)
+
+    def prepared(self) -> Settings:
+        (walk,) = engine(self.scene.engine).walk([self.scene.walker], self.scene.numerics, SETTLING)
+        return dataclasses.replace(self, near=walk)
+
+    def knobs(self) -> list[Knob]:
+        return list(KNOBS)
+
+    def numbers(self, knob: Knob, value: Any) -> list[np.ndarray]:
+        """Return the speed with one knob at another value."""
+        value = FINEST[knob.name] if value is None else value
+        numerics = dataclasses.replace(self.scene.numerics, **{knob.name: value})
+        (walk,) = engine(self.scene.engine).rerun([self.scene.walker], numerics, [self.near], SETTLING)
+        return [np.array(walk.speed)]
+
+    def errors(self, numbers: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
+        return {"error": float(abs(numbers[0] - truth[0]))}
+
+    def describe(self, knob: Knob, measure: str) -> dict[str, Any]:
+        return {"label": knob.name, "order": knob.order}
+
+    def cheapest(self, lines: list[dict], tolerance: float) -> dict[str, Any]:
+        """Return for each knob the coarsest setting from which on the error is within the tolerance; None if there is none."""
+        out: dict[str, Any] = {"tolerance": tolerance}
+        for line in lines:
+            good = [v for k, v in enumerate(line["value"]) if max(line["error"][k:]) <= tolerance]
+            out[line["label"]] = good[0] if good else None
+        return out
+
+    def facts(self) -> dict[str, Any]:
+        return {"scene": self.scene.name, "speed": self.near.speed}
+
+
+def refuse_engine(scene: WalkerScene, by: str | None = None) -> None:
+    """Refuse an engine that is not available, or does not take the scene."""
+    with located(scene.name):
+        engine(by or scene.engine).refuse(scene.walker)
+
+
+def view(scene: WalkerScene):
+    """Return the view that draws a walk of three dimensions (`rft.walking.view.View`)."""
+    from rft.walking.view import View
+
+    return View(scene.walker, scene.numerics)
