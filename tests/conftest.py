@@ -1,5 +1,6 @@
 """One thread a process, as many processes as cores for the whole suite, the truths that are kept, and what solves."""
 
+import gc
 import os
 import subprocess
 import sys
@@ -40,6 +41,13 @@ def pytest_sessionstart(session):
     full = session.config.args_source is session.config.ArgsSource.TESTPATHS
     if full and backend.installed() and not hasattr(session.config, "workerinput"):
         subprocess.run([sys.executable, "-m", "rft"], check=True, capture_output=True)
+
+
+def pytest_collection_finish():
+    """What is there for good is not looked through again and again: a tenth of the time."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(20_000, 20, 50)
 
 
 def pytest_sessionfinish(session):
