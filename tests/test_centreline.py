@@ -85,7 +85,7 @@ def test_order_along_the_body(kind, tmp_path):
     """4 in the middle of the body, no less than 3 at the ends."""
     spacings, middle, whole = np.array([28, 56, 112]), [], []
     for n in spacings:
-        path = write(tmp_path, kind, count=160, places=n + 1, amplitude=0.05)
+        path = write(tmp_path, kind, count=112, places=n + 1, amplitude=0.05)
         middle.append(off(path, 0.05, slice(10, -10)))
         whole.append(off(path, 0.05))
     assert order(middle, spacings) == pytest.approx(4.0, abs=0.4)
