@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from geomech.optimisation.aims import Aim
+from geomech.optimisation.objectives import Objective
 from geomech.optimisation.problem import EVEN, Enough, Problem, is_feasible
 from geomech.optimisation.stroke import Stroke
 
@@ -19,17 +19,17 @@ SHORTER, SHORTEST = 0.25, 0.01  # of the trust radius: after an infeasible loop 
 
 
 def ascend(
-    cycles: Callable, aim: Aim, p: np.ndarray, *, turn: float = 0.0, max_steps: int = 100, tolerance: float = 1e-6,
+    cycles: Callable, objective: Objective, p: np.ndarray, *, turn: float = 0.0, max_steps: int = 100, tolerance: float = 1e-6,
     stroke: bool = False, singularity: Callable | None = None, away: float = 0.0, on_cycle: Callable = lambda: None,
     even: float = EVEN,
 ) -> np.ndarray:  # fmt: skip
-    """Return the loop with the locally largest ``aim`` that an ascent from the loop ``p`` reaches.
+    """Return the loop with the locally largest ``objective`` that an ascent from the loop ``p`` reaches.
 
-    cycles: `Phases` or `Runs`. turn (rad): largest net turn of a cycle, for aims that are distances. max_steps: steps.
+    cycles: `Phases` or `Runs`. turn (rad): largest net turn of a cycle, for objectives that are distances. max_steps: steps.
     stroke: the loop is a `Stroke`, and stays one. singularity: a function of shapes that is 0 at singular ones; it
     stays at least ``away`` from 0. on_cycle: called after every cycle. even: see `Problem`."""
     problem, once_round = (
-        Problem(cycles, aim, p, on_cycle, TRIES * max_steps, even),
+        Problem(cycles, objective, p, on_cycle, TRIES * max_steps, even),
         Stroke(cycles.loops, p) if stroke else None,
     )
     constraints = problem.constraints(turn, once_round, singularity, away)
@@ -48,13 +48,13 @@ def ascend(
 
 
 def project(
-    cycles: Callable, aim: Aim, p: np.ndarray, *, turn: float = 0.0, stroke: bool = False,
+    cycles: Callable, objective: Objective, p: np.ndarray, *, turn: float = 0.0, stroke: bool = False,
     singularity: Callable | None = None, away: float = 0.0,
 ) -> np.ndarray:  # fmt: skip
     """Return a loop near ``p`` that satisfies all constraints of `ascend`, between its phases, too, up to roundoff.
 
     Newton's method: each step is the shortest that satisfies the linearised constraints."""
-    problem = Problem(cycles, aim, p, lambda: None, np.inf)
+    problem = Problem(cycles, objective, p, lambda: None, np.inf)
     constraints = problem.constraints(turn, Stroke(cycles.loops, p) if stroke else None, singularity, away, dense=True)
     x = problem.first
     for _ in range(NEWTON_STEPS):
