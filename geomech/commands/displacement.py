@@ -8,6 +8,7 @@ import typer
 
 from geomech.commands.loading import load_scene
 from geomech.commands.options import (
+    AllOption,
     ExtentOption,
     GridOption,
     JsonOption,
@@ -30,6 +31,7 @@ def displacement(
     extent: ExtentOption = None,
     tol: Annotated[Optional[float], typer.Option(help="error in body lengths that the cheapest tier must meet")] = None,
     effort: Annotated[bool, typer.Option("--effort", help="add path length, work and cost of transport")] = False,
+    everything: AllOption = False,
     as_json: JsonOption = False,
     plot: PlotOption = None,
     yes: YesOption = False,
@@ -41,6 +43,5 @@ def displacement(
     scene = load_scene(name, grid, extent)
     values = spread("--amplitudes", amplitudes, amplitude_kind(scene))
     question = displacement(scene, values, tiers, tol, effort)
-    execute(
-        question, Output(plot, drawing("pictures.displacement"), drawing("pictures.check")), as_json=as_json, yes=yes
-    )
+    figure = Output(plot, drawing("pictures.displacement"), drawing("pictures.check"))
+    execute(question, figure, as_json=as_json, yes=yes, everything=everything)

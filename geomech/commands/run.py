@@ -9,7 +9,7 @@ import typer
 
 from geomech.commands.loading import load_scene
 from geomech.commands.names import scene_names
-from geomech.commands.options import FolderOption, MediumOption, YesOption, with_workers
+from geomech.commands.options import AllOption, FolderOption, MediumOption, YesOption, with_workers
 from geomech.commands.pipeline import Output, execute
 
 DEFAULT_SCENE = "three-link-glass"
@@ -24,6 +24,7 @@ def run(
     name: SceneOrOurs = DEFAULT_SCENE,
     out: FolderOption = Path("results"),
     medium: MediumOption = None,
+    everything: AllOption = False,
     yes: YesOption = False,
 ):
     """Compute connection, CCF and displacements into a folder. Displacements are drawn against amplitude."""
@@ -32,4 +33,4 @@ def run(
 
     question = Report(load_scene(name, medium=medium))
     folder = Output(out, report.write, lambda path: report.refuse_folder(question.scene, path), report.files, True)
-    execute(question, folder, yes=yes)
+    execute(question, folder, yes=yes, everything=everything)
