@@ -34,17 +34,17 @@ def test_tables_are_kept_under_what_they_depend_on(fits):
     study = Study(GLASS)
     first = study.displacement("path")
     study.displacement("area", amplitudes=[0.3, 0.5])
-    finer = study.turned(phases=64)
+    finer = study.with_numerics(phases=64)
     assert finer.fitted is study.fitted and finer.scene.numerics.phases == 64
     (
         finer.displacement("area"),
-        finer.turned(harmonics=5, curves=9, tolerance=None).curvature,
+        finer.with_numerics(harmonics=5, curves=9, tolerance=None).curvature,
         study.curvature_error,
     )
     assert len(fits) == 1
     for changes in ({"grid": 9}, {"extent": 2.0}, {"directions": 4}, {"interpolation": 2}, {"regularisation": 1e-4}):
         before = len(fits)
-        other = study.turned(**changes)
+        other = study.with_numerics(**changes)
         assert np.abs(other.displacement("path") - first).max() > 1e-9
         other.displacement("path")
         assert len(fits) == before + 1
@@ -53,8 +53,8 @@ def test_tables_are_kept_under_what_they_depend_on(fits):
     assert study.table("adapted", amplitudes=[1.0]) is table
     assert study.table("adapted", amplitudes=[0.9]) is not table
     assert study.table("adapted", Circle(), [1.0]) is not table
-    assert study.turned(phases=64).table("adapted", None, [1.0]) is not table
-    assert study.table("harmonic") is study.turned(phases=64).table("harmonic")
+    assert study.with_numerics(phases=64).table("adapted", None, [1.0]) is not table
+    assert study.table("harmonic") is study.with_numerics(phases=64).table("harmonic")
 
 
 def test_a_scene_is_small_and_remembers_nothing():

@@ -12,6 +12,7 @@ from registry import EFFECTS
 
 from geomech import scenes
 from geomech.gaits import Circle, Ellipse, Sine
+from geomech.studies.available import default_tiers
 from geomech.studies.study import Study
 from geomech.text.explain import explain
 from rft import (
@@ -370,12 +371,12 @@ def test_with_grain_inertia_frequency_matters():
     assert np.abs(twice - fast.system.velocity(alpha, alphadot)).max() > 1e-3  # time is not the swimmer's own any more
 
 
-@pytest.mark.parametrize("method", ["area", "path", "harmonic"])
-def test_what_an_effect_breaks_is_refused_by_name(method):
+@pytest.mark.parametrize("tier", ["area", "path", "harmonic"])
+def test_what_an_effect_breaks_is_refused_by_name(tier):
     inertial = scenes.parse(INERTIAL.format(f=1.0))
-    assert Study(inertial).methods == ("direct",)
+    assert default_tiers(inertial.system) == ("direct",)
     with pytest.raises(Refusal, match="the effect grain-inertia, which is not rate-independent"):
-        Study(inertial).displacement(method)
+        Study(inertial).displacement(tier)
     assert "; not rate-independent; costs" in explain(inertial)
     assert "not available: connection, CCF" in explain(inertial)
     np.testing.assert_allclose(
@@ -427,7 +428,7 @@ PAST = {
 @pytest.mark.parametrize("name", PAST)
 def test_what_a_march_cannot_give_is_refused_by_name(name):
     swimmer = scenes.parse(f'{scenes.load("three-link-glass").text}\n[[effects]]\nkind = "{name}"\n{PAST[name]}\n')
-    assert Study(swimmer).tiers == Study(swimmer).methods == ("direct",)
+    assert Study(swimmer).tiers == default_tiers(swimmer.system) == ("direct",)
     for asked in (
         lambda: Study(swimmer).displacement("area"),
         lambda: Study(swimmer).displacement("path"),

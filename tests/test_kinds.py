@@ -97,7 +97,7 @@ def test_the_law_of_the_page_runs_as_it_stands_there(tmp_path, monkeypatch):
 def test_a_law_of_traction_alone_gives_every_tier_within_its_error(law):
     gait, body, amplitudes = Circle(amplitude=0.8, centre=(0.3, -0.2)), Chain((1, 1.4, 0.8)), np.array([0.5, 0.9])
     exact, bare = (Study(Scene(Swimmer(x, body), gait, SMALL)) for x in (law, Bare(law)))
-    finer = bare.turned(loads="gauss:96")  # leaves a quarter
+    finer = bare.with_numerics(loads="gauss:96")  # leaves a quarter
     for tier in ("area", "direct"):
         ours, theirs, better = (x.displacement(tier, amplitudes=amplitudes) for x in (exact, bare, finer))
         size, off = np.hypot(*ours[-1, :2]), estimate.distance(ours, theirs).max()
@@ -257,7 +257,7 @@ def test_one_of_each_family_runs_everywhere_and_round_trips(name):
     assert toml(parse(anew)) == anew
     assert name in explain(scene)
     study = Study(scene)
-    table = study.study([0.4, 0.7], study.methods)
+    table = study.study([0.4, 0.7])
     assert np.isfinite(table["direct"]).all()
     with pytest.raises(ValueError, match="car|hinge|peanut|slick"):
         register(type("Other", (PARTS[name],), {"__module__": "elsewhere"}))  # two of one name

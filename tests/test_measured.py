@@ -593,7 +593,7 @@ def test_the_reach_is_that_of_the_data(usual):
     for side in (-0.125, 0.125):
         np.testing.assert_allclose(usual.known.reach(usual.known.loop.shape(t) + side * n), 1, atol=0.25)
     assert np.abs(usual.known.reach(usual.known.loop.shape(t))).max() < 1e-9
-    near = measured.fit_log(usual.log, within=0.03, harmonics=4)
+    near = measured.fit_log(usual.log, limits=0.03, harmonics=4)
     np.testing.assert_allclose(
         near.known.reach(near.known.loop.shape(t) + 0.03 * near.known.loop.normals(t)[..., 0]), 1
     )
@@ -666,7 +666,7 @@ def test_lengths_and_signs_of_a_field(usual, field, tmp_path):
 
 
 def test_a_tube_between_the_points_of_its_grid_is_looked_up_all_the_same(usual, tmp_path):
-    thin = measured.fit_log(usual.log, within=1e-5, harmonics=4)
+    thin = measured.fit_log(usual.log, limits=1e-5, harmonics=4)
     save_field(tmp_path / "thin.nc", thin)
     study = Study(Scene(Table(tmp_path / "thin.nc"), thin.gait))
     assert np.isnan(study.fitted.A).all()

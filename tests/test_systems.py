@@ -15,6 +15,7 @@ from geomech.geometry.connection import sign_changes
 from geomech.geometry.traits import Traits
 from geomech.scenes import Scene
 from geomech.studies import cost, estimate, fields
+from geomech.studies.available import default_tiers
 from geomech.studies.single import single
 from geomech.studies.study import Study
 from geomech.systems import KINDS, NoSlipSnake, Swimmer
@@ -83,7 +84,7 @@ def snake(**numerics):
 
 def test_tiers_of_the_snake_agree_with_its_closed_form():
     study, exact = snake(), direct(symbolic.velocity(*closed_form()), AWAY, [0.5, 1.0], 512)
-    assert study.tiers == ("adapted", "path", "direct") and study.methods == ("path", "direct")
+    assert study.tiers == ("adapted", "path", "direct") and default_tiers(study.scene.system) == ("path", "direct")
     assert np.abs(exact[1]).min() > 1e-3
     for tier, error in (("adapted", 1e-4), ("path", 1e-12), ("direct", 1e-12)):
         np.testing.assert_allclose(study.displacement(tier, None, [0.5, 1.0]), exact, atol=error)
@@ -146,7 +147,7 @@ def test_singular_shapes_are_refused_by_name_in_integrals():
     with pytest.raises(ValueError, match="velocity is not finite at alpha"):
         connection.fit(study.scene.system.velocity, connection.grid(2, 5))
     with pytest.raises(Refusal, match="numerics: 'regularisation' is unknown"):
-        study.turned(regularisation=1e-3)
+        study.with_numerics(regularisation=1e-3)
     with pytest.raises(ValueError, match="the shape is singular: the wheels' axles meet in one point"):
         single(study.scene.system, [0.4, 0.4], [1.0, 0.0])
 

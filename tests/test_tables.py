@@ -283,7 +283,7 @@ def test_a_table_predicts_what_its_scene_predicts_within_its_error(body, medium,
         ratios += list(np.array(told["estimate"]["direct"]) / np.hypot(*(np.array(told["direct"]) - true).T[:2]))
         for tier in ("area", "path"):  # of the same connection
             np.testing.assert_allclose(
-                told[tier], source.turned(interpolation=3).displacement(tier, gait, amplitudes), atol=2e-5
+                told[tier], source.with_numerics(interpolation=3).displacement(tier, gait, amplitudes), atol=2e-5
             )
     assert np.median(ratios) < 60  # honest, not helpless
     if ending == ".nc" and medium.dry:

@@ -11,8 +11,9 @@ from geomech.gaits import Butterfly, Circle, Fourier, Wave
 from geomech.geometry import connection, family, harmonics
 from geomech.scenes import Numerics, Scene
 from geomech.studies import estimate
+from geomech.studies.available import default_tiers
 from geomech.studies.choose import cheapest
-from geomech.studies.study import METHODS, Study
+from geomech.studies.study import Study
 from geomech.systems import Swimmer
 from geomech.tiers import TIERS, Plan, Tier, fitted
 from geomech.tiers.direct import direct
@@ -258,10 +259,10 @@ def test_look_up_estimates_cover_the_truth(truths):
         some = random_scene(rng)
         a = some.gait.amplitude * np.linspace(0.3, 1.0, 4)
         true = truths("estimates", exact, some.system.medium, some.system.body, some.gait, a)
-        table = Study(some).study(a, [m for m in METHODS if m != "direct"])
-        for method, error in table["estimate"].items():
-            estimates.append(np.stack([error, table["estimate_heading"][method]], -1))
-            errors.append(estimate.pose_distance(np.array(table[method]), true, 1.0))
+        table = Study(some).study(a, [m for m in TIERS if m != "direct"])
+        for tier, error in table["estimate"].items():
+            estimates.append(np.stack([error, table["estimate_heading"][tier]], -1))
+            errors.append(estimate.pose_distance(np.array(table[tier]), true, 1.0))
     coverage, excess = judged(estimates, errors)
     assert (coverage >= 0.95).all()
     assert (excess <= 10).all()
@@ -284,7 +285,7 @@ def test_a_tier_is_one_expression(monkeypatch):
     assert foretold == sum(counts) and [*table["seconds"]] == ["field", "direct", "leading", "path"]
     off = estimate.distance(np.array(table["leading"]), np.array(table["direct"]))
     assert (off <= table["estimate"]["leading"]).all() and off[1] > 0.01
-    assert "leading" in study.tiers and "leading" in study.methods
+    assert "leading" in default_tiers(scene.system)
     assert cheapest(scene, [0.05, 1.0], 1e-4)["tier"] == "direct"
     with pytest.raises(Refusal, match="the leading tier takes a body of joints, this body has 4: use direct"):
         Study(scenes.load("seven-link-wave").changed(body=Chain((1,) * 5), gait=Wave(joints=4))).plan("leading")

@@ -219,7 +219,7 @@ def test_long_bodies_approach_the_endless_wave():
 
 def test_serpenoid_has_a_connection_and_a_ccf():
     swimmer = scenes.load("serpenoid-glass").with_numerics(grid=15)
-    table = Study(swimmer).study([6.0], Study(swimmer).methods)
+    table = Study(swimmer).study([6.0])
     direct = np.hypot(*table["direct"][0][:2])
     assert direct > 0.1
     assert np.hypot(*table["harmonic"][0][:2]) == pytest.approx(direct, rel=0.05)

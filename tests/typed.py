@@ -81,8 +81,7 @@ def scenes() -> list[Any]:
     told = (
         study.study([0.5, 1.0], ["direct"]),
         study.cost([0.5], ["direct"]),
-        study.turned(phases=64),
-        study.methods,
+        study.with_numerics(phases=64),
     )
     more = (
         study.fitted,

@@ -1,4 +1,4 @@
-"""The CCF whose area an aim gains, and what limits the best loop on it, phase by phase."""
+"""The CCF whose area an objective gains, and what limits the best loop on it, phase by phase."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ PHASES = 721
 
 
 def gained_ccf(optimum: Optimum, study: Study | None = None) -> Field:
-    """Return the CCF whose area the aim gains, values (1, N_1, N_2): along the displacement, or of the heading for turning, in
-    the minimum-perturbation frame, or, where singular shapes leave none, in the scene's own."""
+    """Return the CCF whose area the objective gains, values (1, N_1, N_2): along the displacement, or of the heading for
+    turning, in the minimum-perturbation frame, or, where singular shapes leave none, in the scene's own."""
     fitted, best = (study or Study(optimum.scene)).fitted, optimum.best
     connection, (x, y, _) = fitted, best.displacement
     if not fitted.field.masked:
@@ -30,7 +30,7 @@ def gained_ccf(optimum: Optimum, study: Study | None = None) -> Field:
         connection = Connection(fitted.axes, A, fitted.residual, fitted.speed, fitted.degree, **fitted.size)
         x, y, _ = frame.net(best.displacement, best.gait.shape(0.0))
     field = ccf(connection)
-    turning = optimum.request.aim.name == "turning"
+    turning = optimum.request.objective.name == "turning"
     share = np.array([0, 0, 1] if turning else [x, y, 0]) / (np.hypot(x, y) or 1.0)
     values = np.tensordot(share, field.values, 1)[None]
     return replace(field, values=values, unit="rad" if turning else field.unit)
@@ -43,7 +43,7 @@ def limiting(optimum: Optimum, field: Field | None) -> np.ndarray:
     `gained_ccf`; "length": it is off that line for the sake of path length; "else": off that line; "loop": not known,
     where ``field`` is None."""
     alpha = optimum.gait.shape(np.linspace(0, 2 * np.pi, PHASES))
-    rest = "length" if optimum.request.aim.name == "efficiency" else "else"
+    rest = "length" if optimum.request.objective.name == "efficiency" else "else"
     causes = np.full(PHASES, rest if field is not None else "loop", dtype="<U8")
     if field is not None:
         value = np.abs(_nearest_values(field, alpha))

@@ -1,4 +1,4 @@
-"""The best gait of a scene for an aim, as a question."""
+"""The best gait of a scene for an objective, as a question."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from geomech.core.variables import Result, Variable
-from geomech.optimisation.limits import WithinArgument
+from geomech.optimisation.limits import LimitsArgument
 from geomech.optimisation.optimum import Optimum
 from geomech.optimisation.request import Request, checked
 from geomech.optimisation.search import search
@@ -24,10 +24,10 @@ class Optimize(Question):
     costs."""
 
     scene: Scene
-    aim: str
+    objective: str
     direction: str | None = None
     harmonics: int | None = None
-    within: WithinArgument = None
+    limits: LimitsArgument = None
     starts: int | None = None
     rate: float | None = None
     power: float | None = None
@@ -35,12 +35,12 @@ class Optimize(Question):
 
     @property
     def title(self) -> str:
-        return f"{self.aim} of {self.scene.name}"
+        return f"{self.objective} of {self.scene.name}"
 
     @cached_property
     def request(self) -> Request:
         return checked(
-            self.scene, self.aim, self.direction, self.harmonics, self.within, self.starts, self.rate, self.power
+            self.scene, self.objective, self.direction, self.harmonics, self.limits, self.starts, self.rate, self.power
         )
 
     def check(self) -> None:
@@ -60,11 +60,16 @@ class Optimize(Question):
 
 def result_of(optimum: Optimum) -> Result:
     """Return an optimum as variables; the value of a distance is over the body's length, the displacement is not."""
-    best, aim, unit = optimum.best, optimum.request.aim, length_unit(optimum.scene.system)
+    best, objective, unit = optimum.best, optimum.request.objective, length_unit(optimum.scene.system)
     variables = [
-        Variable("value", (), best.value, aim.unit, aim.name, best.error),
+        Variable("value", (), best.value, objective.unit, objective.name, best.error),
         Variable(
-            "start_value", (), optimum.start.value, aim.unit, f"{aim.name} of the scene's gait", optimum.start.error
+            "start_value",
+            (),
+            optimum.start.value,
+            objective.unit,
+            f"{objective.name} of the scene's gait",
+            optimum.start.error,
         ),
     ]
     for name, x, u in zip(("x", "y", "theta"), best.displacement, (unit, unit, "rad")):

@@ -66,7 +66,7 @@ def stretched_optimum(optimum: Optimum, ax=None, field: Field | None = None, stu
 
 
 def gain(optimum: Optimum) -> str:
-    return "heading" if optimum.request.aim.name == "turning" else "displacement"
+    return "heading" if optimum.request.objective.name == "turning" else "displacement"
 
 
 def draw_start_and_best(optimum: Optimum, ax, place, field: Field | None) -> None:
@@ -110,9 +110,9 @@ def angles(optimum: Optimum, ax=None):
             ax.axhline(side, color=LIMITS["limit"][0], lw=0.8, ls=":")
     ax.set(xlabel="phase $t$ (rad)", ylabel=f"shape ({names[0][1]})", xlim=(0, 2 * np.pi))
     ax.set(xticks=np.pi / 2 * np.arange(5), xticklabels=["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"])
-    best, aim = optimum.best, optimum.request.aim
+    best, objective = optimum.best, optimum.request.objective
     start = optimum.start.value
-    ax.set_title(f"{aim.name}: {best.value:.4g} {aim.unit}\n(start {start if start > 1e-9 else 0.0:.4g})")
+    ax.set_title(f"{objective.name}: {best.value:.4g} {objective.unit}\n(start {start if start > 1e-9 else 0.0:.4g})")
     long = max(len(name) for name, _ in names) > LONG
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=1 if long else 3)
     return ax

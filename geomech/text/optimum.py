@@ -42,7 +42,7 @@ def numbers(result: Result) -> dict[str, Any]:
 def text(result: Result) -> str:
     """Return the best gait in lines: its value, its cost, the limits that it touches, and where the starts led."""
     optimum, value, start = result.subject, result["value"], result["start_value"]
-    aim = optimum.request.aim
+    objective = optimum.request.objective
     moved = ", ".join(f"{name} {result[name].values:.6g} {result[name].unit}" for name in ("x", "y", "theta"))
     lines = [_headline(result), f"displacement per cycle: {moved}"]
     if "work" in result:
@@ -50,10 +50,10 @@ def text(result: Result) -> str:
         lines.append(f"path length {length:.6g}, work {work:.6g} (body's axial drag x body length)")
     elif "path_length" in result:
         lines.append(f"path length {result['path_length'].values:.6g} ({METRIC})")
-    if aim.timed:
+    if objective.timed:
         limits = {
-            "rate": aim.rate and f"rates of shape up to {aim.rate:.6g} rad/s",
-            "power": aim.power and f"mean power {aim.power:g}",
+            "rate": objective.rate and f"rates of shape up to {objective.rate:.6g} rad/s",
+            "power": objective.power and f"mean power {objective.power:g}",
         }
         limited = " and ".join(filter(None, limits.values()))
         lines.append(f"frequency {optimum.gait.frequency:.6g} Hz, with {limited}")
@@ -68,7 +68,7 @@ def text(result: Result) -> str:
 def _headline(result: Result) -> str:
     """Return the value with its error, and that of the scene's gait."""
     optimum, value, start = result.subject, result["value"], result["start_value"]
-    towards = f" along {optimum.request.aim.direction}" if optimum.request.aim.direction else ""
+    towards = f" along {optimum.request.objective.direction}" if optimum.request.objective.direction else ""
     reached = f"{value.label}{towards} {value.values:.6g} {value.unit}, error {value.error:.1g}"
     return f"{optimum.scene.name}: {reached} (the scene's gait: {start.values:.6g})"
 
