@@ -97,7 +97,7 @@ def draw_limited(ax, curve: np.ndarray, kinds: np.ndarray, nonlinear: bool = Fal
 
 
 @styled
-def angles(optimum: Optimum, ax=None):
+def optimum_angles(optimum: Optimum, ax=None):
     """Draw the shape variables of the best gait over a cycle, and the limits."""
     ax, gait = axes_of(ax), optimum.gait
     t = np.linspace(0, 2 * np.pi, PHASES)
@@ -120,17 +120,17 @@ def angles(optimum: Optimum, ax=None):
 
 @styled
 def optimum_figure(optimum: Optimum, stretched: bool = False):
-    """Draw `optimum_map` and `angles` side by side; the angles alone where there are not two joints. stretched:
+    """Draw `optimum_map` and `optimum_angles` side by side; the angles alone where there are not two joints. stretched:
     `stretched_optimum` between them."""
     system, study = optimum.scene.system, Study(optimum.scene)
     if system.joints != 2:
         fig, axes = figure(3.8, 3.4)
-        angles(optimum, axes[0, 0])
+        optimum_angles(optimum, axes[0, 0])
         return fig
     fig, axes = figure(11.8 if stretched else 7.6, 3.9, 3 if stretched else 2)
     field = None if system.traits.steps else gained_ccf(optimum, study)
     optimum_map(optimum, axes[0, 0], field)
     if stretched:
         stretched_optimum(optimum, axes[0, 1], field, study)
-    angles(optimum, axes[0, -1])
+    optimum_angles(optimum, axes[0, -1])
     return fig
