@@ -1,0 +1,6 @@
+def drawing():
+    return ""
+
+
+def shown(text, docname):
+    return text

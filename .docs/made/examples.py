@@ -1,0 +1,6 @@
+def thumbnails():
+    return ""
+
+
+def shown(text, docname):
+    return text

@@ -1,0 +1,6 @@
+def table():
+    return ""
+
+
+def shown(text, docname):
+    return text
