@@ -46,7 +46,7 @@ nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 120
 nb_execution_in_temp = True
-suppress_warnings = ["myst.xref_missing_external"]
+suppress_warnings = ["ref.python"]  # two classes of one name in different packages
 
 html_theme = "pydata_sphinx_theme"
 html_title = "geomech"

@@ -35,4 +35,5 @@ def setup(app) -> dict[str, bool]:
     generated.mkdir(exist_ok=True)
     api.write(generated / "api")
     app.connect("source-read", fill_in)
+    app.connect("autodoc-process-docstring", api.readable, priority=400)  # before numpydoc
     return {"parallel_read_safe": True, "parallel_write_safe": True}

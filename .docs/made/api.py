@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import re
 from pathlib import Path
 
 PACKAGES = {
@@ -62,6 +63,22 @@ def write(folder: Path) -> None:
             page.write_text(text, encoding="utf-8")
 
 
+def readable(app, what: str, name: str, obj, options, lines: list[str]) -> None:
+    """Turn a docstring of plain sentences into reStructuredText: |x| is no substitution, and a table stays as it is."""
+    lines[:] = [re.sub(r"(``.*?``)|\|", lambda x: x[1] or r"\|", line) for line in lines]
+    if any(re.fullmatch(r"\s*-{3,}", line) for line in lines):
+        return  # numpydoc's
+    table = {k for k, line in enumerate(lines) if line.startswith(" ")}
+    table |= {k for k, line in enumerate(lines) if re.search(r"\S   +\S", line)}
+    for k in reversed(range(len(lines))):
+        if k in table:
+            lines[k] = "   " + lines[k].replace(r"\|", "|")
+            if k - 1 not in table:
+                lines[k:k] = ["", "::", ""]
+            if k + 1 not in table:
+                lines.insert(k + 1 + 3 * (k - 1 not in table), "")
+
+
 def _summary(name: str) -> str:
     text = inspect.getdoc(importlib.import_module(name)) or ""
     return " ".join(text.partition("\n\n")[0].split()).replace("|", r"\|")
@@ -70,6 +87,7 @@ def _summary(name: str) -> str:
 def _page(name: str) -> str:
     module = importlib.import_module(name)
     objects = {public: getattr(module, public) for public in _public(module) if not public.isupper()}
+    objects = {public: value for public, value in objects.items() if _home(name, value)}
     classes = [public for public, value in objects.items() if inspect.isclass(value)]
     functions = [public for public, value in objects.items() if inspect.isroutine(value)]
     lines = [name, "=" * len(name), "", _summary(name), ""]
@@ -86,6 +104,13 @@ def _page(name: str) -> str:
             for public in names:
                 lines += [f".. {directive}:: {name}.{public}", ""]
     return "\n".join(lines)
+
+
+def _home(name: str, value) -> bool:
+    """Return whether the page of a package is the one of all pages that documents an object it offers."""
+    module = getattr(value, "__module__", name)
+    pages = [page for group in PACKAGES.values() for page in group if f"{module}.".startswith(f"{page}.")]
+    return not pages or max(pages, key=len) == name
 
 
 def _public(module) -> list[str]:

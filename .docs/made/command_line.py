@@ -44,7 +44,8 @@ def _names(parameter) -> str:
 
 
 def _type(parameter) -> str:
-    return {"integer": "N", "float": "NUMBER", "text": "TEXT"}.get(parameter.type.name, parameter.type.name.upper())
+    kind = parameter.type_descriptor.annotation
+    return {int: "N", float: "NUMBER", str: "TEXT"}.get(kind, "VALUE")
 
 
 def _text(help: str | None) -> str:
