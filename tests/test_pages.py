@@ -33,7 +33,7 @@ def text(page):
 
 def blocks(page, language=""):
     """Blocks of code on a page whose first line is ```language."""
-    return [code for first, code in re.findall(r"(?ms)^```(\w*)\n(.*?)^```$", text(page)) if first == language]
+    return [code for first, code in re.findall(r"(?ms)^```([^\n]*)\n(.*?)^```$", text(page)) if first == language]
 
 
 def prose(page):
@@ -60,7 +60,7 @@ def links(page):
 
 def commands(page):
     """Command lines of geomech on a page, as words: of blocks, of tables and in sentences; templates with their brackets."""
-    code = [line for language in ("", "sh") for block in blocks(page, language) for line in block.splitlines()]
+    code = [line for language in ("", "sh", "console") for block in blocks(page, language) for line in block.splitlines()]
     inline = re.findall(r"`([^`]+)`", re.sub(r"(?ms)^```.*?^```$", "", text(page)))
     for line in code + [" ".join(x.split()).replace("\\|", "|") for x in inline]:
         line = line.removeprefix("$ ")

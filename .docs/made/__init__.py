@@ -23,17 +23,26 @@ MADE = {
 
 
 def fill_in(app, docname: str, source: list[str]) -> None:
-    """Replace the blocks {made} of a page, and run those of the gallery's pages."""
-    source[0] = re.sub(r"(?m)^```\{made\} (\w+)\n```$", lambda block: MADE[block[1]](), source[0])
+    """Replace the blocks {made} of a page, and add what its commands print, or the pictures of the gallery."""
     if docname.startswith("gallery/") and docname not in ("gallery/index", "gallery/figures"):
-        source[0] = examples.shown(source[0], docname)
+        source[0] = examples.shown(docname)
+    elif not docname.startswith("generated/"):
+        text = re.sub(r"(?m)^```\{made\} (\w+)\n```$", lambda block: MADE[block[1]](), source[0])
+        source[0] = examples.with_output(text)
 
 
-def setup(app) -> dict[str, bool]:
-    """Register the replacements with Sphinx."""
+def compute(app) -> None:
+    """Compute all pages and pictures to which others refer, before any is read."""
     generated = Path(app.srcdir) / "generated"
     generated.mkdir(exist_ok=True)
     api.write(generated / "api")
+    examples.compute_all()
+    figures.draw_missing()
+
+
+def setup(app) -> dict[str, bool]:
+    """Register the computations with Sphinx."""
+    app.connect("builder-inited", compute)
     app.connect("source-read", fill_in)
     app.connect("autodoc-process-docstring", api.readable, priority=400)  # before numpydoc
     return {"parallel_read_safe": True, "parallel_write_safe": True}
