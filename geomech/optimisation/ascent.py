@@ -36,7 +36,7 @@ def ascend(
     is_same_stroke = lambda x: once_round is None or once_round.winding(problem.loop(x)) == 1
     x, remaining, trust_radius = problem.first, max_steps, TRUST_RADIUS
     while remaining > 0 and trust_radius > SHORTEST * TRUST_RADIUS:
-        ascent = _Ascent(problem.objective, constraints, is_same_stroke)
+        ascent = _Ascent(problem.minimised, constraints, is_same_stroke)
         end = ascent.run(x, trust_radius, p.size, min(remaining, STEPS_PER_RUN), tolerance)
         previous, x = x, x if ascent.best is None else ascent.best
         remaining = 0 if end == "spent" else remaining - max(ascent.steps, 1)
@@ -85,9 +85,9 @@ def _shortest(constraints: list[tuple]) -> np.ndarray:
 class _Ascent:
     """A recorder of iterates: it stores the best feasible one, or the last where none was feasible."""
 
-    def __init__(self, objective: Callable, constraints: list[dict], is_same_stroke: Callable):
-        self.objective, self.constraints, self.is_same_stroke, self.best, self.least, self.steps = (
-            objective,
+    def __init__(self, minimised: Callable, constraints: list[dict], is_same_stroke: Callable):
+        self.minimised, self.constraints, self.is_same_stroke, self.best, self.least, self.steps = (
+            minimised,
             constraints,
             is_same_stroke,
             None,
@@ -100,7 +100,7 @@ class _Ascent:
         if not self.is_same_stroke(x):
             raise RuntimeError("a loop of another number of strokes")
         value = (
-            self.objective(x)[0]
+            self.minimised(x)[0]
             if np.isfinite(x).all() and all(is_feasible(rule, x) for rule in self.constraints)
             else np.inf
         )
@@ -119,7 +119,7 @@ class _Ascent:
             with warnings.catch_warnings():  # SciPy before 1.13 warns where it clips its own steps to the bounds
                 warnings.filterwarnings("ignore", "Values in x were outside bounds", RuntimeWarning)
                 solution = minimize(
-                    self.objective,
+                    self.minimised,
                     x,
                     jac=True,
                     method="SLSQP",

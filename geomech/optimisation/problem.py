@@ -1,4 +1,4 @@
-"""An ascent as a problem of nonlinear programming: an objective to be minimised, and constraints."""
+"""An ascent as a problem of nonlinear programming: a number to be minimised, and constraints."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Problem:
         return np.concatenate([rows, np.zeros((*rows.shape[:-1], len(self.first) - self.count))], -1)
 
     def values_at(self, x: np.ndarray):
-        """Return the cycle of x, computed once for the objective and all constraints."""
+        """Return the cycle of x, computed once for the number to be minimised and all constraints."""
         x = x[: self.count]
         if self._at is None or not np.array_equal(self._at, x):
             if self.cycles.count >= self.last:
@@ -65,7 +65,7 @@ class Problem:
             self.on_cycle()
         return self._values
 
-    def objective(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+    def minimised(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the number to be minimised, and its slopes."""
         b = self.values_at(x)
         value, by = self.objective.value(b, 1 / (2 * np.pi))
