@@ -142,7 +142,7 @@ def test_run_leaves_everything(undrawn, tmp_path):
     assert set(tables) == {"circle", "butterfly"}
     for gait, table in tables.items():
         run = {"circle": glass.gait, "butterfly": scenes.load("butterfly-glass").gait}[gait]
-        wanted = Study(glass).displacement("direct", run, np.array(table["amplitude"]))
+        wanted = Study(glass).poses("direct", run, np.array(table["amplitude"]))
         np.testing.assert_allclose(table["direct"], wanted, atol=1e-9)
         assert f"{abs(plots.net(wanted)[-1]):.6f}" in out
         assert f"{abs(wanted[-1, 1]):.6f}" in out  # of a circle it is nothing but rounding, of either sign

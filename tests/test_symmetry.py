@@ -35,7 +35,7 @@ BACK = Fourier(cos=((0.5, 0.3), (0.4, 0.1)), sin=((0.0, 0.0), (0.0, 0.0)))  # th
     (BACK, Traits(odd=False), []),
 ])  # fmt: skip
 def test_zeros_follow_from_traits_and_curve(gait, traits, zero):
-    assert zero_components(traits, gait, [0.5, 1.0]) == zero
+    assert [*zero_components(traits, gait, [0.5, 1.0])] == zero
 
 
 @pytest.mark.parametrize("name", SYSTEMS)

@@ -10,7 +10,7 @@ diagonal matrix of signs, and the net pose g of a cycle obeys:
 - s = -1: the heading is its own image, so that with D_theta = 1 it is 0; with tau = 0 and no heading gained, x or y is its
   own image, and 0 where D = 1.
 
-No magnitude of a displacement is looked at. Phases are those of a grid, tau is one of them, and curves are compared to roundoff.
+No magnitude of a displacement is looked at. Phases and tau are those of a grid, and curves are compared to roundoff.
 """
 
 from __future__ import annotations
@@ -25,25 +25,35 @@ from geomech.geometry.traits import Traits
 
 PHASES = 48  # at least, and a multiple of it: halves, thirds and quarters of a cycle are among them
 COMPONENTS = "x", "y", "heading"
+ALWAYS = "all shapes are their own image"
+MIRRORED = "the second half of the cycle mirrors the first"
+BACKWARDS = "the cycle run backwards is its own image"
+RETRACED = "the cycle retraces its path"
 
 
-def zero_components(traits: Traits, gait: Gait, amplitudes) -> list[str]:
-    """Return which of COMPONENTS of the net displacement are 0 by symmetry, at each of the amplitudes (B,); none where the
-    velocity does not follow from shape alone."""
-    amplitudes = np.asarray(amplitudes, float)
+def zero_components(traits: Traits, gait: Gait, amplitudes=None) -> dict[str, str]:
+    """Return the reason by component, of those of COMPONENTS that are 0 by symmetry at each of the amplitudes (B,), or at the
+    gait's own; none where the velocity does not follow from shape alone."""
+    amplitudes = np.atleast_1d(gait.amplitude if amplitudes is None else amplitudes).astype(float)
     if traits.steps or not amplitudes.size:
-        return []
+        return {}
     phases = PHASES * -(-(2 * gait.harmonics + 1) // PHASES)
     cycles = np.concatenate([x / (np.abs(x).max() or 1.0) for x in gait.cycle(phases, amplitudes)], -1)
     found = [(sign, D, first) for sign, L, D in _moves(traits) for first in _firsts(cycles, sign, L)]
-    zero = np.zeros(3, bool)
-    for sign, D, first in found:  # a heading of 0 is what places need
-        zero |= (sign == 1 and first == 0) & (D == -1)
-        zero[2] |= D[2] == -sign and (sign == -1 or 2 * first == phases)
-        zero |= sign == -1 and (D == 1).all()
+    why: dict[int, str] = {}
     for sign, D, first in found:
-        zero[:2] |= bool(zero[2] and sign == -1 and D[2] == -1 and first == 0) & (D[:2] == 1)
-    return [name for name, is_zero in zip(COMPONENTS, zero) if is_zero]
+        if sign == 1:
+            of_halves = [2] if D[2] == -1 and 2 * first == phases else []
+            zero, reason = (np.flatnonzero(D == -1), ALWAYS) if first == 0 else (of_halves, MIRRORED)
+        else:
+            retraced = (D == 1).all()
+            zero, reason = (range(3), RETRACED) if retraced else ([2] if D[2] == 1 else [], BACKWARDS)
+        for k in zero:
+            why.setdefault(int(k), reason)
+    for sign, D, first in found if 2 in why else ():  # x and y need a heading of 0
+        for k in np.flatnonzero(D[:2] == 1) if (sign, D[2], first) == (-1, -1, 0) else ():
+            why.setdefault(int(k), BACKWARDS)
+    return {name: why[k] for k, name in enumerate(COMPONENTS) if k in why}
 
 
 def _moves(traits: Traits) -> Iterator[tuple[int, tuple[int, int], np.ndarray]]:

@@ -79,6 +79,6 @@ def result_of(optimum: Optimum) -> Result:
         variables.append(Variable(name, (), x, u, "net displacement per cycle"))
     for name, x in (("path_length", best.length), ("work", best.work)):
         variables += [] if x is None else [Variable(name, (), x, of_effort.get(name, ""))]
-    zero = zero_components(optimum.scene.system.traits, optimum.gait, [optimum.gait.amplitude])
+    zero = [*zero_components(optimum.scene.system.traits, optimum.gait)]
     facts = {"active": optimum.active, "evaluations": optimum.evaluations, "zero_by_symmetry": zero}
     return Result("optimum", tuple(variables), facts, optimum)

@@ -70,11 +70,11 @@ def cheapest(
             break
         ask(cost.predicted(scene, plans[tier], len(amplitudes)))
         try:
-            checked = study.displacement(tier, gait, amplitudes[sampled])
+            checked = study.poses(tier, gait, amplitudes[sampled])
         except ValueError:  # the gait leaves the field or the family of this tier
             continue
         if (pose_distance(checked, pilot[0], system.length) + pilot[1])[:, 0].max() <= tol:
-            poses = study.displacement(tier, gait, amplitudes)
+            poses = study.poses(tier, gait, amplitudes)
             error, spread = against_direct(scene, poses, gait, amplitudes), study.spread(tier, gait, amplitudes)
             if spread is not None:
                 error = np.maximum(error, spread / [system.length, 1.0])

@@ -100,7 +100,7 @@ def result(
     attributes |= {} if frequency is None else {"frequency": frequency}
     if text := getattr(gait, "estimate_is", ""):
         attributes["estimate_is"] = text
-    attributes["zero_by_symmetry"] = zero_components(system.traits, gait, amplitudes)
+    attributes["zero_by_symmetry"] = [*zero_components(system.traits, gait, amplitudes)]
     return Result("displacement", tuple(variables), {**attributes, **more}, (scene, gait))
 
 

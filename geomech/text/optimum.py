@@ -5,10 +5,10 @@ from __future__ import annotations
 import textwrap
 from typing import Any
 
+from geomech.core.summary import moved, wrapped
 from geomech.core.variables import Result
 from geomech.optimisation import Optimum
 from geomech.scenes.write import gait_table, toml
-from geomech.core.summary import moved, wrapped
 
 SHOWN = 6  # answers that a table led to, of those that nobody finished
 

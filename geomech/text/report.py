@@ -5,7 +5,6 @@ from __future__ import annotations
 from geomech.core.variables import Result
 from geomech.text import displacement
 
-
 MORE = displacement.MORE
 ROWS = 10  # amplitudes of all gaits together, so that they fit a screen
 
