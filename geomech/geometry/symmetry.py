@@ -27,7 +27,8 @@ PHASES = 48  # at least, and a multiple of it: halves, thirds and quarters of a 
 COMPONENTS = "x", "y", "heading"
 ALWAYS = "all shapes are their own image"
 MIRRORED = "the second half of the cycle mirrors the first"
-BACKWARDS = "the cycle run backwards is its own image"
+BACKWARDS = "the cycle run backwards is its own image, head for tail"
+REFLECTED = "the cycle run backwards is its own mirror image"
 RETRACED = "the cycle retraces its path"
 
 
@@ -52,7 +53,7 @@ def zero_components(traits: Traits, gait: Gait, amplitudes=None) -> dict[str, st
             why.setdefault(int(k), reason)
     for sign, D, first in found if 2 in why else ():  # x and y need a heading of 0
         for k in np.flatnonzero(D[:2] == 1) if (sign, D[2], first) == (-1, -1, 0) else ():
-            why.setdefault(int(k), BACKWARDS)
+            why.setdefault(int(k), BACKWARDS if D[0] == -1 else REFLECTED)
     return {name: why[k] for k, name in enumerate(COMPONENTS) if k in why}
 
 

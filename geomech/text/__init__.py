@@ -1,7 +1,7 @@
 """Results in words: a kind of result has a module of its name.
 
 Its ``text(result)`` returns lines for a reader, which fit a screen, and ``full(result)`` all of them where there are
-more; ``MORE`` says so in words. ``numbers(result)`` is the JSON, ``medium(result)`` of a calibration a file that scenes take."""
+more; ``MORE`` says so in words. ``numbers(result)`` is the JSON, ``medium(result)`` of a calibration a file for scenes."""
 
 from __future__ import annotations
 
