@@ -60,7 +60,9 @@ def links(page):
 
 def commands(page):
     """Command lines of geomech on a page, as words: of blocks, of tables and in sentences; templates with their brackets."""
-    code = [line for language in ("", "sh", "console") for block in blocks(page, language) for line in block.splitlines()]
+    code = [
+        line for language in ("", "sh", "console") for block in blocks(page, language) for line in block.splitlines()
+    ]
     inline = re.findall(r"`([^`]+)`", re.sub(r"(?ms)^```.*?^```$", "", text(page)))
     for line in code + [" ".join(x.split()).replace("\\|", "|") for x in inline]:
         line = line.removeprefix("$ ")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Optional
 
 import typer
@@ -15,12 +14,14 @@ from geomech.commands.options import (
     GridOption,
     OtherFrameOption,
     PairOption,
+    PlotOption,
     SceneArgument,
     SliceOption,
     YesOption,
     angles,
     colour_limit,
     components,
+    refuse_without_figure,
     with_workers,
 )
 from geomech.commands.pipeline import Output, execute
@@ -29,9 +30,9 @@ from geomech.commands.pipeline import Output, execute
 @with_workers
 def ccf(
     name: SceneArgument,
-    plot: Annotated[Path, typer.Option("--plot", metavar="FILE", help="figure: .png, .pdf or .svg")],
     grid: GridOption = None,
     extent: ExtentOption = None,
+    plot: PlotOption = None,
     style: Annotated[Optional[str], typer.Option(help="map (colours), contours or surface")] = None,
     metric: Annotated[bool, typer.Option("--metric", help="draw rings of joint rates that cost the same")] = False,
     stretch: Annotated[
@@ -49,8 +50,12 @@ def ccf(
     from geomech.output import pictures
     from geomech.studies.shape_space import ccf
 
+    refuse_without_figure(
+        plot, style=style, metric=metric or None, stretch=stretch or None, component=component, clim=clim,
+        **{"compare-frame": other_frame},
+    )  # fmt: skip
     scene = load_scene(name, grid, extent)
     panels = components(component)
     drawn = pictures.Ccf(style, metric, stretch, other_frame, panels, colour_limit(clim, panels))
     question = ccf(scene, pair, angles(scene, "--slice", slice_), other_frame, metric, stretch)
-    execute(question, Output(plot, drawn, pictures.check), yes=yes, silent=True)
+    execute(question, Output(plot, drawn, pictures.check), yes=yes)

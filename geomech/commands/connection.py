@@ -29,7 +29,10 @@ from geomech.commands.pipeline import Output, execute
 @with_workers
 def connection(
     name: SceneArgument,
-    out: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="FILE.nc (NetCDF) or FILE.mat to write")],
+    out: Annotated[
+        Optional[Path],
+        typer.Option("-o", "--output", metavar="FILE", help="write A and more to .nc (NetCDF), A to .mat"),
+    ] = None,
     grid: GridOption = None,
     extent: ExtentOption = None,
     plot: PlotOption = None,
@@ -47,9 +50,10 @@ def connection(
     from geomech.output import parts, pictures
     from geomech.studies.shape_space import connection
 
-    file = parts.Connection(out.suffix, sign, order)
+    ending = "" if out is None else out.suffix
+    file = parts.Connection(ending, sign, order)
     drawn = pictures.Connection(style, plot, pair, slice_, other_frame, components(component))
     scene = load_scene(name, grid, extent)
-    question = connection(scene, file.matlab, plot is not None, pair, angles(scene, "--slice", slice_), other_frame)
+    question = connection(scene, ending, plot is not None, pair, angles(scene, "--slice", slice_), other_frame)
     outputs = Output(out, file, formats.netcdf_or_matlab), Output(plot, drawn, pictures.check)
-    execute(question, *outputs, yes=yes, silent=True)
+    execute(question, *outputs, yes=yes)
