@@ -7,7 +7,7 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.options import JsonOption, PlotOption, parse_end_caps
+from geomech.commands.options import AllOption, JsonOption, PlotOption, parse_end_caps
 from geomech.commands.pipeline import Output, execute
 
 Size = Optional[float]
@@ -33,6 +33,7 @@ def fit_medium(
         Size, typer.Option(help="of the bed in kg/m^3, grains and voids, in place of the file's")
     ] = None,
     area: Annotated[Size, typer.Option(help="of the plate in m^2, in place of the file's")] = None,
+    everything: AllOption = False,
     as_json: JsonOption = False,
 ):
     """Fit a medium to your own drag data. Rods, with the columns psi_deg, F_parallel_N, F_perpendicular_N, give a force law;
@@ -45,4 +46,6 @@ def fit_medium(
     known = tuple((key, x) for key, x in sizes.items() if x is not None)
     file = Output(out, parts.write_medium, message=parts.about_medium)
     figure = Output(plot, pictures.calibration, pictures.check)
-    execute(Calibration(drag, law, known, parse_end_caps(end_caps)), file, figure, as_json=as_json)
+    execute(
+        Calibration(drag, law, known, parse_end_caps(end_caps)), file, figure, as_json=as_json, everything=everything
+    )

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from geomech.core.summary import POSE, grid, spans, wrapped, zero_words
+from geomech.core.summary import POSE, grid, spans, zero_words
 from geomech.core.variables import Result
 from geomech.geometry.field import Field
 from geomech.studies.shape_space import Space
@@ -23,11 +23,11 @@ def text(result: Result) -> str:
     if space.planes:
         axes = space.planes[0].ccf.axes
         unit = f"x and y in {space.planes[0].ccf.unit}/rad2, theta in rad/rad2"
-        lines += [*wrapped([f"slices: {grid(axes)}"]), unit]
-        return "\n".join([*lines, *wrapped(f"{v.label.removeprefix('CCF of ')}: {spans(v.values)}" for v in result.variables)])
+        lines += [f"slices: {grid(axes)}", unit]
+        return "\n".join([*lines, *(f"{v.label.removeprefix('CCF of ')}: {spans(v.values)}" for v in result.variables)])
     ccf, error = space.study.curvature, space.study.curvature_error
-    lines += [*wrapped([f"grid: {grid(ccf.axes)}"]), *_extremes(ccf, error), *_zero_line(ccf, scene.gait.middle)]
-    return "\n".join([*lines, *wrapped(_integral(space))])
+    lines += [f"grid: {grid(ccf.axes)}", *_extremes(ccf, error), *_zero_line(ccf, scene.gait.middle)]
+    return "\n".join([*lines, *_integral(space)])
 
 
 def _extremes(ccf: Field, error: Field) -> Iterator[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from geomech.core.summary import fit_residual, grid, wrapped
+from geomech.core.summary import fit_residual, grid
 from geomech.core.variables import Result
 from geomech.geometry.connection import Connection
 from geomech.studies.shape_space import Space
@@ -20,9 +20,9 @@ def text(result: Result) -> str:
     space: Space = result.subject
     scene, fitted = space.study.scene, space.study.fitted
     lines = [f"{scene.name}: local connection A, xi = A alphadot, in the frame {scene.frame}"]
-    lines += wrapped([f"grid: {grid(fitted.axes)}"])
+    lines += [f"grid: {grid(fitted.axes)}"]
     lines += [*_ranges(fitted, shape_labels(scene.system)), f"fit: {_fit(scene.system, fitted)}"]
-    lines += wrapped(f"symmetry: {line}" for line in symmetries(scene.system))
+    lines += [f"symmetry: {line}" for line in symmetries(scene.system)]
     if not stored_table(scene.system, "connection"):
         balances = tables.table(scene.system, scene.numerics).balances
         lines.append(f"cost: {balances:,} force balances, {space.seconds:.2g} s")

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from geomech.core.summary import wrapped
 from geomech.core.variables import Result, Variable
 
 SHOWN = {"net_distance": "net distance per cycle", "speed": "speed"}
@@ -20,7 +19,7 @@ def text(result: Result) -> str:
     kinds = ", ".join(kind for v in result.variables if v.is_text for kind in _kinds(v))
     shown = [v for v in result.variables if v.name in SHOWN]
     ranges = [f"{SHOWN[v.name]} {v.values.min():.6g} to {v.values.max():.6g} {v.unit}" for v in shown]
-    lines = wrapped([", ".join([f"{points} points" + (f" ({kinds})" if kinds else ""), *ranges])])
+    lines = [", ".join([f"{points} points" + (f" ({kinds})" if kinds else ""), *ranges])]
     words = [v for v in result.variables if v.is_text]
     rows = _table(axes, shown, words) if points <= ROWS else (line for v in shown for line in _extremes(axes, v))
     return "\n".join([*lines, *rows])
