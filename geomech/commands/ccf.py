@@ -33,10 +33,14 @@ def ccf(
     grid: GridOption = None,
     extent: ExtentOption = None,
     plot: PlotOption = None,
-    style: Annotated[Optional[str], typer.Option(help="map (colours), contours or surface")] = None,
-    metric: Annotated[bool, typer.Option("--metric", help="draw rings of joint rates that cost the same")] = False,
+    style: Annotated[
+        Optional[str], typer.Option(metavar="STYLE", help="draw a map (colours, the default), contours or a surface")
+    ] = None,
+    metric: Annotated[
+        bool, typer.Option("--metric", help="draw rings of joint rates that take the same effort")
+    ] = False,
     stretch: Annotated[
-        bool, typer.Option("--stretch", help="redraw shape space: equal lengths cost equal effort")
+        bool, typer.Option("--stretch", help="redraw shape space so that equal lengths take equal effort")
     ] = False,
     pair: PairOption = None,
     slice_: SliceOption = None,
@@ -45,8 +49,8 @@ def ccf(
     clim: ClimOption = None,
     yes: YesOption = False,
 ):
-    """Draw the CCF with the scene's gait on it. Of three and more joints: a slice for each pair, or for one, with the
-    others fixed."""
+    """Compute the CCF and its integral over the scene's gait. --plot draws both. Of three and more joints: a slice for each
+    pair, or for one, with the others fixed."""
     from geomech.output import pictures
     from geomech.studies.shape_space import ccf
 

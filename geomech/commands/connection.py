@@ -31,22 +31,28 @@ def connection(
     name: SceneArgument,
     out: Annotated[
         Optional[Path],
-        typer.Option("-o", "--output", metavar="FILE", help="write A and more to .nc (NetCDF), A to .mat"),
+        typer.Option("-o", "--output", metavar="FILE", help="write the connection to .nc (NetCDF) or .mat"),
     ] = None,
     grid: GridOption = None,
     extent: ExtentOption = None,
     plot: PlotOption = None,
-    sign: Annotated[Optional[str], typer.Option(help="of a .mat file: + for xi = + A alphadot (as is), or -")] = None,
-    order: Annotated[Optional[str], typer.Option(help="of a .mat file: ndgrid (as is) or meshgrid")] = None,
-    style: Annotated[Optional[str], typer.Option(help="of the plot: quiver or streamlines")] = None,
+    sign: Annotated[
+        Optional[str], typer.Option(metavar="+|-", help="sign of A in a .mat file: + (the default) or -")
+    ] = None,
+    order: Annotated[
+        Optional[str], typer.Option(metavar="ORDER", help="order of a .mat file: ndgrid (the default) or meshgrid")
+    ] = None,
+    style: Annotated[
+        Optional[str], typer.Option(metavar="STYLE", help="draw arrows (quiver, the default) or streamlines")
+    ] = None,
     pair: PairOption = None,
     slice_: SliceOption = None,
     other_frame: OtherFrameOption = None,
     component: ComponentOption = None,
     yes: YesOption = False,
 ):
-    """Compute the local connection on a grid, as a file. A NetCDF file has the fit residual and the CCF, too; a .mat
-    file has A alone, in sysplotter's layout."""
+    """Compute the local connection on a grid. A NetCDF file has the fit residual and the CCF, too; a .mat file has A
+    alone, in sysplotter's layout."""
     from geomech.output import parts, pictures
     from geomech.studies.shape_space import connection
 

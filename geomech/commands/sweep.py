@@ -16,9 +16,9 @@ from geomech.commands.pipeline import Output, drawing, execute, path_message
 @with_workers
 def sweep(
     name: SceneArgument,
-    over: Annotated[list[str], typer.Option(help="PARAM=START:STOP:COUNT or PARAM=A,B,...; as often as wanted")],
+    over: Annotated[list[str], typer.Option(metavar="KEY=VALUES", help="parameter and its values; may be repeated")],
     out: Annotated[
-        Optional[Path], typer.Option("-o", "--output", metavar="FILE.nc", help="NetCDF file to write")
+        Optional[Path], typer.Option("-o", "--output", metavar="FILE.nc", help="write the results to .nc (NetCDF)")
     ] = None,
     plot: PlotOption = None,
     yes: YesOption = False,

@@ -52,7 +52,9 @@ class Space(NamedTuple):
 class ShapeSpace(Question):
     """The connection or the CCF of a scene.
 
-    kind: "connection" or "ccf", of the result. file: with all data of a file, metric and harmonics included; else the CCF alone. field: computed on the scene's grid. map:
+    kind: "connection" or "ccf", of the result.
+
+    file: with all data of a file, metric and harmonics included; else the CCF alone. field: computed on the scene's grid. map:
     drawn on that grid. planes: drawn where two joints move, of ``pair``, such as "1,3", or of all pairs; slice_angles: angles
     of the other joints, rad, the gait's middle if None. metric: with the cost of changes of shape. stretch: with shape space
     stretched to that cost. gait: the scene's gait is drawn, and must lie within. other_frame: name of another body frame,

@@ -50,7 +50,7 @@ def text(result: Result) -> str:
         f"pitch {np.degrees(w.pose[:, 2].min()):.3g} to {np.degrees(w.pose[:, 2].max()):.3g} degrees (positive: nose down)",
         *_lateral(w),
         f"effort: work of the motors {w.work[-1]:.4g} J{share}",
-        f"into the ground {w.loss[-1]:.4g} J; {100 * w.unaccounted:.1g} % of the work is not accounted for, an error of the steps",
+        f"into the ground {w.loss[-1]:.4g} J; not accounted for, by the steps: {100 * w.unaccounted:.1g} % of the work",
         *([_unsolved(w)] if w.unsolved else []),
     ])  # fmt: skip
 
