@@ -36,7 +36,7 @@ from rft.laws.base import TermLaw, is_rate_independent
 from rft.refusal import Refusal
 from rft.registry import REGISTRIES
 
-PAGE = (pathlib.Path(__file__).parents[1] / "geomech" / "scenes" / "README.md").read_text()
+PAGE = (pathlib.Path(__file__).parents[1] / ".docs" / "how-it-works" / "extending.md").read_text()
 SMALL = Numerics(grid=7, phases=32)
 pytestmark = pytest.mark.usefixtures("own_parts")
 

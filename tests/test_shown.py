@@ -220,9 +220,10 @@ def test_what_leaves_the_library_has_one_unit_and_says_it():
     assert float(cells[15]) == pytest.approx(table["estimate"]["area"][0], rel=0.06)
 
     drawn = plots.displacement_figure({"ellipse": table}, [made.scene.gait]).axes[0]
-    bars = [c for c in drawn.collections if hasattr(c, "get_segments")]
-    halves = [[np.ptp(s[:, 1]) / 2 for s in c.get_segments()] for c in bars]
-    np.testing.assert_allclose(halves, [table["estimate"][tier] for tier in ("area", "path", "direct")], rtol=1e-6)
+    for shade, tier in zip(drawn.collections, ("area", "path", "direct")):
+        x, y = shade.get_paths()[0].vertices.T
+        halves = [np.ptp(y[x == a]) / 2 for a in table["amplitude"]]
+        np.testing.assert_allclose(halves, table["estimate"][tier], rtol=1e-6)
     assert drawn.get_ylabel() == "x per cycle (m)"
 
     over = {"gait.amplitude": [0.5, 1.0], "medium.C": [1.5]}

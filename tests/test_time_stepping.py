@@ -368,7 +368,7 @@ def test_estimates_cover_what_pieces_leave(kind, seeds, truths):
 @pytest.mark.soak
 @pytest.mark.timeout(3000)
 def test_estimates_cover_what_pieces_leave_of_many_random_chains():
-    """60 scenes of three amplitudes; the row in geomech/studies/README.md has the first four of each kind."""
+    """60 scenes of three amplitudes; the row in .docs/validation.md has the first four of each kind."""
     found, at_once = {}, lambda _, compute, *question: compute(*question)
     for kind in ("transient", "disturbed", "depth"):
         for k in range(20):
@@ -674,7 +674,7 @@ def test_fast_spinning_heavy_bodies_are_solved():
 @pytest.mark.soak
 @pytest.mark.parametrize("backend", ["numpy", "numba"])
 def test_two_hundred_thousand_steps_of_random_marches(backend):
-    """800 marches of eight gaits, two cycles each, to 1e-10: prints a row of rft/README.md."""
+    """800 marches of eight gaits, two cycles each, to 1e-10: prints a row of .docs/validation.md."""
     rng, residuals, failures = np.random.default_rng(2026), [], 0
     for _ in range(800):
         medium, body, alpha, alphadot, effects = random_march(rng)

@@ -8,13 +8,20 @@ import typer
 
 from geomech.commands.loading import load_scene
 from geomech.commands.options import (
+    CURVES,
+    ComponentOption,
+    DataOption,
     ExtentOption,
     GridOption,
     JsonOption,
+    MediumOption,
     PlotOption,
     SceneArgument,
     YesOption,
     amplitude_kind,
+    components,
+    measurements,
+    refuse_without_figure,
     spread,
     with_workers,
 )
@@ -32,15 +39,20 @@ def displacement(
     effort: Annotated[bool, typer.Option("--effort", help="add path length, work and cost of transport")] = False,
     as_json: JsonOption = False,
     plot: PlotOption = None,
+    component: ComponentOption = None,
+    data: DataOption = None,
+    medium: MediumOption = None,
     yes: YesOption = False,
 ):
     """Compute the displacement of a gait by each tier. x, y and theta after a cycle from phase t = 0, each with an
     estimated error."""
     from geomech.studies.displacement import displacement
 
-    scene = load_scene(name, grid, extent)
+    refuse_without_figure(plot, component=component, data=data)
+    scene = load_scene(name, grid, extent, medium)
     values = spread("--amplitudes", amplitudes, amplitude_kind(scene))
+    panels = components(component, CURVES)
+    options = {"components": panels, "data": measurements(data, scene, panels)}
     question = displacement(scene, values, tiers, tol, effort)
-    execute(
-        question, Output(plot, drawing("pictures.displacement"), drawing("pictures.check")), as_json=as_json, yes=yes
-    )
+    figure = Output(plot, drawing("pictures.displacement", **options), drawing("pictures.check"))
+    execute(question, figure, as_json=as_json, yes=yes)

@@ -36,13 +36,13 @@ class Output:
     folder: bool = False
 
 
-def drawing(function: str) -> Callable:
-    """Return a function of a module of `geomech.output`, such as "pictures.sweep", imported at its first call: a command
-    without pictures loads nothing that draws."""
+def drawing(function: str, **options: Any) -> Callable:
+    """Return a function of a module of `geomech.output`, such as "pictures.sweep", with some arguments by keyword, imported at
+    its first call: a command without pictures loads nothing that draws."""
     module, name = function.split(".")
 
     def call(*arguments: Any) -> Any:
-        return getattr(import_module(f"geomech.output.{module}"), name)(*arguments)
+        return getattr(import_module(f"geomech.output.{module}"), name)(*arguments, **options)
 
     return call
 

@@ -89,7 +89,9 @@ class Gait:
 
     def largest(self, amplitudes=None) -> float:
         """Return the largest of its shape variables in size, at 32 phases, for amplitudes (B...) or the gait's own."""
-        return float(np.abs(self.shape(np.linspace(0.0, 2 * np.pi, 32), amplitudes)).max(initial=0.0))
+        a = real_array("amplitudes", self.amplitude if amplitudes is None else amplitudes).ravel()
+        ends = a[[a.argmin(), a.argmax()]] if a.size else a  # between them no shape is further from the middle
+        return float(np.abs(self.shape(np.linspace(0.0, 2 * np.pi, 32), ends)).max(initial=0.0))
 
     def rate(self, t, amplitudes=None) -> np.ndarray:
         """Return d alpha / dt, shaped like `shape`."""

@@ -109,6 +109,19 @@ def quantity(name: str, unit: str = "") -> str:
     return f"{name} ({unit})" if unit else name
 
 
+ENTRY = 2.2  # in, of the width of a figure for an entry of its legend
+
+
+def shared_legend(fig: Any, place: str = "outside upper center") -> None:
+    """Draw one legend for all panels of a figure, with every label once; above or below them in as many columns as fit."""
+    handles = {
+        label: line for ax in fig.axes for line, label in zip(*ax.get_legend_handles_labels()) if label.strip("_")
+    }
+    rows = len(handles) if "right" in place else -(-len(handles) // max(1, int(fig.get_figwidth() / ENTRY)))
+    if handles:
+        fig.legend(handles.values(), handles.keys(), loc=place, ncols=-(-len(handles) // rows))
+
+
 def axes_of(ax: Any, width: float = 3.4, height: float = 3.0) -> Any:
     """Return ax; without it pyplot's current Axes, where the caller has a figure of pyplot open, else new ones, of a size in
     inches, which a notebook shows."""

@@ -36,7 +36,8 @@ from geomech.tiers.base import Plan, Table, Tier, in_groups
 from rft.checks import real_array
 from rft.refusal import Refusal, located
 
-SAMPLES = 64, 4096  # amplitudes and phases that `cost` checks; `study` checks all
+FEW_PHASES = 4096  # that tell whether a gait is far from leaving the field
+SAMPLES = 64, FEW_PHASES  # amplitudes and phases that `cost` checks; `study` checks all
 
 
 class Study:
@@ -321,10 +322,23 @@ class Study:
 def refuse_outside(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int | None = None) -> None:
     """Refuse a gait, or the scene's own, that leaves the field of the tables. phases: the scene's if None."""
     system, n, gait = scene.system, scene.numerics, scene.gait if gait is None else gait
-    field, chosen = fitted.axes(system, n), gait.amplitude if amplitudes is None else amplitudes
+    field, chosen = fitted.axes(system, n), np.atleast_1d(gait.amplitude if amplitudes is None else amplitudes)
     names, phases = [name for name, _ in shape_labels(system)], phases or n.phases
+    few = max(FEW_PHASES, 64 * gait.harmonics)
+    if phases > few:
+        leaves = lambda group: _may_leave(field, *gait.cycle(few, group))[:, None]
+        chosen = chosen[in_groups(leaves, chosen, gaits_per_batch(system, few))[:, 0] > 0]
     shapes = lambda group: inside(field, gait.cycle(phases, group)[0], names)[:, 0]
     in_groups(shapes, chosen, gaits_per_batch(system, phases))
+
+
+def _may_leave(field, alpha: np.ndarray, alphadot: np.ndarray) -> np.ndarray:
+    """Return (B,), whether gaits alpha, alphadot (B, N, d) may leave the field between N phases: whether they come as near
+    to its edge as they move, at twice the fastest of their rates there, in half of the time from phase to phase."""
+    step = 2 * np.pi / alpha.shape[1]
+    margin = step * np.abs(alphadot).max(1)
+    low, high = np.array([(axis[0], axis[-1]) for axis in field]).T
+    return ((alpha.min(1) - margin < low) | (alpha.max(1) + margin > high)).any(-1)
 
 
 def _tier(name: str) -> Tier:
