@@ -307,7 +307,9 @@ def test_nobody_need_listen(tmp_path):
     ids=lambda args: " ".join(args[:2]),
 )
 def test_memory_stays_below_what_was_said(args, large):
-    code = "import atexit, resource, sys; from geomech.cli import main; memory = lambda: resource.getrusage(0).ru_maxrss; "
+    code = (
+        "import atexit, resource, sys; from geomech.cli import main; memory = lambda: resource.getrusage(0).ru_maxrss; "
+    )
     code += "atexit.register(lambda: print(memory() * 1024, file=sys.stderr)); main(sys.argv[1:])"
     done = subprocess.run([sys.executable, "-c", code, *args, "--yes"], capture_output=True, text=True)
     used = int(done.stderr.splitlines()[-1])
