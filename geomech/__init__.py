@@ -1,8 +1,8 @@
 """Geometric mechanics of locomotion: from a force law to the displacement of a gait.
 
-    study = geomech.study("three-link-glass")  # a built-in name, a TOML file, or study(medium, body, gait)
-    study.displacement([0.5, 1.0])             # a table with errors, which plots itself: .plot()
-    study.plot_ccf()                           # and study.ccf(), .animate("swim.gif"), .optimise("efficiency")
+    study = geomech.study("three-link-glass")  # or a TOML file, or study(medium, body, gait)
+    study.displacement([0.5, 1.0])            # a table with errors, which plots itself: .plot()
+    study.plot_ccf()                          # also .ccf(), .animate("swim.gif"), .optimise()
 
 study, Study, tiers, workers            what is computed of a scene; methods of prediction; processes
 optimise (or optimize), sweep, accuracy the best gait; a grid of parameters; error against time

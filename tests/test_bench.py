@@ -12,7 +12,7 @@ from geomech import scenes
 from geomech.gaits import Circle, Fourier, Sine
 from geomech.geometry import connection
 from geomech.scenes import Numerics, Scene
-from geomech.studies.study import Study
+from geomech.studies.study import Study, refuse_outside
 from geomech.systems import Solver, Swimmer
 from geomech.systems.base import length_unit
 from geomech.systems.capabilities import solver_of
@@ -196,3 +196,16 @@ kind = "circle"
 """
     short = PLAIN + '[[effects]]\nkind = "end-caps"\nradius = 0.1\n'
     assert scenes.parse(nested) == scenes.parse(short) == scenes.parse('[system]\nkind = "swimmer"' + short)
+
+
+def test_a_gait_that_leaves_the_field_between_few_phases_is_refused(monkeypatch):
+    """Its largest angle lies at phase pi / 4096, between two of 4096; far inside the field not all phases are computed."""
+    late, computed = np.pi / 4096, []
+    gait = Fourier(cos=((np.cos(late),), (0.5,)), sin=((np.sin(late),), (0.0,)), amplitude=2.5 * (1 + 1e-7))
+    refuse_outside(GLASS, gait, phases=4096)
+    with pytest.raises(Refusal, match="alpha_1 = 2.5 rad lies outside the field's -2.5 to 2.5"):
+        refuse_outside(GLASS, gait, phases=8192)
+    cycle = Fourier.cycle
+    monkeypatch.setattr(Fourier, "cycle", lambda *of: computed.append(of[1]) or cycle(*of))
+    refuse_outside(GLASS, gait, [0.5, 2.0], phases=10**6)
+    assert computed == [4096]

@@ -229,7 +229,7 @@ BACKBONE = '[medium]\nname = "coulomb"\n[body]\nkind = "backbone"\nelements = 8\
 def quick(monkeypatch):
     """`run` and `accuracy` without their numbers."""
 
-    def write(result, folder):
+    def write(result, folder, drawn=None):
         for name in (report.SCENE, report.TABLES):
             (folder / name).write_text(result.subject.text if name == report.SCENE else "{}")
 

@@ -521,6 +521,13 @@ def test_the_loop_on_the_map(stroke, cheap, short, tmp_path):
     assert share(short, "limit") > 0.15
     field, component = gained_ccf(stroke)
     assert component == 0 and field.values[0, 15, 15] == pytest.approx(-0.0204, abs=2e-4)
+    study = Study(stroke.scene).in_frame("minimum-perturbation")
+    for clim in (None, 0.01):  # sign and colours are those of the CCF in that frame
+        drawn = plots.optimum_map(stroke, clim=clim).collections[0]
+        ccf = plots.ccf_figure(study.curvature, components=("x",), clim=clim).axes[0].collections[0]
+        np.testing.assert_allclose(drawn.get_array(), ccf.get_array(), atol=1e-9)
+        np.testing.assert_allclose(drawn.get_clim(), ccf.get_clim())
+        assert drawn.cmap is ccf.cmap
     for found, name in ((short, "two.svg"), (optimise(serpenoid(), "turning", harmonics=1, starts=1), "three.png")):
         plots.save(plots.optimum_figure(found), tmp_path / name)
         assert (tmp_path / name).stat().st_size > 10_000
@@ -748,7 +755,7 @@ def test_loops_on_maps_of_all_kinds(stroke):
 
     snake = optimise(geomech.load("no-slip-snake"), harmonics=1)
     titles = [ax.get_title() for ax in plots.optimum_figure(snake).axes]
-    assert "CCF$_{x}$: forward,\nframe mean" in titles
+    assert "CCF$_{y}$: sideways,\nframe mean" in titles
     assert "singular shapes" in snake.active
     assert 0.1 < (limiting(snake, gained_ccf(snake)) == "singular").mean() < 0.5
     past = stroke.scene.changed(system=Swimmer(SAND, Chain(), (Transient(travel=0.1),)))

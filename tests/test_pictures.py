@@ -438,11 +438,49 @@ def test_a_row_of_rounding_has_no_arrows():
 
 @pytest.mark.parametrize(("name", "rows"), [("three-link-floating", [2]), ("differential-drive", [1])])
 def test_what_is_nothing_but_rounding_is_drawn_as_nothing(name, rows):
-    """No patterns of 1e-16, no hatching over them; the strip of a motion shows what there is."""
+    """No patterns of 1e-16, no hatching over them; left out with a word unless it is asked for."""
     study = Study(scenes.load(name).with_numerics(grid=9, phases=16))
-    made = plots.ccf_figure(study.curvature, [study.scene.gait], error=study.curvature_error)
+    draw = lambda **options: plots.ccf_figure(
+        study.curvature, [study.scene.gait], error=study.curvature_error, **options
+    )
+    made = draw(components=("x", "y", "theta"))
     for k in range(3):
         colours = np.asarray(made.axes[k].collections[0].get_array())
         assert (np.abs(colours).max() > 1e-3) == (k in rows)
-        assert k in rows or made.axes[k].get_legend() is None
         assert ([x.get_text() for x in made.axes[3 + k].get_yticklabels()] == ["0"]) == (k not in rows)
+    assert not made.get_supxlabel()
+    made = draw()
+    titles = [ax.get_title() for ax in made.axes if ax.get_title()]
+    assert [title.partition("$: ")[2] for title in titles] == [("forward", "sideways", "turning")[k] for k in rows]
+    assert made.get_supxlabel().endswith(": zero everywhere")
+    assert made.get_supxlabel().count("CCF") == 3 - len(rows)
+
+
+def test_colours_have_a_limit():
+    """A number or a percentile of the size; arrows of the bar say where there is more. One legend for all panels."""
+    values = np.stack([SHAPES[0], 2 * SHAPES[1], SHAPES[0] + 9])
+    field, error = Field(AXES, values), Field(AXES, np.where(SHAPES[1] > 1.2, 50.0, 1e-3) * np.ones((3, 1, 1)))
+    limits = lambda **o: [
+        only(ax, QuadMesh).get_clim()[1] for ax in plots.ccf_figure(field, **o).axes[: len(o["components"])]
+    ]
+    assert limits(components=("theta", "x"), clim=0.25) == [0.25, 0.25]
+    expected = [np.percentile(np.abs(x), 90) for x in values]
+    np.testing.assert_allclose(limits(components=("x", "y", "theta"), clim="90%"), expected)
+    for clim, ends in ((None, "neither"), (1.2, "max"), (0.5, "both")):
+        bar = only(plots.ccf_figure(field, components=("x",), clim=clim).axes[0], QuadMesh).colorbar
+        assert bar.extend == ends
+    fig = plots.ccf_figure(field, error=error)
+    assert [t.get_text() for legend in fig.legends for t in legend.get_texts()] == [plots.HATCHED]
+    assert not any(ax.get_legend() for ax in fig.axes)
+
+
+def test_components_choose_rows_of_the_connection():
+    A = np.random.default_rng(1).normal(size=(3, 2, 11, 9))
+    A[1] = 0.0
+    fitted = Connection(AXES, A, np.abs(A[:, 0]), np.abs(A[:, 0]))
+    titles = lambda **o: [
+        ax.get_title().partition("$: ")[2] for ax in plots.connection_figure(fitted, **o).axes if ax.get_title()
+    ]
+    assert titles() == ["forward", "turning"]
+    assert titles(components=("y", "theta")) == ["sideways", "turning"]
+    assert plots.connection_figure(fitted).get_supxlabel() == r"$\mathbf{A}^{y}$: zero everywhere"

@@ -354,8 +354,8 @@ def test_a_run_of_three_joints_has_its_field_and_all_slices(tmp_path, monkeypatc
     drawn, scene = {}, Scene(system, LOOP, Numerics(grid=5, extent=1.2, phases=32))
     monkeypatch.setattr(report, "_save", lambda fig, stem: drawn.update({stem.name: fig}))
     for name in ("plane_connection_figure", "planes_figure"):
-        monkeypatch.setattr(report.plots, name, lambda planes, *gait, labels: [one.pair for one in planes])
-    monkeypatch.setattr(report.plots, "displacement_figure", lambda tables, *told: [*tables])
+        monkeypatch.setattr(report.plots, name, lambda planes, *gait, **options: [one.pair for one in planes])
+    monkeypatch.setattr(report.plots, "displacement_figure", lambda tables, *told, **options: [*tables])
     found = Report(scene).ask()
     report.write(found, tmp_path)
     pairs = [(0, 1), (0, 2), (1, 2)]

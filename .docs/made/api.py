@@ -10,6 +10,7 @@ from pathlib import Path
 PACKAGES = {
     "From scene to result": [
         "geomech",
+        "geomech.app",
         "geomech.scenes",
         "geomech.studies.study",
         "geomech.gaits",

@@ -1,7 +1,7 @@
 """Blocks of code that the build runs.
 
 On any page, ```LANGUAGE FILE is a file of that name, and the commands of a block ```console, `$ ` before each, are run in
-the folder of the page's files and followed by what they print. On a page of the gallery the commands of a block ```sh and
+the folder of the page's files, after its programs, and followed by what they print. On a page of the gallery the commands of a block ```sh and
 the programs of a block ```python are run as well, the picture of the command is shown, and the scene is added.
 """
 
@@ -46,6 +46,8 @@ def _shown(block: re.Match, folder: Path) -> str:
     language, name, code = block.groups()
     if name:
         (folder / name).write_text(code)
+    if language == "python":
+        run(code, folder, program=True)
     if language != "console":
         return block[0]
     lines = []
@@ -81,14 +83,15 @@ class Example:
     @property
     def scene(self) -> str:
         """The scene file of the command, or ""."""
-        for _, code in [self.blocks[language] for language in ("toml", "csv") if language in self.blocks]:
-            return code
+        for language in {"toml", "csv"} & {*self.blocks}:
+            return self.blocks[language][1]
         words = self.blocks["sh"][1].split()
         return run(f"geomech scenes --show {words[2]}", ROOT) if words[1] not in ("stress", "fit-medium") else ""
 
     def markdown(self) -> str:
         """Return the section of the site."""
-        tabs = {"Command": ("sh", self.blocks["sh"][1]), "Scene": ("toml", self.scene)}
+        data = "Data" if "csv" in self.blocks else "Scene"
+        tabs = {"Command": ("sh", self.blocks["sh"][1]), data: ("toml" if data == "Scene" else "text", self.scene)}
         tabs["Python"] = ("python", self.blocks["python"][1])
         items = [f":::{{tab-item}} {title}\n```{language}\n{code.strip()}\n```\n:::"
                  for title, (language, code) in tabs.items() if code]  # fmt: skip

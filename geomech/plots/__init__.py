@@ -108,3 +108,7 @@ __all__ = [
     "work_precision",
     "work_precision_figure",
 ]  # fmt: skip
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -193,9 +193,22 @@ def _ccf_rows(rows: Sequence[Row], style: str, metric, names: Sequence[str], sam
                     ax.plot(*shadow.shape(PHASES).T, ax.get_zlim()[0], "--", color="black", lw=1.0)
                 else:
                     draw_gait(shadow, ax, within=r.field.axes, line="--")
+    if style == "map":
+        _one_legend(fig, axes)
     say_left_out(fig, panels, components, ccf_name, *([SHADOW] if any(r.shadows for r in rows) else []))
     _name(axes, names)
     return fig
+
+
+def _one_legend(fig, axes) -> None:
+    """Put the legends of maps, which explain the same, into one below them."""
+    handles = {}
+    for ax in axes.flat:
+        if (legend := ax.get_legend()) is not None:
+            handles |= {h.get_label(): h for h in legend.legend_handles}
+            legend.remove()
+    if handles:
+        fig.legend(handles=[*handles.values()], loc="outside lower center", ncols=len(handles))
 
 
 def _name(axes, names: Sequence[str]) -> None:

@@ -27,6 +27,7 @@ RINGS = "joint rates of equal cost"
 SHORT = 0.06  # of the map's width: a shorter bit of a line of zeros is no line
 PATCH = 6  # points of one
 FINER = 4  # points of a line for each of the grid
+ARROWS, LONGEST = 13, 1.5  # arrows along an axis; the longest, in units of their distance
 FINEST = 400  # grid points along an axis of a map: about the dots of its picture
 
 
@@ -53,7 +54,7 @@ def vector_field(
 
     labels: as for `shape_space`. top: of the colours and of the arrows' scale, for maps that are compared."""
     ax = axes_of(ax)
-    step = every or max(1, round(len(connection.axes[0]) / 13))
+    step = every or max(1, round(len(connection.axes[0]) / ARROWS))
     pick = slice(step // 2, None, step)
     x, y = np.meshgrid(*(a[pick] for a in connection.axes), indexing="ij")
     u, v = (connection.A[component, k][pick, pick] for k in (0, 1))
@@ -63,23 +64,28 @@ def vector_field(
     if np.isnan(size).any():  # beside singular shapes arrows are cut
         cut = np.fmin(1.0, largest(size) / np.fmax(size, 1e-300))
         u, v, size = cut * u, cut * v, cut * size
-    most = np.nanmax(size, initial=0.0)
-    scale = {"scale": None if most else 1.0}
-    if top:
-        scale = {
-            "scale": top / (1.4 * step * np.ptp(connection.axes[0]) / len(connection.axes[0])),
-            "scale_units": "xy",
-        }
-    arrows = ax.quiver(x, y, u, v, size, cmap="viridis", pivot="mid", width=0.007, **scale)
-    arrows.set_clim(0.0, top or most or 1.0)
+    most = top or np.nanmax(size, initial=0.0) or 1.0
+    spacing = step * max(np.ptp(a) / max(1, len(a) - 1) for a in connection.axes)
+    look = {"cmap": arrow_colours(), "pivot": "mid", "width": 0.0085, "headwidth": 3.6, "headlength": 4.0}
+    look |= {"headaxislength": 3.6, "minshaft": 1.6, "minlength": 0.8, "scale_units": "xy"}
+    arrows = ax.quiver(x, y, u, v, size, scale=most / (LONGEST * spacing), **look)
+    arrows.set_clim(0.0, most)
     return label_row(ax, arrows, component, connection, labels)
+
+
+def arrow_colours():
+    """Return a colour map whose ends are both seen on white, light to dark."""
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+
+    return ListedColormap(colormaps["viridis"](np.linspace(0.86, 0.0, 256)), "arrows")
 
 
 def label_row(ax, arrows, component: int, connection: Connection, labels: Labels):
     """Set title, colour bar and axes of a map of a row of A."""
     ax.set_title(f"{row_name(component)}: {TITLES[component]}")
     colorbar = ax.figure.colorbar(arrows, ax=ax, shrink=0.85)
-    colorbar.set_label(f"|{row_name(component)}| ({unit_of(component, connection.unit)}/{labels[0][1]})")
+    colorbar.set_label(f"|{row_name(component)}| ({unit_of(component, connection.unit)}/{labels[0][1]})", labelpad=8)
     return shape_space(ax, connection.axes, labels)
 
 

@@ -35,7 +35,7 @@ def optimum_map(optimum: Optimum, ax=None, gained: Gained | None = None, clim: f
     loop alone.
 
     clim: as for `ccf_figure`."""
-    ax, system = axes_of(ax), optimum.scene.system
+    ax, system = axes_of(ax, 4.4, 4.4), optimum.scene.system
     if system.traits.steps:
         shape_space(ax, [np.linspace(-1, 1, 2) * optimum.scene.numerics.extent] * 2, shape_labels(system))
         ax.set_title("no CCF: the velocity does not follow\nfrom shape alone")
@@ -98,7 +98,7 @@ def draw_limited(ax, curve: np.ndarray, kinds: np.ndarray, nonlinear: bool = Fal
 @styled
 def optimum_angles(optimum: Optimum, ax=None):
     """Draw the shape variables of the best gait over a cycle, and the limits."""
-    ax, gait = axes_of(ax), optimum.gait
+    ax, gait = axes_of(ax, 4.0, 3.4), optimum.gait
     t = np.linspace(0, 2 * np.pi, PHASES)
     names = shape_labels(optimum.scene.system)
     step = max(1, gait.joints // 6)

@@ -39,3 +39,10 @@ def medium(result: Result) -> str:
 
 def _module(result: Result) -> Any:
     return import_module(f"geomech.text.{result.kind}")
+
+
+__all__ = ["medium", "numbers", "text"]
+
+
+def __dir__() -> list[str]:
+    return __all__
