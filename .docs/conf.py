@@ -8,7 +8,7 @@ HERE = Path(__file__).parent
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", NO_COLOR="1")
 sys.path[:0] = [str(HERE), str(HERE.parent)]  # the extensions of this folder; `figures` is no package of the wheel
 
-import geomech
+import geomech  # noqa: E402
 
 project = "geomech"
 author = "the geomech maintainers"

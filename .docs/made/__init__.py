@@ -9,7 +9,15 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from . import api, conventions, examples, figures, keys, command_line, validation
+from . import api, command_line, conventions, examples, figures, keys, validation
+
+
+def notebooks() -> str:
+    """Return the tree of contents of all notebooks, or that there are none."""
+    folder = Path(__file__).parents[1] / "notebooks"
+    names = sorted(path.stem for path in folder.glob("*.md") if path.stem != "index")
+    return "```{toctree}\n" + "\n".join(names) + "\n```" if names else "There are none yet."
+
 
 MADE = {
     "alpha": conventions.drawing,
@@ -17,6 +25,7 @@ MADE = {
     "commands": command_line.page,
     "figures": figures.page,
     "keys": keys.page,
+    "notebooks": notebooks,
     "thumbnails": examples.thumbnails,
     "validation": validation.table,
 }
