@@ -15,10 +15,10 @@ author = "the geomech maintainers"
 project_copyright = "the geomech maintainers"
 version = release = geomech.__version__
 language = "en_GB"
+smartquotes = False  # `--option` is no dash
 
 extensions = [
     "sphinx.ext.autodoc",
-    "sphinx.ext.autosummary",
     "numpydoc",
     "myst_nb",
     "sphinx_design",
@@ -30,8 +30,7 @@ nitpicky = True
 nitpick_ignore_regex = [("py:.*", ".*")]  # types in signatures; links of prose are checked by MyST, glossary terms here
 default_role = "code"
 
-autosummary_generate = False
-autodoc_default_options = {"members": True, "member-order": "bysource", "show-inheritance": False}
+autodoc_default_options = {"members": True, "member-order": "bysource"}
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"
 autodoc_class_signature = "mixed"
@@ -54,13 +53,16 @@ html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_show_sourcelink = False
 html_copy_source = False
+ALONE = ("index", "start", "tiers", "validation", "glossary", "changelog", "citing")
+html_sidebars = {page: [] for page in ALONE}
 html_context = {"default_mode": "light"}
 html_theme_options = {
     "logo": {"text": "geomech"},
     "navigation_with_keys": False,
     "show_prev_next": False,
     "navbar_align": "left",
-    "header_links_before_dropdown": 8,
+    "header_links_before_dropdown": 10,
+    "show_toc_level": 2,
     "secondary_sidebar_items": ["page-toc"],
     "footer_start": ["copyright"],
     "footer_end": [],

@@ -54,4 +54,6 @@ def setup(app) -> dict[str, bool]:
     app.connect("builder-inited", compute)
     app.connect("source-read", fill_in)
     app.connect("autodoc-process-docstring", api.readable, priority=400)  # before numpydoc
+    app.connect("autodoc-process-docstring", api.with_parameters, priority=401)
+    app.connect("autodoc-process-signature", api.plain_types)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
