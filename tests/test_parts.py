@@ -187,7 +187,7 @@ def test_what_was_loaded_is_in_its_registry_and_in_scenes(folder):
         again = library.toml(scene.changed(text="", numerics=Numerics(grid=8, phases=32)))
         assert library.toml(parse(again)) == again
         study = Study(scene)
-        assert np.isfinite(study.study([0.3], study.methods)["direct"]).all() and "leading" in study.tiers
+        assert np.isfinite(study.study([0.3])["direct"]).all() and "leading" in study.tiers
     assert library.load(folder / "skate.toml").changed(grip=0.7).system.wrapped.grip == 0.7
     assert tables.load(folder / "own.json").length == 0.5
 
@@ -222,10 +222,10 @@ def test_five_members_and_functions_go_through_everything(system, tmp_path):
         found = np.hypot(*(np.array(table[tier]) - truth).T[:2])
         assert (found <= 1e-9 + np.array(table["estimate"][tier])).all(), tier
     framed = study.in_frame("minimum-perturbation")
-    assert framed.displacement("direct", None, [0.5]).shape == (1, 3)
+    assert framed.poses("direct", None, [0.5]).shape == (1, 3)
     with pytest.raises(Refusal, match="has one frame, 'mean'"):
         study.in_frame("link-1")
-    found = optimise(scene, harmonics=1, within=1.2)
+    found = optimise(scene, harmonics=1, limits=1.2)
     assert found.value > np.hypot(*truth[-1, :2])
     plots.save(plots.displacement_figure({"circle": table}, [scene.gait]), tmp_path / "a.png")
     plots.save(plots.ccf_figure(study.curvature), tmp_path / "b.png")

@@ -13,6 +13,7 @@ from rft.checks import number_fields
 PACKAGES = {
     "From scene to result": [
         "geomech",
+        "geomech.app",
         "geomech.scenes",
         "geomech.studies.study",
         "geomech.gaits",

@@ -40,7 +40,7 @@ def viscous_geometry():
     )
     moved = area(curvature, Circle(), [1.0])[0]
     yield "the same: area integral over the circle of 1 rad", source, _(np.hypot(*moved[:2]), 4), "0.0510"
-    net = study.displacement("direct", Circle(), [1.0])[0]
+    net = study.poses("direct", Circle(), [1.0])[0]
     yield (
         "the same circle: net distance by the balance of forces",
         "a separate program",
@@ -97,7 +97,7 @@ def waves():
     yield ("snake on the surface of 0.3 mm glass, endless wave of 48.4 degrees: speed over speed along its track",
            "animals of Schiebel et al., eLife 9, e51412 (2020)", _(speed, 3), "0.81 (0.74 to 0.89)")  # fmt: skip
     study = geomech.Study(geomech.load("seven-link-wave"))
-    net = np.hypot(*study.displacement("direct")[:2])
+    net = np.hypot(*study.poses("direct")[:2])
     yield ("robot of seven segments in 6 mm grains: displacement a cycle over the length of its wave, 0.757 BL",
            "experiment of Maladen et al. (2011)", _(net / 0.757, 2), "0.34 +- 0.02")  # fmt: skip
 

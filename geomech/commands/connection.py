@@ -10,6 +10,7 @@ import typer
 from geomech.commands import formats
 from geomech.commands.loading import load_scene
 from geomech.commands.options import (
+    ComponentOption,
     ExtentOption,
     GridOption,
     OtherFrameOption,
@@ -19,6 +20,7 @@ from geomech.commands.options import (
     SliceOption,
     YesOption,
     angles,
+    components,
     with_workers,
 )
 from geomech.commands.pipeline import Output, execute
@@ -37,6 +39,7 @@ def connection(
     pair: PairOption = None,
     slice_: SliceOption = None,
     other_frame: OtherFrameOption = None,
+    component: ComponentOption = None,
     yes: YesOption = False,
 ):
     """Compute the local connection on a grid, as a file. A NetCDF file has the fit residual and the CCF, too; a .mat
@@ -45,7 +48,7 @@ def connection(
     from geomech.studies.shape_space import connection
 
     file = parts.Connection(out.suffix, sign, order)
-    drawn = pictures.Connection(style, plot, pair, slice_, other_frame)
+    drawn = pictures.Connection(style, plot, pair, slice_, other_frame, components(component))
     scene = load_scene(name, grid, extent)
     question = connection(scene, file.matlab, plot is not None, pair, angles(scene, "--slice", slice_), other_frame)
     outputs = Output(out, file, formats.netcdf_or_matlab), Output(plot, drawn, pictures.check)

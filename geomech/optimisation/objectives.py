@@ -1,4 +1,4 @@
-"""Aims of an optimisation: a number of a cycle that should be as large as possible, with its slopes."""
+"""Objectives of an optimisation: a number of a cycle that should be as large as possible, with its slopes."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from geomech.optimisation.cycles import CycleValues
 from rft.checks import in_range
 from rft.refusal import Refusal
 
-AIMS = ("displacement", "efficiency", "turning", "speed")
+OBJECTIVES = ("displacement", "efficiency", "turning", "speed")
 DIRECTIONS = ("x", "y")
 TINY = 1e-9  # body lengths: smaller distances count as 0
 
 
 @dataclass(frozen=True)
-class Aim:
+class Objective:
     """A number of a cycle to be maximised.
 
     displacement: net distance of a cycle over the body's length, or its component along an axis of the body frame as
@@ -25,7 +25,7 @@ class Aim:
     turning: net angle of a cycle, rad. efficiency: displacement over the length of the path. speed: displacement over
     the least time of a cycle.
 
-    name: one of AIMS. direction: "x" or "y", or "" for the net distance. length: of the body. For speed, rate: the
+    name: one of OBJECTIVES. direction: "x" or "y", or "" for the net distance. length: of the body. For speed, rate: the
     largest rate of any shape variable, rad per unit of time; power: the largest mean power, in the body's axial drag x
     body length / time."""
 
@@ -36,7 +36,7 @@ class Aim:
     power: float | None = None
 
     def __post_init__(self):
-        choose("--objective", self.name, AIMS)
+        choose("--objective", self.name, OBJECTIVES)
         if not (isinstance(self.direction, str) and self.direction == ""):
             choose("--direction", self.direction, DIRECTIONS)
             if self.name == "turning":
@@ -47,14 +47,14 @@ class Aim:
                 if self.name != "speed":
                     raise Refusal(f"--{name} limits speed", instead="say --objective speed, or drop it")
 
-    straight = property(lambda self: self.name != "turning", doc="Whether the aim is a distance, not an angle.")
+    straight = property(lambda self: self.name != "turning", doc="Whether the objective is a distance, not an angle.")
     costs = property(
         lambda self: self.name == "efficiency" or self.power is not None, doc="Whether the value depends on power."
     )
     timed = property(lambda self: self.name == "speed", doc="Whether the value depends on the time of a cycle.")
     unit = property(
         lambda self: {"turning": "rad per cycle", "speed": "BL/s"}.get(
-            self.name, "BL per cycle" if self.name == "displacement" else "BL per unit of path length"
+            self.name, "BL per cycle" if self.name == "displacement" else "BL/BL"
         )
     )
 
