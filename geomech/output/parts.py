@@ -31,7 +31,7 @@ class Connection:
         for option, word, known in (("--sign", self.sign, SIGNS), ("--order", self.order, ORDERS)):
             if word is not None:
                 choose(option, word, known)
-                if self.ending == ".nc":
+                if self.ending in ("", ".nc"):
                     raise Refusal(f"{option} is that of a .mat file", instead="drop it, a .nc file says what it has")
 
     @property
