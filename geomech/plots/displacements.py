@@ -39,7 +39,8 @@ def displacement(
         if name in table:
             title = f"{label}, {tier.label}" if label else tier.label
             values = of_pose(table[name])[quantity]
-            ax.plot(amplitudes, values, label=title, **{**tier.style, **style})
+            broad = {"ms": 2 * tier.style.get("linewidth", 1.5)} if len(amplitudes) == 1 else {}  # one point is no line
+            ax.plot(amplitudes, values, label=title, **{**tier.style, **broad, **style})
             if errors:
                 _error_band(ax, amplitudes, values, error_of(table, quantity, name), tier.colour)
     if errors:
