@@ -140,7 +140,7 @@ SCENES = {
 def test_a_cycle_ends_where_the_direct_tier_says(name):
     scene = SCENES[name]
     n = scene.numerics.phases
-    net = Study(scene).displacement("direct")
+    net = Study(scene).poses("direct")
     one, two = moving.motion(scene), moving.motion(scene, 2)
     np.testing.assert_allclose(one.pose[-1], net, atol=1e-13)
     np.testing.assert_allclose(two.pose[:n], one.pose[:n], atol=1e-13)

@@ -137,7 +137,7 @@ def test_what_is_told_is_what_the_scene_does(cheap):
     scene = parse(optima.scene_toml(result_of(cheap)))
     assert scene.gait == cheap.gait
     assert scene.gait.amplitude == 1.0
-    net = Study(scene).displacement("direct", amplitudes=[1.0])[0]
+    net = Study(scene).poses("direct", amplitudes=[1.0])[0]
     assert net == pytest.approx(cheap.best.displacement, abs=1e-12)
     alpha, alphadot = scene.gait.cycle(256)
     power = scene.system.work(alpha, alphadot, scene.system.velocity(alpha, alphadot)).power
@@ -145,7 +145,7 @@ def test_what_is_told_is_what_the_scene_does(cheap):
     assert cheap.best.length == pytest.approx(length, rel=1e-10)
     assert cheap.best.work == pytest.approx(2 * np.pi * power.mean(), rel=1e-10)
     assert cheap.value == pytest.approx(np.hypot(*net[:2]) / length, rel=1e-10)
-    Study(scene).displacement("area", amplitudes=[1.0])  # its field holds it
+    Study(scene).poses("area", amplitudes=[1.0])  # its field holds it
     assert scene.numerics.extent == 2.5  # and is no larger than need be
     numbers = json.loads(json.dumps(optima.numbers(result_of(cheap))))
     assert list(numbers) == [
@@ -243,14 +243,14 @@ def short():
 def test_limits_hold_and_are_named(short):
     assert set(short.active) == {"alpha_1 >= -1.2", "alpha_1 <= 1.2", "alpha_2 >= -1.2", "alpha_2 <= 1.2"}
     assert np.abs(short.gait.cycle(2000)[0]).max() <= 1.2 + 1e-9
-    best_circle = np.hypot(*Study(viscous()).displacement("direct", Circle(), [1.2])[0, :2])
+    best_circle = np.hypot(*Study(viscous()).poses("direct", Circle(), [1.2])[0, :2])
     assert short.value > best_circle
 
 
 def test_a_start_beyond_the_limit_is_drawn_together(capsys):
     found = optimise(viscous(), limits=0.6)
     assert "its gait reaches beyond 0.6" in capsys.readouterr().err
-    small = np.hypot(*Study(viscous()).displacement("direct", Circle(), [0.6])[0, :2])
+    small = np.hypot(*Study(viscous()).poses("direct", Circle(), [0.6])[0, :2])
     assert found.start.value == pytest.approx(small, rel=1e-3)
     assert found.value > small
 
@@ -376,7 +376,7 @@ def test_waves_of_a_long_body():
     assert found.value > 1.5 * found.start.value
     assert isinstance(found.gait, Sine)
     rough = [
-        np.hypot(*Study(scene).displacement("direct", Sine(amplitude=a, waves=w, elements=24), [a])[0, :2])
+        np.hypot(*Study(scene).poses("direct", Sine(amplitude=a, waves=w, elements=24), [a])[0, :2])
         for a in (0.2, 0.4, 0.6) for w in (0.8, 1.0, 1.4)
     ]  # fmt: skip
     assert found.value >= max(rough)

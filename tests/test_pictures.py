@@ -19,7 +19,6 @@ from geomech.plots.precision import PANELS
 from geomech.scenes.measurements import read
 from geomech.studies.study import Study
 from geomech.studies.tiered import KNOBS
-from geomech.studies.zeros import zero_by_symmetry
 from geomech.systems.base import shape_labels
 from geomech.tiers import TIERS
 from rft.refusal import Refusal
@@ -282,19 +281,6 @@ def test_panels_that_are_zero_are_left_out_with_a_reason():
     assert titles(fig) == ["heading", "x"] and not fig.get_supxlabel()
     with pytest.raises(Refusal, match="component: 'z' is unknown"):
         plots.displacement_figure({"a": shift}, [Circle()], components=("z",))
-
-
-@pytest.mark.parametrize(
-    "name", ["three-link-glass", "butterfly-glass", "seven-link-wave", "no-slip-snake", "sandfish-loose"]
-)
-def test_what_is_zero_by_symmetry_is_zero(name):
-    """And with a phase, a centre or a body that breaks the symmetry it is not said to be."""
-    scene = scenes.load(name).with_numerics(phases=64)
-    zero = zero_by_symmetry(scene.system, scene.gait)
-    (pose,) = Study(scene).study([scene.gait.amplitude], ["direct"])["direct"]
-    assert [abs(dict(zip(("x", "y", "heading"), pose))[q]) < 1e-12 for q in zero] == [True] * len(zero)
-    assert ("y" in zero) == (name in ("butterfly-glass", "seven-link-wave")) and "x" not in zero
-    assert not zero_by_symmetry(scene.system, Ellipse(centre=(0.2, 0.5), tilt=0.3))
 
 
 @pytest.mark.parametrize(

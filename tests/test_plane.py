@@ -142,7 +142,7 @@ def test_the_spread_is_that_of_another_surface():
         found.append(se2.exp(2 * np.pi * total / 40))
     apart = max(np.hypot(*(x - found[-1])[:2]) for x in found)
     assert study.spread("area", amplitudes=sizes)[0, 0] == pytest.approx(apart, rel=0.02)
-    np.testing.assert_allclose(study.displacement("area", amplitudes=sizes)[0], found[-1], atol=3e-4)
+    np.testing.assert_allclose(study.poses("area", amplitudes=sizes)[0], found[-1], atol=3e-4)
 
 
 def test_commands_tell_the_surface_and_draw_slices(tmp_path):
@@ -254,7 +254,7 @@ def test_beyond_the_field_tiers_solve_around_the_gait(monkeypatch):
     assert around["surface_spread"]["area"] == pytest.approx(found["surface_spread"]["area"], rel=0.3)  # fewer surfaces
     jobs = study.cost(*asked)
     assert jobs.balances >= study.plan("path").balances(2, 256) == 2 * 256 * 64
-    assert study.displacement("area").shape == study.displacement("path").shape == (3,)
+    assert study.poses("area").shape == study.poses("path").shape == (3,)
 
 
 def test_the_integral_by_stokes_is_that_of_the_two_form():

@@ -9,6 +9,7 @@ import typer
 from geomech.commands.loading import load_scene
 from geomech.commands.options import (
     CURVES,
+    AllOption,
     ComponentOption,
     DataOption,
     ExtentOption,
@@ -37,6 +38,7 @@ def displacement(
     extent: ExtentOption = None,
     tol: Annotated[Optional[float], typer.Option(help="error in body lengths that the cheapest tier must meet")] = None,
     effort: Annotated[bool, typer.Option("--effort", help="add path length, work and cost of transport")] = False,
+    everything: AllOption = False,
     as_json: JsonOption = False,
     plot: PlotOption = None,
     component: ComponentOption = None,
@@ -55,4 +57,4 @@ def displacement(
     options = {"components": panels, "data": measurements(data, scene, panels)}
     question = displacement(scene, values, tiers, tol, effort)
     figure = Output(plot, drawing("pictures.displacement", **options), drawing("pictures.check"))
-    execute(question, figure, as_json=as_json, yes=yes)
+    execute(question, figure, as_json=as_json, yes=yes, everything=everything)

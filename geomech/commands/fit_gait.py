@@ -9,7 +9,7 @@ import typer
 
 from geomech.commands import formats
 from geomech.commands.options import JsonOption, PlotOption, an_angle, column_names
-from geomech.commands.pipeline import Output, execute
+from geomech.commands.pipeline import Output, drawing, execute
 
 
 def fit_gait(
@@ -48,8 +48,9 @@ def fit_gait(
     """Fit the connection near a measured gait. The regression gives phase, mean gait and A with intervals; the
     predicted displacement is compared with the log's."""
     from geomech.measured.results import Fit
-    from geomech.output import parts, pictures
+    from geomech.output import parts
 
     question = Fit(log, column_names(columns), degrees, level, harmonics, limits, body_length)
-    field, figure = Output(out, parts.write_tube, formats.netcdf), Output(plot, pictures.measured, pictures.check)
+    field = Output(out, parts.write_tube, formats.netcdf)
+    figure = Output(plot, drawing("pictures.measured"), drawing("pictures.check"))
     execute(question, field, Output(scene, *parts.mean_gait(out)), figure, as_json=as_json)

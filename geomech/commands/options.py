@@ -46,6 +46,7 @@ FolderOption = Annotated[
     Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results", parser=folder)
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON and nothing else")]
+AllOption = Annotated[bool, typer.Option("--all", help="print every tier and amplitude, net distances and seconds")]
 YesOption = Annotated[bool, typer.Option("--yes", help="compute even for more than a minute, or in more than 2 GB")]
 
 

@@ -11,6 +11,7 @@ import typer
 from geomech.commands.loading import load_scene
 from geomech.commands.names import scene_names
 from geomech.commands.options import (
+    AllOption,
     ClimOption,
     ComponentOption,
     DataOption,
@@ -39,6 +40,7 @@ def run(
     component: ComponentOption = None,
     clim: ClimOption = None,
     data: DataOption = None,
+    everything: AllOption = False,
     yes: YesOption = False,
 ):
     """Compute connection, CCF and displacements into a folder. Displacements are drawn against amplitude."""
@@ -48,4 +50,4 @@ def run(
     question, panels = Report(load_scene(name, medium=medium)), components(component)
     drawn = report.Drawn(panels, colour_limit(clim, panels), measurements(data, question.scene, panels))
     write, check = partial(report.write, drawn=drawn), partial(report.refuse_folder, question.scene)
-    execute(question, Output(out, write, check, report.files, True), yes=yes)
+    execute(question, Output(out, write, check, report.files, True), yes=yes, everything=everything)

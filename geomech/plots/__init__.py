@@ -29,7 +29,7 @@ from geomech.plots.maps import (
 )
 from geomech.plots.measured import measured_figure
 from geomech.plots.motion import LINES, filmstrip, stage
-from geomech.plots.optimum import optimum_figure, optimum_map
+from geomech.plots.optimum import optimum_angles, optimum_figure, optimum_map
 from geomech.plots.plates import penetration_figure, plates_figure
 from geomech.plots.precision import KNOB_MARKER, walk_accuracy_figure, work_precision, work_precision_figure
 from geomech.plots.stretched import stretched_figure, stretched_map
@@ -81,6 +81,7 @@ __all__ = [
     "measured_figure",
     "medium_band",
     "net",
+    "optimum_angles",
     "optimum_figure",
     "optimum_map",
     "pairs_figure", "penetration_figure",
@@ -107,3 +108,7 @@ __all__ = [
     "work_precision",
     "work_precision_figure",
 ]  # fmt: skip
+
+
+def __dir__() -> list[str]:
+    return __all__

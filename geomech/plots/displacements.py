@@ -9,9 +9,9 @@ import numpy as np
 
 from geomech.core.errors import choose
 from geomech.gaits import Gait
+from geomech.geometry.symmetry import zero_components
 from geomech.plots.style import axes_of, figure, shared_legend, styled
 from geomech.studies.tables import ERRORS, QUANTITIES, error_of, of_pose, unit_of
-from geomech.studies.zeros import zero_by_symmetry
 from geomech.systems.base import System
 from geomech.tiers import TIERS
 
@@ -147,7 +147,7 @@ def _zeros(table: Mapping, gait: Gait, system: System | None) -> dict[str, str]:
     nothing = {
         q: TO_ROUNDING for q, x in of_pose(poses).items() if q != "net_distance" and np.all(np.abs(x) <= least[q])
     }
-    return nothing | (zero_by_symmetry(system, gait) if system else {})
+    return nothing | (zero_components(system.traits, gait) if system else {})
 
 
 def _say_zero(ax, quantity: str, why: str) -> None:

@@ -35,7 +35,7 @@ def optimum_map(optimum: Optimum, ax=None, gained: Gained | None = None, clim: f
     loop alone.
 
     clim: as for `ccf_figure`."""
-    ax, system = axes_of(ax), optimum.scene.system
+    ax, system = axes_of(ax, 4.4, 4.4), optimum.scene.system
     if system.traits.steps:
         shape_space(ax, [np.linspace(-1, 1, 2) * optimum.scene.numerics.extent] * 2, shape_labels(system))
         ax.set_title("no CCF: the velocity does not follow\nfrom shape alone")
@@ -96,9 +96,9 @@ def draw_limited(ax, curve: np.ndarray, kinds: np.ndarray, nonlinear: bool = Fal
 
 
 @styled
-def angles(optimum: Optimum, ax=None):
+def optimum_angles(optimum: Optimum, ax=None):
     """Draw the shape variables of the best gait over a cycle, and the limits."""
-    ax, gait = axes_of(ax), optimum.gait
+    ax, gait = axes_of(ax, 4.0, 3.4), optimum.gait
     t = np.linspace(0, 2 * np.pi, PHASES)
     names = shape_labels(optimum.scene.system)
     step = max(1, gait.joints // 6)
@@ -119,17 +119,17 @@ def angles(optimum: Optimum, ax=None):
 
 @styled
 def optimum_figure(optimum: Optimum, stretched: bool = False, *, clim: float | str | None = None):
-    """Draw `optimum_map` and `angles` side by side; the angles alone where there are not two joints. stretched:
+    """Draw `optimum_map` and `optimum_angles` side by side; the angles alone where there are not two joints. stretched:
     `stretched_optimum` between them. clim: as for `ccf_figure`."""
     system, study = optimum.scene.system, Study(optimum.scene)
     if system.joints != 2:
         fig, axes = figure(3.8, 3.4)
-        angles(optimum, axes[0, 0])
+        optimum_angles(optimum, axes[0, 0])
         return fig
     fig, axes = figure(11.8 if stretched else 7.6, 3.9, 3 if stretched else 2)
     gained = None if system.traits.steps else gained_ccf(optimum, study)
     optimum_map(optimum, axes[0, 0], gained, clim)
     if stretched:
         stretched_optimum(optimum, axes[0, 1], gained, study, clim)
-    angles(optimum, axes[0, -1])
+    optimum_angles(optimum, axes[0, -1])
     return fig
