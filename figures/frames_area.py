@@ -34,7 +34,7 @@ def compute(scene: str = "three-link-glass", count: int = 20, grid: int = 31) ->
         bench = study if frame == study.scene.frame else study.in_frame(frame)
         for name, (gait, _, _) in GAITS.items():
             a = found[name]["amplitude"]
-            found[name][frame] = {tier: bench.displacement(tier, gait, a) for tier in ("area", "path", "direct")}
+            found[name][frame] = {tier: bench.poses(tier, gait, a) for tier in ("area", "path", "direct")}
     return found
 
 

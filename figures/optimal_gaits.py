@@ -27,7 +27,7 @@ OBJECTIVES = {"displacement": (style.BLACK, "-"), "efficiency": (style.GREEN, "-
 
 
 def compute(harmonics: int = 5, starts: int | None = None, **numerics) -> dict:
-    """Return, by medium, the optimum for each of OBJECTIVES, and "ccf", the CCF along the displacement on its grid."""
+    """Return, by medium, the optimum for each of OBJECTIVES, and "ccf", the CCF whose area they gain."""
     out = {}
     for medium, name in SCENES.items():
         scene = load(name).with_numerics(**numerics)
@@ -63,16 +63,15 @@ def reach(gait) -> float:
 def draw(numbers: dict):
     fig, axes = plots.figure(7.0, 3.3, len(numbers))
     for ax, (medium, found) in zip(axes[0], numbers.items()):
-        plots.ccf_map(found["ccf"], ax=ax)
+        plots.ccf_map(*found["ccf"], ax=ax)
         ax.set_title(medium)
-        ax.collections[0].colorbar.set_label(rf"CCF ({found['ccf'].unit}/rad$^2$)")
         for objective, (colour, dashes) in OBJECTIVES.items():
             best = found[objective].best
             loop = best.gait.shape(np.linspace(0, 2 * np.pi, PHASES))
             label = f"{objective}: {net(best):.3f} BL, path {best.length:.2f}"
             ax.plot(*loop.T, color=colour, ls=dashes, lw=1.6, label=label)
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22))
-    fig.suptitle("CCF along the displacement, minimum-perturbation frame", fontsize=9)
+    fig.suptitle("CCF in the minimum-perturbation frame", fontsize=9)
     return fig
 
 

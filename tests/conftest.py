@@ -1,5 +1,6 @@
 """One thread a process, as many processes as cores for the whole suite, the truths that are kept, and what solves."""
 
+import gc
 import os
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from rft.balance import backend  # noqa: E402
 backend._preferred.set("numpy")  # "auto" is NumPy, but for `solved_by`
 TRUTHS = pytest.StashKey()
 BY_HAND = {"soak", "benchmark"}
+LAID_OUT = {"test_pictures", "test_figures", "test_frozen", "test_shown"}  # files that look at pictures as they are
 
 
 @pytest.fixture
@@ -40,6 +42,13 @@ def pytest_sessionstart(session):
     full = session.config.args_source is session.config.ArgsSource.TESTPATHS
     if full and backend.installed() and not hasattr(session.config, "workerinput"):
         subprocess.run([sys.executable, "-m", "rft"], check=True, capture_output=True)
+
+
+def pytest_collection_finish():
+    """What is there for good is not looked through again and again: a tenth of the time."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(20_000, 20, 50)
 
 
 def pytest_sessionfinish(session):
@@ -86,6 +95,14 @@ def no_lines_of_progress(monkeypatch):
     from geomech.run import progress
 
     monkeypatch.setattr(progress, "EVERY", 1e9)
+
+
+@pytest.fixture(autouse=True)
+def no_layout(request, monkeypatch):
+    """Axes stay where they are, which saves half the time of a picture; the files of LAID_OUT have all kinds as they are."""
+    engines = sys.modules.get("matplotlib.layout_engine")
+    if engines and request.module.__name__ not in LAID_OUT:
+        monkeypatch.setattr(engines.ConstrainedLayoutEngine, "execute", lambda *_: None)
 
 
 @pytest.fixture(scope="session")

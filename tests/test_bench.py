@@ -32,12 +32,12 @@ def fits(monkeypatch):
 
 def test_tables_are_kept_under_what_they_depend_on(fits):
     study = Study(GLASS)
-    first = study.displacement("path")
-    study.displacement("area", amplitudes=[0.3, 0.5])
+    first = study.poses("path")
+    study.poses("area", amplitudes=[0.3, 0.5])
     finer = study.with_numerics(phases=64)
     assert finer.fitted is study.fitted and finer.scene.numerics.phases == 64
     (
-        finer.displacement("area"),
+        finer.poses("area"),
         finer.with_numerics(harmonics=5, curves=9, tolerance=None).curvature,
         study.curvature_error,
     )
@@ -45,10 +45,10 @@ def test_tables_are_kept_under_what_they_depend_on(fits):
     for changes in ({"grid": 9}, {"extent": 2.0}, {"directions": 4}, {"interpolation": 2}, {"regularisation": 1e-4}):
         before = len(fits)
         other = study.with_numerics(**changes)
-        assert np.abs(other.displacement("path") - first).max() > 1e-9
-        other.displacement("path")
+        assert np.abs(other.poses("path") - first).max() > 1e-9
+        other.poses("path")
         assert len(fits) == before + 1
-    assert (study.displacement("path") == first).all() and len(fits) == 6
+    assert (study.poses("path") == first).all() and len(fits) == 6
     table = study.table("adapted", None, [0.5, 1.0])
     assert study.table("adapted", amplitudes=[1.0]) is table
     assert study.table("adapted", amplitudes=[0.9]) is not table
@@ -63,7 +63,7 @@ def test_a_scene_is_small_and_remembers_nothing():
         scene = scenes.load(name)
         held = dict(scene.__dict__)
         study = Study(scene.with_numerics(phases=32, grid=5) if solver_of(scene.system) else scene)
-        study.displacement("direct", amplitudes=[scene.gait.amplitude / 2])
+        study.poses("direct", amplitudes=[scene.gait.amplitude / 2])
         if "path" in study.tiers:
             study.compute_field()
         for value in (scene, study.scene):
@@ -181,7 +181,7 @@ def test_the_frame_is_the_scenes():
         and "frame" not in scenes.tables(top.changed(text=""))["body"]
     )
     turned = top.changed(system=in_frame(top.system, "link-3"))
-    assert turned.frame == "link-3" and Study(turned.with_numerics(phases=32)).displacement("direct").shape == (3,)
+    assert turned.frame == "link-3" and Study(turned.with_numerics(phases=32)).poses("direct").shape == (3,)
 
 
 def test_a_swimmer_may_be_told_in_full():

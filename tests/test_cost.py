@@ -114,9 +114,9 @@ def test_pieces_change_no_numbers(monkeypatch):
 
     def everything():
         fresh = Study(scene.with_numerics(grid=7))
-        tiers = [fresh.displacement(m, None, amplitudes) for m in ("area", "adapted", "path", "harmonic", "direct")]
+        tiers = [fresh.poses(m, None, amplitudes) for m in ("area", "adapted", "path", "harmonic", "direct")]
         fields = fresh.fitted.A, fresh.fitted.residual, fresh.fitted.speed, fresh.table("harmonic").residual
-        marched = Study(SLOPING.with_numerics(phases=16, cycles=2)).displacement("direct", None, amplitudes / 5)
+        marched = Study(SLOPING.with_numerics(phases=16, cycles=2)).poses("direct", None, amplitudes / 5)
         return [*tiers, *fields, marched, *estimate.direct(scene, scene.gait, amplitudes, 32)]
 
     whole = everything()

@@ -14,6 +14,7 @@ from geomech.studies.study import Study
 from geomech.tiers import fitted
 from rft import se2
 
+pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = scenes.load("three-link-glass")
 BENCH = Study(GLASS)
 

@@ -194,7 +194,7 @@ class Late(Fourier):
 
 @pytest.mark.parametrize("name", symmetric_gaits())
 def test_few_phases_tell_how_many_are_solved(name, monkeypatch):
-    """Of gaits that begin anywhere, at all numbers of phases: images lie on phases of some of these only."""
+    """Of gaits that begin anywhere, at numbers of phases of all remainders: images lie on phases of some of these only."""
     monkeypatch.setattr("geomech.geometry.images.FEW", 32)
     gait, shares = symmetric_gaits()[name], []
     for traits in (NOTHING, MIRROR, BACKWARDS, BOTH):
@@ -202,7 +202,7 @@ def test_few_phases_tell_how_many_are_solved(name, monkeypatch):
         for start in (0.0, 0.1):
             late = Late(cos=gait.cos, sin=gait.sin)
             object.__setattr__(late, "start", 2 * np.pi * start)
-            for phases in range(8, 201):
+            for phases in (*range(8, 33), *range(33, 201, 5)):
                 solved = cycle_images(*late.cycle(phases), traits).count
                 assert solved_count(late, phases, traits) == solved, (start, phases)
                 share = max(share, round(phases / solved))

@@ -19,6 +19,7 @@ from geomech.studies.study import Study
 from rft.plates import VERTICAL, CLeg, Drag, Outline, Penetrate, PlateDrags, Rotate, StressMap, loads
 from rft.refusal import Refusal
 
+pytestmark = pytest.mark.usefixtures("fastest")
 FLAT = [n for n in scenes.intruder_names() if isinstance(scenes.load(n), IntruderScene)]  # others are meshes
 MADE = """[medium]
 name = "poppy-seeds-close"

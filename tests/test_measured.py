@@ -560,7 +560,7 @@ def test_a_field_is_read_back_as_a_system(usual, field):
     assert math.isclose(scene.frequency, usual.frequency)
     net, off = usual.displacement
     study = Study(scene)
-    np.testing.assert_allclose(study.displacement("direct", amplitudes=[1.0])[0], net, rtol=1e-10)
+    np.testing.assert_allclose(study.poses("direct", amplitudes=[1.0])[0], net, rtol=1e-10)
     table = study.study([1.0], ["path", "direct"])
     assert np.hypot(*off[:2]) <= table["estimate"]["direct"][0] < 1.5 * np.hypot(*off[:2])
     assert off[2] <= table["estimate_heading"]["direct"][0] < 1.5 * off[2]
@@ -574,9 +574,9 @@ def test_what_the_data_do_not_reach_is_refused(field):
     with pytest.raises(ValueError, match=r"the data do not reach alpha = \(0.2, -0.1\), \d"):
         system.velocity(np.array([0.2, -0.1]), np.array([1.0, 0.0]))
     with pytest.raises(Refusal, match="the data do not reach"):
-        study.displacement("direct", amplitudes=[0.5])
+        study.poses("direct", amplitudes=[0.5])
     with pytest.raises(Refusal, match="the area tier sums a field up, and A is known near the mean gait"):
-        study.displacement("area")
+        study.poses("area")
     with pytest.raises(Refusal, match="no gait but one to search"):
         geomech.optimisation.optimise(scene, "displacement")
     tube = study.fitted
@@ -669,7 +669,7 @@ def test_a_tube_between_the_points_of_its_grid_is_looked_up_all_the_same(usual, 
     save_field(tmp_path / "thin.nc", thin)
     study = Study(Scene(Table(tmp_path / "thin.nc"), thin.gait))
     assert np.isnan(study.fitted.A).all()
-    np.testing.assert_allclose(study.displacement("direct"), thin.displacement[0], rtol=1e-9)
+    np.testing.assert_allclose(study.poses("direct"), thin.displacement[0], rtol=1e-9)
     assert single(study.scene.system, thin.known.loop.shape(np.array(1.0)), [1.0, 0.0])["residual"] is None
 
 
@@ -962,7 +962,7 @@ def test_a_log_of_trajectory_is_read(field, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert command("trajectory", field / "mine.toml", "--cycles", "10", "-o", "tr.csv")[0] == 0
     f = measured.fit_log("tr.csv")
-    net = Study(load(field / "mine.toml")).displacement("direct")
+    net = Study(load(field / "mine.toml")).poses("direct")
     np.testing.assert_allclose(f.mean[0], net, atol=1e-4)
     np.testing.assert_allclose(f.displacement[0], net, atol=1e-4)
 

@@ -248,5 +248,5 @@ def test_every_command_takes_a_table(folder):
         if args[0] == "displacement":
             table = json.loads(out)
             for tier in ("direct", "path", "area"):
-                want = Study(plain).displacement(tier, amplitudes=[0.5, 0.9])
+                want = Study(plain).poses(tier, amplitudes=[0.5, 0.9])
                 np.testing.assert_allclose(table[tier], want, atol=3e-6)

@@ -137,7 +137,7 @@ def test_what_is_told_is_what_the_scene_does(cheap):
     scene = parse(optima.scene_toml(result_of(cheap)))
     assert scene.gait == cheap.gait
     assert scene.gait.amplitude == 1.0
-    net = Study(scene).displacement("direct", amplitudes=[1.0])[0]
+    net = Study(scene).poses("direct", amplitudes=[1.0])[0]
     assert net == pytest.approx(cheap.best.displacement, abs=1e-12)
     alpha, alphadot = scene.gait.cycle(256)
     power = scene.system.work(alpha, alphadot, scene.system.velocity(alpha, alphadot)).power
@@ -145,7 +145,7 @@ def test_what_is_told_is_what_the_scene_does(cheap):
     assert cheap.best.length == pytest.approx(length, rel=1e-10)
     assert cheap.best.work == pytest.approx(2 * np.pi * power.mean(), rel=1e-10)
     assert cheap.value == pytest.approx(np.hypot(*net[:2]) / length, rel=1e-10)
-    Study(scene).displacement("area", amplitudes=[1.0])  # its field holds it
+    Study(scene).poses("area", amplitudes=[1.0])  # its field holds it
     assert scene.numerics.extent == 2.5  # and is no larger than need be
     numbers = json.loads(json.dumps(optima.numbers(result_of(cheap))))
     assert list(numbers) == [
@@ -243,14 +243,14 @@ def short():
 def test_limits_hold_and_are_named(short):
     assert set(short.active) == {"alpha_1 >= -1.2", "alpha_1 <= 1.2", "alpha_2 >= -1.2", "alpha_2 <= 1.2"}
     assert np.abs(short.gait.cycle(2000)[0]).max() <= 1.2 + 1e-9
-    best_circle = np.hypot(*Study(viscous()).displacement("direct", Circle(), [1.2])[0, :2])
+    best_circle = np.hypot(*Study(viscous()).poses("direct", Circle(), [1.2])[0, :2])
     assert short.value > best_circle
 
 
 def test_a_start_beyond_the_limit_is_drawn_together(capsys):
     found = optimise(viscous(), limits=0.6)
     assert "its gait reaches beyond 0.6" in capsys.readouterr().err
-    small = np.hypot(*Study(viscous()).displacement("direct", Circle(), [0.6])[0, :2])
+    small = np.hypot(*Study(viscous()).poses("direct", Circle(), [0.6])[0, :2])
     assert found.start.value == pytest.approx(small, rel=1e-3)
     assert found.value > small
 
@@ -376,7 +376,7 @@ def test_waves_of_a_long_body():
     assert found.value > 1.5 * found.start.value
     assert isinstance(found.gait, Sine)
     rough = [
-        np.hypot(*Study(scene).displacement("direct", Sine(amplitude=a, waves=w, elements=24), [a])[0, :2])
+        np.hypot(*Study(scene).poses("direct", Sine(amplitude=a, waves=w, elements=24), [a])[0, :2])
         for a in (0.2, 0.4, 0.6) for w in (0.8, 1.0, 1.4)
     ]  # fmt: skip
     assert found.value >= max(rough)
@@ -519,8 +519,15 @@ def test_the_loop_on_the_map(stroke, cheap, short, tmp_path):
     assert share(cheap, "length") > 0.4
     assert share(cheap, "zero") > 0.2
     assert share(short, "limit") > 0.15
-    field = gained_ccf(stroke)
-    assert field.values[0, 15, 15] == pytest.approx(0.0204, abs=2e-4)  # against the sense of the CCF's x
+    field, component = gained_ccf(stroke)
+    assert component == 0 and field.values[0, 15, 15] == pytest.approx(-0.0204, abs=2e-4)
+    study = Study(stroke.scene).in_frame("minimum-perturbation")
+    for clim in (None, 0.01):  # sign and colours are those of the CCF in that frame
+        drawn = plots.optimum_map(stroke, clim=clim).collections[0]
+        ccf = plots.ccf_figure(study.curvature, components=("x",), clim=clim).axes[0].collections[0]
+        np.testing.assert_allclose(drawn.get_array(), ccf.get_array(), atol=1e-9)
+        np.testing.assert_allclose(drawn.get_clim(), ccf.get_clim())
+        assert drawn.cmap is ccf.cmap
     for found, name in ((short, "two.svg"), (optimise(serpenoid(), "turning", harmonics=1, starts=1), "three.png")):
         plots.save(plots.optimum_figure(found), tmp_path / name)
         assert (tmp_path / name).stat().st_size > 10_000
@@ -748,7 +755,7 @@ def test_loops_on_maps_of_all_kinds(stroke):
 
     snake = optimise(geomech.load("no-slip-snake"), harmonics=1)
     titles = [ax.get_title() for ax in plots.optimum_figure(snake).axes]
-    assert "CCF of the displacement,\nframe mean" in titles
+    assert "CCF$_{y}$: sideways,\nframe mean" in titles
     assert "singular shapes" in snake.active
     assert 0.1 < (limiting(snake, gained_ccf(snake)) == "singular").mean() < 0.5
     past = stroke.scene.changed(system=Swimmer(SAND, Chain(), (Transient(travel=0.1),)))

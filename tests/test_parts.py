@@ -245,7 +245,7 @@ def test_five_members_and_functions_go_through_everything(system, tmp_path):
         found = np.hypot(*(np.array(table[tier]) - truth).T[:2])
         assert (found <= 1e-9 + np.array(table["estimate"][tier])).all(), tier
     framed = study.in_frame("minimum-perturbation")
-    assert framed.displacement("direct", None, [0.5]).shape == (1, 3)
+    assert framed.poses("direct", None, [0.5]).shape == (1, 3)
     with pytest.raises(Refusal, match="has one frame, 'mean'"):
         study.in_frame("link-1")
     found = optimise(scene, harmonics=1, limits=1.2)

@@ -58,7 +58,7 @@ def test_a_study_has_every_tier_its_errors_and_times(name):
     ]
     assert table["amplitude"] == amplitudes
     for tier in default_tiers(loaded.system):
-        np.testing.assert_allclose(table[tier], study.displacement(tier, None, amplitudes), atol=1e-9)
+        np.testing.assert_allclose(table[tier], study.poses(tier, None, amplitudes), atol=1e-9)
         assert len(table["estimate"][tier]) == 2
         assert min(table["estimate"][tier]) > 0
     looked_up = [plan.table.name for plan in map(study.plan, default_tiers(loaded.system)) if plan.table]
@@ -182,15 +182,15 @@ def test_four_links_have_an_area_tier_and_two_have_none():
     text = GOOD.replace("[1, 2, 1]", "[1, 1, 1, 1]").split("[gait]")[0]
     four = scenes.parse(text + '[gait]\nkind = "fourier"\ncos = [[1.0], [0.5], [0.0]]\nsin = [[0.0], [0.5], [1.0]]')
     assert default_tiers(four.system) == ("area", "path", "direct")
-    assert np.isfinite(Study(four).displacement("direct")).all()
+    assert np.isfinite(Study(four).poses("direct")).all()
     two = scenes.parse(text.replace("[1, 1, 1, 1]", "[1, 1]") + '[gait]\nkind = "wave"\njoints = 1\n')
     with pytest.raises(Refusal, match="the area tier takes two joints and more"):
-        Study(two).displacement("area")
+        Study(two).poses("area")
 
 
 def test_loose_glass_circles():
     """Displacement per cycle on circles of 0.5, 1 and 1.75 rad, an independent computation's three digits."""
-    got = Study(scenes.load("three-link-glass")).displacement("direct", amplitudes=np.array([0.5, 1.0, 1.75]))
+    got = Study(scenes.load("three-link-glass")).poses("direct", amplitudes=np.array([0.5, 1.0, 1.75]))
     np.testing.assert_allclose(np.hypot(got[:, 0], got[:, 1]), [0.0121, 0.0638, 0.1378], rtol=0.01)
 
 

@@ -1,11 +1,13 @@
 """The import rules: rft knows nothing of geomech; of rft the pure geometry knows planar motions alone."""
 
 import ast
+import functools
 import graphlib
 import pathlib
 import tomllib
 
 import mutants
+import pytest
 
 from geomech.commands import COMMANDS
 
@@ -22,13 +24,16 @@ KNOW_MECHANICS = {
 }  # fmt: skip
 
 
+@functools.cache
 def imports(path):
     """Dotted names of all that a file imports, wherever in it."""
+    found = []
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+            found += [f"{node.module}.{alias.name}" for alias in node.names]
+    return found
 
 
 def test_rft_does_not_import_geomech():
@@ -76,13 +81,18 @@ def arrows(path, known):
 
 
 FILES = modules()
-ARROWS = {name: arrows(path, FILES) - {name} for name, path in FILES.items()}
 
 
-def test_imports_make_no_circle():
+@pytest.fixture(scope="module")
+def imported():
+    """Modules that each one imports."""
+    return {name: arrows(path, FILES) - {name} for name, path in FILES.items()}
+
+
+def test_imports_make_no_circle(imported):
     """Counting what is imported by name; that a package loads before its modules is Python's affair."""
-    assert sum(map(len, ARROWS.values())) > 800
-    graphlib.TopologicalSorter(ARROWS).prepare()
+    assert sum(map(len, imported.values())) > 800
+    graphlib.TopologicalSorter(imported).prepare()
 
 
 LAYERS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["layers"]["order"]
@@ -94,11 +104,11 @@ def layer(module):
     return max((len(prefix), k) for k, row in enumerate(LAYERS) for prefix in row if held(prefix))[1]
 
 
-def test_modules_import_from_their_own_layer_or_a_lower_one():
-    upward = [f"{a} imports {b}" for a, some in ARROWS.items() for b in some if layer(b) > layer(a)]
+def test_modules_import_from_their_own_layer_or_a_lower_one(imported):
+    upward = [f"{a} imports {b}" for a, some in imported.items() for b in some if layer(b) > layer(a)]
     assert upward == []
     folders = {name for name in FILES if name.count(".") == 1 and FILES[name].name == "__init__.py"}
-    assert {name for name in folders if layer(name) == len(LAYERS) - 1} == {"geomech.commands"}
+    assert {name for name in folders if layer(name) == len(LAYERS) - 1} == {"geomech.app", "geomech.commands"}
 
 
 def test_a_scene_is_a_small_class():

@@ -273,7 +273,7 @@ def test_a_table_predicts_what_its_scene_predicts_within_its_error(body, medium,
     ratios, length = [], source.scene.system.length  # of the body, m in one of them
     for gait in GAITS:
         amplitudes = [0.3, 0.8, 1.2]
-        true = source.displacement("direct", gait, amplitudes)
+        true = source.poses("direct", gait, amplitudes)
         told = table.study(amplitudes, ["area", "path", "harmonic", "direct"], gait)
         for tier in ("area", "path", "harmonic", "direct"):
             off = np.array(told[tier]) - true
@@ -282,7 +282,7 @@ def test_a_table_predicts_what_its_scene_predicts_within_its_error(body, medium,
         ratios += list(np.array(told["estimate"]["direct"]) / np.hypot(*(np.array(told["direct"]) - true).T[:2]))
         for tier in ("area", "path"):  # of the same connection
             np.testing.assert_allclose(
-                told[tier], source.with_numerics(interpolation=3).displacement(tier, gait, amplitudes), atol=2e-5
+                told[tier], source.with_numerics(interpolation=3).poses(tier, gait, amplitudes), atol=2e-5
             )
     assert np.median(ratios) < 60  # honest, not helpless
     if ending == ".nc" and medium.dry:
@@ -319,7 +319,7 @@ def test_errors_of_tables_of_random_scenes_cover(tmp_path):
         for ending in ratios:
             fields.save_connection(tmp_path / f"a{ending}", source)
             poses, errors = estimate.direct(Scene(Table(tmp_path / f"a{ending}"), gait), gait, amplitudes, 256)
-            off = estimate.pose_distance(poses, source.displacement("direct", None, amplitudes), length)
+            off = estimate.pose_distance(poses, source.poses("direct", None, amplitudes), length)
             ratios[ending].append(errors / np.maximum(off, 1e-12))
     for ending, found in ratios.items():
         found = np.array(found)
@@ -343,7 +343,7 @@ def test_what_is_even_in_alphadot_is_part_of_the_error(ending, tmp_path):
     for gait in (GAIT, Circle(amplitude=1.2), Butterfly(amplitude=0.8)):
         amplitudes = gait.amplitude * np.array([0.3, 0.8, 1.1])
         poses, errors = estimate.direct(table, gait, amplitudes, 128)
-        off = estimate.pose_distance(poses, source.displacement("direct", gait, amplitudes), 0.3)
+        off = estimate.pose_distance(poses, source.poses("direct", gait, amplitudes), 0.3)
         assert (off <= errors).all()
     if ending == ".nc":
         fields.save_connection(tmp_path / "b.nc", Study(table))

@@ -16,6 +16,7 @@ from geomech.tiers.direct import direct
 from rft import Chain, Viscous
 from rft.refusal import Refusal
 
+pytestmark = pytest.mark.usefixtures("fastest")
 SYSTEM = Swimmer(Viscous(2.3), Chain((0.7, 1.4, 0.9, 0.6)))
 GAIT = Fourier(
     cos=((1.0, 0.0), (0.2, 0.3), (-0.5, 0.2)), sin=((0.1, 0.2), (0.9, 0.0), (0.4, -0.4)), centre=(0.1, -0.2, 0.15)

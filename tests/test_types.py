@@ -190,9 +190,9 @@ def geometries(value):
     yield "gait", lambda: family.fit(velocity, value, 1.0)
     yield "largest", lambda: family.fit(velocity, Circle(), value)
     yield "curves", lambda: family.fit(velocity, Circle(), 1.0, value)
-    yield "gait of the scene", lambda: Study(plain).displacement("direct", value)
-    yield "tier", lambda: Study(plain).displacement(value)
-    yield "amplitudes", lambda: Study(plain).displacement("direct", amplitudes=value)
+    yield "gait of the scene", lambda: Study(plain).poses("direct", value)
+    yield "tier", lambda: Study(plain).poses(value)
+    yield "amplitudes", lambda: Study(plain).poses("direct", amplitudes=value)
     for ask in (Study(plain).study, Study(plain).cost):
         yield "gait of the scene", lambda ask=ask: ask([1.0], ["direct"], value)
         yield "amplitudes of a study", lambda ask=ask: ask(value, ["direct"])

@@ -223,7 +223,7 @@ def test_serpenoid_has_a_connection_and_a_ccf():
     direct = np.hypot(*table["direct"][0][:2])
     assert direct > 0.1
     assert np.hypot(*table["harmonic"][0][:2]) == pytest.approx(direct, rel=0.05)
-    backwards = Study(swimmer).displacement("direct", Circle(amplitude=6.0))
+    backwards = Study(swimmer).poses("direct", Circle(amplitude=6.0))
     np.testing.assert_allclose(backwards[0], -table["direct"][0][0], rtol=0.05)
 
 

@@ -9,6 +9,8 @@ import typer
 
 from geomech.commands.loading import load_scene
 from geomech.commands.options import (
+    ClimOption,
+    ComponentOption,
     ExtentOption,
     GridOption,
     OtherFrameOption,
@@ -17,6 +19,8 @@ from geomech.commands.options import (
     SliceOption,
     YesOption,
     angles,
+    colour_limit,
+    components,
     with_workers,
 )
 from geomech.commands.pipeline import Output, execute
@@ -36,6 +40,8 @@ def ccf(
     pair: PairOption = None,
     slice_: SliceOption = None,
     other_frame: OtherFrameOption = None,
+    component: ComponentOption = None,
+    clim: ClimOption = None,
     yes: YesOption = False,
 ):
     """Draw the CCF with the scene's gait on it. Of three and more joints: a slice for each pair, or for one, with the
@@ -44,6 +50,7 @@ def ccf(
     from geomech.studies.shape_space import ccf
 
     scene = load_scene(name, grid, extent)
-    drawn = pictures.Ccf(style, metric, stretch, other_frame)
+    panels = components(component)
+    drawn = pictures.Ccf(style, metric, stretch, other_frame, panels, colour_limit(clim, panels))
     question = ccf(scene, pair, angles(scene, "--slice", slice_), other_frame, metric, stretch)
     execute(question, Output(plot, drawn, pictures.check), yes=yes, silent=True)

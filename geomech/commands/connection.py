@@ -9,6 +9,7 @@ import typer
 
 from geomech.commands.loading import load_scene
 from geomech.commands.options import (
+    ComponentOption,
     ExtentOption,
     GridOption,
     OtherFrameOption,
@@ -18,6 +19,7 @@ from geomech.commands.options import (
     SliceOption,
     YesOption,
     angles,
+    components,
     with_workers,
 )
 from geomech.commands.pipeline import Output, execute
@@ -36,6 +38,7 @@ def connection(
     pair: PairOption = None,
     slice_: SliceOption = None,
     other_frame: OtherFrameOption = None,
+    component: ComponentOption = None,
     yes: YesOption = False,
 ):
     """Compute the local connection on a grid, as a file. A NetCDF file has the fit residual and the CCF, too; a .mat
@@ -44,7 +47,7 @@ def connection(
     from geomech.studies.shape_space import connection
 
     file = parts.Connection(out, sign, order)
-    drawn = pictures.Connection(style, plot, pair, slice_, other_frame)
+    drawn = pictures.Connection(style, plot, pair, slice_, other_frame, components(component))
     scene = load_scene(name, grid, extent)
     question = connection(scene, file.format, plot is not None, pair, angles(scene, "--slice", slice_), other_frame)
     execute(question, Output(out, file), Output(plot, drawn, pictures.check), yes=yes, silent=True)

@@ -9,7 +9,17 @@ import typer
 
 from geomech.commands import formats
 from geomech.commands.loading import load_scene
-from geomech.commands.options import JsonOption, PlotOption, SceneArgument, YesOption, joint_limits, with_workers
+from geomech.commands.options import (
+    ClimOption,
+    JsonOption,
+    PlotOption,
+    SceneArgument,
+    YesOption,
+    colour_limit,
+    joint_limits,
+    refuse_without_figure,
+    with_workers,
+)
 from geomech.commands.pipeline import Output, execute
 
 
@@ -31,6 +41,7 @@ def optimize(
     out: Annotated[Optional[Path], typer.Option("-o", "--output", metavar="BEST.toml", help="scene to write")] = None,
     plot: PlotOption = None,
     stretch: Annotated[bool, typer.Option("--stretch", help="draw it where equal lengths cost the same, too")] = False,
+    clim: ClimOption = None,
     as_json: JsonOption = False,
     yes: YesOption = False,
 ):  # fmt: skip
@@ -39,8 +50,9 @@ def optimize(
     from geomech.optimisation.question import Optimize
     from geomech.output import parts, pictures
 
+    refuse_without_figure(plot, clim=clim)
     scene = load_scene(name)
-    drawn = pictures.Optimum(stretch, plot)
+    drawn = pictures.Optimum(stretch, plot, colour_limit(clim))
     file, figure = Output(out, parts.write_best, formats.toml), Output(plot, drawn, pictures.check)
     question = Optimize(
         scene, objective, direction, harmonics, joint_limits(limits, scene), starts, rate, power, stretch

@@ -46,12 +46,31 @@ FolderOption = Annotated[
     Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results", parser=folder)
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON and nothing else")]
+AllOption = Annotated[bool, typer.Option("--all", help="print every tier and amplitude, net distances and seconds")]
 YesOption = Annotated[bool, typer.Option("--yes", help="compute even for more than a minute, or in more than 2 GB")]
 
 
 OtherFrameOption = Annotated[
     Optional[str],
     typer.Option("--compare-frame", metavar="FRAME", help="draw another body frame below, on the same scales"),
+]
+ComponentOption = Annotated[
+    Optional[str],
+    typer.Option(
+        "--component", metavar="NAMES", help="panels to draw, such as x or x,theta; all but zero ones if left out"
+    ),
+]
+ClimOption = Annotated[
+    Optional[str],
+    typer.Option(
+        "--clim", metavar="LIMIT", help="of the colours, either side of 0: a number, or a percentile such as 98%"
+    ),
+]
+DataOption = Annotated[
+    Optional[Path],
+    typer.Option(
+        "--data", metavar="FILE.csv", help="own measurements to draw as points: columns amplitude,value,error"
+    ),
 ]
 PairOption = Annotated[
     Optional[str],
@@ -264,3 +283,59 @@ def parse_end_caps(text: str) -> float | str:
         return float(text)
     except ValueError:
         raise Refusal(f"--end-caps {text!r} is neither left-out, fitted nor a number") from None
+
+
+MAPS, CURVES = ("x", "y", "theta"), ("x", "y", "theta", "distance")  # panels of figures, by the words of --component
+
+
+def components(text: str | None, names: Sequence[str] = MAPS) -> tuple[str, ...]:
+    """Return the panels in x,theta; none for an option that is left out."""
+    from geomech.core.errors import choose
+
+    found = () if text is None else tuple(choose("--component", word.strip(), names) for word in text.split(","))
+    if len({*found}) < len(found):
+        raise Refusal("name each panel once", where="--component", value=text)
+    return found
+
+
+def colour_limit(text: str | None, panels: Sequence[str] = ("x",)) -> float | str | None:
+    """Return a limit of colours: a positive number, or a percentile such as "98%". panels: on which it holds, none for all;
+    one number has one unit."""
+    if text is None:
+        return None
+    percent = text.strip().endswith("%")
+    try:
+        value = float(text.strip().removesuffix("%"))
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < (100.0 + 1e-9 if percent else math.inf):
+        raise Refusal(
+            f"{text!r} is no limit", where="--clim", instead="give a number above 0, or a percentile such as 98%"
+        )
+    if not percent and "theta" in (panels or MAPS) and len(panels or MAPS) > 1:
+        why = "panels of theta have another unit than those of x and y"
+        raise Refusal(
+            f"{text!r} is one limit",
+            where="--clim",
+            because=why,
+            instead="say --component x, or a percentile such as 98%",
+        )
+    return text.strip() if percent else value
+
+
+def refuse_without_figure(plot: Path | None, **options: object) -> None:
+    """Refuse options of a figure where none is drawn."""
+    if plot is None and (names := [f"--{name}" for name, value in options.items() if value is not None]):
+        what = f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'} for a figure"
+        raise Refusal(what, instead="say --plot FILE, too")
+
+
+def measurements(path: Path | None, scene, panels: Sequence[str]):
+    """Return what `geomech.scenes.measurements` reads of the quantity of one panel, x if none is named; None without a file."""
+    if path is None:
+        return None
+    from geomech.scenes.measurements import read
+
+    if len(panels) > 1:
+        raise Refusal("--data FILE is of one quantity", instead="name its panel alone with --component, such as x")
+    return read(path, scene, angle=panels == ("theta",))

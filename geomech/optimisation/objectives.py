@@ -54,7 +54,7 @@ class Objective:
     timed = property(lambda self: self.name == "speed", doc="Whether the value depends on the time of a cycle.")
     unit = property(
         lambda self: {"turning": "rad per cycle", "speed": "BL/s"}.get(
-            self.name, "BL per cycle" if self.name == "displacement" else "BL per unit of path length"
+            self.name, "BL per cycle" if self.name == "displacement" else "BL/BL"
         )
     )
 

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from geomech.core.variables import Result, Variable
+from geomech.geometry.symmetry import zero_components
 from geomech.optimisation.limits import LimitsArgument
 from geomech.optimisation.optimum import Optimum
 from geomech.optimisation.request import Request, checked
 from geomech.optimisation.search import search
 from geomech.run.cost import Cost
 from geomech.scenes.model import Scene
-from geomech.studies.effort import why_none
+from geomech.studies.effort import units, why_none
 from geomech.studies.question import Allow, Progress, Question
 from geomech.systems.base import length_unit
 from rft.refusal import Refusal
@@ -61,13 +62,15 @@ class Optimize(Question):
 def result_of(optimum: Optimum) -> Result:
     """Return an optimum as variables; the value of a distance is over the body's length, the displacement is not."""
     best, objective, unit = optimum.best, optimum.request.objective, length_unit(optimum.scene.system)
+    of_effort = units(optimum.scene.system)
+    value_unit = of_effort[objective.name] if objective.name == "efficiency" else objective.unit
     variables = [
-        Variable("value", (), best.value, objective.unit, objective.name, best.error),
+        Variable("value", (), best.value, value_unit, objective.name, best.error),
         Variable(
             "start_value",
             (),
             optimum.start.value,
-            objective.unit,
+            value_unit,
             f"{objective.name} of the scene's gait",
             optimum.start.error,
         ),
@@ -75,5 +78,7 @@ def result_of(optimum: Optimum) -> Result:
     for name, x, u in zip(("x", "y", "theta"), best.displacement, (unit, unit, "rad")):
         variables.append(Variable(name, (), x, u, "net displacement per cycle"))
     for name, x in (("path_length", best.length), ("work", best.work)):
-        variables += [] if x is None else [Variable(name, (), x)]
-    return Result("optimum", tuple(variables), {"active": optimum.active, "evaluations": optimum.evaluations}, optimum)
+        variables += [] if x is None else [Variable(name, (), x, of_effort.get(name, ""))]
+    zero = [*zero_components(optimum.scene.system.traits, optimum.gait)]
+    facts = {"active": optimum.active, "evaluations": optimum.evaluations, "zero_by_symmetry": zero}
+    return Result("optimum", tuple(variables), facts, optimum)

@@ -28,7 +28,7 @@ def cheapest(
     scene: Scene, amplitudes: Sequence[float], tol: float, gait: Gait | None = None, ask: Callable = lambda jobs: None
 ) -> dict:
     """Return a table as of `Study.study` for the cheapest tier with errors of position of at most ``tol`` body lengths,
-    with {"tier", "settings"} besides.
+    with {"tier", "tolerance", "settings"} besides.
 
     For the direct tier, the fewest phases are found. Its seconds include the search. Look-up tiers are tried in the
     order of their cost, as long as that is below the direct tier's. ask: called with the jobs to come
@@ -49,7 +49,12 @@ def cheapest(
     medium = uncertainty.of_medium(scene, gait, amplitudes)
 
     def answer(tier: str, poses, error, settings: dict) -> dict:
-        attributes = {"tier": tier, "settings": settings, "seconds": {tier: time.perf_counter() - start}}
+        attributes = {
+            "tier": tier,
+            "tolerance": float(tol),
+            "settings": settings,
+            "seconds": {tier: time.perf_counter() - start},
+        }
         return Displacements(tables.result(scene, gait, amplitudes, {tier: poses}, {tier: error}, medium, **attributes))
 
     sampled = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))
@@ -65,11 +70,11 @@ def cheapest(
             break
         ask(cost.predicted(scene, plans[tier], len(amplitudes)))
         try:
-            checked = study.displacement(tier, gait, amplitudes[sampled])
+            checked = study.poses(tier, gait, amplitudes[sampled])
         except ValueError:  # the gait leaves the field or the family of this tier
             continue
         if (pose_distance(checked, pilot[0], system.length) + pilot[1])[:, 0].max() <= tol:
-            poses = study.displacement(tier, gait, amplitudes)
+            poses = study.poses(tier, gait, amplitudes)
             error, spread = against_direct(scene, poses, gait, amplitudes), study.spread(tier, gait, amplitudes)
             if spread is not None:
                 error = np.maximum(error, spread / [system.length, 1.0])

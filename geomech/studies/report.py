@@ -30,7 +30,7 @@ from rft.refusal import Refusal, located
 
 AMPLITUDES = 10  # or so, for each gait
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)  # of round amplitudes, times a power of ten
-ADDED = "not in the scene: added because Fig. 11(e) compares the two gaits of the three-link swimmer"
+ADDED = "not in the scene, added to compare the two gaits of Fig. 11(e)"
 
 
 @dataclass(frozen=True)

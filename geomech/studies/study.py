@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -10,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from geomech.core.errors import choose
-from geomech.core.face import Extensible
 from geomech.gaits import Gait
 from geomech.geometry.connection import Connection, even_part
 from geomech.geometry.curvature import ccf
@@ -40,7 +40,7 @@ FEW_PHASES = 4096  # that tell whether a gait is far from leaving the field
 SAMPLES = 64, FEW_PHASES  # amplitudes and phases that `cost` checks; `study` checks all
 
 
-class Study(Extensible):
+class Study:
     """A scene and the tables computed for it so far, each stored under its name, the system and all other data that it
     depends on. `with_numerics` returns a study with other numerics that shares them."""
 
@@ -60,7 +60,7 @@ class Study(Extensible):
 
     def with_numerics(self, **numerics) -> Study:
         """Return the study with other [numerics] and the same stored tables; an entry given as None stays as it is."""
-        return Study(self.scene.with_numerics(**numerics), self._tables)
+        return self._of(self.scene.with_numerics(**numerics))
 
     def in_frame(self, frame: str) -> Study:
         """Return the study in another body frame; Refusal for an unknown one, or the scene's own."""
@@ -69,7 +69,13 @@ class Study(Extensible):
             if frame == s.frame:
                 raise Refusal(f"the frame is {frame!r} already", instead="name another")
             system = framed(s.system, s.numerics) if frame == MINIMUM_PERTURBATION else in_frame(s.system, frame)
-            return Study(s.changed(system=system), self._tables)
+            return self._of(s.changed(system=system))
+
+    def _of(self, scene: Scene) -> Study:
+        """Return the study of another scene with the same stored tables."""
+        study = copy.copy(self)
+        study.scene = scene
+        return study
 
     tiers = property(lambda self: tiers(self.scene.system))
 
@@ -199,7 +205,7 @@ class Study(Extensible):
         """Estimated error of `curvature`."""
         return self._stored("error of the ccf", self._connection().key, lambda: ccf_error(self.fitted))[0]
 
-    def displacement(self, tier: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray:
+    def poses(self, tier: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray:
         """Return the net pose per cycle (..., 3) by one tier of TIERS for amplitudes (...,), of a gait or the scene's
         own."""
         scene, gait = self.scene, self.scene.gait if gait is None else checked_gait(gait)
@@ -210,7 +216,7 @@ class Study(Extensible):
             return plan.predict(self._table_of(plan), amplitudes)
 
     def spread(self, tier: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray | None:
-        """Return how far `displacement` depends on an arbitrary choice of the tier, such as a surface spanned by the
+        """Return how far `poses` depend on an arbitrary choice of the tier, such as a surface spanned by the
         loop: (B, 2), in the system's unit and rad; None without one. Estimates include it."""
         plan = self.plan(tier, gait, amplitudes)
         return plan.spread(self._table_of(plan), amplitudes)
@@ -251,7 +257,7 @@ class Study(Extensible):
                 reference, seconds[tier] = timed(direct)
                 poses[tier], errors[tier] = reference
             else:
-                poses[tier], seconds[tier] = timed(lambda m=tier: self.displacement(m, gait, amplitudes))
+                poses[tier], seconds[tier] = timed(lambda m=tier: self.poses(m, gait, amplitudes))
                 check = lambda m=tier: estimate.against_direct(self.scene, poses[m], gait, amplitudes, reference)
                 errors[tier], took = timed(check)
                 if (spread := self.spread(tier, gait, amplitudes)) is not None:
