@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from . import api, conventions, examples, figures, keys, command_line, validation
+from . import api, command_line, conventions, examples, figures, keys, validation
 
 MADE = {
     "alpha": conventions.drawing,

@@ -22,12 +22,12 @@ from rft.refusal import Refusal
 class Connection:
     """A writer of a connection in the format that an ending names, with this sign and order where it takes them."""
 
-    out: Path
+    out: Path | None
     sign: str | None = None
     order: str | None = None
 
     def __post_init__(self) -> None:
-        if self.out.suffix not in FORMATS or not hasattr(self.format, "write"):
+        if self.out and not hasattr(self.format, "write"):
             endings = [ending for ending, known in FORMATS.items() if hasattr(known, "write")]
             raise Refusal(f"cannot write {self.out}", instead=f"end the name of a connection in {' or '.join(endings)}")
         for name, word, known in (("sign", self.sign, SIGNS), ("order", self.order, ORDERS)):
@@ -35,15 +35,16 @@ class Connection:
                 choose(f"--{name}", word, known)
                 if name not in self._settings(self.format):
                     taking = " or ".join(ending for ending, other in FORMATS.items() if name in self._settings(other))
-                    instead = f"drop it, a {self.out.suffix} file says what it has"
+                    instead = f"drop it, a {self.out.suffix} file says what it has" if self.out else "drop it"
                     raise Refusal(f"--{name} is that of a {taking} file", instead=instead)
 
     @property
-    def format(self) -> Callable:
-        return FORMATS[self.out.suffix]
+    def format(self) -> Callable | None:
+        """The format, None of no file, or of one with another ending."""
+        return FORMATS.get(self.out.suffix) if self.out else None
 
     @staticmethod
-    def _settings(file: Callable) -> tuple[str, ...]:
+    def _settings(file: Callable | None) -> tuple[str, ...]:
         return getattr(file, "settings", ())
 
     def __call__(self, result: Result, path: Path) -> None:

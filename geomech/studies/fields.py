@@ -59,8 +59,8 @@ def save_connection(path: str | Path, study: Study, **settings: str) -> None:
     file.write(path, (of_study if getattr(file, "whole", True) else of_connection_alone)(study), **settings)
 
 
-def check_joints(scene: Scene, file: Callable) -> None:
-    """Refuse a body of more or fewer joints than a format (`geomech.io.tables.FORMATS`) takes."""
+def check_joints(scene: Scene, file: Callable | None) -> None:
+    """Refuse a body of more or fewer joints than a format (`geomech.io.tables.FORMATS`), if there is one, takes."""
     if (only := getattr(file, "joints", None)) not in (None, scene.system.joints):
         why = f"a {file.suffix} file has a layout of {only} joints, and this body has {scene.system.joints}"
         raise Refusal(why, where=scene.name, instead="write a .nc file, which takes any number of joints")
