@@ -29,7 +29,6 @@ from geomech.io import tables
 from geomech.io.results import write_netcdf
 from geomech.io.tables.mat import ERROR
 from geomech.measured import cycles, phase, regression, results, smooth, synthetic, unknowns
-from geomech.output import mat
 from geomech.scenes import Scene, load
 from geomech.studies import fields
 from geomech.studies.single import single
@@ -630,7 +629,7 @@ def test_a_field_written_again_keeps_every_digit(field, tmp_path):
 def test_errors_of_A_go_with_it_into_a_mat_file(field, tmp_path, sign, order):
     """Nan where A is, which leaves nothing to look up."""
     study = Study(load(field / "mine.toml"))
-    mat.save_connection(tmp_path / "a.mat", study, sign, order)
+    fields.save_connection(tmp_path / "a.mat", study, sign=sign, order=order)
     first = xarray.open_dataset(field / "field.nc", engine="scipy")
     error = loadmat(tmp_path / "a.mat")[ERROR]
     np.testing.assert_array_equal(error if order == "ndgrid" else error.swapaxes(-1, -2), first.A_error)

@@ -31,6 +31,7 @@ from geomech.tiers.harmonic import is_looked_up
 from rft.refusal import Refusal, located
 
 NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
+WHOLE, A_ALONE = "whole", "A"
 MOST_PAIRS = 10  # of joints in a figure: as many as five joints have
 
 
@@ -54,15 +55,15 @@ class ShapeSpace(Question):
 
     kind: "connection" or "ccf", of the result.
 
-    file: with all data of a file, metric and harmonics included; else the CCF alone. field: computed on the scene's grid. map:
-    drawn on that grid. planes: drawn where two joints move, of ``pair``, such as "1,3", or of all pairs; slice_angles: angles
-    of the other joints, rad, the gait's middle if None. metric: with the cost of changes of shape. stretch: with shape space
-    stretched to that cost. gait: the scene's gait is drawn, and must lie within. other_frame: name of another body frame,
+    file: contents of a file, WHOLE with metric and harmonics, or A_ALONE; "" for none. field: computed on the scene's grid.
+    map: drawn on that grid. planes: drawn where two joints move, of ``pair``, such as "1,3", or of all pairs; slice_angles:
+    angles of the other joints, rad, the gait's middle if None. metric: with the cost of changes of shape. stretch: with shape
+    space stretched to that cost. gait: the scene's gait is drawn, and must lie within. other_frame: name of another body frame,
     drawn below."""
 
     scene: Scene
     kind: str = "ccf"
-    file: bool = False
+    file: str = ""
     field: bool = True
     map: bool = False
     planes: bool = False
@@ -96,7 +97,7 @@ class ShapeSpace(Question):
     @property
     def _costed(self) -> bool:
         """Whether the metric is computed."""
-        return self.metric or (self.file and not why_none(self.scene.system))
+        return self.metric or (self.file == WHOLE and not why_none(self.scene.system))
 
     @property
     def _enclosed(self) -> bool:
@@ -105,7 +106,7 @@ class ShapeSpace(Question):
 
     @property
     def _harmonics(self) -> bool:
-        return self.file and is_looked_up(self.scene.system)
+        return self.file == WHOLE and is_looked_up(self.scene.system)
 
     @cached_property
     def _at(self) -> list[tuple[tuple[int, int], np.ndarray]]:
@@ -163,7 +164,7 @@ class ShapeSpace(Question):
         seconds = time.perf_counter() - start
         space = Space(study, self.other, tuple(values[:count]), other_planes, stretched, enclosed, seconds)
         if self.file:
-            file = fields.of_study(study)
+            file = (fields.of_study if self.file == WHOLE else fields.of_connection_alone)(study)
             return Result(file.kind, file.variables, file.attributes, space)
         if not self.field:
             return Result(self.kind, tuple(_of_plane(*x) for x in zip(self._at, space.planes)), {}, space)
@@ -254,15 +255,15 @@ def ccf(
 
 def connection(
     scene: Scene,
-    ending: str,
+    file: Callable | None,
     drawn: bool,
     pair: str | None,
     slice_angles: tuple[float, ...] | None,
     other_frame: str | None,
 ) -> ShapeSpace:
-    """Return the question of a connection. ending: of its file, "" for none. drawn: its picture is, too."""
-    if ending == ".mat":
-        check_two_joints(scene)
+    """Return the question of a connection. file: the format of its file (`geomech.io.tables.FORMATS`), or None. drawn: its
+    picture is, too."""
+    fields.check_joints(scene, file)
     sliced = drawn and (scene.system.joints > 2 or pair is not None or slice_angles is not None)
     if sliced and other_frame is not None:
         raise Refusal("`compare_frame` draws maps of two joints", instead="drop it, or see 'geomech ccf --pair'")
@@ -273,11 +274,5 @@ def connection(
         "slice_angles": slice_angles,
         "other_frame": other_frame,
     }
-    return ShapeSpace(scene, "connection", file=ending == ".nc", **picture)
-
-
-def check_two_joints(scene: Scene) -> None:
-    """Refuse a body without exactly two joints, as in sysplotter's layout of arrays."""
-    if (joints := scene.system.joints) != 2:
-        why = f"a .mat file has sysplotter's layout, which is of two joints, and this body has {joints}"
-        raise Refusal(why, where=scene.name, instead="write a .nc file, which takes any number of joints")
+    contents = "" if file is None else WHOLE if getattr(file, "whole", True) else A_ALONE
+    return ShapeSpace(scene, "connection", contents, **picture)
