@@ -24,11 +24,18 @@ def compute(scene: str = "three-link-glass", amplitudes: dict | None = None) -> 
     return {"tables": tables}
 
 
+def curves(axes, tables: dict) -> None:
+    """Draw the displacements of each gait on axes of its own, without a legend."""
+    for ax, (name, table) in zip(axes, tables.items()):
+        plots.displacement(table, ax=ax, gait=GAITS[name], errors=False, legend=False)
+        ax.set_title(name)
+
+
 @plots.styled
 def draw(numbers: dict):
-    fig, axes = plots.figure(7.2, 3.9, len(numbers["tables"]))
-    for ax, (name, table) in zip(axes[0], numbers["tables"].items()):
-        plots.displacement(table, ax=ax, gait=GAITS[name], errors=False)
+    fig, axes = plots.figure(7.2, 3.4, len(numbers["tables"]))
+    curves(axes[0], numbers["tables"])
+    plots.shared_legend(fig)
     return fig
 
 

@@ -28,13 +28,13 @@ def compute(scene: str = "three-link-glass", count: int = 20, grid: int = 31) ->
 
     The field reaches as far as the gaits.
     """
-    study = Study(load(scene)).turned(grid=grid, extent=2.7)
+    study = Study(load(scene)).with_numerics(grid=grid, extent=2.7)
     found: dict = {name: {"amplitude": np.linspace(0, top, count + 1)[1:]} for name, (_, top, _) in GAITS.items()}
     for frame in FRAMES:
         bench = study if frame == study.scene.frame else study.in_frame(frame)
         for name, (gait, _, _) in GAITS.items():
             a = found[name]["amplitude"]
-            found[name][frame] = {tier: bench.displacement(tier, gait, a) for tier in ("area", "path", "direct")}
+            found[name][frame] = {tier: bench.poses(tier, gait, a) for tier in ("area", "path", "direct")}
     return found
 
 

@@ -23,23 +23,25 @@ from geomech.optimisation.gain import PHASES, gained_ccf
 from geomech.scenes import load
 
 SCENES = {"viscous fluid, ratio 2": "three-link-viscous", "loose 0.3 mm glass": "three-link-glass"}
-AIMS = {"displacement": (style.BLACK, "-"), "efficiency": (style.GREEN, "--")}
+OBJECTIVES = {"displacement": (style.BLACK, "-"), "efficiency": (style.GREEN, "--")}
 
 
 def compute(harmonics: int = 5, starts: int | None = None, **numerics) -> dict:
-    """Return, by medium, the optimum for each of AIMS, and "ccf", the CCF along the displacement on its grid."""
+    """Return, by medium, the optimum for each of OBJECTIVES, and "ccf", the CCF whose area they gain."""
     out = {}
     for medium, name in SCENES.items():
         scene = load(name).with_numerics(**numerics)
-        out[medium] = {aim: optimise(scene, aim, harmonics=harmonics, starts=starts) for aim in AIMS}
+        out[medium] = {
+            objective: optimise(scene, objective, harmonics=harmonics, starts=starts) for objective in OBJECTIVES
+        }
         out[medium]["ccf"] = gained_ccf(out[medium]["displacement"])
     return out
 
 
 def table(numbers: dict) -> str:
     """Return a line for each optimum."""
-    heads = "medium", "aim", "BL a cycle", "path length", "BL a unit", "reach (rad)"
-    best = {(medium, aim): found[aim].best for medium, found in numbers.items() for aim in AIMS}
+    heads = "medium", "objective", "BL a cycle", "path length", "BL a unit", "reach (rad)"
+    best = {(medium, objective): found[objective].best for medium, found in numbers.items() for objective in OBJECTIVES}
     rows = [
         (*names, f"{net(x):.4f}", f"{x.length:.4f}", f"{net(x) / x.length:.4f}", f"{reach(x.gait):.2f}")
         for names, x in best.items()
@@ -61,16 +63,15 @@ def reach(gait) -> float:
 def draw(numbers: dict):
     fig, axes = plots.figure(7.0, 3.3, len(numbers))
     for ax, (medium, found) in zip(axes[0], numbers.items()):
-        plots.ccf_map(found["ccf"], ax=ax)
+        plots.ccf_map(*found["ccf"], ax=ax)
         ax.set_title(medium)
-        ax.collections[0].colorbar.set_label(rf"CCF ({found['ccf'].unit}/rad$^2$)")
-        for aim, (colour, dashes) in AIMS.items():
-            best = found[aim].best
+        for objective, (colour, dashes) in OBJECTIVES.items():
+            best = found[objective].best
             loop = best.gait.shape(np.linspace(0, 2 * np.pi, PHASES))
-            label = f"{aim}: {net(best):.3f} BL, path {best.length:.2f}"
+            label = f"{objective}: {net(best):.3f} BL, path {best.length:.2f}"
             ax.plot(*loop.T, color=colour, ls=dashes, lw=1.6, label=label)
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22))
-    fig.suptitle("CCF along the displacement, minimum-perturbation frame", fontsize=9)
+    fig.suptitle("CCF in the minimum-perturbation frame", fontsize=9)
     return fig
 
 

@@ -13,11 +13,11 @@ def compute() -> dict:
 
 @plots.styled
 def draw(numbers: dict):
-    fig, axes = plots.figure(10.8, 3.7, 3)
+    fig, axes = plots.figure(10.8, 3.0, 3, width_ratios=[1.15, 1.0, 1.0])
     field, study = numbers["map"], numbers["tables"]
     plots.ccf_map(field["ccf"], 0, field["gaits"], ax=axes[0, 0], error=field["error"])
-    for ax, (name, table) in zip(axes[0, 1:], study["tables"].items()):
-        plots.displacement(table, ax=ax, gait=fig11e_displacement.GAITS[name], errors=False)
+    fig11e_displacement.curves(axes[0, 1:], study["tables"])
+    plots.shared_legend(fig, "outside right center")
     return fig
 
 

@@ -1,14 +1,16 @@
 """Geometric mechanics of locomotion: from a force law to the displacement of a gait.
 
-    study = geomech.Study(geomech.load("three-link-glass"))  # a built-in name, or a TOML file
-    study.displacement("direct", amplitudes=[0.5, 1.0])
+    study = geomech.study("three-link-glass")  # or a TOML file, or study(medium, body, gait)
+    study.displacement([0.5, 1.0])            # a table with errors, which plots itself: .plot()
+    study.plot_ccf()                          # also .ccf(), .animate("swim.gif"), .optimise()
 
+study, Study, tiers, workers            what is computed of a scene; methods of prediction; processes
+optimise (or optimize), sweep, accuracy the best gait; a grid of parameters; error against time
 load, Scene, Swimmer, Numerics, toml    scenes: read, built and written
-Study, tiers, workers                   connection, CCF, cost, displacements, errors; processes
 media, bodies, gaits, effects, systems  the parts of scenes; `register` adds custom ones
 connection, curvature, reconstruct      the geometry of any velocity(alpha, alphadot)
-optimise (or optimize), undulation      the best gait; swimmers that undulate
-fit_log, plots                          measured gaits; figures
+fit_medium, fit_log, measured           media and connections fitted to measurements
+plots, undulation                       figures; swimmers that undulate
 Refusal                                 the error for whatever makes no sense: a ValueError with its facts
 On the command line: `geomech --help`; every key of a scene file: `geomech reference`.
 """
@@ -27,12 +29,17 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech import plots as plots
     from geomech import systems as systems
     from geomech import tiers as tiers
+    from geomech.app import Study as Study
+    from geomech.app import accuracy as accuracy
+    from geomech.app import fit_medium as fit_medium
+    from geomech.app import optimise as optimise
+    from geomech.app import optimize as optimize
+    from geomech.app import study as study
+    from geomech.app import sweep as sweep
     from geomech.geometry import connection as connection
     from geomech.geometry import curvature as curvature
     from geomech.geometry import reconstruct as reconstruct
     from geomech.measured import fit_log as fit_log
-    from geomech.optimisation import optimise as optimise
-    from geomech.optimisation import optimize as optimize
     from geomech.run import workers as workers
     from geomech.scenes import Numerics as Numerics
     from geomech.scenes import Scene as Scene
@@ -40,7 +47,6 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.scenes import toml as toml
     from geomech.scenes.kinds import register as register
     from geomech.studies import undulation as undulation
-    from geomech.studies.study import Study as Study
     from geomech.systems import Swimmer as Swimmer
     from rft import bodies as bodies
     from rft import effects as effects
@@ -60,10 +66,9 @@ _MODULES = {  # by their names here; none is imported before its first use
     "workers": "geomech.run.workers",
 }
 _OBJECTS = {
+    **dict.fromkeys(("Study", "accuracy", "fit_medium", "optimise", "optimize", "study", "sweep"), "geomech.app"),
     **dict.fromkeys(("load", "toml", "Scene", "Numerics"), "geomech.scenes"),
-    "Study": "geomech.studies.study",
     "Swimmer": "geomech.systems",
-    **dict.fromkeys(("optimise", "optimize"), "geomech.optimisation"),
     "fit_log": "geomech.measured",
     "register": "geomech.scenes.kinds",
     "Refusal": "rft.refusal",
@@ -82,4 +87,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted({*_MODULES, *_OBJECTS, "__doc__", "__file__", "__name__", "__path__", "__version__"})
+    return sorted({*_MODULES, *_OBJECTS, "__version__"})

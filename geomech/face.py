@@ -1,4 +1,4 @@
-"""Methods of values for Python and notebooks: how they are shown, saved and loaded."""
+"""Methods of connections and fields for Python and notebooks: how they are shown, saved and loaded."""
 
 from __future__ import annotations
 
@@ -52,53 +52,5 @@ class Field:
         return to_xarray(of_field(self, name, shapes))[name]
 
 
-class Study:
-    def _repr_html_(self) -> str:
-        from geomech.output import display
-
-        return display.study(self)
-
-    def to_xarray(self) -> Any:
-        """Return a Dataset with all that the file of `geomech connection` has. ImportError without the package xarray."""
-        from geomech.io.results import to_xarray
-        from geomech.studies.fields import of_study
-
-        return to_xarray(of_study(self))
-
-
-class Displacements:
-    def __repr__(self) -> str:
-        from geomech.text.displacement import text
-        from rft.refusal import printable
-
-        return printable(text(self.result))
-
-    def _repr_html_(self) -> str:
-        from geomech.output import display
-
-        return display.displacements(self)
-
-    def to_xarray(self) -> Any:
-        """Return a Dataset over tier, amplitude and component, with units and error estimates."""
-        from geomech.io.results import to_xarray
-        from geomech.studies.tables import as_stored
-
-        return to_xarray(as_stored(self.result))
-
-
-class Swept:
-    def _repr_html_(self) -> str:
-        from geomech.output import display
-
-        return display.swept(self)
-
-    def to_xarray(self) -> Any:
-        """Return a Dataset over the parameters and component, as the file of `geomech sweep`."""
-        from geomech.io.results import to_xarray
-        from geomech.studies.sweep import as_stored
-
-        return to_xarray(as_stored(self.result))
-
-
-for _face in (Connection, Field, Study, Displacements, Swept):
+for _face in (Connection, Field):
     METHODS[_face.__name__] = {k: v for k, v in vars(_face).items() if isinstance(v, FunctionType | classmethod)}

@@ -46,7 +46,7 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return [*__all__, *(module.name for module in pkgutil.iter_modules(__path__) if module.ispkg)]
 
 
 __all__ = [

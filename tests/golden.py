@@ -71,7 +71,7 @@ def tiers():
         study = geomech.Study(scene.with_numerics(**own))
         amplitudes = scene.gait.amplitude * np.array([0.6, 1.0])
         for tier in study.tiers:
-            yield f"tier, {name}, {tier}", study.displacement(tier, None, amplitudes)
+            yield f"tier, {name}, {tier}", study.poses(tier, None, amplitudes)
 
 
 def march(names):

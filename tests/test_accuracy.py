@@ -79,7 +79,7 @@ def test_families_are_of_order_four_where_nothing_kinks():
     exact = direct(viscous.system.velocity, Circle(), a)
     errors = []
     for n in counts:
-        adapted = Study(viscous.with_numerics(curves=int(n))).displacement("adapted", Circle(), a)
+        adapted = Study(viscous.with_numerics(curves=int(n))).poses("adapted", Circle(), a)
         errors.append(np.abs(adapted - exact).max())
     assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(4.0, abs=0.1)
 

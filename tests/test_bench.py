@@ -12,7 +12,7 @@ from geomech import scenes
 from geomech.gaits import Circle, Fourier, Sine
 from geomech.geometry import connection
 from geomech.scenes import Numerics, Scene
-from geomech.studies.study import Study
+from geomech.studies.study import Study, refuse_outside
 from geomech.systems import Solver, Swimmer
 from geomech.systems.base import length_unit
 from geomech.systems.capabilities import solver_of
@@ -32,29 +32,29 @@ def fits(monkeypatch):
 
 def test_tables_are_kept_under_what_they_depend_on(fits):
     study = Study(GLASS)
-    first = study.displacement("path")
-    study.displacement("area", amplitudes=[0.3, 0.5])
-    finer = study.turned(phases=64)
+    first = study.poses("path")
+    study.poses("area", amplitudes=[0.3, 0.5])
+    finer = study.with_numerics(phases=64)
     assert finer.fitted is study.fitted and finer.scene.numerics.phases == 64
     (
-        finer.displacement("area"),
-        finer.turned(harmonics=5, curves=9, tolerance=None).curvature,
+        finer.poses("area"),
+        finer.with_numerics(harmonics=5, curves=9, tolerance=None).curvature,
         study.curvature_error,
     )
     assert len(fits) == 1
     for changes in ({"grid": 9}, {"extent": 2.0}, {"directions": 4}, {"interpolation": 2}, {"regularisation": 1e-4}):
         before = len(fits)
-        other = study.turned(**changes)
-        assert np.abs(other.displacement("path") - first).max() > 1e-9
-        other.displacement("path")
+        other = study.with_numerics(**changes)
+        assert np.abs(other.poses("path") - first).max() > 1e-9
+        other.poses("path")
         assert len(fits) == before + 1
-    assert (study.displacement("path") == first).all() and len(fits) == 6
+    assert (study.poses("path") == first).all() and len(fits) == 6
     table = study.table("adapted", None, [0.5, 1.0])
     assert study.table("adapted", amplitudes=[1.0]) is table
     assert study.table("adapted", amplitudes=[0.9]) is not table
     assert study.table("adapted", Circle(), [1.0]) is not table
-    assert study.turned(phases=64).table("adapted", None, [1.0]) is not table
-    assert study.table("harmonic") is study.turned(phases=64).table("harmonic")
+    assert study.with_numerics(phases=64).table("adapted", None, [1.0]) is not table
+    assert study.table("harmonic") is study.with_numerics(phases=64).table("harmonic")
 
 
 def test_a_scene_is_small_and_remembers_nothing():
@@ -63,7 +63,7 @@ def test_a_scene_is_small_and_remembers_nothing():
         scene = scenes.load(name)
         held = dict(scene.__dict__)
         study = Study(scene.with_numerics(phases=32, grid=5) if solver_of(scene.system) else scene)
-        study.displacement("direct", amplitudes=[scene.gait.amplitude / 2])
+        study.poses("direct", amplitudes=[scene.gait.amplitude / 2])
         if "path" in study.tiers:
             study.compute_field()
         for value in (scene, study.scene):
@@ -181,7 +181,7 @@ def test_the_frame_is_the_scenes():
         and "frame" not in scenes.tables(top.changed(text=""))["body"]
     )
     turned = top.changed(system=in_frame(top.system, "link-3"))
-    assert turned.frame == "link-3" and Study(turned.with_numerics(phases=32)).displacement("direct").shape == (3,)
+    assert turned.frame == "link-3" and Study(turned.with_numerics(phases=32)).poses("direct").shape == (3,)
 
 
 def test_a_swimmer_may_be_told_in_full():
@@ -196,3 +196,16 @@ kind = "circle"
 """
     short = PLAIN + '[[effects]]\nkind = "end-caps"\nradius = 0.1\n'
     assert scenes.parse(nested) == scenes.parse(short) == scenes.parse('[system]\nkind = "swimmer"' + short)
+
+
+def test_a_gait_that_leaves_the_field_between_few_phases_is_refused(monkeypatch):
+    """Its largest angle lies at phase pi / 4096, between two of 4096; far inside the field not all phases are computed."""
+    late, computed = np.pi / 4096, []
+    gait = Fourier(cos=((np.cos(late),), (0.5,)), sin=((np.sin(late),), (0.0,)), amplitude=2.5 * (1 + 1e-7))
+    refuse_outside(GLASS, gait, phases=4096)
+    with pytest.raises(Refusal, match="alpha_1 = 2.5 rad lies outside the field's -2.5 to 2.5"):
+        refuse_outside(GLASS, gait, phases=8192)
+    cycle = Fourier.cycle
+    monkeypatch.setattr(Fourier, "cycle", lambda *of: computed.append(of[1]) or cycle(*of))
+    refuse_outside(GLASS, gait, [0.5, 2.0], phases=10**6)
+    assert computed == [4096]

@@ -148,7 +148,7 @@ def test_the_geometers_pipeline():
         study = Study(scene)
         seen = study.in_frame("minimum-perturbation")
         tables = study.fitted, study.metric, study.curvature, seen.fitted, seen.curvature
-        return tables, seen.displacement("area", amplitudes=[1.0]), study.displacement("direct", amplitudes=[1.0])
+        return tables, seen.poses("area", amplitudes=[1.0]), study.poses("direct", amplitudes=[1.0])
 
     def cpu(f, count=1):
         start = time.process_time()

@@ -98,14 +98,14 @@ def sandfish():
     """The built-in sandfish with fewer elements, and its displacement."""
     full = scenes.load("sandfish-loose").with_numerics(phases=64)
     made = full.changed(body=Backbone(ELEMENTS), gait=Sine(amplitude=0.2, elements=ELEMENTS))
-    return made, Study(made).displacement("direct")
+    return made, Study(made).poses("direct")
 
 
 @pytest.mark.parametrize("kind", HEADERS)
 def test_displacement_is_that_of_the_sine(kind, sandfish, tmp_path):
     made, exact = sandfish
     measured = gait(write(tmp_path, kind, count=64, places=80, amplitude=0.2))
-    np.testing.assert_allclose(Study(made).displacement("direct", measured), exact, atol=1e-5)
+    np.testing.assert_allclose(Study(made).poses("direct", measured), exact, atol=1e-5)
     assert exact[0] > 0.3
 
 
@@ -119,7 +119,7 @@ def test_smoothing_recovers_the_displacement(kind, noise, sandfish, tmp_path):
     ]
 
     def error(**options):
-        poses = np.array([Study(made).displacement("direct", gait(path, **options)) for path in paths])
+        poses = np.array([Study(made).poses("direct", gait(path, **options)) for path in paths])
         return np.sqrt(np.mean((poses - exact)[:, :2] ** 2) * 2)
 
     plain = error()
@@ -257,7 +257,7 @@ def test_file_lies_beside_the_scene(tmp_path, monkeypatch):
     code, out, err = geomech("displacement", "../snake.toml", "--amplitudes", "1", cwd=tmp_path / "elsewhere")
     assert (code, err) == (0, "")
     made = scenes.load(toml)
-    sine = Study(made).displacement("direct", Sine(amplitude=0.1, elements=ELEMENTS))
+    sine = Study(made).poses("direct", Sine(amplitude=0.1, elements=ELEMENTS))
     assert float(out.splitlines()[2].split()[1]) == pytest.approx(np.hypot(*sine[:2]), abs=2e-5)
     with pytest.raises(Refusal, match="cannot read"):
         scenes.parse(toml.read_text())

@@ -60,9 +60,9 @@ FOUND = {
 
 @pytest.mark.parametrize("name", FOUND)
 def test_the_balances_foretold_are_those_solved(name, solved):
-    scene, methods = FOUND[name]
-    foretold = Study(scene).cost([0.1, 0.2, 0.3], methods).balances
-    Study(scene).study([0.1, 0.2, 0.3], methods)
+    scene, tiers = FOUND[name]
+    foretold = Study(scene).cost([0.1, 0.2, 0.3], tiers).balances
+    Study(scene).study([0.1, 0.2, 0.3], tiers)
     assert foretold == sum(solved)
 
 

@@ -12,6 +12,7 @@ from registry import EFFECTS
 
 from geomech import scenes
 from geomech.gaits import Circle, Ellipse, Sine
+from geomech.studies.available import default_tiers
 from geomech.studies.study import Study
 from geomech.text.explain import explain
 from rft import (
@@ -362,25 +363,23 @@ INERTIAL = (
 
 def test_with_grain_inertia_frequency_matters():
     slow, fast = (scenes.parse(INERTIAL.format(f=f)) for f in (0.01, 3.0))
-    plain = Study(scenes.load("three-link-glass")).displacement("direct")
-    np.testing.assert_allclose(Study(slow).displacement("direct"), plain, atol=1e-4)
-    assert np.abs(Study(fast).displacement("direct") - plain).max() > 5e-3
+    plain = Study(scenes.load("three-link-glass")).poses("direct")
+    np.testing.assert_allclose(Study(slow).poses("direct"), plain, atol=1e-4)
+    assert np.abs(Study(fast).poses("direct") - plain).max() > 5e-3
     alpha, alphadot = fast.gait.cycle(16)
     twice = fast.system.velocity(alpha, 2 * alphadot) / 2
     assert np.abs(twice - fast.system.velocity(alpha, alphadot)).max() > 1e-3  # time is not the swimmer's own any more
 
 
-@pytest.mark.parametrize("method", ["area", "path", "harmonic"])
-def test_what_an_effect_breaks_is_refused_by_name(method):
+@pytest.mark.parametrize("tier", ["area", "path", "harmonic"])
+def test_what_an_effect_breaks_is_refused_by_name(tier):
     inertial = scenes.parse(INERTIAL.format(f=1.0))
-    assert Study(inertial).methods == ("direct",)
+    assert default_tiers(inertial.system) == ("direct",)
     with pytest.raises(Refusal, match="the effect grain-inertia, which is not rate-independent"):
-        Study(inertial).displacement(method)
+        Study(inertial).poses(tier)
     assert "; not rate-independent; costs" in explain(inertial)
     assert "not available: connection, CCF" in explain(inertial)
-    np.testing.assert_allclose(
-        Study(inertial).displacement("adapted"), Study(inertial).displacement("direct"), atol=1e-3
-    )
+    np.testing.assert_allclose(Study(inertial).poses("adapted"), Study(inertial).poses("direct"), atol=1e-3)
 
 
 def test_transients_draw(tmp_path):
@@ -413,7 +412,7 @@ def test_the_cost_of_effects_draws(tmp_path):
 def test_a_body_that_comes_to_the_surface_is_refused():
     text = SANDFISH.text.partition("[[effects]]")[0] + '[[effects]]\nkind = "depth-profile"\nslope = 10.0\n'
     with pytest.raises(ValueError, match="comes to the surface: lower the slope"):
-        Study(scenes.parse(text)).displacement("direct")
+        Study(scenes.parse(text)).poses("direct")
 
 
 PAST = {
@@ -427,12 +426,12 @@ PAST = {
 @pytest.mark.parametrize("name", PAST)
 def test_what_a_march_cannot_give_is_refused_by_name(name):
     swimmer = scenes.parse(f'{scenes.load("three-link-glass").text}\n[[effects]]\nkind = "{name}"\n{PAST[name]}\n')
-    assert Study(swimmer).tiers == Study(swimmer).methods == ("direct",)
+    assert Study(swimmer).tiers == default_tiers(swimmer.system) == ("direct",)
     for asked in (
-        lambda: Study(swimmer).displacement("area"),
-        lambda: Study(swimmer).displacement("path"),
-        lambda: Study(swimmer).displacement("harmonic"),
-        lambda: Study(swimmer).displacement("adapted"),
+        lambda: Study(swimmer).poses("area"),
+        lambda: Study(swimmer).poses("path"),
+        lambda: Study(swimmer).poses("harmonic"),
+        lambda: Study(swimmer).poses("adapted"),
         lambda: Study(swimmer).fitted,
         lambda: swimmer.system.velocity([0.1, 0.2], [1.0, 0.0]),
     ):

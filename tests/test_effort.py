@@ -67,8 +67,8 @@ def test_a_norm_shares_the_velocities_of_the_harmonics():
     assert np.array_equal(alone.table("harmonic").coefficients, table.coefficients)
     assert np.abs(alone.metric.coefficients - norm.coefficients).max() < 1e-12 * norm.coefficients.max()
     assert study.metric is norm
-    assert study.turned(grid=15).metric is not norm
-    assert study.turned(phases=64).metric is norm
+    assert study.with_numerics(grid=15).metric is not norm
+    assert study.with_numerics(phases=64).metric is norm
 
 
 def test_work_and_cost_of_transport_of_known_motions():

@@ -190,9 +190,9 @@ def test_optimal_gaits(tmp_path):
     """Sand's strokes reach further and bring more than the fluid's, and the cheap ones are shorter than the long."""
     numbers = optimal_gaits.compute(harmonics=2, starts=1, grid=11, phases=32)
     fluid, sand = numbers.values()
-    for aim in optimal_gaits.AIMS:
-        assert optimal_gaits.reach(sand[aim].gait) > 1.05 * optimal_gaits.reach(fluid[aim].gait)
-        assert sand[aim].value > 1.1 * fluid[aim].value
+    for objective in optimal_gaits.OBJECTIVES:
+        assert optimal_gaits.reach(sand[objective].gait) > 1.05 * optimal_gaits.reach(fluid[objective].gait)
+        assert sand[objective].value > 1.1 * fluid[objective].value
     for found in numbers.values():
         assert found["efficiency"].best.length < found["displacement"].best.length
     row = optimal_gaits.table(numbers).splitlines()[3].split()

@@ -79,7 +79,7 @@ def outcome(text):
         solution = read.system.solve(*read.gait.cycle(16 if read.gait.harmonics < 8 else 64))
         assert (solution.status != "unconverged").all()
         assert np.isfinite(solution.xi).all()
-        assert np.isfinite(Study(read).displacement("direct")).all()
+        assert np.isfinite(Study(read).poses("direct")).all()
         return "run"
     except ValueError as error:
         message = str(error)

@@ -350,7 +350,7 @@ def random_problem(rng, count):
 @pytest.mark.parametrize("backend", ["numpy", "numba"])
 @pytest.mark.parametrize(("problem", "batches"), [(random_problem, 400), (hard_problem, 1600)])
 def test_a_million_random_problems(problem, batches, backend):
-    """Media and bodies, 500 samples each, to a normalised residual of 1e-10: prints rows of rft/README.md."""
+    """Media and bodies, 500 samples each, to a normalised residual of 1e-10: prints rows of .docs/validation.md."""
     rng = np.random.default_rng(2026)
     residuals, iterations, stuck, failures = [], [], 0, 0
     for _ in range(batches):

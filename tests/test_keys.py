@@ -124,7 +124,7 @@ def test_the_command_prints_them_all_or_a_section(printed):
 
 def test_keys_of_ones_own_classes_are_told(tmp_path, monkeypatch):
     monkeypatch.setattr(kinds, "_texts", {})
-    section = (ROOT / "geomech" / "scenes" / "README.md").read_text().partition("## Laws, bodies")[2]
+    section = (ROOT / ".docs" / "how-it-works" / "extending.md").read_text().partition("## Laws, bodies")[2]
     path = tmp_path / "power.py"
     path.write_text(re.search(r"```python\n(.*?)```", section, re.S)[1])
     try:

@@ -36,7 +36,7 @@ from rft.laws.base import TermLaw, is_rate_independent
 from rft.refusal import Refusal
 from rft.registry import REGISTRIES
 
-PAGE = (pathlib.Path(__file__).parents[1] / "geomech" / "scenes" / "README.md").read_text()
+PAGE = (pathlib.Path(__file__).parents[1] / ".docs" / "how-it-works" / "extending.md").read_text()
 SMALL = Numerics(grid=7, phases=32)
 pytestmark = pytest.mark.usefixtures("own_parts")
 
@@ -97,9 +97,9 @@ def test_the_law_of_the_page_runs_as_it_stands_there(tmp_path, monkeypatch):
 def test_a_law_of_traction_alone_gives_every_tier_within_its_error(law):
     gait, body, amplitudes = Circle(amplitude=0.8, centre=(0.3, -0.2)), Chain((1, 1.4, 0.8)), np.array([0.5, 0.9])
     exact, bare = (Study(Scene(Swimmer(x, body), gait, SMALL)) for x in (law, Bare(law)))
-    finer = bare.turned(loads="gauss:96")  # leaves a quarter
+    finer = bare.with_numerics(loads="gauss:96")  # leaves a quarter
     for tier in ("area", "direct"):
-        ours, theirs, better = (x.displacement(tier, amplitudes=amplitudes) for x in (exact, bare, finer))
+        ours, theirs, better = (x.poses(tier, amplitudes=amplitudes) for x in (exact, bare, finer))
         size, off = np.hypot(*ours[-1, :2]), estimate.distance(ours, theirs).max()
         assert off < 0.04 * size
         assert estimate.distance(ours, better).max() <= max(off / 2, 1e-9)
@@ -147,7 +147,7 @@ def test_the_speed_matters_under_a_law_of_no_one_power():
             ValueError,
             match="no connection or CCF with the law .*no one power of the speed: use the direct tier, or take another law",
         ):
-            Study(Scene(swimmer, Circle(), SMALL)).displacement("path")
+            Study(Scene(swimmer, Circle(), SMALL)).poses("path")
     for law in (Viscous(), Coulomb(), Bare(Viscous()), Bare(Granular(1.8, 0.24)), Bare(Coulomb())):
         assert is_rate_independent(law)
 
@@ -257,7 +257,7 @@ def test_one_of_each_family_runs_everywhere_and_round_trips(name):
     assert toml(parse(anew)) == anew
     assert name in explain(scene)
     study = Study(scene)
-    table = study.study([0.4, 0.7], study.methods)
+    table = study.study([0.4, 0.7])
     assert np.isfinite(table["direct"]).all()
     with pytest.raises(ValueError, match="car|hinge|peanut|slick"):
         register(type("Other", (PARTS[name],), {"__module__": "elsewhere"}))  # two of one name
@@ -496,7 +496,7 @@ def test_parts_are_values_and_need_not_be_registered_from_python():
     with pytest.raises(ValueError, match="frozen"):
         Scene(Swimmer(Loose(Viscous()), Chain()), Circle())
     scene = Scene(Swimmer(Bare(Viscous(math.e)), Chain()), Circle(), SMALL)
-    assert Study(scene).displacement("area").shape == (3,)
+    assert Study(scene).poses("area").shape == (3,)
     with pytest.raises(Refusal, match="Bare is of no kind that a scene file can name"):
         toml(scene)
     assert set(GAITS) == GAITS.built_in

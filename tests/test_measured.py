@@ -29,7 +29,6 @@ from geomech.io import tables
 from geomech.io.results import write_netcdf
 from geomech.io.tables.mat import ERROR
 from geomech.measured import cycles, phase, regression, results, smooth, synthetic, unknowns
-from geomech.output import mat
 from geomech.scenes import Scene, load
 from geomech.studies import fields
 from geomech.studies.single import single
@@ -561,7 +560,7 @@ def test_a_field_is_read_back_as_a_system(usual, field):
     assert math.isclose(scene.frequency, usual.frequency)
     net, off = usual.displacement
     study = Study(scene)
-    np.testing.assert_allclose(study.displacement("direct", amplitudes=[1.0])[0], net, rtol=1e-10)
+    np.testing.assert_allclose(study.poses("direct", amplitudes=[1.0])[0], net, rtol=1e-10)
     table = study.study([1.0], ["path", "direct"])
     assert np.hypot(*off[:2]) <= table["estimate"]["direct"][0] < 1.5 * np.hypot(*off[:2])
     assert off[2] <= table["estimate_heading"]["direct"][0] < 1.5 * off[2]
@@ -575,9 +574,9 @@ def test_what_the_data_do_not_reach_is_refused(field):
     with pytest.raises(ValueError, match=r"the data do not reach alpha = \(0.2, -0.1\), \d"):
         system.velocity(np.array([0.2, -0.1]), np.array([1.0, 0.0]))
     with pytest.raises(Refusal, match="the data do not reach"):
-        study.displacement("direct", amplitudes=[0.5])
+        study.poses("direct", amplitudes=[0.5])
     with pytest.raises(Refusal, match="the area tier sums a field up, and A is known near the mean gait"):
-        study.displacement("area")
+        study.poses("area")
     with pytest.raises(Refusal, match="no gait but one to search"):
         geomech.optimisation.optimise(scene, "displacement")
     tube = study.fitted
@@ -593,7 +592,7 @@ def test_the_reach_is_that_of_the_data(usual):
     for side in (-0.125, 0.125):
         np.testing.assert_allclose(usual.known.reach(usual.known.loop.shape(t) + side * n), 1, atol=0.25)
     assert np.abs(usual.known.reach(usual.known.loop.shape(t))).max() < 1e-9
-    near = measured.fit_log(usual.log, within=0.03, harmonics=4)
+    near = measured.fit_log(usual.log, limits=0.03, harmonics=4)
     np.testing.assert_allclose(
         near.known.reach(near.known.loop.shape(t) + 0.03 * near.known.loop.normals(t)[..., 0]), 1
     )
@@ -630,7 +629,7 @@ def test_a_field_written_again_keeps_every_digit(field, tmp_path):
 def test_errors_of_A_go_with_it_into_a_mat_file(field, tmp_path, sign, order):
     """Nan where A is, which leaves nothing to look up."""
     study = Study(load(field / "mine.toml"))
-    mat.save_connection(tmp_path / "a.mat", study, sign, order)
+    fields.save_connection(tmp_path / "a.mat", study, sign=sign, order=order)
     first = xarray.open_dataset(field / "field.nc", engine="scipy")
     error = loadmat(tmp_path / "a.mat")[ERROR]
     np.testing.assert_array_equal(error if order == "ndgrid" else error.swapaxes(-1, -2), first.A_error)
@@ -666,11 +665,11 @@ def test_lengths_and_signs_of_a_field(usual, field, tmp_path):
 
 
 def test_a_tube_between_the_points_of_its_grid_is_looked_up_all_the_same(usual, tmp_path):
-    thin = measured.fit_log(usual.log, within=1e-5, harmonics=4)
+    thin = measured.fit_log(usual.log, limits=1e-5, harmonics=4)
     save_field(tmp_path / "thin.nc", thin)
     study = Study(Scene(Table(tmp_path / "thin.nc"), thin.gait))
     assert np.isnan(study.fitted.A).all()
-    np.testing.assert_allclose(study.displacement("direct"), thin.displacement[0], rtol=1e-9)
+    np.testing.assert_allclose(study.poses("direct"), thin.displacement[0], rtol=1e-9)
     assert single(study.scene.system, thin.known.loop.shape(np.array(1.0)), [1.0, 0.0])["residual"] is None
 
 
@@ -809,13 +808,13 @@ BAD = {
     "nine": (lambda r: r[: 9 * 30 + 15], "7 whole cycles, .*, are too few: give at least 10 in all"),
     "unsorted": (swapped, "line 103: t = .* comes after .*: sort the rows by time"),
     "twice": (changed(0, lambda t: t[0] + 0 * t, slice(99, 101)), "line 102: t = .* is given twice: keep one"),
-    "degrees": (changed(slice(1, 3), np.degrees), "line .*: alpha_1 reaches .* where joint angles are in rad: say --degrees"),
+    "degrees": (changed(slice(1, 3), np.degrees), "line .*: alpha_1 reaches .* where joint angles are in rad: say degrees"),
     "heading in degrees": (
-        changed(5, lambda x: np.degrees(x) % 360), "line .*: heading jumps by .*, a turn in degrees: say --degrees",
+        changed(5, lambda x: np.degrees(x) % 360), "line .*: heading jumps by .*, a turn in degrees: say degrees",
     ),
-    "one joint twice": (twice, "alpha_2 is 1 times alpha_1, .*: one shape variable recorded 2 times .*, by --columns"),
+    "one joint twice": (twice, "alpha_2 is 1 times alpha_1, .*: one shape variable recorded 2 times .*, by columns"),
     "one joint scaled": (scaled, "alpha_2 is -0.5 times alpha_1, but for a constant and noise"),
-    "idle": (idle, "alpha_2 does not move beyond its noise: leave it out with --columns"),
+    "idle": (idle, "alpha_2 does not move beyond its noise: leave it out with columns"),
     "drift": (drifting, "alpha_2 drifts from 0.1.* to 0.8.* over the log and swings by .*: .*; leave it out"),
     "kilometres": (changed(slice(3, 5), lambda x: 1e12 * x), "entries of A come out as large as .*: give x and y in body"),
     "constant": (changed(2, lambda x: 0 * x + 0.4), "alpha_2 does not move"),
@@ -851,7 +850,7 @@ def test_bad_logs_get_one_line(name, short, tmp_path):
         (("t", "alpha_1", "bend", "x", "y", "heading"), (), "one column of joint angles, and a gait is a loop"),
         (("t", "alpha_1", "alpha_1", "x", "y", "heading"), (), "column 'alpha_1' is there twice"),
         (NAMES, ("t", "alpha_1", "alpha_3", "x", "y", "heading"), "no column 'alpha_3'"),
-        (NAMES, ("t", "alpha_1", "x", "y", "heading"), "--columns are those of t, two joint angles or more"),
+        (NAMES, ("t", "alpha_1", "x", "y", "heading"), "columns are those of t, two joint angles or more"),
     ],
 )
 def test_missing_columns_are_named(names, columns, said, short, tmp_path):
@@ -963,7 +962,7 @@ def test_a_log_of_trajectory_is_read(field, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert command("trajectory", field / "mine.toml", "--cycles", "10", "-o", "tr.csv")[0] == 0
     f = measured.fit_log("tr.csv")
-    net = Study(load(field / "mine.toml")).displacement("direct")
+    net = Study(load(field / "mine.toml")).poses("direct")
     np.testing.assert_allclose(f.mean[0], net, atol=1e-4)
     np.testing.assert_allclose(f.displacement[0], net, atol=1e-4)
 

@@ -247,6 +247,6 @@ def test_every_command_takes_a_table(folder):
         assert code == 0, err
         if args[0] == "displacement":
             table = json.loads(out)
-            for method in ("direct", "path", "area"):
-                want = Study(plain).displacement(method, amplitudes=[0.5, 0.9])
-                np.testing.assert_allclose(table[method], want, atol=3e-6)
+            for tier in ("direct", "path", "area"):
+                want = Study(plain).poses(tier, amplitudes=[0.5, 0.9])
+                np.testing.assert_allclose(table[tier], want, atol=3e-6)

@@ -179,11 +179,11 @@ def test_a_scene_in_it(law):
     assert (scene.frame, own.frame) == ("minimum-perturbation", "mean")
     start = scene.gait.shape(np.zeros(1))[0]
     carried = lambda g: scene.system.field.net(g, start)
-    assert study.displacement("direct") == pytest.approx(carried(plain.displacement("direct")), abs=1e-14)
+    assert study.poses("direct") == pytest.approx(carried(plain.poses("direct")), abs=1e-14)
     for tier in ("path", "harmonic", "adapted"):
-        there, here = carried(plain.displacement(tier)), study.displacement(tier)
+        there, here = carried(plain.poses(tier)), study.poses(tier)
         assert np.abs(here - there)[:2].max() < 3e-3 * 0.3, tier
-    assert np.abs(study.displacement("direct") - plain.displacement("direct")).max() > 3e-4
+    assert np.abs(study.poses("direct") - plain.poses("direct")).max() > 3e-4
     found, first = study.fitted, plain.fitted
     assert found.A == pytest.approx(scene.system.field.connection(first), abs=1e-12)
     turned = np.abs(found.residual[2] - first.residual[2]).max()  # the heading's rate does not hang on the frame

@@ -134,7 +134,7 @@ def test_from_python_units_are_warned_of_by_name():
     for make in (
         lambda: Scene(VISCOUS.system, Circle(amplitude=30)),
         lambda: Scene(NoSlipSnake(), Ellipse(centre=(7, 0))),
-        lambda: Study(VISCOUS).displacement("direct", amplitudes=[1, -30]),
+        lambda: Study(VISCOUS).poses("direct", amplitudes=[1, -30]),
         lambda: Study(VISCOUS).study([30], ["direct"]),
         lambda: cheapest(VISCOUS, [30.0], 1.0),
         lambda: single_of(VISCOUS.system, [30, 17], [1, 0]),
@@ -153,7 +153,7 @@ def test_what_is_no_joint_angle_or_just_a_full_turn_is_not_noted():
         assert (code, err) == (0, "")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        assert Study(VISCOUS).displacement("direct", amplitudes=[30]).shape == (1, 3)
+        assert Study(VISCOUS).poses("direct", amplitudes=[30]).shape == (1, 3)
 
 
 def test_degrees_are_taken_wherever_angles_are(tmp_path):
@@ -221,7 +221,7 @@ def test_a_sine_of_negative_amplitude_is_the_mirrored_wave():
 def test_time_stepping_takes_negative_and_zero_amplitudes_too():
     """Of a circle about the straight chain a negative one is the mirror image."""
     text = PLAIN + '[[effects]]\nkind = "transient"\ntravel = 0.1\n[numerics]\ncycles = 1\nphases = 32\n'
-    below, rest, above = Study(scenes.parse(text)).displacement("direct", None, [-0.2, 0.0, 0.2])
+    below, rest, above = Study(scenes.parse(text)).poses("direct", None, [-0.2, 0.0, 0.2])
     np.testing.assert_allclose(rest, 0.0, atol=1e-15)
     np.testing.assert_allclose(below * [1, -1, -1], above, rtol=1e-9, atol=1e-12)
     assert np.abs(above).min() > 1e-5

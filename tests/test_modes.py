@@ -12,7 +12,6 @@ from geomech import scenes
 from geomech.gaits import Circle, Fourier, Wave
 from geomech.geometry import connection, curvature
 from geomech.geometry.coordinates import change_velocity
-from geomech.output import mat
 from geomech.scenes import Scene
 from geomech.studies import fields, sweep
 from geomech.studies.available import tiers
@@ -61,7 +60,7 @@ def test_tiers_are_those_of_the_plain_chain(tier, effects):
         assert effects and effects[0].kind == "transient"
         return
     a = [0.5, 1.0]
-    np.testing.assert_allclose(of_modes.displacement(tier, None, a), plain.displacement(tier, None, a), atol=1e-13)
+    np.testing.assert_allclose(of_modes.poses(tier, None, a), plain.poses(tier, None, a), atol=1e-13)
     if tier == "direct" and not of_modes.scene.system.traits.steps:
         estimates = [s.study(a, ["direct"])["estimate"]["direct"] for s in (of_modes, plain)]
         np.testing.assert_allclose(*estimates, rtol=1e-6, atol=1e-13)
@@ -89,7 +88,7 @@ def test_identity_modes_are_todays_chain(name):
     eye, n = Study(eye.with_numerics(grid=5, phases=32, curves=6, harmonics=5)), Study(scene)
     assert eye.tiers == n.tiers
     for tier in n.tiers:
-        np.testing.assert_allclose(eye.displacement(tier), n.displacement(tier), atol=1e-15)
+        np.testing.assert_allclose(eye.poses(tier), n.poses(tier), atol=1e-15)
     for found, wanted in ((eye.curvature, n.curvature), (eye.curvature_error, n.curvature_error)):
         np.testing.assert_allclose(found.values, wanted.values, atol=1e-13)
 
@@ -100,7 +99,7 @@ def test_one_mode_and_many_modes():
     back_and_forth = Fourier(cos=[[0.5, 0.1]], sin=[[0.2, 0.3]])
     assert tiers(one) == ("adapted", "path", "direct")
     for tier in ("path", "direct"):
-        moved = Study(Scene(one, back_and_forth).with_numerics(grid=9, phases=256)).displacement(tier)
+        moved = Study(Scene(one, back_and_forth).with_numerics(grid=9, phases=256)).poses(tier)
         np.testing.assert_allclose(moved, 0, atol=3e-5)
     all_of_them = Chain(LENGTHS, 0.3, FRAME, modes=(*ROWS, (1, -1, 1)))
     shape = np.linalg.solve(np.transpose(all_of_them.modes), (SHAPE @ ROWS).T).T
@@ -190,7 +189,7 @@ def test_modes_go_through_files(tmp_path):
     found = sweep.sweep(scene, {"body.waves": [0.8, 1.2]})["displacement"]
     for waves, pose in zip((0.8, 1.2), found):
         again = scene.changed(body=Chain((1,) * 7, modes="serpenoid", waves=waves))
-        np.testing.assert_allclose(pose, Study(again).displacement("direct"), atol=1e-13)
+        np.testing.assert_allclose(pose, Study(again).poses("direct"), atol=1e-13)
 
 
 def test_a_serpenoid_has_one_wave_if_it_does_not_say():
@@ -219,8 +218,8 @@ def test_a_wave_is_a_circle_in_serpenoid_modes(waves):
                                    .reshape(links - 1, 2, 16), 0, -1), atol=1e-14)  # fmt: skip
     plain = Swimmer(SAND, Chain(body.lengths))
     for tier in ("direct", "adapted"):
-        of_wave = Study(Scene(plain, wave).with_numerics(phases=32, curves=6)).displacement(tier)
-        of_modes = Study(Scene(Swimmer(SAND, body), circle).with_numerics(phases=32, curves=6)).displacement(tier)
+        of_wave = Study(Scene(plain, wave).with_numerics(phases=32, curves=6)).poses(tier)
+        of_modes = Study(Scene(Swimmer(SAND, body), circle).with_numerics(phases=32, curves=6)).poses(tier)
         np.testing.assert_allclose(of_wave, of_modes, atol=1e-13)
 
 
@@ -228,11 +227,11 @@ def test_a_wave_runs_to_the_tail_and_the_body_to_the_head():
     wave, t = Wave(joints=40, waves=1.5), np.linspace(0, 1, 5)
     crests = np.argmax(wave.shape(t)[:, 8:32], axis=-1)
     assert (np.diff(crests) <= 0).all() and crests[-1] < crests[0]
-    forward = Study(ROBOT).displacement("direct")
+    forward = Study(ROBOT).poses("direct")
     assert forward[0] > 0.2
     for backwards in (Wave(amplitude=0.87, waves=-1.0), Wave(amplitude=0.87, reverse=True)):
-        assert Study(ROBOT.changed(gait=backwards)).displacement("direct")[0] < -0.2
-    still = Study(ROBOT.changed(gait=Wave(amplitude=0.87, waves=0.0))).displacement("direct")
+        assert Study(ROBOT.changed(gait=backwards)).poses("direct")[0] < -0.2
+    still = Study(ROBOT.changed(gait=Wave(amplitude=0.87, waves=0.0))).poses("direct")
     np.testing.assert_allclose(still, 0, atol=1e-6)
 
 
@@ -241,7 +240,7 @@ def test_an_offset_turns_the_body():
     turned = {}
     for offset in (0.15, -0.15):
         study = Study(ROBOT.changed(gait=Wave(amplitude=0.6, offset=offset)))
-        turned[offset] = study.displacement("direct")[2]
+        turned[offset] = study.poses("direct")[2]
     assert turned[0.15] > 0.05
     assert turned[-0.15] == pytest.approx(-turned[0.15], abs=1e-12)
     wave = Wave(joints=3, amplitude=0.4, offset=0.2, centre=(0.1, 0.0, -0.1))
@@ -255,7 +254,7 @@ def test_a_wave_is_swept_and_asked_for(tmp_path):
     coarse = ROBOT.with_numerics(phases=32)
     found = sweep.sweep(coarse, over)
     one = coarse.changed(gait=Wave(amplitude=0.87, waves=0.8, offset=0.1))
-    np.testing.assert_allclose(found["displacement"][0, 1, 1], Study(one).displacement("direct"), atol=1e-13)
+    np.testing.assert_allclose(found["displacement"][0, 1, 1], Study(one).poses("direct"), atol=1e-13)
     code, out, _ = geomech("displacement", "seven-link-wave", "--amplitudes", "0.87", "--json")
     assert code == 0
     net = np.hypot(*json.loads(out)["direct"][0][:2])
@@ -281,11 +280,10 @@ def test_waves_that_make_no_gait_are_refused(wrong, said):
 def test_a_table_keeps_the_names_of_modes(tmp_path, ending):
     scene = Scene(Swimmer(SAND, MODES), Circle(amplitude=0.4)).with_numerics(grid=5, extent=0.6, phases=16)
     study = Study(scene)
-    save = {"nc": fields.save_connection, "mat": mat.save_connection}[ending]
-    save(tmp_path / f"modes.{ending}", study)
+    fields.save_connection(tmp_path / f"modes.{ending}", study)
     again = Table(tmp_path / f"modes.{ending}")
     assert shape_labels(again) == (("m_1", "rad"), ("m_2", "rad"))
-    save(tmp_path / f"twice.{ending}", Study(Scene(again, Circle())))
+    fields.save_connection(tmp_path / f"twice.{ending}", Study(Scene(again, Circle())))
     assert shape_labels(Table(tmp_path / f"twice.{ending}")) == shape_labels(again)
     with pytest.raises(ValueError, match="m_1 = .* lies outside"):
         refuse_outside(Scene(again, Circle(amplitude=9.0)))

@@ -111,9 +111,9 @@ def test_momentum_is_conserved_in_the_world(system, frame):
 
 def test_afloat_nothing_goes_anywhere_and_the_area_tells_how_far_it_turns():
     study = Study(Scene(AFLOAT, OVAL, Numerics(grid=61)))
-    direct = study.displacement("direct")
+    direct = study.poses("direct")
     assert np.abs(direct[:2]).max() < 1e-15 and abs(direct[2]) > 5e-3
-    np.testing.assert_allclose(study.displacement("area"), direct, atol=1e-6)
+    np.testing.assert_allclose(study.poses("area"), direct, atol=1e-6)
 
 
 def test_heavy_links_are_afloat():
@@ -158,9 +158,9 @@ def test_the_cart_drives_as_by_hand():
     heading = 0.2 * 0.8 * (np.sin(t) - np.cos(t))
     flow = 0.015 * 0.8 * (np.cos(t) - np.sin(t)) * np.exp(1j * (heading + 0.2 * 0.8))
     net = 2 * np.pi * flow.mean()
-    np.testing.assert_allclose(study.displacement("direct"), [net.real, net.imag, 0], atol=1e-14)
+    np.testing.assert_allclose(study.poses("direct"), [net.real, net.imag, 0], atol=1e-14)
     area = -(0.03**2) / 0.15 * np.pi * 0.8**2
-    np.testing.assert_allclose(study.displacement("area"), [0, area, 0], atol=1e-12)
+    np.testing.assert_allclose(study.poses("area"), [0, area, 0], atol=1e-12)
     assert net.imag == pytest.approx(area, rel=0.05)
 
 

@@ -7,7 +7,7 @@ import stat
 import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
-from PIL import Image
+from PIL import Image, ImageSequence
 from registry import BODIES, SYSTEMS
 
 from geomech import plots, scenes
@@ -140,7 +140,7 @@ SCENES = {
 def test_a_cycle_ends_where_the_direct_tier_says(name):
     scene = SCENES[name]
     n = scene.numerics.phases
-    net = Study(scene).displacement("direct")
+    net = Study(scene).poses("direct")
     one, two = moving.motion(scene), moving.motion(scene, 2)
     np.testing.assert_allclose(one.pose[-1], net, atol=1e-13)
     np.testing.assert_allclose(two.pose[:n], one.pose[:n], atol=1e-13)
@@ -275,8 +275,8 @@ def chain():
 def test_a_film_shows_body_track_and_shape(chain):
     found = moving.motion(chain[0].scene, 2)
     shown = animate.rows(32, 2)
-    np.testing.assert_array_equal(shown, np.arange(64))
-    np.testing.assert_array_equal(animate.rows(100, 2), np.arange(0, 200, 3))
+    np.testing.assert_array_equal(shown, np.arange(100) * 32 // 50)  # 25 a second, 2 s a cycle
+    np.testing.assert_array_equal(animate.rows(100, 2, 1.0), np.arange(0, 200, 4))
     fig, put = plots.stage(found, shown, *chain[1:])
     world, shapes = fig.axes[:2]
     for row in (0, 20, 51):
@@ -294,13 +294,39 @@ def test_a_film_shows_body_track_and_shape(chain):
     assert (world.get_xlabel(), world.get_ylabel(), world.get_aspect()) == ("x (BL)", "y (BL)", 1.0)
 
 
-def test_a_gif_has_a_picture_a_phase_and_no_two_alike(chain, tmp_path):
+@pytest.mark.parametrize(
+    ("frequency", "cycle", "caption"),
+    [
+        (None, 2.0, "1 cycle = 2 s"),
+        (1.0, 1.0, "real time"),
+        (2.5, 0.4, "real time"),
+        (3.0, 2 / 3, "0.5 × real time"),
+        (20.0, 0.5, "0.1 × real time"),
+        (0.1, 10.0, "real time"),
+        (0.04, 5.0, "5 × real time"),
+    ],
+)
+def test_films_are_in_real_time_or_tell_their_speed(frequency, cycle, caption):
+    at = animate.pace(frequency)
+    assert (at.cycle, at.caption) == (pytest.approx(cycle), caption)
+    shown = animate.rows(256, 3, frequency)
+    assert len(shown) / at.rate == pytest.approx(3 * cycle, abs=1.0 / at.rate)
+    np.testing.assert_allclose(shown, np.arange(len(shown)) / at.rate / cycle * 256, atol=1.0)
+    assert len(shown) <= 302
+
+
+def test_the_caption_of_a_film_is_beside_its_clock(chain):
+    fig, _ = plots.stage(chain[0], [0], caption="0.5 × real time")
+    assert fig.axes[0].get_title("right") == "0.5 × real time"
+
+
+def test_a_gif_shows_its_phases_and_takes_as_long_as_it_says(chain, tmp_path):
     told = []
     animate.save(tmp_path / "out.gif", *chain, progress=told.append)
     with Image.open(tmp_path / "out.gif") as film:
-        assert film.n_frames == len(told) == 32
+        assert film.n_frames in (32, 33) and len(told) == 50  # a picture that is shown twice is stored once
         assert film.size == (800, 360)
-        assert film.info["duration"] == 40
+        assert sum(frame.info["duration"] for frame in ImageSequence.Iterator(film)) == 2000
         film.seek(0)
         first = np.array(film.convert("RGB"), int)
         film.seek(10)
@@ -414,7 +440,7 @@ def test_an_mp4_hands_its_pictures_to_ffmpeg(chain, tmp_path, monkeypatch):
     installed(tmp_path, monkeypatch, 'cat > "$last"')
     animate.check_format(tmp_path / "out.mp4")
     animate.save(tmp_path / "out.mp4", *chain)
-    raw = np.fromfile(tmp_path / "out.mp4", np.uint8).reshape(32, 360, 800, 3)
+    raw = np.fromfile(tmp_path / "out.mp4", np.uint8).reshape(50, 360, 800, 3)
     assert "-s 800x360" in (tmp_path / "said").read_text()
     assert (raw[0, 0, 0] == 255).all() and (raw[0] != raw[10]).any()
 

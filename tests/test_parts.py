@@ -125,7 +125,13 @@ import json
 from geomech.geometry.connection import Connection
 from geomech.io.tables import FORMATS, Stored
 
-@FORMATS.register(suffix=".json")
+def write(path, result, sign="+"):
+    A = (1 if sign == "+" else -1) * result["A"].values
+    axes = [result[f"alpha_{k + 1}"].values.tolist() for k in range(A.shape[1])]
+    with open(path, "w") as file:
+        json.dump({"axes": axes, "A": A.tolist()}, file)
+
+@FORMATS.register(suffix=".json", write=write, settings=("sign",), joints=2, whole=False)
 def parse(raw, sign, order, sha256):
     told = json.loads(raw)
     axes, A = tuple(np.array(a) for a in told["axes"]), np.array(told["A"])
@@ -173,6 +179,23 @@ def test_commands_use_one_of_each(name):
     assert code == 0 and "egg gait" in out, err
 
 
+def test_a_connection_is_written_in_a_format_of_ones_own(folder):
+    """With its settings and its limits; without the plug-in the endings that there are."""
+    argv = ["connection", "trike.toml", "-o", "made.json"]
+    assert "end the name of a connection in .nc or .mat" in geomech(*argv, *PLUGINS[:-2])[2]
+    assert geomech(*argv, "--sign", "-", *PLUGINS)[0] == 0
+    written, wanted = json.loads((folder / "made.json").read_text()), Study(library.load("trike.toml")).fitted
+    np.testing.assert_array_equal(written["A"], -wanted.A)
+    np.testing.assert_array_equal(written["axes"], wanted.axes)
+    assert "--order is that of a .mat file: drop it, a .json" in geomech(*argv, "--order", "ndgrid", *PLUGINS)[2]
+    body = (
+        '[medium]\nlaw = "viscous"\n[body]\nkind = "chain"\nlengths = [1, 1, 1, 1]\n[gait]\nkind = "wave"\njoints = 3\n'
+    )
+    (folder / "four.toml").write_text(body)
+    code, _, err = geomech("connection", "four.toml", "-o", "four.json", *PLUGINS)
+    assert code == 2 and "a .json file has a layout of 2 joints, and this body has 3: write a .nc file" in err
+
+
 def test_what_was_loaded_is_in_its_registry_and_in_scenes(folder):
     for name in FILES:
         assert kinds.load_file(folder / f"own_{name}.py")
@@ -187,7 +210,7 @@ def test_what_was_loaded_is_in_its_registry_and_in_scenes(folder):
         again = library.toml(scene.changed(text="", numerics=Numerics(grid=8, phases=32)))
         assert library.toml(parse(again)) == again
         study = Study(scene)
-        assert np.isfinite(study.study([0.3], study.methods)["direct"]).all() and "leading" in study.tiers
+        assert np.isfinite(study.study([0.3])["direct"]).all() and "leading" in study.tiers
     assert library.load(folder / "skate.toml").changed(grip=0.7).system.wrapped.grip == 0.7
     assert tables.load(folder / "own.json").length == 0.5
 
@@ -222,10 +245,10 @@ def test_five_members_and_functions_go_through_everything(system, tmp_path):
         found = np.hypot(*(np.array(table[tier]) - truth).T[:2])
         assert (found <= 1e-9 + np.array(table["estimate"][tier])).all(), tier
     framed = study.in_frame("minimum-perturbation")
-    assert framed.displacement("direct", None, [0.5]).shape == (1, 3)
+    assert framed.poses("direct", None, [0.5]).shape == (1, 3)
     with pytest.raises(Refusal, match="has one frame, 'mean'"):
         study.in_frame("link-1")
-    found = optimise(scene, harmonics=1, within=1.2)
+    found = optimise(scene, harmonics=1, limits=1.2)
     assert found.value > np.hypot(*truth[-1, :2])
     plots.save(plots.displacement_figure({"circle": table}, [scene.gait]), tmp_path / "a.png")
     plots.save(plots.ccf_figure(study.curvature), tmp_path / "b.png")

@@ -1,21 +1,27 @@
 """What is drawn is what was computed: the data in the artists, not the look."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from artists import mesh, only
 from matplotlib.collections import QuadMesh
+from matplotlib.colors import to_rgba
 from matplotlib.quiver import Quiver
 
 from geomech import plots, scenes
-from geomech.gaits import Ellipse
+from geomech.gaits import Butterfly, Circle, Ellipse
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
+from geomech.plots.displacements import ERROR, MEASURED, MEDIUM, TO_ROUNDING
 from geomech.plots.precision import KNOBS as PRECISION
 from geomech.plots.precision import PANELS
+from geomech.scenes.measurements import read
 from geomech.studies.study import Study
 from geomech.studies.tiered import KNOBS
 from geomech.systems.base import shape_labels
 from geomech.tiers import TIERS
+from rft.refusal import Refusal
 
 AXES = np.linspace(-1.0, 1.5, 11), np.linspace(-0.5, 2.0, 9)
 SHAPES = np.meshgrid(*AXES, indexing="ij")
@@ -192,7 +198,8 @@ LINES = {
 
 @pytest.mark.parametrize("quantity", LINES)
 def test_lines_of_displacement_are_a_quantity_of_each_tier(quantity):
-    """With bars of the errors, in the unit of the quantity, and a band of what the medium leaves open."""
+    """With bands of the errors, in the unit of the quantity and the colour of the tier, and one of what the medium leaves
+    open; the legend tells them apart."""
     label, direct, area, error = LINES[quantity]
     table = {"amplitude": [0.5, 1.0], "direct": [[-0.3, 0.4, 0.1], [0.6, 0.8, 9.0]], "area": [[0.0, 1.0, 0], [2, 0, 0]]}
     both = lambda x: {"direct": [x, x], "area": [x, x]}
@@ -207,21 +214,101 @@ def test_lines_of_displacement_are_a_quantity_of_each_tier(quantity):
     lines = {line.get_label(): line for line in ax.lines}
     for tier, values in (("direct", direct), ("area", area)):
         np.testing.assert_allclose(lines[TIERS[tier].label].get_xydata(), np.transpose([[0.5, 1.0], values]))
-    assert len(lines) == 3
     assert (ax.get_xlabel(), ax.get_ylabel()) == (Ellipse().amplitude_label, label)
-    bars = [c for c in ax.collections if hasattr(c, "get_segments")]
-    np.testing.assert_allclose([np.ptp(s[:, 1]) / 2 for c in bars for s in c.get_segments()], error)
-    (band,) = [c for c in ax.collections if c not in bars]
-    box = band.get_datalim(ax.transData)
-    np.testing.assert_allclose([box.y0, box.y1], [direct[0] - 0.2, direct[1] + 0.4])
+    bands = {c.get_label(): band(c) for c in ax.collections}
+    np.testing.assert_allclose(bands.pop(MEDIUM), [np.subtract(direct, [0.2, 0.4]), np.add(direct, [0.2, 0.4])])
+    (of_area, of_direct) = bands.values()
+    for found, values in ((of_area, area), (of_direct, direct)):
+        np.testing.assert_allclose(found, [np.subtract(values, error), np.add(values, error)])
+    colours = [tuple(c.get_facecolor()[0]) for c in ax.collections]
+    assert colours[:2] == [to_rgba(TIERS[t].colour, 0.14) for t in ("area", "direct")] and len({*colours}) == 3
+    legend = [t.get_text() for t in ax.get_legend().get_texts()]
+    assert legend == [TIERS["area"].label, TIERS["direct"].label, ERROR, MEDIUM]
+    alone = plots.displacement(one(table), quantity=quantity)
+    assert [t.get_text() for t in alone.get_legend().get_texts()] == legend
+
+
+def one(entry):
+    """What a table has of its first amplitude alone."""
+    if isinstance(entry, dict):
+        return {k: one(v) for k, v in entry.items()}
+    return entry[:1] if isinstance(entry, list) else entry
+
+
+def band(collection):
+    """Lower and upper edge (2, B) of an area between two curves."""
+    (path,) = collection.get_paths()
+    x, y = path.vertices.T
+    at = np.unique(x)
+    return np.array([[f(y[x == a]) for a in at] for f in (np.min, np.max)])
+
+
+def test_measurements_are_points_with_bars_of_their_errors():
+    table = {"amplitude": [0.5, 1.0], "direct": [[-0.3, 0.4, 0.1], [0.6, 0.8, 9.0]]}
+    data = {"amplitude": [0.4, 0.9], "value": [0.1, 0.2], "error": [0.02, 0.03]}
+    ax = plots.displacement(table, data=data)
+    (points,) = (c for c in ax.containers if c.get_label() == MEASURED)
+    np.testing.assert_allclose(points.lines[0].get_xydata(), [[0.4, 0.1], [0.9, 0.2]])
+    (bars,) = points.lines[2]
+    np.testing.assert_allclose([s[:, 1] for s in bars.get_segments()], [[0.08, 0.12], [0.17, 0.23]])
+    assert [t.get_text() for t in ax.get_legend().get_texts()] == [TIERS["direct"].label, MEASURED]
+    for names, where in (((), 0), (("y", "x"), 0)):
+        fig = plots.displacement_figure({"circle": table}, [Ellipse()], components=names, data=data)
+        assert [any(c.get_label() == MEASURED for c in ax.containers) for ax in fig.axes].index(True) == where
+
+
+def test_panels_that_are_zero_are_left_out_with_a_reason():
+    """By symmetry, whatever a coarse tier says; to rounding; in one row of two; not where one is asked for."""
+    glass, turns = (
+        scenes.load("three-link-glass").system,
+        "heading: zero, as the second half of the cycle mirrors the first",
+    )
+    moves = {"amplitude": [0.5], "direct": [[0.1, 0.02, 1e-17]], "area": [[0.1, 0.0, 1e-7]]}
+    shift = {"amplitude": [0.5], "direct": [[0.1, 0.0, 0.0]]}
+    titles = lambda fig: [ax.get_ylabel().partition(" per")[0] for ax in fig.axes]
+    fig = plots.displacement_figure({"circle": moves}, [Circle()], system=glass)
+    assert titles(fig) == ["x", "y", "net distance"] and fig.get_supxlabel() == turns
+    both = {"circle": moves, "butterfly": shift}
+    fig = plots.displacement_figure(both, [Circle(), Butterfly()], system=glass)
+    assert titles(fig) == ["x", "y", "net distance", "x", "", "net distance"]
+    (word,) = (" ".join(t.get_text().split()) for t in fig.axes[4].texts)
+    assert word == "y: zero, as the cycle run backwards is its own image, head for tail"
+    fig = plots.displacement_figure({"butterfly": shift}, [Butterfly()], system=glass)
+    assert titles(fig) == ["x", "net distance"] and "y: zero" in fig.get_supxlabel() and turns in fig.get_supxlabel()
+    fig = plots.displacement_figure({"a": shift}, [Circle()])  # of a system that is not known
+    assert titles(fig) == ["x", "net distance"] and fig.get_supxlabel() == f"y and heading: zero, as {TO_ROUNDING}"
+    fig = plots.displacement_figure({"a": shift}, [Circle()], system=glass, components=("theta", "x"))
+    assert titles(fig) == ["heading", "x"] and not fig.get_supxlabel()
+    with pytest.raises(Refusal, match="component: 'z' is unknown"):
+        plots.displacement_figure({"a": shift}, [Circle()], components=("z",))
+
+
+@pytest.mark.parametrize(
+    ("header", "rows", "angle", "expected"),
+    [
+        ("amplitude,value,error", "1,2,3", False, (1, 2, 3)),
+        ("error_bl,amplitude_deg,value (BL)", "0.5,180,2", False, (np.pi, 0.84, 0.21)),
+        ('"value_mm","amplitude [rad]"', "30,1.5", False, (1.5, 0.03, None)),
+        ("amplitude,value_deg,error_rad", "1,90,0.1", True, (1, np.pi / 2, 0.1)),
+    ],
+)
+def test_measurements_are_read_in_the_units_of_the_results(header, rows, angle, expected, tmp_path):
+    (tmp_path / "m.csv").write_text(f"# from the lab\n{header}\n{rows}\n")
+    glass = scenes.load("three-link-glass")
+    scene = glass.changed(system=replace(glass.system, body=replace(glass.system.body, length=0.42)))
+    found = read(tmp_path / "m.csv", scene, angle)
+    for name, value in zip(("amplitude", "value", "error"), expected):
+        assert found.get(name, [None])[0] == (value if value is None else pytest.approx(value))
 
 
 def test_four_quantities_and_the_speed():
     glass = scenes.load("three-link-viscous").changed(gait=Ellipse(frequency=2.5))
     table = Study(glass).study([0.5, 1.0], ["direct"])
-    fig = plots.displacement_figure({"ellipse": table}, [glass.gait])
+    names = ("x", "y", "theta", "distance")
+    fig = plots.displacement_figure({"ellipse": table}, [glass.gait], components=names)
     assert [ax.get_ylabel() for ax in fig.axes] == [f"{q} per cycle ({u})" for q, u in (
         ("x", "BL"), ("y", "BL"), ("heading", "rad"), ("net distance", "BL"))]  # fmt: skip
+    assert len(plots.displacement_figure({"ellipse": table}, [glass.gait]).axes) == 3  # its heading is zero
     (right,) = fig.axes[3].child_axes
     assert right.get_ylabel() == "speed (BL/s) at 2.5 Hz"
     fig.draw_without_rendering()
@@ -351,11 +438,49 @@ def test_a_row_of_rounding_has_no_arrows():
 
 @pytest.mark.parametrize(("name", "rows"), [("three-link-floating", [2]), ("differential-drive", [1])])
 def test_what_is_nothing_but_rounding_is_drawn_as_nothing(name, rows):
-    """No patterns of 1e-16, no hatching over them; the strip of a motion shows what there is."""
+    """No patterns of 1e-16, no hatching over them; left out with a word unless it is asked for."""
     study = Study(scenes.load(name).with_numerics(grid=9, phases=16))
-    made = plots.ccf_figure(study.curvature, [study.scene.gait], error=study.curvature_error)
+    draw = lambda **options: plots.ccf_figure(
+        study.curvature, [study.scene.gait], error=study.curvature_error, **options
+    )
+    made = draw(components=("x", "y", "theta"))
     for k in range(3):
         colours = np.asarray(made.axes[k].collections[0].get_array())
         assert (np.abs(colours).max() > 1e-3) == (k in rows)
-        assert k in rows or made.axes[k].get_legend() is None
         assert ([x.get_text() for x in made.axes[3 + k].get_yticklabels()] == ["0"]) == (k not in rows)
+    assert not made.get_supxlabel()
+    made = draw()
+    titles = [ax.get_title() for ax in made.axes if ax.get_title()]
+    assert [title.partition("$: ")[2] for title in titles] == [("forward", "sideways", "turning")[k] for k in rows]
+    assert made.get_supxlabel().endswith(": zero everywhere")
+    assert made.get_supxlabel().count("CCF") == 3 - len(rows)
+
+
+def test_colours_have_a_limit():
+    """A number or a percentile of the size; arrows of the bar say where there is more. One legend for all panels."""
+    values = np.stack([SHAPES[0], 2 * SHAPES[1], SHAPES[0] + 9])
+    field, error = Field(AXES, values), Field(AXES, np.where(SHAPES[1] > 1.2, 50.0, 1e-3) * np.ones((3, 1, 1)))
+    limits = lambda **o: [
+        only(ax, QuadMesh).get_clim()[1] for ax in plots.ccf_figure(field, **o).axes[: len(o["components"])]
+    ]
+    assert limits(components=("theta", "x"), clim=0.25) == [0.25, 0.25]
+    expected = [np.percentile(np.abs(x), 90) for x in values]
+    np.testing.assert_allclose(limits(components=("x", "y", "theta"), clim="90%"), expected)
+    for clim, ends in ((None, "neither"), (1.2, "max"), (0.5, "both")):
+        bar = only(plots.ccf_figure(field, components=("x",), clim=clim).axes[0], QuadMesh).colorbar
+        assert bar.extend == ends
+    fig = plots.ccf_figure(field, error=error)
+    assert [t.get_text() for legend in fig.legends for t in legend.get_texts()] == [plots.HATCHED]
+    assert not any(ax.get_legend() for ax in fig.axes)
+
+
+def test_components_choose_rows_of_the_connection():
+    A = np.random.default_rng(1).normal(size=(3, 2, 11, 9))
+    A[1] = 0.0
+    fitted = Connection(AXES, A, np.abs(A[:, 0]), np.abs(A[:, 0]))
+    titles = lambda **o: [
+        ax.get_title().partition("$: ")[2] for ax in plots.connection_figure(fitted, **o).axes if ax.get_title()
+    ]
+    assert titles() == ["forward", "turning"]
+    assert titles(components=("y", "theta")) == ["sideways", "turning"]
+    assert plots.connection_figure(fitted).get_supxlabel() == r"$\mathbf{A}^{y}$: zero everywhere"

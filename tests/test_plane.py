@@ -142,7 +142,7 @@ def test_the_spread_is_that_of_another_surface():
         found.append(se2.exp(2 * np.pi * total / 40))
     apart = max(np.hypot(*(x - found[-1])[:2]) for x in found)
     assert study.spread("area", amplitudes=sizes)[0, 0] == pytest.approx(apart, rel=0.02)
-    np.testing.assert_allclose(study.displacement("area", amplitudes=sizes)[0], found[-1], atol=3e-4)
+    np.testing.assert_allclose(study.poses("area", amplitudes=sizes)[0], found[-1], atol=3e-4)
 
 
 def test_commands_tell_the_surface_and_draw_slices(tmp_path):
@@ -254,7 +254,7 @@ def test_beyond_the_field_tiers_solve_around_the_gait(monkeypatch):
     assert around["surface_spread"]["area"] == pytest.approx(found["surface_spread"]["area"], rel=0.3)  # fewer surfaces
     jobs = study.cost(*asked)
     assert jobs.balances >= study.plan("path").balances(2, 256) == 2 * 256 * 64
-    assert study.displacement("area").shape == study.displacement("path").shape == (3,)
+    assert study.poses("area").shape == study.poses("path").shape == (3,)
 
 
 def test_the_integral_by_stokes_is_that_of_the_two_form():
@@ -354,8 +354,8 @@ def test_a_run_of_three_joints_has_its_field_and_all_slices(tmp_path, monkeypatc
     drawn, scene = {}, Scene(system, LOOP, Numerics(grid=5, extent=1.2, phases=32))
     monkeypatch.setattr(report, "_save", lambda fig, stem: drawn.update({stem.name: fig}))
     for name in ("plane_connection_figure", "planes_figure"):
-        monkeypatch.setattr(report.plots, name, lambda planes, *gait, labels: [one.pair for one in planes])
-    monkeypatch.setattr(report.plots, "displacement_figure", lambda tables, *told: [*tables])
+        monkeypatch.setattr(report.plots, name, lambda planes, *gait, **options: [one.pair for one in planes])
+    monkeypatch.setattr(report.plots, "displacement_figure", lambda tables, *told, **options: [*tables])
     found = Report(scene).ask()
     report.write(found, tmp_path)
     pairs = [(0, 1), (0, 2), (1, 2)]

@@ -112,7 +112,7 @@ def test_a_table_from_python_shows_how_far_it_is(notebook, monkeypatch):
     assert np.isfinite(study.fitted.A).all()
     assert "connection of three-link-viscous, 72 force balances: done in 0 s" in notebook[-1]
     before = len(notebook)
-    study.displacement("path", None, [0.3])
+    study.poses("path", None, [0.3])
     assert len(notebook) == before  # it is there already
 
 
@@ -128,6 +128,6 @@ def test_a_command_in_a_pipe_says_how_far_its_tables_are(monkeypatch, capsys):
     solve = Swimmer.velocity
     monkeypatch.setattr(Swimmer, "velocity", lambda self, *x: time.sleep(0.1) or solve(self, *x))
     with terminal.progress("displacement of x"):
-        Study(scenes.load("three-link-glass").with_numerics(grid=5)).displacement("harmonic")
+        Study(scenes.load("three-link-glass").with_numerics(grid=5)).poses("harmonic")
     lines = capsys.readouterr().err.splitlines()
     assert any(line.startswith("harmonics of three-link-glass, 216 force balances: under way") for line in lines)

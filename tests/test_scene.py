@@ -9,6 +9,7 @@ import pytest
 
 import rft
 from geomech import scenes
+from geomech.studies.available import default_tiers
 from geomech.studies.study import Study
 from geomech.systems.base import length_unit
 from rft import Chain, Granular, Viscous
@@ -42,20 +43,29 @@ def test_a_study_has_every_tier_its_errors_and_times(name):
     """Numbers of the scenes are pinned in test_builtin_scenes.py; a study's are those of `displacement`, tier by tier."""
     loaded = scenes.load(name).with_numerics(grid=11, phases=64)
     study, amplitudes = Study(loaded), [0.1, 0.3]
-    table = study.study(amplitudes, study.methods)
+    table = study.study(amplitudes)
     named = ["x", "y", "heading", "net_distance"]
     errors = ["estimate", "estimate_heading"]
-    assert [*table] == ["amplitude", *study.methods, *errors, *named, "body_length", "units", "seconds", "kept"]
+    assert [*table] == [
+        "amplitude",
+        *default_tiers(loaded.system),
+        *errors,
+        *named,
+        "body_length",
+        "units",
+        "seconds",
+        "kept",
+    ]
     assert table["amplitude"] == amplitudes
-    for method in study.methods:
-        np.testing.assert_allclose(table[method], study.displacement(method, None, amplitudes), atol=1e-9)
-        assert len(table["estimate"][method]) == 2
-        assert min(table["estimate"][method]) > 0
-    looked_up = [plan.table.name for plan in map(study.plan, study.methods) if plan.table]
+    for tier in default_tiers(loaded.system):
+        np.testing.assert_allclose(table[tier], study.poses(tier, None, amplitudes), atol=1e-9)
+        assert len(table["estimate"][tier]) == 2
+        assert min(table["estimate"][tier]) > 0
+    looked_up = [plan.table.name for plan in map(study.plan, default_tiers(loaded.system)) if plan.table]
     tables = {"field"} if "connection" in looked_up else set()
     tables |= {"harmonic table"} if name == "three-link-glass" else set()
-    assert set(table["seconds"]) == {*study.methods} | tables
-    again = study.study(amplitudes, study.methods)
+    assert set(table["seconds"]) == {*default_tiers(loaded.system)} | tables
+    again = study.study(amplitudes)
     assert table["kept"] == [] and set(again["kept"]) == tables
     assert {k: table["seconds"][k] for k in tables} == {k: again["seconds"][k] for k in tables}  # what building took
     assert all(v >= 0 for v in table["seconds"].values())
@@ -171,16 +181,16 @@ def test_the_path_of_a_linear_medium_needs_no_field():
 def test_four_links_have_an_area_tier_and_two_have_none():
     text = GOOD.replace("[1, 2, 1]", "[1, 1, 1, 1]").split("[gait]")[0]
     four = scenes.parse(text + '[gait]\nkind = "fourier"\ncos = [[1.0], [0.5], [0.0]]\nsin = [[0.0], [0.5], [1.0]]')
-    assert Study(four).methods == ("area", "path", "direct")
-    assert np.isfinite(Study(four).displacement("direct")).all()
+    assert default_tiers(four.system) == ("area", "path", "direct")
+    assert np.isfinite(Study(four).poses("direct")).all()
     two = scenes.parse(text.replace("[1, 1, 1, 1]", "[1, 1]") + '[gait]\nkind = "wave"\njoints = 1\n')
     with pytest.raises(Refusal, match="the area tier takes two joints and more"):
-        Study(two).displacement("area")
+        Study(two).poses("area")
 
 
 def test_loose_glass_circles():
     """Displacement per cycle on circles of 0.5, 1 and 1.75 rad, an independent computation's three digits."""
-    got = Study(scenes.load("three-link-glass")).displacement("direct", amplitudes=np.array([0.5, 1.0, 1.75]))
+    got = Study(scenes.load("three-link-glass")).poses("direct", amplitudes=np.array([0.5, 1.0, 1.75]))
     np.testing.assert_allclose(np.hypot(got[:, 0], got[:, 1]), [0.0121, 0.0638, 0.1378], rtol=0.01)
 
 

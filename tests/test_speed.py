@@ -112,7 +112,7 @@ def test_every_displacement_is_a_speed():
     assert set(table) - set(plain) == {"frequency", "speed", "speed_body_lengths", "turning_rate"}
     answer = cheapest(scene, amplitudes, 1e-2)
     np.testing.assert_allclose(answer["speed"][answer["tier"]], 2.5 * np.array(answer["net_distance"][answer["tier"]]))
-    lines = displacement.text(table.result, "s").splitlines()
+    lines = displacement.full(table.result, "s").splitlines()
     for unit, length in (("m", 1.0), ("BL", 0.3)):
         (at,) = [k for k, x in enumerate(lines) if x.startswith(f"s: speed ({unit}/s) at 2.5 Hz")]
         a, *_, direct, error = lines[at + 3].split()
@@ -123,7 +123,7 @@ def test_every_displacement_is_a_speed():
 def test_tables_have_one_unit_a_row():
     scene = scenes.parse(CHAIN)
     table = Study(scene).study([1.0], ["direct"])
-    lines = displacement.text(table.result, "s").splitlines()
+    lines = displacement.full(table.result, "s").splitlines()
     found = {}
     for head, _, row in zip(lines[::3], lines[1::3], lines[2::3]):
         if head.startswith("s: "):

@@ -138,7 +138,7 @@ def test_pictures(fitted):
         assert all(ax.get_title() for ax in fig.axes[:3])
     for fig in figures[::4]:
         fig.canvas.draw()
-    rings = [t.get_text() for t in figures[2].axes[0].get_legend().get_texts()]
+    rings = [t.get_text() for t in figures[2].legends[0].get_texts()]
     assert rings == [plots.RINGS]
     drawn = figures[0].axes[0].lines[-2].get_xydata()
     assert np.nanmax(np.abs(drawn - plane(gait.shape(np.linspace(0, 2 * np.pi, 400))))) < 1e-12

@@ -32,7 +32,7 @@ def test_parameters_of_a_medium_given_by_name_can_be_swept():
     text = named[0] + '[medium]\nname = "glass-0.3mm-close"\n[body]' + named[2].partition("[body]")[2]
     results = sweep.sweep(scenes.parse(text).with_numerics(phases=32), over)
     alone = GLASS.changed(medium=Granular(C=CATALOGUE["glass-0.3mm-close"].medium.C, gamma0=np.radians(20.0)))
-    np.testing.assert_allclose(results["displacement"][1, 0], Study(alone).displacement("direct"), rtol=1e-9)
+    np.testing.assert_allclose(results["displacement"][1, 0], Study(alone).poses("direct"), rtol=1e-9)
 
 
 def test_effects_and_whole_numbers_can_be_swept():
@@ -97,7 +97,7 @@ def test_a_level_ground_is_no_gentle_slope(without_estimates):
     effects = PAST + '"transient"\ntravel = 0.03' + PAST + '"depth-profile"\nslope = 0.0'
     parse = lambda text: scenes.parse(text).with_numerics(phases=64, pieces=12)
     found = sweep.sweep(parse(text + effects), {"effects.depth-profile.slope": [0.0, 0.05]})
-    level = Study(parse(text + PAST + '"transient"\ntravel = 0.03')).displacement("direct")
+    level = Study(parse(text + PAST + '"transient"\ntravel = 0.03')).poses("direct")
     np.testing.assert_allclose(found["displacement"][0], level, atol=2e-6)
 
 
@@ -105,8 +105,8 @@ def test_a_scene_changed_since_it_was_read_is_swept_as_it_is():
     fish = scenes.load("sandfish-loose").with_numerics(phases=32)
     plain = fish.changed(effects=())
     found = sweep.sweep(plain, {"gait.amplitude": [0.1], "medium.C": [1.8, 3.0]})["displacement"]
-    assert Study(plain).displacement("direct", None, 0.1) == pytest.approx(found[0, 0], abs=1e-9)
-    assert np.abs(found[0, 0] - Study(fish).displacement("direct", None, 0.1))[0] > 0.01
+    assert Study(plain).poses("direct", None, 0.1) == pytest.approx(found[0, 0], abs=1e-9)
+    assert np.abs(found[0, 0] - Study(fish).poses("direct", None, 0.1))[0] > 0.01
     with pytest.raises(Refusal, match="the scene has no effect 'end-caps'"):
         sweep.sweep(plain, {"effects.end-caps.radius": [0.1]})
 
@@ -117,7 +117,7 @@ def test_one_frequency_for_all_effects(without_estimates):
     )
     swimmer = scenes.parse(both).with_numerics(phases=64)
     found = sweep.sweep(swimmer, {"effects.frequency": [0.0, 3.0, 9.0]})["displacement"]
-    np.testing.assert_allclose(found[1], Study(swimmer).displacement("direct"), atol=1e-9)
+    np.testing.assert_allclose(found[1], Study(swimmer).poses("direct"), atol=1e-9)
     assert np.abs(found[0] - found[2]).max() > 3e-3
     with pytest.raises(Refusal, match="body-inertia gives frequency = 3.0 and grain-inertia 2.0: it is one swimmer"):
         sweep.sweep(scenes.parse(both), {"effects.grain-inertia.frequency": [2.0]})

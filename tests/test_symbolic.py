@@ -125,7 +125,7 @@ def test_the_area_is_that_of_the_formula():
     r, t = 0.25 * (nodes + 1)[:, None], 2 * np.pi * np.arange(24) / 24
     values = np.stack(np.broadcast_arrays(*density(0.4 + r * np.cos(t), -0.1 + r * np.sin(t))))
     total = (values * r * 0.25 * weights[:, None]).sum((1, 2)) * 2 * np.pi / 24
-    area = Study(Scene(swimmer, gait, Numerics(grid=61, extent=1.5))).displacement("area")
+    area = Study(Scene(swimmer, gait, Numerics(grid=61, extent=1.5))).poses("area")
     np.testing.assert_allclose(area, se2.exp(total), atol=2e-7)
 
 

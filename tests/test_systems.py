@@ -15,6 +15,7 @@ from geomech.geometry.connection import sign_changes
 from geomech.geometry.traits import Traits
 from geomech.scenes import Scene
 from geomech.studies import cost, estimate, fields
+from geomech.studies.available import default_tiers
 from geomech.studies.single import single
 from geomech.studies.study import Study
 from geomech.systems import KINDS, NoSlipSnake, Swimmer
@@ -83,10 +84,10 @@ def snake(**numerics):
 
 def test_tiers_of_the_snake_agree_with_its_closed_form():
     study, exact = snake(), direct(symbolic.velocity(*closed_form()), AWAY, [0.5, 1.0], 512)
-    assert study.tiers == ("adapted", "path", "direct") and study.methods == ("path", "direct")
+    assert study.tiers == ("adapted", "path", "direct") and default_tiers(study.scene.system) == ("path", "direct")
     assert np.abs(exact[1]).min() > 1e-3
     for tier, error in (("adapted", 1e-4), ("path", 1e-12), ("direct", 1e-12)):
-        np.testing.assert_allclose(study.displacement(tier, None, [0.5, 1.0]), exact, atol=error)
+        np.testing.assert_allclose(study.poses(tier, None, [0.5, 1.0]), exact, atol=error)
     table = study.study([0.5, 1.0], ["path", "direct"])
     np.testing.assert_allclose(table["direct"], exact, atol=1e-12)
 
@@ -98,7 +99,7 @@ def test_the_built_in_snake_goes_where_its_closed_form_does():
     net = direct(symbolic.velocity(*closed_form()), scene.gait, None, 512)
     h = Chain(frame="link-2").frame_pose("mean", scene.gait.shape(0.0), [0.0, 0.0])[0]
     wanted = se2.compose(se2.compose(se2.inverse(h), net), h)
-    np.testing.assert_allclose(Study(scene).displacement("direct"), wanted, atol=1e-12)
+    np.testing.assert_allclose(Study(scene).poses("direct"), wanted, atol=1e-12)
 
 
 @pytest.mark.parametrize("lengths", [(1, 1, 1), (1, 1.5, 0.7)])
@@ -133,20 +134,20 @@ def test_singular_shapes_are_refused_by_name_in_integrals():
     study, crossing = snake(), Circle(amplitude=0.9, centre=(0.6, 0.0))
     for tier in study.tiers:
         with pytest.raises(Refusal, match=r"the gait meets the singular shape near alpha = \(.*axles meet"):
-            study.displacement(tier, crossing)
+            study.poses(tier, crossing)
         with pytest.raises(Refusal, match="meets the singular shape"):
             study.study([0.9], [tier], crossing)
-        assert np.isfinite(study.displacement(tier, crossing, [0.3])).all()
+        assert np.isfinite(study.poses(tier, crossing, [0.3])).all()
     with pytest.raises(ValueError, match="meets the singular shape"):
         study.scene.cycle(crossing)
     with pytest.raises(Refusal, match="the area tier sums a field up, and the no-slip-snake has singular shapes"):
-        study.displacement("area")
+        study.poses("area")
     with pytest.raises(ValueError, match="a field with singular shapes is not looked up"):
         study.fitted([1.0, -1.0])
     with pytest.raises(ValueError, match="velocity is not finite at alpha"):
         connection.fit(study.scene.system.velocity, connection.grid(2, 5))
     with pytest.raises(Refusal, match="numerics: 'regularisation' is unknown"):
-        study.turned(regularisation=1e-3)
+        study.with_numerics(regularisation=1e-3)
     with pytest.raises(ValueError, match="the shape is singular: the wheels' axles meet in one point"):
         single(study.scene.system, [0.4, 0.4], [1.0, 0.0])
 
@@ -206,9 +207,9 @@ def test_whatever_has_a_velocity_is_a_system():
 
     study = Study(Scene(Disc(), Circle(centre=(0.2, 0.6))))
     assert study.tiers == ("area", "adapted", "path", "harmonic", "direct")
-    truth = study.displacement("direct", None, [0.2])
+    truth = study.poses("direct", None, [0.2])
     for tier in study.tiers:
-        np.testing.assert_allclose(study.displacement(tier, None, [0.2]), truth, atol=0.02 * np.hypot(*truth[0, :2]))
+        np.testing.assert_allclose(study.poses(tier, None, [0.2]), truth, atol=0.02 * np.hypot(*truth[0, :2]))
     with pytest.raises(Refusal, match="of no kind that a scene file can name"):
         scenes.toml(Scene(Disc(), GAITS["ellipse"]))
 

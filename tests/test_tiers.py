@@ -11,8 +11,9 @@ from geomech.gaits import Butterfly, Circle, Fourier, Wave
 from geomech.geometry import connection, family, harmonics
 from geomech.scenes import Numerics, Scene
 from geomech.studies import estimate
+from geomech.studies.available import default_tiers
 from geomech.studies.choose import cheapest
-from geomech.studies.study import METHODS, Study
+from geomech.studies.study import Study
 from geomech.systems import Swimmer
 from geomech.tiers import TIERS, Plan, Tier, fitted
 from geomech.tiers.direct import direct
@@ -47,10 +48,10 @@ def off(poses, truth):
 
 def test_harmonics_predict_circles_within_a_percent(truth):
     """A on a 31 x 31 grid is off by up to 50 %; the odd harmonics to the 15th by 1 % from 0.5 to 2 rad."""
-    tier = BENCH.displacement("harmonic", Circle(), RADII)
+    tier = BENCH.poses("harmonic", Circle(), RADII)
     assert off(tier, truth["circle"]).max() < 0.0101
-    assert off(BENCH.displacement("path", Circle(), RADII), truth["circle"]).max() > 0.4
-    assert off(BENCH.displacement("harmonic", Butterfly(), SCALES), truth["butterfly"]).max() < 0.01
+    assert off(BENCH.poses("path", Circle(), RADII), truth["circle"]).max() > 0.4
+    assert off(BENCH.poses("harmonic", Butterfly(), SCALES), truth["butterfly"]).max() < 0.01
 
 
 def test_the_first_harmonic_is_the_uniform_fit():
@@ -85,13 +86,13 @@ def test_harmonics_fall_off_as_kinks_let_them():
 
 def test_adapted_area_predicts_its_family(truth):
     """The CCF's area integral, uniform: +50 to -29 % on circles. Adapted to the family: the goal was 5 %."""
-    assert off(BENCH.displacement("area", Circle(), RADII), truth["circle"]).max() > 0.2
-    assert off(BENCH.displacement("adapted", Circle(), RADII), truth["circle"]).max() < 0.005
-    assert off(BENCH.displacement("adapted", Butterfly(), SCALES), truth["butterfly"]).max() < 0.01
+    assert off(BENCH.poses("area", Circle(), RADII), truth["circle"]).max() > 0.2
+    assert off(BENCH.poses("adapted", Circle(), RADII), truth["circle"]).max() < 0.005
+    assert off(BENCH.poses("adapted", Butterfly(), SCALES), truth["butterfly"]).max() < 0.01
 
 
 def test_adapted_poses_are_in_the_body_frame_at_the_start(truth):
-    np.testing.assert_allclose(BENCH.displacement("adapted", Circle(), RADII), truth["circle"], atol=2e-4)
+    np.testing.assert_allclose(BENCH.poses("adapted", Circle(), RADII), truth["circle"], atol=2e-4)
 
 
 def test_the_adapted_map_integrates_to_the_displacement():
@@ -111,7 +112,7 @@ def test_the_adapted_map_integrates_to_the_displacement():
 def test_families_of_every_gait(name, medium):
     """Exact up to the table, whether or not the body turns on the whole."""
     swimmer = Scene(Swimmer(MEDIA[medium], Chain()), GAITS[name], Numerics(curves=48))
-    adapted, direct = (Study(swimmer).displacement(m, None, np.array([0.3, 0.6])) for m in ("adapted", "direct"))
+    adapted, direct = (Study(swimmer).poses(m, None, np.array([0.3, 0.6])) for m in ("adapted", "direct"))
     np.testing.assert_allclose(adapted[:, 2], direct[:, 2], atol=1e-3)
     assert (estimate.distance(adapted, direct) < 0.01 * np.abs(plots.net(direct)) + 1e-4).all()
 
@@ -125,11 +126,11 @@ def test_a_net_turn_leaves_nothing_to_commute():
     viscous, a, counts = scenes.load("three-link-viscous"), np.linspace(0.0, 1.4, 401)[1:], np.array([8, 16, 32])
     exact = direct(viscous.system.velocity, TURNING, a)
     assert np.abs(exact[:, 2]).max() > 0.2
-    tables = [Study(viscous.with_numerics(curves=int(n))).displacement("adapted", TURNING, a) for n in counts]
+    tables = [Study(viscous.with_numerics(curves=int(n))).poses("adapted", TURNING, a) for n in counts]
     errors = [np.abs(found - exact).max() for found in tables]
     assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(4.0, abs=0.2)
     a = a[39::40]
-    glass = [BENCH.displacement(tier, TURNING, a) for tier in ("adapted", "direct")]
+    glass = [BENCH.poses(tier, TURNING, a) for tier in ("adapted", "direct")]
     assert estimate.distance(*glass).max() < 3e-4
 
 
@@ -258,10 +259,10 @@ def test_look_up_estimates_cover_the_truth(truths):
         some = random_scene(rng)
         a = some.gait.amplitude * np.linspace(0.3, 1.0, 4)
         true = truths("estimates", exact, some.system.medium, some.system.body, some.gait, a)
-        table = Study(some).study(a, [m for m in METHODS if m != "direct"])
-        for method, error in table["estimate"].items():
-            estimates.append(np.stack([error, table["estimate_heading"][method]], -1))
-            errors.append(estimate.pose_distance(np.array(table[method]), true, 1.0))
+        table = Study(some).study(a, [m for m in TIERS if m != "direct"])
+        for tier, error in table["estimate"].items():
+            estimates.append(np.stack([error, table["estimate_heading"][tier]], -1))
+            errors.append(estimate.pose_distance(np.array(table[tier]), true, 1.0))
     coverage, excess = judged(estimates, errors)
     assert (coverage >= 0.95).all()
     assert (excess <= 10).all()
@@ -284,7 +285,7 @@ def test_a_tier_is_one_expression(monkeypatch):
     assert foretold == sum(counts) and [*table["seconds"]] == ["field", "direct", "leading", "path"]
     off = estimate.distance(np.array(table["leading"]), np.array(table["direct"]))
     assert (off <= table["estimate"]["leading"]).all() and off[1] > 0.01
-    assert "leading" in study.tiers and "leading" in study.methods
+    assert "leading" in default_tiers(scene.system)
     assert cheapest(scene, [0.05, 1.0], 1e-4)["tier"] == "direct"
     with pytest.raises(Refusal, match="the leading tier takes a body of joints, this body has 4: use direct"):
         Study(scenes.load("seven-link-wave").changed(body=Chain((1,) * 5), gait=Wave(joints=4))).plan("leading")
@@ -324,7 +325,7 @@ def test_what_the_solver_left_counts_in_the_estimate():
         poses, error = estimate.direct(lazy, lazy.gait, a, 64)
         assert left.min() > 10 * tight.max()
         assert (error >= left).all()
-        off = estimate.pose_distance(poses, Study(sized).displacement("direct", None, a), length)
+        off = estimate.pose_distance(poses, Study(sized).poses("direct", None, a), length)
         assert (error >= off).all()
         np.testing.assert_allclose(error[:, :1], left, rtol=0.9)
 
@@ -332,7 +333,7 @@ def test_what_the_solver_left_counts_in_the_estimate():
 def test_impossible_tolerances_are_refused():
     with pytest.raises(Refusal, match="no tier gets to 1e-15 body lengths"):
         cheapest(GLASS.with_numerics(regularisation=1e-4), [1.0], 1e-15)
-    with pytest.raises(Refusal, match="--tol must be"):
+    with pytest.raises(Refusal, match="tolerance must be"):
         cheapest(GLASS, [1.0], 0.0)
 
 
@@ -388,18 +389,18 @@ A = np.array([-1.0, -0.35, 0.0, 0.35, 1.0])
 @pytest.mark.parametrize("tier", ["area", "adapted", "path", "harmonic", "direct"])
 def test_every_tier_takes_negative_and_zero_amplitudes_alike(tier):
     """As those of the curve reflected through the gait's centre, and rest."""
-    found = BENCH.displacement(tier, GENERIC, A)
-    np.testing.assert_allclose(found[::-1], BENCH.displacement(tier, TURNED, A), rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(found[:2], BENCH.displacement(tier, GENERIC, A[:2]), atol=1e-12)
+    found = BENCH.poses(tier, GENERIC, A)
+    np.testing.assert_allclose(found[::-1], BENCH.poses(tier, TURNED, A), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found[:2], BENCH.poses(tier, GENERIC, A[:2]), atol=1e-12)
     np.testing.assert_allclose(found[2], 0.0, atol=1e-15)
-    np.testing.assert_allclose(BENCH.displacement(tier, GENERIC, [0.0, 0.0]), 0.0, atol=1e-15)
+    np.testing.assert_allclose(BENCH.poses(tier, GENERIC, [0.0, 0.0]), 0.0, atol=1e-15)
     assert np.abs(found[0] - found[-1]).max() > 1e-3
     own = dataclasses.replace(GENERIC, amplitude=-1.0)
-    np.testing.assert_allclose(BENCH.displacement(tier, own), found[0], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(BENCH.poses(tier, own), found[0], rtol=1e-9, atol=1e-12)
 
 
 def test_the_adapted_tier_is_near_the_truth_on_both_sides():
-    truth, found = (BENCH.displacement(tier, GENERIC, A) for tier in ("direct", "adapted"))
+    truth, found = (BENCH.poses(tier, GENERIC, A) for tier in ("direct", "adapted"))
     np.testing.assert_allclose(found, truth, atol=5e-3 * np.abs(truth).max())
     table = BENCH.table("adapted", GENERIC, A)
     assert len(table.amplitudes) == 2 * BENCH.scene.numerics.curves + 1

@@ -225,12 +225,12 @@ def test_cycles_that_do_not_repeat_are_not_taken_for_periodic():
     slow = scenes.load("three-link-glass").changed(effects=(heavy(20.0),)).with_numerics(cycles=1, phases=64)
     alpha, alphadot = slow.gait.cycle(64)
     wanted = time_steps(GLASS, slow.system.body, alpha, alphadot, effects=slow.system.effects, cycles=1).displacement
-    np.testing.assert_allclose(Study(slow).displacement("direct"), wanted, atol=1e-12)
+    np.testing.assert_allclose(Study(slow).poses("direct"), wanted, atol=1e-12)
 
 
 def test_a_tolerance_below_what_time_stepping_repeats_to_is_refused():
     slowed = scenes.load("sandfish-transient")
-    with pytest.raises(Refusal, match="repeat to 1e-06 only: raise --tol"):
+    with pytest.raises(Refusal, match="repeat to 1e-06 only: raise tolerance"):
         cheapest(slowed, [0.2], 1e-7)
 
 
@@ -313,7 +313,7 @@ def test_batches_march_as_each_alone():
 def periodic(effects, gait, body, phases, amplitudes):
     """Poses after a settled cycle of the sandfish, as its scene gives them."""
     scene = SANDFISH.changed(body=body, effects=effects, gait=gait).with_numerics(phases=phases)
-    return Study(scene).displacement("direct", None, amplitudes)
+    return Study(scene).poses("direct", None, amplitudes)
 
 
 def test_estimates_of_marches_cover_the_truth(truths):
@@ -346,7 +346,7 @@ def second_cycle(medium, body, gait, effects, pieces, phases, amplitudes):
     """Poses after the second cycle."""
     scene = Scene(Swimmer(medium, body, effects), gait)
     scene = scene.with_numerics(pieces=pieces, phases=phases, tolerance=1e-9, cycles=2)
-    return Study(scene).displacement("direct", None, amplitudes)
+    return Study(scene).poses("direct", None, amplitudes)
 
 
 def errors_over_estimates(scene, pieces, phases, finer, truths):
@@ -368,7 +368,7 @@ def test_estimates_cover_what_pieces_leave(kind, seeds, truths):
 @pytest.mark.soak
 @pytest.mark.timeout(3000)
 def test_estimates_cover_what_pieces_leave_of_many_random_chains():
-    """60 scenes of three amplitudes; the row in geomech/studies/README.md has the first four of each kind."""
+    """60 scenes of three amplitudes; the row in .docs/validation.md has the first four of each kind."""
     found, at_once = {}, lambda _, compute, *question: compute(*question)
     for kind in ("transient", "disturbed", "depth"):
         for k in range(20):
@@ -388,7 +388,7 @@ def test_a_tolerance_refines_pieces_or_is_refused(monkeypatch):
     scene = scene.with_numerics(pieces=5)
     found = cheapest(scene, [1.2], 1e-5)
     assert found["settings"]["pieces"] > 5
-    truth = Study(scene.with_numerics(pieces=640)).displacement("direct", None, [1.2])
+    truth = Study(scene.with_numerics(pieces=640)).poses("direct", None, [1.2])
     off = estimate.distance(np.array(found[found["tier"]]), truth)
     assert (off <= found["estimate"][found["tier"]]).all()
     assert max(found["estimate"][found["tier"]]) <= 1e-5
@@ -403,9 +403,9 @@ def test_a_knob_for_pieces():
     assert tiered.applies(knob, depth)
     assert not tiered.applies(knob, depth.changed(effects=()))
     a = np.linspace(0.5, 1.5, 8)
-    far = Study(depth.with_numerics(pieces=320, phases=64)).displacement("direct", Circle(), a)
+    far = Study(depth.with_numerics(pieces=320, phases=64)).poses("direct", Circle(), a)
     coarse = [
-        Study(tiered.Settings(depth.with_numerics(phases=64)).at(knob, n)).displacement("direct", Circle(), a)
+        Study(tiered.Settings(depth.with_numerics(phases=64)).at(knob, n)).poses("direct", Circle(), a)
         for n in knob.values
     ]
     errors = [np.sqrt(np.mean(estimate.distance(x, far) ** 2)) for x in coarse]
@@ -674,7 +674,7 @@ def test_fast_spinning_heavy_bodies_are_solved():
 @pytest.mark.soak
 @pytest.mark.parametrize("backend", ["numpy", "numba"])
 def test_two_hundred_thousand_steps_of_random_marches(backend):
-    """800 marches of eight gaits, two cycles each, to 1e-10: prints a row of rft/README.md."""
+    """800 marches of eight gaits, two cycles each, to 1e-10: prints a row of .docs/validation.md."""
     rng, residuals, failures = np.random.default_rng(2026), [], 0
     for _ in range(800):
         medium, body, alpha, alphadot, effects = random_march(rng)

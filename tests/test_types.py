@@ -177,7 +177,7 @@ def geometries(value):
     yield "a list", lambda: cheapest(plain, value, 0.1)
     yield "gait of the scene", lambda: cheapest(plain, [1.0], 0.1, value)
     yield "gait of the scene", lambda: Study(plain).table("adapted", value)
-    yield "method", lambda: Study(plain).plan(value)
+    yield "tier", lambda: Study(plain).plan(value)
     yield "system", lambda: plain.changed(system=value)
     yield "one shape", lambda: single(plain.system, value, [1, 0])
     for tier in (path, direct):
@@ -190,13 +190,13 @@ def geometries(value):
     yield "gait", lambda: family.fit(velocity, value, 1.0)
     yield "largest", lambda: family.fit(velocity, Circle(), value)
     yield "curves", lambda: family.fit(velocity, Circle(), 1.0, value)
-    yield "gait of the scene", lambda: Study(plain).displacement("direct", value)
-    yield "method", lambda: Study(plain).displacement(value)
-    yield "amplitudes", lambda: Study(plain).displacement("direct", amplitudes=value)
+    yield "gait of the scene", lambda: Study(plain).poses("direct", value)
+    yield "tier", lambda: Study(plain).poses(value)
+    yield "amplitudes", lambda: Study(plain).poses("direct", amplitudes=value)
     for ask in (Study(plain).study, Study(plain).cost):
         yield "gait of the scene", lambda ask=ask: ask([1.0], ["direct"], value)
         yield "amplitudes of a study", lambda ask=ask: ask(value, ["direct"])
-        yield "methods", lambda ask=ask: ask([1.0], value)
+        yield "tiers", lambda ask=ask: ask([1.0], value)
     yield "gait of the scene", lambda: plain.cycle(value)
     yield "shape", lambda: fitted(value)
     yield "xi", lambda: reconstruct.displacement(value)
@@ -215,7 +215,7 @@ def geometries(value):
 TAKEN = {
     *itertools.product(("threads", "cycles", "amplitudes", "gait of the scene", "a change"), ["None"]),
     *itertools.product(["amplitudes"], ("empty", "list", "deep", "array", "many")),
-    *itertools.product(["amplitudes of a study"], ("empty", "list")), ("methods", "empty"),
+    *itertools.product(["amplitudes of a study"], ("empty", "list")), ("tiers", "empty"), ("tiers", "None"),
     *itertools.product(("alpha", "alphadot", "shape"), ["array"]), *itertools.product(["times"], ("empty", "list")),
     ("effects", "empty"), ("progress", "None"), ("progress", "function"), ("a list", "list"), ("rate", "array"),
     *itertools.product(["family's amplitudes"], ("empty", "deep", "many")), ("rate", "deep"),

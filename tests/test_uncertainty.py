@@ -144,7 +144,7 @@ def test_wide_media_shift_the_mean_and_it_is_told(monkeypatch):
         tables[share] = Study(sand).study([1.2], ["direct"])
         errors[share] = told["shift"]["net_distance"][0] / told["net_distance"][0]
     assert errors[1.0] < -0.3 and -uncertainty.SHIFTED < errors[0.1] < 0
-    wide, narrow = (displacement.text(tables[share].result, "sand") for share in (1.0, 0.1))
+    wide, narrow = (displacement.full(tables[share].result, "sand") for share in (1.0, 0.1))
     row = next(x for x in wide.splitlines() if x.startswith("      1.2"))
     assert row.endswith(f"  mean {tables[1.0]['medium_shift_of']['net_distance'][0]:+.1e}")
     assert "\nmean: how far the mean over the media" in wide and "mean" not in narrow
@@ -185,7 +185,7 @@ def test_every_tier_has_it_beside_its_own_error():
     assert not [key for key in plain if key.startswith("medium")]
     answer = cheapest(sand, [0.5, 1.0], 1e-2)
     np.testing.assert_allclose(answer["medium_error"][answer["tier"]], told["position"])
-    text = displacement.text(table.result, "sand").splitlines()
+    text = displacement.full(table.result, "sand").splitlines()
     row = text[text.index(next(x for x in text if x.endswith(": y"))) + 3].split()
     assert row[0] == "1" and row[-1] == f"+-{told['y'][1]:.1e}"
     assert (

@@ -8,10 +8,11 @@ import types
 import numpy as np
 import pytest
 from artists import curve, drawn
+from PIL import Image, ImageSequence
 from scipy.io import netcdf_file
 
 from figures.walking_sensitivity import Sheet
-from geomech import scenes
+from geomech import plots, scenes
 from geomech.output import walks
 from geomech.scenes import WalkerScene
 from geomech.studies import walking
@@ -268,7 +269,7 @@ def test_what_is_told_of_a_walk():
         "xplorer: walking at 0.25 +- 0.01 m/s at 2 Hz (limit cycle; from rest within 5 % of it after 1.5 s)"
     )
     cost = 0.6 / (0.15 * 9.81 * 0.25)
-    assert f"2.4 J, cost of transport {cost:.3g} (work over weight times way, from rest)" in said
+    assert f"2.4 J, cost of transport {cost:.3g} (work over weight times distance, from rest)" in said
     assert "14" not in said and "turning" not in said and (found["settled"], found["cycles"]) == (1.5, 14.0)
     for settled, words in (
         (0.0, "within 5 % of it from the start)"),
@@ -506,6 +507,27 @@ def test_walk_as_a_command(geomech, tmp_path):
     work, loss, energy = (np.diff(table[name][late])[0] for name in ("work", "loss", "energy"))
     assert work - loss == pytest.approx(energy, abs=0.1 * work) and work > 0.1
     np.testing.assert_allclose(np.gradient(table["x"], table["t"])[5:-5], table["v_x"][5:-5], atol=0.06)
+
+
+def test_films_of_a_walk_follow_the_robot_and_tell_their_speed(tmp_path):
+    """The axes hold the whole way, or go with the robot; 3 Hz is seen at half the speed."""
+    scene = dataclasses.replace(XPLORER, numerics=dataclasses.replace(QUICK, duration=0.6), gait=Tripod(3.0))
+    found = walking.run(scene)
+    x, rows, limits = found.walk.pose[:, 0], [0, 5, len(found.walk.t) - 1], {}
+    for follow in (False, True):
+        ax = plots.figure(4, 2)[1][0, 0]
+        update = walks._stage(ax, scene, found, np.array(rows), follow)
+        limits[follow] = np.array([update(row) or ax.get_xlim() for row in rows])
+    assert (np.ptp(limits[False], axis=0) == 0).all()
+    assert (limits[False][0, 0] < x[rows].min()) and (x[rows].max() < limits[False][0, 1])
+    np.testing.assert_allclose(limits[True].mean(1), x[rows])
+    for follow in (False, True):
+        walks.film(walking.of_walk(scene, found), tmp_path / "film.gif", follow=follow)
+        with Image.open(tmp_path / "film.gif") as film:
+            shown = sum(frame.info["duration"] for frame in ImageSequence.Iterator(film)) / 1000
+        assert shown == pytest.approx(2 * found.walk.t[-1], abs=0.1)
+    (picture,) = walks._captioned(iter([np.zeros((90, 400, 3), np.uint8)]), np.array([1.0]), "0.5 × real time")
+    assert picture[:30, :120].any() and picture[:30, 280:].any() and not picture[40:].any()
 
 
 def test_sweep_and_accuracy_of_a_walk(geomech, tmp_path, monkeypatch):

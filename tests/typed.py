@@ -77,12 +77,11 @@ def scenes() -> list[Any]:
     scene: Scene = geomech.load("three-link-viscous").with_numerics(grid=7, phases=32)
     text: str = toml(scene.changed(gait=Circle(amplitude=0.3)))
     study: Study = geomech.Study(scene)
-    net: Array = study.displacement("area", amplitudes=[0.5])
+    net: Array = study.poses("area", amplitudes=[0.5])
     told = (
         study.study([0.5, 1.0], ["direct"]),
         study.cost([0.5], ["direct"]),
-        study.turned(phases=64),
-        study.methods,
+        study.with_numerics(phases=64),
     )
     more = (
         study.fitted,

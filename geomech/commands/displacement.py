@@ -8,13 +8,21 @@ import typer
 
 from geomech.commands.loading import load_scene
 from geomech.commands.options import (
+    CURVES,
+    AllOption,
+    ComponentOption,
+    DataOption,
     ExtentOption,
     GridOption,
     JsonOption,
+    MediumOption,
     PlotOption,
     SceneArgument,
     YesOption,
     amplitude_kind,
+    components,
+    measurements,
+    refuse_without_figure,
     spread,
     with_workers,
 )
@@ -24,23 +32,33 @@ from geomech.commands.pipeline import Output, drawing, execute
 @with_workers
 def displacement(
     name: SceneArgument,
-    amplitudes: Annotated[str, typer.Option(help="0.5,1.0,1.75 or START:STOP:COUNT; angles also as 30deg")],
-    tiers: Annotated[Optional[str], typer.Option(help="any of area,adapted,path,harmonic,direct")] = None,
+    amplitudes: Annotated[str, typer.Option(metavar="LIST", help="amplitudes, as 0.5,1,30deg or START:STOP:COUNT")],
+    tiers: Annotated[
+        Optional[str], typer.Option(metavar="LIST", help="tiers, of area,adapted,path,harmonic,direct")
+    ] = None,
     grid: GridOption = None,
     extent: ExtentOption = None,
-    tol: Annotated[Optional[float], typer.Option(help="error in body lengths that the cheapest tier must meet")] = None,
+    tol: Annotated[
+        Optional[float], typer.Option(metavar="E", help="use the cheapest tier with an error of at most E BL")
+    ] = None,
     effort: Annotated[bool, typer.Option("--effort", help="add path length, work and cost of transport")] = False,
+    everything: AllOption = False,
     as_json: JsonOption = False,
     plot: PlotOption = None,
+    component: ComponentOption = None,
+    data: DataOption = None,
+    medium: MediumOption = None,
     yes: YesOption = False,
 ):
     """Compute the displacement of a gait by each tier. x, y and theta after a cycle from phase t = 0, each with an
     estimated error."""
     from geomech.studies.displacement import displacement
 
-    scene = load_scene(name, grid, extent)
+    refuse_without_figure(plot, component=component, data=data)
+    scene = load_scene(name, grid, extent, medium)
     values = spread("--amplitudes", amplitudes, amplitude_kind(scene))
+    panels = components(component, CURVES)
+    options = {"components": panels, "data": measurements(data, scene, panels)}
     question = displacement(scene, values, tiers, tol, effort)
-    execute(
-        question, Output(plot, drawing("pictures.displacement"), drawing("pictures.check")), as_json=as_json, yes=yes
-    )
+    figure = Output(plot, drawing("pictures.displacement", **options), drawing("pictures.check"))
+    execute(question, figure, as_json=as_json, yes=yes, everything=everything)

@@ -17,7 +17,7 @@ from rft.refusal import Refusal, located
 
 
 def _scene(names: Callable[[], list[str]]):
-    text = "a built-in name (see 'geomech scenes') or a TOML file"
+    text = "built-in name (see 'geomech scenes') or TOML file"
     return typer.Argument(metavar="SCENE", help=text, autocompletion=names)
 
 
@@ -25,13 +25,15 @@ SceneArgument = Annotated[str, _scene(scene_names)]
 IntruderArgument = Annotated[str, _scene(intruder_names)]
 WalkerArgument = Annotated[str, _scene(walker_names)]
 EitherArgument = Annotated[str, _scene(lambda: scene_names() + intruder_names())]
-GridOption = Annotated[Optional[int], typer.Option("--grid", help="points per joint, in place of the scene's")]
-PlotOption = Annotated[Optional[Path], typer.Option("--plot", metavar="FILE", help="figure: .png, .pdf or .svg")]
+GridOption = Annotated[
+    Optional[int], typer.Option("--grid", metavar="N", help="points of the grid per joint, in place of the scene's")
+]
+PlotOption = Annotated[
+    Optional[Path], typer.Option("--plot", metavar="FILE", help="draw a figure to .png, .pdf or .svg")
+]
 MediumOption = Annotated[
     Optional[Path],
-    typer.Option(
-        "--medium", metavar="FILE", help="what 'geomech fit-medium' wrote, or a CSV of drag, in place of the scene's"
-    ),
+    typer.Option("--medium", metavar="FILE", help="file of a medium or of drag, in place of the scene's"),
 ]
 
 
@@ -43,26 +45,39 @@ def folder(text: str | Path) -> Path:
 
 
 FolderOption = Annotated[
-    Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results", parser=folder)
+    Path, typer.Option("-o", "--output", metavar="DIR", help="folder to write the results to", parser=folder)
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON and nothing else")]
-YesOption = Annotated[bool, typer.Option("--yes", help="compute even for more than a minute, or in more than 2 GB")]
+AllOption = Annotated[bool, typer.Option("--all", help="print all lines, not only those that fit a screen")]
+YesOption = Annotated[bool, typer.Option("--yes", help="compute even if it takes over a minute or over 2 GB")]
 
 
 OtherFrameOption = Annotated[
     Optional[str],
     typer.Option("--compare-frame", metavar="FRAME", help="draw another body frame below, on the same scales"),
 ]
+ComponentOption = Annotated[
+    Optional[str],
+    typer.Option("--component", metavar="NAMES", help="panels to draw, such as x or x,theta"),
+]
+ClimOption = Annotated[
+    Optional[str],
+    typer.Option("--clim", metavar="LIMIT", help="limit of the colours, a number or a percentile as 98%"),
+]
+DataOption = Annotated[
+    Optional[Path],
+    typer.Option("--data", metavar="FILE.csv", help="draw points, of columns amplitude,value,error"),
+]
 PairOption = Annotated[
     Optional[str],
-    typer.Option("--pair", metavar="I,J", help="joints on the axes, of three and more: 1,3 (all pairs if left out)"),
+    typer.Option("--pair", metavar="I,J", help="joints on the axes, as 1,3; all pairs if left out"),
 ]
 SliceOption = Annotated[
     Optional[str],
     typer.Option(
         "--slice",
         metavar="ANGLES",
-        help="of the joints that are held: 0.3 for each, or one by one 0.3,-20deg (the gait's middle if left out)",
+        help="angles of the joints that are held, as 0.3 or 0.3,-20deg",
     ),
 ]
 PluginOption = Annotated[
@@ -97,11 +112,12 @@ def with_plugins(command: Callable) -> Callable:
 
 
 WorkersOption = Annotated[
-    Optional[int], typer.Option("--workers", metavar="N", help="processes that compute what takes long; one a core")
+    Optional[int],
+    typer.Option("--workers", metavar="N", help="processes for long computations, one a core if left out"),
 ]
 SchedulerOption = Annotated[
     Optional[str],
-    typer.Option("--scheduler", metavar="ADDRESS", help="of a Dask cluster that computes, such as tcp://10.0.0.1:8786"),
+    typer.Option("--scheduler", metavar="ADDRESS", help="Dask cluster to compute on, as tcp://10.0.0.1:8786"),
 ]
 
 
@@ -190,7 +206,7 @@ def joint_limits(text: str | None, scene) -> float | list[tuple[float, float]] |
 
 ExtentOption = Annotated[
     Optional[float],
-    typer.Option("--extent", metavar="ANGLE", help="half width of the field in rad, or as 120deg", parser=an_angle),
+    typer.Option("--extent", metavar="ANGLE", help="half width of the grid in rad, or as 120deg", parser=an_angle),
 ]
 
 
@@ -264,3 +280,59 @@ def parse_end_caps(text: str) -> float | str:
         return float(text)
     except ValueError:
         raise Refusal(f"--end-caps {text!r} is neither left-out, fitted nor a number") from None
+
+
+MAPS, CURVES = ("x", "y", "theta"), ("x", "y", "theta", "distance")  # panels of figures, by the words of --component
+
+
+def components(text: str | None, names: Sequence[str] = MAPS) -> tuple[str, ...]:
+    """Return the panels in x,theta; none for an option that is left out."""
+    from geomech.core.errors import choose
+
+    found = () if text is None else tuple(choose("--component", word.strip(), names) for word in text.split(","))
+    if len({*found}) < len(found):
+        raise Refusal("name each panel once", where="--component", value=text)
+    return found
+
+
+def colour_limit(text: str | None, panels: Sequence[str] = ("x",)) -> float | str | None:
+    """Return a limit of colours: a positive number, or a percentile such as "98%". panels: on which it holds, none for all;
+    one number has one unit."""
+    if text is None:
+        return None
+    percent = text.strip().endswith("%")
+    try:
+        value = float(text.strip().removesuffix("%"))
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < (100.0 + 1e-9 if percent else math.inf):
+        raise Refusal(
+            f"{text!r} is no limit", where="--clim", instead="give a number above 0, or a percentile such as 98%"
+        )
+    if not percent and "theta" in (panels or MAPS) and len(panels or MAPS) > 1:
+        why = "panels of theta have another unit than those of x and y"
+        raise Refusal(
+            f"{text!r} is one limit",
+            where="--clim",
+            because=why,
+            instead="say --component x, or a percentile such as 98%",
+        )
+    return text.strip() if percent else value
+
+
+def refuse_without_figure(plot: Path | None, **options: object) -> None:
+    """Refuse options of a figure where none is drawn."""
+    if plot is None and (names := [f"--{name}" for name, value in options.items() if value is not None]):
+        what = f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'} for a figure"
+        raise Refusal(what, instead="say --plot FILE, too")
+
+
+def measurements(path: Path | None, scene, panels: Sequence[str]):
+    """Return what `geomech.scenes.measurements` reads of the quantity of one panel, x if none is named; None without a file."""
+    if path is None:
+        return None
+    from geomech.scenes.measurements import read
+
+    if len(panels) > 1:
+        raise Refusal("--data FILE is of one quantity", instead="name its panel alone with --component, such as x")
+    return read(path, scene, angle=panels == ("theta",))

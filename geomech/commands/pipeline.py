@@ -36,23 +36,23 @@ class Output:
     folder: bool = False
 
 
-def drawing(function: str) -> Callable:
-    """Return a function of a module of `geomech.output`, such as "pictures.sweep", imported at its first call: a command
-    without pictures loads nothing that draws."""
+def drawing(function: str, **options: Any) -> Callable:
+    """Return a function of a module of `geomech.output`, such as "pictures.sweep", with some arguments by keyword, imported at
+    its first call: a command without pictures loads nothing that draws."""
     module, name = function.split(".")
 
     def call(*arguments: Any) -> Any:
-        return getattr(import_module(f"geomech.output.{module}"), name)(*arguments)
+        return getattr(import_module(f"geomech.output.{module}"), name)(*arguments, **options)
 
     return call
 
 
 def execute(
-    question: Question, *outputs: Output, as_json: bool = False, yes: bool = False, silent: bool = False
+    question: Question, *outputs: Output, as_json: bool = False, yes: bool = False, everything: bool = False
 ) -> None:
     """Answer a question as a command does: check, cost, compute, write, print.
 
-    yes: whatever it costs. silent: nothing is printed, the outputs hold the result."""
+    yes: whatever it costs. everything: all lines of a result are printed, not only those that fit a screen."""
     requested = [output for output in outputs if output.path is not None]
     for output in requested:
         output.check(output.path)
@@ -67,8 +67,7 @@ def execute(
             output.write(result, place)
     for line in result.attributes.get("notes", ()):
         note(line)
-    if not silent:
-        _print(result, requested, as_json)
+    _print(result, requested, as_json, everything)
 
 
 def show(lines: Iterable[str]) -> None:
@@ -163,13 +162,14 @@ def _place(output: Output, inputs: list[Path], stack: contextlib.ExitStack) -> P
     return stack.enter_context(atomic_folder(output.path, inputs)) if output.folder else output.path
 
 
-def _print(result: Result, outputs: list[Output], as_json: bool) -> None:
+def _print(result: Result, outputs: list[Output], as_json: bool, everything: bool) -> None:
     from geomech import text
+    from geomech.core.summary import wrapped
 
     if as_json:
         print(json.dumps(text.numbers(result)))
         return
-    print(text.text(result))
-    for output in outputs:
-        if output.message:
-            print(output.message(result, output.path))
+    lines = (text.full if everything else text.text)(result).splitlines()
+    lines += [more] if not everything and (more := text.more(result)) else []
+    lines += [output.message(result, output.path) for output in outputs if output.message]
+    print("\n".join(lines if everything else wrapped(lines)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -9,13 +10,25 @@ import typer
 
 from geomech.commands.loading import load_scene
 from geomech.commands.names import scene_names
-from geomech.commands.options import FolderOption, MediumOption, YesOption, with_workers
+from geomech.commands.options import (
+    AllOption,
+    ClimOption,
+    ComponentOption,
+    DataOption,
+    FolderOption,
+    MediumOption,
+    YesOption,
+    colour_limit,
+    components,
+    measurements,
+    with_workers,
+)
 from geomech.commands.pipeline import Output, execute
 
 DEFAULT_SCENE = "three-link-glass"
 SceneOrOurs = Annotated[
     str,
-    typer.Argument(metavar="[SCENE]", help="a built-in name or a TOML file", autocompletion=scene_names),
+    typer.Argument(metavar="[SCENE]", help="built-in name or TOML file", autocompletion=scene_names),
 ]
 
 
@@ -24,12 +37,17 @@ def run(
     name: SceneOrOurs = DEFAULT_SCENE,
     out: FolderOption = Path("results"),
     medium: MediumOption = None,
+    component: ComponentOption = None,
+    clim: ClimOption = None,
+    data: DataOption = None,
+    everything: AllOption = False,
     yes: YesOption = False,
 ):
     """Compute connection, CCF and displacements into a folder. Displacements are drawn against amplitude."""
     from geomech.output import report
     from geomech.studies.report import Report
 
-    question = Report(load_scene(name, medium=medium))
-    folder = Output(out, report.write, lambda path: report.refuse_folder(question.scene, path), report.files, True)
-    execute(question, folder, yes=yes)
+    question, panels = Report(load_scene(name, medium=medium)), components(component)
+    drawn = report.Drawn(panels, colour_limit(clim, panels), measurements(data, question.scene, panels))
+    write, check = partial(report.write, drawn=drawn), partial(report.refuse_folder, question.scene)
+    execute(question, Output(out, write, check, report.files, True), yes=yes, everything=everything)

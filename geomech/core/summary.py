@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from rft.refusal import formatted
 
 ROWS = ("x", "y", "theta")
+POSE = "x", "y", "heading"
+WIDTH = 80  # characters of a line on a small screen
 
 
 def part(kind: str, thing) -> str:
@@ -74,3 +77,26 @@ def lengths(unit: str, length: float | None) -> str:
 def poses(values) -> str:
     """Return the ranges of x, y and theta of poses or velocities (..., 3)."""
     return spans(np.moveaxis(np.round(np.asarray(values, float).reshape(-1, 3), 12) + 0.0, -1, 0))
+
+
+def moved(pose: Sequence[tuple[float, str]], zero: Sequence[str] = ()) -> str:
+    """Return x, y and heading, each a number and its unit, in words. zero: those of POSE that are 0 by symmetry."""
+    shown = [(n, round(float(x), 9) + 0.0, u) for n, (x, u) in zip(POSE, pose) if n not in zero]
+    parts = [", ".join(f"{name} {x:.6g} {unit}" for name, x, unit in shown)] if shown else []
+    return "; ".join([*parts, *zero_words(zero)])
+
+
+def zero_words(zero: Sequence[str]) -> list[str]:
+    """Return what is 0 by symmetry, in words; nothing where nothing is."""
+    return [f"{listed(zero)}: zero by symmetry"] if zero else []
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return "x", "x and y" or "x, y and heading"."""
+    return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+
+
+def wrapped(lines: Iterable[str]) -> list[str]:
+    """Return lines of WIDTH at most; of a longer one the rest follows, indented."""
+    fill = textwrap.TextWrapper(WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    return [part for line in lines for part in (fill.wrap(line) if len(line) > WIDTH else [line])]

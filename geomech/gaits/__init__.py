@@ -23,3 +23,7 @@ __all__ = [
     "Sine",
     "Wave",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

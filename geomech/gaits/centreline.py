@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -60,7 +60,7 @@ class Centreline(Gait):
 
     estimate_is = "of the computation alone: what the measured midlines are off by is not in it"
 
-    file: str
+    file: str = field(kw_only=False)
     elements: Annotated[int, Number(3, 2000, "-", "as many as the body has", whole=True)] = 100
     period: Annotated[
         float | None,

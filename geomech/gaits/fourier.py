@@ -8,7 +8,7 @@ from typing import Annotated
 
 import numpy as np
 
-from geomech.geometry.gait import GAITS, LARGEST, Gait, finite_array
+from geomech.geometry.gait import GAITS, LARGEST, Gait, Scale, finite_array
 from rft.checks import Number
 from rft.refusal import Refusal
 
@@ -43,7 +43,7 @@ class Series(Gait):
 
 
 @GAITS.register
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Circle(Series):
     """alpha = centre + amplitude (cos t, sin t): counter-clockwise."""
 
@@ -64,7 +64,7 @@ class Circle(Series):
 
 
 @GAITS.register
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Ellipse(Series):
     """Counter-clockwise about its centre.
 
@@ -82,6 +82,7 @@ class Ellipse(Series):
         axes = finite_array("semi_axes", self.semi_axes, 1)
         if axes.size != 2:
             raise Refusal("an ellipse needs two semi_axes", value=self.semi_axes)
+        object.__setattr__(self, "semi_axes", tuple(axes.tolist()))
         super().__post_init__()
 
     def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
@@ -94,13 +95,15 @@ class Ellipse(Series):
 
 
 @GAITS.register
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Butterfly(Series):
     """The butterfly of Fig. 11(e), as distributed with sysplotter (OSU-LRAM/GeometricSystemPlotter):
     (alpha_1 + alpha_2)/2 = 1.0908 cos t - 0.2508 cos 3t - 0.18 cos 5t, (alpha_1 - alpha_2)/2 = 1.052 sin t + 0.0859 sin 3t
     at amplitude 1."""
 
     kind = "butterfly"
+
+    amplitude: Scale = 1.0
 
     def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
         sum_cos = np.array([1.0908, 0.0, -0.2508, 0.0, -0.18])
@@ -113,7 +116,7 @@ class Butterfly(Series):
 
 
 @GAITS.register
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Fourier(Series):
     """A Fourier series of one's own.
 

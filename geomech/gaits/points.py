@@ -11,7 +11,7 @@ from rft.refusal import Refusal
 
 
 @GAITS.register
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Points(Gait):
     """The periodic cubic spline through given shapes, in order and back to the first, phase running with chord length.
 

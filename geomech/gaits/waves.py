@@ -14,7 +14,7 @@ from rft.refusal import Refusal
 
 
 @GAITS.register
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Wave(Series):
     """A travelling wave of joint angles: alpha_k = offset + amplitude cos(t + 2 pi waves k / (joints + 1)), k = 1, 2 ... from
     the tail. It runs from head to tail, which drives the body head first where drag across exceeds that along; with
@@ -92,7 +92,7 @@ def arc_to_phase(u: np.ndarray, slope: np.ndarray) -> np.ndarray:
 
 
 @GAITS.register
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Sine(Gait):
     """A body of ``elements`` that lies along an endless sine and moves on along it: with t the wave travels from head to
     tail. Its arc length is fixed, whatever the amplitude.

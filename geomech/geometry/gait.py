@@ -14,6 +14,14 @@ from rft.registry import Registry, subclasses
 
 LARGEST = 1e6  # rad or scale: beyond it an angle has few digits left
 FASTEST = 1e4  # Hz, as of the effects that have a frequency
+Scale = Annotated[
+    float,
+    Number(
+        -LARGEST, LARGEST, "-",
+        "scales the curve about its centre; 0 is rest there, which moves nothing, and a negative one is the curve "
+        "reflected through the centre, alpha - centre -> centre - alpha at every phase",
+    ),
+]  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,14 +35,7 @@ class Gait:
     tiers keep to that. estimate_is: what an estimated error leaves out for such a gait, in words; empty for nothing.
     """
 
-    amplitude: Annotated[
-        float,
-        Number(
-            -LARGEST, LARGEST, "-",
-            "scales the curve about its centre; 0 is rest there, which moves nothing, and a negative one is the curve "
-            "reflected through the centre, alpha - centre -> centre - alpha at every phase",
-        ),
-    ] = 1.0  # fmt: skip
+    amplitude: Scale = 1.0
     centre: tuple[float, ...] = ()
     reverse: bool = False
     frequency: Annotated[
@@ -88,7 +89,9 @@ class Gait:
 
     def largest(self, amplitudes=None) -> float:
         """Return the largest of its shape variables in size, at 32 phases, for amplitudes (B...) or the gait's own."""
-        return float(np.abs(self.shape(np.linspace(0.0, 2 * np.pi, 32), amplitudes)).max(initial=0.0))
+        a = real_array("amplitudes", self.amplitude if amplitudes is None else amplitudes).ravel()
+        ends = a[[a.argmin(), a.argmax()]] if a.size else a  # between them no shape is further from the middle
+        return float(np.abs(self.shape(np.linspace(0.0, 2 * np.pi, 32), ends)).max(initial=0.0))
 
     def rate(self, t, amplitudes=None) -> np.ndarray:
         """Return d alpha / dt, shaped like `shape`."""

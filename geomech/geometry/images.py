@@ -113,7 +113,7 @@ def cycle_images(alpha: np.ndarray, alphadot: np.ndarray, traits: Traits) -> Cyc
     scaled = [x / np.where(size > 0, size, 1.0) for x, size in zip((alpha, alphadot), sizes)]
     path = np.concatenate(scaled, -1).reshape(-1, phases, 2 * joints)
     moving = sizes[1].argmax() if len(path) else 0
-    return _cycle_images(phases, *_symmetries(lambda k: path[:, k % phases], phases, 1, moving, traits))
+    return _cycle_images(phases, *_symmetries(lambda k: path.take(k, 1, mode="wrap"), phases, 1, moving, traits))
 
 
 def solved_count(gait: Gait, phases: int, traits: Traits) -> int:
@@ -136,8 +136,8 @@ def _symmetries(path: Callable, phases: int, step: int, moving: int, traits: Tra
     mirror, sampled = traits.halved, np.arange(0, phases, step)
     samples = path(sampled)
     joints = samples.shape[-1] // 2
-    same = lambda x, y: bool(np.abs(x - y).max(initial=0.0) <= SAME)
-    nearest = lambda k, x: k[np.abs(path(k)[moving] - x).max(-1).argmin()]
+    same = lambda x, y: not x.size or bool(max((d := x - y).max(), -d.min()) <= SAME)
+    nearest = lambda k, x: k[np.einsum("kj,kj->k", d := path(k)[moving] - x, d).argmin()]
     shifted = mirror and phases % 2 == 0 and same(path(sampled + phases // 2), -samples)
     # Where the halves are images of each other, one sign follows from the other.
     signs = (-1.0, 1.0) if mirror and not shifted else (-1.0,)

@@ -4,3 +4,7 @@ from geomech.measured.fit import Fitted, fit_log
 from geomech.measured.log import Log, read
 
 __all__ = ["Fitted", "Log", "fit_log", "read"]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -100,20 +100,20 @@ class Fitted:
 
 def fit_log(
     log: str | Path | Log, *, columns: Sequence[str] = (), degrees: bool = False, level: float = 0.95,
-    harmonics: int | None = None, within: float | None = None, body_length: float = 1.0,
+    harmonics: int | None = None, limits: float | None = None, body_length: float = 1.0,
 ) -> Fitted:  # fmt: skip
     """Fit the connection near the mean gait of a log; Refusal for a log that does not determine it.
 
     columns, degrees: as in `geomech.measured.log.read`. level: share of cases in which an interval should contain the
-    truth. harmonics: of the connection in the phase; by cross-validation if None. within (rad): distance from the mean
+    truth. harmonics: of the connection in the phase; by cross-validation if None. limits (rad): distance from the mean
     gait up to which the connection is given; as far as the data extend if None. body_length (m): of a log in m; 1 for
     one in body lengths."""
-    in_range("--level", level, 0.5, 0.999)
-    in_range("--body-length", body_length, 1e-9, 1e9)
+    in_range("`level`", level, 0.5, 0.999)
+    in_range("`body_length`", body_length, 1e-9, 1e9)
     if harmonics is not None:
-        in_range("--harmonics", harmonics, 1, HARMONICS, whole=True)
-    if within is not None:
-        in_range("--limits", within, 1e-6, 10)
+        in_range("`harmonics`", harmonics, 1, HARMONICS, whole=True)
+    if limits is not None:
+        in_range("`limits`", limits, 1e-6, 10)
     log = log if isinstance(log, Log) else read(log, columns, degrees)
     period = cycles.period(log)
     joints, pose = (smooth.smoothed(log.t, x, period) for x in (log.alpha, log.pose))
@@ -131,12 +131,12 @@ def fit_log(
     cycles.check_one_gait(log, phase, count, joints.values)
     plausibility.check_right_handed(log, loop, phase, joints, pose, count)
     combined = cycles.combined(joints, rows)
-    fit = _regressed(log, loop, phase, count, joints, pose, combined, level, harmonics, within, body_length)
+    fit = _regressed(log, loop, phase, count, joints, pose, combined, level, harmonics, limits, body_length)
     plausibility.note_units(log, joints, pose, period, body_length)
     return fit
 
 
-def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, harmonics, within, length) -> Fitted:
+def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, harmonics, limits, length) -> Fitted:
     inside = count >= 0
     xi, *xi_halves = (_in_the_body(*x)[inside] for x in ((pose.values, pose.rates), *pose.halves))
     halves = tuple((a[inside], u[inside]) for a, u in joints.halves)
@@ -147,14 +147,14 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
     varies = regression.varied(loop, samples)
     most = int(min(HARMONICS, len(samples.phase) / (samples.cycle[-1] + 1) / 4))
     if harmonics is not None and harmonics > most:
-        raise log.wrong(f"--harmonics must be at most {most}, a quarter of the rows of a cycle, got {harmonics}")
+        raise log.wrong(f"`harmonics` must be at most {most}, a quarter of the rows of a cycle, got {harmonics}")
     size = joints.knots * (samples.cycle[-1] + 1)
     try:
         equations, varies = unknowns.selected(loop, samples, most, harmonics, varies, size)
         coefficients, errors = regression.solution(equations)
     except np.linalg.LinAlgError:
         raise log.wrong(
-            "its cycles do not settle so many unknowns", instead="lower --harmonics, or give more cycles"
+            "its cycles do not settle so many unknowns", instead="lower `harmonics`, or give more cycles"
         ) from None
     across, others = varies == regression.RATES, [k for k in range(len(log.joints)) if k not in combined]
     if not combined or across or regression.varied(*regression.of_joints(loop, samples, others)) == varies:
@@ -163,7 +163,7 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
     if not across:
         errors = np.concatenate([errors, regression.unknown(loop, A, varies)])
     known = TaylorSeries(
-        loop, A[:, :, 0], A[:, :, 1:], errors, spread(loop, samples, within, varies > regression.NOTHING), np.zeros(3),
+        loop, A[:, :, 0], A[:, :, 1:], errors, spread(loop, samples, limits, varies > regression.NOTHING), np.zeros(3),
         np.zeros((3, 2, 1)), regression.factor(len(equations.square), level), level,
     )  # fmt: skip
     if (largest := max(np.abs(known.combined).max(), np.abs(known.errors).max())) > LARGEST_ENTRY:

@@ -52,7 +52,7 @@ class Fit(Question):
     degrees: bool = False
     level: float = 0.95
     harmonics: int | None = None
-    within: float | None = None
+    limits: float | None = None
     body_length: float = 1.0
 
     def inputs(self) -> list[Path]:
@@ -65,7 +65,7 @@ class Fit(Question):
             degrees=self.degrees,
             level=self.level,
             harmonics=self.harmonics,
-            within=self.within,
+            limits=self.limits,
             body_length=self.body_length,
         )
         (net, error), (mean, mean_error) = fit.displacement, fit.mean

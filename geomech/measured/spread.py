@@ -13,15 +13,15 @@ WIDTH = 0.3  # rad of phase, over which it is averaged
 LEAST = 0.02  # of the gait's size: range of A at the gait where cycles do not vary
 
 
-def spread(loop: Loop, samples: Samples, within: float | None, varied: bool) -> np.ndarray:
+def spread(loop: Loop, samples: Samples, limits: float | None, varied: bool) -> np.ndarray:
     """Return the spread (d, d, P) of `tube.TaylorSeries`: DEVIATIONS^2 times the covariance of deviations without noise, by
-    phase; or the square of ``within``, rad, in all directions.
+    phase; or the square of ``limits``, rad, in all directions.
 
     Along the gait, where nothing deviates, it is the mean of the spread across it."""
     d = samples.alpha.shape[1]
     least = LEAST * np.sqrt((loop.coefficients[:, 1:] ** 2).sum() / 2)
-    if within is not None or not varied:
-        return np.repeat((np.eye(d) * (least if within is None else within) ** 2)[..., None], PLACES, -1)
+    if limits is not None or not varied:
+        return np.repeat((np.eye(d) * (least if limits is None else limits) ** 2)[..., None], PLACES, -1)
     (one, _), (other, _) = samples.halves
     theta, normal = loop.shape(samples.phase), loop.normals(samples.phase)
     one, other = (np.einsum("nik,ni->nk", normal, x - theta) for x in (one, other))

@@ -7,3 +7,7 @@ from geomech.optimisation.search import optimise, search
 optimize = optimise  # both spellings are in use
 
 __all__ = ["Optimum", "Request", "checked", "optimise", "optimize", "search"]
+
+
+def __dir__() -> list[str]:
+    return __all__

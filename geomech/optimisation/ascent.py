@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from geomech.optimisation.aims import Aim
+from geomech.optimisation.objectives import Objective
 from geomech.optimisation.problem import EVEN, Enough, Problem, is_feasible
 from geomech.optimisation.stroke import Stroke
 
@@ -19,24 +19,24 @@ SHORTER, SHORTEST = 0.25, 0.01  # of the trust radius: after an infeasible loop 
 
 
 def ascend(
-    cycles: Callable, aim: Aim, p: np.ndarray, *, turn: float = 0.0, max_steps: int = 100, tolerance: float = 1e-6,
+    cycles: Callable, objective: Objective, p: np.ndarray, *, turn: float = 0.0, max_steps: int = 100, tolerance: float = 1e-6,
     stroke: bool = False, singularity: Callable | None = None, away: float = 0.0, on_cycle: Callable = lambda: None,
     even: float = EVEN,
 ) -> np.ndarray:  # fmt: skip
-    """Return the loop with the locally largest ``aim`` that an ascent from the loop ``p`` reaches.
+    """Return the loop with the locally largest ``objective`` that an ascent from the loop ``p`` reaches.
 
-    cycles: `Phases` or `Runs`. turn (rad): largest net turn of a cycle, for aims that are distances. max_steps: steps.
+    cycles: `Phases` or `Runs`. turn (rad): largest net turn of a cycle, for objectives that are distances. max_steps: steps.
     stroke: the loop is a `Stroke`, and stays one. singularity: a function of shapes that is 0 at singular ones; it
     stays at least ``away`` from 0. on_cycle: called after every cycle. even: see `Problem`."""
     problem, once_round = (
-        Problem(cycles, aim, p, on_cycle, TRIES * max_steps, even),
+        Problem(cycles, objective, p, on_cycle, TRIES * max_steps, even),
         Stroke(cycles.loops, p) if stroke else None,
     )
     constraints = problem.constraints(turn, once_round, singularity, away)
     is_same_stroke = lambda x: once_round is None or once_round.winding(problem.loop(x)) == 1
     x, remaining, trust_radius = problem.first, max_steps, TRUST_RADIUS
     while remaining > 0 and trust_radius > SHORTEST * TRUST_RADIUS:
-        ascent = _Ascent(problem.objective, constraints, is_same_stroke)
+        ascent = _Ascent(problem.minimised, constraints, is_same_stroke)
         end = ascent.run(x, trust_radius, p.size, min(remaining, STEPS_PER_RUN), tolerance)
         previous, x = x, x if ascent.best is None else ascent.best
         remaining = 0 if end == "spent" else remaining - max(ascent.steps, 1)
@@ -48,13 +48,13 @@ def ascend(
 
 
 def project(
-    cycles: Callable, aim: Aim, p: np.ndarray, *, turn: float = 0.0, stroke: bool = False,
+    cycles: Callable, objective: Objective, p: np.ndarray, *, turn: float = 0.0, stroke: bool = False,
     singularity: Callable | None = None, away: float = 0.0,
 ) -> np.ndarray:  # fmt: skip
     """Return a loop near ``p`` that satisfies all constraints of `ascend`, between its phases, too, up to roundoff.
 
     Newton's method: each step is the shortest that satisfies the linearised constraints."""
-    problem = Problem(cycles, aim, p, lambda: None, np.inf)
+    problem = Problem(cycles, objective, p, lambda: None, np.inf)
     constraints = problem.constraints(turn, Stroke(cycles.loops, p) if stroke else None, singularity, away, dense=True)
     x = problem.first
     for _ in range(NEWTON_STEPS):
@@ -85,9 +85,9 @@ def _shortest(constraints: list[tuple]) -> np.ndarray:
 class _Ascent:
     """A recorder of iterates: it stores the best feasible one, or the last where none was feasible."""
 
-    def __init__(self, objective: Callable, constraints: list[dict], is_same_stroke: Callable):
-        self.objective, self.constraints, self.is_same_stroke, self.best, self.least, self.steps = (
-            objective,
+    def __init__(self, minimised: Callable, constraints: list[dict], is_same_stroke: Callable):
+        self.minimised, self.constraints, self.is_same_stroke, self.best, self.least, self.steps = (
+            minimised,
             constraints,
             is_same_stroke,
             None,
@@ -100,7 +100,7 @@ class _Ascent:
         if not self.is_same_stroke(x):
             raise RuntimeError("a loop of another number of strokes")
         value = (
-            self.objective(x)[0]
+            self.minimised(x)[0]
             if np.isfinite(x).all() and all(is_feasible(rule, x) for rule in self.constraints)
             else np.inf
         )
@@ -119,7 +119,7 @@ class _Ascent:
             with warnings.catch_warnings():  # SciPy before 1.13 warns where it clips its own steps to the bounds
                 warnings.filterwarnings("ignore", "Values in x were outside bounds", RuntimeWarning)
                 solution = minimize(
-                    self.objective,
+                    self.minimised,
                     x,
                     jac=True,
                     method="SLSQP",

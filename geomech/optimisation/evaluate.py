@@ -15,7 +15,7 @@ from geomech.systems.capabilities import OwnMetric, capability
 
 def evaluate_gait(r: Request, gait: Gait) -> Evaluation:
     """Return the evaluation of a gait at its own amplitude."""
-    system, aim = r.scene.system, r.aim
+    system, objective = r.scene.system, r.objective
     phases = max(r.phases, 4 * gait.harmonics)
     (net,), (errors,) = estimate.direct(r.scene, gait, np.array([gait.amplitude]), phases)
     alpha, alphadot = gait.cycle(phases)
@@ -24,15 +24,15 @@ def evaluate_gait(r: Request, gait: Gait) -> Evaluation:
     P = _power(r, run, alpha, alphadot)
     b = _without_slopes(net, *cycle_values(run, P, degree)[1:])
     period, limits = 1.0, []
-    if aim.timed:
-        period, limits = aim.time(np.abs(gait.cycle(series.DENSE)[1]).max(), b.power and b.power[0], degree)
-    value = aim.value(b, period)[0]
-    error = errors[1] if aim.name == "turning" else errors[0]
+    if objective.timed:
+        period, limits = objective.time(np.abs(gait.cycle(series.DENSE)[1]).max(), b.power and b.power[0], degree)
+    value = objective.value(b, period)[0]
+    error = errors[1] if objective.name == "turning" else errors[0]
     length = b.length and b.length[0]
-    if aim.name == "efficiency":
+    if objective.name == "efficiency":
         coarse = 2 * np.pi * (P[::2] ** (1 / degree)).mean()
         error = (error + value * abs(length - coarse)) / (length or 1.0)
-    if aim.timed:
+    if objective.timed:
         error = error / (2 * np.pi * (period or 1.0))
     work = 2 * np.pi * b.power[0] if b.power and capability(system, OwnMetric) is None else None
     return Evaluation(

@@ -1,8 +1,8 @@
-"""The CCF whose area an aim gains, and what limits the best loop on it, phase by phase."""
+"""The CCF whose area an objective gains, and what limits the best loop on it, phase by phase."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,9 +19,17 @@ NEAR_SINGULAR = 0.05  # of the least distance from singular shapes: a loop that 
 PHASES = 721
 
 
-def gained_ccf(optimum: Optimum, study: Study | None = None) -> Field:
-    """Return the CCF whose area the aim gains, values (1, N_1, N_2): along the displacement, or of the heading for turning, in
-    the minimum-perturbation frame, or, where singular shapes leave none, in the scene's own."""
+class Gained(NamedTuple):
+    """The CCF whose area an objective gains. field: the CCF, (3, N_1, N_2), with its own sign. component: of it, the one that
+    counts."""
+
+    field: Field
+    component: int
+
+
+def gained_ccf(optimum: Optimum, study: Study | None = None) -> Gained:
+    """Return the CCF in the minimum-perturbation frame or, where singular shapes leave none, in the scene's own; its component
+    along the larger of the displacements x and y of the best loop, or that of the heading for turning."""
     fitted, best = (study or Study(optimum.scene)).fitted, optimum.best
     connection, (x, y, _) = fitted, best.displacement
     if not fitted.field.masked:
@@ -29,26 +37,22 @@ def gained_ccf(optimum: Optimum, study: Study | None = None) -> Field:
         A = frame.connection(fitted)
         connection = Connection(fitted.axes, A, fitted.residual, fitted.speed, fitted.degree, **fitted.size)
         x, y, _ = frame.net(best.displacement, best.gait.shape(0.0))
-    field = ccf(connection)
-    turning = optimum.request.aim.name == "turning"
-    share = np.array([0, 0, 1] if turning else [x, y, 0]) / (np.hypot(x, y) or 1.0)
-    values = np.tensordot(share, field.values, 1)[None]
-    return replace(field, values=values, unit="rad" if turning else field.unit)
+    turning = optimum.request.objective.name == "turning"
+    return Gained(ccf(connection), 2 if turning else int(abs(y) > abs(x)))
 
 
-def limiting(optimum: Optimum, field: Field | None) -> np.ndarray:
+def limiting(optimum: Optimum, gained: Gained | None) -> np.ndarray:
     """Return what limits the best loop at each of PHASES phases, as words (PHASES,).
 
-    "limit": a joint limit; "singular": singular shapes; "zero": it runs along the zero line of ``field``, that of
-    `gained_ccf`; "length": it is off that line for the sake of path length; "else": off that line; "loop": not known,
-    where ``field`` is None."""
+    "limit": a joint limit; "singular": singular shapes; "zero": it runs along the zero line of ``gained``; "length": it is off
+    that line for the sake of path length; "else": off that line; "loop": not known, where ``gained`` is None."""
     alpha = optimum.gait.shape(np.linspace(0, 2 * np.pi, PHASES))
-    rest = "length" if optimum.request.aim.name == "efficiency" else "else"
-    causes = np.full(PHASES, rest if field is not None else "loop", dtype="<U8")
-    if field is not None:
-        value = np.abs(_nearest_values(field, alpha))
+    rest = "length" if optimum.request.objective.name == "efficiency" else "else"
+    causes = np.full(PHASES, "loop" if gained is None else rest, dtype="<U8")
+    if gained is not None:
+        field, value = gained.field, np.abs(_nearest_values(*gained, alpha))
         inside = [(a >= lo) & (a <= hi) for a, lo, hi in zip(field.axes, alpha.min(0), alpha.max(0))]
-        around = np.abs(field.values[0][np.ix_(*inside)])
+        around = np.abs(field.values[gained.component][np.ix_(*inside)])
         # next to singular shapes the largest value may be any
         top = np.nanmedian(around) if field.masked else around.max(initial=value.max())
         causes = np.where(value <= NEAR_ZERO * top, "zero", causes)
@@ -60,11 +64,12 @@ def limiting(optimum: Optimum, field: Field | None) -> np.ndarray:
     return np.where(((alpha <= box[0] + near) | (alpha >= box[1] - near)).any(-1), "limit", causes)
 
 
-def _nearest_values(field: Field, alpha) -> np.ndarray:
-    """Return the field at shapes, for those beyond it at its edge; next to singular shapes from its nearest points, or nan."""
+def _nearest_values(field: Field, component: int, alpha) -> np.ndarray:
+    """Return a component of the field at shapes, for those beyond it at its edge; next to singular shapes from its nearest
+    points, or nan."""
     from scipy.interpolate import RegularGridInterpolator
 
     alpha = np.clip(alpha, [a[0] for a in field.axes], [a[-1] for a in field.axes])
     if field.masked:
-        return RegularGridInterpolator(field.axes, field.values[0])(alpha)
-    return field(alpha)[..., 0]
+        return RegularGridInterpolator(field.axes, field.values[component])(alpha)
+    return field(alpha)[..., component]

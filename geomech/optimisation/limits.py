@@ -15,37 +15,37 @@ from rft.checks import in_range, is_number, real_array
 from rft.refusal import Refusal, formatted
 
 LEAST, MOST = 1e-6, 100.0  # rad: of the range between two limits, and of a limit
-Within = float | tuple[tuple[float, float], ...]
-WithinArgument = float | Sequence[float] | Sequence[Sequence[float]] | None
+Limits = float | tuple[tuple[float, float], ...]
+LimitsArgument = float | Sequence[float] | Sequence[Sequence[float]] | None
 
 
-def limits(scene: Scene, within: WithinArgument, phases: int) -> Within:
-    """Return ``within`` as `geomech.optimisation.loops.Loops` takes it: a largest |alpha| for all joints, or (lowest,
+def checked_limits(scene: Scene, limits: LimitsArgument, phases: int) -> Limits:
+    """Return ``limits`` as `geomech.optimisation.loops.Loops` takes it: a largest |alpha| for all joints, or (lowest,
     highest) for each.
 
     None stands for the extent of the field, or of the scene's gait where that is larger; for all of a stored table.
     Refusal for limits outside the field of a table or frame."""
     system = scene.system
     low, high = edges(system)
-    if within is None:
+    if limits is None:
         if stored_table(system, "connection"):
             return _simplified(low, high)
         n = scene.numerics
-        within = min(
+        limits = min(
             max(n.extent, float(np.abs(scene.gait.cycle(phases)[0]).max())), float(np.minimum(-low, high).min())
         )
-    if is_number(within):
-        in_range("--limits", within, LEAST, MOST)
-        pairs = np.array([[-float(within), float(within)]] * system.joints)
+    if is_number(limits):
+        in_range("`limits`", limits, LEAST, MOST)
+        pairs = np.array([[-float(limits), float(limits)]] * system.joints)
     else:
-        pairs = _pairs(within, system.joints)
+        pairs = _pairs(limits, system.joints)
     if system.traits.joint_angles:
         check_angle("a limit of joints", float(np.abs(pairs).max()))
     slack = 1e-9 * (1 + np.abs(pairs))
     if (pairs[:, 0] < low - slack[:, 0]).any() or (pairs[:, 1] > high + slack[:, 1]).any():
         field = ", ".join(f"{a:g} to {b:g}" for a, b in zip(low, high))
         raise Refusal(
-            f"--limits {_text(within)} lies outside the field that the scene has", instead=f"{field}; keep to it"
+            f"`limits` {_text(limits)} lies outside the field that the scene has", instead=f"{field}; keep to it"
         )
     return _simplified(np.maximum(pairs[:, 0], low), np.minimum(pairs[:, 1], high))
 
@@ -57,24 +57,24 @@ def edges(system: System) -> tuple[np.ndarray, np.ndarray]:
     return np.array([a[0] for a in axes]), np.array([a[-1] for a in axes])
 
 
-def _pairs(within, joints: int) -> np.ndarray:
+def _pairs(limits, joints: int) -> np.ndarray:
     """Return (joints, 2) from pairs, or from one number for each joint."""
-    x = real_array("--limits", within)
+    x = real_array("`limits`", limits)
     x = np.stack([-x, x], -1) if x.ndim == 1 else x
     good = x.shape == (joints, 2) and (np.abs(x) <= MOST).all() and (x[:, 1] - x[:, 0] >= LEAST).all()
     if not good:
         raise Refusal(
-            f"--limits takes a number, one for each of {joints} joints, or as many from low to high", value=within
+            f"`limits` takes a number, one for each of {joints} joints, or as many from low to high", value=limits
         )
     return x
 
 
-def _simplified(low: np.ndarray, high: np.ndarray) -> Within:
+def _simplified(low: np.ndarray, high: np.ndarray) -> Limits:
     """Return one number where all limits are equal and symmetric, else pairs."""
     if (low == -high[0]).all() and (high == high[0]).all():
         return float(high[0])
     return tuple(zip(low.tolist(), high.tolist()))
 
 
-def _text(within) -> str:
-    return f"{within:g}" if is_number(within) else formatted(within)
+def _text(limits) -> str:
+    return f"{limits:g}" if is_number(limits) else formatted(limits)

@@ -17,7 +17,7 @@ from geomech.systems.capabilities import stored_table
 class Evaluation:
     """A gait as evaluated by the direct tier.
 
-    value, error: of the aim. heading: error of the net turn, rad. displacement: net pose (3,) in the frame at the
+    value, error: of the objective. heading: error of the net turn, rad. displacement: net pose (3,) in the frame at the
     start, in the system's unit. length: of the path; work: of a cycle at a rad of phase per unit of time, in body drag
     x body length; None where these are not known, and for the work of a metric that is not one of drag. time: of a rad
     of phase. limits: names of those that set the time."""

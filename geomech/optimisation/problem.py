@@ -1,4 +1,4 @@
-"""An ascent as a problem of nonlinear programming: an objective to be minimised, and constraints."""
+"""An ascent as a problem of nonlinear programming: a number to be minimised, and constraints."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from geomech.optimisation.aims import Aim
+from geomech.optimisation.objectives import Objective
 from geomech.optimisation.stroke import Stroke
 
 EVEN = 1e-3  # of the value: weight of uneven pacing and length; it decides between loops of equal value
@@ -19,28 +19,32 @@ class Enough(Exception):
 
 
 class Problem:
-    """The aim near the loop p as a function of numbers x: the parameters of a loop over its unit and, where a limit of
+    """The objective near the loop p as a function of numbers x: the parameters of a loop over its unit and, where a limit of
     rate sets the pace, the time of a rad of phase over that of p.
 
     cycles: `Phases` or `Runs`; `Enough` is raised after ``most``. on_cycle: called after every cycle. even: weight of
     the penalty of uneven pacing and long loops, as a share of the value."""
 
-    def __init__(self, cycles, aim: Aim, p: np.ndarray, on_cycle: Callable, max_cycles: float, even: float = EVEN):
-        self.cycles, self.aim, self.loops, self.on_cycle, self.last = (
+    def __init__(
+        self, cycles, objective: Objective, p: np.ndarray, on_cycle: Callable, max_cycles: float, even: float = EVEN
+    ):
+        self.cycles, self.objective, self.loops, self.on_cycle, self.last = (
             cycles,
-            aim,
+            objective,
             cycles.loops,
             on_cycle,
             cycles.count + max_cycles,
         )
         self.unit, self.shape, self.count = cycles.loops.unit, p.shape, p.size
-        self.paced = aim.timed and aim.rate is not None
+        self.paced = objective.timed and objective.rate is not None
         self.first = np.append(p.ravel() / self.unit, 1.0) if self.paced else p.ravel() / self.unit
         self._at, self._values = None, None
         b = self.values_at(self.first)
         power = b.power[0] if b.power else None
-        self.time = aim.time(np.abs(self.loops.cycle(p)[1]).max(), power, cycles.degree)[0] if aim.timed else 1.0
-        self.weight = 0.0 if self.paced else even * max(aim.value(b, 1.0)[0], 0.01)
+        self.time = (
+            objective.time(np.abs(self.loops.cycle(p)[1]).max(), power, cycles.degree)[0] if objective.timed else 1.0
+        )
+        self.weight = 0.0 if self.paced else even * max(objective.value(b, 1.0)[0], 0.01)
 
     def loop(self, x: np.ndarray) -> np.ndarray:
         """Return p of numbers x."""
@@ -52,7 +56,7 @@ class Problem:
         return np.concatenate([rows, np.zeros((*rows.shape[:-1], len(self.first) - self.count))], -1)
 
     def values_at(self, x: np.ndarray):
-        """Return the cycle of x, computed once for the objective and all constraints."""
+        """Return the cycle of x, computed once for the number to be minimised and all constraints."""
         x = x[: self.count]
         if self._at is None or not np.array_equal(self._at, x):
             if self.cycles.count >= self.last:
@@ -61,14 +65,14 @@ class Problem:
             self.on_cycle()
         return self._values
 
-    def objective(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+    def minimised(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the number to be minimised, and its slopes."""
         b = self.values_at(x)
-        value, by = self.aim.value(b, 1 / (2 * np.pi))
+        value, by = self.objective.value(b, 1 / (2 * np.pi))
         slower = 1.0
         if self.paced:
             slower = x[-1]
-        elif self.aim.timed:
+        elif self.objective.timed:
             slower, by_slower = self.by_power(b)
             by = by - value / slower * by_slower
         slopes = self.slopes(self.weight * b.uneven[1] - by / slower)
@@ -79,7 +83,7 @@ class Problem:
     def by_power(self, b) -> tuple[float, np.ndarray]:
         """Return the time of a rad of phase by the limit of power, over that of p, and its slopes."""
         P, dP = b.power
-        slower = (P / self.aim.power) ** (1 / self.cycles.degree) / self.time
+        slower = (P / self.objective.power) ** (1 / self.cycles.degree) / self.time
         return slower, slower / P / self.cycles.degree * dP
 
     def constraints(
@@ -92,9 +96,9 @@ class Problem:
         out = [_limits(self, dense)]
         if self.paced:
             out.append(_rates(self))
-            out += [_power(self)] if self.aim.power is not None else []
+            out += [_power(self)] if self.objective.power is not None else []
         theta = self.values_at(self.first).net[1][2]
-        if self.aim.straight and np.abs(theta).max() > STRAIGHT**2:  # else no loop near turns, as with sines
+        if self.objective.straight and np.abs(theta).max() > STRAIGHT**2:  # else no loop near turns, as with sines
             out += _straight(self, turn)
         out += [] if stroke is None else [_one_stroke(self, stroke)]
         return out + ([] if singularity is None else [_away(self, singularity, away)])
@@ -120,7 +124,7 @@ def _rates(problem: Problem) -> dict:
     """Return the constraint that no shape variable is faster than the limit, in the time that the last of x sets."""
     A = np.concatenate([np.kron(problem.loops.rates, unit) for unit in np.eye(problem.loops.joints)[:, None]])
     A = problem.slopes(np.concatenate([A, -A]).reshape(-1, *problem.shape))
-    A[:, -1] = -problem.aim.rate * problem.time
+    A[:, -1] = -problem.objective.rate * problem.time
     return _linear(A, 0.0)
 
 

@@ -12,10 +12,10 @@ import numpy as np
 
 from geomech.gaits import Gait, Sine
 from geomech.geometry.connection import evaluate
-from geomech.optimisation.aims import Aim
 from geomech.optimisation.ascent import TRIES
-from geomech.optimisation.limits import WithinArgument, limits
+from geomech.optimisation.limits import LimitsArgument, checked_limits
 from geomech.optimisation.loops import DENSE, IN_MIRROR, OUTLINES, Loops
+from geomech.optimisation.objectives import Objective
 from geomech.optimisation.undulations import Undulations
 from geomech.scenes.model import Scene, checked_scene
 from geomech.studies import cost
@@ -48,16 +48,16 @@ DEGREES = 1e-3  # largest scatter of the degree of the power
 
 @dataclass(frozen=True)
 class Request:
-    """A scene, an aim, and the loops that are searched; built by `checked`."""
+    """A scene, an objective, and the loops that are searched; built by `checked`."""
 
     scene: Scene
-    aim: Aim
+    objective: Objective
     loops: Loops | Undulations
     starts: int
 
     def __reduce__(self) -> tuple:
         """Return the request as workers receive it, without cached values."""
-        return Request, (self.scene, self.aim, self.loops, self.starts)
+        return Request, (self.scene, self.objective, self.loops, self.starts)
 
     @property
     def system(self) -> System:
@@ -91,15 +91,16 @@ class Request:
     @cached_property
     def degree(self) -> float:
         """Degree of the power in the rate of shape: 2 in a linear medium, 1 in a dry one; Refusal if it has none."""
-        aim, system = self.aim, self.system
+        objective, system = self.objective, self.system
         if self.power is None:
-            instead = "say --rate" if aim.timed else "optimize for displacement, turning or speed"
+            instead = "say `rate`" if objective.timed else "optimize for displacement, turning or speed"
             raise Refusal(
-                f"--objective {aim.name} asks for power, which {source_name(system)} does not tell", instead=instead
+                f"`objective` {objective.name} asks for power, which {source_name(system)} does not tell",
+                instead=instead,
             )
         if capability(system, OwnMetric) is not None:
-            if aim.power is not None:
-                raise Refusal(f"--power is that of drag, and the {kind_of(system)} has none", instead="say --rate")
+            if objective.power is not None:
+                raise Refusal(f"`power` is that of drag, and the {kind_of(system)} has none", instead="say `rate`")
             return 2.0
         if self.stored:
             return system.traits.power_degree
@@ -170,13 +171,13 @@ class Request:
 
 
 def checked(
-    scene: Scene, aim: str, direction: str | None = None, harmonics: int | None = None, within: WithinArgument = None,
+    scene: Scene, objective: str, direction: str | None = None, harmonics: int | None = None, limits: LimitsArgument = None,
     starts: int | None = None, rate: float | None = None, power: float | None = None,
 ) -> Request:  # fmt: skip
     """Return the request; Refusal for one that makes no sense."""
     with located(checked_scene(scene).name):
-        in_range("--starts", 1 if starts is None else starts, 1, 1000, whole=True)
-        system, limits = scene.system, {"rate": rate, "power": power}
+        in_range("`starts`", 1 if starts is None else starts, 1, 1000, whole=True)
+        system, pace = scene.system, {"rate": rate, "power": power}
         towards = "" if direction is None else direction
         if near_gait(system):
             raise Refusal(
@@ -184,37 +185,37 @@ def checked(
                 because=f"A is known near {near_gait(system)} alone",
                 instead="measure more varied cycles",
             )
-        objective = Aim(aim, towards, system.length, **limits)
-        if objective.timed:
+        maximised = Objective(objective, towards, system.length, **pace)
+        if maximised.timed:
             if system.traits.lacks & Premise.RATE_INDEPENDENT:
                 refuse(system, "speed", Premise.RATE_INDEPENDENT, "optimize for displacement, at the scene's frequency")
             if rate is None and power is None:
                 waves = isinstance(scene.gait, Sine)
                 own = {"power": _own_power(scene)} if waves else {"rate": _own_rate(scene)}
-                objective = Aim(aim, towards, system.length, **own)
-        loops = _loops(scene, harmonics, within)
-        if isinstance(loops, Undulations) and not objective.straight:
+                maximised = Objective(objective, towards, system.length, **own)
+        loops = _loops(scene, harmonics, limits)
+        if isinstance(loops, Undulations) and not maximised.straight:
             raise Refusal(
-                "a sine along a straight axis does not turn", because="--objective turning takes a gait of few joints"
+                "a sine along a straight axis does not turn", because="`objective` turning takes a gait of few joints"
             )
-        if isinstance(loops, Undulations) and objective.direction == "y" and system.traits.mirror:
-            raise Refusal("a sine along a straight axis brings nothing across it", instead="drop --direction, or say x")
-        if isinstance(loops, Undulations) and objective.rate is not None:
+        if isinstance(loops, Undulations) and maximised.direction == "y" and system.traits.mirror:
+            raise Refusal("a sine along a straight axis brings nothing across it", instead="drop `direction`, or say x")
+        if isinstance(loops, Undulations) and maximised.rate is not None:
             raise Refusal(
-                "a wave is as fast as its power allows", instead="say --power, a limit of rate is that of joints"
+                "a wave is as fast as its power allows", instead="say `power`, a limit of rate is that of joints"
             )
-        request = Request(scene, objective, loops, 1 if starts is None else int(starts))
+        request = Request(scene, maximised, loops, 1 if starts is None else int(starts))
         if starts is None and request.looks_up:
             request = dataclasses.replace(request, starts=1 + len(OUTLINES) - IN_MIRROR * _in_mirror(request))
-        if objective.costs:
+        if maximised.costs:
             request.degree  # noqa: B018 - refuses what has none
-        if objective.straight and _stays(system):
+        if maximised.straight and _stays(system):
             raise Refusal(
                 f"the {kind_of(system)} goes nowhere",
                 because="its mean frame stays where it is",
                 instead="optimize for turning",
             )
-        if objective.name == "turning" and _never_turns(request):
+        if maximised.name == "turning" and _never_turns(request):
             whose = (
                 f"{source_name(system)} tells a body whose"
                 if stored_table(system, "connection")
@@ -273,13 +274,13 @@ def _own_power(scene: Scene) -> float:
     return float(np.maximum(work.power, 0.0).mean() / system.length * per_second**system.traits.power_degree) or 1.0
 
 
-def _loops(scene: Scene, harmonics: int | None, within: WithinArgument) -> Loops | Undulations:
+def _loops(scene: Scene, harmonics: int | None, limits: LimitsArgument) -> Loops | Undulations:
     gait, system, n = scene.gait, scene.system, scene.numerics
     if isinstance(gait, Sine):
-        for name, value in (("harmonics", harmonics), ("within", within)):
+        for name, value in (("harmonics", harmonics), ("limits", limits)):
             if value is not None:
                 raise Refusal(
-                    f"--{'limits' if name == 'within' else name} is that of joints",
+                    f"`{name}` is that of joints",
                     because="of a sine, amplitude and waves are sought",
                     instead="drop it",
                 )
@@ -288,9 +289,9 @@ def _loops(scene: Scene, harmonics: int | None, within: WithinArgument) -> Loops
         raise Refusal(
             f"a loop of {system.joints} joints is too much to search", because=f"at most {JOINTS}, or a sine gait"
         )
-    in_range("--harmonics", 5 if harmonics is None else harmonics, 1, 32, whole=True)
+    in_range("`harmonics`", 5 if harmonics is None else harmonics, 1, 32, whole=True)
     harmonics = 5 if harmonics is None else int(harmonics)
-    return Loops(system.joints, harmonics, limits(scene, within, PHASES), max(PHASES, 16 * harmonics))
+    return Loops(system.joints, harmonics, checked_limits(scene, limits, PHASES), max(PHASES, 16 * harmonics))
 
 
 def _inner(system: System) -> System:

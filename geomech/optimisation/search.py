@@ -19,7 +19,7 @@ from geomech.optimisation import loops as series
 from geomech.optimisation.ascent import TRIES, ascend, project
 from geomech.optimisation.constraints import NEARLY, Constraints
 from geomech.optimisation.evaluate import evaluate_gait
-from geomech.optimisation.limits import WithinArgument
+from geomech.optimisation.limits import LimitsArgument
 from geomech.optimisation.loops import Loops
 from geomech.optimisation.optimum import Evaluation, Optimum
 from geomech.optimisation.problem import EVEN
@@ -51,18 +51,18 @@ ENOUGH = 64  # harmonics that suffice for any initial gait
 
 
 def optimise(
-    scene: Scene, aim: str = "displacement", direction: str | None = None, harmonics: int | None = None,
-    within: WithinArgument = None, starts: int | None = None, *, rate: float | None = None, power: float | None = None,
+    scene: Scene, objective: str = "displacement", direction: str | None = None, harmonics: int | None = None,
+    limits: LimitsArgument = None, starts: int | None = None, *, rate: float | None = None, power: float | None = None,
     progress: Callable | None = None,
 ) -> Optimum:  # fmt: skip
-    """Return the gait of a scene with the largest displacement, efficiency, turning or speed (`Aim`).
+    """Return the gait of a scene with the largest displacement, efficiency, turning or speed (`Objective`).
 
-    It is searched among Fourier series of ``harmonics`` (5) with every shape variable ``within`` (the field's extent)
+    It is searched among Fourier series of ``harmonics`` (5) with every shape variable within ``limits`` (the field's extent)
     of 0, or between (lowest, highest) for each, from the scene's own gait and ``starts`` - 1 others. By default there
     are no others, except for two joints in a dry medium, which have many local optima: there the `OUTLINES` of the
-    limits are used. For a sine, sines are searched. rate, power: limits for the aim "speed". Refusal for what makes no
+    limits are used. For a sine, sines are searched. rate, power: limits for the objective "speed". Refusal for what makes no
     sense."""
-    request = checked(scene, aim, direction, harmonics, within, starts, rate, power)
+    request = checked(scene, objective, direction, harmonics, limits, starts, rate, power)
     return search(request, progress)
 
 
@@ -103,7 +103,7 @@ class _Search:
                 continue
             evaluation, q = self._forwards(*self._finished(q, turn), turn)
             answers.append((evaluation.value, times))
-            straight = not r.aim.straight or abs(evaluation.displacement[2]) <= turn + self._slack(evaluation)
+            straight = not r.objective.straight or abs(evaluation.displacement[2]) <= turn + self._slack(evaluation)
             if straight and evaluation.value > best.value:
                 best, p = evaluation, q
         if p is None:
@@ -234,10 +234,12 @@ class _Search:
         finally:
             self.count += 1
         power = b.power[0] if b.power else None
-        timed = self.request.aim.timed
-        period = self.request.aim.time(np.abs(tier.loops.cycle(p)[1]).max(), power, tier.degree)[0] if timed else 1.0
-        value, by = self.request.aim.value(b, period)
-        if self.request.aim.straight:
+        timed = self.request.objective.timed
+        period = (
+            self.request.objective.time(np.abs(tier.loops.cycle(p)[1]).max(), power, tier.degree)[0] if timed else 1.0
+        )
+        value, by = self.request.objective.value(b, period)
+        if self.request.objective.straight:
             theta, by_theta = b.net[0][2], b.net[1][2]
             more = theta - np.clip(theta, -turn, turn)
             value -= more * (by * by_theta).sum() / ((by_theta**2).sum() or 1.0)
@@ -247,7 +249,7 @@ class _Search:
         before = cycles.count
         p = ascend(
             cycles,
-            self.request.aim,
+            self.request.objective,
             p,
             turn=ascent.turn,
             max_steps=ascent.max_steps,
@@ -274,7 +276,7 @@ class _Search:
         cycles = evaluators.direct(r, r.phases)
         with contextlib.suppress(RuntimeError):  # raised for a loop nearby that cannot be run
             p = project(
-                cycles, r.aim, p, turn=turn, stroke=self.constraints.stroke, singularity=r.system.traits.singularity,
+                cycles, r.objective, p, turn=turn, stroke=self.constraints.stroke, singularity=r.system.traits.singularity,
                 away=self.constraints.away,
             )  # fmt: skip
         self.count += cycles.count
@@ -320,9 +322,9 @@ class _Search:
         return r.gait
 
     def _started_at_mean_heading(self, p: np.ndarray) -> np.ndarray:
-        """Return the loop; for an aim with a direction, started at the phase where the heading equals its mean."""
+        """Return the loop; for an objective with a direction, started at the phase where the heading equals its mean."""
         r = self.request
-        if not (r.aim.direction and isinstance(r.loops, Loops)) or r.by_runs:
+        if not (r.objective.direction and isinstance(r.loops, Loops)) or r.by_runs:
             return p
         for _ in range(3):  # the crossing nearest to the start, refined
             ahead = turning(r.scene.system.run(*r.loops.cycle(p)).xi)
@@ -335,7 +337,7 @@ class _Search:
 
     def _forwards(self, evaluation: Evaluation, p: np.ndarray, turn: float) -> tuple[Evaluation, np.ndarray]:
         """Return the gait, or its reverse where it moves against the direction and the reverse is about as good."""
-        k = "xy".find(self.request.aim.direction or "-")
+        k = "xy".find(self.request.objective.direction or "-")
         if k < 0 or evaluation.displacement[k] >= 0 or not isinstance(self.request.loops, Loops):
             return evaluation, p
         reverse, q = self._finished(series.reversed_(p), turn)
@@ -343,13 +345,13 @@ class _Search:
 
     def _timed(self, evaluation: Evaluation) -> Gait:
         """Return the gait with the frequency that its limits allow."""
-        if self.request.aim.timed and 0 < evaluation.time < 1 / (2 * np.pi * FASTEST):
+        if self.request.objective.timed and 0 < evaluation.time < 1 / (2 * np.pi * FASTEST):
             raise Refusal(
-                f"its limits let a gait repeat more than {FASTEST:g} times a second", instead="lower --rate, or --power"
+                f"its limits let a gait repeat more than {FASTEST:g} times a second", instead="lower `rate`, or `power`"
             )
         frequency = (
             1 / (2 * np.pi * evaluation.time)
-            if self.request.aim.timed and evaluation.time
+            if self.request.objective.timed and evaluation.time
             else self.request.scene.gait.frequency
         )
         return dataclasses.replace(evaluation.gait, frequency=frequency)

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,8 +21,11 @@ from geomech.studies.motion import Motion
 from rft.refusal import Refusal
 
 FILMS, STRIPS = (".gif", ".mp4"), (".png", ".pdf", ".svg")
-FRAMES = 48  # of a cycle, at most
-RATE = 25  # frames a second: a cycle takes some two
+RATE, SLOW_RATE = 25, 10  # frames a second; of cycles that take long
+LONG = 4.0  # s: the longest cycle at RATE
+CYCLE = 2.0  # s that a cycle takes without a frequency
+SHORTEST, LONGEST = 0.4, 10.0  # s that a cycle takes: ten pictures to see it by, and patience
+STEPS = (1.0, 2.0, 5.0)  # of speeds, times a power of ten
 DOTS = 100  # an inch
 DRAWING = 0.012  # s a frame takes, some two times what it took
 FRAME = 4e5  # bytes a frame holds until the film is written
@@ -46,15 +50,45 @@ def is_film(path: Path) -> bool:
     return path.suffix.lower() in FILMS
 
 
-def rows(phases: int, cycles: int) -> np.ndarray:
-    """Return the rows of a motion that are drawn: a cycle's end is the next one's start, and the last end is left out."""
-    step = max(1, -(-phases // FRAMES))
-    return np.arange(0, phases * cycles, step)
+class Pace(NamedTuple):
+    """Speed of a film. cycle: s of film that a cycle takes. rate: frames a second. caption: tells the speed."""
+
+    cycle: float
+    rate: int
+    caption: str
 
 
-def cost(phases: int, cycles: int) -> Cost:
+def pace(frequency: float | None) -> Pace:
+    """Return the speed of a film of a gait: real time where a cycle then takes from `SHORTEST` to `LONGEST`, else the nearest
+    round multiple of it; `CYCLE` for a gait without a frequency (Hz)."""
+    if not frequency:
+        return Pace(CYCLE, RATE, f"1 cycle = {CYCLE:g} s")
+    takes = 1 / frequency
+    speed = _speed(takes)
+    cycle = takes / speed
+    return Pace(cycle, RATE if cycle <= LONG else SLOW_RATE, "real time" if speed == 1.0 else f"{speed:g} × real time")
+
+
+def _speed(takes: float) -> float:
+    """Return the speed of a film of cycles that take so long, s: 1, or the nearest of 2, 5, 10 ... or 0.5, 0.2, 0.1 ... with
+    which they are seen."""
+    speeds, slack = np.outer(10.0 ** np.arange(-12, 13), STEPS).ravel(), 1 + 1e-9
+    if takes > LONGEST:
+        return float(speeds[takes / speeds <= LONGEST * slack].min())
+    return 1.0 if takes >= SHORTEST else float(speeds[takes / speeds >= SHORTEST / slack].max())
+
+
+def rows(phases: int, cycles: int, frequency: float | None = None) -> np.ndarray:
+    """Return the row of a motion that each picture shows: a cycle's end is the next one's start, and the last end is left
+    out."""
+    at = pace(frequency)
+    count = max(1, round(cycles * at.cycle * at.rate))
+    return np.minimum(np.arange(count) * phases / (at.cycle * at.rate), phases * cycles - 1).astype(int)
+
+
+def cost(phases: int, cycles: int, frequency: float | None = None) -> Cost:
     """Return the cost of drawing a film."""
-    frames = len(rows(phases, cycles))
+    frames = len(rows(phases, cycles, frequency))
     return Cost(0, DRAWING * frames, FRAME * frames, DRAWING * frames)
 
 
@@ -69,15 +103,20 @@ def save(path: Path, motion: Motion, field=None, error=None, progress: Callable 
     if not is_film(path):
         plots.save(plots.filmstrip(motion, field, error), path)
         return
-    drawn = rows(motion.scene.numerics.phases, motion.cycles)
-    film = counted(_frames(motion, drawn, field, error), len(drawn), progress)
+    at, drawn = pace(motion.frequency), rows(motion.scene.numerics.phases, motion.cycles, motion.frequency)
+    film = counted(_frames(motion, drawn, field, error, at.caption), len(drawn), progress)
     with atomic_file(path) as part:
-        (_gif if path.suffix.lower() == ".gif" else _mp4)(part, film)
+        encode(part, film, at.rate, path.suffix.lower())
 
 
-def _frames(motion: Motion, rows: np.ndarray, field, error) -> Iterator[np.ndarray]:
+def encode(path: Path, frames: Iterator[np.ndarray], rate: int, ending: str) -> None:
+    """Write pictures at a rate (1/s) as the film that an ending names."""
+    (_gif if ending == ".gif" else _mp4)(path, frames, rate)
+
+
+def _frames(motion: Motion, rows: np.ndarray, field, error, caption: str) -> Iterator[np.ndarray]:
     """Yield pictures (height, width, 3), bytes. Artists that stand still are drawn once."""
-    canvas, update, background = _set(motion, rows, field, error)
+    canvas, update, background = _set(motion, rows, field, error, caption)
     for row in rows:
         canvas.restore_region(background)
         for artist in update(row):
@@ -86,11 +125,11 @@ def _frames(motion: Motion, rows: np.ndarray, field, error) -> Iterator[np.ndarr
 
 
 @styled
-def _set(motion: Motion, rows: np.ndarray, field, error):
+def _set(motion: Motion, rows: np.ndarray, field, error, caption: str):
     """Return (canvas, function that moves the artists to a row, background)."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    fig, update = plots.stage(motion, rows, field, error)
+    fig, update = plots.stage(motion, rows, field, error, caption)
     fig.set_dpi(DOTS)
     canvas = FigureCanvasAgg(fig)
     moving = update(rows[0])
@@ -102,21 +141,21 @@ def _set(motion: Motion, rows: np.ndarray, field, error):
     return canvas, update, canvas.copy_from_bbox(fig.bbox)
 
 
-def _gif(path: Path, frames: Iterator[np.ndarray]) -> None:
+def _gif(path: Path, frames: Iterator[np.ndarray], rate: int) -> None:
     """Write a GIF with one palette for all frames, so that nothing flickers."""
     from PIL import Image
 
     first = Image.fromarray(next(frames)).quantize(255, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
     rest = (Image.fromarray(frame).quantize(palette=first, dither=Image.Dither.NONE) for frame in frames)
     with path.open("wb") as file:
-        first.save(file, "GIF", save_all=True, append_images=rest, duration=1000 // RATE, loop=0)
+        first.save(file, "GIF", save_all=True, append_images=rest, duration=1000 // rate, loop=0)
 
 
-def _mp4(path: Path, frames: Iterator[np.ndarray]) -> None:
+def _mp4(path: Path, frames: Iterator[np.ndarray], rate: int) -> None:
     """Write an MP4 by handing frames to ffmpeg one by one; Refusal with its last line if it fails."""
     first = next(frames)
     tall, wide = (2 * (x // 2) for x in first.shape[:2])  # its usual colours take even sizes
-    raw_input = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{wide}x{tall}", "-r", str(RATE), "-i", "-"]
+    raw_input = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{wide}x{tall}", "-r", str(rate), "-i", "-"]
     encoding = ["-an", "-pix_fmt", "yuv420p", "-y", str(path)]
     command = ["ffmpeg", "-loglevel", "error", *raw_input, *encoding]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,10 +23,11 @@ CALIBRATIONS = {
 }
 
 
-def displacement(result: Result, path: Path) -> None:
-    """Draw net displacements against amplitude."""
-    _, gait = result.subject
-    plots.save(plots.displacement_figure({type(gait).__name__.lower(): tables.table(result)}, [gait]), path)
+def displacement(result: Result, path: Path, **options: Any) -> None:
+    """Draw net displacements against amplitude. options: of `plots.displacement_figure`."""
+    scene, gait = result.subject
+    table = {type(gait).__name__.lower(): tables.table(result)}
+    plots.save(plots.displacement_figure(table, [gait], system=scene.system, **options), path)
 
 
 def sweep(result: Result, path: Path) -> None:
@@ -57,33 +59,37 @@ def calibration(result: Result, path: Path) -> None:
 
 @dataclass(frozen=True)
 class Optimum:
-    """A drawing of the best gait. stretch: where equal lengths cost the same, too."""
+    """A drawing of the best gait. stretch: where equal lengths cost the same, too. clim: limit of the colours."""
 
     stretch: bool
     plot: Path | None
+    clim: float | str | None = None
 
     def __post_init__(self) -> None:
         if self.stretch and self.plot is None:
             raise Refusal("--stretch is a way to draw", instead="say --plot FILE, too")
 
     def __call__(self, result: Result, path: Path) -> None:
-        plots.save(plots.optimum_figure(result.subject, self.stretch), path)
+        plots.save(plots.optimum_figure(result.subject, self.stretch, clim=self.clim), path)
 
 
 @dataclass(frozen=True)
 class Connection:
-    """A drawing of a connection as arrows or streamlines."""
+    """A drawing of a connection as arrows or streamlines. components: panels, all that are not zero if there are none."""
 
     style: str | None
     plot: Path | None
     pair: str | None
     slice_: str | None
     other_frame: str | None
+    components: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        if self.plot is None and not (self.style, self.pair, self.slice_, self.other_frame) == (None,) * 4:
+        options = (self.style, self.pair, self.slice_, self.other_frame, self.components or None)
+        if self.plot is None and not options == (None,) * 5:
             raise Refusal(
-                "--style, --pair, --slice and --compare-frame are those of a figure", instead="say --plot FILE"
+                "--style, --component, --pair, --slice and --compare-frame are those of a figure",
+                instead="say --plot FILE",
             )
         if self.style is not None:
             choose("--style", self.style, plots.CONNECTION_STYLES)
@@ -92,6 +98,7 @@ class Connection:
         space: Space = result.subject
         scene = space.study.scene
         options: dict[str, Any] = {"labels": shape_labels(scene.system), "style": self.style or "quiver"}
+        options["components"] = self.components
         if space.planes:
             plots.save(plots.plane_connection_figure(space.planes, **options), path)
             return
@@ -102,12 +109,15 @@ class Connection:
 
 @dataclass(frozen=True)
 class Ccf:
-    """A drawing of a CCF with the scene's gait on it, or of slices of it."""
+    """A drawing of a CCF with the scene's gait on it, or of slices of it. components: panels, all that are not zero if none
+    is named. clim: limit of the colours."""
 
     style: str | None
     metric: bool
     stretch: bool
     other_frame: str | None
+    components: Sequence[str] = ()
+    clim: float | str | None = None
 
     def __post_init__(self) -> None:
         if self.style is not None:
@@ -121,8 +131,12 @@ class Ccf:
         space: Space = result.subject
         plots.save(self._slices(space) if space.planes else self._map(space), path)
 
+    @property
+    def _panels(self) -> dict[str, Any]:
+        return {"components": self.components, "clim": self.clim}
+
     def _slices(self, space: Space) -> Any:
-        scene, options = space.study.scene, {"style": self.style or "map"}
+        scene, options = space.study.scene, {"style": self.style or "map", **self._panels}
         if space.other_planes:
             options |= {"beside": space.other_planes[0], "names": [scene.frame, self.other_frame]}
         return plots.planes_figure(space.planes, scene.gait, labels=shape_labels(scene.system), **options)
@@ -136,8 +150,8 @@ class Ccf:
         }
         if self.stretch:
             effort = "BL" if scene.system.traits.power_degree == 1 else "path length"
-            return plots.stretched_figure(study.curvature, space.stretch, **options, effort=effort)
-        options |= {"style": self.style or "map", "metric": study.metric if self.metric else None}
+            return plots.stretched_figure(study.curvature, space.stretch, **options, **self._panels, effort=effort)
+        options |= {"style": self.style or "map", "metric": study.metric if self.metric else None, **self._panels}
         if other:
             options |= {"beside": (other.curvature, other.curvature_error), "names": [scene.frame, self.other_frame]}
         return plots.ccf_figure(study.curvature, **options)

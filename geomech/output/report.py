@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from geomech import plots, text
 from geomech.core.variables import Result
@@ -40,31 +41,44 @@ def _holds(path: Path, text: str) -> bool:
         return False
 
 
-def write(result: Result, folder: Path) -> None:
+class Drawn(NamedTuple):
+    """Options of the figures. components: panels, all but zero ones if there are none. clim: limit of the CCF's colours. data:
+    measurements beside the displacements of the scene's gait (`geomech.scenes.measurements`)."""
+
+    components: Sequence[str] = ()
+    clim: float | str | None = None
+    data: Mapping | None = None
+
+
+ALL = Drawn()
+
+
+def write(result: Result, folder: Path, drawn: Drawn = ALL) -> None:
     """Write everything of a scene into a folder."""
     found: Reported = result.subject
     scene = found.study.scene
     if found.mapped:
         write_netcdf(folder / "connection.nc", fields.of_study(found.study))
-        _maps(found, folder)
+        _maps(found, folder, drawn)
     numbers = {title: tables.table(table) for title, table in found.tables.items()}
-    _save(plots.displacement_figure(numbers, found.gaits), folder / "displacement")
+    options = {"system": scene.system, "components": drawn.components, "data": drawn.data}
+    _save(plots.displacement_figure(numbers, found.gaits, **options), folder / "displacement")
     (folder / TABLES).write_text(json.dumps(numbers, indent=1) + "\n")
     (folder / SCENE).write_text(toml(scene), encoding="utf-8")
 
 
-def _maps(found: Reported, folder: Path) -> None:
+def _maps(found: Reported, folder: Path, drawn: Drawn) -> None:
     """Draw the connection and the CCF, of three joints for every pair."""
     study, scene = found.study, found.study.scene
-    labels = shape_labels(scene.system)
+    options: dict[str, Any] = {"labels": shape_labels(scene.system), "components": drawn.components}
     if found.planes:
-        _save(plots.plane_connection_figure(found.planes, labels=labels), folder / "connection")
-        _save(plots.planes_figure(found.planes, scene.gait, labels=labels), folder / "ccf")
+        _save(plots.plane_connection_figure(found.planes, **options), folder / "connection")
+        _save(plots.planes_figure(found.planes, scene.gait, clim=drawn.clim, **options), folder / "ccf")
         return
-    _save(plots.connection_figure(study.fitted, labels=labels), folder / "connection")
+    _save(plots.connection_figure(study.fitted, **options), folder / "connection")
     if isinstance(scene.system, Framed):
-        _save(plots.frame_figure(scene.system.field.field, labels=labels), folder / "frame")
-    maps = plots.ccf_figure(study.curvature, found.gaits, error=study.curvature_error, labels=labels)
+        _save(plots.frame_figure(scene.system.field.field, labels=options["labels"]), folder / "frame")
+    maps = plots.ccf_figure(study.curvature, found.gaits, error=study.curvature_error, clim=drawn.clim, **options)
     _save(maps, folder / "ccf")
 
 
@@ -79,7 +93,8 @@ def write_accuracy(result: Result, folder: Path) -> None:
 
 def files(result: Result, folder: Path) -> str:
     """Return the names of the files in a folder."""
-    return f"files in {folder}: {', '.join(sorted(p.name for p in folder.iterdir() if not p.name.startswith('.')))}"
+    names = sorted(p.name for p in folder.iterdir() if not p.name.startswith("."))
+    return f"files in {folder}: {', '.join(names)}"
 
 
 def _save(fig, stem: Path) -> None:

@@ -18,7 +18,7 @@ def question(scene: Scene, path: Path | None, cycles: int | None) -> Trajectory:
     """Return the question of so many cycles of a scene, by default 3 for a film, else 1."""
     film = path is not None and animate.is_film(path)
     count = (3 if film else 1) if cycles is None else cycles
-    drawing = animate.cost(scene.numerics.phases, count) if film else None
+    drawing = animate.cost(scene.numerics.phases, count, getattr(scene.gait, "frequency", None)) if film else None
     return Trajectory(scene, count, path is not None and not is_table(path), drawing)
 
 

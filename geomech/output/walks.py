@@ -20,6 +20,9 @@ from geomech.studies.walking import Walked
 
 TRIPODS = ("0.2", "C0")  # colours of the legs in step
 FRAMES, STRIP = 100, 6  # pictures of a film, at most, and of a strip
+WIDE, TALL = 6.4, (1.8, 3.6)  # in, of a film and the limits of its height
+LABELS = 0.95  # in, of these, for the labels
+ROOM = 2.4  # robots to either side of one that is followed
 
 
 def write(result: Result, folder: Path) -> None:
@@ -49,15 +52,16 @@ def draw(scene: WalkerScene, found: Walked):
     return fig
 
 
-def film(result: Result, path: Path) -> None:
-    """Write a film (.gif, .mp4) of a walk, or a strip of its last cycle (.png, .pdf, .svg); whole or not at all."""
+def film(result: Result, path: Path, follow: bool = False) -> None:
+    """Write a film (.gif, .mp4) of a walk, or a strip of its last cycle (.png, .pdf, .svg); whole or not at all. follow: the
+    camera goes with the robot."""
     scene, found = result.subject
     if not animate.is_film(path):
         plots.save(strip(scene, found), path)
         return
-    frames = _frames(scene, found)
+    at = animate.pace(scene.gait.frequency)
     with atomic_file(path) as part:
-        (animate._gif if path.suffix.lower() == ".gif" else animate._mp4)(part, frames)
+        animate.encode(part, _frames(scene, found, at, follow), at.rate, path.suffix.lower())
 
 
 @plots.styled
@@ -66,50 +70,73 @@ def strip(scene: WalkerScene, found: Walked):
     w = found.walk
     times = np.linspace(max(0.0, w.t[-1] - 1 / scene.gait.frequency), w.t[-1], STRIP)
     rows = np.searchsorted(w.t, times - 1e-9).clip(0, len(w.t) - 1)
-    fig, axes = plots.figure(3.2 * 3, 1.9 * 2, 3, 2)
+    fig, axes = plots.figure(2.3 * 3, 1.9 * 2, 3, 2, layout="compressed")
     for ax, row in zip(axes.ravel(), rows):
         _stage(ax, scene, found, np.array([row]))(row)
+        ax.label_outer(remove_inner_ticks=False)
+        ax.tick_params(labelbottom=True)
     return fig
 
 
-def _frames(scene: WalkerScene, found: Walked) -> Iterator[np.ndarray]:
+def _frames(scene: WalkerScene, found: Walked, at: animate.Pace, follow: bool) -> Iterator[np.ndarray]:
     """Yield pictures (height, width, 3), bytes, at the rate of the film: by MuJoCo for a walk of three dimensions where there
     is a GL to draw with."""
-    w = found.walk
-    last = min(w.t[-1], FRAMES / animate.RATE)
-    times = np.arange(0.0, last, max(1 / animate.RATE, last / FRAMES)) if last else np.zeros(1)
+    w, speed = found.walk, 1 / (scene.gait.frequency * at.cycle)
+    times = np.arange(min(FRAMES, 1 + int(w.t[-1] / speed * at.rate))) * speed / at.rate
     rows = np.searchsorted(w.t, times - 1e-9).clip(0, len(w.t) - 1)
     pictures = w.spatial and walking.view(scene).pictures(w.spatial["states"][rows])
-    return pictures or _drawn(scene, found, rows)
+    return _captioned(pictures, w.t[rows], at.caption) if pictures else _drawn(scene, found, rows, at.caption, follow)
+
+
+def _captioned(pictures: Iterator[np.ndarray], times: np.ndarray, caption: str) -> Iterator[np.ndarray]:
+    """Yield pictures with the time and the speed of the film in their upper corners."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    font = ImageFont.load_default(14)
+    for picture, t in zip(pictures, times):
+        image = Image.fromarray(picture)
+        draw, words = ImageDraw.Draw(image), {"fill": "white", "font": font, "stroke_width": 1, "stroke_fill": "black"}
+        draw.text((10, 8), f"t = {t:.2f} s", **words)
+        draw.text((image.width - 10, 8), caption, anchor="ra", **words)
+        yield np.array(image)
 
 
 @plots.styled
-def _drawn(scene: WalkerScene, found: Walked, rows: np.ndarray) -> Iterator[np.ndarray]:
+def _drawn(scene: WalkerScene, found: Walked, rows: np.ndarray, caption: str, follow: bool) -> Iterator[np.ndarray]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    fig, axes = plots.figure(6.4, 2.4)
-    update = _stage(axes[0, 0], scene, found, rows)
+    fig, axes = plots.figure(WIDE, TALL[1])
+    ax = axes[0, 0]
+    update = _stage(ax, scene, found, rows, follow)
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    fig.set_figheight(float(np.clip((WIDE - LABELS) * (high - low) / (right - left) + LABELS, *TALL)))
+    ax.set_title(caption, loc="right", fontsize=8, color="0.3")
     fig.set_dpi(animate.DOTS)
     canvas = FigureCanvasAgg(fig)
     for row in rows:
         update(row)
         canvas.draw()
+        fig.set_layout_engine("none")  # so that the axes stand still
         yield np.array(canvas.buffer_rgba())[..., :3]
 
 
-def _stage(ax, scene: WalkerScene, found: Walked, rows: np.ndarray):
-    """Draw the ground on axes that hold the robot at these rows of its walk; return a function that draws it at one."""
+def _stage(ax, scene: WalkerScene, found: Walked, rows: np.ndarray, follow: bool = False):
+    """Draw the ground on axes that hold the robot at these rows of its walk; return a function that draws it at one. follow:
+    the axes move with the robot."""
     robot = _Solid(scene, found) if found.walk.spatial else _Flat(scene, found)
-    room, reach = robot.room * 1.1, robot.reach
+    room, reach = robot.room * (ROOM if follow else 1.1), robot.reach
     x = found.walk.pose[rows, 0]
     ax.axhspan(-3 * reach, 0.0, color="peru", alpha=0.35, lw=0)
-    limits = {"xlim": (x.min() - room, x.max() + room), "ylim": (-1.2 * reach, 3.2 * reach)}
+    seen = x[:1] if follow else x
+    limits = {"xlim": (seen.min() - room, seen.max() + room), "ylim": (-1.2 * reach, 3.2 * reach)}
     ax.set(**limits, aspect="equal", xlabel="$x$ (m)", ylabel="$z$ (m)")
     draw, label = robot.on(ax), ax.set_title("", loc="left", fontsize=8)
 
     def update(row):
         draw(row)
         label.set_text(f"t = {found.walk.t[row]:.2f} s")
+        if follow:
+            ax.set_xlim(found.walk.pose[row, 0] - room, found.walk.pose[row, 0] + room)
 
     return update
 

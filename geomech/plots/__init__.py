@@ -2,7 +2,7 @@
 is open, else on a new one, which a notebook shows. Nothing here imports pyplot or changes its state.
 """
 
-from geomech.plots.displacements import displacement, displacement_figure, medium_band, net
+from geomech.plots.displacements import PANELS, displacement, displacement_figure, medium_band, net
 from geomech.plots.drag import drag_figure
 from geomech.plots.figures import (
     ccf_figure,
@@ -29,11 +29,11 @@ from geomech.plots.maps import (
 )
 from geomech.plots.measured import measured_figure
 from geomech.plots.motion import LINES, filmstrip, stage
-from geomech.plots.optimum import optimum_figure, optimum_map
+from geomech.plots.optimum import optimum_angles, optimum_figure, optimum_map
 from geomech.plots.plates import penetration_figure, plates_figure
 from geomech.plots.precision import KNOB_MARKER, walk_accuracy_figure, work_precision, work_precision_figure
 from geomech.plots.stretched import stretched_figure, stretched_map
-from geomech.plots.style import MARKED, STYLE, check_format, figure, quantity, save, styled
+from geomech.plots.style import MARKED, STYLE, check_format, figure, quantity, save, shared_legend, styled
 from geomech.plots.styles import CCF_STYLES, CONNECTION_STYLES, ccf_contours, ccf_surface, streamlines, winding
 from geomech.plots.sweeps import curves, sweep_figure
 from geomech.plots.terradynamics import (
@@ -54,6 +54,7 @@ __all__ = [
     "KNOB_MARKER",
     "LINES",
     "MARKED",
+    "PANELS",
     "RINGS",
     "STYLE",
     "ccf_contours",
@@ -80,6 +81,7 @@ __all__ = [
     "measured_figure",
     "medium_band",
     "net",
+    "optimum_angles",
     "optimum_figure",
     "optimum_map",
     "pairs_figure", "penetration_figure",
@@ -89,6 +91,7 @@ __all__ = [
     "quantity",
     "save",
     "shape_space",
+    "shared_legend",
     "square_of_angles",
     "stage",
     "streamlines",
@@ -105,3 +108,7 @@ __all__ = [
     "work_precision",
     "work_precision_figure",
 ]  # fmt: skip
+
+
+def __dir__() -> list[str]:
+    return __all__

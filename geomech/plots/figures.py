@@ -14,7 +14,21 @@ from geomech.geometry.field import Field
 from geomech.geometry.metric import Finsler, Metric
 from geomech.geometry.plane import Plane, ProjectedGait
 from geomech.geometry.two_form import TwoForm
-from geomech.plots.maps import ANGLES, PHASES, TITLES, Labels, ccf_map, draw_gait, largest
+from geomech.plots.maps import (
+    ANGLES,
+    PHASES,
+    Labels,
+    ccf_map,
+    ccf_name,
+    draw_gait,
+    has,
+    has_row,
+    largest,
+    limit_of,
+    panels_of,
+    row_name,
+    say_left_out,
+)
 from geomech.plots.style import blank, figure, quantity, styled
 from geomech.plots.styles import (
     CCF_STYLES,
@@ -28,20 +42,25 @@ SHADOW = "dashed: the gait, seen along the joints that are held here"
 @styled
 def connection_figure(
     connection: Connection, *, labels: Labels = ANGLES, style: str = "quiver",
-    beside: Connection | None = None, names: Sequence[str] = (),
+    beside: Connection | None = None, names: Sequence[str] = (), components: Sequence[str] = (),
 ):  # fmt: skip
-    """Draw all three rows of A side by side, as arrows ("quiver") or "streamlines".
+    """Draw the rows of A side by side, but for those that are zero everywhere, as arrows ("quiver") or "streamlines".
 
-    beside: the connection in another body frame, drawn below on the same scales. names: of the two frames."""
+    beside: the connection in another body frame, drawn below on the same scales. names: of the two frames. components:
+    of WORDS, drawn even where they are zero."""
     draw = CONNECTION_STYLES[choose("style", style, CONNECTION_STYLES)]
     rows = [connection] if beside is None else [connection, beside]
-    fig, axes = figure(10.8, 3.0 + 2.7 * (len(rows) - 1), 3, len(rows), layout="compressed")
-    for component in range(3):
+    panels = panels_of(components, [[has_row(c, k) for k in range(3)] for c in rows])
+    fig, axes = figure(
+        0.3 + 3.5 * len(panels), 3.0 + 2.7 * (len(rows) - 1), len(panels), len(rows), layout="compressed"
+    )
+    for k, component in enumerate(panels):
         sizes = [largest(np.hypot(*c.A[component])) for c in rows]
         top = None if beside is None else max(sizes)
-        for c, ax in zip(rows, axes[:, component]):
+        for c, ax in zip(rows, axes[:, k]):
             draw(c, component, ax=ax, labels=labels, top=top)
     _name(axes, names)
+    say_left_out(fig, panels, components, row_name)
     return fig
 
 
@@ -84,48 +103,58 @@ class Row(NamedTuple):
 def ccf_figure(
     field: Field, gaits: Sequence[Gait] = (), *, error: Field | None = None, labels: Labels = ANGLES,
     style: str = "map", metric: Metric | Finsler | None = None, beside: tuple[Field, Field | None] | None = None,
-    names: Sequence[str] = (),
+    names: Sequence[str] = (), components: Sequence[str] = (), clim: float | str | None = None,
 ):  # fmt: skip
-    """Draw all three components of the CCF side by side with gaits on them, as colours ("map"), "contours" or a "surface".
+    """Draw the components of the CCF side by side with gaits on them, but for those that are zero everywhere, as colours
+    ("map"), "contours" or a "surface".
 
     metric: its rings on a map. beside: (CCF, error) in another body frame, drawn below on the same scales. names: of the two
-    frames."""
+    frames. components: of WORDS, drawn even where they are zero. clim: limit of the colours on either side of zero, a number or
+    a percentile of the values' size such as "98%"; their largest if left out."""
     rows = [Row(field, error, gaits, labels)] + ([] if beside is None else [Row(*beside, gaits, labels)])
-    return _ccf_rows(rows, style, metric, names, same=True)
+    return _ccf_rows(rows, style, metric, names, True, components, clim)
 
 
 @styled
 def planes_figure(
     planes: Sequence[Plane], gait: Gait | None = None, *, labels: Labels | None = None, style: str = "map",
-    beside: Plane | None = None, names: Sequence[str] = (),
+    beside: Plane | None = None, names: Sequence[str] = (), components: Sequence[str] = (),
+    clim: float | str | None = None,
 ):  # fmt: skip
     """Draw the CCF of pairs of joints on planes of shape space, a row for each pair, as `ccf_figure` does.
 
     gait: of all joints; where it leaves the plane it is dashed, as it is seen along the fixed joints, and has no area. labels:
     (name, unit) of all shape variables. beside: the plane of a single pair in another body frame, below on the same scales.
-    names: of the two frames."""
+    names: of the two frames. components, clim: as for `ccf_figure`."""
     labels, rows = labels or _angles(planes), []
     for one in [*planes, *([] if beside is None else [beside])]:
         seen = [] if gait is None else [ProjectedGait(gait, one)]
         on_plane, shadows = ([x for x in seen if x.lies_in_plane == lies] for lies in (True, False))
         rows.append(Row(one.ccf, one.error, on_plane, [labels[k] for k in one.pair], shadows))
     titles = [f"{plane_title(one, labels)}; frame {name}" for one, name in zip([planes[0], beside], names)]
-    return _ccf_rows(rows, style, None, titles or [plane_title(one, labels) for one in planes], same=beside is not None)
+    titles = titles or [plane_title(one, labels) for one in planes]
+    return _ccf_rows(rows, style, None, titles, beside is not None, components, clim)
 
 
 @styled
-def plane_connection_figure(planes: Sequence[Plane], *, labels: Labels | None = None, style: str = "quiver"):
+def plane_connection_figure(
+    planes: Sequence[Plane], *, labels: Labels | None = None, style: str = "quiver", components: Sequence[str] = ()
+):  # fmt: skip
     """Draw the rows of A of the two joints that move, on planes of shape space, a row for each pair, as `connection_figure`
     does.
 
     labels: as for `planes_figure`."""
     draw = CONNECTION_STYLES[choose("style", style, CONNECTION_STYLES)]
     labels = labels or _angles(planes)
-    fig, axes = figure(10.8, 3.0 + 2.7 * (len(planes) - 1), 3, len(planes), layout="compressed")
+    panels = panels_of(components, [[has_row(one.connection, k) for k in range(3)] for one in planes])
+    fig, axes = figure(
+        0.3 + 3.5 * len(panels), 3.0 + 2.7 * (len(planes) - 1), len(panels), len(planes), layout="compressed"
+    )
     for one, row in zip(planes, axes):
-        for component, ax in enumerate(row):
+        for component, ax in zip(panels, row):
             draw(one.connection, component, ax=ax, labels=[labels[k] for k in one.pair])
     _name(axes, [plane_title(one, labels) for one in planes])
+    say_left_out(fig, panels, components, row_name)
     return fig
 
 
@@ -140,30 +169,47 @@ def plane_title(plane: Plane, labels: Labels) -> str:
     return f"{angles} {labels[plane.fixed[0]][1]}" if plane.fixed else ""
 
 
-def _ccf_rows(rows: Sequence[Row], style: str, metric, names: Sequence[str], same: bool):
-    """Draw maps of the three components, a line of them for each row. same: on the same scales."""
+def _ccf_rows(rows: Sequence[Row], style: str, metric, names: Sequence[str], same: bool, components, clim):
+    """Draw maps of the components, a line of them for each row. same: on the same scales."""
     draw = CCF_STYLES[choose("style", style, CCF_STYLES)]
     solid = getattr(draw, "projection", "") == "3d"
+    panels = panels_of(components, [[has(r.field, k) for k in range(3)] for r in rows])
+    count = len(panels)
     if solid:
-        fig = blank(11.8, 3.6 * len(rows))
-        axes = fig.subplots(len(rows), 3, squeeze=False, subplot_kw={"projection": "3d"})
+        fig = blank(1.0 + 3.6 * count, 3.6 * len(rows))
+        axes = fig.subplots(len(rows), count, squeeze=False, subplot_kw={"projection": "3d"})
         fig.get_layout_engine().set(w_pad=0.25)
     else:
-        fig, axes = figure(10.8, 3.2 + 2.75 * (len(rows) - 1), 3, len(rows), layout="compressed")
+        fig, axes = figure(0.3 + 3.5 * count, 3.2 + 2.75 * (len(rows) - 1), count, len(rows), layout="compressed")
+        fig.get_layout_engine().set(rect=(0.0, 0.0, 0.97 if len(rows) > 1 else 1.0, 1.0))  # room for the widest labels
     more = {"metric": metric} if style == "map" else {}
-    for component in range(len(TITLES)):
-        top = max(largest(r.field.values[component]) for r in rows) if same and len(rows) > 1 else None
-        for r, ax in zip(rows, axes[:, component]):
+    for k, component in enumerate(panels):
+        tops = [limit_of(r.field.values[component], clim) if has(r.field, component) else None for r in rows]
+        if same:
+            tops = [max((x for x in tops if x), default=None)] * len(rows)
+        for r, ax, top in zip(rows, axes[:, k], tops):
             draw(r.field, component, r.gaits, ax=ax, error=r.error, labels=r.labels, top=top, **more)
             for shadow in r.shadows:
                 if solid:
                     ax.plot(*shadow.shape(PHASES).T, ax.get_zlim()[0], "--", color="black", lw=1.0)
                 else:
                     draw_gait(shadow, ax, within=r.field.axes, line="--")
-    if any(r.shadows for r in rows):
-        fig.supxlabel(SHADOW, fontsize=8)
+    say_left_out(fig, panels, components, ccf_name, *([SHADOW] if any(r.shadows for r in rows) else []))
+    if style == "map":
+        _one_legend(fig, axes, "upper" if fig.get_supxlabel() else "lower")
     _name(axes, names)
     return fig
+
+
+def _one_legend(fig, axes, where: str) -> None:
+    """Put the legends of maps, which explain the same, into one, "upper" or "lower"."""
+    handles = {}
+    for ax in axes.flat:
+        if (legend := ax.get_legend()) is not None:
+            handles |= {h.get_label(): h for h in legend.legend_handles}
+            legend.remove()
+    if handles:
+        fig.legend(handles=[*handles.values()], loc=f"outside {where} center", ncols=len(handles))
 
 
 def _name(axes, names: Sequence[str]) -> None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from geomech.core.errors import choose
 from geomech.gaits import Gait
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
@@ -15,6 +16,7 @@ from geomech.plots.style import axes_of, figure, quantity, styled
 
 ROUNDING = 1e-13  # of the largest entry of A: a row below it is nothing but rounding
 COMPONENTS = ("x", "y", r"\theta")
+WORDS = ("x", "y", "theta")  # for the components, as --component has them
 TITLES = ("forward", "sideways", "turning")
 Labels = Sequence[tuple[str, str]]
 ANGLES = (("alpha_1", "rad"), ("alpha_2", "rad"))
@@ -25,6 +27,7 @@ RINGS = "joint rates of equal cost"
 SHORT = 0.06  # of the map's width: a shorter bit of a line of zeros is no line
 PATCH = 6  # points of one
 FINER = 4  # points of a line for each of the grid
+ARROWS, LONGEST = 13, 1.5  # arrows along an axis; the longest, in units of their distance
 FINEST = 400  # grid points along an axis of a map: about the dots of its picture
 
 
@@ -51,35 +54,50 @@ def vector_field(
 
     labels: as for `shape_space`. top: of the colours and of the arrows' scale, for maps that are compared."""
     ax = axes_of(ax)
-    step = every or max(1, round(len(connection.axes[0]) / 13))
+    step = every or max(1, round(len(connection.axes[0]) / ARROWS))
     pick = slice(step // 2, None, step)
     x, y = np.meshgrid(*(a[pick] for a in connection.axes), indexing="ij")
     u, v = (connection.A[component, k][pick, pick] for k in (0, 1))
     size = np.hypot(u, v)
-    if np.nanmax(size, initial=0.0) <= ROUNDING * np.nanmax(np.abs(connection.A), initial=0.0):  # a row of nothing
+    if not has_row(connection, component):
         u, v, size = 0 * u, 0 * v, 0 * size
     if np.isnan(size).any():  # beside singular shapes arrows are cut
         cut = np.fmin(1.0, largest(size) / np.fmax(size, 1e-300))
         u, v, size = cut * u, cut * v, cut * size
-    most = np.nanmax(size, initial=0.0)
-    scale = {"scale": None if most else 1.0}
-    if top:
-        scale = {
-            "scale": top / (1.4 * step * np.ptp(connection.axes[0]) / len(connection.axes[0])),
-            "scale_units": "xy",
-        }
-    arrows = ax.quiver(x, y, u, v, size, cmap="viridis", pivot="mid", width=0.007, **scale)
-    arrows.set_clim(0.0, top or most or 1.0)
+    most = top or np.nanmax(size, initial=0.0) or 1.0
+    spacing = step * max(np.ptp(a) / max(1, len(a) - 1) for a in connection.axes)
+    look = {"cmap": arrow_colours(), "pivot": "mid", "width": 0.0085, "headwidth": 3.6, "headlength": 4.0}
+    look |= {"headaxislength": 3.6, "minshaft": 1.6, "minlength": 0.8, "scale_units": "xy"}
+    arrows = ax.quiver(x, y, u, v, size, scale=most / (LONGEST * spacing), **look)
+    arrows.set_clim(0.0, most)
     return label_row(ax, arrows, component, connection, labels)
+
+
+def arrow_colours():
+    """Return a colour map whose ends are both seen on white, light to dark."""
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+
+    return ListedColormap(colormaps["viridis"](np.linspace(0.86, 0.0, 256)), "arrows")
 
 
 def label_row(ax, arrows, component: int, connection: Connection, labels: Labels):
     """Set title, colour bar and axes of a map of a row of A."""
-    of = rf"\mathbf{{A}}^{{{COMPONENTS[component]}}}"
-    ax.set_title(f"${of}$: {TITLES[component]}")
+    ax.set_title(f"{row_name(component)}: {TITLES[component]}")
     colorbar = ax.figure.colorbar(arrows, ax=ax, shrink=0.85)
-    colorbar.set_label(f"$|{of}|$ ({unit_of(component, connection.unit)}/{labels[0][1]})")
+    colorbar.set_label(f"|{row_name(component)}| ({unit_of(component, connection.unit)}/{labels[0][1]})", labelpad=8)
     return shape_space(ax, connection.axes, labels)
+
+
+def row_name(component: int) -> str:
+    """Return "A" with the index of a row."""
+    return rf"$\mathbf{{A}}^{{{COMPONENTS[component]}}}$"
+
+
+def has_row(connection: Connection, component: int) -> bool:
+    """Return whether a row of A is more than rounding."""
+    row = np.nanmax(np.hypot(*connection.A[component][:2]), initial=0.0)
+    return bool(row > ROUNDING * np.nanmax(np.abs(connection.A), initial=0.0))
 
 
 def unit_of(component: int, unit: str) -> str:
@@ -139,10 +157,17 @@ def ccf_map(
         paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
         ax.text(0.02, 0.02, "gait leaves the field", transform=ax.transAxes, fontsize=7, bbox=paper)
     ax.set_title(f"{ccf_name(component)}: {TITLES[component]}")
-    ax.figure.colorbar(image, ax=ax, shrink=0.85, ticks=None if drawn else [0.0]).set_label(
-        ccf_label(component, field.unit, labels)
+    bar = ax.figure.colorbar(
+        image, ax=ax, shrink=0.85, ticks=None if drawn else [0.0], extend=extend(image.get_array(), top)
     )
+    bar.set_label(ccf_label(component, field.unit, labels))
     return ax
+
+
+def extend(values: np.ndarray, top: float) -> str:
+    """Return at which ends of a colour bar from -top to top there are values beyond it."""
+    above, below = bool((values > top).any()), bool((values < -top).any())
+    return {(True, True): "both", (True, False): "max", (False, True): "min"}.get((above, below), "neither")
 
 
 def ccf_name(component: int) -> str:
@@ -238,6 +263,31 @@ def largest(values: np.ndarray) -> float:
     if not size.size:
         return 1.0
     return float(size.max() if size.size == values.size else np.quantile(size, 0.9)) or 1.0
+
+
+def limit_of(values: np.ndarray, clim: float | str | None = None) -> float:
+    """Return the limit of colours for values: a number as it is, that percentile of their size for "98%", else `largest`."""
+    if clim is None:
+        return largest(values)
+    if not isinstance(clim, str):
+        return float(clim)
+    size = np.abs(values[np.isfinite(values)])
+    return float(np.percentile(size, float(clim.rstrip("%")))) or largest(values) if size.size else 1.0
+
+
+def panels_of(components: Sequence[str], drawn: Sequence[Sequence[bool]]) -> list[int]:
+    """Return the components to draw: those named; else those that are more than rounding in a row, or all if there are none."""
+    if components:
+        return [WORDS.index(choose("component", name, WORDS)) for name in components]
+    return [k for k in range(3) if any(row[k] for row in drawn)] or [0, 1, 2]
+
+
+def say_left_out(fig, panels: Sequence[int], components: Sequence[str], name: Callable, *notes: str) -> None:
+    """Write below the panels which are left out as they are zero, after some notes."""
+    absent = [] if components else [name(k) for k in range(3) if k not in panels]
+    zero = [f"{' and '.join(absent)}: zero everywhere"] if absent else []
+    if lines := [*notes, *zero]:
+        fig.supxlabel("; ".join(lines), fontsize=8, color="0.3")
 
 
 def certain(values: np.ndarray, error: np.ndarray) -> np.ndarray:

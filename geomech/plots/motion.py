@@ -125,14 +125,16 @@ def clock(motion: Motion, row: int) -> str:
 
 
 @styled
-def stage(motion: Motion, rows, field: Field | None = None, error: Field | None = None):
-    """Return (Figure, function that moves its artists to a row and returns them): the world next to the shapes."""
+def stage(motion: Motion, rows, field: Field | None = None, error: Field | None = None, caption: str = ""):
+    """Return (Figure, function that moves its artists to a row and returns them): the world next to the shapes. caption: of the
+    film, such as its speed."""
     fig, axes = figure(8.0, 3.6, 2, width_ratios=[1.25, 1.0])
     track_ax, shape_ax = axes[0]
     if motion.scene.system.joints != 2:
         shape_ax.set_box_aspect(0.8)
     move_body, move_shape = world(track_ax, motion, rows), shape(shape_ax, motion, field, error)
     text = track_ax.set_title("", loc="left")
+    track_ax.set_title(caption, loc="right", color="0.3")
 
     def update(row: int):
         text.set_text(clock(motion, row))

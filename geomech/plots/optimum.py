@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from geomech.geometry.field import Field
 from geomech.geometry.stretch import stretch
 from geomech.optimisation import Optimum
-from geomech.optimisation.gain import PHASES, gained_ccf, limiting
-from geomech.plots.maps import ccf_map, drawable, shape_space
+from geomech.optimisation.gain import PHASES, Gained, gained_ccf, limiting
+from geomech.plots.maps import ccf_map, limit_of, shape_space
 from geomech.plots.stretched import stretched_map
 from geomech.plots.style import axes_of, figure, quantity, styled
 from geomech.studies.study import Study
@@ -30,51 +29,51 @@ RESIDUAL = {
 
 
 @styled
-def optimum_map(optimum: Optimum, ax=None, field: Field | None = None):
-    """Draw the best loop on the map of `gained_ccf`, coloured by what limits it; the start dashed. Where the velocity does not
-    follow from shape alone there is no CCF, and the map has the loop alone."""
-    ax, system = axes_of(ax), optimum.scene.system
+def optimum_map(optimum: Optimum, ax=None, gained: Gained | None = None, clim: float | str | None = None):
+    """Draw the best loop on the map of `gained_ccf`, coloured by what limits it; the start dashed. Sign and colours are those
+    of `ccf_figure` in the same frame. Where the velocity does not follow from shape alone there is no CCF, and the map has the
+    loop alone.
+
+    clim: as for `ccf_figure`."""
+    ax, system = axes_of(ax, 4.6, 5.2), optimum.scene.system
     if system.traits.steps:
         shape_space(ax, [np.linspace(-1, 1, 2) * optimum.scene.numerics.extent] * 2, shape_labels(system))
         ax.set_title("no CCF: the velocity does not follow\nfrom shape alone")
     else:
-        field = drawable(gained_ccf(optimum) if field is None else field)
-        ccf_map(field, ax=ax, labels=shape_labels(system))
+        gained = gained or gained_ccf(optimum)
+        field, component = gained
+        top = limit_of(field.values[component], clim)
+        ccf_map(field, component, ax=ax, labels=shape_labels(system), top=top)
         frame = f"frame {optimum.scene.frame}" if field.masked else "minimum-perturbation frame"
-        ax.set_title(f"CCF of the {gain(optimum)},\n{frame}")
-        bar = ax.collections[0].colorbar
-        bar.set_label(bar.ax.get_ylabel().replace("$_{x}$", ""))
-    draw_start_and_best(optimum, ax, lambda curve: curve, field)
+        ax.set_title(f"{ax.get_title()},\n{frame}")
+    draw_start_and_best(optimum, ax, lambda curve: curve, gained)
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=1)
     return ax
 
 
 @styled
-def stretched_optimum(optimum: Optimum, ax=None, field: Field | None = None, study: Study | None = None):
+def stretched_optimum(
+    optimum: Optimum, ax=None, gained: Gained | None = None, study: Study | None = None, clim: float | str | None = None
+):
     """Draw `optimum_map` on shape space redrawn so that equal lengths cost equal effort. Refusal for a system without a
     metric."""
     ax, study, system = axes_of(ax), study or Study(optimum.scene), optimum.scene.system
-    field, plane = gained_ccf(optimum, study) if field is None else field, stretch(study.metric)
+    gained, plane = gained or gained_ccf(optimum, study), stretch(study.metric)
     effort = "BL" if system.traits.power_degree == 1 else "path length"
-    stretched_map(field, plane, ax=ax, labels=shape_labels(system), effort=effort)
+    look = {"labels": shape_labels(system), "effort": effort, "clim": clim}
+    stretched_map(gained.field, plane, gained.component, ax=ax, **look)
     ax.set_title(f"the same, stretched to its cost\n(lengths off by {100 * plane.rms:.2g} % rms)")
-    bar = ax.collections[0].colorbar
-    bar.set_label(bar.ax.get_ylabel().replace("$_{x}$", ""))
     low, high = ([a[k] for a in plane.field.axes] for k in (0, -1))
-    draw_start_and_best(optimum, ax, lambda curve: plane(np.clip(curve, low, high)), field)
+    draw_start_and_best(optimum, ax, lambda curve: plane(np.clip(curve, low, high)), gained)
     return ax
 
 
-def gain(optimum: Optimum) -> str:
-    return "heading" if optimum.request.aim.name == "turning" else "displacement"
-
-
-def draw_start_and_best(optimum: Optimum, ax, place, field: Field | None) -> None:
+def draw_start_and_best(optimum: Optimum, ax, place, gained: Gained | None) -> None:
     """Draw both loops, each shape where ``place`` puts it."""
     t = np.linspace(0, 2 * np.pi, PHASES)
     ax.plot(*place(optimum.start.gait.shape(t)).T, color="0.25", lw=0.9, ls="--", label="start")
-    nonlinear = field is not None and not optimum.scene.system.traits.linear
-    draw_limited(ax, place(optimum.gait.shape(t)), limiting(optimum, field), nonlinear)
+    nonlinear = gained is not None and not optimum.scene.system.traits.linear
+    draw_limited(ax, place(optimum.gait.shape(t)), limiting(optimum, gained), nonlinear)
 
 
 def draw_limited(ax, curve: np.ndarray, kinds: np.ndarray, nonlinear: bool = False) -> None:
@@ -97,9 +96,9 @@ def draw_limited(ax, curve: np.ndarray, kinds: np.ndarray, nonlinear: bool = Fal
 
 
 @styled
-def angles(optimum: Optimum, ax=None):
+def optimum_angles(optimum: Optimum, ax=None):
     """Draw the shape variables of the best gait over a cycle, and the limits."""
-    ax, gait = axes_of(ax), optimum.gait
+    ax, gait = axes_of(ax, 4.0, 3.4), optimum.gait
     t = np.linspace(0, 2 * np.pi, PHASES)
     names = shape_labels(optimum.scene.system)
     step = max(1, gait.joints // 6)
@@ -110,27 +109,27 @@ def angles(optimum: Optimum, ax=None):
             ax.axhline(side, color=LIMITS["limit"][0], lw=0.8, ls=":")
     ax.set(xlabel="phase $t$ (rad)", ylabel=f"shape ({names[0][1]})", xlim=(0, 2 * np.pi))
     ax.set(xticks=np.pi / 2 * np.arange(5), xticklabels=["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"])
-    best, aim = optimum.best, optimum.request.aim
+    best, objective = optimum.best, optimum.request.objective
     start = optimum.start.value
-    ax.set_title(f"{aim.name}: {best.value:.4g} {aim.unit}\n(start {start if start > 1e-9 else 0.0:.4g})")
+    ax.set_title(f"{objective.name}: {best.value:.4g} {objective.unit}\n(start {start if start > 1e-9 else 0.0:.4g})")
     long = max(len(name) for name, _ in names) > LONG
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=1 if long else 3)
     return ax
 
 
 @styled
-def optimum_figure(optimum: Optimum, stretched: bool = False):
-    """Draw `optimum_map` and `angles` side by side; the angles alone where there are not two joints. stretched:
-    `stretched_optimum` between them."""
+def optimum_figure(optimum: Optimum, stretched: bool = False, *, clim: float | str | None = None):
+    """Draw `optimum_map` and `optimum_angles` side by side; the angles alone where there are not two joints. stretched:
+    `stretched_optimum` between them. clim: as for `ccf_figure`."""
     system, study = optimum.scene.system, Study(optimum.scene)
     if system.joints != 2:
         fig, axes = figure(3.8, 3.4)
-        angles(optimum, axes[0, 0])
+        optimum_angles(optimum, axes[0, 0])
         return fig
     fig, axes = figure(11.8 if stretched else 7.6, 3.9, 3 if stretched else 2)
-    field = None if system.traits.steps else gained_ccf(optimum, study)
-    optimum_map(optimum, axes[0, 0], field)
+    gained = None if system.traits.steps else gained_ccf(optimum, study)
+    optimum_map(optimum, axes[0, 0], gained, clim)
     if stretched:
-        stretched_optimum(optimum, axes[0, 1], field, study)
-    angles(optimum, axes[0, -1])
+        stretched_optimum(optimum, axes[0, 1], gained, study, clim)
+    optimum_angles(optimum, axes[0, -1])
     return fig

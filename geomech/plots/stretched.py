@@ -16,8 +16,12 @@ from geomech.plots.maps import (
     Labels,
     ccf_name,
     certain,
+    extend,
+    has,
     inside_of,
-    largest,
+    limit_of,
+    panels_of,
+    say_left_out,
     unit_of,
     unknown,
 )
@@ -27,16 +31,17 @@ from geomech.plots.style import axes_of, figure, quantity, styled
 @styled
 def stretched_map(
     field: Field, stretch: Stretch, component: int = 0, gaits: Sequence[Gait] = (), *, ax=None,
-    error: Field | None = None, labels: Labels = ANGLES, effort: str = "effort", top: float | None = None,
+    error: Field | None = None, labels: Labels = ANGLES, effort: str = "effort",
+    clim: float | str | None = None,
 ):  # fmt: skip
     """Draw a component of the CCF over stretched shape space, per area there: an area on paper times the colour is what it
     adds to the displacement, and the length of a gait is its cost. Lines of constant shape variables are thin, and thick at 0.
 
-    effort: unit of path length. Other arguments as for `ccf_map`."""
+    effort: unit of path length. clim: as for `ccf_figure`, of the values per area there. Other arguments as for `ccf_map`."""
     from cmcrameri import cm
 
     ax, values = axes_of(ax), stretch.density(Field(field.axes, field.values[component], field.degree))
-    most = top or largest(values)
+    most = limit_of(values, clim)
     u, v = stretch.field.values
     image = ax.pcolormesh(u, v, values, cmap=cm.vik, vmin=-most, vmax=most, shading="gouraud", rasterized=True)
     if error is not None:
@@ -52,7 +57,7 @@ def stretched_map(
     ax.set_title(f"{ccf_name(component)}: {TITLES[component]}")
     per = f"{effort}$^2$" if effort.isalpha() else f"({effort})$^2$"
     label = f"{ccf_name(component)} / area ({unit_of(component, field.unit)}/{per})"
-    ax.figure.colorbar(image, ax=ax, shrink=0.85).set_label(label)
+    ax.figure.colorbar(image, ax=ax, shrink=0.85, extend=extend(image.get_array(), most)).set_label(label)
     return ax
 
 
@@ -102,13 +107,15 @@ def _draw(gait: Gait, ax, stretch: Stretch) -> None:
 @styled
 def stretched_figure(
     field: Field, stretch: Stretch, gaits: Sequence[Gait] = (), *, error: Field | None = None,
-    labels: Labels = ANGLES, effort: str = "effort",
+    labels: Labels = ANGLES, effort: str = "effort", components: Sequence[str] = (), clim: float | str | None = None,
 ):  # fmt: skip
-    """Draw all three components side by side, with the errors of length of the plane."""
-    fig, axes = figure(11.4, 3.5, 3, layout="compressed")
-    for component, ax in enumerate(axes[0]):
-        stretched_map(field, stretch, component, gaits, ax=ax, error=error, labels=labels, effort=effort)
+    """Draw the components side by side, with the errors of length of the plane. components, clim: as for `ccf_figure`."""
+    panels = panels_of(components, [[has(field, k) for k in range(3)]])
+    fig, axes = figure(0.3 + 3.7 * len(panels), 3.5, len(panels), layout="compressed")
+    look = {"error": error, "labels": labels, "effort": effort, "clim": clim}
+    for component, ax in zip(panels, axes[0]):
+        stretched_map(field, stretch, component, gaits, ax=ax, **look)
     caption = f"lengths on paper are off by {100 * stretch.rms:.2g} % rms, {100 * stretch.largest:.2g} % at most"
     fold = f"; {100 * stretch.folded:.2g} % of the plane is folded over" if stretch.folded else ""
-    fig.supxlabel(caption + fold, fontsize=8)
+    say_left_out(fig, panels, components, ccf_name, caption + fold)
     return fig

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import functools
+import inspect
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar, get_origin, get_type_hints
 
 from geomech.io.files import atomic_file
 from rft.refusal import Refusal
 
 GREEK = ("alpha", "gamma", "theta")  # letters that names of shape variables and parameters begin with
 MARKED = 40  # points of a line up to which each has its marker
+SOURCES = {  # what is drawn, by its class
+    "Connection": "a Connection such as study.fitted",
+    "Field": "a Field such as study.ccf()",
+    "Fitted": "a measured gait, the result of geomech.fit_log",
+    "Mapping": "a table such as study.displacement(...)",
+    "Motion": "a Motion, the result of geomech.studies.motion.motion",
+    "Optimum": "an Optimum, the result of study.optimise()",
+    "Result": "the Result of a question",
+    "TwoForm": "a TwoForm such as study.two_form",
+}
 PACKED = 4  # of zlib's nine levels: half the time of the usual six, for files a twentieth larger
 STYLE = {
     "font.size": 9,
@@ -34,16 +45,37 @@ Drawn = TypeVar("Drawn")
 
 
 def styled(draw: Callable[Arguments, Drawn]) -> Callable[Arguments, Drawn]:
-    """Make a drawing function use the project's style, whatever the caller's is."""
+    """Make a drawing function use the project's style, whatever the caller's is, and refuse what it does not draw."""
 
     @functools.wraps(draw)
     def in_style(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Drawn:
         import matplotlib as mpl
 
+        if args:
+            _require_drawn(draw, args[0])
         with mpl.rc_context(STYLE):
             return draw(*args, **kwargs)
 
     return in_style
+
+
+def _require_drawn(draw: Callable[..., Any], value: Any) -> None:
+    """Refuse a first argument of another class than the function draws."""
+    kind = _drawn_kind(draw)
+    if kind and not isinstance(value, kind):
+        raise Refusal(f"{draw.__name__} draws {SOURCES[kind.__name__]}", value=value)
+
+
+@functools.cache
+def _drawn_kind(draw: Callable[..., Any]) -> type | None:
+    """Return the class of the first argument by its annotation; None where several kinds will do."""
+    name = next(iter(inspect.signature(draw).parameters), "")
+    try:
+        hint = get_type_hints(draw).get(name)
+    except NameError:  # an annotation that is for type checkers alone
+        return None
+    kind = get_origin(hint) or hint
+    return kind if isinstance(kind, type) and kind.__name__ in SOURCES else None
 
 
 @styled
@@ -77,13 +109,26 @@ def quantity(name: str, unit: str = "") -> str:
     return f"{name} ({unit})" if unit else name
 
 
-def axes_of(ax: Any) -> Any:
-    """Return ax; without it pyplot's current Axes, where the caller has a figure of pyplot open, else new ones that a notebook
-    shows."""
+ENTRY = 2.2  # in, of the width of a figure for an entry of its legend
+
+
+def shared_legend(fig: Any, place: str = "outside upper center") -> None:
+    """Draw one legend for all panels of a figure, with every label once; above or below them in as many columns as fit."""
+    handles = {
+        label: line for ax in fig.axes for line, label in zip(*ax.get_legend_handles_labels()) if label.strip("_")
+    }
+    rows = len(handles) if "right" in place else -(-len(handles) // max(1, int(fig.get_figwidth() / ENTRY)))
+    if handles:
+        fig.legend(handles.values(), handles.keys(), loc=place, ncols=-(-len(handles) // rows))
+
+
+def axes_of(ax: Any, width: float = 3.4, height: float = 3.0) -> Any:
+    """Return ax; without it pyplot's current Axes, where the caller has a figure of pyplot open, else new ones, of a size in
+    inches, which a notebook shows."""
     if ax is not None:
         return ax
     pyplot = sys.modules.get("matplotlib.pyplot")
-    return pyplot.gca() if pyplot and pyplot.get_fignums() else figure(3.4, 3.0)[1][0, 0]
+    return pyplot.gca() if pyplot and pyplot.get_fignums() else figure(width, height)[1][0, 0]
 
 
 def check_format(path: str | Path) -> Path:
@@ -97,8 +142,9 @@ def check_format(path: str | Path) -> Path:
 
 @styled
 def save(fig, *paths: str | Path) -> None:
-    """Write a figure to files, each of which appears whole or not at all. The figure is laid out once and drawn once for each
-    file, where `savefig` lays out and draws twice for each."""
+    """Write a figure, or that of Axes, to files, each of which appears whole or not at all. The figure is laid out once and
+    drawn once for each file, where `savefig` lays out and draws twice for each."""
+    fig = getattr(fig, "figure", fig)
     canvas, engine, dpi = fig.canvas, fig.get_layout_engine(), fig.dpi
     try:
         for path in map(check_format, paths):

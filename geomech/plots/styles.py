@@ -14,6 +14,7 @@ from geomech.plots.maps import (
     PHASES,
     TITLES,
     Labels,
+    arrow_colours,
     ccf_label,
     ccf_map,
     ccf_name,
@@ -65,7 +66,7 @@ def streamlines(
     most = top or largest(size)
     if np.nanmax(size, initial=0.0) <= 1e-13 * np.nanmax(np.abs(connection.A), initial=0.0):
         u, v, size = 0 * u, 0 * v, 0 * size
-    look = {"cmap": "viridis", "norm": Normalize(0.0, most), "density": 1.1, "linewidth": 0.9, "arrowsize": 0.8}
+    look = {"cmap": arrow_colours(), "norm": Normalize(0.0, most), "density": 1.1, "linewidth": 0.9, "arrowsize": 0.8}
     lines = ax.streamplot(*even, u.T, v.T, color=np.nan_to_num(size.T), **look)
     return label_row(ax, lines.lines, component, connection, labels)
 

@@ -22,9 +22,10 @@ SLOW, FAST = 10.0, 5.0  # most and one over the least that balances may take, ov
 ENOUGH, FEWEST = 0.25, 3  # s of computing, and batches of balances, that suffice to time them
 LOADING = 20.0  # times the median: a batch that takes longer has loaded or compiled code
 
-# Assumed seconds, for each place of the body where forces are evaluated; measured 3.5e-6 to 6e-6 by NumPy and 0.7e-6 to
-# 1.8e-6 compiled in dry media, 0.4e-6 and 0.2e-6 in a linear one; and for each batch of balances, however small.
-BALANCE = {"numpy": 5e-6, "numba": 1.2e-6}
+# Assumed seconds, for each place of the body where forces are evaluated; measured, with the work around a balance, 2e-6 to
+# 5e-6 by NumPy and 0.3e-6 to 1.2e-6 compiled in dry media, 0.8e-6 and 0.5e-6 in a linear one, whose bodies were small; and
+# for each batch of balances, however small.
+BALANCE = {"numpy": 5e-6, "numba": 0.8e-6}
 LINEAR = 0.1
 BATCH = {"numpy": 2e-3, "numba": 5e-4}
 STEP = 200  # balances of large batches that take NumPy as long as one batch, however small

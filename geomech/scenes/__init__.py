@@ -28,3 +28,7 @@ def __getattr__(name: str) -> type:
         raise AttributeError(f"module 'geomech.scenes' has no attribute {name!r}")
     globals()[name] = kind = getattr(import_module(f"geomech.scenes.{_OTHER[name]}"), name)
     return kind
+
+
+def __dir__() -> list[str]:
+    return __all__

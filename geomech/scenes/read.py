@@ -15,7 +15,7 @@ from geomech.scenes import hints, reader, swimming
 from geomech.scenes.medium import MEDIUM
 from geomech.scenes.model import Scene, checked_scene
 from geomech.systems.base import kind_of
-from geomech.systems.swimmer import Swimmer
+from geomech.systems.swimmer import MEDIA, Swimmer
 from rft.refusal import Refusal, formatted
 
 if TYPE_CHECKING:
@@ -92,11 +92,24 @@ def in_medium(scene: Scene, file: str | Path) -> Scene:
     none."""
     if not isinstance(scene.system, Swimmer):
         raise Refusal(f"a {kind_of(scene.system)} takes no medium", where=scene.name)
+    medium, files = _medium_file(file, scene.name)
+    return scene.changed(medium=medium, files=files)
+
+
+def medium_of(name: str | Path) -> Any:
+    """Return the medium of a name of the catalogue, or of a file as `in_medium` takes it. Refusal for neither."""
+    if isinstance(name, Path) or name.endswith((".toml", ".csv")):
+        return _medium_file(name, "medium")[0]
+    return MEDIA[choose("medium", name, MEDIA)]
+
+
+def _medium_file(file: str | Path, place: str) -> tuple[Any, tuple[str, ...]]:
+    """Return the medium of a file, and the files that it was read from. place: what a refusal names."""
     table = {"file": str(Path(file).absolute())}
     if Path(file).suffix.lower() == ".csv":
         table["law"] = "table"
-    source = reader.Source(scene.name)
-    return scene.changed(medium=reader.read_section(source, "medium", table, MEDIUM), files=tuple(source.files))
+    source = reader.Source(place)
+    return reader.read_section(source, "medium", table, MEDIUM), tuple(source.files)
 
 
 def inputs(scene: Scene | Intruding | WalkerScene) -> list[Path]:

@@ -5,14 +5,12 @@ from __future__ import annotations
 from geomech.systems.base import System
 from geomech.tiers import TIERS
 
-METHODS = TIERS  # cheapest look-up first
-
 
 def tiers(system: System) -> tuple[str, ...]:
-    """Return the names of all tiers that can predict displacements of the system."""
+    """Return the names of all tiers that can predict displacements of the system, cheapest look-up first."""
     return tuple(name for name, tier in TIERS.items() if tier.is_offered(system))
 
 
-def methods(system: System) -> tuple[str, ...]:
-    """Return the names of the tiers of a plain study: without those whose tables serve one family of gaits only."""
+def default_tiers(system: System) -> tuple[str, ...]:
+    """Return the tiers of a plain study: without those whose tables serve one family of gaits only."""
     return tuple(name for name in tiers(system) if TIERS[name].common)

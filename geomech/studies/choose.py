@@ -28,13 +28,13 @@ def cheapest(
     scene: Scene, amplitudes: Sequence[float], tol: float, gait: Gait | None = None, ask: Callable = lambda jobs: None
 ) -> dict:
     """Return a table as of `Study.study` for the cheapest tier with errors of position of at most ``tol`` body lengths,
-    with {"tier", "settings"} besides.
+    with {"tier", "tolerance", "settings"} besides.
 
     For the direct tier, the fewest phases are found. Its seconds include the search. Look-up tiers are tried in the
     order of their cost, as long as that is below the direct tier's. ask: called with the jobs to come
     (`geomech.studies.cost`) before each. Refusal if no tier is accurate enough."""
     if not (is_number(tol) and 0 < tol <= 1e300):
-        raise Refusal("--tol must be a number > 0 in body lengths", value=tol)
+        raise Refusal("`tolerance` must be a number > 0 in body lengths", value=tol)
     study, start = Study(scene), time.perf_counter()
     system, gait = scene.system, checked_gait(scene.gait if gait is None else gait)
     amplitudes = real_array("amplitudes", amplitudes)
@@ -43,16 +43,21 @@ def cheapest(
     scene.note_turns(gait, amplitudes)
     if tol <= settling(system):
         raise Refusal(
-            f"cycles with these effects repeat to {settling(system):g} only", where=scene.name, instead="raise --tol"
+            f"cycles with these effects repeat to {settling(system):g} only",
+            where=scene.name,
+            instead="raise `tolerance`",
         )
     ask(cost.of_medium(scene, gait, len(amplitudes)))
     medium = uncertainty.of_medium(scene, gait, amplitudes)
 
-    def answer(method: str, poses, error, settings: dict) -> dict:
-        attributes = {"tier": method, "settings": settings, "seconds": {method: time.perf_counter() - start}}
-        return Displacements(
-            tables.result(scene, gait, amplitudes, {method: poses}, {method: error}, medium, **attributes)
-        )
+    def answer(tier: str, poses, error, settings: dict) -> dict:
+        attributes = {
+            "tier": tier,
+            "tolerance": float(tol),
+            "settings": settings,
+            "seconds": {tier: time.perf_counter() - start},
+        }
+        return Displacements(tables.result(scene, gait, amplitudes, {tier: poses}, {tier: error}, medium, **attributes))
 
     sampled = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))
     phases = max(FEWEST_STEPS if system.traits.steps else 32, 8 * gait.harmonics)
@@ -62,21 +67,21 @@ def cheapest(
         phases = settings["phases"]
     balances = {m: cost.balances(plan, len(amplitudes), phases) for m, plan in plans.items()}
     enough = len(amplitudes) * solved_phases(system, gait, phases)  # of the system itself
-    for method in sorted(plans, key=balances.get):
-        if balances[method] >= enough:
+    for tier in sorted(plans, key=balances.get):
+        if balances[tier] >= enough:
             break
-        ask(cost.predicted(scene, plans[method], len(amplitudes)))
+        ask(cost.predicted(scene, plans[tier], len(amplitudes)))
         try:
-            checked = study.displacement(method, gait, amplitudes[sampled])
+            checked = study.poses(tier, gait, amplitudes[sampled])
         except ValueError:  # the gait leaves the field or the family of this tier
             continue
         if (pose_distance(checked, pilot[0], system.length) + pilot[1])[:, 0].max() <= tol:
-            poses = study.displacement(method, gait, amplitudes)
-            error, spread = against_direct(scene, poses, gait, amplitudes), study.spread(method, gait, amplitudes)
+            poses = study.poses(tier, gait, amplitudes)
+            error, spread = against_direct(scene, poses, gait, amplitudes), study.spread(tier, gait, amplitudes)
             if spread is not None:
                 error = np.maximum(error, spread / [system.length, 1.0])
             if error[:, 0].max() <= tol:
-                return answer(method, poses, error, {"grid": scene.numerics.grid})
+                return answer(tier, poses, error, {"grid": scene.numerics.grid})
     (poses, error), settings = _refined(scene, gait, amplitudes, tol, phases, ask)
     if error[:, 0].max() > tol:
         settings_text = " and ".join(f"{n} {name}" for name, n in settings.items())
@@ -84,7 +89,7 @@ def cheapest(
         raise Refusal(
             f"no tier gets to {tol:g} body lengths (best estimate {error[:, 0].max():.1e} with {settings_text})",
             where=scene.name,
-            instead=f"raise --tol, or {finer}",
+            instead=f"raise `tolerance`, or {finer}",
         )
     return answer(DIRECT.name, poses, error, settings)
 

@@ -11,16 +11,18 @@ from geomech.core.variables import Result
 from geomech.run.cost import Cost
 from geomech.scenes.model import Scene
 from geomech.studies import cost
+from geomech.studies.available import default_tiers
 from geomech.studies.choose import cheapest
 from geomech.studies.effort import refuse_costless, with_effort
 from geomech.studies.question import Allow, Progress, Question
-from geomech.studies.study import METHODS, Study
+from geomech.studies.study import Study
+from geomech.tiers import TIERS
 from rft.refusal import Refusal
 
 
 @dataclass(frozen=True)
 class Displacement(Question):
-    """Net displacement of a gait by amplitude, by tiers of METHODS; without any by all of a plain study. effort: with
+    """Net displacement of a gait by amplitude, by tiers of TIERS; without any by all of a plain study. effort: with
     path length, work and cost of transport."""
 
     scene: Scene
@@ -30,7 +32,7 @@ class Displacement(Question):
 
     @property
     def chosen(self) -> tuple[str, ...]:
-        return self.tiers or self.study.methods
+        return self.tiers or default_tiers(self.scene.system)
 
     @cached_property
     def study(self) -> Study:
@@ -88,9 +90,9 @@ def displacement(
     effort: bool = False,
 ) -> Question:
     """Return the question of a command. tiers: their names, with commas between them."""
-    chosen = () if tiers is None else tuple(choose("--tiers", name.strip(), METHODS) for name in tiers.split(","))
+    chosen = () if tiers is None else tuple(choose("`tiers`", name.strip(), TIERS) for name in tiers.split(","))
     if tolerance is None:
         return Displacement(scene, tuple(amplitudes), chosen, effort)
     if chosen:
-        raise Refusal("--tol chooses the tier", instead="drop --tiers")
+        raise Refusal("`tolerance` chooses the tier", instead="drop `tiers`")
     return Cheapest(scene, tuple(amplitudes), tolerance, effort)

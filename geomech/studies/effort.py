@@ -1,9 +1,11 @@
 """The cost of moving: the metric of a system's shape space, and path length, work and cost of transport of its gaits.
 
 Power is in axial drags of the whole body times body lengths per unit of time, in which phase grows by 1 rad; in a fluid
-the drag is that at a body length per unit of time. Work is its integral over a cycle; path length is the integral of F
-= power^(1/degree) (`geomech.geometry.metric`): in a dry medium both are equal, in body lengths. Cost of transport is
-work over that of towing the body, straight and along itself, as far in the same time."""
+the drag is that at a body length per unit of time. Work is its integral over a cycle, in drag x BL. Path length is the integral
+of F = power^(1/degree) (`geomech.geometry.metric`), the speed at which towing the body, straight and along itself, takes the
+same power; so it is in body lengths, and in a dry medium the same number as work. Efficiency is the net distance in body
+lengths over it, cost of transport the work over that of towing the body as far in the same time. A system with a metric of its
+own has a path length in units of that alone."""
 
 from __future__ import annotations
 
@@ -46,6 +48,7 @@ from rft.refusal import Refusal
 DEPENDS_ON = ("grid", "extent", "interpolation")  # of [numerics]
 HIGHEST = 14  # harmonic of a norm that the 24 directions of the harmonic table resolve well
 METRIC = "of the system's own metric"
+WORK = "drag x BL"  # the axial drag of the whole body, in a fluid at 1 BL per rad of phase
 EVEN = 1e-6  # of the power: above a solver's tolerance
 
 
@@ -246,6 +249,4 @@ def units(system: System) -> dict[str, str]:
     """Return the units of the variables that `with_effort` adds."""
     if capability(system, OwnMetric) is not None:
         return {"path_length": METRIC, "efficiency": f"BL / {METRIC}"}
-    length = "BL" if system.traits.power_degree == 1 else "sqrt(axial drag at 1 BL per unit of time, BL, unit of time)"
-    work = "axial drag x BL" if system.traits.power_degree == 1 else "axial drag at 1 BL per rad of phase, x BL"
-    return {"path_length": length, "work": work, "efficiency": "BL per unit of path_length", "cost_of_transport": "1"}
+    return {"path_length": "BL", "work": WORK, "efficiency": "BL/BL", "cost_of_transport": "1"}

@@ -14,6 +14,7 @@ from geomech.geometry.plane import Plane
 from geomech.run.cost import Cost
 from geomech.scenes.model import Scene
 from geomech.studies import effort
+from geomech.studies.available import default_tiers
 from geomech.studies.cost import Job, of_even_part, of_metric, of_planes, price
 from geomech.studies.cost import study as jobs
 from geomech.studies.question import Allow, Progress, Question
@@ -29,7 +30,7 @@ from rft.refusal import Refusal, located
 
 AMPLITUDES = 10  # or so, for each gait
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)  # of round amplitudes, times a power of ten
-ADDED = "not in the scene: added because Fig. 11(e) compares the two gaits of the three-link swimmer"
+ADDED = "not in the scene, added to compare the two gaits of Fig. 11(e)"
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class Report(Question):
             study.compute_field(progress)
         tables = {}
         for gait, values in zip(gaits, amplitudes):
-            result = study.study(values, study.methods, gait).result
+            result = study.study(values, gait=gait).result
             if gait is not scene.gait:
                 result = replace(result, attributes={**result.attributes, "note": ADDED})
             tables[type(gait).__name__.lower()] = result
@@ -90,7 +91,7 @@ def cost(scene: Scene) -> Cost:
     parts: list[Job] = []
     for k, gait in enumerate(_gaits(scene)):
         amplitudes = reachable(scene, gait)
-        plans = {m: study.plan(m, gait, amplitudes) for m in study.methods}
+        plans = {m: study.plan(m, gait, amplitudes) for m in default_tiers(system)}
         parts += jobs(scene, plans, len(amplitudes), gait, tables=k == 0)
     if is_mapped(system):
         pairs = [*combinations(range(3), 2)] if system.joints == 3 else []

@@ -1,16 +1,14 @@
-"""Results of a study as tables that users index: dicts, ready for JSON, with a view in notebooks and a conversion to
-xarray."""
+"""Results of a study as tables that users index: dicts, ready for JSON."""
 
 from __future__ import annotations
 
-from geomech.core.face import Extensible
 from geomech.core.variables import Result
 from geomech.gaits import Gait
 from geomech.scenes.model import Scene
 from geomech.studies import tables
 
 
-class Displacements(Extensible, dict):
+class Displacements(dict):
     """Net displacement per cycle by amplitude and tier (`tables.table`) of a gait of a scene. result: the numbers with
     their units and errors (`tables.result`), which this dict renders."""
 

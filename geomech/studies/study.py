@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -10,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from geomech.core.errors import choose
-from geomech.core.face import Extensible
 from geomech.gaits import Gait
 from geomech.geometry.connection import Connection, even_part
 from geomech.geometry.curvature import ccf
@@ -25,8 +25,7 @@ from geomech.run.progress import progress as shown
 from geomech.scenes.frames import framed
 from geomech.scenes.model import Scene, frequency_of
 from geomech.studies import cost, effort, estimate, tables, uncertainty
-from geomech.studies.available import METHODS as METHODS
-from geomech.studies.available import methods, tiers
+from geomech.studies.available import default_tiers, tiers
 from geomech.studies.results import Displacements
 from geomech.systems.base import refuse_singular, shape_labels
 from geomech.systems.capabilities import gaits_per_batch, stored_table
@@ -37,12 +36,13 @@ from geomech.tiers.base import Plan, Table, Tier, in_groups
 from rft.checks import real_array
 from rft.refusal import Refusal, located
 
-SAMPLES = 64, 4096  # amplitudes and phases that `cost` checks; `study` checks all
+FEW_PHASES = 4096  # that tell whether a gait is far from leaving the field
+SAMPLES = 64, FEW_PHASES  # amplitudes and phases that `cost` checks; `study` checks all
 
 
-class Study(Extensible):
+class Study:
     """A scene and the tables computed for it so far, each stored under its name, the system and all other data that it
-    depends on. `turned` returns a study with other numerics that shares them."""
+    depends on. `with_numerics` returns a study with other numerics that shares them."""
 
     def __init__(self, scene: Scene, tables: dict | None = None):
         if not isinstance(scene, Scene):
@@ -58,9 +58,9 @@ class Study(Extensible):
         """Keys (name, system, key) of the tables computed so far."""
         return tuple(self._tables)
 
-    def turned(self, **numerics) -> Study:
+    def with_numerics(self, **numerics) -> Study:
         """Return the study with other [numerics] and the same stored tables; an entry given as None stays as it is."""
-        return Study(self.scene.with_numerics(**numerics), self._tables)
+        return self._of(self.scene.with_numerics(**numerics))
 
     def in_frame(self, frame: str) -> Study:
         """Return the study in another body frame; Refusal for an unknown one, or the scene's own."""
@@ -69,9 +69,14 @@ class Study(Extensible):
             if frame == s.frame:
                 raise Refusal(f"the frame is {frame!r} already", instead="name another")
             system = framed(s.system, s.numerics) if frame == MINIMUM_PERTURBATION else in_frame(s.system, frame)
-            return Study(s.changed(system=system), self._tables)
+            return self._of(s.changed(system=system))
 
-    methods = property(lambda self: methods(self.scene.system))
+    def _of(self, scene: Scene) -> Study:
+        """Return the study of another scene with the same stored tables."""
+        study = copy.copy(self)
+        study.scene = scene
+        return study
+
     tiers = property(lambda self: tiers(self.scene.system))
 
     def _stored(self, name: str, key: tuple, build: Callable):
@@ -200,20 +205,20 @@ class Study(Extensible):
         """Estimated error of `curvature`."""
         return self._stored("error of the ccf", self._connection().key, lambda: ccf_error(self.fitted))[0]
 
-    def displacement(self, method: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray:
+    def poses(self, tier: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray:
         """Return the net pose per cycle (..., 3) by one tier of TIERS for amplitudes (...,), of a gait or the scene's
         own."""
         scene, gait = self.scene, self.scene.gait if gait is None else checked_gait(gait)
         with located(scene.name):
-            plan = self.plan(method, gait, amplitudes)
+            plan = self.plan(tier, gait, amplitudes)
             scene.note_turns(gait, amplitudes)
             self._refuse_singular(plan, gait, amplitudes)
             return plan.predict(self._table_of(plan), amplitudes)
 
-    def spread(self, method: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray | None:
-        """Return how far `displacement` depends on an arbitrary choice of the tier, such as a surface spanned by the
+    def spread(self, tier: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray | None:
+        """Return how far `poses` depend on an arbitrary choice of the tier, such as a surface spanned by the
         loop: (B, 2), in the system's unit and rad; None without one. Estimates include it."""
-        plan = self.plan(method, gait, amplitudes)
+        plan = self.plan(tier, gait, amplitudes)
         return plan.spread(self._table_of(plan), amplitudes)
 
     def _refuse_singular(self, plan: Plan, gait: Gait, amplitudes, phases: int | None = None) -> None:
@@ -226,17 +231,17 @@ class Study(Extensible):
             refuse_singular(system, gait.cycle(phases, a)[0])
 
     def study(
-        self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, progress=None
+        self, amplitudes: Sequence[float], tiers: Sequence[str] | None = None, gait: Gait | None = None, progress=None
     ) -> dict:
-        """Return a table (`geomech.studies.tables.table`) of the net poses by tiers of TIERS, with their errors, and
-        {"seconds": {...}, "kept": [...]} besides.
+        """Return a table (`geomech.studies.tables.table`) of the net poses by tiers of TIERS (`default_tiers` if
+        None), with their errors, and {"seconds": {...}, "kept": [...]} besides.
 
         estimate, estimate_heading: errors (`geomech.studies.estimate`), in the unit of the poses, and rad. seconds: time
         to build each table, by its name ("field", "harmonic table" ...), even if it was built before, and time of each
         tier from there, of the direct one with its errors; "errors" of the others, without the direct tier; "medium" of
         the errors of an uncertain one. kept: the tables that were stored before, whose seconds are not part of this
         call."""
-        gait, amplitudes, chosen = self._checked(gait, amplitudes, methods)
+        gait, amplitudes, chosen = self._checked(gait, amplitudes, tiers)
         medium, took = timed(lambda: uncertainty.of_medium(self.scene, gait, amplitudes))  # first, as it may refuse
         seconds, stored = self._build_all(chosen, progress)
         if medium:
@@ -244,22 +249,22 @@ class Study(Extensible):
         poses, errors, spreads, reference = {}, {}, {}, None
         size = [self.scene.system.length, 1.0]  # estimates are in body lengths
         order = [*TIERS]
-        for method in sorted(
+        for tier in sorted(
             chosen, key=lambda m: (not chosen[m].exact, -order.index(m))
         ):  # the direct tier first, as the reference of others
-            if chosen[method].exact:
+            if chosen[tier].exact:
                 direct = lambda: estimate.direct(self.scene, gait, amplitudes, self.scene.numerics.phases)
-                reference, seconds[method] = timed(direct)
-                poses[method], errors[method] = reference
+                reference, seconds[tier] = timed(direct)
+                poses[tier], errors[tier] = reference
             else:
-                poses[method], seconds[method] = timed(lambda m=method: self.displacement(m, gait, amplitudes))
-                check = lambda m=method: estimate.against_direct(self.scene, poses[m], gait, amplitudes, reference)
-                errors[method], took = timed(check)
-                if (spread := self.spread(method, gait, amplitudes)) is not None:
-                    spreads[method], errors[method] = spread, np.maximum(errors[method], spread / size)
+                poses[tier], seconds[tier] = timed(lambda m=tier: self.poses(m, gait, amplitudes))
+                check = lambda m=tier: estimate.against_direct(self.scene, poses[m], gait, amplitudes, reference)
+                errors[tier], took = timed(check)
+                if (spread := self.spread(tier, gait, amplitudes)) is not None:
+                    spreads[tier], errors[tier] = spread, np.maximum(errors[tier], spread / size)
                 if reference is None:
                     seconds["errors"] = seconds.get("errors", 0.0) + took
-        poses, errors = ({m: x[m] for m in methods} for x in (poses, errors))
+        poses, errors = ({m: x[m] for m in chosen} for x in (poses, errors))
         facts = {"seconds": seconds, "kept": stored}
         return Displacements(tables.result(self.scene, gait, amplitudes, poses, errors, medium, spreads, **facts))
 
@@ -269,22 +274,24 @@ class Study(Extensible):
         field, seconds, stored = self._connection(), {}, []
         tables = {m: plan.table for m, plan in chosen.items() if plan.table}
         of_field = lambda m: tables[m].name == field.name
-        for method in sorted(tables, key=of_field, reverse=True):  # the field first, as it is also drawn
-            name = "field" if of_field(method) else f"{method} table"
+        for tier in sorted(tables, key=of_field, reverse=True):  # the field first, as it is also drawn
+            name = "field" if of_field(tier) else f"{tier} table"
             if name not in seconds:
                 with located(self.scene.name):
-                    _, seconds[name], exists = self._built(tables[method], progress)
+                    _, seconds[name], exists = self._built(tables[tier], progress)
                 stored += [name] * exists
         return seconds, stored
 
-    def cost(self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, more=()) -> cost.Cost:
+    def cost(
+        self, amplitudes: Sequence[float], tiers: Sequence[str] | None = None, gait: Gait | None = None, more=()
+    ) -> cost.Cost:
         """Return the cost of `study`, and of ``more`` jobs: force balances, seconds on this machine and memory; see
         `geomech.studies.cost`."""
-        gait, amplitudes, plans = self._checked(gait, amplitudes, methods, *SAMPLES)
+        gait, amplitudes, plans = self._checked(gait, amplitudes, tiers, *SAMPLES)
         with located(self.scene.name):
             return cost.price([*cost.study(self.scene, plans, len(amplitudes), gait), *more])
 
-    def _checked(self, gait, amplitudes, methods, samples: int = sys.maxsize, phases: int = sys.maxsize):
+    def _checked(self, gait, amplitudes, tiers, samples: int = sys.maxsize, phases: int = sys.maxsize):
         """Return the gait, or the scene's own, amplitudes (B,) and plans by tier of a request.
 
         Refusal for one that makes no sense, such as a gait that leaves the field at one of ``samples`` amplitudes, at so
@@ -293,8 +300,9 @@ class Study(Extensible):
         gait, amplitudes = checked_gait(scene.gait if gait is None else gait), real_array("amplitudes", amplitudes)
         if amplitudes.ndim != 1:
             raise Refusal("amplitudes must be a list of numbers", value=amplitudes, where=scene.name)
-        if isinstance(methods, str) or not isinstance(methods, Sequence):
-            raise Refusal(f"methods must be a list of {', '.join(TIERS)}", value=methods, where=scene.name)
+        tiers = default_tiers(scene.system) if tiers is None else tiers
+        if isinstance(tiers, str) or not isinstance(tiers, Sequence):
+            raise Refusal(f"tiers must be a list of {', '.join(TIERS)}", value=tiers, where=scene.name)
         with located(scene.name):
             frequency_of(scene.system, gait)
             scene.note_turns(gait, amplitudes)
@@ -302,7 +310,7 @@ class Study(Extensible):
                 np.linspace(0, len(amplitudes) - 1, min(len(amplitudes), samples)).astype(int)
             ]
             phases, chosen = min(scene.numerics.phases, max(phases, 4 * gait.harmonics)), {}
-            for tier in [_tier(m) for m in methods]:
+            for tier in [_tier(m) for m in tiers]:
                 tier.refuse(scene.system)
                 chosen[tier.name] = plan = self._plan(tier, gait, amplitudes)
                 self._refuse_singular(plan, gait, sampled, phases)
@@ -314,14 +322,27 @@ class Study(Extensible):
 def refuse_outside(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int | None = None) -> None:
     """Refuse a gait, or the scene's own, that leaves the field of the tables. phases: the scene's if None."""
     system, n, gait = scene.system, scene.numerics, scene.gait if gait is None else gait
-    field, chosen = fitted.axes(system, n), gait.amplitude if amplitudes is None else amplitudes
+    field, chosen = fitted.axes(system, n), np.atleast_1d(gait.amplitude if amplitudes is None else amplitudes)
     names, phases = [name for name, _ in shape_labels(system)], phases or n.phases
+    few = max(FEW_PHASES, 64 * gait.harmonics)
+    if phases > few:
+        leaves = lambda group: _may_leave(field, *gait.cycle(few, group))[:, None]
+        chosen = chosen[in_groups(leaves, chosen, gaits_per_batch(system, few))[:, 0] > 0]
     shapes = lambda group: inside(field, gait.cycle(phases, group)[0], names)[:, 0]
     in_groups(shapes, chosen, gaits_per_batch(system, phases))
 
 
+def _may_leave(field, alpha: np.ndarray, alphadot: np.ndarray) -> np.ndarray:
+    """Return (B,), whether gaits alpha, alphadot (B, N, d) may leave the field between N phases: whether they come as near
+    to its edge as they move, at twice the fastest of their rates there, in half of the time from phase to phase."""
+    step = 2 * np.pi / alpha.shape[1]
+    margin = step * np.abs(alphadot).max(1)
+    low, high = np.array([(axis[0], axis[-1]) for axis in field]).T
+    return ((alpha.min(1) - margin < low) | (alpha.max(1) + margin > high)).any(-1)
+
+
 def _tier(name: str) -> Tier:
-    return TIERS[choose("methods", name, TIERS)]
+    return TIERS[choose("tier", name, TIERS)]
 
 
 def timed(f: Callable) -> tuple[Any, float]:

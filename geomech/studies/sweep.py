@@ -13,7 +13,6 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from geomech.core.face import Extensible
 from geomech.core.summary import span
 from geomech.core.variables import Result, Variable
 from geomech.run.cost import Cost
@@ -24,7 +23,7 @@ from geomech.studies.question import Allow, Progress, Question
 from rft.refusal import Refusal, printable
 
 
-class Swept(Extensible, dict):
+class Swept(dict):
     """Result of a sweep as a table that users index: {"over": {parameter: values}, name: array (N_1, ...)}."""
 
     def __init__(self, result: Result):

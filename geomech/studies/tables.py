@@ -10,6 +10,7 @@ import numpy as np
 from geomech.core.variables import Result, Variable
 from geomech.gaits import Gait
 from geomech.geometry.field import UNKNOWN_UNIT
+from geomech.geometry.symmetry import zero_components
 from geomech.io.results import unit_name
 from geomech.scenes.model import Scene, frequency_of
 from geomech.systems.base import length_unit
@@ -99,6 +100,7 @@ def result(
     attributes |= {} if frequency is None else {"frequency": frequency}
     if text := getattr(gait, "estimate_is", ""):
         attributes["estimate_is"] = text
+    attributes["zero_by_symmetry"] = [*zero_components(system.traits, gait, amplitudes)]
     return Result("displacement", tuple(variables), {**attributes, **more}, (scene, gait))
 
 
@@ -111,7 +113,8 @@ def table(result: Result) -> dict:
     "speed_body_lengths", in body lengths per second, and "turning_rate" (rad/s). Where the medium is uncertain
     "medium_error" {tier: [...]}, of the position, "medium_error_heading" {tier: [...]}, rad, "medium_error_of" {one of
     QUANTITIES: [...]}, each in its own unit, "medium_shift_of", likewise, the shift of the mean, and
-    "medium_error_rule" [...]. For a measured gait "estimate_is" describes in words what the estimates leave out."""
+    "medium_error_rule" [...]. For a measured gait "estimate_is" describes in words what the estimates leave out.
+    "zero_by_symmetry" [...] names which of x, y and heading are (`geomech.geometry.symmetry`)."""
     facts, tiers = dict(result.attributes), result["tier"].values.tolist()
     unit, net, heading = facts.pop("length_unit"), result["net_distance"], result["heading"]
     by_tier = lambda values: dict(zip(tiers, np.asarray(values).tolist()))
@@ -121,6 +124,7 @@ def table(result: Result) -> dict:
         "heading": "rad",
     }
     units |= {"estimate": unit, "estimate_heading": "rad", "body_length": unit, "seconds": "s"}
+    units |= {"tolerance": "BL"} if "tolerance" in facts else {}
     units |= {"surface_spread": unit, "surface_spread_heading": "rad"} if SURFACE[0] in result else {}
     out = {
         "amplitude": result["amplitude"].values.tolist(),

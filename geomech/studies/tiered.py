@@ -104,7 +104,7 @@ class Settings:
     def numbers(self, knob: Knob | None, value: Any) -> list[np.ndarray]:
         """Return net poses (B, 3), with tables built anew so that their cost is counted."""
         tier = knob.tier if knob else DIRECT.name
-        return [Study(self.at(knob, value)).displacement(tier, None, self.amplitudes)]
+        return [Study(self.at(knob, value)).poses(tier, None, self.amplitudes)]
 
     def errors(self, numbers: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
         distances = estimate.distance(numbers[0], truth[0]) / self.scene.system.length

@@ -19,3 +19,7 @@ __all__ = [
     "velocity",
     "viscous_chain",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,7 +1,7 @@
 """Results in words: a kind of result has a module of its name.
 
-Its ``text(result)`` returns lines for a reader, ``numbers(result)`` the JSON, and of a calibration ``medium(result)`` a file
-that scenes take."""
+Its ``text(result)`` returns lines for a reader, which fit a screen, and ``full(result)`` all of them where there are
+more; ``MORE`` says so in words. ``numbers(result)`` is the JSON, ``medium(result)`` of a calibration a file for scenes."""
 
 from __future__ import annotations
 
@@ -12,8 +12,19 @@ from geomech.core.variables import Result
 
 
 def text(result: Result) -> str:
-    """Return a result as lines."""
+    """Return a result as lines that fit a screen."""
     return _module(result).text(result)
+
+
+def full(result: Result) -> str:
+    """Return everything of a result as lines."""
+    module = _module(result)
+    return getattr(module, "full", module.text)(result)
+
+
+def more(result: Result) -> str:
+    """Return in words what `text` leaves out; "" for nothing."""
+    return getattr(_module(result), "MORE", "")
 
 
 def numbers(result: Result) -> dict[str, Any]:
@@ -28,3 +39,10 @@ def medium(result: Result) -> str:
 
 def _module(result: Result) -> Any:
     return import_module(f"geomech.text.{result.kind}")
+
+
+__all__ = ["medium", "numbers", "text"]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,21 +1,131 @@
-"""Net displacements per cycle as lines of plain text."""
+"""Net displacements per cycle as lines of plain text: `text` by the most exact tier, `full` by every tier."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
+from geomech.core.summary import POSE, WIDTH, zero_words
 from geomech.core.variables import Result, Variable
 from geomech.studies import tables, uncertainty
 
 numbers = tables.table
+MORE = "--all prints every tier, the net distance and the seconds"
+FRAME = "x ahead, y to the left, as the body frame points at the start of the cycle"
+ROWS = 14  # of a table that fits a screen
 
 
-def text(result: Result, title: str = "") -> str:
+def text(result: Result, title: str = "", rows: int = ROWS) -> str:
+    """Return x, y and heading per cycle by the most exact tier, each with its error, a word for what is zero, and the errors
+    of the other tiers, in lines that fit a screen. title: the beginning of lines, by default the scene's name. rows: at most so
+    many amplitudes, of more the first, the last and some between."""
+    return "\n".join([*gait_lines(result, title, rows), FRAME])
+
+
+def gait_lines(result: Result, title: str = "", rows: int = ROWS) -> list[str]:
+    """Return the lines of `text`, without the one that tells x from y."""
+    facts, title = result.attributes, title or result.attributes["name"]
+    tier = exact_tier(result)
+    shown = shown_rows(len(result["amplitude"].values), rows)
+    unit, frequency = result["x"].unit, facts.get("frequency")
+    lines = [f"{title}: {facts['note']}"] if "note" in facts else []
+    lines.append(f"{title}: displacement per cycle ({unit}), {_tier_words(result, tier)}")
+    zeros, moving = _zeros(result, tier)
+    for columns in _side_by_side([_column(result, tier, name, shown) for name in moving], result, shown):
+        lines += ["".join(cells) for cells in zip(*columns)]
+    lines += zeros
+    lines += _errors(result, tier, unit)
+    if frequency is not None:
+        lines.append(f"speed: {frequency:g} Hz times the displacement")
+    if "medium_error_rule" in result:
+        lines.append("medium: one standard deviation by its covariance")
+    lines += _effort(result, title, [tier], shown)
+    some = len(shown) < (count := len(result["amplitude"].values))
+    lines.append(f"amplitude: {_amplitude(result)}" + f", {len(shown)} of {count}" * some)
+    if "estimate_is" in facts:
+        lines.append(f"estimated error: {facts['estimate_is']}")
+    return lines
+
+
+def exact_tier(result: Result) -> int:
+    """Return the number of the tier whose largest error of position is least, the last of several."""
+    errors = np.nan_to_num(result["x"].error, nan=np.inf).max(1, initial=0.0)
+    return len(errors) - 1 - int(errors[::-1].argmin())
+
+
+def shown_rows(count: int, rows: int) -> np.ndarray:
+    """Return the numbers of at most ``rows`` of so many amplitudes, evenly spread."""
+    return np.unique(np.linspace(0, count - 1, min(count, rows)).round().astype(int))
+
+
+def _zeros(result: Result, tier: int) -> tuple[list[str], list[str]]:
+    """Return lines that say which of x, y and heading are zero, by symmetry or within their error, and the names of the
+    others."""
+    symmetric = result.attributes["zero_by_symmetry"]
+    lines, moving = zero_words(symmetric), []
+    for name in (n for n in POSE if n not in symmetric):
+        values, errors = result[name].values[tier], result[name].error[tier]
+        zero = (np.abs(values) <= errors).all() and (np.abs(values) < 5e-7 * _scale(result, name)).all()
+        if zero:
+            lines.append(f"{name}: zero within its error, {errors.max(initial=0.0):.0e} {result[name].unit}")
+        else:
+            moving.append(name)
+    return lines, moving
+
+
+def _scale(result: Result, name: str) -> float:
+    return 1.0 if name == "heading" else result.attributes["body_length"]
+
+
+def _tier_words(result: Result, tier: int) -> str:
+    """Return the name of a tier, and why it is this one."""
+    names, facts = result["tier"].values.tolist(), result.attributes
+    if "tolerance" in facts:
+        return f"{names[tier]} tier, cheapest within {facts['tolerance']:g} BL"
+    return f"{names[tier]} tier" + f", most exact of {len(names)}" * (len(names) > 1)
+
+
+def _column(result: Result, tier: int, name: str, shown: np.ndarray) -> list[str]:
+    """Return the cells of a quantity under its name: values, errors and what an uncertain medium adds."""
+    v = result[name]
+    places = 6 if v.unit == "rad" else _decimals(result)
+    head = name + " (rad)" * (v.unit == "rad")
+    cells = [f"{head:>{places + 8}}{'+- error':>11}" + f"{'+- medium':>12}" * (v.spread is not None)]
+    for k in shown:
+        cell = f"{np.round(v.values[tier, k], places) + 0.0:{places + 8}.{places}f}  +-{v.error[tier, k]:7.1e}"
+        cells.append(cell + (f"   +-{v.spread[tier, k]:7.1e}" if v.spread is not None else ""))
+    return cells
+
+
+def _side_by_side(columns: list[list[str]], result: Result, shown: np.ndarray) -> Iterator[list[list[str]]]:
+    """Yield columns behind that of amplitudes, as many together as fit WIDTH."""
+    amplitudes = ["amplitude", *(f"{a:9.6g}" for a in result["amplitude"].values[shown])]
+    while columns:
+        group = [amplitudes, columns.pop(0)]
+        while columns and sum(len(c[0]) for c in group) + len(columns[0][0]) <= WIDTH:
+            group.append(columns.pop(0))
+        yield group
+
+
+def _errors(result: Result, tier: int, unit: str) -> list[str]:
+    """Return the largest errors of the other tiers, in lines."""
+    others = [
+        f"{name} {result['x'].error[k].max(initial=0.0):.1e}"
+        for k, name in enumerate(result["tier"].values.tolist())
+        if k != tier
+    ]
+    return [f"other tiers, largest error ({unit}): {', '.join(others)}"] if others else []
+
+
+def _amplitude(result: Result) -> str:
+    return re.sub(r"[$\\]", "", result["amplitude"].label)
+
+
+def full(result: Result, title: str = "") -> str:
     """Return x, y, heading and net distance per cycle by tier, each with its error in its own unit. title: the beginning of
     lines, by default the scene's name."""
     facts, title = result.attributes, title or result.attributes["name"]
@@ -31,9 +141,10 @@ def text(result: Result, title: str = "") -> str:
             lines.append(
                 "mean: how far the mean over the media of that covariance lies from the displacement in their mean"
             )
-    lines += [*_surfaces(result), *_effort(result, title)]
-    amplitude = re.sub(r"[$\\]", "", result["amplitude"].label)
-    lines.append(f"amplitude: {amplitude}; x, y, heading: the pose after a cycle, in the frame at its start")
+    every = np.arange(len(result["amplitude"].values))
+    lines += [*_surfaces(result), *_effort(result, title, range(len(result["tier"].values)), every)]
+    lines.append(f"amplitude: {_amplitude(result)}; x, y, heading: the pose after a cycle, in the frame at its start")
+    lines += zero_words(facts["zero_by_symmetry"])
     if "estimate_is" in facts:
         lines.append(f"estimated error: {facts['estimate_is']}")
     return "\n".join([*lines, _times(facts), ""])
@@ -43,8 +154,7 @@ def _blocks(result: Result) -> Iterator[tuple[Variable, str, float, int]]:
     """Yield (variable, headline, factor, decimals) of the parts of a table, each of one unit; the last digit of a length is a
     millionth of the body's."""
     facts, unit = result.attributes, result["x"].unit
-    length = facts["body_length"]
-    decimals = 6 - min(0, math.floor(math.log10(length) + 1e-9))
+    length, decimals = facts["body_length"], _decimals(result)
     per_cycle = f"displacement per cycle ({unit}) +- estimated error"
     yield result["net_distance"], f"{per_cycle}: net distance, sqrt(x^2 + y^2)", 1.0, decimals
     yield result["x"], f"{per_cycle}: x", 1.0, decimals
@@ -55,6 +165,11 @@ def _blocks(result: Result) -> Iterator[tuple[Variable, str, float, int]]:
         if unit != "BL":
             yield result["net_distance"], speed(unit), f, decimals
         yield result["net_distance"], speed("BL"), f / length, 6
+
+
+def _decimals(result: Result) -> int:
+    """Return the decimals of lengths, of which the last is about a millionth of the body's."""
+    return 6 - min(0, math.floor(math.log10(result.attributes["body_length"]) + 1e-9))
 
 
 def _block(result: Result, variable: Variable, by: float, places: int) -> Iterator[str]:
@@ -91,19 +206,21 @@ def _surfaces(result: Result) -> Iterator[str]:
         yield from (f"{a:9.6g} {x:13.1e} {t:14.1e}" for a, x, t in rows)
 
 
-def _effort(result: Result, title: str) -> Iterator[str]:
-    """Yield path length and work, and the cost of transport by tier, if the result has them."""
+def _effort(result: Result, title: str, tiers: Sequence[int], shown: np.ndarray) -> Iterator[str]:
+    """Yield path length and work, and the cost of transport by tier, at some of the amplitudes, if the result has them."""
     if "work" not in result:
         return
-    cell = lambda x, form: f"{format(x, form) if np.isfinite(x) else '-':>12}"
-    yield f"{title}: path length and work of a cycle, and cost of transport: work over that of towing the body as far"
-    yield "amplitude path length        work" + "".join(f"{m:>12}" for m in result["tier"].values)
-    length, work, transport = (result[key].values for key in ("path_length", "work", "cost_of_transport"))
-    for k, amplitude in enumerate(result["amplitude"].values):
-        ratios = "".join(cell(x, ".4g") for x in transport[:, k])
-        yield f"{amplitude:9.6g}{cell(length[k], '.6f')}{cell(work[k], '.6f')}{ratios}"
-    with_unit = [result[key] for key in ("path_length", "work") if result[key].unit]
-    yield "; ".join(f"{v.name.replace('_', ' ')}: {v.unit}" for v in with_unit)
+    cell = lambda x, form, wide: f"{format(x, form) if np.isfinite(x) else '-':>{wide}}"
+    length, work, transport = (result[key] for key in ("path_length", "work", "cost_of_transport"))
+    heads = [f"{v.name.replace('_', ' ')} ({v.unit})" if v.unit else v.name for v in (length, work)]
+    yield f"{title}: effort of a cycle (drag: of the body along itself), cost of transport by tier"
+    names = (result["tier"].values[k] for k in tiers)
+    yield f"amplitude  {heads[0]:>16}  {heads[1]:>16}" + "".join(f"{name:>12}" for name in names)
+    wide = [max(16, len(head)) + 2 for head in heads]
+    for k in shown:
+        ratios = "".join(cell(transport.values[t, k], ".4g", 12) for t in tiers)
+        both = "".join(cell(v.values[k], ".6f", w) for v, w in zip((length, work), wide))
+        yield f"{result['amplitude'].values[k]:9.6g}{both}{ratios}"
 
 
 def _times(facts: Any) -> str:

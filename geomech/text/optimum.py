@@ -5,10 +5,10 @@ from __future__ import annotations
 import textwrap
 from typing import Any
 
+from geomech.core.summary import moved
 from geomech.core.variables import Result
 from geomech.optimisation import Optimum
 from geomech.scenes.write import gait_table, toml
-from geomech.studies.effort import METRIC
 
 SHOWN = 6  # answers that a table led to, of those that nobody finished
 
@@ -30,9 +30,11 @@ def numbers(result: Result) -> dict[str, Any]:
         "answers": [list(x) for x in optimum.answers + optimum.others],
         "estimate": float(value.error),
         "body_length": float(optimum.scene.system.length),
+        "zero_by_symmetry": result.attributes["zero_by_symmetry"],
         "units": {
             **dict.fromkeys(("value", "start_value", "estimate"), value.unit),
             "displacement": [unit, unit, "rad"],
+            **{name: result[name].unit for name in ("path_length", "work") if name in result},
             "body_length": unit,
             "seconds": "s",
         },
@@ -40,24 +42,23 @@ def numbers(result: Result) -> dict[str, Any]:
 
 
 def text(result: Result) -> str:
-    """Return the best gait in lines: its value, its cost, the limits that it touches, and where the starts led."""
+    """Return the best gait in lines: its value, its effort, the limits that it touches, and where the starts led."""
     optimum, value, start = result.subject, result["value"], result["start_value"]
-    aim = optimum.request.aim
-    moved = ", ".join(f"{name} {result[name].values:.6g} {result[name].unit}" for name in ("x", "y", "theta"))
-    lines = [_headline(result), f"displacement per cycle: {moved}"]
-    if "work" in result:
-        length, work = result["path_length"].values, result["work"].values
-        lines.append(f"path length {length:.6g}, work {work:.6g} (body's axial drag x body length)")
-    elif "path_length" in result:
-        lines.append(f"path length {result['path_length'].values:.6g} ({METRIC})")
-    if aim.timed:
+    objective = optimum.request.objective
+    pose, zero = (result["x"], result["y"], result["theta"]), result.attributes["zero_by_symmetry"]
+    lines = [_headline(result), f"the scene's gait: {start.values:.6g} {start.unit}"]
+    lines += [f"displacement per cycle: {moved([(v.values, v.unit) for v in pose], zero)}"]
+    efforts = [result[name] for name in ("path_length", "work") if name in result]
+    spent = ", ".join(f"{v.name.replace('_', ' ')} {v.values:.6g} {v.unit}" for v in efforts)
+    lines += [f"effort per cycle: {spent}"] * bool(spent)
+    if objective.timed:
         limits = {
-            "rate": aim.rate and f"rates of shape up to {aim.rate:.6g} rad/s",
-            "power": aim.power and f"mean power {aim.power:g}",
+            "rate": objective.rate and f"rates of shape up to {objective.rate:.6g} rad/s",
+            "power": objective.power and f"mean power up to {objective.power:g} drag x BL/s",
         }
         limited = " and ".join(filter(None, limits.values()))
         lines.append(f"frequency {optimum.gait.frequency:.6g} Hz, with {limited}")
-    lines.append(f"limits that it touches: {', '.join(optimum.active) or 'none'}")
+    lines.append(f"limits touched: {', '.join(optimum.active) or 'none'}")
     if optimum.request.starts > 1:
         lines += _answers(optimum)
     if value.values <= start.values * (1 + 1e-12):
@@ -66,11 +67,10 @@ def text(result: Result) -> str:
 
 
 def _headline(result: Result) -> str:
-    """Return the value with its error, and that of the scene's gait."""
-    optimum, value, start = result.subject, result["value"], result["start_value"]
-    towards = f" along {optimum.request.aim.direction}" if optimum.request.aim.direction else ""
-    reached = f"{value.label}{towards} {value.values:.6g} {value.unit}, error {value.error:.1g}"
-    return f"{optimum.scene.name}: {reached} (the scene's gait: {start.values:.6g})"
+    """Return the value with its error."""
+    optimum, value = result.subject, result["value"]
+    towards = f" along {optimum.request.objective.direction}" if optimum.request.objective.direction else ""
+    return f"{optimum.scene.name}: {value.label}{towards} {value.values:.6g} {value.unit}, error {value.error:.1g}"
 
 
 def _answers(optimum: Optimum) -> list[str]:
@@ -88,5 +88,6 @@ def _answers(optimum: Optimum) -> list[str]:
 
 def scene_toml(result: Result) -> str:
     """Return the scene with the best gait, behind a comment with its value."""
-    about = textwrap.wrap(_headline(result), 110)
+    start = result["start_value"]
+    about = textwrap.wrap(f"{_headline(result)} (the scene's gait: {start.values:.6g})", 110)
     return "".join(f"# {line}\n" for line in about) + "\n" + toml(result.subject.scene)

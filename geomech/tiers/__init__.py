@@ -11,3 +11,7 @@ for _tier in (AREA, ADAPTED, PATH, HARMONIC, DIRECT):  # cheapest look-up first
     TIERS.register(_tier)
 
 __all__ = ["TIERS", "Numerics", "Plan", "Table", "Tier"]
+
+
+def __dir__() -> list[str]:
+    return __all__

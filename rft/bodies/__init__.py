@@ -8,3 +8,7 @@ from rft.registry import load_all
 load_all(__name__, __path__)
 
 __all__ = ["BODIES", "Backbone", "Body", "Chain", "ConstantCurvature", "Elements", "Serpenoid"]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -33,3 +33,7 @@ __all__ = [
     "engine",
     "stepwise_effects",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -22,3 +22,7 @@ __all__ = [
     "GROUND_EFFECTS", "Aeration", "DisturbedGround", "GrainInertia", "Ground", "GroundEffect", "Slope", "checked_effects",
     "ground_of", "inverse_speed", "strength_at", "weight",
 ]  # fmt: skip
+
+
+def __dir__() -> list[str]:
+    return __all__

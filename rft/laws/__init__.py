@@ -27,3 +27,7 @@ __all__ = [
     "is_rate_independent",
     "speed_exponent",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -11,3 +11,7 @@ __all__ = [
     "Rotate", "Screw", "Solid", "Spatial", "Sphere", "Trajectory", "Wrench", "bearing", "below", "read",
     "wrench",
 ]  # fmt: skip
+
+
+def __dir__() -> list[str]:
+    return __all__

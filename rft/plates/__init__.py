@@ -54,3 +54,7 @@ __all__ = [
     "parts",
     "survey",
 ]  # fmt: skip
+
+
+def __dir__() -> list[str]:
+    return __all__

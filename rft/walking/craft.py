@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
@@ -62,11 +63,17 @@ class Screws(Robot):
 
     def meshes(self, elements: int) -> list[Mesh]:
         """Return the meshes of the screws, of `PER_SQUARE` elements^2 triangles."""
-        return [screw.mesh(PER_SQUARE * elements**2) for screw, _ in self.screws]
+        return [_mesh(screw, PER_SQUARE * elements**2) for screw, _ in self.screws]
 
     def hull(self, elements: int) -> Mesh:
         """Return the mesh of the box, about the centre of mass."""
         return shapes.box((self.length, self.width, self.height), max(1, elements // 6))
 
     def check(self, elements: int) -> None:
-        self.meshes(elements)
+        _mesh(self.screw, PER_SQUARE * elements**2)  # the right screw is the same, or its mirror image
+
+
+@lru_cache(maxsize=2)
+def _mesh(screw: Screw, triangles: int) -> Mesh:
+    """Return the mesh of a screw, the same one for the scenes of a sweep over another parameter."""
+    return screw.mesh(triangles)

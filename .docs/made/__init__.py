@@ -1,0 +1,59 @@
+"""What the site computes while it is built: reference pages, numbers, and pictures.
+
+A page asks for it by an empty block of code, ```{made} NAME, which is replaced by the Markdown that the function of that
+name returns. Blocks of the gallery's pages are run, and their pictures shown.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from . import api, command_line, conventions, examples, figures, keys, validation
+
+
+def notebooks() -> str:
+    """Return the tree of contents of all notebooks, or that there are none."""
+    folder = Path(__file__).parents[1] / "notebooks"
+    names = sorted(path.stem for path in folder.glob("*.md") if path.stem != "index")
+    return "```{toctree}\n" + "\n".join(names) + "\n```" if names else "There are none yet."
+
+
+MADE = {
+    "alpha": conventions.drawing,
+    "api": api.index,
+    "commands": command_line.page,
+    "figures": figures.page,
+    "keys": keys.page,
+    "notebooks": notebooks,
+    "thumbnails": examples.thumbnails,
+    "validation": validation.table,
+}
+
+
+def fill_in(app, docname: str, source: list[str]) -> None:
+    """Replace the blocks {made} of a page, and add what its commands print, or the pictures of the gallery."""
+    if docname.startswith("gallery/") and docname not in ("gallery/index", "gallery/figures"):
+        source[0] = examples.shown(docname)
+    elif not docname.startswith("generated/"):
+        text = re.sub(r"(?m)^```\{made\} (\w+)\n```$", lambda block: MADE[block[1]](), source[0])
+        source[0] = examples.with_output(text)
+
+
+def compute(app) -> None:
+    """Compute all pages and pictures to which others refer, before any is read."""
+    generated = Path(app.srcdir) / "generated"
+    generated.mkdir(exist_ok=True)
+    api.write(generated / "api")
+    examples.compute_all()
+    figures.draw_missing()
+
+
+def setup(app) -> dict[str, bool]:
+    """Register the computations with Sphinx."""
+    app.connect("builder-inited", compute)
+    app.connect("source-read", fill_in)
+    app.connect("autodoc-process-docstring", api.readable, priority=400)  # before numpydoc
+    app.connect("autodoc-process-docstring", api.with_parameters, priority=401)
+    app.connect("autodoc-process-signature", api.plain_types)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

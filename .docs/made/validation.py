@@ -1,0 +1,110 @@
+"""The table of validation: numbers that geomech gives beside those of others, computed while the site is built.
+
+`python .docs/made/validation.py` prints the table alone.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+import geomech
+from geomech.gaits import Circle
+from geomech.geometry import metric
+from geomech.geometry.curvature import ccf
+from geomech.geometry.minimum_perturbation import minimum_perturbation
+from geomech.studies import undulation
+from geomech.tiers.area import area
+from rft.plates import VERTICAL
+
+
+def table() -> str:
+    """Return the rows of all checks as a Markdown table."""
+    rows = [row for check in (viscous_geometry, viscous_cost, strokes, stress, waves) for row in check()]
+    lines = [f"| {check} | {source} | {ours} | {theirs} |" for check, source, ours, theirs in rows]
+    return "\n".join(["| check | source | geomech | source says |", "|---|---|---|---|", *lines])
+
+
+def viscous_geometry():
+    """Yield the CCF and the area of the viscous swimmer in its minimum-perturbation frame, and its true displacement."""
+    study = geomech.Study(geomech.load("three-link-viscous").with_numerics(grid=31, extent=2.5))
+    field = dataclasses.replace(study.fitted, A=minimum_perturbation(study.fitted).connection(study.fitted))
+    source = "a separate program with a coarser discretisation, 31 x 31"
+    curvature = ccf(field)
+    yield (
+        "viscous three-link swimmer, minimum-perturbation frame: CCF_x(0, 0)",
+        source,
+        _(curvature([0.0, 0.0])[0], 5),
+        "-0.0204",
+    )
+    moved = area(curvature, Circle(), [1.0])[0]
+    yield "the same: area integral over the circle of 1 rad", source, _(np.hypot(*moved[:2]), 4), "0.0510"
+    net = study.poses("direct", Circle(), [1.0])[0]
+    yield (
+        "the same circle: net distance by the balance of forces",
+        "a separate program",
+        _(np.hypot(*net[:2]), 4),
+        "0.0513",
+    )
+
+
+def viscous_cost():
+    """Yield the dissipation metric of the straight viscous swimmer and the path length of a circle."""
+    study = geomech.Study(geomech.load("three-link-viscous"))
+    M = study.metric.field([0.0, 0.0])
+    source = "a separate program"
+    yield "the same: dissipation metric M(0, 0), diagonal entry", source, _(M.ravel()[0], 7), "0.0073160"
+    yield "the same: dissipation metric M(0, 0), off-diagonal entry", source, _(M.ravel()[1], 7), "0.0050297"
+    length = metric.path_length(study.metric.norm, Circle(), [1.0])[0]
+    yield "the same: path length of the circle of 1 rad", source, _(length, 6), "0.512235"
+
+
+def strokes():
+    """Yield the best strokes of the viscous swimmer."""
+    scene = geomech.load("three-link-viscous")
+    source = "Ramasamy and Hatton, published optimum"
+    yield (
+        "the same: best stroke for displacement (BL a cycle)",
+        source,
+        _(geomech.optimise(scene, "displacement").value, 4),
+        "0.1035",
+    )
+    yield (
+        "the same: best stroke for efficiency (BL per unit of path length)",
+        source,
+        _(geomech.optimise(scene, "efficiency").value, 4),
+        "0.1109",
+    )
+
+
+def stress():
+    """Yield the generic stress map at published angles."""
+    source = "Li, Zhang and Goldman, Science 339, 1408 (2013), Table S2, evaluated by hand"
+    wanted = {(0, 90): (0.0, 1.0), (0, -90): (0.0, -0.25), (90, 0): (0.37, 0.037), (0, 0): (0.136, 0.375),
+              (45, 45): (0.3595, 0.5702)}  # fmt: skip
+    for (beta, gamma), (x, z) in wanted.items():
+        found = VERTICAL["generic"].stress(np.radians(beta), np.radians(gamma))
+        yield (f"generic stress map at beta = {beta}, gamma = {gamma} degrees: alpha_x, alpha_z (N/cm^3)", source,
+               f"{_(found[0], 4)}, {_(found[1], 4)}", f"{x}, {z}")  # fmt: skip
+
+
+def waves():
+    """Yield progress of waves: a snake at the surface, a robot of seven segments."""
+    medium = geomech.media.CATALOGUE["glass-0.3mm-surface"].medium
+    headings = np.radians(48.4) * np.cos(2 * np.pi * (np.arange(2000) + 0.5) / 2000)
+    speed = undulation.endless_efficiency(medium, headings) * np.cos(headings).mean()
+    yield ("snake on the surface of 0.3 mm glass, endless wave of 48.4 degrees: speed over speed along its track",
+           "animals of Schiebel et al., eLife 9, e51412 (2020)", _(speed, 3), "0.81 (0.74 to 0.89)")  # fmt: skip
+    study = geomech.Study(geomech.load("seven-link-wave"))
+    net = np.hypot(*study.poses("direct")[:2])
+    yield ("robot of seven segments in 6 mm grains: displacement a cycle over the length of its wave, 0.757 BL",
+           "experiment of Maladen et al. (2011)", _(net / 0.757, 2), "0.34 +- 0.02")  # fmt: skip
+
+
+def _(value: float, digits: int) -> str:
+    return f"{value:.{digits}f}"
+
+
+if __name__ == "__main__":
+    print(table())

@@ -1,0 +1,81 @@
+"""Results that print themselves, show themselves in a notebook and draw themselves."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+from geomech import optimisation, plots, text
+from geomech.core.variables import Result
+from geomech.io.results import to_xarray
+from geomech.optimisation.question import result_of
+from geomech.output import display, parts, pictures
+from geomech.studies import results, sweep, tables
+from rft.refusal import printable
+
+
+class Displacements(results.Displacements):
+    """Net displacement per cycle by amplitude and tier: `table["direct"]` are poses (B, 3), `table["estimate"]` their
+    errors, `table["units"]` the units of all."""
+
+    def __repr__(self) -> str:
+        return printable(text.text(self.result))
+
+    def _repr_html_(self) -> str:
+        return display.displacements(self)
+
+    def plot(self, quantity: str = "net_distance", *, ax: Any = None, **options: Any) -> Any:
+        """Draw x, y, heading or net_distance against amplitude, a line a tier with its errors; return the Axes."""
+        return plots.displacement(self, quantity=quantity, gait=self.gait, ax=ax, **options)
+
+    def to_xarray(self) -> Any:
+        """Return a Dataset over tier, amplitude and component, with units and error estimates."""
+        return to_xarray(tables.as_stored(self.result))
+
+
+class Swept(sweep.Swept):
+    """Result of a sweep: {"over": {parameter: values}, name: array (N_1, ...)}."""
+
+    def _repr_html_(self) -> str:
+        return display.swept(self)
+
+    def plot(self) -> Any:
+        """Draw curves over one parameter, or maps over two; return the Figure."""
+        return plots.sweep_figure(self.scene, self)
+
+    def to_xarray(self) -> Any:
+        """Return a Dataset over the parameters and component, as the file of `geomech sweep`."""
+        return to_xarray(sweep.as_stored(self.result))
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Optimum(optimisation.Optimum):
+    """The best gait: its ``gait``, ``value``, ``estimate`` of the error, and the ``scene`` with it."""
+
+    def __repr__(self) -> str:
+        return printable(text.text(result_of(self)))
+
+    def plot(self, *, ax: Any = None) -> Any:
+        """Draw the loop on the CCF that it gains from, or, without a map, its joint angles; return the Axes."""
+        draw = plots.optimum_map if self.scene.system.joints == 2 else plots.optimum_angles
+        return draw(self, ax)
+
+
+class FittedMedium:
+    """A medium fitted to measurements. result: parameters, errors and residuals. medium: the law, or stress map."""
+
+    def __init__(self, result: Result):
+        self.result = result
+        self.medium = result.subject.medium if result.kind == "rod_drag" else result.subject.stress
+
+    def __repr__(self) -> str:
+        return printable(text.text(self.result))
+
+    def plot(self) -> Any:
+        """Draw measurements and fit; return the Figure."""
+        return pictures.CALIBRATIONS[self.result.kind](self.result)
+
+    def save(self, path: str | Path) -> None:
+        """Write a medium's file, which a scene names as [medium] file."""
+        parts.write_medium(self.result, Path(path))
