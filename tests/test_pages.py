@@ -17,6 +17,7 @@ from geomech.commands import names
 from rft.laws import CATALOGUE
 from rft.plates import VERTICAL
 
+pytestmark = pytest.mark.usefixtures("fastest")
 ROOT = pathlib.Path(__file__).parents[1]
 README, CONTRIBUTING = ROOT / "README.md", ROOT / "CONTRIBUTING.md"
 SITE = ROOT / ".docs"
