@@ -15,7 +15,7 @@ from rft.balance import backend  # noqa: E402
 backend._preferred.set("numpy")  # "auto" is NumPy, but for `solved_by`
 TRUTHS = pytest.StashKey()
 BY_HAND = {"soak", "benchmark"}
-LAID_OUT = {"test_pictures", "test_figures", "test_frozen", "test_shown"}  # files that look at pictures as they are
+LAID_OUT = {"test_pictures", "test_figures", "test_shown"}  # files that look at pictures as they are
 
 
 @pytest.fixture
