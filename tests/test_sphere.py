@@ -16,6 +16,7 @@ from geomech.systems import Swimmer
 from geomech.tiers import harmonic
 from rft import CATALOGUE, Chain
 
+pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 
 

@@ -511,7 +511,7 @@ def test_walk_as_a_command(geomech, tmp_path):
 
 def test_films_of_a_walk_follow_the_robot_and_tell_their_speed(tmp_path):
     """The axes hold the whole way, or go with the robot; 3 Hz is seen at half the speed."""
-    scene = dataclasses.replace(XPLORER, numerics=dataclasses.replace(QUICK, duration=0.6), gait=Tripod(3.0))
+    scene = dataclasses.replace(XPLORER, numerics=dataclasses.replace(QUICK, duration=0.3), gait=Tripod(3.0))
     found = walking.run(scene)
     x, rows, limits = found.walk.pose[:, 0], [0, 5, len(found.walk.t) - 1], {}
     for follow in (False, True):
