@@ -36,8 +36,8 @@ MOST_PAIRS = 10  # of joints in a figure: as many as five joints have
 
 class Space(NamedTuple):
     """Subject of texts and pictures of shape space. other, other_planes: the study and its planes in another body frame.
-    stretch: of shape space, to equal effort. enclosed: the displacement of the scene's gait by the area tier. seconds: of the
-    computation."""
+    stretch: of shape space, to equal effort. enclosed: the displacement of the scene's gait by the area tier. balances, seconds: of
+    the computation."""
 
     study: Study
     other: Study | None = None
@@ -45,6 +45,7 @@ class Space(NamedTuple):
     other_planes: tuple[Plane, ...] = ()
     stretch: Stretch | None = None
     enclosed: Result | None = None
+    balances: int = 0
     seconds: float = 0.0
 
 
@@ -160,8 +161,8 @@ class ShapeSpace(Question):
         stretched = stretch_to_metric(study.metric) if self.stretch else None
         amplitude = self.scene.gait.amplitude
         enclosed = study.study([amplitude], [AREA.name]).result if self._enclosed else None
-        seconds = time.perf_counter() - start
-        space = Space(study, self.other, tuple(values[:count]), other_planes, stretched, enclosed, seconds)
+        spent = self.cost().balances, time.perf_counter() - start
+        space = Space(study, self.other, tuple(values[:count]), other_planes, stretched, enclosed, *spent)
         if self.file:
             file = fields.of_study(study)
             return Result(file.kind, file.variables, file.attributes, space)

@@ -31,16 +31,17 @@ def gait_lines(result: Result, title: str = "", rows: int = ROWS) -> list[str]:
     facts, title = result.attributes, title or result.attributes["name"]
     tier = exact_tier(result)
     shown = shown_rows(len(result["amplitude"].values), rows)
-    unit, frequency = result["x"].unit, facts.get("frequency")
+    unit = result["x"].unit
     lines = [f"{title}: {facts['note']}"] if "note" in facts else []
     lines.append(f"{title}: displacement per cycle ({unit}), {_tier_words(result, tier)}")
     zeros, moving = _zeros(result, tier)
+    moving += ["speed"] if "speed" in result else []
     for columns in _side_by_side([_column(result, tier, name, shown) for name in moving], result, shown):
         lines += ["".join(cells) for cells in zip(*columns)]
     lines += zeros
     lines += _errors(result, tier, unit)
-    if frequency is not None:
-        lines.append(f"speed: {frequency:g} Hz times the displacement")
+    if "speed" in result:
+        lines.append("speed: net distance, sqrt(x^2 + y^2), times frequency")
     if "medium_error_rule" in result:
         lines.append("medium: one standard deviation by its covariance")
     lines += _effort(result, title, [tier], shown)
@@ -91,12 +92,15 @@ def _tier_words(result: Result, tier: int) -> str:
 
 def _column(result: Result, tier: int, name: str, shown: np.ndarray) -> list[str]:
     """Return the cells of a quantity under its name: values, errors and what an uncertain medium adds."""
-    v = result[name]
+    v, facts = result[name], result.attributes
     places = 6 if v.unit == "rad" else _decimals(result)
-    head = name + " (rad)" * (v.unit == "rad")
-    cells = [f"{head:>{places + 8}}{'+- error':>11}" + f"{'+- medium':>12}" * (v.spread is not None)]
+    head = {"heading": "heading (rad)", "speed": f"speed ({v.unit}) at {facts.get('frequency', 0.0):g} Hz"}.get(
+        name, name
+    )
+    wide = max(places + 8, len(head) + 2)
+    cells = [f"{head:>{wide}}{'+- error':>11}" + f"{'+- medium':>12}" * (v.spread is not None)]
     for k in shown:
-        cell = f"{np.round(v.values[tier, k], places) + 0.0:{places + 8}.{places}f}  +-{v.error[tier, k]:7.1e}"
+        cell = f"{np.round(v.values[tier, k], places) + 0.0:{wide}.{places}f}  +-{v.error[tier, k]:7.1e}"
         cells.append(cell + (f"   +-{v.spread[tier, k]:7.1e}" if v.spread is not None else ""))
     return cells
 
