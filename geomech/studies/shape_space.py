@@ -36,8 +36,8 @@ MOST_PAIRS = 10  # of joints in a figure: as many as five joints have
 
 class Space(NamedTuple):
     """Subject of texts and pictures of shape space. other, other_planes: the study and its planes in another body frame.
-    stretch: of shape space, to equal effort. enclosed: the displacement of the scene's gait by the area tier. balances, seconds: of
-    the computation."""
+    stretch: of shape space, to equal effort. enclosed: the displacement of the scene's gait by the area tier. balances,
+    seconds: of the computation."""
 
     study: Study
     other: Study | None = None

@@ -44,7 +44,7 @@ def gait_lines(result: Result, title: str = "", rows: int = ROWS) -> list[str]:
         lines.append("speed: net distance, sqrt(x^2 + y^2), times frequency")
     if "medium_error_rule" in result:
         lines.append("medium: one standard deviation by its covariance")
-    lines += _effort(result, title, [tier], shown)
+    lines += _effort(result, [tier], shown)
     some = len(shown) < (count := len(result["amplitude"].values))
     lines.append(f"amplitude: {_amplitude(result)}" + f", {len(shown)} of {count}" * some)
     if "estimate_is" in facts:
@@ -146,7 +146,7 @@ def full(result: Result, title: str = "") -> str:
                 "mean: how far the mean over the media of that covariance lies from the displacement in their mean"
             )
     every = np.arange(len(result["amplitude"].values))
-    lines += [*_surfaces(result), *_effort(result, title, range(len(result["tier"].values)), every)]
+    lines += [*_surfaces(result), *_effort(result, range(len(result["tier"].values)), every)]
     lines.append(f"amplitude: {_amplitude(result)}; x, y, heading: the pose after a cycle, in the frame at its start")
     lines += zero_words(facts["zero_by_symmetry"])
     if "estimate_is" in facts:
@@ -210,21 +210,26 @@ def _surfaces(result: Result) -> Iterator[str]:
         yield from (f"{a:9.6g} {x:13.1e} {t:14.1e}" for a, x, t in rows)
 
 
-def _effort(result: Result, title: str, tiers: Sequence[int], shown: np.ndarray) -> Iterator[str]:
-    """Yield path length and work, and the cost of transport by tier, at some of the amplitudes, if the result has them."""
+def _effort(result: Result, tiers: Sequence[int], shown: np.ndarray) -> Iterator[str]:
+    """Yield path length and work, and the cost of transport by tier, at some of the amplitudes, if the result has them; none of
+    these that does not exist."""
     if "work" not in result:
         return
-    cell = lambda x, form, wide: f"{format(x, form) if np.isfinite(x) else '-':>{wide}}"
-    length, work, transport = (result[key] for key in ("path_length", "work", "cost_of_transport"))
-    heads = [f"{v.name.replace('_', ' ')} ({v.unit})" if v.unit else v.name for v in (length, work)]
-    yield f"{title}: effort of a cycle (drag: of the body along itself), cost of transport by tier"
-    names = (result["tier"].values[k] for k in tiers)
-    yield f"amplitude  {heads[0]:>16}  {heads[1]:>16}" + "".join(f"{name:>12}" for name in names)
-    wide = [max(16, len(head)) + 2 for head in heads]
+    names = result["tier"].values
+    columns = [
+        (f"{v.name.replace('_', ' ')} ({v.unit})", v.values, ".6f") for v in (result["path_length"], result["work"])
+    ]
+    columns += [(str(names[t]), result["cost_of_transport"].values[t], ".4g") for t in tiers]
+    columns = [x for x in columns if np.isfinite(x[1]).any()]
+    of_tiers = (
+        "" if np.isnan(result["work"].values).all() else ", cost of transport by tier (drag: the body's along itself)"
+    )
+    yield f"effort per cycle{of_tiers}"
+    wide = [max(10, len(head)) + 2 for head, *_ in columns]
+    yield "amplitude" + "".join(f"{head:>{w}}" for (head, *_), w in zip(columns, wide))
     for k in shown:
-        ratios = "".join(cell(transport.values[t, k], ".4g", 12) for t in tiers)
-        both = "".join(cell(v.values[k], ".6f", w) for v, w in zip((length, work), wide))
-        yield f"{result['amplitude'].values[k]:9.6g}{both}{ratios}"
+        cells = (format(x[k], form) if np.isfinite(x[k]) else "-" for _, x, form in columns)
+        yield f"{result['amplitude'].values[k]:9.6g}" + "".join(f"{cell:>{w}}" for cell, w in zip(cells, wide))
 
 
 def _times(facts: Any) -> str:
