@@ -57,7 +57,7 @@ def strokes():
     source = "Ramasamy and Hatton, published optimum"
     yield "the same: best stroke for displacement (BL a cycle)", source, _(
         geomech.optimise(scene, "displacement").value, 4), "0.1035"
-    yield "the same: best stroke for efficiency (BL per unit of path length)", source, _(
+    yield "the same: best stroke for efficiency (BL/BL)", source, _(
         geomech.optimise(scene, "efficiency").value, 4), "0.1109"
 
 

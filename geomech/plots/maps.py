@@ -23,7 +23,7 @@ ANGLES = (("alpha_1", "rad"), ("alpha_2", "rad"))
 OF_CCF = 1e-12  # the same of a CCF, a derivative
 PHASES = np.linspace(0, 2 * np.pi, 400)  # at which a gait is drawn
 HATCHED = "error above value"
-RINGS = "joint rates of equal cost"
+RINGS = "joint rates of equal effort"
 SHORT = 0.06  # of the map's width: a shorter bit of a line of zeros is no line
 PATCH = 6  # points of one
 FINER = 4  # points of a line for each of the grid
@@ -182,7 +182,7 @@ def ccf_label(component: int, unit: str, labels: Labels) -> str:
 
 
 def indicatrices(metric: Metric | Finsler, ax, axes: Sequence[np.ndarray], count: int = 7):
-    """Draw rings around ``count`` x ``count`` shapes: rates that cost the same, so that a ring is long in directions in which
+    """Draw rings around ``count`` x ``count`` shapes: rates that take the same effort, so that a ring is long in directions in which
     shape changes cheaply. All have one scale. Return a handle for the legend."""
     from matplotlib.lines import Line2D
 

@@ -55,14 +55,14 @@ def optimum_map(optimum: Optimum, ax=None, gained: Gained | None = None, clim: f
 def stretched_optimum(
     optimum: Optimum, ax=None, gained: Gained | None = None, study: Study | None = None, clim: float | str | None = None
 ):
-    """Draw `optimum_map` on shape space redrawn so that equal lengths cost equal effort. Refusal for a system without a
+    """Draw `optimum_map` on shape space redrawn so that equal lengths take equal effort. Refusal for a system without a
     metric."""
     ax, study, system = axes_of(ax), study or Study(optimum.scene), optimum.scene.system
     gained, plane = gained or gained_ccf(optimum, study), stretch(study.metric)
     effort = "BL" if system.traits.power_degree == 1 else "path length"
     look = {"labels": shape_labels(system), "effort": effort, "clim": clim}
     stretched_map(gained.field, plane, gained.component, ax=ax, **look)
-    ax.set_title(f"the same, stretched to its cost\n(lengths off by {100 * plane.rms:.2g} % rms)")
+    ax.set_title(f"the same, stretched to its effort\n(lengths off by {100 * plane.rms:.2g} % rms)")
     low, high = ([a[k] for a in plane.field.axes] for k in (0, -1))
     draw_start_and_best(optimum, ax, lambda curve: plane(np.clip(curve, low, high)), gained)
     return ax

@@ -1,4 +1,4 @@
-"""The CCF on shape space redrawn so that equal lengths on paper cost equal effort (`geomech.geometry.stretch`)."""
+"""The CCF on shape space redrawn so that equal lengths on paper take equal effort (`geomech.geometry.stretch`)."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def stretched_map(
     clim: float | str | None = None,
 ):  # fmt: skip
     """Draw a component of the CCF over stretched shape space, per area there: an area on paper times the colour is what it
-    adds to the displacement, and the length of a gait is its cost. Lines of constant shape variables are thin, and thick at 0.
+    adds to the displacement, and the length of a gait is its effort. Lines of constant shape variables are thin, and thick at 0.
 
     effort: unit of path length. clim: as for `ccf_figure`, of the values per area there. Other arguments as for `ccf_map`."""
     from cmcrameri import cm
