@@ -182,8 +182,8 @@ def ccf_label(component: int, unit: str, labels: Labels) -> str:
 
 
 def indicatrices(metric: Metric | Finsler, ax, axes: Sequence[np.ndarray], count: int = 7):
-    """Draw rings around ``count`` x ``count`` shapes: rates that take the same effort, so that a ring is long in directions in which
-    shape changes cheaply. All have one scale. Return a handle for the legend."""
+    """Draw rings around ``count`` x ``count`` shapes: rates that take the same effort, so that a ring is long in
+    directions in which shape changes cheaply. All have one scale. Return a handle for the legend."""
     from matplotlib.lines import Line2D
 
     spots = [a[0] + np.ptp(a) * (np.arange(count) + 0.5) / count for a in axes]

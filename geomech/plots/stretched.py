@@ -35,7 +35,8 @@ def stretched_map(
     clim: float | str | None = None,
 ):  # fmt: skip
     """Draw a component of the CCF over stretched shape space, per area there: an area on paper times the colour is what it
-    adds to the displacement, and the length of a gait is its effort. Lines of constant shape variables are thin, and thick at 0.
+    adds to the displacement, and the length of a gait is its effort. Lines of constant shape variables are thin, and
+    thick at 0.
 
     effort: unit of path length. clim: as for `ccf_figure`, of the values per area there. Other arguments as for `ccf_map`."""
     from cmcrameri import cm

@@ -16,30 +16,31 @@ from geomech.studies import tables, uncertainty
 numbers = tables.table
 MORE = "--all prints every tier, the net distance and the seconds"
 FRAME = "x ahead, y to the left, as the body frame points at the start of the cycle"
-ROWS = 14  # of a table that fits a screen
+ROWS, COMPARED = 14, 4  # amplitudes in a table that fits a screen; with x by every tier
 
 
 def text(result: Result, title: str = "", rows: int = ROWS) -> str:
-    """Return x, y and heading per cycle by the most exact tier, each with its error, a word for what is zero, and the errors
-    of the other tiers, in lines that fit a screen. title: the beginning of lines, by default the scene's name. rows: at most so
-    many amplitudes, of more the first, the last and some between."""
+    """Return x, y and heading per cycle by the most exact tier, each with its error, a word for what is zero, and x by the
+    other tiers or their errors, in lines that fit a screen. title: the beginning of lines, by default the scene's name.
+    rows: at most so many amplitudes, of more the first, the last and some between."""
     return "\n".join([*gait_lines(result, title, rows), FRAME])
 
 
 def gait_lines(result: Result, title: str = "", rows: int = ROWS) -> list[str]:
     """Return the lines of `text`, without the one that tells x from y."""
     facts, title = result.attributes, title or result.attributes["name"]
-    tier = exact_tier(result)
-    shown = shown_rows(len(result["amplitude"].values), rows)
-    unit = result["x"].unit
+    tier, unit, shown = exact_tier(result), result["x"].unit, shown_rows(len(result["amplitude"].values), rows)
     lines = [f"{title}: {facts['note']}"] if "note" in facts else []
     lines.append(f"{title}: displacement per cycle ({unit}), {_tier_words(result, tier)}")
     zeros, moving = _zeros(result, tier)
     moving += ["speed"] if "speed" in result else []
-    for columns in _side_by_side([_column(result, tier, name, shown) for name in moving], result, shown):
+    tables = lambda at: list(_side_by_side([_column(result, tier, name, at) for name in moving], result, at))
+    if len(stacked := tables(shown)) > 1:
+        shown = shown_rows(len(result["amplitude"].values), rows // len(stacked))  # tables below each other
+        stacked = tables(shown)
+    for columns in stacked:
         lines += ["".join(cells) for cells in zip(*columns)]
-    lines += zeros
-    lines += _errors(result, tier, unit)
+    lines += [*zeros, *_others(result, tier, shown)]
     if "speed" in result:
         lines.append("speed: net distance, sqrt(x^2 + y^2), times frequency")
     if "medium_error_rule" in result:
@@ -115,14 +116,22 @@ def _side_by_side(columns: list[list[str]], result: Result, shown: np.ndarray) -
         yield group
 
 
-def _errors(result: Result, tier: int, unit: str) -> list[str]:
-    """Return the largest errors of the other tiers, in lines."""
-    others = [
-        f"{name} {result['x'].error[k].max(initial=0.0):.1e}"
-        for k, name in enumerate(result["tier"].values.tolist())
-        if k != tier
-    ]
-    return [f"other tiers, largest error ({unit}): {', '.join(others)}"] if others else []
+def _others(result: Result, tier: int, shown: np.ndarray) -> Iterator[str]:
+    """Yield x by the other tiers with its errors where amplitudes are few, else the largest error of each."""
+    others = [(str(name), k) for k, name in enumerate(result["tier"].values) if k != tier]
+    x, places = result["x"], _decimals(result)
+    if not others:
+        return
+    wide = places + 11
+    if len(shown) > COMPARED or 9 + wide * len(others) > WIDTH or "x" in result.attributes["zero_by_symmetry"]:
+        errors = (f"{name} {x.error[k].max(initial=0.0):.1e}" for name, k in others)
+        yield f"other tiers, largest error ({x.unit}): {', '.join(errors)}"
+        return
+    yield "x by tier" + "".join(f"{name:>{wide}}" for name, _ in others)
+    for row in shown:
+        values, errors = np.round(x.values[:, row], places) + 0.0, x.error[:, row]
+        cells = (f"{values[k]:.{places}f} +-{errors[k]:.0e}" for _, k in others)
+        yield f"{result['amplitude'].values[row]:9.6g}" + "".join(f"{cell:>{wide}}" for cell in cells)
 
 
 def _amplitude(result: Result) -> str:
