@@ -179,9 +179,11 @@ BY_HAND = [pytest.param(x, marks=pytest.mark.soak) for x in (("displacement", 2.
 @pytest.fixture(scope="module", params=[("displacement", 3.0), *BY_HAND], ids=str)
 def sand(request):
     objective, limits = request.param
-    return optimise(geomech.load("three-link-glass"), objective, limits=limits)
+    return optimise(geomech.load("three-link-glass"), objective, limits=limits, starts=STARTS[request.param][0])
 
 
+# By default 9; 7 lead to the same gait. The second are those that narrower limits led to.
+STARTS = {("displacement", 3.0): (7, 3), ("displacement", 2.5): (9, 4), ("efficiency", 2.5): (9, 4)}
 LEAST = {("displacement", 2.5): 0.4415, ("displacement", 3.0): 0.6938, ("efficiency", 2.5): 0.2245}
 
 
@@ -193,9 +195,10 @@ def test_best_gaits_in_sand(sand):
     assert sand.value == sand.answers[0][0]
     assert len(sand.active) == (4 if asked[0] == "displacement" else 2)
     assert np.abs(sand.gait.cycle(20_000)[0]).max() <= asked[1]
-    assert sum(times for _, times in sand.answers + sand.others) == 9 + 4
+    starts, more = STARTS[asked]
+    assert sum(times for _, times in sand.answers + sand.others) == starts + more
     told = optima.text(result_of(sand))
-    assert "9 starts, and 4 that narrower limits led to, answers that differ: " in told
+    assert f"{starts} starts, and {more} that narrower limits led to, answers that differ: " in told
     assert "by a table alone, less: " in told
     assert optima.numbers(result_of(sand))["answers"] == [list(x) for x in sand.answers + sand.others]
 
@@ -419,22 +422,22 @@ def test_a_rate_that_no_gait_can_keep_is_refused_before_the_search():
 @pytest.mark.parametrize(
     ("name", "asked", "said"),
     [
-        ("three-link-viscous", {"objective": "distance"}, "--objective: 'distance' is unknown"),
-        ("three-link-viscous", {"direction": "z"}, "--direction: 'z' is unknown"),
+        ("three-link-viscous", {"objective": "distance"}, "objective: 'distance' is unknown"),
+        ("three-link-viscous", {"direction": "z"}, "direction: 'z' is unknown"),
         ("three-link-viscous", {"objective": "turning", "direction": "x"}, "turning takes none"),
-        ("three-link-viscous", {"harmonics": 0}, "--harmonics must be"),
-        ("three-link-viscous", {"limits": 0.0}, "--limits must be"),
-        ("three-link-viscous", {"starts": 0}, "--starts must be"),
+        ("three-link-viscous", {"harmonics": 0}, "harmonics must be"),
+        ("three-link-viscous", {"limits": 0.0}, "limits must be"),
+        ("three-link-viscous", {"starts": 0}, "starts must be"),
         ("three-link-viscous", {"rate": 1.0}, "limits speed"),
-        ("three-link-viscous", {"objective": "speed", "power": -1.0}, "--power must be"),
+        ("three-link-viscous", {"objective": "speed", "power": -1.0}, "power must be"),
         ("no-slip-snake", {"objective": "efficiency"}, "asks for power"),
         ("no-slip-snake", {"objective": "speed", "power": 1.0}, "asks for power"),
         ("sandfish-heavy", {"objective": "speed"}, "no speed with"),
         ("sandfish-loose", {"harmonics": 3}, "amplitude and waves are sought"),
         ("sandfish-loose", {"limits": 1.0}, "amplitude and waves are sought"),
-        ("sandfish-loose", {"objective": "speed", "rate": 1.0}, "say --power"),
+        ("sandfish-loose", {"objective": "speed", "rate": 1.0}, "say power"),
         ("three-link-floating", {}, "goes nowhere: its mean frame stays"),
-        ("three-link-ideal-fluid", {"objective": "speed", "power": 1.0}, "has none: say --rate"),
+        ("three-link-ideal-fluid", {"objective": "speed", "power": 1.0}, "has none: say rate"),
         ("three-link-viscous", {"limits": [1.0]}, "one for each of 2 joints"),
         ("three-link-viscous", {"limits": [(1.0, 0.0), (-1.0, 1.0)]}, "or as many from low to high"),
         ("sandfish-loose", {"objective": "turning"}, "does not turn"),

@@ -122,7 +122,7 @@ def _others(result: Result, tier: int, shown: np.ndarray) -> Iterator[str]:
     x, places = result["x"], _decimals(result)
     if not others:
         return
-    wide = places + 11
+    wide = places + 12
     if len(shown) > COMPARED or 9 + wide * len(others) > WIDTH or "x" in result.attributes["zero_by_symmetry"]:
         errors = (f"{name} {x.error[k].max(initial=0.0):.1e}" for name, k in others)
         yield f"other tiers, largest error ({x.unit}): {', '.join(errors)}"
