@@ -64,12 +64,6 @@ def strokes():
     """Yield the best strokes of the viscous swimmer."""
     scene = geomech.load("three-link-viscous")
     source = "Ramasamy and Hatton, published optimum"
-<<<<<<< HEAD
-    yield "the same: best stroke for displacement (BL a cycle)", source, _(
-        geomech.optimise(scene, "displacement").value, 4), "0.1035"
-    yield "the same: best stroke for efficiency (BL/BL)", source, _(
-        geomech.optimise(scene, "efficiency").value, 4), "0.1109"
-=======
     yield (
         "the same: best stroke for displacement (BL a cycle)",
         source,
@@ -77,12 +71,11 @@ def strokes():
         "0.1035",
     )
     yield (
-        "the same: best stroke for efficiency (BL per unit of path length)",
+        "the same: best stroke for efficiency (BL/BL)",
         source,
         _(geomech.optimise(scene, "efficiency").value, 4),
         "0.1109",
     )
->>>>>>> main
 
 
 def stress():
