@@ -17,6 +17,7 @@ from rft.refusal import Refusal, require
 
 if TYPE_CHECKING:
     import numpy as np
+from numpy.typing import ArrayLike
 
 
 class Number(NamedTuple):
@@ -55,7 +56,7 @@ def check_numbers(owner: Any) -> None:
                 object.__setattr__(owner, name, int(value))
 
 
-def real_array(name: str, x) -> np.ndarray:
+def real_array(name: str, x: ArrayLike) -> np.ndarray:
     """Return x as an array of floats; ValueError with its name unless it is an array of real numbers."""
     import numpy as np  # a command that refuses starts without it
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -88,7 +88,11 @@ class Study(studies.Study):
         return Displacements(cheapest(self.scene, amplitudes, tolerance, gait).result)
 
     def study(
-        self, amplitudes: Sequence[float], tiers: Sequence[str] | None = None, gait: Gait | None = None, progress=None
+        self,
+        amplitudes: Sequence[float],
+        tiers: Sequence[str] | None = None,
+        gait: Gait | None = None,
+        progress: Callable | None = None,
     ) -> Displacements:
         return Displacements(super().study(amplitudes, tiers, gait, progress).result)
 

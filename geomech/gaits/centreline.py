@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.core.errors import Note, UnitWarning
 from geomech.gaits import frames, midline
@@ -149,10 +150,10 @@ class Centreline(Gait):
                 stacklevel=5,
             )
 
-    def unit(self, t) -> np.ndarray:
+    def unit(self, t: ArrayLike) -> np.ndarray:
         return self._curve(np.asarray(t, float), 0)
 
-    def unit_rate(self, t) -> np.ndarray:
+    def unit_rate(self, t: ArrayLike) -> np.ndarray:
         return self._curve(np.asarray(t, float), 1)
 
     @classmethod

@@ -129,7 +129,7 @@ class Chain:
         heading, rotation, centre, velocity, _ = self._links(alpha, alphadot)
         return Elements.from_complex(heading, centre, velocity, rotation, self._half_lengths)
 
-    def frame_pose(self, frame: str, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
+    def frame_pose(self, frame: str, alpha: np.ndarray, alphadot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the pose h of another frame of this body in the body frame, and dh/dt: each (..., 3), in length units and
         rad.
 
@@ -144,7 +144,7 @@ class Chain:
         h, hdot = (centre.real, centre.imag, theta), (velocity.real, velocity.imag, rotation)
         return np.stack(h, -1), np.stack(hdot, -1)
 
-    def points(self, alpha, pose=(0.0, 0.0, 0.0)) -> np.ndarray:
+    def points(self, alpha: np.ndarray, pose: np.ndarray = (0.0, 0.0, 0.0)) -> np.ndarray:
         """Return the ends of the links in the world, tail to head, (..., links + 1, 2), in length units.
 
         alpha: (..., joints), rad. pose: (..., 3), pose of the body frame in the world, (x, y) in length units, theta in
