@@ -672,5 +672,5 @@ def test_what_accuracy_costs_includes_the_tables_own_error(made, monkeypatch):
     assert all(own < c["error"] <= c["tolerance"] for c in found["cheapest"] if c["tier"])
     assert f"the table's own, {own:.1e} BL" in text.table(found)
     monkeypatch.setattr(choose, "MOST_PHASES", 256)
-    with pytest.raises(Refusal, match="no tier gets to 1e-06 .*: raise --tol, or take a finer table"):
+    with pytest.raises(Refusal, match="no tier gets to 1e-06 .*: raise tolerance, or take a finer table"):
         choose.cheapest(scene, [0.5], 1e-6)

@@ -32,15 +32,15 @@ def text(result: Result) -> str:
 
 def _extremes(ccf: Field, error: Field) -> Iterator[str]:
     """Yield a row a component: least and largest value with their shapes, and the larger error there."""
-    yield f"{'component':18}{'least':>10}  {'at (rad)':>14}{'largest':>12}  {'at (rad)':>14}  {'+- error':>8}"
+    yield f"{'component':16}{'least':>10}  {'at (rad)':>14}{'largest':>12}  {'at (rad)':>14}  {'+- error':>8}"
     for row, values, errors in zip(("x", "y", "theta"), ccf.values, error.values):
         name = f"{row} ({'rad' if row == 'theta' else ccf.unit}/rad2)"
         if np.nanmax(np.abs(values), initial=0.0) < ROUNDING:
-            yield f"{name:18}{'zero':>10}"
+            yield f"{name:16}{'zero':>10}"
             continue
         places = [np.unravel_index(find(values), values.shape) for find in (np.nanargmin, np.nanargmax)]
         cells = (f"{values[at]:10.4g}  {_shape(ccf, at):>14}" for at in places)
-        yield f"{name:18}{'  '.join(cells)}  {max(errors[at] for at in places):8.1e}"
+        yield f"{name:16}{'  '.join(cells)}  {max(errors[at] for at in places):8.1e}"
 
 
 def _shape(field: Field, at: tuple) -> str:
