@@ -17,6 +17,7 @@ from geomech.plots.style import axes_of, figure, quantity, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.colors import ListedColormap
     from matplotlib.figure import Figure
 
 ROUNDING = 1e-13  # of the largest entry of A: a row below it is nothing but rounding
@@ -78,7 +79,7 @@ def vector_field(
     return label_row(ax, arrows, component, connection, labels)
 
 
-def arrow_colours() -> Any:
+def arrow_colours() -> ListedColormap:
     """Return a colour map whose ends are both seen on white, light to dark."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
