@@ -27,7 +27,7 @@ class Series(Gait):
         return self.coefficients()[0].shape[0]
 
     @property
-    def harmonics(self) -> int:
+    def harmonics(self) -> int:  # type: ignore[override]  # of most gaits it is a number of the class
         """The highest harmonic of the series."""
         return self.coefficients()[0].shape[1]
 

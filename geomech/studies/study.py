@@ -6,7 +6,7 @@ import copy
 import sys
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -59,11 +59,11 @@ class Study:
         """Keys (name, system, key) of the tables computed so far."""
         return tuple(self._tables)
 
-    def with_numerics(self, **numerics: Any) -> Study:
+    def with_numerics(self, **numerics: Any) -> Self:
         """Return the study with other [numerics] and the same stored tables; an entry given as None stays as it is."""
         return self._of(self.scene.with_numerics(**numerics))
 
-    def in_frame(self, frame: str) -> Study:
+    def in_frame(self, frame: str) -> Self:
         """Return the study in another body frame; Refusal for an unknown one, or the scene's own."""
         s = self.scene
         with located(s.name):
@@ -72,7 +72,7 @@ class Study:
             system = framed(s.system, s.numerics) if frame == MINIMUM_PERTURBATION else in_frame(s.system, frame)
             return self._of(s.changed(system=system))
 
-    def _of(self, scene: Scene) -> Study:
+    def _of(self, scene: Scene) -> Self:
         """Return the study of another scene with the same stored tables."""
         study = copy.copy(self)
         study.scene = scene
@@ -239,7 +239,7 @@ class Study:
         tiers: Sequence[str] | None = None,
         gait: Gait | None = None,
         progress: Callable | None = None,
-    ) -> dict:
+    ) -> Displacements:
         """Return a table (`geomech.studies.tables.table`) of the net poses by tiers of TIERS (`default_tiers` if
         None), with their errors, and {"seconds": {...}, "kept": [...]} besides.
 
