@@ -37,7 +37,7 @@ LARGE = {
     "values of a sweep": ["sweep", "sandfish-transient", "--over", "medium.C=1:2:99999", "-o", "out.nc"],
     "amplitudes of a sweep": ["sweep", "sandfish-loose", "--over", "gait.amplitude=0.1:2:99999", "-o", "out.nc"],
     "a grid": ["connection", "three-link-glass", "--grid", "1414", "-o", "out.nc"],
-    "a field of four joints": ["connection", "five.toml", "--grid", "36", "-o", "out.nc"],
+    "a field of four joints": ["connection", "finest.toml", "--grid", "36", "-o", "out.nc"],
     "a connection around a gait": ["displacement", "five.toml", "--amplitudes", "0.1:0.5:99999", "--tiers", "path"],
     "a map": ["ccf", "directions.toml", "--grid", "301", "--plot", "out.png"],
     "directions": ["connection", "directions.toml", "-o", "out.nc", "--grid", "301"],
@@ -57,6 +57,7 @@ def large(tmp_path, monkeypatch):
     for name, value in (("directions", 4096), ("harmonics", 999), ("phases", 1_000_000)):
         (tmp_path / f"{name}.toml").write_text(f"{GLASS.text}\n[numerics]\n{name} = {value}\n")
     (tmp_path / "five.toml").write_text(FIVE_LINKS)
+    (tmp_path / "finest.toml").write_text(f"{FIVE_LINKS}[numerics]\ndirections = 128\n")
     fish = scenes.load("sandfish-loose").text
     (tmp_path / "elements.toml").write_text(fish.replace("elements = 100", "elements = 2000"))
     monkeypatch.chdir(tmp_path)
