@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.gaits import Fourier
 from geomech.geometry.reconstruct import displacement
@@ -85,7 +86,7 @@ class Fitted:
         points = int(np.clip(np.ceil(3 * extent / wide), min(31, most), most))
         return tube(self.known, covering_grid(self.known, points), self.residual, self.unit, self.length)
 
-    def along(self, t) -> tuple[np.ndarray, np.ndarray]:
+    def along(self, t: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Return A (T, 3, d) at phases t of the mean gait, and half widths of its interval."""
         known = self.known
         variance = (series(known.errors[:, :, :, 0], t) ** 2).sum(-3) + known.standard_error_at(t) ** 2

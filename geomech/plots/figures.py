@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -36,6 +36,9 @@ from geomech.plots.styles import (
     MINUS_SIGN,
 )
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 SHADOW = "dashed: the gait, seen along the joints that are held here"
 
 
@@ -43,7 +46,7 @@ SHADOW = "dashed: the gait, seen along the joints that are held here"
 def connection_figure(
     connection: Connection, *, labels: Labels = ANGLES, style: str = "quiver",
     beside: Connection | None = None, names: Sequence[str] = (), components: Sequence[str] = (),
-):  # fmt: skip
+) -> Figure:  # fmt: skip
     """Draw the rows of A side by side, but for those that are zero everywhere, as arrows ("quiver") or "streamlines".
 
     beside: the connection in another body frame, drawn below on the same scales. names: of the two frames. components:
@@ -65,7 +68,7 @@ def connection_figure(
 
 
 @styled
-def pairs_figure(form: TwoForm, at: Sequence[float], component: int = 0, *, labels: Labels | None = None):
+def pairs_figure(form: TwoForm, at: Sequence[float], component: int = 0, *, labels: Labels | None = None) -> Figure:
     """Draw one component of the CCF of all pairs of joints, on the planes through the shape ``at`` (d,), on one scale.
 
     labels: (name, unit) of each shape variable."""
@@ -104,7 +107,7 @@ def ccf_figure(
     field: Field, gaits: Sequence[Gait] = (), *, error: Field | None = None, labels: Labels = ANGLES,
     style: str = "map", metric: Metric | Finsler | None = None, beside: tuple[Field, Field | None] | None = None,
     names: Sequence[str] = (), components: Sequence[str] = (), clim: float | str | None = None,
-):  # fmt: skip
+) -> Figure:  # fmt: skip
     """Draw the components of the CCF side by side with gaits on them, but for those that are zero everywhere, as colours
     ("map"), "contours" or a "surface".
 
@@ -120,7 +123,7 @@ def planes_figure(
     planes: Sequence[Plane], gait: Gait | None = None, *, labels: Labels | None = None, style: str = "map",
     beside: Plane | None = None, names: Sequence[str] = (), components: Sequence[str] = (),
     clim: float | str | None = None,
-):  # fmt: skip
+) -> Figure:  # fmt: skip
     """Draw the CCF of pairs of joints on planes of shape space, a row for each pair, as `ccf_figure` does.
 
     gait: of all joints; where it leaves the plane it is dashed, as it is seen along the fixed joints, and has no area. labels:
@@ -139,7 +142,7 @@ def planes_figure(
 @styled
 def plane_connection_figure(
     planes: Sequence[Plane], *, labels: Labels | None = None, style: str = "quiver", components: Sequence[str] = ()
-):  # fmt: skip
+) -> Figure:  # fmt: skip
     """Draw the rows of A of the two joints that move, on planes of shape space, a row for each pair, as `connection_figure`
     does.
 

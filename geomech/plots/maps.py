@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,7 +16,9 @@ from geomech.geometry.metric import Finsler, Metric
 from geomech.plots.style import axes_of, figure, quantity, styled
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.colors import ListedColormap
+    from matplotlib.figure import Figure
 
 ROUNDING = 1e-13  # of the largest entry of A: a row below it is nothing but rounding
 COMPONENTS = ("x", "y", r"\theta")
@@ -35,7 +37,7 @@ ARROWS, LONGEST = 13, 1.5  # arrows along an axis; the longest, in units of thei
 FINEST = 400  # grid points along an axis of a map: about the dots of its picture
 
 
-def shape_space(ax, axes: Sequence[np.ndarray], labels: Labels = ANGLES):
+def shape_space(ax: Axes, axes: Sequence[np.ndarray], labels: Labels = ANGLES) -> Axes:
     """Label a plane of two shape variables and set it to the grid. labels: (name, unit) of each."""
     ax.set(
         xlabel=quantity(*labels[0]), ylabel=quantity(*labels[1]), aspect="equal",
@@ -49,11 +51,11 @@ def vector_field(
     connection: Connection,
     component: int = 0,
     *,
-    ax=None,
+    ax: Axes | None = None,
     every: int | None = None,
     labels: Labels = ANGLES,
     top: float | None = None,
-):
+) -> Axes:
     """Draw row ``component`` of A as arrows over shape space (Fig. 11(c)); colour repeats their length.
 
     labels: as for `shape_space`. top: of the colours and of the arrows' scale, for maps that are compared."""
@@ -124,9 +126,9 @@ def has(field: Field, component: int) -> bool:
 
 @styled
 def ccf_map(
-    field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax=None, error: Field | None = None,
+    field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax: Axes | None = None, error: Field | None = None,
     labels: Labels = ANGLES, legend: bool = True, metric: Metric | Finsler | None = None, top: float | None = None,
-):  # fmt: skip
+) -> Axes:  # fmt: skip
     """Draw a component of the CCF over shape space with gaits on it (Fig. 11(d)), as far as the field goes; the colours are
     centred on zero. A component that is rounding alone is drawn as zero.
 
@@ -185,9 +187,9 @@ def ccf_label(component: int, unit: str, labels: Labels) -> str:
     return f"{ccf_name(component)} ({unit_of(component, unit)}/{per})"
 
 
-def indicatrices(metric: Metric | Finsler, ax, axes: Sequence[np.ndarray], count: int = 7):
-    """Draw rings around ``count`` x ``count`` shapes: rates that take the same effort, so that a ring is long in
-    directions in which shape changes cheaply. All have one scale. Return a handle for the legend."""
+def indicatrices(metric: Metric | Finsler, ax: Axes, axes: Sequence[np.ndarray], count: int = 7) -> Any:
+    """Draw rings around ``count`` x ``count`` shapes: rates that take the same effort, so that a ring is long in directions in
+    which shape changes cheaply. All have one scale. Return a handle for the legend."""
     from matplotlib.lines import Line2D
 
     spots = [a[0] + np.ptp(a) * (np.arange(count) + 0.5) / count for a in axes]
@@ -310,7 +312,13 @@ def certain(values: np.ndarray, error: np.ndarray) -> np.ndarray:
 
 
 @styled
-def draw_gait(gait: Gait, ax=None, color: str = "black", within: Sequence[np.ndarray] | None = None, line: str = "-"):
+def draw_gait(
+    gait: Gait,
+    ax: Axes | None = None,
+    color: str = "black",
+    within: Sequence[np.ndarray] | None = None,
+    line: str = "-",
+) -> Axes:
     """Draw the gait's curve with a dot at its start and an arrow along it, as far as it lies within the axes of a grid.
 
     line: its style."""
@@ -336,7 +344,7 @@ def inside_of(curve: np.ndarray, axes: Sequence[np.ndarray]) -> np.ndarray:
 
 
 @styled
-def frame_figure(pose: Field, *, labels: Labels = ANGLES):
+def frame_figure(pose: Field, *, labels: Labels = ANGLES) -> Figure:
     """Draw the pose of a body frame in another over shape space: x, y and heading side by side, colours centred on zero."""
     from cmcrameri import cm
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from geomech.geometry.stretch import stretch
@@ -12,6 +14,10 @@ from geomech.plots.stretched import stretched_map
 from geomech.plots.style import axes_of, figure, quantity, styled
 from geomech.studies.study import Study
 from geomech.systems.base import shape_labels
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 LONG = 12  # letters of a name: a legend of longer ones has a line for each
 LIMITS = {  # of a loop: colour, text
@@ -29,7 +35,9 @@ RESIDUAL = {
 
 
 @styled
-def optimum_map(optimum: Optimum, ax=None, gained: Gained | None = None, clim: float | str | None = None):
+def optimum_map(
+    optimum: Optimum, ax: Axes | None = None, gained: Gained | None = None, clim: float | str | None = None
+) -> Axes:
     """Draw the best loop on the map of `gained_ccf`, coloured by what limits it; the start dashed. Sign and colours are those
     of `ccf_figure` in the same frame. Where the velocity does not follow from shape alone there is no CCF, and the map has the
     loop alone.
@@ -96,7 +104,7 @@ def draw_limited(ax, curve: np.ndarray, kinds: np.ndarray, nonlinear: bool = Fal
 
 
 @styled
-def optimum_angles(optimum: Optimum, ax=None):
+def optimum_angles(optimum: Optimum, ax: Axes | None = None) -> Axes:
     """Draw the shape variables of the best gait over a cycle, and the limits."""
     ax, gait = axes_of(ax, 4.0, 3.4), optimum.gait
     t = np.linspace(0, 2 * np.pi, PHASES)
@@ -118,7 +126,7 @@ def optimum_angles(optimum: Optimum, ax=None):
 
 
 @styled
-def optimum_figure(optimum: Optimum, stretched: bool = False, *, clim: float | str | None = None):
+def optimum_figure(optimum: Optimum, stretched: bool = False, *, clim: float | str | None = None) -> Figure:
     """Draw `optimum_map` and `optimum_angles` side by side; the angles alone where there are not two joints. stretched:
     `stretched_optimum` between them. clim: as for `ccf_figure`."""
     system, study = optimum.scene.system, Study(optimum.scene)

@@ -7,10 +7,13 @@ import inspect
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, get_origin, get_type_hints
 
 from geomech.io.files import atomic_file
 from rft.refusal import Refusal
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 GREEK = ("alpha", "gamma", "theta")  # letters that names of shape variables and parameters begin with
 MARKED = 40  # points of a line up to which each has its marker
@@ -141,7 +144,7 @@ def check_format(path: str | Path) -> Path:
 
 
 @styled
-def save(fig, *paths: str | Path) -> None:
+def save(fig: Figure, *paths: str | Path) -> None:
     """Write a figure, or that of Axes, to files, each of which appears whole or not at all. The figure is laid out once and
     drawn once for each file, where `savefig` lays out and draws twice for each."""
     fig = getattr(fig, "figure", fig)

@@ -26,7 +26,7 @@ FINEST_PIECES = 640  # of body, for a tolerance
 
 def cheapest(
     scene: Scene, amplitudes: Sequence[float], tol: float, gait: Gait | None = None, ask: Callable = lambda jobs: None
-) -> dict:
+) -> Displacements:
     """Return a table as of `Study.study` for the cheapest tier with errors of position of at most ``tol`` body lengths,
     with {"tier", "tolerance", "settings"} besides.
 
@@ -50,7 +50,7 @@ def cheapest(
     ask(cost.of_medium(scene, gait, len(amplitudes)))
     medium = uncertainty.of_medium(scene, gait, amplitudes)
 
-    def answer(tier: str, poses, error, settings: dict) -> dict:
+    def answer(tier: str, poses, error, settings: dict) -> Displacements:
         attributes = {
             "tier": tier,
             "tolerance": float(tol),
