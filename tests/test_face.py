@@ -122,9 +122,7 @@ def test_functions_take_whatever_makes_a_scene(study):
 
 def test_a_medium_is_fitted_to_drag(tmp_path):
     sand = geomech.fit_medium("dem-rod-drag")
-    assert (
-        sand.medium.C == pytest.approx(1.49, abs=0.01) and "granular law" in repr(sand)
-    )
+    assert sand.medium.C == pytest.approx(1.49, abs=0.01) and "granular law" in repr(sand)
     sand.save(tmp_path / "sand.toml")
     assert as_scene(str(tmp_path / "sand.toml"), CHAIN).system.medium.C == pytest.approx(sand.medium.C)
     assert sand.plot().axes

@@ -79,4 +79,3 @@ class FittedMedium:
     def save(self, path: str | Path) -> None:
         """Write a medium's file, which a scene names as [medium] file."""
         parts.write_medium(self.result, Path(path))
-

@@ -7,7 +7,6 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands import formats
 from geomech.commands.loading import load_scene
 from geomech.commands.options import (
     ComponentOption,
@@ -56,10 +55,8 @@ def connection(
     from geomech.output import parts, pictures
     from geomech.studies.shape_space import connection
 
-    ending = "" if out is None else out.suffix
-    file = parts.Connection(ending, sign, order)
+    file = parts.Connection(out, sign, order)
     drawn = pictures.Connection(style, plot, pair, slice_, other_frame, components(component))
     scene = load_scene(name, grid, extent)
-    question = connection(scene, ending, plot is not None, pair, angles(scene, "--slice", slice_), other_frame)
-    outputs = Output(out, file, formats.netcdf_or_matlab), Output(plot, drawn, pictures.check)
-    execute(question, *outputs, yes=yes)
+    question = connection(scene, file.format, plot is not None, pair, angles(scene, "--slice", slice_), other_frame)
+    execute(question, Output(out, file), Output(plot, drawn, pictures.check), yes=yes)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from geomech.core.errors import choose
+from geomech.core.summary import listed
 from geomech.gaits import Gait
 from geomech.geometry.symmetry import zero_components
 from geomech.plots.style import axes_of, figure, shared_legend, styled
@@ -20,7 +21,7 @@ BAND, EDGE = "#E69F00", "#A66F00"  # of the medium: its area and its outline
 ERROR, MEDIUM, MEASURED = "estimated error, in the tier's colour", "medium, one standard deviation", "measured"
 PANELS = {"x": "x", "y": "y", "theta": "heading", "distance": "net_distance"}  # by the words of --component
 ROUNDING = 1e-9  # body lengths or rad: below it a displacement is nothing
-TO_ROUNDING = "it is below 1e-9 by every tier"
+TO_ROUNDING = "every tier has less than 1e-9"
 
 
 @styled
@@ -39,7 +40,8 @@ def displacement(
         if name in table:
             title = f"{label}, {tier.label}" if label else tier.label
             values = of_pose(table[name])[quantity]
-            ax.plot(amplitudes, values, label=title, **{**tier.style, **style})
+            broad = {"ms": 2 * tier.style.get("linewidth", 1.5)} if len(amplitudes) == 1 else {}  # one point is no line
+            ax.plot(amplitudes, values, label=title, **{**tier.style, **broad, **style})
             if errors:
                 _error_band(ax, amplitudes, values, error_of(table, quantity, name), tier.colour)
     if errors:
@@ -118,12 +120,12 @@ def displacement_figure(
     zero = [{} if wanted else _zeros(table, gait, system) for table, gait in zip(tables.values(), gaits)]
     if data is not None and not wanted:
         zero[0].pop("x", None)
-    panels = wanted or [q for q in QUANTITIES if not all(q in one for one in zero)]
+    panels = wanted or [q for q in QUANTITIES if not all(q in one for one in zero)] or [*QUANTITIES]
     alone = len(panels) == 1  # with its legend at the right
     fig, axes = figure(2.7 * (len(panels) + alone) + 0.3, 0.5 + 2.5 * len(tables), len(panels), len(tables))
     for row, (name, table), gait, absent in zip(axes, tables.items(), gaits, zero):
         for ax, quantity in zip(row, panels):
-            if quantity in absent:
+            if quantity in absent and len(absent) < len(QUANTITIES):
                 _say_zero(ax, quantity, absent[quantity])
                 continue
             measurements = data if ax is axes[0, 0] else None  # x is never left out beside them
@@ -133,9 +135,16 @@ def displacement_figure(
             _speed_axis(row[-1], table["frequency"], unit_of(table, "x"))
     fig.get_layout_engine().set(rect=(0.0, 0.0, 0.985, 1.0))  # the last labels are wider than their axes
     shared_legend(fig, "outside right center" if alone else "outside upper center")
-    if lines := [f"{q}: zero, as {zero[0][q]}" for q in QUANTITIES if q not in panels and not wanted]:
-        fig.supxlabel("; ".join(lines), fontsize=8, color="0.3")
+    if not wanted:
+        fig.supxlabel(_left_out({q: why for q, why in zero[0].items() if q not in panels}), fontsize=8, color="0.3")
     return fig
+
+
+def _left_out(zero: Mapping[str, str]) -> str:
+    """Return lines that say which quantities are zero, and why."""
+    reasons = dict.fromkeys(zero.values())
+    names = {why: [q.replace("_", " ") for q in QUANTITIES if zero.get(q) == why] for why in reasons}
+    return "\n".join(f"{listed(some)}: zero, as {why}" for why, some in names.items())
 
 
 def _zeros(table: Mapping, gait: Gait, system: System | None) -> dict[str, str]:
@@ -143,10 +152,8 @@ def _zeros(table: Mapping, gait: Gait, system: System | None) -> dict[str, str]:
     scene: Any = getattr(table, "scene", None)
     system, poses = system or (scene and scene.system), np.concatenate([table[t] for t in TIERS if t in table])
     least = {q: ROUNDING * (1.0 if q == "heading" else table.get("body_length", 1.0)) for q in QUANTITIES}
-    nothing = {
-        q: TO_ROUNDING for q, x in of_pose(poses).items() if q != "net_distance" and np.all(np.abs(x) <= least[q])
-    }
-    return nothing | (zero_components(system.traits, gait) if system else {})
+    nothing = {q: TO_ROUNDING for q, x in of_pose(poses).items() if np.all(np.abs(x) <= least[q])}
+    return nothing | (zero_components(system.traits, gait, table["amplitude"]) if system else {})
 
 
 def _say_zero(ax, quantity: str, why: str) -> None:

@@ -181,6 +181,7 @@ def _ccf_rows(rows: Sequence[Row], style: str, metric, names: Sequence[str], sam
         fig.get_layout_engine().set(w_pad=0.25)
     else:
         fig, axes = figure(0.3 + 3.5 * count, 3.2 + 2.75 * (len(rows) - 1), count, len(rows), layout="compressed")
+        fig.get_layout_engine().set(rect=(0.0, 0.0, 0.97 if len(rows) > 1 else 1.0, 1.0))  # room for the widest labels
     more = {"metric": metric} if style == "map" else {}
     for k, component in enumerate(panels):
         tops = [limit_of(r.field.values[component], clim) if has(r.field, component) else None for r in rows]
@@ -193,22 +194,22 @@ def _ccf_rows(rows: Sequence[Row], style: str, metric, names: Sequence[str], sam
                     ax.plot(*shadow.shape(PHASES).T, ax.get_zlim()[0], "--", color="black", lw=1.0)
                 else:
                     draw_gait(shadow, ax, within=r.field.axes, line="--")
-    if style == "map":
-        _one_legend(fig, axes)
     say_left_out(fig, panels, components, ccf_name, *([SHADOW] if any(r.shadows for r in rows) else []))
+    if style == "map":
+        _one_legend(fig, axes, "upper" if fig.get_supxlabel() else "lower")
     _name(axes, names)
     return fig
 
 
-def _one_legend(fig, axes) -> None:
-    """Put the legends of maps, which explain the same, into one below them."""
+def _one_legend(fig, axes, where: str) -> None:
+    """Put the legends of maps, which explain the same, into one, "upper" or "lower"."""
     handles = {}
     for ax in axes.flat:
         if (legend := ax.get_legend()) is not None:
             handles |= {h.get_label(): h for h in legend.legend_handles}
             legend.remove()
     if handles:
-        fig.legend(handles=[*handles.values()], loc="outside lower center", ncols=len(handles))
+        fig.legend(handles=[*handles.values()], loc=f"outside {where} center", ncols=len(handles))
 
 
 def _name(axes, names: Sequence[str]) -> None:
