@@ -8,11 +8,10 @@ import pytest
 from commands import geomech
 from scipy.special import ellipe
 
-from geomech import scenes
+from geomech import Study, scenes
 from geomech.core.errors import Note, UnitWarning
 from geomech.gaits import Centreline, Sine
 from geomech.gaits.waves import arc_to_phase
-from geomech.studies.study import Study
 from geomech.studies.sweep import Sweep
 from rft import Backbone
 from rft.refusal import Refusal
