@@ -8,17 +8,17 @@ HERE = Path(__file__).parent
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", NO_COLOR="1")
 sys.path[:0] = [str(HERE), str(HERE.parent)]  # the extensions of this folder; `figures` is no package of the wheel
 
-import geomech
+import geomech  # noqa: E402
 
 project = "geomech"
 author = "the geomech maintainers"
 project_copyright = "the geomech maintainers"
 version = release = geomech.__version__
 language = "en_GB"
+smartquotes = False  # `--option` is no dash
 
 extensions = [
     "sphinx.ext.autodoc",
-    "sphinx.ext.autosummary",
     "numpydoc",
     "myst_nb",
     "sphinx_design",
@@ -30,12 +30,12 @@ nitpicky = True
 nitpick_ignore_regex = [("py:.*", ".*")]  # types in signatures; links of prose are checked by MyST, glossary terms here
 default_role = "code"
 
-autosummary_generate = False
-autodoc_default_options = {"members": True, "member-order": "bysource", "show-inheritance": False}
+autodoc_default_options = {"members": True, "member-order": "bysource"}
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"
 autodoc_class_signature = "mixed"
 autodoc_preserve_defaults = True
+toc_object_entries_show_parents = "hide"
 python_maximum_signature_line_length = 88
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
@@ -54,13 +54,16 @@ html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_show_sourcelink = False
 html_copy_source = False
+ALONE = ("index", "start", "tiers", "validation", "glossary", "changelog", "citing")
+html_sidebars = {page: [] for page in ALONE}
 html_context = {"default_mode": "light"}
 html_theme_options = {
     "logo": {"text": "geomech"},
     "navigation_with_keys": False,
     "show_prev_next": False,
     "navbar_align": "left",
-    "header_links_before_dropdown": 8,
+    "header_links_before_dropdown": 10,
+    "show_toc_level": 2,
     "secondary_sidebar_items": ["page-toc"],
     "footer_start": ["copyright"],
     "footer_end": [],

@@ -30,7 +30,7 @@ def _version(requested: bool) -> None:
 @app.callback()
 def geomech(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="print the version and exit")
     ] = False,
     plugin: PluginOption = None,
 ):

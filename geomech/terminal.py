@@ -23,7 +23,7 @@ import typer
 from geomech.core.errors import Note
 from geomech.run import BELOW
 from geomech.run.progress import progress
-from rft.refusal import line, printable
+from rft.refusal import Refusal, line, printable
 
 __all__ = ["Stopped", "exit_code", "progress", "report", "stoppable"]
 
@@ -148,7 +148,7 @@ def _run_noting(app: typer.Typer, argv: list[str], notes: dict[str, str]) -> int
     except BrokenPipeError:
         return _pipe_closed()
     except Exception as error:
-        text = line(error.format_message()) if hasattr(error, "format_message") else str(error)
+        text = line(error.format_message()) if hasattr(error, "format_message") else _said(error)
         if not isinstance(error, (ValueError, OSError, RuntimeError)) and not hasattr(error, "format_message"):
             raise
         if isinstance(error, OSError):
@@ -157,6 +157,15 @@ def _run_noting(app: typer.Typer, argv: list[str], notes: dict[str, str]) -> int
         if isinstance(error, OSError):
             _discard(sys.stdout)
     return 2
+
+
+OPTIONS = {"tolerance": "--tol"}  # whose name is not that of the argument
+
+
+def _said(error: Exception) -> str:
+    """Return the line of an error, with options for the arguments that it names."""
+    option = lambda argument: OPTIONS.get(argument) or "--" + argument.replace("_", "-")
+    return error.said(option) if isinstance(error, Refusal) else str(error)
 
 
 def _system_error(error: OSError) -> str:

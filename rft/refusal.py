@@ -8,15 +8,18 @@ from __future__ import annotations
 import contextlib
 import re
 import unicodedata
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
+
+ARGUMENT = re.compile("`([a-z_]+)`")  # in the words of a refusal
 
 
 class Refusal(ValueError):
     """A request, scene, file or argument that makes no sense.
 
     what: says what is wrong. value: what was given, where that tells more. where: the way there, outermost first (file or
-    scene, table, key, option). because: why it cannot be. instead: what to give or to do.
+    scene, table, key, argument). because: why it cannot be. instead: what to give or to do. The name of an argument
+    stands in backticks: Python shows it bare, and a command as its option (`said`).
     """
 
     def __init__(self, what: str, *, value: Any = ..., where: Any = (), because: str = "", instead: str = ""):
@@ -25,10 +28,15 @@ class Refusal(ValueError):
         self.where = tuple(map(str, where if isinstance(where, tuple) else (where,)))
 
     def __str__(self) -> str:
-        text = self.what if self.value is ... else f"{self.what}, got {formatted(self.value)}"
-        if reasons := "; ".join(filter(None, (self.because, self.instead))):
+        return self.said(lambda argument: argument)
+
+    def said(self, spelled: Callable[[str], str]) -> str:
+        """Return the refusal as a line. spelled: returns what a reader types for the name of an argument."""
+        named = lambda words: ARGUMENT.sub(lambda match: spelled(match[1]), words)
+        text = named(self.what) if self.value is ... else f"{named(self.what)}, got {formatted(self.value)}"
+        if reasons := "; ".join(named(x) for x in (self.because, self.instead) if x):
             text = f"{text}: {reasons}"
-        for place in reversed(self.where):
+        for place in map(named, reversed(self.where)):
             text = f"{place} {text}" if place.endswith("]") else f"{place}: {text}"
         return line(text)
 

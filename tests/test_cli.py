@@ -92,9 +92,9 @@ def test_displacement_to_a_tolerance():
     assert {len(answer[key][answer["tier"]]) for key in ("estimate", "estimate_heading", "net_distance")} == {2}
     plain = ("displacement", "three-link-glass", "--amplitudes", "0.5,1.0", "--tiers", "direct", "--json")
     without = json.loads(geomech(*plain)[1])  # of one form, whether a tolerance is asked for or not
-    assert set(answer) - set(without) == {"tier", "settings"} and set(without) - set(answer) == {"kept"}
+    assert set(answer) - set(without) == {"tier", "tolerance", "settings"} and set(without) - set(answer) == {"kept"}
     assert all(type(answer[k]) is type(without[k]) for k in without if k != "kept")
-    assert answer["units"] == without["units"]
+    assert answer["units"] == {**without["units"], "tolerance": "BL"}
     code, out, _ = geomech("displacement", "three-link-viscous", "--amplitudes", "1", "--tol", "1e-9")
     assert code == 0
     assert "direct" in out
@@ -144,12 +144,15 @@ def test_run_leaves_everything(undrawn, tmp_path):
         run = {"circle": glass.gait, "butterfly": scenes.load("butterfly-glass").gait}[gait]
         wanted = Study(glass).poses("direct", run, np.array(table["amplitude"]))
         np.testing.assert_allclose(table["direct"], wanted, atol=1e-9)
-        assert f"{abs(plots.net(wanted)[-1]):.6f}" in out
-        assert f"{abs(wanted[-1, 1]):.6f}" in out  # of a circle it is nothing but rounding, of either sign
+        assert f"{wanted[-1, 0]:.6f}  +-" in out
         assert ("note" in table) == (gait == "butterfly")
     assert tables["circle"]["amplitude"] == [0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5]
     assert tables["butterfly"]["amplitude"] == [k / 10 for k in range(1, 14)]
-    assert "butterfly: not in the scene: added because" in out and "circle: not in" not in out
+    assert (
+        "butterfly: not in the scene, added to compare" in out
+        and "\ny and heading: zero by symmetry\n" in out
+        and "circle: not in" not in out
+    )
     assert (tmp_path / "deep" / "dir" / "scene.toml").read_text() == glass.text
 
 
@@ -226,7 +229,7 @@ BACKBONE = '[medium]\nname = "coulomb"\n[body]\nkind = "backbone"\nelements = 8\
 def quick(monkeypatch):
     """`run` and `accuracy` without their numbers."""
 
-    def write(result, folder):
+    def write(result, folder, drawn=None):
         for name in (report.SCENE, report.TABLES):
             (folder / name).write_text(result.subject.text if name == report.SCENE else "{}")
 

@@ -74,7 +74,7 @@ def test_what_makes_no_scene_is_refused(parts, says):
 def test_a_table_of_displacements_prints_and_plots_itself(study):
     table = study.displacement([0.5, 1.0], "direct")
     assert_allclose(table["direct"], study.poses("direct", amplitudes=[0.5, 1.0]), atol=1e-5)
-    assert "displacement per cycle (BL) +- estimated error" in repr(table) and "<table>" in table._repr_html_()
+    assert "displacement per cycle (BL), direct tier" in repr(table) and "<table>" in table._repr_html_()
     (line, *_), ax = table.plot().lines, table.plot()
     assert_allclose(line.get_ydata(), table["net_distance"]["direct"])
     assert (ax.get_ylabel(), ax.get_xlabel()) == ("net distance per cycle (BL)", "radius of the circle (rad)")
@@ -122,9 +122,7 @@ def test_functions_take_whatever_makes_a_scene(study):
 
 def test_a_medium_is_fitted_to_drag(tmp_path):
     sand = geomech.fit_medium("dem-rod-drag")
-    assert (
-        sand.medium.C == pytest.approx(1.49, abs=0.01) and "granular law" in repr(sand) and "<p>" in sand._repr_html_()
-    )
+    assert sand.medium.C == pytest.approx(1.49, abs=0.01) and "granular law" in repr(sand)
     sand.save(tmp_path / "sand.toml")
     assert as_scene(str(tmp_path / "sand.toml"), CHAIN).system.medium.C == pytest.approx(sand.medium.C)
     assert sand.plot().axes

@@ -13,7 +13,7 @@ from test_mjcf import SCENE as WALKER
 from geomech import scenes
 from geomech.io import files, tables
 from geomech.io.tables.mat import ABOUT
-from geomech.output import display, mat
+from geomech.output import display
 from geomech.run import progress
 from geomech.scenes import Numerics, Scene
 from geomech.studies import fields, sweep
@@ -55,7 +55,7 @@ def stored(tmp_path_factory):
     folder = tmp_path_factory.mktemp("tables")
     bench = Study(scenes.load("three-link-viscous").with_numerics(grid=7))
     fields.save_connection(folder / "a.nc", bench)
-    mat.save_connection(folder / "a.mat", bench)
+    fields.save_connection(folder / "a.mat", bench)
     return folder
 
 

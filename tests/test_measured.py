@@ -29,7 +29,6 @@ from geomech.io import tables
 from geomech.io.results import write_netcdf
 from geomech.io.tables.mat import ERROR
 from geomech.measured import cycles, phase, regression, results, smooth, synthetic, unknowns
-from geomech.output import mat
 from geomech.scenes import Scene, load
 from geomech.studies import fields
 from geomech.studies.single import single
@@ -630,7 +629,7 @@ def test_a_field_written_again_keeps_every_digit(field, tmp_path):
 def test_errors_of_A_go_with_it_into_a_mat_file(field, tmp_path, sign, order):
     """Nan where A is, which leaves nothing to look up."""
     study = Study(load(field / "mine.toml"))
-    mat.save_connection(tmp_path / "a.mat", study, sign, order)
+    fields.save_connection(tmp_path / "a.mat", study, sign=sign, order=order)
     first = xarray.open_dataset(field / "field.nc", engine="scipy")
     error = loadmat(tmp_path / "a.mat")[ERROR]
     np.testing.assert_array_equal(error if order == "ndgrid" else error.swapaxes(-1, -2), first.A_error)
@@ -809,13 +808,13 @@ BAD = {
     "nine": (lambda r: r[: 9 * 30 + 15], "7 whole cycles, .*, are too few: give at least 10 in all"),
     "unsorted": (swapped, "line 103: t = .* comes after .*: sort the rows by time"),
     "twice": (changed(0, lambda t: t[0] + 0 * t, slice(99, 101)), "line 102: t = .* is given twice: keep one"),
-    "degrees": (changed(slice(1, 3), np.degrees), "line .*: alpha_1 reaches .* where joint angles are in rad: say --degrees"),
+    "degrees": (changed(slice(1, 3), np.degrees), "line .*: alpha_1 reaches .* where joint angles are in rad: say degrees"),
     "heading in degrees": (
-        changed(5, lambda x: np.degrees(x) % 360), "line .*: heading jumps by .*, a turn in degrees: say --degrees",
+        changed(5, lambda x: np.degrees(x) % 360), "line .*: heading jumps by .*, a turn in degrees: say degrees",
     ),
-    "one joint twice": (twice, "alpha_2 is 1 times alpha_1, .*: one shape variable recorded 2 times .*, by --columns"),
+    "one joint twice": (twice, "alpha_2 is 1 times alpha_1, .*: one shape variable recorded 2 times .*, by columns"),
     "one joint scaled": (scaled, "alpha_2 is -0.5 times alpha_1, but for a constant and noise"),
-    "idle": (idle, "alpha_2 does not move beyond its noise: leave it out with --columns"),
+    "idle": (idle, "alpha_2 does not move beyond its noise: leave it out with columns"),
     "drift": (drifting, "alpha_2 drifts from 0.1.* to 0.8.* over the log and swings by .*: .*; leave it out"),
     "kilometres": (changed(slice(3, 5), lambda x: 1e12 * x), "entries of A come out as large as .*: give x and y in body"),
     "constant": (changed(2, lambda x: 0 * x + 0.4), "alpha_2 does not move"),
@@ -851,7 +850,7 @@ def test_bad_logs_get_one_line(name, short, tmp_path):
         (("t", "alpha_1", "bend", "x", "y", "heading"), (), "one column of joint angles, and a gait is a loop"),
         (("t", "alpha_1", "alpha_1", "x", "y", "heading"), (), "column 'alpha_1' is there twice"),
         (NAMES, ("t", "alpha_1", "alpha_3", "x", "y", "heading"), "no column 'alpha_3'"),
-        (NAMES, ("t", "alpha_1", "x", "y", "heading"), "--columns are those of t, two joint angles or more"),
+        (NAMES, ("t", "alpha_1", "x", "y", "heading"), "columns are those of t, two joint angles or more"),
     ],
 )
 def test_missing_columns_are_named(names, columns, said, short, tmp_path):

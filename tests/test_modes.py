@@ -12,7 +12,6 @@ from geomech import scenes
 from geomech.gaits import Circle, Fourier, Wave
 from geomech.geometry import connection, curvature
 from geomech.geometry.coordinates import change_velocity
-from geomech.output import mat
 from geomech.scenes import Scene
 from geomech.studies import fields, sweep
 from geomech.studies.available import tiers
@@ -281,11 +280,10 @@ def test_waves_that_make_no_gait_are_refused(wrong, said):
 def test_a_table_keeps_the_names_of_modes(tmp_path, ending):
     scene = Scene(Swimmer(SAND, MODES), Circle(amplitude=0.4)).with_numerics(grid=5, extent=0.6, phases=16)
     study = Study(scene)
-    save = {"nc": fields.save_connection, "mat": mat.save_connection}[ending]
-    save(tmp_path / f"modes.{ending}", study)
+    fields.save_connection(tmp_path / f"modes.{ending}", study)
     again = Table(tmp_path / f"modes.{ending}")
     assert shape_labels(again) == (("m_1", "rad"), ("m_2", "rad"))
-    save(tmp_path / f"twice.{ending}", Study(Scene(again, Circle())))
+    fields.save_connection(tmp_path / f"twice.{ending}", Study(Scene(again, Circle())))
     assert shape_labels(Table(tmp_path / f"twice.{ending}")) == shape_labels(again)
     with pytest.raises(ValueError, match="m_1 = .* lies outside"):
         refuse_outside(Scene(again, Circle(amplitude=9.0)))

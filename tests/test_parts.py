@@ -125,7 +125,13 @@ import json
 from geomech.geometry.connection import Connection
 from geomech.io.tables import FORMATS, Stored
 
-@FORMATS.register(suffix=".json")
+def write(path, result, sign="+"):
+    A = (1 if sign == "+" else -1) * result["A"].values
+    axes = [result[f"alpha_{k + 1}"].values.tolist() for k in range(A.shape[1])]
+    with open(path, "w") as file:
+        json.dump({"axes": axes, "A": A.tolist()}, file)
+
+@FORMATS.register(suffix=".json", write=write, settings=("sign",), joints=2, whole=False)
 def parse(raw, sign, order, sha256):
     told = json.loads(raw)
     axes, A = tuple(np.array(a) for a in told["axes"]), np.array(told["A"])
@@ -171,6 +177,23 @@ def test_commands_use_one_of_each(name):
         assert code == 0, err
     code, out, err = geomech("explain", f"{name}.toml", *PLUGINS)
     assert code == 0 and "egg gait" in out, err
+
+
+def test_a_connection_is_written_in_a_format_of_ones_own(folder):
+    """With its settings and its limits; without the plug-in the endings that there are."""
+    argv = ["connection", "trike.toml", "-o", "made.json"]
+    assert "end the name of a connection in .nc or .mat" in geomech(*argv, *PLUGINS[:-2])[2]
+    assert geomech(*argv, "--sign", "-", *PLUGINS)[0] == 0
+    written, wanted = json.loads((folder / "made.json").read_text()), Study(library.load("trike.toml")).fitted
+    np.testing.assert_array_equal(written["A"], -wanted.A)
+    np.testing.assert_array_equal(written["axes"], wanted.axes)
+    assert "--order is that of a .mat file: drop it, a .json" in geomech(*argv, "--order", "ndgrid", *PLUGINS)[2]
+    body = (
+        '[medium]\nlaw = "viscous"\n[body]\nkind = "chain"\nlengths = [1, 1, 1, 1]\n[gait]\nkind = "wave"\njoints = 3\n'
+    )
+    (folder / "four.toml").write_text(body)
+    code, _, err = geomech("connection", "four.toml", "-o", "four.json", *PLUGINS)
+    assert code == 2 and "a .json file has a layout of 2 joints, and this body has 3: write a .nc file" in err
 
 
 def test_what_was_loaded_is_in_its_registry_and_in_scenes(folder):

@@ -63,6 +63,7 @@ class Asked(Question):
 @pytest.fixture
 def asked(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("geomech.text.text", lambda result: "the result")
     return lambda **how: Asked(scenes.load("three-link-viscous"), **how)
 
 
@@ -74,8 +75,7 @@ def output(question, name="out.csv", **how):
     return pipeline.Output(Path(name), write, lambda path: question.note(f"name {path}"), **how)
 
 
-def test_every_command_has_one_order(asked, monkeypatch, capsys):
-    monkeypatch.setattr("geomech.text.text", lambda result: "the result")
+def test_every_command_has_one_order(asked, capsys):
     question = asked()
     said = lambda result, path: f"{result.kind} in {path}"
     wanted = output(question, message=said), pipeline.Output(None, None), output(question, "more.csv")
@@ -102,7 +102,7 @@ def test_too_much_takes_yes_beforehand_and_on_the_way(asked):
         with pytest.raises(Refusal, match="say --yes, or ask for less"):
             pipeline.execute(question, output(question))
         assert question.told[-1] == last
-        pipeline.execute(question, output(question), yes=True, silent=True)
+        pipeline.execute(question, output(question), yes=True)
 
 
 def test_outputs_are_refused_before_computing(asked):

@@ -22,7 +22,6 @@ from geomech.geometry import connection
 from geomech.geometry.connection import Connection
 from geomech.io import tables
 from geomech.io.tables import matlab
-from geomech.output import mat
 from geomech.scenes import Numerics, Scene
 from geomech.studies import accuracy, choose, estimate, fields, tiered
 from geomech.studies.single import single
@@ -51,7 +50,7 @@ def made(tmp_path_factory):
     """A folder with a.nc and a.mat of a table in a generic frame, and its study."""
     folder, s = tmp_path_factory.mktemp("tables"), study()
     fields.save_connection(folder / "a.nc", s)
-    mat.save_connection(folder / "a.mat", s)
+    fields.save_connection(folder / "a.mat", s)
     return folder, s
 
 
@@ -81,7 +80,7 @@ def test_netcdf_of_three_joints_and_of_singular_shapes(tmp_path):
     snake = Study(Scene(NoSlipSnake(), GAIT, Numerics(grid=7)))
     fields.save_connection(tmp_path / "b.nc", snake)
     same(Connection.load(tmp_path / "b.nc"), snake.fitted)
-    mat.save_connection(tmp_path / "b.mat", snake)
+    fields.save_connection(tmp_path / "b.mat", snake)
     again = Connection.load(tmp_path / "b.mat")
     np.testing.assert_array_equal(again.A, snake.fitted.A)
     np.testing.assert_array_equal(again.residual, snake.fitted.residual)
@@ -94,7 +93,7 @@ def test_netcdf_of_three_joints_and_of_singular_shapes(tmp_path):
 @pytest.mark.parametrize("order", ["ndgrid", "meshgrid"])
 def test_a_mat_round_trip_keeps_every_digit(sign, order, made, tmp_path):
     _, s = made
-    mat.save_connection(tmp_path / "a.mat", s, sign, order)
+    fields.save_connection(tmp_path / "a.mat", s, sign=sign, order=order)
     found = loadmat(tmp_path / "a.mat")
     A = found["Ay2"] if order == "ndgrid" else found["Ay2"].T
     np.testing.assert_array_equal(A, (1 if sign == "+" else -1) * s.fitted.A[1, 1])
@@ -104,7 +103,7 @@ def test_a_mat_round_trip_keeps_every_digit(sign, order, made, tmp_path):
     np.testing.assert_array_equal(again.fitted.A, s.fitted.A)
     np.testing.assert_array_equal(again.fitted.residual, s.fitted.residual)
     assert (length_unit(again.scene.system), again.scene.system.length, again.scene.frame) == ("m", 0.3, "link-1")
-    mat.save_connection(tmp_path / "b.mat", again, sign, order)
+    fields.save_connection(tmp_path / "b.mat", again, sign=sign, order=order)
     more = loadmat(tmp_path / "b.mat")
     for name in ("alpha1", "alpha2", "Ax1", "Ax2", "Ay1", "Ay2", "Atheta1", "Atheta2"):
         np.testing.assert_array_equal(more[name], found[name])
@@ -118,9 +117,9 @@ def test_a_mat_file_takes_two_joints_and_says_why(links, tmp_path, monkeypatch):
     gait = Fourier(cos=((0.2,),) * (links - 1), sin=((0.1,),) * (links - 1))
     scene = Scene(Swimmer(rft.Viscous(2.0), rft.Chain((1,) * links)), gait, Numerics(grid=5))
     Path("mine.toml").write_text(scenes.toml(scene))
-    said = f"sysplotter's layout, which is of two joints, and this body has {links - 1}: write a .nc file"
+    said = f"a .mat file has a layout of 2 joints, and this body has {links - 1}: write a .nc file"
     with pytest.raises(Refusal, match=said):
-        mat.save_connection("a.mat", Study(scene))
+        fields.save_connection("a.mat", Study(scene))
     for more in ((), ("--plot", "a.png")):
         code, _, err = geomech("connection", "mine.toml", "-o", "a.mat", *more)
         assert code == 2 and said in err and err.count("\n") == 1 and "maps" not in err
@@ -158,7 +157,7 @@ def test_intervals_of_a_table_of_ones_own_are_kept_and_part_of_its_error(ending,
     table = Study(Scene(Table(path), GAIT))
     np.testing.assert_array_equal(table.to_xarray().A_error, error)
     fields.save_connection(tmp_path / "b.nc", table)
-    mat.save_connection(tmp_path / "b.mat", table, "-", "meshgrid")
+    fields.save_connection(tmp_path / "b.mat", table, sign="-", order="meshgrid")
     for again in (tables.load(tmp_path / "b.nc"), tables.load(tmp_path / "b.mat")):
         np.testing.assert_array_equal(again.A_error, error)
         assert again.level == 0.9
@@ -269,7 +268,7 @@ GAITS = (
 )  # fmt: skip
 def test_a_table_predicts_what_its_scene_predicts_within_its_error(body, medium, ending, tmp_path):
     source = study(medium, BODIES[body], grid=21, extent=2.3, harmonics=9)
-    (fields if ending == ".nc" else mat).save_connection(tmp_path / f"a{ending}", source)
+    fields.save_connection(tmp_path / f"a{ending}", source)
     table = Study(Scene(Table(tmp_path / f"a{ending}"), GAIT))
     ratios, length = [], source.scene.system.length  # of the body, m in one of them
     for gait in GAITS:
@@ -317,8 +316,8 @@ def test_errors_of_tables_of_random_scenes_cover(tmp_path):
         source = Study(random_scene(np.random.default_rng(seed)))
         gait, length = source.scene.gait, source.scene.system.length
         amplitudes = gait.amplitude * np.array([0.3, 0.7, 1.0])
-        for ending, module in ((".nc", fields), (".mat", mat)):
-            module.save_connection(tmp_path / f"a{ending}", source)
+        for ending in ratios:
+            fields.save_connection(tmp_path / f"a{ending}", source)
             poses, errors = estimate.direct(Scene(Table(tmp_path / f"a{ending}"), gait), gait, amplitudes, 256)
             off = estimate.pose_distance(poses, source.poses("direct", None, amplitudes), length)
             ratios[ending].append(errors / np.maximum(off, 1e-12))
@@ -338,7 +337,7 @@ def test_what_is_even_in_alphadot_is_part_of_the_error(ending, tmp_path):
     both = swimmer.velocity(alpha, unit) + swimmer.velocity(alpha, -unit)
     np.testing.assert_allclose(source.even_part[:, 3, 10], np.sqrt((both**2).mean(0)), rtol=1e-6)
     assert study().even_part is None
-    (fields if ending == ".nc" else mat).save_connection(tmp_path / f"a{ending}", source)
+    fields.save_connection(tmp_path / f"a{ending}", source)
     table = Scene(Table(tmp_path / f"a{ending}"), GAIT)
     assert ("xi is not odd in alphadot" in explain(table)) == (ending == ".nc")
     for gait in (GAIT, Circle(amplitude=1.2), Butterfly(amplitude=0.8)):
@@ -359,7 +358,7 @@ def test_a_bare_mat_file_becomes_netcdf_that_says_what_it_does_not_know(made, tm
     held = tables.load(tmp_path / "a.nc")
     np.testing.assert_array_equal(held.connection.A, made[1].fitted.A)
     assert not held.has_residual and "fit residual unknown" in repr(held.connection)
-    mat.save_connection(tmp_path / "b.mat", bare)
+    fields.save_connection(tmp_path / "b.mat", bare)
     assert not tables.load(tmp_path / "b.mat").has_residual
 
 
@@ -596,7 +595,7 @@ def test_endings_that_lie(made, tmp_path):
         ("a.mat", old, r"is a MATLAB 7.3 \(HDF5\) file"),
         ("a.mat", b"t,x,y\n1,2,3\n", "no MATLAB file"),
         ("a.nc", b"t,x,y\n1,2,3\n", "is no NetCDF file: write it anew"),
-        ("a.csv", b"t,x,y\n1,2,3\n", r"end the name in .mat or .nc"),
+        ("a.csv", b"t,x,y\n1,2,3\n", r"end the name in .nc or .mat"),
     ):
         (tmp_path / name).write_bytes(raw)
         with pytest.raises(Refusal, match=said):
@@ -673,5 +672,5 @@ def test_what_accuracy_costs_includes_the_tables_own_error(made, monkeypatch):
     assert all(own < c["error"] <= c["tolerance"] for c in found["cheapest"] if c["tier"])
     assert f"the table's own, {own:.1e} BL" in text.table(found)
     monkeypatch.setattr(choose, "MOST_PHASES", 256)
-    with pytest.raises(Refusal, match="no tier gets to 1e-06 .*: raise --tol, or take a finer table"):
+    with pytest.raises(Refusal, match="no tier gets to 1e-06 .*: raise tolerance, or take a finer table"):
         choose.cheapest(scene, [0.5], 1e-6)

@@ -333,7 +333,7 @@ def test_what_the_solver_left_counts_in_the_estimate():
 def test_impossible_tolerances_are_refused():
     with pytest.raises(Refusal, match="no tier gets to 1e-15 body lengths"):
         cheapest(GLASS.with_numerics(regularisation=1e-4), [1.0], 1e-15)
-    with pytest.raises(Refusal, match="--tol must be"):
+    with pytest.raises(Refusal, match="tolerance must be"):
         cheapest(GLASS, [1.0], 0.0)
 
 

@@ -230,7 +230,7 @@ def test_cycles_that_do_not_repeat_are_not_taken_for_periodic():
 
 def test_a_tolerance_below_what_time_stepping_repeats_to_is_refused():
     slowed = scenes.load("sandfish-transient")
-    with pytest.raises(Refusal, match="repeat to 1e-06 only: raise --tol"):
+    with pytest.raises(Refusal, match="repeat to 1e-06 only: raise tolerance"):
         cheapest(slowed, [0.2], 1e-7)
 
 

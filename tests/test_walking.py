@@ -269,7 +269,7 @@ def test_what_is_told_of_a_walk():
         "xplorer: walking at 0.25 +- 0.01 m/s at 2 Hz (limit cycle; from rest within 5 % of it after 1.5 s)"
     )
     cost = 0.6 / (0.15 * 9.81 * 0.25)
-    assert f"2.4 J, cost of transport {cost:.3g} (work over weight times way, from rest)" in said
+    assert f"2.4 J, cost of transport {cost:.3g} (work over weight times distance, from rest)" in said
     assert "14" not in said and "turning" not in said and (found["settled"], found["cycles"]) == (1.5, 14.0)
     for settled, words in (
         (0.0, "within 5 % of it from the start)"),

@@ -9,7 +9,15 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from . import api, conventions, examples, figures, keys, command_line, validation
+from . import api, command_line, conventions, examples, figures, keys, validation
+
+
+def notebooks() -> str:
+    """Return the tree of contents of all notebooks, or that there are none."""
+    folder = Path(__file__).parents[1] / "notebooks"
+    names = sorted(path.stem for path in folder.glob("*.md") if path.stem != "index")
+    return "```{toctree}\n" + "\n".join(names) + "\n```" if names else "There are none yet."
+
 
 MADE = {
     "alpha": conventions.drawing,
@@ -17,6 +25,7 @@ MADE = {
     "commands": command_line.page,
     "figures": figures.page,
     "keys": keys.page,
+    "notebooks": notebooks,
     "thumbnails": examples.thumbnails,
     "validation": validation.table,
 }
@@ -45,4 +54,6 @@ def setup(app) -> dict[str, bool]:
     app.connect("builder-inited", compute)
     app.connect("source-read", fill_in)
     app.connect("autodoc-process-docstring", api.readable, priority=400)  # before numpydoc
+    app.connect("autodoc-process-docstring", api.with_parameters, priority=401)
+    app.connect("autodoc-process-signature", api.plain_types)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -7,6 +7,9 @@ import inspect
 import re
 from pathlib import Path
 
+from geomech.scenes.key import first_sentence
+from rft.checks import number_fields
+
 PACKAGES = {
     "From scene to result": [
         "geomech",
@@ -80,6 +83,48 @@ def readable(app, what: str, name: str, obj, options, lines: list[str]) -> None:
                 lines.insert(k + 1 + 3 * (k - 1 not in table), "")
 
 
+def plain_types(app, what: str, name: str, obj, options, signature: str | None, returned: str | None):
+    """Drop bounds and meanings from the types of a signature, as they stand in the list of parameters."""
+    return tuple(text and _without_annotations(text) for text in (signature, returned))
+
+
+def _without_annotations(text: str) -> str:
+    head, found, tail = text.partition("Annotated[")
+    if not found:
+        return text
+    depth, quote, comma = 0, "", None
+    for k, character in enumerate(tail):
+        if quote:
+            quote = "" if character == quote else quote
+        elif character in "'\"":
+            quote = character
+        elif character in "([{":
+            depth += 1
+        elif character == "," and depth == 0 and comma is None:
+            comma = k
+        elif character in ")]}":
+            if depth == 0:
+                return head + tail[:comma] + _without_annotations(tail[k + 1 :])
+            depth -= 1
+    return text
+
+
+def with_parameters(app, what: str, name: str, obj, options, lines: list[str]) -> None:
+    """Add the list of parameters of a class whose fields are annotated with bounds, unit and meaning."""
+    if what != "class" or not (numbers := number_fields(obj)) or any(line.startswith("Parameters") for line in lines):
+        return
+    lines += ["", "Parameters", "----------"]
+    for field, number in numbers.items():
+        kind = "int" if number.whole else "float"
+        unit = "" if number.unit == "-" else f", {number.unit}"
+        meaning = number.meaning.replace("|", r"\|").replace("*", r"\*")
+        lines += [
+            f"{field} : {kind}{unit}",
+            f"    {meaning[:1].upper()}{meaning[1:]}; {number.low:g} to {number.high:g}.",
+        ]
+    lines.append("")
+
+
 def _summary(name: str) -> str:
     text = inspect.getdoc(importlib.import_module(name)) or ""
     return " ".join(text.partition("\n\n")[0].split()).replace("|", r"\|")
@@ -100,8 +145,11 @@ def _page(name: str) -> str:
         ("Functions", functions, "autofunction"),
     ):
         if names:
-            lines += [heading, "-" * len(heading), "", ".. autosummary::", ""]
-            lines += [*(f"   {name}.{public}" for public in names), ""]
+            lines += [heading, "-" * len(heading), "", ".. list-table::", "   :widths: auto", ""]
+            for public in names:
+                about = first_sentence(objects[public]).replace("|", r"\|").replace("*", r"\*")
+                lines += [f"   * - :py:obj:`~{name}.{public}`", f"     - {about or '..'}"]
+            lines.append("")
             for public in names:
                 lines += [f".. {directive}:: {name}.{public}", ""]
     return "\n".join(lines)

@@ -1,8 +1,8 @@
 """Blocks of code that the build runs.
 
-On any page, ```LANGUAGE FILE is a file of that name, and the commands of a block ```console, `$ ` before each, are run in
-the folder of the page's files, after its programs, and followed by what they print. On a page of the gallery the commands of a block ```sh and
-the programs of a block ```python are run as well, the picture of the command is shown, and the scene is added.
+On any page, ```LANGUAGE FILE is a file of that name. The commands of a block ```console, `$ ` before each, are run in the
+folder of the page's files, after its programs, and followed by what they print. On a page of the gallery the commands of
+a block ```sh and the programs of a block ```python are run, the picture of the command is shown, and the scene is added.
 """
 
 from __future__ import annotations
@@ -48,6 +48,8 @@ def _shown(block: re.Match, folder: Path) -> str:
         (folder / name).write_text(code)
     if language == "python":
         run(code, folder, program=True)
+    if language == "csv":
+        return f"```text\n{code}```"
     if language != "console":
         return block[0]
     lines = []
@@ -56,7 +58,7 @@ def _shown(block: re.Match, folder: Path) -> str:
         if line.startswith("$ geomech "):
             printed = run(line[2:], folder).rstrip().splitlines()
             lines += printed if len(printed) <= LONGEST else [*printed[:LONGEST], "..."]
-    return "```console\n" + "\n".join(lines) + "\n```"
+    return "```text\n" + "\n".join(lines) + "\n```"
 
 
 class Example:
@@ -116,6 +118,10 @@ def compute_all(workers: int = 2) -> None:
     """Run all examples, and draw their pictures."""
     PICTURES.mkdir(parents=True, exist_ok=True)
     all_examples = [example for page in pages() for example in sections(page)[1]]
+    names = [example.picture for example in all_examples]
+    assert len({*names}) == len(names), f"two examples draw one picture: {sorted(names)}"
+    if os.environ.get("QUICK"):  # while pages are written
+        all_examples = [example for example in all_examples if not (PICTURES / example.picture).exists()]
     with ThreadPoolExecutor(workers) as pool:
         list(pool.map(Example.compute, all_examples))
 
@@ -134,5 +140,5 @@ def thumbnails() -> str:
         title = head.partition("\n")[0].lstrip("# ")
         cards = [f":::{{grid-item-card}} {x.title}\n:link: {x.page}.html#{x.anchor}\n:link-type: url\n"
                  f":img-top: /generated/gallery/{x.picture}\n:::" for x in examples]  # fmt: skip
-        parts.append(f"## {title}\n\n::::{{grid}} 2 2 3 4\n:gutter: 2\n\n" + "\n".join(cards) + "\n::::")
+        parts.append(f"## {title}\n\n::::{{grid}} 1 2 3 3\n:gutter: 2\n\n" + "\n".join(cards) + "\n::::")
     return "\n\n".join(parts)

@@ -32,12 +32,21 @@ def viscous_geometry():
     field = dataclasses.replace(study.fitted, A=minimum_perturbation(study.fitted).connection(study.fitted))
     source = "a separate program with a coarser discretisation, 31 x 31"
     curvature = ccf(field)
-    yield "viscous three-link swimmer, minimum-perturbation frame: CCF_x(0, 0)", source, _(
-        curvature([0.0, 0.0])[0], 5), "-0.0204"
+    yield (
+        "viscous three-link swimmer, minimum-perturbation frame: CCF_x(0, 0)",
+        source,
+        _(curvature([0.0, 0.0])[0], 5),
+        "-0.0204",
+    )
     moved = area(curvature, Circle(), [1.0])[0]
     yield "the same: area integral over the circle of 1 rad", source, _(np.hypot(*moved[:2]), 4), "0.0510"
     net = study.poses("direct", Circle(), [1.0])[0]
-    yield "the same circle: net distance by the balance of forces", "a separate program", _(np.hypot(*net[:2]), 4), "0.0513"
+    yield (
+        "the same circle: net distance by the balance of forces",
+        "a separate program",
+        _(np.hypot(*net[:2]), 4),
+        "0.0513",
+    )
 
 
 def viscous_cost():
@@ -55,10 +64,18 @@ def strokes():
     """Yield the best strokes of the viscous swimmer."""
     scene = geomech.load("three-link-viscous")
     source = "Ramasamy and Hatton, published optimum"
-    yield "the same: best stroke for displacement (BL a cycle)", source, _(
-        geomech.optimise(scene, "displacement").value, 4), "0.1035"
-    yield "the same: best stroke for efficiency (BL per unit of path length)", source, _(
-        geomech.optimise(scene, "efficiency").value, 4), "0.1109"
+    yield (
+        "the same: best stroke for displacement (BL a cycle)",
+        source,
+        _(geomech.optimise(scene, "displacement").value, 4),
+        "0.1035",
+    )
+    yield (
+        "the same: best stroke for efficiency (BL per unit of path length)",
+        source,
+        _(geomech.optimise(scene, "efficiency").value, 4),
+        "0.1109",
+    )
 
 
 def stress():

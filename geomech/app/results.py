@@ -56,9 +56,6 @@ class Optimum(optimisation.Optimum):
     def __repr__(self) -> str:
         return printable(text.text(result_of(self)))
 
-    def _repr_html_(self) -> str:
-        return lines(repr(self))
-
     def plot(self, *, ax: Any = None) -> Any:
         """Draw the loop on the CCF that it gains from, or, without a map, its joint angles; return the Axes."""
         draw = plots.optimum_map if self.scene.system.joints == 2 else plots.optimum_angles
@@ -75,9 +72,6 @@ class FittedMedium:
     def __repr__(self) -> str:
         return printable(text.text(self.result))
 
-    def _repr_html_(self) -> str:
-        return lines(repr(self))
-
     def plot(self) -> Any:
         """Draw measurements and fit; return the Figure."""
         return pictures.CALIBRATIONS[self.result.kind](self.result)
@@ -85,9 +79,3 @@ class FittedMedium:
     def save(self, path: str | Path) -> None:
         """Write a medium's file, which a scene names as [medium] file."""
         parts.write_medium(self.result, Path(path))
-
-
-def lines(text: str) -> str:
-    """Return the lines of a text as HTML."""
-    first, *rest = text.splitlines()
-    return display.page(first, rows=[(line,) for line in rest])

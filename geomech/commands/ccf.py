@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Optional
 
 import typer
@@ -15,12 +14,14 @@ from geomech.commands.options import (
     GridOption,
     OtherFrameOption,
     PairOption,
+    PlotOption,
     SceneArgument,
     SliceOption,
     YesOption,
     angles,
     colour_limit,
     components,
+    refuse_without_figure,
     with_workers,
 )
 from geomech.commands.pipeline import Output, execute
@@ -29,13 +30,17 @@ from geomech.commands.pipeline import Output, execute
 @with_workers
 def ccf(
     name: SceneArgument,
-    plot: Annotated[Path, typer.Option("--plot", metavar="FILE", help="figure: .png, .pdf or .svg")],
     grid: GridOption = None,
     extent: ExtentOption = None,
-    style: Annotated[Optional[str], typer.Option(help="map (colours), contours or surface")] = None,
-    metric: Annotated[bool, typer.Option("--metric", help="draw rings of joint rates that cost the same")] = False,
+    plot: PlotOption = None,
+    style: Annotated[
+        Optional[str], typer.Option(metavar="STYLE", help="draw a map (colours, the default), contours or a surface")
+    ] = None,
+    metric: Annotated[
+        bool, typer.Option("--metric", help="draw rings of joint rates that take the same effort")
+    ] = False,
     stretch: Annotated[
-        bool, typer.Option("--stretch", help="redraw shape space: equal lengths cost equal effort")
+        bool, typer.Option("--stretch", help="redraw shape space so that equal lengths take equal effort")
     ] = False,
     pair: PairOption = None,
     slice_: SliceOption = None,
@@ -44,13 +49,17 @@ def ccf(
     clim: ClimOption = None,
     yes: YesOption = False,
 ):
-    """Draw the CCF with the scene's gait on it. Of three and more joints: a slice for each pair, or for one, with the
-    others fixed."""
+    """Compute the CCF and its integral over the scene's gait. --plot draws both. Of three and more joints: a slice for each
+    pair, or for one, with the others fixed."""
     from geomech.output import pictures
     from geomech.studies.shape_space import ccf
 
+    refuse_without_figure(
+        plot, style=style, metric=metric or None, stretch=stretch or None, component=component, clim=clim,
+        **{"compare-frame": other_frame},
+    )  # fmt: skip
     scene = load_scene(name, grid, extent)
     panels = components(component)
     drawn = pictures.Ccf(style, metric, stretch, other_frame, panels, colour_limit(clim, panels))
     question = ccf(scene, pair, angles(scene, "--slice", slice_), other_frame, metric, stretch)
-    execute(question, Output(plot, drawn, pictures.check), yes=yes, silent=True)
+    execute(question, Output(plot, drawn, pictures.check), yes=yes)

@@ -7,7 +7,6 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands import formats
 from geomech.commands.loading import load_scene
 from geomech.commands.options import (
     ComponentOption,
@@ -29,27 +28,35 @@ from geomech.commands.pipeline import Output, execute
 @with_workers
 def connection(
     name: SceneArgument,
-    out: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="FILE.nc (NetCDF) or FILE.mat to write")],
+    out: Annotated[
+        Optional[Path],
+        typer.Option("-o", "--output", metavar="FILE", help="write the connection to .nc (NetCDF) or .mat"),
+    ] = None,
     grid: GridOption = None,
     extent: ExtentOption = None,
     plot: PlotOption = None,
-    sign: Annotated[Optional[str], typer.Option(help="of a .mat file: + for xi = + A alphadot (as is), or -")] = None,
-    order: Annotated[Optional[str], typer.Option(help="of a .mat file: ndgrid (as is) or meshgrid")] = None,
-    style: Annotated[Optional[str], typer.Option(help="of the plot: quiver or streamlines")] = None,
+    sign: Annotated[
+        Optional[str], typer.Option(metavar="+|-", help="sign of A in a .mat file: + (the default) or -")
+    ] = None,
+    order: Annotated[
+        Optional[str], typer.Option(metavar="ORDER", help="order of a .mat file: ndgrid (the default) or meshgrid")
+    ] = None,
+    style: Annotated[
+        Optional[str], typer.Option(metavar="STYLE", help="draw arrows (quiver, the default) or streamlines")
+    ] = None,
     pair: PairOption = None,
     slice_: SliceOption = None,
     other_frame: OtherFrameOption = None,
     component: ComponentOption = None,
     yes: YesOption = False,
 ):
-    """Compute the local connection on a grid, as a file. A NetCDF file has the fit residual and the CCF, too; a .mat
-    file has A alone, in sysplotter's layout."""
+    """Compute the local connection on a grid. A NetCDF file has the fit residual and the CCF, too; a .mat file has A
+    alone, in sysplotter's layout."""
     from geomech.output import parts, pictures
     from geomech.studies.shape_space import connection
 
-    file = parts.Connection(out.suffix, sign, order)
+    file = parts.Connection(out, sign, order)
     drawn = pictures.Connection(style, plot, pair, slice_, other_frame, components(component))
     scene = load_scene(name, grid, extent)
-    question = connection(scene, file.matlab, plot is not None, pair, angles(scene, "--slice", slice_), other_frame)
-    outputs = Output(out, file, formats.netcdf_or_matlab), Output(plot, drawn, pictures.check)
-    execute(question, *outputs, yes=yes, silent=True)
+    question = connection(scene, file.format, plot is not None, pair, angles(scene, "--slice", slice_), other_frame)
+    execute(question, Output(out, file), Output(plot, drawn, pictures.check), yes=yes)

@@ -32,11 +32,15 @@ from geomech.commands.pipeline import Output, drawing, execute
 @with_workers
 def displacement(
     name: SceneArgument,
-    amplitudes: Annotated[str, typer.Option(help="0.5,1.0,1.75 or START:STOP:COUNT; angles also as 30deg")],
-    tiers: Annotated[Optional[str], typer.Option(help="any of area,adapted,path,harmonic,direct")] = None,
+    amplitudes: Annotated[str, typer.Option(metavar="LIST", help="amplitudes, as 0.5,1,30deg or START:STOP:COUNT")],
+    tiers: Annotated[
+        Optional[str], typer.Option(metavar="LIST", help="tiers, of area,adapted,path,harmonic,direct")
+    ] = None,
     grid: GridOption = None,
     extent: ExtentOption = None,
-    tol: Annotated[Optional[float], typer.Option(help="error in body lengths that the cheapest tier must meet")] = None,
+    tol: Annotated[
+        Optional[float], typer.Option(metavar="E", help="use the cheapest tier with an error of at most E BL")
+    ] = None,
     effort: Annotated[bool, typer.Option("--effort", help="add path length, work and cost of transport")] = False,
     everything: AllOption = False,
     as_json: JsonOption = False,

@@ -14,35 +14,35 @@ from geomech.commands.pipeline import Output, drawing, execute
 
 def fit_gait(
     log: Annotated[
-        Path, typer.Argument(metavar="LOG.csv", help="t, joint angles, x, y, heading of many cycles of a gait")
+        Path, typer.Argument(metavar="LOG.csv", help="table of t, joint angles, x, y, heading over many cycles")
     ],
     out: Annotated[
-        Optional[Path], typer.Option("-o", "--output", metavar="FIELD.nc", help="connection to write")
+        Optional[Path], typer.Option("-o", "--output", metavar="FILE.nc", help="write the connection to .nc (NetCDF)")
     ] = None,
     scene: Annotated[
         Optional[Path],
-        typer.Option("--scene", metavar="FILE.toml", help="scene of the mean gait to write, with FIELD.nc"),
+        typer.Option("--scene", metavar="FILE.toml", help="write a scene of the mean gait, which takes FILE.nc"),
     ] = None,
     plot: PlotOption = None,
     columns: Annotated[
-        Optional[str], typer.Option(metavar="T,A1,A2,...,X,Y,HEADING", help="names of the columns, in this order")
+        Optional[str], typer.Option(metavar="LIST", help="names of the columns T,A1,A2,...,X,Y,HEADING, in order")
     ] = None,
-    degrees: Annotated[bool, typer.Option("--degrees", help="joint angles and heading are in degrees")] = False,
-    level: Annotated[float, typer.Option(help="share of cases in which intervals are to cover the truth")] = 0.95,
+    degrees: Annotated[bool, typer.Option("--degrees", help="read joint angles and heading in degrees")] = False,
+    level: Annotated[
+        float, typer.Option(metavar="SHARE", help="share of cases in which intervals cover the truth")
+    ] = 0.95,
     harmonics: Annotated[
-        Optional[int], typer.Option(help="of the connection in the phase; by cross-validation if left out")
+        Optional[int], typer.Option(metavar="N", help="harmonics of A in the phase, cross-validated if left out")
     ] = None,
     limits: Annotated[
         Optional[float],
         typer.Option(
             metavar="ANGLE",
-            help="of the mean gait, in rad or as 5deg; as far as the data reach if left out",
+            help="distance from the mean gait that the field covers",
             parser=an_angle,
         ),
     ] = None,
-    body_length: Annotated[
-        float, typer.Option(metavar="M", help="of the body in m, where x and y are; else they are in body lengths")
-    ] = 1.0,
+    body_length: Annotated[float, typer.Option(metavar="M", help="length of the body in m, if x and y are in m")] = 1.0,
     as_json: JsonOption = False,
 ):
     """Fit the connection near a measured gait. The regression gives phase, mean gait and A with intervals; the

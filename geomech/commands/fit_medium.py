@@ -7,32 +7,35 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.options import JsonOption, PlotOption, parse_end_caps
+from geomech.commands.options import AllOption, JsonOption, PlotOption, parse_end_caps
 from geomech.commands.pipeline import Output, execute
 
 Size = Optional[float]
 
 
 def fit_medium(
-    drag: Annotated[str, typer.Argument(metavar="DRAG.csv", help="a CSV file, or dem-rod-drag, the sample that ships")],
+    drag: Annotated[str, typer.Argument(metavar="DRAG.csv", help="CSV file, or dem-rod-drag, a sample that ships")],
     out: Annotated[
-        Optional[Path], typer.Option("-o", "--output", metavar="MEDIUM.toml", help="medium to write")
+        Optional[Path], typer.Option("-o", "--output", metavar="FILE.toml", help="write the medium to .toml")
     ] = None,
     plot: PlotOption = None,
     law: Annotated[
         Optional[str],
-        typer.Option(help="granular, viscous or coulomb; stress-map or zeta; by the columns if left out"),
+        typer.Option(metavar="LAW", help="granular, viscous, coulomb, stress-map or zeta"),
     ] = None,
     end_caps: Annotated[
-        str, typer.Option(metavar="left-out|fitted|E", help="drag on the rod's ends; E = 1: one flat end")
+        str, typer.Option(metavar="E", help="ends of the rod: left-out, fitted or 1 for a flat end")
     ] = "left-out",
-    radius: Annotated[Size, typer.Option(help="of the rod in m, in place of the file's")] = None,
-    length: Annotated[Size, typer.Option(help="of the rod in m, in place of the file's")] = None,
-    depth: Annotated[Size, typer.Option(help="of its axis in m, in place of the file's")] = None,
-    density: Annotated[
-        Size, typer.Option(help="of the bed in kg/m^3, grains and voids, in place of the file's")
+    radius: Annotated[Size, typer.Option(metavar="SIZE", help="radius of the rod in m, in place of the file's")] = None,
+    length: Annotated[Size, typer.Option(metavar="SIZE", help="length of the rod in m, in place of the file's")] = None,
+    depth: Annotated[
+        Size, typer.Option(metavar="SIZE", help="depth of the rod's axis in m, in place of the file's")
     ] = None,
-    area: Annotated[Size, typer.Option(help="of the plate in m^2, in place of the file's")] = None,
+    density: Annotated[
+        Size, typer.Option(metavar="SIZE", help="density of the bed in kg/m^3, in place of the file's")
+    ] = None,
+    area: Annotated[Size, typer.Option(metavar="SIZE", help="area of the plate in m^2, in place of the file's")] = None,
+    everything: AllOption = False,
     as_json: JsonOption = False,
 ):
     """Fit a medium to your own drag data. Rods, with the columns psi_deg, F_parallel_N, F_perpendicular_N, give a force law;
@@ -45,4 +48,6 @@ def fit_medium(
     known = tuple((key, x) for key, x in sizes.items() if x is not None)
     file = Output(out, parts.write_medium, message=parts.about_medium)
     figure = Output(plot, pictures.calibration, pictures.check)
-    execute(Calibration(drag, law, known, parse_end_caps(end_caps)), file, figure, as_json=as_json)
+    execute(
+        Calibration(drag, law, known, parse_end_caps(end_caps)), file, figure, as_json=as_json, everything=everything
+    )

@@ -12,13 +12,6 @@ def netcdf(path: Path) -> None:
         raise Refusal(f"cannot write {path}", instead="end the name of a NetCDF file in .nc")
 
 
-def netcdf_or_matlab(path: Path) -> None:
-    if path.suffix not in (".nc", ".mat"):
-        raise Refusal(
-            f"cannot write {path}", instead="end the name of a NetCDF file in .nc, or that of a MATLAB file in .mat"
-        )
-
-
 def csv(path: Path) -> None:
     if path.suffix.lower() != ".csv":
         raise Refusal(f"cannot write {path}", instead="end the name of a table in .csv")

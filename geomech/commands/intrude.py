@@ -16,7 +16,9 @@ from geomech.commands.pipeline import Output, drawing, execute
 def intrude(
     name: IntruderArgument,
     as_json: JsonOption = False,
-    out: Annotated[Optional[Path], typer.Option("-o", "--output", metavar="FILE.csv", help="table to write")] = None,
+    out: Annotated[
+        Optional[Path], typer.Option("-o", "--output", metavar="FILE.csv", help="write the table to .csv")
+    ] = None,
     plot: PlotOption = None,
 ):
     """Compute force and moment of grains on a moving body. The body is an outline in the vertical plane or a

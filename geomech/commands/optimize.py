@@ -26,25 +26,40 @@ from geomech.commands.pipeline import Output, execute
 @with_workers
 def optimize(
     name: SceneArgument,
-    objective: Annotated[str, typer.Option("--objective", help="displacement, efficiency, turning or speed")],
-    direction: Annotated[Optional[str], typer.Option(help="x or y: displacement along that axis of the body")] = None,
-    harmonics: Annotated[Optional[int], typer.Option(help="of the Fourier series; 5 if left out")] = None,
+    objective: Annotated[
+        str, typer.Option("--objective", metavar="NAME", help="maximise displacement, efficiency, turning or speed")
+    ],
+    direction: Annotated[
+        Optional[str], typer.Option(metavar="x|y", help="take the displacement along x or y of the body")
+    ] = None,
+    harmonics: Annotated[
+        Optional[int], typer.Option(metavar="N", help="harmonics of the Fourier series, 5 if left out")
+    ] = None,
     limits: Annotated[
         Optional[str],
-        typer.Option(metavar="EXTENT", help="of joints, in rad: 2.5, 120deg, -0.5:2, or 1,2 for each; else the field's"),
+        typer.Option(metavar="ANGLES", help="joint limits, as 2.5, 120deg, -0.5:2 or 1,2 for each"),
     ] = None,
     starts: Annotated[
-        Optional[int], typer.Option(metavar="N", help="loops to begin with; the first is the scene's; 1, in sand 9")
+        Optional[int], typer.Option(metavar="N", help="number of starts, 9 in dry media and else 1 if left out")
     ] = None,
-    rate: Annotated[Optional[float], typer.Option(help="rad/s that no joint exceeds, for speed")] = None,
-    power: Annotated[Optional[float], typer.Option(help="mean, body's axial drag x BL/s, for speed")] = None,
-    out: Annotated[Optional[Path], typer.Option("-o", "--output", metavar="BEST.toml", help="scene to write")] = None,
+    rate: Annotated[
+        Optional[float], typer.Option(metavar="RATE", help="largest joint rate in rad/s, for speed")
+    ] = None,
+    power: Annotated[
+        Optional[float], typer.Option(metavar="POWER", help="largest mean power in drag x BL/s, for speed")
+    ] = None,
+    out: Annotated[
+        Optional[Path],
+        typer.Option("-o", "--output", metavar="FILE.toml", help="write the scene with the best gait to .toml"),
+    ] = None,
     plot: PlotOption = None,
-    stretch: Annotated[bool, typer.Option("--stretch", help="draw it where equal lengths cost the same, too")] = False,
+    stretch: Annotated[
+        bool, typer.Option("--stretch", help="draw it also where equal lengths take equal effort")
+    ] = False,
     clim: ClimOption = None,
     as_json: JsonOption = False,
     yes: YesOption = False,
-):  # fmt: skip
+):
     """Find the best gait for an objective. Its value has an error; -o writes it as a scene, --plot draws its loop on
     the CCF."""
     from geomech.optimisation.question import Optimize

@@ -17,7 +17,7 @@ from rft.refusal import Refusal, located
 
 
 def _scene(names: Callable[[], list[str]]):
-    text = "a built-in name (see 'geomech scenes') or a TOML file"
+    text = "built-in name (see 'geomech scenes') or TOML file"
     return typer.Argument(metavar="SCENE", help=text, autocompletion=names)
 
 
@@ -25,13 +25,15 @@ SceneArgument = Annotated[str, _scene(scene_names)]
 IntruderArgument = Annotated[str, _scene(intruder_names)]
 WalkerArgument = Annotated[str, _scene(walker_names)]
 EitherArgument = Annotated[str, _scene(lambda: scene_names() + intruder_names())]
-GridOption = Annotated[Optional[int], typer.Option("--grid", help="points per joint, in place of the scene's")]
-PlotOption = Annotated[Optional[Path], typer.Option("--plot", metavar="FILE", help="figure: .png, .pdf or .svg")]
+GridOption = Annotated[
+    Optional[int], typer.Option("--grid", metavar="N", help="points of the grid per joint, in place of the scene's")
+]
+PlotOption = Annotated[
+    Optional[Path], typer.Option("--plot", metavar="FILE", help="draw a figure to .png, .pdf or .svg")
+]
 MediumOption = Annotated[
     Optional[Path],
-    typer.Option(
-        "--medium", metavar="FILE", help="what 'geomech fit-medium' wrote, or a CSV of drag, in place of the scene's"
-    ),
+    typer.Option("--medium", metavar="FILE", help="file of a medium or of drag, in place of the scene's"),
 ]
 
 
@@ -43,11 +45,11 @@ def folder(text: str | Path) -> Path:
 
 
 FolderOption = Annotated[
-    Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results", parser=folder)
+    Path, typer.Option("-o", "--output", metavar="DIR", help="folder to write the results to", parser=folder)
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON and nothing else")]
-AllOption = Annotated[bool, typer.Option("--all", help="print every tier and amplitude, net distances and seconds")]
-YesOption = Annotated[bool, typer.Option("--yes", help="compute even for more than a minute, or in more than 2 GB")]
+AllOption = Annotated[bool, typer.Option("--all", help="print all lines, not only those that fit a screen")]
+YesOption = Annotated[bool, typer.Option("--yes", help="compute even if it takes over a minute or over 2 GB")]
 
 
 OtherFrameOption = Annotated[
@@ -56,32 +58,26 @@ OtherFrameOption = Annotated[
 ]
 ComponentOption = Annotated[
     Optional[str],
-    typer.Option(
-        "--component", metavar="NAMES", help="panels to draw, such as x or x,theta; all but zero ones if left out"
-    ),
+    typer.Option("--component", metavar="NAMES", help="panels to draw, such as x or x,theta"),
 ]
 ClimOption = Annotated[
     Optional[str],
-    typer.Option(
-        "--clim", metavar="LIMIT", help="of the colours, either side of 0: a number, or a percentile such as 98%"
-    ),
+    typer.Option("--clim", metavar="LIMIT", help="limit of the colours, a number or a percentile as 98%"),
 ]
 DataOption = Annotated[
     Optional[Path],
-    typer.Option(
-        "--data", metavar="FILE.csv", help="own measurements to draw as points: columns amplitude,value,error"
-    ),
+    typer.Option("--data", metavar="FILE.csv", help="draw points, of columns amplitude,value,error"),
 ]
 PairOption = Annotated[
     Optional[str],
-    typer.Option("--pair", metavar="I,J", help="joints on the axes, of three and more: 1,3 (all pairs if left out)"),
+    typer.Option("--pair", metavar="I,J", help="joints on the axes, as 1,3; all pairs if left out"),
 ]
 SliceOption = Annotated[
     Optional[str],
     typer.Option(
         "--slice",
         metavar="ANGLES",
-        help="of the joints that are held: 0.3 for each, or one by one 0.3,-20deg (the gait's middle if left out)",
+        help="angles of the joints that are held, as 0.3 or 0.3,-20deg",
     ),
 ]
 PluginOption = Annotated[
@@ -116,11 +112,12 @@ def with_plugins(command: Callable) -> Callable:
 
 
 WorkersOption = Annotated[
-    Optional[int], typer.Option("--workers", metavar="N", help="processes that compute what takes long; one a core")
+    Optional[int],
+    typer.Option("--workers", metavar="N", help="processes for long computations, one a core if left out"),
 ]
 SchedulerOption = Annotated[
     Optional[str],
-    typer.Option("--scheduler", metavar="ADDRESS", help="of a Dask cluster that computes, such as tcp://10.0.0.1:8786"),
+    typer.Option("--scheduler", metavar="ADDRESS", help="Dask cluster to compute on, as tcp://10.0.0.1:8786"),
 ]
 
 
@@ -209,7 +206,7 @@ def joint_limits(text: str | None, scene) -> float | list[tuple[float, float]] |
 
 ExtentOption = Annotated[
     Optional[float],
-    typer.Option("--extent", metavar="ANGLE", help="half width of the field in rad, or as 120deg", parser=an_angle),
+    typer.Option("--extent", metavar="ANGLE", help="half width of the grid in rad, or as 120deg", parser=an_angle),
 ]
 
 

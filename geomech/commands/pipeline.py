@@ -164,13 +164,12 @@ def _place(output: Output, inputs: list[Path], stack: contextlib.ExitStack) -> P
 
 def _print(result: Result, outputs: list[Output], as_json: bool, everything: bool) -> None:
     from geomech import text
+    from geomech.core.summary import wrapped
 
     if as_json:
         print(json.dumps(text.numbers(result)))
         return
-    print(text.text(result, everything))
-    if not everything and (more := text.more(result)):
-        print(more)
-    for output in outputs:
-        if output.message:
-            print(output.message(result, output.path))
+    lines = (text.full if everything else text.text)(result).splitlines()
+    lines += [more] if not everything and (more := text.more(result)) else []
+    lines += [output.message(result, output.path) for output in outputs if output.message]
+    print("\n".join(lines if everything else wrapped(lines)))

@@ -14,7 +14,11 @@ from geomech.commands.pipeline import show
 def reference(
     section: Annotated[
         Optional[str],
-        typer.Argument(metavar="[SECTION]", help="medium, body, gait, ... or all", autocompletion=section_names),
+        typer.Argument(
+            metavar="[SECTION]",
+            help="section such as medium, body or gait; all if left out",
+            autocompletion=section_names,
+        ),
     ] = None,
     json_schema: Annotated[bool, typer.Option("--json-schema", help="print a JSON Schema of scene files")] = False,
     plugin: PluginOption = None,

@@ -28,7 +28,7 @@ from geomech.commands.pipeline import Output, execute
 DEFAULT_SCENE = "three-link-glass"
 SceneOrOurs = Annotated[
     str,
-    typer.Argument(metavar="[SCENE]", help="a built-in name or a TOML file", autocompletion=scene_names),
+    typer.Argument(metavar="[SCENE]", help="built-in name or TOML file", autocompletion=scene_names),
 ]
 
 

@@ -16,12 +16,16 @@ def stress(
         str,
         typer.Argument(
             metavar="MEDIUM",
-            help="a name (see 'geomech scenes'), a TOML file or a CSV file of plate drags",
+            help="name (see 'geomech scenes'), TOML or CSV of plate drags",
             autocompletion=medium_names,
         ),
     ],
-    beta: Annotated[Optional[float], typer.Option(help="tilt of the plate in degrees, 0 lying flat")] = None,
-    gamma: Annotated[Optional[float], typer.Option(help="direction of motion in degrees below the horizontal")] = None,
+    beta: Annotated[
+        Optional[float], typer.Option(metavar="ANGLE", help="tilt of the plate in degrees, 0 if it lies flat")
+    ] = None,
+    gamma: Annotated[
+        Optional[float], typer.Option(metavar="ANGLE", help="direction of motion in degrees below the horizontal")
+    ] = None,
     as_json: JsonOption = False,
     plot: PlotOption = None,
 ):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Optional
 
 import typer
 
@@ -16,8 +16,10 @@ from geomech.commands.pipeline import Output, drawing, execute, path_message
 @with_workers
 def sweep(
     name: SceneArgument,
-    over: Annotated[list[str], typer.Option(help="PARAM=START:STOP:COUNT or PARAM=A,B,...; as often as wanted")],
-    out: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.nc", help="NetCDF file to write")],
+    over: Annotated[list[str], typer.Option(metavar="KEY=VALUES", help="parameter and its values; may be repeated")],
+    out: Annotated[
+        Optional[Path], typer.Option("-o", "--output", metavar="FILE.nc", help="write the results to .nc (NetCDF)")
+    ] = None,
     plot: PlotOption = None,
     yes: YesOption = False,
 ):

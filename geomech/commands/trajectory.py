@@ -16,9 +16,11 @@ def trajectory(
     name: SceneArgument,
     out: Annotated[
         Optional[Path],
-        typer.Option("-o", "--output", metavar="FILE", help="table: .csv; film: .gif, .mp4; strip: .png, .pdf, .svg"),
+        typer.Option("-o", "--output", metavar="FILE", help="write a table (.csv), film (.gif, .mp4) or strip (.png)"),
     ] = None,
-    cycles: Annotated[Optional[int], typer.Option(metavar="N", help="of the gait; 3 in a film, else 1")] = None,
+    cycles: Annotated[
+        Optional[int], typer.Option(metavar="N", help="cycles of the gait, 3 in a film and else 1 if left out")
+    ] = None,
     yes: YesOption = False,
 ):
     """Follow the body through its gait: table, film or strip. A table has pose, joint angles and ends of all links at every

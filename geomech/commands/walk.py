@@ -16,14 +16,15 @@ from rft.refusal import Refusal
 def walk(
     name: WalkerArgument,
     engine: Annotated[
-        Optional[str], typer.Option(metavar="planar|mujoco", help="what computes the motion, in place of the scene's")
+        Optional[str], typer.Option(metavar="ENGINE", help="planar or mujoco, in place of the scene's")
     ] = None,
     as_json: JsonOption = False,
     out: Annotated[
-        Optional[Path], typer.Option("-o", "--output", metavar="DIR", help="folder for the results", parser=folder)
+        Optional[Path],
+        typer.Option("-o", "--output", metavar="DIR", help="folder to write the results to", parser=folder),
     ] = None,
     animate: Annotated[
-        Optional[Path], typer.Option(metavar="FILE", help="film: .gif, .mp4; strip: .png, .pdf, .svg")
+        Optional[Path], typer.Option(metavar="FILE", help="draw a film (.gif, .mp4) or a strip (.png, .pdf, .svg)")
     ] = None,
     follow: Annotated[bool, typer.Option("--follow", help="the camera of the film goes with the robot")] = False,
     yes: YesOption = False,

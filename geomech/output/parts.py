@@ -12,38 +12,45 @@ from geomech.core.errors import choose
 from geomech.core.variables import Result
 from geomech.io.files import note, write_text
 from geomech.io.results import write_netcdf
-from geomech.io.tables import ORDERS, SIGNS
+from geomech.io.tables import FORMATS, ORDERS, SIGNS
 from geomech.measured import results
-from geomech.output import mat
 from geomech.text import optimum
 from rft.refusal import Refusal
 
 
 @dataclass(frozen=True)
 class Connection:
-    """A writer of a connection, as NetCDF or, with an ending of .mat, in sysplotter's layout with this sign and order."""
+    """A writer of a connection in the format that an ending names, with this sign and order where it takes them."""
 
-    ending: str
+    out: Path | None
     sign: str | None = None
     order: str | None = None
 
     def __post_init__(self) -> None:
-        for option, word, known in (("--sign", self.sign, SIGNS), ("--order", self.order, ORDERS)):
+        if self.out and not hasattr(self.format, "write"):
+            endings = [ending for ending, known in FORMATS.items() if hasattr(known, "write")]
+            raise Refusal(f"cannot write {self.out}", instead=f"end the name of a connection in {' or '.join(endings)}")
+        for name, word, known in (("sign", self.sign, SIGNS), ("order", self.order, ORDERS)):
             if word is not None:
-                choose(option, word, known)
-                if self.ending == ".nc":
-                    raise Refusal(f"{option} is that of a .mat file", instead="drop it, a .nc file says what it has")
+                choose(f"--{name}", word, known)
+                if name not in self._settings(self.format):
+                    taking = " or ".join(ending for ending, other in FORMATS.items() if name in self._settings(other))
+                    instead = f"drop it, a {self.out.suffix} file says what it has" if self.out else "drop it"
+                    raise Refusal(f"--{name} is that of a {taking} file", instead=instead)
 
     @property
-    def matlab(self) -> bool:
-        return self.ending == ".mat"
+    def format(self) -> Callable | None:
+        """The format, None of no file, or of one with another ending."""
+        return FORMATS.get(self.out.suffix) if self.out else None
+
+    @staticmethod
+    def _settings(file: Callable | None) -> tuple[str, ...]:
+        return getattr(file, "settings", ())
 
     def __call__(self, result: Result, path: Path) -> None:
-        if not self.matlab:
-            write_netcdf(path, result)
-            return
-        mat.save_connection(path, result.subject.study, self.sign or "+", self.order or "ndgrid")
-        if not self.sign:
+        given = {name: word for name, word in (("sign", self.sign), ("order", self.order)) if word}
+        self.format.write(path, result, **given)
+        if "sign" in self._settings(self.format) and not self.sign:
             note(f"{path} has {SIGNS['+']}; --sign - gives the other")
 
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from geomech import plots, text
-from geomech.core.summary import wrapped
 from geomech.core.variables import Result
 from geomech.io.files import read, refuse_inputs
 from geomech.io.results import write_netcdf
@@ -95,7 +94,7 @@ def write_accuracy(result: Result, folder: Path) -> None:
 def files(result: Result, folder: Path) -> str:
     """Return the names of the files in a folder."""
     names = sorted(p.name for p in folder.iterdir() if not p.name.startswith("."))
-    return "\n".join(wrapped([f"files in {folder}: {', '.join(names)}"]))
+    return f"files in {folder}: {', '.join(names)}"
 
 
 def _save(fig, stem: Path) -> None:

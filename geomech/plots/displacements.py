@@ -34,7 +34,7 @@ def displacement(
     errors: with a band of each tier's estimated error, in its colour; an uncertain medium has an outlined band of its own. The
     table's own units are those of the axis. data: measurements to draw as points, "amplitude", "value" and "error" (N,) in the
     units of the axes, such as a data frame of pandas; the error may be missing."""
-    ax, amplitudes = axes_of(ax), np.asarray(table["amplitude"], float)
+    ax, amplitudes = axes_of(ax, 4.4, 3.8), np.asarray(table["amplitude"], float)
     errors = errors and all(key in table for key in ERRORS)
     for name, tier in TIERS.items():
         if name in table:

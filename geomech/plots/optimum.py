@@ -35,7 +35,7 @@ def optimum_map(optimum: Optimum, ax=None, gained: Gained | None = None, clim: f
     loop alone.
 
     clim: as for `ccf_figure`."""
-    ax, system = axes_of(ax, 4.4, 4.4), optimum.scene.system
+    ax, system = axes_of(ax, 4.6, 5.2), optimum.scene.system
     if system.traits.steps:
         shape_space(ax, [np.linspace(-1, 1, 2) * optimum.scene.numerics.extent] * 2, shape_labels(system))
         ax.set_title("no CCF: the velocity does not follow\nfrom shape alone")

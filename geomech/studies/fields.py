@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,8 @@ from geomech.geometry.harmonics import Harmonics
 from geomech.geometry.metric import Finsler, Metric
 from geomech.geometry.tube import TaylorSeries, Tube
 from geomech.geometry.two_form import TwoForm
-from geomech.io.results import unit_name, write_netcdf
+from geomech.io.results import unit_name
+from geomech.io.tables import FORMATS
 from geomech.io.tables.netcdf import SHAPE
 from geomech.scenes.model import Scene
 from geomech.scenes.write import toml
@@ -25,6 +26,7 @@ from geomech.studies.tables import COMPONENTS
 from geomech.systems.base import System, length_unit, shape_labels
 from geomech.systems.capabilities import OwnMetric, Recorded, capability, solver_of, stored_table
 from geomech.systems.framed import Framed
+from rft.refusal import Refusal
 
 ERROR_OF_CCF = "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
 INTERVAL_OF_CCF = "half width of the interval of ccf"
@@ -42,9 +44,26 @@ def of_study(study: Study) -> Result:
     return Result("connection", (*coordinates(study.fitted.axes, labels), *variables(study)), attributes(study), study)
 
 
-def save_connection(path: str | Path, study: Study) -> None:
-    """Write the result of `of_study` as NetCDF; the file appears whole or not at all."""
-    write_netcdf(path, of_study(study))
+def of_connection_alone(study: Study) -> Result:
+    """Return what `of_study` has of A, its errors and its axes."""
+    labels = shape_labels(study.scene.system)
+    variables = of_connection(study.fitted, stored_table(study.scene.system, "A_error")) + of_even_part(study)
+    return Result("connection", (*coordinates(study.fitted.axes, labels), *variables), attributes(study), study)
+
+
+def save_connection(path: str | Path, study: Study, **settings: str) -> None:
+    """Write the connection of a study in the format that the ending names, with ``settings`` that it takes; the file appears
+    whole or not at all."""
+    file = FORMATS[Path(path).suffix]
+    check_joints(study.scene, file)
+    file.write(path, (of_study if getattr(file, "whole", True) else of_connection_alone)(study), **settings)
+
+
+def check_joints(scene: Scene, file: Callable | None) -> None:
+    """Refuse a body of more or fewer joints than a format (`geomech.io.tables.FORMATS`), if there is one, takes."""
+    if (only := getattr(file, "joints", None)) not in (None, scene.system.joints):
+        why = f"a {file.suffix} file has a layout of {only} joints, and this body has {scene.system.joints}"
+        raise Refusal(why, where=scene.name, instead="write a .nc file, which takes any number of joints")
 
 
 def attributes(study: Study) -> dict:
@@ -86,11 +105,16 @@ def variables(study: Study) -> list[Variable]:
         )  # before the harmonics, as they may share velocities
     if (harmonics := study.harmonics) is not None:
         variables += of_harmonics(harmonics, unit)
-    if (even := study.even_part) is not None:
-        units = f"{unit_name(unit)} rad-1 (x, y), rad rad-1 (theta)"
-        name = "rms over directions of xi(alphadot) + xi(-alphadot), |alphadot| = 1, which A takes for 0"
-        variables.append(Variable("even_part", ("component", *angles_of(study.fitted.axes)), even, units, name))
-    return variables
+    return variables + of_even_part(study)
+
+
+def of_even_part(study: Study) -> list[Variable]:
+    """Return the part of the velocity that is even in alphadot, if there is one."""
+    if (even := study.even_part) is None:
+        return []
+    units = f"{unit_name(length_unit(study.scene.system))} rad-1 (x, y), rad rad-1 (theta)"
+    name = "rms over directions of xi(alphadot) + xi(-alphadot), |alphadot| = 1, which A takes for 0"
+    return [Variable("even_part", ("component", *angles_of(study.fitted.axes)), even, units, name)]
 
 
 def of_connection(fitted: Connection, error: np.ndarray | None = None) -> list[Variable]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,44 +18,52 @@ from geomech.geometry.stretch import stretch as stretch_to_metric
 from geomech.run.cost import Cost
 from geomech.scenes.model import Scene
 from geomech.studies import fields
-from geomech.studies.cost import Job, frame, harmonics, of_even_part, of_metric, of_planes, price
+from geomech.studies.cost import Job, direct, frame, harmonics, of_even_part, of_metric, of_planes, price
 from geomech.studies.cost import connection as fitted
 from geomech.studies.effort import shared, why_none
 from geomech.studies.question import Allow, Progress, Question
 from geomech.studies.study import Study, refuse_outside
 from geomech.systems.base import shape_labels
 from geomech.systems.capabilities import stored_table
+from geomech.tiers.area import AREA
 from geomech.tiers.fitted import finest_grid, refuse
 from geomech.tiers.harmonic import is_looked_up
 from rft.refusal import Refusal, located
 
 NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
+WHOLE, A_ALONE = "whole", "A"
 MOST_PAIRS = 10  # of joints in a figure: as many as five joints have
 
 
 class Space(NamedTuple):
-    """Subject of pictures of shape space. other, other_planes: the study and its planes in another body frame. stretch: of
-    shape space, to equal effort."""
+    """Subject of texts and pictures of shape space. other, other_planes: the study and its planes in another body frame.
+    stretch: of shape space, to equal effort. enclosed: the displacement of the scene's gait by the area tier. seconds: of the
+    computation."""
 
     study: Study
     other: Study | None = None
     planes: tuple[Plane, ...] = ()
     other_planes: tuple[Plane, ...] = ()
     stretch: Stretch | None = None
+    enclosed: Result | None = None
+    seconds: float = 0.0
 
 
 @dataclass(frozen=True)
 class ShapeSpace(Question):
     """The connection or the CCF of a scene.
 
-    file: with all data of a file, metric and harmonics included; else the CCF alone. field: computed on the scene's grid. map:
-    drawn on that grid. planes: drawn where two joints move, of ``pair``, such as "1,3", or of all pairs; slice_angles: angles
-    of the other joints, rad, the gait's middle if None. metric: with the cost of changes of shape. stretch: with shape space
-    stretched to that cost. gait: the scene's gait is drawn, and must lie within. other_frame: name of another body frame,
+    kind: "connection" or "ccf", of the result.
+
+    file: contents of a file, WHOLE with metric and harmonics, or A_ALONE; "" for none. field: computed on the scene's grid.
+    map: drawn on that grid. planes: drawn where two joints move, of ``pair``, such as "1,3", or of all pairs; slice_angles:
+    angles of the other joints, rad, the gait's middle if None. metric: with the cost of changes of shape. stretch: with shape
+    space stretched to that cost. gait: the scene's gait is drawn, and must lie within. other_frame: name of another body frame,
     drawn below."""
 
     scene: Scene
-    file: bool = False
+    kind: str = "ccf"
+    file: str = ""
     field: bool = True
     map: bool = False
     planes: bool = False
@@ -88,11 +97,16 @@ class ShapeSpace(Question):
     @property
     def _costed(self) -> bool:
         """Whether the metric is computed."""
-        return self.metric or (self.file and not why_none(self.scene.system))
+        return self.metric or (self.file == WHOLE and not why_none(self.scene.system))
+
+    @property
+    def _enclosed(self) -> bool:
+        """Whether the CCF is integrated over the scene's gait."""
+        return self.gait and AREA.is_offered(self.scene.system)
 
     @property
     def _harmonics(self) -> bool:
-        return self.file and is_looked_up(self.scene.system)
+        return self.file == WHOLE and is_looked_up(self.scene.system)
 
     @cached_property
     def _at(self) -> list[tuple[tuple[int, int], np.ndarray]]:
@@ -104,7 +118,7 @@ class ShapeSpace(Question):
         if len(pairs) > MOST_PAIRS:
             raise Refusal(
                 f"{joints} joints have {len(pairs)} pairs",
-                instead=f"say which, such as --pair 1,{joints}, or give a chain [body] modes",
+                instead=f"say which, such as `pair` 1,{joints}, or give a chain [body] modes",
             )
         return [(one, through(self.scene, one, self.slice_angles, self.pair is not None)) for one in pairs]
 
@@ -119,7 +133,7 @@ class ShapeSpace(Question):
             if self.metric and (reason := why_none(system)):
                 raise Refusal(reason, where=name)
             if self.other_frame is not None and len(self._at) > 1:
-                raise Refusal("--compare-frame draws one pair of joints", instead="say which with --pair")
+                raise Refusal("`compare_frame` draws one pair of joints", instead="say which with `pair`")
         _ = self.other
 
     def cost(self) -> Cost:
@@ -131,6 +145,7 @@ class ShapeSpace(Question):
         jobs = [*of_planes(scene, *zip(*self._at)), *frame(scene)] if self._at else []
         if not self.field:
             return jobs
+        jobs += direct(scene, scene.gait, 1, scene.numerics.phases) if self._enclosed and study is self.study else []
         jobs += fitted(scene)
         if study is self.study:
             jobs += of_metric(scene) if self._costed else []
@@ -139,19 +154,24 @@ class ShapeSpace(Question):
         return jobs
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        study, parts = self.study, self._parts()
+        study, parts, start = self.study, self._parts(), time.perf_counter()
         values = [part(lambda done, k=k: progress((k + done) / len(parts))) for k, part in enumerate(parts)]
         count = len(self._at)
         other_planes = tuple(values[count : 2 * count]) if self.other else ()
         stretched = stretch_to_metric(study.metric) if self.stretch else None
-        space = Space(study, self.other, tuple(values[:count]), other_planes, stretched)
+        amplitude = self.scene.gait.amplitude
+        enclosed = study.study([amplitude], [AREA.name]).result if self._enclosed else None
+        seconds = time.perf_counter() - start
+        space = Space(study, self.other, tuple(values[:count]), other_planes, stretched, enclosed, seconds)
         if self.file:
-            file = fields.of_study(study)
+            file = (fields.of_study if self.file == WHOLE else fields.of_connection_alone)(study)
             return Result(file.kind, file.variables, file.attributes, space)
         if not self.field:
-            return Result("shape_space", tuple(_of_plane(*x) for x in zip(self._at, space.planes)), {}, space)
+            return Result(self.kind, tuple(_of_plane(*x) for x in zip(self._at, space.planes)), {}, space)
         axes = fields.coordinates(study.fitted.axes, shape_labels(self.scene.system))
-        return Result("shape_space", (*axes, fields.of_ccf(study.curvature, study.curvature_error)), {}, space)
+        if self.kind == "connection":
+            return Result(self.kind, (*axes, *fields.of_connection(study.fitted)), {}, space)
+        return Result(self.kind, (*axes, fields.of_ccf(study.curvature, study.curvature_error)), {}, space)
 
     def _parts(self) -> list[Callable[[Progress], Any]]:
         """Return the parts of the computation, in order: planes first."""
@@ -181,10 +201,10 @@ def _pair(text: str, joints: int) -> tuple[int, int]:
     """Return the joints, counted from 0, of a text such as 1,3."""
     names = text.split(",")
     if len(names) != 2 or not all(x.strip().isdecimal() for x in names):
-        raise Refusal(f"{text!r} is not two joints such as 1,{joints}", where="--pair")
+        raise Refusal(f"{text!r} is not two joints such as 1,{joints}", where="`pair`")
     i, j = (int(x) - 1 for x in names)
     if i == j or not all(0 <= k < joints for k in (i, j)):
-        raise Refusal(f"{text!r} must be two different joints from 1 to {joints}", where="--pair")
+        raise Refusal(f"{text!r} must be two different joints from 1 to {joints}", where="`pair`")
     return i, j
 
 
@@ -193,22 +213,22 @@ def through(scene: Scene, pair: tuple[int, int], angles: tuple[float, ...] | Non
     only."""
     at, fixed = scene.gait.middle.copy(), [k for k in range(scene.system.joints) if k not in pair]
     if angles is not None and not fixed:
-        raise Refusal("--slice says where other joints are held, and this body has but two", instead="drop it")
+        raise Refusal("`slice` says where other joints are held, and this body has but two", instead="drop it")
     if angles is None:
         return at
     extent = scene.numerics.extent
     if not (stored_table(scene.system, "connection") or all(abs(a) <= extent for a in angles)):
         raise Refusal(
             f"the angles must lie within the field's {extent:g} rad",
-            where="--slice",
-            instead="give others, or raise --extent",
+            where="`slice`",
+            instead="give others, or raise `extent`",
         )
     if len(angles) == len(at) > 1:
         return np.array(angles)
     if len(angles) != 1 and not (alone and len(angles) == len(fixed)):
         choices = f"{len(fixed)} one by one, " * (alone and len(fixed) > 1) + "or "
         raise Refusal(
-            f"--slice takes one angle for all joints that are held, {choices}{len(at)} for a shape", value=len(angles)
+            f"`slice` takes one angle for all joints that are held, {choices}{len(at)} for a shape", value=len(angles)
         )
     at[fixed] = angles
     return at
@@ -222,10 +242,10 @@ def ccf(
     metric: bool,
     stretch: bool,
 ) -> ShapeSpace:
-    """Return the question of the CCF's picture. metric, stretch: the picture needs the metric."""
+    """Return the question of a CCF. metric, stretch: its picture needs the metric."""
     sliced = scene.system.joints > 2 or pair is not None or slice_angles is not None
     if sliced and (metric or stretch):
-        raise Refusal("--metric and --stretch are those of two joints", instead="drop them for slices")
+        raise Refusal("`metric` and `stretch` are those of two joints", instead="drop them for slices")
     if sliced:
         return ShapeSpace(
             scene, field=False, planes=True, pair=pair, slice_angles=slice_angles, other_frame=other_frame
@@ -235,18 +255,18 @@ def ccf(
 
 def connection(
     scene: Scene,
-    matlab: bool,
+    file: Callable | None,
     drawn: bool,
     pair: str | None,
     slice_angles: tuple[float, ...] | None,
     other_frame: str | None,
 ) -> ShapeSpace:
-    """Return the question of a connection's file, a .mat file if ``matlab``, and of its picture, if it is ``drawn``."""
-    if matlab:
-        check_two_joints(scene)
+    """Return the question of a connection. file: the format of its file (`geomech.io.tables.FORMATS`), or None. drawn: its
+    picture is, too."""
+    fields.check_joints(scene, file)
     sliced = drawn and (scene.system.joints > 2 or pair is not None or slice_angles is not None)
     if sliced and other_frame is not None:
-        raise Refusal("--compare-frame draws maps of two joints", instead="drop it, or see 'geomech ccf --pair'")
+        raise Refusal("`compare_frame` draws maps of two joints", instead="drop it, or see 'geomech ccf --pair'")
     picture = {
         "map": drawn and not sliced,
         "planes": sliced,
@@ -254,11 +274,5 @@ def connection(
         "slice_angles": slice_angles,
         "other_frame": other_frame,
     }
-    return ShapeSpace(scene, file=not matlab, **picture)
-
-
-def check_two_joints(scene: Scene) -> None:
-    """Refuse a body without exactly two joints, as in sysplotter's layout of arrays."""
-    if (joints := scene.system.joints) != 2:
-        why = f"a .mat file has sysplotter's layout, which is of two joints, and this body has {joints}"
-        raise Refusal(why, where=scene.name, instead="write a .nc file, which takes any number of joints")
+    contents = "" if file is None else WHOLE if getattr(file, "whole", True) else A_ALONE
+    return ShapeSpace(scene, "connection", contents, **picture)

@@ -11,10 +11,15 @@ from typing import Any
 from geomech.core.variables import Result
 
 
-def text(result: Result, everything: bool = False) -> str:
-    """Return a result as lines that fit a screen, or everything of it."""
+def text(result: Result) -> str:
+    """Return a result as lines that fit a screen."""
+    return _module(result).text(result)
+
+
+def full(result: Result) -> str:
+    """Return everything of a result as lines."""
     module = _module(result)
-    return module.full(result) if everything and hasattr(module, "full") else module.text(result)
+    return getattr(module, "full", module.text)(result)
 
 
 def more(result: Result) -> str:

@@ -10,6 +10,7 @@ from geomech.core.variables import Result
 from geomech.studies.intrusion import Estimate
 from geomech.text.grains import effect_lines
 
+ROUNDING = 1e-12  # over the largest force or moment
 UNITS = {"t": "s", "angle": "degrees", "x": "m", "y": "m", "z": "m"}
 
 
@@ -22,7 +23,7 @@ def numbers(result: Result) -> dict[str, Any]:
 
 
 def text(result: Result) -> str:
-    """Return the extremes of force and moment with their places and errors, and the work."""
+    """Return the extremes of force and moment with their places and errors, and the effort."""
     (scene, found), error = result.subject, result.attributes["error"]
     columns = {v.name: v.values for v in result.variables}
     kinds = type(scene.intruder).__name__, type(scene.motion).__name__
@@ -32,11 +33,20 @@ def text(result: Result) -> str:
     lines += effect_lines(scene.effects)
     place = "angle" if "angle" in columns else max((n for n in "xyz" if n in columns), key=lambda n: np.ptp(columns[n]))
     names = [n for n in columns if n.startswith(("force", "moment")) and not (n == "moment" and "moment_y" in columns)]
+    largest = {kind: max(np.abs(columns[n]).max() for n in names if n.startswith(kind)) for kind in ("force", "moment")}
     for name in names:
         ends = [(columns[name][k], np.degrees(columns[place][k]) if place == "angle" else columns[place][k])
                 for k in (columns[name].argmin(), columns[name].argmax())]  # fmt: skip
-        low, high = (f"{value + 0.0:.4g} at {place} = {where + 0.0:.4g} {UNITS[place]}" for value, where in ends)
-        lines.append(f"{name:8} {low}, to {high} ({result[name].unit})")
+        (low, at_low), (high, at_high) = (
+            (value + 0.0, f"{place} = {where + 0.0:.4g} {UNITS[place]}") for value, where in ends
+        )
+        unit, kind = result[name].unit, name.partition("_")[0]
+        if max(abs(low), abs(high)) < ROUNDING * largest[kind]:
+            lines.append(f"{name:8} zero to rounding")
+        elif high - low < ROUNDING * largest[kind]:
+            lines.append(f"{name:8} {low:.4g} {unit} throughout")
+        else:
+            lines.append(f"{name:8} {low:.4g} at {at_low}, to {high:.4g} at {at_high} ({unit})")
     lines.append(f"error    {_error(scene, error)}")
     work = float(np.sum((found.power[1:] + found.power[:-1]) / 2 * np.diff(found.t)))
     lines.append(f"work     {work:.4g} J of the grains on the body; power at most {found.power.max():.4g} W")

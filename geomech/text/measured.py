@@ -75,17 +75,18 @@ def described(fit: Fitted) -> str:
     (net, half_width), (mean, mean_half_width), unit = fit.displacement, fit.mean, fit.unit
     residual, wide = np.sqrt(((fit.measured - fit.predicted) ** 2).mean(0)), reach(fit)
     lines = [
-        f"{fit.log.name}: {len(fit.measured)} whole cycles of {', '.join(fit.log.joints)}, {fit.frequency:.6g} per unit of t; "
+        f"{fit.log.name}: {len(fit.measured)} whole cycles of {', '.join(fit.log.joints)}, {fit.frequency:.6g} per unit of t",
         f"phase within {fit.irregular:.2g} rad of a uniform run through each",
         f"displacement per cycle, with intervals of {fit.known.level:.3g} of cases:",
-        "            mean of the log        mean gait, by the connection   rms of a cycle: log - prediction",
+        f"{'':10}{'mean of the log':>19}   {'by the connection':>19}   rms of their difference",
     ]
     for k, (name, u) in enumerate((("x", unit), ("y", unit), ("heading", "rad"))):
-        pair = f"{mean[k]:11.6f} +-{mean_half_width[k]:7.1e}      {net[k]:11.6f} +-{half_width[k]:7.1e}"
-        lines.append(f"{name:>8}{pair}          {residual[k]:.2g} of {fit.measured[:, k].std():.2g} {u}")
+        pair = f"{mean[k]:11.6f} +-{mean_half_width[k]:7.1e}  {net[k]:11.6f} +-{half_width[k]:7.1e}"
+        lines.append(f"{name:>8}{pair}   {residual[k]:.2g} of {fit.measured[:, k].std():.2g} {u}")
     explained = "  ".join(f"{name} {100 * x:.3g} %" for name, x in zip(("x", "y", "heading"), fit.explained))
     return "\n".join([
         *lines,
-        f"connection: {fit.known.A.shape[-1] // 2} harmonics in the phase; explains of the body velocity {explained}",
+        f"connection: {fit.known.A.shape[-1] // 2} harmonics in the phase; explained of the body velocity:",
+        f"  {explained}",
         f"the data reach {wide.min():.3g} to {wide.max():.3g} rad from the mean gait; status: {status(fit)}",
     ])  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from typing import Any
 
-from geomech.core.summary import moved, wrapped
+from geomech.core.summary import moved
 from geomech.core.variables import Result
 from geomech.optimisation import Optimum
 from geomech.scenes.write import gait_table, toml
@@ -63,7 +63,7 @@ def text(result: Result) -> str:
         lines += _answers(optimum)
     if value.values <= start.values * (1 + 1e-12):
         lines.append("nothing better than the scene's own gait was found")
-    return "\n".join([*wrapped(lines), f"{optimum.evaluations} cycles evaluated in {optimum.seconds:.2g} s"])
+    return "\n".join([*lines, f"{optimum.evaluations} cycles evaluated in {optimum.seconds:.2g} s"])
 
 
 def _headline(result: Result) -> str:

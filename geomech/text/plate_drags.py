@@ -6,7 +6,7 @@ import json
 from typing import Any
 
 from geomech.core.variables import Result
-from geomech.text.rod_drag import MOST_ROWS
+from geomech.text.rod_drag import MOST_ROWS, RESIDUALS
 
 OF_COEFFICIENTS = "coefficient", "value", "interval", "resolution"
 
@@ -35,7 +35,16 @@ def numbers(result: Result) -> dict[str, Any]:
 
 
 def text(result: Result) -> str:
-    """Return the coefficients, what the map does over its plane, and the residuals in lines."""
+    """Return the coefficients, what the map does over its plane, and a few residuals in lines."""
+    return _lines(result, MOST_ROWS)
+
+
+def full(result: Result) -> str:
+    """Return the coefficients, what the map does over its plane, and all residuals in lines."""
+    return _lines(result, result["beta"].values.size)
+
+
+def _lines(result: Result, most: int) -> str:
     facts, zeta, beta = result.attributes, result.subject.zeta, result["beta"].values
     lines = [
         f"stress map fitted to {facts['name']}: {beta.size} plate drags",
@@ -45,8 +54,8 @@ def text(result: Result) -> str:
         lines.append(f"{name:5}{x:10.4f}   {low:7.4f} to {high:7.4f}{100 * abs(share):13.0f} %{y:16.4f}")
     lines.append(f"zeta of the generic set that comes nearest: {zeta:.4g}; rms residual {facts['rms']:.3g} N/cm^3")
     lines.append(f"the map {facts['map']}")
-    if beta.size > MOST_ROWS:
-        return "\n".join([*lines, "residuals: with --json"])
+    if beta.size > most:
+        return "\n".join([*lines, RESIDUALS])
     lines.append("    beta   gamma   alpha_x       map   alpha_z       map")
     stress, fitted = result["stress"].values, result["stress"].values - result["residual"].values
     for b, g, (x, z), (map_x, map_z) in zip(beta, result["gamma"].values, stress.T, fitted.T):

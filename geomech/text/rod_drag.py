@@ -12,7 +12,8 @@ from geomech.scenes.write import table
 
 UNITS = {"axial_stress": "Pa", "axial_force": "N", "gamma0_deg": "degrees"}
 SIZES = {"radius": "m", "length": "m", "depth": "m", "density": "kg/m^3"}
-MOST_ROWS = 60  # of a table of residuals
+MOST_ROWS = 10  # of a table of residuals that fits a screen
+RESIDUALS = "residuals: with --all or --json"
 
 
 def numbers(result: Result) -> dict[str, Any]:
@@ -40,7 +41,16 @@ def numbers(result: Result) -> dict[str, Any]:
 
 
 def text(result: Result) -> str:
-    """Return the law, its intervals and residuals in lines."""
+    """Return the law, its intervals and a few residuals in lines."""
+    return _lines(result, MOST_ROWS)
+
+
+def full(result: Result) -> str:
+    """Return the law, its intervals and all residuals in lines."""
+    return _lines(result, result["psi"].values.size)
+
+
+def _lines(result: Result, most: int) -> str:
     f, facts = result.subject, result.attributes
     lines = [f"{f.law} law fitted to {facts['name']}: {f.data.n_forces} forces at {f.data.n_angles} angles"]
     for name, x, (low, high) in zip(*(result[v].values for v in ("parameter", "value", "interval"))):
@@ -58,8 +68,8 @@ def text(result: Result) -> str:
     repeats = "" if facts["repeats_rms"] is None else f", among repeats {facts['repeats_rms']:.3g} N"
     lines.append(f"rms residual {f.rms:.3g} N{repeats}")
     psi, force, residual = (result[name].values.T for name in ("psi", "force", "residual"))
-    if psi.size > MOST_ROWS:
-        return "\n".join([*lines, "residuals: with --json"])
+    if psi.size > most:
+        return "\n".join([*lines, RESIDUALS])
     lines.append("  psi_deg  F_parallel_N       law  F_perpendicular_N       law")
     for angle, (t, n), (law_t, law_n) in zip(psi, force, np.round(force - residual, 12) + 0.0):
         lines.append(f"{angle:9.4g} {t:13.4g} {law_t:9.4g} {n:18.4g} {law_n:9.4g}")

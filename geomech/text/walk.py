@@ -41,7 +41,7 @@ def text(result: Result) -> str:
     scene, found = result.subject
     w, f, cost = found.walk, scene.gait.frequency, walking.cost_of_transport(scene, found.walk)
     known = w.status == "walking" and np.isfinite(cost)
-    share = f", cost of transport {cost:.3g} (work over weight times way, from rest)" if known else ""
+    share = f", cost of transport {cost:.3g} (work over weight times distance, from rest)" if known else ""
     return "\n".join([
         f"{scene.name}: {w.status} at {w.speed:.4g} +- {found.estimate:.1g} m/s at {f:g} Hz ({_regular(w)}{_settling(w)})",
         f"of the error {found.elements:.1g} m/s are of the elements, from twice as many",
@@ -49,8 +49,8 @@ def text(result: Result) -> str:
         f"t = 0 to {w.t[-1]:.4g} s: x to {w.pose[-1, 0]:.4g} m, z {w.pose[:, 1].min():.4g} to {w.pose[:, 1].max():.4g} m, "
         f"pitch {np.degrees(w.pose[:, 2].min()):.3g} to {np.degrees(w.pose[:, 2].max()):.3g} degrees (positive: nose down)",
         *_lateral(w),
-        f"work of the motors {w.work[-1]:.4g} J{share}; into the ground {w.loss[-1]:.4g} J; "
-        f"{100 * w.unaccounted:.1g} % of the work is not accounted for, an error of the time steps",
+        f"effort: work of the motors {w.work[-1]:.4g} J{share}",
+        f"into the ground {w.loss[-1]:.4g} J; not accounted for, by the steps: {100 * w.unaccounted:.1g} % of the work",
         *([_unsolved(w)] if w.unsolved else []),
     ])  # fmt: skip
 

@@ -1,5 +1,5 @@
-"""Tables of a connection read from files, whose contents are always checked: NetCDF as `geomech connection` writes it,
-and MATLAB files in sysplotter's layout."""
+"""Tables of a connection in files, a format each: NetCDF, and MATLAB files in sysplotter's layout. What is read is always
+checked."""
 
 from geomech.io.tables.base import FORMATS, ORDERS, SIGNS, Stored, scaled
 from geomech.io.tables.read import load

@@ -1,7 +1,7 @@
-"""A connection from a MATLAB file in sysplotter's layout: alpha1, alpha2, Ax1, Ax2, Ay1, Ay2, Atheta1, Atheta2, each (N, M).
+"""A connection as a MATLAB file in sysplotter's layout: alpha1, alpha2, Ax1, Ax2, Ay1, Ay2, Atheta1, Atheta2, each (N, M).
 
-Source: https://github.com/OSU-LRAM/GeometricSystemPlotter, Granular_Local_Connection_Matrix.mat. Files that
-`geomech.output.mat` wrote say more, in the variables ABOUT, RESIDUAL and ERROR.
+Source: https://github.com/OSU-LRAM/GeometricSystemPlotter, Granular_Local_Connection_Matrix.mat. Files that `write` wrote
+say more, in the variables ABOUT, RESIDUAL and ERROR.
 """
 
 from __future__ import annotations
@@ -10,11 +10,15 @@ import functools
 import io
 import json
 import warnings
+from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
+from geomech.core.variables import Result
 from geomech.geometry.connection import Connection
+from geomech.io.files import atomic_file
 from geomech.io.tables import matlab
 from geomech.io.tables.base import (
     FORMATS,
@@ -31,6 +35,7 @@ from geomech.io.tables.base import (
     numbers,
     rms,
 )
+from geomech.io.tables.netcdf import UNITS, shape_name
 from rft.refusal import Refusal
 
 ANGLES = ("alpha1", "alpha2")
@@ -39,7 +44,47 @@ ABOUT, RESIDUAL, ERROR = "geomech_about", "geomech_fit_residual", "geomech_A_err
 SAVE = "save it in MATLAB by save(FILE, ..., '-v7')"
 
 
-@FORMATS.register(suffix=".mat")
+def write(path: str | Path, result: Result, sign: str = "+", order: str = "ndgrid") -> None:
+    """Write A, each entry (N, M), for xi = ``sign`` A alphadot; rows run over alpha1 as of ndgrid, or over alpha2 as of
+    meshgrid.
+
+    ABOUT is a JSON text of sign, frame, body length, unit and spline. The file has the fit residual (3, N, M), too, which
+    includes the part of the velocity that is even in alphadot, and where A has intervals their half widths (3, 2, N, M). It
+    appears whole or not at all."""
+    from scipy.io import savemat
+
+    A, axes = result["A"], [result["alpha_1"], result["alpha_2"]]
+    residual = result["fit_residual"].values
+    if "even_part" in result:  # counts at half of all directions
+        residual = np.sqrt(residual**2 + result["even_part"].values ** 2 / 2)
+    known = np.isfinite(residual[:, ~np.isnan(A.values).any((0, 1))]).all()
+    extra = {RESIDUAL: residual} if known else {}
+    if A.error is not None:
+        extra[ERROR] = A.error
+    factor = 1.0 if sign == "+" else -1.0
+    shapes = dict(zip(ANGLES, np.meshgrid(*(axis.values for axis in axes), indexing="ij")))
+    entries = dict(zip(ENTRIES, factor * A.values.reshape(6, *A.values.shape[2:])))
+    ordered = (lambda x: x) if order == "ndgrid" else (lambda x: x.swapaxes(-1, -2))
+    arrays = {name: np.array(ordered(x)) for name, x in {**shapes, **entries, **extra}.items()}
+    about = _written_about(result.attributes, [shape_name(axis) for axis in axes], sign)
+    with atomic_file(path) as part:
+        savemat(part, {**arrays, ABOUT: json.dumps(about)}, appendmat=False)
+
+
+def _written_about(attributes: Mapping, names: list[str], sign: str) -> dict:
+    """Return what ABOUT says. names: of the shape variables."""
+    meaning = "alpha_k is the heading of link k+1 minus that of link k, link 1 the tail"
+    if names != ["alpha_1", "alpha_2"]:
+        meaning = f"alpha1 is {names[0]}, alpha2 {names[1]}"
+    return {
+        "sign": sign, "frame": attributes["frame"], "length": attributes["body_length"],
+        "unit": UNITS[attributes["length_unit"]], "interpolation": attributes["interpolation"], "shapes": names,
+        "conventions": f"xi = {sign} A alphadot; {meaning}",
+        **{key: value for key, value in attributes.items() if key in ("singular_shapes", "level")},
+    }  # fmt: skip
+
+
+@FORMATS.register(suffix=".mat", write=write, settings=("sign", "order"), joints=2, whole=False)
 def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     """Return the table in the bytes of a file; Refusal, to follow the file's name, if there is none."""
     variables = _variables(raw)

@@ -1,4 +1,4 @@
-"""A connection from the NetCDF file that `geomech connection` wrote (`geomech.output.netcdf`)."""
+"""A connection as the NetCDF file that `geomech connection` writes."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ from itertools import combinations
 
 import numpy as np
 
+from geomech.core.variables import Variable
 from geomech.geometry.connection import Connection
 from geomech.geometry.harmonics import Harmonics
 from geomech.geometry.metric import Finsler, Metric
 from geomech.geometry.tube import Loop, TaylorSeries, Tube
+from geomech.io.results import write_netcdf
 from geomech.io.tables.base import (
     FORMATS,
     ROWS,
@@ -35,7 +37,7 @@ ANGLES = ("rad", "radian", "radians")
 SHAPE = "shape variable "  # before the name of one that is no angle between links
 
 
-@FORMATS.register(suffix=".nc")
+@FORMATS.register(suffix=".nc", write=write_netcdf)
 def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     """Return the table in the bytes of a file; Refusal, to follow the file's name, if there is none."""
     if raw[:4] not in (b"CDF\x01", b"CDF\x02"):
@@ -56,7 +58,7 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
         raise Refusal("is damaged or cut short", instead=SOURCE) from None
     stored = _stored(variables, units, attributes, sign, sha256)
     shapes = [f"alpha_{k + 1}" for k in range(len(stored.connection.axes))]
-    called = [names[x].removeprefix(SHAPE) if names[x].startswith(SHAPE) else x for x in shapes]
+    called = [_called(x, names[x]) for x in shapes]
     return replace(stored, shapes=checked_names(called, shapes))
 
 
@@ -126,6 +128,15 @@ def _stored(variables: dict, units: dict, attributes: dict, sign: str, sha256: s
         connection, harmonics, even, length, unit, frame, sign, "ndgrid", (), sha256, metric=metric, power_degree=power,
         A_error=error, level=checked_level(attributes), sized=sized,
     )  # fmt: skip
+
+
+def shape_name(axis: Variable) -> str:
+    """Return the name of the shape variable along an axis of a field."""
+    return _called(axis.name, axis.label)
+
+
+def _called(name: str, label: str) -> str:
+    return label.removeprefix(SHAPE) if label.startswith(SHAPE) else name
 
 
 def _taylor_series(variables: dict, attributes: dict, turn: float) -> TaylorSeries:
