@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -73,7 +74,7 @@ def vector_field(
     return label_row(ax, arrows, component, connection, labels)
 
 
-def arrow_colours():
+def arrow_colours() -> Any:
     """Return a colour map whose ends are both seen on white, light to dark."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
