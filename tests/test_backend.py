@@ -63,7 +63,7 @@ def test_the_same_marches(name, monkeypatch):
         return solved
 
     monkeypatch.setattr("rft.stepping.solve", counted)
-    alpha, alphadot = GAIT.cycle(12, np.array([0.4, 1.0]))
+    alpha, alphadot = GAIT.cycle(8, np.array([0.4, 1.0]))
     effects = EFFECTS[name][0](0.2), EndCaps(radius=0.06, tail=1.0)
     effects = effects[:1] if name == "end-caps" else effects
     given = {"effects": effects, "cycles": 2, "with_work": True}

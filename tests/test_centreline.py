@@ -8,11 +8,10 @@ import pytest
 from commands import geomech
 from scipy.special import ellipe
 
-from geomech import scenes
+from geomech import Study, scenes
 from geomech.core.errors import Note, UnitWarning
 from geomech.gaits import Centreline, Sine
 from geomech.gaits.waves import arc_to_phase
-from geomech.studies.study import Study
 from geomech.studies.sweep import Sweep
 from rft import Backbone
 from rft.refusal import Refusal
@@ -85,7 +84,7 @@ def test_order_along_the_body(kind, tmp_path):
     """4 in the middle of the body, no less than 3 at the ends."""
     spacings, middle, whole = np.array([28, 56, 112]), [], []
     for n in spacings:
-        path = write(tmp_path, kind, count=160, places=n + 1, amplitude=0.05)
+        path = write(tmp_path, kind, count=112, places=n + 1, amplitude=0.05)
         middle.append(off(path, 0.05, slice(10, -10)))
         whole.append(off(path, 0.05))
     assert order(middle, spacings) == pytest.approx(4.0, abs=0.4)
@@ -258,7 +257,7 @@ def test_file_lies_beside_the_scene(tmp_path, monkeypatch):
     assert (code, err) == (0, "")
     made = scenes.load(toml)
     sine = Study(made).poses("direct", Sine(amplitude=0.1, elements=ELEMENTS))
-    assert float(out.splitlines()[2].split()[1]) == pytest.approx(np.hypot(*sine[:2]), abs=2e-5)
+    assert float(out.splitlines()[2].split()[1]) == pytest.approx(sine[0], abs=2e-5)
     with pytest.raises(Refusal, match="cannot read"):
         scenes.parse(toml.read_text())
     monkeypatch.chdir(tmp_path)
@@ -443,7 +442,9 @@ def test_what_an_estimate_leaves_out_is_told(tmp_path):
     write(tmp_path / "data", "points", count=12, places=20)
     for more in ([], ["--json"]):
         told = geomech("displacement", toml, "--amplitudes", "1", *more)[1]
-        assert json.loads(told)["estimate_is"] == said if more else f"\nestimated error: {said}\n" in told
+        assert (
+            json.loads(told)["estimate_is"] == said if more else f" estimated error: {said} " in " ".join(told.split())
+        )
     measured = Study(scenes.load(toml))
     swept = lambda scene: Sweep(scene, {"gait.amplitude": [1.0]}).ask().attributes
     assert measured.study([1.0], ["direct"]).to_xarray().attrs["estimate_is"] == said

@@ -122,7 +122,7 @@ def test_accuracy_leaves_its_study(undrawn, tmp_path):
     assert all(len(x["value"]) == len(x["error"]) == len(x["seconds"]) for x in found["lines"])
     written = (tmp_path / "out" / "accuracy.txt").read_text()
     assert written == "\n".join([accuracy.table(found), "", *accuracy.sentences(found), ""])
-    assert out.startswith(written)
+    assert " ".join(out.split()).startswith(" ".join(written.split()))  # lines are wrapped on a screen
 
 
 def test_run_leaves_everything(undrawn, tmp_path):

@@ -180,14 +180,14 @@ def started(args, cwd):
 
 
 def test_a_signal_stops_the_solvers_threads(large):
-    """One batch of a million balances, solved on both cores: nobody waits for its shares."""
+    """One batch of half a million balances, solved on both cores: nobody waits for its shares."""
     code = """if True:
         import os, signal, sys, threading, numpy as np
         from geomech import terminal
         from geomech.terminal import stoppable
         from rft import Chain, Granular, body_velocity
-        shapes = np.random.default_rng(0).uniform(-2, 2, (2, 2_000_000, 2))
-        threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGTERM)).start()
+        shapes = np.random.default_rng(0).uniform(-2, 2, (2, 500_000, 2))
+        threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGTERM)).start()
         try:
             with stoppable():
                 body_velocity(Granular(1.8, .24), Chain(), *shapes, threads=2)

@@ -179,9 +179,11 @@ BY_HAND = [pytest.param(x, marks=pytest.mark.soak) for x in (("displacement", 2.
 @pytest.fixture(scope="module", params=[("displacement", 3.0), *BY_HAND], ids=str)
 def sand(request):
     objective, limits = request.param
-    return optimise(geomech.load("three-link-glass"), objective, limits=limits)
+    return optimise(geomech.load("three-link-glass"), objective, limits=limits, starts=STARTS[request.param][0])
 
 
+# By default 9; 7 lead to the same gait. The second are those that narrower limits led to.
+STARTS = {("displacement", 3.0): (7, 3), ("displacement", 2.5): (9, 4), ("efficiency", 2.5): (9, 4)}
 LEAST = {("displacement", 2.5): 0.4415, ("displacement", 3.0): 0.6938, ("efficiency", 2.5): 0.2245}
 
 
@@ -193,9 +195,10 @@ def test_best_gaits_in_sand(sand):
     assert sand.value == sand.answers[0][0]
     assert len(sand.active) == (4 if asked[0] == "displacement" else 2)
     assert np.abs(sand.gait.cycle(20_000)[0]).max() <= asked[1]
-    assert sum(times for _, times in sand.answers + sand.others) == 9 + 4
+    starts, more = STARTS[asked]
+    assert sum(times for _, times in sand.answers + sand.others) == starts + more
     told = optima.text(result_of(sand))
-    assert "9 starts, and 4 that narrower limits led to, answers that differ: " in told
+    assert f"{starts} starts, and {more} that narrower limits led to, answers that differ: " in told
     assert "by a table alone, less: " in told
     assert optima.numbers(result_of(sand))["answers"] == [list(x) for x in sand.answers + sand.others]
 

@@ -153,7 +153,7 @@ def test_commands_tell_the_surface_and_draw_slices(tmp_path):
     assert (code, err) == (0, "") and table["units"]["surface_spread"] == "m"
     spread = table["surface_spread"]["area"]
     assert 0 < spread[0] < spread[1] < table["estimate"]["area"][1]
-    lines = geomech(*args, "area", cwd=tmp_path)[1].splitlines()
+    lines = geomech(*args, "area", "--all", cwd=tmp_path)[1].splitlines()
     at = next(k for k, line in enumerate(lines) if line.startswith("area: over a cone from the loop's mean shape"))
     assert lines[at + 1].split()[:3] == ["amplitude", "position", "(m)"]
     assert float(lines[at + 3].split()[1]) == pytest.approx(spread[1], rel=0.06)

@@ -16,7 +16,7 @@ from registry import SYSTEMS
 from scipy.io import loadmat, netcdf_file, savemat
 
 import rft
-from geomech import plots, scenes
+from geomech import Study, plots, scenes
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
@@ -25,7 +25,6 @@ from geomech.io.tables import matlab
 from geomech.scenes import Numerics, Scene
 from geomech.studies import accuracy, choose, estimate, fields, tiered
 from geomech.studies.single import single
-from geomech.studies.study import Study
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from geomech.systems.base import length_unit
 from geomech.systems.table import LENGTHS

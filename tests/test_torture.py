@@ -150,7 +150,7 @@ def whole(tmp_path_factory):
 
 
 def test_kills_and_interrupts_change_no_digit(place, whole):
-    assert tortured("sweep", place, whole, 4, 0)
+    assert tortured("sweep", place, whole, 3, 0)
 
 
 @pytest.mark.soak

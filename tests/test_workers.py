@@ -216,7 +216,7 @@ def test_error_studies_have_the_same_digits_whoever_computes(two, given_away, mo
 
 def test_searches_have_the_same_digits_whoever_computes(two, given_away):
     scene, told = GLASS.with_numerics(grid=7), []
-    request = checked(scene, "efficiency", harmonics=1, starts=3)
+    request = checked(scene, "efficiency", harmonics=1, starts=2)
     here, shared = both(two, lambda: search(request, told.append))
     numbers = lambda optimum: text.numbers(result_of(optimum)) | {"seconds": 0.0}
     assert numbers(here) == numbers(shared)
@@ -276,7 +276,7 @@ def test_a_signal_at_any_moment_leaves_nobody_waiting(monkeypatch):
     monkeypatch.setattr(executors, "SIGNALS", [signal.SIGALRM])
     before = signal.signal(signal.SIGALRM, ring)
     try:
-        for k in range(4):
+        for k in (0, 2):
             with contextlib.suppress(Rung), using(2):
                 executor = runner().executor
                 assert each(executor, doubled, 2, range(3)) == [0, 2, 4]

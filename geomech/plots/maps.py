@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
 from geomech.geometry.metric import Finsler, Metric
 from geomech.plots.style import axes_of, figure, quantity, styled
+
+if TYPE_CHECKING:
+    from matplotlib.colors import ListedColormap
 
 ROUNDING = 1e-13  # of the largest entry of A: a row below it is nothing but rounding
 COMPONENTS = ("x", "y", r"\theta")
@@ -74,7 +77,7 @@ def vector_field(
     return label_row(ax, arrows, component, connection, labels)
 
 
-def arrow_colours() -> Any:
+def arrow_colours() -> ListedColormap:
     """Return a colour map whose ends are both seen on white, light to dark."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
