@@ -467,6 +467,7 @@ def test_colours_have_a_limit():
     assert limits(components=("theta", "x"), clim=0.25) == [0.25, 0.25]
     expected = [np.percentile(np.abs(x), 90) for x in values]
     np.testing.assert_allclose(limits(components=("x", "y", "theta"), clim="90%"), expected)
+    assert only(plots.ccf_map(field, 1, clim="90%"), QuadMesh).get_clim()[1] == pytest.approx(expected[1])
     for clim, ends in ((None, "neither"), (1.2, "max"), (0.5, "both")):
         bar = only(plots.ccf_figure(field, components=("x",), clim=clim).axes[0], QuadMesh).colorbar
         assert bar.extend == ends
