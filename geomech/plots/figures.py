@@ -79,7 +79,7 @@ def pairs_figure(form: TwoForm, at: Sequence[float], component: int = 0, *, labe
     fig, axes = figure(3.6 * columns, 3.2 * rows, columns, rows, layout="compressed")
     top = max(largest(f.values[component]) for f in fields)
     for (i, j), field, ax in zip(form.pairs, fields, axes.ravel()):
-        ccf_map(field, component, ax=ax, labels=(labels[i], labels[j]), top=top)
+        ccf_map(field, component, ax=ax, labels=(labels[i], labels[j]), clim=top)
         fixed = ", ".join(
             f"{quantity(labels[k][0])} = {at[k]:g}".replace("-", MINUS_SIGN)
             for k in range(len(labels))
@@ -191,7 +191,7 @@ def _ccf_rows(rows: Sequence[Row], style: str, metric, names: Sequence[str], sam
         if same:
             tops = [max((x for x in tops if x), default=None)] * len(rows)
         for r, ax, top in zip(rows, axes[:, k], tops):
-            draw(r.field, component, r.gaits, ax=ax, error=r.error, labels=r.labels, top=top, **more)
+            draw(r.field, component, r.gaits, ax=ax, error=r.error, labels=r.labels, clim=top, **more)
             for shadow in r.shadows:
                 if solid:
                     ax.plot(*shadow.shape(PHASES).T, ax.get_zlim()[0], "--", color="black", lw=1.0)

@@ -127,15 +127,16 @@ def has(field: Field, component: int) -> bool:
 @styled
 def ccf_map(
     field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax: Axes | None = None, error: Field | None = None,
-    labels: Labels = ANGLES, legend: bool = True, metric: Metric | Finsler | None = None, top: float | None = None,
+    labels: Labels = ANGLES, legend: bool = True, metric: Metric | Finsler | None = None,
+    clim: float | str | None = None,
 ) -> Axes:  # fmt: skip
     """Draw a component of the CCF over shape space with gaits on it (Fig. 11(d)), as far as the field goes; the colours are
     centred on zero. A component that is rounding alone is drawn as zero.
 
     error: of the field (`curvature.error`). Hatched are patches where it exceeds the value, so that not even the sign is known
     (`unknown`); there no line of zeros is drawn, and next to them only lines that part two known signs (`certain`). labels: as
-    for `shape_space`. legend: explain hatching and rings below the map. metric: drawn as rings (`indicatrices`). top: of the
-    colours, for maps that are compared."""
+    for `shape_space`. legend: explain hatching and rings below the map. metric: drawn as rings (`indicatrices`). clim: limit of
+    the colours on either side of zero, a number or a percentile of the values' size such as "98%"; else their largest."""
     from cmcrameri import cm
 
     ax = axes_of(ax)
@@ -143,7 +144,7 @@ def ccf_map(
     values, drawn = field.values[component], has(field, component)
     if not drawn:
         values, error = 0 * values, None
-    top, smooth = top or (largest(values) if drawn else 1.0), "nearest" if field.masked else "gouraud"
+    top, smooth = limit_of(values, clim) if drawn else 1.0, "nearest" if field.masked else "gouraud"
     image = ax.pcolormesh(*field.axes, values.T, cmap=cm.vik, vmin=-top, vmax=top, shading=smooth, rasterized=True)
     hidden, handles = None, []
     if error is not None:

@@ -9,7 +9,7 @@ import numpy as np
 from geomech.geometry.stretch import stretch
 from geomech.optimisation import Optimum
 from geomech.optimisation.gain import PHASES, Gained, gained_ccf, limiting
-from geomech.plots.maps import ccf_map, limit_of, shape_space
+from geomech.plots.maps import ccf_map, shape_space
 from geomech.plots.stretched import stretched_map
 from geomech.plots.style import axes_of, figure, quantity, styled
 from geomech.studies.study import Study
@@ -50,8 +50,7 @@ def optimum_map(
     else:
         gained = gained or gained_ccf(optimum)
         field, component = gained
-        top = limit_of(field.values[component], clim)
-        ccf_map(field, component, ax=ax, labels=shape_labels(system), top=top)
+        ccf_map(field, component, ax=ax, labels=shape_labels(system), clim=clim)
         frame = f"frame {optimum.scene.frame}" if field.masked else "minimum-perturbation frame"
         ax.set_title(f"{ax.get_title()},\n{frame}")
     draw_start_and_best(optimum, ax, lambda curve: curve, gained)

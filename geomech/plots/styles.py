@@ -24,6 +24,7 @@ from geomech.plots.maps import (
     finer,
     label_row,
     largest,
+    limit_of,
     shape_space,
     unit_of,
     vector_field,
@@ -79,7 +80,7 @@ def streamlines(
 @styled
 def ccf_contours(
     field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax: Axes | None = None, error: Field | None = None,
-    labels: Labels = ANGLES, top: float | None = None,
+    labels: Labels = ANGLES, clim: float | str | None = None,
 ) -> Axes:  # fmt: skip
     """Draw a component of the CCF as contours, dashed below zero, and shade the area of each gait by the sign of its
     contribution to the displacement: CCF times winding number.
@@ -89,7 +90,7 @@ def ccf_contours(
 
     ax, field = axes_of(ax), drawable(field)
     axes, values = finer(field, field.values[component])
-    most = top or largest(values)
+    most = limit_of(values, clim)
     levels = MaxNLocator(2 * LEVELS, steps=[1, 2, 2.5, 5, 10], symmetric=True).tick_values(-most, most)
     looks = {0: ("0.6", 1.4, "-"), 1: ("0.25", 0.6, "-"), -1: ("0.25", 0.6, "--")}
     colours, widths, dashes = zip(*(looks[int(np.sign(x)) if abs(x) > 1e-9 * most else 0] for x in levels))
@@ -150,7 +151,7 @@ def winding(curve: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 @styled
 def ccf_surface(
     field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax: Axes | None = None, error: Field | None = None,
-    labels: Labels = ANGLES, top: float | None = None,
+    labels: Labels = ANGLES, clim: float | str | None = None,
 ) -> Axes:  # fmt: skip
     """Draw a component of the CCF as a surface over shape space, with gaits on it and, on the plane below, their areas shaded
     by sign as in `ccf_contours`.
@@ -163,7 +164,7 @@ def ccf_surface(
     ax = blank(4.2, 3.6).add_subplot(projection="3d") if ax is None else ax
     field = drawable(field)
     axes, values = finer(field, field.values[component])
-    most = top or largest(values)
+    most = limit_of(values, clim)
     clipped = np.clip(values, -most, most)
     ax.plot_surface(
         *np.meshgrid(*axes, indexing="ij"), clipped, cmap=cm.vik, vmin=-most, vmax=most, rcount=121, ccount=121, lw=0,

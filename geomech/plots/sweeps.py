@@ -71,7 +71,7 @@ def drawn(scene: Scene, results: Mapping):
 @styled
 def _line(ax, x, values: np.ndarray, errors: np.ndarray, medium: np.ndarray | None, label: str) -> None:
     marker = "o" if len(x) <= MARKED else ""
-    ax.errorbar(x, values, yerr=errors, fmt=f"{marker}-", color="black", ms=3, lw=1)
+    ax.errorbar(x, values, yerr=errors, fmt=f"{marker}-", color="black", ms=3, lw=1, label="with estimated error")
     if medium is not None:
         medium_band(ax, x, values, medium)
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))

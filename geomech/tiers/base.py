@@ -135,7 +135,7 @@ class Tier:
 
     @property
     def colour(self) -> str:
-        """Colour of its markers and error bars."""
+        """Colour of its markers and of the band of its error."""
         return self.markers or self.style["color"]
 
     @property
