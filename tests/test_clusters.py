@@ -79,6 +79,7 @@ def test_a_worker_that_is_ended_loses_nothing(processes, tmp_path, monkeypatch):
     monkeypatch.setattr(executors, "WAIT", 30.0)
     monkeypatch.setattr(executors, "SEEN", 0.2)
     with using(scheduler=local.scheduler_address):
+        monkeypatch.setattr(executors, "WAIT", 3.0)  # to close the connection; its workers have come
         assert list(runner().map(dies, str(tmp_path), range(8), 8)) == [*range(8)]
         assert (tmp_path / "died").exists()
         assert sorted(process.poll() is None for process in both) == [False, True]
