@@ -119,7 +119,7 @@ class ShapeSpace(Question):
         if len(pairs) > MOST_PAIRS:
             raise Refusal(
                 f"{joints} joints have {len(pairs)} pairs",
-                instead=f"say which, such as `pair` 1,{joints}, or give a chain [body] modes",
+                instead=f"say which, such as ``pair`` 1,{joints}, or give a chain [body] modes",
             )
         return [(one, through(self.scene, one, self.slice_angles, self.pair is not None)) for one in pairs]
 
@@ -134,7 +134,7 @@ class ShapeSpace(Question):
             if self.metric and (reason := why_none(system)):
                 raise Refusal(reason, where=name)
             if self.other_frame is not None and len(self._at) > 1:
-                raise Refusal("`compare_frame` draws one pair of joints", instead="say which with `pair`")
+                raise Refusal("``compare_frame`` draws one pair of joints", instead="say which with ``pair``")
         _ = self.other
 
     def cost(self) -> Cost:
@@ -202,10 +202,10 @@ def _pair(text: str, joints: int) -> tuple[int, int]:
     """Return the joints, counted from 0, of a text such as 1,3."""
     names = text.split(",")
     if len(names) != 2 or not all(x.strip().isdecimal() for x in names):
-        raise Refusal(f"{text!r} is not two joints such as 1,{joints}", where="`pair`")
+        raise Refusal(f"{text!r} is not two joints such as 1,{joints}", where="``pair``")
     i, j = (int(x) - 1 for x in names)
     if i == j or not all(0 <= k < joints for k in (i, j)):
-        raise Refusal(f"{text!r} must be two different joints from 1 to {joints}", where="`pair`")
+        raise Refusal(f"{text!r} must be two different joints from 1 to {joints}", where="``pair``")
     return i, j
 
 
@@ -214,22 +214,22 @@ def through(scene: Scene, pair: tuple[int, int], angles: tuple[float, ...] | Non
     only."""
     at, fixed = scene.gait.middle.copy(), [k for k in range(scene.system.joints) if k not in pair]
     if angles is not None and not fixed:
-        raise Refusal("`slice` says where other joints are held, and this body has but two", instead="drop it")
+        raise Refusal("``slice`` says where other joints are held, and this body has but two", instead="drop it")
     if angles is None:
         return at
     extent = scene.numerics.extent
     if not (stored_table(scene.system, "connection") or all(abs(a) <= extent for a in angles)):
         raise Refusal(
             f"the angles must lie within the field's {extent:g} rad",
-            where="`slice`",
-            instead="give others, or raise `extent`",
+            where="``slice``",
+            instead="give others, or raise ``extent``",
         )
     if len(angles) == len(at) > 1:
         return np.array(angles)
     if len(angles) != 1 and not (alone and len(angles) == len(fixed)):
         choices = f"{len(fixed)} one by one, " * (alone and len(fixed) > 1) + "or "
         raise Refusal(
-            f"`slice` takes one angle for all joints that are held, {choices}{len(at)} for a shape", value=len(angles)
+            f"``slice`` takes one angle for all joints that are held, {choices}{len(at)} for a shape", value=len(angles)
         )
     at[fixed] = angles
     return at
@@ -246,7 +246,7 @@ def ccf(
     """Return the question of a CCF. metric, stretch: its picture needs the metric."""
     sliced = scene.system.joints > 2 or pair is not None or slice_angles is not None
     if sliced and (metric or stretch):
-        raise Refusal("`metric` and `stretch` are those of two joints", instead="drop them for slices")
+        raise Refusal("``metric`` and ``stretch`` are those of two joints", instead="drop them for slices")
     if sliced:
         return ShapeSpace(
             scene, field=False, planes=True, pair=pair, slice_angles=slice_angles, other_frame=other_frame
@@ -267,7 +267,7 @@ def connection(
     fields.check_joints(scene, file)
     sliced = drawn and (scene.system.joints > 2 or pair is not None or slice_angles is not None)
     if sliced and other_frame is not None:
-        raise Refusal("`compare_frame` draws maps of two joints", instead="drop it, or see 'geomech ccf --pair'")
+        raise Refusal("``compare_frame`` draws maps of two joints", instead="drop it, or see 'geomech ccf --pair'")
     picture = {
         "map": drawn and not sliced,
         "planes": sliced,
