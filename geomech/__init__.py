@@ -34,8 +34,8 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.app import fit_medium as fit_medium
     from geomech.app import optimise as optimise
     from geomech.app import optimize as optimize
-    from geomech.app import study as study
     from geomech.app import sweep as sweep
+    from geomech.app.study import study as study
     from geomech.geometry import connection as connection
     from geomech.geometry import curvature as curvature
     from geomech.geometry import reconstruct as reconstruct

@@ -11,12 +11,13 @@ import functools
 import math
 import numbers
 from dataclasses import fields, is_dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, get_args, get_type_hints
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeGuard, get_args, get_type_hints
 
 from rft.refusal import Refusal, require
 
 if TYPE_CHECKING:
     import numpy as np
+from numpy.typing import ArrayLike
 
 
 class Number(NamedTuple):
@@ -33,7 +34,7 @@ class Number(NamedTuple):
 
 
 @functools.cache
-def number_fields(kind: type) -> dict[str, Number]:
+def number_fields(kind: Any) -> dict[str, Number]:
     """Return the `Number` annotations of a class by field."""
     try:
         hints = get_type_hints(kind, include_extras=True)
@@ -47,7 +48,8 @@ def check_numbers(owner: Any) -> None:
     """Raise ValueError unless the number fields of an object lie within the bounds of their annotations, or are None where
     that is the default; store integers as int."""
     defaults = {f.name: f.default for f in fields(owner)} if is_dataclass(owner) else {}
-    for name, number in number_fields(type(owner)).items():
+    kind: Any = type(owner)
+    for name, number in number_fields(kind).items():
         value = getattr(owner, name)
         if value is not None or defaults.get(name) is not None:
             in_range(name, value, number.low, number.high, number.whole, number.unit)
@@ -55,7 +57,7 @@ def check_numbers(owner: Any) -> None:
                 object.__setattr__(owner, name, int(value))
 
 
-def real_array(name: str, x) -> np.ndarray:
+def real_array(name: str, x: ArrayLike) -> np.ndarray:
     """Return x as an array of floats; ValueError with its name unless it is an array of real numbers."""
     import numpy as np  # a command that refuses starts without it
 
@@ -68,7 +70,7 @@ def real_array(name: str, x) -> np.ndarray:
     raise Refusal(f"{name} must be real numbers in equal rows", value=x)
 
 
-def is_number(value: object) -> bool:
+def is_number(value: object) -> TypeGuard[float]:
     """Return whether value is one real number; True and False are not."""
     return isinstance(value, numbers.Real) and not isinstance(value, bool)
 
@@ -78,9 +80,9 @@ def is_whole(value: object) -> bool:
     return is_number(value) and (isinstance(value, numbers.Integral) or (math.isfinite(value) and value == int(value)))
 
 
-def in_range(name: str, value: object, low: float, high: float, whole: bool = False, unit: str = "-") -> None:
+def in_range(name: str, value: Any, low: float, high: float, whole: bool = False, unit: str = "-") -> None:
     """Raise ValueError with the name unless value is a number, if ``whole`` an integer, from low to high."""
-    exact = value.item() if hasattr(value, "item") and is_number(value) else value  # float32 has no 1e-50
+    exact = getattr(value, "item", lambda: value)() if is_number(value) else value  # float32 has no 1e-50
     if not ((is_whole if whole else is_number)(value) and low <= exact <= high):
         bounds = f"{low:g} to {high:g}" + (f" {unit}" if unit != "-" else "")
         raise Refusal(f"{name} must be a {'whole ' * whole}number from {bounds}", value=value)

@@ -11,7 +11,7 @@ import unicodedata
 from collections.abc import Callable, Iterator
 from typing import Any
 
-ARGUMENT = re.compile("`([a-z_]+)`")  # in the words of a refusal
+ARGUMENT = re.compile("``([a-z_]+)``")  # in the words of a refusal
 
 
 class Refusal(ValueError):
@@ -19,7 +19,7 @@ class Refusal(ValueError):
 
     what: says what is wrong. value: what was given, where that tells more. where: the way there, outermost first (file or
     scene, table, key, argument). because: why it cannot be. instead: what to give or to do. The name of an argument
-    stands in backticks: Python shows it bare, and a command as its option (`said`).
+    stands in double backticks: Python shows it bare, and a command as its option (`said`).
     """
 
     def __init__(self, what: str, *, value: Any = ..., where: Any = (), because: str = "", instead: str = ""):

@@ -55,10 +55,10 @@ class Registry(Mapping[str, Any]):
         return [self[name] for name in self if name not in self.built_in]
 
     @overload
-    def register(self, part: Part, /) -> Part: ...
+    def register(self, part: Part, /, **members: Any) -> Part: ...
 
     @overload
-    def register(self, **members: Any) -> Callable[[Part], Part]: ...
+    def register(self, part: None = None, /, **members: Any) -> Callable[[Part], Part]: ...
 
     def register(self, part: Any = None, /, **members: Any) -> Any:
         """Add a part under its name and return it: a decorator. Of the same module and name it takes the place of the one
@@ -75,7 +75,7 @@ class Registry(Mapping[str, Any]):
         """Add a part under a name; ValueError as `register`."""
         who = f"{self.noun} of one's own, {getattr(part, '__name__', name)},"
         if isinstance(part, type):
-            if not dataclasses.is_dataclass(part) or not part.__dataclass_params__.frozen:
+            if not dataclasses.is_dataclass(part) or not part.__dataclass_params__.frozen:  # type: ignore[attr-defined]
                 raise Refusal(f"{who} must be a value", instead="put @dataclass(frozen=True) above it")
             if self.key in {f.name for f in dataclasses.fields(part)}:
                 raise Refusal(
@@ -102,7 +102,7 @@ class Registry(Mapping[str, Any]):
 
     def examples(self) -> dict[str, Any]:
         """Return parts of every class by name: those of its ``examples()``, else one without parameters."""
-        own_parts = {}
+        own_parts: dict[str, Any] = {}
         for name, part in self.items():
             own = getattr(part, "examples", None)
             own_parts |= own() if own else {name: part() if isinstance(part, type) else part}

@@ -15,6 +15,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rft import limit_cycle
 from rft.balance.arrays import frame_net, velocities, with_frame_velocity
@@ -85,8 +86,8 @@ class TimeSteps(NamedTuple):
 def time_steps(
     medium: Medium,
     body: Body,
-    alpha,
-    alphadot,
+    alpha: ArrayLike,
+    alphadot: ArrayLike,
     *,
     effects: Sequence[Effect] = (),
     cycles: int | None = None,

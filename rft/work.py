@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rft.balance.arrays import loads as loads_on
 from rft.balance.arrays import velocities, with_frame_velocity
@@ -45,9 +46,9 @@ class Work(NamedTuple):
 def work_done(
     medium: Medium,
     body: Body,
-    alpha,
-    alphadot,
-    xi,
+    alpha: ArrayLike,
+    alphadot: ArrayLike,
+    xi: ArrayLike,
     *,
     loads: str = "exact",
     regularisation: float = 1e-6,

@@ -216,5 +216,5 @@ def test_a_metric_of_the_systems_own_has_lengths_and_no_work(name, capsys):
     assert metric.path_length(study.metric.norm, study.scene.gait, [0.8]) == pytest.approx([length], rel=1e-4)
     with pytest.raises(SystemExit) as ended:
         main(["displacement", name, "--amplitudes", "0.8", "--tiers", "direct", "--effort"])
-    assert ended.value.code == 0 and f"path length: {effort.METRIC}" in capsys.readouterr().out
+    assert ended.value.code == 0 and f"path length ({effort.METRIC})" in capsys.readouterr().out
     assert "metric" in study.to_xarray()

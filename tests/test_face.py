@@ -1,5 +1,6 @@
 """The Python face: one study from a name or from parts, whose tables and pictures show themselves."""
 
+import doctest
 import pkgutil
 from importlib import import_module
 
@@ -74,7 +75,7 @@ def test_what_makes_no_scene_is_refused(parts, says):
 def test_a_table_of_displacements_prints_and_plots_itself(study):
     table = study.displacement([0.5, 1.0], "direct")
     assert_allclose(table["direct"], study.poses("direct", amplitudes=[0.5, 1.0]), atol=1e-5)
-    assert "displacement per cycle (BL), direct tier" in repr(table) and "<table>" in table._repr_html_()
+    assert "displacement per cycle (BL), direct tier" in repr(table) and "<table" in table._repr_html_()
     (line, *_), ax = table.plot().lines, table.plot()
     assert_allclose(line.get_ydata(), table["net_distance"]["direct"])
     assert (ax.get_ylabel(), ax.get_xlabel()) == ("net distance per cycle (BL)", "radius of the circle (rad)")
@@ -134,6 +135,23 @@ def test_a_medium_is_fitted_to_drag(tmp_path):
 def test_a_picture_of_something_else_says_what_it_draws(draw, study):
     with pytest.raises(Refusal, match=f"{draw.__name__} draws an? .*, got Study"):
         draw(study)
+
+
+def test_the_example_of_a_study_runs():
+    assert doctest.testmod(import_module("geomech.app.study")) == (0, 3)
+
+
+def test_a_refusal_names_the_argument_and_a_command_its_option():
+    from commands import geomech as command
+
+    with pytest.raises(Refusal, match="three-link-viscous: limits must be a number from"):
+        geomech.optimise("three-link-viscous", limits=0.0)
+    code, _, err = command("optimize", "three-link-viscous", "--objective", "turning", "--starts", "0")
+    assert code == 2 and "three-link-viscous: --starts must be a whole number from 1 to 1000, got 0" in err
+    with pytest.raises(Refusal, match="body_length must be"):
+        geomech.fit_log("log.csv", body_length=-1)
+    code, _, err = command("displacement", "three-link-viscous", "--amplitudes", "1", "--tol", "0")
+    assert code == 2 and "--tol must be a number > 0" in err
 
 
 def test_packages_list_their_public_names():

@@ -150,7 +150,7 @@ def test_what_is_told_is_what_the_scene_does(cheap):
     numbers = json.loads(json.dumps(optima.numbers(result_of(cheap))))
     assert list(numbers) == [
         "objective", "value", "start_value", "displacement", "path_length", "work", "gait", "evaluations", "seconds",
-        "active", "answers", "estimate", "body_length", "units",
+        "active", "answers", "estimate", "body_length", "zero_by_symmetry", "units",
     ]  # fmt: skip
     assert numbers["gait"]["kind"] == "fourier"
 
@@ -652,7 +652,7 @@ def test_chains_without_drag_cost_what_their_metric_says():
     assert found.best.length == pytest.approx(length, rel=1e-10)
     assert found.value == pytest.approx(np.hypot(*found.best.displacement[:2]) / length, rel=1e-10)
     assert found.value > 1.005 * found.start.value
-    assert "of the system's own metric" in optima.text(result_of(found))
+    assert " own metric" in optima.text(result_of(found))
 
 
 @pytest.mark.parametrize("name", ["three-link-viscous", "three-link-ideal-fluid"])

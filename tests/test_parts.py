@@ -116,7 +116,7 @@ geomech.register(Tier("leading", "area times the CCF in the middle", {"color": "
 """,
     "plot": """
 @geomech.plots.CCF_STYLES.register(style="dots")
-def dots(field, component=0, gaits=(), *, ax=None, error=None, labels=(), top=None):
+def dots(field, component=0, gaits=(), *, ax=None, error=None, labels=(), clim=None):
     x, y = np.meshgrid(*field.axes, indexing="ij")
     return ax.scatter(x, y, c=field.values[component])
 """,

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from artists import mesh, only
+from commands import geomech
 from matplotlib.collections import QuadMesh
 from matplotlib.colors import to_rgba
 from matplotlib.quiver import Quiver
@@ -466,6 +467,7 @@ def test_colours_have_a_limit():
     assert limits(components=("theta", "x"), clim=0.25) == [0.25, 0.25]
     expected = [np.percentile(np.abs(x), 90) for x in values]
     np.testing.assert_allclose(limits(components=("x", "y", "theta"), clim="90%"), expected)
+    assert only(plots.ccf_map(field, 1, clim="90%"), QuadMesh).get_clim()[1] == pytest.approx(expected[1])
     for clim, ends in ((None, "neither"), (1.2, "max"), (0.5, "both")):
         bar = only(plots.ccf_figure(field, components=("x",), clim=clim).axes[0], QuadMesh).colorbar
         assert bar.extend == ends
@@ -484,3 +486,39 @@ def test_components_choose_rows_of_the_connection():
     assert titles() == ["forward", "turning"]
     assert titles(components=("y", "theta")) == ["sideways", "turning"]
     assert plots.connection_figure(fitted).get_supxlabel() == r"$\mathbf{A}^{y}$: zero everywhere"
+
+
+def test_options_of_figures_reach_them_from_commands(tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(plots, "save", lambda fig, *paths: drawn.append(fig))
+    (tmp_path / "own.csv").write_text("amplitude_deg,value,error\n30,-0.01,0.002\n60,-0.05,0.004\n")
+
+    def figures(*args):
+        drawn.clear()
+        code, _, err = geomech(*args, cwd=tmp_path)
+        assert code == 0, err
+        return drawn
+
+    limit = lambda fig: only(fig.axes[0], QuadMesh).get_clim()[1]
+    args = ("--plot", "a.png", "--component", "x", "--data", "own.csv")
+    (fig,) = figures("displacement", "three-link-viscous", "--amplitudes", "0.5,1", "--tiers", "direct", *args)
+    (ax,) = fig.axes
+    (points,) = (c for c in ax.containers if c.get_label() == MEASURED)
+    np.testing.assert_allclose(points.lines[0].get_xydata(), [[np.pi / 6, -0.01], [np.pi / 3, -0.05]])
+    assert ax.get_ylabel() == "x per cycle (BL)"
+    (fig,) = figures(
+        "ccf", "three-link-viscous", "--grid", "7", "--plot", "a.png", "--component", "theta", "--clim", "0.5"
+    )
+    assert limit(fig) == 0.5 and "turning" in fig.axes[0].get_title()
+    (fig,) = figures(
+        "connection", "three-link-viscous", "--grid", "7", "-o", "a.nc", "--plot", "a.png", "--component", "y,x"
+    )
+    assert ["sideways" in fig.axes[0].get_title(), "forward" in fig.axes[1].get_title()] == [True, True]
+    objective = ("--objective", "displacement", "--harmonics", "1")
+    (fig,) = figures("optimize", "three-link-viscous", *objective, "--plot", "a.png", "--clim", "0.01")
+    assert limit(fig) == 0.01
+    rows, ccf, moved = figures(
+        "run", "three-link-viscous", "-o", "out", "--component", "x", "--clim", "0.02", "--data", "own.csv"
+    )
+    assert limit(ccf) == 0.02 and sum(bool(ax.get_title()) for fig in (rows, ccf) for ax in fig.axes) == 2
+    assert [any(c.get_label() == MEASURED for c in ax.containers) for ax in moved.axes] == [True, False]

@@ -53,6 +53,7 @@ def test_a_study_has_every_tier_its_errors_and_times(name):
         *named,
         "body_length",
         "units",
+        "zero_by_symmetry",
         "seconds",
         "kept",
     ]

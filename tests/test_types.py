@@ -1,6 +1,8 @@
 """Wrong Python types are refused like wrong numbers: a ValueError of one line, from every public constructor."""
 
 import dataclasses
+import importlib
+import inspect
 import itertools
 import math
 import pickle
@@ -268,3 +270,40 @@ def test_refusals_carry_facts_and_go_to_other_processes():
     assert (refusal.what, refusal.value, refusal.where) == ("C must be > 0", -3, ("own.toml: [medium]",))
     assert (refusal.because, refusal.instead) == ("it is a stress", "give a positive one")
     assert str(refusal) == "own.toml: [medium] C must be > 0, got -3: it is a stress; give a positive one"
+
+
+PUBLIC = [
+    "geomech", "geomech.app", "geomech.gaits", "geomech.geometry.connection", "geomech.geometry.curvature",
+    "geomech.geometry.reconstruct", "geomech.measured", "geomech.optimisation", "geomech.plots", "geomech.scenes",
+    "geomech.studies.undulation", "geomech.symbolic", "geomech.systems", "geomech.tiers", "rft", "rft.bodies",
+    "rft.effects", "rft.laws",
+]  # fmt: skip
+
+
+def own(part) -> bool:
+    return getattr(part, "__module__", "").partition(".")[0] in ("geomech", "rft")
+
+
+def functions(part):
+    """The function that a public name is, or those of the class that it is, inherited ones too."""
+    members = [part] if not inspect.isclass(part) else [
+        member for base in part.__mro__ if own(base) for name, member in vars(base).items() if not name.startswith("_")
+    ]  # fmt: skip
+    for member in members:
+        inner = getattr(member, "fget", None) or getattr(member, "func", None) or getattr(member, "__func__", member)
+        if inspect.isfunction(inner) and own(inner) and inner.__name__ != "<lambda>":
+            yield inspect.unwrap(inner)
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_public_signatures_are_annotated(name):
+    """Every parameter and every returned value of what a user can name, so that editors and type checkers know them."""
+    module = importlib.import_module(name)
+    names = getattr(module, "__all__", None) or [x for x in dir(module) if not x.startswith("_")]
+    missing = []
+    for function in {f for x in names if own(part := getattr(module, x)) for f in functions(part)}:
+        signature = inspect.signature(function)
+        parameters = [p for p in signature.parameters.values() if p.name not in ("self", "cls")]
+        known = {p.name: p.annotation for p in parameters} | {"return": signature.return_annotation}
+        missing += [f"{function.__qualname__}: {k}" for k, x in known.items() if x is inspect.Signature.empty]
+    assert missing == []

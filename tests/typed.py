@@ -5,10 +5,12 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.axes import Axes
 
 import geomech
 import rft
 from geomech import connection, curvature, plots, reconstruct, symbolic
+from geomech.app import Displacements
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Gait, Points, Sine
 from geomech.geometry import family, harmonics
 from geomech.geometry.traits import Traits
@@ -78,6 +80,9 @@ def scenes() -> list[Any]:
     text: str = toml(scene.changed(gait=Circle(amplitude=0.3)))
     study: Study = geomech.Study(scene)
     net: Array = study.poses("area", amplitudes=[0.5])
+    face = geomech.study("three-link-viscous").with_numerics(grid=7, phases=32)
+    numbers: Displacements = face.displacement([0.5], tiers="area")
+    drawn: Axes = plots.ccf_map(face.ccf(), gaits=[Circle()])
     told = (
         study.study([0.5, 1.0], ["direct"]),
         study.cost([0.5], ["direct"]),
@@ -109,6 +114,7 @@ def scenes() -> list[Any]:
         told,
         more,
         asked,
+        (numbers.tiers, drawn),
     ]
 
 

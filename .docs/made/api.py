@@ -176,5 +176,7 @@ def _top(module) -> list[str]:
     for public in sorted(name for name in dir(module) if not name.startswith("_")):
         value = getattr(module, public)
         home = value.__name__ if inspect.ismodule(value) else value.__module__
-        rows += [f"   * - ``geomech.{public}``", f"     - ``{home}``"]
+        pages = [page for group in PACKAGES.values() for page in group if f"{home}.".startswith(f"{page}.")]
+        page = max(pages, key=len)
+        rows += [f"   * - ``geomech.{public}``", f"     - :doc:`{page}`" if page != "geomech" else f"     - ``{home}``"]
     return [".. list-table::", "   :header-rows: 1", "", "   * - name", "     - defined in", *rows, ""]

@@ -30,7 +30,7 @@ def viscous_geometry():
     """Yield the CCF and the area of the viscous swimmer in its minimum-perturbation frame, and its true displacement."""
     study = geomech.Study(geomech.load("three-link-viscous").with_numerics(grid=31, extent=2.5))
     field = dataclasses.replace(study.fitted, A=minimum_perturbation(study.fitted).connection(study.fitted))
-    source = "a separate program with a coarser discretisation, 31 x 31"
+    source = "reference value of an earlier, coarser discretisation, 31 x 31"
     curvature = ccf(field)
     yield (
         "viscous three-link swimmer, minimum-perturbation frame: CCF_x(0, 0)",
@@ -43,7 +43,7 @@ def viscous_geometry():
     net = study.poses("direct", Circle(), [1.0])[0]
     yield (
         "the same circle: net distance by the balance of forces",
-        "a separate program",
+        "reference value, origin not recorded",
         _(np.hypot(*net[:2]), 4),
         "0.0513",
     )
@@ -53,7 +53,7 @@ def viscous_cost():
     """Yield the dissipation metric of the straight viscous swimmer and the path length of a circle."""
     study = geomech.Study(geomech.load("three-link-viscous"))
     M = study.metric.field([0.0, 0.0])
-    source = "a separate program"
+    source = "reference value, origin not recorded"
     yield "the same: dissipation metric M(0, 0), diagonal entry", source, _(M.ravel()[0], 7), "0.0073160"
     yield "the same: dissipation metric M(0, 0), off-diagonal entry", source, _(M.ravel()[1], 7), "0.0050297"
     length = metric.path_length(study.metric.norm, Circle(), [1.0])[0]
@@ -71,7 +71,7 @@ def strokes():
         "0.1035",
     )
     yield (
-        "the same: best stroke for efficiency (BL per unit of path length)",
+        "the same: best stroke for efficiency (BL/BL)",
         source,
         _(geomech.optimise(scene, "efficiency").value, 4),
         "0.1109",
@@ -80,7 +80,7 @@ def strokes():
 
 def stress():
     """Yield the generic stress map at published angles."""
-    source = "Li, Zhang and Goldman, Science 339, 1408 (2013), Table S2, evaluated by hand"
+    source = "Li, Zhang and Goldman, Science 339, 1408 (2013), Table S2: check value for its coefficients"
     wanted = {(0, 90): (0.0, 1.0), (0, -90): (0.0, -0.25), (90, 0): (0.37, 0.037), (0, 0): (0.136, 0.375),
               (45, 45): (0.3595, 0.5702)}  # fmt: skip
     for (beta, gamma), (x, z) in wanted.items():

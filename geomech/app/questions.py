@@ -37,7 +37,7 @@ def optimise(
     starts : int
         Loops from which the search starts; by default 1, or about 9 for two joints in dry media.
     rate, power : number
-        Limits of "speed": largest joint rate, rad/s; mean power, in the body's axial drag x body length / s.
+        Limits of "speed": largest joint rate, rad/s; mean power, in drag x BL/s.
     progress : function of the fraction done
     """
     found = optimisation.optimise(

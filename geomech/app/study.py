@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -80,15 +80,19 @@ class Study(studies.Study):
         """
         chosen = self.scene.gait if gait is None else gait
         amplitudes = getattr(chosen, "amplitude", 1.0) if amplitudes is None else amplitudes
-        amplitudes = [amplitudes] if is_number(amplitudes) else amplitudes
+        values: Any = [amplitudes] if is_number(amplitudes) else amplitudes
         if tolerance is None:
-            return self.study(amplitudes, [tiers] if isinstance(tiers, str) else tiers, gait)
+            return self.study(values, [tiers] if isinstance(tiers, str) else tiers, gait)
         if tiers is not None:
             raise Refusal("tolerance chooses the tier", instead="drop tiers")
-        return Displacements(cheapest(self.scene, amplitudes, tolerance, gait).result)
+        return Displacements(cheapest(self.scene, values, tolerance, gait).result)
 
     def study(
-        self, amplitudes: Sequence[float], tiers: Sequence[str] | None = None, gait: Gait | None = None, progress=None
+        self,
+        amplitudes: Sequence[float],
+        tiers: Sequence[str] | None = None,
+        gait: Gait | None = None,
+        progress: Callable | None = None,
     ) -> Displacements:
         return Displacements(super().study(amplitudes, tiers, gait, progress).result)
 
@@ -153,7 +157,7 @@ class Study(studies.Study):
         """Return displacements over a grid of parameters such as {"medium.C": [1, 2, 3]}; see `geomech.sweep`."""
         return sweep(self.scene, over)
 
-    def _is_slice(self, pair: Sequence[int] | None) -> bool:
+    def _is_slice(self, pair: Sequence[int] | None) -> TypeGuard[Sequence[int]]:
         """Return whether a map is a slice of more than two joints; Refusal where nobody says which."""
         joints = self.scene.system.joints
         if pair is None and joints > 2:

@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextvars import ContextVar
 from typing import Any, Protocol, TypeVar
 
-Item, Outcome = TypeVar("Item"), TypeVar("Found")
+Item = TypeVar("Item")
+Outcome = TypeVar("Outcome")
 Map = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]  # as the builtin `map`, of one sequence
 
 

@@ -6,9 +6,10 @@ import warnings
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.core.errors import Note, UnitWarning
 from geomech.gaits import frames, midline
@@ -57,6 +58,7 @@ class Centreline(Gait):
     """
 
     kind = "centreline"
+    _curve: ClassVar[Any]  # of the data, set once they are read
 
     estimate_is = "of the computation alone: what the measured midlines are off by is not in it"
 
@@ -109,7 +111,7 @@ class Centreline(Gait):
         return self.elements - 1
 
     @property
-    def harmonics(self) -> int:
+    def harmonics(self) -> int:  # type: ignore[override]  # of most gaits it is a number of the class
         """The highest harmonic of the series; 1 for a spline, which has no highest."""
         return max(1, self.keep_harmonics)
 
@@ -149,10 +151,10 @@ class Centreline(Gait):
                 stacklevel=5,
             )
 
-    def unit(self, t) -> np.ndarray:
+    def unit(self, t: ArrayLike) -> np.ndarray:
         return self._curve(np.asarray(t, float), 0)
 
-    def unit_rate(self, t) -> np.ndarray:
+    def unit_rate(self, t: ArrayLike) -> np.ndarray:
         return self._curve(np.asarray(t, float), 1)
 
     @classmethod

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.geometry.gait import GAITS, LARGEST, Gait, Scale, finite_array
 from rft.checks import Number
@@ -26,16 +27,16 @@ class Series(Gait):
         return self.coefficients()[0].shape[0]
 
     @property
-    def harmonics(self) -> int:
+    def harmonics(self) -> int:  # type: ignore[override]  # of most gaits it is a number of the class
         """The highest harmonic of the series."""
         return self.coefficients()[0].shape[1]
 
-    def unit(self, t) -> np.ndarray:
+    def unit(self, t: ArrayLike) -> np.ndarray:
         cos, sin = self.coefficients()
         kt = np.asarray(t, float)[..., None] * np.arange(1, cos.shape[1] + 1)
         return np.cos(kt) @ cos.T + np.sin(kt) @ sin.T
 
-    def unit_rate(self, t) -> np.ndarray:
+    def unit_rate(self, t: ArrayLike) -> np.ndarray:
         cos, sin = self.coefficients()
         k = np.arange(1, cos.shape[1] + 1)
         kt = np.asarray(t, float)[..., None] * k

@@ -93,7 +93,7 @@ def _check_points(frames: Frames, start: int, points: np.ndarray) -> None:
     if turn.max() > LARGEST_BEND:
         raise frames.wrong(
             f"the midline turns by {turn.max():.3g} rad at this point, more than {LARGEST_BEND:.3g}",
-            start + turn.argmax() + 1,
+            int(start + turn.argmax() + 1),
             instead="order the points from tail to head, mend the frame, or give more points",
         )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.geometry.gait import GAITS, Gait, finite_array
 from rft.refusal import Refusal
@@ -43,10 +44,10 @@ class Points(Gait):
         length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(loop, axis=0), axis=1))])
         return CubicSpline(2 * np.pi * length / length[-1], loop, bc_type="periodic")
 
-    def unit(self, t) -> np.ndarray:
+    def unit(self, t: ArrayLike) -> np.ndarray:
         return self._spline()(np.asarray(t, float))
 
-    def unit_rate(self, t) -> np.ndarray:
+    def unit_rate(self, t: ArrayLike) -> np.ndarray:
         return self._spline()(np.asarray(t, float), 1)
 
     @classmethod

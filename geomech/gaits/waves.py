@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.gaits.fourier import Series
 from geomech.geometry.gait import GAITS, LARGEST, Gait
@@ -48,7 +49,7 @@ class Wave(Series):
         phase = 2 * np.pi * self.waves * np.arange(1, self.joints + 1) / (self.joints + 1)
         return np.cos(phase)[:, None], -np.sin(phase)[:, None]
 
-    def wavelength(self, amplitudes=None) -> np.ndarray:
+    def wavelength(self, amplitudes: ArrayLike | None = None) -> np.ndarray:
         """Return lambda over the body's length (...,), of an endless chain of equal links without offset: the arc
         length of a wave, 1 / waves, times the mean cosine of headings, which oscillate as a sine: J_0 of their
         amplitude."""
@@ -58,7 +59,7 @@ class Wave(Series):
         swing = self._sizes(amplitudes) / (2 * np.sin(np.pi * abs(self.waves) / links))
         return np.abs(j0(swing)) / abs(self.waves)
 
-    def relative_curvature(self, amplitudes=None) -> np.ndarray:
+    def relative_curvature(self, amplitudes: ArrayLike | None = None) -> np.ndarray:
         """Return mean of |joint angle| over a wave and a link's length, times the wave's arc length (...,); without
         offset."""
         return 2 / np.pi * self._sizes(amplitudes) * (self.joints + 1) / abs(self.waves)
@@ -145,31 +146,31 @@ class Sine(Gait):
         speed = np.sqrt(1 + slope**2) * 4 * ellipe(m) / (2 * np.pi) / np.sqrt(1 + rise**2)  # dp/du
         return np.arctan(rise), -slope * np.sin(p) / (1 + rise**2) * speed
 
-    def headings(self, t, amplitudes=None) -> np.ndarray:
+    def headings(self, t: ArrayLike, amplitudes: ArrayLike | None = None) -> np.ndarray:
         """Return headings of the elements against the wave's axis, (B..., T..., elements), rad."""
         return self._headings(t, amplitudes)[0]
 
-    def shape(self, t, amplitudes=None) -> np.ndarray:
+    def shape(self, t: ArrayLike, amplitudes: ArrayLike | None = None) -> np.ndarray:
         return np.diff(self._headings(t, amplitudes)[0], axis=-1)
 
-    def rate(self, t, amplitudes=None) -> np.ndarray:
+    def rate(self, t: ArrayLike, amplitudes: ArrayLike | None = None) -> np.ndarray:
         return self._shape_and_rate(t, amplitudes)[1]
 
     def _shape_and_rate(self, t, amplitudes) -> tuple[np.ndarray, np.ndarray]:
         headings, rates = self._headings(t, amplitudes)  # which takes as long as to solve for the body's motion
         return np.diff(headings, axis=-1), np.diff(rates, axis=-1) * (-1.0 if self.reverse else 1.0)
 
-    def largest(self, amplitudes=None) -> float:
+    def largest(self, amplitudes: ArrayLike | None = None) -> float:
         """Return an upper bound of the joint angles, rad: headings stay between -pi/2 and pi/2."""
         return np.pi
 
-    def unit(self, t) -> np.ndarray:
+    def unit(self, t: ArrayLike) -> np.ndarray:
         return self.shape(t)
 
-    def unit_rate(self, t) -> np.ndarray:
+    def unit_rate(self, t: ArrayLike) -> np.ndarray:
         return self.rate(t)
 
-    def wavelength(self, amplitudes=None) -> np.ndarray:
+    def wavelength(self, amplitudes: ArrayLike | None = None) -> np.ndarray:
         """Return lambda over the body's length (...,): the arc length of a wave, 1 / waves, laid out straight."""
         from scipy.special import ellipe
 
@@ -177,7 +178,7 @@ class Sine(Gait):
         arc = np.sqrt(1 + slope**2) * 4 * ellipe(slope**2 / (1 + slope**2)) / (2 * np.pi)  # of a wave of unit length
         return 1 / (self.waves * arc)
 
-    def relative_curvature(self, amplitudes=None) -> np.ndarray:
+    def relative_curvature(self, amplitudes: ArrayLike | None = None) -> np.ndarray:
         """Return mean of |curvature| over a wave, times the wave's arc length (...,): 4 atan(2 pi A / lambda)."""
         return 4 * np.arctan(np.abs(self._slopes(amplitudes)))
 

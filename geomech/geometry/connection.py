@@ -12,6 +12,7 @@ from dataclasses import KW_ONLY, dataclass
 from functools import cached_property, partial
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.core import summary
 from geomech.core.face import Extensible
@@ -63,7 +64,7 @@ class Connection(Extensible):
         """Return A (..., 3, d) at shapes alpha (..., d); ValueError outside the grid."""
         return self.field(alpha)
 
-    def velocity(self, alpha, alphadot) -> np.ndarray:
+    def velocity(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
         """Return xi = A(alpha) alphadot, (..., 3)."""
         return np.einsum("...ij,...j->...i", self(alpha), real_array("alphadot", alphadot))
 
@@ -83,7 +84,7 @@ def grid(joints: int, points: int = 31, extent: float = 2.5) -> tuple[np.ndarray
     return ((axis - axis[::-1]) / 2,) * int(joints)  # symmetric to the last digit, for `fit`'s mirror
 
 
-def check_fit_options(degree, progress) -> None:
+def check_fit_options(degree: object, progress: object) -> None:
     """Raise Refusal for no degree of a spline, or for progress that is no function of the fraction done."""
     in_range("degree", degree, 1, 5, whole=True)
     if not (progress is None or callable(progress)):
@@ -131,8 +132,8 @@ def _primes(count: int) -> list[int]:
 
 def sampled(
     velocity: Velocity,
-    axes,
-    unit,
+    axes: Sequence[ArrayLike],
+    unit: ArrayLike,
     reduce: Callable,
     degree: int = 3,
     progress: Callable | None = None,
@@ -150,8 +151,8 @@ def sampled(
 
 def sampled_on(
     velocity: Velocity,
-    alpha,
-    unit,
+    alpha: ArrayLike,
+    unit: ArrayLike,
     reduce: Callable,
     progress: Callable | None = None,
     symmetries: Sequence[Image] = (),
@@ -171,8 +172,8 @@ def sampled_on(
 
 def sampled_at(
     velocity: Velocity,
-    alpha,
-    unit,
+    alpha: ArrayLike,
+    unit: ArrayLike,
     reduce: Callable,
     progress: Callable | None = None,
     symmetries: Sequence[Image] = (),
@@ -219,7 +220,9 @@ def _velocities(shared: tuple, alpha: np.ndarray) -> tuple[np.ndarray, ...]:
     return evaluate(lambda *arguments: xi, alpha, unit, masked), extra
 
 
-def even_part(velocity: Velocity, axes, traits: Traits = NOTHING, map: Map = each) -> np.ndarray | None:
+def even_part(
+    velocity: Velocity, axes: Sequence[ArrayLike], traits: Traits = NOTHING, map: Map = each
+) -> np.ndarray | None:
     """Return the rms (3, N_1, ..., N_d) over directions of xi(alpha, alphadot) + xi(alpha, -alphadot), |alphadot| = 1.
     A fit from half of the directions takes it for 0. None where it is roundoff at a few shapes that stand for all."""
     axes = tuple(np.asarray(a, float) for a in axes)
@@ -253,7 +256,7 @@ def sign_changes(d: np.ndarray) -> np.ndarray:
 
 def fit(
     velocity: Velocity,
-    axes,
+    axes: Sequence[ArrayLike],
     count: int = 8,
     degree: int = 3,
     progress: Callable | None = None,

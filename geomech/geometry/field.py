@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.core import summary
 from geomech.core.face import Extensible
@@ -117,12 +118,12 @@ class Field(Extensible):
                 "a field with singular shapes is not looked up between its points", instead="use the direct tier"
             )
 
-    def inside(self, alpha) -> np.ndarray:
+    def inside(self, alpha: ArrayLike) -> np.ndarray:
         """Return alpha as an array; Refusal names the first angle that leaves the grid."""
         return inside(self.axes, alpha)
 
 
-def as_axes(axes) -> tuple[np.ndarray, ...]:
+def as_axes(axes: Sequence[ArrayLike]) -> tuple[np.ndarray, ...]:
     """Return axes as arrays of angles; Refusal for anything else."""
     try:
         arrays = tuple(real_array("an axis", a) for a in axes)
@@ -158,7 +159,9 @@ def every_second(axis: np.ndarray, first: int) -> np.ndarray:
     return np.unique([0, *range(first, len(axis), 2), len(axis) - 1])
 
 
-def half_grid(axes, arrays, degree: int, first: int):
+def half_grid(
+    axes: Sequence[np.ndarray], arrays: Sequence[np.ndarray], degree: int, first: int
+) -> tuple[tuple[np.ndarray, ...], list[np.ndarray], int]:
     """Return (axes, arrays (..., N_1, ..., N_d), degree) on `every_second` point of each axis; of a lower degree where
     that leaves too few points for the spline."""
     picks = [every_second(axis, first) for axis in axes]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rft.checks import Number, check_numbers, is_whole, real_array
 from rft.refusal import Refusal
@@ -77,23 +78,23 @@ class Gait:
         """Label of an axis of amplitudes."""
         return f"amplitude of the {type(self).__name__.lower()} (scale)"
 
-    def unit(self, t) -> np.ndarray:
+    def unit(self, t: np.ndarray) -> np.ndarray:
         raise TypeError(f"{type(self).__name__} gives no curve: define unit(t)")
 
-    def unit_rate(self, t) -> np.ndarray:
+    def unit_rate(self, t: np.ndarray) -> np.ndarray:
         raise TypeError(f"{type(self).__name__} gives no curve: define unit_rate(t)")
 
-    def shape(self, t, amplitudes=None) -> np.ndarray:
+    def shape(self, t: ArrayLike, amplitudes: ArrayLike | None = None) -> np.ndarray:
         """Return alpha at phases t (T...), for amplitudes (B...) or the gait's own: (B..., T..., joints), rad."""
         return self.middle + self._times(amplitudes, self.unit((-1.0 if self.reverse else 1.0) * real_array("t", t)))
 
-    def largest(self, amplitudes=None) -> float:
+    def largest(self, amplitudes: ArrayLike | None = None) -> float:
         """Return the largest of its shape variables in size, at 32 phases, for amplitudes (B...) or the gait's own."""
         a = real_array("amplitudes", self.amplitude if amplitudes is None else amplitudes).ravel()
         ends = a[[a.argmin(), a.argmax()]] if a.size else a  # between them no shape is further from the middle
         return float(np.abs(self.shape(np.linspace(0.0, 2 * np.pi, 32), ends)).max(initial=0.0))
 
-    def rate(self, t, amplitudes=None) -> np.ndarray:
+    def rate(self, t: ArrayLike, amplitudes: ArrayLike | None = None) -> np.ndarray:
         """Return d alpha / dt, shaped like `shape`."""
         sign = -1.0 if self.reverse else 1.0
         return self._times(amplitudes, sign * self.unit_rate(sign * real_array("t", t)))
@@ -104,7 +105,7 @@ class Gait:
             raise Refusal(f"amplitudes must be finite and at most {LARGEST:g}, got {a.ravel()[:4]}")
         return a[(..., *([None] * curve.ndim))] * curve
 
-    def cycle(self, phases: int, amplitudes=None) -> tuple[np.ndarray, np.ndarray]:
+    def cycle(self, phases: int, amplitudes: ArrayLike | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Return (alpha, alphadot) at ``phases`` equally spaced phases from 0, each (B..., phases, joints)."""
         least = max(4, 2 * self.harmonics + 1)
         if not (is_whole(phases) and phases >= least):

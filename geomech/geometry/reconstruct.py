@@ -11,6 +11,7 @@ import functools
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rft import se2
 from rft.checks import real_array
@@ -41,7 +42,7 @@ def _waves(n: int) -> _Waves:
     return _Waves(k, k % n, share, np.where(k == 0, 0.0, 1 / np.where(k == 0, 1, 1j * k)))
 
 
-def turning(xi) -> np.ndarray:
+def turning(xi: ArrayLike) -> np.ndarray:
     """Return the heading (..., N) gained at the phases, less its mean growth, of zero mean over the cycle; xi as in
     `displacement`."""
     xi = real_array("xi", xi)
@@ -57,7 +58,7 @@ class _Spectrum(NamedTuple):
     wave: np.ndarray  # (..., M) Fourier coefficients of e^(i (theta - mean)) (xi_x + i xi_y)
 
 
-def displacement(xi) -> np.ndarray:
+def displacement(xi: ArrayLike) -> np.ndarray:
     """Return the net pose (..., 3) after one cycle, in the frame at its start.
 
     xi: (..., N, 3), body velocity with respect to phase at t = 2 pi n / N, N >= 3.
@@ -67,7 +68,7 @@ def displacement(xi) -> np.ndarray:
     return np.stack([z.real, z.imag, 2 * np.pi * s.mean_turn[..., 0]], -1)
 
 
-def trajectory(xi, phases) -> np.ndarray:
+def trajectory(xi: ArrayLike, phases: ArrayLike) -> np.ndarray:
     """Return poses (..., P, 3) at phases t (P,) from the start of the cycle; arguments as in `displacement`."""
     s, t = _spectrum(xi), real_array("phases", phases)
     if t.ndim != 1 or not np.isfinite(t).all():
@@ -82,7 +83,7 @@ def trajectory(xi, phases) -> np.ndarray:
     return np.stack([z.real, z.imag, s.mean_turn * t + swing], -1)
 
 
-def poses(xi) -> np.ndarray:
+def poses(xi: ArrayLike) -> np.ndarray:
     """Return poses (..., N + 1, 3) at the phases of the samples and at the cycle's end: `trajectory` there, in time N
     log N."""
     s, n = _spectrum(xi), np.shape(xi)[-2]
@@ -126,7 +127,7 @@ def _values(c: np.ndarray, k: np.ndarray, n: int) -> np.ndarray:
     return np.fft.ifft(spectrum, axis=-1) * n
 
 
-def slopes(xi) -> tuple[np.ndarray, np.ndarray]:
+def slopes(xi: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """Return (net pose (3,) of `displacement`, its derivatives (3, N, 3) by the body velocities) for one cycle xi (N,
     3)."""
     xi, n = real_array("xi", xi), np.shape(xi)[-2]

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import inside
@@ -238,11 +239,11 @@ class Tube(Connection):
 
     taylor: TaylorSeries | None = None
 
-    def reach(self, alpha) -> np.ndarray:
+    def reach(self, alpha: ArrayLike) -> np.ndarray:
         """Return the distances (...,) of shapes from the gait, as `TaylorSeries.reach`."""
         return self.taylor.reach(alpha)
 
-    def checked(self, alpha) -> np.ndarray:
+    def checked(self, alpha: ArrayLike) -> np.ndarray:
         """Return alpha; Refusal names the first shape that the data do not reach."""
         alpha = inside(self.axes, alpha)
         reach = self.reach(alpha)

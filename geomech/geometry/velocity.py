@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.core.errors import VelocityWarning
 from rft.checks import real_array
@@ -19,7 +20,7 @@ TOLERANCE = 1e-3  # of the velocity's rms: more than solvers and roundings leave
 SAME = 1e-12  # of it: what does not depend on the shape at all
 
 
-def checked_velocity(velocity: Callable, axes, masked: bool) -> Callable:
+def checked_velocity(velocity: Callable, axes: Sequence[ArrayLike], masked: bool) -> Callable:
     """Return the velocity, as `geomech.geometry.connection.evaluate` takes it; one for a single shape is called one by
     one. Warn (`VelocityWarning`, once for all reasons) if it is not odd or not homogeneous in alphadot, or ignores
     alpha."""
@@ -102,7 +103,7 @@ class Reporting:
         return self.with_report(alpha, alphadot)[0]
 
 
-def evaluate(velocity: Velocity, alpha, alphadot, masked: bool = False) -> np.ndarray:
+def evaluate(velocity: Velocity, alpha: ArrayLike, alphadot: ArrayLike, masked: bool = False) -> np.ndarray:
     """Return velocity(alpha, alphadot); Refusal if that does not broadcast to (..., 3), or is not finite unless
     ``masked``."""
     shape = (*np.broadcast_shapes(alpha.shape, alphadot.shape)[:-1], 3)

@@ -69,7 +69,7 @@ def check_a_loop(log: Log, joints: Smoothed, rows: float) -> None:
     deviations, noise_sizes = joints.values - joints.values.mean(0), _noise(joints, rows)
     for name, size, noise in zip(log.joints, deviations.std(0), noise_sizes):
         if size <= noise:
-            raise log.wrong(f"{name} does not move beyond its noise", instead="leave it out with `columns`")
+            raise log.wrong(f"{name} does not move beyond its noise", instead="leave it out with ``columns``")
     _, size, axes = np.linalg.svd(deviations, full_matrices=False)
     if size[1] > max(THIN * size[0], np.sqrt(len(deviations)) * noise_sizes.max()):
         return
@@ -77,7 +77,7 @@ def check_a_loop(log: Log, joints: Smoothed, rows: float) -> None:
     raise log.wrong(
         f"{last} is {slope:.3g} times {first}, but for a constant and noise",
         because=f"one shape variable recorded {len(log.joints)} times goes to and fro, and is no loop",
-        instead="name the columns of joints that move apart, by `columns`",
+        instead="name the columns of joints that move apart, by ``columns``",
     )
 
 
@@ -165,7 +165,7 @@ def check_no_drift(log: Log, number: np.ndarray, alpha: np.ndarray) -> None:
             raise log.wrong(
                 f"{name} drifts from {means[0]:.3g} to {means[-1]:.3g} over the log and swings by {swing:.2g} in a cycle",
                 because="what drifts is no part of a gait",
-                instead="leave it out with `columns`",
+                instead="leave it out with ``columns``",
             )
 
 

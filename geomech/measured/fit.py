@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.gaits import Fourier
 from geomech.geometry.reconstruct import displacement
@@ -85,7 +86,7 @@ class Fitted:
         points = int(np.clip(np.ceil(3 * extent / wide), min(31, most), most))
         return tube(self.known, covering_grid(self.known, points), self.residual, self.unit, self.length)
 
-    def along(self, t) -> tuple[np.ndarray, np.ndarray]:
+    def along(self, t: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Return A (T, 3, d) at phases t of the mean gait, and half widths of its interval."""
         known = self.known
         variance = (series(known.errors[:, :, :, 0], t) ** 2).sum(-3) + known.standard_error_at(t) ** 2
@@ -108,12 +109,12 @@ def fit_log(
     truth. harmonics: of the connection in the phase; by cross-validation if None. limits (rad): distance from the mean
     gait up to which the connection is given; as far as the data extend if None. body_length (m): of a log in m; 1 for
     one in body lengths."""
-    in_range("`level`", level, 0.5, 0.999)
-    in_range("`body_length`", body_length, 1e-9, 1e9)
+    in_range("``level``", level, 0.5, 0.999)
+    in_range("``body_length``", body_length, 1e-9, 1e9)
     if harmonics is not None:
-        in_range("`harmonics`", harmonics, 1, HARMONICS, whole=True)
+        in_range("``harmonics``", harmonics, 1, HARMONICS, whole=True)
     if limits is not None:
-        in_range("`limits`", limits, 1e-6, 10)
+        in_range("``limits``", limits, 1e-6, 10)
     log = log if isinstance(log, Log) else read(log, columns, degrees)
     period = cycles.period(log)
     joints, pose = (smooth.smoothed(log.t, x, period) for x in (log.alpha, log.pose))
@@ -147,14 +148,14 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
     varies = regression.varied(loop, samples)
     most = int(min(HARMONICS, len(samples.phase) / (samples.cycle[-1] + 1) / 4))
     if harmonics is not None and harmonics > most:
-        raise log.wrong(f"`harmonics` must be at most {most}, a quarter of the rows of a cycle, got {harmonics}")
+        raise log.wrong(f"``harmonics`` must be at most {most}, a quarter of the rows of a cycle, got {harmonics}")
     size = joints.knots * (samples.cycle[-1] + 1)
     try:
         equations, varies = unknowns.selected(loop, samples, most, harmonics, varies, size)
         coefficients, errors = regression.solution(equations)
     except np.linalg.LinAlgError:
         raise log.wrong(
-            "its cycles do not settle so many unknowns", instead="lower `harmonics`, or give more cycles"
+            "its cycles do not settle so many unknowns", instead="lower ``harmonics``, or give more cycles"
         ) from None
     across, others = varies == regression.RATES, [k for k in range(len(log.joints)) if k not in combined]
     if not combined or across or regression.varied(*regression.of_joints(loop, samples, others)) == varies:

@@ -99,7 +99,7 @@ def _picked(name: str, line: int, header: tuple[str, ...], columns: list[str]) -
             )
         if len(columns) < 6 or len({*columns}) < len(columns):
             raise Refusal(
-                "`columns` are those of t, two joint angles or more, x, y and heading, in this order", where=name
+                "``columns`` are those of t, two joint angles or more, x, y and heading, in this order", where=name
             )
         return _of_joints(name, columns)
     if len(header) < 2:
@@ -115,7 +115,7 @@ def _picked(name: str, line: int, header: tuple[str, ...], columns: list[str]) -
     if missing or len(joints) < 2:
         few = f"{'one column' if joints else 'no columns'} of joint angles, and a gait is a loop of two or more"
         what = f"no column {missing[0]}" if missing else few
-        cure = "name them t,alpha_1,alpha_2,x,y,heading, or say `columns`"
+        cure = "name them t,alpha_1,alpha_2,x,y,heading, or say ``columns``"
         known = f"it has {formatted(', '.join(header), 120)}"
         raise Refusal(what, where=f"{name}, line {line}", because=known, instead=cure)
     return _of_joints(name, [roles["t"], *joints, roles["x"], roles["y"], roles["heading"]])
@@ -132,7 +132,7 @@ def _of_joints(name: str, columns: list[str]) -> tuple[str, ...]:
         raise Refusal(
             f"{other[0][0]} is in {other[0][1]} by its name",
             where=name,
-            instead="give t in s, x and y in body lengths, or in m with `body_length`",
+            instead="give t in s, x and y in body lengths, or in m with ``body_length``",
         )
     return tuple(columns)
 
@@ -153,12 +153,12 @@ def _check_units(log: Log, picked: Sequence[str], turn: np.ndarray) -> None:
     step = np.abs(np.diff(log.pose[:, 2]))
     if turn[-1] == 1.0 and (jumps := np.flatnonzero(np.abs(step - 360) < 30)).size:
         k = jumps[0] + 1
-        raise log.wrong(f"{picked[-1]} jumps by {step[k - 1]:.4g}, a turn in degrees", k, instead="say `degrees`")
+        raise log.wrong(f"{picked[-1]} jumps by {step[k - 1]:.4g}, a turn in degrees", k, instead="say ``degrees``")
     for k, name in enumerate(log.joints):
         row = int(np.abs(log.alpha[:, k]).argmax())
         if turn[k + 1] == 1.0 and abs(log.alpha[row, k]) > 2 * np.pi:
             what = f"{name} reaches {log.alpha[row, k]:.4g} where joint angles are in rad"
-            raise log.wrong(what, row, instead="say `degrees` if these are degrees")
+            raise log.wrong(what, row, instead="say ``degrees`` if these are degrees")
         if abs(log.alpha[row, k]) > LARGEST_ANGLE:
             raise log.wrong(
                 f"{name} reaches {np.degrees(log.alpha[row, k]):.4g} degrees", row, because="no joint turns so far"
@@ -174,7 +174,7 @@ def _checked(log: Log) -> Log:
     alpha = np.unwrap(log.alpha, axis=0)
     for name, values in zip(log.joints, alpha.T):
         if np.ptp(values) < 1e-6:
-            raise log.wrong(f"{name} does not move", instead="leave it out with `columns`")
+            raise log.wrong(f"{name} does not move", instead="leave it out with ``columns``")
     if (np.ptp(pose, axis=0) == 0).all():
         raise log.wrong("x, y and heading do not move", because="nothing was measured of the body's motion")
     return replace(log, alpha=alpha, pose=pose)

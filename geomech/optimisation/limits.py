@@ -35,7 +35,7 @@ def checked_limits(scene: Scene, limits: LimitsArgument, phases: int) -> Limits:
             max(n.extent, float(np.abs(scene.gait.cycle(phases)[0]).max())), float(np.minimum(-low, high).min())
         )
     if is_number(limits):
-        in_range("`limits`", limits, LEAST, MOST)
+        in_range("``limits``", limits, LEAST, MOST)
         pairs = np.array([[-float(limits), float(limits)]] * system.joints)
     else:
         pairs = _pairs(limits, system.joints)
@@ -45,7 +45,7 @@ def checked_limits(scene: Scene, limits: LimitsArgument, phases: int) -> Limits:
     if (pairs[:, 0] < low - slack[:, 0]).any() or (pairs[:, 1] > high + slack[:, 1]).any():
         field = ", ".join(f"{a:g} to {b:g}" for a, b in zip(low, high))
         raise Refusal(
-            f"`limits` {_text(limits)} lies outside the field that the scene has", instead=f"{field}; keep to it"
+            f"``limits`` {_text(limits)} lies outside the field that the scene has", instead=f"{field}; keep to it"
         )
     return _simplified(np.maximum(pairs[:, 0], low), np.minimum(pairs[:, 1], high))
 
@@ -59,12 +59,12 @@ def edges(system: System) -> tuple[np.ndarray, np.ndarray]:
 
 def _pairs(limits, joints: int) -> np.ndarray:
     """Return (joints, 2) from pairs, or from one number for each joint."""
-    x = real_array("`limits`", limits)
+    x = real_array("``limits``", limits)
     x = np.stack([-x, x], -1) if x.ndim == 1 else x
     good = x.shape == (joints, 2) and (np.abs(x) <= MOST).all() and (x[:, 1] - x[:, 0] >= LEAST).all()
     if not good:
         raise Refusal(
-            f"`limits` takes a number, one for each of {joints} joints, or as many from low to high", value=limits
+            f"``limits`` takes a number, one for each of {joints} joints, or as many from low to high", value=limits
         )
     return x
 

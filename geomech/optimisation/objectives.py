@@ -36,16 +36,18 @@ class Objective:
     power: float | None = None
 
     def __post_init__(self):
-        choose("`objective`", self.name, OBJECTIVES)
+        choose("``objective``", self.name, OBJECTIVES)
         if not (isinstance(self.direction, str) and self.direction == ""):
-            choose("`direction`", self.direction, DIRECTIONS)
+            choose("``direction``", self.direction, DIRECTIONS)
             if self.name == "turning":
-                raise Refusal("`direction` is that of a displacement", because="turning takes none", instead="drop it")
+                raise Refusal(
+                    "``direction`` is that of a displacement", because="turning takes none", instead="drop it"
+                )
         for name in ("rate", "power"):
             if getattr(self, name) is not None:
-                in_range(f"`{name}`", getattr(self, name), 1e-9, 1e9)
+                in_range(f"``{name}``", getattr(self, name), 1e-9, 1e9)
                 if self.name != "speed":
-                    raise Refusal(f"`{name}` limits speed", instead="say `objective` speed, or drop it")
+                    raise Refusal(f"``{name}`` limits speed", instead="say ``objective`` speed, or drop it")
 
     straight = property(lambda self: self.name != "turning", doc="Whether the objective is a distance, not an angle.")
     costs = property(

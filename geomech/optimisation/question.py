@@ -48,9 +48,9 @@ class Optimize(Question):
         _ = self.request  # refuses what makes no sense
         name, joints = self.scene.name, self.scene.system.joints
         if self.stretch and joints != 2:
-            raise Refusal(f"`stretch` takes two joints, this one has {joints}", where=name, instead="drop it")
+            raise Refusal(f"``stretch`` takes two joints, this one has {joints}", where=name, instead="drop it")
         if self.stretch and (reason := why_none(self.scene.system)):
-            raise Refusal(reason, where=name, instead="drop `stretch`")
+            raise Refusal(reason, where=name, instead="drop ``stretch``")
 
     def cost(self) -> Cost:
         return self.request.cost()

@@ -93,14 +93,14 @@ class Request:
         """Degree of the power in the rate of shape: 2 in a linear medium, 1 in a dry one; Refusal if it has none."""
         objective, system = self.objective, self.system
         if self.power is None:
-            instead = "say `rate`" if objective.timed else "optimize for displacement, turning or speed"
+            instead = "say ``rate``" if objective.timed else "optimize for displacement, turning or speed"
             raise Refusal(
-                f"`objective` {objective.name} asks for power, which {source_name(system)} does not tell",
+                f"``objective`` {objective.name} asks for power, which {source_name(system)} does not tell",
                 instead=instead,
             )
         if capability(system, OwnMetric) is not None:
             if objective.power is not None:
-                raise Refusal(f"`power` is that of drag, and the {kind_of(system)} has none", instead="say `rate`")
+                raise Refusal(f"``power`` is that of drag, and the {kind_of(system)} has none", instead="say ``rate``")
             return 2.0
         if self.stored:
             return system.traits.power_degree
@@ -176,7 +176,7 @@ def checked(
 ) -> Request:  # fmt: skip
     """Return the request; Refusal for one that makes no sense."""
     with located(checked_scene(scene).name):
-        in_range("`starts`", 1 if starts is None else starts, 1, 1000, whole=True)
+        in_range("``starts``", 1 if starts is None else starts, 1, 1000, whole=True)
         system, pace = scene.system, {"rate": rate, "power": power}
         towards = "" if direction is None else direction
         if near_gait(system):
@@ -196,13 +196,15 @@ def checked(
         loops = _loops(scene, harmonics, limits)
         if isinstance(loops, Undulations) and not maximised.straight:
             raise Refusal(
-                "a sine along a straight axis does not turn", because="`objective` turning takes a gait of few joints"
+                "a sine along a straight axis does not turn", because="``objective`` turning takes a gait of few joints"
             )
         if isinstance(loops, Undulations) and maximised.direction == "y" and system.traits.mirror:
-            raise Refusal("a sine along a straight axis brings nothing across it", instead="drop `direction`, or say x")
+            raise Refusal(
+                "a sine along a straight axis brings nothing across it", instead="drop ``direction``, or say x"
+            )
         if isinstance(loops, Undulations) and maximised.rate is not None:
             raise Refusal(
-                "a wave is as fast as its power allows", instead="say `power`, a limit of rate is that of joints"
+                "a wave is as fast as its power allows", instead="say ``power``, a limit of rate is that of joints"
             )
         request = Request(scene, maximised, loops, 1 if starts is None else int(starts))
         if starts is None and request.looks_up:
@@ -280,7 +282,7 @@ def _loops(scene: Scene, harmonics: int | None, limits: LimitsArgument) -> Loops
         for name, value in (("harmonics", harmonics), ("limits", limits)):
             if value is not None:
                 raise Refusal(
-                    f"`{name}` is that of joints",
+                    f"``{name}`` is that of joints",
                     because="of a sine, amplitude and waves are sought",
                     instead="drop it",
                 )
@@ -289,7 +291,7 @@ def _loops(scene: Scene, harmonics: int | None, limits: LimitsArgument) -> Loops
         raise Refusal(
             f"a loop of {system.joints} joints is too much to search", because=f"at most {JOINTS}, or a sine gait"
         )
-    in_range("`harmonics`", 5 if harmonics is None else harmonics, 1, 32, whole=True)
+    in_range("``harmonics``", 5 if harmonics is None else harmonics, 1, 32, whole=True)
     harmonics = 5 if harmonics is None else int(harmonics)
     return Loops(system.joints, harmonics, checked_limits(scene, limits, PHASES), max(PHASES, 16 * harmonics))
 

@@ -347,7 +347,8 @@ class _Search:
         """Return the gait with the frequency that its limits allow."""
         if self.request.objective.timed and 0 < evaluation.time < 1 / (2 * np.pi * FASTEST):
             raise Refusal(
-                f"its limits let a gait repeat more than {FASTEST:g} times a second", instead="lower `rate`, or `power`"
+                f"its limits let a gait repeat more than {FASTEST:g} times a second",
+                instead="lower ``rate``, or ``power``",
             )
         frequency = (
             1 / (2 * np.pi * evaluation.time)

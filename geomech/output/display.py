@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from geomech import plots
+from geomech.core.summary import zero_words
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
 from geomech.studies.results import Displacements
@@ -31,7 +32,7 @@ def page(line: str, head: Sequence[str] = (), rows: Iterable[Sequence] = (), pic
     if rows:
         lines = [("th", head)] * bool(head) + [("td", row) for row in rows[:MOST_ROWS]]
         body = "".join(f"<tr>{''.join(cell(tag, x) for x in row)}</tr>" for tag, row in lines)
-        parts.append(f"<table>{body}</table>")
+        parts.append(f'<table cellpadding="4">{body}</table>')
         if len(rows) > MOST_ROWS:
             parts.append(f"<p>and {len(rows) - MOST_ROWS} rows more</p>")
     if picture is not None:
@@ -79,19 +80,24 @@ def displacements(table: Displacements) -> str:
     """Return a table with a row for each amplitude and tier."""
     result = table.result
     net, heading = result["net_distance"], result["heading"]
+    zero = result.attributes["zero_by_symmetry"]
+    moving = [q for q in ("x", "y", "heading") if q not in zero]
     columns = {f"error ({net.unit})": net.error, "error of heading (rad)": heading.error}
     if net.spread is not None:
         columns |= {f"medium ({net.unit})": position_spread(result), "medium, heading (rad)": heading.spread}
+    columns = {name: x for name, x in columns.items() if "heading" not in name or "heading" in moving}
     styles = dict.fromkeys(columns, ".1e")
     if "speed" in result:
         columns[f"speed ({result['speed'].unit})"] = result["speed"].values
     rows = []
     for k, amplitude in enumerate(result["amplitude"].values.tolist()):
         for j, tier in enumerate(result["tier"].values.tolist()):
-            pose = (float(np.round(result[q].values[j, k], 12)) + 0.0 for q in ("x", "y", "heading"))
+            pose = (float(np.round(result[q].values[j, k], 12)) + 0.0 for q in moving)
             rows.append((amplitude, tier, *pose, *(f"{x[j, k]:{styles.get(n, '.4g')}}" for n, x in columns.items())))
-    head = ("amplitude", "tier", f"x ({net.unit})", f"y ({net.unit})", "heading (rad)", *columns)
-    note = f"; estimated error: {table['estimate_is']}" if "estimate_is" in table else ""
+    units = {"x": net.unit, "y": net.unit, "heading": "rad"}
+    head = ("amplitude", "tier", *(f"{q} ({units[q]})" for q in moving), *columns)
+    note = "".join(f"; {line}" for line in zero_words(zero))
+    note += f"; estimated error: {table['estimate_is']}" if "estimate_is" in table else ""
     return page(f"Net displacement per cycle of {table.scene.name}{note}", head, rows)
 
 

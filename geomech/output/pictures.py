@@ -59,7 +59,7 @@ def calibration(result: Result, path: Path) -> None:
 
 @dataclass(frozen=True)
 class Optimum:
-    """A drawing of the best gait. stretch: where equal lengths cost the same, too. clim: limit of the colours."""
+    """A drawing of the best gait. stretch: where equal lengths take equal effort, too. clim: limit of the colours."""
 
     stretch: bool
     plot: Path | None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,10 @@ from geomech.studies.tables import ERRORS, QUANTITIES, error_of, of_pose, unit_o
 from geomech.systems.base import System
 from geomech.tiers import TIERS
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 LEAST = 1e-3  # body lengths or rad: an axis spans no less, so that rounding is not drawn as motion
 BAND, EDGE = "#E69F00", "#A66F00"  # of the medium: its area and its outline
 ERROR, MEDIUM, MEASURED = "estimated error, in the tier's colour", "medium, one standard deviation", "measured"
@@ -26,9 +30,9 @@ TO_ROUNDING = "every tier has less than 1e-9"
 
 @styled
 def displacement(
-    table: Mapping, *, ax=None, label: str = "", gait: Gait | None = None, quantity: str = "x", legend: bool = True,
-    errors: bool = True, data: Mapping | None = None, **style,
-):  # fmt: skip
+    table: Mapping, *, ax: Axes | None = None, label: str = "", gait: Gait | None = None, quantity: str = "x",
+    legend: bool = True, errors: bool = True, data: Mapping | None = None, **style: Any,
+) -> Axes:  # fmt: skip
     """Draw one of QUANTITIES per cycle against amplitude, a line for each tier; ``table`` as `Study.study` returns it.
 
     errors: with a band of each tier's estimated error, in its colour; an uncertain medium has an outlined band of its own. The
@@ -80,7 +84,7 @@ def _band(ax, table: Mapping, quantity: str, amplitudes) -> None:
         medium_band(ax, amplitudes, values + shift, error)
 
 
-def medium_band(ax, x, values, error) -> None:
+def medium_band(ax: Axes, x: Any, values: Any, error: Any) -> None:
     """Draw the uncertainty by a medium of values (B,): error (B,) to either side, outlined so that it is seen over the line of
     the tier that it is about."""
     from matplotlib.colors import to_rgba
@@ -110,7 +114,7 @@ def _widen(ax, least: float) -> None:
 def displacement_figure(
     tables: Mapping[str, Mapping], gaits: Sequence[Gait], *, system: System | None = None,
     components: Sequence[str] = (), data: Mapping | None = None,
-):  # fmt: skip
+) -> Figure:  # fmt: skip
     """Draw QUANTITIES side by side, a row for each gait's table, without those that are zero; a line says which and why.
 
     system: whose symmetry makes quantities zero; that of the tables' scene if left out. components: of PANELS, drawn even where
@@ -172,7 +176,7 @@ def _speed_axis(ax, frequency: float, unit: str) -> None:
     right.spines["right"].set_visible(True)
 
 
-def net(poses) -> np.ndarray:
+def net(poses: Any) -> np.ndarray:
     """Return the net distance (...,) of poses (..., 3), negative where it points backwards (x < 0)."""
     found = of_pose(poses)
     return np.copysign(found["net_distance"], found["x"])

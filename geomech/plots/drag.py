@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from geomech.core.variables import Result
 from geomech.plots.style import figure, styled
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PARTS = (("across", "#D55E00", "o"), ("along", "#0072B2", "s"))
 
 
 @styled
-def drag_figure(result: Result):
+def drag_figure(result: Result) -> Figure:
     """Draw forces against the attack angle with the fitted law and its 95 % band, and the residuals below."""
     fig, axes = figure(4.4, 4.6, 1, 2)
     (top,), (bottom,) = axes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -36,6 +36,9 @@ from geomech.plots.styles import (
     MINUS_SIGN,
 )
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 SHADOW = "dashed: the gait, seen along the joints that are held here"
 
 
@@ -43,7 +46,7 @@ SHADOW = "dashed: the gait, seen along the joints that are held here"
 def connection_figure(
     connection: Connection, *, labels: Labels = ANGLES, style: str = "quiver",
     beside: Connection | None = None, names: Sequence[str] = (), components: Sequence[str] = (),
-):  # fmt: skip
+) -> Figure:  # fmt: skip
     """Draw the rows of A side by side, but for those that are zero everywhere, as arrows ("quiver") or "streamlines".
 
     beside: the connection in another body frame, drawn below on the same scales. names: of the two frames. components:
@@ -65,7 +68,7 @@ def connection_figure(
 
 
 @styled
-def pairs_figure(form: TwoForm, at: Sequence[float], component: int = 0, *, labels: Labels | None = None):
+def pairs_figure(form: TwoForm, at: Sequence[float], component: int = 0, *, labels: Labels | None = None) -> Figure:
     """Draw one component of the CCF of all pairs of joints, on the planes through the shape ``at`` (d,), on one scale.
 
     labels: (name, unit) of each shape variable."""
@@ -76,7 +79,7 @@ def pairs_figure(form: TwoForm, at: Sequence[float], component: int = 0, *, labe
     fig, axes = figure(3.6 * columns, 3.2 * rows, columns, rows, layout="compressed")
     top = max(largest(f.values[component]) for f in fields)
     for (i, j), field, ax in zip(form.pairs, fields, axes.ravel()):
-        ccf_map(field, component, ax=ax, labels=(labels[i], labels[j]), top=top)
+        ccf_map(field, component, ax=ax, labels=(labels[i], labels[j]), clim=top)
         fixed = ", ".join(
             f"{quantity(labels[k][0])} = {at[k]:g}".replace("-", MINUS_SIGN)
             for k in range(len(labels))
@@ -104,7 +107,7 @@ def ccf_figure(
     field: Field, gaits: Sequence[Gait] = (), *, error: Field | None = None, labels: Labels = ANGLES,
     style: str = "map", metric: Metric | Finsler | None = None, beside: tuple[Field, Field | None] | None = None,
     names: Sequence[str] = (), components: Sequence[str] = (), clim: float | str | None = None,
-):  # fmt: skip
+) -> Figure:  # fmt: skip
     """Draw the components of the CCF side by side with gaits on them, but for those that are zero everywhere, as colours
     ("map"), "contours" or a "surface".
 
@@ -120,7 +123,7 @@ def planes_figure(
     planes: Sequence[Plane], gait: Gait | None = None, *, labels: Labels | None = None, style: str = "map",
     beside: Plane | None = None, names: Sequence[str] = (), components: Sequence[str] = (),
     clim: float | str | None = None,
-):  # fmt: skip
+) -> Figure:  # fmt: skip
     """Draw the CCF of pairs of joints on planes of shape space, a row for each pair, as `ccf_figure` does.
 
     gait: of all joints; where it leaves the plane it is dashed, as it is seen along the fixed joints, and has no area. labels:
@@ -139,7 +142,7 @@ def planes_figure(
 @styled
 def plane_connection_figure(
     planes: Sequence[Plane], *, labels: Labels | None = None, style: str = "quiver", components: Sequence[str] = ()
-):  # fmt: skip
+) -> Figure:  # fmt: skip
     """Draw the rows of A of the two joints that move, on planes of shape space, a row for each pair, as `connection_figure`
     does.
 
@@ -188,7 +191,7 @@ def _ccf_rows(rows: Sequence[Row], style: str, metric, names: Sequence[str], sam
         if same:
             tops = [max((x for x in tops if x), default=None)] * len(rows)
         for r, ax, top in zip(rows, axes[:, k], tops):
-            draw(r.field, component, r.gaits, ax=ax, error=r.error, labels=r.labels, top=top, **more)
+            draw(r.field, component, r.gaits, ax=ax, error=r.error, labels=r.labels, clim=top, **more)
             for shadow in r.shadows:
                 if solid:
                     ax.plot(*shadow.shape(PHASES).T, ax.get_zlim()[0], "--", color="black", lw=1.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,7 +16,9 @@ from geomech.geometry.metric import Finsler, Metric
 from geomech.plots.style import axes_of, figure, quantity, styled
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.colors import ListedColormap
+    from matplotlib.figure import Figure
 
 ROUNDING = 1e-13  # of the largest entry of A: a row below it is nothing but rounding
 COMPONENTS = ("x", "y", r"\theta")
@@ -27,7 +29,7 @@ ANGLES = (("alpha_1", "rad"), ("alpha_2", "rad"))
 OF_CCF = 1e-12  # the same of a CCF, a derivative
 PHASES = np.linspace(0, 2 * np.pi, 400)  # at which a gait is drawn
 HATCHED = "error above value"
-RINGS = "joint rates of equal cost"
+RINGS = "joint rates of equal effort"
 SHORT = 0.06  # of the map's width: a shorter bit of a line of zeros is no line
 PATCH = 6  # points of one
 FINER = 4  # points of a line for each of the grid
@@ -35,7 +37,7 @@ ARROWS, LONGEST = 13, 1.5  # arrows along an axis; the longest, in units of thei
 FINEST = 400  # grid points along an axis of a map: about the dots of its picture
 
 
-def shape_space(ax, axes: Sequence[np.ndarray], labels: Labels = ANGLES):
+def shape_space(ax: Axes, axes: Sequence[np.ndarray], labels: Labels = ANGLES) -> Axes:
     """Label a plane of two shape variables and set it to the grid. labels: (name, unit) of each."""
     ax.set(
         xlabel=quantity(*labels[0]), ylabel=quantity(*labels[1]), aspect="equal",
@@ -49,11 +51,11 @@ def vector_field(
     connection: Connection,
     component: int = 0,
     *,
-    ax=None,
+    ax: Axes | None = None,
     every: int | None = None,
     labels: Labels = ANGLES,
     top: float | None = None,
-):
+) -> Axes:
     """Draw row ``component`` of A as arrows over shape space (Fig. 11(c)); colour repeats their length.
 
     labels: as for `shape_space`. top: of the colours and of the arrows' scale, for maps that are compared."""
@@ -124,16 +126,17 @@ def has(field: Field, component: int) -> bool:
 
 @styled
 def ccf_map(
-    field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax=None, error: Field | None = None,
-    labels: Labels = ANGLES, legend: bool = True, metric: Metric | Finsler | None = None, top: float | None = None,
-):  # fmt: skip
+    field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax: Axes | None = None, error: Field | None = None,
+    labels: Labels = ANGLES, legend: bool = True, metric: Metric | Finsler | None = None,
+    clim: float | str | None = None,
+) -> Axes:  # fmt: skip
     """Draw a component of the CCF over shape space with gaits on it (Fig. 11(d)), as far as the field goes; the colours are
     centred on zero. A component that is rounding alone is drawn as zero.
 
     error: of the field (`curvature.error`). Hatched are patches where it exceeds the value, so that not even the sign is known
     (`unknown`); there no line of zeros is drawn, and next to them only lines that part two known signs (`certain`). labels: as
-    for `shape_space`. legend: explain hatching and rings below the map. metric: drawn as rings (`indicatrices`). top: of the
-    colours, for maps that are compared."""
+    for `shape_space`. legend: explain hatching and rings below the map. metric: drawn as rings (`indicatrices`). clim: limit of
+    the colours on either side of zero, a number or a percentile of the values' size such as "98%"; else their largest."""
     from cmcrameri import cm
 
     ax = axes_of(ax)
@@ -141,7 +144,7 @@ def ccf_map(
     values, drawn = field.values[component], has(field, component)
     if not drawn:
         values, error = 0 * values, None
-    top, smooth = top or (largest(values) if drawn else 1.0), "nearest" if field.masked else "gouraud"
+    top, smooth = limit_of(values, clim) if drawn else 1.0, "nearest" if field.masked else "gouraud"
     image = ax.pcolormesh(*field.axes, values.T, cmap=cm.vik, vmin=-top, vmax=top, shading=smooth, rasterized=True)
     hidden, handles = None, []
     if error is not None:
@@ -185,9 +188,9 @@ def ccf_label(component: int, unit: str, labels: Labels) -> str:
     return f"{ccf_name(component)} ({unit_of(component, unit)}/{per})"
 
 
-def indicatrices(metric: Metric | Finsler, ax, axes: Sequence[np.ndarray], count: int = 7):
-    """Draw rings around ``count`` x ``count`` shapes: rates that cost the same, so that a ring is long in directions in which
-    shape changes cheaply. All have one scale. Return a handle for the legend."""
+def indicatrices(metric: Metric | Finsler, ax: Axes, axes: Sequence[np.ndarray], count: int = 7) -> Any:
+    """Draw rings around ``count`` x ``count`` shapes: rates that take the same effort, so that a ring is long in directions in
+    which shape changes cheaply. All have one scale. Return a handle for the legend."""
     from matplotlib.lines import Line2D
 
     spots = [a[0] + np.ptp(a) * (np.arange(count) + 0.5) / count for a in axes]
@@ -310,7 +313,13 @@ def certain(values: np.ndarray, error: np.ndarray) -> np.ndarray:
 
 
 @styled
-def draw_gait(gait: Gait, ax=None, color: str = "black", within: Sequence[np.ndarray] | None = None, line: str = "-"):
+def draw_gait(
+    gait: Gait,
+    ax: Axes | None = None,
+    color: str = "black",
+    within: Sequence[np.ndarray] | None = None,
+    line: str = "-",
+) -> Axes:
     """Draw the gait's curve with a dot at its start and an arrow along it, as far as it lies within the axes of a grid.
 
     line: its style."""
@@ -336,7 +345,7 @@ def inside_of(curve: np.ndarray, axes: Sequence[np.ndarray]) -> np.ndarray:
 
 
 @styled
-def frame_figure(pose: Field, *, labels: Labels = ANGLES):
+def frame_figure(pose: Field, *, labels: Labels = ANGLES) -> Figure:
     """Draw the pose of a body frame in another over shape space: x, y and heading side by side, colours centred on zero."""
     from cmcrameri import cm
 

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from geomech.measured.fit import Fitted
 from geomech.plots.maps import COMPONENTS, TITLES, unit_of
 from geomech.plots.style import figure, quantity, styled
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 DOTS = 4000  # rows that are drawn
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -14,7 +19,7 @@ TICKS = {0.0: "0", np.pi: r"$\pi$", 2 * np.pi: r"$2\pi$"}
 
 
 @styled
-def measured_figure(fit: Fitted):
+def measured_figure(fit: Fitted) -> Figure:
     """Draw on the left the shapes of the first two joints, in the middle the rows of A along the mean gait, with bands, on the
     right the net poses of the cycles as logged against those that the connection predicts."""
     from geomech.plots.shown import ShownAxes

@@ -4,6 +4,7 @@ page."""
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from geomech.plots.maps import ccf_map, draw_gait, has, shape_space
 from geomech.plots.style import blank, figure, quantity, styled
 from geomech.studies.motion import Motion
 from geomech.systems.base import length_unit, shape_labels
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 BODY, HEAD = "#1b4965", "#d1495b"
 LINES = 8  # shape variables beyond which they are a map along the body, not a line each
@@ -125,7 +129,7 @@ def clock(motion: Motion, row: int) -> str:
 
 
 @styled
-def stage(motion: Motion, rows, field: Field | None = None, error: Field | None = None, caption: str = ""):
+def stage(motion: Motion, rows: Any, field: Field | None = None, error: Field | None = None, caption: str = "") -> Any:
     """Return (Figure, function that moves its artists to a row and returns them): the world next to the shapes. caption: of the
     film, such as its speed."""
     fig, axes = figure(8.0, 3.6, 2, width_ratios=[1.25, 1.0])
@@ -144,7 +148,7 @@ def stage(motion: Motion, rows, field: Field | None = None, error: Field | None 
 
 
 @styled
-def filmstrip(motion: Motion, field: Field | None = None, error: Field | None = None, pictures: int = STRIP):
+def filmstrip(motion: Motion, field: Field | None = None, error: Field | None = None, pictures: int = STRIP) -> Figure:
     """Draw the body at some phases, equally spaced from start to end and to one scale, and its shapes in a panel next to them,
     with the same numbers."""
     rows = np.linspace(0, len(motion.phase) - 1, pictures).round().astype(int)

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from geomech.geometry.stretch import stretch
 from geomech.optimisation import Optimum
 from geomech.optimisation.gain import PHASES, Gained, gained_ccf, limiting
-from geomech.plots.maps import ccf_map, limit_of, shape_space
+from geomech.plots.maps import ccf_map, shape_space
 from geomech.plots.stretched import stretched_map
 from geomech.plots.style import axes_of, figure, quantity, styled
 from geomech.studies.study import Study
 from geomech.systems.base import shape_labels
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 LONG = 12  # letters of a name: a legend of longer ones has a line for each
 LIMITS = {  # of a loop: colour, text
@@ -29,7 +35,9 @@ RESIDUAL = {
 
 
 @styled
-def optimum_map(optimum: Optimum, ax=None, gained: Gained | None = None, clim: float | str | None = None):
+def optimum_map(
+    optimum: Optimum, ax: Axes | None = None, gained: Gained | None = None, clim: float | str | None = None
+) -> Axes:
     """Draw the best loop on the map of `gained_ccf`, coloured by what limits it; the start dashed. Sign and colours are those
     of `ccf_figure` in the same frame. Where the velocity does not follow from shape alone there is no CCF, and the map has the
     loop alone.
@@ -42,8 +50,7 @@ def optimum_map(optimum: Optimum, ax=None, gained: Gained | None = None, clim: f
     else:
         gained = gained or gained_ccf(optimum)
         field, component = gained
-        top = limit_of(field.values[component], clim)
-        ccf_map(field, component, ax=ax, labels=shape_labels(system), top=top)
+        ccf_map(field, component, ax=ax, labels=shape_labels(system), clim=clim)
         frame = f"frame {optimum.scene.frame}" if field.masked else "minimum-perturbation frame"
         ax.set_title(f"{ax.get_title()},\n{frame}")
     draw_start_and_best(optimum, ax, lambda curve: curve, gained)
@@ -55,14 +62,14 @@ def optimum_map(optimum: Optimum, ax=None, gained: Gained | None = None, clim: f
 def stretched_optimum(
     optimum: Optimum, ax=None, gained: Gained | None = None, study: Study | None = None, clim: float | str | None = None
 ):
-    """Draw `optimum_map` on shape space redrawn so that equal lengths cost equal effort. Refusal for a system without a
+    """Draw `optimum_map` on shape space redrawn so that equal lengths take equal effort. Refusal for a system without a
     metric."""
     ax, study, system = axes_of(ax), study or Study(optimum.scene), optimum.scene.system
     gained, plane = gained or gained_ccf(optimum, study), stretch(study.metric)
     effort = "BL" if system.traits.power_degree == 1 else "path length"
     look = {"labels": shape_labels(system), "effort": effort, "clim": clim}
     stretched_map(gained.field, plane, gained.component, ax=ax, **look)
-    ax.set_title(f"the same, stretched to its cost\n(lengths off by {100 * plane.rms:.2g} % rms)")
+    ax.set_title(f"the same, stretched to its effort\n(lengths off by {100 * plane.rms:.2g} % rms)")
     low, high = ([a[k] for a in plane.field.axes] for k in (0, -1))
     draw_start_and_best(optimum, ax, lambda curve: plane(np.clip(curve, low, high)), gained)
     return ax
@@ -96,7 +103,7 @@ def draw_limited(ax, curve: np.ndarray, kinds: np.ndarray, nonlinear: bool = Fal
 
 
 @styled
-def optimum_angles(optimum: Optimum, ax=None):
+def optimum_angles(optimum: Optimum, ax: Axes | None = None) -> Axes:
     """Draw the shape variables of the best gait over a cycle, and the limits."""
     ax, gait = axes_of(ax, 4.0, 3.4), optimum.gait
     t = np.linspace(0, 2 * np.pi, PHASES)
@@ -118,7 +125,7 @@ def optimum_angles(optimum: Optimum, ax=None):
 
 
 @styled
-def optimum_figure(optimum: Optimum, stretched: bool = False, *, clim: float | str | None = None):
+def optimum_figure(optimum: Optimum, stretched: bool = False, *, clim: float | str | None = None) -> Figure:
     """Draw `optimum_map` and `optimum_angles` side by side; the angles alone where there are not two joints. stretched:
     `stretched_optimum` between them. clim: as for `ccf_figure`."""
     system, study = optimum.scene.system, Study(optimum.scene)

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from geomech.core.variables import Result
 from geomech.plots.style import figure, styled
 from geomech.plots.terradynamics import square_of_angles
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 @styled
-def plates_figure(result: Result):
+def plates_figure(result: Result) -> Figure:
     """Draw the residuals of plate drags over their angles, and the nine coefficients with 95 % intervals."""
     fig, axes = figure(12.0, 3.5, 3)
     beta, gamma, side = _ahead(result["beta"].values, result["gamma"].values)
@@ -60,7 +65,7 @@ def _coefficients(ax, result: Result) -> None:
 
 
 @styled
-def penetration_figure(result: Result):
+def penetration_figure(result: Result) -> Figure:
     """Draw the force on a plate against depth with the law and its 95 % interval, and the residuals below."""
     fig, axes = figure(4.4, 4.6, 1, 2)
     (top,), (bottom,) = axes

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from geomech.plots.style import figure, styled
 from geomech.tiers import TIERS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 KNOB_MARKER = "osD^v<>Ph*X"
 KNOBS = {  # in words, where an entry of [numerics] is short for them
@@ -29,7 +33,7 @@ FLAT = 0.3  # order below which finer settings gain nothing to speak of
 
 
 @styled
-def work_precision(results: Mapping, axes=None):
+def work_precision(results: Mapping, axes: Any = None) -> Any:
     """Draw error against seconds of `accuracy.study`, a line for each setting of a tier with its first and last value at its
     ends.
 
@@ -73,7 +77,7 @@ def _decades(axis) -> None:
 
 
 @styled
-def work_precision_figure(results: Mapping):
+def work_precision_figure(results: Mapping) -> Figure:
     count = len({line["against"] for line in results["lines"]})
     fig, axes = figure(5.0 * count, 5.2, count)
     work_precision(results, axes[0])
@@ -81,7 +85,7 @@ def work_precision_figure(results: Mapping):
 
 
 @styled
-def walk_accuracy_figure(results: dict):
+def walk_accuracy_figure(results: dict) -> Figure:
     """Draw the error of the speed against each knob of a robot (`geomech.studies.accuracy`)."""
     fig, axes = figure(8.4, 2.9, len(results["lines"]))
     labels = {"steps": "steps of a cycle", "elements": "elements of an outline", "rounding": "rounding (m/s)"}

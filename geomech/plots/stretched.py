@@ -1,8 +1,9 @@
-"""The CCF on shape space redrawn so that equal lengths on paper cost equal effort (`geomech.geometry.stretch`)."""
+"""The CCF on shape space redrawn so that equal lengths on paper take equal effort (`geomech.geometry.stretch`)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,15 +28,20 @@ from geomech.plots.maps import (
 )
 from geomech.plots.style import axes_of, figure, quantity, styled
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 
 @styled
 def stretched_map(
-    field: Field, stretch: Stretch, component: int = 0, gaits: Sequence[Gait] = (), *, ax=None,
+    field: Field, stretch: Stretch, component: int = 0, gaits: Sequence[Gait] = (), *, ax: Axes | None = None,
     error: Field | None = None, labels: Labels = ANGLES, effort: str = "effort",
     clim: float | str | None = None,
-):  # fmt: skip
+) -> Axes:  # fmt: skip
     """Draw a component of the CCF over stretched shape space, per area there: an area on paper times the colour is what it
-    adds to the displacement, and the length of a gait is its cost. Lines of constant shape variables are thin, and thick at 0.
+    adds to the displacement, and the length of a gait is its effort. Lines of constant shape variables are thin, and
+    thick at 0.
 
     effort: unit of path length. clim: as for `ccf_figure`, of the values per area there. Other arguments as for `ccf_map`."""
     from cmcrameri import cm
@@ -108,7 +114,7 @@ def _draw(gait: Gait, ax, stretch: Stretch) -> None:
 def stretched_figure(
     field: Field, stretch: Stretch, gaits: Sequence[Gait] = (), *, error: Field | None = None,
     labels: Labels = ANGLES, effort: str = "effort", components: Sequence[str] = (), clim: float | str | None = None,
-):  # fmt: skip
+) -> Figure:  # fmt: skip
     """Draw the components side by side, with the errors of length of the plane. components, clim: as for `ccf_figure`."""
     panels = panels_of(components, [[has(field, k) for k in range(3)]])
     fig, axes = figure(0.3 + 3.7 * len(panels), 3.5, len(panels), layout="compressed")

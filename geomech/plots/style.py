@@ -7,10 +7,13 @@ import inspect
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, get_origin
 
 from geomech.io.files import atomic_file
 from rft.refusal import Refusal
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 GREEK = ("alpha", "gamma", "theta")  # letters that names of shape variables and parameters begin with
 MARKED = 40  # points of a line up to which each has its marker
@@ -69,10 +72,10 @@ def _require_drawn(draw: Callable[..., Any], value: Any) -> None:
 @functools.cache
 def _drawn_kind(draw: Callable[..., Any]) -> type | None:
     """Return the class of the first argument by its annotation; None where several kinds will do."""
-    name = next(iter(inspect.signature(draw).parameters), "")
-    try:
-        hint = get_type_hints(draw).get(name)
-    except NameError:  # an annotation that is for type checkers alone
+    first = next(iter(inspect.signature(draw).parameters.values()))
+    try:  # the first alone: others may be of Matplotlib's types, which are imported for type checkers only
+        hint = eval(first.annotation, draw.__globals__)
+    except (NameError, TypeError):  # an annotation for type checkers alone, or none
         return None
     kind = get_origin(hint) or hint
     return kind if isinstance(kind, type) and kind.__name__ in SOURCES else None
@@ -141,7 +144,7 @@ def check_format(path: str | Path) -> Path:
 
 
 @styled
-def save(fig, *paths: str | Path) -> None:
+def save(fig: Figure, *paths: str | Path) -> None:
     """Write a figure, or that of Axes, to files, each of which appears whole or not at all. The figure is laid out once and
     drawn once for each file, where `savefig` lays out and draws twice for each."""
     fig = getattr(fig, "figure", fig)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,12 +24,16 @@ from geomech.plots.maps import (
     finer,
     label_row,
     largest,
+    limit_of,
     shape_space,
     unit_of,
     vector_field,
 )
 from geomech.plots.style import axes_of, quantity, styled
 from rft.registry import Registry, functions_with
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 CONNECTION_STYLES = Registry(
     "geomech.connection_styles", "style", "a way to draw a connection", functions_with("draws", "connection")
@@ -47,8 +52,8 @@ PLUS, MINUS = "#B2182B", "#2166AC"  # of areas that carry forwards and backwards
 @CONNECTION_STYLES.register(style="streamlines")
 @styled
 def streamlines(
-    connection: Connection, component: int = 0, *, ax=None, labels: Labels = ANGLES, top: float | None = None
-):  # fmt: skip
+    connection: Connection, component: int = 0, *, ax: Axes | None = None, labels: Labels = ANGLES, top: float | None = None
+) -> Axes:  # fmt: skip
     """Draw row ``component`` of A as streamlines over shape space: along them a change of shape moves the body the most for
     its size, across them not at all. Colour: length of the row. Other arguments as for `vector_field`."""
     from matplotlib.colors import Normalize
@@ -74,9 +79,9 @@ def streamlines(
 @CCF_STYLES.register(style="contours")
 @styled
 def ccf_contours(
-    field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax=None, error: Field | None = None,
-    labels: Labels = ANGLES, top: float | None = None,
-):  # fmt: skip
+    field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax: Axes | None = None, error: Field | None = None,
+    labels: Labels = ANGLES, clim: float | str | None = None,
+) -> Axes:  # fmt: skip
     """Draw a component of the CCF as contours, dashed below zero, and shade the area of each gait by the sign of its
     contribution to the displacement: CCF times winding number.
 
@@ -85,7 +90,7 @@ def ccf_contours(
 
     ax, field = axes_of(ax), drawable(field)
     axes, values = finer(field, field.values[component])
-    most = top or largest(values)
+    most = limit_of(values, clim)
     levels = MaxNLocator(2 * LEVELS, steps=[1, 2, 2.5, 5, 10], symmetric=True).tick_values(-most, most)
     looks = {0: ("0.6", 1.4, "-"), 1: ("0.25", 0.6, "-"), -1: ("0.25", 0.6, "--")}
     colours, widths, dashes = zip(*(looks[int(np.sign(x)) if abs(x) > 1e-9 * most else 0] for x in levels))
@@ -145,9 +150,9 @@ def winding(curve: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 @CCF_STYLES.register(style="surface", projection="3d")
 @styled
 def ccf_surface(
-    field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax=None, error: Field | None = None,
-    labels: Labels = ANGLES, top: float | None = None,
-):  # fmt: skip
+    field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax: Axes | None = None, error: Field | None = None,
+    labels: Labels = ANGLES, clim: float | str | None = None,
+) -> Axes:  # fmt: skip
     """Draw a component of the CCF as a surface over shape space, with gaits on it and, on the plane below, their areas shaded
     by sign as in `ccf_contours`.
 
@@ -159,7 +164,7 @@ def ccf_surface(
     ax = blank(4.2, 3.6).add_subplot(projection="3d") if ax is None else ax
     field = drawable(field)
     axes, values = finer(field, field.values[component])
-    most = top or largest(values)
+    most = limit_of(values, clim)
     clipped = np.clip(values, -most, most)
     ax.plot_surface(
         *np.meshgrid(*axes, indexing="ij"), clipped, cmap=cm.vik, vmin=-most, vmax=most, rcount=121, ccount=121, lw=0,

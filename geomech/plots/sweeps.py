@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +12,10 @@ from geomech.plots.style import MARKED, figure, quantity, styled
 from geomech.scenes.model import Scene
 from geomech.studies.cycles import AMPLITUDE
 from rft.refusal import Refusal
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 PARAMETERS = {  # units of parameters, by the last part of their names; the others have none
     "gamma0": "rad", "length": "m", "frequency": "Hz", "mass": "kg", "drag": "N", "depth": "m", "radius": "BL",
@@ -28,7 +32,7 @@ OF_ROBOTS = {  # likewise, of scenes of robots
 }  # fmt: skip
 
 
-def sweep_figure(scene: Any, results: Mapping):
+def sweep_figure(scene: Any, results: Mapping) -> Figure:
     """Draw a sweep (`geomech.studies.sweep`) over one parameter or two: net distance or speed, or the speed of a robot.
     Refusal for more."""
     if len(over := results["over"]) > 2:
@@ -67,7 +71,7 @@ def drawn(scene: Scene, results: Mapping):
 @styled
 def _line(ax, x, values: np.ndarray, errors: np.ndarray, medium: np.ndarray | None, label: str) -> None:
     marker = "o" if len(x) <= MARKED else ""
-    ax.errorbar(x, values, yerr=errors, fmt=f"{marker}-", color="black", ms=3, lw=1)
+    ax.errorbar(x, values, yerr=errors, fmt=f"{marker}-", color="black", ms=3, lw=1, label="with estimated error")
     if medium is not None:
         medium_band(ax, x, values, medium)
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))
@@ -114,7 +118,7 @@ def _speed_figure(scene: Any, results: Mapping):
     return fig
 
 
-def curves(ax, values, results: Mapping, names) -> None:
+def curves(ax: Axes, values: Any, results: Mapping, names: Any) -> None:
     """Draw speed (N, ...) over ``values``, a curve for each name, with its error; open markers: not walking."""
     from cmcrameri import cm
 

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from geomech.plots.maps import largest
 from geomech.plots.style import figure, styled
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 POSES = 5  # of the body that are drawn
 COLOURS = {"x": "C0", "y": "C2", "z": "C3"}
 
 
 @styled
-def stress_figure(survey, point: tuple[float, float] | None = None):
+def stress_figure(survey: Any, point: tuple[float, float] | None = None) -> Figure:
     """Draw alpha_z and alpha_x of an `rft.plates.Survey` over tilt and direction of motion (Fig. 7(c) and (d)), hatched where
     the map pulls.
 
@@ -30,7 +34,7 @@ def stress_figure(survey, point: tuple[float, float] | None = None):
     return fig
 
 
-def stress_map(ax, survey, name: str):
+def stress_map(ax: Axes, survey: Any, name: str) -> Axes:
     """Draw alpha_x or alpha_z (``name`` "x" or "z") of an `rft.plates.Survey` for motion forwards, hatched where it pulls.
     Both have one scale of colours."""
     from cmcrameri import cm
@@ -49,7 +53,7 @@ def stress_map(ax, survey, name: str):
     return ax
 
 
-def square_of_angles(ax) -> None:
+def square_of_angles(ax: Axes) -> None:
     """Set the axes of tilt and direction of motion."""
     ticks = [-90, -45, 0, 45, 90]
     ax.set(xlabel=r"tilt $\beta$ (degrees)", ylabel=r"direction $\gamma$ below the horizontal (degrees)")
@@ -63,7 +67,7 @@ def _point_on_map(beta: float, gamma: float) -> tuple[float, float]:
 
 
 @styled
-def intrusion_figure(scene, found) -> Any:
+def intrusion_figure(scene: Any, found: Any) -> Any:
     """Draw an intruder scene and its run: the body, and force and moment along the motion. An outline is drawn at a few of its
     poses, a mesh where the force is largest, with the stress on its faces."""
     fig, axes = figure(10.2, 3.2, 3)
@@ -92,7 +96,7 @@ def intrusion_figure(scene, found) -> Any:
     return fig
 
 
-def draw_stress(ax, faces, above: np.ndarray, unit: float = 1e3) -> None:
+def draw_stress(ax: Any, faces: Any, above: np.ndarray, unit: float = 1e3) -> None:
     """Draw the faces below the surface (`rft.meshes.Faces`) on 3-D axes, coloured by the size of the stress on them, and the
     triangles ``above`` it (Q, 3, 3) in grey."""
     from cmcrameri import cm
@@ -159,7 +163,7 @@ def _abscissa(columns) -> tuple[str, str, float]:
 
 
 @styled
-def elements_figure(results: Mapping):
+def elements_figure(results: Mapping) -> Figure:
     """Draw the error of an intruder scene against its number of parts, and against seconds (`geomech.studies.intrusion`)."""
     from matplotlib.ticker import NullFormatter
 

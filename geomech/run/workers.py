@@ -43,9 +43,11 @@ def using(count: int | None = None, scheduler: str | None = None) -> Iterator[No
 
 def _executor(count: int | None, scheduler: str | None) -> Executor | None:
     if count is not None:
-        in_range("`workers`", count, 1, MOST, whole=True)
+        in_range("``workers``", count, 1, MOST, whole=True)
     if scheduler is not None and count is not None:
-        raise Refusal("`workers` are processes of this machine, --scheduler has its own", instead="give one of the two")
+        raise Refusal(
+            "``workers`` are processes of this machine, --scheduler has its own", instead="give one of the two"
+        )
     if scheduler is None and (count or cores()) == 1:
         return None
     from geomech.run.executors import Cluster, Processes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -60,7 +60,7 @@ class Intruding:
         """Order of the error in 1 / parts."""
         raise NotImplementedError
 
-    def changed(self, **parts) -> Intruding:
+    def changed(self, **parts: Any) -> Intruding:
         """Return the scene with other parts."""
         return dataclasses.replace(self, **parts)
 

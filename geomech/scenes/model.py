@@ -5,9 +5,10 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass, field
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.core.errors import choose
 from geomech.gaits import KINDS as GAITS
@@ -70,7 +71,7 @@ class Scene(Displayed):
             object.__setattr__(self, "system", reframed(self.system, self.numerics))
             self.note_turns(self.gait)
 
-    def note_turns(self, gait: Gait, amplitudes=None) -> None:
+    def note_turns(self, gait: Gait, amplitudes: ArrayLike | None = None) -> None:
         """Warn (`UnitWarning`) if a gait turns a joint by more than a full turn."""
         if hasattr(gait, "largest"):
             note_angles(self.system, gait.largest(amplitudes))
@@ -78,7 +79,7 @@ class Scene(Displayed):
     frame = property(lambda self: self.system.traits.frame, doc="The body frame of all velocities and displacements.")
     frequency = property(lambda self: frequency_of(self.system, self.gait), doc="Hz; None where nothing says one.")
 
-    def with_numerics(self, **changes) -> Scene:
+    def with_numerics(self, **changes: Any) -> Scene:
         """Return the scene with some of its [numerics], or of its system's, changed; None leaves an entry."""
         own_keys = {f.name for f in _fields(solver_of(self.system))}
         changes = {k: v for k, v in changes.items() if v is not None}
@@ -89,7 +90,7 @@ class Scene(Displayed):
                 choose("numerics", name, [*own_keys, *self.numerics.__dataclass_fields__])
             return dataclasses.replace(self, system=system, numerics=dataclasses.replace(self.numerics, **tier_changes))
 
-    def changed(self, **changes) -> Scene:
+    def changed(self, **changes: Any) -> Scene:
         """Return the scene with some of its parts, or of its system's, changed."""
         parts = {k: v for k, v in changes.items() if k in ("system", "gait", "numerics", "name", "text", "files")}
         with located(self.name):
@@ -101,7 +102,9 @@ class Scene(Displayed):
                 parts["system"] = dataclasses.replace(system, **system_changes)
             return dataclasses.replace(self, **parts)
 
-    def cycle(self, gait: Gait | None = None, amplitudes=None, phases: int | None = None, work: bool = False) -> Cycle:
+    def cycle(
+        self, gait: Gait | None = None, amplitudes: ArrayLike | None = None, phases: int | None = None, work: bool = False
+    ) -> Cycle:  # fmt: skip
         """Run a gait, or the scene's own, for amplitudes (...,), all at once."""
         gait = checked_gait(self.gait if gait is None else gait)
         return self.system.run(*gait.cycle(phases or self.numerics.phases, amplitudes), work)

@@ -30,7 +30,7 @@ def rod_drags(law: str, source: str, sizes: Mapping[str, float], end_caps: float
     sizes: those of `SIZES` that overrule the header lines. Refusal, one line that names the file, if the data are bad or
     do not determine the law."""
     if "area" in sizes:
-        raise Refusal("`area` belongs to another measurement", instead=f"leave it out for `law` {law}")
+        raise Refusal("``area`` belongs to another measurement", instead=f"leave it out for ``law`` {law}")
     measured = drag.read(source)
     with located(measured.name):
         f = fit(law, rod_drag(*measured.rows), Rod(**{**measured.sizes, **sizes}), end_caps)
@@ -110,7 +110,7 @@ class Calibration(Question):
 
     @cached_property
     def chosen(self) -> str:
-        return choose("`law`", law_of(self.source) if self.law is None else self.law, CALIBRATIONS)
+        return choose("``law``", law_of(self.source) if self.law is None else self.law, CALIBRATIONS)
 
     def check(self) -> None:
         _ = self.chosen

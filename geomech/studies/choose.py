@@ -26,7 +26,7 @@ FINEST_PIECES = 640  # of body, for a tolerance
 
 def cheapest(
     scene: Scene, amplitudes: Sequence[float], tol: float, gait: Gait | None = None, ask: Callable = lambda jobs: None
-) -> dict:
+) -> Displacements:
     """Return a table as of `Study.study` for the cheapest tier with errors of position of at most ``tol`` body lengths,
     with {"tier", "tolerance", "settings"} besides.
 
@@ -34,7 +34,7 @@ def cheapest(
     order of their cost, as long as that is below the direct tier's. ask: called with the jobs to come
     (`geomech.studies.cost`) before each. Refusal if no tier is accurate enough."""
     if not (is_number(tol) and 0 < tol <= 1e300):
-        raise Refusal("`tolerance` must be a number > 0 in body lengths", value=tol)
+        raise Refusal("``tolerance`` must be a number > 0 in body lengths", value=tol)
     study, start = Study(scene), time.perf_counter()
     system, gait = scene.system, checked_gait(scene.gait if gait is None else gait)
     amplitudes = real_array("amplitudes", amplitudes)
@@ -45,12 +45,12 @@ def cheapest(
         raise Refusal(
             f"cycles with these effects repeat to {settling(system):g} only",
             where=scene.name,
-            instead="raise `tolerance`",
+            instead="raise ``tolerance``",
         )
     ask(cost.of_medium(scene, gait, len(amplitudes)))
     medium = uncertainty.of_medium(scene, gait, amplitudes)
 
-    def answer(tier: str, poses, error, settings: dict) -> dict:
+    def answer(tier: str, poses, error, settings: dict) -> Displacements:
         attributes = {
             "tier": tier,
             "tolerance": float(tol),
@@ -89,7 +89,7 @@ def cheapest(
         raise Refusal(
             f"no tier gets to {tol:g} body lengths (best estimate {error[:, 0].max():.1e} with {settings_text})",
             where=scene.name,
-            instead=f"raise `tolerance`, or {finer}",
+            instead=f"raise ``tolerance``, or {finer}",
         )
     return answer(DIRECT.name, poses, error, settings)
 

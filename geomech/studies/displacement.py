@@ -90,9 +90,9 @@ def displacement(
     effort: bool = False,
 ) -> Question:
     """Return the question of a command. tiers: their names, with commas between them."""
-    chosen = () if tiers is None else tuple(choose("`tiers`", name.strip(), TIERS) for name in tiers.split(","))
+    chosen = () if tiers is None else tuple(choose("``tiers``", name.strip(), TIERS) for name in tiers.split(","))
     if tolerance is None:
         return Displacement(scene, tuple(amplitudes), chosen, effort)
     if chosen:
-        raise Refusal("`tolerance` chooses the tier", instead="drop `tiers`")
+        raise Refusal("``tolerance`` chooses the tier", instead="drop ``tiers``")
     return Cheapest(scene, tuple(amplitudes), tolerance, effort)

@@ -47,7 +47,7 @@ from rft.refusal import Refusal
 
 DEPENDS_ON = ("grid", "extent", "interpolation")  # of [numerics]
 HIGHEST = 14  # harmonic of a norm that the 24 directions of the harmonic table resolve well
-METRIC = "of the system's own metric"
+METRIC = "own metric"  # unit of path lengths by the metric of the system itself
 WORK = "drag x BL"  # the axial drag of the whole body, in a fluid at 1 BL per rad of phase
 EVEN = 1e-6  # of the power: above a solver's tolerance
 

@@ -90,14 +90,14 @@ def listed(over: Mapping[str, Any]) -> dict[str, list[float]]:
     values = {name: _listed(name, x) for name, x in over.items()}
     total = math.prod(map(len, values.values())) if values else 0
     if not 0 < total <= LARGEST:
-        raise Refusal(f"`over` must span 1 to {LARGEST:,} points, got {total:,}")
+        raise Refusal(f"``over`` must span 1 to {LARGEST:,} points, got {total:,}")
     return values
 
 
 def _listed(name: str, values: Any) -> list[float]:
     array = real_array(name, values)
     if array.ndim != 1 or not np.isfinite(array).all():
-        raise Refusal("values must be a list of finite numbers", value=values, where=f"`over` {name}")
+        raise Refusal("values must be a list of finite numbers", value=values, where=f"``over`` {name}")
     return array.tolist()
 
 
@@ -145,7 +145,7 @@ def changed(tables: dict, parameter: str, value: float) -> dict:
             return {**tables, "effects": [{**e, parts[1]: value} if parts[1] in e else e for e in effects]}
         raise Refusal(
             f"no effect of the scene gives {parts[1]!r}",
-            where=f"`over` {parameter}",
+            where=f"``over`` {parameter}",
             instead="name the effect, or add it",
         )
     if len(parts) == 3 and parts[0] == "effects":
@@ -153,10 +153,10 @@ def changed(tables: dict, parameter: str, value: float) -> dict:
         if any(e.get("kind") == parts[1] for e in effects):
             return {**tables, "effects": [{**e, parts[2]: value} if e["kind"] == parts[1] else e for e in effects]}
         raise Refusal(
-            f"the scene has no effect {parts[1]!r}", where=f"`over` {parameter}", instead="add it as [[effects]]"
+            f"the scene has no effect {parts[1]!r}", where=f"``over`` {parameter}", instead="add it as [[effects]]"
         )
     raise Refusal(
-        "name a parameter such as gait.amplitude, medium.C or effects.end-caps.radius", where=f"`over` {parameter}"
+        "name a parameter such as gait.amplitude, medium.C or effects.end-caps.radius", where=f"``over`` {parameter}"
     )
 
 

@@ -154,7 +154,7 @@ def motion(scene: Scene, cycles: int = 1) -> Motion:
 def checked(cycles: int) -> None:
     """Refuse a number of cycles that makes no sense."""
     if not (is_whole(cycles) and 1 <= cycles <= MOST_CYCLES):
-        raise Refusal(f"`cycles` must be a whole number from 1 to {MOST_CYCLES}", value=cycles)
+        raise Refusal(f"``cycles`` must be a whole number from 1 to {MOST_CYCLES}", value=cycles)
 
 
 def cost(scene: Scene, cycles: int = 1) -> Cost:

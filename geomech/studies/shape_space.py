@@ -37,8 +37,8 @@ MOST_PAIRS = 10  # of joints in a figure: as many as five joints have
 
 class Space(NamedTuple):
     """Subject of texts and pictures of shape space. other, other_planes: the study and its planes in another body frame.
-    stretch: of shape space, to equal effort. enclosed: the displacement of the scene's gait by the area tier. seconds: of the
-    computation."""
+    stretch: of shape space, to equal effort. enclosed: the displacement of the scene's gait by the area tier. balances,
+    seconds: of the computation."""
 
     study: Study
     other: Study | None = None
@@ -46,6 +46,7 @@ class Space(NamedTuple):
     other_planes: tuple[Plane, ...] = ()
     stretch: Stretch | None = None
     enclosed: Result | None = None
+    balances: int = 0
     seconds: float = 0.0
 
 
@@ -118,7 +119,7 @@ class ShapeSpace(Question):
         if len(pairs) > MOST_PAIRS:
             raise Refusal(
                 f"{joints} joints have {len(pairs)} pairs",
-                instead=f"say which, such as `pair` 1,{joints}, or give a chain [body] modes",
+                instead=f"say which, such as ``pair`` 1,{joints}, or give a chain [body] modes",
             )
         return [(one, through(self.scene, one, self.slice_angles, self.pair is not None)) for one in pairs]
 
@@ -133,7 +134,7 @@ class ShapeSpace(Question):
             if self.metric and (reason := why_none(system)):
                 raise Refusal(reason, where=name)
             if self.other_frame is not None and len(self._at) > 1:
-                raise Refusal("`compare_frame` draws one pair of joints", instead="say which with `pair`")
+                raise Refusal("``compare_frame`` draws one pair of joints", instead="say which with ``pair``")
         _ = self.other
 
     def cost(self) -> Cost:
@@ -161,8 +162,8 @@ class ShapeSpace(Question):
         stretched = stretch_to_metric(study.metric) if self.stretch else None
         amplitude = self.scene.gait.amplitude
         enclosed = study.study([amplitude], [AREA.name]).result if self._enclosed else None
-        seconds = time.perf_counter() - start
-        space = Space(study, self.other, tuple(values[:count]), other_planes, stretched, enclosed, seconds)
+        spent = self.cost().balances, time.perf_counter() - start
+        space = Space(study, self.other, tuple(values[:count]), other_planes, stretched, enclosed, *spent)
         if self.file:
             file = (fields.of_study if self.file == WHOLE else fields.of_connection_alone)(study)
             return Result(file.kind, file.variables, file.attributes, space)
@@ -201,10 +202,10 @@ def _pair(text: str, joints: int) -> tuple[int, int]:
     """Return the joints, counted from 0, of a text such as 1,3."""
     names = text.split(",")
     if len(names) != 2 or not all(x.strip().isdecimal() for x in names):
-        raise Refusal(f"{text!r} is not two joints such as 1,{joints}", where="`pair`")
+        raise Refusal(f"{text!r} is not two joints such as 1,{joints}", where="``pair``")
     i, j = (int(x) - 1 for x in names)
     if i == j or not all(0 <= k < joints for k in (i, j)):
-        raise Refusal(f"{text!r} must be two different joints from 1 to {joints}", where="`pair`")
+        raise Refusal(f"{text!r} must be two different joints from 1 to {joints}", where="``pair``")
     return i, j
 
 
@@ -213,22 +214,22 @@ def through(scene: Scene, pair: tuple[int, int], angles: tuple[float, ...] | Non
     only."""
     at, fixed = scene.gait.middle.copy(), [k for k in range(scene.system.joints) if k not in pair]
     if angles is not None and not fixed:
-        raise Refusal("`slice` says where other joints are held, and this body has but two", instead="drop it")
+        raise Refusal("``slice`` says where other joints are held, and this body has but two", instead="drop it")
     if angles is None:
         return at
     extent = scene.numerics.extent
     if not (stored_table(scene.system, "connection") or all(abs(a) <= extent for a in angles)):
         raise Refusal(
             f"the angles must lie within the field's {extent:g} rad",
-            where="`slice`",
-            instead="give others, or raise `extent`",
+            where="``slice``",
+            instead="give others, or raise ``extent``",
         )
     if len(angles) == len(at) > 1:
         return np.array(angles)
     if len(angles) != 1 and not (alone and len(angles) == len(fixed)):
         choices = f"{len(fixed)} one by one, " * (alone and len(fixed) > 1) + "or "
         raise Refusal(
-            f"`slice` takes one angle for all joints that are held, {choices}{len(at)} for a shape", value=len(angles)
+            f"``slice`` takes one angle for all joints that are held, {choices}{len(at)} for a shape", value=len(angles)
         )
     at[fixed] = angles
     return at
@@ -245,7 +246,7 @@ def ccf(
     """Return the question of a CCF. metric, stretch: its picture needs the metric."""
     sliced = scene.system.joints > 2 or pair is not None or slice_angles is not None
     if sliced and (metric or stretch):
-        raise Refusal("`metric` and `stretch` are those of two joints", instead="drop them for slices")
+        raise Refusal("``metric`` and ``stretch`` are those of two joints", instead="drop them for slices")
     if sliced:
         return ShapeSpace(
             scene, field=False, planes=True, pair=pair, slice_angles=slice_angles, other_frame=other_frame
@@ -266,7 +267,7 @@ def connection(
     fields.check_joints(scene, file)
     sliced = drawn and (scene.system.joints > 2 or pair is not None or slice_angles is not None)
     if sliced and other_frame is not None:
-        raise Refusal("`compare_frame` draws maps of two joints", instead="drop it, or see 'geomech ccf --pair'")
+        raise Refusal("``compare_frame`` draws maps of two joints", instead="drop it, or see 'geomech ccf --pair'")
     picture = {
         "map": drawn and not sliced,
         "planes": sliced,

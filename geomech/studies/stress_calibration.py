@@ -77,7 +77,7 @@ def penetration_test(law: str, source: str, sizes: Mapping[str, float], end_caps
         if area is None:
             raise Refusal(
                 "the area of the plate is missing",
-                instead="give `area` in m^2, or a header line '# plate area = 9.5 cm^2'",
+                instead="give ``area`` in m^2, or a header line '# plate area = 9.5 cm^2'",
             )
         f = fit_zeta(test.depth, test.force, area)
     facts = {"name": test.name, "rms": _rms(f.force - f.law), "notes": _shifted(test.name, f)}
@@ -110,7 +110,7 @@ def _refuse(law: str, sizes: Mapping[str, float], end_caps, known: tuple[str, ..
     """Refuse options that belong to a rod."""
     for name in (*sizes, *(["end_caps"] if end_caps else [])):
         if name not in known:
-            raise Refusal(f"`{name}` belongs to another measurement", instead=f"leave it out for `law` {law}")
+            raise Refusal(f"``{name}`` belongs to another measurement", instead=f"leave it out for ``law`` {law}")
 
 
 def law_of(source: str) -> str:

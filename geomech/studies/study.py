@@ -6,9 +6,10 @@ import copy
 import sys
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.core.errors import choose
 from geomech.gaits import Gait
@@ -58,11 +59,11 @@ class Study:
         """Keys (name, system, key) of the tables computed so far."""
         return tuple(self._tables)
 
-    def with_numerics(self, **numerics) -> Study:
+    def with_numerics(self, **numerics: Any) -> Self:
         """Return the study with other [numerics] and the same stored tables; an entry given as None stays as it is."""
         return self._of(self.scene.with_numerics(**numerics))
 
-    def in_frame(self, frame: str) -> Study:
+    def in_frame(self, frame: str) -> Self:
         """Return the study in another body frame; Refusal for an unknown one, or the scene's own."""
         s = self.scene
         with located(s.name):
@@ -71,7 +72,7 @@ class Study:
             system = framed(s.system, s.numerics) if frame == MINIMUM_PERTURBATION else in_frame(s.system, frame)
             return self._of(s.changed(system=system))
 
-    def _of(self, scene: Scene) -> Study:
+    def _of(self, scene: Scene) -> Self:
         """Return the study of another scene with the same stored tables."""
         study = copy.copy(self)
         study.scene = scene
@@ -102,7 +103,7 @@ class Study:
     def _connection(self) -> Table:
         return fitted.table(self.scene.system, self.scene.numerics)
 
-    def plan(self, tier: str, gait: Gait | None = None, amplitudes=None) -> Plan:
+    def plan(self, tier: str, gait: Gait | None = None, amplitudes: ArrayLike | None = None) -> Plan:
         """Return how a tier predicts displacements of a gait, or of the scene's own; Refusal if it is not available."""
         with located(self.scene.name):
             chosen = _tier(tier)
@@ -112,7 +113,9 @@ class Study:
     def _plan(self, tier: Tier, gait: Gait, amplitudes) -> Plan:
         return tier.plan(self.scene.system, self.scene.numerics, gait, amplitudes)
 
-    def table(self, tier: str, gait: Gait | None = None, amplitudes=None, progress: Callable | None = None) -> Any:
+    def table(
+        self, tier: str, gait: Gait | None = None, amplitudes: ArrayLike | None = None, progress: Callable | None = None
+    ) -> Any:
         """Return the table of a tier, computed once: a Connection, Harmonics or a Family; None for a tier without one.
         Refusal if the tier is not available."""
         return self._table_of(self.plan(tier, gait, amplitudes), progress)
@@ -142,7 +145,7 @@ class Study:
         """Harmonics of the velocity in a plain study; None where it is linear, or has too many joints."""
         return self.compute_harmonics() if harmonic.is_looked_up(self.scene.system) else None
 
-    def plane(self, pair: Sequence[int], at=None, progress: Callable | None = None) -> Plane:
+    def plane(self, pair: Sequence[int], at: ArrayLike | None = None, progress: Callable | None = None) -> Plane:
         """Return a plane of shape space in which two joints move, counted from 0, through a shape or the gait's middle:
         the CCF of that pair, without a field of all joints (`geomech.geometry.plane`)."""
         s, at = self.scene, self.scene.gait.middle if at is None else at
@@ -178,7 +181,7 @@ class Study:
         alphadot, else a norm. Refusal if the system has none."""
         return self.compute_metric()
 
-    def effort(self, gait: Gait | None = None, amplitudes=None) -> dict[str, np.ndarray]:
+    def effort(self, gait: Gait | None = None, amplitudes: ArrayLike | None = None) -> dict[str, np.ndarray]:
         """Return path length and work of a gait, or the scene's own, with their errors: see
         `geomech.studies.effort.effort`."""
         with located(self.scene.name):
@@ -205,7 +208,7 @@ class Study:
         """Estimated error of `curvature`."""
         return self._stored("error of the ccf", self._connection().key, lambda: ccf_error(self.fitted))[0]
 
-    def poses(self, tier: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray:
+    def poses(self, tier: str, gait: Gait | None = None, amplitudes: ArrayLike | None = None) -> np.ndarray:
         """Return the net pose per cycle (..., 3) by one tier of TIERS for amplitudes (...,), of a gait or the scene's
         own."""
         scene, gait = self.scene, self.scene.gait if gait is None else checked_gait(gait)
@@ -215,7 +218,7 @@ class Study:
             self._refuse_singular(plan, gait, amplitudes)
             return plan.predict(self._table_of(plan), amplitudes)
 
-    def spread(self, tier: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray | None:
+    def spread(self, tier: str, gait: Gait | None = None, amplitudes: ArrayLike | None = None) -> np.ndarray | None:
         """Return how far `poses` depend on an arbitrary choice of the tier, such as a surface spanned by the
         loop: (B, 2), in the system's unit and rad; None without one. Estimates include it."""
         plan = self.plan(tier, gait, amplitudes)
@@ -231,8 +234,12 @@ class Study:
             refuse_singular(system, gait.cycle(phases, a)[0])
 
     def study(
-        self, amplitudes: Sequence[float], tiers: Sequence[str] | None = None, gait: Gait | None = None, progress=None
-    ) -> dict:
+        self,
+        amplitudes: Sequence[float],
+        tiers: Sequence[str] | None = None,
+        gait: Gait | None = None,
+        progress: Callable | None = None,
+    ) -> Displacements:
         """Return a table (`geomech.studies.tables.table`) of the net poses by tiers of TIERS (`default_tiers` if
         None), with their errors, and {"seconds": {...}, "kept": [...]} besides.
 
@@ -283,7 +290,11 @@ class Study:
         return seconds, stored
 
     def cost(
-        self, amplitudes: Sequence[float], tiers: Sequence[str] | None = None, gait: Gait | None = None, more=()
+        self,
+        amplitudes: Sequence[float],
+        tiers: Sequence[str] | None = None,
+        gait: Gait | None = None,
+        more: Sequence[cost.Job] = (),
     ) -> cost.Cost:
         """Return the cost of `study`, and of ``more`` jobs: force balances, seconds on this machine and memory; see
         `geomech.studies.cost`."""

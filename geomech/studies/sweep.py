@@ -4,7 +4,7 @@ other."""
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
@@ -145,7 +145,7 @@ def answered(common: tuple, part: tuple) -> np.ndarray:
 
 def sweep(
     scene: Any,
-    over: Mapping[str, list[float]],
+    over: Mapping[str, Sequence[float]],
     partial: Path | None = None,
     progress: Callable | None = None,
 ) -> Swept:

@@ -4,9 +4,10 @@ activation of the muscles (Sec. III C, Fig. 10)."""
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.gaits import Sine, Wave
 from rft.checks import real_array
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 MIDDLE = (0.1, 0.9)  # share of the body over which speeds of waves are fitted: at its ends the moment vanishes
 
 
-def performance(scene: Scene, amplitudes) -> dict[str, np.ndarray]:
+def performance(scene: Scene, amplitudes: ArrayLike) -> dict[str, np.ndarray]:
     """Return the performance of the scene's travelling wave over a cycle: a `Sine` for amplitudes A / lambda (B,) or a
     `Wave` of the joint angles of a chain of equal links for amplitudes in rad (B,). Each entry is (B,) but the
     velocity:
@@ -86,7 +87,7 @@ def _sine(scene: Scene, what: str) -> Sine:
 KINEMATICS = ("sliding", "sideways")
 
 
-def endless_efficiency(medium, headings: np.ndarray, cap=None, kinematics: str = "sliding") -> float:
+def endless_efficiency(medium: Any, headings: np.ndarray, cap: Any = None, kinematics: str = "sliding") -> float:
     """Return the efficiency, progress over wavelength, of an endless wave by the balance of force along it alone: no
     yaw.
 
@@ -120,7 +121,9 @@ def endless_efficiency(medium, headings: np.ndarray, cap=None, kinematics: str =
     return float(brentq(along, -1.0, 1.0, xtol=1e-14))
 
 
-def endless_sine(medium, amplitude: float, cap=None, elements: int = 2000, kinematics: str = "sliding") -> float:
+def endless_sine(
+    medium: Any, amplitude: float, cap: Any = None, elements: int = 2000, kinematics: str = "sliding"
+) -> float:
     """Return `endless_efficiency` of a sine of this A / lambda, with one wave on the body where ends count. Sliding, it
     is the endless limit of the gait `Sine`.
 
@@ -131,7 +134,7 @@ def endless_sine(medium, amplitude: float, cap=None, elements: int = 2000, kinem
     return endless_efficiency(medium, gait.headings(0.0), cap, kinematics)
 
 
-def optimum(x, values, sign: int = 1) -> tuple[float, float] | None:
+def optimum(x: ArrayLike, values: ArrayLike, sign: int = 1) -> tuple[float, float] | None:
     """Return the place and height of the largest (sign 1) or least (-1) of positive values (B,) at x (B,).
 
     Both are those of the parabola through the logarithms of that value and its neighbours. None if it is the first or the

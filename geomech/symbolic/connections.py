@@ -7,7 +7,7 @@ frame, and the tuple of shape variables. `geomech.symbolic.simplified` brings A 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -101,7 +101,9 @@ def solve_chain(lengths, frame: str, weights, equations: Callable) -> Formula:
     return A, alpha
 
 
-def chain_connection(lengths, resistances, frame: str = "mean", weights=None) -> Formula:
+def chain_connection(
+    lengths: Sequence, resistances: Sequence, frame: str = "mean", weights: Sequence | None = None
+) -> Formula:
     """Return A = -(sum J_i^T R_i J_i)^-1 sum J_i^T R_i B_i of a chain whose links resist their velocity v_i by R_i v_i.
 
     R_i v_i is drag or momentum, and adds up to zero over the body.
@@ -118,7 +120,7 @@ def chain_connection(lengths, resistances, frame: str = "mean", weights=None) ->
     return solve_chain(lengths, frame, weights, balance)
 
 
-def viscous_chain(lengths=(1, 1, 1), ratio=2, frame: str = "link-2") -> Formula:
+def viscous_chain(lengths: Sequence = (1, 1, 1), ratio: Any = 2, frame: str = "link-2") -> Formula:
     """Return the connection of a chain of links in a linear medium.
 
     lengths: of the links, divided by their sum. ratio: drag across over drag along. frame: as in `solve_chain`.
@@ -129,13 +131,13 @@ def viscous_chain(lengths=(1, 1, 1), ratio=2, frame: str = "link-2") -> Formula:
     return chain_connection(lengths, drag, frame)
 
 
-def no_slip_snake(lengths=(1, 1, 1), frame: str = "mean") -> Formula:
+def no_slip_snake(lengths: Sequence = (1, 1, 1), frame: str = "mean") -> Formula:
     """Return the connection of three links on wheels: the velocity across each link's centre is zero."""
     rolling = lambda chain: tuple(sp.Matrix.vstack(*(x[1, :] for x in each)) for each in zip(*(x[2:] for x in chain)))
     return solve_chain(lengths, frame, None, rolling)
 
 
-def differential_drive(radius=None, track=None) -> Formula:
+def differential_drive(radius: Any = None, track: Any = None) -> Formula:
     """Return the connection of a cart on two wheels of a radius, a track apart; symbols r and w if left out."""
     r, w = (sp.Symbol(name, positive=True) if x is None else exact(x) for name, x in (("r", radius), ("w", track)))
     return sp.Matrix([[r / 2, r / 2], [0, 0], [-r / w, r / w]]), shape_angles(2)

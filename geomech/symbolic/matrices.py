@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import sympy as sp
@@ -15,12 +15,12 @@ def bracket(X: sp.Matrix, Y: sp.Matrix) -> sp.Matrix:
     return sp.Matrix([Y[2] * X[1] - X[2] * Y[1], X[2] * Y[0] - Y[2] * X[0], 0])
 
 
-def ccf(A: sp.Matrix, alpha, i: int = 0, j: int = 1) -> sp.Matrix:
+def ccf(A: sp.Matrix, alpha: Sequence[sp.Symbol], i: int = 0, j: int = 1) -> sp.Matrix:
     """Return d_i A_j - d_j A_i + [A_i, A_j] of a connection A (3, d), a column of three."""
     return A[:, j].diff(alpha[i]) - A[:, i].diff(alpha[j]) + bracket(A[:, i], A[:, j])
 
 
-def velocity(A: sp.Matrix, alpha) -> Callable[..., Any]:
+def velocity(A: sp.Matrix, alpha: Sequence[sp.Symbol]) -> Callable[..., Any]:
     """Return a function velocity(alpha, alphadot) -> xi, as `geomech.geometry.connection.fit` and
     `geomech.tiers.direct.direct` take it."""
     import numpy as np
@@ -37,7 +37,7 @@ def velocity(A: sp.Matrix, alpha) -> Callable[..., Any]:
     return xi
 
 
-def simplified(A: sp.Matrix, alpha) -> sp.Matrix:
+def simplified(A: sp.Matrix, alpha: Sequence[sp.Symbol]) -> sp.Matrix:
     """Return the matrix with every entry one fraction in lowest terms, of sums of cosines and sines of sums of angles.
     Two formulas of one function come out equal. An entry that is no rational function of sines and cosines, or neither
     even nor odd in alpha, is unchanged."""

@@ -62,14 +62,14 @@ class System(Protocol):
     def traits(self) -> Traits:
         """Facts that algorithms may use to save work."""
 
-    def velocity(self, alpha, alphadot) -> np.ndarray:
+    def velocity(self, alpha: np.ndarray, alphadot: np.ndarray) -> np.ndarray:
         """Return xi (..., 3) at shapes and rates (..., d), in the body frame; nan at singular shapes."""
 
-    def run(self, alpha, alphadot, work: bool = False) -> Cycle:
+    def run(self, alpha: np.ndarray, alphadot: np.ndarray, work: bool = False) -> Cycle:
         """Return the cycle of a gait with shapes and rates (..., N, d) at N equally spaced phases."""
 
 
-def integrated(system: System, alpha, alphadot, work: bool = False) -> Cycle:
+def integrated(system: System, alpha: np.ndarray, alphadot: np.ndarray, work: bool = False) -> Cycle:
     """Return the cycle of a velocity that follows from shape alone, by integration. Classes take this as their ``run``.
 
     Refusal at a singular shape."""

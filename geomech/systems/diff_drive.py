@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.core.errors import choose
 from geomech.geometry.traits import Traits
@@ -49,7 +50,7 @@ class DifferentialDrive:
         half, turn = self.wheel_radius / 2, self.wheel_radius / self.track
         return np.array([[half, half], [0.0, 0.0], [-turn, turn]])
 
-    def velocity(self, alpha, alphadot) -> np.ndarray:
+    def velocity(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
         """Return xi (..., 3), (track/time, track/time, rad/time): (r (w_1 + w_2) / 2, 0, r (w_2 - w_1) / track)."""
         _, rates = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
         return rates @ self._matrix.T

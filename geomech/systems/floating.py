@@ -33,7 +33,7 @@ class FloatingChain(Momentum):
         self.check_per_link("masses", 1e-9, 1e9)
         self.check_per_link("inertias", 1e-6, 1e6)
 
-    def inertia(self, number=float) -> tuple[list[Any], list[list[Any]]]:
+    def inertia(self, number: int = float) -> tuple[list[Any], list[list[Any]]]:
         """Return masses, as shares of the whole chain's, and inertias of the links (`Momentum.inertia`)."""
         lengths = [number(x) for x in self.lengths]
         masses = [number(x) for x in self.masses] or lengths

@@ -40,7 +40,7 @@ class IdealFluidSwimmer(Momentum):
         self.check_per_link("masses", 1e-9, 1e9)
         self.check_per_link("inertias", 1e-6, 1e6)
 
-    def inertia(self, number=float) -> tuple[list[Any], list[list[Any]]]:
+    def inertia(self, number: int = float) -> tuple[list[Any], list[list[Any]]]:
         """Return masses and inertias of the links (`Momentum.inertia`), in units of pi rho times the square of the
         body's length, per unit depth."""
         body, aspect = sum(number(x) for x in self.lengths), number(self.aspect)

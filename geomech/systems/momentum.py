@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.geometry.traits import Traits
 from geomech.systems.base import integrated
@@ -64,7 +65,7 @@ class Momentum:
             )
         object.__setattr__(self, name, tuple(x.tolist()))
 
-    def inertia(self, number=float) -> tuple[list[Any], list[list[Any]]]:
+    def inertia(self, number: int = float) -> tuple[list[Any], list[list[Any]]]:
         """Return masses of the links, and [along, across, about the centre] of each: the mass that it moves, its own
         and the fluid's, in any one unit and body lengths. number: `float`, or `geomech.symbolic.connections.exact` for
         formulas."""
@@ -82,11 +83,11 @@ class Momentum:
     def _chain(self) -> Linkage:
         return Linkage(self.lengths, self.length, self.frame, masses=tuple(self.inertia()[0]))
 
-    def points(self, alpha, pose=(0.0, 0.0, 0.0)) -> np.ndarray:
+    def points(self, alpha: ArrayLike, pose: ArrayLike = (0.0, 0.0, 0.0)) -> np.ndarray:
         """Return the ends of the links in the world, as `rft.Chain.points`."""
         return self._chain.points(alpha, pose)
 
-    def frame_pose(self, frame: str, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
+    def frame_pose(self, frame: str, alpha: ArrayLike, alphadot: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Return the pose of a frame and its rate, as `rft.Chain.frame_pose`."""
         return self._chain.frame_pose(frame, alpha, alphadot)
 
@@ -116,12 +117,12 @@ class Momentum:
         alpha, alphadot = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
         return alpha.reshape(-1, self.joints), alphadot.reshape(-1, self.joints), alpha.shape[:-1]
 
-    def velocity(self, alpha, alphadot) -> np.ndarray:
+    def velocity(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
         """Return xi (..., 3) in the frame, (length/time, length/time, rad/time)."""
         alpha, alphadot, shape = self._flat(alpha, alphadot)
         return self._moving(alpha, alphadot)[2].T.reshape(*shape, 3) * [self.length, self.length, 1.0]
 
-    def squared_speed(self, alpha, alphadot) -> np.ndarray:
+    def squared_speed(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
         """Return alphadot^T M alphadot (...,): twice the kinetic energy, in the unit of `inertia` and body lengths."""
         alpha, alphadot, shape = self._flat(alpha, alphadot)
         motion, weights, xi = self._moving(alpha, alphadot)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.geometry.traits import Traits
 from geomech.systems.base import SYSTEMS, integrated
@@ -52,7 +53,7 @@ class NoSlipSnake:
     def _chain(self) -> Chain:
         return Chain(self.lengths, self.length, self.frame)
 
-    def points(self, alpha, pose=(0.0, 0.0, 0.0)) -> np.ndarray:
+    def points(self, alpha: ArrayLike, pose: ArrayLike = (0.0, 0.0, 0.0)) -> np.ndarray:
         """Return the ends of the links in the world, as `rft.Chain.points`."""
         return self._chain.points(alpha, pose)
 
@@ -74,7 +75,7 @@ class NoSlipSnake:
         det = np.linalg.det(self._rolling(alpha, np.zeros(2))[0])
         return np.where(np.abs(det) < 1e-14, 0.0, det)
 
-    def velocity(self, alpha, alphadot) -> np.ndarray:
+    def velocity(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
         """Return xi (..., 3) in the frame, (length/time, length/time, rad/time); nan at singular shapes."""
         rows, side = self._rolling(alpha, alphadot)
         good = np.abs(np.linalg.det(rows)) >= 1e-14

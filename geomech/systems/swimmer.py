@@ -8,6 +8,7 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 import rft
 from geomech.core.work import iterate
@@ -133,7 +134,7 @@ class Swimmer:
         """Covariance of the medium's parameters, as measured."""
         return self.medium.covariance
 
-    def varied(self, step) -> Swimmer:
+    def varied(self, step: np.ndarray) -> Swimmer:
         """Return the swimmer in a medium whose uncertain parameters are changed by ``step`` (n,); Refusal if that is no
         medium."""
         changed = {name: getattr(self.medium, name) + float(d) for name, d in zip(self.medium.uncertain, step)}
@@ -173,19 +174,19 @@ class Swimmer:
         names = ("loads", "regularisation", "pieces", *names)
         return {"effects": self.effects, **{name: getattr(self.solver, name) for name in names}}
 
-    def solve(self, alpha, alphadot, start=None) -> rft.Solution:
+    def solve(self, alpha: ArrayLike, alphadot: ArrayLike, start: ArrayLike | None = None) -> rft.Solution:
         """Return body velocities with residual and status for alpha, alphadot (..., joints), begun from ``start`` (...,
         3) where given; see `rft.body_velocity`. Refusal if they do not follow from shape alone."""
         refuse(self, "body velocity from shape alone", SHAPE_ALONE, "run a whole gait by the direct tier")
         settings = self._settings("tolerance", "backend")
         return rft.body_velocity(self.medium, self.body, alpha, alphadot, start=start, **settings)
 
-    def velocity(self, alpha, alphadot, start=None) -> np.ndarray:
+    def velocity(self, alpha: ArrayLike, alphadot: ArrayLike, start: ArrayLike | None = None) -> np.ndarray:
         """Return xi (..., 3) in the body's frame, begun from ``start`` as in `solve`; RuntimeError if any sample did
         not converge."""
         return self.solve(alpha, alphadot, start).checked().xi
 
-    def diagnosed(self, alpha, alphadot) -> dict:
+    def diagnosed(self, alpha: ArrayLike, alphadot: ArrayLike) -> dict:
         s = self.solve(alpha, alphadot)
         if str(s.status) == "unconverged":
             raise Refusal("the force balance did not converge", instead="raise [numerics] regularisation")
@@ -201,14 +202,16 @@ class Swimmer:
         A, alpha = connections.viscous_chain(self.body.lengths, self.medium.ratio, self.body.frame)
         return connections.in_length(self.body.length, A), alpha
 
-    def power(self, alpha, alphadot, xi) -> np.ndarray:
+    def power(self, alpha: ArrayLike, alphadot: ArrayLike, xi: ArrayLike) -> np.ndarray:
         return self.work(alpha, alphadot, xi).power / self.length
 
-    def work(self, alpha, alphadot, xi) -> rft.Work:
+    def work(self, alpha: ArrayLike, alphadot: ArrayLike, xi: ArrayLike) -> rft.Work:
         """Return power, internal moments and slip of a solution of `solve`; see `rft.work_done`."""
         return rft.work_done(self.medium, self.body, alpha, alphadot, xi, **self._settings())
 
-    def time_steps(self, alpha, alphadot, cycles: int | None, work: bool = False, path: bool = False) -> rft.TimeSteps:
+    def time_steps(
+        self, alpha: ArrayLike, alphadot: ArrayLike, cycles: int | None, work: bool = False, path: bool = False
+    ) -> rft.TimeSteps:
         """Return the gait computed phase after phase (`rft.time_steps`), without checking convergence."""
         settings = {"cycles": cycles, "with_work": work, "with_path": path, **self._settings("tolerance", "backend")}
         context = Swimmer.time_steps, self, alpha, alphadot, cycles is None
@@ -219,7 +222,7 @@ class Swimmer:
 
         return rft.time_steps(self.medium, self.body, alpha, alphadot, advance=advance, **settings)
 
-    def run(self, alpha, alphadot, work: bool = False, start=None) -> Cycle:
+    def run(self, alpha: ArrayLike, alphadot: ArrayLike, work: bool = False, start: ArrayLike | None = None) -> Cycle:
         """Run a gait given by alpha, alphadot (..., N, joints) at N equally spaced phases, by the cheapest engine that
         is right. Balances begin from ``start`` as in `solve`, steps of time from the step before. RuntimeError if a
         force balance did not converge or cycles did not become periodic."""
@@ -249,7 +252,7 @@ class Swimmer:
         it."""
         return not self.traits.lacks & Premise.SE2_SYMMETRIC and (steps.status == "periodic").all()
 
-    def path(self, alpha, alphadot, cycles: int = 1) -> np.ndarray:
+    def path(self, alpha: ArrayLike, alphadot: ArrayLike, cycles: int = 1) -> np.ndarray:
         """Return poses of the limit cycle; where cycles do not repeat, from the cycle that `run` returns."""
         before = (self.solver.cycles or 1) - 1
         if not self.traits.lacks & Premise.SE2_SYMMETRIC:

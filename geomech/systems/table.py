@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.geometry.field import Field
 from geomech.geometry.reconstruct import displacement, trajectory
@@ -111,10 +112,10 @@ class Table:
         absent = {Dissipative: metric is None or degree is None, OwnMetric: metric is None or degree is not None}
         return self if isinstance(self, kind) and not absent.get(kind) else None
 
-    def squared_speed(self, alpha, alphadot) -> np.ndarray:
+    def squared_speed(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
         return self.stored.metric.norm(alpha, alphadot) ** 2
 
-    def power(self, alpha, alphadot, xi=None) -> np.ndarray:
+    def power(self, alpha: ArrayLike, alphadot: ArrayLike, xi: ArrayLike | None = None) -> np.ndarray:
         return self.stored.metric.norm(alpha, alphadot) ** self.stored.power_degree
 
     def _beyond(self, alpha) -> np.ndarray:
@@ -127,7 +128,7 @@ class Table:
             instead=f"make it anew in the frame {frame!r}",
         )
 
-    def refuse_singular(self, alpha) -> None:
+    def refuse_singular(self, alpha: ArrayLike) -> None:
         """Raise Refusal for shapes that the data of a measured gait do not reach; it says how far away they are."""
         if self.tube is not None:
             self.tube.checked(alpha)
@@ -145,11 +146,11 @@ class Table:
             return self.tube.at_grid(self.tube.taylor.connection_error)
         return self.stored.A_error
 
-    def velocity(self, alpha, alphadot) -> np.ndarray:
+    def velocity(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
         """Return the interpolated xi (..., 3); Refusal outside the table's grid."""
         return self.stored.table.velocity(alpha, alphadot)
 
-    def diagnosed(self, alpha, alphadot) -> dict:
+    def diagnosed(self, alpha: ArrayLike, alphadot: ArrayLike) -> dict:
         """Return {"xi", "status", "residual"}: the residual is the norm of that of the fit, rms over directions; None
         if the file has none."""
         residual = (
@@ -168,7 +169,7 @@ class Table:
             return (known[:, 0] if known.size else np.zeros(3)) * np.linalg.norm(alphadot, axis=-1)[..., None]
         return Field(self.stored.table.axes, values, 1)(alpha) * np.linalg.norm(alphadot, axis=-1)[..., None]
 
-    def table_error(self, alpha, alphadot) -> np.ndarray:
+    def table_error(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
         """Return (..., 2), body lengths and rad: the fit's residual summed along the gait, the error of the heading
         times its lever, and the larger change with half the grid.
 

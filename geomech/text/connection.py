@@ -10,7 +10,6 @@ from geomech.geometry.connection import Connection
 from geomech.studies.shape_space import Space
 from geomech.systems.base import System, shape_labels
 from geomech.systems.capabilities import stored_table
-from geomech.tiers import fitted as tables
 
 ROWS = 16  # joints in a table
 
@@ -23,9 +22,8 @@ def text(result: Result) -> str:
     lines += [f"grid: {grid(fitted.axes)}"]
     lines += [*_ranges(fitted, shape_labels(scene.system)), f"fit: {_fit(scene.system, fitted)}"]
     lines += [f"symmetry: {line}" for line in symmetries(scene.system)]
-    if not stored_table(scene.system, "connection"):
-        balances = tables.table(scene.system, scene.numerics).balances
-        lines.append(f"cost: {balances:,} force balances, {space.seconds:.2g} s")
+    if space.balances:
+        lines.append(f"cost: {space.balances:,} force balances, {space.seconds:.2g} s")
     return "\n".join(lines)
 
 

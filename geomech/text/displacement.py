@@ -16,34 +16,36 @@ from geomech.studies import tables, uncertainty
 numbers = tables.table
 MORE = "--all prints every tier, the net distance and the seconds"
 FRAME = "x ahead, y to the left, as the body frame points at the start of the cycle"
-ROWS = 14  # of a table that fits a screen
+ROWS, COMPARED = 14, 4  # amplitudes in a table that fits a screen; with x by every tier
 
 
 def text(result: Result, title: str = "", rows: int = ROWS) -> str:
-    """Return x, y and heading per cycle by the most exact tier, each with its error, a word for what is zero, and the errors
-    of the other tiers, in lines that fit a screen. title: the beginning of lines, by default the scene's name. rows: at most so
-    many amplitudes, of more the first, the last and some between."""
+    """Return x, y and heading per cycle by the most exact tier, each with its error, a word for what is zero, and x by the
+    other tiers or their errors, in lines that fit a screen. title: the beginning of lines, by default the scene's name.
+    rows: at most so many amplitudes, of more the first, the last and some between."""
     return "\n".join([*gait_lines(result, title, rows), FRAME])
 
 
 def gait_lines(result: Result, title: str = "", rows: int = ROWS) -> list[str]:
     """Return the lines of `text`, without the one that tells x from y."""
     facts, title = result.attributes, title or result.attributes["name"]
-    tier = exact_tier(result)
-    shown = shown_rows(len(result["amplitude"].values), rows)
-    unit, frequency = result["x"].unit, facts.get("frequency")
+    tier, unit, shown = exact_tier(result), result["x"].unit, shown_rows(len(result["amplitude"].values), rows)
     lines = [f"{title}: {facts['note']}"] if "note" in facts else []
     lines.append(f"{title}: displacement per cycle ({unit}), {_tier_words(result, tier)}")
     zeros, moving = _zeros(result, tier)
-    for columns in _side_by_side([_column(result, tier, name, shown) for name in moving], result, shown):
+    moving += ["speed"] if "speed" in result else []
+    tables = lambda at: list(_side_by_side([_column(result, tier, name, at) for name in moving], result, at))
+    if len(stacked := tables(shown)) > 1:
+        shown = shown_rows(len(result["amplitude"].values), rows // len(stacked))  # tables below each other
+        stacked = tables(shown)
+    for columns in stacked:
         lines += ["".join(cells) for cells in zip(*columns)]
-    lines += zeros
-    lines += _errors(result, tier, unit)
-    if frequency is not None:
-        lines.append(f"speed: {frequency:g} Hz times the displacement")
+    lines += [*zeros, *_others(result, tier, shown)]
+    if "speed" in result:
+        lines.append("speed: net distance, sqrt(x^2 + y^2), times frequency")
     if "medium_error_rule" in result:
         lines.append("medium: one standard deviation by its covariance")
-    lines += _effort(result, title, [tier], shown)
+    lines += _effort(result, [tier], shown)
     some = len(shown) < (count := len(result["amplitude"].values))
     lines.append(f"amplitude: {_amplitude(result)}" + f", {len(shown)} of {count}" * some)
     if "estimate_is" in facts:
@@ -91,12 +93,15 @@ def _tier_words(result: Result, tier: int) -> str:
 
 def _column(result: Result, tier: int, name: str, shown: np.ndarray) -> list[str]:
     """Return the cells of a quantity under its name: values, errors and what an uncertain medium adds."""
-    v = result[name]
+    v, facts = result[name], result.attributes
     places = 6 if v.unit == "rad" else _decimals(result)
-    head = name + " (rad)" * (v.unit == "rad")
-    cells = [f"{head:>{places + 8}}{'+- error':>11}" + f"{'+- medium':>12}" * (v.spread is not None)]
+    head = {"heading": "heading (rad)", "speed": f"speed ({v.unit}) at {facts.get('frequency', 0.0):g} Hz"}.get(
+        name, name
+    )
+    wide = max(places + 8, len(head) + 2)
+    cells = [f"{head:>{wide}}{'+- error':>11}" + f"{'+- medium':>12}" * (v.spread is not None)]
     for k in shown:
-        cell = f"{np.round(v.values[tier, k], places) + 0.0:{places + 8}.{places}f}  +-{v.error[tier, k]:7.1e}"
+        cell = f"{np.round(v.values[tier, k], places) + 0.0:{wide}.{places}f}  +-{v.error[tier, k]:7.1e}"
         cells.append(cell + (f"   +-{v.spread[tier, k]:7.1e}" if v.spread is not None else ""))
     return cells
 
@@ -111,14 +116,22 @@ def _side_by_side(columns: list[list[str]], result: Result, shown: np.ndarray) -
         yield group
 
 
-def _errors(result: Result, tier: int, unit: str) -> list[str]:
-    """Return the largest errors of the other tiers, in lines."""
-    others = [
-        f"{name} {result['x'].error[k].max(initial=0.0):.1e}"
-        for k, name in enumerate(result["tier"].values.tolist())
-        if k != tier
-    ]
-    return [f"other tiers, largest error ({unit}): {', '.join(others)}"] if others else []
+def _others(result: Result, tier: int, shown: np.ndarray) -> Iterator[str]:
+    """Yield x by the other tiers with its errors where amplitudes are few, else the largest error of each."""
+    others = [(str(name), k) for k, name in enumerate(result["tier"].values) if k != tier]
+    x, places = result["x"], _decimals(result)
+    if not others:
+        return
+    wide = places + 12
+    if len(shown) > COMPARED or 9 + wide * len(others) > WIDTH or "x" in result.attributes["zero_by_symmetry"]:
+        errors = (f"{name} {x.error[k].max(initial=0.0):.1e}" for name, k in others)
+        yield f"other tiers, largest error ({x.unit}): {', '.join(errors)}"
+        return
+    yield "x by tier" + "".join(f"{name:>{wide}}" for name, _ in others)
+    for row in shown:
+        values, errors = np.round(x.values[:, row], places) + 0.0, x.error[:, row]
+        cells = (f"{values[k]:.{places}f} +-{errors[k]:.0e}" for _, k in others)
+        yield f"{result['amplitude'].values[row]:9.6g}" + "".join(f"{cell:>{wide}}" for cell in cells)
 
 
 def _amplitude(result: Result) -> str:
@@ -142,7 +155,7 @@ def full(result: Result, title: str = "") -> str:
                 "mean: how far the mean over the media of that covariance lies from the displacement in their mean"
             )
     every = np.arange(len(result["amplitude"].values))
-    lines += [*_surfaces(result), *_effort(result, title, range(len(result["tier"].values)), every)]
+    lines += [*_surfaces(result), *_effort(result, range(len(result["tier"].values)), every)]
     lines.append(f"amplitude: {_amplitude(result)}; x, y, heading: the pose after a cycle, in the frame at its start")
     lines += zero_words(facts["zero_by_symmetry"])
     if "estimate_is" in facts:
@@ -206,21 +219,26 @@ def _surfaces(result: Result) -> Iterator[str]:
         yield from (f"{a:9.6g} {x:13.1e} {t:14.1e}" for a, x, t in rows)
 
 
-def _effort(result: Result, title: str, tiers: Sequence[int], shown: np.ndarray) -> Iterator[str]:
-    """Yield path length and work, and the cost of transport by tier, at some of the amplitudes, if the result has them."""
+def _effort(result: Result, tiers: Sequence[int], shown: np.ndarray) -> Iterator[str]:
+    """Yield path length and work, and the cost of transport by tier, at some of the amplitudes, if the result has them; none of
+    these that does not exist."""
     if "work" not in result:
         return
-    cell = lambda x, form, wide: f"{format(x, form) if np.isfinite(x) else '-':>{wide}}"
-    length, work, transport = (result[key] for key in ("path_length", "work", "cost_of_transport"))
-    heads = [f"{v.name.replace('_', ' ')} ({v.unit})" if v.unit else v.name for v in (length, work)]
-    yield f"{title}: effort of a cycle (drag: of the body along itself), cost of transport by tier"
-    names = (result["tier"].values[k] for k in tiers)
-    yield f"amplitude  {heads[0]:>16}  {heads[1]:>16}" + "".join(f"{name:>12}" for name in names)
-    wide = [max(16, len(head)) + 2 for head in heads]
+    names = result["tier"].values
+    columns = [
+        (f"{v.name.replace('_', ' ')} ({v.unit})", v.values, ".6f") for v in (result["path_length"], result["work"])
+    ]
+    columns += [(str(names[t]), result["cost_of_transport"].values[t], ".4g") for t in tiers]
+    columns = [x for x in columns if np.isfinite(x[1]).any()]
+    of_tiers = (
+        "" if np.isnan(result["work"].values).all() else ", cost of transport by tier (drag: the body's along itself)"
+    )
+    yield f"effort per cycle{of_tiers}"
+    wide = [max(10, len(head)) + 2 for head, *_ in columns]
+    yield "amplitude" + "".join(f"{head:>{w}}" for (head, *_), w in zip(columns, wide))
     for k in shown:
-        ratios = "".join(cell(transport.values[t, k], ".4g", 12) for t in tiers)
-        both = "".join(cell(v.values[k], ".6f", w) for v, w in zip((length, work), wide))
-        yield f"{result['amplitude'].values[k]:9.6g}{both}{ratios}"
+        cells = (format(x[k], form) if np.isfinite(x[k]) else "-" for _, x, form in columns)
+        yield f"{result['amplitude'].values[k]:9.6g}" + "".join(f"{cell:>{w}}" for cell, w in zip(cells, wide))
 
 
 def _times(facts: Any) -> str:

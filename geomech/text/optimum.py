@@ -46,7 +46,7 @@ def text(result: Result) -> str:
     optimum, value, start = result.subject, result["value"], result["start_value"]
     objective = optimum.request.objective
     pose, zero = (result["x"], result["y"], result["theta"]), result.attributes["zero_by_symmetry"]
-    lines = [_headline(result), f"the scene's gait: {start.values:.6g} {start.unit}"]
+    lines = [_headline(result), f"the scene's gait: {round(float(start.values), 12) + 0.0:.6g} {start.unit}"]
     lines += [f"displacement per cycle: {moved([(v.values, v.unit) for v in pose], zero)}"]
     efforts = [result[name] for name in ("path_length", "work") if name in result]
     spent = ", ".join(f"{v.name.replace('_', ' ')} {v.values:.6g} {v.unit}" for v in efforts)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.core.knob import Knob
 from geomech.gaits import Gait
@@ -81,7 +82,7 @@ def no_balances(count: int, phases: int) -> int:
     return 0
 
 
-def no_spread(table: Any, amplitudes) -> None:
+def no_spread(table: Any, amplitudes: ArrayLike) -> None:
     """Return None, the spread of a prediction without a choice."""
 
 
@@ -134,7 +135,7 @@ class Tier:
 
     @property
     def colour(self) -> str:
-        """Colour of its markers and error bars."""
+        """Colour of its markers and of the band of its error."""
         return self.markers or self.style["color"]
 
     @property

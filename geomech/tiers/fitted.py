@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache, partial
+from typing import Any
 
 import numpy as np
 
@@ -93,12 +94,11 @@ def _build(system: System, numerics: Numerics, progress: Callable | None) -> Con
         return stored if stored.length else replace(stored, unit=length_unit(system), length=system.length)
     if isinstance(system, Framed):
         return system.fitted(progress)
-    count, options = (
-        directions(system, numerics),
-        {"traits": system.traits, "trusted": not isinstance(system, WrappedSystem)},
+    count, trusted = directions(system, numerics), not isinstance(system, WrappedSystem)
+    options: dict[str, Any] = {"traits": system.traits, "unit": length_unit(system), "length": system.length}
+    return connection.fit(
+        system.velocity, axes(system, numerics), count, numerics.interpolation, progress, trusted=trusted, **options
     )
-    options |= {"unit": length_unit(system), "length": system.length}
-    return connection.fit(system.velocity, axes(system, numerics), count, numerics.interpolation, progress, **options)
 
 
 def without_field(system: System, numerics: Numerics) -> Callable:
@@ -124,7 +124,7 @@ def plane(system: System, numerics: Numerics, pair: tuple[int, int], at, progres
     axis = connection.grid(1, numerics.grid, numerics.extent)[0]
     at = inside((axis,) * system.joints, at, [name for name, _ in shape_labels(system)])
     count = directions(system, numerics)
-    options = {"traits": system.traits, "unit": length_unit(system), "length": system.length}
+    options: dict[str, Any] = {"traits": system.traits, "unit": length_unit(system), "length": system.length}
     return fit_plane(system.velocity, (axis, axis), pair, at, count, numerics.interpolation, progress, **options)
 
 

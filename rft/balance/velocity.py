@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rft.balance.backend import check
 from rft.balance.solver import Accuracy, Solved, solve
@@ -59,8 +60,8 @@ class Solution(NamedTuple):
 def body_velocity(
     medium: Medium,
     body: Body,
-    alpha,
-    alphadot,
+    alpha: ArrayLike,
+    alphadot: ArrayLike,
     *,
     loads: str = "exact",
     regularisation: float = 1e-6,
@@ -69,7 +70,7 @@ def body_velocity(
     effects: Sequence[Effect] = (),
     pieces: int = PIECES,
     backend: str = "auto",
-    start=None,
+    start: ArrayLike | None = None,
 ) -> Solution:
     """Return the body velocity at which the medium's net force and moment on the body vanish.
 

@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rft.bodies.base import BODIES, Elements, Length, numbered_labels
 from rft.bodies.chain import Chain
@@ -59,13 +60,13 @@ class Backbone:
             return self.chain.motion(alpha, alphadot)
         return self.chain.motion(self.bends @ alpha, self.bends @ alphadot)
 
-    def frame_pose(self, frame: str, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
+    def frame_pose(self, frame: str, alpha: np.ndarray, alphadot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the pose of another frame as `Chain.frame_pose` does; "link-k" is the k-th element."""
         if self.bends is None:
             return self.chain.frame_pose(frame, alpha, alphadot)
         return self.chain.frame_pose(frame, np.asarray(alpha) @ self.bends.T, np.asarray(alphadot) @ self.bends.T)
 
-    def points(self, alpha, pose=(0.0, 0.0, 0.0)) -> np.ndarray:
+    def points(self, alpha: np.ndarray, pose: ArrayLike = (0.0, 0.0, 0.0)) -> np.ndarray:
         """Return the ends of the elements in the world, (..., elements + 1, 2), as `Chain.points` does."""
         return self.chain.points(alpha if self.bends is None else np.asarray(alpha, float) @ self.bends.T, pose)
 

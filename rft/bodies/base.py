@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple, Protocol
+from typing import Annotated, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -38,7 +38,7 @@ class Elements(NamedTuple):
     v_w: np.ndarray
 
     @classmethod
-    def from_complex(cls, heading, centre, velocity, rotation, half) -> Elements:
+    def from_complex(cls, heading: Any, centre: Any, velocity: Any, rotation: Any, half: Any) -> Elements:
         """Return elements from complex numbers (n, B): exp(i theta) of their headings, their centres x + i y and the
         velocities of the centres. rotation: (n, B), rates of theta. half: (n, 1), half lengths."""
         back = heading.conj()

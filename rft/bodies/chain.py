@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rft.bodies.base import BODIES, Elements, Length, numbered_labels
 from rft.bodies.modes import checked_modes, mode_rows
@@ -90,9 +91,10 @@ class Chain:
         text = frame if isinstance(frame, str) else ""
         if text == "mean":
             return None
-        match, n = re.fullmatch(r"link-([1-9]\d{0,6})", text), len(self.lengths)
-        require(bool(match) and int(match[1]) <= n, f"frame must be 'mean' or 'link-1' ... 'link-{n}'", value=frame)
-        return int(match[1]) - 1
+        found, n = re.fullmatch(r"link-([1-9]\d{0,6})", text), len(self.lengths)
+        number = int(found[1]) if found else 0
+        require(0 < number <= n, f"frame must be 'mean' or 'link-1' ... 'link-{n}'", value=frame)
+        return number - 1
 
     @cached_property
     def _link(self) -> int | None:
@@ -129,7 +131,7 @@ class Chain:
         heading, rotation, centre, velocity, _ = self._links(alpha, alphadot)
         return Elements.from_complex(heading, centre, velocity, rotation, self._half_lengths)
 
-    def frame_pose(self, frame: str, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
+    def frame_pose(self, frame: str, alpha: np.ndarray, alphadot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the pose h of another frame of this body in the body frame, and dh/dt: each (..., 3), in length units and
         rad.
 
@@ -144,7 +146,7 @@ class Chain:
         h, hdot = (centre.real, centre.imag, theta), (velocity.real, velocity.imag, rotation)
         return np.stack(h, -1), np.stack(hdot, -1)
 
-    def points(self, alpha, pose=(0.0, 0.0, 0.0)) -> np.ndarray:
+    def points(self, alpha: np.ndarray, pose: ArrayLike = (0.0, 0.0, 0.0)) -> np.ndarray:
         """Return the ends of the links in the world, tail to head, (..., links + 1, 2), in length units.
 
         alpha: (..., joints), rad. pose: (..., 3), pose of the body frame in the world, (x, y) in length units, theta in

@@ -36,12 +36,12 @@ class Site(NamedTuple):
     pose: np.ndarray
     v_before: tuple[np.ndarray, np.ndarray, np.ndarray]
 
-    def centres(self, elements) -> np.ndarray:
+    def centres(self, elements: Any) -> np.ndarray:
         """Return the centres of elements on the ground as complex numbers x + i y, (n, B)."""
         x, y, theta = self.pose
         return x + 1j * y + np.exp(1j * theta) * elements.centres
 
-    def headings(self, elements) -> np.ndarray:
+    def headings(self, elements: Any) -> np.ndarray:
         """Return the headings of elements on the ground as complex numbers exp(i theta), (n, B)."""
         return np.exp(1j * self.pose[2]) * (elements.c + 1j * elements.s)
 
@@ -76,7 +76,7 @@ class Effect:
     memory_size = 0
     varies_along = odd = False
 
-    def check(self, medium) -> None:
+    def check(self, medium: Any) -> None:
         """Raise ValueError for a medium that the effect does not take."""
 
     @classmethod
@@ -104,18 +104,18 @@ class Effect:
         ``site``, with an additional ``drag`` (3, B) over the axial drag; the state of the ground stays as it is."""
         return state
 
-    def assumes(self, medium) -> str:
+    def assumes(self, medium: Any) -> str:
         """Return, as text, what is assumed because neither the effect nor the medium gives it; "" for nothing."""
         return ""
 
-    def take(self, index) -> Self:
+    def take(self, index: Any) -> Self:
         """Return the effect with its parameters at the samples ``index``."""
         arrays = {f.name: x for f in fields(self) if isinstance(x := getattr(self, f.name), np.ndarray)}
         return self.with_parameters(
             **{name: x[..., index] for name, x in arrays.items() if x.ndim > 0 and x.shape[-1] != 1}
         )
 
-    def with_parameters(self, **values) -> Self:
+    def with_parameters(self, **values: Any) -> Self:
         """Return the effect with other parameters, which may be arrays (B,); nothing is checked."""
         if not values:
             return self

@@ -64,10 +64,12 @@ class BodyInertia(Effect):
             momentum_rate=MomentumRate(np.full((1, 1), rate), *ground_to_frame(site.pose, past), strength)
         )
 
-    def after(self, problem: Problem, site: Site, state: np.ndarray, v) -> np.ndarray:
+    def after(self, problem: Problem, site: Site, state: np.ndarray, v: np.ndarray) -> np.ndarray:
         return np.stack([state[1], frame_to_ground(site.pose, element_momenta(problem.sides.elements, v))])
 
-    def with_velocity_change(self, problem: Problem, site: Site, state: np.ndarray, change, drag) -> np.ndarray:
+    def with_velocity_change(
+        self, problem: Problem, site: Site, state: np.ndarray, change: np.ndarray, drag: np.ndarray
+    ) -> np.ndarray:
         # Drag reduced the change of momentum during the last step, so that it was larger one step earlier.
         e = problem.sides.elements
         last = element_momenta(e, to_element(e, *change))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -51,7 +51,7 @@ class DepthProfile(Effect):
     def breaks(self) -> Premise:
         return Premise.SE2_SYMMETRIC if np.any(self.slope) else NONE
 
-    def apply(self, problem: Problem, site: Site | None, state=None) -> Problem:
+    def apply(self, problem: Problem, site: Site | None, state: Any = None) -> Problem:
         def with_depths(contact):
             depth = np.where(contact.buried > 0, self.depths(contact, site), 1.0)
             return contact.with_factors(depth, depth, depth)

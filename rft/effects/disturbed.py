@@ -70,7 +70,7 @@ class DisturbedGround(Effect):
             memory=m._replace(intact_left=m.intact_left * left, intact_right=m.intact_right * right)
         )
 
-    def after(self, problem: Problem, site: Site, state: Tiles, v) -> Tiles:
+    def after(self, problem: Problem, site: Site, state: Tiles, v: np.ndarray) -> Tiles:
         if site.count == 0:  # the first step is on undisturbed ground
             return state
         return self.with_track(state, self.points(problem, site))
@@ -81,7 +81,7 @@ class DisturbedGround(Effect):
         k = int(np.ceil(4 * e.half.max() / self.radius))
         return site.centres(e) + (np.arange(k)[:, None, None] * 2 + 1 - k) / k * e.half * site.headings(e)
 
-    def location(self, i, j) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def location(self, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the tile and the row in the tile that store the cells (i, j) of the plane, and their patch of the
         plane."""
         (tile_i, i), (tile_j, j) = np.divmod(i, TILE), np.divmod(j, TILE)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -37,17 +37,17 @@ class EndCaps(Effect):
     def __post_init__(self):
         check_numbers(self)
 
-    def check(self, medium) -> None:
+    def check(self, medium: Any) -> None:
         require(isinstance(medium, Granular), f"end caps take a granular medium, got {type(medium).__name__}")
 
-    def apply(self, problem: Problem, site=None, state=None) -> Problem:
+    def apply(self, problem: Problem, site: Any = None, state: Any = None) -> Problem:
         e = problem.sides.elements
         # In units of the whole body's axial drag 2 r C_F L: e pi r^2 C_F / (2 r C_F L) = e pi (r / L) / 2.
         weight = math.pi * self.radius / 2 * np.array([[self.tail], [self.head]])
         ends = e.attached_points([0, -1], e.half[[0, -1]] * [[-1.0], [1.0]], weight)
         return problem.with_points(Contact(ends, np.array([[0.0], [1.0]]), np.ones((2, 1))), cap_terms(problem.medium))
 
-    def traction(self, medium: Granular, v_t, v_n, rounding=0.0) -> tuple[np.ndarray, np.ndarray]:
+    def traction(self, medium: Granular, v_t: Any, v_n: Any, rounding: Any = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the force (along, across) of both ends together at velocities (v_t, v_n), in units of the body's axial
         drag."""
         load = dry_point(*(np.asarray(v, float) for v in (v_t, v_n)), rounding, np.array(cap_terms(medium)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -49,13 +49,13 @@ class GrainInertia(Effect):
     def _known_k(self, medium):
         return getattr(medium, "k", None) if self.k is None else self.k
 
-    def assumes(self, medium) -> str:
+    def assumes(self, medium: Any) -> str:
         return f"k = {ASSUMED_K:g}, that of loose glass" if self._known_k(medium) is None else ""
 
-    def check(self, medium) -> None:
+    def check(self, medium: Any) -> None:
         require(not is_linear(medium), f"grain inertia takes a medium of grains, got {type(medium).__name__}")
 
-    def apply(self, problem: Problem, site=None, state=None) -> Problem:
+    def apply(self, problem: Problem, site: Any = None, state: Any = None) -> Problem:
         speed_per_rad = 2 * np.pi * self.frequency * self.length
         k = self._known_k(problem.medium)
         strength = self.strength * speed_per_rad**2 / ((ASSUMED_K if k is None else k) * GRAVITY * self.depth)

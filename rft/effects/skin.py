@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 from rft.checks import Number, check_numbers
 from rft.contact import Problem
@@ -39,7 +39,7 @@ class SkinFriction(Effect):
     def __post_init__(self):
         check_numbers(self)
 
-    def apply(self, problem: Problem, site=None, state=None) -> Problem:
+    def apply(self, problem: Problem, site: Any = None, state: Any = None) -> Problem:
         factors = self.forward / self.reference, self.backward / self.reference, 1.0
         return problem._replace(sides=problem.sides.with_factors(*factors))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -63,14 +63,14 @@ class Slope(Effect):
             f"the drag downhill, {drag:.3g}",
         )
 
-    def check(self, medium) -> None:
+    def check(self, medium: Any) -> None:
         require(not is_linear(medium), f"a slope takes a medium of grains, got {type(medium).__name__}")
 
-    def assumes(self, medium) -> str:
+    def assumes(self, medium: Any) -> str:
         repose = f"an angle of repose of {math.degrees(REPOSE):.1f} degrees, from half the drag downhill at 20, and "
         return f"{repose if np.all(self.repose == REPOSE) else ''}that only what moves downhill meets weaker ground"
 
-    def apply(self, problem: Problem, site: Site, state=None) -> Problem:
+    def apply(self, problem: Problem, site: Site, state: Any = None) -> Problem:
         cos, sin = np.cos(self.angle), np.sin(self.angle)
 
         def inclined(contact, weight):

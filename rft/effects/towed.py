@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -36,13 +36,13 @@ class TowedSled(Effect):
     def __post_init__(self):
         check_numbers(self)
 
-    def check(self, medium) -> None:
+    def check(self, medium: Any) -> None:
         name = type(medium).__name__
         require(
             speed_exponent(medium) == 0, f"a towed sled takes a medium without viscous drag, dry as itself, got {name}"
         )
 
-    def apply(self, problem: Problem, site=None, state=None) -> Problem:
+    def apply(self, problem: Problem, site: Any = None, state: Any = None) -> Problem:
         e = problem.sides.elements
         point = e.attached_points([0], -(e.half[:1] + self.distance), np.ones((1, 1)))
         sled = Contact(point, np.zeros((1, 1)), np.zeros((1, 1))).with_factors(self.pull, self.pull, self.pull)

@@ -56,7 +56,7 @@ class Transient(Effect):
         memory = problem.memory._replace(left=left, right=right, v_n_before=site.v_before[1], dt=dt, rate=rate)
         return problem._replace(memory=memory)
 
-    def after(self, problem: Problem, site: Site, state: np.ndarray, v) -> np.ndarray:
+    def after(self, problem: Problem, site: Site, state: np.ndarray, v: np.ndarray) -> np.ndarray:
         velocity, left = part_velocities(v[1], v[2])
         share, deficit, _, _ = decay(SIGN * site.v_before[1], SIGN * velocity, site.dt, self.rate)
         # In each part the share of the side that it moves to grows, and the share of the opposite side decays likewise.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -35,7 +35,7 @@ class Medium(Protocol):
     A law runs in compiled code if its traction, and its slopes if it has them, are formulas (`rft.vectors.formula`) of
     its number fields."""
 
-    def traction(self, v_t, v_n, rounding=0.0) -> tuple[np.ndarray, np.ndarray]:
+    def traction(self, v_t: Any, v_n: Any, rounding: Any = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the drag per unit length (f_t, f_n) opposing the velocity (v_t, v_n); arrays broadcast together."""
         ...
 
@@ -75,12 +75,12 @@ class TermLaw:
     viscous: tuple[float, float] = (0.0, 0.0)
     mirror = True
 
-    def traction(self, v_t, v_n, rounding=0.0) -> tuple[np.ndarray, np.ndarray]:
+    def traction(self, v_t: Any, v_n: Any, rounding: Any = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the drag per unit length (f_t, f_n) opposing (v_t, v_n), in units of the axial drag; zero at rest."""
         v_t, v_n = np.asarray(v_t, float), np.asarray(v_n, float)
         return terms_traction(term_numbers(self), v_t, v_n, rounding)
 
-    def slopes(self, v_t, v_n, rounding=0.0) -> tuple[np.ndarray, ...]:
+    def slopes(self, v_t: Any, v_n: Any, rounding: Any = 0.0) -> tuple[np.ndarray, ...]:
         """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n); infinite slopes at rest are returned as 0."""
         v_t, v_n = np.broadcast_arrays(np.asarray(v_t, float), np.asarray(v_n, float))
         return terms_slopes(term_numbers(self), v_t, v_n, rounding)
@@ -109,12 +109,12 @@ def viscous_terms(medium) -> tuple[float, float] | None:
     return getattr(medium, "viscous", None)
 
 
-def is_closed(medium) -> bool:
+def is_closed(medium: Any) -> bool:
     """Return whether a medium has a closed form, and so exact averages over a link."""
     return dry_terms(medium) is not None and viscous_terms(medium) is not None
 
 
-def is_mirror(medium) -> bool:
+def is_mirror(medium: Any) -> bool:
     """Return whether a medium claims that left and right are alike; a field then takes half the balances."""
     return bool(getattr(medium, "mirror", False))
 

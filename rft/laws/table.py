@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -73,7 +74,7 @@ class Table:
         require_drag(self)
 
     @formula
-    def traction(self, v_t, v_n, rounding=0.0):
+    def traction(self, v_t: Any, v_n: Any, rounding: Any = 0.0) -> Any:
         """Return the drag per unit length (f_t, f_n) opposing (v_t, v_n), in units of the axial drag; zero at rest."""
         inverse = inverse_speed(v_t, v_n, rounding)
         f_t, _ = curve(v_t * inverse, self.along, self.along_cells, self.along_knots, self.along_steps)
@@ -81,7 +82,7 @@ class Table:
         return f_t, f_n
 
     @formula
-    def slopes(self, v_t, v_n, rounding):
+    def slopes(self, v_t: Any, v_n: Any, rounding: Any) -> Any:
         """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n); infinite slopes at rest are returned as 0."""
         inverse = inverse_speed(v_t, v_n, rounding)
         c, s, e = v_t * inverse, v_n * inverse, rounding * inverse
