@@ -74,8 +74,9 @@ class Chart:
 
     axes: of the grid, rad. knots, degree: of the splines along each axis. harmonics: (N_1, N_2, 3 T), of cos beta, sin beta,
     cos 3 beta ... of each component of xi. residual: on the grid, (N_1, N_2, 3), rms over directions of what they leave.
-    outline: (N_1, N_2, 2 P), x and y of the ends of links in the scene's frame. frames: by name. grid_error: of position (BL)
-    and heading (rad) for each rad of a loop's length, that the grid leaves. family: None for one scene."""
+    outline: (N_1, N_2, 2 P), x and y of the ends of links in the scene's frame. frames: by name. grid_error: of position and
+    heading for each rad of a loop's length, that the grid leaves, in the scene's unit and rad. family: None for one scene.
+    between: error of position that interpolation from member to member leaves, in the scene's unit."""
 
     scene: Scene
     axes: tuple[np.ndarray, ...]
@@ -87,6 +88,7 @@ class Chart:
     frames: Mapping[str, FrameTables]
     grid_error: tuple[float, float]
     family: Family | None = None
+    between: float = 0.0
 
     @property
     def highest(self) -> int:
@@ -97,7 +99,10 @@ class Chart:
         if self.family is None:
             raise Refusal("this chart is that of one scene, and not of a family")
         f = self.family
-        return _mapped(replace(self, family=None), lambda x: _spline((f.knots,), (f.degree,), x)([[value]])[0])
+        between = 0.0 if value in f.values else f.error * self.scene.system.length
+        return _mapped(
+            replace(self, family=None, between=between), lambda x: _spline((f.knots,), (f.degree,), x)([[value]])[0]
+        )
 
     @cached_property
     def _splines(self) -> dict[tuple, Any]:
@@ -127,11 +132,13 @@ class Prediction(NamedTuple):
 
 
 def tiers(chart: Chart, gait: Gait, frame: str | None = None, phases: int = 256) -> dict[str, Prediction]:
-    """Return what a chart predicts of a cycle of a gait by the area, the path and the harmonic tier. frame: the scene's own if
-        None. phases: a power of two agrees with the page. Refusal for a gait that leaves the chart.
+    """Return what a chart predicts of a cycle of a gait by the area, the path and the harmonic tier. Refusal for a gait that
+    leaves the chart.
+
+    frame: the scene's own if None. phases: of a cycle; the page takes 256.
 
     The harmonic tier is off by the error of the grid and by a share (`SHARES`) of what the series leaves along the loop, the
-        other two by their distance from it, besides."""
+    other two by their distance from it, besides."""
     frame = frame or chart.scene.frame
     alpha, alphadot = gait.cycle(phases)
     inside(chart.axes, alpha)
@@ -155,7 +162,8 @@ def left_error(chart: Chart, alpha: np.ndarray, alphadot: np.ndarray) -> tuple[f
     )
     speed = np.linalg.norm(alphadot, axis=-1)
     along = np.array([speed @ np.hypot(rms[:, 0], rms[:, 1]), speed @ rms[:, 2]]) / len(speed)
-    return tuple((2 * np.pi * (SHARES * along + speed.mean() * np.array(chart.grid_error))).tolist())
+    position, heading = 2 * np.pi * (SHARES * along + speed.mean() * np.array(chart.grid_error))
+    return float(position) + chart.between, float(heading)
 
 
 def _in_frame(chart: Chart, frame: str, net: np.ndarray, start: np.ndarray) -> np.ndarray:

@@ -61,7 +61,11 @@ class Lab(Question):
         key = next(iter(self.over))
         section, _, name = key.partition(".")
         if section not in SECTIONS:
-            raise Refusal(f"a family varies a key of {', '.join(SECTIONS)}, not {key}", where="``over``")
+            raise Refusal(
+                f"a family varies a key of {', '.join(SECTIONS)}, not {key}",
+                where="``over``",
+                instead="see 'geomech sweep' for others",
+            )
         own = self._grid.tables.get(section, {}).get(name)
         if isinstance(own, bool) or not isinstance(own, (int, float)):
             raise Refusal(
@@ -76,7 +80,7 @@ class Lab(Question):
         if len(found) not in MEMBERS:
             raise Refusal(
                 f"a family has {MEMBERS[0]} to {MEMBERS[-1]} members, its own value counted", value=len(found),
-                where="``over``",
+                where="``over``", instead="give fewer or more values",
             )  # fmt: skip
         for value in (*found, *charts.middles(found)):
             charts.refuse(self._grid.at((value,)))

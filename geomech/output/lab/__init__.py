@@ -97,8 +97,9 @@ def data(charts: list[Chart]) -> dict[str, Any]:
 
 def _scene(chart: Chart, tables: dict[str, str]) -> dict[str, Any]:
     scene, system = chart.scene, chart.scene.system
-    text = toml(scene)
-    first, family = text.split("\n", 1)[0], chart.family
+    family = chart.family
+    text = toml(scene if family is None else scene.changed(text=""))  # of a family every key is spelled out
+    first = toml(scene).split("\n", 1)[0]
 
     def stored(values: np.ndarray) -> str:
         text = base64.b64encode(np.ascontiguousarray(values, "<f4").tobytes()).decode()

@@ -94,7 +94,8 @@ class Chart {
 
   /** Return the error of the harmonic tier, of position and heading. */
   errorLeft({ alpha, rate }) {
-    const n = alpha.length / 2, rms = new Float64Array(3), error = [0, 0];
+    const n = alpha.length / 2, rms = new Float64Array(3), { family } = this;
+    const error = [family && !family.values.includes(this.value) ? family.error * this.length : 0, 0];
     for (let i = 0; i < n; i++) {
       this.residual.at(alpha[2 * i], alpha[2 * i + 1], rms);
       const step = Math.hypot(rate[2 * i], rate[2 * i + 1]) * TAU / n;

@@ -17,8 +17,13 @@ function asToml() {
   const keys = { kind: `"${kind}"`, ...own, amplitude: literal(state.amplitude), centre: row(state.centre), reverse: String(state.reverse) };
   if (player.frequency) keys.frequency = literal(player.frequency);
   const lines = Object.entries(keys).map(([name, value]) => `${name} = ${value}`);
-  const note = chart.family && state.value !== chart.family.own ? `# the lab showed ${chart.family.key} = ${state.value}\n` : "";
-  return `${chart.toml}\n${note}[gait]\n${lines.join("\n")}\n`;
+  return `${chart.family ? withValue(chart.toml, chart.family.key, state.value) : chart.toml}\n[gait]\n${lines.join("\n")}\n`;
+}
+
+/** Return the text of a scene with another value of the key of a section. */
+function withValue(text, name, value) {
+  const [section, key] = name.split("."), start = text.indexOf(`[${section}]`), place = text.indexOf(`\n${key} = `, start) + 1;
+  return `${text.slice(0, place)}${key} = ${literal(value)}${text.slice(text.indexOf("\n", place))}`;
 }
 
 /** Return lines of Python that repeat what the page shows, and the force balance beside it. */
@@ -30,7 +35,7 @@ function asPython() {
   return [
     "import geomech",
     `from geomech.gaits import ${name}`,
-    `study = geomech.study(${JSON.stringify(chart.name)})` + (varied ? `  # with ${chart.family.key} = ${state.value}` : ""),
+    varied ? `study = geomech.study("loop.toml")  # the saved scene: ${chart.family.key} = ${state.value}` : `study = geomech.study(${JSON.stringify(chart.name)})`,
     ...(state.frame === chart.frame ? [] : [`study = study.in_frame(${JSON.stringify(state.frame)})`]),
     `gait = ${name}(${call})`,
     "print(study.displacement(gait=gait))",
