@@ -8,7 +8,7 @@ from geomech import load
 from geomech.output import lab
 from geomech.studies.lab import GALLERY, Lab
 
-FILE = Path(__file__).parents[1] / "generated" / "extra" / "lab.html"
+FILE = Path(__file__).parents[1] / "generated" / "extra" / "gait-lab.html"
 
 
 def write() -> None:
@@ -21,7 +21,7 @@ def frame() -> str:
     """Return the page in a frame."""
     return (
         "```{raw} html\n"
-        '<iframe class="lab" src="lab.html" title="Gait lab: drag the loop on the map and watch the swimmer"></iframe>\n'
-        '<p><a href="lab.html">The gait lab in a window of its own</a></p>\n'
+        '<iframe class="lab" src="gait-lab.html" title="Gait lab: drag the loop on the map and watch the swimmer"></iframe>\n'
+        '<p><a href="gait-lab.html">The gait lab in a window of its own</a></p>\n'
         "```"
     )
