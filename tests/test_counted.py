@@ -1,11 +1,14 @@
 """Counted beforehand: the force balances of every tier, table, error, motion and sweep are those that are solved."""
 
 import dataclasses
+import tracemalloc
 
+import numpy as np
 import pytest
 
 from geomech import scenes
 from geomech.gaits import Fourier
+from geomech.run.cost import BASE
 from geomech.studies import accuracy, cost, effort, motion, sweep
 from geomech.studies.study import Study
 from rft.balance.listening import listening
@@ -118,3 +121,16 @@ def test_accuracy_and_sweep_say_what_they_cost(solved):
         solved.clear()
         sweep.sweep(scene, over)
         assert foretold == sum(solved)
+
+
+def test_memory_is_foretold_too_large_rather_than_too_small():
+    """Of gaits that fill a batch, beside what is in memory anyway."""
+    scene, amplitudes = GLASS.with_numerics(phases=4096), np.linspace(0.1, 1, 40)
+    told = cost.direct(scene, scene.gait, len(amplitudes), 4096)[0].memory - BASE
+    tracemalloc.start()
+    try:
+        Study(scene).study(amplitudes, ["direct"])
+        used = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert used < told < 6 * used
