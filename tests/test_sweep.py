@@ -169,6 +169,14 @@ def test_an_interrupted_sweep_resumes_from_the_file_it_is_given(over, tmp_path, 
         sweep.sweep(GLASS, over, "")
 
 
+def test_three_parameters_are_swept_but_not_drawn(tmp_path):
+    args = [f"--over={key}" for key in ("gait.amplitude=0.5", "medium.ratio=2,4", "body.length=1")]
+    code, out, err = geomech("sweep", "three-link-viscous", *args, "-o", "s.nc", cwd=tmp_path)
+    assert (code, err) == (0, "") and out.startswith("2 points")
+    code, out, err = geomech("sweep", "three-link-viscous", *args, "--plot", "s.png", cwd=tmp_path)
+    assert (code, out) == (2, "") and "cannot draw 3 parameters: sweep one or two" in err
+
+
 def test_the_command_writes_netcdf_and_a_plot(tmp_path):
     args = ["--over", "gait.amplitude=0.5:1.5:3", "--over", "medium.ratio=2,4", "-o", "s.nc", "--plot", "s.png"]
     code, out, err = geomech("sweep", "three-link-viscous", *args, cwd=tmp_path)

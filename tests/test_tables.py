@@ -22,6 +22,7 @@ from geomech.geometry import connection
 from geomech.geometry.connection import Connection
 from geomech.io import tables
 from geomech.io.tables import matlab
+from geomech.io.tables.base import checked_names
 from geomech.scenes import Numerics, Scene
 from geomech.studies import accuracy, choose, estimate, fields, tiered
 from geomech.studies.single import single
@@ -582,6 +583,14 @@ def read(path):
         return tables.load(path), ""
     except Refusal as error:
         return None, str(error)
+
+
+@pytest.mark.parametrize("name", ["", "x" * 61, "a\x1b", "$x$", 3, "lower"])
+def test_names_of_joints_that_make_no_sense_are_not_taken(name):
+    """Empty, too long, not printable, formulas, none, or twice the same."""
+    usual = ["alpha_1", "alpha_2"]
+    assert checked_names(["lower", name], usual) == tuple(usual)
+    assert checked_names(["lower", "x" * 60], usual) == ("lower", "x" * 60)
 
 
 def test_endings_that_lie(made, tmp_path):

@@ -1,6 +1,7 @@
 """The tiers beyond the uniform fit, and whether error estimates can be believed."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from geomech.tiers import TIERS, Plan, Tier, fitted
 from geomech.tiers.direct import direct
 from rft import BodyInertia, Chain, Granular, se2
 from rft.balance.listening import listening
+from rft.effects import DepthProfile
 from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -266,6 +268,18 @@ def test_look_up_estimates_cover_the_truth(truths):
     coverage, excess = judged(estimates, errors)
     assert (coverage >= 0.95).all()
     assert (excess <= 10).all()
+
+
+@pytest.mark.parametrize(
+    ("off", "told"),
+    [({16: 0.01, 4: 0.0, 2: 0.02}, 0.02), ({16: 0.0, 4: 0.16, 2: 0.0}, 0.04), ({16: 0.0, 4: 0.1, 2: 0.1}, 0.0)],
+)
+def test_the_error_of_pieces_is_what_halving_them_changes_or_how_that_scatters(off, told, monkeypatch):
+    """Of poses made up for 16, 4 and 2 pieces to a body length, where the request has 8."""
+    run = lambda self, alpha, rate: SimpleNamespace(net=np.array([[off[self.solver.pieces], 0.0, 0.0]]))
+    monkeypatch.setattr(Swimmer, "run", run)
+    scene, cycle = GLASS.changed(effects=(DepthProfile((1.0, 0.5)),)).with_numerics(pieces=8), Circle().cycle(8)
+    assert estimate.pieces_error(scene, cycle, cycle, np.zeros((1, 3)))[0] == pytest.approx([told, 0.0])
 
 
 def test_a_tier_is_one_expression(monkeypatch):

@@ -601,6 +601,8 @@ def test_other_refusals(geomech, tmp_path):
         Walker(ROBOT, Tripod(1.0), SAND, (Slope(0.1),))
     with pytest.raises(ValueError, match="a robot without legs"):
         dataclasses.replace(ROBOT, legs=None)
+    with pytest.raises(ValueError, match="hips must be a list of x in m"):
+        dataclasses.replace(ROBOT, hips=((-0.05, 0.06),))
     with pytest.raises(ValueError, match="engine must be one of"):
         engine(3)
 
