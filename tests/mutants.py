@@ -43,6 +43,17 @@ OPPOSITE = {ast.Lt: ast.GtE, ast.LtE: ast.Gt, ast.Gt: ast.LtE, ast.GtE: ast.Lt, 
 OPPOSITE |= {ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In}
 PAIRS = "minimum maximum, min max, sin cos, real imag, any all, zeros ones, zeros_like ones_like, floor ceil, sum mean"
 TWIN = {p[i]: p[1 - i] for p in map(str.split, (PAIRS + ", argmin argmax, exp expm1").split(",")) for i in (0, 1)}
+EITHER_WAY = {
+    "max",
+    "min",
+    "maximum",
+    "minimum",
+    "fmax",
+    "fmin",
+    "hypot",
+    "distance",
+    "pose_distance",
+}  # of two arguments
 
 
 class Mutant(NamedTuple):
@@ -84,7 +95,9 @@ def variants(node):
             yield with_(attr=TWIN[name])
         case ast.Call(args=args, keywords=given):
             yield from (with_(keywords=[*given[:k], *given[k + 1 :]]) for k in range(len(given)))
-            if len({*map(ast.dump, args[:2])}) == 2 and not any(isinstance(x, ast.Starred) for x in args[:2]):
+            either_way = len(args) == 2 and ast.unparse(node.func).rpartition(".")[2] in EITHER_WAY
+            told_apart = len({*map(ast.dump, args[:2])}) == 2 and not any(isinstance(x, ast.Starred) for x in args[:2])
+            if told_apart and not either_way:
                 yield with_(args=[args[1], args[0], *args[2:]])
         case ast.If(test=test) | ast.IfExp(test=test):
             yield test, ast.UnaryOp(ast.Not(), test)
