@@ -18,7 +18,7 @@ from geomech.studies.study import Study
 from geomech.systems import Swimmer
 from geomech.tiers import TIERS, Plan, Tier, fitted
 from geomech.tiers.direct import direct
-from rft import BodyInertia, Chain, Granular, se2
+from rft import BodyInertia, Chain, Granular, Viscous, se2
 from rft.balance.listening import listening
 from rft.effects import DepthProfile
 from rft.refusal import Refusal
@@ -280,6 +280,26 @@ def test_the_error_of_pieces_is_what_halving_them_changes_or_how_that_scatters(o
     monkeypatch.setattr(Swimmer, "run", run)
     scene, cycle = GLASS.changed(effects=(DepthProfile((1.0, 0.5)),)).with_numerics(pieces=8), Circle().cycle(8)
     assert estimate.pieces_error(scene, cycle, cycle, np.zeros((1, 3)))[0] == pytest.approx([told, 0.0])
+
+
+class Known(Swimmer):
+    """With a table of its own, of a body of length 1."""
+
+    near_gait = ""
+
+    def table(self, name):
+        return connection.fit(self.velocity, connection.grid(2, 4)) if name == "connection" else None
+
+    def table_error(self, alpha, alphadot):
+        return np.zeros((*np.shape(alpha)[:-2], 2))
+
+
+def test_a_table_without_a_length_has_that_of_its_body():
+    body = Chain(length=0.3)
+    made, found = (
+        Study(Scene(kind(Viscous(2.0), body), Circle(), Numerics(grid=5))).fitted for kind in (Swimmer, Known)
+    )
+    assert len(found.axes[0]) == 4 and (found.length, found.unit) == (made.length, made.unit) == (0.3, "m")
 
 
 def test_a_tier_is_one_expression(monkeypatch):

@@ -355,6 +355,8 @@ def test_slow_robots_walk_as_their_clock_says():
     assert all(w.periodic and w.unsolved == 0 for w in found)
     np.testing.assert_allclose(ways[:2], ways[2], rtol=0.01)
     assert 0.1 < ways[2] < 2 * np.pi * 0.041
+    rest = from_rest(_strides([xplorer(1.0, 0.02)], Fineness(steps=16, elements=6)), np.array([1000.0]))
+    assert rest.status == ["periodic"] and 2 < rest.strides < 20  # further ones need no computing
 
 
 def test_a_walker_that_speeds_up_slowly_is_not_yet_periodic():
