@@ -60,6 +60,18 @@ class OwnMetric(Protocol):
 
 
 @runtime_checkable
+class Loaded(Protocol):
+    """A body under forces along its length; read by `geomech.studies.forces` and `undulation`. Its `run` with work has
+    them."""
+
+    def elements(self, alpha, alphadot) -> Any:
+        """Return the `rft.bodies.Elements` (n, N) of the body at shapes and rates (N, d), with the frame held."""
+
+    def subdivided(self, pieces: int) -> System:
+        """Return the system with its body cut into at least ``pieces`` elements to its length."""
+
+
+@runtime_checkable
 class Drawable(Protocol):
     """A body to draw; read by `geomech.studies.motion`."""
 

@@ -21,6 +21,7 @@ from geomech.systems.premises import refuse
 from geomech.systems.solver import Solver
 from rft.bodies import BODIES
 from rft.bodies.base import checked_body, half_lengths, is_reversible, joint_speed
+from rft.bodies.pieces import subdivide
 from rft.contact import assemble
 from rft.effects import EFFECTS
 from rft.laws import CATALOGUE, LAWS, is_closed, is_linear, is_mirror, is_rate_independent, speed_exponent
@@ -208,6 +209,12 @@ class Swimmer:
     def work(self, alpha: ArrayLike, alphadot: ArrayLike, xi: ArrayLike) -> rft.Work:
         """Return power, internal moments and slip of a solution of `solve`; see `rft.work_done`."""
         return rft.work_done(self.medium, self.body, alpha, alphadot, xi, **self._settings())
+
+    def elements(self, alpha: ArrayLike, alphadot: ArrayLike) -> rft.bodies.Elements:
+        return self.body.motion(*(np.asarray(x, float).T for x in (alpha, alphadot)))
+
+    def subdivided(self, pieces: int) -> Swimmer:
+        return dataclasses.replace(self, body=subdivide(self.body, pieces))
 
     def time_steps(
         self, alpha: ArrayLike, alphadot: ArrayLike, cycles: int | None, work: bool = False, path: bool = False
