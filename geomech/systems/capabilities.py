@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.systems.base import System, kind_of
 from rft.premise import Premise
@@ -64,7 +65,7 @@ class Loaded(Protocol):
     """A body under forces along its length; read by `geomech.studies.forces` and `undulation`. Its `run` with work has
     them."""
 
-    def elements(self, alpha, alphadot) -> Any:
+    def elements(self, alpha: ArrayLike, alphadot: ArrayLike) -> Any:
         """Return the `rft.bodies.Elements` (n, N) of the body at shapes and rates (N, d), with the frame held."""
 
     def subdivided(self, pieces: int) -> System:
