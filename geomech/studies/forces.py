@@ -29,6 +29,7 @@ from rft.refusal import located
 FLANK, PARTS = ("normal", "tangential"), ("normal", "tangential", "ends")
 STILL = 1e-6  # body lengths per cycle, below which there is no direction of travel
 WORK = "drag x BL/rad"
+UNKNOWN = Sizes()
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class Forces(Question):
     newtons and watts, of a body whose scene does not have them."""
 
     scene: Scene
-    sizes: Sizes = Sizes()
+    sizes: Sizes = UNKNOWN
 
     @property
     def title(self) -> str:
@@ -78,7 +79,7 @@ def _divided(scene: Scene) -> Scene:
     return scene.changed(system=system.subdivided(max(PIECES, pieces_per_length(scene.system))))
 
 
-def forces(scene: Scene, sizes: Sizes = Sizes()) -> Result:
+def forces(scene: Scene, sizes: Sizes = UNKNOWN) -> Result:
     """Return forces, power, bending moments and activation over a cycle of the scene's gait, at its N phases.
 
     Over the n elements, at least 40, or the n - 1 points between them, or the joints: positions s, 0 at the tail to 1 at the

@@ -32,7 +32,9 @@ class Sizes:
     length: Annotated[float | None, Number(1e-9, 1e6, "m", "length of the body")] = None
     radius: Annotated[float | None, Number(1e-9, 1e6, "m", "radius of the body")] = None
     depth: Annotated[float | None, Number(1e-9, 1e6, "m", "depth of the body's axis")] = None
-    stress: Annotated[float | None, Number(1e-12, 1e12, "Pa", "axial drag over 2 radius x length, at that depth")] = None
+    stress: Annotated[float | None, Number(1e-12, 1e12, "Pa", "axial drag over 2 radius x length, at that depth")] = (
+        None
+    )
     frequency: Annotated[float | None, Number(1e-12, 1e4, "Hz", "cycles per second")] = None
 
     def __post_init__(self) -> None:
