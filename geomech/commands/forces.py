@@ -45,7 +45,7 @@ def forces(
     clim: ClimOption = None,
     yes: YesOption = False,
 ):
-    """Compute thrust, drag, power and bending moment along the body. Forces are in newtons where length, radius and
+    """Compute force, power and bending moment along the body. Forces are in newtons where length, radius and
     depth of the body are known, and else in axial drags of the straight body."""
     from geomech.output import parts
     from geomech.studies.forces import Forces

@@ -20,14 +20,13 @@ from geomech.studies.cost import direct, price
 from geomech.studies.newtons import Newtons, Sizes, newtons
 from geomech.studies.question import Allow, Progress, Question
 from geomech.studies.undulation import activation_of, bends, loaded
-from geomech.systems.capabilities import Stepped, capability, pieces_per_length
-from rft.bodies.pieces import PIECES
-from rft.contact import assemble
+from geomech.systems.capabilities import Stepped, capability
 from rft.premise import Premise
 from rft.refusal import located
 
 FLANK, PARTS = ("normal", "tangential"), ("normal", "tangential", "ends")
 STILL = 1e-6  # body lengths per cycle, below which there is no direction of travel
+WHAT = "force along the body"
 WORK = "drag x BL/rad"
 UNKNOWN = Sizes()
 
@@ -46,7 +45,7 @@ class Forces(Question):
 
     def check(self) -> None:
         with located(self.scene.name):
-            newtons(self.scene, loaded(self.scene, "force along the body").medium, self.sizes)
+            newtons(self.scene, loaded(self.scene, WHAT), self.sizes)
 
     def cost(self) -> Cost:
         return price(direct(_divided(self.scene), self.scene.gait, 1, self.scene.numerics.phases, checked=False))
@@ -74,9 +73,8 @@ class Run(NamedTuple):
 
 
 def _divided(scene: Scene) -> Scene:
-    """Return the scene with a body of PIECES elements at least, so that forces are known along each link, too."""
-    system = loaded(scene, "force along the body")
-    return scene.changed(system=system.subdivided(max(PIECES, pieces_per_length(scene.system))))
+    """Return the scene with a body of short elements, so that forces are known along each link, too."""
+    return scene.changed(system=loaded(scene, WHAT).subdivided())
 
 
 def forces(scene: Scene, sizes: Sizes = UNKNOWN) -> Result:
@@ -89,15 +87,14 @@ def forces(scene: Scene, sizes: Sizes = UNKNOWN) -> Result:
     moments on the bends, which is the same but for the kinetic energy of a heavy body. Forces are in axial drags of the
     straight body, or in N where its sizes are known. Refusal for a system without a body in a medium."""
     system, gait = _divided(scene).system, scene.gait.cycle(scene.numerics.phases)
-    bent, elements = bends(loaded(scene, "force along the body"), *gait), system.elements(*gait)
+    bent, elements = bends(loaded(scene, WHAT), *gait), system.elements(*gait)
     cycle = system.run(*gait, work=True)
-    axial_drag = assemble(system.medium, system.body).axial_drag
-    work = type(cycle.work)(*(x / axial_drag for x in cycle.work))
+    work = type(cycle.work)(*(x / system.axial_drag for x in cycle.work))
     length = 2 * elements.half[:, 0]
     points = np.cumsum(length)[:-1]
     moment = work.bending_moment[:, np.searchsorted(points, bent.s - 1e-9)]
     pose = _poses(system, gait, cycle.xi)
-    run = Run(scene, pose[-1], _direction(pose[-1]), newtons(scene, system.medium, sizes), activation_of(bent, moment))
+    run = Run(scene, pose[-1], _direction(pose[-1]), newtons(scene, system, sizes), activation_of(bent, moment))
     ahead = _ahead(run, pose)[:, None] * (elements.c + 1j * elements.s).T  # elements, the real axis that of travel
     of_ends = work.end_force[:, 0] * ahead[:, [0, -1]].real - work.end_force[:, 1] * ahead[:, [0, -1]].imag
     along, across = work.element_force[:, 0], work.element_force[:, 1]
@@ -160,31 +157,36 @@ def _maps(parts: dict, along: np.ndarray, across: np.ndarray, work: Any, length:
     ]
 
 
+SIDES = {"thrust": (np.maximum, "forwards"), "drag": (np.minimum, "backwards")}  # what pushes, and what holds back
+
+
 def _by_phase(parts: dict, work: Any, joint_power: np.ndarray) -> list[Variable]:
-    sums = lambda sign: {name: sign * np.maximum(sign * x, 0.0).sum(-1) for name, x in parts.items()}
-    of = lambda kind, sign, label: [
-        Variable(f"{kind}_{name}", ("phase",), x, "drag", f"{label} by {name} forces") for name, x in sums(sign).items()
+    dims, total = ("phase",), work.element_power.sum(-1) + work.end_power.sum(-1)
+    sums = [
+        Variable(f"{kind}_{name}", dims, side(x, 0.0).sum(-1), "drag", f"sum of {name} forces {way}")
+        for kind, (side, way) in SIDES.items()
+        for name, x in parts.items()
     ]
-    total = work.element_power.sum(-1) + work.end_power.sum(-1)
-    return [
-        *of("thrust", 1, "sum of forces forwards"),
-        *of("drag", -1, "sum of forces backwards"),
-        *(Variable(f"{end}_forward", ("phase",), parts["ends"][:, k], "drag", f"force on the {end} in the direction of travel")
-          for k, end in enumerate(("tail", "head"))),
-        Variable("medium_power", ("phase",), total, WORK, "work against the medium"),
-        Variable("joint_power", ("phase",), joint_power, WORK, "work of the bending moments at the joints"),
-    ]  # fmt: skip
+    of_ends = [
+        Variable(f"{end}_forward", dims, parts["ends"][:, k], "drag", f"force on the {end} in the direction of travel")
+        for k, end in enumerate(("tail", "head"))
+    ]
+    powers = [
+        Variable("medium_power", dims, total, WORK, "work against the medium"),
+        Variable("joint_power", dims, joint_power, WORK, "work of the bending moments at the joints"),
+    ]
+    return [*sums, *of_ends, *powers]
 
 
 def _by_place(parts: dict, length: np.ndarray) -> list[Variable]:
+    label = "mean over the cycle of {} forces {}, per length of body"
     return [
         Variable(
-            f"mean_{kind}_{name}", ("s",), sign * np.maximum(sign * parts[name], 0.0).mean(0) / length, "drag/BL",
-            f"mean over the cycle of {name} forces {'forwards' if sign > 0 else 'backwards'}, per length of body",
+            f"mean_{kind}_{name}", ("s",), side(parts[name], 0.0).mean(0) / length, "drag/BL", label.format(name, way)
         )
-        for kind, sign in (("thrust", 1), ("drag", -1))
+        for kind, (side, way) in SIDES.items()
         for name in FLANK
-    ]  # fmt: skip
+    ]
 
 
 def _of_joints(activation: dict[str, Any]) -> list[Variable]:

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from geomech.scenes.model import Scene
 from geomech.systems.base import length_unit
+from geomech.systems.capabilities import Loaded
 from rft.checks import Number, check_numbers
-from rft.laws.catalogue import CATALOGUE, DEPTH
 from rft.refusal import Refusal
 
 UNITS = {  # power of the body's length in a unit of drag, BL and rad of phase; that unit in SI, with a frequency, without
@@ -62,29 +62,24 @@ class Newtons(NamedTuple):
         return (factor * 2 * math.pi * self.frequency, timed) if per_second else (factor, untimed)
 
 
-def newtons(scene: Scene, medium: Any, sizes: Sizes) -> Newtons:
-    """Return the axial drag of a scene's body in a medium, from the scene and from sizes that it does not have. Refusal where
-    the two contradict each other."""
+def newtons(scene: Scene, system: Loaded, sizes: Sizes) -> Newtons:
+    """Return the axial drag of a scene's body, from the scene and from sizes that it does not have. Refusal where the two
+    contradict each other."""
     given = _merged(scene, sizes)
     effects = getattr(scene.system, "effects", ())
     drag = next((e.drag for e in effects if hasattr(e, "drag")), None)
     length, radius, depth = given["length"], given["radius"], given["depth"]
     stress, place = given["stress"], ""
-    if stress is None and depth is not None and (measured := _measured_stress(medium)) is not None:
-        stress, place = measured * depth / DEPTH, f" at a depth of {depth:g} m"
+    if stress is None and depth is not None:
+        stress, place = system.axial_stress(depth), f" at a depth of {depth:g} m"
     if stress is not None and None not in (length, radius):
         how = f"stress {stress:.4g} Pa{place} x 2 x radius {radius:g} m x length {length:g} m"
         return Newtons(stress * 2 * radius * length, length, given["frequency"], how)
     if drag is not None and length is not None:
         return Newtons(float(drag), length, given["frequency"], "as the effect body-inertia has it")
     lacks = [name for name in ("length", "radius") if given[name] is None]
-    lacks += [] if stress is not None else ["depth" if _measured_stress(medium) else "stress"]
+    lacks += [] if stress is not None else ["depth" if system.axial_stress(1.0) else "stress"]
     return Newtons(None, length, given["frequency"], "unknown in N", tuple(lacks))
-
-
-def _measured_stress(medium: Any) -> float | None:
-    """Return the axial stress, Pa at DEPTH, of a medium of the catalogue; None for any other."""
-    return next((entry.axial_stress for entry in CATALOGUE.values() if entry.medium == medium), None)
 
 
 def _merged(scene: Scene, sizes: Sizes) -> dict[str, float | None]:

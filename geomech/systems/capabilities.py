@@ -62,14 +62,19 @@ class OwnMetric(Protocol):
 
 @runtime_checkable
 class Loaded(Protocol):
-    """A body under forces along its length; read by `geomech.studies.forces` and `undulation`. Its `run` with work has
-    them."""
+    """A body under forces along its length, of which its `run` with work tells; read by `geomech.studies.forces` and
+    `undulation`."""
+
+    axial_drag: float  # on the whole straight body along itself, in the law's unit of force
+
+    def axial_stress(self, depth: float) -> float | None:
+        """Return the axial drag over projected area, Pa, at a depth, m, where the medium is a measured one."""
 
     def elements(self, alpha: ArrayLike, alphadot: ArrayLike) -> Any:
         """Return the `rft.bodies.Elements` (n, N) of the body at shapes and rates (N, d), with the frame held."""
 
-    def subdivided(self, pieces: int) -> System:
-        """Return the system with its body cut into at least ``pieces`` elements to its length."""
+    def subdivided(self) -> System:
+        """Return the system with its body cut into short elements."""
 
 
 @runtime_checkable

@@ -21,11 +21,12 @@ from geomech.systems.premises import refuse
 from geomech.systems.solver import Solver
 from rft.bodies import BODIES
 from rft.bodies.base import checked_body, half_lengths, is_reversible, joint_speed
-from rft.bodies.pieces import subdivide
+from rft.bodies.pieces import PIECES, subdivide
 from rft.contact import assemble
 from rft.effects import EFFECTS
 from rft.laws import CATALOGUE, LAWS, is_closed, is_linear, is_mirror, is_rate_independent, speed_exponent
 from rft.laws.base import is_odd, require_law
+from rft.laws.catalogue import DEPTH
 from rft.laws.records import record, rule_for
 from rft.premise import NONE, SHAPE_ALONE, Premise
 from rft.quadrature import QUADRATURE
@@ -213,8 +214,16 @@ class Swimmer:
     def elements(self, alpha: ArrayLike, alphadot: ArrayLike) -> rft.bodies.Elements:
         return self.body.motion(*(np.asarray(x, float).T for x in (alpha, alphadot)))
 
-    def subdivided(self, pieces: int) -> Swimmer:
-        return dataclasses.replace(self, body=subdivide(self.body, pieces))
+    def subdivided(self) -> Swimmer:
+        return dataclasses.replace(self, body=subdivide(self.body, max(PIECES, self.balance_size.pieces)))
+
+    @property
+    def axial_drag(self) -> float:
+        return assemble(self.medium, self.body).axial_drag
+
+    def axial_stress(self, depth: float) -> float | None:
+        stresses = (entry.axial_stress for entry in CATALOGUE.values() if entry.medium == self.medium)
+        return None if (stress := next(stresses, None)) is None else stress * depth / DEPTH
 
     def time_steps(
         self, alpha: ArrayLike, alphadot: ArrayLike, cycles: int | None, work: bool = False, path: bool = False
