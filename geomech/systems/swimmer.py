@@ -20,7 +20,7 @@ from geomech.systems.capabilities import BalanceSize, Drawable, Part, Stepped, U
 from geomech.systems.premises import refuse
 from geomech.systems.solver import Solver
 from rft.bodies import BODIES
-from rft.bodies.base import checked_body, half_lengths, is_reversible, joint_speed
+from rft.bodies.base import checked_body, half_lengths, is_reversible, is_symmetric, joint_speed
 from rft.bodies.pieces import PIECES, subdivide
 from rft.contact import assemble
 from rft.effects import EFFECTS
@@ -95,7 +95,7 @@ class Swimmer:
         return Traits(
             linear=is_linear(medium) and not effects,
             odd=central and all(e.odd for e in effects),
-            mirror=is_mirror(medium),
+            mirror=is_mirror(medium) and is_symmetric(body),
             reversible=not effects and central and is_reversible(body),
             smooth=is_linear(medium),
             power_degree=None if lacks & RATES else speed_exponent(medium) + 1.0,
