@@ -16,11 +16,11 @@ from geomech.gaits import Butterfly, Circle, Ellipse
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
 from geomech.plots.displacements import ERROR, MEASURED, MEDIUM, TO_ROUNDING
-from geomech.plots.precision import KNOBS as PRECISION
 from geomech.plots.precision import PANELS
+from geomech.plots.precision import SETTINGS as PRECISION
 from geomech.scenes.measurements import read
 from geomech.studies.study import Study
-from geomech.studies.tiered import KNOBS
+from geomech.studies.tiered import SETTINGS
 from geomech.systems.base import shape_labels
 from geomech.tiers import TIERS
 from rft.refusal import Refusal
@@ -360,7 +360,7 @@ def test_the_map_of_a_sweep_lies_as_its_parameters():
 
 def test_a_work_precision_diagram_has_no_empty_axes_and_takes_errors_of_0(tmp_path):
     """As of systems that no setting approximates: warnings are errors here."""
-    line = {"tier": "direct", "knob": "phases", "value": [16, 64, 128], "seconds": [0.1, 0.3, 0.5], "slope": None}
+    line = {"tier": "direct", "setting": "phases", "value": [16, 64, 128], "seconds": [0.1, 0.3, 0.5], "slope": None}
     for against, title in PANELS.items():
         for error in ([1e-3, 1e-5, 0.0], [0.0, 0.0, 0.0]):
             fig = plots.work_precision_figure(
@@ -376,14 +376,21 @@ def test_the_work_precision_diagram_says_what_its_lines_are():
     lines = [
         {
             "tier": "direct",
-            "knob": "phases",
+            "setting": "phases",
             "value": [16, 64],
             "error": [1e-3, 1e-5],
             "seconds": [0.1, 0.3],
             "slope": 2.26,
         },
-        {"tier": "area", "knob": "grid", "value": [7, 61], "error": [0.02, 0.01], "seconds": [0.2, 0.4], "slope": 0.04},
-        {"tier": "path", "knob": "directions", "value": [2, 8], "error": [0.1, 0], "seconds": [1, 2], "slope": None},
+        {
+            "tier": "area",
+            "setting": "grid",
+            "value": [7, 61],
+            "error": [0.02, 0.01],
+            "seconds": [0.2, 0.4],
+            "slope": 0.04,
+        },
+        {"tier": "path", "setting": "directions", "value": [2, 8], "error": [0.1, 0], "seconds": [1, 2], "slope": None},
     ]
     for line, against in zip(lines, ("truth", "truth", "limit")):
         line["against"] = against
@@ -397,7 +404,7 @@ def test_the_work_precision_diagram_says_what_its_lines_are():
     assert left.get_xlabel() == "time for 3 amplitudes, tables included (s)"
     assert "finer force balance (BL)" in left.get_ylabel() and "the setting leads (BL)" in right.get_ylabel()
     np.testing.assert_array_equal(left.lines[1].get_xydata(), [[0.2, 0.02], [0.4, 0.01]])
-    assert set(PRECISION) <= {knob.name for knob in KNOBS}
+    assert set(PRECISION) <= {setting.name for setting in SETTINGS}
     assert left.get_title() and right.get_title()
     fig.canvas.draw()
     for ax in (left, right):  # two powers of ten on each axis, though the times span less than one
