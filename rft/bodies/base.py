@@ -107,9 +107,9 @@ def is_symmetric(body: Body) -> bool:
     shapes; a body of one's own may be bent where its shape is zero."""
     rng = np.random.default_rng(0)
     alpha, rates = rng.uniform(-1.5, 1.5, (2, body.joints, 5))
-    elements, image = body.motion(alpha, rates), body.motion(-alpha, -rates)
-    signs = Elements(c=1, s=-1, r_t=-1, r_n=1, half=1, weight=1, v_t=1, v_n=-1, v_w=-1)
-    return all(bool((np.abs(x - sign * y) <= 1e-10).all()) for x, y, sign in zip(elements, image, signs))
+    elements, other = body.motion(alpha, rates), body.motion(-alpha, -rates)
+    image = other._replace(s=-other.s, r_t=-other.r_t, v_n=-other.v_n, v_w=-other.v_w)
+    return all(bool((np.abs(x - y) <= 1e-10).all()) for x, y in zip(elements, image))
 
 
 def numbered_labels(joints: int, name: str = "alpha_{}", unit: str = "rad") -> tuple[tuple[str, str], ...]:

@@ -39,7 +39,7 @@ class Links:
 
     def __getstate__(self) -> dict:
         """Return the fields alone for copies and workers, without cached properties."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
+        return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]  # of subclasses
 
     def _links(self, alpha: np.ndarray, alphadot: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return of the links in the body frame at shapes and rates (joints, B), (n, B) each: exp(i theta), rates of theta,
