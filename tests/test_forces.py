@@ -13,7 +13,7 @@ from geomech.geometry.reconstruct import poses
 from geomech.io.results import write_netcdf
 from geomech.scenes import Scene
 from geomech.scenes.frames import framed
-from geomech.studies.forces import Forces
+from geomech.studies.forces import Forces, forces
 from geomech.studies.newtons import Sizes
 from geomech.systems import Swimmer
 from rft import Backbone, Chain, ConstantCurvature, DepthProfile, Granular, SkinFriction, Transient, Viscous
@@ -55,7 +55,7 @@ def cases(folder):
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
     scenes = cases(tmp_path_factory.mktemp("midline"))
-    return {name: Forces(scene.with_numerics(phases=24)).ask() for name, scene in scenes.items()}
+    return {name: forces(scene.with_numerics(phases=24)) for name, scene in scenes.items()}
 
 
 def places(scene, s):
@@ -133,7 +133,7 @@ def test_a_small_sine_in_a_fluid_has_the_forces_of_its_closed_form():
     backwards by tangential ones, and power r A^2 cos^2; far from the ends, to the square of the slope."""
     r, waves, slope = 3.0, 8.0, 0.02
     gait = Sine(amplitude=slope / (2 * np.pi), waves=waves, elements=320)
-    result = Forces(Scene(Swimmer(Viscous(r), Backbone(320)), gait).with_numerics(phases=16)).ask()
+    result = forces(Scene(Swimmer(Viscous(r), Backbone(320)), gait).with_numerics(phases=16))
     k, s, t = 2 * np.pi * waves, result["s"].values, result["phase"].values
     A = slope / k
     middle = np.abs(s - 0.5) < 0.5 / waves  # a wave, where the body's yaw, which a long one has little of, moves least
@@ -156,19 +156,17 @@ class Doubled:
 
 
 def test_forces_are_in_axial_drags_whatever_the_unit_of_a_law():
-    one, two = (
-        Forces(Scene(Swimmer(law, Chain()), Circle(0.7)).with_numerics(phases=8)).ask() for law in (FLUID, Doubled())
-    )
+    one, two = (forces(Scene(Swimmer(law, Chain()), Circle(0.7)).with_numerics(phases=8)) for law in (FLUID, Doubled()))
     for name in ("forward", "bending_moment", "medium_power"):
         np.testing.assert_allclose(two[name].values, one[name].values, atol=1e-9)
 
 
 def test_forces_do_not_see_the_frame():
     scene = geomech.load("three-link-viscous").with_numerics(phases=16, grid=9)
-    one = Forces(scene).ask()
+    one = forces(scene)
     link = scene.changed(body=Chain(frame="link-3"))
     other = scene.changed(system=framed(scene.system, scene.numerics))
-    for two in (Forces(link).ask(), Forces(other).ask()):
+    for two in (forces(link), forces(other)):
         for name in ("normal", "forward", "bending_moment", "fundamental_lag"):
             np.testing.assert_allclose(two[name].values, one[name].values, atol=1e-6)
 
@@ -177,7 +175,7 @@ def test_a_heavy_body_is_pushed_by_what_accelerates_it():
     """Thrust and drag balance in the mean alone; so do the powers."""
     heavy = geomech.load("sandfish-heavy")
     small = heavy.changed(body=Backbone(20), gait=dataclasses.replace(heavy.gait, elements=20)).with_numerics(phases=32)
-    v = {k: x.values for k, x in Forces(small).ask().items()}
+    v = {k: x.values for k, x in forces(small).items()}
     net = sum(v[f"{kind}_{part}"] for kind in ("thrust", "drag") for part in PARTS)
     assert np.abs(net).max() > 0.01 and abs(net.mean()) < 2e-4 * np.abs(v["drag_tangential"]).max()
     assert v["joint_power"].mean() == pytest.approx(v["medium_power"].mean(), rel=1e-3)
@@ -187,8 +185,8 @@ def test_a_heavy_body_is_pushed_by_what_accelerates_it():
 def test_newtons_and_watts_follow_from_sizes():
     """Stress x 2 r L; the catalogue's stress grows with depth; a heavy body says its own; a contradiction is refused."""
     fish = geomech.load("sandfish-loose").with_numerics(phases=16)
-    plain = Forces(fish).ask()
-    known = Forces(fish, Sizes(length=0.1, depth=0.05, frequency=3.0)).ask()
+    plain = forces(fish)
+    known = forces(fish, Sizes(length=0.1, depth=0.05, frequency=3.0))
     drag = 2710 * 0.05 / 0.0762 * 2 * 0.006 * 0.1
     scales = {
         "forward": (drag / 0.1, "N/m"), "drag_ends": (drag, "N"), "bending_moment": (drag * 0.1, "N m"),
@@ -197,17 +195,36 @@ def test_newtons_and_watts_follow_from_sizes():
     for name, (scale, unit) in scales.items():
         np.testing.assert_allclose(known[name].values, scale * plain[name].values, rtol=1e-12)
         assert known[name].unit == unit
-    by_stress = Forces(fish, Sizes(length=0.1, stress=500.0)).ask()
+    by_stress = forces(fish, Sizes(length=0.1, stress=500.0))
     np.testing.assert_allclose(by_stress["drag_ends"].values, 500 * 2 * 0.006 * 0.1 * plain["drag_ends"].values)
     assert by_stress["medium_power"].unit == "J/rad" and by_stress["power"].unit == "N/rad"
     assert plain.subject.newtons.lacks == ("length", "radius", "depth")
     fluid = geomech.load("three-link-viscous").changed(body=Chain(length=0.3)).with_numerics(phases=16)
-    assert Forces(fluid).ask().subject.newtons.lacks == ("radius", "stress")
+    assert forces(fluid).subject.newtons.lacks == ("radius", "stress")
     heavy = geomech.load("sandfish-heavy")
     with pytest.raises(Refusal, match="sandfish-heavy: length is 0.2, but the scene has 0.1: drop length"):
         Forces(heavy, Sizes(length=0.2)).check()
     with pytest.raises(Refusal, match="differential-drive: force along the body is that of a body in a medium"):
         geomech.study("differential-drive").forces()
+
+
+@pytest.mark.parametrize("name", ["sandfish-loose", "serpenoid-glass", "three-link-glass", "sandfish-transient"])
+def test_errors_cover_what_finer_numerics_change(name):
+    """Three times the elements, a hundredth of the regularisation, four times the steps in time; within 20 errors of these."""
+    scene, phases = geomech.load(name).with_numerics(phases=32), 32
+    if name == "sandfish-transient":
+        scene, phases = scene.changed(body=Backbone(40), gait=dataclasses.replace(scene.gait, elements=40)), 16
+        scene = scene.with_numerics(phases=phases)
+    found, body = Forces(scene).ask(), scene.system.body
+    finer = scene.with_numerics(regularisation=1e-8, phases=4 * phases if scene.system.traits.steps else phases)
+    if count := getattr(body, "elements", None):
+        gait = dataclasses.replace(scene.gait, **{"elements": 3 * count} if hasattr(scene.gait, "elements") else {})
+        finer = finer.changed(body=dataclasses.replace(body, elements=3 * count), gait=gait)
+    truth = forces(finer)
+    for key in ("thrust_normal", "drag_normal", "drag_tangential", "drag_ends", "medium_power", "joint_power"):
+        off = np.abs(truth[key].values[:: len(truth["phase"].values) // phases] - found[key].values).mean()
+        error = found[key].error.mean()
+        assert off <= error < 20 * off + 1e-9, key
 
 
 def test_a_stroke_that_goes_nowhere_says_so():

@@ -20,11 +20,15 @@ from geomech.studies.cost import direct, price
 from geomech.studies.newtons import Newtons, Sizes, newtons
 from geomech.studies.question import Allow, Progress, Question
 from geomech.studies.undulation import activation_of, bends, loaded
-from geomech.systems.capabilities import Stepped, capability
+from geomech.systems.capabilities import Stepped, capability, pieces_per_length, refined
 from rft.premise import Premise
 from rft.refusal import located
 
 FLANK, PARTS = ("normal", "tangential"), ("normal", "tangential", "ends")
+SEEN = (
+    1.2  # times a change: that to a law computed more exactly is nearly all of the error (`geomech.studies.estimate`)
+)
+LEAST_STEPS = 8  # of time stepping
 STILL = 1e-6  # body lengths per cycle, below which there is no direction of travel
 WHAT = "force along the body"
 WORK = "drag x BL/rad"
@@ -48,11 +52,13 @@ class Forces(Question):
             newtons(self.scene, loaded(self.scene, WHAT), self.sizes)
 
     def cost(self) -> Cost:
-        return price(direct(_divided(self.scene), self.scene.gait, 1, self.scene.numerics.phases, checked=False))
+        scenes = [self.scene, *_variants(self.scene)]
+        once = lambda scene: direct(_divided(scene), scene.gait, 1, scene.numerics.phases, checked=False)
+        return price([job for scene in scenes for job in once(scene)])
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
         with located(self.scene.name):
-            return forces(self.scene, self.sizes)
+            return with_errors(forces(self.scene, self.sizes))
 
 
 class Run(NamedTuple):
@@ -72,12 +78,58 @@ class Run(NamedTuple):
         return bool(np.hypot(*self.net[:2]) > STILL * self.scene.system.length)
 
 
+def with_errors(result: Result) -> Result:
+    """Return forces with errors of what is summed over the body at each phase: the changes with half the elements of a
+    backbone, with half the pieces into which effects cut a body, with a law computed more exactly, and in time stepping with
+    half the phases. Errors of order 2 are a third of these changes; near stuck links they scatter."""
+    scene, unit = result.subject.scene, result.subject.newtons
+    others = [forces(other, unit=unit) for other in _variants(scene)]
+    return replace(result, variables=tuple(_with_error(v, others) for v in result.variables))
+
+
+def _with_error(v: Variable, others: list[Result]) -> Variable:
+    if v.dims != ("phase",) or v.is_coordinate:
+        return v
+    error = np.zeros_like(v.values)
+    for other in others:
+        values = other[v.name].values
+        change = SEEN * np.abs(v.values[:: len(error) // len(values)] - values)
+        error += change if len(change) == len(error) else change.max()
+    return replace(v, error=error)
+
+
+def _variants(scene: Scene) -> list[Scene]:
+    """Return other approximations of a scene, coarser ones and one with its law computed more exactly."""
+    system, phases = loaded(scene, WHAT), scene.numerics.phases
+    scene = scene.changed(system=system)
+    variants = [scene.changed(system=finer) for finer in [refined(system)] if finer]
+    variants += _with_fewer_elements(scene)
+    if pieces := pieces_per_length(system):
+        variants.append(scene.with_numerics(pieces=max(1, pieces // 2)))
+    if system.traits.steps and phases % 2 == 0 and phases >= 2 * LEAST_STEPS:
+        variants.append(scene.with_numerics(phases=phases // 2))
+    return variants
+
+
+def _with_fewer_elements(scene: Scene) -> list[Scene]:
+    """Return the scene of half as many elements, of a backbone and its gait, where they allow it."""
+    body, gait = getattr(scene.system, "body", None), scene.gait
+    if (count := getattr(body, "elements", None)) is None:
+        return []
+    try:
+        body = replace(body, elements=count // 2)
+        gait = replace(gait, elements=count // 2) if hasattr(gait, "elements") else gait
+        return [scene.changed(system=replace(scene.system, body=body), gait=gait)]
+    except ValueError:  # such as arcs that no longer divide the elements
+        return []
+
+
 def _divided(scene: Scene) -> Scene:
     """Return the scene with a body of short elements, so that forces are known along each link, too."""
     return scene.changed(system=loaded(scene, WHAT).subdivided())
 
 
-def forces(scene: Scene, sizes: Sizes = UNKNOWN) -> Result:
+def forces(scene: Scene, sizes: Sizes = UNKNOWN, unit: Newtons | None = None) -> Result:
     """Return forces, power, bending moments and activation over a cycle of the scene's gait, at its N phases.
 
     Over the n elements, at least 40, or the n - 1 points between them, or the joints: positions s, 0 at the tail to 1 at the
@@ -85,7 +137,8 @@ def forces(scene: Scene, sizes: Sizes = UNKNOWN) -> Result:
     element's left and to its head. `thrust_*` and `drag_*` are sums over the body of what pushes and of what holds back,
     `mean_thrust_*` and `mean_drag_*` means over the cycle. power: work against the medium; joint_power: of the bending
     moments on the bends, which is the same but for the kinetic energy of a heavy body. Forces are in axial drags of the
-    straight body, or in N where its sizes are known. Refusal for a system without a body in a medium."""
+    straight body, or in N where its sizes are known. unit: that of forces, in place of sizes. Refusal for a system without a
+    body in a medium."""
     system, gait = _divided(scene).system, scene.gait.cycle(scene.numerics.phases)
     bent, elements = bends(loaded(scene, WHAT), *gait), system.elements(*gait)
     cycle = system.run(*gait, work=True)
@@ -94,7 +147,8 @@ def forces(scene: Scene, sizes: Sizes = UNKNOWN) -> Result:
     points = np.cumsum(length)[:-1]
     moment = work.bending_moment[:, np.searchsorted(points, bent.s - 1e-9)]
     pose = _poses(system, gait, cycle.xi)
-    run = Run(scene, pose[-1], _direction(pose[-1]), newtons(scene, system, sizes), activation_of(bent, moment))
+    unit = unit or newtons(scene, system, sizes)
+    run = Run(scene, pose[-1], _direction(pose[-1]), unit, activation_of(bent, moment))
     ahead = _ahead(run, pose)[:, None] * (elements.c + 1j * elements.s).T  # elements, the real axis that of travel
     of_ends = work.end_force[:, 0] * ahead[:, [0, -1]].real - work.end_force[:, 1] * ahead[:, [0, -1]].imag
     along, across = work.element_force[:, 0], work.element_force[:, 1]

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from geomech.core.variables import Result
+from geomech.core.variables import Result, Variable
 from geomech.studies.forces import PARTS
 from geomech.systems.base import length_unit
 
@@ -14,20 +14,21 @@ PLACES = (0.25, 0.5, 0.75)  # of the body, at which the lag of activation is pri
 
 
 def numbers(result: Result) -> dict[str, Any]:
-    """Return all variables by name, None for nan, with their units."""
+    """Return all variables by name, None for nan, with errors and units."""
     values = {v.name: np.where(np.isfinite(v.values), v.values, None).tolist() for v in result.variables}
-    return {**result.attributes, **values, "units": {v.name: v.unit for v in result.variables}}
+    errors = {v.name: v.error.tolist() for v in result.variables if v.error is not None}
+    return {**result.attributes, **values, "errors": errors, "units": {v.name: v.unit for v in result.variables}}
 
 
 def text(result: Result) -> str:
     """Return means over the cycle of thrust and drag by their parts, power, bending moment and activation."""
-    mean = lambda name: float(result[name].values.mean())
-    rows = [(name, mean(f"thrust_{name}"), mean(f"drag_{name}")) for name in PARTS]
-    rows.append(("sum", *(sum(row[k] for row in rows) for k in (1, 2))))
+    rows = [(name, [_mean(result[f"{kind}_{name}"]) for kind in ("thrust", "drag")]) for name in PARTS]
+    rows.append(("sum", [tuple(map(sum, zip(*(row[k] for _, row in rows)))) for k in (0, 1)]))
+    unit = f"mean of a cycle, {result['thrust_normal'].unit}:"
     return "\n".join([
         _travel(result),
-        f"means over the cycle, {result['thrust_normal'].unit}:   thrust      drag",
-        *(f"{name:>22} {_digits(a):>9} {_digits(b):>9}" for name, a, b in rows),
+        f"{unit:<22} {'thrust +- error':>20} {'drag +- error':>20}",
+        *(f"{name:>22} {' '.join(f'{_digits(*pair):>20}' for pair in row)}" for name, row in rows),
         _power(result),
         _moment(result),
         _activation(result),
@@ -35,8 +36,13 @@ def text(result: Result) -> str:
     ])  # fmt: skip
 
 
-def _digits(x: float) -> str:
-    return f"{x:.4g}" if abs(x) >= 1e-9 else "0"
+def _mean(v: Variable) -> tuple[float, float]:
+    """Return the mean of a variable and that of its error."""
+    return float(v.values.mean()), 0.0 if v.error is None else float(v.error.mean())
+
+
+def _digits(x: float, error: float) -> str:
+    return f"{x:.4g} +-{error:.0e}" if abs(x) + error >= 1e-9 else "0"
 
 
 def _travel(result: Result) -> str:
@@ -53,7 +59,7 @@ def _power(result: Result) -> str:
     most = np.abs(medium.values).max() or 1.0
     difference = np.abs(medium.values - joints.values).max() / most
     same = "at the joints the same" if difference < 1e-6 else f"at the joints {joints.values.mean():.4g} {joints.unit}"
-    return f"power {medium.values.mean():.4g} {medium.unit} into the medium, largest {medium.values.max():.4g}; {same}"
+    return f"power {_digits(*_mean(medium))} {medium.unit} into the medium, largest {medium.values.max():.4g}; {same}"
 
 
 def _moment(result: Result) -> str:
