@@ -16,7 +16,7 @@ from geomech.scenes.frames import framed
 from geomech.studies.forces import Forces, forces
 from geomech.studies.newtons import Sizes
 from geomech.systems import Swimmer
-from rft import Backbone, Chain, ConstantCurvature, DepthProfile, Granular, SkinFriction, Transient, Viscous
+from rft import Backbone, Chain, ConstantCurvature, DepthProfile, Granular, SkinFriction, Slope, Transient, Viscous
 from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -77,6 +77,7 @@ NAMES = "sine", "past", "serpenoid", "arcs", "links", "measured law", "sunk", "t
 def test_thrust_and_drag_balance_and_forces_do_the_work_of_the_joints(found, name):
     result = found[name]
     v = lambda key: result[key].values
+    assert v("thrust_normal").shape == v("drag_ends").shape == v("phase").shape
     thrust, drag = (sum(v(f"{kind}_{part}") for part in PARTS) for kind in ("thrust", "drag"))
     assert np.abs(thrust + drag).max() < 1e-8 < thrust.min()
     assert v("medium_power") == pytest.approx(v("joint_power"), rel=1e-6) and v("medium_power").min() > 0
@@ -180,6 +181,30 @@ def test_a_heavy_body_is_pushed_by_what_accelerates_it():
     assert np.abs(net).max() > 0.01 and abs(net.mean()) < 2e-4 * np.abs(v["drag_tangential"]).max()
     assert v["joint_power"].mean() == pytest.approx(v["medium_power"].mean(), rel=1e-3)
     assert np.abs(v["joint_power"] - v["medium_power"]).max() > 1e-3
+
+
+def test_on_a_slope_forces_hold_the_weight_in_the_world():
+    """Where the place matters headings are those of the steps; the weight pulls downhill, and the ground holds it."""
+    slope = Slope(angle=0.3, towards=2.0, weight=0.4)
+    scene = Scene(Swimmer(SAND, Chain((1,) * 5), (slope,)), Wave(0.6, 1.0, offset=0.3, joints=4)).with_numerics(
+        phases=32
+    )
+    result = forces(scene)
+    v = {k: x.values for k, x in result.items()}
+    net = sum(v[f"{kind}_{part}"] for kind in ("thrust", "drag") for part in PARTS)
+    ahead = result.subject.direction + result.subject.net[2] * (np.arange(32) / 32 - 0.5)
+    assert net == pytest.approx(0.4 * np.sin(0.3) * np.cos(ahead - 2.0), abs=2e-3)
+    assert abs(result.subject.net[2]) > 0.1
+
+
+def test_the_cost_counts_all_that_errors_take():
+    """Balances over those of one run: a law computed more exactly, half the elements or pieces, half the steps."""
+    fish, steps = geomech.load("sandfish-loose"), geomech.load("sandfish-heavy")
+    solved = lambda scene: Forces(scene.with_numerics(phases=32)).cost().balances
+    cycles = 3  # assumed, of what is run until it repeats
+    once = 9  # of 32 phases, whose images the others are
+    assert solved(geomech.load("three-link-viscous")) == once and solved(geomech.load("three-link-glass")) == 2 * once
+    assert solved(fish) == 16 + 32 and solved(steps) == cycles * (3 * 32 + 16)
 
 
 def test_newtons_and_watts_follow_from_sizes():

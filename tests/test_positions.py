@@ -150,6 +150,8 @@ def test_functions_that_return_no_poses_are_refused(function, says):
         Positions(function, 2, (1, 1, 1))
     with pytest.raises(Refusal, match="frame must be 'mean' or 'link-1' ... 'link-3'"):
         Positions(hinged, 2, (1, 1, 1), frame="link-4")
+    with pytest.raises(Refusal, match="lengths must all be finite and > 0"):
+        Positions(hinged, 2, (1, -1, 1))
 
 
 def test_bodies_that_are_built_in_have_mirror_images():
