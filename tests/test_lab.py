@@ -136,6 +136,12 @@ def test_one_file_without_network_markup_or_repetition(glass):
     np.testing.assert_array_equal(harmonics, glass.harmonics.ravel())
 
 
+@pytest.mark.parametrize("name", ["seven-link-wave", "no-slip-snake", "differential-drive"])
+def test_scenes_without_a_chart_are_refused_before_others_are_computed(name):
+    with pytest.raises(Refusal, match=f"^{name}: "):
+        Lab((scenes.load("three-link-glass"), scenes.load(name))).check()
+
+
 def test_the_command(tmp_path):
     code, out, _ = geomech("lab", "three-link-viscous", "seven-link-modes", "-o", "lab.html", cwd=tmp_path)
     assert code == 0 and "three-link-viscous  961 shapes, harmonics to 1\n" in out and "page in lab.html" in out
