@@ -9,7 +9,7 @@ import pytest
 from geomech import scenes
 from geomech.gaits import Fourier
 from geomech.run.cost import BASE
-from geomech.studies import accuracy, cost, effort, motion, sweep
+from geomech.studies import accuracy, cost, effort, motion, shape_space, sweep
 from geomech.studies.study import Study
 from rft import Chain, body_velocity
 from rft.balance.listening import listening
@@ -133,6 +133,24 @@ def test_a_balance_that_is_tried_twice_is_one(solved):
         solved.clear()
         body_velocity(GLASS.system.medium, Chain(), alpha, alphadot, start=start)
         assert sum(solved) == 12
+
+
+@pytest.mark.parametrize("scene", [GLASS, VISCOUS])
+@pytest.mark.parametrize(
+    "question",
+    [
+        lambda s: shape_space.ccf(s, None, None, "link-1", False, False),
+        lambda s: shape_space.ccf(s, "1,2", None, None, False, False),
+    ],
+    ids=["map with gait and another frame", "slice"],
+)
+def test_a_map_takes_the_balances_foretold(scene, question, solved):
+    asked = question(scene.with_numerics(grid=7))
+    asked.check()
+    foretold = asked.cost().balances
+    solved.clear()
+    asked.answer(lambda done: None, lambda cost: None)
+    assert foretold == sum(solved)
 
 
 def test_memory_is_foretold_too_large_rather_than_too_small():

@@ -88,6 +88,9 @@ def family():
 
 def test_a_family_has_the_scene_as_a_member(family):
     (chart,) = family.subject
+    told = {v.name: (v.dims, v.values.tolist()) for v in family.variables}
+    assert told["shapes"] == (("scene",), [441]) and told["highest"] == (("scene",), [9])
+    assert [told[name][1] for name in ("grid_error", "grid_error_heading")] == [[x] for x in chart.grid_error]
     assert chart.family.values.tolist() == [1.0, 1.5, 1.8, 2.2, 3.0] and family.attributes["members"] == 5
     own = charts.tiers(charts.chart(chart.scene), OFF_CENTRE)
     for tier, (net, _) in charts.tiers(chart.at(1.8), OFF_CENTRE).items():
@@ -131,6 +134,12 @@ def test_one_file_without_network_markup_or_repetition(glass):
     assert len(text) < 600_000
     harmonics = np.frombuffer(base64.b64decode(data["tables"][data["scenes"][0]["harmonics"]]), "<f4")
     np.testing.assert_array_equal(harmonics, glass.harmonics.ravel())
+
+
+@pytest.mark.parametrize("name", ["seven-link-wave", "no-slip-snake", "differential-drive"])
+def test_scenes_without_a_chart_are_refused_before_others_are_computed(name):
+    with pytest.raises(Refusal, match=f"^{name}: "):
+        Lab((scenes.load("three-link-glass"), scenes.load(name))).check()
 
 
 def test_the_command(tmp_path):
