@@ -18,7 +18,7 @@ import pytest
 from commands import geomech
 
 from geomech import scenes
-from geomech.gaits import Circle, Points
+from geomech.gaits import Circle, Points, Sine
 from geomech.output import lab
 from geomech.studies import charts
 from geomech.studies.lab import GALLERY, Lab
@@ -72,6 +72,13 @@ def test_errors_hold_and_are_not_idle(name):
         ratios.append(found["harmonic"].error[0] / off["harmonic"][0])
     assert (np.mean(held, 0) >= 0.9).all(), np.mean(held, 0)
     assert np.median(ratios) < 12
+
+
+def test_a_wave_of_centrelines_is_nearly_a_series():
+    wave, t = Sine(elements=3, waves=0.5), np.linspace(0.0, 6.0, 50)
+    cos, sin = charts.series_of(wave)
+    kt = np.outer(t, 1 + np.arange(cos.shape[1]))
+    np.testing.assert_allclose(np.cos(kt) @ cos.T + np.sin(kt) @ sin.T, wave.unit(t), atol=1e-4)
 
 
 def test_a_loop_that_leaves_the_chart(glass):

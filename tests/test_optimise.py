@@ -272,7 +272,7 @@ def test_a_start_beyond_the_limit_is_drawn_together(capsys):
 
 def test_never_worse_than_the_start(stroke):
     again = optimise(stroke.scene, "displacement")
-    assert again.value >= stroke.value
+    assert again.value >= stroke.value and again.best.gait.harmonics == stroke.best.gait.harmonics
     butterfly = viscous(gait=Butterfly(amplitude=0.9))
     assert (poor := optimise(butterfly, "displacement", harmonics=1)).value >= poor.start.value
     still = optimise(viscous(gait=Circle(amplitude=1e-3)), "displacement")
