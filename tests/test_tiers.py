@@ -346,6 +346,12 @@ def test_a_table_pays_for_many_amplitudes_and_not_for_few():
     assert (few, many) == ("direct", "adapted")
 
 
+@pytest.mark.parametrize(("error", "tier"), [([1.9e-3, 0.5], "adapted"), ([2.1e-3, 0.0], "direct")])
+def test_the_position_decides_and_not_the_heading(error, tier, monkeypatch):
+    monkeypatch.setattr("geomech.studies.choose.against_direct", lambda *_: np.tile(error, (400, 1)))
+    assert cheapest(GLASS, np.linspace(0.3, 2.0, 400), 2e-3)["tier"] == tier
+
+
 def test_what_the_solver_left_counts_in_the_estimate():
     """A residual, in units of the axial drag, is a velocity of the body for 2 pi of phase: where it is what is left, the
     estimate says it, in body lengths whatever the size; likewise in rad for the heading."""
