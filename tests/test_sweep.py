@@ -116,7 +116,9 @@ def test_one_frequency_for_all_effects(without_estimates):
         PAST + '"grain-inertia"\nfrequency = 3.0\nlength = 0.1\ndepth = 0.05'
     )
     swimmer = scenes.parse(both).with_numerics(phases=64)
-    found = sweep.sweep(swimmer, {"effects.frequency": [0.0, 3.0, 9.0]})["displacement"]
+    swept = sweep.sweep(swimmer, {"effects.frequency": [0.0, 3.0, 9.0]})
+    found = swept["displacement"]
+    assert swept["frequency"].tolist() == [0.0, 3.0, 9.0]
     np.testing.assert_allclose(found[1], Study(swimmer).poses("direct"), atol=1e-9)
     assert np.abs(found[0] - found[2]).max() > 3e-3
     with pytest.raises(Refusal, match="body-inertia gives frequency = 3.0 and grain-inertia 2.0: it is one swimmer"):

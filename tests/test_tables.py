@@ -629,6 +629,7 @@ def test_endings_that_lie(made, tmp_path):
         ({"Ax1": {"a": 1}}, "Ax1 that is no array of real numbers"),
         ({"alpha1": np.ones((9, 9))}, "alpha1 must be at least 4 ascending angles"),
         ({"alpha1": np.arange(81.0).reshape(9, 9) / 81}, "span no grid"),
+        ({"alpha2": np.linspace(-2, 2, 9) + 0.01 * np.outer(*np.eye(9)[[0, 0]])}, "span no grid"),  # but for one corner
         ({"alpha1": np.ones((3, 3, 3))}, "span no grid"),
         ({"degrees": True}, "alpha1 up to 114.6 where angles are in rad"),
     ],
