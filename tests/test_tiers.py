@@ -325,6 +325,12 @@ def test_a_tier_is_one_expression(monkeypatch):
         Study(scenes.load("seven-link-wave").changed(body=Chain((1,) * 5), gait=Wave(joints=4))).plan("leading")
 
 
+def test_settings_go_from_coarse_to_fine_without_a_repetition():
+    for values in (setting.values for tier in TIERS.values() for setting in tier.settings):
+        steps = np.diff(values)
+        assert (steps > 0).all() or (steps < 0).all()
+
+
 MANY = np.linspace(0.3, 2.0, 201)
 
 
