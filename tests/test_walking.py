@@ -532,6 +532,13 @@ def test_films_of_a_walk_follow_the_robot_and_tell_their_speed(tmp_path):
     assert picture[:30, :120].any() and picture[:30, 280:].any() and not picture[40:].any()
 
 
+def test_settings_of_a_walk_go_from_coarse_to_fine():
+    """Each has a finer reference."""
+    for setting in walking.SETTINGS:
+        steps = np.diff([*setting.values, walking.FINEST[setting.name]])
+        assert min(setting.values) > 0 and ((steps > 0).all() or (steps < 0).all())
+
+
 def test_sweep_and_accuracy_of_a_walk(geomech, tmp_path, monkeypatch):
     (tmp_path / "small.toml").write_text(
         SMALL.replace("steps = 16", "steps = 10").replace("elements = 8", "elements = 6")
