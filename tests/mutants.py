@@ -5,6 +5,7 @@
 `mutants.toml` beside this file says which tests watch a module, what is left out and which mutants are no bugs. Mutants
 live in copies of the tree in the system's temporary folder, one a worker; the checkout is only read. A mutant is killed
 when a test fails; time-outs, far longer than without it, are counted apart. Survivors are printed as what they change.
+`--done 50` goes on with a run that was stopped after 50.
 """
 
 import argparse
@@ -191,12 +192,13 @@ def main() -> None:
     ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     ask.add_argument("--count", type=int, default=200, help="how many, at random")
     ask.add_argument("--seed", type=int, default=1)
+    ask.add_argument("--done", type=int, default=0, help="so many of them are left out: a stopped run had them")
     ask.add_argument("--jobs", type=int, default=2)
     ask.add_argument("--only", nargs="+", default=[""], help="beginnings of file names")
     asked = ask.parse_args()
     files = sorted(p.relative_to(ROOT).as_posix() for top in ("rft", "geomech") for p in (ROOT / top).rglob("*.py"))
     every = [m for f in files if watch(f) and f.startswith(tuple(asked.only)) for m in mutants_of(ROOT / f)]
-    some = random.Random(asked.seed).sample(every, min(asked.count, len(every)))
+    some = random.Random(asked.seed).sample(every, min(asked.count, len(every)))[asked.done :]
     print(f"{len(some)} of {len(every)} mutants, seed {asked.seed}", flush=True)
     os.environ.update(CLEAN)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # clean up then too
