@@ -358,6 +358,13 @@ def test_the_position_decides_and_not_the_heading(error, tier, monkeypatch):
     assert cheapest(GLASS, np.linspace(0.3, 2.0, 400), 2e-3)["tier"] == tier
 
 
+def test_the_error_of_a_rule_is_that_against_a_finer_one_amplitude_by_amplitude():
+    a, ruled = np.array([0.4, 0.9, 1.4]), GLASS.with_numerics(loads="midpoint:4")
+    poses, error = estimate.direct(ruled, ruled.gait, a, 64)
+    off = estimate.pose_distance(poses, estimate.direct(GLASS, GLASS.gait, a, 64)[0], 1.0)
+    assert error.shape == (3, 2) and (off <= 1.5 * error + 1e-12).all() and error.max() < 5 * off.max()
+
+
 def test_what_the_solver_left_counts_in_the_estimate():
     """A residual, in units of the axial drag, is a velocity of the body for 2 pi of phase: where it is what is left, the
     estimate says it, in body lengths whatever the size; likewise in rad for the heading."""
