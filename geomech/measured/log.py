@@ -164,7 +164,7 @@ def _check_units(log: Log, picked: Sequence[str], turn: np.ndarray) -> None:
                 f"{name} reaches {np.degrees(log.alpha[row, k]):.4g} degrees", row, because="no joint turns so far"
             )
     if (turn[1:-3] != 1.0).all() and (size := np.abs(log.alpha).max()) < np.radians(2 * np.pi):
-        what = f"joint angles of at most {np.degrees(size):.3g} degrees: drop --degrees if these are rad"
+        what = f"joint angles of at most {np.degrees(size):.3g} degrees: drop ``degrees`` if these are rad"
         warnings.warn(f"{log.name}: {what}", UnitWarning, stacklevel=3)
 
 

@@ -36,7 +36,7 @@ def sweep_figure(scene: Any, results: Mapping) -> Figure:
     """Draw a sweep (`geomech.studies.sweep`) over one parameter or two: net distance or speed, or the speed of a robot.
     Refusal for more."""
     if len(over := results["over"]) > 2:
-        raise Refusal(f"cannot draw {len(over)} parameters", instead="sweep one or two, or leave --plot out")
+        raise Refusal(f"cannot draw {len(over)} parameters", instead="sweep one or two, or leave ``plot`` out")
     return (_speed_figure if "status" in results else _net_figure)(scene, results)
 
 

@@ -66,7 +66,7 @@ def load_file(path: str | Path) -> list[str]:
     if not isinstance(path, (str, Path)):
         raise Refusal("a file of one's own is named by text", value=path)
     path = Path(path)
-    place = f"--plugin {path}"
+    place = f"``plugin`` {path}"
     if path.suffix != ".py":
         raise Refusal("give a Python file, with a name that ends in .py", where=place)
     try:
@@ -89,7 +89,7 @@ def _module(full_name: str) -> str:
 
 
 def _load(path: Path, full_name: str, text: str) -> list[str]:
-    place, name = f"--plugin {path}", _module(full_name)
+    place, name = f"``plugin`` {path}", _module(full_name)
     module = types.ModuleType(name)
     module.__file__ = str(path)
     with _all_or_none(name, module):
