@@ -32,7 +32,14 @@ LEVEL, ONE_SIGMA = 0.95, 0.6827  # confidence of intervals and bands; of one sta
 
 
 def student_factor(degrees_of_freedom: float, level: float = LEVEL) -> float:
-    """Return half the width of a confidence interval over the standard error, by Student's distribution."""
+    """Return half the width of a confidence interval over the standard error, by Student's distribution.
+
+    Examples
+    --------
+    >>> from rft.calibrate import student_factor
+    >>> round(student_factor(10), 3)
+    2.228
+    """
     from scipy.special import stdtrit
 
     return float(stdtrit(degrees_of_freedom, (1 + level) / 2))
@@ -164,7 +171,19 @@ def fit(law: str, data: RodDrag, rod: Rod = UNKNOWN_ROD, end_caps: float | str =
 
     end_caps: e of both ends together (`EndCaps`; 1 for one flat end), 0 for none, or "fitted"; other than 0 only for the
     granular law and a rod of known radius and length. Raises ValueError if the data do not determine the parameters, or
-    if a parameter ends on a bound."""
+    if a parameter ends on a bound.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft.calibrate import fit
+    >>> from rft.drag import rod_drag
+    >>> psi = np.array([0.0, 15.0, 30.0, 45.0, 60.0, 90.0])  # degrees
+    >>> along, across = np.cos(np.radians(psi)), 2 * np.sin(np.radians(psi))  # N
+    >>> found = fit("viscous", rod_drag(psi, along, across))
+    >>> round(float(found.medium.ratio), 6)
+    2.0
+    """
     fitted_law = FITS[law]
     fits_caps = isinstance(end_caps, str)
     require(not fits_caps or end_caps == "fitted", "end caps must be 'fitted' or a number", value=end_caps)

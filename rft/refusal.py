@@ -25,6 +25,16 @@ class Refusal(ValueError):
     what: says what is wrong. value: what was given, where that tells more. where: the way there, outermost first (file or
     scene, table, key, argument). because: why it cannot be. instead: what to give or to do. The name of an argument
     stands in double backticks: Python shows it bare, and a command as its option (`said`).
+
+    Examples
+    --------
+    >>> from rft import Viscous
+    >>> try:
+    ...     Viscous(-1.0)
+    ... except ValueError as refusal:
+    ...     print(refusal)
+    ...
+    ratio must be a number from 1e-08 to 1e+08, got -1.0
     """
 
     def __init__(self, what: str, *, value: Any = ..., where: Any = (), because: str = "", instead: str = ""):

@@ -56,7 +56,16 @@ def work_done(
     pieces: int = PIECES,
 ) -> Work:
     """Return power, internal moments and slip at body velocities xi (..., 3) of `body_velocity` for the same
-    arguments."""
+    arguments.
+
+    Examples
+    --------
+    >>> from rft import Chain, Viscous, body_velocity, work_done
+    >>> motion = Viscous(), Chain(), [0.5, 0.3], [1.0, 0.0]
+    >>> work = work_done(*motion, body_velocity(*motion).xi)
+    >>> round(float(work.power), 5), work.bending_moment.round(4)
+    (0.00827, array([0.0083, 0.0056]))
+    """
     checked_body(body)
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, 1.0)
     batch, xi = alpha.shape[:-1], real_array("xi", xi)

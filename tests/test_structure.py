@@ -115,7 +115,7 @@ def test_modules_import_from_their_own_layer_or_a_lower_one(imported):
 def test_a_scene_is_a_small_class():
     tree = ast.parse((ROOT / "geomech" / "scenes" / "model.py").read_text())
     (scene,) = (node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == "Scene")
-    assert scene.end_lineno - scene.lineno < 63
+    assert scene.end_lineno - scene.body[0].end_lineno < 60  # without its docstring
 
 
 def test_mutants_are_made_of_all_files_that_exist_and_watched_by_tests_that_do():

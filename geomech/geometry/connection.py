@@ -35,7 +35,18 @@ class Connection(Extensible):
     ..., N_d), rms over the fitted directions of xi - A alphadot for |alphadot| = 1; speed: (3, N_1, ..., N_d), rms of
     xi itself. degree: of the interpolating spline. All are nan at grid points that are singular, or have a neighbour
     beyond singular shapes. unit: of lengths, "BL" (body lengths) or "m". length: of the body in that unit; None where
-    it is unknown."""
+    it is unknown.
+
+    Examples
+    --------
+    >>> from geomech.geometry import connection
+    >>> from geomech.scenes import load
+    >>> A = connection.fit(load("three-link-viscous").system.velocity, connection.grid(2, 7))
+    >>> A([0.5, 0.3]).round(3)  # at a shape, (3, joints)
+    array([[-0.017,  0.002],
+           [-0.054, -0.054],
+           [ 0.252, -0.262]])
+    """
 
     axes: tuple[np.ndarray, ...]
     A: np.ndarray
@@ -76,7 +87,14 @@ class Connection(Extensible):
 
 
 def grid(joints: int, points: int = 31, extent: float = 2.5) -> tuple[np.ndarray, ...]:
-    """Return ``joints`` equal axes of ``points`` angles from -extent to extent (rad)."""
+    """Return ``joints`` equal axes of ``points`` angles from -extent to extent (rad).
+
+    Examples
+    --------
+    >>> from geomech.geometry.connection import grid
+    >>> [axis.tolist() for axis in grid(2, 5, 1.0)]
+    [[-1.0, -0.5, 0.0, 0.5, 1.0], [-1.0, -0.5, 0.0, 0.5, 1.0]]
+    """
     in_range("joints", joints, 1, 10_000, whole=True)
     in_range("grid", points, 4, 1e6, whole=True)
     in_range("extent", extent, 1e-9, 1e6)
@@ -93,7 +111,17 @@ def check_fit_options(degree: object, progress: object) -> None:
 
 def directions(joints: int, count: int) -> np.ndarray:
     """Return unit alphadot (count, joints), spread evenly over half of all directions: exactly for two joints, by a
-    low-discrepancy sequence for more."""
+    low-discrepancy sequence for more.
+
+    Examples
+    --------
+    >>> from geomech.geometry.connection import directions
+    >>> directions(2, 4).round(3)
+    array([[ 1.   ,  0.   ],
+           [ 0.707,  0.707],
+           [ 0.   ,  1.   ],
+           [-0.707,  0.707]])
+    """
     in_range("joints", joints, 1, 10_000, whole=True)
     least = joints if joints <= 2 else 4 * joints  # a scattered set of fewer may nearly miss a direction
     if not (is_whole(count) and count >= least):
@@ -224,7 +252,15 @@ def even_part(
     velocity: Velocity, axes: Sequence[ArrayLike], traits: Traits = NOTHING, map: Map = each
 ) -> np.ndarray | None:
     """Return the rms (3, N_1, ..., N_d) over directions of xi(alpha, alphadot) + xi(alpha, -alphadot), |alphadot| = 1.
-    A fit from half of the directions takes it for 0. None where it is roundoff at a few shapes that stand for all."""
+    A fit from half of the directions takes it for 0. None where it is roundoff at a few shapes that stand for all.
+
+    Examples
+    --------
+    >>> from geomech.geometry.connection import even_part, grid
+    >>> from geomech.systems import DifferentialDrive
+    >>> even_part(DifferentialDrive().velocity, grid(2, 5)) is None  # it changes sign with alphadot
+    True
+    """
     axes = tuple(np.asarray(a, float) for a in axes)
     unit = directions(len(axes), EVEN_DIRECTIONS * len(axes))
     rng = np.random.default_rng(0)
@@ -243,7 +279,15 @@ def even_part(
 
 def sign_changes(d: np.ndarray) -> np.ndarray:
     """Return a mask (N_1, ..., N_d) of the grid points at which d is 0 or of another sign than at a neighbour along an
-    axis."""
+    axis.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.geometry.connection import sign_changes
+    >>> sign_changes(np.array([2.0, 1.0, -1.0, -2.0]))
+    array([False,  True,  True, False])
+    """
     mask = d == 0
     for axis in range(d.ndim):
         low, high = (np.moveaxis(mask, axis, 0)[part] for part in (slice(None, -1), slice(1, None)))
@@ -279,6 +323,16 @@ def fit(
     few shapes: `VelocityWarning` if it is not odd or not homogeneous in alphadot, or ignores alpha. trusted: it is not tried.
     unit, length: of lengths in the velocity, and of the body, as `Connection` keeps them. map: as the builtin, of tasks that
     each have many shapes; that of a request, where one is under way, shares and stores them.
+
+    Examples
+    --------
+    >>> from geomech.geometry import connection
+    >>> from geomech.systems import Swimmer
+    >>> from rft import Chain, Viscous
+    >>> swimmer = Swimmer(Viscous(), Chain())
+    >>> A = connection.fit(swimmer.velocity, connection.grid(2, 15))
+    >>> A.velocity([0.5, 0.3], [1.0, 0.0]).round(4)
+    array([-0.0014, -0.0035, -0.0817])
     """
     axes = as_axes(axes)
     check_fit_options(degree, progress)
@@ -293,7 +347,18 @@ def connection_function(
     velocity: Velocity, joints: int, count: int, degree_one: bool = False, map: Map = each
 ) -> Callable:
     """Return the least-squares A (..., 3, d) as a function of shapes (..., d), solved at every call from ``count``
-    directions; from d where the velocity is linear in alphadot (``degree_one``)."""
+    directions; from d where the velocity is linear in alphadot (``degree_one``).
+
+    Examples
+    --------
+    >>> from geomech.geometry.connection import connection_function
+    >>> from geomech.systems import DifferentialDrive
+    >>> A = connection_function(DifferentialDrive().velocity, joints=2, count=2, degree_one=True)
+    >>> A([0.3, 0.1]).round(3)
+    array([[ 0.25,  0.25],
+           [ 0.  ,  0.  ],
+           [-0.5 ,  0.5 ]])
+    """
     unit = np.eye(joints) if degree_one else directions(joints, count)
     reduce = least_squares(unit)
 

@@ -96,7 +96,19 @@ def _even(beta, highest: int) -> np.ndarray:
 
 def fit(power: Power, axes, degree: int = 3, progress: Callable | None = None, map: Map = each) -> Metric:
     """Fit M on the grid spanned by ``axes`` exactly, from d (d + 1) / 2 powers at each shape. power: (...,), quadratic
-    in alphadot."""
+    in alphadot.
+
+    Examples
+    --------
+    >>> from geomech.geometry import metric
+    >>> from geomech.geometry.connection import grid
+    >>> from geomech.scenes import load
+    >>> swimmer = load("three-link-viscous").system
+    >>> power = lambda alpha, alphadot: swimmer.power(alpha, alphadot, swimmer.velocity(alpha, alphadot))
+    >>> metric.fit(power, grid(2, 9)).M[..., 4, 4].round(5)  # of the straight body
+    array([[0.00732, 0.00503],
+           [0.00503, 0.00732]])
+    """
     axes = as_axes(axes)
     d = len(axes)
     i, j = np.triu_indices(d)
@@ -120,7 +132,18 @@ def fit_norm(
     highest: int = 14,
     map: Map = each,
 ) -> Finsler:
-    """Fit even harmonics up to ``highest`` of a norm (...,), from ``count`` directions at each shape of two joints."""
+    """Fit even harmonics up to ``highest`` of a norm (...,), from ``count`` directions at each shape of two joints.
+
+    Examples
+    --------
+    >>> from geomech.geometry import metric
+    >>> from geomech.geometry.connection import grid
+    >>> from geomech.scenes import load
+    >>> swimmer = load("three-link-glass").system
+    >>> power = lambda alpha, alphadot: swimmer.power(alpha, alphadot, swimmer.velocity(alpha, alphadot))
+    >>> metric.fit_norm(power, grid(2, 5)).coefficients.shape
+    (15, 5, 5)
+    """
     if not is_whole(highest) or highest % 2 or not 0 <= highest < count:
         raise Refusal(f"harmonics must be even and below the number of directions ({count})", value=highest)
     axes = as_axes(axes)
@@ -161,6 +184,16 @@ def _powers(shared: tuple, alpha: np.ndarray) -> np.ndarray:
 
 
 def path_length(norm: Power, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
-    """Return length of a gait's cycle, for amplitudes (...,) or the gait's own. norm: F(alpha, alphadot) -> (...,)."""
+    """Return length of a gait's cycle, for amplitudes (...,) or the gait's own. norm: F(alpha, alphadot) -> (...,).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.gaits import Circle
+    >>> from geomech.geometry.metric import path_length
+    >>> norm = lambda alpha, alphadot: np.linalg.norm(alphadot, axis=-1)
+    >>> round(float(path_length(norm, Circle(0.5))), 4)  # of the circle itself, rad
+    3.1416
+    """
     alpha, alphadot = checked_gait(gait).cycle(phases, amplitudes)
     return np.asarray(norm(alpha, alphadot)).mean(-1) * 2 * np.pi

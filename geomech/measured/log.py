@@ -60,7 +60,21 @@ def read(path: str | Path, columns: Sequence[str] = (), degrees: bool = False) -
 
     columns: names of the time, of all joint angles, of x, y and the heading, in this order; by default those with known
     names (`POSE`, `JOINT`; "phase" in place of a time). degrees: joint angles and heading are in degrees, as are
-    columns whose names end in _deg."""
+    columns whose names end in _deg.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from geomech.gaits import Circle
+    >>> from geomech.measured import read, synthetic
+    >>> from geomech.scenes import load
+    >>> velocity = load("three-link-viscous").system.velocity
+    >>> file = pathlib.Path(tempfile.mkdtemp()) / "log.csv"
+    >>> synthetic.save(file, synthetic.made(velocity, Circle(0.8), cycles=20))
+    >>> log = read(file)
+    >>> log.joints, log.pose.shape
+    (('alpha_1', 'alpha_2'), (1201, 3))
+    """
     try:
         source = read_rows(path, LARGEST_FILE, WHAT)
         line, header = source.header

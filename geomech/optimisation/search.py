@@ -61,7 +61,16 @@ def optimise(
     of 0, or between (lowest, highest) for each, from the scene's own gait and ``starts`` - 1 others. By default there
     are no others, except for two joints in a dry medium, which have many local optima: there the `OUTLINES` of the
     limits are used. For a sine, sines are searched. rate, power: limits for the objective "speed". Refusal for what makes no
-    sense."""
+    sense.
+
+    Examples
+    --------
+    >>> from geomech.optimisation import optimise
+    >>> from geomech.scenes import load
+    >>> best = optimise(load("three-link-viscous"), "efficiency", harmonics=1, starts=1)
+    >>> round(best.value, 3)  # displacement over path length
+    0.11
+    """
     request = checked(scene, objective, direction, harmonics, limits, starts, rate, power)
     return search(request, progress)
 

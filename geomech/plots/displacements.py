@@ -37,7 +37,15 @@ def displacement(
 
     errors: with a band of each tier's estimated error, in its colour; an uncertain medium has an outlined band of its own. The
     table's own units are those of the axis. data: measurements to draw as points, "amplitude", "value" and "error" (N,) in the
-    units of the axes, such as a data frame of pandas; the error may be missing."""
+    units of the axes, such as a data frame of pandas; the error may be missing.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> table = geomech.study("three-link-viscous", grid=15).displacement([0.5, 1.0], ["path", "direct"])
+    >>> geomech.plots.displacement(table, quantity="net_distance").get_ylabel()
+    'net distance per cycle (BL)'
+    """
     ax, amplitudes = axes_of(ax, 4.4, 3.8), np.asarray(table["amplitude"], float)
     errors = errors and all(key in table for key in ERRORS)
     for name, tier in TIERS.items():
@@ -177,6 +185,14 @@ def _speed_axis(ax, frequency: float, unit: str) -> None:
 
 
 def net(poses: Any) -> np.ndarray:
-    """Return the net distance (...,) of poses (..., 3), negative where it points backwards (x < 0)."""
+    """Return the net distance (...,) of poses (..., 3), negative where it points backwards (x < 0).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.plots import net
+    >>> net(np.array([[0.3, 0.4, 0.0], [-0.3, 0.0, 0.0]]))
+    array([ 0.5, -0.3])
+    """
     found = of_pose(poses)
     return np.copysign(found["net_distance"], found["x"])

@@ -50,7 +50,14 @@ def connection_figure(
     """Draw the rows of A side by side, but for those that are zero everywhere, as arrows ("quiver") or "streamlines".
 
     beside: the connection in another body frame, drawn below on the same scales. names: of the two frames. components:
-    of WORDS, drawn even where they are zero."""
+    of WORDS, drawn even where they are zero.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> fig = geomech.plots.connection_figure(study.fitted, components=["x", "theta"])
+    """
     draw = CONNECTION_STYLES[choose("style", style, CONNECTION_STYLES)]
     rows = [connection] if beside is None else [connection, beside]
     panels = panels_of(components, [[has_row(c, k) for k in range(3)] for c in rows])
@@ -113,7 +120,14 @@ def ccf_figure(
 
     metric: its rings on a map. beside: (CCF, error) in another body frame, drawn below on the same scales. names: of the two
     frames. components: of WORDS, drawn even where they are zero. clim: limit of the colours on either side of zero, a number or
-    a percentile of the values' size such as "98%"; their largest if left out."""
+    a percentile of the values' size such as "98%"; their largest if left out.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> fig = geomech.plots.ccf_figure(study.ccf(), gaits=[study.scene.gait], error=study.ccf_error(), components=["x"])
+    """
     rows = [Row(field, error, gaits, labels)] + ([] if beside is None else [Row(*beside, gaits, labels)])
     return _ccf_rows(rows, style, metric, names, True, components, clim)
 

@@ -58,7 +58,14 @@ def vector_field(
 ) -> Axes:
     """Draw row ``component`` of A as arrows over shape space (Fig. 11(c)); colour repeats their length.
 
-    labels: as for `shape_space`. top: of the colours and of the arrows' scale, for maps that are compared."""
+    labels: as for `shape_space`. top: of the colours and of the arrows' scale, for maps that are compared.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> ax = geomech.plots.vector_field(study.fitted, component=0)
+    """
     ax = axes_of(ax)
     step = every or max(1, round(len(connection.axes[0]) / ARROWS))
     pick = slice(step // 2, None, step)
@@ -136,7 +143,14 @@ def ccf_map(
     error: of the field (`curvature.error`). Hatched are patches where it exceeds the value, so that not even the sign is known
     (`unknown`); there no line of zeros is drawn, and next to them only lines that part two known signs (`certain`). labels: as
     for `shape_space`. legend: explain hatching and rings below the map. metric: drawn as rings (`indicatrices`). clim: limit of
-    the colours on either side of zero, a number or a percentile of the values' size such as "98%"; else their largest."""
+    the colours on either side of zero, a number or a percentile of the values' size such as "98%"; else their largest.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> ax = geomech.plots.ccf_map(study.ccf(), component=0, gaits=[study.scene.gait], error=study.ccf_error())
+    """
     from cmcrameri import cm
 
     ax = axes_of(ax)
@@ -322,7 +336,16 @@ def draw_gait(
 ) -> Axes:
     """Draw the gait's curve with a dot at its start and an arrow along it, as far as it lies within the axes of a grid.
 
-    line: its style."""
+    line: its style.
+
+    Examples
+    --------
+    >>> from geomech.gaits import Circle
+    >>> from geomech.plots import draw_gait, figure
+    >>> fig, axes = figure(3.0, 3.0)
+    >>> draw_gait(Circle(0.5), axes[0, 0])
+    <ShownAxes: >
+    """
     ax, curve = axes_of(ax), gait.shape(PHASES)
     curve[~inside_of(curve, within or ())] = np.nan
     ax.plot(*curve.T, line, color=color, lw=1.2)

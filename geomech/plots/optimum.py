@@ -38,7 +38,13 @@ def optimum_map(optimum: Optimum, ax: Axes | None = None, clim: float | str | No
     colours are those of `ccf_figure` in the same frame. Where the velocity does not follow from shape alone there is no CCF,
     and the map has the loop alone.
 
-    clim: as for `ccf_figure`."""
+    clim: as for `ccf_figure`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> ax = geomech.plots.optimum_map(geomech.optimise("three-link-viscous", harmonics=1, starts=1))
+    """
     ax, system = axes_of(ax, 4.6, 5.2), optimum.scene.system
     if optimum.gained is None:
         shape_space(ax, [np.linspace(-1, 1, 2) * optimum.scene.numerics.extent] * 2, shape_labels(system))
@@ -120,7 +126,13 @@ def optimum_angles(optimum: Optimum, ax: Axes | None = None) -> Axes:
 @styled
 def optimum_figure(optimum: Optimum, stretched: bool = False, *, clim: float | str | None = None) -> Figure:
     """Draw `optimum_map` and `optimum_angles` side by side; the angles alone where there are not two joints. stretched:
-    `stretched_optimum` between them. clim: as for `ccf_figure`."""
+    `stretched_optimum` between them. clim: as for `ccf_figure`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> fig = geomech.plots.optimum_figure(geomech.optimise("three-link-viscous", harmonics=1, starts=1))
+    """
     if optimum.scene.system.joints != 2:
         fig, axes = figure(3.8, 3.4)
         optimum_angles(optimum, axes[0, 0])

@@ -55,7 +55,14 @@ def streamlines(
     connection: Connection, component: int = 0, *, ax: Axes | None = None, labels: Labels = ANGLES, top: float | None = None
 ) -> Axes:  # fmt: skip
     """Draw row ``component`` of A as streamlines over shape space: along them a change of shape moves the body the most for
-    its size, across them not at all. Colour: length of the row. Other arguments as for `vector_field`."""
+    its size, across them not at all. Colour: length of the row. Other arguments as for `vector_field`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> ax = geomech.plots.streamlines(study.fitted, 0)
+    """
     from matplotlib.colors import Normalize
 
     ax = axes_of(ax)
@@ -85,7 +92,14 @@ def ccf_contours(
     """Draw a component of the CCF as contours, dashed below zero, and shade the area of each gait by the sign of its
     contribution to the displacement: CCF times winding number.
 
-    error: shapes where it exceeds the value have no shade. Other arguments as for `ccf_map`."""
+    error: shapes where it exceeds the value have no shade. Other arguments as for `ccf_map`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> ax = geomech.plots.ccf_contours(study.ccf(), 0)
+    """
     from matplotlib.ticker import MaxNLocator
 
     ax, field = axes_of(ax), drawable(field)

@@ -23,7 +23,14 @@ def stress_figure(survey: Any, point: tuple[float, float] | None = None) -> Figu
     """Draw alpha_z and alpha_x of an `rft.plates.Survey` over tilt and direction of motion (Fig. 7(c) and (d)), hatched where
     the map pulls.
 
-    point: (beta, gamma) in degrees to mark."""
+    point: (beta, gamma) in degrees to mark.
+
+    Examples
+    --------
+    >>> from geomech.plots import stress_figure
+    >>> from rft.plates import StressMap, survey
+    >>> fig = stress_figure(survey(StressMap(), cells=30))
+    """
     fig, axes = figure(8.6, 3.5, 2)
     for ax, name in zip(axes[0], "zx"):
         stress_map(ax, survey, name)

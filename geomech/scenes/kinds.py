@@ -35,7 +35,20 @@ def register(part: Any = None, /, **members: Any) -> Any:
 
     members: of a function ``velocity(alpha, alphadot)`` that is a system: its ``joints``, and ``kind``, ``length`` and
     ``traits`` if they are not its name, 1 and `Traits()`. Its other parameters are keys of a scene. ValueError for what is
-    no part, no frozen dataclass where a class, or has a name that is taken."""
+    no part, no frozen dataclass where a class, or has a name that is taken.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import geomech
+    >>> @geomech.register(joints=2)
+    ... def drift(alpha, alphadot):
+    ...     return np.stack([alphadot[..., 0] * np.sin(alpha[..., 1]), 0 * alpha[..., 0], 0 * alpha[..., 0]], -1)
+    ...
+    >>> table = geomech.study(drift, geomech.gaits.Circle(0.5)).displacement(tiers="direct")
+    >>> [round(x, 3) for x in table["net_distance"]["direct"]]
+    [0.761]
+    """
     if part is None and members:
         return lambda function: register(function, **members)
     for name, value in members.items():

@@ -48,7 +48,17 @@ class Displayed:
 @dataclass(frozen=True, repr=False)
 class Scene(Displayed):
     """A system and a gait. numerics: the tiers'; the system has its own. name: a built-in one's, or its file's. text: the
-    TOML it was read from, if it was; `geomech.scenes.write` says whether it still holds. files: others it was read from."""
+    TOML it was read from, if it was; `geomech.scenes.write` says whether it still holds. files: others it was read from.
+
+    Examples
+    --------
+    >>> from geomech.gaits import Circle
+    >>> from geomech.scenes import Scene
+    >>> from geomech.systems import NoSlipSnake
+    >>> scene = Scene(NoSlipSnake(), Circle(0.3, centre=(0.7, -0.7)))
+    >>> scene.system.joints, scene.numerics.phases
+    (2, 256)
+    """
 
     system: Annotated[System, OneOf(SYSTEMS, inner={SHORT: SWIMMER}, sized=True, short=SHORT)]
     gait: Annotated[Gait, OneOf(GAITS, sized=True)]

@@ -27,17 +27,38 @@ PIPE = "pipe"  # name of a scene that comes through one, as from /dev/stdin or <
 
 
 def builtin_names() -> list[str]:
-    """Return the names of the scenes with a gait that ship with the package."""
+    """Return the names of the scenes with a gait that ship with the package.
+
+    Examples
+    --------
+    >>> from geomech.scenes import builtin_names
+    >>> "three-link-glass" in builtin_names()
+    True
+    """
     return _names("")
 
 
 def intruder_names() -> list[str]:
-    """Return the names of the intruder scenes that ship with the package."""
+    """Return the names of the intruder scenes that ship with the package.
+
+    Examples
+    --------
+    >>> from geomech.scenes import intruder_names
+    >>> "c-leg" in intruder_names()
+    True
+    """
     return _names("intruders")
 
 
 def walker_names() -> list[str]:
-    """Return the names of the scenes of walking robots that ship with the package."""
+    """Return the names of the scenes of walking robots that ship with the package.
+
+    Examples
+    --------
+    >>> from geomech.scenes import walker_names
+    >>> "xplorer" in walker_names()
+    True
+    """
     return _names("walkers")
 
 
@@ -59,7 +80,15 @@ def builtin_text(name: str) -> str | None:
 
 def load(scene: str | Path) -> Scene | Any:
     """Return the scene of a built-in name or a TOML file: an intruder scene if it has an [intruder], a `WalkerScene` if
-    a [robot] (Any, so that no type checker asks which). Refusal if there is none."""
+    a [robot] (Any, so that no type checker asks which). Refusal if there is none.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> scene = geomech.load("three-link-glass")
+    >>> scene.system.medium.C, scene.gait
+    (1.8, Circle(amplitude=1.0, centre=(), reverse=True, frequency=None))
+    """
     if not isinstance(scene, (str, Path)):
         raise Refusal("scene must be a name or a TOML file", value=scene)
     if (text := builtin_text(str(scene))) is not None:
@@ -121,7 +150,23 @@ def inputs(scene: Scene | Intruding | WalkerScene) -> list[Path]:
 
 
 def parse(text: str, name: str = "scene") -> Scene | Any:
-    """Return the scene of a TOML text; Refusal if it is none."""
+    """Return the scene of a TOML text; Refusal if it is none.
+
+    Examples
+    --------
+    >>> from geomech.scenes import parse
+    >>> text = '''
+    ... [medium]
+    ... law = "viscous"
+    ... [body]
+    ... kind = "chain"
+    ... [gait]
+    ... kind = "circle"
+    ... amplitude = 0.5
+    ... '''
+    >>> parse(text).gait.amplitude
+    0.5
+    """
     if not isinstance(text, str):
         raise Refusal("a scene is a TOML text", value=text, where=formatted(name))
     try:
@@ -144,7 +189,15 @@ def _intruding(tables: Mapping, name: str) -> type[Intruding]:
 
 
 def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | Any:
-    """Return the scene of the tables of a TOML text; Refusal if they make none."""
+    """Return the scene of the tables of a TOML text; Refusal if they make none.
+
+    Examples
+    --------
+    >>> from geomech.scenes import from_tables
+    >>> body, gait = {"kind": "chain"}, {"kind": "circle", "amplitude": 0.5}
+    >>> from_tables({"medium": {"law": "viscous"}, "body": body, "gait": gait}).system.medium.ratio
+    2.0
+    """
     if not isinstance(tables, Mapping):
         raise Refusal("a scene is a dict of tables", value=tables, where=formatted(name))
     if "robot" in tables:

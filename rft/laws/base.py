@@ -110,12 +110,26 @@ def viscous_terms(medium) -> tuple[float, float] | None:
 
 
 def is_closed(medium: Any) -> bool:
-    """Return whether a medium has a closed form, and so exact averages over a link."""
+    """Return whether a medium has a closed form, and so exact averages over a link.
+
+    Examples
+    --------
+    >>> from rft.laws import Viscous, is_closed
+    >>> is_closed(Viscous())
+    True
+    """
     return dry_terms(medium) is not None and viscous_terms(medium) is not None
 
 
 def is_mirror(medium: Any) -> bool:
-    """Return whether a medium claims that left and right are alike; a field then takes half the balances."""
+    """Return whether a medium claims that left and right are alike; a field then takes half the balances.
+
+    Examples
+    --------
+    >>> from rft.laws import Viscous, is_mirror
+    >>> is_mirror(Viscous())
+    True
+    """
     return bool(getattr(medium, "mirror", False))
 
 
@@ -214,19 +228,40 @@ def require_drag(medium: Medium) -> None:
 
 
 def is_linear(medium: Medium) -> bool:
-    """Return whether drag is proportional to velocity, and so the body velocity linear in alphadot."""
+    """Return whether drag is proportional to velocity, and so the body velocity linear in alphadot.
+
+    Examples
+    --------
+    >>> from rft.laws import Coulomb, Viscous, is_linear
+    >>> is_linear(Viscous()), is_linear(Coulomb())
+    (True, False)
+    """
     return dry_terms(medium) == () and is_closed(medium)
 
 
 def is_rate_independent(medium: Medium) -> bool:
     """Return whether drag grows with one power of the speed in all directions, so that the speed of a gait does not
-    matter."""
+    matter.
+
+    Examples
+    --------
+    >>> from rft.laws import Viscous, is_rate_independent
+    >>> is_rate_independent(Viscous())
+    True
+    """
     return speed_exponent(medium) is not None
 
 
 def speed_exponent(medium: Medium) -> float | None:
     """Return the power of the speed with which drag grows in all directions, 0 for dry media, 1 for viscous ones; None
-    if it differs between speeds or directions."""
+    if it differs between speeds or directions.
+
+    Examples
+    --------
+    >>> from rft.laws import Coulomb, Viscous, speed_exponent
+    >>> speed_exponent(Coulomb()), speed_exponent(Viscous())
+    (0.0, 1.0)
+    """
     if is_closed(medium):
         return (None if any(medium.viscous) else 0.0) if medium.dry else 1.0
     speeds = np.logspace(-3, 1, 5)[:, None]

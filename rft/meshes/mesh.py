@@ -25,7 +25,17 @@ class Mesh:
     vertices: (V, 3), m. faces: (F, 3), indices of vertices, counter-clockwise as seen from outside. closed: whether every
     edge must be shared by two triangles that agree on which side is out; False for a thin plate, of which either side may
     lead. smooth_normals: (F, 3, 3), unit normals at the corners of the triangles of a mesh that stands for a smooth
-    surface; None for the normals of the triangles."""
+    surface; None for the normals of the triangles.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft.meshes import Mesh
+    >>> vertices = 0.01 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> tetrahedron = Mesh(vertices, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+    >>> tetrahedron.faces.shape
+    (4, 3)
+    """
 
     vertices: np.ndarray
     faces: np.ndarray

@@ -104,6 +104,14 @@ class StressMap(PlateStress):
 
     The defaults are the generic set M0. Source: Li, Zhang and Goldman, Science 339, 1408 (2013), Table S2; Fig. 7 of Zhang
     and Goldman (2014).
+
+    Examples
+    --------
+    >>> import math
+    >>> from rft.plates import StressMap
+    >>> alpha_x, alpha_z = StressMap(zeta=0.5)(0.0, math.pi / 2)  # a level plate pushed down, N/cm^3
+    >>> round(float(alpha_z), 3)
+    0.5
     """
 
     A00: CosineZ = 0.206

@@ -46,7 +46,15 @@ class Survey:
 
 
 def survey(stress: PlateStress, cells: int = 180) -> Survey:
-    """Return the survey of a map on ``cells`` tilts and twice as many directions."""
+    """Return the survey of a map on ``cells`` tilts and twice as many directions.
+
+    Examples
+    --------
+    >>> from rft.plates import StressMap, survey
+    >>> overview = survey(StressMap(), cells=30)
+    >>> round(float(overview.pulling), 3)  # share of directions in which the map pulls
+    0.116
+    """
     beta = (np.arange(cells) + 0.5) / cells * np.pi - np.pi / 2
     gamma = (np.arange(2 * cells) + 0.5) / cells * np.pi - np.pi
     n, v = (np.sin(beta)[:, None], -np.cos(beta)[:, None]), (np.cos(gamma), -np.sin(gamma))

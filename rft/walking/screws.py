@@ -51,7 +51,17 @@ def turning(
     medium: Spatial, screw: Screw, height: float, slip, rate: float = 1.0, triangles: int = TRIANGLES, angles: int = ANGLES
 ) -> Turning:  # fmt: skip
     """Return the mean forces on a level screw with its axis ``height``, m, above the surface. rate: rad/s. slip: (...,), 0 as
-    in a nut, 1 where the screw rotates without moving."""
+    in a nut, 1 where the screw rotates without moving.
+
+    Examples
+    --------
+    >>> from rft.meshes import Screw, Spatial
+    >>> from rft.walking import turning
+    >>> screw = Screw(radius=0.03, core=0.02, pitch=0.06, length=0.2, thickness=0.004)
+    >>> mean = turning(Spatial(xi_n=1e5), screw, height=0.0, slip=[0.2, 0.6], triangles=500)
+    >>> bool(mean.thrust[1] > mean.thrust[0])  # N
+    True
+    """
     slip = real_array("slip", slip)
     require(bool((np.abs(slip) <= 100).all()), "slip must be within +-100", value=slip)
     in_range("height", height, -10.0, 10.0)
@@ -72,7 +82,16 @@ def free_turning(
     medium: Spatial, screw: Screw, height: float, triangles: int = TRIANGLES, angles: int = ANGLES
 ) -> Turning:
     """Return the mean forces of `turning` at the slip without thrust, where nothing pulls the screw and it pulls nothing; nan
-    where that slip is beyond 1."""
+    where that slip is beyond 1.
+
+    Examples
+    --------
+    >>> from rft.meshes import Screw, Spatial
+    >>> from rft.walking import free_turning
+    >>> screw = Screw(radius=0.03, core=0.02, pitch=0.06, length=0.2, thickness=0.004)
+    >>> float(free_turning(Spatial(xi_n=1e5), screw, height=0.0, triangles=500).slip) < 1
+    True
+    """
 
     def forces(slip):
         return turning(medium, screw, height, slip, 1.0, triangles, angles)
@@ -114,6 +133,16 @@ def cruise(
 
     Two equal screws push a craft sideways. It has one balance where it screws forwards and drifts a little, and, if it is
     light, another where it rolls sideways on them; the first is tried first.
+
+    Examples
+    --------
+    >>> from rft.meshes import Screw, Spatial
+    >>> from rft.walking import Screws, cruise
+    >>> screw = Screw(radius=0.03, core=0.02, pitch=0.06, length=0.2, thickness=0.004)
+    >>> craft = Screws(1.0, 0.2, 0.16, 0.04, screw, track=0.12, drop=0.055)
+    >>> motion = cruise(Spatial(xi_n=1e5), craft, triangles=300)
+    >>> round(motion.advance, 3), round(motion.slip, 2)
+    (0.029, 0.52)
     """
     in_range("frequency", frequency, 1e-9, 1e3)
     steady, mirrored = _Steady(medium, craft, frequency, triangles, angles), craft.pair == "mirrored"

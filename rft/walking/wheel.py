@@ -38,6 +38,14 @@ def rolling(
 
     At the hub's height the grains bear the load, in the mean over a turn for a wheel with lugs. radius: m, by default the
     wheel's own. slip: (...,), 0 for pure rolling, 1 for a wheel that rotates without moving, below 0 for braking.
+
+    Examples
+    --------
+    >>> from rft.plates import StressMap, Wheel
+    >>> from rft.walking import rolling
+    >>> wheel = rolling(StressMap(), Wheel(radius=0.05, width=0.03), load=5.0, rate=2.0, slip=[0.0, 0.3])
+    >>> wheel.carried, bool(wheel.pull[1] > wheel.pull[0])
+    (array([ True,  True]), True)
     """
     slip, points = real_array("slip", slip), wheel.outline(elements)
     radius = getattr(wheel, "radius", None) if radius is None else radius
