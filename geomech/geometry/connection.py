@@ -10,12 +10,14 @@ import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property, partial
+from os import PathLike
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from geomech.core import summary
-from geomech.core.face import Extensible
+from geomech.core.face import implementation
 from geomech.core.work import Map, each
 from geomech.geometry.field import UNKNOWN_UNIT, Field, as_axes, half_grid
 from geomech.geometry.images import Image, images, to_solve
@@ -30,7 +32,7 @@ SAMPLES_TOGETHER = 25_000  # velocities asked for in one call: enough to fill th
 
 
 @dataclass(frozen=True, eq=False)
-class Connection(Extensible):
+class Connection:
     """A connection on a grid: xi = + A alphadot, in the velocity's frame. A: (3, d, N_1, ..., N_d). residual: (3, N_1,
     ..., N_d), rms over the fitted directions of xi - A alphadot for |alphadot| = 1; speed: (3, N_1, ..., N_d), rms of
     xi itself. degree: of the interpolating spline. All are nan at grid points that are singular, or have a neighbour
@@ -61,6 +63,23 @@ class Connection(Extensible):
         singular = summary.masked(self.A.reshape(-1, *self.A.shape[2:]))
         size = f"A {summary.spans(self.A)}; {summary.fit_residual(self.residual, self.speed)}{summary.lengths(**self.size)}"
         return f"Connection({summary.grid(self.axes)}{singular}; {size})"
+
+    def _repr_html_(self) -> str:
+        return implementation("Connection._repr_html_")(self)
+
+    def to_xarray(self, *, shapes: Sequence[str] = ()) -> Any:
+        """Return a Dataset of A, its fit residual and the rms of xi, as in the file of `geomech connection`.
+
+        shapes: names of the shape variables, where these are no joint angles. ImportError without the package xarray."""
+        return implementation("Connection.to_xarray")(self, shapes)
+
+    @staticmethod
+    def load(path: str | PathLike[str], sign: str = "", order: str = "") -> Connection:
+        """Return the connection in a file that `geomech connection` wrote, .nc or .mat, or that sysplotter wrote
+        (`geomech.io.tables`).
+
+        Refusal, one line, for any other. The residual is nan where the file has none."""
+        return implementation("Connection.load")(path, sign, order)
 
     @property
     def size(self) -> dict:
