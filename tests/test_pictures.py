@@ -244,6 +244,15 @@ def band(collection):
     return np.array([[f(y[x == a]) for a in at] for f in (np.min, np.max)])
 
 
+def test_tiers_of_one_amplitude_stand_side_by_side():
+    table = Study(scenes.load("three-link-viscous").with_numerics(grid=9)).study([0.5])
+    ax = plots.displacement(table)
+    points = [line.get_xdata().item() for line in ax.lines if line.get_marker() == "o"]
+    bars = [bar.get_segments()[0][0, 0] for bar in ax.collections]
+    assert len({*points}) == len(points) == sum(tier in table for tier in TIERS) and bars == points
+    assert np.mean(points) == pytest.approx(0.5) and ax.get_xticks().tolist() == [0.5]
+
+
 def test_measurements_are_points_with_bars_of_their_errors():
     table = {"amplitude": [0.5, 1.0], "direct": [[-0.3, 0.4, 0.1], [0.6, 0.8, 9.0]]}
     data = {"amplitude": [0.4, 0.9], "value": [0.1, 0.2], "error": [0.02, 0.03]}
@@ -481,6 +490,16 @@ def test_colours_have_a_limit():
     fig = plots.ccf_figure(field, error=error)
     assert [t.get_text() for legend in fig.legends for t in legend.get_texts()] == [plots.HATCHED]
     assert not any(ax.get_legend() for ax in fig.axes)
+
+
+@pytest.mark.parametrize(("clim", "limit"), [(2.0, 2.0), ("50%", 3.0), (None, 6.0)])
+def test_arrows_end_at_the_limit_of_the_colours(clim, limit):
+    A = np.zeros((3, 2, 5, 5))
+    A[0, 0] = np.array([1.0, 2.0, 3.0, 4.0, 6.0])[:, None]
+    found = Connection((np.linspace(-1, 1, 5),) * 2, A, A[:, 0], A[:, 0])
+    arrows = only(plots.vector_field(found, 0, clim=clim, every=1), Quiver)
+    assert arrows.get_clim() == (0.0, limit)
+    np.testing.assert_allclose(arrows.U.reshape(5, 5), np.minimum(A[0, 0], limit))
 
 
 def test_components_choose_rows_of_the_connection():

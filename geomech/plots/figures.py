@@ -46,11 +46,12 @@ SHADOW = "dashed: the gait, seen along the joints that are held here"
 def connection_figure(
     connection: Connection, *, labels: Labels = ANGLES, style: str = "quiver",
     beside: Connection | None = None, names: Sequence[str] = (), components: Sequence[str] = (),
+    clim: float | str | None = None,
 ) -> Figure:  # fmt: skip
     """Draw the rows of A side by side, but for those that are zero everywhere, as arrows ("quiver") or "streamlines".
 
     beside: the connection in another body frame, drawn below on the same scales. names: of the two frames. components:
-    of WORDS, drawn even where they are zero.
+    of WORDS, drawn even where they are zero. clim: limit of the colours, a number or a percentile as "98%".
 
     Examples
     --------
@@ -65,10 +66,9 @@ def connection_figure(
         0.3 + 3.5 * len(panels), 3.0 + 2.7 * (len(rows) - 1), len(panels), len(rows), layout="compressed"
     )
     for k, component in enumerate(panels):
-        sizes = [largest(np.hypot(*c.A[component])) for c in rows]
-        top = None if beside is None else max(sizes)
+        top = clim if beside is None else max(limit_of(np.hypot(*c.A[component]), clim) for c in rows)
         for c, ax in zip(rows, axes[:, k]):
-            draw(c, component, ax=ax, labels=labels, top=top)
+            draw(c, component, ax=ax, labels=labels, clim=top)
     _name(axes, names)
     say_left_out(fig, panels, components, row_name)
     return fig
@@ -155,7 +155,8 @@ def planes_figure(
 
 @styled
 def plane_connection_figure(
-    planes: Sequence[Plane], *, labels: Labels | None = None, style: str = "quiver", components: Sequence[str] = ()
+    planes: Sequence[Plane], *, labels: Labels | None = None, style: str = "quiver", components: Sequence[str] = (),
+    clim: float | str | None = None,
 ) -> Figure:  # fmt: skip
     """Draw the rows of A of the two joints that move, on planes of shape space, a row for each pair, as `connection_figure`
     does.
@@ -169,7 +170,7 @@ def plane_connection_figure(
     )
     for one, row in zip(planes, axes):
         for component, ax in zip(panels, row):
-            draw(one.connection, component, ax=ax, labels=[labels[k] for k in one.pair])
+            draw(one.connection, component, ax=ax, labels=[labels[k] for k in one.pair], clim=clim)
     _name(axes, [plane_title(one, labels) for one in planes])
     say_left_out(fig, panels, components, row_name)
     return fig

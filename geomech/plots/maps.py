@@ -54,11 +54,12 @@ def vector_field(
     ax: Axes | None = None,
     every: int | None = None,
     labels: Labels = ANGLES,
-    top: float | None = None,
+    clim: float | str | None = None,
 ) -> Axes:
     """Draw row ``component`` of A as arrows over shape space (Fig. 11(c)); colour repeats their length.
 
-    labels: as for `shape_space`. top: of the colours and of the arrows' scale, for maps that are compared.
+    labels: as for `shape_space`. clim: limit of the colours and of the arrows, which are cut there: a number, or a
+    percentile as "98%".
 
     Examples
     --------
@@ -74,10 +75,9 @@ def vector_field(
     size = np.hypot(u, v)
     if not has_row(connection, component):
         u, v, size = 0 * u, 0 * v, 0 * size
-    if np.isnan(size).any():  # beside singular shapes arrows are cut
-        cut = np.fmin(1.0, largest(size) / np.fmax(size, 1e-300))
-        u, v, size = cut * u, cut * v, cut * size
-    most = top or np.nanmax(size, initial=0.0) or 1.0
+    most = limit_of(size, clim)
+    cut = np.fmin(1.0, most / np.fmax(size, 1e-300))  # beside singular shapes, and beyond the limit
+    u, v = cut * u, cut * v
     spacing = step * max(np.ptp(a) / max(1, len(a) - 1) for a in connection.axes)
     look = {"cmap": arrow_colours(), "pivot": "mid", "width": 0.0085, "headwidth": 3.6, "headlength": 4.0}
     look |= {"headaxislength": 3.6, "minshaft": 1.6, "minlength": 0.8, "scale_units": "xy"}
@@ -97,7 +97,8 @@ def arrow_colours() -> ListedColormap:
 def label_row(ax, arrows, component: int, connection: Connection, labels: Labels):
     """Set title, colour bar and axes of a map of a row of A."""
     ax.set_title(f"{row_name(component)}: {TITLES[component]}")
-    colorbar = ax.figure.colorbar(arrows, ax=ax, shrink=0.85)
+    _, most = arrows.get_clim()
+    colorbar = ax.figure.colorbar(arrows, ax=ax, shrink=0.85, extend=extend(arrows.get_array(), most))
     colorbar.set_label(f"|{row_name(component)}| ({unit_of(component, connection.unit)}/{labels[0][1]})", labelpad=8)
     return shape_space(ax, connection.axes, labels)
 

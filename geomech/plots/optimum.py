@@ -11,6 +11,7 @@ from geomech.optimisation.gain import PHASES, limiting
 from geomech.plots.maps import ccf_map, shape_space
 from geomech.plots.stretched import stretched_map
 from geomech.plots.style import axes_of, figure, quantity, styled
+from geomech.studies.effort import units
 from geomech.systems.base import shape_labels
 
 if TYPE_CHECKING:
@@ -61,14 +62,13 @@ def optimum_map(optimum: Optimum, ax: Axes | None = None, clim: float | str | No
 
 @styled
 def stretched_optimum(optimum: Optimum, ax: Axes | None = None, clim: float | str | None = None) -> Axes:
-    """Draw `optimum_map` on shape space redrawn so that equal lengths take equal effort. Refusal for a system without a
+    """Draw `optimum_map` on shape space redrawn so that equal lengths are equal path lengths. Refusal for a system without a
     metric."""
     ax, system, (field, component) = axes_of(ax), optimum.scene.system, optimum.gained
     plane = optimum.stretched
-    effort = "BL" if system.traits.power_degree == 1 else "path length"
-    look = {"labels": shape_labels(system), "effort": effort, "clim": clim}
+    look = {"labels": shape_labels(system), "unit": units(system)["path_length"], "clim": clim}
     stretched_map(field, plane, component, ax=ax, **look)
-    ax.set_title(f"the same, stretched to its effort\n(lengths off by {100 * plane.rms:.2g} % rms)")
+    ax.set_title(f"the same, stretched to path lengths\n(lengths off by {100 * plane.rms:.2g} % rms)")
     low, high = ([a[k] for a in plane.field.axes] for k in (0, -1))
     draw_start_and_best(optimum, ax, lambda curve: plane(np.clip(curve, low, high)))
     return ax
