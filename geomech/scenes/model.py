@@ -41,6 +41,11 @@ SWIMMER = {
 class Displayed:
     """The `repr` of a scene: its name and its parts, in a line of readable length."""
 
+    name: str
+    system: System
+    gait: Gait
+    numerics: Numerics
+
     def __repr__(self) -> str:
         return f"Scene({printable(self.name)}: {formatted(self.system, 160)}, {formatted(self.gait, 100)}, {self.numerics!r})"
 

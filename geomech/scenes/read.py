@@ -109,7 +109,7 @@ def load(scene: str | Path) -> Scene | Any:
             instead=f"give a TOML file or one of {', '.join(names)}",
         ) from None
     result = parse(text, str(scene))
-    system = getattr(result, "system", None)
+    system: Any = getattr(result, "system", None)
     for line in getattr(system, "assumed", ()):
         note(f"{system.file}: {line}")
     return result
@@ -144,7 +144,8 @@ def _medium_file(file: str | Path, place: str) -> tuple[Any, tuple[str, ...]]:
 def inputs(scene: Scene | Intruding | WalkerScene) -> list[Path]:
     """Return the files that a scene was read from: its own, unless it is built in or came through a pipe, and those of
     its medium, gait and system, or of an intruder scene's parts."""
-    parts = () if hasattr(scene, "intruder") or hasattr(scene, "robot") else (checked_scene(scene).gait, scene.system)
+    alone = hasattr(scene, "intruder") or hasattr(scene, "robot")
+    parts: tuple = () if alone else ((whole := checked_scene(scene)).gait, whole.system)
     own_file = [] if scene.name in [PIPE, *builtin_names(), *intruder_names(), *walker_names()] else [scene.name]
     return [Path(x) for x in (*own_file, *scene.files, *(getattr(part, "file", None) for part in parts)) if x]
 
