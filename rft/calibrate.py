@@ -84,7 +84,17 @@ class Fit:
     the density of the bed are known; else ``axial_stress`` (Pa, over the projected area) where radius and length are;
     else ``axial_force`` (N, on the whole rod). covariance: (n, n), of the parameters, from the scatter of the forces
     about the law, taken for independent noise. residuals: (2, N), measured minus fitted forces, N. end_caps: e of both
-    ends together (`EndCaps`), 0 without."""
+    ends together (`EndCaps`), 0 without.
+
+    Examples
+    --------
+    >>> from rft.calibrate import fit
+    >>> from rft.drag import rod_drag
+    >>> drag = rod_drag([0, 30, 60, 90], [1.0, 0.9, 0.5, 0.0], [0.0, 1.0, 1.7, 2.0])  # degrees, N
+    >>> found = fit("viscous", drag)
+    >>> found.names, found.values.round(2), found.residuals.shape
+    (('ratio', 'axial_force'), array([1.96, 1.01]), (2, 4))
+    """
 
     law: str
     data: RodDrag

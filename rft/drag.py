@@ -56,7 +56,15 @@ class RodDrag:
     """Forces on the whole rod, positive where they oppose the velocity.
 
     psi: (N,), attack angles, rad, from 0 to pi/2. forces: (2, N), along and across the rod, N. weight: (N,), of the squares
-    of residuals, with mean 1."""
+    of residuals, with mean 1.
+
+    Examples
+    --------
+    >>> from rft.drag import rod_drag
+    >>> drag = rod_drag([0.0, 90.0], [1.0, 0.0], [0.0, 2.0])
+    >>> drag.psi.round(3), drag.forces.shape, drag.weight
+    (array([0.   , 1.571]), (2, 2), array([1., 1.]))
+    """
 
     psi: np.ndarray
     forces: np.ndarray

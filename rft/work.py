@@ -31,7 +31,16 @@ class Work(NamedTuple):
     balance the medium and, where the body has mass, accelerate it; positive where the body works to bend to the left
     (counter-clockwise, tail to head), as muscles on its left side do. The sum of bending_moment d(bend)/dt x length is
     the power, with mass in the mean over a cycle that repeats. slip: (...), mean over the body of the angle between an
-    element's direction and the velocity of its centre, 0 to pi/2 rad."""
+    element's direction and the velocity of its centre, 0 to pi/2 rad.
+
+    Examples
+    --------
+    >>> from rft import Chain, Viscous, body_velocity, work_done
+    >>> motion = Viscous(), Chain(), [0.5, 0.3], [1.0, 0.0]
+    >>> work = work_done(*motion, body_velocity(*motion).xi)
+    >>> work.bending_moment.shape, bool(work.power > 0)
+    ((2,), True)
+    """
 
     power: np.ndarray
     bending_moment: np.ndarray

@@ -187,7 +187,17 @@ def sampled(
     traits: Traits = NOTHING,
     map: Map = each,
 ) -> list[np.ndarray]:
-    """Return what `sampled_at` returns at every shape of a grid; arrays are (..., N_1, ..., N_d)."""
+    """Return what `sampled_at` returns at every shape of a grid; arrays are (..., N_1, ..., N_d).
+
+    Examples
+    --------
+    >>> from geomech.geometry.connection import directions, grid, least_squares, sampled
+    >>> from geomech.scenes import load
+    >>> unit = directions(2, 8)
+    >>> A, residual, speed = sampled(load("three-link-viscous").system.velocity, grid(2, 5), unit, least_squares(unit))
+    >>> A.shape, residual.shape
+    ((3, 2, 5, 5), (3, 5, 5))
+    """
     for a in axes:
         if a.ndim != 1 or len(a) <= degree or not (np.diff(a) > 0).all():
             raise Refusal(f"each axis must be more than {degree} ascending angles, got {a}")
@@ -207,7 +217,18 @@ def sampled_on(
     map: Map = each,
 ) -> list[np.ndarray]:
     """Return what `sampled_at` returns on a mesh of shapes alpha (N_1, ..., d); arrays are (..., N_1, ...), nan where
-    shapes are singular."""
+    shapes are singular.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.geometry.connection import directions, least_squares, sampled_on
+    >>> from geomech.scenes import load
+    >>> unit, alpha = directions(2, 8), np.zeros((3, 4, 2))
+    >>> A, residual, speed = sampled_on(load("three-link-viscous").system.velocity, alpha, unit, least_squares(unit))
+    >>> A.shape, residual.shape
+    ((3, 2, 3, 4), (3, 3, 4))
+    """
     flat, shape = alpha.reshape(-1, alpha.shape[-1]), alpha.shape[:-1]
     fields = sampled_at(velocity, flat, unit, reduce, progress, symmetries, singularity is not None, map)
     fields = [x.reshape(*x.shape[:-1], *shape) for x in fields]
@@ -231,7 +252,19 @@ def sampled_at(
     alphadot.
 
     ``reduce`` takes xi (s, C, 3) at some shapes and returns arrays (..., s). symmetries: images of shapes among
-    themselves, of which one is solved. masked: xi may be nan. map: as the builtin, over batches of shapes."""
+    themselves, of which one is solved. masked: xi may be nan. map: as the builtin, over batches of shapes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.geometry.connection import directions, least_squares, sampled_at
+    >>> from geomech.scenes import load
+    >>> unit = directions(2, 8)
+    >>> velocity = load("three-link-viscous").system.velocity
+    >>> A, residual, speed = sampled_at(velocity, np.zeros((1, 2)), unit, least_squares(unit))
+    >>> A.shape, residual.shape
+    ((3, 2, 1), (3, 1))
+    """
     solved = to_solve(symmetries, len(alpha))
     to_compute = np.flatnonzero(solved)
     step = max(1, SAMPLES_TOGETHER // len(unit))
@@ -391,7 +424,17 @@ def connection_function(
 
 def least_squares(unit: np.ndarray) -> Callable:
     """Return a ``reduce`` of `sampled_at`: the A (3, d, s) that fits best, and the rms (3, s) of its residual and of
-    xi."""
+    xi.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.geometry.connection import directions, least_squares
+    >>> unit = directions(2, 8)
+    >>> A, residual, speed = least_squares(unit)((unit @ np.array([[1.0, 0.0, 2.0], [0.0, 3.0, 0.0]]))[None])
+    >>> round(float(A[1, 1, 0]), 6)  # of xi_y = 3 alphadot_2
+    3.0
+    """
     inverse = np.linalg.pinv(unit)
 
     def reduce(xi):

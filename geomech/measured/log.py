@@ -39,7 +39,20 @@ class Log:
 
     name: of the file. t: (N,), ascending. alpha: (N, d), rad, and the heading have no jumps by a full turn. pose: (N,
     3), x, y, heading. joints: names of their columns. lines: (N,), line of each row in the file. seconds: t is a time.
-    metres: x and y are in m, by the names of their columns."""
+    metres: x and y are in m, by the names of their columns.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from geomech.gaits import Circle
+    >>> from geomech.measured import read, synthetic
+    >>> from geomech.scenes import load
+    >>> velocity = load("three-link-viscous").system.velocity
+    >>> file = pathlib.Path(tempfile.mkdtemp()) / "log.csv"
+    >>> synthetic.save(file, synthetic.made(velocity, Circle(0.8), cycles=5))
+    >>> read(file).alpha.shape  # rad
+    (301, 2)
+    """
 
     name: str
     t: np.ndarray

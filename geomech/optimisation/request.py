@@ -48,7 +48,16 @@ DEGREES = 1e-3  # largest scatter of the degree of the power
 
 @dataclass(frozen=True)
 class Request:
-    """A scene, an objective, and the loops that are searched; built by `checked`."""
+    """A scene, an objective, and the loops that are searched; built by `checked`.
+
+    Examples
+    --------
+    >>> from geomech.optimisation import checked
+    >>> from geomech.scenes import load
+    >>> request = checked(load("three-link-viscous"), "displacement", harmonics=2)
+    >>> request.starts, request.scene.system.joints
+    (1, 2)
+    """
 
     scene: Scene
     objective: Objective

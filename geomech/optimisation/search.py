@@ -76,7 +76,16 @@ def optimise(
 
 
 def search(request: Request, progress: Callable | None = None) -> Optimum:
-    """Return the result of `optimise` for a checked request."""
+    """Return the result of `optimise` for a checked request.
+
+    Examples
+    --------
+    >>> from geomech.optimisation import checked, search
+    >>> from geomech.scenes import load
+    >>> found = search(checked(load("three-link-viscous"), "efficiency", harmonics=1, starts=1))
+    >>> round(found.value, 3)  # displacement over path length
+    0.11
+    """
     check_fit_options(1, progress)
     with located(request.scene.name):
         return _Search(request, progress).optimum()

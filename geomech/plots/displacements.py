@@ -139,7 +139,15 @@ def displacement_figure(
 
     system: whose symmetry makes quantities zero; that of the tables' scene if left out. components: of PANELS, drawn even where
     they are zero; all of them if left out. data: measurements of the first gait, drawn as `displacement` does on the first of
-    the components, else on x."""
+    the components, else on x.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> from geomech.plots import displacement_figure
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> fig = displacement_figure({"circle": study.displacement([0.5, 1.0])}, [study.scene.gait])
+    """
     wanted = [PANELS[choose("component", name, PANELS)] for name in components]
     zero = [{} if wanted else _zeros(table, gait, system) for table, gait in zip(tables.values(), gaits)]
     if data is not None and not wanted:

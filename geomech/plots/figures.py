@@ -142,7 +142,14 @@ def planes_figure(
 
     gait: of all joints; where it leaves the plane it is dashed, as it is seen along the fixed joints, and has no area. labels:
     (name, unit) of all shape variables. beside: the plane of a single pair in another body frame, below on the same scales.
-    names: of the two frames. components, clim: as for `ccf_figure`."""
+    names: of the two frames. components, clim: as for `ccf_figure`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("seven-link-wave", grid=7)
+    >>> fig = geomech.plots.planes_figure([study.plane((0, 5))], study.scene.gait)
+    """
     labels, rows = labels or _angles(planes), []
     for one in [*planes, *([] if beside is None else [beside])]:
         seen = [] if gait is None else [ProjectedGait(gait, one)]
@@ -161,7 +168,14 @@ def plane_connection_figure(
     """Draw the rows of A of the two joints that move, on planes of shape space, a row for each pair, as `connection_figure`
     does.
 
-    labels: as for `planes_figure`."""
+    labels: as for `planes_figure`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("seven-link-wave", grid=7)
+    >>> fig = geomech.plots.plane_connection_figure([study.plane((0, 5))])
+    """
     draw = CONNECTION_STYLES[choose("style", style, CONNECTION_STYLES)]
     labels = labels or _angles(planes)
     panels = panels_of(components, [[has_row(one.connection, k) for k in range(3)] for one in planes])

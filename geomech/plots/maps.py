@@ -38,7 +38,15 @@ FINEST = 400  # grid points along an axis of a map: about the dots of its pictur
 
 
 def shape_space(ax: Axes, axes: Sequence[np.ndarray], labels: Labels = ANGLES) -> Axes:
-    """Label a plane of two shape variables and set it to the grid. labels: (name, unit) of each."""
+    """Label a plane of two shape variables and set it to the grid. labels: (name, unit) of each.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.plots import figure, shape_space
+    >>> fig, axes = figure(3.0, 3.0)
+    >>> ax = shape_space(axes[0, 0], [np.linspace(-1, 1, 5)] * 2)
+    """
     ax.set(
         xlabel=quantity(*labels[0]), ylabel=quantity(*labels[1]), aspect="equal",
         xlim=(axes[0][0], axes[0][-1]), ylim=(axes[1][0], axes[1][-1]),
@@ -205,7 +213,15 @@ def ccf_label(component: int, unit: str, labels: Labels) -> str:
 
 def indicatrices(metric: Metric | Finsler, ax: Axes, axes: Sequence[np.ndarray], count: int = 7) -> Any:
     """Draw rings around ``count`` x ``count`` shapes: rates that take the same effort, so that a ring is long in directions in
-    which shape changes cheaply. All have one scale. Return a handle for the legend."""
+    which shape changes cheaply. All have one scale. Return a handle for the legend.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> from geomech.plots import ccf_map, indicatrices
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> rings = indicatrices(study.metric, ccf_map(study.ccf()), study.ccf().axes)
+    """
     from matplotlib.lines import Line2D
 
     spots = [a[0] + np.ptp(a) * (np.arange(count) + 0.5) / count for a in axes]
@@ -280,7 +296,15 @@ def unknown(values: np.ndarray, error: np.ndarray) -> np.ndarray:
 
 def largest(values: np.ndarray) -> float:
     """Return the largest of magnitudes, for a scale; next to singular shapes, where they have no bound, of nine tenths of
-    them."""
+    them.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.plots import largest
+    >>> largest(np.array([0.5, -2.0, 1.0]))
+    2.0
+    """
     size = np.abs(values[np.isfinite(values)])
     if not size.size:
         return 1.0

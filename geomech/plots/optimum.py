@@ -103,7 +103,13 @@ def draw_limited(ax, curve: np.ndarray, kinds: np.ndarray, nonlinear: bool = Fal
 
 @styled
 def optimum_angles(optimum: Optimum, ax: Axes | None = None) -> Axes:
-    """Draw the shape variables of the best gait over a cycle, and the limits."""
+    """Draw the shape variables of the best gait over a cycle, and the limits.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> ax = geomech.plots.optimum_angles(geomech.optimise("three-link-viscous", harmonics=1, starts=1))
+    """
     ax, gait = axes_of(ax, 4.0, 3.4), optimum.gait
     t = np.linspace(0, 2 * np.pi, PHASES)
     names = shape_labels(optimum.scene.system)

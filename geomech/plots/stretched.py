@@ -43,7 +43,17 @@ def stretched_map(
     adds to the displacement, and the length of a gait is its path length. Lines of constant shape variables are thin, and
     thick at 0.
 
-    unit: of path length. clim: as for `ccf_figure`, of the values per area there. Other arguments as for `ccf_map`."""
+    unit: of path length. clim: as for `ccf_figure`, of the values per area there. Other arguments as for `ccf_map`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> from geomech.geometry.stretch import stretch
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> ax = geomech.plots.stretched_map(study.ccf(), stretch(study.metric), gaits=[study.scene.gait])
+    >>> ax.get_xlabel()
+    'path length (BL)'
+    """
     from cmcrameri import cm
 
     ax, values = axes_of(ax), stretch.density(Field(field.axes, field.values[component], field.degree))
@@ -115,7 +125,15 @@ def stretched_figure(
     field: Field, stretch: Stretch, gaits: Sequence[Gait] = (), *, error: Field | None = None,
     labels: Labels = ANGLES, unit: str = "BL", components: Sequence[str] = (), clim: float | str | None = None,
 ) -> Figure:  # fmt: skip
-    """Draw the components side by side, with the errors of length of the plane. components, clim: as for `ccf_figure`."""
+    """Draw the components side by side, with the errors of length of the plane. components, clim: as for `ccf_figure`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> from geomech.geometry.stretch import stretch
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> fig = geomech.plots.stretched_figure(study.ccf(), stretch(study.metric), components=["x"])
+    """
     panels = panels_of(components, [[has(field, k) for k in range(3)]])
     fig, axes = figure(0.3 + 3.7 * len(panels), 3.5, len(panels), layout="compressed")
     look = {"error": error, "labels": labels, "unit": unit, "clim": clim}

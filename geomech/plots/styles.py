@@ -170,7 +170,13 @@ def ccf_surface(
     """Draw a component of the CCF as a surface over shape space, with gaits on it and, on the plane below, their areas shaded
     by sign as in `ccf_contours`.
 
-    ax: of projection "3d"; without it one of a new figure."""
+    ax: of projection "3d"; without it one of a new figure.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> ax = geomech.plots.ccf_surface(geomech.study("three-link-viscous", grid=15).ccf(), 0)
+    """
     from cmcrameri import cm
 
     from geomech.plots.style import blank

@@ -118,7 +118,18 @@ def load(scene: str | Path) -> Scene | Any:
 def in_medium(scene: Scene, file: str | Path) -> Scene:
     """Return the scene in another medium, from a file as ``[medium] file`` takes it, or a table of drag if its name
     ends in .csv; relative to the current folder. Refusal if the file has no medium, or the scene's system takes
-    none."""
+    none.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import geomech
+    >>> from geomech.scenes import in_medium, load
+    >>> file = pathlib.Path(tempfile.mkdtemp()) / "sand.toml"
+    >>> geomech.fit_medium("dem-rod-drag").save(file)
+    >>> round(in_medium(load("three-link-glass"), file).system.medium.C, 2)
+    1.49
+    """
     if not isinstance(scene.system, Swimmer):
         raise Refusal(f"a {kind_of(scene.system)} takes no medium", where=scene.name)
     medium, files = _medium_file(file, scene.name)
@@ -143,7 +154,14 @@ def _medium_file(file: str | Path, place: str) -> tuple[Any, tuple[str, ...]]:
 
 def inputs(scene: Scene | Intruding | WalkerScene) -> list[Path]:
     """Return the files that a scene was read from: its own, unless it is built in or came through a pipe, and those of
-    its medium, gait and system, or of an intruder scene's parts."""
+    its medium, gait and system, or of an intruder scene's parts.
+
+    Examples
+    --------
+    >>> from geomech.scenes import inputs, load
+    >>> inputs(load("three-link-glass"))  # of a built-in scene there are none
+    []
+    """
     alone = hasattr(scene, "intruder") or hasattr(scene, "robot")
     parts: tuple = () if alone else ((whole := checked_scene(scene)).gait, whole.system)
     own_file = [] if scene.name in [PIPE, *builtin_names(), *intruder_names(), *walker_names()] else [scene.name]

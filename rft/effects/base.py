@@ -63,6 +63,12 @@ class Effect:
     memory_size : numbers that time stepping stores for each sample, beside a few for each element.
     varies_along : whether the effect varies along an element; it then acts by its mean over each piece of an element.
     odd : whether the loads that it adds change sign with all velocities (assumed, not proven).
+
+    Examples
+    --------
+    >>> from rft.effects import Effect, SkinFriction
+    >>> isinstance(SkinFriction(), Effect), SkinFriction().kind
+    (True, 'skin-friction')
     """
 
     kind = "effect"

@@ -30,7 +30,14 @@ class Ground(NamedTuple):
     speed v bears v / sqrt(v^2 + rounding^2) times the stress of the law, which jumps at rest. grazing_sine: sine of the
     grazing angle, over which a face begins to lead; 0 for a jump. downhill_loss: share of the strength that motion
     along +x loses, or along -x where it is negative. disturbed: (G, 2 + P), one row for each effect: radius, m, weakening, and
-    places x, m; places at infinity fill short rows up."""
+    places x, m; places at infinity fill short rows up.
+
+    Examples
+    --------
+    >>> from rft.ground import Ground
+    >>> Ground(strength=0.6).strength
+    0.6
+    """
 
     strength: float = 1.0
     flux: float = 0.0
@@ -84,6 +91,12 @@ class GroundEffect:
 
     kind: name of the effect in scenes and messages. breaks: premises of the plain law that the effect breaks. walks:
     whether robots can walk on such ground.
+
+    Examples
+    --------
+    >>> from rft.ground import Aeration, GroundEffect
+    >>> isinstance(Aeration(0.1, 0.25), GroundEffect)
+    True
     """
 
     kind = "effect"

@@ -33,7 +33,22 @@ class Medium(Protocol):
     covariance: (n, n), of the parameters named in ``uncertain``; it changes no force.
 
     A law runs in compiled code if its traction, and its slopes if it has them, are formulas (`rft.vectors.formula`) of
-    its number fields."""
+    its number fields.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> from rft import Chain, body_velocity
+    >>> @dataclass(frozen=True)
+    ... class Drag:
+    ...     ratio: float = 2.0
+    ...
+    ...     def traction(self, v_t, v_n, eps=0.0):
+    ...         return v_t, self.ratio * v_n
+    ...
+    >>> body_velocity(Drag(), Chain(), [0.5, 0.3], [1.0, 0.0]).xi.round(4)  # as by Viscous(2)
+    array([-0.0014, -0.0035, -0.0817])
+    """
 
     def traction(self, v_t: Any, v_n: Any, rounding: Any = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the drag per unit length (f_t, f_n) opposing the velocity (v_t, v_n); arrays broadcast together."""
@@ -69,7 +84,15 @@ def terms_slopes(law, v_t, v_n, rounding):
 
 
 class TermLaw:
-    """Base of laws that are a sum of dry and viscous terms: `traction` follows from the terms."""
+    """Base of laws that are a sum of dry and viscous terms: `traction` follows from the terms.
+
+    Examples
+    --------
+    >>> from rft import Granular
+    >>> from rft.laws import TermLaw
+    >>> isinstance(Granular(1.8, 0.24), TermLaw), len(Granular(1.8, 0.24).dry)
+    (True, 2)
+    """
 
     dry: tuple[tuple[float, float, float], ...] = ()
     viscous: tuple[float, float] = (0.0, 0.0)

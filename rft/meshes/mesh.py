@@ -146,7 +146,17 @@ class Mesh:
 
 def below(corners: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the parts of triangles (T, 3, 3) below the surface, from the corners' heights (T, 3): triangles (P, 3, 3), and
-    the index (P,) of the triangle that each is a part of. A triangle that crosses the surface has one part or two."""
+    the index (P,) of the triangle that each is a part of. A triangle that crosses the surface has one part or two.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft.meshes import below
+    >>> corners = np.array([[[0.0, 0.0, 0.01], [0.01, 0.0, -0.01], [0.0, 0.01, -0.01]]])
+    >>> triangles, index = below(corners, corners[..., 2])
+    >>> triangles.shape, index  # one triangle, cut at the surface
+    ((2, 3, 3), array([0, 0]))
+    """
     under = heights < 0
     count = under.sum(-1)
     full, tips, pairs = (np.flatnonzero(count == k) for k in (3, 1, 2))

@@ -31,7 +31,17 @@ Angle = Annotated[float, Number(-1e3, 1e3, "rad", "angle about the axis, from th
 class Trajectory(NamedTuple):
     """A motion in time, in the world. t: (T,), s. place: (T, 3), of the origin, m. rotation: (T, 3, 3). velocity: (T, 3), of
     the origin, m/s. spin: (T, 3), angular velocity, rad/s. angle: (T,), rad, of a body that rotates about one axis, else
-    0."""
+    0.
+
+    Examples
+    --------
+    >>> from rft.meshes import Drag, Sphere
+    >>> motion = Drag(depth=0.05, distance=0.1, samples=3).trajectory(Sphere(0.02).mesh(80))
+    >>> motion.place, motion.spin.shape
+    (array([[ 0.  ,  0.  , -0.05],
+           [ 0.05,  0.  , -0.05],
+           [ 0.1 ,  0.  , -0.05]]), (3, 3))
+    """
 
     t: np.ndarray
     place: np.ndarray

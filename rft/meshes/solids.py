@@ -23,7 +23,14 @@ MOST_TURNS = 100  # of a thread: more turns need more than `MOST_TRIANGLES` tria
 
 
 class Solid:
-    """Base of bodies that have a mesh."""
+    """Base of bodies that have a mesh.
+
+    Examples
+    --------
+    >>> from rft.meshes import Solid, Sphere
+    >>> isinstance(Sphere(0.02), Solid)
+    True
+    """
 
     def __post_init__(self):
         check_numbers(self)

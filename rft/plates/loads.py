@@ -27,7 +27,16 @@ CHUNK = 50_000  # elements times motions that are computed at once, for memory
 
 
 class Loads(NamedTuple):
-    """Loads of the grains on an outline. force: (..., 2) as (x, z), N. moment: (...,), N m, about the frame's origin."""
+    """Loads of the grains on an outline. force: (..., 2) as (x, z), N. moment: (...,), N m, about the frame's origin.
+
+    Examples
+    --------
+    >>> from rft.plates import RoundRod, StressMap, loads
+    >>> rod = RoundRod(radius=0.01, width=0.1).outline(60)
+    >>> found = loads(StressMap(), rod, [0.0, -0.05, 0.0], [0.01, 0.0, 0.0])
+    >>> found.force.shape, bool(found.power([0.01, 0.0, 0.0]) < 0)  # W
+    ((2,), True)
+    """
 
     force: np.ndarray
     moment: np.ndarray

@@ -21,7 +21,15 @@ Angle = Annotated[float, Number(-1e3, 1e3, "rad", "angle at one end of the motio
 
 
 class Trajectory(NamedTuple):
-    """A motion in time. t: (T,), s. pose: (T, 3) as (x, z, angle), m and rad. twist: (T, 3) as (v_x, v_z, rate)."""
+    """A motion in time. t: (T,), s. pose: (T, 3) as (x, z, angle), m and rad. twist: (T, 3) as (v_x, v_z, rate).
+
+    Examples
+    --------
+    >>> from rft.plates import CLeg, Rotate
+    >>> motion = Rotate(hub_height=0.02, samples=5).trajectory(CLeg(0.038, 0.02).outline(24))
+    >>> motion.pose[:, 2].round(3)  # angle, rad
+    array([-3.142, -1.571,  0.   ,  1.571,  3.142])
+    """
 
     t: np.ndarray
     pose: np.ndarray

@@ -25,7 +25,14 @@ HalfLength = Annotated[float, metres("R, half the distance from hip to free end"
 
 
 class Shape:
-    """Base of bodies that have an outline."""
+    """Base of bodies that have an outline.
+
+    Examples
+    --------
+    >>> from rft.plates import Plate, Shape
+    >>> isinstance(Plate(0.04, 0.02), Shape)
+    True
+    """
 
     width: float
 

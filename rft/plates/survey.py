@@ -16,6 +16,13 @@ class Survey:
     beta: (B,), within +-pi/2, and gamma: (G,), within +-pi, rad, midpoints of equal cells. alpha_x, alpha_z, normal,
     power: (B, G), N/cm^3. normal: stress along the leading normal, positive where the grains pull. power: power of the
     stress at unit speed, negative where the grains dissipate, as they should.
+
+    Examples
+    --------
+    >>> from rft.plates import StressMap, survey
+    >>> overview = survey(StressMap(), cells=30)
+    >>> overview.beta.shape, overview.alpha_z.shape
+    ((30,), (30, 60))
     """
 
     beta: np.ndarray

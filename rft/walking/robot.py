@@ -106,6 +106,13 @@ def walking_rounding(rounding: float, frequency, reach):
 class Robot:
     """Base of robots. legs: shape of every leg, which rotates about its axle at a hip. inertia: kg m^2, infinite for a robot
     that keeps its pitch.
+
+    Examples
+    --------
+    >>> from rft.plates import Wheel
+    >>> from rft.walking import Robot, Roller
+    >>> isinstance(Roller(mass=1.0, legs=Wheel(radius=0.05, width=0.03)), Robot)
+    True
     """
 
     mass: float

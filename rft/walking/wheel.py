@@ -20,7 +20,16 @@ ANGLES = 24  # of a turn of a wheel that is not round
 
 class Rolling(NamedTuple):
     """Rolling of a wheel, (...,) for each slip. sinkage: m, of the lowest point. pull: N, of the drawbar, the net force of the
-    grains forwards. torque: N m, of the axle. carried: whether the ground bears the load; where not, the others are nan."""
+    grains forwards. torque: N m, of the axle. carried: whether the ground bears the load; where not, the others are nan.
+
+    Examples
+    --------
+    >>> from rft.plates import StressMap, Wheel
+    >>> from rft.walking import rolling
+    >>> found = rolling(StressMap(), Wheel(radius=0.05, width=0.03), load=5.0, rate=2.0, slip=[0.0, 0.3])
+    >>> found.sinkage.round(4), found.carried  # m
+    (array([0.0088, 0.0115]), array([ True,  True]))
+    """
 
     slip: np.ndarray
     sinkage: np.ndarray
