@@ -78,7 +78,7 @@ def _decades(axis) -> None:
 
 @styled
 def work_precision_figure(results: Mapping) -> Figure:
-    """Draw error against cost of every tier, a panel for each kind of cost; ``results`` as `geomech.accuracy` returns them.
+    """Draw `work_precision` on a figure of its own; ``results`` as `geomech.accuracy` returns them.
 
     Examples
     --------
