@@ -40,6 +40,7 @@ BACK = Fourier(cos=((0.5, 0.3), (0.4, 0.1)), sin=((0.0, 0.0), (0.0, 0.0)))  # th
     (Wave(joints=6), BOTH, ["y", "heading"]),
     (Wave(joints=6, offset=0.1), BOTH, []),
     (Wave(joints=2, waves=0.0), BOTH, ["x", "y", "heading"]),
+    (Fourier(cos=((1, 0.4), (-1, 0.4)), sin=((0, 0.2), (0, 0.2))), dataclasses.replace(BOTH, odd=False), ["heading"]),  # halves
     (BACK, Traits(), ["x", "y", "heading"]),
     (BACK, Traits(odd=False), []),
     (HEAD_FOR_TAIL, Traits(reversible=True), []),  # it turns twice as far as in half a cycle

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from sphinx.util import logging
 
-from . import api, command_line, conventions, examples, figures, keys, validation
+from . import api, command_line, conventions, examples, figures, keys, lab, validation
 
 
 def notebooks() -> str:
@@ -27,6 +27,7 @@ MADE = {
     "commands": command_line.page,
     "figures": figures.page,
     "keys": keys.page,
+    "lab": lab.frame,
     "notebooks": notebooks,
     "thumbnails": examples.thumbnails,
     "validation": validation.table,
@@ -51,6 +52,7 @@ def compute(app) -> None:
         logging.getLogger(__name__).warning(wrong)
     examples.compute_all()
     figures.draw_missing()
+    lab.write()
 
 
 def setup(app) -> dict[str, bool]:

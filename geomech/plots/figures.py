@@ -48,10 +48,12 @@ def connection_figure(
     beside: Connection | None = None, names: Sequence[str] = (), components: Sequence[str] = (),
     clim: float | str | None = None,
 ) -> Figure:  # fmt: skip
-    """Draw the rows of A side by side, but for those that are zero everywhere, as arrows ("quiver") or "streamlines".
+    """Draw the rows of A side by side, but for those that are zero everywhere, as arrows ("quiver") or "streamlines", each row
+    on a scale of its own.
 
     beside: the connection in another body frame, drawn below on the same scales. names: of the two frames. components:
-    of WORDS, drawn even where they are zero. clim: limit of the colours, a number or a percentile as "98%".
+    of WORDS, drawn even where they are zero. clim: top of the scales, a number or a percentile of a row's lengths such as
+    "98%", their largest if left out.
 
     Examples
     --------
@@ -66,9 +68,10 @@ def connection_figure(
         0.3 + 3.5 * len(panels), 3.0 + 2.7 * (len(rows) - 1), len(panels), len(rows), layout="compressed"
     )
     for k, component in enumerate(panels):
-        top = clim if beside is None else max(limit_of(np.hypot(*c.A[component]), clim) for c in rows)
+        tops = [limit_of(np.hypot(*c.A[component]), clim) for c in rows if has_row(c, component)]
+        top = None if beside is None and clim is None else max(tops, default=None)
         for c, ax in zip(rows, axes[:, k]):
-            draw(c, component, ax=ax, labels=labels, clim=top)
+            draw(c, component, ax=ax, labels=labels, top=top)
     _name(axes, names)
     say_left_out(fig, panels, components, row_name)
     return fig
@@ -184,7 +187,8 @@ def plane_connection_figure(
     )
     for one, row in zip(planes, axes):
         for component, ax in zip(panels, row):
-            draw(one.connection, component, ax=ax, labels=[labels[k] for k in one.pair], clim=clim)
+            top = None if clim is None else limit_of(np.hypot(*one.connection.A[component][:2]), clim)
+            draw(one.connection, component, ax=ax, labels=[labels[k] for k in one.pair], top=top)
     _name(axes, [plane_title(one, labels) for one in planes])
     say_left_out(fig, panels, components, row_name)
     return fig
