@@ -1,0 +1,98 @@
+"""A bed of sand under the geoms of a model: its surface, its law, and the elements of the geoms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from rft.ground import Ground
+from rft.meshes.blocks import Blocks
+from rft.meshes.contact import Motion, faces
+from rft.meshes.extruded import Extruded
+from rft.meshes.law import Spatial
+from rft.meshes.mesh import Mesh
+
+FASTEST = 100.0  # m/s, assumed: a geom that is faster is the result of a time step that is too long, and bears nothing
+
+
+@dataclass(frozen=True)
+class Bed:
+    """Sand below the plane up . x = level, and what of a model is in it.
+
+    up, ahead: (3,), unit vectors away from the surface and along it, in the world. geoms, bodies, roots: (G,), numbers of the
+    geoms, their bodies and these bodies' roots. dofs: (G,), the last degree of freedom of each body; parents: (nv,), that of
+    each degree of freedom, -1 for none. spheres: (G, 4), middle of a sphere around each geom in its frame, and radius, m."""
+
+    law: Extruded | Spatial
+    ground: Ground
+    up: np.ndarray
+    ahead: np.ndarray
+    level: float
+    blocks: Blocks
+    geoms: np.ndarray
+    bodies: np.ndarray
+    roots: np.ndarray
+    dofs: np.ndarray
+    parents: np.ndarray
+    spheres: np.ndarray
+
+    @classmethod
+    def under(cls, model: mujoco.MjModel, geoms: list[int], meshes: list[Mesh], law, ground, slope, level) -> Bed:
+        """Return the bed under geoms with these meshes. slope: rad, by which the surface rises along x. level: m, the height
+        of the surface at x = 0."""
+        bodies = np.array([model.geom_bodyid[g] for g in geoms], np.int64)
+        up, ahead = np.array([-np.sin(slope), 0.0, np.cos(slope)]), np.array([np.cos(slope), 0.0, np.sin(slope)])
+        spheres = [_sphere(mesh) for mesh in meshes]
+        blocks = Blocks([faces(m.vertices[m.faces], m.middle_normals) for m in meshes])
+        return cls(
+            law, ground, up, ahead, float(level * up[2]), blocks,
+            np.array(geoms, np.int64), bodies, model.body_rootid[bodies].astype(np.int64),
+            np.array([_last_dof(model, b) for b in bodies], np.int64), model.dof_parentid.astype(np.int64),
+            np.array(spheres),
+        )  # fmt: skip
+
+    def rounded(self, rounding: float) -> Bed:
+        """Return the bed with another rounding, m/s."""
+        return replace(self, ground=self.ground._replace(rounding=rounding))
+
+    def twists(self, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
+        """Return velocities of the geoms' origins, m/s, and angular velocities, rad/s, (G, 3), in the world."""
+        spin, linear = np.split(data.cvel[self.bodies], 2, axis=1)
+        return linear + np.cross(spin, data.geom_xpos[self.geoms] - data.subtree_com[self.roots]), spin
+
+    def wrenches(self, data: mujoco.MjData, velocity=None, spin=None, sunk: float = 0.0) -> np.ndarray:
+        """Return force, N, and moment about the geom's origin, N m, on each geom, (G, 6), in the world.
+
+        velocity, spin: (G, 3), by default those of the data. sunk: m, by which all geoms lie deeper than in the data."""
+        if velocity is None:
+            velocity, spin = self.twists(data)
+        turn, place = data.geom_xmat[self.geoms].reshape(-1, 3, 3), data.geom_xpos[self.geoms]
+        along_axes = lambda x: np.einsum("gij,gi->gj", turn, np.broadcast_to(x, place.shape))[:, None]
+        motions = Motion(
+            along_axes(velocity), along_axes(spin), (place @ self.ahead)[:, None], along_axes(self.up),
+            along_axes(self.ahead), (place @ self.up - self.level - sunk)[:, None],
+        )  # fmt: skip
+        loads = self.blocks.loads(self.law, self.ground, motions)[:, 0].reshape(-1, 2, 3)
+        return np.einsum("gij,gpj->gpi", turn, loads).reshape(-1, 6)
+
+    def add_forces(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Add the forces of the grains to qfrc_passive."""
+        for wrench, geom, body in zip(self.wrenches(data), self.geoms, self.bodies):
+            if wrench.any():
+                place = data.geom_xpos[geom]
+                mujoco.mj_applyFT(model, data, wrench[:3], wrench[3:], place, body, data.qfrc_passive)
+
+
+def _last_dof(model: mujoco.MjModel, body: int) -> int:
+    """Return the last degree of freedom that moves a body, its own or that of the body it is welded to; -1 for none."""
+    while body and not model.body_dofnum[body]:
+        body = model.body_parentid[body]
+    return int(model.body_dofadr[body] + model.body_dofnum[body] - 1) if body else -1
+
+
+def _sphere(mesh: Mesh) -> list[float]:
+    """Return the middle and the radius, m, of a sphere around a mesh."""
+    middle = (mesh.vertices.max(0) + mesh.vertices.min(0)) / 2
+    return [*middle, np.linalg.norm(mesh.vertices - middle, axis=1).max()]
