@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import fnmatch
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import mujoco
 import numpy as np
@@ -16,6 +16,7 @@ from rft.meshes.smooth import smooth
 from rft.refusal import Refusal, formatted, require
 
 MOST_FACES = 20_000  # of a geom's mesh
+MOST_ELEMENTS = 100_000  # of a geom
 ALONG_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # rows of vectors times this: from y to z
 ICOSAHEDRON = 1.0515  # edge of an icosahedron over its radius
 FEWEST_AROUND = 8  # edges around round geoms
@@ -45,25 +46,36 @@ def mesh_of_elements(model: mujoco.MjModel, geom: int, length: float) -> Mesh:
     """Return the mesh of a geom in its own frame, of triangles with edges of about ``length``, m; the triangles of a mesh
     geom are cut in four until they are that small."""
     kind, size = geom_kind(model, geom), np.array(model.geom_size[geom])
-    pieces = lambda x, fewest=1: int(np.clip(math.ceil(x / length - 1e-9), fewest, 512))
-    around = pieces(2 * math.pi * size[0], FEWEST_AROUND)
+    pieces = lambda x, fewest=1: int(np.clip(math.ceil(x / length - 1e-9), fewest, 4096))
+    around, across = pieces(2 * math.pi * size[0], FEWEST_AROUND), pieces(size[0])
     if kind == "box":
-        mesh = shapes.box(2 * size, [pieces(2 * x) for x in size])
-    elif kind == "capsule":
-        mesh = smooth(shapes.capsule(size[0], size[1], around, pieces(2 * size[1])))
-    elif kind == "cylinder":
-        rod = shapes.cylinder(size[0], 2 * size[1], around, pieces(2 * size[1]), pieces(size[0]))
-        mesh = smooth(Mesh(rod.vertices @ ALONG_Z, rod.faces))
-    elif kind == "mesh":
+        a, b, c = (pieces(2 * x) for x in size)
+        _require_few(4 * (a * b + b * c + c * a))
+        return shapes.box(2 * size, (a, b, c))
+    if kind == "capsule":
+        _require_few(2 * around * (pieces(2 * size[1]) + around // 2))
+        return smooth(shapes.capsule(size[0], size[1], around, pieces(2 * size[1])))
+    if kind == "cylinder":
+        _require_few(2 * around * (pieces(2 * size[1]) + 2 * across))
+        rod = shapes.cylinder(size[0], 2 * size[1], around, pieces(2 * size[1]), across)
+        return smooth(Mesh(rod.vertices @ ALONG_Z, rod.faces))
+    if kind == "mesh":
         mesh = smooth(_model_mesh(model, int(model.geom_dataid[geom])))
-        while _longest_edge(mesh) > 1.5 * length and 4 * len(mesh.faces) <= MOST_FACES:
+        while _longest_edge(mesh) > 1.5 * length:
+            _require_few(4 * len(mesh.faces))
             mesh = quartered(mesh)
-    else:
-        radii = size if kind == "ellipsoid" else size[[0, 0, 0]]
-        ball = shapes.sphere(1.0, int(np.clip(round(math.log2(ICOSAHEDRON * radii.max() / length)), 1, 5)))
-        mesh = smooth(Mesh(ball.vertices * radii, ball.faces))
-    require(len(mesh.faces) <= MOST_FACES, f"{len(mesh.faces)} elements are more than {MOST_FACES}")
-    return mesh
+        return mesh
+    radii = size if kind == "ellipsoid" else size[[0, 0, 0]]
+    fineness = max(1, round(math.log2(ICOSAHEDRON * radii.max() / length)))
+    _require_few(20 * 4**fineness)
+    ball = shapes.sphere(1.0, fineness)
+    return smooth(Mesh(ball.vertices * radii, ball.faces))
+
+
+def _require_few(count: int) -> None:
+    """Raise Refusal for more elements than a geom may have."""
+    what = f"the geom has {count} elements, more than {MOST_ELEMENTS}"
+    require(count <= MOST_ELEMENTS, what, instead="make ``element`` longer")
 
 
 def _longest_edge(mesh: Mesh) -> float:
@@ -101,7 +113,9 @@ def chosen_geoms(model: mujoco.MjModel, geoms: str | int | Sequence[str | int] |
         require(len(able) > 0, "the model has no geom that moves and has an inside", instead="give it joints")
         return able
     found: list[int] = []
-    for one in [geoms] if isinstance(geoms, str | int) else list(geoms):
+    given = [geoms] if isinstance(geoms, str | int) else geoms
+    require(isinstance(given, Iterable), "``geoms`` must be names, patterns or groups", value=geoms)
+    for one in given:
         found += [g for g in _matching(model, one) if g not in found]
     require(len(found) > 0, "``geoms`` names none", value=geoms)
     for geom in found:

@@ -18,6 +18,7 @@ import numpy as np
 
 from rft.balance.backend import Note, compiles
 from rft.meshes.contact import record
+from rft.mujoco.addresses import Arrays, offsets
 from rft.mujoco.bed import FASTEST, Bed
 from rft.refusal import require
 
@@ -38,9 +39,10 @@ class Layout(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """A bed in a row of the table. address: of its model."""
+    """A bed in a row of the table. address: of its model. sizes: nv, ngeom and nbody of the model."""
 
     address: int
+    sizes: tuple[int, int, int]
     bed: Bed
     layout: Layout | None
 
@@ -60,7 +62,7 @@ def install(model: mujoco.MjModel, bed: Bed) -> int:
         used = [k for k in range(ROWS) if TABLE[k, 0] in (0, REMOVED)]
         require(len(used) > 0, f"{ROWS} beds of sand are in use", instead="detach some")
         row = used[0]
-        _entries[row] = Entry(model._address, bed, layout)
+        _entries[row] = Entry(model._address, (model.nv, model.ngeom, model.nbody), bed, layout)
         if layout:
             from rft.mujoco.compiled import kernel
 
@@ -134,12 +136,14 @@ def _compiled_callback() -> list:
     return [code.ctypes, code]
 
 
-def _by_python(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Add the forces of all beds under a model, without numba. A fault detaches its bed and is told in one line."""
+@ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
+def _by_python(model: int, data: int) -> None:
+    """Add the forces of all beds under the model at an address, without numba. A fault detaches its bed and is told in one
+    line. MuJoCo's own callbacks of Python let no other model be compiled; this one, of addresses alone, does."""
     for row, entry in [*_entries.items()]:
-        if entry.address == model._address:
+        if entry.address == model:
             try:
-                entry.bed.add_forces(model, data)
+                entry.bed.add_forces(Arrays.at(data, *entry.sizes))
             except Exception as error:
                 remove(row)
                 warnings.warn(f"the sand is detached: {type(error).__name__}: {error}", Note, stacklevel=2)
@@ -154,7 +158,6 @@ def _tell_too_fast(_data, _layout) -> None:
 
 def layout_of(model: mujoco.MjModel, bed: Bed) -> Layout:
     """Return the layout of a bed under a model, in the order in which `rft.mujoco.compiled.kernel` reads it."""
-    from rft.mujoco.addresses import offsets
     from rft.mujoco.compiled import kernel
 
     law = record(bed.law)

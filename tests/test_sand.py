@@ -1,0 +1,438 @@
+"""Sand under MuJoCo models: forces, virtual work, symmetries, steps, threads, lifetimes and refusals."""
+
+import gc
+import math
+import threading
+import warnings
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import rft
+from rft.balance.backend import Note, preferring
+from rft.ground import GrainInertia, Ground, Slope
+from rft.meshes import Spatial, wrench
+from rft.meshes.blocks import Blocks
+from rft.meshes.contact import Motion, faces
+from rft.meshes.extruded import Extruded
+from rft.plates import VERTICAL, PlateDrags, RoundRod, StressMap, loads
+
+mujoco = pytest.importorskip("mujoco", reason="needs the extra: pip install 'geomech[mujoco]'")
+from rft.mujoco import installed  # noqa: E402
+from rft.mujoco.geoms import mesh_of_elements  # noqa: E402
+from rft.mujoco.sand import law_of, meshes  # noqa: E402
+from rft.mujoco.steps import asked_rounding  # noqa: E402
+
+SPATIAL = Spatial(3e5, surface_friction=0.6, grazing=math.radians(5))
+MAP = StressMap(zeta=0.3, grazing=math.radians(5))
+GEOMS = (
+    'type="box" size="0.05 0.03 0.02"',
+    'type="capsule" size="0.02 0.04"',
+    'type="cylinder" size="0.03 0.04"',
+    'type="sphere" size="0.04"',
+    'type="ellipsoid" size="0.05 0.03 0.02"',
+    'type="mesh" mesh="wedge"',
+)
+ASSET = '<asset><mesh name="wedge" vertex="0 0 0 .06 0 0 0 .04 0 0 0 .1"/></asset>'
+
+
+pytestmark = pytest.mark.usefixtures("fastest")
+
+
+@pytest.fixture(autouse=True)
+def no_callback_remains():
+    """Every test leaves MuJoCo without a callback, and notes are no errors but where a test looks for them."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Note)
+        yield
+        gc.collect()
+        assert mujoco.get_mjcb_passive() is None and not installed._entries
+
+
+def model_of(body, options="", more=""):
+    return mujoco.MjModel.from_xml_string(f"<mujoco>{options}{ASSET}<worldbody>{body}</worldbody>{more}</mujoco>")
+
+
+def chain(rng, joints, links=5):
+    """A branching chain of links with random places, joints and geoms, hinges and slides two on a body at times."""
+    numbers = lambda n, size: " ".join(f"{x:.4f}" for x in size * rng.normal(size=n))
+    joint = lambda k: f'<joint type="{k}" axis="{numbers(3, 1.0)}" pos="{numbers(3, 0.02)}"/>' if k else ""
+    text = ""
+    for k in range(links):
+        kind = joints[k % len(joints)]
+        own = (
+            "".join(map(joint, kind)) if isinstance(kind, tuple) else "<freejoint/>" if kind == "free" else joint(kind)
+        )
+        geom = f'<geom name="g{k}" {GEOMS[k % len(GEOMS)]} pos="{numbers(3, 0.02)}" euler="{numbers(3, 60)}"/>'
+        text += f'<body name="b{k}" pos="{numbers(3, 0.05)}" euler="{numbers(3, 60)}">{own}{geom}'
+        text += "</body>" if k == 2 else ""
+    return text + "</body>" * (links - 1)
+
+
+CHAINS = {
+    "free root": ("free", "ball", "", ("hinge", "slide"), "hinge"),
+    "fixed root": ("hinge", "", ("slide", "slide", "hinge"), "ball", ""),
+    "welded to the world": ("", "ball", "slide", "hinge", "hinge"),
+}
+
+
+@pytest.mark.parametrize("law", [SPATIAL, MAP])
+@pytest.mark.parametrize("name", CHAINS)
+def test_forces_are_those_of_the_meshes_and_do_their_virtual_work(name, law, solved_by):
+    """Of random motions of chains: each geom against the force on its mesh alone, qfrc_passive against mj_applyFT."""
+    rng = np.random.default_rng(len(name))
+    model = model_of(chain(rng, CHAINS[name]), '<option gravity="0 0 0"/>')
+    data, plain = mujoco.MjData(model), mujoco.MjData(model)
+    effects = (GrainInertia(0.5, 300.0),)
+    with rft.mujoco.attach(model, law, element=0.02, slope=0.2, effects=effects) as sand:
+        cut = meshes(model, sand._bed.geoms, 0.02)
+        for _ in range(3):
+            data.qpos[:] += 0.3 * rng.normal(size=model.nq)
+            data.qvel[:] = rng.normal(size=model.nv)
+            mujoco.mj_normalizeQuat(model, data.qpos)
+            mujoco.mj_forward(model, data)
+            found, expected, work = sand.forces(data), np.zeros((len(cut), 3)), np.zeros(model.nv)
+            for k, (geom, body, mesh) in enumerate(zip(sand._bed.geoms, sand._bed.bodies, cut)):
+                motion = np.zeros(6)
+                mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_GEOM, geom, motion, 0)
+                force, moment = on_mesh(law, mesh, data, geom, motion, Slope(0.2), effects, sand.rounding)
+                expected[k] = force
+                mujoco.mj_applyFT(model, data, force, moment, data.geom_xpos[geom], body, work)
+            assert np.abs(expected).max() > 0.1
+            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+            np.testing.assert_allclose(data.qfrc_passive, work, rtol=0, atol=1e-12 * np.abs(work).max())
+            power = float(work @ data.qvel)
+            assert sand.power(data) == pytest.approx(power, abs=1e-11 * abs(power)) and power < 0
+    plain.qpos[:], plain.qvel[:] = data.qpos, data.qvel
+    mujoco.mj_forward(model, plain)
+    assert not plain.qfrc_passive.any()
+
+
+def on_mesh(law, mesh, data, geom, motion, slope, effects, rounding):
+    """Force and moment about the geom's origin, from `wrench` in the frame of the slope; of a stress map by NumPy."""
+    turn = Rotation.from_euler("y", slope.angle).as_matrix()  # from the world to axes along and across the slope
+    rotation, place = turn @ data.geom_xmat[geom].reshape(3, 3), turn @ data.geom_xpos[geom]
+    velocity, spin = turn @ motion[3:], turn @ motion[:3]
+    if isinstance(law, Spatial) and rounding < 1e-9:
+        one = wrench(law, mesh, rotation, place, velocity, spin, (*effects, slope))
+        return turn.T @ one.force, turn.T @ one.moment
+    law = law if isinstance(law, Spatial) else Extruded(law)
+    ground = Ground(rounding=rounding, grazing_sine=law.grazing_sine)
+    for effect in (*effects, slope):
+        ground = effect.apply(ground)
+    up, ahead = rotation[2], rotation[0]
+    motion = Motion(*(x[None, None] for x in (velocity @ rotation, spin @ rotation, place[0], up, ahead, place[2])))
+    block = Blocks([faces(mesh.vertices[mesh.faces], mesh.middle_normals)])
+    out = block._loads_by_numpy(law, ground, motion)[0, 0].reshape(2, 3)
+    return turn.T @ rotation @ out[0], turn.T @ rotation @ out[1]
+
+
+BALL = '<body name="ball" pos="0 0 0.01"><freejoint/><geom name="ball" type="sphere" size="0.03" mass="0.2"/></body>'
+
+
+def test_a_geom_bears_what_its_mesh_does(solved_by):
+    """Of `rft.meshes.wrench`, which has no rounding, on the same triangles; and about the origin of the body."""
+    model = model_of(BALL.replace("<geom", '<geom pos="0.01 0.02 -0.01" euler="20 30 40"'))
+    data = mujoco.MjData(model)
+    data.qvel[:] = [0.4, 0.3, -0.5, 3.0, -2.0, 1.0]
+    with rft.mujoco.attach(model, SPATIAL, level=-0.005, rounding=1e-7, element=0.01) as sand:
+        mujoco.mj_forward(model, data)
+        turn, place, motion = data.geom_xmat[0].reshape(3, 3), data.geom_xpos[0] + [0, 0, 0.005], np.zeros(6)
+        mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_GEOM, 0, motion, 0)
+        one = wrench(SPATIAL, mesh_of_elements(model, 0, 0.01), turn, place, motion[3:], motion[:3])
+        moment = one.moment + np.cross(data.geom_xpos[0] - data.xpos[1], one.force)
+        size = np.abs(one.force).max()
+        np.testing.assert_allclose(sand.wrench(data, "ball"), [*one.force, *moment], rtol=0, atol=2e-12 * size)
+        np.testing.assert_allclose(sand.forces(data), [one.force], rtol=0, atol=2e-12 * size)
+        assert sand.power(data) == pytest.approx(one.power, rel=1e-11)
+
+
+def test_a_long_rod_bears_what_the_plane_says():
+    """A stress map on a cylinder dragged across its axis and down, against the outline of the vertical plane."""
+    model = model_of('<body pos="0 0 -0.1" euler="90 0 0"><freejoint/><geom type="cylinder" size="0.02 0.05"/></body>')
+    data = mujoco.MjData(model)
+    data.qvel[:3] = [0.3, 0.0, -0.2]
+    sharp = StressMap(zeta=0.3, grazing=2e-3)
+    with rft.mujoco.attach(model, sharp, element=0.002, rounding=1e-7) as sand:
+        mujoco.mj_forward(model, data)
+        flat = loads(sharp, RoundRod(0.02, 0.1).outline(64), (0, -0.1, 0), (0.3, -0.2, 0)).force
+        np.testing.assert_allclose(sand.forces(data)[0, [0, 2]], flat, rtol=0.01)
+
+
+def test_forces_converge_with_the_length_of_elements():
+    """At order 2, on round and flat geoms."""
+    body = "".join(f'<body pos="0 0 -0.02"><freejoint/><geom {geom}/></body>' for geom in GEOMS)
+    model = model_of(body, '<option gravity="0 0 0"/>')
+    data = mujoco.MjData(model)
+    data.qvel[:] = np.random.default_rng(3).normal(size=model.nv)
+    values = []
+    for element in (0.016, 0.008, 0.004, 0.002):
+        with rft.mujoco.attach(model, SPATIAL, element=element) as sand:
+            mujoco.mj_forward(model, data)
+            values.append(sand.forces(data))
+    errors = [np.linalg.norm(x - values[-1]) / np.linalg.norm(values[-1]) for x in values[:-1]]
+    assert errors[2] < 4e-3 and errors[0] / errors[2] > 8.0, errors
+
+
+def test_forces_turn_and_mirror_with_the_motion():
+    model = model_of(f'<body pos="0 0 0.01"><freejoint/><geom {GEOMS[0]}/><geom {GEOMS[1]} pos="0.03 0 0"/></body>')
+    data, rng = mujoco.MjData(model), np.random.default_rng(2)
+    tilt, twist = Rotation.random(random_state=4), rng.normal(size=(2, 3))
+
+    def wrench_at(turn, velocity, spin):
+        data.qpos[3:] = np.roll(turn.as_quat(), 1)
+        data.qvel[:3], data.qvel[3:] = velocity, turn.inv().apply(spin)
+        mujoco.mj_forward(model, data)
+        return sand.wrench(data, 1).reshape(2, 3)
+
+    with rft.mujoco.attach(model, MAP, element=0.01) as sand:
+        plain, yaw = wrench_at(tilt, *twist), Rotation.from_euler("z", 0.7)
+        turned = wrench_at(yaw * tilt, *yaw.apply(twist))
+        np.testing.assert_allclose(turned, yaw.apply(plain), atol=1e-12 * np.abs(plain).max())
+        level, mirror = Rotation.from_euler("y", 0.3), np.array([1.0, -1.0, 1.0])
+        one = wrench_at(level, *twist)
+        other = wrench_at(level, twist[0] * mirror, -twist[1] * mirror)
+        np.testing.assert_allclose(other, one * [mirror, -mirror], atol=1e-2 * np.abs(one).max())
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast", "RK4"])
+def test_a_body_falls_sinks_and_is_dragged_and_the_energy_goes_into_the_grains(integrator):
+    """Change of energy = work of the grains, of the pull and of no one else, to the order of the steps."""
+    model = model_of(BALL, f'<option timestep="2e-4" integrator="{integrator}"><flag energy="enable"/></option>')
+    data = mujoco.MjData(model)
+    data.qpos[2], data.qfrc_applied[0] = 0.06, 1.0
+    with rft.mujoco.attach(model, SPATIAL, element=0.01) as sand:
+        mujoco.mj_forward(model, data)
+        energy, work, lost, power = data.energy.sum(), 0.0, 0.0, sand.power(data)
+        for _ in range(1000):
+            v, before = data.qvel[0], power
+            mujoco.mj_step(model, data)
+            mujoco.mj_forward(model, data)
+            power = sand.power(data)
+            work, lost = work + 1e-4 * (v + data.qvel[0]), lost - 1e-4 * (before + power)
+        assert lost > 0.05 and data.energy.sum() - energy == pytest.approx(work - lost, abs=0.01 * lost)
+
+
+def test_a_body_at_rest_creeps_as_its_sinkage_says():
+    model = model_of(BALL, '<option timestep="2e-4"/>')
+    data = mujoco.MjData(model)
+    data.qpos[2] = 0.028
+    with rft.mujoco.attach(model, SPATIAL, element=0.01, rounding=5e-3) as sand:
+        mujoco.mj_forward(model, data)
+        plastic, later = sand.sinkage(data, 0.5)
+        data.qpos[2] -= plastic
+        mujoco.mj_step(model, data, 2500)
+        assert 1e-4 < plastic < later and 0.028 - data.qpos[2] == pytest.approx(later, abs=0.05 * (later - plastic))
+        mujoco.mj_forward(model, data)
+        assert sand.sinkage(data, 0.0)[0] == pytest.approx(plastic - 0.028 + data.qpos[2], abs=1e-9)
+    with rft.mujoco.attach(model, Spatial(1.0)) as sand:
+        assert sand.sinkage(data) == (math.inf, math.inf)
+
+
+def test_the_time_step_and_the_masses_ask_for_a_rounding():
+    """h g / 2 of a free body; the step that a rounding allows is told, and a geom that runs away is, once."""
+    model = model_of(BALL, '<option timestep="0.002"/>')
+    with rft.mujoco.attach(model, MAP) as sand:
+        assert sand.rounding == pytest.approx(0.002 * 9.81 / 2) and sand.notes == ()
+        assert "rounding 0.00981 m/s at a time step of 2 ms" in repr(sand)
+    with pytest.warns(Note, match=r"asks for a rounding of 0\.0098 m/s, .* steps of 0\.2 ms would not"):
+        rft.mujoco.attach(model, MAP, rounding=9.81e-4).detach()
+    model.opt.timestep = 0.05
+    with pytest.warns(Note, match=r"the rounding of 0\.25 m/s, .* creep"):
+        sand = rft.mujoco.attach(model, MAP)
+    data = mujoco.MjData(model)
+    data.qpos[2], data.qvel[0] = 0.0, 200.0
+    if installed.serves_compiled():
+        with pytest.warns(Note, match="a geom in the sand is faster than 100 m/s") as caught:
+            mujoco.mj_step(model, data, 3)
+        assert len(caught) == 1 and installed.times_too_fast(sand._row) == 3
+    sand.detach()
+
+
+FLOORED = """<geom name="floor" type="plane" size="1 1 1" {}/><geom name="rock" type="box" size=".1 .1 .1" pos="3 0 .1"/>
+<body name="a" pos="0 0 0.01"><freejoint/><geom name="foot" type="box" size="0.05 0.04 0.02"/></body>
+<body name="b" pos="3 0 0.215"><freejoint/><geom name="stone" type="sphere" size="0.02"/></body>
+<body name="c" pos="1 0 0.015"><freejoint/><geom name="ball" type="sphere" size="0.02"/></body>"""
+
+
+def touching(model):
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return sorted(tuple(sorted(model.geom(g).name for g in data.contact.geom[k])) for k in range(data.ncon))
+
+
+def test_geoms_in_the_sand_touch_no_floor_and_everything_else():
+    model = model_of(FLOORED.format('contype="4" conaffinity="7"'))
+    before = touching(model)
+    assert {*before} == {("floor", "foot"), ("rock", "stone"), ("ball", "floor")}
+    with pytest.warns(Note, match="the geom no longer touches the floor 'floor'"):
+        sand = rft.mujoco.attach(model, MAP, geoms="foot")
+    assert {*touching(model)} == {("rock", "stone"), ("ball", "floor")}
+    sand.detach()
+    assert touching(model) == before
+    with rft.mujoco.attach(model, MAP, geoms=["foot", "s*"], level=0.005) as sand:
+        assert sand.notes == () and touching(model) == before  # the floor is the bottom of a bed 5 mm deep
+    with rft.mujoco.attach(model, MAP) as sand:
+        assert {*touching(model)} == {("rock", "stone")} and sand.geoms == ("foot", "stone", "ball")
+
+
+def test_several_models_sands_and_threads_at_once():
+    """Each as it is alone, to the last digit; a copy of a model has no sand."""
+    models = [model_of(BALL.replace("0.03", size)) for size in ("0.03", "0.04")]
+    both = model_of(BALL + BALL.replace("ball", "other").replace("0 0 0.01", "1 0 0.01"))
+
+    def run(model):
+        data = mujoco.MjData(model)
+        data.qvel[:3] = 0.3
+        mujoco.mj_step(model, data, 300)
+        return data.qpos.copy()
+
+    def attached(model, law, **more):
+        with rft.mujoco.attach(model, law, rounding=0.02, **more):
+            return run(model)
+
+    alone = [attached(m, law) for m, law in zip(models, (SPATIAL, MAP))]
+    sands = [rft.mujoco.attach(m, law, rounding=0.02) for m, law in zip(models, (SPATIAL, MAP))]
+    sands += [rft.mujoco.attach(both, law, geoms=g, rounding=0.02) for g, law in (("ball", SPATIAL), ("other", MAP))]
+    ends = [[] for _ in range(4)]
+    threads = [threading.Thread(target=lambda k=k: ends[k].append(run(models[k % 2]))) for k in range(4)]
+    for step in (threading.Thread.start, threading.Thread.join):
+        for thread in threads:
+            step(thread)
+    for k in range(4):
+        np.testing.assert_array_equal(ends[k][0], alone[k % 2])
+    two = run(both)
+    np.testing.assert_allclose(two[:7], alone[0], atol=1e-9)
+    assert abs(two[9] - two[2]) > 1e-4
+    assert run(__import__("copy").copy(both))[2] < -1.0
+    for sand in sands:
+        sand.detach()
+        sand.detach()
+    assert run(both)[2] < -1.0 and "detached" in repr(sands[0])
+
+
+def test_rollouts_and_batches_feel_the_sand():
+    model = model_of(BALL)
+    data = mujoco.MjData(model)
+    with rft.mujoco.attach(model, MAP, rounding=0.02) as sand:
+        mujoco.mj_step(model, data, 200)
+        if not installed.serves_compiled():
+            return
+        from mujoco import rollout
+
+        start = np.zeros((2, mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)))
+        mujoco.mj_getState(model, mujoco.MjData(model), start[0], mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        start[1] = start[0]
+        states, _ = rollout.rollout(model, [mujoco.MjData(model) for _ in range(2)], start, nstep=200)
+        np.testing.assert_array_equal(states[:, -1, 1:8], [data.qpos, data.qpos])
+        if int(mujoco.__version__.partition(".")[0]) < 4:
+            with pytest.raises(rft.Refusal, match=r"has no Batch: pip install 'mujoco>=4\.0'"):
+                sand.batch(2)
+            return
+        batch = sand.batch(4, 2)
+        batch.step(nstep=200)
+        np.testing.assert_array_equal(batch.bind("qpos"), [data.qpos] * 4)
+
+
+def test_a_callback_does_not_outlive_its_model():
+    model = model_of(BALL)
+    sand = rft.mujoco.attach(model, MAP)
+    assert sand.is_attached
+    del model
+    gc.collect()
+    assert mujoco.get_mjcb_passive() is None and not sand.is_attached
+    sand.detach()
+    with pytest.raises(rft.Refusal, match="the sand is detached"):
+        sand.batch(2)
+
+
+def test_a_fault_inside_the_callback_of_python_detaches_the_sand(monkeypatch):
+    model = model_of(BALL)
+    data = mujoco.MjData(model)
+    with preferring("numpy"):
+        sand = rft.mujoco.attach(model, MAP)
+    monkeypatch.setattr("rft.mujoco.bed.Bed.wrenches", lambda *_: 1 / 0)
+    with pytest.warns(Note, match="the sand is detached: ZeroDivisionError"):
+        mujoco.mj_step(model, data)
+    assert not sand.is_attached
+    sand.detach()
+
+
+def test_without_numba_a_line_says_how_much_slower_it_is():
+    model = model_of(BALL)
+    with preferring("numpy"), pytest.warns(Note, match=r"by Python's callback, some \d+ times slower: pip install"):
+        rft.mujoco.attach(model, MAP).detach()
+
+
+HFIELD = '<geom name="hills" type="plane" size="1 1 1"/>'
+DRAGS = PlateDrags(*np.random.default_rng(1).uniform(-1.5, 1.5, (4, 200)))
+REFUSED = {
+    "geoms": ({"geoms": "bal"}, "the model has no geom 'bal': did you mean 'ball'"),
+    "pattern": ({"geoms": ["ball", "leg*"]}, "the model has no geom 'leg"),
+    "group": ({"geoms": 5}, r"no geom is in group 5: groups are \[0\]"),
+    "none": ({"geoms": []}, "geoms`` names none|geoms names none"),
+    "kind": ({"geoms": 1.5}, "must be|not iterable"),
+    "plane": ({"geoms": "slab"}, "the geom 'slab' is a plane and has no inside: give a sphere"),
+    "fixed": ({"geoms": "post"}, "the geom 'post' is fixed to the world: name geoms that move"),
+    "medium": ({"medium": "poppy-seeds-lose"}, "there is no medium 'poppy-seeds-lose': did you mean poppy-seeds-loose"),
+    "horizontal": ({"medium": "glass-0.3mm-loose"}, "glass-0.3mm-loose has no vertical law: take one of generic"),
+    "law": ({"medium": rft.Granular(1.8, 0.2)}, "the medium has no vertical law in three dimensions"),
+    "drags": ({"medium": DRAGS}, "the medium has no vertical law in three dimensions"),
+    "zero": ({"element": 0.0}, "element must be"),
+    "rounding": ({"rounding": 0.0}, "rounding must be"),
+    "level": ({"level": math.nan}, "level must be"),
+    "slope": ({"slope": 1.2}, "slides by itself"),
+    "effects": ({"effects": ["aeration"]}, "effects must be a list of effects"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_makes_no_sense_is_refused_in_one_line_and_changes_nothing(name):
+    more = '<geom name="slab" type="plane" size="1 1 1"/><geom name="post" type="box" size="1 1 1" pos="9 9 9"/>'
+    model = model_of(BALL + more)
+    arguments, message = REFUSED[name]
+    masks = model.geom_contype.copy()
+    with pytest.raises(rft.Refusal, match=message) as refused:
+        rft.mujoco.attach(model, **({"medium": MAP} | arguments))
+    assert "\n" not in str(refused.value)
+    assert mujoco.get_mjcb_passive() is None and np.array_equal(masks, model.geom_contype)
+
+
+def test_what_changes_after_attach_is_refused():
+    model = model_of(BALL)
+    data = mujoco.MjData(model)
+    with rft.mujoco.attach(model, MAP) as sand:
+        with pytest.raises(rft.Refusal, match="sand is attached to 'ball' already: detach it"):
+            rft.mujoco.attach(model, MAP)
+        with pytest.raises(rft.Refusal, match="the model has no body 'zz'"):
+            sand.wrench(data, "zz")
+        with pytest.raises(rft.Refusal, match="the data are of another model"):
+            sand.forces(mujoco.MjData(model_of(FLOORED.format(""))))
+        model.geom_size[0, 0] = 0.05
+        with pytest.raises(rft.Refusal, match="the geom 'ball' changed after attach: detach the sand"):
+            sand.power(data)
+        mujoco.set_mjcb_passive(None)
+        with pytest.raises(rft.Refusal, match="another passive callback took the place"):
+            sand.power(data)
+    with pytest.raises(rft.Refusal, match="the sand is detached"):
+        sand.forces(data)
+    mujoco.set_mjcb_passive(lambda *_: None)
+    with pytest.raises(rft.Refusal, match="another passive callback is installed"):
+        rft.mujoco.attach(model, MAP)
+    mujoco.set_mjcb_passive(None)
+    still = model_of('<geom name="post" type="box" size="1 1 1"/>')
+    with pytest.raises(rft.Refusal, match="nothing in the model can move"):
+        rft.mujoco.attach(still, MAP)
+    paired = model_of(FLOORED.format(""), more='<contact><pair geom1="floor" geom2="foot"/></contact>')
+    with pytest.raises(rft.Refusal, match="a <pair> of <contact> makes 'floor' and 'foot' touch: drop it"):
+        rft.mujoco.attach(paired, MAP)
+
+
+def test_a_name_is_the_stress_map_of_the_catalogue():
+    assert law_of("poppy-seeds-loose") == Extruded(VERTICAL["poppy-seeds-loose"].stress) and law_of(SPATIAL) == SPATIAL
+    model = model_of(BALL)
+    assert asked_rounding(model, [0]) == pytest.approx(9.81e-3)
+    block = model_of('<body><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>')
+    with pytest.raises(rft.Refusal, match=r"^the geom 'geom 0': the geom has 480000 elements, .*: make element longer"):
+        rft.mujoco.attach(block, MAP, element=1e-3)
