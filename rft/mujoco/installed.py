@@ -39,12 +39,14 @@ class Layout(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """A bed in a row of the table. address: of its model. sizes: nv, ngeom and nbody of the model."""
+    """A bed in a row of the table. address: of its model. sizes: nv, ngeom and nbody of the model. end: removes the bed
+    when the model is gone."""
 
     address: int
     sizes: tuple[int, int, int]
     bed: Bed
     layout: Layout | None
+    end: weakref.finalize
 
 
 _entries: dict[int, Entry] = {}
@@ -59,16 +61,16 @@ def install(model: mujoco.MjModel, bed: Bed) -> int:
         compiled = serves_compiled()
         layout = layout_of(model, bed) if compiled else None  # compiles
         _set_callback(compiled)
-        used = [k for k in range(ROWS) if TABLE[k, 0] in (0, REMOVED)]
-        require(len(used) > 0, f"{ROWS} beds of sand are in use", instead="detach some")
-        row = used[0]
-        _entries[row] = Entry(model._address, (model.nv, model.ngeom, model.nbody), bed, layout)
+        row = next((k for k in range(ROWS) if TABLE[k, 0] in (0, REMOVED)), ROWS)
+        require(row < ROWS, f"{ROWS} beds of sand are in use", instead="detach some")
+        end = weakref.finalize(model, remove, row)
+        end.atexit = False
+        _entries[row] = Entry(model._address, (model.nv, model.ngeom, model.nbody), bed, layout, end)
         if layout:
             from rft.mujoco.compiled import kernel
 
             TABLE[row, 1:] = kernel(type(record(bed.law))).address, layout.numbers.ctypes.data
         TABLE[row, 0] = model._address
-        weakref.finalize(model, remove, row).atexit = False
         return row
 
 
@@ -78,6 +80,7 @@ def remove(row: int) -> None:
         if (entry := _entries.pop(row, None)) is None:
             return
         TABLE[row, 0] = REMOVED
+        entry.end.detach()
         _retired.append(entry)
         if not _entries:
             _clear_callback()

@@ -27,7 +27,7 @@ from rft.plates import VERTICAL, StressMap
 from rft.refusal import Refusal, formatted, located, require
 
 PER_GEOM = 4  # elements along the mean radius of the geoms, if no length is given
-SLOWER = 40  # Python's callback without numba over the compiled one, measured (`figures.sand_speed`)
+SLOWER = 60  # times that a step takes by NumPy over compiled code, measured: pytest -m benchmark -k hexapod
 
 
 class Sand:
