@@ -69,7 +69,8 @@ def chain(rng, joints, links=5):
         own = (
             "".join(map(joint, kind)) if isinstance(kind, tuple) else "<freejoint/>" if kind == "free" else joint(kind)
         )
-        geom = f'<geom name="g{k}" {GEOMS[k % len(GEOMS)]} pos="{numbers(3, 0.02)}" euler="{numbers(3, 60)}"/>'
+        geom = '<site name="o"/>' if k == 4 else ""
+        geom += f'<geom name="g{k}" {GEOMS[k % len(GEOMS)]} pos="{numbers(3, 0.02)}" euler="{numbers(3, 60)}"/>'
         text += f'<body name="b{k}" pos="{numbers(3, 0.05)}" euler="{numbers(3, 60)}">{own}{geom}'
         text += "</body>" if k == 2 else ""
     return text + "</body>" * (links - 1)
@@ -82,12 +83,18 @@ CHAINS = {
 }
 
 
+MORE = """<worldbody><camera/><light/><body name="m" mocap="true" pos="0 0 9"><site name="s"/></body></worldbody>
+<tendon><spatial name="t"><site site="s"/><site site="o"/></spatial></tendon><actuator><motor tendon="t"/></actuator>
+<sensor><tendonpos tendon="t"/></sensor><equality><weld body1="b0" body2="m" active="false"/></equality>"""
+
+
 @pytest.mark.parametrize("law", [SPATIAL, MAP])
 @pytest.mark.parametrize("name", CHAINS)
 def test_forces_are_those_of_the_meshes_and_do_their_virtual_work(name, law, solved_by):
     """Of random motions of chains: each geom against the force on its mesh alone, qfrc_passive against mj_applyFT."""
     rng = np.random.default_rng(len(name))
-    model = model_of(chain(rng, CHAINS[name]), '<option gravity="0 0 0"/>')
+    more = "" if name == "free root" else MORE  # empty arrays of MuJoCo's, or none
+    model = model_of(chain(rng, CHAINS[name]), '<option gravity="0 0 0"/>', more)
     data, plain = mujoco.MjData(model), mujoco.MjData(model)
     effects = (GrainInertia(0.5, 300.0),)
     with rft.mujoco.attach(model, law, element=0.02, slope=0.2, effects=effects) as sand:

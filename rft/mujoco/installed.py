@@ -18,7 +18,7 @@ import numpy as np
 
 from rft.balance.backend import Note, compiles
 from rft.meshes.contact import record
-from rft.mujoco.addresses import Arrays, offsets
+from rft.mujoco.addresses import Arrays, check_offsets, offsets
 from rft.mujoco.bed import FASTEST, Bed
 from rft.refusal import require
 
@@ -59,6 +59,7 @@ def install(model: mujoco.MjModel, bed: Bed) -> int:
     """Let the callback serve a bed under a model until `remove`, or until the model is gone; return its row."""
     with _lock:
         compiled = serves_compiled()
+        check_offsets(mujoco.MjData(model))
         layout = layout_of(model, bed) if compiled else None  # compiles
         _set_callback(compiled)
         row = next((k for k in range(ROWS) if TABLE[k, 0] in (0, REMOVED)), ROWS)
