@@ -42,6 +42,7 @@ PACKAGES = {
         "rft.meshes",
         "rft.ground",
         "rft.walking",
+        "rft.mujoco",
     ],
 }
 
