@@ -491,8 +491,9 @@ def test_a_scene_in_the_minimum_perturbation_frame(cheap):
     assert cheap.value <= found.start.value * (1 + 1e-6)
     assert found.value == pytest.approx(cheap.value, rel=1e-3)
     assert abs(found.best.displacement[1]) < 0.3 * abs(cheap.best.displacement[1])
-    with pytest.raises(Refusal, match="outside the field that the scene has"):
-        checked(scene, "efficiency", limits=3.0)
+    for limits in (3.0, [(-3.0, 1.0), (-1.0, 1.0)], [(-1.0, 1.0), (-1.0, 3.0)]):
+        with pytest.raises(Refusal, match="outside the field that the scene has"):
+            checked(scene, "efficiency", limits=limits)
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from matplotlib.colors import to_rgba
 from matplotlib.quiver import Quiver
 
 from geomech import plots, scenes
+from geomech.commands.options import colour_limit
 from geomech.gaits import Butterfly, Circle, Ellipse
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
@@ -481,6 +482,32 @@ def test_colours_have_a_limit():
     fig = plots.ccf_figure(field, error=error)
     assert [t.get_text() for legend in fig.legends for t in legend.get_texts()] == [plots.HATCHED]
     assert not any(ax.get_legend() for ax in fig.axes)
+
+
+def test_two_percentiles_are_ends_of_the_values():
+    """Colours of a CCF stay centred on zero, as far as the further of the two; "5:9" and the like are no limits."""
+    values = np.stack([SHAPES[0] + 0.5, SHAPES[1], SHAPES[0]])
+    top = max(abs(np.percentile(values[0], p)) for p in (20, 90))
+    limits = only(plots.ccf_map(Field(AXES, values), 0, clim="20%:90%"), QuadMesh).get_clim()
+    assert limits == pytest.approx((-top, top)) and top == pytest.approx(np.percentile(values[0], 90))
+    assert colour_limit("5%:95%") == "5%:95%"
+    for text in ("5:9", "95%:5%", "5%:9", "5%:5%", "0%", "1%:2%:3%"):
+        with pytest.raises(Refusal, match="is no limit"):
+            colour_limit(text)
+
+
+def test_each_row_of_a_connection_has_its_scale_whose_top_may_be_a_percentile():
+    A = np.random.default_rng(1).normal(size=(3, 2, 11, 9)) * np.array([1.0, 20.0, 300.0])[:, None, None, None]
+    fitted, sizes = Connection(AXES, A, np.abs(A[:, 0]), np.abs(A[:, 0])), np.hypot(A[:, 0], A[:, 1])
+    tops = lambda **o: [only(ax, Quiver).get_clim()[1] for ax in plots.connection_figure(fitted, **o).axes[:3]]
+    np.testing.assert_allclose(tops(), sizes.max((1, 2)))
+    np.testing.assert_allclose(tops(clim="80%"), np.percentile(sizes, 80, axis=(1, 2)))
+    np.testing.assert_allclose(tops(clim="5%:80%"), tops(clim="80%"))
+    assert tops(clim=0.7) == [0.7] * 3
+    arrows = only(plots.vector_field(fitted, 1, clim="80%"), Quiver)
+    cut = np.fmin(1.0, np.percentile(sizes[1], 80) / sizes[1])
+    np.testing.assert_allclose(arrows.U, (cut * A[1, 0]).ravel())
+    assert arrows.colorbar.extend == "max" and only(plots.vector_field(fitted, 1), Quiver).colorbar.extend == "neither"
 
 
 def test_components_choose_rows_of_the_connection():

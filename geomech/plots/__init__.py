@@ -11,6 +11,7 @@ from geomech.plots.figures import (
     plane_connection_figure,
     planes_figure,
 )
+from geomech.plots.forces import force_map, forces_figure, stacked_by_phase, stacked_by_place
 from geomech.plots.maps import (
     COMPONENTS,
     FINEST,
@@ -74,6 +75,8 @@ __all__ = [
     "elements_figure",
     "figure",
     "filmstrip",
+    "force_map",
+    "forces_figure",
     "frame_figure",
     "indicatrices",
     "intrusion_figure",
@@ -94,6 +97,8 @@ __all__ = [
     "shape_space",
     "shared_legend",
     "square_of_angles",
+    "stacked_by_phase",
+    "stacked_by_place",
     "stage",
     "streamlines",
     "stress_figure",
