@@ -17,11 +17,14 @@ from rft.meshes.blocks import Blocks
 from rft.meshes.contact import Motion, faces
 from rft.meshes.extruded import Extruded
 from rft.plates import VERTICAL, PlateDrags, RoundRod, StressMap, loads
+from rft.plates.calibrate import fit_stress
+from rft.plates.stress import COEFFICIENTS
 
 mujoco = pytest.importorskip("mujoco", reason="needs the extra: pip install 'geomech[mujoco]'")
 from rft.mujoco import installed  # noqa: E402
 from rft.mujoco.geoms import mesh_of_elements  # noqa: E402
-from rft.mujoco.sand import law_of, meshes  # noqa: E402
+from rft.mujoco.media import law_of  # noqa: E402
+from rft.mujoco.sand import meshes  # noqa: E402
 from rft.mujoco.steps import asked_rounding  # noqa: E402
 
 SPATIAL = Spatial(3e5, surface_friction=0.6, grazing=math.radians(5))
@@ -285,6 +288,9 @@ def test_geoms_in_the_sand_touch_no_floor_and_everything_else():
     assert touching(model) == before
     with rft.mujoco.attach(model, MAP, geoms=["foot", "s*"], level=0.005) as sand:
         assert own_notes(sand) == [] and touching(model) == before  # the floor is the bottom of a bed 5 mm deep
+    model.geom_group[model.geom("ball").id] = 2
+    with rft.mujoco.attach(model, MAP, geoms=2) as sand:
+        assert sand.geoms == ("ball",)
     with rft.mujoco.attach(model, MAP) as sand:
         assert {*touching(model)} == {("rock", "stone")} and sand.geoms == ("foot", "stone", "ball")
 
@@ -347,6 +353,60 @@ def test_rollouts_and_batches_feel_the_sand():
         np.testing.assert_array_equal(batch.bind("qpos"), [data.qpos] * 4)
 
 
+def test_simulations_have_media_of_their_own():
+    """Each as in its medium alone; a medium that is changed between steps is felt from then on."""
+    model = model_of(BALL)
+    media = rft.mujoco.sample("poppy-seeds-loose", 3, seed=1, spread=0.4)
+    with rft.mujoco.attach(model, "poppy-seeds-loose", rounding=0.02) as sand:
+        if int(mujoco.__version__.partition(".")[0]) < 4:
+            return
+        batch = sand.batch(3, 2, media=media)
+        batch.step(nstep=100)
+        middle = batch.bind("qpos")[0].copy()
+        sand.media[0] = media[1]
+        batch.step(nstep=100)
+        found = batch.bind("qpos").copy()
+        assert [*sand.media] == [media[1], *media[1:]] and sand.media[1:] == [law_of(x) for x in media[1:]]
+        with pytest.raises(rft.Refusal, match="media must be 4, one for each simulation"):
+            sand.batch(4, media=media)
+        with pytest.raises(rft.Refusal, match="media of one batch must have one form"):
+            sand.media[0] = SPATIAL
+        with pytest.raises(rft.Refusal, match="there is no simulation 3"):
+            sand.media[3] = media[0]
+    for k, medium in enumerate(media):
+        with rft.mujoco.attach(model, medium, rounding=0.02):
+            data = mujoco.MjData(model)
+            mujoco.mj_step(model, data, 100)
+            if k == 0:
+                np.testing.assert_allclose(middle, data.qpos, rtol=0, atol=1e-14)
+                continue
+            mujoco.mj_step(model, data, 100)
+            np.testing.assert_allclose(found[k], data.qpos, rtol=0, atol=1e-14)
+    assert abs(found[0, 2] - found[1, 2]) > 1e-6
+
+
+def test_media_are_drawn_within_their_uncertainty():
+    drawn = rft.mujoco.sample(Spatial(3e5), 2000, seed=2, spread=0.1)
+    logs = np.log([x.xi_n / 3e5 for x in drawn])
+    assert logs.std() == pytest.approx(0.1, rel=0.1) and abs(logs.mean()) < 0.01
+    assert drawn == rft.mujoco.sample(Spatial(3e5), 2000, seed=2, spread=0.1)
+    beta, gamma = (x.ravel() for x in np.meshgrid(*[np.radians(np.arange(-75, 90, 30))] * 2))
+    noise = 0.02 * np.random.default_rng(1).normal(size=(2, beta.size))
+    fit = fit_stress(beta, gamma, *(MAP(beta, gamma) + noise))
+    drawn = rft.mujoco.sample(fit, 4000, seed=3)
+    values = np.array([[getattr(x, name) for name in COEFFICIENTS] for x in drawn])
+    np.testing.assert_allclose(np.cov(values.T), fit.covariance, atol=0.1 * fit.covariance.max())
+    assert isinstance(drawn[0], StressMap)
+    for medium, more, message in (
+        ("generic", {}, "the uncertainty of the medium is unknown: give spread"),
+        (fit, {"spread": 0.1}, "a fit has its own covariance: drop spread"),
+        ("sand", {"spread": 0.1}, "the medium has no strength to draw"),
+        ("generic", {"spread": -1.0}, "spread must be"),
+    ):
+        with pytest.raises(rft.Refusal, match=message):
+            rft.mujoco.sample(medium, 3, **more)
+
+
 def test_a_callback_does_not_outlive_its_model():
     model = model_of(BALL)
     sand = rft.mujoco.attach(model, MAP)
@@ -397,7 +457,7 @@ REFUSED = {
     "medium": ({"medium": "poppy-seeds-lose"}, "there is no medium 'poppy-seeds-lose': did you mean poppy-seeds-loose"),
     "horizontal": ({"medium": "glass-0.3mm-loose"}, "glass-0.3mm-loose has no vertical law: take one of generic"),
     "law": ({"medium": rft.Granular(1.8, 0.2)}, "the medium has no vertical law in three dimensions"),
-    "drags": ({"medium": DRAGS}, "the medium has no vertical law in three dimensions"),
+    "drags": ({"medium": DRAGS}, "stress must be a StressMap, nine coefficients, .* fit some to plate drags"),
     "zero": ({"element": 0.0}, "element must be"),
     "rounding": ({"rounding": 0.0}, "rounding must be"),
     "level": ({"level": math.nan}, "level must be"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import warnings
 import weakref
 from collections.abc import Sequence
@@ -14,7 +13,6 @@ import numpy as np
 from rft.balance.backend import Note
 from rft.checks import in_range
 from rft.ground import Ground, GroundEffect, Slope, ground_of
-from rft.laws import CATALOGUE
 from rft.meshes.extruded import Extruded
 from rft.meshes.law import Spatial
 from rft.meshes.mesh import Mesh
@@ -22,9 +20,12 @@ from rft.mujoco import installed
 from rft.mujoco.bed import Bed
 from rft.mujoco.floor import Masks, floors, masks_without_contact, set_masks
 from rft.mujoco.geoms import chosen_geoms, geom_name, mesh_of_elements
+from rft.mujoco.media import Media, law_of, sample
 from rft.mujoco.steps import asked_rounding, sinkage, step_note
-from rft.plates import VERTICAL, StressMap
+from rft.plates import StressMap
 from rft.refusal import Refusal, formatted, located, require
+
+__all__ = ["Sand", "attach", "sample"]
 
 PER_GEOM = 4  # elements along the mean radius of the geoms, if no length is given
 SLOWER = 60  # times that a step takes by NumPy over compiled code, measured: pytest -m benchmark -k hexapod
@@ -35,7 +36,7 @@ class Sand:
 
     geoms: names of the geoms in the sand, in the order of `forces`. element: length of the elements' edges, m. rounding: m/s;
     an element of speed v bears v / sqrt(v^2 + rounding^2) of its stress. elements: number of elements. notes: lines about
-    what was changed and what is inexact.
+    what was changed and what is inexact. media: of the simulations of the last batch that was given some; None else.
 
     All that is read from data holds for data whose positions and velocities are up to date, as after ``mj_forward``.
     """
@@ -49,7 +50,7 @@ class Sand:
         self._masks, self._old_masks = masks, Masks.of(model).copied()
         if masks:
             set_masks(model, masks)
-        self.notes = tuple(notes)
+        self.notes, self.media = tuple(notes), None
         for line in self.notes:
             warnings.warn(line, Note, stacklevel=3)
 
@@ -74,6 +75,7 @@ class Sand:
     def detach(self) -> None:
         """Take the sand away and let the geoms touch the floor again; a second call does nothing."""
         attached, model = self._row >= 0, self._model()
+        self._forget_media()
         installed.remove(self._row)
         self._row = -1
         if attached and model is not None and self._masks:
@@ -109,17 +111,31 @@ class Sand:
         in_range("time", time, 0, 1e6, unit="s")
         return sinkage(model, data, self._bed, time)
 
-    def batch(self, nsim: int, nthread: int = 0, persistent: bool = False) -> Any:
-        """Return a ``mujoco.batch.Batch`` of simulations of the model in this sand."""
+    def batch(self, nsim: int, nthread: int = 0, persistent: bool = False, media: Sequence[Any] | None = None) -> Any:
+        """Return a ``mujoco.batch.Batch`` of simulations of the model in this sand.
+
+        media: one for each simulation, of one form, such as `sample` draws; ``sand.media[i] = medium`` changes one later."""
         model = self._model()
         require(model is not None and self.is_attached, "the sand is detached", instead="attach it anew")
         try:
             from mujoco.batch import Batch
         except ImportError:
             raise Refusal(f"MuJoCo {mujoco.__version__} has no Batch", instead="pip install 'mujoco>=4.0'") from None
+        require(media is None or len(media) == nsim, f"media must be {nsim}, one for each simulation")
         batch = Batch(model, nsim, nthread, persistent)
-        batch.set_models(model)  # a Batch copies the model it is given, and a copy has no sand
+        if media is not None:
+            laws = [law_of(medium) for medium in media]
+            self._forget_media()
+            self.media = Media(model, self._bed, laws)
+        # A Batch copies the model that it is given, and a copy has no sand.
+        batch.set_models(model if media is None else self.media.models)
         return batch
+
+    def _forget_media(self) -> None:
+        """Detach the media of the last batch that had its own."""
+        if self.media is not None:
+            self.media.detach()
+            self.media = None
 
     def _check(self, data: mujoco.MjData) -> mujoco.MjModel:
         """Return the model; Refusal for a detached sand, other models' data, and geoms that have changed."""
@@ -213,23 +229,6 @@ def attach(
     notes = [_contact_note(model, chosen, planes)] if planes else []
     notes += [line for line in (step_note(model, chosen, rounding), _python_note()) if line]
     return Sand(model, bed, element, notes, masks)
-
-
-def law_of(medium: object) -> Extruded | Spatial:
-    """Return the law of three dimensions of a medium; Refusal for one without a vertical law."""
-    if isinstance(medium, str):
-        if medium in CATALOGUE and medium not in VERTICAL:
-            raise Refusal(f"{medium} has no vertical law", instead=f"take one of {', '.join(VERTICAL)}")
-        near = difflib.get_close_matches(medium, VERTICAL, 1, 0.5)
-        cure = f"did you mean {near[0]}?" if near else f"take one of {', '.join(VERTICAL)}"
-        require(medium in VERTICAL, f"there is no medium {formatted(medium)}", instead=cure)
-        return Extruded(VERTICAL[medium].stress)
-    if isinstance(medium, Spatial | Extruded):
-        return medium
-    if isinstance(medium, StressMap):
-        return Extruded(medium)
-    cure = "give a name of rft.plates.VERTICAL, a StressMap or a Spatial"
-    raise Refusal("the medium has no vertical law in three dimensions", value=medium, instead=cure)
 
 
 def meshes(model: mujoco.MjModel, geoms: Sequence[int], element: float) -> list[Mesh]:
