@@ -23,6 +23,7 @@ from rft.plates.stress import COEFFICIENTS
 mujoco = pytest.importorskip("mujoco", reason="needs the extra: pip install 'geomech[mujoco]'")
 from rft.mujoco import installed  # noqa: E402
 from rft.mujoco.geoms import mesh_of_elements  # noqa: E402
+from rft.mujoco.hills import hills_of, tangent_plane  # noqa: E402
 from rft.mujoco.media import law_of  # noqa: E402
 from rft.mujoco.sand import meshes  # noqa: E402
 from rft.mujoco.steps import asked_rounding  # noqa: E402
@@ -173,6 +174,65 @@ def test_a_long_rod_bears_what_the_plane_says():
         mujoco.mj_forward(model, data)
         flat = loads(sharp, RoundRod(0.02, 0.1).outline(64), (0, -0.1, 0), (0.3, -0.2, 0)).force
         np.testing.assert_allclose(sand.forces(data)[0, [0, 2]], flat, rtol=0.01)
+
+
+def hilly(heights, pose="", geoms=f"<geom {GEOMS[1]}/>"):
+    """A model of one body over a height field 2 m along x and 1 m along y, with heights of up to 1 m."""
+    rows = " ".join(f"{x:.12f}" for x in np.ravel(heights))
+    size = f'nrow="{len(heights)}" ncol="{len(heights[0])}" size="1 0.5 1 0.1"'
+    asset = f'<asset><hfield name="hills" {size} elevation="{rows}"/></asset>'
+    field = f'<geom name="hills" type="hfield" hfield="hills" {pose}/>'
+    return model_of(f'{field}<body pos="0 0 0"><freejoint/>{geoms}</body>', more=asset)
+
+
+def test_a_height_field_is_the_surface(solved_by):
+    """A plane of one slope, turned about the vertical: the forces of `slope`, but for the weaker ground; and level beyond."""
+    along = np.linspace(0.0, 1.0, 5) * np.ones((4, 1))  # rises by 1 m in 2 m
+    model = hilly(along, 'pos="0 0 -0.5" euler="0 0 30"')
+    flat, angle = model_of(f"<body><freejoint/><geom {GEOMS[1]}/></body>"), math.atan(0.5)
+    turn, place = Rotation.from_euler("z", 30, degrees=True), np.array([0.2, 0.1, 0.11])
+    spin, velocity = np.array([1.0, -2.0, 0.5]), np.array([0.5, 0.05, -0.4])  # into the ground and uphill
+
+    def forces(model, turn, **more):
+        data = mujoco.MjData(model)
+        data.qpos[:3], data.qpos[3:] = turn.apply(place), np.roll((turn * Rotation.from_euler("x", 0.4)).as_quat(), 1)
+        data.qvel[:3], data.qvel[3:] = turn.apply(velocity), Rotation.from_euler("x", -0.4).apply(spin)
+        with rft.mujoco.attach(model, SPATIAL, element=0.01, rounding=0.01, **more) as sand:
+            mujoco.mj_forward(model, data)
+            assert data.ncon == 0
+            np.testing.assert_allclose(data.qfrc_passive[:3], sand.forces(data)[0], atol=1e-12)
+            return turn.inv().apply(sand.forces(data)[0])
+
+    expected = forces(flat, Rotation.identity(), slope=angle) / math.cos(angle)
+    assert np.linalg.norm(expected) > 1.0
+    np.testing.assert_allclose(forces(model, turn, level="hills"), expected, rtol=0, atol=2e-3 * abs(expected).max())
+    place[:] = [1.5, 0.0, 0.49]
+    expected = forces(flat, turn, level=0.5)
+    np.testing.assert_allclose(forces(model, turn, level="hills"), expected, rtol=0, atol=1e-12 * abs(expected).max())
+    with pytest.raises(rft.Refusal, match="a height field has slopes of its own: drop slope"):
+        rft.mujoco.attach(model, SPATIAL, level="hills", slope=0.1)
+    with pytest.raises(rft.Refusal, match="the geom 'geom 1' is a capsule|has no geom"):
+        rft.mujoco.attach(model, SPATIAL, level="geom 1")
+    with pytest.raises(rft.Refusal, match="the height field 'hills' is tilted or moves"):
+        rft.mujoco.attach(hilly(along, 'euler="10 0 0"'), SPATIAL, level="hills")
+
+
+def test_a_height_field_is_where_mujoco_has_it():
+    """At its nodes, by rays that MuJoCo casts down."""
+    heights = np.random.default_rng(7).uniform(0, 1, (4, 6))
+    model = hilly((heights - heights.min()) / np.ptp(heights), 'pos="0.3 -0.2 0.1" euler="0 0 40"')
+    hills, geom = hills_of(model, "hills")
+    data, turn = mujoco.MjData(model), Rotation.from_euler("z", 40, degrees=True)
+    data.qpos[2] = -9.0
+    mujoco.mj_forward(model, data)
+    for u in np.linspace(-1, 1, 6)[1:-1]:
+        for v in np.linspace(-0.5, 0.5, 4)[1:-1]:
+            x, y, _ = place = turn.apply([u, v, 0.0]) + [0.3, -0.2, 5.0]
+            hit = place[2] - mujoco.mj_ray(
+                model, data, place, np.array([0, 0, -1.0]), None, 1, -1, np.zeros(1, np.int32)
+            )
+            (n_x, n_y, n_z), level = tangent_plane(*hills, x, y)
+            assert geom == 0 and (level - n_x * x - n_y * y) / n_z == pytest.approx(hit, abs=1e-6)
 
 
 def test_forces_converge_with_the_length_of_elements():

@@ -15,6 +15,7 @@ from rft.meshes.extruded import Extruded
 from rft.meshes.law import Spatial
 from rft.meshes.mesh import Mesh
 from rft.mujoco.addresses import Arrays
+from rft.mujoco.hills import FLAT, Hills, tangent_plane
 
 FASTEST = 100.0  # m/s, assumed: a geom that is faster is the result of a time step that is too long, and bears nothing
 
@@ -25,7 +26,8 @@ class Bed:
 
     up, ahead: (3,), unit vectors away from the surface and along it, in the world. geoms, bodies, roots: (G,), numbers of the
     geoms, their bodies and these bodies' roots. dofs: (G,), the last degree of freedom of each body; parents: (nv,), that of
-    each degree of freedom, -1 for none. spheres: (G, 4), middle of a sphere around each geom in its frame, and radius, m."""
+    each degree of freedom, -1 for none. spheres: (G, 4), middle of a sphere around each geom in its frame, and radius, m.
+    hills: the surface in place of a plane, where its grid is not empty."""
 
     law: Extruded | Spatial
     ground: Ground
@@ -39,11 +41,14 @@ class Bed:
     dofs: np.ndarray
     parents: np.ndarray
     spheres: np.ndarray
+    hills: Hills = FLAT
 
     @classmethod
-    def under(cls, model: mujoco.MjModel, geoms: list[int], meshes: list[Mesh], law, ground, slope, level) -> Bed:
+    def under(
+        cls, model: mujoco.MjModel, geoms: list[int], meshes: list[Mesh], law, ground, slope, level, hills: Hills
+    ) -> Bed:
         """Return the bed under geoms with these meshes. slope: rad, by which the surface rises along x. level: m, the height
-        of the surface at x = 0."""
+        of the surface at x = 0. hills: the surface in place of this plane, or `FLAT`."""
         bodies = np.array([model.geom_bodyid[g] for g in geoms], np.int64)
         up, ahead = np.array([-np.sin(slope), 0.0, np.cos(slope)]), np.array([np.cos(slope), 0.0, np.sin(slope)])
         spheres = [_sphere(mesh) for mesh in meshes]
@@ -52,7 +57,7 @@ class Bed:
             law, ground, up, ahead, float(level * up[2]), blocks,
             np.array(geoms, np.int64), bodies, model.body_rootid[bodies].astype(np.int64),
             np.array([_last_dof(model, b) for b in bodies], np.int64), model.dof_parentid.astype(np.int64),
-            np.array(spheres),
+            np.array(spheres), hills,
         )  # fmt: skip
 
     def rounded(self, rounding: float) -> Bed:
@@ -73,12 +78,20 @@ class Bed:
             velocity, spin = self.twists(data)
         turn, place = data.geom_xmat[self.geoms].reshape(-1, 3, 3), data.geom_xpos[self.geoms]
         along_axes = lambda x: np.einsum("gij,gi->gj", turn, np.broadcast_to(x, place.shape))[:, None]
+        up, level = self._surface(place + np.einsum("gij,gj->gi", turn, self.spheres[:, :3]))
         motions = Motion(
-            along_axes(velocity), along_axes(spin), (place @ self.ahead)[:, None], along_axes(self.up),
-            along_axes(self.ahead), (place @ self.up - self.level - sunk)[:, None],
+            along_axes(velocity), along_axes(spin), (place @ self.ahead)[:, None], along_axes(up),
+            along_axes(self.ahead), ((place * up).sum(-1) - level - sunk)[:, None],
         )  # fmt: skip
         loads = self.blocks.loads(self.law, self.ground, motions)[:, 0].reshape(-1, 2, 3)
         return np.einsum("gij,gpj->gpi", turn, loads).reshape(-1, 6)
+
+    def _surface(self, middles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the planes up . x = level, (G, 3) and (G,), that geoms with these middles (G, 3) see."""
+        if not self.hills.grid.size:
+            return np.broadcast_to(self.up, middles.shape), np.full(len(middles), self.level)
+        planes = [tangent_plane(*self.hills, x, y) for x, y, _ in middles]
+        return np.array([n for n, _ in planes]), np.array([level for _, level in planes])
 
     @cached_property
     def moved_by(self) -> np.ndarray:

@@ -13,7 +13,7 @@ from llvmlite import ir
 from numba import carray, types
 from numba.core import sigutils
 from numba.core.ccallback import CFunc
-from numba.extending import intrinsic
+from numba.extending import intrinsic, register_jitable
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from rft.balance.cache import Cache
@@ -22,9 +22,11 @@ from rft.meshes.compiled import on_faces
 from rft.meshes.contact import Motion
 from rft.meshes.triples import cross, dot, minus, plus, times
 from rft.mujoco.addresses import FARTHEST
+from rft.mujoco.hills import tangent_plane
 from rft.simd import WIDTH, register_formulas
 
-LAYOUT = 23  # numbers that `rft.mujoco.installed.layout_of` writes
+LAYOUT = 27  # numbers that `rft.mujoco.installed.layout_of` writes
+plane = register_jitable(tangent_plane)
 OPTIONS = {"nopython": True, "nogil": True, "error_model": "numpy"}
 
 
@@ -89,17 +91,22 @@ def kernel(Law: type) -> CFunc:
         disturbed = carray(_pointer(row[18]), (row[19], row[20]), np.float64)
         ground = Ground(g[0], g[1], g[2], g[3], g[4], disturbed)
         up, ahead, level, fastest = (g[5], g[6], g[7]), (g[8], g[9], g[10]), g[11], g[12]
+        grid = carray(_pointer(row[23]), (row[24], row[25], 3), np.float64)
+        field = carray(_pointer(row[26]), 7, np.float64)
         fast = carray(_pointer(row[21]), 1, np.int64)
         for k in range(groups):
             geom, body, root, dof = numbers[k, 0], numbers[k, 1], numbers[k, 2], numbers[k, 3]
             turn, place = xmat[geom], (xpos[geom, 0], xpos[geom, 1], xpos[geom, 2])
-            height = dot(up, place) - level
             x_axis = (turn[0, 0], turn[1, 0], turn[2, 0])
             y_axis = (turn[0, 1], turn[1, 1], turn[2, 1])
             z_axis = (turn[0, 2], turn[1, 2], turn[2, 2])
+            center = (spheres[k, 0], spheres[k, 1], spheres[k, 2])
+            if row[24] > 0:
+                middle = plus(plus(times(center[0], x_axis), times(center[1], y_axis)), times(center[2], z_axis))
+                up, level = plane(grid, field, place[0] + middle[0], place[1] + middle[1])
+            height = dot(up, place) - level
             local_up = (dot(x_axis, up), dot(y_axis, up), dot(z_axis, up))
-            middle = height + dot(local_up, (spheres[k, 0], spheres[k, 1], spheres[k, 2]))
-            if not middle < spheres[k, 3]:
+            if not height + dot(local_up, center) < spheres[k, 3]:
                 continue
             spin = (cvel[body, 0], cvel[body, 1], cvel[body, 2])
             arm = minus(place, (com[root, 0], com[root, 1], com[root, 2]))

@@ -191,9 +191,11 @@ def layout_of(model: mujoco.MjModel, bed: Bed) -> Layout:
         np.array([*ground[:5], *bed.up, *bed.ahead, bed.level, FASTEST]),
         np.array(ground.disturbed, float),
         fast,
+        *bed.hills,
     ]
     arrays = [np.ascontiguousarray(x) for x in arrays]
     addresses = [x.ctypes.data for x in arrays]
     sizes = [model.nv, model.ngeom, model.nbody, len(table), len(bed.geoms)]
     numbers = [*offsets(), *sizes, *addresses[:8], *arrays[7].shape, addresses[8], report]
+    numbers += [addresses[9], *bed.hills.grid.shape[:2], addresses[10]]
     return Layout(np.array(numbers, np.int64), tuple(arrays), arrays[8])

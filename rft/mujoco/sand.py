@@ -20,6 +20,7 @@ from rft.mujoco import installed
 from rft.mujoco.bed import Bed
 from rft.mujoco.floor import Masks, floors, masks_without_contact, set_masks
 from rft.mujoco.geoms import chosen_geoms, geom_name, mesh_of_elements
+from rft.mujoco.hills import FLAT, Hills, hills_of
 from rft.mujoco.media import Media, law_of, sample
 from rft.mujoco.steps import asked_rounding, sinkage, step_note
 from rft.plates import StressMap
@@ -161,7 +162,7 @@ def attach(
     model: mujoco.MjModel,
     medium: str | StressMap | Spatial | Extruded,
     geoms: str | int | Sequence[str | int] | None = None,
-    level: float = 0.0,
+    level: float | str = 0.0,
     slope: float = 0.0,
     element: float | None = None,
     rounding: float | None = None,
@@ -179,8 +180,9 @@ def attach(
         `rft.meshes.extruded` has it; or a law of three dimensions.
     geoms : str, int or list of these
         Names, patterns such as "leg*" and groups of the geoms in the sand; by default all that move.
-    level : float, m
-        Height of the surface at x = 0.
+    level : float, m, or str
+        Height of the surface at x = 0; or the name of a height field, which is the surface then. Each geom sees the plane
+        that touches it below the geom; the ground there is as strong as where it is level.
     slope : float, rad
         Angle by which the surface rises along x; the ground is weaker as `rft.ground.Slope` has it.
     element : float, m
@@ -208,6 +210,8 @@ def attach(
     """
     require(isinstance(model, mujoco.MjModel), "model must be a mujoco.MjModel", value=model)
     require(model.nv > 0, "nothing in the model can move", because="it has no joints")
+    hills, field = (FLAT, []) if not isinstance(level, str) else _field(model, level, slope)
+    level = 0.0 if field else level
     in_range("level", level, -1e6, 1e6, unit="m")
     law, chosen = law_of(medium), chosen_geoms(model, geoms)
     taken = {int(g) for bed in installed.beds(model) for g in bed.geoms} & {*chosen}
@@ -223,12 +227,19 @@ def attach(
     rounding = max(asked, 1e-6) if rounding is None else rounding
     effects = (*effects, Slope(slope)) if slope else tuple(effects)
     ground = ground_of(effects, Ground(rounding=rounding, grazing_sine=law.grazing_sine))
-    bed = Bed.under(model, chosen, meshes(model, chosen, element), law, ground, slope, level)
-    planes = [g for g in floors(model, bed.up, bed.level) if _touch(model, chosen, g)]
+    bed = Bed.under(model, chosen, meshes(model, chosen, element), law, ground, slope, level, hills)
+    planes = [g for g in field or floors(model, bed.up, bed.level) if _touch(model, chosen, g)]
     masks = masks_without_contact(model, chosen, planes) if planes else None
     notes = [_contact_note(model, chosen, planes)] if planes else []
     notes += [line for line in (step_note(model, chosen, rounding), _python_note()) if line]
     return Sand(model, bed, element, notes, masks)
+
+
+def _field(model: mujoco.MjModel, name: str, slope: float) -> tuple[Hills, list[int]]:
+    """Return the surface of a height field and the number of its geom; Refusal for a slope beside it."""
+    require(not slope, "a height field has slopes of its own", instead="drop ``slope``")
+    hills, geom = hills_of(model, name)
+    return hills, [geom]
 
 
 def meshes(model: mujoco.MjModel, geoms: Sequence[int], element: float) -> list[Mesh]:
