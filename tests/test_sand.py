@@ -164,6 +164,24 @@ def test_a_geom_bears_what_its_mesh_does(solved_by):
         assert sand.power(data) == pytest.approx(one.power, rel=1e-11)
 
 
+@pytest.mark.parametrize("geom", GEOMS)
+def test_a_geom_that_hardly_dips_in_bears(geom, solved_by):
+    """With its lowest corner 0.5 mm deep, whatever its pose: the sphere around each geom holds all of it."""
+    model = model_of(f'<body><freejoint/><geom {geom} pos="0.02 0.01 -0.03"/></body>')
+    data = mujoco.MjData(model)
+    mesh = mesh_of_elements(model, 0, 0.01)
+    with rft.mujoco.attach(model, SPATIAL, element=0.01) as sand:
+        for pose in Rotation.random(6, random_state=1):
+            data.qpos[:3], data.qpos[3:], data.qvel[2] = 0.0, np.roll(pose.as_quat(), 1), -1.0
+            mujoco.mj_forward(model, data)
+            heights = mesh.vertices @ data.geom_xmat[0].reshape(3, 3)[2] + data.geom_xpos[0, 2]
+            data.qpos[2] = -heights.min() - 5e-4
+            mujoco.mj_forward(model, data)
+            force = sand.forces(data)[0]
+            np.testing.assert_allclose(data.qfrc_passive[:3], force, atol=1e-12)
+            assert force[2] > 1e-5
+
+
 def test_a_long_rod_bears_what_the_plane_says():
     """A stress map on a cylinder dragged across its axis and down, against the outline of the vertical plane."""
     model = model_of('<body pos="0 0 -0.1" euler="90 0 0"><freejoint/><geom type="cylinder" size="0.02 0.05"/></body>')
@@ -348,6 +366,21 @@ def test_geoms_in_the_sand_touch_no_floor_and_everything_else():
     assert touching(model) == before
     with rft.mujoco.attach(model, MAP, geoms=["foot", "s*"], level=0.005) as sand:
         assert own_notes(sand) == [] and touching(model) == before  # the floor is the bottom of a bed 5 mm deep
+    first, second = (rft.mujoco.attach(model, MAP, geoms=name) for name in ("foot", "ball"))
+    assert {*touching(model)} == {("rock", "stone")}
+    first.detach()  # not the last one first
+    assert {*touching(model)} == {("rock", "stone"), ("floor", "foot")}
+    second.detach()
+    assert touching(model) == before
+    with rft.mujoco.attach(model, MAP, geoms="foot"):
+        model.geom_contype[:] = 1  # as users may
+    assert (model.geom_contype == 1).all()
+    model = model_of(FLOORED.format('contype="4" conaffinity="7"'))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(Note, match="no longer touches the floor"):
+            rft.mujoco.attach(model, MAP, geoms="foot")
+    assert touching(model) == before and mujoco.get_mjcb_passive() is None
     model.geom_group[model.geom("ball").id] = 2
     with rft.mujoco.attach(model, MAP, geoms=2) as sand:
         assert sand.geoms == ("ball",)

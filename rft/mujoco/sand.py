@@ -18,7 +18,7 @@ from rft.meshes.law import Spatial
 from rft.meshes.mesh import Mesh
 from rft.mujoco import installed
 from rft.mujoco.bed import Bed
-from rft.mujoco.floor import Masks, floors, masks_without_contact, set_masks
+from rft.mujoco.floor import Apart, apart, floors, part, rejoin
 from rft.mujoco.geoms import chosen_geoms, geom_name, mesh_of_elements
 from rft.mujoco.hills import FLAT, Hills, hills_of
 from rft.mujoco.media import Media, law_of, sample
@@ -42,18 +42,15 @@ class Sand:
     All that is read from data holds for data whose positions and velocities are up to date, as after ``mj_forward``.
     """
 
-    def __init__(self, model: mujoco.MjModel, bed: Bed, element: float, notes: Sequence[str], masks: Masks | None):
+    def __init__(self, model: mujoco.MjModel, bed: Bed, element: float, notes: Sequence[str], told: Apart | None):
         self._model, self._bed, self.element = weakref.ref(model), bed, element
         self.geoms = tuple(geom_name(model, g) for g in bed.geoms)
         self.rounding, self.elements = bed.ground.rounding, len(bed.blocks.owner)
         self._form, self._step = _form(model, bed.geoms), model.opt.timestep
         self._row = installed.install(model, bed)
-        self._masks, self._old_masks = masks, Masks.of(model).copied()
-        if masks:
-            set_masks(model, masks)
-        self.notes, self.media = tuple(notes), None
-        for line in self.notes:
-            warnings.warn(line, Note, stacklevel=3)
+        self.notes, self.media, self._parted = tuple(notes), None, told.pairs[-1] if told else None
+        if told:
+            part(model, told)
 
     def __enter__(self) -> Sand:
         return self
@@ -79,10 +76,8 @@ class Sand:
         self._forget_media()
         installed.remove(self._row)
         self._row = -1
-        if attached and model is not None and self._masks:
-            ours = all(np.array_equal(a, b) for a, b in zip(Masks.of(model), self._masks))
-            if ours:  # another sand, or the user, has set them since
-                set_masks(model, self._old_masks)
+        if attached and model is not None and self._parted:
+            rejoin(model, *self._parted)
 
     def forces(self, data: mujoco.MjData) -> np.ndarray:
         """Return the force of the grains on each geom, (G, 3), N, in the world."""
@@ -229,10 +224,12 @@ def attach(
     ground = ground_of(effects, Ground(rounding=rounding, grazing_sine=law.grazing_sine))
     bed = Bed.under(model, chosen, meshes(model, chosen, element), law, ground, slope, level, hills)
     planes = [g for g in field or floors(model, bed.up, bed.level) if _touch(model, chosen, g)]
-    masks = masks_without_contact(model, chosen, planes) if planes else None
+    told = apart(model, chosen, planes) if planes else None
     notes = [_contact_note(model, chosen, planes)] if planes else []
     notes += [line for line in (step_note(model, chosen, rounding), _python_note()) if line]
-    return Sand(model, bed, element, notes, masks)
+    for line in notes:  # before anything is changed: a filter may turn warnings into errors
+        warnings.warn(line, Note, stacklevel=2)
+    return Sand(model, bed, element, notes, told)
 
 
 def _field(model: mujoco.MjModel, name: str, slope: float) -> tuple[Hills, list[int]]:
