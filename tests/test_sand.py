@@ -388,6 +388,32 @@ def test_geoms_in_the_sand_touch_no_floor_and_everything_else():
         assert {*touching(model)} == {("rock", "stone")} and sand.geoms == ("foot", "stone", "ball")
 
 
+CLOTH = """<flexcomp name="cloth" type="grid" count="3 3 1" spacing=".05 .05 .05" mass=".1" radius=".01" pos="2 0 .005">
+<contact contype="2" conaffinity="2"/></flexcomp>"""
+
+
+def test_what_is_not_in_the_sand_touches_the_floor_as_before():
+    """Cloth; geoms named in a <pair>, which hold all the same; and geoms in sand whose surface is not the floor."""
+    pairs = '<contact><pair geom1="floor" geom2="stone"/><pair geom1="rock" geom2="foot"/></contact>'
+    model = model_of(FLOORED.format('contype="3" conaffinity="3"') + CLOTH, more=pairs)
+
+    def cloth():
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        return int((data.contact.flex >= 0).any(1).sum())
+
+    before = cloth()
+    assert before > 0
+    with rft.mujoco.attach(model, MAP, geoms="foot") as sand:
+        assert own_notes(sand) and cloth() == before
+    for more in ({"slope": 0.01}, {"level": 0.002}):
+        with rft.mujoco.attach(model, MAP, geoms="foot", **more) as sand:
+            assert own_notes(sand) == []
+    crowded = model_of(FLOORED.format('contype="2147483647"'))
+    with pytest.raises(rft.Refusal, match="no bit is free to tell the floor from other geoms: use fewer contypes"):
+        rft.mujoco.attach(crowded, MAP)
+
+
 def test_several_models_sands_and_threads_at_once():
     """Each as it is alone, to the last digit; a copy of a model has no sand."""
     models = [model_of(BALL.replace("0.03", size)) for size in ("0.03", "0.04")]
