@@ -7,6 +7,7 @@ import warnings
 
 import numpy as np
 import pytest
+from artists import drawn
 from scipy.spatial.transform import Rotation
 
 import rft
@@ -634,3 +635,19 @@ def test_a_name_is_the_stress_map_of_the_catalogue():
     block = model_of('<body><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>')
     with pytest.raises(rft.Refusal, match=r"^the geom 'geom 0': the geom has 480000 elements, .*: make element longer"):
         rft.mujoco.attach(block, MAP, element=1e-3)
+
+
+def test_a_gait_for_sand_is_searched_for(tmp_path):
+    """A few short walks: the best never gets worse, and what is drawn is what was found."""
+    if int(mujoco.__version__.partition(".")[0]) < 4:
+        pytest.skip("needs mujoco.batch")
+    from figures import sand_gaits
+
+    numbers = sand_gaits.compute(2, 4, 0.6)
+    for speeds in numbers["found"].values():
+        assert speeds[1] >= speeds[0] > -1.0
+    assert numbers["speeds"].shape == (2, 2) and len(numbers["strip"]) == sand_gaits.SNAPSHOTS
+    assert numbers["speeds"][0, 0] == pytest.approx(numbers["found"]["sand"][-1], abs=1e-12)
+    figure = drawn(sand_gaits, numbers, tmp_path)
+    assert [bar.get_height() for bar in figure.axes[1].patches] == [*numbers["speeds"][0], *numbers["speeds"][1]]
+    assert "for sand" in sand_gaits.table(numbers)
