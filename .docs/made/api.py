@@ -45,6 +45,7 @@ PACKAGES = {
         "rft.meshes",
         "rft.ground",
         "rft.walking",
+        "rft.mujoco",
     ],
 }
 

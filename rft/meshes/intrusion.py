@@ -14,7 +14,7 @@ import numpy as np
 
 from rft.checks import real_array
 from rft.ground import Ground, GroundEffect, ground_of
-from rft.meshes.contact import Motion, Part, load
+from rft.meshes.contact import Motion, Part, load, velocity_of_middle
 from rft.meshes.law import Spatial
 from rft.meshes.mesh import Mesh, below
 from rft.meshes.submerged import submerged
@@ -112,11 +112,11 @@ def _wrench_at(medium: Spatial, mesh: Mesh, ground: Ground, rotation, place, vel
         _cut_triangles(mesh, np.flatnonzero(any_under & ~all_under), heights),
     )
     part = Part(*(np.concatenate(x, -1) for x in zip(*parts)))
-    motion = Motion(velocity[:, None], spin[:, None], place[0], up, rotation[0])
-    force, moment, stress = load(medium, ground, part, motion)
-    force, moment = force.sum(-1), moment.sum(-1)
+    motion = Motion(velocity, spin, place[0], up, rotation[0])
+    force, moment, stress = load(medium, ground, part, motion, velocity_of_middle(part, motion), False)
+    force, moment = np.sum(force, -1), np.sum(moment, -1)
     power = force @ velocity + moment @ spin
-    return np.array([*rotation @ force, *rotation @ moment, power, part.area[stress.any(0)].sum()])
+    return np.array([*rotation @ force, *rotation @ moment, power, part.area[np.any(stress, 0)].sum()])
 
 
 def _full_triangles(mesh: Mesh, index: np.ndarray, up: np.ndarray, height: float) -> Part:
@@ -159,5 +159,6 @@ def bearing(
     depth, arm = -middle[:, 2] * area, (middle - place).T
     part = Part((mesh.middle_normals[triangle] @ rotation.T).T, arm, area, depth, depth * arm)
     ground = ground_of(effects, Ground(grazing_sine=medium.grazing_sine))
-    force = load(medium, ground, part, Motion(velocity[:, None], spin[:, None], place[0]))[0]
-    return Faces(parts, middle, force.T, triangle)
+    motion = Motion(velocity, spin, place[0])
+    force = load(medium, ground, part, motion, velocity_of_middle(part, motion), False)[0]
+    return Faces(parts, middle, np.stack(force, -1), triangle)
