@@ -36,6 +36,7 @@ SWIMMER = {
     "body": OneOf(PARTS["body"], sized=True),
     "effects": Each(PARTS["effects"], sized=True),
 }
+TABLE = {"body": OneOf({"chain": PARTS["body"]["chain"]}), "medium": MEDIUM}  # of a table whose file does not say them
 
 
 class Displayed:
@@ -50,7 +51,7 @@ class Scene(Displayed):
     """A system and a gait. numerics: the tiers'; the system has its own. name: a built-in one's, or its file's. text: the
     TOML it was read from, if it was; `geomech.scenes.write` says whether it still holds. files: others it was read from."""
 
-    system: Annotated[System, OneOf(SYSTEMS, inner={SHORT: SWIMMER}, sized=True, short=SHORT)]
+    system: Annotated[System, OneOf(SYSTEMS, inner={SHORT: SWIMMER, "table": TABLE}, sized=True, short=SHORT)]
     gait: Annotated[Gait, OneOf(GAITS, sized=True)]
     numerics: Annotated[Numerics, Keys(Numerics)] = field(default_factory=Numerics)
     name: str = "scene"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from geomech.geometry.tube import TaylorSeries, Tube
 from geomech.geometry.two_form import TwoForm
 from geomech.io.results import unit_name
 from geomech.io.tables import FORMATS
+from geomech.io.tables.base import UNKNOWN_FRAME, body_text
 from geomech.io.tables.netcdf import SHAPE
 from geomech.scenes.model import Scene
 from geomech.scenes.write import toml
@@ -285,10 +287,16 @@ def recorded(system: System) -> dict:
     return {} if recorded is None else dict(recorded.about())
 
 
+def _body(system: System) -> Any:
+    """Return the body of a system, or of the table that it is; None without one."""
+    inner = system.inner if isinstance(system, Framed) else system
+    return getattr(getattr(inner, "stored", inner), "body", None)
+
+
 def about(scene: Scene) -> dict:
     """Return the conventions of a connection as attributes of a file: frame, length, forces and signs."""
     system = scene.system
-    meanings = {"mean": "centre of mass, length-weighted mean heading", "that of the table": "not told by its file"}
+    meanings = {"mean": "centre of mass, length-weighted mean heading", UNKNOWN_FRAME: "not told by its file"}
     meanings["minimum-perturbation"] = "the one in which the squares of A, integrated over the grid, are least"
     meanings["that of the log"] = "the one whose x, y and heading were logged"
     meaning = meanings.get(scene.frame, "centre and heading of that link, 1 the tail")
@@ -299,6 +307,7 @@ def about(scene: Scene) -> dict:
         "body_length": float(system.length),
         "length_unit": unit_name(length_unit(system)),
         **recorded(system),
+        **({"body": text} if (text := body_text(_body(system))) else {}),
         "components": "x, y, theta of the body velocity xi: forward (tail to head), to the left, counter-clockwise",
         "sign_of_A": "xi = + A alphadot",
         "sign_of_ccf": "CCF = dA + [A, A] with [X, Y] = XY - YX, positive for counter-clockwise loops",
