@@ -4,6 +4,7 @@ import struct as packed
 
 import numpy as np
 import pytest
+from scipy.io import loadmat
 from structs import cell, computed, save, struct
 
 import rft
@@ -14,6 +15,7 @@ from geomech.geometry.minimum_perturbation import minimum_perturbation
 from geomech.io import tables
 from geomech.io.tables import matlab
 from geomech.scenes import Scene
+from geomech.studies import fields
 from geomech.systems import Swimmer, Table
 from rft.refusal import Refusal
 
@@ -254,3 +256,42 @@ def test_parts_of_version_7_3_are_refused_by_place(tmp_path):
     path.write_bytes(raw)
     with pytest.raises(Refusal, match=r"is damaged at s.grid.eval\{1, 1\}: save it in MATLAB again"):
         tables.load(path)
+
+
+@pytest.mark.parametrize("frame", ["mean", "link-1", "link-2", "link-3", "minimum-perturbation"])
+def test_an_exported_struct_has_all_that_its_scripts_read(frame, tmp_path):
+    """Of a body of 0.3 m: read again it is what it was, and loaded by SciPy it has the fields, shapes and signs."""
+    uneven = Swimmer(rft.Viscous(2.0), rft.Chain((0.7, 1.4, 0.9), 0.3))
+    source = Study(Scene(uneven, Circle())).with_numerics(grid=21, extent=1.5)
+    source = source if frame == "mean" else source.in_frame(frame)
+    fields.save_connection(tmp_path / "s.mat", source, layout="struct")
+    again = study(tmp_path / "s.mat")
+    assert again.scene.frame == frame and again.scene.system.stored.power_degree == 2
+    lengths = np.array([0.3, 0.3, 1.0]).reshape(3, 1, 1, 1)
+    np.testing.assert_allclose(again.fitted.A * lengths, source.fitted.A, rtol=1e-13, atol=1e-16)
+    np.testing.assert_allclose(again.metric.M, source.metric.M, rtol=1e-13)
+    np.testing.assert_allclose(again.fitted.residual * lengths[..., 0], source.fitted.residual, rtol=1e-13, atol=1e-16)
+    known = again.scene.system.stored.computed
+    np.testing.assert_allclose(known.ccf[:, 0] * lengths[..., 0], source.curvature.values, rtol=1e-12, atol=1e-15)
+    if frame != "minimum-perturbation":  # which is kept but for the spline
+        np.testing.assert_allclose(known.A_optimised, again.in_frame("minimum-perturbation").fitted.A, atol=1e-9)
+    s = loadmat(tmp_path / "s.mat", simplify_cells=True)["s"]
+    assert {"vector", "scalar", "eval", "metric_eval", "metric_display"} <= {*s["grid"]} and s["singularity"] == 0
+    for place, grid in (("eval", "eval"), ("display", "vector"), ("finite_element", "finite_element")):
+        content = s["vecfield"][place]["content"]
+        assert s["vecfield"][place]["type"] == grid and content["Avec"].shape == (3, 2)
+        np.testing.assert_array_equal(np.array(content["Avec"].tolist()), -np.array(content["A_num"].tolist()))
+    for ending in ("", "_optimized"):
+        DA, dA, lb = (np.array(s[f"{name}{ending}"].tolist()) for name in ("DA", "dA", "lb"))
+        np.testing.assert_allclose(DA, dA - lb, atol=1e-15)
+    assert s["metricfield"]["metric_display"]["content"]["metric"][0, 0].shape == s["grid"]["metric_display"][0].shape
+
+
+def test_an_exported_struct_of_sand_keeps_what_its_fit_left(tmp_path):
+    source = Study(Scene(Swimmer(rft.Granular(1.8, 0.24), SWIMMER.body), Circle())).with_numerics(grid=7, extent=1.5)
+    fields.save_connection(tmp_path / "s.mat", source, layout="struct")
+    again = study(tmp_path / "s.mat")
+    np.testing.assert_array_equal(again.fitted.residual, source.fitted.residual)
+    assert (
+        again.scene.system.stored.metric is None and again.scene.system.table_error(*Circle().cycle(32, 1.0))[0] > 0.05
+    )

@@ -64,7 +64,7 @@ def why_none(system: System) -> str:
         has_power = capability(system, Dissipative) is not None
         power = "its power is of no one degree in the rate" if has_power else "nothing says what moving costs"
         return f"no metric with {_responsible_parts(system)}: {power}"
-    if not _is_quadratic(system) and system.joints != 2:
+    if not is_quadratic(system) and system.joints != 2:
         return f"no metric of {system.joints} joints where power is not quadratic: its norm is told for two"
     return (
         ""
@@ -73,7 +73,7 @@ def why_none(system: System) -> str:
     )
 
 
-def _is_quadratic(system: System) -> bool:
+def is_quadratic(system: System) -> bool:
     """Return whether power is a quadratic form of alphadot: that of a linear medium where xi = A alphadot."""
     return system.traits.linear and system.traits.power_degree in (None, 2.0)
 
@@ -102,7 +102,7 @@ def table(system: System, numerics: Numerics, progress: Callable | None = None) 
         return own
     grid, degree = axes(system, numerics), numerics.interpolation
     own = capability(system, OwnMetric)
-    if own is not None or _is_quadratic(system):
+    if own is not None or is_quadratic(system):
         return metric.fit(own.squared_speed if own else partial(power, system), grid, degree, progress)
     norm = partial(_norm_of, system)
     count = harmonic.directions(system, numerics)

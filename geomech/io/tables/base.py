@@ -19,15 +19,18 @@ from rft.refusal import Refusal, printable
 from rft.registry import Registry, functions_with
 
 LONGEST_NAME = 60  # characters of what a file calls a frame, or a shape variable
+MINIMUM_PERTURBATION = "minimum-perturbation"
 UNKNOWN_FRAME = "that of the table"  # of a file that does not say it
 LARGEST_ANGLE = 10 * np.pi  # rad of a shape variable, a joint angle or a bend; beyond it is taken for degrees
 LARGEST_ENTRY = 1e9  # of A, body lengths or m or rad per rad
 SIGNS = {"+": "xi = + A alphadot", "-": "xi = - A alphadot"}
 BODY = ("lengths", "frame", "modes", "waves")  # what files say of a chain of links
+LAYOUTS = ("arrays", "struct")
 ORDERS = ("ndgrid", "meshgrid")
 # Readers, parse(raw, sign, order, sha256) -> Stored. Their attributes: suffix; write, a function of (path, result, **settings),
 # where a result as of `geomech.studies.fields.of_study` can be written; settings, names of those that it takes ("sign",
-# "order"); joints, the only number that it takes; whole, False where it takes no more than A and what is known of its error.
+# "order", "layout"); joints, the only number that it takes; whole, False where it takes no more than A, what is known of its
+# error, and a quadratic metric.
 FORMATS = Registry("geomech.formats", "suffix", "a file format", functions_with("suffix"))
 ROWS = ("x", "y", "theta")
 ROUNDING = 1e-9  # of the largest velocity: a displacement below it has no sign

@@ -17,11 +17,9 @@ from geomech.geometry.coordinates import change_connection
 from geomech.geometry.harmonics import Harmonics, basis
 from geomech.geometry.minimum_perturbation import minimum_perturbation
 from geomech.geometry.tube import Tube
-from geomech.io.tables.base import Stored, rms
+from geomech.io.tables.base import MINIMUM_PERTURBATION, Stored, rms
 from rft import se2
 from rft.refusal import Refusal
-
-MINIMUM_PERTURBATION = "minimum-perturbation"
 
 
 def in_frame(stored: Stored, frame: str, chain: Any = None) -> Stored:

@@ -15,7 +15,7 @@ from geomech.io.tables.matlab import DEEPEST, LARGEST
 from rft.refusal import Refusal
 
 CURE = "pip install 'geomech[hdf5]', or save it in MATLAB by save(FILE, ..., '-v7')"
-ANEW = "save it in MATLAB again"
+ANEW = "save it in MATLAB again, by save(FILE, ..., '-v7')"
 
 
 def arrays(raw: bytes, names: Collection[str]) -> dict[str, Any]:
@@ -34,7 +34,7 @@ def arrays(raw: bytes, names: Collection[str]) -> dict[str, Any]:
     except Refusal:
         raise
     except Exception:  # what is damaged makes HDF5 raise whatever comes first
-        raise Refusal("is damaged, cut short, or no MATLAB file", instead=ANEW) from None
+        raise Refusal("is a damaged MATLAB 7.3 (HDF5) file, or cut short", instead=ANEW) from None
 
 
 class Reader:

@@ -26,6 +26,7 @@ from geomech.io.tables import hdf5, matlab, sysplotter
 from geomech.io.tables.base import (
     FORMATS,
     LARGEST_ANGLE,
+    LAYOUTS,
     ORDERS,
     SIGNS,
     UNKNOWN_FRAME,
@@ -40,6 +41,7 @@ from geomech.io.tables.base import (
     numbers,
     rms,
 )
+from geomech.io.tables.calc import write_struct
 from geomech.io.tables.netcdf import UNITS, shape_name
 from rft.refusal import Refusal
 
@@ -52,13 +54,17 @@ ABOUT, RESIDUAL, ERROR = "geomech_about", "geomech_fit_residual", "geomech_A_err
 SAVE = "save it in MATLAB by save(FILE, ..., '-v7')"
 
 
-def write(path: str | Path, result: Result, sign: str = "+", order: str = "ndgrid") -> None:
+def write(path: str | Path, result: Result, sign: str = "+", order: str = "ndgrid", layout: str = LAYOUTS[0]) -> None:
     """Write A, each entry (N, M), for xi = ``sign`` A alphadot; rows run over alpha1 as of ndgrid, or over alpha2 as of
     meshgrid.
 
     ABOUT is a JSON text of sign, frame, body length, unit and spline. The file has the fit residual (3, N, M), too, which
     includes the part of the velocity that is even in alphadot, where A has intervals their half widths (3, 2, N, M), and M
-    where it is quadratic. It appears whole or not at all."""
+    where it is quadratic. It appears whole or not at all. layout: "struct" writes sysplotter's struct s (`write_struct`)
+    instead."""
+    if layout == LAYOUTS[1]:
+        write_struct(path, result)
+        return
     from scipy.io import savemat
 
     A, axes = result["A"], [result["alpha_1"], result["alpha_2"]]
@@ -94,7 +100,7 @@ def _written_about(attributes: Mapping, names: list[str], sign: str) -> dict:
     }  # fmt: skip
 
 
-@FORMATS.register(suffix=".mat", write=write, settings=("sign", "order"), joints=2, whole=False)
+@FORMATS.register(suffix=".mat", write=write, settings=("sign", "order", "layout"), joints=2, whole=False)
 def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     """Return the table in the bytes of a file; Refusal, to follow the file's name, if there is none."""
     variables = _variables(raw)

@@ -25,12 +25,14 @@ import numpy as np
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
 from geomech.geometry.metric import Metric
-from geomech.io.tables.base import UNKNOWN_FRAME, Stored, checked_axis, numbers, rms
+from geomech.io.tables.base import MINIMUM_PERTURBATION, UNKNOWN_FRAME, Stored, checked_axis, numbers, rms
 from rft.refusal import Refusal
 
 CALC = "save it by sys_calcsystem, in a file whose name ends in _calc.mat"
 CONTENT = "vecfield.eval.content"
 DRAG, INERTIA = "drag", "inertia"  # s.system_type
+RESIDUAL = "geomech_fit_residual"  # a field that sysplotter has not: rms of xi - A alphadot, as of `Connection`
+OURS = (MINIMUM_PERTURBATION, UNKNOWN_FRAME)  # names of frames in files of ours that sysplotter has not
 FRAMES = {"com-mean": "mean", "tail": "link-1"}  # our names of its base frames, of any number of links
 
 
@@ -70,7 +72,9 @@ def parse(s: Mapping, sign: str, order: str, sha256: str) -> Stored:
     )  # fmt: skip
     size = {} if length is None else {"unit": "BL", "length": 1.0}
     spline = min(3, min(shape) - 1)
-    connection = Connection(axes, scaled(A), np.full((3, *shape), np.nan), rms(scaled(A)), spline, **size)
+    A, residual = scaled(A), scaled(optional(RESIDUAL, (3,)))
+    residual = np.full((3, *shape), np.nan) if residual is None else residual
+    connection = Connection(axes, A, residual, rms(A, np.nan_to_num(residual)), spline, **size)
     return Stored(
         connection, frame=frame, sha256=sha256, shapes=tuple(f"alpha_{k + 1}" for k in range(d)), sized=length is not None,
         metric=None if metric is None else _on_grid(axes_of_metric, metric, axes, spline), power_degree=degree, body=body,
@@ -161,7 +165,7 @@ def _body(s: Mapping) -> tuple[dict | None, str, float | None]:
     if not _has(s, "geometry"):
         return None, UNKNOWN_FRAME, None
     base = _get(s, "geometry.baseframe") if _has(s, "geometry.baseframe") else "center"
-    named = f"{base} of sysplotter" if isinstance(base, str) else UNKNOWN_FRAME
+    named = UNKNOWN_FRAME if not isinstance(base, str) else base if base in OURS else f"{base} of sysplotter"
     length = _number(s, "geometry.length")
     if not _has(s, "geometry.linklengths"):
         return None, named, length
