@@ -11,7 +11,7 @@ import functools
 import io
 import json
 import warnings
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -103,23 +103,23 @@ def _written_about(attributes: Mapping, names: list[str], sign: str) -> dict:
 @FORMATS.register(suffix=".mat", write=write, settings=("sign", "order", "layout"), joints=2, whole=False)
 def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     """Return the table in the bytes of a file; Refusal, to follow the file's name, if there is none."""
-    variables = _variables(raw)
-    if isinstance(variables.get(STRUCT), dict) and not {*ANGLES, *ENTRIES} <= {*variables}:
-        return sysplotter.parse(variables[STRUCT], sign, order, sha256)
-    _check(variables)
-    axes, order = _axes(variables, order)
-    about = _about(variables)
-    A = _entries(variables, axes, order, about)
+    found = variables(raw, (STRUCT, *ANGLES, *ENTRIES, *METRIC, ABOUT, RESIDUAL, ERROR))
+    if isinstance(found.get(STRUCT), dict) and not {*ANGLES, *ENTRIES} <= {*found}:
+        return sysplotter.parse(found[STRUCT], sign, order, sha256)
+    _check(found)
+    axes, order = _axes(found, order)
+    about = _about(found)
+    A = _entries(found, axes, order, about)
     if not A.any():
         raise Refusal("has a connection that is zero everywhere")
-    residual, error = _residual(variables, A, order, about), _error(variables, A, order, about)
+    residual, error = _residual(found, A, order, about), _error(found, A, order, about)
     degree = about.get("interpolation", 3)
     degree = degree if degree in (1, 2, 3, 4, 5) and min(map(len, axes)) > degree else 3
     sized = about.get("unit") in ("BL", "m") and isinstance(about.get("length"), float) and 0 < about["length"] < 1e9
     length, unit = (about["length"], about["unit"]) if sized else (1.0, "BL")
     size = {"unit": unit, "length": length} if sized else {}
     plain = Connection(axes, A, residual, rms(A, np.nan_to_num(residual)), degree, **size)
-    assumptions = () if variables[ANGLES[0]].ndim == 1 or order == "ndgrid" else ("its arrays run as meshgrid's",)
+    assumptions = () if found[ANGLES[0]].ndim == 1 or order == "ndgrid" else ("its arrays run as meshgrid's",)
     if not sign and about.get("sign") not in SIGNS:
         assumptions += (f"its sign is made out as {SIGNS[detected_sign(plain)]}; say sign = '+' or '-' if you know it",)
     sign = sign or (about["sign"] if about.get("sign") in SIGNS else detected_sign(plain))
@@ -128,19 +128,20 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     shapes = checked_names(about.get("shapes"), ["alpha_1", "alpha_2"])
     optional = {
         "A_error": error, "level": checked_level(about), "sized": sized, "body": checked_body(about.get("body")),
-        **_metric(variables, axes, order, about, degree),
+        **_metric(found, axes, order, about, degree),
     }  # fmt: skip
     return Stored(connection, None, None, length, unit, frame, sign, order, assumptions, sha256, shapes, **optional)
 
 
-def _variables(raw: bytes) -> dict[str, Any]:
-    """Return the variables of a file by name; Refusal if it is none of MATLAB's."""
+def variables(raw: bytes, names: Collection[str]) -> dict[str, Any]:
+    """Return the variables of a file by name, those of some names at least, as `matlab.arrays`; Refusal if it is none of
+    MATLAB's."""
     if raw[:4] == b"\x89HDF" or raw[:10] == b"MATLAB 7.3":
-        return hdf5.arrays(raw, (STRUCT, *ANGLES, *ENTRIES, *METRIC, ABOUT, RESIDUAL, ERROR))
+        return hdf5.arrays(raw, names)
     if raw[:3] == b"CDF":
         raise Refusal("is no MATLAB file, but a NetCDF one", instead="end its name in .nc")
     try:
-        return _read_version_4(raw) if raw[:4] and 0 in raw[:4] else matlab.arrays(raw)
+        return _read_version_4(raw, names) if raw[:4] and 0 in raw[:4] else matlab.arrays(raw)
     except ValueError:
         raise Refusal("is damaged, cut short, or no MATLAB file", instead=SAVE) from None
 
@@ -155,14 +156,14 @@ def _check(variables: dict) -> None:
             raise Refusal(f"has {name} that is no array of real numbers")
 
 
-def _read_version_4(raw: bytes) -> dict[str, np.ndarray]:
+def _read_version_4(raw: bytes, names: Collection[str]) -> dict[str, np.ndarray]:
     """Return the variables of a file of version 4, which SciPy reads in Python; Refusal for a damaged one."""
     from scipy.io import loadmat
 
     try:  # what is damaged makes SciPy raise whatever comes first
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return loadmat(io.BytesIO(raw), variable_names=[*ANGLES, *ENTRIES, *METRIC])
+            return loadmat(io.BytesIO(raw), variable_names=[*names])
     except Exception:
         raise Refusal("damaged") from None
 
