@@ -18,27 +18,13 @@ from rft.refusal import Refusal
 T = np.linspace(0, 2 * np.pi, 201)
 CIRCLE = Circle(amplitude=0.8, centre=(0.3, -0.2))
 # Of shchf_LowRe_MaxDisplacement.m and shchf_LowRe_MaxEfficiency.m (GeometricSystemPlotter, MIT).
-DISPLACEMENT = (
-    2.017955906441066,
-    1.353385144748382,
-    0.013112519773635,
-    0.263823759269392,
-    -0.031456173657342,
-    -0.003626287235861,
-)
-EFFICIENCY = (
-    1.495398722861924,
-    1.326600886340017,
-    0.083253854456986,
-    0.089227148110158,
-    -0.034695750579259,
-    -0.044759551791058,
-)
+DISPLACEMENT = (2.0179559064, 1.3533851447, 0.0131125198, 0.2638237593, -0.0314561737, -0.0036262872)
+EFFICIENCY = (1.4953987229, 1.3266008863, 0.0832538545, 0.0892271481, -0.0346957506, -0.0447595518)
 
 
 @pytest.mark.parametrize(("XV", "distance", "length"), [(DISPLACEMENT, 0.1035, None), (EFFICIENCY, 0.0873, 0.7866)])
 def test_its_optima_move_as_published(XV, distance, length):
-    """Distance and path length: S. Ramasamy and R. L. Hatton, IEEE Trans. Robotics 35, 1014 (2019)."""
+    """Distance and path length of the published optima (Ramasamy and Hatton)."""
     study = Study(Scene(Swimmer(rft.Viscous(2.0), rft.Chain()), Shchf(XV=XV))).with_numerics(phases=64)
     assert np.hypot(*study.poses("direct", None, [1.0])[0, :2]) == pytest.approx(distance, abs=5e-5)
     assert length is None or study.effort()["path_length"][0] == pytest.approx(length, abs=5e-5)
@@ -112,7 +98,7 @@ def test_a_scene_names_its_file(form, tmp_path, monkeypatch):
             r"a.mat has alpha1, alpha2, ... that do not close: .* 6.28 rad from the first; end it where it begins",
         ),
         ({"alpha1": 60 * np.sin(T)}, "has alpha1, alpha2, ... up to 60 where angles are in rad: convert it"),
-        ({"alpha2": np.nan * T}, r"has alpha2 that is not finite .* \(0,\): mend it"),
+        ({"alpha2": np.nan * T}, r"has alpha2 that is not finite .* \(0, 0\): mend it"),
         ({"t": -T}, "no four shapes or more at ascending times"),
         ({"t": T[:9]}, "no four shapes or more at ascending times"),
     ],
@@ -125,7 +111,7 @@ def test_points_that_make_no_gait_are_refused(changes, said, tmp_path):
 @pytest.mark.parametrize(
     ("variables", "settings", "said"),
     [
-        ({"x": 1.0}, {}, r"a.mat has no gait: one is alpha1, .* phi|has no gait: one is alpha1"),
+        ({"x": 1.0}, {}, "a.mat has no gait: one is alpha1, alpha2"),
         ({"A1": [0.0, 1.0], "B1": [0.0]}, {}, "has no gait"),
         ({"A1": [0.0, 1.0], "B1": [0.0, 1.0]}, {"number": 2}, "has one gait, and no 2: drop number"),
         ({"p": {"phi_def": 1.0}}, {}, "has no gait: .* function handles are not run"),

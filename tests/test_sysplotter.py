@@ -169,8 +169,8 @@ AVEC, METRIC = "s.vecfield.eval.content.Avec", ("metricfield", "metric_eval", "c
 BAD = {
     "not computed": (("vecfield",), None, f"has no {AVEC}: save it by sys_calcsystem, .* _calc.mat$"),
     "no grid": (("grid", "eval"), None, "has no s.grid.eval: save it by"),
-    "nan": ((*CONTENT, "Avec"), spoiled((1, 0), np.nan), rf"has {AVEC}\{{2, 1\}} that is not finite .* \(2, 5\)"),
-    "nan in the grid": (("grid", "eval"), spoiled((0, 0), np.nan), r"has s.grid.eval\{1\} that is not finite .* \(2, 5\)"),
+    "nan": ((*CONTENT, "Avec"), spoiled((1, 0), np.nan), rf"has {AVEC}\{{2, 1\}} that is not finite .* \(3, 6\)"),
+    "nan in the grid": (("grid", "eval"), spoiled((0, 0), np.nan), r"has s.grid.eval\{1\} that is not finite .* \(3, 6\)"),
     "a bit": (
         (*CONTENT, "A_num"), spoiled((0, 1), 0.25),
         rf"is damaged: {AVEC}\{{1, 2\}} is not the negative of A_num at \(3, 6\)",

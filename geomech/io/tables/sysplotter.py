@@ -108,11 +108,19 @@ def _cells(s: Mapping, path: str, lead: tuple[int, ...], shape: tuple[int, ...])
     out = np.empty((count, *shape))
     for k, values in enumerate(cell.reshape(count)):
         place = f"s.{path}{{{', '.join(str(i + 1) for i in np.unravel_index(k, lead))}}}"
-        values = numbers(place, np.nan if values is None else values)
+        values = _numbers(place, np.nan if values is None else values)
         if values.shape != shape:
             raise Refusal(f"has {place} of shape {values.shape} where its grid makes it {shape}", instead=CALC)
         out[k] = values
     return out.reshape(*lead, *shape)
+
+
+def _numbers(place: str, values: Any) -> np.ndarray:
+    """Return `numbers`, with the place of the first that is not finite as MATLAB counts, from 1."""
+    if getattr(values, "dtype", np.dtype(object)).kind == "f" and not np.isfinite(values).all():
+        index = ", ".join(str(k + 1) for k in np.argwhere(~np.isfinite(values))[0])
+        raise Refusal(f"has {place} that is not finite (nan or inf) at ({index})", instead="mend it")
+    return numbers(place, values)
 
 
 def _axes(s: Mapping, path: str) -> tuple[np.ndarray, ...]:
@@ -120,7 +128,7 @@ def _axes(s: Mapping, path: str) -> tuple[np.ndarray, ...]:
     cell = _get(s, path)
     if not isinstance(cell, np.ndarray) or cell.dtype != object or cell.size < 2:
         raise Refusal(f"has s.{path} that is no cell of the grids of two angles or more", instead=CALC)
-    grids = [numbers(f"s.{path}{{{k + 1}}}", x) for k, x in enumerate(cell.ravel())]
+    grids = [_numbers(f"s.{path}{{{k + 1}}}", x) for k, x in enumerate(cell.ravel())]
     if any(x.ndim != len(grids) or x.shape != grids[0].shape for x in grids):
         raise Refusal(f"has s.{path} of shapes {', '.join(str(x.shape) for x in grids)}", instead=CALC)
     axes = []
