@@ -17,6 +17,7 @@ from geomech.io.tables import matlab
 from geomech.scenes import Scene
 from geomech.studies import fields
 from geomech.systems import Swimmer, Table
+from geomech.text.system import described
 from rft.refusal import Refusal
 
 SWIMMER = Swimmer(rft.Viscous(2.0), rft.Chain((1, 1, 1), frame="link-2"))
@@ -295,3 +296,30 @@ def test_an_exported_struct_of_sand_keeps_what_its_fit_left(tmp_path):
     assert (
         again.scene.system.stored.metric is None and again.scene.system.table_error(*Circle().cycle(32, 1.0))[0] > 0.05
     )
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda A: A, None),
+        (lambda A: -A, "of the other sign"),
+        (lambda A: A[:, ::-1].swapaxes(-1, -2), "with alpha1 and alpha2 swapped"),
+        (lambda A: A[..., ::-1, ::-1], "with both axes mirrored"),
+        (lambda A: -A[..., ::-1, ::-1], "with angles, or y and heading, positive clockwise"),
+    ],
+)
+def test_a_connection_that_its_body_would_have_with_other_axes_is_noted(change, said, tmp_path):
+    """By the swimmer in a fluid that its links are; nothing is changed, and a scene that loads it says so in a line."""
+    A = change(computed()[0].A)
+    content = {"A_num": cell(-A, (3, 2)), "Avec": cell(A, (3, 2))}
+    table = Table(write(tmp_path / "s.mat", vecfield={"eval": {"content": content}}))
+    np.testing.assert_array_equal(table.stored.connection.A, A)
+    line = f"its A is that of a body of links {said} (correlation 1.00, as it stands "
+    assert table.assumed == () if said is None else table.assumed[0].startswith(line)
+    assert said is None or table.assumed[0].endswith("): check sign, axes and angles")
+
+
+def test_explain_says_how_far_its_own_numbers_are_from_ours(tmp_path):
+    lines = described(Table(write(tmp_path / "s.mat")))
+    (line,) = [line for line in lines if line.startswith("largest difference of sysplotter's own from ours")]
+    assert "CCF of joints 1 and 2 11 %, minimum-perturbation frame 1.6 %" in line

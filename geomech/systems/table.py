@@ -23,6 +23,7 @@ from geomech.io import tables
 from geomech.io.tables.base import BODY, UNKNOWN_FRAME
 from geomech.systems.base import SYSTEMS, integrated
 from geomech.systems.capabilities import Dissipative, OwnMetric
+from geomech.systems.misread import misread
 from geomech.systems.swimmer import Swimmer
 from rft.bodies import Chain
 from rft.checks import Number, check_numbers
@@ -31,6 +32,7 @@ from rft.refusal import Refusal
 LENGTHS = (
     "its lengths are taken for body lengths; say body_length = 1 if they are, 3 if one is a link of three equal ones"
 )
+THREE_LINKS = [Chain(frame=frame) for frame in ("mean", "link-1", "link-2", "link-3")]  # a bare file is likely of one
 
 
 def _chain(stored: tables.Stored) -> Chain | None:
@@ -260,14 +262,17 @@ class Table:
         taylor = self.tube.taylor
         return {**attributes, "singular_shapes": BEYOND, "level": taylor.level, "error_factor": taylor.factor}
 
-    @property
+    @cached_property
     def assumed(self) -> tuple[str, ...]:
-        """Assumptions about facts that the file does not state, one a line."""
-        return (
-            self.stored.assumptions
-            if self.stored.sized or self.body_length is not None
-            else (*self.stored.assumptions, LENGTHS)
-        )
+        """Assumptions about facts that the file does not state, and what contradicts those that it states, one a line."""
+        stored = self.original
+        lines = stored.assumptions if stored.sized or self.body_length is not None else (*stored.assumptions, LENGTHS)
+        ours = stored.sized and stored.computed is None  # a file of geomech's
+        drag = stored.metric is None or stored.power_degree is not None or not stored.sized
+        if self.tube is not None or ours or not drag:
+            return lines
+        misread_as = misread(stored.connection, [self.chain] if self.chain else THREE_LINKS)
+        return (*lines, misread_as) if misread_as else lines
 
     @classmethod
     def examples(cls) -> dict[str, Table]:

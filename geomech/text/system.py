@@ -6,6 +6,7 @@ import dataclasses
 
 from geomech.core import summary
 from geomech.io.tables.base import SIGNS
+from geomech.io.tables.sysplotter import compared
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import System, WrappedSystem, kind_of
 from geomech.systems.framed import NAME, Framed
@@ -98,6 +99,9 @@ def _table(system: Table) -> list[str]:
         lines.append("its file tells intervals of A: they are part of every error")
     if not held.has_residual:
         lines.append("the file does not tell what its fit left: errors are those of the grid alone")
+    if held.computed is not None:
+        found = ", ".join(f"{name} {100 * x:.2g} %" for name, x in compared(system.original).items())
+        lines.append(f"largest difference of sysplotter's own from ours, in the middle half of the grid: {found}")
     lines.append(f"stored as {SIGNS[held.sign]}, arrays as {held.order}, lengths in {held.unit}, frame {held.frame}")
     return [
         *lines,

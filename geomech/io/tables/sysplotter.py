@@ -17,14 +17,16 @@ coordinates solve the same equations as `geomech.geometry.minimum_perturbation` 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from geomech.geometry.connection import Connection
+from geomech.geometry.curvature import ccf
 from geomech.geometry.field import Field
 from geomech.geometry.metric import Metric
+from geomech.geometry.minimum_perturbation import minimum_perturbation
 from geomech.io.tables.base import MINIMUM_PERTURBATION, UNKNOWN_FRAME, Stored, checked_axis, numbers, rms
 from rft.refusal import Refusal
 
@@ -50,6 +52,24 @@ class Computed:
     ccf_optimised: np.ndarray | None = None
     metric_axes: tuple[np.ndarray, ...] = ()
     metric: np.ndarray | None = None
+
+
+def compared(stored: Stored) -> dict[str, float]:
+    """Return how far what sysplotter computed is from ours of its A, in the middle half of the grid, over the largest value
+    there is: by name, in words."""
+    c, theirs = stored.connection, stored.computed
+    ours = {"CCF of joints 1 and 2": (ccf(c).values, theirs.ccf)}
+    frame = minimum_perturbation(c)
+    ours["minimum-perturbation frame"] = frame.field.values, theirs.beta
+    ours["CCF in that frame"] = ccf(replace(c, A=frame.connection(c))).values, theirs.ccf_optimised
+    inner = (..., *(slice(len(a) // 4, -(len(a) // 4) or None) for a in c.axes))
+    found = {}
+    for name, (values, other) in ours.items():
+        if other is not None:
+            other = other[:, 0] if other.ndim > values.ndim else other
+            largest = np.abs(values).reshape(3, -1).max(1).reshape(3, *[1] * len(c.axes))
+            found[name] = float((np.abs(values - other) / np.where(largest > 1e-9, largest, np.inf))[inner].max())
+    return found
 
 
 def parse(s: Mapping, sign: str, order: str, sha256: str) -> Stored:
