@@ -34,6 +34,8 @@ def test_numbers_run_as_its_function_of_time():
     """stroke = Rot45 (sum a_k cos k t, sum b_k sin k t) at -t."""
     k, (a, b) = np.array([1, 3, 5])[:, None], np.reshape(EFFICIENCY, (3, 2)).T
     u, v = a @ np.cos(-k * T), b @ np.sin(-k * T)
+    scene = Scene(Swimmer(rft.Viscous(2.0), rft.Chain()), Shchf(XV=EFFICIENCY))
+    assert scenes.parse(scenes.toml(scene)).gait == scene.gait
     np.testing.assert_allclose(Shchf(XV=EFFICIENCY).shape(T), np.stack([u - v, u + v], -1) / np.sqrt(2), atol=1e-14)
 
 
@@ -137,7 +139,7 @@ def test_files_without_a_gait_are_refused(variables, settings, said, tmp_path):
         ({"XV": (1.0, 1.0), "file": "a.mat"}, "either XV or a file: give one"),
         ({"XV": (1.0, 1.0, 0.1)}, "XV must be pairs a1, b1, a3, b3"),
         ({"file": "none.mat"}, "cannot read the gait none.mat: No such file"),
-        ({"file": 3}, "file must be text"),
+        ({"file": 3}, "file must be the name of a .mat file, got 3"),
     ],
 )
 def test_settings_that_make_no_gait_are_refused(settings, said):

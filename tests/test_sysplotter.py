@@ -84,6 +84,9 @@ def test_base_frames_have_our_names(base, frame, tmp_path):
 def test_a_base_frame_without_our_name_keeps_its_own(tmp_path):
     table = Table(write(tmp_path / "s.mat", base="tail-tip"))
     assert table.traits.frame == "tail-tip of sysplotter"
+    for base in ([[2.0, 0.5]], [[np.nan]], [[4.0]]):  # as a damaged one, or a matrix, reads
+        start = Table(write(tmp_path / "t.mat", base=np.array(base)))
+        assert start.traits.frame == "that of the table" and start.chain is None
     with pytest.raises(Refusal, match=r"no frame 'mean' of a table whose frame is 'tail-tip of sysplotter'"):
         table.in_frame("mean")
     assert study(tmp_path / "s.mat", frame="minimum-perturbation").fitted.A.any()

@@ -32,18 +32,19 @@ class Shchf(Gait):
     _curve: ClassVar[Any]  # a Fourier series, or a spline through points
 
     XV: tuple[float, ...] = ()
-    file: str = ""
+    file: str | None = None
     number: Annotated[int, Number(1, 10_000, "-", "of the gait, where the file has several", whole=True)] = 1
     amplitude: Scale = 1.0
     sha256: str = ""
 
     def __post_init__(self):
-        for name in ("file", "sha256"):
-            if not isinstance(getattr(self, name), (str, Path)):
-                raise Refusal(f"{name} must be text", value=getattr(self, name))
-        object.__setattr__(self, "file", str(self.file))
-        if bool(self.file) == bool(len(self.XV)):
+        if not isinstance(self.file, (str, Path, type(None))):
+            raise Refusal("file must be the name of a .mat file", value=self.file)
+        if not isinstance(self.sha256, str):
+            raise Refusal("sha256 must be text", value=self.sha256)
+        if (self.file is None) == (not len(self.XV)):
             raise Refusal("a shchf gait has either XV or a file", instead="give one")
+        object.__setattr__(self, "file", self.file and str(self.file))
         object.__setattr__(self, "_curve", self._of_file() if self.file else self._of_numbers())
         super().__post_init__()
 

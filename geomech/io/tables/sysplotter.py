@@ -207,11 +207,13 @@ def _body(s: Mapping) -> tuple[dict | None, str, float | None]:
 
 def _frame(base: Any, links: int) -> str:
     """Return our name of a base frame; its own where we have none."""
-    if isinstance(base, np.ndarray) and base.size == 1 and base.dtype.kind in "iuf":
-        return f"link-{int(base.reshape(()))}"
+    if not isinstance(base, str):
+        number = np.asarray(base)
+        numbered = number.size == 1 and number.dtype.kind in "iuf" and number.item() in range(1, links + 1)
+        return f"link-{int(number.item())}" if numbered else ""
     if base in ("center", "centered") and links % 2:
         return f"link-{(links + 1) // 2}"
-    return f"link-{links}" if base == "head" else FRAMES.get(base, "") if isinstance(base, str) else ""
+    return f"link-{links}" if base == "head" else FRAMES.get(base, "")
 
 
 def _metric(
