@@ -10,6 +10,7 @@ from structs import cell, computed, save, struct
 import rft
 from geomech import Study
 from geomech.gaits import Circle
+from geomech.geometry import connection
 from geomech.geometry.curvature import ccf
 from geomech.geometry.minimum_perturbation import minimum_perturbation
 from geomech.io import tables
@@ -299,6 +300,20 @@ def test_an_exported_struct_of_sand_keeps_what_its_fit_left(tmp_path):
     assert (
         again.scene.system.stored.metric is None and again.scene.system.table_error(*Circle().cycle(32, 1.0))[0] > 0.05
     )
+
+
+def test_a_struct_of_three_joints_is_read(tmp_path):
+    four = Swimmer(rft.Viscous(2.0), rft.Chain((1, 1, 1, 1), frame="link-2"))
+    fitted = connection.fit(four.velocity, connection.grid(3, 5, 1.0), 12, traits=four.traits)
+    grid = cell(np.array(np.meshgrid(*fitted.axes, indexing="ij")), (3,))
+    content = {"Avec": cell(fitted.A, (3, 3))}
+    geometry = {"linklengths": [1.0, 1, 1, 1], "baseframe": 2.0}  # without a length links are not scaled
+    save(tmp_path / "s.mat", {"geometry": geometry, "grid": {"eval": grid}, "vecfield": {"eval": {"content": content}}})
+    table = Table(tmp_path / "s.mat")
+    assert (table.joints, table.traits.frame, table.chain) == (3, "link-2", four.body)
+    np.testing.assert_allclose(table.stored.connection.A[:2], fitted.A[:2] / 4, rtol=1e-13)
+    np.testing.assert_array_equal(table.stored.connection.A[2], fitted.A[2])
+    assert not [line for line in described(table) if "sysplotter's own" in line]
 
 
 @pytest.mark.parametrize(

@@ -99,8 +99,8 @@ def _table(system: Table) -> list[str]:
         lines.append("its file tells intervals of A: they are part of every error")
     if not held.has_residual:
         lines.append("the file does not tell what its fit left: errors are those of the grid alone")
-    if held.computed is not None:
-        found = ", ".join(f"{name} {100 * x:.2g} %" for name, x in compared(system.original).items())
+    if held.computed is not None and (differences := compared(system.original)):
+        found = ", ".join(f"{name} {100 * x:.2g} %" for name, x in differences.items())
         lines.append(f"largest difference of sysplotter's own from ours, in the middle half of the grid: {found}")
     lines.append(f"stored as {SIGNS[held.sign]}, arrays as {held.order}, lengths in {held.unit}, frame {held.frame}")
     return [
