@@ -192,7 +192,8 @@ BAD = {
         r"has s.DA\{1, 1\} of shape \(4, 4\) where its grid makes it \(15, 15\)",
     ),
     "symmetric": (METRIC, spoiled((0, 1), 1.0), r"metric that is not symmetric: \{1, 2\} at \(3, 6\)"),
-    "metric too small": (("grid", "metric_eval"), lambda x: 0.5 * x, "s.grid.metric_eval that does not cover s.grid.eval"),
+    "metric too low": (("grid", "metric_eval"), lambda x: x - 0.5, "s.grid.metric_eval that does not cover s.grid.eval"),
+    "metric too high": (("grid", "metric_eval"), lambda x: x + 0.5, "s.grid.metric_eval that does not cover s.grid.eval"),
 }  # fmt: skip
 
 

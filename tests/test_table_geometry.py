@@ -18,6 +18,7 @@ from geomech.io import tables
 from geomech.scenes import Numerics, Scene
 from geomech.studies import effort, estimate, fields
 from geomech.systems import Swimmer, Table
+from geomech.text.system import described
 from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -140,6 +141,9 @@ def test_a_scene_gives_a_table_its_body_and_medium(sources, tmp_path, monkeypatc
         scene = scenes.load(f"{name}.toml")
         assert scene.frame == frame and isinstance(scene.system.medium, rft.Viscous)
         assert scenes.parse(scenes.toml(scene)).system == scene.system
+        lines = "\n".join(described(scene.system))
+        assert "changes of shape cost the drag of viscous (ratio = 2.0) on chain (" in lines
+        assert ("frame mean, from link-1 in the file" in lines) == (frame == "mean")
     code, out, err = geomech("displacement", "t.toml", "--amplitudes", "0.8", "--effort", "--json")
     assert code == 0 and "path_length" in out, err
 
