@@ -36,6 +36,7 @@ SWIMMER = {
     "body": OneOf(PARTS["body"], sized=True),
     "effects": Each(PARTS["effects"], sized=True),
 }
+TABLE = {"body": OneOf({"chain": PARTS["body"]["chain"]}), "medium": MEDIUM}  # of a table whose file does not say them
 
 
 class Displayed:
@@ -65,7 +66,7 @@ class Scene(Displayed):
     (2, 256)
     """
 
-    system: Annotated[System, OneOf(SYSTEMS, inner={SHORT: SWIMMER}, sized=True, short=SHORT)]
+    system: Annotated[System, OneOf(SYSTEMS, inner={SHORT: SWIMMER, "table": TABLE}, sized=True, short=SHORT)]
     gait: Annotated[Gait, OneOf(GAITS, sized=True)]
     numerics: Annotated[Numerics, Keys(Numerics)] = field(default_factory=Numerics)
     name: str = "scene"

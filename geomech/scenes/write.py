@@ -20,6 +20,7 @@ from geomech.systems.base import unwrapped
 from geomech.systems.capabilities import solver_of
 from geomech.systems.framed import Framed
 from geomech.systems.swimmer import Swimmer, name_in
+from geomech.systems.table import Table
 from rft.refusal import Refusal, located
 
 if TYPE_CHECKING:
@@ -143,7 +144,8 @@ def _section(part: Any, section: Section) -> dict:
     for variant in variants(section):
         is_one = type(part) is getattr(variant.kind, "makes", variant.kind)
         if is_one and not (variant.file and not variant.file.keys):
-            inner = {field: section_tables(getattr(part, field), one) for field, one in variant.inner.items()}
+            parts = {field: (getattr(part, field), one) for field, one in variant.inner.items()}
+            inner = {field: section_tables(*each) for field, each in parts.items() if each[0] is not None}
             return {**variant.named, **_fields(part, variant.kind), **inner}
         if is_one or isinstance(section, Keys):
             raise Refusal(
@@ -162,7 +164,7 @@ def _short(tables: dict, scene: Scene) -> dict:
     else:
         tables = {"system": system} | tables
     for part in ("body", "system"):
-        if "frame" in tables.get(part, {}):
+        if "frame" in tables.get(part, {}) and tables[part].get("kind") != Table.kind:  # which has its file's otherwise
             del tables[part]["frame"]
             if scene.frame != "mean":
                 tables = {"frame": scene.frame} | tables
