@@ -9,7 +9,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from . import api, command_line, conventions, examples, figures, keys, validation
+from sphinx.util import logging
+
+from . import api, command_line, conventions, examples, figures, keys, lab, validation
 
 
 def notebooks() -> str:
@@ -25,6 +27,7 @@ MADE = {
     "commands": command_line.page,
     "figures": figures.page,
     "keys": keys.page,
+    "lab": lab.frame,
     "notebooks": notebooks,
     "thumbnails": examples.thumbnails,
     "validation": validation.table,
@@ -45,8 +48,11 @@ def compute(app) -> None:
     generated = Path(app.srcdir) / "generated"
     generated.mkdir(exist_ok=True)
     api.write(generated / "api")
+    for wrong in api.wrong_examples():
+        logging.getLogger(__name__).warning(wrong)
     examples.compute_all()
     figures.draw_missing()
+    lab.write()
 
 
 def setup(app) -> dict[str, bool]:

@@ -29,11 +29,11 @@ def _six_digits(value):
     return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
-def grid(axes: Sequence[np.ndarray]) -> str:
-    """Return the shape of a grid and the ranges of its axes."""
+def grid(axes: Sequence[np.ndarray], names: Sequence[str] = ()) -> str:
+    """Return the shape of a grid and the ranges of its axes. names: of the axes, alpha_1 ... if left out."""
     ranges = [f"{a[0]:.4g} to {a[-1]:.4g}" for a in axes]
     equal = len(set(ranges)) == 1 and len(ranges) > 1
-    names = [f"alpha_{k + 1}" for k in range(len(axes))]
+    names = names or [f"alpha_{k + 1}" for k in range(len(axes))]
     described = f"{names[0]}{' and ' if len(names) == 2 else ' to '}{names[-1]} from {ranges[0]}" if equal else ""
     described = described or ", ".join(f"{name} from {r}" for name, r in zip(names, ranges))
     return f"{' x '.join(str(len(a)) for a in axes)} shapes, {described} rad"
@@ -101,7 +101,7 @@ def listed(names: Sequence[str]) -> str:
     return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
 
 
-def wrapped(lines: Iterable[str]) -> list[str]:
+def wrapped(lines: Iterable[str], indent: int = 2) -> list[str]:
     """Return lines of WIDTH at most; of a longer one the rest follows, indented."""
-    fill = textwrap.TextWrapper(WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    fill = textwrap.TextWrapper(WIDTH, subsequent_indent=" " * indent, break_long_words=False, break_on_hyphens=False)
     return [part for line in lines for part in (fill.wrap(line) if len(line) > WIDTH else [line])]

@@ -58,7 +58,7 @@ def _write(file: Any, v: Variable) -> None:
         variable._Encoding = "ascii"
     else:
         variable = file.createVariable(v.name, "i4" if v.values.dtype.kind == "i" else "f8", v.dims)
-        variable[:] = v.values
+        variable[...] = v.values
     for key, text in _described(v).items():
         setattr(variable, key, _encoded(text))
 

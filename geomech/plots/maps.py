@@ -38,7 +38,15 @@ FINEST = 400  # grid points along an axis of a map: about the dots of its pictur
 
 
 def shape_space(ax: Axes, axes: Sequence[np.ndarray], labels: Labels = ANGLES) -> Axes:
-    """Label a plane of two shape variables and set it to the grid. labels: (name, unit) of each."""
+    """Label a plane of two shape variables and set it to the grid. labels: (name, unit) of each.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.plots import figure, shape_space
+    >>> fig, axes = figure(3.0, 3.0)
+    >>> ax = shape_space(axes[0, 0], [np.linspace(-1, 1, 5)] * 2)
+    """
     ax.set(
         xlabel=quantity(*labels[0]), ylabel=quantity(*labels[1]), aspect="equal",
         xlim=(axes[0][0], axes[0][-1]), ylim=(axes[1][0], axes[1][-1]),
@@ -55,10 +63,19 @@ def vector_field(
     every: int | None = None,
     labels: Labels = ANGLES,
     top: float | None = None,
+    clim: float | str | None = None,
 ) -> Axes:
-    """Draw row ``component`` of A as arrows over shape space (Fig. 11(c)); colour repeats their length.
+    """Draw row ``component`` of A as arrows over shape space (Fig. 11(c)), on a scale of its own; colour repeats their length.
 
-    labels: as for `shape_space`. top: of the colours and of the arrows' scale, for maps that are compared."""
+    labels: as for `shape_space`. top: of the colours and of the arrows' scale, for maps that are compared. clim: that top as a
+    number or a percentile of the lengths, as for `limit_of`. Longer arrows are cut to it.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> ax = geomech.plots.vector_field(study.fitted, component=0)
+    """
     ax = axes_of(ax)
     step = every or max(1, round(len(connection.axes[0]) / ARROWS))
     pick = slice(step // 2, None, step)
@@ -67,16 +84,15 @@ def vector_field(
     size = np.hypot(u, v)
     if not has_row(connection, component):
         u, v, size = 0 * u, 0 * v, 0 * size
-    if np.isnan(size).any():  # beside singular shapes arrows are cut
-        cut = np.fmin(1.0, largest(size) / np.fmax(size, 1e-300))
-        u, v, size = cut * u, cut * v, cut * size
-    most = top or np.nanmax(size, initial=0.0) or 1.0
+    most = top or (limit_of(np.hypot(*connection.A[component][:2]), clim) if clim else largest(size))
+    cut, lengths = np.fmin(1.0, most / np.fmax(size, 1e-300)), size
+    u, v, size = cut * u, cut * v, cut * size
     spacing = step * max(np.ptp(a) / max(1, len(a) - 1) for a in connection.axes)
     look = {"cmap": arrow_colours(), "pivot": "mid", "width": 0.0085, "headwidth": 3.6, "headlength": 4.0}
     look |= {"headaxislength": 3.6, "minshaft": 1.6, "minlength": 0.8, "scale_units": "xy"}
     arrows = ax.quiver(x, y, u, v, size, scale=most / (LONGEST * spacing), **look)
     arrows.set_clim(0.0, most)
-    return label_row(ax, arrows, component, connection, labels)
+    return label_row(ax, arrows, component, connection, labels, lengths)
 
 
 def arrow_colours() -> ListedColormap:
@@ -87,10 +103,10 @@ def arrow_colours() -> ListedColormap:
     return ListedColormap(colormaps["viridis"](np.linspace(0.86, 0.0, 256)), "arrows")
 
 
-def label_row(ax, arrows, component: int, connection: Connection, labels: Labels):
-    """Set title, colour bar and axes of a map of a row of A."""
+def label_row(ax, arrows, component: int, connection: Connection, labels: Labels, lengths: np.ndarray):
+    """Set title, colour bar and axes of a map of a row of A with arrows of these lengths."""
     ax.set_title(f"{row_name(component)}: {TITLES[component]}")
-    colorbar = ax.figure.colorbar(arrows, ax=ax, shrink=0.85)
+    colorbar = ax.figure.colorbar(arrows, ax=ax, shrink=0.85, extend=extend(lengths, arrows.get_clim()[1] * (1 + 1e-9)))
     colorbar.set_label(f"|{row_name(component)}| ({unit_of(component, connection.unit)}/{labels[0][1]})", labelpad=8)
     return shape_space(ax, connection.axes, labels)
 
@@ -136,7 +152,14 @@ def ccf_map(
     error: of the field (`curvature.error`). Hatched are patches where it exceeds the value, so that not even the sign is known
     (`unknown`); there no line of zeros is drawn, and next to them only lines that part two known signs (`certain`). labels: as
     for `shape_space`. legend: explain hatching and rings below the map. metric: drawn as rings (`indicatrices`). clim: limit of
-    the colours on either side of zero, a number or a percentile of the values' size such as "98%"; else their largest."""
+    the colours on either side of zero, a number or a percentile of the values' size such as "98%"; else their largest.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> ax = geomech.plots.ccf_map(study.ccf(), component=0, gaits=[study.scene.gait], error=study.ccf_error())
+    """
     from cmcrameri import cm
 
     ax = axes_of(ax)
@@ -190,7 +213,15 @@ def ccf_label(component: int, unit: str, labels: Labels) -> str:
 
 def indicatrices(metric: Metric | Finsler, ax: Axes, axes: Sequence[np.ndarray], count: int = 7) -> Any:
     """Draw rings around ``count`` x ``count`` shapes: rates that take the same effort, so that a ring is long in directions in
-    which shape changes cheaply. All have one scale. Return a handle for the legend."""
+    which shape changes cheaply. All have one scale. Return a handle for the legend.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> from geomech.plots import ccf_map, indicatrices
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> rings = indicatrices(study.metric, ccf_map(study.ccf()), study.ccf().axes)
+    """
     from matplotlib.lines import Line2D
 
     spots = [a[0] + np.ptp(a) * (np.arange(count) + 0.5) / count for a in axes]
@@ -265,7 +296,15 @@ def unknown(values: np.ndarray, error: np.ndarray) -> np.ndarray:
 
 def largest(values: np.ndarray) -> float:
     """Return the largest of magnitudes, for a scale; next to singular shapes, where they have no bound, of nine tenths of
-    them."""
+    them.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.plots import largest
+    >>> largest(np.array([0.5, -2.0, 1.0]))
+    2.0
+    """
     size = np.abs(values[np.isfinite(values)])
     if not size.size:
         return 1.0
@@ -273,13 +312,18 @@ def largest(values: np.ndarray) -> float:
 
 
 def limit_of(values: np.ndarray, clim: float | str | None = None) -> float:
-    """Return the limit of colours for values: a number as it is, that percentile of their size for "98%", else `largest`."""
+    """Return the limit of colours for values: a number as it is, that percentile of their size for "98%", the further from
+    zero of two percentiles of the values for "5%:95%", else `largest`."""
     if clim is None:
         return largest(values)
     if not isinstance(clim, str):
         return float(clim)
-    size = np.abs(values[np.isfinite(values)])
-    return float(np.percentile(size, float(clim.rstrip("%")))) or largest(values) if size.size else 1.0
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return 1.0
+    percents = [float(end.rstrip("%")) for end in clim.split(":")]
+    ends = np.percentile(finite if len(percents) > 1 else np.abs(finite), percents)
+    return float(np.abs(ends).max()) or largest(values)
 
 
 def panels_of(components: Sequence[str], drawn: Sequence[Sequence[bool]]) -> list[int]:
@@ -322,7 +366,15 @@ def draw_gait(
 ) -> Axes:
     """Draw the gait's curve with a dot at its start and an arrow along it, as far as it lies within the axes of a grid.
 
-    line: its style."""
+    line: its style.
+
+    Examples
+    --------
+    >>> from geomech.gaits import Circle
+    >>> from geomech.plots import draw_gait, figure
+    >>> fig, axes = figure(3.0, 3.0)
+    >>> ax = draw_gait(Circle(0.5), axes[0, 0])
+    """
     ax, curve = axes_of(ax), gait.shape(PHASES)
     curve[~inside_of(curve, within or ())] = np.nan
     ax.plot(*curve.T, line, color=color, lw=1.2)

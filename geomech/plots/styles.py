@@ -23,7 +23,6 @@ from geomech.plots.maps import (
     drawable,
     finer,
     label_row,
-    largest,
     limit_of,
     shape_space,
     unit_of,
@@ -52,10 +51,18 @@ PLUS, MINUS = "#B2182B", "#2166AC"  # of areas that carry forwards and backwards
 @CONNECTION_STYLES.register(style="streamlines")
 @styled
 def streamlines(
-    connection: Connection, component: int = 0, *, ax: Axes | None = None, labels: Labels = ANGLES, top: float | None = None
+    connection: Connection, component: int = 0, *, ax: Axes | None = None, labels: Labels = ANGLES,
+    top: float | None = None, clim: float | str | None = None,
 ) -> Axes:  # fmt: skip
     """Draw row ``component`` of A as streamlines over shape space: along them a change of shape moves the body the most for
-    its size, across them not at all. Colour: length of the row. Other arguments as for `vector_field`."""
+    its size, across them not at all. Colour: length of the row. Other arguments as for `vector_field`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> ax = geomech.plots.streamlines(study.fitted, 0)
+    """
     from matplotlib.colors import Normalize
 
     ax = axes_of(ax)
@@ -68,12 +75,12 @@ def streamlines(
     even = [np.linspace(a[0], a[-1], len(a)) for a in axes]  # to the last digit, as streamplot asks
     u, v = values
     size = np.hypot(u, v)
-    most = top or largest(size)
+    most = top or limit_of(size, clim)
     if np.nanmax(size, initial=0.0) <= 1e-13 * np.nanmax(np.abs(connection.A), initial=0.0):
         u, v, size = 0 * u, 0 * v, 0 * size
     look = {"cmap": arrow_colours(), "norm": Normalize(0.0, most), "density": 1.1, "linewidth": 0.9, "arrowsize": 0.8}
     lines = ax.streamplot(*even, u.T, v.T, color=np.nan_to_num(size.T), **look)
-    return label_row(ax, lines.lines, component, connection, labels)
+    return label_row(ax, lines.lines, component, connection, labels, size)
 
 
 @CCF_STYLES.register(style="contours")
@@ -85,7 +92,14 @@ def ccf_contours(
     """Draw a component of the CCF as contours, dashed below zero, and shade the area of each gait by the sign of its
     contribution to the displacement: CCF times winding number.
 
-    error: shapes where it exceeds the value have no shade. Other arguments as for `ccf_map`."""
+    error: shapes where it exceeds the value have no shade. Other arguments as for `ccf_map`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> ax = geomech.plots.ccf_contours(study.ccf(), 0)
+    """
     from matplotlib.ticker import MaxNLocator
 
     ax, field = axes_of(ax), drawable(field)
@@ -156,7 +170,13 @@ def ccf_surface(
     """Draw a component of the CCF as a surface over shape space, with gaits on it and, on the plane below, their areas shaded
     by sign as in `ccf_contours`.
 
-    ax: of projection "3d"; without it one of a new figure."""
+    ax: of projection "3d"; without it one of a new figure.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> ax = geomech.plots.ccf_surface(geomech.study("three-link-viscous", grid=15).ccf(), 0)
+    """
     from cmcrameri import cm
 
     from geomech.plots.style import blank

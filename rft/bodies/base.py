@@ -25,7 +25,16 @@ class Elements(NamedTuple):
     c, s: cosine and sine of the heading. r_t, r_n: velocity of the centre along and across the element at a unit
     rotation rate of the frame. half: (n, 1), half length, 0 for a point. weight: (n, 1), factor of the drag per length,
     which is the length of a piece of body. v_t, v_n, v_w: velocity with the frame held, along and across at the centre,
-    and rotation rate times half length."""
+    and rotation rate times half length.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft import Chain
+    >>> elements = Chain().motion(np.zeros((2, 1)), np.ones((2, 1)))
+    >>> elements.half[:, 0].round(4), elements.v_w.shape
+    (array([0.1667, 0.1667, 0.1667]), (3, 1))
+    """
 
     c: np.ndarray
     s: np.ndarray
@@ -71,7 +80,16 @@ class Body(Protocol):
 
     joints: number of shape variables. length: of the body, in the unit wanted for displacement. motion(alpha, alphadot):
     its `Elements` at shapes and rates (joints, B), with the frame held. A body that is drawn also has ``points``, and
-    ``shape_labels`` if its shape variables are no joint angles: see `rft.Chain`."""
+    ``shape_labels`` if its shape variables are no joint angles: see `rft.Chain`.
+
+    Examples
+    --------
+    >>> from rft import Chain
+    >>> import numpy as np
+    >>> chain = Chain()
+    >>> chain.joints, chain.motion(np.zeros((2, 1)), np.ones((2, 1))).c.shape  # of three elements
+    (2, (3, 1))
+    """
 
     @property
     def length(self) -> float: ...
@@ -99,6 +117,17 @@ def is_reversible(body: Body) -> bool:
     elements, exchanged = body.motion(alpha, rates), body.motion(-alpha[::-1], -rates[::-1])
     rotated = elements._replace(r_t=-elements.r_t, r_n=-elements.r_n, v_t=-elements.v_t, v_n=-elements.v_n)
     return all(bool((np.abs(x[::-1] - y) <= 1e-12).all()) for x, y in zip(rotated, exchanged))
+
+
+@cached_if_immutable
+def is_symmetric(body: Body) -> bool:
+    """Return whether a body of shape -alpha is its mirror image of shape alpha, left and right exchanged, from a few random
+    shapes; a body of one's own may be bent where its shape is zero."""
+    rng = np.random.default_rng(0)
+    alpha, rates = rng.uniform(-1.5, 1.5, (2, body.joints, 5))
+    elements, other = body.motion(alpha, rates), body.motion(-alpha, -rates)
+    image = other._replace(s=-other.s, r_t=-other.r_t, v_n=-other.v_n, v_w=-other.v_w)
+    return all(bool((np.abs(x - y) <= 1e-10).all()) for x, y in zip(elements, image))
 
 
 def numbered_labels(joints: int, name: str = "alpha_{}", unit: str = "rad") -> tuple[tuple[str, str], ...]:
