@@ -19,8 +19,9 @@ ROOT = pathlib.Path(__file__).parents[1]
 # solver to take one thread, and by which back end. Environments for learning stand on sand.
 KNOW_MECHANICS = {
     "__init__.py", "gym/hexapod.py", "text/grains.py", "text/scenes.py", "text/system.py", "studies/stress.py",
-    "scenes/intruder.py", "scenes/intruding.py", "scenes/solid.py", "scenes/stress.py", "scenes/walker.py", "scenes/write.py", "studies/batch.py",
-    "studies/calibration.py", "run/backend.py", "studies/stress_calibration.py", "studies/walking.py",
+    "scenes/intruder.py", "scenes/intruding.py", "scenes/solid.py", "scenes/stress.py", "scenes/walker.py",
+    "scenes/write.py", "studies/batch.py", "studies/calibration.py", "run/backend.py",
+    "studies/stress_calibration.py", "studies/walking.py",
 }  # fmt: skip
 
 
