@@ -94,6 +94,13 @@ class Spatial:
     20 degrees above the horizontal, drives in 0.05 % of directions, with at most 0.0052 xi_n |z| of stress. A face tilted by
     56 to 64 degrees that is drawn out against its tilt, 64 to 71 degrees above the horizontal, drives in 0.011 % of
     directions, with at most 8e-4 xi_n |z|; "cut" and "push" leave 0.001 % and 4e-4 of this region.
+
+    Examples
+    --------
+    >>> from rft.meshes import Spatial
+    >>> sand = Spatial.from_grains(1500.0, 0.5, surface_friction=0.4)  # kg/m^3, internal friction
+    >>> round(sand.xi_n / 1e6, 3)  # N/cm^3
+    0.879
     """
 
     xi_n: Annotated[
