@@ -26,6 +26,12 @@ class Shchf(Gait):
     .mat file of points alpha1, alpha2, ... at t, of coefficients A1, B1, A2, B2, ..., or of the paths that sys_calcpath
     computed; in a scene from a file relative to that file's folder, else to the current one. sha256 (-): of the file,
     filled in if left out; given, the file must have it. Its centre is the mean that coefficients have, if left out.
+
+    Examples
+    --------
+    >>> from geomech.gaits import Shchf
+    >>> Shchf(XV=(1.4, 1.2)).shape(0.0).round(3)  # rad
+    array([0.99, 0.99])
     """
 
     kind = "shchf"
@@ -61,7 +67,7 @@ class Shchf(Gait):
     def _of_file(self) -> Any:
         from scipy.interpolate import CubicSpline
 
-        curve = shchf.read(self.file, self.number)
+        curve: Any = shchf.read(str(self.file), self.number)
         if self.sha256.lower() not in ("", curve.sha256):
             raise Refusal(
                 f"{self.file} is not the file whose sha256 is given", instead="restore it, or leave sha256 out"
