@@ -17,6 +17,7 @@ from rft.checks import in_range
 GAP = 1 / 8  # of a cycle without a frame, at most
 ROWS = 10  # frames a cycle, at least
 FEWEST = 3  # cycles that show their scatter
+LEAST_AHEAD = 0.4 * np.pi  # rad of phase in half a cycle
 LIKE = 0.5  # correlation of a cycle with the mean of all, at least
 PACE = 1.6  # ratio of a cycle's duration to the median, at most
 EVEN = 0.7  # rad, by which the phase of few cycles may stray from a line
@@ -102,12 +103,12 @@ def fit_midlines(
         raise trial.wrong(
             "the body bends in one shape to and fro", because="no wave runs along it, and has a wavelength"
         )
-    marks, used = _full_cycles(trial, curve, clock)
+    marks, used = full_cycles(trial, curve, clock)
     turn, words = _head(trial, used_cycles(curve, clock, marks, used), head)
     if turn:
         curve, trial = smooth.fitted(trial.reversed(), repeat)
         clock = kinematics.clock(curve, repeat)
-        marks, used = _full_cycles(trial, curve, clock)
+        marks, used = full_cycles(trial, curve, clock)
     trial = trial.with_notes(*_notes(used))
     fine = smooth.refined(trial, curve)
     near = clock.phase(curve)
@@ -170,9 +171,10 @@ def _with_length(trial: Trial, curve: smooth.Curve) -> Trial:
     return trial
 
 
-def _full_cycles(trial: Trial, curve, clock: kinematics.Clock) -> tuple[np.ndarray, np.ndarray]:
+def full_cycles(trial: Trial, curve, clock: kinematics.Clock) -> tuple[np.ndarray, np.ndarray]:
     """Return the phases that begin and end full cycles, and the numbers of those that have no gap and are like the others."""
     phase = clock.phase(curve)
+    _check_growing(trial, clock.t, phase)
     marks = kinematics.marks(clock, phase)
     if len(marks) < 2:
         turns = (phase[-1] - phase[0]) / (2 * np.pi)
@@ -189,6 +191,17 @@ def _full_cycles(trial: Trial, curve, clock: kinematics.Clock) -> tuple[np.ndarr
         )
     _check_alike(trial, kinematics.cycles(curve, times).selected(used))
     return marks, used
+
+
+def _check_growing(trial: Trial, t: np.ndarray, phase: np.ndarray) -> None:
+    """Refuse a trial whose phase stands or runs back: over half a cycle it must grow by at least a fifth of one."""
+    half = kinematics.PHASES // 2
+    ahead = phase[half:] - phase[:-half]
+    if (bad := np.flatnonzero(ahead < LEAST_AHEAD)).size:
+        raise trial.wrong(
+            f"the motion stands, or is another one, after t = {t[bad[0]]:.4g}",
+            instead="cut pauses, starts and other gaits out, and give each its file",
+        )
 
 
 def _gap(trial: Trial, start: float, end: float) -> bool:

@@ -90,14 +90,14 @@ def _variance(values: np.ndarray, noise: np.ndarray) -> np.ndarray:
 
 
 def sampled(
-    curve: smooth.Curve, fine: smooth.Curve, values: Values, resampled: int = RESAMPLED, seed: int = 0
+    curve: smooth.Curve, fine: smooth.Curve, values: Values, resampled: int | None = None, seed: int = 0
 ) -> Sample:
-    """Return the quantities of a curve, and the same with noise put on once more, as often as ``resampled``.
+    """Return the quantities of a curve, and the same with noise put on once more, as often as ``resampled`` or RESAMPLED.
 
     fine: the same `smooth.refined`. values: returns quantities (Q,) and pseudo-values (C, Q) of a curve."""
     value, pseudo = values(curve)
     noisy, changes = [], []
-    for k in range(resampled):
+    for k in range(RESAMPLED if resampled is None else resampled):
         one, other = (c.noisy(np.random.default_rng((seed, k))) for c in (curve, fine))
         noisy.append(values(one))
         changes.append(values(other)[0] - noisy[-1][0])

@@ -207,6 +207,7 @@ def arc_waves(first: np.ndarray) -> np.ndarray:
 
     In the MIDDLE of the body it is fitted by a + b exp(2 pi i s / wavelength), a wave and a turning of the whole body,
     over a list of wave numbers; a parabola through the least residual and its neighbours gives it."""
+    first = first.conj() if wave_sign(first.mean(0)) < 0 else first
     first = first[:, _middle(first.shape[1])]
     left = (np.abs(first) ** 2).sum(-1) - (np.abs(np.einsum("wns,cs->wcn", _waves(NODES), first)) ** 2).sum(-1)
     k = np.clip(left.argmin(0), 1, len(WAVES) - 2)

@@ -99,7 +99,7 @@ def read(
     if table.unused:
         notes.append(f"columns that are not used: {', '.join(table.unused[:6])}")
     length = body_length * size if body_length is not None and unit != "BL" else body_length
-    return Trial(source.name, t, xy, table.names, table.lines, unit, timed, length, tuple(notes))
+    return Trial(source.name, t, xy, table.names, table.lines, unit, timed, length, notes=tuple(notes))
 
 
 def _missing_note(xy: np.ndarray, low: np.ndarray) -> list[str]:

@@ -18,6 +18,7 @@ from geomech.measured.midlines.trial import Trial
 DEGREE = 5  # of the splines in time: their rates are of order 5 in the spacing of the knots
 KNOTS = (6, 7, 8, 10, 12, 14, 16, 20, 24, 32)  # per cycle, that are tried
 MODES = 4, 14  # of x and of y along the body, that are tried
+SAFE = 2.2  # times the root of the number of points: more modes through equal distances oscillate at the ends (Runge)
 PASSES = 3  # of finding where along the body the points lie
 NODES = 30  # places along the body at which a curve is evaluated
 
@@ -148,7 +149,7 @@ def fitted(trial: Trial, period: float) -> tuple[Curve, Trial]:
     smooth midlines where points were missing."""
     s = _chord_places(trial.points)
     rows = len(trial.t) * period / (trial.t[-1] - trial.t[0])
-    most = min(MODES[1], int(0.75 * len(s)))
+    most = min(MODES[1], int(SAFE * np.sqrt(len(s))), len(s) - 1)
     solvers = {k: Solver(trial.t, k) for k in sorted({max(2, round(rows / n)) for n in KNOTS})}
     modes, step = _chosen(trial, s, most, solvers)
     for _ in range(PASSES):
@@ -170,7 +171,12 @@ def _completed(trial: Trial, curve: Curve) -> Trial:
 def refined(trial: Trial, curve: Curve) -> Curve:
     """Return the curve with more modes and more knots, whose difference from it shows what smoothing has cut off."""
     step = max(2, round(curve.step / 1.5))
-    return _curve(trial, curve.s, min(curve.modes + 2, len(curve.s) - 1), step, Solver(trial.t, step))
+    return curve_of(trial, curve.s, min(curve.modes + 2, len(curve.s) - 1), step)
+
+
+def curve_of(trial: Trial, s: np.ndarray, modes: int, step: int) -> Curve:
+    """Return the curve with these places of points (P,), modes, and rows between knots."""
+    return _curve(trial, s, modes, step, Solver(trial.t, step))
 
 
 def _chosen(trial: Trial, s: np.ndarray, most: int, solvers: dict[int, Solver]) -> tuple[int, int]:
