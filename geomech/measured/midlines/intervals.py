@@ -2,8 +2,9 @@
 
 The value is that of all cycles, less its mean change by noise. Its variance has three parts. Noise: the residual of
 the smooth midlines is put on them again and again, and everything is computed anew. Cycles: leaving out one after
-another gives pseudo-values, whose scatter is that of the cycles and that which noise explains; the variance taken for
-the former is the likeliest. Smoothing: the change with more modes and more knots, less the part that noise explains."""
+another gives pseudo-values, whose scatter is that of the cycles and that which noise explains; all variances of the
+former count by their likelihood. Smoothing: the change with more modes and more knots, less the part that noise
+explains."""
 
 from __future__ import annotations
 
@@ -17,7 +18,9 @@ from geomech.measured.midlines import smooth
 Values = Callable[[smooth.Curve], tuple[np.ndarray, np.ndarray]]
 
 RESAMPLED = 40  # times that noise is put on
-TRIED = np.concatenate([[0.0], np.geomspace(1e-3, 10, 80)])  # variances of cycles over that of the pseudo-values
+TRIED = np.geomspace(1e-3, 100, 60)  # variances of cycles over that of the pseudo-values
+REPEATING = 0.5  # prior probability that cycles repeat exactly, as a robot's; found by coverage
+FURTHEST = 12.0  # standard deviations of the largest variance: more than half a width
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,41 +55,54 @@ class Sample:
 
 def intervals(sample: Sample, level: float) -> Intervals:
     """Return intervals that cover the truth in a share ``level`` of cases."""
-    from scipy.stats import t as student
+    from scipy.special import ndtr, ndtri
 
     count, by_noise = len(sample.pseudo), sample.noisy - sample.value
     noise = by_noise.var(0, ddof=1)
-    cycles = np.zeros_like(noise)
-    if count > 1:
-        cycles = _variance(sample.pseudo, sample.noisy_pseudo - sample.pseudo) / count
     unbiased = 2 * sample.change - sample.noisy_change.mean(0)
     cut_off = np.maximum(unbiased**2 - sample.noisy_change.var(0, ddof=1), 0.0)
-    total = np.maximum(cycles + noise + cut_off, 1e-300)
-    degrees = total**2 / np.maximum(cycles**2 / max(count - 1, 1) + noise**2 / (len(by_noise) - 1), 1e-300)
-    factor = student.ppf((1 + level) / 2, np.clip(degrees, max(count - 1, 1), 1e6))
+    known = np.maximum(noise + cut_off, 1e-300)
+    half_width = ndtri((1 + level) / 2) * np.sqrt(known)
+    if count > 1:
+        weights, variances = _variances(sample.pseudo, sample.noisy_pseudo - sample.pseudo, noise)
+        deviation = np.sqrt(variances / count + known)
+        low, high = half_width, FURTHEST * deviation.max(0)
+        for _ in range(40):
+            middle = (low + high) / 2
+            inside = (weights * (2 * ndtr(middle / deviation) - 1)).sum(0) < level
+            low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+        half_width = high
+    cycles = np.maximum((half_width / ndtri((1 + level) / 2)) ** 2 - known, 0.0)
     value = sample.value - by_noise.mean(0)
-    return Intervals(value, *np.sqrt((cycles, noise, cut_off)), factor * np.sqrt(total), sample.pseudo)
+    return Intervals(value, *np.sqrt((cycles, noise, cut_off)), half_width, sample.pseudo)
 
 
-def _variance(values: np.ndarray, noise: np.ndarray) -> np.ndarray:
-    """Return the variances (Q,) of values (C, Q) between cycles beyond noise (B, C, Q), of largest likelihood.
+def _variances(values: np.ndarray, noise: np.ndarray, of_mean: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return weights and variances (V, Q) that the cycles may have beyond noise, from pseudo-values (C, Q).
 
-    Noise is correlated between neighbours: what ends one cycle too far begins the next too late."""
+    noise: (B, C, Q), of the pseudo-values, correlated between neighbours: what ends one cycle too far begins the next too
+    late. of_mean: (Q,), its variance in the mean. The weights are the likelihood of the contrasts between cycles, times a
+    prior: cycles repeat exactly with REPEATING, else v^-1/2 (v + C of_mean)^-1/2 dv."""
     count = len(values)
     contrasts = np.linalg.qr(np.column_stack([np.ones(count), np.eye(count)[:, 1:]]))[0][:, 1:]
     deviation = noise - noise.mean(0)
     same = (deviation**2).sum(0).mean(0) / (len(noise) - 1)
-    next_one = (deviation[:, 1:] * deviation[:, :-1]).sum(0).mean(0) / (len(noise) - 1)
+    near = (deviation[:, 1:] * deviation[:, :-1]).sum(0).mean(0) / (len(noise) - 1)
+    near = np.clip(near, -0.5 * same, 0.5 * same)
+    neighbours = np.eye(count, k=1) + np.eye(count, k=-1)
     scatter = np.maximum(values.var(0, ddof=1), 1e-300)
-    best = np.empty(values.shape[1])
+    variances = np.vstack([np.zeros_like(scatter), TRIED[:, None] * scatter])
+    likelihood = np.empty_like(variances)
     for q in range(values.shape[1]):
-        near = np.clip(next_one[q], -0.5 * same[q], 0.5 * same[q])
-        known = same[q] * np.eye(count) + near * (np.eye(count, k=1) + np.eye(count, k=-1))
-        sizes, axes = np.linalg.eigh(contrasts.T @ known @ contrasts)
+        known = contrasts.T @ (same[q] * np.eye(count) + near[q] * neighbours) @ contrasts
+        sizes, axes = np.linalg.eigh(known)
         square = (axes.T @ (contrasts.T @ values[:, q])) ** 2
-        spread = np.maximum(TRIED[:, None] * scatter[q] + np.maximum(sizes, 0.0), 1e-12 * scatter[q])
-        best[q] = TRIED[(np.log(spread) + square / spread).sum(1).argmin()] * scatter[q]
-    return best
+        spread = variances[:, q, None] + np.maximum(sizes, 1e-12 * scatter[q])
+        likelihood[:, q] = -0.5 * (np.log(spread) + square / spread).sum(1)
+    prior = np.sqrt(variances[1:] / (variances[1:] + count * of_mean))  # times v, as TRIED is geometric
+    prior = np.vstack([np.full_like(scatter, REPEATING), (1 - REPEATING) * prior / prior.sum(0)])
+    weights = prior * np.exp(likelihood - likelihood.max(0))
+    return weights / weights.sum(0), variances
 
 
 def sampled(
