@@ -51,10 +51,12 @@ suppress_warnings = ["ref.python"]  # two classes of one name in different packa
 html_theme = "pydata_sphinx_theme"
 html_title = "geomech"
 html_static_path = ["static"]
+html_extra_path = ["generated/extra"]  # the gait lab, made before anything is read
+(HERE / "generated" / "extra").mkdir(parents=True, exist_ok=True)
 html_css_files = ["site.css"]
 html_show_sourcelink = False
 html_copy_source = False
-ALONE = ("index", "start", "tiers", "validation", "glossary", "changelog", "citing")
+ALONE = ("index", "start", "lab", "tiers", "validation", "glossary", "changelog", "citing")
 html_sidebars = {page: [] for page in ALONE}
 html_context = {"default_mode": "light"}
 html_theme_options = {

@@ -19,7 +19,7 @@ import numpy as np
 from figures import main, style
 from geomech import plots
 from geomech.optimisation import optimise
-from geomech.optimisation.gain import PHASES, gained_ccf
+from geomech.optimisation.gain import PHASES
 from geomech.scenes import load
 
 SCENES = {"viscous fluid, ratio 2": "three-link-viscous", "loose 0.3 mm glass": "three-link-glass"}
@@ -34,7 +34,7 @@ def compute(harmonics: int = 5, starts: int | None = None, **numerics) -> dict:
         out[medium] = {
             objective: optimise(scene, objective, harmonics=harmonics, starts=starts) for objective in OBJECTIVES
         }
-        out[medium]["ccf"] = gained_ccf(out[medium]["displacement"])
+        out[medium]["ccf"] = out[medium]["displacement"].gained
     return out
 
 

@@ -34,7 +34,7 @@ def geomech(
     ] = False,
     plugin: PluginOption = None,
 ):
-    """Geometric mechanics of locomotion in sand and fluid: from a force law to the displacement of a gait."""
+    """Geometric mechanics of locomotion: from a force law to displacement."""
     from geomech.run.backend import prefer
 
     prefer("numpy")  # its first call takes half a second less; `commands.pipeline` knows who has much to do

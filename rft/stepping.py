@@ -198,8 +198,8 @@ def _with_batch_axes(steps: TimeSteps, batch: tuple, length: float) -> TimeSteps
     path = None if steps.path is None else samples_first(steps.path)
     work = steps.work
     if work is not None:  # (N, B, ...)
-        power, moment, slip = (np.moveaxis(x, 1, 0).reshape((*batch, len(x), *x.shape[2:])) for x in work)
-        work = Work(power * length, moment, slip)
+        work = Work(*(np.moveaxis(x, 1, 0).reshape((*batch, len(x), *x.shape[2:])) for x in work))
+        work = work._replace(power=work.power * length)
     residual, status, drift = (x.reshape(batch) for x in steps[2:5])
     return TimeSteps(xi, pose, residual, status, drift, steps.cycles, work, path)
 

@@ -31,11 +31,20 @@ class Work(NamedTuple):
     balance the medium and, where the body has mass, accelerate it; positive where the body works to bend to the left
     (counter-clockwise, tail to head), as muscles on its left side do. The sum of bending_moment d(bend)/dt x length is
     the power, with mass in the mean over a cycle that repeats. slip: (...), mean over the body of the angle between an
-    element's direction and the velocity of its centre, 0 to pi/2 rad."""
+    element's direction and the velocity of its centre, 0 to pi/2 rad.
+
+    Of the m elements into which effects cut the n: element_force: (..., 2, m), force of the medium on each, along it
+    towards the head and across it to the left, in axial drag. element_power: (..., m), work against it, in axial drag x
+    body length / time. end_force: (..., 2, 2), the same force on points that effects add at the tail and at the head, by
+    the direction of the element there. end_power: (..., 2)."""
 
     power: np.ndarray
     bending_moment: np.ndarray
     slip: np.ndarray
+    element_force: np.ndarray
+    element_power: np.ndarray
+    end_force: np.ndarray
+    end_power: np.ndarray
 
     def __repr__(self) -> str:
         names = zip(("power", "bending moment", "slip"), self)
@@ -80,19 +89,31 @@ def element_work(problem: Problem, body_halves: np.ndarray, xi: np.ndarray, roun
     between these elements. rounding: (B,), speed below which dry friction is rounded off."""
     scale = problem.frame.speed_scale
     v = with_frame_velocity(problem, velocities(problem), *(xi / scale))
-    power, wrenches, stations = 0.0, [], []
+    wrenches, stations, forces, powers = [], [], [], []
     for (e, load), u, contact in zip(loads_on(problem, v, rounding / scale[0]), v, (problem.sides, problem.points)):
         force = [e.weight * x for x in (load.t, load.n, load.w)]
         weight = [e.weight * contact.incline.weight * x for x in (contact.incline.down_t, contact.incline.down_n)]
         drag = force[0] + weight[0], force[1] + weight[1], force[2]  # work against gravity is none against the medium
-        power = power + sum(f * scale * x for f, x in zip(drag, u)).sum(0)
+        powers.append(sum(f * scale * x for f, x in zip(drag, u)))
+        forces.append(np.stack(np.broadcast_arrays(-drag[0], -drag[1])))
         wrenches.append(np.stack(np.broadcast_arrays(*to_frame(e, *force))))
         stations.append(contact.station[:, 0])
     e, (v_t, v_n, _) = problem.sides.elements, v[0]
     slip = np.average(np.arctan2(np.abs(v_n), np.abs(v_t)), 0, e.half[:, 0])
     if problem.momentum_rate is not None:
         wrenches[0] = wrenches[0] + element_momentum_rates(e, problem.momentum_rate, times(scale, v[0]))
-    return Work(power, _moments(e, np.concatenate(wrenches, 1), np.concatenate(stations), body_halves), slip)
+    moment = _moments(e, np.concatenate(wrenches, 1), np.concatenate(stations), body_halves)
+    end_force, end_power = (np.moveaxis(_by_end(problem, x), -1, 0) for x in (forces, powers))
+    element_force, element_power = (np.moveaxis(x[0], -1, 0) for x in (forces, powers))
+    return Work(sum(x.sum(0) for x in powers), moment, slip, element_force, element_power, end_force, end_power)
+
+
+def _by_end(problem: Problem, values: Sequence[np.ndarray]) -> np.ndarray:
+    """Return sums (..., 2, B) over the points nearer to the tail and nearer to the head, from values (..., n, B) of the
+    sides and of the points, if there are any."""
+    of_points = values[1] if len(values) > 1 else values[0][..., :0, :]
+    at_head = problem.points.station[:, 0] > 0.5
+    return np.stack([of_points[..., at_end, :].sum(-2) for at_end in (~at_head, at_head)], -2)
 
 
 def _moments(sides: Elements, wrenches: np.ndarray, stations: np.ndarray, body_halves: np.ndarray) -> np.ndarray:

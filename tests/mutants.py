@@ -149,7 +149,11 @@ def hunted(some: list[Mutant], folder: Path, jobs: int) -> Iterator[tuple[Mutant
     """Each with "survived", "killed" or "time-out", so many at a time, each in a copy of the tree below ``folder``."""
     trees = [folder / str(k) for k in range(jobs)]
     for tree in trees:
-        shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "results"))
+        shutil.copytree(
+            ROOT,
+            tree,
+            ignore=shutil.ignore_patterns(".git", ".venv", ".*_cache", "__pycache__", "build", "*.egg-info", "results"),
+        )
     usual, running = {}, {}
     for name in sorted({name for m in some for name in watch(m.file)}):
         _, status, used = os.wait4(start(trees[0], [name], 600), 0)

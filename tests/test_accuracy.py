@@ -31,9 +31,9 @@ def line(results, label):
     return next(x for x in results["lines"] if x["label"] == label)
 
 
-def test_every_knob_gets_better(glass):
-    """Each knob's finest setting beats its coarsest, but for those whose tier has an error of its own."""
-    assert len(glass["lines"]) == len(tiered.KNOBS) - 1  # no effect cuts the body into pieces
+def test_every_setting_gets_better(glass):
+    """Each setting's finest value beats its coarsest, but for those whose tier has an error of its own."""
+    assert len(glass["lines"]) == len(tiered.SETTINGS) - 1  # no effect cuts the body into pieces
     for found in glass["lines"]:
         if found["label"] not in ("path: grid", "area: grid"):
             assert found["error"][-1] < 0.5 * found["error"][0], found["label"]
@@ -116,11 +116,18 @@ def test_table_and_sentences(glass):
 
 
 def test_the_cheapest_setting_is_the_quickest_that_is_good_enough():
-    """Of lines made up here: not the most accurate, not the slowest, and none that is against the knob's own limit."""
+    """Of lines made up here: not the most accurate, not the slowest, and none that is against the setting's own limit."""
 
-    def made(tier, knob, against, *settings):
+    def made(tier, setting, against, *settings):
         value, error, seconds = zip(*settings)
-        return {"tier": tier, "knob": knob, "against": against, "value": value, "error": error, "seconds": seconds}
+        return {
+            "tier": tier,
+            "setting": setting,
+            "against": against,
+            "value": value,
+            "error": error,
+            "seconds": seconds,
+        }
 
     lines = [
         made("direct", "phases", "truth", (16, 3e-2, 1.0), (32, 2e-3, 2.0), (64, 5e-5, 4.0)),
@@ -136,13 +143,13 @@ def test_the_cheapest_setting_is_the_quickest_that_is_good_enough():
         1e-4: ("direct", 64, 4.0),
         1e-5: (None, None, None),
     }
-    assert (best[1e-3]["knob"], best[1e-3]["error"]) == ("curves", 8e-4)
+    assert (best[1e-3]["setting"], best[1e-3]["error"]) == ("curves", 8e-4)
     told = text.table({"cheapest": list(best.values())})
     assert "adapted, curves = 12" in told
     assert told.splitlines()[-1].split() == ["1e-05", "none", "of", "those", "tried"]
 
 
-def test_a_linear_medium_has_no_dry_knobs(viscous):
+def test_a_linear_medium_has_no_dry_settings(viscous):
     labels = {x["label"] for x in viscous["lines"]}
     assert "direct: phases" in labels
     assert not any("regularisation" in x or "harmonic" in x or "path" in x for x in labels)

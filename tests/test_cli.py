@@ -117,7 +117,7 @@ def test_accuracy_leaves_its_study(undrawn, tmp_path):
     assert found["scene"] == "s.toml"
     assert found["amplitudes"] == pytest.approx([0.4, 0.55, 0.7, 0.85, 1.0])
     assert {x["label"] for x in found["lines"]} == {
-        *(f"direct: {knob}" for knob in ("phases", "segments", "nodes")), "adapted: curves", "area: grid"
+        *(f"direct: {setting}" for setting in ("phases", "segments", "nodes")), "adapted: curves", "area: grid"
     }  # fmt: skip
     assert all(len(x["value"]) == len(x["error"]) == len(x["seconds"]) for x in found["lines"])
     written = (tmp_path / "out" / "accuracy.txt").read_text()

@@ -1,12 +1,15 @@
 """Counted beforehand: the force balances of every tier, table, error, motion and sweep are those that are solved."""
 
 import dataclasses
+import tracemalloc
 
+import numpy as np
 import pytest
 
 from geomech import scenes
 from geomech.gaits import Fourier
-from geomech.studies import accuracy, cost, effort, motion, sweep
+from geomech.run.cost import BASE
+from geomech.studies import accuracy, cost, effort, motion, shape_space, sweep
 from geomech.studies.study import Study
 from rft.balance.listening import listening
 from rft.effects import SkinFriction, Slope
@@ -118,3 +121,34 @@ def test_accuracy_and_sweep_say_what_they_cost(solved):
         solved.clear()
         sweep.sweep(scene, over)
         assert foretold == sum(solved)
+
+
+@pytest.mark.parametrize("scene", [GLASS, VISCOUS])
+@pytest.mark.parametrize(
+    "question",
+    [
+        lambda s: shape_space.ccf(s, None, None, "link-1", False, False),
+        lambda s: shape_space.ccf(s, "1,2", None, None, False, False),
+    ],
+    ids=["map with gait and another frame", "slice"],
+)
+def test_a_map_takes_the_balances_foretold(scene, question, solved):
+    asked = question(scene.with_numerics(grid=7))
+    asked.check()
+    foretold = asked.cost().balances
+    solved.clear()
+    asked.answer(lambda done: None, lambda cost: None)
+    assert foretold == sum(solved)
+
+
+def test_memory_is_foretold_too_large_rather_than_too_small():
+    """Of gaits that fill a batch, beside what is in memory anyway."""
+    scene, amplitudes = GLASS.with_numerics(phases=4096), np.linspace(0.1, 1, 40)
+    told = cost.direct(scene, scene.gait, len(amplitudes), 4096)[0].memory - BASE
+    tracemalloc.start()
+    try:
+        Study(scene).study(amplitudes, ["direct"])
+        used = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert used < told < 6 * used

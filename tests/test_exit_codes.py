@@ -108,6 +108,13 @@ def test_what_is_stopped_leaves_nothing_half_written(name, how, ends, said, ende
     assert err == "" or err.startswith("error: ")
 
 
+def test_an_interrupt_that_typer_catches_is_one_too(monkeypatch):
+    """It tells so by a code of its own, and says nothing."""
+    monkeypatch.setattr(cli, "app", lambda **options: 130)
+    code, out, err = geomech("displacement", "three-link-glass")
+    assert (code, out) == (130, "") and err.startswith("error: stopped by SIGINT")
+
+
 def test_a_fault_of_the_program_is_not_passed_off_as_the_users(ended, monkeypatch):
     failing(monkeypatch, lambda: 1 / 0)
     with pytest.raises(ZeroDivisionError):

@@ -48,6 +48,8 @@ def test_a_scene_is_made_of_what_there_is(parts, expected):
 def test_effects_and_lengths_are_lists_too_and_sizes_have_places():
     scene = as_scene(SAND, rft.Chain([1, 1, 1]), effects=[rft.Transient(0.1)], phases=32)
     assert scene.system.effects == (rft.Transient(0.1),) and scene.numerics.phases == 32
+    study = Study(SAND, rft.Chain([1, 1, 1]), effects=[rft.Transient(0.1)], phases=32)
+    assert (study.scene.system, study.scene.numerics) == (scene.system, scene.numerics)
     assert hash(geomech.Swimmer(SAND, rft.Chain([1, 1, 1]), [rft.Transient(0.1)])) == hash(scene.system)
     assert [g(0.3).amplitude for g in (Circle, Butterfly, Wave, Sine)] == [0.3] * 4
     assert hash(Ellipse([1.0, 0.5], 0.2)) == hash(Ellipse(semi_axes=(1.0, 0.5), tilt=0.2))

@@ -16,7 +16,7 @@ from test_store import HARD, same
 
 from geomech import plots, scenes, terminal, text
 from geomech.commands.pipeline import allow, storing
-from geomech.core.knob import Knob
+from geomech.core.setting import Setting
 from geomech.geometry import connection
 from geomech.optimisation import checked, search
 from geomech.optimisation.question import result_of
@@ -208,11 +208,11 @@ def test_what_has_no_digest_is_computed_and_not_stored(tmp_path):
 def test_studies_resume_to_the_last_digit(tmp_path, monkeypatch):
     """Error studies, searches from several starts, fields with what moving costs; seconds are those of the first
     time."""
-    few = [dataclasses.replace(k, values=k.values[:2]) for k in tiered.KNOBS if k.tier == "direct"]
-    monkeypatch.setattr(tiered, "KNOBS", few)
+    few = [dataclasses.replace(k, values=k.values[:2]) for k in tiered.SETTINGS if k.tier == "direct"]
+    monkeypatch.setattr(tiered, "SETTINGS", few)
     monkeypatch.setattr(tiered, "TRUTH_PHASES", 64)
     monkeypatch.setattr(connection, "SAMPLES_TOGETHER", 100)
-    monkeypatch.setattr(walking, "KNOBS", (Knob("steps", (8, 9), 2, against="limit"),))
+    monkeypatch.setattr(walking, "SETTINGS", (Setting("steps", (8, 9), 2, against="limit"),))
     monkeypatch.setattr(walking, "FINEST", {"steps": 10})
     monkeypatch.setattr(walking, "SETTLING", 1)
     monkeypatch.setattr(type(scenes.load("c-leg")), "ladder", (4, 8, 16, 32))

@@ -24,7 +24,8 @@ from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = Swimmer(MEDIA["glass-0.3mm-loose"], Backbone(40))
-USUAL = {"spread": 0.05, "jitter": 0.02}
+USUAL, REPEATING = {"spread": 0.05, "jitter": 0.02}, {"spread": 0.0, "jitter": 0.0}
+VARYING = {"spread": 0.1, "jitter": 0.05, "swing": 0.7, "waves": 1.5}
 
 
 @pytest.fixture(autouse=True)
@@ -118,13 +119,10 @@ def wide(trial, names=None, t="t", unit=""):
 
 
 def deeplabcut(trial, score=0.99):
+    """A film of 600 pixels, in which the body is 300 long and y runs down."""
     names = [f"part{k}" for k in range(trial.points.shape[1])]
-    heads = [
-        ["scorer", *["net"] * 3 * len(names)],
-        ["bodyparts", *np.repeat(names, 3)],
-        ["coords", *["x", "y", "likelihood"] * len(names)],
-    ]
-    rows = [",".join(x) for x in heads]
+    heads = {"scorer": ["net"] * 3, "bodyparts": None, "coords": ["x", "y", "likelihood"]}
+    rows = [",".join([word, *(x for n in names for x in cells or [n] * 3)]) for word, cells in heads.items()]
     for k, p in enumerate(trial.points):
         cells = [f"{v:.8g}" for x, y in p for v in (100 + 300 * x, 700 - 300 * y, score)]
         rows.append(",".join([str(k), *cells]))
@@ -138,20 +136,16 @@ def long(trial, order=1):
 
 def test_every_format_gives_the_same_trial(exact, tmp_path):
     file = tmp_path / "trial.csv"
-    forms = {
-        long(exact): {},
-        long(exact, -1): {},
-        "\n".join(line.replace(f",{k},", ",", 1) for line in long(exact).splitlines() for k in ("point",)).replace("t,x_BL", "t,x_BL"): None,
-        wide(exact, unit="_bl"): {},
-        wide(exact).replace("_x", ".x").replace("_y", ".y"): {"units": "BL"},
-        wide(exact, t="time_ms").replace("p", "head "): None,
-        wide(dataclasses.replace(exact.trial(), points=exact.points * 120), unit="_mm"): {"mm": 0.12},
-        wide(dataclasses.replace(exact.trial(), points=exact.points * 12), unit=" (cm)"): {"mm": 0.12},
-    }  # fmt: skip
-    for text, options in forms.items():
-        if options is None:
-            continue
-        size = options.pop("mm", 1.0)
+    scaled = lambda size: dataclasses.replace(exact.trial(), points=exact.points * size)
+    forms = (
+        (long(exact), {}, 1.0),
+        (long(exact, -1), {}, 1.0),
+        (wide(exact, unit="_bl"), {}, 1.0),
+        (wide(exact).replace("_x", ".x").replace("_y", ".y"), {"units": "BL"}, 1.0),
+        (wide(scaled(120), unit="_mm"), {}, 0.12),
+        (wide(scaled(12), unit=" (cm)"), {}, 0.12),
+    )
+    for text, options, size in forms:
         file.write_text(text)
         trial = reader.read(file, **options)
         np.testing.assert_allclose(trial.points, exact.points * size, atol=1e-6)

@@ -11,7 +11,7 @@ import pytest
 from matplotlib import image
 
 from geomech import scenes
-from geomech.core.knob import Knob
+from geomech.core.setting import Setting
 from geomech.studies import accuracy, walking
 from geomech.studies.sweep import sweep
 from rft.meshes import Spatial
@@ -250,7 +250,7 @@ engine = "mujoco"
 
 
 def test_walk_sweep_and_accuracy_take_the_engine(geomech, tmp_path, monkeypatch):
-    monkeypatch.setattr(walking, "KNOBS", (Knob("steps", (8, 10), 2, against="limit"),))
+    monkeypatch.setattr(walking, "SETTINGS", (Setting("steps", (8, 10), 2, against="limit"),))
     monkeypatch.setattr(walking, "FINEST", {"steps": 12})
     (tmp_path / "small.toml").write_text(SMALL)
     code, out, _ = geomech("walk", "small.toml", "--json", "-o", "out")

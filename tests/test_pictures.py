@@ -11,15 +11,16 @@ from matplotlib.colors import to_rgba
 from matplotlib.quiver import Quiver
 
 from geomech import plots, scenes
+from geomech.commands.options import colour_limit
 from geomech.gaits import Butterfly, Circle, Ellipse
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
 from geomech.plots.displacements import ERROR, MEASURED, MEDIUM, TO_ROUNDING
-from geomech.plots.precision import KNOBS as PRECISION
 from geomech.plots.precision import PANELS
+from geomech.plots.precision import SETTINGS as PRECISION
 from geomech.scenes.measurements import read
 from geomech.studies.study import Study
-from geomech.studies.tiered import KNOBS
+from geomech.studies.tiered import SETTINGS
 from geomech.systems.base import shape_labels
 from geomech.tiers import TIERS
 from rft.refusal import Refusal
@@ -359,7 +360,7 @@ def test_the_map_of_a_sweep_lies_as_its_parameters():
 
 def test_a_work_precision_diagram_has_no_empty_axes_and_takes_errors_of_0(tmp_path):
     """As of systems that no setting approximates: warnings are errors here."""
-    line = {"tier": "direct", "knob": "phases", "value": [16, 64, 128], "seconds": [0.1, 0.3, 0.5], "slope": None}
+    line = {"tier": "direct", "setting": "phases", "value": [16, 64, 128], "seconds": [0.1, 0.3, 0.5], "slope": None}
     for against, title in PANELS.items():
         for error in ([1e-3, 1e-5, 0.0], [0.0, 0.0, 0.0]):
             fig = plots.work_precision_figure(
@@ -375,14 +376,21 @@ def test_the_work_precision_diagram_says_what_its_lines_are():
     lines = [
         {
             "tier": "direct",
-            "knob": "phases",
+            "setting": "phases",
             "value": [16, 64],
             "error": [1e-3, 1e-5],
             "seconds": [0.1, 0.3],
             "slope": 2.26,
         },
-        {"tier": "area", "knob": "grid", "value": [7, 61], "error": [0.02, 0.01], "seconds": [0.2, 0.4], "slope": 0.04},
-        {"tier": "path", "knob": "directions", "value": [2, 8], "error": [0.1, 0], "seconds": [1, 2], "slope": None},
+        {
+            "tier": "area",
+            "setting": "grid",
+            "value": [7, 61],
+            "error": [0.02, 0.01],
+            "seconds": [0.2, 0.4],
+            "slope": 0.04,
+        },
+        {"tier": "path", "setting": "directions", "value": [2, 8], "error": [0.1, 0], "seconds": [1, 2], "slope": None},
     ]
     for line, against in zip(lines, ("truth", "truth", "limit")):
         line["against"] = against
@@ -396,7 +404,7 @@ def test_the_work_precision_diagram_says_what_its_lines_are():
     assert left.get_xlabel() == "time for 3 amplitudes, tables included (s)"
     assert "finer force balance (BL)" in left.get_ylabel() and "the setting leads (BL)" in right.get_ylabel()
     np.testing.assert_array_equal(left.lines[1].get_xydata(), [[0.2, 0.02], [0.4, 0.01]])
-    assert set(PRECISION) <= {knob.name for knob in KNOBS}
+    assert set(PRECISION) <= {setting.name for setting in SETTINGS}
     assert left.get_title() and right.get_title()
     fig.canvas.draw()
     for ax in (left, right):  # two powers of ten on each axis, though the times span less than one
@@ -474,6 +482,32 @@ def test_colours_have_a_limit():
     fig = plots.ccf_figure(field, error=error)
     assert [t.get_text() for legend in fig.legends for t in legend.get_texts()] == [plots.HATCHED]
     assert not any(ax.get_legend() for ax in fig.axes)
+
+
+def test_two_percentiles_are_ends_of_the_values():
+    """Colours of a CCF stay centred on zero, as far as the further of the two; "5:9" and the like are no limits."""
+    values = np.stack([SHAPES[0] + 0.5, SHAPES[1], SHAPES[0]])
+    top = max(abs(np.percentile(values[0], p)) for p in (20, 90))
+    limits = only(plots.ccf_map(Field(AXES, values), 0, clim="20%:90%"), QuadMesh).get_clim()
+    assert limits == pytest.approx((-top, top)) and top == pytest.approx(np.percentile(values[0], 90))
+    assert colour_limit("5%:95%") == "5%:95%"
+    for text in ("5:9", "95%:5%", "5%:9", "5%:5%", "0%", "1%:2%:3%"):
+        with pytest.raises(Refusal, match="is no limit"):
+            colour_limit(text)
+
+
+def test_each_row_of_a_connection_has_its_scale_whose_top_may_be_a_percentile():
+    A = np.random.default_rng(1).normal(size=(3, 2, 11, 9)) * np.array([1.0, 20.0, 300.0])[:, None, None, None]
+    fitted, sizes = Connection(AXES, A, np.abs(A[:, 0]), np.abs(A[:, 0])), np.hypot(A[:, 0], A[:, 1])
+    tops = lambda **o: [only(ax, Quiver).get_clim()[1] for ax in plots.connection_figure(fitted, **o).axes[:3]]
+    np.testing.assert_allclose(tops(), sizes.max((1, 2)))
+    np.testing.assert_allclose(tops(clim="80%"), np.percentile(sizes, 80, axis=(1, 2)))
+    np.testing.assert_allclose(tops(clim="5%:80%"), tops(clim="80%"))
+    assert tops(clim=0.7) == [0.7] * 3
+    arrows = only(plots.vector_field(fitted, 1, clim="80%"), Quiver)
+    cut = np.fmin(1.0, np.percentile(sizes[1], 80) / sizes[1])
+    np.testing.assert_allclose(arrows.U, (cut * A[1, 0]).ravel())
+    assert arrows.colorbar.extend == "max" and only(plots.vector_field(fitted, 1), Quiver).colorbar.extend == "neither"
 
 
 def test_components_choose_rows_of_the_connection():

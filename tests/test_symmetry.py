@@ -31,6 +31,7 @@ BACK = Fourier(cos=((0.5, 0.3), (0.4, 0.1)), sin=((0.0, 0.0), (0.0, 0.0)))  # th
     (Wave(joints=6), BOTH, ["y", "heading"]),
     (Wave(joints=6, offset=0.1), BOTH, []),
     (Wave(joints=2, waves=0.0), BOTH, ["x", "y", "heading"]),
+    (Fourier(cos=((1, 0.4), (-1, 0.4)), sin=((0, 0.2), (0, 0.2))), dataclasses.replace(BOTH, odd=False), ["heading"]),  # halves
     (BACK, Traits(), ["x", "y", "heading"]),
     (BACK, Traits(odd=False), []),
 ])  # fmt: skip

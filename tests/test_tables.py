@@ -400,7 +400,10 @@ def test_every_command_works_on_a_table_or_says_why_not(made, tmp_path, monkeypa
     assert (tmp_path / "t" / "a.nc").read_bytes() == before
     told = explain(scenes.load("t/t.toml"))
     assert "fit leaves x" in told and "odd harmonics" in told and "frame link-1" in told
-    assert [k.label for k in tiered.Settings(scenes.load("t/t.toml")).knobs()] == ["direct: phases", "adapted: curves"]
+    assert [k.label for k in tiered.Settings(scenes.load("t/t.toml")).settings()] == [
+        "direct: phases",
+        "adapted: curves",
+    ]
     written = scenes.toml(Scene(Table("t/a.nc"), Circle()))
     assert scenes.parse(written).system == Table("t/a.nc")
     again = pickle.loads(pickle.dumps(Table("t/a.nc")))
@@ -662,7 +665,7 @@ def test_a_scene_that_is_written_elsewhere_finds_its_file(tmp_path):
 
 def test_what_accuracy_costs_includes_the_tables_own_error(made, monkeypatch):
     scene = Scene(Table(made[0] / "a.nc"), GAIT).with_numerics(phases=64)
-    monkeypatch.setattr(tiered, "KNOBS", [k for k in tiered.KNOBS if k.label == "direct: phases"])
+    monkeypatch.setattr(tiered, "SETTINGS", [k for k in tiered.SETTINGS if k.label == "direct: phases"])
     found = accuracy.study(scene, runs=1)
     amplitudes = np.array(found["amplitudes"])
     own = scene.system.table_error(*GAIT.cycle(64, amplitudes))[:, 0].max()

@@ -397,19 +397,19 @@ def test_a_tolerance_refines_pieces_or_is_refused(monkeypatch):
         cheapest(scene, [1.2], 1e-8)
 
 
-def test_a_knob_for_pieces():
+def test_a_setting_for_pieces():
     depth = scenes.load("three-link-glass").changed(effects=(DepthProfile(along=(0.5, 2, 1)),))
-    knob = next(k for k in tiered.KNOBS if k.name == "pieces")
-    assert tiered.applies(knob, depth)
-    assert not tiered.applies(knob, depth.changed(effects=()))
+    setting = next(k for k in tiered.SETTINGS if k.name == "pieces")
+    assert tiered.applies(setting, depth)
+    assert not tiered.applies(setting, depth.changed(effects=()))
     a = np.linspace(0.5, 1.5, 8)
     far = Study(depth.with_numerics(pieces=320, phases=64)).poses("direct", Circle(), a)
     coarse = [
-        Study(tiered.Settings(depth.with_numerics(phases=64)).at(knob, n)).poses("direct", Circle(), a)
-        for n in knob.values
+        Study(tiered.Settings(depth.with_numerics(phases=64)).at(setting, n)).poses("direct", Circle(), a)
+        for n in setting.values
     ]
     errors = [np.sqrt(np.mean(estimate.distance(x, far) ** 2)) for x in coarse]
-    assert -np.polyfit(np.log(knob.values), np.log(errors), 1)[0] == pytest.approx(2, abs=0.35)
+    assert -np.polyfit(np.log(setting.values), np.log(errors), 1)[0] == pytest.approx(2, abs=0.35)
     with pytest.raises(ValueError, match="pieces must be a whole number from 1 to 10000, got 0"):
         body_velocity(GLASS, Chain(), [0.1, 0.2], [1, 0], effects=depth.system.effects, pieces=0)
     with pytest.raises(Refusal, match="pieces must be a whole number from 1 to 10000, got 0.5"):

@@ -542,8 +542,8 @@ def test_sweep_and_accuracy_of_a_walk(geomech, tmp_path, monkeypatch):
         assert file.variables["gait_frequency"][:].tolist() == [2, 3] and speed.shape == (1, 2)
         assert (np.diff(speed, axis=1) > 0).all() and (file.variables["status"][:] == 0).all()
     few = {"steps": (8, 16), "elements": (4, 6), "rounding": (8e-3, 4e-3)}
-    knobs = tuple(dataclasses.replace(knob, values=few[knob.name]) for knob in walking.KNOBS)
-    monkeypatch.setattr(walking, "KNOBS", knobs)
+    settings = tuple(dataclasses.replace(setting, values=few[setting.name]) for setting in walking.SETTINGS)
+    monkeypatch.setattr(walking, "SETTINGS", settings)
     monkeypatch.setattr(walking, "FINEST", {"steps": 24, "elements": 12, "rounding": 2e-3})
     code, out, err = geomech("accuracy", "small.toml", "-o", "acc", "--json")
     assert (code, err) == (0, "")

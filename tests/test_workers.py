@@ -203,8 +203,8 @@ def test_fields_have_the_same_digits_whoever_computes(two, given_away, monkeypat
 
 
 def test_error_studies_have_the_same_digits_whoever_computes(two, given_away, monkeypatch):
-    few = [dataclasses.replace(k, values=k.values[:2]) for k in tiered.KNOBS if k.tier in ("direct", "path")]
-    monkeypatch.setattr(tiered, "KNOBS", few)
+    few = [dataclasses.replace(k, values=k.values[:2]) for k in tiered.SETTINGS if k.tier in ("direct", "path")]
+    monkeypatch.setattr(tiered, "SETTINGS", few)
     monkeypatch.setattr(tiered, "TRUTH_PHASES", 64)
     scene, told = GLASS.with_numerics(grid=7), []
     here, shared = both(two, lambda: accuracy.study(scene, told.append, runs=1))

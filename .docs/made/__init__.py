@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from . import api, command_line, conventions, examples, figures, keys, validation
+from . import api, command_line, conventions, examples, figures, keys, lab, validation
 
 
 def notebooks() -> str:
@@ -25,6 +25,7 @@ MADE = {
     "commands": command_line.page,
     "figures": figures.page,
     "keys": keys.page,
+    "lab": lab.frame,
     "notebooks": notebooks,
     "thumbnails": examples.thumbnails,
     "validation": validation.table,
@@ -47,6 +48,7 @@ def compute(app) -> None:
     api.write(generated / "api")
     examples.compute_all()
     figures.draw_missing()
+    lab.write()
 
 
 def setup(app) -> dict[str, bool]:

@@ -1,7 +1,7 @@
 """The Python face: a study of a scene that computes, prints itself and draws."""
 
 from geomech.app.questions import accuracy, fit_medium, fit_midlines, optimise, sweep
-from geomech.app.results import Displacements, FittedMedium, FittedMidlines, Optimum, Swept
+from geomech.app.results import Displacements, FittedMedium, FittedMidlines, Forces, Optimum, Swept
 from geomech.app.study import Study, study
 
 optimize = optimise
@@ -10,6 +10,7 @@ __all__ = [
     "Displacements",
     "FittedMedium",
     "FittedMidlines",
+    "Forces",
     "Optimum",
     "Study",
     "Swept",

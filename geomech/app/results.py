@@ -65,6 +65,27 @@ class Optimum(optimisation.Optimum):
         return draw(self, ax)
 
 
+class Forces:
+    """Forces along a body over a cycle: ``forces["forward"]`` are values, ``forces.result`` has units and labels, too."""
+
+    def __init__(self, result: Result):
+        self.result = result
+
+    def __getitem__(self, name: str) -> Any:
+        return self.result[name].values
+
+    def __repr__(self) -> str:
+        return printable(text.text(self.result))
+
+    def plot(self, *panels: str, clim: float | str | None = None) -> Any:
+        """Draw maps over place and phase, and thrust and drag stacked; see `geomech.plots.forces_figure`. Return the Figure."""
+        return plots.forces_figure(self.result, panels, clim=clim)
+
+    def to_xarray(self) -> Any:
+        """Return a Dataset over phase, s, point and joint, with units."""
+        return to_xarray(self.result)
+
+
 class FittedMidlines:
     """Kinematics of midlines. result: all numbers as variables. kinematics: the fit. comparison: with a prediction, or None."""
 

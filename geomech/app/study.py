@@ -10,7 +10,7 @@ import numpy as np
 
 from geomech import plots
 from geomech.app.questions import optimise, sweep
-from geomech.app.results import Displacements, Optimum, Swept
+from geomech.app.results import Displacements, Forces, Optimum, Swept
 from geomech.core.errors import choose
 from geomech.gaits import Gait
 from geomech.geometry.field import Field
@@ -18,10 +18,11 @@ from geomech.geometry.plane import Plane, ProjectedGait
 from geomech.io.results import to_xarray
 from geomech.output import animate, display
 from geomech.scenes.parts import as_scene
-from geomech.studies import fields
+from geomech.studies import fields, forces
 from geomech.studies import study as studies
 from geomech.studies.choose import cheapest
 from geomech.studies.motion import Trajectory
+from geomech.studies.newtons import Sizes
 from geomech.studies.report import reachable
 from geomech.systems.base import shape_labels
 from rft.checks import is_number, is_whole
@@ -146,6 +147,13 @@ class Study(studies.Study):
         animate.check_format(path := Path(path))
         animate.write(Trajectory(self.scene, cycles, drawn=True).ask(), path)
         return path
+
+    def forces(self, **sizes: float) -> Forces:
+        """Return force, power and bending moment along the body over a cycle of the gait, and when its muscles work.
+
+        sizes: length, radius and depth of the body, m, or its axial stress, Pa, and the frequency, Hz, where the scene does
+        not have them; with these forces are in N and powers in W, else in axial drags of the straight body."""
+        return Forces(forces.Forces(self.scene, Sizes(**sizes)).ask())
 
     def optimise(self, objective: str = "displacement", **options: Any) -> Optimum:
         """Return the best gait for an objective; see `geomech.optimise`."""

@@ -2,8 +2,8 @@
 one is a file and its name here; `geomech.commands.options` and `loading` have what they share."""
 
 COMMANDS = {  # by the headings of `geomech --help`, in its order
-    "Analyse": ("run", "displacement", "ccf", "connection", "velocity", "symbolic", "sweep", "accuracy"),
-    "Gaits": ("trajectory", "optimize"),
+    "Analyse": ("run", "displacement", "ccf", "connection", "velocity", "symbolic", "sweep", "accuracy", "lab"),
+    "Gaits": ("trajectory", "forces", "optimize"),
     "Grains and robots": ("stress", "intrude", "walk"),
     "Your own data": ("fit_medium", "fit_gait"),
     "Reference": ("scenes", "reference", "explain"),

@@ -70,6 +70,15 @@ def optimize(
     drawn = pictures.Optimum(stretch, plot, colour_limit(clim))
     file, figure = Output(out, parts.write_best, formats.toml), Output(plot, drawn, pictures.check)
     question = Optimize(
-        scene, objective, direction, harmonics, joint_limits(limits, scene), starts, rate, power, stretch
+        scene,
+        objective,
+        direction,
+        harmonics,
+        joint_limits(limits, scene),
+        starts,
+        rate,
+        power,
+        plot is not None,
+        stretch,
     )
     execute(question, file, figure, as_json=as_json, yes=yes)

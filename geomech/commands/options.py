@@ -62,7 +62,7 @@ ComponentOption = Annotated[
 ]
 ClimOption = Annotated[
     Optional[str],
-    typer.Option("--clim", metavar="LIMIT", help="limit of the colours, a number or a percentile as 98%"),
+    typer.Option("--clim", metavar="LIMIT", help="limit of the colours, a number or percentiles as 98% or 5%:95%"),
 ]
 DataOption = Annotated[
     Optional[Path],
@@ -296,19 +296,22 @@ def components(text: str | None, names: Sequence[str] = MAPS) -> tuple[str, ...]
 
 
 def colour_limit(text: str | None, panels: Sequence[str] = ("x",)) -> float | str | None:
-    """Return a limit of colours: a positive number, or a percentile such as "98%". panels: on which it holds, none for all;
-    one number has one unit."""
+    """Return a limit of colours: a positive number, a percentile such as "98%", or two such as "5%:95%". panels: on which it
+    holds, none for all; one number has one unit."""
     if text is None:
         return None
+    ends = text.strip().split(":")
     percent = text.strip().endswith("%")
     try:
-        value = float(text.strip().removesuffix("%"))
+        if any(end.endswith("%") != percent for end in ends) or len(ends) > 1 + percent:
+            raise ValueError
+        values = [float(end.removesuffix("%")) for end in ends]
     except ValueError:
-        value = math.nan
-    if not 0.0 < value < (100.0 + 1e-9 if percent else math.inf):
-        raise Refusal(
-            f"{text!r} is no limit", where="--clim", instead="give a number above 0, or a percentile such as 98%"
-        )
+        values = [math.nan]
+    least = 0.0 if len(values) == 1 else -1e-9
+    if not (least < values[0] and values == sorted({*values}) and values[-1] < (100.0 + 1e-9 if percent else math.inf)):
+        instead = "give a number above 0, or a percentile such as 98% or 5%:95%"
+        raise Refusal(f"{text!r} is no limit", where="--clim", instead=instead)
     if not percent and "theta" in (panels or MAPS) and len(panels or MAPS) > 1:
         why = "panels of theta have another unit than those of x and y"
         raise Refusal(
@@ -317,7 +320,7 @@ def colour_limit(text: str | None, panels: Sequence[str] = ("x",)) -> float | st
             because=why,
             instead="say --component x, or a percentile such as 98%",
         )
-    return text.strip() if percent else value
+    return text.strip() if percent else values[0]
 
 
 def refuse_without_figure(plot: Path | None, **options: object) -> None:

@@ -24,11 +24,11 @@ def part(kind: str, thing) -> str:
     return f"{kind} ({', '.join(values)})" if values else kind
 
 
-def grid(axes: Sequence[np.ndarray]) -> str:
-    """Return the shape of a grid and the ranges of its axes."""
+def grid(axes: Sequence[np.ndarray], names: Sequence[str] = ()) -> str:
+    """Return the shape of a grid and the ranges of its axes. names: of the axes, alpha_1 ... if left out."""
     ranges = [f"{a[0]:.4g} to {a[-1]:.4g}" for a in axes]
     equal = len(set(ranges)) == 1 and len(ranges) > 1
-    names = [f"alpha_{k + 1}" for k in range(len(axes))]
+    names = names or [f"alpha_{k + 1}" for k in range(len(axes))]
     described = f"{names[0]}{' and ' if len(names) == 2 else ' to '}{names[-1]} from {ranges[0]}" if equal else ""
     described = described or ", ".join(f"{name} from {r}" for name, r in zip(names, ranges))
     return f"{' x '.join(str(len(a)) for a in axes)} shapes, {described} rad"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,8 +11,9 @@ from geomech.geometry.curvature import ccf
 from geomech.geometry.field import Field
 from geomech.geometry.minimum_perturbation import minimum_perturbation
 from geomech.optimisation.loops import TOUCHING
-from geomech.optimisation.optimum import Optimum
-from geomech.studies.study import Study
+
+if TYPE_CHECKING:
+    from geomech.optimisation.optimum import Optimum
 
 NEAR_ZERO = 0.15  # of the CCF's largest value inside the loop's box: below it a loop runs along the line of zeros
 NEAR_SINGULAR = 0.05  # of the least distance from singular shapes: a loop that is so near is limited by them
@@ -27,10 +28,10 @@ class Gained(NamedTuple):
     component: int
 
 
-def gained_ccf(optimum: Optimum, study: Study | None = None) -> Gained:
+def gained_ccf(optimum: Optimum) -> Gained:
     """Return the CCF in the minimum-perturbation frame or, where singular shapes leave none, in the scene's own; its component
     along the larger of the displacements x and y of the best loop, or that of the heading for turning."""
-    fitted, best = (study or Study(optimum.scene)).fitted, optimum.best
+    fitted, best = optimum.study.fitted, optimum.best
     connection, (x, y, _) = fitted, best.displacement
     if not fitted.field.masked:
         frame = minimum_perturbation(fitted)
@@ -41,11 +42,12 @@ def gained_ccf(optimum: Optimum, study: Study | None = None) -> Gained:
     return Gained(ccf(connection), 2 if turning else int(abs(y) > abs(x)))
 
 
-def limiting(optimum: Optimum, gained: Gained | None) -> np.ndarray:
+def limiting(optimum: Optimum) -> np.ndarray:
     """Return what limits the best loop at each of PHASES phases, as words (PHASES,).
 
-    "limit": a joint limit; "singular": singular shapes; "zero": it runs along the zero line of ``gained``; "length": it is off
-    that line for the sake of path length; "else": off that line; "loop": not known, where ``gained`` is None."""
+    "limit": a joint limit; "singular": singular shapes; "zero": it runs along the zero line of `Optimum.gained`; "length":
+    it is off that line for the sake of path length; "else": off that line; "loop": not known, where there is no such CCF."""
+    gained = optimum.gained
     alpha = optimum.gait.shape(np.linspace(0, 2 * np.pi, PHASES))
     rest = "length" if optimum.request.objective.name == "efficiency" else "else"
     causes = np.full(PHASES, "loop" if gained is None else rest, dtype="<U8")

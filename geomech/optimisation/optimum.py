@@ -8,8 +8,11 @@ from functools import cached_property
 import numpy as np
 
 from geomech.gaits import Gait, Sine
+from geomech.geometry.stretch import Stretch, stretch
+from geomech.optimisation.gain import Gained, gained_ccf
 from geomech.optimisation.request import Request
 from geomech.scenes.model import Scene
+from geomech.studies.study import Study
 from geomech.systems.capabilities import stored_table
 
 
@@ -63,3 +66,17 @@ class Optimum:
             return scene
         largest = np.abs(gait.shape(np.linspace(0, 2 * np.pi, 721))).max()
         return scene.with_numerics(extent=max(scene.numerics.extent, 1.0001 * float(largest)))
+
+    @cached_property
+    def study(self) -> Study:
+        return Study(self.scene)
+
+    @cached_property
+    def gained(self) -> Gained | None:
+        """CCF whose area the best gait gains; None where the velocity does not follow from shape alone."""
+        return None if self.scene.system.traits.steps else gained_ccf(self)
+
+    @cached_property
+    def stretched(self) -> Stretch:
+        """Coordinates of shape space in which equal lengths take equal effort. Refusal for a system without a metric."""
+        return stretch(self.study.metric)

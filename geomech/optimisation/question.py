@@ -21,8 +21,8 @@ from rft.refusal import Refusal
 
 @dataclass(frozen=True)
 class Optimize(Question):
-    """The best gait of a scene, see `optimise`. stretch: it is also drawn in coordinates where equal lengths have equal
-    costs."""
+    """The best gait of a scene, see `optimise`. drawn: on its CCF, where that is a map; stretch: on the same map also in
+    coordinates where equal lengths take equal effort."""
 
     scene: Scene
     objective: str
@@ -32,6 +32,7 @@ class Optimize(Question):
     starts: int | None = None
     rate: float | None = None
     power: float | None = None
+    drawn: bool = False
     stretch: bool = False
 
     @property
@@ -56,7 +57,10 @@ class Optimize(Question):
         return self.request.cost()
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        return result_of(search(self.request, progress))
+        optimum = search(self.request, progress)
+        if self.drawn and self.scene.system.joints == 2:
+            _ = (optimum.gained, self.stretch and optimum.stretched)
+        return result_of(optimum)
 
 
 def result_of(optimum: Optimum) -> Result:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from geomech import text
 from geomech.core.errors import choose
-from geomech.core.variables import Result
+from geomech.core.variables import Result, Variable
 from geomech.io.files import note, write_text
-from geomech.io.results import write_netcdf
+from geomech.io.results import write_csv, write_netcdf
 from geomech.io.tables import FORMATS, ORDERS, SIGNS
 from geomech.measured import results
 from geomech.text import optimum
@@ -75,6 +77,24 @@ def mean_gait(field: Path | None) -> tuple[Callable[[Result, Path], None], Calla
 def write_best(result: Result, path: Path) -> None:
     """Write a scene with the best gait."""
     write_text(path, optimum.scene_toml(result))
+
+
+def check_forces(path: Path) -> None:
+    """Refuse a name that is none of a NetCDF file or a table."""
+    if path.suffix not in (".nc", ".csv"):
+        raise Refusal(f"cannot write {path}", instead="end the name in .nc or .csv")
+
+
+def write_forces(result: Result, path: Path) -> None:
+    """Write forces along a body: all variables as NetCDF, or those over phase and place as a table with a row for each."""
+    if path.suffix == ".nc":
+        write_netcdf(path, result)
+        return
+    over = [v for v in result.variables if v.dims == ("phase", "s")]
+    phase, s = np.meshgrid(result["phase"].values, result["s"].values, indexing="ij")
+    columns = [Variable("phase", (), phase), Variable("s", (), s), *over]
+    rows = [replace(v, dims=("row",), values=v.values.ravel()) for v in columns]
+    write_csv(path, replace(result, variables=tuple(rows)))
 
 
 def write_medium(result: Result, path: Path) -> None:

@@ -53,6 +53,11 @@ def measured(result: Result, path: Path) -> None:
     plots.save(figure, path)
 
 
+def forces(result: Result, path: Path, **options: Any) -> None:
+    """Draw forces along a body. options: of `plots.forces_figure`."""
+    plots.save(plots.forces_figure(result, **options), path)
+
+
 def calibration(result: Result, path: Path) -> None:
     """Draw measurements and the law that was fitted to them."""
     plots.save(CALIBRATIONS[result.kind](result), path)

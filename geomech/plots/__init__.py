@@ -11,6 +11,7 @@ from geomech.plots.figures import (
     plane_connection_figure,
     planes_figure,
 )
+from geomech.plots.forces import force_map, forces_figure, stacked_by_phase, stacked_by_place
 from geomech.plots.maps import (
     COMPONENTS,
     FINEST,
@@ -32,7 +33,7 @@ from geomech.plots.midlines import midlines_figure
 from geomech.plots.motion import LINES, filmstrip, stage
 from geomech.plots.optimum import optimum_angles, optimum_figure, optimum_map
 from geomech.plots.plates import penetration_figure, plates_figure
-from geomech.plots.precision import KNOB_MARKER, walk_accuracy_figure, work_precision, work_precision_figure
+from geomech.plots.precision import SETTING_MARKER, walk_accuracy_figure, work_precision, work_precision_figure
 from geomech.plots.stretched import stretched_figure, stretched_map
 from geomech.plots.style import MARKED, STYLE, check_format, figure, quantity, save, shared_legend, styled
 from geomech.plots.styles import CCF_STYLES, CONNECTION_STYLES, ccf_contours, ccf_surface, streamlines, winding
@@ -52,11 +53,11 @@ __all__ = [
     "CONNECTION_STYLES",
     "FINEST",
     "HATCHED",
-    "KNOB_MARKER",
     "LINES",
     "MARKED",
     "PANELS",
     "RINGS",
+    "SETTING_MARKER",
     "STYLE",
     "ccf_contours",
     "ccf_figure",
@@ -75,6 +76,8 @@ __all__ = [
     "elements_figure",
     "figure",
     "filmstrip",
+    "force_map",
+    "forces_figure",
     "frame_figure",
     "indicatrices",
     "intrusion_figure",
@@ -86,7 +89,8 @@ __all__ = [
     "optimum_angles",
     "optimum_figure",
     "optimum_map",
-    "pairs_figure", "penetration_figure",
+    "pairs_figure",
+    "penetration_figure",
     "plane_connection_figure",
     "planes_figure",
     "plates_figure",
@@ -95,6 +99,8 @@ __all__ = [
     "shape_space",
     "shared_legend",
     "square_of_angles",
+    "stacked_by_phase",
+    "stacked_by_place",
     "stage",
     "streamlines",
     "stress_figure",

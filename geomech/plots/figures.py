@@ -46,11 +46,14 @@ SHADOW = "dashed: the gait, seen along the joints that are held here"
 def connection_figure(
     connection: Connection, *, labels: Labels = ANGLES, style: str = "quiver",
     beside: Connection | None = None, names: Sequence[str] = (), components: Sequence[str] = (),
+    clim: float | str | None = None,
 ) -> Figure:  # fmt: skip
-    """Draw the rows of A side by side, but for those that are zero everywhere, as arrows ("quiver") or "streamlines".
+    """Draw the rows of A side by side, but for those that are zero everywhere, as arrows ("quiver") or "streamlines", each row
+    on a scale of its own.
 
     beside: the connection in another body frame, drawn below on the same scales. names: of the two frames. components:
-    of WORDS, drawn even where they are zero."""
+    of WORDS, drawn even where they are zero. clim: top of the scales, a number or a percentile of a row's lengths such as
+    "98%", their largest if left out."""
     draw = CONNECTION_STYLES[choose("style", style, CONNECTION_STYLES)]
     rows = [connection] if beside is None else [connection, beside]
     panels = panels_of(components, [[has_row(c, k) for k in range(3)] for c in rows])
@@ -58,8 +61,8 @@ def connection_figure(
         0.3 + 3.5 * len(panels), 3.0 + 2.7 * (len(rows) - 1), len(panels), len(rows), layout="compressed"
     )
     for k, component in enumerate(panels):
-        sizes = [largest(np.hypot(*c.A[component])) for c in rows]
-        top = None if beside is None else max(sizes)
+        tops = [limit_of(np.hypot(*c.A[component]), clim) for c in rows if has_row(c, component)]
+        top = None if beside is None and clim is None else max(tops, default=None)
         for c, ax in zip(rows, axes[:, k]):
             draw(c, component, ax=ax, labels=labels, top=top)
     _name(axes, names)
@@ -141,7 +144,8 @@ def planes_figure(
 
 @styled
 def plane_connection_figure(
-    planes: Sequence[Plane], *, labels: Labels | None = None, style: str = "quiver", components: Sequence[str] = ()
+    planes: Sequence[Plane], *, labels: Labels | None = None, style: str = "quiver", components: Sequence[str] = (),
+    clim: float | str | None = None,
 ) -> Figure:  # fmt: skip
     """Draw the rows of A of the two joints that move, on planes of shape space, a row for each pair, as `connection_figure`
     does.
@@ -155,7 +159,8 @@ def plane_connection_figure(
     )
     for one, row in zip(planes, axes):
         for component, ax in zip(panels, row):
-            draw(one.connection, component, ax=ax, labels=[labels[k] for k in one.pair])
+            top = None if clim is None else limit_of(np.hypot(*one.connection.A[component][:2]), clim)
+            draw(one.connection, component, ax=ax, labels=[labels[k] for k in one.pair], top=top)
     _name(axes, [plane_title(one, labels) for one in planes])
     say_left_out(fig, panels, components, row_name)
     return fig

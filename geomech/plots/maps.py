@@ -55,10 +55,12 @@ def vector_field(
     every: int | None = None,
     labels: Labels = ANGLES,
     top: float | None = None,
+    clim: float | str | None = None,
 ) -> Axes:
-    """Draw row ``component`` of A as arrows over shape space (Fig. 11(c)); colour repeats their length.
+    """Draw row ``component`` of A as arrows over shape space (Fig. 11(c)), on a scale of its own; colour repeats their length.
 
-    labels: as for `shape_space`. top: of the colours and of the arrows' scale, for maps that are compared."""
+    labels: as for `shape_space`. top: of the colours and of the arrows' scale, for maps that are compared. clim: that top as a
+    number or a percentile of the lengths, as for `limit_of`. Longer arrows are cut to it."""
     ax = axes_of(ax)
     step = every or max(1, round(len(connection.axes[0]) / ARROWS))
     pick = slice(step // 2, None, step)
@@ -67,16 +69,15 @@ def vector_field(
     size = np.hypot(u, v)
     if not has_row(connection, component):
         u, v, size = 0 * u, 0 * v, 0 * size
-    if np.isnan(size).any():  # beside singular shapes arrows are cut
-        cut = np.fmin(1.0, largest(size) / np.fmax(size, 1e-300))
-        u, v, size = cut * u, cut * v, cut * size
-    most = top or np.nanmax(size, initial=0.0) or 1.0
+    most = top or (limit_of(np.hypot(*connection.A[component][:2]), clim) if clim else largest(size))
+    cut, lengths = np.fmin(1.0, most / np.fmax(size, 1e-300)), size
+    u, v, size = cut * u, cut * v, cut * size
     spacing = step * max(np.ptp(a) / max(1, len(a) - 1) for a in connection.axes)
     look = {"cmap": arrow_colours(), "pivot": "mid", "width": 0.0085, "headwidth": 3.6, "headlength": 4.0}
     look |= {"headaxislength": 3.6, "minshaft": 1.6, "minlength": 0.8, "scale_units": "xy"}
     arrows = ax.quiver(x, y, u, v, size, scale=most / (LONGEST * spacing), **look)
     arrows.set_clim(0.0, most)
-    return label_row(ax, arrows, component, connection, labels)
+    return label_row(ax, arrows, component, connection, labels, lengths)
 
 
 def arrow_colours() -> ListedColormap:
@@ -87,10 +88,10 @@ def arrow_colours() -> ListedColormap:
     return ListedColormap(colormaps["viridis"](np.linspace(0.86, 0.0, 256)), "arrows")
 
 
-def label_row(ax, arrows, component: int, connection: Connection, labels: Labels):
-    """Set title, colour bar and axes of a map of a row of A."""
+def label_row(ax, arrows, component: int, connection: Connection, labels: Labels, lengths: np.ndarray):
+    """Set title, colour bar and axes of a map of a row of A with arrows of these lengths."""
     ax.set_title(f"{row_name(component)}: {TITLES[component]}")
-    colorbar = ax.figure.colorbar(arrows, ax=ax, shrink=0.85)
+    colorbar = ax.figure.colorbar(arrows, ax=ax, shrink=0.85, extend=extend(lengths, arrows.get_clim()[1] * (1 + 1e-9)))
     colorbar.set_label(f"|{row_name(component)}| ({unit_of(component, connection.unit)}/{labels[0][1]})", labelpad=8)
     return shape_space(ax, connection.axes, labels)
 
@@ -273,13 +274,18 @@ def largest(values: np.ndarray) -> float:
 
 
 def limit_of(values: np.ndarray, clim: float | str | None = None) -> float:
-    """Return the limit of colours for values: a number as it is, that percentile of their size for "98%", else `largest`."""
+    """Return the limit of colours for values: a number as it is, that percentile of their size for "98%", the further from
+    zero of two percentiles of the values for "5%:95%", else `largest`."""
     if clim is None:
         return largest(values)
     if not isinstance(clim, str):
         return float(clim)
-    size = np.abs(values[np.isfinite(values)])
-    return float(np.percentile(size, float(clim.rstrip("%")))) or largest(values) if size.size else 1.0
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return 1.0
+    percents = [float(end.rstrip("%")) for end in clim.split(":")]
+    ends = np.percentile(finite if len(percents) > 1 else np.abs(finite), percents)
+    return float(np.abs(ends).max()) or largest(values)
 
 
 def panels_of(components: Sequence[str], drawn: Sequence[Sequence[bool]]) -> list[int]:

@@ -6,13 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from geomech.geometry.stretch import stretch
 from geomech.optimisation import Optimum
-from geomech.optimisation.gain import PHASES, Gained, gained_ccf, limiting
+from geomech.optimisation.gain import PHASES, limiting
 from geomech.plots.maps import ccf_map, shape_space
 from geomech.plots.stretched import stretched_map
 from geomech.plots.style import axes_of, figure, quantity, styled
-from geomech.studies.study import Study
 from geomech.systems.base import shape_labels
 
 if TYPE_CHECKING:
@@ -35,52 +33,47 @@ RESIDUAL = {
 
 
 @styled
-def optimum_map(
-    optimum: Optimum, ax: Axes | None = None, gained: Gained | None = None, clim: float | str | None = None
-) -> Axes:
-    """Draw the best loop on the map of `gained_ccf`, coloured by what limits it; the start dashed. Sign and colours are those
-    of `ccf_figure` in the same frame. Where the velocity does not follow from shape alone there is no CCF, and the map has the
-    loop alone.
+def optimum_map(optimum: Optimum, ax: Axes | None = None, clim: float | str | None = None) -> Axes:
+    """Draw the best loop on the map of the CCF that it gains, coloured by what limits it; the start dashed. Sign and
+    colours are those of `ccf_figure` in the same frame. Where the velocity does not follow from shape alone there is no CCF,
+    and the map has the loop alone.
 
     clim: as for `ccf_figure`."""
     ax, system = axes_of(ax, 4.6, 5.2), optimum.scene.system
-    if system.traits.steps:
+    if optimum.gained is None:
         shape_space(ax, [np.linspace(-1, 1, 2) * optimum.scene.numerics.extent] * 2, shape_labels(system))
         ax.set_title("no CCF: the velocity does not follow\nfrom shape alone")
     else:
-        gained = gained or gained_ccf(optimum)
-        field, component = gained
+        field, component = optimum.gained
         ccf_map(field, component, ax=ax, labels=shape_labels(system), clim=clim)
         frame = f"frame {optimum.scene.frame}" if field.masked else "minimum-perturbation frame"
         ax.set_title(f"{ax.get_title()},\n{frame}")
-    draw_start_and_best(optimum, ax, lambda curve: curve, gained)
+    draw_start_and_best(optimum, ax, lambda curve: curve)
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=1)
     return ax
 
 
 @styled
-def stretched_optimum(
-    optimum: Optimum, ax=None, gained: Gained | None = None, study: Study | None = None, clim: float | str | None = None
-):
+def stretched_optimum(optimum: Optimum, ax: Axes | None = None, clim: float | str | None = None) -> Axes:
     """Draw `optimum_map` on shape space redrawn so that equal lengths take equal effort. Refusal for a system without a
     metric."""
-    ax, study, system = axes_of(ax), study or Study(optimum.scene), optimum.scene.system
-    gained, plane = gained or gained_ccf(optimum, study), stretch(study.metric)
+    ax, system, (field, component) = axes_of(ax), optimum.scene.system, optimum.gained
+    plane = optimum.stretched
     effort = "BL" if system.traits.power_degree == 1 else "path length"
     look = {"labels": shape_labels(system), "effort": effort, "clim": clim}
-    stretched_map(gained.field, plane, gained.component, ax=ax, **look)
+    stretched_map(field, plane, component, ax=ax, **look)
     ax.set_title(f"the same, stretched to its effort\n(lengths off by {100 * plane.rms:.2g} % rms)")
     low, high = ([a[k] for a in plane.field.axes] for k in (0, -1))
-    draw_start_and_best(optimum, ax, lambda curve: plane(np.clip(curve, low, high)), gained)
+    draw_start_and_best(optimum, ax, lambda curve: plane(np.clip(curve, low, high)))
     return ax
 
 
-def draw_start_and_best(optimum: Optimum, ax, place, gained: Gained | None) -> None:
+def draw_start_and_best(optimum: Optimum, ax, place) -> None:
     """Draw both loops, each shape where ``place`` puts it."""
     t = np.linspace(0, 2 * np.pi, PHASES)
     ax.plot(*place(optimum.start.gait.shape(t)).T, color="0.25", lw=0.9, ls="--", label="start")
-    nonlinear = gained is not None and not optimum.scene.system.traits.linear
-    draw_limited(ax, place(optimum.gait.shape(t)), limiting(optimum, gained), nonlinear)
+    nonlinear = optimum.gained is not None and not optimum.scene.system.traits.linear
+    draw_limited(ax, place(optimum.gait.shape(t)), limiting(optimum), nonlinear)
 
 
 def draw_limited(ax, curve: np.ndarray, kinds: np.ndarray, nonlinear: bool = False) -> None:
@@ -128,15 +121,13 @@ def optimum_angles(optimum: Optimum, ax: Axes | None = None) -> Axes:
 def optimum_figure(optimum: Optimum, stretched: bool = False, *, clim: float | str | None = None) -> Figure:
     """Draw `optimum_map` and `optimum_angles` side by side; the angles alone where there are not two joints. stretched:
     `stretched_optimum` between them. clim: as for `ccf_figure`."""
-    system, study = optimum.scene.system, Study(optimum.scene)
-    if system.joints != 2:
+    if optimum.scene.system.joints != 2:
         fig, axes = figure(3.8, 3.4)
         optimum_angles(optimum, axes[0, 0])
         return fig
     fig, axes = figure(11.8 if stretched else 7.6, 3.9, 3 if stretched else 2)
-    gained = None if system.traits.steps else gained_ccf(optimum, study)
-    optimum_map(optimum, axes[0, 0], gained, clim)
+    optimum_map(optimum, axes[0, 0], clim)
     if stretched:
-        stretched_optimum(optimum, axes[0, 1], gained, study, clim)
+        stretched_optimum(optimum, axes[0, 1], clim)
     optimum_angles(optimum, axes[0, -1])
     return fig

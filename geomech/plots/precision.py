@@ -13,8 +13,8 @@ from geomech.tiers import TIERS
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-KNOB_MARKER = "osD^v<>Ph*X"
-KNOBS = {  # in words, where an entry of [numerics] is short for them
+SETTING_MARKER = "osD^v<>Ph*X"
+SETTINGS = {  # in words, where an entry of [numerics] is short for them
     "phases": "phases a cycle",
     "segments": "midpoints a link for the loads",
     "nodes": "Gauss points a link for the loads",
@@ -44,8 +44,8 @@ def work_precision(results: Mapping, axes: Any = None) -> Any:
     axes = figure(5.0 * len(found), 3.8, len(found))[1][0] if axes is None else axes
     for ax, (against, lines) in zip(axes, found.items()):
         title, error = PANELS[against]
-        for line, marker in zip(lines, KNOB_MARKER):
-            colour = TIERS[line["tier"]].colour if against == "truth" else f"C{KNOB_MARKER.index(marker)}"
+        for line, marker in zip(lines, SETTING_MARKER):
+            colour = TIERS[line["tier"]].colour if against == "truth" else f"C{SETTING_MARKER.index(marker)}"
             _line(ax, line, marker, colour)
         ax.set(xlabel=f"time for {len(results['amplitudes'])} amplitudes, tables included (s)", ylabel=error)
         ax.set_title(title)
@@ -61,7 +61,7 @@ def _line(ax, line: Mapping, marker: str, colour: str) -> None:
     error, values = np.maximum(line["error"], 1e-17), line["value"]
     slope = line["slope"]
     gain = "" if slope is None else f", order {slope:.1f}" if slope >= FLAT else ", no gain"
-    label = f"{line['tier']}: {KNOBS.get(line['knob'], line['knob'])}, {values[0]:g} to {values[-1]:g}{gain}"
+    label = f"{line['tier']}: {SETTINGS.get(line['setting'], line['setting'])}, {values[0]:g} to {values[-1]:g}{gain}"
     ax.loglog(line["seconds"], error, marker=marker, label=label, color=colour, lw=1.0)
     for end, offset, how in ((0, (0, 5), {"ha": "center"}), (-1, (5, 0), {"ha": "left", "va": "center"})):
         at = {"xy": (line["seconds"][end], error[end]), "xytext": offset, "textcoords": "offset points"}
@@ -86,7 +86,7 @@ def work_precision_figure(results: Mapping) -> Figure:
 
 @styled
 def walk_accuracy_figure(results: dict) -> Figure:
-    """Draw the error of the speed against each knob of a robot (`geomech.studies.accuracy`)."""
+    """Draw the error of the speed against each setting of a robot (`geomech.studies.accuracy`)."""
     fig, axes = figure(8.4, 2.9, len(results["lines"]))
     labels = {"steps": "steps of a cycle", "elements": "elements of an outline", "rounding": "rounding (m/s)"}
     for ax, line in zip(axes[0], results["lines"]):

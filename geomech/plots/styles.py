@@ -23,7 +23,6 @@ from geomech.plots.maps import (
     drawable,
     finer,
     label_row,
-    largest,
     limit_of,
     shape_space,
     unit_of,
@@ -52,7 +51,8 @@ PLUS, MINUS = "#B2182B", "#2166AC"  # of areas that carry forwards and backwards
 @CONNECTION_STYLES.register(style="streamlines")
 @styled
 def streamlines(
-    connection: Connection, component: int = 0, *, ax: Axes | None = None, labels: Labels = ANGLES, top: float | None = None
+    connection: Connection, component: int = 0, *, ax: Axes | None = None, labels: Labels = ANGLES,
+    top: float | None = None, clim: float | str | None = None,
 ) -> Axes:  # fmt: skip
     """Draw row ``component`` of A as streamlines over shape space: along them a change of shape moves the body the most for
     its size, across them not at all. Colour: length of the row. Other arguments as for `vector_field`."""
@@ -68,12 +68,12 @@ def streamlines(
     even = [np.linspace(a[0], a[-1], len(a)) for a in axes]  # to the last digit, as streamplot asks
     u, v = values
     size = np.hypot(u, v)
-    most = top or largest(size)
+    most = top or limit_of(size, clim)
     if np.nanmax(size, initial=0.0) <= 1e-13 * np.nanmax(np.abs(connection.A), initial=0.0):
         u, v, size = 0 * u, 0 * v, 0 * size
     look = {"cmap": arrow_colours(), "norm": Normalize(0.0, most), "density": 1.1, "linewidth": 0.9, "arrowsize": 0.8}
     lines = ax.streamplot(*even, u.T, v.T, color=np.nan_to_num(size.T), **look)
-    return label_row(ax, lines.lines, component, connection, labels)
+    return label_row(ax, lines.lines, component, connection, labels, size)
 
 
 @CCF_STYLES.register(style="contours")

@@ -34,8 +34,9 @@ def register(part: Any = None, /, **members: Any) -> Any:
     it: also a decorator. Of the same module and name it takes the place of the one before.
 
     members: of a function ``velocity(alpha, alphadot)`` that is a system: its ``joints``, and ``kind``, ``length`` and
-    ``traits`` if they are not its name, 1 and `Traits()`. Its other parameters are keys of a scene. ValueError for what is
-    no part, no frozen dataclass where a class, or has a name that is taken."""
+    ``traits`` if they are not its name, 1 and `Traits()`; of a function ``positions(alpha)`` that returns the poses of the
+    links of a body: ``joints`` and ``lengths``. Other parameters are keys of a scene. ValueError for what is no part, no
+    frozen dataclass where a class, or has a name that is taken."""
     if part is None and members:
         return lambda function: register(function, **members)
     for name, value in members.items():
@@ -54,8 +55,8 @@ def registry_of(part: Any) -> Registry:
         f"{formatted(part)} is no part of a scene",
         because="a law is a class with `traction`, a body one with `motion`, `joints` and `length`, "
         "a system one with `velocity`, `joints`, `length` and `traits`, or a function velocity(alpha, "
-        "alphadot) with joints = ...; a gait is derived from geomech.gaits.Gait, an effect "
-        "from rft.effects.Effect",
+        "alphadot) with joints = ...; a function positions(alpha) with joints and lengths = ... is a body; a gait "
+        "is derived from geomech.gaits.Gait, an effect from rft.effects.Effect",
         instead="a tier is a geomech.tiers.Tier",
     )
 

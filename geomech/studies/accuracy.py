@@ -1,7 +1,7 @@
 """Accuracy studies: error against computing time of a question, at settings of every approximation from coarse to fine.
 
-A knob declares its settings, the order of its error by theory and its reference: the truth, common to all knobs, or the
-limit of that knob alone, all else being equal."""
+A setting declares its values from coarse to fine, the order of its error by theory and its reference: the truth, common to
+all settings, or the limit of that setting alone, all else being equal."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 
-from geomech.core.knob import ROUNDING, Knob
+from geomech.core.setting import ROUNDING, Setting
 from geomech.core.variables import Result, Variable
 from geomech.run.cost import Cost
 from geomech.run.jobs import runner
@@ -42,16 +42,16 @@ class Adjustable(Protocol):
     def prepared(self) -> Self:
         """Return the question with the data that all settings share, computed once."""
 
-    def knobs(self) -> list[Knob]: ...
+    def settings(self) -> list[Setting]: ...
 
-    def numbers(self, knob: Knob | None, value: Any) -> list[np.ndarray]:
-        """Return the answer at a setting; for a value of None the limit of the knob, without a knob the truth."""
+    def numbers(self, setting: Setting | None, value: Any) -> list[np.ndarray]:
+        """Return the answer at a value of a setting; for None the limit of the setting, without a setting the truth."""
 
     def errors(self, numbers_: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
         """Return the error of an answer by measure."""
 
-    def describe(self, knob: Knob, measure: str) -> dict[str, Any]:
-        """Return the entries of a line of the study that describe a knob."""
+    def describe(self, setting: Setting, measure: str) -> dict[str, Any]:
+        """Return the entries of a line of the study that describe a setting."""
 
     def cheapest(self, lines: list[dict], tolerance: float) -> dict[str, Any]:
         """Return the best setting for a tolerance; ``lines`` as of `lines`."""
@@ -71,7 +71,7 @@ def adjustable(scene: Any, runs: int | None = None) -> Adjustable:
 
 @dataclass(frozen=True)
 class Accuracy(Question):
-    """Error and computing time of a question at every setting of its knobs.
+    """Error and computing time of a question at every value of its settings.
 
     Each setting is timed ``runs`` times, and the quickest counts, so that first calls that load and warm up do not.
     Seconds are CPU seconds of one thread."""
@@ -91,59 +91,64 @@ class Accuracy(Question):
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
         question = self.question.prepared()
-        knobs, runs, tasks = question.knobs(), question.runs, []
-        if any(knob.against == "truth" for knob in knobs):
+        settings, runs, tasks = question.settings(), question.runs, []
+        if any(setting.against == "truth" for setting in settings):
             tasks.append((None, None, 1))
-        for knob in knobs:
-            tasks += [(knob, None, 1)] if knob.against == "limit" else []
-            tasks += [(knob, value, runs) for value in knob.values]
+        for setting in settings:
+            tasks += [(setting, None, 1)] if setting.against == "limit" else []
+            tasks += [(setting, value, runs) for value in setting.values]
         answers = runner().map(answered, question, tasks, len(tasks), progress=progress)
         true = next(answers)[0] if tasks[0][0] is None else None
         rows = []
-        for knob in knobs:
-            truth = next(answers)[0] if knob.against == "limit" else true
-            for value in knob.values:
+        for setting in settings:
+            truth = next(answers)[0] if setting.against == "limit" else true
+            for value in setting.values:
                 numbers, seconds = next(answers)
-                rows.append((knob.label, value, seconds, *question.errors(numbers, truth).values()))
-        return _result(question, knobs, rows)
+                rows.append((setting.label, value, seconds, *question.errors(numbers, truth).values()))
+        return _result(question, settings, rows)
 
 
-def _result(question: Adjustable, knobs: list[Knob], rows: list[tuple]) -> Result:
+def _result(question: Adjustable, settings: list[Setting], rows: list[tuple]) -> Result:
     labels, values, seconds, *errors = zip(*rows)
     over = ("setting",)
     variables = [
-        Variable("knob", over, np.array(labels)),
+        Variable("setting", over, np.array(labels)),
         Variable("value", over, np.array(values, float)),
         Variable("seconds", over, np.array(seconds), "s"),
         *(Variable(measure, over, np.array(e)) for measure, e in zip(question.measures, errors)),
     ]
     descriptions = [
-        (knob, measure, question.describe(knob, measure)) for measure in question.measures for knob in knobs
+        (setting, measure, question.describe(setting, measure)) for measure in question.measures for setting in settings
     ]
-    bare = Result("accuracy", tuple(variables), {"knobs": descriptions}, question)
+    bare = Result("accuracy", tuple(variables), {"settings": descriptions}, question)
     choices = [question.cheapest(lines(bare), float(tolerance)) for tolerance in question.tolerances]
     return Result(
-        "accuracy", tuple(variables), {**question.facts(), "knobs": descriptions, "cheapest": choices}, question
+        "accuracy", tuple(variables), {**question.facts(), "settings": descriptions, "cheapest": choices}, question
     )
 
 
-def answered(question: Any, task: tuple[Knob | None, Any, int]) -> tuple[list[np.ndarray], float]:
+def answered(question: Any, task: tuple[Setting | None, Any, int]) -> tuple[list[np.ndarray], float]:
     """Return the answer at a setting, and the seconds that the quickest of its runs took."""
-    (knob, value, runs), times = task, []
+    (setting, value, runs), times = task, []
     for _ in range(runs):
         start = time.thread_time()
-        numbers = question.numbers(knob, value)
+        numbers = question.numbers(setting, value)
         times.append(time.thread_time() - start)
     return numbers, min(times)
 
 
 def lines(result: Result) -> list[dict[str, Any]]:
-    """Return a line {"label", ..., "order", "value", "error", "seconds", "slope"} for every knob and measure."""
+    """Return a line {"label", ..., "order", "value", "error", "seconds", "slope"} for every setting and measure."""
     out = []
-    for knob, measure, description in result.attributes["knobs"]:
-        rows = result["knob"].values == knob.label
+    for setting, measure, description in result.attributes["settings"]:
+        rows = result["setting"].values == setting.label
         errors, seconds = result[measure].values[rows].tolist(), result["seconds"].values[rows].tolist()
-        numbers = {"value": list(knob.values), "error": errors, "seconds": seconds, "slope": slope(knob.values, errors)}
+        numbers = {
+            "value": list(setting.values),
+            "error": errors,
+            "seconds": seconds,
+            "slope": slope(setting.values, errors),
+        }
         out.append({**description, **numbers})
     return out
 
@@ -161,7 +166,7 @@ def slope(values, errors) -> float | None:
 def table(result: Result) -> dict[str, Any]:
     """Return the JSON of a study: {"scene", ..., "lines": [...], "cheapest": [...]}."""
     facts = dict(result.attributes)
-    del facts["knobs"]
+    del facts["settings"]
     head, last = {}, facts.pop("cheapest")
     for key in [key for key in facts if key not in ("units", "own_error")]:
         head[key] = facts.pop(key)

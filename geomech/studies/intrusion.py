@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from geomech.core.knob import ROUNDING, Knob
+from geomech.core.setting import ROUNDING, Setting
 from geomech.core.variables import Result, Variable
 from geomech.run.cost import BASE, Cost
 from geomech.scenes.intruding import Intruding
@@ -93,15 +93,15 @@ class Settings:
     def prepared(self) -> Settings:
         return self
 
-    def knobs(self) -> list[Knob]:
-        """Return the number of parts as a knob; a shape may have more than the number given."""
+    def settings(self) -> list[Setting]:
+        """Return the number of parts as a setting; a shape may have more than the number given."""
         values = tuple(self.scene.actual_count(n) for n in self.scene.ladder[:-1])
-        return [Knob(self.scene.parts, values, self.scene.order, against="limit")]
+        return [Setting(self.scene.parts, values, self.scene.order, against="limit")]
 
-    def numbers(self, knob: Knob | None, value: Any) -> list[np.ndarray]:
+    def numbers(self, setting: Setting | None, value: Any) -> list[np.ndarray]:
         """Return force (T, 2 or 3), N, and moment (T,) or (T, 3), N m, along the motion."""
         *counts, finest = self.scene.ladder
-        run = self.scene.run(finest if value is None else counts[self.knobs()[0].values.index(value)])
+        run = self.scene.run(finest if value is None else counts[self.settings()[0].values.index(value)])
         return [run.force, run.moment]
 
     def errors(self, numbers: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
@@ -114,8 +114,8 @@ class Settings:
             errors[what] = float(np.sqrt(np.mean((one - exact) ** 2)) / largest)
         return errors
 
-    def describe(self, knob: Knob, measure: str) -> dict[str, Any]:
-        return {"label": measure, "order": knob.order}
+    def describe(self, setting: Setting, measure: str) -> dict[str, Any]:
+        return {"label": measure, "order": setting.order}
 
     def cheapest(self, lines: list[dict], tolerance: float) -> dict[str, Any]:
         """Return the fewest of the tried parts that meet a tolerance in force and moment."""

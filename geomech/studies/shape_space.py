@@ -18,8 +18,9 @@ from geomech.geometry.stretch import stretch as stretch_to_metric
 from geomech.run.cost import Cost
 from geomech.scenes.model import Scene
 from geomech.studies import fields
-from geomech.studies.cost import Job, direct, frame, harmonics, of_even_part, of_metric, of_planes, price
+from geomech.studies.cost import Job, frame, harmonics, of_even_part, of_metric, of_planes, price
 from geomech.studies.cost import connection as fitted
+from geomech.studies.cost import study as displacement
 from geomech.studies.effort import shared, why_none
 from geomech.studies.question import Allow, Progress, Question
 from geomech.studies.study import Study, refuse_outside
@@ -146,7 +147,8 @@ class ShapeSpace(Question):
         jobs = [*of_planes(scene, *zip(*self._at)), *frame(scene)] if self._at else []
         if not self.field:
             return jobs
-        jobs += direct(scene, scene.gait, 1, scene.numerics.phases) if self._enclosed and study is self.study else []
+        if self._enclosed and study is self.study:
+            jobs += displacement(scene, {AREA.name: study.plan(AREA.name)}, 1, tables=False)
         jobs += fitted(scene)
         if study is self.study:
             jobs += of_metric(scene) if self._costed else []

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from geomech.core.knob import Knob
+from geomech.core.setting import Setting
 from geomech.run.cost import Cost
 from geomech.scenes.model import Scene, checked_scene
 from geomech.studies import cost as foretold
@@ -28,10 +28,10 @@ TRUTH_PHASES = 4096
 TRUTH_STEPS = 1024  # of time stepping, which is sequential
 FINE_PIECES = 320  # of body, where effects cut it
 FINEST = {"loads": "exact", "regularisation": 1e-9, "directions": 192, "pieces": FINE_PIECES}
-KNOBS = tuple(
-    replace(knob, tier=tier.name)
+SETTINGS = tuple(
+    replace(setting, tier=tier.name)
     for tier in sorted(TIERS.values(), key=lambda tier: (tier is not DIRECT, tier.common, -[*TIERS].index(tier.name)))
-    for knob in tier.knobs
+    for setting in tier.settings
 )  # the direct tier's first, then those of one gait's family, then those of fields
 
 
@@ -55,11 +55,11 @@ class Settings:
         return self.scene.gait.amplitude * FRACTIONS
 
     def check(self) -> None:
-        """Refuse a gait that does not move, or leaves a field that a knob changes."""
+        """Refuse a gait that does not move, or leaves a field that a setting changes."""
         scene = self.scene
         if np.ptp(scene.gait.cycle(_truth_phases(scene))[0], axis=0).max() == 0:
             raise Refusal("[gait] does not move", where=scene.name, instead="give it a size")
-        tables = [_plan(scene, knob.tier).table for knob in self.knobs()]
+        tables = [_plan(scene, setting.tier).table for setting in self.settings()]
         if any(table and table.axes for table in tables):
             with located(scene.name):
                 refuse_outside(scene)
@@ -67,15 +67,15 @@ class Settings:
     def cost(self) -> Cost:
         scene = self.scene
         jobs = foretold.direct(scene, scene.gait, len(FRACTIONS), _truth_phases(scene), checked=False)
-        for knob in self.knobs():
-            jobs += [job for value in knob.values for job in self.runs * self._jobs(knob, value)]
-            jobs += self._jobs(knob, None) if knob.against == "limit" else []
+        for setting in self.settings():
+            jobs += [job for value in setting.values for job in self.runs * self._jobs(setting, value)]
+            jobs += self._jobs(setting, None) if setting.against == "limit" else []
         return foretold.price(jobs)
 
-    def _jobs(self, knob: Knob, value: Any) -> list[foretold.Job]:
+    def _jobs(self, setting: Setting, value: Any) -> list[foretold.Job]:
         """Return the jobs of a displacement at a setting."""
-        scene = self.at(knob, value)
-        plan = _plan(scene, knob.tier)
+        scene = self.at(setting, value)
+        plan = _plan(scene, setting.tier)
         if not plan.exact:
             return foretold.predicted(scene, plan, len(FRACTIONS))
         return foretold.direct(scene, scene.gait, len(FRACTIONS), scene.numerics.phases, checked=False)
@@ -83,42 +83,42 @@ class Settings:
     def prepared(self) -> Settings:
         return self
 
-    def knobs(self) -> list[Knob]:
-        return [k for k in KNOBS if applies(k, self.scene) and not (k.rule and not is_closed(self.scene.system))]
+    def settings(self) -> list[Setting]:
+        return [k for k in SETTINGS if applies(k, self.scene) and not (k.rule and not is_closed(self.scene.system))]
 
-    def at(self, knob: Knob | None, value: Any) -> Scene:
-        """Return the scene at a setting; for a value of None at the limit of the knob, without a knob at the settings
-        of the truth."""
+    def at(self, setting: Setting | None, value: Any) -> Scene:
+        """Return the scene at a value of a setting; for None at the limit of the setting, without a setting at what the
+        truth takes."""
         scene = self.scene
-        if knob is None:
+        if setting is None:
             finest = scene.with_numerics(loads="exact", regularisation=1e-9) if is_closed(scene.system) else scene
             finest = finest.with_numerics(pieces=FINE_PIECES) if pieces_per_length(scene.system) else finest
             return finest.with_numerics(phases=_truth_phases(scene))
-        setting = knob.setting or knob.name
+        key = setting.key or setting.name
         if value is not None:
-            return scene.with_numerics(**{setting: f"{knob.rule}:{value}" if knob.rule else value})
-        if setting == "interpolation":  # an exact fit at the gait's own shapes would cost more than a far finer grid
+            return scene.with_numerics(**{key: f"{setting.rule}:{value}" if setting.rule else value})
+        if key == "interpolation":  # an exact fit at the gait's own shapes would cost more than a far finer grid
             return scene.with_numerics(interpolation=5, grid=4 * scene.numerics.grid - 3)
-        return scene.with_numerics(**{setting: FINEST[setting]})
+        return scene.with_numerics(**{key: FINEST[key]})
 
-    def numbers(self, knob: Knob | None, value: Any) -> list[np.ndarray]:
+    def numbers(self, setting: Setting | None, value: Any) -> list[np.ndarray]:
         """Return net poses (B, 3), with tables built anew so that their cost is counted."""
-        tier = knob.tier if knob else DIRECT.name
-        return [Study(self.at(knob, value)).poses(tier, None, self.amplitudes)]
+        tier = setting.tier if setting else DIRECT.name
+        return [Study(self.at(setting, value)).poses(tier, None, self.amplitudes)]
 
     def errors(self, numbers: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
         distances = estimate.distance(numbers[0], truth[0]) / self.scene.system.length
         return {"error": float(np.sqrt(np.mean(distances**2)))}
 
-    def describe(self, knob: Knob, measure: str) -> dict[str, Any]:
+    def describe(self, setting: Setting, measure: str) -> dict[str, Any]:
         entry = {
-            "label": knob.label,
-            "tier": knob.tier,
-            "knob": knob.name,
-            "order": knob.order,
-            "against": knob.against,
+            "label": setting.label,
+            "tier": setting.tier,
+            "setting": setting.name,
+            "order": setting.order,
+            "against": setting.against,
         }
-        return {**entry, "buys": knob.buys}
+        return {**entry, "buys": setting.buys}
 
     @property
     def own_error(self) -> float:
@@ -136,20 +136,20 @@ class Settings:
         return {**facts, **({"own_error": own} if own else {})}
 
 
-def applies(knob: Knob, scene: Scene) -> bool:
-    """Return whether a knob applies to a scene."""
-    system, setting = scene.system, knob.setting or knob.name
-    if system.traits.linear and setting in ("regularisation", "directions"):
+def applies(setting: Setting, scene: Scene) -> bool:
+    """Return whether a setting applies to a scene."""
+    system, key = scene.system, setting.key or setting.name
+    if system.traits.linear and key in ("regularisation", "directions"):
         return False
-    if setting == "regularisation" and solver_of(system) is None:
+    if key == "regularisation" and solver_of(system) is None:
         return False
-    if knob.tier not in tiers(system):
+    if setting.tier not in tiers(system):
         return False
-    if knob.tier != DIRECT.name:
-        of_a_field = TIERS[knob.tier].common and (stored_table(system, "connection") or system.joints > 2)
-        if of_a_field or _plan(scene, knob.tier).exact:  # from 7 to 61 points per joint: hours
+    if setting.tier != DIRECT.name:
+        of_a_field = TIERS[setting.tier].common and (stored_table(system, "connection") or system.joints > 2)
+        if of_a_field or _plan(scene, setting.tier).exact:  # from 7 to 61 points per joint: hours
             return False
-    return setting != "pieces" or pieces_per_length(system) > 0
+    return key != "pieces" or pieces_per_length(system) > 0
 
 
 def _plan(scene: Scene, tier: str) -> Plan:
@@ -177,7 +177,7 @@ def cheapest(lines: list[dict], tol: float, own: float = 0.0) -> dict[str, Any]:
     return {
         "tolerance": float(tol),
         "tier": line["tier"],
-        "knob": line["knob"],
+        "setting": line["setting"],
         "value": value,
         "error": error,
         "seconds": seconds,

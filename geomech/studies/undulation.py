@@ -1,15 +1,17 @@
 """Undulatory swimmers: performance of a wave along the body (paper Sec. III B, Fig. 9), closed cases as checks, and
-activation of the muscles (Sec. III C, Fig. 10)."""
+activation of the muscles (Sec. III C, Fig. 10). Performance and activation are those of any body and gait."""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from geomech.gaits import Sine, Wave
+from geomech.systems.base import kind_of
+from geomech.systems.capabilities import Loaded, capability
 from rft.checks import real_array
 from rft.refusal import Refusal
 
@@ -20,30 +22,34 @@ MIDDLE = (0.1, 0.9)  # share of the body over which speeds of waves are fitted: 
 
 
 def performance(scene: Scene, amplitudes: ArrayLike) -> dict[str, np.ndarray]:
-    """Return the performance of the scene's travelling wave over a cycle: a `Sine` for amplitudes A / lambda (B,) or a
-    `Wave` of the joint angles of a chain of equal links for amplitudes in rad (B,). Each entry is (B,) but the
-    velocity:
+    """Return the performance of the scene's gait over a cycle, for amplitudes (B,) of that gait: A / lambda of a `Sine`,
+    rad of a `Wave`, whatever scales another. Each entry is (B,) but the velocity:
 
     progress: net distance, body lengths. efficiency: progress over the wavelength. Sec. III B and the caption of Fig.
     9(c) define it so and show an optimum near the animal; here it has none, it grows with the amplitude.
-    arc_efficiency: progress over the arc length of a wave, lambda_s, which has one. wavelength: body lengths.
-    relative_curvature: mean |curvature| x lambda_s. cost_of_transport: work against the medium over (the whole body's
-    axial drag x distance), the drag being the plain medium's, without skin or ends. slip: mean angle between body and
-    velocity, rad. velocity: (B, N, 3), body velocity at the scene's N phases, body lengths per rad of phase and rad per
-    rad. Where the swimmer has a frequency, in the scene's own unit, body lengths or m, besides: distance, net, per
+    arc_efficiency: progress over the arc length of a wave, lambda_s, which has one. waves: on the body. wavelength: body
+    lengths. relative_curvature: mean |curvature| x lambda_s. cost_of_transport: work against the medium over (the whole
+    body's axial drag x distance), the drag being the plain medium's, without skin or ends. slip: mean angle between body
+    and velocity, rad. velocity: (B, N, 3), body velocity at the scene's N phases, body lengths per rad of phase and rad
+    per rad. Where the swimmer has a frequency, in the scene's own unit, body lengths or m, besides: distance, net, per
     cycle; speed, per second; speed_body_lengths, body lengths per second; velocity_per_second: (B, N, 3), unit/s and
-    rad/s. Refusal if the gait is no such wave.
+    rad/s.
+
+    A `Sine`, and a `Wave` about the straight chain of equal links, tell their wavelength. Of any other gait the waves are
+    those of the bends' first harmonic, by a straight line through its phase along the body, and the wavelength is the
+    mean distance from tail to head over the waves; nan of a single joint. Refusal for a system without a body in a medium.
 
     The elements are chords of the wave: 40 elements per wave cause errors of 2 % at A / lambda = 0.2, but above 0.4
     enough to feign an optimum of efficiency and slip. Use `refined` before believing an `optimum`."""
-    gait = _travelling(scene)
+    gait, system = getattr(scene, "gait", None), loaded(scene, "performance")
     amplitudes = real_array("amplitudes", amplitudes)
     if amplitudes.ndim != 1:
         raise Refusal("amplitudes must be a list of numbers", value=amplitudes.tolist())
-    run, length = scene.cycle(gait, amplitudes, work=True), scene.system.length
+    alpha, alphadot = gait.cycle(scene.numerics.phases, amplitudes)
+    run, length = scene.system.run(alpha, alphadot, work=True), scene.system.length
     spent = run.work
     progress = np.hypot(run.net[:, 0], run.net[:, 1]) / length
-    wavelength = gait.wavelength(amplitudes)
+    wave = _known_wave(scene, amplitudes) or _moving_wave(system, alpha, alphadot)
     energy = 2 * np.pi * spent.power.mean(-1) / length
     timed = {}
     if (frequency := scene.frequency) is not None:
@@ -53,10 +59,11 @@ def performance(scene: Scene, amplitudes: ArrayLike) -> dict[str, np.ndarray]:
     return {
         "amplitude": amplitudes,
         "progress": progress,
-        "wavelength": wavelength,
-        "efficiency": progress / wavelength,
-        "arc_efficiency": progress * abs(gait.waves),
-        "relative_curvature": gait.relative_curvature(amplitudes),
+        "waves": wave.waves,
+        "wavelength": wave.wavelength,
+        "efficiency": progress / wave.wavelength,
+        "arc_efficiency": progress * wave.waves,
+        "relative_curvature": wave.relative_curvature,
         "cost_of_transport": energy / np.maximum(progress, 1e-300),
         "slip": spent.slip.mean(-1),
         "velocity": run.xi / np.array([length, length, 1.0]),
@@ -64,18 +71,67 @@ def performance(scene: Scene, amplitudes: ArrayLike) -> dict[str, np.ndarray]:
     }
 
 
-def _travelling(scene: Scene) -> Sine | Wave:
-    """Return the scene's gait, which must have a wavelength."""
-    gait, body = getattr(scene, "gait", None), getattr(getattr(scene, "system", None), "body", None)
-    if not isinstance(gait, Wave):
-        return _sine(scene, "performance")
-    if gait.waves == 0 or gait.offset != 0 or any(gait.centre):
-        raise Refusal(
-            "performance is that of a wave about the straight body", instead="give it waves, no offset and no centre"
-        )
-    if len({*getattr(body, "lengths", ())}) != 1 or body.modes is not None:
-        raise Refusal("performance is that of a chain whose links are of equal length, moved joint by joint")
-    return gait
+class BodyWave(NamedTuple):
+    """A wave along the body, for amplitudes (B,). waves: their number on the body. wavelength: body lengths.
+    relative_curvature: mean |curvature| times the arc length of a wave."""
+
+    waves: np.ndarray
+    wavelength: np.ndarray
+    relative_curvature: np.ndarray
+
+
+def _known_wave(scene: Scene, amplitudes: np.ndarray) -> BodyWave | None:
+    """Return the wave of a gait that tells its wavelength; None for other gaits, and for other bodies than the gait's."""
+    gait, body = scene.gait, getattr(scene.system, "body", None)
+    if isinstance(gait, Wave):
+        equal = len({*getattr(body, "lengths", ())}) == 1 and body.modes is None
+        known = equal and gait.waves != 0 and gait.offset == 0 and not any(gait.centre)
+    else:
+        known = isinstance(gait, Sine)
+    if not known:
+        return None
+    waves = np.full(amplitudes.shape, abs(gait.waves))
+    return BodyWave(waves, gait.wavelength(amplitudes), gait.relative_curvature(amplitudes))
+
+
+def _moving_wave(system: Loaded, alpha: np.ndarray, alphadot: np.ndarray) -> BodyWave:
+    """Return the wave that gaits (B, N, d) send along the body."""
+    s, bend, _, chord = bends(system, alpha, alphadot)
+    first = np.fft.fft(bend, axis=-2)[:, 1]
+    slopes = np.array([_slope(s, np.unwrap(np.angle(x))) if x.any() else np.nan for x in first])
+    waves = np.abs(slopes) / (2 * np.pi)
+    curved = np.abs(bend).mean((-2, -1)) * (len(s) + 1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return BodyWave(waves, chord.mean(-1) / waves, curved / waves)
+
+
+class Bends(NamedTuple):
+    """Bends of a body. s: (n - 1,), points between its n elements, tail 0 to head 1. bend, rate: (..., N, n - 1), rad and
+    rad per rad of phase, positive to the left. chord: (..., N), distance from tail to head, body lengths."""
+
+    s: np.ndarray
+    bend: np.ndarray
+    rate: np.ndarray
+    chord: np.ndarray
+
+
+def bends(system: Loaded, alpha: np.ndarray, alphadot: np.ndarray) -> Bends:
+    """Return the bends of a body at shapes and rates (..., N, d), whatever its shape variables are."""
+    batch = alpha.shape[:-1]
+    e = system.elements(*(x.reshape(-1, x.shape[-1]) for x in (alpha, alphadot)))
+    heading, rotation = e.c + 1j * e.s, e.v_w / e.half
+    bend, rate = np.angle(heading[1:] * heading[:-1].conj()), np.diff(rotation, axis=0)
+    bend, rate = (x.T.reshape(*batch, -1) for x in (bend, rate))
+    chord = np.abs((2 * e.half * heading).sum(0)).reshape(batch)
+    return Bends(np.cumsum(2 * e.half[:, 0])[:-1], np.unwrap(bend, axis=-2), rate, chord)
+
+
+def loaded(scene: Any, what: str) -> Loaded:
+    """Return the scene's system as a body under forces; Refusal, which names ``what`` cannot be, without one."""
+    system = getattr(scene, "system", None)
+    if (found := system and capability(system, Loaded)) is None:
+        raise Refusal(f"{what} is that of a body in a medium, got a {kind_of(scene if system is None else system)}")
+    return found
 
 
 def _sine(scene: Scene, what: str) -> Sine:
@@ -157,11 +213,11 @@ def refined(scene: Scene, finer: int) -> Scene:
 
 
 def activation(scene: Scene) -> dict[str, np.ndarray | float]:
-    """Return when the muscles of the right side work, over a cycle of the scene's sine wave of amplitude > 0.
+    """Return when the muscles of the right side work, over a cycle of the scene's gait, of amplitude other than 0.
 
     The internal moment against the medium is taken for that of the muscles, and its sign for the side that works:
     negative, the right (paper Sec. III C, Fig. 10; the left works for the other half of the cycle). At the S points
-    between elements and the scene's N phases, angles of phase in rad:
+    between elements, or links, and the scene's N phases, angles of phase in rad:
 
     s: (S,), tail 0 to head 1. t: (N,). moment: (N, S), axial drag x length. bend, bend_rate: (N, S), rad and rad per
     rad of phase, positive to the left. onset, offset: (S,), the moment's falls and rises through zero, interpolated
@@ -171,13 +227,18 @@ def activation(scene: Scene) -> dict[str, np.ndarray | float]:
     bending, pi / 2 where the side that works is the one that shortens, 0 where it is the one that is short.
     fundamental_lag: (S,), the lag between the two waves' first harmonics. speed_ratio, fundamental_speed_ratio: speed
     of the moment's wave over that of the curvature's, from straight lines through onset and offset, or through the
-    phase of the first harmonic, over the MIDDLE of the body; nan if there is a place without an onset there."""
-    gait = _sine(scene, "activation")
-    if gait.amplitude == 0:
-        raise Refusal("activation takes a wave of amplitude > 0", because="a straight body at rest needs no muscles")
-    bend, rate = gait.cycle(scene.numerics.phases)
-    moment = scene.system.run(bend, rate, work=True).work.bending_moment
-    s = np.arange(1, gait.elements) / gait.elements
+    phase of the first harmonic, over the MIDDLE of the body; nan if there is a place without an onset there, or but one
+    joint. Refusal for a system without a body in a medium."""
+    system = loaded(scene, "activation")
+    cycle = scene.gait.cycle(scene.numerics.phases)
+    return activation_of(bends(system, *cycle), scene.system.run(*cycle, work=True).work.bending_moment)
+
+
+def activation_of(bent: Bends, moment: np.ndarray) -> dict[str, np.ndarray | float]:
+    """Return `activation` from the bends and the bending moments (N, S) of a cycle."""
+    s, bend, rate, _ = bent
+    if not bend.any() or not np.ptp(bend, axis=0).any():
+        raise Refusal("activation takes a wave of amplitude > 0", because="a body at rest needs no muscles")
     onset, offset, changes = _zeros(moment)
     to_right, to_left, _ = _zeros(bend)
     onset, to_right, to_left = _continuous(onset), _continuous(to_right), _continuous(to_left)
@@ -185,6 +246,7 @@ def activation(scene: Scene) -> dict[str, np.ndarray | float]:
     waves = [np.fft.fft(x, axis=0)[1] for x in (moment, bend)]
     slopes = [_slope(s, x) for x in (onset, offset, to_right, to_left)]
     harmonics = [_slope(s, np.unwrap(np.angle(x))) for x in waves]
+    ratio = lambda a, b: a / b if b else np.nan
     return {
         "s": s,
         "t": 2 * np.pi * np.arange(len(bend)) / len(bend),
@@ -195,9 +257,9 @@ def activation(scene: Scene) -> dict[str, np.ndarray | float]:
         "offset": offset,
         "changes": changes,
         "lag": (_continuous(to_right - onset, -np.pi) + _continuous(to_left - offset, -np.pi)) / 2,
-        "fundamental_lag": _continuous(np.angle(waves[0] / waves[1]), -np.pi),
-        "speed_ratio": (slopes[2] + slopes[3]) / (slopes[0] + slopes[1]),
-        "fundamental_speed_ratio": harmonics[1] / harmonics[0],
+        "fundamental_lag": _continuous(np.angle(waves[0] * waves[1].conj()), -np.pi),
+        "speed_ratio": ratio(slopes[2] + slopes[3], slopes[0] + slopes[1]),
+        "fundamental_speed_ratio": ratio(harmonics[1], harmonics[0]),
     }
 
 
@@ -229,8 +291,11 @@ def _continuous(phase: np.ndarray, least: float = 0.0) -> np.ndarray:
 
 
 def _slope(s: np.ndarray, phase: np.ndarray) -> float:
-    """Return the slope of the straight line through phase (S,) over the MIDDLE; nan if some of it is unknown. The line
-    is fitted at fixed places, not at the joints, so that it converges with the joints at their own order."""
-    places = np.linspace(*MIDDLE, 81)
+    """Return the slope of the straight line through phase (S,) over the MIDDLE, as far as there are joints; nan if some
+    of it is unknown, and of one joint. The line is fitted at fixed places, not at the joints, so that it converges with
+    the joints at their own order."""
+    if len(s) < 2:
+        return np.nan
+    places = np.linspace(max(MIDDLE[0], s[0]), min(MIDDLE[1], s[-1]), 81)
     line = np.interp(places, s, phase)
     return float(np.polyfit(places, line, 1)[0]) if np.isfinite(line).all() else np.nan

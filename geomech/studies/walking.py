@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from geomech.core.knob import Knob
+from geomech.core.setting import Setting
 from geomech.core.summary import span
 from geomech.core.variables import Result, Variable
 from geomech.run import jobs
@@ -44,10 +44,10 @@ UNITS = {  # of a walk's table; a positive pitch is nose down
     "energy": "J", "y": "m", "roll": "rad", "yaw": "rad",
 }  # fmt: skip
 LIMIT = 3  # cycles up to the limit cycle, and half as many for each of two errors
-KNOBS = (
-    Knob("steps", (12, 16, 24, 32, 48, 64, 96), 2, against="limit"),
-    Knob("elements", (6, 8, 12, 16, 24, 32), 2, against="limit"),
-    Knob("rounding", (8e-3, 4e-3, 2e-3, 1e-3, 5e-4), 1, against="limit"),
+SETTINGS = (
+    Setting("steps", (12, 16, 24, 32, 48, 64, 96), 2, against="limit"),
+    Setting("elements", (6, 8, 12, 16, 24, 32), 2, against="limit"),
+    Setting("rounding", (8e-3, 4e-3, 2e-3, 1e-3, 5e-4), 1, against="limit"),
 )
 FINEST = {"steps": 256, "elements": 96, "rounding": 6.25e-5}
 
@@ -265,7 +265,7 @@ class Walks:
 
 @dataclass(frozen=True)
 class Settings:
-    """The speed of a robot, m/s, near a walk of its scene. For every knob the reference has that knob at `FINEST`."""
+    """The speed of a robot, m/s, near a walk of its scene. For every setting the reference has that setting at `FINEST`."""
 
     scene: WalkerScene
     runs: int = 1
@@ -279,7 +279,7 @@ class Settings:
         refuse_engine(self.scene)
 
     def cost(self) -> Steps:
-        finest = {knob.name: (*knob.values, FINEST[knob.name]) for knob in KNOBS}
+        finest = {setting.name: (*setting.values, FINEST[setting.name]) for setting in SETTINGS}
         shares = sum(v / self.scene.numerics.steps for v in finest["steps"])
         shares += sum(0.5 + v / 32 for v in finest["elements"]) + 2 * (len(finest["rounding"]) - 1)
         one = price(self.scene, settling=True)
@@ -290,24 +290,24 @@ class Settings:
         (walk,) = engine(self.scene.engine).walk([self.scene.walker], self.scene.numerics, SETTLING)
         return dataclasses.replace(self, near=walk)
 
-    def knobs(self) -> list[Knob]:
-        return list(KNOBS)
+    def settings(self) -> list[Setting]:
+        return list(SETTINGS)
 
-    def numbers(self, knob: Knob, value: Any) -> list[np.ndarray]:
-        """Return the speed with one knob at another value."""
-        value = FINEST[knob.name] if value is None else value
-        numerics = dataclasses.replace(self.scene.numerics, **{knob.name: value})
+    def numbers(self, setting: Setting, value: Any) -> list[np.ndarray]:
+        """Return the speed with one setting at another value."""
+        value = FINEST[setting.name] if value is None else value
+        numerics = dataclasses.replace(self.scene.numerics, **{setting.name: value})
         (walk,) = engine(self.scene.engine).rerun([self.scene.walker], numerics, [self.near], SETTLING)
         return [np.array(walk.speed)]
 
     def errors(self, numbers: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
         return {"error": float(abs(numbers[0] - truth[0]))}
 
-    def describe(self, knob: Knob, measure: str) -> dict[str, Any]:
-        return {"label": knob.name, "order": knob.order}
+    def describe(self, setting: Setting, measure: str) -> dict[str, Any]:
+        return {"label": setting.name, "order": setting.order}
 
     def cheapest(self, lines: list[dict], tolerance: float) -> dict[str, Any]:
-        """Return for each knob the coarsest setting from which on the error is within the tolerance; None if there is none."""
+        """Return for each setting the coarsest value from which on the error is within the tolerance; None if there is none."""
         out: dict[str, Any] = {"tolerance": tolerance}
         for line in lines:
             good = [v for k, v in enumerate(line["value"]) if max(line["error"][k:]) <= tolerance]

@@ -46,13 +46,17 @@ def simplified(A: sp.Matrix, alpha: Sequence[sp.Symbol]) -> sp.Matrix:
 
 
 def latex(A: sp.Matrix, name: str = "A") -> str:
-    """Return LaTeX of a matrix, with its denominator in front if all entries have the same, up to a number. It needs
-    amsmath."""
+    """Return LaTeX of a matrix, an entry a line, with its denominator in front if all entries have the same, up to a number.
+    It needs amsmath."""
     below = lambda x: sp.Mul(*(f for f in sp.Mul.make_args(x) if f.is_Pow and f.exp.is_negative and not f.is_number))
     common = {below(x) for x in A if x != 0}
-    printed = lambda M: sp.latex(M, mat_str="pmatrix", mat_delim="")
     if len(common) != 1 or common == {1}:
-        return f"{name} = {printed(A)}"
+        return f"{name} = {_pmatrix(A)}"
     (one_over,) = common
     above = A.applyfunc(lambda x: sp.Mul(*(f for f in sp.Mul.make_args(x) if f not in one_over.args and f != one_over)))
-    return f"{name} = \\frac{{1}}{{D}} {printed(above)}, \\qquad D = {sp.latex(1 / one_over)}"
+    return f"{name} = \\frac{{1}}{{D}} {_pmatrix(above)},\n\\qquad D = {sp.latex(1 / one_over)}"
+
+
+def _pmatrix(M: sp.Matrix) -> str:
+    rows = (" &\n".join(map(sp.latex, M.row(k))) for k in range(M.rows))
+    return "\\begin{pmatrix}\n" + " \\\\\n".join(rows) + "\n\\end{pmatrix}"

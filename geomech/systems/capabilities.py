@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geomech.systems.base import System, kind_of
 from rft.premise import Premise
@@ -57,6 +58,23 @@ class OwnMetric(Protocol):
 
     def squared_speed(self, alpha, alphadot) -> np.ndarray:
         """Return alphadot^T M(alpha) alphadot (...) at shapes and rates (..., d)."""
+
+
+@runtime_checkable
+class Loaded(Protocol):
+    """A body under forces along its length, of which its `run` with work tells; read by `geomech.studies.forces` and
+    `undulation`."""
+
+    axial_drag: float  # on the whole straight body along itself, in the law's unit of force
+
+    def axial_stress(self, depth: float) -> float | None:
+        """Return the axial drag over projected area, Pa, at a depth, m, where the medium is a measured one."""
+
+    def elements(self, alpha: ArrayLike, alphadot: ArrayLike) -> Any:
+        """Return the `rft.bodies.Elements` (n, N) of the body at shapes and rates (N, d), with the frame held."""
+
+    def subdivided(self) -> System:
+        """Return the system with its body cut into short elements."""
 
 
 @runtime_checkable

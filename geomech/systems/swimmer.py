@@ -20,11 +20,13 @@ from geomech.systems.capabilities import BalanceSize, Drawable, Part, Stepped, U
 from geomech.systems.premises import refuse
 from geomech.systems.solver import Solver
 from rft.bodies import BODIES
-from rft.bodies.base import checked_body, half_lengths, is_reversible, joint_speed
+from rft.bodies.base import checked_body, half_lengths, is_reversible, is_symmetric, joint_speed
+from rft.bodies.pieces import PIECES, subdivide
 from rft.contact import assemble
 from rft.effects import EFFECTS
 from rft.laws import CATALOGUE, LAWS, is_closed, is_linear, is_mirror, is_rate_independent, speed_exponent
 from rft.laws.base import is_odd, require_law
+from rft.laws.catalogue import DEPTH
 from rft.laws.records import record, rule_for
 from rft.premise import NONE, SHAPE_ALONE, Premise
 from rft.quadrature import QUADRATURE
@@ -93,7 +95,7 @@ class Swimmer:
         return Traits(
             linear=is_linear(medium) and not effects,
             odd=central and all(e.odd for e in effects),
-            mirror=is_mirror(medium),
+            mirror=is_mirror(medium) and is_symmetric(body),
             reversible=not effects and central and is_reversible(body),
             smooth=is_linear(medium),
             power_degree=None if lacks & RATES else speed_exponent(medium) + 1.0,
@@ -208,6 +210,20 @@ class Swimmer:
     def work(self, alpha: ArrayLike, alphadot: ArrayLike, xi: ArrayLike) -> rft.Work:
         """Return power, internal moments and slip of a solution of `solve`; see `rft.work_done`."""
         return rft.work_done(self.medium, self.body, alpha, alphadot, xi, **self._settings())
+
+    def elements(self, alpha: ArrayLike, alphadot: ArrayLike) -> rft.bodies.Elements:
+        return self.body.motion(*(np.asarray(x, float).T for x in (alpha, alphadot)))
+
+    def subdivided(self) -> Swimmer:
+        return dataclasses.replace(self, body=subdivide(self.body, max(PIECES, self.balance_size.pieces)))
+
+    @property
+    def axial_drag(self) -> float:
+        return assemble(self.medium, self.body).axial_drag
+
+    def axial_stress(self, depth: float) -> float | None:
+        stresses = (entry.axial_stress for entry in CATALOGUE.values() if entry.medium == self.medium)
+        return None if (stress := next(stresses, None)) is None else stress * depth / DEPTH
 
     def time_steps(
         self, alpha: ArrayLike, alphadot: ArrayLike, cycles: int | None, work: bool = False, path: bool = False

@@ -45,8 +45,10 @@ def _cells(choice: Mapping[str, Any]) -> dict[str, str]:
     """Return a row of the table by column; its tolerance alone where nothing meets that."""
     cells = {"tolerance": f"{choice['tolerance']:.0e}"}
     if choice.get("tier"):
-        cells["setting"] = f"{choice['tier']}, {choice['knob']} = {choice['value']:g}"
-    settings = {k: x for k, x in choice.items() if k not in ("tolerance", "tier", "knob", "value", "error", "seconds")}
+        cells["setting"] = f"{choice['tier']}, {choice['setting']} = {choice['value']:g}"
+    settings = {
+        k: x for k, x in choice.items() if k not in ("tolerance", "tier", "setting", "value", "error", "seconds")
+    }
     if any(x is not None for x in settings.values()) or len(settings) > 1:
         cells |= {name: "-" if x is None else f"{x:g}" for name, x in settings.items()}
     if "error" in choice:
@@ -55,7 +57,7 @@ def _cells(choice: Mapping[str, Any]) -> dict[str, str]:
 
 
 def sentences(found: Mapping[str, Any]) -> list[str]:
-    """Return a sentence for each knob: its settings from coarse to fine, error, time, gain, and measured order."""
+    """Return a sentence for each setting: its values from coarse to fine, error, time, gain, and measured order."""
     lines, (_, of) = [], _scale(found)
     for line in found["lines"]:
         e, t, v = line["error"], line["seconds"], line["value"]

@@ -23,7 +23,7 @@ def text(result: Result) -> str:
     if space.planes:
         axes = space.planes[0].ccf.axes
         unit = f"x and y in {space.planes[0].ccf.unit}/rad2, theta in rad/rad2"
-        lines += [f"slices: {grid(axes)}", unit]
+        lines += [f"slices: {grid(axes, ('the first', 'the second joint'))}", unit]
         return "\n".join([*lines, *(f"{v.label.removeprefix('CCF of ')}: {spans(v.values)}" for v in result.variables)])
     ccf, error = space.study.curvature, space.study.curvature_error
     lines += [f"grid: {grid(ccf.axes)}", *_extremes(ccf, error), *_zero_line(ccf, scene.gait.middle)]

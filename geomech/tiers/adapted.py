@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from geomech.core.knob import Knob
+from geomech.core.setting import Setting
 from geomech.geometry import family
 from geomech.geometry.family import Family
 from geomech.tiers.base import Plan, Table, Tier, solved_phases
@@ -54,8 +54,8 @@ ADAPTED = Tier(
     rests_on=SHAPE_ALONE,
     result="adapted tier",
     common=False,  # its table serves one family of gaits
-    knobs=(
-        Knob(
+    settings=(
+        Setting(
             "curves",
             (4, 6, 8, 12, 16, 24, 48),
             "4 if smooth, about 2 across kinks",

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from geomech.core.knob import Knob
+from geomech.core.setting import Setting
 from geomech.gaits import Gait
 from geomech.geometry.connection import SAMPLES_TOGETHER
 from geomech.geometry.curvature import ccf
@@ -84,5 +84,5 @@ AREA = Tier(
     takes="takes two joints and more, of which a loop encloses area",
     instead="use path or direct",
     regular=True,
-    knobs=(Knob("grid", fitted.GRIDS, "3 or 4 in amplitude, set by the gait", "a map to read, not digits"),),
+    settings=(Setting("grid", fitted.GRIDS, "3 or 4 in amplitude, set by the gait", "a map to read, not digits"),),
 )

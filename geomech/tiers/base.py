@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geomech.core.knob import Knob
+from geomech.core.setting import Setting
 from geomech.gaits import Gait
 from geomech.geometry.images import solved_count
 from geomech.systems.base import System, kind_of
@@ -115,7 +115,7 @@ class Tier:
     amplitudes). rests_on: premises without which it says nothing, and no ``result`` exists. joints: shape variables that it
     takes, in words ``takes``, with ``instead`` for other bodies; offered: those for which it is chosen unless others are
     named. regular: there must be no singular shapes. common: a plain study takes it.
-    markers: their colour, that of the line if left out. knobs: settings that an error study sweeps.
+    markers: their colour, that of the line if left out. settings: those that an error study sweeps.
     """
 
     name: str
@@ -131,7 +131,7 @@ class Tier:
     regular: bool = False
     common: bool = True
     markers: str = ""
-    knobs: tuple[Knob, ...] = ()
+    settings: tuple[Setting, ...] = ()
 
     @property
     def colour(self) -> str:

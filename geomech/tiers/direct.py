@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from geomech.core.knob import Knob
+from geomech.core.setting import Setting
 from geomech.gaits import Gait
 from geomech.geometry.connection import SAMPLES_TOGETHER, Velocity, evaluate
 from geomech.geometry.gait import checked_gait
@@ -63,20 +63,20 @@ DIRECT = Tier(
     _plan,
     rests_on=NONE,
     markers="black",
-    knobs=(
-        Knob("phases", (16, 32, 64, 128, 256, 512), "spectral if smooth, else 2", "the true answer"),
-        Knob("segments", COUNTS, "2; less with pivots in links", NOTHING, "limit", setting="loads", rule="midpoint"),
-        Knob(
+    settings=(
+        Setting("phases", (16, 32, 64, 128, 256, 512), "spectral if smooth, else 2", "the true answer"),
+        Setting("segments", COUNTS, "2; less with pivots in links", NOTHING, "limit", key="loads", rule="midpoint"),
+        Setting(
             "nodes",
             COUNTS,
             "spectral; about 1 to 2 with pivots in links",
             NOTHING,
             "limit",
-            setting="loads",
+            key="loads",
             rule="gauss",
         ),
-        Knob("regularisation", (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6), "1", "links that really stand still", "limit"),
-        Knob(
+        Setting("regularisation", (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6), "1", "links that really stand still", "limit"),
+        Setting(
             "pieces",
             (5, 10, 20, 40, 80),
             "2 in the mean, scattered by pivots",

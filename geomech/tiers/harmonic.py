@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from geomech.core.knob import Knob
+from geomech.core.setting import Setting
 from geomech.geometry import harmonics
 from geomech.geometry.harmonics import Harmonics
 from geomech.systems.capabilities import stored_table
@@ -85,9 +85,9 @@ HARMONIC = Tier(
     takes="takes two to five joints, and of more there are too many harmonics",
     instead="use path, adapted or direct",
     regular=True,
-    knobs=(
-        Knob("grid", fitted.GRIDS, "4 if smooth, 1 to 2 across kinks", "any gait inside the field from one table"),
-        Knob(
+    settings=(
+        Setting("grid", fitted.GRIDS, "4 if smooth, 1 to 2 across kinks", "any gait inside the field from one table"),
+        Setting(
             "harmonics",
             (1, 3, 5, 9, 15, 21),
             "1 to 2, set by the kinks",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from geomech.core.knob import Knob
+from geomech.core.setting import Setting
 from geomech.gaits import Gait
 from geomech.geometry.connection import Connection, Velocity
 from geomech.tiers import fitted
@@ -36,9 +36,9 @@ PATH = Tier(
     {"color": "#0072B2", "linestyle": "-."},
     _plan,
     offered=range(1, 6),
-    knobs=(
-        Knob("grid", fitted.GRIDS, "4 if smooth, 1 to 2 across kinks", "the limit of linearity, no further"),
-        Knob("directions", (2, 4, 8, 16, 32, 64), "2, harmonics folding back", "a steadier fit", "limit"),
-        Knob("interpolation", (1, 2, 3, 5), "degree + 1 if smooth", "little where links stick", "limit"),
+    settings=(
+        Setting("grid", fitted.GRIDS, "4 if smooth, 1 to 2 across kinks", "the limit of linearity, no further"),
+        Setting("directions", (2, 4, 8, 16, 32, 64), "2, harmonics folding back", "a steadier fit", "limit"),
+        Setting("interpolation", (1, 2, 3, 5), "degree + 1 if smooth", "little where links stick", "limit"),
     ),
 )

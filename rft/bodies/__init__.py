@@ -3,11 +3,12 @@
 from rft.bodies.backbone import Backbone, ConstantCurvature, Serpenoid
 from rft.bodies.base import BODIES, Body, Elements
 from rft.bodies.chain import Chain
+from rft.bodies.positions import Positions
 from rft.registry import load_all
 
 load_all(__name__, __path__)
 
-__all__ = ["BODIES", "Backbone", "Body", "Chain", "ConstantCurvature", "Elements", "Serpenoid"]
+__all__ = ["BODIES", "Backbone", "Body", "Chain", "ConstantCurvature", "Elements", "Positions", "Serpenoid"]
 
 
 def __dir__() -> list[str]:

@@ -101,6 +101,17 @@ def is_reversible(body: Body) -> bool:
     return all(bool((np.abs(x[::-1] - y) <= 1e-12).all()) for x, y in zip(rotated, exchanged))
 
 
+@cached_if_immutable
+def is_symmetric(body: Body) -> bool:
+    """Return whether a body of shape -alpha is its mirror image of shape alpha, left and right exchanged, from a few random
+    shapes; a body of one's own may be bent where its shape is zero."""
+    rng = np.random.default_rng(0)
+    alpha, rates = rng.uniform(-1.5, 1.5, (2, body.joints, 5))
+    elements, other = body.motion(alpha, rates), body.motion(-alpha, -rates)
+    image = other._replace(s=-other.s, r_t=-other.r_t, v_n=-other.v_n, v_w=-other.v_w)
+    return all(bool((np.abs(x - y) <= 1e-10).all()) for x, y in zip(elements, image))
+
+
 def numbered_labels(joints: int, name: str = "alpha_{}", unit: str = "rad") -> tuple[tuple[str, str], ...]:
     """Return (name, unit) of each shape variable, numbered from 1."""
     return tuple((name.format(k + 1), unit) for k in range(joints))

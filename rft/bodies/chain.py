@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import math
-import re
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from rft.bodies.base import BODIES, Elements, Length, numbered_labels
+from rft.bodies.base import BODIES, Length, numbered_labels
+from rft.bodies.links import Links
 from rft.bodies.modes import checked_modes, mode_rows
-from rft.checks import Number, check_numbers, real_array
-from rft.refusal import require
-from rft.se2 import rotated
+from rft.checks import Number, check_numbers
 
 
 @BODIES.register
 @dataclass(frozen=True)
-class Chain:
+class Chain(Links):
     """n straight links, tail to head; alpha_k is the heading of link k+1 minus that of link k, counter-clockwise.
 
     lengths (-): relative link lengths, all > 0, at least two. frame (-): "mean", centre of mass of a uniform body and
@@ -41,21 +37,10 @@ class Chain:
     kind = "chain"
 
     def __post_init__(self):
-        lengths = real_array("lengths", self.lengths)
-        require(lengths.ndim == 1, "lengths must be a list of numbers", value=self.lengths)
-        object.__setattr__(self, "lengths", tuple(lengths.tolist()))
-        require(len(self.lengths) >= 2, "lengths needs at least two links", value=len(self.lengths))
-        are_lengths = all(0 < x < math.inf for x in self.lengths) and sum(self.lengths) < 1e100
-        require(are_lengths, "lengths must all be finite and > 0", value=list(self.lengths))
-        shortest = min(self.lengths) / sum(self.lengths)
-        require(shortest >= 1e-12, f"the shortest link must be at least 1e-12 of the body, got {shortest:.3g}")
+        self._check_lengths()
         object.__setattr__(self, "modes", checked_modes(self.modes, self.waves, len(self.lengths)))
         check_numbers(self)
         self._frame_link(self.frame)
-
-    def __getstate__(self) -> dict:
-        """Return the fields alone for copies and workers, without cached properties."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
     def joints(self) -> int:
@@ -75,35 +60,6 @@ class Chain:
         """(name, unit) of each shape variable, for the axes of pictures."""
         return numbered_labels(self.joints, "alpha_{}" if self.modes is None else "m_{}")
 
-    @cached_property
-    def fractions(self) -> np.ndarray:
-        """Link lengths over the length of the body, (n,)."""
-        lengths = np.asarray(self.lengths)
-        return lengths / lengths.sum()
-
-    @cached_property
-    def _half_lengths(self) -> np.ndarray:
-        """Half lengths of the links, (n, 1)."""
-        return (self.fractions / 2)[:, None]
-
-    def _frame_link(self, frame: str) -> int | None:
-        """Return the index of the link that carries a frame, None for "mean"; ValueError for no frame of this body."""
-        text = frame if isinstance(frame, str) else ""
-        if text == "mean":
-            return None
-        found, n = re.fullmatch(r"link-([1-9]\d{0,6})", text), len(self.lengths)
-        number = int(found[1]) if found else 0
-        require(0 < number <= n, f"frame must be 'mean' or 'link-1' ... 'link-{n}'", value=frame)
-        return number - 1
-
-    @cached_property
-    def _link(self) -> int | None:
-        return self._frame_link(self.frame)
-
-    def _frame_value(self, x: np.ndarray, link: int | None) -> np.ndarray:
-        """Return a frame's value from values of the links (n, ...): its link's, or the length-weighted mean."""
-        return x[link] if link is not None else self.fractions @ x
-
     def _in_frame(self, differences: np.ndarray, link: int | None) -> np.ndarray:
         """Return values of all links (n, B), less the frame's, from the differences (n - 1, B) between neighbours."""
         x = np.zeros((len(self.lengths), differences.shape[1]), differences.dtype)
@@ -112,8 +68,6 @@ class Chain:
         return x
 
     def _links(self, alpha, alphadot):
-        """Return of the links in the body frame, (n, B) each: exp(i theta), rates of theta, centres x + i y, velocities of
-        the centres, and headings theta."""
         size, link = alpha.shape[1], self._link
         angles = self._in_frame(np.concatenate([self.joint_angles(alpha), self.joint_angles(alphadot)], 1), link)
         theta, rotation = angles[:, :size], angles[:, size:]
@@ -125,42 +79,6 @@ class Chain:
         np.multiply(1j * rotation, halves[:, :size], out=halves[:, size:])
         centres = self._in_frame(halves[:-1] + halves[1:], link)
         return heading, rotation, centres[:, :size], centres[:, size:], theta
-
-    def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Elements:
-        """Return the links at shapes (rad) and rates (rad per unit time), (joints, B) each, with the body frame held."""
-        heading, rotation, centre, velocity, _ = self._links(alpha, alphadot)
-        return Elements.from_complex(heading, centre, velocity, rotation, self._half_lengths)
-
-    def frame_pose(self, frame: str, alpha: np.ndarray, alphadot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the pose h of another frame of this body in the body frame, and dh/dt: each (..., 3), in length units and
-        rad.
-
-        alpha, alphadot: (..., joints). `geomech.geometry.coordinates` uses it to change the frame of velocities and
-        connections.
-        """
-        alpha, alphadot = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
-        _, *links = self._links(*(x.reshape(-1, self.joints).T for x in (alpha, alphadot)))
-        link = self._frame_link(frame)
-        rotation, centre, velocity, theta = (self._frame_value(x, link).reshape(alpha.shape[:-1]) for x in links)
-        centre, velocity = self.length * centre, self.length * velocity
-        h, hdot = (centre.real, centre.imag, theta), (velocity.real, velocity.imag, rotation)
-        return np.stack(h, -1), np.stack(hdot, -1)
-
-    def points(self, alpha: np.ndarray, pose: ArrayLike = (0.0, 0.0, 0.0)) -> np.ndarray:
-        """Return the ends of the links in the world, tail to head, (..., links + 1, 2), in length units.
-
-        alpha: (..., joints), rad. pose: (..., 3), pose of the body frame in the world, (x, y) in length units, theta in
-        rad."""
-        alpha, pose = np.asarray(alpha, float), np.asarray(pose, float)
-        require(alpha.shape[-1:] == (self.joints,), f"alpha must have {self.joints} angles last", value=alpha.shape)
-        require(pose.shape[-1:] == (3,), "pose must be (x, y, theta)", value=pose.shape)
-        flat = alpha.reshape(-1, self.joints).T
-        heading, _, centre, *_ = self._links(flat, np.zeros_like(flat))
-        half = self._half_lengths * heading
-        ends = self.length * np.concatenate([centre - half, (centre + half)[-1:]]).T.reshape(*alpha.shape[:-1], -1)
-        x, y, theta = np.moveaxis(pose[..., None], -2, 0)
-        dx, dy = rotated(theta, ends.real, ends.imag)
-        return np.stack([x + dx, y + dy], -1)
 
     @classmethod
     def examples(cls) -> dict[str, Chain]:

@@ -1,18 +1,18 @@
-"""One approximation of a question, with its settings from coarse to fine."""
+"""One numerical setting of a question, with its values from coarse to fine."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
-ROUNDING = 1e-13  # errors below this are rounding, and say nothing about a knob
+ROUNDING = 1e-13  # errors below this are rounding, and say nothing about a setting
 
 
 @dataclass(frozen=True)
-class Knob:
+class Setting:
     """A numerical setting that an error study varies from coarse to fine. order: of the error in 1/value, or in value
     where that falls, as theory gives it. buys: what a finer value improves, to complete a sentence. against: "truth",
-    or "limit" of the setting alone. setting: the name of an entry of [numerics], where that is not the knob's; loads
+    or "limit" of the setting alone. key: its entry of [numerics], where that has another name; "loads"
     for rules, whose prefix is ``rule``. tier: to which it belongs."""
 
     name: str
@@ -21,7 +21,7 @@ class Knob:
     buys: str = ""
     against: str = "truth"
     tier: str = ""
-    setting: str = ""
+    key: str = ""
     rule: str = ""
 
     @property

@@ -1,0 +1,133 @@
+"""The gait lab: charts of one scene or several, or of a family of scenes, as a question."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import prod
+
+import numpy as np
+
+from geomech.core.variables import Result, Variable
+from geomech.run.cost import Cost
+from geomech.scenes.model import Scene
+from geomech.studies import charts, cost
+from geomech.studies.charts import Chart
+from geomech.studies.cycles import Cycles
+from geomech.studies.grid import Grid, listed
+from geomech.studies.question import Allow, Progress, Question
+from rft.refusal import Refusal
+
+GALLERY = (  # in which a page shows them
+    "three-link-glass", "three-link-glass-close", "three-link-coulomb", "three-link-viscous", "serpenoid-glass",
+    "seven-link-modes",
+)  # fmt: skip
+MEMBERS = range(2, 34)  # of a family
+SECTIONS = ("medium", "body", "system", "physical")  # that a family may vary
+
+
+@dataclass(frozen=True)
+class Lab(Question):
+    """Charts of scenes with two shape variables. over: values of one parameter of the first scene, {"medium.C": [...]}, which
+    makes that chart one of a family; the scene's own value is added to them."""
+
+    scenes: tuple[Scene, ...]
+    over: Mapping[str, Sequence[float]] = field(default_factory=dict)
+
+    scene = property(lambda self: self.scenes[0])
+    title = property(lambda self: f"charts of {', '.join(s.name for s in self.scenes)}")
+
+    def inputs(self) -> list:
+        from geomech.scenes import inputs
+
+        return [path for scene in self.scenes for path in inputs(scene)]
+
+    def check(self) -> None:
+        for scene in self.scenes:
+            charts.refuse(scene)
+        if self.over:
+            _ = self._values
+
+    @cached_property
+    def _grid(self) -> Grid:
+        return Cycles().grid(self.scene, listed(self.over))
+
+    @cached_property
+    def _own(self) -> float:
+        """Value of the parameter in the scene itself."""
+        if len(self.over) != 1:
+            raise Refusal("a family has one parameter", value=list(self.over), instead="give --over once")
+        key = next(iter(self.over))
+        section, _, name = key.partition(".")
+        if section not in SECTIONS:
+            raise Refusal(
+                f"a family varies a key of {', '.join(SECTIONS)}, not {key}",
+                where="``over``",
+                instead="see 'geomech sweep' for others",
+            )
+        own = self._grid.tables.get(section, {}).get(name)
+        if isinstance(own, bool) or not isinstance(own, (int, float)):
+            raise Refusal(
+                f"the scene gives no number for {key}", where=self.scene.name, instead="name a key of its file"
+            )
+        return float(own)
+
+    @cached_property
+    def _values(self) -> list[float]:
+        """Values of the members, with the scene's own."""
+        found = sorted({*next(iter(listed(self.over).values())), self._own})
+        if len(found) not in MEMBERS:
+            raise Refusal(
+                f"a family has {MEMBERS[0]} to {MEMBERS[-1]} members, its own value counted", value=len(found),
+                where="``over``", instead="give fewer or more values",
+            )  # fmt: skip
+        for value in (*found, *charts.middles(found)):
+            charts.refuse(self._grid.at((value,)))
+        return found
+
+    def cost(self) -> Cost:
+        times = 2 * len(self._values) - 1 if self.over else 1
+        jobs = [job for k, scene in enumerate(self.scenes) for job in (1 if k else times) * _jobs(scene)]
+        return cost.price(jobs)
+
+    def answer(self, progress: Progress, allow: Allow) -> Result:
+        made = []
+        for k, scene in enumerate(self.scenes):
+            made.append(self._family(progress) if self.over and k == 0 else charts.chart(scene))
+            progress((k + 1) / len(self.scenes))
+        return _result(made)
+
+    def _family(self, progress: Callable) -> Chart:
+        values, between = self._values, charts.middles(self._values)
+        made = {}
+        for value in (*values, *between):
+            made[value] = charts.chart(self._grid.at((value,)))
+            progress(len(made) / (len(values) + len(between)) / len(self.scenes))
+        some = [made[v] for v in values]
+        family = charts.family(self.scene, next(iter(self.over)), values, self._own, some, [made[v] for v in between])
+        return replace(family, scene=self.scene)
+
+
+def _jobs(scene: Scene) -> list[cost.Job]:
+    jobs = [*cost.connection(scene), *([] if scene.system.traits.linear else cost.harmonics(scene))]
+    if scene.frame != charts.MINIMUM_PERTURBATION:
+        jobs += cost.connection(scene)  # that of the minimum-perturbation frame
+    return jobs
+
+
+def _result(made: list[Chart]) -> Result:
+    """Return what the charts are: shapes, harmonics, errors."""
+    dims, size = ("scene",), lambda k: np.array([x.grid_error[k] for x in made])
+    variables = [
+        Variable("scene", dims, np.array([x.scene.name for x in made])),
+        Variable("shapes", dims, np.array([prod(map(len, x.axes)) for x in made]), "1", "shapes of the grid"),
+        Variable("highest", dims, np.array([x.highest for x in made]), "1", "highest harmonic of alphadot's direction"),
+        Variable("grid_error", dims, size(0), "BL/rad", "error of the grid, position"),
+        Variable("grid_error_heading", dims, size(1), "1", "error of the grid, heading"),
+    ]
+    facts = {}
+    if made[0].family:
+        family = made[0].family
+        facts = {"over": family.key, "members": len(family.values), "between_members": family.error}
+    return Result("lab", tuple(variables), facts, made)
