@@ -155,8 +155,7 @@ def _turning(t: np.ndarray, headings: np.ndarray) -> float:
 
 def _with_length(trial: Trial, curve: smooth.Curve) -> Trial:
     """Refuse lengths that no body has, or that contradict each other."""
-    tangent = np.einsum("sm,fmc->fsc", curve.basis(curve.places, 1), curve.at(curve.t))
-    length = float(np.hypot(tangent[..., 0], tangent[..., 1]).mean())
+    length = float(np.abs(smooth.placed(curve.basis(curve.places, 1), curve.at(curve.t))).mean())
     if trial.unit == "m" and not SHORTEST < length < LONGEST:
         raise trial.wrong(
             f"the body is {length:.3g} m long", instead="say the unit of x and y: mm, cm or px by ``units``"

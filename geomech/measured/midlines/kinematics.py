@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech.measured.midlines.smooth import NODES, Curve
+from geomech.measured.midlines.smooth import NODES, Curve, placed
 
 PHASES = 48  # of a cycle
 PLACES = 12  # along the body, whose headings make the phase
@@ -45,8 +45,7 @@ class Clock:
 
 def relative_headings(curve: Curve, t: np.ndarray) -> np.ndarray:
     """Return headings (T, PLACES) along the body at times t, less their mean, rad."""
-    tangent = np.einsum("sm,fmc->fsc", curve.basis((np.arange(PLACES) + 0.5) / PLACES, 1), curve.at(t))
-    heading = np.unwrap(np.arctan2(tangent[..., 1], tangent[..., 0]), axis=1)
+    heading = np.unwrap(np.angle(placed(curve.basis((np.arange(PLACES) + 0.5) / PLACES, 1), curve.at(t))), axis=1)
     return heading - heading.mean(1, keepdims=True)
 
 
@@ -106,10 +105,9 @@ def cycles(curve: Curve, at: np.ndarray) -> Cycles:
     t = at[:-1, None] + np.diff(at)[:, None] * (np.arange(PHASES) + 0.5) / PHASES
     z, rate, ends = curve.at(t.ravel()), curve.at(t.ravel(), 1), curve.at(at)
     shape = (*t.shape, len(curve.places))
-    complexly = lambda basis, z: (lambda p: p[..., 0] + 1j * p[..., 1])(np.einsum("sm,fmc->fsc", basis, z))
     value, slope = curve.basis(curve.places), curve.basis(curve.places, 1)
-    place, tangent, velocity = (complexly(b, c).reshape(shape) for b, c in ((value, z), (slope, z), (value, rate)))
-    poses = _poses(complexly(value, ends), complexly(slope, ends))
+    place, tangent, velocity = (placed(b, c).reshape(shape) for b, c in ((value, z), (slope, z), (value, rate)))
+    poses = _poses(placed(value, ends), placed(slope, ends))
     return Cycles(t, place, tangent, velocity, poses[:-1], poses[1:], np.diff(at))
 
 
@@ -198,7 +196,7 @@ def _share() -> np.ndarray:
 def wave_sign(first: np.ndarray) -> int:
     """Return 1 for a wave of headings' first harmonic (NODES,) that runs to the point 0 of the body, -1 for the other way."""
     inside = first[_middle(len(first))]
-    powers = [(np.abs(np.einsum("wns,s->wn", _waves(NODES), x)) ** 2).sum(-1).max() for x in (inside, inside.conj())]
+    powers = [(np.abs(_waves(NODES) @ x) ** 2).sum(-1).max() for x in (inside, inside.conj())]
     return 1 if powers[0] >= powers[1] else -1
 
 
@@ -209,7 +207,7 @@ def arc_waves(first: np.ndarray) -> np.ndarray:
     over a list of wave numbers; a parabola through the least residual and its neighbours gives it."""
     first = first.conj() if wave_sign(first.mean(0)) < 0 else first
     first = first[:, _middle(first.shape[1])]
-    left = (np.abs(first) ** 2).sum(-1) - (np.abs(np.einsum("wns,cs->wcn", _waves(NODES), first)) ** 2).sum(-1)
+    left = (np.abs(first) ** 2).sum(-1) - (np.abs(_waves(NODES) @ first.T) ** 2).sum(1)
     k = np.clip(left.argmin(0), 1, len(WAVES) - 2)
     before, least, after = left[k + np.arange(-1, 2)[:, None], np.arange(left.shape[1])]
     waves = WAVES[k] + 0.5 * (WAVES[1] - WAVES[0]) * (before - after) / np.maximum(before - 2 * least + after, 1e-300)

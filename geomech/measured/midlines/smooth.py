@@ -66,6 +66,11 @@ class Curve:
         return replace(self, coefficients=self.coefficients + self.solver(rows))
 
 
+def placed(basis: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Return x + i y (T, S) at places, from `Curve.basis` (S, modes) and coefficients (T, modes, 2)."""
+    return (z @ [1.0, 1j]) @ basis.T
+
+
 def _legendre(s: np.ndarray, modes: int, order: int) -> np.ndarray:
     """Return Legendre polynomials (S, modes) of 2 s - 1, or their derivatives by s."""
     identity = np.eye(modes)
@@ -110,8 +115,8 @@ def crude(trial: Trial) -> np.ndarray:
     s = _chord_places(trial.points)
     z, triangle, _ = projected(trial.points, s, min(6, len(s) - 1))
     places = (np.arange(8) + 0.5) / 8
-    tangent = np.einsum("sm,fmc->fsc", _legendre(places, len(triangle), 1) @ np.linalg.inv(triangle), z)
-    heading = np.unwrap(np.arctan2(tangent[..., 1], tangent[..., 0]), axis=1)
+    tangent = placed(_legendre(places, len(triangle), 1) @ np.linalg.inv(triangle), z)
+    heading = np.unwrap(np.angle(tangent), axis=1)
     return heading - heading.mean(1, keepdims=True)
 
 
@@ -125,8 +130,8 @@ def projected(points: np.ndarray, s: np.ndarray, modes: int) -> tuple[np.ndarray
     """Return orthonormal coefficients (F, modes, 2) of frames, what makes them from Legendre's, and the squares of what
     they leave of each frame (F,)."""
     q, triangle = np.linalg.qr(_legendre(s, modes, 0))
-    z = np.einsum("pm,fpc->fmc", q, points)
-    left = points - np.einsum("pm,fmc->fpc", q, z)
+    z = q.T @ points
+    left = points - q @ z
     return z, triangle, (left**2).sum((1, 2))
 
 
@@ -164,7 +169,7 @@ def _completed(trial: Trial, curve: Curve) -> Trial:
     """Return the trial with points of the curve where there were none: so the least squares of what is known converge."""
     if not trial.filled.any():
         return trial
-    smooth = np.einsum("pm,fmc->fpc", curve.basis(curve.s), curve.at(trial.t))
+    smooth = curve.basis(curve.s) @ curve.at(trial.t)
     return replace(trial, points=np.where(trial.filled[..., None], smooth, trial.points))
 
 
@@ -205,7 +210,6 @@ def _curve(trial: Trial, s: np.ndarray, modes: int, step: int, solver: Solver) -
 def _arc_places(curve: Curve, s: np.ndarray) -> np.ndarray:
     """Return the shares (P,) of the curve's own length, mean over the frames, at which points of s (P,) lie."""
     fine = np.linspace(0, 1, 201)
-    tangent = np.einsum("sm,fmc->fsc", curve.basis(fine, 1), curve.at(curve.t))
-    speed = np.hypot(tangent[..., 0], tangent[..., 1]).mean(0)
+    speed = np.abs(placed(curve.basis(fine, 1), curve.at(curve.t))).mean(0)
     arc = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2)])
     return np.interp(s, fine, arc / arc[-1])
