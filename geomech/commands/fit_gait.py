@@ -66,8 +66,8 @@ def fit_gait(
     as_json: JsonOption = False,
 ):
     """Fit a measured gait. A log of joint angles gives the connection near its mean gait, with intervals; tracked midlines
-    give speed, heading, slip, wave efficiency, amplitude and wavelength, each with an interval, and, with --medium, the same
-    as predicted."""
+    give speed, heading, slip, wave efficiency, amplitude and wavelength, each with an interval, and in a medium the same as
+    predicted."""
     from geomech.measured.ask import question
     from geomech.output import parts
 

@@ -18,7 +18,7 @@ OF_MIDLINES = "medium", "units", "scale", "fps", "y", "head", "least_score", "me
 def question(file: Path, scene: Path | None = None, **options: Any) -> Fit | Midlines:
     """Return the question of a file; Refusal for options of the other kind. options: those that are None or False are left
     out."""
-    given = {name: value for name, value in options.items() if value not in (None, False, ())}
+    given = {name: value for name, value in options.items() if value is not None and value is not False and value != ()}
     midlines = _is_midlines(file)
     wrong = [x for x in (OF_LOGS if midlines else OF_MIDLINES) if x in given or (x == "scene" and scene is not None)]
     if wrong:

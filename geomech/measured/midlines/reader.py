@@ -21,6 +21,7 @@ import numpy as np
 from geomech.core.errors import choose
 from geomech.io.rows import LARGEST_NUMBER, Rows
 from geomech.io.rows import read as read_rows
+from geomech.measured.log import JOINT
 from geomech.measured.midlines.trial import UNITS, Trial
 from rft.checks import in_range
 from rft.refusal import Refusal, formatted
@@ -54,13 +55,11 @@ class Table(NamedTuple):
 
 
 def is_midlines(header: tuple[str, ...]) -> bool:
-    """Return whether the header of a file is that of midlines."""
-    if header[:1] and header[0] in HEADS:
+    """Return whether the header of a file is that of points along a body, not of a log of joint angles."""
+    bare = {_split(name)[0] for name in header}
+    if {*header[:1]} & {*HEADS} or {"s", "curvature"} <= bare or {*POINTS[:2]} & bare or len(_pairs(header)) > 1:
         return True
-    bare = [_split(name)[0] for name in header]
-    return ({"x", "y"} <= {*bare} - {"heading"} and "heading" not in bare and "theta" not in bare and not any(
-        re.fullmatch(r"(alpha|joint|angle|a|q)_?\d+(_rad|_deg)?", c) for c in bare
-    )) or len(_pairs(header)) >= 2  # fmt: skip
+    return {"x", "y"} <= bare and not {"heading", "theta", "yaw"} & bare and not any(map(JOINT.fullmatch, bare))
 
 
 def read(
