@@ -99,7 +99,8 @@ class FittedMidlines:
         return float(variable.values), float(variable.error)
 
     def __repr__(self) -> str:
-        return printable(text.text(self.result))
+        notes = [f"note: {line}" for line in self.result.attributes["notes"]]
+        return printable("\n".join([text.text(self.result), *notes]))
 
     def against(self, medium: Any, effects: Any = ()) -> FittedMidlines:
         """Return the same beside its prediction in a medium, or a medium's name or file, with effects on the body."""
