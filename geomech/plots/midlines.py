@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from geomech.core.variables import Result
-from geomech.measured.midlines.predicted import COMPARED
+from geomech.measured.midlines.kinematics import Cycles
+from geomech.measured.midlines.predicted import COMPARED, Comparison
 from geomech.measured.midlines.question import units_of
 from geomech.plots.style import figure, styled
 
@@ -46,9 +47,23 @@ def _way(result: Result, ax) -> None:
     for k, body in enumerate(place):
         ax.plot(body.real, body.imag, color="0.55", lw=0.8, label="midlines of a cycle" if k == 0 else None)
     ax.plot(place[:, -1].real, place[:, -1].imag, "o", color="black", ms=2.5, label="head")
-    ax.set(xlabel=f"x ({unit or 'BL'})", ylabel=f"y ({unit or 'BL'})", aspect="equal")
+    if (comparison := result.subject[1]) is not None:
+        way = _predicted_way(cycles, comparison, length, size)
+        ax.plot(way.real, way.imag, "--", color=PREDICTED, lw=1.2, label="predicted")
+    ax.set(xlabel=f"x ({unit or 'BL'})", ylabel=f"y ({unit or 'BL'})")
+    ax.set_aspect("equal", adjustable="datalim")
     ax.set_title(f"{len(fit.used)} cycles", loc="left")
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.28), ncols=2)
+
+
+def _predicted_way(cycles: Cycles, comparison: Comparison, length: float, size: float) -> np.ndarray:
+    """Return where the body is after each cycle as predicted (C + 1,), x + i y, from where it was at the start. size: unit of
+    the axes in that of the trial."""
+    stride, heading, turn = (comparison.predicted[COMPARED.index(name)] for name in ("stride", "heading", "turn"))
+    count = len(cycles.duration)
+    steps = stride * length / size * np.exp(1j * (heading + turn * (np.arange(count) - (count - 1) / 2)))
+    start = complex(*cycles.starts[0, :2]) / size
+    return np.concatenate([[0.0], np.cumsum(steps)]) + start
 
 
 def _along(result: Result, name: str, unit: str, ax) -> None:

@@ -260,7 +260,8 @@ def _head(trial: Trial, cycles: kinematics.Cycles, head: str | None) -> tuple[bo
 
 def _notes(used: np.ndarray) -> list[str]:
     notes, count = [], len(used)
-    if count < FEWEST:
-        one = "one full cycle does" if count == 1 else "two full cycles do"
-        notes.append(f"{one} not show how cycles vary: intervals are of the tracking's noise" + " alone" * (count == 1))
+    if count == 1:
+        notes.append("one full cycle does not show how cycles vary: intervals are of the tracking's noise alone")
+    elif count < FEWEST:
+        notes.append("two full cycles hardly show how cycles vary")
     return notes

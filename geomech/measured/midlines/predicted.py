@@ -22,7 +22,7 @@ HARMONICS = 5  # of the mean cycle's headings
 ELEMENTS = smooth.NODES  # of the body; twice as many tell the error
 RESAMPLED = 12  # times that noise is put on the midlines
 COMPARED = "speed", "stride", "heading", "turn", "slip", "efficiency"
-FACTORS = np.geomspace(1 / 64, 64, 13)  # of a parameter, that are tried first
+FACTORS = np.geomspace(1 / 64, 64, 25)  # of a parameter, that are tried first
 MOVED = 1e-4  # relative change of the stride, below which a parameter does not change it
 FINE = 1e-3  # relative accuracy of a parameter that closes the gap
 
