@@ -21,7 +21,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from geomech import face as _face  # noqa: F401  registers the methods of values
+from geomech import face as _face  # noqa: F401  implements methods of values
 from geomech.core import version as _version
 
 if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors

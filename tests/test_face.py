@@ -139,8 +139,8 @@ def test_a_picture_of_something_else_says_what_it_draws(draw, study):
         draw(study)
 
 
-def test_the_example_of_a_study_runs():
-    assert doctest.testmod(import_module("geomech.app.study")) == (0, 3)
+def test_the_examples_of_a_study_run():
+    assert doctest.testmod(import_module("geomech.app.study")).failed == 0
 
 
 def test_a_refusal_names_the_argument_and_a_command_its_option():

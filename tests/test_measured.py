@@ -405,7 +405,7 @@ def test_three_joints(tmp_path):
     assert np.isnan(A[~reached]).all() and 0 < reached.sum() < reached.size / 4
     thin = dataclasses.replace(f.tube, taylor=dataclasses.replace(f.known, spread=1e-9 * f.known.spread))
     with pytest.raises(
-        ValueError, match="do not reach the plane of alpha_2 = 0.1: slice it at a shape of the mean gait, --"
+        ValueError, match="do not reach the plane of alpha_2 = 0.1: slice it at a shape of the mean gait, at 0"
     ):
         interpolated_plane(thin, (0, 2), [0.0, 0.1, 0.0])
 
@@ -435,7 +435,7 @@ def tied(rows, noise, spread=0.05):
     return log_of(made._replace(alpha=alpha + noise * np.random.default_rng(5).normal(size=alpha.shape)))
 
 
-SUM = [[1, 1]], "alpha_3 is 1 alpha_1 \\+ 1 alpha_2, but for .* leave alpha_3 out with --columns$"
+SUM = [[1, 1]], "alpha_3 is 1 alpha_1 \\+ 1 alpha_2, but for .* leave alpha_3 out of the columns$"
 
 
 @pytest.mark.parametrize(
@@ -887,7 +887,7 @@ def test_columns_in_any_order_and_unit_tell_the_same(short, tmp_path):
     names = ("time", "joint1_deg", "joint2_deg", "x", "y", "theta")
     third = measured.fit_log(written(tmp_path / "c.csv", short, names, changed(slice(1, 3), np.degrees)), harmonics=3)
     np.testing.assert_allclose(third.known.A, one.known.A, rtol=1e-6, atol=1e-9)
-    with pytest.warns(UnitWarning, match="drop --degrees"):
+    with pytest.warns(UnitWarning, match="drop degrees"):
         measured.read(tmp_path / "a.csv", degrees=True)
 
 
@@ -916,10 +916,10 @@ def test_a_left_handed_pose_is_refused(moving):
         (
             NAMES,
             changed(slice(3, 5), lambda x: 150 * x),
-            "x and y move by .* body lengths .* or in m with --body-length",
+            "x and y move by .* body lengths .* or in m with body_length",
         ),
         (NAMES, changed(0, lambda t: 1000 * t), "the joints repeat every 1005, and t is taken for s"),
-        (("t", "a1", "a2", "x_m", "y_m", "heading"), None, "x and y are in m by the names .* say --body-length"),
+        (("t", "a1", "a2", "x_m", "y_m", "heading"), None, "x and y are in m by the names .* say body_length"),
     ],
 )
 def test_likely_slips_of_unit_are_noted(names, change, said, moving, tmp_path):

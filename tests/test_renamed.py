@@ -19,6 +19,12 @@ def test_help_has_every_command_under_its_heading_with_its_whole_summary():
     assert max(map(len, out.splitlines())) <= 80
 
 
+@pytest.mark.parametrize("command", ["scenes", "explain sandfish-heavy", "explain c-leg", "explain xplorer"])
+def test_lists_fit_a_screen(command):
+    code, out, _ = geomech(*command.split())
+    assert code == 0 and max(map(len, out.splitlines())) <= 80
+
+
 @pytest.mark.parametrize("old", renamed.COMMANDS)
 def test_an_old_name_of_a_command_is_the_new_one_with_a_note(old):
     new = renamed.COMMANDS[old]

@@ -18,7 +18,7 @@ GROUPS = {  # by physics; a script that is not here is found by the build
     ],
     "Animals": ["fig09c_efficiency", "fig10_neuromechanics", "transients", "midlines"],
     "Legs, rods and bodies in grains": ["fig08a_rods", "fig08b_legs", "ground_effects", "meshes"],
-    "Robots": ["fig12_walking", "walking_mujoco", "walking_sensitivity", "walking_steps", "wheel", "screws"],
+    "Robots": ["fig12_walking", "walking_mujoco", "walking_sensitivity", "walking_steps", "wheel", "screws", "sand_gaits"],
     "Accuracy and cost": ["work_precision", "cost_scaling", "effects_cost"],
 }  # fmt: skip
 PICTURES = {  # of scripts whose committed picture has a shorter name

@@ -20,7 +20,16 @@ from rft.refusal import printable
 
 class Displacements(results.Displacements):
     """Net displacement per cycle by amplitude and tier: `table["direct"]` are poses (B, 3), `table["estimate"]` their
-    errors, `table["units"]` the units of all."""
+    errors, `table["units"]` the units of all.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> table = geomech.study("three-link-viscous").displacement([0.5, 1.0], "direct")
+    >>> [round(x, 4) for x in table["net_distance"]["direct"]], table["units"]["estimate"]
+    ([0.0153, 0.0513], 'BL')
+    >>> ax = table.plot()
+    """
 
     def __repr__(self) -> str:
         return printable(text.text(self.result))
@@ -38,7 +47,16 @@ class Displacements(results.Displacements):
 
 
 class Swept(sweep.Swept):
-    """Result of a sweep: {"over": {parameter: values}, name: array (N_1, ...)}."""
+    """Result of a sweep: {"over": {parameter: values}, name: array (N_1, ...)}.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> swept = geomech.sweep("three-link-viscous", {"medium.ratio": [1.5, 2.0]})
+    >>> swept["over"]
+    {'medium.ratio': [1.5, 2.0]}
+    >>> fig = swept.plot()
+    """
 
     def _repr_html_(self) -> str:
         return display.swept(self)
@@ -54,7 +72,16 @@ class Swept(sweep.Swept):
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Optimum(optimisation.Optimum):
-    """The best gait: its ``gait``, ``value``, ``estimate`` of the error, and the ``scene`` with it."""
+    """The best gait: its ``gait``, ``value``, ``estimate`` of the error, and the ``scene`` with it.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> best = geomech.optimise("three-link-viscous", harmonics=1, starts=1)
+    >>> best.gait.harmonics, best.scene.gait is best.gait
+    (1, True)
+    >>> ax = best.plot()
+    """
 
     def __repr__(self) -> str:
         return printable(text.text(result_of(self)))
@@ -123,7 +150,16 @@ class FittedMidlines:
 
 
 class FittedMedium:
-    """A medium fitted to measurements. result: parameters, errors and residuals. medium: the law, or stress map."""
+    """A medium fitted to measurements. result: parameters, errors and residuals. medium: the law, or stress map.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> sand = geomech.fit_medium("dem-rod-drag")
+    >>> print(str(sand).splitlines()[0])
+    granular law fitted to dem_rod_drag.csv: 16 forces at 8 angles
+    >>> fig = sand.plot()
+    """
 
     def __init__(self, result: Result):
         self.result = result

@@ -96,7 +96,7 @@ def listed(names: Sequence[str]) -> str:
     return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
 
 
-def wrapped(lines: Iterable[str]) -> list[str]:
+def wrapped(lines: Iterable[str], indent: int = 2) -> list[str]:
     """Return lines of WIDTH at most; of a longer one the rest follows, indented."""
-    fill = textwrap.TextWrapper(WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    fill = textwrap.TextWrapper(WIDTH, subsequent_indent=" " * indent, break_long_words=False, break_on_hyphens=False)
     return [part for line in lines for part in (fill.wrap(line) if len(line) > WIDTH else [line])]

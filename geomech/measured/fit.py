@@ -41,7 +41,21 @@ class Fitted:
     misfit of xi, over that of the joint rates; explained: (3,), share of the squares of xi that the fit explains.
     noise: (d + 3,), of the rows' joint angles, x, y and heading. across: whether the cycles vary enough to determine A
     across the gait. combined: joints that are linear combinations of others, factors (d,) by number, where these are
-    why they do not. length: of the body in m; 1 for a log in body lengths."""
+    why they do not. length: of the body in m; 1 for a log in body lengths.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from geomech.gaits import Circle
+    >>> from geomech.measured import fit_log, synthetic
+    >>> from geomech.scenes import load
+    >>> velocity = load("three-link-viscous").system.velocity
+    >>> file = pathlib.Path(tempfile.mkdtemp()) / "log.csv"
+    >>> synthetic.save(file, synthetic.made(velocity, Circle(0.8), cycles=20))
+    >>> fit = fit_log(file)
+    >>> fit.measured.shape, fit.predicted.shape  # net poses of whole cycles
+    ((18, 3), (18, 3))
+    """
 
     log: Log
     known: TaylorSeries
@@ -111,7 +125,21 @@ def fit_log(
     columns, degrees: as in `geomech.measured.log.read`. level: share of cases in which an interval should contain the
     truth. harmonics: of the connection in the phase; by cross-validation if None. limits (rad): distance from the mean
     gait up to which the connection is given; as far as the data extend if None. body_length (m): of a log in m; 1 for
-    one in body lengths."""
+    one in body lengths.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from geomech.gaits import Circle
+    >>> from geomech.measured import fit_log, synthetic
+    >>> from geomech.scenes import load
+    >>> velocity = load("three-link-viscous").system.velocity
+    >>> file = pathlib.Path(tempfile.mkdtemp()) / "log.csv"
+    >>> synthetic.save(file, synthetic.made(velocity, Circle(0.8), cycles=20))
+    >>> fit = fit_log(file)
+    >>> fit.gait.joints, len(fit.measured)  # joints, and whole cycles
+    (2, 18)
+    """
     in_range("``level``", level, 0.5, 0.999)
     in_range("``body_length``", body_length, 1e-9, 1e9)
     if harmonics is not None:
