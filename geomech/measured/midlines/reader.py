@@ -90,7 +90,7 @@ def read(
     if y is not None:
         choose("``y``", y, ("up", "down"))
     elif pixels:
-        notes.append("y is taken to run down, as in images, else heading and turn have the other sign: say --y up")
+        notes.append("y is taken to run down, as in images, else heading and turn have the other sign: say y up")
     if y == "down" or (y is None and pixels):
         xy[..., 1] *= -1
     xy[np.isnan(xy).any(-1)] = np.nan
@@ -381,7 +381,7 @@ def _check(table: Table, name: str) -> None:
 def _unit(table: Table, name: str, units: str | None, scale: float | None) -> tuple[str, float, list[str]]:
     """Return the unit of lengths, m or BL or "", that of the file in it, and what was taken for granted."""
     if units and table.unit and units != table.unit and table.unit != "px":
-        raise Refusal(f"x and y are in {table.unit} by the names of their columns", where=name, instead="drop --units")
+        raise Refusal(f"x and y are in {table.unit} by the names of their columns", where=name, instead="drop ``units``")
     unit = units or table.unit
     if scale is not None and unit not in ("px", ""):
         raise Refusal("``scale`` is that of pixels", where=name, instead=f"drop it, x and y are in {unit}")
@@ -392,7 +392,7 @@ def _unit(table: Table, name: str, units: str | None, scale: float | None) -> tu
     if unit == "BL":
         return "BL", 1.0, []
     return "", 1.0, ["lengths are in body lengths alone: nobody says how long a pixel is" if unit == "px" else
-                     "lengths are in body lengths alone: nobody says the unit of x and y, say --units"]  # fmt: skip
+                     "lengths are in body lengths alone: nobody says the unit of x and y, say units"]  # fmt: skip
 
 
 def _time(table: Table, fps: float | None) -> tuple[np.ndarray, bool, list[str]]:
@@ -403,4 +403,4 @@ def _time(table: Table, fps: float | None) -> tuple[np.ndarray, bool, list[str]]
         return table.t, True, []
     if fps is not None:
         return table.t / fps, True, []
-    return table.t, False, ["times are in frames: nobody says how many there are in a second, say --fps"]
+    return table.t, False, ["times are in frames: nobody says how many there are in a second, say fps"]
