@@ -42,8 +42,12 @@ class Shchf(Gait):
             raise Refusal("file must be the name of a .mat file", value=self.file)
         if not isinstance(self.sha256, str):
             raise Refusal("sha256 must be text", value=self.sha256)
+        if isinstance(self.XV, str) or not hasattr(self.XV, "__len__"):
+            raise Refusal("XV must be numbers", value=self.XV)
         if (self.file is None) == (not len(self.XV)):
             raise Refusal("a shchf gait has either XV or a file", instead="give one")
+        if self.sha256 and self.file is None:
+            raise Refusal("sha256 is that of a file", instead="drop it")
         object.__setattr__(self, "file", self.file and str(self.file))
         object.__setattr__(self, "_curve", self._of_file() if self.file else self._of_numbers())
         super().__post_init__()
@@ -61,7 +65,7 @@ class Shchf(Gait):
     def _of_file(self) -> Any:
         from scipy.interpolate import CubicSpline
 
-        curve = shchf.read(self.file, self.number)
+        curve: Any = shchf.read(self.file or "", self.number)
         if self.sha256.lower() not in ("", curve.sha256):
             raise Refusal(
                 f"{self.file} is not the file whose sha256 is given", instead="restore it, or leave sha256 out"

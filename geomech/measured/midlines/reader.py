@@ -381,7 +381,9 @@ def _check(table: Table, name: str) -> None:
 def _unit(table: Table, name: str, units: str | None, scale: float | None) -> tuple[str, float, list[str]]:
     """Return the unit of lengths, m or BL or "", that of the file in it, and what was taken for granted."""
     if units and table.unit and units != table.unit and table.unit != "px":
-        raise Refusal(f"x and y are in {table.unit} by the names of their columns", where=name, instead="drop ``units``")
+        raise Refusal(
+            f"x and y are in {table.unit} by the names of their columns", where=name, instead="drop ``units``"
+        )
     unit = units or table.unit
     if scale is not None and unit not in ("px", ""):
         raise Refusal("``scale`` is that of pixels", where=name, instead=f"drop it, x and y are in {unit}")
