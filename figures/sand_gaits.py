@@ -12,25 +12,10 @@ from figures import main, style
 from geomech import plots
 from rft.walking import Tripod
 
-HIPS = [(x, y) for x in (-0.08, 0.0, 0.08) for y in (-0.07, 0.07)]  # m
-PHASES = 0.5 * np.array([0, 1, 1, 0, 0, 1])  # cycles: a tripod
-LEG = """<body pos="{} {} 0"><joint name="j{}" axis="0 1 0" armature="0.002"/><geom type="capsule" size=".012" mass=".05"
-fromto="0 0 0 0 0 -.07" group="2"/></body>"""
-MOTOR = '<position joint="j{}" kp="4" kv="0.1" forcerange="-2 2"/>'
-ROBOT = """<mujoco><option timestep="0.002"/><default><geom contype="2" conaffinity="1"/></default><worldbody>
-<geom name="floor" type="plane" size="9 9 1" contype="1" conaffinity="2"/><body pos="0 0 .09"><freejoint/>
-<geom type="box" size=".1 .05 .02" mass="1" group="1"/>{}</body></worldbody><actuator>{}</actuator></mujoco>"""
+PHASES = 0.5 * np.array([0, 1, 1, 0, 0, 1])  # of the legs, cycles: a tripod
 MEDIUM = "poppy-seeds-loose"
 LOW, HIGH = np.array([1.0, 0.3, 0.6, -0.6]), np.array([4.0, 0.8, 2.4, 0.6])  # Hz, -, rad, rad: of the clock
 SNAPSHOTS = 6  # of one cycle
-
-
-def model():
-    """Return the compiled hexapod, with a floor at z = 0."""
-    import mujoco
-
-    legs = "".join(LEG.format(x, y, k) for k, (x, y) in enumerate(HIPS))
-    return mujoco.MjModel.from_xml_string(ROBOT.format(legs, "".join(map(MOTOR.format, range(len(HIPS))))))
 
 
 def controls(clock: np.ndarray, seconds: float, step: float) -> np.ndarray:
@@ -75,8 +60,9 @@ def compute(generations: int = 8, walks: int = 32, seconds: float = 3.0) -> dict
     from mujoco.batch import Batch
 
     from rft.mujoco import attach
+    from rft.mujoco.example import hexapod
 
-    hard, soft = model(), model()
+    hard, soft = hexapod(), hexapod()
     step = float(soft.opt.timestep)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the legs touch the floor no more

@@ -1,7 +1,9 @@
 """Sand under MuJoCo models: forces, virtual work, symmetries, steps, threads, lifetimes and refusals."""
 
 import gc
+import importlib
 import math
+import sys
 import threading
 import warnings
 
@@ -651,3 +653,24 @@ def test_a_gait_for_sand_is_searched_for(tmp_path):
     figure = drawn(sand_gaits, numbers, tmp_path)
     assert [bar.get_height() for bar in figure.axes[1].patches] == [*numbers["speeds"][0], *numbers["speeds"][1]]
     assert "for sand" in sand_gaits.table(numbers)
+
+
+@pytest.mark.parametrize(
+    ("missing", "module", "name", "message"),
+    [
+        ("mujoco", "rft.mujoco", "sand", r"rft.mujoco needs MuJoCo: pip install 'geomech\[mujoco\]'"),
+        (
+            "gymnasium",
+            "geomech.gym",
+            "hexapod",
+            r"geomech.gym needs Gymnasium and MuJoCo: pip install 'geomech\[gym\]'",
+        ),
+    ],
+)
+def test_what_is_not_installed_is_named(missing, module, name, message, monkeypatch):
+    package = importlib.import_module(module)
+    monkeypatch.delitem(sys.modules, f"{module}.{name}", raising=False)
+    monkeypatch.delattr(package, name, raising=False)
+    monkeypatch.setitem(sys.modules, missing, None)
+    with pytest.raises(rft.Refusal, match=message):
+        getattr(package, package.__all__[0])

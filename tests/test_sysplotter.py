@@ -17,7 +17,7 @@ from geomech.io import tables
 from geomech.io.tables import matlab
 from geomech.scenes import Scene
 from geomech.studies import fields
-from geomech.systems import Swimmer, Table
+from geomech.systems import DifferentialDrive, IdealFluidSwimmer, Swimmer, Table
 from geomech.text.system import described
 from rft.refusal import Refusal
 
@@ -342,3 +342,37 @@ def test_explain_says_how_far_its_own_numbers_are_from_ours(tmp_path):
     lines = described(Table(write(tmp_path / "s.mat")))
     (line,) = [line for line in lines if line.startswith("largest difference of sysplotter's own from ours")]
     assert "CCF of joints 1 and 2 11 %, minimum-perturbation frame 1.6 %" in line
+
+
+def test_a_connection_with_a_denominator_is_that_of_avec(tmp_path):
+    """A_num is then no negative of it."""
+    content = {name: cell(x, (3, 2)) for name, x in (("A_num", -2 * computed()[0].A), ("Avec", computed()[0].A))}
+    content["A_den"] = cell(np.full_like(computed()[0].A, 2.0), (3, 2))
+    stored = tables.load(write(tmp_path / "s.mat", vecfield={"eval": {"content": content}}))
+    np.testing.assert_array_equal(stored.connection.A, computed()[0].A)
+
+
+@pytest.mark.parametrize(
+    ("system", "kind"),
+    [
+        (DifferentialDrive(), "drag"),
+        (IdealFluidSwimmer(), "inertia"),
+        (Swimmer(rft.Viscous(2.0), rft.Chain((1,) * 4, modes="serpenoid")), "drag"),
+        (Swimmer(rft.Viscous(2.0), rft.Chain((1,) * 4, frame="link-2", modes=((1, 0, -1), (0, 1, 0)))), "drag"),
+    ],
+)
+def test_systems_of_other_kinds_are_exported_with_what_is_known_of_them(system, kind, tmp_path):
+    source = Study(Scene(system, Circle(amplitude=0.5))).with_numerics(grid=9, extent=1.0)
+    fields.save_connection(tmp_path / "s.mat", source, layout="struct")
+    s, again = loadmat(tmp_path / "s.mat", simplify_cells=True)["s"], study(tmp_path / "s.mat")
+    assert s["system_type"] == kind
+    np.testing.assert_allclose(again.fitted.A, source.fitted.A / [[[[system.length]]], [[[system.length]]], [[[1.0]]]])
+    metric = again.scene.system.stored.metric
+    if kind == "inertia":
+        np.testing.assert_allclose(metric.M, source.metric.M)
+    assert again.scene.system.stored.power_degree == (2 if kind == "drag" and metric else None)
+    modes = getattr(getattr(system, "body", None), "modes", None)
+    assert (
+        again.scene.system.chain == (None if modes is None or isinstance(modes, str) else system.body)
+        or kind == "inertia"
+    )

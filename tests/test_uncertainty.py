@@ -148,6 +148,7 @@ def test_wide_media_shift_the_mean_and_it_is_told(monkeypatch):
     row = next(x for x in wide.splitlines() if x.startswith("      1.2"))
     assert row.endswith(f"  mean {tables[1.0]['medium_shift_of']['net_distance'][0]:+.1e}")
     assert "\nmean: how far the mean over the media" in wide and "mean" not in narrow
+    assert tables[1.0].result["quantity"].values.tolist() == list(QUANTITIES)
     assert tables[1.0]["units"]["medium_shift_of"] == "that of the quantity"
 
 

@@ -6,7 +6,7 @@ last two are formulas (`rft.vectors`): they take numbers, arrays that broadcast,
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -24,12 +24,12 @@ class FaceLaw(Protocol):
     grazing_sine: float
     numbers: dict[str, float]
 
-    def traction(self, n, v, up=UP):
+    def traction(self, n, v, up=UP) -> tuple:
         """Return the force per area and depth, N/m^3, on faces with outward unit normals n and unit velocities v, whether
         or not they lead; ``up`` is the unit vector upwards."""
         ...
 
-    def lead(self, n_dot_v, grazing_sine, sheet=False):
+    def lead(self, n_dot_v, grazing_sine, sheet=False) -> Any:
         """Return the share of the traction that faces bear, 0 to 1 (`rft.ground.lead`). sheet: whether either side may
         lead."""
         ...

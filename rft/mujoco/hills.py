@@ -29,7 +29,7 @@ class Hills(NamedTuple):
 FLAT = Hills(np.zeros((0, 0, 3)), np.zeros(7))
 
 
-def tangent_plane(grid, frame, x, y):
+def tangent_plane(grid: np.ndarray, frame: np.ndarray, x: float, y: float) -> tuple[tuple, float]:
     """Return the unit normal n and the distance n . x of the plane that touches the surface at a place (x, y), m.
 
     Heights and slopes are linear along rows and columns between the nodes. Compiled code takes this function, too."""
