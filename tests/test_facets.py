@@ -46,7 +46,7 @@ def test_a_stress_map_of_three_dimensions_is_the_planar_one_in_every_vertical_pl
     n, v = np.array([np.sin(b), -np.cos(b)]), np.array([np.cos(g), -np.sin(g)])
     raised = lambda a: np.array([a[0] * np.cos(turn), a[0] * np.sin(turn), a[1]])
     planar = lambda stress: 1e6 * raised(np.array([[-1.0], [1.0]]) * stress.alpha(n, v))
-    found, wanted = Extruded(stress).traction(raised(n), raised(v)), planar(stress)
+    found, wanted = np.stack(Extruded(stress).traction(raised(n), raised(v))), planar(stress)
     kept = planar(dataclasses.replace(stress, tension="keep"))
     clear = np.abs((kept * raised(n)).sum(0) * (n * v).sum(0)) > 0.026 * np.linalg.norm(kept, axis=0)  # of the cut
     clear |= tension == "keep"
@@ -79,6 +79,16 @@ def test_loads_are_those_of_each_mesh_alone():
         wanted[b] += 0.7 * np.concatenate([one.force, one.moment + np.cross(arm, one.force)])
     assert list(facets.bodies) == [4, 5] and np.abs(wanted).min() > 1e-4
     np.testing.assert_allclose(found, wanted, rtol=2e-3, atol=3e-3 * np.abs(wanted).max())
+
+
+def test_a_surface_stands_where_its_mesh_does():
+    """Unless it is told another place."""
+    mesh = Cylinder(0.02, 0.05).mesh(200)
+    np.testing.assert_array_equal(Surface.from_mesh(0, mesh).corners, mesh.vertices[mesh.faces])
+    outline, at = CLeg(0.03, 0.02).outline(12), np.array([0.02, -0.01, 0.015])
+    moved = Surface.from_outline(0, outline, at).corners - Surface.from_outline(0, outline).corners
+    np.testing.assert_allclose(moved, np.broadcast_to(at, moved.shape), atol=1e-15)
+    assert Surface.from_outline(0, outline).corners[..., 1].max() == outline.width / 2
 
 
 @pytest.mark.parametrize(

@@ -26,6 +26,7 @@ from geomech.studies.study import Study
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from rft.refusal import Refusal
 
+pytestmark = pytest.mark.usefixtures("fastest")
 OFF_CENTRE = Circle(amplitude=0.7, centre=(0.3, -0.4))
 ALLOWED = {"profile.default_content_setting_values.automatic_downloads": 1}  # more than one file
 NEEDS = importlib.util.find_spec("selenium") and shutil.which("chromium") and shutil.which("chromedriver")

@@ -9,6 +9,7 @@ import typer
 
 from geomech.commands.loading import load_scene
 from geomech.commands.options import (
+    ClimOption,
     ComponentOption,
     ExtentOption,
     GridOption,
@@ -19,6 +20,7 @@ from geomech.commands.options import (
     SliceOption,
     YesOption,
     angles,
+    colour_limit,
     components,
     with_workers,
 )
@@ -52,6 +54,7 @@ def connection(
     slice_: SliceOption = None,
     other_frame: OtherFrameOption = None,
     component: ComponentOption = None,
+    clim: ClimOption = None,
     yes: YesOption = False,
 ):
     """Compute the local connection on a grid. A NetCDF file has the fit residual and the CCF, too; a .mat file has A
@@ -60,7 +63,8 @@ def connection(
     from geomech.studies.shape_space import connection
 
     file = parts.Connection(out, sign, order, layout)
-    drawn = pictures.Connection(style, plot, pair, slice_, other_frame, components(component))
+    panels = components(component)
+    drawn = pictures.Connection(style, plot, pair, slice_, other_frame, panels, colour_limit(clim, panels))
     scene = load_scene(name, grid, extent)
     held = angles(scene, "--slice", slice_)
     question = connection(scene, file.format, layout, plot is not None, pair, held, other_frame)

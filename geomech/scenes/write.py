@@ -31,7 +31,17 @@ if TYPE_CHECKING:
 def toml(scene: Scene | Intruding | WalkerScene) -> str:
     """Return the text that the scene was read from where it is valid by itself and in any folder, comments and all;
     else a new one, which spells out a medium that came from a file, and names other files with their folders. Refusal
-    if it has a part that no scene file can name."""
+    if it has a part that no scene file can name.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> scene = geomech.study(geomech.media.Viscous(3.0), geomech.bodies.Chain(), geomech.gaits.Circle(0.5)).scene
+    >>> print(geomech.toml(scene).partition("[body]")[0].strip())
+    [medium]
+    law = "viscous"
+    ratio = 3.0
+    """
     self_contained = not isinstance(_checked(scene), Scene) or not (scene.files or _names_relative_file(scene.text))
     if scene.text and self_contained and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene:
         return scene.text
@@ -84,7 +94,14 @@ def vertical_toml(name: str, entry) -> str:
 
 def tables(scene: Scene | Intruding | WalkerScene) -> dict:
     """Return the tables of a scene's text, with its present numerics, where these make the scene; else newly written
-    ones."""
+    ones.
+
+    Examples
+    --------
+    >>> from geomech.scenes import load, tables
+    >>> tables(load("three-link-viscous"))["gait"]["kind"]
+    'circle'
+    """
     read = tomllib.loads(_checked(scene).text)
     if isinstance(scene, Scene):
         read["numerics"] = _numerics(scene)

@@ -85,7 +85,7 @@ class ShapeSpace(Question):
     @property
     def less(self) -> str:
         joints = self.scene.system.joints
-        return f"lower --grid, to {finest_grid(joints)} or less" if joints > 2 and self.field else "ask for less"
+        return f"lower ``grid``, to {finest_grid(joints)} or less" if joints > 2 and self.field else "ask for less"
 
     @cached_property
     def study(self) -> Study:
@@ -272,7 +272,7 @@ def connection(
     fields.check_joints(scene, file)
     sliced = drawn and (scene.system.joints > 2 or pair is not None or slice_angles is not None)
     if sliced and other_frame is not None:
-        raise Refusal("``compare_frame`` draws maps of two joints", instead="drop it, or see 'geomech ccf --pair'")
+        raise Refusal("``compare_frame`` draws maps of two joints", instead="drop it, or see ``Study.ccf(pair=...)``")
     picture = {
         "map": drawn and not sliced,
         "planes": sliced,
