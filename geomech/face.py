@@ -1,56 +1,54 @@
-"""Methods of connections and fields for Python and notebooks: how they are shown, saved and loaded."""
+"""Implementations of methods of connections and fields that take the layers of files and words.
+
+They are imported at their first use, so that the package starts fast.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from types import FunctionType
 from typing import Any
 
-from geomech.core.face import METHODS
+from geomech.core.face import implements
 
 
-class Connection:
-    def _repr_html_(self) -> str:
-        from geomech.output import display
+@implements("Connection._repr_html_")
+def connection_html(connection: Any) -> str:
+    """Return a connection as a notebook shows it."""
+    from geomech.output import display
 
-        return display.connection(self)
-
-    def to_xarray(self, *, shapes: Sequence[str] = ()) -> Any:
-        """Return a Dataset of A, its fit residual and the rms of xi, as in the file of `geomech connection`.
-
-        shapes: names of the shape variables, where these are no joint angles. ImportError without the package xarray."""
-        from geomech.io.results import to_xarray
-        from geomech.studies.fields import of_fitted
-
-        return to_xarray(of_fitted(self, shapes))
-
-    @classmethod
-    def load(cls, path: str | Path, sign: str = "", order: str = "") -> Any:
-        """Return the connection in a file that `geomech connection` wrote, .nc or .mat, or that sysplotter wrote
-        (`geomech.io.tables`).
-
-        Refusal, one line, for any other. The residual is nan where the file has none."""
-        from geomech.io.tables import load
-
-        return load(path, sign, order).connection
+    return display.connection(connection)
 
 
-class Field:
-    def _repr_html_(self) -> str:
-        from geomech.output import display
+@implements("Connection.to_xarray")
+def connection_to_xarray(connection: Any, shapes: Sequence[str]) -> Any:
+    """Return a connection as a Dataset."""
+    from geomech.io.results import to_xarray
+    from geomech.studies.fields import of_fitted
 
-        return display.field(self)
-
-    def to_xarray(self, name: str = "ccf", *, shapes: Sequence[str] = ()) -> Any:
-        """Return a DataArray; with three components it is taken for a CCF, with its units.
-
-        shapes: names of the shape variables, where these are no joint angles. ImportError without the package xarray."""
-        from geomech.io.results import to_xarray
-        from geomech.studies.fields import of_field
-
-        return to_xarray(of_field(self, name, shapes))[name]
+    return to_xarray(of_fitted(connection, shapes))
 
 
-for _face in (Connection, Field):
-    METHODS[_face.__name__] = {k: v for k, v in vars(_face).items() if isinstance(v, FunctionType | classmethod)}
+@implements("Connection.load")
+def load_connection(path: str | Path, sign: str, order: str) -> Any:
+    """Return the connection in a file."""
+    from geomech.io.tables import load
+
+    return load(path, sign, order).connection
+
+
+@implements("Field._repr_html_")
+def field_html(field: Any) -> str:
+    """Return a field as a notebook shows it."""
+    from geomech.output import display
+
+    return display.field(field)
+
+
+@implements("Field.to_xarray")
+def field_to_xarray(field: Any, name: str, shapes: Sequence[str]) -> Any:
+    """Return a field as a DataArray."""
+    from geomech.io.results import to_xarray
+    from geomech.studies.fields import of_field
+
+    return to_xarray(of_field(field, name, shapes))[name]

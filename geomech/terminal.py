@@ -23,7 +23,7 @@ import typer
 from geomech.core.errors import Note
 from geomech.run import BELOW
 from geomech.run.progress import progress
-from rft.refusal import Refusal, line, printable
+from rft.refusal import Refusal, line, printable, worded
 
 __all__ = ["Stopped", "exit_code", "progress", "report", "stoppable"]
 
@@ -119,7 +119,8 @@ def _notes():
 
         def show(message, category, *where, **options):
             if issubclass(category, Note) or category.__module__.partition(".")[0] == "rft":
-                notes.setdefault(re.split(r"[\d.]+ ", str(message))[0], str(message))
+                text = worded(message.args[0], _option) if isinstance(message, Note) else str(message)
+                notes.setdefault(re.split(r"[\d.]+ ", text)[0], text)
             else:
                 others(message, category, *where, **options)
 
@@ -159,13 +160,23 @@ def _run_noting(app: typer.Typer, argv: list[str], notes: dict[str, str]) -> int
     return 2
 
 
-OPTIONS = {"tolerance": "--tol"}  # whose name is not that of the argument
+OPTIONS = {  # what a reader of a command types where its name is not that of the argument
+    "tolerance": "--tol",
+    "at": "--slice",
+    "drawn": "--plot",
+    "longest": "--yes",
+    "geomech.register": "--plugin FILE.py",
+    "Study.ccf(pair=...)": "geomech ccf --pair",
+}
 
 
 def _said(error: Exception) -> str:
     """Return the line of an error, with options for the arguments that it names."""
-    option = lambda argument: OPTIONS.get(argument) or "--" + argument.replace("_", "-")
-    return error.said(option) if isinstance(error, Refusal) else str(error)
+    return error.said(_option) if isinstance(error, Refusal) else str(error)
+
+
+def _option(argument: str) -> str:
+    return OPTIONS.get(argument) or "--" + argument.replace("_", "-")
 
 
 def _system_error(error: OSError) -> str:

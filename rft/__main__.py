@@ -1,11 +1,20 @@
-"""`python -m rft` compiles the solver, the contact with the ground and the steps of robots, so that no later run has to."""
+"""`python -m rft` compiles the solver, the contact with the ground, the steps of robots and, where MuJoCo is installed, the
+forces of grains in it, so that no later run has to."""
 
+import importlib.util
 import sys
 from math import radians
 
+import numpy as np
+
 from rft import CATALOGUE, Chain, Granular, body_velocity
 from rft.balance.backend import check, preferring
+from rft.ground import Ground
 from rft.laws.records import record
+from rft.meshes import Spatial, shapes
+from rft.meshes import contact as faces
+from rft.meshes.blocks import Blocks
+from rft.meshes.extruded import Extruded
 from rft.plates import VERTICAL, CLeg, loads
 from rft.walking import Fineness, Rhex, Tripod, Walker, engine
 
@@ -20,6 +29,15 @@ with preferring("numba"):
     body_velocity(FOLDED, Chain(), (-1.47053323, -1.9356507), (-0.99735926, -0.07262584))
     loads(stress, leg.outline(8), (0.0, -0.1, 0.0), (1.0, 0.0, 0.0))
     engine("planar").step_cost([Walker(Rhex(0.1, 0.1, 0.02, 0.05, leg, (0.0,)), Tripod(1.0), stress)], Fineness(), 0.0)
+
+    box, still = shapes.box((1.0, 1.0, 1.0)), np.zeros((1, 1, 3))
+    for form in (Extruded(stress), Spatial(1e5)):
+        blocks = Blocks([faces.faces(box.vertices[box.faces], box.normals)])
+        blocks.loads(form, Ground(), faces.Motion(still, still, still[..., 0], still, still, still[..., 0]))
+        if importlib.util.find_spec("mujoco"):
+            from rft.mujoco.compiled import kernel as forces_in_mujoco
+
+            forces_in_mujoco(type(faces.record(form)))
 
 from rft.balance.compiled import kernel  # noqa: E402  # after the check, for the import loads numba
 

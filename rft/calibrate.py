@@ -32,7 +32,14 @@ LEVEL, ONE_SIGMA = 0.95, 0.6827  # confidence of intervals and bands; of one sta
 
 
 def student_factor(degrees_of_freedom: float, level: float = LEVEL) -> float:
-    """Return half the width of a confidence interval over the standard error, by Student's distribution."""
+    """Return half the width of a confidence interval over the standard error, by Student's distribution.
+
+    Examples
+    --------
+    >>> from rft.calibrate import student_factor
+    >>> round(student_factor(10), 3)
+    2.228
+    """
     from scipy.special import stdtrit
 
     return float(stdtrit(degrees_of_freedom, (1 + level) / 2))
@@ -77,7 +84,17 @@ class Fit:
     the density of the bed are known; else ``axial_stress`` (Pa, over the projected area) where radius and length are;
     else ``axial_force`` (N, on the whole rod). covariance: (n, n), of the parameters, from the scatter of the forces
     about the law, taken for independent noise. residuals: (2, N), measured minus fitted forces, N. end_caps: e of both
-    ends together (`EndCaps`), 0 without."""
+    ends together (`EndCaps`), 0 without.
+
+    Examples
+    --------
+    >>> from rft.calibrate import fit
+    >>> from rft.drag import rod_drag
+    >>> drag = rod_drag([0, 30, 60, 90], [1.0, 0.9, 0.5, 0.0], [0.0, 1.0, 1.7, 2.0])  # degrees, N
+    >>> found = fit("viscous", drag)
+    >>> found.names, found.values.round(2), found.residuals.shape
+    (('ratio', 'axial_force'), array([1.96, 1.01]), (2, 4))
+    """
 
     law: str
     data: RodDrag
@@ -164,7 +181,19 @@ def fit(law: str, data: RodDrag, rod: Rod = UNKNOWN_ROD, end_caps: float | str =
 
     end_caps: e of both ends together (`EndCaps`; 1 for one flat end), 0 for none, or "fitted"; other than 0 only for the
     granular law and a rod of known radius and length. Raises ValueError if the data do not determine the parameters, or
-    if a parameter ends on a bound."""
+    if a parameter ends on a bound.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft.calibrate import fit
+    >>> from rft.drag import rod_drag
+    >>> psi = np.array([0.0, 15.0, 30.0, 45.0, 60.0, 90.0])  # degrees
+    >>> along, across = np.cos(np.radians(psi)), 2 * np.sin(np.radians(psi))  # N
+    >>> found = fit("viscous", rod_drag(psi, along, across))
+    >>> round(float(found.medium.ratio), 6)
+    2.0
+    """
     fitted_law = FITS[law]
     fits_caps = isinstance(end_caps, str)
     require(not fits_caps or end_caps == "fitted", "end caps must be 'fitted' or a number", value=end_caps)

@@ -19,7 +19,16 @@ class Rod:
     """A rod and the bed that it was dragged through; None for an unknown number.
 
     radius, length, depth (of the axis): m. density: kg/m^3, of the bed, which is that of the grains times their volume
-    fraction."""
+    fraction.
+
+    Examples
+    --------
+    >>> from rft.calibrate import fit
+    >>> from rft.drag import Rod, rod_drag
+    >>> drag = rod_drag([0, 30, 60, 90], [1.0, 0.9, 0.5, 0.0], [0.0, 1.0, 1.7, 2.0])  # degrees, N
+    >>> round(fit("viscous", drag, Rod(radius=0.008, length=0.08)).axial_stress)  # Pa
+    793
+    """
 
     radius: float | None = None
     length: float | None = None
@@ -47,7 +56,15 @@ class RodDrag:
     """Forces on the whole rod, positive where they oppose the velocity.
 
     psi: (N,), attack angles, rad, from 0 to pi/2. forces: (2, N), along and across the rod, N. weight: (N,), of the squares
-    of residuals, with mean 1."""
+    of residuals, with mean 1.
+
+    Examples
+    --------
+    >>> from rft.drag import rod_drag
+    >>> drag = rod_drag([0.0, 90.0], [1.0, 0.0], [0.0, 2.0])
+    >>> drag.psi.round(3), drag.forces.shape, drag.weight
+    (array([0.   , 1.571]), (2, 2), array([1., 1.]))
+    """
 
     psi: np.ndarray
     forces: np.ndarray
@@ -70,7 +87,16 @@ def rod_drag(psi_deg, along, across, weight=None) -> RodDrag:
 
     At angles beyond 0 to 90 forces may have the signs of the velocity's components, or all be magnitudes. Equal angles are
     separate measurements. Raises ValueError for numbers that cannot be drag: forces that push, exchanged columns, angles
-    in radians."""
+    in radians.
+
+    Examples
+    --------
+    >>> from rft.drag import rod_drag
+    >>> drag = rod_drag([0.0, 45.0, 135.0], [1.0, 0.8, -0.8], [0.0, 1.9, 1.9])
+    >>> drag.psi.round(3), drag.forces
+    (array([0.   , 0.785, 0.785]), array([[1. , 0.8, 0.8],
+           [0. , 1.9, 1.9]]))
+    """
     columns = {"psi_deg": psi_deg, "forces along": along, "forces across": across}
     psi, *forces = (real_array(name, x) for name, x in columns.items())
     forces = np.array(forces) if all(x.shape == psi.shape for x in forces) else np.zeros(0)

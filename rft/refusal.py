@@ -11,7 +11,12 @@ import unicodedata
 from collections.abc import Callable, Iterator
 from typing import Any
 
-ARGUMENT = re.compile("``([a-z_]+)``")  # in the words of a refusal
+ARGUMENT = re.compile("``([^`]+)``")  # in the words of a refusal
+
+
+def worded(words: str, spelled: Callable[[str], str] = str) -> str:
+    """Return words with each argument that they name in double backticks as ``spelled`` returns it, by default bare."""
+    return ARGUMENT.sub(lambda match: spelled(match[1]), words)
 
 
 class Refusal(ValueError):
@@ -20,6 +25,16 @@ class Refusal(ValueError):
     what: says what is wrong. value: what was given, where that tells more. where: the way there, outermost first (file or
     scene, table, key, argument). because: why it cannot be. instead: what to give or to do. The name of an argument
     stands in double backticks: Python shows it bare, and a command as its option (`said`).
+
+    Examples
+    --------
+    >>> from rft import Viscous
+    >>> try:
+    ...     Viscous(-1.0)
+    ... except ValueError as refusal:
+    ...     print(refusal)
+    ...
+    ratio must be a number from 1e-08 to 1e+08, got -1.0
     """
 
     def __init__(self, what: str, *, value: Any = ..., where: Any = (), because: str = "", instead: str = ""):
@@ -28,11 +43,11 @@ class Refusal(ValueError):
         self.where = tuple(map(str, where if isinstance(where, tuple) else (where,)))
 
     def __str__(self) -> str:
-        return self.said(lambda argument: argument)
+        return self.said(str)
 
     def said(self, spelled: Callable[[str], str]) -> str:
         """Return the refusal as a line. spelled: returns what a reader types for the name of an argument."""
-        named = lambda words: ARGUMENT.sub(lambda match: spelled(match[1]), words)
+        named = lambda words: worded(words, spelled)
         text = named(self.what) if self.value is ... else f"{named(self.what)}, got {formatted(self.value)}"
         if reasons := "; ".join(named(x) for x in (self.because, self.instead) if x):
             text = f"{text}: {reasons}"
@@ -42,7 +57,7 @@ class Refusal(ValueError):
 
     def within(self, place: object) -> Refusal:
         """Return the refusal with a place before its own, unless it names that already."""
-        if not str(self).startswith((f"{place}: ", f"{line(str(place))}: ")):
+        if not str(self).startswith((f"{place}: ", f"{line(worded(str(place)))}: ")):
             self.where = (str(place), *self.where)
         return self
 

@@ -238,6 +238,16 @@ def _polynomial(z, coefficients):
     )
 
 
+@overload(vectors.combinations, inline="never", jit_options={"forceinline": True})
+def _combinations(coefficients, terms):
+    """Return the sums without loops, for numba would not unroll loops over tuples."""
+    row = lambda i: " + ".join([f"c[{i}][0]", *(f"c[{i}][{j + 1}] * t[{j}]" for j in range(len(terms)))])
+    sums = ", ".join(row(i) for i in range(len(coefficients)))
+    return _function_from_source(
+        "unrolled", ["coefficients, terms", "    c, t = coefficients, terms", f"    return ({sums},)"]
+    )
+
+
 def _function_from_source(name: str, lines: list[str], **names):
     """Return the function of this name from its source, arguments followed by the lines of its body, with ``names`` for
     globals."""
@@ -302,6 +312,19 @@ def _pointer(context, builder, sig, args):
     array = context.make_array(sig.args[0])(context, builder, args[0])
     row = builder.mul(context.cast(builder, args[1], sig.args[1], types.int64), ir.IntType(64)(WIDTH))
     return builder.bitcast(builder.gep(array.data, [row]), DOUBLES.as_pointer())
+
+
+@intrinsic
+def sum_of(context, x):
+    """Return the sum of the eight numbers of a vector, pair by pair."""
+
+    def emit(context, builder, sig, args):
+        lanes = [builder.extract_element(args[0], ir.IntType(32)(lane)) for lane in range(WIDTH)]
+        while len(lanes) > 1:
+            lanes = [builder.fadd(a, b) for a, b in zip(lanes[::2], lanes[1::2])]
+        return lanes[0]
+
+    return types.float64(x), emit
 
 
 @intrinsic
@@ -385,3 +408,4 @@ _register_method("traction", 3)
 _register_method("slopes", 3)
 _register_method("average", 4)
 _register_method("alpha_ahead", 2)
+_register_method("lead", 3)

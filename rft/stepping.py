@@ -46,7 +46,19 @@ class TimeSteps(NamedTuple):
     `rft.Solution`. status: (...), "periodic", "running" (the requested number of cycles, not yet periodic), "not
     periodic" or "unconverged". drift: (...), largest component of the sum of all changes of displacement, body lengths
     and rad, in cycles to come. cycles: their number. work: (..., N) each, or None. path: (..., cycles N + 1, 3), all
-    poses since the first step, or None."""
+    poses since the first step, or None.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft import Chain, Granular, time_steps
+    >>> from rft.effects import Transient
+    >>> t = 2 * np.pi * np.arange(32) / 32
+    >>> alpha, alphadot = np.stack([np.cos(t), np.sin(t)], -1), np.stack([-np.sin(t), np.cos(t)], -1)
+    >>> steps = time_steps(Granular(1.8, 0.24), Chain(), alpha, alphadot, effects=[Transient(travel=0.12)])
+    >>> steps.xi.shape, steps.pose.shape, steps.cycles > 1
+    ((32, 3), (33, 3), True)
+    """
 
     xi: np.ndarray
     pose: np.ndarray
@@ -118,6 +130,17 @@ def time_steps(
     ------
     ValueError
         For arguments of another shape or out of bounds, and for a medium that pushes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft import Chain, Granular, time_steps
+    >>> from rft.effects import Transient
+    >>> t = 2 * np.pi * np.arange(32) / 32
+    >>> alpha, alphadot = np.stack([np.cos(t), np.sin(t)], -1), np.stack([-np.sin(t), np.cos(t)], -1)
+    >>> steps = time_steps(Granular(1.8, 0.24), Chain(), alpha, alphadot, effects=[Transient(travel=0.12)])
+    >>> steps.pose[-1, :2].round(3)  # x, y after the cycle, body lengths
+    array([-0.237, -0.024])
     """
     broken = broken_premises(effects)
     assembly = assemble(medium, body, effects, loads, pieces)

@@ -78,6 +78,14 @@ def polynomial(z, coefficients):
     return value
 
 
+def combinations(coefficients, terms):
+    """Return c_0 + sum_j c_j terms[j - 1] for each row c of coefficients, a tuple of tuples."""
+    terms = np.broadcast_arrays(*terms)
+    rows = np.stack([np.ones(terms[0].shape), *terms])
+    sums = np.array(coefficients) @ rows.reshape(len(rows), rows[0].size)
+    return tuple(sums.reshape(len(coefficients), *rows.shape[1:]))
+
+
 def gather(table, row, column):
     """Return table[row, column] for each of the integers ``row``."""
     return table[np.asarray(row, int), column]

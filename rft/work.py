@@ -36,7 +36,16 @@ class Work(NamedTuple):
     Of the m elements into which effects cut the n: element_force: (..., 2, m), force of the medium on each, along it
     towards the head and across it to the left, in axial drag. element_power: (..., m), work against it, in axial drag x
     body length / time. end_force: (..., 2, 2), the same force on points that effects add at the tail and at the head, by
-    the direction of the element there. end_power: (..., 2)."""
+    the direction of the element there. end_power: (..., 2).
+
+    Examples
+    --------
+    >>> from rft import Chain, Viscous, body_velocity, work_done
+    >>> motion = Viscous(), Chain(), [0.5, 0.3], [1.0, 0.0]
+    >>> work = work_done(*motion, body_velocity(*motion).xi)
+    >>> work.bending_moment.shape, bool(work.power > 0)
+    ((2,), True)
+    """
 
     power: np.ndarray
     bending_moment: np.ndarray
@@ -65,7 +74,16 @@ def work_done(
     pieces: int = PIECES,
 ) -> Work:
     """Return power, internal moments and slip at body velocities xi (..., 3) of `body_velocity` for the same
-    arguments."""
+    arguments.
+
+    Examples
+    --------
+    >>> from rft import Chain, Viscous, body_velocity, work_done
+    >>> motion = Viscous(), Chain(), [0.5, 0.3], [1.0, 0.0]
+    >>> work = work_done(*motion, body_velocity(*motion).xi)
+    >>> round(float(work.power), 5), work.bending_moment.round(4)
+    (0.00827, array([0.0083, 0.0056]))
+    """
     checked_body(body)
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, 1.0)
     batch, xi = alpha.shape[:-1], real_array("xi", xi)

@@ -1,7 +1,9 @@
 """One thread a process, as many processes as cores for the whole suite, the truths that are kept, and what solves."""
 
+import compileall
 import gc
 import os
+import pathlib
 import subprocess
 import sys
 
@@ -40,8 +42,21 @@ def pytest_configure(config):
 def pytest_sessionstart(session):
     """Compile the balance once, before the processes of the whole suite would do so side by side."""
     full = session.config.args_source is session.config.ArgsSource.TESTPATHS
-    if full and backend.installed() and not hasattr(session.config, "workerinput"):
-        subprocess.run([sys.executable, "-m", "rft"], check=True, capture_output=True)
+    if full and not hasattr(session.config, "workerinput"):
+        for folder in ("geomech", "rft"):  # for the processes that tests start, also where Python writes no bytecode
+            compileall.compile_dir(pathlib.Path(__file__).parents[1] / folder, quiet=2)
+        if backend.installed():
+            subprocess.run([sys.executable, "-m", "rft"], check=True, capture_output=True)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Tests are stored as pytest rewrites them, which takes longer than all else in their collection."""
+    before, sys.dont_write_bytecode = sys.dont_write_bytecode, False
+    try:
+        return (yield)
+    finally:
+        sys.dont_write_bytecode = before
 
 
 def pytest_collection_finish():

@@ -3,6 +3,7 @@
 import doctest
 import pkgutil
 from importlib import import_module
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -139,8 +140,8 @@ def test_a_picture_of_something_else_says_what_it_draws(draw, study):
         draw(study)
 
 
-def test_the_example_of_a_study_runs():
-    assert doctest.testmod(import_module("geomech.app.study")) == (0, 3)
+def test_the_examples_of_a_study_run():
+    assert doctest.testmod(import_module("geomech.app.study")).failed == 0
 
 
 def test_a_refusal_names_the_argument_and_a_command_its_option():
@@ -161,6 +162,7 @@ def test_packages_list_their_public_names():
         for module in pkgutil.walk_packages(top.__path__, f"{top.__name__}."):
             if module.ispkg and hasattr(package := import_module(module.name), "__all__"):
                 assert dir(package) == sorted(package.__all__), module.name
-                assert all(hasattr(package, name) for name in package.__all__), module.name
+                if module.name != "geomech.gym" or find_spec("gymnasium"):  # an extra
+                    assert all(hasattr(package, name) for name in package.__all__), module.name
     assert {"sweep", "accuracy", "motion"} <= set(dir(geomech.studies)) and not hasattr(geomech.studies, "sweeps")
     assert {"Chain", "laws", "walking"} <= set(dir(rft)) and "importlib" not in dir(rft)

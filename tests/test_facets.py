@@ -46,7 +46,7 @@ def test_a_stress_map_of_three_dimensions_is_the_planar_one_in_every_vertical_pl
     n, v = np.array([np.sin(b), -np.cos(b)]), np.array([np.cos(g), -np.sin(g)])
     raised = lambda a: np.array([a[0] * np.cos(turn), a[0] * np.sin(turn), a[1]])
     planar = lambda stress: 1e6 * raised(np.array([[-1.0], [1.0]]) * stress.alpha(n, v))
-    found, wanted = Extruded(stress).traction(raised(n), raised(v)), planar(stress)
+    found, wanted = np.stack(Extruded(stress).traction(raised(n), raised(v))), planar(stress)
     kept = planar(dataclasses.replace(stress, tension="keep"))
     clear = np.abs((kept * raised(n)).sum(0) * (n * v).sum(0)) > 0.026 * np.linalg.norm(kept, axis=0)  # of the cut
     clear |= tension == "keep"

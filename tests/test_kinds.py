@@ -310,7 +310,7 @@ def test_files_that_cannot_be_registered_get_one_line_and_leave_nothing(text, sa
     with pytest.raises(Refusal, match=".") as caught:
         load_file(path)
     assert said in str(caught.value)
-    assert str(caught.value).startswith(f"--plugin {path}")
+    assert str(caught.value).startswith(f"plugin {path}")
     assert kinds.code() == {}
     assert "thick" not in REGISTRIES["geomech.media"]
     assert not [name for name in sys.modules if name.startswith("geomech_plugin_own")]
@@ -341,7 +341,7 @@ def test_names_of_no_python_file_are_refused(tmp_path):
             load_file(tmp_path / name if name else "")
     for raw, said in ((b"\xff\xfe\x00", "it is not text"), (b"#" * 1_000_001, "it is larger than 1 MB")):
         (tmp_path / "own.py").write_bytes(raw)
-        with pytest.raises(Refusal, match=f"--plugin .*: {said}"):
+        with pytest.raises(Refusal, match=f"plugin .*: {said}"):
             load_file(tmp_path / "own.py")
 
 

@@ -18,7 +18,7 @@ import pytest
 from commands import geomech
 
 from geomech import scenes
-from geomech.gaits import Circle, Points, Sine
+from geomech.gaits import Circle, Points
 from geomech.output import lab
 from geomech.studies import charts
 from geomech.studies.lab import GALLERY, Lab
@@ -26,6 +26,7 @@ from geomech.studies.study import Study
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from rft.refusal import Refusal
 
+pytestmark = pytest.mark.usefixtures("fastest")
 OFF_CENTRE = Circle(amplitude=0.7, centre=(0.3, -0.4))
 ALLOWED = {"profile.default_content_setting_values.automatic_downloads": 1}  # more than one file
 NEEDS = importlib.util.find_spec("selenium") and shutil.which("chromium") and shutil.which("chromedriver")
@@ -74,11 +75,21 @@ def test_errors_hold_and_are_not_idle(name):
     assert np.median(ratios) < 12
 
 
-def test_a_wave_of_centrelines_is_nearly_a_series():
-    wave, t = Sine(elements=3, waves=0.5), np.linspace(0.0, 6.0, 50)
-    cos, sin = charts.series_of(wave)
-    kt = np.outer(t, 1 + np.arange(cos.shape[1]))
-    np.testing.assert_allclose(np.cos(kt) @ cos.T + np.sin(kt) @ sin.T, wave.unit(t), atol=1e-4)
+def test_harmonics_that_are_next_to_nothing_are_left_out(monkeypatch):
+    monkeypatch.setattr(charts, "SMALL", 0.05)
+    series = Study(scenes.load("three-link-glass").with_numerics(grid=9)).compute_harmonics()
+    size = np.abs(series.coefficients).max((0, 2, 3)).reshape(-1, 2).max(-1)
+    found = charts.chart(scenes.load("three-link-glass").with_numerics(grid=9))
+    assert found.highest == 1 + 2 * np.flatnonzero(size > 0.05 * size.max()).max() == 7 < series.highest
+
+
+def test_a_gait_that_is_no_series_is_one_for_the_page():
+    gait = Points(points=((1.0, 0.2), (0.3, 0.9), (-0.8, 0.1), (-0.2, -0.7)))
+    cos, sin = charts.series_of(gait)
+    t = np.linspace(0, 2 * np.pi, 50)
+    kt = np.outer(t, np.arange(1, cos.shape[1] + 1))
+    constant = gait.unit(2 * np.pi * np.arange(64) / 64).mean(0)
+    np.testing.assert_allclose(constant + np.cos(kt) @ cos.T + np.sin(kt) @ sin.T, gait.unit(t), atol=2e-4)
 
 
 def test_a_loop_that_leaves_the_chart(glass):
@@ -89,8 +100,10 @@ def test_a_loop_that_leaves_the_chart(glass):
 @pytest.fixture(scope="module")
 def family():
     scene = scenes.load("three-link-glass").with_numerics(grid=21, harmonics=9)
-    question = Lab((scene,), {"medium.C": [1.0, 1.5, 2.2, 3.0]})
-    return question.ask()
+    question, done = Lab((scene,), {"medium.C": [1.0, 1.5, 2.2, 3.0]}), []
+    found = question.answer(done.append, lambda cost: None)
+    assert done == sorted(done) and done[-1] == 1.0 and len(done) == 10
+    return found
 
 
 def test_a_family_has_the_scene_as_a_member(family):
@@ -121,6 +134,8 @@ def test_between_members_the_error_says_how_far_off(family):
         - charts.tiers(chart.at(1.0), OFF_CENTRE)["harmonic"].net
     )
     assert np.hypot(*moved[:2]) > 20 * chart.family.error
+    with pytest.raises(Refusal, match="one scene, and not of a family"):
+        chart.at(2.0).at(2.0)
 
 
 def test_one_file_without_network_markup_or_repetition(glass):

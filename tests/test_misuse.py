@@ -56,7 +56,7 @@ def test_results_are_equal_to_themselves_alone_and_have_a_hash():
         assert (value == value) is True and (value == same) is False and (value != other) is True
         assert len({value, same, value}) == 2
     for module in pkgutil.walk_packages(geomech_package.__path__, "geomech."):
-        if not module.name.endswith("__main__"):
+        if not module.name.endswith("__main__") and not module.name.startswith("geomech.gym."):  # takes an extra
             for kind in vars(importlib.import_module(module.name)).values():
                 if dataclasses.is_dataclass(kind) and any("ndarray" in str(f.type) for f in dataclasses.fields(kind)):
                     assert kind.__eq__ is object.__eq__, kind

@@ -250,13 +250,13 @@ def test_too_much_is_refused_before_it_begins(tmp_path):
             moving.motion(scene, cycles)
     with pytest.raises(Refusal, match="a motion is that of a Scene, got 'sandfish'"):
         moving.motion("sandfish")
-    with pytest.raises(Refusal, match="say --yes"):
+    with pytest.raises(Refusal, match="say yes"):
         moving.cost(scene, 10_000).check("scene", False)
     moving.cost(scene, 10).check("scene", False)
     for name, balances in (("swimmer", 33), ("slope", 100 * 32)):  # cycles that repeat are solved once
         assert moving.cost(SCENES[name], 100).balances == balances
         assert moving.cost(SCENES[name], 100).seconds > moving.cost(SCENES[name], 1).seconds
-    with pytest.raises(Refusal, match="say --yes"):
+    with pytest.raises(Refusal, match="say yes"):
         animate.cost(256, 2000).check("scene", False)
     for name, cure in (("out.txt", "end the name in .gif or .mp4"), ("out", "end the name")):
         with pytest.raises(Refusal, match=cure):

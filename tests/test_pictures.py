@@ -245,6 +245,15 @@ def band(collection):
     return np.array([[f(y[x == a]) for a in at] for f in (np.min, np.max)])
 
 
+def test_tiers_of_one_amplitude_stand_side_by_side():
+    table = Study(scenes.load("three-link-viscous").with_numerics(grid=9)).study([0.5])
+    ax = plots.displacement(table)
+    points = [line.get_xdata().item() for line in ax.lines if line.get_marker() == "o"]
+    bars = [bar.get_segments()[0][0, 0] for bar in ax.collections]
+    assert len({*points}) == len(points) == sum(tier in table for tier in TIERS) and bars == points
+    assert np.mean(points) == pytest.approx(0.5) and ax.get_xticks().tolist() == [0.5]
+
+
 def test_measurements_are_points_with_bars_of_their_errors():
     table = {"amplitude": [0.5, 1.0], "direct": [[-0.3, 0.4, 0.1], [0.6, 0.8, 9.0]]}
     data = {"amplitude": [0.4, 0.9], "value": [0.1, 0.2], "error": [0.02, 0.03]}

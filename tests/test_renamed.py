@@ -20,6 +20,12 @@ def test_help_has_every_command_under_its_heading_with_its_whole_summary():
     assert max(map(len, out.splitlines())) <= 80
 
 
+@pytest.mark.parametrize("command", ["scenes", "explain sandfish-heavy", "explain c-leg", "explain xplorer"])
+def test_lists_fit_a_screen(command):
+    code, out, _ = geomech(*command.split())
+    assert code == 0 and max(map(len, out.splitlines())) <= 80
+
+
 def test_every_option_and_argument_says_what_it_is_for():
     every = [(name, x) for name, command in PARSER(cli.app).commands.items() for x in command.params]
     assert len(every) > 100 and [(name, x.name) for name, x in every if not x.help] == []

@@ -128,7 +128,7 @@ def test_pictures(fitted):
     field, gait = curvature.ccf(fitted), Circle(amplitude=0.8)
     plane = stretch(metric.fit(pulled_back, fitted.axes))
     figures = [
-        plots.stretched_figure(field, plane, [gait], effort="BL"),
+        plots.stretched_figure(field, plane, [gait], unit="BL"),
         plots.ccf_figure(field, [gait], style="contours", beside=(field, None), names=["a", "b"]),
         plots.ccf_figure(field, [gait], metric=metric.fit(pulled_back, fitted.axes)),
         plots.connection_figure(fitted, style="streamlines"),

@@ -194,6 +194,8 @@ def test_every_tier_has_it_beside_its_own_error():
         and "second order" in text[-4]
         and text[-3].startswith("mean: ")
     )
+    short = displacement.text(table.result, "sand", rows=2)
+    assert short.count("+- medium") > 1 and ", 1 of 2" not in short, "tables below each other keep both amplitudes"
 
 
 def test_effects_and_time_stepping_feel_it(monkeypatch):

@@ -9,6 +9,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from sphinx.util import logging
+
 from . import api, command_line, conventions, examples, figures, keys, lab, validation
 
 
@@ -46,6 +48,8 @@ def compute(app) -> None:
     generated = Path(app.srcdir) / "generated"
     generated.mkdir(exist_ok=True)
     api.write(generated / "api")
+    for wrong in api.wrong_examples():
+        logging.getLogger(__name__).warning(wrong)
     examples.compute_all()
     figures.draw_missing()
     lab.write()

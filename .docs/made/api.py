@@ -1,9 +1,11 @@
-"""The Python reference: a page for each public package, from `__all__` and docstrings."""
+"""The Python reference: a page for each public package, from `__all__` and docstrings, whose examples are run."""
 
 from __future__ import annotations
 
+import doctest
 import importlib
 import inspect
+import io
 import re
 from pathlib import Path
 
@@ -23,6 +25,7 @@ PACKAGES = {
         "geomech.measured",
         "geomech.studies.undulation",
         "geomech.plots",
+        "geomech.run.workers",
     ],
     "Geometry of any velocity": [
         "geomech.geometry.connection",
@@ -42,6 +45,7 @@ PACKAGES = {
         "rft.meshes",
         "rft.ground",
         "rft.walking",
+        "rft.mujoco",
     ],
 }
 
@@ -69,9 +73,11 @@ def write(folder: Path) -> None:
 
 def readable(app, what: str, name: str, obj, options, lines: list[str]) -> None:
     """Turn a docstring of plain sentences into reStructuredText: |x| is no substitution, and a table stays as it is."""
-    lines[:] = [re.sub(r"(``.*?``)|\|", lambda x: x[1] or r"\|", line) for line in lines]
-    if any(re.fullmatch(r"\s*-{3,}", line) for line in lines):
-        return  # numpydoc's
+    escaped = lambda some: [re.sub(r"(``.*?``)|\|", lambda x: x[1] or r"\|", line) for line in some]
+    heads = {lines[k - 1].strip(): k - 1 for k, line in enumerate(lines) if re.fullmatch(r"\s*-{3,}", line)}
+    begin, examples = min(heads.values(), default=len(lines)), heads.get("Examples", len(lines))
+    sections = escaped(lines[begin:examples]) + lines[examples:]  # numpydoc's
+    lines[:] = escaped(lines[:begin])
     table = {k for k, line in enumerate(lines) if line.startswith(" ")}
     table |= {k for k, line in enumerate(lines) if re.search(r"\S   +\S", line)}
     for k in reversed(range(len(lines))):
@@ -81,6 +87,7 @@ def readable(app, what: str, name: str, obj, options, lines: list[str]) -> None:
                 lines[k:k] = ["", "::", ""]
             if k + 1 not in table:
                 lines.insert(k + 1 + 3 * (k - 1 not in table), "")
+    lines += sections
 
 
 def plain_types(app, what: str, name: str, obj, options, signature: str | None, returned: str | None):
@@ -138,7 +145,8 @@ def _page(name: str) -> str:
     functions = [public for public, value in objects.items() if inspect.isroutine(value)]
     lines = [name, "=" * len(name), "", _summary(name), ""]
     if name == "geomech":
-        lines += ["Its names are those of the modules below, imported at their first use.", "", *_top(module)]
+        lines += ["Its names are those of the modules below, imported at their first use.", "", *_top(module), ""]
+        lines += [line for public in _nowhere_else(module) for line in (f".. autofunction:: geomech.{public}", "")]
         return "\n".join(lines)
     for heading, names, directive in (
         ("Classes", classes, "autoclass"),
@@ -168,6 +176,39 @@ def _public(module) -> list[str]:
         return sorted(module.__all__)
     own = lambda value: getattr(value, "__module__", "") == module.__name__
     return sorted(name for name, value in vars(module).items() if not name.startswith("_") and own(value))
+
+
+def _nowhere_else(module) -> list[str]:
+    """Return the functions of `geomech` that no other page documents."""
+    shown = [f"{page}.{public}" for page in _pages() if page != "geomech" for public in _public(_imported(page))]
+    names = [name for name in dir(module) if inspect.isfunction(getattr(module, name))]
+    return [name for name in names if not any(x.endswith(f".{name}") for x in shown)]
+
+
+def wrong_examples() -> list[str]:
+    """Run the examples of all docstrings in the reference; return what those print that end otherwise than shown."""
+    objects: dict[int, tuple[str, object]] = {}
+    for page in _pages():
+        module = _imported(page)
+        for public in dir(module) if page == "geomech" else _public(module):
+            value = getattr(module, public)
+            if inspect.isclass(value) or inspect.isroutine(value):
+                objects.setdefault(id(value), (f"{page}.{public}", value))
+    finder, runner, failures = doctest.DocTestFinder(exclude_empty=True), doctest.DocTestRunner(verbose=False), []
+    for name, value in objects.values():
+        for test in finder.find(value, name, globs={}):
+            out = io.StringIO()
+            if test.examples and runner.run(test, out=out.write).failed:
+                failures.append(out.getvalue())
+    return failures
+
+
+def _pages() -> list[str]:
+    return [name for names in PACKAGES.values() for name in names]
+
+
+def _imported(page: str):
+    return importlib.import_module(page)
 
 
 def _top(module) -> list[str]:

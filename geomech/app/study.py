@@ -46,7 +46,8 @@ class Study(studies.Study):
 
     Examples
     --------
-    >>> study = Study("three-link-glass", phases=64)
+    >>> import geomech
+    >>> study = geomech.study("three-link-glass", phases=64)
     >>> table = study.displacement([0.5, 1.0], ["direct"])
     >>> [round(x, 4) for x in table["net_distance"]["direct"]]
     [0.0121, 0.0638]
@@ -78,6 +79,16 @@ class Study(studies.Study):
             By default the scene's.
         tolerance : number
             In place of tiers: the cheapest tier whose errors of position are at most so many body lengths.
+
+        Examples
+        --------
+        >>> import geomech
+        >>> study = geomech.study("three-link-viscous", grid=15)
+        >>> table = study.displacement([0.5, 1.0], ["path", "direct"])
+        >>> [round(x, 4) for x in table["direct"][1][:2]]  # x, y in body lengths, at 1 rad
+        [-0.0495, 0.0134]
+        >>> [round(x, 4) for x in table["net_distance"]["path"]]
+        [0.0153, 0.0513]
         """
         chosen = self.scene.gait if gait is None else gait
         amplitudes = getattr(chosen, "amplitude", 1.0) if amplitudes is None else amplitudes
@@ -101,11 +112,29 @@ class Study(studies.Study):
         """Return the CCF, values (3, N, N) on a grid of two shape variables.
 
         pair: two joints, the first is 1; needed where there are more than two. at: (joints,), rad, a shape where the
-        others are held; by default the gait's middle."""
+        others are held; by default the gait's middle.
+
+        Examples
+        --------
+        >>> import geomech
+        >>> study = geomech.study("three-link-viscous", grid=15)
+        >>> study.ccf().values.shape  # x, y and theta on a grid of both joints
+        (3, 15, 15)
+        >>> round(float(study.ccf()([0.0, 0.0])[0]), 3)  # body lengths per rad^2
+        -0.021
+        """
         return self._plane(pair, at).ccf if self._is_slice(pair) else self.curvature
 
     def ccf_error(self, pair: Sequence[int] | None = None, at: Sequence[float] | None = None) -> Field:
-        """Return the estimated error of `ccf`."""
+        """Return the estimated error of `ccf`.
+
+        Examples
+        --------
+        >>> import geomech
+        >>> study = geomech.study("three-link-viscous", grid=15)
+        >>> round(float(study.ccf_error()([0.0, 0.0])[2]), 5)  # of theta, rad per rad^2
+        0.00137
+        """
         return self._plane(pair, at).error if self._is_slice(pair) else self.curvature_error
 
     def plot_ccf(
@@ -114,7 +143,14 @@ class Study(studies.Study):
     ) -> Any:  # fmt: skip
         """Draw a component of the CCF, x, y or theta, with the gait on it; hatched where its error exceeds it.
 
-        pair, at: as of `ccf`. options: of `geomech.plots.ccf_map`. Return the Axes."""
+        pair, at: as of `ccf`. options: of `geomech.plots.ccf_map`. Return the Axes.
+
+        Examples
+        --------
+        >>> import geomech
+        >>> study = geomech.study("three-link-viscous", grid=15)
+        >>> ax = study.plot_ccf("theta")
+        """
         gait, labels = self._drawn(pair, at)
         options = {"gaits": [gait], "labels": labels, "error": self.ccf_error(pair, at), **options}
         return plots.ccf_map(self.ccf(pair, at), _component(component), ax=ax, **options)
@@ -125,7 +161,14 @@ class Study(studies.Study):
     ) -> Any:  # fmt: skip
         """Draw a row of the local connection, x, y or theta, as arrows over shape space; return the Axes.
 
-        pair, at: as of `ccf`. options: of `geomech.plots.vector_field`."""
+        pair, at: as of `ccf`. options: of `geomech.plots.vector_field`.
+
+        Examples
+        --------
+        >>> import geomech
+        >>> study = geomech.study("three-link-viscous", grid=15)
+        >>> ax = study.plot_connection("x")
+        """
         A = self._plane(pair, at).connection if self._is_slice(pair) else self.fitted
         options = {"labels": self._drawn(pair, at)[1], **options}
         return plots.vector_field(A, _component(component), ax=ax, **options)
@@ -136,14 +179,30 @@ class Study(studies.Study):
     ) -> Any:  # fmt: skip
         """Draw x, y, heading or net_distance per cycle against amplitude, a line a tier; return the Axes.
 
-        amplitudes: by default some ten, up to the largest that the tables reach."""
+        amplitudes: by default some ten, up to the largest that the tables reach.
+
+        Examples
+        --------
+        >>> import geomech
+        >>> study = geomech.study("three-link-viscous", grid=15)
+        >>> ax = study.plot_displacement([0.5, 1.0], ["path", "direct"])
+        """
         chosen = self.scene.gait if gait is None else gait
         amplitudes = reachable(self.scene, chosen) if amplitudes is None else amplitudes
         return self.displacement(amplitudes, tiers, gait=gait).plot(quantity, ax=ax, **options)
 
     def animate(self, path: str | Path = "swim.gif", *, cycles: int = 1) -> Path:
         """Write a film of the body beside its gait on the CCF, .gif or .mp4, or a strip of it, .png, .pdf or .svg;
-        return its path."""
+        return its path.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import geomech
+        >>> study = geomech.study("three-link-viscous", grid=15, phases=16)
+        >>> study.animate(pathlib.Path(tempfile.mkdtemp()) / "swim.png").name
+        'swim.png'
+        """
         animate.check_format(path := Path(path))
         animate.write(Trajectory(self.scene, cycles, drawn=True).ask(), path)
         return path
@@ -152,17 +211,42 @@ class Study(studies.Study):
         """Return force, power and bending moment along the body over a cycle of the gait, and when its muscles work.
 
         sizes: length, radius and depth of the body, m, or its axial stress, Pa, and the frequency, Hz, where the scene does
-        not have them; with these forces are in N and powers in W, else in axial drags of the straight body."""
+        not have them; with these forces are in N and powers in W, else in axial drags of the straight body.
+
+        Examples
+        --------
+        >>> import geomech
+        >>> forces = geomech.study("seven-link-wave", phases=32).forces()
+        >>> forces["forward"].shape
+        (32, 42)
+        """
         return Forces(forces.Forces(self.scene, Sizes(**sizes)).ask())
 
     def optimise(self, objective: str = "displacement", **options: Any) -> Optimum:
-        """Return the best gait for an objective; see `geomech.optimise`."""
+        """Return the best gait for an objective; see `geomech.optimise`.
+
+        Examples
+        --------
+        >>> import geomech
+        >>> best = geomech.study("three-link-viscous", grid=15).optimise(harmonics=1, starts=1)
+        >>> round(best.value, 3)  # body lengths per cycle
+        0.101
+        """
         return optimise(self.scene, objective, **options)
 
     optimize = optimise
 
     def sweep(self, over: Mapping[str, Sequence[float]]) -> Swept:
-        """Return displacements over a grid of parameters such as {"medium.C": [1, 2, 3]}; see `geomech.sweep`."""
+        """Return displacements over a grid of parameters such as {"medium.C": [1, 2, 3]}; see `geomech.sweep`.
+
+        Examples
+        --------
+        >>> import geomech
+        >>> study = geomech.study("three-link-viscous", grid=15)
+        >>> study.sweep({"medium.ratio": [1.5, 2.0]})["displacement"].round(3)  # x, y, theta at each point
+        array([[-0.026,  0.007,  0.   ],
+               [-0.049,  0.013,  0.   ]])
+        """
         return sweep(self.scene, over)
 
     def _is_slice(self, pair: Sequence[int] | None) -> TypeGuard[Sequence[int]]:
@@ -193,7 +277,17 @@ class Study(studies.Study):
 
 def study(*parts: Any, effects: Sequence = (), **numerics: Any) -> Study:
     """Return the study of a scene: `study("three-link-glass")`, of a TOML file, a Scene, or its parts: `study(medium,
-    body, gait)`, `study(system, gait)`, `study(velocity, gait)`. See `Study`."""
+    body, gait)`, `study(system, gait)`, `study(velocity, gait)`. See `Study`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> from geomech import bodies, gaits, media
+    >>> study = geomech.study(media.Viscous(), bodies.Chain(), gaits.Circle(0.5))
+    >>> table = study.displacement(tiers="direct")
+    >>> [round(x, 5) for x in table["net_distance"]["direct"]]
+    [0.0153]
+    """
     return Study(*parts, effects=effects, **numerics)
 
 

@@ -9,6 +9,7 @@ import typer
 
 from geomech.commands.loading import load_scene
 from geomech.commands.options import (
+    ClimOption,
     ComponentOption,
     ExtentOption,
     GridOption,
@@ -19,6 +20,7 @@ from geomech.commands.options import (
     SliceOption,
     YesOption,
     angles,
+    colour_limit,
     components,
     with_workers,
 )
@@ -41,6 +43,10 @@ def connection(
     order: Annotated[
         Optional[str], typer.Option(metavar="ORDER", help="order of a .mat file: ndgrid (the default) or meshgrid")
     ] = None,
+    layout: Annotated[
+        Optional[str],
+        typer.Option(metavar="LAYOUT", help="layout of a .mat file: arrays (the default) or struct, sysplotter's s"),
+    ] = None,
     style: Annotated[
         Optional[str], typer.Option(metavar="STYLE", help="draw arrows (quiver, the default) or streamlines")
     ] = None,
@@ -48,15 +54,18 @@ def connection(
     slice_: SliceOption = None,
     other_frame: OtherFrameOption = None,
     component: ComponentOption = None,
+    clim: ClimOption = None,
     yes: YesOption = False,
 ):
     """Compute the local connection on a grid. A NetCDF file has the fit residual and the CCF, too; a .mat file has A
-    alone, in sysplotter's layout."""
+    and the metric, in a layout of sysplotter's."""
     from geomech.output import parts, pictures
     from geomech.studies.shape_space import connection
 
-    file = parts.Connection(out, sign, order)
-    drawn = pictures.Connection(style, plot, pair, slice_, other_frame, components(component))
+    file = parts.Connection(out, sign, order, layout)
+    panels = components(component)
+    drawn = pictures.Connection(style, plot, pair, slice_, other_frame, panels, colour_limit(clim, panels))
     scene = load_scene(name, grid, extent)
-    question = connection(scene, file.format, plot is not None, pair, angles(scene, "--slice", slice_), other_frame)
+    held = angles(scene, "--slice", slice_)
+    question = connection(scene, file.format, layout, plot is not None, pair, held, other_frame)
     execute(question, Output(out, file), Output(plot, drawn, pictures.check), yes=yes)

@@ -35,7 +35,7 @@ def choose_part(registry: Registry, where: str, word: object) -> str:
         name = choose(where, word, [*registry, *packages])
     except Refusal as error:
         if isinstance(word, str):
-            error.instead += " (or add --plugin FILE.py, a file that has it)"
+            error.instead += " (or add one of your own by ``geomech.register``)"
         raise
     _load(registry, where, name, packages[name])
     return name

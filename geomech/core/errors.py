@@ -7,11 +7,16 @@ import math
 import warnings
 from collections.abc import Iterable
 
-from rft.refusal import Refusal, formatted
+from rft.refusal import Refusal, formatted, worded
 
 
 class Note(UserWarning):
-    """A warning that something is likely not meant, though it is done; on the command line a line on standard error."""
+    """A warning that something is likely not meant, though it is done; on the command line a line on standard error.
+
+    It names arguments as a `Refusal` does, in double backticks, which ``args[0]`` keeps."""
+
+    def __str__(self) -> str:
+        return worded(str(self.args[0]))
 
 
 class UnitWarning(Note):

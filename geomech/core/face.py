@@ -1,27 +1,21 @@
-"""Methods that other modules add to values: how a notebook shows them, how they are saved and loaded.
+"""Methods of values that take layers above them: how a notebook shows a value, how it is converted and loaded.
 
-`geomech.face` registers them as the package is imported, before the classes of the values exist; the classes do not
-depend on them.
+Such a method calls the function that `implementation` returns; `geomech.face`, imported with the package, names it.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
-METHODS: dict[str, dict[str, Any]] = {}  # by the name of a class
+_functions: dict[str, Callable[..., Any]] = {}  # by method, such as "Field.to_xarray"
 
 
-class Extensible:
-    """Base of a value whose class receives the methods that are registered under its name."""
+def implements(method: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Return a decorator that makes a function the implementation of a method, such as "Field.to_xarray"."""
+    return lambda function: _functions.setdefault(method, function)
 
-    def __init_subclass__(cls, **options: Any) -> None:
-        super().__init_subclass__(**options)
-        for name, method in METHODS.get(cls.__name__, {}).items():
-            setattr(cls, name, method)
 
-    if TYPE_CHECKING:
-
-        def to_xarray(self, *arguments: Any, **options: Any) -> Any: ...
-
-        @classmethod
-        def load(cls, *arguments: Any, **options: Any) -> Any: ...
+def implementation(method: str) -> Callable[..., Any]:
+    """Return the function that implements a method."""
+    return _functions[method]

@@ -55,6 +55,18 @@ class Centreline(Gait):
     Refused as slips of the tracking or of the pen: neighbouring elements or chords that bend by more than pi/2, a frame
     20 % longer or shorter than the mean, a quarter of the period without a frame, a gait that does not close, or that
     repeats within the period. Noted: a wave that runs from tail to head, as of points that were given from the head.
+
+    Examples
+    --------
+    >>> import numpy as np, pathlib, tempfile
+    >>> t, s = np.meshgrid(np.arange(20) / 20, np.linspace(0, 1, 21), indexing="ij")
+    >>> rows = np.column_stack([t.ravel(), s.ravel(), 6 * np.cos(2 * np.pi * (s + t)).ravel()])
+    >>> file = pathlib.Path(tempfile.mkdtemp()) / "bends.csv"
+    >>> np.savetxt(file, rows, delimiter=",", header="t,s,curvature", comments="")
+    >>> from geomech.gaits import Centreline
+    >>> gait = Centreline(str(file), elements=30, period=1.0)
+    >>> gait.shape(0.0).shape
+    (29,)
     """
 
     kind = "centreline"

@@ -46,7 +46,18 @@ class Series(Gait):
 @GAITS.register
 @dataclass(frozen=True)
 class Circle(Series):
-    """alpha = centre + amplitude (cos t, sin t): counter-clockwise."""
+    """alpha = centre + amplitude (cos t, sin t): counter-clockwise.
+
+    Examples
+    --------
+    >>> from geomech.gaits import Circle
+    >>> gait = Circle(0.5, centre=(0.2, 0.0))
+    >>> gait.shape(0.0)  # rad, at phase 0
+    array([0.7, 0. ])
+    >>> alpha, alphadot = gait.cycle(64)  # at 64 phases, for any velocity(alpha, alphadot)
+    >>> alpha.shape
+    (64, 2)
+    """
 
     amplitude: Annotated[float, Number(-LARGEST, LARGEST, "rad", "its radius")] = 1.0
 
@@ -70,6 +81,13 @@ class Ellipse(Series):
     """Counter-clockwise about its centre.
 
     semi_axes (rad): at amplitude 1.
+
+    Examples
+    --------
+    >>> import math
+    >>> from geomech.gaits import Ellipse
+    >>> Ellipse(semi_axes=(1.0, 0.5), tilt=math.pi / 4).shape(0.0).round(3)
+    array([0.707, 0.707])
     """
 
     kind = "ellipse"
@@ -100,7 +118,14 @@ class Ellipse(Series):
 class Butterfly(Series):
     """The butterfly of Fig. 11(e), as distributed with sysplotter (OSU-LRAM/GeometricSystemPlotter):
     (alpha_1 + alpha_2)/2 = 1.0908 cos t - 0.2508 cos 3t - 0.18 cos 5t, (alpha_1 - alpha_2)/2 = 1.052 sin t + 0.0859 sin 3t
-    at amplitude 1."""
+    at amplitude 1.
+
+    Examples
+    --------
+    >>> from geomech.gaits import Butterfly
+    >>> Butterfly(1.2).shape(0.0).round(3)
+    array([0.792, 0.792])
+    """
 
     kind = "butterfly"
 
@@ -122,6 +147,13 @@ class Fourier(Series):
     """A Fourier series of one's own.
 
     cos, sin (rad): coefficients, a row for each joint, harmonics 1, 2 ... along the row.
+
+    Examples
+    --------
+    >>> from geomech.gaits import Fourier
+    >>> gait = Fourier(cos=((0.5,), (0.0,)), sin=((0.0,), (0.5,)))  # the circle of 0.5 rad
+    >>> gait.joints, gait.shape(0.0).tolist()
+    (2, [0.5, 0.0])
     """
 
     kind = "fourier"

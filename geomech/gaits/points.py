@@ -17,6 +17,13 @@ class Points(Gait):
     """The periodic cubic spline through given shapes, in order and back to the first, phase running with chord length.
 
     points (rad): three rows of joint angles or more.
+
+    Examples
+    --------
+    >>> from geomech.gaits import Points
+    >>> square = Points(((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5)))
+    >>> square.shape(0.0).round(6)
+    array([0.5, 0.5])
     """
 
     kind = "points"

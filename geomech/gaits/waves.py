@@ -23,6 +23,12 @@ class Wave(Series):
 
     In the two modes of a serpenoid chain of as many waves (`rft.bodies.modes`) it is the circle of that amplitude, run in
     reverse.
+
+    Examples
+    --------
+    >>> from geomech.gaits import Wave
+    >>> Wave(0.4, joints=6).shape(0.0).round(3)  # of a chain of seven links
+    array([ 0.249, -0.089, -0.36 , -0.36 , -0.089,  0.249])
     """
 
     kind = "wave"
@@ -101,6 +107,12 @@ class Sine(Gait):
     centre (rad): takes none.
 
     The bends are those between neighbouring elements, so the gait is of order 2 in 1/elements.
+
+    Examples
+    --------
+    >>> from geomech.gaits import Sine
+    >>> Sine(0.2, elements=50).shape(0.0).shape  # bends of a backbone of 50 elements
+    (49,)
     """
 
     kind = "sine"

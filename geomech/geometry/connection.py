@@ -10,12 +10,14 @@ import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property, partial
+from os import PathLike
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from geomech.core import summary
-from geomech.core.face import Extensible
+from geomech.core.face import implementation
 from geomech.core.work import Map, each
 from geomech.geometry.field import UNKNOWN_UNIT, Field, as_axes, half_grid
 from geomech.geometry.images import Image, images, to_solve
@@ -30,12 +32,23 @@ SAMPLES_TOGETHER = 25_000  # velocities asked for in one call: enough to fill th
 
 
 @dataclass(frozen=True, eq=False)
-class Connection(Extensible):
+class Connection:
     """A connection on a grid: xi = + A alphadot, in the velocity's frame. A: (3, d, N_1, ..., N_d). residual: (3, N_1,
     ..., N_d), rms over the fitted directions of xi - A alphadot for |alphadot| = 1; speed: (3, N_1, ..., N_d), rms of
     xi itself. degree: of the interpolating spline. All are nan at grid points that are singular, or have a neighbour
     beyond singular shapes. unit: of lengths, "BL" (body lengths) or "m". length: of the body in that unit; None where
-    it is unknown."""
+    it is unknown.
+
+    Examples
+    --------
+    >>> from geomech.geometry import connection
+    >>> from geomech.scenes import load
+    >>> A = connection.fit(load("three-link-viscous").system.velocity, connection.grid(2, 7))
+    >>> A([0.5, 0.3]).round(3)  # at a shape, (3, joints)
+    array([[-0.017,  0.002],
+           [-0.054, -0.054],
+           [ 0.252, -0.262]])
+    """
 
     axes: tuple[np.ndarray, ...]
     A: np.ndarray
@@ -50,6 +63,23 @@ class Connection(Extensible):
         singular = summary.masked(self.A.reshape(-1, *self.A.shape[2:]))
         size = f"A {summary.spans(self.A)}; {summary.fit_residual(self.residual, self.speed)}{summary.lengths(**self.size)}"
         return f"Connection({summary.grid(self.axes)}{singular}; {size})"
+
+    def _repr_html_(self) -> str:
+        return implementation("Connection._repr_html_")(self)
+
+    def to_xarray(self, *, shapes: Sequence[str] = ()) -> Any:
+        """Return a Dataset of A, its fit residual and the rms of xi, as in the file of `geomech connection`.
+
+        shapes: names of the shape variables, where these are no joint angles. ImportError without the package xarray."""
+        return implementation("Connection.to_xarray")(self, shapes)
+
+    @staticmethod
+    def load(path: str | PathLike[str], sign: str = "", order: str = "") -> Connection:
+        """Return the connection in a file that `geomech connection` wrote, .nc or .mat, or that sysplotter wrote
+        (`geomech.io.tables`).
+
+        Refusal, one line, for any other. The residual is nan where the file has none."""
+        return implementation("Connection.load")(path, sign, order)
 
     @property
     def size(self) -> dict:
@@ -76,7 +106,14 @@ class Connection(Extensible):
 
 
 def grid(joints: int, points: int = 31, extent: float = 2.5) -> tuple[np.ndarray, ...]:
-    """Return ``joints`` equal axes of ``points`` angles from -extent to extent (rad)."""
+    """Return ``joints`` equal axes of ``points`` angles from -extent to extent (rad).
+
+    Examples
+    --------
+    >>> from geomech.geometry.connection import grid
+    >>> [axis.tolist() for axis in grid(2, 5, 1.0)]
+    [[-1.0, -0.5, 0.0, 0.5, 1.0], [-1.0, -0.5, 0.0, 0.5, 1.0]]
+    """
     in_range("joints", joints, 1, 10_000, whole=True)
     in_range("grid", points, 4, 1e6, whole=True)
     in_range("extent", extent, 1e-9, 1e6)
@@ -93,7 +130,17 @@ def check_fit_options(degree: object, progress: object) -> None:
 
 def directions(joints: int, count: int) -> np.ndarray:
     """Return unit alphadot (count, joints), spread evenly over half of all directions: exactly for two joints, by a
-    low-discrepancy sequence for more."""
+    low-discrepancy sequence for more.
+
+    Examples
+    --------
+    >>> from geomech.geometry.connection import directions
+    >>> directions(2, 4).round(3)
+    array([[ 1.   ,  0.   ],
+           [ 0.707,  0.707],
+           [ 0.   ,  1.   ],
+           [-0.707,  0.707]])
+    """
     in_range("joints", joints, 1, 10_000, whole=True)
     least = joints if joints <= 2 else 4 * joints  # a scattered set of fewer may nearly miss a direction
     if not (is_whole(count) and count >= least):
@@ -140,7 +187,17 @@ def sampled(
     traits: Traits = NOTHING,
     map: Map = each,
 ) -> list[np.ndarray]:
-    """Return what `sampled_at` returns at every shape of a grid; arrays are (..., N_1, ..., N_d)."""
+    """Return what `sampled_at` returns at every shape of a grid; arrays are (..., N_1, ..., N_d).
+
+    Examples
+    --------
+    >>> from geomech.geometry.connection import directions, grid, least_squares, sampled
+    >>> from geomech.scenes import load
+    >>> unit = directions(2, 8)
+    >>> A, residual, speed = sampled(load("three-link-viscous").system.velocity, grid(2, 5), unit, least_squares(unit))
+    >>> A.shape, residual.shape
+    ((3, 2, 5, 5), (3, 5, 5))
+    """
     for a in axes:
         if a.ndim != 1 or len(a) <= degree or not (np.diff(a) > 0).all():
             raise Refusal(f"each axis must be more than {degree} ascending angles, got {a}")
@@ -160,7 +217,18 @@ def sampled_on(
     map: Map = each,
 ) -> list[np.ndarray]:
     """Return what `sampled_at` returns on a mesh of shapes alpha (N_1, ..., d); arrays are (..., N_1, ...), nan where
-    shapes are singular."""
+    shapes are singular.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.geometry.connection import directions, least_squares, sampled_on
+    >>> from geomech.scenes import load
+    >>> unit, alpha = directions(2, 8), np.zeros((3, 4, 2))
+    >>> A, residual, speed = sampled_on(load("three-link-viscous").system.velocity, alpha, unit, least_squares(unit))
+    >>> A.shape, residual.shape
+    ((3, 2, 3, 4), (3, 3, 4))
+    """
     flat, shape = alpha.reshape(-1, alpha.shape[-1]), alpha.shape[:-1]
     fields = sampled_at(velocity, flat, unit, reduce, progress, symmetries, singularity is not None, map)
     fields = [x.reshape(*x.shape[:-1], *shape) for x in fields]
@@ -184,7 +252,19 @@ def sampled_at(
     alphadot.
 
     ``reduce`` takes xi (s, C, 3) at some shapes and returns arrays (..., s). symmetries: images of shapes among
-    themselves, of which one is solved. masked: xi may be nan. map: as the builtin, over batches of shapes."""
+    themselves, of which one is solved. masked: xi may be nan. map: as the builtin, over batches of shapes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.geometry.connection import directions, least_squares, sampled_at
+    >>> from geomech.scenes import load
+    >>> unit = directions(2, 8)
+    >>> velocity = load("three-link-viscous").system.velocity
+    >>> A, residual, speed = sampled_at(velocity, np.zeros((1, 2)), unit, least_squares(unit))
+    >>> A.shape, residual.shape
+    ((3, 2, 1), (3, 1))
+    """
     solved = to_solve(symmetries, len(alpha))
     to_compute = np.flatnonzero(solved)
     step = max(1, SAMPLES_TOGETHER // len(unit))
@@ -224,7 +304,15 @@ def even_part(
     velocity: Velocity, axes: Sequence[ArrayLike], traits: Traits = NOTHING, map: Map = each
 ) -> np.ndarray | None:
     """Return the rms (3, N_1, ..., N_d) over directions of xi(alpha, alphadot) + xi(alpha, -alphadot), |alphadot| = 1.
-    A fit from half of the directions takes it for 0. None where it is roundoff at a few shapes that stand for all."""
+    A fit from half of the directions takes it for 0. None where it is roundoff at a few shapes that stand for all.
+
+    Examples
+    --------
+    >>> from geomech.geometry.connection import even_part, grid
+    >>> from geomech.systems import DifferentialDrive
+    >>> even_part(DifferentialDrive().velocity, grid(2, 5)) is None  # it changes sign with alphadot
+    True
+    """
     axes = tuple(np.asarray(a, float) for a in axes)
     unit = directions(len(axes), EVEN_DIRECTIONS * len(axes))
     rng = np.random.default_rng(0)
@@ -243,7 +331,15 @@ def even_part(
 
 def sign_changes(d: np.ndarray) -> np.ndarray:
     """Return a mask (N_1, ..., N_d) of the grid points at which d is 0 or of another sign than at a neighbour along an
-    axis."""
+    axis.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.geometry.connection import sign_changes
+    >>> sign_changes(np.array([2.0, 1.0, -1.0, -2.0]))
+    array([False,  True,  True, False])
+    """
     mask = d == 0
     for axis in range(d.ndim):
         low, high = (np.moveaxis(mask, axis, 0)[part] for part in (slice(None, -1), slice(1, None)))
@@ -279,6 +375,16 @@ def fit(
     few shapes: `VelocityWarning` if it is not odd or not homogeneous in alphadot, or ignores alpha. trusted: it is not tried.
     unit, length: of lengths in the velocity, and of the body, as `Connection` keeps them. map: as the builtin, of tasks that
     each have many shapes; that of a request, where one is under way, shares and stores them.
+
+    Examples
+    --------
+    >>> from geomech.geometry import connection
+    >>> from geomech.systems import Swimmer
+    >>> from rft import Chain, Viscous
+    >>> swimmer = Swimmer(Viscous(), Chain())
+    >>> A = connection.fit(swimmer.velocity, connection.grid(2, 15))
+    >>> A.velocity([0.5, 0.3], [1.0, 0.0]).round(4)
+    array([-0.0014, -0.0035, -0.0817])
     """
     axes = as_axes(axes)
     check_fit_options(degree, progress)
@@ -293,7 +399,18 @@ def connection_function(
     velocity: Velocity, joints: int, count: int, degree_one: bool = False, map: Map = each
 ) -> Callable:
     """Return the least-squares A (..., 3, d) as a function of shapes (..., d), solved at every call from ``count``
-    directions; from d where the velocity is linear in alphadot (``degree_one``)."""
+    directions; from d where the velocity is linear in alphadot (``degree_one``).
+
+    Examples
+    --------
+    >>> from geomech.geometry.connection import connection_function
+    >>> from geomech.systems import DifferentialDrive
+    >>> A = connection_function(DifferentialDrive().velocity, joints=2, count=2, degree_one=True)
+    >>> A([0.3, 0.1]).round(3)
+    array([[ 0.25,  0.25],
+           [ 0.  ,  0.  ],
+           [-0.5 ,  0.5 ]])
+    """
     unit = np.eye(joints) if degree_one else directions(joints, count)
     reduce = least_squares(unit)
 
@@ -307,7 +424,17 @@ def connection_function(
 
 def least_squares(unit: np.ndarray) -> Callable:
     """Return a ``reduce`` of `sampled_at`: the A (3, d, s) that fits best, and the rms (3, s) of its residual and of
-    xi."""
+    xi.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.geometry.connection import directions, least_squares
+    >>> unit = directions(2, 8)
+    >>> A, residual, speed = least_squares(unit)((unit @ np.array([[1.0, 0.0, 2.0], [0.0, 3.0, 0.0]]))[None])
+    >>> round(float(A[1, 1, 0]), 6)  # of xi_y = 3 alphadot_2
+    3.0
+    """
     inverse = np.linalg.pinv(unit)
 
     def reduce(xi):

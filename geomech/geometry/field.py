@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geomech.core import summary
-from geomech.core.face import Extensible
+from geomech.core.face import implementation
 from rft.checks import in_range, real_array
 from rft.refusal import Refusal
 
@@ -19,7 +19,7 @@ UNKNOWN_UNIT = "length"  # stands for the unit of lengths where nothing says it
 
 
 @dataclass(frozen=True, eq=False)
-class Field(Extensible):
+class Field:
     """Values (..., N_1, ..., N_d) on the grid spanned by d axes of shape angles (rad), all ascending. nan in all
     components masks a grid point: derivatives come from the points between masks, and nothing is looked up.
 
@@ -52,6 +52,15 @@ class Field(Extensible):
         components = "x".join(map(str, lead)) or "one"
         described = f"values {size}{summary.lengths(**self.size)}"
         return f"Field({components} components on {summary.grid(self.axes)}{summary.masked(flat)}; {described})"
+
+    def _repr_html_(self) -> str:
+        return implementation("Field._repr_html_")(self)
+
+    def to_xarray(self, name: str = "ccf", *, shapes: Sequence[str] = ()) -> Any:
+        """Return a DataArray; with three components it is taken for a CCF, with its units.
+
+        shapes: names of the shape variables, where these are no joint angles. ImportError without the package xarray."""
+        return implementation("Field.to_xarray")(self, name, shapes)
 
     @property
     def size(self) -> dict:

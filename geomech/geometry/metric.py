@@ -32,7 +32,15 @@ Power = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 @dataclass(frozen=True, eq=False)
 class Metric:
-    """M on a grid. M: (d, d, N_1, ..., N_d), symmetric. degree: of the interpolating spline."""
+    """M on a grid. M: (d, d, N_1, ..., N_d), symmetric. degree: of the interpolating spline.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> M = geomech.study("three-link-viscous", grid=15).metric
+    >>> round(float(M.norm([0.0, 0.0], [1.0, 0.0])), 4)  # path length per rad of alpha_1, straight
+    0.0855
+    """
 
     axes: tuple[np.ndarray, ...]
     M: np.ndarray
@@ -56,7 +64,15 @@ class Metric:
 @dataclass(frozen=True, eq=False)
 class Finsler:
     """F on a grid, for two joints, by its even harmonics in the direction of alphadot. coefficients: (K + 1, N_1, N_2),
-    the mean, then cosine and sine of 2 beta, 4 beta ... K beta. residual: (N_1, N_2), rms over directions of what is left."""
+    the mean, then cosine and sine of 2 beta, 4 beta ... K beta. residual: (N_1, N_2), rms over directions of what is left.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> F = geomech.study("three-link-glass", grid=15).metric
+    >>> round(float(F.norm([0.0, 0.0], [1.0, 0.0])), 3)  # path length per rad of alpha_1, straight
+    0.134
+    """
 
     axes: tuple[np.ndarray, ...]
     coefficients: np.ndarray
@@ -96,7 +112,19 @@ def _even(beta, highest: int) -> np.ndarray:
 
 def fit(power: Power, axes, degree: int = 3, progress: Callable | None = None, map: Map = each) -> Metric:
     """Fit M on the grid spanned by ``axes`` exactly, from d (d + 1) / 2 powers at each shape. power: (...,), quadratic
-    in alphadot."""
+    in alphadot.
+
+    Examples
+    --------
+    >>> from geomech.geometry import metric
+    >>> from geomech.geometry.connection import grid
+    >>> from geomech.scenes import load
+    >>> swimmer = load("three-link-viscous").system
+    >>> power = lambda alpha, alphadot: swimmer.power(alpha, alphadot, swimmer.velocity(alpha, alphadot))
+    >>> metric.fit(power, grid(2, 9)).M[..., 4, 4].round(5)  # of the straight body
+    array([[0.00732, 0.00503],
+           [0.00503, 0.00732]])
+    """
     axes = as_axes(axes)
     d = len(axes)
     i, j = np.triu_indices(d)
@@ -120,7 +148,18 @@ def fit_norm(
     highest: int = 14,
     map: Map = each,
 ) -> Finsler:
-    """Fit even harmonics up to ``highest`` of a norm (...,), from ``count`` directions at each shape of two joints."""
+    """Fit even harmonics up to ``highest`` of a norm (...,), from ``count`` directions at each shape of two joints.
+
+    Examples
+    --------
+    >>> from geomech.geometry import metric
+    >>> from geomech.geometry.connection import grid
+    >>> from geomech.scenes import load
+    >>> swimmer = load("three-link-glass").system
+    >>> power = lambda alpha, alphadot: swimmer.power(alpha, alphadot, swimmer.velocity(alpha, alphadot))
+    >>> metric.fit_norm(power, grid(2, 5)).coefficients.shape
+    (15, 5, 5)
+    """
     if not is_whole(highest) or highest % 2 or not 0 <= highest < count:
         raise Refusal(f"harmonics must be even and below the number of directions ({count})", value=highest)
     axes = as_axes(axes)
@@ -131,7 +170,18 @@ def fit_norm(
 
 
 def norm_from_samples(F: np.ndarray, axes, unit: np.ndarray, degree: int = 3, *, highest: int = 14) -> Finsler:
-    """Return the series of `fit_norm` from norms F (C, N_1, N_2) of the rates ``unit`` (C, 2)."""
+    """Return the series of `fit_norm` from norms F (C, N_1, N_2) of the rates ``unit`` (C, 2).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.geometry.connection import directions, grid
+    >>> from geomech.geometry.metric import norm_from_samples
+    >>> unit, axes = directions(2, 24), grid(2, 5)
+    >>> F = norm_from_samples(np.ones((24, 5, 5)), axes, unit)  # of a circle at every shape
+    >>> round(float(F.norm([0.1, 0.2], [3.0, 4.0])), 6)
+    5.0
+    """
     basis = _even(np.arctan2(unit[:, 1], unit[:, 0]), highest)
     onto = np.linalg.pinv(basis)
     coefficients = np.tensordot(onto, F, 1)
@@ -161,6 +211,16 @@ def _powers(shared: tuple, alpha: np.ndarray) -> np.ndarray:
 
 
 def path_length(norm: Power, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
-    """Return length of a gait's cycle, for amplitudes (...,) or the gait's own. norm: F(alpha, alphadot) -> (...,)."""
+    """Return length of a gait's cycle, for amplitudes (...,) or the gait's own. norm: F(alpha, alphadot) -> (...,).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.gaits import Circle
+    >>> from geomech.geometry.metric import path_length
+    >>> norm = lambda alpha, alphadot: np.linalg.norm(alphadot, axis=-1)
+    >>> round(float(path_length(norm, Circle(0.5))), 4)  # of the circle itself, rad
+    3.1416
+    """
     alpha, alphadot = checked_gait(gait).cycle(phases, amplitudes)
     return np.asarray(norm(alpha, alphadot)).mean(-1) * 2 * np.pi

@@ -127,7 +127,7 @@ def interpolated_plane(fitted: Connection, pair: tuple[int, int], at) -> Plane:
         start = ",".join(f"{x:.3f}" for x in fitted.taylor.loop.shape(np.array(0.0)))
         raise Refusal(
             f"the data do not reach the plane of {fixed}",
-            instead=f"slice it at a shape of the mean gait, --slice {start}",
+            instead=f"slice it at a shape of the mean gait, ``at`` {start}",
         )
     A = np.moveaxis(A, (-2, -1), (0, 1))[:, list(pair)]
     has_residual = np.isfinite(fitted.residual).all()  # files from elsewhere tell nothing of their fit

@@ -44,7 +44,16 @@ def _waves(n: int) -> _Waves:
 
 def turning(xi: ArrayLike) -> np.ndarray:
     """Return the heading (..., N) gained at the phases, less its mean growth, of zero mean over the cycle; xi as in
-    `displacement`."""
+    `displacement`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.geometry.reconstruct import turning
+    >>> t = 2 * np.pi * np.arange(8) / 8
+    >>> turning(np.stack([0 * t, 0 * t, 1 + np.cos(t)], -1))[1:4].round(3)  # sin t
+    array([0.707, 1.   , 0.707])
+    """
     xi = real_array("xi", xi)
     if xi.ndim < 2 or xi.shape[-1] != 3:
         raise Refusal("xi must be of shape (..., N, 3)", value=xi.shape)
@@ -62,6 +71,14 @@ def displacement(xi: ArrayLike) -> np.ndarray:
     """Return the net pose (..., 3) after one cycle, in the frame at its start.
 
     xi: (..., N, 3), body velocity with respect to phase at t = 2 pi n / N, N >= 3.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.geometry.reconstruct import displacement
+    >>> xi = np.tile([1.0, 0.0, 0.5], (64, 1))  # ahead and turning left, per rad of phase
+    >>> displacement(xi).round(3)  # half a turn on a circle of radius 2
+    array([0.   , 4.   , 3.142])
     """
     s = _spectrum(xi)
     z = (s.wave * _reach(s.mean_turn + s.k)).sum(-1)
@@ -69,7 +86,17 @@ def displacement(xi: ArrayLike) -> np.ndarray:
 
 
 def trajectory(xi: ArrayLike, phases: ArrayLike) -> np.ndarray:
-    """Return poses (..., P, 3) at phases t (P,) from the start of the cycle; arguments as in `displacement`."""
+    """Return poses (..., P, 3) at phases t (P,) from the start of the cycle; arguments as in `displacement`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.geometry.reconstruct import trajectory
+    >>> xi = np.tile([1.0, 0.0, 0.5], (64, 1))
+    >>> trajectory(xi, [np.pi, 2 * np.pi]).round(3)
+    array([[2.   , 2.   , 1.571],
+           [0.   , 4.   , 3.142]])
+    """
     s, t = _spectrum(xi), real_array("phases", phases)
     if t.ndim != 1 or not np.isfinite(t).all():
         raise Refusal("phases must be a list of finite numbers", value=t)
@@ -85,7 +112,18 @@ def trajectory(xi: ArrayLike, phases: ArrayLike) -> np.ndarray:
 
 def poses(xi: ArrayLike) -> np.ndarray:
     """Return poses (..., N + 1, 3) at the phases of the samples and at the cycle's end: `trajectory` there, in time N
-    log N."""
+    log N.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.geometry.reconstruct import poses
+    >>> xi = np.tile([1.0, 0.0, 0.5], (64, 1))
+    >>> poses(xi)[[0, 32, 64]].round(3)
+    array([[0.   , 0.   , 0.   ],
+           [2.   , 2.   , 1.571],
+           [0.   , 4.   , 3.142]])
+    """
     s, n = _spectrum(xi), np.shape(xi)[-2]
     span = 2 * np.pi * np.arange(n + 1) / n
     closed = lambda x: np.take(x, np.arange(n + 1) % n, -1)
@@ -101,7 +139,16 @@ def poses(xi: ArrayLike) -> np.ndarray:
 
 
 def repeated(path: np.ndarray, cycles: int) -> np.ndarray:
-    """Return the poses (cycles N + 1, 3) of several equal cycles from those of one, (N + 1, 3)."""
+    """Return the poses (cycles N + 1, 3) of several equal cycles from those of one, (N + 1, 3).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.geometry.reconstruct import poses, repeated
+    >>> xi = np.tile([1.0, 0.0, 0.25], (64, 1))
+    >>> repeated(poses(xi), 2)[-1].round(3)  # after half a turn
+    array([0.   , 8.   , 3.142])
+    """
     starts, net = np.zeros((1, 3)), path[-1]
     while len(starts) <= cycles:
         starts = np.concatenate([starts, se2.compose(se2.compose(starts[-1], net), starts)])
@@ -129,7 +176,16 @@ def _values(c: np.ndarray, k: np.ndarray, n: int) -> np.ndarray:
 
 def slopes(xi: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """Return (net pose (3,) of `displacement`, its derivatives (3, N, 3) by the body velocities) for one cycle xi (N,
-    3)."""
+    3).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.geometry.reconstruct import slopes
+    >>> net, derivative = slopes(np.tile([1.0, 0.0, 0.5], (64, 1)))
+    >>> derivative.shape
+    (3, 64, 3)
+    """
     xi, n = real_array("xi", xi), np.shape(xi)[-2]
     s = _spectrum(xi)
     turns = s.mean_turn + s.k

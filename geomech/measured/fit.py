@@ -15,15 +15,18 @@ from geomech.geometry.reconstruct import displacement
 from geomech.geometry.tube import Loop, TaylorSeries, Tube, covering_grid, series, tube
 from geomech.io.tables.base import LARGEST_ENTRY
 from geomech.measured import cycles, plausibility, regression, smooth, unknowns
+from geomech.measured import phase as phase_module
 from geomech.measured.log import Log, read
 from geomech.measured.residual import residual_of
-from geomech.measured.spread import spread
+from geomech.measured.spread import DEVIATIONS, spread
 from rft import se2
 from rft.checks import in_range
 
 HARMONICS = 12  # of the connection and of the gait, at most
 PHASES = 128  # of the mean gait, at which it is integrated
 PRINTED_PHASES = 24  # phases of printed numbers
+DEVIATING = 3  # harmonics of a cycle's deviation from the mean gait
+PART = 0.1  # of it, by which the net pose is differentiated
 SAFETY = 2.0  # covers the net poses of gaits in sand that pass many places where links begin and cease to stick
 MOST_POINTS, MOST_SHAPES = 201, 100_000  # of a field, along an axis and in all
 
@@ -38,7 +41,21 @@ class Fitted:
     misfit of xi, over that of the joint rates; explained: (3,), share of the squares of xi that the fit explains.
     noise: (d + 3,), of the rows' joint angles, x, y and heading. across: whether the cycles vary enough to determine A
     across the gait. combined: joints that are linear combinations of others, factors (d,) by number, where these are
-    why they do not. length: of the body in m; 1 for a log in body lengths."""
+    why they do not. length: of the body in m; 1 for a log in body lengths.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from geomech.gaits import Circle
+    >>> from geomech.measured import fit_log, synthetic
+    >>> from geomech.scenes import load
+    >>> velocity = load("three-link-viscous").system.velocity
+    >>> file = pathlib.Path(tempfile.mkdtemp()) / "log.csv"
+    >>> synthetic.save(file, synthetic.made(velocity, Circle(0.8), cycles=20))
+    >>> fit = fit_log(file)
+    >>> fit.measured.shape, fit.predicted.shape  # net poses of whole cycles
+    ((18, 3), (18, 3))
+    """
 
     log: Log
     known: TaylorSeries
@@ -108,7 +125,21 @@ def fit_log(
     columns, degrees: as in `geomech.measured.log.read`. level: share of cases in which an interval should contain the
     truth. harmonics: of the connection in the phase; by cross-validation if None. limits (rad): distance from the mean
     gait up to which the connection is given; as far as the data extend if None. body_length (m): of a log in m; 1 for
-    one in body lengths."""
+    one in body lengths.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from geomech.gaits import Circle
+    >>> from geomech.measured import fit_log, synthetic
+    >>> from geomech.scenes import load
+    >>> velocity = load("three-link-viscous").system.velocity
+    >>> file = pathlib.Path(tempfile.mkdtemp()) / "log.csv"
+    >>> synthetic.save(file, synthetic.made(velocity, Circle(0.8), cycles=20))
+    >>> fit = fit_log(file)
+    >>> fit.gait.joints, len(fit.measured)  # joints, and whole cycles
+    (2, 18)
+    """
     in_range("``level``", level, 0.5, 0.999)
     in_range("``body_length``", body_length, 1e-9, 1e9)
     if harmonics is not None:
@@ -177,6 +208,8 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
     square = (_net(known)[0] - mean) ** 2 - mean_error**2  # less the error of the mean
     beyond = SAFETY * np.sqrt(np.maximum(square, 0.0))
     residual = residual_of(known, samples, varies)
+    outward = _outward(known, spread(loop, samples, None, varies > regression.NOTHING))
+    beyond = np.sqrt(beyond**2 + outward**2 + (known.factor * _by_gait(known, samples)) ** 2)
     known = replace(known, beyond=beyond, standard_error=residual.standard_error)
     frequency = (len(times) - 1) / (times[-1] - times[0])
     uniform = np.interp(log.t, times, np.interp(times, log.t, phase))
@@ -204,6 +237,38 @@ def _net(known: TaylorSeries) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     t = 2 * np.pi * np.arange(PHASES) / PHASES
     alpha, alphadot = known.loop.shape(t), known.loop.shape(t, 1)
     return displacement(np.einsum("nij,nj->ni", known.connection(alpha), alphadot)), alpha, alphadot
+
+
+def _outward(known: TaylorSeries, extent: np.ndarray) -> np.ndarray:
+    """Return the change (3,) of the net pose by what the phase of the nearest point does to the mean gait.
+
+    Shapes that lie beside the gait in all directions alike, with variance s^2 in each, are on average outside of it by
+    s^2 / 2 times its curvature at their nearest points. extent: (d, d, P), `spread` of the data."""
+    t = 2 * np.pi * np.arange(PHASES) / PHASES
+    alpha, rate, second = (known.loop.shape(t, order) for order in range(3))
+    along = (rate**2).sum(-1, keepdims=True)
+    curvature = (second - (second * rate).sum(-1, keepdims=True) / along * rate) / along
+    across = np.einsum("iip->", extent) / extent.shape[-1] / len(extent) / DEVIATIONS**2
+    inside = alpha + across / 2 * curvature
+    wave = 1j * np.arange(PHASES // 2 + 1)[:, None]
+    inside_rate = np.fft.irfft(wave * np.fft.rfft(inside, axis=0), PHASES, axis=0)
+    return displacement(np.einsum("nij,nj->ni", known.connection(inside), inside_rate)) - _net(known)[0]
+
+
+def _by_gait(known: TaylorSeries, samples: regression.Samples) -> np.ndarray:
+    """Return the standard error (3,) of the net pose by that of the mean gait, whose cycles vary."""
+    cycles = samples.cycle[-1] + 1
+    deviation = samples.alpha - known.loop.shape(samples.phase)
+    t, each = 2 * np.pi * np.arange(PHASES) / PHASES, []
+    for k in range(cycles):
+        rows = samples.cycle == k
+        each.append(phase_module.fitted_loop(samples.phase[rows], deviation[rows], DEVIATING))
+    each = np.array(each) - np.mean(each, 0)
+    loops = [(known.loop.shape(t) + PART * series(x, t), known.loop.shape(t, 1) + PART * series(x, t, 1)) for x in each]
+    alpha, alphadot = (np.array(x) for x in zip(*loops))
+    net = displacement(np.einsum("knij,knj->kni", known.connection(alpha), alphadot))
+    errors = regression.lagged((net - _net(known)[0]) / PART / cycles)
+    return np.sqrt((errors**2).sum(0))
 
 
 def _cycles(log: Log, known: TaylorSeries, phase, count, joints, pose):

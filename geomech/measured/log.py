@@ -39,7 +39,20 @@ class Log:
 
     name: of the file. t: (N,), ascending. alpha: (N, d), rad, and the heading have no jumps by a full turn. pose: (N,
     3), x, y, heading. joints: names of their columns. lines: (N,), line of each row in the file. seconds: t is a time.
-    metres: x and y are in m, by the names of their columns."""
+    metres: x and y are in m, by the names of their columns.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from geomech.gaits import Circle
+    >>> from geomech.measured import read, synthetic
+    >>> from geomech.scenes import load
+    >>> velocity = load("three-link-viscous").system.velocity
+    >>> file = pathlib.Path(tempfile.mkdtemp()) / "log.csv"
+    >>> synthetic.save(file, synthetic.made(velocity, Circle(0.8), cycles=5))
+    >>> read(file).alpha.shape  # rad
+    (301, 2)
+    """
 
     name: str
     t: np.ndarray
@@ -60,7 +73,21 @@ def read(path: str | Path, columns: Sequence[str] = (), degrees: bool = False) -
 
     columns: names of the time, of all joint angles, of x, y and the heading, in this order; by default those with known
     names (`POSE`, `JOINT`; "phase" in place of a time). degrees: joint angles and heading are in degrees, as are
-    columns whose names end in _deg."""
+    columns whose names end in _deg.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from geomech.gaits import Circle
+    >>> from geomech.measured import read, synthetic
+    >>> from geomech.scenes import load
+    >>> velocity = load("three-link-viscous").system.velocity
+    >>> file = pathlib.Path(tempfile.mkdtemp()) / "log.csv"
+    >>> synthetic.save(file, synthetic.made(velocity, Circle(0.8), cycles=20))
+    >>> log = read(file)
+    >>> log.joints, log.pose.shape
+    (('alpha_1', 'alpha_2'), (1201, 3))
+    """
     try:
         source = read_rows(path, LARGEST_FILE, WHAT)
         line, header = source.header
@@ -164,7 +191,7 @@ def _check_units(log: Log, picked: Sequence[str], turn: np.ndarray) -> None:
                 f"{name} reaches {np.degrees(log.alpha[row, k]):.4g} degrees", row, because="no joint turns so far"
             )
     if (turn[1:-3] != 1.0).all() and (size := np.abs(log.alpha).max()) < np.radians(2 * np.pi):
-        what = f"joint angles of at most {np.degrees(size):.3g} degrees: drop --degrees if these are rad"
+        what = f"joint angles of at most {np.degrees(size):.3g} degrees: drop ``degrees`` if these are rad"
         warnings.warn(f"{log.name}: {what}", UnitWarning, stacklevel=3)
 
 

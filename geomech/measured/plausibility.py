@@ -30,11 +30,11 @@ def note_units(log: Log, joints: Smoothed, pose: Smoothed, period: float, length
         cure = "end the name of its column in _deg if it is in degrees"
         notes.append(f"the heading turns {turning / joint_speed:.3g} times as fast as the joints: {cure}")
     if speed > MOVES * joint_speed:
-        cure = "give them in body lengths, or in m with --body-length"
+        cure = "give them in body lengths, or in m with ``body_length``"
         notes.append(f"x and y move by {speed / joint_speed:.3g} body lengths where the joints turn by 1 rad: {cure}")
     if length == 1.0 and log.metres:
         notes.append(
-            "x and y are in m by the names of their columns, and are taken for body lengths: say --body-length"
+            "x and y are in m by the names of their columns, and are taken for body lengths: say ``body_length``"
         )
     if log.seconds and period > SLOWEST:
         notes.append(

@@ -33,7 +33,7 @@ def status(fit: Fitted) -> str:
     names = ", ".join(fit.log.joints[k] for k in fit.combined)
     return (
         f"{ALONG}: {combinations}, but for constants and noise, which leaves A across it open: "
-        f"leave {names} out with --columns"
+        f"leave {names} out of the columns"
     )
 
 

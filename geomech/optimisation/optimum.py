@@ -42,7 +42,16 @@ class Optimum:
 
     best, start: evaluated by the direct tier. active: limits that the best touches. answers: value and number of starts
     of every different local optimum, best first; others: the same of those that only a table led to, by the direct
-    tier, unfinished. seconds: duration of the search."""
+    tier, unfinished. seconds: duration of the search.
+
+    Examples
+    --------
+    >>> from geomech.optimisation import optimise
+    >>> from geomech.scenes import load
+    >>> best = optimise(load("three-link-viscous"), harmonics=1, starts=1)
+    >>> best.value > best.start.value, best.gait.joints
+    (True, 2)
+    """
 
     request: Request
     best: Evaluation

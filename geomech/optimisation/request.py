@@ -48,7 +48,16 @@ DEGREES = 1e-3  # largest scatter of the degree of the power
 
 @dataclass(frozen=True)
 class Request:
-    """A scene, an objective, and the loops that are searched; built by `checked`."""
+    """A scene, an objective, and the loops that are searched; built by `checked`.
+
+    Examples
+    --------
+    >>> from geomech.optimisation import checked
+    >>> from geomech.scenes import load
+    >>> request = checked(load("three-link-viscous"), "displacement", harmonics=2)
+    >>> request.starts, request.scene.system.joints
+    (1, 2)
+    """
 
     scene: Scene
     objective: Objective
@@ -174,7 +183,16 @@ def checked(
     scene: Scene, objective: str, direction: str | None = None, harmonics: int | None = None, limits: LimitsArgument = None,
     starts: int | None = None, rate: float | None = None, power: float | None = None,
 ) -> Request:  # fmt: skip
-    """Return the request; Refusal for one that makes no sense."""
+    """Return the request; Refusal for one that makes no sense.
+
+    Examples
+    --------
+    >>> from geomech.optimisation import checked, search
+    >>> from geomech.scenes import load
+    >>> request = checked(load("three-link-viscous"), "displacement", harmonics=1, starts=1)
+    >>> round(search(request).value, 3)
+    0.101
+    """
     with located(checked_scene(scene).name):
         in_range("``starts``", 1 if starts is None else starts, 1, 1000, whole=True)
         system, pace = scene.system, {"rate": rate, "power": power}

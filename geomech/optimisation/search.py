@@ -61,13 +61,31 @@ def optimise(
     of 0, or between (lowest, highest) for each, from the scene's own gait and ``starts`` - 1 others. By default there
     are no others, except for two joints in a dry medium, which have many local optima: there the `OUTLINES` of the
     limits are used. For a sine, sines are searched. rate, power: limits for the objective "speed". Refusal for what makes no
-    sense."""
+    sense.
+
+    Examples
+    --------
+    >>> from geomech.optimisation import optimise
+    >>> from geomech.scenes import load
+    >>> best = optimise(load("three-link-viscous"), "efficiency", harmonics=1, starts=1)
+    >>> round(best.value, 3)  # displacement over path length
+    0.11
+    """
     request = checked(scene, objective, direction, harmonics, limits, starts, rate, power)
     return search(request, progress)
 
 
 def search(request: Request, progress: Callable | None = None) -> Optimum:
-    """Return the result of `optimise` for a checked request."""
+    """Return the result of `optimise` for a checked request.
+
+    Examples
+    --------
+    >>> from geomech.optimisation import checked, search
+    >>> from geomech.scenes import load
+    >>> found = search(checked(load("three-link-viscous"), "efficiency", harmonics=1, starts=1))
+    >>> round(found.value, 3)  # displacement over path length
+    0.11
+    """
     check_fit_options(1, progress)
     with located(request.scene.name):
         return _Search(request, progress).optimum()

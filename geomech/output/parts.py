@@ -14,7 +14,7 @@ from geomech.core.errors import choose
 from geomech.core.variables import Result, Variable
 from geomech.io.files import note, write_text
 from geomech.io.results import write_csv, write_netcdf
-from geomech.io.tables import FORMATS, ORDERS, SIGNS
+from geomech.io.tables import FORMATS, LAYOUTS, ORDERS, SIGNS
 from geomech.measured import results
 from geomech.text import optimum
 from rft.refusal import Refusal
@@ -22,23 +22,30 @@ from rft.refusal import Refusal
 
 @dataclass(frozen=True)
 class Connection:
-    """A writer of a connection in the format that an ending names, with this sign and order where it takes them."""
+    """A writer of a connection in the format that an ending names, with this sign, order and layout where it takes them."""
 
     out: Path | None
     sign: str | None = None
     order: str | None = None
+    layout: str | None = None
 
     def __post_init__(self) -> None:
         if self.out and not hasattr(self.format, "write"):
             endings = [ending for ending, known in FORMATS.items() if hasattr(known, "write")]
             raise Refusal(f"cannot write {self.out}", instead=f"end the name of a connection in {' or '.join(endings)}")
-        for name, word, known in (("sign", self.sign, SIGNS), ("order", self.order, ORDERS)):
+        for name, word, known in (
+            ("sign", self.sign, SIGNS),
+            ("order", self.order, ORDERS),
+            ("layout", self.layout, LAYOUTS),
+        ):
             if word is not None:
                 choose(f"--{name}", word, known)
                 if name not in self._settings(self.format):
                     taking = " or ".join(ending for ending, other in FORMATS.items() if name in self._settings(other))
                     instead = f"drop it, a {self.out.suffix} file says what it has" if self.out else "drop it"
                     raise Refusal(f"--{name} is that of a {taking} file", instead=instead)
+        if self.layout == LAYOUTS[1] and (self.sign or self.order):
+            raise Refusal("a struct s has its own sign and order", instead="drop --sign and --order")
 
     @property
     def format(self) -> Callable | None:
@@ -50,15 +57,15 @@ class Connection:
         return getattr(file, "settings", ())
 
     def __call__(self, result: Result, path: Path) -> None:
-        given = {name: word for name, word in (("sign", self.sign), ("order", self.order)) if word}
+        given = {name: word for name in ("sign", "order", "layout") if (word := getattr(self, name))}
         self.format.write(path, result, **given)
-        if "sign" in self._settings(self.format) and not self.sign:
+        if "sign" in self._settings(self.format) and not self.sign and self.layout != LAYOUTS[1]:
             note(f"{path} has {SIGNS['+']}; --sign - gives the other")
 
 
-def write_tube(result: Result, path: Path) -> None:
-    """Write the connection near a measured gait."""
-    write_netcdf(path, results.of_fit(result.subject))
+def write_measured(result: Result, path: Path) -> None:
+    """Write the connection near a measured gait, or the kinematics of midlines."""
+    write_netcdf(path, result if result.kind == "midlines" else results.of_fit(result.subject))
 
 
 def mean_gait(field: Path | None) -> tuple[Callable[[Result, Path], None], Callable[[Path], Any]]:

@@ -11,6 +11,7 @@ from geomech import plots
 from geomech.core.errors import choose
 from geomech.core.variables import Result
 from geomech.studies import tables
+from geomech.studies.effort import units
 from geomech.studies.shape_space import Space
 from geomech.systems.base import shape_labels
 from rft.refusal import Refusal
@@ -48,8 +49,9 @@ def stress(result: Result, path: Path) -> None:
 
 
 def measured(result: Result, path: Path) -> None:
-    """Draw a measured gait."""
-    plots.save(plots.measured_figure(result.subject), path)
+    """Draw a measured gait, or midlines."""
+    figure = plots.midlines_figure(result) if result.kind == "midlines" else plots.measured_figure(result.subject)
+    plots.save(figure, path)
 
 
 def forces(result: Result, path: Path, **options: Any) -> None:
@@ -80,7 +82,8 @@ class Optimum:
 
 @dataclass(frozen=True)
 class Connection:
-    """A drawing of a connection as arrows or streamlines. components: panels, all that are not zero if there are none."""
+    """A drawing of a connection as arrows or streamlines. components: panels, all that are not zero if there are none. clim:
+    limit of the colours."""
 
     style: str | None
     plot: Path | None
@@ -88,12 +91,13 @@ class Connection:
     slice_: str | None
     other_frame: str | None
     components: Sequence[str] = ()
+    clim: float | str | None = None
 
     def __post_init__(self) -> None:
-        options = (self.style, self.pair, self.slice_, self.other_frame, self.components or None)
-        if self.plot is None and not options == (None,) * 5:
+        options = (self.style, self.pair, self.slice_, self.other_frame, self.components or None, self.clim)
+        if self.plot is None and any(option is not None for option in options):
             raise Refusal(
-                "--style, --component, --pair, --slice and --compare-frame are those of a figure",
+                "--style, --component, --pair, --slice, --compare-frame and --clim are those of a figure",
                 instead="say --plot FILE",
             )
         if self.style is not None:
@@ -103,7 +107,7 @@ class Connection:
         space: Space = result.subject
         scene = space.study.scene
         options: dict[str, Any] = {"labels": shape_labels(scene.system), "style": self.style or "quiver"}
-        options["components"] = self.components
+        options |= {"components": self.components, "clim": self.clim}
         if space.planes:
             plots.save(plots.plane_connection_figure(space.planes, **options), path)
             return
@@ -154,8 +158,8 @@ class Ccf:
             "labels": shape_labels(scene.system),
         }
         if self.stretch:
-            effort = "BL" if scene.system.traits.power_degree == 1 else "path length"
-            return plots.stretched_figure(study.curvature, space.stretch, **options, **self._panels, effort=effort)
+            options["unit"] = units(scene.system)["path_length"]
+            return plots.stretched_figure(study.curvature, space.stretch, **options, **self._panels)
         options |= {"style": self.style or "map", "metric": study.metric if self.metric else None, **self._panels}
         if other:
             options |= {"beside": (other.curvature, other.curvature_error), "names": [scene.frame, self.other_frame]}

@@ -24,6 +24,7 @@ LEAST = 1e-3  # body lengths or rad: an axis spans no less, so that rounding is 
 BAND, EDGE = "#E69F00", "#A66F00"  # of the medium: its area and its outline
 ERROR, MEDIUM, MEASURED = "estimated error, in the tier's colour", "medium, one standard deviation", "measured"
 PANELS = {"x": "x", "y": "y", "theta": "heading", "distance": "net_distance"}  # by the words of --component
+SPAN, APART = 1.0, 0.04  # of the axis about one amplitude; of it, between tiers there
 ROUNDING = 1e-9  # body lengths or rad: below it a displacement is nothing
 TO_ROUNDING = "every tier has less than 1e-9"
 
@@ -37,22 +38,35 @@ def displacement(
 
     errors: with a band of each tier's estimated error, in its colour; an uncertain medium has an outlined band of its own. The
     table's own units are those of the axis. data: measurements to draw as points, "amplitude", "value" and "error" (N,) in the
-    units of the axes, such as a data frame of pandas; the error may be missing."""
+    units of the axes, such as a data frame of pandas; the error may be missing.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> table = geomech.study("three-link-viscous", grid=15).displacement([0.5, 1.0], ["path", "direct"])
+    >>> geomech.plots.displacement(table, quantity="net_distance").get_ylabel()
+    'net distance per cycle (BL)'
+    """
     ax, amplitudes = axes_of(ax, 4.4, 3.8), np.asarray(table["amplitude"], float)
     errors = errors and all(key in table for key in ERRORS)
-    for name, tier in TIERS.items():
-        if name in table:
-            title = f"{label}, {tier.label}" if label else tier.label
-            values = of_pose(table[name])[quantity]
-            broad = {"ms": 2 * tier.style.get("linewidth", 1.5)} if len(amplitudes) == 1 else {}  # one point is no line
-            ax.plot(amplitudes, values, label=title, **{**tier.style, **broad, **style})
-            if errors:
-                _error_band(ax, amplitudes, values, error_of(table, quantity, name), tier.colour)
+    shown = [name for name in TIERS if name in table]
+    span = np.ptp(np.append(amplitudes, [] if data is None else data["amplitude"]))
+    places = _side_by_side(amplitudes, len(shown), span or SPAN)
+    for name, x in zip(shown, places):
+        tier, values = TIERS[name], of_pose(table[name])[quantity]
+        title = f"{label}, {tier.label}" if label else tier.label
+        point = {"marker": "o", "ms": 5} if len(amplitudes) == 1 else {}  # one point is no line
+        ax.plot(x, values, label=title, **{**tier.style, **point, **style})
+        if errors:
+            _error_band(ax, x, values, error_of(table, quantity, name), tier.colour)
     if errors:
         ax.plot([], [], color="0.5", alpha=0.3, lw=7, label=ERROR)
-    _band(ax, table, quantity, amplitudes)
+    if shown:
+        _band(ax, table, quantity, shown[-1], places[-1])
     if data is not None:
         measured(ax, data)
+    if not span:
+        ax.set(xlim=amplitudes + [-SPAN / 2, SPAN / 2], xticks=amplitudes)
     ax.axhline(0.0, color="0.7", lw=0.6, zorder=0)
     _widen(ax, LEAST * (1.0 if quantity == "heading" else table.get("body_length", 1.0)))
     what = quantity.replace("_", " ")
@@ -61,6 +75,13 @@ def displacement(
     if legend:
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=1)
     return ax
+
+
+def _side_by_side(amplitudes: np.ndarray, count: int, span: float) -> np.ndarray:
+    """Return where each of so many tiers is drawn (count, B): at the amplitudes or, of one amplitude, about it side by side, so
+    that no error bar hides another. span: of the axis."""
+    aside = APART * span * (np.arange(count) - (count - 1) / 2) if len(amplitudes) == 1 else np.zeros(count)
+    return amplitudes + aside[:, None]
 
 
 def _error_band(ax, x, values, error, colour: str) -> None:
@@ -75,13 +96,12 @@ def _error_band(ax, x, values, error, colour: str) -> None:
         ax.fill_between(x, values - error, values + error, **look)
 
 
-def _band(ax, table: Mapping, quantity: str, amplitudes) -> None:
+def _band(ax, table: Mapping, quantity: str, best: str, x) -> None:
     """Draw the uncertainty by the medium about the best tier, shifted as far as the medium shifts the mean."""
-    best = [name for name in TIERS if name in table][-1:]
-    if "medium_error_of" in table and best:
-        values, error = of_pose(table[best[0]])[quantity], np.array(table["medium_error_of"][quantity])
+    if "medium_error_of" in table:
+        values, error = of_pose(table[best])[quantity], np.array(table["medium_error_of"][quantity])
         shift = np.array(table["medium_shift_of"][quantity]) if "medium_shift_of" in table else 0.0
-        medium_band(ax, amplitudes, values + shift, error)
+        medium_band(ax, x, values + shift, error)
 
 
 def medium_band(ax: Axes, x: Any, values: Any, error: Any) -> None:
@@ -119,7 +139,15 @@ def displacement_figure(
 
     system: whose symmetry makes quantities zero; that of the tables' scene if left out. components: of PANELS, drawn even where
     they are zero; all of them if left out. data: measurements of the first gait, drawn as `displacement` does on the first of
-    the components, else on x."""
+    the components, else on x.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> from geomech.plots import displacement_figure
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> fig = displacement_figure({"circle": study.displacement([0.5, 1.0])}, [study.scene.gait])
+    """
     wanted = [PANELS[choose("component", name, PANELS)] for name in components]
     zero = [{} if wanted else _zeros(table, gait, system) for table, gait in zip(tables.values(), gaits)]
     if data is not None and not wanted:
@@ -177,6 +205,14 @@ def _speed_axis(ax, frequency: float, unit: str) -> None:
 
 
 def net(poses: Any) -> np.ndarray:
-    """Return the net distance (...,) of poses (..., 3), negative where it points backwards (x < 0)."""
+    """Return the net distance (...,) of poses (..., 3), negative where it points backwards (x < 0).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.plots import net
+    >>> net(np.array([[0.3, 0.4, 0.0], [-0.3, 0.0, 0.0]]))
+    array([ 0.5, -0.3])
+    """
     found = of_pose(poses)
     return np.copysign(found["net_distance"], found["x"])

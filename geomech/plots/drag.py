@@ -15,7 +15,13 @@ PARTS = (("across", "#D55E00", "o"), ("along", "#0072B2", "s"))
 
 @styled
 def drag_figure(result: Result) -> Figure:
-    """Draw forces against the attack angle with the fitted law and its 95 % band, and the residuals below."""
+    """Draw forces against the attack angle with the fitted law and its 95 % band, and the residuals below.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> fig = geomech.plots.drag_figure(geomech.fit_medium("dem-rod-drag").result)
+    """
     fig, axes = figure(4.4, 4.6, 1, 2)
     (top,), (bottom,) = axes
     angle, psi, forces, residuals = (result[name].values for name in ("angle", "folded_psi", "force", "residual"))

@@ -53,7 +53,14 @@ def connection_figure(
 
     beside: the connection in another body frame, drawn below on the same scales. names: of the two frames. components:
     of WORDS, drawn even where they are zero. clim: top of the scales, a number or a percentile of a row's lengths such as
-    "98%", their largest if left out."""
+    "98%", their largest if left out.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> fig = geomech.plots.connection_figure(study.fitted, components=["x", "theta"])
+    """
     draw = CONNECTION_STYLES[choose("style", style, CONNECTION_STYLES)]
     rows = [connection] if beside is None else [connection, beside]
     panels = panels_of(components, [[has_row(c, k) for k in range(3)] for c in rows])
@@ -116,7 +123,14 @@ def ccf_figure(
 
     metric: its rings on a map. beside: (CCF, error) in another body frame, drawn below on the same scales. names: of the two
     frames. components: of WORDS, drawn even where they are zero. clim: limit of the colours on either side of zero, a number or
-    a percentile of the values' size such as "98%"; their largest if left out."""
+    a percentile of the values' size such as "98%"; their largest if left out.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> fig = geomech.plots.ccf_figure(study.ccf(), gaits=[study.scene.gait], error=study.ccf_error(), components=["x"])
+    """
     rows = [Row(field, error, gaits, labels)] + ([] if beside is None else [Row(*beside, gaits, labels)])
     return _ccf_rows(rows, style, metric, names, True, components, clim)
 
@@ -131,7 +145,14 @@ def planes_figure(
 
     gait: of all joints; where it leaves the plane it is dashed, as it is seen along the fixed joints, and has no area. labels:
     (name, unit) of all shape variables. beside: the plane of a single pair in another body frame, below on the same scales.
-    names: of the two frames. components, clim: as for `ccf_figure`."""
+    names: of the two frames. components, clim: as for `ccf_figure`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("seven-link-wave", grid=7)
+    >>> fig = geomech.plots.planes_figure([study.plane((0, 5))], study.scene.gait)
+    """
     labels, rows = labels or _angles(planes), []
     for one in [*planes, *([] if beside is None else [beside])]:
         seen = [] if gait is None else [ProjectedGait(gait, one)]
@@ -150,7 +171,14 @@ def plane_connection_figure(
     """Draw the rows of A of the two joints that move, on planes of shape space, a row for each pair, as `connection_figure`
     does.
 
-    labels: as for `planes_figure`."""
+    labels: as for `planes_figure`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("seven-link-wave", grid=7)
+    >>> fig = geomech.plots.plane_connection_figure([study.plane((0, 5))])
+    """
     draw = CONNECTION_STYLES[choose("style", style, CONNECTION_STYLES)]
     labels = labels or _angles(planes)
     panels = panels_of(components, [[has_row(one.connection, k) for k in range(3)] for one in planes])

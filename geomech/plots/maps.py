@@ -38,7 +38,15 @@ FINEST = 400  # grid points along an axis of a map: about the dots of its pictur
 
 
 def shape_space(ax: Axes, axes: Sequence[np.ndarray], labels: Labels = ANGLES) -> Axes:
-    """Label a plane of two shape variables and set it to the grid. labels: (name, unit) of each."""
+    """Label a plane of two shape variables and set it to the grid. labels: (name, unit) of each.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.plots import figure, shape_space
+    >>> fig, axes = figure(3.0, 3.0)
+    >>> ax = shape_space(axes[0, 0], [np.linspace(-1, 1, 5)] * 2)
+    """
     ax.set(
         xlabel=quantity(*labels[0]), ylabel=quantity(*labels[1]), aspect="equal",
         xlim=(axes[0][0], axes[0][-1]), ylim=(axes[1][0], axes[1][-1]),
@@ -60,7 +68,14 @@ def vector_field(
     """Draw row ``component`` of A as arrows over shape space (Fig. 11(c)), on a scale of its own; colour repeats their length.
 
     labels: as for `shape_space`. top: of the colours and of the arrows' scale, for maps that are compared. clim: that top as a
-    number or a percentile of the lengths, as for `limit_of`. Longer arrows are cut to it."""
+    number or a percentile of the lengths, as for `limit_of`. Longer arrows are cut to it.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> ax = geomech.plots.vector_field(study.fitted, component=0)
+    """
     ax = axes_of(ax)
     step = every or max(1, round(len(connection.axes[0]) / ARROWS))
     pick = slice(step // 2, None, step)
@@ -137,7 +152,14 @@ def ccf_map(
     error: of the field (`curvature.error`). Hatched are patches where it exceeds the value, so that not even the sign is known
     (`unknown`); there no line of zeros is drawn, and next to them only lines that part two known signs (`certain`). labels: as
     for `shape_space`. legend: explain hatching and rings below the map. metric: drawn as rings (`indicatrices`). clim: limit of
-    the colours on either side of zero, a number or a percentile of the values' size such as "98%"; else their largest."""
+    the colours on either side of zero, a number or a percentile of the values' size such as "98%"; else their largest.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> ax = geomech.plots.ccf_map(study.ccf(), component=0, gaits=[study.scene.gait], error=study.ccf_error())
+    """
     from cmcrameri import cm
 
     ax = axes_of(ax)
@@ -191,7 +213,15 @@ def ccf_label(component: int, unit: str, labels: Labels) -> str:
 
 def indicatrices(metric: Metric | Finsler, ax: Axes, axes: Sequence[np.ndarray], count: int = 7) -> Any:
     """Draw rings around ``count`` x ``count`` shapes: rates that take the same effort, so that a ring is long in directions in
-    which shape changes cheaply. All have one scale. Return a handle for the legend."""
+    which shape changes cheaply. All have one scale. Return a handle for the legend.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> from geomech.plots import ccf_map, indicatrices
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> rings = indicatrices(study.metric, ccf_map(study.ccf()), study.ccf().axes)
+    """
     from matplotlib.lines import Line2D
 
     spots = [a[0] + np.ptp(a) * (np.arange(count) + 0.5) / count for a in axes]
@@ -266,7 +296,15 @@ def unknown(values: np.ndarray, error: np.ndarray) -> np.ndarray:
 
 def largest(values: np.ndarray) -> float:
     """Return the largest of magnitudes, for a scale; next to singular shapes, where they have no bound, of nine tenths of
-    them."""
+    them.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.plots import largest
+    >>> largest(np.array([0.5, -2.0, 1.0]))
+    2.0
+    """
     size = np.abs(values[np.isfinite(values)])
     if not size.size:
         return 1.0
@@ -328,7 +366,15 @@ def draw_gait(
 ) -> Axes:
     """Draw the gait's curve with a dot at its start and an arrow along it, as far as it lies within the axes of a grid.
 
-    line: its style."""
+    line: its style.
+
+    Examples
+    --------
+    >>> from geomech.gaits import Circle
+    >>> from geomech.plots import draw_gait, figure
+    >>> fig, axes = figure(3.0, 3.0)
+    >>> ax = draw_gait(Circle(0.5), axes[0, 0])
+    """
     ax, curve = axes_of(ax), gait.shape(PHASES)
     curve[~inside_of(curve, within or ())] = np.nan
     ax.plot(*curve.T, line, color=color, lw=1.2)

@@ -150,7 +150,14 @@ def stage(motion: Motion, rows: Any, field: Field | None = None, error: Field | 
 @styled
 def filmstrip(motion: Motion, field: Field | None = None, error: Field | None = None, pictures: int = STRIP) -> Figure:
     """Draw the body at some phases, equally spaced from start to end and to one scale, and its shapes in a panel next to them,
-    with the same numbers."""
+    with the same numbers.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> from geomech.studies.motion import motion
+    >>> fig = geomech.plots.filmstrip(motion(geomech.study("three-link-viscous", phases=16).scene), pictures=4)
+    """
     rows = np.linspace(0, len(motion.phase) - 1, pictures).round().astype(int)
     low, high = limits = reach(motion, rows)
     tall = max((high - low)[1] / (high - low)[0], 0.12)  # of a picture, for its width

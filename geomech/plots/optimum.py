@@ -11,6 +11,7 @@ from geomech.optimisation.gain import PHASES, limiting
 from geomech.plots.maps import ccf_map, shape_space
 from geomech.plots.stretched import stretched_map
 from geomech.plots.style import axes_of, figure, quantity, styled
+from geomech.studies.effort import units
 from geomech.systems.base import shape_labels
 
 if TYPE_CHECKING:
@@ -38,7 +39,13 @@ def optimum_map(optimum: Optimum, ax: Axes | None = None, clim: float | str | No
     colours are those of `ccf_figure` in the same frame. Where the velocity does not follow from shape alone there is no CCF,
     and the map has the loop alone.
 
-    clim: as for `ccf_figure`."""
+    clim: as for `ccf_figure`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> ax = geomech.plots.optimum_map(geomech.optimise("three-link-viscous", harmonics=1, starts=1))
+    """
     ax, system = axes_of(ax, 4.6, 5.2), optimum.scene.system
     if optimum.gained is None:
         shape_space(ax, [np.linspace(-1, 1, 2) * optimum.scene.numerics.extent] * 2, shape_labels(system))
@@ -55,14 +62,13 @@ def optimum_map(optimum: Optimum, ax: Axes | None = None, clim: float | str | No
 
 @styled
 def stretched_optimum(optimum: Optimum, ax: Axes | None = None, clim: float | str | None = None) -> Axes:
-    """Draw `optimum_map` on shape space redrawn so that equal lengths take equal effort. Refusal for a system without a
+    """Draw `optimum_map` on shape space redrawn so that equal lengths are equal path lengths. Refusal for a system without a
     metric."""
     ax, system, (field, component) = axes_of(ax), optimum.scene.system, optimum.gained
     plane = optimum.stretched
-    effort = "BL" if system.traits.power_degree == 1 else "path length"
-    look = {"labels": shape_labels(system), "effort": effort, "clim": clim}
+    look = {"labels": shape_labels(system), "unit": units(system)["path_length"], "clim": clim}
     stretched_map(field, plane, component, ax=ax, **look)
-    ax.set_title(f"the same, stretched to its effort\n(lengths off by {100 * plane.rms:.2g} % rms)")
+    ax.set_title(f"the same, stretched to path lengths\n(lengths off by {100 * plane.rms:.2g} % rms)")
     low, high = ([a[k] for a in plane.field.axes] for k in (0, -1))
     draw_start_and_best(optimum, ax, lambda curve: plane(np.clip(curve, low, high)))
     return ax
@@ -97,7 +103,13 @@ def draw_limited(ax, curve: np.ndarray, kinds: np.ndarray, nonlinear: bool = Fal
 
 @styled
 def optimum_angles(optimum: Optimum, ax: Axes | None = None) -> Axes:
-    """Draw the shape variables of the best gait over a cycle, and the limits."""
+    """Draw the shape variables of the best gait over a cycle, and the limits.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> ax = geomech.plots.optimum_angles(geomech.optimise("three-link-viscous", harmonics=1, starts=1))
+    """
     ax, gait = axes_of(ax, 4.0, 3.4), optimum.gait
     t = np.linspace(0, 2 * np.pi, PHASES)
     names = shape_labels(optimum.scene.system)
@@ -120,7 +132,13 @@ def optimum_angles(optimum: Optimum, ax: Axes | None = None) -> Axes:
 @styled
 def optimum_figure(optimum: Optimum, stretched: bool = False, *, clim: float | str | None = None) -> Figure:
     """Draw `optimum_map` and `optimum_angles` side by side; the angles alone where there are not two joints. stretched:
-    `stretched_optimum` between them. clim: as for `ccf_figure`."""
+    `stretched_optimum` between them. clim: as for `ccf_figure`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> fig = geomech.plots.optimum_figure(geomech.optimise("three-link-viscous", harmonics=1, starts=1))
+    """
     if optimum.scene.system.joints != 2:
         fig, axes = figure(3.8, 3.4)
         optimum_angles(optimum, axes[0, 0])

@@ -78,6 +78,14 @@ def _decades(axis) -> None:
 
 @styled
 def work_precision_figure(results: Mapping) -> Figure:
+    """Draw `work_precision` on a figure of its own; ``results`` as `geomech.accuracy` returns them.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> table = geomech.accuracy(geomech.study("three-link-viscous", phases=32, grid=7).scene, runs=1)
+    >>> fig = geomech.plots.work_precision_figure(table)
+    """
     count = len({line["against"] for line in results["lines"]})
     fig, axes = figure(5.0 * count, 5.2, count)
     work_precision(results, axes[0])

@@ -1,4 +1,4 @@
-"""The CCF on shape space redrawn so that equal lengths on paper take equal effort (`geomech.geometry.stretch`)."""
+"""The CCF on shape space redrawn so that equal lengths on paper are equal path lengths (`geomech.geometry.stretch`)."""
 
 from __future__ import annotations
 
@@ -36,14 +36,24 @@ if TYPE_CHECKING:
 @styled
 def stretched_map(
     field: Field, stretch: Stretch, component: int = 0, gaits: Sequence[Gait] = (), *, ax: Axes | None = None,
-    error: Field | None = None, labels: Labels = ANGLES, effort: str = "effort",
+    error: Field | None = None, labels: Labels = ANGLES, unit: str = "BL",
     clim: float | str | None = None,
 ) -> Axes:  # fmt: skip
     """Draw a component of the CCF over stretched shape space, per area there: an area on paper times the colour is what it
-    adds to the displacement, and the length of a gait is its effort. Lines of constant shape variables are thin, and
+    adds to the displacement, and the length of a gait is its path length. Lines of constant shape variables are thin, and
     thick at 0.
 
-    effort: unit of path length. clim: as for `ccf_figure`, of the values per area there. Other arguments as for `ccf_map`."""
+    unit: of path length. clim: as for `ccf_figure`, of the values per area there. Other arguments as for `ccf_map`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> from geomech.geometry.stretch import stretch
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> ax = geomech.plots.stretched_map(study.ccf(), stretch(study.metric), gaits=[study.scene.gait])
+    >>> ax.get_xlabel()
+    'path length (BL)'
+    """
     from cmcrameri import cm
 
     ax, values = axes_of(ax), stretch.density(Field(field.axes, field.values[component], field.degree))
@@ -59,9 +69,9 @@ def stretched_map(
     _angles(ax, stretch, labels)
     for gait in gaits:
         _draw(gait, ax, stretch)
-    ax.set(aspect="equal", xlabel=f"effort ({effort})", ylabel=f"effort ({effort})")
+    ax.set(aspect="equal", xlabel=quantity("path length", unit), ylabel=quantity("path length", unit))
     ax.set_title(f"{ccf_name(component)}: {TITLES[component]}")
-    per = f"{effort}$^2$" if effort.isalpha() else f"({effort})$^2$"
+    per = f"{unit}$^2$" if unit.isalpha() else f"({unit})$^2$"
     label = f"{ccf_name(component)} / area ({unit_of(component, field.unit)}/{per})"
     ax.figure.colorbar(image, ax=ax, shrink=0.85, extend=extend(image.get_array(), most)).set_label(label)
     return ax
@@ -113,12 +123,20 @@ def _draw(gait: Gait, ax, stretch: Stretch) -> None:
 @styled
 def stretched_figure(
     field: Field, stretch: Stretch, gaits: Sequence[Gait] = (), *, error: Field | None = None,
-    labels: Labels = ANGLES, effort: str = "effort", components: Sequence[str] = (), clim: float | str | None = None,
+    labels: Labels = ANGLES, unit: str = "BL", components: Sequence[str] = (), clim: float | str | None = None,
 ) -> Figure:  # fmt: skip
-    """Draw the components side by side, with the errors of length of the plane. components, clim: as for `ccf_figure`."""
+    """Draw the components side by side, with the errors of length of the plane. components, clim: as for `ccf_figure`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> from geomech.geometry.stretch import stretch
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> fig = geomech.plots.stretched_figure(study.ccf(), stretch(study.metric), components=["x"])
+    """
     panels = panels_of(components, [[has(field, k) for k in range(3)]])
     fig, axes = figure(0.3 + 3.7 * len(panels), 3.5, len(panels), layout="compressed")
-    look = {"error": error, "labels": labels, "effort": effort, "clim": clim}
+    look = {"error": error, "labels": labels, "unit": unit, "clim": clim}
     for component, ax in zip(panels, axes[0]):
         stretched_map(field, stretch, component, gaits, ax=ax, **look)
     caption = f"lengths on paper are off by {100 * stretch.rms:.2g} % rms, {100 * stretch.largest:.2g} % at most"

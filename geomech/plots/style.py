@@ -97,7 +97,15 @@ def figure(
     width: float, height: float, columns: int = 1, rows: int = 1, layout: str = "constrained", **grid: Any
 ) -> tuple[Any, Any]:
     """Return (Figure, array of Axes (rows, columns)) as `blank` does; both show in a notebook. ``grid`` as for matplotlib's
-    GridSpec."""
+    GridSpec.
+
+    Examples
+    --------
+    >>> from geomech.plots import figure
+    >>> fig, axes = figure(6.0, 3.0, columns=2)
+    >>> axes.shape
+    (1, 2)
+    """
     from geomech.plots.shown import ShownAxes
 
     fig, subplot = blank(width, height, layout), {"axes_class": ShownAxes}
@@ -105,7 +113,14 @@ def figure(
 
 
 def quantity(name: str, unit: str = "") -> str:
-    """Return the label of an axis: the name with its unit in brackets, a letter with an index drawn as one."""
+    """Return the label of an axis: the name with its unit in brackets, a letter with an index drawn as one.
+
+    Examples
+    --------
+    >>> from geomech.plots import quantity
+    >>> quantity("speed", "m/s")
+    'speed (m/s)'
+    """
     letter, _, index = name.partition("_")
     if index.isalnum() and (letter in GREEK or len(letter) == 1):
         name = rf"$\{letter}_{{{index}}}$" if letter in GREEK else f"${letter}_{{{index}}}$"
@@ -146,7 +161,18 @@ def check_format(path: str | Path) -> Path:
 @styled
 def save(fig: Figure, *paths: str | Path) -> None:
     """Write a figure, or that of Axes, to files, each of which appears whole or not at all. The figure is laid out once and
-    drawn once for each file, where `savefig` lays out and draws twice for each."""
+    drawn once for each file, where `savefig` lays out and draws twice for each.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from geomech.plots import figure, save
+    >>> fig, axes = figure(3.0, 3.0)
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "empty.png"
+    >>> save(fig, path)
+    >>> path.exists()
+    True
+    """
     fig = getattr(fig, "figure", fig)
     canvas, engine, dpi = fig.canvas, fig.get_layout_engine(), fig.dpi
     try:

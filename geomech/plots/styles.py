@@ -55,7 +55,14 @@ def streamlines(
     top: float | None = None, clim: float | str | None = None,
 ) -> Axes:  # fmt: skip
     """Draw row ``component`` of A as streamlines over shape space: along them a change of shape moves the body the most for
-    its size, across them not at all. Colour: length of the row. Other arguments as for `vector_field`."""
+    its size, across them not at all. Colour: length of the row. Other arguments as for `vector_field`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> ax = geomech.plots.streamlines(study.fitted, 0)
+    """
     from matplotlib.colors import Normalize
 
     ax = axes_of(ax)
@@ -85,7 +92,14 @@ def ccf_contours(
     """Draw a component of the CCF as contours, dashed below zero, and shade the area of each gait by the sign of its
     contribution to the displacement: CCF times winding number.
 
-    error: shapes where it exceeds the value have no shade. Other arguments as for `ccf_map`."""
+    error: shapes where it exceeds the value have no shade. Other arguments as for `ccf_map`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> ax = geomech.plots.ccf_contours(study.ccf(), 0)
+    """
     from matplotlib.ticker import MaxNLocator
 
     ax, field = axes_of(ax), drawable(field)
@@ -156,7 +170,13 @@ def ccf_surface(
     """Draw a component of the CCF as a surface over shape space, with gaits on it and, on the plane below, their areas shaded
     by sign as in `ccf_contours`.
 
-    ax: of projection "3d"; without it one of a new figure."""
+    ax: of projection "3d"; without it one of a new figure.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> ax = geomech.plots.ccf_surface(geomech.study("three-link-viscous", grid=15).ccf(), 0)
+    """
     from cmcrameri import cm
 
     from geomech.plots.style import blank

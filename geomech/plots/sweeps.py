@@ -34,9 +34,16 @@ OF_ROBOTS = {  # likewise, of scenes of robots
 
 def sweep_figure(scene: Any, results: Mapping) -> Figure:
     """Draw a sweep (`geomech.studies.sweep`) over one parameter or two: net distance or speed, or the speed of a robot.
-    Refusal for more."""
+    Refusal for more.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> swept = geomech.sweep("three-link-viscous", {"medium.ratio": [1.5, 2.0]})
+    >>> fig = geomech.plots.sweep_figure(swept.scene, swept)
+    """
     if len(over := results["over"]) > 2:
-        raise Refusal(f"cannot draw {len(over)} parameters", instead="sweep one or two, or leave --plot out")
+        raise Refusal(f"cannot draw {len(over)} parameters", instead="sweep one or two, or leave ``plot`` out")
     return (_speed_figure if "status" in results else _net_figure)(scene, results)
 
 

@@ -23,7 +23,14 @@ def stress_figure(survey: Any, point: tuple[float, float] | None = None) -> Figu
     """Draw alpha_z and alpha_x of an `rft.plates.Survey` over tilt and direction of motion (Fig. 7(c) and (d)), hatched where
     the map pulls.
 
-    point: (beta, gamma) in degrees to mark."""
+    point: (beta, gamma) in degrees to mark.
+
+    Examples
+    --------
+    >>> from geomech.plots import stress_figure
+    >>> from rft.plates import StressMap, survey
+    >>> fig = stress_figure(survey(StressMap(), cells=30))
+    """
     fig, axes = figure(8.6, 3.5, 2)
     for ax, name in zip(axes[0], "zx"):
         stress_map(ax, survey, name)
@@ -36,7 +43,15 @@ def stress_figure(survey: Any, point: tuple[float, float] | None = None) -> Figu
 
 def stress_map(ax: Axes, survey: Any, name: str) -> Axes:
     """Draw alpha_x or alpha_z (``name`` "x" or "z") of an `rft.plates.Survey` for motion forwards, hatched where it pulls.
-    Both have one scale of colours."""
+    Both have one scale of colours.
+
+    Examples
+    --------
+    >>> from geomech.plots import figure, stress_map
+    >>> from rft.plates import StressMap, survey
+    >>> fig, axes = figure(3.5, 3.5)
+    >>> ax = stress_map(axes[0, 0], survey(StressMap(), cells=30), "z")
+    """
     from cmcrameri import cm
 
     ahead = np.abs(survey.gamma) < np.pi / 2
@@ -69,7 +84,15 @@ def _point_on_map(beta: float, gamma: float) -> tuple[float, float]:
 @styled
 def intrusion_figure(scene: Any, found: Any) -> Any:
     """Draw an intruder scene and its run: the body, and force and moment along the motion. An outline is drawn at a few of its
-    poses, a mesh where the force is largest, with the stress on its faces."""
+    poses, a mesh where the force is largest, with the stress on its faces.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> from geomech.scenes import load
+    >>> scene = load("c-leg")
+    >>> fig = geomech.plots.intrusion_figure(scene, scene.run())
+    """
     fig, axes = figure(10.2, 3.2, 3)
     columns = scene.table(found)
     if hasattr(found, "trajectory"):

@@ -67,7 +67,7 @@ class Cost(NamedTuple):
         """Raise `TooLong` beyond the limits unless ``yes``. less: advice on a smaller request."""
         if not yes and (self.seconds > LONGEST or self.memory > LARGEST):
             limits = f"{duration(LONGEST)} or {_size(LARGEST)}"
-            raise TooLong(str(self), where=place, instead=f"to compute for more than {limits} say --yes, or {less}")
+            raise TooLong(str(self), where=place, instead=f"to compute for more than {limits} say ``yes``, or {less}")
 
 
 def assumed(samples: float, points: int, linear: bool, batches: float, back_end: str = "") -> float:

@@ -13,7 +13,7 @@ from concurrent.futures import BrokenExecutor, Future
 
 from geomech.io.files import note
 from geomech.run.backend import BACKENDS, VERSION, fastest
-from rft.refusal import Refusal, formatted
+from rft.refusal import Refusal, formatted, worded
 
 AHEAD = 4  # tasks for each worker that are submitted before the oldest is back
 LONGEST_END = 2.0  # s for a pool to notice that its processes were killed
@@ -107,7 +107,7 @@ class Cluster:
     remote = True
 
     def __init__(self, address: str):
-        self.address, self.place = address, f"--scheduler {address}"
+        self.address, self.place = address, f"``scheduler`` {address}"
         self.client = self._connected(_distributed())
         self.seen, self.threads, self.waited = -SEEN, 0, False
         try:
@@ -190,7 +190,7 @@ class Cluster:
     def look(self, future: Future) -> None:
         """Note, once, that all workers are gone; others may come."""
         if not future.done() and not self._count() and not self.waited:
-            note(f"{self.place}: no workers are left: waiting for others ('dask worker {self.address}')")
+            note(f"{worded(self.place)}: no workers are left: waiting for others ('dask worker {self.address}')")
             self.waited = True
 
     def failure(self, error: Exception) -> Exception:
@@ -201,7 +201,7 @@ class Cluster:
             meaning = "the scheduler, or the connection to it, was lost"
         else:
             meaning = f"{name}: {formatted(str(error), 120)}"
-        return RuntimeError(f"{self.place}: {meaning}")
+        return RuntimeError(f"{worded(self.place)}: {meaning}")
 
     def close(self) -> None:
         with contextlib.suppress(Exception):
@@ -213,7 +213,7 @@ def _distributed():
         import distributed
     except ImportError as error:
         raise Refusal(
-            f"--scheduler takes the package distributed ({error})", instead="pip install 'geomech[distributed]'"
+            f"``scheduler`` takes the package distributed ({error})", instead="pip install 'geomech[distributed]'"
         ) from None
     return distributed
 

@@ -225,7 +225,7 @@ class _Queue:
         try:
             self.order = packed(self.task, self.common, self.back_end)
         except Alone as error:
-            cure = "put it in a module, or in a file for --plugin"
+            cure = "put it in a module"
             if self.executor.remote:
                 raise Refusal(
                     "a cluster cannot know what is to be computed", because=str(error), instead=cure
@@ -282,7 +282,7 @@ class _Part:
             except Exception as error:
                 raise self.executor.failure(error) from error
         raise RuntimeError(
-            f"a worker process was ended {TRIES} times at the same part: out of memory? Take fewer --workers"
+            f"a worker process was ended {TRIES} times at the same part: out of memory? Take fewer workers"
         )
 
 

@@ -98,7 +98,7 @@ def perform(order: Order, item: bytes) -> bytes:
             value = compute_here(task, common, pickle.loads(item), order.back_end)
         except Exception as raised:
             error, where = _sendable(raised), traceback.format_exc()
-    notes = tuple((str(w.message), w.category, w.filename, w.lineno) for w in notes or ())
+    notes = tuple((str(w.message.args[0]), w.category, w.filename, w.lineno) for w in notes or ())
     return pickle.dumps(Outcome(value, error, where, notes))
 
 

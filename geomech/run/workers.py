@@ -28,7 +28,17 @@ def using(count: int | None = None, scheduler: str | None = None) -> Iterator[No
     Dask cluster of the ``scheduler`` at an address such as "tcp://10.0.0.1:8786".
 
     Processes start when a request turns out to be worth it. Refusal for wrong arguments, and at once for a scheduler
-    that does not answer."""
+    that does not answer.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> with geomech.workers.using(1):
+    ...     A = geomech.study("three-link-viscous", grid=9).fitted
+    ...
+    >>> A.A.shape
+    (3, 2, 9, 9)
+    """
     executor = _executor(count, scheduler)
     try:
         with (
@@ -46,7 +56,7 @@ def _executor(count: int | None, scheduler: str | None) -> Executor | None:
         in_range("``workers``", count, 1, MOST, whole=True)
     if scheduler is not None and count is not None:
         raise Refusal(
-            "``workers`` are processes of this machine, --scheduler has its own", instead="give one of the two"
+            "``workers`` are processes of this machine, ``scheduler`` has its own", instead="give one of the two"
         )
     if scheduler is None and (count or cores()) == 1:
         return None

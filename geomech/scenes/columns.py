@@ -18,21 +18,21 @@ def columns(place: str, path, required: tuple, optional: tuple[str, ...] = ()) -
     names for the same, returned under the first. Refusal, with ``place`` and the line, for any other file."""
     if not isinstance(path, (str, Path)):
         raise Refusal("file must be the name of a CSV file", value=path, where=place)
-    required = [(w,) if isinstance(w, str) else w for w in required]
-    header = ",".join(w[0] for w in required)
+    words = [(w,) if isinstance(w, str) else w for w in required]
+    header = ",".join(w[0] for w in words)
     with located(place):
         source = rows.read(path, LARGEST_FILE, f"give a CSV file with the header {header}")
         line, names = source.header
-        allowed = [n for w in required for n in w] + [*optional]
+        allowed = [n for w in words for n in w] + [*optional]
         if (
             [n for n in names if n not in allowed]
             or len({*names}) < len(names)
-            or any(not {*w} & {*names} for w in required)
+            or any(not {*w} & {*names} for w in words)
         ):
             more = f", and {','.join(optional)} if wanted" if optional else ""
             raise Refusal(f"the header must be {header}{more}", where=f"{source.name}, line {line}")
         values = dict(zip(names, source.numbers(names).T))
-    result = {w[0]: next(values[n] for n in w if n in values) for w in required}
+    result = {w[0]: next(values[n] for n in w if n in values) for w in words}
     return result | {n: values[n] for n in optional if n in values}
 
 

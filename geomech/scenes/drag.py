@@ -144,7 +144,7 @@ def _lengths(part: str):
             # radius_mm = 8, radius = 0.008
             in_unit = rf"{pattern}\s*\(?(um|mm|cm|m|)\)?\s*[=:]\s*{NUMBER}\s*(?![\s\d.e]*[cmu]?m)"
             matches += [(m[2], m[1], m.start()) for m in re.finditer(in_unit, part)]
-            yield from ((name, _rounded(float(x) * LENGTHS[unit] * share), place) for x, unit, place in matches)
+            yield from ((name, _rounded(float(x) * LENGTHS[str(unit)] * share), place) for x, unit, place in matches)
     for m in re.finditer(r"(?:diameter|radius)\s*(?:x|by|times)\s*" + LENGTH, part):
         yield "length", _rounded(float(m[1]) * LENGTHS[m[2]]), m.start()
 

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from geomech.geometry import connection
 from geomech.systems.base import System
-from geomech.systems.framed import Framed
+from geomech.systems.framed import NAME, Framed
+from geomech.systems.table import Table
 from geomech.tiers.base import Numerics
 from geomech.tiers.fitted import FIELD, LARGEST_GRID, directions
 from rft.refusal import Refusal
 
 
-def framed(system: System, numerics: Numerics) -> Framed:
+def framed(system: System, numerics: Numerics) -> System:
     """Return a system in its minimum-perturbation frame, on the grid of the numerics; the same object where these
     change nothing."""
+    if isinstance(system, Table):
+        return system.in_frame(NAME)  # on the grid of its file
     inner = system.inner if isinstance(system, Framed) else system
     if (count := numerics.grid**inner.joints) > LARGEST_GRID or (inner.joints > 3 and count > FIELD):
         raise Refusal(

@@ -48,7 +48,15 @@ class Intrusion(NamedTuple):
 @dataclass(frozen=True)
 class IntruderScene(Intruding):
     """A stress map, a body and its motion, and effects. elements: of the outline. files: those that the scene names. text: its
-    TOML."""
+    TOML.
+
+    Examples
+    --------
+    >>> from geomech.scenes import load
+    >>> forces = load("c-leg").run()
+    >>> forces.force.shape, forces.moment.shape
+    ((271, 2), (271,))
+    """
 
     medium: Annotated[PlateStress, Keys(StressKeys, owner="an intruder scene")]
     intruder: Annotated[Shape, OUTLINES]

@@ -23,6 +23,8 @@ class Intruding:
     per_part = 0.0
     example: ClassVar[str] = "c-leg"
     effects: tuple[GroundEffect, ...]
+    name: str
+    text: str
     files: tuple[str, ...]
 
     def _check(self) -> None:
@@ -60,7 +62,7 @@ class Intruding:
         """Order of the error in 1 / parts."""
         raise NotImplementedError
 
-    def changed(self, **parts: Any) -> Intruding:
+    def changed(self: Any, **parts: Any) -> Any:
         """Return the scene with other parts."""
         return dataclasses.replace(self, **parts)
 

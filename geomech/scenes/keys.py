@@ -11,7 +11,7 @@ from geomech.core.entry_points import unloaded
 from geomech.core.errors import choose
 from geomech.scenes.intruder import IntruderScene
 from geomech.scenes.key import Key, first_sentence
-from geomech.scenes.model import Scene
+from geomech.scenes.model import SWIMMER, Scene
 from geomech.scenes.sections import Each, Keys, OneOf, Section, Variant, file_sections, keys_in, variants
 from geomech.scenes.solid import MeshScene
 from geomech.scenes.swimming import solvers
@@ -70,7 +70,8 @@ def _part(name: str, section: Section, variant: Variant) -> Part:
         about.append(f"Its tables, {inner}, may as well stand by themselves.")
     elif variant.inner:
         inner = " and ".join(f"[{name}.{part}]" for part in variant.inner)
-        about.append(f"'geomech reference intruder' has the keys of {inner}.")
+        where = [part for part in variant.inner if part in SWIMMER] or ["intruder"]
+        about.append(f"'geomech reference {where[0]}' has the keys of {inner}.")
     if variant.implied:
         about.append(f"It need not say its {section.key}.")
     owner = f" of {section.owner}" if section.owner else ""

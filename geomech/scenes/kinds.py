@@ -36,7 +36,20 @@ def register(part: Any = None, /, **members: Any) -> Any:
     members: of a function ``velocity(alpha, alphadot)`` that is a system: its ``joints``, and ``kind``, ``length`` and
     ``traits`` if they are not its name, 1 and `Traits()`; of a function ``positions(alpha)`` that returns the poses of the
     links of a body: ``joints`` and ``lengths``. Other parameters are keys of a scene. ValueError for what is no part, no
-    frozen dataclass where a class, or has a name that is taken."""
+    frozen dataclass where a class, or has a name that is taken.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import geomech
+    >>> @geomech.register(joints=2)
+    ... def drift(alpha, alphadot):
+    ...     return np.stack([alphadot[..., 0] * np.sin(alpha[..., 1]), 0 * alpha[..., 0], 0 * alpha[..., 0]], -1)
+    ...
+    >>> table = geomech.study(drift, geomech.gaits.Circle(0.5)).displacement(tiers="direct")
+    >>> [round(x, 3) for x in table["net_distance"]["direct"]]
+    [0.761]
+    """
     if part is None and members:
         return lambda function: register(function, **members)
     for name, value in members.items():
@@ -67,7 +80,7 @@ def load_file(path: str | Path) -> list[str]:
     if not isinstance(path, (str, Path)):
         raise Refusal("a file of one's own is named by text", value=path)
     path = Path(path)
-    place = f"--plugin {path}"
+    place = f"``plugin`` {path}"
     if path.suffix != ".py":
         raise Refusal("give a Python file, with a name that ends in .py", where=place)
     try:
@@ -90,7 +103,7 @@ def _module(full_name: str) -> str:
 
 
 def _load(path: Path, full_name: str, text: str) -> list[str]:
-    place, name = f"--plugin {path}", _module(full_name)
+    place, name = f"``plugin`` {path}", _module(full_name)
     module = types.ModuleType(name)
     module.__file__ = str(path)
     with _all_or_none(name, module):

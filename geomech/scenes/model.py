@@ -36,10 +36,16 @@ SWIMMER = {
     "body": OneOf(PARTS["body"], sized=True),
     "effects": Each(PARTS["effects"], sized=True),
 }
+TABLE = {"body": OneOf({"chain": PARTS["body"]["chain"]}), "medium": MEDIUM}  # of a table whose file does not say them
 
 
 class Displayed:
     """The `repr` of a scene: its name and its parts, in a line of readable length."""
+
+    name: str
+    system: System
+    gait: Gait
+    numerics: Numerics
 
     def __repr__(self) -> str:
         return f"Scene({printable(self.name)}: {formatted(self.system, 160)}, {formatted(self.gait, 100)}, {self.numerics!r})"
@@ -48,9 +54,19 @@ class Displayed:
 @dataclass(frozen=True, repr=False)
 class Scene(Displayed):
     """A system and a gait. numerics: the tiers'; the system has its own. name: a built-in one's, or its file's. text: the
-    TOML it was read from, if it was; `geomech.scenes.write` says whether it still holds. files: others it was read from."""
+    TOML it was read from, if it was; `geomech.scenes.write` says whether it still holds. files: others it was read from.
 
-    system: Annotated[System, OneOf(SYSTEMS, inner={SHORT: SWIMMER}, sized=True, short=SHORT)]
+    Examples
+    --------
+    >>> from geomech.gaits import Circle
+    >>> from geomech.scenes import Scene
+    >>> from geomech.systems import NoSlipSnake
+    >>> scene = Scene(NoSlipSnake(), Circle(0.3, centre=(0.7, -0.7)))
+    >>> scene.system.joints, scene.numerics.phases
+    (2, 256)
+    """
+
+    system: Annotated[System, OneOf(SYSTEMS, inner={SHORT: SWIMMER, "table": TABLE}, sized=True, short=SHORT)]
     gait: Annotated[Gait, OneOf(GAITS, sized=True)]
     numerics: Annotated[Numerics, Keys(Numerics)] = field(default_factory=Numerics)
     name: str = "scene"

@@ -9,7 +9,7 @@ from typing import Any
 from geomech.gaits import Circle, Gait, Wave
 from geomech.scenes.model import Scene
 from geomech.scenes.read import load, medium_of
-from geomech.systems.base import as_system
+from geomech.systems.base import System, as_system
 from geomech.systems.swimmer import Swimmer
 from rft.refusal import Refusal, formatted
 
@@ -53,7 +53,7 @@ def _assembled(parts: Sequence, effects: tuple) -> Scene:
     bodies = [p for p in parts if _is_body(p)]
     others = [p for p in parts if not (_is_gait(p) or _is_medium(p) or _is_body(p))]
     if (len(media), len(bodies), len(others)) == (1, 1, 0) and len(gaits) <= 1:
-        system = Swimmer(media[0], bodies[0], effects)
+        system: System = Swimmer(media[0], bodies[0], effects)
     elif (media, bodies, effects) == ([], [], ()) and len(others) == 1 and len(gaits) <= 1 and _moves(others[0]):
         system = as_system(others[0], gaits[0].joints if gaits else 2)
     else:

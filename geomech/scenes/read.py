@@ -27,17 +27,38 @@ PIPE = "pipe"  # name of a scene that comes through one, as from /dev/stdin or <
 
 
 def builtin_names() -> list[str]:
-    """Return the names of the scenes with a gait that ship with the package."""
+    """Return the names of the scenes with a gait that ship with the package.
+
+    Examples
+    --------
+    >>> from geomech.scenes import builtin_names
+    >>> "three-link-glass" in builtin_names()
+    True
+    """
     return _names("")
 
 
 def intruder_names() -> list[str]:
-    """Return the names of the intruder scenes that ship with the package."""
+    """Return the names of the intruder scenes that ship with the package.
+
+    Examples
+    --------
+    >>> from geomech.scenes import intruder_names
+    >>> "c-leg" in intruder_names()
+    True
+    """
     return _names("intruders")
 
 
 def walker_names() -> list[str]:
-    """Return the names of the scenes of walking robots that ship with the package."""
+    """Return the names of the scenes of walking robots that ship with the package.
+
+    Examples
+    --------
+    >>> from geomech.scenes import walker_names
+    >>> "xplorer" in walker_names()
+    True
+    """
     return _names("walkers")
 
 
@@ -59,7 +80,15 @@ def builtin_text(name: str) -> str | None:
 
 def load(scene: str | Path) -> Scene | Any:
     """Return the scene of a built-in name or a TOML file: an intruder scene if it has an [intruder], a `WalkerScene` if
-    a [robot] (Any, so that no type checker asks which). Refusal if there is none."""
+    a [robot] (Any, so that no type checker asks which). Refusal if there is none.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> scene = geomech.load("three-link-glass")
+    >>> scene.system.medium.C, scene.gait
+    (1.8, Circle(amplitude=1.0, centre=(), reverse=True, frequency=None))
+    """
     if not isinstance(scene, (str, Path)):
         raise Refusal("scene must be a name or a TOML file", value=scene)
     if (text := builtin_text(str(scene))) is not None:
@@ -80,7 +109,7 @@ def load(scene: str | Path) -> Scene | Any:
             instead=f"give a TOML file or one of {', '.join(names)}",
         ) from None
     result = parse(text, str(scene))
-    system = getattr(result, "system", None)
+    system: Any = getattr(result, "system", None)
     for line in getattr(system, "assumed", ()):
         note(f"{system.file}: {line}")
     return result
@@ -89,7 +118,18 @@ def load(scene: str | Path) -> Scene | Any:
 def in_medium(scene: Scene, file: str | Path) -> Scene:
     """Return the scene in another medium, from a file as ``[medium] file`` takes it, or a table of drag if its name
     ends in .csv; relative to the current folder. Refusal if the file has no medium, or the scene's system takes
-    none."""
+    none.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import geomech
+    >>> from geomech.scenes import in_medium, load
+    >>> file = pathlib.Path(tempfile.mkdtemp()) / "sand.toml"
+    >>> geomech.fit_medium("dem-rod-drag").save(file)
+    >>> round(in_medium(load("three-link-glass"), file).system.medium.C, 2)
+    1.49
+    """
     if not isinstance(scene.system, Swimmer):
         raise Refusal(f"a {kind_of(scene.system)} takes no medium", where=scene.name)
     medium, files = _medium_file(file, scene.name)
@@ -114,14 +154,38 @@ def _medium_file(file: str | Path, place: str) -> tuple[Any, tuple[str, ...]]:
 
 def inputs(scene: Scene | Intruding | WalkerScene) -> list[Path]:
     """Return the files that a scene was read from: its own, unless it is built in or came through a pipe, and those of
-    its medium, gait and system, or of an intruder scene's parts."""
-    parts = () if hasattr(scene, "intruder") or hasattr(scene, "robot") else (checked_scene(scene).gait, scene.system)
+    its medium, gait and system, or of an intruder scene's parts.
+
+    Examples
+    --------
+    >>> from geomech.scenes import inputs, load
+    >>> inputs(load("three-link-glass"))  # of a built-in scene there are none
+    []
+    """
+    alone = hasattr(scene, "intruder") or hasattr(scene, "robot")
+    parts: tuple = () if alone else ((whole := checked_scene(scene)).gait, whole.system)
     own_file = [] if scene.name in [PIPE, *builtin_names(), *intruder_names(), *walker_names()] else [scene.name]
     return [Path(x) for x in (*own_file, *scene.files, *(getattr(part, "file", None) for part in parts)) if x]
 
 
 def parse(text: str, name: str = "scene") -> Scene | Any:
-    """Return the scene of a TOML text; Refusal if it is none."""
+    """Return the scene of a TOML text; Refusal if it is none.
+
+    Examples
+    --------
+    >>> from geomech.scenes import parse
+    >>> text = '''
+    ... [medium]
+    ... law = "viscous"
+    ... [body]
+    ... kind = "chain"
+    ... [gait]
+    ... kind = "circle"
+    ... amplitude = 0.5
+    ... '''
+    >>> parse(text).gait.amplitude
+    0.5
+    """
     if not isinstance(text, str):
         raise Refusal("a scene is a TOML text", value=text, where=formatted(name))
     try:
@@ -144,7 +208,15 @@ def _intruding(tables: Mapping, name: str) -> type[Intruding]:
 
 
 def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | Any:
-    """Return the scene of the tables of a TOML text; Refusal if they make none."""
+    """Return the scene of the tables of a TOML text; Refusal if they make none.
+
+    Examples
+    --------
+    >>> from geomech.scenes import from_tables
+    >>> body, gait = {"kind": "chain"}, {"kind": "circle", "amplitude": 0.5}
+    >>> from_tables({"medium": {"law": "viscous"}, "body": body, "gait": gait}).system.medium.ratio
+    2.0
+    """
     if not isinstance(tables, Mapping):
         raise Refusal("a scene is a dict of tables", value=tables, where=formatted(name))
     if "robot" in tables:

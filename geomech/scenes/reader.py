@@ -112,7 +112,7 @@ def _read_one(source: Source, path: str, table: Mapping, section: Section) -> An
         if field in table:
             _check_form(source, within, table[field], part)
             inner[field] = read_section(source, within, table.pop(field), part)
-        elif not isinstance(part, Each):
+        elif field in variant.needed:
             raise Refusal(f"the table [{within}] is missing", where=place, instead=f"add it, {source.cure}")
     if variant.file:
         table = _from_file(place, table, variant)

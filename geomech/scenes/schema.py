@@ -90,7 +90,7 @@ def _variant(variant: Variant, elsewhere: Collection[str] = (), short: str = "")
     needed = [*(named if not variant.implied else ())]
     needed += [key.name for key in keys if key.required and not key.degrees and key.name not in elsewhere]
     if short not in variant.named.values():
-        needed += [field for field, section in variant.inner.items() if not isinstance(section, Each)]
+        needed += variant.needed
     rules = [_spelled(key) for key in keys if len(key.spellings) > 1]
     if alternatives:
         rules.append(_alternatives(alternatives, {key.alias or key.name: key for key in keys}))

@@ -127,6 +127,12 @@ class Variant(NamedTuple):
         return getattr(self.kind, "alternatives", None)
 
     @property
+    def needed(self) -> list[str]:
+        """Names of the sections within it that a file must have."""
+        optional = {f.name for f in dataclasses.fields(self.kind) if f.default is not f.default_factory}
+        return [name for name in self.inner if name not in optional]
+
+    @property
     def label(self) -> str:
         """The keys that name it, as a file has them."""
         return ", ".join(f'{key} = "{name}"' for key, name in self.named.items())

@@ -44,7 +44,7 @@ def _imported(module: str, text: bytes) -> Iterator[str]:
     for node in nodes:
         base: list[str] = []
         if isinstance(node, ast.ImportFrom):
-            base = package[: len(package) + 1 - node.level] * bool(node.level) + [node.module] * bool(node.module)
+            base = package[: len(package) + 1 - node.level] * bool(node.level) + [node.module or ""] * bool(node.module)
         if isinstance(node, ast.Import | ast.ImportFrom):
             for alias in node.names:
                 yield from _with_packages(".".join([*base, alias.name]))

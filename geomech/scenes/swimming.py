@@ -16,7 +16,6 @@ from geomech.systems import KINDS as SYSTEMS
 from geomech.systems.base import System
 from geomech.systems.capabilities import solver_of
 from geomech.systems.framed import NAME as FITTED
-from geomech.systems.swimmer import Swimmer
 from geomech.tiers.base import Numerics
 from rft.refusal import Refusal, located
 
@@ -38,7 +37,7 @@ def from_tables(tables: Mapping, name: str, text: str) -> Scene:
         system = reader.read_sections(Scene, {"system": _system(tables, name)}, source)["system"]
         source.sizes.all_used()
         system, numerics = _with_numerics(system, tables.get("numerics", {}), source)
-        files = tuple(source.files) if isinstance(system, Swimmer) else ()  # others know their own, as gaits do
+        files = tuple(file for file in source.files if file != getattr(system, "file", None))  # which it knows itself
         return Scene(framed(system, numerics) if fitted else system, gait, numerics, name, text, files)
 
 

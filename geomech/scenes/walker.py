@@ -27,7 +27,15 @@ OWNER = "a robot that walks"
 @dataclass(frozen=True)
 class WalkerScene:
     """A stress map or a law of three dimensions, a robot and its gait, and effects on the ground. numerics: how finely. text:
-    its TOML. files: those that the scene names."""
+    its TOML. files: those that the scene names.
+
+    Examples
+    --------
+    >>> from geomech.scenes import load
+    >>> scene = load("xplorer")
+    >>> scene.robot.mass, scene.gait.frequency  # kg, Hz
+    (0.15, 2.0)
+    """
 
     medium: Annotated[PlateStress | Spatial, OneOf(LAWS, "law", implied=tuple(LAWS), owner=OWNER, meaning=LAW)]
     robot: Annotated[

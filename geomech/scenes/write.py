@@ -20,6 +20,7 @@ from geomech.systems.base import unwrapped
 from geomech.systems.capabilities import solver_of
 from geomech.systems.framed import Framed
 from geomech.systems.swimmer import Swimmer, name_in
+from geomech.systems.table import Table
 from rft.refusal import Refusal, located
 
 if TYPE_CHECKING:
@@ -30,7 +31,17 @@ if TYPE_CHECKING:
 def toml(scene: Scene | Intruding | WalkerScene) -> str:
     """Return the text that the scene was read from where it is valid by itself and in any folder, comments and all;
     else a new one, which spells out a medium that came from a file, and names other files with their folders. Refusal
-    if it has a part that no scene file can name."""
+    if it has a part that no scene file can name.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> scene = geomech.study(geomech.media.Viscous(3.0), geomech.bodies.Chain(), geomech.gaits.Circle(0.5)).scene
+    >>> print(geomech.toml(scene).partition("[body]")[0].strip())
+    [medium]
+    law = "viscous"
+    ratio = 3.0
+    """
     self_contained = not isinstance(_checked(scene), Scene) or not (scene.files or _names_relative_file(scene.text))
     if scene.text and self_contained and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene:
         return scene.text
@@ -83,7 +94,14 @@ def vertical_toml(name: str, entry) -> str:
 
 def tables(scene: Scene | Intruding | WalkerScene) -> dict:
     """Return the tables of a scene's text, with its present numerics, where these make the scene; else newly written
-    ones."""
+    ones.
+
+    Examples
+    --------
+    >>> from geomech.scenes import load, tables
+    >>> tables(load("three-link-viscous"))["gait"]["kind"]
+    'circle'
+    """
     read = tomllib.loads(_checked(scene).text)
     if isinstance(scene, Scene):
         read["numerics"] = _numerics(scene)
@@ -126,7 +144,8 @@ def _section(part: Any, section: Section) -> dict:
     for variant in variants(section):
         is_one = type(part) is getattr(variant.kind, "makes", variant.kind)
         if is_one and not (variant.file and not variant.file.keys):
-            inner = {field: section_tables(getattr(part, field), one) for field, one in variant.inner.items()}
+            parts = {field: (getattr(part, field), one) for field, one in variant.inner.items()}
+            inner = {field: section_tables(*each) for field, each in parts.items() if each[0] is not None}
             return {**variant.named, **_fields(part, variant.kind), **inner}
         if is_one or isinstance(section, Keys):
             raise Refusal(
@@ -145,7 +164,7 @@ def _short(tables: dict, scene: Scene) -> dict:
     else:
         tables = {"system": system} | tables
     for part in ("body", "system"):
-        if "frame" in tables.get(part, {}):
+        if "frame" in tables.get(part, {}) and tables[part].get("kind") != Table.kind:  # which has its file's otherwise
             del tables[part]["frame"]
             if scene.frame != "mean":
                 tables = {"frame": scene.frame} | tables

@@ -56,21 +56,26 @@ def why_none(system: System) -> str:
     """Return why a system has no metric, in words that follow its name; "" if it has one."""
     if parts := because(system, SHAPE_ALONE):
         return f"no metric with {parts}: its power does not follow from shape alone"
-    if stored_table(system, "connection"):
-        return "" if stored_table(system, "metric") else "no metric with this table: its file tells no power"
-    if capability(system, OwnMetric) is not None:
+    if stored_table(system, "metric") or capability(system, OwnMetric) is not None:
         return ""
+    if stored_table(system, "connection") and capability(system, Dissipative) is None:
+        return "no metric with this table: its file tells no power, and the scene no medium"
     if system.traits.power_degree is None:
         has_power = capability(system, Dissipative) is not None
         power = "its power is of no one degree in the rate" if has_power else "nothing says what moving costs"
         return f"no metric with {_responsible_parts(system)}: {power}"
-    if not system.traits.linear and system.joints != 2:
+    if not is_quadratic(system) and system.joints != 2:
         return f"no metric of {system.joints} joints where power is not quadratic: its norm is told for two"
     return (
         ""
         if _even(system)
         else f"no metric with {_responsible_parts(system)}: one way costs another power than the way back"
     )
+
+
+def is_quadratic(system: System) -> bool:
+    """Return whether power is a quadratic form of alphadot: that of a linear medium where xi = A alphadot."""
+    return system.traits.linear and system.traits.power_degree in (None, 2.0)
 
 
 def _responsible_parts(system: System) -> str:
@@ -97,7 +102,7 @@ def table(system: System, numerics: Numerics, progress: Callable | None = None) 
         return own
     grid, degree = axes(system, numerics), numerics.interpolation
     own = capability(system, OwnMetric)
-    if own is not None or system.traits.linear:
+    if own is not None or is_quadratic(system):
         return metric.fit(own.squared_speed if own else partial(power, system), grid, degree, progress)
     norm = partial(_norm_of, system)
     count = harmonic.directions(system, numerics)

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from geomech.core.variables import Result, Variable
 from geomech.geometry import two_form
 from geomech.geometry.connection import Connection
+from geomech.geometry.curvature import ccf, exterior_derivative
 from geomech.geometry.field import Field
 from geomech.geometry.harmonics import Harmonics
 from geomech.geometry.metric import Finsler, Metric
+from geomech.geometry.minimum_perturbation import minimum_perturbation
 from geomech.geometry.tube import TaylorSeries, Tube
 from geomech.geometry.two_form import TwoForm
 from geomech.io.results import unit_name
-from geomech.io.tables import FORMATS
+from geomech.io.tables import FORMATS, LAYOUTS
+from geomech.io.tables.base import UNKNOWN_FRAME, body_text
 from geomech.io.tables.netcdf import SHAPE
 from geomech.scenes.model import Scene
 from geomech.scenes.write import toml
@@ -28,6 +33,7 @@ from geomech.systems.capabilities import OwnMetric, Recorded, capability, solver
 from geomech.systems.framed import Framed
 from rft.refusal import Refusal
 
+WHOLE, A_ALONE, STRUCT = "whole", "A", "struct"  # contents of files
 ERROR_OF_CCF = "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
 INTERVAL_OF_CCF = "half width of the interval of ccf"
 INTERVAL_OF_A = "half width of the interval of A"
@@ -45,10 +51,33 @@ def of_study(study: Study) -> Result:
 
 
 def of_connection_alone(study: Study) -> Result:
-    """Return what `of_study` has of A, its errors and its axes."""
+    """Return what `of_study` has of A, its errors and its axes, and of a metric that is a quadratic form."""
     labels = shape_labels(study.scene.system)
     variables = of_connection(study.fitted, stored_table(study.scene.system, "A_error")) + of_even_part(study)
+    if has_matrix(study.scene.system):
+        variables += of_metric(study.metric, capability(study.scene.system, OwnMetric) is None)
     return Result("connection", (*coordinates(study.fitted.axes, labels), *variables), attributes(study), study)
+
+
+def of_struct(study: Study) -> Result:
+    """Return what sysplotter's struct s has of a connection of two joints: that of `of_connection_alone`, the same in
+    minimum-perturbation coordinates, the pose of their frame, and CCFs with their part dA."""
+    alone, fitted = of_connection_alone(study), study.fitted
+    frame = minimum_perturbation(fitted)
+    optimised = replace(fitted, A=frame.connection(fitted))
+    variables = [replace(of_connection(optimised)[0], name="A_optimised"), of_frame(frame.field)]
+    for ending, each in (("", fitted), ("_optimized", optimised)):
+        variables.append(of_ccf(ccf(each), name=f"ccf{ending}"))
+        variables.append(of_ccf(replace(fitted.field, values=exterior_derivative(each)), name=f"exterior{ending}"))
+    return Result(alone.kind, (*alone.variables, *variables), alone.attributes, study)
+
+
+CONTENTS = {WHOLE: of_study, A_ALONE: of_connection_alone, STRUCT: of_struct}
+
+
+def contents(file: Callable, layout: str | None = None) -> str:
+    """Return which of CONTENTS a format writes, in a layout that it may have."""
+    return STRUCT if layout == LAYOUTS[1] else WHOLE if getattr(file, "whole", True) else A_ALONE
 
 
 def save_connection(path: str | Path, study: Study, **settings: str) -> None:
@@ -56,7 +85,13 @@ def save_connection(path: str | Path, study: Study, **settings: str) -> None:
     whole or not at all."""
     file = FORMATS[Path(path).suffix]
     check_joints(study.scene, file)
-    file.write(path, (of_study if getattr(file, "whole", True) else of_connection_alone)(study), **settings)
+    file.write(path, CONTENTS[contents(file, settings.get("layout"))](study), **settings)
+
+
+def has_matrix(system: System) -> bool:
+    """Return whether a system has a metric that is a quadratic form of the rates of shape."""
+    own = stored_table(system, "metric")
+    return isinstance(own, Metric) if own else not effort.why_none(system) and effort.is_quadratic(system)
 
 
 def check_joints(scene: Scene, file: Callable | None) -> None:
@@ -285,10 +320,16 @@ def recorded(system: System) -> dict:
     return {} if recorded is None else dict(recorded.about())
 
 
+def _body(system: System) -> Any:
+    """Return the body of a system, or of the table that it is; None without one."""
+    inner = system.inner if isinstance(system, Framed) else system
+    return getattr(getattr(inner, "stored", inner), "body", None)
+
+
 def about(scene: Scene) -> dict:
     """Return the conventions of a connection as attributes of a file: frame, length, forces and signs."""
     system = scene.system
-    meanings = {"mean": "centre of mass, length-weighted mean heading", "that of the table": "not told by its file"}
+    meanings = {"mean": "centre of mass, length-weighted mean heading", UNKNOWN_FRAME: "not told by its file"}
     meanings["minimum-perturbation"] = "the one in which the squares of A, integrated over the grid, are least"
     meanings["that of the log"] = "the one whose x, y and heading were logged"
     meaning = meanings.get(scene.frame, "centre and heading of that link, 1 the tail")
@@ -299,6 +340,7 @@ def about(scene: Scene) -> dict:
         "body_length": float(system.length),
         "length_unit": unit_name(length_unit(system)),
         **recorded(system),
+        **({"body": text} if (text := body_text(_body(system))) else {}),
         "components": "x, y, theta of the body velocity xi: forward (tail to head), to the left, counter-clockwise",
         "sign_of_A": "xi = + A alphadot",
         "sign_of_ccf": "CCF = dA + [A, A] with [X, Y] = XY - YX, positive for counter-clockwise loops",

@@ -63,7 +63,7 @@ class Grid:
 
     @cached_property
     def at(self) -> At:
-        return At(self.tables, self.scene, tuple(self.names))
+        return At(dict(self.tables), self.scene, tuple(self.names))
 
     def corners(self) -> Iterator[tuple[float, ...]]:
         """Yield the corners, and the values of each parameter with the others at their first: all, or of more than `MOST`
@@ -104,7 +104,7 @@ def _listed(name: str, values: Any) -> list[float]:
 class At(NamedTuple):
     """The scene at a point of a grid."""
 
-    tables: Mapping[str, Any]
+    tables: dict[str, Any]
     scene: Any
     names: tuple[str, ...]
 
@@ -170,6 +170,6 @@ def at_points(over: Mapping[str, list[float]], names: tuple[str, ...], value):
     or None."""
     for axis, (name, values) in enumerate(over.items()):
         if name.partition(".")[0] in names and name.rpartition(".")[2] == names[-1]:
-            values = np.reshape(values, [-1 if k == axis else 1 for k in range(len(over))])
-            return np.broadcast_to(values, [len(v) for v in over.values()]).copy()
+            along = np.reshape(values, [-1 if k == axis else 1 for k in range(len(over))])
+            return np.broadcast_to(along, [len(v) for v in over.values()]).copy()
     return None if value is None else np.full([len(v) for v in over.values()], float(value))

@@ -57,7 +57,7 @@ class Lab(Question):
     def _own(self) -> float:
         """Value of the parameter in the scene itself."""
         if len(self.over) != 1:
-            raise Refusal("a family has one parameter", value=list(self.over), instead="give --over once")
+            raise Refusal("a family has one parameter", value=list(self.over), instead="give ``over`` once")
         key = next(iter(self.over))
         section, _, name = key.partition(".")
         if section not in SECTIONS:

@@ -22,6 +22,7 @@ from geomech.studies.cost import Job, frame, harmonics, of_even_part, of_metric,
 from geomech.studies.cost import connection as fitted
 from geomech.studies.cost import study as displacement
 from geomech.studies.effort import shared, why_none
+from geomech.studies.fields import WHOLE, has_matrix
 from geomech.studies.question import Allow, Progress, Question
 from geomech.studies.study import Study, refuse_outside
 from geomech.systems.base import shape_labels
@@ -32,7 +33,6 @@ from geomech.tiers.harmonic import is_looked_up
 from rft.refusal import Refusal, located
 
 NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
-WHOLE, A_ALONE = "whole", "A"
 MOST_PAIRS = 10  # of joints in a figure: as many as five joints have
 
 
@@ -57,7 +57,7 @@ class ShapeSpace(Question):
 
     kind: "connection" or "ccf", of the result.
 
-    file: contents of a file, WHOLE with metric and harmonics, or A_ALONE; "" for none. field: computed on the scene's grid.
+    file: contents of a file, one of `fields.CONTENTS`; "" for none. field: computed on the scene's grid.
     map: drawn on that grid. planes: drawn where two joints move, of ``pair``, such as "1,3", or of all pairs; slice_angles:
     angles of the other joints, rad, the gait's middle if None. metric: with the cost of changes of shape. stretch: with shape
     space stretched to that cost. gait: the scene's gait is drawn, and must lie within. other_frame: name of another body frame,
@@ -85,7 +85,7 @@ class ShapeSpace(Question):
     @property
     def less(self) -> str:
         joints = self.scene.system.joints
-        return f"lower --grid, to {finest_grid(joints)} or less" if joints > 2 and self.field else "ask for less"
+        return f"lower ``grid``, to {finest_grid(joints)} or less" if joints > 2 and self.field else "ask for less"
 
     @cached_property
     def study(self) -> Study:
@@ -99,7 +99,9 @@ class ShapeSpace(Question):
     @property
     def _costed(self) -> bool:
         """Whether the metric is computed."""
-        return self.metric or (self.file == WHOLE and not why_none(self.scene.system))
+        system = self.scene.system
+        needed = {"": False, WHOLE: not why_none(system)}
+        return self.metric or needed.get(self.file, has_matrix(system))
 
     @property
     def _enclosed(self) -> bool:
@@ -167,7 +169,7 @@ class ShapeSpace(Question):
         spent = self.cost().balances, time.perf_counter() - start
         space = Space(study, self.other, tuple(values[:count]), other_planes, stretched, enclosed, *spent)
         if self.file:
-            file = (fields.of_study if self.file == WHOLE else fields.of_connection_alone)(study)
+            file = fields.CONTENTS[self.file](study)
             return Result(file.kind, file.variables, file.attributes, space)
         if not self.field:
             return Result(self.kind, tuple(_of_plane(*x) for x in zip(self._at, space.planes)), {}, space)
@@ -259,17 +261,18 @@ def ccf(
 def connection(
     scene: Scene,
     file: Callable | None,
+    layout: str | None,
     drawn: bool,
     pair: str | None,
     slice_angles: tuple[float, ...] | None,
     other_frame: str | None,
 ) -> ShapeSpace:
-    """Return the question of a connection. file: the format of its file (`geomech.io.tables.FORMATS`), or None. drawn: its
-    picture is, too."""
+    """Return the question of a connection. file: the format of its file (`geomech.io.tables.FORMATS`), or None. layout: that
+    of the file, None for its first. drawn: its picture is, too."""
     fields.check_joints(scene, file)
     sliced = drawn and (scene.system.joints > 2 or pair is not None or slice_angles is not None)
     if sliced and other_frame is not None:
-        raise Refusal("``compare_frame`` draws maps of two joints", instead="drop it, or see 'geomech ccf --pair'")
+        raise Refusal("``compare_frame`` draws maps of two joints", instead="drop it, or see ``Study.ccf(pair=...)``")
     picture = {
         "map": drawn and not sliced,
         "planes": sliced,
@@ -277,5 +280,5 @@ def connection(
         "slice_angles": slice_angles,
         "other_frame": other_frame,
     }
-    contents = "" if file is None else WHOLE if getattr(file, "whole", True) else A_ALONE
+    contents = "" if file is None else fields.contents(file, layout)
     return ShapeSpace(scene, "connection", contents, **picture)

@@ -31,9 +31,9 @@ class Stress(Question):
 
     def check(self) -> None:
         if (self.beta is None) != (self.gamma is None) or (self.beta is None and not self.drawn):
-            raise Refusal("give both --beta and --gamma, in degrees, or --plot for all angles")
+            raise Refusal("give both ``beta`` and ``gamma``, in degrees, or ``drawn`` for all angles")
         if not all(x is None or abs(x) <= LARGEST_ANGLE for x in (self.beta, self.gamma)):
-            raise Refusal("--beta and --gamma must be finite angles in degrees, of at most 1e6")
+            raise Refusal("``beta`` and ``gamma`` must be finite angles in degrees, of at most 1e6")
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
         law = load_medium(self.medium)

@@ -6,7 +6,7 @@ import copy
 import sys
 import time
 from collections.abc import Callable, Sequence
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -148,10 +148,11 @@ class Study:
     def plane(self, pair: Sequence[int], at: ArrayLike | None = None, progress: Callable | None = None) -> Plane:
         """Return a plane of shape space in which two joints move, counted from 0, through a shape or the gait's middle:
         the CCF of that pair, without a field of all joints (`geomech.geometry.plane`)."""
-        s, at = self.scene, self.scene.gait.middle if at is None else at
+        s, both = self.scene, cast(tuple[int, int], tuple(pair))
+        place: Any = s.gait.middle if at is None else at
         with located(s.name):
-            build = lambda: fitted.plane(s.system, s.numerics, tuple(pair), at, progress)
-            return self._stored("plane", (*self._connection().key, *pair, *at), build)[0]
+            build = lambda: fitted.plane(s.system, s.numerics, both, place, progress)
+            return self._stored("plane", (*self._connection().key, *both, *place), build)[0]
 
     @property
     def two_form(self) -> TwoForm:
@@ -248,8 +249,8 @@ class Study:
         tier from there, of the direct one with its errors; "errors" of the others, without the direct tier; "medium" of
         the errors of an uncertain one. kept: the tables that were stored before, whose seconds are not part of this
         call."""
-        gait, amplitudes, chosen = self._checked(gait, amplitudes, tiers)
-        medium, took = timed(lambda: uncertainty.of_medium(self.scene, gait, amplitudes))  # first, as it may refuse
+        gait, values, chosen = self._checked(gait, amplitudes, tiers)
+        medium, took = timed(lambda: uncertainty.of_medium(self.scene, gait, values))  # first, as it may refuse
         seconds, stored = self._build_all(chosen, progress)
         if medium:
             seconds["medium"] = took
@@ -260,20 +261,20 @@ class Study:
             chosen, key=lambda m: (not chosen[m].exact, -order.index(m))
         ):  # the direct tier first, as the reference of others
             if chosen[tier].exact:
-                direct = lambda: estimate.direct(self.scene, gait, amplitudes, self.scene.numerics.phases)
+                direct = lambda: estimate.direct(self.scene, gait, values, self.scene.numerics.phases)
                 reference, seconds[tier] = timed(direct)
                 poses[tier], errors[tier] = reference
             else:
-                poses[tier], seconds[tier] = timed(lambda m=tier: self.poses(m, gait, amplitudes))
-                check = lambda m=tier: estimate.against_direct(self.scene, poses[m], gait, amplitudes, reference)
+                poses[tier], seconds[tier] = timed(lambda m=tier: self.poses(m, gait, values))
+                check = lambda m=tier: estimate.against_direct(self.scene, poses[m], gait, values, reference)
                 errors[tier], took = timed(check)
-                if (spread := self.spread(tier, gait, amplitudes)) is not None:
+                if (spread := self.spread(tier, gait, values)) is not None:
                     spreads[tier], errors[tier] = spread, np.maximum(errors[tier], spread / size)
                 if reference is None:
                     seconds["errors"] = seconds.get("errors", 0.0) + took
         poses, errors = ({m: x[m] for m in chosen} for x in (poses, errors))
         facts = {"seconds": seconds, "kept": stored}
-        return Displacements(tables.result(self.scene, gait, amplitudes, poses, errors, medium, spreads, **facts))
+        return Displacements(tables.result(self.scene, gait, values, poses, errors, medium, spreads, **facts))
 
     def _build_all(self, chosen: dict[str, Plan], progress) -> tuple[dict[str, float], list[str]]:
         """Build the tables of tiers; return the seconds that each took, even if before, and the names of those that

@@ -85,7 +85,7 @@ class Sweep(Question):
     that other processes start sooner."""
 
     scene: Any
-    over: Mapping[str, list[float]]
+    over: Mapping[str, Sequence[float]]
     seconds: float | None = field(default=None, compare=False)
 
     @cached_property

@@ -40,7 +40,16 @@ def performance(scene: Scene, amplitudes: ArrayLike) -> dict[str, np.ndarray]:
     mean distance from tail to head over the waves; nan of a single joint. Refusal for a system without a body in a medium.
 
     The elements are chords of the wave: 40 elements per wave cause errors of 2 % at A / lambda = 0.2, but above 0.4
-    enough to feign an optimum of efficiency and slip. Use `refined` before believing an `optimum`."""
+    enough to feign an optimum of efficiency and slip. Use `refined` before believing an `optimum`.
+
+    Examples
+    --------
+    >>> from geomech.scenes import load
+    >>> from geomech.studies.undulation import performance
+    >>> found = performance(load("seven-link-wave"), [0.3, 0.6])
+    >>> found["progress"].round(3)  # body lengths per cycle
+    array([0.026, 0.136])
+    """
     gait, system = getattr(scene, "gait", None), loaded(scene, "performance")
     amplitudes = real_array("amplitudes", amplitudes)
     if amplitudes.ndim != 1:
@@ -155,7 +164,17 @@ def endless_efficiency(medium: Any, headings: np.ndarray, cap: Any = None, kinem
     sideways  points that move across the direction of motion only, at the curve's slope times the speed of the wave: the
               textbook model of small waves, in which a body of finite waves is stretched and compressed
 
-    Refusal for other kinematics."""
+    Refusal for other kinematics.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.studies.undulation import endless_efficiency
+    >>> from rft import Viscous
+    >>> s = np.arange(200) / 200
+    >>> round(endless_efficiency(Viscous(2.0), 0.8 * np.cos(2 * np.pi * s)), 3)
+    0.214
+    """
     from scipy.optimize import brentq
 
     if kinematics not in KINEMATICS:
@@ -185,7 +204,15 @@ def endless_sine(
 
     Progress over the wavelength has no optimum in either kinematics. Progress over the arc length of a wave, this times
     `Sine.wavelength`, is largest at A / lambda = 0.211 (0.530) in loose glass and 0.243 (0.476) in close; sideways at
-    0.212 (0.515) and 0.245 (0.460)."""
+    0.212 (0.515) and 0.245 (0.460).
+
+    Examples
+    --------
+    >>> from geomech.studies.undulation import endless_sine
+    >>> from rft import Granular
+    >>> round(endless_sine(Granular(1.8, 0.24), 0.2), 3)  # progress over wavelength
+    0.7
+    """
     gait = Sine(amplitude=amplitude, waves=1.0, elements=elements)
     return endless_efficiency(medium, gait.headings(0.0), cap, kinematics)
 
@@ -195,6 +222,14 @@ def optimum(x: ArrayLike, values: ArrayLike, sign: int = 1) -> tuple[float, floa
 
     Both are those of the parabola through the logarithms of that value and its neighbours. None if it is the first or the
     last of the values: the optimum lies outside of the range, or there is none.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.studies.undulation import optimum
+    >>> x = np.linspace(0, 2, 9)
+    >>> [round(v, 3) for v in optimum(x, np.exp(-((x - 0.9) ** 2)))]
+    [0.9, 1.0]
     """
     x, heights = np.asarray(x, float), sign * np.log(values)
     k = int(np.argmax(heights))
@@ -206,7 +241,15 @@ def optimum(x: ArrayLike, values: ArrayLike, sign: int = 1) -> tuple[float, floa
 
 
 def refined(scene: Scene, finer: int) -> Scene:
-    """Return the scene with ``finer`` times its elements, of the body and of its wave."""
+    """Return the scene with ``finer`` times its elements, of the body and of its wave.
+
+    Examples
+    --------
+    >>> from geomech.scenes import load
+    >>> from geomech.studies.undulation import refined
+    >>> refined(load("sandfish-loose"), 2).system.body.elements
+    200
+    """
     elements = finer * _sine(scene, "refined").elements
     gait = dataclasses.replace(scene.gait, elements=elements)
     return scene.changed(body=dataclasses.replace(scene.system.body, elements=elements), gait=gait)
@@ -228,7 +271,15 @@ def activation(scene: Scene) -> dict[str, np.ndarray | float]:
     fundamental_lag: (S,), the lag between the two waves' first harmonics. speed_ratio, fundamental_speed_ratio: speed
     of the moment's wave over that of the curvature's, from straight lines through onset and offset, or through the
     phase of the first harmonic, over the MIDDLE of the body; nan if there is a place without an onset there, or but one
-    joint. Refusal for a system without a body in a medium."""
+    joint. Refusal for a system without a body in a medium.
+
+    Examples
+    --------
+    >>> from geomech.scenes import load
+    >>> from geomech.studies.undulation import activation
+    >>> round(float(activation(load("sandfish-loose"))["speed_ratio"]), 2)  # of the muscles' wave over the body's
+    2.08
+    """
     system = loaded(scene, "activation")
     cycle = scene.gait.cycle(scene.numerics.phases)
     return activation_of(bends(system, *cycle), scene.system.run(*cycle, work=True).work.bending_moment)

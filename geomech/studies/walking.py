@@ -116,7 +116,7 @@ def run(
 
     def report(done: float) -> None:
         if time.process_time() - begin > longest and done < WALKING:
-            cure = "lower [numerics] duration, or say --yes"
+            cure = "lower [numerics] duration, or lift the limit (``longest``)"
             raise Refusal(
                 f"after {longest:.0f} s of computing {done:.0%} is done, and no cycle repeats itself", instead=cure
             )

@@ -110,6 +110,14 @@ def chain_connection(
 
     resistances: (along, across, about the centre) of each link, in any unit and body lengths. lengths, frame, weights: as
     in `solve_chain`.
+
+    Examples
+    --------
+    >>> from geomech.symbolic import chain_connection
+    >>> drag = [(1, 2, 0)] * 2
+    >>> A, alpha = chain_connection((1, 1), drag, frame="link-1")
+    >>> A.shape
+    (3, 1)
     """
 
     def balance(chain):
@@ -124,6 +132,13 @@ def viscous_chain(lengths: Sequence = (1, 1, 1), ratio: Any = 2, frame: str = "l
     """Return the connection of a chain of links in a linear medium.
 
     lengths: of the links, divided by their sum. ratio: drag across over drag along. frame: as in `solve_chain`.
+
+    Examples
+    --------
+    >>> from geomech.symbolic import viscous_chain
+    >>> A, alpha = viscous_chain(ratio=2)
+    >>> A.shape, alpha
+    ((3, 2), (alpha_1, alpha_2))
     """
     ratio, body = exact(ratio), sum(map(exact, lengths))
     parts = [exact(x) / body for x in lengths]
@@ -132,12 +147,31 @@ def viscous_chain(lengths: Sequence = (1, 1, 1), ratio: Any = 2, frame: str = "l
 
 
 def no_slip_snake(lengths: Sequence = (1, 1, 1), frame: str = "mean") -> Formula:
-    """Return the connection of three links on wheels: the velocity across each link's centre is zero."""
+    """Return the connection of three links on wheels: the velocity across each link's centre is zero.
+
+    Examples
+    --------
+    >>> from geomech.symbolic import no_slip_snake
+    >>> A, alpha = no_slip_snake()
+    >>> A.shape
+    (3, 2)
+    """
     rolling = lambda chain: tuple(sp.Matrix.vstack(*(x[1, :] for x in each)) for each in zip(*(x[2:] for x in chain)))
     return solve_chain(lengths, frame, None, rolling)
 
 
 def differential_drive(radius: Any = None, track: Any = None) -> Formula:
-    """Return the connection of a cart on two wheels of a radius, a track apart; symbols r and w if left out."""
+    """Return the connection of a cart on two wheels of a radius, a track apart; symbols r and w if left out.
+
+    Examples
+    --------
+    >>> from geomech.symbolic import differential_drive
+    >>> A, alpha = differential_drive()
+    >>> A
+    Matrix([
+    [ r/2, r/2],
+    [   0,   0],
+    [-r/w, r/w]])
+    """
     r, w = (sp.Symbol(name, positive=True) if x is None else exact(x) for name, x in (("r", radius), ("w", track)))
     return sp.Matrix([[r / 2, r / 2], [0, 0], [-r / w, r / w]]), shape_angles(2)

@@ -27,7 +27,16 @@ class Cycle(NamedTuple):
     in the frame at its start. residual: (...), the largest of the cycle. speed: (...), mean |alphadot|, 1. work: power,
     internal moments and slip, (..., N) each (`rft.work_done`), or None. cycles: how many time stepping took, 1 without it.
     to_come: (...), change of displacement still to come where cycles go on until they repeat, body lengths or rad; 0
-    elsewhere."""
+    elsewhere.
+
+    Examples
+    --------
+    >>> from geomech.gaits import Circle
+    >>> from geomech.systems import DifferentialDrive
+    >>> cycle = DifferentialDrive().run(*Circle(0.5).cycle(64))
+    >>> cycle.xi.shape, cycle.net.shape
+    ((64, 3), (3,))
+    """
 
     xi: np.ndarray
     net: np.ndarray
@@ -48,6 +57,19 @@ class System(Protocol):
     """A body velocity for every shape and every rate of change of shape.
 
     What only some systems can do besides is in `geomech.systems.capabilities`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.systems import as_system
+    >>> class Roller:
+    ...     joints = 1
+    ...
+    ...     def velocity(self, alpha, alphadot):
+    ...         return np.concatenate([alphadot, 0 * alphadot, 0 * alphadot], -1)
+    ...
+    >>> as_system(Roller()).velocity(np.zeros(1), np.ones(1))
+    array([1., 0., 0.])
     """
 
     @property
@@ -72,7 +94,16 @@ class System(Protocol):
 def integrated(system: System, alpha: np.ndarray, alphadot: np.ndarray, work: bool = False) -> Cycle:
     """Return the cycle of a velocity that follows from shape alone, by integration. Classes take this as their ``run``.
 
-    Refusal at a singular shape."""
+    Refusal at a singular shape.
+
+    Examples
+    --------
+    >>> from geomech.gaits import Circle
+    >>> from geomech.systems import NoSlipSnake, integrated
+    >>> cycle = integrated(NoSlipSnake(), *Circle(0.3, centre=(0.7, -0.7)).cycle(64))
+    >>> cycle.net[:2].round(3)  # x, y in body lengths
+    array([0.063, 0.009])
+    """
     refuse_singular(system, alpha)
     xi, speed = evaluate(system.velocity, alpha, alphadot), np.sqrt((alphadot**2).sum(-1)).mean(-1)
     return Cycle(xi, displacement(xi), 0.0 * speed, speed, None, 1, 0.0 * speed)
@@ -139,7 +170,19 @@ def _accepts_two(function: Callable) -> bool:
 
 def as_system(system: Any, joints: int | None = None) -> System:
     """Return a system from an object with a velocity: the object itself where it has the five members, else with
-    defaults for those it lacks. joints: of a function without an attribute ``joints``. Refusal for anything else."""
+    defaults for those it lacks. joints: of a function without an attribute ``joints``. Refusal for anything else.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from geomech.systems import as_system
+    >>> def drift(alpha, alphadot):
+    ...     return np.stack([alphadot[..., 0] * np.sin(alpha[..., 1]), 0 * alpha[..., 0], 0 * alpha[..., 0]], -1)
+    ...
+    >>> system = as_system(drift, joints=2)
+    >>> system.joints, system.length
+    (2, 1.0)
+    """
     if not isinstance(system, type) and all(hasattr(system, name) for name in MEMBERS):
         refuse_mutable(system)
         if not isinstance(system.traits, Traits):

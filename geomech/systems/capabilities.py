@@ -26,7 +26,16 @@ STEPPED_TOGETHER = 1 << 22  # likewise of time steps, each of which takes its ti
 
 
 def capability(system: System, kind: type[T]) -> T | None:
-    """Return the object with which a system has an ability, a protocol of this module; None if it has not."""
+    """Return the object with which a system has an ability, a protocol of this module; None if it has not.
+
+    Examples
+    --------
+    >>> from geomech.systems import DifferentialDrive, Swimmer, capability
+    >>> from geomech.systems.capabilities import Dissipative
+    >>> from rft import Chain, Viscous
+    >>> [capability(x, Dissipative) is None for x in (Swimmer(Viscous(), Chain()), DifferentialDrive())]
+    [False, True]
+    """
     if method := getattr(system, "capability", None):
         return method(kind)
     return system if isinstance(system, kind) else None

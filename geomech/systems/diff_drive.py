@@ -25,6 +25,12 @@ class DifferentialDrive:
     """Two wheels on one axle. alpha_1 is the angle of the left one, alpha_2 of the right one, positive forwards.
 
     frame (-): "mean", midway between the wheels and heading forwards.
+
+    Examples
+    --------
+    >>> from geomech.systems import DifferentialDrive
+    >>> DifferentialDrive(wheel_radius=0.5, track=1.0).velocity([0.0, 0.0], [1.0, 1.0])
+    array([0.5, 0. , 0. ])
     """
 
     wheel_radius: Annotated[float, Number(1e-9, 1e9, "m", "of both, in the unit of track")] = 0.5

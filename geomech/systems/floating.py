@@ -21,6 +21,12 @@ class FloatingChain(Momentum):
 
     masses (-): of the links, relative; as their lengths if left out. inertias (-): of each link about its centre, over its
     mass and the square of its length; 1/12, that of a thin rod, if left out.
+
+    Examples
+    --------
+    >>> from geomech.systems import FloatingChain
+    >>> FloatingChain(lengths=(1, 1, 1)).velocity([0.5, 0.3], [1.0, 0.0]).round(4)
+    array([ 0.    ,  0.    , -0.0841])
     """
 
     masses: tuple[float, ...] = ()

@@ -27,6 +27,12 @@ class IdealFluidSwimmer(Momentum):
 
     Added mass of an ellipse with semi-axes a along and b across, per unit depth: pi rho b^2 along, pi rho a^2 across, and
     pi rho (a^2 - b^2)^2 / 8 about the centre (H. Lamb, Hydrodynamics, 6th ed., Art. 71).
+
+    Examples
+    --------
+    >>> from geomech.systems import IdealFluidSwimmer
+    >>> IdealFluidSwimmer(aspect=0.1).velocity([0.5, 0.3], [1.0, 0.0]).round(4)
+    array([-0.0141, -0.0066, -0.0998])
     """
 
     aspect: Annotated[float, Number(1e-3, 1, "-", "width over length of every link, 0.001 to 1")] = 0.1

@@ -29,6 +29,12 @@ class NoSlipSnake:
 
     Where the wheels' axles meet in one point, or are parallel, the snake can turn about it without rolling any wheel
     sideways: the shape is singular. For equal links that is alpha_1 = alpha_2, the straight snake and arcs of a circle.
+
+    Examples
+    --------
+    >>> from geomech.systems import NoSlipSnake
+    >>> NoSlipSnake().velocity([0.7, -0.7], [1.0, 0.0]).round(4)
+    array([-0.1027, -0.0041, -0.05  ])
     """
 
     lengths: tuple[float, float, float] = (1.0, 1.0, 1.0)

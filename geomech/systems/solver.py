@@ -18,7 +18,16 @@ class Solver:
 
     loads (-): "exact", "midpoint:N", "gauss:N" (rft.quadrature). backend (-): what computes, "numpy", "numba" (compiled
     code, where numba is installed) or "auto": compiled code where numba is installed (`rft.balance.backend`). Answers
-    are the same but for rounding."""
+    are the same but for rounding.
+
+    Examples
+    --------
+    >>> from geomech.systems import Solver, Swimmer
+    >>> from rft import Chain, Viscous
+    >>> swimmer = Swimmer(Viscous(), Chain(), solver=Solver(loads="gauss:24"))
+    >>> swimmer.velocity([0.5, 0.3], [1.0, 0.0]).round(4)
+    array([-0.0014, -0.0035, -0.0817])
+    """
 
     loads: str = "exact"
     regularisation: Annotated[

@@ -41,7 +41,16 @@ MEDIA = {name: entry.medium for name, entry in CATALOGUE.items()}  # by the name
 @SYSTEMS.register
 @dataclass(frozen=True)
 class Swimmer:
-    """A body in a medium, with the effects it is asked to have."""
+    """A body in a medium, with the effects it is asked to have.
+
+    Examples
+    --------
+    >>> from geomech.systems import Swimmer
+    >>> from rft import Chain, Viscous
+    >>> swimmer = Swimmer(Viscous(), Chain())
+    >>> swimmer.velocity([0.5, 0.3], [1.0, 0.0]).round(4)
+    array([-0.0014, -0.0035, -0.0817])
+    """
 
     medium: rft.Medium
     body: rft.Body

@@ -6,7 +6,7 @@ alphadot as in the scene it came from, and A is its linear part; else xi = A alp
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,25 +20,43 @@ from geomech.geometry.traits import Traits
 from geomech.geometry.tube import BEYOND, Tube
 from geomech.geometry.velocity import evaluate
 from geomech.io import tables
+from geomech.io.tables.base import BODY, UNKNOWN_FRAME
 from geomech.systems.base import SYSTEMS, integrated
 from geomech.systems.capabilities import Dissipative, OwnMetric
+from geomech.systems.misread import misread
+from geomech.systems.swimmer import Swimmer
+from rft.bodies import Chain
 from rft.checks import Number, check_numbers
 from rft.refusal import Refusal
 
 LENGTHS = (
     "its lengths are taken for body lengths; say body_length = 1 if they are, 3 if one is a link of three equal ones"
 )
+THREE_LINKS = [Chain(frame=frame) for frame in ("mean", "link-1", "link-2", "link-3")]  # a bare file is likely of one
+
+
+def _chain(stored: tables.Stored) -> Chain | None:
+    """Return the body of a table, with its length; None where nothing says it, or no chain."""
+    try:
+        chain = None if stored.body is None else Chain(**{**stored.body, "length": stored.length})
+    except (ValueError, TypeError):
+        return None
+    return chain if chain and chain.joints == len(stored.connection.axes) else None
 
 
 @SYSTEMS.register
 @dataclass(frozen=True)
 class Table:
-    """A file of `geomech connection`, .nc or .mat, or one in sysplotter's layout.
+    """A file of `geomech connection`, .nc or .mat, or one of sysplotter's.
 
     file (-): in a scene from a file relative to that file's folder, else to the current one. sign (-): "+" or "-" for
     xi = + or - A alphadot in the file; order (-): "ndgrid" or "meshgrid"; if left out as the file says or shows
     (`tables.load`). sha256 (-): of the file, filled in if left out;
-    given, the file must have it.
+    given, the file must have it. frame (-): of xi, "mean", "link-1" ... or "minimum-perturbation", the file's own if
+    left out; another one takes a body that the file or the scene says.
+
+    body: the chain that the table is of, in the frame that its A has, where the file does not say it. medium: of the
+    power that a change of shape takes, by its law on that body, in place of a metric in the file.
 
     A file of `geomech fit-gait` holds A near a mean gait alone: gaits that leave the data are refused, and no area tier
     exists.
@@ -59,6 +77,9 @@ class Table:
         ),
     ] = None  # fmt: skip
     sha256: str = ""
+    frame: str = ""
+    body: Any = None
+    medium: Any = None
 
     kind = "table"
     run = integrated
@@ -67,7 +88,7 @@ class Table:
         if not isinstance(self.file, (str, Path)):
             raise Refusal("file must be the name of a .nc or .mat file", value=self.file)
         object.__setattr__(self, "file", str(Path(self.file).absolute()))
-        for name in ("sign", "order", "sha256"):
+        for name in ("sign", "order", "sha256", "frame"):
             if not isinstance(getattr(self, name), str):
                 raise Refusal(f"{name} must be text", value=getattr(self, name))
         check_numbers(self)
@@ -81,16 +102,52 @@ class Table:
                 "" if stored.A_error is None else ": give the .nc file of the measured gait, which has what lies there"
             )
             raise Refusal(f"{self.file} has singular shapes (nan), and nothing is looked up between those{cure}")
-        if self.body_length is not None and (stored.unit, stored.length) != ("BL", 1.0):
+        stated = (stored.unit, stored.length) != ("BL", 1.0) or (stored.sized and stored.computed is not None)
+        if self.body_length is not None and stated:
             raise Refusal(
                 f"{self.file} says the body's length itself, {stored.length:g} {stored.unit}",
                 instead="drop body_length",
             )
         object.__setattr__(self, "sha256", stored.sha256)
-        object.__setattr__(self, "stored", tables.scaled(stored, 1.0 / (self.body_length or 1.0)))
+        original = self._with_body(tables.scaled(stored, 1.0 / (self.body_length or 1.0)))
+        object.__setattr__(self, "original", original)
+        object.__setattr__(self, "chain", _chain(original))
+        object.__setattr__(self, "stored", tables.in_frame(original, self.frame, self.chain))
+        object.__setattr__(self, "swimmer", self._swimmer())
+
+    def _with_body(self, stored: tables.Stored) -> tables.Stored:
+        """Return the table with the scene's body; Refusal if the file says its own, or it has not the table's joints."""
+        if self.body is None:
+            return stored
+        if not isinstance(self.body, Chain):
+            raise Refusal("the body of a table must be a Chain", value=self.body)
+        if stored.body is not None:
+            raise Refusal(f"{self.file} says its body itself", instead="drop the body")
+        if (joints := len(stored.connection.axes)) != self.body.joints:
+            raise Refusal(f"the body has {self.body.joints} shape variables, {self.file} {joints}", instead="mend one")
+        if self.body.length != 1.0:
+            raise Refusal("the body of a table has no length", value=self.body.length, instead="say body_length")
+        if stored.frame not in (UNKNOWN_FRAME, self.body.frame):
+            raise Refusal(
+                f"the body has the frame {self.body.frame!r}, {self.file} {stored.frame!r}", instead="mend one"
+            )
+        known = {name: getattr(self.body, name) for name in BODY}
+        return replace(stored, frame=self.body.frame, body=known)
+
+    def _swimmer(self) -> Swimmer | None:
+        """Return the body of the table in the medium of the scene, None without one."""
+        if self.medium is None:
+            return None
+        if self.chain is None or self.chain.frame != self.original.frame:
+            raise Refusal(
+                f"a medium needs the body of {self.file}, which does not say it",
+                instead="add [system.body], with the frame that A has",
+            )
+        return Swimmer(self.medium, self.chain)
 
     def __reduce__(self):
-        return Table, (self.file, self.sign, self.order, self.body_length, self.sha256)
+        values = self.file, self.sign, self.order, self.body_length, self.sha256, self.frame, self.body, self.medium
+        return Table, values
 
     tube = property(lambda self: self.stored.connection if isinstance(self.stored.connection, Tube) else None)
     near_gait = property(lambda self: f"the mean gait that {self.file} was measured at" if self.tube else "")
@@ -101,21 +158,28 @@ class Table:
     def traits(self) -> Traits:
         stored = self.stored
         limits = {"singularity": self._beyond, "singular": "the data of the log do not reach"} if self.tube else {}
+        degree = self.swimmer.traits.power_degree if self.swimmer else stored.power_degree
         return Traits(
-            linear=stored.harmonics is None, mirror=stored.mirror, smooth=False, power_degree=stored.power_degree,
+            linear=stored.harmonics is None, mirror=stored.mirror, smooth=False, power_degree=degree,
             frame=stored.frame, unit=stored.unit, labels=tuple((name, "rad") for name in stored.shapes), **limits,
         )  # fmt: skip
 
     def capability(self, kind: type) -> Table | None:
         """Return itself if it has the ability: power or a metric of its own where the file has them."""
         metric, degree = self.stored.metric, self.stored.power_degree
-        absent = {Dissipative: metric is None or degree is None, OwnMetric: metric is None or degree is not None}
+        absent = {
+            Dissipative: self.swimmer is None and (metric is None or degree is None),
+            OwnMetric: self.swimmer is not None or metric is None or degree is not None,
+        }
         return self if isinstance(self, kind) and not absent.get(kind) else None
 
     def squared_speed(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
         return self.stored.metric.norm(alpha, alphadot) ** 2
 
     def power(self, alpha: ArrayLike, alphadot: ArrayLike, xi: ArrayLike | None = None) -> np.ndarray:
+        if self.swimmer:  # of the file's own velocity, in the frame of the body; power is the same in every frame
+            own = self.original.table.velocity(alpha, alphadot)
+            return self.swimmer.power(*np.broadcast_arrays(alpha, alphadot), own)
         return self.stored.metric.norm(alpha, alphadot) ** self.stored.power_degree
 
     def _beyond(self, alpha) -> np.ndarray:
@@ -123,10 +187,7 @@ class Table:
         return 1 - self.tube.reach(alpha)
 
     def in_frame(self, frame: str) -> Table:
-        raise Refusal(
-            f"a table has the frame it was made in, {self.stored.frame!r}",
-            instead=f"make it anew in the frame {frame!r}",
-        )
+        return replace(self, frame=frame)
 
     def refuse_singular(self, alpha: ArrayLike) -> None:
         """Raise Refusal for shapes that the data of a measured gait do not reach; it says how far away they are."""
@@ -136,7 +197,8 @@ class Table:
     def table(self, name: str) -> Any:
         stored = self.stored
         tables = {"connection": stored.connection, "harmonics": stored.harmonics, "even part": stored.even}
-        return self.A_error if name == "A_error" else {**tables, "metric": stored.metric}.get(name)
+        metric = None if self.swimmer else stored.metric
+        return self.A_error if name == "A_error" else {**tables, "metric": metric}.get(name)
 
     @cached_property
     def A_error(self) -> np.ndarray | None:
@@ -203,14 +265,17 @@ class Table:
         taylor = self.tube.taylor
         return {**attributes, "singular_shapes": BEYOND, "level": taylor.level, "error_factor": taylor.factor}
 
-    @property
+    @cached_property
     def assumed(self) -> tuple[str, ...]:
-        """Assumptions about facts that the file does not state, one a line."""
-        return (
-            self.stored.assumptions
-            if self.stored.sized or self.body_length is not None
-            else (*self.stored.assumptions, LENGTHS)
-        )
+        """Assumptions about facts that the file does not state, and what contradicts those that it states, one a line."""
+        stored = self.original
+        lines = stored.assumptions if stored.sized or self.body_length is not None else (*stored.assumptions, LENGTHS)
+        ours = stored.sized and stored.computed is None  # a file of geomech's
+        drag = stored.metric is None or stored.power_degree is not None or not stored.sized
+        if self.tube is not None or ours or not drag:
+            return lines
+        misread_as = misread(stored.connection, [self.chain] if self.chain else THREE_LINKS)
+        return (*lines, misread_as) if misread_as else lines
 
     @classmethod
     def examples(cls) -> dict[str, Table]:

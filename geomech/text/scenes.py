@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import rft
 from geomech.core.errors import choose
+from geomech.core.summary import wrapped
 from geomech.scenes import builtin_names, intruder_names, walker_names
 from geomech.scenes.read import builtin_text
 from geomech.scenes.write import medium_toml, vertical_toml
@@ -18,7 +19,7 @@ def lines(name: str | None) -> Iterator[str]:
 
 
 def listing() -> Iterator[str]:
-    """Yield a line for each scene and medium, with what it is."""
+    """Yield each scene and medium with what it is, in lines that fit a screen."""
     for title, names in (
         ("", builtin_names()),
         ("intruder scenes, for 'geomech intrude'", intruder_names()),
@@ -27,14 +28,18 @@ def listing() -> Iterator[str]:
         if title:
             yield f"\n{title}"
         for name in names:
-            yield f"{name:24} {builtin_text(name).splitlines()[0].lstrip('# ')}"
+            yield from _entry(name, builtin_text(name).splitlines()[0].lstrip("# "))
     for title, media in (
         ("media for [medium] name = ...", rft.CATALOGUE),
         ("media of intruder and walker scenes, and for 'geomech stress'", VERTICAL),
     ):
         yield f"\n{title}"
         for name, entry in media.items():
-            yield f"{name:24} {entry.source}"
+            yield from _entry(name, entry.source)
+
+
+def _entry(name: str, about: str) -> list[str]:
+    return wrapped([f"{name:24} {about}"], indent=25)
 
 
 def toml_of(name: str) -> str:

@@ -6,6 +6,7 @@ import dataclasses
 
 from geomech.core import summary
 from geomech.io.tables.base import SIGNS
+from geomech.io.tables.sysplotter import compared
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import System, WrappedSystem, kind_of
 from geomech.systems.framed import NAME, Framed
@@ -98,7 +99,16 @@ def _table(system: Table) -> list[str]:
         lines.append("its file tells intervals of A: they are part of every error")
     if not held.has_residual:
         lines.append("the file does not tell what its fit left: errors are those of the grid alone")
-    lines.append(f"stored as {SIGNS[held.sign]}, arrays as {held.order}, lengths in {held.unit}, frame {held.frame}")
+    if held.computed is not None and (differences := compared(system.original)):
+        found = ", ".join(f"{name} {100 * x:.2g} %" for name, x in differences.items())
+        lines.append(f"largest difference of sysplotter's own from ours, in the middle half of the grid: {found}")
+    if system.swimmer:
+        parts = ((LAWS, system.swimmer.medium), (BODIES, system.swimmer.body))
+        medium, body = (summary.part(name_in(kinds, x), x) for kinds, x in parts)
+        lines.append(f"changes of shape cost the drag of {medium} on {body}")
+    own = system.original.frame
+    frame = held.frame if held.frame == own else f"{held.frame}, from {own} in the file"
+    lines.append(f"stored as {SIGNS[held.sign]}, arrays as {held.order}, lengths in {held.unit}, frame {frame}")
     return [
         *lines,
         *system.assumed,

@@ -27,7 +27,15 @@ from rft.registry import Registry
 
 @dataclass(frozen=True)
 class Numerics:
-    """Numerical settings of the tiers, all optional: the part of [numerics] beside the system's own."""
+    """Numerical settings of the tiers, all optional: the part of [numerics] beside the system's own.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("three-link-viscous").with_numerics(grid=15, phases=64)
+    >>> study.scene.numerics.grid
+    15
+    """
 
     directions: Annotated[
         int | None,
@@ -116,6 +124,14 @@ class Tier:
     takes, in words ``takes``, with ``instead`` for other bodies; offered: those for which it is chosen unless others are
     named. regular: there must be no singular shapes. common: a plain study takes it.
     markers: their colour, that of the line if left out. settings: those that an error study sweeps.
+
+    Examples
+    --------
+    >>> from geomech.tiers import TIERS
+    >>> list(TIERS)
+    ['area', 'adapted', 'path', 'harmonic', 'direct']
+    >>> TIERS["path"].label
+    'path integral of A'
     """
 
     name: str

@@ -24,7 +24,7 @@ from geomech.tiers.base import Numerics, Table
 from rft.premise import ALL
 from rft.refusal import Refusal
 
-INSTEAD = "draw slices (geomech ccf --pair), or use tiers such as path and direct, which need no field"
+INSTEAD = "draw slices by ``Study.ccf(pair=...)``, or use tiers such as path and direct, which need no field"
 
 LARGEST_GRID = 2_000_000  # shapes; a finer field is a slip of the pen
 FIELD = 30_000  # shapes of four and more joints: tiers do without a larger field

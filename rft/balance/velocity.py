@@ -30,7 +30,15 @@ class Solution(NamedTuple):
     xi: (..., 3), in the body frame, (length/time, length/time, rad/time). residual: (...), the larger of force and of
     moment about the body's mean place, over the axial yield force of the whole body (its drag at unit speed in a viscous
     medium) and over that times the body's length. status: (...), "sliding", "stuck" (an element is at rest) or
-    "unconverged". iterations: (...), number of evaluations of the load."""
+    "unconverged". iterations: (...), number of evaluations of the load.
+
+    Examples
+    --------
+    >>> from rft import Chain, Viscous, body_velocity
+    >>> solution = body_velocity(Viscous(), Chain(), [[0.5, 0.3], [0.2, 0.1]], [1.0, 0.0])
+    >>> solution.xi.shape, bool((solution.residual < 1e-9).all())
+    ((2, 3), True)
+    """
 
     xi: np.ndarray
     residual: np.ndarray
@@ -94,6 +102,13 @@ def body_velocity(
     ------
     ValueError
         For arguments of another shape or out of bounds, for a medium that pushes, and for effects of another engine.
+
+    Examples
+    --------
+    >>> from rft import Chain, Granular, body_velocity
+    >>> solution = body_velocity(Granular(1.8, 0.24), Chain(), [0.5, 0.3], [1.0, 0.0])
+    >>> solution.xi.round(4), str(solution.status)
+    (array([ 0.015 ,  0.0161, -0.1929]), 'sliding')
     """
     if effects != () and engine(effects) != "algebraic":
         broken = negated(broken_premises(effects))

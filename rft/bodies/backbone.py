@@ -25,6 +25,12 @@ class Backbone:
     waves and measured centrelines.
 
     frame (-): "mean", centre of mass and mean heading, or "link-1", "link-2" ..., centre and heading of that element.
+
+    Examples
+    --------
+    >>> from rft.bodies import Backbone
+    >>> Backbone(elements=50).joints
+    49
     """
 
     elements: Annotated[int, Number(3, 2000, "-", "elements of the body, 3 to 2000", whole=True)] = 100
@@ -83,6 +89,13 @@ class Serpenoid(Backbone):
 
     A circle in (alpha_1, alpha_2) is a wave that travels towards the head; the reversed circle is one that travels
     towards the tail and drives the body head first.
+
+    Examples
+    --------
+    >>> from rft.bodies import Serpenoid
+    >>> body = Serpenoid(elements=40, waves=1.5)
+    >>> body.joints, body.points([3.0, 0.0]).shape
+    (2, (41, 2))
     """
 
     waves: Annotated[float, Number(0, 500, "-", "waves on the body, > 0 and at most elements / 4")] = 1.0
@@ -114,7 +127,15 @@ class Serpenoid(Backbone):
 @BODIES.register
 @dataclass(frozen=True)
 class ConstantCurvature(Backbone):
-    """A backbone of sections of equal length, each an arc; alpha_k is the angle through which section k bends (rad)."""
+    """A backbone of sections of equal length, each an arc; alpha_k is the angle through which section k bends (rad).
+
+    Examples
+    --------
+    >>> from rft.bodies import ConstantCurvature
+    >>> body = ConstantCurvature(elements=40, sections=2)
+    >>> body.joints, body.points([1.0, -1.0]).shape
+    (2, (41, 2))
+    """
 
     sections: Annotated[int, Number(1, 2000, "-", "arcs, a divisor of elements", whole=True)] = 2
     kind = "constant-curvature"

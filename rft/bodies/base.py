@@ -25,7 +25,16 @@ class Elements(NamedTuple):
     c, s: cosine and sine of the heading. r_t, r_n: velocity of the centre along and across the element at a unit
     rotation rate of the frame. half: (n, 1), half length, 0 for a point. weight: (n, 1), factor of the drag per length,
     which is the length of a piece of body. v_t, v_n, v_w: velocity with the frame held, along and across at the centre,
-    and rotation rate times half length."""
+    and rotation rate times half length.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft import Chain
+    >>> elements = Chain().motion(np.zeros((2, 1)), np.ones((2, 1)))
+    >>> elements.half[:, 0].round(4), elements.v_w.shape
+    (array([0.1667, 0.1667, 0.1667]), (3, 1))
+    """
 
     c: np.ndarray
     s: np.ndarray
@@ -71,7 +80,16 @@ class Body(Protocol):
 
     joints: number of shape variables. length: of the body, in the unit wanted for displacement. motion(alpha, alphadot):
     its `Elements` at shapes and rates (joints, B), with the frame held. A body that is drawn also has ``points``, and
-    ``shape_labels`` if its shape variables are no joint angles: see `rft.Chain`."""
+    ``shape_labels`` if its shape variables are no joint angles: see `rft.Chain`.
+
+    Examples
+    --------
+    >>> from rft import Chain
+    >>> import numpy as np
+    >>> chain = Chain()
+    >>> chain.joints, chain.motion(np.zeros((2, 1)), np.ones((2, 1))).c.shape  # of three elements
+    (2, (3, 1))
+    """
 
     @property
     def length(self) -> float: ...

@@ -25,7 +25,20 @@ class Chain(Links):
     modes (-): rows of joint angles; the shape variables are then the amplitudes m_1, m_2 ... of these modes in place of
     the joint angles, alpha_k = sum over j of m_j modes[j][k]. "serpenoid": the cosine and the sine of ``waves`` waves on
     the body (`rft.bodies.modes`), whose circle is a travelling wave. Joint speeds, and with them the regularisation,
-    are the same as without modes."""
+    are the same as without modes.
+
+    Examples
+    --------
+    >>> from rft import Chain
+    >>> chain = Chain(lengths=(1, 2, 1))
+    >>> chain.joints, chain.lengths
+    (2, (1.0, 2.0, 1.0))
+    >>> chain.points([0.0, 0.0]).round(3)  # the straight body, tail to head
+    array([[-0.5 ,  0.  ],
+           [-0.25,  0.  ],
+           [ 0.25,  0.  ],
+           [ 0.5 ,  0.  ]])
+    """
 
     lengths: tuple[float, ...] = (1.0, 1.0, 1.0)
     length: Length = 1.0

@@ -63,6 +63,12 @@ class Effect:
     memory_size : numbers that time stepping stores for each sample, beside a few for each element.
     varies_along : whether the effect varies along an element; it then acts by its mean over each piece of an element.
     odd : whether the loads that it adds change sign with all velocities (assumed, not proven).
+
+    Examples
+    --------
+    >>> from rft.effects import Effect, SkinFriction
+    >>> isinstance(SkinFriction(), Effect), SkinFriction().kind
+    (True, 'skin-friction')
     """
 
     kind = "effect"
@@ -128,14 +134,28 @@ EFFECTS = Registry("geomech.effects", "kind", "an effect", subclasses(Effect))
 
 
 def stepwise_effects(effects: Sequence[Effect]) -> list[Effect]:
-    """Return the effects that depend on the past or on the place on the ground, and so take time stepping."""
+    """Return the effects that depend on the past or on the place on the ground, and so take time stepping.
+
+    Examples
+    --------
+    >>> from rft.effects import SkinFriction, Transient, stepwise_effects
+    >>> [effect.kind for effect in stepwise_effects([SkinFriction(), Transient(travel=0.12)])]
+    ['transient']
+    """
     return [e for e in effects if e.breaks & SHAPE_ALONE]
 
 
 def batched_effect(effects: Sequence[Effect], counts: Sequence[int]) -> Effect:
     """Return one effect for a batch, made from effects of one kind, each of them for ``count`` samples in a row.
 
-    Raises ValueError if they differ in a parameter that is not `Effect.batched`."""
+    Raises ValueError if they differ in a parameter that is not `Effect.batched`.
+
+    Examples
+    --------
+    >>> from rft.effects import SkinFriction, batched_effect
+    >>> batched_effect([SkinFriction(0.1, 0.1), SkinFriction(0.1, 0.2)], counts=[1, 2]).backward
+    array([0.1, 0.2, 0.2])
+    """
     first = effects[0]
     joined = {}
     for field in fields(first):
@@ -148,14 +168,28 @@ def batched_effect(effects: Sequence[Effect], counts: Sequence[int]) -> Effect:
 
 
 def broken_premises(effects: Sequence[Effect]) -> Premise:
-    """Return the premises that the effects break; ValueError unless all are effects."""
+    """Return the premises that the effects break; ValueError unless all are effects.
+
+    Examples
+    --------
+    >>> from rft.effects import Transient, broken_premises
+    >>> broken_premises([Transient(travel=0.12)])
+    <Premise.MEMORYLESS: 4>
+    """
     is_list = isinstance(effects, Sequence) and all(isinstance(e, Effect) for e in effects)
     require(is_list, "effects must be a list of effects such as EndCaps(radius=0.06)", value=effects)
     return functools.reduce(operator.or_, (e.breaks for e in effects), NONE)
 
 
 def engine(effects: Sequence[Effect]) -> str:
-    """Return the cheapest of ENGINES that is right with these effects."""
+    """Return the cheapest of ENGINES that is right with these effects.
+
+    Examples
+    --------
+    >>> from rft.effects import SkinFriction, Transient, engine
+    >>> engine([SkinFriction()]), engine([SkinFriction(), Transient(travel=0.12)])
+    ('algebraic', 'time stepping')
+    """
     broken = broken_premises(effects)
     if broken & Premise.QUASI_STATIC:
         return "dynamic"

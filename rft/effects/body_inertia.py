@@ -22,7 +22,14 @@ class BodyInertia(Effect):
     """Mass of the body, uniform along its length: d(momentum)/dt = force of the medium, and likewise for the moment.
 
     Only mass x length x (2 pi frequency)^2 / drag matters. In a viscous medium the drag is that at one body length per
-    radian of phase."""
+    radian of phase.
+
+    Examples
+    --------
+    >>> from rft.effects import BodyInertia
+    >>> BodyInertia(mass=0.1, frequency=1.0, length=0.3, drag=2.0).breaks
+    <Premise.RATE_INDEPENDENT|QUASI_STATIC: 9>
+    """
 
     mass: Annotated[float, Number(0, 1e9, "kg", "mass of the body")]
     frequency: Annotated[float, Number(0, 1e4, "1/s", "cycles per second, alphadot being per radian of phase")]

@@ -22,6 +22,14 @@ class DepthProfile(Effect):
     along (-): |z| over that depth at equally spaced places from tail to head, linear between them; [1, 1] is level.
 
     Each piece of the body has the depth of its centre. With a slope, drag depends on place and heading.
+
+    Examples
+    --------
+    >>> from rft import Chain, Granular, body_velocity
+    >>> from rft.effects import DepthProfile
+    >>> tail_down = DepthProfile(along=(1.5, 1.0))
+    >>> body_velocity(Granular(1.8, 0.24), Chain(), [0.5, 0.3], [1.0, 0.0], effects=[tail_down]).xi.round(3)
+    array([ 0.009,  0.008, -0.139])
     """
 
     along: tuple[float, ...] = (1.0, 1.0)

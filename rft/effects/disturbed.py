@@ -28,7 +28,20 @@ class DisturbedGround(Effect):
     disturbance, 0 to 1, never decreases (grains do not settle by themselves). The disturbance on either side of an
     element is read two radii from its axis, outside its present track. Drag near disturbed ground falls substantially
     in experiments (paper Sec. IV B); the form, and every number, are assumed. Ground more than two body lengths away
-    may be forgotten."""
+    may be forgotten.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft import Chain, Granular, time_steps
+    >>> from rft.effects import DisturbedGround
+    >>> t = 2 * np.pi * np.arange(32) / 32
+    >>> alpha, alphadot = np.stack([np.cos(t), np.sin(t)], -1), np.stack([-np.sin(t), np.cos(t)], -1)
+    >>> track = DisturbedGround(radius=0.02, weakening=0.3)
+    >>> steps = time_steps(Granular(1.8, 0.24), Chain(), alpha, alphadot, effects=[track])
+    >>> steps.pose[-1, :2].round(3)  # x, y after the cycle, body lengths
+    array([-0.119, -0.007])
+    """
 
     radius: Annotated[float, Number(0.01, 0.25, "body lengths", "half width of the track that the body leaves")]
     weakening: Annotated[float, Number(0, 1, "-", "share of the drag lost in fully disturbed ground")]

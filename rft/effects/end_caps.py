@@ -23,6 +23,14 @@ class EndCaps(Effect):
 
     Source: the end forces of the cylinder in granular resistive force theory as written in third-party code, C_S / C_F
     being C of Eq. 3. Granular media only.
+
+    Examples
+    --------
+    >>> from rft import Chain, Granular, body_velocity
+    >>> from rft.effects import EndCaps
+    >>> solution = body_velocity(Granular(1.8, 0.24), Chain(), [0.5, 0.3], [1.0, 0.0], effects=[EndCaps(radius=0.04)])
+    >>> solution.xi.round(4)
+    array([ 0.0151,  0.0128, -0.1833])
     """
 
     radius: Annotated[float, Number(0, 1, "body lengths", "radius of the body")]

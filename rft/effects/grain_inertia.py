@@ -27,7 +27,14 @@ class GrainInertia(Effect):
     rho g r |z| the force is strength v_n^2 / (k g |z|), without radius or density. Dry media only.
 
     Where neither the medium nor ``k`` gives k of Eq. 2 (2.5 for loose glass, 5.1 for close), that of loose glass is
-    assumed."""
+    assumed.
+
+    Examples
+    --------
+    >>> from rft.effects import GrainInertia
+    >>> GrainInertia(frequency=2.0, length=0.3, depth=0.05).breaks
+    <Premise.RATE_INDEPENDENT: 1>
+    """
 
     frequency: Annotated[float, Number(0, 1e4, "1/s", "cycles per second, alphadot being per radian of phase")]
     length: Annotated[float, Number(1e-9, 1e6, "m", "length of the body")]

@@ -27,7 +27,19 @@ class Slope(Effect):
     of an element's centre, 0 across and uphill. With the default of repose, 37.9 degrees, motion straight downhill at 20
     degrees has half the drag of level ground, as measured (paper Sec. IV B). Only one direction at one angle has been
     measured; assumed are a drag that falls in proportion to d, no gain uphill, and the same factor along and across an
-    element. Weight adds the force weight sin(angle) downhill."""
+    element. Weight adds the force weight sin(angle) downhill.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft import Chain, Granular, time_steps
+    >>> from rft.effects import Slope
+    >>> t = 2 * np.pi * np.arange(32) / 32
+    >>> alpha, alphadot = np.stack([np.cos(t), np.sin(t)], -1), np.stack([-np.sin(t), np.cos(t)], -1)
+    >>> steps = time_steps(Granular(1.8, 0.24), Chain(), alpha, alphadot, effects=[Slope(angle=0.2)])
+    >>> steps.pose[-1, :2].round(3)  # x, y after the cycle, body lengths
+    array([-0.086,  0.002])
+    """
 
     angle: Annotated[float, Number(0, math.pi / 2, "rad", "angle by which the surface rises")]
     towards: Annotated[

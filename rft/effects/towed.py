@@ -22,6 +22,14 @@ class TowedSled(Effect):
 
     The sled lies on the surface, so that its friction does not depend on the body's depth. Dry media only: beside drag
     that grows with speed, friction would depend on the unit of time.
+
+    Examples
+    --------
+    >>> from rft import Chain, Granular, body_velocity
+    >>> from rft.effects import TowedSled
+    >>> solution = body_velocity(Granular(1.8, 0.24), Chain(), [0.5, 0.3], [1.0, 0.0], effects=[TowedSled(pull=0.2)])
+    >>> solution.xi.round(4)
+    array([ 0.0071, -0.0021, -0.1022])
     """
 
     pull: Annotated[float, Number(0, 1000, "-", "friction of the sled over the drag on the straight body along itself")]

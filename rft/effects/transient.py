@@ -32,7 +32,14 @@ class Transient(Effect):
     start from no drag, and no transient of the drag along the body. A piece of the body has the means of its shares.
     At every step a piece is split at its pivot, and the share of each part develops with the mean velocity of that part,
     so that travel = 0 gives the steady drag however long the pieces are. The effect vanishes at order 1 for a body that
-    slides along itself as it reverses, at order 1/2 if links come to rest there, in a dry medium."""
+    slides along itself as it reverses, at order 1/2 if links come to rest there, in a dry medium.
+
+    Examples
+    --------
+    >>> from rft.effects import Transient, engine
+    >>> engine([Transient(travel=0.12)])
+    'time stepping'
+    """
 
     travel: Annotated[float, Number(0, 10, "body lengths", "travel over which 95 % of the drag comes back")]
 

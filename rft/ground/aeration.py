@@ -18,6 +18,12 @@ class Aeration(GroundEffect):
     An air speed of fluidisation, or more, is refused: no resistive force theory is known there. Strength falls
     linearly with air speed by measurements of alpha_z(0, 90 degrees). The same fall at all angles, down to nothing, is
     assumed.
+
+    Examples
+    --------
+    >>> from rft.ground import Aeration, ground_of
+    >>> ground_of([Aeration(air_speed=0.1, fluidisation=0.25)]).strength
+    0.6
     """
 
     air_speed: Annotated[float, Number(0, 1e3, "m/s", "upward speed of the air over the bed's whole cross section")]

@@ -30,7 +30,14 @@ class Ground(NamedTuple):
     speed v bears v / sqrt(v^2 + rounding^2) times the stress of the law, which jumps at rest. grazing_sine: sine of the
     grazing angle, over which a face begins to lead; 0 for a jump. downhill_loss: share of the strength that motion
     along +x loses, or along -x where it is negative. disturbed: (G, 2 + P), one row for each effect: radius, m, weakening, and
-    places x, m; places at infinity fill short rows up."""
+    places x, m; places at infinity fill short rows up.
+
+    Examples
+    --------
+    >>> from rft.ground import Ground
+    >>> Ground(strength=0.6).strength
+    0.6
+    """
 
     strength: float = 1.0
     flux: float = 0.0
@@ -42,7 +49,15 @@ class Ground(NamedTuple):
 
 @formula
 def strength_at(ground, x, v_x):
-    """Return the strength at places x along the ground, m, for unit velocities with the component ``v_x`` along x."""
+    """Return the strength at places x along the ground, m, for unit velocities with the component ``v_x`` along x.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft.ground import Slope, ground_of, strength_at
+    >>> strength_at(ground_of([Slope(angle=0.2)]), np.zeros(2), np.array([1.0, -1.0])).round(3)  # up and down the slope
+    array([0.98 , 0.725])
+    """
     strength = ground.strength * (1.0 - maximum(ground.downhill_loss * v_x, 0.0))
     for g in range(len(ground.disturbed)):
         disturbance = 0.0 * x
@@ -56,7 +71,14 @@ def strength_at(ground, x, v_x):
 @formula
 def inverse_speed(ground, speed):
     """Return 1 / sqrt(speed^2 + rounding^2), s/m, and 0 at rest; speed times this is the share of stress that a face
-    bears."""
+    bears.
+
+    Examples
+    --------
+    >>> from rft.ground import Ground, inverse_speed
+    >>> float(inverse_speed(Ground(), 0.5))  # s/m
+    2.0
+    """
     at_rest = speed == 0.0
     rounded_speed = sqrt(speed * speed + ground.rounding * ground.rounding)
     return where(at_rest, 0.0, 1.0) / where(at_rest, 1.0, rounded_speed)
@@ -69,6 +91,12 @@ class GroundEffect:
 
     kind: name of the effect in scenes and messages. breaks: premises of the plain law that the effect breaks. walks:
     whether robots can walk on such ground.
+
+    Examples
+    --------
+    >>> from rft.ground import Aeration, GroundEffect
+    >>> isinstance(Aeration(0.1, 0.25), GroundEffect)
+    True
     """
 
     kind = "effect"
@@ -101,7 +129,15 @@ GROUND_EFFECTS = Registry("geomech.ground_effects", "kind", "an effect on the gr
 
 
 def ground_of(effects: Sequence[GroundEffect], ground: Ground | None = None) -> Ground:
-    """Return the ground with all effects; ValueError for anything but a list of effects."""
+    """Return the ground with all effects; ValueError for anything but a list of effects.
+
+    Examples
+    --------
+    >>> from rft.ground import Aeration, GrainInertia, ground_of
+    >>> ground = ground_of([Aeration(0.1, 0.25), GrainInertia()])
+    >>> ground.strength, ground.flux
+    (0.6, 638.0)
+    """
     ground = ground or Ground()
     for effect in checked_effects(effects):
         ground = effect.apply(ground)
@@ -109,13 +145,27 @@ def ground_of(effects: Sequence[GroundEffect], ground: Ground | None = None) -> 
 
 
 def weight(effects: Sequence[GroundEffect]) -> np.ndarray:
-    """Return the sum (2,) of the forces (x, z), N, that effects add at the body's origin besides the grains' force."""
+    """Return the sum (2,) of the forces (x, z), N, that effects add at the body's origin besides the grains' force.
+
+    Examples
+    --------
+    >>> from rft.ground import Slope, weight
+    >>> weight([Slope(angle=0.2, mass=1.0)]).round(3)  # N
+    array([-1.949,  0.   ])
+    """
     return np.sum([effect.weight() for effect in effects] or [(0.0, 0.0)], axis=0)
 
 
 def checked_effects(effects) -> tuple[GroundEffect, ...]:
     """Return the effects as a tuple; ValueError for anything else in the list, and for a kind that stands twice, but for
-    disturbed ground."""
+    disturbed ground.
+
+    Examples
+    --------
+    >>> from rft.ground import Aeration, checked_effects
+    >>> checked_effects([Aeration(0.1, 0.25)])[0].kind
+    'aeration'
+    """
     valid = isinstance(effects, Sequence) and all(isinstance(e, GroundEffect) for e in effects)
     require(valid, "effects must be a list of effects such as Aeration(0.01, 0.03)", value=effects)
     kinds = [e.kind for e in effects]

@@ -25,6 +25,14 @@ class DisturbedGround(GroundEffect):
 
     Disturbed grains bear less by experiment (paper Sec. IV B). The form and every number are assumed; so is that
     disturbances neither add up nor heal. The motion itself disturbs nothing: places are given.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft.ground import DisturbedGround, ground_of, strength_at
+    >>> ground = ground_of([DisturbedGround(places=(0.0,), radius=0.02, weakening=0.4)])
+    >>> strength_at(ground, np.array([0.0, 0.1]), np.array([1.0, 1.0]))
+    array([0.6, 1. ])
     """
 
     places: tuple[float, ...]

@@ -19,6 +19,12 @@ class GrainInertia(GroundEffect):
     a face along its normal: the momentum of grains that are swept up (Agarwal et al. 2021; paper Sec. IV C).
 
     The paper's other finding, a surface that sinks behind a fast body, is not modelled.
+
+    Examples
+    --------
+    >>> from rft.ground import GrainInertia, ground_of
+    >>> ground_of([GrainInertia(strength=2.0)]).flux  # kg/m^3
+    1276.0
     """
 
     strength: Annotated[float, Number(0, 1e6, "-", "lambda, 1 to 4 by grains and body; 1 is assumed")] = 1.0

@@ -29,6 +29,14 @@ class Slope(GroundEffect):
     Assumed are a strength that falls in proportion to d, no gain uphill, and one factor for forces along and across a
     face. Liao and Qian (arXiv:2603.06928, 2026) find the resistance to penetration nearly unchanged by a slope and that
     to shear much less.
+
+    Examples
+    --------
+    >>> import math
+    >>> from rft.ground import Slope, ground_of, strength_at
+    >>> ground = ground_of([Slope(angle=math.radians(20))])
+    >>> round(float(strength_at(ground, 0.0, -1.0)), 3)  # straight downhill
+    0.5
     """
 
     angle: Annotated[

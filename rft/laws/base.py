@@ -33,7 +33,22 @@ class Medium(Protocol):
     covariance: (n, n), of the parameters named in ``uncertain``; it changes no force.
 
     A law runs in compiled code if its traction, and its slopes if it has them, are formulas (`rft.vectors.formula`) of
-    its number fields."""
+    its number fields.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> from rft import Chain, body_velocity
+    >>> @dataclass(frozen=True)
+    ... class Drag:
+    ...     ratio: float = 2.0
+    ...
+    ...     def traction(self, v_t, v_n, eps=0.0):
+    ...         return v_t, self.ratio * v_n
+    ...
+    >>> body_velocity(Drag(), Chain(), [0.5, 0.3], [1.0, 0.0]).xi.round(4)  # as by Viscous(2)
+    array([-0.0014, -0.0035, -0.0817])
+    """
 
     def traction(self, v_t: Any, v_n: Any, rounding: Any = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the drag per unit length (f_t, f_n) opposing the velocity (v_t, v_n); arrays broadcast together."""
@@ -69,7 +84,15 @@ def terms_slopes(law, v_t, v_n, rounding):
 
 
 class TermLaw:
-    """Base of laws that are a sum of dry and viscous terms: `traction` follows from the terms."""
+    """Base of laws that are a sum of dry and viscous terms: `traction` follows from the terms.
+
+    Examples
+    --------
+    >>> from rft import Granular
+    >>> from rft.laws import TermLaw
+    >>> isinstance(Granular(1.8, 0.24), TermLaw), len(Granular(1.8, 0.24).dry)
+    (True, 2)
+    """
 
     dry: tuple[tuple[float, float, float], ...] = ()
     viscous: tuple[float, float] = (0.0, 0.0)
@@ -110,12 +133,26 @@ def viscous_terms(medium) -> tuple[float, float] | None:
 
 
 def is_closed(medium: Any) -> bool:
-    """Return whether a medium has a closed form, and so exact averages over a link."""
+    """Return whether a medium has a closed form, and so exact averages over a link.
+
+    Examples
+    --------
+    >>> from rft.laws import Viscous, is_closed
+    >>> is_closed(Viscous())
+    True
+    """
     return dry_terms(medium) is not None and viscous_terms(medium) is not None
 
 
 def is_mirror(medium: Any) -> bool:
-    """Return whether a medium claims that left and right are alike; a field then takes half the balances."""
+    """Return whether a medium claims that left and right are alike; a field then takes half the balances.
+
+    Examples
+    --------
+    >>> from rft.laws import Viscous, is_mirror
+    >>> is_mirror(Viscous())
+    True
+    """
     return bool(getattr(medium, "mirror", False))
 
 
@@ -214,19 +251,40 @@ def require_drag(medium: Medium) -> None:
 
 
 def is_linear(medium: Medium) -> bool:
-    """Return whether drag is proportional to velocity, and so the body velocity linear in alphadot."""
+    """Return whether drag is proportional to velocity, and so the body velocity linear in alphadot.
+
+    Examples
+    --------
+    >>> from rft.laws import Coulomb, Viscous, is_linear
+    >>> is_linear(Viscous()), is_linear(Coulomb())
+    (True, False)
+    """
     return dry_terms(medium) == () and is_closed(medium)
 
 
 def is_rate_independent(medium: Medium) -> bool:
     """Return whether drag grows with one power of the speed in all directions, so that the speed of a gait does not
-    matter."""
+    matter.
+
+    Examples
+    --------
+    >>> from rft.laws import Viscous, is_rate_independent
+    >>> is_rate_independent(Viscous())
+    True
+    """
     return speed_exponent(medium) is not None
 
 
 def speed_exponent(medium: Medium) -> float | None:
     """Return the power of the speed with which drag grows in all directions, 0 for dry media, 1 for viscous ones; None
-    if it differs between speeds or directions."""
+    if it differs between speeds or directions.
+
+    Examples
+    --------
+    >>> from rft.laws import Coulomb, Viscous, speed_exponent
+    >>> speed_exponent(Coulomb()), speed_exponent(Viscous())
+    (0.0, 1.0)
+    """
     if is_closed(medium):
         return (None if any(medium.viscous) else 0.0) if medium.dry else 1.0
     speeds = np.logspace(-3, 1, 5)[:, None]

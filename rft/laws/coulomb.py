@@ -12,7 +12,14 @@ from rft.laws.base import LAWS, TermLaw
 class Coulomb(TermLaw):
     """Isotropic friction: f_t = v.t, f_n = v.n with v the unit velocity, in units of the yield force.
 
-    The law is that of `Granular` with C = 0."""
+    The law is that of `Granular` with C = 0.
+
+    Examples
+    --------
+    >>> from rft import Coulomb
+    >>> [float(f) for f in Coulomb().traction(0.6, 0.8)]  # along and across, on a piece that slides obliquely
+    [0.6, 0.8]
+    """
 
     dry = ((1.0, 1.0, 1.0),)
     law = "coulomb"

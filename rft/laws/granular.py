@@ -24,7 +24,15 @@ class Granular(TermLaw):
     k is part of the unit of force; only effects measured against the weight of grains use it (grain inertia).
 
     covariance (-): of C and gamma0 (in rad), and of k as a third parameter if k is given and has one; it changes no
-    force and is what drag measurements leave open (`rft.calibrate`)."""
+    force and is what drag measurements leave open (`rft.calibrate`).
+
+    Examples
+    --------
+    >>> from rft import Granular
+    >>> f_t, f_n = Granular(C=1.8, gamma0=0.24).traction(0.0, 1.0)
+    >>> round(float(f_n), 3)  # broadside, over the axial drag
+    2.748
+    """
 
     C: Annotated[float, Number(0, 1e6, "-", "the extra normal force")]
     gamma0: Annotated[float, Number(-1e6, 1e6, "rad", "angle at which it saturates, strictly between 0 and pi/2")]

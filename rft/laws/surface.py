@@ -23,6 +23,13 @@ class Surface(TermLaw):
     friction, is assumed.
 
     covariance (-): of C, gamma0 (in rad) and across; it changes no force and is what drag measurements leave open.
+
+    Examples
+    --------
+    >>> from rft.laws import Surface
+    >>> f_t, f_n = Surface(C=1.8, gamma0=0.24, across=1.0).traction(0.0, 1.0)
+    >>> round(float(f_n), 3)
+    2.748
     """
 
     C: Annotated[float, Number(0, 1e6, "-", "the extra normal force")]

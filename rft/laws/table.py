@@ -31,7 +31,16 @@ class Table:
     With the unit velocity v, f_t is a function of v.t = cos psi and f_n a function of v.n = sin psi, as in Eq. 3 of
     Zhang and Goldman (2014). Both are odd piecewise cubics through the origin and the measured values, monotone between
     neighbours and with a continuous derivative (PCHIP), and constant beyond the last measured value. Values of f_n at 0
-    and of f_t at pi/2 are ignored, for they vanish by symmetry. Forces are in units of f_t at psi = 0."""
+    and of f_t at pi/2 are ignored, for they vanish by symmetry. Forces are in units of f_t at psi = 0.
+
+    Examples
+    --------
+    >>> import math
+    >>> from rft.laws import Table
+    >>> medium = Table(psi=(0.0, math.pi / 4, math.pi / 2), f_t=(1.0, 0.8, 0.0), f_n=(0.0, 1.9, 2.5))
+    >>> round(float(medium.traction(0.0, 1.0)[1]), 2)
+    2.5
+    """
 
     psi: tuple[float, ...]
     f_t: tuple[float, ...]

@@ -17,7 +17,14 @@ class Viscous(TermLaw):
     A ratio of 2 is the slender-body limit of Gray and Hancock, J. Exp. Biol. 32, 802 (1955).
 
     covariance (-): of the ratio, 1 x 1; it changes no force and is what drag measurements leave open
-    (`rft.calibrate`)."""
+    (`rft.calibrate`).
+
+    Examples
+    --------
+    >>> from rft import Viscous
+    >>> [float(f) for f in Viscous(2.0).traction(0.5, 0.5)]
+    [0.5, 1.0]
+    """
 
     ratio: Annotated[float, Number(1e-8, 1e8, "-", "normal over axial drag")] = 2.0
     covariance: tuple[tuple[float, ...], ...] | None = None

@@ -1,90 +1,143 @@
 """The contact of triangles with the ground: meshes, hulls, legs and geoms of three dimensions.
 
 On the part of a face below the surface the stress is that of `rft.ground.base` with one alpha, that of the velocity of
-the part's middle; |z| and its moments are integrated exactly. Vectors are (3, ...), along any axes."""
+the part's middle; |z| and its moments are integrated exactly. Vectors are triples along any axes. All functions but the
+last two are formulas (`rft.vectors`): they take numbers, arrays that broadcast, and the vectors of compiled code."""
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from rft.ground import Ground, inverse_speed, strength_at
-
-UP, AHEAD = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
+from rft.ground import inverse_speed, strength_at
+from rft.laws.records import law_numbers, record_class
+from rft.meshes.submerged import part_of_triangle
+from rft.meshes.triples import AHEAD, UP, cross, dot, minus, plus, times, weighted
+from rft.vectors import absolute, formula, maximum, sqrt, where
 
 
 class FaceLaw(Protocol):
-    """A law of three dimensions. grazing_sine: sine of the grazing angle."""
+    """A law of three dimensions. grazing_sine: sine of the grazing angle. traction and lead are formulas; numbers: those
+    that they read."""
 
     grazing_sine: float
+    numbers: dict[str, float]
 
-    def traction(self, n: np.ndarray, v: np.ndarray, up: np.ndarray = UP) -> np.ndarray:
-        """Return the force per area and depth (3, ...), N/m^3, on faces with outward unit normals n and unit velocities
-        v (3, ...), whether or not they lead; ``up`` (3,) is the unit vector upwards."""
+    def traction(self, n, v, up=UP) -> tuple:
+        """Return the force per area and depth, N/m^3, on faces with outward unit normals n and unit velocities v, whether
+        or not they lead; ``up`` is the unit vector upwards."""
         ...
 
-    def lead(self, n_dot_v: np.ndarray, grazing_sine: float, sheet: np.ndarray | bool) -> np.ndarray:
+    def lead(self, n_dot_v, grazing_sine, sheet=False) -> Any:
         """Return the share of the traction that faces bear, 0 to 1 (`rft.ground.lead`). sheet: whether either side may
         lead."""
         ...
+
+
+class Face(NamedTuple):
+    """Corners (x, y, z) of a triangle and its outward unit normal, in the frame of its body, m; its area, m^2, negative
+    where the corners run clockwise about the normal; 1 for a face of a thin sheet, of which either side may lead, else 0."""
+
+    x1: float
+    y1: float
+    z1: float
+    x2: float
+    y2: float
+    z2: float
+    x3: float
+    y3: float
+    z3: float
+    nx: float
+    ny: float
+    nz: float
+    area: float
+    sheet: float
 
 
 class Part(NamedTuple):
     """The parts of faces below the surface. n: outward unit normal. middle: from the origin, m. area: m^2. depth:
     integral of |z| over the part, m^3. arms: integral of |z| times the vector from the origin, m^4."""
 
-    n: np.ndarray
-    middle: np.ndarray
-    area: np.ndarray
-    depth: np.ndarray
-    arms: np.ndarray
+    n: tuple
+    middle: tuple
+    area: float
+    depth: float
+    arms: tuple
 
 
 class Motion(NamedTuple):
-    """Motion of a body. velocity: of the origin, m/s. spin: angular velocity, rad/s. x: of the origin in the world, m.
-    up, ahead: unit vectors upwards and along the world's x axis. All vectors are along the same axes."""
+    """Motion of a body. velocity: of the origin, m/s. spin: angular velocity, rad/s. x, height: of the origin along the
+    world's x axis and above the surface, m. up, ahead: unit vectors upwards and along the world's x axis. All vectors are
+    along the same axes."""
 
-    velocity: np.ndarray
-    spin: np.ndarray
-    x: float | np.ndarray = 0.0
-    up: np.ndarray = UP
-    ahead: np.ndarray = AHEAD
+    velocity: tuple
+    spin: tuple
+    x: float = 0.0
+    up: tuple = UP
+    ahead: tuple = AHEAD
+    height: float = 0.0
 
 
-def load(law: FaceLaw, ground: Ground, part: Part, motion: Motion, sheet: np.ndarray | bool = False):
-    """Return force (3, ...), N, moment about the origin (3, ...), N m, and stress per depth (3, ...), N/m^3, of the
-    grains on parts of faces. sheet: whether a face is one of a thin sheet, of which either side may lead."""
-    n, v = np.broadcast_arrays(part.n, motion.velocity + cross(motion.spin, part.middle))
-    speed, across = np.sqrt(dot(v, v)), dot(n, v)
-    slowness, unit = inverse_speed(ground, speed), v / np.where(speed == 0.0, 1.0, speed)
-    lead = law.lead(across * slowness, ground.grazing_sine, sheet)
-    share = speed * slowness * lead * _strength(ground, part, motion, unit)
-    stress = law.traction(n.reshape(3, -1), unit.reshape(3, -1), motion.up).reshape(v.shape) * share
-    force, moment = stress * part.depth, cross(part.arms, stress)
-    if np.any(ground.flux):
-        across = np.where(sheet, across, np.maximum(across, 0.0))
-        push = ground.flux * across * np.abs(across) * part.area
-        force, moment = force - push * n, moment - push * cross(part.middle, n)
+@formula
+def corner_heights(face, motion):
+    """Return the heights, m, of a face's corners above the surface."""
+    up, height = motion.up, motion.height
+    return (
+        height + dot(up, (face.x1, face.y1, face.z1)),
+        height + dot(up, (face.x2, face.y2, face.z2)),
+        height + dot(up, (face.x3, face.y3, face.z3)),
+    )
+
+
+@formula
+def part_below(face, heights):
+    """Return the `Part` of a face below the surface, from the heights of its corners, m."""
+    share, middle, moments = part_of_triangle(-heights[0], -heights[1], -heights[2])
+    a, b, c = (face.x1, face.y1, face.z1), (face.x2, face.y2, face.z2), (face.x3, face.y3, face.z3)
+    depth = face.area * (moments[0] + moments[1] + moments[2])
+    arms = times(face.area, weighted(moments, a, b, c))
+    return Part((face.nx, face.ny, face.nz), weighted(middle, a, b, c), face.area * share, depth, arms)
+
+
+@formula
+def velocity_of_middle(part, motion):
+    """Return the velocity of a part's middle, m/s."""
+    return plus(motion.velocity, cross(motion.spin, part.middle))
+
+
+@formula
+def load(law, ground, part, motion, v, sheet):
+    """Return force, N, moment about the origin, N m, and stress per depth, N/m^3, of the grains on a part of a face.
+
+    v: `velocity_of_middle`. sheet: whether the face is one of a thin sheet, of which either side may lead."""
+    n, speed, across = part.n, sqrt(dot(v, v)), dot(part.n, v)
+    slowness = inverse_speed(ground, speed)
+    unit = times(1.0 / where(speed == 0.0, 1.0, speed), v)
+    share = speed * slowness * law.lead(across * slowness, ground.grazing_sine, sheet)
+    if ground.downhill_loss == 0.0 and len(ground.disturbed) == 0:
+        share = share * ground.strength
+    else:
+        share = share * strength_at(ground, motion.x + dot(motion.ahead, part.middle), dot(motion.ahead, unit))
+    stress = times(share, law.traction(n, unit, motion.up))
+    force, moment = times(part.depth, stress), cross(part.arms, stress)
+    if ground.flux != 0.0:
+        across = where(sheet, across, maximum(across, 0.0))
+        push = times(ground.flux * across * absolute(across) * part.area, n)
+        force, moment = minus(force, push), minus(moment, cross(part.middle, push))
     return force, moment, stress
 
 
-def _strength(ground: Ground, part: Part, motion: Motion, unit: np.ndarray):
-    """Return the ground's strength at the parts, one number where it is the same everywhere."""
-    if not (ground.downhill_loss or len(ground.disturbed)):
-        return ground.strength
-    ahead = motion.ahead.reshape(3, *[1] * (unit.ndim - 1))
-    return strength_at(ground, motion.x + dot(ahead, part.middle), dot(ahead, unit))
+def record(law: FaceLaw):
+    """Return the record of a law for compiled code: its numbers and its formulas."""
+    formulas = ("traction", type(law).traction), ("lead", type(law).lead)
+    numbers = law_numbers(law)
+    return record_class(type(law).__name__, tuple(numbers), formulas)(*numbers.values())
 
 
-def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return a x b, components first."""
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        np.subtract(a[j] * b[k], a[k] * b[j], out=out[i])
-    return out
-
-
-def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return a . b, components first."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+def faces(corners: np.ndarray, normals: np.ndarray, sheet: np.ndarray | bool = False) -> Face:
+    """Return the faces (T,) with corners (T, 3, 3), m, and outward unit normals (T, 3)."""
+    a, b, c = corners.swapaxes(0, 1)
+    across = np.cross(b - a, c - a)
+    area = np.copysign(np.linalg.norm(across, axis=1) / 2, (across * normals).sum(1))
+    return Face(*a.T, *b.T, *c.T, *normals.T, area, np.broadcast_to(sheet, area.shape).astype(float))

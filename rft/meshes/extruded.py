@@ -17,15 +17,35 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from rft.ground.lead import rounded
-from rft.plates.stress import PER_CUBIC_METRE, StressMap
+from rft.meshes.triples import UP, dot, minus, plus, times
+from rft.plates.stress import COEFFICIENTS, PER_CUBIC_METRE, StressMap
 from rft.refusal import formatted, require
+from rft.vectors import formula, maximum, minimum, sqrt, where
 
 CUT = 0.05  # width, in n . v times the cosine between stress and n, over which a cut of tension is rounded
 SHARPEST = 2e-3  # least sine of the angle over which stress rises: implicit time steps cannot solve a jump
-UP = np.array([0.0, 0.0, 1.0])
+NUMBERS = (*COEFFICIENTS, "zeta", "cut")
+
+
+@formula
+def traction_of_map(s, n, v, up=UP):
+    """Return the force per area and depth, N/m^3, by the numbers of a stress map on faces with unit normals n and unit
+    velocities v, whether or not they lead; ``up`` is the unit vector upwards."""
+    n_z, v_z, along = dot(up, n), dot(up, v), dot(n, v)
+    n_h, v_h, inner = minus(n, times(n_z, up)), minus(v, times(v_z, up)), along - n_z * v_z
+    cos_2b = n_z * n_z - dot(n_h, n_h)
+    total, difference = s.C11 + s.Cm11, s.Cm11 - s.C11
+    a_z = s.A00 + s.A10 * cos_2b - (s.B11 + s.Bm11) * cos_2b * v_z - (s.B11 - s.Bm11) * 2.0 * n_z * inner - s.B01 * v_z
+    a_h = plus(
+        times((s.C01 + total) * n_z * n_z, v_h),
+        times((s.C01 - total) * inner + 2.0 * n_z * (difference * v_z - s.D10), n_h),
+    )
+    traction = times(PER_CUBIC_METRE * s.zeta, minus(times(a_z, up), a_h))
+    if s.cut == 0.0:
+        return traction
+    push = -(dot(traction, n) * along) / maximum(sqrt(dot(traction, traction)), 1e-300)
+    return times(minimum(maximum(0.5 + push / CUT, 0.0), 1.0), traction)
 
 
 @dataclass(frozen=True)
@@ -40,29 +60,25 @@ class Extruded:
         )
         require(isinstance(self.stress, StressMap), message)
 
-    def traction(self, n: np.ndarray, v: np.ndarray, up: np.ndarray = UP) -> np.ndarray:
-        """Return the force per area and depth (3, N), N/m^3, on faces with unit normals n and unit velocities v (3, N),
-        whether or not they lead; ``up`` (3,) is the unit vector upwards."""
-        s, n_z, v_z, along = self.stress, up @ n, up @ v, (n * v).sum(0)
-        n_h, v_h, inner = n - n_z * up[:, None], v - v_z * up[:, None], along - n_z * v_z
-        cos_2b = n_z * n_z - (n_h * n_h).sum(0)
-        total, difference = s.C11 + s.Cm11, s.Cm11 - s.C11
-        a_z = (
-            s.A00 + s.A10 * cos_2b - (s.B11 + s.Bm11) * cos_2b * v_z - (s.B11 - s.Bm11) * 2 * n_z * inner - s.B01 * v_z
-        )
-        a_h = (s.C01 + total) * n_z * n_z * v_h
-        a_h = a_h + ((s.C01 - total) * inner + 2 * n_z * (difference * v_z - s.D10)) * n_h
-        traction = PER_CUBIC_METRE * s.zeta * (a_z * up[:, None] - a_h)
-        if s.tension == "keep":
-            return traction
-        push = -(traction * n).sum(0) * along / np.maximum(np.sqrt((traction * traction).sum(0)), 1e-300)
-        return traction * np.clip(0.5 + push / CUT, 0.0, 1.0)
+    def __getattr__(self, name: str) -> float:
+        """Return a number of the map; the formulas read these."""
+        if name in NUMBERS:
+            return getattr(self.stress, name)
+        raise AttributeError(name)
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Numbers that the formulas read (`rft.laws.records.law_numbers`)."""
+        return {name: float(getattr(self.stress, name)) for name in NUMBERS}
+
+    traction = traction_of_map
 
     @property
     def grazing_sine(self) -> float:
         """Sine of the grazing angle (`rft.plates.stress.PlateStress`), at least `SHARPEST`."""
         return max(math.sin(self.stress.grazing), SHARPEST)
 
-    def lead(self, n_dot_v: np.ndarray, grazing_sine: float, sheet: np.ndarray | bool = False) -> np.ndarray:
+    @formula
+    def lead(self, n_dot_v, grazing_sine, sheet=False):
         """Return the share of the traction that faces bear, 0 to 1; 1 on a thin sheet, of which either side leads."""
-        return np.where(sheet, 1.0, rounded(n_dot_v, grazing_sine))
+        return where(sheet, 1.0, rounded(n_dot_v, grazing_sine))

@@ -14,7 +14,7 @@ import numpy as np
 
 from rft.checks import real_array
 from rft.ground import Ground, GroundEffect, ground_of
-from rft.meshes.contact import Motion, Part, load
+from rft.meshes.contact import Motion, Part, load, velocity_of_middle
 from rft.meshes.law import Spatial
 from rft.meshes.mesh import Mesh, below
 from rft.meshes.submerged import submerged
@@ -23,7 +23,17 @@ from rft.refusal import require
 
 class Wrench(NamedTuple):
     """Load of the grains on a mesh, in the world. force: (..., 3), N. moment: (..., 3), N m, about the origin of the mesh.
-    power: (...,), W, of the grains on the mesh; not positive where the law dissipates. area: (...,), m^2, under stress."""
+    power: (...,), W, of the grains on the mesh; not positive where the law dissipates. area: (...,), m^2, under stress.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft.meshes import Spatial, Sphere, wrench
+    >>> ball, sand = Sphere(radius=0.02).mesh(320), Spatial(xi_n=1e5)
+    >>> load = wrench(sand, ball, np.eye(3), place=[0, 0, -0.05], velocity=[0, 0, -0.01], spin=[0, 0, 0])
+    >>> bool(load.power < 0), round(float(load.area), 4)  # W, m^2
+    (True, 0.0023)
+    """
 
     force: np.ndarray
     moment: np.ndarray
@@ -33,7 +43,17 @@ class Wrench(NamedTuple):
 
 class Faces(NamedTuple):
     """Parts of triangles below the surface at one pose. corners: (P, 3, 3), and middle: (P, 3), in the world, m. force:
-    (P, 3), N. triangle: (P,), index of the triangle that each is a part of."""
+    (P, 3), N. triangle: (P,), index of the triangle that each is a part of.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft.meshes import Spatial, Sphere, bearing
+    >>> ball, sand = Sphere(radius=0.02).mesh(320), Spatial(xi_n=1e5)
+    >>> faces = bearing(sand, ball, np.eye(3), place=[0, 0, 0], velocity=[0, 0, -0.01], spin=[0, 0, 0])
+    >>> faces.corners.shape[1:], int(faces.triangle.max()) < 320
+    ((3, 3), True)
+    """
 
     corners: np.ndarray
     middle: np.ndarray
@@ -48,7 +68,17 @@ def wrench(
 
     rotation: (..., 3, 3), from the mesh's axes to the world's, z up and z = 0 the surface. place: (..., 3), origin of the
     mesh in the world, m. velocity: (..., 3), of the origin, m/s. spin: (..., 3), angular velocity, rad/s. Both are in the
-    world."""
+    world.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft.meshes import Spatial, Sphere, wrench
+    >>> ball, sand = Sphere(radius=0.02).mesh(320), Spatial(xi_n=1e5)
+    >>> load = wrench(sand, ball, np.eye(3), place=[0, 0, -0.05], velocity=[0, 0, -0.01], spin=[0, 0, 0])
+    >>> round(float(load.force[2]), 2)  # N, upwards
+    7.19
+    """
     rotation = real_array("rotation", rotation)
     place, velocity, spin = (real_array(n, x) for n, x in (("place", place), ("velocity", velocity), ("spin", spin)))
     require(rotation.shape[-2:] == (3, 3), "rotation must be (..., 3, 3)", value=rotation.shape)
@@ -82,11 +112,11 @@ def _wrench_at(medium: Spatial, mesh: Mesh, ground: Ground, rotation, place, vel
         _cut_triangles(mesh, np.flatnonzero(any_under & ~all_under), heights),
     )
     part = Part(*(np.concatenate(x, -1) for x in zip(*parts)))
-    motion = Motion(velocity[:, None], spin[:, None], place[0], up, rotation[0])
-    force, moment, stress = load(medium, ground, part, motion)
-    force, moment = force.sum(-1), moment.sum(-1)
+    motion = Motion(velocity, spin, place[0], up, rotation[0])
+    force, moment, stress = load(medium, ground, part, motion, velocity_of_middle(part, motion), False)
+    force, moment = np.sum(force, -1), np.sum(moment, -1)
     power = force @ velocity + moment @ spin
-    return np.array([*rotation @ force, *rotation @ moment, power, part.area[stress.any(0)].sum()])
+    return np.array([*rotation @ force, *rotation @ moment, power, part.area[np.any(stress, 0)].sum()])
 
 
 def _full_triangles(mesh: Mesh, index: np.ndarray, up: np.ndarray, height: float) -> Part:
@@ -108,7 +138,17 @@ def _cut_triangles(mesh: Mesh, index: np.ndarray, heights: np.ndarray) -> Part:
 def bearing(
     medium: Spatial, mesh: Mesh, rotation, place, velocity, spin, effects: Sequence[GroundEffect] = ()
 ) -> Faces:
-    """Return the parts of faces below the surface at one pose, and the force on each; arguments as of `wrench`."""
+    """Return the parts of faces below the surface at one pose, and the force on each; arguments as of `wrench`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft.meshes import Spatial, Sphere, bearing
+    >>> ball, sand = Sphere(radius=0.02).mesh(320), Spatial(xi_n=1e5)
+    >>> faces = bearing(sand, ball, np.eye(3), place=[0, 0, 0], velocity=[0, 0, -0.01], spin=[0, 0, 0])
+    >>> round(float(faces.force[:, 2].sum()), 2)  # N, upwards, on the half below the surface
+    1.56
+    """
     rotation, place, velocity, spin = (np.asarray(x, float) for x in (rotation, place, velocity, spin))
     world = mesh.vertices @ rotation.T + place
     parts, triangle = below(world[mesh.faces], world[mesh.faces, 2])
@@ -119,5 +159,6 @@ def bearing(
     depth, arm = -middle[:, 2] * area, (middle - place).T
     part = Part((mesh.middle_normals[triangle] @ rotation.T).T, arm, area, depth, depth * arm)
     ground = ground_of(effects, Ground(grazing_sine=medium.grazing_sine))
-    force = load(medium, ground, part, Motion(velocity[:, None], spin[:, None], place[0]))[0]
-    return Faces(parts, middle, force.T, triangle)
+    motion = Motion(velocity, spin, place[0])
+    force = load(medium, ground, part, motion, velocity_of_middle(part, motion), False)[0]
+    return Faces(parts, middle, np.stack(force, -1), triangle)

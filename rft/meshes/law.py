@@ -26,41 +26,42 @@ import numpy as np
 
 from rft.checks import Number, check_numbers, in_range
 from rft.ground.lead import jump, smoothstep
+from rft.meshes.triples import UP, dot, minus, plus, times
 from rft.metres import GRAVITY
 from rft.refusal import require
+from rft.vectors import absolute, combinations, formula, minimum, sqrt, where
 
+DOWN = (0.0, 0.0, -1.0)
 TENSION = ("cut", "keep", "push")
-UP = np.array([0.0, 0.0, 1.0])
 UPRIGHT = 1e-9  # |n . z| of faces that are vertical but for roundoff
 
-# Rows: coefficients of f1, f2, f3 for the terms of `_terms`. Source: Agarwal et al. (2023), as in a public implementation.
+# Rows: coefficients of f1, f2, f3 for the terms of `fitted`. Source: Agarwal et al. (2023), as in a public implementation.
 # Invariance about the vertical, and no stress along theta where psi = 0, hold by the form of the law for any digits.
-COEFFICIENTS = np.array([
-    [0.00212, -0.02320, -0.20890, -0.43083, -0.00259, 0.48872, -0.00415, 0.07204, -0.02750, -0.08772,
-     0.01992, -0.45961, 0.40799, -0.10107, -0.06576, 0.05664, -0.09269, 0.01892, 0.01033, 0.15120],
-    [-0.06796, -0.10941, 0.04725, -0.06914, -0.05835, -0.65880, -0.11985, -0.25739, -0.26834, 0.02692,
-     -0.00736, 0.63758, 0.08997, 0.21069, 0.04748, 0.20406, 0.18589, 0.04934, 0.13527, -0.33207],
-    [-0.02634, -0.03436, 0.45256, 0.00835, 0.02553, -1.31290, -0.05532, 0.06790, -0.16404, 0.02287,
-     0.02927, 0.95406, -0.00131, -0.11028, 0.01487, -0.02730, 0.10911, -0.04097, 0.07881, -0.27519],
-])  # fmt: skip
+COEFFICIENTS = (
+    (0.00212, -0.02320, -0.20890, -0.43083, -0.00259, 0.48872, -0.00415, 0.07204, -0.02750, -0.08772,
+     0.01992, -0.45961, 0.40799, -0.10107, -0.06576, 0.05664, -0.09269, 0.01892, 0.01033, 0.15120),
+    (-0.06796, -0.10941, 0.04725, -0.06914, -0.05835, -0.65880, -0.11985, -0.25739, -0.26834, 0.02692,
+     -0.00736, 0.63758, 0.08997, 0.21069, 0.04748, 0.20406, 0.18589, 0.04934, 0.13527, -0.33207),
+    (-0.02634, -0.03436, 0.45256, 0.00835, 0.02553, -1.31290, -0.05532, 0.06790, -0.16404, 0.02287,
+     0.02927, 0.95406, -0.00131, -0.11028, 0.01487, -0.02730, 0.10911, -0.04097, 0.07881, -0.27519),
+)  # fmt: skip
 
 
-def _terms(x1, x2, x3) -> np.ndarray:
-    """Return the monomials (20, ...) that the coefficients multiply."""
+@formula
+def fitted(n, v, up):
+    """Return `alpha` for unit normals n and unit velocities v; ``up`` is the unit vector upwards."""
+    height, along = dot(up, n), dot(n, v)
+    down = where((height > UPRIGHT) | ((absolute(height) <= UPRIGHT) & (along < 0.0)), -1.0, 1.0)
+    x1, x2, x3 = -dot(up, v), -(down * height), down * along
     a, b, c = x1 * x1, x2 * x2, x3 * x3
-    one = np.ones_like(x1)
-    return np.stack([
-        one, x1, x2, x3, a, b, c, x1 * x2, x2 * x3, x3 * x1,
-        x1 * a, x2 * b, x3 * c, x1 * b, x2 * a, x2 * c, x3 * b, x3 * a, x1 * c, x1 * x2 * x3,
-    ])  # fmt: skip
-
-
-def _alpha(n: np.ndarray, v: np.ndarray, up: np.ndarray) -> np.ndarray:
-    """Return `alpha` (3, N) for n and v (3, N); ``up`` (3,) is the unit vector upwards."""
-    height, along = up @ n, np.einsum("iN,iN->N", n, v)
-    down = np.where((height > UPRIGHT) | ((np.abs(height) <= UPRIGHT) & (along < 0)), -1.0, 1.0)
-    f1, f2, f3 = COEFFICIENTS @ _terms(-(up @ v), -down * height, down * along)
-    return f1 * down * n + f2 * v - f3 * up[:, None]
+    f1, f2, f3 = combinations(
+        COEFFICIENTS,
+        (
+            x1, x2, x3, a, b, c, x1 * x2, x2 * x3, x3 * x1,
+            x1 * a, x2 * b, x3 * c, x1 * b, x2 * a, x2 * c, x3 * b, x3 * a, x1 * c, x1 * x2 * x3,
+        ),
+    )  # fmt: skip
+    return minus(plus(times(f1 * down, n), times(f2, v)), times(f3, up))
 
 
 def alpha(n, v) -> np.ndarray:
@@ -70,13 +71,13 @@ def alpha(n, v) -> np.ndarray:
     The law is invariant under rotations of n and v about the vertical. It jumps, by 0.02 in the mean, where a face passes
     through the vertical and its other side begins to point down; a vertical face counts as one that leads.
     """
-    return _by_rows(lambda n, v: _alpha(n, v, UP), n, v)
+    return _by_rows(lambda n, v: fitted(n, v, UP), n, v)
 
 
 def _by_rows(law, n, v) -> np.ndarray:
-    """Return law(n, v), a function of arrays (3, N), for n and v (..., 3)."""
+    """Return law(n, v), a function of triples of arrays (N,), for n and v (..., 3)."""
     n, v = np.broadcast_arrays(np.asarray(n, float), np.asarray(v, float))
-    return law(n.reshape(-1, 3).T, v.reshape(-1, 3).T).T.reshape(n.shape)
+    return np.stack(law(n.reshape(-1, 3).T, v.reshape(-1, 3).T), -1).reshape(n.shape)
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,13 @@ class Spatial:
     20 degrees above the horizontal, drives in 0.05 % of directions, with at most 0.0052 xi_n |z| of stress. A face tilted by
     56 to 64 degrees that is drawn out against its tilt, 64 to 71 degrees above the horizontal, drives in 0.011 % of
     directions, with at most 8e-4 xi_n |z|; "cut" and "push" leave 0.001 % and 4e-4 of this region.
+
+    Examples
+    --------
+    >>> from rft.meshes import Spatial
+    >>> sand = Spatial.from_grains(1500.0, 0.5, surface_friction=0.4)  # kg/m^3, internal friction
+    >>> round(sand.xi_n / 1e6, 3)  # N/cm^3
+    0.879
     """
 
     xi_n: Annotated[
@@ -130,7 +138,7 @@ class Spatial:
     @property
     def plate(self) -> float:
         """Stress on a plate pushed straight down, over xi_n |z|, at any ``tension``."""
-        return float(alpha(-UP, -UP)[2])
+        return float(alpha(DOWN, DOWN)[2])
 
     @property
     def grazing_sine(self) -> float:
@@ -144,30 +152,48 @@ class Spatial:
 
     def _stress(self, n: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Return `stress` (3, N) for n and v (3, N)."""
-        speed = np.sqrt(np.einsum("iN,iN->N", v, v))
+        speed = np.sqrt(dot(v, v))
         v = v / np.where(speed > 0, speed, 1.0)
-        return self.traction(n, v) * (self.lead(np.einsum("iN,iN->N", n, v), self.grazing_sine) * (speed > 0))
+        return np.stack(self.traction(n, v)) * (self.lead(dot(n, v), self.grazing_sine) * (speed > 0))
 
-    def traction(self, n: np.ndarray, v: np.ndarray, up: np.ndarray = UP) -> np.ndarray:
-        """Return the force per area and depth (3, N), N/m^3, for unit normals n and unit velocities v (3, N), whether or
-        not faces lead; ``up`` (3,) is the unit vector upwards."""
-        return self._limited(_alpha(n, v, up), n) * self.xi_n
+    @property
+    def cut(self) -> float:
+        """1 if faces on which the fit pulls have no stress across, else 0."""
+        return float(self.tension == "cut")
 
-    def lead(self, n_dot_v: np.ndarray, grazing_sine: float, sheet: np.ndarray | bool = False) -> np.ndarray:
+    @property
+    def pushed(self) -> float:
+        """1 if the fit's pull across a face is reversed, else 0."""
+        return float(self.tension == "push")
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Numbers that the formulas read (`rft.laws.records.law_numbers`)."""
+        names = "xi_n", "surface_friction", "cut", "pushed"
+        return {name: float(getattr(self, name)) for name in names}
+
+    @formula
+    def traction(self, n, v, up=UP):
+        """Return the force per area and depth, N/m^3, for unit normals n and unit velocities v, whether or not faces lead;
+        ``up`` is the unit vector upwards. Surface friction limits it, and ``tension`` on faces that are pulled."""
+        a = fitted(n, v, up)
+        across = dot(a, n)  # negative: a push against the face
+        along = minus(a, times(across, n))
+        if self.cut == 1.0:
+            across = minimum(across, 0.0)
+        elif self.pushed == 1.0:
+            across = -absolute(across)
+        size, most = sqrt(dot(along, along)), self.surface_friction * absolute(across)
+        share = minimum(1.0, most / where(size > 0.0, size, 1.0))
+        return times(self.xi_n, plus(times(across, n), times(share, along)))
+
+    @formula
+    def lead(self, n_dot_v, grazing_sine, sheet=False):
         """Return the share of the traction that faces bear, 0 to 1; a sheet leads on either side."""
-        n_dot_v = np.where(sheet, np.abs(n_dot_v), n_dot_v)
-        return smoothstep(n_dot_v, grazing_sine) if grazing_sine else jump(n_dot_v)
-
-    def _limited(self, a: np.ndarray, n: np.ndarray) -> np.ndarray:
-        """Return alpha (3, N) limited by surface friction, with the chosen ``tension`` on faces that are pulled."""
-        across = np.einsum("iN,iN->N", a, n)  # negative: a push against the face
-        along = a - across * n
-        if self.tension == "cut":
-            across = np.minimum(across, 0.0)
-        elif self.tension == "push":
-            across = -np.abs(across)
-        size, most = np.sqrt(np.einsum("iN,iN->N", along, along)), self.surface_friction * np.abs(across)
-        return across * n + np.minimum(1.0, most / np.where(size > 0, size, 1.0)) * along
+        n_dot_v = where(sheet, absolute(n_dot_v), n_dot_v)
+        if grazing_sine > 0.0:
+            return smoothstep(n_dot_v, grazing_sine)
+        return jump(n_dot_v)
 
 
 def alpha_of_angles(beta, gamma, psi) -> np.ndarray:

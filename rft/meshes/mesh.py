@@ -25,7 +25,17 @@ class Mesh:
     vertices: (V, 3), m. faces: (F, 3), indices of vertices, counter-clockwise as seen from outside. closed: whether every
     edge must be shared by two triangles that agree on which side is out; False for a thin plate, of which either side may
     lead. smooth_normals: (F, 3, 3), unit normals at the corners of the triangles of a mesh that stands for a smooth
-    surface; None for the normals of the triangles."""
+    surface; None for the normals of the triangles.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft.meshes import Mesh
+    >>> vertices = 0.01 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> tetrahedron = Mesh(vertices, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+    >>> tetrahedron.faces.shape
+    (4, 3)
+    """
 
     vertices: np.ndarray
     faces: np.ndarray
@@ -136,7 +146,17 @@ class Mesh:
 
 def below(corners: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the parts of triangles (T, 3, 3) below the surface, from the corners' heights (T, 3): triangles (P, 3, 3), and
-    the index (P,) of the triangle that each is a part of. A triangle that crosses the surface has one part or two."""
+    the index (P,) of the triangle that each is a part of. A triangle that crosses the surface has one part or two.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft.meshes import below
+    >>> corners = np.array([[[0.0, 0.0, 0.01], [0.01, 0.0, -0.01], [0.0, 0.01, -0.01]]])
+    >>> triangles, index = below(corners, corners[..., 2])
+    >>> triangles.shape, index  # one triangle, cut at the surface
+    ((2, 3, 3), array([0, 0]))
+    """
     under = heights < 0
     count = under.sum(-1)
     full, tips, pairs = (np.flatnonzero(count == k) for k in (3, 1, 2))

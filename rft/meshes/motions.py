@@ -31,7 +31,17 @@ Angle = Annotated[float, Number(-1e3, 1e3, "rad", "angle about the axis, from th
 class Trajectory(NamedTuple):
     """A motion in time, in the world. t: (T,), s. place: (T, 3), of the origin, m. rotation: (T, 3, 3). velocity: (T, 3), of
     the origin, m/s. spin: (T, 3), angular velocity, rad/s. angle: (T,), rad, of a body that rotates about one axis, else
-    0."""
+    0.
+
+    Examples
+    --------
+    >>> from rft.meshes import Drag, Sphere
+    >>> motion = Drag(depth=0.05, distance=0.1, samples=3).trajectory(Sphere(0.02).mesh(80))
+    >>> motion.place, motion.spin.shape
+    (array([[ 0.  ,  0.  , -0.05],
+           [ 0.05,  0.  , -0.05],
+           [ 0.1 ,  0.  , -0.05]]), (3, 3))
+    """
 
     t: np.ndarray
     place: np.ndarray
@@ -46,6 +56,13 @@ class Drag(Motion):
     """Motion along a straight line without turning.
 
     attitude (rad): orientation of the body, a rotation vector, or an angle about y.
+
+    Examples
+    --------
+    >>> from rft.meshes import Drag, Sphere
+    >>> motion = Drag(depth=0.05, distance=0.1).trajectory(Sphere(0.02).mesh(80))
+    >>> motion.place[-1].round(3)
+    array([ 0.1 ,  0.  , -0.05])
     """
 
     depth: Depth
@@ -70,6 +87,13 @@ class Penetrate(Motion):
     """Motion straight down, or on a slope, from where the lowest point touches the surface.
 
     attitude (rad): orientation of the body, a rotation vector, or an angle about y.
+
+    Examples
+    --------
+    >>> from rft.meshes import Penetrate, Sphere
+    >>> motion = Penetrate(depth=0.05).trajectory(Sphere(0.02).mesh(80))
+    >>> motion.place[-1].round(3)
+    array([ 0.  ,  0.  , -0.03])
     """
 
     depth: Annotated[float, metres("depth of the lowest point at the end", 1e-9)]
@@ -96,6 +120,13 @@ class Rotate(Motion):
 
     axis (-): direction of the axis, of any length but 0. attitude (rad): orientation of the body at angle 0, a rotation
     vector, or an angle about y.
+
+    Examples
+    --------
+    >>> from rft.meshes import Leg, Rotate
+    >>> motion = Rotate(hub_height=0.02).trajectory(Leg(0.038, 0.02, 0.002).mesh(500))
+    >>> motion.rotation.shape
+    (361, 3, 3)
     """
 
     hub_height: Height
@@ -138,6 +169,13 @@ class Path(Motion):
 
     t (s): times, ascending. x, y, z (m): of the origin. rx, ry, rz (rad): rotation vectors, all or none; from one pose to the
     next the body turns by less than 2 rad.
+
+    Examples
+    --------
+    >>> from rft.meshes import Path, Sphere
+    >>> path = Path(t=(0.0, 1.0, 2.0), x=(0.0, 0.01, 0.02), y=(0.0, 0.0, 0.0), z=(-0.05, -0.05, -0.05))
+    >>> path.trajectory(Sphere(0.02).mesh(80)).velocity[0].round(3)  # m/s
+    array([0.01, 0.  , 0.  ])
     """
 
     t: tuple[float, ...]

@@ -3,6 +3,8 @@ hip of a leg."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from rft.checks import in_range
@@ -75,15 +77,19 @@ def capsule(radius: float, half: float, around: int = 24, along: int = 4) -> Mes
     return _tube(np.stack([np.outer(r, np.cos(turn)), np.outer(r, np.sin(turn)), z[:, None] + 0 * turn], -1), 1)
 
 
-def box(sides, m: int = 1) -> Mesh:
-    """Return a box along the axes, about the origin, with each face cut into m x m rectangles."""
-    half = np.asarray(sides, float) / 2
-    s, points, faces = np.arange(-_count("m", m, 1), m + 1, 2) / m, [], []
+def box(sides, m: int | Sequence[int] = 1) -> Mesh:
+    """Return a box along the axes, about the origin, with each edge along an axis cut into m pieces, or into the number of
+    pieces given for that axis."""
+    half, points, faces, n = np.asarray(sides, float) / 2, [], [], 0
+    pieces = [_count("m", one, 1) for one in np.broadcast_to(m, 3)]
     for axis in range(3):
+        along, across = (pieces[(axis + k) % 3] for k in (1, 2))
         for out in (-1.0, 1.0):
-            u, v = np.meshgrid(s, out * s, indexing="ij")
-            n = len(faces) // 2 * (m + 1) ** 2 + np.arange((m + 1) ** 2).reshape(m + 1, m + 1)
-            a, b, c, d = n[:-1, :-1].ravel(), n[1:, :-1].ravel(), n[1:, 1:].ravel(), n[:-1, 1:].ravel()
+            lines = (np.arange(-one, one + 1, 2) / one for one in (along, across))
+            u, v = np.meshgrid(*(side * line for side, line in zip((1.0, out), lines)), indexing="ij")
+            index = n + np.arange(u.size).reshape(u.shape)
+            n += u.size
+            a, b, c, d = (x.ravel() for x in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
             points.append(np.roll(np.stack([out + 0 * u, u, v], -1).reshape(-1, 3), axis, 1) * half)
             faces += [np.stack([a, b, c], -1), np.stack([a, c, d], -1)]
     vertices, index = np.unique(np.concatenate(points), axis=0, return_inverse=True)

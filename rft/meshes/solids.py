@@ -23,7 +23,14 @@ MOST_TURNS = 100  # of a thread: more turns need more than `MOST_TRIANGLES` tria
 
 
 class Solid:
-    """Base of bodies that have a mesh."""
+    """Base of bodies that have a mesh.
+
+    Examples
+    --------
+    >>> from rft.meshes import Solid, Sphere
+    >>> isinstance(Sphere(0.02), Solid)
+    True
+    """
 
     def __post_init__(self):
         check_numbers(self)
@@ -46,7 +53,14 @@ class Solid:
 
 @dataclass(frozen=True)
 class Sphere(Solid):
-    """A ball about the origin, of 20, 80, 320, ..., or 327680 triangles: the least that are enough for ``triangles``."""
+    """A ball about the origin, of 20, 80, 320, ..., or 327680 triangles: the least that are enough for ``triangles``.
+
+    Examples
+    --------
+    >>> from rft.meshes import Sphere
+    >>> Sphere(radius=0.02).mesh(300).faces.shape
+    (320, 3)
+    """
 
     radius: Annotated[float, metres("radius of the sphere")]
 
@@ -61,7 +75,14 @@ class Sphere(Solid):
 
 @dataclass(frozen=True)
 class Cylinder(Solid):
-    """A rod along y, about the origin, across the plane of x and z."""
+    """A rod along y, about the origin, across the plane of x and z.
+
+    Examples
+    --------
+    >>> from rft.meshes import Cylinder
+    >>> Cylinder(radius=0.01, length=0.1).mesh(500).closed
+    True
+    """
 
     radius: Annotated[float, metres("radius of the rod")]
     length: Annotated[float, metres("length along y")]
@@ -77,6 +98,12 @@ class Screw(Solid):
     """An Archimedean screw along x, about the origin: a core with one thread, which is a blade or has a smooth profile.
 
     handed (-): "right", which drives to +x as it turns about +x by the right hand, or "left", its mirror image.
+
+    Examples
+    --------
+    >>> from rft.meshes import Screw
+    >>> Screw(radius=0.03, core=0.02, pitch=0.06, length=0.2, thickness=0.004).mesh(2000).closed
+    True
     """
 
     radius: Annotated[float, metres("radius of the thread")]
@@ -143,7 +170,14 @@ class Screw(Solid):
 
 @dataclass(frozen=True)
 class Leg(Solid):
-    """The c-leg of the vertical plane, extruded across it: hip at the origin, free end at z = -2 R."""
+    """The c-leg of the vertical plane, extruded across it: hip at the origin, free end at z = -2 R.
+
+    Examples
+    --------
+    >>> from rft.meshes import Leg
+    >>> Leg(radius=0.038, width=0.02, thickness=0.002).mesh(500).closed
+    True
+    """
 
     radius: Annotated[float, metres("R, half the distance from hip to free end")]
     width: Annotated[float, metres("width across the plane, along y")]

@@ -51,7 +51,15 @@ class Part(NamedTuple):
     """The part of an element that is below the surface and leads. arm: from the frame's origin to its middle, m. depth:
     of its middle, m; 0 where there is no such part. area: m^2. n: unit normal of its middle, of either side where both
     sides are summed at once. v, speed: unit velocity of its middle, and m/s. first, last: its ends, 0 to 1 along the
-    element."""
+    element.
+
+    Examples
+    --------
+    >>> from rft.plates import Plate, parts
+    >>> part = parts(Plate(length=0.04, width=0.02).outline(2), [0.0, -0.05, 0.0], [0.0, -0.01, 0.0])
+    >>> part.depth, part.area  # m, m^2
+    (array([0.05, 0.05]), array([0.0004, 0.0004]))
+    """
 
     arm: tuple[float, float]
     depth: float

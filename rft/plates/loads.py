@@ -27,7 +27,16 @@ CHUNK = 50_000  # elements times motions that are computed at once, for memory
 
 
 class Loads(NamedTuple):
-    """Loads of the grains on an outline. force: (..., 2) as (x, z), N. moment: (...,), N m, about the frame's origin."""
+    """Loads of the grains on an outline. force: (..., 2) as (x, z), N. moment: (...,), N m, about the frame's origin.
+
+    Examples
+    --------
+    >>> from rft.plates import RoundRod, StressMap, loads
+    >>> rod = RoundRod(radius=0.01, width=0.1).outline(60)
+    >>> found = loads(StressMap(), rod, [0.0, -0.05, 0.0], [0.01, 0.0, 0.0])
+    >>> found.force.shape, bool(found.power([0.01, 0.0, 0.0]) < 0)  # W
+    ((2,), True)
+    """
 
     force: np.ndarray
     moment: np.ndarray
@@ -51,6 +60,14 @@ def loads(
     Each element is cut where it crosses the surface and where it begins to lead; the stress is that at the middle of the
     part which is below and leads. The error is of `ORDER` 2 in 1/elements, 1 where tension is cut. Without inertia of
     grains the force depends on the direction of the twist alone; at rest it is 0. backend: see `rft.balance.backend`.
+
+    Examples
+    --------
+    >>> from rft.plates import RoundRod, StressMap, loads
+    >>> rod = RoundRod(radius=0.01, width=0.1).outline(60)
+    >>> load = loads(StressMap(), rod, pose=[0.0, -0.05, 0.0], twist=[0.01, 0.0, 0.0])
+    >>> load.force.round(3)  # N, against the motion and up
+    array([-40.866,  34.354])
     """
     check(backend)
     pose, twist = np.broadcast_arrays(_triples("pose", pose), _triples("twist", twist))
@@ -84,7 +101,15 @@ def motion(pose: np.ndarray, twist: np.ndarray) -> Motion:
 
 
 def parts(outline: Outline, pose, twist, side: float = 1.0) -> Part:
-    """Return the parts (..., E) of an outline that are below the surface and lead on a side."""
+    """Return the parts (..., E) of an outline that are below the surface and lead on a side.
+
+    Examples
+    --------
+    >>> from rft.plates import Plate, parts
+    >>> plate = Plate(length=0.04, width=0.02).outline(4)
+    >>> parts(plate, [0.0, -0.05, 0.0], [0.0, -0.01, 0.0]).area  # m^2, of each element
+    array([0.0002, 0.0002, 0.0002, 0.0002])
+    """
     motions = motion(_triples("pose", pose), _triples("twist", twist))
     return leading_part(elements(outline), Motion(*(x[..., None] for x in motions)), side, side != 0.0)
 

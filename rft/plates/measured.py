@@ -23,6 +23,15 @@ class PlateDrags(PlateStress):
     and gamma within +-pi/2 suffice. Drags at the same angles are averaged. The error is of order 2 in the spacing.
     Refused: fewer than 6 drags, more than 5000, angles more than 35 degrees from all of them. zeta, grazing, tension: see
     `StressMap`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft.plates import PlateDrags, StressMap
+    >>> beta, gamma = (x.ravel() for x in np.meshgrid(*[np.radians(np.arange(-90, 91, 30.0))] * 2))
+    >>> drags = PlateDrags(tuple(beta), tuple(gamma), *map(tuple, StressMap()(beta, gamma)))
+    >>> round(float(drags(0.0, np.pi / 2)[1]), 3)  # N/cm^3, a level plate pushed down
+    1.0
     """
 
     beta: tuple[float, ...]

@@ -21,7 +21,15 @@ Angle = Annotated[float, Number(-1e3, 1e3, "rad", "angle at one end of the motio
 
 
 class Trajectory(NamedTuple):
-    """A motion in time. t: (T,), s. pose: (T, 3) as (x, z, angle), m and rad. twist: (T, 3) as (v_x, v_z, rate)."""
+    """A motion in time. t: (T,), s. pose: (T, 3) as (x, z, angle), m and rad. twist: (T, 3) as (v_x, v_z, rate).
+
+    Examples
+    --------
+    >>> from rft.plates import CLeg, Rotate
+    >>> motion = Rotate(hub_height=0.02, samples=5).trajectory(CLeg(0.038, 0.02).outline(24))
+    >>> motion.pose[:, 2].round(3)  # angle, rad
+    array([-3.142, -1.571,  0.   ,  1.571,  3.142])
+    """
 
     t: np.ndarray
     pose: np.ndarray
@@ -30,7 +38,16 @@ class Trajectory(NamedTuple):
 
 @dataclass(frozen=True)
 class Drag(Motion):
-    """Motion along a straight line without turning."""
+    """Motion along a straight line without turning.
+
+    Examples
+    --------
+    >>> from rft.plates import Drag, RoundRod
+    >>> motion = Drag(depth=0.05, distance=0.1).trajectory(RoundRod(0.01, 0.1).outline(40))
+    >>> motion.pose[[0, -1]].round(3)
+    array([[ 0.  , -0.05,  0.  ],
+           [ 0.1 , -0.05,  0.  ]])
+    """
 
     depth: Depth
     direction: Direction = 0.0
@@ -49,7 +66,15 @@ class Drag(Motion):
 
 @dataclass(frozen=True)
 class Penetrate(Motion):
-    """Motion straight down, or on a slope, from where the outline's lowest point touches the surface."""
+    """Motion straight down, or on a slope, from where the outline's lowest point touches the surface.
+
+    Examples
+    --------
+    >>> from rft.plates import Penetrate, Plate
+    >>> motion = Penetrate(depth=0.05).trajectory(Plate(0.04, 0.02).outline(4))
+    >>> motion.pose[-1].round(3)
+    array([ 0.  , -0.05,  0.  ])
+    """
 
     depth: Annotated[float, metres("depth of the lowest point at the end", 1e-9)]
     direction: Direction = math.pi / 2
@@ -70,7 +95,15 @@ class Penetrate(Motion):
 
 @dataclass(frozen=True)
 class Rotate(Motion):
-    """Rotation about a hub at a fixed height above the surface."""
+    """Rotation about a hub at a fixed height above the surface.
+
+    Examples
+    --------
+    >>> from rft.plates import CLeg, Rotate
+    >>> motion = Rotate(hub_height=0.02).trajectory(CLeg(0.038, 0.02).outline(24))
+    >>> motion.pose.shape
+    (361, 3)
+    """
 
     hub_height: Height
     rate: Annotated[
@@ -99,6 +132,13 @@ class Path(Motion):
     """Motion through given poses. Velocities are differences of order 2 in the spacing of t.
 
     t (s): times, ascending. x, z (m): of the frame's origin. angle (rad): of the body, 0 throughout if left out.
+
+    Examples
+    --------
+    >>> from rft.plates import Path, Plate
+    >>> path = Path(t=(0.0, 1.0, 2.0), x=(0.0, 0.01, 0.03), z=(-0.02, -0.02, -0.02))
+    >>> path.trajectory(Plate(0.04, 0.02).outline(4)).twist[:, 0].round(3)  # m/s
+    array([0.005, 0.015, 0.025])
     """
 
     t: tuple[float, ...]

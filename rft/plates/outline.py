@@ -22,7 +22,16 @@ class Outline:
     points: (N + 1, 2) as (x, z), the last repeating the first if the outline is closed. smooth_normals: (N, 2, 2), unit
     normals at both ends of each element of a chain that stands for a curve; None for the normals of the elements. A
     closed outline has faces outwards, and is stored counter-clockwise with x to the right and z up. An open one is a thin
-    sheet; either side may lead. Refused: outlines that cross or touch themselves, elements of no length."""
+    sheet; either side may lead. Refused: outlines that cross or touch themselves, elements of no length.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft.plates import Outline
+    >>> plate = Outline(np.array([[0.0, 0.0], [0.02, 0.0], [0.04, 0.0]]), width=0.02)
+    >>> plate.elements, plate.closed
+    (2, False)
+    """
 
     points: np.ndarray
     width: Annotated[float, metres("width of the body across the plane")]

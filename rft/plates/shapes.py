@@ -25,7 +25,14 @@ HalfLength = Annotated[float, metres("R, half the distance from hip to free end"
 
 
 class Shape:
-    """Base of bodies that have an outline."""
+    """Base of bodies that have an outline.
+
+    Examples
+    --------
+    >>> from rft.plates import Plate, Shape
+    >>> isinstance(Plate(0.04, 0.02), Shape)
+    True
+    """
 
     width: float
 
@@ -45,7 +52,14 @@ class Shape:
 
 @dataclass(frozen=True)
 class Plate(Shape):
-    """A thin plate."""
+    """A thin plate.
+
+    Examples
+    --------
+    >>> from rft.plates import Plate
+    >>> Plate(length=0.04, width=0.02).outline(2).points[:, 0]  # x along the plate, m
+    array([-0.02,  0.  ,  0.02])
+    """
 
     length: Annotated[float, metres("length in the plane")]
     width: Width
@@ -58,7 +72,14 @@ class Plate(Shape):
 
 @dataclass(frozen=True)
 class RoundRod(Shape):
-    """A cylinder that lies across the plane (Fig. 8(a))."""
+    """A cylinder that lies across the plane (Fig. 8(a)).
+
+    Examples
+    --------
+    >>> from rft.plates import RoundRod
+    >>> RoundRod(radius=0.01, width=0.1).outline(40).elements
+    40
+    """
 
     radius: Annotated[float, metres("radius of the cylinder")]
     width: Width
@@ -72,6 +93,12 @@ class HalfCylinder(Shape):
     """Half of a cylinder (Fig. 8(a)).
 
     flat (-): where its flat side is, "down" or "up"; the frame is at the middle of that side.
+
+    Examples
+    --------
+    >>> from rft.plates import HalfCylinder
+    >>> HalfCylinder(radius=0.02, width=0.1, flat="down").outline(30).closed
+    True
     """
 
     radius: Annotated[float, metres("radius of the cylinder")]
@@ -99,7 +126,18 @@ class HalfCylinder(Shape):
 
 @dataclass(frozen=True)
 class SquareRod(Shape):
-    """A square bar that lies across the plane, one side down (Fig. 8(a))."""
+    """A square bar that lies across the plane, one side down (Fig. 8(a)).
+
+    Examples
+    --------
+    >>> from rft.plates import SquareRod
+    >>> SquareRod(side=0.02, width=0.1).outline(4).points
+    array([[-0.01, -0.01],
+           [ 0.01, -0.01],
+           [ 0.01,  0.01],
+           [-0.01,  0.01],
+           [-0.01, -0.01]])
+    """
 
     side: Annotated[float, metres("side of the square")]
     width: Width
@@ -115,6 +153,12 @@ class CLeg(Shape):
 
     A leg of positive curvature bulges backwards as it points down, and enters the grains with the bulge ahead as it turns
     at a positive rate. The sign is assumed to be the paper's.
+
+    Examples
+    --------
+    >>> from rft.plates import CLeg
+    >>> CLeg(radius=0.038, width=0.02).outline(24).points[[0, -1], 1].round(3)  # hip and free end, m
+    array([ 0.   , -0.076])
     """
 
     radius: HalfLength
@@ -141,7 +185,14 @@ class CLeg(Shape):
 
 @dataclass(frozen=True)
 class FlatLeg(Shape):
-    """A thin straight leg of length 2 R."""
+    """A thin straight leg of length 2 R.
+
+    Examples
+    --------
+    >>> from rft.plates import FlatLeg
+    >>> FlatLeg(radius=0.038, width=0.02).outline(4).points[:, 1].round(3)  # from the hip downwards, m
+    array([ 0.   , -0.019, -0.038, -0.057, -0.076])
+    """
 
     radius: HalfLength
     width: Width
@@ -152,7 +203,14 @@ class FlatLeg(Shape):
 
 @dataclass(frozen=True)
 class Wheel(Shape):
-    """A wheel with or without lugs: straight bars that stand off its rim, equally spaced."""
+    """A wheel with or without lugs: straight bars that stand off its rim, equally spaced.
+
+    Examples
+    --------
+    >>> from rft.plates import Wheel
+    >>> Wheel(radius=0.05, width=0.03, lugs=12, lug_height=0.01, lug_width=0.004).outline(200).closed
+    True
+    """
 
     radius: Annotated[float, metres("radius of the rim")]
     width: Width
@@ -200,6 +258,12 @@ class Polygon(Shape):
     """Straight edges between points.
 
     points (m): (x, z) of each. closed (-): the last point is joined to the first, and the body has an inside.
+
+    Examples
+    --------
+    >>> from rft.plates import Polygon
+    >>> Polygon(((0.0, 0.0), (0.02, 0.0), (0.01, 0.02)), width=0.05).outline(12).closed
+    True
     """
 
     points: tuple[tuple[float, float], ...]
@@ -220,6 +284,12 @@ class Spline(Shape):
     """A smooth curve through points: a cubic spline, its parameter the length of the chords.
 
     points (m): (x, z) of each. closed (-): the last point is joined to the first, and the body has an inside.
+
+    Examples
+    --------
+    >>> from rft.plates import Spline
+    >>> Spline(((0.01, 0.0), (0.0, 0.01), (-0.01, 0.0), (0.0, -0.01)), width=0.1).outline(40).closed
+    True
     """
 
     points: tuple[tuple[float, float], ...]

@@ -63,6 +63,14 @@ class PlateStress:
     grazing: angle between motion and face, rad, over which the stress on the face of a closed body rises. A thin plate has
     no jump where it slides along itself: its other face leads. tension: "keep" leaves the stress on faces that the map
     pulls on instead of pushing, "cut" sets it to 0.
+
+    Examples
+    --------
+    >>> import math
+    >>> from rft.plates import VERTICAL
+    >>> stress = VERTICAL["poppy-seeds-loose"].stress
+    >>> [round(float(x), 3) for x in stress(0.0, math.pi / 2)]  # alpha_x, alpha_z of a level plate pushed down, N/cm^3
+    [0.0, 0.254]
     """
 
     grazing: float
@@ -104,6 +112,14 @@ class StressMap(PlateStress):
 
     The defaults are the generic set M0. Source: Li, Zhang and Goldman, Science 339, 1408 (2013), Table S2; Fig. 7 of Zhang
     and Goldman (2014).
+
+    Examples
+    --------
+    >>> import math
+    >>> from rft.plates import StressMap
+    >>> alpha_x, alpha_z = StressMap(zeta=0.5)(0.0, math.pi / 2)  # a level plate pushed down, N/cm^3
+    >>> round(float(alpha_z), 3)
+    0.5
     """
 
     A00: CosineZ = 0.206

@@ -16,6 +16,13 @@ class Survey:
     beta: (B,), within +-pi/2, and gamma: (G,), within +-pi, rad, midpoints of equal cells. alpha_x, alpha_z, normal,
     power: (B, G), N/cm^3. normal: stress along the leading normal, positive where the grains pull. power: power of the
     stress at unit speed, negative where the grains dissipate, as they should.
+
+    Examples
+    --------
+    >>> from rft.plates import StressMap, survey
+    >>> overview = survey(StressMap(), cells=30)
+    >>> overview.beta.shape, overview.alpha_z.shape
+    ((30,), (30, 60))
     """
 
     beta: np.ndarray
@@ -46,7 +53,15 @@ class Survey:
 
 
 def survey(stress: PlateStress, cells: int = 180) -> Survey:
-    """Return the survey of a map on ``cells`` tilts and twice as many directions."""
+    """Return the survey of a map on ``cells`` tilts and twice as many directions.
+
+    Examples
+    --------
+    >>> from rft.plates import StressMap, survey
+    >>> overview = survey(StressMap(), cells=30)
+    >>> round(float(overview.pulling), 3)  # share of directions in which the map pulls
+    0.116
+    """
     beta = (np.arange(cells) + 0.5) / cells * np.pi - np.pi / 2
     gamma = (np.arange(2 * cells) + 0.5) / cells * np.pi - np.pi
     n, v = (np.sin(beta)[:, None], -np.cos(beta)[:, None]), (np.cos(gamma), -np.sin(gamma))

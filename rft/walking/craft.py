@@ -24,6 +24,15 @@ class Screws(Robot):
 
     screw (-): the left screw; both drive forwards. pair (-): "mirrored", the right screw is the mirror image of the left and
     rotates in the other direction, or "alike", both are the same and rotate in the same direction.
+
+    Examples
+    --------
+    >>> from rft.meshes import Screw
+    >>> from rft.walking import Screws
+    >>> screw = Screw(radius=0.03, core=0.02, pitch=0.06, length=0.2, thickness=0.004)
+    >>> craft = Screws(1.0, 0.2, 0.16, 0.04, screw, track=0.12, drop=0.055)
+    >>> craft.pair  # the right screw is the mirror image of this one
+    'mirrored'
     """
 
     mass: Mass

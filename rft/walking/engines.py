@@ -19,7 +19,18 @@ from rft.walking.stride import Walk, compute_stride
 @dataclass(frozen=True)
 class Walker:
     """A robot, its clock and its ground. stress: a stress map of the vertical plane, or a law of three dimensions. effects:
-    aeration and grain inertia."""
+    aeration and grain inertia.
+
+    Examples
+    --------
+    >>> from rft.plates import CLeg, StressMap
+    >>> from rft.walking import Fineness, Rhex, Tripod, Walker, engine
+    >>> robot = Rhex(0.15, 0.13, 0.02, 0.03, CLeg(0.02, 0.01), hips=(-0.05, 0.0, 0.05))
+    >>> walker = Walker(robot, Tripod(frequency=2.0), StressMap(zeta=0.6))
+    >>> (walk,) = engine("planar").walk([walker], Fineness(steps=16))
+    >>> walk.status, round(walk.speed, 3)
+    ('walking', 0.305)
+    """
 
     robot: Robot
     gait: Tripod
@@ -49,6 +60,12 @@ class Fineness:
     """Numerical settings of a walk.
 
     engine (-): planar or mujoco; by default planar, but mujoco for robots and ground of three dimensions.
+
+    Examples
+    --------
+    >>> from rft.walking import Fineness
+    >>> Fineness(steps=64).elements  # of each leg, where none are given
+    12
     """
 
     steps: Annotated[int, Number(8, 10_000, "-", "time steps of a cycle", whole=True)] = 32
@@ -112,7 +129,14 @@ class Engine(Protocol):
 
 
 def engine(name: str) -> Engine:
-    """Return the engine of a name; ValueError for unknown engines and those that are not installed."""
+    """Return the engine of a name; ValueError for unknown engines and those that are not installed.
+
+    Examples
+    --------
+    >>> from rft.walking import ENGINES, engine
+    >>> list(ENGINES), callable(engine("planar").walk)
+    (['planar', 'mujoco'], True)
+    """
     require(isinstance(name, str) and name in ENGINES, f"engine must be one of {', '.join(ENGINES)}", value=name)
     try:
         return importlib.import_module(ENGINES[name])

@@ -15,11 +15,11 @@ import numpy as np
 
 from rft.checks import Number, check_numbers
 from rft.ground import Ground
-from rft.meshes.contact import Motion, Part, cross, load
+from rft.meshes.blocks import Blocks
+from rft.meshes.contact import Motion, faces
 from rft.meshes.extruded import Extruded
 from rft.meshes.law import Spatial
 from rft.meshes.mesh import Mesh
-from rft.meshes.submerged import submerged
 from rft.plates.outline import Outline
 from rft.refusal import require
 
@@ -112,7 +112,7 @@ class Facets:
     """All surfaces that touch the ground.
 
     bodies: (B,), numbers of their bodies, in the order of all arrays over bodies. owner: (T,), index into ``bodies`` of each
-    triangle. A triangle with corners that run clockwise about its normal has a negative area."""
+    triangle. blocks: their faces, body after body."""
 
     def __init__(self, surfaces: Sequence[Surface]):
         require(len(surfaces) > 0, "no geoms that touch the ground")
@@ -120,13 +120,12 @@ class Facets:
         self.bodies, counts = np.unique([s.body for s in surfaces], return_inverse=True)
         sizes = [len(s.corners) for s in surfaces]
         self.corners = np.concatenate([s.corners for s in surfaces])
-        self.normals = np.concatenate([s.normals for s in surfaces])
-        self.sheet, self.owner = np.repeat([s.sheet for s in surfaces], sizes), np.repeat(counts, sizes)
-        a, b, c = self.corners.swapaxes(0, 1)
-        across = np.cross(b - a, c - a)
-        self.areas = np.copysign(np.linalg.norm(across, axis=1) / 2, (across * self.normals).sum(1))
+        normals = np.concatenate([s.normals for s in surfaces])
+        sheet, self.owner = np.repeat([s.sheet for s in surfaces], sizes), np.repeat(counts, sizes)
         first = np.searchsorted(self.owner, np.arange(len(self.bodies)))
         self.reach = np.maximum.reduceat(np.linalg.norm(self.corners, axis=2).max(1), first)
+        of_bodies = (np.split(x, first[1:]) for x in (self.corners, normals, sheet))
+        self.blocks = Blocks([faces(*one) for one in zip(*of_bodies)])
 
     def heights(self, rotation, place) -> np.ndarray:
         """Return the heights (T, 3), m, of the corners for rotations (B, 3, 3) and places (B, 3) of the bodies."""
@@ -136,39 +135,27 @@ class Facets:
         """Return wrenches (B, 6), force, N, and moment, N m, and their slopes (B, 6, 6) by velocity and spin.
 
         k: time, s, by which a pose changes with its velocity; None for no slopes."""
-        heights = self.heights(poses.rotation, poses.place)
-        under = np.flatnonzero((heights < 0.0).any(1))
-        count = len(self.bodies)
-        if not under.size:
-            return np.zeros((count, 6)), None if k is None else np.zeros((count, 6, 6))
-        owner, rotation = self.owner[under], poses.rotation[self.owner[under]]
-        r = np.einsum("tij,tcj->ict", rotation, self.corners[under])[:, :, None]  # (xyz, corner, column, triangle)
-        n = np.einsum("tij,tj->it", rotation, self.normals[under])[:, None]
-        heights = heights[under].T[:, None]
-        v, spin = poses.velocity[owner].T[:, None], poses.spin[owner].T[:, None]
-        if k is not None:
-            nudge = grains.rounding * NUDGE / np.stack([np.ones(count), self.reach])
-            dv, dw = np.zeros((3, 7, len(owner))), np.zeros((3, 7, len(owner)))
-            for j in range(3):
-                dv[j, 1 + j], dw[j, 4 + j] = nudge[0, owner], nudge[1, owner]
-            angle = k * dw
-            r = r + cross(angle[:, None], r)
-            heights = heights + k * dv[2] + (r[2] - r[2, :, :1])
-            n, v, spin = n + cross(angle, n), v + dv, spin + dw
-        wrench = self._wrenches(grains, under, owner, r, heights, n, v, spin)
         if k is None:
-            return wrench[:, 0], None
-        change = (wrench[:, 1:] - wrench[:, :1]) / np.repeat(nudge, 3, 0).T[:, :, None]
+            return self._wrenches(grains, Poses(*(x[:, None] for x in poses)))[:, 0], None
+        nudge = grains.rounding * NUDGE / np.stack([np.ones(len(self.bodies)), self.reach], -1)
+        velocity, spin = np.zeros((2, len(self.bodies), 7, 3))
+        velocity[:, 1:4], spin[:, 4:7] = nudge[:, :1, None] * np.eye(3), nudge[:, 1:, None] * np.eye(3)
+        rotation = poses.rotation[:, None]
+        moved = Poses(
+            rotation + np.cross((k * spin)[..., None], rotation, axis=2),
+            poses.place[:, None] + k * velocity,
+            poses.velocity[:, None] + velocity,
+            poses.spin[:, None] + spin,
+        )
+        wrench = self._wrenches(grains, moved)
+        change = (wrench[:, 1:] - wrench[:, :1]) / np.repeat(nudge, 3, 1)[:, :, None]
         return wrench[:, 0], change.swapaxes(1, 2)
 
-    def _wrenches(self, grains, under, owner, r, heights, n, v, spin) -> np.ndarray:
-        """Return the wrenches (B, C, 6) on triangles ``under`` the surface in C motions."""
-        share, middle, moments = submerged(heights)
-        middle, arms, areas = (middle * r).sum(1), (moments * r).sum(1), self.areas[under]
-        part = Part(n, middle, areas * share, areas * moments.sum(0), areas * arms)
-        force, moment, _ = load(grains.law, grains.ground, part, Motion(v, spin), self.sheet[under])
-        out = np.zeros((len(self.bodies), share.shape[0], 6))
-        first = np.flatnonzero(np.diff(owner, prepend=-1))
-        sums = np.add.reduceat(np.concatenate([force, moment]), first, axis=2)
-        out[owner[first]] = sums.transpose(2, 1, 0)
-        return out
+    def _wrenches(self, grains: Grains, poses: Poses) -> np.ndarray:
+        """Return the wrenches (B, C, 6) in C motions, arrays (B, C, ...), of the bodies."""
+        turn = poses.rotation
+        along_axes = lambda x: np.einsum("bcij,bci->bcj", turn, x)
+        x, _, z = np.moveaxis(poses.place, -1, 0)
+        motions = Motion(along_axes(poses.velocity), along_axes(poses.spin), x, turn[..., 2, :], turn[..., 0, :], z)
+        loads = self.blocks.loads(grains.law, grains.ground, motions)
+        return np.einsum("bcij,bcpj->bcpi", turn, loads.reshape(*loads.shape[:2], 2, 3)).reshape(loads.shape)

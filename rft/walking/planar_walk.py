@@ -22,8 +22,8 @@ from rft.walking.stride import STUCK, Strides, Walk, compute_stride, cycles_to_s
 def refuse(walker: Walker) -> None:
     """Raise ValueError for a walker that this engine cannot compute."""
     planar = isinstance(walker.robot, Rhex | Roller)
-    require(planar, f"the planar engine knows no {type(walker.robot).__name__} robot", instead="use --engine mujoco")
-    require(isinstance(walker.stress, PlateStress), "a law of three dimensions takes --engine mujoco")
+    require(planar, f"the planar engine knows no {type(walker.robot).__name__} robot", instead="use ``engine`` mujoco")
+    require(isinstance(walker.stress, PlateStress), "a law of three dimensions takes ``engine`` mujoco")
 
 
 def walk(

@@ -36,6 +36,13 @@ class Tripod:
     default they are equal.
 
     The legs at a hip differ by half a cycle.
+
+    Examples
+    --------
+    >>> from rft.walking import Tripod
+    >>> gait = Tripod(frequency=2.0, duty=0.5, sweep=1.0)
+    >>> round(float(gait.angle(0.25, 0.25)), 3)  # rad, a quarter of a cycle after the middle of its stance
+    0.5
     """
 
     frequency: Annotated[float, Number(1e-3, 200, "Hz", "turns a second")]
@@ -99,6 +106,13 @@ def walking_rounding(rounding: float, frequency, reach):
 class Robot:
     """Base of robots. legs: shape of every leg, which rotates about its axle at a hip. inertia: kg m^2, infinite for a robot
     that keeps its pitch.
+
+    Examples
+    --------
+    >>> from rft.plates import Wheel
+    >>> from rft.walking import Robot, Roller
+    >>> isinstance(Roller(mass=1.0, legs=Wheel(radius=0.05, width=0.03)), Robot)
+    True
     """
 
     mass: float
@@ -143,6 +157,14 @@ class Rhex(Robot):
     aside (m): distance of the legs at each hip from the middle plane, one on either side, for the engine of three
     dimensions. By default legs touch the box; of an odd number of hips every second one has its legs farther out, so that a
     tripod with equal forces on its legs neither rolls nor yaws the body.
+
+    Examples
+    --------
+    >>> from rft.plates import CLeg
+    >>> from rft.walking import Rhex
+    >>> robot = Rhex(0.15, 0.13, 0.02, 0.03, CLeg(0.02, 0.01), hips=(-0.05, 0.0, 0.05))
+    >>> robot.leg(24).elements
+    24
     """
 
     mass: Mass
@@ -199,7 +221,17 @@ class Rhex(Robot):
 @dataclass(frozen=True)
 class Roller(Robot):
     """A wheel, or another rotating shape, on an axle kept level: a mass that moves forwards and up and down under its own
-    weight."""
+    weight.
+
+    Examples
+    --------
+    >>> from rft.plates import StressMap, Wheel
+    >>> from rft.walking import Fineness, Roller, Tripod, Walker, engine
+    >>> wheel = Roller(mass=1.0, legs=Wheel(radius=0.05, width=0.03))
+    >>> (walk,) = engine("planar").walk([Walker(wheel, Tripod(frequency=0.5), StressMap())], Fineness(steps=16))
+    >>> walk.status
+    'walking'
+    """
 
     mass: Annotated[float, Number(1e-6, 1e4, "kg", "mass of all that the wheel carries, and its own")]
     legs: Shape

@@ -36,7 +36,17 @@ DIFFERENCE = 1e-3  # for slopes, in the same units
 class Turning(NamedTuple):
     """Means over a turn of a screw, (...,) for each slip. thrust, side, lift: N, of the grains along x, y, z. torque: N m, of
     the motor. pitching: N m, moment about y at the screw's middle, positive nose down. efficiency: thrust times speed over
-    the motor's power, nan for a screw out of the ground."""
+    the motor's power, nan for a screw out of the ground.
+
+    Examples
+    --------
+    >>> from rft.meshes import Screw, Spatial
+    >>> from rft.walking import turning
+    >>> screw = Screw(radius=0.03, core=0.02, pitch=0.06, length=0.2, thickness=0.004)
+    >>> mean = turning(Spatial(xi_n=1e5), screw, height=0.0, slip=[0.2, 0.6], triangles=500)
+    >>> mean.thrust.shape, mean.efficiency.shape
+    ((2,), (2,))
+    """
 
     slip: np.ndarray
     thrust: np.ndarray
@@ -51,7 +61,17 @@ def turning(
     medium: Spatial, screw: Screw, height: float, slip, rate: float = 1.0, triangles: int = TRIANGLES, angles: int = ANGLES
 ) -> Turning:  # fmt: skip
     """Return the mean forces on a level screw with its axis ``height``, m, above the surface. rate: rad/s. slip: (...,), 0 as
-    in a nut, 1 where the screw rotates without moving."""
+    in a nut, 1 where the screw rotates without moving.
+
+    Examples
+    --------
+    >>> from rft.meshes import Screw, Spatial
+    >>> from rft.walking import turning
+    >>> screw = Screw(radius=0.03, core=0.02, pitch=0.06, length=0.2, thickness=0.004)
+    >>> mean = turning(Spatial(xi_n=1e5), screw, height=0.0, slip=[0.2, 0.6], triangles=500)
+    >>> bool(mean.thrust[1] > mean.thrust[0])  # N
+    True
+    """
     slip = real_array("slip", slip)
     require(bool((np.abs(slip) <= 100).all()), "slip must be within +-100", value=slip)
     in_range("height", height, -10.0, 10.0)
@@ -72,7 +92,16 @@ def free_turning(
     medium: Spatial, screw: Screw, height: float, triangles: int = TRIANGLES, angles: int = ANGLES
 ) -> Turning:
     """Return the mean forces of `turning` at the slip without thrust, where nothing pulls the screw and it pulls nothing; nan
-    where that slip is beyond 1."""
+    where that slip is beyond 1.
+
+    Examples
+    --------
+    >>> from rft.meshes import Screw, Spatial
+    >>> from rft.walking import free_turning
+    >>> screw = Screw(radius=0.03, core=0.02, pitch=0.06, length=0.2, thickness=0.004)
+    >>> float(free_turning(Spatial(xi_n=1e5), screw, height=0.0, triangles=500).slip) < 1
+    True
+    """
 
     def forces(slip):
         return turning(medium, screw, height, slip, 1.0, triangles, angles)
@@ -94,7 +123,18 @@ class Cruise(NamedTuple):
     """Steady motion of a craft. height: m, of the centre of mass above the surface. roll, pitch: rad, about its x and the level
     y; positive nose down. velocity: (2,), m/s, forwards and to its left. yaw_rate: rad/s, to its left. advance: m, path
     length per turn of the screws. slip: 1 - velocity forwards over that in a nut. torque: (2,), N m, of the motors, left and
-    right. residual: of the balance, over the weight. All others are nan without a balance, as where the craft sinks."""
+    right. residual: of the balance, over the weight. All others are nan without a balance, as where the craft sinks.
+
+    Examples
+    --------
+    >>> from rft.meshes import Screw, Spatial
+    >>> from rft.walking import Screws, cruise
+    >>> screw = Screw(radius=0.03, core=0.02, pitch=0.06, length=0.2, thickness=0.004)
+    >>> craft = Screws(1.0, 0.2, 0.16, 0.04, screw, track=0.12, drop=0.055)
+    >>> motion = cruise(Spatial(xi_n=1e5), craft, triangles=300)
+    >>> motion.velocity.shape, motion.residual < 1e-3
+    ((2,), True)
+    """
 
     height: float
     roll: float
@@ -114,6 +154,16 @@ def cruise(
 
     Two equal screws push a craft sideways. It has one balance where it screws forwards and drifts a little, and, if it is
     light, another where it rolls sideways on them; the first is tried first.
+
+    Examples
+    --------
+    >>> from rft.meshes import Screw, Spatial
+    >>> from rft.walking import Screws, cruise
+    >>> screw = Screw(radius=0.03, core=0.02, pitch=0.06, length=0.2, thickness=0.004)
+    >>> craft = Screws(1.0, 0.2, 0.16, 0.04, screw, track=0.12, drop=0.055)
+    >>> motion = cruise(Spatial(xi_n=1e5), craft, triangles=300)
+    >>> round(motion.advance, 3), round(motion.slip, 2)
+    (0.029, 0.52)
     """
     in_range("frequency", frequency, 1e-9, 1e3)
     steady, mirrored = _Steady(medium, craft, frequency, triangles, angles), craft.pair == "mirrored"

@@ -61,6 +61,15 @@ class Walk(NamedTuple):
     lateral_speed, yaw_rate : float
         Mean velocity to the left of the heading at a cycle's start, m/s, and rate to the left, rad/s, over the same time
         as the speed; 0 in the plane.
+
+    Examples
+    --------
+    >>> from rft.plates import CLeg, StressMap
+    >>> from rft.walking import Fineness, Rhex, Tripod, Walker, engine
+    >>> robot = Rhex(0.15, 0.13, 0.02, 0.03, CLeg(0.02, 0.01), hips=(-0.05, 0.0, 0.05))
+    >>> (walk,) = engine("planar").walk([Walker(robot, Tripod(frequency=2.0), StressMap(zeta=0.6))], Fineness(steps=16))
+    >>> walk.periodic, walk.pose.shape[1]
+    (True, 3)
     """
 
     t: np.ndarray

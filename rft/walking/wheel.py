@@ -20,7 +20,16 @@ ANGLES = 24  # of a turn of a wheel that is not round
 
 class Rolling(NamedTuple):
     """Rolling of a wheel, (...,) for each slip. sinkage: m, of the lowest point. pull: N, of the drawbar, the net force of the
-    grains forwards. torque: N m, of the axle. carried: whether the ground bears the load; where not, the others are nan."""
+    grains forwards. torque: N m, of the axle. carried: whether the ground bears the load; where not, the others are nan.
+
+    Examples
+    --------
+    >>> from rft.plates import StressMap, Wheel
+    >>> from rft.walking import rolling
+    >>> found = rolling(StressMap(), Wheel(radius=0.05, width=0.03), load=5.0, rate=2.0, slip=[0.0, 0.3])
+    >>> found.sinkage.round(4), found.carried  # m
+    (array([0.0088, 0.0115]), array([ True,  True]))
+    """
 
     slip: np.ndarray
     sinkage: np.ndarray
@@ -38,6 +47,14 @@ def rolling(
 
     At the hub's height the grains bear the load, in the mean over a turn for a wheel with lugs. radius: m, by default the
     wheel's own. slip: (...,), 0 for pure rolling, 1 for a wheel that rotates without moving, below 0 for braking.
+
+    Examples
+    --------
+    >>> from rft.plates import StressMap, Wheel
+    >>> from rft.walking import rolling
+    >>> wheel = rolling(StressMap(), Wheel(radius=0.05, width=0.03), load=5.0, rate=2.0, slip=[0.0, 0.3])
+    >>> wheel.carried, bool(wheel.pull[1] > wheel.pull[0])
+    (array([ True,  True]), True)
     """
     slip, points = real_array("slip", slip), wheel.outline(elements)
     radius = getattr(wheel, "radius", None) if radius is None else radius

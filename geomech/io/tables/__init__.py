@@ -1,13 +1,14 @@
 """Tables of a connection in files, a format each: NetCDF, and MATLAB files in sysplotter's layout. What is read is always
 checked."""
 
-from geomech.io.tables.base import FORMATS, ORDERS, SIGNS, Stored, scaled
+from geomech.io.tables.base import FORMATS, LAYOUTS, ORDERS, SIGNS, Stored, scaled
+from geomech.io.tables.frames import in_frame
 from geomech.io.tables.read import load
 from rft.registry import load_all
 
 load_all(__name__, __path__)
 
-__all__ = ["FORMATS", "ORDERS", "SIGNS", "Stored", "load", "scaled"]
+__all__ = ["FORMATS", "LAYOUTS", "ORDERS", "SIGNS", "Stored", "in_frame", "load", "scaled"]
 
 
 def __dir__() -> list[str]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -17,13 +19,18 @@ from rft.refusal import Refusal, printable
 from rft.registry import Registry, functions_with
 
 LONGEST_NAME = 60  # characters of what a file calls a frame, or a shape variable
+MINIMUM_PERTURBATION = "minimum-perturbation"
+UNKNOWN_FRAME = "that of the table"  # of a file that does not say it
 LARGEST_ANGLE = 10 * np.pi  # rad of a shape variable, a joint angle or a bend; beyond it is taken for degrees
 LARGEST_ENTRY = 1e9  # of A, body lengths or m or rad per rad
 SIGNS = {"+": "xi = + A alphadot", "-": "xi = - A alphadot"}
+BODY = ("lengths", "frame", "modes", "waves")  # what files say of a chain of links
+LAYOUTS = ("arrays", "struct")
 ORDERS = ("ndgrid", "meshgrid")
 # Readers, parse(raw, sign, order, sha256) -> Stored. Their attributes: suffix; write, a function of (path, result, **settings),
 # where a result as of `geomech.studies.fields.of_study` can be written; settings, names of those that it takes ("sign",
-# "order"); joints, the only number that it takes; whole, False where it takes no more than A and what is known of its error.
+# "order", "layout"); joints, the only number that it takes; whole, False where it takes no more than A, what is known of its
+# error, and a quadratic metric.
 FORMATS = Registry("geomech.formats", "suffix", "a file format", functions_with("suffix"))
 ROWS = ("x", "y", "theta")
 ROUNDING = 1e-9  # of the largest velocity: a displacement below it has no sign
@@ -39,7 +46,10 @@ class Stored:
     assumptions: facts inferred because the file does not state them. sha256: of the file. shapes: names of the shape
     variables, alpha_k where the file has none. A_error: (3, d, N_1, ...), half widths of intervals of A, which cover it
     in a share ``level`` of cases, where the file has them. sized: whether the file states length and unit; body lengths
-    are assumed where it does not.
+    are assumed where it does not. body: the chain that the table is of, as arguments of `rft.Chain`, where the file
+    says it; its frame is the one in which A is, unless ``frame`` is another.
+    computed: what another program computed of the table (`geomech.io.tables.sysplotter.Computed`), in the file's frame,
+    where the file has it.
     """
 
     connection: Connection
@@ -47,7 +57,7 @@ class Stored:
     even: np.ndarray | None = None
     length: float = 1.0
     unit: str = "BL"
-    frame: str = "that of the table"
+    frame: str = UNKNOWN_FRAME
     sign: str = "+"
     order: str = "ndgrid"
     assumptions: tuple[str, ...] = ()
@@ -58,6 +68,8 @@ class Stored:
     A_error: np.ndarray | None = None
     level: float | None = None
     sized: bool = True
+    body: Mapping[str, Any] | None = None
+    computed: Any = None
 
     def __post_init__(self):
         object.__setattr__(self, "frame", printable(" ".join(self.frame.split()))[:LONGEST_NAME])
@@ -164,6 +176,21 @@ def checked_error(name: str, error: np.ndarray, A: np.ndarray, attributes: Mappi
     if (error < 0).any():
         raise Refusal(f"has {name} below 0 where it is half of an interval of A")
     return error.astype(float)
+
+
+def body_text(body: Any) -> str:
+    """Return a chain of links, and the frame in which A is, as the text that files have; "" for another body."""
+    body = {key: getattr(body, key) for key in BODY} if getattr(body, "kind", "") == "chain" else body
+    return json.dumps({k: x for k, x in body.items() if x is not None}) if isinstance(body, Mapping) else ""
+
+
+def checked_body(text: Any) -> dict | None:
+    """Return the chain of `body_text` as arguments of `rft.Chain`; None where it makes no sense."""
+    try:
+        body = json.loads(text)
+    except (ValueError, TypeError, RecursionError):
+        return None
+    return body if isinstance(body, dict) and {"lengths", "frame"} <= {*body} <= {*BODY} else None
 
 
 def checked_level(attributes: Mapping) -> float | None:

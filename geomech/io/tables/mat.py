@@ -1,4 +1,5 @@
-"""A connection as a MATLAB file in sysplotter's layout: alpha1, alpha2, Ax1, Ax2, Ay1, Ay2, Atheta1, Atheta2, each (N, M).
+"""A connection as a MATLAB file in sysplotter's layout: alpha1, alpha2, Ax1, Ax2, Ay1, Ay2, Atheta1, Atheta2, each (N, M), and
+M11, M12, M22, the metric of shape space, where it is known; or sysplotter's struct s (`geomech.io.tables.sysplotter`).
 
 Source: https://github.com/OSU-LRAM/GeometricSystemPlotter, Granular_Local_Connection_Matrix.mat. Files that `write` wrote
 say more, in the variables ABOUT, RESIDUAL and ERROR.
@@ -10,23 +11,28 @@ import functools
 import io
 import json
 import warnings
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from geomech.core.variables import Result
 from geomech.geometry.connection import Connection
+from geomech.geometry.metric import Metric
 from geomech.io.files import atomic_file
-from geomech.io.tables import matlab
+from geomech.io.tables import hdf5, matlab, sysplotter
 from geomech.io.tables.base import (
     FORMATS,
     LARGEST_ANGLE,
+    LAYOUTS,
     ORDERS,
     SIGNS,
+    UNKNOWN_FRAME,
     Stored,
     checked_axis,
+    checked_body,
     checked_error,
     checked_level,
     checked_names,
@@ -35,22 +41,30 @@ from geomech.io.tables.base import (
     numbers,
     rms,
 )
+from geomech.io.tables.calc import write_struct
 from geomech.io.tables.netcdf import UNITS, shape_name
 from rft.refusal import Refusal
 
 ANGLES = ("alpha1", "alpha2")
 ENTRIES = tuple(f"A{row}{joint}" for row in ("x", "y", "theta") for joint in (1, 2))
+METRIC = ("M11", "M12", "M22")
+STRUCT = "s"
+OPTIONAL = ("singular_shapes", "level", "body", "power_degree")  # attributes that ABOUT has where they are known
 ABOUT, RESIDUAL, ERROR = "geomech_about", "geomech_fit_residual", "geomech_A_error"
 SAVE = "save it in MATLAB by save(FILE, ..., '-v7')"
 
 
-def write(path: str | Path, result: Result, sign: str = "+", order: str = "ndgrid") -> None:
+def write(path: str | Path, result: Result, sign: str = "+", order: str = "ndgrid", layout: str = LAYOUTS[0]) -> None:
     """Write A, each entry (N, M), for xi = ``sign`` A alphadot; rows run over alpha1 as of ndgrid, or over alpha2 as of
     meshgrid.
 
     ABOUT is a JSON text of sign, frame, body length, unit and spline. The file has the fit residual (3, N, M), too, which
-    includes the part of the velocity that is even in alphadot, and where A has intervals their half widths (3, 2, N, M). It
-    appears whole or not at all."""
+    includes the part of the velocity that is even in alphadot, where A has intervals their half widths (3, 2, N, M), and M
+    where it is quadratic. It appears whole or not at all. layout: "struct" writes sysplotter's struct s (`write_struct`)
+    instead."""
+    if layout == LAYOUTS[1]:
+        write_struct(path, result)
+        return
     from scipy.io import savemat
 
     A, axes = result["A"], [result["alpha_1"], result["alpha_2"]]
@@ -61,6 +75,8 @@ def write(path: str | Path, result: Result, sign: str = "+", order: str = "ndgri
     extra = {RESIDUAL: residual} if known else {}
     if A.error is not None:
         extra[ERROR] = A.error
+    if "metric" in result:
+        extra |= dict(zip(METRIC, result["metric"].values[np.triu_indices(2)]))
     factor = 1.0 if sign == "+" else -1.0
     shapes = dict(zip(ANGLES, np.meshgrid(*(axis.values for axis in axes), indexing="ij")))
     entries = dict(zip(ENTRIES, factor * A.values.reshape(6, *A.values.shape[2:])))
@@ -80,63 +96,74 @@ def _written_about(attributes: Mapping, names: list[str], sign: str) -> dict:
         "sign": sign, "frame": attributes["frame"], "length": attributes["body_length"],
         "unit": UNITS[attributes["length_unit"]], "interpolation": attributes["interpolation"], "shapes": names,
         "conventions": f"xi = {sign} A alphadot; {meaning}",
-        **{key: value for key, value in attributes.items() if key in ("singular_shapes", "level")},
+        **{key: value for key, value in attributes.items() if key in OPTIONAL},
     }  # fmt: skip
 
 
-@FORMATS.register(suffix=".mat", write=write, settings=("sign", "order"), joints=2, whole=False)
+@FORMATS.register(suffix=".mat", write=write, settings=("sign", "order", "layout"), joints=2, whole=False)
 def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     """Return the table in the bytes of a file; Refusal, to follow the file's name, if there is none."""
-    variables = _variables(raw)
-    axes, order = _axes(variables, order)
-    about = _about(variables)
-    A = _entries(variables, axes, order, about)
+    found = variables(raw, (STRUCT, *ANGLES, *ENTRIES, *METRIC, ABOUT, RESIDUAL, ERROR))
+    if isinstance(found.get(STRUCT), dict) and not {*ANGLES, *ENTRIES} <= {*found}:
+        return sysplotter.parse(found[STRUCT], sign, order, sha256)
+    _check(found)
+    axes, order = _axes(found, order)
+    about = _about(found)
+    A = _entries(found, axes, order, about)
     if not A.any():
         raise Refusal("has a connection that is zero everywhere")
-    residual, error = _residual(variables, A, order, about), _error(variables, A, order, about)
+    residual, error = _residual(found, A, order, about), _error(found, A, order, about)
     degree = about.get("interpolation", 3)
     degree = degree if degree in (1, 2, 3, 4, 5) and min(map(len, axes)) > degree else 3
     sized = about.get("unit") in ("BL", "m") and isinstance(about.get("length"), float) and 0 < about["length"] < 1e9
     length, unit = (about["length"], about["unit"]) if sized else (1.0, "BL")
     size = {"unit": unit, "length": length} if sized else {}
     plain = Connection(axes, A, residual, rms(A, np.nan_to_num(residual)), degree, **size)
-    assumptions = () if variables[ANGLES[0]].ndim == 1 or order == "ndgrid" else ("its arrays run as meshgrid's",)
+    assumptions = () if found[ANGLES[0]].ndim == 1 or order == "ndgrid" else ("its arrays run as meshgrid's",)
     if not sign and about.get("sign") not in SIGNS:
         assumptions += (f"its sign is made out as {SIGNS[detected_sign(plain)]}; say sign = '+' or '-' if you know it",)
     sign = sign or (about["sign"] if about.get("sign") in SIGNS else detected_sign(plain))
-    frame = about["frame"] if isinstance(about.get("frame"), str) else "that of the table"
+    frame = about["frame"] if isinstance(about.get("frame"), str) else UNKNOWN_FRAME
     connection = plain if sign == "+" else replace(plain, A=-A)
     shapes = checked_names(about.get("shapes"), ["alpha_1", "alpha_2"])
-    optional = {"A_error": error, "level": checked_level(about), "sized": sized}
+    optional = {
+        "A_error": error, "level": checked_level(about), "sized": sized, "body": checked_body(about.get("body")),
+        **_metric(found, axes, order, about, degree),
+    }  # fmt: skip
     return Stored(connection, None, None, length, unit, frame, sign, order, assumptions, sha256, shapes, **optional)
 
 
-def _variables(raw: bytes) -> dict[str, np.ndarray]:
-    """Return the variables of the file, those of the layout as arrays of real numbers; Refusal if one is missing."""
+def variables(raw: bytes, names: Collection[str]) -> dict[str, Any]:
+    """Return the variables of a file by name, those of some names at least, as `matlab.arrays`; Refusal if it is none of
+    MATLAB's."""
     if raw[:4] == b"\x89HDF" or raw[:10] == b"MATLAB 7.3":
-        raise Refusal("is a MATLAB 7.3 (HDF5) file", instead=SAVE)
+        return hdf5.arrays(raw, names)
     if raw[:3] == b"CDF":
         raise Refusal("is no MATLAB file, but a NetCDF one", instead="end its name in .nc")
     try:
-        variables = _read_version_4(raw) if raw[:4] and 0 in raw[:4] else matlab.arrays(raw)
+        return _read_version_4(raw, names) if raw[:4] and 0 in raw[:4] else matlab.arrays(raw)
     except ValueError:
         raise Refusal("is damaged, cut short, or no MATLAB file", instead=SAVE) from None
+
+
+def _check(variables: dict) -> None:
+    """Raise Refusal unless the variables of the layout are there, as arrays of real numbers."""
     for name in (*ANGLES, *ENTRIES):
         if name not in variables:
-            raise Refusal(f"has no {name}", because=f"a connection is {', '.join((*ANGLES, *ENTRIES))}")
-        if not isinstance(variables[name], np.ndarray):
+            connection = f"a connection is {', '.join((*ANGLES, *ENTRIES))}, or sysplotter's struct s"
+            raise Refusal(f"has no {name}", because=connection)
+        if not isinstance(variables[name], np.ndarray) or variables[name].dtype == object:
             raise Refusal(f"has {name} that is no array of real numbers")
-    return variables
 
 
-def _read_version_4(raw: bytes) -> dict[str, np.ndarray]:
+def _read_version_4(raw: bytes, names: Collection[str]) -> dict[str, np.ndarray]:
     """Return the variables of a file of version 4, which SciPy reads in Python; Refusal for a damaged one."""
     from scipy.io import loadmat
 
     try:  # what is damaged makes SciPy raise whatever comes first
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return loadmat(io.BytesIO(raw), variable_names=[*ANGLES, *ENTRIES])
+            return loadmat(io.BytesIO(raw), variable_names=[*names])
     except Exception:
         raise Refusal("damaged") from None
 
@@ -206,3 +233,26 @@ def _error(variables: dict, A: np.ndarray, order: str, about: dict) -> np.ndarra
     """Return half widths of intervals of A (3, 2, N, M), None where the file has none."""
     values = variables.get(ERROR)
     return checked_error(ERROR, _as_ndgrid(values, order), A, about) if isinstance(values, np.ndarray) else None
+
+
+def _metric(variables: dict, axes, order: str, about: dict, degree: int) -> dict:
+    """Return metric and power_degree as arguments of `Stored`; {} of a file without M11, M12 and M22.
+
+    Without ABOUT nothing says that M is a power of drag: it is then a metric of its own."""
+    if not {*METRIC} <= {*variables}:
+        return {}
+    given = {name: _as_ndgrid(numbers(name, variables[name]), order) for name in METRIC}
+    shape = tuple(map(len, axes))
+    for name, values in given.items():
+        if values.shape != shape:
+            raise Refusal(f"has {name} of shape {values.shape} where alpha1 and alpha2 make it {shape}")
+    a, b, c = given.values()
+    indefinite = (a <= 0) | (c <= 0) | (a * c <= b * b)
+    if indefinite.any():
+        place = ", ".join(map(str, np.argwhere(indefinite)[0]))
+        raise Refusal(
+            f"has M11, M12 and M22 that are no metric at index ({place})", because="it must be positive definite"
+        )
+    power = about.get("power_degree")
+    power = power if isinstance(power, float) and 0 < power < 100 else None
+    return {"metric": Metric(axes, np.array([[a, b], [b, c]]), degree), "power_degree": power}

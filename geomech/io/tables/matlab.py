@@ -1,5 +1,5 @@
-"""Arrays of numbers and texts in a MATLAB file of version 5, 6 or 7, read by hand: SciPy's reader, in C, trusts the sizes that
-a file states, and one that lies ends the process.
+"""Arrays, texts, cells and structs in a MATLAB file of version 5, 6 or 7, read by hand: SciPy's reader, in C, trusts the sizes
+that a file states, and one that lies ends the process. Function handles and instances of classes are skipped.
 
 Source: MAT-File Format, The MathWorks, R2024a, chapter 1: Level 5 MAT-files.
 """
@@ -9,6 +9,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -19,14 +20,16 @@ HEADER = 128  # bytes before the first element
 MATRIX, COMPRESSED = 14, 15  # types of elements
 NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}  # by type
 TEXTS = {2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
-CHAR, REAL = 4, range(6, 16)  # classes of arrays: of characters, of numbers
+CELL, STRUCT, CHAR, REAL = 1, 2, 4, range(6, 16)  # classes of arrays: of arrays, of fields, of characters, of numbers
+OPAQUE = 17  # class of an instance of a class, which has no dimensions
 COMPLEX = 0x0800  # among an array's flags
 MOST_DIMENSIONS = 32
+DEEPEST = 32  # cells and structs within one another
 
 
-def arrays(raw: bytes) -> dict[str, np.ndarray | str | None]:
-    """Return variables by name: arrays of real numbers, lines of text, None for anything else. Refusal for a damaged
-    file."""
+def arrays(raw: bytes) -> dict[str, Any]:
+    """Return variables by name: arrays of real numbers, lines of text, cells as arrays of such objects, structs as dicts by
+    field, None for anything else. Refusal for a damaged file."""
     marks = {b"\x00\x01IM": "<", b"\x01\x00MI": ">"}
     if (order := marks.get(raw[124:HEADER])) is None:
         raise Refusal("no MATLAB file of version 5 to 7")
@@ -43,7 +46,7 @@ def arrays(raw: bytes) -> dict[str, np.ndarray | str | None]:
                 raise Refusal("cut short, or too large")
             ((kind, data),) = _elements(data, order)
         if kind == MATRIX and data:
-            name, values = _matrix(data, order)
+            name, values = _matrix(data, order, DEEPEST)
             variables[name] = values
     return variables
 
@@ -66,25 +69,73 @@ def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
         k += step
 
 
-def _matrix(data: bytes, order: str) -> tuple[str, np.ndarray | str | None]:
-    """Return (name, values) of a matrix; Refusal if its parts do not fit each other."""
+def _matrix(data: bytes, order: str, depth: int) -> tuple[str, Any]:
+    """Return (name, values) of a matrix; Refusal if its parts do not fit each other. depth: of cells and structs within
+    it."""
     parts = list(_elements(data, order))
-    if len(parts) < 3 or len(parts[0][1]) != 8 or len(parts[1][1]) % 4:
+    if len(parts) < 3 or len(parts[0][1]) != 8 or not depth:
         raise Refusal("damaged")
     (flags,) = struct.unpack_from(f"{order}I", parts[0][1])
+    kind = flags & 0xFF
+    if kind == OPAQUE:
+        return parts[1][1].decode("latin-1"), None
+    if len(parts[1][1]) % 4:
+        raise Refusal("damaged")
     shape = tuple(np.frombuffer(parts[1][1], f"{order}i4").tolist())
-    name = parts[2][1].decode("latin-1")
-    if len(parts) != 4 or flags & COMPLEX or not 2 <= len(shape) <= MOST_DIMENSIONS or min(shape) < 0:
+    name, parts = parts[2][1].decode("latin-1"), parts[3:]
+    if flags & COMPLEX or not 2 <= len(shape) <= MOST_DIMENSIONS or min(shape) < 0:
         return name, None
-    kind, raw = parts[3]
-    if flags & 0xFF == CHAR and kind in TEXTS:
-        wide = TEXTS[kind].startswith("utf-") and TEXTS[kind] != "utf-8"
-        return name, raw.decode(f"{TEXTS[kind]}-{'le' if order == '<' else 'be'}" if wide else TEXTS[kind], "replace")
-    if flags & 0xFF not in REAL or kind not in NUMBERS:
-        return name, None
+    if kind in (CELL, STRUCT):
+        return name, (_cell if kind == CELL else _struct)(parts, shape, order, depth - 1)
+    return name, _array(kind, shape, *parts[0], order) if len(parts) == 1 else None
+
+
+def _array(kind: int, shape: tuple[int, ...], stored_as: int, raw: bytes, order: str) -> np.ndarray | str | None:
+    """Return an array of numbers of a shape, or a text, from the bytes of its element; None for another class."""
+    if kind == CHAR and stored_as in TEXTS:
+        wide = TEXTS[stored_as].startswith("utf-") and TEXTS[stored_as] != "utf-8"
+        end = "-le" if order == "<" else "-be"
+        return raw.decode(f"{TEXTS[stored_as]}{end}" if wide else TEXTS[stored_as], "replace")
+    if kind not in REAL or stored_as not in NUMBERS:
+        return None
+    if len(raw) != _count(shape) * np.dtype(NUMBERS[stored_as]).itemsize:
+        raise Refusal("damaged")
+    return np.frombuffer(raw, np.dtype(NUMBERS[stored_as]).newbyteorder(order)).reshape(shape, order="F")
+
+
+def _count(shape: tuple[int, ...]) -> int:
     size = 1
     for n in shape:  # as Python's own, which do not overflow
         size *= n
-    if len(raw) != size * np.dtype(NUMBERS[kind]).itemsize:
+    return size
+
+
+def _cell(parts: list, shape: tuple[int, ...], order: str, depth: int) -> np.ndarray:
+    """Return the contents of a cell, an array of objects."""
+    if _count(shape) != len(parts):
         raise Refusal("damaged")
-    return name, np.frombuffer(raw, np.dtype(NUMBERS[kind]).newbyteorder(order)).reshape(shape, order="F")
+    values = np.empty(len(parts), object)
+    values[:] = [_value(part, order, depth) for part in parts]
+    return values.reshape(shape, order="F")
+
+
+def _struct(parts: list, shape: tuple[int, ...], order: str, depth: int) -> dict[str, Any] | None:
+    """Return the fields of a struct by name; None of an array of structs."""
+    if len(parts) < 2 or len(parts[0][1]) != 4:
+        raise Refusal("damaged")
+    (width,) = struct.unpack_from(f"{order}i", parts[0][1])
+    names, values = parts[1][1], parts[2:]
+    if width <= 0 or len(names) % width or len(names) // width * _count(shape) != len(values):
+        raise Refusal("damaged")
+    if _count(shape) != 1:
+        return None
+    fields = [names[k : k + width].partition(b"\0")[0].decode("latin-1") for k in range(0, len(names), width)]
+    return {name: _value(part, order, depth) for name, part in zip(fields, values)}
+
+
+def _value(part: tuple[int, bytes], order: str, depth: int) -> Any:
+    """Return the values of a matrix within another one; an empty array for an empty one."""
+    kind, data = part
+    if kind != MATRIX:
+        raise Refusal("damaged")
+    return _matrix(data, order, depth)[1] if data else np.zeros((0, 0))

@@ -19,8 +19,10 @@ from geomech.io.tables.base import (
     FORMATS,
     ROWS,
     SIGNS,
+    UNKNOWN_FRAME,
     Stored,
     checked_axis,
+    checked_body,
     checked_error,
     checked_level,
     checked_names,
@@ -114,7 +116,7 @@ def _stored(variables: dict, units: dict, attributes: dict, sign: str, sha256: s
     connection = Connection(axes, turn * A, residual, speed, degree, **size)
     if "gait" in variables:
         connection = Tube(axes, turn * A, residual, speed, degree, _taylor_series(variables, attributes, turn), **size)
-    frame = _text(attributes.get("frame", b"that of the table"))
+    frame = _text(attributes.get("frame", UNKNOWN_FRAME))
     even = (
         numbers("even_part", pick("even_part", "component")) if "even_part" in variables and not masked.any() else None
     )
@@ -127,6 +129,7 @@ def _stored(variables: dict, units: dict, attributes: dict, sign: str, sha256: s
     return Stored(
         connection, harmonics, even, length, unit, frame, sign, "ndgrid", (), sha256, metric=metric, power_degree=power,
         A_error=error, level=checked_level(attributes), sized=sized,
+        body=checked_body(_text(attributes.get("body", b""))),
     )  # fmt: skip
 
 

@@ -1,0 +1,103 @@
+"""A gait of sysplotter's, by the numbers of a `shchf_` file: six coefficients, or a MATLAB file of points or coefficients."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from geomech.gaits.fourier import Fourier
+from geomech.geometry.gait import GAITS, Gait, Scale, finite_array
+from geomech.io import shchf
+from rft.checks import Number
+from rft.refusal import Refusal
+
+
+@GAITS.register
+@dataclass(frozen=True, kw_only=True)
+class Shchf(Gait):
+    """The gait of a shchf file of sysplotter's, in numbers.
+
+    XV (rad): a1, b1, a3, b3, a5, b5 ... as in its `shchf_LowRe_...` files, for the closed curve u = sum of a_k cos(k t),
+    v = - sum of b_k sin(k t), alpha_1 = (u - v)/sqrt 2, alpha_2 = (u + v)/sqrt 2, which runs as it does there. file (-): a
+    .mat file of points alpha1, alpha2, ... at t, of coefficients A1, B1, A2, B2, ..., or of the paths that sys_calcpath
+    computed; in a scene from a file relative to that file's folder, else to the current one. sha256 (-): of the file,
+    filled in if left out; given, the file must have it. Its centre is the mean that coefficients have, if left out.
+
+    Examples
+    --------
+    >>> from geomech.gaits import Shchf
+    >>> Shchf(XV=(1.4, 1.2)).shape(0.0).round(3)  # rad
+    array([0.99, 0.99])
+    """
+
+    kind = "shchf"
+    _curve: ClassVar[Any]  # a Fourier series, or a spline through points
+
+    XV: tuple[float, ...] = ()
+    file: str | None = None
+    number: Annotated[int, Number(1, 10_000, "-", "of the gait, where the file has several", whole=True)] = 1
+    amplitude: Scale = 1.0
+    sha256: str = ""
+
+    def __post_init__(self):
+        if not isinstance(self.file, (str, Path, type(None))):
+            raise Refusal("file must be the name of a .mat file", value=self.file)
+        if not isinstance(self.sha256, str):
+            raise Refusal("sha256 must be text", value=self.sha256)
+        if isinstance(self.XV, str) or not hasattr(self.XV, "__len__"):
+            raise Refusal("XV must be numbers", value=self.XV)
+        if (self.file is None) == (not len(self.XV)):
+            raise Refusal("a shchf gait has either XV or a file", instead="give one")
+        if self.sha256 and self.file is None:
+            raise Refusal("sha256 is that of a file", instead="drop it")
+        object.__setattr__(self, "file", self.file and str(self.file))
+        object.__setattr__(self, "_curve", self._of_file() if self.file else self._of_numbers())
+        super().__post_init__()
+
+    def _of_numbers(self) -> Fourier:
+        values = finite_array("XV", self.XV, 1)
+        if values.size % 2:
+            raise Refusal("XV must be pairs a1, b1, a3, b3 ...", value=self.XV)
+        object.__setattr__(self, "XV", tuple(values.tolist()))
+        a, b = (
+            np.repeat(x, 2)[:-1] * (np.arange(values.size - 1) % 2 == 0) for x in values.reshape(-1, 2).T / np.sqrt(2)
+        )
+        return Fourier(cos=(a, a), sin=(b, -b))
+
+    def _of_file(self) -> Any:
+        from scipy.interpolate import CubicSpline
+
+        curve: Any = shchf.read(self.file or "", self.number)
+        if self.sha256.lower() not in ("", curve.sha256):
+            raise Refusal(
+                f"{self.file} is not the file whose sha256 is given", instead="restore it, or leave sha256 out"
+            )
+        object.__setattr__(self, "sha256", curve.sha256)
+        if curve.points is not None:
+            return CubicSpline(curve.phase, curve.points, bc_type="periodic")
+        if not len(self.centre):
+            object.__setattr__(self, "centre", tuple(curve.cos[:, 0].tolist()))
+        return Fourier(cos=curve.cos[:, 1:], sin=curve.sin[:, 1:])
+
+    @property
+    def joints(self) -> int:
+        return self._curve.joints if isinstance(self._curve, Fourier) else self._curve.c.shape[-1]
+
+    @property
+    def harmonics(self) -> int:  # type: ignore[override]  # of most gaits it is a number of the class
+        """The highest harmonic of the series; 1 for a spline, which has no highest."""
+        return self._curve.harmonics if isinstance(self._curve, Fourier) else 1
+
+    def unit(self, t: ArrayLike) -> np.ndarray:
+        return self._curve.unit(t) if isinstance(self._curve, Fourier) else self._curve(np.asarray(t, float))
+
+    def unit_rate(self, t: ArrayLike) -> np.ndarray:
+        return self._curve.unit_rate(t) if isinstance(self._curve, Fourier) else self._curve(np.asarray(t, float), 1)
+
+    @classmethod
+    def examples(cls) -> dict[str, Shchf]:
+        return {"shchf": cls(XV=(1.4, 1.2, 0.1, 0.09, -0.03, -0.04), amplitude=0.7)}

@@ -1,0 +1,48 @@
+"""Environments of Gymnasium in which robots learn to walk in sand. Importing this module registers them. Needs the extra
+`gym`.
+
+    import gymnasium
+    import geomech.gym
+
+    env = gymnasium.make("geomech/HexapodSand-v0")
+    many = gymnasium.make_vec("geomech/HexapodSand-v0", num_envs=64, vectorization_mode="vector_entry_point")
+"""
+
+from __future__ import annotations
+
+import contextlib
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from rft.refusal import Refusal
+
+if TYPE_CHECKING:
+    from geomech.gym.hexapod import HexapodSand, HexapodSands
+
+__all__ = ["HexapodSand", "HexapodSands"]
+
+with contextlib.suppress(ModuleNotFoundError):  # what is missing is told at the first use
+    from gymnasium.envs.registration import register
+
+    register(
+        "geomech/HexapodSand-v0",
+        entry_point="geomech.gym.hexapod:HexapodSand",
+        vector_entry_point="geomech.gym.hexapod:HexapodSands",
+        max_episode_steps=250,
+    )
+
+
+def __getattr__(name: str) -> Any:
+    """Import a name at its first use, for that needs Gymnasium and MuJoCo."""
+    if name not in __all__:
+        raise AttributeError(f"module 'geomech.gym' has no attribute {name!r}")
+    try:
+        return getattr(import_module("geomech.gym.hexapod"), name)
+    except ModuleNotFoundError as error:
+        if error.name not in ("gymnasium", "mujoco"):
+            raise
+        raise Refusal("geomech.gym needs Gymnasium and MuJoCo", instead="pip install 'geomech[gym]'") from None
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,147 @@
+"""A hexapod that learns to walk in sand: one robot in MuJoCo, and many in a Batch."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import mujoco
+import numpy as np
+from gymnasium.vector.utils import batch_space
+
+from rft.balance.backend import Note
+from rft.mujoco import Sand, attach
+from rft.mujoco.example import hexapod
+
+ELEMENT = 0.03  # m
+STEPS = 10  # time steps for one action
+FASTEST_LEG = 20.0  # rad/s, for the action 1
+EFFORT = 0.02  # reward for a power of -1 W
+FALL = 2.0  # reward lost by turning over
+NOISE = 0.3  # rad, of the angles at the start
+SIZE = 28  # of an observation
+PARTS = "forward", "effort", "fall"
+
+
+def _sand(medium: Any) -> tuple[mujoco.MjModel, Sand]:
+    """Return the robot and the sand under it."""
+    model = hexapod()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Note)  # that the legs do not touch the floor is what it is for
+        return model, attach(model, medium, element=ELEMENT)
+
+
+def observation(qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
+    """Return observations (..., 28) from positions (..., 13) and velocities (..., 12): height; the vertical, and the velocity
+    of the trunk, along its axes; its angular velocity; cosines, sines and rates of the legs."""
+    w, x, y, z = np.moveaxis(qpos[..., 3:7], -1, 0)
+    turn = np.stack([
+        np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], -1),
+        np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], -1),
+        np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1),
+    ], -2)  # fmt: skip
+    velocity = np.einsum("...ij,...i->...j", turn, qvel[..., :3])
+    legs = qpos[..., 7:]
+    parts = qpos[..., 2:3], turn[..., 2, :], velocity, qvel[..., 3:6], np.cos(legs), np.sin(legs), qvel[..., 6:]
+    return np.concatenate(parts, -1).astype(np.float32)
+
+
+def rewards(moved: np.ndarray, seconds: float, force: np.ndarray, rate: np.ndarray, upright: np.ndarray) -> dict:
+    """Return the parts of the reward (...,): progress along x, m/s; the motors' work; and a fall."""
+    power = np.maximum(force * rate, 0.0).sum(-1)
+    return dict(zip(PARTS, (moved / seconds, -EFFORT * power, -FALL * (upright < 0.0))))
+
+
+class HexapodSand(gymnasium.Env):
+    """A hexapod in sand. An action is the rates of its six legs, over 20 rad/s; it lasts 20 ms.
+
+    medium: name, stress map or law, as of `rft.mujoco.attach`. The reward is the sum of its parts, which stand in ``info``:
+    "forward", m/s, "effort" and "fall". An episode ends when the robot turns over."""
+
+    metadata = {"render_modes": []}
+
+    def __init__(self, medium: Any = "poppy-seeds-loose", render_mode: str | None = None):
+        self.render_mode = render_mode
+        self.model, self.sand = _sand(medium)
+        self.data = mujoco.MjData(self.model)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.model.nu,), np.float32)
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (SIZE,), np.float32)
+
+    def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[np.ndarray, dict]:
+        super().reset(seed=seed)
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[7:] = self.data.ctrl[:] = self.np_random.uniform(-NOISE, NOISE, self.model.nu)
+        mujoco.mj_forward(self.model, self.data)
+        return observation(self.data.qpos, self.data.qvel), {}
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
+        before, seconds = self.data.qpos[0], STEPS * self.model.opt.timestep
+        self.data.ctrl[:] += FASTEST_LEG * seconds * np.clip(action, -1.0, 1.0)
+        mujoco.mj_step(self.model, self.data, STEPS)
+        seen, force = observation(self.data.qpos, self.data.qvel), self.data.actuator_force
+        parts = rewards(self.data.qpos[0] - before, seconds, force, self.data.qvel[6:], seen[3])
+        parts = {name: float(x) for name, x in parts.items()}
+        return seen, sum(parts.values()), bool(seen[3] < 0.0), False, parts
+
+    def close(self) -> None:
+        self.sand.detach()
+
+
+class HexapodSands(gymnasium.vector.VectorEnv):
+    """Many hexapods in sand, in one `mujoco.batch.Batch` on all cores (MuJoCo 4); spaces and rewards as of `HexapodSand`.
+
+    media: one for each robot, such as `rft.mujoco.sample` draws; None for the one medium of all. An episode that has ended
+    begins anew with the next step."""
+
+    metadata = {"render_modes": [], "autoreset_mode": gymnasium.vector.AutoresetMode.NEXT_STEP}
+
+    def __init__(
+        self,
+        num_envs: int = 64,
+        medium: Any = "poppy-seeds-loose",
+        media: Sequence[Any] | None = None,
+        max_episode_steps: int = 250,
+        render_mode: str | None = None,
+    ):
+        self.num_envs, self.max_episode_steps, self.render_mode = num_envs, max_episode_steps, render_mode
+        self.model, self.sand = _sand(medium)
+        self.batch = self.sand.batch(num_envs, persistent=True, media=media)
+        self.qpos, self.qvel, self.ctrl, self.force = map(self.batch.bind, ("qpos", "qvel", "ctrl", "actuator_force"))
+        self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.model.nu,), np.float32)
+        self.single_observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (SIZE,), np.float32)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.ended, self.age = np.zeros(num_envs, bool), np.zeros(num_envs, int)
+
+    def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[np.ndarray, dict]:
+        super().reset(seed=seed)
+        self._begin(np.arange(self.num_envs))
+        return observation(self.qpos, self.qvel), {}
+
+    def _begin(self, robots: np.ndarray) -> None:
+        """Set some robots to the start of an episode."""
+        self.batch.reset(robots)
+        self.qpos[robots, 7:] = self.np_random.uniform(-NOISE, NOISE, (len(robots), self.model.nu))
+        self.ctrl[robots] = self.qpos[robots, 7:]
+        self.ended[robots], self.age[robots] = False, 0
+
+    def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict]:
+        before, begun, seconds = self.qpos[:, 0].copy(), self.ended.copy(), STEPS * self.model.opt.timestep
+        going = np.flatnonzero(~begun)
+        self.ctrl[going] += FASTEST_LEG * seconds * np.clip(actions[going], -1.0, 1.0)
+        if len(going):
+            self.batch.step(going, STEPS)
+        if begun.any():
+            self._begin(np.flatnonzero(begun))
+        self.age[going] += 1
+        seen = observation(self.qpos, self.qvel)
+        parts = rewards(self.qpos[:, 0] - before, seconds, self.force, self.qvel[:, 6:], seen[:, 3])
+        parts = {name: np.where(begun, 0.0, x) for name, x in parts.items()}
+        fallen, late = seen[:, 3] < 0.0, self.age >= self.max_episode_steps
+        self.ended = (fallen | late) & ~begun
+        return seen, sum(parts.values()), fallen & ~begun, late & ~fallen & ~begun, parts
+
+    def close_extras(self, **_: Any) -> None:
+        self.sand.detach()

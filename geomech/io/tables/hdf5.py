@@ -1,0 +1,99 @@
+"""Arrays, texts, cells and structs in a MATLAB file of version 7.3, which is an HDF5 file, read by the package h5py.
+
+Function handles and instances of classes are skipped, links out of the file refused.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Collection
+from typing import Any
+
+import numpy as np
+
+from geomech.io.tables.matlab import DEEPEST, LARGEST
+from rft.refusal import Refusal
+
+CURE = "pip install 'geomech[hdf5]', or save it in MATLAB by save(FILE, ..., '-v7')"
+ANEW = "save it in MATLAB again, by save(FILE, ..., '-v7')"
+
+
+def arrays(raw: bytes, names: Collection[str]) -> dict[str, Any]:
+    """Return the variables that have one of some names, as `geomech.io.tables.matlab.arrays`; Refusal for a damaged file,
+    or without h5py."""
+    try:
+        import h5py
+    except ImportError:
+        raise Refusal(
+            "is a MATLAB 7.3 (HDF5) file", because="the package h5py, which reads it, is missing", instead=CURE
+        ) from None
+    try:
+        with h5py.File(io.BytesIO(raw), "r") as file:
+            reader = Reader(file)
+            return {name: reader.member(file, name, DEEPEST) for name in file if name in names}
+    except Refusal:
+        raise
+    except Exception:  # what is damaged makes HDF5 raise whatever comes first
+        raise Refusal("is a damaged MATLAB 7.3 (HDF5) file, or cut short", instead=ANEW) from None
+
+
+class Reader:
+    """Reader of the nodes of one file. bytes_left: what may still be read of it, inflated."""
+
+    def __init__(self, file: Any):
+        self.file, self.bytes_left = file, LARGEST
+
+    def member(self, group: Any, name: str, depth: int) -> Any:
+        """Return the value of a node in a group; Refusal, which says where, if it cannot be read."""
+        import h5py
+
+        place = f"{group.name.rstrip('/')}/{name}".lstrip("/").replace("/", ".")
+        try:
+            if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+                raise Refusal(f"has {place} in another file")
+            return self.value(group[name], place, depth)
+        except Refusal:
+            raise
+        except Exception:
+            raise Refusal(f"is damaged at {place}", instead=ANEW) from None
+
+    def value(self, node: Any, place: str, depth: int) -> Any:
+        """Return an array, a text, a cell or a struct; None for anything else."""
+        import h5py
+
+        if not depth:
+            raise Refusal(f"is damaged at {place}", because="it lies in itself", instead=ANEW)
+        if "MATLAB_object_decode" in node.attrs:
+            return None
+        if isinstance(node, h5py.Group):
+            return {name: self.member(node, name, depth - 1) for name in node}
+        kind = bytes(node.attrs.get("MATLAB_class", b"")).decode("latin-1")
+        if kind == "function_handle" or node.is_virtual or node.external:
+            return None
+        if "MATLAB_empty" in node.attrs:
+            return "" if kind == "char" else np.zeros((0, 0))
+        values = self._read(node, place)
+        if kind == "cell" and values.dtype == object:
+            return self._cell(values, place, depth)
+        if kind == "char" and values.dtype.kind in "ui":
+            return values.ravel().astype("<u2").tobytes().decode("utf-16-le", "replace")
+        return values if kind and values.dtype.kind in "iuf" else None
+
+    def _read(self, node: Any, place: str) -> np.ndarray:
+        """Return the values of a dataset, with the first axis first, which HDF5 has last."""
+        self.bytes_left -= node.size * node.dtype.itemsize
+        if self.bytes_left < 0:
+            raise Refusal(f"is too large, or damaged, at {place}", instead=ANEW)
+        return np.asarray(node[()]).T
+
+    def _cell(self, references: np.ndarray, place: str, depth: int) -> np.ndarray:
+        values = np.empty(references.shape, object)
+        for index in np.ndindex(references.shape):
+            label = ", ".join(str(k + 1) for k in index)
+            try:
+                values[index] = self.value(self.file[references[index]], f"{place}{{{label}}}", depth - 1)
+            except Refusal:
+                raise
+            except Exception:
+                raise Refusal(f"is damaged at {place}{{{label}}}", instead=ANEW) from None
+        return values

@@ -1,0 +1,280 @@
+"""Sand under the geoms of a MuJoCo model, by one call."""
+
+from __future__ import annotations
+
+import warnings
+import weakref
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from rft.balance.backend import Note
+from rft.checks import in_range
+from rft.ground import Ground, GroundEffect, Slope, ground_of
+from rft.meshes.extruded import Extruded
+from rft.meshes.law import Spatial
+from rft.meshes.mesh import Mesh
+from rft.mujoco import installed
+from rft.mujoco.bed import Bed
+from rft.mujoco.floor import Apart, apart, floors, part, rejoin
+from rft.mujoco.geoms import chosen_geoms, geom_name, mesh_of_elements
+from rft.mujoco.hills import FLAT, Hills, hills_of
+from rft.mujoco.media import Media, law_of, sample
+from rft.mujoco.steps import asked_rounding, sinkage, step_note
+from rft.plates import StressMap
+from rft.refusal import Refusal, formatted, located, require
+
+__all__ = ["Sand", "attach", "sample"]
+
+PER_GEOM = 4  # elements along the mean radius of the geoms, if no length is given
+SLOWER = 60  # times that a step takes by NumPy over compiled code, measured: pytest -m benchmark -k hexapod
+
+
+class Sand:
+    """Sand that is attached to a model; `attach` makes it. As a context manager it is detached at the end.
+
+    geoms: names of the geoms in the sand, in the order of `forces`. element: length of the elements' edges, m. rounding: m/s;
+    an element of speed v bears v / sqrt(v^2 + rounding^2) of its stress. elements: number of elements. notes: lines about
+    what was changed and what is inexact. media: of the simulations of the last batch that was given some; None else.
+
+    All that is read from data holds for data whose positions and velocities are up to date, as after ``mj_forward``.
+    """
+
+    def __init__(self, model: mujoco.MjModel, bed: Bed, element: float, notes: Sequence[str], told: Apart | None):
+        self._model, self._bed, self.element = weakref.ref(model), bed, element
+        self.geoms = tuple(geom_name(model, g) for g in bed.geoms)
+        self.rounding, self.elements = bed.ground.rounding, len(bed.blocks.owner)
+        self._form, self._step = _form(model, bed.geoms), model.opt.timestep
+        self._row = installed.install(model, bed)
+        self.notes, self.media, self._parted = tuple(notes), None, told.pairs[-1] if told else None
+        if told:
+            part(model, told)
+
+    def __enter__(self) -> Sand:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.detach()
+
+    def __repr__(self) -> str:
+        state = "" if self.is_attached else ", detached"
+        return (
+            f"Sand({len(self.geoms)} geoms, {self.elements} elements of {self.element:.3g} m, rounding"
+            f" {self.rounding:.3g} m/s at a time step of {1e3 * self._step:.3g} ms{state})"
+        )
+
+    @property
+    def is_attached(self) -> bool:
+        """Whether steps of the model feel the sand."""
+        return installed.is_installed(self._row)
+
+    def detach(self) -> None:
+        """Take the sand away and let the geoms touch the floor again; a second call does nothing."""
+        attached, model = self._row >= 0, self._model()
+        self._forget_media()
+        installed.remove(self._row)
+        self._row = -1
+        if attached and model is not None and self._parted:
+            rejoin(model, *self._parted)
+
+    def forces(self, data: mujoco.MjData) -> np.ndarray:
+        """Return the force of the grains on each geom, (G, 3), N, in the world."""
+        self._check(data)
+        return self._bed.wrenches(data)[:, :3]
+
+    def wrench(self, data: mujoco.MjData, body: str | int) -> np.ndarray:
+        """Return force, N, and moment about the body's origin, N m, of the grains on a body, (6,), in the world."""
+        model = self._check(data)
+        number = body if isinstance(body, int) else mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body)
+        require(0 <= number < model.nbody, f"the model has no body {formatted(body)}")
+        own = self._bed.bodies == number
+        force, moment = np.split(self._bed.wrenches(data)[own], 2, axis=1)
+        arm = data.geom_xpos[self._bed.geoms[own]] - data.xpos[number]
+        return np.concatenate([force.sum(0), (moment + np.cross(arm, force)).sum(0)])
+
+    def power(self, data: mujoco.MjData) -> float:
+        """Return the power of the grains on the geoms, W; negative where they dissipate."""
+        self._check(data)
+        twist = np.concatenate(self._bed.twists(data), axis=1)
+        return float((self._bed.wrenches(data) * twist).sum())
+
+    def sinkage(self, data: mujoco.MjData, time: float = 1.0) -> tuple[float, float]:
+        """Return how deep, m, the geoms sink from where they are in the data, straight down under the weight of their
+        robot: until the grains bear it, and a ``time``, s, later, as the rounding lets them creep."""
+        model = self._check(data)
+        in_range("time", time, 0, 1e6, unit="s")
+        return sinkage(model, data, self._bed, time)
+
+    def batch(self, nsim: int, nthread: int = 0, persistent: bool = False, media: Sequence[Any] | None = None) -> Any:
+        """Return a ``mujoco.batch.Batch`` of simulations of the model in this sand.
+
+        media: one for each simulation, of one form, such as `sample` draws; ``sand.media[i] = medium`` changes one later."""
+        model = self._model()
+        require(model is not None and self.is_attached, "the sand is detached", instead="attach it anew")
+        try:
+            from mujoco.batch import Batch
+        except ImportError:
+            raise Refusal(f"MuJoCo {mujoco.__version__} has no Batch", instead="pip install 'mujoco>=4.0'") from None
+        require(media is None or len(media) == nsim, f"media must be {nsim}, one for each simulation")
+        batch = Batch(model, nsim, nthread, persistent)
+        if media is not None:
+            laws = [law_of(medium) for medium in media]
+            self._forget_media()
+            self.media = Media(model, self._bed, laws)
+        # A Batch copies the model that it is given, and a copy has no sand.
+        batch.set_models(model if media is None else self.media.models)
+        return batch
+
+    def _forget_media(self) -> None:
+        """Detach the media of the last batch that had its own."""
+        if self.media is not None:
+            self.media.detach()
+            self.media = None
+
+    def _check(self, data: mujoco.MjData) -> mujoco.MjModel:
+        """Return the model; Refusal for a detached sand, other models' data, and geoms that have changed."""
+        model = self._model()
+        require(model is not None and self._row >= 0, "the sand is detached", instead="attach it anew")
+        require(self.is_attached, "another passive callback took the place of the sand's", instead="attach it anew")
+        require(len(data.qvel) == model.nv and data.geom_xpos.shape[0] == model.ngeom, "the data are of another model")
+        now = _form(model, self._bed.geoms)
+        changed = np.flatnonzero((now != self._form).any(1))
+        require(
+            not changed.size,
+            f"the geom {formatted(self.geoms[changed[0]] if changed.size else '')} changed after attach",
+            instead="detach the sand and attach it anew",
+        )
+        if model.opt.timestep != self._step:
+            self._step = model.opt.timestep
+            if line := step_note(model, list(self._bed.geoms), self.rounding):
+                warnings.warn(line, Note, stacklevel=3)
+        return model
+
+
+def attach(
+    model: mujoco.MjModel,
+    medium: str | StressMap | Spatial | Extruded,
+    geoms: str | int | Sequence[str | int] | None = None,
+    level: float | str = 0.0,
+    slope: float = 0.0,
+    element: float | None = None,
+    rounding: float | None = None,
+    effects: Sequence[GroundEffect] = (),
+) -> Sand:
+    """Put sand under geoms of a MuJoCo model, until `Sand.detach` or until the model is gone.
+
+    Parameters
+    ----------
+    model : MjModel
+        Compiled model, z up. Its MjData, ``mj_step``, ``mj_forward``, ``rollout`` and the viewer feel the sand; a copy of
+        the model does not, so a ``Batch`` is made by `Sand.batch`.
+    medium : str, StressMap or Spatial
+        Name in `rft.plates.VERTICAL` or a stress map of the vertical plane, which acts in three dimensions as
+        `rft.meshes.extruded` has it; or a law of three dimensions.
+    geoms : str, int or list of these
+        Names, patterns such as "leg*" and groups of the geoms in the sand; by default all that move.
+    level : float, m, or str
+        Height of the surface at x = 0; or the name of a height field, which is the surface then. Each geom sees the plane
+        that touches it below the geom; the ground there is as strong as where it is level.
+    slope : float, rad
+        Angle by which the surface rises along x; the ground is weaker as `rft.ground.Slope` has it.
+    element : float, m
+        Length of the edges of the triangles that geoms are cut into; by default a quarter of the mean radius of the geoms.
+    rounding : float, m/s
+        Speed below which the stress on an element falls off in proportion to its speed; by default what the time step asks
+        for, `rft.mujoco.steps.asked_rounding`.
+    effects : list of GroundEffect
+        Effects on the ground, such as `rft.ground.GrainInertia`.
+
+    Returns
+    -------
+    Sand
+        Forces for logging and reward, and ``detach``; also a context manager.
+
+    Raises
+    ------
+    Refusal
+        For geoms and media that make no sense; nothing is changed then.
+
+    Notes
+    -----
+    The geoms no longer touch planes that lie in the surface; a plane below it remains, as the bottom of a shallow bed. What
+    is changed or inexact is a `rft.balance.backend.Note`, a warning of one line.
+    """
+    require(isinstance(model, mujoco.MjModel), "model must be a mujoco.MjModel", value=model)
+    require(model.nv > 0, "nothing in the model can move", because="it has no joints")
+    hills, field = (FLAT, []) if not isinstance(level, str) else _field(model, level, slope)
+    level = 0.0 if field else level
+    in_range("level", level, -1e6, 1e6, unit="m")
+    law, chosen = law_of(medium), chosen_geoms(model, geoms)
+    taken = {int(g) for bed in installed.beds(model) for g in bed.geoms} & {*chosen}
+    names = ", ".join(formatted(geom_name(model, g)) for g in sorted(taken)[:3])
+    require(not taken, f"sand is attached to {names} already", instead="detach it, or name other geoms")
+    _require_passive(model)
+    if element is None:
+        element = float(np.mean(model.geom_rbound[chosen])) / PER_GEOM
+    in_range("element", element, 1e-6, 1e3, unit="m")
+    if rounding is not None:
+        in_range("rounding", rounding, 1e-7, 10, unit="m/s")
+    asked = asked_rounding(model, chosen)
+    rounding = max(asked, 1e-6) if rounding is None else rounding
+    effects = (*effects, Slope(slope)) if slope else tuple(effects)
+    ground = ground_of(effects, Ground(rounding=rounding, grazing_sine=law.grazing_sine))
+    bed = Bed.under(model, chosen, meshes(model, chosen, element), law, ground, slope, level, hills)
+    planes = [g for g in field or floors(model, bed.up, bed.level) if _touch(model, chosen, g)]
+    told = apart(model, chosen, planes) if planes else None
+    notes = [_contact_note(model, chosen, planes)] if planes else []
+    notes += [line for line in (step_note(model, chosen, rounding), _python_note()) if line]
+    for line in notes:  # before anything is changed: a filter may turn warnings into errors
+        warnings.warn(line, Note, stacklevel=2)
+    return Sand(model, bed, element, notes, told)
+
+
+def _field(model: mujoco.MjModel, name: str, slope: float) -> tuple[Hills, list[int]]:
+    """Return the surface of a height field and the number of its geom; Refusal for a slope beside it."""
+    require(not slope, "a height field has slopes of its own", instead="drop ``slope``")
+    hills, geom = hills_of(model, name)
+    return hills, [geom]
+
+
+def meshes(model: mujoco.MjModel, geoms: Sequence[int], element: float) -> list[Mesh]:
+    """Return the meshes of geoms in their frames, with edges of about ``element``, m."""
+    out = []
+    for geom in geoms:
+        with located(f"the geom {formatted(geom_name(model, geom))}"):
+            out.append(mesh_of_elements(model, geom, element))
+    return out
+
+
+def _form(model: mujoco.MjModel, geoms: Sequence[int]) -> np.ndarray:
+    """Return the numbers of a model that the elements of geoms follow from, (G, 5)."""
+    kinds = np.stack([model.geom_type[geoms], model.geom_dataid[geoms]], -1)
+    return np.concatenate([model.geom_size[geoms], kinds], axis=1)
+
+
+def _touch(model: mujoco.MjModel, geoms: Sequence[int], plane: int) -> bool:
+    """Return whether any of the geoms may touch a plane."""
+    contype, conaffinity = model.geom_contype, model.geom_conaffinity
+    touch = (contype[geoms] & conaffinity[plane]) | (conaffinity[geoms] & contype[plane])
+    return bool(touch.any())
+
+
+def _contact_note(model: mujoco.MjModel, geoms: Sequence[int], planes: Sequence[int]) -> str:
+    names = " and ".join(formatted(geom_name(model, g)) for g in planes)
+    count = f"{len(geoms)} geoms no longer touch" if len(geoms) > 1 else "the geom no longer touches"
+    return f"{count} the floor {names}, which lies in the surface of the sand"
+
+
+def _python_note() -> str:
+    if installed.serves_compiled():
+        return ""
+    return f"sand by Python's callback, some {SLOWER} times slower: pip install 'geomech[fast]'"
+
+
+def _require_passive(model: mujoco.MjModel) -> None:
+    """Raise Refusal if the model's flags switch passive forces off."""
+    flag = getattr(mujoco.mjtDisableBit, "mjDSBL_PASSIVE", None)
+    disabled = flag is not None and model.opt.disableflags & int(flag)
+    require(not disabled, "passive forces are disabled in the model", instead='drop <flag passive="disable"/>')

@@ -1,0 +1,68 @@
+"""Environments of Gymnasium: the checker's view, rewards, and many robots as one."""
+
+import numpy as np
+import pytest
+
+mujoco = pytest.importorskip("mujoco", reason="needs the extra: pip install 'geomech[mujoco]'")
+gymnasium = pytest.importorskip("gymnasium", reason="needs the extra: pip install 'geomech[gym]'")
+from gymnasium.utils.env_checker import check_env  # noqa: E402
+
+import geomech.gym  # noqa: E402
+from rft.plates import VERTICAL  # noqa: E402
+
+pytestmark = pytest.mark.usefixtures("fastest")
+NAME = "geomech/HexapodSand-v0"
+needs_batch = pytest.mark.skipif(int(mujoco.__version__.partition(".")[0]) < 4, reason="needs mujoco.batch")
+
+
+@pytest.mark.filterwarnings("ignore")  # the checker's advice about infinite bounds
+def test_the_checker_has_nothing_to_say():
+    env = gymnasium.make(NAME)
+    check_env(env.unwrapped, skip_render_check=True)
+    env.close()
+    assert mujoco.get_mjcb_passive() is None
+
+
+def test_the_reward_is_the_sum_of_its_parts():
+    """Legs that turn all alike drive the robot forwards, at a cost; the trunk's velocity is along its own axes."""
+    env = geomech.gym.HexapodSand()
+    seen, _ = env.reset(seed=1)
+    total = dict.fromkeys(("forward", "effort", "fall"), 0.0)
+    for _ in range(40):
+        seen, reward, ended, cut, parts = env.step(np.full(6, 0.5))
+        assert reward == pytest.approx(sum(parts.values())) and not ended and not cut
+        total = {name: total[name] + parts[name] for name in total}
+    assert 0.02 * total["forward"] == pytest.approx(env.data.qpos[0], abs=1e-9) and env.data.qpos[0] > 0.02
+    assert total["effort"] < 0.0 == total["fall"]
+    mujoco.mj_forward(env.model, env.data)
+    turn = env.data.xmat[1].reshape(3, 3)
+    np.testing.assert_allclose(seen[1:4], turn[2], atol=1e-6)
+    np.testing.assert_allclose(seen[4:7], turn.T @ env.data.qvel[:3], atol=1e-6)
+    env.data.qpos[3:7] = [0, 1, 0, 0]
+    _, reward, ended, _, parts = env.step(np.zeros(6))
+    assert ended and parts["fall"] == -2.0
+    env.close()
+
+
+@needs_batch
+def test_many_robots_go_as_each_alone():
+    """Also in media of their own; an episode that has ended begins anew with the next step."""
+    media = [VERTICAL[name].stress for name in ("poppy-seeds-loose", "poppy-seeds-close")]
+    many = gymnasium.make_vec(NAME, 2, "vector_entry_point", media=media, max_episode_steps=20)
+    many.reset(seed=3)
+    starts, rng = many.unwrapped.qpos.copy(), np.random.default_rng(0)
+    actions = rng.uniform(-1, 1, (20, 2, 6)).astype(np.float32)
+    rows = [many.step(action) for action in actions]
+    for k, medium in enumerate(media):
+        one = geomech.gym.HexapodSand(medium)
+        one.reset()
+        one.data.qpos[:], one.data.ctrl[:] = starts[k], starts[k, 7:]
+        for row, action in zip(rows, actions):
+            seen, reward, *_ = one.step(action[k])
+            np.testing.assert_allclose(row[0][k], seen, atol=2e-5)
+            assert row[1][k] == pytest.approx(reward, abs=1e-9)
+        one.close()
+    assert not rows[-2][3].any() and rows[-1][3].all() and not rows[-1][2].any()
+    seen, reward, ended, cut, _ = many.step(actions[0])
+    assert not reward.any() and not ended.any() and not cut.any() and seen[0, 0] == pytest.approx(0.09)
+    many.close()
