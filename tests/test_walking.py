@@ -399,7 +399,7 @@ def test_a_sweep_takes_the_strides_until_robots_walk_steadily_and_no_more():
         return Sweep(scene, {"gait.frequency": [1.0, 2.0]}).cost().balances, walking.price(scene).balances
 
     (brief, one), (long, whole) = costs(0.5), costs(20.0)
-    assert brief == long and whole > one
+    assert brief == long and whole > one > 2 * walking.LIMIT * QUICK.steps
 
 
 def test_a_walk_may_be_over_before_its_first_step():
