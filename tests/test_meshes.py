@@ -381,7 +381,11 @@ REFUSED = [
     ('kind = "mesh"', 'kind = "sphere"', "'shape' is unknown: use one of radius"),
     ("radius = 0.02", "radius = 20", "radius must be a number from 1e-06 to 10 m"),
     ("radius = 0.02", "radius = 0.02\nlength = 0.1", "[intruder] key: 'length' is unknown"),
-    ("attitude_deg = [10, 0, 20]", "attitude_deg = [10, 0]", "attitude must be an angle about y or a rotation vector"),
+    (
+        "attitude_deg = [10, 0, 20]",
+        "attitude_deg = [10, 0]",
+        "attitude must be an angle about y or a rotation vector of three numbers, within 10 rad, got",
+    ),
     ('kind = "drag"', 'kind = "rotate"', "[motion] key: 'depth' is unknown"),
     ("triangles = 300", "triangles = 0", "triangles must be a whole number from 1"),
     ("triangles = 300", "elements = 300", "[numerics] key: 'elements' is unknown"),
