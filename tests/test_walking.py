@@ -493,6 +493,8 @@ def test_a_wheel_bears_its_load_and_pulls_more_the_more_it_slips():
     lugs = rolling(stress, Wheel(0.1, 0.08, 12, 0.01, 0.005), 15.0, 2.0, 0.3)
     assert lugs.pull > 2 * np.interp(0.3, slip, found.pull)
     assert np.isnan(rolling(stress, wheel, 1e5, 2.0, 0.3).sinkage)
+    with pytest.raises(ValueError, match="load must be a number from 1e-06 to 1e\\+06"):
+        rolling(stress, wheel, 1.1e6, 2.0, 0.3)
     with pytest.raises(ValueError, match="slip must be"):
         rolling(stress, wheel, 15.0, 2.0, math.nan)
     with pytest.raises(ValueError, match="has no radius"):
