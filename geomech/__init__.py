@@ -9,7 +9,8 @@ optimise (or optimize), sweep, accuracy the best gait; a grid of parameters; err
 load, Scene, Swimmer, Numerics, toml    scenes: read, built and written
 media, bodies, gaits, effects, systems  the parts of scenes; `register` adds custom ones
 connection, curvature, reconstruct      the geometry of any velocity(alpha, alphadot)
-fit_medium, fit_log, measured           media and connections fitted to measurements
+fit_medium, fit_log, fit_midlines       media, connections and kinematics fitted to measurements
+measured                                logs and midlines, stage by stage
 plots, undulation                       figures; swimmers that undulate
 Refusal                                 the error for whatever makes no sense: a ValueError with its facts
 On the command line: `geomech --help`; every key of a scene file: `geomech reference`.
@@ -32,6 +33,7 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.app import Study as Study
     from geomech.app import accuracy as accuracy
     from geomech.app import fit_medium as fit_medium
+    from geomech.app import fit_midlines as fit_midlines
     from geomech.app import optimise as optimise
     from geomech.app import optimize as optimize
     from geomech.app import sweep as sweep
@@ -66,7 +68,9 @@ _MODULES = {  # by their names here; none is imported before its first use
     "workers": "geomech.run.workers",
 }
 _OBJECTS = {
-    **dict.fromkeys(("Study", "accuracy", "fit_medium", "optimise", "optimize", "study", "sweep"), "geomech.app"),
+    **dict.fromkeys(
+        ("Study", "accuracy", "fit_medium", "fit_midlines", "optimise", "optimize", "study", "sweep"), "geomech.app"
+    ),
     **dict.fromkeys(("load", "toml", "Scene", "Numerics"), "geomech.scenes"),
     "Swimmer": "geomech.systems",
     "fit_log": "geomech.measured",

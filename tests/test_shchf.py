@@ -41,7 +41,8 @@ def test_numbers_run_as_its_function_of_time():
 
 def points(path, **changes):
     alpha = CIRCLE.shape(T)
-    savemat(path, {"alpha1": alpha[:, 0], "alpha2": alpha[:, 1], "t": T[:, None], **changes})
+    t = 3.0 + 2.5 * T  # from any time on, in any unit
+    savemat(path, {"alpha1": alpha[:, 0], "alpha2": alpha[:, 1], "t": t[:, None], **changes})
     return path
 
 

@@ -17,11 +17,12 @@ ROOT = pathlib.Path(__file__).parents[1]
 # system, a sweep puts effects side by side, a calibration fits a law, a class of one's own is told to be an effect, and the
 # top shows media, bodies and effects to type checkers. A robot that walks has a map and no system, either; a map
 # of stress is written by its coefficients. Workers tell the
-# solver to take one thread, and by which back end. Environments for learning stand on sand.
+# solver to take one thread, and by which back end. Environments for learning stand on sand, and
+# measured midlines are put into a medium.
 KNOW_MECHANICS = {
     "__init__.py", "gym/hexapod.py", "text/grains.py", "text/scenes.py", "text/system.py", "studies/stress.py",
     "scenes/intruder.py", "scenes/intruding.py", "scenes/solid.py", "scenes/stress.py", "scenes/walker.py",
-    "scenes/write.py", "studies/batch.py", "studies/calibration.py", "run/backend.py",
+    "scenes/write.py", "studies/batch.py", "studies/calibration.py", "run/backend.py", "measured/midlines/predicted.py",
     "studies/stress_calibration.py", "studies/walking.py",
 }  # fmt: skip
 

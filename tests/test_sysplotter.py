@@ -17,7 +17,8 @@ from geomech.io import tables
 from geomech.io.tables import matlab
 from geomech.scenes import Scene
 from geomech.studies import fields
-from geomech.systems import Swimmer, Table
+from geomech.systems import DifferentialDrive, IdealFluidSwimmer, NoSlipSnake, Swimmer, Table
+from geomech.systems.table import LENGTHS
 from geomech.text.system import described
 from rft.refusal import Refusal
 
@@ -44,6 +45,7 @@ def test_a_struct_is_read_whole(version, tmp_path):
     np.testing.assert_array_equal(stored.connection.axes, fitted.axes)
     assert (stored.frame, stored.unit, stored.length) == ("link-2", "BL", 1.0)
     assert Table(tmp_path / "s.mat").chain == SWIMMER.body
+    assert stored.connection.size == {"unit": "BL", "length": 1.0}
     assert stored.assumptions == () and stored.sized and stored.power_degree == 2
     np.testing.assert_array_equal(stored.computed.A_optimised, A)
     np.testing.assert_array_equal(stored.computed.beta, pose)
@@ -73,6 +75,7 @@ def test_lengths_and_drag_are_those_of_its_geometry_and_physics(length, drag, tm
         ("tail", "link-1"),
         ("head", "link-3"),
         ("com-mean", "mean"),
+        (np.array([[1.0]]), "link-1"),
         (np.array([[3.0]]), "link-3"),
     ],
 )
@@ -203,6 +206,23 @@ def test_a_bad_struct_is_refused_by_place_and_cure(name, tmp_path):
     save(tmp_path / "s.mat", changed(path, value))
     with pytest.raises(Refusal, match=said):
         tables.load(tmp_path / "s.mat")
+
+
+def test_a_struct_without_geometry_is_one_of_unknown_lengths_and_frame(tmp_path):
+    save(tmp_path / "s.mat", changed(("geometry",), None))
+    table = Table(tmp_path / "s.mat")
+    assert (table.assumed, table.traits.frame, table.chain) == ((LENGTHS,), "that of the table", None)
+    np.testing.assert_array_equal(table.stored.connection.A, computed()[0].A)
+    np.testing.assert_allclose(
+        Table(tmp_path / "s.mat", body_length=2.0).stored.connection.A[:2], computed()[0].A[:2] / 2, rtol=1e-13
+    )
+
+
+def test_singular_shapes_are_not_exported(tmp_path):
+    source = Study(Scene(NoSlipSnake(), Circle(amplitude=0.5, centre=(1.5, -1.5)))).with_numerics(grid=7, extent=2.5)
+    with pytest.raises(Refusal, match="no minimum-perturbation frame of a field with singular shapes: shrink"):
+        fields.save_connection(tmp_path / "s.mat", source, layout="struct")
+    assert not (tmp_path / "s.mat").exists()
 
 
 def test_sign_and_order_are_its_own(tmp_path):
@@ -342,3 +362,37 @@ def test_explain_says_how_far_its_own_numbers_are_from_ours(tmp_path):
     lines = described(Table(write(tmp_path / "s.mat")))
     (line,) = [line for line in lines if line.startswith("largest difference of sysplotter's own from ours")]
     assert "CCF of joints 1 and 2 11 %, minimum-perturbation frame 1.6 %" in line
+
+
+def test_a_connection_with_a_denominator_is_that_of_avec(tmp_path):
+    """A_num is then no negative of it."""
+    content = {name: cell(x, (3, 2)) for name, x in (("A_num", -2 * computed()[0].A), ("Avec", computed()[0].A))}
+    content["A_den"] = cell(np.full_like(computed()[0].A, 2.0), (3, 2))
+    stored = tables.load(write(tmp_path / "s.mat", vecfield={"eval": {"content": content}}))
+    np.testing.assert_array_equal(stored.connection.A, computed()[0].A)
+
+
+@pytest.mark.parametrize(
+    ("system", "kind"),
+    [
+        (DifferentialDrive(), "drag"),
+        (IdealFluidSwimmer(), "inertia"),
+        (Swimmer(rft.Viscous(2.0), rft.Chain((1,) * 4, modes="serpenoid")), "drag"),
+        (Swimmer(rft.Viscous(2.0), rft.Chain((1,) * 4, frame="link-2", modes=((1, 0, -1), (0, 1, 0)))), "drag"),
+    ],
+)
+def test_systems_of_other_kinds_are_exported_with_what_is_known_of_them(system, kind, tmp_path):
+    source = Study(Scene(system, Circle(amplitude=0.5))).with_numerics(grid=9, extent=1.0)
+    fields.save_connection(tmp_path / "s.mat", source, layout="struct")
+    s, again = loadmat(tmp_path / "s.mat", simplify_cells=True)["s"], study(tmp_path / "s.mat")
+    assert s["system_type"] == kind
+    np.testing.assert_allclose(again.fitted.A, source.fitted.A / [[[[system.length]]], [[[system.length]]], [[[1.0]]]])
+    metric = again.scene.system.stored.metric
+    if kind == "inertia":
+        np.testing.assert_allclose(metric.M, source.metric.M)
+    assert again.scene.system.stored.power_degree == (2 if kind == "drag" and metric else None)
+    modes = getattr(getattr(system, "body", None), "modes", None)
+    assert (
+        again.scene.system.chain == (None if modes is None or isinstance(modes, str) else system.body)
+        or kind == "inertia"
+    )

@@ -78,6 +78,7 @@ RIGHT = {  # what looks wrong and is not
     ("closed", "true"), ("Path", "angle", "empty"),
     ("places", "list"), *itertools.product(("SpatialPath",), ("rx", "ry", "rz"), ("empty",)),
     ("smooth_normals", "None"), ("body_length", "None"),
+    ("table, system", "body", "None"), ("table, system", "medium", "None"), ("Shchf", "file", "None"),
     *itertools.product(("name", "text", "matched"), ("text", "digits")),
 }  # fmt: skip
 

@@ -53,6 +53,12 @@ def each(executor, task, common, items, total=100, seconds=1e9):
     return list(Runner(executor=executor).map(task, common, items, total, seconds))
 
 
+def test_what_is_left_to_do_decides_whether_processes_are_worth_their_start(monkeypatch):
+    asked = []
+    monkeypatch.setattr(jobs._Queue, "_is_worth_it", lambda self, remaining: asked.append(remaining))
+    assert each(executors.Processes(2), doubled, 2, range(4), total=4) == [0, 2, 4, 6] and asked == [4, 3, 2, 1]
+
+
 def test_results_come_in_order(two):
     found = each(two, doubled, np.array([1.0, 2.0]), range(40))
     np.testing.assert_array_equal(found, np.outer(range(40), [1.0, 2.0]))

@@ -16,7 +16,7 @@ GROUPS = {  # by physics; a script that is not here is found by the build
         "fig11c_connection", "fig11d_ccf", "fig11e_displacement", "readme", "filmstrip", "frames_area", "kinks",
         "optimal_gaits", "measured_gait",
     ],
-    "Animals": ["fig09c_efficiency", "fig10_neuromechanics", "transients"],
+    "Animals": ["fig09c_efficiency", "fig10_neuromechanics", "transients", "midlines"],
     "Legs, rods and bodies in grains": ["fig08a_rods", "fig08b_legs", "ground_effects", "meshes"],
     "Robots": ["fig12_walking", "walking_mujoco", "walking_sensitivity", "walking_steps", "wheel", "screws", "sand_gaits"],
     "Accuracy and cost": ["work_precision", "cost_scaling", "effects_cost"],

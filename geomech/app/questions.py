@@ -6,8 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from geomech import optimisation
-from geomech.app.results import FittedMedium, Optimum, Swept
+from geomech.app.results import FittedMedium, FittedMidlines, Optimum, Swept
 from geomech.core.errors import choose
+from geomech.measured.midlines import fit
+from geomech.measured.midlines import question as of_midlines
 from geomech.optimisation.limits import LimitsArgument
 from geomech.scenes.parts import as_scene
 from geomech.studies import accuracy as accuracies
@@ -80,6 +82,22 @@ def accuracy(scene: Any, *, runs: int | None = None, progress: Callable | None =
     ['amplitudes', 'cheapest', 'lines', 'scene', 'units']
     """
     return accuracies.study(as_scene(scene), progress, runs)
+
+
+def fit_midlines(midlines: Any, medium: Any = None, **options: Any) -> FittedMidlines:
+    """Return the kinematics of tracked midlines with intervals, as `geomech fit-gait` does.
+
+    Parameters
+    ----------
+    midlines : path, or `geomech.measured.midlines.trial.Trial`
+        CSV file of points along the body over whole cycles.
+    medium : medium, name or file
+        In which the motion of the measured shapes is predicted; none if left out.
+    **options : columns, units, scale, fps, y, head, least_score, body_length, mend, level
+        See `geomech.measured.midlines.fit.fit_midlines`.
+    """
+    fitted = FittedMidlines(of_midlines.result_of(fit.fit_midlines(midlines, **options)))
+    return fitted if medium is None else fitted.against(medium)
 
 
 def fit_medium(drag: Any, law: str | None = None, *, end_caps: float | str = 0.0, **sizes: float) -> FittedMedium:

@@ -8,9 +8,12 @@ from typing import Any
 
 from geomech import optimisation, plots, text
 from geomech.core.variables import Result
-from geomech.io.results import to_xarray
+from geomech.io.results import to_xarray, write_netcdf
+from geomech.measured.midlines import predicted
+from geomech.measured.midlines import question as midlines
 from geomech.optimisation.question import result_of
 from geomech.output import display, parts, pictures
+from geomech.scenes.read import medium_of
 from geomech.studies import results, sweep, tables
 from rft.refusal import printable
 
@@ -90,7 +93,16 @@ class Optimum(optimisation.Optimum):
 
 
 class Forces:
-    """Forces along a body over a cycle: ``forces["forward"]`` are values, ``forces.result`` has units and labels, too."""
+    """Forces along a body over a cycle: ``forces["forward"]`` are values, ``forces.result`` has units and labels, too.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> forces = geomech.study("seven-link-wave", phases=32).forces()
+    >>> forces["forward"].shape  # by phase and element, in axial drags of the straight body
+    (32, 42)
+    >>> fig = forces.plot("forward")
+    """
 
     def __init__(self, result: Result):
         self.result = result
@@ -107,6 +119,42 @@ class Forces:
 
     def to_xarray(self) -> Any:
         """Return a Dataset over phase, s, point and joint, with units."""
+        return to_xarray(self.result)
+
+
+class FittedMidlines:
+    """Kinematics of midlines. result: all numbers as variables. kinematics: the fit. comparison: with a prediction, or None."""
+
+    def __init__(self, result: Result):
+        self.result = result
+        self.kinematics, self.comparison = result.subject
+
+    def __getitem__(self, name: str) -> tuple[float, float]:
+        """Return a quantity such as "speed", and half the width of its interval."""
+        variable = self.result[name]
+        return float(variable.values), float(variable.error)
+
+    def __repr__(self) -> str:
+        notes = [f"note: {line}" for line in self.result.attributes["notes"]]
+        return printable("\n".join([text.text(self.result), *notes]))
+
+    def against(self, medium: Any, effects: Any = ()) -> FittedMidlines:
+        """Return the same beside its prediction in a medium, or a medium's name or file, with effects on the body."""
+        known = medium_of(medium) if isinstance(medium, (str, Path)) else medium
+        return FittedMidlines(
+            midlines.result_of(self.kinematics, predicted.compare(self.kinematics, known, tuple(effects)))
+        )
+
+    def plot(self) -> Any:
+        """Draw the way of the body, slip and amplitude along it, and the prediction; return the Figure."""
+        return plots.midlines_figure(self.result)
+
+    def save(self, path: str | Path) -> None:
+        """Write a NetCDF file."""
+        write_netcdf(path, self.result)
+
+    def to_xarray(self) -> Any:
+        """Return a Dataset, as the file of `geomech fit-gait`."""
         return to_xarray(self.result)
 
 

@@ -13,11 +13,11 @@ from geomech.commands.pipeline import Output, drawing, execute
 
 
 def fit_gait(
-    log: Annotated[
-        Path, typer.Argument(metavar="LOG.csv", help="table of t, joint angles, x, y, heading over many cycles")
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE.csv", help="table of joint angles, x, y, heading, or points of midlines")
     ],
     out: Annotated[
-        Optional[Path], typer.Option("-o", "--output", metavar="FILE.nc", help="write the connection to .nc (NetCDF)")
+        Optional[Path], typer.Option("-o", "--output", metavar="FILE.nc", help="write the result to .nc (NetCDF)")
     ] = None,
     scene: Annotated[
         Optional[Path],
@@ -25,7 +25,7 @@ def fit_gait(
     ] = None,
     plot: PlotOption = None,
     columns: Annotated[
-        Optional[str], typer.Option(metavar="LIST", help="names of the columns T,A1,A2,...,X,Y,HEADING, in order")
+        Optional[str], typer.Option(metavar="LIST", help="columns T,A1,A2,...,X,Y,HEADING, or points along the body")
     ] = None,
     degrees: Annotated[bool, typer.Option("--degrees", help="read joint angles and heading in degrees")] = False,
     level: Annotated[
@@ -42,15 +42,40 @@ def fit_gait(
             parser=an_angle,
         ),
     ] = None,
-    body_length: Annotated[float, typer.Option(metavar="M", help="length of the body in m, if x and y are in m")] = 1.0,
+    body_length: Annotated[
+        Optional[float], typer.Option(metavar="M", help="length of the body, in the unit of x and y")
+    ] = None,
+    medium: Annotated[
+        Optional[str], typer.Option(metavar="NAME", help="medium, or its file, in which midlines are predicted")
+    ] = None,
+    units: Annotated[
+        Optional[str], typer.Option(metavar="UNIT", help="unit of x and y of midlines: m, cm, mm, px or BL")
+    ] = None,
+    scale: Annotated[Optional[float], typer.Option(metavar="MM", help="mm per pixel of midlines")] = None,
+    fps: Annotated[Optional[float], typer.Option(metavar="N", help="frames per second of midlines")] = None,
+    y: Annotated[Optional[str], typer.Option("--y", metavar="SENSE", help="y of midlines runs up or down")] = None,
+    head: Annotated[
+        Optional[str], typer.Option(metavar="END", help="the first or last point is the head, else by the motion")
+    ] = None,
+    least_score: Annotated[
+        Optional[float], typer.Option(metavar="P", help="likelihood from which on points are taken, 0.6 if left out")
+    ] = None,
+    mend: Annotated[
+        bool, typer.Option("--mend", help="leave out points that jump or swap, turn reversed frames round")
+    ] = False,
     as_json: JsonOption = False,
 ):
-    """Fit the connection near a measured gait. The regression gives phase, mean gait and A with intervals; the
-    predicted displacement is compared with the log's."""
-    from geomech.measured.results import Fit
+    """Fit a measured gait. A log of joint angles gives the connection near its mean gait, with intervals; tracked midlines
+    give speed, heading, slip, wave efficiency, amplitude and wavelength, each with an interval, and in a medium the same as
+    predicted."""
+    from geomech.measured.ask import question
     from geomech.output import parts
 
-    question = Fit(log, column_names(columns), degrees, level, harmonics, limits, body_length)
-    field = Output(out, parts.write_tube, formats.netcdf)
+    asked = question(
+        file, scene, columns=column_names(columns), degrees=degrees, level=level, harmonics=harmonics, limits=limits,
+        body_length=body_length, medium=medium, units=units, scale=scale, fps=fps, y=y, head=head, least_score=least_score,
+        mend=mend,
+    )  # fmt: skip
+    field = Output(out, parts.write_measured, formats.netcdf)
     figure = Output(plot, drawing("pictures.measured"), drawing("pictures.check"))
-    execute(question, field, Output(scene, *parts.mean_gait(out)), figure, as_json=as_json)
+    execute(asked, field, Output(scene, *parts.mean_gait(out)), figure, as_json=as_json)

@@ -19,13 +19,19 @@ from rft.refusal import Refusal
 @GAITS.register
 @dataclass(frozen=True, kw_only=True)
 class Shchf(Gait):
-    """The gait of a `shchf_` file of sysplotter's, in numbers.
+    """The gait of a shchf file of sysplotter's, in numbers.
 
-    XV (rad): a1, b1, a3, b3, a5, b5 ... as in its shchf_LowRe_... files, for the closed curve u = sum of a_k cos(k t),
+    XV (rad): a1, b1, a3, b3, a5, b5 ... as in its `shchf_LowRe_...` files, for the closed curve u = sum of a_k cos(k t),
     v = - sum of b_k sin(k t), alpha_1 = (u - v)/sqrt 2, alpha_2 = (u + v)/sqrt 2, which runs as it does there. file (-): a
     .mat file of points alpha1, alpha2, ... at t, of coefficients A1, B1, A2, B2, ..., or of the paths that sys_calcpath
     computed; in a scene from a file relative to that file's folder, else to the current one. sha256 (-): of the file,
     filled in if left out; given, the file must have it. Its centre is the mean that coefficients have, if left out.
+
+    Examples
+    --------
+    >>> from geomech.gaits import Shchf
+    >>> Shchf(XV=(1.4, 1.2)).shape(0.0).round(3)  # rad
+    array([0.99, 0.99])
     """
 
     kind = "shchf"
@@ -42,8 +48,12 @@ class Shchf(Gait):
             raise Refusal("file must be the name of a .mat file", value=self.file)
         if not isinstance(self.sha256, str):
             raise Refusal("sha256 must be text", value=self.sha256)
+        if isinstance(self.XV, str) or not hasattr(self.XV, "__len__"):
+            raise Refusal("XV must be numbers", value=self.XV)
         if (self.file is None) == (not len(self.XV)):
             raise Refusal("a shchf gait has either XV or a file", instead="give one")
+        if self.sha256 and self.file is None:
+            raise Refusal("sha256 is that of a file", instead="drop it")
         object.__setattr__(self, "file", self.file and str(self.file))
         object.__setattr__(self, "_curve", self._of_file() if self.file else self._of_numbers())
         super().__post_init__()
@@ -61,7 +71,7 @@ class Shchf(Gait):
     def _of_file(self) -> Any:
         from scipy.interpolate import CubicSpline
 
-        curve = shchf.read(self.file, self.number)
+        curve: Any = shchf.read(self.file or "", self.number)
         if self.sha256.lower() not in ("", curve.sha256):
             raise Refusal(
                 f"{self.file} is not the file whose sha256 is given", instead="restore it, or leave sha256 out"

@@ -39,6 +39,9 @@ def write_netcdf(path: str | Path, result: Result) -> None:
 
     with atomic_file(path) as part, netcdf_file(part, "w", version=2) as file:
         for key, value in result.attributes.items():
+            value = "; ".join(value) if isinstance(value, tuple) else value
+            if isinstance(value, str) and not value:
+                continue
             # SciPy keeps but seven digits of a float of Python's
             number = np.float64(value) if isinstance(value, float) else value
             setattr(file, key, _encoded(value) if isinstance(value, str) else number)

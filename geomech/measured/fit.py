@@ -15,15 +15,18 @@ from geomech.geometry.reconstruct import displacement
 from geomech.geometry.tube import Loop, TaylorSeries, Tube, covering_grid, series, tube
 from geomech.io.tables.base import LARGEST_ENTRY
 from geomech.measured import cycles, plausibility, regression, smooth, unknowns
+from geomech.measured import phase as phase_module
 from geomech.measured.log import Log, read
 from geomech.measured.residual import residual_of
-from geomech.measured.spread import spread
+from geomech.measured.spread import DEVIATIONS, spread
 from rft import se2
 from rft.checks import in_range
 
 HARMONICS = 12  # of the connection and of the gait, at most
 PHASES = 128  # of the mean gait, at which it is integrated
 PRINTED_PHASES = 24  # phases of printed numbers
+DEVIATING = 3  # harmonics of a cycle's deviation from the mean gait
+PART = 0.1  # of it, by which the net pose is differentiated
 SAFETY = 2.0  # covers the net poses of gaits in sand that pass many places where links begin and cease to stick
 MOST_POINTS, MOST_SHAPES = 201, 100_000  # of a field, along an axis and in all
 
@@ -205,6 +208,8 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
     square = (_net(known)[0] - mean) ** 2 - mean_error**2  # less the error of the mean
     beyond = SAFETY * np.sqrt(np.maximum(square, 0.0))
     residual = residual_of(known, samples, varies)
+    outward = _outward(known, spread(loop, samples, None, varies > regression.NOTHING))
+    beyond = np.sqrt(beyond**2 + outward**2 + (known.factor * _by_gait(known, samples)) ** 2)
     known = replace(known, beyond=beyond, standard_error=residual.standard_error)
     frequency = (len(times) - 1) / (times[-1] - times[0])
     uniform = np.interp(log.t, times, np.interp(times, log.t, phase))
@@ -232,6 +237,38 @@ def _net(known: TaylorSeries) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     t = 2 * np.pi * np.arange(PHASES) / PHASES
     alpha, alphadot = known.loop.shape(t), known.loop.shape(t, 1)
     return displacement(np.einsum("nij,nj->ni", known.connection(alpha), alphadot)), alpha, alphadot
+
+
+def _outward(known: TaylorSeries, extent: np.ndarray) -> np.ndarray:
+    """Return the change (3,) of the net pose by what the phase of the nearest point does to the mean gait.
+
+    Shapes that lie beside the gait in all directions alike, with variance s^2 in each, are on average outside of it by
+    s^2 / 2 times its curvature at their nearest points. extent: (d, d, P), `spread` of the data."""
+    t = 2 * np.pi * np.arange(PHASES) / PHASES
+    alpha, rate, second = (known.loop.shape(t, order) for order in range(3))
+    along = (rate**2).sum(-1, keepdims=True)
+    curvature = (second - (second * rate).sum(-1, keepdims=True) / along * rate) / along
+    across = np.einsum("iip->", extent) / extent.shape[-1] / len(extent) / DEVIATIONS**2
+    inside = alpha + across / 2 * curvature
+    wave = 1j * np.arange(PHASES // 2 + 1)[:, None]
+    inside_rate = np.fft.irfft(wave * np.fft.rfft(inside, axis=0), PHASES, axis=0)
+    return displacement(np.einsum("nij,nj->ni", known.connection(inside), inside_rate)) - _net(known)[0]
+
+
+def _by_gait(known: TaylorSeries, samples: regression.Samples) -> np.ndarray:
+    """Return the standard error (3,) of the net pose by that of the mean gait, whose cycles vary."""
+    cycles = samples.cycle[-1] + 1
+    deviation = samples.alpha - known.loop.shape(samples.phase)
+    t, each = 2 * np.pi * np.arange(PHASES) / PHASES, []
+    for k in range(cycles):
+        rows = samples.cycle == k
+        each.append(phase_module.fitted_loop(samples.phase[rows], deviation[rows], DEVIATING))
+    each = np.array(each) - np.mean(each, 0)
+    loops = [(known.loop.shape(t) + PART * series(x, t), known.loop.shape(t, 1) + PART * series(x, t, 1)) for x in each]
+    alpha, alphadot = (np.array(x) for x in zip(*loops))
+    net = displacement(np.einsum("knij,knj->kni", known.connection(alpha), alphadot))
+    errors = regression.lagged((net - _net(known)[0]) / PART / cycles)
+    return np.sqrt((errors**2).sum(0))
 
 
 def _cycles(log: Log, known: TaylorSeries, phase, count, joints, pose):

@@ -63,9 +63,9 @@ class Connection:
             note(f"{path} has {SIGNS['+']}; --sign - gives the other")
 
 
-def write_tube(result: Result, path: Path) -> None:
-    """Write the connection near a measured gait."""
-    write_netcdf(path, results.of_fit(result.subject))
+def write_measured(result: Result, path: Path) -> None:
+    """Write the connection near a measured gait, or the kinematics of midlines."""
+    write_netcdf(path, result if result.kind == "midlines" else results.of_fit(result.subject))
 
 
 def mean_gait(field: Path | None) -> tuple[Callable[[Result, Path], None], Callable[[Path], Any]]:

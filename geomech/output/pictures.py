@@ -49,8 +49,9 @@ def stress(result: Result, path: Path) -> None:
 
 
 def measured(result: Result, path: Path) -> None:
-    """Draw a measured gait."""
-    plots.save(plots.measured_figure(result.subject), path)
+    """Draw a measured gait, or midlines."""
+    figure = plots.midlines_figure(result) if result.kind == "midlines" else plots.measured_figure(result.subject)
+    plots.save(figure, path)
 
 
 def forces(result: Result, path: Path, **options: Any) -> None:

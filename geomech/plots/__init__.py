@@ -29,6 +29,7 @@ from geomech.plots.maps import (
     vector_field,
 )
 from geomech.plots.measured import measured_figure
+from geomech.plots.midlines import midlines_figure
 from geomech.plots.motion import LINES, filmstrip, stage
 from geomech.plots.optimum import optimum_angles, optimum_figure, optimum_map
 from geomech.plots.plates import penetration_figure, plates_figure
@@ -83,6 +84,7 @@ __all__ = [
     "largest",
     "measured_figure",
     "medium_band",
+    "midlines_figure",
     "net",
     "optimum_angles",
     "optimum_figure",

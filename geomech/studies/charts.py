@@ -226,8 +226,8 @@ def _series(study: Study) -> Harmonics:
         return Harmonics(A.axes, A.A, A.residual, A.degree)
     series = study.compute_harmonics()
     size = np.abs(series.coefficients).max((0, 2, 3)).reshape(-1, 2).max(-1)
-    kept = 1 + int(np.flatnonzero(size > SMALL * size.max()).max())
-    return replace(series, coefficients=series.coefficients[:, : 2 * kept])
+    count = 1 + int(np.flatnonzero(size > SMALL * size.max()).max())
+    return replace(series, coefficients=series.coefficients[:, : 2 * count])
 
 
 def _frame(connection: Connection, pose: Field | None = None) -> FrameTables:

@@ -217,8 +217,8 @@ SIDES = {"thrust": (np.maximum, "forwards"), "drag": (np.minimum, "backwards")} 
 def _by_phase(parts: dict, work: Any, joint_power: np.ndarray) -> list[Variable]:
     dims, total = ("phase",), work.element_power.sum(-1) + work.end_power.sum(-1)
     sums = [
-        Variable(f"{kind}_{name}", dims, side(x, 0.0).sum(-1), "drag", f"sum of {name} forces {way}")
-        for kind, (side, way) in SIDES.items()
+        Variable(f"{kind}_{name}", dims, side(x, 0.0).sum(-1), "drag", f"sum of {name} forces {words}")
+        for kind, (side, words) in SIDES.items()
         for name, x in parts.items()
     ]
     of_ends = [
@@ -236,9 +236,9 @@ def _by_place(parts: dict, length: np.ndarray) -> list[Variable]:
     label = "mean over the cycle of {} forces {}, per length of body"
     return [
         Variable(
-            f"mean_{kind}_{name}", ("s",), side(parts[name], 0.0).mean(0) / length, "drag/BL", label.format(name, way)
+            f"mean_{kind}_{name}", ("s",), side(parts[name], 0.0).mean(0) / length, "drag/BL", label.format(name, words)
         )
-        for kind, (side, way) in SIDES.items()
+        for kind, (side, words) in SIDES.items()
         for name in FLANK
     ]
 

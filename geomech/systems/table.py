@@ -102,7 +102,8 @@ class Table:
                 "" if stored.A_error is None else ": give the .nc file of the measured gait, which has what lies there"
             )
             raise Refusal(f"{self.file} has singular shapes (nan), and nothing is looked up between those{cure}")
-        if self.body_length is not None and stored.sized:
+        stated = (stored.unit, stored.length) != ("BL", 1.0) or (stored.sized and stored.computed is not None)
+        if self.body_length is not None and stated:
             raise Refusal(
                 f"{self.file} says the body's length itself, {stored.length:g} {stored.unit}",
                 instead="drop body_length",
@@ -118,6 +119,8 @@ class Table:
         """Return the table with the scene's body; Refusal if the file says its own, or it has not the table's joints."""
         if self.body is None:
             return stored
+        if not isinstance(self.body, Chain):
+            raise Refusal("the body of a table must be a Chain", value=self.body)
         if stored.body is not None:
             raise Refusal(f"{self.file} says its body itself", instead="drop the body")
         if (joints := len(stored.connection.axes)) != self.body.joints:

@@ -48,7 +48,8 @@ class Stored:
     in a share ``level`` of cases, where the file has them. sized: whether the file states length and unit; body lengths
     are assumed where it does not. body: the chain that the table is of, as arguments of `rft.Chain`, where the file
     says it; its frame is the one in which A is, unless ``frame`` is another.
-    computed: what another program computed of the table (`geomech.io.tables.sysplotter.Computed`), where the file has it.
+    computed: what another program computed of the table (`geomech.io.tables.sysplotter.Computed`), in the file's frame,
+    where the file has it.
     """
 
     connection: Connection

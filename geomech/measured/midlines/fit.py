@@ -1,0 +1,267 @@
+"""From a trial to kinematics with intervals: checks, period, smoothing, head and tail, cycles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from geomech.core.errors import choose
+from geomech.measured import phase
+from geomech.measured.midlines import intervals, kinematics, reader, slips, smooth
+from geomech.measured.midlines.trial import Trial
+from rft.checks import in_range
+
+GAP = 1 / 8  # of a cycle without a frame, at most
+ROWS = 10  # frames a cycle, at least
+FEWEST = 3  # cycles that show their scatter
+LEAST_AHEAD = 0.4 * np.pi  # rad of phase in half a cycle
+LIKE = 0.5  # correlation of a cycle with the mean of all, at least
+PACE = 1.6  # ratio of a cycle's duration to the median, at most
+EVEN = 0.7  # rad, by which the phase of few cycles may stray from a line
+LONGEST, SHORTEST = 30.0, 1e-4  # m: bodies beyond are in another unit
+MOVES = 0.02  # body lengths per cycle: below it nobody sees where a body goes
+AGREED = 1.4  # ratio of the points' length to a body length that is given, at most
+
+
+@dataclass(frozen=True, eq=False)
+class Kinematics:
+    """Kinematics of a trial.
+
+    trial: points from tail to head. curve, fine: smooth midlines, and finer ones. clock: phase. marks: phases that begin
+    and end the full cycles, of which ``used`` (C,) are without gaps. sample, intervals: of `kinematics.QUANTITIES`.
+    level: share of cases in which intervals cover the truth. head: how the head was found."""
+
+    trial: Trial
+    curve: smooth.Curve
+    fine: smooth.Curve
+    clock: kinematics.Clock
+    marks: np.ndarray
+    used: np.ndarray
+    sample: intervals.Sample
+    intervals: intervals.Intervals
+    level: float
+    head: str
+
+    def cycles(self, curve: smooth.Curve, near: np.ndarray | None = None) -> kinematics.Cycles:
+        """Return the used cycles of a curve. near: as of `kinematics.Clock.phase`."""
+        return used_cycles(curve, self.clock, self.marks, self.used, near)
+
+    def value(self, name: str) -> tuple[float, float]:
+        """Return a quantity and half the width of its interval."""
+        k = kinematics.QUANTITIES.index(name)
+        return float(self.intervals.value[k]), float(self.intervals.half_width[k])
+
+
+def fit_midlines(
+    midlines: str | Path | Trial, *, columns: Sequence[str] = (), units: str | None = None, scale: float | None = None,
+    fps: float | None = None, y: str | None = None, head: str | None = None, least_score: float = reader.LEAST_SCORE,
+    body_length: float | None = None, mend: bool = False, level: float = 0.95,
+) -> Kinematics:  # fmt: skip
+    """Return the kinematics of a trial; Refusal, with its place, for data that do not give it.
+
+    Parameters
+    ----------
+    midlines : path or Trial
+        CSV file of points along the body (`geomech.measured.midlines.reader`).
+    columns : list of names
+        Points to take, in their order along the body; by default all.
+    units : "m", "cm", "mm", "px" or "BL"
+        Unit of x and y, where the header does not say.
+    scale : number
+        mm per pixel.
+    fps : number
+        Frames per second, of a file that counts frames.
+    y : "up" or "down"
+        Sense of y; down, as in images, is taken for pixels.
+    head : "first" or "last"
+        Which of the points is the head; by default as the motion shows.
+    least_score : number
+        Points of a lower likelihood are taken for missing.
+    body_length : number
+        In ``units``, where the points do not reach both ends.
+    mend : bool
+        Leave out points that jump or swap, and turn frames round that run the other way; both are noted.
+    level : number
+        Share of cases in which intervals cover the truth.
+    """
+    in_range("``level``", level, 0.5, 0.999)
+    if head is not None:
+        choose("``head``", head, ("first", "last"))
+    options = {"points": columns, "units": units, "scale": scale, "fps": fps, "y": y, "least_score": least_score}
+    trial = midlines
+    if not isinstance(trial, Trial):
+        trial = reader.read(midlines, **options, body_length=body_length)
+    trial = smooth.filled(slips.checked(trial, mend))
+    repeat = period(trial)
+    curve, trial = smooth.fitted(trial, repeat)
+    trial = _with_length(trial, curve)
+    clock = kinematics.clock(curve, repeat)
+    if clock.ratio < kinematics.STANDING:
+        raise trial.wrong(
+            "the body bends in one shape to and fro", because="no wave runs along it, and has a wavelength"
+        )
+    marks, used = full_cycles(trial, curve, clock)
+    turn, words = _head(trial, used_cycles(curve, clock, marks, used), head)
+    if turn:
+        curve, trial = smooth.fitted(trial.reversed(), repeat)
+        clock = kinematics.clock(curve, repeat)
+        marks, used = full_cycles(trial, curve, clock)
+    trial = trial.with_notes(*_notes(used))
+    fine = smooth.refined(trial, curve)
+    near = clock.phase(curve)
+
+    def values(curve: smooth.Curve) -> tuple[np.ndarray, np.ndarray]:
+        each = kinematics.averages(used_cycles(curve, clock, marks, used, near))
+        weighted = lambda w: kinematics.quantities(each.weighted(w), trial.length, trial.unit == "m")
+        return kinematics.pseudo_values(weighted, len(used))
+
+    sample = intervals.sampled(curve, fine, values)
+    return Kinematics(
+        trial, curve, fine, clock, marks, used, sample, intervals.intervals(sample, level), level, words
+    )  # fmt: skip
+
+
+def used_cycles(curve, clock: kinematics.Clock, marks, used, near=None) -> kinematics.Cycles:
+    """Return the cycles that have no gap. near: as of `kinematics.Clock.phase`."""
+    return kinematics.cycles(curve, kinematics.times(clock, clock.phase(curve, near), marks)).selected(used)
+
+
+def period(trial: Trial) -> float:
+    """Return the period of the body's bends; Refusal if they do not repeat, or too few frames show them."""
+    headings = smooth.crude(trial)
+    t = np.linspace(trial.t[0], trial.t[-1], len(trial.t))
+    even = np.stack([np.interp(t, trial.t, x) for x in headings.T], -1)
+    repeat = phase.period_of(t, even) or _turning(t, even)
+    if not repeat:
+        raise trial.wrong(
+            "the body does not repeat its motion", instead="give one cycle at least, better eight, of one gait"
+        )
+    if (rows := repeat / np.median(np.diff(trial.t))) < ROWS:
+        raise trial.wrong(f"{rows:.2g} frames a cycle are too few", instead=f"give at least {ROWS}, better 30")
+    return repeat
+
+
+def _turning(t: np.ndarray, headings: np.ndarray) -> float:
+    """Return the period of headings (T, 8) that turn evenly in the plane of their principal components; 0 if they do not.
+    It serves trials of less than two cycles."""
+    scores = np.linalg.svd(headings - headings.mean(0), full_matrices=False)[0]
+    angle = np.unwrap(np.arctan2(scores[:, 1], scores[:, 0]))
+    slope, start = np.polyfit(t, angle, 1)
+    return 2 * np.pi / abs(slope) if np.std(angle - slope * t - start) < EVEN else 0.0
+
+
+def _with_length(trial: Trial, curve: smooth.Curve) -> Trial:
+    """Refuse lengths that no body has, or that contradict each other."""
+    length = float(np.abs(smooth.placed(curve.basis(curve.places, 1), curve.at(curve.t))).mean())
+    if trial.unit == "m" and not SHORTEST < length < LONGEST:
+        raise trial.wrong(
+            f"the body is {length:.3g} m long", instead="say the unit of x and y: mm, cm or px by ``units``"
+        )
+    if trial.unit == "BL" and not 1 / AGREED < length < AGREED:
+        raise trial.wrong(f"the body is {length:.3g} body lengths long", instead="say the unit of x and y by ``units``")
+    if trial.length is not None and length > AGREED * trial.length:
+        raise trial.wrong(
+            f"the points lie along {length:.3g} and the body is {trial.length:.3g} long",
+            instead="give ``body_length`` in the unit of x and y, which ``units`` says",
+        )
+    return trial
+
+
+def full_cycles(trial: Trial, curve, clock: kinematics.Clock) -> tuple[np.ndarray, np.ndarray]:
+    """Return the phases that begin and end full cycles, and the numbers of those that have no gap and are like the others."""
+    phase = clock.phase(curve)
+    _check_growing(trial, clock.t, phase)
+    marks = kinematics.marks(clock, phase)
+    if len(marks) < 2:
+        turns = (phase[-1] - phase[0]) / (2 * np.pi)
+        raise trial.wrong(f"the trial has {turns:.2g} cycles", instead="give one full cycle at least, better eight")
+    times = kinematics.times(clock, phase, marks)
+    _check_pace(trial, times)
+    used = np.array([k for k in range(len(marks) - 1) if not _gap(trial, times[k], times[k + 1])], int)
+    if not used.size:
+        widest = int(np.diff(trial.t).argmax())
+        raise trial.wrong(
+            f"no frames for {np.diff(trial.t)[widest]:.3g} after this one, and so in every cycle",
+            widest,
+            instead="give a trial with one cycle at least that has no gap",
+        )
+    _check_alike(trial, kinematics.cycles(curve, times).selected(used))
+    return marks, used
+
+
+def _check_growing(trial: Trial, t: np.ndarray, phase: np.ndarray) -> None:
+    """Refuse a trial whose phase stands or runs back: over half a cycle it must grow by at least a fifth of one."""
+    half = kinematics.PHASES // 2
+    ahead = phase[half:] - phase[:-half]
+    if (bad := np.flatnonzero(ahead < LEAST_AHEAD)).size:
+        raise trial.wrong(
+            f"the motion stands, or is another one, after t = {t[bad[0]]:.4g}",
+            instead="cut pauses, starts and other gaits out, and give each its file",
+        )
+
+
+def _gap(trial: Trial, start: float, end: float) -> bool:
+    inside = trial.t[(trial.t > start) & (trial.t < end)]
+    return np.diff(inside, prepend=start, append=end).max() > GAP * (end - start)
+
+
+def _check_pace(trial: Trial, times: np.ndarray) -> None:
+    duration = np.diff(times)
+    ratio = duration / np.median(duration)
+    k = int(np.abs(np.log(np.maximum(ratio, 1e-6))).argmax())
+    if not 1 / PACE < ratio[k] < PACE:
+        raise trial.wrong(
+            f"the cycle from t = {times[k]:.4g} to {times[k + 1]:.4g} takes {ratio[k]:.2g} times as long as most",
+            instead="cut pauses, starts and other gaits out, and give each its file",
+        )
+
+
+def _check_alike(trial: Trial, cycles: kinematics.Cycles) -> None:
+    """Refuse a cycle whose bends have little in common with the mean of all."""
+    headings = cycles.headings - cycles.headings.mean(-1, keepdims=True)
+    mean = np.median(headings, 0)
+    like = (headings * mean).sum((1, 2)) / np.sqrt((headings**2).sum((1, 2)) * (mean**2).sum())
+    k = int(like.argmin())
+    if like[k] < LIKE:
+        start, end = cycles.t[k, [0, -1]]
+        raise trial.wrong(
+            f"the cycle from t = {start:.4g} to {end:.4g} does not repeat the others (correlation {like[k]:.2g})",
+            instead="cut it out, and give each gait a file",
+        )
+
+
+def _head(trial: Trial, cycles: kinematics.Cycles, head: str | None) -> tuple[bool, str]:
+    """Return whether the first point is the head, and how that was found: a body moves head first, and the wave that drives it
+    runs to the tail."""
+    ends = trial.names[0], trial.names[-1]
+    each = kinematics.averages(cycles)
+    length = each.numbers[:, 1].mean()
+    forward = (np.cos(each.numbers[:, 3] - each.numbers[:, 4]) * each.numbers[:, 2]).mean() / length
+    wave = kinematics.wave_sign(each.first.mean(0))
+    motion = int(np.sign(forward)) if abs(forward) > MOVES else 0
+    if head is not None:
+        backwards = motion and (motion > 0) == (head == "first")
+        return (
+            head == "first",
+            f"{ends[0] if head == 'first' else ends[1]}, as given" + backwards * "; it moves tail first",
+        )
+    if motion and motion != wave:
+        raise trial.wrong(
+            f"the body moves towards its point {ends[motion > 0]}, and so does its wave",
+            because="most swimmers move head first against their wave",
+            instead="say which end is the head, ``head`` first or last",
+        )
+    shown = "it moves there, against its wave" if motion else "the wave runs away from it; the body hardly moves"
+    return wave < 0, f"{ends[wave > 0]}, by the motion: {shown}"
+
+
+def _notes(used: np.ndarray) -> list[str]:
+    notes, count = [], len(used)
+    if count == 1:
+        notes.append("one full cycle does not show how cycles vary: intervals are of the tracking's noise alone")
+    elif count < FEWEST:
+        notes.append("two full cycles hardly show how cycles vary")
+    return notes

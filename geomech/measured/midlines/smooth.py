@@ -1,0 +1,215 @@
+"""Smooth midlines: Legendre modes along the body whose coefficients are splines in time, both numbers by
+cross-validation.
+
+x(s, t) and y(s, t) are linear in the data: their least squares have no bias from noise, and how noise spreads is known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from geomech.measured.midlines.trial import Trial
+
+DEGREE = 5  # of the splines in time: their rates are of order 5 in the spacing of the knots
+KNOTS = (6, 7, 8, 10, 12, 14, 16, 20, 24, 32)  # per cycle, that are tried
+MODES = 4, 14  # of x and of y along the body, that are tried
+SAFE = 2.2  # times the root of the number of points: more modes through equal distances oscillate at the ends (Runge)
+PASSES = 3  # of finding where along the body the points lie
+NODES = 30  # places along the body at which a curve is evaluated
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Smooth midlines x(s, t) of a trial.
+
+    s: (P,), places of the points, 0 to 1. modes, step: the number of modes, and of rows between knots. knots: (K,).
+    coefficients: (K - DEGREE - 1, modes, 2). residual: (F, modes, 2), noise of the modes in the rows, orthonormal over
+    the points. noise: standard deviation of x and y of a point. triangle: (modes, modes), from Legendre coefficients to
+    orthonormal ones. solver: of the least squares in time."""
+
+    t: np.ndarray
+    s: np.ndarray
+    modes: int
+    step: int
+    knots: np.ndarray
+    coefficients: np.ndarray
+    residual: np.ndarray
+    noise: float
+    triangle: np.ndarray
+    solver: Any
+
+    def at(self, t: np.ndarray, order: int = 0) -> np.ndarray:
+        """Return orthonormal coefficients (T, modes, 2) at times t, or their derivatives."""
+        from scipy.interpolate import BSpline
+
+        return BSpline(self.knots, self.coefficients, DEGREE)(t, nu=order)
+
+    def basis(self, s: np.ndarray, order: int = 0) -> np.ndarray:
+        """Return what multiplies orthonormal coefficients at places s (S, modes), or its derivative by s."""
+        return _legendre(s, self.modes, order) @ np.linalg.inv(self.triangle)
+
+    @cached_property
+    def places(self) -> np.ndarray:
+        """Places (NODES,) of equal parts of the body."""
+        return (np.arange(NODES) + 0.5) / NODES
+
+    def noisy(self, rng: np.random.Generator) -> Curve:
+        """Return the curve with the effect of new noise on top: rows of the residual drawn with replacement, with random
+        signs."""
+        frames = len(self.t)
+        rows = self.residual[rng.integers(frames, size=frames)] * rng.choice([-1.0, 1.0], (frames, 1, 1))
+        return replace(self, coefficients=self.coefficients + self.solver(rows))
+
+
+def placed(basis: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Return x + i y (T, S) at places, from `Curve.basis` (S, modes) and coefficients (T, modes, 2)."""
+    return (z @ [1.0, 1j]) @ basis.T
+
+
+def _legendre(s: np.ndarray, modes: int, order: int) -> np.ndarray:
+    """Return Legendre polynomials (S, modes) of 2 s - 1, or their derivatives by s."""
+    identity = np.eye(modes)
+    if order:
+        identity = legendre.legder(identity, order, axis=0) * 2.0**order
+    return legendre.legvander(2 * s - 1, len(identity) - 1) @ identity
+
+
+class Solver:
+    """Least squares by splines in time with a knot at every ``step``-th row: linear in the rows, factored once."""
+
+    def __init__(self, t: np.ndarray, step: int):
+        from scipy.interpolate import BSpline
+        from scipy.linalg import cholesky_banded
+
+        inner = t[step : len(t) - step : step]
+        self.knots = np.concatenate([[t[0]] * (DEGREE + 1), inner, [t[-1]] * (DEGREE + 1)])
+        self.design = BSpline.design_matrix(t, self.knots, DEGREE).tocsr()
+        normal = (self.design.T @ self.design).todia()
+        self.count = self.design.shape[1]
+        banded = np.zeros((DEGREE + 1, self.count))
+        for offset, row in zip(normal.offsets, normal.data):
+            if offset >= 0:
+                banded[DEGREE - offset, : len(row)] = row[: self.count]
+        banded[DEGREE] *= 1 + 1e-12
+        self.factor = cholesky_banded(banded)
+
+    def __call__(self, rows: np.ndarray) -> np.ndarray:
+        """Return the splines' coefficients (K, ...) through rows (F, ...)."""
+        from scipy.linalg import cho_solve_banded
+
+        flat = rows.reshape(len(rows), -1)
+        return cho_solve_banded((self.factor, False), self.design.T @ flat).reshape(-1, *rows.shape[1:])
+
+    def smoothed(self, rows: np.ndarray) -> np.ndarray:
+        """Return the splines through rows (F, C) at the rows."""
+        return self.design @ self(rows)
+
+
+def crude(trial: Trial) -> np.ndarray:
+    """Return headings (F, 8) along the body from few modes frame by frame, less their mean, rad."""
+    s = _chord_places(trial.points)
+    z, triangle, _ = projected(trial.points, s, min(6, len(s) - 1))
+    places = (np.arange(8) + 0.5) / 8
+    tangent = placed(_legendre(places, len(triangle), 1) @ np.linalg.inv(triangle), z)
+    heading = np.unwrap(np.angle(tangent), axis=1)
+    return heading - heading.mean(1, keepdims=True)
+
+
+def _chord_places(points: np.ndarray) -> np.ndarray:
+    chord = np.median(np.hypot(*np.moveaxis(np.diff(points, axis=1), -1, 0)), 0)
+    s = np.concatenate([[0.0], np.cumsum(chord)])
+    return s / s[-1]
+
+
+def projected(points: np.ndarray, s: np.ndarray, modes: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return orthonormal coefficients (F, modes, 2) of frames, what makes them from Legendre's, and the squares of what
+    they leave of each frame (F,)."""
+    q, triangle = np.linalg.qr(_legendre(s, modes, 0))
+    z = q.T @ points
+    left = points - q @ z
+    return z, triangle, (left**2).sum((1, 2))
+
+
+def filled(trial: Trial) -> Trial:
+    """Return the trial with missing points interpolated in time, point by point; `fitted` replaces them."""
+    from scipy.interpolate import PchipInterpolator
+
+    missing, points = np.isnan(trial.points[..., 0]), trial.points.copy()
+    for p in np.flatnonzero(missing.any(0)):
+        known = ~missing[:, p]
+        inside = np.clip(trial.t, *trial.t[known][[0, -1]])
+        points[:, p] = np.where(
+            known[:, None], points[:, p], PchipInterpolator(trial.t[known], points[known, p])(inside)
+        )
+    return replace(trial, points=points, filled=missing)
+
+
+def fitted(trial: Trial, period: float) -> tuple[Curve, Trial]:
+    """Return the smooth midlines of a trial, with modes and knots by generalised cross-validation, and the trial with the
+    smooth midlines where points were missing."""
+    s = _chord_places(trial.points)
+    rows = len(trial.t) * period / (trial.t[-1] - trial.t[0])
+    most = min(MODES[1], int(SAFE * np.sqrt(len(s))), len(s) - 1)
+    solvers = {k: Solver(trial.t, k) for k in sorted({max(2, round(rows / n)) for n in KNOTS})}
+    modes, step = _chosen(trial, s, most, solvers)
+    for _ in range(PASSES):
+        curve = _curve(trial, s, modes, step, solvers[step])
+        trial = _completed(trial, curve)
+        s = _arc_places(curve, s)
+    modes, step = _chosen(trial, s, most, solvers)
+    return _curve(trial, s, modes, step, solvers[step]), trial
+
+
+def _completed(trial: Trial, curve: Curve) -> Trial:
+    """Return the trial with points of the curve where there were none: so the least squares of what is known converge."""
+    if not trial.filled.any():
+        return trial
+    smooth = curve.basis(curve.s) @ curve.at(trial.t)
+    return replace(trial, points=np.where(trial.filled[..., None], smooth, trial.points))
+
+
+def refined(trial: Trial, curve: Curve) -> Curve:
+    """Return the curve with more modes and more knots, whose difference from it shows what smoothing has cut off."""
+    step = max(2, round(curve.step / 1.5))
+    return curve_of(trial, curve.s, min(curve.modes + 2, len(curve.s) - 1), step)
+
+
+def curve_of(trial: Trial, s: np.ndarray, modes: int, step: int) -> Curve:
+    """Return the curve with these places of points (P,), modes, and rows between knots."""
+    return _curve(trial, s, modes, step, Solver(trial.t, step))
+
+
+def _chosen(trial: Trial, s: np.ndarray, most: int, solvers: dict[int, Solver]) -> tuple[int, int]:
+    """Return modes and rows between knots of the least generalised cross-validation."""
+    z, _, left = projected(trial.points, s, most)
+    count = trial.known
+    scores = {}
+    for step, solver in solvers.items():
+        square = ((z - solver.smoothed(z.reshape(len(z), -1)).reshape(z.shape)) ** 2).sum((0, 2))
+        for modes in range(min(MODES[0], most), most + 1):
+            residual = left.sum() + square[:modes].sum() + (z[:, modes:] ** 2).sum()
+            scores[modes, step] = residual / (1 - 2 * modes * solver.count / count) ** 2
+    return min(scores, key=scores.get)
+
+
+def _curve(trial: Trial, s: np.ndarray, modes: int, step: int, solver: Solver) -> Curve:
+    z, triangle, left = projected(trial.points, s, modes)
+    coefficients = solver(z)
+    residual = z - (solver.design @ coefficients.reshape(solver.count, -1)).reshape(z.shape)
+    free = trial.known - 2 * modes * solver.count
+    noise = np.sqrt((left.sum() + (residual**2).sum()) / free)
+    residual = residual / np.sqrt(1 - solver.count / len(trial.t))
+    return Curve(trial.t, s, modes, step, solver.knots, coefficients, residual, float(noise), triangle, solver)
+
+
+def _arc_places(curve: Curve, s: np.ndarray) -> np.ndarray:
+    """Return the shares (P,) of the curve's own length, mean over the frames, at which points of s (P,) lie."""
+    fine = np.linspace(0, 1, 201)
+    speed = np.abs(placed(curve.basis(fine, 1), curve.at(curve.t))).mean(0)
+    arc = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2)])
+    return np.interp(s, fine, arc / arc[-1])

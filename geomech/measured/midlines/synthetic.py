@@ -1,0 +1,89 @@
+"""Trials of an undulator whose motion in the world is known, with cycles that vary and noise, to test intervals."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from geomech.io.files import atomic_file
+from geomech.measured.midlines.trial import Trial
+from geomech.measured.synthetic import _integrated as integrated
+from geomech.measured.synthetic import _smooth as smooth_noise
+from rft.checks import in_range
+
+FINER = 3  # steps of the integration between two frames
+MEMORY = 0.25  # correlation time of the wave's deviations, cycles
+
+
+class SyntheticTrial(NamedTuple):
+    """A trial: t (F,), points (F, P, 2) tail to head, in body lengths, and the same without noise."""
+
+    t: np.ndarray
+    points: np.ndarray
+    exact: np.ndarray
+
+    def trial(self, name: str = "synthetic") -> Trial:
+        """Return the trial as `geomech.measured.midlines.reader.read` gives it."""
+        frames, points = self.points.shape[:2]
+        lines = 2 + np.arange(frames * points).reshape(frames, points)
+        return Trial(name, self.t, self.points, tuple(str(k + 1) for k in range(points)), lines, "BL")
+
+
+def made(
+    system: Any, cycles: float = 8.0, frames: int = 40, points: int = 30, *, swing: float = 0.9, waves: float = 1.1,
+    frequency: float = 1.0, noise: float = 0.01, spread: float = 0.05, jitter: float = 0.02, heading: float = 0.5,
+    bend: float = 0.0, seed: int = 0,
+) -> SyntheticTrial:  # fmt: skip
+    """Return a trial of a swimmer of many equal elements (`rft.Backbone`) in its medium.
+
+    Headings along the body are swing sin(phase + 2 pi waves s), a wave from head to tail. frames: per cycle. points: at
+    equal distances from tail to head. noise: standard deviation of x and y, body lengths. spread, jitter: relative
+    standard deviations of swing and waves, and of the rate of the phase, which vary over MEMORY of a cycle. heading
+    (rad): at the start. bend (rad): of the resting body, which makes it turn."""
+    in_range("frames", frames, 8, 1e6, whole=True)
+    rng, count = np.random.default_rng(seed), int(cycles * frames * FINER) + 1
+    t = np.arange(count) / (frames * FINER * frequency)
+    varying = smooth_noise(rng, count, MEMORY * frames * FINER, 3)[0]
+    rate = 2 * np.pi * frequency * (1 + jitter * varying[:, 0])
+    phase = np.concatenate([[rng.uniform(0, 2 * np.pi)], np.cumsum((rate[1:] + rate[:-1]) / 2) * t[1]]).cumsum()
+    phase = phase[0] + np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2) * t[1]])
+    swings, wavenumbers = swing * (1 + spread * varying[:, 1]), 2 * np.pi * waves * (1 + spread * varying[:, 2])
+    elements = system.joints + 1
+    s = (np.arange(elements) + 0.5) / elements
+    headings = swings[:, None] * np.sin(phase[:, None] + wavenumbers[:, None] * (s - 0.5)) + bend * (s - 0.5)
+    alpha = np.diff(headings, axis=-1)
+    alphadot = _rates(t, alpha)
+    pose = integrated(system.velocity(alpha, alphadot), t[1]) + [0.0, 0.0, heading]
+    pose[:, :2] = pose[:, :2] @ _turn(heading).T
+    ends = system.body.points(alpha[::FINER], pose[::FINER])
+    exact = _at(ends, np.linspace(0, 1, points)) / system.length
+    return SyntheticTrial(t[::FINER], exact + noise * rng.normal(size=exact.shape), exact)
+
+
+def _turn(angle: float) -> np.ndarray:
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+def _rates(t: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+    from scipy.interpolate import CubicSpline
+
+    return CubicSpline(t, alpha).derivative()(t)
+
+
+def _at(ends: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """Return points (F, P, 2) at shares s of the arc through ends (F, n + 1, 2) of equal elements."""
+    from scipy.interpolate import CubicSpline
+
+    return CubicSpline(np.linspace(0, 1, ends.shape[1]), ends, axis=1)(s)
+
+
+def save(path: str | Path, trial: SyntheticTrial) -> None:
+    """Write a trial as CSV: t, point, x, y, in body lengths."""
+    frames, points = trial.points.shape[:2]
+    rows = np.column_stack(
+        [np.repeat(trial.t, points), np.tile(np.arange(1, points + 1), frames), trial.points.reshape(-1, 2)]
+    )
+    with atomic_file(path) as part:
+        np.savetxt(part, rows, ("%.6g", "%d", "%.6g", "%.6g"), ",", header="t,point,x_BL,y_BL", comments="")

@@ -1,0 +1,64 @@
+"""A trial: points tracked along a body over time, in the world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from rft.refusal import Refusal
+
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}  # m; px needs a scale, and BL is the body's own length
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """Points of a file, in the order of the body.
+
+    name: of the file. t: (F,), ascending, in s or, untimed, in frames. points: (F, P, 2), in ``unit``, nan where the
+    tracker has none. names: (P,), of the points. lines: (F, P), of the file. unit: m, BL, or "" where nobody says.
+    length: of the body, in ``unit``; None where the points are the whole body. filled: (F, P), which points were
+    missing and are now those of the smooth midlines; None where they are still nan. notes: what was taken for
+    granted."""
+
+    name: str
+    t: np.ndarray
+    points: np.ndarray
+    names: tuple[str, ...]
+    lines: np.ndarray
+    unit: str = ""
+    timed: bool = True
+    length: float | None = None
+    filled: np.ndarray | None = None
+    notes: tuple[str, ...] = ()
+
+    def wrong(self, what: str, frame: int | None = None, point: int | None = None, **facts: Any) -> Refusal:
+        """Return a Refusal about a point of a frame, a frame, or the file. facts: keywords of `Refusal`."""
+        places = [self.name]
+        if frame is not None:
+            places = [f"{self.name}, line {self.lines[frame, 0 if point is None else point]}"]
+            places[0] += f" ({self.frame(frame)}" + (")" if point is None else f", point {self.names[point]})")
+        return Refusal(what, where=places[0], **facts)
+
+    def frame(self, frame: int) -> str:
+        """Return the name of a frame: its time, or its number."""
+        return f"t = {self.t[frame]:.6g}" if self.timed else f"frame {self.t[frame]:g}"
+
+    @property
+    def unit_of_time(self) -> str:
+        return "s" if self.timed else "frame"
+
+    def with_notes(self, *notes: str, **changes: Any) -> Trial:
+        """Return the trial with more notes, and other fields."""
+        return replace(self, notes=(*self.notes, *notes), **changes)
+
+    @property
+    def known(self) -> int:
+        """Number of coordinates that the tracker gave."""
+        return 2 * int((~(np.isnan(self.points[..., 0]) if self.filled is None else self.filled)).sum())
+
+    def reversed(self) -> Trial:
+        """Return the trial with its points in the other order."""
+        return replace(self, points=self.points[:, ::-1], names=self.names[::-1], lines=self.lines[:, ::-1],
+                       filled=None if self.filled is None else self.filled[:, ::-1])  # fmt: skip
