@@ -734,7 +734,7 @@ def test_a_loop_that_cannot_be_run_ends_no_search():
     cycles, objective = Phases(loops, velocity), Objective("displacement")
     first = loops.of(Circle(amplitude=0.5))
     p = ascend(cycles, objective, first, max_steps=40)
-    assert np.abs(loops.cycle(p)[0]).max() <= 1.1
+    assert 1.09 < np.abs(loops.cycle(p)[0]).max() <= 1.1
     assert objective.value(cycles(p))[0] > 1.5 * objective.value(cycles(first))[0]
 
 

@@ -151,7 +151,9 @@ def test_the_map_of_a_family_integrates_to_its_area(gait):
 
 
 def test_limits_of_the_tables():
-    table = family.fit(GLASS.system.velocity, Circle(), 0.5, 6, 16)
+    done = []
+    table = family.fit(GLASS.system.velocity, Circle(), 0.5, 6, 16, done.append)
+    assert done == [1.0]
     with pytest.raises(ValueError, match="from 0 to the family's 0.5"):
         table.area([0.6])
     with pytest.raises(ValueError, match="largest amplitude"):
@@ -356,6 +358,16 @@ def test_a_table_pays_for_many_amplitudes_and_not_for_few():
 def test_the_position_decides_and_not_the_heading(error, tier, monkeypatch):
     monkeypatch.setattr("geomech.studies.choose.against_direct", lambda *_: np.tile(error, (400, 1)))
     assert cheapest(GLASS, np.linspace(0.3, 2.0, 400), 2e-3)["tier"] == tier
+
+
+def test_errors_of_rules_are_those_of_each_amplitude():
+    """In a medium without closed integrals, where one rule is judged by another."""
+    sand, a = GLASS.changed(medium=MEDIA["measured"]), np.array([0.4, 0.9, 1.4])
+    (poses, error), (true, _) = (
+        estimate.direct(sand.with_numerics(loads=x), Circle(), a, 64) for x in ("gauss:4", "gauss:64")
+    )
+    off = estimate.pose_distance(poses, true, 1.0)
+    assert error.shape == (3, 2) and (off <= error + 1e-12).all() and error.max() < 5 * off.max()
 
 
 def test_what_the_solver_left_counts_in_the_estimate():
