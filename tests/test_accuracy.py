@@ -46,6 +46,12 @@ def test_amplitudes_go_up_to_the_gaits_own(glass):
     )
 
 
+def test_the_truth_has_exact_integrals_whatever_rule_the_scene_takes():
+    ruled = scenes.load("three-link-glass").with_numerics(loads="midpoint:3", regularisation=1e-3)
+    solver = tiered.Settings(ruled).at(None, None).system.solver
+    assert (solver.loads, solver.regularisation) == ("exact", 1e-9)
+
+
 def test_tiers_rank_as_they_should(glass):
     """What each tier settles at: the direct one below the harmonic one below the path and the area."""
     floor = {x["tier"]: min(x["error"]) for x in glass["lines"] if x["against"] == "truth"}

@@ -299,6 +299,11 @@ def covered(system, known, seeds, cycles=8.4, frames=40, **options):
     return np.array(hits)[:, : len(QUANTITIES)]
 
 
+def test_cycles_too_few_to_show_how_they_vary_are_noted():
+    one, two, three = (fit._notes(np.zeros(count)) for count in (1, 2, 3))
+    assert one[0].startswith("one full cycle") and two[0].startswith("two full cycles") and three == []
+
+
 def test_intervals_cover_the_truth_in_a_few_trials():
     known = noiseless(synthetic.made(GLASS, 40, 30, seed=99, noise=0.0, **USUAL))
     hits = covered(GLASS, known, range(2), 4.4, 30, **USUAL)

@@ -16,6 +16,7 @@ from geomech import plots, scenes
 from geomech.output import walks
 from geomech.scenes import WalkerScene
 from geomech.studies import walking
+from geomech.studies.sweep import Sweep
 from geomech.text import walk as walk_text
 from geomech.text.explain import explain
 from rft.balance.backend import preferring
@@ -390,6 +391,15 @@ def test_what_a_walk_takes_is_told_from_its_first_steps(geomech, tmp_path):
     assert (code, out) == (2, "") and "say --yes" in err and err.count("\n") == 1, err
     with pytest.raises(Refusal, match=r"xplorer: after 0 s of computing \d+% is done, and no cycle repeats itself"):
         walking.run(dataclasses.replace(XPLORER, numerics=QUICK), longest=0.0)
+
+
+def test_a_sweep_takes_the_strides_until_robots_walk_steadily_and_no_more():
+    def costs(duration):
+        scene = dataclasses.replace(XPLORER, numerics=dataclasses.replace(QUICK, duration=duration))
+        return Sweep(scene, {"gait.frequency": [1.0, 2.0]}).cost().balances, walking.price(scene).balances
+
+    (brief, one), (long, whole) = costs(0.5), costs(20.0)
+    assert brief == long and whole > one
 
 
 def test_a_walk_may_be_over_before_its_first_step():
