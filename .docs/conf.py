@@ -66,7 +66,7 @@ html_theme_options = {
     "navbar_align": "left",
     "header_links_before_dropdown": 10,
     "show_toc_level": 2,
-    "secondary_sidebar_items": ["page-toc"],
+    "secondary_sidebar_items": {"**": ["page-toc"], "index": []},
     "footer_start": ["copyright"],
     "footer_end": [],
     "pygments_light_style": "tango",

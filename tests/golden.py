@@ -112,7 +112,8 @@ def shipped(kind: str) -> list[str]:
     """Names of the scenes that ship: of a "gait", an "intruder" or a "walker"."""
     sections = command("scenes").split("\n\n")  # each but the first under a heading
     lines = sections[("gait", "intruder", "walker").index(kind)].splitlines()
-    return [line.split()[0] for line in lines[kind != "gait" :]]
+    own = [line for line in lines[kind != "gait" :] if not line.startswith(" ")]  # others go on with a description
+    return [line.split()[0] for line in own]
 
 
 def read(file: pathlib.Path) -> dict[str, np.ndarray]:

@@ -5,6 +5,7 @@
 `mutants.toml` beside this file says which tests watch a module, what is left out and which mutants are no bugs. Mutants
 live in copies of the tree in the system's temporary folder, one a worker; the checkout is only read. A mutant is killed
 when a test fails; time-outs, far longer than without it, are counted apart. Survivors are printed as what they change.
+`--done 50` goes on with a run that was stopped after 50.
 """
 
 import argparse
@@ -43,6 +44,17 @@ OPPOSITE = {ast.Lt: ast.GtE, ast.LtE: ast.Gt, ast.Gt: ast.LtE, ast.GtE: ast.Lt, 
 OPPOSITE |= {ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In}
 PAIRS = "minimum maximum, min max, sin cos, real imag, any all, zeros ones, zeros_like ones_like, floor ceil, sum mean"
 TWIN = {p[i]: p[1 - i] for p in map(str.split, (PAIRS + ", argmin argmax, exp expm1").split(",")) for i in (0, 1)}
+EITHER_WAY = {
+    "max",
+    "min",
+    "maximum",
+    "minimum",
+    "fmax",
+    "fmin",
+    "hypot",
+    "distance",
+    "pose_distance",
+}  # of two arguments
 
 
 class Mutant(NamedTuple):
@@ -84,7 +96,9 @@ def variants(node):
             yield with_(attr=TWIN[name])
         case ast.Call(args=args, keywords=given):
             yield from (with_(keywords=[*given[:k], *given[k + 1 :]]) for k in range(len(given)))
-            if len({*map(ast.dump, args[:2])}) == 2 and not any(isinstance(x, ast.Starred) for x in args[:2]):
+            either_way = len(args) == 2 and ast.unparse(node.func).rpartition(".")[2] in EITHER_WAY
+            told_apart = len({*map(ast.dump, args[:2])}) == 2 and not any(isinstance(x, ast.Starred) for x in args[:2])
+            if told_apart and not either_way:
                 yield with_(args=[args[1], args[0], *args[2:]])
         case ast.If(test=test) | ast.IfExp(test=test):
             yield test, ast.UnaryOp(ast.Not(), test)
@@ -178,12 +192,13 @@ def main() -> None:
     ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     ask.add_argument("--count", type=int, default=200, help="how many, at random")
     ask.add_argument("--seed", type=int, default=1)
+    ask.add_argument("--done", type=int, default=0, help="so many of them are left out: a stopped run had them")
     ask.add_argument("--jobs", type=int, default=2)
     ask.add_argument("--only", nargs="+", default=[""], help="beginnings of file names")
     asked = ask.parse_args()
     files = sorted(p.relative_to(ROOT).as_posix() for top in ("rft", "geomech") for p in (ROOT / top).rglob("*.py"))
     every = [m for f in files if watch(f) and f.startswith(tuple(asked.only)) for m in mutants_of(ROOT / f)]
-    some = random.Random(asked.seed).sample(every, min(asked.count, len(every)))
+    some = random.Random(asked.seed).sample(every, min(asked.count, len(every)))[asked.done :]
     print(f"{len(some)} of {len(every)} mutants, seed {asked.seed}", flush=True)
     os.environ.update(CLEAN)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # clean up then too

@@ -40,6 +40,12 @@ def test_every_setting_gets_better(glass):
         assert all(t > 0 for t in found["seconds"])
 
 
+def test_amplitudes_go_up_to_the_gaits_own(glass):
+    assert glass["amplitudes"] == pytest.approx(
+        np.array([0.4, 0.55, 0.7, 0.85, 1.0]) * scenes.load(glass["scene"]).gait.amplitude
+    )
+
+
 def test_tiers_rank_as_they_should(glass):
     """What each tier settles at: the direct one below the harmonic one below the path and the area."""
     floor = {x["tier"]: min(x["error"]) for x in glass["lines"] if x["against"] == "truth"}

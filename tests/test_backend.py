@@ -188,6 +188,20 @@ def test_a_sample_alone_has_the_digits_that_it_has_among_others(body, effects):
 
 
 @pytest.mark.usefixtures("compiled_code")
+@pytest.mark.parametrize("effects", [(), (EndCaps(radius=0.06, tail=1.0), TowedSled(1.0, 0.3))], ids=len)
+def test_forces_at_given_velocities_are_those_by_numpy(effects):
+    """And their slopes, of elements and of points, in more samples than share a vector."""
+    from rft.balance import arrays, compiled
+
+    rng = np.random.default_rng(9)
+    problem = assemble(GLASS, BODY, effects).problem(*rng.uniform(-1, 1, (2, 2, 21)))
+    count = len(problem.sides.station) + len(problem.points.station)
+    v, xi, rounding = rng.normal(size=(3, count, 21)), rng.normal(size=(3, 21)), np.full(21, 1e-3)
+    wanted, found = (np.reshape(by.nets(problem, v, rounding, xi), (5, 3, -1)) for by in (arrays, compiled))
+    np.testing.assert_allclose(found, wanted, rtol=1e-11, atol=1e-12 * np.abs(wanted).max())
+
+
+@pytest.mark.usefixtures("compiled_code")
 def test_compiled_once_for_each_form_of_law():
     """One signature: whatever the effects, no call waits for another compilation."""
     from rft.balance.compiled import kernel

@@ -12,7 +12,7 @@ from rft import Chain, Coulomb, EndCaps, GrainInertia, Granular, TowedSled, Visc
 from rft.balance.arrays import nets, solve
 from rft.balance.newton import Descent, Limits, plus, to_element, to_frame
 from rft.balance.path import _to_elements, _with_slope
-from rft.balance.solver import QUICK
+from rft.balance.solver import QUICK, SLOW
 from rft.contact import assemble, mapped
 from rft.laws.base import TermLaw
 
@@ -226,6 +226,12 @@ def test_the_first_step_is_that_of_kinks_rounded_off_without_end(medium, effects
     assert (evaluations <= 2).all()
     assert residual.max() < 1e-11
     assert np.abs(xi).max() > 0.1
+
+
+def test_descents_are_ever_slower_and_more_patient():
+    firsts, ratios, residuals, free, budgets = np.array([QUICK, *SLOW]).T
+    assert ((firsts > 0) & (ratios > 0) & (ratios < 1) & (free > 1)).all()
+    assert (np.diff(firsts) > 0).all() and (np.diff(residuals) < 0).all() and (np.diff(budgets) > 0).all()
 
 
 def test_a_starved_solver_says_so(monkeypatch):

@@ -11,6 +11,7 @@ from geomech.gaits import Fourier
 from geomech.run.cost import BASE
 from geomech.studies import accuracy, cost, effort, motion, shape_space, sweep
 from geomech.studies.study import Study
+from rft import Chain, body_velocity
 from rft.balance.listening import listening
 from rft.effects import SkinFriction, Slope
 
@@ -121,6 +122,17 @@ def test_accuracy_and_sweep_say_what_they_cost(solved):
         solved.clear()
         sweep.sweep(scene, over)
         assert foretold == sum(solved)
+
+
+def test_a_balance_that_is_tried_twice_is_one(solved):
+    """From starts of which all, some and none lead to the solution."""
+    rng = np.random.default_rng(3)
+    alpha, alphadot = rng.uniform(-1, 1, (2, 12, 2))
+    answer = body_velocity(VISCOUS.system.medium, Chain(), alpha, alphadot).xi
+    for start in (answer, np.where(np.arange(12)[:, None] < 6, answer, np.nan), 1e7 * answer, None):
+        solved.clear()
+        body_velocity(GLASS.system.medium, Chain(), alpha, alphadot, start=start)
+        assert sum(solved) == 12
 
 
 @pytest.mark.parametrize("scene", [GLASS, VISCOUS])

@@ -278,6 +278,21 @@ def test_the_side_where_most_was_disturbed_does_not_weaken_the_whole():
     assert [left[1], *right] == [1, 1, 1]
 
 
+def test_a_parameter_that_all_samples_share_is_that_of_some():
+    shared = SkinFriction().with_parameters(forward=np.array([0.2]), backward=np.array([0.1, 0.3, 0.5]))
+    some = shared.take([2, 0])
+    assert (some.forward.tolist(), some.backward.tolist()) == ([0.2], [0.5, 0.1])
+
+
+def test_the_track_has_no_gaps_along_the_longest_element():
+    """Points are half a radius apart at most, in the middles of equal parts."""
+    effect, problem = DisturbedGround(radius=0.03, weakening=1.0), straight((), Chain((1, 10)))
+    at = effect.points(problem, Site(1, 0.1, np.zeros((3, 1)), ()))[:, :, 0]
+    half = problem.sides.elements.half[:, 0]
+    assert np.abs(np.diff(at, axis=0)).max() <= 0.03 / 2
+    np.testing.assert_allclose(np.abs(at[-1] - at[0]), 2 * half * (1 - 1 / len(at)))
+
+
 @pytest.mark.parametrize("name", BODIES)
 def test_pieces_move_as_the_body(name):
     """Cutting elements changes no force and no moment."""

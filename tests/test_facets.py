@@ -81,6 +81,16 @@ def test_loads_are_those_of_each_mesh_alone():
     np.testing.assert_allclose(found, wanted, rtol=2e-3, atol=3e-3 * np.abs(wanted).max())
 
 
+def test_a_surface_stands_where_its_mesh_does():
+    """Unless it is told another place."""
+    mesh = Cylinder(0.02, 0.05).mesh(200)
+    np.testing.assert_array_equal(Surface.from_mesh(0, mesh).corners, mesh.vertices[mesh.faces])
+    outline, at = CLeg(0.03, 0.02).outline(12), np.array([0.02, -0.01, 0.015])
+    moved = Surface.from_outline(0, outline, at).corners - Surface.from_outline(0, outline).corners
+    np.testing.assert_allclose(moved, np.broadcast_to(at, moved.shape), atol=1e-15)
+    assert Surface.from_outline(0, outline).corners[..., 1].max() == outline.width / 2
+
+
 @pytest.mark.parametrize(
     "shape", [CLeg(0.03, 0.02, 0.6), RoundRod(0.03, 0.02), Polygon(((0, 0), (0.05, 0), (0.01, 0.04)), 0.03)]
 )

@@ -14,7 +14,7 @@ import geomech.scenes as scenes
 from geomech import plots
 from geomech.scenes.intruder import IntruderScene
 from geomech.scenes.stress import load_medium
-from geomech.studies.intrusion import estimate
+from geomech.studies.intrusion import Settings, estimate
 from geomech.studies.study import Study
 from rft.plates import VERTICAL, CLeg, Drag, Outline, Penetrate, PlateDrags, Rotate, StressMap, loads
 from rft.refusal import Refusal
@@ -380,6 +380,13 @@ def test_options_of_stress_and_intrude_are_refused_before_anything_is_written(ge
     refused(geomech("intrude", "c-leg", "-o", "no/a.csv"), "cannot write no/a.csv")
     refused(geomech("intrude", "c-legs"), "scene: 'c-legs' is unknown: did you mean 'c-leg'")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_tolerance_that_is_just_met_is_met():
+    settings, seconds = Settings(scenes.load("c-leg")), [1.0, 2.0]
+    lines = [{"value": [8, 16], "error": error, "seconds": seconds} for error in ([5e-3, 2e-3], [1e-2, 1e-3])]
+    found = [settings.cheapest(lines, tolerance) for tolerance in (1e-2, 9.9e-3, 1e-3)]
+    assert [(x["elements"], x.get("error")) for x in found] == [(8, 1e-2), (16, 2e-3), (None, None)]
 
 
 def test_accuracy_of_the_number_of_elements(geomech, tmp_path, monkeypatch):

@@ -357,7 +357,7 @@ def test_a_walk_resumes_where_it_was(engine, tmp_path):
     ask = lambda: walking.walked([dataclasses.replace(scene, numerics=few)], engine, settling=True)[0]
     with counted() as every, jobs.storing(tmp_path / "p"):
         whole = ask()
-    assert len(every) > 2
+    assert len(every) > 7  # of the walk and of those that tell its errors
     after = len(every) // 2
     assert stopped(tmp_path / "p", after, ask).startswith(f"{after} results so far are kept")
     found, strides = asked(tmp_path / "p", ask)

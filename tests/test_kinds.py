@@ -316,6 +316,14 @@ def test_files_that_cannot_be_registered_get_one_line_and_leave_nothing(text, sa
     assert not [name for name in sys.modules if name.startswith("geomech_plugin_own")]
 
 
+def test_a_file_tells_its_own_parts_and_not_those_of_a_module_beside_it(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    beside = LAW.replace("Thick", "Thin").replace('"thick"', '"thin"')
+    (tmp_path / "thin_beside.py").write_text(f"from rft.laws.base import LAWS\n{beside}\nLAWS.register(Thin)")
+    (tmp_path / "own.py").write_text("import thin_beside" + LAW)
+    assert load_file(tmp_path / "own.py") == ["thick"] and "thin" in REGISTRIES["geomech.media"]
+
+
 @pytest.mark.parametrize("future", [False, True])
 def test_a_file_is_run_as_python_would_with_types_as_it_writes_them(future, tmp_path):
     types = "{'thickness': 'float'}" if future else "{'thickness': float}"

@@ -704,6 +704,7 @@ def test_damaged_fields_are_refused(field, tmp_path):
         (lambda d: d.assign_attrs(level=1.0), "parts do not fit"),
         (lambda d: d.assign_attrs(level=b"most"), "parts do not fit"),
         (lambda d: d.assign_attrs(error_factor=0.0), "parts do not fit"),
+        (lambda d: d.assign_attrs(error_factor=1e6), "parts do not fit"),
         (lambda d: d.assign_attrs(error_factor=[2.0, 2.0]), "parts do not fit"),
         (lambda d: d.assign(gait=0 * d.gait), "a gait that does not move"),
     ],

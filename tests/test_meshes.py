@@ -328,7 +328,7 @@ LAST = {PLY: b"3 1 2 3\n", OBJ: b"f 2 3 4\n"}
         (PLY, b"4 1 2 -4 3\n", "a face names vertex -4, where vertices are 0 to 3"),
         (OBJ, b"f 2/1/1 3//-7 4\n", None),
         (OBJ, b"f -3 -2 -1\n", None),
-        (OBJ, b"f -3 -2 -1\nv 5 5 5\n", "a face counts vertices back, and vertices follow it"),
+        (OBJ, b"f -3 -2 -1\nv 5 5 5\n", "a face counts vertices back, and vertices follow it: count from 1, or"),
         (OBJ, b"f 2 3 5\n", "is no OBJ mesh: 'index 4 is out of bounds"),
         (OBJ, b"f 2 3 -5\n", "is no OBJ mesh: 'index -5 is out of bounds"),
         (OBJ, b"f 2 3 0\n", "a face names vertex 0, where vertices count from 1"),

@@ -247,6 +247,15 @@ def test_every_end_has_its_status_and_no_nan():
     assert found.status == "airborne" and found.limit is None and found.speed == pytest.approx(1.0, rel=1e-3)
 
 
+def test_the_state_of_a_stride_has_velocities_over_that_of_the_legs():
+    states = []
+    for frequency in (1.0, 2.0):
+        one = Simulation(Walker(XPLORER.robot, Tripod(frequency), XPLORER.medium), QUICK)
+        one.body.data.qvel[:] = frequency * np.linspace(-1, 1, one.body.model.nv)
+        states.append(one.scaled_state())
+    np.testing.assert_allclose(*states, atol=1e-12)
+
+
 @pytest.mark.parametrize("turn", [0.0, 0.3])
 def test_who_turns_is_not_told_by_strides_along_a_line(turn, monkeypatch):
     """A way that is prescribed: each stride 0.1 m ahead, then to the left."""

@@ -153,7 +153,7 @@ WITH_PYTHON = {page.relative_to(ROOT).as_posix(): page for page in PAGES
 
 
 @pytest.mark.parametrize("page", WITH_PYTHON.values(), ids=WITH_PYTHON)
-def test_python_on_all_pages_runs(page, tmp_path, capsys, monkeypatch):
+def test_python_on_all_pages_runs(page, tmp_path, capsys, monkeypatch, own_parts):
     monkeypatch.chdir(tmp_path)
     for code in blocks(page, "python"):
         own_law = "@formula" in code  # of no module, from which code compiled by an earlier run could be loaded

@@ -277,6 +277,14 @@ def test_every_file_of_a_folder_is_registered(group):
     registry = REGISTRIES[group]
     assert len(registry) == len(registry.built_in) > 1
     assert {*registry} == {getattr(part, registry.key) for part in registry.values()}
+    assert all(registry.admits(part) for part in registry.values())
+
+
+def test_a_style_that_a_package_offers_says_what_it_draws():
+    some = lambda: None
+    some.draws = "ccf"
+    assert plots.CCF_STYLES.admits(some) and not plots.CONNECTION_STYLES.admits(some)
+    assert not plots.CCF_STYLES.admits(lambda: None)
 
 
 ADDED = {

@@ -3,8 +3,9 @@
 import re
 
 import pytest
-from commands import geomech
+from commands import PARSER, geomech
 
+from geomech import cli
 from geomech.commands import COMMANDS, renamed
 
 SUMMARIES = re.compile(r"^  ([a-z][a-z-]*)  +(\S.*)$", re.M)
@@ -23,6 +24,11 @@ def test_help_has_every_command_under_its_heading_with_its_whole_summary():
 def test_lists_fit_a_screen(command):
     code, out, _ = geomech(*command.split())
     assert code == 0 and max(map(len, out.splitlines())) <= 80
+
+
+def test_every_option_and_argument_says_what_it_is_for():
+    every = [(name, x) for name, command in PARSER(cli.app).commands.items() for x in command.params]
+    assert len(every) > 100 and [(name, x.name) for name, x in every if not x.help] == []
 
 
 @pytest.mark.parametrize("old", renamed.COMMANDS)

@@ -304,8 +304,8 @@ SIDES = np.array([
 @pytest.mark.parametrize(
     ("vertices", "faces", "said"),
     [
-        (CUBE, SIDES[:-1], "open: 3 edges"),
-        (CUBE, SIDES[:, ::-1], "inside out"),
+        (CUBE, SIDES[:-1], "open: 3 edges have one triangle; close it, or say"),
+        (CUBE, SIDES[:, ::-1], "inside out: its normals point inwards; turn the triangles round"),
         (CUBE, np.concatenate([SIDES[:-1], SIDES[-1:, ::-1]]), "run along the same way"),
         (CUBE, np.concatenate([SIDES, SIDES[:1]]), "doubles"),
         (CUBE, np.concatenate([SIDES[:-1], [(1, 1, 3)]]), "no area"),

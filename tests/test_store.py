@@ -114,6 +114,7 @@ def test_what_is_there_is_kept_by_a_request_that_adds_nothing(tmp_path):
 
 def test_one_at_a_time(tmp_path):
     first = Store(tmp_path / "p", hold=True)
+    assert first.db.execute("PRAGMA busy_timeout").fetchone() == (0,)  # none waits for the other
     for again in (lambda: Store(tmp_path / "p", hold=True), lambda: _elsewhere(tmp_path / "p")):
         with pytest.raises(Refusal, match="another computation has .*p open"):
             again()

@@ -284,6 +284,12 @@ def test_plate_drags_become_a_medium_that_commands_read(tmp_path):
     assert str(out) in map(str, scene.inputs(loaded))
 
 
+def test_all_residuals_are_told_of_many_drags_when_asked_for(tmp_path):
+    few, every = (geomech("fit-medium", plates(tmp_path), *more)[1].splitlines() for more in ((), ("--all",)))
+    assert few[-1] == "residuals: with --all or --json" and every[: len(few) - 1] == few[:-1]
+    assert len(every) == len(few) + 42
+
+
 def test_what_is_not_determined_is_noted(tmp_path):
     level = np.stack([np.arange(-75, 91, 15) * RAD, np.zeros(12)])
     file, out = plates(tmp_path, angles=level), tmp_path / "m.toml"

@@ -116,7 +116,9 @@ def test_one_frequency_for_all_effects(without_estimates):
         PAST + '"grain-inertia"\nfrequency = 3.0\nlength = 0.1\ndepth = 0.05'
     )
     swimmer = scenes.parse(both).with_numerics(phases=64)
-    found = sweep.sweep(swimmer, {"effects.frequency": [0.0, 3.0, 9.0]})["displacement"]
+    swept = sweep.sweep(swimmer, {"effects.frequency": [0.0, 3.0, 9.0]})
+    found = swept["displacement"]
+    assert swept["frequency"].tolist() == [0.0, 3.0, 9.0]
     np.testing.assert_allclose(found[1], Study(swimmer).poses("direct"), atol=1e-9)
     assert np.abs(found[0] - found[2]).max() > 3e-3
     with pytest.raises(Refusal, match="body-inertia gives frequency = 3.0 and grain-inertia 2.0: it is one swimmer"):
@@ -167,6 +169,14 @@ def test_an_interrupted_sweep_resumes_from_the_file_it_is_given(over, tmp_path, 
     assert len(calls) > count
     with pytest.raises(Refusal, match="partial must be the path of a file"):
         sweep.sweep(GLASS, over, "")
+
+
+def test_three_parameters_are_swept_but_not_drawn(tmp_path):
+    args = [f"--over={key}" for key in ("gait.amplitude=0.5", "medium.ratio=2,4", "body.length=1")]
+    code, out, err = geomech("sweep", "three-link-viscous", *args, "-o", "s.nc", cwd=tmp_path)
+    assert (code, err) == (0, "") and out.startswith("2 points")
+    code, out, err = geomech("sweep", "three-link-viscous", *args, "--plot", "s.png", cwd=tmp_path)
+    assert (code, out) == (2, "") and "cannot draw 3 parameters: sweep one or two" in err
 
 
 def test_the_command_writes_netcdf_and_a_plot(tmp_path):

@@ -17,7 +17,8 @@ from geomech.io import tables
 from geomech.io.tables import matlab
 from geomech.scenes import Scene
 from geomech.studies import fields
-from geomech.systems import DifferentialDrive, IdealFluidSwimmer, Swimmer, Table
+from geomech.systems import DifferentialDrive, IdealFluidSwimmer, NoSlipSnake, Swimmer, Table
+from geomech.systems.table import LENGTHS
 from geomech.text.system import described
 from rft.refusal import Refusal
 
@@ -44,6 +45,7 @@ def test_a_struct_is_read_whole(version, tmp_path):
     np.testing.assert_array_equal(stored.connection.axes, fitted.axes)
     assert (stored.frame, stored.unit, stored.length) == ("link-2", "BL", 1.0)
     assert Table(tmp_path / "s.mat").chain == SWIMMER.body
+    assert stored.connection.size == {"unit": "BL", "length": 1.0}
     assert stored.assumptions == () and stored.sized and stored.power_degree == 2
     np.testing.assert_array_equal(stored.computed.A_optimised, A)
     np.testing.assert_array_equal(stored.computed.beta, pose)
@@ -73,6 +75,7 @@ def test_lengths_and_drag_are_those_of_its_geometry_and_physics(length, drag, tm
         ("tail", "link-1"),
         ("head", "link-3"),
         ("com-mean", "mean"),
+        (np.array([[1.0]]), "link-1"),
         (np.array([[3.0]]), "link-3"),
     ],
 )
@@ -203,6 +206,23 @@ def test_a_bad_struct_is_refused_by_place_and_cure(name, tmp_path):
     save(tmp_path / "s.mat", changed(path, value))
     with pytest.raises(Refusal, match=said):
         tables.load(tmp_path / "s.mat")
+
+
+def test_a_struct_without_geometry_is_one_of_unknown_lengths_and_frame(tmp_path):
+    save(tmp_path / "s.mat", changed(("geometry",), None))
+    table = Table(tmp_path / "s.mat")
+    assert (table.assumed, table.traits.frame, table.chain) == ((LENGTHS,), "that of the table", None)
+    np.testing.assert_array_equal(table.stored.connection.A, computed()[0].A)
+    np.testing.assert_allclose(
+        Table(tmp_path / "s.mat", body_length=2.0).stored.connection.A[:2], computed()[0].A[:2] / 2, rtol=1e-13
+    )
+
+
+def test_singular_shapes_are_not_exported(tmp_path):
+    source = Study(Scene(NoSlipSnake(), Circle(amplitude=0.5, centre=(1.5, -1.5)))).with_numerics(grid=7, extent=2.5)
+    with pytest.raises(Refusal, match="no minimum-perturbation frame of a field with singular shapes: shrink"):
+        fields.save_connection(tmp_path / "s.mat", source, layout="struct")
+    assert not (tmp_path / "s.mat").exists()
 
 
 def test_sign_and_order_are_its_own(tmp_path):

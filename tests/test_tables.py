@@ -22,6 +22,7 @@ from geomech.geometry import connection
 from geomech.geometry.connection import Connection
 from geomech.io import tables
 from geomech.io.tables import matlab
+from geomech.io.tables.base import checked_names
 from geomech.scenes import Numerics, Scene
 from geomech.studies import accuracy, choose, estimate, fields, tiered
 from geomech.studies.single import single
@@ -586,6 +587,14 @@ def read(path):
         return None, str(error)
 
 
+@pytest.mark.parametrize("name", ["", "x" * 61, "a\x1b", "$x$", 3, "lower"])
+def test_names_of_joints_that_make_no_sense_are_not_taken(name):
+    """Empty, too long, not printable, formulas, none, or twice the same."""
+    usual = ["alpha_1", "alpha_2"]
+    assert checked_names(["lower", name], usual) == tuple(usual)
+    assert checked_names(["lower", "x" * 60], usual) == ("lower", "x" * 60)
+
+
 def test_endings_that_lie(made, tmp_path):
     folder, _ = made
     nc, mat_file = (folder / "a.nc").read_bytes(), (folder / "a.mat").read_bytes()
@@ -622,6 +631,7 @@ def test_endings_that_lie(made, tmp_path):
         ({"Ax1": {"a": 1}}, "Ax1 that is no array of real numbers"),
         ({"alpha1": np.ones((9, 9))}, "alpha1 must be at least 4 ascending angles"),
         ({"alpha1": np.arange(81.0).reshape(9, 9) / 81}, "span no grid"),
+        ({"alpha2": np.linspace(-2, 2, 9) + 0.01 * np.outer(*np.eye(9)[[0, 0]])}, "span no grid"),  # but for one corner
         ({"alpha1": np.ones((3, 3, 3))}, "span no grid"),
         ({"degrees": True}, "alpha1 up to 114.6 where angles are in rad"),
     ],

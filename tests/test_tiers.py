@@ -1,6 +1,7 @@
 """The tiers beyond the uniform fit, and whether error estimates can be believed."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,8 +18,9 @@ from geomech.studies.study import Study
 from geomech.systems import Swimmer
 from geomech.tiers import TIERS, Plan, Tier, fitted
 from geomech.tiers.direct import direct
-from rft import BodyInertia, Chain, Granular, se2
+from rft import BodyInertia, Chain, Granular, Viscous, se2
 from rft.balance.listening import listening
+from rft.effects import DepthProfile
 from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -149,7 +151,9 @@ def test_the_map_of_a_family_integrates_to_its_area(gait):
 
 
 def test_limits_of_the_tables():
-    table = family.fit(GLASS.system.velocity, Circle(), 0.5, 6, 16)
+    done = []
+    table = family.fit(GLASS.system.velocity, Circle(), 0.5, 6, 16, done.append)
+    assert done == [1.0]
     with pytest.raises(ValueError, match="from 0 to the family's 0.5"):
         table.area([0.6])
     with pytest.raises(ValueError, match="largest amplitude"):
@@ -268,6 +272,38 @@ def test_look_up_estimates_cover_the_truth(truths):
     assert (excess <= 10).all()
 
 
+@pytest.mark.parametrize(
+    ("off", "told"),
+    [({16: 0.01, 4: 0.0, 2: 0.02}, 0.02), ({16: 0.0, 4: 0.16, 2: 0.0}, 0.04), ({16: 0.0, 4: 0.1, 2: 0.1}, 0.0)],
+)
+def test_the_error_of_pieces_is_what_halving_them_changes_or_how_that_scatters(off, told, monkeypatch):
+    """Of poses made up for 16, 4 and 2 pieces to a body length, where the request has 8."""
+    run = lambda self, alpha, rate: SimpleNamespace(net=np.array([[off[self.solver.pieces], 0.0, 0.0]]))
+    monkeypatch.setattr(Swimmer, "run", run)
+    scene, cycle = GLASS.changed(effects=(DepthProfile((1.0, 0.5)),)).with_numerics(pieces=8), Circle().cycle(8)
+    assert estimate.pieces_error(scene, cycle, cycle, np.zeros((1, 3)))[0] == pytest.approx([told, 0.0])
+
+
+class Known(Swimmer):
+    """With a table of its own, of a body of length 1."""
+
+    near_gait = ""
+
+    def table(self, name):
+        return connection.fit(self.velocity, connection.grid(2, 4)) if name == "connection" else None
+
+    def table_error(self, alpha, alphadot):
+        return np.zeros((*np.shape(alpha)[:-2], 2))
+
+
+def test_a_table_without_a_length_has_that_of_its_body():
+    body = Chain(length=0.3)
+    made, found = (
+        Study(Scene(kind(Viscous(2.0), body), Circle(), Numerics(grid=5))).fitted for kind in (Swimmer, Known)
+    )
+    assert len(found.axes[0]) == 4 and (found.length, found.unit) == (made.length, made.unit) == (0.3, "m")
+
+
 def test_a_tier_is_one_expression(monkeypatch):
     """The constant of the connection alone, looked up where the path tier looks: predicted, counted, and judged like any."""
 
@@ -291,6 +327,12 @@ def test_a_tier_is_one_expression(monkeypatch):
         Study(scenes.load("seven-link-wave").changed(body=Chain((1,) * 5), gait=Wave(joints=4))).plan("leading")
 
 
+def test_settings_go_from_coarse_to_fine_without_a_repetition():
+    for values in (setting.values for tier in TIERS.values() for setting in tier.settings):
+        steps = np.diff(values)
+        assert (steps > 0).all() or (steps < 0).all()
+
+
 MANY = np.linspace(0.3, 2.0, 201)
 
 
@@ -310,6 +352,22 @@ def test_the_cheapest_tier_meets_the_tolerance(tol, every, truths):
 def test_a_table_pays_for_many_amplitudes_and_not_for_few():
     few, many = (cheapest(GLASS, np.linspace(0.3, 2.0, n), 2e-3)["tier"] for n in (3, 400))
     assert (few, many) == ("direct", "adapted")
+
+
+@pytest.mark.parametrize(("error", "tier"), [([1.9e-3, 0.5], "adapted"), ([2.1e-3, 0.0], "direct")])
+def test_the_position_decides_and_not_the_heading(error, tier, monkeypatch):
+    monkeypatch.setattr("geomech.studies.choose.against_direct", lambda *_: np.tile(error, (400, 1)))
+    assert cheapest(GLASS, np.linspace(0.3, 2.0, 400), 2e-3)["tier"] == tier
+
+
+def test_errors_of_rules_are_those_of_each_amplitude():
+    """In a medium without closed integrals, where one rule is judged by another."""
+    sand, a = GLASS.changed(medium=MEDIA["measured"]), np.array([0.4, 0.9, 1.4])
+    (poses, error), (true, _) = (
+        estimate.direct(sand.with_numerics(loads=x), Circle(), a, 64) for x in ("gauss:4", "gauss:64")
+    )
+    off = estimate.pose_distance(poses, true, 1.0)
+    assert error.shape == (3, 2) and (off <= error + 1e-12).all() and error.max() < 5 * off.max()
 
 
 def test_what_the_solver_left_counts_in_the_estimate():

@@ -148,6 +148,7 @@ def test_wide_media_shift_the_mean_and_it_is_told(monkeypatch):
     row = next(x for x in wide.splitlines() if x.startswith("      1.2"))
     assert row.endswith(f"  mean {tables[1.0]['medium_shift_of']['net_distance'][0]:+.1e}")
     assert "\nmean: how far the mean over the media" in wide and "mean" not in narrow
+    assert tables[1.0].result["quantity"].values.tolist() == list(QUANTITIES)
     assert tables[1.0]["units"]["medium_shift_of"] == "that of the quantity"
 
 
@@ -193,6 +194,8 @@ def test_every_tier_has_it_beside_its_own_error():
         and "second order" in text[-4]
         and text[-3].startswith("mean: ")
     )
+    short = displacement.text(table.result, "sand", rows=2)
+    assert short.count("+- medium") > 1 and ", 1 of 2" not in short, "tables below each other keep both amplitudes"
 
 
 def test_effects_and_time_stepping_feel_it(monkeypatch):

@@ -210,6 +210,18 @@ def test_a_turning_plate_against_adaptive_quadrature():
     np.testing.assert_allclose([*found.force, found.moment], wanted, rtol=2e-6)
 
 
+@pytest.mark.parametrize("tension", ["keep", "cut"])
+@pytest.mark.parametrize("shape", [name for name, shape in OUTLINES.items() if not shape.outline(60).closed])
+def test_either_side_of_a_sheet_may_lead(shape, tension):
+    """Its points come in either order."""
+    sheet, stress = OUTLINES[shape].outline(60), dataclasses.replace(STRESSES["jumping"], tension=tension)
+    normals = None if sheet.smooth_normals is None else -sheet.smooth_normals[::-1, ::-1]
+    other = Outline(sheet.points[::-1], sheet.width, normals)
+    there, here = (loads(stress, outline, *random_motions(200, 3)) for outline in (other, sheet))
+    np.testing.assert_allclose(there.force, here.force, atol=1e-11 * np.abs(here.force).max())
+    assert (np.abs(here.force).max(-1) > 0).mean() > 0.5
+
+
 @pytest.mark.parametrize("shape", OUTLINES)
 def test_the_mirrored_scene_has_the_mirrored_force(shape):
     outline = OUTLINES[shape].outline(60)

@@ -355,6 +355,8 @@ def test_slow_robots_walk_as_their_clock_says():
     assert all(w.periodic and w.unsolved == 0 for w in found)
     np.testing.assert_allclose(ways[:2], ways[2], rtol=0.01)
     assert 0.1 < ways[2] < 2 * np.pi * 0.041
+    rest = from_rest(_strides([xplorer(1.0, 0.02)], Fineness(steps=16, elements=6)), np.array([1000.0]))
+    assert rest.status == ["periodic"] and 2 < rest.strides < 20  # further ones need no computing
 
 
 def test_a_walker_that_speeds_up_slowly_is_not_yet_periodic():
@@ -530,6 +532,13 @@ def test_films_of_a_walk_follow_the_robot_and_tell_their_speed(tmp_path):
     assert picture[:30, :120].any() and picture[:30, 280:].any() and not picture[40:].any()
 
 
+def test_settings_of_a_walk_go_from_coarse_to_fine():
+    """Each has a finer reference."""
+    for setting in walking.SETTINGS:
+        steps = np.diff([*setting.values, walking.FINEST[setting.name]])
+        assert min(setting.values) > 0 and ((steps > 0).all() or (steps < 0).all())
+
+
 def test_sweep_and_accuracy_of_a_walk(geomech, tmp_path, monkeypatch):
     (tmp_path / "small.toml").write_text(
         SMALL.replace("steps = 16", "steps = 10").replace("elements = 8", "elements = 6")
@@ -601,6 +610,8 @@ def test_other_refusals(geomech, tmp_path):
         Walker(ROBOT, Tripod(1.0), SAND, (Slope(0.1),))
     with pytest.raises(ValueError, match="a robot without legs"):
         dataclasses.replace(ROBOT, legs=None)
+    with pytest.raises(ValueError, match="hips must be a list of x in m"):
+        dataclasses.replace(ROBOT, hips=((-0.05, 0.06),))
     with pytest.raises(ValueError, match="engine must be one of"):
         engine(3)
 

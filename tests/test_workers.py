@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import Future
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +52,27 @@ def given_away(monkeypatch):
 
 def each(executor, task, common, items, total=100, seconds=1e9):
     return list(Runner(executor=executor).map(task, common, items, total, seconds))
+
+
+def test_an_executor_is_looked_at_while_nothing_comes():
+    """Which may find that its workers have gone."""
+
+    class Slow(executors.Processes):
+        patience = 0.01
+
+        def submit(self, task, *arguments):
+            return Future()
+
+        def look(self, future):
+            future.set_result(b"done")
+
+    assert jobs._Part(Slow(2), None, b"").result() == b"done"
+
+
+def test_what_is_left_to_do_decides_whether_processes_are_worth_their_start(monkeypatch):
+    asked = []
+    monkeypatch.setattr(jobs._Queue, "_is_worth_it", lambda self, remaining: asked.append(remaining))
+    assert each(executors.Processes(2), doubled, 2, range(4), total=4) == [0, 2, 4, 6] and asked == [4, 3, 2, 1]
 
 
 def test_results_come_in_order(two):

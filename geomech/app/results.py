@@ -93,7 +93,16 @@ class Optimum(optimisation.Optimum):
 
 
 class Forces:
-    """Forces along a body over a cycle: ``forces["forward"]`` are values, ``forces.result`` has units and labels, too."""
+    """Forces along a body over a cycle: ``forces["forward"]`` are values, ``forces.result`` has units and labels, too.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> forces = geomech.study("seven-link-wave", phases=32).forces()
+    >>> forces["forward"].shape  # by phase and element, in axial drags of the straight body
+    (32, 42)
+    >>> fig = forces.plot("forward")
+    """
 
     def __init__(self, result: Result):
         self.result = result

@@ -211,7 +211,15 @@ class Study(studies.Study):
         """Return force, power and bending moment along the body over a cycle of the gait, and when its muscles work.
 
         sizes: length, radius and depth of the body, m, or its axial stress, Pa, and the frequency, Hz, where the scene does
-        not have them; with these forces are in N and powers in W, else in axial drags of the straight body."""
+        not have them; with these forces are in N and powers in W, else in axial drags of the straight body.
+
+        Examples
+        --------
+        >>> import geomech
+        >>> forces = geomech.study("seven-link-wave", phases=32).forces()
+        >>> forces["forward"].shape
+        (32, 42)
+        """
         return Forces(forces.Forces(self.scene, Sizes(**sizes)).ask())
 
     def optimise(self, objective: str = "displacement", **options: Any) -> Optimum:

@@ -16,12 +16,17 @@ WIDTH = 80  # characters of a line on a small screen
 
 
 def part(kind: str, thing) -> str:
-    """Return the kind and the numbers of a part of a scene, as a scene has them; a covariance only where there is
-    one."""
+    """Return the kind and the numbers of a part of a scene, to six digits, as a scene has them; no key that is None."""
     names = [f.name for f in dataclasses.fields(thing)] if dataclasses.is_dataclass(thing) else []
-    given = [name for name in names if name != "covariance" or thing.covariance is not None]
-    values = [f"{name} = {formatted(getattr(thing, name))}" for name in given]
-    return f"{kind} ({', '.join(values)})" if values else kind
+    values = [(name, getattr(thing, name)) for name in names]
+    given = [f"{name} = {formatted(_six_digits(value))}" for name, value in values if value is not None]
+    return f"{kind} ({', '.join(given)})" if given else kind
+
+
+def _six_digits(value):
+    if isinstance(value, tuple | list):
+        return type(value)(map(_six_digits, value))
+    return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
 def grid(axes: Sequence[np.ndarray], names: Sequence[str] = ()) -> str:

@@ -19,13 +19,19 @@ from rft.refusal import Refusal
 @GAITS.register
 @dataclass(frozen=True, kw_only=True)
 class Shchf(Gait):
-    """The gait of a `shchf_` file of sysplotter's, in numbers.
+    """The gait of a shchf file of sysplotter's, in numbers.
 
-    XV (rad): a1, b1, a3, b3, a5, b5 ... as in its shchf_LowRe_... files, for the closed curve u = sum of a_k cos(k t),
+    XV (rad): a1, b1, a3, b3, a5, b5 ... as in its `shchf_LowRe_...` files, for the closed curve u = sum of a_k cos(k t),
     v = - sum of b_k sin(k t), alpha_1 = (u - v)/sqrt 2, alpha_2 = (u + v)/sqrt 2, which runs as it does there. file (-): a
     .mat file of points alpha1, alpha2, ... at t, of coefficients A1, B1, A2, B2, ..., or of the paths that sys_calcpath
     computed; in a scene from a file relative to that file's folder, else to the current one. sha256 (-): of the file,
     filled in if left out; given, the file must have it. Its centre is the mean that coefficients have, if left out.
+
+    Examples
+    --------
+    >>> from geomech.gaits import Shchf
+    >>> Shchf(XV=(1.4, 1.2)).shape(0.0).round(3)  # rad
+    array([0.99, 0.99])
     """
 
     kind = "shchf"

@@ -37,7 +37,13 @@ def forces_figure(result: Result, panels: Sequence[str] = (), *, clim: float | s
     and drag stacked by their parts against "phase" or "place".
 
     panels: which, by default the force forwards and both stacks. clim: limit of the colours of each map on either side of
-    zero, a number or a percentile of the values' size such as "98%"."""
+    zero, a number or a percentile of the values' size such as "98%".
+
+    Examples
+    --------
+    >>> import geomech
+    >>> fig = geomech.plots.forces_figure(geomech.study("seven-link-wave", phases=32).forces().result, ["power"])
+    """
     names = [choose("panel", name, (*MAPS, *STACKS)) for name in panels or DEFAULT]
     columns = min(COLUMNS, len(names))
     rows = -(-len(names) // columns)

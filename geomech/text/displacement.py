@@ -16,7 +16,7 @@ from geomech.studies import tables, uncertainty
 numbers = tables.table
 MORE = "--all prints every tier, the net distance and the seconds"
 FRAME = "x ahead, y to the left, as the body frame points at the start of the cycle"
-ROWS, COMPARED = 14, 4  # amplitudes in a table that fits a screen; with x by every tier
+ROWS, COMPARED, LEAST = 14, 4, 3  # amplitudes in a table that fits a screen; with x by every tier; below each other
 
 
 def text(result: Result, title: str = "", rows: int = ROWS) -> str:
@@ -36,7 +36,7 @@ def gait_lines(result: Result, title: str = "", rows: int = ROWS) -> list[str]:
     moving += ["speed"] if "speed" in result else []
     tables = lambda at: list(_side_by_side([_column(result, tier, name, at) for name in moving], result, at))
     if len(stacked := tables(shown)) > 1:
-        shown = shown_rows(len(result["amplitude"].values), rows // len(stacked))  # tables below each other
+        shown = shown_rows(len(result["amplitude"].values), max(LEAST, rows // len(stacked)))
         stacked = tables(shown)
     for columns in stacked:
         lines += ["".join(cells) for cells in zip(*columns)]
@@ -117,13 +117,14 @@ def _side_by_side(columns: list[list[str]], result: Result, shown: np.ndarray) -
 
 
 def _others(result: Result, tier: int, shown: np.ndarray) -> Iterator[str]:
-    """Yield x by the other tiers with its errors where amplitudes are few, else the largest error of each."""
+    """Yield x by the other tiers with its errors where amplitudes are few and all shown, else the largest error of each."""
     others = [(str(name), k) for k, name in enumerate(result["tier"].values) if k != tier]
     x, places = result["x"], _decimals(result)
     if not others:
         return
     wide = places + 12
-    if len(shown) > COMPARED or 9 + wide * len(others) > WIDTH or "x" in result.attributes["zero_by_symmetry"]:
+    few = len(shown) == len(result["amplitude"].values) <= COMPARED
+    if not few or 9 + wide * len(others) > WIDTH or "x" in result.attributes["zero_by_symmetry"]:
         errors = (f"{name} {x.error[k].max(initial=0.0):.1e}" for name, k in others)
         yield f"other tiers, largest error ({x.unit}): {', '.join(errors)}"
         return

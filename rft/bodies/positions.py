@@ -93,7 +93,22 @@ class Positions(Posed):
 
     positions: function of shapes alpha (..., joints), or of one shape, that returns poses (..., n, 3) of the links, tail to
     head: x, y of the centre in the unit of ``lengths`` and heading theta (rad), in any frame. lengths: of the n links.
-    length: of the body, in the unit wanted for displacement. frame: "mean" or "link-1", "link-2" ..."""
+    length: of the body, in the unit wanted for displacement. frame: "mean" or "link-1", "link-2" ...
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft import Viscous, body_velocity
+    >>> from rft.bodies import Positions
+    >>> def poses(alpha):  # of two links that meet at the origin
+    ...     heading = np.stack([-alpha[..., 0] / 2, alpha[..., 0] / 2], -1)
+    ...     return np.stack([[-0.25, 0.25] * np.cos(heading), [-0.25, 0.25] * np.sin(heading), heading], -1)
+    ...
+    >>> body = Positions(poses, joints=1, lengths=(0.5, 0.5))
+    >>> xi = body_velocity(Viscous(), body, [0.5], [1.0]).xi
+    >>> round(float(xi[1]), 4)  # to the left, per rad
+    -0.0038
+    """
 
     positions: Callable[[np.ndarray], np.ndarray]
     joints: int

@@ -13,7 +13,6 @@ import numpy as np
 from geomech.core.variables import Result
 from geomech.io.files import atomic_file
 from geomech.io.tables.sysplotter import DRAG, INERTIA, RESIDUAL
-from rft.refusal import Refusal
 
 SHOWN = 11  # points an axis, about, of the grid of metric ellipses
 BASES = {"mean": "com-mean", "link-1": "tail"}  # its names of our frames, of any number of links
@@ -24,8 +23,6 @@ def write_struct(path: str | Path, result: Result) -> None:
     """Write s, of the variables of `geomech.studies.fields.of_struct`; it appears whole or not at all."""
     from scipy.io import savemat
 
-    if np.isnan(result["A"].values).any():
-        raise Refusal(f"cannot write {path}", because="A has singular shapes", instead="write arrays, or a .nc file")
     axes = [v.values for v in result.variables if v.is_coordinate and v.name.startswith("alpha_")]
     pick = lambda name: result[name].values if name in result else None
     A, optimised, metric = pick("A"), pick("A_optimised"), pick("metric")
