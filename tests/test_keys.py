@@ -130,7 +130,7 @@ def test_keys_of_ones_own_classes_are_told(tmp_path, monkeypatch):
     try:
         code, out, _ = geomech("reference", "medium", "--plugin", str(path))
         assert code == 0
-        assert re.search(r'law = "power"\n  power +number +- +required +of the speed.*\n.*ratio +number +- +3.0', out)
+        assert re.search(r'law = "power"\nDrag .*\n  power +number +- +required +0 dry.*\n.*ratio +number +- +3.0', out)
         made = json.loads(geomech("reference", "--json-schema", "--plugin", str(path))[1])
         assert {"const": "power"} in [x["properties"].get("law") for x in made["$defs"]["gaits"]["medium"]["oneOf"]]
     finally:

@@ -67,7 +67,10 @@ SCENE = """[medium]\nlaw = "thick"\nthickness = 3.0\n[body]\nkind = "chain"\nlen
 
 def test_the_law_of_the_page_runs_as_it_stands_there(tmp_path, monkeypatch):
     section = PAGE.partition("## Laws, bodies")[2].partition("\n## ")[0]
-    (law,), scene = re.findall(r"```python\n(.*?)```", section, re.S), re.search(r"```toml\n(.*?)```", section, re.S)[1]
+    (law, *_), scene = (
+        re.findall(r"```python\n(.*?)```", section, re.S),
+        re.search(r"```toml\n(.*?)```", section, re.S)[1],
+    )
     assert len(law.splitlines()) == 15
     monkeypatch.chdir(tmp_path)
     (tmp_path / "power.py").write_text(law)

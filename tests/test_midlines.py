@@ -169,6 +169,7 @@ def test_every_format_gives_the_same_trial(exact, tmp_path):
         ("t,point,x_BL,y_BL", "t,s,curvature,y_BL", "centreline"),
         ("t,point,x_BL,y_BL\n0,1,", "t,point,x_BL,y_BL\n0,1,one", "line 2, column x_bl"),
         ("\n0,2,", "\n0,1,", "line 3: point 1 is given twice"),
+        ("t,point,x_BL,y_BL", "t,point,x_BL,x_BL", "the column 'x_bl' is there twice"),
     ],
 )
 def test_bad_files_are_refused_by_place(exact, tmp_path, old, new, names):
@@ -207,7 +208,7 @@ SLIPS = {
 @pytest.mark.parametrize("said", SLIPS)
 def test_slips_of_tracking_are_refused_by_place_and_mended_on_request(noisy, fitted, said):
     trial = changed(noisy.trial(), SLIPS[said])
-    with pytest.raises(Refusal, match=r"line \d+ .*" + said):
+    with pytest.raises(Refusal, match=r"line \d+ .*" + said + ".* mend"):
         fit.slips.checked(trial, False)
     mended = fit.slips.checked(trial, True)
     assert len(mended.notes) == 1 and "line" in mended.notes[0]
@@ -221,6 +222,7 @@ def test_slips_of_tracking_are_refused_by_place_and_mended_on_request(noisy, fit
         (lambda t: changed(t, lambda p: p.__setitem__(30, 1000 * p[30])), "times as long as in most frames: mm for m"),
         (lambda t: dataclasses.replace(t, points=t.points * 120, unit="m"), "the body is 1.. m long"),
         (lambda t: dataclasses.replace(t, length=0.1), "body is 0.1 long"),
+        (lambda t: changed(t, lambda p: p.__setitem__((slice(80), 4), np.nan)), "point 5 is missing in"),
         (lambda t: changed(t, lambda p: p.__setitem__((slice(None), [3, 20]), p[:, [20, 3]])), "turns back"),
         (lambda t: dataclasses.replace(t, t=t.t[::4], points=t.points[::4], lines=t.lines[::4]), "frames a cycle"),
         (lambda t: dataclasses.replace(t, t=t.t[:20], points=t.points[:20], lines=t.lines[:20]), "0.8"),
@@ -269,6 +271,20 @@ def test_mirrored_trials_differ_in_the_sign_of_turns_alone(noisy, fitted):
     assert (np.abs(theirs - sign * ours) < 0.3 * fitted.intervals.half_width[: len(QUANTITIES)]).all()
 
 
+def test_two_animals_in_a_file_are_refused_and_tracks_are_no_points(exact, tmp_path):
+    file, (head, *rows) = tmp_path / "trial.csv", wide(exact, t="frame_idx").splitlines()
+    file.write_text("\n".join(["track," + head, *("a," + row for row in rows)]))
+    assert reader.read(file, units="BL", fps=1.0).points.shape == exact.points.shape
+    file.write_text("\n".join(["track," + head, *(f"{'ab'[k % 2]}," + row for k, row in enumerate(rows))]))
+    with pytest.raises(Refusal, match="2 animals are in it: a, b"):
+        reader.read(file)
+    scorer, *rest = deeplabcut(exact).splitlines()
+    names = ["individuals", *["one"] * 24, *["two"] * 24]
+    file.write_text("\n".join([scorer, ",".join(names), *rest]))
+    with pytest.raises(Refusal, match="2 individuals are in it: one, two"):
+        reader.read(file)
+
+
 # Intervals.
 
 
@@ -304,6 +320,23 @@ def test_cycles_too_few_to_show_how_they_vary_are_noted():
     assert one[0].startswith("one full cycle") and two[0].startswith("two full cycles") and three == []
 
 
+@pytest.mark.parametrize("variance", [0.0, 3.0])
+def test_intervals_of_samples_whose_truth_is_zero(variance):
+    """Noise that ends one cycle too far begins the next too late: it is less in the mean than its scatter says."""
+    rng, shape, sigma = np.random.default_rng(0), (8, 400), 0.7
+    noise = lambda *lead: np.diff(sigma * rng.normal(size=(*lead, shape[0] + 1, shape[1])), axis=-2)
+    pseudo = np.sqrt(variance) * rng.normal(size=shape) + noise()
+    noisy, none = pseudo + noise(40), np.zeros(shape[1])
+    sample = intervals.Sample(pseudo.mean(0), pseudo, noisy.mean(1), noisy, none, np.zeros((40, shape[1])))
+    found = intervals.intervals(sample, 0.95)
+    assert 0.87 < (np.abs(found.value) <= found.half_width).mean() <= (0.975 if variance else 1.0)
+    assert np.median(found.noise) == pytest.approx(sigma * np.sqrt(2) / 8, rel=0.1)
+    if variance:
+        assert np.median(found.cycles) == pytest.approx(np.sqrt(variance / 8), rel=0.15)
+    else:
+        assert np.median(found.half_width) < 0.5  # of noise alone 0.24; 0.83 by the scatter of the cycles
+
+
 def test_intervals_cover_the_truth_in_a_few_trials():
     known = noiseless(synthetic.made(GLASS, 40, 30, seed=99, noise=0.0, **USUAL))
     hits = covered(GLASS, known, range(2), 4.4, 30, **USUAL)
@@ -334,6 +367,7 @@ def test_the_medium_of_the_trial_predicts_it_and_another_does_not(fitted):
     assert other.predicted[slip] > other.measured[slip]
     C, gamma0 = other.closing
     assert (C.name, gamma0.name) == ("C", "gamma0") and 1.5 < C.value < 2.0 and np.isnan(gamma0.value)
+    assert 0.01 < C.error < 0.3
     closed = predicted.compare(fitted, dataclasses.replace(other.medium, C=C.value))
     assert closed.predicted[speed] == pytest.approx(closed.measured[speed], rel=0.02)
 

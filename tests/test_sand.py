@@ -271,6 +271,17 @@ def test_forces_converge_with_the_length_of_elements():
     assert errors[2] < 4e-3 and errors[0] / errors[2] > 8.0, errors
 
 
+@pytest.mark.parametrize("geom", GEOMS)
+def test_elements_are_as_long_as_asked_for(geom):
+    """Edges of about that length, neither much longer nor, but for poles of round geoms, much shorter."""
+    model = model_of(f"<body><freejoint/><geom {geom}/></body>")
+    for element in (0.01, 0.005):
+        mesh = mesh_of_elements(model, 0, element)
+        corners = mesh.vertices[mesh.faces]
+        edges = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=-1)
+        assert edges.max() < 1.75 * element and 0.45 * element < np.median(edges)
+
+
 def test_forces_turn_and_mirror_with_the_motion():
     model = model_of(f'<body pos="0 0 0.01"><freejoint/><geom {GEOMS[0]}/><geom {GEOMS[1]} pos="0.03 0 0"/></body>')
     data, rng = mujoco.MjData(model), np.random.default_rng(2)

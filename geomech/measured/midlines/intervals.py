@@ -19,7 +19,7 @@ Values = Callable[[smooth.Curve], tuple[np.ndarray, np.ndarray]]
 
 RESAMPLED = 40  # times that noise is put on
 TRIED = np.geomspace(1e-3, 100, 60)  # variances of cycles over that of the pseudo-values
-REPEATING = 0.5  # prior probability that cycles repeat exactly, as a robot's; found by coverage
+REPEATING = 0.25  # prior probability that cycles repeat exactly, as a robot's; found by coverage
 FURTHEST = 12.0  # standard deviations of the largest variance: more than half a width
 
 
