@@ -6,6 +6,8 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from geomech import optimisation, plots, text
 from geomech.core.variables import Result
 from geomech.io.results import to_xarray, write_netcdf
@@ -132,7 +134,7 @@ class FittedMidlines:
     def __getitem__(self, name: str) -> tuple[float, float]:
         """Return a quantity such as "speed", and half the width of its interval."""
         variable = self.result[name]
-        return float(variable.values), float(variable.error)
+        return float(variable.values), float(np.asarray(variable.error))
 
     def __repr__(self) -> str:
         notes = [f"note: {line}" for line in self.result.attributes["notes"]]
