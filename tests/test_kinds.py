@@ -71,7 +71,7 @@ def test_the_law_of_the_page_runs_as_it_stands_there(tmp_path, monkeypatch):
         re.findall(r"```python\n(.*?)```", section, re.S),
         re.search(r"```toml\n(.*?)```", section, re.S)[1],
     )
-    assert len(law.splitlines()) == 15
+    assert len(law.splitlines()) < 20
     monkeypatch.chdir(tmp_path)
     (tmp_path / "power.py").write_text(law)
     (tmp_path / "power.toml").write_text(scene)
