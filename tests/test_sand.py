@@ -29,7 +29,7 @@ from rft.mujoco.geoms import mesh_of_elements  # noqa: E402
 from rft.mujoco.hills import hills_of, tangent_plane  # noqa: E402
 from rft.mujoco.media import law_of  # noqa: E402
 from rft.mujoco.sand import meshes  # noqa: E402
-from rft.mujoco.steps import asked_rounding  # noqa: E402
+from rft.mujoco.steps import needed_rounding  # noqa: E402
 
 SPATIAL = Spatial(3e5, surface_friction=0.6, grazing=math.radians(5))
 MAP = StressMap(zeta=0.3, grazing=math.radians(5))
@@ -644,7 +644,7 @@ def test_what_changes_after_attach_is_refused():
 def test_a_name_is_the_stress_map_of_the_catalogue():
     assert law_of("poppy-seeds-loose") == Extruded(VERTICAL["poppy-seeds-loose"].stress) and law_of(SPATIAL) == SPATIAL
     model = model_of(BALL)
-    assert asked_rounding(model, [0]) == pytest.approx(9.81e-3)
+    assert needed_rounding(model, [0]) == pytest.approx(9.81e-3)
     block = model_of('<body><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>')
     with pytest.raises(rft.Refusal, match=r"^the geom 'geom 0': the geom has 480000 elements, .*: make element longer"):
         rft.mujoco.attach(block, MAP, element=1e-3)

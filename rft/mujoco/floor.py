@@ -68,10 +68,10 @@ def apart(model: mujoco.MjModel, geoms: Sequence[int], planes: Sequence[int]) ->
     return Apart(known.old, _masks(known.old, pairs), pairs)
 
 
-def part(model: mujoco.MjModel, told: Apart) -> None:
+def part(model: mujoco.MjModel, separation: Apart) -> None:
     """Let geoms and planes touch each other no more."""
-    _apart[model] = told
-    _write(model, told.new)
+    _apart[model] = separation
+    _write(model, separation.new)
 
 
 def rejoin(model: mujoco.MjModel, geoms: Sequence[int], planes: Sequence[int]) -> None:

@@ -22,7 +22,7 @@ from rft.mujoco.floor import Apart, apart, floors, part, rejoin
 from rft.mujoco.geoms import chosen_geoms, geom_name, mesh_of_elements
 from rft.mujoco.hills import FLAT, Hills, hills_of
 from rft.mujoco.media import Media, law_of, sample
-from rft.mujoco.steps import asked_rounding, sinkage, step_note
+from rft.mujoco.steps import needed_rounding, sinkage, step_note
 from rft.plates import StressMap
 from rft.refusal import Refusal, formatted, located, require
 
@@ -42,15 +42,15 @@ class Sand:
     All that is read from data holds for data whose positions and velocities are up to date, as after ``mj_forward``.
     """
 
-    def __init__(self, model: mujoco.MjModel, bed: Bed, element: float, notes: Sequence[str], told: Apart | None):
+    def __init__(self, model: mujoco.MjModel, bed: Bed, element: float, notes: Sequence[str], separation: Apart | None):
         self._model, self._bed, self.element = weakref.ref(model), bed, element
         self.geoms = tuple(geom_name(model, g) for g in bed.geoms)
         self.rounding, self.elements = bed.ground.rounding, len(bed.blocks.owner)
         self._form, self._step = _form(model, bed.geoms), model.opt.timestep
         self._row = installed.install(model, bed)
-        self.notes, self.media, self._parted = tuple(notes), None, told.pairs[-1] if told else None
-        if told:
-            part(model, told)
+        self.notes, self.media, self._parted = tuple(notes), None, separation.pairs[-1] if separation else None
+        if separation:
+            part(model, separation)
 
     def __enter__(self) -> Sand:
         return self
@@ -184,7 +184,7 @@ def attach(
         Length of the edges of the triangles that geoms are cut into; by default a quarter of the mean radius of the geoms.
     rounding : float, m/s
         Speed below which the stress on an element falls off in proportion to its speed; by default what the time step asks
-        for, `rft.mujoco.steps.asked_rounding`.
+        for, `rft.mujoco.steps.needed_rounding`.
     effects : list of GroundEffect
         Effects on the ground, such as `rft.ground.GrainInertia`.
 
@@ -218,18 +218,18 @@ def attach(
     in_range("element", element, 1e-6, 1e3, unit="m")
     if rounding is not None:
         in_range("rounding", rounding, 1e-7, 10, unit="m/s")
-    asked = asked_rounding(model, chosen)
-    rounding = max(asked, 1e-6) if rounding is None else rounding
+    needed = needed_rounding(model, chosen)
+    rounding = max(needed, 1e-6) if rounding is None else rounding
     effects = (*effects, Slope(slope)) if slope else tuple(effects)
     ground = ground_of(effects, Ground(rounding=rounding, grazing_sine=law.grazing_sine))
     bed = Bed.under(model, chosen, meshes(model, chosen, element), law, ground, slope, level, hills)
     planes = [g for g in field or floors(model, bed.up, bed.level) if _touch(model, chosen, g)]
-    told = apart(model, chosen, planes) if planes else None
+    separation = apart(model, chosen, planes) if planes else None
     notes = [_contact_note(model, chosen, planes)] if planes else []
     notes += [line for line in (step_note(model, chosen, rounding), _python_note()) if line]
     for line in notes:  # before anything is changed: a filter may turn warnings into errors
         warnings.warn(line, Note, stacklevel=2)
-    return Sand(model, bed, element, notes, told)
+    return Sand(model, bed, element, notes, separation)
 
 
 def _field(model: mujoco.MjModel, name: str, slope: float) -> tuple[Hills, list[int]]:

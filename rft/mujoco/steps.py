@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from rft.mujoco.bed import Bed
 
 COARSE = 0.1  # assumed: a rounding above that share of sqrt(g L), L the size of the robot, changes how it moves
-ROOM = 1.01  # a rounding that is short of what is asked for by less than that is no fault
+ROOM = 1.01  # a rounding that is short of what is needed by less than that is no fault
 DEPTHS = 200  # at which bearing forces are computed
 
 
@@ -38,7 +38,7 @@ def loads_and_masses(model: mujoco.MjModel, geoms: Sequence[int]) -> tuple[np.nd
     return weight, model.body_invweight0[bodies, 0]
 
 
-def asked_rounding(model: mujoco.MjModel, geoms: Sequence[int]) -> float:
+def needed_rounding(model: mujoco.MjModel, geoms: Sequence[int]) -> float:
     """Return the rounding, m/s, that the model's time step asks for, so that no geom chatters at rest."""
     weight, inverse_mass = loads_and_masses(model, geoms)
     return float(model.opt.timestep * (weight * inverse_mass).max() / 2)
@@ -46,17 +46,17 @@ def asked_rounding(model: mujoco.MjModel, geoms: Sequence[int]) -> float:
 
 def step_note(model: mujoco.MjModel, geoms: Sequence[int], rounding: float) -> str:
     """Return a line about a time step that is too long for a rounding, m/s, or for the robot; "" for none."""
-    asked, step = asked_rounding(model, geoms), model.opt.timestep
+    needed, step = needed_rounding(model, geoms), model.opt.timestep
     coarse = COARSE * float(np.sqrt(np.linalg.norm(model.opt.gravity) * 2 * model.stat.extent))
-    told = f"a time step of {1e3 * step:.3g} ms"
-    if rounding * ROOM < asked:
+    described = f"a time step of {1e3 * step:.3g} ms"
+    if rounding * ROOM < needed:
         return (
-            f"{told} asks for a rounding of {asked:.2g} m/s, the sand has {rounding:.2g}: light geoms may chatter at up to"
-            f" {asked:.2g} m/s; steps of {1e3 * step * rounding / asked:.2g} ms would not"
+            f"{described} asks for a rounding of {needed:.2g} m/s, the sand has {rounding:.2g}: light geoms may chatter at"
+            f" up to {needed:.2g} m/s; steps of {1e3 * step * rounding / needed:.2g} ms would not"
         )
     if rounding > coarse > 0:
         return (
-            f"the rounding of {rounding:.2g} m/s, for {told}, lets geoms creep at a speed that matters: with steps of"
+            f"the rounding of {rounding:.2g} m/s, for {described}, lets geoms creep at a speed that matters: with steps of"
             f" {1e3 * step * coarse / rounding:.2g} ms, or more armature, it would be {coarse:.2g}"
         )
     return ""
