@@ -71,11 +71,11 @@ def fit_gait(
     from geomech.measured.ask import question
     from geomech.output import parts
 
-    asked = question(
+    request = question(
         file, scene, columns=column_names(columns), degrees=degrees, level=level, harmonics=harmonics, limits=limits,
         body_length=body_length, medium=medium, units=units, scale=scale, fps=fps, y=y, head=head, least_score=least_score,
         mend=mend,
     )  # fmt: skip
     field = Output(out, parts.write_measured, formats.netcdf)
     figure = Output(plot, drawing("pictures.measured"), drawing("pictures.check"))
-    execute(asked, field, Output(scene, *parts.mean_gait(out)), figure, as_json=as_json)
+    execute(request, field, Output(scene, *parts.mean_gait(out)), figure, as_json=as_json)

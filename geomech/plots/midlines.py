@@ -26,7 +26,7 @@ def midlines_figure(result: Result) -> Figure:
     there is a prediction, speed, heading and slip of each cycle, measured and predicted, with their means and intervals."""
     comparison = result.subject[1]
     fig, axes = figure(9.6, 3.2 if comparison is None else 6.0, 3, 1 if comparison is None else 2)
-    _way(result, axes[0, 0])
+    _track(result, axes[0, 0])
     _along(result, "slip", "rad", axes[0, 1])
     _along(result, "amplitude", "BL", axes[0, 2])
     if comparison is not None:
@@ -36,7 +36,7 @@ def midlines_figure(result: Result) -> Figure:
     return fig
 
 
-def _way(result: Result, ax) -> None:
+def _track(result: Result, ax) -> None:
     fit, unit = result.subject[0], result.subject[0].trial.unit
     cycles, length = fit.cycles(fit.curve), fit.value("length")[0]
     size = 1.0 if unit == "m" else length
@@ -48,15 +48,15 @@ def _way(result: Result, ax) -> None:
         ax.plot(body.real, body.imag, color="0.55", lw=0.8, label="midlines of a cycle" if k == 0 else None)
     ax.plot(place[:, -1].real, place[:, -1].imag, "o", color="black", ms=2.5, label="head")
     if (comparison := result.subject[1]) is not None:
-        way = _predicted_way(cycles, comparison, length, size)
-        ax.plot(way.real, way.imag, "--", color=PREDICTED, lw=1.2, label="predicted")
+        track = _predicted_track(cycles, comparison, length, size)
+        ax.plot(track.real, track.imag, "--", color=PREDICTED, lw=1.2, label="predicted")
     ax.set(xlabel=f"x ({unit or 'BL'})", ylabel=f"y ({unit or 'BL'})")
     ax.set_aspect("equal", adjustable="datalim")
     ax.set_title(f"{len(fit.used)} cycles", loc="left")
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.28), ncols=2)
 
 
-def _predicted_way(cycles: Cycles, comparison: Comparison, length: float, size: float) -> np.ndarray:
+def _predicted_track(cycles: Cycles, comparison: Comparison, length: float, size: float) -> np.ndarray:
     """Return where the body is after each cycle as predicted (C + 1,), x + i y, from where it was at the start. size: unit of
     the axes in that of the trial."""
     stride, heading, turn = (comparison.predicted[COMPARED.index(name)] for name in ("stride", "heading", "turn"))

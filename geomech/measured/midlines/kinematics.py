@@ -137,8 +137,8 @@ class Averages(NamedTuple):
 
 def averages(c: Cycles) -> Averages:
     """Return what is averaged, of each cycle."""
-    start, way, headings = c.starts[:, 0] + 1j * c.starts[:, 1], c.ends - c.starts, c.headings
-    step, turn = way[:, 0] + 1j * way[:, 1], way[:, 2]
+    start, moved, headings = c.starts[:, 0] + 1j * c.starts[:, 1], c.ends - c.starts, c.headings
+    step, turn = moved[:, 0] + 1j * moved[:, 1], moved[:, 2]
     axis = headings.mean((1, 2))
     course = axis[:, None] + turn[:, None] * _share()
     relative = headings - course[..., None]

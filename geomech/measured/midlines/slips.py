@@ -24,7 +24,7 @@ def checked(trial: Trial, mend: bool) -> Trial:
     trial = _without_poor_frames(trial)
     _check_scale(trial)
     _check_order(trial)
-    return _without_jumps(_turned(trial, mend), mend)
+    return _without_jumps(_rotated(trial, mend), mend)
 
 
 def usual_chords(points: np.ndarray) -> np.ndarray:
@@ -52,16 +52,16 @@ def _without_poor_frames(trial: Trial) -> Trial:
     poor = known < KNOWN
     if not poor.any():
         return trial
-    kept = ~poor
-    if kept.sum() < 12:
+    enough = ~poor
+    if enough.sum() < 12:
         raise trial.wrong(
-            f"{kept.sum()} frames have most of their points",
+            f"{enough.sum()} frames have most of their points",
             instead="track more points, or lower ``least_score``",
         )
     k = int(np.flatnonzero(poor)[0])
     return trial.with_notes(
         f"{poor.sum()} frames with fewer than {KNOWN:.0%} of the points are left out, the first at line {trial.lines[k, 0]}",
-        t=trial.t[kept], points=trial.points[kept], lines=trial.lines[kept],
+        t=trial.t[enough], points=trial.points[enough], lines=trial.lines[enough],
     )  # fmt: skip
 
 
@@ -97,7 +97,7 @@ def _check_order(trial: Trial) -> None:
         )
 
 
-def _turned(trial: Trial, mend: bool) -> Trial:
+def _rotated(trial: Trial, mend: bool) -> Trial:
     """Return the trial with frames turned round that run from the other end, or refuse the first."""
     x = trial.points
     distance = np.nanmean(np.hypot(*np.moveaxis(x[1:] - x[:-1], -1, 0)), 1)
