@@ -85,11 +85,11 @@ def test_harmonics_that_are_next_to_nothing_are_left_out(monkeypatch):
 
 def test_a_gait_that_is_no_series_is_one_for_the_page():
     gait = Points(points=((1.0, 0.2), (0.3, 0.9), (-0.8, 0.1), (-0.2, -0.7)))
-    cos, sin = charts.series_of(gait)
+    mean, cos, sin = charts.series_of(gait)
     t = np.linspace(0, 2 * np.pi, 50)
     kt = np.outer(t, np.arange(1, cos.shape[1] + 1))
-    constant = gait.unit(2 * np.pi * np.arange(64) / 64).mean(0)
-    np.testing.assert_allclose(constant + np.cos(kt) @ cos.T + np.sin(kt) @ sin.T, gait.unit(t), atol=2e-4)
+    assert np.abs(mean).min() > 0.01
+    np.testing.assert_allclose(mean + np.cos(kt) @ cos.T + np.sin(kt) @ sin.T, gait.unit(t), atol=2e-4)
 
 
 def test_a_loop_that_leaves_the_chart(glass):
@@ -365,6 +365,22 @@ def test_files_and_back(opened, page):
     assert state(opened) == before
 
 
+@pytest.mark.parametrize("loop", ["ellipse", "figure-eight", "circle"])
+def test_loops_of_the_page_are_saved_as_they_are(opened, loop):
+    (opened.folder / "loop.toml").unlink(missing_ok=True)
+    click(opened, f"[data-loop='{loop}']")
+    before = state(opened)
+    assert f"loop={loop}" in before
+    click(opened, "#save-toml")
+    until(lambda: (opened.folder / "loop.toml").exists() and (opened.folder / "loop.toml").stat().st_size)
+    saved = scenes.load(opened.folder / "loop.toml")
+    assert saved.frequency is None  # the page chooses one to play it at
+    click(opened, "[data-loop='butterfly']")
+    opened.find_element("id", "open").send_keys(str(opened.folder / "loop.toml"))
+    until(lambda: said(opened).startswith("Read the loop"))
+    assert state(opened) == before
+
+
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
@@ -390,11 +406,13 @@ def test_files_that_are_none(opened, text, reason):
 def test_gaits_of_files_in_all_their_forms(opened):
     """As TOML writes them: comments, lists over lines, signs, exponents."""
     points = "[\n  [+1.0, 5e-1],\n  [-1.0, 0.5],\n  [0.0, -1.0],\n]"
-    text = f"[medium]\nzeta = 1\n[gait]\nkind = 'points' # three\npoints = {points}\namplitude = 1.2\n[numerics]\n"
+    text = f"[medium]\nzeta = 1\n[gait]\nkind = 'points' # three\npoints = {points}\n"
+    text += "amplitude = 1.2\nfrequency = 2\n[numerics]\n"
     (opened.folder / "good.toml").write_text(text)
     opened.find_element("id", "open").send_keys(str(opened.folder / "good.toml"))
     until(lambda: said(opened).startswith("Read"))
     gait = tomllib.loads(text)["gait"]
+    assert opened.execute_script("return lab.player.frequency") == 2
     assert f"points={';'.join(','.join(f'{x:g}' for x in p) for p in gait['points'])}&amplitude=1.2" in state(opened)
 
 
@@ -414,6 +432,12 @@ def test_addresses_that_say_nothing(opened, page, address):
     opened.get(f"{page[0].as_uri()}#{address}")
     assert state(opened).startswith("scene=three-link-glass&loop=circle")
     assert said(opened).startswith("The address is not used") or address.startswith("%")
+
+
+def test_a_refusal_leaves_no_folder_behind(monkeypatch, tmp_path):
+    (tmp_path / "page").mkdir()
+    monkeypatch.setattr("tempfile.mkdtemp", lambda prefix: str(tmp_path / "page"))
+    assert geomech("lab", "no-slip-snake")[0] == 2 and not (tmp_path / "page").exists()
 
 
 def test_a_loop_that_leaves_the_map(opened, page):

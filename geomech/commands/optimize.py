@@ -78,7 +78,7 @@ def optimize(
         starts,
         rate,
         power,
-        plot is not None,
-        stretch,
+        drawn=plot is not None,
+        stretch=stretch,
     )
     execute(question, file, figure, as_json=as_json, yes=yes)

@@ -259,14 +259,14 @@ def loops(axes: tuple[np.ndarray, ...], count: int = TRIED, seed: int = 1) -> li
     return found
 
 
-def series_of(gait: Gait) -> tuple[np.ndarray, np.ndarray]:
-    """Return the unit curve of a gait as a Fourier series, coefficients (cos, sin) of (2, K) each; of one that is no series the
-    first terms of its own."""
+def series_of(gait: Gait) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the unit curve of a gait as a Fourier series: its mean (2,), and coefficients (cos, sin), (2, K) each; of one that
+    is no series the first terms of its own."""
     if hasattr(gait, "coefficients"):
-        return gait.coefficients()
+        return np.zeros(2), *gait.coefficients()
     unit = gait.unit(2 * np.pi * np.arange(SAMPLES) / SAMPLES)
     terms = np.fft.rfft(unit, axis=0)[1 : SAMPLES // 4] * 2 / SAMPLES
-    return terms.real.T, -terms.imag.T
+    return unit.mean(0), terms.real.T, -terms.imag.T
 
 
 def _grid_error(series: Harmonics) -> tuple[float, float]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import shutil
 import tempfile
 import webbrowser
 from collections.abc import Iterator
@@ -49,7 +50,11 @@ def opened(path: Path | None) -> Iterator[Path]:
         yield path
         return
     page = Path(tempfile.mkdtemp(prefix="geomech-")) / "lab.html"
-    yield page
+    try:
+        yield page
+    except BaseException:
+        shutil.rmtree(page.parent)
+        raise
     webbrowser.open(page.as_uri())
 
 
@@ -145,7 +150,8 @@ def _gait(gait: Gait) -> dict[str, Any]:
     }  # fmt: skip
     if isinstance(gait, Points):
         return {**shared, "points": [list(p) for p in gait.points]}
-    cos, sin = series_of(gait)
+    mean, cos, sin = series_of(gait)
+    shared["centre"] = (gait.middle + gait.amplitude * mean).tolist()
     return {**shared, "cos": cos.tolist(), "sin": sin.tolist()}
 
 

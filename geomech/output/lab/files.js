@@ -15,7 +15,7 @@ function described() {
 function asToml() {
   const chart = chartOf(), [kind, own] = described();
   const keys = { kind: `"${kind}"`, ...own, amplitude: literal(state.amplitude), centre: row(state.centre), reverse: String(state.reverse) };
-  if (player.frequency) keys.frequency = literal(player.frequency);
+  if (player.stated) keys.frequency = literal(player.frequency);
   const lines = Object.entries(keys).map(([name, value]) => `${name} = ${value}`);
   return `${chart.family ? withValue(chart.toml, chart.family.key, state.value) : chart.toml}\n[gait]\n${lines.join("\n")}\n`;
 }
@@ -58,7 +58,7 @@ function asCsv() {
   return lines.join("\n") + "\n";
 }
 
-/** Return the state with the loop of a file: its [gait], or that of an address in a picture. An Error says what is wrong. */
+/** Return the state with the loop of a file, and the frequency that it gives or null. An Error says what is wrong. */
 function opened(text) {
   if (text.length > 1e6) throw new Error("the file is too long for a scene");
   const keys = gaitOf(text), s = JSON.parse(JSON.stringify(state));
@@ -75,15 +75,22 @@ function opened(text) {
   s.reverse = keys.reverse === true;
   [s.loop, s.points] = [keys.kind, []];
   if (keys.kind === "points") s.points = checkPoints((keys.points ?? []).map((p) => p.map((x) => number(x))));
-  if (keys.kind === "ellipse") [s.loop, s.points] = ["points", around(ellipse(keys))];
-  if (keys.kind === "fourier") [s.loop, s.points] = ["points", around(checkedSeries(keys))];
-  return s;
+  if (keys.kind === "ellipse" || keys.kind === "fourier") {
+    const series = keys.kind === "ellipse" ? ellipse(keys) : checkedSeries(keys);
+    [s.loop, s.points] = nameOf(series) ? [nameOf(series), []] : ["points", around(series)];
+  }
+  return [s, keys.frequency === undefined ? null : number(keys.frequency, 1e4)];
+}
+
+/** Return the name of the loop of this page that a series is, if it is one. */
+function nameOf(series) {
+  const { cos, sin } = chartOf().gait, same = JSON.stringify({ cos, sin }) === JSON.stringify(series);
+  return presetOf(series) || (same ? "own" : null);
 }
 
 /** Return points of a series, close enough for the spline through them to be that curve to 1e-4 of its size. */
 function around(series) {
-  const name = presetOf(series), count = Math.min(MOST_POINTS, Math.max(24, 10 * series.cos[0].length)), at = curve(series);
-  if (name) return Array.from({ length: MOST_POINTS }, (_, i) => at(TAU * i / MOST_POINTS).slice(0, 2));
+  const count = Math.min(MOST_POINTS, Math.max(24, 10 * series.cos[0].length)), at = curve(series);
   return Array.from({ length: count }, (_, i) => at(TAU * i / count).slice(0, 2));
 }
 

@@ -214,7 +214,7 @@ function climb() {
 
 function controls() {
   PAGE.scenes.forEach((scene, k) => $("scene").append(new Option(scene.name, k)));
-  $("scene").addEventListener("change", () => change("", () => { state = initial(Number($("scene").value)); }, redraw));
+  $("scene").addEventListener("change", () => change("", () => { state = initial(Number($("scene").value)); play(chartOf().gait.frequency); }, redraw));
   DIRECTIONS.forEach((direction, k) => {
     const button = Object.assign(document.createElement("button"), { type: "button", textContent: direction });
     button.addEventListener("click", () => change("", () => { state.component = k; }, () => { drawMap(); update(); }));
@@ -227,7 +227,7 @@ function controls() {
   $("amplitude").addEventListener("input", () => change("amplitude", () => { state.amplitude = Number($("amplitude").value); }));
   [0, 1].forEach((d) => $(`centre-${d + 1}`).addEventListener("input", (event) => change(`centre-${d + 1}`, () => { state.centre[d] = Number(event.target.value); })));
   $("reverse").addEventListener("change", () => change("", () => { state.reverse = $("reverse").checked; }, () => { restart(); update(); }));
-  $("frequency").addEventListener("input", () => { player.frequency = Number($("frequency").value); showControls(); });
+  $("frequency").addEventListener("input", () => { play(Number($("frequency").value)); showControls(); });
   $("value").addEventListener("input", () => change("value", () => { state.value = Number($("value").value); }, () => { chartOf().choose(state.value); drawMap(); update(); }));
   $("undo").addEventListener("click", () => { stopClimb(); step(past, future); redraw(); });
   $("redo").addEventListener("click", () => { stopClimb(); step(future, past); redraw(); });
@@ -273,7 +273,8 @@ function saving() {
 
 async function read(file) {
   try {
-    const next = opened(await file.text());
+    const [next, frequency] = opened(await file.text());
+    if (frequency) play(frequency);
     change("", () => { state = next; }, redraw);
     say(`Read the loop of ${file.name}.`);
   } catch (error) {
@@ -329,10 +330,11 @@ function frame(now) {
 }
 
 player.playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
-player.frequency = chartOf().gait.frequency || player.frequency;
 controls();
 if (location.hash.length > 1) take(location.hash.slice(1));
 if (!shown.loop) redraw();
+play(chartOf().gait.frequency);
+showControls();
 requestAnimationFrame(frame);
 window.lab = {  // for tests, and for whoever opens the console
   state: () => addressOf(state), update, player,
