@@ -23,7 +23,9 @@ def geomech(*args, cwd="."):
     streams = [io.TextIOWrapper(io.BytesIO(), encoding="utf-8") for _ in range(2)]
     handlers = {s: signal.getsignal(s) for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     for number in (s for s, handler in handlers.items() if handler is signal.SIG_IGN):
-        signal.signal(number, signal.SIG_DFL)  # the tests may run in the background, where a command heeds what is ignored
+        signal.signal(
+            number, signal.SIG_DFL
+        )  # the tests may run in the background, where a command heeds what is ignored
     try:
         with (
             mock.patch.object(sys, "argv", ["geomech", *map(str, args)]),
