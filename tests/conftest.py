@@ -114,10 +114,13 @@ def no_lines_of_progress(monkeypatch):
 
 @pytest.fixture(autouse=True)
 def no_layout(request, monkeypatch):
-    """Axes stay where they are, which saves half the time of a picture; the files of LAID_OUT have all kinds as they are."""
+    """Axes stay where they are, and dots are few, which saves half the time of a picture; the files of LAID_OUT have all
+    kinds as they are."""
     engines = sys.modules.get("matplotlib.layout_engine")
     if engines and request.module.__name__ not in LAID_OUT:
         monkeypatch.setattr(engines.ConstrainedLayoutEngine, "execute", lambda *_: None)
+    if (style := sys.modules.get("geomech.plots.style")) and request.module.__name__ not in LAID_OUT:
+        monkeypatch.setitem(style.STYLE, "savefig.dpi", 60)
 
 
 @pytest.fixture(scope="session")

@@ -92,8 +92,8 @@ def outcome(text):
 @pytest.mark.parametrize("seed", range(4))
 def test_mutated_scenes_are_run_or_refused(seed):
     rng, names = np.random.default_rng(seed), scenes.builtin_names()
-    texts = [mutated(with_effects(text_of(names[rng.integers(len(names))]), rng), rng) for _ in range(800)]
+    texts = [mutated(with_effects(text_of(names[rng.integers(len(names))]), rng), rng) for _ in range(500)]
     seen = [outcome(text) for text in texts]
-    assert seen.count("run") + seen.count("marched") > 50
-    assert seen.count("marched") > 10
-    assert seen.count("refused") > 400
+    assert seen.count("run") + seen.count("marched") > 30
+    assert seen.count("marched") > 6
+    assert seen.count("refused") > 250

@@ -283,7 +283,7 @@ def test_a_march_resumes_where_it_was(effects, tmp_path, monkeypatch):
     with steps() as every:
         whole = ask()
     monkeypatch.setattr(jobs, "CHECKPOINT", -1.0)
-    for after in (20, len(every) - 3):
+    for after in (len(every) - 3,):
         said = stopped(tmp_path / str(after), after, ask)
         assert (
             said == f"{after} results so far are kept in {tmp_path / str(after)}: the same command goes on from there"

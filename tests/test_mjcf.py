@@ -19,6 +19,7 @@ from rft.refusal import Refusal
 from rft.walking import Fineness, Mjcf, Tripod, Walker, engine
 
 mujoco = pytest.importorskip("mujoco", reason="needs the extra: pip install 'geomech[mujoco]'")
+pytestmark = pytest.mark.usefixtures("fastest")
 from rft.walking import geoms  # noqa: E402
 from rft.walking.facets import Facets  # noqa: E402
 from rft.walking.machine import Clock, machine  # noqa: E402

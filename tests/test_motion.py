@@ -15,6 +15,7 @@ from geomech.commands import formats
 from geomech.gaits import Circle, Ellipse, Fourier, Sine
 from geomech.geometry import reconstruct
 from geomech.output import animate, trajectories
+from geomech.plots.style import STYLE
 from geomech.scenes import Numerics, Scene
 from geomech.studies import motion as moving
 from geomech.studies.study import Study
@@ -359,7 +360,7 @@ def test_a_strip_numbers_bodies_and_shapes_alike(chain, tmp_path):
         np.testing.assert_allclose(xy, found.alpha[rows[k]], atol=1e-8)
     animate.save(tmp_path / "out.png", found, *chain[1:])
     with Image.open(tmp_path / "out.png") as picture:
-        assert picture.size[0] == 1440
+        assert picture.size[0] == round(7.2 * STYLE["savefig.dpi"])
 
 
 WAVE = Fourier(sin=((0.8,), (0.1,), (0.0,)), cos=((0.0,), (0.5,), (0.8,)))

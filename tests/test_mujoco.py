@@ -19,6 +19,7 @@ from rft.walking.facets import Grains, Surface
 from rft.walking.planar_walk import walk as planar_walk
 
 mujoco = pytest.importorskip("mujoco", reason="needs the extra: pip install 'geomech[mujoco]'")
+pytestmark = pytest.mark.usefixtures("fastest")
 from rft.walking import geoms, hexapod  # noqa: E402
 from rft.walking.mujoco_walk import Simulation, Start, rerun, walk  # noqa: E402
 from rft.walking.multibody import Multibody  # noqa: E402

@@ -194,8 +194,8 @@ def sand(request):
     return optimise(geomech.load("three-link-glass"), objective, limits=limits, starts=STARTS[request.param][0])
 
 
-# By default 9; 7 lead to the same gait. The second are those that narrower limits led to.
-STARTS = {("displacement", 3.0): (7, 3), ("displacement", 2.5): (9, 4), ("efficiency", 2.5): (9, 4)}
+# By default 9; 2 lead to the same gait. The second are those that narrower limits led to.
+STARTS = {("displacement", 3.0): (2, 2), ("displacement", 2.5): (9, 4), ("efficiency", 2.5): (9, 4)}
 LEAST = {("displacement", 2.5): 0.4415, ("displacement", 3.0): 0.6938, ("efficiency", 2.5): 0.2245}
 
 
@@ -211,7 +211,7 @@ def test_best_gaits_in_sand(sand):
     assert sum(times for _, times in sand.answers + sand.others) == starts + more
     told = optima.text(result_of(sand))
     assert f"{starts} starts, and {more} that narrower limits led to, answers that differ: " in told
-    assert "by a table alone, less: " in told
+    assert ("by a table alone, less: " in told) == bool(sand.others)
     assert optima.numbers(result_of(sand))["answers"] == [list(x) for x in sand.answers + sand.others]
 
 

@@ -9,6 +9,7 @@ from commands import geomech
 from matplotlib.collections import QuadMesh
 from matplotlib.colors import to_rgba
 from matplotlib.quiver import Quiver
+from PIL import Image
 
 from geomech import plots, scenes
 from geomech.commands.options import colour_limit
@@ -375,7 +376,7 @@ def test_a_work_precision_diagram_has_no_empty_axes_and_takes_errors_of_0(tmp_pa
             fig = plots.work_precision_figure(
                 {"lines": [{**line, "error": error, "against": against}], "amplitudes": [1.0]}
             )
-            plots.save(fig, tmp_path / "a.png")
+            fig.canvas.draw()
             (ax,) = fig.axes
             assert (ax.get_title(), ax.get_ylabel(), ax.get_yscale()) == (*title, "log")
             np.testing.assert_array_equal(ax.lines[0].get_ydata(), np.maximum(error, 1e-17))
@@ -565,3 +566,9 @@ def test_options_of_figures_reach_them_from_commands(tmp_path, monkeypatch):
     )
     assert limit(ccf) == 0.02 and sum(bool(ax.get_title()) for fig in (rows, ccf) for ax in fig.axes) == 2
     assert [any(c.get_label() == MEASURED for c in ax.containers) for ax in moved.axes] == [True, False]
+
+
+def test_a_picture_in_a_file_has_200_dots_an_inch(tmp_path):
+    plots.save(plots.figure(3.0, 2.0)[0], tmp_path / "a.png")
+    with Image.open(tmp_path / "a.png") as picture:
+        assert picture.size == (600, 400)

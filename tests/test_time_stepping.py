@@ -192,7 +192,7 @@ def test_work_is_done_by_the_joints_in_time_stepping_too():
     assert found.work.bending_moment.shape == (32, 2)
 
 
-@pytest.mark.parametrize(("medium", "phases"), [(GLASS, 128), (Viscous(2.0), 64)])
+@pytest.mark.parametrize(("medium", "phases"), [(GLASS, 64), (Viscous(2.0), 64)])
 def test_work_moves_the_mass(medium, phases):
     """With mass the joints put in what the ground takes in the mean over a cycle, and it does not matter from which end
     the links are counted: the moments include what moves them."""

@@ -229,7 +229,7 @@ def test_serpenoid_has_a_connection_and_a_ccf():
 
 @pytest.fixture(scope="module")
 def numbers():
-    return fig09c_efficiency.compute(np.linspace(0.05, 0.5, 19), finer=1)
+    return fig09c_efficiency.compute(np.linspace(0.05, 0.5, 16), finer=1)
 
 
 def test_fig09c(numbers, tmp_path):

@@ -535,11 +535,10 @@ def test_films_of_a_walk_follow_the_robot_and_tell_their_speed(tmp_path):
     assert (np.ptp(limits[False], axis=0) == 0).all()
     assert (limits[False][0, 0] < x[rows].min()) and (x[rows].max() < limits[False][0, 1])
     np.testing.assert_allclose(limits[True].mean(1), x[rows])
-    for follow in (False, True):
-        walks.film(walking.of_walk(scene, found), tmp_path / "film.gif", follow=follow)
-        with Image.open(tmp_path / "film.gif") as film:
-            shown = sum(frame.info["duration"] for frame in ImageSequence.Iterator(film)) / 1000
-        assert shown == pytest.approx(2 * found.walk.t[-1], abs=0.1)
+    walks.film(walking.of_walk(scene, found), tmp_path / "film.gif", follow=True)
+    with Image.open(tmp_path / "film.gif") as film:
+        shown = sum(frame.info["duration"] for frame in ImageSequence.Iterator(film)) / 1000
+    assert shown == pytest.approx(2 * found.walk.t[-1], abs=0.1)
     (picture,) = walks._captioned(iter([np.zeros((90, 400, 3), np.uint8)]), np.array([1.0]), "0.5 × real time")
     assert picture[:30, :120].any() and picture[:30, 280:].any() and not picture[40:].any()
 

@@ -9,6 +9,7 @@ from geomech.gaits.frames import Frames
 
 LARGEST_BEND = np.pi / 2  # rad, between neighbouring elements, and between neighbouring chords from point to point
 LENGTH_SPREAD = 0.2  # of a frame's length about the mean of all; beyond it the tracking has lost a part of the body
+NODES, WEIGHTS = legendre.leggauss(5)
 PASSES = 3  # of making a spline's parameter its own arc length; 1e-7 rad is left at 30 points along a sandfish
 
 
@@ -74,13 +75,12 @@ def _arc(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     its headings at these, rad, and its length. Of order 4 in the spacing, but of order 3 at the ends."""
     from scipy.interpolate import CubicSpline
 
-    node, weight = legendre.leggauss(5)
     step = np.abs(np.diff(points))
     for _ in range(PASSES):
         u = np.concatenate([[0.0], np.cumsum(step)])
         curve = CubicSpline(u, points)
-        speed = np.abs(curve(u[:-1, None] + step[:, None] * (node + 1) / 2, 1))
-        step = step * (speed @ weight) / 2
+        speed = np.abs(curve(u[:-1, None] + step[:, None] * (NODES + 1) / 2, 1))
+        step = step * (speed @ WEIGHTS) / 2
     return u / u[-1], np.unwrap(np.angle(curve(u, 1))), u[-1]
 
 

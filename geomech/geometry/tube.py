@@ -29,11 +29,13 @@ SHAPES_TOGETHER = 4096  # whose distances from all places are held at a time
 
 def waves(t, harmonics: int, order: int = 0) -> np.ndarray:
     """Return (..., 2 harmonics + 1): 1, cos t, sin t, cos 2t, sin 2t ... or their derivatives of that order."""
-    k = np.arange(1, harmonics + 1)
-    angle = np.asarray(t, float)[..., None] * k + order * np.pi / 2  # each derivative is a quarter turn on
-    both = np.stack([np.cos(angle), np.sin(angle)], -1) * (k.astype(float) ** order)[:, None]
-    one = np.full((*np.shape(t), 1), float(order == 0))
-    return np.concatenate([one, both.reshape(*np.shape(t), 2 * harmonics)], -1)
+    turn = np.exp(1j * np.asarray(t, float))[..., None]
+    turns = np.cumprod(np.broadcast_to(turn, (*np.shape(t), harmonics)), -1)
+    if order:
+        turns *= (1, 1j, -1, -1j)[order % 4] * np.arange(1.0, harmonics + 1) ** order
+    found = np.empty((*np.shape(t), 2 * harmonics + 1))
+    found[..., 0], found[..., 1::2], found[..., 2::2] = float(order == 0), turns.real, turns.imag
+    return found
 
 
 def series(coefficients: np.ndarray, t, order: int = 0) -> np.ndarray:
@@ -55,6 +57,18 @@ class Loop:
     def shape(self, t, order: int = 0) -> np.ndarray:
         """Return (..., d) at phases t (...), or its derivative."""
         return series(self.coefficients, t, order)
+
+    @cached_property
+    def _twice_differentiated(self) -> np.ndarray:
+        """Coefficients (3, d, 2 K + 1) of the shape and its first two derivatives."""
+        found = [self.coefficients]
+        for _ in range(2):
+            cos, sin = found[-1][:, 1::2], found[-1][:, 2::2]
+            k = np.arange(1, self.harmonics + 1)
+            rate = np.zeros_like(self.coefficients, float)
+            rate[:, 1::2], rate[:, 2::2] = k * sin, -k * cos
+            found.append(rate)
+        return np.array(found)
 
     @cached_property
     def _places(self) -> tuple[np.ndarray, np.ndarray]:
@@ -102,7 +116,8 @@ class Loop:
         """Return phases (...,) near t at which alpha - theta is normal to the curve: Newton, at most ``step`` rad at a
         time."""
         for _ in range(NEWTON):
-            deviation, rate, bend = alpha - self.shape(t), self.shape(t, 1), self.shape(t, 2)
+            shape, rate, bend = np.moveaxis(series(self._twice_differentiated, t), -2, 0)
+            deviation = alpha - shape
             square = (rate**2).sum(-1)
             slope = np.maximum(
                 square - (deviation * bend).sum(-1), 0.2 * square

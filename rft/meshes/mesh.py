@@ -71,13 +71,13 @@ class Mesh:
             "the mesh has an edge that two triangles run along the same way",
             because="some are turned inside out, or there are doubles",
         )
-        open_edges = np.setdiff1d(edges, reversed_edges).size
-        require(
-            not open_edges,
-            "the mesh is open",
-            because=f"{open_edges} edges have one triangle",
-            instead="close it, or say closed = false",
-        )
+        if not np.array_equal(edges, reversed_edges):
+            open_edges = np.setdiff1d(edges, reversed_edges).size
+            raise Refusal(
+                "the mesh is open",
+                because=f"{open_edges} edges have one triangle",
+                instead="close it, or say closed = false",
+            )
         require(
             self.volume > 0,
             "the mesh is inside out",
