@@ -286,7 +286,6 @@ def test_nobody_need_listen(tmp_path):
         (f"{said} | true; exit ${{PIPESTATUS[0]}}", 0, ""),
         (f"{said} >&-", 0, ""),
         (f"{said} 2>&-  >/dev/null", 0, ""),
-        (f"{said} > /dev/full", 2, full),
         (f"{told} velocity three-link-viscous --alpha 0,0 --alphadot 1,0 > /dev/full", 2, full),
     ):
         done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, cwd=tmp_path, timeout=60)

@@ -28,10 +28,15 @@ KNOW_MECHANICS = {
 
 
 @functools.cache
+def tree_of(path):
+    return ast.parse(path.read_text())
+
+
+@functools.cache
 def imports(path):
     """Dotted names of all that a file imports, wherever in it."""
     found = []
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.Import):
             found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -73,14 +78,14 @@ def arrows(path, known):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []
         if isinstance(node, ast.ImportFrom):
             names = [f"{node.module}.{name}" for name in names]
-        elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("import_module"):
+        elif isinstance(node, ast.Call) and "import_module" in (getattr(node.func, "id", ""), getattr(node.func, "attr", "")):
             names = [x.value for x in node.args if isinstance(x, ast.Constant)]
         for name in names:
             yield next((m for m in (name, name.rpartition(".")[0]) if m in known), None)
         for child in ast.iter_child_nodes(node):
             yield from visit(child)
 
-    return {*visit(ast.parse(path.read_text()))} - {None}
+    return {*visit(tree_of(path))} - {None}
 
 
 FILES = modules()
@@ -165,7 +170,7 @@ def test_what_python_reaches_names_arguments_and_no_options():
     texts = []
     for path in sorted(p for x in ("rft", "geomech") for p in (ROOT / x).rglob("*.py")):
         if not path.relative_to(ROOT).as_posix().removeprefix("geomech/").startswith(SPEAK_OF_OPTIONS):
-            tree = ast.parse(path.read_text())
+            tree = tree_of(path)
             prose = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
             found = (n for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str))
             texts += [n.value for n in found if id(n) not in prose and re.search(r"(?<!\w)--[a-z]", n.value)]
