@@ -17,6 +17,7 @@ import contextlib
 import itertools
 import json
 import math
+import os
 import pathlib
 import re
 import shlex
@@ -68,7 +69,8 @@ def place() -> Iterator[pathlib.Path]:
 
 def files() -> dict[pathlib.Path, int]:
     """When each file below the folder where we are was written."""
-    return {p: p.stat().st_mtime_ns for p in pathlib.Path().rglob("*") if p.is_file()}
+    paths = (os.path.join(folder, name) for folder, _, names in os.walk(".") for name in names)
+    return {pathlib.Path(p): os.stat(p).st_mtime_ns for p in paths if os.path.isfile(p)}
 
 
 # commands.txt

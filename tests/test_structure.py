@@ -78,7 +78,10 @@ def arrows(path, known):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []
         if isinstance(node, ast.ImportFrom):
             names = [f"{node.module}.{name}" for name in names]
-        elif isinstance(node, ast.Call) and "import_module" in (getattr(node.func, "id", ""), getattr(node.func, "attr", "")):
+        elif isinstance(node, ast.Call) and "import_module" in (
+            getattr(node.func, "id", ""),
+            getattr(node.func, "attr", ""),
+        ):
             names = [x.value for x in node.args if isinstance(x, ast.Constant)]
         for name in names:
             yield next((m for m in (name, name.rpartition(".")[0]) if m in known), None)

@@ -186,10 +186,10 @@ def judged(estimates, errors):
 
 
 def test_direct_estimates_cover_the_truth(truths):
-    """160 random scenes against 2048 phases at a regularisation of 1e-9: covered in 95 %, ten times too large at most in
+    """80 random scenes against 2048 phases at a regularisation of 1e-9: covered in 95 %, ten times too large at most in
     the median; positions and headings."""
     rng, estimates, errors = np.random.default_rng(7), [], []
-    for _ in range(160):
+    for _ in range(80):
         some = random_scene(rng)
         loads = ("exact", "exact", "midpoint:20")[rng.integers(3)]
         coarse = some.with_numerics(loads=loads, regularisation=10.0 ** rng.uniform(-6, -3))
