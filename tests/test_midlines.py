@@ -346,6 +346,17 @@ def test_contrasts_that_are_one_thing_seen_often_are_weak_evidence(copies, least
     assert least < intervals._repeating(np.full((12, 7), np.sqrt(1.5)), np.repeat(drawn, copies, 1)) < most
 
 
+def test_noise_that_is_alike_from_frame_to_frame_is_found(noisy):
+    """Noise of standard deviation 0.01 whose neighbours in time are correlated by 0.6."""
+    fresh = np.random.default_rng(0).normal(size=noisy.points.shape)
+    noise = 0.01 * smooth._alike(fresh, 0.6)
+    f = fit.fit_midlines(noisy._replace(points=noisy.exact + noise).trial())
+    assert f.curve.alike == pytest.approx(0.6, abs=0.03) and f.curve.noise == pytest.approx(0.01, rel=0.03)
+    put_on = np.array([f.curve.noisy(np.random.default_rng(k)).coefficients - f.curve.coefficients for k in range(20)])
+    modes = np.linalg.qr(np.vander(f.curve.s, f.curve.modes))[0]
+    assert put_on.std() == pytest.approx(f.curve.solver(modes.T @ noise).std(), rel=0.05)
+
+
 def test_bodies_are_taken_to_keep_their_length(fitted):
     alike = intervals.intervals(fitted.sample, 0.95).half_width / fitted.intervals.half_width
     assert alike[1] > 1.02 and (np.delete(alike, 1) == 1).all() and QUANTITIES[1] == "length"
