@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 from commands import geomech as run
+from scipy.interpolate import interp1d
 
 import geomech
 from geomech.gaits import Centreline, Circle, Sine, Wave
@@ -235,7 +236,8 @@ def test_newtons_and_watts_follow_from_sizes():
 
 @pytest.mark.parametrize("name", ["sandfish-loose", "serpenoid-glass", "three-link-glass", "sandfish-transient"])
 def test_errors_cover_what_finer_numerics_change(name):
-    """Three times the elements, a hundredth of the regularisation, four times the steps in time; within 20 errors of these."""
+    """Three times the elements, a hundredth of the regularisation, four times the steps in time: they cover these at nine
+    points of ten, and are in the mean 20 times as large at most, along the body 30."""
     scene, phases = geomech.load(name).with_numerics(phases=32), 32
     if name == "sandfish-transient":
         scene, phases = scene.changed(body=Backbone(40), gait=dataclasses.replace(scene.gait, elements=40)), 16
@@ -246,10 +248,14 @@ def test_errors_cover_what_finer_numerics_change(name):
         gait = dataclasses.replace(scene.gait, **{"elements": 3 * count} if hasattr(scene.gait, "elements") else {})
         finer = finer.changed(body=dataclasses.replace(body, elements=3 * count), gait=gait)
     truth = forces(finer)
-    for key in ("thrust_normal", "drag_normal", "drag_tangential", "drag_ends", "medium_power", "joint_power"):
-        off = np.abs(truth[key].values[:: len(truth["phase"].values) // phases] - found[key].values).mean()
-        error = found[key].error.mean()
-        assert off <= error < 20 * off + 1e-9, key
+    sums = "thrust_normal", "drag_normal", "drag_tangential", "drag_ends", "medium_power", "joint_power"
+    for key in (*sums, "forward", "tangential", "power", "bending_moment"):
+        values = truth[key].values[:: len(truth["phase"].values) // phases]
+        for place in found[key].dims[1:]:
+            values = interp1d(truth[place].values, values, fill_value="extrapolate")(found[place].values)
+        off, error = np.abs(values - found[key].values), found[key].error
+        assert (off <= error + 1e-9).mean() >= 0.9, key
+        assert off.mean() <= error.mean() < (30 if found[key].dims[1:] else 20) * off.mean() + 1e-9, key
 
 
 def test_a_stroke_that_goes_nowhere_says_so():

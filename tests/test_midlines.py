@@ -50,7 +50,7 @@ def exact():
 
 @pytest.fixture(scope="module")
 def noisy():
-    return synthetic.made(GLASS, 4.4, 30, 30, seed=5)
+    return synthetic.made(GLASS, 4.4, 30, 30, seed=8)
 
 
 @pytest.fixture(scope="module")
@@ -104,9 +104,9 @@ def test_slip_and_efficiency_without_noise_are_those_of_the_balance():
 
 
 def test_cycles_that_repeat_without_noise_have_small_errors(exact):
-    f = fit.fit_midlines(exact.trial())
-    assert f.intervals.half_width[: len(QUANTITIES)].max() < 0.03
-    assert f.value("frequency")[0] == pytest.approx(1.0, abs=1e-3)
+    f, n = fit.fit_midlines(exact.trial()), len(QUANTITIES)
+    width, error = f.intervals.half_width[:n], (f.intervals.value - noiseless(exact))[:n]
+    assert (np.abs(error) <= width + 2e-4).all() and width.max() < 0.04
 
 
 # Files.
@@ -304,15 +304,16 @@ def noiseless(made):
 
 
 def covered(system, known, seeds, cycles=8.4, frames=40, **options):
-    """Which quantities (N, Q) the intervals of trials of 30 points with 1 % noise cover. The heading is that of the trial, to
-    which the animal's drift is added."""
-    hits, k = [], QUANTITIES.index("heading")
+    """Errors and half widths (N, Q) of trials of 30 points with 1 % noise. The heading is that of the trial, to which the
+    animal's drift is added."""
+    errors, widths, k = [], [], QUANTITIES.index("heading")
     for seed in seeds:
         made = synthetic.made(system, cycles, frames, seed=seed, **options)
         f, own, expected = fit.fit_midlines(made.trial()), noiseless(made), known.copy()
         expected[k] = own[k] - own[k + 1] + known[k + 1]
-        hits.append(np.abs(f.intervals.value - expected) <= f.intervals.half_width)
-    return np.array(hits)[:, : len(QUANTITIES)]
+        errors.append(f.intervals.value - expected)
+        widths.append(f.intervals.half_width)
+    return np.array(errors)[:, : len(QUANTITIES)], np.array(widths)[:, : len(QUANTITIES)]
 
 
 def test_cycles_too_few_to_show_how_they_vary_are_noted():
@@ -320,38 +321,83 @@ def test_cycles_too_few_to_show_how_they_vary_are_noted():
     assert one[0].startswith("one full cycle") and two[0].startswith("two full cycles") and three == []
 
 
-@pytest.mark.parametrize("variance", [0.0, 3.0])
-def test_intervals_of_samples_whose_truth_is_zero(variance):
+@pytest.mark.parametrize(
+    ("variance", "alike", "width"), [(0.0, 0.0, 1.0), (0.3, 0.0, 1.32), (3.0, 0.0, 1.55), (30.0, 0.3, 1.6)]
+)
+def test_intervals_of_samples_whose_truth_is_zero(variance, alike, width):
     """Noise that ends one cycle too far begins the next too late: it is less in the mean than its scatter says."""
-    rng, shape, sigma = np.random.default_rng(0), (8, 400), 0.7
-    noise = lambda *lead: np.diff(sigma * rng.normal(size=(*lead, shape[0] + 1, shape[1])), axis=-2)
-    pseudo = np.sqrt(variance) * rng.normal(size=shape) + noise()
-    noisy, none = pseudo + noise(40), np.zeros(shape[1])
-    sample = intervals.Sample(pseudo.mean(0), pseudo, noisy.mean(1), noisy, none, np.zeros((40, shape[1])))
+    rng, count, sigma = np.random.default_rng(0), 8, 0.7
+    noise = lambda *lead: np.diff(sigma * rng.normal(size=(*lead, count + 1, 400)), axis=-2)
+    apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    pseudo = np.sqrt(variance) * np.linalg.cholesky(alike**apart) @ rng.normal(size=(count, 400)) + noise()
+    noisy, none = pseudo + noise(40), np.zeros(400)
+    sample = intervals.Sample(pseudo.mean(0), pseudo, noisy.mean(1), noisy, none, np.zeros((40, 400)))
     found = intervals.intervals(sample, 0.95)
-    assert 0.87 < (np.abs(found.value) <= found.half_width).mean() <= (0.975 if variance else 1.0)
-    assert np.median(found.noise) == pytest.approx(sigma * np.sqrt(2) / 8, rel=0.1)
-    if variance:
-        assert np.median(found.cycles) == pytest.approx(np.sqrt(variance / 8), rel=0.15)
-    else:
-        assert np.median(found.half_width) < 0.5  # of noise alone 0.24; 0.83 by the scatter of the cycles
+    assert 0.92 < (np.abs(found.value) <= found.half_width).mean() < 0.98
+    assert np.median(found.noise) == pytest.approx(sigma * np.sqrt(2) / count, rel=0.05)
+    deviation = np.sqrt(2 * sigma**2 / count**2 + variance / count)
+    assert np.median(found.half_width) == pytest.approx(1.96 * width * deviation, rel=0.05)
+
+
+@pytest.mark.parametrize(("copies", "least", "most"), [(1, 0.0, 0.2), (12, 0.6, 0.8)])
+def test_contrasts_that_are_one_thing_seen_often_are_weak_evidence(copies, least, most):
+    """Of 84 contrasts a mean square 1.5 times that of noise shows that cycles vary; of 7, twelve times over, it does not."""
+    drawn = 2 * np.random.default_rng(0).normal(size=(400, 12 // copies, 7))
+    assert least < intervals._repeating(np.full((12, 7), np.sqrt(1.5)), np.repeat(drawn, copies, 1)) < most
+
+
+def test_noise_that_is_alike_from_frame_to_frame_is_found(noisy):
+    """Noise of standard deviation 0.01 whose neighbours in time are correlated by 0.6."""
+    fresh = np.random.default_rng(0).normal(size=noisy.points.shape)
+    noise = 0.01 * smooth._alike(fresh, 0.6)
+    f = fit.fit_midlines(noisy._replace(points=noisy.exact + noise).trial())
+    assert f.curve.alike == pytest.approx(0.6, abs=0.03) and f.curve.noise == pytest.approx(0.01, rel=0.03)
+    put_on = np.array([f.curve.noisy(np.random.default_rng(k)).coefficients - f.curve.coefficients for k in range(40)])
+    slow = 0.01 * np.sqrt((1 + 0.6) / (1 - 0.6) / len(noisy.t))  # mean over the trial
+    assert put_on.mean(1).std() == pytest.approx(slow, rel=0.1)
+
+
+def test_more_modes_and_knots_are_taken_than_leave_an_error_beside_that_of_noise(exact, fitted):
+    found, n = fitted.intervals, len(QUANTITIES)
+    assert (found.smoothing < found.noise)[:n].all()
+    few = dataclasses.replace(exact.trial(), points=exact.points[:, ::3], lines=exact.trial().lines[:, ::3])
+    curve, few = smooth.fitted(smooth.filled(few), 1.0)
+    assert (curve.modes, smooth.coarser(few, curve).modes) == (5, 4)
+
+
+def test_bodies_are_taken_to_keep_their_length(fitted):
+    alike = intervals.intervals(fitted.sample, 0.95).half_width / fitted.intervals.half_width
+    assert alike[1] > 1.02 and (np.delete(alike, 1) == 1).all() and QUANTITIES[1] == "length"
+
+
+def test_what_smoothing_cuts_off_is_judged_from_its_change():
+    """A change of 0.7 that noise of 0.1 explains in small part, where 3 modes more leave a seventh."""
+    rng, one = np.random.default_rng(0), np.ones((1, 50))
+    noise = 0.1 * rng.normal(size=(4000, 50))
+    sample = intervals.Sample(one[0], one, 1 + noise, (1 + noise)[:, None], 0.7 * one[0], 0.7 + noise)
+    found = intervals.intervals(sample, 0.95)
+    np.testing.assert_allclose(found.smoothing, np.sqrt(0.7**2 - 0.1**2), rtol=0.01)
+    np.testing.assert_allclose(found.half_width, 1.96 * 0.7, rtol=0.02)
 
 
 def test_intervals_cover_the_truth_in_a_few_trials():
     known = noiseless(synthetic.made(GLASS, 40, 30, seed=99, noise=0.0, **USUAL))
-    hits = covered(GLASS, known, range(2), 4.4, 30, **USUAL)
-    assert hits.mean() > 0.8
+    error, width = covered(GLASS, known, range(2), 4.4, 30, **USUAL)
+    assert (np.abs(error) <= width).mean() > 0.8
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize("cycles", [3.5, 8.4])
-@pytest.mark.parametrize(
-    "options", [{"spread": 0.0, "jitter": 0.0}, USUAL, {"spread": 0.1, "jitter": 0.05, "swing": 0.7, "waves": 1.5}]
-)
+@pytest.mark.parametrize("options", [REPEATING, USUAL, VARYING])
 def test_intervals_cover_the_truth_in_90_to_98_percent(options, cycles):
-    hits = covered(GLASS, truth(GLASS, **options), range(200), cycles, **options)
-    print(options, cycles, dict(zip(QUANTITIES, hits.mean(0).round(3))))
-    assert (hits.mean(0) > 0.88).all()
+    """Of 200 trials a share of 95 % has a standard error of 1.5 %. Turns of cycles that vary share their ends, as heading
+    is what turns: few cycles do not show that, and their intervals are too wide."""
+    error, width = covered(GLASS, truth(GLASS, **options), range(40000, 40200), cycles, **options)
+    share, size = (np.abs(error) <= width).mean(0), np.median(width, 0) / 1.96 / np.sqrt((error**2).mean(0))
+    print(options, cycles, *zip(QUANTITIES, share.round(3), size.round(2)), sep="\n")
+    turn = QUANTITIES.index("turn")
+    assert (share >= 0.9).all() and (np.delete(share, turn) <= 0.99).all()
+    assert share[turn] <= 0.98 or (options["spread"] and size[turn] < 2.5)
 
 
 # Prediction.

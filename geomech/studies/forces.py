@@ -28,6 +28,7 @@ FLANK, PARTS = ("normal", "tangential"), ("normal", "tangential", "ends")
 SEEN = (
     1.2  # times a change: that to a law computed more exactly is nearly all of the error (`geomech.studies.estimate`)
 )
+NEAR = 1 / 32  # cycle
 LEAST_STEPS = 8  # of time stepping
 STILL = 1e-6  # body lengths per cycle, below which there is no direction of travel
 WHAT = "force along the body"
@@ -79,22 +80,28 @@ class Run(NamedTuple):
 
 
 def with_errors(result: Result) -> Result:
-    """Return forces with errors of what is summed over the body at each phase: the changes with half the elements of a
-    backbone, with half the pieces into which effects cut a body, with a law computed more exactly, and in time stepping with
-    half the phases. Errors of order 2 are a third of these changes; near stuck links they scatter."""
+    """Return forces with errors: the changes with half the elements of a backbone, with half the pieces into which effects cut
+    a body, with a law computed more exactly, and in time stepping with half the phases; the largest of each within NEAR of a
+    phase, as changes pass through zero. Errors of order 2 are a third of these changes; near stuck links they scatter."""
     scene, unit = result.subject.scene, result.subject.newtons
     others = [forces(other, unit=unit) for other in _variants(scene)]
-    return replace(result, variables=tuple(_with_error(v, others) for v in result.variables))
+    return replace(result, variables=tuple(_with_error(v, result, others) for v in result.variables))
 
 
-def _with_error(v: Variable, others: list[Result]) -> Variable:
-    if v.dims != ("phase",) or v.is_coordinate:
+def _with_error(v: Variable, result: Result, others: list[Result]) -> Variable:
+    if v.dims not in (("phase",), ("phase", "s"), ("phase", "point")) or v.is_coordinate:
         return v
+    from scipy.interpolate import make_interp_spline
+    from scipy.ndimage import maximum_filter1d
+
     error = np.zeros_like(v.values)
     for other in others:
         values = other[v.name].values
+        for place in v.dims[1:]:
+            values = make_interp_spline(other[place].values, values, 1, axis=1)(result[place].values)
         change = SEEN * np.abs(v.values[:: len(error) // len(values)] - values)
-        error += change if len(change) == len(error) else change.max()
+        near = maximum_filter1d(change, 2 * round(NEAR * len(change)) + 1, axis=0, mode="wrap")
+        error += near if len(near) == len(error) else near.max(0)
     return replace(v, error=error)
 
 

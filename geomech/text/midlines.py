@@ -61,8 +61,8 @@ def text(result: Result) -> str:
         f"{about['file']}: {about['cycles']} full cycles of {about['points']} points"
         + (f"; {left} with gaps left out" if left else ""),
         f"head: {about['head']}",
-        f"smoothed by {about['modes']} modes along the body and {about['knots_per_cycle']:.3g} knots a cycle, by "
-        f"cross-validation; noise of a point {about['noise']:.2g} BL",
+        f"smoothed by {about['modes']} modes along the body and {about['knots_per_cycle']:.3g} knots a cycle, more than "
+        f"by cross-validation; noise of a point {about['noise']:.2g} BL",
         f"with intervals of {100 * about['level']:.3g} % of cases:",
     ]
     lines += [f"  {name:<12}{pair(result[name].values, result[name].error)} {units[name]}" for name in SHOWN]

@@ -23,6 +23,7 @@ PACE = 1.6  # ratio of a cycle's duration to the median, at most
 EVEN = 0.7  # rad, by which the phase of few cycles may stray from a line
 LONGEST, SHORTEST = 30.0, 1e-4  # m: bodies beyond are in another unit
 MOVES = 0.02  # body lengths per cycle: below it nobody sees where a body goes
+STRETCHLESS = 0.6  # prior probability that a body keeps its length where its motion varies, assumed
 AGREED = 1.4  # ratio of the points' length to a body length that is given, at most
 
 
@@ -30,13 +31,13 @@ AGREED = 1.4  # ratio of the points' length to a body length that is given, at m
 class Kinematics:
     """Kinematics of a trial.
 
-    trial: points from tail to head. curve, fine: smooth midlines, and finer ones. clock: phase. marks: phases that begin
-    and end the full cycles, of which ``used`` (C,) are without gaps. sample, intervals: of `kinematics.QUANTITIES`.
-    level: share of cases in which intervals cover the truth. head: how the head was found."""
+    trial: points from tail to head. curve, coarse: smooth midlines, and the same with fewer modes and knots. clock:
+    phase. marks: phases that begin and end the full cycles, of which ``used`` (C,) are without gaps. sample, intervals:
+    of `kinematics.QUANTITIES`. level: share of cases in which intervals cover the truth. head: how the head was found."""
 
     trial: Trial
     curve: smooth.Curve
-    fine: smooth.Curve
+    coarse: smooth.Curve
     clock: kinematics.Clock
     marks: np.ndarray
     used: np.ndarray
@@ -110,7 +111,7 @@ def fit_midlines(
         clock = kinematics.clock(curve, repeat)
         marks, used = full_cycles(trial, curve, clock)
     trial = trial.with_notes(*_notes(used))
-    fine = smooth.refined(trial, curve)
+    coarse = smooth.coarser(trial, curve)
     near = clock.phase(curve)
 
     def values(curve: smooth.Curve) -> tuple[np.ndarray, np.ndarray]:
@@ -118,10 +119,11 @@ def fit_midlines(
         weighted = lambda w: kinematics.quantities(each.weighted(w), trial.length, trial.unit == "m")
         return kinematics.pseudo_values(weighted, len(used))
 
-    sample = intervals.sampled(curve, fine, values)
-    return Kinematics(
-        trial, curve, fine, clock, marks, used, sample, intervals.intervals(sample, level), level, words
-    )  # fmt: skip
+    sample = intervals.sampled(curve, coarse, values)
+    constant = np.full(len(sample.value), intervals.CONSTANT)
+    constant[kinematics.QUANTITIES.index("length")] = STRETCHLESS
+    found = intervals.intervals(sample, level, constant)
+    return Kinematics(trial, curve, coarse, clock, marks, used, sample, found, level, words)
 
 
 def used_cycles(curve, clock: kinematics.Clock, marks, used, near=None) -> kinematics.Cycles:
@@ -239,7 +241,7 @@ def _head(trial: Trial, cycles: kinematics.Cycles, head: str | None) -> tuple[bo
     ends = trial.names[0], trial.names[-1]
     each = kinematics.averages(cycles)
     length = each.numbers[:, 1].mean()
-    forward = (np.cos(each.numbers[:, 3] - each.numbers[:, 4]) * each.numbers[:, 2]).mean() / length
+    forward = (np.cos(each.numbers[:, 3]) * each.numbers[:, 2]).mean() / length
     wave = kinematics.wave_sign(each.first.mean(0))
     motion = int(np.sign(forward)) if abs(forward) > MOVES else 0
     if head is not None:

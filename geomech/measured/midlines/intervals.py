@@ -3,8 +3,8 @@
 The value is that of all cycles, less its mean change by noise. Its variance has three parts. Noise: the residual of
 the smooth midlines is put on them again and again, and everything is computed anew. Cycles: leaving out one after
 another gives pseudo-values, whose scatter is that of the cycles and that which noise explains; all variances of the
-former count by their likelihood. Smoothing: the change with more modes and more knots, less the part that noise
-explains."""
+former count by their likelihood. Smoothing: the change from fewer modes and fewer knots, less the part that noise
+explains, and as a series goes on that each mode more halves."""
 
 from __future__ import annotations
 
@@ -18,8 +18,11 @@ from geomech.measured.midlines import smooth
 Values = Callable[[smooth.Curve], tuple[np.ndarray, np.ndarray]]
 
 RESAMPLED = 40  # times that noise is put on
-TRIED = np.geomspace(1e-3, 100, 60)  # variances of cycles over that of the pseudo-values
-REPEATING = 0.25  # prior probability that cycles repeat exactly, as a robot's; found by coverage
+TRIED = np.geomspace(1e-3, 100, 40)  # variances of cycles over that of the pseudo-values, and over that of noise
+REPEATING = 0.5  # prior probability that all cycles repeat exactly, as a robot's
+CONSTANT = 0.2  # prior probability that a quantity repeats exactly where others do not; found by coverage
+ALIKE = -0.5, 0.0, 0.5  # correlations of neighbouring cycles
+TINY = 1e-30  # variance below which there is rounding alone
 FURTHEST = 12.0  # standard deviations of the largest variance: more than half a width
 
 
@@ -43,7 +46,7 @@ class Sample:
     """Quantities as measured and with noise put on once more.
 
     value (Q,), pseudo (C, Q): of all cycles, and their pseudo-values. noisy (B, Q), noisy_pseudo (B, C, Q): likewise.
-    change: (Q,), what finer smoothing adds to the value; noisy_change: (B, Q)."""
+    change: (Q,), what smoothing cuts off; noisy_change: (B, Q)."""
 
     value: np.ndarray
     pseudo: np.ndarray
@@ -53,19 +56,21 @@ class Sample:
     noisy_change: np.ndarray
 
 
-def intervals(sample: Sample, level: float) -> Intervals:
-    """Return intervals that cover the truth in a share ``level`` of cases."""
+def intervals(sample: Sample, level: float, constant: float | np.ndarray = CONSTANT) -> Intervals:
+    """Return intervals that cover the truth in a share ``level`` of cases.
+
+    constant: prior probability that a quantity repeats where others do not; of all, or (Q,)."""
     from scipy.special import ndtr, ndtri
 
-    count, by_noise = len(sample.pseudo), sample.noisy - sample.value
+    by_noise = sample.noisy - sample.value
     noise = by_noise.var(0, ddof=1)
     unbiased = 2 * sample.change - sample.noisy_change.mean(0)
     cut_off = np.maximum(unbiased**2 - sample.noisy_change.var(0, ddof=1), 0.0)
     known = np.maximum(noise + cut_off, 1e-300)
     half_width = ndtri((1 + level) / 2) * np.sqrt(known)
-    if count > 1:
-        weights, variances = _variances(sample.pseudo, sample.noisy_pseudo - sample.pseudo, noise)
-        deviation = np.sqrt(variances / count + known)
+    if len(sample.pseudo) > 1:
+        weights, by_cycles = _of_cycles(sample.pseudo, sample.noisy_pseudo - sample.pseudo, constant)
+        deviation = np.sqrt(by_cycles + known)
         low, high = half_width, FURTHEST * deviation.max(0)
         for _ in range(40):
             middle = (low + high) / 2
@@ -77,45 +82,66 @@ def intervals(sample: Sample, level: float) -> Intervals:
     return Intervals(value, *np.sqrt((cycles, noise, cut_off)), half_width, sample.pseudo)
 
 
-def _variances(values: np.ndarray, noise: np.ndarray, of_mean: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return weights and variances (V, Q) that the cycles may have beyond noise, from pseudo-values (C, Q).
+def _of_cycles(values: np.ndarray, noise: np.ndarray, constant: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return weights and variances (M, Q) that the mean of pseudo-values (C, Q) may have by cycles, beyond noise (B, C, Q).
 
-    noise: (B, C, Q), of the pseudo-values, correlated between neighbours: what ends one cycle too far begins the next too
-    late. of_mean: (Q,), its variance in the mean. The weights are the likelihood of the contrasts between cycles, times a
-    prior: cycles repeat exactly with REPEATING, else v^-1/2 (v + C of_mean)^-1/2 dv."""
+    The weights are the likelihood of the contrasts between cycles times a prior: v = 0 if `_repeating` or ``constant``,
+    else the density of the cycles' variance v is 1/(v + noise); neighbours are correlated by one of ALIKE, as cycles k
+    apart by its k-th power. Noise is correlated between neighbours, too: what ends one cycle too far begins the next
+    too late."""
     count = len(values)
+    apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
     contrasts = np.linalg.qr(np.column_stack([np.ones(count), np.eye(count)[:, 1:]]))[0][:, 1:]
     deviation = noise - noise.mean(0)
-    same = (deviation**2).sum(0).mean(0) / (len(noise) - 1)
+    same = np.maximum((deviation**2).sum(0).mean(0) / (len(noise) - 1), TINY)
     near = (deviation[:, 1:] * deviation[:, :-1]).sum(0).mean(0) / (len(noise) - 1)
     near = np.clip(near, -0.5 * same, 0.5 * same)
-    neighbours = np.eye(count, k=1) + np.eye(count, k=-1)
-    scatter = np.maximum(values.var(0, ddof=1), 1e-300)
+    scatter = np.maximum(values.var(0, ddof=1), TINY)
+    known = np.where(apart == 0, (same + 1e-9 * scatter)[:, None, None], (apart == 1) * near[:, None, None])
+    whitening = np.linalg.inv(np.linalg.cholesky(contrasts.T @ known @ contrasts)) @ contrasts.T
+    white = (whitening @ values.T[..., None])[..., 0]
+    repeating = _repeating(white, np.einsum("qkc,bcq->bqk", whitening, deviation))
+    exact = repeating + (1 - repeating) * constant
     variances = np.vstack([np.zeros_like(scatter), TRIED[:, None] * scatter])
-    likelihood = np.empty_like(variances)
-    for q in range(values.shape[1]):
-        known = contrasts.T @ (same[q] * np.eye(count) + near[q] * neighbours) @ contrasts
-        sizes, axes = np.linalg.eigh(known)
-        square = (axes.T @ (contrasts.T @ values[:, q])) ** 2
-        spread = variances[:, q, None] + np.maximum(sizes, 1e-12 * scatter[q])
-        likelihood[:, q] = -0.5 * (np.log(spread) + square / spread).sum(1)
-    prior = np.sqrt(variances[1:] / (variances[1:] + count * of_mean))  # times v, as TRIED is geometric
-    prior = np.vstack([np.full_like(scatter, REPEATING), (1 - REPEATING) * prior / prior.sum(0)])
-    weights = prior * np.exp(likelihood - likelihood.max(0))
-    return weights / weights.sum(0), variances
+    prior = variances[1:] / (variances[1:] + same)  # times v, as TRIED is geometric
+    prior = np.vstack([exact + 0 * scatter, (1 - exact) * prior / prior.sum(0)])
+    likelihood, by_cycles = [], []
+    for correlation in np.power.outer(ALIKE, apart):
+        sizes, axes = np.linalg.eigh(whitening @ correlation @ whitening.transpose(0, 2, 1))
+        square = (axes.transpose(0, 2, 1) @ white[..., None])[..., 0] ** 2
+        spread = 1 + variances[..., None] * sizes
+        likelihood.append(-0.5 * (np.log(spread) + square / spread).sum(-1))
+        by_cycles.append(variances * correlation.mean())
+    weights = prior * np.exp(likelihood - np.max(likelihood, (0, 1)))
+    return tuple(x.reshape(-1, len(scatter)) for x in (weights / weights.sum((0, 1)), np.array(by_cycles)))
+
+
+def _repeating(white: np.ndarray, drawn: np.ndarray) -> float:
+    """Return the probability that cycles repeat exactly, from contrasts (Q, C - 1) of unit variance by noise.
+
+    All are one test of it: by noise alone their mean square is 1, and its scatter in noise that is drawn (B, Q, C - 1)
+    tells how many of them are independent; cycles that vary make it 1 + r, of a density (r (1 + r))^-1/2."""
+    square, by_noise = (white**2).mean(), (drawn**2).mean((1, 2))
+    free = 2 * by_noise.mean() ** 2 / by_noise.var(ddof=1)
+    ratio = 1 + np.concatenate([[0.0], TRIED])
+    prior = np.sqrt(TRIED / (1 + TRIED))
+    prior = np.concatenate([[REPEATING], (1 - REPEATING) * prior / prior.sum()])
+    likelihood = -0.5 * free * (np.log(ratio) + square / ratio)
+    weights = prior * np.exp(likelihood - likelihood.max())
+    return float(weights[0] / weights.sum())
 
 
 def sampled(
-    curve: smooth.Curve, fine: smooth.Curve, values: Values, resampled: int | None = None, seed: int = 0
+    curve: smooth.Curve, coarse: smooth.Curve, values: Values, resampled: int | None = None, seed: int = 0
 ) -> Sample:
     """Return the quantities of a curve, and the same with noise put on once more, as often as ``resampled`` or RESAMPLED.
 
-    fine: the same `smooth.refined`. values: returns quantities (Q,) and pseudo-values (C, Q) of a curve."""
-    value, pseudo = values(curve)
-    noisy, changes = [], []
+    coarse: the same `smooth.coarser`. values: returns quantities (Q,) and pseudo-values (C, Q) of a curve."""
+    (value, pseudo), noisy, changes = values(curve), [], []
+    rest = 1 / (2 ** (curve.modes - coarse.modes) - 1)  # of a series that halves with each mode
     for k in range(RESAMPLED if resampled is None else resampled):
-        one, other = (c.noisy(np.random.default_rng((seed, k))) for c in (curve, fine))
+        one, other = (c.noisy(np.random.default_rng((seed, k))) for c in (curve, coarse))
         noisy.append(values(one))
-        changes.append(values(other)[0] - noisy[-1][0])
+        changes.append(rest * (noisy[-1][0] - values(other)[0]))
     each, every = (np.array([x[k] for x in noisy]) for k in (0, 1))
-    return Sample(value, pseudo, each, every, values(fine)[0] - value, np.array(changes))
+    return Sample(value, pseudo, each, every, rest * (value - values(coarse)[0]), np.array(changes))

@@ -121,7 +121,7 @@ def _poses(place: np.ndarray, tangent: np.ndarray) -> np.ndarray:
 class Averages(NamedTuple):
     """What is averaged over cycles, the first axis of each.
 
-    numbers: (C, 7): time, own length, distance, direction, mean heading, turn, mean cosine of headings. first:
+    numbers: (C, 7): time, own length, distance, drift, mean heading of all cycles, turn, mean cosine of headings. first:
     (C, NODES), first harmonic of headings over the cycle, complex. slip: (C, NODES), mean over the cycle. lateral:
     (C, PHASES, NODES), place across the path."""
 
@@ -144,8 +144,8 @@ def averages(c: Cycles) -> Averages:
     relative = headings - course[..., None]
     slip = np.abs(np.angle(c.velocity / c.tangent))
     numbers = (
-        c.duration, np.abs(c.tangent).mean((1, 2)), np.abs(step), axis + np.angle(step * np.exp(-1j * axis)), axis,
-        turn, np.cos(relative).mean((1, 2)),
+        c.duration, np.abs(c.tangent).mean((1, 2)), np.abs(step), np.angle(step * np.exp(-1j * axis)),
+        np.full_like(axis, axis.mean()), turn, np.cos(relative).mean((1, 2)),
     )  # fmt: skip
     path = start[:, None] + step[:, None] * (_share() + 0.5)
     lateral = ((c.place - path[..., None]) * np.exp(-1j * course)[..., None]).imag
@@ -157,11 +157,12 @@ def quantities(a: Averages, length: float | None = None, absolute: bool = True) 
     """Return the numbers of QUANTITIES, then slip and amplitude of PARTS of the body, (R, Q), of averages over cycles.
 
     length: of the body in the trial's unit; that of the midlines if None. absolute: speed is in that unit, else in body
-    lengths. frequency: 1/time. stride: distance of the mean frame per cycle in body lengths.
-    heading: direction of the way in the world. drift: the same less the mean heading of the body. turn: of the body in
-    a cycle. slip: mean angle between body and velocity. efficiency: distance over wavelength. amplitude: half the range
-    across the path, mean over the body. wavelength: along the path; arc_wavelength: along the body; body lengths."""
-    time, own, distance, direction, axis, turn, cosine = a.numbers.T
+    lengths. frequency: 1/time. stride: distance of the mean frame per cycle in body lengths. drift: direction of the
+    way less the mean heading of the body. heading: direction of the way in the world, drift and mean heading of all
+    cycles; how the body wanders between cycles is no error of it. turn: of the body in a cycle. slip: mean angle
+    between body and velocity. efficiency: distance over wavelength. amplitude: half the range across the path, mean
+    over the body. wavelength: along the path; arc_wavelength: along the body; body lengths."""
+    time, own, distance, drift, axis, turn, cosine = a.numbers.T
     body = own if length is None else np.full_like(own, length)
     arc = own * arc_waves(a.first)
     wavelength = arc * cosine
@@ -169,8 +170,8 @@ def quantities(a: Averages, length: float | None = None, absolute: bool = True) 
     amplitude = np.ptp(a.lateral, axis=1).reshape(slip.shape[0], PARTS, -1).mean(-1) / 2 / body[:, None]
     numbers = np.stack(
         [
-            1 / time, body, distance / time / (1.0 if absolute else body), distance / body, direction,
-            direction - axis, turn, slip.mean(-1), distance / wavelength, amplitude.mean(-1), wavelength / body, arc / body,
+            1 / time, body, distance / time / (1.0 if absolute else body), distance / body, axis + drift,
+            drift, turn, slip.mean(-1), distance / wavelength, amplitude.mean(-1), wavelength / body, arc / body,
         ],
         -1,
     )  # fmt: skip

@@ -70,7 +70,7 @@ def compare(fit: Kinematics, medium: Any, effects: tuple = ()) -> Comparison:
 
         return of
 
-    sample = intervals.sampled(fit.curve, fit.fine, values(swimmer), RESAMPLED)
+    sample = intervals.sampled(fit.curve, fit.coarse, values(swimmer), RESAMPLED)
     found = intervals.intervals(sample, fit.level)
     finer = values(Swimmer(medium, Backbone(2 * ELEMENTS), effects))(fit.curve)[0] - sample.value
     k = [QUANTITIES.index(name) for name in COMPARED]

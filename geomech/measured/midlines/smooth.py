@@ -1,5 +1,8 @@
-"""Smooth midlines: Legendre modes along the body whose coefficients are splines in time, both numbers by
-cross-validation.
+"""Smooth midlines: Legendre modes along the body whose coefficients are splines in time.
+
+Cross-validation finds the numbers of modes and knots that are best for the points. Slopes and rates need more: with
+those numbers what smoothing cuts off is several times their noise. So MORE modes and CLOSER knots are taken, whose
+noise is by a fifth to a half larger and covers what they cut off.
 
 x(s, t) and y(s, t) are linear in the data: their least squares have no bias from noise, and how noise spreads is known.
 """
@@ -19,7 +22,10 @@ DEGREE = 5  # of the splines in time: their rates are of order 5 in the spacing 
 KNOTS = (6, 7, 8, 10, 12, 14, 16, 20, 24, 32)  # per cycle, that are tried
 MODES = 4, 14  # of x and of y along the body, that are tried
 SAFE = 2.2  # times the root of the number of points: more modes through equal distances oscillate at the ends (Runge)
+MORE = 3  # modes than by cross-validation
+CLOSER = 1.5  # ratio of its distance between knots to the one taken
 PASSES = 3  # of finding where along the body the points lie
+ALIKE = 0.9  # correlation of noise between frames, at most
 NODES = 30  # places along the body at which a curve is evaluated
 
 
@@ -29,8 +35,8 @@ class Curve:
 
     s: (P,), places of the points, 0 to 1. modes, step: the number of modes, and of rows between knots. knots: (K,).
     coefficients: (K - DEGREE - 1, modes, 2). residual: (F, modes, 2), noise of the modes in the rows, orthonormal over
-    the points. noise: standard deviation of x and y of a point. triangle: (modes, modes), from Legendre coefficients to
-    orthonormal ones. solver: of the least squares in time."""
+    the points. noise: standard deviation of x and y of a point. alike: correlation of noise between frames. triangle:
+    (modes, modes), from Legendre coefficients to orthonormal ones. solver: of the least squares in time."""
 
     t: np.ndarray
     s: np.ndarray
@@ -40,6 +46,7 @@ class Curve:
     coefficients: np.ndarray
     residual: np.ndarray
     noise: float
+    alike: float
     triangle: np.ndarray
     solver: Any
 
@@ -60,10 +67,18 @@ class Curve:
 
     def noisy(self, rng: np.random.Generator) -> Curve:
         """Return the curve with the effect of new noise on top: rows of the residual drawn with replacement, with random
-        signs."""
+        signs, and as alike as the noise."""
         frames = len(self.t)
         rows = self.residual[rng.integers(frames, size=frames)] * rng.choice([-1.0, 1.0], (frames, 1, 1))
-        return replace(self, coefficients=self.coefficients + self.solver(rows))
+        return replace(self, coefficients=self.coefficients + self.solver(_alike(rows, self.alike)))
+
+
+def _alike(rows: np.ndarray, correlation: float) -> np.ndarray:
+    """Return rows (F, ...) of the variance of independent ones, k apart correlated by the k-th power of a number."""
+    from scipy.signal import lfilter
+
+    fresh = np.sqrt(1 - correlation**2)
+    return lfilter([1.0], [1.0, -correlation], np.concatenate([rows[:1], fresh * rows[1:]]), axis=0)
 
 
 def placed(basis: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -127,12 +142,11 @@ def _chord_places(points: np.ndarray) -> np.ndarray:
 
 
 def projected(points: np.ndarray, s: np.ndarray, modes: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return orthonormal coefficients (F, modes, 2) of frames, what makes them from Legendre's, and the squares of what
-    they leave of each frame (F,)."""
+    """Return orthonormal coefficients (F, modes, 2) of frames, what makes them from Legendre's, and what they leave of
+    the frames (F, P, 2)."""
     q, triangle = np.linalg.qr(_legendre(s, modes, 0))
     z = q.T @ points
-    left = points - q @ z
-    return z, triangle, (left**2).sum((1, 2))
+    return z, triangle, points - q @ z
 
 
 def filled(trial: Trial) -> Trial:
@@ -150,8 +164,8 @@ def filled(trial: Trial) -> Trial:
 
 
 def fitted(trial: Trial, period: float) -> tuple[Curve, Trial]:
-    """Return the smooth midlines of a trial, with modes and knots by generalised cross-validation, and the trial with the
-    smooth midlines where points were missing."""
+    """Return the smooth midlines of a trial, finer than by generalised cross-validation, and the trial with the smooth
+    midlines where points were missing."""
     s = _chord_places(trial.points)
     rows = len(trial.t) * period / (trial.t[-1] - trial.t[0])
     most = min(MODES[1], int(SAFE * np.sqrt(len(s))), len(s) - 1)
@@ -162,7 +176,7 @@ def fitted(trial: Trial, period: float) -> tuple[Curve, Trial]:
         trial = _completed(trial, curve)
         s = _arc_places(curve, s)
     modes, step = _chosen(trial, s, most, solvers)
-    return _curve(trial, s, modes, step, solvers[step]), trial
+    return curve_of(trial, s, min(modes + MORE, most), max(2, round(step / CLOSER))), trial
 
 
 def _completed(trial: Trial, curve: Curve) -> Trial:
@@ -173,10 +187,10 @@ def _completed(trial: Trial, curve: Curve) -> Trial:
     return replace(trial, points=np.where(trial.filled[..., None], smooth, trial.points))
 
 
-def refined(trial: Trial, curve: Curve) -> Curve:
-    """Return the curve with more modes and more knots, whose difference from it shows what smoothing has cut off."""
-    step = max(2, round(curve.step / 1.5))
-    return curve_of(trial, curve.s, min(curve.modes + 2, len(curve.s) - 1), step)
+def coarser(trial: Trial, curve: Curve) -> Curve:
+    """Return the curve with fewer modes and knots, whose difference from it shows what smoothing cuts off."""
+    modes = max(curve.modes - MORE, min(MODES[0], curve.modes - 1))
+    return curve_of(trial, curve.s, modes, round(CLOSER * curve.step))
 
 
 def curve_of(trial: Trial, s: np.ndarray, modes: int, step: int) -> Curve:
@@ -192,7 +206,7 @@ def _chosen(trial: Trial, s: np.ndarray, most: int, solvers: dict[int, Solver]) 
     for step, solver in solvers.items():
         square = ((z - solver.smoothed(z.reshape(len(z), -1)).reshape(z.shape)) ** 2).sum((0, 2))
         for modes in range(min(MODES[0], most), most + 1):
-            residual = left.sum() + square[:modes].sum() + (z[:, modes:] ** 2).sum()
+            residual = (left**2).sum() + square[:modes].sum() + (z[:, modes:] ** 2).sum()
             scores[modes, step] = residual / (1 - 2 * modes * solver.count / count) ** 2
     return min(scores, key=scores.get)
 
@@ -201,10 +215,14 @@ def _curve(trial: Trial, s: np.ndarray, modes: int, step: int, solver: Solver) -
     z, triangle, left = projected(trial.points, s, modes)
     coefficients = solver(z)
     residual = z - (solver.design @ coefficients.reshape(solver.count, -1)).reshape(z.shape)
-    free = trial.known - 2 * modes * solver.count
-    noise = np.sqrt((left.sum() + (residual**2).sum()) / free)
-    residual = residual / np.sqrt(1 - solver.count / len(trial.t))
-    return Curve(trial.t, s, modes, step, solver.knots, coefficients, residual, float(noise), triangle, solver)
+    # What modes leave of the frames shows how alike noise is from one to the next; the more it is, the more of it a
+    # spline takes along.
+    alike = float(np.clip((left[1:] * left[:-1]).sum() / max((left**2).sum(), 1e-300), 0.0, ALIKE))
+    drawn = np.random.default_rng(0).normal(size=(len(trial.t), 2 * NODES))
+    kept, white = (((x - solver.smoothed(x)) ** 2).sum() for x in (_alike(drawn, alike), drawn))
+    residual = residual / np.sqrt((1 - solver.count / len(trial.t)) * kept / white)
+    noise = np.sqrt(((left**2).sum() + (residual**2).sum()) / trial.known)
+    return Curve(trial.t, s, modes, step, solver.knots, coefficients, residual, float(noise), alike, triangle, solver)
 
 
 def _arc_places(curve: Curve, s: np.ndarray) -> np.ndarray:

@@ -15,6 +15,7 @@ from rft.checks import in_range
 
 FINER = 3  # steps of the integration between two frames
 MEMORY = 0.25  # correlation time of the wave's deviations, cycles
+LONGER = 8  # times the trial, over which deviations have no mean: over the trial theirs varies as that of free ones
 
 
 class SyntheticTrial(NamedTuple):
@@ -45,7 +46,7 @@ def made(
     in_range("frames", frames, 8, 1e6, whole=True)
     rng, count = np.random.default_rng(seed), int(cycles * frames * FINER) + 1
     t = np.arange(count) / (frames * FINER * frequency)
-    varying = smooth_noise(rng, count, MEMORY * frames * FINER, 3)[0]
+    varying = smooth_noise(rng, LONGER * count, MEMORY * frames * FINER, 3)[0][:count]
     rate = 2 * np.pi * frequency * (1 + jitter * varying[:, 0])
     phase = np.concatenate([[rng.uniform(0, 2 * np.pi)], np.cumsum((rate[1:] + rate[:-1]) / 2) * t[1]]).cumsum()
     phase = phase[0] + np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2) * t[1]])
