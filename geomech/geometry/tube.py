@@ -31,8 +31,7 @@ def waves(t, harmonics: int, order: int = 0) -> np.ndarray:
     """Return (..., 2 harmonics + 1): 1, cos t, sin t, cos 2t, sin 2t ... or their derivatives of that order."""
     turn = np.exp(1j * np.asarray(t, float))[..., None]
     turns = np.cumprod(np.broadcast_to(turn, (*np.shape(t), harmonics)), -1)
-    if order:
-        turns *= (1, 1j, -1, -1j)[order % 4] * np.arange(1.0, harmonics + 1) ** order
+    turns *= (1j * np.arange(1.0, harmonics + 1)) ** order
     found = np.empty((*np.shape(t), 2 * harmonics + 1))
     found[..., 0], found[..., 1::2], found[..., 2::2] = float(order == 0), turns.real, turns.imag
     return found
