@@ -143,7 +143,7 @@ def on_mesh(law, mesh, data, geom, motion, slope, effects, rounding):
     up, ahead = rotation[2], rotation[0]
     motion = Motion(*(x[None, None] for x in (velocity @ rotation, spin @ rotation, place[0], up, ahead, place[2])))
     block = Blocks([faces(mesh.vertices[mesh.faces], mesh.middle_normals)])
-    out = block._loads_by_numpy(law, ground, motion)[0, 0].reshape(2, 3)
+    out = block.loads_by_numpy(law, ground, motion)[0, 0].reshape(2, 3)
     return turn.T @ rotation @ out[0], turn.T @ rotation @ out[1]
 
 
@@ -254,6 +254,68 @@ def test_a_height_field_is_where_mujoco_has_it():
             )
             (n_x, n_y, n_z), level = tangent_plane(*hills, x, y)
             assert geom == 0 and (level - n_x * x - n_y * y) / n_z == pytest.approx(hit, abs=1e-6)
+
+
+OTHER = StressMap(C01=0.1, D10=0.01, zeta=0.7, grazing=math.radians(8))
+REGIONS = "2 * x - y / 2 > 0.3 and y >= -0.5", "-1 < x < 0.02", "0.01 + x <= 0.5 * y"
+
+
+def test_media_by_region(solved_by):
+    """A geom in a region bears what that medium bears alone; across boundaries the regions share all of its faces."""
+    body = "".join(f'<body pos="0 0 -0.02"><freejoint/><geom {geom}/></body>' for geom in GEOMS)
+    model = model_of(body, '<option gravity="0 0 0"/>')
+    data, rng = mujoco.MjData(model), np.random.default_rng(5)
+    poses = data.qpos.reshape(-1, 7)
+    poses[:, 3:] = Rotation.random(6, random_state=6).as_quat()
+    data.qvel[:] = rng.normal(size=model.nv)
+
+    def forces(medium, **regions):
+        with rft.mujoco.attach(model, medium, element=0.02, rounding=0.01, **regions) as sand:
+            mujoco.mj_forward(model, data)
+            by_joint = data.qfrc_passive.reshape(-1, 6)[:, :3]
+            np.testing.assert_allclose(by_joint, sand.forces(data), rtol=0, atol=1e-12 * np.abs(by_joint).max())
+            return by_joint.copy()
+
+    for first, second in ((MAP, OTHER), (SPATIAL, Spatial(1e5, surface_friction=0.3))):
+        poses[:, :2] = [[1, 0.3], [1, -1.2], [-0.4, 0], [-0.4, -1], [0.1, 0.1], [0.09, 0.4]]
+        alone = forces(first), forces(second)
+        found = forces(first, regions={REGIONS[0]: second, REGIONS[1]: first, REGIONS[2]: second})
+        expected = np.choose(np.array([1, 0, 0, 0, 0, 1])[:, None], alone)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+        poses[:, :2] = rng.uniform(-0.02, 0.03, (6, 2)) + [0.1, -0.05]
+        alone, crossed = forces(first) + forces(second), np.zeros((6, 3))
+        for medium, other in ((first, second), (second, first)):
+            crossed += forces(medium, regions={REGIONS[0]: other, REGIONS[1]: medium, REGIONS[2]: other})
+        np.testing.assert_allclose(crossed, alone, rtol=0, atol=1e-12 * np.abs(alone).max())
+    straight, yaw = forces(MAP, regions={"x > 0.1": OTHER}), Rotation.from_rotvec([0, 0, math.atan2(0.6, 0.8)])
+    poses[:, :3], turn = yaw.apply(poses[:, :3]), Rotation.from_quat(np.roll(poses[:, 3:], -1, 1))
+    poses[:, 3:] = np.roll((yaw * turn).as_quat(), 1, 1)
+    data.qvel.reshape(-1, 6)[:, :3] = yaw.apply(data.qvel.reshape(-1, 6)[:, :3])
+    turned = forces(MAP, regions={"0.8 * x + 0.6 * y > 0.1": OTHER})
+    np.testing.assert_allclose(turned, yaw.apply(straight), rtol=0, atol=1e-11 * np.abs(straight).max())
+    poses[0], data.qvel[:6] = [0.3, -0.2, -0.01, 1, 0, 0, 0], [0, 0, -1, 0, 0, 0]  # a box straight down, half in each
+    halves = forces(MAP)[0], forces(OTHER)[0], forces(MAP, regions={"-1.7 > 4*y - 3*x": OTHER})[0]
+    assert abs(halves[1][2] - halves[0][2]) > 1.0 and halves[2][2] == pytest.approx((halves[0] + halves[1])[2] / 2)
+
+
+@pytest.mark.parametrize(
+    ("regions", "message"),
+    [
+        (["x > 1"], "regions must be media by their conditions"),
+        ({"x > z": MAP}, "the region 'x > z' is no condition on x and y: write it like 'x > 0.5' or"),
+        ({"x * y > 1": MAP}, "is no condition"),
+        ({"x > 1 or y > 1": MAP}, "is no condition"),
+        ({"1 > 0": MAP}, "is no condition"),
+        ({"x / 0 > 1": MAP}, "is no condition"),
+        ({"x = 1": MAP}, "is no condition"),
+        ({" < ".join("1x" * 51): MAP}, "the regions have 101 boundaries, more than 100"),
+        ({"x > 1": SPATIAL}, "media of all regions must have one form: give stress maps, or laws, alone"),
+        ({"x > 1": "poppy-seeds-lose"}, "did you mean poppy-seeds-loose"),
+    ],
+)
+def test_regions_that_make_no_sense_are_refused(regions, message):
+    with pytest.raises(rft.Refusal, match=message):
+        rft.mujoco.attach(model_of(BALL), MAP, regions=regions)
 
 
 def test_forces_converge_with_the_length_of_elements():
@@ -499,7 +561,7 @@ def test_simulations_have_media_of_their_own():
         sand.media[0] = media[1]
         batch.step(nstep=100)
         found = batch.bind("qpos").copy()
-        assert [*sand.media] == [media[1], *media[1:]] and sand.media[1:] == [law_of(x) for x in media[1:]]
+        assert [*sand.media] == [media[1], *media[1:]] and sand.media[1:] == media[1:]
         with pytest.raises(rft.Refusal, match="media must be 4, one for each simulation"):
             sand.batch(4, media=media)
         with pytest.raises(rft.Refusal, match="media of one batch must have one form"):
@@ -513,6 +575,28 @@ def test_simulations_have_media_of_their_own():
             if k == 0:
                 np.testing.assert_allclose(middle, data.qpos, rtol=0, atol=1e-14)
                 continue
+            mujoco.mj_step(model, data, 100)
+            np.testing.assert_allclose(found[k], data.qpos, rtol=0, atol=1e-14)
+    assert abs(found[0, 2] - found[1, 2]) > 1e-6
+
+
+def test_simulations_have_media_by_region_of_their_own():
+    model = model_of(BALL)
+    if int(mujoco.__version__.partition(".")[0]) < 4:
+        return
+    with rft.mujoco.attach(model, MAP, rounding=0.2, regions={"x > 0.01": OTHER}) as sand:
+        with pytest.raises(rft.Refusal, match="media of a simulation must be 2, the medium and one for each region"):
+            sand.batch(2, media=[MAP, [MAP]])
+        with pytest.raises(rft.Refusal, match="media of all regions must have one form"):
+            sand.batch(2, media=[MAP, SPATIAL])
+        batch = sand.batch(2, 2, media=[MAP, (OTHER, MAP)])
+        sand.media[0] = OTHER
+        assert sand.media[:] == [(OTHER, OTHER), (OTHER, MAP)]
+        batch.step(nstep=100)
+        found = batch.bind("qpos").copy()
+    for k, regions in enumerate(({}, {"x > 0.01": MAP})):
+        with rft.mujoco.attach(model, OTHER, rounding=0.2, regions=regions):
+            data = mujoco.MjData(model)
             mujoco.mj_step(model, data, 100)
             np.testing.assert_allclose(found[k], data.qpos, rtol=0, atol=1e-14)
     assert abs(found[0, 2] - found[1, 2]) > 1e-6

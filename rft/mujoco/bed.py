@@ -14,6 +14,7 @@ from rft.meshes.contact import Motion, faces
 from rft.meshes.extruded import Extruded
 from rft.meshes.law import Spatial
 from rft.meshes.mesh import Mesh
+from rft.meshes.zones import Place, Zones, share_in
 from rft.mujoco.addresses import Arrays
 from rft.mujoco.hills import FLAT, Hills, tangent_plane
 
@@ -27,9 +28,10 @@ class Bed:
     up, ahead: (3,), unit vectors away from the surface and along it, in the world. geoms, bodies, roots: (G,), numbers of the
     geoms, their bodies and these bodies' roots. dofs: (G,), the last degree of freedom of each body; parents: (nv,), that of
     each degree of freedom, -1 for none. spheres: (G, 4), middle of a sphere around each geom in its frame, and radius, m.
-    hills: the surface in place of a plane, where its grid is not empty."""
+    hills: the surface in place of a plane, where its grid is not empty. laws: one for each of the zones."""
 
-    law: Extruded | Spatial
+    laws: tuple[Extruded | Spatial, ...]
+    zones: Zones
     ground: Ground
     up: np.ndarray
     ahead: np.ndarray
@@ -45,7 +47,16 @@ class Bed:
 
     @classmethod
     def under(
-        cls, model: mujoco.MjModel, geoms: list[int], meshes: list[Mesh], law, ground, slope, level, hills: Hills
+        cls,
+        model: mujoco.MjModel,
+        geoms: list[int],
+        meshes: list[Mesh],
+        laws,
+        zones,
+        ground,
+        slope,
+        level,
+        hills: Hills,
     ) -> Bed:
         """Return the bed under geoms with these meshes. slope: rad, by which the surface rises along x. level: m, the height
         of the surface at x = 0. hills: the surface in place of this plane, or `FLAT`."""
@@ -54,7 +65,7 @@ class Bed:
         spheres = [_sphere(mesh) for mesh in meshes]
         blocks = Blocks([faces(m.vertices[m.faces], m.middle_normals) for m in meshes])
         return cls(
-            law, ground, up, ahead, float(level * up[2]), blocks,
+            laws, zones, ground, up, ahead, float(level * up[2]), blocks,
             np.array(geoms, np.int64), bodies, model.body_rootid[bodies].astype(np.int64),
             np.array([_last_dof(model, b) for b in bodies], np.int64), model.dof_parentid.astype(np.int64),
             np.array(spheres), hills,
@@ -83,8 +94,20 @@ class Bed:
             along_axes(velocity), along_axes(spin), (place @ self.ahead)[:, None], along_axes(up),
             along_axes(self.ahead), ((place * up).sum(-1) - level - sunk)[:, None],
         )  # fmt: skip
-        loads = self.blocks.loads(self.law, self.ground, motions)[:, 0].reshape(-1, 2, 3)
+        loads = self._loads(motions, turn, place).reshape(-1, 2, 3)
         return np.einsum("gij,gpj->gpi", turn, loads).reshape(-1, 6)
+
+    def _loads(self, motions: Motion, turn: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """Return force and moment on each geom along its own axes, (G, 6), summed over the zones."""
+        grounds = [self.ground._replace(grazing_sine=law.grazing_sine) for law in self.laws]
+        if len(self.laws) == 1:
+            return self.blocks.loads(self.laws[0], grounds[0], motions)[:, 0]
+        where = Place(np.moveaxis(turn[self.blocks.owner], 0, -1), place[self.blocks.owner].T)
+        total = np.zeros((len(self.geoms), 6))
+        for zone, (law, ground) in enumerate(zip(self.laws, grounds)):
+            share = share_in(self.zones, zone, self.blocks.faces, where)
+            total += self.blocks.loads_by_numpy(law, ground, motions, share)[:, 0]
+        return total
 
     def _surface(self, middles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the planes up . x = level, (G, 3) and (G,), that geoms with these middles (G, 3) see."""

@@ -21,11 +21,12 @@ from rft.ground import Ground
 from rft.meshes.compiled import on_faces
 from rft.meshes.contact import Motion
 from rft.meshes.triples import cross, dot, minus, plus, times
+from rft.meshes.zones import NOWHERE, PARTLY, Place, Zones, extent_in
 from rft.mujoco.addresses import FARTHEST
 from rft.mujoco.hills import tangent_plane
 from rft.simd import WIDTH, register_formulas
 
-LAYOUT = 27  # numbers that `rft.mujoco.installed.layout_of` writes
+LAYOUT = 31  # numbers that `rft.mujoco.installed.layout_of` writes
 plane = register_jitable(tangent_plane)
 OPTIONS = {"nopython": True, "nogil": True, "error_model": "numpy"}
 
@@ -86,10 +87,12 @@ def kernel(Law: type) -> CFunc:
         numbers = carray(_pointer(row[13]), (groups, 4), np.int64)
         spheres = carray(_pointer(row[14]), (groups, 4), np.float64)
         parents = carray(_pointer(row[15]), nv, np.int64)
-        law = Law(*to_fixed_tuple(carray(_pointer(row[16]), count, np.float64), count))
+        zones = Zones(
+            carray(_pointer(row[27]), (row[29], 3), np.float64), carray(_pointer(row[28]), row[30] + 1, np.int64)
+        )
+        laws = carray(_pointer(row[16]), (row[30], count + 1), np.float64)
         g = carray(_pointer(row[17]), 13, np.float64)
         disturbed = carray(_pointer(row[18]), (row[19], row[20]), np.float64)
-        ground = Ground(g[0], g[1], g[2], g[3], g[4], disturbed)
         up, ahead, level, fastest = (g[5], g[6], g[7]), (g[8], g[9], g[10]), g[11], g[12]
         grid = carray(_pointer(row[23]), (row[24], row[25], 3), np.float64)
         field = carray(_pointer(row[26]), 7, np.float64)
@@ -100,18 +103,19 @@ def kernel(Law: type) -> CFunc:
             x_axis = (turn[0, 0], turn[1, 0], turn[2, 0])
             y_axis = (turn[0, 1], turn[1, 1], turn[2, 1])
             z_axis = (turn[0, 2], turn[1, 2], turn[2, 2])
-            center = (spheres[k, 0], spheres[k, 1], spheres[k, 2])
+            center, radius = (spheres[k, 0], spheres[k, 1], spheres[k, 2]), spheres[k, 3]
+            middle = plus(plus(times(center[0], x_axis), times(center[1], y_axis)), times(center[2], z_axis))
+            middle = plus(place, middle)
             if row[24] > 0:
-                middle = plus(plus(times(center[0], x_axis), times(center[1], y_axis)), times(center[2], z_axis))
-                up, level = plane(grid, field, place[0] + middle[0], place[1] + middle[1])
+                up, level = plane(grid, field, middle[0], middle[1])
             height = dot(up, place) - level
             local_up = (dot(x_axis, up), dot(y_axis, up), dot(z_axis, up))
-            if not height + dot(local_up, center) < spheres[k, 3]:
+            if not height + dot(local_up, center) < radius:
                 continue
             spin = (cvel[body, 0], cvel[body, 1], cvel[body, 2])
             arm = minus(place, (com[root, 0], com[root, 1], com[root, 2]))
             velocity = plus((cvel[body, 3], cvel[body, 4], cvel[body, 5]), cross(spin, arm))
-            if not dot(velocity, velocity) + dot(spin, spin) * spheres[k, 3] ** 2 < fastest * fastest:
+            if not dot(velocity, velocity) + dot(spin, spin) * radius**2 < fastest * fastest:
                 fast[0] += 1
                 if fast[0] == 1:
                     _call(row[22], data, _address(layout))
@@ -124,7 +128,16 @@ def kernel(Law: type) -> CFunc:
                 (dot(x_axis, ahead), dot(y_axis, ahead), dot(z_axis, ahead)),
                 height,
             )
-            f, m = on_faces(law, ground, table, first[k], first[k + 1], motion)
+            f, m = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+            for zone in range(row[30]):
+                extent = extent_in(zones, zone, middle[0], middle[1], radius)
+                if extent == NOWHERE:
+                    continue
+                law = Law(*to_fixed_tuple(laws[zone, :count], count))
+                ground = Ground(g[0], g[1], g[2], laws[zone, count], g[4], disturbed)
+                only = zone if extent == PARTLY else -1
+                df, dm = on_faces(law, ground, table, first[k], first[k + 1], motion, zones, only, Place(turn, place))
+                f, m = plus(f, df), plus(m, dm)
             force = plus(plus(times(f[0], x_axis), times(f[1], y_axis)), times(f[2], z_axis))
             moment = plus(plus(times(m[0], x_axis), times(m[1], y_axis)), times(m[2], z_axis))
             moment = plus(moment, cross(arm, force))

@@ -25,7 +25,7 @@ from rft.refusal import require
 
 ROWS = 4096  # beds of sand at one time
 RETIRED = 64  # layouts of detached beds that are kept, for a step of another thread that is still under way
-LAW, GROUND = 5, 6  # places of their numbers in the arrays of a `Layout`
+LAWS = 5  # place of the laws' numbers in the arrays of a `Layout`
 REMOVED = -1  # in place of a model's address
 
 TABLE = np.zeros((ROWS + 1, 3), np.int64)
@@ -72,7 +72,7 @@ def install(model: mujoco.MjModel, bed: Bed) -> int:
         if layout:
             from rft.mujoco.compiled import kernel
 
-            TABLE[row, 1:] = kernel(type(record(bed.law))).address, layout.numbers.ctypes.data
+            TABLE[row, 1:] = kernel(_form(bed)).address, layout.numbers.ctypes.data
         TABLE[row, 0] = model._address
         return row
 
@@ -95,8 +95,7 @@ def change(row: int, bed: Bed) -> None:
         entry = _entries[row]
         _entries[row] = entry._replace(bed=bed)
         if entry.layout:
-            entry.layout.arrays[LAW][:] = np.array(record(bed.law), float)
-            entry.layout.arrays[GROUND][:5] = bed.ground[:5]
+            entry.layout.arrays[LAWS][:] = _laws(bed)
 
 
 def is_installed(row: int) -> bool:
@@ -177,8 +176,7 @@ def layout_of(model: mujoco.MjModel, bed: Bed) -> Layout:
     """Return the layout of a bed under a model, in the order in which `rft.mujoco.compiled.kernel` reads it."""
     from rft.mujoco.compiled import kernel
 
-    law = record(bed.law)
-    kernel(type(law))
+    kernel(_form(bed))
     (table, first), ground, fast = bed.blocks.rows, bed.ground, np.zeros(1, np.int64)
     report = ctypes.cast(_tell_too_fast, ctypes.c_void_p).value
     arrays = [
@@ -187,15 +185,27 @@ def layout_of(model: mujoco.MjModel, bed: Bed) -> Layout:
         np.stack([bed.geoms, bed.bodies, bed.roots, bed.dofs], -1),
         bed.spheres,
         bed.parents,
-        np.array(law, float),
+        _laws(bed),
         np.array([*ground[:5], *bed.up, *bed.ahead, bed.level, FASTEST]),
         np.array(ground.disturbed, float),
         fast,
         *bed.hills,
+        *bed.zones,
     ]
     arrays = [np.ascontiguousarray(x) for x in arrays]
     addresses = [x.ctypes.data for x in arrays]
     sizes = [model.nv, model.ngeom, model.nbody, len(table), len(bed.geoms)]
     numbers = [*offsets(), *sizes, *addresses[:8], *arrays[7].shape, addresses[8], report]
     numbers += [addresses[9], *bed.hills.grid.shape[:2], addresses[10]]
+    numbers += [*addresses[11:13], len(bed.zones.planes), len(bed.laws)]
     return Layout(np.array(numbers, np.int64), tuple(arrays), arrays[8])
+
+
+def _form(bed: Bed) -> type:
+    """Return the class of the records of a bed's laws."""
+    return type(record(bed.laws[0]))
+
+
+def _laws(bed: Bed) -> np.ndarray:
+    """Return the numbers of a bed's laws, and the sine of the grazing angle of each in the last column."""
+    return np.array([[*record(law), law.grazing_sine] for law in bed.laws], float)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 import weakref
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -21,7 +21,8 @@ from rft.mujoco.bed import Bed
 from rft.mujoco.floor import Apart, apart, floors, part, rejoin
 from rft.mujoco.geoms import chosen_geoms, geom_name, mesh_of_elements
 from rft.mujoco.hills import FLAT, Hills, hills_of
-from rft.mujoco.media import Media, law_of, sample
+from rft.mujoco.media import Media, law_of, one_form, sample
+from rft.mujoco.regions import zones_of
 from rft.mujoco.steps import needed_rounding, sinkage, step_note
 from rft.plates import StressMap
 from rft.refusal import Refusal, formatted, located, require
@@ -110,7 +111,8 @@ class Sand:
     def batch(self, nsim: int, nthread: int = 0, persistent: bool = False, media: Sequence[Any] | None = None) -> Any:
         """Return a ``mujoco.batch.Batch`` of simulations of the model in this sand.
 
-        media: one for each simulation, of one form, such as `sample` draws; ``sand.media[i] = medium`` changes one later."""
+        media: one for each simulation, of one form, such as `sample` draws; ``sand.media[i] = medium`` changes one later. With
+        regions, one may be a list of the medium and those of the regions; a single medium leaves those of the regions."""
         model = self._model()
         require(model is not None and self.is_attached, "the sand is detached", instead="attach it anew")
         try:
@@ -120,9 +122,9 @@ class Sand:
         require(media is None or len(media) == nsim, f"media must be {nsim}, one for each simulation")
         batch = Batch(model, nsim, nthread, persistent)
         if media is not None:
-            laws = [law_of(medium) for medium in media]
+            new = Media(model, self._bed, media)
             self._forget_media()
-            self.media = Media(model, self._bed, laws)
+            self.media = new
         # A Batch copies the model that it is given, and a copy has no sand.
         batch.set_models(model if media is None else self.media.models)
         return batch
@@ -162,6 +164,7 @@ def attach(
     element: float | None = None,
     rounding: float | None = None,
     effects: Sequence[GroundEffect] = (),
+    regions: Mapping[str, Any] | None = None,
 ) -> Sand:
     """Put sand under geoms of a MuJoCo model, until `Sand.detach` or until the model is gone.
 
@@ -187,6 +190,9 @@ def attach(
         for, `rft.mujoco.steps.needed_rounding`.
     effects : list of GroundEffect
         Effects on the ground, such as `rft.ground.GrainInertia`.
+    regions : dict
+        Other media by the regions where they lie, such as ``{"x > 0.5": "poppy-seeds-close", "0 < y < x": other}``, with x
+        and y in m in the world. A place belongs to the first region that holds it, or else to ``medium``.
 
     Returns
     -------
@@ -208,7 +214,9 @@ def attach(
     hills, field = (FLAT, []) if not isinstance(level, str) else _field(model, level, slope)
     level = 0.0 if field else level
     in_range("level", level, -1e6, 1e6, unit="m")
-    law, chosen = law_of(medium), chosen_geoms(model, geoms)
+    regions = {} if regions is None else regions
+    zones = zones_of(regions)
+    laws, chosen = one_form((*map(law_of, regions.values()), law_of(medium))), chosen_geoms(model, geoms)
     taken = {int(g) for bed in installed.beds(model) for g in bed.geoms} & {*chosen}
     names = ", ".join(formatted(geom_name(model, g)) for g in sorted(taken)[:3])
     require(not taken, f"sand is attached to {names} already", instead="detach it, or name other geoms")
@@ -221,8 +229,8 @@ def attach(
     needed = needed_rounding(model, chosen)
     rounding = max(needed, 1e-6) if rounding is None else rounding
     effects = (*effects, Slope(slope)) if slope else tuple(effects)
-    ground = ground_of(effects, Ground(rounding=rounding, grazing_sine=law.grazing_sine))
-    bed = Bed.under(model, chosen, meshes(model, chosen, element), law, ground, slope, level, hills)
+    ground = ground_of(effects, Ground(rounding=rounding))
+    bed = Bed.under(model, chosen, meshes(model, chosen, element), laws, zones, ground, slope, level, hills)
     planes = [g for g in field or floors(model, bed.up, bed.level) if _touch(model, chosen, g)]
     separation = apart(model, chosen, planes) if planes else None
     notes = [_contact_note(model, chosen, planes)] if planes else []
