@@ -13,6 +13,7 @@ from artists import drawn
 from scipy.spatial.transform import Rotation
 
 import rft
+from rft.balance import backend
 from rft.balance.backend import Note, preferring
 from rft.ground import GrainInertia, Ground, Slope
 from rft.meshes import Spatial, wrench
@@ -342,6 +343,184 @@ def test_elements_are_as_long_as_asked_for(geom):
         corners = mesh.vertices[mesh.faces]
         edges = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=-1)
         assert edges.max() < 1.75 * element and 0.45 * element < np.median(edges)
+
+
+PLATE = """<body pos="0 0 0.04"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>
+<geom type="box" size="0.005 0.046 0.06" mass="1e6"/></body>"""
+REMEMBERS = '<size nuserdata="30000"/><option gravity="0 0 0" timestep="{}"/>'
+needs_numba = pytest.mark.skipif(not backend.installed(), reason="needs the extra: pip install 'geomech[fast]'")
+
+
+def moved(sand, model, data, velocity, seconds):
+    """Forces on the only geom at each step of a motion with a velocity along x and z."""
+    forces = []
+    for _ in range(round(seconds / model.opt.timestep)):
+        data.qvel[:] = velocity
+        mujoco.mj_step(model, data)
+        forces.append(sand.forces(data)[0])
+    return np.array(forces)
+
+
+@needs_numba
+def test_a_dragged_plate_leaves_a_trench_and_a_ridge_and_its_second_run_meets_less_sand():
+    """Fresh ground bears as if it remembered nothing. The volume stays, to rounding; what is left is as wide as the plate."""
+    prints = rft.mujoco.Footprints(spacing=0.01, length=0.6, width=0.4, x=0.1, y=0.05, repose=0.6)
+    model = model_of(PLATE.replace('pos="0 0', 'pos="0 0.05'), REMEMBERS.format(0.002))
+
+    def runs(**more):
+        data, forces = mujoco.MjData(model), []
+        with rft.mujoco.attach(model, MAP, rounding=0.01, **more) as sand:
+            for velocity, seconds in (
+                ((0.3, 0), 0.7),
+                ((0, 0.3), 0.4),
+                ((-0.3, 0), 0.7),
+                ((0, -0.3), 0.4),
+                ((0.3, 0), 0.5),
+            ):
+                forces.append(moved(sand, model, data, velocity, seconds))
+                if more and len(forces) == 1:
+                    memory, during = sand._bed.prints.memory(data.userdata), [x.copy() for x in sand.ground(data)]
+                    assert (memory.pressed < 0.0).any() and memory.ground.max() > 0.01
+            return forces, (during, sand.ground(data)) if more else None
+
+    plain, _ = runs()
+    forces, ((x, y, heights), (_, _, later)) = runs(footprints=prints)
+    assert heights.shape == (40, 60) and (x[0], y[-1]) == pytest.approx((-0.195, 0.245))
+    for z in (heights, later):
+        assert abs(z.sum()) < 1e-12 * np.abs(z).sum() and np.abs(z).sum() > 1.0
+    np.testing.assert_allclose(forces[0], plain[0], rtol=0, atol=1e-12 * np.abs(plain[0]).max())
+    np.testing.assert_allclose(forces[1], plain[1], rtol=0, atol=1e-12 * np.abs(plain[0]).max())
+    behind, middle = heights[:, np.searchsorted(x, 0.1)], np.abs(y - 0.05) < 0.02
+    assert behind[middle] == pytest.approx(-0.02, abs=3e-3) and behind[np.abs(y - 0.05) > 0.15] == pytest.approx(0.0)
+    assert 0.005 < behind.max() < 0.03 and behind == pytest.approx(behind[::-1], abs=2e-3)
+    assert x[heights[20].argmax()] == pytest.approx(0.22, abs=0.02) and heights[20].max() > behind.max()
+    again = slice(50, 200)
+    assert np.abs(forces[4][again, 0]).mean() < 0.5 * np.abs(plain[4][again, 0]).mean()
+
+
+@needs_numba
+def test_a_cone_slides_to_the_angle_of_repose_and_rests():
+    """Within 2 degrees in all directions, in steps of any length, without losing a grain."""
+    model = model_of(PLATE.replace("0 0 0.04", "0 0 1"), REMEMBERS.format(0.002))
+    for repose, step in ((0.4, 2e-3), (0.66, 1e-4)):
+        model.opt.timestep = step
+        data = mujoco.MjData(model)
+        with rft.mujoco.attach(model, MAP, footprints=rft.mujoco.Footprints(0.01, 0.7, 0.6, 1, 2, repose)) as sand:
+            x, y, _ = sand.ground(data)
+            away, memory = np.hypot(*np.meshgrid(x - 1, y - 2)), sand._bed.prints.memory(data.userdata)
+            memory.ground[:] = np.maximum(0.0, 0.15 - 2.5 * away)
+            before, memory.head[3:7] = memory.ground.sum(), [0, 60, 0, 70]
+            mujoco.mj_step(model, data, round(2.0 / step))
+            heights = sand.ground(data)[2]
+            assert heights.sum() == pytest.approx(before, rel=1e-13) and not memory.head[3:7].any()
+            flank = (away > 0.03) & (heights > 0.015)
+            by_y, by_x = (x[flank] for x in np.gradient(heights, 0.01))
+            angles, directions = np.degrees(np.arctan(np.hypot(by_x, by_y))), np.arctan2(by_y, by_x)
+            assert flank.sum() > 60 and np.degrees(repose) == pytest.approx(angles.min(), abs=2.5)
+            for k in range(8):
+                sector = np.abs((directions - k * np.pi / 4 + np.pi) % (2 * np.pi) - np.pi) < np.pi / 8
+                assert angles[sector].mean() == pytest.approx(np.degrees(repose), abs=2.0)
+
+
+@needs_numba
+def test_a_foot_meets_less_sand_in_its_print_and_prints_lie_on_slopes_and_hills():
+    """The print is where the foot was, as deep as it was below the surface; a new foot beside it meets what the first met."""
+    foot = f'<body pos="0.12 -0.06 0"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>{{}}</body>'
+    foot, prints = (
+        foot.format('<geom type="cylinder" size="0.03 0.03" mass="1e6"/>'),
+        rft.mujoco.Footprints(0.01, 0.5, 0.5),
+    )
+    rises = np.linspace(0.0, 1.0, 5) * np.ones((4, 1))
+    hills = '<asset><hfield name="hills" nrow="4" ncol="5" size="1 0.5 0.2 0.1" elevation="{}"/></asset>'
+    hills = hills.format(" ".join(map(str, rises.ravel())))
+    field = '<geom name="hills" type="hfield" hfield="hills" pos="0 0 -0.1"/>'  # rises by 0.2 m in 2 m
+    for options, slope in (({}, 0.0), ({"slope": math.atan(0.1)}, 0.1), ({"level": "hills"}, 0.1)):
+        model = model_of(foot + field * (options.get("level") == "hills"), REMEMBERS.format(0.002), hills)
+        data = mujoco.MjData(model)
+        data.qpos[1] = 0.12 * slope + 0.03 + 0.003
+        with rft.mujoco.attach(model, MAP, rounding=0.01, footprints=prints, **options) as sand:
+            mujoco.mj_forward(model, data)
+            x, y, flat = sand.ground(data)
+            np.testing.assert_allclose(flat, slope * x * np.ones((50, 1)), atol=1e-6)
+            first = moved(sand, model, data, (0, -0.1), 0.2)[:, 2]
+            moved(sand, model, data, (0, 0.1), 0.2)
+            second = moved(sand, model, data, (0, -0.1), 0.2)[:, 2]
+            deep = sand.ground(data)[2] - flat
+            i, j = np.nonzero(deep < 0.6 * deep.min())
+            assert (x[j].mean(), y[i].mean()) == pytest.approx((0.12, -0.06), abs=2e-3) and 28 <= len(i) <= 40
+            assert deep.min() == pytest.approx(-0.017, abs=4e-3)
+            assert first[-1] > 1.0 and second[60] < 0.5 * first[60] and second[-1] < first[-1]
+            if slope == 0.0:
+                moved(sand, model, data, (0, 0.2), 0.25)
+                moved(sand, model, data, (-0.5, 0), 0.3)
+                data.qpos[1] = 0.033
+                np.testing.assert_allclose(moved(sand, model, data, (0, -0.1), 0.2)[:, 2], first, rtol=1e-9)
+
+
+@needs_numba
+def test_each_simulation_remembers_for_itself():
+    """Data, copies, resets, rollouts and batches each have the ground of their own motion."""
+    model = model_of(BALL, '<size nuserdata="9000"/>')
+    prints = rft.mujoco.Footprints(0.01, 0.4, 0.4)
+    with rft.mujoco.attach(model, MAP, rounding=0.02, footprints=prints) as sand:
+        data, still = mujoco.MjData(model), mujoco.MjData(model)
+        data.qvel[:] = start = [0.5, 0.2, 0, 0, 0, 0]
+        mujoco.mj_step(model, data, 150)
+        ground, grounds = sand.ground(data)[2], []
+        copied = __import__("copy").copy(data)
+        for _ in range(2):
+            mujoco.mj_forward(model, copied)  # the second time it is the same step
+            grounds.append(sand.ground(copied)[2])
+        np.testing.assert_array_equal(*grounds)
+        assert np.ptp(ground) > 0.005 and not sand.ground(still)[2].any() and not still.userdata.any()
+        from mujoco import rollout
+
+        mujoco.mj_resetData(model, copied)
+        assert not sand.ground(copied)[2].any()
+        copied.qvel[:] = start
+        state = np.zeros((2, mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)))
+        mujoco.mj_getState(model, copied, state[0], mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        state[1] = state[0]
+        states, _ = rollout.rollout(model, [copied], state, nstep=150)  # both by the same data, one after the other
+        np.testing.assert_array_equal(states[:, -1, 1:8], [data.qpos, data.qpos])
+        if int(mujoco.__version__.partition(".")[0]) < 4:
+            return
+        for more in ({}, {"persistent": True}):
+            batch = sand.batch(3, 2, media=[MAP, OTHER, MAP], **more)
+            batch.bind("qvel")[:2] = start
+            batch.step(nstep=150)
+            np.testing.assert_allclose(batch.bind("qpos")[0], data.qpos, rtol=0, atol=1e-13)
+            grounds = [sand.ground(np.array(numbers))[2] for numbers in batch.bind("userdata")]
+            np.testing.assert_allclose(grounds[0], ground, rtol=0, atol=1e-13)
+            assert np.abs(grounds[1] - ground).max() > 1e-4 and np.abs(grounds[2] - ground).max() > 1e-4
+            batch.reset([0])
+            assert not sand.ground(batch.bind("userdata")[0])[2].any() and batch.bind("userdata")[1].any()
+
+
+def test_footprints_that_cannot_be_are_refused():
+    model, prints = model_of(BALL, '<size nuserdata="100"/>'), rft.mujoco.Footprints(0.01, 0.4, 0.4)
+    with (
+        preferring("numpy"),
+        pytest.raises(rft.Refusal, match=r"footprints need compiled code: pip install 'geomech\[fast\]'"),
+    ):
+        rft.mujoco.attach(model, MAP, footprints=prints)
+    with pytest.raises(rft.Refusal, match="footprints have 16000000 cells, more than 1000000"):
+        rft.mujoco.Footprints(0.001, 4, 4)
+    with pytest.raises(rft.Refusal, match="spacing must be"):
+        rft.mujoco.Footprints(0.0, 4, 4)
+    with pytest.raises(rft.Refusal, match="footprints must be rft.mujoco.Footprints"):
+        rft.mujoco.attach(model, MAP, footprints=0.01)
+    with rft.mujoco.attach(model, MAP) as sand, pytest.raises(rft.Refusal, match="the ground remembers nothing: give"):
+        sand.ground(mujoco.MjData(model))
+    if not backend.installed():
+        return
+    line = r"footprints need 8015 numbers of userdata, the model has 100: write <size nuserdata=\"8015\"/> in its MJCF"
+    with pytest.raises(rft.Refusal, match=line):
+        rft.mujoco.attach(model, MAP, footprints=prints)
+    both = model_of(BALL + BALL.replace("ball", "other"), '<size nuserdata="9000"/>')
+    line = "another sand under the model has footprints: attach all geoms at once"
+    with rft.mujoco.attach(both, MAP, geoms="ball", footprints=prints), pytest.raises(rft.Refusal, match=line):
+        rft.mujoco.attach(both, MAP, geoms="other", footprints=prints)
 
 
 def test_forces_turn_and_mirror_with_the_motion():

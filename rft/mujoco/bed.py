@@ -16,6 +16,7 @@ from rft.meshes.law import Spatial
 from rft.meshes.mesh import Mesh
 from rft.meshes.zones import Place, Zones, share_in
 from rft.mujoco.addresses import Arrays
+from rft.mujoco.footprints import Prints
 from rft.mujoco.hills import FLAT, Hills, tangent_plane
 
 FASTEST = 100.0  # m/s, assumed: a geom that is faster is the result of a time step that is too long, and bears nothing
@@ -28,7 +29,8 @@ class Bed:
     up, ahead: (3,), unit vectors away from the surface and along it, in the world. geoms, bodies, roots: (G,), numbers of the
     geoms, their bodies and these bodies' roots. dofs: (G,), the last degree of freedom of each body; parents: (nv,), that of
     each degree of freedom, -1 for none. spheres: (G, 4), middle of a sphere around each geom in its frame, and radius, m.
-    hills: the surface in place of a plane, where its grid is not empty. laws: one for each of the zones."""
+    hills: the surface in place of a plane, where its grid is not empty. laws: one for each of the zones. prints: what
+    footprints follow from; None for ground that remembers nothing."""
 
     laws: tuple[Extruded | Spatial, ...]
     zones: Zones
@@ -44,6 +46,7 @@ class Bed:
     parents: np.ndarray
     spheres: np.ndarray
     hills: Hills = FLAT
+    prints: Prints | None = None
 
     @classmethod
     def under(
@@ -89,7 +92,9 @@ class Bed:
             velocity, spin = self.twists(data)
         turn, place = data.geom_xmat[self.geoms].reshape(-1, 3, 3), data.geom_xpos[self.geoms]
         along_axes = lambda x: np.einsum("gij,gi->gj", turn, np.broadcast_to(x, place.shape))[:, None]
-        up, level = self._surface(place + np.einsum("gij,gj->gi", turn, self.spheres[:, :3]))
+        up, level = self.surface(place + np.einsum("gij,gj->gi", turn, self.spheres[:, :3]))
+        if self.prints:
+            level = level + up[:, 2] * self.prints.memory(data.userdata).levels
         motions = Motion(
             along_axes(velocity), along_axes(spin), (place @ self.ahead)[:, None], along_axes(up),
             along_axes(self.ahead), ((place * up).sum(-1) - level - sunk)[:, None],
@@ -109,7 +114,7 @@ class Bed:
             total += self.blocks.loads_by_numpy(law, ground, motions, share)[:, 0]
         return total
 
-    def _surface(self, middles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self, middles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the planes up . x = level, (G, 3) and (G,), that geoms with these middles (G, 3) see."""
         if not self.hills.grid.size:
             return np.broadcast_to(self.up, middles.shape), np.full(len(middles), self.level)

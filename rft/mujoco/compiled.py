@@ -23,11 +23,13 @@ from rft.meshes.contact import Motion
 from rft.meshes.triples import cross, dot, minus, plus, times
 from rft.meshes.zones import NOWHERE, PARTLY, Place, Zones, extent_in
 from rft.mujoco.addresses import FARTHEST
+from rft.mujoco.footprints import COMPILED, HEAD, PER_CELL, PER_GEOM, memory_of, remember
 from rft.mujoco.hills import tangent_plane
 from rft.simd import WIDTH, register_formulas
 
-LAYOUT = 31  # numbers that `rft.mujoco.installed.layout_of` writes
-plane = register_jitable(tangent_plane)
+LAYOUT = 41  # numbers that `rft.mujoco.installed.layout_of` writes
+for function in (tangent_plane, *COMPILED):
+    register_jitable(function)
 OPTIONS = {"nopython": True, "nogil": True, "error_model": "numpy"}
 
 
@@ -97,6 +99,10 @@ def kernel(Law: type) -> CFunc:
         grid = carray(_pointer(row[23]), (row[24], row[25], 3), np.float64)
         field = carray(_pointer(row[26]), 7, np.float64)
         fast = carray(_pointer(row[21]), 1, np.int64)
+        levels = g[:0]
+        if row[31] != 0:
+            _call(row[31], data, _address(layout))
+            levels = carray(_pointer(fields[row[32]] + 8 * (row[33] + HEAD)), groups, np.float64)
         for k in range(groups):
             geom, body, root, dof = numbers[k, 0], numbers[k, 1], numbers[k, 2], numbers[k, 3]
             turn, place = xmat[geom], (xpos[geom, 0], xpos[geom, 1], xpos[geom, 2])
@@ -107,8 +113,10 @@ def kernel(Law: type) -> CFunc:
             middle = plus(plus(times(center[0], x_axis), times(center[1], y_axis)), times(center[2], z_axis))
             middle = plus(place, middle)
             if row[24] > 0:
-                up, level = plane(grid, field, middle[0], middle[1])
+                up, level = tangent_plane(grid, field, middle[0], middle[1])
             height = dot(up, place) - level
+            if row[31] != 0:
+                height -= up[2] * levels[k]
             local_up = (dot(x_axis, up), dot(y_axis, up), dot(z_axis, up))
             if not height + dot(local_up, center) < radius:
                 continue
@@ -147,6 +155,38 @@ def kernel(Law: type) -> CFunc:
                 dof = parents[dof]
 
     return _compiled(add_forces, f"the forces of grains in MuJoCo of the form {Law.__name__}")
+
+
+@functools.cache
+def recorder() -> CFunc:
+    """Return the C function (data, layout) that lets footprints remember a step."""
+
+    def record(data, layout):
+        row = carray(layout, LAYOUT, np.int64)
+        fields = carray(data, FARTHEST // 8, np.int64)
+        ngeom, nbody, groups, g = row[7], row[8], row[10], carray(_pointer(row[17]), 13, np.float64)
+        shape, first = (row[34], row[35]), carray(_pointer(row[39]), groups + 1, np.int64)
+        size = HEAD + PER_GEOM * groups + PER_CELL * shape[0] * shape[1]
+        numbers = carray(_pointer(fields[row[32]] + 8 * row[33]), size, np.float64)
+        prints = (
+            carray(_pointer(row[36]), 5, np.float64),
+            carray(_pointer(row[37]), shape, np.float64),
+            carray(_pointer(row[38]), (first[groups], 3), np.float64),
+            first,
+        )
+        bodies = carray(_pointer(row[13]), (groups, 4), np.int64), carray(_pointer(row[14]), (groups, 4), np.float64)
+        poses = (
+            carray(_pointer(fields[row[1]]), (ngeom, 3), np.float64),
+            carray(_pointer(fields[row[2]]), (ngeom, 3, 3), np.float64),
+            carray(_pointer(fields[row[3]]), (nbody, 6), np.float64),
+            carray(_pointer(fields[row[5]]), (nbody, 3), np.float64),
+        )
+        hills = carray(_pointer(row[23]), (row[24], row[25], 3), np.float64), carray(_pointer(row[26]), 7, np.float64)
+        time = carray(_pointer(_address(data) + 8 * row[40]), 1, np.float64)[0]
+        slopes = hills[0], hills[1], (g[5], g[6], g[7]), g[11]
+        remember(memory_of(numbers, groups, shape[0], shape[1]), time, prints, bodies, poses, slopes)
+
+    return _compiled(record, "footprints in the ground of MuJoCo")
 
 
 def _compiled(function, purpose: str) -> CFunc:

@@ -19,8 +19,9 @@ import numpy as np
 
 from rft.balance.backend import Note, compiles
 from rft.meshes.contact import record
-from rft.mujoco.addresses import Arrays, check_offsets, offsets
+from rft.mujoco.addresses import Arrays, check_offsets, memory_offsets, offsets
 from rft.mujoco.bed import FASTEST, Bed
+from rft.mujoco.footprints import Prints
 from rft.refusal import require
 
 ROWS = 4096  # beds of sand at one time
@@ -61,7 +62,7 @@ def install(model: mujoco.MjModel, bed: Bed) -> int:
     """Let the callback serve a bed under a model until `remove`, or until the model is gone; return its row."""
     with _lock:
         compiled = serves_compiled()
-        check_offsets(mujoco.MjData(model))
+        check_offsets(mujoco.MjData(model), bed.prints is not None)
         layout = layout_of(model, bed) if compiled else None  # compiles
         _set_callback(compiled)
         row = next((k for k in range(ROWS) if TABLE[k, 0] in (0, REMOVED)), ROWS)
@@ -191,6 +192,7 @@ def layout_of(model: mujoco.MjModel, bed: Bed) -> Layout:
         fast,
         *bed.hills,
         *bed.zones,
+        *(bed.prints[2:] if bed.prints else ()),
     ]
     arrays = [np.ascontiguousarray(x) for x in arrays]
     addresses = [x.ctypes.data for x in arrays]
@@ -198,7 +200,16 @@ def layout_of(model: mujoco.MjModel, bed: Bed) -> Layout:
     numbers = [*offsets(), *sizes, *addresses[:8], *arrays[7].shape, addresses[8], report]
     numbers += [addresses[9], *bed.hills.grid.shape[:2], addresses[10]]
     numbers += [*addresses[11:13], len(bed.zones.planes), len(bed.laws)]
+    numbers += _print_numbers(model, bed.prints, addresses[13:]) if bed.prints else [0] * 10
     return Layout(np.array(numbers, np.int64), tuple(arrays), arrays[8])
+
+
+def _print_numbers(model: mujoco.MjModel, prints: Prints, addresses: list[int]) -> list[int]:
+    """Return the numbers of a layout by which footprints are remembered."""
+    from rft.mujoco.compiled import recorder
+
+    time, userdata = memory_offsets()
+    return [recorder().address, userdata, model.nuserdata - prints.numbers, *prints.shape, *addresses, time]
 
 
 def _form(bed: Bed) -> type:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 import weakref
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import mujoco
@@ -19,6 +20,7 @@ from rft.meshes.mesh import Mesh
 from rft.mujoco import installed
 from rft.mujoco.bed import Bed
 from rft.mujoco.floor import Apart, apart, floors, part, rejoin
+from rft.mujoco.footprints import Footprints, Prints
 from rft.mujoco.geoms import chosen_geoms, geom_name, mesh_of_elements
 from rft.mujoco.hills import FLAT, Hills, hills_of
 from rft.mujoco.media import Media, law_of, one_form, sample
@@ -27,7 +29,7 @@ from rft.mujoco.steps import needed_rounding, sinkage, step_note
 from rft.plates import StressMap
 from rft.refusal import Refusal, formatted, located, require
 
-__all__ = ["Sand", "attach", "sample"]
+__all__ = ["Footprints", "Sand", "attach", "sample"]
 
 PER_GEOM = 4  # elements along the mean radius of the geoms, if no length is given
 SLOWER = 60  # times that a step takes by NumPy over compiled code, measured: pytest -m benchmark -k hexapod
@@ -101,6 +103,18 @@ class Sand:
         twist = np.concatenate(self._bed.twists(data), axis=1)
         return float((self._bed.wrenches(data) * twist).sum())
 
+    def ground(self, data: mujoco.MjData | np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the ground that footprints have left: x (C,), y (R,) and heights (R, C), m, as if the geoms were not in it.
+
+        data: of a simulation, or its userdata, (N,), such as a row of what ``bind("userdata")`` of a Batch gives."""
+        prints = self._bed.prints
+        require(prints is not None, "the ground remembers nothing", instead="give ``footprints`` to attach")
+        memory = prints.memory(data if isinstance(data, np.ndarray) else data.userdata)
+        x_0, y_0, size = prints.grid[:3]
+        along = lambda count, start: start + size * (np.arange(count) + 0.5)
+        rows, columns = prints.shape
+        return along(columns, x_0), along(rows, y_0), prints.surface + memory.ground + memory.pressed
+
     def sinkage(self, data: mujoco.MjData, time: float = 1.0) -> tuple[float, float]:
         """Return how deep, m, the geoms sink from where they are in the data, straight down under the weight of their
         robot: until the grains bear it, and a ``time``, s, later, as the rounding lets them creep."""
@@ -165,6 +179,7 @@ def attach(
     rounding: float | None = None,
     effects: Sequence[GroundEffect] = (),
     regions: Mapping[str, Any] | None = None,
+    footprints: Footprints | None = None,
 ) -> Sand:
     """Put sand under geoms of a MuJoCo model, until `Sand.detach` or until the model is gone.
 
@@ -193,6 +208,8 @@ def attach(
     regions : dict
         Other media by the regions where they lie, such as ``{"x > 0.5": "poppy-seeds-close", "0 < y < x": other}``, with x
         and y in m in the world. A place belongs to the first region that holds it, or else to ``medium``.
+    footprints : Footprints
+        Grid on which the ground remembers what geoms press down and heap up; None for ground that remembers nothing.
 
     Returns
     -------
@@ -231,6 +248,8 @@ def attach(
     effects = (*effects, Slope(slope)) if slope else tuple(effects)
     ground = ground_of(effects, Ground(rounding=rounding))
     bed = Bed.under(model, chosen, meshes(model, chosen, element), laws, zones, ground, slope, level, hills)
+    if footprints is not None:
+        bed = replace(bed, prints=prints_under(model, bed, footprints))
     planes = [g for g in field or floors(model, bed.up, bed.level) if _touch(model, chosen, g)]
     separation = apart(model, chosen, planes) if planes else None
     notes = [_contact_note(model, chosen, planes)] if planes else []
@@ -238,6 +257,25 @@ def attach(
     for line in notes:  # before anything is changed: a filter may turn warnings into errors
         warnings.warn(line, Note, stacklevel=2)
     return Sand(model, bed, element, notes, separation)
+
+
+def prints_under(model: mujoco.MjModel, bed: Bed, footprints: Footprints) -> Prints:
+    """Return what footprints in a bed follow from; Refusal where there is no memory for them."""
+    require(isinstance(footprints, Footprints), "footprints must be rft.mujoco.Footprints", value=footprints)
+    require(installed.serves_compiled(), "footprints need compiled code", instead="pip install 'geomech[fast]'")
+    others = any(other.prints for other in installed.beds(model))
+    require(not others, "another sand under the model has footprints", instead="attach all geoms at once")
+    points = [mesh.vertices for mesh in meshes(model, list(bed.geoms), footprints.spacing / 2)]
+    places = np.stack(np.meshgrid(*footprints.middles), -1).reshape(-1, 2)
+    up, level = bed.surface(np.concatenate([places, np.zeros((len(places), 1))], 1))
+    heights = (level - (up[:, :2] * places).sum(-1)) / up[:, 2]
+    first = np.cumsum([0, *map(len, points)]).astype(np.int64)
+    shape = footprints.shape
+    prints = Prints(shape, len(points), footprints.grid, heights.reshape(shape), np.concatenate(points), first)
+    cure = f'write <size nuserdata="{prints.numbers}"/> in its MJCF, or spec.nuserdata'
+    what = f"footprints need {prints.numbers} numbers of userdata, the model has {model.nuserdata}"
+    require(model.nuserdata >= prints.numbers, what, instead=cure)
+    return prints
 
 
 def _field(model: mujoco.MjModel, name: str, slope: float) -> tuple[Hills, list[int]]:
