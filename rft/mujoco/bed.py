@@ -18,6 +18,7 @@ from rft.meshes.zones import Place, Zones, share_in
 from rft.mujoco.addresses import Arrays
 from rft.mujoco.footprints import Prints
 from rft.mujoco.hills import FLAT, Hills, tangent_plane
+from rft.mujoco.rest import Held, Rest, damping, held_of
 
 FASTEST = 100.0  # m/s, assumed: a geom that is faster is the result of a time step that is too long, and bears nothing
 
@@ -30,7 +31,8 @@ class Bed:
     geoms, their bodies and these bodies' roots. dofs: (G,), the last degree of freedom of each body; parents: (nv,), that of
     each degree of freedom, -1 for none. spheres: (G, 4), middle of a sphere around each geom in its frame, and radius, m.
     hills: the surface in place of a plane, where its grid is not empty. laws: one for each of the zones. prints: what
-    footprints follow from; None for ground that remembers nothing."""
+    footprints follow from; None for ground that remembers nothing. rest: what holding a body at rest follows from; None for
+    forces that depend on the motion alone."""
 
     laws: tuple[Extruded | Spatial, ...]
     zones: Zones
@@ -47,6 +49,7 @@ class Bed:
     spheres: np.ndarray
     hills: Hills = FLAT
     prints: Prints | None = None
+    rest: Rest | None = None
 
     @classmethod
     def under(
@@ -88,6 +91,7 @@ class Bed:
         """Return force, N, and moment about the geom's origin, N m, on each geom, (G, 6), in the world.
 
         velocity, spin: (G, 3), by default those of the data. sunk: m, by which all geoms lie deeper than in the data."""
+        holds = velocity is None and self.rest is not None
         if velocity is None:
             velocity, spin = self.twists(data)
         turn, place = data.geom_xmat[self.geoms].reshape(-1, 3, 3), data.geom_xpos[self.geoms]
@@ -100,7 +104,22 @@ class Bed:
             along_axes(self.ahead), ((place * up).sum(-1) - level - sunk)[:, None],
         )  # fmt: skip
         loads = self._loads(motions, turn, place).reshape(-1, 2, 3)
-        return np.einsum("gij,gpj->gpi", turn, loads).reshape(-1, 6)
+        wrenches = np.einsum("gij,gpj->gpi", turn, loads).reshape(-1, 6)
+        if holds:
+            held, radii = self.held(data.userdata), self.spheres[:, 3]
+            speed = np.sqrt((velocity**2).sum(-1) + (spin**2).sum(-1) * radii**2)
+            wrenches *= damping(speed, held.speeds, self.ground.rounding)[:, None]
+            wrenches += held.wrenches
+        return wrenches
+
+    @property
+    def remembered(self) -> int:
+        """How many numbers of userdata a simulation takes."""
+        return sum(x.numbers for x in (self.rest, self.prints) if x is not None)
+
+    def held(self, userdata: np.ndarray) -> Held:
+        """Return what holds the geoms, from the userdata (N,) of a simulation."""
+        return held_of(userdata[len(userdata) - self.remembered :], len(self.geoms))
 
     def _loads(self, motions: Motion, turn: np.ndarray, place: np.ndarray) -> np.ndarray:
         """Return force and moment on each geom along its own axes, (G, 6), summed over the zones."""

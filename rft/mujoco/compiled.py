@@ -6,6 +6,7 @@ its law with its `Layout` and the model's and the data's addresses."""
 from __future__ import annotations
 
 import functools
+import math
 import sys
 
 import numpy as np
@@ -25,10 +26,13 @@ from rft.meshes.zones import NOWHERE, PARTLY, Place, Zones, extent_in
 from rft.mujoco.addresses import FARTHEST
 from rft.mujoco.footprints import COMPILED, HEAD, PER_CELL, PER_GEOM, memory_of, remember
 from rft.mujoco.hills import tangent_plane
+from rft.mujoco.rest import COMPILED as HOLDING
+from rft.mujoco.rest import PER_GEOM as NUMBERS
+from rft.mujoco.rest import Rest, begin, damping, held_of, hold, let_go
 from rft.simd import WIDTH, register_formulas
 
-LAYOUT = 41  # numbers that `rft.mujoco.installed.layout_of` writes
-for function in (tangent_plane, *COMPILED):
+LAYOUT = 48  # numbers that `rft.mujoco.installed.layout_of` writes
+for function in (tangent_plane, *COMPILED, *HOLDING):
     register_jitable(function)
 OPTIONS = {"nopython": True, "nogil": True, "error_model": "numpy"}
 
@@ -103,6 +107,16 @@ def kernel(Law: type) -> CFunc:
         if row[31] != 0:
             _call(row[31], data, _address(layout))
             levels = carray(_pointer(fields[row[32]] + 8 * (row[33] + HEAD)), groups, np.float64)
+        passed, holds = 0.0, row[41] != 0
+        if holds:
+            held = held_of(carray(_pointer(fields[row[42]] + 8 * row[43]), 1 + NUMBERS * groups, np.float64), groups)
+            holding = Rest(
+                carray(_pointer(row[44]), groups, np.float64),
+                carray(_pointer(row[45]), groups, np.float64),
+                carray(_pointer(row[46]), groups, np.int64),
+                carray(_pointer(row[47]), 1, np.float64),
+            )
+            passed = begin(held, holding, carray(_pointer(_address(data) + 8 * row[41]), 1, np.float64)[0])
         for k in range(groups):
             geom, body, root, dof = numbers[k, 0], numbers[k, 1], numbers[k, 2], numbers[k, 3]
             turn, place = xmat[geom], (xpos[geom, 0], xpos[geom, 1], xpos[geom, 2])
@@ -119,6 +133,8 @@ def kernel(Law: type) -> CFunc:
                 height -= up[2] * levels[k]
             local_up = (dot(x_axis, up), dot(y_axis, up), dot(z_axis, up))
             if not height + dot(local_up, center) < radius:
+                if holds:
+                    let_go(held, k)
                 continue
             spin = (cvel[body, 0], cvel[body, 1], cvel[body, 2])
             arm = minus(place, (com[root, 0], com[root, 1], com[root, 2]))
@@ -148,6 +164,12 @@ def kernel(Law: type) -> CFunc:
                 f, m = plus(f, df), plus(m, dm)
             force = plus(plus(times(f[0], x_axis), times(f[1], y_axis)), times(f[2], z_axis))
             moment = plus(plus(times(m[0], x_axis), times(m[1], y_axis)), times(m[2], z_axis))
+            if holds:
+                speed = math.sqrt(dot(velocity, velocity) + dot(spin, spin) * radius**2)
+                hold(held, holding, k, passed, speed, g[2], (*force, *moment))
+                own, share = held.wrenches[k], damping(speed, held.speeds[k], g[2])
+                force = plus((own[0], own[1], own[2]), times(share, force))
+                moment = plus((own[3], own[4], own[5]), times(share, moment))
             moment = plus(moment, cross(arm, force))
             while dof >= 0:
                 c = cdof[dof]

@@ -62,7 +62,7 @@ def install(model: mujoco.MjModel, bed: Bed) -> int:
     """Let the callback serve a bed under a model until `remove`, or until the model is gone; return its row."""
     with _lock:
         compiled = serves_compiled()
-        check_offsets(mujoco.MjData(model), bed.prints is not None)
+        check_offsets(mujoco.MjData(model), bed.remembered > 0)
         layout = layout_of(model, bed) if compiled else None  # compiles
         _set_callback(compiled)
         row = next((k for k in range(ROWS) if TABLE[k, 0] in (0, REMOVED)), ROWS)
@@ -193,6 +193,7 @@ def layout_of(model: mujoco.MjModel, bed: Bed) -> Layout:
         *bed.hills,
         *bed.zones,
         *(bed.prints[2:] if bed.prints else ()),
+        *(bed.rest or ()),
     ]
     arrays = [np.ascontiguousarray(x) for x in arrays]
     addresses = [x.ctypes.data for x in arrays]
@@ -200,7 +201,8 @@ def layout_of(model: mujoco.MjModel, bed: Bed) -> Layout:
     numbers = [*offsets(), *sizes, *addresses[:8], *arrays[7].shape, addresses[8], report]
     numbers += [addresses[9], *bed.hills.grid.shape[:2], addresses[10]]
     numbers += [*addresses[11:13], len(bed.zones.planes), len(bed.laws)]
-    numbers += _print_numbers(model, bed.prints, addresses[13:]) if bed.prints else [0] * 10
+    numbers += _print_numbers(model, bed.prints, addresses[13:17]) if bed.prints else [0] * 10
+    numbers += [*_memory(model, bed.remembered), *addresses[-4:]] if bed.rest else [0] * 7
     return Layout(np.array(numbers, np.int64), tuple(arrays), arrays[8])
 
 
@@ -208,8 +210,13 @@ def _print_numbers(model: mujoco.MjModel, prints: Prints, addresses: list[int]) 
     """Return the numbers of a layout by which footprints are remembered."""
     from rft.mujoco.compiled import recorder
 
-    time, userdata = memory_offsets()
-    return [recorder().address, userdata, model.nuserdata - prints.numbers, *prints.shape, *addresses, time]
+    time, userdata, start = _memory(model, prints.numbers)
+    return [recorder().address, userdata, start, *prints.shape, *addresses, time]
+
+
+def _memory(model: mujoco.MjModel, count: int) -> tuple[int, int, int]:
+    """Return the places of time and userdata in an mjData, and where its last ``count`` numbers begin."""
+    return *memory_offsets(), model.nuserdata - count
 
 
 def _form(bed: Bed) -> type:

@@ -25,6 +25,7 @@ from rft.mujoco.geoms import chosen_geoms, geom_name, mesh_of_elements
 from rft.mujoco.hills import FLAT, Hills, hills_of
 from rft.mujoco.media import Media, law_of, one_form, sample
 from rft.mujoco.regions import zones_of
+from rft.mujoco.rest import ROUNDING, Rest
 from rft.mujoco.steps import needed_rounding, sinkage, step_note
 from rft.plates import StressMap
 from rft.refusal import Refusal, formatted, located, require
@@ -120,7 +121,7 @@ class Sand:
         robot: until the grains bear it, and a ``time``, s, later, as the rounding lets them creep."""
         model = self._check(data)
         in_range("time", time, 0, 1e6, unit="s")
-        return sinkage(model, data, self._bed, time)
+        return sinkage(model, data, self._bed, 0.0 if self._bed.rest else time)
 
     def batch(self, nsim: int, nthread: int = 0, persistent: bool = False, media: Sequence[Any] | None = None) -> Any:
         """Return a ``mujoco.batch.Batch`` of simulations of the model in this sand.
@@ -164,7 +165,10 @@ class Sand:
         )
         if model.opt.timestep != self._step:
             self._step = model.opt.timestep
-            if line := step_note(model, list(self._bed.geoms), self.rounding):
+            line = step_note(model, list(self._bed.geoms), self.rounding)
+            if self._bed.rest:
+                self._bed.rest.step[0], line = self._step, ""
+            if line:
                 warnings.warn(line, Note, stacklevel=3)
         return model
 
@@ -180,6 +184,7 @@ def attach(
     effects: Sequence[GroundEffect] = (),
     regions: Mapping[str, Any] | None = None,
     footprints: Footprints | None = None,
+    rest: bool = False,
 ) -> Sand:
     """Put sand under geoms of a MuJoCo model, until `Sand.detach` or until the model is gone.
 
@@ -210,6 +215,8 @@ def attach(
         and y in m in the world. A place belongs to the first region that holds it, or else to ``medium``.
     footprints : Footprints
         Grid on which the ground remembers what geoms press down and heap up; None for ground that remembers nothing.
+    rest : bool
+        Whether bodies come to rest, held by what `rft.mujoco.rest` remembers; otherwise they creep, and chatter at last.
 
     Returns
     -------
@@ -244,38 +251,50 @@ def attach(
     if rounding is not None:
         in_range("rounding", rounding, 1e-7, 10, unit="m/s")
     needed = needed_rounding(model, chosen)
-    rounding = max(needed, 1e-6) if rounding is None else rounding
+    if rounding is None:
+        rounding = ROUNDING if rest else max(needed, 1e-6)
     effects = (*effects, Slope(slope)) if slope else tuple(effects)
     ground = ground_of(effects, Ground(rounding=rounding))
     bed = Bed.under(model, chosen, meshes(model, chosen, element), laws, zones, ground, slope, level, hills)
-    if footprints is not None:
-        bed = replace(bed, prints=prints_under(model, bed, footprints))
+    if footprints is not None or rest:
+        bed = remembering(model, bed, footprints, rest)
     planes = [g for g in field or floors(model, bed.up, bed.level) if _touch(model, chosen, g)]
     separation = apart(model, chosen, planes) if planes else None
     notes = [_contact_note(model, chosen, planes)] if planes else []
-    notes += [line for line in (step_note(model, chosen, rounding), _python_note()) if line]
+    notes += [line for line in (step_note(model, chosen, max(rounding, needed * rest)), _python_note()) if line]
     for line in notes:  # before anything is changed: a filter may turn warnings into errors
         warnings.warn(line, Note, stacklevel=2)
     return Sand(model, bed, element, notes, separation)
 
 
+def remembering(model: mujoco.MjModel, bed: Bed, footprints: Footprints | None, rest: bool) -> Bed:
+    """Return a bed that remembers footprints, and what holds bodies at rest; Refusal where there is no memory for that."""
+    what = "footprints need" if footprints is not None else "rest needs"
+    require(installed.serves_compiled(), f"{what} compiled code", instead="pip install 'geomech[fast]'")
+    others = any(other.remembered for other in installed.beds(model))
+    require(not others, "another sand under the model remembers", instead="attach all geoms at once")
+    if footprints is not None:
+        bed = replace(bed, prints=prints_under(model, bed, footprints))
+    if rest:
+        inverse = model.body_invweight0[bed.bodies, 0]
+        robots = np.array([np.flatnonzero(bed.roots == root)[0] for root in bed.roots], np.int64)
+        bed = replace(bed, rest=Rest(inverse, bed.spheres[:, 3], robots, np.array([model.opt.timestep])))
+    cure = f'write <size nuserdata="{bed.remembered}"/> in its MJCF, or spec.nuserdata'
+    what = f"{what} {bed.remembered} numbers of userdata, the model has {model.nuserdata}"
+    require(model.nuserdata >= bed.remembered, what, instead=cure)
+    return bed
+
+
 def prints_under(model: mujoco.MjModel, bed: Bed, footprints: Footprints) -> Prints:
-    """Return what footprints in a bed follow from; Refusal where there is no memory for them."""
+    """Return what footprints in a bed follow from."""
     require(isinstance(footprints, Footprints), "footprints must be rft.mujoco.Footprints", value=footprints)
-    require(installed.serves_compiled(), "footprints need compiled code", instead="pip install 'geomech[fast]'")
-    others = any(other.prints for other in installed.beds(model))
-    require(not others, "another sand under the model has footprints", instead="attach all geoms at once")
     points = [mesh.vertices for mesh in meshes(model, list(bed.geoms), footprints.spacing / 2)]
     places = np.stack(np.meshgrid(*footprints.middles), -1).reshape(-1, 2)
     up, level = bed.surface(np.concatenate([places, np.zeros((len(places), 1))], 1))
     heights = (level - (up[:, :2] * places).sum(-1)) / up[:, 2]
     first = np.cumsum([0, *map(len, points)]).astype(np.int64)
     shape = footprints.shape
-    prints = Prints(shape, len(points), footprints.grid, heights.reshape(shape), np.concatenate(points), first)
-    cure = f'write <size nuserdata="{prints.numbers}"/> in its MJCF, or spec.nuserdata'
-    what = f"footprints need {prints.numbers} numbers of userdata, the model has {model.nuserdata}"
-    require(model.nuserdata >= prints.numbers, what, instead=cure)
-    return prints
+    return Prints(shape, len(points), footprints.grid, heights.reshape(shape), np.concatenate(points), first)
 
 
 def _field(model: mujoco.MjModel, name: str, slope: float) -> tuple[Hills, list[int]]:
