@@ -72,9 +72,10 @@ def _call(context, function, data, layout):
 
 
 @functools.cache
-def kernel(Law: type) -> CFunc:
+def kernel(Law: type, has_regions: bool = False) -> CFunc:
     """Return the C function (data, layout) that adds the forces of the grains to qfrc_passive, for laws whose records have
-    one class. layout: int64 numbers and addresses, in the order in which `rft.mujoco.installed.layout_of` writes them."""
+    one class, in one medium or in several regions. layout: int64 numbers and addresses, in the order in which
+    `rft.mujoco.installed.layout_of` writes them."""
     register_formulas()
     count = len(Law._fields)
 
@@ -107,6 +108,8 @@ def kernel(Law: type) -> CFunc:
         if row[31] != 0:
             _call(row[31], data, _address(layout))
             levels = carray(_pointer(fields[row[32]] + 8 * (row[33] + HEAD)), groups, np.float64)
+        only_law = Law(*to_fixed_tuple(laws[0, :count], count))
+        only_ground = Ground(g[0], g[1], g[2], laws[0, count], g[4], disturbed)
         passed, holds = 0.0, row[41] != 0
         if holds:
             held = held_of(carray(_pointer(fields[row[42]] + 8 * row[43]), 1 + NUMBERS * groups, np.float64), groups)
@@ -153,15 +156,18 @@ def kernel(Law: type) -> CFunc:
                 height,
             )
             f, m = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-            for zone in range(row[30]):
-                extent = extent_in(zones, zone, middle[0], middle[1], radius)
-                if extent == NOWHERE:
-                    continue
-                law = Law(*to_fixed_tuple(laws[zone, :count], count))
-                ground = Ground(g[0], g[1], g[2], laws[zone, count], g[4], disturbed)
-                only = zone if extent == PARTLY else -1
-                df, dm = on_faces(law, ground, table, first[k], first[k + 1], motion, zones, only, Place(turn, place))
-                f, m = plus(f, df), plus(m, dm)
+            if has_regions:  # a branch that the compiler drops
+                for zone in range(row[30]):
+                    extent = extent_in(zones, zone, middle[0], middle[1], radius)
+                    if extent == NOWHERE:
+                        continue
+                    law = Law(*to_fixed_tuple(laws[zone, :count], count))
+                    ground = Ground(g[0], g[1], g[2], laws[zone, count], g[4], disturbed)
+                    only, at = zone if extent == PARTLY else -1, Place(turn, place)
+                    df, dm = on_faces(law, ground, table, first[k], first[k + 1], motion, zones, only, at)
+                    f, m = plus(f, df), plus(m, dm)
+            else:
+                f, m = on_faces(only_law, only_ground, table, first[k], first[k + 1], motion)
             force = plus(plus(times(f[0], x_axis), times(f[1], y_axis)), times(f[2], z_axis))
             moment = plus(plus(times(m[0], x_axis), times(m[1], y_axis)), times(m[2], z_axis))
             if holds:

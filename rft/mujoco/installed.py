@@ -73,7 +73,7 @@ def install(model: mujoco.MjModel, bed: Bed) -> int:
         if layout:
             from rft.mujoco.compiled import kernel
 
-            TABLE[row, 1:] = kernel(_form(bed)).address, layout.numbers.ctypes.data
+            TABLE[row, 1:] = kernel(*_form(bed)).address, layout.numbers.ctypes.data
         TABLE[row, 0] = model._address
         return row
 
@@ -177,7 +177,7 @@ def layout_of(model: mujoco.MjModel, bed: Bed) -> Layout:
     """Return the layout of a bed under a model, in the order in which `rft.mujoco.compiled.kernel` reads it."""
     from rft.mujoco.compiled import kernel
 
-    kernel(_form(bed))
+    kernel(*_form(bed))
     (table, first), ground, fast = bed.blocks.rows, bed.ground, np.zeros(1, np.int64)
     report = ctypes.cast(_tell_too_fast, ctypes.c_void_p).value
     arrays = [
@@ -219,9 +219,9 @@ def _memory(model: mujoco.MjModel, count: int) -> tuple[int, int, int]:
     return *memory_offsets(), model.nuserdata - count
 
 
-def _form(bed: Bed) -> type:
-    """Return the class of the records of a bed's laws."""
-    return type(record(bed.laws[0]))
+def _form(bed: Bed) -> tuple[type, bool]:
+    """Return the class of the records of a bed's laws, and whether there are several."""
+    return type(record(bed.laws[0])), len(bed.laws) > 1
 
 
 def _laws(bed: Bed) -> np.ndarray:
