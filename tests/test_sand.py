@@ -589,7 +589,7 @@ DROPPED = """<body pos="0.01 0.02 0.05" euler="3 5 10"><freejoint/><geom type="b
 @needs_numba
 @pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast", "RK4"])
 def test_a_body_comes_to_rest(integrator):
-    """At 2 ms: it chatters at 5 mm/s and more without memory, and creeps by 0.05 mm/s at most with it, borne by the grains."""
+    """At 2 ms: it chatters at 5 mm/s and more without memory, and creeps by 0.03 mm/s at most with it, borne by the grains."""
     options = f'<option timestep="0.002" integrator="{integrator}"/><size nuserdata="19"/>'
     model = model_of(DROPPED, options)
     for rest in (False, True):
@@ -603,7 +603,7 @@ def test_a_body_comes_to_rest(integrator):
             if not rest:
                 assert fastest > 5e-3
                 continue
-            assert fastest < 1e-3 and np.abs(data.qvel[:3]).max() < 5e-5
+            assert fastest < 1e-4 and np.abs(data.qvel[:3]).max() < 3e-5
             assert sand.forces(data)[:, 2].sum() == pytest.approx(1.05 * 9.81, rel=1e-3)
             np.testing.assert_allclose(data.qfrc_passive[:3], sand.forces(data).sum(0), atol=1e-9)
             before = data.userdata.copy()

@@ -15,9 +15,10 @@ that the geom's body has, as joints let it move,
 
     e = q h S / m,    d = 10 h^2 S / m:
 
-a step takes what is left of the motion away, and the stiffness S / d is a tenth of m / h^2. H is at most w, so that a body
-rests no higher than where the grains just bear it. The margins were found on a box, a hexapod, and steps of 0.5 and 2 ms;
-with half of them, some do not come to rest. Landing hard, a geom springs back by up to d."""
+a step takes what is left of the motion away, and the stiffness S / d is a tenth of m / h^2. A geom that moves out of the
+grains has no such load; half of what it holds counts then. H is at most w, so that a body rests no higher than where the
+grains just bear it. The numbers were found on a box and a hexapod in steps of 0.5 and 2 ms, and hold for other bodies in
+steps of up to 5 ms; with the stiffness ten times as high, bodies do not come to rest."""
 
 from __future__ import annotations
 
@@ -31,6 +32,7 @@ from rft.vectors import formula, sqrt
 PER_GEOM = 9  # numbers that a simulation remembers for a geom, beside the time
 STIFFNESS = 10.0  # m / h^2 over S / d
 SHARE = 0.25  # q
+RELEASE = 0.5  # of what is held: the least that counts as load, where a geom moves out of the grains
 ROUNDING = 1e-3  # m/s, assumed: of the stress on elements, in place of what a force without memory needs
 
 
@@ -92,7 +94,7 @@ def hold(held, rest, k, passed, speed, rounding, wrench):
         return
     size, own = math.sqrt(speed * speed + rounding * rounding), held.wrenches[k]
     moving = math.sqrt(wrench[0] ** 2 + wrench[1] ** 2 + wrench[2] ** 2) * size / max(speed, 1e-9)
-    load = max(moving, math.sqrt(own[0] ** 2 + own[1] ** 2 + own[2] ** 2))
+    load = max(moving, RELEASE * math.sqrt(own[0] ** 2 + own[1] ** 2 + own[2] ** 2))
     total = held.totals[rest.robots[k]] - held.loads[k] + load  # of other geoms in the last step
     held.loads[k], held.speeds[k] = load, SHARE * rest.step[0] * total * rest.inverse_masses[k]
     share = passed / max(STIFFNESS / SHARE * rest.step[0] * held.speeds[k], 1e-9)
