@@ -143,6 +143,8 @@ def kernel(Law: type, has_regions: bool = False) -> CFunc:
             arm = minus(place, (com[root, 0], com[root, 1], com[root, 2]))
             velocity = plus((cvel[body, 3], cvel[body, 4], cvel[body, 5]), cross(spin, arm))
             if not dot(velocity, velocity) + dot(spin, spin) * radius**2 < fastest * fastest:
+                if holds:
+                    let_go(held, k)
                 fast[0] += 1
                 if fast[0] == 1:
                     _call(row[22], data, _address(layout))

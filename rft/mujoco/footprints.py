@@ -44,7 +44,14 @@ class Footprints:
     """Ground that remembers, on a grid of cells.
 
     spacing: of the cells, m. length, width: of the grid along x and y, m, around the place ``x``, ``y``; the ground beyond it
-    remembers nothing. repose: rad; the default is that of `rft.ground.Slope`."""
+    remembers nothing. repose: rad; the default is that of `rft.ground.Slope`.
+
+    Examples
+    --------
+    >>> from rft.mujoco import Footprints
+    >>> Footprints(spacing=0.02, length=3, width=2).shape  # rows and columns
+    (100, 150)
+    """
 
     spacing: Annotated[float, Number(1e-4, 10, "m", "of the cells")]
     length: Annotated[float, Number(1e-3, 1e4, "m", "of the grid along x")]
