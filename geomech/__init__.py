@@ -7,6 +7,7 @@
 study, Study, tiers, workers            what is computed of a scene; methods of prediction; processes
 optimise (or optimize), sweep, accuracy the best gait; a grid of parameters; error against time
 load, Scene, Swimmer, Numerics, toml    scenes: read, built and written
+medium                                  a medium of the vertical plane, by name or from a file
 media, bodies, gaits, effects, systems  the parts of scenes; `register` adds custom ones
 connection, curvature, reconstruct      the geometry of any velocity(alpha, alphadot)
 fit_medium, fit_log, fit_midlines       media, connections and kinematics fitted to measurements
@@ -48,6 +49,7 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.scenes import load as load
     from geomech.scenes import toml as toml
     from geomech.scenes.kinds import register as register
+    from geomech.scenes.stress import medium as medium
     from geomech.studies import undulation as undulation
     from geomech.systems import Swimmer as Swimmer
     from rft import bodies as bodies
@@ -72,6 +74,7 @@ _OBJECTS = {
         ("Study", "accuracy", "fit_medium", "fit_midlines", "optimise", "optimize", "study", "sweep"), "geomech.app"
     ),
     **dict.fromkeys(("load", "toml", "Scene", "Numerics"), "geomech.scenes"),
+    "medium": "geomech.scenes.stress",
     "Swimmer": "geomech.systems",
     "fit_log": "geomech.measured",
     "register": "geomech.scenes.kinds",

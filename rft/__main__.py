@@ -35,9 +35,10 @@ with preferring("numba"):
         blocks = Blocks([faces.faces(box.vertices[box.faces], box.normals)])
         blocks.loads(form, Ground(), faces.Motion(still, still, still[..., 0], still, still, still[..., 0]))
         if importlib.util.find_spec("mujoco"):
-            from rft.mujoco.compiled import kernel as forces_in_mujoco
+            from rft.mujoco import compiled as in_mujoco
 
-            forces_in_mujoco(type(faces.record(form)))
+            in_mujoco.kernel(type(faces.record(form)))
+            in_mujoco.recorder()
 
 from rft.balance.compiled import kernel  # noqa: E402  # after the check, for the import loads numba
 

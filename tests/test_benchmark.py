@@ -218,10 +218,10 @@ def test_sand_under_a_hexapod():
     text = HEXAPOD.format(legs, "".join(map(MOTOR.format, range(6))))
 
     @contextlib.contextmanager
-    def sand_under(model, law, how):
+    def sand_under(model, law, how, **more):
         with warnings.catch_warnings(), preferring(how):
             warnings.simplefilter("ignore")  # a floor that is not touched
-            with sands.attach(model, law, element=0.035) as sand:
+            with sands.attach(model, law, element=0.035, **more) as sand:
                 yield sand
 
     def rate(model, steps, height=0.0):
@@ -244,6 +244,12 @@ def test_sand_under_a_hexapod():
                 rates[name] = max(rate(model, steps) for _ in range(3))
                 if how == "numba":
                     rates["compiled, above the sand"] = max(rate(model, steps, 30.0) for _ in range(3))
+        printed = mujoco.MjModel.from_xml_string(text.replace("<mujoco>", '<mujoco><size nuserdata="310000"/>'))
+        for spacing in (0.02, 0.01):
+            with sand_under(printed, law, "numba", footprints=sands.Footprints(spacing, 3.0, 2.0)):
+                rates[f"compiled, footprints of {100 * spacing:.0f} cm"] = max(rate(printed, 4000) for _ in range(3))
+        with sand_under(model, law, "numba", regions={"y > 0": law}):
+            rates["compiled, a boundary below the robot"] = max(rate(model, 4000) for _ in range(3))
         share = 1 / rates["compiled"] - 1 / rates["no floor"]  # s a step
         print(
             f"\n{type(law).__name__}: {sand.elements} elements, of which {sand.elements / share / 1e6:.0f} M a second"

@@ -11,9 +11,8 @@ from registry import OUTLINES, STRESSES
 from test_fuzz import VALUES, mutated
 
 import geomech.scenes as scenes
-from geomech import plots
+from geomech import medium, plots
 from geomech.scenes.intruder import IntruderScene
-from geomech.scenes.stress import load_medium
 from geomech.studies.intrusion import Settings, estimate
 from geomech.studies.study import Study
 from rft.plates import VERTICAL, CLeg, Drag, Outline, Penetrate, PlateDrags, Rotate, StressMap, loads
@@ -84,14 +83,14 @@ def test_media_from_files(geomech, tmp_path):
     (tmp_path / "bare.toml").write_text(lines)
     (tmp_path / "own.toml").write_text(f"[medium]\n{lines}\nzeta = 2\ntension = 'cut'\ngrazing_deg = 3\n")
     wanted = StressMap(*nine.values(), zeta=2.0, grazing=math.radians(3), tension="cut")
-    assert load_medium(str(tmp_path / "own.toml")) == wanted
+    assert medium(str(tmp_path / "own.toml")) == wanted
     for name, times in (("bare.toml", 1), ("own.toml", 2)):
         found = json.loads(geomech("stress", name, "--beta", 20, "--gamma", 50, "--json")[1])
         assert found["alpha_z"] == pytest.approx(
             times * float(StressMap(*nine.values())(math.radians(20), math.radians(50))[1]), abs=1e-12
         )
     (tmp_path / "scene.toml").write_text(MADE)
-    assert load_medium(str(tmp_path / "scene.toml")).zeta == 0.5  # a scene has a medium, too
+    assert medium(str(tmp_path / "scene.toml")).zeta == 0.5  # a scene has a medium, too
 
 
 def test_a_scene_takes_its_medium_from_a_file(tmp_path):

@@ -159,14 +159,21 @@ def plate_drags(place: str, file) -> PlateDrags:
         return PlateDrags(*map(tuple, (np.radians(beta), np.radians(gamma), a_x, a_z)))
 
 
-def load_medium(medium: str) -> PlateStress:
+def medium(name: str) -> PlateStress:
     """Return the stress map of a name of the catalogue, a TOML file with a table [medium] (or nothing but one), or a CSV
-    file of plate drags."""
-    if medium in VERTICAL:
-        return VERTICAL[medium].stress
-    if Path(medium).suffix not in (".toml", ".csv") and not Path(medium).exists():
-        choose("medium", medium, VERTICAL)
-    return _read_stress(Source("medium"), "medium", medium)
+    file of plate drags, for bodies in the vertical plane and in `rft.mujoco.attach`; ValueError for anything else.
+
+    Examples
+    --------
+    >>> geomech.medium("poppy-seeds-loose").zeta  # or of "own.toml"
+    1.0
+    """
+    name = str(name)
+    if name in VERTICAL:
+        return VERTICAL[name].stress
+    if Path(name).suffix not in (".toml", ".csv") and not Path(name).exists():
+        choose("medium", name, VERTICAL)
+    return _read_stress(Source("medium"), "medium", name)
 
 
 def _read_stress(source: Source, place: str, file: str) -> PlateStress:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from geomech.core.variables import Result, Variable
-from geomech.scenes.stress import load_medium
+from geomech.scenes.stress import medium as load_medium
 from geomech.studies.question import Allow, Progress, Question
 from rft.plates import survey
 from rft.refusal import Refusal

@@ -10,6 +10,7 @@ import numpy as np
 from rft.balance.backend import compiles
 from rft.ground import Ground
 from rft.meshes.contact import Face, FaceLaw, Motion, corner_heights, load, part_below, record, velocity_of_middle
+from rft.meshes.zones import shared
 
 WIDTH = 8  # faces that compiled code computes at once, `rft.simd.WIDTH`
 
@@ -49,10 +50,13 @@ class Blocks:
             from rft.meshes.compiled import sum_loads
 
             return sum_loads(record(law), ground, *self.rows, motions)
-        return self._loads_by_numpy(law, ground, motions)
+        return self.loads_by_numpy(law, ground, motions)
 
-    def _loads_by_numpy(self, law: FaceLaw, ground: Ground, motions: Motion) -> np.ndarray:
-        """Return the same as `loads`; faces that are above the surface in the first motion bear nothing."""
+    def loads_by_numpy(
+        self, law: FaceLaw, ground: Ground, motions: Motion, shares: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Return the same as `loads`; faces that are above the surface in the first motion bear nothing. shares: (T,), of
+        each face, that the law acts upon."""
         first = Motion(*(x[self.owner, 0].T for x in motions))
         under = np.flatnonzero(np.min(corner_heights(self.faces, first), 0) < 0.0)
         owner, out = self.owner[under], np.zeros((*motions.height.shape, 6))
@@ -61,6 +65,8 @@ class Blocks:
         motion = Motion(*(np.moveaxis(x[owner], (0, 1), (-1, -2)) for x in motions))  # (..., C, T)
         face = Face(*(x[under] for x in self.faces))
         part = part_below(face, corner_heights(face, motion))
+        if shares is not None:
+            part = shared(part, shares[under])
         force, moment, _ = load(law, ground, part, motion, velocity_of_middle(part, motion), face.sheet > 0.0)
         begin = np.flatnonzero(np.diff(owner, prepend=-1))
         sums = np.add.reduceat(np.stack(force + moment), begin, axis=2)

@@ -12,6 +12,7 @@ from rft.balance.cache import cached
 from rft.ground import Ground
 from rft.meshes.contact import Face, Motion, corner_heights, load, part_below, velocity_of_middle
 from rft.meshes.triples import dot, plus
+from rft.meshes.zones import share_in, shared
 from rft.simd import any_of, record_access, register_formulas, sum_of
 from rft.simd import load as read
 from rft.vectors import absolute
@@ -20,9 +21,9 @@ from rft.vectors import absolute
 
 
 @register_jitable
-def on_faces(law, ground, table, begin, end, motion):
+def on_faces(law, ground, table, begin, end, motion, zones=None, zone=-1, place=None):
     """Return force, N, and moment about the origin, N m, on the faces in rows ``begin`` to ``end`` of a table (R, 14, 8),
-    along the axes of their body."""
+    along the axes of their body; of their share in a zone, unless it is negative."""
     zero = 0.0 * read(table[begin], 0)
     force, moment = (zero, zero, zero), (zero, zero, zero)
     for k in range(begin, end):
@@ -30,6 +31,9 @@ def on_faces(law, ground, table, begin, end, motion):
         heights = corner_heights(face, motion)
         if any_of((heights[0] < 0.0) | (heights[1] < 0.0) | (heights[2] < 0.0)):
             part, sheet = part_below(face, heights), face.sheet > 0.0
+            if zones is not None:  # noqa: SIM102, a branch that the compiler drops
+                if zone >= 0:
+                    part = shared(part, share_in(zones, zone, face, place))
             v = velocity_of_middle(part, motion)
             if any_of(((dot(part.n, v) >= 0.0) | sheet) & (absolute(part.depth) > 0.0)):  # others bear nothing
                 f, m, _ = load(law, ground, part, motion, v, sheet)

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 from rft.refusal import Refusal
 
 if TYPE_CHECKING:
-    from rft.mujoco.sand import Sand, attach, sample
+    from rft.mujoco.sand import Footprints, Sand, attach, sample
 
-__all__ = ["Sand", "attach", "sample"]
+__all__ = ["Footprints", "Sand", "attach", "sample"]
 
 
 def __getattr__(name: str) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import functools
 import math
+import struct
 from typing import NamedTuple
 
 import mujoco
@@ -44,7 +45,7 @@ BODY = """<body name="{0}" pos="0 0 {1}"><freejoint/><geom size="0.1"/><site nam
 PARTS = """<worldbody><body mocap="true"><geom size="0.1"/></body></worldbody>
 <tendon><fixed name="t"><joint joint="ja" coef="1"/></fixed></tendon><equality><weld body1="a" body2="b"/></equality>
 <actuator><motor joint="ja"/><general joint="jb" dyntype="integrator"/></actuator>
-<sensor><framepos objtype="site" objname="a"/></sensor><size nuserdata="3"/>"""
+<sensor><framepos objtype="site" objname="a"/></sensor>"""
 MODELS = (
     f"<worldbody>{BODY.format('a', 1)}</worldbody>",
     f"<worldbody>{BODY.format('a', 1)}{BODY.format('b', 0)}</worldbody>{PARTS}",
@@ -67,12 +68,31 @@ def offsets() -> np.ndarray:
     return np.array(found)
 
 
+@functools.cache
+def memory_offsets() -> tuple[int, int]:
+    """Return the places of the time and of the pointer to userdata in an mjData, in units of 8 bytes."""
+    found = []
+    for k, text in enumerate(MODELS):
+        model = mujoco.MjModel.from_xml_string(f'<mujoco><size nuserdata="{k + 5}"/>{text}</mujoco>')
+        data = mujoco.MjData(model)
+        data.time = 0.1234567 * (k + 1)
+        time = struct.unpack("<q", struct.pack("<d", data.time))[0]
+        words = next(({j} for j in range(FARTHEST // 8) if _word(data, j) == time), set())
+        found.append((words, _places(data, "userdata")))
+    times, pointers = (set.intersection(*x) for x in zip(*found))
+    require(
+        bool(times and pointers), UNKNOWN, because="its userdata are not where they are looked for", instead="report it"
+    )
+    return max(times), max(pointers)
+
+
 UNKNOWN = f"MuJoCo {mujoco.__version__} is unknown"
 
 
-def check_offsets(data: mujoco.MjData) -> None:
-    """Raise Refusal unless the arrays of data of a model lie where `offsets` says."""
+def check_offsets(data: mujoco.MjData, with_memory: bool = False) -> None:
+    """Raise Refusal unless the arrays of data of a model lie where `offsets` says; also userdata, with its memory."""
     right = all(_word(data, int(k)) == _address(data, name) for k, name in zip(offsets(), Arrays._fields))
+    right = right and not (with_memory and _word(data, memory_offsets()[1]) != _address(data, "userdata"))
     require(right, UNKNOWN, because="its arrays are not where they are looked for", instead="report it")
 
 

@@ -14,8 +14,11 @@ from rft.meshes.contact import Motion, faces
 from rft.meshes.extruded import Extruded
 from rft.meshes.law import Spatial
 from rft.meshes.mesh import Mesh
+from rft.meshes.zones import Place, Zones, share_in
 from rft.mujoco.addresses import Arrays
+from rft.mujoco.footprints import Prints
 from rft.mujoco.hills import FLAT, Hills, tangent_plane
+from rft.mujoco.rest import Held, Rest, damping, held_of
 
 FASTEST = 100.0  # m/s, assumed: a geom that is faster is the result of a time step that is too long, and bears nothing
 
@@ -27,9 +30,12 @@ class Bed:
     up, ahead: (3,), unit vectors away from the surface and along it, in the world. geoms, bodies, roots: (G,), numbers of the
     geoms, their bodies and these bodies' roots. dofs: (G,), the last degree of freedom of each body; parents: (nv,), that of
     each degree of freedom, -1 for none. spheres: (G, 4), middle of a sphere around each geom in its frame, and radius, m.
-    hills: the surface in place of a plane, where its grid is not empty."""
+    hills: the surface in place of a plane, where its grid is not empty. laws: one for each of the zones. prints: what
+    footprints follow from; None for ground that remembers nothing. rest: what holding a body at rest follows from; None for
+    forces that depend on the motion alone."""
 
-    law: Extruded | Spatial
+    laws: tuple[Extruded | Spatial, ...]
+    zones: Zones
     ground: Ground
     up: np.ndarray
     ahead: np.ndarray
@@ -42,10 +48,21 @@ class Bed:
     parents: np.ndarray
     spheres: np.ndarray
     hills: Hills = FLAT
+    prints: Prints | None = None
+    rest: Rest | None = None
 
     @classmethod
     def under(
-        cls, model: mujoco.MjModel, geoms: list[int], meshes: list[Mesh], law, ground, slope, level, hills: Hills
+        cls,
+        model: mujoco.MjModel,
+        geoms: list[int],
+        meshes: list[Mesh],
+        laws,
+        zones,
+        ground,
+        slope,
+        level,
+        hills: Hills,
     ) -> Bed:
         """Return the bed under geoms with these meshes. slope: rad, by which the surface rises along x. level: m, the height
         of the surface at x = 0. hills: the surface in place of this plane, or `FLAT`."""
@@ -54,7 +71,7 @@ class Bed:
         spheres = [_sphere(mesh) for mesh in meshes]
         blocks = Blocks([faces(m.vertices[m.faces], m.middle_normals) for m in meshes])
         return cls(
-            law, ground, up, ahead, float(level * up[2]), blocks,
+            laws, zones, ground, up, ahead, float(level * up[2]), blocks,
             np.array(geoms, np.int64), bodies, model.body_rootid[bodies].astype(np.int64),
             np.array([_last_dof(model, b) for b in bodies], np.int64), model.dof_parentid.astype(np.int64),
             np.array(spheres), hills,
@@ -74,19 +91,49 @@ class Bed:
         """Return force, N, and moment about the geom's origin, N m, on each geom, (G, 6), in the world.
 
         velocity, spin: (G, 3), by default those of the data. sunk: m, by which all geoms lie deeper than in the data."""
+        holds = velocity is None and self.rest is not None
         if velocity is None:
             velocity, spin = self.twists(data)
         turn, place = data.geom_xmat[self.geoms].reshape(-1, 3, 3), data.geom_xpos[self.geoms]
         along_axes = lambda x: np.einsum("gij,gi->gj", turn, np.broadcast_to(x, place.shape))[:, None]
-        up, level = self._surface(place + np.einsum("gij,gj->gi", turn, self.spheres[:, :3]))
+        up, level = self.surface(place + np.einsum("gij,gj->gi", turn, self.spheres[:, :3]))
+        if self.prints:
+            level = level + up[:, 2] * self.prints.memory(data.userdata).levels
         motions = Motion(
             along_axes(velocity), along_axes(spin), (place @ self.ahead)[:, None], along_axes(up),
             along_axes(self.ahead), ((place * up).sum(-1) - level - sunk)[:, None],
         )  # fmt: skip
-        loads = self.blocks.loads(self.law, self.ground, motions)[:, 0].reshape(-1, 2, 3)
-        return np.einsum("gij,gpj->gpi", turn, loads).reshape(-1, 6)
+        loads = self._loads(motions, turn, place).reshape(-1, 2, 3)
+        wrenches = np.einsum("gij,gpj->gpi", turn, loads).reshape(-1, 6)
+        if holds:
+            held, radii = self.held(data.userdata), self.spheres[:, 3]
+            speed = np.sqrt((velocity**2).sum(-1) + (spin**2).sum(-1) * radii**2)
+            wrenches *= damping(speed, held.speeds, self.ground.rounding)[:, None]
+            wrenches += held.wrenches
+        return wrenches
 
-    def _surface(self, middles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    @property
+    def remembered(self) -> int:
+        """How many numbers of userdata a simulation takes."""
+        return sum(x.numbers for x in (self.rest, self.prints) if x is not None)
+
+    def held(self, userdata: np.ndarray) -> Held:
+        """Return what holds the geoms, from the userdata (N,) of a simulation."""
+        return held_of(userdata[len(userdata) - self.remembered :], len(self.geoms))
+
+    def _loads(self, motions: Motion, turn: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """Return force and moment on each geom along its own axes, (G, 6), summed over the zones."""
+        grounds = [self.ground._replace(grazing_sine=law.grazing_sine) for law in self.laws]
+        if len(self.laws) == 1:
+            return self.blocks.loads(self.laws[0], grounds[0], motions)[:, 0]
+        where = Place(np.moveaxis(turn[self.blocks.owner], 0, -1), place[self.blocks.owner].T)
+        total = np.zeros((len(self.geoms), 6))
+        for zone, (law, ground) in enumerate(zip(self.laws, grounds)):
+            share = share_in(self.zones, zone, self.blocks.faces, where)
+            total += self.blocks.loads_by_numpy(law, ground, motions, share)[:, 0]
+        return total
+
+    def surface(self, middles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the planes up . x = level, (G, 3) and (G,), that geoms with these middles (G, 3) see."""
         if not self.hills.grid.size:
             return np.broadcast_to(self.up, middles.shape), np.full(len(middles), self.level)

@@ -6,6 +6,7 @@ its law with its `Layout` and the model's and the data's addresses."""
 from __future__ import annotations
 
 import functools
+import math
 import sys
 
 import numpy as np
@@ -21,12 +22,18 @@ from rft.ground import Ground
 from rft.meshes.compiled import on_faces
 from rft.meshes.contact import Motion
 from rft.meshes.triples import cross, dot, minus, plus, times
+from rft.meshes.zones import NOWHERE, PARTLY, Place, Zones, extent_in
 from rft.mujoco.addresses import FARTHEST
+from rft.mujoco.footprints import COMPILED, HEAD, PER_CELL, PER_GEOM, memory_of, remember
 from rft.mujoco.hills import tangent_plane
+from rft.mujoco.rest import COMPILED as HOLDING
+from rft.mujoco.rest import PER_GEOM as NUMBERS
+from rft.mujoco.rest import Rest, begin, damping, held_of, hold, let_go
 from rft.simd import WIDTH, register_formulas
 
-LAYOUT = 27  # numbers that `rft.mujoco.installed.layout_of` writes
-plane = register_jitable(tangent_plane)
+LAYOUT = 48  # numbers that `rft.mujoco.installed.layout_of` writes
+for function in (tangent_plane, *COMPILED, *HOLDING):
+    register_jitable(function)
 OPTIONS = {"nopython": True, "nogil": True, "error_model": "numpy"}
 
 
@@ -65,9 +72,10 @@ def _call(context, function, data, layout):
 
 
 @functools.cache
-def kernel(Law: type) -> CFunc:
+def kernel(Law: type, has_regions: bool = False) -> CFunc:
     """Return the C function (data, layout) that adds the forces of the grains to qfrc_passive, for laws whose records have
-    one class. layout: int64 numbers and addresses, in the order in which `rft.mujoco.installed.layout_of` writes them."""
+    one class, in one medium or in several regions. layout: int64 numbers and addresses, in the order in which
+    `rft.mujoco.installed.layout_of` writes them."""
     register_formulas()
     count = len(Law._fields)
 
@@ -86,32 +94,57 @@ def kernel(Law: type) -> CFunc:
         numbers = carray(_pointer(row[13]), (groups, 4), np.int64)
         spheres = carray(_pointer(row[14]), (groups, 4), np.float64)
         parents = carray(_pointer(row[15]), nv, np.int64)
-        law = Law(*to_fixed_tuple(carray(_pointer(row[16]), count, np.float64), count))
+        zones = Zones(
+            carray(_pointer(row[27]), (row[29], 3), np.float64), carray(_pointer(row[28]), row[30] + 1, np.int64)
+        )
+        laws = carray(_pointer(row[16]), (row[30], count + 1), np.float64)
         g = carray(_pointer(row[17]), 13, np.float64)
         disturbed = carray(_pointer(row[18]), (row[19], row[20]), np.float64)
-        ground = Ground(g[0], g[1], g[2], g[3], g[4], disturbed)
         up, ahead, level, fastest = (g[5], g[6], g[7]), (g[8], g[9], g[10]), g[11], g[12]
         grid = carray(_pointer(row[23]), (row[24], row[25], 3), np.float64)
         field = carray(_pointer(row[26]), 7, np.float64)
         fast = carray(_pointer(row[21]), 1, np.int64)
+        levels = g[:0]
+        if row[31] != 0:
+            _call(row[31], data, _address(layout))
+            levels = carray(_pointer(fields[row[32]] + 8 * (row[33] + HEAD)), groups, np.float64)
+        only_law = Law(*to_fixed_tuple(laws[0, :count], count))
+        only_ground = Ground(g[0], g[1], g[2], laws[0, count], g[4], disturbed)
+        passed, holds = 0.0, row[41] != 0
+        if holds:
+            held = held_of(carray(_pointer(fields[row[42]] + 8 * row[43]), 1 + NUMBERS * groups, np.float64), groups)
+            holding = Rest(
+                carray(_pointer(row[44]), groups, np.float64),
+                carray(_pointer(row[45]), groups, np.float64),
+                carray(_pointer(row[46]), groups, np.int64),
+                carray(_pointer(row[47]), 1, np.float64),
+            )
+            passed = begin(held, holding, carray(_pointer(_address(data) + 8 * row[41]), 1, np.float64)[0])
         for k in range(groups):
             geom, body, root, dof = numbers[k, 0], numbers[k, 1], numbers[k, 2], numbers[k, 3]
             turn, place = xmat[geom], (xpos[geom, 0], xpos[geom, 1], xpos[geom, 2])
             x_axis = (turn[0, 0], turn[1, 0], turn[2, 0])
             y_axis = (turn[0, 1], turn[1, 1], turn[2, 1])
             z_axis = (turn[0, 2], turn[1, 2], turn[2, 2])
-            center = (spheres[k, 0], spheres[k, 1], spheres[k, 2])
+            center, radius = (spheres[k, 0], spheres[k, 1], spheres[k, 2]), spheres[k, 3]
+            middle = plus(plus(times(center[0], x_axis), times(center[1], y_axis)), times(center[2], z_axis))
+            middle = plus(place, middle)
             if row[24] > 0:
-                middle = plus(plus(times(center[0], x_axis), times(center[1], y_axis)), times(center[2], z_axis))
-                up, level = plane(grid, field, place[0] + middle[0], place[1] + middle[1])
+                up, level = tangent_plane(grid, field, middle[0], middle[1])
             height = dot(up, place) - level
+            if row[31] != 0:
+                height -= up[2] * levels[k]
             local_up = (dot(x_axis, up), dot(y_axis, up), dot(z_axis, up))
-            if not height + dot(local_up, center) < spheres[k, 3]:
+            if not height + dot(local_up, center) < radius:
+                if holds:
+                    let_go(held, k)
                 continue
             spin = (cvel[body, 0], cvel[body, 1], cvel[body, 2])
             arm = minus(place, (com[root, 0], com[root, 1], com[root, 2]))
             velocity = plus((cvel[body, 3], cvel[body, 4], cvel[body, 5]), cross(spin, arm))
-            if not dot(velocity, velocity) + dot(spin, spin) * spheres[k, 3] ** 2 < fastest * fastest:
+            if not dot(velocity, velocity) + dot(spin, spin) * radius**2 < fastest * fastest:
+                if holds:
+                    let_go(held, k)
                 fast[0] += 1
                 if fast[0] == 1:
                     _call(row[22], data, _address(layout))
@@ -124,9 +157,27 @@ def kernel(Law: type) -> CFunc:
                 (dot(x_axis, ahead), dot(y_axis, ahead), dot(z_axis, ahead)),
                 height,
             )
-            f, m = on_faces(law, ground, table, first[k], first[k + 1], motion)
+            f, m = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+            if has_regions:  # a branch that the compiler drops
+                for zone in range(row[30]):
+                    extent = extent_in(zones, zone, middle[0], middle[1], radius)
+                    if extent == NOWHERE:
+                        continue
+                    law = Law(*to_fixed_tuple(laws[zone, :count], count))
+                    ground = Ground(g[0], g[1], g[2], laws[zone, count], g[4], disturbed)
+                    only, at = zone if extent == PARTLY else -1, Place(turn, place)
+                    df, dm = on_faces(law, ground, table, first[k], first[k + 1], motion, zones, only, at)
+                    f, m = plus(f, df), plus(m, dm)
+            else:
+                f, m = on_faces(only_law, only_ground, table, first[k], first[k + 1], motion)
             force = plus(plus(times(f[0], x_axis), times(f[1], y_axis)), times(f[2], z_axis))
             moment = plus(plus(times(m[0], x_axis), times(m[1], y_axis)), times(m[2], z_axis))
+            if holds:
+                speed = math.sqrt(dot(velocity, velocity) + dot(spin, spin) * radius**2)
+                hold(held, holding, k, passed, speed, g[2], (*force, *moment))
+                own, share = held.wrenches[k], damping(speed, held.speeds[k], g[2])
+                force = plus((own[0], own[1], own[2]), times(share, force))
+                moment = plus((own[3], own[4], own[5]), times(share, moment))
             moment = plus(moment, cross(arm, force))
             while dof >= 0:
                 c = cdof[dof]
@@ -134,6 +185,38 @@ def kernel(Law: type) -> CFunc:
                 dof = parents[dof]
 
     return _compiled(add_forces, f"the forces of grains in MuJoCo of the form {Law.__name__}")
+
+
+@functools.cache
+def recorder() -> CFunc:
+    """Return the C function (data, layout) that lets footprints remember a step."""
+
+    def record(data, layout):
+        row = carray(layout, LAYOUT, np.int64)
+        fields = carray(data, FARTHEST // 8, np.int64)
+        ngeom, nbody, groups, g = row[7], row[8], row[10], carray(_pointer(row[17]), 13, np.float64)
+        shape, first = (row[34], row[35]), carray(_pointer(row[39]), groups + 1, np.int64)
+        size = HEAD + PER_GEOM * groups + PER_CELL * shape[0] * shape[1]
+        numbers = carray(_pointer(fields[row[32]] + 8 * row[33]), size, np.float64)
+        prints = (
+            carray(_pointer(row[36]), 5, np.float64),
+            carray(_pointer(row[37]), shape, np.float64),
+            carray(_pointer(row[38]), (first[groups], 3), np.float64),
+            first,
+        )
+        bodies = carray(_pointer(row[13]), (groups, 4), np.int64), carray(_pointer(row[14]), (groups, 4), np.float64)
+        poses = (
+            carray(_pointer(fields[row[1]]), (ngeom, 3), np.float64),
+            carray(_pointer(fields[row[2]]), (ngeom, 3, 3), np.float64),
+            carray(_pointer(fields[row[3]]), (nbody, 6), np.float64),
+            carray(_pointer(fields[row[5]]), (nbody, 3), np.float64),
+        )
+        hills = carray(_pointer(row[23]), (row[24], row[25], 3), np.float64), carray(_pointer(row[26]), 7, np.float64)
+        time = carray(_pointer(_address(data) + 8 * row[40]), 1, np.float64)[0]
+        slopes = hills[0], hills[1], (g[5], g[6], g[7]), g[11]
+        remember(memory_of(numbers, groups, shape[0], shape[1]), time, prints, bodies, poses, slopes)
+
+    return _compiled(record, "footprints in the ground of MuJoCo")
 
 
 def _compiled(function, purpose: str) -> CFunc:

@@ -19,13 +19,14 @@ import numpy as np
 
 from rft.balance.backend import Note, compiles
 from rft.meshes.contact import record
-from rft.mujoco.addresses import Arrays, check_offsets, offsets
+from rft.mujoco.addresses import Arrays, check_offsets, memory_offsets, offsets
 from rft.mujoco.bed import FASTEST, Bed
+from rft.mujoco.footprints import Prints
 from rft.refusal import require
 
 ROWS = 4096  # beds of sand at one time
 RETIRED = 64  # layouts of detached beds that are kept, for a step of another thread that is still under way
-LAW, GROUND = 5, 6  # places of their numbers in the arrays of a `Layout`
+LAWS = 5  # place of the laws' numbers in the arrays of a `Layout`
 REMOVED = -1  # in place of a model's address
 
 TABLE = np.zeros((ROWS + 1, 3), np.int64)
@@ -61,7 +62,7 @@ def install(model: mujoco.MjModel, bed: Bed) -> int:
     """Let the callback serve a bed under a model until `remove`, or until the model is gone; return its row."""
     with _lock:
         compiled = serves_compiled()
-        check_offsets(mujoco.MjData(model))
+        check_offsets(mujoco.MjData(model), bed.remembered > 0)
         layout = layout_of(model, bed) if compiled else None  # compiles
         _set_callback(compiled)
         row = next((k for k in range(ROWS) if TABLE[k, 0] in (0, REMOVED)), ROWS)
@@ -72,7 +73,7 @@ def install(model: mujoco.MjModel, bed: Bed) -> int:
         if layout:
             from rft.mujoco.compiled import kernel
 
-            TABLE[row, 1:] = kernel(type(record(bed.law))).address, layout.numbers.ctypes.data
+            TABLE[row, 1:] = kernel(*_form(bed)).address, layout.numbers.ctypes.data
         TABLE[row, 0] = model._address
         return row
 
@@ -95,8 +96,7 @@ def change(row: int, bed: Bed) -> None:
         entry = _entries[row]
         _entries[row] = entry._replace(bed=bed)
         if entry.layout:
-            entry.layout.arrays[LAW][:] = np.array(record(bed.law), float)
-            entry.layout.arrays[GROUND][:5] = bed.ground[:5]
+            entry.layout.arrays[LAWS][:] = _laws(bed)
 
 
 def is_installed(row: int) -> bool:
@@ -177,8 +177,7 @@ def layout_of(model: mujoco.MjModel, bed: Bed) -> Layout:
     """Return the layout of a bed under a model, in the order in which `rft.mujoco.compiled.kernel` reads it."""
     from rft.mujoco.compiled import kernel
 
-    law = record(bed.law)
-    kernel(type(law))
+    kernel(*_form(bed))
     (table, first), ground, fast = bed.blocks.rows, bed.ground, np.zeros(1, np.int64)
     report = ctypes.cast(_tell_too_fast, ctypes.c_void_p).value
     arrays = [
@@ -187,15 +186,44 @@ def layout_of(model: mujoco.MjModel, bed: Bed) -> Layout:
         np.stack([bed.geoms, bed.bodies, bed.roots, bed.dofs], -1),
         bed.spheres,
         bed.parents,
-        np.array(law, float),
+        _laws(bed),
         np.array([*ground[:5], *bed.up, *bed.ahead, bed.level, FASTEST]),
         np.array(ground.disturbed, float),
         fast,
         *bed.hills,
+        *bed.zones,
+        *(bed.prints[2:] if bed.prints else ()),
+        *(bed.rest or ()),
     ]
     arrays = [np.ascontiguousarray(x) for x in arrays]
     addresses = [x.ctypes.data for x in arrays]
     sizes = [model.nv, model.ngeom, model.nbody, len(table), len(bed.geoms)]
     numbers = [*offsets(), *sizes, *addresses[:8], *arrays[7].shape, addresses[8], report]
     numbers += [addresses[9], *bed.hills.grid.shape[:2], addresses[10]]
+    numbers += [*addresses[11:13], len(bed.zones.planes), len(bed.laws)]
+    numbers += _print_numbers(model, bed.prints, addresses[13:17]) if bed.prints else [0] * 10
+    numbers += [*_memory(model, bed.remembered), *addresses[-4:]] if bed.rest else [0] * 7
     return Layout(np.array(numbers, np.int64), tuple(arrays), arrays[8])
+
+
+def _print_numbers(model: mujoco.MjModel, prints: Prints, addresses: list[int]) -> list[int]:
+    """Return the numbers of a layout by which footprints are remembered."""
+    from rft.mujoco.compiled import recorder
+
+    time, userdata, start = _memory(model, prints.numbers)
+    return [recorder().address, userdata, start, *prints.shape, *addresses, time]
+
+
+def _memory(model: mujoco.MjModel, count: int) -> tuple[int, int, int]:
+    """Return the places of time and userdata in an mjData, and where its last ``count`` numbers begin."""
+    return *memory_offsets(), model.nuserdata - count
+
+
+def _form(bed: Bed) -> tuple[type, bool]:
+    """Return the class of the records of a bed's laws, and whether there are several."""
+    return type(record(bed.laws[0])), len(bed.laws) > 1
+
+
+def _laws(bed: Bed) -> np.ndarray:
+    """Return the numbers of a bed's laws, and the sine of the grazing angle of each in the last column."""
+    return np.array([[*record(law), law.grazing_sine] for law in bed.laws], float)

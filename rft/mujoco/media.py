@@ -82,32 +82,35 @@ def _maps(draw: Callable[[int], np.ndarray], n: int) -> list[StressMap]:
 class Media(Sequence):
     """Media of the simulations of a batch, one each; ``media[i] = medium`` changes one between steps.
 
-    models: those of the simulations, copies of one model, with a bed of sand each."""
+    Where the ground has regions, each is a tuple of the medium and those of the regions, in order; a single medium that is
+    set is the one beyond the regions. models: those of the simulations, copies of one model, with a bed of sand each."""
 
-    def __init__(self, model: mujoco.MjModel, bed: Bed, laws: Sequence[Extruded | Spatial]):
-        kinds = {type(law) for law in laws}
+    def __init__(self, model: mujoco.MjModel, bed: Bed, media: Sequence[Any]):
+        beds = [with_medium(bed, medium) for medium in media]
+        kinds = {type(one.laws[0]) for one in beds}
         require(len(kinds) == 1, "media of one batch must have one form", instead="give stress maps, or laws, alone")
-        self.models = [copy.copy(model) for _ in laws]
-        self._beds = [_with_law(bed, law) for law in laws]
+        self._beds, self.models = beds, [copy.copy(model) for _ in beds]
         self._rows = [installed.install(*pair) for pair in zip(self.models, self._beds)]
 
     def __len__(self) -> int:
         return len(self.models)
 
     def __getitem__(self, i: Any) -> Any:
-        laws = [bed.law for bed in self._beds][i]
-        return laws if isinstance(laws, list) else laws.stress if isinstance(laws, Extruded) else laws
+        if isinstance(i, slice):
+            return [self[k] for k in range(*i.indices(len(self)))]
+        *regions, medium = (law.stress if isinstance(law, Extruded) else law for law in self._beds[i].laws)
+        return (medium, *regions) if regions else medium
 
-    def __iter__(self) -> Iterator[StressMap | Spatial]:
+    def __iter__(self) -> Iterator[Any]:
         return (self[i] for i in range(len(self)))
 
     def __setitem__(self, i: int, medium: Any) -> None:
-        law = law_of(medium)
         require(isinstance(i, int) and -len(self) <= i < len(self), f"there is no simulation {formatted(i)}")
-        same = type(law) is type(self._beds[i].law)
+        bed = with_medium(self._beds[i], medium)
+        same = type(bed.laws[0]) is type(self._beds[i].laws[0])
         require(same, "media of one batch must have one form", instead="make another batch")
-        self._beds[i] = _with_law(self._beds[i], law)
-        installed.change(self._rows[i], self._beds[i])
+        self._beds[i] = bed
+        installed.change(self._rows[i], bed)
 
     def detach(self) -> None:
         """Take the beds away."""
@@ -115,6 +118,18 @@ class Media(Sequence):
             installed.remove(row)
 
 
-def _with_law(bed: Bed, law: Extruded | Spatial) -> Bed:
-    """Return a bed of another medium."""
-    return replace(bed, law=law, ground=bed.ground._replace(grazing_sine=law.grazing_sine))
+def with_medium(bed: Bed, medium: Any) -> Bed:
+    """Return a bed of another medium, or of a list of the medium and those of all regions."""
+    if not isinstance(medium, tuple | list):
+        return replace(bed, laws=one_form((*bed.laws[:-1], law_of(medium))))
+    count = len(bed.laws)
+    require(len(medium) == count, f"media of a simulation must be {count}, the medium and one for each region")
+    base, *regions = map(law_of, medium)
+    return replace(bed, laws=one_form((*regions, base)))
+
+
+def one_form(laws: tuple[Extruded | Spatial, ...]) -> tuple[Extruded | Spatial, ...]:
+    """Return the laws; Refusal unless all are stress maps or all laws of three dimensions."""
+    alike = len({type(law) for law in laws}) == 1
+    require(alike, "media of all regions must have one form", instead="give stress maps, or laws, alone")
+    return laws

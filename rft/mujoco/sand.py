@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import warnings
 import weakref
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import mujoco
@@ -19,14 +20,17 @@ from rft.meshes.mesh import Mesh
 from rft.mujoco import installed
 from rft.mujoco.bed import Bed
 from rft.mujoco.floor import Apart, apart, floors, part, rejoin
+from rft.mujoco.footprints import Footprints, Prints
 from rft.mujoco.geoms import chosen_geoms, geom_name, mesh_of_elements
 from rft.mujoco.hills import FLAT, Hills, hills_of
-from rft.mujoco.media import Media, law_of, sample
+from rft.mujoco.media import Media, law_of, one_form, sample
+from rft.mujoco.regions import zones_of
+from rft.mujoco.rest import ROUNDING, Rest
 from rft.mujoco.steps import needed_rounding, sinkage, step_note
 from rft.plates import StressMap
 from rft.refusal import Refusal, formatted, located, require
 
-__all__ = ["Sand", "attach", "sample"]
+__all__ = ["Footprints", "Sand", "attach", "sample"]
 
 PER_GEOM = 4  # elements along the mean radius of the geoms, if no length is given
 SLOWER = 60  # times that a step takes by NumPy over compiled code, measured: pytest -m benchmark -k hexapod
@@ -100,17 +104,30 @@ class Sand:
         twist = np.concatenate(self._bed.twists(data), axis=1)
         return float((self._bed.wrenches(data) * twist).sum())
 
+    def ground(self, data: mujoco.MjData | np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the ground that footprints have left: x (C,), y (R,) and heights (R, C), m, as if the geoms were not in it.
+
+        data: of a simulation, or its userdata, (N,), such as a row of what ``bind("userdata")`` of a Batch gives."""
+        prints = self._bed.prints
+        require(prints is not None, "the ground remembers nothing", instead="give ``footprints`` to attach")
+        memory = prints.memory(data if isinstance(data, np.ndarray) else data.userdata)
+        x_0, y_0, size = prints.grid[:3]
+        along = lambda count, start: start + size * (np.arange(count) + 0.5)
+        rows, columns = prints.shape
+        return along(columns, x_0), along(rows, y_0), prints.surface + memory.ground + memory.pressed
+
     def sinkage(self, data: mujoco.MjData, time: float = 1.0) -> tuple[float, float]:
         """Return how deep, m, the geoms sink from where they are in the data, straight down under the weight of their
         robot: until the grains bear it, and a ``time``, s, later, as the rounding lets them creep."""
         model = self._check(data)
         in_range("time", time, 0, 1e6, unit="s")
-        return sinkage(model, data, self._bed, time)
+        return sinkage(model, data, self._bed, 0.0 if self._bed.rest else time)
 
     def batch(self, nsim: int, nthread: int = 0, persistent: bool = False, media: Sequence[Any] | None = None) -> Any:
         """Return a ``mujoco.batch.Batch`` of simulations of the model in this sand.
 
-        media: one for each simulation, of one form, such as `sample` draws; ``sand.media[i] = medium`` changes one later."""
+        media: one for each simulation, of one form, such as `sample` draws; ``sand.media[i] = medium`` changes one later. With
+        regions, one may be a list of the medium and those of the regions; a single medium leaves those of the regions."""
         model = self._model()
         require(model is not None and self.is_attached, "the sand is detached", instead="attach it anew")
         try:
@@ -120,9 +137,9 @@ class Sand:
         require(media is None or len(media) == nsim, f"media must be {nsim}, one for each simulation")
         batch = Batch(model, nsim, nthread, persistent)
         if media is not None:
-            laws = [law_of(medium) for medium in media]
+            new = Media(model, self._bed, media)
             self._forget_media()
-            self.media = Media(model, self._bed, laws)
+            self.media = new
         # A Batch copies the model that it is given, and a copy has no sand.
         batch.set_models(model if media is None else self.media.models)
         return batch
@@ -148,7 +165,10 @@ class Sand:
         )
         if model.opt.timestep != self._step:
             self._step = model.opt.timestep
-            if line := step_note(model, list(self._bed.geoms), self.rounding):
+            line = step_note(model, list(self._bed.geoms), self.rounding)
+            if self._bed.rest:
+                self._bed.rest.step[0], line = self._step, ""
+            if line:
                 warnings.warn(line, Note, stacklevel=3)
         return model
 
@@ -162,6 +182,9 @@ def attach(
     element: float | None = None,
     rounding: float | None = None,
     effects: Sequence[GroundEffect] = (),
+    regions: Mapping[str, Any] | None = None,
+    footprints: Footprints | None = None,
+    rest: bool = False,
 ) -> Sand:
     """Put sand under geoms of a MuJoCo model, until `Sand.detach` or until the model is gone.
 
@@ -187,6 +210,13 @@ def attach(
         for, `rft.mujoco.steps.needed_rounding`.
     effects : list of GroundEffect
         Effects on the ground, such as `rft.ground.GrainInertia`.
+    regions : dict
+        Other media by the regions where they lie, such as ``{"x > 0.5": "poppy-seeds-close", "0 < y < x": other}``, with x
+        and y in m in the world. A place belongs to the first region that holds it, or else to ``medium``.
+    footprints : Footprints
+        Grid on which the ground remembers what geoms press down and heap up; None for ground that remembers nothing.
+    rest : bool
+        Whether bodies come to rest, held by what `rft.mujoco.rest` remembers; otherwise they creep, and chatter at last.
 
     Returns
     -------
@@ -208,7 +238,9 @@ def attach(
     hills, field = (FLAT, []) if not isinstance(level, str) else _field(model, level, slope)
     level = 0.0 if field else level
     in_range("level", level, -1e6, 1e6, unit="m")
-    law, chosen = law_of(medium), chosen_geoms(model, geoms)
+    regions = {} if regions is None else regions
+    zones = zones_of(regions)
+    laws, chosen = one_form((*map(law_of, regions.values()), law_of(medium))), chosen_geoms(model, geoms)
     taken = {int(g) for bed in installed.beds(model) for g in bed.geoms} & {*chosen}
     names = ", ".join(formatted(geom_name(model, g)) for g in sorted(taken)[:3])
     require(not taken, f"sand is attached to {names} already", instead="detach it, or name other geoms")
@@ -219,17 +251,50 @@ def attach(
     if rounding is not None:
         in_range("rounding", rounding, 1e-7, 10, unit="m/s")
     needed = needed_rounding(model, chosen)
-    rounding = max(needed, 1e-6) if rounding is None else rounding
+    if rounding is None:
+        rounding = ROUNDING if rest else max(needed, 1e-6)
     effects = (*effects, Slope(slope)) if slope else tuple(effects)
-    ground = ground_of(effects, Ground(rounding=rounding, grazing_sine=law.grazing_sine))
-    bed = Bed.under(model, chosen, meshes(model, chosen, element), law, ground, slope, level, hills)
+    ground = ground_of(effects, Ground(rounding=rounding))
+    bed = Bed.under(model, chosen, meshes(model, chosen, element), laws, zones, ground, slope, level, hills)
+    if footprints is not None or rest:
+        bed = remembering(model, bed, footprints, rest)
     planes = [g for g in field or floors(model, bed.up, bed.level) if _touch(model, chosen, g)]
     separation = apart(model, chosen, planes) if planes else None
     notes = [_contact_note(model, chosen, planes)] if planes else []
-    notes += [line for line in (step_note(model, chosen, rounding), _python_note()) if line]
+    notes += [line for line in (step_note(model, chosen, max(rounding, needed * rest)), _python_note()) if line]
     for line in notes:  # before anything is changed: a filter may turn warnings into errors
         warnings.warn(line, Note, stacklevel=2)
     return Sand(model, bed, element, notes, separation)
+
+
+def remembering(model: mujoco.MjModel, bed: Bed, footprints: Footprints | None, rest: bool) -> Bed:
+    """Return a bed that remembers footprints, and what holds bodies at rest; Refusal where there is no memory for that."""
+    what = "footprints need" if footprints is not None else "rest needs"
+    require(installed.serves_compiled(), f"{what} compiled code", instead="pip install 'geomech[fast]'")
+    others = any(other.remembered for other in installed.beds(model))
+    require(not others, "another sand under the model remembers", instead="attach all geoms at once")
+    if footprints is not None:
+        bed = replace(bed, prints=prints_under(model, bed, footprints))
+    if rest:
+        inverse = model.body_invweight0[bed.bodies, 0]
+        robots = np.array([np.flatnonzero(bed.roots == root)[0] for root in bed.roots], np.int64)
+        bed = replace(bed, rest=Rest(inverse, bed.spheres[:, 3], robots, np.array([model.opt.timestep])))
+    cure = f'write <size nuserdata="{bed.remembered}"/> in its MJCF, or spec.nuserdata'
+    what = f"{what} {bed.remembered} numbers of userdata, the model has {model.nuserdata}"
+    require(model.nuserdata >= bed.remembered, what, instead=cure)
+    return bed
+
+
+def prints_under(model: mujoco.MjModel, bed: Bed, footprints: Footprints) -> Prints:
+    """Return what footprints in a bed follow from."""
+    require(isinstance(footprints, Footprints), "footprints must be rft.mujoco.Footprints", value=footprints)
+    points = [mesh.vertices for mesh in meshes(model, list(bed.geoms), footprints.spacing / 2)]
+    places = np.stack(np.meshgrid(*footprints.middles), -1).reshape(-1, 2)
+    up, level = bed.surface(np.concatenate([places, np.zeros((len(places), 1))], 1))
+    heights = (level - (up[:, :2] * places).sum(-1)) / up[:, 2]
+    first = np.cumsum([0, *map(len, points)]).astype(np.int64)
+    shape = footprints.shape
+    return Prints(shape, len(points), footprints.grid, heights.reshape(shape), np.concatenate(points), first)
 
 
 def _field(model: mujoco.MjModel, name: str, slope: float) -> tuple[Hills, list[int]]:
