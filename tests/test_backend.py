@@ -451,6 +451,22 @@ def test_compiled_code_is_kept_in_one_file(small):
     assert [p.name for p in file.path.parent.iterdir()] == [file.path.name]
 
 
+@pytest.mark.usefixtures("compiled_code")
+@pytest.mark.parametrize("reached", ["half", "formulas.half"])
+def test_code_has_another_key_once_a_function_that_it_names_changes(reached):
+    """By its own name, and as that of a module; what the module has besides does not count."""
+    from rft.balance.cache import digest
+
+    def key(share, unused=1.0):
+        module = types.ModuleType("formulas")
+        exec(f"def half(x):\n    return {share} * x\ndef other(x):\n    return {unused} * x", vars(module))
+        own = {"formulas": module} if "." in reached else {"half": module.half}
+        exec(f"def law(x):\n    return {reached}(x) + 1", own)
+        return digest(own["law"])
+
+    assert key(0.5) == key(0.5, unused=2.0) != key(0.6)
+
+
 def flipped(at):
     return lambda raw: raw[: int(at * len(raw))] + bytes([raw[int(at * len(raw))] ^ 8]) + raw[int(at * len(raw)) + 1 :]
 

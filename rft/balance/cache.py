@@ -27,6 +27,8 @@ from numba.misc.appdirs import user_cache_dir
 from rft import simd, vectors
 from rft.balance.backend import Note
 
+KNOWN = {"math", "numba", "numpy"}  # packages whose functions numba has its own code for
+
 
 def folder() -> Path:
     """Return the folder of compiled code: NUMBA_CACHE_DIR where that is set, else the user's own."""
@@ -152,9 +154,13 @@ def digest(function) -> str:
             visit_code(constant, function) if isinstance(constant, types.CodeType) else parts.append(
                 repr(constant).encode()
             )
-        for name in code.co_names:
+        named = [function.__globals__.get(name) for name in code.co_names]
+        modules = [x for x in named if isinstance(x, types.ModuleType) and x.__name__.partition(".")[0] not in KNOWN]
+        for name, value in zip(code.co_names, named):
             parts.append(name.encode())
-            visit(function.__globals__.get(name))
+            visit(value)
+            for module in modules:  # module.name
+                visit(getattr(module, name, None))
 
     visit(function)
     processor = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
