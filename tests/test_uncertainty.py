@@ -69,7 +69,7 @@ def test_in_a_frame_that_depends_on_the_medium_media_have_their_own(monkeypatch)
     sand, amplitudes = scene(granular()).with_numerics(grid=7), np.array([0.7, 1.2])
     in_frame = lambda system: Study(sand.changed(system=system)).in_frame("minimum-perturbation").scene
     told = uncertainty.of_medium(in_frame(sand.system), GAIT, amplitudes)
-    media = whitened(40, 2, seed=2) @ uncertainty.root(COVARIANCE).T
+    media = whitened(20, 2, seed=2) @ uncertainty.root(COVARIANCE).T
     at = lambda d: (
         in_frame(Swimmer(Granular(1.49 + d[0], 0.22 + d[1]), BODY)).system.run(*GAIT.cycle(16, amplitudes)).net
     )
