@@ -310,6 +310,8 @@ def test_media_by_region(solved_by):
         ({"1 > 0": MAP}, "is no condition"),
         ({"x / 0 > 1": MAP}, "is no condition"),
         ({"x = 1": MAP}, "is no condition"),
+        ({"x > " + 3000 * "-" + "1": MAP}, "is no condition"),
+        ({"x > 1" + 400 * "0": MAP}, "is no condition"),
         ({" < ".join("1x" * 51): MAP}, "the regions have 101 boundaries, more than 100"),
         ({"x > 1": SPATIAL}, "media of all regions must have one form: give stress maps, or laws, alone"),
         ({"x > 1": "poppy-seeds-lose"}, "did you mean poppy-seeds-loose"),
@@ -408,6 +410,7 @@ def test_a_cone_slides_to_the_angle_of_repose_and_rests():
         model.opt.timestep = step
         data = mujoco.MjData(model)
         with rft.mujoco.attach(model, MAP, footprints=rft.mujoco.Footprints(0.01, 0.7, 0.6, 1, 2, repose)) as sand:
+            mujoco.mj_forward(model, data)  # from now on the memory is of this grid
             x, y, _ = sand.ground(data)
             away, memory = np.hypot(*np.meshgrid(x - 1, y - 2)), sand._bed.prints.memory(data.userdata)
             memory.ground[:] = np.maximum(0.0, 0.15 - 2.5 * away)
@@ -477,6 +480,9 @@ def test_each_simulation_remembers_for_itself():
             grounds.append(sand.ground(copied)[2])
         np.testing.assert_array_equal(*grounds)
         assert np.ptp(ground) > 0.005 and not sand.ground(still)[2].any() and not still.userdata.any()
+        still.userdata[:] = 1.0  # of another grid, or of something else
+        mujoco.mj_step(model, still, 2)
+        assert np.abs(sand.ground(still)[2]).max() < 0.05
         from mujoco import rollout
 
         mujoco.mj_resetData(model, copied)
@@ -523,8 +529,11 @@ def test_footprints_that_cannot_be_are_refused():
         rft.mujoco.attach(model, MAP, footprints=prints)
     both = model_of(BALL + BALL.replace("ball", "other"), '<size nuserdata="9000"/>')
     line = "another sand under the model remembers: attach all geoms at once"
-    with rft.mujoco.attach(both, MAP, geoms="ball", footprints=prints), pytest.raises(rft.Refusal, match=line):
-        rft.mujoco.attach(both, MAP, geoms="other", footprints=prints)
+    with rft.mujoco.attach(both, MAP, geoms="ball", footprints=prints) as sand:
+        with pytest.raises(rft.Refusal, match=line):
+            rft.mujoco.attach(both, MAP, geoms="other", footprints=prints)
+        with pytest.raises(rft.Refusal, match="data must be an MjData, or its userdata, 8015 numbers or more"):
+            sand.ground(np.zeros(5))
 
 
 def test_forces_turn_and_mirror_with_the_motion():
@@ -594,8 +603,9 @@ def test_a_body_comes_to_rest(integrator):
     options = f'<option timestep="0.002" integrator="{integrator}"/><size nuserdata="19"/>'
     model = model_of(DROPPED, options)
     for rest in (False, True):
-        data, fastest = mujoco.MjData(model), 0.0
+        data, fastest, model.opt.timestep = mujoco.MjData(model), 0.0, 0.0005
         with rft.mujoco.attach(model, MAP, rest=rest) as sand:
+            model.opt.timestep = 0.002
             mujoco.mj_step(model, data, 1000)
             for _ in range(200):
                 mujoco.mj_step(model, data)
@@ -923,6 +933,7 @@ REFUSED = {
     "rounding": ({"rounding": 0.0}, "rounding must be"),
     "level": ({"level": math.nan}, "level must be"),
     "slope": ({"slope": 1.2}, "slides by itself"),
+    "rest": ({"rest": "no"}, "rest must be True or False, got 'no'"),
     "effects": ({"effects": ["aeration"]}, "effects must be a list of effects"),
 }
 

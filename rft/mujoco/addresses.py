@@ -86,6 +86,27 @@ def memory_offsets() -> tuple[int, int]:
     return max(times), max(pointers)
 
 
+def time_step(model: mujoco.MjModel) -> np.ndarray:
+    """Return the time step of a model, s, (1,), in the model's own memory."""
+    return _before_gravity(model, _step_offset())
+
+
+@functools.cache
+def _step_offset() -> int:
+    """Return how many numbers the time step stands before gravity in an mjOption."""
+    model = mujoco.MjModel.from_xml_string('<mujoco><option timestep="0.1234567"/></mujoco>')
+    found = (k for k in range(1, POINTERS) if _before_gravity(model, k)[0] == model.opt.timestep)
+    offset = next(found, 0)
+    require(offset > 0, UNKNOWN, because="its time step is not where it is looked for", instead="report it")
+    return offset
+
+
+def _before_gravity(model: mujoco.MjModel, k: int) -> np.ndarray:
+    """Return the number, (1,), that stands k numbers before gravity in a model's mjOption; it shares its memory."""
+    gravity = model.opt.gravity.__array_interface__["data"][0]
+    return np.ctypeslib.as_array((ctypes.c_double * 1).from_address(gravity - 8 * k))
+
+
 UNKNOWN = f"MuJoCo {mujoco.__version__} is unknown"
 
 

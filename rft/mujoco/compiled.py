@@ -199,7 +199,7 @@ def recorder() -> CFunc:
         size = HEAD + PER_GEOM * groups + PER_CELL * shape[0] * shape[1]
         numbers = carray(_pointer(fields[row[32]] + 8 * row[33]), size, np.float64)
         prints = (
-            carray(_pointer(row[36]), 5, np.float64),
+            carray(_pointer(row[36]), 6, np.float64),
             carray(_pointer(row[37]), shape, np.float64),
             carray(_pointer(row[38]), (first[groups], 3), np.float64),
             first,

@@ -35,8 +35,7 @@ SHARE = 0.25  # of the excess of a slope that slides in one step at most; with m
 SLIDES = 0.1  # time in which an excess slides over that in which grains fall by one cell
 STEEPER = 1e-3  # share by which a slope may be steeper than it should
 HEAD, PER_GEOM, PER_CELL = 8, 7, 5  # numbers that a simulation remembers
-TIME, STAMP, TOP = 0, 1, 2  # places in the head; a box of cells follows
-BOX = 3
+TIME, STAMP, TOP, BOX, FORM = 0, 1, 2, 3, 7  # places in the head; the box takes four
 
 
 @dataclass(frozen=True)
@@ -87,7 +86,8 @@ class Footprints:
 
 
 class Prints(NamedTuple):
-    """What footprints follow from. shape: rows and columns. geoms: number of geoms. grid: `Footprints.grid`. surface: (R, C),
+    """What footprints follow from. shape: rows and columns. geoms: number of geoms. grid: `Footprints.grid`, and a
+    number that no other grid and number of geoms has. surface: (R, C),
     undisturbed heights, m. points: (P, 3), on the geoms in their frames, m. first: (G + 1,), first point of each geom."""
 
     shape: tuple[int, int]
@@ -110,12 +110,13 @@ class Prints(NamedTuple):
 class Memory(NamedTuple):
     """What a simulation remembers, views of its userdata.
 
-    head: the time, a number for each step, a height, m, that no ground is above, and the box of cells that move: first row
-    and end, first column and end. levels: (G,), mean height of the ground that each geom is in, m. carried: (G,), m, sum
-    over cells of what each geom has pressed away and not heaped up yet. visits: (G,), a number for each time that a geom
-    was in the ground, of no other geom. boxes: (G, 4), of cells under each geom. ground: (R, C), m. pressed: (R, C), m, how
-    far geoms press the cells that they are in down, negative. marks: (R, C), the number of the last step in which a geom was
-    in a cell. owners: (R, C), the visit in which a cell was heaped up last. floors: (R, C), m, its height before."""
+    head: the time, a number for each step, a height, m, that no ground is above, the box of cells that move: first
+    row and end, first column and end, and the number of the grid that all this is of, the last of ``Prints.grid``.
+    levels: (G,), mean height of the ground that each geom is in, m. carried: (G,), m, sum over cells of what each
+    geom has pressed away and not heaped up yet. visits: (G,), a number for each time that a geom was in the ground,
+    of no other geom. boxes: (G, 4), of cells under each geom. ground: (R, C), m. pressed: (R, C), m, how far geoms
+    press the cells that they are in down, negative. marks: (R, C), the number of the last step in which a geom was in
+    a cell. owners: (R, C), the visit in which a cell was heaped up last. floors: (R, C), m, its height before."""
 
     head: np.ndarray
     levels: np.ndarray
@@ -146,18 +147,19 @@ def memory_of(numbers, geoms, rows, columns):
     )
 
 
-def begin_step(memory, time):
-    """Return the time, s, since the last step that was remembered, at most 1 s; negative if there is nothing to do. At time 0
-    the ground is undisturbed."""
+def begin_step(memory, time, form):
+    """Return the time, s, since the last step that was remembered, at most 1 s; negative if there is nothing to do. At time 0,
+    and where the memory is of another grid than that with the number ``form``, the ground is undisturbed."""
     passed = time - memory.head[TIME]
-    if passed == 0.0:
-        return -1.0
-    if time == 0.0:  # a rollout starts anew, which leaves userdata as they are
+    if (time == 0.0 and passed != 0.0) or memory.head[FORM] != form:  # a rollout leaves userdata as they are
         for numbers in (memory.levels, memory.carried, memory.visits):
             numbers[:] = 0.0
         for cells in (memory.boxes, memory.ground, memory.pressed, memory.marks, memory.owners, memory.floors):
             cells[:] = 0.0
         memory.head[:] = 0.0
+        memory.head[FORM] = form
+        passed = time
+    if passed == 0.0:
         return -1.0
     memory.head[TIME] = time
     memory.head[STAMP] += 1.0
@@ -169,14 +171,14 @@ def begin_step(memory, time):
 def remember(memory, time, prints, bodies, poses, slopes):
     """Take a step of all geoms, unless the memory has it already.
 
-    prints: grid, (5,), undisturbed heights (R, C), points (P, 3) on the geoms and the first of each geom, (G + 1,). bodies:
+    prints: grid, (6,), undisturbed heights (R, C), points (P, 3) on the geoms and the first of each geom, (G + 1,). bodies:
     numbers (G, 4) of geoms, bodies and roots, and spheres (G, 4) as of `rft.mujoco.bed.Bed`. poses: arrays of
     `rft.mujoco.addresses.Arrays`. slopes: grid and frame of hills, (0, 0, 3) for none, and up and level."""
     grid, surface, points, first = prints
     numbers, spheres = bodies
     xpos, xmat, cvel, com = poses
     hills, frame, up, level = slopes
-    passed = begin_step(memory, time)
+    passed = begin_step(memory, time, grid[5])
     if passed < 0.0:
         return
     for k in range(len(numbers)):

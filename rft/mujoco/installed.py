@@ -19,7 +19,7 @@ import numpy as np
 
 from rft.balance.backend import Note, compiles
 from rft.meshes.contact import record
-from rft.mujoco.addresses import Arrays, check_offsets, memory_offsets, offsets
+from rft.mujoco.addresses import Arrays, check_offsets, memory_offsets, offsets, time_step
 from rft.mujoco.bed import FASTEST, Bed
 from rft.mujoco.footprints import Prints
 from rft.refusal import require
@@ -193,7 +193,7 @@ def layout_of(model: mujoco.MjModel, bed: Bed) -> Layout:
         *bed.hills,
         *bed.zones,
         *(bed.prints[2:] if bed.prints else ()),
-        *(bed.rest or ()),
+        *((*bed.rest[:-1], time_step(model)) if bed.rest else ()),
     ]
     arrays = [np.ascontiguousarray(x) for x in arrays]
     addresses = [x.ctypes.data for x in arrays]

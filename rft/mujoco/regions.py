@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rft.meshes.zones import EVERYWHERE, Zones
-from rft.refusal import Refusal, require
+from rft.refusal import Refusal, formatted, require
 
 MOST = 100  # planes of all regions
 CURE = "write it like 'x > 0.5' or '0 < x < 1 and y > 0.2 * x', x and y in m"
@@ -28,12 +28,12 @@ def zones_of(regions: Mapping[str, Any]) -> Zones:
 
 def planes_of(text: str) -> list[tuple[float, float, float]]:
     """Return a, b and c of the planes within which a condition holds, a x + b y > c with a^2 + b^2 = 1."""
-    what = f"the region {text!r} is no condition on x and y"
+    what = f"the region {formatted(text)} is no condition on x and y"
     try:
-        tree = ast.parse(text, mode="eval").body
+        tree = ast.parse(text.strip(), mode="eval").body
         parts = tree.values if isinstance(tree, ast.BoolOp) and isinstance(tree.op, ast.And) else [tree]
         pairs = [pair for part in parts for pair in _greater(part)]
-    except (SyntaxError, TypeError, ValueError, ZeroDivisionError):
+    except (SyntaxError, ValueError, ArithmeticError, AttributeError, TypeError, RecursionError, MemoryError):
         raise Refusal(what, instead=CURE) from None
     planes = []
     for (a, b, c), (p, q, r) in pairs:

@@ -38,12 +38,12 @@ ROUNDING = 1e-3  # m/s, assumed: of the stress on elements, in place of what a f
 
 class Rest(NamedTuple):
     """What holding follows from. inverse_masses, radii: (G,), 1/kg and m. robots: (G,), the first geom of each geom's robot.
-    step: h, s."""
+    step: (1,), h, s; in compiled code, in the model's own memory, as it may change."""
 
     inverse_masses: np.ndarray
     radii: np.ndarray
     robots: np.ndarray
-    step: np.ndarray
+    step: np.ndarray = np.zeros(1)
 
     @property
     def numbers(self) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 import weakref
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -20,7 +21,7 @@ from rft.meshes.mesh import Mesh
 from rft.mujoco import installed
 from rft.mujoco.bed import Bed
 from rft.mujoco.floor import Apart, apart, floors, part, rejoin
-from rft.mujoco.footprints import Footprints, Prints
+from rft.mujoco.footprints import FORM, Footprints, Prints
 from rft.mujoco.geoms import chosen_geoms, geom_name, mesh_of_elements
 from rft.mujoco.hills import FLAT, Hills, hills_of
 from rft.mujoco.media import Media, law_of, one_form, sample
@@ -110,11 +111,15 @@ class Sand:
         data: of a simulation, or its userdata, (N,), such as a row of what ``bind("userdata")`` of a Batch gives."""
         prints = self._bed.prints
         require(prints is not None, "the ground remembers nothing", instead="give ``footprints`` to attach")
-        memory = prints.memory(data if isinstance(data, np.ndarray) else data.userdata)
+        userdata = getattr(data, "userdata", data)
+        enough = np.ndim(userdata) == 1 and len(userdata) >= prints.numbers
+        require(enough, f"data must be an MjData, or its userdata, {prints.numbers} numbers or more")
+        memory = prints.memory(userdata)
         x_0, y_0, size = prints.grid[:3]
         along = lambda count, start: start + size * (np.arange(count) + 0.5)
         rows, columns = prints.shape
-        return along(columns, x_0), along(rows, y_0), prints.surface + memory.ground + memory.pressed
+        own = memory.head[FORM] == prints.grid[-1]
+        return along(columns, x_0), along(rows, y_0), prints.surface + own * (memory.ground + memory.pressed)
 
     def sinkage(self, data: mujoco.MjData, time: float = 1.0) -> tuple[float, float]:
         """Return how deep, m, the geoms sink from where they are in the data, straight down under the weight of their
@@ -165,9 +170,7 @@ class Sand:
         )
         if model.opt.timestep != self._step:
             self._step = model.opt.timestep
-            line = step_note(model, list(self._bed.geoms), self.rounding)
-            if self._bed.rest:
-                self._bed.rest.step[0], line = self._step, ""
+            line = "" if self._bed.rest else step_note(model, list(self._bed.geoms), self.rounding)
             if line:
                 warnings.warn(line, Note, stacklevel=3)
         return model
@@ -234,6 +237,7 @@ def attach(
     is changed or inexact is a `rft.balance.backend.Note`, a warning of one line.
     """
     require(isinstance(model, mujoco.MjModel), "model must be a mujoco.MjModel", value=model)
+    require(isinstance(rest, bool | np.bool_), "rest must be True or False", value=rest)
     require(model.nv > 0, "nothing in the model can move", because="it has no joints")
     hills, field = (FLAT, []) if not isinstance(level, str) else _field(model, level, slope)
     level = 0.0 if field else level
@@ -278,7 +282,7 @@ def remembering(model: mujoco.MjModel, bed: Bed, footprints: Footprints | None, 
     if rest:
         inverse = model.body_invweight0[bed.bodies, 0]
         robots = np.array([np.flatnonzero(bed.roots == root)[0] for root in bed.roots], np.int64)
-        bed = replace(bed, rest=Rest(inverse, bed.spheres[:, 3], robots, np.array([model.opt.timestep])))
+        bed = replace(bed, rest=Rest(inverse, bed.spheres[:, 3], robots))
     cure = f'write <size nuserdata="{bed.remembered}"/> in its MJCF, or spec.nuserdata'
     what = f"{what} {bed.remembered} numbers of userdata, the model has {model.nuserdata}"
     require(model.nuserdata >= bed.remembered, what, instead=cure)
@@ -294,7 +298,8 @@ def prints_under(model: mujoco.MjModel, bed: Bed, footprints: Footprints) -> Pri
     heights = (level - (up[:, :2] * places).sum(-1)) / up[:, 2]
     first = np.cumsum([0, *map(len, points)]).astype(np.int64)
     shape = footprints.shape
-    return Prints(shape, len(points), footprints.grid, heights.reshape(shape), np.concatenate(points), first)
+    grid = np.append(footprints.grid, zlib.crc32(repr((shape, len(points), *footprints.grid[:3])).encode()) + 1)
+    return Prints(shape, len(points), grid, heights.reshape(shape), np.concatenate(points), first)
 
 
 def _field(model: mujoco.MjModel, name: str, slope: float) -> tuple[Hills, list[int]]:
