@@ -20,7 +20,7 @@ from rft.meshes.blocks import Blocks
 from rft.meshes.contact import Motion, faces
 from rft.meshes.extruded import Extruded
 from rft.plates import VERTICAL, PlateDrags, RoundRod, StressMap, loads
-from rft.plates.calibrate import fit_stress
+from rft.plates.calibrate import ZetaFit, fit_stress
 from rft.plates.stress import COEFFICIENTS
 
 mujoco = pytest.importorskip("mujoco", reason="needs the extra: pip install 'geomech[mujoco]'")
@@ -354,6 +354,12 @@ def test_the_time_step_and_the_masses_ask_for_a_rounding():
         with pytest.warns(Note, match="a geom in the sand is faster than 100 m/s") as caught:
             mujoco.mj_step(model, data, 3)
         assert len(caught) == 1 and installed.times_too_fast(sand._row) == 3
+    model.opt.timestep = 0.1
+    with pytest.warns(
+        Note, match=r"100 ms asks for a rounding of 0\.49 m/s, the sand has 0\.25: .*; steps of 50 ms"
+    ) as caught:
+        sand.forces(data), sand.forces(data)
+    assert len(caught) == 1
     sand.detach()
 
 
@@ -423,6 +429,15 @@ def test_what_is_not_in_the_sand_touches_the_floor_as_before():
     for more in ({"slope": 0.01}, {"level": 0.002}):
         with rft.mujoco.attach(model, MAP, geoms="foot", **more) as sand:
             assert own_notes(sand) == []
+    second = '<geom name="{}" type="plane" size="1 1 1" pos="0 0 {}" euler="{} 0 0"/>'
+    more = second.format("second", 9e-4, 0.05) + second.format("below", -2e-3, 0) + second.format("tilted", 0, 0.06)
+    model = model_of(FLOORED.format("") + more)
+    with pytest.warns(Note, match="the geom no longer touches the floor 'floor' and 'second', which lies"):
+        sand = rft.mujoco.attach(model, MAP, geoms="foot")
+    touched = touching(model)
+    sand.detach()
+    assert {x for x in touched if "foot" in x} == {("below", "foot"), ("foot", "tilted")}
+    assert {x for x in touched if "ball" in x} == {("ball", x) for x in ("floor", "second", "below", "tilted")}
     crowded = model_of(FLOORED.format('contype="2147483647"'))
     with pytest.raises(rft.Refusal, match="no bit is free to tell the floor from other geoms: use fewer contypes"):
         rft.mujoco.attach(crowded, MAP)
@@ -523,6 +538,8 @@ def test_media_are_drawn_within_their_uncertainty():
     logs = np.log([x.xi_n / 3e5 for x in drawn])
     assert logs.std() == pytest.approx(0.1, rel=0.1) and abs(logs.mean()) < 0.01
     assert drawn == rft.mujoco.sample(Spatial(3e5), 2000, seed=2, spread=0.1)
+    scaled = rft.mujoco.sample(ZetaFit(0.5, 0.05, 30, *[None] * 3, 0.0, 0.0), 1000)
+    assert np.std([x.zeta for x in scaled]) == pytest.approx(0.05, rel=0.1)
     beta, gamma = (x.ravel() for x in np.meshgrid(*[np.radians(np.arange(-75, 90, 30))] * 2))
     noise = 0.02 * np.random.default_rng(1).normal(size=(2, beta.size))
     fit = fit_stress(beta, gamma, *(MAP(beta, gamma) + noise))
