@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import math
 import re
 
 import numpy as np
@@ -435,6 +436,17 @@ def test_the_command_prints_writes_and_draws(noisy, tmp_path, monkeypatch):
     )
     numbers = json.loads(out)
     assert not code and numbers["cycles"] == 4 and {*numbers["quantities"]} == {*QUANTITIES}
+    speed = numbers["quantities"]["speed"]
+    assert {x["unit"] for x in numbers["quantities"].values()} == {"Hz", "BL", "BL/s", "rad", "1"}
+    assert math.hypot(*speed["standard_error"].values()) < speed["half_width"]
+    assert (
+        len(numbers["along"]["slip"]["value"]) == len(numbers["along"]["amplitude"]["half_width"]) == kinematics.PARTS
+    )
+    assert np.mean(numbers["per_cycle"]["speed"]) == pytest.approx(speed["value"], rel=0.01)
+    assert numbers["predicted"]["speed"]["value"] < speed["value"] and numbers["predicted"]["heading"]["unit"] == "rad"
+    C, gamma0 = numbers["closing"]
+    assert C["tried"][0] < C["present"] < C["value"] < C["tried"][1] and 0 < C["half_width"] < 0.5
+    assert gamma0["unit"] == "rad" and gamma0["value"] is None is gamma0["half_width"]
     with netcdf_file("mid.nc", mmap=False) as file:
         assert float(file.variables["speed"].data) == numbers["quantities"]["speed"]["value"]
         assert float(file.variables["speed_error"].data) == numbers["quantities"]["speed"]["half_width"]
