@@ -202,7 +202,8 @@ def swap(points):
 
 
 def turn_round(points):
-    points[50:60] = points[50:60, ::-1]
+    for some in (slice(50, 56), slice(70, 74)):
+        points[some] = points[some, ::-1]
 
 
 def jump(points):
