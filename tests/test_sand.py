@@ -401,9 +401,10 @@ def test_geoms_in_the_sand_touch_no_floor_and_everything_else():
         with pytest.raises(Note, match="no longer touches the floor"):
             rft.mujoco.attach(model, MAP, geoms="foot")
     assert touching(model) == before and mujoco.get_mjcb_passive() is None
-    model.geom_group[model.geom("ball").id] = 2
-    with rft.mujoco.attach(model, MAP, geoms=2) as sand:
-        assert sand.geoms == ("ball",)
+    model.geom_group[[model.geom(name).id for name in ("ball", "rock")]] = 2
+    for fixed_and_moving, moving in ((2, "ball"), ("[rs]*", "stone")):
+        with rft.mujoco.attach(model, MAP, geoms=fixed_and_moving) as sand:
+            assert sand.geoms == (moving,)
     with rft.mujoco.attach(model, MAP) as sand:
         assert {*touching(model)} == {("rock", "stone")} and sand.geoms == ("foot", "stone", "ball")
 
