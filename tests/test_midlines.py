@@ -321,6 +321,12 @@ def test_missing_points_and_gaps_are_bridged_and_said(noisy, fitted):
     assert len(gap.used) == len(fitted.used) - 1
 
 
+def test_five_points_have_modes_enough(noisy, fitted):
+    found = fit.fit_midlines(trial_of(noisy.t, noisy.points[:, [0, 7, 15, 22, 29]]))
+    assert (found.curve.modes, found.fine.modes) == (4, 4)
+    assert abs(found.value("speed")[0] - fitted.value("speed")[0]) < found.value("speed")[1]
+
+
 def test_mirrored_trials_differ_in_the_sign_of_turns_alone(noisy, fitted):
     mirrored = fit.fit_midlines(dataclasses.replace(noisy.trial(), points=noisy.points * [1, -1]))
     sign = np.array([-1 if name in ("heading", "drift", "turn") else 1 for name in QUANTITIES])

@@ -35,9 +35,10 @@ TILTED = """<mujoco><option gravity="0 0 -9.81"/><worldbody><body name="a" pos="
 </body></worldbody></mujoco>"""
 
 
-def test_momenta_change_by_the_forces_and_moments_of_grains_and_weight():
+def test_momenta_change_by_the_forces_and_moments_of_grains_and_weight(tmp_path, monkeypatch):
     """Of a body whose centre of mass, origin and geom are three places with three frames, that tumbles; against the wrench of
     the geom's mesh by itself."""
+    monkeypatch.chdir(tmp_path)
     model = mujoco.MjModel.from_xml_string(TILTED)
     mesh = geoms.geom_mesh(model, 0, 24)
     body = Multibody(model, geoms.surfaces(model, {"g": mesh}), Grains(SPATIAL, rounding=1e-5))
@@ -58,6 +59,9 @@ def test_momenta_change_by_the_forces_and_moments_of_grains_and_weight():
     wanted = [one.force + [0, 0, -0.3 * 9.81], one.moment + np.cross(place - com, one.force)]
     assert np.abs(wanted).min() > 1e-3
     np.testing.assert_allclose((momenta() - before) / h, np.concatenate(wanted), rtol=0.02, atol=2e-3)
+    data.qpos[0] = np.nan
+    mujoco.mj_step(model, data)  # warns, but in no file
+    assert not [*tmp_path.iterdir()]
 
 
 def test_what_falls_free_falls_as_galilei_says():
