@@ -105,6 +105,9 @@ def test_a_scene_takes_its_medium_from_a_file(tmp_path):
     (tmp_path / "own.toml").write_text("file = 'own.toml'\n")
     with pytest.raises(Refusal, match="names another file, own.toml: copy the coefficients"):
         scenes.load(tmp_path / "s.toml")
+    (tmp_path / "own.toml").write_text("zetta = 1\n")
+    with pytest.raises(Refusal, match=r"s.toml: \[medium\]: own.toml: key: 'zetta' is unknown: did you mean 'zeta'"):
+        scenes.load(tmp_path / "s.toml")
     (tmp_path / "own.toml").write_text("[medium\n")
     with pytest.raises(Refusal, match="it is not TOML"):
         scenes.load(tmp_path / "s.toml")
