@@ -375,7 +375,9 @@ def test_digests_of_own_code_cover_its_sources(name, tmp_path, monkeypatch):
         (tmp_path / "thick.py").write_text(
             f"{law}{IMPORTS[name]}\n" if "def" in IMPORTS[name] else f"{IMPORTS[name]}\n{law}"
         )
-        (tmp_path / "thick_factor.py").write_text(f"FACTOR = {factor}\ndef times(x):\n    return FACTOR * x\n")
+        (tmp_path / "thick_factor.py").write_text(
+            f"import rft.laws\nFACTOR = {factor}\ndef times(x):\n    return FACTOR * x\n"
+        )
         for module in [module for module in sys.modules if module.startswith("thick_")]:
             monkeypatch.delitem(sys.modules, module)
         monkeypatch.setattr(kinds, "_texts", {})

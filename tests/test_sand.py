@@ -10,6 +10,7 @@ import warnings
 import numpy as np
 import pytest
 from artists import drawn
+from scipy.interpolate import RegularGridInterpolator
 from scipy.spatial.transform import Rotation
 
 import rft
@@ -254,6 +255,14 @@ def test_a_height_field_is_where_mujoco_has_it():
             )
             (n_x, n_y, n_z), level = tangent_plane(*hills, x, y)
             assert geom == 0 and (level - n_x * x - n_y * y) / n_z == pytest.approx(hit, abs=1e-6)
+    x, y = np.linspace(-1, 1, 6), np.linspace(-0.5, 0.5, 4)
+    known = np.stack([hills[0][..., 0], *np.gradient(hills[0][..., 0], y, x)], -1)
+    for v, u in np.random.default_rng(8).uniform([-0.5, -1], [0.5, 1], (20, 2)):  # between nodes, all along lines
+        height, by_v, by_u = RegularGridInterpolator((y, x), known)((v, u))
+        place, (by_x, by_y, _) = turn.apply([u, v, 0.0]) + [0.3, -0.2, 0.1], turn.apply([by_u, by_v, 0.0])
+        n, level = tangent_plane(*hills, *place[:2])
+        np.testing.assert_allclose(n, np.array([-by_x, -by_y, 1.0]) / math.hypot(by_x, by_y, 1.0), atol=1e-12)
+        assert level == pytest.approx(n @ (place + [0, 0, height]), abs=1e-12)
 
 
 def test_forces_converge_with_the_length_of_elements():
