@@ -304,6 +304,7 @@ REFUSED = [
         "No such file or directory; give a CSV file with the header beta,gamma",
     ),
     ('kind = "polygon"', 'kind = "poligon"', "[intruder] kind: 'poligon' is unknown: did you mean 'polygon'"),
+    ('kind = "polygon"', 'kind = "cyllinder"', "[intruder] kind: 'cyllinder' is unknown: did you mean 'cylinder'"),
     ('kind = "polygon"', "", "[intruder] has no 'kind': add kind = one of plate, round-rod"),
     ("[0.03, 0.02]", "[0.03, 0.02], [0.01, -0.02]", "of the outline cross or touch"),
     ("[0.03, 0.02]", "[0.03]", "[intruder]"),
