@@ -92,6 +92,8 @@ def test_viscous_circle_is_as_efficient_as_published():
     table = Displacements(effort.with_effort(table.result))
     assert table["path_length"][0] == pytest.approx(0.512235, abs=1e-6)
     assert table["efficiency"]["direct"] == pytest.approx([0.1001, 0.1088], abs=6e-5)
+    towed = np.array(table["net_distance"]["direct"]) ** 2 / (2 * np.pi)  # at constant speed, through the same cycle
+    assert table["cost_of_transport"]["direct"] == pytest.approx(np.array(table["work"]) / towed)
 
 
 def test_errors_cover_four_times_as_many_phases():
