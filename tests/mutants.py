@@ -54,6 +54,8 @@ EITHER_WAY = {
     "hypot",
     "distance",
     "pose_distance",
+    "dot",
+    "plus",
 }  # of two arguments
 
 
