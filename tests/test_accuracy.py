@@ -34,6 +34,9 @@ def line(results, label):
 def test_every_setting_gets_better(glass):
     """Each setting's finest value beats its coarsest, but for those whose tier has an error of its own."""
     assert len(glass["lines"]) == len(tiered.SETTINGS) - 1  # no effect cuts the body into pieces
+    for name, factor in {"phases": 2, "segments": 2, "nodes": 2, "regularisation": 0.1}.items():
+        values = line(glass, f"direct: {name}")["value"]
+        assert np.divide(values[1:], values[:-1]) == pytest.approx(factor)
     for found in glass["lines"]:
         if found["label"] not in ("path: grid", "area: grid"):
             assert found["error"][-1] < 0.5 * found["error"][0], found["label"]

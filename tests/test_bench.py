@@ -205,6 +205,12 @@ def test_a_gait_that_leaves_the_field_between_few_phases_is_refused(monkeypatch)
     refuse_outside(GLASS, gait, phases=4096)
     with pytest.raises(Refusal, match="alpha_1 = 2.5 rad lies outside the field's -2.5 to 2.5"):
         refuse_outside(GLASS, gait, phases=8192)
+    mirrored = dataclasses.replace(
+        gait, cos=((-np.cos(late),), (0.5,)), sin=((-np.sin(late),), (0.0,)), centre=(-0.1, 0.0)
+    )
+    mirrored = dataclasses.replace(mirrored, amplitude=gait.amplitude - 0.1)
+    with pytest.raises(Refusal, match="alpha_1 = -2.5 rad lies outside the field's -2.5 to 2.5"):
+        refuse_outside(GLASS, mirrored, phases=8192)
     cycle = Fourier.cycle
     monkeypatch.setattr(Fourier, "cycle", lambda *of: computed.append(of[1]) or cycle(*of))
     refuse_outside(GLASS, gait, [0.5, 2.0], phases=10**6)

@@ -13,7 +13,7 @@ from geomech.scenes.frames import framed
 from geomech.studies import cost, effort, fields
 from geomech.studies.results import Displacements
 from geomech.systems import NoSlipSnake, Swimmer, Table
-from geomech.systems.capabilities import velocity_and_power
+from geomech.systems.capabilities import refined, velocity_and_power
 from rft import BodyInertia, Chain, DisturbedGround, Granular, Serpenoid, SkinFriction, Transient, Viscous
 from rft.balance.listening import listening
 from rft.refusal import Refusal
@@ -50,6 +50,8 @@ def test_power_is_that_of_every_frame(medium):
     xi, power = velocity_and_power(system, alpha, rate)
     assert power == pytest.approx(velocity_and_power(inner, alpha, rate)[1], rel=1e-12)
     assert xi == pytest.approx(system.velocity(alpha, rate), abs=1e-14)
+    assert (finer := refined(system)) is None or finer.inner == refined(inner) != inner
+    assert (finer is None) == (refined(inner) is None) == (medium is FLUID)
 
 
 def test_a_norm_shares_the_velocities_of_the_harmonics():
@@ -92,6 +94,8 @@ def test_viscous_circle_is_as_efficient_as_published():
     table = Displacements(effort.with_effort(table.result))
     assert table["path_length"][0] == pytest.approx(0.512235, abs=1e-6)
     assert table["efficiency"]["direct"] == pytest.approx([0.1001, 0.1088], abs=6e-5)
+    towed = np.array(table["net_distance"]["direct"]) ** 2 / (2 * np.pi)  # at constant speed, through the same cycle
+    assert table["cost_of_transport"]["direct"] == pytest.approx(np.array(table["work"]) / towed)
 
 
 def test_errors_cover_four_times_as_many_phases():

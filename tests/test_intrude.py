@@ -104,6 +104,9 @@ def test_a_scene_takes_its_medium_from_a_file(tmp_path):
     (tmp_path / "own.toml").write_text("file = 'own.toml'\n")
     with pytest.raises(Refusal, match="names another file, own.toml: copy the coefficients"):
         scenes.load(tmp_path / "s.toml")
+    (tmp_path / "own.toml").write_text("zetta = 1\n")
+    with pytest.raises(Refusal, match=r"s.toml: \[medium\]: own.toml: key: 'zetta' is unknown: did you mean 'zeta'"):
+        scenes.load(tmp_path / "s.toml")
     (tmp_path / "own.toml").write_text("[medium\n")
     with pytest.raises(Refusal, match="it is not TOML"):
         scenes.load(tmp_path / "s.toml")
@@ -300,6 +303,7 @@ REFUSED = [
         "No such file or directory; give a CSV file with the header beta,gamma",
     ),
     ('kind = "polygon"', 'kind = "poligon"', "[intruder] kind: 'poligon' is unknown: did you mean 'polygon'"),
+    ('kind = "polygon"', 'kind = "cyllinder"', "[intruder] kind: 'cyllinder' is unknown: did you mean 'cylinder'"),
     ('kind = "polygon"', "", "[intruder] has no 'kind': add kind = one of plate, round-rod"),
     ("[0.03, 0.02]", "[0.03, 0.02], [0.01, -0.02]", "of the outline cross or touch"),
     ("[0.03, 0.02]", "[0.03]", "[intruder]"),

@@ -375,7 +375,9 @@ def test_digests_of_own_code_cover_its_sources(name, tmp_path, monkeypatch):
         (tmp_path / "thick.py").write_text(
             f"{law}{IMPORTS[name]}\n" if "def" in IMPORTS[name] else f"{IMPORTS[name]}\n{law}"
         )
-        (tmp_path / "thick_factor.py").write_text(f"FACTOR = {factor}\ndef times(x):\n    return FACTOR * x\n")
+        (tmp_path / "thick_factor.py").write_text(
+            f"import rft.laws\nFACTOR = {factor}\ndef times(x):\n    return FACTOR * x\n"
+        )
         for module in [module for module in sys.modules if module.startswith("thick_")]:
             monkeypatch.delitem(sys.modules, module)
         monkeypatch.setattr(kinds, "_texts", {})
@@ -383,6 +385,7 @@ def test_digests_of_own_code_cover_its_sources(name, tmp_path, monkeypatch):
         load_file(tmp_path / "thick.py")
         found.append(kinds.code())
     assert all("thick_factor" in one for one in found) and len({len(one) for one in found}) == 1
+    assert not [module for one in found for module in one if module.partition(".")[0] in ("rft", "geomech", "numpy")]
     assert found[0] == found[3] and len({tuple(one.items()) for one in found}) == 3
 
 

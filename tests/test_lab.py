@@ -24,6 +24,7 @@ from geomech.studies import charts
 from geomech.studies.lab import GALLERY, Lab
 from geomech.studies.study import Study
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
+from geomech.text import lab as lines
 from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -112,6 +113,8 @@ def test_a_family_has_the_scene_as_a_member(family):
     assert told["shapes"] == (("scene",), [441]) and told["highest"] == (("scene",), [9])
     assert [told[name][1] for name in ("grid_error", "grid_error_heading")] == [[x] for x in chart.grid_error]
     assert chart.family.values.tolist() == [1.0, 1.5, 1.8, 2.2, 3.0] and family.attributes["members"] == 5
+    line = f"three-link-glass over medium.C: 5 members, interpolated between them to {chart.family.error:.1e} BL"
+    assert lines.text(family).splitlines() == ["three-link-glass  441 shapes, harmonics to 9", line]
     own = charts.tiers(charts.chart(chart.scene), OFF_CENTRE)
     for tier, (net, _) in charts.tiers(chart.at(1.8), OFF_CENTRE).items():
         np.testing.assert_allclose(net, own[tier].net, atol=1e-6)

@@ -780,6 +780,12 @@ def swapped(rows):
     return rows
 
 
+def slower(rows):
+    """By 1.3 from the middle on; the clock begins at 100."""
+    rows[:, 0] += 100 + 0.3 * np.maximum(np.arange(len(rows)) - len(rows) // 2, 0) / 30
+    return rows
+
+
 def faster(rows):
     rows[:, 0] += np.maximum(np.arange(len(rows)) - len(rows) // 2, 0) / 30
     return rows
@@ -817,9 +823,9 @@ BAD = {
     "nine": (lambda r: r[: 9 * 30 + 15], "7 whole cycles, .*, are too few: give at least 10 in all"),
     "unsorted": (swapped, "line 103: t = .* comes after .*: sort the rows by time"),
     "twice": (changed(0, lambda t: t[0] + 0 * t, slice(99, 101)), "line 102: t = .* is given twice: keep one"),
-    "degrees": (changed(slice(1, 3), np.degrees), "line .*: alpha_1 reaches .* where joint angles are in rad: say degrees"),
+    "degrees": (changed(slice(1, 3), np.degrees), "line 273: alpha_1 reaches 58.12 where joint angles are in rad: say degrees"),
     "heading in degrees": (
-        changed(5, lambda x: np.degrees(x) % 360), "line .*: heading jumps by .*, a turn in degrees: say degrees",
+        changed(5, lambda x: np.degrees(x) % 360), "line 3: heading jumps by 359.3, a turn in degrees: say degrees",
     ),
     "one joint twice": (twice, "alpha_2 is 1 times alpha_1, .*: one shape variable recorded 2 times .*, by columns"),
     "one joint scaled": (scaled, "alpha_2 is -0.5 times alpha_1, but for a constant and noise"),
@@ -833,13 +839,17 @@ BAD = {
     "few": (lambda r: r[:150], r"the joints repeat 4\..* times: give at least 10 cycles"),
     "fewer": (lambda r: r[:90], "90 rows are too few"),
     "thin": (lambda r: r[::4], "7.6 rows a cycle are too few: give at least 12"),
-    "noise": (changed(slice(1, 6), noise), "the joints (do not repeat|repeat 2.. times)"),
+    "noise": (changed(slice(1, 6), noise), "the joints repeat 2.4 times: give at least 10 cycles"),
     "spike": (changed(3, lambda x: x + 1, 200), "line 202: x is .* off the rows before and after: mend that row"),
-    "slip": (changed(3, lambda x: x + 1, slice(200, None)), "line 202: x jumps by .*: the tracking slipped"),
+    "slip": (changed(3, lambda x: x + 1, slice(200, None)), "line 202: x jumps by 1 to this row: the tracking slipped"),
+    "slip back": (changed(4, lambda y: y - 1, slice(202, None)), "line 204: y jumps by -1 to this row: the tracking slipped"),
     "t in another unit": (changed(0, lambda t: 1e-9 * t), "the joints repeat every .*e-09 where t is in s: give t in s"),
-    "two rates": (faster, "(the joints repeat every .* two gaits are in it|the gait stands, slips or runs back)"),
+    "two rates": (
+        slower, "the joints repeat every 1.01 in the first quarter of the log and every 1.28 in the last: two gaits are",
+    ),
+    "two other rates": (faster, "line 33: the gait stands, slips or runs back after this row .t = 1.03333.: cut pauses"),
     "two gaits": (changed(1, lambda x: 0.4 * x - 1, slice(200, None)), "line 202: alpha_1 jumps by .* two gaits"),
-    "two sizes": (larger, "line 2..: (two gaits: . cycles are of one kind and . of another|alpha_. jumps)"),
+    "two sizes": (larger, "line 212: two gaits: 6 cycles are of one kind and 6 of another, which begins here .t = 7.; give"),
 }  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from rft.balance.arrays import solve
 from rft.balance.newton import RESIDUAL, Limits
 from rft.balance.solver import QUICK
 from rft.contact import assemble
+from rft.laws import base
 from rft.laws.base import TermLaw, require_drag
 from rft.laws.catalogue import SURFACE_ALONG, SURFACE_ALONG_RANGE
 from rft.laws.records import record
@@ -30,6 +31,19 @@ def test_granular_is_equation_3():
     sine = np.sin(DIRECTIONS)
     np.testing.assert_allclose(f_n, (1 + C / np.sqrt(math.tan(gamma0) ** 2 + sine**2)) * sine, rtol=1e-14, atol=1e-15)
     np.testing.assert_allclose(f_t, np.cos(DIRECTIONS), rtol=1e-14, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", MEDIA)
+def test_what_a_medium_claims_is_so(name):
+    """Left and right alike, odd, linear, one power of the speed: yes or no, as its tractions have it."""
+    law, v = MEDIA[name], (np.cos(DIRECTIONS), np.sin(DIRECTIONS))
+    f, back, left, fast = (np.stack(law.traction(a * v[0], b * v[1])) for a, b in ((1, 1), (-1, -1), (1, -1), (4, 4)))
+    same = lambda x, y: bool(np.allclose(x, y, rtol=0, atol=1e-12 * np.abs(y).max()))
+    assert base.is_mirror(law) in (same(left * [[1], [-1]], f), False) and type(base.is_mirror(law)) is bool
+    assert base.is_odd(law) is same(-back, f)
+    assert base.is_linear(law) is (base.is_closed(law) and same(fast, 4 * f))
+    power = base.speed_exponent(law)
+    assert base.is_rate_independent(law) is (power is not None) and (power is None or same(fast, 4**power * f))
 
 
 @pytest.mark.parametrize("name", DRY)

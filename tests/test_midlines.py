@@ -2,6 +2,8 @@
 
 import dataclasses
 import json
+import math
+import re
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ from geomech.scenes import Numerics, Scene
 from geomech.studies.undulation import performance
 from geomech.systems import Swimmer
 from geomech.systems.swimmer import MEDIA
-from rft import Backbone
+from rft import Backbone, Viscous
 from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -144,6 +146,9 @@ def test_every_format_gives_the_same_trial(exact, tmp_path):
         (wide(exact).replace("_x", ".x").replace("_y", ".y"), {"units": "BL"}, 1.0),
         (wide(scaled(120), unit="_mm"), {}, 0.12),
         (wide(scaled(12), unit=" (cm)"), {}, 0.12),
+        (re.sub(r"p(\d+)_([xy])", r"\2_\1", wide(exact, unit="_bl")), {"y": "up"}, 1.0),
+        (re.sub("(?m)^([^,]*),[^,]*,", r"\1,", long(exact)).replace("t,", "time,"), {}, 1.0),  # points have no numbers
+        (re.sub("(?m)^([^,t]+)", lambda t: f"{1e3 * float(t[1]):.9g}", long(exact)).replace("t,", "t_ms,", 1), {}, 1.0),
     )
     for text, options, size in forms:
         file.write_text(text)
@@ -170,6 +175,12 @@ def test_every_format_gives_the_same_trial(exact, tmp_path):
         ("t,point,x_BL,y_BL\n0,1,", "t,point,x_BL,y_BL\n0,1,one", "line 2, column x_bl"),
         ("\n0,2,", "\n0,1,", "line 3: point 1 is given twice"),
         ("t,point,x_BL,y_BL", "t,point,x_BL,x_BL", "the column 'x_bl' is there twice"),
+        ("t,point", "t_mm,point", "line 1: t_mm is in mm: give t in s or ms"),
+        (
+            "t,point,x_BL,y_BL\n0,",
+            "t,colour,x_BL,y_BL\n0.033333333,",
+            "line 3: 15 points at t = 0, and 16 at most others",
+        ),
     ],
 )
 def test_bad_files_are_refused_by_place(exact, tmp_path, old, new, names):
@@ -191,7 +202,8 @@ def swap(points):
 
 
 def turn_round(points):
-    points[50:60] = points[50:60, ::-1]
+    for some in (slice(50, 56), slice(70, 74)):
+        points[some] = points[some, ::-1]
 
 
 def jump(points):
@@ -233,12 +245,57 @@ def test_trials_that_do_not_tell_are_refused(noisy, change, said):
         fit.fit_midlines(change(noisy.trial()))
 
 
-def test_another_motion_within_a_trial_is_refused_by_its_times(noisy):
+def at(places, value):
+    """A change of a trial: its points at some places, (frames, points), have other values."""
+    return lambda t: changed(t, lambda p: p.__setitem__(places, value(p) if callable(value) else value))
+
+
+def standing(trial):
+    """A body that bends to and fro in one shape."""
+    s, bend = np.linspace(-0.5, 0.5, 20), np.sin(2 * np.pi * trial.t)[:, None]
+    return trial_of(trial.t, np.stack([s - 0.4 * bend**2 * s**3, bend * s**2], -1))
+
+
+def without(trial, left_out):
+    kept = ~left_out
+    return dataclasses.replace(trial, t=trial.t[kept], points=trial.points[kept], lines=trial.lines[kept])
+
+
+def backwards(_):
+    """A swimmer that its wave takes along, as where drag is less across the body than along it."""
+    return synthetic.made(Swimmer(Viscous(0.4), Backbone(20)), 3.4, 30, 20).trial()
+
+
+ALSO_REFUSED = {
+    "the body bends in one shape to and fro": standing,
+    "the body is 2.01 body lengths long": lambda t: dataclasses.replace(t, points=2 * t.points),
+    "point 4 never moves": at((slice(None), 3), 0.0),
+    "points 4 and 5 are in one place": at((slice(None), 4), lambda p: p[:, 3]),
+    "10 frames have most of their points": at(np.indices((133, 30)).sum(0) % 2 * (np.arange(133) > 9)[:, None] > 0, np.nan),
+    "line 542 .t = 0.6.: no frames for 0.2 after this one, and so in every cycle":
+        lambda t: without(t, (np.arange(len(t.t)) >= 19) & ((np.arange(len(t.t)) - 19) % 30 < 5)),
+    "the cycle from t = 1.2.. to 3.6.. takes 1.9 times as long as most":
+        lambda t: dataclasses.replace(t, t=t.t + 2 * np.clip(t.t - 1.5, 0, 1)),
+    "the body moves towards its point 1, and so does its wave": backwards,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("said", ALSO_REFUSED)
+def test_trials_of_other_faults_are_refused(noisy, said):
+    with pytest.raises(Refusal, match=said):
+        fit.fit_midlines(ALSO_REFUSED[said](noisy.trial()), mend=True)
+
+
+def test_another_motion_within_a_trial_is_refused_by_its_times(noisy, fitted):
     other = synthetic.made(GLASS, 1.5, 30, waves=2.4, swing=0.5, seed=1)
     shift = noisy.points[-1].mean(0) - other.points[0].mean(0)
     points = np.concatenate([noisy.points, other.points + shift])
     with pytest.raises(Refusal, match="the motion stands, or is another one, after t = [45]"):
         fit.fit_midlines(trial_of(np.arange(len(points)) / 30, points), mend=True)
+    t = (cycles := fitted.cycles(fitted.curve)).tangent
+    mirrored = dataclasses.replace(cycles, tangent=np.stack([*t[:2], t[2].conj(), t[3]]))
+    with pytest.raises(Refusal, match=r"the cycle from t = 2\.\d+ to 3\.\d+ does not repeat .* \(correlation -0\.9"):
+        fit._check_alike(fitted.trial, mirrored)
 
 
 def test_the_head_is_found_from_the_motion_and_said(exact, noisy, fitted):
@@ -262,6 +319,12 @@ def test_missing_points_and_gaps_are_bridged_and_said(noisy, fitted):
     kept = np.r_[0:50, 62 : len(noisy.t)]
     gap = fit.fit_midlines(dataclasses.replace(t, t=t.t[kept], points=t.points[kept], lines=t.lines[kept]))
     assert len(gap.used) == len(fitted.used) - 1
+
+
+def test_five_points_have_modes_enough(noisy, fitted):
+    found = fit.fit_midlines(trial_of(noisy.t, noisy.points[:, [0, 7, 15, 22, 29]]))
+    assert (found.curve.modes, found.fine.modes) == (4, 4)
+    assert abs(found.value("speed")[0] - fitted.value("speed")[0]) < found.value("speed")[1]
 
 
 def test_mirrored_trials_differ_in_the_sign_of_turns_alone(noisy, fitted):
@@ -426,6 +489,17 @@ def test_the_command_prints_writes_and_draws(noisy, tmp_path, monkeypatch):
     )
     numbers = json.loads(out)
     assert not code and numbers["cycles"] == 4 and {*numbers["quantities"]} == {*QUANTITIES}
+    speed = numbers["quantities"]["speed"]
+    assert {x["unit"] for x in numbers["quantities"].values()} == {"Hz", "BL", "BL/s", "rad", "1"}
+    assert math.hypot(*speed["standard_error"].values()) < speed["half_width"]
+    assert (
+        len(numbers["along"]["slip"]["value"]) == len(numbers["along"]["amplitude"]["half_width"]) == kinematics.PARTS
+    )
+    assert np.mean(numbers["per_cycle"]["speed"]) == pytest.approx(speed["value"], rel=0.01)
+    assert numbers["predicted"]["speed"]["value"] < speed["value"] and numbers["predicted"]["heading"]["unit"] == "rad"
+    C, gamma0 = numbers["closing"]
+    assert C["tried"][0] < C["present"] < C["value"] < C["tried"][1] and 0 < C["half_width"] < 0.5
+    assert gamma0["unit"] == "rad" and gamma0["value"] is None is gamma0["half_width"]
     with netcdf_file("mid.nc", mmap=False) as file:
         assert float(file.variables["speed"].data) == numbers["quantities"]["speed"]["value"]
         assert float(file.variables["speed_error"].data) == numbers["quantities"]["speed"]["half_width"]

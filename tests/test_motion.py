@@ -215,7 +215,9 @@ def test_a_table_reads_back_with_every_digit(name, tmp_path):
     ends = columns(*(f"end_{k}_{axis}" for k in range(4) for axis in "xy"))
     np.testing.assert_array_equal(ends.reshape(-1, 4, 2), found.points())
     comments = [line for line in path.read_text().splitlines() if line.startswith("#")]
-    assert any("x (m), y (m), theta (rad)" in line for line in comments)
+    assert len(comments) == 5 and comments[2].startswith("# x (m), y (m), theta (rad): pose of the frame ")
+    assert comments[1] == "# phase (rad): of the gait, 2 pi a cycle"
+    assert comments[3].startswith("# alpha_k (rad): joint angle, heading of link k+1") and "end_k_x" in comments[4]
     assert "time" not in found.columns
 
 
@@ -227,6 +229,7 @@ def test_time_where_the_gait_has_a_frequency(tmp_path):
     trajectories.save(tmp_path / "out.csv", found)
     table = np.genfromtxt(tmp_path / "out.csv", delimiter=",", names=True)
     np.testing.assert_allclose(table["time"], found.phase / (2 * np.pi * 2.5))
+    assert "# phase (rad): of the gait, 2 pi a cycle; time (s)\n" in (tmp_path / "out.csv").read_text()
     assert plots.filmstrip(found).axes[1].get_title("left").endswith(f"t = {found.time[19]:.3g} s")
 
 
@@ -415,6 +418,7 @@ def test_a_system_without_a_body_is_an_arrow(tmp_path):
     assert list(found.columns) == ["phase", "x", "y", "theta", "alpha_1", "alpha_2"]
     trajectories.save(tmp_path / "out.csv", found)
     np.testing.assert_array_equal(np.loadtxt(tmp_path / "out.csv", delimiter=",", skiprows=1)[:, 1:4], found.pose)
+    assert "end_k_x" not in (tmp_path / "out.csv").read_text()
     _, put = plots.stage(found, animate.rows(24, 1))
     body, (x, y, theta) = put(7)[1].get_xydata(), found.pose[7]
     np.testing.assert_allclose(body.mean(0), [x, y], atol=1e-14)

@@ -306,6 +306,12 @@ def test_speed_keeps_its_limit(limit, least):
         assert found.active == ("rate",)
 
 
+def test_without_a_limit_joints_are_as_fast_as_in_the_gait_of_the_scene():
+    gait = Fourier(cos=((0.8,), (0.1,)), sin=((0.2,), (0.5,)), frequency=1.5)
+    limit = checked(viscous(gait=gait), "speed").objective.rate
+    assert limit == pytest.approx(3 * np.pi * np.hypot(0.8, 0.2), rel=1e-4)  # of the faster joint
+
+
 def test_both_limits_of_speed_hold():
     found = optimise(viscous(), "speed", rate=1.0, power=0.006)
     alpha, alphadot = found.gait.cycle(2048)

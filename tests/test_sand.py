@@ -10,6 +10,7 @@ import warnings
 import numpy as np
 import pytest
 from artists import drawn
+from scipy.interpolate import RegularGridInterpolator
 from scipy.spatial.transform import Rotation
 
 import rft
@@ -21,7 +22,7 @@ from rft.meshes.blocks import Blocks
 from rft.meshes.contact import Motion, faces
 from rft.meshes.extruded import Extruded
 from rft.plates import VERTICAL, PlateDrags, RoundRod, StressMap, loads
-from rft.plates.calibrate import fit_stress
+from rft.plates.calibrate import ZetaFit, fit_stress
 from rft.plates.stress import COEFFICIENTS
 
 mujoco = pytest.importorskip("mujoco", reason="needs the extra: pip install 'geomech[mujoco]'")
@@ -256,6 +257,14 @@ def test_a_height_field_is_where_mujoco_has_it():
             )
             (n_x, n_y, n_z), level = tangent_plane(*hills, x, y)
             assert geom == 0 and (level - n_x * x - n_y * y) / n_z == pytest.approx(hit, abs=1e-6)
+    x, y = np.linspace(-1, 1, 6), np.linspace(-0.5, 0.5, 4)
+    known = np.stack([hills[0][..., 0], *np.gradient(hills[0][..., 0], y, x)], -1)
+    for v, u in np.random.default_rng(8).uniform([-0.5, -1], [0.5, 1], (20, 2)):  # between nodes, all along lines
+        height, by_v, by_u = RegularGridInterpolator((y, x), known)((v, u))
+        place, (by_x, by_y, _) = turn.apply([u, v, 0.0]) + [0.3, -0.2, 0.1], turn.apply([by_u, by_v, 0.0])
+        n, level = tangent_plane(*hills, *place[:2])
+        np.testing.assert_allclose(n, np.array([-by_x, -by_y, 1.0]) / math.hypot(by_x, by_y, 1.0), atol=1e-12)
+        assert level == pytest.approx(n @ (place + [0, 0, height]), abs=1e-12)
 
 
 OTHER = StressMap(C01=0.1, D10=0.01, zeta=0.7, grazing=math.radians(8))
@@ -670,6 +679,12 @@ def test_the_time_step_and_the_masses_ask_for_a_rounding():
         with pytest.warns(Note, match="a geom in the sand is faster than 100 m/s") as caught:
             mujoco.mj_step(model, data, 3)
         assert len(caught) == 1 and installed.times_too_fast(sand._row) == 3
+    model.opt.timestep = 0.1
+    with pytest.warns(
+        Note, match=r"100 ms asks for a rounding of 0\.49 m/s, the sand has 0\.25: .*; steps of 50 ms"
+    ) as caught:
+        sand.forces(data), sand.forces(data)
+    assert len(caught) == 1
     sand.detach()
 
 
@@ -711,9 +726,10 @@ def test_geoms_in_the_sand_touch_no_floor_and_everything_else():
         with pytest.raises(Note, match="no longer touches the floor"):
             rft.mujoco.attach(model, MAP, geoms="foot")
     assert touching(model) == before and mujoco.get_mjcb_passive() is None
-    model.geom_group[model.geom("ball").id] = 2
-    with rft.mujoco.attach(model, MAP, geoms=2) as sand:
-        assert sand.geoms == ("ball",)
+    model.geom_group[[model.geom(name).id for name in ("ball", "rock")]] = 2
+    for fixed_and_moving, moving in ((2, "ball"), ("[rs]*", "stone")):
+        with rft.mujoco.attach(model, MAP, geoms=fixed_and_moving) as sand:
+            assert sand.geoms == (moving,)
     with rft.mujoco.attach(model, MAP) as sand:
         assert {*touching(model)} == {("rock", "stone")} and sand.geoms == ("foot", "stone", "ball")
 
@@ -739,6 +755,15 @@ def test_what_is_not_in_the_sand_touches_the_floor_as_before():
     for more in ({"slope": 0.01}, {"level": 0.002}):
         with rft.mujoco.attach(model, MAP, geoms="foot", **more) as sand:
             assert own_notes(sand) == []
+    second = '<geom name="{}" type="plane" size="1 1 1" pos="0 0 {}" euler="{} 0 0"/>'
+    more = second.format("second", 9e-4, 0.05) + second.format("below", -2e-3, 0) + second.format("tilted", 0, 0.06)
+    model = model_of(FLOORED.format("") + more)
+    with pytest.warns(Note, match="the geom no longer touches the floor 'floor' and 'second', which lies"):
+        sand = rft.mujoco.attach(model, MAP, geoms="foot")
+    touched = touching(model)
+    sand.detach()
+    assert {x for x in touched if "foot" in x} == {("below", "foot"), ("foot", "tilted")}
+    assert {x for x in touched if "ball" in x} == {("ball", x) for x in ("floor", "second", "below", "tilted")}
     crowded = model_of(FLOORED.format('contype="2147483647"'))
     with pytest.raises(rft.Refusal, match="no bit is free to tell the floor from other geoms: use fewer contypes"):
         rft.mujoco.attach(crowded, MAP)
@@ -861,6 +886,8 @@ def test_media_are_drawn_within_their_uncertainty():
     logs = np.log([x.xi_n / 3e5 for x in drawn])
     assert logs.std() == pytest.approx(0.1, rel=0.1) and abs(logs.mean()) < 0.01
     assert drawn == rft.mujoco.sample(Spatial(3e5), 2000, seed=2, spread=0.1)
+    scaled = rft.mujoco.sample(ZetaFit(0.5, 0.05, 30, *[None] * 3, 0.0, 0.0), 1000)
+    assert np.std([x.zeta for x in scaled]) == pytest.approx(0.05, rel=0.1)
     beta, gamma = (x.ravel() for x in np.meshgrid(*[np.radians(np.arange(-75, 90, 30))] * 2))
     noise = 0.02 * np.random.default_rng(1).normal(size=(2, beta.size))
     fit = fit_stress(beta, gamma, *(MAP(beta, gamma) + noise))

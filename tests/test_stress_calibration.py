@@ -234,7 +234,7 @@ REFUSED = {
     "3 to 100000 depths below the surface are needed, got 0": lambda: fit_zeta([-1.0, -2, -3], [1.0, 2, 3], 1e-3),
     "the force is against the law": lambda: fit_zeta([0.01, 0.02, 0.03], [-1.0, -2, -3], 1e-3),
     "zeta = 1e+05 is that of no grains": lambda: fit_zeta([0.01, 0.02, 0.03], [0.1e9, 0.2e9, 0.3e9], 1e-1),
-    "the area of the plate must be above 0": lambda: fit_zeta([0.01, 0.02, 0.03], [1.0, 2, 3], 0.0),
+    "the area of the plate must be above 0": lambda: fit_zeta([0.01, 0.02, 0.03], [1.0, 2, 3], [1.0, 0.0, 1.0]),
     "depths, forces and areas must be finite": lambda: fit_zeta([0.01, np.nan, 0.03], [1.0, 2, 3], 1e-3),
     "depth and force must be equally many": lambda: fit_zeta([0.01, 0.02], [1.0, 2, 3], 1e-3),
     "area must be one number": lambda: fit_zeta([0.01, 0.02, 0.03], [1.0, 2, 3], [1e-3, 1e-3]),

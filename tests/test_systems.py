@@ -19,7 +19,7 @@ from geomech.studies.available import default_tiers
 from geomech.studies.single import single
 from geomech.studies.study import Study
 from geomech.systems import KINDS, NoSlipSnake, Swimmer
-from geomech.systems.base import kind_of, length_unit
+from geomech.systems.base import WrappedSystem, kind_of, length_unit
 from geomech.systems.capabilities import stored_table
 from geomech.systems.framed import in_frame
 from geomech.systems.swimmer import Solver, is_three_link
@@ -218,6 +218,14 @@ def test_three_links_are_a_chain_of_three_and_nothing_else():
     """The published gaits, circle and butterfly, are compared for these alone."""
     bodies = Chain((1, 2, 1)), Chain((1,) * 4), Chain((1,) * 3, modes=((1.0, 0.5), (0.0, 1.0))), Serpenoid(12)
     assert [is_three_link(Swimmer(Coulomb(), body)) for body in bodies] == [True, False, False, False]
+
+
+def test_systems_of_users_have_one_to_ten_thousand_joints():
+    forwards = lambda alpha, alphadot: alphadot[..., :1] * [1.0, 0.0, 0.0]
+    assert WrappedSystem(forwards, 10_000).joints == 10_000
+    for joints in (0, 10_001):
+        with pytest.raises(Refusal, match="joints must be a whole number from 1 to 10000"):
+            WrappedSystem(forwards, joints)
 
 
 def test_points_on_either_side_of_a_change_of_sign_are_crossed():

@@ -19,6 +19,7 @@ from geomech.scenes import Numerics, Scene
 from geomech.studies import effort, estimate, fields
 from geomech.systems import Swimmer, Table
 from geomech.text.system import described
+from rft import se2
 from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -74,10 +75,18 @@ def test_harmonics_are_carried_over(joints):
         f(swimmer.velocity, axes, 24, traits=swimmer.traits)
         for f in (connection.fit, partial(harmonics.fit, highest=3))
     )
-    stored = tables.Stored(A, series, frame="link-1", body={"lengths": chain.lengths, "frame": "link-1"})
+    errors = np.random.default_rng(1).uniform(0.1, 1.0, A.A.shape)
+    body = {"lengths": chain.lengths, "frame": "link-1"}
+    stored = tables.Stored(A, series, frame="link-1", body=body, A_error=errors, even=errors[:, 0])
     alpha, rates = np.full(joints, 0.5), np.random.default_rng(0).normal(size=(9, joints))
+    here = (..., *[3] * joints)  # of alpha on the grid
     for frame in ("link-2", "mean"):
         other = tables.in_frame(stored, frame, chain)
+        bound = np.abs(se2.adjoint(se2.inverse(chain.frame_pose(frame, alpha, rates[0])[0])))
+        np.testing.assert_allclose(other.A_error[here], bound @ errors[here], rtol=1e-12)
+        for name in ("even", "residual"):
+            ours, its = (getattr(x if name == "even" else x.connection, name)[here] for x in (other, stored))
+            np.testing.assert_allclose(ours, bound @ its, rtol=1e-12)
         xi = change_velocity(series.velocity(alpha, rates), *chain.frame_pose(frame, alpha, rates))
         np.testing.assert_allclose(other.harmonics.velocity(alpha, rates), xi, atol=1e-12)
         back = tables.in_frame(other, "link-1", dataclasses.replace(chain, frame=frame))

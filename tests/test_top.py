@@ -99,7 +99,7 @@ def test_help_fits_a_screen():
         ("geomech sweep --ov", {"--over"}),
         ("geomech intrude sq", {"square-rod"}),
         ("geomech reference mo", {"motion"}),
-        ("geomech intrude sph", {"sphere"}),
+        ("geomech accuracy sph", {"sphere"}),
         ("geomech walk xpl", {"xplorer"}),
         ("geomech --ver", {"--version"}),
     ],

@@ -220,10 +220,8 @@ def _long(source: Rows, header: tuple[str, ...], bare: dict[str, int]) -> Table:
     key = next((bare[name] for name in POINTS if name in bare), None)
     score = next((bare[name] for name in SCORES if name in bare), None)
     unit = _common_unit([header[bare["x"]], header[bare["y"]]], f"{source.name}, line {line}")
-    labels = [
-        text.split(",")[key].strip(' "') if text.count(",") >= (key or 0) else "" for _, text in source.filled[1:]
-    ]
     if key is not None:  # names need not be numbers
+        labels = [text.split(",")[key].strip(' "') if text.count(",") >= key else "" for _, text in source.filled[1:]]
         blank = [(n, ",".join("0" if k == key else c for k, c in enumerate(x.split(",")))) for n, x in source.filled]
         source = Rows(source.name, source.sha256, [source.filled[0], *blank[1:]], source.comments)
     rows = _cells(source, 1, header)

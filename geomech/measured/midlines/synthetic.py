@@ -48,8 +48,7 @@ def made(
     t = np.arange(count) / (frames * FINER * frequency)
     varying = smooth_noise(rng, LONGER * count, MEMORY * frames * FINER, 3)[0][:count]
     rate = 2 * np.pi * frequency * (1 + jitter * varying[:, 0])
-    phase = np.concatenate([[rng.uniform(0, 2 * np.pi)], np.cumsum((rate[1:] + rate[:-1]) / 2) * t[1]]).cumsum()
-    phase = phase[0] + np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2) * t[1]])
+    phase = rng.uniform(0, 2 * np.pi) + np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2) * t[1]])
     swings, wavenumbers = swing * (1 + spread * varying[:, 1]), 2 * np.pi * waves * (1 + spread * varying[:, 2])
     elements = system.joints + 1
     s = (np.arange(elements) + 0.5) / elements
