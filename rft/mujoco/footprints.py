@@ -130,7 +130,7 @@ class Memory(NamedTuple):
     floors: np.ndarray
 
 
-def memory_of(numbers, geoms, rows, columns):
+def memory_of(numbers, geoms, rows, columns) -> Memory:
     """Return the memory in an array of numbers, the last that userdata has."""
     cells, start = rows * columns, HEAD + PER_GEOM * geoms
     return Memory(
@@ -147,7 +147,7 @@ def memory_of(numbers, geoms, rows, columns):
     )
 
 
-def begin_step(memory, time, form):
+def begin_step(memory, time, form) -> float:
     """Return the time, s, since the last step that was remembered, at most 1 s; negative if there is nothing to do. At time 0,
     and where the memory is of another grid than that with the number ``form``, the ground is undisturbed."""
     passed = time - memory.head[TIME]
@@ -168,7 +168,7 @@ def begin_step(memory, time, form):
     return min(max(passed, 0.0), 1.0)
 
 
-def remember(memory, time, prints, bodies, poses, slopes):
+def remember(memory, time, prints, bodies, poses, slopes) -> None:
     """Take a step of all geoms, unless the memory has it already.
 
     prints: grid, (6,), undisturbed heights (R, C), points (P, 3) on the geoms and the first of each geom, (G + 1,). bodies:
@@ -208,7 +208,7 @@ def remember(memory, time, prints, bodies, poses, slopes):
     slide(memory, grid, surface, passed)
 
 
-def press(memory, grid, k, points, turn, place, up, level):
+def press(memory, grid, k, points, turn, place, up, level) -> None:
     """Press the cells that geom k is in, and set its level. points: (P, 3), on its surface in its frame, m. The surface is
     undisturbed at up . x = level."""
     rows, columns = memory.ground.shape
@@ -257,12 +257,12 @@ def press(memory, grid, k, points, turn, place, up, level):
         leave(memory, k)
 
 
-def leave(memory, k):
+def leave(memory, k) -> None:
     """Let geom k be out of the ground: what it heaps up later it has not heaped up yet."""
     memory.visits[k] = memory.head[STAMP] * len(memory.visits) + k + 1.0
 
 
-def extend(box, i, j, margin, rows, columns):
+def extend(box, i, j, margin, rows, columns) -> None:
     """Let a box of cells hold a cell and its neighbours within a margin."""
     if box[1] <= box[0]:
         box[0], box[1], box[2], box[3] = rows, 0.0, columns, 0.0
@@ -270,7 +270,7 @@ def extend(box, i, j, margin, rows, columns):
     box[2], box[3] = min(box[2], max(j - margin, 0)), max(box[3], min(j + margin + 1, columns))
 
 
-def release(memory):
+def release(memory) -> None:
     """Lower the cells that geoms have left."""
     box, stamp = memory.head[BOX : BOX + 4], memory.head[STAMP]
     for i in range(int(box[0]), int(box[1])):
@@ -280,7 +280,7 @@ def release(memory):
                 memory.pressed[i, j] = 0.0
 
 
-def heap(memory, k, v_x, v_y, v_z):
+def heap(memory, k, v_x, v_y, v_z) -> None:
     """Heap what geom k has pressed away on the cells around it. v_x, v_y, v_z: its velocity, m/s."""
     rows, columns = memory.ground.shape
     box, stamp = memory.boxes[k], memory.head[STAMP]
@@ -311,13 +311,13 @@ def heap(memory, k, v_x, v_y, v_z):
     memory.carried[k] = 0.0
 
 
-def own(memory, i, j, visit):
+def own(memory, i, j, visit) -> None:
     """Let a cell be heaped up in a visit from now on."""
     if memory.owners[i, j] != visit:
         memory.owners[i, j], memory.floors[i, j] = visit, memory.ground[i, j]
 
 
-def beside(marks, stamp, i, j):
+def beside(marks, stamp, i, j) -> bool:
     """Return whether a geom is within `RIM` cells of a cell, and in the cell itself none."""
     rows, columns = marks.shape
     if marks[i, j] == stamp:
@@ -329,7 +329,7 @@ def beside(marks, stamp, i, j):
     return False
 
 
-def slide(memory, grid, surface, passed):
+def slide(memory, grid, surface, passed) -> None:
     """Let ground that is steeper than the angle of repose slide for a time, s. surface: (R, C), undisturbed heights, m."""
     rows, columns = memory.ground.shape
     ground, pressed, owners = memory.ground, memory.pressed, memory.owners

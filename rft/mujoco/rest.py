@@ -62,7 +62,7 @@ class Held(NamedTuple):
     totals: np.ndarray
 
 
-def held_of(numbers, geoms):
+def held_of(numbers, geoms) -> Held:
     """Return the memory in an array of numbers."""
     return Held(
         numbers[:1],
@@ -73,7 +73,7 @@ def held_of(numbers, geoms):
     )
 
 
-def begin(held, rest, time):
+def begin(held, rest, time) -> float:
     """Return the time, s, since the last step, 0 if it is the same. At time 0 nothing is held."""
     passed = time - held.time[0]
     if passed == 0.0:
@@ -88,7 +88,7 @@ def begin(held, rest, time):
     return min(max(passed, 0.0), rest.step[0])
 
 
-def hold(held, rest, k, passed, speed, rounding, wrench):
+def hold(held, rest, k, passed, speed, rounding, wrench) -> None:
     """Let geom k hold, after a time, s, what the grains exert on it; wrench: six numbers, rounded."""
     if passed == 0.0:
         return
@@ -102,7 +102,7 @@ def hold(held, rest, k, passed, speed, rounding, wrench):
         own[i] = (own[i] + share * wrench[i] * size) / (1.0 + share * speed)
 
 
-def let_go(held, k):
+def let_go(held, k) -> None:
     """Let geom k, out of the ground, hold nothing."""
     held.wrenches[k] = 0.0
     held.loads[k] = 0.0
