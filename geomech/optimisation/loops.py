@@ -17,6 +17,7 @@ DENSE = 1024  # phases at which limits hold and loops are compared
 TOUCHING = 5e-3  # of a limit: a loop this near touches it
 NARROWER = 1e-4  # of a limit: a curve may exceed it by this between phases
 SMALL, SIZEABLE = 0.05, 0.3  # of the range: a start that is too small, and its size after enlargement
+NOTHING = 1e-11  # of the largest coefficient: a smaller one is rounding
 SAME = 0.02  # of its size: largest distance between two loops that count as the same
 OUTLINES = (  # initial polygons of two joints with limits -1 and 1: the largest and shorter ones
     ((1, 1), (-1, 1), (-1, -1), (1, -1)),
@@ -106,8 +107,10 @@ class Loops:
         return names
 
     def gait(self, p) -> Fourier:
-        """Return the loop as a gait of amplitude 1."""
+        """Return the loop as a gait of amplitude 1, without coefficients that are nothing but rounding: they would hide
+        its symmetry."""
         p = np.reshape(p, self.shape)
+        p = np.where(np.abs(p) > NOTHING * np.abs(p).max(), p, 0.0)
         cos, sin = (tuple(map(tuple, p[first::2].T.tolist())) for first in (1, 2))
         return Fourier(cos=cos, sin=sin, centre=tuple(p[0].tolist()))
 
