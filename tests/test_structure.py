@@ -23,7 +23,7 @@ KNOW_MECHANICS = {
     "__init__.py", "gym/hexapod.py", "text/grains.py", "text/scenes.py", "text/system.py", "studies/stress.py",
     "scenes/intruder.py", "scenes/intruding.py", "scenes/solid.py", "scenes/stress.py", "scenes/walker.py",
     "scenes/write.py", "studies/batch.py", "studies/calibration.py", "run/backend.py", "measured/midlines/predicted.py",
-    "studies/stress_calibration.py", "studies/walking.py",
+    "studies/stress_calibration.py", "studies/walking.py", "studies/grains.py", "studies/grain_swim.py",
 }  # fmt: skip
 
 
