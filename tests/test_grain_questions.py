@@ -94,7 +94,7 @@ def towed(monkeypatch):
 
 def test_a_drag_is_a_file_that_fit_medium_reads(towed, tmp_path):
     question = grains.DragGrains(0.18, 0.007, tuple(PSI), 2, 0.2, store=tmp_path)
-    question = dataclasses.replace(question, bed=dataclasses.replace(question.bed, seed=4, length=0.3, width=0.3))
+    question = dataclasses.replace(question, seed=4, bed=dataclasses.replace(question.bed, length=0.3, width=0.3))
     result = question.ask()
     assert result["flank"].values.shape == (2, 2, 6) and result["bed"].values.tolist() == [4, 5]
     np.testing.assert_allclose(result["flank"].values[0, :, 0], [2.0, 2.1], rtol=1e-6)

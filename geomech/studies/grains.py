@@ -71,7 +71,7 @@ class DragGrains(Question):
     """The drag on a round rod in beds of grains, at several attack angles.
 
     length, radius (m): of the rod, from end to end. angles: between velocity and axis, degrees, 0 to 90. beds: how many,
-    with seeds from that of ``bed`` on. speed (m/s). depth (m): of the axis below the surface, half of the bed's if None.
+    with seeds from ``seed`` on. speed (m/s). depth (m): of the axis below the surface, half of the bed's if None.
     store: folder of beds and runs."""
 
     length: float = 0.162
@@ -80,6 +80,7 @@ class DragGrains(Question):
     beds: int = 3
     speed: float = 0.1
     depth: float | None = None
+    seed: int = 1
     bed: Bed = field(default_factory=Bed)
     store: Path | None = field(default=None, compare=False)
 
@@ -102,7 +103,7 @@ class DragGrains(Question):
         duration_ = round(TRAVEL * self.radius / self.speed, 9)
         return [
             Experiment(
-                replace(self.bed, seed=self.bed.seed + k), self.body, Tow(self.speed, math.radians(psi)), duration_,
+                replace(self.bed, seed=self.seed + k), self.body, Tow(self.speed, math.radians(psi)), duration_,
                 self.depth,
             )
             for k in range(self.beds)
@@ -147,7 +148,7 @@ class DragGrains(Question):
         across, over = ("component", "bed", "angle"), ("bed", "angle")
         variables = (
             Variable("angle", ("angle",), np.array(self.angles), "degrees", "attack angle"),
-            Variable("bed", ("bed",), self.bed.seed + np.arange(self.beds), "1", "seed"),
+            Variable("bed", ("bed",), self.seed + np.arange(self.beds), "1", "seed"),
             Variable("component", ("component",), np.array(["parallel", "perpendicular"])),
             Variable("flank", across, drags.flank, "N/m", "drag on the flank", drags.flank_error),
             Variable("ends", across, drags.ends, "N", "drag on both ends beyond that", drags.ends_error),

@@ -92,4 +92,4 @@ def command(result: Result) -> str:
     angles = ",".join(f"{x:g}" for x in question.angles)
     sizes = f"--length {question.length:g} --radius {question.radius:g} --speed {question.speed:g}"
     depth = "" if question.depth is None else f" --depth {question.depth:g}"
-    return f"geomech drag-grains {sizes}{depth} --angles {angles} --beds {question.beds} --seed {question.bed.seed}"
+    return f"geomech drag-grains {sizes}{depth} --angles {angles} --beds {question.beds} --seed {question.seed}"
