@@ -111,7 +111,6 @@ class DragGrains(Question):
         ]  # fmt: skip
 
     def check(self) -> None:
-        lammps()
         require(len(set(self.angles)) >= 3, "a law takes three angles or more", value=list(self.angles))
         require(all(0 <= psi <= 90 for psi in self.angles), "angles must be 0 to 90 degrees", value=list(self.angles))
         require(1 <= self.beds <= 100, "beds must be 1 to 100", value=self.beds)
@@ -120,6 +119,7 @@ class DragGrains(Question):
         for experiment in self.experiments()[: len(self.angles)]:
             experiment.check()
         store_folder(self.store)
+        lammps()
 
     def cost(self) -> GrainSteps:
         return price(self.experiments(), store_folder(self.store))

@@ -27,7 +27,8 @@ from rft.refusal import Refusal, require
 
 FORMAT = 1  # of the files; another number begins anew
 BLOCK = 2000  # steps between restart files: some 15 s of a bed of 15,000 grains
-FREE = 2.0  # grain diameters that must lie below and above a body, and aside of it
+FREE = 2.0  # grain diameters that must lie below a body and aside of it
+COVER = 1.0  # grain diameters that must lie above it
 FASTEST = 0.01  # grain diameters a step: a body that moves farther passes through contacts
 SETTLING = 0.4, 0.3  # s of falling in a viscous air, and of rest without it
 SLOWING = 0.6  # s in which the viscous air slows a grain down
@@ -132,9 +133,9 @@ class Experiment:
         require(0 < self.duration < math.inf, "duration must be > 0", value=self.duration)
         below, above = self.height + body.bottom, bed.depth - self.height - body.top
         require(
-            min(below, above) >= FREE * bed.diameter,
+            below >= FREE * bed.diameter and above >= COVER * bed.diameter,
             f"the bed is too shallow: {1e3 * below:.1f} mm below the body and {1e3 * above:.1f} mm above",
-            because=f"{FREE:g} grains must fit in",
+            because=f"{FREE:g} grains must fit in below and {COVER:g} above",
             instead="take a deeper bed or a thinner body",
         )
         room = FREE * bed.diameter + body.half_width

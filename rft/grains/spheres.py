@@ -236,8 +236,10 @@ def _outline(shape: str, radius: float, grain: float) -> np.ndarray:
         s = np.linspace(-q, q, math.ceil(2 * q / grain) + 1)
         sides = [(x, y) for x in s for y in (-q, q)] + [(x, y) for x in (-q, q) for y in s[1:-1]]
         return np.array(sides)
-    angle = np.linspace(0, math.pi, math.ceil(math.pi * q / grain) + 1)
-    flat = np.linspace(-q, q, math.ceil(2 * q / grain) + 1)[1:-1]
-    up = -1.0 if shape.endswith("flat up") else 1.0
-    arc = np.column_stack([q * np.cos(angle), up * q * np.sin(angle)])
-    return np.concatenate([arc, np.column_stack([flat, 0 * flat])]) - [0.0, up * radius / 2]
+    # Half a disc of that radius: the flat side a sphere's radius inside, the arc down to it.
+    least = math.asin(grain / q)
+    angle = np.linspace(least, math.pi - least, math.ceil(math.pi * q / grain) + 1)
+    arc, half = q * np.column_stack([np.cos(angle), np.sin(angle)]), q * math.cos(least)
+    y = np.linspace(-half, half, math.ceil(2 * half / grain) + 1)[1:-1]
+    outline = np.concatenate([arc, np.column_stack([y, np.full(len(y), grain)])]) - [0.0, radius / 2]
+    return outline * [1.0, -1.0] if shape.endswith("flat up") else outline
