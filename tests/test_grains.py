@@ -302,3 +302,30 @@ def test_grains_that_fly_off_are_refused():
 
 
 FOLDED = lambda t: np.array([2.9 * np.cos(t), 0.0])
+
+
+@needs_lammps
+@pytest.mark.soak
+def test_three_links_swim_in_grains_as_the_law_of_their_flank_says(tmp_path):
+    """A circle of 1 rad, one cycle in one bed: 0.11 body lengths +- .02; some four minutes of computing."""
+    from geomech.scenes import load
+    from geomech.studies.grain_swim import GRAINS_LAW, GrainSwim
+
+    result = GrainSwim(load("three-link-glass"), cycles=1, store=tmp_path).ask()
+    distance = dict(zip(result["method"].values, np.hypot(result["x"].values, result["y"].values)))
+    assert distance["grains"] == pytest.approx(0.11, abs=0.02)
+    assert distance[GRAINS_LAW] == pytest.approx(distance["grains"], abs=0.03)
+    assert abs(result["heading"].values[-1]) < 0.1
+
+
+@needs_lammps
+@pytest.mark.soak
+def test_half_the_time_step_gives_the_same_drag(tmp_path):
+    """Drag on a bar without ends, in one bed that settles anew, within three standard errors in time."""
+    bed, bar = Bed(length=0.06, width=0.2, depth=0.045), rod(0.06, 6e-3, through=True)
+    found = []
+    for step in (bed.step, bed.step / 2):
+        towed = Experiment(dataclasses.replace(bed, time_step=step), bar, Tow(0.1, np.pi / 2), 0.4)
+        found.append(steady(towed.run(tmp_path), 6e-3, np.pi / 2, 0.1))
+    (a, e), (b, f) = ((-s.force[1], s.error[1]) for s in found)
+    assert abs(a - b) < 3 * np.hypot(e, f) < 0.3 * a

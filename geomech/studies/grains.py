@@ -43,10 +43,10 @@ class GrainSteps(Cost):
 
 
 def price(experiments: Sequence[Experiment], store: Path) -> GrainSteps:
-    """Return the cost of experiments whose settled beds may be in a store; runs that are there, too, count all the same."""
+    """Return the cost of experiments, as far as their settled beds and runs are not in a store."""
     missing = {e.bed: e for e in experiments if not e.is_settled(store)}
     settling = sum(e.grain_steps / e.n_steps * sum(SETTLING) / e.bed.step for e in missing.values())
-    steps = sum(e.grain_steps for e in experiments) + settling
+    steps = sum(e.grain_steps * e.steps_left(store) / e.n_steps for e in experiments) + settling
     return GrainSteps(round(steps), steps / RATE, BASE, steps / RATE)
 
 

@@ -25,14 +25,14 @@ def text(result: Result) -> str:
     lines = [
         f"{facts['name']} in {facts['grains']:,} grains, seed {facts['seed']}: body {1e3 * facts['size']:g} mm long, "
         f"{2e3 * facts['radius']:g} mm wide, {facts['frequency']:g} Hz",
-        f"{'displacement per cycle (BL)':30}{'x':>20}{'y':>20}{'heading (rad)':>20}",
+        f"{'displacement per cycle (BL)':27}{'x':>17}{'y':>17}{'heading (rad)':>17}",
     ]
     rows = zip(result["method"].values, *(zip(result[n].values, result[n].error) for n in ("x", "y", "heading")))
-    lines += [f"{name:30}" + "".join(f"{_cell(value, error):>20}" for value, error in cells) for name, *cells in rows]
+    lines += [f"{name:27}" + "".join(f"{_cell(value, error):>17}" for value, error in cells) for name, *cells in rows]
     for k, *pose in zip(*(result[n].values for n in ("cycle", "cycle_x", "cycle_y", "cycle_heading"))):
-        lines.append(f"{f'  cycle {k}':30}" + "".join(f"{x:20.4f}" for x in pose))
-    lines.append("+-: of tiers the estimated error with that of the medium, of grains the deviation between cycles;")
-    lines.append("beds differ by more than cycles: take other seeds, too")
+        lines.append(f"{f'  cycle {k}':27}" + "".join(f"{f'{x:.4f}          ':>17}" for x in pose).rstrip())
+    lines.append("+-: error of tiers with that of the medium, deviation of cycles in grains; beds")
+    lines.append("differ by more than cycles: take other seeds, too")
     lines.append(
         f"work {facts['work']:.3g} J a cycle; packing {facts['packing']:.3f}; largest overlap {facts['overlap']:.3f} "
         "of a grain"

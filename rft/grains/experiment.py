@@ -123,6 +123,12 @@ class Experiment:
         """Grains times steps, which the cost is proportional to; the settling of the bed is not counted."""
         return float(self.n_steps) * (self.bed.grains + len(self.body.radius))
 
+    def steps_left(self, folder: str | Path) -> int:
+        """Return the number of time steps that are not in a folder yet."""
+        lengths = self._blocks()
+        place = Path(folder) / f"run-{self._key()}"
+        return sum(lengths[_blocks_done(place, len(lengths)) :])
+
     def is_settled(self, folder: str | Path) -> bool:
         """Return whether a folder has the bed at rest."""
         return _bed_file(Path(folder), _settled_key(self.bed, self.body, self.height)).exists()
