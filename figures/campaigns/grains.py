@@ -2,7 +2,8 @@
 
     python -m figures.campaigns.grains swims STORE        circles of three links beside the law of their grains
     python -m figures.campaigns.grains reversals STORE    a rod to and fro across its axis
-    python -m figures.campaigns.grains lift STORE         bars of four sections
+    python -m figures.campaigns.grains lift STORE         bars of three sections
+    python -m figures.campaigns.grains convergence STORE  a bar with another step, stiffness, width or depth of the bed
 
 STORE is a folder for settled beds and runs. What is there is read and what is missing computed, so that a stopped campaign
 goes on. Each prints what it has as it comes and writes its file at the end. `BEDS`, `SWIMS`, `STROKES` and `BARS` say what
@@ -89,12 +90,36 @@ def lift(store: Path) -> Rows:
             yield f'"{shape}"', seed, -found.force[1], found.force[2], found.lift, found.lift_error
 
 
-CAMPAIGNS: dict[str, Callable[[Path], Rows]] = {"swims": swims, "reversals": reversals, "lift": lift}
+def convergence(store: Path) -> Rows:
+    """Yield drag and lift on a round bar in one bed, with one number of the bed changed at a time."""
+    yield "change", "drag_N", "drag_error_N", "lift_N", "lift_error_N", "lift_over_drag", "largest_overlap"
+    changes = {
+        "none": TROUGH,
+        "half the time step": replace(TROUGH, time_step=TROUGH.step / 2),
+        "young 5 MPa": replace(TROUGH, young=5e6),
+        "width 0.45 m": replace(TROUGH, width=0.45),
+        "16 mm deeper": replace(TROUGH, depth=TROUGH.depth + 0.016),
+    }
+    bar, tow = rod(TROUGH.length, BAR, through=True, grain=1.5e-3), Tow(SPEED, math.pi / 2)
+    for name, bed in changes.items():
+        run = Experiment(bed, bar, tow, 0.6, depth=BAR_DEPTH).run(store)
+        found = steady(run, BAR, tow.angle, SPEED)
+        force, error = found.force, found.error
+        overlap = float(run.overlaps[:, 0].max())
+        yield f'"{name}"', -force[1], error[1], force[2], error[2], found.lift, overlap
+
+
+CAMPAIGNS: dict[str, Callable[[Path], Rows]] = {
+    "swims": swims,
+    "reversals": reversals,
+    "lift": lift,
+    "convergence": convergence,
+}
 
 
 def main(name: str, store: str) -> None:
     """Run a campaign and write its file."""
-    bed = TROUGH if name == "lift" else Bed()
+    bed = TROUGH if name in ("lift", "convergence") else Bed()
     lines = [f"# python -m figures.campaigns.grains {name} STORE", f"# {replace(bed, seed=BEDS[0])!r}, seeds {BEDS}"]
     for row in CAMPAIGNS[name](Path(store)):
         lines.append(",".join(f"{x:.5g}" if isinstance(x, float) else str(x) for x in row))
