@@ -95,8 +95,8 @@ def measured_reversals() -> dict:
     for stretch in np.unique(data["stretch"]):
         mine = data["stretch"] == stretch
         found[int(stretch)] = {
-            "at_once": over_beds(data["at_once"][mine], data["bed"][mine]),
-            "travel": over_beds(data["travel_95_m"][mine], data["bed"][mine]),
+            "at_once": over_beds(data["at_once_of_fresh"][mine], data["bed"][mine]),
+            "travel": over_beds(data["travel_to_95_of_fresh_m"][mine], data["bed"][mine]),
         }
     return found
 
@@ -148,7 +148,7 @@ def draw(numbers: dict):
             "fresh bed" if k == 0 else f"reversal {k}", (x, h), (5, 5), textcoords="offset points", **style.NOTE
         )
     right.set(
-        xlabel="travel to 95 % of the drag (mm)", ylabel="share of the drag at once", ylim=(0, 1.1), xlim=(0, None)
+        xlabel="travel to 95 % of a fresh bed's drag (mm)", ylabel="share of it at once", ylim=(0, 1.1), xlim=(0, None)
     )
     return fig
 

@@ -148,6 +148,8 @@ def test_drag_comes_back_after_a_reversal():
     for k, leg in enumerate(found):
         assert leg[:3] == pytest.approx((1.5 + 0.1 * k, 0.2 if k else 0.85, 7e-3 if k else 3e-3), rel=1e-3)
         assert leg.travel == pytest.approx(7e-3 * np.log(16) if k else 3e-3 * np.log(3), rel=1e-3) and leg.rms < 1e-4
+    assert found[1].reaches(0.95 * 1.5) == pytest.approx(7e-3 * np.log(0.8 / (1 - 0.95 * 1.5 / 1.6)))
+    assert found[1].reaches(0.1) == 0 and found[1].reaches(1.61) == np.inf
     with pytest.raises(ValueError, match="the body has not turned round"):
         recoveries(run._replace(t=t / 10), stroke)
 

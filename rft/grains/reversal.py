@@ -25,10 +25,17 @@ class Recovery(NamedTuple):
     scale: float
     rms: float
 
+    def reaches(self, force: float) -> float:
+        """Return the travel at which a force, N, is reached, m: 0 where it is there at once, inf where it never is."""
+        missing = 1 - force / self.plateau
+        if missing <= 0:
+            return math.inf
+        return self.scale * math.log(max(1.0, (1 - self.at_once) / missing))
+
     @property
     def travel(self) -> float:
-        """Travel to `SHARE` of the plateau, m; 0 where that is there at once."""
-        return self.scale * math.log(max(1.0, (1 - self.at_once) / (1 - SHARE)))
+        """Travel to `SHARE` of the plateau, m. A plateau that is still rising at the end of the stretch makes it long."""
+        return self.reaches(SHARE * self.plateau)
 
 
 def recoveries(run: Run, stroke: Stroke) -> list[Recovery]:
