@@ -25,7 +25,7 @@ from rft.grains.spheres import Spheres
 from rft.metres import GRAVITY
 from rft.refusal import Refusal, require
 
-FORMAT = 1  # of the files; another number begins anew
+FORMAT = 1  # of the files and of all constants that digits depend on; another number begins anew
 BLOCK = 2000  # steps between restart files: some 15 s of a bed of 15,000 grains
 FREE = 2.0  # grain diameters that must lie below a body and aside of it
 COVER = 1.0  # grain diameters that must lie above it
