@@ -87,7 +87,7 @@ def lift(store: Path) -> Rows:
     yield "shape", "bed", "drag_N", "lift_N", "lift_over_drag", "error_in_time"
     for shape in BARS:
         for seed in BEDS:
-            bar = rod(TROUGH.length, BAR, shape, through=True, grain=1.5e-3)
+            bar = rod(TROUGH.length, BAR, shape, through=True, grain=1e-3)
             tow = Tow(SPEED, math.pi / 2)
             run = Experiment(replace(TROUGH, seed=seed), bar, tow, 0.6, depth=BAR_DEPTH).run(store)
             found = steady(run, BAR, tow.angle, SPEED)
@@ -104,7 +104,7 @@ def convergence(store: Path) -> Rows:
         "width 0.45 m": replace(TROUGH, width=0.45),
         "16 mm deeper": replace(TROUGH, depth=TROUGH.depth + 0.016),
     }
-    bar, tow = rod(TROUGH.length, BAR, through=True, grain=1.5e-3), Tow(SPEED, math.pi / 2)
+    bar, tow = rod(TROUGH.length, BAR, through=True, grain=1e-3), Tow(SPEED, math.pi / 2)
     for name, bed in changes.items():
         run = Experiment(bed, bar, tow, 0.6, depth=BAR_DEPTH).run(store)
         found = steady(run, BAR, tow.angle, SPEED)

@@ -31,11 +31,13 @@ def text(result: Result) -> str:
         f"{head}, in {beds} beds of {facts['grains']:,} grains, packing {facts['packing']:.3f}; mean +- error over beds"
         if beds > 1
         else f"{head}, in a bed of {facts['grains']:,} grains, packing {facts['packing']:.3f}; +- error in time",
-        "  psi_deg  flank along, across (N/m)         ends along, across (N)            lift (N)",
+        f"psi_deg{'flank along':>15}{'across (N/m)':>15}{'ends along':>13}{'across (mN)':>13}{'lift (mN)':>13}",
     ]
+    forms = (1.0, "6.2f", "4.2f"), (1.0, "6.2f", "4.2f"), *[(1e3, "5.0f", "3.0f")] * 3
     columns = [x for name in ("flank", "ends", "lift") for x in _with_errors(result, name)]
     for psi, *cells in zip(result["angle"].values, *columns):
-        lines.append(f"{psi:9.4g}  " + "  ".join(f"{value:7.3f} +- {error:5.3f}" for value, error in cells))
+        words = [f" {unit * v:{form}} +- {unit * e:{short}}" for (v, e), (unit, form, short) in zip(cells, forms)]
+        lines.append(f"{psi:7.4g}" + "".join(words))
     for name, x, (low, high) in zip(law.names, law.values, law.intervals):
         scale, unit = (np.degrees(1.0), " degrees") if name == "gamma0" else (1.0, "")
         lines.append(f"{name:9}{x * scale:9.3g}, {low * scale:.3g} to {high * scale:.3g}{unit} with 95 %")
