@@ -40,7 +40,7 @@ def compute(amplitudes=AMPLITUDES) -> dict:
 
     "amplitude": (A,), rad. "curves": by name {"distance", "spread": (A,), BL}. "swims": {"amplitude", "distance", "error":
     (S,)}. "lift": by shape {"grains", "error", "keep", "cut"}, lift over drag. "reversal": by stretch, 0 in a fresh bed, 1
-    and 2 after reversals {"at_once", "travel": (mean, error), - and m}."""
+    and 2 after reversals {"at_once", "travel": (mean, error)}, shares and m."""
     flank = Calibration("flank-drag", end_caps="fitted").ask().subject
     short = Calibration("short-rod-drag").ask().subject
     caps = (EndCaps(RADIUS / SIZE, flank.end_caps / 2, flank.end_caps / 2),)
@@ -95,8 +95,8 @@ def measured_reversals() -> dict:
     for stretch in np.unique(data["stretch"]):
         mine = data["stretch"] == stretch
         found[int(stretch)] = {
-            "at_once": over_beds(data["at_once_of_fresh"][mine], data["bed"][mine]),
-            "travel": over_beds(data["travel_to_95_of_fresh_m"][mine], data["bed"][mine]),
+            "at_once": over_beds(data["at_once"][mine], data["bed"][mine]),
+            "travel": over_beds(data["travel_95_m"][mine], data["bed"][mine]),
         }
     return found
 
@@ -128,8 +128,8 @@ def draw(numbers: dict):
     swims = numbers["swims"]
     dots = {"color": "black", "ls": "none", "marker": "o", "ms": 4, "capsize": 2}
     left.errorbar(swims["amplitude"], swims["distance"], np.nan_to_num(swims["error"]), label="grains", **dots)
-    left.set(xlabel="amplitude of the circle (rad)", ylabel="distance per cycle (BL)", ylim=(0, None))
-    left.legend()
+    left.set(xlabel="amplitude of the circle (rad)", ylabel="distance per cycle (BL)", ylim=(0, 0.36))
+    left.legend(loc="upper left", ncols=2)
     lift = numbers["lift"]
     y = np.arange(len(lift))
     for key, marker, label in (("keep", "D", "nine-term map"), ("cut", "s", "tension cut")):
@@ -143,12 +143,11 @@ def draw(numbers: dict):
     reversal = numbers["reversal"]
     at_once, travel = (np.array([x[key] for x in reversal.values()]).T for key in ("at_once", "travel"))
     right.errorbar(1e3 * travel[0], at_once[0], at_once[1], 1e3 * travel[1], **dots)
-    for k, (x, h) in zip(reversal, zip(1e3 * travel[0], at_once[0])):
-        right.annotate(
-            "fresh bed" if k == 0 else f"reversal {k}", (x, h), (5, 5), textcoords="offset points", **style.NOTE
-        )
+    for k, x, h, aside in zip(reversal, 1e3 * travel[0], at_once[0], ((6, 6), (-30, -18), (-28, 14))):
+        label = f"reversal {k}" if k else "fresh bed"
+        right.annotate(label, (x, h), aside, textcoords="offset points", **style.NOTE)
     right.set(
-        xlabel="travel to 95 % of a fresh bed's drag (mm)", ylabel="share of it at once", ylim=(0, 1.1), xlim=(0, None)
+        xlabel="travel to 95 % of the late drag (mm)", ylabel="share of it at once", ylim=(0, 1), xlim=(0, 32)
     )
     return fig
 

@@ -206,3 +206,28 @@ def test_samples_have_names_that_say_what_they_are():
     flank = Calibration("flank-drag", end_caps="fitted").ask().subject
     assert flank.data.n_angles == 6 and flank.rod.length == 0.162
     np.testing.assert_allclose(flank.values, [4.54, 0.260, 0.981, 1.71], rtol=2e-3)  # as written with the sample
+
+
+def test_the_figure_of_grains_shows_beds_beside_laws():
+    """Three beds of two cycles each; lift and reversals as they were computed, over beds."""
+    from figures import grains as figure
+    from figures.campaigns.grains import read
+
+    numbers = figure.compute([0.9, 1.0])
+    curves, swims = numbers["curves"], numbers["swims"]
+    assert curves["flank and ends"]["distance"][1] == pytest.approx(0.107, abs=2e-3)
+    assert curves["flank and ends"]["spread"][1] == pytest.approx(0.006, abs=1e-3)
+    assert curves["short rod"]["distance"][1] == pytest.approx(0.0504, abs=1e-3)
+    data = read("swims")
+    means = [np.hypot(data["x_BL"], data["y_BL"])[data["bed"] == bed].mean() for bed in (1, 2, 3)]
+    assert swims["distance"] == pytest.approx([np.mean(means)]) and swims["amplitude"] == pytest.approx([1.0])
+    assert swims["error"] == pytest.approx([np.std(means, ddof=1) / np.sqrt(3)])
+    lift = numbers["lift"]
+    assert list(lift) == list(figure.BARS) and lift["round"]["grains"] == pytest.approx(0.43, abs=0.1)
+    assert (lift["half round"]["keep"], lift["half round"]["cut"]) == pytest.approx((0.54, 0.04), abs=0.01)
+    fresh, first, _ = (numbers["reversal"][k]["at_once"][0] for k in (0, 1, 2))
+    assert fresh > 0.7 and 0.1 < first < 0.4
+    assert "1.00 rad" in figure.table(numbers)
+    left, middle, right = figure.draw(numbers).axes
+    assert left.lines[0].get_ydata().tolist() == curves["flank and ends"]["distance"].tolist()
+    assert len(middle.get_yticklabels()) == 3 and len(right.texts) == 3

@@ -25,7 +25,7 @@ from geomech.scenes import load
 from geomech.studies.grain_swim import RAMP, GrainSwim, cycle_poses
 from rft.grains import Bed, Experiment, Stroke, Tow, rod
 from rft.grains.drag import steady
-from rft.grains.reversal import SHARE, recoveries
+from rft.grains.reversal import recoveries
 
 FOLDER = Path(__file__).parent
 BEDS = (1, 2, 3)  # seeds
@@ -68,18 +68,14 @@ def swims(store: Path) -> Rows:
 
 def reversals(store: Path) -> Rows:
     """Yield the recovery of the drag along every stretch of a rod to and fro; the first is in a fresh bed."""
-    names = "at_once_of_fresh", "travel_to_95_of_fresh_m"  # against the plateau of the first stretch
-    yield "amplitude_m", "bed", "stretch", "plateau_N", "at_once", "scale_m", "travel_95_m", "rms_N", *names
+    yield "amplitude_m", "bed", "stretch", "late_N", "at_once", "travel_95_m", "plateau_N", "scale_m", "rms_N"
     for amplitude in STROKES:
         for seed in BEDS:
             stroke = Stroke(SPEED, math.pi / 2, amplitude)
             duration = round(5 * amplitude / SPEED, 6)  # out, and twice across
             run = Experiment(Bed(seed=seed), rod(0.162, 6e-3), stroke, duration).run(store)
-            legs = recoveries(run, stroke)
-            for k, leg in enumerate(legs):
-                fresh = legs[0].plateau
-                shares = leg.at_once * leg.plateau / fresh, leg.reaches(SHARE * fresh)
-                yield amplitude, seed, k, leg.plateau, leg.at_once, leg.scale, leg.travel, leg.rms, *shares
+            for k, leg in enumerate(recoveries(run, stroke)):
+                yield amplitude, seed, k, leg.late, leg.at_once, leg.travel, leg.plateau, leg.scale, leg.rms
 
 
 def lift(store: Path) -> Rows:

@@ -12,30 +12,38 @@ from rft.grains.experiment import Run
 from rft.grains.motions import Stroke
 from rft.refusal import require
 
-SHARE = 0.95  # of the plateau: what counts as come back
+SHARE = 0.95  # of the late drag: what counts as come back
+LATE = 0.4  # of a stretch, its end
 
 
 class Recovery(NamedTuple):
-    """Drag along one straight stretch of a body's way, force = plateau (1 - (1 - at_once) exp(-travel / scale)).
+    """Drag along one straight stretch of a body's way, fitted by force = plateau (1 - (1 - start) exp(-travel / scale)).
 
-    plateau: N. at_once: share of it at the start of the stretch. scale: m. rms: of the samples about it, N."""
+    plateau: N, which short stretches and rising drags leave open. start: share of it at the start of the stretch. scale: m.
+    late: mean drag over the last `LATE` of the stretch, N. rms: of the samples about the fit, N."""
 
     plateau: float
-    at_once: float
+    start: float
     scale: float
+    late: float
     rms: float
+
+    @property
+    def at_once(self) -> float:
+        """Fitted drag at the start of the stretch over the late one."""
+        return self.plateau * self.start / self.late
+
+    @property
+    def travel(self) -> float:
+        """Travel at which the fitted drag reaches `SHARE` of the late one, m."""
+        return self.reaches(SHARE * self.late)
 
     def reaches(self, force: float) -> float:
         """Return the travel at which a force, N, is reached, m: 0 where it is there at once, inf where it never is."""
         missing = 1 - force / self.plateau
         if missing <= 0:
             return math.inf
-        return self.scale * math.log(max(1.0, (1 - self.at_once) / missing))
-
-    @property
-    def travel(self) -> float:
-        """Travel to `SHARE` of the plateau, m. A plateau that is still rising at the end of the stretch makes it long."""
-        return self.reaches(SHARE * self.plateau)
+        return self.scale * math.log(max(1.0, (1 - self.start) / missing))
 
 
 def recoveries(run: Run, stroke: Stroke) -> list[Recovery]:
@@ -59,13 +67,13 @@ def _fit(x: np.ndarray, force: np.ndarray) -> Recovery:
     """Return the recovery of forces (n,), N, over travel x (n,), m."""
     from scipy.optimize import least_squares
 
-    top = force[x > 0.6 * x.max()].mean()
+    late = float(force[x > (1 - LATE) * x.max()].mean())
 
     def misfit(p):
         return p[0] * (1 - (1 - p[1]) * np.exp(-x / p[2])) - force
 
     span = float(x.max())
-    low, high = [0.0, -1.0, 1e-3 * span], [5 * top, 2.0, 2 * span]
-    starts = [[top, h, s * span] for h in (0.2, 0.8) for s in (0.05, 0.3)]
+    low, high = [0.0, -1.0, 1e-3 * span], [5 * late, 2.0, 2 * span]
+    starts = [[late, h, s * span] for h in (0.2, 0.8) for s in (0.05, 0.3)]
     best = min((least_squares(misfit, p, bounds=(low, high), x_scale=p) for p in starts), key=lambda r: r.cost)
-    return Recovery(*best.x.tolist(), rms=float(np.sqrt(np.mean(best.fun**2))))
+    return Recovery(*best.x.tolist(), late, rms=float(np.sqrt(np.mean(best.fun**2))))
