@@ -146,9 +146,7 @@ def draw(numbers: dict):
     for k, x, h, aside in zip(reversal, 1e3 * travel[0], at_once[0], ((6, 6), (-30, -18), (-28, 14))):
         label = f"reversal {k}" if k else "fresh bed"
         right.annotate(label, (x, h), aside, textcoords="offset points", **style.NOTE)
-    right.set(
-        xlabel="travel to 95 % of the late drag (mm)", ylabel="share of it at once", ylim=(0, 1), xlim=(0, 32)
-    )
+    right.set(xlabel="travel to 95 % of the late drag (mm)", ylabel="share of it at once", ylim=(0, 1), xlim=(0, 32))
     return fig
 
 

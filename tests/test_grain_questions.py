@@ -184,6 +184,13 @@ def test_a_swim_stands_beside_the_tiers(monkeypatch, tmp_path):
     own = Study(scene).study([0.9], ("direct",))
     assert result["x"].values[k] == pytest.approx(own["x"]["direct"][0] / 0.3)
     assert not np.isclose(result["x"].values[k], result["x"].values[k + 1])
+    # Ends that both push half as much are one end that pushes, to 1 %.
+    flank = Calibration("flank-drag", end_caps="fitted").ask().subject
+    ahead = dataclasses.replace(
+        scene.system, medium=flank.medium, effects=(EndCaps(0.03, head=flank.end_caps, tail=0.0),)
+    )
+    one_end = Study(scene.changed(system=ahead)).study([0.9], ("direct",))
+    assert result["x"].values[k + 1] == pytest.approx(one_end["x"]["direct"][0] / 0.3, rel=0.03)
     words = text.text(result)
     assert "body 300 mm long, 18 mm wide, 2 Hz" in words and "cycle 2" in words and "+-" in words
     assert json.dumps(text.numbers(result))
