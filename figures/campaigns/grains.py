@@ -120,7 +120,8 @@ CAMPAIGNS: dict[str, Callable[[Path], Rows]] = {
 def main(name: str, store: str) -> None:
     """Run a campaign and write its file."""
     bed = TROUGH if name in ("lift", "convergence") else Bed()
-    lines = [f"# python -m figures.campaigns.grains {name} STORE", f"# {replace(bed, seed=BEDS[0])!r}, seeds {BEDS}"]
+    seeds = "" if name == "convergence" else f", seeds {BEDS}"
+    lines = [f"# python -m figures.campaigns.grains {name} STORE", f"# {replace(bed, seed=BEDS[0])!r}{seeds}"]
     for row in CAMPAIGNS[name](Path(store)):
         lines.append(",".join(f"{x:.5g}" if isinstance(x, float) else str(x) for x in row))
         print(lines[-1], flush=True)
