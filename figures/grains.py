@@ -106,7 +106,7 @@ def table(numbers: dict) -> str:
     swims, at = numbers["swims"], numbers["amplitude"]
     by_curve = [np.interp(swims["amplitude"], at, c["distance"]) for c in numbers["curves"].values()]
     rows = [
-        (f"{a:.2f} rad", f"{d:.3f} +- {e:.3f}", *(f"{c[k]:.3f}" for c in by_curve))
+        (f"{a:.2f} rad", f"{d:.3f} +- {e:.3f}" if np.isfinite(e) else f"{d:.3f} (one bed)", *(f"{c[k]:.3f}" for c in by_curve))
         for k, (a, d, e) in enumerate(zip(*swims.values()))
     ]
     lines = style.table(("BL per cycle", "grains", *numbers["curves"]), rows)

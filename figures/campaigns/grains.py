@@ -29,7 +29,7 @@ from rft.grains.reversal import recoveries
 
 FOLDER = Path(__file__).parent
 BEDS = (1, 2, 3)  # seeds
-SWIMS = ((1.0, 1.0),)  # amplitude, rad, and frequency, Hz
+SWIMS = ((1.0, 1.0, BEDS), (1.7, 1.0, BEDS[:1]))  # amplitude, rad, frequency, Hz, and seeds
 STROKES = (0.02,)  # amplitudes, m, of a rod 12 mm in diameter, 24.5 mm deep
 BARS = ("round", "half round", "half round, flat up")
 SPEED = 0.1  # m/s of rods
@@ -54,9 +54,9 @@ def swims(store: Path) -> Rows:
         "surface_m",
     )
     scene = load("three-link-glass")
-    for amplitude, frequency in SWIMS:
+    for amplitude, frequency, seeds in SWIMS:
         gait = replace(scene.gait, amplitude=amplitude, frequency=None if frequency == 1.0 else frequency)
-        for seed in BEDS:
+        for seed in seeds:
             question = GrainSwim(scene.changed(gait=gait), seed=seed)
             run = question.experiment.run(store)
             starts = (RAMP + np.arange(question.cycles + 1)) / question.frequency
