@@ -1,6 +1,6 @@
 """What beds of grains say about resistive force theory: a swimmer's speed, lift on bars, and drag after a reversal.
 
-Spheres of 6 mm with friction 0.3 and 1 MPa, in beds that differ by their seeds; error bars are standard errors over beds.
+Spheres of 6 mm with friction 0.3 and 1 MPa, in beds that differ by their seeds; error bars are standard errors over beds, and a point without one is of one bed.
 Left: displacement of a three-link swimmer, 162 x 12 mm at 25 mm depth, on circles, beside the direct tier with the law of
 its flank and its end caps, both measured in the same grains (band: one standard deviation of the law), the same without the
 caps, and the law of a short rod with its ends in it. Middle: lift over drag on bars without ends, beside the nine-term map,
@@ -106,7 +106,11 @@ def table(numbers: dict) -> str:
     swims, at = numbers["swims"], numbers["amplitude"]
     by_curve = [np.interp(swims["amplitude"], at, c["distance"]) for c in numbers["curves"].values()]
     rows = [
-        (f"{a:.2f} rad", f"{d:.3f} +- {e:.3f}" if np.isfinite(e) else f"{d:.3f} (one bed)", *(f"{c[k]:.3f}" for c in by_curve))
+        (
+            f"{a:.2f} rad",
+            f"{d:.3f} +- {e:.3f}" if np.isfinite(e) else f"{d:.3f} (one bed)",
+            *(f"{c[k]:.3f}" for c in by_curve),
+        )
         for k, (a, d, e) in enumerate(zip(*swims.values()))
     ]
     lines = style.table(("BL per cycle", "grains", *numbers["curves"]), rows)
