@@ -1,6 +1,8 @@
 """What beds of grains say about resistive force theory: a swimmer's speed, lift on bars, and drag after a reversal.
 
-Spheres of 6 mm with friction 0.3 and 1 MPa, in beds that differ by their seeds; error bars are standard errors over beds, and a point without one is of one bed.
+Spheres of 6 mm with friction 0.3 and 1 MPa, in beds that differ by their seeds; error bars are standard errors over beds, and
+a point without one is of one bed.
+
 Left: displacement of a three-link swimmer, 162 x 12 mm at 25 mm depth, on circles, beside the direct tier with the law of
 its flank and its end caps, both measured in the same grains (band: one standard deviation of the law), the same without the
 caps, and the law of a short rod with its ends in it. Middle: lift over drag on bars without ends, beside the nine-term map,
