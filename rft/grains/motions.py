@@ -76,10 +76,12 @@ class Tow:
     def start(self) -> np.ndarray:
         return np.zeros(0)
 
-    def push(self, state, force, moment, dt):
+    def push(self, state: np.ndarray, force: np.ndarray, moment: float, dt: float) -> np.ndarray:
         return state
 
-    def move(self, state, t, dt, body, mass, height):
+    def move(
+        self, state: np.ndarray, t: float, dt: float, body: Spheres, mass: float, height: float
+    ) -> tuple[np.ndarray, Moved]:
         zero, direction = np.zeros(body.joints), np.exp(1j * self.angle)
         distance, speed = self.path(t)
         links, place = body.links(zero, zero), distance * direction
@@ -169,10 +171,12 @@ class Swim:
         # x, y of the centre of mass, heading of the frame, momentum x and y, moment of momentum about the centre.
         return np.zeros(6)
 
-    def push(self, state, force, moment, dt):
+    def push(self, state: np.ndarray, force: np.ndarray, moment: float, dt: float) -> np.ndarray:
         return state + dt * np.array([0.0, 0.0, 0.0, force[0], force[1], moment])
 
-    def move(self, state, t, dt, body, mass, height):
+    def move(
+        self, state: np.ndarray, t: float, dt: float, body: Spheres, mass: float, height: float
+    ) -> tuple[np.ndarray, Moved]:
         alpha, alphadot = self.joint_angles(t)
         links = body.links(alpha, alphadot)
         m = mass * body.half_lengths / body.half_lengths.sum()
