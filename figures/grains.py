@@ -1,7 +1,6 @@
 """What beds of grains say about resistive force theory: a swimmer's speed, lift on bars, and drag after a reversal.
 
-Spheres of 6 mm with friction 0.3 and 1 MPa, in beds that differ by their seeds; error bars are standard errors over beds, and
-a point without one is of one bed.
+Spheres of 6 mm with friction 0.3 and 1 MPa, in beds that differ by their seeds; error bars are standard errors over beds.
 
 Left: displacement of a three-link swimmer, 162 x 12 mm at 25 mm depth, on circles, beside the direct tier with the law of
 its flank and its end caps, both measured in the same grains (band: one standard deviation of the law), the same without the
@@ -110,7 +109,7 @@ def table(numbers: dict) -> str:
     rows = [
         (
             f"{a:.2f} rad",
-            f"{d:.3f} +- {e:.3f}" if np.isfinite(e) else f"{d:.3f} (one bed)",
+            f"{d:.3f} +- {e:.3f}",
             *(f"{c[k]:.3f}" for c in by_curve),
         )
         for k, (a, d, e) in enumerate(zip(*swims.values()))

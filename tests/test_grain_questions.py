@@ -229,7 +229,7 @@ def test_the_figure_of_grains_shows_beds_beside_laws():
     of = lambda bed: np.hypot(data["x_BL"], data["y_BL"])[(data["bed"] == bed) & (data["amplitude"] == 1.0)].mean()
     means = [of(bed) for bed in (1, 2, 3)]
     assert swims["amplitude"].tolist() == [1.0, 1.7] and swims["distance"][0] == pytest.approx(np.mean(means))
-    assert swims["error"][0] == pytest.approx(np.std(means, ddof=1) / np.sqrt(3)) and np.isnan(swims["error"][1])
+    assert swims["error"][0] == pytest.approx(np.std(means, ddof=1) / np.sqrt(3)) and swims["error"][1] > 0
     lift = numbers["lift"]
     assert list(lift) == list(figure.BARS) and lift["round"]["grains"] == pytest.approx(0.43, abs=0.1)
     assert (lift["half round"]["keep"], lift["half round"]["cut"]) == pytest.approx((0.54, 0.04), abs=0.01)

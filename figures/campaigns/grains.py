@@ -29,7 +29,7 @@ from rft.grains.reversal import recoveries
 
 FOLDER = Path(__file__).parent
 BEDS = (1, 2, 3)  # seeds
-SWIMS = ((1.0, 1.0, BEDS), (1.7, 1.0, BEDS[:1]))  # amplitude, rad, frequency, Hz, and seeds
+SWIMS = ((1.0, 1.0, BEDS), (1.7, 1.0, BEDS[:2]))  # amplitude, rad, frequency, Hz, and seeds
 STROKES = (0.02,)  # amplitudes, m, of a rod 12 mm in diameter, 24.5 mm deep
 BARS = ("round", "half round", "half round, flat up")
 SPEED = 0.1  # m/s of rods
