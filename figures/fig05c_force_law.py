@@ -1,7 +1,7 @@
 """Fig. 5(c): drag along and across a rod against its attack angle, in dry grains and in a viscous fluid.
 
 Forces are in units of the axial drag 2 k rho g r |z| per length. Dots: drag on a rod in a discrete-element bed of 6 mm
-grains (the sample dem-rod-drag), with the granular law fitted to it.
+grains (the sample short-rod-drag), with the granular law fitted to it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def compute(angles: int = 181) -> dict:
         "viscous": Viscous(2.0),
     }
     curves = {name: np.array(law.traction(np.cos(psi), np.sin(psi))) for name, law in laws.items()}
-    fit = Calibration("dem-rod-drag", "granular").ask().subject
+    fit = Calibration("short-rod-drag", "granular").ask().subject
     bed = {"psi": fit.data.psi, "parallel": fit.data.forces[0], "perpendicular": fit.data.forces[1]}
     values = dict(zip(fit.names, fit.values.tolist()))
     return {"psi": psi, **curves, "bed": bed, "fit": {**values, "axial_N": fit.axial_force, "rms_N": fit.rms}}

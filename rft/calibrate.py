@@ -7,6 +7,7 @@ has the laws with their parameters, bounds and start values; F is fitted beside 
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 from collections.abc import Callable
@@ -84,7 +85,8 @@ class Fit:
     the density of the bed are known; else ``axial_stress`` (Pa, over the projected area) where radius and length are;
     else ``axial_force`` (N, on the whole rod). covariance: (n, n), of the parameters, from the scatter of the forces
     about the law, taken for independent noise. residuals: (2, N), measured minus fitted forces, N. end_caps: e of both
-    ends together (`EndCaps`), 0 without.
+    ends together (`EndCaps`), 0 without. Where the data tell the ends from the flank, law and residuals are the flank's, and
+    e follows from the ends.
 
     Examples
     --------
@@ -159,7 +161,10 @@ class Fit:
         """Return the forces (2, ...) along and across the rod at attack angles psi (rad), N; values: parameters in place of
         the fitted ones."""
         values = self.values if values is None else values
-        return _forces(self.law, self.rod, self.end_caps, psi, _in_newton(self.law, self.rod, values))
+        values = _in_newton(self.law, self.rod, values)
+        if self.data.ends is not None:
+            return _forces(self.law, self.rod, 0.0, psi, values[: len(FITS[self.law].names) + 1])
+        return _forces(self.law, self.rod, self.end_caps, psi, values)
 
     def band(self, psi) -> np.ndarray:
         """Return half the width (2, ...) of the 95 % confidence band of the law at angles psi (rad), N, by linear
@@ -180,7 +185,8 @@ def fit(law: str, data: RodDrag, rod: Rod = UNKNOWN_ROD, end_caps: float | str =
     """Return the law of that name in `FITS` fitted to drag, by weighted least squares of both components.
 
     end_caps: e of both ends together (`EndCaps`; 1 for one flat end), 0 for none, or "fitted"; other than 0 only for the
-    granular law and a rod of known radius and length. Raises ValueError if the data do not determine the parameters, or
+    granular law and a rod of known radius and length. Data that tell the ends
+    from the flank take "fitted" or 0. Raises ValueError if the data do not determine the parameters, or
     if a parameter ends on a bound.
 
     Examples
@@ -207,6 +213,11 @@ def fit(law: str, data: RodDrag, rod: Rod = UNKNOWN_ROD, end_caps: float | str =
             instead="give both, or leave the caps out",
         )
         require(rod.radius <= rod.length, f"end caps take a rod longer than its radius, got {rod.length:g} m")
+    if data.ends is not None and end_caps:
+        require(
+            fits_caps, "these are forces on the flank and on the ends", instead="leave ``end_caps`` out or say 'fitted'"
+        )
+        return _with_ends(fit(law, data, rod))
     names = (*fitted_law.names, "axial_force", *([CAPS] if fits_caps else []))
     require(
         data.n_forces > len(names),
@@ -239,6 +250,35 @@ def fit(law: str, data: RodDrag, rod: Rod = UNKNOWN_ROD, end_caps: float | str =
         data.forces - _forces(law, rod, fixed_caps, data.psi, best.x),
         float(best.x[-1]) if fits_caps else fixed_caps,
     )
+
+
+def _with_ends(flank: Fit) -> Fit:
+    """Return a fit to the flank with e of the ends, by least squares of the forces on them. Its variance has their scatter,
+    and its covariance with the law what the law leaves uncertain."""
+    data, n = flank.data, len(flank.values)
+
+    def caps(values: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        """Return e, the forces on a flat end, N, and the residuals of the ends, N."""
+        without = _in_newton(flank.law, flank.rod, values)
+        unit = _forces(flank.law, flank.rod, 1.0, data.psi, without) - _forces(
+            flank.law, flank.rod, 0.0, data.psi, without
+        )
+        e = float((data.weight * unit * data.ends).sum() / (data.weight * unit**2).sum())
+        return e, unit, data.ends - e * unit
+
+    e, unit, rest = caps(flank.values)
+    steps = np.diag(1e-4 * np.where(flank.errors > 0, flank.errors, np.abs(flank.values)))
+    slope = np.array([(caps(flank.values + h)[0] - caps(flank.values - h)[0]) / (2 * h.max()) for h in steps])
+    scatter = (data.weight * rest**2).sum() / (data.n_forces - 1) / (data.weight * unit**2).sum()
+    covariance = np.zeros((n + 1, n + 1))
+    covariance[:n, :n] = flank.covariance
+    covariance[n, :n] = covariance[:n, n] = flank.covariance @ slope
+    covariance[n, n] = slope @ flank.covariance @ slope + scatter
+    require(
+        0 < e < MOST_CAPS, f"the force on the ends is that of {e:.2g} flat ends", because=f"e is 0 to {MOST_CAPS:g}"
+    )
+    values = np.append(flank.values, e)
+    return dataclasses.replace(flank, names=(*flank.names, CAPS), values=values, covariance=covariance, end_caps=e)
 
 
 def _unit(law: str, rod: Rod) -> tuple[str, float]:

@@ -53,10 +53,11 @@ class Rod:
 
 @dataclass(frozen=True, eq=False)
 class RodDrag:
-    """Forces on the whole rod, positive where they oppose the velocity.
+    """Forces on a rod, positive where they oppose the velocity.
 
     psi: (N,), attack angles, rad, from 0 to pi/2. forces: (2, N), along and across the rod, N. weight: (N,), of the squares
-    of residuals, with mean 1.
+    of residuals, with mean 1. ends: (2, N), forces on both ends together, N, where they are told apart: ``forces`` are then
+    those on a flank as long as the rod; None where they are those on the whole rod.
 
     Examples
     --------
@@ -69,6 +70,7 @@ class RodDrag:
     psi: np.ndarray
     forces: np.ndarray
     weight: np.ndarray
+    ends: np.ndarray | None = None
 
     @property
     def n_forces(self) -> int:
@@ -81,9 +83,9 @@ class RodDrag:
         return np.unique(self.psi.round(9)).size
 
 
-def rod_drag(psi_deg, along, across, weight=None) -> RodDrag:
+def rod_drag(psi_deg, along, across, weight=None, ends=None) -> RodDrag:
     """Return measurements at attack angles in degrees, mapped to 0 to 90 by symmetry: the ends of a rod are alike, and so
-    are its sides.
+    are its sides. ends: (2, N), forces along and across on both ends, where the others are those on the flank.
 
     At angles beyond 0 to 90 forces may have the signs of the velocity's components, or all be magnitudes. Equal angles are
     separate measurements. Raises ValueError for numbers that cannot be drag: forces that push, exchanged columns, angles
@@ -112,15 +114,26 @@ def rod_drag(psi_deg, along, across, weight=None) -> RodDrag:
         instead="give degrees from 0 to 90",
     )
     angle = np.arctan2(np.abs(np.sin(np.radians(psi))), np.abs(np.cos(np.radians(psi))))
-    data = RodDrag(angle, _opposing(psi, forces), weight / weight[weight > 0].mean())
+    if ends is not None:
+        ends = real_array("forces on the ends", ends)
+        require(
+            ends.shape == forces.shape and bool(np.isfinite(ends).all()),
+            "forces on the ends must be two rows of numbers",
+        )
+        ends = _signs(psi) * ends
+    data = RodDrag(angle, _opposing(psi, forces), weight / weight[weight > 0].mean(), ends)
     _require_not_exchanged(data)
     return data
 
 
+def _signs(psi: np.ndarray) -> np.ndarray:
+    """Return the signs (2, N) of velocities along and across at angles in degrees, 1 where there is none."""
+    velocity = np.array([np.cos(np.radians(psi)), np.sin(np.radians(psi))])
+    return np.where(np.abs(velocity) < 1e-9, 1.0, np.sign(velocity))
+
+
 def _opposing(psi: np.ndarray, forces: np.ndarray) -> np.ndarray:
     """Return the forces, positive where they oppose the motion; ValueError with the angle of a force that pushes."""
-    velocity = np.array([np.cos(np.radians(psi)), np.sin(np.radians(psi))])
-    signs = np.where(np.abs(velocity) < 1e-9, 1.0, np.sign(velocity))
     largest = np.abs(forces).max()
     require(largest > 0, "all forces are zero", because="there is no drag to fit")
     require(
@@ -129,7 +142,7 @@ def _opposing(psi: np.ndarray, forces: np.ndarray) -> np.ndarray:
         because="drag is, where it opposes the motion",
         instead="change the sign",
     )
-    opposing = max(signs * forces, forces, key=lambda x: x.min())
+    opposing = max(_signs(psi) * forces, forces, key=lambda x: x.min())
     component, row = np.unravel_index(np.argmin(opposing), opposing.shape)
     direction, force = ("along", "across")[component], forces[component, row]
     require(

@@ -31,7 +31,7 @@ def noisy(seed=0, psi=PSI, size=0.03, medium=Granular(1.8, 0.24)):  # noqa: B008
 
 
 def test_the_sample_has_its_published_fit():
-    code, out, err = geomech("fit-medium", "dem-rod-drag", "--json")
+    code, out, err = geomech("fit-medium", "short-rod-drag", "--json")
     found = json.loads(out)
     assert (code, err) == (0, "")
     assert list(found)[:6] == ["law", "C", "gamma0_deg", "k", "covariance", "rms"]
@@ -287,8 +287,8 @@ def test_files_that_cannot_be_read(tmp_path, monkeypatch):
     ):
         code, _, err = geomech("fit-medium", path)
         assert code == 2 and said in err and err.count("\n") == 1
-    code, _, err = geomech("fit-medium", "dem-rod-dragg")
-    assert code == 2 and "did you mean 'dem-rod-drag'" in err
+    code, _, err = geomech("fit-medium", "short-rod-dragg")
+    assert code == 2 and "did you mean 'short-rod-drag'" in err
 
 
 def test_other_spellings_of_a_good_file(tmp_path):
@@ -351,26 +351,26 @@ def test_sizes_of_header_lines(lines, sizes):
 
 
 def test_options_overrule_the_header():
-    found = json.loads(geomech("fit-medium", "dem-rod-drag", "--json", "--depth", "0.06", "--density", "600")[1])
+    found = json.loads(geomech("fit-medium", "short-rod-drag", "--json", "--depth", "0.06", "--density", "600")[1])
     assert found["rod"] == {"radius": 0.008, "length": 0.08, "depth": 0.06, "density": 600.0}
-    base = json.loads(geomech("fit-medium", "dem-rod-drag", "--json")[1])
+    base = json.loads(geomech("fit-medium", "short-rod-drag", "--json")[1])
     assert found["k"] * 0.06 * 600 == pytest.approx(base["k"] * 0.03 * 0.588 * 1030)
-    text = geomech("fit-medium", "dem-rod-drag", "--law", "viscous")[1]
+    text = geomech("fit-medium", "short-rod-drag", "--law", "viscous")[1]
     assert "ratio" in text and "psi_deg  F_parallel_N" in text and "k is not known" not in text
-    assert geomech("fit-medium", "dem-rod-drag", "--depth", "-1")[0] == 2
-    code, _, err = geomech("fit-medium", "dem-rod-drag", "--density", "0.6")
-    assert code == 2 and "dem_rod_drag.csv: k must be a number from 0.001 to 1000" in err
-    assert "neither left-out, fitted nor a number" in geomech("fit-medium", "dem-rod-drag", "--end-caps", "flat")[2]
+    assert geomech("fit-medium", "short-rod-drag", "--depth", "-1")[0] == 2
+    code, _, err = geomech("fit-medium", "short-rod-drag", "--density", "0.6")
+    assert code == 2 and "short_rod_drag.csv: k must be a number from 0.001 to 1000" in err
+    assert "neither left-out, fitted nor a number" in geomech("fit-medium", "short-rod-drag", "--end-caps", "flat")[2]
 
 
 def test_the_medium_written_is_the_one_fitted(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for law, kind in (("granular", Granular), ("viscous", Viscous), ("coulomb", Coulomb)):
-        assert geomech("fit-medium", "dem-rod-drag", "-o", "M.toml", "--law", law)[0] == 0
+        assert geomech("fit-medium", "short-rod-drag", "-o", "M.toml", "--law", law)[0] == 0
         read = scene.parse(
             '[medium]\nfile = "M.toml"\n[body]\nkind = "chain"\n[gait]\nkind = "circle"\n', str(tmp_path / "s.toml")
         ).system.medium
-        want = calibration.Calibration("dem-rod-drag", law).ask().subject.medium
+        want = calibration.Calibration("short-rod-drag", law).ask().subject.medium
         assert type(read) is kind
         for field in dataclasses.fields(kind):
             np.testing.assert_allclose(*(getattr(m, field.name) for m in (read, want)), rtol=1e-15)
@@ -393,7 +393,7 @@ def test_outputs_never_replace_the_data(tmp_path):
 def test_the_picture_shows_data_law_band_and_residuals():
     from geomech import plots
 
-    result = calibration.Calibration("dem-rod-drag", "granular").ask()
+    result = calibration.Calibration("short-rod-drag", "granular").ask()
     psi, force, residual, law = (result[name].values for name in ("psi", "force", "residual", "law"))
     top, bottom = plots.drag_figure(result).axes
     across, data_across, along, data_along = top.lines[:4]

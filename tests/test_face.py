@@ -125,13 +125,13 @@ def test_functions_take_whatever_makes_a_scene(study):
 
 
 def test_a_medium_is_fitted_to_drag(tmp_path):
-    sand = geomech.fit_medium("dem-rod-drag")
+    sand = geomech.fit_medium("short-rod-drag")
     assert sand.medium.C == pytest.approx(1.49, abs=0.01) and "granular law" in repr(sand)
     sand.save(tmp_path / "sand.toml")
     assert as_scene(str(tmp_path / "sand.toml"), CHAIN).system.medium.C == pytest.approx(sand.medium.C)
     assert sand.plot().axes
     with pytest.raises(Refusal, match="size: 'width' is unknown"):
-        geomech.fit_medium("dem-rod-drag", width=0.1)
+        geomech.fit_medium("short-rod-drag", width=0.1)
 
 
 @pytest.mark.parametrize("draw", [plots.ccf_map, plots.vector_field, plots.displacement, plots.optimum_map])

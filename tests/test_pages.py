@@ -14,6 +14,7 @@ from frozen import read_commands
 
 from geomech import cli
 from geomech.commands import names
+from geomech.scenes import drag
 from rft.balance import backend
 from rft.laws import CATALOGUE
 from rft.plates import VERTICAL
@@ -23,7 +24,7 @@ ROOT = pathlib.Path(__file__).parents[1]
 README, CONTRIBUTING = ROOT / "README.md", ROOT / "CONTRIBUTING.md"
 SITE = ROOT / ".docs"
 PAGES = [README, CONTRIBUTING, *sorted(p for p in SITE.rglob("*.md") if p.parent != SITE / "generated")]
-SHIPPED = {*names.scene_names(), *names.intruder_names(), *names.walker_names(), *CATALOGUE, *VERTICAL, "dem-rod-drag"}
+SHIPPED = {*names.scene_names(), *names.intruder_names(), *names.walker_names(), *CATALOGUE, *VERTICAL, *drag.SAMPLES}
 COMMANDS = typer.main.get_command(cli.app).commands
 NUMBER = r"-?\d+(?:\.\d+)?(?:e[+-]\d+)?"
 

@@ -498,7 +498,7 @@ def test_the_law_is_that_of_the_columns_or_the_one_asked_for(tmp_path):
         ("gamma,beta_deg", "stress-map"), ("gamma,alpha_x", "stress-map"), ("area,force", "granular"),
     ):  # fmt: skip
         assert stress_calibration.law_of(str(written(tmp_path / "q.csv", head))) == law
-    assert stress_calibration.law_of("dem-rod-drag") == stress_calibration.law_of("nowhere.csv") == "granular"
+    assert stress_calibration.law_of("short-rod-drag") == stress_calibration.law_of("nowhere.csv") == "granular"
     for law, said in (
         ("granular", "the header has no column psi_deg"), ("zeta", "the header has no column depth"),
         ("stres-map", "--law: 'stres-map' is unknown: did you mean 'stress-map'?"),
@@ -511,7 +511,7 @@ def test_the_law_is_that_of_the_columns_or_the_one_asked_for(tmp_path):
     for option in ("--radius", "--length", "--depth", "--density"):
         code, _, err = geomech("fit-medium", tmp_path / "p.csv", "--area", "1e-3", option, "0.01")
         assert code == 2 and f"{option} belongs to another measurement: leave it out for --law zeta" in err
-    code, _, err = geomech("fit-medium", "dem-rod-drag", "--area", "1e-3")
+    code, _, err = geomech("fit-medium", "short-rod-drag", "--area", "1e-3")
     assert code == 2 and "--area belongs to another measurement" in err
 
 

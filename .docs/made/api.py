@@ -46,6 +46,7 @@ PACKAGES = {
         "rft.ground",
         "rft.walking",
         "rft.mujoco",
+        "rft.grains",
     ],
 }
 

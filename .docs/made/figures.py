@@ -13,7 +13,7 @@ DRAWN = ROOT / ".docs" / "generated" / "figures"
 GROUPS = {  # by physics; a script that is not here is found by the build
     "Force laws": ["fig05c_force_law", "fig06b_plate_stress", "fig07_stress_maps"],
     "Swimmers of three links": [
-        "fig11c_connection", "fig11d_ccf", "fig11e_displacement", "readme", "filmstrip", "frames_area", "kinks",
+        "fig11c_connection", "fig11d_ccf", "fig11e_displacement", "grains", "readme", "filmstrip", "frames_area", "kinks",
         "optimal_gaits", "measured_gait",
     ],
     "Animals": ["fig09c_efficiency", "fig10_neuromechanics", "transients", "midlines"],

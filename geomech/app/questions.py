@@ -107,7 +107,8 @@ def fit_medium(drag: Any, law: str | None = None, *, end_caps: float | str = 0.0
     ----------
     drag : path
         A CSV file, whose columns say which law is fitted: psi_deg, F_parallel_N, F_perpendicular_N of a rod; beta,
-        gamma, alpha_x, alpha_z of plates; depth_m, force_N of a plate pushed down. Or "dem-rod-drag", the sample.
+        gamma, alpha_x, alpha_z of plates; depth_m, force_N of a plate pushed down. Or "short-rod-drag" or
+        "flank-drag", the samples.
     law : "granular", "viscous", "coulomb", "stress-map" or "zeta"
     end_caps : number or "fitted"
         Drag on the rod's ends, 1 for one flat end; by default left out.
@@ -117,7 +118,7 @@ def fit_medium(drag: Any, law: str | None = None, *, end_caps: float | str = 0.0
     Examples
     --------
     >>> import geomech
-    >>> sand = geomech.fit_medium("dem-rod-drag")
+    >>> sand = geomech.fit_medium("short-rod-drag")
     >>> round(sand.medium.C, 2), round(sand.medium.gamma0, 2)
     (1.49, 0.22)
     >>> study = geomech.study(sand.medium, geomech.bodies.Chain(), geomech.gaits.Circle(1.0))

@@ -166,9 +166,9 @@ class FittedMedium:
     Examples
     --------
     >>> import geomech
-    >>> sand = geomech.fit_medium("dem-rod-drag")
+    >>> sand = geomech.fit_medium("short-rod-drag")
     >>> print(str(sand).splitlines()[0])
-    granular law fitted to dem_rod_drag.csv: 16 forces at 8 angles
+    granular law fitted to short_rod_drag.csv: 16 forces at 8 angles
     >>> fig = sand.plot()
     """
 

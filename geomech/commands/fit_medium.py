@@ -14,7 +14,9 @@ Size = Optional[float]
 
 
 def fit_medium(
-    drag: Annotated[str, typer.Argument(metavar="DRAG.csv", help="CSV file, or dem-rod-drag, a sample that ships")],
+    drag: Annotated[
+        str, typer.Argument(metavar="DRAG.csv", help="CSV file, or short-rod-drag or flank-drag, samples that ship")
+    ],
     out: Annotated[
         Optional[Path], typer.Option("-o", "--output", metavar="FILE.toml", help="write the medium to .toml")
     ] = None,

@@ -20,7 +20,7 @@ def drag_figure(result: Result) -> Figure:
     Examples
     --------
     >>> import geomech
-    >>> fig = geomech.plots.drag_figure(geomech.fit_medium("dem-rod-drag").result)
+    >>> fig = geomech.plots.drag_figure(geomech.fit_medium("short-rod-drag").result)
     """
     fig, axes = figure(4.4, 4.6, 1, 2)
     (top,), (bottom,) = axes

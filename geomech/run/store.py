@@ -240,16 +240,22 @@ def partial_file(output: Path) -> Path:
     return hidden(folder / "-".join(place.relative_to(folder).parts), ".partial")
 
 
-def in_cache(question: bytes) -> Path | None:
-    """Return the file in the user's cache folder that stores unfinished results of a command without output; None
-    without a folder."""
+def cache_folder() -> Path | None:
+    """Return geomech's folder in the user's cache folder; None where there is none."""
     named = {"win32": os.environ.get("LOCALAPPDATA"), "darwin": "~/Library/Caches"}
     folder = Path(os.environ.get("XDG_CACHE_HOME") or named.get(sys.platform) or "~/.cache")
     try:
         folder = folder.expanduser()
     except RuntimeError:  # there is no home
         return None
-    return folder / "geomech" / f"{question.hex()[:16]}.partial" if folder.is_absolute() else None
+    return folder / "geomech" if folder.is_absolute() else None
+
+
+def in_cache(question: bytes) -> Path | None:
+    """Return the file in the user's cache folder that stores unfinished results of a command without output; None
+    without a folder."""
+    folder = cache_folder()
+    return folder and folder / f"{question.hex()[:16]}.partial"
 
 
 def _checksum(key: bytes, raw: bytes) -> bytes:

@@ -20,7 +20,12 @@ MOST_ROWS = 100_000
 MOST_COMMENTS, LONGEST_COMMENT = 100, 1000  # lines, and letters of each, that are looked through for sizes
 ANGLE, ALONG, ACROSS, WEIGHT = "psi_deg", "F_parallel_N", "F_perpendicular_N", "weight"
 NEEDED = (ANGLE, ALONG, ACROSS)
-SAMPLES = {"dem-rod-drag": "dem_rod_drag.csv"}  # that ship with the package
+ENDS = "end_parallel_N", "end_perpendicular_N"  # where the others are those on a flank as long as the rod
+SAMPLES = {  # that ship with the package
+    "short-rod-drag": "short_rod_drag.csv",
+    "flank-drag": "flank_drag.csv",
+    "dem-rod-drag": "short_rod_drag.csv",  # its name before
+}
 
 NUMBER, CONNECTIVE = r"((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)", r"\s*(?:of|is|=|:|about)?\s*"
 LENGTHS = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "": 1.0}
@@ -42,18 +47,21 @@ EXCLUDED_OWNERS = {"radius": ("grain", "box"), "length": ("grain", "box"), "dept
 
 class Measured(NamedTuple):
     """Measured drag on a rod. rows: psi (degrees), forces along and across (N), weight, (4, N). sizes: of radius,
-    length, depth (m) and density (kg/m^3, of the bed), those in the header lines. name: of the file."""
+    length, depth (m) and density (kg/m^3, of the bed), those in the header lines. name: of the file. ends: (2, N), forces on
+    both ends along and across, N; None where they are part of the others."""
 
     rows: np.ndarray
     sizes: dict[str, float]
     name: str
+    ends: np.ndarray | None = None
 
 
 def read(path: str | Path) -> Measured:
     """Return the drag in a CSV file, or in one of `SAMPLES`; Refusal if it has none.
 
     Columns, by the header line and in any order: psi_deg, F_parallel_N, F_perpendicular_N and, if wanted, weight (of the
-    squares; 1 where left out); others are ignored. Lines that begin with # may give the rod's diameter or radius, length and
+    squares; 1 where left out), end_parallel_N and end_perpendicular_N (of both ends, where the others are those on a flank as
+    long as the rod); others are ignored. Lines that begin with # may give the rod's diameter or radius, length and
     depth, the grains' density and packing, in words as in the sample or as ``radius = 8 mm``.
     """
     if str(path) in SAMPLES:
@@ -67,7 +75,11 @@ def read(path: str | Path) -> Measured:
 
 def _measured(source: Rows) -> Measured:
     columns = header(source, NEEDED)
-    weighed = WEIGHT in columns
+    weighed, lowered = WEIGHT in columns, tuple(x.lower() for x in ENDS)
+    ends = None
+    if any(name in columns for name in lowered):
+        header(source, ENDS)
+        ends = source.numbers(columns, lowered).T
     rows = source.numbers(columns, tuple(x.lower() for x in NEEDED) + (WEIGHT,) * weighed).T
     if not 0 < rows.shape[1] <= MOST_ROWS:
         raise Refusal(f"it must have 1 to {MOST_ROWS} rows of drag, got {rows.shape[1]}", where=source.name)
@@ -75,7 +87,7 @@ def _measured(source: Rows) -> Measured:
         line = source.lines[far[0]]
         raise Refusal(f"{ANGLE} must be from -360 to 360, got {rows[0, far[0]]:g}", where=f"{source.name}, line {line}")
     rows = rows if weighed else np.vstack([rows, np.ones(rows.shape[1])])
-    return Measured(rows, sizes(source), source.name)
+    return Measured(rows, sizes(source), source.name, ends)
 
 
 def header(source: Rows, needed: tuple[str, ...]) -> tuple[str, ...]:

@@ -126,7 +126,7 @@ def in_medium(scene: Scene, file: str | Path) -> Scene:
     >>> import geomech
     >>> from geomech.scenes import in_medium, load
     >>> file = pathlib.Path(tempfile.mkdtemp()) / "sand.toml"
-    >>> geomech.fit_medium("dem-rod-drag").save(file)
+    >>> geomech.fit_medium("short-rod-drag").save(file)
     >>> round(in_medium(load("three-link-glass"), file).system.medium.C, 2)
     1.49
     """

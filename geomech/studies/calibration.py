@@ -33,7 +33,7 @@ def rod_drags(law: str, source: str, sizes: Mapping[str, float], end_caps: float
         raise Refusal("``area`` belongs to another measurement", instead=f"leave it out for ``law`` {law}")
     measured = drag.read(source)
     with located(measured.name):
-        f = fit(law, rod_drag(*measured.rows), Rod(**{**measured.sizes, **sizes}), end_caps)
+        f = fit(law, rod_drag(*measured.rows, measured.ends), Rod(**{**measured.sizes, **sizes}), end_caps)
         facts = {
             "name": measured.name,
             "medium": _medium(f),  # what no medium can be, such as a k of thousands, is refused here

@@ -84,4 +84,8 @@ def medium(result: Result) -> str:
     fitted = (
         f"# Fitted to {json.dumps(result.attributes['name'])}: {f.data.n_angles} angles, rms residual {f.rms:.3g} N"
     )
-    return f"{fitted}{of if uncertain else ''}.\n" + table("medium", result.attributes["medium"])
+    caps = ""
+    if f.data.ends is not None and f.end_caps:
+        e = f"e = {f.end_caps:.3g} +- {f.errors[-1]:.2g}"
+        caps = f'# Of the flank alone. Both ends together, in [[effects]] kind = "end-caps": {e}.\n'
+    return f"{fitted}{of if uncertain else ''}.\n{caps}" + table("medium", result.attributes["medium"])

@@ -1,0 +1,142 @@
+"""Swims, reversals and lift in beds of grains, as CSV files; hours of computing, run by hand.
+
+    python -m figures.campaigns.grains swims STORE        circles of three links beside the law of their grains
+    python -m figures.campaigns.grains reversals STORE    a rod to and fro across its axis
+    python -m figures.campaigns.grains lift STORE         bars of three sections
+    python -m figures.campaigns.grains convergence STORE  a bar with another step, stiffness, width or depth of the bed
+
+STORE is a folder for settled beds and runs. What is there is read and what is missing computed, so that a stopped campaign
+goes on. Each prints what it has as it comes and writes its file at the end. `BEDS`, `SWIMS`, `STROKES` and `BARS` say what
+is computed. Needs the extra grains.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from geomech.io.files import write_text
+from geomech.scenes import load
+from geomech.studies.grain_swim import RAMP, GrainSwim, cycle_poses
+from rft.grains import Bed, Experiment, Stroke, Tow, rod
+from rft.grains.drag import steady
+from rft.grains.reversal import recoveries
+
+FOLDER = Path(__file__).parent
+BEDS = (1, 2, 3)  # seeds
+SWIMS = ((1.0, 1.0, BEDS), (1.7, 1.0, BEDS[:2]))  # amplitude, rad, frequency, Hz, and seeds
+STROKES = (0.02,)  # amplitudes, m, of a rod 12 mm in diameter, 24.5 mm deep
+BARS = ("round", "half round", "half round, flat up")
+SPEED = 0.1  # m/s of rods
+TROUGH = Bed(length=0.06, width=0.30, depth=0.048)  # for bars across it
+BAR, BAR_DEPTH = 8e-3, 0.016  # m, radius and depth of the axis
+Rows = Iterator[tuple]
+
+
+def swims(store: Path) -> Rows:
+    """Yield the displacement of every cycle of a three-link swimmer, 162 x 12 mm."""
+    yield (
+        "gait",
+        "amplitude",
+        "frequency_Hz",
+        "bed",
+        "cycle",
+        "x_BL",
+        "y_BL",
+        "heading_rad",
+        "work_J",
+        "packing",
+        "surface_m",
+    )
+    scene = load("three-link-glass")
+    for amplitude, frequency, seeds in SWIMS:
+        gait = replace(scene.gait, amplitude=amplitude, frequency=None if frequency == 1.0 else frequency)
+        for seed in seeds:
+            question = GrainSwim(scene.changed(gait=gait), seed=seed)
+            run = question.experiment.run(store)
+            starts = (RAMP + np.arange(question.cycles + 1)) / question.frequency
+            size = question.experiment.body.size
+            work = np.diff(np.interp(starts, run.t, run.work))
+            for k, (pose, joule) in enumerate(zip(cycle_poses(run, starts) / [size, size, 1.0], work), 1):
+                yield "circle", amplitude, frequency, seed, k, *pose, joule, run.facts["packing"], run.facts["surface"]
+
+
+def reversals(store: Path) -> Rows:
+    """Yield the recovery of the drag along every stretch of a rod to and fro; the first is in a fresh bed."""
+    yield "amplitude_m", "bed", "stretch", "late_N", "at_once", "travel_95_m", "plateau_N", "scale_m", "rms_N"
+    for amplitude in STROKES:
+        for seed in BEDS:
+            stroke = Stroke(SPEED, math.pi / 2, amplitude)
+            duration = round(5 * amplitude / SPEED, 6)  # out, and twice across
+            run = Experiment(Bed(seed=seed), rod(0.162, 6e-3), stroke, duration).run(store)
+            for k, leg in enumerate(recoveries(run, stroke)):
+                yield amplitude, seed, k, leg.late, leg.at_once, leg.travel, leg.plateau, leg.scale, leg.rms
+
+
+def lift(store: Path) -> Rows:
+    """Yield drag and lift on bars that span a trough, 16 mm in diameter, 16 mm deep."""
+    yield "shape", "bed", "drag_N", "lift_N", "lift_over_drag", "error_in_time"
+    for shape in BARS:
+        for seed in BEDS:
+            bar = rod(TROUGH.length, BAR, shape, through=True, grain=1e-3)
+            tow = Tow(SPEED, math.pi / 2)
+            run = Experiment(replace(TROUGH, seed=seed), bar, tow, 0.6, depth=BAR_DEPTH).run(store)
+            found = steady(run, BAR, tow.angle, SPEED)
+            yield f'"{shape}"', seed, -found.force[1], found.force[2], found.lift, found.lift_error
+
+
+def convergence(store: Path) -> Rows:
+    """Yield drag and lift on a round bar in one bed, with one number of the bed changed at a time."""
+    yield "change", "drag_N", "drag_error_N", "lift_N", "lift_error_N", "lift_over_drag", "largest_overlap"
+    changes = {
+        "none": TROUGH,
+        "half the time step": replace(TROUGH, time_step=TROUGH.step / 2),
+        "young 5 MPa": replace(TROUGH, young=5e6),
+        "width 0.45 m": replace(TROUGH, width=0.45),
+        "16 mm deeper": replace(TROUGH, depth=TROUGH.depth + 0.016),
+    }
+    bar, tow = rod(TROUGH.length, BAR, through=True, grain=1e-3), Tow(SPEED, math.pi / 2)
+    for name, bed in changes.items():
+        run = Experiment(bed, bar, tow, 0.6, depth=BAR_DEPTH).run(store)
+        found = steady(run, BAR, tow.angle, SPEED)
+        force, error = found.force, found.error
+        overlap = float(run.overlaps[:, 0].max())
+        yield f'"{name}"', -force[1], error[1], force[2], error[2], found.lift, overlap
+
+
+CAMPAIGNS: dict[str, Callable[[Path], Rows]] = {
+    "swims": swims,
+    "reversals": reversals,
+    "lift": lift,
+    "convergence": convergence,
+}
+
+
+def main(name: str, store: str) -> None:
+    """Run a campaign and write its file."""
+    bed = TROUGH if name in ("lift", "convergence") else Bed()
+    seeds = "" if name == "convergence" else f", seeds {BEDS}"
+    lines = [f"# python -m figures.campaigns.grains {name} STORE", f"# {replace(bed, seed=BEDS[0])!r}{seeds}"]
+    for row in CAMPAIGNS[name](Path(store)):
+        lines.append(",".join(f"{x:.5g}" if isinstance(x, float) else str(x) for x in row))
+        print(lines[-1], flush=True)
+    write_text(FOLDER / f"grains_{name}.csv", "\n".join(lines) + "\n")
+
+
+def read(name: str) -> dict[str, np.ndarray]:
+    """Return the columns of a campaign's file."""
+    from csv import DictReader
+
+    with open(FOLDER / f"grains_{name}.csv") as file:
+        rows = list(DictReader(line for line in file if not line.startswith("#")))
+    as_column = lambda key: np.array([row[key] for row in rows])
+    return {key: as_column(key) if key in ("gait", "shape") else as_column(key).astype(float) for key in rows[0]}
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

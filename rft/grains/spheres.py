@@ -1,0 +1,245 @@
+"""Bodies of overlapping spheres on rigid links, for grains to touch."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rft.bodies.base import Elements
+from rft.refusal import require
+
+SPACING = (
+    0.25  # of neighbouring spheres, in radii: the surface dips by 1 - sqrt(1 - 1/64) = 0.8 % of the radius between them
+)
+SHAPES = "round", "half round", "half round, flat up", "square"
+
+
+class Bar:
+    """The skeleton of one rigid link, as a body without joints."""
+
+    joints, length = 0, 1.0
+
+    def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Elements:
+        zero = np.zeros((1, alpha.shape[1]), complex)
+        return Elements.from_complex(1.0 + zero, zero, zero, zero.real, np.full((1, 1), 0.5))
+
+
+class Placement(NamedTuple):
+    """Spheres of a body in the world: centres (n, 3), m, velocities (n, 3), m/s, rates of turning about z (n,), rad/s."""
+
+    centres: np.ndarray
+    velocities: np.ndarray
+    rates: np.ndarray
+
+
+class Skeleton(NamedTuple):
+    """Links in the body frame, held, (n,): exp(i heading), rates, rad/s, centres, m, and their velocities, m/s, as complex
+    numbers."""
+
+    heading: np.ndarray
+    rates: np.ndarray
+    centres: np.ndarray
+    velocities: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Spheres:
+    """A body of spheres on rigid links, in a plane of constant height.
+
+    skeleton: body of `rft.bodies`, or `Bar`, whose shapes are its joint angles. size (m): its length. link: (n,), index of
+    each sphere's link. at: (n, 3), m, centre of each sphere in its link's frame: along it from its middle, to its left,
+    upwards. radius: (n,), m. half_width (m): largest distance of the surface from the links' axes. density (kg/m^3): mass
+    over the volume pi half_width^2 length of the links; as the packed grains' if None. through: a bar that spans a periodic
+    bed along x.
+
+    Examples
+    --------
+    >>> from rft.grains import chain
+    >>> import rft
+    >>> swimmer = chain(rft.Chain((1, 1, 1)), size=0.162, radius=6e-3)
+    >>> len(swimmer.radius), swimmer.ends
+    (102, 0.006)
+    """
+
+    skeleton: Any
+    size: float
+    link: np.ndarray
+    at: np.ndarray
+    radius: np.ndarray
+    half_width: float
+    density: float | None = None
+    through: bool = False
+
+    @property
+    def joints(self) -> int:
+        """Number of shape variables."""
+        return self.skeleton.joints
+
+    @property
+    def ends(self) -> float:
+        """Length of either end of the body, m, where spheres form its cap."""
+        return 0.0 if self.through else self.half_width
+
+    @property
+    def along(self) -> np.ndarray:
+        """Distance of each sphere from the middle of the body along its links, tail to head, (n,), m."""
+        half = self.half_lengths
+        starts = np.concatenate([[0.0], np.cumsum(2 * half)[:-1]]) - half.sum()
+        return starts[self.link] + half[self.link] + self.at[:, 0]
+
+    @property
+    def half_lengths(self) -> np.ndarray:
+        """Half lengths of the links, (links,), m."""
+        zero = np.zeros((self.joints, 1))
+        return self.size * np.broadcast_to(self.skeleton.motion(zero, zero).half[:, 0], (self.n_links,))
+
+    @property
+    def n_links(self) -> int:
+        return int(self.link.max()) + 1
+
+    @property
+    def bottom(self) -> float:
+        """Lowest point of the surface over the axis, m."""
+        return float((self.at[:, 2] - self.radius).min())
+
+    @property
+    def top(self) -> float:
+        """Highest point of the surface over the axis, m."""
+        return float((self.at[:, 2] + self.radius).max())
+
+    def mass(self, bulk: float) -> float:
+        """Return the mass, kg. bulk: density of the packed grains, kg/m^3, of a body without its own."""
+        return (self.density or bulk) * math.pi * self.half_width**2 * self.size
+
+    def links(self, alpha: np.ndarray, alphadot: np.ndarray) -> Skeleton:
+        """Return the links in the body frame at joint angles (joints,), rad, and rates, rad/s."""
+        e = self.skeleton.motion(np.reshape(alpha, (-1, 1)), np.reshape(alphadot, (-1, 1)))
+        heading = (e.c + 1j * e.s)[:, 0]
+        rates = (e.v_w / e.half)[:, 0]
+        velocities = (e.v_t + 1j * e.v_n)[:, 0] * heading
+        return Skeleton(heading, rates, self.size * e.centres[:, 0], self.size * velocities)
+
+    def placed(self, links: Skeleton, x: complex, theta: float, v: complex, rate: float, height: float) -> Placement:
+        """Return the spheres of links whose frame is at x (m), heading theta (rad), and moves at v (m/s), turning at ``rate``
+        (rad/s); all in the world. height: of the axis, m."""
+        turn = np.exp(1j * theta)
+        lever = links.heading[self.link] * (self.at[:, 0] + 1j * self.at[:, 1])
+        p = turn * (links.centres[self.link] + lever)
+        inner = turn * (links.velocities[self.link] + 1j * links.rates[self.link] * lever)
+        velocity = v + 1j * rate * p + inner
+        centres = np.column_stack([(x + p).real, (x + p).imag, height + self.at[:, 2]])
+        velocities = np.column_stack([velocity.real, velocity.imag, np.zeros(len(p))])
+        return Placement(centres, velocities, rate + links.rates[self.link])
+
+    def check_apart(self, shapes: np.ndarray) -> None:
+        """Raise ValueError if links touch, other than neighbours at their joint, at one of the shapes (B, joints), rad."""
+        along, zero = self.along, np.zeros(self.joints)
+        far = np.abs(along[:, None] - along) > 8 * self.half_width
+        reach = self.radius[:, None] + self.radius
+        for alpha in shapes:
+            links = self.links(alpha, zero)
+            p = self.placed(links, 0.0, 0.0, 0.0, 0.0, 0.0).centres
+            gap = np.linalg.norm(p[:, None] - p, axis=-1) - reach
+            require(
+                not bool((far & (gap < 0)).any()),
+                f"links touch at the shape ({', '.join(f'{x:.2f}' for x in alpha)}) rad",
+                because="grains between them would have no room",
+                instead="take smaller joint angles or a thinner body",
+            )
+
+
+def chain(skeleton: Any, size: float, radius: float, density: float | None = None) -> Spheres:
+    """Return a body of straight round links with round ends.
+
+    skeleton: body of straight links such as `rft.Chain`. size (m): its length from end to end. radius (m): of the links;
+    the spheres at both ends are its caps. density (kg/m^3): as for `Spheres`.
+
+    Examples
+    --------
+    >>> import rft
+    >>> from rft.grains import chain
+    >>> chain(rft.Chain((1, 2, 1)), size=0.2, radius=6e-3).half_lengths
+    array([0.025, 0.05 , 0.025])
+    """
+    zero = np.zeros((skeleton.joints, 1))
+    half = size * skeleton.motion(zero, zero).half[:, 0]
+    require(bool((half >= radius).all()), "links must be longer than their width", value=(2 * half).tolist())
+    links, along = [], []
+    for k, h in enumerate(half):
+        low, high = -h + radius * (k == 0), h - radius * (k == len(half) - 1)
+        n = max(2, math.ceil((high - low) / (SPACING * radius)))
+        # From joint to joint spheres stand at the middles of equal pieces; an end has its sphere at its very place.
+        u = np.linspace(low, high, n + 1)
+        at = np.concatenate([u[:1] if k == 0 else [], (u[1:] + u[:-1]) / 2, u[-1:] if k == len(half) - 1 else []])
+        links += [k] * len(at)
+        along += at.tolist()
+    at = np.column_stack([along, np.zeros((len(along), 2))])
+    return Spheres(
+        skeleton, float(size), np.array(links), at, np.full(len(links), float(radius)), float(radius), density
+    )
+
+
+def rod(length: float, radius: float, shape: str = "round", through: bool = False, grain: float = 1e-3) -> Spheres:
+    """Return a rigid bar along x.
+
+    length (m): from end to end. radius (m): half its width. shape: one of `SHAPES`; "half round" lies on its flat side. A
+    round bar that ends in the bed has round ends. through: it spans a periodic bed of that length, as bars of other shapes
+    must. grain (m): radius of the spheres on the outline of a shape that is not round or spans the bed.
+
+    Examples
+    --------
+    >>> from rft.grains import rod
+    >>> len(rod(0.162, 6e-3).radius), len(rod(0.06, 8e-3, "half round", through=True).radius)
+    (102, 2160)
+    """
+    require(shape in SHAPES, f"shape must be one of {', '.join(SHAPES)}", value=shape)
+    if not through:
+        require(shape == "round", f"a {shape} bar has no ends here", instead="give through=True")
+        return chain(Bar(), length, radius)
+    outline = _outline(shape, radius, grain)
+    n = max(4, math.ceil(length / grain))
+    x = (np.arange(n) + 0.5) / n * length - length / 2
+    at = np.array([(u, y, z) for u in x for y, z in outline])
+    return Spheres(Bar(), length, np.zeros(len(at), int), at, np.full(len(at), grain), radius, through=True)
+
+
+def plate(length: float, height: float, tilt: float, grain: float = 1e-3) -> Spheres:
+    """Return a thin plate that spans a periodic bed along x.
+
+    length (m): of the bed. height (m): of the plate. tilt (rad): its turn about x; 0 is upright, and the face that looks
+    towards +y looks up where it is positive.
+
+    Examples
+    --------
+    >>> from rft.grains import plate
+    >>> wall = plate(length=0.06, height=0.03, tilt=0.0)
+    >>> round(wall.top, 3), wall.through
+    (0.015, True)
+    """
+    n = max(2, math.ceil(height / grain))
+    s = ((np.arange(n) + 0.5) / n - 0.5) * (height - 2 * grain)
+    x = np.arange(math.ceil(length / grain)) * grain - length / 2 + grain / 2
+    at = np.array([(u, -w * math.sin(tilt), w * math.cos(tilt)) for u in x for w in s])
+    return Spheres(Bar(), length, np.zeros(len(at), int), at, np.full(len(at), grain), height / 2, through=True)
+
+
+def _outline(shape: str, radius: float, grain: float) -> np.ndarray:
+    """Return the centres (n, 2), m, of spheres on the outline of a section."""
+    q = radius - grain
+    if shape == "round":
+        angle = np.arange(n := math.ceil(2 * math.pi * q / grain)) / n * 2 * math.pi
+        return q * np.column_stack([np.cos(angle), np.sin(angle)])
+    if shape == "square":
+        s = np.linspace(-q, q, math.ceil(2 * q / grain) + 1)
+        sides = [(x, y) for x in s for y in (-q, q)] + [(x, y) for x in (-q, q) for y in s[1:-1]]
+        return np.array(sides)
+    # Half a disc of that radius: the flat side a sphere's radius inside, the arc down to it.
+    least = math.asin(grain / q)
+    angle = np.linspace(least, math.pi - least, math.ceil(math.pi * q / grain) + 1)
+    arc, half = q * np.column_stack([np.cos(angle), np.sin(angle)]), q * math.cos(least)
+    y = np.linspace(-half, half, math.ceil(2 * half / grain) + 1)[1:-1]
+    outline = np.concatenate([arc, np.column_stack([y, np.full(len(y), grain)])]) - [0.0, radius / 2]
+    return outline * [1.0, -1.0] if shape.endswith("flat up") else outline

@@ -1,0 +1,241 @@
+"""Questions to grains: the drag of flank and ends becomes a law, a scene's swimmer a table, without LAMMPS."""
+
+import dataclasses
+import json
+import types
+
+import numpy as np
+import pytest
+from commands import geomech
+
+from geomech import scenes, text
+from geomech.output import grains as files
+from geomech.scenes import drag
+from geomech.studies import grain_swim, grains
+from geomech.studies.calibration import Calibration
+from geomech.text import drag_grains
+from rft import EndCaps, Granular
+from rft.calibrate import fit
+from rft.drag import Rod, rod_drag
+from rft.grains import Experiment, Run
+
+PSI = np.array([0.0, 10, 20, 40, 65, 90])
+LAW, ROD = Granular(3.1, 0.3), Rod(0.007, 0.2, 0.03, 600.0)
+
+
+def forces(e=1.7, axial=0.4):
+    """On the flank and on both ends of the rod (2, N), N, by the law and caps of e together."""
+    v = np.cos(np.radians(PSI)), np.sin(np.radians(PSI))
+    caps = EndCaps(ROD.radius / ROD.length, head=e, tail=0.0)
+    return axial * np.array(LAW.traction(*v)), axial * np.array(caps.traction(LAW, *v))
+
+
+def test_flank_and_ends_give_the_law_and_its_caps():
+    flank, ends = forces()
+    found = fit("granular", rod_drag(PSI, *flank, ends=ends), ROD, "fitted")
+    assert found.names == ("C", "gamma0", "k", "end_caps")
+    np.testing.assert_allclose(found.values, [3.1, 0.3, 0.4 / ROD.area / ROD.pressure, 1.7], rtol=1e-5)
+    np.testing.assert_allclose(found.forces(np.radians(PSI)), flank, rtol=1e-5)
+    whole = fit(
+        "granular", rod_drag(PSI, *(flank + ends)), ROD, "fitted"
+    )  # the sum, as a rod without the columns has it
+    np.testing.assert_allclose(whole.values, found.values, rtol=1e-4)
+    folded = fit("granular", rod_drag(180 - PSI, *(flank * [[-1], [1]]), ends=ends * [[-1], [1]]), ROD, "fitted")
+    np.testing.assert_allclose(folded.values, found.values, rtol=1e-6)
+    for caps in (1.0, 0.5):
+        with pytest.raises(ValueError, match="forces on the flank and on the ends: leave end_caps out or say 'fitted'"):
+            fit("granular", rod_drag(PSI, *flank, ends=ends), ROD, caps)
+    with pytest.raises(ValueError, match=r"that of -1.7 flat ends: e is 0 to 10"):
+        fit("granular", rod_drag(PSI, *flank, ends=-ends), ROD, "fitted")
+
+
+@pytest.mark.soak
+def test_the_error_of_caps_is_their_scatter_over_many_fits():
+    """With the covariance of e and the law, over 300 samples of noise, within 20 %."""
+    flank, ends = forces()
+    rng, values, covariance = np.random.default_rng(1), [], []
+    for _ in range(300):
+        noise = rng.normal(0, 0.01, (4, PSI.size))
+        found = fit("granular", rod_drag(PSI, *(flank + noise[:2]), ends=ends + 2 * noise[2:]), ROD, "fitted")
+        values.append(found.values)
+        covariance.append(found.covariance)
+    expected, spread = np.mean(covariance, 0), np.cov(np.transpose(values))
+    np.testing.assert_allclose(np.sqrt(np.diag(expected)), np.sqrt(np.diag(spread)), rtol=0.2)
+    correlation = lambda m: m[3] / np.sqrt(m[3, 3] * np.diag(m))
+    np.testing.assert_allclose(correlation(expected), correlation(spread), atol=0.2)
+
+
+@pytest.fixture
+def towed(monkeypatch):
+    """Runs of rods that obey the law, with 5 % more drag in the second bed, in place of those of LAMMPS."""
+    monkeypatch.setattr(grains, "lammps", lambda: None)
+    monkeypatch.setattr(grains, "settle", lambda *_: types.SimpleNamespace(facts={"packing": 0.6, "surface": 0.05}))
+
+    def run(experiment, folder, progress=None):
+        tow, body = experiment.motion, experiment.body
+        n, v = len(body.radius), (np.cos(tow.angle), np.sin(tow.angle))
+        strength = 2.0 * (1.05 if experiment.bed.seed == 5 else 1.0)  # N/m
+        caps = EndCaps(body.half_width / body.size, head=1.7, tail=0.0)
+        profile = np.zeros((200, n, 3))
+        spacing = np.diff(body.along[1:-1]).mean()
+        profile[..., :2] = -strength * spacing * np.array(LAW.traction(*v))
+        rest = strength * (body.size - n * spacing) * np.array(LAW.traction(*v))
+        profile[:, -1, :2] -= strength * body.size * np.array(caps.traction(LAW, *v)) + rest
+        profile[..., 2] = 0.5 / n
+        t = np.linspace(0, experiment.duration, 201)[1:]
+        nothing = np.zeros((200, 3))
+        overlaps = np.full((2, 2), 0.04)
+        return Run(
+            t, nothing, nothing, profile, body.along, *[nothing] * 6, overlaps, {"lammps": 20250722, "grains": 16225}
+        )
+
+    monkeypatch.setattr(Experiment, "run", run)
+
+
+def test_a_drag_is_a_file_that_fit_medium_reads(towed, tmp_path):
+    question = grains.DragGrains(0.18, 0.007, tuple(PSI), 2, 0.2, store=tmp_path)
+    question = dataclasses.replace(question, seed=4, bed=dataclasses.replace(question.bed, length=0.3, width=0.3))
+    result = question.ask()
+    assert result["flank"].values.shape == (2, 2, 6) and result["bed"].values.tolist() == [4, 5]
+    np.testing.assert_allclose(result["flank"].values[0, :, 0], [2.0, 2.1], rtol=1e-6)
+    np.testing.assert_allclose(result["lift"].values, 0.5)
+    law = result.subject[1]
+    np.testing.assert_allclose(law.values[[0, 1, 3]], [3.1, 0.3, 1.7], rtol=2e-3)
+    words = text.text(result)
+    assert "rod 14 x 180 mm, 25.5 mm deep, in 2 beds of 16,225 grains, packing 0.600" in words
+    assert "      0   2.05 +- 0.05" in words and "e = 1.70 of both together" in words
+    assert max(map(len, words.splitlines())) < 100
+    numbers = text.numbers(result)
+    assert numbers["law"]["C"] == pytest.approx(3.1, rel=2e-3) and numbers["law_errors"]["end_caps"] > 0
+    files.write_drag(result, tmp_path)
+    read = drag.read(tmp_path / "drag.csv")
+    assert read.sizes == pytest.approx({"radius": 0.007, "length": 0.18, "depth": 0.0255, "density": 618.0})
+    np.testing.assert_allclose(read.rows[1:3], 0.18 * result["flank"].values.reshape(2, -1), atol=6e-5)
+    code, out, err = geomech("fit-medium", tmp_path / "drag.csv", "--end-caps", "fitted", "-o", tmp_path / "sand.toml")
+    assert (code, err) == (0, "") and "end_caps" in out
+    assert "Both ends together" in (tmp_path / "sand.toml").read_text()
+    assert drag_grains.command(result).endswith("--angles 0,10,20,40,65,90 --beds 2 --seed 4")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"angles": (0.0, 90.0)}, "a law takes three angles or more"),
+        ({"angles": (0.0, 30.0, 100.0)}, "angles must be 0 to 90 degrees"),
+        ({"beds": 0}, "beds must be 1 to 100"),
+        ({"speed": 0.0}, "speed must be > 0"),
+        ({"radius": 0.01}, "ten times as long as it is wide"),
+        ({"length": 0.25}, "the bed is too small"),
+    ],
+)
+def test_drags_that_cannot_be_are_refused(change, words, towed, tmp_path):
+    with pytest.raises(ValueError, match=words):
+        dataclasses.replace(grains.DragGrains(store=tmp_path), **change).check()
+
+
+def test_the_cost_is_said_before_and_refused_beyond_ten_minutes(towed, monkeypatch, tmp_path):
+    one = grains.DragGrains(beds=1, angles=(0.0, 30.0, 90.0), store=tmp_path)
+    cost = one.cost()
+    e = one.experiments()[0]
+    assert cost.balances == pytest.approx((16225 + 102) * (3 * e.n_steps + 0.7 / e.bed.step), rel=1e-3)
+    assert str(cost).endswith("about 3.2 min of computing")
+    code, _, err = geomech("drag-grains", "-o", tmp_path / "out", "--store", tmp_path)
+    assert code == 2 and "for more than 10 min say --yes, or take fewer --beds or --angles" in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_swim_stands_beside_the_tiers(monkeypatch, tmp_path):
+    """A scene in metres, 0.3 m long, at 2 Hz; each cycle turns by 0.2 rad and moves by 24 mm ahead."""
+    scene = scenes.parse(
+        '[medium]\nname = "glass-0.3mm-loose"\n[body]\nkind = "chain"\nlengths = [1, 1.5, 1]\nlength = 0.3\n[gait]\n'
+        'kind = "circle"\namplitude = 0.9\nfrequency = 2.0\nreverse = true\n[[effects]]\nkind = "end-caps"\nradius = 0.03\n'
+        "[numerics]\nphases = 32\ngrid = 7\n"
+    )
+    monkeypatch.setattr(grain_swim, "lammps", lambda: None)
+    asked = []
+
+    def run(experiment, folder, progress=None):
+        asked.append(experiment)
+        t = np.linspace(0, 1.25, 1001)[1:]
+        theta = 0.4 * t + 0.3
+        # An arc, whose chord of half a second, a cycle, is 24 mm.
+        place = -1j * np.exp(1j * theta) * 0.024 / abs(np.exp(0.2j) - 1)
+        pose = np.column_stack([place.real, place.imag, theta])
+        alpha = np.array([experiment.motion.joint_angles(x)[0] for x in t])
+        nothing, facts = np.zeros((1000, 3)), {"grains": 100, "packing": 0.6, "lammps": 1, "mass": 0.1}
+        series = t, nothing, t, np.zeros((1000, 1, 3)), np.zeros(1), pose, nothing[:, :2], alpha, 0.5 * t, t, nothing
+        return Run(*series, np.ones((2, 2)), facts)
+
+    monkeypatch.setattr(Experiment, "run", run)
+    result = grain_swim.GrainSwim(scene, store=tmp_path).ask()
+    (experiment,) = asked
+    assert experiment.body.size == 0.3 and experiment.body.half_width == pytest.approx(0.009)
+    assert experiment.bed.length == pytest.approx(0.418) and experiment.duration == pytest.approx(1.25)
+    alpha, _ = experiment.motion.joint_angles(0.25)
+    np.testing.assert_allclose(alpha, scene.gait.shape(0.0), atol=1e-12)  # full grown, at phase 0
+    assert result["method"].values.tolist()[-3:] == ["direct", grain_swim.GRAINS_LAW, "grains"]
+    np.testing.assert_allclose(result["cycle_heading"].values, 0.2)
+    np.testing.assert_allclose(np.hypot(result["cycle_x"].values, result["cycle_y"].values), 0.08, rtol=1e-6)
+    np.testing.assert_allclose(result["cycle_y"].values, 0.08 * np.sin(0.1), rtol=1e-3)
+    assert result.attributes["work"] == pytest.approx(0.25)
+    k = result["method"].values.tolist().index("direct")
+    from geomech.studies.study import Study
+
+    own = Study(scene).study([0.9], ("direct",))
+    assert result["x"].values[k] == pytest.approx(own["x"]["direct"][0] / 0.3)
+    assert not np.isclose(result["x"].values[k], result["x"].values[k + 1])
+    # Ends that both push half as much are one end that pushes, to 1 %.
+    flank = Calibration("flank-drag", end_caps="fitted").ask().subject
+    ahead = dataclasses.replace(
+        scene.system, medium=flank.medium, effects=(EndCaps(0.03, head=flank.end_caps, tail=0.0),)
+    )
+    one_end = Study(scene.changed(system=ahead)).study([0.9], ("direct",))
+    assert result["x"].values[k + 1] == pytest.approx(one_end["x"]["direct"][0] / 0.3, rel=0.03)
+    words = text.text(result)
+    assert "body 300 mm long, 18 mm wide, 2 Hz" in words and "cycle 2" in words and "+-" in words
+    assert json.dumps(text.numbers(result))
+    files.write_swim(result, tmp_path)
+    head, columns, row, *_ = (tmp_path / "motion.csv").read_text().splitlines()
+    assert "--cycles 2 --seed 1" in head and len(columns.split(",")) == len(row.split(",")) == 12
+    assert (tmp_path / "grains.png").stat().st_size > 10_000
+
+
+def test_scenes_without_rigid_links_are_refused():
+    code, _, err = geomech("grains", "sandfish-loose")
+    assert code == 2 and "grains take a body of rigid links" in err
+    code, _, err = geomech("grains", "three-link-floating")
+    assert code == 2 and "grains take a body of rigid links" in err
+
+
+def test_samples_have_names_that_say_what_they_are():
+    old, short = (Calibration(name).ask().subject for name in ("dem-rod-drag", "short-rod-drag"))
+    np.testing.assert_array_equal(old.values, short.values)
+    flank = Calibration("flank-drag", end_caps="fitted").ask().subject
+    assert flank.data.n_angles == 6 and flank.rod.length == 0.162
+    np.testing.assert_allclose(flank.values, [4.54, 0.260, 0.981, 1.71], rtol=2e-3)  # as written with the sample
+
+
+def test_the_figure_of_grains_shows_beds_beside_laws():
+    """Three beds of two cycles each; lift and reversals as they were computed, over beds."""
+    from figures import grains as figure
+    from figures.campaigns.grains import read
+
+    numbers = figure.compute([0.9, 1.0])
+    curves, swims = numbers["curves"], numbers["swims"]
+    assert curves["flank and ends"]["distance"][1] == pytest.approx(0.107, abs=2e-3)
+    assert curves["flank and ends"]["spread"][1] == pytest.approx(0.006, abs=1e-3)
+    assert curves["short rod"]["distance"][1] == pytest.approx(0.0504, abs=1e-3)
+    data = read("swims")
+    of = lambda bed: np.hypot(data["x_BL"], data["y_BL"])[(data["bed"] == bed) & (data["amplitude"] == 1.0)].mean()
+    means = [of(bed) for bed in (1, 2, 3)]
+    assert swims["amplitude"].tolist() == [1.0, 1.7] and swims["distance"][0] == pytest.approx(np.mean(means))
+    assert swims["error"][0] == pytest.approx(np.std(means, ddof=1) / np.sqrt(3)) and swims["error"][1] > 0
+    lift = numbers["lift"]
+    assert list(lift) == list(figure.BARS) and lift["round"]["grains"] == pytest.approx(0.43, abs=0.1)
+    assert (lift["half round"]["keep"], lift["half round"]["cut"]) == pytest.approx((0.54, 0.04), abs=0.01)
+    fresh, first, _ = (numbers["reversal"][k]["at_once"][0] for k in (0, 1, 2))
+    assert fresh > 0.7 and 0.1 < first < 0.4
+    assert "1.00 rad" in figure.table(numbers)
+    left, middle, right = figure.draw(numbers).axes
+    assert left.lines[0].get_ydata().tolist() == curves["flank and ends"]["distance"].tolist()
+    assert len(middle.get_yticklabels()) == 3 and len(right.texts) == 3
