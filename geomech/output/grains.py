@@ -57,5 +57,6 @@ def draw_swim(result: Result):
     right.barh(range(len(names)), distance, xerr=error, color=colours, height=0.6)
     right.set_yticks(range(len(names)), names)
     right.invert_yaxis()
-    right.set(xlabel="distance per cycle (BL)")
+    right.set(xlabel="distance per cycle (BL)", xlim=(0, 1.15 * (distance + error).max() or None))
+    right.locator_params(axis="x", nbins=5)
     return fig

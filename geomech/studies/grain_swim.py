@@ -31,7 +31,7 @@ SIZE, RADIUS, FREQUENCY = 0.162, 6e-3, 1.0  # m, m and Hz of a scene that gives 
 ROOM = 0.118, 0.078  # m of bed beyond the body along and across it
 DEPTH = 0.049  # m of bed, or as much as a thick body takes
 FLANK = "flank-drag"  # the sample of drag in such beds
-GRAINS_LAW = "direct, law of these grains"
+GRAINS_LAW = "direct, law of grains"
 
 
 @dataclass(frozen=True)

@@ -25,12 +25,12 @@ def text(result: Result) -> str:
     lines = [
         f"{facts['name']} in {facts['grains']:,} grains, seed {facts['seed']}: body {1e3 * facts['size']:g} mm long, "
         f"{2e3 * facts['radius']:g} mm wide, {facts['frequency']:g} Hz",
-        f"{'displacement per cycle (BL)':27}{'x':>17}{'y':>17}{'heading (rad)':>17}",
+        f"{'BL per cycle':24}{'x':>18}{'y':>18}{'heading (rad)':>18}",
     ]
     rows = zip(result["method"].values, *(zip(result[n].values, result[n].error) for n in ("x", "y", "heading")))
-    lines += [f"{name:27}" + "".join(f"{_cell(value, error):>17}" for value, error in cells) for name, *cells in rows]
+    lines += [f"{name:24}" + "".join(f"{_cell(value, error):>18}" for value, error in cells) for name, *cells in rows]
     for k, *pose in zip(*(result[n].values for n in ("cycle", "cycle_x", "cycle_y", "cycle_heading"))):
-        lines.append(f"{f'  cycle {k}':27}" + "".join(f"{f'{x:.4f}          ':>17}" for x in pose).rstrip())
+        lines.append(f"{f'  cycle {k}':24}" + "".join(f"{f'{x:.4f}          ':>18}" for x in pose).rstrip())
     lines.append("+-: error of tiers with that of the medium, deviation of cycles in grains; beds")
     lines.append("differ by more than cycles: take other seeds, too")
     lines.append(
@@ -41,7 +41,7 @@ def text(result: Result) -> str:
 
 
 def _cell(value: float, error: float) -> str:
-    return f"{value:.4f}" + (f" +- {error:.4f}" if np.isfinite(error) else "")
+    return f"{round(value, 4) + 0.0:.4f}" + (f" +- {error:.4f}" if np.isfinite(error) else "")
 
 
 def csv(result: Result) -> str:
