@@ -5,7 +5,8 @@ Spheres of 6 mm with friction 0.3 and 1 MPa, in beds that differ by their seeds;
 Left: displacement of a three-link swimmer, 162 x 12 mm at 25 mm depth, on circles, beside the direct tier with the law of
 its flank and its end caps, both measured in the same grains (band: one standard deviation of the law), the same without the
 caps, and the law of a short rod with its ends in it. Middle: lift over drag on bars without ends, beside the nine-term map,
-as it is and without tension. Right: share of the drag on a rod that is there at once, and after a reversal.
+as it is and without tension. Right: share of the drag on a rod, to and fro, that is there at once, against the travel to 95 %
+of it.
 
 Size, depth and friction of the robot of Fig. 11(e) are not in the paper's text, so that this is no copy of it. The data are
 in `figures/campaigns`; the commands that made them stand in the files.
@@ -40,8 +41,9 @@ def compute(amplitudes=AMPLITUDES) -> dict:
     """Return curves and measured numbers.
 
     "amplitude": (A,), rad. "curves": by name {"distance", "spread": (A,), BL}. "swims": {"amplitude", "distance", "error":
-    (S,)}. "lift": by shape {"grains", "error", "keep", "cut"}, lift over drag. "reversal": by stretch, 0 in a fresh bed, 1
-    and 2 after reversals {"at_once", "travel": (mean, error)}, shares and m."""
+    (S,)}. "lift": by shape {"grains", "error", "keep", "cut"}, lift over drag. "reversal": by (amplitude, m,
+    depth, m, angle from the axis, degrees) and by stretch, 0 in a fresh bed, 1 and 2 after reversals, {"at_once", "travel":
+    (mean, error)}, shares and m."""
     flank = Calibration("flank-drag", end_caps="fitted").ask().subject
     short = Calibration("short-rod-drag").ask().subject
     caps = (EndCaps(RADIUS / SIZE, flank.end_caps / 2, flank.end_caps / 2),)
@@ -92,14 +94,22 @@ def lifts(name: str, bar) -> dict:
 
 def measured_reversals() -> dict:
     data = grains.read("reversals")
-    found = {}
-    for stretch in np.unique(data["stretch"]):
-        mine = data["stretch"] == stretch
-        found[int(stretch)] = {
-            "at_once": over_beds(data["at_once"][mine], data["bed"][mine]),
-            "travel": over_beds(data["travel_95_m"][mine], data["bed"][mine]),
-        }
+    cases = np.column_stack([data["amplitude_m"], data["depth_m"], data["angle_deg"]])
+    found: dict[tuple, dict] = {}
+    for case in dict.fromkeys(map(tuple, cases.tolist())):
+        for stretch in np.unique(data["stretch"]):
+            mine = (cases == case).all(1) & (data["stretch"] == stretch)
+            found.setdefault(case, {})[int(stretch)] = {
+                "at_once": over_beds(data["at_once"][mine], data["bed"][mine]),
+                "travel": over_beds(data["travel_95_m"][mine], data["bed"][mine]),
+            }
     return found
+
+
+def named(case: tuple[float, float, float]) -> str:
+    """Return the name of a way to and fro."""
+    amplitude, depth, angle = case
+    return f"{1e3 * amplitude:g} mm {'across' if angle else 'along'}, {1e3 * depth:.3g} mm deep"
 
 
 def table(numbers: dict) -> str:
@@ -119,7 +129,17 @@ def table(numbers: dict) -> str:
         (name, f"{x['grains']:+.2f} +- {x['error']:.2f}", f"{x['keep']:+.2f}", f"{x['cut']:+.2f}")
         for name, x in numbers["lift"].items()
     ]
-    return f"{lines}\n{style.table(('lift over drag', 'grains', 'map', 'tension cut'), rows)}"
+    lifted = style.table(("lift over drag", "grains", "map", "tension cut"), rows)
+    rows = [
+        (
+            f"{named(case)}, {f'reversal {k}' if k else 'fresh bed'}",
+            "{:.2f} +- {:.2f}".format(*x["at_once"]),
+            "{:.1f} +- {:.1f} mm".format(*(1e3 * np.array(x["travel"]))),
+        )
+        for case, stretches in numbers["reversal"].items()
+        for k, x in stretches.items()
+    ]
+    return f"{lines}\n{lifted}\n{style.table(('drag', 'at once', '95 % after'), rows)}"
 
 
 @plots.styled
@@ -145,13 +165,16 @@ def draw(numbers: dict):
     middle.set_yticks(y, list(lift))
     middle.set(xlabel="lift over drag", ylim=(len(lift) - 0.5, -1.2))
     middle.legend(loc="upper right", ncols=1)
-    reversal = numbers["reversal"]
-    at_once, travel = (np.array([x[key] for x in reversal.values()]).T for key in ("at_once", "travel"))
-    right.errorbar(1e3 * travel[0], at_once[0], at_once[1], 1e3 * travel[1], **dots)
-    for k, x, h, aside in zip(reversal, 1e3 * travel[0], at_once[0], ((6, 6), (-30, -18), (-28, 14))):
-        label = f"reversal {k}" if k else "fresh bed"
-        right.annotate(label, (x, h), aside, textcoords="offset points", **style.NOTE)
-    right.set(xlabel="travel to 95 % of the late drag (mm)", ylabel="share of it at once", ylim=(0, 1), xlim=(0, 32))
+    for (case, stretches), colour in zip(numbers["reversal"].items(), style.SEQUENCE):
+        for k, found in stretches.items():
+            (y, y_error), (x, x_error) = found["at_once"], 1e3 * np.array(found["travel"])
+            look = {**dots, "color": colour, "mfc": colour if k else "white", "label": named(case) if k == 1 else None}
+            right.errorbar(x, y, y_error, x_error, **look)
+    right.set(
+        xlabel="travel to 95 % of the late drag (mm)", ylabel="share of it at once", ylim=(0, 1.6), xlim=(0, None)
+    )
+    right.set_yticks([0, 0.5, 1])
+    right.legend(loc="upper right", title="filled: after a reversal")
     return fig
 
 

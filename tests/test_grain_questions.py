@@ -233,9 +233,18 @@ def test_the_figure_of_grains_shows_beds_beside_laws():
     lift = numbers["lift"]
     assert list(lift) == list(figure.BARS) and lift["round"]["grains"] == pytest.approx(0.43, abs=0.1)
     assert (lift["half round"]["keep"], lift["half round"]["cut"]) == pytest.approx((0.54, 0.04), abs=0.01)
-    fresh, first, _ = (numbers["reversal"][k]["at_once"][0] for k in (0, 1, 2))
-    assert fresh > 0.7 and 0.1 < first < 0.4
+    base, *others = numbers["reversal"]
+    assert base == (0.02, 0.0245, 90) and len({*others}) == len(others)
+    for case, stretches in numbers["reversal"].items():
+        fresh, first, _ = (stretches[k]["at_once"][0] for k in (0, 1, 2))
+        assert fresh > 0.5 and first < 0.5, case
+    rows = read("reversals")
+    mine = (
+        (rows["amplitude_m"] == 0.02) & (rows["depth_m"] == 0.0245) & (rows["angle_deg"] == 90) & (rows["stretch"] == 2)
+    )
+    travel = rows["travel_95_m"][mine]
+    assert numbers["reversal"][base][2]["travel"] == pytest.approx((travel.mean(), travel.std(ddof=1) / np.sqrt(3)))
     assert "1.00 rad" in figure.table(numbers)
     left, middle, right = figure.draw(numbers).axes
     assert left.lines[0].get_ydata().tolist() == curves["flank and ends"]["distance"].tolist()
-    assert len(middle.get_yticklabels()) == 3 and len(right.texts) == 3
+    assert len(middle.get_yticklabels()) == 3 and len(right.containers) == 3 * len(numbers["reversal"])

@@ -30,7 +30,13 @@ from rft.grains.reversal import recoveries
 FOLDER = Path(__file__).parent
 BEDS = (1, 2, 3)  # seeds
 SWIMS = ((1.0, 1.0, BEDS), (1.7, 1.0, BEDS[:2]))  # amplitude, rad, frequency, Hz, and seeds
-STROKES = (0.02,)  # amplitudes, m, of a rod 12 mm in diameter, 24.5 mm deep
+STROKES = (  # amplitude, m, depth, m, and angle from its axis, degrees, of the ways of a rod 12 mm in diameter
+    (0.02, 0.0245, 90),
+    (0.01, 0.0245, 90),
+    (0.02, 0.0245, 0),
+    (0.02, 0.0150, 90),
+    (0.04, 0.0245, 90),
+)
 BARS = ("round", "half round", "half round, flat up")
 SPEED = 0.1  # m/s of rods
 TROUGH = Bed(length=0.06, width=0.30, depth=0.048)  # for bars across it
@@ -68,14 +74,16 @@ def swims(store: Path) -> Rows:
 
 def reversals(store: Path) -> Rows:
     """Yield the recovery of the drag along every stretch of a rod to and fro; the first is in a fresh bed."""
-    yield "amplitude_m", "bed", "stretch", "late_N", "at_once", "travel_95_m", "plateau_N", "scale_m", "rms_N"
-    for amplitude in STROKES:
+    where = "amplitude_m", "depth_m", "angle_deg", "bed", "stretch"
+    yield *where, "late_N", "at_once", "travel_95_m", "plateau_N", "scale_m", "rms_N"
+    for amplitude, depth, angle in STROKES:
         for seed in BEDS:
-            stroke = Stroke(SPEED, math.pi / 2, amplitude)
+            stroke = Stroke(SPEED, math.radians(angle), amplitude)
             duration = round(5 * amplitude / SPEED, 6)  # out, and twice across
-            run = Experiment(Bed(seed=seed), rod(0.162, 6e-3), stroke, duration).run(store)
+            run = Experiment(Bed(seed=seed), rod(0.162, 6e-3), stroke, duration, depth).run(store)
             for k, leg in enumerate(recoveries(run, stroke)):
-                yield amplitude, seed, k, leg.late, leg.at_once, leg.travel, leg.plateau, leg.scale, leg.rms
+                found = leg.late, leg.at_once, leg.travel, leg.plateau, leg.scale, leg.rms
+                yield amplitude, depth, angle, seed, k, *found
 
 
 def lift(store: Path) -> Rows:

@@ -73,7 +73,10 @@ def _fit(x: np.ndarray, force: np.ndarray) -> Recovery:
         return p[0] * (1 - (1 - p[1]) * np.exp(-x / p[2])) - force
 
     span = float(x.max())
-    low, high = [0.0, -1.0, 1e-3 * span], [5 * late, 2.0, 2 * span]
+    shortest = float(
+        x[1] - x[0]
+    )  # nothing faster than a sample is seen: where the drag is there at once, any start would do
+    low, high = [0.0, -1.0, shortest], [5 * late, 2.0, 2 * span]
     starts = [[late, h, s * span] for h in (0.2, 0.8) for s in (0.05, 0.3)]
     best = min((least_squares(misfit, p, bounds=(low, high), x_scale=p) for p in starts), key=lambda r: r.cost)
     return Recovery(*best.x.tolist(), late, rms=float(np.sqrt(np.mean(best.fun**2))))
