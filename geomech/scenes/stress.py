@@ -165,6 +165,7 @@ def medium(name: str) -> PlateStress:
 
     Examples
     --------
+    >>> import geomech
     >>> geomech.medium("poppy-seeds-loose").zeta  # or of "own.toml"
     1.0
     """
