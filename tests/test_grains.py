@@ -3,6 +3,7 @@
 import dataclasses
 import importlib.util
 import json
+import signal
 import sys
 import types
 
@@ -224,9 +225,24 @@ def store(tmp_path_factory):
     return tmp_path_factory.mktemp("grains")
 
 
+def test_folders_that_keep_no_beds_are_refused(tmp_path):
+    (tmp_path / "file").write_text("")
+    for folder, said in (
+        ("file", "cannot keep beds in .*: File exists: take"),
+        ("f\u00fcr", "takes no folder named"),
+        ('a"', "quotes"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            experiments.settle(SMALL, ROD, 0.02, tmp_path / folder)
+    with pytest.raises(ValueError, match="sample must be a number"):
+        Experiment(SMALL, ROD, Tow(0.1), 0.01, sample=0.1).check()
+
+
 @needs_lammps
-def test_a_stopped_run_goes_on_to_the_same_digits(store, tmp_path, monkeypatch):
-    """An exception out of the callback ends the run at once; blocks that are done are not done again."""
+def test_a_stopped_run_goes_on_to_the_same_digits(store, tmp_path, monkeypatch, request):
+    """A signal ends the run after its step; blocks that are done are not done again, unless their files are damaged."""
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, handler))
     monkeypatch.setattr(experiments, "BLOCK", 80)
     towed = Experiment(SMALL, ROD, Tow(0.1, np.pi / 2), 0.024)
     whole = towed.run(store)
@@ -237,17 +253,28 @@ def test_a_stopped_run_goes_on_to_the_same_digits(store, tmp_path, monkeypatch):
     fractions = []
 
     def stop(fraction):
-        fractions.append(fraction)
         if fraction > 0.5:
-            raise KeyboardInterrupt
+            signal.raise_signal(signal.SIGINT)
+            with pytest.raises(ValueError, match="another process computes the run"):
+                towed.run(tmp_path)
+        fractions.append(fraction)
 
     with pytest.raises(KeyboardInterrupt):
         towed.run(tmp_path, stop)
     assert 0.5 < fractions[-1] < 0.6
-    resumed = towed.run(tmp_path, fractions.append)
-    assert fractions[-1] == 1 and len(fractions) < 1.4 * len(whole.t)
-    for name in experiments.SERIES:
-        np.testing.assert_array_equal(getattr(whole, name), getattr(resumed, name))
+    (place,) = tmp_path.glob("run-*")
+    (state,) = place.glob("before-*")
+    kept = {file: file.read_bytes() for file in place.iterdir()}
+    for damaged in (None, state, place / "block-0000.npz"):
+        for file in [*place.iterdir()]:
+            file.unlink()
+        for file, raw in kept.items():
+            file.write_bytes(raw[:-9] if file == damaged else raw)
+        fractions.clear()
+        resumed = towed.run(tmp_path, fractions.append)
+        assert fractions[-1] == 1 and (len(fractions) < 0.9 * len(whole.t)) == (damaged is None)
+        for name in experiments.SERIES:
+            np.testing.assert_array_equal(getattr(whole, name), getattr(resumed, name))
     assert [file.parent for file in tmp_path.glob("**/*.restart*")] == [tmp_path]  # the bed's
     assert len(whole.t) == towed.n_steps / towed.sample_steps and whole.t[-1] == pytest.approx(0.024, rel=0.02)
     np.testing.assert_allclose(whole.centre[:, 1], 0.1 * whole.t, rtol=1e-9)
@@ -260,9 +287,6 @@ def test_a_stopped_run_goes_on_to_the_same_digits(store, tmp_path, monkeypatch):
     experiments.settle(SMALL, ROD, towed.height, tmp_path)  # anew, and with the same seed to the same digits
     assert bed_file.read_bytes() == before and bed_file.with_suffix(".damaged").exists()
     assert towed.run(tmp_path, pytest.fail).force.tolist() == whole.force.tolist()  # read, not computed
-    (tmp_path / f"run-{towed._key()}" / "lock").write_text("1")  # the number of a process that runs
-    with pytest.raises(ValueError, match="process 1 computes this run"):
-        towed.run(tmp_path)
 
 
 @needs_lammps

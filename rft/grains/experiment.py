@@ -10,6 +10,7 @@ import json
 import math
 import os
 import time
+import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import astuple, dataclass
 from pathlib import Path
@@ -17,6 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rft.checks import in_range
 from rft.grains.bed import Bed
 from rft.grains.contacts import contacts, motion_energy
 from rft.grains.engine import Engine, Forces, write_data
@@ -24,6 +26,11 @@ from rft.grains.motions import Motion
 from rft.grains.spheres import Spheres
 from rft.metres import GRAVITY
 from rft.refusal import Refusal, require
+
+try:
+    import fcntl
+except ImportError:  # no such locks on Windows, where a run in one folder by two processes is not refused
+    fcntl = None  # type: ignore[assignment]
 
 FORMAT = 1  # of the files and of all constants that digits depend on; another number begins anew
 BLOCK = 2000  # steps between restart files: some 15 s of a bed of 15,000 grains
@@ -35,6 +42,9 @@ SLOWING = 0.6  # s in which the viscous air slows a grain down
 CALM = 1e-3  # kinetic energy of a settled grain, on average, over its weight times its diameter
 LONGEST = 5.0  # s of settling
 Progress = Callable[[float], None]
+Block = dict[
+    str, np.ndarray
+]  # the series of a run over a block, its state and time, and the digest of the file after it
 
 
 def _silent(fraction: float) -> None: ...
@@ -127,7 +137,7 @@ class Experiment:
         """Return the number of time steps that are not in a folder yet."""
         lengths = self._blocks()
         place = Path(folder) / f"run-{self._key()}"
-        return sum(lengths[_blocks_done(place, len(lengths)) :])
+        return sum(lengths[len(_blocks_done(place, len(lengths))) :])
 
     def is_settled(self, folder: str | Path) -> bool:
         """Return whether a folder has the bed at rest."""
@@ -136,7 +146,8 @@ class Experiment:
     def check(self) -> None:
         """Raise ValueError, one line, for a body that does not fit its bed, or a motion that it cannot do."""
         bed, body = self.bed, self.body
-        require(0 < self.duration < math.inf, "duration must be > 0", value=self.duration)
+        in_range("duration", self.duration, bed.step, 1e6, unit="s")
+        in_range("sample", self.sample, 1e-9, self.duration, unit="s")
         below, above = self.height + body.bottom, bed.depth - self.height - body.top
         require(
             below >= FREE * bed.diameter and above >= COVER * bed.diameter,
@@ -168,24 +179,27 @@ class Experiment:
         ``frames-*.lammpstrj``, which OVITO opens as one; only of blocks that are computed now. Raises ValueError if grains
         fly off or the body leaves the bed: blocks that are done stay."""
         self.check()
+        if film is not None:
+            in_range("film", film, 1e-9, 1e6, unit="s")
         folder = Path(folder).resolve()
         report = progress or _silent
         settling = 0 if self.is_settled(folder) else round(sum(SETTLING) / self.bed.step)
         share = settling / (settling + self.n_steps)
         settled = settle(self.bed, self.body, self.height, folder, lambda done: report(share * done))
-        place = folder / f"run-{self._key()}"
+        place, lengths = folder / f"run-{self._key()}", self._blocks()
         place.mkdir(parents=True, exist_ok=True)
-        lengths = self._blocks()
-        done = _blocks_done(place, len(lengths))
-        step = sum(lengths[:done])
-        with _locked(place):
-            for k in range(done, len(lengths)):
-                start = _state_file(place, k) if k else settled.file
-                block = _Block(self, settled.bulk, place, k, step, lambda done: report(share + (1 - share) * done))
-                block.compute(start, lengths[k], film)
-                step += lengths[k]
-            _remove(_state_file(place, k) for k in range(1, len(lengths) + 1))
-        return self._gathered(place, len(lengths), settled)
+        blocks = _blocks_done(place, len(lengths))
+        if len(blocks) < len(lengths):
+            with _locked(place):
+                for k in range(len(blocks), len(lengths)):
+                    start, step = (_state_file(place, k) if k else settled.file), sum(lengths[:k])
+                    before = blocks[-1] if k else None
+                    tell = lambda done: report(share + (1 - share) * done)
+                    blocks.append(
+                        _Block(self, settled.bulk, place, k, step, before, tell).compute(start, lengths[k], film)
+                    )
+                _remove(_state_file(place, k) for k in range(1, len(lengths) + 1))
+        return self._gathered(blocks, settled)
 
     def _blocks(self) -> list[int]:
         """Return the numbers of steps of the blocks."""
@@ -195,10 +209,9 @@ class Experiment:
 
     def _key(self) -> str:
         named = self.motion.named(), self.duration, self.sample, _settled_key(self.bed, self.body, self.height)
-        return hashlib.sha256(json.dumps([FORMAT, *named]).encode()).hexdigest()[:16]
+        return hashlib.sha256(json.dumps([FORMAT, *named], default=float).encode()).hexdigest()[:16]
 
-    def _gathered(self, place: Path, n: int, settled: Settled) -> Run:
-        blocks = [np.load(_rows_file(place, k)) for k in range(n)]
+    def _gathered(self, blocks: list[Block], settled: Settled) -> Run:
         series = {name: np.concatenate([b[name] for b in blocks]) for name in SERIES}
         facts = {
             **settled.facts, "time_step": self.bed.step, "steps": self.n_steps, "mass": self.body.mass(settled.bulk),
@@ -210,14 +223,16 @@ class Experiment:
 class _Block:
     """One block of an experiment under way: what LAMMPS calls every step, and the samples of it."""
 
-    def __init__(self, experiment: Experiment, bulk: float, place: Path, index: int, step: int, progress: Progress):
+    def __init__(
+        self, experiment: Experiment, bulk: float, place: Path, index: int, step: int, before: Block | None,
+        progress: Progress,
+    ):  # fmt: skip
         self.experiment, self.place, self.index, self.progress = experiment, place, index, progress
         self.step, self.dt, self.n = step, experiment.bed.step, experiment.sample_steps
         self.mass = experiment.body.mass(bulk)
         self.rows: dict[str, list] = {name: [] for name in SERIES}
         self.state, self.work = experiment.motion.start(), 0.0
-        if index:
-            before = np.load(_rows_file(place, index - 1))
+        if before:
             self.state, self.work = before["state"], float(before["work"][-1])
         self.now = self._move(0.0)
         self._clear()
@@ -230,8 +245,8 @@ class _Block:
     def _clear(self) -> None:
         self.sums = np.zeros(3), 0.0, np.zeros((len(self.experiment.body.radius), 3))
 
-    def compute(self, start: Path, steps: int, film: float | None) -> None:
-        """Compute the block and write its rows and the state after it."""
+    def compute(self, start: Path, steps: int, film: float | None) -> Block:
+        """Compute the block, write its rows and the state after it, and return the rows."""
         e, clock = self.experiment, time.process_time()
         with Engine(e.bed, start, len(e.body.radius), restart=True) as engine:
             if not self.index:
@@ -242,10 +257,12 @@ class _Block:
             self._weigh(engine)
             with _replacing(_state_file(self.place, self.index + 1)) as path:
                 engine.write(path)
+        after = _digest(_state_file(self.place, self.index + 1))
         series = {name: np.array(rows, np.float32 if name == "profile" else float) for name, rows in self.rows.items()}
         with _replacing(_rows_file(self.place, self.index)) as path, path.open("wb") as file:
-            np.savez_compressed(file, **series, state=self.state, cpu=time.process_time() - clock)
+            np.savez_compressed(file, **series, state=self.state, cpu=time.process_time() - clock, after=after)
         _remove([_state_file(self.place, self.index)] if self.index else [])
+        return _rows(self.place, self.index)
 
     def _place(self, forces: Forces) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Take up the forces of a step and return the body of the next."""
@@ -317,7 +334,12 @@ def settle(
     """Return the bed at rest around a straight body whose axis is at a height (m) over the floor, from the folder where it is
     there, else computed and kept there. progress: called with the fraction done."""
     folder = Path(folder).resolve()
-    folder.mkdir(parents=True, exist_ok=True)
+    plain = str(folder).isascii() and '"' not in str(folder)
+    require(plain, f"LAMMPS takes no folder named {folder}", instead="take one of ASCII letters, without quotes")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise Refusal(f"cannot keep beds in {folder}", because=error.strerror, instead="take another folder") from None
     file = _bed_file(folder, _settled_key(bed, body, height))
     sheet = file.with_suffix(".json")
     with contextlib.suppress(OSError, ValueError, KeyError):
@@ -396,14 +418,27 @@ def _state_file(place: Path, block: int) -> Path:
     return place / f"before-{block:04d}.restart"
 
 
-def _blocks_done(place: Path, n: int) -> int:
-    """Return the number of blocks whose rows are there, with the state to go on from, or all of them."""
-    rows = 0
-    while rows < n and _rows_file(place, rows).exists():
-        rows += 1
-    while 0 < rows < n and not _state_file(place, rows).exists():
-        rows -= 1
-    return rows
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.exists() else ""
+
+
+def _rows(place: Path, block: int) -> Block:
+    """Return the rows of a block; {} if they are not there, or damaged."""
+    try:
+        with _rows_file(place, block).open("rb") as file, np.load(file) as rows:
+            return {name: rows[name] for name in rows.files}
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile):
+        return {}
+
+
+def _blocks_done(place: Path, n: int) -> list[Block]:
+    """Return the blocks whose rows are there and whole, with the state to go on from, or all n of them."""
+    blocks: list[Block] = []
+    while len(blocks) < n and (rows := _rows(place, len(blocks))):
+        blocks.append(rows)
+    while 0 < len(blocks) < n and str(blocks[-1].get("after", "none")) != _digest(_state_file(place, len(blocks))):
+        blocks.pop()
+    return blocks
 
 
 def _remove(paths: Any) -> None:
@@ -425,25 +460,11 @@ def _replacing(path: Path) -> Iterator[Path]:
 @contextlib.contextmanager
 def _locked(place: Path) -> Iterator[None]:
     """Refuse a run that another process computes."""
-    lock = place / "lock"
-    try:
-        file = os.open(lock, os.O_CREAT | os.O_EXCL | os.O_WRONLY)
-    except FileExistsError:
-        owner = lock.read_text()
-        if owner.isdigit() and _alive(int(owner)):
-            raise Refusal(f"process {owner} computes this run", instead="wait for it, or take another folder") from None
-        file = os.open(lock, os.O_WRONLY | os.O_TRUNC)  # of a process that was killed
-    with os.fdopen(file, "w") as owned:
-        owned.write(str(os.getpid()))
-    try:
+    with (place / "lock").open("w") as file:
+        if fcntl:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                what = f"another process computes the run in {place}"
+                raise Refusal(what, instead="wait for it, or take another folder") from None
         yield
-    finally:
-        lock.unlink(missing_ok=True)
-
-
-def _alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except OSError:
-        return False
-    return True

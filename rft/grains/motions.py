@@ -68,6 +68,7 @@ class Tow:
 
     def check(self, body: Spheres) -> None:
         require(0 < self.speed < math.inf, "speed must be > 0", value=self.speed)
+        require(math.isfinite(self.angle), "angle must be a number", value=self.angle)
 
     def path(self, t: float) -> tuple[float, float]:
         """Return how far the body is along its line, m, and its speed, m/s."""
