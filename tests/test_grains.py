@@ -228,7 +228,7 @@ def store(tmp_path_factory):
 def test_folders_that_keep_no_beds_are_refused(tmp_path):
     (tmp_path / "file").write_text("")
     for folder, said in (
-        ("file", "cannot keep beds in .*: File exists: take"),
+        ("file", "cannot keep beds in .*: File exists; take"),
         ("f\u00fcr", "takes no folder named"),
         ('a"', "quotes"),
     ):
