@@ -200,6 +200,12 @@ def test_a_swim_stands_beside_the_tiers(monkeypatch, tmp_path):
     assert (tmp_path / "grains.png").stat().st_size > 10_000
 
 
+def test_sizes_that_are_none_are_refused():
+    for option, said in (("--length", "length must be > 0"), ("--radius", "radius must be > 0")):
+        code, _, err = geomech("grains", "three-link-glass", option, "0")
+        assert code == 2 and said in err and err.count("\n") == 1
+
+
 def test_scenes_without_rigid_links_are_refused():
     code, _, err = geomech("grains", "sandfish-loose")
     assert code == 2 and "grains take a body of rigid links" in err

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -77,13 +76,19 @@ class GrainSwim(Question):
     def experiment(self) -> Experiment:
         body = self.swimmer.body
         caps = next((e.radius for e in self.swimmer.effects if isinstance(e, EndCaps)), None)
-        size = self.size or (SIZE if body.length == 1.0 else body.length)
-        radius = self.radius or (RADIUS if caps is None else caps * size)
+        size = self.size
+        if size is None:
+            size = SIZE if body.length == 1.0 else body.length
+        require(0 < size < np.inf, "length must be > 0", value=size)
+        radius = self.radius
+        if radius is None:
+            radius = RADIUS if caps is None else caps * size
+        require(0 < radius < size / 2, "radius must be > 0 and below half of the length", value=radius)
         bed = Bed(seed=self.seed)
         depth = max(DEPTH, round(2 * radius + 6 * bed.diameter, 6))
         bed = replace(bed, length=round(size + ROOM[0], 6), width=round(size + ROOM[1], 6), depth=depth)
         gait, f = self.scene.gait, self.frequency
-        swim = Swim(_of(gait.shape), _of(gait.rate), f, RAMP / f, -2 * np.pi * RAMP)
+        swim = Swim(gait.shape, gait.rate, f, RAMP / f, -2 * np.pi * RAMP)
         return Experiment(bed, chain(body, size, radius), swim, (RAMP + self.cycles) / f, self.depth)
 
     def check(self) -> None:
@@ -99,10 +104,6 @@ class GrainSwim(Question):
     def answer(self, progress: Progress, allow: Allow) -> Result:
         tiers = predictions(self)  # before the grains: a scene that no tier takes is refused at once
         return result(self, self.experiment.run(store_folder(self.store), progress), tiers)
-
-
-def _of(curve: Callable) -> Callable[[float], np.ndarray]:
-    return lambda t: curve(t)
 
 
 Predictions = dict[str, tuple[list[float], list[float]]]  # (x, y, heading) in body lengths and rad, and errors, by tier

@@ -12,9 +12,7 @@ from rft.checks import Number, check_numbers
 from rft.metres import GRAVITY
 from rft.refusal import require
 
-PACKING = (
-    0.56  # assumed where grains are counted: of all the bed, with the voids at floor and surface (0.6 within, measured)
-)
+PACKING = 0.56  # of all the bed, voids at floor and surface included, assumed to count grains; 0.6 within, measured
 SHARE = 0.2  # of the Rayleigh time: the largest time step (Otsubo et al., Comput. Geotech. 86, 67 (2017), discuss it)
 PITCH = 1.02  # of the lattice that grains fall from, in largest diameters
 JITTER = 0.04  # of the lattice, diameters

@@ -11,9 +11,7 @@ import numpy as np
 from rft.bodies.base import Elements
 from rft.refusal import require
 
-SPACING = (
-    0.25  # of neighbouring spheres, in radii: the surface dips by 1 - sqrt(1 - 1/64) = 0.8 % of the radius between them
-)
+SPACING = 0.25  # of neighbouring spheres, in radii: between them the surface dips by 1 - sqrt(1 - 1/64) = 0.8 % of one
 SHAPES = "round", "half round", "half round, flat up", "square"
 
 
