@@ -17,6 +17,7 @@ from geomech.optimisation.cycles import Phases, Runs, cycle_values
 from geomech.optimisation.loops import Loops
 from geomech.optimisation.objectives import Objective
 from geomech.optimisation.question import result_of
+from geomech.optimisation.search import _Search
 from geomech.optimisation.stroke import Stroke
 from geomech.optimisation.undulations import Undulations
 from geomech.scenes import Scene, parse
@@ -371,6 +372,15 @@ def test_starts_are_the_same_every_time_and_answers_are_counted():
     assert all(np.array_equal(p, q) for p, q in zip(first, again))
     assert all(np.abs(loops.gait(p).cycle(500)[0]).max() <= 1.4 for p in first)
     assert "answers that differ" in optima.text(result_of(found))
+
+
+def test_one_start_alone_is_finished_without_perturbations(monkeypatch):
+    perturbed, own = [], _Search._perturbed
+    monkeypatch.setattr(_Search, "_perturbed", lambda self, p: perturbed.append(self.request.starts) or own(self, p))
+    scene = geomech.load("three-link-glass").with_numerics(grid=5, phases=16)
+    for starts in (1, 2):
+        optimise(scene, limits=1.2, harmonics=1, starts=starts)
+    assert {*perturbed} == {2}
 
 
 def serpenoid(body=None):
