@@ -63,6 +63,7 @@ class Bed:
 
     def __post_init__(self):
         check_numbers(self)
+        require(isinstance(self.walled, bool), "walled must be True or False", value=self.walled)
         require(
             self.step <= SHARE * self.rayleigh_time * (1 + 1e-9),
             f"a time step of {self.step:.3g} s is {self.step / self.rayleigh_time:.2f} of the Rayleigh time",

@@ -146,6 +146,8 @@ class Experiment:
     def check(self) -> None:
         """Raise ValueError, one line, for a body that does not fit its bed, or a motion that it cannot do."""
         bed, body = self.bed, self.body
+        if self.depth is not None:
+            in_range("depth", self.depth, 0, bed.depth, unit="m")
         in_range("duration", self.duration, bed.step, 1e6, unit="s")
         in_range("sample", self.sample, 1e-9, self.duration, unit="s")
         below, above = self.height + body.bottom, bed.depth - self.height - body.top

@@ -5,13 +5,13 @@ grains, and the placement of the body."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Annotated, NamedTuple, Protocol
 
 import numpy as np
 
+from rft.checks import Number, check_numbers
 from rft.grains.spheres import Placement, Spheres
 from rft.refusal import require
 
@@ -60,15 +60,14 @@ class Tow:
     (0.05, 0.1)
     """
 
-    speed: float
-    angle: float = 0.0
+    speed: Annotated[float, Number(1e-9, 1e3, "m/s", "")]
+    angle: Annotated[float, Number(-1e3, 1e3, "rad", "")] = 0.0
 
     def named(self) -> tuple:
         return type(self).__name__, self.speed, self.angle
 
     def check(self, body: Spheres) -> None:
-        require(0 < self.speed < math.inf, "speed must be > 0", value=self.speed)
-        require(math.isfinite(self.angle), "angle must be a number", value=self.angle)
+        check_numbers(self)
 
     def path(self, t: float) -> tuple[float, float]:
         """Return how far the body is along its line, m, and its speed, m/s."""
@@ -102,14 +101,10 @@ class Stroke(Tow):
     (0.0625, -0.25)
     """
 
-    amplitude: float = 0.02
+    amplitude: Annotated[float, Number(1e-9, 1e3, "m", "")] = 0.02
 
     def named(self) -> tuple:
         return (*super().named(), self.amplitude)
-
-    def check(self, body: Spheres) -> None:
-        super().check(body)
-        require(0 < self.amplitude < math.inf, "amplitude must be > 0", value=self.amplitude)
 
     def path(self, t: float) -> tuple[float, float]:
         a = self.amplitude
@@ -139,9 +134,9 @@ class Swim:
 
     shape: Callable[[float], np.ndarray]
     rate: Callable[[float], np.ndarray]
-    frequency: float = 1.0
-    ramp: float = 0.5
-    phase: float = 0.0
+    frequency: Annotated[float, Number(1e-9, 1e6, "Hz", "")] = 1.0
+    ramp: Annotated[float, Number(1e-9, 1e6, "s", "")] = 0.5
+    phase: Annotated[float, Number(-1e6, 1e6, "rad", "")] = 0.0
 
     def named(self) -> tuple:
         samples = np.array([self.shape(t) for t in self._phases()], float)
@@ -151,8 +146,7 @@ class Swim:
         return 2 * np.pi * np.arange(SAMPLES) / SAMPLES
 
     def check(self, body: Spheres) -> None:
-        require(0 < self.frequency < math.inf, "frequency must be > 0", value=self.frequency)
-        require(0 < self.ramp < math.inf, "ramp must be > 0", value=self.ramp)
+        check_numbers(self)
         shapes = np.array([self.shape(t) for t in self._phases()], float)
         require(
             shapes.shape[1:] == (body.joints,),
