@@ -44,6 +44,8 @@ from rft.link import (
     two_sided_load,
 )
 
+pytestmark = pytest.mark.usefixtures("fastest")
+
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 
 

@@ -15,6 +15,8 @@ from rft.balance.newton import Descent, to_element
 from rft.balance.solver import QUICK, Accuracy, solve
 from rft.contact import assemble
 
+pytestmark = pytest.mark.usefixtures("fastest")
+
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 
 

@@ -38,7 +38,7 @@ from rft.registry import REGISTRIES
 
 PAGE = (pathlib.Path(__file__).parents[1] / ".docs" / "how-it-works" / "extending.md").read_text()
 SMALL = Numerics(grid=7, phases=32)
-pytestmark = pytest.mark.usefixtures("own_parts")
+pytestmark = pytest.mark.usefixtures("own_parts", "fastest")
 
 
 class Bare:

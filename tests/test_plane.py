@@ -21,6 +21,8 @@ from geomech.tiers import TIERS
 from geomech.tiers.fitted import finest_grid, is_too_large
 from rft import CATALOGUE, Chain, Viscous, se2
 
+pytestmark = pytest.mark.usefixtures("fastest")
+
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 LOOP = Fourier(
     cos=((0.5, 0.0), (0.1, 0.1), (-0.3, 0.1)), sin=((0.1, 0.1), (0.6, 0.0), (0.2, -0.2)), centre=(0.1, -0.2, 0.15)
