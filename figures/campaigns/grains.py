@@ -4,7 +4,7 @@
     python -m figures.campaigns.grains reversals STORE    a rod to and fro across its axis
     python -m figures.campaigns.grains lift STORE         bars of three sections
     python -m figures.campaigns.grains plates STORE       plates at the angles of a round bar's leading face
-    python -m figures.campaigns.grains faces STORE        stress around the bars of `lift`
+    python -m figures.campaigns.grains faces STORE        stress around the bars of `lift`, and around a shell
     python -m figures.campaigns.grains convergence STORE  a bar with another step, stiffness, width or depth of the bed
 
 STORE is a folder for settled beds and runs. What is there is read and what is missing computed, so that a stopped campaign
@@ -40,12 +40,12 @@ STROKES = (  # amplitude, m, depth, m, and angle from its axis, degrees, of the 
     (0.04, 0.0245, 90),
 )
 BARS = ("round", "half round", "half round, flat up")
+SHELL = "half shell, hollow ahead"
 SPEED = 0.1  # m/s of rods
 TROUGH = Bed(length=0.06, width=0.30, depth=0.048)  # for bars across it
 BAR, BAR_DEPTH = 8e-3, 0.016  # m, radius and depth of the axis
 PLATES = (  # height, m, and tilts of the face from the underside of a cylinder, degrees; 90 is upright, 180 its top
-    (0.016, (15, 30, 50, 70, 90, 110, 130, 150, 165)),
-    (0.020, (90, 150)),
+    (0.016, (15, 30, 50, 90, 150)),
 )
 THICKNESS, EDGE = 3e-3, 3e-3  # m, of plates, and of the strips along their edges that are no middle: half a grain
 GRAIN = 1e-3  # m, radius of the spheres of bars and plates
@@ -128,16 +128,23 @@ def plates(store: Path) -> Rows:
 
 
 def faces(store: Path) -> Rows:
-    """Yield the force on every row of spheres along the bars of `lift`, at y and z from the axis."""
+    """Yield the force on every row of spheres along the bars of `lift` and a shell, at y and z from the axis."""
     yield "shape", "bed", "y_m", "z_m", "drag_N", "lift_N"
-    for shape in BARS:
-        bar = rod(TROUGH.length, BAR, shape, through=True, grain=GRAIN)
+    bars = {shape: rod(TROUGH.length, BAR, shape, through=True, grain=GRAIN) for shape in BARS}
+    for shape, bar in {**bars, SHELL: rear_half(bars["round"])}.items():
         rows = np.unique(bar.at[:, 1:], axis=0)
-        for seed in BEDS:
+        for seed in BEDS[:2] if shape == SHELL else BEDS:
             force = steady_towed(bar, seed, store).profile[:, 1:]
             for row in rows:
                 on_row = force[(bar.at[:, 1:] == row).all(1)].sum(0)
                 yield f'"{shape}"', seed, *map(float, (*row, -on_row[0], on_row[1]))
+
+
+def rear_half(bar: Spheres) -> Spheres:
+    """Return the rear half of a round bar: a thin sheet whose hollow leads."""
+    at = bar.at[bar.at[:, 1] < 1e-9] + [0.0, (BAR - GRAIN) / 2, 0.0]
+    at = at[np.lexsort((at[:, 2], at[:, 0]))]
+    return replace(bar, at=at, link=bar.link[: len(at)], radius=bar.radius[: len(at)])
 
 
 def steady_towed(body: Spheres, seed: int, store: Path) -> Steady:
