@@ -284,6 +284,9 @@ def test_plates_in_grains_stand_beside_bars_and_the_map():
         np.degrees(figure.BETA[pulls].min()) == pytest.approx(144, abs=1) and (maps["cut"]["normal"][pulls] == 0).all()
     )
     assert bar["normal"][bar["beta"] > np.radians(143)].min() > 0.009  # N/cm^3, in every bed
+    plates = numbers["plates"][0.016]
+    up = plates["beta"] > np.radians(143)
+    assert up.any() and plates["face"]["normal"][up].min() > 0.006 and plates["whole"]["normal"][up].min() > 0.005
     assert maps["cut"]["misfit"][1] < 0.75 * maps["keep"]["misfit"][1]
     bars = numbers["bars"]
     assert bars["half round"]["faces"] == pytest.approx((-0.62, 0.03), abs=0.01)
