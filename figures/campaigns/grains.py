@@ -45,7 +45,7 @@ SPEED = 0.1  # m/s of rods
 TROUGH = Bed(length=0.06, width=0.30, depth=0.048)  # for bars across it
 BAR, BAR_DEPTH = 8e-3, 0.016  # m, radius and depth of the axis
 PLATES = (  # height, m, and tilts of the face from the underside of a cylinder, degrees; 90 is upright, 180 its top
-    (0.016, (15, 30, 50, 90, 150, 165)),
+    (0.016, (15, 30, 50, 90, 130, 150, 165)),
 )
 THICKNESS, EDGE = 3e-3, 3e-3  # m, of plates, and of the strips along their edges that are no middle: half a grain
 GRAIN = 1e-3  # m, radius of the spheres of bars and plates
