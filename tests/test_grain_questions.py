@@ -18,6 +18,7 @@ from rft import EndCaps, Granular
 from rft.calibrate import fit
 from rft.drag import Rod, rod_drag
 from rft.grains import Experiment, Run
+from rft.plates import StressMap
 
 PSI = np.array([0.0, 10, 20, 40, 65, 90])
 LAW, ROD = Granular(3.1, 0.3), Rod(0.007, 0.2, 0.03, 600.0)
@@ -254,3 +255,39 @@ def test_the_figure_of_grains_shows_beds_beside_laws():
     left, middle, right = figure.draw(numbers).axes
     assert left.lines[0].get_ydata().tolist() == curves["flank and ends"]["distance"].tolist()
     assert len(middle.get_yticklabels()) == 3 and len(right.containers) == 3 * len(numbers["reversal"])
+
+
+def test_plates_in_grains_stand_beside_bars_and_the_map():
+    """The rows of a bar add up to it; stress on them is force over their area and depth; grains press where the map pulls."""
+    from figures import grain_plates as figure
+    from figures.campaigns import grains as campaign
+    from figures.fig08a_rods import on_face
+
+    rows, lift = campaign.read("faces"), campaign.read("lift")
+    for key in ("drag_N", "lift_N"):
+        sums = [rows[key][(rows["shape"] == s) & (rows["bed"] == b)].sum() for s, b in zip(lift["shape"], lift["bed"])]
+        np.testing.assert_allclose(sums, lift[key], rtol=0, atol=4e-4)  # blocks of a mean differ by a sample
+    numbers = figure.compute()
+    bar, maps = numbers["bar"], numbers["maps"]
+    # One depth for all rows: lift over drag of Fig. 8(a), and of the two kinds of stress the force on the rows.
+    deep = bar | {"weight": bar["weight"] / (campaign.BAR_DEPTH + campaign.BAR * np.cos(bar["beta"]))}
+    for rule, ratio in (("keep", 0.81), ("cut", 0.68)):
+        stress = on_face(StressMap(tension=rule), figure.BETA)
+        assert figure.summed(deep, figure.BETA, *stress) == pytest.approx(ratio, abs=0.01)
+    assert deep["weight"].sum() == pytest.approx(
+        np.pi * campaign.BAR * campaign.TROUGH.length
+    )  # half the bar's surface
+    one = figure.summed(bar, bar["beta"], bar["normal"][:, 1], bar["tangent"][:, 1])
+    assert one == pytest.approx(bar["lift"][:, 1].sum() / bar["drag"][:, 1].sum())
+    pulls = maps["keep"]["normal"] < 0
+    assert (
+        np.degrees(figure.BETA[pulls].min()) == pytest.approx(144, abs=1) and (maps["cut"]["normal"][pulls] == 0).all()
+    )
+    assert bar["normal"][bar["beta"] > np.radians(143)].min() > 0.009  # N/cm^3, in every bed
+    plates = numbers["plates"][0.016]
+    up = plates["beta"] > np.radians(143)
+    assert up.any() and plates["face"]["normal"][up].min() > 0.006 and plates["whole"]["normal"][up].min() > 0.005
+    assert maps["cut"]["misfit"][1] < 0.75 * maps["keep"]["misfit"][1]
+    bars = numbers["bars"]
+    assert bars["half round"]["faces"] == pytest.approx((-0.62, 0.03), abs=0.01)
+    assert bars[campaign.SHELL]["whole"][0] == pytest.approx(0.27, abs=0.01) and bars[campaign.SHELL]["cut"] < 0.6

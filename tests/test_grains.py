@@ -98,6 +98,9 @@ def test_a_plate_looks_up_where_its_tilt_says():
     at = plate(0.06, 0.02, 0.5).at
     assert np.ptp(at[:, 2]) == pytest.approx(0.018 * np.cos(0.5), abs=1e-3)
     assert at[at[:, 2].argmax(), 1] < at[at[:, 2].argmin(), 1]
+    front, rear = np.split(plate(0.06, 0.02, 0.5, thickness=5e-3).at, 2)  # a layer a face
+    np.testing.assert_allclose(front - rear, [[0.0, 3e-3 * np.cos(0.5), 3e-3 * np.sin(0.5)]] * len(front), atol=1e-12)
+    np.testing.assert_allclose((front + rear) / 2, at, atol=1e-12)
 
 
 def test_flank_and_ends_are_told_apart():

@@ -17,7 +17,7 @@ GROUPS = {  # by physics; a script that is not here is found by the build
         "optimal_gaits", "measured_gait",
     ],
     "Animals": ["fig09c_efficiency", "fig10_neuromechanics", "transients", "midlines"],
-    "Legs, rods and bodies in grains": ["fig08a_rods", "fig08b_legs", "ground_effects", "meshes"],
+    "Legs, rods and bodies in grains": ["fig08a_rods", "grain_plates", "fig08b_legs", "ground_effects", "meshes"],
     "Robots": ["fig12_walking", "walking_mujoco", "walking_sensitivity", "walking_steps", "wheel", "screws", "sand_gaits"],
     "Accuracy and cost": ["work_precision", "cost_scaling", "effects_cost"],
 }  # fmt: skip

@@ -3,6 +3,8 @@
     python -m figures.campaigns.grains swims STORE        circles of three links beside the law of their grains
     python -m figures.campaigns.grains reversals STORE    a rod to and fro across its axis
     python -m figures.campaigns.grains lift STORE         bars of three sections
+    python -m figures.campaigns.grains plates STORE       plates at the angles of a round bar's leading face
+    python -m figures.campaigns.grains faces STORE        stress around the bars of `lift`, and around a shell
     python -m figures.campaigns.grains convergence STORE  a bar with another step, stiffness, width or depth of the bed
 
 STORE is a folder for settled beds and runs. What is there is read and what is missing computed, so that a stopped campaign
@@ -23,8 +25,8 @@ import numpy as np
 from geomech.io.files import write_text
 from geomech.scenes import load
 from geomech.studies.grain_swim import RAMP, GrainSwim, cycle_poses
-from rft.grains import Bed, Experiment, Stroke, Tow, rod
-from rft.grains.drag import steady
+from rft.grains import Bed, Experiment, Spheres, Stroke, Tow, plate, rod
+from rft.grains.drag import Steady, steady
 from rft.grains.reversal import recoveries
 
 FOLDER = Path(__file__).parent
@@ -38,9 +40,15 @@ STROKES = (  # amplitude, m, depth, m, and angle from its axis, degrees, of the 
     (0.04, 0.0245, 90),
 )
 BARS = ("round", "half round", "half round, flat up")
+SHELL = "half shell, hollow ahead"
 SPEED = 0.1  # m/s of rods
 TROUGH = Bed(length=0.06, width=0.30, depth=0.048)  # for bars across it
 BAR, BAR_DEPTH = 8e-3, 0.016  # m, radius and depth of the axis
+PLATES = (  # height, m, and tilts of the face from the underside of a cylinder, degrees; 90 is upright, 180 its top
+    (0.016, (15, 30, 50, 90, 130, 150, 165)),
+)
+THICKNESS, EDGE = 3e-3, 3e-3  # m, of plates, and of the strips along their edges that are no middle: half a grain
+GRAIN = 1e-3  # m, radius of the spheres of bars and plates
 Rows = Iterator[tuple]
 
 
@@ -91,11 +99,59 @@ def lift(store: Path) -> Rows:
     yield "shape", "bed", "drag_N", "lift_N", "lift_over_drag", "error_in_time"
     for shape in BARS:
         for seed in BEDS:
-            bar = rod(TROUGH.length, BAR, shape, through=True, grain=1e-3)
-            tow = Tow(SPEED, math.pi / 2)
-            run = Experiment(replace(TROUGH, seed=seed), bar, tow, 0.6, depth=BAR_DEPTH).run(store)
-            found = steady(run, BAR, tow.angle, SPEED)
+            bar = rod(TROUGH.length, BAR, shape, through=True, grain=GRAIN)
+            found = steady_towed(bar, seed, store)
             yield f'"{shape}"', seed, -found.force[1], found.force[2], found.lift, found.lift_error
+
+
+def plates(store: Path) -> Rows:
+    """Yield stress over depth on plates that are towed level: in the middle of the leading face and of the rear one, without
+    the edges, and on the whole plate, both faces and edges, over the area of one face.
+
+    Of either face, normal stress is positive where grains push the plate back, tangential stress where they push it up."""
+    names = [f"{part}_{way}_N/cm3" for part in ("face", "rear", "whole") for way in ("normal", "tangent")]
+    yield "height_m", "beta_deg", "bed", *names
+    for height, beta in ((height, beta) for height, tilts in PLATES for beta in tilts):
+        body = plate(TROUGH.length, height, math.radians(beta - 90), grain=GRAIN, thickness=THICKNESS)
+        sin, cos = math.sin(math.radians(beta)), math.cos(math.radians(beta))
+        back, up = np.array([-sin, cos]), np.array([cos, sin])
+        middle = np.abs(body.at[:, 1:] @ up) < height / 2 - EDGE
+        front = np.arange(len(middle)) < len(middle) // 2
+        patch = GRAIN * (height - 2 * GRAIN) / round(height / GRAIN)  # m^2 of a sphere
+        parts = [(m, m.sum() * patch) for m in (middle & front, middle & ~front)]
+        parts.append((middle | True, TROUGH.length * height))
+        for seed in BEDS:
+            force = steady_towed(body, seed, store).profile[:, 1:]
+            over_depth = 1e-6 * force / (BAR_DEPTH - body.at[:, 2:])
+            stress = [over_depth[mine].sum(0) @ way / area for mine, area in parts for way in (back, up)]
+            yield height, beta, seed, *map(float, stress)
+
+
+def faces(store: Path) -> Rows:
+    """Yield the force on every row of spheres along the bars of `lift` and a shell, at y and z from the axis."""
+    yield "shape", "bed", "y_m", "z_m", "drag_N", "lift_N"
+    bars = {shape: rod(TROUGH.length, BAR, shape, through=True, grain=GRAIN) for shape in BARS}
+    for shape, bar in {**bars, SHELL: rear_half(bars["round"])}.items():
+        rows = np.unique(bar.at[:, 1:], axis=0)
+        for seed in BEDS[:2] if shape == SHELL else BEDS:
+            force = steady_towed(bar, seed, store).profile[:, 1:]
+            for row in rows:
+                on_row = force[(bar.at[:, 1:] == row).all(1)].sum(0)
+                yield f'"{shape}"', seed, *map(float, (*row, -on_row[0], on_row[1]))
+
+
+def rear_half(bar: Spheres) -> Spheres:
+    """Return the rear half of a round bar: a thin sheet whose hollow leads."""
+    at = bar.at[bar.at[:, 1] < 1e-9] + [0.0, (BAR - GRAIN) / 2, 0.0]
+    at = at[np.lexsort((at[:, 2], at[:, 0]))]
+    return replace(bar, at=at, link=bar.link[: len(at)], radius=bar.radius[: len(at)])
+
+
+def steady_towed(body: Spheres, seed: int, store: Path) -> Steady:
+    """Return the steady force on a body that is towed across the trough."""
+    tow = Tow(SPEED, math.pi / 2)
+    run = Experiment(replace(TROUGH, seed=seed), body, tow, 0.6, depth=BAR_DEPTH).run(store)
+    return steady(run, body.half_width, tow.angle, SPEED)
 
 
 def convergence(store: Path) -> Rows:
@@ -108,7 +164,7 @@ def convergence(store: Path) -> Rows:
         "width 0.45 m": replace(TROUGH, width=0.45),
         "16 mm deeper": replace(TROUGH, depth=TROUGH.depth + 0.016),
     }
-    bar, tow = rod(TROUGH.length, BAR, through=True, grain=1e-3), Tow(SPEED, math.pi / 2)
+    bar, tow = rod(TROUGH.length, BAR, through=True, grain=GRAIN), Tow(SPEED, math.pi / 2)
     for name, bed in changes.items():
         run = Experiment(bed, bar, tow, 0.6, depth=BAR_DEPTH).run(store)
         found = steady(run, BAR, tow.angle, SPEED)
@@ -121,13 +177,15 @@ CAMPAIGNS: dict[str, Callable[[Path], Rows]] = {
     "swims": swims,
     "reversals": reversals,
     "lift": lift,
+    "plates": plates,
+    "faces": faces,
     "convergence": convergence,
 }
 
 
 def main(name: str, store: str) -> None:
     """Run a campaign and write its file."""
-    bed = TROUGH if name in ("lift", "convergence") else Bed()
+    bed = TROUGH if name in ("lift", "plates", "faces", "convergence") else Bed()
     seeds = "" if name == "convergence" else f", seeds {BEDS}"
     lines = [f"# python -m figures.campaigns.grains {name} STORE", f"# {replace(bed, seed=BEDS[0])!r}{seeds}"]
     for row in CAMPAIGNS[name](Path(store)):

@@ -204,11 +204,12 @@ def rod(length: float, radius: float, shape: str = "round", through: bool = Fals
     return Spheres(Bar(), length, np.zeros(len(at), int), at, np.full(len(at), grain), radius, through=True)
 
 
-def plate(length: float, height: float, tilt: float, grain: float = 1e-3) -> Spheres:
+def plate(length: float, height: float, tilt: float, grain: float = 1e-3, thickness: float | None = None) -> Spheres:
     """Return a thin plate that spans a periodic bed along x.
 
     length (m): of the bed. height (m): of the plate. tilt (rad): its turn about x; 0 is upright, and the face that looks
-    towards +y looks up where it is positive.
+    towards +y looks up where it is positive. grain (m): radius of its spheres. thickness (m): one layer of spheres if None;
+    else two, first those of the face that looks towards +y, then those of the other, so that the force on each is told.
 
     Examples
     --------
@@ -220,7 +221,9 @@ def plate(length: float, height: float, tilt: float, grain: float = 1e-3) -> Sph
     n = max(2, math.ceil(height / grain))
     s = ((np.arange(n) + 0.5) / n - 0.5) * (height - 2 * grain)
     x = np.arange(math.ceil(length / grain)) * grain - length / 2 + grain / 2
-    at = np.array([(u, -w * math.sin(tilt), w * math.cos(tilt)) for u in x for w in s])
+    layers = [0.0] if thickness is None else [thickness / 2 - grain, grain - thickness / 2]
+    cos, sin = math.cos(tilt), math.sin(tilt)
+    at = np.array([(u, q * cos - w * sin, q * sin + w * cos) for q in layers for u in x for w in s])
     return Spheres(Bar(), length, np.zeros(len(at), int), at, np.full(len(at), grain), height / 2, through=True)
 
 

@@ -62,7 +62,7 @@ class PlateStress:
 
     grazing: angle between motion and face, rad, over which the stress on the face of a closed body rises. A thin plate has
     no jump where it slides along itself: its other face leads. tension: "keep" leaves the stress on faces that the map
-    pulls on instead of pushing, "cut" sets it to 0.
+    pulls on instead of pushing, "cut" sets it to 0, which is nearer to what beds of grains bear in level motion.
 
     Examples
     --------
