@@ -39,7 +39,6 @@ STROKES = (  # amplitude, m, depth, m, and angle from its axis, degrees, of the 
     (0.01, 0.0245, 0),
     (0.01, 0.0150, 90),
     (0.04, 0.0245, 0),
-    (0.04, 0.0150, 90),
 )
 BARS = ("round", "half round", "half round, flat up")
 SPEED = 0.1  # m/s of rods
