@@ -24,7 +24,7 @@ import numpy as np
 from geomech.io.files import write_text
 from geomech.scenes import load
 from geomech.studies.grain_swim import RAMP, GrainSwim, cycle_poses
-from rft.grains import Bed, Experiment, Stroke, Tow, rod
+from rft.grains import Bed, Experiment, Run, Stroke, Tow, rod
 from rft.grains.drag import steady
 from rft.grains.reversal import recoveries
 
@@ -49,13 +49,25 @@ BARS = ("round", "half round", "half round, flat up")
 SPEED = 0.1  # m/s of rods
 TROUGH = Bed(length=0.06, width=0.30, depth=0.048)  # for bars across it
 BAR, BAR_DEPTH = 8e-3, 0.016  # m, radius and depth of the axis
-TEXTS = "scene", "change", "shape"  # columns that are no numbers
+TEXTS = "scene", "change", "shape", "part"  # columns that are no numbers
 Rows = Iterator[tuple]
 
 
 def swims(store: Path) -> Rows:
     """Yield the displacement of every cycle of the swimmers of `SWIMS`, 162 x 12 mm, in every bed."""
-    yield "scene", "amplitude", "frequency_Hz", "bed", "cycle", "x_BL", "y_BL", "heading_rad", "work_J", "packing", "surface_m"
+    yield (
+        "scene",
+        "amplitude",
+        "frequency_Hz",
+        "bed",
+        "cycle",
+        "x_BL",
+        "y_BL",
+        "heading_rad",
+        "work_J",
+        "packing",
+        "surface_m",
+    )
     for scene, amplitude, frequency in SWIMS:
         for seed in BEDS:
             question = swim(scene, amplitude, frequency, seed)
