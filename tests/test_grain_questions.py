@@ -224,18 +224,20 @@ def test_samples_have_names_that_say_what_they_are():
 def test_the_figure_of_grains_shows_beds_beside_laws():
     """Three beds of two cycles each; lift and reversals as they were computed, over beds."""
     from figures import grains as figure
-    from figures.campaigns.grains import read
+    from figures.campaigns.grains import CIRCLE, read
 
-    numbers = figure.compute([0.9, 1.0])
+    numbers = figure.compute([0.5, 1.0], others=[], travels=[])
     curves, swims = numbers["curves"], numbers["swims"]
-    assert curves["flank and ends"]["distance"][1] == pytest.approx(0.107, abs=2e-3)
-    assert curves["flank and ends"]["spread"][1] == pytest.approx(0.006, abs=1e-3)
-    assert curves["short rod"]["distance"][1] == pytest.approx(0.0504, abs=1e-3)
+    area, harmonic, direct, flat = (c["distance"][1] for c in curves.values())
+    assert (area, harmonic, direct, flat) == pytest.approx((0.177, 0.152, 0.151, 0.107), abs=2e-3)
+    assert curves["direct"]["spread"][1] == pytest.approx(0.008, abs=1e-3)
+    numbers["others"] = {(CIRCLE, 0.5): {name: (c["distance"][0], c["spread"][0]) for name, c in curves.items()}}
     data = read("swims")
-    of = lambda bed: np.hypot(data["x_BL"], data["y_BL"])[(data["bed"] == bed) & (data["amplitude"] == 1.0)].mean()
+    one = (data["scene"] == CIRCLE) & (data["amplitude"] == 1.0) & (data["frequency_Hz"] == 1.0)
+    of = lambda bed: np.hypot(data["x_BL"], data["y_BL"])[one & (data["bed"] == bed)].mean()
     means = [of(bed) for bed in (1, 2, 3)]
-    assert swims["amplitude"].tolist() == [1.0, 1.7] and swims["distance"][0] == pytest.approx(np.mean(means))
-    assert swims["error"][0] == pytest.approx(np.std(means, ddof=1) / np.sqrt(3)) and swims["error"][1] > 0
+    assert swims[CIRCLE, 1.0, 1.0] == pytest.approx((np.mean(means), np.std(means, ddof=1) / np.sqrt(3)))
+    assert {(CIRCLE, a, 1.0) for a in (0.5, 1.0, 1.5, 1.7, 2.0)} <= set(swims)
     lift = numbers["lift"]
     assert list(lift) == list(figure.BARS) and lift["round"]["grains"] == pytest.approx(0.43, abs=0.1)
     assert (lift["half round"]["keep"], lift["half round"]["cut"]) == pytest.approx((0.54, 0.04), abs=0.01)
@@ -250,10 +252,12 @@ def test_the_figure_of_grains_shows_beds_beside_laws():
     )
     travel = rows["travel_95_m"][mine]
     assert numbers["reversal"][base][2]["travel"] == pytest.approx((travel.mean(), travel.std(ddof=1) / np.sqrt(3)))
-    assert "1.00 rad" in figure.table(numbers)
-    left, middle, right = figure.draw(numbers).axes
-    assert left.lines[0].get_ydata().tolist() == curves["flank and ends"]["distance"].tolist()
-    assert len(middle.get_yticklabels()) == 3 and len(right.containers) == 3 * len(numbers["reversal"])
+    assert "circle 1 rad" in figure.table(numbers)
+    circles, others, lifts, right = figure.draw(numbers).axes
+    assert circles.lines[2].get_ydata().tolist() == curves["direct"]["distance"].tolist()
+    assert others.lines[2].get_xdata()[0] == numbers["others"][CIRCLE, 0.5]["direct"][0]
+    assert others.containers[0].lines[0].get_xdata()[0] == swims[CIRCLE, 0.5, 1.0][0]
+    assert len(lifts.get_yticklabels()) == 3 and len(right.containers) == 3 * len(numbers["reversal"])
 
 
 def test_the_budget_of_a_swim_finds_which_force_is_another():
@@ -286,8 +290,10 @@ def test_the_budget_of_a_swim_finds_which_force_is_another():
         pose = np.column_stack([place.real, place.imag, heading])
         profile = np.stack([world.real, world.imag, 0 * world.real], -1)
         run = Run(t, nothing, t, profile, t, pose, *[nothing] * 2, t, t, *[nothing] * 2, {})
-        ((velocities, parts),) = budget.budget(question, run, law, caps)
-        return [budget.distance(x, 1 / n)[0] for x in velocities], {name: x.sum() for name, x in parts.items()}
+        (swum,) = budget.budget(question, run, law, caps)
+        assert list(budget.recovery(body, swum, 1 / n)) == pytest.approx(np.ones(len(budget.TRAVELS)), abs=0.05)
+        distances = [budget.distance(x, 1 / n)[0] for x in (swum.xi_0, swum.xi)]
+        return distances, {name: x.sum() for name, x in swum.shares.items()}
 
     (by_law, same), parts = found(caps)
     assert same == pytest.approx(by_law, rel=2e-3) and max(map(abs, parts.values())) < 0.01 * by_law
@@ -297,3 +303,4 @@ def test_the_budget_of_a_swim_finds_which_force_is_another():
     assert ends == pytest.approx(other - by_law, rel=0.1) and parts["ends, along"] < 0
     assert max(abs(parts[name]) for name in ("flank, along", "flank, across", "rest")) < 0.03 * by_law
     assert sum(parts.values()) == pytest.approx(other - by_law, rel=1e-9)
+    assert 16 <= budget.near_singular(question, law, caps).sum() <= 18  # a quarter of 64, and pairs that are alike

@@ -11,7 +11,12 @@ the law sum to a wrench on every part of the body. With W(xi) the wrench of the 
     xi - xi_0 = -J^-1 sum of the parts,
 
 so that each part has its share of xi - xi_0, and by the integral over the cycle of the difference in displacement. What the
-quadratures of J and of the displacement leave is the row "rest"."""
+quadratures of J and of the displacement leave is the row "rest".
+
+Where the connection A is singular in x and y, no joint rates move the body in one direction. The row "near a singularity" has
+what the quarter of the cycle with the smallest singular values of A there adds to the difference; it is part of the others.
+The rows "flank across, 3 mm" are no distances but the force of the grains on the flank over that of the law, both across and
+towards where the drag points, while it has moved by up to 3 mm since its last reversal, and more than the row before."""
 
 from __future__ import annotations
 
@@ -27,6 +32,7 @@ from figures.campaigns.grains import BEDS, FOLDER, SWIMS, swim
 from geomech.io.files import write_text
 from geomech.studies.calibration import Calibration
 from geomech.studies.grain_swim import FLANK, RAMP, GrainSwim
+from geomech.systems.swimmer import Swimmer
 from rft.calibrate import Fit
 from rft.effects import EndCaps
 from rft.grains.drag import END
@@ -35,7 +41,9 @@ from rft.grains.experiment import Run
 PHASES = 64
 ROUNDING = 1e-4  # m/s, below which dry friction is linear here; points of the body move at some 0.1 m/s
 NODES, WEIGHTS = (x / 2 + 0.5 * (k == 0) for k, x in enumerate(np.polynomial.legendre.leggauss(6)))
-COLUMNS = "scene", "amplitude", "frequency_Hz", "bed", "cycle", "part", "distance_BL"
+TRAVELS = 1, 2, 3, 6, 9, 15, 40  # mm since a reversal
+DIRECTIONS = 2 * np.pi * (np.arange(24) + 0.5) / 24  # of joint rates, to which A is fitted
+COLUMNS = "scene", "amplitude", "frequency_Hz", "bed", "cycle", "part", "value"
 
 
 class Points(NamedTuple):
@@ -151,20 +159,65 @@ def shares(xi_0: np.ndarray, xi: np.ndarray, parts: dict[str, np.ndarray], step:
     return {**found, "rest": np.full(len(xi), rest / len(xi))}
 
 
-def budget(question: GrainSwim, run: Run, law: Fit, caps: EndCaps) -> Iterator[tuple[np.ndarray, dict]]:
-    """Yield xi_0 and xi, (2, N, 3), m/s and rad/s, and the shares (N,), m, of every cycle."""
+class Swum(NamedTuple):
+    """A cycle. xi_0, xi (N, 3), m/s and rad/s, by the law and in grains. shares (N,), m, by part. forces: (2, N, P), N, of the
+    grains and of the law at xi."""
+
+    xi_0: np.ndarray
+    xi: np.ndarray
+    shares: dict[str, np.ndarray]
+    forces: np.ndarray
+
+
+def budget(question: GrainSwim, run: Run, law: Fit, caps: EndCaps) -> Iterator[Swum]:
+    """Yield every cycle beside the direct tier with a law and its end caps."""
     body, f, size = points(question), question.frequency, question.experiment.body.size
-    system = replace(question.swimmer, medium=law.medium, effects=(caps,))
-    phases = 2 * np.pi * (np.arange(PHASES) + 0.5) / PHASES
-    alpha, alphadot = (np.array([g(t) for t in phases]) for g in (question.scene.gait.shape, question.scene.gait.rate))
-    xi_0 = system.velocity(alpha, alphadot) * 2 * np.pi * f * [size, size, 1.0]
+    alpha, alphadot = gait(question)
+    xi_0 = ruled(question, law, caps).velocity(alpha, alphadot) * 2 * np.pi * f * [size, size, 1.0]
     for xi, force in measured(question, run, body):
         parts = contributions(body, law, caps, xi_0, xi, force)
-        yield np.array([xi_0, xi]), shares(xi_0, xi, parts, 1 / (PHASES * f))
+        forces = np.array([force, law_forces(body, law, caps, xi)])
+        yield Swum(xi_0, xi, shares(xi_0, xi, parts, 1 / (PHASES * f)), forces)
+
+
+def ruled(question: GrainSwim, law: Fit, caps: EndCaps) -> Swimmer:
+    """Return the swimmer with a law and end caps."""
+    return replace(question.swimmer, medium=law.medium, effects=(caps,))
+
+
+def gait(question: GrainSwim) -> tuple[np.ndarray, np.ndarray]:
+    """Return shapes and rates (N, joints) at the phases."""
+    phases, g = 2 * np.pi * (np.arange(PHASES) + 0.5) / PHASES, question.scene.gait
+    return np.array([g.shape(t) for t in phases]), np.array([g.rate(t) for t in phases])
+
+
+def near_singular(question: GrainSwim, law: Fit, caps: EndCaps) -> np.ndarray:
+    """Return which quarter of the phases (N,) is nearest to shapes where A, fitted by least squares over directions, is
+    singular in x and y."""
+    rates = np.stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)], -1)
+    alpha, _ = np.broadcast_arrays(gait(question)[0][:, None], rates)
+    xi = ruled(question, law, caps).velocity(alpha, np.broadcast_to(rates, alpha.shape))
+    A = np.linalg.pinv(rates) @ xi[..., :2]
+    least = np.linalg.svd(A, compute_uv=False)[:, -1]
+    return least <= np.sort(least)[PHASES // 4 - 1]
+
+
+def recovery(body: Points, swum: Swum, step: float) -> Iterator[float]:
+    """Yield the force of the grains across the flank over that of the law, by travel since a reversal up to `TRAVELS`."""
+    flank = ~body.is_end
+    v = body.velocities(swum.xi).imag[:, flank]
+    grains, law = swum.forces[..., flank].imag * -np.sign(v)
+    travel, since = np.zeros_like(v), np.zeros(v.shape[1])
+    for k in 2 * list(range(len(v))):  # once more, for what came before the first phase
+        since = np.where(np.sign(v[k]) == np.sign(v[k - 1]), since, 0.0) + np.abs(v[k]) * step
+        travel[k] = since - np.abs(v[k]) * step / 2
+    for low, high in zip((0.0, *TRAVELS), TRAVELS):
+        inside = (travel > 1e-3 * low) & (travel <= 1e-3 * high)
+        yield float(grains[inside].sum() / law[inside].sum())
 
 
 def rows(store: Path) -> Iterator[tuple]:
-    """Yield the distance by the law and in grains, and the shares of parts, for all swims that are in the store."""
+    """Yield the distance by the law and in grains, and the shares of parts, body lengths, for swims that are in the store."""
     yield COLUMNS
     law = Calibration(FLANK, end_caps="fitted").ask().subject
     for scene, amplitude, frequency in SWIMS:
@@ -174,11 +227,16 @@ def rows(store: Path) -> Iterator[tuple]:
             if question.experiment.steps_left(store):
                 continue
             run, step = question.experiment.run(store), 1 / (PHASES * frequency)
-            found = budget(question, run, law, law.caps(body.half_width / body.size))
-            for cycle, ((xi_0, xi), parts) in enumerate(found, 1):
-                whole = {"law": distance(xi_0, step)[0], "grains": distance(xi, step)[0]}
-                for part, x in {**whole, **{part: x.sum() for part, x in parts.items()}}.items():
-                    yield scene, amplitude, frequency, question.seed, cycle, f'"{part}"', float(x / body.size)
+            caps, points_of = law.caps(body.half_width / body.size), points(question)
+            near = near_singular(question, law, caps) if body.joints == 2 else np.zeros(PHASES, bool)
+            for cycle, swum in enumerate(budget(question, run, law, caps), 1):
+                found = {"law": distance(swum.xi_0, step)[0], "grains": distance(swum.xi, step)[0]}
+                found |= {part: x.sum() for part, x in swum.shares.items()}
+                found["near a singularity"] = sum(x[near].sum() for x in swum.shares.values())
+                ratios = zip(TRAVELS, recovery(points_of, swum, step))
+                of_length = {part: x / body.size for part, x in found.items()}
+                for part, x in (of_length | {f"flank across, {t} mm": x for t, x in ratios}).items():
+                    yield scene, amplitude, frequency, question.seed, cycle, f'"{part}"', float(x)
 
 
 def main(store: str) -> None:

@@ -75,7 +75,4 @@ class EndCaps(Effect):
 
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, EndCaps]:
-        return {
-            "end-caps": cls(radius=0.1 * x, tail=4.0),
-            "end-caps, across": cls(radius=0.1 * x, head=2.0, across=1.2),
-        }
+        return {"end-caps": cls(radius=0.1 * x, tail=4.0)}
