@@ -5,8 +5,9 @@ Spheres of 6 mm with friction 0.3 and 1 MPa, in beds that differ by their seeds;
 (a) Displacement of three links, 162 x 12 mm at 25 mm depth, on circles, beside the tiers with the law of its flank and its
 ends, both measured in the same grains (band: one standard deviation of the flank's law): with ends whose axial force falls
 with the angle as on rods, with flat ends, and with a transient over two travels. (b) The same for the butterfly and a wave on
-seven links. (c) Lift over drag on bars without ends, beside the nine-term map, as it is and without tension. (d) Share of the
-drag on a rod, to and fro, that is there at once, against the travel to 95 % of it.
+seven links. (c) Lift over drag on bars without ends, beside the nine-term map, as it is and without tension. (d) Drag on the
+flank of a rod after its second reversal over that after a long way, in grains (dots) and by the law of the effect `transient`
+(lines), fitted at 20 mm alone: 10 and 40 mm are predicted.
 
 Size, depth and friction of the robot of Fig. 11(e) are not in the paper's text, so that this is no copy of it. The data are
 in `figures/campaigns`; the commands that made them stand in the files.
@@ -26,6 +27,7 @@ from geomech.scenes import load
 from geomech.studies.calibration import Calibration
 from geomech.studies.study import Study
 from rft import EndCaps, Transient
+from rft.grains.reversal import Recovery, recovery
 from rft.plates import VERTICAL, HalfCylinder, RoundRod
 
 RADIUS, SIZE = 6e-3, 0.162  # m, of the swimmer
@@ -47,9 +49,10 @@ def compute(amplitudes=AMPLITUDES, others=OTHERS, travels=TRAVELS) -> dict:
 
     "amplitude": (A,), rad. "curves": by name {"distance", "spread": (A,), BL} of circles, spread only of the law. "others": by
     scene and amplitude, by name distances and spread (float, float). "swims": by scene, amplitude, rad, and frequency, Hz,
-    (distance, error), BL. "lift": by shape {"grains", "error", "keep", "cut"}, lift over drag. "reversal": by (amplitude, m,
-    depth, m, angle from the axis, degrees) and by stretch, 0 in a fresh bed, 1 and 2 after reversals, {"at_once", "travel":
-    (mean, error)}, shares and m."""
+    (distance, error), BL. "lift": by shape {"grains", "error", "keep", "cut"}, lift over drag. "reversal": by (depth, m, angle
+    from the axis, degrees) and "flank" or "ends" {"plateau", "at_once", "travel", "start", "rms": (mean, error)} of
+    `rft.grains.reversal.Recovery`, by all amplitudes together. "ways": by (amplitude, m, angle) {"travel" since the second
+    reversal, m, "grains", "law"}, shares of the plateau, 24.5 mm deep."""
     found = {case: predicted(case[0], [case[1]], travels) for case in others}
     return {
         "amplitude": np.asarray(amplitudes),
@@ -61,6 +64,7 @@ def compute(amplitudes=AMPLITUDES, others=OTHERS, travels=TRAVELS) -> dict:
         "swims": measured_swims(),
         "lift": {name: lifts(name, rod) for name, rod in BARS.items()},
         "reversal": measured_reversals(),
+        "ways": ways(),
     }
 
 
@@ -110,24 +114,38 @@ def lifts(name: str, bar) -> dict:
     return {"grains": value, "error": error, **by_map}
 
 
-def measured_reversals() -> dict:
+def reversal_cases(depth: float, angle: float, part: str, beds=grains.BEDS, amplitudes=None) -> list[tuple]:
+    """Return (amplitude, travel, drag) of all ways at a depth, m, and an angle, degrees; means over beds."""
     data = grains.read("reversals")
-    cases = np.column_stack([data["amplitude_m"], data["depth_m"], data["angle_deg"]])
-    found: dict[tuple, dict] = {}
-    for case in dict.fromkeys(map(tuple, cases.tolist())):
-        for stretch in np.unique(data["stretch"]):
-            mine = (cases == case).all(1) & (data["stretch"] == stretch)
-            found.setdefault(case, {})[int(stretch)] = {
-                "at_once": over_beds(data["at_once"][mine], data["bed"][mine]),
-                "travel": over_beds(data["travel_95_m"][mine], data["bed"][mine]),
-            }
+    mine = (data["depth_m"] == depth) & (data["angle_deg"] == angle)
+    found = []
+    for a in np.unique(data["amplitude_m"][mine]) if amplitudes is None else amplitudes:
+        rows = [mine & (data["amplitude_m"] == a) & (data["bed"] == bed) for bed in beds]
+        drag = np.mean([data[f"{part}_N"][r] for r in rows], 0)
+        found.append((float(a), data["travel_m"][rows[0]], drag))
     return found
 
 
-def named(case: tuple[float, float, float]) -> str:
-    """Return the name of a way to and fro."""
-    amplitude, depth, angle = case
-    return f"{1e3 * amplitude:g} mm {'across' if angle else 'along'}, {1e3 * depth:.3g} mm deep"
+def measured_reversals() -> dict:
+    found = {}
+    for depth, angle in dict.fromkeys((depth, angle) for _, depth, angle in grains.STROKES):
+        for part in ("flank", "ends"):
+            fits = np.array([recovery(reversal_cases(depth, angle, part, (bed,))) for bed in grains.BEDS])
+            pairs = zip(fits.mean(0).tolist(), (fits.std(0, ddof=1) / np.sqrt(len(fits))).tolist())
+            found[depth, angle, part] = dict(zip(Recovery._fields, pairs))
+    return found
+
+
+def ways(depth: float = 0.0245, fitted: float = 0.02) -> dict:
+    """Return drags after the second reversal, and the law fitted at one amplitude, m, alone."""
+    found = {}
+    for angle in (90.0, 0.0):
+        law = recovery(reversal_cases(depth, angle, "flank", amplitudes=(fitted,)))
+        for a, travel, drag in reversal_cases(depth, angle, "flank"):
+            late = travel > 3 * a
+            pair = drag[late] / law.plateau, law.drag(travel, a)[late] / law.plateau
+            found[a, angle] = {"travel": travel[late] - 3 * a, **dict(zip(("grains", "law"), pair))}
+    return found
 
 
 def named_swim(case: tuple[str, float, float]) -> str:
@@ -166,14 +184,14 @@ def table(numbers: dict) -> str:
     lifted = style.table(("lift over drag", "grains", "map", "tension cut"), rows)
     rows = [
         (
-            f"{named(case)}, {f'reversal {k}' if k else 'fresh bed'}",
-            "{:.2f} +- {:.2f}".format(*x["at_once"]),
-            "{:.1f} +- {:.1f} mm".format(*(1e3 * np.array(x["travel"]))),
+            f"{part} {'across' if angle else 'along'}, {1e3 * depth:.3g} mm deep",
+            *("{:.2f} +- {:.2f}".format(*x[key]) for key in ("plateau", "at_once")),
+            "{:.0f} +- {:.0f} mm".format(*(1e3 * np.array(x["travel"]))),
         )
-        for case, stretches in numbers["reversal"].items()
-        for k, x in stretches.items()
+        for (depth, angle, part), x in numbers["reversal"].items()
     ]
-    return f"{lines}\n{lifted}\n{style.table(('drag', 'at once', '95 % after'), rows)}"
+    back = style.table(("drag after a reversal", "plateau, N", "at once", "95 % after"), rows)
+    return f"{lines}\n{lifted}\n{back}"
 
 
 @plots.styled
@@ -184,7 +202,7 @@ def draw(numbers: dict):
     draw_circles(left, numbers)
     draw_others(right, numbers)
     draw_lift(lift_axes, numbers["lift"])
-    draw_reversals(reversal_axes, numbers["reversal"])
+    draw_reversals(reversal_axes, numbers["ways"])
     return fig
 
 
@@ -246,16 +264,17 @@ def draw_lift(ax, lift: dict) -> None:
     ax.legend(loc="upper right", ncols=1)
 
 
-def draw_reversals(ax, reversals: dict) -> None:
-    """Draw shares of the drag that are there at once against travels, by way and stretch."""
-    for (case, stretches), colour in zip(reversals.items(), style.SEQUENCE):
-        for k, found in stretches.items():
-            (y, y_error), (x, x_error) = found["at_once"], 1e3 * np.array(found["travel"])
-            look = {**DOTS, "color": colour, "mfc": colour if k else "white", "label": named(case) if k == 1 else None}
-            ax.errorbar(x, y, y_error, x_error, **look)
-    ax.set(xlabel="travel to 95 % of the late drag (mm)", ylabel="share of it at once", ylim=(0, 1.6), xlim=(0, None))
-    ax.set_yticks([0, 0.5, 1])
-    ax.legend(loc="upper right", title="filled: after a reversal")
+def draw_reversals(ax, ways: dict) -> None:
+    """Draw drags against the travel since a reversal, in grains and by the law."""
+    for (a, angle), way in ways.items():
+        if angle or a == 0.02:
+            colour = style.SEQUENCE[(0.01, 0.02, 0.04).index(a)] if angle else "0.5"
+            x, label = 1e3 * way["travel"], f"{1e3 * a:g} mm {'across' if angle else 'along'}"
+            ax.plot(x, way["grains"], ".", ms=3, color=colour)
+            ax.plot(x, way["law"], color=colour, label=label)
+    ax.set(xlabel="travel since the reversal (mm)", ylabel="drag over that after a long way", xlim=(0, 80))
+    ax.set(ylim=(0, 1.3))
+    ax.legend(loc="lower right")
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ MOST_PIECES = 10_000  # to a body length
 ONE, ZERO = np.ones((1, 1)), np.zeros((1, 1))
 NO_FACTOR = Factor(ONE, ONE, ONE)
 NO_INCLINE = Incline(ONE, ZERO, ONE, ZERO, ZERO)
-NO_MEMORY = Memory(ONE, ONE, ZERO, ONE, ONE, -ONE, ZERO)
+NO_MEMORY = Memory(ZERO, ZERO, ZERO, ZERO, ONE, ONE, ONE, ONE, ZERO, ZERO)
 
 
 class Contact(NamedTuple):
@@ -62,7 +62,7 @@ class Problem(NamedTuple):
     straight body along itself at unit speed (across if there is none along). lateral_drag: that drag across.
     homogeneous, linear: whether drag stays, or doubles, when velocities double. sides: the body's elements, under the
     law. points: points attached to them, under dry terms that face along the body, point_terms (T, 3, n, 1).
-    quadratic_drag: (1, 1) or (1, B), force over |v_n| v_n. memory: of the ground on both sides. momentum_rate: of the
+    quadratic_drag: (1, 1) or (1, B), force over |v_n| v_n. memory: of the ground at the elements. momentum_rate: of the
     body, None without mass. frame: means and scales of the samples."""
 
     medium: Any

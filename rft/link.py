@@ -262,77 +262,79 @@ def inclined_load(load, v, rounding, incline):
     )  # fmt: skip
 
 
-# Memory of the ground: a share of the drag across for the left and the right side of each element.
+# Memory of the ground: shares of the drag by the directions in which an element has moved.
 
 
 class Memory(NamedTuple):
-    """State of the ground on both sides of an element.
+    """State of the ground at an element.
 
-    left, right: developed shares, 0 to 1, of the drag on motion to either side. v_n_before: v_n one step earlier.
-    intact_left, intact_right: shares, 0 to 1, of the drag in ground that earlier passes have disturbed. dt: the step,
-    rad; below 0 shares do not develop. rate: e-foldings of a share per body length of travel."""
+    along, across: mean directions of its travel so far, -1 to 1. v_t_before, v_n_before: its velocity one step earlier.
+    intact_left, intact_right: shares, 0 to 1, of the drag across in ground that earlier passes have disturbed.
+    at_once_along, at_once_across: shares of the drag that are there at once after a reversal. step_along, step_across:
+    e-foldings of a mean direction over the step at unit speed, inf where the drag is steady at once."""
 
-    left: float
-    right: float
+    along: float
+    across: float
+    v_t_before: float
     v_n_before: float
     intact_left: float
     intact_right: float
-    dt: float
-    rate: float
-
-
-class Decay(NamedTuple):
-    """Factors of a share over one step.
-
-    share, deficit: of the share while the element moves away from its side, and of 1 - share while it moves towards it.
-    share_slope, deficit_slope: slopes of their negative logarithms in the velocity ``now``."""
-
-    share: float
-    deficit: float
-    share_slope: float
-    deficit_slope: float
+    at_once_along: float
+    at_once_across: float
+    step_along: float
+    step_across: float
 
 
 @formula
-def decay(before, now, dt, rate):
-    """Return the decay over a step in which the velocity towards a side changes linearly from ``before`` to ``now`` >= 0.
+def developed_direction(direction, before, now, step):
+    """Return the mean direction of travel after a step, and its slope in ``now``.
 
-    Where ``before`` is negative the share decays first. With an infinite rate the share develops at once.
-    """
-    instant, forward = rate == np.inf, before >= 0.0
+    The velocity changes linearly from ``before`` to ``now`` >= 0, and the direction decays towards -1 while it is negative,
+    towards 1 while it is positive, exp(-step) at unit speed. With an infinite ``step`` it is 1."""
+    instant, forward = step == np.inf, before >= 0.0
     total = absolute(before) + now
     total = where(total == 0.0, 1.0, total)
     old, new = absolute(before) / total, now / total
-    # Travels away from the side and towards it, over total x dt / 2.
-    away, towards = where(forward, 0.0, old * old), where(forward, old + new, new * new)
-    towards_slope = where(forward, 1.0, new * new + 2.0 * old * new)
-    step = where(instant, 0.0, rate) * dt / 2.0
-    return Decay(
-        exp(-step * total * away),
-        where(instant, 0.0, exp(-step * total * towards)),
-        step * away,
-        step * towards_slope,
-    )
+    # Travels backward and forward, over total x the duration of the step / 2.
+    backward_travel, forward_travel = where(forward, 0.0, old * old), where(forward, old + new, new * new)
+    forward_slope = where(forward, 1.0, new * new + 2.0 * old * new)
+    half_step = where(instant, 0.0, step) / 2.0
+    turned = (1.0 + direction) * exp(-half_step * total * backward_travel)
+    rest = where(instant, 0.0, exp(-half_step * total * forward_travel))
+    slope = rest * half_step * (forward_slope * (2.0 - turned) + backward_travel * turned)
+    return 1.0 - (2.0 - turned) * rest, slope
 
 
 @formula
-def developed_share(share, before, now, dt, rate):
-    """Return a share after the step of `decay`, and its slope in ``now``."""
-    d = decay(before, now, dt, rate)
-    old = share * d.share
-    return 1.0 - (1.0 - old) * d.deficit, d.deficit * (d.deficit_slope * (1.0 - old) + d.share_slope * old)
+def developed_share(direction, before, now, at_once, step):
+    """Return the share of the drag on motion with the velocity ``now`` >= 0 after the step of `developed_direction`, and
+    its slope in ``now``."""
+    after, slope = developed_direction(direction, before, now, step)
+    return at_once + (1.0 - at_once) * (0.5 + 0.5 * after), (1.0 - at_once) * (0.5 * slope)
 
 
 @formula
-def side_share(share, intact, sign, v_n, v_w, memory):
+def share_across(sign, intact, v_n, v_w, memory):
     """Return the share of the drag across on the part of an element that moves left (sign 1) or right (sign -1), and its
     slopes in v_n and v_w."""
     _, inside, _ = find_pivot(v_n, v_w)
     now = where(inside, 0.5 * (sign * v_n + absolute(v_w)), maximum(sign * v_n, 0.0))  # mean velocity of the part
-    value, slope = developed_share(share, sign * memory.v_n_before, now, memory.dt, memory.rate)
-    develops = memory.dt >= 0.0
-    value, slope = where(develops, intact * value, intact), where(develops, intact * slope, 0.0)
-    return value, where(inside, 0.5, 1.0) * sign * slope, where(inside, copysign(0.5, v_w), 0.0) * slope
+    direction, before = sign * memory.across, sign * memory.v_n_before
+    value, slope = developed_share(direction, before, now, memory.at_once_across, memory.step_across)
+    slope = intact * slope
+    return intact * value, where(inside, 0.5, 1.0) * sign * slope, where(inside, copysign(0.5, v_w), 0.0) * slope
+
+
+@formula
+def with_share_along(load, v_t, memory):
+    """Return a load with the share of the drag along that the ground has developed."""
+    sign = where(v_t >= 0.0, 1.0, -1.0)
+    direction, before = sign * memory.along, sign * memory.v_t_before
+    value, slope = developed_share(direction, before, absolute(v_t), memory.at_once_along, memory.step_along)
+    return Load(
+        value * load.t, value * load.t_t + sign * slope * load.t, value * load.t_n, value * load.t_w,
+        load.n, load.n_t, load.n_n, load.n_w, load.w, load.w_t, load.w_n, load.w_w,
+    )  # fmt: skip
 
 
 @formula
@@ -359,16 +361,16 @@ def part_load(law, v_t, v_n, v_w, rounding, low, high, share):
 
 @formula
 def two_sided_load(law, v_t, v_n, v_w, rounding, memory):
-    """Return the load of a law with a share of the drag across for each side of an element, split at its pivot.
+    """Return the load of a law with shares of the drag along and, for each side of an element, across, split at its pivot.
 
     The drag across vanishes at the pivot, so that its motion does not contribute to the slopes."""
     pivot, _, u_head = find_pivot(v_n, v_w)
-    left = side_share(memory.left, memory.intact_left, 1.0, v_n, v_w, memory)
-    right = side_share(memory.right, memory.intact_right, -1.0, v_n, v_w, memory)
+    left = share_across(1.0, memory.intact_left, v_n, v_w, memory)
+    right = share_across(-1.0, memory.intact_right, v_n, v_w, memory)
     leftward = u_head > 0.0
     head = part_load(law, v_t, v_n, v_w, rounding, pivot, 1.0, select_triple(leftward, left, right))
     tail = part_load(law, v_t, v_n, v_w, rounding, -1.0, pivot, select_triple(leftward, right, left))
-    return sum_loads(head, tail)
+    return with_share_along(sum_loads(head, tail), v_t, memory)
 
 
 @formula

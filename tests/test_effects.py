@@ -385,12 +385,12 @@ def test_what_an_effect_breaks_is_refused_by_name(tier):
 def test_transients_draw(tmp_path):
     from figures import transients
 
-    numbers = transients.compute(shares=(0.0, 0.2, 0.65), elements=20, phases=32)
+    numbers = transients.compute(shares=(0.0, 0.2, 0.65, 2.1), elements=20, phases=32)
     assert (np.diff(numbers["net"], axis=1) < 0).all()
-    assert numbers["net"][1] == pytest.approx([1, 0.902, 0.70], abs=0.01)
+    assert numbers["net"][1] == pytest.approx([1, 0.92, 0.75, 0.54], abs=0.01)
     net, velocity = drawn(transients, numbers, tmp_path).axes
     np.testing.assert_allclose(curve(net, r"$A/\lambda$ = 0.4"), [numbers["shares"], numbers["net"][2]])
-    np.testing.assert_allclose(curve(velocity, "travel 0.65 $A$"), [numbers["t"], numbers["velocity"][2]])
+    np.testing.assert_allclose(curve(velocity, "travel 2.1 $A$"), [numbers["t"], numbers["velocity"][3]])
 
 
 def test_the_cost_of_effects_draws(tmp_path):

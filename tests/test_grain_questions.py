@@ -17,7 +17,9 @@ from geomech.text import drag_grains
 from rft import EndCaps, Granular
 from rft.calibrate import fit
 from rft.drag import Rod, rod_drag
+from rft.effects.transient import AT_ONCE, AT_ONCE_ALONG, RATIO
 from rft.grains import Experiment, Run
+from rft.grains.reversal import recovery
 
 PSI = np.array([0.0, 10, 20, 40, 65, 90])
 LAW, ROD = Granular(3.1, 0.3), Rod(0.007, 0.2, 0.03, 600.0)
@@ -241,23 +243,28 @@ def test_the_figure_of_grains_shows_beds_beside_laws():
     lift = numbers["lift"]
     assert list(lift) == list(figure.BARS) and lift["round"]["grains"] == pytest.approx(0.43, abs=0.1)
     assert (lift["half round"]["keep"], lift["half round"]["cut"]) == pytest.approx((0.54, 0.04), abs=0.01)
-    base, *others = numbers["reversal"]
-    assert base == (0.02, 0.0245, 90) and len({*others}) == len(others)
-    for case, stretches in numbers["reversal"].items():
-        fresh, first, _ = (stretches[k]["at_once"][0] for k in (0, 1, 2))
-        assert fresh > 0.5 and first < 0.5, case
+    across, along = (numbers["reversal"][0.0245, angle, "flank"] for angle in (90, 0))
+    measured = AT_ONCE, AT_ONCE_ALONG, RATIO
+    ratio = along["travel"][0] / across["travel"][0]
+    assert (across["at_once"][0], along["at_once"][0], ratio) == pytest.approx(measured, abs=0.006)
     rows = read("reversals")
-    mine = (
-        (rows["amplitude_m"] == 0.02) & (rows["depth_m"] == 0.0245) & (rows["angle_deg"] == 90) & (rows["stretch"] == 2)
-    )
-    travel = rows["travel_95_m"][mine]
-    assert numbers["reversal"][base][2]["travel"] == pytest.approx((travel.mean(), travel.std(ddof=1) / np.sqrt(3)))
+    fits = []
+    for bed in (1, 2, 3):
+        mine = [
+            (rows["amplitude_m"] == a) & (rows["depth_m"] == 0.0245) & (rows["angle_deg"] == 90) & (rows["bed"] == bed)
+            for a in (0.01, 0.02, 0.04)
+        ]
+        fits.append(recovery([(rows["amplitude_m"][m][0], rows["travel_m"][m], rows["flank_N"][m]) for m in mine]))
+    travel = np.array([fit.travel for fit in fits])
+    assert across["travel"] == pytest.approx((travel.mean(), travel.std(ddof=1) / np.sqrt(3)))
+    for (a, angle), way in numbers["ways"].items():  # fitted at 20 mm
+        assert np.sqrt(np.mean((way["grains"] - way["law"]) ** 2)) < 0.11, (a, angle)
     assert "circle 1 rad" in figure.table(numbers)
     circles, others, lifts, right = figure.draw(numbers).axes
     assert circles.lines[2].get_ydata().tolist() == curves["direct"]["distance"].tolist()
     assert others.lines[2].get_xdata()[0] == numbers["others"][CIRCLE, 0.5]["direct"][0]
     assert others.containers[0].lines[0].get_xdata()[0] == swims[CIRCLE, 0.5, 1.0][0]
-    assert len(lifts.get_yticklabels()) == 3 and len(right.containers) == 3 * len(numbers["reversal"])
+    assert len(lifts.get_yticklabels()) == 3 and len(right.lines) == 8
 
 
 def test_the_budget_of_a_swim_finds_which_force_is_another():

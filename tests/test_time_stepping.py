@@ -161,16 +161,16 @@ def test_order_two_in_the_step(effect, fewest, truths):
 
 
 def test_transients_slow_the_sandfish():
-    """A build-up over a fifth of the wave's amplitude costs a tenth of the speed; 30 %, the most by which resistive
-    force theory exceeds discrete-element simulation, takes 0.65 of it (paper Secs. III B, IV A)."""
+    """A travel of a fifth of the wave's amplitude costs 8 % of the speed; that resistive force theory exceeds
+    discrete-element simulation by 30 %, the most there is, takes 0.6 of it (paper Secs. III B, IV A)."""
     wave = SANDFISH.gait.amplitude * float(SANDFISH.gait.wavelength())
-    effects = [Transient(travel=share * wave) for share in (0.0, 0.1, 0.2, 0.4, 0.65)]
+    effects = [Transient(travel=share * wave) for share in (0.0, 0.1, 0.2, 0.4, 0.6)]
     slowed = [SANDFISH.changed(effects=(effect,)) for effect in effects]
     net = np.hypot(*side_by_side(slowed).cycle(phases=64).net.T[:2])
     lost = 1 - net / net[0]
     assert (np.diff(lost) > 0).all()
-    assert lost[2] == pytest.approx(0.098, abs=0.003)
-    assert lost[4] == pytest.approx(0.30, abs=0.02)
+    assert lost[2] == pytest.approx(0.085, abs=0.003)
+    assert lost[4] == pytest.approx(1 - 1 / 1.3, abs=0.02)
 
 
 def test_the_built_in_march_is_slower_than_the_plain_sandfish():

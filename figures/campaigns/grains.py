@@ -2,7 +2,7 @@
 
     python -m figures.campaigns.grains swims STORE             three and seven links
     python -m figures.campaigns.grains swim-convergence STORE  three links with another step, stiffness or bed
-    python -m figures.campaigns.grains reversals STORE         a rod to and fro across its axis
+    python -m figures.campaigns.grains reversals STORE         a rod to and fro, across its axis and along
     python -m figures.campaigns.grains lift STORE              bars of three sections
     python -m figures.campaigns.grains convergence STORE       a bar with another step, stiffness, width or depth
 
@@ -26,7 +26,7 @@ from geomech.scenes import load
 from geomech.studies.grain_swim import RAMP, GrainSwim, cycle_poses
 from rft.grains import Bed, Experiment, Run, Stroke, Tow, rod
 from rft.grains.drag import steady
-from rft.grains.reversal import recoveries
+from rft.grains.reversal import drags
 
 FOLDER = Path(__file__).parent
 BEDS = (1, 2, 3)  # seeds
@@ -44,9 +44,13 @@ STROKES = (  # amplitude, m, depth, m, and angle from its axis, degrees, of the 
     (0.02, 0.0245, 0),
     (0.02, 0.0150, 90),
     (0.04, 0.0245, 90),
+    (0.01, 0.0245, 0),
+    (0.01, 0.0150, 90),
+    (0.04, 0.0245, 0),
 )
 BARS = ("round", "half round", "half round, flat up")
 SPEED = 0.1  # m/s of rods
+LONGEST_BIN = 2e-3  # m of the way of a rod to and fro
 TROUGH = Bed(length=0.06, width=0.30, depth=0.048)  # for bars across it
 BAR, BAR_DEPTH = 8e-3, 0.016  # m, radius and depth of the axis
 TEXTS = "scene", "change", "shape", "part"  # columns that are no numbers
@@ -113,17 +117,17 @@ def swim_convergence(store: Path) -> Rows:
 
 
 def reversals(store: Path) -> Rows:
-    """Yield the recovery of the drag along every stretch of a rod to and fro; the first is in a fresh bed."""
-    where = "amplitude_m", "depth_m", "angle_deg", "bed", "stretch"
-    yield *where, "late_N", "at_once", "travel_95_m", "plateau_N", "scale_m", "rms_N"
+    """Yield the drag along the way of a rod to and fro; it turns at one amplitude, three and five."""
+    yield "amplitude_m", "depth_m", "angle_deg", "bed", "travel_m", "flank_N", "ends_N"
+    radius = 6e-3
     for amplitude, depth, angle in STROKES:
         for seed in BEDS:
             stroke = Stroke(SPEED, math.radians(angle), amplitude)
             duration = round(5 * amplitude / SPEED, 6)  # out, and twice across
-            run = Experiment(Bed(seed=seed), rod(0.162, 6e-3), stroke, duration, depth).run(store)
-            for k, leg in enumerate(recoveries(run, stroke)):
-                found = leg.late, leg.at_once, leg.travel, leg.plateau, leg.scale, leg.rms
-                yield amplitude, depth, angle, seed, k, *found
+            run = Experiment(Bed(seed=seed), rod(0.162, radius), stroke, duration, depth).run(store)
+            found = drags(run, stroke, radius, min(amplitude / 10, LONGEST_BIN))
+            for row in zip(*(x.tolist() for x in found[1:])):
+                yield amplitude, depth, angle, seed, *row
 
 
 def lift(store: Path) -> Rows:

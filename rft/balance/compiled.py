@@ -39,7 +39,7 @@ from rft.vectors import absolute, minimum, where
 
 # First rows of the records of an element: `Elements`, `Factor`, quadratic drag, `Memory`, `Incline`; of the records of a
 # sample: `Iterate`, `Frame`, scale of speed, `Inertia`. Rows of sums: `Net`, then the square of the slowest speed.
-ELEMENTS, FACTOR, QUADRATIC, MEMORY, INCLINE, ROWS = 0, 9, 12, 13, 20, 25
+ELEMENTS, FACTOR, QUADRATIC, MEMORY, INCLINE, ROWS = 0, 9, 12, 13, 23, 28
 ITERATE, FRAME, SPEED, MASS, SAMPLE_ROWS = 0, 13, 17, 18, 31
 SLOWEST2, SUM_ROWS = 15, 16
 WEIGHT, V_T = 5, 6  # places in `Elements`

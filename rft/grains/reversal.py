@@ -2,81 +2,94 @@
 
 from __future__ import annotations
 
-import itertools
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from rft.effects.transient import E_FOLDINGS
+from rft.grains.drag import END
 from rft.grains.experiment import Run
 from rft.grains.motions import Stroke
 from rft.refusal import require
 
-SHARE = 0.95  # of the late drag: what counts as come back
-LATE = 0.4  # of a stretch, its end
+
+class Drags(NamedTuple):
+    """Drag on a rod that goes to and fro, against its motion, in bins of its way.
+
+    amplitude (m). travel: (n,), way so far at the middle of each bin, m. flank, ends: (n,), of the flank and of both ends
+    together, N."""
+
+    amplitude: float
+    travel: np.ndarray
+    flank: np.ndarray
+    ends: np.ndarray
 
 
 class Recovery(NamedTuple):
-    """Drag along one straight stretch of a body's way, fitted by force = plateau (1 - (1 - start) exp(-travel / scale)).
+    """Drag = plateau (at_once + (1 - at_once) (1 + m) / 2) with the mean direction m of `rft.effects.Transient`.
 
-    plateau: N, which short stretches and rising drags leave open. start: share of it at the start of the stretch. scale: m.
-    late: mean drag over the last `LATE` of the stretch, N. rms: of the samples about the fit, N."""
+    plateau: drag after a long way, N. at_once: share of it. travel: m. start: m in the fresh bed. rms: of the bins about the
+    fit, over the plateau."""
 
     plateau: float
+    at_once: float
+    travel: float
     start: float
-    scale: float
-    late: float
     rms: float
 
-    @property
-    def at_once(self) -> float:
-        """Fitted drag at the start of the stretch over the late one."""
-        return self.plateau * self.start / self.late
-
-    @property
-    def travel(self) -> float:
-        """Travel at which the fitted drag reaches `SHARE` of the late one, m."""
-        return self.reaches(SHARE * self.late)
-
-    def reaches(self, force: float) -> float:
-        """Return the travel at which a force, N, is reached, m: 0 where it is there at once, inf where it never is."""
-        missing = 1 - force / self.plateau
-        if missing <= 0:
-            return math.inf
-        return self.scale * math.log(max(1.0, (1 - self.start) / missing))
+    def drag(self, travel: np.ndarray, amplitude: float) -> np.ndarray:
+        """Return the drag, N, at ways so far (n,), m, of a rod to and fro with an amplitude, m."""
+        m = mean_direction(travel, amplitude, self.travel, self.start)
+        return self.plateau * (self.at_once + (1 - self.at_once) * (1 + m) / 2)
 
 
-def recoveries(run: Run, stroke: Stroke) -> list[Recovery]:
-    """Return the recoveries of a body that went to and fro: the first in a fresh bed, the others after a reversal."""
-    a, v = stroke.amplitude, stroke.speed
+def mean_direction(way: np.ndarray, amplitude: float, travel: float, start: float) -> np.ndarray:
+    """Return the mean direction of travel, 1 for the present one, at ways so far (n,) of a rod that turns round at an
+    amplitude and then at every second one, from ``start``; lengths in one unit."""
+    length = travel / E_FOLDINGS
+    stretch = np.maximum(np.ceil((way / amplitude - 1) / 2), 0).astype(int)
+    out = np.empty_like(way)
+    for k in range(stretch.max() + 1):
+        begin, end = max(0, 2 * k - 1) * amplitude, (2 * k + 1) * amplitude
+        mine = stretch == k
+        out[mine] = 1 - (1 - start) * np.exp(-(way[mine] - begin) / length)
+        start = -(1 - (1 - start) * np.exp(-(end - begin) / length))
+    return out
+
+
+def drags(run: Run, stroke: Stroke, half_width: float, bin_width: float) -> Drags:
+    """Return the drag on a round rod along x that went to and fro, in bins (m) of its way that divide its amplitude.
+
+    half_width (m): of the rod, whose ends reach `END` of them as in `rft.grains.drag.flank_and_ends`. Samples in which
+    it turns are left out."""
+    a, way, sample = stroke.amplitude, stroke.speed * run.t, stroke.speed * (run.t[1] - run.t[0])
+    require(way[-1] > a, "the body has not turned round", instead="take a longer run")
+    turned = np.maximum(np.ceil((way / a - 1) / 2), 0)
+    whole = turned == np.maximum(np.ceil(((way - sample) / a - 1) / 2), 0)
     direction = np.array([math.cos(stroke.angle), math.sin(stroke.angle)])
-    ends = np.array([0.0, *np.arange(a, v * run.t[-1] + 1e-9, 2 * a)])
-    if v * run.t[-1] - ends[-1] > a:  # the last stretch counts if half of it is there
-        ends = np.append(ends, v * run.t[-1])
-    require(len(ends) >= 2, "the body has not turned round", instead="take a longer run")
-    drag = -(run.force[:, :2] @ direction)
-    travel = v * (run.t - 0.5 * (run.t[1] - run.t[0]))  # middles of the samples
-    found = []
-    for k, (low, high) in enumerate(itertools.pairwise(ends)):
-        inside = (travel > low) & (travel < high)
-        found.append(_fit(travel[inside] - low, (-1.0) ** k * drag[inside]))
-    return found
+    force = -((-1.0) ** turned)[:, None] * (run.profile[..., :2] @ direction)
+    flank = np.abs(run.along) < np.abs(run.along).max() + half_width - END * half_width
+    bins = np.floor((way - sample / 2) / bin_width + 1e-9).astype(int)
+    n = round(way[-1] / bin_width)
+    mean = lambda x: np.array([x[whole & (bins == k)].mean() for k in range(n)])
+    return Drags(a, (np.arange(n) + 0.5) * bin_width, mean(force[:, flank].sum(1)), mean(force[:, ~flank].sum(1)))
 
 
-def _fit(x: np.ndarray, force: np.ndarray) -> Recovery:
-    """Return the recovery of forces (n,), N, over travel x (n,), m."""
+def recovery(cases: Sequence[tuple[float, np.ndarray, np.ndarray]]) -> Recovery:
+    """Return the recovery that fits drags on one rod, (amplitude, travel (n,), drag (n,)) of each run, all runs alike."""
     from scipy.optimize import least_squares
 
-    late = float(force[x > (1 - LATE) * x.max()].mean())
+    scale = float(np.mean([drag.mean() for _, _, drag in cases]))
+    longest = max(float(way[-1]) for _, way, _ in cases)
 
     def misfit(p):
-        return p[0] * (1 - (1 - p[1]) * np.exp(-x / p[2])) - force
+        law = Recovery(*p, rms=0.0)
+        return np.concatenate([(law.drag(way, a) - drag) / (scale * math.sqrt(len(way))) for a, way, drag in cases])
 
-    span = float(x.max())
-    shortest = float(
-        x[1] - x[0]
-    )  # nothing faster than a sample is seen: where the drag is there at once, any start would do
-    low, high = [0.0, -1.0, shortest], [5 * late, 2.0, 2 * span]
-    starts = [[late, h, s * span] for h in (0.2, 0.8) for s in (0.05, 0.3)]
-    best = min((least_squares(misfit, p, bounds=(low, high), x_scale=p) for p in starts), key=lambda r: r.cost)
-    return Recovery(*best.x.tolist(), late, rms=float(np.sqrt(np.mean(best.fun**2))))
+    first = [scale, 0.2, longest / 5, 0.2]
+    low, high = [0.0, -1.0, longest / 1e3, -1.0], [9 * scale, 1.0, longest, 2.0]
+    found = least_squares(misfit, first, bounds=(low, high), x_scale=first)
+    plateau, *others = found.x.tolist()
+    return Recovery(plateau, *others, rms=math.sqrt(2 * found.cost / len(cases)) * scale / plateau)
