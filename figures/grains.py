@@ -243,7 +243,7 @@ def draw_others(ax, numbers: dict) -> None:
     for y, (case, curves) in enumerate(numbers["others"].items()):
         for k, (name, look) in enumerate(looks(curves).items()):
             height = y + 0.09 * (k - 2.5)
-            ax.plot(curves[name][0], height, **{**look, "ls": ""})
+            ax.plot(curves[name][0], height, **{**look, "ls": "", "markevery": None})
         if swum := numbers["swims"].get((*case, 1.0)):
             ax.errorbar(swum[0], y, xerr=np.nan_to_num(swum[1]), **DOTS)
     names = [named_swim((*case, 1.0)) for case in numbers["others"]]
