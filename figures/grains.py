@@ -1,12 +1,13 @@
-"""What beds of grains say about resistive force theory: a swimmer's speed, lift on bars, and drag after a reversal.
+"""What beds of grains say about resistive force theory: swimmers, lift on bars, and drag after a reversal.
 
 Spheres of 6 mm with friction 0.3 and 1 MPa, in beds that differ by their seeds; error bars are standard errors over beds.
 
-Left: displacement of a three-link swimmer, 162 x 12 mm at 25 mm depth, on circles, beside the direct tier with the law of
-its flank and its end caps, both measured in the same grains (band: one standard deviation of the law), the same without the
-caps, and the law of a short rod with its ends in it. Middle: lift over drag on bars without ends, beside the nine-term map,
-as it is and without tension. Right: drag on the flank of a rod after its second reversal over that after a long way, in grains
-(dots) and by the law of the effect `transient` (lines), fitted at 20 mm alone: 10 and 40 mm are predicted.
+(a) Displacement of three links, 162 x 12 mm at 25 mm depth, on circles, beside the tiers with the law of its flank and its
+ends, both measured in the same grains (band: one standard deviation of the flank's law): with ends whose axial force falls
+with the angle as on rods, with flat ends, and with a transient over two travels. (b) The same for the butterfly and a wave on
+seven links. (c) Lift over drag on bars without ends, beside the nine-term map, as it is and without tension. (d) Drag on the
+flank of a rod after its second reversal over that after a long way, in grains (dots) and by the law of the effect `transient`
+(lines), fitted at 20 mm alone: 10 and 40 mm are predicted.
 
 Size, depth and friction of the robot of Fig. 11(e) are not in the paper's text, so that this is no copy of it. The data are
 in `figures/campaigns`; the commands that made them stand in the files.
@@ -25,12 +26,17 @@ from geomech import plots
 from geomech.scenes import load
 from geomech.studies.calibration import Calibration
 from geomech.studies.study import Study
-from rft import EndCaps
+from rft import EndCaps, Transient
 from rft.grains.reversal import Recovery, recovery
 from rft.plates import VERTICAL, HalfCylinder, RoundRod
 
 RADIUS, SIZE = 6e-3, 0.162  # m, of the swimmer
 AMPLITUDES = np.linspace(0.25, 2.1, 14)
+TIERS = "area", "harmonic", "direct"
+# Travels of the transient, body lengths: as the flank's drag comes back in these swims, and as on a rod to and fro.
+TRAVELS = 0.05, 0.21
+OTHERS = (grains.BUTTERFLY, 1.0), (grains.WAVE, 0.5), (grains.WAVE, 0.87), (grains.WAVE, 1.2)
+FLAT, FLAT_ENDS = "direct, flat ends", 1.71  # e of both, fitted to the same rods
 BARS = {  # by their names in the data
     "round": RoundRod(grains.BAR, 0.1),
     "half round": HalfCylinder(grains.BAR, 0.1, "down"),
@@ -38,25 +44,23 @@ BARS = {  # by their names in the data
 }
 
 
-def compute(amplitudes=AMPLITUDES) -> dict:
-    """Return curves and measured numbers.
+def compute(amplitudes=AMPLITUDES, others=OTHERS, travels=TRAVELS) -> dict:
+    """Return predicted and measured numbers.
 
-    "amplitude": (A,), rad. "curves": by name {"distance", "spread": (A,), BL}. "swims": {"amplitude", "distance", "error":
-    (S,)}. "lift": by shape {"grains", "error", "keep", "cut"}, lift over drag. "reversal": by (depth, m, angle
+    "amplitude": (A,), rad. "curves": by name {"distance", "spread": (A,), BL} of circles, spread only of the law. "others": by
+    scene and amplitude, by name distances and spread (float, float). "swims": by scene, amplitude, rad, and frequency, Hz,
+    (distance, error), BL. "lift": by shape {"grains", "error", "keep", "cut"}, lift over drag. "reversal": by (depth, m, angle
     from the axis, degrees) and "flank" or "ends" {"plateau", "at_once", "travel", "start", "rms": (mean, error)} of
     `rft.grains.reversal.Recovery`, by all amplitudes together. "ways": by (amplitude, m, angle) {"travel" since the second
     reversal, m, "grains", "law"}, shares of the plateau, 24.5 mm deep."""
-    flank = Calibration("flank-drag", end_caps="fitted").ask().subject
-    short = Calibration("short-rod-drag").ask().subject
-    caps = (EndCaps(RADIUS / SIZE, flank.end_caps / 2, flank.end_caps / 2),)
-    laws = {
-        "flank and ends": (flank.medium, caps),
-        "flank alone": (flank.medium, ()),
-        "short rod": (short.medium, ()),
-    }
+    found = {case: predicted(case[0], [case[1]], travels) for case in others}
     return {
         "amplitude": np.asarray(amplitudes),
-        "curves": {name: predicted(*law, amplitudes) for name, law in laws.items()},
+        "curves": predicted(grains.CIRCLE, amplitudes, travels),
+        "others": {
+            case: {name: (float(c["distance"][0]), float(c["spread"][0])) for name, c in curves.items()}
+            for case, curves in found.items()
+        },
         "swims": measured_swims(),
         "lift": {name: lifts(name, rod) for name, rod in BARS.items()},
         "reversal": measured_reversals(),
@@ -64,12 +68,25 @@ def compute(amplitudes=AMPLITUDES) -> dict:
     }
 
 
-def predicted(medium, effects, amplitudes) -> dict:
-    """Return distances of circles by the direct tier, and their spread by the medium, body lengths."""
-    scene = load("three-link-glass")
-    scene = scene.changed(system=replace(scene.system, medium=medium, effects=effects))
-    net = Study(scene).study(list(amplitudes), ("direct",)).result["net_distance"]
-    return {"distance": net.values[0], "spread": net.spread[0]}
+def predicted(scene_name: str, amplitudes, travels=TRAVELS) -> dict:
+    """Return distances by tier, with flat ends and with transients, and their spread by the medium, body lengths."""
+    law, scene = Calibration("flank-drag", end_caps="fitted").ask().subject, load(scene_name)
+    caps = law.caps(RADIUS / SIZE)
+    medium = replace(law.medium, covariance=None)
+    study = lambda medium, tiers, *effects: (
+        Study(scene.changed(system=replace(scene.system, medium=medium, effects=effects)))
+        .study(list(amplitudes), tiers)
+        .result["net_distance"]
+    )
+    none = np.zeros(len(amplitudes))
+    net = study(law.medium, TIERS, caps)
+    curves = {tier: {"distance": net.values[k], "spread": net.spread[k]} for k, tier in enumerate(TIERS)}
+    flat = EndCaps(caps.radius, FLAT_ENDS / 2, FLAT_ENDS / 2)
+    curves[FLAT] = {"distance": study(medium, ("direct",), flat).values[0], "spread": none}
+    for travel in travels:
+        net = study(medium, ("direct",), caps, Transient(travel=travel))
+        curves[f"direct, transient {travel:g} BL"] = {"distance": net.values[0], "spread": none}
+    return curves
 
 
 def over_beds(values: np.ndarray, beds: np.ndarray) -> tuple[float, float]:
@@ -78,11 +95,13 @@ def over_beds(values: np.ndarray, beds: np.ndarray) -> tuple[float, float]:
     return float(means.mean()), float(means.std(ddof=1) / np.sqrt(len(means))) if len(means) > 1 else np.nan
 
 
-def measured_swims() -> dict:
+def measured_swims() -> dict[tuple[str, float, float], tuple[float, float]]:
+    """Return (distance, error), BL, by scene, amplitude, rad, and frequency, Hz."""
     data = grains.read("swims")
-    distance, amplitude = np.hypot(data["x_BL"], data["y_BL"]), data["amplitude"]
-    rows = [(a, *over_beds(distance[amplitude == a], data["bed"][amplitude == a])) for a in np.unique(amplitude)]
-    return dict(zip(("amplitude", "distance", "error"), np.array(rows).T))
+    distance = np.hypot(data["x_BL"], data["y_BL"])
+    cases = list(zip(*(data[key].tolist() for key in ("scene", "amplitude", "frequency_Hz"))))
+    mine = {case: np.array([other == case for other in cases]) for case in sorted(set(cases))}
+    return {case: over_beds(distance[rows], data["bed"][rows]) for case, rows in mine.items()}
 
 
 def lifts(name: str, bar) -> dict:
@@ -129,18 +148,34 @@ def ways(depth: float = 0.0245, fitted: float = 0.02) -> dict:
     return found
 
 
+def named_swim(case: tuple[str, float, float]) -> str:
+    """Return the name of a swim."""
+    scene, amplitude, frequency = case
+    gait = {grains.CIRCLE: "circle", grains.BUTTERFLY: "butterfly", grains.WAVE: "seven links"}[scene]
+    return f"{gait} {amplitude:g} rad" + ("" if frequency == 1.0 else f", {frequency:g} Hz")
+
+
+def by_curves(numbers: dict, case: tuple[str, float, float]) -> dict[str, float]:
+    """Return what the curves say of a swim, body lengths; nothing of one that is not predicted."""
+    scene, amplitude, _ = case
+    if scene == grains.CIRCLE:
+        at = numbers["amplitude"]
+        return {name: float(np.interp(amplitude, at, c["distance"])) for name, c in numbers["curves"].items()}
+    return {name: x for name, (x, _) in numbers["others"].get((scene, amplitude), {}).items()}
+
+
 def table(numbers: dict) -> str:
-    """Return the measured displacements beside the curves, and lift over drag."""
-    swims, at = numbers["swims"], numbers["amplitude"]
-    by_curve = [np.interp(swims["amplitude"], at, c["distance"]) for c in numbers["curves"].values()]
-    rows = [
-        (
-            f"{a:.2f} rad",
-            f"{d:.3f} +- {e:.3f}",
-            *(f"{c[k]:.3f}" for c in by_curve),
+    """Return the measured displacements beside the curves, lift over drag, and drag after reversals."""
+    rows = []
+    for case, (d, e) in numbers["swims"].items():
+        curves = by_curves(numbers, case)
+        rows.append(
+            (
+                named_swim(case),
+                f"{d:.3f} +- {e:.3f}",
+                *(f"{curves[n]:.3f}" if curves else "" for n in numbers["curves"]),
+            )
         )
-        for k, (a, d, e) in enumerate(zip(*swims.values()))
-    ]
     lines = style.table(("BL per cycle", "grains", *numbers["curves"]), rows)
     rows = [
         (name, f"{x['grains']:+.2f} +- {x['error']:.2f}", f"{x['keep']:+.2f}", f"{x['cut']:+.2f}")
@@ -161,37 +196,85 @@ def table(numbers: dict) -> str:
 
 @plots.styled
 def draw(numbers: dict):
-    fig, axes = plots.figure(9.6, 3.0, 3)
-    left, middle, right = axes[0]
-    for (name, curve), colour in zip(numbers["curves"].items(), (style.VERMILION, style.BLUE, "0.5")):
-        x, d, s = numbers["amplitude"], curve["distance"], curve["spread"]
-        left.fill_between(x, d - s, d + s, color=colour, alpha=0.2, lw=0)
-        left.plot(x, d, color=colour, label=name)
-    swims = numbers["swims"]
-    dots = {"color": "black", "ls": "none", "marker": "o", "ms": 4, "capsize": 2}
-    left.errorbar(swims["amplitude"], swims["distance"], np.nan_to_num(swims["error"]), label="grains", **dots)
-    left.set(xlabel="amplitude of the circle (rad)", ylabel="distance per cycle (BL)", ylim=(0, 0.36))
-    left.legend(loc="upper left", ncols=2)
-    lift = numbers["lift"]
+    fig, axes = plots.figure(9.0, 6.4, 2, 2)
+    (left, right), (lift_axes, reversal_axes) = axes
+    style.lettered(axes)
+    draw_circles(left, numbers)
+    draw_others(right, numbers)
+    draw_lift(lift_axes, numbers["lift"])
+    draw_reversals(reversal_axes, numbers["ways"])
+    return fig
+
+
+DOTS = {"color": "black", "ls": "none", "marker": "o", "ms": 4, "capsize": 2, "zorder": 3}  # of grains
+
+
+def looks(curves) -> dict[str, dict]:
+    """Return colour, line and marker of every curve, by its name."""
+    colours = (style.PINK, style.BLUE, style.VERMILION, "0.5", style.GREEN, style.GREEN)
+    lines, markers = ("-", ":", "-", "-", "--", ":"), "^Dsvx+"
+    shape = {"mfc": "white", "ms": 4.5}
+    return {
+        name: {"color": c, "ls": ls, "marker": m, "markevery": (k, len(colours)), **shape}
+        for k, (name, c, ls, m) in enumerate(zip(curves, colours, lines, markers))
+    }
+
+
+def draw_circles(ax, numbers: dict) -> None:
+    """Draw displacements of circles against the amplitude."""
+    for name, look in looks(numbers["curves"]).items():
+        x, curve = numbers["amplitude"], numbers["curves"][name]
+        if name == "direct":
+            low, high = curve["distance"] - curve["spread"], curve["distance"] + curve["spread"]
+            ax.fill_between(x, low, high, color=look["color"], alpha=0.2, lw=0)
+        ax.plot(x, curve["distance"], **look, label=name)
+    for frequency, face in ((1.0, "black"), (0.5, "white")):
+        here = {a: x for (scene, a, f), x in numbers["swims"].items() if scene == grains.CIRCLE and f == frequency}
+        if here:
+            d, e = np.transpose(list(here.values()))
+            label = "grains" if frequency == 1.0 else f"grains, {frequency:g} Hz"
+            ax.errorbar(list(here), d, np.nan_to_num(e), label=label, mfc=face, **DOTS)
+    ax.set(xlabel="amplitude of the circle (rad)", ylabel="distance per cycle (BL)", ylim=(0, 0.4), xlim=(0.2, 2.15))
+    ax.legend(loc="upper left", ncols=2)
+
+
+def draw_others(ax, numbers: dict) -> None:
+    """Draw displacements of other gaits, a row each."""
+    for y, (case, curves) in enumerate(numbers["others"].items()):
+        for k, (name, look) in enumerate(looks(curves).items()):
+            height = y + 0.09 * (k - 2.5)
+            ax.plot(curves[name][0], height, **{**look, "ls": "", "markevery": None})
+        if swum := numbers["swims"].get((*case, 1.0)):
+            ax.errorbar(swum[0], y, xerr=np.nan_to_num(swum[1]), **DOTS)
+    names = [named_swim((*case, 1.0)) for case in numbers["others"]]
+    ax.set_yticks(range(len(names)), names)
+    ax.set(xlabel="distance per cycle (BL)", ylim=(len(names) - 0.4, -0.6), xlim=(0, None), title="marks as in (a)")
+
+
+def draw_lift(ax, lift: dict) -> None:
+    """Draw lift over drag by shape."""
     y = np.arange(len(lift))
     for key, marker, label in (("keep", "D", "nine-term map"), ("cut", "s", "tension cut")):
-        middle.plot([x[key] for x in lift.values()], y, marker, mfc="white", color=style.BLUE, label=label)
+        ax.plot([x[key] for x in lift.values()], y, marker, mfc="white", color=style.BLUE, label=label)
     errors = np.nan_to_num([x["error"] for x in lift.values()])
-    middle.errorbar([x["grains"] for x in lift.values()], y, xerr=errors, label="grains", **dots)
-    middle.axvline(0.0, **style.GUIDE)
-    middle.set_yticks(y, list(lift))
-    middle.set(xlabel="lift over drag", ylim=(len(lift) - 0.5, -1.2))
-    middle.legend(loc="upper right", ncols=1)
-    for (a, angle), way in numbers["ways"].items():
+    ax.errorbar([x["grains"] for x in lift.values()], y, xerr=errors, label="grains", **DOTS)
+    ax.axvline(0.0, **style.GUIDE)
+    ax.set_yticks(y, list(lift))
+    ax.set(xlabel="lift over drag", ylim=(len(lift) - 0.5, -1.2))
+    ax.legend(loc="upper right", ncols=1)
+
+
+def draw_reversals(ax, ways: dict) -> None:
+    """Draw drags against the travel since a reversal, in grains and by the law."""
+    for (a, angle), way in ways.items():
         if angle or a == 0.02:
             colour = style.SEQUENCE[(0.01, 0.02, 0.04).index(a)] if angle else "0.5"
             x, label = 1e3 * way["travel"], f"{1e3 * a:g} mm {'across' if angle else 'along'}"
-            right.plot(x, way["grains"], ".", ms=3, color=colour)
-            right.plot(x, way["law"], color=colour, label=label)
-    right.set(xlabel="travel since the reversal (mm)", ylabel="drag over that after a long way", xlim=(0, 80))
-    right.set(ylim=(0, 1.3))
-    right.legend(loc="lower right")
-    return fig
+            ax.plot(x, way["grains"], ".", ms=3, color=colour)
+            ax.plot(x, way["law"], color=colour, label=label)
+    ax.set(xlabel="travel since the reversal (mm)", ylabel="drag over that after a long way", xlim=(0, 80))
+    ax.set(ylim=(0, 1.3))
+    ax.legend(loc="lower right")
 
 
 if __name__ == "__main__":

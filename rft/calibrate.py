@@ -24,7 +24,7 @@ from rft.laws.granular import Granular
 from rft.laws.viscous import Viscous
 from rft.refusal import Refusal, require
 
-CAPS = "end_caps"
+CAPS, ACROSS = "end_caps", "end_caps_across"
 MOST_CAPS = 10.0  # e of a hemisphere is 4
 AT_BOUND = 1e-6  # of a bound: a parameter that near lies on it
 CONVERGED = 1e-14  # relative change of parameters and of the sum of squares that ends a fit
@@ -86,7 +86,7 @@ class Fit:
     else ``axial_force`` (N, on the whole rod). covariance: (n, n), of the parameters, from the scatter of the forces
     about the law, taken for independent noise. residuals: (2, N), measured minus fitted forces, N. end_caps: e of both
     ends together (`EndCaps`), 0 without. Where the data tell the ends from the flank, law and residuals are the flank's, and
-    e follows from the ends.
+    e follows from the ends with `EndCaps.across`, the last of the parameters.
 
     Examples
     --------
@@ -156,6 +156,11 @@ class Fit:
         values, n = dict(zip(self.names, self.values.tolist())), len(names)
         covariance = student_factor(self.degrees_of_freedom, ONE_SIGMA) ** 2 * self.covariance[:n, :n]
         return build(**{name: values[name] for name in names}, **({"covariance": covariance} if names else {}))
+
+    def caps(self, radius: float) -> EndCaps:
+        """Return the end caps, half of e at each end, of a body of that radius in body lengths."""
+        across = dict(zip(self.names, self.values.tolist())).get(ACROSS)
+        return EndCaps(radius, self.end_caps / 2, self.end_caps / 2, across)
 
     def forces(self, psi, values=None) -> np.ndarray:
         """Return the forces (2, ...) along and across the rod at attack angles psi (rad), N; values: parameters in place of
@@ -253,32 +258,41 @@ def fit(law: str, data: RodDrag, rod: Rod = UNKNOWN_ROD, end_caps: float | str =
 
 
 def _with_ends(flank: Fit) -> Fit:
-    """Return a fit to the flank with e of the ends, by least squares of the forces on them. Its variance has their scatter,
-    and its covariance with the law what the law leaves uncertain."""
-    data, n = flank.data, len(flank.values)
+    """Return a fit to the flank with e and ``across`` of the ends, by least squares of the forces on them. Their variance
+    has the scatter of these forces, and their covariance with the law what the law leaves uncertain."""
+    from scipy.optimize import least_squares
 
-    def caps(values: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-        """Return e, the forces on a flat end, N, and the residuals of the ends, N."""
-        without = _in_newton(flank.law, flank.rod, values)
-        unit = _forces(flank.law, flank.rod, 1.0, data.psi, without) - _forces(
-            flank.law, flank.rod, 0.0, data.psi, without
+    data, n, n_law = flank.data, len(flank.values), len(FITS[flank.law].names)
+    v, names = (np.cos(data.psi), np.sin(data.psi)), (CAPS, ACROSS)
+
+    def caps(values: np.ndarray):
+        """Return the least-squares solution of e and ``across`` with parameters of the law."""
+        values = _in_newton(flank.law, flank.rod, values)
+        medium = FITS[flank.law].build(*map(float, values[:n_law]))
+
+        def residual(x):
+            end = EndCaps(flank.rod.radius / flank.rod.length, head=1.0, tail=0.0, across=float(x[1]))
+            return _weighted(data, values[n_law] * x[0] * np.array(end.traction(medium, *v)), data.ends)
+
+        start, bounds = [1.0, 1.0], ([-np.inf, 0.0], [np.inf, MOST_CAPS])
+        return least_squares(
+            residual, start, jac="3-point", bounds=bounds, xtol=CONVERGED, ftol=CONVERGED, gtol=CONVERGED
         )
-        e = float((data.weight * unit * data.ends).sum() / (data.weight * unit**2).sum())
-        return e, unit, data.ends - e * unit
 
-    e, unit, rest = caps(flank.values)
-    steps = np.diag(1e-4 * np.where(flank.errors > 0, flank.errors, np.abs(flank.values)))
-    slope = np.array([(caps(flank.values + h)[0] - caps(flank.values - h)[0]) / (2 * h.max()) for h in steps])
-    scatter = (data.weight * rest**2).sum() / (data.n_forces - 1) / (data.weight * unit**2).sum()
-    covariance = np.zeros((n + 1, n + 1))
-    covariance[:n, :n] = flank.covariance
-    covariance[n, :n] = covariance[:n, n] = flank.covariance @ slope
-    covariance[n, n] = slope @ flank.covariance @ slope + scatter
+    best = caps(flank.values)
+    e = float(best.x[0])
     require(
         0 < e < MOST_CAPS, f"the force on the ends is that of {e:.2g} flat ends", because=f"e is 0 to {MOST_CAPS:g}"
     )
-    values = np.append(flank.values, e)
-    return dataclasses.replace(flank, names=(*flank.names, CAPS), values=values, covariance=covariance, end_caps=e)
+    steps = np.diag(1e-4 * np.where(flank.errors > 0, flank.errors, np.abs(flank.values)))
+    slope = np.array([(caps(flank.values + h).x - caps(flank.values - h).x) / (2 * h.max()) for h in steps])
+    covariance = np.zeros((n + 2, n + 2))
+    covariance[:n, :n] = flank.covariance
+    covariance[:n, n:] = flank.covariance @ slope
+    covariance[n:, :n] = covariance[:n, n:].T
+    covariance[n:, n:] = slope.T @ flank.covariance @ slope + _covariance(names, best, data.n_forces)
+    values = np.append(flank.values, best.x)
+    return dataclasses.replace(flank, names=(*flank.names, *names), values=values, covariance=covariance, end_caps=e)
 
 
 def _unit(law: str, rod: Rod) -> tuple[str, float]:
@@ -308,8 +322,10 @@ def _forces(law: str, rod: Rod, end_caps: float, psi, values) -> np.ndarray:
     return values[n] * force
 
 
-def _weighted(data: RodDrag, forces: np.ndarray) -> np.ndarray:
-    return (np.sqrt(data.weight) * (forces - data.forces))[:, data.weight > 0].ravel()
+def _weighted(data: RodDrag, forces: np.ndarray, measured: np.ndarray | None = None) -> np.ndarray:
+    """Return forces minus those measured, by default on the rod, in units of their errors."""
+    measured = data.forces if measured is None else measured
+    return (np.sqrt(data.weight) * (forces - measured))[:, data.weight > 0].ravel()
 
 
 def _starts(fitted_law: FittedLaw, data: RodDrag, residual: Callable, fits_caps: bool) -> list[np.ndarray]:

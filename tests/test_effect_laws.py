@@ -70,6 +70,11 @@ def test_end_caps_are_the_written_formula():
     axial = e * np.pi * 0.08**2 * GLASS.C * np.sin(np.arctan(np.cos(psi) / np.tan(GLASS.gamma0))) / unit
     np.testing.assert_allclose(along, axial, rtol=1e-12)
     np.testing.assert_allclose(across, e * np.pi * 0.08**2 * np.sin(psi) / unit, rtol=1e-12)
+    rounded = EndCaps(radius=0.08, head=4.0, tail=0.0, across=1.0).traction(GLASS, np.cos(psi), np.sin(psi))
+    np.testing.assert_allclose(
+        rounded[0], along[0] / np.cos(psi[0]) * np.cos(psi), rtol=2e-3
+    )  # as cos psi, from psi = 0
+    np.testing.assert_array_equal(rounded[1], across)
 
 
 def test_skin_friction_scales_the_drag_along_by_the_way_it_slides():

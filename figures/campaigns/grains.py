@@ -1,11 +1,12 @@
 """Swims, reversals and lift in beds of grains, as CSV files; hours of computing, run by hand.
 
-    python -m figures.campaigns.grains swims STORE        circles of three links beside the law of their grains
-    python -m figures.campaigns.grains reversals STORE    a rod to and fro, across its axis and along
-    python -m figures.campaigns.grains lift STORE         bars of three sections
-    python -m figures.campaigns.grains plates STORE       plates at the angles of a round bar's leading face
-    python -m figures.campaigns.grains faces STORE        stress around the bars of `lift`, and around a shell
-    python -m figures.campaigns.grains convergence STORE  a bar with another step, stiffness, width or depth of the bed
+    python -m figures.campaigns.grains swims STORE             three and seven links
+    python -m figures.campaigns.grains swim-convergence STORE  three links with another step, stiffness or bed
+    python -m figures.campaigns.grains reversals STORE         a rod to and fro, across its axis and along
+    python -m figures.campaigns.grains lift STORE              bars of three sections
+    python -m figures.campaigns.grains plates STORE            plates at the angles of a round bar's leading face
+    python -m figures.campaigns.grains faces STORE             stress around the bars of `lift`, and around a shell
+    python -m figures.campaigns.grains convergence STORE       a bar with another step, stiffness, width or depth
 
 STORE is a folder for settled beds and runs. What is there is read and what is missing computed, so that a stopped campaign
 goes on. Each prints what it has as it comes and writes its file at the end. `BEDS`, `SWIMS`, `STROKES` and `BARS` say what
@@ -25,13 +26,20 @@ import numpy as np
 from geomech.io.files import write_text
 from geomech.scenes import load
 from geomech.studies.grain_swim import RAMP, GrainSwim, cycle_poses
-from rft.grains import Bed, Experiment, Spheres, Stroke, Tow, plate, rod
+from rft.grains import Bed, Experiment, Run, Spheres, Stroke, Tow, plate, rod
 from rft.grains.drag import Steady, steady
 from rft.grains.reversal import drags
 
 FOLDER = Path(__file__).parent
 BEDS = (1, 2, 3)  # seeds
-SWIMS = ((1.0, 1.0, BEDS), (1.7, 1.0, BEDS[:2]))  # amplitude, rad, frequency, Hz, and seeds
+CIRCLE, BUTTERFLY, WAVE = "three-link-glass", "butterfly-glass", "seven-link-modes"
+SWIMS = (  # scene, amplitude, rad, frequency, Hz
+    *((CIRCLE, amplitude, 1.0) for amplitude in (1.0, 1.7, 0.5, 1.5, 2.0)),
+    (BUTTERFLY, 1.0, 1.0),
+    *((WAVE, amplitude, 1.0) for amplitude in (0.5, 0.87, 1.2)),
+    (CIRCLE, 1.0, 0.5),
+    (CIRCLE, 1.7, 0.5),
+)
 STROKES = (  # amplitude, m, depth, m, and angle from its axis, degrees, of the ways of a rod 12 mm in diameter
     (0.02, 0.0245, 90),
     (0.01, 0.0245, 90),
@@ -54,13 +62,14 @@ PLATES = (  # height, m, and tilts of the face from the underside of a cylinder,
 )
 THICKNESS, EDGE = 3e-3, 3e-3  # m, of plates, and of the strips along their edges that are no middle: half a grain
 GRAIN = 1e-3  # m, radius of the spheres of bars and plates
+TEXTS = "scene", "change", "shape", "part"  # columns that are no numbers
 Rows = Iterator[tuple]
 
 
 def swims(store: Path) -> Rows:
-    """Yield the displacement of every cycle of a three-link swimmer, 162 x 12 mm."""
+    """Yield the displacement of every cycle of the swimmers of `SWIMS`, 162 x 12 mm, in every bed."""
     yield (
-        "gait",
+        "scene",
         "amplitude",
         "frequency_Hz",
         "bed",
@@ -72,17 +81,48 @@ def swims(store: Path) -> Rows:
         "packing",
         "surface_m",
     )
-    scene = load("three-link-glass")
-    for amplitude, frequency, seeds in SWIMS:
-        gait = replace(scene.gait, amplitude=amplitude, frequency=None if frequency == 1.0 else frequency)
-        for seed in seeds:
-            question = GrainSwim(scene.changed(gait=gait), seed=seed)
+    for scene, amplitude, frequency in SWIMS:
+        for seed in BEDS:
+            question = swim(scene, amplitude, frequency, seed)
             run = question.experiment.run(store)
-            starts = (RAMP + np.arange(question.cycles + 1)) / question.frequency
-            size = question.experiment.body.size
-            work = np.diff(np.interp(starts, run.t, run.work))
-            for k, (pose, joule) in enumerate(zip(cycle_poses(run, starts) / [size, size, 1.0], work), 1):
-                yield "circle", amplitude, frequency, seed, k, *pose, joule, run.facts["packing"], run.facts["surface"]
+            for cycle in cycles(question, run):
+                facts = run.facts["packing"], run.facts["surface"]
+                yield scene, amplitude, frequency, seed, *cycle, *facts
+
+
+def swim(scene: str, amplitude: float, frequency: float, seed: int) -> GrainSwim:
+    """Return a swim of a built-in scene with another amplitude (rad) and frequency (Hz)."""
+    built_in = load(scene)
+    gait = replace(built_in.gait, amplitude=amplitude, frequency=None if frequency == 1.0 else frequency)
+    return GrainSwim(built_in.changed(gait=gait), seed=seed)
+
+
+def cycles(question: GrainSwim, run: Run) -> Rows:
+    """Yield number, displacement (x and y in body lengths, heading in rad) and work, J, of every cycle of a swim."""
+    starts = (RAMP + np.arange(question.cycles + 1)) / question.frequency
+    size = question.experiment.body.size
+    work = np.diff(np.interp(starts, run.t, run.work))
+    for k, (pose, joule) in enumerate(zip(cycle_poses(run, starts) / [size, size, 1.0], work), 1):
+        yield k, *pose, joule
+
+
+def swim_convergence(store: Path) -> Rows:
+    """Yield the displacement of every cycle of a circle of 1 rad, with one number of its bed changed at a time."""
+    yield "change", "cycle", "x_BL", "y_BL", "heading_rad", "work_J", "mean_overlap", "largest_overlap"
+    question = swim(CIRCLE, 1.0, 1.0, BEDS[0])
+    experiment, bed = question.experiment, question.experiment.bed
+    changes = {
+        "none": bed,
+        "half the time step": replace(bed, time_step=bed.step / 2),
+        "young 5 MPa": replace(bed, young=5e6),
+        "16 mm deeper": replace(bed, depth=bed.depth + 0.016),
+        "60 mm longer and wider": replace(bed, length=bed.length + 0.06, width=bed.width + 0.06),
+    }
+    for name, changed in changes.items():
+        run = replace(experiment, bed=changed, depth=bed.depth / 2).run(store)
+        overlaps = run.overlaps[:, 1].mean(), run.overlaps[:, 0].max()
+        for cycle in cycles(question, run):
+            yield f'"{name}"', *cycle, *overlaps
 
 
 def reversals(store: Path) -> Rows:
@@ -180,6 +220,7 @@ def convergence(store: Path) -> Rows:
 
 CAMPAIGNS: dict[str, Callable[[Path], Rows]] = {
     "swims": swims,
+    "swim-convergence": swim_convergence,
     "reversals": reversals,
     "lift": lift,
     "plates": plates,
@@ -191,12 +232,12 @@ CAMPAIGNS: dict[str, Callable[[Path], Rows]] = {
 def main(name: str, store: str) -> None:
     """Run a campaign and write its file."""
     bed = TROUGH if name in ("lift", "plates", "faces", "convergence") else Bed()
-    seeds = "" if name == "convergence" else f", seeds {BEDS}"
+    seeds = "" if name.endswith("convergence") else f", seeds {BEDS}"
     lines = [f"# python -m figures.campaigns.grains {name} STORE", f"# {replace(bed, seed=BEDS[0])!r}{seeds}"]
     for row in CAMPAIGNS[name](Path(store)):
         lines.append(",".join(f"{x:.5g}" if isinstance(x, float) else str(x) for x in row))
         print(lines[-1], flush=True)
-    write_text(FOLDER / f"grains_{name}.csv", "\n".join(lines) + "\n")
+    write_text(FOLDER / f"grains_{name.replace('-', '_')}.csv", "\n".join(lines) + "\n")
 
 
 def read(name: str) -> dict[str, np.ndarray]:
@@ -206,7 +247,7 @@ def read(name: str) -> dict[str, np.ndarray]:
     with open(FOLDER / f"grains_{name}.csv") as file:
         rows = list(DictReader(line for line in file if not line.startswith("#")))
     as_column = lambda key: np.array([row[key] for row in rows])
-    return {key: as_column(key) if key in ("gait", "shape") else as_column(key).astype(float) for key in rows[0]}
+    return {key: as_column(key) if key in TEXTS else as_column(key).astype(float) for key in rows[0]}
 
 
 if __name__ == "__main__":

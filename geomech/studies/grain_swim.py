@@ -154,9 +154,8 @@ def predictions(question: GrainSwim) -> Predictions:
     found = dict(_predicted(scene))
     body = question.experiment.body
     law = Calibration(FLANK, end_caps="fitted").ask().subject
-    caps = EndCaps(body.half_width / body.size, law.end_caps / 2, law.end_caps / 2)
     others = tuple(e for e in question.swimmer.effects if not isinstance(e, EndCaps))
-    system = replace(question.swimmer, medium=law.medium, effects=(*others, caps))
+    system = replace(question.swimmer, medium=law.medium, effects=(*others, law.caps(body.half_width / body.size)))
     found[GRAINS_LAW] = dict(_predicted(scene.changed(system=system), ("direct",)))["direct"]
     return found
 

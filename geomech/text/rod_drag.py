@@ -86,6 +86,6 @@ def medium(result: Result) -> str:
     )
     caps = ""
     if f.data.ends is not None and f.end_caps:
-        e = f"e = {f.end_caps:.3g} +- {f.errors[-1]:.2g}"
+        e = ", ".join(f"{n} = {x:.3g} +- {d:.2g}" for n, x, d in zip(("e", "across"), f.values[-2:], f.errors[-2:]))
         caps = f'# Of the flank alone. Both ends together, in [[effects]] kind = "end-caps": {e}.\n'
     return f"{fitted}{of if uncertain else ''}.\n{caps}" + table("medium", result.attributes["medium"])
