@@ -51,7 +51,8 @@ def compute(amplitudes=AMPLITUDES, others=OTHERS, travels=TRAVELS) -> dict:
     scene and amplitude, by name distances and spread (float, float). "swims": by scene, amplitude, rad, and frequency, Hz,
     (distance, error), BL. "lift": by shape {"grains", "error", "keep", "cut"}, lift over drag. "reversal": by (depth, m, angle
     from the axis, degrees) and "flank" or "ends" {"plateau", "at_once", "travel", "start", "rms": (mean, error)} of
-    `rft.grains.reversal.Recovery`, by all amplitudes together. "ways": by (amplitude, m, angle) {"travel" since the second
+    `rft.grains.reversal.Recovery`, by all amplitudes together. "stretches": by (amplitude, m, depth, m, angle) (mean, error) of
+    the share of the flank's late drag that is there at once after the second reversal, and of the travel, m, to 95 % of it. "ways": by (amplitude, m, angle) {"travel" since the second
     reversal, m, "grains", "law"}, shares of the plateau, 24.5 mm deep."""
     found = {case: predicted(case[0], [case[1]], travels) for case in others}
     return {
@@ -64,6 +65,7 @@ def compute(amplitudes=AMPLITUDES, others=OTHERS, travels=TRAVELS) -> dict:
         "swims": measured_swims(),
         "lift": {name: lifts(name, rod) for name, rod in BARS.items()},
         "reversal": measured_reversals(),
+        "stretches": measured_stretches(),
         "ways": ways(),
     }
 
@@ -136,6 +138,27 @@ def measured_reversals() -> dict:
     return found
 
 
+def measured_stretches() -> dict:
+    """Return what fits to each bed alone say, drag = late (1 - (1 - share) exp(-travel / length)), with the mean of the last 40
+    % of the stretch as the late drag."""
+    from scipy.optimize import curve_fit
+
+    found = {}
+    for a, depth, angle in grains.STROKES:
+        fits = []
+        for bed in grains.BEDS:
+            ((_, way, drag),) = reversal_cases(depth, angle, "flank", (bed,), (a,))
+            x, drag = (way - 3 * a)[way > 3 * a], drag[way > 3 * a]
+            share = lambda x, at_once, length: 1 - (1 - at_once) * np.exp(-x / length)
+            late = drag[x > 0.6 * 2 * a].mean()
+            bounds = [-1, x[1] - x[0]], [1, 4 * a]  # nothing faster than a bin is seen
+            (at_once, length), _ = curve_fit(share, x, drag / late, (0.2, a / 2), bounds=bounds)
+            fits.append((at_once, length * np.log((1 - at_once) / 0.05)))
+        pairs = np.transpose([np.mean(fits, 0), np.std(fits, 0, ddof=1) / np.sqrt(len(fits))])
+        found[a, depth, angle] = {"at_once": tuple(pairs[0]), "travel": tuple(pairs[1])}
+    return found
+
+
 def ways(depth: float = 0.0245, fitted: float = 0.02) -> dict:
     """Return drags after the second reversal, and the law fitted at one amplitude, m, alone."""
     found = {}
@@ -191,7 +214,16 @@ def table(numbers: dict) -> str:
         for (depth, angle, part), x in numbers["reversal"].items()
     ]
     back = style.table(("drag after a reversal", "plateau, N", "at once", "95 % after"), rows)
-    return f"{lines}\n{lifted}\n{back}"
+    rows = [
+        (
+            f"{1e3 * a:g} mm {'across' if angle else 'along'}, {1e3 * depth:.3g} mm deep",
+            "{:.2f} +- {:.2f}".format(*x["at_once"]),
+            "{:.1f} +- {:.1f} mm".format(*(1e3 * np.array(x["travel"]))),
+        )
+        for (a, depth, angle), x in sorted(numbers["stretches"].items(), key=lambda item: item[0][1:] + item[0][:1])
+    ]
+    each = style.table(("second reversal", "at once of the late drag", "95 % of it after"), rows)
+    return f"{lines}\n{lifted}\n{back}\n{each}"
 
 
 @plots.styled

@@ -258,6 +258,9 @@ def test_the_figure_of_grains_shows_beds_beside_laws():
         fits.append(recovery([(rows["amplitude_m"][m][0], rows["travel_m"][m], rows["flank_N"][m]) for m in mine]))
     travel = np.array([fit.travel for fit in fits])
     assert across["travel"] == pytest.approx((travel.mean(), travel.std(ddof=1) / np.sqrt(3)))
+    late = {case: (x["at_once"][0], 1e3 * x["travel"][0]) for case, x in numbers["stretches"].items()}
+    assert late[0.04, 0.0245, 90] == pytest.approx((0.32, 61.4), abs=0.05)
+    assert late[0.02, 0.0150, 90] == pytest.approx((-0.03, 36.8), abs=0.05)
     for (a, angle), way in numbers["ways"].items():  # fitted at 20 mm
         assert np.sqrt(np.mean((way["grains"] - way["law"]) ** 2)) < 0.11, (a, angle)
     assert "circle 1 rad" in figure.table(numbers)

@@ -2,6 +2,7 @@
 
     python -m figures.campaigns.grains swims STORE             three and seven links
     python -m figures.campaigns.grains swim-convergence STORE  three links with another step, stiffness or bed
+    python -m figures.campaigns.grains swim-depth STORE        three links deeper below the surface
     python -m figures.campaigns.grains reversals STORE         a rod to and fro, across its axis and along
     python -m figures.campaigns.grains lift STORE              bars of three sections
     python -m figures.campaigns.grains plates STORE            plates at the angles of a round bar's leading face
@@ -53,6 +54,7 @@ STROKES = (  # amplitude, m, depth, m, and angle from its axis, degrees, of the 
 )
 BARS = ("round", "half round", "half round, flat up")
 SHELL = "half shell, hollow ahead"
+DEEPER = 0.016  # m of bed above a swimmer, or below
 SPEED = 0.1  # m/s of rods
 LONGEST_BIN = 2e-3  # m of the way of a rod to and fro
 TROUGH = Bed(length=0.06, width=0.30, depth=0.048)  # for bars across it
@@ -115,7 +117,7 @@ def swim_convergence(store: Path) -> Rows:
         "none": bed,
         "half the time step": replace(bed, time_step=bed.step / 2),
         "young 5 MPa": replace(bed, young=5e6),
-        "16 mm deeper": replace(bed, depth=bed.depth + 0.016),
+        "16 mm deeper": replace(bed, depth=bed.depth + DEEPER),
         "60 mm longer and wider": replace(bed, length=bed.length + 0.06, width=bed.width + 0.06),
     }
     for name, changed in changes.items():
@@ -123,6 +125,18 @@ def swim_convergence(store: Path) -> Rows:
         overlaps = run.overlaps[:, 1].mean(), run.overlaps[:, 0].max()
         for cycle in cycles(question, run):
             yield f'"{name}"', *cycle, *overlaps
+
+
+def swim_depth(store: Path) -> Rows:
+    """Yield the displacement of every cycle of a circle of 1 rad in beds that are deeper above the body."""
+    yield "depth_m", "bed", "cycle", "x_BL", "y_BL", "heading_rad", "work_J"
+    for seed in BEDS:
+        question = swim(CIRCLE, 1.0, 1.0, seed)
+        bed = question.experiment.bed
+        deep, depth = replace(bed, depth=bed.depth + DEEPER), bed.depth / 2 + DEEPER
+        run = replace(question.experiment, bed=deep, depth=depth).run(store)
+        for cycle in cycles(question, run):
+            yield depth, seed, *cycle
 
 
 def reversals(store: Path) -> Rows:
@@ -221,6 +235,7 @@ def convergence(store: Path) -> Rows:
 CAMPAIGNS: dict[str, Callable[[Path], Rows]] = {
     "swims": swims,
     "swim-convergence": swim_convergence,
+    "swim-depth": swim_depth,
     "reversals": reversals,
     "lift": lift,
     "plates": plates,
