@@ -270,8 +270,8 @@ def hunted(some: list[Mutant], watch: Watch, folder: Path, jobs: int) -> Iterato
 
 def report(asked: argparse.Namespace, folder: Path) -> None:
     files = sorted(p.relative_to(ROOT).as_posix() for top in PACKAGES for p in (ROOT / top).rglob("*.py"))
-    watched = [f for f in files if f in TABLE["tests"] or not f.startswith(tuple(TABLE["unwatched"]))]
-    every = [m for f in watched if f.startswith(tuple(asked.only)) for m in mutants_of(ROOT / f)]
+    files = [f for f in files if f.startswith(tuple(asked.only)) and not f.startswith(tuple(TABLE["unwatched"]))]
+    every = [m for f in files for m in mutants_of(ROOT / f)]
     some = random.Random(asked.seed).sample(every, min(asked.count, len(every)))[asked.done :]
     print(f"{len(some)} of {len(every)} mutants, seed {asked.seed}", flush=True)
     known = {(x["file"], x["change"].strip()): x["why"] for x in TABLE.get("equivalent", ())}
