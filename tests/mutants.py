@@ -4,7 +4,7 @@
     python tests/mutants.py calls.txt --count 200 --seed 1 --jobs 2 [--only rft/loads.py rft/bodies]
 
 The first line runs the suite once and notes which functions each test calls, and its seconds. A mutant then meets the
-tests that call the function in which it stands (of a constant: any of its class, or file), quickest first, and, as far
+tests that call the function in which it stands (of a constant: any of its class, file or folder), quickest first, and as far
 as `ENOUGH` seconds go, the rest of their files, which may look at what a fixture or a cache holds. `mutants.toml` beside
 this file names the tests of what Python does not see called, what is left out and which mutants are no bugs. Mutants
 live in copies of the tree in the system's temporary folder, one a worker; the checkout is only read. A mutant is killed
@@ -146,10 +146,10 @@ def mutants_of(path: Path) -> list[Mutant]:
 
 
 def outwards(place: str) -> Iterator[str]:
-    """A place (a file, a dot and a qualified name), the function or class around it, and so on to the file."""
-    yield place
-    if not place.endswith(".py"):
-        yield from outwards(place.rpartition(".")[0])
+    """A place (a file, a dot and a qualified name), the function or class around it, and so on to the file and folders."""
+    while place:
+        yield place
+        place = place.rpartition("." if ".py." in place else "/")[0]
 
 
 class Calls:
@@ -265,7 +265,8 @@ def hunted(some: list[Mutant], watch: Watch, folder: Path, jobs: int) -> Iterato
             done, tree = running.pop(child)
             (tree / done.file).write_text(done.source)
             trees.append(tree)
-            yield done, "time-out" if os.WIFSIGNALED(status) else "killed" if status else "survived"
+            late = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGKILL, signal.SIGXCPU, signal.SIGALRM)
+            yield done, "time-out" if late else "killed" if status else "survived"
 
 
 def report(asked: argparse.Namespace, folder: Path) -> None:
