@@ -109,7 +109,10 @@ NUMBERS = [
     ("rod's density", having(Rod, "density"), 1e-9, 1e6),
     ("curvature of a leg", lambda x: leg(0.1, x, 1e-3, 0.02, 2, 2, 1), -1.0, 1.0),
     ("width of a leg", lambda x: leg(0.1, 0.5, 1e-3, x, 2, 2, 1), 1e-6, 1e3),
-    *((f"objective's {name}", having(functools.partial(Objective, "speed"), name), 1e-9, 1e9) for name in ("rate", "power")),
+    *(
+        (f"objective's {name}", having(functools.partial(Objective, "speed"), name), 1e-9, 1e9)
+        for name in ("rate", "power")
+    ),
     ("body length of midlines", lambda x: Midlines(midlines="trial.csv", body_length=x).check(), 1e-9, 1e9),
     *((f"grains' {name}", having(Grains, name, law=Spatial(3e5)), 0.0, 1e9) for name in ("strength", "flux")),
     ("grains' rounding", having(Grains, "rounding", law=Spatial(3e5)), 1e-7, 10.0),
