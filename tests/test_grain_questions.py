@@ -105,6 +105,8 @@ def test_a_drag_is_a_file_that_fit_medium_reads(towed, tmp_path):
     assert "rod 14 x 180 mm, 25.5 mm deep, in 2 beds of 16,225 grains, packing 0.600" in words
     assert "      0   2.05 +- 0.05" in words and "e = 1.70 of both together" in words
     assert max(map(len, words.splitlines())) < 100
+    one_bed = text.text(dataclasses.replace(question, beds=1).ask())
+    assert "25.5 mm deep, in a bed of 16,225 grains, packing 0.600; +- error in time" in one_bed
     numbers = text.numbers(result)
     assert numbers["law"]["C"] == pytest.approx(3.1, rel=2e-3) and numbers["law_errors"]["end_caps"] > 0
     files.write_drag(result, tmp_path)
