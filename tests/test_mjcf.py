@@ -202,6 +202,12 @@ def test_an_actuator_that_is_named_must_follow_the_clock(cart):
         Mjcf(str(file), NAMES, actuators=("fl",))
 
 
+def test_a_sweep_over_robots_that_its_engine_does_not_take_is_refused(cart):
+    (cart / "bad.toml").write_text(SCENE.replace("steps = 8", 'engine = "planar"', 1))
+    with pytest.raises(ValueError, match="use engine mujoco"):
+        walking.Walks().grid(scenes.load(cart / "bad.toml"), {"gait.frequency": [1.0, 2.0]})
+
+
 def test_a_machine_is_known_by_what_it_includes_too(cart):
     whole, part = CART.replace('size="0.06 0.03 0.01"', 'size="{} 0.03 0.01"'), cart / "parts" / "whole.xml"
     (cart / "parts" / "cart.xml").write_text('<mujoco><include file="whole.xml"/></mujoco>')
