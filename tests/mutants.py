@@ -1,8 +1,12 @@
 """Small bugs put into the code on purpose, to see whether a test notices. By hand, not collected by pytest:
 
-    python tests/mutants.py --count 200 --seed 1 --jobs 2 [--only rft/loads.py rft/bodies]
+    python tests/mutants.py calls.txt --measure
+    python tests/mutants.py calls.txt --count 200 --seed 1 --jobs 2 [--only rft/loads.py rft/bodies]
 
-`mutants.toml` beside this file says which tests watch a module, what is left out and which mutants are no bugs. Mutants
+The first line runs the suite once and notes which functions each test calls, and its seconds. A mutant then meets the
+tests that call the function in which it stands (of a constant: any of its class, file or folder), quickest first, and as far
+as `ENOUGH` seconds go, the rest of their files, which may look at what a fixture or a cache holds. `mutants.toml` beside
+this file names the tests of what Python does not see called, what is left out and which mutants are no bugs. Mutants
 live in copies of the tree in the system's temporary folder, one a worker; the checkout is only read. A mutant is killed
 when a test fails; time-outs, far longer than without it, are counted apart. Survivors are printed as what they change.
 `--done 50` goes on with a run that was stopped after 50.
@@ -14,25 +18,29 @@ import collections
 import copy
 import difflib
 import importlib
-import importlib.util
+import inspect
+import itertools
+import json
 import os
 import random
 import resource
-import runpy
 import shutil
 import signal
 import sys
 import tempfile
+import threading
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).parents[1]
+PACKAGES = "rft/", "geomech/"
 TABLE = tomllib.loads((ROOT / "tests/mutants.toml").read_text())
 # In one process and without time limits of its own, whatever the suite's settings are.
-PYTEST = ["-qx", "--assert=plain", "--hypothesis-seed=0", "-p", "no:cacheprovider"]
+PYTEST = ["-q", "--assert=plain", "--hypothesis-seed=0", "-p", "no:cacheprovider"]
 PYTEST += ["-o", "addopts=", "-o", "timeout=0", "-m", "not soak and not benchmark"]
+ENOUGH = 30  # s of CPU that the tests of one mutant may take
 # Loaded once, before each mutant's process splits off.
 HEAVY = "pytest numpy scipy.interpolate scipy.special scipy.stats sympy mpmath hypothesis.strategies matplotlib.pyplot xarray"
 CLEAN = {"PYTHONDONTWRITEBYTECODE": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MPLBACKEND": "agg"}
@@ -44,24 +52,13 @@ OPPOSITE = {ast.Lt: ast.GtE, ast.LtE: ast.Gt, ast.Gt: ast.LtE, ast.GtE: ast.Lt, 
 OPPOSITE |= {ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In}
 PAIRS = "minimum maximum, min max, sin cos, real imag, any all, zeros ones, zeros_like ones_like, floor ceil, sum mean"
 TWIN = {p[i]: p[1 - i] for p in map(str.split, (PAIRS + ", argmin argmax, exp expm1").split(",")) for i in (0, 1)}
-EITHER_WAY = {
-    "max",
-    "min",
-    "maximum",
-    "minimum",
-    "fmax",
-    "fmin",
-    "hypot",
-    "distance",
-    "pose_distance",
-    "dot",
-    "plus",
-}  # of two arguments
+EITHER_WAY = "max min maximum minimum fmax fmin hypot distance pose_distance dot plus"  # functions of two arguments
 
 
 class Mutant(NamedTuple):
     file: str
     line: int
+    scope: str  # qualified name of the function or class around it, "" outside of all
     source: str  # of the whole file
     mutated: str
 
@@ -98,7 +95,7 @@ def variants(node):
             yield with_(attr=TWIN[name])
         case ast.Call(args=args, keywords=given):
             yield from (with_(keywords=[*given[:k], *given[k + 1 :]]) for k in range(len(given)))
-            either_way = len(args) == 2 and ast.unparse(node.func).rpartition(".")[2] in EITHER_WAY
+            either_way = len(args) == 2 and ast.unparse(node.func).rpartition(".")[2] in EITHER_WAY.split()
             told_apart = len({*map(ast.dump, args[:2])}) == 2 and not any(isinstance(x, ast.Starred) for x in args[:2])
             if told_apart and not either_way:
                 yield with_(args=[args[1], args[0], *args[2:]])
@@ -121,31 +118,107 @@ def nodes(tree):
                 yield from () if isinstance(node, ast.Raise) else nodes(node)
 
 
+def scopes(node, name=""):
+    """(first line, last line, qualified name) of a tree and of each function and class in it, outer ones first."""
+    if isinstance(node, ast.Module):
+        yield 0, sys.maxsize, name
+    for x in ast.iter_child_nodes(node):
+        if isinstance(x, (ast.FunctionDef, ast.ClassDef)):
+            yield x.lineno, x.end_lineno, name + x.name
+            yield from scopes(x, f"{name}{x.name}." + "<locals>." * isinstance(x, ast.FunctionDef))
+        else:
+            yield from scopes(x, name)
+
+
 def mutants_of(path: Path) -> list[Mutant]:
     file, text = path.relative_to(ROOT).as_posix(), path.read_bytes()
     starts = [0, *(i + 1 for i, byte in enumerate(text) if byte == 10)]
     tree, found = ast.parse(text), {}
+    around = list(scopes(tree))
     for part, new in (v for node in nodes(tree) for v in variants(node)):
         low, high = starts[part.lineno - 1] + part.col_offset, starts[part.end_lineno - 1] + part.end_col_offset
         code = ast.unparse(ast.fix_missing_locations(new))
         bare = isinstance(new, (ast.stmt, ast.Name)) or (isinstance(new, ast.Constant) and "-" not in code)
         mutated = (text[:low] + (code if bare else f"({code})").encode() + text[high:]).decode()
-        found[mutated] = Mutant(file, part.lineno, text.decode(), mutated)
+        scope = [name for first, last, name in around if first <= part.lineno <= last][-1]
+        found[mutated] = Mutant(file, part.lineno, scope, text.decode(), mutated)
     return list(found.values())
 
 
-def watch(file: str) -> list[str] | None:
-    """The tests that watch a file, of the longest entry in the table with which it begins; None if it has none."""
-    keys = [key for key in TABLE["tests"] if file.startswith(key)]
-    return TABLE["tests"][max(keys, key=len)] if keys else None
+def outwards(place: str) -> Iterator[str]:
+    """A place (a file, a dot and a qualified name), the function or class around it, and so on to the file and folders."""
+    while place:
+        yield place
+        place = place.rpartition("." if ".py." in place else "/")[0]
 
 
-def start(tree: Path, tests: list[str], seconds: float) -> int:
-    """The id of a new process that runs some test files in a copy of the tree, with so much CPU time at most."""
+class Calls:
+    """A plugin of pytest that writes a line for each test: its CPU time, and the functions of the project it calls."""
+
+    def __init__(self, tree: Path, file: Path):
+        self.tree, self.file = f"{tree}/", file
+
+    def pytest_runtest_logstart(self, nodeid):
+        self.codes, self.failed, self.start = {}, False, sum(os.times()[:4])
+        threading.settrace(self.note)
+        sys.settrace(self.note)
+
+    def note(self, frame, *_):
+        self.codes[id(frame.f_code)] = frame.f_code  # whose hash takes long
+
+    def pytest_runtest_logreport(self, report):
+        self.failed |= report.failed
+
+    def pytest_runtest_logfinish(self, nodeid):
+        sys.settrace(None)
+        threading.settrace(None)
+        calls = set()
+        for code in self.codes.values():
+            if code.co_filename.startswith(self.tree) and code.co_flags & inspect.CO_OPTIMIZED:  # no class, no module
+                name = code.co_qualname.partition(".<locals>.<")[0]  # what is around a lambda
+                calls.add(f"{code.co_filename.removeprefix(self.tree)}.{name}")
+        calls = sorted(x for x in calls if x.startswith(PACKAGES))
+        if not self.failed:
+            with self.file.open("a") as file:
+                print(json.dumps([nodeid, round(sum(os.times()[:4]) - self.start, 3), calls]), file=file)
+
+
+class Watch:
+    """The tests that watch a mutant, from a file that `Calls` wrote."""
+
+    def __init__(self, file: Path):
+        self.seconds, self.calling = {}, collections.defaultdict(set)  # by test; and tests by place
+        for line in file.open():
+            test, self.seconds[test], calls = json.loads(line)
+            for place in {place for call in calls for place in outwards(call)}:
+                self.calling[place].add(test)
+
+    def over(self, m: Mutant) -> list[str]:
+        """The tests to be run on a mutant, file by file, the quickest first."""
+        if named := TABLE["tests"].get(m.file):
+            near = {test for test in self.seconds if file_of(test) in named}
+        else:
+            places = outwards(f"{m.file}.{m.scope}".rstrip("."))
+            near = next((self.calling[x] for x in places if x in self.calling), set())
+        files, some, sums = {file_of(test) for test in near}, [], collections.Counter()
+        every = (test for test in self.seconds if file_of(test) in files)
+        for test in sorted(every, key=lambda test: (test not in near, self.seconds[test])):
+            if sums.total() < ENOUGH:
+                some.append(test)
+                sums[file_of(test)] += self.seconds[test]
+        return sorted(some, key=lambda test: (sums[file_of(test)], file_of(test)))
+
+
+def file_of(test: str) -> str:
+    """The name of a test's file, as the table has it."""
+    return test.partition("::")[0].removeprefix("tests/test_").removesuffix(".py")
+
+
+def start(tree: Path, tests: list[str], seconds: float, *options: str, plugins=()) -> int:
+    """The id of a new process that runs some tests in a copy of the tree, with so much CPU time at most."""
     if child := os.fork():
         return child
     try:
-        os.nice(10)
         resource.setrlimit(resource.RLIMIT_CPU, (int(seconds),) * 2)
         resource.setrlimit(resource.RLIMIT_AS, (8 << 30,) * 2)
         signal.alarm(int(10 * seconds))  # for what sleeps
@@ -153,70 +226,83 @@ def start(tree: Path, tests: list[str], seconds: float) -> int:
         os.dup2(1, 2)
         os.chdir(tree)
         os.environ["PYTHONPATH"] = sys.path[0] = str(tree)
-        if "backend" in tests and importlib.util.find_spec("numba"):  # else they are skipped
-            runpy.run_module("rft")
-        slow = [f"--deselect=tests/test_{name}.py::test_{x}" for name in tests for x in TABLE["slow"].get(name, ())]
-        os._exit(importlib.import_module("pytest").main([*PYTEST, *slow, *(f"tests/test_{x}.py" for x in tests)]))
+        for _, some in itertools.groupby(tests, file_of):  # each is read when it is its turn
+            if status := importlib.import_module("pytest").main([*PYTEST, *options, *some], plugins):
+                os._exit(status)
+        os._exit(0)
     finally:
         os._exit(1)
 
 
-def hunted(some: list[Mutant], folder: Path, jobs: int) -> Iterator[tuple[Mutant, str]]:
+def copied(tree: Path) -> Path:
+    left = (".git", ".venv", ".*_cache", "__pycache__", "build", "*.egg-info", "results")
+    return Path(shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(*left)))
+
+
+def measure(file: Path, folder: Path) -> None:
+    """Write what each test calls, with a process for each file of tests."""
+    tree = copied(folder / "0")
+    file.write_text("")
+    for path in sorted(ROOT.glob("tests/test_*.py")):
+        if file_of(f"tests/{path.name}") not in TABLE["sources"]:
+            child = start(tree, [f"tests/{path.name}"], 1200, plugins=[Calls(tree, file.absolute())])
+            print(path.stem, "fails, or is skipped whole" if os.waitpid(child, 0)[1] else "", flush=True)
+
+
+def hunted(some: list[Mutant], watch: Watch, folder: Path, jobs: int) -> Iterator[tuple[Mutant, str]]:
     """Each with "survived", "killed" or "time-out", so many at a time, each in a copy of the tree below ``folder``."""
-    trees = [folder / str(k) for k in range(jobs)]
-    for tree in trees:
-        shutil.copytree(
-            ROOT,
-            tree,
-            ignore=shutil.ignore_patterns(".git", ".venv", ".*_cache", "__pycache__", "build", "*.egg-info", "results"),
-        )
-    usual, running = {}, {}
-    for name in sorted({name for m in some for name in watch(m.file)}):
-        _, status, used = os.wait4(start(trees[0], [name], 600), 0)
-        if status:
-            sys.exit(f"tests/test_{name}.py does not pass as it is, or is skipped whole")
-        usual[name] = used.ru_utime + used.ru_stime
-    todo = iter(some)
+    trees, running, todo = [copied(folder / str(k)) for k in range(jobs)], {}, iter(some)
+    tests = sorted({test for m in some for test in watch.over(m)})
+    if os.waitpid(start(trees[0], tests, 600, "--collect-only"), 0)[1]:
+        sys.exit("there are other tests now: --measure anew")
     while (m := next(todo, None)) or running:
         if m:
-            tree = trees.pop()
+            tree, tests = trees.pop(), watch.over(m)
             (tree / m.file).write_text(m.mutated)
-            running[start(tree, watch(m.file), 10 + 3 * sum(usual[x] for x in watch(m.file)))] = m, tree
+            running[start(tree, tests, 30 + 3 * sum(watch.seconds[x] for x in tests), "-x")] = m, tree
         if not trees or not m:
             child, status = os.wait()
             done, tree = running.pop(child)
             (tree / done.file).write_text(done.source)
             trees.append(tree)
-            yield done, "time-out" if os.WIFSIGNALED(status) else "killed" if status else "survived"
+            late = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGKILL, signal.SIGXCPU, signal.SIGALRM)
+            yield done, "time-out" if late else "killed" if status else "survived"
+
+
+def report(asked: argparse.Namespace, folder: Path) -> None:
+    files = sorted(p.relative_to(ROOT).as_posix() for top in PACKAGES for p in (ROOT / top).rglob("*.py"))
+    files = [f for f in files if f.startswith(tuple(asked.only)) and not f.startswith(tuple(TABLE["unwatched"]))]
+    every = [m for f in files for m in mutants_of(ROOT / f)]
+    some = random.Random(asked.seed).sample(every, min(asked.count, len(every)))[asked.done :]
+    print(f"{len(some)} of {len(every)} mutants, seed {asked.seed}", flush=True)
+    known = {(x["file"], x["change"].strip()): x["why"] for x in TABLE.get("equivalent", ())}
+    counts = collections.Counter()
+    for m, outcome in hunted(some, Watch(asked.calls), folder, asked.jobs):
+        why = known.get((m.file, m.change())) if outcome == "survived" else None
+        counts["no bug" if why else outcome] += 1
+        more = f" no bug: {why}" if why else f"\n{m.change()}" if outcome == "survived" else ""
+        print(f"{outcome:8} {m.file}:{m.line}{more}", flush=True)
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    told = ", ".join(f"{count} {outcome}" for outcome, count in sorted(counts.items()))
+    print(f"\n{told}; {(used.ru_utime + used.ru_stime) / 60:.1f} minutes of CPU")
 
 
 def main() -> None:
     ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    ask.add_argument("calls", type=Path, help="the file of what each test calls")
+    ask.add_argument("--measure", action="store_true", help="write it")
     ask.add_argument("--count", type=int, default=200, help="how many, at random")
     ask.add_argument("--seed", type=int, default=1)
     ask.add_argument("--done", type=int, default=0, help="so many of them are left out: a stopped run had them")
     ask.add_argument("--jobs", type=int, default=2)
     ask.add_argument("--only", nargs="+", default=[""], help="beginnings of file names")
     asked = ask.parse_args()
-    files = sorted(p.relative_to(ROOT).as_posix() for top in ("rft", "geomech") for p in (ROOT / top).rglob("*.py"))
-    every = [m for f in files if watch(f) and f.startswith(tuple(asked.only)) for m in mutants_of(ROOT / f)]
-    some = random.Random(asked.seed).sample(every, min(asked.count, len(every)))[asked.done :]
-    print(f"{len(some)} of {len(every)} mutants, seed {asked.seed}", flush=True)
     os.environ.update(CLEAN)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # clean up then too
     for name in HEAVY.split():
         importlib.import_module(name)
-    known = {(x["file"], x["change"].strip()): x["why"] for x in TABLE.get("equivalent", ())}
-    counts = collections.Counter()
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
-        for m, outcome in hunted(some, Path(folder), asked.jobs):
-            why = known.get((m.file, m.change())) if outcome == "survived" else None
-            counts["no bug" if why else outcome] += 1
-            more = f" no bug: {why}" if why else f"\n{m.change()}" if outcome == "survived" else ""
-            print(f"{outcome:8} {m.file}:{m.line}{more}", flush=True)
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    told = ", ".join(f"{count} {outcome}" for outcome, count in sorted(counts.items()))
-    print(f"\n{told}; {(used.ru_utime + used.ru_stime) / 60:.1f} minutes of CPU")
+        measure(asked.calls, Path(folder)) if asked.measure else report(asked, Path(folder))
 
 
 if __name__ == "__main__":

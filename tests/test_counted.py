@@ -11,6 +11,7 @@ from geomech.gaits import Fourier
 from geomech.run.cost import BASE
 from geomech.studies import accuracy, cost, effort, motion, shape_space, sweep
 from geomech.studies.study import Study
+from geomech.tiers import TIERS
 from rft import Chain, body_velocity
 from rft.balance.listening import listening
 from rft.effects import SkinFriction, Slope
@@ -164,3 +165,11 @@ def test_memory_is_foretold_too_large_rather_than_too_small():
     finally:
         tracemalloc.stop()
     assert used < told < 6 * used
+
+
+def test_a_look_up_reads_the_numbers_of_the_nodes_around():
+    """3 d at each of (degree + 1)^d nodes; of harmonics 3 for each of their terms, cosine and sine of 1, 3 and 5."""
+    for scene, tier, count in ((FIVE, "path", 3 * 4 * 3**4), (GLASS, "path", 54), (GLASS, "harmonic", 3 * 6 * 9)):
+        numerics = scene.with_numerics(grid=4, interpolation=2, harmonics=5).numerics
+        plan = TIERS[tier].plan(scene.system, numerics, scene.gait, None)
+        assert (plan.read, plan.balances(3, 64)) == (count, 0)

@@ -108,6 +108,8 @@ def test_a_drag_is_a_file_that_fit_medium_reads(towed, tmp_path):
     assert "rod 14 x 180 mm, 25.5 mm deep, in 2 beds of 16,225 grains, packing 0.600" in words
     assert "      0   2.05 +- 0.05" in words and "e = 1.70 of both together" in words
     assert max(map(len, words.splitlines())) < 100
+    one_bed = text.text(dataclasses.replace(question, beds=1).ask())
+    assert "25.5 mm deep, in a bed of 16,225 grains, packing 0.600; +- error in time" in one_bed
     numbers = text.numbers(result)
     assert numbers["law"]["C"] == pytest.approx(3.1, rel=2e-3) and numbers["law_errors"]["end_caps"] > 0
     files.write_drag(result, tmp_path)
@@ -200,6 +202,17 @@ def test_a_swim_stands_beside_the_tiers(monkeypatch, tmp_path):
     head, columns, row, *_ = (tmp_path / "motion.csv").read_text().splitlines()
     assert "--cycles 2 --seed 1" in head and len(columns.split(",")) == len(row.split(",")) == 12
     assert (tmp_path / "grains.png").stat().st_size > 10_000
+    left, right = files.draw_swim(result).axes
+    run, times = result.subject[1], (0.0, 0.25, 0.75, 1.25)
+    for line, row in zip(left.lines[1:], np.minimum(np.searchsorted(run.t, times), 999), strict=True):
+        points = scene.system.body.points(run.alpha[row], run.pose[row])
+        np.testing.assert_allclose(line.get_xydata(), points / 0.3, atol=1e-12)
+    x, y = result["x"], result["y"]
+    distance = np.hypot(x.values, y.values)
+    np.testing.assert_allclose([bar.get_width() for bar in right.patches], distance)
+    ends = np.array([bar[:, 0] for bar in right.collections[0].get_segments()])
+    error = np.nan_to_num(np.hypot(x.values * x.error, y.values * y.error) / distance)
+    np.testing.assert_allclose(ends, np.transpose([distance - error, distance + error]))
 
 
 def test_sizes_that_are_none_are_refused():

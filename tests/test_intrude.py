@@ -4,6 +4,7 @@ import csv
 import dataclasses
 import json
 import math
+import types
 
 import numpy as np
 import pytest
@@ -460,3 +461,12 @@ def test_mutated_intruder_scenes_are_run_or_refused(seed):
     keys = f"{keys} samples elements closed points attitude A00 speed depth".split()
     seen = [outcome(mutated(texts[rng.integers(len(texts))], rng, keys, values)) for _ in range(500)]
     assert seen.count("run") > 50 and seen.count("refused") > 200
+
+
+def test_a_moment_of_roundoff_has_its_error_over_the_force_times_the_size():
+    """And where there is no force, either, an error is a force."""
+    question = types.SimpleNamespace(measures=("force", "moment"), scene=types.SimpleNamespace(size=0.5))
+    for force, over in ((4.0, 2.0), (0.0, 1.0)):
+        truth = [np.array([[force, 0.0]]), np.array([1e-15 * force])]
+        found = Settings.errors(question, [truth[0], truth[1] + 0.02], truth)
+        assert found == {"force": 0.0, "moment": pytest.approx(0.02 / over)}

@@ -11,6 +11,9 @@ from registry import GAITS
 
 from geomech.gaits import Butterfly, Circle, Ellipse, Points, Sine
 from geomech.geometry import connection, family, harmonics
+from geomech.geometry.field import Field
+from geomech.measured.midlines.question import Midlines
+from geomech.optimisation.objectives import Objective
 from geomech.systems import Swimmer
 from geomech.tiers import fitted
 from geomech.tiers.base import Numerics
@@ -33,7 +36,10 @@ from rft import (
     Viscous,
     body_velocity,
 )
+from rft.drag import Rod
 from rft.meshes import Spatial
+from rft.meshes.shapes import leg
+from rft.mujoco.media import sample
 from rft.plates import CLeg
 from rft.walking import Rhex
 from rft.walking.facets import Grains
@@ -96,6 +102,18 @@ NUMBERS = [
     ("off the family", FAMILY.area, 0.0, None),
     ("hip", lambda x: ROBOT(hips=(0.0, x)), -0.13, 0.13),
     ("leg's distance", lambda x: ROBOT(hips=(0.0, 0.1), aside=(0.03, x)), 0.0, 10.0),
+    ("grains' density", lambda x: Spatial.from_grains(x, 0.5), 1.0, 1e5),
+    ("grains' friction", lambda x: Spatial.from_grains(1500.0, x), 0.05, 1.5),
+    ("spread of media", lambda x: sample(Spatial(3e5), 1, spread=x), 0.0, 2.0),
+    *((f"rod's {name}", having(Rod, name), 1e-9, 1e3) for name in ("radius", "length", "depth")),
+    ("rod's density", having(Rod, "density"), 1e-9, 1e6),
+    ("curvature of a leg", lambda x: leg(0.1, x, 1e-3, 0.02, 2, 2, 1), -1.0, 1.0),
+    ("width of a leg", lambda x: leg(0.1, 0.5, 1e-3, x, 2, 2, 1), 1e-6, 1e3),
+    *(
+        (f"objective's {name}", having(functools.partial(Objective, "speed"), name), 1e-9, 1e9)
+        for name in ("rate", "power")
+    ),
+    ("body length of midlines", lambda x: Midlines(midlines="trial.csv", body_length=x).check(), 1e-9, 1e9),
     *((f"grains' {name}", having(Grains, name, law=Spatial(3e5)), 0.0, 1e9) for name in ("strength", "flux")),
     ("grains' rounding", having(Grains, "rounding", law=Spatial(3e5)), 1e-7, 10.0),
 ]
@@ -119,6 +137,10 @@ COUNTS = [
     ("phases", lambda n: Circle().cycle(n), 4, None),
     ("phases of the butterfly", lambda n: Butterfly().cycle(n), 11, None),
     ("hips", lambda n: ROBOT(hips=(0.05,) * n), 1, 20),
+    ("degree of a field", lambda n: Field((np.arange(9.0),), np.zeros(9), n), 0, 5),
+    ("axis of a field", Field((np.arange(4.0),) * 2, np.zeros((4, 4))).derivative, 0, 1),
+    ("media", lambda n: sample(Spatial(3e5), n, spread=0.1), 1, None),
+    ("quadrilaterals of a leg", lambda n: leg(0.1, 0.5, 1e-3, 0.02, n, 1, 1), 2, 4096),
     ("points of a gait", lambda n: Points(points=tuple((k, k * k) for k in range(n))), 3, None),
 ]
 

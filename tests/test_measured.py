@@ -817,6 +817,13 @@ def larger(rows):
     return rows
 
 
+def in_turn(rows):
+    """Two cycles of either size in turn."""
+    for k in range(85, len(rows), 120):
+        rows[k : k + 60, 1:3] = GAIT.middle + 1.4 * (rows[k : k + 60, 1:3] - GAIT.middle)
+    return rows
+
+
 BAD = {
     "gap": (lambda r: np.delete(r, slice(100, 120), 0), "line 101: no rows for 0.7 after this one .*, its one gap: cut"),
     "gaps": (lambda r: np.delete(r, [*range(100, 120), *range(220, 230)], 0), "line 101: .*, the longest of 2 gaps: cut"),
@@ -850,6 +857,7 @@ BAD = {
     "two other rates": (faster, "line 33: the gait stands, slips or runs back after this row .t = 1.03333.: cut pauses"),
     "two gaits": (changed(1, lambda x: 0.4 * x - 1, slice(200, None)), "line 202: alpha_1 jumps by .* two gaits"),
     "two sizes": (larger, "line 212: two gaits: 6 cycles are of one kind and 6 of another, which begins here .t = 7.; give"),
+    "two sizes in turn": (in_turn, "two gaits: 6 cycles are of one kind and 6 of another"),
 }  # fmt: skip
 
 

@@ -35,6 +35,7 @@ from rft.meshes import (
     bearing,
     read,
     shapes,
+    solids,
     wrench,
 )
 from rft.plates import VERTICAL
@@ -231,7 +232,7 @@ def test_velocities_of_a_path_are_of_order_2():
     assert (np.log2(np.divide(errors[0], errors[-1])) / 2 > 1.8).all()
 
 
-def test_meshes_of_files(geomech, tmp_path):
+def test_meshes_of_files(geomech, tmp_path, monkeypatch):
     pytest.importorskip("trimesh")
     mesh = shapes.leg(0.038, -1.0, 0.003, 0.025, 40, 6, 1)
     stl(tmp_path / "leg.STL", mesh, 1000)
@@ -245,6 +246,10 @@ def test_meshes_of_files(geomech, tmp_path):
     weight = [-0.2 * 9.81 * math.sin(math.radians(10)), 0.0, 0.0]
     assert scene.run(len(mesh.faces)).force == pytest.approx(wanted.force + weight, rel=1e-4, abs=1e-6)
     assert [len(scene.intruder.mesh(n).faces) for n in scene.ladder[:2]] == [len(mesh.faces), 4 * len(mesh.faces)]
+    n = len(mesh.faces)
+    for finest, ladder in ((5 * n, (n, 4 * n)), (n - 1, (n, n))):  # a finer mesh that is within reach, and none
+        monkeypatch.setattr(solids, "FINEST", finest)
+        assert scene.ladder == ladder
     refused(geomech("intrude", "s.toml", "-o", "leg.csv", "--plot", "leg.STL"), "end the name in .png")
 
 

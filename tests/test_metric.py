@@ -50,7 +50,9 @@ def test_a_norm_known_in_closed_form_comes_back():
             2 + np.cos(alpha[..., 0]) + 0.3 * np.sin(2 * beta) + 0.1 * np.cos(4 * beta)
         )
 
-    found = metric.fit_norm(F, axes, 12, highest=6)
+    done: list[float] = []
+    found = metric.fit_norm(F, axes, 12, progress=done.append, highest=6)
+    assert done == sorted(done) and done[-1] == 1.0
     assert found.residual.max() < 1e-13
     assert np.abs(found.coefficients[:, 3, 5]) == pytest.approx(
         [2 + np.cos(axes[0][3]), 0, 0.3, 0.1, 0, 0, 0], abs=1e-13

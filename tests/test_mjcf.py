@@ -193,6 +193,21 @@ def test_files_that_are_no_robot_are_refused_with_one_line(said, cart, geomech):
     assert (code, out) == (2, "") and err.count("\n") == 1 and said in err, err
 
 
+def test_an_actuator_that_is_named_must_follow_the_clock(cart):
+    file = cart / "parts" / "cart.xml"
+    file.write_text(FILES["no actuator can follow the clock"])
+    with pytest.raises(
+        ValueError, match="cart.xml: the actuator 'fl' cannot .* clock: make it <position> or <velocity>$"
+    ):
+        Mjcf(str(file), NAMES, actuators=("fl",))
+
+
+def test_a_sweep_over_robots_that_its_engine_does_not_take_is_refused(cart):
+    (cart / "bad.toml").write_text(SCENE.replace("steps = 8", 'engine = "planar"', 1))
+    with pytest.raises(ValueError, match="use engine mujoco"):
+        walking.Walks().grid(scenes.load(cart / "bad.toml"), {"gait.frequency": [1.0, 2.0]})
+
+
 def test_a_machine_is_known_by_what_it_includes_too(cart):
     whole, part = CART.replace('size="0.06 0.03 0.01"', 'size="{} 0.03 0.01"'), cart / "parts" / "whole.xml"
     (cart / "parts" / "cart.xml").write_text('<mujoco><include file="whole.xml"/></mujoco>')

@@ -1,6 +1,7 @@
 """Optimal gaits against published strokes, differences, bounds and each other."""
 
 import json
+import types
 from dataclasses import dataclass
 
 import numpy as np
@@ -796,3 +797,10 @@ def test_loops_on_maps_of_all_kinds(stroke):
     assert "no CCF" in plots.optimum_figure(stepped).axes[0].get_title()
     fig = plots.optimum_figure(stroke, stretched=True)
     assert any("stretched" in ax.get_title() for ax in fig.axes)
+
+
+@pytest.mark.parametrize("larger", [1.0, 7.0])
+def test_the_first_start_keeps_the_better_of_its_two_sizes(larger):
+    search = types.SimpleNamespace(_rough=True, _larger=lambda p: larger, _each=lambda starts, *_: [*starts])
+    search._merit = lambda cycles, p, turn: p
+    assert _Search._optima(search, None, [3.0, 5.0], 0.0, None, 1) == [max(3.0, larger), 5.0]

@@ -501,6 +501,9 @@ def test_two_percentiles_are_ends_of_the_values():
     limits = only(plots.ccf_map(Field(AXES, values), 0, clim="20%:90%"), QuadMesh).get_clim()
     assert limits == pytest.approx((-top, top)) and top == pytest.approx(np.percentile(values[0], 90))
     assert colour_limit("5%:95%") == "5%:95%"
+    assert colour_limit("0.3", ("theta",)) == colour_limit("0.3", ("x", "y")) == 0.3
+    with pytest.raises(ValueError, match="one limit"):
+        colour_limit("0.3", ("theta", "x"))
     for text in ("5:9", "95%:5%", "5%:9", "5%:5%", "0%", "1%:2%:3%"):
         with pytest.raises(Refusal, match="is no limit"):
             colour_limit(text)

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 import rft
 from rft.balance import backend
 from rft.balance.backend import Note, preferring
-from rft.ground import GrainInertia, Ground, Slope
+from rft.ground import DisturbedGround, GrainInertia, Ground, Slope
 from rft.meshes import Spatial, wrench
 from rft.meshes.blocks import Blocks
 from rft.meshes.contact import Motion, faces
@@ -106,7 +106,8 @@ def test_forces_are_those_of_the_meshes_and_do_their_virtual_work(name, law, sol
     more = "" if name == "free root" else MORE  # empty arrays of MuJoCo's, or none
     model = model_of(chain(rng, CHAINS[name]), '<option gravity="0 0 0"/>', more)
     data, plain = mujoco.MjData(model), mujoco.MjData(model)
-    effects = (GrainInertia(0.5, 300.0),)
+    holes = (DisturbedGround((0.05, -0.3), 0.2, 0.4), DisturbedGround((0.2,), 0.15, 0.3))
+    effects = (GrainInertia(0.5, 300.0), *holes)
     with rft.mujoco.attach(model, law, element=0.02, slope=0.2, effects=effects) as sand:
         cut = meshes(model, sand._bed.geoms, 0.02)
         for _ in range(3):

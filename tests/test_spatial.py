@@ -325,6 +325,11 @@ def test_bad_meshes_are_refused(vertices, faces, said):
     assert "\n" not in str(told.value)
 
 
+def test_a_mesh_is_closed_or_not():
+    with pytest.raises(ValueError, match="closed must be true or false, got 1$"):
+        Mesh(CUBE, SIDES, closed=1)
+
+
 @pytest.mark.parametrize("ending", ["stl", "obj", "ply"])
 def test_meshes_are_read(ending, tmp_path):
     trimesh = pytest.importorskip("trimesh")

@@ -137,6 +137,15 @@ def test_tables_have_one_unit_a_row():
     assert [head.rpartition(": ")[2] for head in found][:3] == ["net distance, sqrt(x^2 + y^2)", "x", "y"]
 
 
+def test_what_is_nothing_but_its_error_is_zero():
+    result = Study(scenes.parse(CHAIN)).study([0.5, 1.0], ["direct"]).result
+    y = dataclasses.replace(result["y"], values=[[1e-8, -1e-8]], error=[[2e-8, 3e-8]])
+    lines = displacement.text(
+        dataclasses.replace(result, variables=(y, *(v for v in result.values() if v.name != "y")))
+    )
+    assert "y: zero within its error, 3e-08 m" in lines.splitlines()
+
+
 def test_sweeps_give_it(tmp_path):
     scene = scenes.parse(CHAIN + GRAINS)
     found = sweep.sweep(scene, {"gait.amplitude": [0.5, 1.0], "gait.frequency": [1.0, 2.5, 4.0]})
