@@ -47,13 +47,14 @@ BARS = {  # by their names in the data
 def compute(amplitudes=AMPLITUDES, others=OTHERS, travels=TRAVELS) -> dict:
     """Return predicted and measured numbers.
 
-    "amplitude": (A,), rad. "curves": by name {"distance", "spread": (A,), BL} of circles, spread only of the law. "others": by
-    scene and amplitude, by name distances and spread (float, float). "swims": by scene, amplitude, rad, and frequency, Hz,
-    (distance, error), BL. "lift": by shape {"grains", "error", "keep", "cut"}, lift over drag. "reversal": by (depth, m, angle
-    from the axis, degrees) and "flank" or "ends" {"plateau", "at_once", "travel", "start", "rms": (mean, error)} of
-    `rft.grains.reversal.Recovery`, by all amplitudes together. "stretches": by (amplitude, m, depth, m, angle) (mean, error) of
-    the share of the flank's late drag that is there at once after the second reversal, and of the travel, m, to 95 % of it. "ways": by (amplitude, m, angle) {"travel" since the second
-    reversal, m, "grains", "law"}, shares of the plateau, 24.5 mm deep."""
+    "amplitude": (A,), rad. "curves": by name {"distance", "spread": (A,), BL} of circles, spread only of the law. "others":
+    by scene and amplitude, by name distances and spread (float, float). "swims": by scene, amplitude, rad, and frequency,
+    Hz, (distance, error), BL. "lift": by shape {"grains", "error", "keep", "cut"}, lift over drag. "reversal": by (depth,
+    m, angle from the axis, degrees) and "flank" or "ends" {"plateau", "at_once", "travel", "start", "rms": (mean, error)}
+    of `rft.grains.reversal.Recovery`, by all amplitudes together. "stretches": by (amplitude, m, depth, m, angle) (mean,
+    error) of the share of the flank's late drag that is there at once after the second reversal, and of the travel, m, to
+    95 % of it. "ways": by (amplitude, m, angle) {"travel" since the second reversal, m, "grains", "law"}, shares of the
+    plateau, 24.5 mm deep."""
     found = {case: predicted(case[0], [case[1]], travels) for case in others}
     return {
         "amplitude": np.asarray(amplitudes),
