@@ -139,7 +139,7 @@ def test_kinks(tmp_path):
 
 def test_every_script_computes_and_draws():
     scripts = {p.stem for p in pathlib.Path(figures.__file__).parent.glob("*.py")} - {"__init__", "style"}
-    assert len(scripts) == 31
+    assert len(scripts) == 32
     for name in scripts:
         module = importlib.import_module(f"figures.{name}")
         assert (

@@ -74,7 +74,7 @@ RIGHT = {  # what looks wrong and is not
     *((type(gait).__name__, "frequency", "None") for gait in (*GAITS.values(), Sine(elements=8))),
     ("Chain", "lengths", "list"), ("masses", "empty"), ("inertias", "empty"),
     ("along", "list"), ("cos", "array"), ("sin", "array"), ("modes", "None"), ("modes", "array"),
-    ("Chain", "waves", "None"),
+    ("Chain", "waves", "None"), ("EndCaps", "across", "None"),
     ("closed", "true"), ("Path", "angle", "empty"),
     ("places", "list"), *itertools.product(("SpatialPath",), ("rx", "ry", "rz"), ("empty",)),
     ("smooth_normals", "None"), ("body_length", "None"),
