@@ -204,12 +204,18 @@ def test_contacts_have_the_energy_of_hertz():
         (lambda: Experiment(Bed(), uneven(), dataclasses.replace(CIRCLE, ramp=0), 1).check(), "ramp must be a number"),
         (lambda: Experiment(Bed(), ROD, CIRCLE, 1).check(), "2 joint angles, and the body 0"),
         (lambda: Experiment(Bed(), uneven(), dataclasses.replace(CIRCLE, shape=FOLDED), 1).check(), "links touch at the shape"),
+        (lambda: rod("long", 4e-3), "length must be a number"),
+        (lambda: rod(0.05, 4e-3, through=True, grain=0), "grain must be a number"),
+        (lambda: rod(0.05, 4e-3, through=True, grain=1e-5), "some 2e+06 spheres are too many"),
+        (lambda: plate(0.05, None, 0.1), "height must be a number"),
+        (lambda: plate(0.05, 0.02, 0.1, thickness=1e-3), "thickness must be a number from 0.002 to 0.02 m"),
+        (lambda: chain("links", 0.1, 5e-3), "a chain of spheres takes a body of rft.bodies"),
         (lambda: rod(0.05, 4e-3, "square"), "a square bar has no ends here"),
         (lambda: chain(rft.Chain((1, 9)), 0.1, 0.02), "links must be longer than their width"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused(build, words):
-    with pytest.raises(ValueError, match="grains|bed|must|links|bar|joint") as refusal:
+    with pytest.raises(ValueError, match="grains|bed|must|links|bar|joint|spheres") as refusal:
         build()
     assert words in str(refusal.value) and "\n" not in str(refusal.value)
 

@@ -9,9 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rft.bodies.base import Elements
-from rft.refusal import require
+from rft.checks import in_range
+from rft.refusal import Refusal, require
 
 SPACING = 0.25  # of neighbouring spheres, in radii: between them the surface dips by 1 - sqrt(1 - 1/64) = 0.8 % of one
+MOST_SPHERES = 1e5  # of a bar or plate: more take minutes to place
 SHAPES = "round", "half round", "half round, flat up", "square"
 
 
@@ -162,6 +164,9 @@ def chain(skeleton: Any, size: float, radius: float, density: float | None = Non
     >>> chain(rft.Chain((1, 2, 1)), size=0.2, radius=6e-3).half_lengths
     array([0.025, 0.05 , 0.025])
     """
+    _check_sizes(size=size, radius=radius)
+    if not hasattr(skeleton, "motion"):
+        raise Refusal("a chain of spheres takes a body of rft.bodies", value=skeleton)
     zero = np.zeros((skeleton.joints, 1))
     half = size * skeleton.motion(zero, zero).half[:, 0]
     require(bool((half >= radius).all()), "links must be longer than their width", value=(2 * half).tolist())
@@ -194,6 +199,7 @@ def rod(length: float, radius: float, shape: str = "round", through: bool = Fals
     (102, 2160)
     """
     require(shape in SHAPES, f"shape must be one of {', '.join(SHAPES)}", value=shape)
+    _check_sizes(grain if through else None, length=length, radius=radius)
     if not through:
         require(shape == "round", f"a {shape} bar has no ends here", instead="give through=True")
         return chain(Bar(), length, radius)
@@ -218,6 +224,10 @@ def plate(length: float, height: float, tilt: float, grain: float = 1e-3, thickn
     >>> round(wall.top, 3), wall.through
     (0.015, True)
     """
+    _check_sizes(grain, length=length, height=height)
+    in_range("tilt", tilt, -10, 10, unit="rad")
+    if thickness is not None:
+        in_range("thickness", thickness, 2 * grain, height, unit="m")
     n = max(2, math.ceil(height / grain))
     s = ((np.arange(n) + 0.5) / n - 0.5) * (height - 2 * grain)
     x = np.arange(math.ceil(length / grain)) * grain - length / 2 + grain / 2
@@ -225,6 +235,17 @@ def plate(length: float, height: float, tilt: float, grain: float = 1e-3, thickn
     cos, sin = math.cos(tilt), math.sin(tilt)
     at = np.array([(u, q * cos - w * sin, q * sin + w * cos) for q in layers for u in x for w in s])
     return Spheres(Bar(), length, np.zeros(len(at), int), at, np.full(len(at), grain), height / 2, through=True)
+
+
+def _check_sizes(grain: float | None = None, **sizes: float) -> None:
+    """Raise ValueError unless sizes, m, are some, and spheres of radius ``grain``, m, resolve the smallest and are not too
+    many."""
+    for name, value in sizes.items():
+        in_range(name, value, 1e-6, 1e3, unit="m")
+    if grain is not None:
+        in_range("grain", grain, 1e-7, min(sizes.values()) / 3, unit="m")
+        many = math.prod(value / grain for value in sizes.values())
+        require(many <= MOST_SPHERES, f"some {many:.0e} spheres are too many", instead="take a larger ``grain``")
 
 
 def _outline(shape: str, radius: float, grain: float) -> np.ndarray:
