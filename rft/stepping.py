@@ -140,7 +140,7 @@ def time_steps(
     >>> alpha, alphadot = np.stack([np.cos(t), np.sin(t)], -1), np.stack([-np.sin(t), np.cos(t)], -1)
     >>> steps = time_steps(Granular(1.8, 0.24), Chain(), alpha, alphadot, effects=[Transient(travel=0.12)])
     >>> steps.pose[-1, :2].round(3)  # x, y after the cycle, body lengths
-    array([-0.237, -0.024])
+    array([-0.245, -0.033])
     """
     broken = broken_premises(effects)
     assembly = assemble(medium, body, effects, loads, pieces)
