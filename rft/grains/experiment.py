@@ -32,7 +32,7 @@ try:
 except ImportError:  # no such locks on Windows, where a run in one folder by two processes is not refused
     fcntl = None  # type: ignore[assignment]
 
-FORMAT = 1  # of the files and of all constants that digits depend on; another number begins anew
+FORMAT = 2  # of the files and of all constants that digits depend on; another number begins anew
 BLOCK = 2000  # steps between restart files: some 15 s of a bed of 15,000 grains
 FREE = 2.0  # grain diameters that must lie below a body and beside it
 COVER = 1.0  # grain diameters that must lie above it
