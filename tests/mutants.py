@@ -3,9 +3,10 @@
     python tests/mutants.py calls.txt --measure
     python tests/mutants.py calls.txt --count 200 --seed 1 --jobs 2 [--only rft/loads.py rft/bodies]
 
-The first line runs the suite once and notes which functions each test calls, and its seconds. A mutant then meets the
-tests that call the function in which it stands (of a constant: any of its class, file or folder), quickest first, and as far
-as `ENOUGH` seconds go, the rest of their files, which may look at what a fixture or a cache holds. `mutants.toml` beside
+The first line runs the suite and the examples of docstrings once and notes which functions each test calls, and its
+seconds. A mutant then meets the tests that call the function in which it stands (of a constant: any of its class, file or
+folder), quickest first, and as far as `ENOUGH` seconds go, the rest of their files, which may look at what a fixture or a
+cache holds. `mutants.toml` beside
 this file names the tests of what Python does not see called, what is left out and which mutants are no bugs. Mutants
 live in copies of the tree in the system's temporary folder, one a worker; the checkout is only read. A mutant is killed
 when a test fails; time-outs, far longer than without it, are counted apart. Survivors are printed as what they change.
@@ -38,9 +39,9 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = "rft/", "geomech/"
 TABLE = tomllib.loads((ROOT / "tests/mutants.toml").read_text())
 # In one process and without time limits of its own, whatever the suite's settings are.
-PYTEST = ["-q", "--assert=plain", "--hypothesis-seed=0", "-p", "no:cacheprovider"]
+PYTEST = ["-q", "--doctest-modules", "--assert=plain", "--hypothesis-seed=0", "-p", "no:cacheprovider"]
 PYTEST += ["-o", "addopts=", "-o", "timeout=0", "-m", "not soak and not benchmark"]
-ENOUGH = 30  # s of CPU that the tests of one mutant may take
+ENOUGH = 60  # s of CPU that the tests of one mutant may take
 # Loaded once, before each mutant's process splits off.
 HEAVY = "pytest numpy scipy.interpolate scipy.special scipy.stats sympy mpmath hypothesis.strategies matplotlib.pyplot xarray"
 CLEAN = {"PYTHONDONTWRITEBYTECODE": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MPLBACKEND": "agg"}
@@ -210,8 +211,8 @@ class Watch:
 
 
 def file_of(test: str) -> str:
-    """The name of a test's file, as the table has it."""
-    return test.partition("::")[0].removeprefix("tests/test_").removesuffix(".py")
+    """The name of a test's file, as the table has it; examples of docstrings are one file."""
+    return test.partition("::")[0].removeprefix("tests/test_").removesuffix(".py") if test[:6] == "tests/" else "examples"
 
 
 def start(tree: Path, tests: list[str], seconds: float, *options: str, plugins=()) -> int:
@@ -243,10 +244,10 @@ def measure(file: Path, folder: Path) -> None:
     """Write what each test calls, with a process for each file of tests."""
     tree = copied(folder / "0")
     file.write_text("")
-    for path in sorted(ROOT.glob("tests/test_*.py")):
-        if file_of(f"tests/{path.name}") not in TABLE["sources"]:
-            child = start(tree, [f"tests/{path.name}"], 1200, plugins=[Calls(tree, file.absolute())])
-            print(path.stem, "fails, or is skipped whole" if os.waitpid(child, 0)[1] else "", flush=True)
+    files = [f"tests/{path.name}" for path in sorted(ROOT.glob("tests/test_*.py"))]
+    for some in [[f] for f in files if file_of(f) not in TABLE["sources"]] + [list(PACKAGES)]:
+        child = start(tree, some, 1200, plugins=[Calls(tree, file.absolute())])
+        print(*some, "fails, or is skipped whole" if os.waitpid(child, 0)[1] else "", flush=True)
 
 
 def hunted(some: list[Mutant], watch: Watch, folder: Path, jobs: int) -> Iterator[tuple[Mutant, str]]:
