@@ -77,7 +77,7 @@ def test_displacement_by_every_tier(tmp_path):
     )
     assert math.hypot(*table["direct"][1][:2]) == pytest.approx(0.0638, rel=0.01)
     assert {m: len(e) for m, e in table["estimate_heading"].items()} == dict.fromkeys(table["estimate"], 2)
-    assert plot.stat().st_size > 10_000
+    assert plot.is_file()
     code, out, _ = geomech("displacement", "three-link-glass", "--amplitudes", "3.0", "--tiers", "direct")
     assert code == 0
     assert "direct" in out
