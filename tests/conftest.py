@@ -14,6 +14,7 @@ for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 from rft.balance import backend  # noqa: E402
 
+gc.disable()  # until all is read
 backend._preferred.set("numpy")  # "auto" is NumPy, but for `solved_by`
 TRUTHS = pytest.StashKey()
 BY_HAND = {"soak", "benchmark"}
@@ -64,9 +65,12 @@ def pytest_collection_finish():
     gc.collect()
     gc.freeze()
     gc.set_threshold(20_000, 20, 50)
+    gc.enable()
 
 
 def pytest_sessionfinish(session):
+    gc.collect()
+    gc.freeze()  # pytest collects five times more
     truths = session.config.stash[TRUTHS]
     if truths.renew:
         truths.write()
