@@ -9,7 +9,7 @@ import pytest
 from geomech import scenes
 from geomech.gaits import Fourier
 from geomech.run.cost import BASE
-from geomech.studies import accuracy, cost, effort, motion, shape_space, sweep
+from geomech.studies import accuracy, cost, effort, motion, report, shape_space, sweep
 from geomech.studies.study import Study
 from geomech.tiers import TIERS
 from rft import Chain, body_velocity
@@ -152,6 +152,13 @@ def test_a_map_takes_the_balances_foretold(scene, question, solved):
     solved.clear()
     asked.answer(lambda done: None, lambda cost: None)
     assert foretold == sum(solved)
+
+
+def test_a_report_takes_as_much_as_foretold_and_what_its_pictures_take(solved):
+    scene = VISCOUS.with_numerics(grid=9, phases=32)
+    report.Report(scene).ask()
+    drawn = cost.price(cost.of_even_part(scene) + cost.of_metric(scene)).balances
+    assert report.cost(scene).balances == sum(solved) + drawn
 
 
 def test_memory_is_foretold_too_large_rather_than_too_small():

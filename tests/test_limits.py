@@ -137,6 +137,7 @@ COUNTS = [
     ("phases", lambda n: Circle().cycle(n), 4, None),
     ("phases of the butterfly", lambda n: Butterfly().cycle(n), 11, None),
     ("hips", lambda n: ROBOT(hips=(0.05,) * n), 1, 20),
+    ("degree of a fit", lambda n: connection.fit(still, (np.arange(9.0),), degree=n), 1, 5),
     ("degree of a field", lambda n: Field((np.arange(9.0),), np.zeros(9), n), 0, 5),
     ("axis of a field", Field((np.arange(4.0),) * 2, np.zeros((4, 4))).derivative, 0, 1),
     ("media", lambda n: sample(Spatial(3e5), n, spread=0.1), 1, None),
@@ -161,6 +162,11 @@ def test_counts(make, least, most):
             make(last)
             with pytest.raises(ValueError):  # noqa: PT011
                 make(beyond)
+
+
+def test_degrees_are_whole():
+    with pytest.raises(ValueError, match="degree"):
+        connection.fit(still, (np.arange(9.0),), degree=2.5)
 
 
 @pytest.mark.parametrize(

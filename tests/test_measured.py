@@ -700,6 +700,7 @@ def test_damaged_fields_are_refused(field, tmp_path):
         (lambda d: d.assign(gait_beyond=d.gait_beyond.expand_dims("more")), "no gait_beyond that fits it"),
         (lambda d: d.assign(gait_spread=d.gait_spread * (2 * d.joint - 3)), "parts do not fit"),
         (lambda d: d.isel(normal=[0, 0]), "parts do not fit"),
+        (lambda d: d.isel({d.gait_A.dims[-1]: slice(1, None)}), "parts do not fit"),
         (lambda d: d.isel(along_and_across=[0, 1, 1]), "parts do not fit"),
         (lambda d: d.assign_attrs(level=1.0), "parts do not fit"),
         (lambda d: d.assign_attrs(level=b"most"), "parts do not fit"),

@@ -77,7 +77,7 @@ def along_a_sine(amplitude, waves, cycles=3.0, frames=32, count=24):
 @pytest.mark.parametrize(("amplitude", "waves"), [(0.2, 1.0), (0.1, 1.6)])
 def test_a_body_that_slides_along_a_sine_has_the_numbers_of_the_sine(amplitude, waves):
     t, points, wavelength = along_a_sine(amplitude, waves)
-    f = fit.fit_midlines(trial_of(t, points))
+    f = fit.fit_midlines(dataclasses.replace(trial_of(t, points), unit="m"))
     expected = {"frequency": 1.0, "length": 1.0, "stride": wavelength, "heading": 0.3, "drift": 0.0, "turn": 0.0,
                 "efficiency": 1.0, "wavelength": wavelength, "arc_wavelength": 1 / waves,
                 "amplitude": amplitude * wavelength}  # fmt: skip

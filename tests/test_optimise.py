@@ -17,6 +17,7 @@ from geomech.optimisation.constraints import Constraints
 from geomech.optimisation.cycles import Phases, Runs, cycle_values
 from geomech.optimisation.loops import Loops
 from geomech.optimisation.objectives import Objective
+from geomech.optimisation.problem import Problem
 from geomech.optimisation.question import result_of
 from geomech.optimisation.search import _Search
 from geomech.optimisation.stroke import Stroke
@@ -122,6 +123,22 @@ def test_slopes_of_aims_are_those_of_differences(objective):
     rise = (objective.value(cycles(p + h * way), 1.7)[0] - objective.value(cycles(p - h * way), 1.7)[0]) / (2 * h)
     assert value > 0
     assert (found * way).sum() == pytest.approx(rise, rel=1e-6)
+
+
+@pytest.mark.parametrize(("rate", "turn"), [(None, 0.0), (2.0, 0.05)])
+def test_slopes_of_ascents_are_those_of_differences(rate, turn):
+    """Of what is minimised and of all constraints, with and without a limit of rate, in which the time is a number too."""
+    system, (loops, p) = Swimmer(FLUID, ODD), some_loop(phases=16)
+    power = lambda alpha, alphadot, xi: system.work(alpha, alphadot, xi).power
+    objective = Objective("speed", rate=rate, power=0.3)
+    problem = Problem(Phases(loops, system.velocity, power, 2.0), objective, p, lambda: None, np.inf)
+    rules = problem.constraints(turn, Stroke(loops, p), lambda alpha: alpha @ [0.3, -0.2] + alpha[..., 1] ** 2 - 9, 0.1)
+    assert len(rules) == (4 if rate is None else 7) and [rule["type"] for rule in rules].count("eq") == (not turn)
+    x = problem.first * (1 + 0.1 * np.random.default_rng(5).normal(size=problem.first.shape))
+    values = lambda x: np.concatenate([[problem.minimised(x)[0]], *(rule["fun"](x) for rule in rules)])
+    found = np.concatenate([problem.minimised(x)[1][None], *(rule["jac"](x) for rule in rules)])
+    rise = np.stack([(values(x + e) - values(x - e)) / 2e-6 for e in 1e-6 * np.eye(len(x))], -1)
+    assert found == pytest.approx(rise, rel=1e-5, abs=2e-6)
 
 
 @pytest.fixture(scope="module")
@@ -804,3 +821,15 @@ def test_the_first_start_keeps_the_better_of_its_two_sizes(larger):
     search = types.SimpleNamespace(_rough=True, _larger=lambda p: larger, _each=lambda starts, *_: [*starts])
     search._merit = lambda cycles, p, turn: p
     assert _Search._optima(search, None, [3.0, 5.0], 0.0, None, 1) == [max(3.0, larger), 5.0]
+
+
+def test_loops_are_ranked_by_their_worth():
+    search = types.SimpleNamespace(
+        _different=lambda loops: [(p, 1) for p in loops], _merit=lambda tier, p, turn: -abs(p - 4)
+    )
+    assert _Search._ranked(search, None, [1.0, 5.0, 9.0, 4.5], 0.0) == [
+        (4.5, 1, -0.5),
+        (5.0, 1, -1),
+        (1.0, 1, -3),
+        (9.0, 1, -5),
+    ]
