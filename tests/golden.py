@@ -22,13 +22,16 @@ import tempfile
 
 import frozen
 import numpy as np
+import pytest
 from registry import BODIES, EFFECTS, GROUND_EFFECTS, MEDIA, OUTLINES, SOLIDS, STRESSES, WALKERS
 from scipy.io import netcdf_file
 from scipy.spatial.transform import Rotation
 
 import geomech
 import rft
+from geomech.run import cost
 from geomech.systems.capabilities import solver_of
+from rft.balance import backend
 from rft.meshes import Spatial, wrench
 from rft.plates import loads
 from rft.walking import Fineness, engine
@@ -228,6 +231,35 @@ def measurements():
             yield from of_json(f"measured, {name}", told)
 
 
+ASKED = {  # lines with costs that are known in some hundredths of a second, by what they are about
+    "gait": (
+        "displacement {} --amplitudes 0.3,0.9", "ccf {}", "connection {} -o x.nc", "run {} -o d", "lab {} -o x.html",
+        "sweep {} --over gait.amplitude=0.3,0.6 -o x.nc", "trajectory {} --cycles 3", "forces {}", "accuracy {} -o d",
+        "optimize {} --objective speed", "optimize {} --objective efficiency --starts 3",
+    ),
+    "intruder": ("intrude {}", "accuracy {} -o d"),
+    "walker": ("walk {}", "sweep {} --over gait.frequency=1,2 -o x.nc", "accuracy {} -o d"),
+}  # fmt: skip
+SLOW = re.compile("(accuracy|optimize) (sandfish|shovel)|sandbot|(walk|sweep) screws|-close|coulomb")  # gaits or falls come first
+
+
+def costs():
+    """What is said to be needed before anything is computed: balances, memory, and, but for walks, of which some steps are
+    timed, seconds, other seconds, and steps."""
+    told: list[cost.Cost] = []
+    with pytest.MonkeyPatch.context() as patch, backend.preferring("numpy"), frozen.place():
+        patch.setattr(cost, "decide", lambda asked, judge: told.append(asked) or asked.check("", False))
+        patch.setattr(cost, "LONGEST", 0.0)  # nothing is begun
+        for kind, lines in ASKED.items():
+            for line in (line.format(name) for name in shipped(kind) for line in lines):
+                if not SLOW.search(line):
+                    frozen.geomech(*line.split())
+                    for asked in told:
+                        timed = () if kind == "walker" else (asked.seconds, asked.besides, asked.steps)
+                        yield f"cost, {line}", [asked.balances, asked.memory, *timed]
+                    told.clear()
+
+
 # The quick ones first, each with what the names of its entries begin with.
 PARTS = {
     velocities: ("velocity", "work"),
@@ -241,6 +273,7 @@ PARTS = {
     intruders: ("intruder",),
     walkers: ("walker",),
     measurements: ("measured",),
+    costs: ("cost",),
 }
 
 
