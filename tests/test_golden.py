@@ -39,7 +39,7 @@ def test_nothing_changed_that_nobody_meant_to_change(part, least):
         (golden.walkers, 20),
         (golden.intruders, 40),
         (golden.measurements, 80),
-        (golden.costs, 150),
+        (golden.costs, 130),
     ],
     ids=lambda x: getattr(x, "__name__", ""),
 )
