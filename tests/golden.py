@@ -240,7 +240,9 @@ ASKED = {  # lines with costs that are known in some hundredths of a second, by 
     "intruder": ("intrude {}", "accuracy {} -o d"),
     "walker": ("walk {}", "sweep {} --over gait.frequency=1,2 -o x.nc", "accuracy {} -o d"),
 }  # fmt: skip
-SLOW = re.compile("(accuracy|optimize) (sandfish|shovel)|sandbot|(walk|sweep) screws|-close|coulomb")  # gaits or falls come first
+SLOW = re.compile(
+    "(accuracy|optimize) (sandfish|shovel)|sandbot|(walk|sweep) screws|-close|coulomb"
+)  # gaits or falls come first
 
 
 def costs():

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import types
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from geomech.scenes.frames import framed
 from geomech.studies.forces import Forces, forces
 from geomech.studies.newtons import Sizes
 from geomech.systems import Swimmer
+from geomech.text import forces as texts
 from rft import Backbone, Chain, ConstantCurvature, DepthProfile, Granular, SkinFriction, Slope, Transient, Viscous
 from rft.refusal import Refusal
 
@@ -261,6 +263,12 @@ def test_errors_cover_what_finer_numerics_change(name):
 def test_a_stroke_that_goes_nowhere_says_so():
     still = geomech.study(SAND, Chain((1, 1, 1)), Wave(0.5, waves=0.0, joints=2), phases=16).forces()
     assert "no net displacement; forwards is where the frame points" in repr(still)
+
+
+def test_power_that_goes_elsewhere_is_said():
+    medium, joint = (types.SimpleNamespace(values=1e-8 * np.array(x), unit="W", error=None) for x in ([1, 2], [1, 2.6]))
+    said = texts._power({"medium_power": medium, "joint_power": joint})
+    assert said == "power 1.5e-08 +-0e+00 W into the medium, largest 2e-08; at the joints 1.8e-08 W"
 
 
 def test_the_command_prints_writes_and_draws(tmp_path):

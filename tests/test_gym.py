@@ -53,8 +53,10 @@ def test_many_robots_go_as_each_alone():
     starts, rng = many.unwrapped.qpos.copy(), np.random.default_rng(0)
     actions = rng.uniform(-1, 1, (20, 2, 6)).astype(np.float32)
     rows = [many.step(action) for action in actions]
+    spaces = many.unwrapped.single_observation_space, many.unwrapped.single_action_space
     for k, medium in enumerate(media):
         one = geomech.gym.HexapodSand(medium)
+        assert spaces == (one.observation_space, one.action_space)
         one.reset()
         one.data.qpos[:], one.data.ctrl[:] = starts[k], starts[k, 7:]
         for row, action in zip(rows, actions):

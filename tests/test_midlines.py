@@ -114,6 +114,11 @@ def test_cycles_that_repeat_without_noise_have_small_errors(exact):
 # Files.
 
 
+def test_heads_of_files_tell_midlines_from_logs():
+    assert reader.is_midlines(("scorer", "a", "b")) and reader.is_midlines(("frame", "x", "y"))
+    assert not reader.is_midlines(("t", "coords", "alpha_1")) and not reader.is_midlines(("t", "x", "y", "theta"))
+
+
 def wide(trial, names=None, t="t", unit=""):
     names = names or [f"p{k + 1}" for k in range(trial.points.shape[1])]
     rows = [",".join([t, *(f"{n}_{c}{unit}" for n in names for c in "xy")])]

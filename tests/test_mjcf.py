@@ -324,3 +324,8 @@ def test_the_clock_of_a_robot_of_the_plane_is_that_of_its_tripods():
     np.testing.assert_allclose(
         clock.actuator_motion(0.0, 1e-9)[0][[1, 2, 5]] - clock.actuator_motion(0.0, 1e-9)[0][[0, 3, 4]], np.pi
     )
+
+
+def test_machines_without_surfaces_are_refused():
+    with pytest.raises(Refusal, match="no geoms that touch the ground"):
+        Facets([])

@@ -332,6 +332,19 @@ def test_regions_that_make_no_sense_are_refused(regions, message):
         rft.mujoco.attach(model_of(BALL), MAP, regions=regions)
 
 
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"element": 0}, "element must be a number from 1e-06 to 1000 m, got 0"),
+        ({"rounding": 0}, "rounding must be a number from 1e-07 to 10 m/s, got 0"),
+        ({"level": 2e6}, r"level must be a number from -1e\+06 to 1e\+06 m"),
+    ],
+)
+def test_numbers_of_sand_have_limits(given, message):
+    with pytest.raises(rft.Refusal, match=message):
+        rft.mujoco.attach(model_of(BALL), MAP, **given)
+
+
 def test_forces_converge_with_the_length_of_elements():
     """At order 2, on round and flat geoms."""
     body = "".join(f'<body pos="0 0 -0.02"><freejoint/><geom {geom}/></body>' for geom in GEOMS)
