@@ -3,7 +3,7 @@
     python tests/golden.py --write    records these, too; entries that still hold stay as they are
 
 commands.txt has command lines with their output and what they wrote, refusals.txt what is refused and what its message
-names, keys.txt every key of a scene file, the schema and the names in Python. They are run in a copy of data/frozen,
+names, keys.txt every key of a scene file, the schema, names in Python and their defaults. They are run in a copy of data/frozen,
 which has scenes, and a file of every format as the first version with this net wrote it (`FILES`): later ones read them.
 
 Names, numbers, keys and exit codes are fixed, wording is free (`words`): of a refusal counts what it names, and that it
@@ -14,6 +14,8 @@ in `namespace` at most.
 from __future__ import annotations
 
 import contextlib
+import importlib
+import inspect
 import itertools
 import json
 import math
@@ -42,6 +44,19 @@ FILES = {
     "grains.toml": "fit-medium plates.csv -o grains.toml",
     "best.toml": "optimize three-link-viscous --objective efficiency --harmonics 1 -o best.toml",
 }
+
+
+DOORS = [
+    "rft",
+    "geomech",
+    "geomech.gaits",
+    "geomech.measured",
+    "geomech.plots",
+    "geomech.systems",
+    "rft.bodies",
+    "rft.effects",
+]
+DOORS += ["rft.grains", "rft.ground", "rft.laws", "rft.meshes", "rft.mujoco", "rft.plates", "rft.walking"]
 
 
 # What a command does.
@@ -288,7 +303,8 @@ def read_refusals() -> dict[tuple[str, str], str]:
 
 
 def keys() -> Iterator[str]:
-    """Every key of a scene file with its type, unit and default; the schema, less its descriptions; names in Python."""
+    """Every key of a scene file with its type, unit and default; the schema, less its descriptions; names in Python, and
+    what is taken where an argument is left out."""
     import geomech as top
 
     table = ""
@@ -304,6 +320,20 @@ def keys() -> Iterator[str]:
         for line in of_schema(json.loads(geomech("reference", "--json-schema")[1]))
     )
     yield from (f"geomech.{name}" for name in sorted(dir(top)) if not name.startswith("_"))
+    yield from sorted({line for module in DOORS for line in defaults(importlib.import_module(module))})
+
+
+def defaults(module) -> Iterator[str]:
+    """The arguments with defaults of the functions, classes and methods that a module offers."""
+    for name, x in ((name, getattr(module, name)) for name in dir(module) if not name.startswith("_")):
+        if callable(x) and re.match("(geomech|rft)[.]", getattr(x, "__module__", None) or ""):
+            methods = vars(x) if isinstance(x, type) else {}
+            parts = {"": x} | {f".{k}": getattr(x, k) for k in methods if not k.startswith("_")}
+            for part, f in parts.items():
+                some = inspect.signature(f).parameters.values() if callable(f) else ()
+                if found := [f"{p.name}={p.default!r}" for p in some if p.default is not p.empty]:
+                    line = f"default {x.__module__.partition('.')[0]}: {name}{part}({', '.join(found)})"
+                    yield re.sub(" at 0x[0-9a-f]+", "", line)
 
 
 def of_schema(node, path: str = "", before: dict | None = None) -> Iterator[str]:
