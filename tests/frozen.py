@@ -3,8 +3,9 @@
     python tests/golden.py --write    records these, too; entries that still hold stay as they are
 
 commands.txt has command lines with their output and what they wrote, refusals.txt what is refused and what its message
-names, keys.txt every key of a scene file, the schema, names in Python and their defaults. They are run in a copy of data/frozen,
-which has scenes, and a file of every format as the first version with this net wrote it (`FILES`): later ones read them.
+names, keys.txt every key of a scene file, the schema, names in Python and their defaults. They are run in a copy of
+data/frozen, which has scenes, and a file of every format as the first version with this net wrote it (`FILES`): later
+ones read them.
 
 Names, numbers, keys and exit codes are fixed, wording is free (`words`): of a refusal counts what it names, and that it
 says what to do. Everything goes through the command line, files and names of `geomech`; a move of modules needs changes
