@@ -310,7 +310,7 @@ def solutions(medium, body, alpha, alphadot, regularisation, starts, monkeypatch
         problem = assembly.problem(alpha, alphadot)
         guess = rng.normal(size=(3, starts)) * [[0.3], [0.3], [1.0]] * 10.0 ** rng.uniform(-4, 0, starts)
         accuracy = Accuracy(regularisation, 1e-10)
-        solved = solve(problem.take, np.ones(starts), accuracy, assembly, "numpy", 1, guess)
+        solved = solve(problem.take, np.ones(starts), accuracy, assembly, "auto", 1, guess)
         for xi in solved.xi[:, solved.residual <= solved.limit].T:
             if (np.abs(found - xi).max(-1, initial=0.0) > 10 * regularisation).all():
                 found = np.concatenate([found, xi[None]])
