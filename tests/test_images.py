@@ -16,6 +16,8 @@ from rft import CATALOGUE, Chain, EndCaps, GrainInertia, SkinFriction
 from rft.bodies.base import is_reversible
 from rft.laws.base import TermLaw, is_odd
 
+pytestmark = pytest.mark.usefixtures("fastest")
+
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 MIRROR, BACKWARDS, BOTH = Traits(mirror=True), Traits(reversible=True), Traits(mirror=True, reversible=True)
 REVERSIBLE = {

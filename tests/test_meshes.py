@@ -41,6 +41,8 @@ from rft.meshes import (
 from rft.plates import VERTICAL
 from rft.refusal import Refusal
 
+pytestmark = pytest.mark.usefixtures("fastest")
+
 NAMES = [n for n in scenes.intruder_names() if isinstance(scenes.load(n), MeshScene)]
 BODIES = (Sphere(0.02), Cylinder(0.0127, 0.1), Screw(0.03, 0.015, 0.06, 0.18), Leg(0.038, 0.025, 0.003, 0.7))
 MOTIONS = (

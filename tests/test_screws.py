@@ -10,6 +10,8 @@ from rft.meshes import Screw, Spatial, wrench
 from rft.walking.craft import Screws
 from rft.walking.screws import _Steady, cruise, free_turning, turning
 
+pytestmark = pytest.mark.usefixtures("fastest")
+
 SAND = Spatial(3e5, 0.3)
 SCREW = Screw(0.03, 0.018, 0.05, 0.13, 0.006, 0.02)
 CRAFT = Screws(0.25, 0.2, 0.16, 0.04, SCREW, 0.12, 0.03)

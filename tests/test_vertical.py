@@ -36,6 +36,8 @@ from rft.plates import (
 from rft.plates.loads import ORDER
 from rft.vectors import formula
 
+pytestmark = pytest.mark.usefixtures("fastest")
+
 RAD = np.pi / 180
 M0 = StressMap()
 
