@@ -116,14 +116,13 @@ def test_ccf_at_the_straight_pose_for_any_ratio():
     straight = symbolic.ccf(A, alpha).subs(dict.fromkeys(alpha, 0))
     assert sp.simplify(straight[0] + 5 * (r - 1) / 243) == 0
     assert sp.simplify(straight[1]) == 0
-    for ratio in (1.0, 7.5):
-        fitted = connection.fit(viscous("link-2", ratio), around((0, 0), 0.3), degree=5)
-        assert curvature.ccf(fitted).values[0, 20, 20] == pytest.approx(-5 * (ratio - 1) / 243, abs=1e-9)
+    fitted = connection.fit(viscous("link-2", 7.5), around((0, 0), 0.3), degree=5)
+    assert curvature.ccf(fitted).values[0, 20, 20] == pytest.approx(-5 * 6.5 / 243, abs=1e-9)
 
 
 def test_ccf_agrees_with_sympy_everywhere():
-    fitted = connection.fit(MIDDLE, connection.grid(2, 49, 1.2), degree=5)
-    exact = sp.lambdify(ALPHA, list(symbolic.ccf(A_MIDDLE, ALPHA)), "numpy", cse=True)
+    fitted = connection.fit(MIDDLE, connection.grid(2, 37, 1.2), degree=5)
+    exact = sp.lambdify(ALPHA, list(symbolic.ccf(symbolic.simplified(A_MIDDLE, ALPHA), ALPHA)), "numpy")
     a1, a2 = np.meshgrid(*fitted.axes, indexing="ij")
     np.testing.assert_allclose(curvature.ccf(fitted).values, np.broadcast_arrays(*exact(a1, a2)), atol=2e-6)
 

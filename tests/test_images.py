@@ -204,7 +204,7 @@ def test_few_phases_tell_how_many_are_solved(name, monkeypatch):
         for start in (0.0, 0.1):
             late = Late(cos=gait.cos, sin=gait.sin)
             object.__setattr__(late, "start", 2 * np.pi * start)
-            for phases in (*range(8, 33), *range(33, 201, 5)):
+            for phases in (*range(8, 33), *range(33, 201, 13)):
                 solved = cycle_images(*late.cycle(phases), traits).count
                 assert solved_count(late, phases, traits) == solved, (start, phases)
                 share = max(share, round(phases / solved))

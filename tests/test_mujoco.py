@@ -152,7 +152,7 @@ def test_steps_are_of_order_two_and_energy_is_kept_to_that():
     walker = dataclasses.replace(XPLORER.walker, gait=Tripod(4.0))
     first = Simulation(walker, dataclasses.replace(QUICK, steps=48), planar=True).walk(1).limit
     run = lambda steps: Simulation(walker, dataclasses.replace(QUICK, steps=steps), planar=True).walk(1, start=first)
-    finest, errors, audits = run(160), [], []
+    finest, errors, audits = run(112), [], []
     for steps in (12, 24, 48):
         w = run(steps)
         errors.append(np.abs(w.pose[-1] - finest.pose[-1]).max() / np.abs(finest.pose).max())
