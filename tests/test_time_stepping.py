@@ -176,8 +176,8 @@ def test_transients_slow_the_sandfish():
 def test_the_built_in_march_is_slower_than_the_plain_sandfish():
     slowed = scenes.load("sandfish-transient")
     assert slowed.system.traits.steps
-    found = undulation.performance(slowed, [0.15, 0.22])
-    plain = undulation.performance(SANDFISH, [0.15, 0.22])
+    found = undulation.performance(slowed, [0.22])
+    plain = undulation.performance(SANDFISH, [0.22])
     assert (found["efficiency"] < 0.95 * plain["efficiency"]).all()
     assert (found["cost_of_transport"] > 0).all()
 
