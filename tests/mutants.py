@@ -212,9 +212,7 @@ class Watch:
 
 def file_of(test: str) -> str:
     """The name of a test's file, as the table has it; examples of docstrings are one file."""
-    return (
-        test.partition("::")[0].removeprefix("tests/test_").removesuffix(".py") if test[:6] == "tests/" else "examples"
-    )
+    return test.partition("::")[0].removeprefix("tests/test_").removesuffix(".py") if test[:6] == "tests/" else "examples"
 
 
 def start(tree: Path, tests: list[str], seconds: float, *options: str, plugins=()) -> int:
