@@ -7,6 +7,7 @@ import stat
 import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from PIL import Image, ImageSequence
 from registry import BODIES, SYSTEMS
 
@@ -451,7 +452,10 @@ def brief(monkeypatch):
 def test_an_mp4_hands_its_pictures_to_ffmpeg(chain, tmp_path, monkeypatch):
     installed(tmp_path, monkeypatch, 'cat > "$last"')
     animate.check_format(tmp_path / "out.mp4")
+    laid_out = []
+    monkeypatch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: laid_out.append(True))
     animate.save(tmp_path / "out.mp4", *chain)
+    assert laid_out == [True]  # once, and stays for all pictures
     raw = np.fromfile(tmp_path / "out.mp4", np.uint8).reshape(12, 360, 800, 3)
     assert "-s 800x360" in (tmp_path / "said").read_text()
     assert (raw[0, 0, 0] == 255).all() and (raw[0] != raw[10]).any()
