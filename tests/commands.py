@@ -12,10 +12,17 @@ import pytest
 import typer.main
 
 from geomech import cli
+from geomech.run import backend
 from geomech.scenes import kinds
 from rft.registry import REGISTRIES
 
 PARSER = functools.cache(typer.main.get_command)  # it takes 20 ms, and is the same each time
+
+
+def _prefer(name, prefer=backend.prefer):
+    """Tests that run compiled (the fixture `fastest`) have it loaded: it is worth its start for few balances, too."""
+    if backend.preferred() != "numba":
+        prefer(name)
 
 
 def geomech(*args, cwd="."):
@@ -30,6 +37,7 @@ def geomech(*args, cwd="."):
         with (
             mock.patch.object(sys, "argv", ["geomech", *map(str, args)]),
             mock.patch.object(typer.main, "get_command", PARSER),
+            mock.patch.object(backend, "prefer", _prefer),
             contextlib.redirect_stdout(streams[0]),
             contextlib.redirect_stderr(streams[1]),
             contextlib.chdir(cwd),

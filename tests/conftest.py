@@ -78,6 +78,12 @@ def pytest_sessionfinish(session):
         session.config.workeroutput["missing"] = truths.missing
 
 
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure():
+    """What pytest has just looked through for garbage is not looked through twice more as the process ends: a second."""
+    gc.freeze()
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node):
     node.config.stash[TRUTHS].missing += getattr(node, "workeroutput", {}).get("missing", [])

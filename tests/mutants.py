@@ -39,11 +39,11 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = "rft/", "geomech/"
 TABLE = tomllib.loads((ROOT / "tests/mutants.toml").read_text())
 # In one process and without time limits of its own, whatever the suite's settings are.
-PYTEST = ["-q", "--doctest-modules", "--assert=plain", "--hypothesis-seed=0", "-p", "no:cacheprovider"]
+PYTEST = ["-q", "--doctest-modules", "--assert=plain", "-p", "no:cacheprovider"]
 PYTEST += ["-o", "addopts=", "-o", "timeout=0", "-m", "not soak and not benchmark"]
 ENOUGH = 60  # s of CPU that the tests of one mutant may take
 # Loaded once, before each mutant's process splits off.
-HEAVY = "pytest numpy scipy.interpolate scipy.special scipy.stats sympy mpmath hypothesis.strategies matplotlib.pyplot xarray"
+HEAVY = "pytest numpy scipy.interpolate scipy.special scipy.stats sympy mpmath matplotlib.pyplot xarray"
 CLEAN = {"PYTHONDONTWRITEBYTECODE": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MPLBACKEND": "agg"}
 
 SWAPPED = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Pow: ast.Mult}

@@ -74,7 +74,7 @@ def order(errors, counts):
 
 def test_order_in_frames(tmp_path):
     counts = [20, 40, 80]
-    errors = [off(write(tmp_path, "curvature", count=n, places=150, amplitude=0.05), 0.05) for n in counts]
+    errors = [off(write(tmp_path, "curvature", count=n, places=120, amplitude=0.05), 0.05) for n in counts]
     assert order(errors, counts) == pytest.approx(4.0, abs=0.4)
     assert errors[-1] < 2e-6
 

@@ -29,11 +29,11 @@ def test_seconds_are_assumed_for_places_of_the_body_and_for_batches():
         )
         assert places == pytest.approx(10 * one) and run_cost.assumed(1e6, 3, True, 0) == pytest.approx(one / 10)
         assert run_cost.assumed(1e6, 3, False, 1e3) == pytest.approx(one + batches)
-    few, many = ({"medium.ratio": np.linspace(1, 3, n).tolist()} for n in (20, 200))  # each medium is a batch
+    few, many = ({"medium.ratio": np.linspace(1, 3, n).tolist()} for n in (10, 100))  # each medium is a batch
     assert sweep.Sweep(VISCOUS, many).cost().seconds == pytest.approx(
         10 * sweep.Sweep(VISCOUS, few).cost().seconds, rel=0.01
     )
-    together = {"medium.ratio": many["medium.ratio"][:20], "gait.amplitude": np.linspace(0.1, 1, 10).tolist()}
+    together = {"medium.ratio": many["medium.ratio"][:10], "gait.amplitude": np.linspace(0.1, 1, 10).tolist()}
     assert sweep.Sweep(VISCOUS, together).cost().seconds < 0.4 * sweep.Sweep(VISCOUS, many).cost().seconds
 
 

@@ -22,6 +22,8 @@ from rft.grains import Experiment, Run
 from rft.grains.reversal import recovery
 from rft.plates import StressMap
 
+pytestmark = pytest.mark.usefixtures("fastest")
+
 PSI = np.array([0.0, 10, 20, 40, 65, 90])
 LAW, ROD = Granular(3.1, 0.3), Rod(0.007, 0.2, 0.03, 600.0)
 

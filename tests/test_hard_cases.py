@@ -48,13 +48,9 @@ HARD = {
     "at random": lambda n: np.random.default_rng(n).normal(size=(2, 60, n)) * [[[2.0]], [[1.0]]],
 }
 
-SOME_LAWS = (
-    "coulomb",
-    "sharp",
-    "strong",
-    "viscous-1",
-    "measured",
-)  # for strange and large bodies: others are between these
+# Others are between these. Of strange bodies one closed form and quadrature, of other sizes what rounds and what does not.
+SOME_LAWS = ("coulomb", "sharp", "strong", "viscous-1", "measured")
+STRANGE_LAWS = ("sharp", "viscous-1", "measured")
 STRANGE_BODIES = {
     "a millionth of a link": Chain((1, 1e-6, 1)),
     "a millionth at the end": Chain((1, 1, 1e-6)),
@@ -88,7 +84,8 @@ def test_hard_cases(name):
     its residual leaves the sixth digit open; there the two are compared at a wider one."""
     body, ill = (BODIES | STRANGE_BODIES)[name], name in ILL_CONDITIONED
     backends = ("numpy", "numba") if backend.installed() else ("numpy",)
-    for label, medium in (MEDIA if name == "three" else {label: MEDIA[label] for label in SOME_LAWS}).items():
+    labels = SOME_LAWS if name in BODIES else STRANGE_LAWS[: 2 if body.length != 1 else 3]
+    for label, medium in (MEDIA if name == "three" else {label: MEDIA[label] for label in labels}).items():
         some = slice(None, None, 1 if body.joints < 5 or label in CLOSED else 3)  # quadrature takes its time
         cases, alpha, alphadot = (x[some] for x in hard(body.joints, ill))
         fastest = 3 * np.linalg.norm(alphadot, axis=-1, keepdims=True) * [body.length, body.length, 1] + 1e-300
@@ -313,7 +310,7 @@ def solutions(medium, body, alpha, alphadot, regularisation, starts, monkeypatch
         problem = assembly.problem(alpha, alphadot)
         guess = rng.normal(size=(3, starts)) * [[0.3], [0.3], [1.0]] * 10.0 ** rng.uniform(-4, 0, starts)
         accuracy = Accuracy(regularisation, 1e-10)
-        solved = solve(problem.take, np.ones(starts), accuracy, assembly, "numpy", 1, guess)
+        solved = solve(problem.take, np.ones(starts), accuracy, assembly, "auto", 1, guess)
         for xi in solved.xi[:, solved.residual <= solved.limit].T:
             if (np.abs(found - xi).max(-1, initial=0.0) > 10 * regularisation).all():
                 found = np.concatenate([found, xi[None]])

@@ -154,7 +154,7 @@ def test_intrude_gives_what_the_python_door_gives(name, geomech, tmp_path):
     }
     assert list(found) == ["t", *place, "force_x", "force_z", "moment"]
     _, pose, twist = scene.motion.trajectory(scene.outline)
-    wanted = loads(scene.medium, scene.outline, pose, twist, backend="numpy")
+    wanted = loads(scene.medium, scene.outline, pose, twist)
     np.testing.assert_allclose(np.stack([found["force_x"], found["force_z"]], -1), wanted.force, rtol=1e-14)
     np.testing.assert_array_equal(found["moment"], wanted.moment)
     with open(tmp_path / "out.csv", newline="") as file:
@@ -163,6 +163,8 @@ def test_intrude_gives_what_the_python_door_gives(name, geomech, tmp_path):
     for key, values in found.items():
         assert [float(row[key]) for row in rows] == values
     assert not plot or (tmp_path / "out.png").read_bytes().startswith(b"\x89PNG")
+    if not plot:
+        return
     code, out, err = geomech("intrude", name)
     assert (code, err) == (0, "") and "work     -" in out and "power at most" in out
     assert f"error    force {error['force']:.1g} N, moment {error['moment']:.1g} N m at most, from up to 2" in out
@@ -394,7 +396,7 @@ def test_a_tolerance_that_is_just_met_is_met():
 
 
 def test_accuracy_of_the_number_of_elements(geomech, tmp_path, monkeypatch):
-    monkeypatch.setattr(IntruderScene, "ladder", (12, 25, 50, 100, 200, 400, 1600))
+    monkeypatch.setattr(IntruderScene, "ladder", (12, 25, 50, 100, 200, 800))
     (tmp_path / "s.toml").write_text(MADE)
     code, out, err = geomech("accuracy", "s.toml", "-o", "out", "--json")
     assert (code, err) == (0, "")
@@ -402,7 +404,7 @@ def test_accuracy_of_the_number_of_elements(geomech, tmp_path, monkeypatch):
     force, moment = found["lines"]
     assert (force["label"], moment["label"], force["order"]) == ("force", "moment", 2)
     assert moment["slope"] > 1.7 and moment["error"][-1] < 1e-5
-    exact = scenes.load(tmp_path / "s.toml").run(1600)
+    exact = scenes.load(tmp_path / "s.toml").run(800)
     error = scenes.load(tmp_path / "s.toml").run(12).moment - exact.moment
     wanted = np.sqrt(np.mean(error**2)) / np.abs(exact.moment).max()
     assert moment["error"][0] == pytest.approx(wanted, rel=1e-9)

@@ -15,6 +15,8 @@ from rft import Chain, Granular, Table, body_velocity
 from rft.laws.base import require_drag
 from rft.refusal import Refusal
 
+pytestmark = pytest.mark.usefixtures("fastest")
+
 LOOSE = Granular(C=1.8, gamma0=math.radians(13.8))
 REST = '[body]\nkind = "chain"\nlengths = [1, 1.3, 0.8]\n[gait]\nkind = "circle"\namplitude = 0.9\n'
 GAUSS = '[numerics]\nloads = "gauss:12"\nphases = 32\ngrid = 7\nharmonics = 5\nextent = 1.5\n'

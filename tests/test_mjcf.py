@@ -267,7 +267,7 @@ engine = "mujoco"
 
 
 def test_walk_sweep_and_accuracy_take_the_engine(geomech, tmp_path, monkeypatch):
-    monkeypatch.setattr(walking, "SETTINGS", (Setting("steps", (8, 10), 2, against="limit"),))
+    monkeypatch.setattr(walking, "SETTINGS", (Setting("steps", (8,), 2, against="limit"),))
     monkeypatch.setattr(walking, "FINEST", {"steps": 12})
     (tmp_path / "small.toml").write_text(SMALL)
     code, out, _ = geomech("walk", "small.toml", "--json", "-o", "out")

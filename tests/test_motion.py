@@ -7,6 +7,7 @@ import stat
 import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from PIL import Image, ImageSequence
 from registry import BODIES, SYSTEMS
 
@@ -441,11 +442,21 @@ def installed(folder, monkeypatch, does):
     monkeypatch.setenv("PATH", f"{path.parent}{os.pathsep}/usr/bin{os.pathsep}/bin")
 
 
+@pytest.fixture
+def brief(monkeypatch):
+    """Films of twelve pictures: a gif has all of them."""
+    monkeypatch.setattr(animate, "rows", lambda *_: np.arange(12))
+
+
+@pytest.mark.usefixtures("brief")
 def test_an_mp4_hands_its_pictures_to_ffmpeg(chain, tmp_path, monkeypatch):
     installed(tmp_path, monkeypatch, 'cat > "$last"')
     animate.check_format(tmp_path / "out.mp4")
+    laid_out = []
+    monkeypatch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: laid_out.append(True))
     animate.save(tmp_path / "out.mp4", *chain)
-    raw = np.fromfile(tmp_path / "out.mp4", np.uint8).reshape(50, 360, 800, 3)
+    assert laid_out == [True]  # once, and stays for all pictures
+    raw = np.fromfile(tmp_path / "out.mp4", np.uint8).reshape(12, 360, 800, 3)
     assert "-s 800x360" in (tmp_path / "said").read_text()
     assert (raw[0, 0, 0] == 255).all() and (raw[0] != raw[10]).any()
 
@@ -456,6 +467,7 @@ def test_an_mp4_says_what_it_lacks(chain, tmp_path, monkeypatch):
         animate.check_format(tmp_path / "out.mp4")
 
 
+@pytest.mark.usefixtures("brief")
 @pytest.mark.parametrize(
     "does", ['cat > /dev/null; echo "first" >&2; echo "no such codec" >&2; exit 1', "echo no such codec >&2; exit 1"]
 )
@@ -466,6 +478,7 @@ def test_an_mp4_that_ffmpeg_refuses_is_not_left(does, chain, tmp_path, monkeypat
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bin", "said"]
 
 
+@pytest.mark.usefixtures("brief")
 @pytest.mark.parametrize("ending", ["gif", "mp4"])
 def test_a_film_that_is_stopped_leaves_nothing(ending, chain, tmp_path, monkeypatch):
     installed(tmp_path, monkeypatch, 'cat > "$last"')

@@ -154,7 +154,7 @@ def test_steps_are_of_order_two_and_energy_is_kept_to_that():
     run = lambda steps: Simulation(walker, dataclasses.replace(QUICK, steps=steps), planar=True).walk(
         1, start=fallen.limit
     )
-    finest, errors, audits = run(160), [], []
+    finest, errors, audits = run(112), [], []
     np.testing.assert_allclose(finest.pose[0, 1:], fallen.pose[-1, 1:], atol=1e-12)
     for steps in (12, 24, 48):
         w = run(steps)

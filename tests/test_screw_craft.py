@@ -17,6 +17,8 @@ from rft.refusal import Refusal
 from rft.walking import Fineness, Screws, Tripod, Walker, cruise
 from rft.walking.craft import PER_SQUARE
 
+pytestmark = pytest.mark.usefixtures("fastest")
+
 SCENE = scenes.load("screws")
 SMALL = SCENE.text.replace("steps = 16 ", "elements = 4\nduration = 1\nsteps = 8 ")
 COARSE = Fineness(steps=8, elements=4)

@@ -10,6 +10,8 @@ from rft.meshes.mesh import below, quartered
 from rft.meshes.smooth import smooth
 from rft.plates import VERTICAL
 
+pytestmark = pytest.mark.usefixtures("fastest")
+
 RNG = np.random.default_rng(7)
 MEDIUM = Spatial(xi_n=3e5, surface_friction=0.3)
 UPRIGHT, STILL = np.eye(3), np.zeros(3)

@@ -20,6 +20,8 @@ from geomech.text import displacement
 from rft import BodyInertia, GrainInertia
 from rft.refusal import Refusal
 
+pytestmark = pytest.mark.usefixtures("fastest")
+
 CHAIN = """[medium]
 name = "glass-0.3mm-loose"
 [body]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 
 from geomech import plots
 from geomech.gaits import Circle
@@ -125,7 +126,9 @@ def fitted():
     return connection.fit(velocity, connection.grid(2, 15, 1.5))
 
 
-def test_pictures(fitted):
+def test_pictures(fitted, monkeypatch):
+    lines = Axes.streamplot
+    monkeypatch.setattr(Axes, "streamplot", lambda *args, density, **look: lines(*args, density=0.2, **look))
     field, gait = curvature.ccf(fitted), Circle(amplitude=0.8)
     plane = stretch(metric.fit(pulled_back, fitted.axes))
     figures = [

@@ -41,7 +41,9 @@ def test_formulas_give_the_numbers(name):
         assert (np.abs(found - wanted).max(-1) < 1e-11 * (1 + np.abs(wanted).max(-1))).all()
     if system.joints == 1:
         return
-    ccf = symbolic.simplified(symbolic.ccf(short, alpha), alpha)
+    ccf = symbolic.ccf(short, alpha)
+    if name == "snake":  # of the others it takes as long as all else here
+        ccf = symbolic.simplified(ccf, alpha)
     here = np.array([1.1, -0.4])
     of = lambda shape: np.stack([system.velocity(shape, e) for e in np.eye(2)], -1)
     weights, h = (4 / 5, -1 / 5, 4 / 105, -1 / 280), 1e-2

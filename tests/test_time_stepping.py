@@ -176,8 +176,8 @@ def test_transients_slow_the_sandfish():
 def test_the_built_in_march_is_slower_than_the_plain_sandfish():
     slowed = scenes.load("sandfish-transient")
     assert slowed.system.traits.steps
-    found = undulation.performance(slowed, [0.15, 0.22])
-    plain = undulation.performance(SANDFISH, [0.15, 0.22])
+    found = undulation.performance(slowed, [0.22])
+    plain = undulation.performance(SANDFISH, [0.22])
     assert (found["efficiency"] < 0.95 * plain["efficiency"]).all()
     assert (found["cost_of_transport"] > 0).all()
 
@@ -192,7 +192,7 @@ def test_work_is_done_by_the_joints_in_time_stepping_too():
     assert found.work.bending_moment.shape == (32, 2)
 
 
-@pytest.mark.parametrize(("medium", "phases"), [(GLASS, 64), (Viscous(2.0), 64)])
+@pytest.mark.parametrize(("medium", "phases"), [(GLASS, 48), (Viscous(2.0), 64)])
 def test_work_moves_the_mass(medium, phases):
     """With mass the joints put in what the ground takes in the mean over a cycle, and it does not matter from which end
     the links are counted: the moments include what moves them."""
@@ -468,19 +468,19 @@ def test_heavy_bodies_know_how_far_they_are(truths):
 
 
 def test_estimates_hold_what_is_left_of_the_way(monkeypatch):
-    scene = Scene(Swimmer(Viscous(2.0), Chain((1, 2, 1.5)), (heavy(5.0),)), HEAVY).with_numerics(phases=64)
-    a, shapes = np.array([1.0]), HEAVY.cycle(64, np.array([1.0]))
+    scene = Scene(Swimmer(Viscous(2.0), Chain((1, 2, 1.5)), (heavy(5.0),)), HEAVY).with_numerics(phases=32)
+    a, shapes = np.array([1.0]), HEAVY.cycle(32, np.array([1.0]))
     left = time_steps(scene.system.medium, scene.system.body, *shapes, effects=scene.system.effects).drift
     assert scene.system.run(*shapes).to_come == left > 0
     assert (scene.with_numerics(cycles=3).system.run(*shapes).to_come == 0).all()
     scene = scene.with_numerics(cycles=1)
-    of_steps = estimate.direct(scene, HEAVY, a, 64)[1]
+    of_steps = estimate.direct(scene, HEAVY, a, 32)[1]
     monkeypatch.setattr(
         Swimmer,
         "run",
         lambda *args, run=Swimmer.run, **more: (c := run(*args, **more))._replace(to_come=c.to_come + 0.125),
     )
-    np.testing.assert_allclose(estimate.direct(scene, HEAVY, a, 64)[1], of_steps + 0.125, rtol=1e-6)
+    np.testing.assert_allclose(estimate.direct(scene, HEAVY, a, 32)[1], of_steps + 0.125, rtol=1e-6)
 
 
 def test_a_kicked_body_coasts():

@@ -36,6 +36,8 @@ from rft.plates import (
 from rft.plates.loads import ORDER
 from rft.vectors import formula
 
+pytestmark = pytest.mark.usefixtures("fastest")
+
 RAD = np.pi / 180
 M0 = StressMap()
 
@@ -339,7 +341,7 @@ def test_the_order_in_the_number_of_elements(shape):
     pose, twist = random_motions(60, 8)
     twist[:, 2] = np.hypot(*twist[:, :2].T) * np.linspace(-5, 5, 60)  # centres 0.2 m away and more
     for stress in (STRESSES["jumping"], M0, StressMap(grazing=0.1), StressMap(tension="cut")):
-        fine, errors = loads(stress, OUTLINES[shape].outline(1600), pose, twist).force, []
+        fine, errors = loads(stress, OUTLINES[shape].outline(800), pose, twist).force, []
         for elements in (25, 50, 100, 200):
             found = loads(stress, OUTLINES[shape].outline(elements), pose, twist).force
             errors.append(np.sqrt(np.mean((found - fine) ** 2)) / np.abs(fine).max())

@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import importlib.metadata
-from importlib.metadata import EntryPoint
+from importlib.metadata import EntryPoint, EntryPoints
 
 from geomech.core.errors import choose
 from rft.refusal import Refusal, located
 from rft.registry import Registry
 
 
-def installed_entries(registry: Registry) -> dict[str, list[EntryPoint]]:
-    """Return the entry points that installed packages declare for a registry, by name, not loaded."""
-    entries: dict[str, list] = {}
-    for entry in importlib.metadata.entry_points(group=registry.group):
-        entries.setdefault(entry.name, []).append(entry)
-    return entries
+def installed_entries(registry: Registry, entries: EntryPoints | None = None) -> dict[str, list[EntryPoint]]:
+    """Return the entry points that installed packages declare for a registry, by name, not loaded. entries: those of all
+    packages, where they have been read already."""
+    found: dict[str, list] = {}
+    for entry in (importlib.metadata.entry_points() if entries is None else entries).select(group=registry.group):
+        found.setdefault(entry.name, []).append(entry)
+    return found
 
 
-def unloaded(registry: Registry) -> tuple[dict[str, str], dict[str, str]]:
+def unloaded(registry: Registry, entries: EntryPoints | None = None) -> tuple[dict[str, str], dict[str, str]]:
     """Return parts of installed packages that are not loaded yet, by name, with their packages: new ones, and those
-    that are refused because a built-in part has their name."""
-    packages = {name: " and ".join(map(_package, entries)) for name, entries in installed_entries(registry).items()}
+    that are refused because a built-in part has their name. entries: as of `installed_entries`."""
+    installed = installed_entries(registry, entries)
+    packages = {name: " and ".join(map(_package, some)) for name, some in installed.items()}
     new = {name: package for name, package in packages.items() if name not in registry}
     return new, {name: package for name, package in packages.items() if name in registry.built_in}
 

@@ -231,11 +231,12 @@ def _check_once(data: frames.Frames, period: float, phase: np.ndarray, bends: np
     closed = CubicSpline(phase, np.concatenate([heading, heading[:1]]), bc_type="periodic")
     shape = closed(2 * np.pi * np.arange(PLACES) / PLACES)
     shape = shape - shape.mean(0)
-    square, differ = (shape**2).sum(1), np.full(int(LONGEST * PLACES), 0.5)
+    products = shape @ shape.T
+    square, differ = products.diagonal(), np.full(int(LONGEST * PLACES), 0.5)
     for k in range(1, len(differ)):
         ends = square[k:].mean(), square[:-k].mean()
         if min(ends) > 0.5 * square.mean():  # neither is a pause
-            differ[k] = ((shape[k:] - shape[:-k]) ** 2).sum(1).mean() / sum(ends)
+            differ[k] = 1 - 2 * products.diagonal(k).mean() / sum(ends)
     repeats = np.flatnonzero((differ < REPEATED) & (np.maximum.accumulate(differ) > 0.5))
     if repeats.size:
         lag = (repeats[0] + int((np.diff(differ[repeats[0] :]) > 0).argmax())) / PLACES

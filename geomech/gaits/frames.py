@@ -6,6 +6,7 @@ import itertools
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from weakref import WeakValueDictionary
 
 import numpy as np
 
@@ -48,9 +49,18 @@ class Frames:
         return np.diff(self.starts, append=len(self.rows))
 
 
+_READ: WeakValueDictionary[tuple[str, str], Frames] = WeakValueDictionary()
+
+
 def read(path: str | Path) -> Frames:
-    """Return the frames of a CSV file; Refusal if it has none that can be used."""
+    """Return the frames of a CSV file, of one that is in use the same object; Refusal if it has none that can be used."""
     source = read_rows(path, LARGEST_FILE, "file must be a CSV file of one period")
+    if (frames := _READ.get((source.name, source.sha256))) is None:
+        frames = _READ[source.name, source.sha256] = _frames(source)
+    return frames
+
+
+def _frames(source: Rows) -> Frames:
     columns = _header(source)
     rows = source.numbers(columns)
     keyed = columns[1] in ("s", "point")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from numpy.polynomial import legendre
 
@@ -13,6 +15,7 @@ NODES, WEIGHTS = legendre.leggauss(5)
 PASSES = 3  # of making a spline's parameter its own arc length; 1e-7 rad is left at 30 points along a sandfish
 
 
+@functools.lru_cache(maxsize=4)  # scenes of a sweep have one file
 def bends(frames: Frames, elements: int, modes: int) -> np.ndarray:
     """Return the heading of each element minus that of the one before, (F, elements - 1), rad. modes: Legendre modes of
     the curvature along the body, fitted by least squares; 0: splines through the data."""

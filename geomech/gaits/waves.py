@@ -82,18 +82,21 @@ def arc_to_phase(u: np.ndarray, slope: np.ndarray) -> np.ndarray:
     """Return p at which the sine y = sin, of largest slope ``slope``, has covered the share u / 2 pi of its length per
     wave.
 
-    The length up to p is proportional to E(p | m), m = slope^2 / (1 + slope^2); Newton from u, which converges
-    quadratically because E is monotone with a slope between sqrt(1 - m) and 1.
+    The length up to p is proportional to E(p | m), m = slope^2 / (1 + slope^2), which is monotone with a slope D between
+    sqrt(1 - m) and 1; Halley's steps from u, each of which leaves about the cube of its size.
     """
     from scipy.special import ellipe, ellipeinc
 
     m = slope**2 / (1 + slope**2)
-    per_wave = 4 * ellipe(m)
+    length = u / (2 * np.pi) * (4 * ellipe(m))
     p = np.array(np.broadcast_to(u, np.broadcast_shapes(u.shape, np.shape(slope))), float)
     for _ in range(50):
-        step = (ellipeinc(p, m) - u / (2 * np.pi) * per_wave) / np.sqrt(1 - m * np.sin(p) ** 2)
-        p -= np.clip(step, -0.5, 0.5)
-        if np.abs(step).max() < 1e-13 * (1 + np.abs(p).max()):
+        sin = np.sin(p)
+        D2 = 1 - m * sin * sin
+        newton = (ellipeinc(p, m) - length) / np.sqrt(D2)
+        step = np.clip(newton / (1 + 0.5 * newton * m * sin * np.cos(p) / D2), -0.5, 0.5)
+        p -= step
+        if np.abs(step).max() < 1e-6:
             break
     return p
 

@@ -133,7 +133,7 @@ def _set(motion: Motion, rows: np.ndarray, field, error, caption: str):
     fig.set_dpi(DOTS)
     canvas = FigureCanvasAgg(fig)
     moving = update(rows[0])
-    canvas.draw()  # lays out with the longest text in place
+    fig.get_layout_engine().execute(fig)  # with the longest text in place
     fig.set_layout_engine("none")
     for artist in moving:
         artist.set_animated(True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator
+from importlib.metadata import EntryPoints, entry_points
 from typing import Any, NamedTuple
 
 from geomech.core.entry_points import unloaded
@@ -36,7 +37,7 @@ class Part(NamedTuple):
 def sections() -> dict[str, list[Part]]:
     """Return the kinds of every section of a scene file; a class that several kinds of scene have is listed once."""
     parts_of: dict[str, list[Part]] = {"frame": []}
-    listed = set()
+    listed, installed = set(), entry_points()
     for scene in SCENES.values():
         for name, (section, *_) in file_sections(scene).items():
             parts = parts_of.setdefault(name, [])
@@ -52,7 +53,7 @@ def sections() -> dict[str, list[Part]]:
                 if (name, variant.label, variant.kind) not in listed:
                     parts.append(_part(name, section, variant))
                     listed.add((name, variant.label, variant.kind))
-            parts += _package_parts(section)
+            parts += _package_parts(section, installed)
     return parts_of
 
 
@@ -78,10 +79,10 @@ def _part(name: str, section: Section, variant: Variant) -> Part:
     return Part(f"{head} {variant.label}".strip() + owner, "\n".join(about).strip(), keys_in(variant))
 
 
-def _package_parts(section: Section) -> Iterator[Part]:
+def _package_parts(section: Section, entries: EntryPoints) -> Iterator[Part]:
     """Yield the parts of installed packages."""
     if (registry := registry_of(section)) is not None:
-        new, refused = unloaded(registry)
+        new, refused = unloaded(registry, entries)
         for name, package in new.items():
             yield Part(f'{section.key} = "{name}"', f"Of {package}, which is loaded when a scene asks for it.", [])
         for name, package in refused.items():
