@@ -70,18 +70,12 @@ def pytest_collection_finish():
 
 def pytest_sessionfinish(session):
     gc.collect()
-    gc.freeze()  # pytest collects five times more
+    gc.freeze()  # pytest collects five times more, and Python as it ends
     truths = session.config.stash[TRUTHS]
     if truths.renew:
         truths.write()
     if hasattr(session.config, "workeroutput"):
         session.config.workeroutput["missing"] = truths.missing
-
-
-@pytest.hookimpl(trylast=True)
-def pytest_unconfigure():
-    """What pytest has just looked through for garbage is not looked through twice more as the process ends: a second."""
-    gc.freeze()
 
 
 @pytest.hookimpl(optionalhook=True)
