@@ -105,8 +105,7 @@ def test_what_turns_out_to_take_long_is_given_away(two, monkeypatch):
 
 
 def test_an_ended_worker_loses_nothing(tmp_path):
-    with using(2):
-        executor = runner().executor
+    with contextlib.closing(executors.Processes(1)) as executor:
         assert each(executor, dies, str(tmp_path), range(8)) == [*range(8)]
         with pytest.raises(RuntimeError, match="ended 3 times at the same part: out of memory"):
             each(executor, always_dies, None, [0])
@@ -135,14 +134,15 @@ def test_a_request_that_is_given_up_ends_its_workers(tmp_path):
     """Nobody waits for what is under way, and nobody goes on with it."""
 
     def stop():
-        while len(list(tmp_path.iterdir())) < 2:
+        while not list(tmp_path.iterdir()):
             time.sleep(0.02)
         os.kill(os.getpid(), signal.SIGTERM)
 
     start, stopper = time.monotonic(), threading.Thread(target=stop)
     stopper.start()
-    with pytest.raises(terminal.Stopped), terminal.stoppable(), using(2):
-        each(runner().executor, waits, str(tmp_path), range(4))
+    one = contextlib.closing(executors.Processes(1))
+    with pytest.raises(terminal.Stopped), terminal.stoppable(), one as executor:
+        each(executor, waits, str(tmp_path), range(4))
     assert time.monotonic() - start < 50  # of the minute that a task takes
     for mark in tmp_path.iterdir():
         with pytest.raises(ProcessLookupError):
@@ -155,13 +155,12 @@ def test_workers_end_with_whoever_started_them(tmp_path):
         import sys
         sys.path[:0] = {[str(Path(__file__).parent)]!r}
         from tasks import waits
-        import geomech
-        from geomech.run.jobs import runner
-        with geomech.workers.using(2):
-            list(runner().map(waits, {str(tmp_path)!r}, range(4), 4, seconds=1e9))
+        from geomech.run.executors import Processes
+        from geomech.run.jobs import Runner
+        list(Runner(executor=Processes(1)).map(waits, {str(tmp_path)!r}, range(4), 4, seconds=1e9))
     """
     with subprocess.Popen([sys.executable, "-c", code]) as process:
-        while len(list(tmp_path.iterdir())) < 2:
+        while not list(tmp_path.iterdir()):
             assert process.poll() is None
             time.sleep(0.02)
         process.kill()
@@ -208,9 +207,9 @@ def both(two, ask, shared=True):
 
 def test_fields_have_the_same_digits_whoever_computes(two, given_away, monkeypatch):
     """With what moving costs, whose powers come beside the velocities."""
-    monkeypatch.setattr(connection, "SAMPLES_TOGETHER", 20)  # a quarter of the viscous field has 64
-    monkeypatch.setattr(metric, "SAMPLES_TOGETHER", 60)
-    for scene in (GLASS.with_numerics(grid=7, harmonics=5), scenes.load("three-link-viscous").with_numerics(grid=7)):
+    monkeypatch.setattr(connection, "SAMPLES_TOGETHER", 20)  # a quarter of the viscous field has 36
+    monkeypatch.setattr(metric, "SAMPLES_TOGETHER", 30)
+    for scene in (GLASS.with_numerics(grid=5, harmonics=3), scenes.load("three-link-viscous").with_numerics(grid=5)):
 
         def ask():
             study = Study(scene)
@@ -299,8 +298,7 @@ def test_a_signal_at_any_moment_leaves_nobody_waiting(monkeypatch):
     before = signal.signal(signal.SIGALRM, ring)
     try:
         for k in (0, 2):
-            with contextlib.suppress(Rung), using(2):
-                executor = runner().executor
+            with contextlib.suppress(Rung), contextlib.closing(executors.Processes(1)) as executor:
                 assert each(executor, doubled, 2, range(3)) == [0, 2, 4]
                 pool = executor.pool
                 signal.setitimer(signal.ITIMER_REAL, 1e-3 * (1 + 13 * k))
