@@ -227,17 +227,18 @@ def test_error_studies_have_the_same_digits_whoever_computes(two, given_away, mo
     few = [dataclasses.replace(k, values=k.values[:2]) for k in tiered.SETTINGS if k.tier in ("direct", "path")]
     monkeypatch.setattr(tiered, "SETTINGS", few)
     monkeypatch.setattr(tiered, "TRUTH_PHASES", 64)
-    scene, told = GLASS.with_numerics(grid=7), []
+    scene, told = scenes.load("three-link-viscous").with_numerics(grid=5, phases=32), []
     here, shared = both(two, lambda: accuracy.study(scene, told.append, runs=1))
     assert [x["error"] for x in shared["lines"]] == [x["error"] for x in here["lines"]]
-    assert len(here["lines"]) == 7 and all(t > 0 for x in shared["lines"] for t in x["seconds"])
+    assert len(here["lines"]) == 3 and all(t > 0 for x in shared["lines"] for t in x["seconds"])
     parts = len(told) // 2  # each tells, whoever has done it
-    assert parts > 2 * len(few) and told == 2 * [(k + 1) / parts for k in range(parts)]
+    assert parts >= 2 * 3 and told == 2 * [(k + 1) / parts for k in range(parts)]
 
 
 def test_searches_have_the_same_digits_whoever_computes(two, given_away, monkeypatch):
     for names in (search.__globals__, vars(sys.modules["geomech.optimisation.request"])):
         monkeypatch.setitem(names, "MORE", 1)  # perturbation of each size
+        monkeypatch.setitem(names, "LED", 1)  # start from narrower limits
     scene, told = GLASS.with_numerics(grid=5), []
     request = checked(scene, "efficiency", harmonics=1, starts=2)
     here, shared = both(two, lambda: search(request, told.append))
