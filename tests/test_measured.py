@@ -543,6 +543,9 @@ def test_the_ccf_near_the_gait_is_that_of_differences(usual):
     np.testing.assert_allclose(
         known.ccf(alpha), d[0][..., 1] - d[1][..., 0] + se2.bracket(A[..., 0], A[..., 1]), atol=1e-7
     )
+    others = (dataclasses.replace(known, A=known.A + x[:, :, 0], slope=known.slope + x[:, :, 1:]) for x in known.errors)
+    errors = [other.ccf(alpha) - known.ccf(alpha) for other in others]
+    np.testing.assert_allclose(known.ccf_error(alpha), known.factor * np.sqrt(np.square(errors).sum(0)), rtol=1e-9)
     field = ccf(usual.tube)
     assert np.isnan(field.values).any() and np.isfinite(field.values).any()
 
