@@ -12,6 +12,7 @@ import pytest
 import typer.main
 
 from geomech import cli
+from geomech.run import backend
 from geomech.scenes import kinds
 from rft.registry import REGISTRIES
 
@@ -30,6 +31,7 @@ def geomech(*args, cwd="."):
         with (
             mock.patch.object(sys, "argv", ["geomech", *map(str, args)]),
             mock.patch.object(typer.main, "get_command", PARSER),
+            mock.patch.object(backend, "prefer"),  # what the fixture `fastest` prefers remains
             contextlib.redirect_stdout(streams[0]),
             contextlib.redirect_stderr(streams[1]),
             contextlib.chdir(cwd),

@@ -154,7 +154,7 @@ def test_intrude_gives_what_the_python_door_gives(name, geomech, tmp_path):
     }
     assert list(found) == ["t", *place, "force_x", "force_z", "moment"]
     _, pose, twist = scene.motion.trajectory(scene.outline)
-    wanted = loads(scene.medium, scene.outline, pose, twist, backend="numpy")
+    wanted = loads(scene.medium, scene.outline, pose, twist)
     np.testing.assert_allclose(np.stack([found["force_x"], found["force_z"]], -1), wanted.force, rtol=1e-14)
     np.testing.assert_array_equal(found["moment"], wanted.moment)
     with open(tmp_path / "out.csv", newline="") as file:

@@ -14,7 +14,7 @@ from commands import geomech
 from tasks import doubled, who
 from test_store import HARD, same
 
-from geomech import plots, scenes, terminal, text
+from geomech import cli, plots, scenes, terminal, text
 from geomech.commands.pipeline import allow, storing
 from geomech.geometry import connection
 from geomech.optimisation import checked, search
@@ -183,6 +183,15 @@ def test_a_count_of_balances_decides_on_the_back_end_and_no_clock():
             with backend.preferring("numpy"):
                 allow(ASKED, cost.Cost(balances, seconds, 0.0), yes=True)
                 assert backend.preferred() == expected
+
+
+def test_a_command_begins_with_numpy(monkeypatch, capsys):
+    """Whose first call takes least."""
+    preferred = []
+    monkeypatch.setattr("geomech.run.backend.prefer", preferred.append)
+    with pytest.raises(SystemExit):
+        cli.main(["scenes"])
+    assert preferred == ["numpy"]
 
 
 def test_others_resume_too(tmp_path, monkeypatch):

@@ -227,7 +227,8 @@ class TaylorSeries:
         return self.factor * np.sqrt(sum((of(self.combined + x) - value) ** 2 for x in self.errors))
 
     def _ccf_at(self, alpha) -> Callable:
-        """Return a function of coefficients as `combined`, of any connection along the gait: its CCF (..., 3) at shapes (..., 2).
+        """Return a function that gives the CCF (..., 3) at shapes (..., 2) of any connection along the gait, from its
+        coefficients as `combined`.
 
         alpha = theta(phi) + s n(phi) has d alpha / d phi = theta' (1 - curvature s), and dA/ds is the slope."""
         t, delta = self._deviation(alpha)
