@@ -106,8 +106,8 @@ def test_a_law_of_traction_alone_gives_every_tier_within_its_error(law):
         size, off = np.hypot(*ours[-1, :2]), estimate.distance(ours, theirs).max()
         assert off < 0.04 * size
         assert estimate.distance(ours, better).max() <= max(off / 2, 1e-9)
-    poses, errors = estimate.direct(bare.scene, gait, amplitudes, 64)
-    truth = estimate.direct(exact.scene, gait, amplitudes, 512)[0]
+    poses, errors = estimate.direct(bare.scene, gait, amplitudes, 128)
+    truth = estimate.direct(exact.scene, gait, amplitudes, 1024)[0]
     assert (estimate.pose_distance(poses, truth, 1.0) <= errors + 1e-9).all()
     assert exact.tiers == bare.tiers
 
