@@ -192,7 +192,8 @@ def test_a_sweep_has_the_same_digits_whoever_computes(at_once, two, given_away, 
 
 def both(two, ask, shared=True):
     """What a request gives here, and by processes, which have done some of it if it is to be shared."""
-    here, sent = ask(), []
+    with running(Runner()):  # `two` is there for all tests
+        here, sent = ask(), []
 
     class Counted(executors.Processes):
         def submit(self, task, *arguments):
