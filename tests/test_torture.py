@@ -19,7 +19,6 @@ from commands import geomech
 
 from geomech import scenes
 from geomech.run.store import Store
-from rft.balance import backend
 
 pytestmark = pytest.mark.skipif(not Path("/proc").is_dir(), reason="sees by /proc what is left of a process")
 COMMAND = """
@@ -152,8 +151,7 @@ def quiet(name, place):
 def whole(tmp_path_factory):
     """The sweep that nobody disturbs, by this process."""
     (args, out), folder = REQUESTS["sweep"], scenes_in(tmp_path_factory.mktemp("quiet"))
-    with backend.preferring(backend.fastest()):
-        assert geomech(*args, "--workers", "1", "-o", out, cwd=folder)[0] == 0
+    assert geomech(*args, "--workers", "1", "-o", out, cwd=folder)[0] == 0
     return (folder / out).read_bytes()
 
 
