@@ -14,14 +14,15 @@ import typer.main
 from geomech import cli
 from geomech.run import backend
 from geomech.scenes import kinds
+from rft.balance.backend import preferring
 from rft.registry import REGISTRIES
 
 PARSER = functools.cache(typer.main.get_command)  # it takes 20 ms, and is the same each time
 
 
-def _prefer(name, prefer=backend.prefer):
-    """Tests that run compiled (the fixture `fastest`) have it loaded: it is worth its start for few balances, too."""
-    if backend.preferred() != "numba":
+def unless_numpy(name, prefer=backend.prefer):
+    """Prefers a back end, but for the one that commands begin with: what the fixture `fastest` prefers remains."""
+    if name != "numpy":
         prefer(name)
 
 
@@ -30,14 +31,13 @@ def geomech(*args, cwd="."):
     streams = [io.TextIOWrapper(io.BytesIO(), encoding="utf-8") for _ in range(2)]
     handlers = {s: signal.getsignal(s) for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     for number in (s for s, handler in handlers.items() if handler is signal.SIG_IGN):
-        signal.signal(
-            number, signal.SIG_DFL
-        )  # the tests may run in the background, where a command heeds what is ignored
+        signal.signal(number, signal.SIG_DFL)  # tests may run in the background, where a command heeds what is ignored
     try:
         with (
             mock.patch.object(sys, "argv", ["geomech", *map(str, args)]),
             mock.patch.object(typer.main, "get_command", PARSER),
-            mock.patch.object(backend, "prefer", _prefer),
+            mock.patch.object(backend, "prefer", unless_numpy),
+            preferring(""),  # what it prefers ends with it
             contextlib.redirect_stdout(streams[0]),
             contextlib.redirect_stderr(streams[1]),
             contextlib.chdir(cwd),

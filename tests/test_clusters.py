@@ -110,7 +110,7 @@ def listening():
     "word", ["tcp://127.0.0.1:{port}", "127.0.0.1:{port}", "nonsense", "http://127.0.0.1:{port}", ""]
 )
 def test_a_scheduler_that_is_none_is_one_line(word, tmp_path, monkeypatch):
-    monkeypatch.setattr(executors, "WAIT", 0.3)
+    monkeypatch.setattr(executors, "WAIT", 0.1)
     word = word.format(port=listening())
     args = ["three-link-viscous", "--over", "gait.amplitude=0.5,1", "-o", "s.nc", "--scheduler", word]
     code, out, err = geomech("sweep", *args, cwd=tmp_path)
@@ -128,7 +128,7 @@ def test_no_client_is_made_of_what_is_no_address(monkeypatch):
 
 
 def test_a_scheduler_that_never_answers_is_one_line(monkeypatch):
-    monkeypatch.setattr(executors, "WAIT", 0.3)
+    monkeypatch.setattr(executors, "WAIT", 0.1)
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
         silent.listen()

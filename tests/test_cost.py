@@ -46,7 +46,7 @@ LARGE = {
     "phases of many amplitudes": ["displacement", "phases.toml", "--amplitudes", "0.1:1:1000"],
     "elements": ["displacement", "elements.toml", "--amplitudes", "0.1:0.2:2000"],
     "time stepping": ["displacement", "sandfish-transient", "--amplitudes", "0.1:0.2:9999"],
-    "a tolerance": ["displacement", "butterfly-glass", "--amplitudes", "0.1:1:99999", "--tol", "1e-6"],
+    "a tolerance": ["displacement", "butterfly-glass", "--amplitudes", "0.1:1:99999", "--tol", "1e-5"],
     "accuracy": ["accuracy", "phases.toml", "-o", "out"],
 }
 
@@ -54,7 +54,7 @@ LARGE = {
 @pytest.fixture
 def large(tmp_path, monkeypatch):
     """A folder with scenes that ask for much."""
-    for name, value in (("directions", 4096), ("harmonics", 999), ("phases", 1_000_000)):
+    for name, value in (("directions", 2048), ("harmonics", 999), ("phases", 1_000_000)):
         (tmp_path / f"{name}.toml").write_text(f"{GLASS.text}\n[numerics]\n{name} = {value}\n")
     (tmp_path / "five.toml").write_text(FIVE_LINKS)
     (tmp_path / "finest.toml").write_text(f"{FIVE_LINKS}[numerics]\ndirections = 128\n")
@@ -247,19 +247,18 @@ def test_a_terminal_without_letters_and_a_home_without_folders(tmp_path):
         import sys
         from geomech import cli
         for args in (
-            ["ccf", "sch\\u00f6n \\u2603.toml", "--plot", "\\u2603.png", "--grid", "5"],
-            ["displacement", "sch\\u00f6n \\u2603.toml", "--amplitudes", "1", "--tiers", "direct"],
-            ["explain", "\\u2603.toml"],
+            "displacement/sch\\u00f6n \\u2603.toml/--amplitudes/1/--tiers/direct/--plot/\\u2603.png",
+            "explain/\\u2603.toml",
         ):
             try:
-                cli.main(args)
+                cli.main(args.split("/"))
             except SystemExit as ended:
                 print("code", ended.code)
     """
     env = {k: v for k, v in os.environ.items() if k != "HOME"} | poor
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, cwd=tmp_path, env=env, timeout=120)
     lines = done.stdout.decode("ascii").splitlines()
-    assert [line for line in lines if line.startswith("code")] == ["code 0", "code 0", "code 2"]
+    assert [line for line in lines if line.startswith("code")] == ["code 0", "code 2"]
     assert any(line.startswith("sch\\xf6n \\u2603.toml: displacement per cycle") for line in lines)
     assert (tmp_path / "\u2603.png").stat().st_size > 10_000
     *_, error = done.stderr.decode("ascii").splitlines()  # on a slow machine how far it is comes before
@@ -267,8 +266,8 @@ def test_a_terminal_without_letters_and_a_home_without_folders(tmp_path):
 
 
 def test_too_many_open_files_are_said_and_nothing_is_left(tmp_path):
-    """Where a figure needs a font and a folder of ours two more to go."""
-    line = f"ulimit -n 8; exec {sys.executable} -m geomech ccf three-link-viscous --grid 5 --plot a.png"
+    """Where a folder of ours needs two more to go than the file that is to be written."""
+    line = f"ulimit -n 6; exec {sys.executable} -m geomech trajectory three-link-viscous -o a.csv"
     done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, cwd=tmp_path, timeout=60)
     assert done.returncode == 2
     assert done.stderr.startswith("error: too many files are open at once: raise the limit, as by 'ulimit -n 1024'")
@@ -281,12 +280,12 @@ FULL = "No space left on device; make room, or send it elsewhere"
 def test_nobody_need_listen(tmp_path):
     """A pipe that is closed, as by head, and no standard output at all, are no failures; a full disk is one."""
     told = f"{sys.executable} -m geomech"
-    said, full = f"{told} scenes", f"error: cannot write to standard output: {FULL}\n"
+    full = f"error: cannot write to standard output: {FULL}\n"
     for line, code, err in (
-        (f"{said} | true; exit ${{PIPESTATUS[0]}}", 0, ""),
-        (f"{said} >&-", 0, ""),
-        (f"{said} 2>&-  >/dev/null", 0, ""),
-        (f"{told} velocity three-link-viscous --alpha 0,0 --alphadot 1,0 > /dev/full", 2, full),
+        (f"{told} scenes | true; exit ${{PIPESTATUS[0]}}", 0, ""),
+        (f"{told} --version >&-", 0, ""),
+        (f"{told} --version 2>&- >/dev/null", 0, ""),
+        (f"{told} --version > /dev/full", 2, full),
     ):
         done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, cwd=tmp_path, timeout=60)
         assert (done.returncode, done.stderr) == (code, err), line

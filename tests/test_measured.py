@@ -93,7 +93,7 @@ def covered(velocity, seeds, **asked):
 
 
 def test_intervals_cover_the_truth_in_a_fluid(viscous):
-    net, A = covered(viscous, range(5), noise=2e-3, cycles=24, samples=32)
+    net, A = covered(viscous, range(5), noise=2e-3, cycles=24, samples=32, fit={"harmonics": 4})
     assert net >= 13 / 15
     assert 0.9 <= A
 
@@ -102,7 +102,7 @@ def test_half_of_the_intervals_of_one_half_miss(viscous, usual):
     """An interval that covered all would cover too much."""
     wide, narrow = (measured.fit_log(usual.log, level=x, harmonics=5) for x in (0.95, 0.5))
     np.testing.assert_allclose(wide.displacement[0], narrow.displacement[0], rtol=1e-12)
-    assert wide.known.A.shape[-1] == 11 and measured.fit_log(usual.log, harmonics=9).known.A.shape[-1] == 19
+    assert wide.known.A.shape[-1] == 11
     t = 2 * np.pi * np.arange(32) / 32
     found, off = narrow.along(t)
     assert 0.3 <= np.mean(np.abs(found - true_A(narrow, viscous, t)) <= off) <= 0.75
@@ -111,7 +111,7 @@ def test_half_of_the_intervals_of_one_half_miss(viscous, usual):
 def test_intervals_cover_the_net_pose_in_sand():
     """xi is not linear in alphadot there; near the gait A is its derivative."""
     velocity = Swimmer(rft.Granular(1.8, math.radians(13.8)), BODY).velocity
-    net, A = covered(velocity, range(2), cycles=20, samples=32)
+    net, A = covered(velocity, range(2), cycles=20, samples=32, fit={"harmonics": 8})
     assert net >= 5 / 6
     assert A >= 0.85  # with corners of A, where links begin and cease to stick
 
@@ -249,7 +249,7 @@ def test_every_entry_of_A_and_its_slope_is_the_truth_without_noise(viscous):
     np.testing.assert_allclose(f.displacement[0], true_net(f, viscous), atol=3e-5)
 
 
-@pytest.mark.parametrize(("wave", "kept"), [(1, 4), (5, 7), (7, 9)])
+@pytest.mark.parametrize(("wave", "kept"), [(1, 4), (7, 9)])
 def test_as_many_harmonics_as_the_connection_asks_for_and_two_more(wave, kept):
     """A that goes up and down ``wave`` times along the gait; at least four harmonics."""
     alongside = lambda alpha: np.real((alpha[..., 0] + 1j * alpha[..., 1]) ** wave)[..., None, None]
@@ -273,9 +273,9 @@ def test_where_and_when_a_log_begins_does_not_matter(viscous):
 
 
 def test_a_backward_log_has_the_same_connection(viscous):
-    made = synthetic.made(viscous, GAIT, cycles=40, samples=40, seed=1)
+    made = synthetic.made(viscous, GAIT, cycles=30, samples=32, seed=1)
     back = made._replace(t=made.t[-1] - made.t[::-1], alpha=made.alpha[::-1], pose=made.pose[::-1])
-    one, other = (measured.fit_log(log_of(x), harmonics=5) for x in (made, back))
+    one, other = (measured.fit_log(log_of(x), harmonics=4) for x in (made, back))
     shape = one.known.loop.shape(np.arange(5.0))
     np.testing.assert_allclose(other.known.connection(shape), one.known.connection(shape), atol=0.02)
     for k in (0, 2):
@@ -543,6 +543,9 @@ def test_the_ccf_near_the_gait_is_that_of_differences(usual):
     np.testing.assert_allclose(
         known.ccf(alpha), d[0][..., 1] - d[1][..., 0] + se2.bracket(A[..., 0], A[..., 1]), atol=1e-7
     )
+    others = (dataclasses.replace(known, A=known.A + x[:, :, 0], slope=known.slope + x[:, :, 1:]) for x in known.errors)
+    errors = [other.ccf(alpha) - known.ccf(alpha) for other in others]
+    np.testing.assert_allclose(known.ccf_error(alpha), known.factor * np.sqrt(np.square(errors).sum(0)), rtol=1e-9)
     field = ccf(usual.tube)
     assert np.isnan(field.values).any() and np.isfinite(field.values).any()
 
@@ -658,7 +661,7 @@ def test_what_an_older_file_does_not_have_is_told_all_the_same(field, tmp_path):
     np.testing.assert_allclose(old.table("A_error"), now.table("A_error"), rtol=1e-12)
 
 
-def test_lengths_and_signs_of_a_field(usual, field, tmp_path):
+def test_lengths_and_signs_of_a_field(usual, short, field, tmp_path):
     minus = Connection.load(field / "field.nc", sign="-")
     alpha = usual.known.loop.shape(np.arange(3.0))
     np.testing.assert_array_equal(minus(alpha), -usual.tube(alpha))
@@ -666,7 +669,7 @@ def test_lengths_and_signs_of_a_field(usual, field, tmp_path):
     cycle = usual.gait.cycle(64)
     np.testing.assert_allclose(two.run(*cycle).net * [2, 2, 1], Table(field / "field.nc").run(*cycle).net, rtol=1e-9)
     np.testing.assert_allclose(two.table_error(*cycle), Table(field / "field.nc").table_error(*cycle) * [0.5, 1])
-    metres = measured.fit_log(usual.log, body_length=0.3, harmonics=4)
+    metres = measured.fit_log(log_of(short), body_length=0.3, harmonics=3)
     save_field(tmp_path / "m.nc", metres)
     table = Table(tmp_path / "m.nc")
     assert (table.length, length_unit(table)) == (0.3, "m")

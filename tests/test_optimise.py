@@ -197,8 +197,9 @@ def test_no_loop_near_the_best_is_better(stroke):
     assert np.hypot(*net[:, :2].T).max() < stroke.value * (1 + 1e-5)
 
 
-def test_more_harmonics_bring_more_and_converge():
-    values = [optimise(viscous(), "efficiency", harmonics=k).value for k in (1, 3, 5, 7)]
+def test_more_harmonics_bring_more_and_converge(cheap):
+    found = {k: optimise(viscous(), "efficiency", harmonics=k).value for k in (1, 3, 7)}
+    values = [found[1], found[3], cheap.value, found[7]]
     assert values[0] > 0.1088  # the best circle
     assert (np.diff(values) > -1e-5).all()
     assert values[3] - values[2] < 0.1 * (values[2] - values[0])
@@ -210,7 +211,8 @@ BY_HAND = [pytest.param(x, marks=pytest.mark.soak) for x in (("displacement", 2.
 @pytest.fixture(scope="module", params=[("displacement", 3.0), *BY_HAND], ids=str)
 def sand(request):
     objective, limits = request.param
-    return optimise(geomech.load("three-link-glass"), objective, limits=limits, starts=STARTS[request.param][0])
+    scene = geomech.load("three-link-glass").with_numerics(grid=11, phases=64)
+    return optimise(scene, objective, limits=limits, starts=STARTS[request.param][0])
 
 
 # By default 9; 2 lead to the same gait. The second are those that narrower limits led to.
@@ -294,15 +296,15 @@ def test_never_worse_than_the_start(stroke):
     assert again.value >= stroke.value and again.best.gait.harmonics == stroke.best.gait.harmonics
     butterfly = viscous(gait=Butterfly(amplitude=0.9))
     assert (poor := optimise(butterfly, "displacement", harmonics=1)).value >= poor.start.value
-    still = optimise(viscous(gait=Circle(amplitude=1e-3)), "displacement")
+    still = optimise(viscous(gait=Circle(amplitude=1e-3)), "displacement", harmonics=1)
     assert still.value > 0.1
 
 
 def test_turning_and_direction(stroke):
-    turning = optimise(viscous(), "turning", limits=1.5)
+    turning = optimise(viscous(), "turning", limits=1.5, harmonics=2)
     assert turning.start.value == pytest.approx(0.0, abs=1e-12)
     assert turning.value == abs(turning.best.displacement[2]) > 0.22
-    ahead = optimise(viscous(), "displacement", "x")
+    ahead = optimise(viscous(), "displacement", "x", harmonics=3)
     assert ahead.value == pytest.approx(ahead.best.displacement[0], rel=1e-6)
     assert ahead.value == pytest.approx(stroke.value, rel=1e-3)
 
@@ -332,13 +334,13 @@ def test_without_a_limit_joints_are_as_fast_as_in_the_gait_of_the_scene():
 
 
 def test_both_limits_of_speed_hold():
-    found = optimise(viscous(), "speed", rate=1.0, power=0.006)
+    found = optimise(viscous(), "speed", harmonics=1, rate=1.0, power=0.006)
     alpha, alphadot = found.gait.cycle(2048)
     per_second = 2 * np.pi * found.gait.frequency
     power = found.scene.system.work(alpha, alphadot, found.scene.system.velocity(alpha, alphadot)).power
     assert np.abs(alphadot).max() * per_second <= 1.0 + 1e-5
     assert power.mean() * per_second**2 <= 0.006 + 1e-8
-    alone = [optimise(viscous(), "speed", **one).value for one in ({"rate": 1.0}, {"power": 0.006})]
+    alone = [optimise(viscous(), "speed", harmonics=1, **one).value for one in ({"rate": 1.0}, {"power": 0.006})]
     assert found.value <= min(alone) * (1 + 1e-4)
 
 
@@ -392,13 +394,15 @@ def test_starts_are_the_same_every_time_and_answers_are_counted():
     assert "answers that differ" in optima.text(result_of(found))
 
 
-def test_one_start_alone_is_finished_without_perturbations(monkeypatch):
-    perturbed, own = [], _Search._perturbed
-    monkeypatch.setattr(_Search, "_perturbed", lambda self, p: perturbed.append(self.request.starts) or own(self, p))
-    scene = geomech.load("three-link-glass").with_numerics(grid=5, phases=16)
-    for starts in (1, 2):
-        optimise(scene, limits=1.2, harmonics=1, starts=starts)
-    assert {*perturbed} == {2}
+@pytest.mark.parametrize(("starts", "loops"), [(1, [0.0]), (2, [0.0, 1.0, -2.0])])
+def test_one_start_alone_is_finished_without_perturbations(starts, loops):
+    """Loops are numbers here, and the larger the better; an ascent adds a half."""
+    asked, ranked = types.SimpleNamespace(starts=starts, phases=64), []
+    search = types.SimpleNamespace(request=asked, _perturbed=lambda p: ([p + 0.5], [p - 3.0]))
+    search._each = lambda starts, *_, **__: [p + 0.5 for p in starts]
+    search._merit = lambda tier, p, turn: ranked.append(p) or p
+    assert _Search._polished(search, None, (), 0.0, 0.0) == (0.0, max(loops), max(loops) + 0.5)
+    assert ranked == loops
 
 
 def serpenoid(body=None):
@@ -444,15 +448,9 @@ def test_three_joints_and_gaits_that_must_be_run_as_a_whole():
     assert checked(past, "displacement").by_runs
 
 
-def test_singular_shapes_are_kept_away_from():
-    snake = geomech.load("no-slip-snake")
-    found = optimise(snake, limits=1.6, harmonics=2)
-    d = snake.system.traits.singularity(found.gait.cycle(500)[0])
-    assert found.value > 2 * found.start.value
-    assert np.abs(d).min() > 0.45 * np.abs(snake.system.traits.singularity(snake.gait.cycle(500)[0])).min()
-
-
-def test_a_gait_drawn_together_is_kept_clear_of_them_too():
+def test_a_gait_drawn_together_is_kept_clear_of_singular_shapes(monkeypatch):
+    """From which no ascent is to lead away."""
+    monkeypatch.setattr(_Search, "_each", lambda self, starts, *_: list(starts))
     snake = geomech.load("no-slip-snake").with_numerics(phases=32)
     found = optimise(snake, limits=(1.0, 0.5), harmonics=1)
     assert found.value >= found.start.value > 0
@@ -652,7 +650,7 @@ def test_strokes():
 
 def test_limits_of_each_joint_and_side():
     box = ((-0.5, 2.0), (-1.2, 1.0))
-    found = optimise(viscous(), limits=box, harmonics=3)
+    found = optimise(viscous(), limits=box, harmonics=1)
     low, high = (f(found.gait.cycle(2000)[0], 0) for f in (np.min, np.max))
     assert (low >= np.array([-0.5, -1.2]) - 1e-9).all()
     assert (high <= np.array([2.0, 1.0]) + 1e-9).all()
@@ -733,11 +731,11 @@ class Strips:
 
 
 def test_several_answers_are_told_from_one_found_again():
-    found = optimise(Scene(Strips(), Circle(amplitude=0.5)), harmonics=2, limits=2.0, starts=9)
+    found = optimise(Scene(Strips(), Circle(amplitude=0.5)), harmonics=2, limits=2.0, starts=8)
     values, counts = zip(*found.answers)
-    assert sum(counts) == 9
+    assert sum(counts) == 8
     assert max(counts) > 1
-    assert 1 < len(values) < 9
+    assert 1 < len(values) < 8
     assert list(values) == sorted(values, reverse=True)
     assert found.value == values[0] > 1.01 * values[1]
     edge = np.arccos(-0.2 / 3) / 3  # of the strip in the middle, which is 4 rad long
@@ -747,7 +745,8 @@ def test_several_answers_are_told_from_one_found_again():
 
 def test_all_starts_keep_off_singular_shapes():
     snake = geomech.load("no-slip-snake")
-    found = optimise(snake, limits=1.6, harmonics=2, starts=5)
+    found = optimise(snake, limits=1.6, harmonics=2, starts=2)
+    assert found.value > 2 * found.start.value
     least = np.abs(snake.system.traits.singularity(snake.gait.cycle(1000)[0])).min()
     d = snake.system.traits.singularity(found.gait.cycle(1000)[0])
     assert np.ptp(np.sign(d)) == 0

@@ -335,12 +335,12 @@ def test_plots_draw_where_they_stand(study, table):
     for one in draw:
         ax = one()
         assert pyplot.get_fignums() == [] and ax._repr_png_().startswith(PNG)
-        assert ax.figure._repr_png_().startswith(PNG)
         figure, (first, second) = pyplot.subplots(1, 2)
         assert one(ax=first) is first and not second.lines and not second.collections
         pyplot.sca(second)
         assert one() is second and pyplot.gcf() is figure
         pyplot.close("all")
+    assert ax.figure._repr_png_().startswith(PNG)
     assert "matplotlib.pyplot" in sys.modules
 
 

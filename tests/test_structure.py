@@ -28,15 +28,16 @@ KNOW_MECHANICS = {
 
 
 @functools.cache
-def tree_of(path):
-    return ast.parse(path.read_text())
+def nodes(path):
+    """All nodes of the tree of a file."""
+    return [*ast.walk(ast.parse(path.read_text()))]
 
 
 @functools.cache
 def imports(path):
     """Dotted names of all that a file imports, wherever in it."""
     found = []
-    for node in ast.walk(tree_of(path)):
+    for node in nodes(path):
         if isinstance(node, ast.Import):
             found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -72,9 +73,9 @@ def modules():
 def arrows(path, known):
     """Modules that a file imports, inside functions too, but for type checkers alone."""
 
-    def visit(node):
-        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
-            return
+    checked = (node for node in nodes(path) if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING")
+    unloaded, found = {id(node) for one in checked for node in ast.walk(one)}, set()
+    for node in nodes(path):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []
         if isinstance(node, ast.ImportFrom):
             names = [f"{node.module}.{name}" for name in names]
@@ -83,12 +84,9 @@ def arrows(path, known):
             getattr(node.func, "attr", ""),
         ):
             names = [x.value for x in node.args if isinstance(x, ast.Constant)]
-        for name in names:
-            yield next((m for m in (name, name.rpartition(".")[0]) if m in known), None)
-        for child in ast.iter_child_nodes(node):
-            yield from visit(child)
-
-    return {*visit(tree_of(path))} - {None}
+        if names and id(node) not in unloaded:
+            found |= {next((m for m in (name, name.rpartition(".")[0]) if m in known), None) for name in names}
+    return found - {None}
 
 
 FILES = modules()
@@ -173,8 +171,7 @@ def test_what_python_reaches_names_arguments_and_no_options():
     texts = []
     for path in sorted(p for x in ("rft", "geomech") for p in (ROOT / x).rglob("*.py")):
         if not path.relative_to(ROOT).as_posix().removeprefix("geomech/").startswith(SPEAK_OF_OPTIONS):
-            tree = tree_of(path)
-            prose = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-            found = (n for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str))
+            prose = {id(node.value) for node in nodes(path) if isinstance(node, ast.Expr)}
+            found = (n for n in nodes(path) if isinstance(n, ast.Constant) and isinstance(n.value, str))
             texts += [n.value for n in found if id(n) not in prose and re.search(r"(?<!\w)--[a-z]", n.value)]
     assert [x for x in texts if "geomech scenes --show" not in x] == []

@@ -15,6 +15,7 @@ import time
 from pathlib import Path
 
 import pytest
+from commands import geomech
 
 from geomech import scenes
 from geomech.run.store import Store
@@ -33,7 +34,7 @@ cli.main()
 """
 SANDFISH = scenes.load("sandfish-transient").text.replace("= 100", "= 5").replace("phases = 64", "phases = 32")
 REQUESTS = {  # with the name of the output
-    "sweep": (["sweep", "glass.toml", "--over", "medium.C=1:3:6", "--over", "gait.amplitude=0.3:1.2:40"], "out.nc"),
+    "sweep": (["sweep", "glass.toml", "--over", "medium.C=1:3:4", "--over", "gait.amplitude=0.3:1.2:40"], "out.nc"),
     "field": (["connection", "glass.toml", "--grid", "31"], "out.nc"),
     "march": (["trajectory", "sandfish.toml", "--cycles", "2"], "out.csv"),
 }
@@ -89,17 +90,20 @@ def ended(process, number, patience=1.0):
     return err
 
 
-def tortured(name, place, whole, kills, seed):
-    """Every bout of a request ends badly, with one worker or two; the last one has the digits of a quiet one."""
+def tortured(name, place, whole, kills, seed, early=False):
+    """Every bout of a request ends badly, with one worker or two; the last one has the digits of a quiet one. early: each as
+    soon as it has kept something, else at any moment."""
     (args, out), rng, seen = REQUESTS[name], random.Random(seed), set()
     partial = place / f".{out}.partial"
+    size = lambda: partial.stat().st_size if partial.exists() else 0
     numbers = [signal.SIGINT, signal.SIGKILL, signal.SIGTERM, signal.SIGKILL]
     for bout in range(kills):
+        before = size()
         process = begun(args, out, place, 1 + bout % 2)
         assert process.stdout.readline() == "begun\n"
         until = time.monotonic() + rng.uniform(0.05, 0.8)
-        while process.poll() is None and time.monotonic() < until:
-            time.sleep(0.02)
+        while process.poll() is None and (size() <= before if early else time.monotonic() < until):
+            time.sleep(0.005)
         if process.poll() is not None:  # it was through
             process.communicate()
             assert (place / out).read_bytes() == whole
@@ -113,7 +117,7 @@ def tortured(name, place, whole, kills, seed):
             assert err.splitlines()[-1].startswith(f"error: stopped by {number.name}: "), err
             kept = re.search(r"(\d+) results so far are kept in (.*): the same command", err)
             assert kept is None or (kept[2] == partial.name and partial.exists())
-        if partial.exists() and partial.stat().st_size:
+        if size():
             if bout % 5 == 2:
                 raw = bytearray(partial.read_bytes())
                 raw[rng.randrange(len(raw))] ^= 1 << rng.randrange(8)
@@ -145,12 +149,14 @@ def quiet(name, place):
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """The sweep that nobody disturbs."""
-    return quiet("sweep", scenes_in(tmp_path_factory.mktemp("quiet")))
+    """The sweep that nobody disturbs, by this process."""
+    (args, out), folder = REQUESTS["sweep"], scenes_in(tmp_path_factory.mktemp("quiet"))
+    assert geomech(*args, "--workers", "1", "-o", out, cwd=folder)[0] == 0
+    return (folder / out).read_bytes()
 
 
 def test_kills_and_interrupts_change_no_digit(place, whole):
-    assert tortured("sweep", place, whole, 2, 0)
+    assert len(tortured("sweep", place, whole, 2, 0, early=True)) == 2
 
 
 @pytest.mark.soak
@@ -171,8 +177,8 @@ def test_a_rival_is_refused_and_a_full_disk_is_no_obstacle(place, whole):
     while not (place / f".{out}.partial").exists():
         assert first.poll() is None, first.communicate()
         time.sleep(0.005)
-    second = begun(args, out, place, 1)
-    assert second.communicate(timeout=60) == ("begun\n", f"error: another computation to {out} is under way: wait for it, stop "
+    second = geomech(*args, "-o", out, cwd=place)
+    assert second == (2, "", f"error: another computation to {out} is under way: wait for it, stop "
         "it, or choose another output with -o\n")  # fmt: skip
     _, err = first.communicate(timeout=100)
     assert first.returncode == 0 and err.count("note: what is done is not kept in .out.nc.partial: ") == 1, err

@@ -53,7 +53,7 @@ def test_media_drawn_from_the_covariance_scatter_as_told(monkeypatch):
     monkeypatch.setattr(uncertainty, "PHASES", 16)
     sand, amplitudes = scene(granular()), [0.7, 1.2]
     told = uncertainty.of_medium(sand, GAIT, np.array(amplitudes))
-    media = whitened(200, 2, seed=1) @ uncertainty.root(COVARIANCE).T
+    media = whitened(100, 2, seed=1) @ uncertainty.root(COVARIANCE).T
     nets = drawn(sand, np.concatenate([media, -media]), amplitudes)
     scatter, shift = nets.std(0), nets.mean(0) - drawn(sand, [[0.0, 0.0]], amplitudes)[0]
     assert told["rule"] == ["second order", "second order"]  # of the heading, 3 % of it
@@ -69,7 +69,7 @@ def test_in_a_frame_that_depends_on_the_medium_media_have_their_own(monkeypatch)
     sand, amplitudes = scene(granular()).with_numerics(grid=7), np.array([0.7, 1.2])
     in_frame = lambda system: Study(sand.changed(system=system)).in_frame("minimum-perturbation").scene
     told = uncertainty.of_medium(in_frame(sand.system), GAIT, amplitudes)
-    media = whitened(20, 2, seed=2) @ uncertainty.root(COVARIANCE).T
+    media = whitened(12, 2, seed=2) @ uncertainty.root(COVARIANCE).T
     at = lambda d: (
         in_frame(Swimmer(Granular(1.49 + d[0], 0.22 + d[1]), BODY)).system.run(*GAIT.cycle(16, amplitudes)).net
     )
@@ -135,7 +135,7 @@ def test_wide_media_shift_the_mean_and_it_is_told(monkeypatch):
         sand = Scene(Swimmer(medium, Chain()), gait, name="sand").with_numerics(phases=64)
         told = uncertainty.of_medium(sand, gait, np.array([1.2]))
         assert told["x"] == pytest.approx(told["net_distance"], rel=1e-3)
-        media = np.concatenate([d := whitened(120, 2, seed=5), -d]) * share * spread
+        media = np.concatenate([d := whitened(60, 2, seed=5), -d]) * share * spread
         media = media[(media + [1.8, 0.24] > [0.0, 0.001]).all(1)]
         nets = drawn(sand, media, [1.2], 32)[:, 0, 3]
         shift = nets.mean() - drawn(sand, [[0.0, 0.0]], [1.2], 32)[0, 0, 3]

@@ -24,7 +24,7 @@ from rft.refusal import Refusal
 BEYOND = "nan, where the data of the log do not reach"
 PLACES = 512  # of the gait, at which the nearest one is looked for, and normals are kept
 NEWTON = 6  # steps to the nearest point from there
-SHAPES_TOGETHER = 4096  # whose distances from all places are held at a time
+SHAPES_TOGETHER = 256  # whose distances from all places, 1 MB, are held at a time: a fourth of the time that 4096 take
 
 
 def waves(t, harmonics: int, order: int = 0) -> np.ndarray:
@@ -107,8 +107,9 @@ class Loop:
         flat = np.reshape(alpha, (-1, np.shape(alpha)[-1]))
         t, places = self._places
         rows = [flat[k : k + SHAPES_TOGETHER] for k in range(0, len(flat), SHAPES_TOGETHER)]
-        squared_distance = lambda shapes: (places**2).sum(1) - 2 * shapes @ places.T  # + |some|^2, the same for all
-        start = np.concatenate([t[squared_distance(shapes).argmin(1)] for shapes in rows]) if rows else np.zeros(0)
+        half_square = (places**2).sum(1) / 2  # of the distance, less that of the shape and its product with the place
+        nearest_places = [t[(half_square - shapes @ places.T).argmin(1)] for shapes in rows]
+        start = np.concatenate(nearest_places) if rows else np.zeros(0)
         return self.projected(alpha, start.reshape(np.shape(alpha)[:-1]), np.pi / PLACES)
 
     def projected(self, alpha, t, step: float = 0.1) -> np.ndarray:
@@ -215,27 +216,39 @@ class TaylorSeries:
         squares = (np.einsum("ijmk,...k,...jm->...ij", x, w, terms) ** 2 for x in self.errors)
         return self.factor * np.sqrt(sum(squares) + self.standard_error_at(t) ** 2)
 
-    def ccf(self, alpha, combined: np.ndarray | None = None) -> np.ndarray:
-        """Return the CCF (..., 3) of two joints at shapes (..., 2), of this connection or another ``combined`` along
-        the same gait. alpha = theta(phi) + s n(phi) has d alpha / d phi = theta' (1 - curvature s), and dA/ds is the
-        slope."""
-        combined = self.combined if combined is None else combined
+    def ccf(self, alpha) -> np.ndarray:
+        """Return the CCF (..., 3) of two joints at shapes (..., 2)."""
+        return self._ccf_at(alpha)(self.combined)
+
+    def ccf_error(self, alpha) -> np.ndarray:
+        """Return the errors (..., 3) of `ccf`."""
+        of = self._ccf_at(alpha)
+        value = of(self.combined)
+        return self.factor * np.sqrt(sum((of(self.combined + x) - value) ** 2 for x in self.errors))
+
+    def _ccf_at(self, alpha) -> Callable:
+        """Return a function that gives the CCF (..., 3) at shapes (..., 2) of any connection along the gait, from its
+        coefficients as `combined`.
+
+        alpha = theta(phi) + s n(phi) has d alpha / d phi = theta' (1 - curvature s), and dA/ds is the slope."""
         t, delta = self._deviation(alpha)
         rate, bend, n = self.loop.shape(t, 1), self.loop.shape(t, 2), self.loop.normals(t)[..., 0]
         speed, s = np.linalg.norm(rate, axis=-1), (n * delta).sum(-1)
         ahead = speed - s * (bend * n).sum(-1) / speed  # |d alpha / d phi|
-        (A, slope), (A_on, slope_on) = ([series(combined[:, :, m], t, order) for m in (0, 1)] for order in (0, 1))
-        along = (A_on + slope_on * s[..., None, None]) / ahead[..., None, None]
-        derivative = np.einsum("...ij,...j->...i", along, n) - np.einsum(
-            "...ij,...j->...i", slope, rate / speed[..., None]
-        )
-        A_here = A + slope * s[..., None, None]
-        return derivative + se2.bracket(A_here[..., 0], A_here[..., 1])
+        waves_at, rates_at = (waves(t, self.A.shape[-1] // 2, order) for order in (0, 1))
 
-    def ccf_error(self, alpha) -> np.ndarray:
-        """Return the errors (..., 3) of `ccf`."""
-        value = self.ccf(alpha)
-        return self.factor * np.sqrt(sum((self.ccf(alpha, self.combined + x) - value) ** 2 for x in self.errors))
+        def ccf(combined: np.ndarray) -> np.ndarray:
+            (A, slope), (A_on, slope_on) = (
+                [np.tensordot(w, combined[:, :, m], (-1, -1)) for m in (0, 1)] for w in (waves_at, rates_at)
+            )
+            along = (A_on + slope_on * s[..., None, None]) / ahead[..., None, None]
+            derivative = np.einsum("...ij,...j->...i", along, n) - np.einsum(
+                "...ij,...j->...i", slope, rate / speed[..., None]
+            )
+            A_here = A + slope * s[..., None, None]
+            return derivative + se2.bracket(A_here[..., 0], A_here[..., 1])
+
+        return ccf
 
     def error(self, alpha, alphadot) -> np.ndarray:
         """Return the errors (..., 3) of the net pose of gaits alpha, alphadot (..., N, d)."""

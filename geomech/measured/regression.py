@@ -110,24 +110,24 @@ def _spread_out(loop: Loop, along: np.ndarray) -> np.ndarray:
 
 
 def columns(loop: Loop, phase, alpha, rate, harmonics: int, varies: int, second: int = SECOND) -> np.ndarray:
-    """Return the regressors (N, P): alphadot_j and s_k alphadot_j times waves in phase, and s_k s_l alphadot_j times
-    ``second`` harmonics, none if that is -1.
+    """Return the regressors (..., N, P) of alpha and rate (..., N, d): alphadot_j and s_k alphadot_j times waves in phase
+    (N,), and s_k s_l alphadot_j times ``second`` harmonics, none if that is -1.
 
     Where not all varies, the rate along the gait stands for alphadot; where nothing does, s_k are left out."""
-    one, mean = np.ones((len(phase), 1)), loop.shape(phase, 1)
+    one, mean = np.ones((*alpha.shape[:-1], 1)), loop.shape(phase, 1)
     if varies < RATES:
-        rate = ((rate * mean).sum(-1) / (mean**2).sum(-1))[:, None]
+        rate = ((rate * mean).sum(-1) / (mean**2).sum(-1))[..., None]
     if varies == NOTHING:
         return _times(rate, one, waves(phase, harmonics))
-    normal = np.einsum("nik,ni->nk", loop.normals(phase), alpha - loop.shape(phase))
-    k, m = np.triu_indices(normal.shape[1])
-    groups = ((np.concatenate([one, normal], 1), harmonics), (normal[:, k] * normal[:, m], second))
-    return np.concatenate([_times(rate, s, waves(phase, h)) for s, h in groups if h >= 0], 1)
+    normal = np.einsum("nik,...ni->...nk", loop.normals(phase), alpha - loop.shape(phase))
+    k, m = np.triu_indices(normal.shape[-1])
+    groups = ((np.concatenate([one, normal], -1), harmonics), (normal[..., k] * normal[..., m], second))
+    return np.concatenate([_times(rate, s, waves(phase, h)) for s, h in groups if h >= 0], -1)
 
 
 def _times(rate, s, w) -> np.ndarray:
-    """Return all products (N, d S W) of rates (N, d), deviations (N, S) and waves (N, W)."""
-    return np.einsum("nj,ns,nw->njsw", rate, s, w).reshape(len(rate), -1)
+    """Return all products (..., N, d S W) of rates (..., N, d), deviations (..., N, S) and waves (N, W)."""
+    return np.einsum("...nj,...ns,nw->...njsw", rate, s, w).reshape(*rate.shape[:-1], -1)
 
 
 def sums(loop: Loop, samples: Samples, harmonics: int, varies: int = RATES, second: int = SECOND) -> Sums:
@@ -142,10 +142,8 @@ def sums(loop: Loop, samples: Samples, harmonics: int, varies: int = RATES, seco
     most = min(MOST_BLOCKS, max(FOLDS * LAGS, MOST_NUMBERS // count**2))
     products = []
     for block in blocks(samples, most):
-        one, other = (
-            columns(loop, samples.phase[block], x[block], u[block], harmonics, varies, second)
-            for x, u in samples.halves
-        )
+        alpha, rate = (np.stack([x[block] for x in both]) for both in zip(*samples.halves))
+        one, other = columns(loop, samples.phase[block], alpha, rate, harmonics, varies, second)
         product, xi = one.T @ other, samples.xi[block]
         products.append(((product + product.T) / 2, (one + other).T @ xi / 2, (xi**2).sum(0)))
     kinds = d if varies == RATES else 1, 1 if varies == NOTHING else d
