@@ -16,7 +16,7 @@ from rft.balance import backend  # noqa: E402
 
 gc.disable()  # until all is read
 backend._preferred.set("numpy")  # "auto" is NumPy, but for `solved_by`
-TRUTHS = pytest.StashKey()
+TRUTHS, COMPILED = pytest.StashKey(), pytest.StashKey()
 BY_HAND = {"soak", "benchmark"}
 LAID_OUT = {"test_pictures", "test_figures", "test_shown"}  # files that look at pictures as they are
 
@@ -41,13 +41,20 @@ def pytest_configure(config):
 
 
 def pytest_sessionstart(session):
-    """Compile the balance once, before the processes of the whole suite would do so side by side."""
+    """Compile the balance once, while tests are read, before the processes of the whole suite would do so side by side."""
     full = session.config.args_source is session.config.ArgsSource.TESTPATHS
     if full and not hasattr(session.config, "workerinput"):
         for folder in ("geomech", "rft"):  # for the processes that tests start, also where Python writes no bytecode
             compileall.compile_dir(pathlib.Path(__file__).parents[1] / folder, quiet=2)
         if backend.installed():
-            subprocess.run([sys.executable, "-m", "rft"], check=True, capture_output=True)
+            session.config.stash[COMPILED] = subprocess.Popen([sys.executable, "-m", "rft"], stdout=subprocess.DEVNULL)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_node_collection_finished(node):
+    """No test begins before."""
+    if compiled := node.config.stash.get(COMPILED, None):
+        assert not compiled.wait(), "python -m rft"
 
 
 @pytest.hookimpl(wrapper=True)
