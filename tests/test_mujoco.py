@@ -360,7 +360,8 @@ def test_a_way_is_along_and_to_the_left_of_the_first_heading():
 
 
 @pytest.mark.parametrize(
-    ("turn", "straight"), [(0.0083, True), (-0.0083, True), (0.0084, False), (2 * np.pi - 0.0084, False)]
+    ("turn", "straight"),
+    [(0.0083, True), (-0.0083, True), (0.0084, False), (2 * np.pi - 0.0084, False), (2 * np.pi - 0.0083, True)],
 )
 def test_a_way_is_straight_that_turns_little_until_the_end(turn, straight):
     """By 0.05 rad in the six strides of half a second that are left, not in those that are over."""

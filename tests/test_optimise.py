@@ -1027,7 +1027,7 @@ def test_undulations_are_sines_within_their_bounds():
     assert sines.gait(rows[0]) == Sine(elements=30, amplitude=0.2, waves=1.0, frequency=2.0)
     own, *others = sines.starts([2.0, 0.1], 200)
     low, high = map(np.array, sines.bounds)
-    assert own.tolist() == [1.0, 0.5]
+    assert own.tolist() == [1.0, 0.5] and len(others) == 199
     share = (np.array(others) - low) / (high - low)
     assert share.min(0) == pytest.approx([0.05, 0.05], abs=0.01) and share.max(0) == pytest.approx([0.5, 0.5], abs=0.01)
     assert sines.same([0.2, 1.0], [0.2095, 1.0095]) and not sines.same([0.2, 1.0], [0.2, 1.0105])

@@ -25,13 +25,13 @@ from rft.metres import GRAVITY
 from rft.plates import VERTICAL, CLeg, RoundRod, StressMap, Wheel, loads
 from rft.refusal import Refusal
 from rft.walking import Fineness, Rhex, Roller, Tripod, Walker, engine, rolling
-from rft.walking.limit import Limit, LimitCycles, _Search, _with_means, limit_cycles
+from rft.walking.limit import Limit, LimitCycles, _Search, _with_means, limit_cycles, predicted_progress
 from rft.walking.march import march, step
 from rft.walking.planar import State
-from rft.walking.planar_walk import _limit_fields, _strides, rerun, walk
+from rft.walking.planar_walk import _limit_fields, _rows, _strides, rerun, walk
 from rft.walking.robot import intervals
 from rft.walking.sdirk import EFFORT, Effort
-from rft.walking.stride import Walk, cycles_to_settle, from_rest, remaining_change
+from rft.walking.stride import Walk, cycles_to_settle, from_rest, map_period, remaining_change
 
 pytestmark = pytest.mark.usefixtures("fastest")
 SAND = StressMap(zeta=0.3, grazing=math.radians(5))
@@ -752,3 +752,33 @@ def test_axes_of_a_sweep_have_units():
     one = {"over": {"robot.legs.relative_curvature": [0.0, 1.0]}, **{k: v[:, 0] for k, v in many.items()}}
     (ax,) = plots.sweep_figure(scenes.load("xplorer"), one).axes
     assert ax.get_xlabel() == "relative_curvature (-)" and ax.get_legend() is None
+
+
+def test_a_robot_limps_whose_every_second_stride_is_alike():
+    """By less than half of what one stride changes, where that is more than nothing."""
+    starts = lambda before, last, now: map_period(*(np.array([[0.0], [x]]) for x in (before, last, now)))
+    assert [int(starts(0.0, -0.1, x)[0]) for x in (0.099, 0.101, -0.05)] == [2, 1, 1]
+    assert [int(starts(0.0, -x, 0.0)[0]) for x in (0.99e-3, 1.01e-3)] == [1, 2]
+
+
+@pytest.mark.parametrize("period", [1, 2])
+def test_slopes_at_a_limit_foretell_the_strides_on_the_way_to_it(period):
+    """Each map of so many strides takes the distance on, and adds what the gains make of it to the progress of each."""
+    slopes, gains = np.array([[0.6, -0.3], [0.2, 0.5]]), np.array([0.03, -0.07])
+    fake = types.SimpleNamespace(cycle=2, scaled=lambda state, index: np.array([[state], [2.0 * state]]))
+    found = predicted_progress(fake, Limit(0.1, period, slopes, gains), 0.6, 0, 0.02)
+    distance = [np.linalg.matrix_power(slopes, k // period) @ [0.5, 1.0] for k in range(2000)]
+    np.testing.assert_allclose(found, 0.02 + np.array(distance) @ gains / period, rtol=1e-9)
+
+
+def test_strides_that_repeat_themselves_go_on_until_the_walk_is_over():
+    """Time, way and the sums of energies grow, all else recurs; a walk that does not repeat itself ends where it ends."""
+
+    def rows(t):
+        rocks = np.sin(4 * np.pi * t)
+        return np.stack([t, 0.3 * t, rocks, -rocks, 0.3 + 0 * t, rocks, rocks, 2.0 * t, 1.5 * t], -1)
+
+    times = [np.zeros(1), *np.arange(1, 5)[:, None] / 4 + np.array([-0.125, 0.0])]
+    for cycle, duration, last in ((2, 2.3, 2.25), (4, 2.0, 2.0), (2, 1.0, 1.0), (2, 0.6, 0.5), (0, 2.3, 1.0)):
+        found = _rows([rows(t) for t in times], cycle, duration)
+        np.testing.assert_allclose(found, rows(np.arange(0, last + 1e-9, 0.125)), atol=1e-12)
