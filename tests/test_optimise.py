@@ -140,6 +140,9 @@ def test_slopes_of_ascents_are_those_of_differences(rate, turn):
     problem = Problem(Phases(loops, system.velocity, power, 2.0), objective, p, lambda: None, np.inf)
     rules = problem.constraints(turn, Stroke(loops, p), lambda alpha: alpha @ [0.3, -0.2] + alpha[..., 1] ** 2 - 9, 0.1)
     assert len(rules) == (4 if rate is None else 7) and [rule["type"] for rule in rules].count("eq") == (not turn)
+    if rate:  # one of the limits sets the time of the first loop
+        assert min(rule["fun"](problem.first).min() for rule in rules[1:3]) == pytest.approx(0.0, abs=1e-12)
+        assert problem.minimised(problem.first)[0] == -objective.value(problem.cycles(p), 1 / (2 * np.pi))[0]
     x = problem.first * (1 + 0.1 * np.random.default_rng(5).normal(size=problem.first.shape))
     values = lambda x: np.concatenate([[problem.minimised(x)[0]], *(rule["fun"](x) for rule in rules)])
     found = np.concatenate([problem.minimised(x)[1][None], *(rule["jac"](x) for rule in rules)])
@@ -1133,3 +1136,21 @@ def test_without_limits_those_of_the_field_or_the_gait_hold():
     for span, kept in ((1.01e-6, True), (0.99e-6, False)):
         with contextlib.nullcontext() if kept else pytest.raises(Refusal, match="or as many from low to high"):
             assert within([(0.2, 0.2 + span), (-1.0, 1.0)])[0] == (0.2, 0.2 + span)
+
+
+def test_balances_of_a_cycle_start_from_the_last_one_and_those_nearby_from_its_own():
+    starts, found, (loops, p) = [], [], some_loop()
+
+    def velocity(alpha, alphadot, start=None):
+        starts.append(start)
+        found.append(np.stack([alphadot[..., 0], alpha[..., 1] * alphadot[..., 0], alphadot[..., 1]], -1))
+        return found[-1]
+
+    cycles = Phases(loops, velocity)
+    for k in (1.0, 0.9):
+        cycles(k * p)
+    assert [len(x) for x in found] == [1, 8, 1, 8] and cycles.count == 2
+    assert starts[0] is None and starts[1] is starts[2] is found[0] and starts[3] is found[2]
+    runs = Runs(loops, Swimmer(FLUID, ODD).run, True)
+    runs(p)
+    assert runs.count == 1

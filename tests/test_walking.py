@@ -30,7 +30,7 @@ from rft.walking.march import march, step
 from rft.walking.planar import State
 from rft.walking.planar_walk import _limit_fields, _rows, _strides, rerun, walk
 from rft.walking.robot import intervals
-from rft.walking.sdirk import EFFORT, Effort
+from rft.walking.sdirk import EFFORT, Effort, end_of_part, newton_step, next_part, start_of_step
 from rft.walking.stride import Walk, cycles_to_settle, from_rest, map_period, remaining_change
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -782,3 +782,71 @@ def test_strides_that_repeat_themselves_go_on_until_the_walk_is_over():
     for cycle, duration, last in ((2, 2.3, 2.25), (4, 2.0, 2.0), (2, 1.0, 1.0), (2, 0.6, 0.5), (0, 2.3, 1.0)):
         found = _rows([rows(t) for t in times], cycle, duration)
         np.testing.assert_allclose(found, rows(np.arange(0, last + 1e-9, 0.125)), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("stage", "ended", "halved", "after"),
+    [
+        ((1.0, 0.0), True, False, (1.0, 0.0, True)), ((1.0, 0.0), False, True, (0.5, 0.0, False)),
+        ((0.5, 0.0), True, False, (0.5, 0.5, False)), ((0.5, 0.5), True, False, (1.0, 0.0, True)),
+        ((0.25, 0.25), True, False, (0.5, 0.5, False)), ((0.125, 0.375), True, False, (0.5, 0.5, False)),
+        ((0.125, 0.125), True, False, (0.25, 0.25, False)), ((0.125, 0.25), True, False, (0.125, 0.375, False)),
+        ((0.25, 0.5), False, True, (0.125, 0.5, False)), ((0.25, 0.5), False, False, (0.25, 0.5, False)),
+        ((0.125, 0.875), True, False, (1.0, 0.0, True)),
+    ],
+)  # fmt: skip
+def test_parts_of_a_step_that_were_halved_join_again(stage, ended, halved, after):
+    part, elapsed = np.array(stage)[:, None]
+    found = next_part(types.SimpleNamespace(part=part, elapsed=elapsed), np.array([ended]), np.array([halved]))
+    assert tuple(x[0] for x in found) == after
+
+
+def test_a_step_of_newtons_method_goes_to_the_zero_of_a_line_but_not_too_far():
+    """Of robots whose residual is S (v - w): one near its zero, one that is far off, and one whose residual grew."""
+    S, k, reach = np.array([[2.0, 0.3, -0.1], [0.4, 1.5, 0.2], [-0.2, 0.1, 0.7]]), 0.01, 0.05
+    w, v = np.array([0.3, -0.2, 4.0]), np.array([[0.1, 0.1, 2.0], [-9.0, 2.0, 1.0], [0.1, 0.1, 2.0]]).T
+    start = start_of_step((0.0 * v), tuple(v), *np.zeros((5, 3))).newton
+    last = start._replace(
+        residual=np.array([np.inf, np.inf, 1e-3]), step=tuple(np.full((3, 3), 0.8)), best=tuple(0.5 * v)
+    )
+    power = np.full(3, 7.0), np.full(3, 5.0)
+    residual = S @ (v - w[:, None])
+    slopes = tuple(tuple(np.full(3, x) for x in column) for column in S.T)
+    step, solved, failed = newton_step(last, tuple(residual), slopes, power, k, reach, 1e-6, EFFORT)
+    assert not solved.any() and not failed.any() and step.tries.tolist() == [1.0] * 3
+    far = 0.5 * reach / k / 9.3  # a half of its reach in the step's time, over the fastest rate
+    np.testing.assert_allclose(step.share, [1.0, far, 0.5])
+    np.testing.assert_allclose(np.array(step.trial)[:, 0], w)
+    np.testing.assert_allclose(np.array(step.trial)[:, 1], v[:, 1] + far * (w - v[:, 1]))
+    np.testing.assert_allclose(np.array(step.trial)[:, 2], 0.5 * v[:, 2] + 0.5 * 0.8)
+    size = np.abs(residual * [[1.0], [1.0], [reach]]).max(0)
+    np.testing.assert_allclose(step.residual, [*size[:2], 1e-3])
+    assert [x.tolist() for x in step.power] == [[7.0, 7.0, 0.0], [5.0, 5.0, 0.0]]
+    more, solved, failed = newton_step(
+        step, tuple(S @ (np.array(step.trial) - w[:, None])), slopes, power, k, reach, 1e-6, EFFORT
+    )
+    assert solved.tolist() == [True, False, False] and not failed.any() and more.share[2] == 0.25
+    for share, tries, ends in ((0.11, 3.0, False), (0.09, 3.0, True), (1.0, 12.0, False), (1.0, 13.0, True)):
+        late = last._replace(share=np.full(3, share), tries=np.full(3, tries), residual=np.full(3, 1e-9))
+        assert newton_step(late, tuple(residual), slopes, power, k, reach, 1e-6, EFFORT)[2].tolist() == [ends] * 3
+
+
+def test_a_part_of_a_step_adds_what_its_stages_did():
+    """Powers by the weights of its stages, and the residuals of those that were not solved; else all stays."""
+    first = tuple(np.full(4, x) for x in (3.0, 2.0)), np.array([1e-9, 1e-9, 5e-3, 1e-9])
+    stage = types.SimpleNamespace(base=(1.0, 2.0, 3.0), first=(*first[0], first[1]))
+    best, power = (0.1, 0.2, 0.3), (np.full(4, 10.0), np.full(4, 20.0))
+    newton = types.SimpleNamespace(best=best, power=power, residual=np.array([1e-8, 2e-3, 1e-3, 2e-3]))
+    old = start_of_step(
+        (0.5, 0.6, 0.7), (0.0, 0.0, 0.0), *np.array([1.0, 4.0, 2.0, 0.1, 1e-3])[:, None] * np.ones(4)
+    ).accepted
+    h, k = 0.1, (1 - 0.5**0.5) * 0.1
+    new = end_of_part(old, stage, newton, np.array([True, True, True, False]), 1e-6, k, h)
+    np.testing.assert_allclose(np.array(new.pose)[:, 0], [1 + 0.1 * k, 2 + 0.2 * k, 3 + 0.3 * k])
+    np.testing.assert_allclose([x[3] for x in (*new.pose, *new.twist)], [0.5, 0.6, 0.7, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(np.array(new.twist)[:, 0], best)
+    np.testing.assert_allclose(new.work - 1.0, [3.0 * (h - k) + 10.0 * k] * 3 + [0.0])
+    np.testing.assert_allclose(new.loss - 4.0, [2.0 * (h - k) + 20.0 * k] * 3 + [0.0])
+    assert new.unsolved.tolist() == [2.0, 3.0, 3.0, 2.0]
+    np.testing.assert_allclose(new.defect, [0.1, 0.102, 0.106, 0.1])
+    np.testing.assert_allclose(new.residual, [1e-3, 2e-3, 5e-3, 1e-3])
