@@ -1154,3 +1154,50 @@ def test_balances_of_a_cycle_start_from_the_last_one_and_those_nearby_from_its_o
     runs = Runs(loops, Swimmer(FLUID, ODD).run, True)
     runs(p)
     assert runs.count == 1
+
+
+@pytest.mark.parametrize("joints", [2, 3])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_sense_of_any_loop_is_told(seed, joints):
+    _, p = some_loop(seed, joints)
+    for q, there in ((p, True), (-p, True), (series.reversed_(p), False), (-series.reversed_(p), False)):
+        assert series.same(p, series.shifted(q, 2.0 + seed), odd=False) is there
+
+
+def test_a_search_tells_how_far_it_is_and_never_that_it_is_done():
+    told = []
+    search = searching(checked(viscous(), "displacement"), progress=told.append, completed=0, expected=10.0)
+    for cycles in (5, 4, 6):
+        search._report(cycles)
+    assert told == pytest.approx([0.5, 0.9, 1 / 1.1]) and search.completed == 15
+
+
+def test_a_gait_has_the_frequency_that_its_time_allows_or_that_of_the_scene():
+    scene = viscous(gait=Circle(frequency=3.0))
+    timed, free = (searching(checked(scene, name)) for name in ("speed", "displacement"))
+    evaluation = lambda time: types.SimpleNamespace(time=time, gait=Circle(amplitude=0.5))
+    assert timed._timed(evaluation(0.2)) == Circle(amplitude=0.5, frequency=1 / (2 * np.pi * 0.2))
+    assert timed._timed(evaluation(0.0)) == free._timed(evaluation(0.2)) == Circle(amplitude=0.5, frequency=3.0)
+    assert timed._timed(evaluation(1.0001e-4 / (2 * np.pi))).frequency == pytest.approx(1e4, rel=1e-3)
+    with pytest.raises(Refusal, match="more than 10000 times a second"):
+        timed._timed(evaluation(0.9999e-4 / (2 * np.pi)))
+
+
+def test_a_turn_may_be_off_by_its_error_where_cycles_are_not_those_of_the_search():
+    from rft.effects import Transient
+
+    past = viscous(system=Swimmer(SAND, Chain(), (Transient(travel=0.1),)))
+    framed = Study(viscous()).in_frame("minimum-perturbation").scene
+    evaluation = types.SimpleNamespace(heading=0.3)
+    slacks = [searching(checked(scene, "displacement"))._slack(evaluation) for scene in (viscous(), past, framed)]
+    assert slacks == pytest.approx([1e-7, 0.3 + 1e-7, 0.3 + 1e-7], rel=1e-9)
+
+
+def test_phases_and_fields_of_a_search():
+    """Phases are eights, as many as the scene or the search has; a field reaches a little beyond the farthest limit."""
+    asked = lambda phases, **more: checked(viscous().with_numerics(phases=phases), "displacement", **more)
+    assert [asked(n).phases for n in (64, 128, 129)] == [128, 128, 136]
+    assert asked(64, harmonics=9).phases == asked(64, harmonics=9).loops.phases == 144
+    assert asked(64, limits=[(-0.5, 1.0), (-1.5, 0.2)]).extent == pytest.approx(1.02 * 1.5)
+    rests = viscous(gait=Circle(amplitude=0.0, frequency=2.0))
+    assert checked(rests, "speed").objective.rate == 1.0 == checked(viscous(gait=Circle()), "speed").objective.rate

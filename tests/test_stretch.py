@@ -97,6 +97,7 @@ def test_displacement_is_density_times_area_on_paper():
     ("make", "said"),
     [
         (lambda: stretch(constant(np.eye(2)), 3), "points must be"),
+        (lambda: stretch(constant(np.eye(2)), 7.5), "points must be"),
         (lambda: stretch(constant(np.zeros((2, 2)))), "costs nothing"),
         (lambda: stretch(metric.fit(lambda a, u: (u**2).sum(-1) + 0 * a[..., 0], connection.grid(3, 5))), "two joints"),
     ],

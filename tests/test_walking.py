@@ -30,7 +30,7 @@ from rft.walking.march import march, step
 from rft.walking.planar import State
 from rft.walking.planar_walk import _limit_fields, _rows, _strides, rerun, walk
 from rft.walking.robot import intervals
-from rft.walking.sdirk import EFFORT, Effort, end_of_part, newton_step, next_part, start_of_step
+from rft.walking.sdirk import EFFORT, Effort, end_of_part, largest_speed, newton_step, next_part, start_of_step
 from rft.walking.stride import Walk, cycles_to_settle, from_rest, map_period, remaining_change
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -850,3 +850,19 @@ def test_a_part_of_a_step_adds_what_its_stages_did():
     assert new.unsolved.tolist() == [2.0, 3.0, 3.0, 2.0]
     np.testing.assert_allclose(new.defect, [0.1, 0.102, 0.106, 0.1])
     np.testing.assert_allclose(new.residual, [1e-3, 2e-3, 5e-3, 1e-3])
+
+
+def test_a_trial_counts_as_better_where_the_largest_speed_falls_by_a_tenth_of_what_is_foretold():
+    """Speeds of a body's ends count like others; what is no number is never better."""
+    assert [largest_speed(v, 0.5) for v in ((1.0, -2.0, 3.0), (1.0, -2.0, -5.0), (-3.0, 1.0, 1.0))] == [2.0, 2.5, 3.0]
+    start = start_of_step((0.0,) * 3, (0.0,) * 3, *np.zeros(5)).newton
+    slopes, power = tuple(map(tuple, np.eye(3))), (0.0, 0.0)
+    for share, old, better in ((1.0, 1.12, True), (1.0, 1.1, False), (0.5, 1.06, True), (0.5, 1.04, False)):
+        last = start._replace(residual=old, share=share, best=(9.0, 9.0, 9.0))
+        found, *_ = newton_step(last, (1.0, 0.5, 0.2), slopes, power, 1e-9, 0.5, 1e-6, EFFORT)
+        assert (found.best == (0.0, 0.0, 0.0)) is better and found.share == (1.0 if better else share / 2)
+    for bad in (np.inf, np.nan):
+        for residual in ((bad, 0.1, 0.1), (0.1, bad, 0.1), (0.1, 0.1, bad)):
+            with np.errstate(invalid="ignore"):
+                found, solved, _ = newton_step(start, residual, slopes, power, 1e-9, 0.5, 1e-6, EFFORT)
+            assert not solved and found.share == 0.5 and found.residual == np.inf
