@@ -425,3 +425,12 @@ def test_a_robot_is_sunk_with_all_of_its_hull(height, tilt, status):
     data.qpos[2:7] = [one.ceiling + (0.001 if tilt else -0.001), 1.0, 0.0, 0.0, 0.0]
     mujoco.mj_forward(one.body.model, data)
     assert one.end_status() == ("airborne" if tilt else "")
+
+
+def test_a_hull_pitches_as_its_robot_is_told_and_rolls_and_yaws_as_a_box_would():
+    robot = Rhex(0.2, 0.15, 0.03, 0.06, CLeg(0.025, 0.012), (-0.05, 0.06), inertia=5e-4)
+    x, y, z = 0.15**2, 0.06**2, 0.03**2
+    np.testing.assert_allclose(hexapod.inertia(robot, 0.1), 5e-4 / (x + z) * np.array([y + z, x + z, x + y]))
+    wheel = Roller(2.0, RoundRod(0.1, 0.1))
+    assert hexapod.inertia(wheel, 0.1).tolist() == pytest.approx([0.02] * 3)
+    assert (hexapod.hips(wheel), hexapod.phases(wheel).tolist()) == ([(0.0, 0.0, 0.0)], [0.0])

@@ -25,11 +25,11 @@ from rft.metres import GRAVITY
 from rft.plates import VERTICAL, CLeg, RoundRod, StressMap, Wheel, loads
 from rft.refusal import Refusal
 from rft.walking import Fineness, Rhex, Roller, Tripod, Walker, engine, rolling
-from rft.walking.limit import Limit, LimitCycles, _Search, _with_means, limit_cycles, predicted_progress
+from rft.walking.limit import Limit, LimitCycles, _Search, _with_means, limit_cycles, predicted_progress, solve
 from rft.walking.march import march, step
 from rft.walking.planar import State
 from rft.walking.planar_walk import _limit_fields, _rows, _strides, rerun, walk
-from rft.walking.robot import intervals
+from rft.walking.robot import intervals, walking_rounding
 from rft.walking.sdirk import EFFORT, Effort, end_of_part, largest_speed, newton_step, next_part, start_of_step
 from rft.walking.stride import Walk, cycles_to_settle, from_rest, map_period, remaining_change
 
@@ -866,3 +866,43 @@ def test_a_trial_counts_as_better_where_the_largest_speed_falls_by_a_tenth_of_wh
             with np.errstate(invalid="ignore"):
                 found, solved, _ = newton_step(start, residual, slopes, power, 1e-9, 0.5, 1e-6, EFFORT)
             assert not solved and found.share == 0.5 and found.residual == np.inf
+
+
+def test_a_robot_comes_to_an_end_above_its_reach_below_its_top_and_on_its_back():
+    """Of a robot whose farthest hip and legs are known; on an axle that is kept level neither pitch nor its rate is free."""
+    rod = dataclasses.replace(ROBOT, legs=RoundRod(0.02, 0.012))
+    strides = _strides([Walker(rod, Tripod(2.0), SAND), Walker(rod, Tripod(3.0), SAND)], QUICK)
+    reach, height = 0.022, 0.03  # the axle is 2 mm off the middle of the rod
+    farthest = reach + math.hypot(0.06, 0.004) + height
+    assert strides.reach == pytest.approx([reach] * 2, rel=0.02)
+    one = np.zeros(1, int)
+    for z, pitch, status in (
+        (farthest + 1e-3, 0.0, "airborne"), (farthest - 1e-3, 0.0, ""), (-0.0151, 0.0, "sunk"), (-0.0149, 0.0, ""),
+        (0.0, 1.58, "flipped"), (0.0, -1.58, "flipped"), (0.0, -1.57, ""),
+    ):  # fmt: skip
+        assert strides.end_status(State.at_rest(np.array([[7.0, z, pitch]])), one) == [status]
+    speed = 2 * np.pi * np.array([2.0, 3.0]) * strides.reach
+    state = State.at_rest(np.array([[9.0, 0.1, 0.2]] * 2))._replace(twist=np.array([[0.3, 0.4, 0.5]] * 2))
+    scaled = [0.1 / strides.reach, [0.2] * 2, 0.3 / speed, 0.4 / speed, 0.5 * strides.reach / speed]
+    np.testing.assert_allclose(strides.scaled(state, np.arange(2)), scaled)
+    moved = strides.with_scaled(state, 2 * np.array(scaled), np.arange(2))
+    np.testing.assert_allclose([*moved.pose[1], *moved.twist[1]], [9.0, 0.2, 0.4, 0.6, 0.8, 1.0])
+    roller = _strides([Walker(Roller(1.0, RoundRod(0.05, 0.02)), Tripod(1.0, 0.3), SAND)], QUICK)
+    assert roller.scaled(state.take([0]), one)[:, 0] == pytest.approx(
+        np.array([0.1, 0.3 / (2 * np.pi), 0.4 / (2 * np.pi)]) / 0.05
+    )
+    kinks = roller.phases[np.flatnonzero(np.diff(roller.rate_phases) != 0) + 1]
+    assert (strides.cycle, roller.cycle) == (2, 1) and kinks == pytest.approx([0.15, 0.35, 0.5, 0.65, 0.85])
+    assert roller.phases[[0, -1]] == pytest.approx([0.0, 1.0]) and strides.phases[-1] == 0.5
+
+
+def test_equations_without_a_solution_are_answered_by_nothing():
+    slopes = np.array([[[2.0, 1.0], [0.0, 4.0]], [[1.0, 2.0], [2.0, 4.0]], [[0.0, 1.0], [1.0, 0.0]]])
+    right = np.array([[3.0, 4.0], [1.0, 1.0], [5.0, 6.0]])
+    np.testing.assert_allclose(solve(slopes, right), [[1.0, 1.0], [0.0, 0.0], [6.0, 5.0]])
+    np.testing.assert_allclose(solve(slopes[::2], right[::2]), [[1.0, 1.0], [6.0, 5.0]])
+
+
+def test_the_rounding_of_slow_legs_is_a_twentieth_of_the_speed_of_their_ends():
+    found = walking_rounding(3e-3, np.array([1e-9, 0.1, 1.0]), 0.05)
+    np.testing.assert_allclose(found, [1e-7, 0.05 * 2 * np.pi * 0.1 * 0.05, 3e-3])
