@@ -5,6 +5,7 @@ import dataclasses
 import json
 import types
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -801,6 +802,9 @@ def test_other_starts_are_made_one_stroke():
         assert constraints.stroke is one
         assert Stroke.is_one(loops, constraints.feasible(twice)) is one
         assert np.array_equal(constraints.feasible(first), first)
+    # Of 0.4 e^(i t) + b e^(2 i t) the sweep is 0.16 + 2 b^2 + 1.2 b cos t, nowhere below 0 for b up to 0.2.
+    rounder = Constraints(loops, None, first).feasible(twice)
+    assert rounder == pytest.approx(np.concatenate([twice[:3], 0.7**5 * twice[3:]]))
 
 
 def test_loops_on_maps_of_all_kinds(stroke):
@@ -868,6 +872,9 @@ def test_outlines_go_round_their_corners_at_constant_speed():
         places = np.interp(t * way[-1], way, ends)
         found = loops.gait(p).shape(2 * np.pi * t)
         assert found == pytest.approx(middle + half * np.stack([places.real, places.imag], -1), abs=0.05)
+        assert sum((np.conj(a) * b).imag for a, b in pairwise(ends)) > 0  # to the left
+    *others, right, left = ({*corners} for corners in series.OUTLINES)
+    assert all({(-x, -y) for x, y in last} in others for last in (right, left))
 
 
 def test_further_starts_are_waves_about_the_middle_of_the_limits():
@@ -983,7 +990,13 @@ def test_a_start_is_a_series_of_as_few_harmonics_as_it_has():
 
 @pytest.mark.parametrize(
     ("objective", "pace"),
-    [("displacement", {}), ("turning", {}), ("efficiency", {}), ("speed", {"power": 0.4, "rate": 9.0})],
+    [
+        ("displacement", {}),
+        ("turning", {}),
+        ("efficiency", {}),
+        ("speed", {"power": 0.4, "rate": 9.0}),
+        ("speed", {"rate": 0.5}),
+    ],
 )
 def test_an_evaluation_is_what_the_gait_does_by_itself(objective, pace):
     """In sand, of an odd body of its own length in a frame off its centre: value, path, work, time, and errors, that of a
@@ -996,7 +1009,9 @@ def test_an_evaluation_is_what_the_gait_does_by_itself(objective, pace):
     alpha, alphadot = gait.cycle(128)
     power = scene.system.work(alpha, alphadot, scene.system.velocity(alpha, alphadot)).power / 0.3
     length, half, far = *(2 * np.pi * x.mean() for x in (power, power[::2])), np.hypot(*net[:2]) / 0.3
-    time = max(power.mean() / 0.4, np.abs(alphadot).max() / 9.0) if pace else 1.0
+    time = (
+        max(power.mean() / 0.4 * ("power" in pace), np.abs(gait.cycle(1024)[1]).max() / pace["rate"]) if pace else 1.0
+    )
     known = {
         "displacement": (far, error), "turning": (abs(net[2]), heading), "speed": (far / (2 * np.pi * time),) * 2,
         "efficiency": (far / length, far / length * (error / far + abs(half / length - 1))),
@@ -1008,7 +1023,7 @@ def test_an_evaluation_is_what_the_gait_does_by_itself(objective, pace):
     assert (found.heading, found.time, found.limits) == (
         pytest.approx(heading),
         pytest.approx(time),
-        ("power",) * bool(pace),
+        (*pace,)[:1],
     )
     assert found.displacement == pytest.approx(net)
     assert [found.length, found.work] == [pytest.approx(length, rel=1e-6)] * 2
@@ -1075,6 +1090,17 @@ def bowl(bound=0.4):
 def test_an_ascent_keeps_to_its_radius_and_says_how_it_ends():
     """The best feasible point; the first numbers alone stay near the start."""
     start, value = np.zeros(2), 1.0
+    best = _Ascent(lambda x: (x[0],), bowl()[1], lambda x: True)
+    for x, known in (
+        ((7.0, 9.0), 7.0),
+        ((5.0, 8.0), 5.0),
+        ((3.0, 0.0), 3.0),
+        ((4.0, 0.1), 3.0),
+        ((1.0, 2.0), 3.0),
+        ((2.0, 0.3), 2.0),
+    ):
+        best(np.array(x))  # the last where none was feasible, then the least that is
+        assert best.best[0] == known
     for bound, radius, moving, best, ends in (
         (0.4, 9.0, 2, (1.0, 0.4), "converged"), (0.4, 0.3, 2, (0.3, 0.3), "converged"), (0.4, 0.3, 1, (0.3, 0.4), "converged"),
         (-1.0, 9.0, 2, (1.0, -1.0), "converged"),
@@ -1201,3 +1227,15 @@ def test_phases_and_fields_of_a_search():
     assert asked(64, limits=[(-0.5, 1.0), (-1.5, 0.2)]).extent == pytest.approx(1.02 * 1.5)
     rests = viscous(gait=Circle(amplitude=0.0, frequency=2.0))
     assert checked(rests, "speed").objective.rate == 1.0 == checked(viscous(gait=Circle()), "speed").objective.rate
+
+
+@pytest.mark.parametrize("pace", [{"rate": 0.5}, {"power": 0.01}])
+def test_a_loop_is_worth_its_speed_in_the_time_that_its_limits_allow(pace):
+    search, (loops, p) = searching(checked(viscous(), "speed", **pace)), some_loop()
+    system = search.request.system
+    power = lambda alpha, alphadot, xi: system.work(alpha, alphadot, xi).power
+    alpha, alphadot = loops.cycle(p)
+    xi = system.velocity(alpha, alphadot)
+    time = np.sqrt(power(alpha, alphadot, xi).mean() / 0.01) if "power" in pace else np.abs(alphadot).max() / 0.5
+    found = search._merit(Phases(loops, system.velocity, power, 2.0), p, 10.0)
+    assert found == pytest.approx(np.hypot(*displacement(xi)[:2]) / (2 * np.pi * time), rel=1e-9)
