@@ -418,3 +418,15 @@ def test_a_fit_shows_itself_in_a_line_and_one_angle_settles_nothing():
     )
     with pytest.raises(ValueError, match="^(?!.*radians)"):
         fit("granular", rod_drag([0.0], [0.47], [0.0]))
+
+
+def test_what_repeats_scatter_by_is_told_with_the_freedom_that_their_means_leave():
+    """Of three angles, one of them once and one thrice: three of six rows are free, in two components."""
+    psi, off = (
+        np.array([0.2, 0.5, 0.2, 0.9, 0.5, 0.5]),
+        np.array([[1.0, 3.0, -1.0, 0.0, 0.0, -3.0], [-2.0, 1.0, 2.0, 0.0, -2.0, 1.0]]),
+    )
+    forces = np.array([[5.0], [7.0]]) + psi * [[2.0], [-3.0]] + off
+    assert calibration.repeats(psi, forces) == pytest.approx(np.sqrt((20.0 + 14.0) / 6))
+    assert calibration.repeats(psi[[0, 1, 3]], forces[:, [0, 1, 3]]) is None
+    assert calibration.repeats(psi + 1e-11 * np.arange(6), forces) == pytest.approx(calibration.repeats(psi, forces))

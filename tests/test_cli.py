@@ -15,12 +15,14 @@ from commands import as_process, geomech
 
 from geomech import plots, scenes
 from geomech.core.variables import Result
+from geomech.gaits import Circle, Ellipse
 from geomech.geometry import curvature
 from geomech.io import files
 from geomech.output import report
-from geomech.studies.report import Report
+from geomech.studies.report import Report, _gaits, reachable, steps
 from geomech.studies.study import Study
 from geomech.text import accuracy
+from rft.refusal import Refusal
 
 SMALL = ["--grid", "9"]
 
@@ -443,3 +445,31 @@ def test_commands_load_what_they_use_and_no_more(tmp_path):
     """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("top", "step", "count"),
+    [(1.0, 0.1, 10), (1.3, 0.1, 13), (1.5, 0.2, 7), (0.07, 0.005, 14), (25.0, 2.5, 10), (3.0, 0.25, 12), (9.0, 1.0, 9)],
+)
+def test_amplitudes_of_a_report_are_round_and_about_ten(top, step, count):
+    assert steps(top) == pytest.approx(step * np.arange(1, count + 1), rel=1e-9)
+
+
+def test_amplitudes_of_a_report_fill_the_field():
+    """Up to the side that is nearest to the gait's centre, with the sign of the gait's own; and those of both gaits of the
+    paper's figure are compared, the scene's own first."""
+    scene = scenes.load("three-link-glass").with_numerics(extent=2.0)
+    for centre, amplitude, room in (((0.4, -0.8), 0.7, 1.2), ((0.8, -0.4), -0.7, 1.2)):
+        gait = Circle(amplitude=amplitude, centre=centre, frequency=3.0)
+        moved = scene.changed(gait=gait)
+        assert reachable(moved, gait) == pytest.approx(np.sign(amplitude) * np.array(steps(room)))
+        own, other = _gaits(moved)
+        assert own is gait and (type(other).__name__, other.frequency) == ("Butterfly", 3.0)
+    with pytest.raises(Refusal, match="the gait's centre lies outside the field: raise \\[numerics\\] extent"):
+        reachable(scene, Circle(centre=(0.0, 2.0)))
+    snake = scenes.load("no-slip-snake")  # with singular shapes the gait's own is the last
+    gait = Circle(amplitude=-0.33, centre=snake.gait.centre)
+    assert reachable(snake, gait) == pytest.approx([*(-np.array(steps(0.33))), -0.33])
+    for still in (Circle(amplitude=0.0), Ellipse(semi_axes=(0.0, 0.0))):
+        with pytest.raises(Refusal, match="does not move: give it a size"):
+            reachable(snake, still)

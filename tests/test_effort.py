@@ -222,3 +222,15 @@ def test_a_metric_of_the_systems_own_has_lengths_and_no_work(name, capsys):
         main(["displacement", name, "--amplitudes", "0.8", "--tiers", "direct", "--effort"])
     assert ended.value.code == 0 and f"path length ({effort.METRIC})" in capsys.readouterr().out
     assert "metric" in study.to_xarray()
+
+
+def test_phases_of_a_cost_are_fours_and_its_errors_are_what_half_of_them_change():
+    fluid, past = scene(Swimmer(FLUID, UNEVEN)), scene(Swimmer(SAND, UNEVEN, (Transient(travel=0.1),)))
+    assert [effort.phases_of(fluid, n) for n in (8, 9, 12, 13)] == [8, 12, 12, 16]
+    assert [effort.phases_of(past, n) for n in (8, 32, 33)] == [32, 32, 36]
+    assert effort.phases_of(fluid) == -(-fluid.numerics.phases // 4) * 4
+    sand = scene(Swimmer(SAND, UNEVEN))
+    fine, half = (effort.effort(sand, None, [0.4, 1.1], phases) for phases in (32, 16))
+    for key in ("path_length", "work"):
+        assert fine[f"{key}_error"] == pytest.approx(np.abs(fine[key] - half[key]), rel=1e-9)
+        assert (fine[f"{key}_error"] > 1e-8).all()

@@ -366,3 +366,32 @@ def test_plates_in_grains_stand_beside_bars_and_the_map():
     bars = numbers["bars"]
     assert bars["half round"]["faces"] == pytest.approx((-0.62, 0.03), abs=0.01)
     assert bars[campaign.SHELL]["whole"][0] == pytest.approx(0.27, abs=0.01) and bars[campaign.SHELL]["cut"] < 0.6
+
+
+def test_a_cycle_in_grains_is_told_in_the_frame_at_its_start():
+    """Of a body that goes ahead and aside in its own frame and turns faster and faster."""
+    t = np.linspace(0, 3, 3001)
+    heading, start = 0.3 + 0.7 * t**2, 0.3 + 0.7 * np.array([0.5, 1.5, 2.5]) ** 2
+    place = np.array([complex(0.2, -0.1), complex(0.5, 0.4)]) * np.exp(1j * start[:2])
+    way = np.interp(t, [0, 0.5, 1.5, 2.5, 3.0], np.cumsum([0.7j, 0.0, *place, 0.1]).real)
+    aside = np.interp(t, [0, 0.5, 1.5, 2.5, 3.0], np.cumsum([0.7j, 0.0, *place, 0.1]).imag)
+    run = types.SimpleNamespace(t=t, pose=np.stack([way, aside, heading], -1))
+    found = grain_swim.cycle_poses(run, np.array([0.5, 1.5, 2.5]))
+    np.testing.assert_allclose(found, [[0.2, -0.1, 0.7 * 2.0], [0.5, 0.4, 0.7 * 4.0]], atol=1e-9)
+
+
+def test_sizes_of_a_swimmer_are_those_given_or_the_scenes():
+    """Its length in metres, the radius of its caps, and a bed that is wide and deep enough."""
+    chain = '[medium]\nname = "glass-0.3mm-loose"\n[body]\nkind = "chain"\n{}[gait]\nkind = "circle"\n'
+    caps = '[[effects]]\nkind = "end-caps"\nradius = 0.05\n'
+    for text_, given, size, radius in (
+        (chain.format(""), {}, 0.162, 6e-3), (chain.format("length = 0.2\n"), {}, 0.2, 6e-3),
+        (chain.format("length = 0.2\n") + caps, {}, 0.2, 0.01), (chain.format("") + caps, {"size": 0.3}, 0.3, 0.015),
+        (chain.format("") + caps, {"size": 0.3, "radius": 0.02}, 0.3, 0.02),
+    ):  # fmt: skip
+        question = grain_swim.GrainSwim(scenes.parse(text_), 3, 7, **given)
+        one = question.experiment
+        assert (one.body.size, one.body.half_width, one.bed.seed) == pytest.approx((size, radius, 7))
+        assert (one.bed.length, one.bed.width) == pytest.approx((size + 0.118, size + 0.078))
+        assert one.bed.depth == pytest.approx(max(0.049, 2 * radius + 6 * one.bed.diameter))
+        assert (question.frequency, one.duration) == (1.0, 3.5)

@@ -12,6 +12,7 @@ import re
 import shutil
 import time
 import tomllib
+import types
 
 import numpy as np
 import pytest
@@ -487,3 +488,31 @@ def test_names_are_text_and_controls_have_labels(opened, page):
         " && !(e.textContent.trim() || e.ariaLabel || (e.labels && e.labels[0].textContent.trim()))).map((e) => e.outerHTML)"
     )
     assert nameless == []
+
+
+def test_what_a_series_leaves_is_summed_along_the_loop():
+    """Of a circle that goes round steadily where what is left is linear, the value at its centre; the error of the grid is
+    that of its length, and that between members of a family counts besides."""
+    axes = np.linspace(-2, 2, 9), np.linspace(-1.5, 2.5, 9)
+    first, second = np.meshgrid(*axes, indexing="ij")
+    left = 1 + 0.2 * first - 0.1 * second
+    residual = np.stack([0.03 * left, 0.04 * left, 0.07 * (1 + 0.3 * second)], -1)
+    chart = types.SimpleNamespace(axes=axes, residual=residual, grid_error=(1e-3, 2e-3), between=0.5)
+    length, (a, b) = 2 * np.pi * 0.6, (0.4, 0.7)
+    found = charts.left_error(chart, *Circle(amplitude=0.6, centre=(a, b)).cycle(64))
+    assert found == pytest.approx(
+        (length * (0.35 * 0.05 * (1 + 0.2 * a - 0.1 * b) + 1e-3) + 0.5, length * (0.45 * 0.07 * (1 + 0.3 * b) + 2e-3))
+    )
+
+
+def test_loops_of_a_chart_fill_its_field_and_stay_within():
+    """Curves through three to nine shapes within 0.85 of either side about the middle."""
+    axes = np.linspace(-1.0, 3.0, 5), np.linspace(-0.5, 0.1, 5)
+    found = charts.loops(axes, 20, seed=3)
+    shares = [(np.array(gait.points) - [1.0, -0.2]) / [2.0, 0.3] for gait in found]
+    counts = sorted(map(len, shares))
+    assert len(counts) == 20 and counts[0] == 3 and 7 <= counts[-1] <= 9
+    every = np.concatenate(shares)
+    np.testing.assert_allclose([every.min(0), every.max(0)], [[-0.85, -0.85], [0.85, 0.85]], atol=0.06)
+    inside = np.array([(np.abs(gait.cycle(300)[0] - [1.0, -0.2]) / [2.0, 0.3]).max() for gait in found])
+    assert inside.max() < 1.001 and (inside > 0.9).any()

@@ -2,10 +2,12 @@
 
 import dataclasses
 import math
+import types
 
 import numpy as np
 import pytest
 from artists import curve
+from scipy.spatial.transform import Rotation
 
 from geomech import scenes
 from geomech.scenes import WalkerScene
@@ -21,7 +23,7 @@ from rft.walking.planar_walk import walk as planar_walk
 mujoco = pytest.importorskip("mujoco", reason="needs the extra: pip install 'geomech[mujoco]'")
 pytestmark = pytest.mark.usefixtures("fastest")
 from rft.walking import geoms, hexapod  # noqa: E402
-from rft.walking.mujoco_walk import Simulation, Start, rerun, walk  # noqa: E402
+from rft.walking.mujoco_walk import ROW, Simulation, Start, _goes_straight, _moved, _until, rerun, walk  # noqa: E402
 from rft.walking.multibody import Multibody  # noqa: E402
 
 SAND = StressMap(zeta=0.3, grazing=math.radians(5))
@@ -316,3 +318,119 @@ def test_the_figure_compares_steps_and_engines(monkeypatch):
     np.testing.assert_allclose(curve(speeds, "MuJoCo"), [[1.0, 2.0], [0.1, 0.202]])
     assert (ways.get_ylabel(), speeds.get_title()) == ("error of the way", "SandBot: within 1.0 %")
     assert {name.lower() for name in walking_mujoco.FREQUENCIES} <= {*scenes.walker_names()}
+
+
+def course(t, yaw=0.0, ahead=0.3):
+    """Rows of a robot that goes steadily and rocks twice a second."""
+    zero, rocks = np.zeros_like(t), np.sin(4 * np.pi * t)
+    columns = {
+        "t": t,
+        "x": ahead * t,
+        "z": 0.1 + 0.01 * rocks,
+        "pitch": 0.2 * rocks,
+        "v_x": ahead + zero,
+        "v_z": 0.4 * rocks,
+    }
+    columns |= {"rate": rocks, "work": 2.0 * t, "loss": 1.5 * t, "energy": 0.3 + rocks, "y": -0.1 * t, "roll": -rocks}
+    return np.stack([columns.get(name, yaw + zero) for name in ROW], -1)
+
+
+def test_strides_are_repeated_until_the_walk_is_over():
+    """What grows goes on growing, x and y and the sums of energies, and all else recurs; without strides a walk is cut."""
+    positions = lambda t: np.stack([0.3 * t, -0.1 * t, 0.1 + 0.01 * np.sin(4 * np.pi * t), np.cos(4 * np.pi * t)], -1)
+    known, whole = np.arange(0, 1.26, 0.125), np.arange(0, 3.01, 0.125)
+    for duration, steps, t in (
+        (3.1, 4, whole),
+        (3.0, 8, whole),
+        (1.25, 4, known),
+        (0.7, 4, known[:6]),
+        (3.0, 0, known),
+    ):
+        rows, states = _until(duration, course(known), positions(known), steps)
+        np.testing.assert_allclose(rows, course(t), atol=1e-12)
+        np.testing.assert_allclose(states, positions(t), atol=1e-12)
+
+
+def test_a_way_is_along_and_to_the_left_of_the_first_heading():
+    """And turns by less than half a turn."""
+    before, after = np.zeros((2, len(ROW)))
+    before[[1, 10, 12]], after[[1, 10, 12]] = (2.0, -1.0, 3.0), (2.0 - 3.0, -1.0 + 0.5, -3.0)
+    way = complex(-3.0, 0.5) * np.exp(-3.0j)
+    np.testing.assert_allclose(_moved(before, after), [way.real, way.imag, 2 * np.pi - 6.0], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("turn", "straight"),
+    [(0.0083, True), (-0.0083, True), (0.0084, False), (2 * np.pi - 0.0084, False), (2 * np.pi - 0.0083, True)],
+)
+def test_a_way_is_straight_that_turns_little_until_the_end(turn, straight):
+    """By 0.05 rad in the six strides of half a second that are left, not in those that are over."""
+    before, after = course(np.array([1.5, 2.0]))
+    before[12], after[12] = 0.7, 0.7 + turn
+    assert _goes_straight(before, after, 5.0) is straight
+    assert _goes_straight(before, after, 1.0) and not _goes_straight(before, after + 0.1, 1e3)
+
+
+def test_the_means_of_a_walk_are_those_of_its_last_strides():
+    """Of the last one where it repeats itself, else of four; of a robot at its end of all its way."""
+    robot = types.SimpleNamespace(gait=Tripod(2.0), reach=0.5)
+    moves = np.array([[9.0, 9.0, 9.0], [0.1, 0.01, -0.1], [0.2, 0.02, -0.2], [0.3, 0.03, 0.4], [0.2, 0.02, 0.1]])
+    means = lambda *arguments: Simulation.means(robot, course(np.linspace(0, 2, 9)), *arguments)
+    assert means(moves, True, 0.03, "") == (pytest.approx([0.4, 0.04, 0.2]), pytest.approx(0.06), "walking")
+    assert means(moves, False, 0.03, "") == (pytest.approx([0.4, 0.04, 0.1]), pytest.approx(0.4), "walking")
+    assert means(moves[1:2] * [-1, 1, 1], False, 0.0, "")[1:] == (pytest.approx(0.2), "walking")
+    for move, status in ((-0.0099, "stuck"), (0.0101, "walking")):
+        assert means(np.array([[move, 0.5, 0.0]]), True, 0.0, "")[2] == status
+    rows = course(np.linspace(0, 2, 9))
+    rows[:, 12] = (3.0 + np.linspace(0, 0.5, 9) + np.pi) % (2 * np.pi) - np.pi
+    way = complex(0.3, -0.1) * np.exp(-3.0j)
+    found = Simulation.means(robot, rows, moves, False, 0.03, "sunk")
+    assert found == (pytest.approx([way.real, way.imag, 0.25]), 0.0, "sunk")
+
+
+def test_a_row_tells_place_attitude_and_their_rates():
+    """Of a robot turned by yaw, then pitch, then roll, nose down where the pitch is positive, that moves anyhow."""
+    one = Simulation(XPLORER.walker, QUICK)
+    data, angles = one.body.data, (0.4, 0.3, -0.2)  # yaw, pitch, roll
+    turn = Rotation.from_euler("ZYX", angles)
+    data.qpos[:7] = [0.3, -0.4, 0.5, *turn.as_quat()[[3, 0, 1, 2]]]
+    data.qvel[:6], data.time = [1.0, 2.0, 3.0, 0.5, -0.6, 0.7], 0.25
+    mujoco.mj_forward(one.body.model, data)
+    row = dict(zip(ROW, one.row()))
+    assert [row[x] for x in ("t", "x", "y", "z", "yaw", "pitch", "roll")] == pytest.approx(
+        [0.25, 0.3, -0.4, 0.5, *angles]
+    )
+    spin = turn.apply([0.5, -0.6, 0.7])
+    assert (row["v_x"], row["v_z"]) == pytest.approx((1.0, 3.0))
+    assert row["rate"] == pytest.approx(spin @ [-math.sin(0.4), math.cos(0.4), 0.0])
+    (x, y, z), legs = (
+        (XPLORER.robot.length, XPLORER.robot.width, XPLORER.robot.height),
+        one.body.facets.bodies != one.machine.root,
+    )
+    hips = np.linalg.norm(data.xpos[one.body.facets.bodies[legs]] - data.xpos[1], axis=1)
+    diagonal = math.sqrt(x**2 + y**2 + z**2) / 2
+    assert one.ceiling == pytest.approx(max(diagonal, hips.max() + one.reach) + max(diagonal, one.reach))
+
+
+@pytest.mark.parametrize(
+    ("height", "tilt", "status"), [(-0.497, 0.0, ""), (-0.503, 0.0, "sunk"), (-1.7, 1.0, ""), (-6.0, 1.6, "flipped")]
+)
+def test_a_robot_is_sunk_with_all_of_its_hull(height, tilt, status):
+    """Whose highest corner counts, whichever way it is tilted. height: over that of the hull."""
+    one = Simulation(XPLORER.walker, QUICK)
+    data = one.body.data
+    data.qpos[2:7] = [height * XPLORER.robot.height, math.cos(tilt / 2), 0.0, math.sin(tilt / 2), 0.0]
+    mujoco.mj_forward(one.body.model, data)
+    assert one.end_status() == status
+    data.qpos[2:7] = [one.ceiling + (0.001 if tilt else -0.001), 1.0, 0.0, 0.0, 0.0]
+    mujoco.mj_forward(one.body.model, data)
+    assert one.end_status() == ("airborne" if tilt else "")
+
+
+def test_a_hull_pitches_as_its_robot_is_told_and_rolls_and_yaws_as_a_box_would():
+    robot = Rhex(0.2, 0.15, 0.03, 0.06, CLeg(0.025, 0.012), (-0.05, 0.06), inertia=5e-4)
+    x, y, z = 0.15**2, 0.06**2, 0.03**2
+    np.testing.assert_allclose(hexapod.inertia(robot, 0.1), 5e-4 / (x + z) * np.array([y + z, x + z, x + y]))
+    wheel = Roller(2.0, RoundRod(0.1, 0.1))
+    assert hexapod.inertia(wheel, 0.1).tolist() == pytest.approx([0.02] * 3)
+    assert (hexapod.hips(wheel), hexapod.phases(wheel).tolist()) == ([(0.0, 0.0, 0.0)], [0.0])

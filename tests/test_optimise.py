@@ -1,29 +1,36 @@
 """Optimal gaits against published strokes, differences, bounds and each other."""
 
+import contextlib
+import dataclasses
 import json
 import types
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import geomech
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Sine
-from geomech.geometry.reconstruct import displacement, slopes
+from geomech.geometry.field import Field
+from geomech.geometry.reconstruct import displacement, slopes, turning
 from geomech.geometry.traits import Traits
 from geomech.optimisation import checked, optimise
 from geomech.optimisation import loops as series
+from geomech.optimisation.ascent import _Ascent, _shortest
 from geomech.optimisation.constraints import Constraints
-from geomech.optimisation.cycles import Phases, Runs, cycle_values
+from geomech.optimisation.cycles import CycleValues, Phases, Runs, cycle_values
+from geomech.optimisation.evaluate import evaluate_gait
+from geomech.optimisation.gain import Gained, limiting
 from geomech.optimisation.loops import Loops
 from geomech.optimisation.objectives import Objective
-from geomech.optimisation.problem import Problem
+from geomech.optimisation.problem import Enough, Problem
 from geomech.optimisation.question import result_of
 from geomech.optimisation.search import _Search
 from geomech.optimisation.stroke import Stroke
 from geomech.optimisation.undulations import Undulations
 from geomech.scenes import Scene, parse
-from geomech.studies import fields
+from geomech.studies import estimate, fields
 from geomech.studies.study import Study
 from geomech.systems import Swimmer, Table
 from geomech.systems.capabilities import OwnMetric, capability
@@ -134,6 +141,9 @@ def test_slopes_of_ascents_are_those_of_differences(rate, turn):
     problem = Problem(Phases(loops, system.velocity, power, 2.0), objective, p, lambda: None, np.inf)
     rules = problem.constraints(turn, Stroke(loops, p), lambda alpha: alpha @ [0.3, -0.2] + alpha[..., 1] ** 2 - 9, 0.1)
     assert len(rules) == (4 if rate is None else 7) and [rule["type"] for rule in rules].count("eq") == (not turn)
+    if rate:  # one of the limits sets the time of the first loop
+        assert min(rule["fun"](problem.first).min() for rule in rules[1:3]) == pytest.approx(0.0, abs=1e-12)
+        assert problem.minimised(problem.first)[0] == -objective.value(problem.cycles(p), 1 / (2 * np.pi))[0]
     x = problem.first * (1 + 0.1 * np.random.default_rng(5).normal(size=problem.first.shape))
     values = lambda x: np.concatenate([[problem.minimised(x)[0]], *(rule["fun"](x) for rule in rules)])
     found = np.concatenate([problem.minimised(x)[1][None], *(rule["jac"](x) for rule in rules)])
@@ -560,7 +570,6 @@ def test_wrong_types_are_refused(wrong):
 def test_the_loop_on_the_map(stroke, cheap, short, tmp_path):
     """For displacement it follows the zero line, for efficiency the path's length holds it back, and a limit is a limit."""
     from geomech import plots
-    from geomech.optimisation.gain import limiting
 
     share = lambda found, kind: (limiting(found) == kind).mean()
     assert share(stroke, "zero") > 0.95
@@ -792,14 +801,14 @@ def test_other_starts_are_made_one_stroke():
         assert constraints.stroke is one
         assert Stroke.is_one(loops, constraints.feasible(twice)) is one
         assert np.array_equal(constraints.feasible(first), first)
+    # Of 0.4 e^(i t) + b e^(2 i t) the sweep is 0.16 + 2 b^2 + 1.2 b cos t, nowhere below 0 for b up to 0.2.
+    rounder = Constraints(loops, None, first).feasible(twice)
+    assert rounder == pytest.approx(np.concatenate([twice[:3], 0.7**5 * twice[3:]]))
 
 
 def test_loops_on_maps_of_all_kinds(stroke):
     """Singular shapes leave the scene's own frame, time stepping no CCF, and a metric stretches the map."""
-    import dataclasses
-
     from geomech import plots
-    from geomech.optimisation.gain import limiting
     from rft.effects import Transient
 
     snake = optimise(geomech.load("no-slip-snake"), harmonics=1)
@@ -832,3 +841,400 @@ def test_loops_are_ranked_by_their_worth():
         (1.0, 1, -3),
         (9.0, 1, -5),
     ]
+
+
+LOPSIDED = ((-0.5, 2.0), (-1.2, 1.0))
+
+
+def test_a_start_too_small_is_enlarged_and_one_at_rest_is_a_wave():
+    """To 0.3 of the range where it is below a twentieth; its centre stays. Of a wave of 1 rad each joint lags by a quarter."""
+    loops = Loops(2, 3, LOPSIDED)
+    sizes = {0.06: 0.375, 0.0626: 0.0626, 0.4: 0.4}
+    for before, after in sizes.items():
+        p = loops.of(Ellipse(semi_axes=(before, 0.7 * before), centre=(0.6, -0.2)))
+        assert loops.starts(p, 1)[0] == pytest.approx(p * np.r_[1.0, np.full(6, after / before)][:, None], abs=1e-12)
+    rest = np.zeros((7, 3))
+    (wave,) = Loops(3, 3, 2.0).starts(rest, 1)
+    t = 2 * np.pi * np.arange(8) / 8
+    lagging = [np.cos(t), np.sin(t), -np.cos(t)]
+    assert Loops(3, 3, 2.0, 8).cycle(wave)[0].T == pytest.approx(np.array(lagging), abs=1e-12)
+
+
+def test_outlines_go_round_their_corners_at_constant_speed():
+    """In the box of the limits, with so many harmonics that corners are sharp."""
+    loops = Loops(2, 40, LOPSIDED)
+    t, middle, half = np.linspace(0, 1, 41)[:-1] + 0.01, np.array([0.75, -0.1]), np.array([1.25, 1.1])
+    _, *outlines = loops.starts(loops.of(Circle()), 1 + len(series.OUTLINES))
+    for corners, p in zip(series.OUTLINES, outlines, strict=True):
+        ends = [*map(complex, *np.transpose(corners)), complex(*corners[0])]
+        way = [0.0, *np.cumsum(np.abs(np.diff(ends)))]
+        places = np.interp(t * way[-1], way, ends)
+        found = loops.gait(p).shape(2 * np.pi * t)
+        assert found == pytest.approx(middle + half * np.stack([places.real, places.imag], -1), abs=0.05)
+        assert sum((np.conj(a) * b).imag for a, b in pairwise(ends)) > 0  # to the left
+    *others, right, left = ({*corners} for corners in series.OUTLINES)
+    assert all({(-x, -y) for x, y in last} in others for last in (right, left))
+
+
+def test_further_starts_are_waves_about_the_middle_of_the_limits():
+    """The first is one of 0.7 of the range; the others scatter about such waves, of lags named or any."""
+    loops = Loops(3, 2, ((-0.5, 2.0), (-1.2, 1.0), (-1.0, 1.0)))
+    own, middle, half = (
+        loops.of(Fourier(cos=((0.4,), (0.1,), (0.2,)), sin=((0.0,), (0.3,), (0.1,)))),
+        loops.middle,
+        loops.half,
+    )
+    lag = np.exp(1j * np.pi / 2 * np.arange(3))
+    starts = np.array([loops.starts(own, 6, seed) for seed in range(100)])
+    assert (starts[:, 0] == own).all()
+    assert starts[:, 1] == pytest.approx(
+        np.array([[middle, *0.7 * half * [lag.real, lag.imag], *np.zeros((2, 3))]] * 100), abs=1e-12
+    )
+    first = (starts[:, :, 1] + 1j * starts[:, :, 2]) / half
+    for k, angle in ((2, -np.pi / 2), (3, 2 * np.pi / 3), (4, np.pi / 4)):
+        assert first[:, k].mean(0) == pytest.approx(0.6 * np.exp(1j * angle * np.arange(3)), abs=0.12)
+    assert np.abs(first[:, 5].mean(0)[1:]).max() < 0.15 < 0.5 < first[:, 5, 0].mean().real
+    others = starts[:, 2:] / half
+    assert others[:, :, 0].mean((0, 1)) == pytest.approx(middle / half, abs=0.03)
+    assert others[:, :, 0].std((0, 1)) == pytest.approx(np.full(3, 0.1), rel=0.2)
+    assert others[:, :, 3:].std((0, 1, 2)) == pytest.approx(np.full(3, 0.3 / 4 * 0.6), rel=0.25)
+
+
+def searching(request, **parts):
+    """A search of which a part is looked at alone."""
+    search = _Search(request, None)
+    vars(search).update(constraints=types.SimpleNamespace(feasible=lambda p: p), **parts)
+    return search
+
+
+def test_loops_tried_besides_have_their_sizes():
+    """The first in another size, 0.6 of the range; others near the best by a tenth, and further by a fifth, of a rad."""
+    search = searching(checked(viscous(), harmonics=4, limits=5.0, objective="displacement"))
+    loops = search.request.loops
+    p = loops.of(Ellipse(semi_axes=(0.4, 0.2), tilt=0.3, centre=(0.3, -0.2)))
+    larger = search._larger(p)
+    assert larger[0] == pytest.approx(p[0]) and np.ptp(larger[1:3] / p[1:3]) < 1e-9
+    assert np.abs(loops.gait(larger).shape(np.linspace(0, 6.28, 500)) - p[0]).max() == pytest.approx(3.0, rel=1e-3)
+    harmonic = np.array([1, 1, 1, 2, 2, 3, 3, 4, 4])[:, None]
+    for others, size in zip(search._perturbed(p), (0.1, 0.2), strict=True):
+        spread = (np.array(others) - p) * harmonic / (size * 2.0)  # a range of 5 rad is twice that of 2.5
+        assert len(others) == 3 and np.abs(spread.mean()) < 0.3
+        assert spread.std((0, 2)) == pytest.approx(np.ones(9), rel=0.65) and spread.std() == pytest.approx(1.0, rel=0.2)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.05])
+def test_a_loop_that_turns_too_much_is_worth_what_is_left_where_it_does_not(turn):
+    """Where displacement and turn are linear, exactly what the nearest loop that turns no more brings."""
+    rng = np.random.default_rng(2)
+    by_x, by_theta = rng.normal(size=(2, 3, 2))
+    flat, count = np.zeros((3, 2)), 0
+    net = lambda p: np.array([5.0 + (by_x * p).sum(), 0.0, (by_theta * p).sum()])
+    tier = lambda p: CycleValues((net(p), np.array([by_x, flat, by_theta])), (0.0, flat), None, None, (0.0, flat))
+    search = searching(checked(viscous(), "displacement", "x"))
+    for p in (rng.normal(size=(3, 2)), 0.01 * by_theta, -rng.normal(size=(3, 2))):
+        theta, count = net(p)[2], count + 1
+        nearest = p - (theta - np.clip(theta, -turn, turn)) * by_theta / (by_theta**2).sum()
+        assert abs(net(nearest)[2]) <= turn + 1e-12
+        assert search._merit(tier, p, turn) == pytest.approx(net(nearest)[0], rel=1e-12)
+        assert search.count == count
+    assert searching(checked(viscous(), "turning"))._merit(tier, p, turn) == abs(net(p)[2])
+
+    def fails(p):
+        raise RuntimeError
+
+    assert search._merit(fails, p, turn) == -np.inf == search._merit(lambda p: tier(p * np.nan), p, turn)
+
+
+def test_a_direction_is_that_of_the_mean_heading():
+    """A loop is begun where the heading crosses its mean, at the crossing next to its start."""
+    search = searching(checked(viscous(), "displacement", "x", harmonics=2))
+    loops, system = search.request.loops, search.request.system
+    for shift in (0.3, 2.9, 5.5):
+        p = series.shifted(loops.of(Ellipse(semi_axes=(1.0, 0.5), tilt=0.4, centre=(0.3, 0.1))), shift)
+        q = search._started_at_mean_heading(p)
+        assert abs(turning(system.run(*loops.cycle(q)).xi)[0]) < 1e-8
+        fine = dataclasses.replace(loops, phases=2000)
+        ahead = turning(system.velocity(*fine.cycle(p)))
+        crossings = np.flatnonzero(ahead * np.roll(ahead, -1) <= 0)
+        k = crossings[np.minimum(crossings, 2000 - crossings).argmin()]
+        assert q == pytest.approx(series.shifted(p, 2 * np.pi * (k + 0.5) / 2000), abs=5e-3)
+    assert searching(checked(viscous(), "displacement"))._started_at_mean_heading(p) is p
+
+
+@pytest.mark.parametrize(
+    ("direction", "net", "reverse", "turned"),
+    [
+        ("x", (-0.2, 0.3, 0.0), 0.9991, True), ("x", (-0.2, 0.3, 0.0), 0.9989, False), ("y", (0.3, -0.2, 0.0), 1.0, True),
+        ("x", (0.2, -0.3, 0.0), 1.1, False), ("y", (-0.3, 0.2, 0.0), 1.1, False), (None, (-0.2, -0.3, 0.0), 1.1, False),
+    ],
+)  # fmt: skip
+def test_a_gait_that_moves_backwards_is_reversed_unless_that_brings_less(direction, net, reverse, turned):
+    search = searching(checked(viscous(), "displacement", direction))
+    evaluation = lambda value: types.SimpleNamespace(displacement=np.array(net), value=value)
+    loop, own, other = np.eye(11, 2), evaluation(2.0), evaluation(2.0 * reverse)
+    search._finished = lambda p, turn: (other, p)
+    found, p = search._forwards(own, loop, 0.0)
+    assert (found is other, found is own) == (turned, not turned)
+    assert np.array_equal(p, series.reversed_(loop) if turned else loop)
+
+
+def test_a_start_is_a_series_of_as_few_harmonics_as_it_has():
+    """None of its own are cut, though the search has fewer; the limit of the search where these suffice."""
+    for gait, asked, harmonics in ((Butterfly(amplitude=0.9), 1, 16), (Circle(amplitude=0.9), 3, 3)):
+        search = searching(checked(viscous(gait=gait), "displacement", harmonics=asked))
+        found = search._as_series(gait)
+        assert (found.amplitude, found.harmonics) == (1.0, harmonics)
+        assert found.cycle(64)[0] == pytest.approx(gait.cycle(64)[0], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("objective", "pace"),
+    [
+        ("displacement", {}),
+        ("turning", {}),
+        ("efficiency", {}),
+        ("speed", {"power": 0.4, "rate": 9.0}),
+        ("speed", {"rate": 0.5}),
+    ],
+)
+def test_an_evaluation_is_what_the_gait_does_by_itself(objective, pace):
+    """In sand, of an odd body of its own length in a frame off its centre: value, path, work, time, and errors, that of a
+    ratio the sum of the relative ones."""
+    gait = Ellipse(semi_axes=(1.2, 0.7), tilt=0.4, centre=(0.3, -0.1), amplitude=0.7)
+    scene = Scene(Swimmer(SAND, ODD), gait, Numerics(phases=32))
+    request = checked(scene, objective, **pace)
+    found = evaluate_gait(request, gait)
+    (net,), ((error, heading),) = estimate.direct(scene, gait, [0.7], 128)
+    alpha, alphadot = gait.cycle(128)
+    power = scene.system.work(alpha, alphadot, scene.system.velocity(alpha, alphadot)).power / 0.3
+    length, half, far = *(2 * np.pi * x.mean() for x in (power, power[::2])), np.hypot(*net[:2]) / 0.3
+    time = (
+        max(power.mean() / 0.4 * ("power" in pace), np.abs(gait.cycle(1024)[1]).max() / pace["rate"]) if pace else 1.0
+    )
+    known = {
+        "displacement": (far, error), "turning": (abs(net[2]), heading), "speed": (far / (2 * np.pi * time),) * 2,
+        "efficiency": (far / length, far / length * (error / far + abs(half / length - 1))),
+    }  # fmt: skip
+    value, error_of_value = known[objective]
+    if objective == "speed":
+        error_of_value *= error / far
+    assert (found.value, found.error) == pytest.approx((value, error_of_value), rel=1e-6)
+    assert (found.heading, found.time, found.limits) == (
+        pytest.approx(heading),
+        pytest.approx(time),
+        (*pace,)[:1],
+    )
+    assert found.displacement == pytest.approx(net)
+    assert [found.length, found.work] == [pytest.approx(length, rel=1e-6)] * 2
+
+
+def test_undulations_are_sines_within_their_bounds():
+    """Limits are touched within 5e-3 of them; starts lie in the lower half of the range."""
+    sines = Undulations(Sine(elements=30, amplitude=0.3, waves=1.5, frequency=2.0), phases=16)
+    for p, names in (
+        ((0.01004, 2.489), ["amplitude >= 0.01", "waves <= 2.5"]), ((0.996, 0.502), ["amplitude <= 1", "waves >= 0.5"]),
+        ((0.01006, 2.487), []), ((0.994, 0.503), []),
+    ):  # fmt: skip
+        assert sines.active(np.array(p)) == names
+    assert sines.of(Sine(amplitude=-0.4, waves=1.2)).tolist() == [0.4, 1.2]
+    rows = np.array([[0.2, 1.0], [0.5, 2.2]])
+    for found, p in zip(zip(*sines.cycle(rows)), rows):
+        one = Sine(elements=30, amplitude=p[0], waves=p[1]).cycle(16)
+        assert all(np.array_equal(x, y) for x, y in zip(found, one)) and np.array_equal(sines.cycle(p)[0], one[0])
+    assert sines.gait(rows[0]) == Sine(elements=30, amplitude=0.2, waves=1.0, frequency=2.0)
+    own, *others = sines.starts([2.0, 0.1], 200)
+    low, high = map(np.array, sines.bounds)
+    assert own.tolist() == [1.0, 0.5] and len(others) == 199
+    share = (np.array(others) - low) / (high - low)
+    assert share.min(0) == pytest.approx([0.05, 0.05], abs=0.01) and share.max(0) == pytest.approx([0.5, 0.5], abs=0.01)
+    assert sines.same([0.2, 1.0], [0.2095, 1.0095]) and not sines.same([0.2, 1.0], [0.2, 1.0105])
+
+
+def test_loops_about_singular_shapes_are_made_smaller_until_they_are_clear():
+    """Singular on a line at 1 rad from the first one's centre: others keep half of its distance, about that centre."""
+    loops, centre = Loops(2, 2, 5.0), np.array([0.3, -0.2])
+    circle = lambda size, middle=centre: loops.of(Circle(amplitude=size, centre=tuple(middle)))
+    singularity = lambda alpha: 1.3 - alpha[..., 0]
+    found = Constraints(loops, singularity, circle(0.4))
+    assert found.first == pytest.approx(circle(0.4)) and found.away == pytest.approx(0.3, rel=1e-6)
+    for size, smaller in ((0.69, 0.69), (0.71, 0.7 * 0.71), (2.0, 0.7**3 * 2.0), (1e3, 0.4)):
+        assert found.feasible(circle(size)) == pytest.approx(circle(smaller), abs=1e-12)
+    far = circle(2.0, (-4.0, 0.1))
+    assert found.feasible(far) is far
+    assert Constraints(loops, singularity, circle(1.5)).away == pytest.approx(0.5 * (1 - 0.49 * 1.5), rel=1e-6)
+    for size, share in ((0.5, 1.6), (0.5, 1.7)):
+        assert found.meets_singular(circle(size), share) == (share == 1.7)
+    assert found.meets_singular(circle(2.0), 0.0) and not Constraints(loops, None, circle(2.0)).meets_singular(
+        circle(2.0)
+    )
+
+
+def test_the_shortest_step_onto_constraints():
+    """Of an equation, of a bound that counts, of one that does not, and of two that exclude each other."""
+    A, b = np.array([[0.6, -0.8, 0.0]]), np.array([[1.0, 0.0, 2.0], [0.0, 5.0, 0.0]])
+    assert _shortest([("eq", np.array([0.3]), A)]) == pytest.approx([-0.18, 0.24, 0.0], abs=1e-9)
+    assert _shortest([("ineq", np.array([-0.5, 0.2]), b)]) == pytest.approx([0.1, 0.0, 0.2], abs=1e-8)
+    both = _shortest([("eq", np.array([0.3]), A), ("ineq", np.array([-0.5, 0.2]), b)])
+    assert both == pytest.approx(np.linalg.pinv([A[0], b[0]]) @ [-0.3, 0.5], abs=1e-8) and 5 * both[1] > -0.2
+    assert not _shortest([("ineq", np.array([-0.5, -0.5]), np.array([[1.0, 0.0], [-1.0, 0.0]]))]).any()
+
+
+def bowl(bound=0.4):
+    """|x - (1, 2)|^2 with x_2 <= bound."""
+    top = np.array([1.0, 2.0])
+    least = {"type": "ineq", "fun": lambda x: np.array([bound - x[1]]), "jac": lambda x: np.array([[0.0, -1.0]])}
+    return lambda x: (((x - top) ** 2).sum(), 2 * (x - top)), [least]
+
+
+def test_an_ascent_keeps_to_its_radius_and_says_how_it_ends():
+    """The best feasible point; the first numbers alone stay near the start."""
+    start, value = np.zeros(2), 1.0
+    best = _Ascent(lambda x: (x[0],), bowl()[1], lambda x: True)
+    for x, known in (
+        ((7.0, 9.0), 7.0),
+        ((5.0, 8.0), 5.0),
+        ((3.0, 0.0), 3.0),
+        ((4.0, 0.1), 3.0),
+        ((1.0, 2.0), 3.0),
+        ((2.0, 0.3), 2.0),
+    ):
+        best(np.array(x))  # the last where none was feasible, then the least that is
+        assert best.best[0] == known
+    for bound, radius, moving, best, ends in (
+        (0.4, 9.0, 2, (1.0, 0.4), "converged"), (0.4, 0.3, 2, (0.3, 0.3), "converged"), (0.4, 0.3, 1, (0.3, 0.4), "converged"),
+        (-1.0, 9.0, 2, (1.0, -1.0), "converged"),
+    ):  # fmt: skip
+        ascent = _Ascent(*bowl(bound), lambda x: True)
+        assert ascent.run(start, radius, moving, 50, 1e-9) == ends
+        assert ascent.best == pytest.approx(best, abs=1e-6) and ascent.steps > 0
+        assert ascent.least == pytest.approx((best[0] - 1) ** 2 + (best[1] - 2) ** 2, abs=1e-5)
+    valley = lambda x: (100 * (x[1] - x[0] ** 2) ** 2 + (value - x[0]) ** 2, np.array(
+        [-400 * x[0] * (x[1] - x[0] ** 2) - 2 * (value - x[0]), 200 * (x[1] - x[0] ** 2)]))  # fmt: skip
+    assert (ascent := _Ascent(valley, bowl()[1], lambda x: True)).run(start, 9.0, 2, 3, 1e-12) == "unfinished"
+    assert ascent.steps == 3
+    assert _Ascent(*bowl(), lambda x: x[0] < 0.1).run(start, 9.0, 2, 50, 1e-9) == "infeasible"
+
+    def spent(x):
+        raise Enough
+
+    assert _Ascent(spent, [], lambda x: True).run(start, 9.0, 2, 50, 1e-9) == "spent"
+
+
+@pytest.mark.parametrize("objective", ["displacement", "efficiency"])
+@pytest.mark.parametrize("component", [0, 1])
+def test_what_limits_a_loop_at_each_phase(objective, component):
+    """A circle of 1 rad in a field that is alpha_1: by its lines of zeros, a side of the box, and the singular shapes below."""
+    axes = (np.linspace(-2, 2, 9), np.linspace(-2.5, 2.5, 11))
+    values = np.zeros((3, 9, 11))
+    values[component] = axes[0][:, None]
+    t = np.linspace(0, 2 * np.pi, 721)
+    alpha_1, alpha_2 = np.cos(t), np.sin(t)
+    asked = types.SimpleNamespace(objective=Objective(objective), loops=Loops(2, 1, ((-2.0, 1.0), (-2.0, 2.0))))
+    singularity = types.SimpleNamespace(traits=types.SimpleNamespace(singularity=lambda alpha: -2.0 - alpha[..., 1]))
+    found = types.SimpleNamespace(
+        gained=Gained(Field(axes, values), component), gait=Circle(), request=asked, active=(),
+        scene=types.SimpleNamespace(system=singularity),
+    )  # fmt: skip
+    rest = np.where(alpha_1 >= 1 - 7.5e-3, "limit", "length" if objective == "efficiency" else "else")
+    known = np.where(np.abs(alpha_1) <= 0.15, "zero", rest)
+    assert limiting(found).tolist() == known.tolist()
+    found.active = ("singular shapes",)
+    assert limiting(found).tolist() == np.where(alpha_2 <= -0.95, "singular", known).tolist()
+    values[:, 8] = np.nan  # of a field with gaps the median counts, 0.5 in the loop's box
+    found.gained, found.active = Gained(Field(axes, values), component), ()
+    assert limiting(found).tolist() == np.where(np.abs(alpha_1) <= 0.075, "zero", rest).tolist()
+    found.gained = None
+    assert set(limiting(found)) == {"loop", "limit"}
+
+
+def test_without_limits_those_of_the_field_or_the_gait_hold():
+    """The larger of the two; a table's own field, and a number where that is the same on all sides."""
+    scene = viscous(gait=Ellipse(semi_axes=(0.7, 0.2), centre=(0.1, 0.0)))
+    for extent, limit in ((0.5, 0.8), (2.0, 2.0)):
+        assert checked(scene.with_numerics(extent=extent), "displacement").loops.within == pytest.approx(
+            limit, rel=1e-3
+        )
+    within = lambda limits: checked(scene, "displacement", limits=limits).loops.within
+    assert within([0.9, 0.9]) == 0.9 and within([(-0.4, 0.4), (-0.4, 0.4)]) == 0.4
+    assert within([0.9, 0.5]) == ((-0.9, 0.9), (-0.5, 0.5))
+    assert within([(-0.4, 0.9), (-0.4, 0.9)]) == ((-0.4, 0.9),) * 2
+    for span, kept in ((1.01e-6, True), (0.99e-6, False)):
+        with contextlib.nullcontext() if kept else pytest.raises(Refusal, match="or as many from low to high"):
+            assert within([(0.2, 0.2 + span), (-1.0, 1.0)])[0] == (0.2, 0.2 + span)
+
+
+def test_balances_of_a_cycle_start_from_the_last_one_and_those_nearby_from_its_own():
+    starts, found, (loops, p) = [], [], some_loop()
+
+    def velocity(alpha, alphadot, start=None):
+        starts.append(start)
+        found.append(np.stack([alphadot[..., 0], alpha[..., 1] * alphadot[..., 0], alphadot[..., 1]], -1))
+        return found[-1]
+
+    cycles = Phases(loops, velocity)
+    for k in (1.0, 0.9):
+        cycles(k * p)
+    assert [len(x) for x in found] == [1, 8, 1, 8] and cycles.count == 2
+    assert starts[0] is None and starts[1] is starts[2] is found[0] and starts[3] is found[2]
+    runs = Runs(loops, Swimmer(FLUID, ODD).run, True)
+    runs(p)
+    assert runs.count == 1
+
+
+@pytest.mark.parametrize("joints", [2, 3])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_sense_of_any_loop_is_told(seed, joints):
+    _, p = some_loop(seed, joints)
+    for q, there in ((p, True), (-p, True), (series.reversed_(p), False), (-series.reversed_(p), False)):
+        assert series.same(p, series.shifted(q, 2.0 + seed), odd=False) is there
+
+
+def test_a_search_tells_how_far_it_is_and_never_that_it_is_done():
+    told = []
+    search = searching(checked(viscous(), "displacement"), progress=told.append, completed=0, expected=10.0)
+    for cycles in (5, 4, 6):
+        search._report(cycles)
+    assert told == pytest.approx([0.5, 0.9, 1 / 1.1]) and search.completed == 15
+
+
+def test_a_gait_has_the_frequency_that_its_time_allows_or_that_of_the_scene():
+    scene = viscous(gait=Circle(frequency=3.0))
+    timed, free = (searching(checked(scene, name)) for name in ("speed", "displacement"))
+    evaluation = lambda time: types.SimpleNamespace(time=time, gait=Circle(amplitude=0.5))
+    assert timed._timed(evaluation(0.2)) == Circle(amplitude=0.5, frequency=1 / (2 * np.pi * 0.2))
+    assert timed._timed(evaluation(0.0)) == free._timed(evaluation(0.2)) == Circle(amplitude=0.5, frequency=3.0)
+    assert timed._timed(evaluation(1.0001e-4 / (2 * np.pi))).frequency == pytest.approx(1e4, rel=1e-3)
+    with pytest.raises(Refusal, match="more than 10000 times a second"):
+        timed._timed(evaluation(0.9999e-4 / (2 * np.pi)))
+
+
+def test_a_turn_may_be_off_by_its_error_where_cycles_are_not_those_of_the_search():
+    from rft.effects import Transient
+
+    past = viscous(system=Swimmer(SAND, Chain(), (Transient(travel=0.1),)))
+    framed = Study(viscous()).in_frame("minimum-perturbation").scene
+    evaluation = types.SimpleNamespace(heading=0.3)
+    slacks = [searching(checked(scene, "displacement"))._slack(evaluation) for scene in (viscous(), past, framed)]
+    assert slacks == pytest.approx([1e-7, 0.3 + 1e-7, 0.3 + 1e-7], rel=1e-9)
+
+
+def test_phases_and_fields_of_a_search():
+    """Phases are eights, as many as the scene or the search has; a field reaches a little beyond the farthest limit."""
+    asked = lambda phases, **more: checked(viscous().with_numerics(phases=phases), "displacement", **more)
+    assert [asked(n).phases for n in (64, 128, 129)] == [128, 128, 136]
+    assert asked(64, harmonics=9).phases == asked(64, harmonics=9).loops.phases == 144
+    assert asked(64, limits=[(-0.5, 1.0), (-1.5, 0.2)]).extent == pytest.approx(1.02 * 1.5)
+    rests = viscous(gait=Circle(amplitude=0.0, frequency=2.0))
+    assert checked(rests, "speed").objective.rate == 1.0 == checked(viscous(gait=Circle()), "speed").objective.rate
+
+
+@pytest.mark.parametrize("pace", [{"rate": 0.5}, {"power": 0.01}])
+def test_a_loop_is_worth_its_speed_in_the_time_that_its_limits_allow(pace):
+    search, (loops, p) = searching(checked(viscous(), "speed", **pace)), some_loop()
+    system = search.request.system
+    power = lambda alpha, alphadot, xi: system.work(alpha, alphadot, xi).power
+    alpha, alphadot = loops.cycle(p)
+    xi = system.velocity(alpha, alphadot)
+    time = np.sqrt(power(alpha, alphadot, xi).mean() / 0.01) if "power" in pace else np.abs(alphadot).max() / 0.5
+    found = search._merit(Phases(loops, system.velocity, power, 2.0), p, 10.0)
+    assert found == pytest.approx(np.hypot(*displacement(xi)[:2]) / (2 * np.pi * time), rel=1e-9)

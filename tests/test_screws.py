@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from rft.meshes import Screw, Spatial, wrench
 from rft.walking.craft import Screws
-from rft.walking.screws import _Steady, cruise, free_turning, turning
+from rft.walking.screws import _solve, _Steady, cruise, free_turning, turning
 
 pytestmark = pytest.mark.usefixtures("fastest")
 
@@ -231,3 +231,15 @@ def test_what_makes_no_screw_is_refused(wrong, said):
     with pytest.raises(ValueError, match=".") as caught:
         dataclasses.replace(SCREW, **wrong)
     assert said in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_balance_is_found_by_short_steps_or_what_is_left_is_told():
+    """Of a line far off, of a curve, and where there is none."""
+    A, tries = np.array([[2.0, -0.5], [0.3, 1.0]]), []
+    x, left = _solve(lambda x: tries.append(x) or A @ (x - [1.0, -2.0]), np.zeros(2))
+    np.testing.assert_allclose(x, [1.0, -2.0], atol=1e-5)
+    assert left < 1e-5 and np.abs(np.diff(tries[::3], axis=0)).max() <= 0.3 + 1e-9
+    x, left = _solve(lambda x: np.array([x[0] ** 2 - 2.0, x[0] * x[1] - 1.0]), np.array([0.5, 0.5]))
+    np.testing.assert_allclose(x, [2**0.5, 0.5**0.5], atol=1e-5)
+    x, left = _solve(lambda x: x**2 + 0.3, np.array([0.8]))
+    assert 0.3 <= left < 0.31 and abs(x[0]) < 0.1

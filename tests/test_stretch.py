@@ -8,7 +8,7 @@ from geomech import plots
 from geomech.gaits import Circle
 from geomech.geometry import connection, curvature, metric
 from geomech.geometry.field import Field
-from geomech.geometry.stretch import _first, stretch
+from geomech.geometry.stretch import _first, _inverted_fraction, stretch
 
 
 def constant(M, points=9, extent=1.5):
@@ -98,6 +98,7 @@ def test_displacement_is_density_times_area_on_paper():
     ("make", "said"),
     [
         (lambda: stretch(constant(np.eye(2)), 3), "points must be"),
+        (lambda: stretch(constant(np.eye(2)), 7.5), "points must be"),
         (lambda: stretch(constant(np.zeros((2, 2)))), "costs nothing"),
         (lambda: stretch(metric.fit(lambda a, u: (u**2).sum(-1) + 0 * a[..., 0], connection.grid(3, 5))), "two joints"),
     ],
@@ -156,3 +157,40 @@ def test_the_area_is_shaded_by_what_it_adds(fitted):
     for reverse, word in ((False, "backwards"), (True, "ahead")):
         ax = plots.ccf_contours(field, 0, [Circle(amplitude=0.8, reverse=reverse)], ax=plots.figure(3, 3)[1][0, 0])
         assert [t.get_text() for t in ax.get_legend().get_texts()] == [word]
+
+
+def test_the_distortion_at_a_shape_is_that_of_the_edges_that_meet_there():
+    """Each against the length of a straight line by a fine sum, of a cap of a sphere that is longer than it is wide."""
+    cap = lambda alpha, rate: np.cos(alpha[..., 1]) ** 2 * rate[..., 0] ** 2 + rate[..., 1] ** 2
+    axes = np.linspace(-0.9, 0.9, 7), np.linspace(-0.2, 1.2, 6)
+    sphere, found = metric.fit(cap, axes), stretch(metric.fit(cap, axes))
+    assert found.distortion.shape == (7, 6) and found.folded == 0.0
+    u, alpha = (np.moveaxis(x, 0, -1) for x in (found.field.values, shapes(axes)))
+    square, times, every = np.zeros((7, 6)), np.zeros((7, 6)), []
+    for i, j in np.ndindex(7, 6):
+        for k, m in ((i + 1, j), (i, j + 1), (i + 1, j + 1), (i + 1, j - 1)):
+            if k < 7 and 0 <= m < 6:
+                step = alpha[k, m] - alpha[i, j]
+                along = alpha[i, j] + (np.arange(40)[:, None] + 0.5) / 40 * step
+                off = (
+                    np.linalg.norm(u[k, m] - u[i, j]) / sphere.norm(along, np.broadcast_to(step, along.shape)).mean()
+                    - 1
+                )
+                every.append(off)
+                for place in ((i, j), (k, m)):
+                    square[place], times[place] = square[place] + off**2, times[place] + 1
+    assert found.distortion == pytest.approx(np.sqrt(square / times), rel=2e-2)
+    assert (found.rms, found.largest) == pytest.approx(
+        (np.std([*every, *-np.array(every)]), np.abs(every).max()), rel=1e-2
+    )
+
+
+def test_cells_that_are_turned_over_are_counted_by_triangles():
+    """Of a plane that is folded along the middle of its third column of four, all of the last column and half of the third."""
+    x, y = shapes((np.arange(5.0), np.arange(4.0)))
+    fold = np.stack([np.minimum(x, 6.0 - x), y], -1)
+    assert _inverted_fraction(np.stack([x, y], -1)) == 0.0 and _inverted_fraction(np.stack([y, x], -1)) == 1.0
+    assert _inverted_fraction(fold) == 0.25
+    sheared = np.stack([x, y], -1)
+    sheared[2, 2] = 3.5, 0.5  # beyond the diagonal of the cell to the lower right
+    assert 0 < _inverted_fraction(sheared) < 0.25

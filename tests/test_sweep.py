@@ -6,7 +6,7 @@ import xarray
 from commands import geomech
 
 from geomech import scenes
-from geomech.studies import cycles, estimate, sweep
+from geomech.studies import cycles, estimate, grid, sweep
 from geomech.studies.study import Study
 from rft import CATALOGUE, Granular
 from rft.refusal import Refusal
@@ -207,3 +207,28 @@ def test_the_command_writes_netcdf_and_a_plot(tmp_path):
 def test_bad_sweeps_are_refused_before_computing(over, said):
     with pytest.raises(Refusal, match=said):
         sweep.sweep(GLASS, over)
+
+
+def test_rows_find_their_points_whatever_varies_fastest_or_changes_nothing():
+    """The amplitude is the innermost, wherever it is given, and a frequency that changes no row is computed once."""
+    over = {"gait.amplitude": [0.5, 1.0, 1.5], "gait.frequency": [1.0, 2.0], "body.length": [1.0, 2.0, 3.0, 4.0]}
+    one = grid.Grid(None, over, {}, "gait.amplitude", ("gait.frequency",))
+    assert (one.names, one.total) == (["gait.frequency", "body.length", "gait.amplitude"], 12)
+    points = [one.points[k] for k in range(one.points.total)]
+    rows = one.arranged(np.array([[10 * length, a, f] for f, length in points for a in one.inner_values]))
+    amplitude, frequency, length = np.meshgrid(*over.values(), indexing="ij")
+    np.testing.assert_array_equal(rows, np.stack([10 * length, amplitude, 1.0 + 0 * frequency], -1))
+    assert np.array_equal(grid.at_points(over, ("gait", "physical", "frequency"), 7.0), frequency)
+    assert np.array_equal(grid.at_points(over, ("physical", "frequency"), 7.0), np.full((3, 2, 4), 7.0))
+    assert grid.at_points(over, ("physical", "frequency"), None) is None
+
+
+def test_corners_of_a_grid_are_tried_and_some_of_many_values_along_its_edges():
+    over = {"medium.C": [3.0, 1.0, 2.0], "body.length": [*range(1, 402), 0.5]}
+    corners = list(grid.Grid(None, over, {}).corners())
+    assert corners[:4] == [(3.0, 1), (3.0, 0.5), (2.0, 1), (2.0, 0.5)]
+    assert corners[4:7] == [(3.0, 1), (1.0, 1), (2.0, 1)]
+    along = [x for c, x in corners[7:] if c == 3.0]
+    assert len(along) == len(corners) - 7 <= 202 and {0.5, 401} <= {*along} and np.diff(sorted({*along})).max() <= 3
+    few = list(grid.Grid(None, {"body.length": [*range(1, 201)]}, {}).corners())
+    assert few == [(1,), (200,), *((x,) for x in range(1, 201))]

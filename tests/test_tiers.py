@@ -470,3 +470,40 @@ def test_the_adapted_tier_is_near_the_truth_on_both_sides():
     reflected = family.fit(GLASS.system.velocity, TURNED, 1.0)
     np.testing.assert_allclose(values[23::-1], reflected.ccf()[1][1:], rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(shapes[23::-1], reflected.ccf()[0][1:], atol=1e-12)
+
+
+@pytest.mark.parametrize("r", [0.1, 0.25, 0.4, 0.5, 0.8])
+def test_what_is_to_come_of_further_phases_is_a_geometric_series(r):
+    """Of which the changes so far tell the ratio, at most a half; where links stick at least a quarter, from the first on."""
+    changes = 3e-3 * r ** np.arange(3)
+    sum_from = lambda first, ratio: estimate.SAFETY * first * (ratio ** np.arange(1, 100)).sum()
+    assert estimate._remaining(*changes, False) == pytest.approx(sum_from(changes[2], min(r, 0.5)))
+    slowest = sum_from(3e-3 * max(r, 0.25) ** 2, min(max(r, 0.25), 0.5)) if r <= 0.5 else sum_from(changes[2], 0.5)
+    assert estimate._remaining(*changes, True) == pytest.approx(slowest)
+    scattered = estimate._remaining(1e-6, 4e-3, 1e-5, True), estimate._remaining(1e-6, 4e-3, 3e-3, True)
+    assert scattered == pytest.approx((sum_from(2e-3, 0.5), sum_from(3e-3, 0.5)))
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_between_amplitudes_that_are_compared_the_worse_neighbour_counts(way, monkeypatch):
+    """33 of 100 are compared, with the tier that has an error of its own."""
+    asked, amplitudes = [], np.linspace(0.5, 1.0, 100)
+
+    def truth(scene, gait, some, phases):
+        asked.append((some, phases))
+        return np.zeros((len(some), 3)), np.array([[0.5, 7.0]] * len(some))
+
+    monkeypatch.setattr(estimate, "direct", truth)
+    k, scene = np.arange(100)[::way], SimpleNamespace(system=SimpleNamespace(length=0.2))
+    poses = np.stack([0.6 * k, -0.8 * k, 2.0 * k], -1)
+    found = estimate.against_direct(scene, poses, SimpleNamespace(harmonics=9), amplitudes)
+    ((some, phases),) = asked
+    assert (len(some), phases) == (33, 72)
+    compared = np.searchsorted(amplitudes, some)
+    assert compared[[0, -1]].tolist() == [0, 99] and np.diff(compared).max() <= 4
+    after = compared[np.searchsorted(compared, np.arange(100))]
+    before = compared[np.searchsorted(compared, np.arange(100), "right") - 1]
+    worse = (after if way == 1 else 99 - before).astype(float)
+    np.testing.assert_allclose(found, np.stack([5 * worse + 0.5, 2 * worse + 7.0], -1), rtol=1e-12)
+    estimate.against_direct(scene, poses, SimpleNamespace(harmonics=1), amplitudes[:20])
+    assert (len(asked[1][0]), asked[1][1]) == (20, 64)

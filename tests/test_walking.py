@@ -25,13 +25,13 @@ from rft.metres import GRAVITY
 from rft.plates import VERTICAL, CLeg, RoundRod, StressMap, Wheel, loads
 from rft.refusal import Refusal
 from rft.walking import Fineness, Rhex, Roller, Tripod, Walker, engine, rolling
-from rft.walking.limit import Limit, LimitCycles, _Search, _with_means, limit_cycles
+from rft.walking.limit import Limit, LimitCycles, _Search, _with_means, limit_cycles, predicted_progress, solve
 from rft.walking.march import march, step
 from rft.walking.planar import State
-from rft.walking.planar_walk import _limit_fields, _strides, rerun, walk
-from rft.walking.robot import intervals
-from rft.walking.sdirk import EFFORT, Effort
-from rft.walking.stride import Walk, cycles_to_settle, from_rest, remaining_change
+from rft.walking.planar_walk import _limit_fields, _rows, _strides, rerun, walk
+from rft.walking.robot import intervals, walking_rounding
+from rft.walking.sdirk import EFFORT, Effort, end_of_part, largest_speed, newton_step, next_part, start_of_step
+from rft.walking.stride import Walk, cycles_to_settle, from_rest, map_period, remaining_change
 
 pytestmark = pytest.mark.usefixtures("fastest")
 SAND = StressMap(zeta=0.3, grazing=math.radians(5))
@@ -752,3 +752,157 @@ def test_axes_of_a_sweep_have_units():
     one = {"over": {"robot.legs.relative_curvature": [0.0, 1.0]}, **{k: v[:, 0] for k, v in many.items()}}
     (ax,) = plots.sweep_figure(scenes.load("xplorer"), one).axes
     assert ax.get_xlabel() == "relative_curvature (-)" and ax.get_legend() is None
+
+
+def test_a_robot_limps_whose_every_second_stride_is_alike():
+    """By less than half of what one stride changes, where that is more than nothing."""
+    starts = lambda before, last, now: map_period(*(np.array([[0.0], [x]]) for x in (before, last, now)))
+    assert [int(starts(0.0, -0.1, x)[0]) for x in (0.099, 0.101, -0.05)] == [2, 1, 1]
+    assert [int(starts(0.0, -x, 0.0)[0]) for x in (0.99e-3, 1.01e-3)] == [1, 2]
+
+
+@pytest.mark.parametrize("period", [1, 2])
+def test_slopes_at_a_limit_foretell_the_strides_on_the_way_to_it(period):
+    """Each map of so many strides takes the distance on, and adds what the gains make of it to the progress of each."""
+    slopes, gains = np.array([[0.6, -0.3], [0.2, 0.5]]), np.array([0.03, -0.07])
+    fake = types.SimpleNamespace(cycle=2, scaled=lambda state, index: np.array([[state], [2.0 * state]]))
+    found = predicted_progress(fake, Limit(0.1, period, slopes, gains), 0.6, 0, 0.02)
+    distance = [np.linalg.matrix_power(slopes, k // period) @ [0.5, 1.0] for k in range(2000)]
+    np.testing.assert_allclose(found, 0.02 + np.array(distance) @ gains / period, rtol=1e-9)
+
+
+def test_strides_that_repeat_themselves_go_on_until_the_walk_is_over():
+    """Time, way and the sums of energies grow, all else recurs; a walk that does not repeat itself ends where it ends."""
+
+    def rows(t):
+        rocks = np.sin(4 * np.pi * t)
+        return np.stack([t, 0.3 * t, rocks, -rocks, 0.3 + 0 * t, rocks, rocks, 2.0 * t, 1.5 * t], -1)
+
+    times = [np.zeros(1), *np.arange(1, 5)[:, None] / 4 + np.array([-0.125, 0.0])]
+    for cycle, duration, last in ((2, 2.3, 2.25), (4, 2.0, 2.0), (2, 1.0, 1.0), (2, 0.6, 0.5), (0, 2.3, 1.0)):
+        found = _rows([rows(t) for t in times], cycle, duration)
+        np.testing.assert_allclose(found, rows(np.arange(0, last + 1e-9, 0.125)), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("stage", "ended", "halved", "after"),
+    [
+        ((1.0, 0.0), True, False, (1.0, 0.0, True)), ((1.0, 0.0), False, True, (0.5, 0.0, False)),
+        ((0.5, 0.0), True, False, (0.5, 0.5, False)), ((0.5, 0.5), True, False, (1.0, 0.0, True)),
+        ((0.25, 0.25), True, False, (0.5, 0.5, False)), ((0.125, 0.375), True, False, (0.5, 0.5, False)),
+        ((0.125, 0.125), True, False, (0.25, 0.25, False)), ((0.125, 0.25), True, False, (0.125, 0.375, False)),
+        ((0.25, 0.5), False, True, (0.125, 0.5, False)), ((0.25, 0.5), False, False, (0.25, 0.5, False)),
+        ((0.125, 0.875), True, False, (1.0, 0.0, True)),
+    ],
+)  # fmt: skip
+def test_parts_of_a_step_that_were_halved_join_again(stage, ended, halved, after):
+    part, elapsed = np.array(stage)[:, None]
+    found = next_part(types.SimpleNamespace(part=part, elapsed=elapsed), np.array([ended]), np.array([halved]))
+    assert tuple(x[0] for x in found) == after
+
+
+def test_a_step_of_newtons_method_goes_to_the_zero_of_a_line_but_not_too_far():
+    """Of robots whose residual is S (v - w): one near its zero, one that is far off, and one whose residual grew."""
+    S, k, reach = np.array([[2.0, 0.3, -0.1], [0.4, 1.5, 0.2], [-0.2, 0.1, 0.7]]), 0.01, 0.05
+    w, v = np.array([0.3, -0.2, 4.0]), np.array([[0.1, 0.1, 2.0], [-9.0, 2.0, 1.0], [0.1, 0.1, 2.0]]).T
+    start = start_of_step((0.0 * v), tuple(v), *np.zeros((5, 3))).newton
+    last = start._replace(
+        residual=np.array([np.inf, np.inf, 1e-3]), step=tuple(np.full((3, 3), 0.8)), best=tuple(0.5 * v)
+    )
+    power = np.full(3, 7.0), np.full(3, 5.0)
+    residual = S @ (v - w[:, None])
+    slopes = tuple(tuple(np.full(3, x) for x in column) for column in S.T)
+    step, solved, failed = newton_step(last, tuple(residual), slopes, power, k, reach, 1e-6, EFFORT)
+    assert not solved.any() and not failed.any() and step.tries.tolist() == [1.0] * 3
+    far = 0.5 * reach / k / 9.3  # a half of its reach in the step's time, over the fastest rate
+    np.testing.assert_allclose(step.share, [1.0, far, 0.5])
+    np.testing.assert_allclose(np.array(step.trial)[:, 0], w)
+    np.testing.assert_allclose(np.array(step.trial)[:, 1], v[:, 1] + far * (w - v[:, 1]))
+    np.testing.assert_allclose(np.array(step.trial)[:, 2], 0.5 * v[:, 2] + 0.5 * 0.8)
+    size = np.abs(residual * [[1.0], [1.0], [reach]]).max(0)
+    np.testing.assert_allclose(step.residual, [*size[:2], 1e-3])
+    assert [x.tolist() for x in step.power] == [[7.0, 7.0, 0.0], [5.0, 5.0, 0.0]]
+    more, solved, failed = newton_step(
+        step, tuple(S @ (np.array(step.trial) - w[:, None])), slopes, power, k, reach, 1e-6, EFFORT
+    )
+    assert solved.tolist() == [True, False, False] and not failed.any() and more.share[2] == 0.25
+    for share, tries, ends in ((0.11, 3.0, False), (0.09, 3.0, True), (1.0, 12.0, False), (1.0, 13.0, True)):
+        late = last._replace(share=np.full(3, share), tries=np.full(3, tries), residual=np.full(3, 1e-9))
+        assert newton_step(late, tuple(residual), slopes, power, k, reach, 1e-6, EFFORT)[2].tolist() == [ends] * 3
+
+
+def test_a_part_of_a_step_adds_what_its_stages_did():
+    """Powers by the weights of its stages, and the residuals of those that were not solved; else all stays."""
+    first = tuple(np.full(4, x) for x in (3.0, 2.0)), np.array([1e-9, 1e-9, 5e-3, 1e-9])
+    stage = types.SimpleNamespace(base=(1.0, 2.0, 3.0), first=(*first[0], first[1]))
+    best, power = (0.1, 0.2, 0.3), (np.full(4, 10.0), np.full(4, 20.0))
+    newton = types.SimpleNamespace(best=best, power=power, residual=np.array([1e-8, 2e-3, 1e-3, 2e-3]))
+    old = start_of_step(
+        (0.5, 0.6, 0.7), (0.0, 0.0, 0.0), *np.array([1.0, 4.0, 2.0, 0.1, 1e-3])[:, None] * np.ones(4)
+    ).accepted
+    h, k = 0.1, (1 - 0.5**0.5) * 0.1
+    new = end_of_part(old, stage, newton, np.array([True, True, True, False]), 1e-6, k, h)
+    np.testing.assert_allclose(np.array(new.pose)[:, 0], [1 + 0.1 * k, 2 + 0.2 * k, 3 + 0.3 * k])
+    np.testing.assert_allclose([x[3] for x in (*new.pose, *new.twist)], [0.5, 0.6, 0.7, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(np.array(new.twist)[:, 0], best)
+    np.testing.assert_allclose(new.work - 1.0, [3.0 * (h - k) + 10.0 * k] * 3 + [0.0])
+    np.testing.assert_allclose(new.loss - 4.0, [2.0 * (h - k) + 20.0 * k] * 3 + [0.0])
+    assert new.unsolved.tolist() == [2.0, 3.0, 3.0, 2.0]
+    np.testing.assert_allclose(new.defect, [0.1, 0.102, 0.106, 0.1])
+    np.testing.assert_allclose(new.residual, [1e-3, 2e-3, 5e-3, 1e-3])
+
+
+def test_a_trial_counts_as_better_where_the_largest_speed_falls_by_a_tenth_of_what_is_foretold():
+    """Speeds of a body's ends count like others; what is no number is never better."""
+    assert [largest_speed(v, 0.5) for v in ((1.0, -2.0, 3.0), (1.0, -2.0, -5.0), (-3.0, 1.0, 1.0))] == [2.0, 2.5, 3.0]
+    start = start_of_step((0.0,) * 3, (0.0,) * 3, *np.zeros(5)).newton
+    slopes, power = tuple(map(tuple, np.eye(3))), (0.0, 0.0)
+    for share, old, better in ((1.0, 1.12, True), (1.0, 1.1, False), (0.5, 1.06, True), (0.5, 1.04, False)):
+        last = start._replace(residual=old, share=share, best=(9.0, 9.0, 9.0))
+        found, *_ = newton_step(last, (1.0, 0.5, 0.2), slopes, power, 1e-9, 0.5, 1e-6, EFFORT)
+        assert (found.best == (0.0, 0.0, 0.0)) is better and found.share == (1.0 if better else share / 2)
+    for bad in (np.inf, np.nan):
+        for residual in ((bad, 0.1, 0.1), (0.1, bad, 0.1), (0.1, 0.1, bad)):
+            with np.errstate(invalid="ignore"):
+                found, solved, _ = newton_step(start, residual, slopes, power, 1e-9, 0.5, 1e-6, EFFORT)
+            assert not solved and found.share == 0.5 and found.residual == np.inf
+
+
+def test_a_robot_comes_to_an_end_above_its_reach_below_its_top_and_on_its_back():
+    """Of a robot whose farthest hip and legs are known; on an axle that is kept level neither pitch nor its rate is free."""
+    rod = dataclasses.replace(ROBOT, legs=RoundRod(0.02, 0.012))
+    strides = _strides([Walker(rod, Tripod(2.0), SAND), Walker(rod, Tripod(3.0), SAND)], QUICK)
+    reach, height = 0.022, 0.03  # the axle is 2 mm off the middle of the rod
+    farthest = reach + math.hypot(0.06, 0.004) + height
+    assert strides.reach == pytest.approx([reach] * 2, rel=0.02)
+    one = np.zeros(1, int)
+    for z, pitch, status in (
+        (farthest + 1e-3, 0.0, "airborne"), (farthest - 1e-3, 0.0, ""), (-0.0151, 0.0, "sunk"), (-0.0149, 0.0, ""),
+        (0.0, 1.58, "flipped"), (0.0, -1.58, "flipped"), (0.0, -1.57, ""),
+    ):  # fmt: skip
+        assert strides.end_status(State.at_rest(np.array([[7.0, z, pitch]])), one) == [status]
+    speed = 2 * np.pi * np.array([2.0, 3.0]) * strides.reach
+    state = State.at_rest(np.array([[9.0, 0.1, 0.2]] * 2))._replace(twist=np.array([[0.3, 0.4, 0.5]] * 2))
+    scaled = [0.1 / strides.reach, [0.2] * 2, 0.3 / speed, 0.4 / speed, 0.5 * strides.reach / speed]
+    np.testing.assert_allclose(strides.scaled(state, np.arange(2)), scaled)
+    moved = strides.with_scaled(state, 2 * np.array(scaled), np.arange(2))
+    np.testing.assert_allclose([*moved.pose[1], *moved.twist[1]], [9.0, 0.2, 0.4, 0.6, 0.8, 1.0])
+    roller = _strides([Walker(Roller(1.0, RoundRod(0.05, 0.02)), Tripod(1.0, 0.3), SAND)], QUICK)
+    assert roller.scaled(state.take([0]), one)[:, 0] == pytest.approx(
+        np.array([0.1, 0.3 / (2 * np.pi), 0.4 / (2 * np.pi)]) / 0.05
+    )
+    kinks = roller.phases[np.flatnonzero(np.diff(roller.rate_phases) != 0) + 1]
+    assert (strides.cycle, roller.cycle) == (2, 1) and kinks == pytest.approx([0.15, 0.35, 0.5, 0.65, 0.85])
+    assert roller.phases[[0, -1]] == pytest.approx([0.0, 1.0]) and strides.phases[-1] == 0.5
+
+
+def test_equations_without_a_solution_are_answered_by_nothing():
+    slopes = np.array([[[2.0, 1.0], [0.0, 4.0]], [[1.0, 2.0], [2.0, 4.0]], [[0.0, 1.0], [1.0, 0.0]]])
+    right = np.array([[3.0, 4.0], [1.0, 1.0], [5.0, 6.0]])
+    np.testing.assert_allclose(solve(slopes, right), [[1.0, 1.0], [0.0, 0.0], [6.0, 5.0]])
+    np.testing.assert_allclose(solve(slopes[::2], right[::2]), [[1.0, 1.0], [6.0, 5.0]])
+
+
+def test_the_rounding_of_slow_legs_is_a_twentieth_of_the_speed_of_their_ends():
+    found = walking_rounding(3e-3, np.array([1e-9, 0.1, 1.0]), 0.05)
+    np.testing.assert_allclose(found, [1e-7, 0.05 * 2 * np.pi * 0.1 * 0.05, 3e-3])

@@ -240,7 +240,7 @@ class Simulation:
             return "flipped"
         if height > self.ceiling:
             return "airborne"
-        top = max(height, (facets.corners[self.hull] @ rotation[2] + height).max(initial=height))
+        top = (facets.corners[self.hull] @ rotation[2] + height).max(initial=height)
         return "sunk" if top < 0.0 else ""
 
     def scaled_state(self) -> np.ndarray:
