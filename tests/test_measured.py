@@ -1466,7 +1466,7 @@ def test_logs_have_a_hundred_rows_and_six_joints_at_most(tmp_path, monkeypatch):
 @pytest.mark.parametrize(("apart", "period"), [(0.22, 1.0), (0.24, 2.0)])
 def test_cycles_that_are_nearly_alike_are_of_one_period(apart, period):
     """Shapes and, cycle by cycle in turn, so much more or less of them: a correlation of (1 - apart^2) / (1 + apart^2)."""
-    t = np.arange(0, 60, 0.02)
+    t = np.arange(0, 60, 0.023)
     alpha = np.stack([np.cos(2 * np.pi * t), 0.3 * np.sin(2 * np.pi * t)], -1)
     alpha += apart * math.sqrt(1.09 / 2) * np.stack([np.cos(3 * np.pi * t), np.sin(3 * np.pi * t)], -1)
     assert phase.period_of(t + 5, alpha + 3) == pytest.approx(period, rel=1e-3)

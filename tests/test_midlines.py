@@ -527,7 +527,7 @@ def test_the_command_prints_writes_and_draws(noisy, tmp_path, monkeypatch):
 
 def test_trials_that_are_made_are_what_they_say():
     """Without what is random a wave of headings, and after a cycle the displacement of its shapes; then how it varies."""
-    swimmer = Swimmer(Viscous(2.0), Backbone(24))
+    swimmer = Swimmer(Viscous(2.0), Backbone(24, length=0.4))
     plain = {"noise": 0.0, "spread": 0.0, "jitter": 0.0, "frequency": 2.0, "seed": 4}
     form = {"swing": 0.6, "waves": 1.3, "heading": 0.7, "bend": 0.3}
     made = synthetic.made(swimmer, 2.2, 30, 24, **plain, **form)
@@ -544,7 +544,9 @@ def test_trials_that_are_made_are_what_they_say():
         np.unwrap(np.arctan2(sin, cos)) - np.arctan2(sin[0], cos[0]), 4 * np.pi * made.t, atol=0.02
     )
     net = displacement(swimmer.velocity(*one_cycle(swimmer, np.arctan2(sin[0], cos[0]), 0.6, 1.3, 0.3)))
-    np.testing.assert_allclose(z[30], np.exp(1j * net[2]) * z[0] + np.exp(0.7j) * (net[0] + 1j * net[1]), atol=2e-3)
+    np.testing.assert_allclose(
+        z[30], np.exp(1j * net[2]) * z[0] + np.exp(0.7j) * (net[0] + 1j * net[1]) / 0.4, atol=2e-3
+    )
     np.testing.assert_allclose(np.abs(np.diff(z, axis=1)).sum(1), 1.0, atol=0.01)
 
     swimmer = Swimmer(Viscous(2.0), Backbone(6))
@@ -697,9 +699,11 @@ def refused(said):
 @pytest.mark.parametrize(
     ("factor", "said"),
     [
-        (3.9, ""), (1 / 3.9, ""), (4.1, r"line 32 \(t = 3\): the body is 4.1 times as long as in most frames: mend or drop that frame"),
+        (3.9, ""), (1 / 3.9, ""),
+        (4.1, r"line 32 \(t = 3\): the body is 4.1 times as long as in most frames: mend or drop that frame"),
         (1 / 4.1, "the body is 0.244 times as long as in most frames: mend"), (12.9, "frames: mm for m, or another such unit"),
-        (13.1, "in most frames: mend"), (1 / 129, "mm for m"), (1 / 132, "most frames: mend"), (710, "mm for m"), (690, "frames: mend"),
+        (13.1, "in most frames: mend"), (1 / 129, "mm for m"), (1 / 132, "most frames: mend"), (710, "mm for m"),
+        (690, "frames: mend"),
     ],
 )  # fmt: skip
 def test_frames_are_of_one_size(factor, said):
@@ -829,8 +833,10 @@ def test_a_cycle_has_a_gap_where_an_eighth_of_it_has_no_frame():
     ("unit", "size", "length", "said"),
     [
         ("m", 29.9, None, ""), ("m", 30.1, None, "the body is 30.1 m long: say the unit of x and y: mm, cm or px by units"),
-        ("m", 1.01e-4, None, ""), ("m", 0.99e-4, None, "the body is 9.9e-05 m long"), ("BL", 1.39, None, ""), ("BL", 0.72, None, ""),
-        ("BL", 1.41, None, "the body is 1.41 body lengths long: say the unit"), ("BL", 0.71, None, "the body is 0.71 body lengths"),
+        ("m", 1.01e-4, None, ""), ("m", 0.99e-4, None, "the body is 9.9e-05 m long"), ("BL", 1.39, None, ""),
+        ("BL", 0.72, None, ""),
+        ("BL", 1.41, None, "the body is 1.41 body lengths long: say the unit"),
+        ("BL", 0.71, None, "the body is 0.71 body lengths"),
         ("m", 0.139, 0.1, ""), ("m", 0.02, 0.1, ""), ("", 100.0, None, ""),
         ("m", 0.141, 0.1, "the points lie along 0.141 and the body is 0.1 long: give body_length in the unit of x and y"),
     ],
@@ -935,7 +941,8 @@ def test_times_are_those_of_the_file_or_of_frames():
 @pytest.mark.parametrize(
     ("frames", "points", "said"),
     [
-        (12, 5, ""), (11, 5, "f.csv: 11 frames: give a whole trial"), (12, 4, "f.csv: 4 points along the body: give 5 to 1000, better 10"),
+        (12, 5, ""), (11, 5, "f.csv: 11 frames: give a whole trial"),
+        (12, 4, "f.csv: 4 points along the body: give 5 to 1000, better 10"),
         (12, 1000, ""), (12, 1001, "1001 points along"),
     ],
 )  # fmt: skip
@@ -987,7 +994,8 @@ def test_points_are_taken_by_name_in_their_order_and_with_the_bodys_length(tmp_p
         ("t,point,x,y", {8: [1, 2, 0, 0]}, "f.csv, line 10: point 2 is given twice at t = 1: keep one"),
         ("t,other,x,y", {3: [5, 3, 0, 0]}, "f.csv, line 2: 4 points at t = 0, and 5 at most others: number the points"),
         ("t,x1,y1,x2", {}, "f.csv, line 1: no columns of points: it has 't, x1, y1, x2'; give a CSV file"),
-        ("t;x1,y1,x2,y2", {}, "f.csv, line 1: no columns of points; columns must be parted by commas: it has 't;x1, y1, x2, y2'; give"),
+        ("t;x1,y1,x2,y2", {},
+         "f.csv, line 1: no columns of points; columns must be parted by commas: it has 't;x1, y1, x2, y2'; give"),
         ("s,x1,y1,x2,y2", {}, "f.csv, line 1: no column t or frame: it has 's, x1, y1, x2, y2'; name the column of the time t"),
         ("t,a_x_mm,a_y_mm,b_x_mm,b_y", {}, "f.csv, line 1: columns in mm and in no unit: give all x and y in one unit"),
     ],
