@@ -18,13 +18,14 @@ from scipy.stats import multivariate_normal, norm
 import geomech
 from geomech.gaits import Sine
 from geomech.geometry.reconstruct import displacement
-from geomech.measured.midlines import fit, intervals, kinematics, predicted, reader, smooth, synthetic
+from geomech.measured.midlines import fit, intervals, kinematics, predicted, question, reader, smooth, synthetic
 from geomech.measured.midlines.kinematics import QUANTITIES
 from geomech.measured.midlines.trial import Trial
 from geomech.scenes import Numerics, Scene
 from geomech.studies.undulation import performance
 from geomech.systems import Swimmer
 from geomech.systems.swimmer import MEDIA
+from geomech.text import midlines as texts
 from rft import Backbone, Viscous
 from rft.refusal import Refusal
 
@@ -1018,3 +1019,88 @@ def test_frames_come_in_their_order(t, said, tmp_path):
     (tmp_path / "f.csv").write_text(csv_of("t," + ",".join(f"x{k},y{k}" for k in range(5)), rows))
     with pytest.raises(Refusal, match=said + ": sort the rows by time, one for each"):
         reader.read(tmp_path / "f.csv")
+
+
+# Words.
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "said"),
+    [
+        (0.34567, 0.0961, "0.346 +- 0.096"), (0.34567, 0.1, "0.35 +- 0.10"), (1234.5, 12.0, "1234 +- 12"),
+        (2.5, 340.0, "2 +- 340"),
+        (0.1234567891, 2e-12, "0.123456789 +- 0.000000000"), (0.34567, 0.0, "0.3457"), (0.34567, math.nan, "0.3457"),
+        (1e5, math.inf, "1e+05"),
+    ],
+)  # fmt: skip
+def test_values_have_the_digits_of_their_errors(value, error, said):
+    assert texts.pair(value, error).strip() == said and len(texts.pair(value, error).partition(" +-")[0]) >= 10
+
+
+def test_what_closes_the_gap_is_told_in_the_units_of_scenes():
+    of = lambda *numbers, unit="-": texts.closing_line(predicted.Closing("gamma0", numbers[0], unit, *numbers[1:]))
+    assert of(0.25, 0.5, 0.02, 0.01, 1.2) == "gamma0 = 0.25: 0.500 +- 0.020 gives the measured distance"
+    turned = of(0.25, 0.5, 0.02, 0.01, 1.2, unit="rad")
+    assert turned == "gamma0 = 14.32 deg: 28.6 +- 1.1 deg gives the measured distance"
+    none = of(0.25, math.nan, math.nan, 0.012345, 1.2, unit="rad")
+    assert none == "gamma0 = 14.32 deg: none from 0.707 to 68.8 deg gives the measured distance"
+    closing = predicted.Closing("gamma0", 0.25, "rad", math.nan, math.nan, 0.1, 1.2)
+    assert texts._numbers(closing)["value"] is None is texts._numbers(closing)["half_width"]
+
+
+def test_measured_and_predicted_agree_within_both_of_their_errors(fitted):
+    number = len(predicted.COMPARED)
+    of = lambda off: predicted.Comparison(
+        None, np.full(number, 0.5), np.full(number, 0.03), np.full(number, 0.5) + off, np.full(number, 0.04), None, ()
+    )
+    for off, said in (
+        (0.0499, "they agree"),
+        (-0.0499, "they agree"),
+        (0.0501, "they differ"),
+        (-0.0501, "they differ"),
+    ):
+        lines = texts._compared(of(off), dict.fromkeys(predicted.COMPARED, "BL"))
+        assert len(lines) == 2 + number and all(line.endswith(f"BL: {said}") for line in lines[2:])
+        assert lines[2].split()[:7] == ["speed", "0.500", "+-", "0.030", f"{0.5 + off:.3f}", "+-", "0.040"]
+
+
+def test_a_trial_is_told_in_lines(fitted):
+    result = question.result_of(fitted)
+    first, head, smoothed, level, *rows = texts.text(result).splitlines()
+    assert first == "synthetic: 4 full cycles of 30 points" and head == f"head: {fitted.head}" and len(rows) == 10
+    per_cycle = (len(fitted.curve.knots) - 12 + 1) / (fitted.trial.t[-1] * fitted.value("frequency")[0])
+    assert smoothed.startswith(
+        f"smoothed by {fitted.curve.modes} modes along the body and {per_cycle:.3g} knots a cycle, more"
+    )
+    noise = fitted.curve.noise / fitted.value("length")[0]
+    assert smoothed.endswith(f"noise of a point {noise:.2g} BL") and level == "with intervals of 95 % of cases:"
+    assert rows[0].split()[0::4] == ["frequency", "Hz"] and rows[-1].split()[0] == "wavelength"
+    short = dataclasses.replace(fitted, used=fitted.used[:3], level=0.9)
+    lines = texts.text(question.result_of(short)).splitlines()
+    assert (
+        lines[0] == "synthetic: 3 full cycles of 30 points; 1 with gaps left out"
+        and lines[3] == "with intervals of 90 % of cases:"
+    )
+    pixels = dataclasses.replace(fitted, trial=dataclasses.replace(fitted.trial, timed=False, unit=""))
+    assert [question.units_of(pixels)[x] for x in ("frequency", "length", "speed")] == ["1/frame", "", "BL/frame"]
+    metres = dataclasses.replace(fitted, trial=dataclasses.replace(fitted.trial, unit="m"))
+    assert [question.units_of(metres)[x] for x in ("frequency", "length", "speed")] == ["Hz", "m", "m/s"]
+
+
+def test_the_mean_cycle_and_the_times_of_cycles_are_those_of_the_curve(fitted):
+    result, cycles = question.result_of(fitted), fitted.cycles(fitted.curve)
+    headings = np.unwrap(np.angle(cycles.tangent), axis=-1)
+    headings -= headings.mean((1, 2), keepdims=True)
+    np.testing.assert_allclose(result["mean_cycle"].values, headings.mean(0), atol=1e-9)
+    raw = cycles.headings
+    np.testing.assert_allclose(result["mean_cycle"].error, raw.std(0, ddof=1) / 2, atol=1e-9)
+    np.testing.assert_allclose(result["phase"].values, np.pi * np.arange(1, 96, 2) / 48, rtol=1e-12)
+    times = kinematics.times(fitted.clock, fitted.clock.phase(fitted.curve), fitted.marks)
+    np.testing.assert_allclose(result["cycle_start"].values, times[:-1], atol=1e-9)
+    np.testing.assert_allclose(result["s"].values, np.arange(0.05, 1, 0.1), atol=1e-12)
+    n = len(QUANTITIES)
+    for name, k in (("slip_along", n), ("amplitude_along", n + 10)):
+        np.testing.assert_array_equal(result[name].values, fitted.intervals.value[k : k + 10])
+        np.testing.assert_array_equal(result[name].error, fitted.intervals.half_width[k : k + 10])
+    one = dataclasses.replace(fitted, used=fitted.used[:1])
+    assert question._mean_cycle(one)[-1].error is None
