@@ -159,7 +159,7 @@ def test_extremes_of_a_ccf_are_told_with_their_places_and_the_larger_error():
     field = field_of(lambda a, b: 2 * a - b, lambda a, b: -5e-13 + 0 * a, lambda a, b: a * b)
     error = dataclasses.replace(field, values=1e-3 * np.arange(3 * 132.0).reshape(3, 11, 12))
     head, x, y, theta = words._extremes(field, error)
-    assert head.split() == "component least at (rad) largest at (rad) +- error".split()
+    assert head.split() == ["component", "least", "at", "(rad)", "largest", "at", "(rad)", "+-", "error"]
     assert x.split() == ["x", "(m/rad2)", "-3", "-1.00,", "1.00", "4.2", "1.50,", "-1.20", "1.2e-01"]
     assert y.split() == ["y", "(m/rad2)", "zero"]
     assert theta.split() == ["theta", "(rad/rad2)", "-1.8", "1.50,", "-1.20", "1.5", "1.50,", "1.00", "4.0e-01"]
