@@ -7,7 +7,9 @@ import json
 import pickle
 import re
 import shutil
+import struct
 import warnings
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -1015,3 +1017,131 @@ def test_the_sign_is_that_of_loops_of_three_and_five_tenths_of_the_grid(zero, si
                 base.detected_sign(c)
     with pytest.raises(Refusal, match="does not tell the sign of A: say sign"):
         base.detected_sign(Connection(axes, 0 * A, np.zeros((3, 9, 7)), np.ones((3, 9, 7)), 3))
+
+
+# MATLAB files, byte by byte.
+
+
+def element(kind, data, order="<", small=False):
+    """An element of a file; a small one has up to four bytes in the place of its size."""
+    if small:
+        return struct.pack(f"{order}I", kind | len(data) << 16) + data.ljust(4, b"\0")
+    return struct.pack(f"{order}II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+
+def matrix(kind, shape, *parts, name=b"abc", flags=0, order="<", lead=None):
+    """The bytes of a matrix of a class and a shape, without its own tag."""
+    lead = lead or [
+        element(6, struct.pack(f"{order}II", kind | flags, 0), order),
+        element(5, struct.pack(f"{order}{len(shape)}i", *shape), order), element(1, name, order, small=len(name) < 5),
+    ]  # fmt: skip
+    return b"".join([*lead, *parts])
+
+
+def number(value=1.5, order="<"):
+    return element(
+        14, matrix(6, (1, 1), element(9, struct.pack(f"{order}d", value), order), name=b"", order=order), order
+    )
+
+
+@pytest.mark.parametrize("order", "<>")
+def test_matrices_of_numbers_and_texts_are_read_in_either_order_of_bytes(order):
+    read = lambda *args, **others: matlab._matrix(matrix(*args, **others, order=order), order, 1)
+    for kind, code, values in (
+        (9, "d", range(6)),
+        (7, "f", range(6)),
+        (3, "h", range(-3, 3)),
+        (2, "B", range(250, 256)),
+        (13, "Q", range(6)),
+    ):
+        data = element(kind, struct.pack(f"{order}6{code}", *values), order)
+        name, found = read(6, (2, 3), data)
+        assert (
+            name == "abc"
+            and found.tolist() == np.reshape(values, (2, 3), order="F").tolist()
+            and found.dtype.kind == ("f" if kind in (7, 9) else "iu"[code in "BQ"])
+        )
+    assert (
+        read(6, (1, 2), element(4, struct.pack(f"{order}2H", 7, 300), order, small=True), name=b"longer name")[0]
+        == "longer name"
+    )
+    end = "le" if order == "<" else "be"
+    for kind, raw in ((16, "\u00e4b".encode()), (17, "\u00e4b".encode(f"utf-16-{end}")),
+    (4, "\u00e4b".encode(f"utf-16-{end}")), (2, b"\xe4b"),
+                      (18, "\u00e4b".encode(f"utf-32-{end}"))):  # fmt: skip
+        assert read(4, (1, 2), element(kind, raw, order)) == ("abc", "\u00e4b")
+    assert read(6, (0, 3), element(9, b"", order))[1].shape == (0, 3)
+
+
+ONE = element(9, struct.pack("<d", 1.0))
+
+
+@pytest.mark.parametrize(
+    ("data", "found"),
+    [
+        (matrix(6, (1, 1), ONE, flags=0x0800), None), (matrix(6, (1,), ONE), None), (matrix(6, (1,) * 32, ONE), 32),
+        (matrix(6, (1,) * 33, ONE), None), (matrix(6, (-1, 1), ONE), None), (matrix(6, (1, 1), ONE, ONE), None),
+        (matrix(5, (1, 1), ONE), None),
+        (matrix(16, (1, 1), ONE), None), (matrix(15, (1, 1), ONE), 2), (matrix(6, (1, 1), element(8, b"12345678")), None),
+        (matrix(4, (1, 1), element(5, b"1234")), None), (matrix(6, (1, 2), ONE), "damaged"),
+        (matrix(6, (1, 1), element(9, b"1234567")), "damaged"),
+        (matrix(17, (1,), lead=[element(6, struct.pack("<II", 17, 0)), element(1, b"obj"), element(1, b"x")]), None),
+        (matrix(6, (), lead=[element(6, struct.pack("<II", 6, 0)), element(5, b"12345678")]), "damaged"),
+        (matrix(6, (), lead=[element(6, b"1234"), element(5, b"12345678"), element(1, b"a")]), "damaged"),
+        (matrix(6, (), lead=[element(6, struct.pack("<II", 6, 0)), element(5, b"123456"), element(1, b"a")]), "damaged"),
+    ],
+)  # fmt: skip
+def test_what_is_no_plain_array_is_skipped_and_what_does_not_fit_is_damaged(data, found):
+    if found == "damaged":
+        with pytest.raises(Refusal, match="^damaged$"):
+            matlab._matrix(data, "<", 1)
+        return
+    name, values = matlab._matrix(data, "<", 1)
+    assert (values is None) if found is None else values.ndim == found
+    assert name == ("obj" if data[8] == 17 else "abc")
+
+
+def test_cells_and_structs_hold_others_to_a_depth():
+    cell = matrix(1, (2, 1), number(1.5), element(14, b""))
+    name, values = matlab._matrix(cell, "<", 2)
+    assert name == "abc" and values.shape == (2, 1) and values[0, 0] == 1.5 and values[1, 0].shape == (0, 0)
+    with pytest.raises(Refusal, match="^damaged$"):
+        matlab._matrix(cell, "<", 1)
+    fields = element(5, struct.pack("<i", 4), small=True), element(1, b"ab\0\0c\0\0\0")
+    found = matlab._matrix(matrix(2, (1, 1), *fields, number(2.5), number(3.5)), "<", 2)[1]
+    assert {key: float(x.item()) for key, x in found.items()} == {"ab": 2.5, "c": 3.5}
+    assert matlab._matrix(matrix(2, (1, 2), *fields, *[number()] * 4), "<", 2)[1] is None
+    for bad in (
+        matrix(1, (2, 2), number()), matrix(1, (1, 1), ONE), matrix(2, (1, 1), *fields, number()), matrix(2, (1, 1), fields[0]),
+        matrix(2, (1, 1), element(5, struct.pack("<i", 0), small=True), fields[1], number()), matrix(2, (1,
+         1), *fields, ONE, ONE),
+        matrix(2, (1, 1), element(5, struct.pack("<i", -4), small=True), fields[1], number(), number()),
+        matrix(2, (1, 1), element(5, struct.pack("<i", 3), small=True), fields[1], number(), number()),
+        matrix(2, (1, 1), element(5, b"12", small=True), fields[1], number(), number()),
+    ):  # fmt: skip
+        with pytest.raises(Refusal, match="^damaged$"):
+            matlab._matrix(bad, "<", 2)
+
+
+def test_elements_fill_a_file_and_are_not_longer(monkeypatch):
+    both = element(1, b"abcde") + element(2, b"xy", small=True) + element(3, b"12345678")
+    assert list(matlab._elements(both, "<")) == [(1, b"abcde"), (2, b"xy"), (3, b"12345678")]
+    for bad in (both + b"1234567", both[:-1], struct.pack("<I", 1 | 5 << 16) + b"12345678", element(1, b"a")[:4]):
+        with pytest.raises(Refusal, match="^cut short$"):
+            list(matlab._elements(bad, "<"))
+    head, whole = b"MATLAB".ljust(124) + b"\x00\x01IM", element(14, matrix(6, (1, 1), ONE))
+    packed = lambda data: struct.pack("<II", 15, len(x := zlib.compress(data))) + x
+    assert matlab.arrays(head + whole)["abc"] == 1.0 == matlab.arrays(head + packed(whole) + packed(whole))["abc"]
+    assert matlab.arrays(head + element(14, b"") + element(9, b"12345678")) == {}
+    with pytest.raises(Refusal, match="^no MATLAB file of version 5 to 7$"):
+        matlab.arrays(b"MATLAB".ljust(124) + b"\x00\x02IM" + whole)
+    with pytest.raises(Refusal, match="^damaged$"):
+        matlab.arrays(head + element(15, b"no zip at all..."))
+    cut = zlib.compress(whole)[:-6]
+    with pytest.raises(Refusal, match="^cut short, or too large$"):
+        matlab.arrays(head + struct.pack("<II", 15, len(cut)) + cut)
+    monkeypatch.setattr(matlab, "LARGEST", 2 * len(whole) + 1)
+    assert matlab.arrays(head + packed(whole) * 2)["abc"] == 1.0
+    monkeypatch.setattr(matlab, "LARGEST", 2 * len(whole))
+    with pytest.raises(Refusal, match="^cut short, or too large$"):
+        matlab.arrays(head + packed(whole) * 2)
