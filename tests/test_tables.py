@@ -25,8 +25,9 @@ from geomech.gaits import Butterfly, Circle, Ellipse, Fourier
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
 from geomech.io import tables
-from geomech.io.tables import base, matlab, netcdf
+from geomech.io.tables import base, mat, matlab, netcdf
 from geomech.io.tables.base import checked_names
+from geomech.io.tables.mat import ERROR
 from geomech.scenes import Numerics, Scene
 from geomech.studies import accuracy, choose, estimate, fields, tiered
 from geomech.studies.single import single
@@ -1145,3 +1146,119 @@ def test_elements_fill_a_file_and_are_not_longer(monkeypatch):
     monkeypatch.setattr(matlab, "LARGEST", 2 * len(whole))
     with pytest.raises(Refusal, match="^cut short, or too large$"):
         matlab.arrays(head + packed(whole) * 2)
+
+
+def mat_with(monkeypatch, about=None, sign="+", order="", left_out=(), **changes):
+    """A table of 5 by 4 shapes from variables of a MATLAB file, as of ndgrid, with A_x1 = 1, A_x2 = 2 ... at the first."""
+    axes = np.linspace(-1, 1, 5), np.array([-0.5, 0.0, 0.2, 0.9])
+    shapes = np.meshgrid(*axes, indexing="ij")
+    plain = np.arange(20.0).reshape(5, 4)
+    found = {"alpha1": shapes[0], "alpha2": shapes[1]}
+    found |= {name: k + 0.1 * plain for k, name in enumerate(("Ax1", "Ax2", "Ay1", "Ay2", "Atheta1", "Atheta2"), 1)}
+    found |= {
+        "M11": 2 + plain,
+        "M12": 0.5 + 0 * plain,
+        "M22": 1 + plain,
+        mat.RESIDUAL: np.stack([plain, plain + 1, plain + 2]),
+    }
+    found |= {ERROR: 0.1 + np.zeros((3, 2, 5, 4)), **changes}
+    if about is not None:
+        found[mat.ABOUT] = json.dumps(about)
+    monkeypatch.setattr(mat, "variables", lambda raw, names: {k: x for k, x in found.items() if k not in left_out})
+    return mat.parse(b"", sign, order, "0f")
+
+
+def test_parts_of_a_mat_file_are_where_they_belong(monkeypatch):
+    about = {
+        "unit": "m",
+        "length": 0.3,
+        "interpolation": 2,
+        "frame": "mean",
+        "level": 0.9,
+        "power_degree": 1.5,
+        "sign": "-",
+        "shapes": ["a", "b"],
+    }
+    plain = np.arange(20.0).reshape(5, 4)
+    for sign, turn in (("", -1), ("-", -1), ("+", 1)):
+        held = mat_with(monkeypatch, about, sign)
+        c = held.connection
+        np.testing.assert_allclose(turn * c.A, np.arange(1, 7).reshape(3, 2, 1, 1) + 0.1 * plain, rtol=1e-12)
+        assert held.sign == ("+" if turn > 0 else "-")
+    np.testing.assert_array_equal(c.residual, [plain, plain + 1, plain + 2])
+    np.testing.assert_allclose(c.speed, np.sqrt((c.A**2).mean(1) + c.residual**2), rtol=1e-12)
+    np.testing.assert_array_equal(held.metric.M, [[2 + plain, 0.5 + 0 * plain], [0.5 + 0 * plain, 1 + plain]])
+    assert (c.degree, held.metric.degree, c.unit, c.length, held.length, held.unit) == (2, 2, "m", 0.3, 0.3, "m")
+    assert (held.frame, held.level, held.power_degree, held.sized, held.shapes) == ("mean", 0.9, 1.5, True, ("a", "b"))
+    assert (held.order, held.assumptions, held.sha256, held.body) == ("ndgrid", (), "0f", None)
+    assert (held.A_error == 0.1).all() and held.A_error.shape == (3, 2, 5, 4)
+    bare = mat_with(monkeypatch, left_out=("M12", mat.RESIDUAL, ERROR))
+    assert (bare.unit, bare.length, bare.sized, bare.frame, bare.level) == ("BL", 1.0, False, "that of the table", None)
+    assert bare.metric is bare.A_error is bare.power_degree is None and np.isnan(bare.connection.residual).all()
+    assert bare.connection.degree == 3 and bare.shapes == ("alpha_1", "alpha_2")
+    np.testing.assert_allclose(bare.connection.speed, np.sqrt((bare.connection.A**2).mean(1)), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("about", "sized", "degree", "power"),
+    [
+        ({"unit": "m", "length": 0.99e9, "interpolation": 1, "power_degree": 99.0}, True, 1, 99.0),
+        ({"unit": "m", "length": 1e9, "interpolation": 4, "power_degree": 100.0}, False, 3, None),
+        ({"unit": "BL", "length": 1.0, "interpolation": 0, "power_degree": 0.0}, True, 3, None),
+        ({"unit": "m", "length": 0.0, "interpolation": 3, "power_degree": 2}, False, 3, None),
+        ({"unit": "m", "length": 2, "frame": 3, "level": "most"}, False, 3, None), ([1, 2], False, 3, None),
+        ({"unit": "mm", "length": 2.0}, False, 3, None), ({"power_degree": 0.1}, False, 3, 0.1),
+    ],
+)  # fmt: skip
+def test_what_a_mat_file_says_of_itself_is_taken_where_it_makes_sense(about, sized, degree, power, monkeypatch):
+    held = mat_with(monkeypatch, about)
+    size = (about["unit"], about["length"]) if sized else ("BL", 1.0)
+    assert (held.sized, held.unit, held.length, held.connection.degree, held.power_degree) == (
+        sized,
+        *size,
+        degree,
+        power,
+    )
+    assert held.frame == "that of the table" and held.level is None
+
+
+GRID = np.zeros((5, 4))
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"order": "meshgrid"}, "has arrays that run as ndgrid's: drop order"), ({"order": "ndgrid"}, ""),
+        ({"alpha1": np.linspace(0, 1, 5)[:, None], "alpha2": np.linspace(0, 1, 4)[None]},
+         "has alpha1 and alpha2 as rows, which leave the"),
+        ({"alpha1": np.linspace(0, 1, 5)[:, None], "alpha2": np.linspace(0, 1, 4)[None], "order": "ndgrid"}, ""),
+        ({"alpha1": np.linspace(0, 1, 5)[:, None], "alpha2": np.linspace(0, 1, 4)[None], "order": "meshgrid"},
+         "has Ax1 of shape (5, 4) where"),
+        ({"alpha1": GRID[:, :3]}, "has alpha1 (5, 3) and alpha2 (5, 4), which span no grid"),
+        ({"M11": 0.25 / (1 + np.arange(20.0).reshape(5, 4))}, "has M11, M12 and M22 that are no metric at"),
+        ({"M11": 0.26 / (1 + np.arange(20.0).reshape(5, 4))}, ""),
+        ({"M11": -1 - GRID, "M22": -1 - GRID}, "has M11, M12 and M22 that are"),
+        ({"M22": GRID}, "has M11, M12 and M22 that are no metric at"),
+        ({"M12": GRID[:4]}, "has M12 of shape (4, 4) where alpha1 and alpha2"),
+        ({"left_out": ("M11",), "M12": GRID[:4]}, ""),
+        ({"left_out": ("Ay1",)}, "has no Ay1: a connection is alpha1, alpha2, Ax1"),
+        (dict.fromkeys(("Ax1", "Ax2", "Ay1", "Ay2", "Atheta1", "Atheta2"), GRID), "has a connection that is zero everywhere"),
+        ({ERROR: np.zeros((3, 2, 4, 5))}, "has geomech_A_error of shape (3, 2, 4, 5) where A has (3, 2, 5, 4)"),
+        ({ERROR: "none"}, ""),
+        ({mat.RESIDUAL: np.zeros((3, 4, 5))}, ""),
+        ({mat.RESIDUAL: np.full((3, 5, 4), np.inf)}, "has geomech_fit_residual that is not finite"),
+        ({"alpha1": 3.1 * np.linspace(-2, 2, 5)[:, None] + GRID}, ""),
+        ({"alpha1": 3.2 * np.linspace(-2, 2, 5)[:, None] + GRID}, "has alpha1 up to"),
+        ({"alpha1": 3.2 * np.linspace(-2, 2, 5)[:, None] + GRID, "about": {}}, ""),
+        ({"alpha1": np.linspace(-1, 1, 5)[:, None] + GRID + 2e-9 * np.arange(4)},
+         "has alpha1 and alpha2 that span no grid: one must"),
+        ({"alpha1": np.linspace(-1, 1, 5)[:, None] + GRID + 2e-10 * np.arange(4)}, ""),
+    ],
+)  # fmt: skip
+def test_parts_of_a_mat_file_fit_each_other_or_are_refused(changes, said, monkeypatch):
+    if not said:
+        mat_with(monkeypatch, **changes)
+        return
+    with pytest.raises(Refusal) as found:
+        mat_with(monkeypatch, **changes)
+    assert str(found.value).startswith(said)
