@@ -1479,3 +1479,152 @@ def test_a_period_is_found_in_two_cycles_and_a_bit():
         assert phase.period_of(t, alpha) == pytest.approx(found, abs=0.02)
     still = np.ones((50, 2))
     assert phase.period_of(np.arange(50.0), still) == 0.0
+
+
+# The regression against least squares.
+
+THREE = Loop(np.array([[0.1, 0.5, 0.1], [0.0, -0.2, 0.4], [-0.1, 0.3, 0.2]]))
+
+
+@pytest.fixture(params=[UNEVEN, THREE], ids=["two", "three"])
+def regressed(request):
+    """A gait, and twelve cycles of samples about it whose velocity is random."""
+    rng, loop = np.random.default_rng(0), request.param
+    d, t = len(loop.coefficients), np.sort(rng.uniform(0, 24 * np.pi, 900))
+    alpha, rate = loop.shape(t) + 0.1 * rng.normal(size=(900, d)), loop.shape(t, 1) + 0.3 * rng.normal(size=(900, d))
+    samples = samples_of(loop, t, alpha, rate, rng.normal(size=(900, 3)))
+    return loop, samples._replace(cycle=(t / (2 * np.pi)).astype(int))
+
+
+def columns_one_by_one(loop, s, harmonics, varies, second):
+    """Products of a rate, of deviations and of a wave, as they stand in the series of xi."""
+    wave = lambda k: (lambda t: np.sin((k + 1) // 2 * t)) if k and k % 2 == 0 else (lambda t: np.cos((k + 1) // 2 * t))
+    along = (s.rate * loop.shape(s.phase, 1)).sum(1) / (loop.shape(s.phase, 1) ** 2).sum(1)
+    rates = list(s.rate.T) if varies == regression.RATES else [along]
+    off, one = s.alpha - loop.shape(s.phase), np.ones(len(s.phase))
+    normal = (
+        [(off * n).sum(1) for n in np.moveaxis(loop.normals(s.phase), 2, 0)] if varies != regression.NOTHING else []
+    )
+    first = [[one, *normal], 2 * harmonics + 1]
+    pairs = [[a * b for a, b in itertools.combinations_with_replacement(normal, 2)], 2 * second + 1]
+    return np.stack(
+        [u * x * wave(k)(s.phase) for some, count in (first, pairs) for u in rates for x in some for k in range(count)],
+        1,
+    )
+
+
+@pytest.mark.parametrize("varies", range(3))
+def test_the_regression_without_noise_is_that_of_least_squares(varies, regressed):
+    loop, s = regressed
+    equations = regression.sums(loop, s, 3, varies)
+    everything = np.ones(12)
+    for some, harmonics, second in (
+        (equations, 3, 2),
+        (equations.truncated(2), 2, 2),
+        (equations.plain, 3, -1),
+        (equations.plain.truncated(1), 1, -1),
+    ):
+        given = columns_one_by_one(loop, s, harmonics, varies, second)
+        np.testing.assert_allclose(
+            regression.columns(loop, s.phase, s.alpha, s.rate, harmonics, varies, second), given, atol=1e-12
+        )
+        wanted = np.linalg.lstsq(given, s.xi, rcond=None)[0]
+        np.testing.assert_allclose(some.solved(everything), wanted, atol=1e-7)
+        left = [((s.xi - given @ wanted)[s.cycle == k] ** 2).sum(0) for k in range(12)]
+        np.testing.assert_allclose(some.residual(wanted), left, atol=1e-7)
+        weight = 1.0 * (np.arange(12) != 4)
+        kept = s.cycle != 4
+        np.testing.assert_allclose(
+            some.solved(weight), np.linalg.lstsq(given[kept], s.xi[kept], rcond=None)[0], atol=1e-7
+        )
+    without, (found, errors) = equations.plain, regression.solution(equations.plain)
+    each = np.array([without.solved(1.0 * (np.arange(12) != k)) for k in range(12)]) - found
+    np.testing.assert_allclose(errors, each, atol=1e-12)  # of so few cycles none are alike
+    fold = np.arange(12) % 5
+    square = [without.residual(without.solved(1.0 * (fold != k)))[fold == k].sum(0) for k in range(5)]
+    np.testing.assert_allclose(unknowns.unpredicted(without), np.sum(square, 0), rtol=1e-9)
+
+
+def test_solutions_are_a_series_about_the_gait(regressed):
+    """A and its slopes at all rates; along the gait alone, they are such as give the same velocity there."""
+    loop, s = regressed
+    d = len(loop.coefficients)
+    equations = regression.sums(loop, s, 3, regression.RATES)
+    solution = np.random.default_rng(1).normal(size=(2, equations.matrix.shape[1], 3))
+    for found, one in zip(equations.split(solution, loop), solution):
+        known = series_about(loop, 3, A=found[:, :, 0], slope=found[:, :, 1:])
+        w, terms = known.terms(s.phase, s.alpha, s.rate)
+        xi = columns_one_by_one(loop, s, 3, regression.RATES, -1) @ one[: d * d * 7]
+        np.testing.assert_allclose(np.einsum("ijmk,nk,njm->ni", known.combined, w, terms), xi, atol=1e-10)
+    for varies, kinds in ((regression.SHAPES, d), (regression.NOTHING, 1)):
+        equations = regression.sums(loop, s, 5, varies)
+        solution = np.random.default_rng(1).normal(size=(equations.matrix.shape[1], 3))
+        first = solution[: kinds * 11].reshape(kinds, 11, 3)
+        first[:, 7:] = 0  # harmonics that the loop's own take beyond the last
+        solution[: kinds * 11] = first.reshape(-1, 3)
+        found = equations.split(solution, loop)
+        assert found.shape == (3, d, d, 11) and (found[:, :, kinds:] == 0).all()
+        along = np.einsum("tijm,tj->tim", series(found, s.phase), loop.shape(s.phase, 1))
+        np.testing.assert_allclose(along[..., :kinds], np.einsum("tw,mwi->tim", waves(s.phase, 5), first), atol=0.05)
+
+
+def test_cycles_are_counted_in_blocks_and_their_errors_by_student(regressed):
+    _, s = regressed
+    assert [(b.start, b.stop) for b in regression.blocks(s)] == [
+        (np.flatnonzero(s.cycle == k)[0], np.flatnonzero(s.cycle == k)[-1] + 1) for k in range(12)
+    ]
+    five = regression.blocks(s, 5)
+    whole = [sorted({*s.cycle[b].tolist()}) for b in five]
+    assert (
+        [k for some in whole for k in some] == list(range(12))
+        and sorted(map(len, whole)) == [2, 2, 2, 3, 3]
+        and five[-1].stop == 900
+    )
+    for count, level, found in (
+        (8, 0.95, 2.2010),
+        (64, 0.95, 2.2010),
+        (15, 0.9, 1.7189),
+        (16, 0.9, 1.7959),
+        (128, 0.95, 2.0687),
+        (1, 0.5, 0.8165),
+    ):
+        assert regression.factor(count, level) == pytest.approx(found, abs=1e-4)  # tables of Student's t
+
+
+@pytest.mark.parametrize(
+    ("header", "picked"),
+    [
+        ("t a2 a1 a10 x y heading", "t a1 a2 a10 x y heading"),
+        ("time q_2_deg q_1_deg yaw y_m x_m", "time q_1_deg q_2_deg x_m y_m yaw"),
+        ("phase angle1 angle2 x y theta", "phase angle1 angle2 x y theta"),
+        ("phase time_s joint1_rad joint2_rad x y heading_deg",) * 2,
+        ("alpha_1 alpha_2 a1 a2 x y heading t", "t alpha_1 alpha_2 x y heading"),
+        ("t_s b1 b2 joint3 joint1 x y yaw", "t_s joint1 joint3 x y yaw"),
+    ],
+)  # fmt: skip
+def test_columns_are_known_by_their_names(header, picked):
+    header, picked = (tuple(x.split()) for x in (header, picked))
+    picked = tuple(x for x in picked if x != "phase") if "time_s" in picked else picked
+    assert measured_log._picked("log.csv", 1, header, []) == picked
+
+
+@pytest.mark.parametrize(
+    ("header", "columns", "said"),
+    [
+        ("t a1 a2 x y", "", "log.csv, line 3: no column heading: it has 't, a1, a2, x, y'; name them t,alpha_1"),
+        ("t b1 b2 x y yaw", "", "log.csv, line 3: no columns of joint angles, and a gait is a loop of two or more: it has"),
+        ("t a1 x y yaw", "", "log.csv, line 3: one column of joint angles, and a gait is"),
+        ("t a1 a2 a1 x y yaw", "", "log.csv, line 3: the column 'a1' is"),
+        ("t", "", "log.csv, line 3: no header of columns: give a CSV file"),
+        ("t;a1;a2", "", "log.csv, line 3: no header of columns; columns must be"),
+        ("t a b x y c", "t a b x y d", "log.csv, line 3: no column 'd'; it has 't, a, b, x, y, c'"),
+        ("t a x y c", "t a x y c", "log.csv: columns are"),
+        ("t a b x y c", "t a a x y c",
+         "log.csv: columns are those of t, two joint angles or more, x, y and heading, in this order"),
+        ("t_ms a b x y c", "t_ms a b x y c", "log.csv: t_ms is in ms by its name: give t in s"),
+    ],
+)  # fmt: skip
+def test_columns_that_are_not_there_are_named(header, columns, said):
+    with pytest.raises(Refusal) as found:
+        measured_log._picked("log.csv", 3, tuple(header.split()), columns.split())
+    assert str(found.value).startswith(said)
