@@ -1049,6 +1049,9 @@ def test_logs_that_are_made_are_what_they_say():
     np.testing.assert_allclose(made.pose[1:], np.stack([way.real, way.imag, heading[16::16]], -1), atol=2e-5)
 
     second = lambda alpha, rate: np.stack([0 * rate[:, 0], 0 * rate[:, 0], rate[:, 1]], -1)
+    usual = {"spread": 0.05, "noise": 1e-3, "pose_noise": 1e-3, "frequency": 1.0, "jitter": 0.02, "seed": 0}
+    for found, wanted in zip(synthetic.made(second, GAIT), synthetic.made(second, GAIT, 60, 60, **usual)):
+        np.testing.assert_array_equal(found, wanted)
     many = lambda **other: synthetic.made(second, GAIT, cycles=300, samples=8, seed=3, **{**plain, **other})
     still, off = many(), many(noise=0.03, pose_noise=0.07)
     np.testing.assert_allclose((off.alpha - still.alpha).std(0), 0.03, rtol=0.04)

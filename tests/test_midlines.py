@@ -569,6 +569,17 @@ def test_trials_that_are_made_are_what_they_say():
     )  # half a cycle
     with pytest.raises(Refusal, match="frames"):
         synthetic.made(swimmer, 3.0, 7, 6, **plain)
+    usual = {
+        "swing": 0.9,
+        "waves": 1.1,
+        "frequency": 1.0,
+        "noise": 0.01,
+        "spread": 0.05,
+        "jitter": 0.02,
+        "heading": 0.5,
+    }
+    wanted = synthetic.made(swimmer, 8.0, 40, 30, **usual, bend=0.0, seed=0)
+    np.testing.assert_array_equal(synthetic.made(swimmer).points, wanted.points)
 
 
 def one_cycle(swimmer, start, swing, waves, bend):
