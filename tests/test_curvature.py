@@ -1,6 +1,7 @@
 """The CCF of any pair of joints, its estimated error near kinks, and what a file says of both."""
 
 import dataclasses
+import types
 
 import numpy as np
 import pytest
@@ -8,9 +9,12 @@ import sympy as sp
 import xarray
 
 from geomech import scenes, symbolic
+from geomech.core.variables import Result, Variable
 from geomech.geometry import connection, curvature
+from geomech.geometry.field import Field
 from geomech.studies import fields
 from geomech.studies.study import Study
+from geomech.text import ccf as words
 from geomech.tiers import fitted
 from rft import se2
 
@@ -118,3 +122,67 @@ def test_files_have_values_units_and_conventions(tmp_path, length, unit):
     assert said["pair_of_ccf"].startswith("CCF_12 = dA_2 / dalpha_1 - dA_1 / dalpha_2")
     assert "counter-clockwise" in said["sign_of_ccf"]
     assert "x, y, theta" in said["components"]
+
+
+AXES = np.linspace(-1.0, 1.5, 11), np.linspace(-1.2, 1.0, 12)
+
+
+def field_of(x, y=0.0, theta=0.0):
+    """A CCF on AXES, x and y in metres."""
+    values = [
+        np.broadcast_to(f(*np.meshgrid(*AXES, indexing="ij")) if callable(f) else f, (11, 12)) for f in (x, y, theta)
+    ]
+    return Field(AXES, np.array(values, float), 3, unit="m", length=0.3)
+
+
+@pytest.mark.parametrize(
+    ("x", "middle", "said"),
+    [
+        (lambda a, b: 1 + a**2, (0.0, 0.0), "none, x has one sign"),
+        (lambda a, b: -1 - b**2, (0.0, 0.0), "none, x has one sign"),
+        (lambda a, b: (a - 0.25) ** 2 + (b + 0.1) ** 2 - 0.5**2, (0.25, -0.1), "0.5 to 0.5 rad from the gait's middle"),
+        (lambda a, b: (a - 0.25) ** 2 + (b + 0.1) ** 2 - 0.5**2, (0.1, 0.1), "0.25 to 0.75 rad from the gait's middle"),
+        (lambda a, b: 0.405 - a, (0.0, 0.0), "0.4 to 0.96 rad from the gait's middle, in 38 % of directions"),
+        (lambda a, b: a - 1.2, (0.0, 0.0), "further than 1 rad from the gait's middle"),
+        (lambda a, b: b + 1.1, (0.5, 0.1), "further than 0.9 rad from the gait's middle"),
+        (lambda a, b: 1e-13 * a, (0.0, 0.0), None), (lambda a, b: np.where(a < -0.9, np.nan, a), (0.0, 0.0), None),
+    ],
+)  # fmt: skip
+def test_the_zero_line_is_looked_for_around_the_gaits_middle(x, middle, said):
+    """Up to the nearest edge, in 72 directions and 200 steps."""
+    field = field_of(x)
+    field = dataclasses.replace(field, values=np.where(np.isnan(field.values[0]), np.nan, field.values))
+    assert words._zero_line(field, np.array(middle)) == ([] if said is None else [f"zero line of x: {said}"])
+
+
+def test_extremes_of_a_ccf_are_told_with_their_places_and_the_larger_error():
+    field = field_of(lambda a, b: 2 * a - b, lambda a, b: -5e-13 + 0 * a, lambda a, b: a * b)
+    error = dataclasses.replace(field, values=1e-3 * np.arange(3 * 132.0).reshape(3, 11, 12))
+    head, x, y, theta = words._extremes(field, error)
+    assert head.split() == ["component", "least", "at", "(rad)", "largest", "at", "(rad)", "+-", "error"]
+    assert x.split() == ["x", "(m/rad2)", "-3", "-1.00,", "1.00", "4.2", "1.50,", "-1.20", "1.2e-01"]
+    assert y.split() == ["y", "(m/rad2)", "zero"]
+    assert theta.split() == ["theta", "(rad/rad2)", "-1.8", "1.50,", "-1.20", "1.5", "1.50,", "1.00", "4.0e-01"]
+    seen = dataclasses.replace(field, values=np.where(field.values[0] > 4, np.nan, 3 * field.values))
+    assert list(words._extremes(seen, error))[1].split()[5:] == ["12", "1.50,", "-1.00", "1.2e-01"]
+    assert list(words._extremes(seen, error))[2].split()[:3] == ["y", "(m/rad2)", "-1.5e-12"]
+
+
+@pytest.mark.parametrize(
+    ("zero", "said"),
+    [
+        ((), "  x 0.1235 +- 0.002 m, y -0.02 +- 0.0003 m, heading 0 +- 0.04 rad"),
+        (("x", "heading"), "  y -0.02 +- 0.0003 m; x and heading: zero by symmetry"),
+        (("x", "y", "heading"), "  x, y and heading: zero by symmetry"),
+    ],
+)  # fmt: skip
+def test_what_a_gait_encloses_is_told_with_its_error(zero, said):
+    numbers = (("x", 0.123456, 2e-3, "m"), ("y", -0.02, 3e-4, "m"), ("heading", -1e-12, 0.04, "rad"))
+    moved = [Variable(name, ("tier", "amplitude"), [[x]], unit, error=[[e]]) for name, x, e, unit in numbers]
+    table = Result(
+        "displacement", (*moved, Variable("amplitude", ("amplitude",), [0.75])), {"zero_by_symmetry": list(zero)}
+    )
+    first, second = words._integral(types.SimpleNamespace(enclosed=table))
+    assert first == "integral over the scene's gait, of amplitude 0.75 (the area tier):"
+    assert second == said
+    assert [*words._integral(types.SimpleNamespace(enclosed=None))] == []

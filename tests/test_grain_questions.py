@@ -14,6 +14,7 @@ from geomech.scenes import drag
 from geomech.studies import grain_swim, grains
 from geomech.studies.calibration import Calibration
 from geomech.text import drag_grains
+from geomech.text import grain_swim as swim_text
 from rft import EndCaps, Granular
 from rft.calibrate import fit
 from rft.drag import Rod, rod_drag
@@ -108,13 +109,29 @@ def test_a_drag_is_a_file_that_fit_medium_reads(towed, tmp_path):
     np.testing.assert_allclose(law.values[[0, 1, 3]], [3.1, 0.3, 1.7], rtol=2e-3)
     words = text.text(result)
     assert "rod 14 x 180 mm, 25.5 mm deep, in 2 beds of 16,225 grains, packing 0.600" in words
-    assert "      0   2.05 +- 0.05" in words and "e = 1.70 of both together" in words
-    assert max(map(len, words.splitlines())) < 100
+    rows = words.splitlines()
+    assert max(map(len, rows)) < 100 and len(rows) == 14
+    assert (
+        " ".join(rows[6].split()) == "65 0.87 +- 0.02 7.87 +- 0.19 96 +- 2 35 +- 1 500 +- 0"
+    )  # of 2.0 N/m and 5 % more
+    assert " ".join(rows[8].split()) == "C 3.1, 2.91 to 3.29 with 95 %"
+    assert " ".join(rows[9].split()) == "gamma0 17.2, 15.9 to 18.4 degrees with 95 %"
+    assert rows[13] == "ends: e = 1.70 of both together; largest overlap 0.040 grain diameters"
     one_bed = text.text(dataclasses.replace(question, beds=1).ask())
     assert "25.5 mm deep, in a bed of 16,225 grains, packing 0.600; +- error in time" in one_bed
     numbers = text.numbers(result)
     assert numbers["law"]["C"] == pytest.approx(3.1, rel=2e-3) and numbers["law_errors"]["end_caps"] > 0
     files.write_drag(result, tmp_path)
+    told = (tmp_path / "drag.csv").read_text().splitlines()
+    for line, said in (
+        (0, "geomech drag-grains --length 0.18 --radius 0.007 --speed 0.2 --angles 0,10,20,40,65,90 --beds 2 --seed 4"),
+        (1, "mean after 17.5 mm of travel"),
+        (2, "grains 6 mm +-7 %, density 1030 kg/m^3, packing 0.6000; rod 14 mm diameter x 180 mm"),
+        (2, ", axis 25.50 mm deep, 0.2 m/s"),
+        (4, "16225 grains in 300 mm by 300 mm, periodic; time step 98 us; largest overlap 0.040"),
+        (11, "65,0.1521,1.3824,0.0935,0.0339,0.5000,4,0.0000"), (17, "65,0.1597,1.4516,0.0982,0.0356,0.5000,5,0.0000"),
+    ):  # fmt: skip
+        assert said in told[line]
     read = drag.read(tmp_path / "drag.csv")
     assert read.sizes == pytest.approx({"radius": 0.007, "length": 0.18, "depth": 0.0255, "density": 618.0})
     np.testing.assert_allclose(read.rows[1:3], 0.18 * result["flank"].values.reshape(2, -1), atol=6e-5)
@@ -181,6 +198,17 @@ def test_a_swim_stands_beside_the_tiers(monkeypatch, tmp_path):
     alpha, _ = experiment.motion.joint_angles(0.25)
     np.testing.assert_allclose(alpha, scene.gait.shape(0.0), atol=1e-12)  # full grown, at phase 0
     assert result["method"].values.tolist()[-3:] == ["direct", grain_swim.GRAINS_LAW, "grains"]
+    words = text.text(result).splitlines()
+    assert words[0] == "scene in 100 grains, seed 1: body 300 mm long, 18 mm wide, 2 Hz"
+    assert " ".join(words[7].split()) == "grains 0.0796 +- 0.0000 0.0080 +- 0.0000 0.2000 +- 0.0000"
+    assert " ".join(words[8].split()) == "cycle 1 0.0796 0.0080 0.2000" and words[9].split()[:2] == ["cycle", "2"]
+    assert words[-1] == "work 0.25 J a cycle; packing 0.600; largest overlap 1.000 of a grain"
+    motion = swim_text.csv(result).splitlines()
+    assert motion[0] == "# geomech grains scene --cycles 2 --seed 1 --length 0.3 --radius 0.009" and len(motion) == 1002
+    assert motion[1] == "t,x,y,theta,alpha_1,alpha_2,F_x,F_y,F_z,M,work,kinetic"
+    row, theta = np.array(motion[-1].split(","), float), 0.4 * 1.25 + 0.3
+    np.testing.assert_allclose(row[[0, 1, 3, 10]], [1.25, 0.1201 * np.sin(theta), theta, 0.625], rtol=2e-3)
+    np.testing.assert_allclose(row[4:6], experiment.motion.joint_angles(1.25)[0], atol=1e-5)
     np.testing.assert_allclose(result["cycle_heading"].values, 0.2)
     np.testing.assert_allclose(np.hypot(result["cycle_x"].values, result["cycle_y"].values), 0.08, rtol=1e-6)
     np.testing.assert_allclose(result["cycle_y"].values, 0.08 * np.sin(0.1), rtol=1e-3)

@@ -6,6 +6,7 @@ import itertools
 import json
 import math
 import re
+import warnings
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ import xarray
 from commands import geomech as command
 from scipy.interpolate import CubicSpline
 from scipy.io import loadmat
+from scipy.special import ive
 
 import geomech
 import rft
@@ -24,11 +26,15 @@ from geomech.geometry.connection import Connection
 from geomech.geometry.curvature import ccf
 from geomech.geometry.plane import interpolated_plane
 from geomech.geometry.reconstruct import displacement
-from geomech.geometry.tube import Loop, Tube, series, waves
+from geomech.geometry.tube import Loop, TaylorSeries, Tube, series, waves
 from geomech.io import tables
 from geomech.io.results import write_netcdf
 from geomech.io.tables.mat import ERROR
-from geomech.measured import cycles, phase, regression, results, smooth, synthetic, unknowns
+from geomech.measured import cycles, phase, plausibility, regression, results, smooth, synthetic, unknowns
+from geomech.measured import fit as fitted_parts
+from geomech.measured import log as measured_log
+from geomech.measured import residual as measured_residual
+from geomech.measured import spread as measured_spread
 from geomech.scenes import Scene, load
 from geomech.studies import fields
 from geomech.studies.single import single
@@ -503,6 +509,12 @@ def test_unknowns_are_half_of_what_tells_them_at_most(joints):
         first, second = unknowns.afforded(joints, most, varies, size)
         count = regression.columns(loop, np.zeros(1), alpha, alpha, first, varies, second).shape[1]
         assert 1 <= first <= most and (count <= size / 2 or (first, second) == (1, -1))
+        more = regression.columns(loop, np.zeros(1), alpha, alpha, first + 1, varies, second).shape[1]
+        assert first == most or more > size / 2
+        if second < 2:  # more of the second order would be too much beside two harmonics, or four
+            least = min(2 if second < 0 else 4, most)
+            more = regression.columns(loop, np.zeros(1), alpha, alpha, least, varies, second + 1).shape[1]
+            assert more > size / 2
     assert unknowns.afforded(joints, 12, regression.RATES, 1e5) == (12, 2)
 
 
@@ -1021,3 +1033,604 @@ def test_the_picture_shows_all_there_is():
     fig = measured_gait.draw(numbers)
     labels = " ".join(ax.get_xlabel() + ax.get_ylabel() for ax in fig.axes)
     assert "BL/rad" in labels and "x predicted (BL)" in labels and "heading logged (rad)" in labels
+
+
+# Parts of the fit against closed forms.
+
+
+def test_logs_that_are_made_are_what_they_say():
+    """Without what is random, the path of a body whose A is constant; then the sizes of all that is random."""
+    A = np.array([[0.2, -0.1], [0.05, 0.3], [0.15, 0.4]])
+    plain = {"spread": 0.0, "noise": 0.0, "pose_noise": 0.0, "jitter": 0.0, "frequency": 2.0}
+    made = synthetic.made(lambda alpha, rate: rate @ A.T, GAIT, cycles=3, samples=30, **plain)
+    np.testing.assert_allclose(made.t, np.arange(91) / 60, atol=1e-12)
+    np.testing.assert_allclose(made.phase, 4 * np.pi * made.t, atol=1e-9)
+    np.testing.assert_allclose(made.alpha, GAIT.shape(made.phase), atol=1e-9)
+    fine = GAIT.shape(np.linspace(0, 6 * np.pi, 90 * 16 + 1))
+    turn = np.exp(1j * (heading := (fine - fine[0]) @ A[2]))
+    way = np.cumsum((turn[1:] + turn[:-1]) / 2 * (np.diff(fine, axis=0) @ (A[0] + 1j * A[1])))[15::16]
+    np.testing.assert_allclose(made.pose[1:], np.stack([way.real, way.imag, heading[16::16]], -1), atol=2e-5)
+
+    second = lambda alpha, rate: np.stack([0 * rate[:, 0], 0 * rate[:, 0], rate[:, 1]], -1)
+    usual = {"spread": 0.05, "noise": 1e-3, "pose_noise": 1e-3, "frequency": 1.0, "jitter": 0.02, "seed": 0}
+    for found, wanted in zip(synthetic.made(second, GAIT), synthetic.made(second, GAIT, 60, 60, **usual)):
+        np.testing.assert_array_equal(found, wanted)
+    many = lambda **other: synthetic.made(second, GAIT, cycles=300, samples=8, seed=3, **{**plain, **other})
+    still, off = many(), many(noise=0.03, pose_noise=0.07)
+    np.testing.assert_allclose((off.alpha - still.alpha).std(0), 0.03, rtol=0.04)
+    np.testing.assert_allclose((off.pose - still.pose).std(0), 0.07, rtol=0.04)
+    varied = many(spread=0.05, jitter=0.02)
+    np.testing.assert_allclose(varied.pose[:, 2], varied.alpha[:, 1] - varied.alpha[0, 1], atol=2e-4)
+    apart = varied.alpha - GAIT.shape(varied.phase)
+    np.testing.assert_allclose(apart.std(0), 0.05, rtol=0.06)
+    assert np.abs(apart.mean(0)).max() < 0.01
+    pace = np.diff(varied.phase) * 8 / (2 * np.pi) - 1
+    assert pace.std() == pytest.approx(0.02, rel=0.1) and abs(pace.mean()) < 2e-3
+    alike = lambda x, rows: (x[rows:] * x[:-rows]).mean() / (x**2).mean()
+    for x, rows in ((apart[:, 0], 4), (apart[:, 1], 4), (pace, 16)):  # twice the width of the filter
+        assert alike(x, rows) == pytest.approx(math.exp(-1), abs=0.1)
+
+
+@pytest.mark.parametrize(("name", "least"), [("cycles", 2), ("samples", 8), ("seed", 0)])
+def test_logs_that_cannot_be_made_are_refused(name, least):
+    none = lambda alpha, rate: np.zeros((len(rate), 3))
+    synthetic.made(none, GAIT, **{"cycles": 3, "samples": 9, name: least})
+    for wrong in (least - 1, least + 0.5):
+        with pytest.raises(Refusal, match=name):
+            synthetic.made(none, GAIT, **{"cycles": 3, "samples": 9, name: wrong})
+
+
+UNEVEN = Loop(np.array([[0.1, 0.7, 0.2], [-0.2, -0.1, 0.4]]))  # an ellipse
+EVEN = Loop(np.array([[0.1, 0.6, 0.0], [-0.2, 0.0, 0.6]]))  # a circle
+
+
+def test_what_is_not_known_across_a_gait_is_as_large_as_what_is_along_it():
+    """Of an ellipse, whose rate and its normal are series of one harmonic."""
+    t, A = 2 * np.pi * np.arange(60) / 60, np.zeros((3, 2, 2, 7))
+    A[:, :, 0] = np.random.default_rng(0).normal(size=(3, 2, 7))
+    rate = UNEVEN.shape(t, 1)
+    speed = np.linalg.norm(rate, axis=1)
+    size = np.sqrt(((np.einsum("tij,tj->ti", series(A[:, :, 0], t), rate) / speed[:, None]) ** 2).mean(0))
+    rate, extent = rate / np.sqrt((speed**2).mean()), math.sqrt(0.7**2 + 0.2**2 + 0.1**2 + 0.4**2)
+    normal = np.stack([-rate[:, 1], rate[:, 0]], -1)
+    for varies, kinds in (
+        (regression.SHAPES, [(normal, 0, 1), (normal, 1, extent)]),
+        (regression.NOTHING, [(normal, 0, 1), (normal, 1, extent), (rate, 1, extent)]),
+    ):
+        errors = regression.unknown(UNEVEN, A, varies)
+        assert errors.shape == (3 * len(kinds), 3, 2, 2, 7)
+        for error, (i, (direction, k, by)) in zip(errors, itertools.product(range(3), kinds)):
+            wanted = np.zeros((60, 3, 2, 2))
+            wanted[:, i, :, k] = size[i] * direction / by
+            np.testing.assert_allclose(series(error, t), wanted, atol=5e-3 * size[i])
+
+
+def von_mises(n, width=0.3):
+    """What averages over a width leave of cos(n t)."""
+    return ive(n, 1 / width**2) / ive(0, 1 / width**2)
+
+
+def samples_of(loop, t, alpha, rate, xi, halves=None, xi_halves=None):
+    halves = halves or ((alpha, rate),) * 2
+    return regression.Samples(t, np.zeros(len(t), int), alpha, rate, xi, halves, xi_halves or (xi, xi))
+
+
+def test_the_extent_of_the_data_is_their_covariance_across_the_gait():
+    """Noise that one half has and the other has not is no extent, nor what is less than a fiftieth of the gait's size."""
+    t = np.repeat(2 * np.pi * np.arange(256) / 256, 4)
+    one, other, noise = (np.tile(x, 256) for x in ([1, 1, -1, -1], [1, -1, 1, -1], [1, -1, -1, 1]))
+    places = 2 * np.pi * np.arange(64) / 64
+    size = 0.1 * np.sqrt(1 + 0.5 * np.cos(t))
+    halves = tuple(
+        (EVEN.shape(t) + (size * one + 0.3 * x)[:, None] * EVEN.normals(t)[..., 0], 0) for x in (other, noise)
+    )
+    found = measured_spread.spread(EVEN, samples_of(EVEN, t, EVEN.shape(t), 0, 0, halves), None, True)
+    wanted = 2.5**2 * 0.01 * (1 + 0.5 * von_mises(1) * np.cos(places))
+    np.testing.assert_allclose(found, wanted * np.eye(2)[..., None], atol=1e-12)
+
+    loop = Loop(np.array([[0.0, 0.5, 0.0], [0.0, 0.0, 0.5], [0.1, 0.0, 0.0]]))
+    deviation = np.einsum(
+        "nik,nk->ni", loop.normals(t), np.stack([0.2 * one + 0.1 * other, 0.1 * other - 0.05 * one], -1)
+    )
+    alpha = loop.shape(t) + deviation
+    found = measured_spread.spread(loop, samples_of(loop, t, alpha, alpha, 0), None, True)
+    least = (0.02 * 0.5) ** 2
+    covariance = 2.5**2 * np.array([[0.2**2 + 0.1**2, 0], [0, 0.1**2 + 0.05**2]])
+    N, tangent = loop.normals(places), loop.shape(places, 1) / 0.5
+    across = np.einsum("pik,pij,pjl->pkl", N, np.moveaxis(found, -1, 0), N)
+    np.testing.assert_allclose(across, np.broadcast_to(covariance, across.shape), atol=2e-4)
+    along = np.einsum("pi,ijp,pj->p", tangent, found, tangent)
+    np.testing.assert_allclose(along, np.trace(covariance) / 2, rtol=1e-3)
+
+    small = loop.shape(t) + 1e-3 * deviation
+    for limits, varies, wanted in (
+        (None, True, least),
+        (None, False, least),
+        (0.03, True, 0.03**2),
+        (0.03, False, 0.03**2),
+    ):
+        found = measured_spread.spread(loop, samples_of(loop, t, small, small, 0), limits, varies)
+        np.testing.assert_allclose(found, wanted * np.ones(64) * np.eye(3)[..., None], atol=1e-12)
+
+
+def series_about(loop, harmonics=4, **other):
+    """A Taylor series of no A about a loop, with other parts given."""
+    d = len(loop.coefficients)
+    none = np.zeros((3, d, d, 2 * harmonics + 1))
+    parts = {"A": none[:, :, 0], "slope": none[:, :, 1:], "errors": none[None], "spread": np.eye(d)[..., None],
+             "beyond": np.zeros(3), "standard_error": np.zeros((3, 2, 1)), "factor": 2.0, "level": 0.95}  # fmt: skip
+    return TaylorSeries(loop, **{**parts, **other})
+
+
+def test_what_a_fit_leaves_is_split_into_its_mean_and_its_scatter_beyond_noise():
+    """At each place of a circle the same sixteen rows: a mean misfit, one that scatters, and noise of either half."""
+    rows = np.array(list(itertools.product([1.0, -1.0], repeat=4)))
+    scatter, one, other, swing = np.tile(rows, (64, 1)).T
+    t = np.repeat(2 * np.pi * np.arange(64) / 64, 16)
+    A = np.zeros((3, 2, 9))
+    A[:, :, 0] = [[0.3, 0.1], [-0.2, 0.4], [0.1, 0.5]]
+    alpha, rate = EVEN.shape(t), 2 * EVEN.shape(t, 1) + 0.4 * swing[:, None] * EVEN.normals(t)[..., 0]
+    mean, sizes, noise = np.array([0.05, 0.08, 0.02]), np.array([0.2, 0.1, 0.3]), np.array([0.03, 0.02, 0.01])
+    xi = rate @ A[:, :, 0].T + mean + scatter[:, None] * sizes
+    halves = tuple(xi + x[:, None] * noise for x in (one, other))
+    samples = samples_of(EVEN, t, alpha, rate, xi, None, halves)
+    found = measured_residual.residual_of(series_about(EVEN, A=A), samples, regression.RATES)
+    square = (2 * 0.6) ** 2 + 0.4**2  # of the rates
+    np.testing.assert_allclose(found.residual, np.sqrt((mean**2 + sizes**2) / square), rtol=1e-12)
+    np.testing.assert_allclose(found.explained, 1 - (mean**2 + sizes**2) / xi.var(0), rtol=1e-12)
+    common, apart = sizes**2 * 16 / 15, noise**2 / 2 * 16 / 15  # of halves whose noise is independent
+    along = 0.25 * (mean**2 - (common + apart) / 16) / 0.6**2
+    across = (common - 0.3 * apart) / 0.4**2
+    wanted = np.sqrt(np.maximum(np.stack([along, across], -1), 0.0))
+    np.testing.assert_allclose(found.standard_error, np.repeat(wanted[..., None], 64, -1), atol=1e-9)
+    assert (wanted[:2] > 0).sum() >= 3
+    found = measured_residual.residual_of(series_about(EVEN, A=A), samples, regression.SHAPES)
+    np.testing.assert_allclose(
+        found.standard_error, np.stack([wanted[:, :1] + np.zeros(64), np.zeros((3, 64))], 1), atol=1e-9
+    )
+
+
+def test_harmonics_that_a_series_omits_are_as_large_as_its_upper_half():
+    """Along and across a circle, less those of their errors; the second of four harmonics is no upper one."""
+    A, errors, t = np.zeros((3, 2, 9)), np.zeros((2, 3, 2, 2, 9)), 2 * np.pi * np.arange(64) / 64
+    A[0, 0, 7], A[1, 1, 3], A[2, 1, 5] = 0.3, 5.0, 0.2  # cos 4t, cos 2t, cos 3t
+    errors[:, 2, 1, 0, 5] = 0.12, 0.05
+    cos, four, six, eight, ten = (lambda n: von_mises(n) * np.cos(n * t)), 4, 6, 8, 10
+    sines = (1 - cos(2) + cos(eight) - cos(six) / 2 - cos(ten) / 2) / 4  # mean of cos^2 4t sin^2 t
+    cosines = (1 + cos(2) + cos(eight) + cos(six) / 2 + cos(ten) / 2) / 4
+    of_three = (1 + cos(2) + cos(six) + cos(eight) / 2 + cos(four) / 2) / 4  # of cos^2 3t cos^2 t
+    and_three = (1 - cos(2) + cos(six) - cos(eight) / 2 - cos(four) / 2) / 4
+    left = 0.2**2 - 0.12**2 - 0.05**2
+    wanted = np.zeros((2, 64, 3))
+    wanted[:, :, 0], wanted[:, :, 2] = 0.3**2 * np.stack([sines, cosines]), left * np.stack([of_three, and_three])
+    found = measured_residual._truncation(series_about(EVEN, A=A, errors=errors))
+    np.testing.assert_allclose(found, wanted, atol=1e-9)
+    t = np.repeat(t, 2)
+    samples = samples_of(EVEN, t, EVEN.shape(t), EVEN.shape(t, 1), np.zeros((128, 3)))
+    samples = samples._replace(xi=np.einsum("tij,tj->ti", series(A, t), samples.rate))
+    samples = samples._replace(xi_halves=(samples.xi, samples.xi))
+    told = measured_residual.residual_of(series_about(EVEN, A=A, errors=errors), samples, regression.SHAPES)
+    np.testing.assert_allclose(told.standard_error, 2 * np.sqrt(wanted).transpose(2, 0, 1), atol=1e-6)
+
+
+def area_of(loop):
+    """A series of A_theta = (- alpha_2, alpha_1) / 2 about a circle round the origin, by which a loop turns by its area."""
+    r = loop.coefficients[0, 1]
+    A, slope = np.zeros((3, 2, 9)), np.zeros((3, 2, 1, 9))
+    A[2, 0, 2], A[2, 1, 1] = -r / 2, r / 2
+    slope[2, 0, 0, 2], slope[2, 1, 0, 1] = 1 / 2, -1 / 2  # inwards, as its normals
+    return series_about(loop, A=A, slope=slope)
+
+
+def test_the_phase_of_the_nearest_point_makes_a_varied_gait_too_large():
+    """By s^2 / 2 times its curvature, which a circle of less radius has to be compared with."""
+    known = area_of(Loop(np.array([[0.0, 0.6, 0.0], [0.0, 0.0, 0.6]])))
+    variances = np.array([0.01, 0.03])
+    extent = 2.5**2 * np.diag(variances)[..., None] * np.ones(64)
+    turned = np.pi * ((0.6 - variances.mean() / 2 / 0.6) ** 2 - 0.6**2)
+    np.testing.assert_allclose(fitted_parts._outward(known, extent), [0, 0, turned], atol=1e-12)
+    net, alpha, alphadot = fitted_parts._net(known)
+    np.testing.assert_allclose(net, [0, 0, np.pi * 0.6**2], atol=1e-12)
+    np.testing.assert_allclose(alpha[[0, 32]], [[0.6, 0], [0, 0.6]], atol=1e-12)
+    np.testing.assert_allclose(alphadot[[0, 32]], [[0, 0.6], [-0.6, 0]], atol=1e-12)
+
+
+def test_the_error_of_the_mean_gait_is_that_of_what_its_cycles_enclose():
+    known, cycle = area_of(Loop(np.array([[0.0, 0.6, 0.0], [0.0, 0.0, 0.6]]))), np.repeat(np.arange(16), 40)
+    t = 2 * np.pi * np.arange(640) / 40
+    sizes = 0.05 * np.random.default_rng(0).normal(size=16)
+    alpha = (1 + sizes[cycle] + 0.03)[:, None] * known.loop.shape(t)  # a mean gait off by as much in all is no error
+    found = fitted_parts._by_gait(known, regression.Samples(t, cycle, alpha, alpha, alpha, (), ()))
+    sizes -= sizes.mean()
+    turned = np.pi * 0.6**2 * (2 * sizes + 0.1 * sizes**2) / 16
+    np.testing.assert_allclose(found, [0, 0, np.sqrt((regression.lagged(turned) ** 2).sum())], atol=1e-9)
+
+
+# Cycles: both sides of what is refused.
+
+
+def cycles_of(sizes, rows=24):
+    """A log of an ellipse whose cycles have these sizes, its phase and the number of each row's cycle."""
+    number = np.repeat(np.arange(len(sizes)), rows)
+    at = 2 * np.pi * (np.arange(len(number)) + 0.5) / rows
+    alpha = np.asarray(sizes)[number, None] * np.stack([0.5 * np.cos(at), 0.8 * np.sin(at)], -1)
+    lines = 2 + np.arange(len(at))
+    return measured.Log("log.csv", at / (2 * np.pi), alpha, np.zeros((len(at), 3)), ("a1", "a2"), lines), at, number
+
+
+def two_kinds(kind, apart, share):
+    """Sizes of cycles of two kinds, ``apart`` from each other, between which lies this share of their spread."""
+    count = np.array([kind.count("b"), kind.count("a")])
+    scatter = apart * np.sqrt(count.prod() / count.sum() ** 2 * (1 / share - 1))
+    sizes, sign = [], {"a": -1, "b": -1}
+    for k in kind:
+        sign[k] *= -1  # one more and one less
+        sizes.append(1 + apart * (k == "b") + scatter * sign[k])
+    return sizes
+
+
+@pytest.mark.parametrize(
+    ("kind", "apart", "share", "said"),
+    [
+        ("abbaabbaabab", 0.2, 0.905, "line 26: two gaits: 6 cycles are of one kind and 6 of another, .* here .t = 1.02083.;"),
+        ("abbaabbaabab", 0.2, 0.895, ""), ("aaaabbbbbbbb", 0.2, 0.805, "line 98: two gaits: [48] cycles .* and [48] of"),
+        ("aaaabbbbbbbb", 0.2, 0.795, ""), ("aaaabbbbbbbb", -0.2, 0.805, "line 98: two gaits: [48] cycles .* and [48] of"),
+        ("aaaabbbbbbbb", 0.0525, 0.95, "two gaits"), ("aaaabbbbbbbb", 0.05, 0.95, ""),  # of a mean size of 1.035
+        ("aabbaaaabb", 0.3, 0.97, "two gaits: 6 cycles"), ("aaaaaaaabb", 0.3, 0.97, ""), ("aabbb", 0.3, 0.97, ""),
+        ("aaabbb", 0.3, 0.999, "two gaits: 3 cycles are of one kind and 3"), ("aaaaaabbb", 0.3, 0.98, "two gaits: [36] cycles"),
+    ],
+)  # fmt: skip
+def test_two_gaits_are_far_apart_for_their_scatter_and_have_three_cycles_each(kind, apart, share, said):
+    log, at, number = cycles_of(two_kinds(kind, apart, share))
+    with pytest.raises(Refusal, match=said) if said else contextlib.nullcontext():
+        cycles.check_one_gait(log, at, number, log.alpha)
+
+
+@pytest.mark.parametrize(
+    ("slope", "scatter", "said"),
+    [
+        (0.0735, 0.0, "a2 drifts from .* to 0.808 over the log and swings by 0.79 in a cycle: .* leave it out"),
+        (-0.0735, 0.0, "a2 drifts"), (0.0720, 0.0, ""), (0.09, 0.24, "a2 drifts"), (0.09, 0.26, ""),
+    ],
+)  # fmt: skip
+def test_a_drift_is_larger_than_a_swing_and_four_times_the_scatter(slope, scatter, said):
+    log, _, number = cycles_of(np.ones(12))
+    about = scatter * np.array([1, -1, -1, 1] * 3)
+    alpha = np.stack([log.alpha[:, 0], 0.5 * log.alpha[:, 1] + (slope * np.arange(12) + about)[number]], -1)
+    with pytest.raises(Refusal, match=said) if said else contextlib.nullcontext():
+        cycles.check_no_drift(log, number, alpha)
+
+
+def test_cycles_are_whole_and_not_at_the_ends_of_a_log():
+    """Half a period at each end has no phase to go by."""
+    t = np.arange(0, 6.001, 0.05)
+    log = measured.Log("log.csv", t, t, t, (), t)
+    for off in (0.0, 0.26, 0.74):
+        number = cycles.cycle_numbers(log, 2 * np.pi * (t - off), 1.0)
+        for k in range(number.max() + 1):
+            begin = math.ceil(0.5 - off + 1e-9) + off + k
+            np.testing.assert_array_equal(number == k, (t >= begin - 1e-9) & (t < begin + 1 - 1e-9))
+        assert number.max() == 3
+
+
+def smooth_of(values, noise=0.0, knots=4.0):
+    values = np.asarray(values, float)
+    return smooth.Smoothed(values, values, (), knots, np.full(values.shape[1], noise))
+
+
+@pytest.mark.parametrize(
+    ("width", "noise", "said"),
+    [
+        (0.3, 0.05, ""), (0.00109, 0.0, ""), (0.00107, 0.0, "a2 is 0.4 times a1, but .*: one shape variable recorded 2"),
+        (0.3, 0.280, ""), (0.3, 0.286, "a2 is 0.4 times a1"), (1.5, 0.372, ""),
+        (1.5, 0.374, "a2 does not move beyond its noise"),
+    ],
+)  # fmt: skip
+def test_joints_move_beyond_their_noise_and_apart(width, noise, said):
+    """Noise in splines of 4 knots and 16 rows a cycle is half of that of the rows; 1.5 times as much may look like a motion.
+    A line of slope 0.4, and ``width`` across it."""
+    t = 2 * np.pi * np.arange(200) / 200
+    deviation = np.cos(t)[:, None] * np.array([1.0, 0.4]) + width / math.hypot(1, 0.4) * np.sin(t)[:, None] * [
+        -0.4,
+        1.0,
+    ]
+    if width > 1:  # a joint of its own size
+        deviation = np.stack([np.cos(t), 0.28 * math.sqrt(2) * np.sin(t)], -1)
+    log = measured.Log("log.csv", t, deviation, deviation, ("a1", "a2"), np.arange(200))
+    with pytest.raises(Refusal, match=said) if said else contextlib.nullcontext():
+        cycles.check_a_loop(log, smooth_of(deviation + 0.7, noise), 16)
+
+
+def test_right_handed_poses_are_told_from_mirrored_ones():
+    """By velocities of which a part follows from the phase in either frame."""
+    t = 2 * np.pi * np.arange(400) / 40
+    log = measured.Log("log.csv", t, t, t, (), t)
+    alpha, rate, heading = UNEVEN.shape(t), UNEVEN.shape(t, 1), 0.37 * t
+    joints = smooth.Smoothed(alpha, rate, (), 4.0, np.zeros(2))
+    own, mirrored = (0.2 + np.cos(t)) * np.exp(1j * heading), (0.2 + np.cos(t)) * np.exp(-1j * heading)
+    for share, said in ((0.55, ""), (0.6, r"do not fit each other, 2\.\d* times worse than mirrored: give y upwards")):
+        v = (1 - share) * own + share * mirrored
+        pose = smooth.Smoothed(*(np.stack([*x, heading], -1) for x in ((0 * t, 0 * t), (v.real, v.imag))), (), 4.0, 0)
+        with pytest.raises(Refusal, match=said) if said else contextlib.nullcontext():
+            plausibility.check_right_handed(log, UNEVEN, t, joints, pose, np.zeros(400, int))
+
+
+@pytest.mark.parametrize(
+    ("speed", "turn", "period", "length", "facts", "said"),
+    [
+        (0.98, 1.96, 299.0, 1.0, {}, ()), (1.02, 0.0, 1.0, 1.0, {}, ("x and y move by 2.04 body lengths where",)),
+        (0.5, 2.02, 1.0, 1.0, {}, ("the heading turns 4.04 times as fast as the joints",)),
+        (2.9, 0.0, 1.0, 3.0, {"metres": True}, ()), (0.5, 0.0, 301.0, 1.0, {"seconds": False}, ()),
+        (3.1, 0.0, 301.0, 3.0, {}, ("x and y move by 2.07", "the joints repeat every 301, and t is")),
+        (0.5, 0.0, 1.0, 1.0, {"metres": True}, ("x and y are in m by the names",)),
+    ],
+)  # fmt: skip
+def test_units_are_noted_beyond_what_bodies_do(speed, turn, period, length, facts, said):
+    """Joints turn by 0.5 rad per unit of time, in all."""
+    joints, moves = np.tile([0.3, -0.4], (9, 1)), np.tile([0.6 * speed, -0.8 * speed, turn], (9, 1))
+    log = measured.Log("log.csv", joints, joints, moves, ("a1", "a2"), joints, **facts)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        plausibility.note_units(log, smooth_of(joints), smooth_of(moves), period, length)
+    assert len(told) == len(said) and all(str(x.message).startswith(f"log.csv: {y}") for x, y in zip(told, said))
+
+
+def log_with(values, column, t=None):
+    """A log of 200 rows with these values in a column of six, the others zero; its lines count from 2."""
+    rows = np.zeros((len(values), 6))
+    rows[:, 0] = np.arange(len(values)) if t is None else t
+    rows[:, column] = values
+    return measured.Log("log.csv", rows[:, 0], rows[:, 1:3], rows[:, 3:], ("a1", "a2"), np.arange(len(values)) + 2)
+
+
+@pytest.mark.parametrize(
+    ("column", "off", "jump", "said"),
+    [
+        (2, 0.35, 0.0, "line 52: a2 is 0.35 off the rows before and after: mend"), (2, 0.32, 0.0, ""),
+        (3, 0.0, 0.66, "line 52: x jumps by 0.66 to this row: the tracking slipped; cut"), (3, 0.0, 0.62, ""),
+        (1, 0.0, -0.7, "line 52: a1 jumps by -0.7 to this row: two gaits are in the file, or"),
+        (5, 0.4, 0.3, "line 52: heading is 0.55 off the rows before"), (4, 0.3, 0.7, "line 52: y jumps by 1 to this row"),
+        (4, 0.4, 0.7, "line 52: y is 0.75 off"), (4, -0.3, 1.0, "line 52: y jumps by 0.7 to this row"),
+    ],
+)  # fmt: skip
+def test_outliers_and_jumps_are_told_from_motion(column, off, jump, said):
+    """Of rows that lie by 0.008 to either side in turn: 0.016 off their neighbours, a twentieth of which is allowed."""
+    values = 0.008 * (-1.0) ** np.arange(200)
+    values[50] = off
+    values[50:] += jump
+    values[49], values[51] = 0.0, jump
+    with pytest.raises(Refusal, match=said) if said else contextlib.nullcontext():
+        measured_log.check_rows(log_with(values, column))
+
+
+def test_outliers_at_uneven_times_are_those_from_a_straight_line():
+    """And none where rows before or after are missing."""
+    t = np.cumsum(np.tile([1.0, 2.0], 100))
+    values = 0.01 * t
+    measured_log.check_rows(log_with(values, 4, t))
+    values[60] += 0.2
+    with pytest.raises(Refusal, match="line 62: y is 0.2 off"):
+        measured_log.check_rows(log_with(values, 4, t))
+    t[60:] += 3.9  # below 2.5 times the step of most
+    with pytest.raises(Refusal, match="line 62: y is 0.1.* off"):
+        measured_log.check_rows(log_with(values, 4, t))
+    t[60:] += 0.2
+    measured_log.check_rows(log_with(values, 4, t))
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "turned", "said"),
+    [
+        (1, 6.28, (), ""), (1, -6.29, (), "line 52: a1 reaches -6.29 where joint angles are in rad: say degrees"),
+        (2, 31.4, (1, 2), ""), (2, -31.5, (1, 2), "line 52: a2 reaches -1805 degrees: no joint turns so far"),
+        (5, 331.0, (), "line 52: heading jumps by 331, a turn in degrees: say degrees"), (5, -389.0, (), "jumps by 389"),
+        (5, 329.0, (), ""), (5, 391.0, (), ""), (5, 360.0, (5,), ""),
+    ],
+)  # fmt: skip
+def test_degrees_are_told_from_radians(column, value, turned, said):
+    values = np.zeros(200)
+    values[50:] = value
+    turn = np.where(np.isin(range(6), turned), np.pi / 180, 1.0)
+    names = ("t", "a1", "a2", "x", "y", "heading")
+    with pytest.raises(Refusal, match=said) if said else contextlib.nullcontext():
+        measured_log._check_units(log_with(values, column), names, turn)
+
+
+@pytest.mark.parametrize(
+    ("size", "turned", "said"), [(0.109, (1, 2), "at most 6.25 degrees"), (0.110, (1, 2), ""), (0.109, (1,), "")]
+)
+def test_radians_that_are_read_as_degrees_are_noted(size, turned, said):
+    turn = np.where(np.isin(range(6), turned), np.pi / 180, 1.0)
+    with (
+        pytest.warns(UnitWarning, match=f"log.csv: joint angles of {said}: drop") if said else contextlib.nullcontext()
+    ):
+        measured_log._check_units(log_with(np.full(200, -size), 2), ("t", "a1", "a2", "x", "y", "heading"), turn)
+
+
+def test_logs_have_a_hundred_rows_and_six_joints_at_most(tmp_path, monkeypatch):
+    path = tmp_path / "log.csv"
+    row = lambda k, joints: ",".join(str(x) for x in (k, *(math.sin(k + j) for j in range(joints)), k, 0, 0))
+    text = lambda rows, joints: "\n".join(
+        [
+            ",".join(["t", *(f"a{j}" for j in range(joints)), "x", "y", "heading"]),
+            *(row(k, joints) for k in range(rows)),
+        ]
+    )
+    for rows, joints, said in (
+        (100, 6, ""), (99, 6, "99 rows are too few: give at least 100, of many cycles"),
+        (100, 7, "7 joint angles, more than 6"),
+        (121, 2, "121 rows, more than 120"), (120, 2, ""),
+    ):  # fmt: skip
+        monkeypatch.setattr(measured_log, "MOST_ROWS", 120)
+        path.write_text(text(rows, joints))
+        with pytest.raises(Refusal, match=said) if said else contextlib.nullcontext():
+            log = measured.read(path)
+            assert log.alpha.shape == (rows, joints) and log.pose[-1].tolist() == [rows - 1, 0, 0]
+            assert log.lines.tolist() == [*range(2, rows + 2)] and log.seconds and not log.metres
+
+
+@pytest.mark.parametrize(("apart", "period"), [(0.22, 1.0), (0.24, 2.0)])
+def test_cycles_that_are_nearly_alike_are_of_one_period(apart, period):
+    """Shapes and, cycle by cycle in turn, so much more or less of them: a correlation of (1 - apart^2) / (1 + apart^2)."""
+    t = np.arange(0, 60, 0.023)
+    alpha = np.stack([np.cos(2 * np.pi * t), 0.3 * np.sin(2 * np.pi * t)], -1)
+    alpha += apart * math.sqrt(1.09 / 2) * np.stack([np.cos(3 * np.pi * t), np.sin(3 * np.pi * t)], -1)
+    assert phase.period_of(t + 5, alpha + 3) == pytest.approx(period, rel=1e-3)
+
+
+def test_a_period_is_found_in_two_cycles_and_a_bit():
+    for count, found in ((2.3, 1.0), (1.9, 0.0)):
+        t = np.linspace(0, count, 231)
+        alpha = np.stack([np.cos(2 * np.pi * t), np.sin(2 * np.pi * t)], -1)
+        assert phase.period_of(t, alpha) == pytest.approx(found, abs=0.02)
+    still = np.ones((50, 2))
+    assert phase.period_of(np.arange(50.0), still) == 0.0
+
+
+# The regression against least squares.
+
+THREE = Loop(np.array([[0.1, 0.5, 0.1], [0.0, -0.2, 0.4], [-0.1, 0.3, 0.2]]))
+
+
+@pytest.fixture(params=[UNEVEN, THREE], ids=["two", "three"])
+def regressed(request):
+    """A gait, and twelve cycles of samples about it whose velocity is random."""
+    rng, loop = np.random.default_rng(0), request.param
+    d, t = len(loop.coefficients), np.sort(rng.uniform(0, 24 * np.pi, 900))
+    alpha, rate = loop.shape(t) + 0.1 * rng.normal(size=(900, d)), loop.shape(t, 1) + 0.3 * rng.normal(size=(900, d))
+    samples = samples_of(loop, t, alpha, rate, rng.normal(size=(900, 3)))
+    return loop, samples._replace(cycle=(t / (2 * np.pi)).astype(int))
+
+
+def columns_one_by_one(loop, s, harmonics, varies, second):
+    """Products of a rate, of deviations and of a wave, as they stand in the series of xi."""
+    wave = lambda k: (lambda t: np.sin((k + 1) // 2 * t)) if k and k % 2 == 0 else (lambda t: np.cos((k + 1) // 2 * t))
+    along = (s.rate * loop.shape(s.phase, 1)).sum(1) / (loop.shape(s.phase, 1) ** 2).sum(1)
+    rates = list(s.rate.T) if varies == regression.RATES else [along]
+    off, one = s.alpha - loop.shape(s.phase), np.ones(len(s.phase))
+    normal = (
+        [(off * n).sum(1) for n in np.moveaxis(loop.normals(s.phase), 2, 0)] if varies != regression.NOTHING else []
+    )
+    first = [[one, *normal], 2 * harmonics + 1]
+    pairs = [[a * b for a, b in itertools.combinations_with_replacement(normal, 2)], 2 * second + 1]
+    return np.stack(
+        [u * x * wave(k)(s.phase) for some, count in (first, pairs) for u in rates for x in some for k in range(count)],
+        1,
+    )
+
+
+@pytest.mark.parametrize("varies", range(3))
+def test_the_regression_without_noise_is_that_of_least_squares(varies, regressed):
+    loop, s = regressed
+    equations = regression.sums(loop, s, 3, varies)
+    everything = np.ones(12)
+    for some, harmonics, second in (
+        (equations, 3, 2),
+        (equations.truncated(2), 2, 2),
+        (equations.plain, 3, -1),
+        (equations.plain.truncated(1), 1, -1),
+    ):
+        given = columns_one_by_one(loop, s, harmonics, varies, second)
+        np.testing.assert_allclose(
+            regression.columns(loop, s.phase, s.alpha, s.rate, harmonics, varies, second), given, atol=1e-12
+        )
+        wanted = np.linalg.lstsq(given, s.xi, rcond=None)[0]
+        np.testing.assert_allclose(some.solved(everything), wanted, atol=1e-7)
+        left = [((s.xi - given @ wanted)[s.cycle == k] ** 2).sum(0) for k in range(12)]
+        np.testing.assert_allclose(some.residual(wanted), left, atol=1e-7)
+        weight = 1.0 * (np.arange(12) != 4)
+        kept = s.cycle != 4
+        np.testing.assert_allclose(
+            some.solved(weight), np.linalg.lstsq(given[kept], s.xi[kept], rcond=None)[0], atol=1e-7
+        )
+    without, (found, errors) = equations.plain, regression.solution(equations.plain)
+    each = np.array([without.solved(1.0 * (np.arange(12) != k)) for k in range(12)]) - found
+    np.testing.assert_allclose(errors, each, atol=1e-12)  # of so few cycles none are alike
+    fold = np.arange(12) % 5
+    square = [without.residual(without.solved(1.0 * (fold != k)))[fold == k].sum(0) for k in range(5)]
+    np.testing.assert_allclose(unknowns.unpredicted(without), np.sum(square, 0), rtol=1e-9)
+
+
+def test_solutions_are_a_series_about_the_gait(regressed):
+    """A and its slopes at all rates; along the gait alone, they are such as give the same velocity there."""
+    loop, s = regressed
+    d = len(loop.coefficients)
+    equations = regression.sums(loop, s, 3, regression.RATES)
+    solution = np.random.default_rng(1).normal(size=(2, equations.matrix.shape[1], 3))
+    for found, one in zip(equations.split(solution, loop), solution):
+        known = series_about(loop, 3, A=found[:, :, 0], slope=found[:, :, 1:])
+        w, terms = known.terms(s.phase, s.alpha, s.rate)
+        xi = columns_one_by_one(loop, s, 3, regression.RATES, -1) @ one[: d * d * 7]
+        np.testing.assert_allclose(np.einsum("ijmk,nk,njm->ni", known.combined, w, terms), xi, atol=1e-10)
+    for varies, kinds in ((regression.SHAPES, d), (regression.NOTHING, 1)):
+        equations = regression.sums(loop, s, 5, varies)
+        solution = np.random.default_rng(1).normal(size=(equations.matrix.shape[1], 3))
+        first = solution[: kinds * 11].reshape(kinds, 11, 3)
+        first[:, 7:] = 0  # harmonics that the loop's own take beyond the last
+        solution[: kinds * 11] = first.reshape(-1, 3)
+        found = equations.split(solution, loop)
+        assert found.shape == (3, d, d, 11) and (found[:, :, kinds:] == 0).all()
+        along = np.einsum("tijm,tj->tim", series(found, s.phase), loop.shape(s.phase, 1))
+        np.testing.assert_allclose(along[..., :kinds], np.einsum("tw,mwi->tim", waves(s.phase, 5), first), atol=0.05)
+
+
+def test_cycles_are_counted_in_blocks_and_their_errors_by_student(regressed):
+    _, s = regressed
+    assert [(b.start, b.stop) for b in regression.blocks(s)] == [
+        (np.flatnonzero(s.cycle == k)[0], np.flatnonzero(s.cycle == k)[-1] + 1) for k in range(12)
+    ]
+    five = regression.blocks(s, 5)
+    whole = [sorted({*s.cycle[b].tolist()}) for b in five]
+    assert (
+        [k for some in whole for k in some] == list(range(12))
+        and sorted(map(len, whole)) == [2, 2, 2, 3, 3]
+        and five[-1].stop == 900
+    )
+    for count, level, found in (
+        (8, 0.95, 2.2010),
+        (64, 0.95, 2.2010),
+        (15, 0.9, 1.7189),
+        (16, 0.9, 1.7959),
+        (128, 0.95, 2.0687),
+        (1, 0.5, 0.8165),
+    ):
+        assert regression.factor(count, level) == pytest.approx(found, abs=1e-4)  # tables of Student's t
+
+
+@pytest.mark.parametrize(
+    ("header", "picked"),
+    [
+        ("t a2 a1 a10 x y heading", "t a1 a2 a10 x y heading"),
+        ("time q_2_deg q_1_deg yaw y_m x_m", "time q_1_deg q_2_deg x_m y_m yaw"),
+        ("phase angle1 angle2 x y theta", "phase angle1 angle2 x y theta"),
+        ("phase time_s joint1_rad joint2_rad x y heading_deg",) * 2,
+        ("alpha_1 alpha_2 a1 a2 x y heading t", "t alpha_1 alpha_2 x y heading"),
+        ("t_s b1 b2 joint3 joint1 x y yaw", "t_s joint1 joint3 x y yaw"),
+    ],
+)  # fmt: skip
+def test_columns_are_known_by_their_names(header, picked):
+    header, picked = (tuple(x.split()) for x in (header, picked))
+    picked = tuple(x for x in picked if x != "phase") if "time_s" in picked else picked
+    assert measured_log._picked("log.csv", 1, header, []) == picked
+
+
+@pytest.mark.parametrize(
+    ("header", "columns", "said"),
+    [
+        ("t a1 a2 x y", "", "log.csv, line 3: no column heading: it has 't, a1, a2, x, y'; name them t,alpha_1"),
+        ("t b1 b2 x y yaw", "", "log.csv, line 3: no columns of joint angles, and a gait is a loop of two or more: it has"),
+        ("t a1 x y yaw", "", "log.csv, line 3: one column of joint angles, and a gait is"),
+        ("t a1 a2 a1 x y yaw", "", "log.csv, line 3: the column 'a1' is"),
+        ("t", "", "log.csv, line 3: no header of columns: give a CSV file"),
+        ("t;a1;a2", "", "log.csv, line 3: no header of columns; columns must be"),
+        ("t a b x y c", "t a b x y d", "log.csv, line 3: no column 'd'; it has 't, a, b, x, y, c'"),
+        ("t a x y c", "t a x y c", "log.csv: columns are"),
+        ("t a b x y c", "t a a x y c",
+         "log.csv: columns are those of t, two joint angles or more, x, y and heading, in this order"),
+        ("t_ms a b x y c", "t_ms a b x y c", "log.csv: t_ms is in ms by its name: give t in s"),
+    ],
+)  # fmt: skip
+def test_columns_that_are_not_there_are_named(header, columns, said):
+    with pytest.raises(Refusal) as found:
+        measured_log._picked("log.csv", 3, tuple(header.split()), columns.split())
+    assert str(found.value).startswith(said)

@@ -1,5 +1,6 @@
 """Measured midlines: closed forms, files as trackers write them, slips that are refused, coverage of intervals."""
 
+import contextlib
 import dataclasses
 import json
 import math
@@ -10,17 +11,21 @@ import pytest
 from commands import geomech as command
 from scipy.interpolate import CubicSpline
 from scipy.io import netcdf_file
+from scipy.linalg import null_space
 from scipy.special import ellipe
+from scipy.stats import multivariate_normal, norm
 
 import geomech
 from geomech.gaits import Sine
-from geomech.measured.midlines import fit, intervals, kinematics, predicted, reader, smooth, synthetic
+from geomech.geometry.reconstruct import displacement
+from geomech.measured.midlines import fit, intervals, kinematics, predicted, question, reader, smooth, synthetic
 from geomech.measured.midlines.kinematics import QUANTITIES
 from geomech.measured.midlines.trial import Trial
 from geomech.scenes import Numerics, Scene
 from geomech.studies.undulation import performance
 from geomech.systems import Swimmer
 from geomech.systems.swimmer import MEDIA
+from geomech.text import midlines as texts
 from rft import Backbone, Viscous
 from rft.refusal import Refusal
 
@@ -516,3 +521,597 @@ def test_the_command_prints_writes_and_draws(noisy, tmp_path, monkeypatch):
     assert found.to_xarray()["slip_along"].attrs["units"] == "rad"
     code, _, err = command("fit-gait", "mid.csv", "--degrees")
     assert code == 2 and "--degrees" in err
+
+
+# Parts against closed forms.
+
+
+def test_trials_that_are_made_are_what_they_say():
+    """Without what is random a wave of headings, and after a cycle the displacement of its shapes; then how it varies."""
+    swimmer = Swimmer(Viscous(2.0), Backbone(24, length=0.4))
+    plain = {"noise": 0.0, "spread": 0.0, "jitter": 0.0, "frequency": 2.0, "seed": 4}
+    form = {"swing": 0.6, "waves": 1.3, "heading": 0.7, "bend": 0.3}
+    made = synthetic.made(swimmer, 2.2, 30, 24, **plain, **form)
+    np.testing.assert_allclose(made.t, np.arange(67) / 60, atol=1e-12)
+    np.testing.assert_array_equal(made.points, made.exact)
+    z = made.exact @ [1.0, 1j]
+    middle = np.arange(23) / 23 + 0.5 / 23  # of the body, between two points
+    headings = np.unwrap(np.angle(np.diff(z)), axis=1)
+    headings -= 0.3 * (middle - 0.5)
+    basis = np.stack([np.ones(23), np.sin(2 * np.pi * 1.3 * (middle - 0.5)), np.cos(2 * np.pi * 1.3 * (middle - 0.5))])
+    _, cos, sin = np.linalg.lstsq(basis.T, headings.T, rcond=None)[0]
+    np.testing.assert_allclose(np.hypot(cos, sin), 0.6, rtol=0.01)
+    np.testing.assert_allclose(
+        np.unwrap(np.arctan2(sin, cos)) - np.arctan2(sin[0], cos[0]), 4 * np.pi * made.t, atol=0.02
+    )
+    net = displacement(swimmer.velocity(*one_cycle(swimmer, np.arctan2(sin[0], cos[0]), 0.6, 1.3, 0.3)))
+    np.testing.assert_allclose(
+        z[30], np.exp(1j * net[2]) * z[0] + np.exp(0.7j) * (net[0] + 1j * net[1]) / 0.4, atol=2e-3
+    )
+    np.testing.assert_allclose(np.abs(np.diff(z, axis=1)).sum(1), 1.0, atol=0.01)
+
+    swimmer = Swimmer(Viscous(2.0), Backbone(6))
+    many = lambda **other: synthetic.made(swimmer, 40, 8, 6, **{**plain, **other})
+    still, off = many(), many(noise=0.02)
+    np.testing.assert_array_equal(still.exact, off.exact)
+    assert (off.points - still.points).std() == pytest.approx(0.02, rel=0.03)
+    varied = many(spread=1e-3)
+    bend = lambda trial: np.diff(np.unwrap(np.angle(np.diff(trial.exact @ [1.0, 1j])), axis=1))
+    rates = [
+        (bend(many(**{name: 1e-4 + value})) - bend(still)) / 1e-4 for name, value in (("swing", 0.9), ("waves", 1.1))
+    ]
+    rows = np.stack(rates, -1) * [0.9, 1.1]
+    found = np.array([np.linalg.lstsq(a, b, rcond=None)[0] for a, b in zip(rows, bend(varied) - bend(still))])
+    np.testing.assert_allclose(found.std(0), 1e-3, rtol=0.2)
+    assert abs(np.corrcoef(found.T)[0, 1]) < 0.2
+    np.testing.assert_allclose(
+        (found[4:] * found[:-4]).mean(0) / (found**2).mean(0), math.exp(-1), atol=0.2
+    )  # half a cycle
+    with pytest.raises(Refusal, match="frames"):
+        synthetic.made(swimmer, 3.0, 7, 6, **plain)
+    usual = {
+        "swing": 0.9,
+        "waves": 1.1,
+        "frequency": 1.0,
+        "noise": 0.01,
+        "spread": 0.05,
+        "jitter": 0.02,
+        "heading": 0.5,
+    }
+    wanted = synthetic.made(swimmer, 8.0, 40, 30, **usual, bend=0.0, seed=0)
+    np.testing.assert_array_equal(synthetic.made(swimmer).points, wanted.points)
+
+
+def one_cycle(swimmer, start, swing, waves, bend):
+    """Shapes and rates (64, d) of a wave of headings from the head of a body to its tail."""
+    s = (np.arange(swimmer.joints + 1) + 0.5) / (swimmer.joints + 1) - 0.5
+    at = start + 2 * np.pi * np.arange(64)[:, None] / 64 + 2 * np.pi * waves * s
+    return np.diff(swing * np.sin(at) + bend * s), np.diff(swing * np.cos(at))
+
+
+@pytest.mark.parametrize(
+    ("level", "power", "bounds", "value", "root", "low", "high"),
+    [
+        (3.0, 0.5, (0.1, 10.0), 2.0, 3.0, 2 / 2**3.0, 2 * 2**2.0), (3.0, -0.5, (0.1, 10.0), 2.0, 3.0, 2 / 2**4, 2 * 2**2.0),
+        (0.4, 0.5, (0.1, 100.0), 2.0, 0.4, 2 / 2**4.0, 2 * 2**5.5), (30.0, 1.0, (0.1, 10.0), 2.0, math.nan, 0.125, 8.0),
+        (0.2, 1.0, (0.0, 900.0), 0.0, 0.2, 1e-3, 10**2.5),
+    ],
+)  # fmt: skip
+def test_the_value_that_closes_a_gap_is_a_root(level, power, bounds, value, root, low, high):
+    """Of a stride that is a power of a parameter, which a medium takes within bounds."""
+
+    def gap(x):
+        if not bounds[0] <= x <= bounds[1]:
+            raise Refusal("beyond the bounds")
+        return x**power - level**power
+
+    found = predicted._closed("C", "rad", value, gap, 0.01, None, 1.0)
+    assert (found.name, found.unit, found.present) == ("C", "rad", value)
+    slope = abs(power) * level ** (power - 1)
+    wanted = (root, 0.01 / slope) if math.isfinite(root) else (math.nan, math.nan)
+    np.testing.assert_allclose((found.value, found.error), wanted, rtol=2e-3)
+    tried = value * 2 ** (np.arange(25) / 2 - 6) if value else 10 ** (np.arange(13) / 2 - 3)
+    tried = tried[(tried >= bounds[0]) & (tried <= bounds[1])]
+    np.testing.assert_allclose((found.low, found.high), (tried[0], tried[-1]), rtol=1e-12)
+
+
+def test_of_several_roots_the_one_nearest_to_the_present_value_closes_a_gap():
+    wave = lambda x: math.sin(math.pi * math.log2(x) / 3)  # zero at powers of 8
+    assert predicted._closed("C", "-", 3.0, wave, 0.1, None, 1.0).value == pytest.approx(8.0, rel=2e-3)
+    assert predicted._closed("C", "-", 2.0, wave, 0.1, None, 1.0).value == pytest.approx(1.0, rel=2e-3)
+    flat = lambda size: predicted._closed("C", "-", 2.0, lambda x: size * wave(x), 0.1, None, 0.5)
+    moves = np.ptp([wave(2 * x) for x in predicted.FACTORS])
+    assert flat(0.49e-4 / moves) is None and flat(0.51e-4 / moves) is not None
+
+    def alone(x):
+        if abs(x - 2) > 0.1:
+            raise Refusal("beyond the bounds")
+        return wave(x)
+
+    assert predicted._closed("C", "-", 2.0, alone, 0.1, None, 1.0) is None
+
+
+@pytest.mark.parametrize("constant", [0.2, 0.6])
+def test_the_variances_of_cycles_have_their_likelihood(constant):
+    """By the normal density of what is left of the cycles without their mean, as it stands."""
+    rng, count, number = np.random.default_rng(5), 5, 9
+    values = rng.normal(size=(count, 2)) * [1.0, 0.2] + 3.0
+    noise = rng.normal(size=(number, count, 2)) * 0.3 + 0.1
+    deviation = noise - noise.mean(0)
+    apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    contrasts = null_space(np.ones((1, count)))
+    variances, weights, exact = [], [], None
+    knowns = []
+    for k in range(2):
+        same = (deviation[..., k] ** 2).sum(0).mean() / (number - 1)
+        near = (deviation[:, 1:, k] * deviation[:, :-1, k]).sum(0).mean() / (number - 1)
+        scatter = values[:, k].var(ddof=1)
+        knowns.append((same + 1e-9 * scatter) * (apart == 0) + np.clip(near, -same / 2, same / 2) * (apart == 1))
+    white = [np.linalg.inv(np.linalg.cholesky(contrasts.T @ x @ contrasts)) @ contrasts.T for x in knowns]
+    drawn = np.stack([deviation[..., k] @ white[k].T for k in range(2)], 1)
+    exact = intervals._repeating(np.stack([white[k] @ values[:, k] for k in range(2)]), drawn)
+    exact += (1 - exact) * constant
+    found, by_cycles = intervals._of_cycles(values, noise, constant)
+    for k, known in enumerate(knowns):
+        scatter, same = values[:, k].var(ddof=1), knowns[k][0, 0] - 1e-9 * values[:, k].var(ddof=1)
+        prior = intervals.TRIED * scatter / (intervals.TRIED * scatter + same)
+        prior = [exact, *((1 - exact) * prior / prior.sum())]
+        for correlation in (-0.5, 0.0, 0.5):
+            alike = correlation ** apart.astype(float)
+            for v, p in zip([0.0, *(intervals.TRIED * scatter)], prior):
+                covariance = contrasts.T @ (known + v * alike) @ contrasts
+                weights.append(p * multivariate_normal.pdf(contrasts.T @ values[:, k], cov=covariance))
+                variances.append(v * alike.mean())
+    weights = np.reshape(weights, (2, -1)).T
+    np.testing.assert_allclose(found, weights / weights.sum(0), atol=1e-7)
+    np.testing.assert_allclose(by_cycles, np.reshape(variances, (2, -1)).T, rtol=1e-9)
+
+
+def test_an_interval_has_its_share_of_the_mixture_of_normals():
+    """Of a sample whose parts are known one by one."""
+    rng = np.random.default_rng(2)
+    pseudo, noise = rng.normal(size=(4, 3)), 0.4 * rng.normal(size=(12, 4, 3))
+    value, change = pseudo.mean(0) + 5.0, np.array([0.3, 0.0, -0.2])
+    noisy, moved = value + noise.mean(1) + [0.1, 0.0, -0.2], change + 0.05 * rng.normal(size=(12, 3)) + [0.0, 0.0, 0.05]
+    sample = intervals.Sample(value, pseudo, noisy, pseudo + noise, change, moved)
+    for level in (0.9, 0.95):
+        found = intervals.intervals(sample, level)
+        np.testing.assert_allclose(found.value, 2 * value - noisy.mean(0), rtol=1e-12)
+        np.testing.assert_allclose(found.noise, noisy.std(0, ddof=1), rtol=1e-12)
+        left = np.maximum((2 * change - moved.mean(0)) ** 2 - moved.var(0, ddof=1), 0)
+        np.testing.assert_allclose(found.smoothing, np.sqrt(left), rtol=1e-12)
+        assert (found.smoothing > 0).sum() == 2
+        weights, by_cycles = intervals._of_cycles(pseudo, noise, 0.2)
+        known = noisy.var(0, ddof=1) + left
+        inside = 2 * norm.cdf(found.half_width / np.sqrt(by_cycles + known)) - 1
+        np.testing.assert_allclose((weights * inside).sum(0), level, atol=1e-9)
+        np.testing.assert_allclose(
+            found.half_width / norm.ppf((1 + level) / 2), np.sqrt(found.cycles**2 + known), rtol=1e-9
+        )
+        one = intervals.Sample(value, pseudo[:1], noisy, (pseudo + noise)[:, :1], change, moved)
+        alone = intervals.intervals(one, level)
+        np.testing.assert_allclose(alone.half_width, norm.ppf((1 + level) / 2) * np.sqrt(known), rtol=1e-12)
+        np.testing.assert_allclose(alone.cycles, 0.0, atol=1e-7)
+        np.testing.assert_array_equal(found.per_cycle, pseudo)
+
+
+# Both sides of what trials are refused for.
+
+
+def line_of(frames=40, count=11, move=0.0):
+    """A straight body of length 1, tail at the origin and head at x = 1, that moves along y."""
+    points = np.stack(np.broadcast_arrays(np.linspace(0, 1, count), move * np.arange(frames)[:, None]), -1)
+    return trial_of(np.arange(frames) / 10, points)
+
+
+def refused(said):
+    return pytest.raises(Refusal, match=said) if said else contextlib.nullcontext()
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"),
+    [
+        (3.9, ""), (1 / 3.9, ""),
+        (4.1, r"line 32 \(t = 3\): the body is 4.1 times as long as in most frames: mend or drop that frame"),
+        (1 / 4.1, "the body is 0.244 times as long as in most frames: mend"), (12.9, "frames: mm for m, or another such unit"),
+        (13.1, "in most frames: mend"), (1 / 129, "mm for m"), (1 / 132, "most frames: mend"), (710, "mm for m"),
+        (690, "frames: mend"),
+    ],
+)  # fmt: skip
+def test_frames_are_of_one_size(factor, said):
+    with refused(said):
+        fit.slips._check_scale(at(30, lambda p: factor * p[30])(line_of()))
+
+
+@pytest.mark.parametrize(
+    ("degrees", "said"), [(119, ""), (121, "from 4 by 5 to 6 the body turns back in most frames: points")]
+)
+def test_points_run_along_the_body(degrees, said):
+    turn = np.exp(1j * np.radians(degrees) * (np.arange(10) >= 4))
+    z = np.concatenate([[0], np.cumsum(turn)]) / 10
+    trial = trial_of(np.arange(20.0), np.broadcast_to(np.stack([z.real, z.imag], -1), (20, 11, 2)))
+    with refused(said):
+        fit.slips._check_order(trial)
+
+
+def test_points_are_seen_in_half_of_the_frames_and_frames_have_most_of_their_points():
+    fit.slips._check_points(at((slice(20), 4), np.nan)(line_of()))
+    with pytest.raises(Refusal, match="trial.csv: point 5 is missing in 52.5 % of the frames: leave it out"):
+        fit.slips._check_points(at((slice(21), 4), np.nan)(line_of()))
+    trial = at((slice(20), [0, 1, 2, 3]), np.nan)(line_of())
+    assert fit.slips._without_poor_frames(trial) is trial
+    poor = at((slice(7, 35), [0, 1, 2, 3, 4]), np.nan)(line_of(move=0.1))
+    left = fit.slips._without_poor_frames(poor)
+    kept = [*range(7), *range(35, 40)]
+    assert left.notes == ("28 frames with fewer than 60% of the points are left out, the first at line 9",)
+    for name in ("t", "points", "lines"):
+        np.testing.assert_array_equal(getattr(left, name), getattr(poor, name)[kept])
+    with pytest.raises(Refusal, match="11 frames have most of their points: track more points, or lower least_score"):
+        fit.slips._without_poor_frames(at((slice(7, 36), [0, 1, 2, 3, 4]), np.nan)(line_of()))
+
+
+@pytest.mark.parametrize(
+    ("aside", "turned"), [(0.22, True), (0.25, False)]
+)  # 0.4 of what the turned frame is off, 0.24
+def test_frames_that_run_the_other_way_are_turned_round(aside, turned):
+    trial = line_of()
+    points = trial.points.copy()
+    points[12:] += [0.0, aside]
+    points[12:] = points[12:, ::-1]
+    trial = dataclasses.replace(trial, points=points)
+    mended = fit.slips._rotated(trial, True)
+    if not turned:
+        assert mended is trial is fit.slips._rotated(trial, False)
+        return
+    np.testing.assert_array_equal(mended.points, np.concatenate([points[:12, ::-1], points[12:]]))  # the fewer
+    assert mended.notes == ("12 frames run from the other end of the body and are turned round, the first at line 2",)
+    with pytest.raises(
+        Refusal, match=r"line 2 \(t = 0\): 12 frames run from the other end of the body, the first is this one: turn"
+    ):
+        fit.slips._rotated(trial, False)
+
+
+@pytest.mark.parametrize(("wide", "turned"), [(0.21, True), (0.19, False)])
+def test_ends_that_are_near_each_other_are_not_told_apart(wide, turned):
+    """A hairpin whose legs are ``wide`` of its length apart."""
+    height = np.array([1.0, 0.5, 0.0, 0.0, 0.5, 1.0]) * (1 - wide) / 2
+    hairpin = np.stack([wide / 2 * np.array([-1, -1, -1, 1, 1, 1]), height], -1)
+    points = np.repeat(hairpin[None], 20, 0)
+    points[8:11] = points[8:11, ::-1]
+    trial = trial_of(np.arange(20.0), points)
+    assert (fit.slips._rotated(trial, True) is trial) != turned
+
+
+@pytest.mark.parametrize(
+    ("wobble", "move", "jump", "found"),
+    [
+        (0.0, 0.0, 0.029, 0), (0.0, 0.0, 0.031, 1), (0.01, 0.0, 0.079, 0), (0.01, 0.0, 0.081, 1), (0.0, 0.01, 0.089, 0),
+        (0.0, 0.01, 0.091, 1), (0.0, 0.02, -0.25, 1),
+    ],
+)  # fmt: skip
+def test_points_jump_from_where_they_are_in_the_frames_around(wobble, move, jump, found):
+    """By more than 0.03 lengths, 8 times what they are off otherwise, and 6 times what the frames around are."""
+    trial = line_of()
+    points = trial.points.copy()
+    points[..., 1] += (wobble * (-1.0) ** np.arange(40) + move * np.arange(40))[:, None]
+    points[20, 3, 1] = jump + 20 * move
+    trial = dataclasses.replace(trial, points=points)
+    mended = fit.slips._without_jumps(trial, True)
+    if not found:
+        assert mended is trial
+        return
+    assert mended.notes == ("1 points that jump or swap are taken for missing: 4 at line 22",)
+    np.testing.assert_array_equal(np.argwhere(np.isnan(mended.points[..., 1])), [[20, 3]])
+    with pytest.raises(
+        Refusal, match=rf"line 22 \(t = 2, point 4\): it jumps by {abs(jump):.2g} body lengths from where it is in"
+    ):
+        fit.slips._without_jumps(trial, False)
+
+
+def test_many_jumps_are_counted():
+    trial = at(([5, 15, 25, 35, 35], [1, 2, 3, 4, 7]), 0.5)(line_of())
+    assert fit.slips._without_jumps(trial, True).notes == (
+        "5 points that jump or swap are taken for missing: 2 at line 7, 3 at line 17, 4 at line 27 and 2 more",
+    )
+
+
+@pytest.mark.parametrize(
+    ("longer", "said"),
+    [
+        (0.59, ""), (0.61, "the cycle from t = 2 to 3.61 takes 1.6 times as long as most: cut pauses"), (-0.37, ""),
+        (-0.38, "the cycle from t = 2 to 2.62 takes 0.62 times as long"),
+    ],
+)  # fmt: skip
+def test_cycles_are_of_one_pace(longer, said):
+    with refused(said):
+        fit._check_pace(line_of(), np.array([0.0, 1.0, 2.0, 3.0 + longer, 4.0 + longer, 5.0 + longer]))
+
+
+def test_a_cycle_has_a_gap_where_an_eighth_of_it_has_no_frame():
+    t = np.arange(0, 5, 0.1)
+    trial = dataclasses.replace(line_of(50), t=t)
+    assert not fit._gap(trial, 1.02, 1.9)
+    assert fit._gap(trial, 1.02, 1.8)
+    for out, start, end, gap in (
+        (12, 1.02, 2.7, False),
+        (12, 1.02, 2.6, True),
+        (10, 0.98, 2.0, False),
+        (10, 0.96, 2.0, True),
+    ):
+        assert fit._gap(dataclasses.replace(trial, t=np.delete(t, out)), start, end) == gap
+
+
+@pytest.mark.parametrize(
+    ("unit", "size", "length", "said"),
+    [
+        ("m", 29.9, None, ""), ("m", 30.1, None, "the body is 30.1 m long: say the unit of x and y: mm, cm or px by units"),
+        ("m", 1.01e-4, None, ""), ("m", 0.99e-4, None, "the body is 9.9e-05 m long"), ("BL", 1.39, None, ""),
+        ("BL", 0.72, None, ""),
+        ("BL", 1.41, None, "the body is 1.41 body lengths long: say the unit"),
+        ("BL", 0.71, None, "the body is 0.71 body lengths"),
+        ("m", 0.139, 0.1, ""), ("m", 0.02, 0.1, ""), ("", 100.0, None, ""),
+        ("m", 0.141, 0.1, "the points lie along 0.141 and the body is 0.1 long: give body_length in the unit of x and y"),
+    ],
+)  # fmt: skip
+def test_bodies_have_the_length_of_one(unit, size, length, said):
+    trial = dataclasses.replace(line_of(), points=size * line_of().points, unit=unit, length=length)
+    with refused(said):
+        assert fit._with_length(trial, smooth.curve_of(trial, np.linspace(0, 1, 11), 4, 4)) is trial
+
+
+def test_motions_turn_evenly_or_have_no_period():
+    t = np.arange(60) / 50
+    at = lambda off: 2 * np.pi * t / 0.8 + off * np.sqrt(2) * np.cos(25 * t)
+    headings = lambda at: np.stack([np.cos(at), 0.9 * np.sin(at), 0.3 * np.cos(at + 1)], -1)
+    for sign in (1, -1):
+        assert fit._turning(t, headings(sign * at(0.0)) + 2.0) == pytest.approx(0.8, rel=0.05)
+    assert fit._turning(t, headings(at(0.6))) > 0 == fit._turning(t, headings(at(0.85)))
+
+
+def test_a_phase_grows_by_a_fifth_of_a_turn_in_half_a_cycle():
+    t = np.arange(120) / 10
+    for least, said in ((0.41, ""), (0.39, "the motion stands, or is another one, after t = 3.1: cut pauses")):
+        phase = np.concatenate([np.arange(31) * 2, 60 + 2 + least * np.pi / 24 * np.arange(89)])
+        with refused(said):
+            fit._check_growing(line_of(), t, phase)
+
+
+@pytest.mark.parametrize(
+    ("course", "stride", "wave", "head", "turn", "said"),
+    [
+        (0.1, 0.3, -1, None, False, "11, by the motion: it moves there, against its wave"),
+        (3.0, 0.3, 1, None, True, "1, by the motion: it moves there, against its wave"),
+        (0.1, 0.015, 1, None, True, "1, by the motion: the wave runs away from it; the body hardly moves"),
+        (0.1, 0.3, -1, "last", False, "11, as given"), (0.1, 0.3, -1, "first", True, "1, as given; it moves tail first"),
+        (3.0, 0.3, -1, "last", False, "11, as given; it moves tail first"), (3.0, 0.3, 1, "first", True, "1, as given"),
+        (0.1, 0.015, -1, "first", True, "1, as given"),
+    ],
+)  # fmt: skip
+def test_a_body_moves_head_first_against_its_wave(course, stride, wave, head, turn, said, monkeypatch):
+    """A wave that runs to the head, 1, or away from it, of a body of length 2."""
+    numbers = np.tile([1.0, 2.0, 2 * stride, course, 0.0, 0.0, 1.0], (3, 1))
+    s = (np.arange(kinematics.NODES) + 0.5) / kinematics.NODES
+    first = np.tile(np.exp(-wave * 2j * np.pi * 1.2 * s), (3, 1))
+    monkeypatch.setattr(kinematics, "averages", lambda _: kinematics.Averages(numbers, first, None, None))
+    found = fit._head(line_of(), None, head)
+    assert (bool(found[0]), found[1]) == (turn, said)
+    if head is None and stride > 0.02:
+        monkeypatch.setattr(kinematics, "averages", lambda _: kinematics.Averages(numbers, first.conj(), None, None))
+        end = "11" if course < 1 else "1"
+        with pytest.raises(
+            Refusal, match=f"the body moves towards its point {end}, and so does its wave: most swimmers"
+        ):
+            fit._head(line_of(), None, None)
+        assert fit._head(line_of(), None, "last") == (False, "11, as given" + "; it moves tail first" * (course > 1))
+
+
+# Files: what is said of them.
+
+
+def table_of(unit="", timed=True, frames=12, points=5):
+    values = np.zeros((frames, points, 3))
+    return reader.Table(np.arange(frames), values, tuple("abcde"[:points]), values[..., 0], unit, timed)
+
+
+@pytest.mark.parametrize(
+    ("unit", "units", "scale", "found"),
+    [
+        ("mm", None, None, ("m", 1e-3, "")), ("", "cm", None, ("m", 1e-2, "")), ("m", "m", None, ("m", 1.0, "")),
+        ("BL", None, None, ("BL", 1.0, "")), ("", "BL", None, ("BL", 1.0, "")), ("px", None, 0.4, ("m", 4e-4, "")),
+        ("", None, 0.4, ("m", 4e-4, "")), ("px", "mm", None, ("m", 1e-3, "")),
+        ("", None, None, ("", 1.0, "lengths are in body lengths alone: nobody says the unit of x and y, say units")),
+        ("px", None, None, ("", 1.0, "lengths are in body lengths alone: nobody says how long a pixel is")),
+        ("mm", "cm", None, "f.csv: x and y are in mm by the names of their columns: drop units"),
+        ("mm", None, 0.4, "f.csv: scale is that of pixels: drop it, x and y are in mm"),
+        ("", "cm", 0.4, "f.csv: scale is that of pixels: drop it, x and y are in cm"),
+    ],
+)  # fmt: skip
+def test_units_of_lengths_are_those_of_the_header_or_of_options(unit, units, scale, found):
+    if isinstance(found, str):
+        with pytest.raises(Refusal) as said:
+            reader._unit(table_of(unit), "f.csv", units, scale)
+        assert str(said.value) == found
+    else:
+        name, size, notes = reader._unit(table_of(unit), "f.csv", units, scale)
+        assert (name, size, "".join(notes)) == (found[0], pytest.approx(found[1]), found[2])
+
+
+def test_times_are_those_of_the_file_or_of_frames():
+    t, timed, notes = reader._time(table_of(timed=False), 50.0)
+    assert timed and not notes and t.tolist() == [k / 50 for k in range(12)]
+    t, timed, notes = reader._time(table_of(timed=False), None)
+    assert (
+        not timed
+        and t[-1] == 11
+        and notes == ["times are in frames: nobody says how many there are in a second, say fps"]
+    )
+    assert reader._time(table_of(), None)[1:] == (True, [])
+    with pytest.raises(Refusal, match="fps is that of a file that counts frames: drop it, the file has a time"):
+        reader._time(table_of(), 50.0)
+
+
+@pytest.mark.parametrize(
+    ("frames", "points", "said"),
+    [
+        (12, 5, ""), (11, 5, "f.csv: 11 frames: give a whole trial"),
+        (12, 4, "f.csv: 4 points along the body: give 5 to 1000, better 10"),
+        (12, 1000, ""), (12, 1001, "1001 points along"),
+    ],
+)  # fmt: skip
+def test_trials_have_frames_and_points_enough(frames, points, said):
+    with refused(said):
+        reader._check(table_of(frames=frames, points=points), "f.csv")
+
+
+def csv_of(header, rows):
+    return "\n".join([header, *(",".join(map(str, row)) for row in rows)]) + "\n"
+
+
+def test_points_are_taken_by_name_in_their_order_and_with_the_bodys_length(tmp_path):
+    """In mm, of a body of which the points are half; a likelihood at the limit is enough."""
+    rows = [
+        [k, *(x for p in range(6) for x in (p + 0.1 * k, 10 * p, 0.6 if (k, p) != (3, 4) else 0.59)), 7]
+        for k in range(12)
+    ]
+    names = ",".join(f"P{p}_x_mm,P{p}_y_mm,P{p}_score" for p in range(6))
+    (tmp_path / "f.csv").write_text(csv_of(f"t,{names},more", rows))
+    trial = reader.read(tmp_path / "f.csv", points=["p5", "P4 ", "p3", "p2", "p0"], body_length=10.0, y="down")
+    assert (trial.names, trial.unit, trial.timed, trial.length) == (
+        ("p5", "p4", "p3", "p2", "p0"),
+        "m",
+        True,
+        pytest.approx(0.01),
+    )
+    order = np.array([5, 4, 3, 2, 0])
+    wanted = 1e-3 * np.stack([order + 0.1 * np.arange(12)[:, None], np.broadcast_to(-10 * order, (12, 5))], -1)
+    wanted[3, 1] = np.nan
+    np.testing.assert_allclose(trial.points, wanted, atol=1e-12)
+    assert trial.lines.tolist() == [[k] * 5 for k in range(2, 14)]
+    assert trial.notes == (
+        "0.017 of all points are missing, 0.017 of all by their likelihood: modes along the body stand for them",
+        "columns that are not used: more",
+    )
+    with pytest.raises(Refusal, match="f.csv: columns name a point twice: name each once, from one end of the body"):
+        reader.read(tmp_path / "f.csv", points=["p5", "p4", "p3", "p2", "p5"])
+    with pytest.raises(Refusal, match="p7"):
+        reader.read(tmp_path / "f.csv", points=["p5", "p4", "p3", "p2", "p7"])
+
+
+@pytest.mark.parametrize(
+    ("header", "change", "said"),
+    [
+        ("t,point,x,y", {7: [0, 5]}, "f.csv, line 9: 2 cells under 4 columns: mend that row"),
+        ("t,point,x,y", {3: ["", 3, 0, 0]}, "f.csv, line 5: no time: give every row its t or frame"),
+        ("t,point,x,y", {3: [0, 3, 0, "1e13"]}, "f.csv, line 5, column y: '1e13' is no number up to 1e+12: mend it"),
+        ("t,point,x,y", {8: [1, 2, 0, 0]}, "f.csv, line 10: point 2 is given twice at t = 1: keep one"),
+        ("t,other,x,y", {3: [5, 3, 0, 0]}, "f.csv, line 2: 4 points at t = 0, and 5 at most others: number the points"),
+        ("t,x1,y1,x2", {}, "f.csv, line 1: no columns of points: it has 't, x1, y1, x2'; give a CSV file"),
+        ("t;x1,y1,x2,y2", {},
+         "f.csv, line 1: no columns of points; columns must be parted by commas: it has 't;x1, y1, x2, y2'; give"),
+        ("s,x1,y1,x2,y2", {}, "f.csv, line 1: no column t or frame: it has 's, x1, y1, x2, y2'; name the column of the time t"),
+        ("t,a_x_mm,a_y_mm,b_x_mm,b_y", {}, "f.csv, line 1: columns in mm and in no unit: give all x and y in one unit"),
+    ],
+)  # fmt: skip
+def test_faults_of_files_are_told_by_line(header, change, said, tmp_path):
+    rows = {k: [k // 5, k % 5 + 1, k, k] for k in range(60)} | change
+    (tmp_path / "f.csv").write_text(csv_of(header, rows.values()))
+    with pytest.raises(Refusal) as found:
+        reader.read(tmp_path / "f.csv")
+    assert str(found.value).startswith(said)
+
+
+@pytest.mark.parametrize(
+    ("t", "said"),
+    [(2.0, "line 5: t = 2 comes after 2"), (1.5, "line 5: t = 1.5 comes after 2"), ("", "line 5: no time")],
+)
+def test_frames_come_in_their_order(t, said, tmp_path):
+    rows = [[k, *range(10)] for k in range(12)]
+    rows[3][0] = t
+    (tmp_path / "f.csv").write_text(csv_of("t," + ",".join(f"x{k},y{k}" for k in range(5)), rows))
+    with pytest.raises(Refusal, match=said + ": sort the rows by time, one for each"):
+        reader.read(tmp_path / "f.csv")
+
+
+# Words.
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "said"),
+    [
+        (0.34567, 0.0961, "0.346 +- 0.096"), (0.34567, 0.1, "0.35 +- 0.10"), (1234.5, 12.0, "1234 +- 12"),
+        (2.5, 340.0, "2 +- 340"),
+        (0.1234567891, 2e-12, "0.123456789 +- 0.000000000"), (0.34567, 0.0, "0.3457"), (0.34567, math.nan, "0.3457"),
+        (1e5, math.inf, "1e+05"),
+    ],
+)  # fmt: skip
+def test_values_have_the_digits_of_their_errors(value, error, said):
+    assert texts.pair(value, error).strip() == said and len(texts.pair(value, error).partition(" +-")[0]) >= 10
+
+
+def test_what_closes_the_gap_is_told_in_the_units_of_scenes():
+    of = lambda *numbers, unit="-": texts.closing_line(predicted.Closing("gamma0", numbers[0], unit, *numbers[1:]))
+    assert of(0.25, 0.5, 0.02, 0.01, 1.2) == "gamma0 = 0.25: 0.500 +- 0.020 gives the measured distance"
+    turned = of(0.25, 0.5, 0.02, 0.01, 1.2, unit="rad")
+    assert turned == "gamma0 = 14.32 deg: 28.6 +- 1.1 deg gives the measured distance"
+    none = of(0.25, math.nan, math.nan, 0.012345, 1.2, unit="rad")
+    assert none == "gamma0 = 14.32 deg: none from 0.707 to 68.8 deg gives the measured distance"
+    closing = predicted.Closing("gamma0", 0.25, "rad", math.nan, math.nan, 0.1, 1.2)
+    assert texts._numbers(closing)["value"] is None is texts._numbers(closing)["half_width"]
+
+
+def test_measured_and_predicted_agree_within_both_of_their_errors(fitted):
+    number = len(predicted.COMPARED)
+    of = lambda off: predicted.Comparison(
+        None, np.full(number, 0.5), np.full(number, 0.03), np.full(number, 0.5) + off, np.full(number, 0.04), None, ()
+    )
+    for off, said in (
+        (0.0499, "they agree"),
+        (-0.0499, "they agree"),
+        (0.0501, "they differ"),
+        (-0.0501, "they differ"),
+    ):
+        lines = texts._compared(of(off), dict.fromkeys(predicted.COMPARED, "BL"))
+        assert len(lines) == 2 + number and all(line.endswith(f"BL: {said}") for line in lines[2:])
+        assert lines[2].split()[:7] == ["speed", "0.500", "+-", "0.030", f"{0.5 + off:.3f}", "+-", "0.040"]
+
+
+def test_a_trial_is_told_in_lines(fitted):
+    result = question.result_of(fitted)
+    first, head, smoothed, level, *rows = texts.text(result).splitlines()
+    assert first == "synthetic: 4 full cycles of 30 points" and head == f"head: {fitted.head}" and len(rows) == 10
+    per_cycle = (len(fitted.curve.knots) - 12 + 1) / (fitted.trial.t[-1] * fitted.value("frequency")[0])
+    assert smoothed.startswith(
+        f"smoothed by {fitted.curve.modes} modes along the body and {per_cycle:.3g} knots a cycle, more"
+    )
+    noise = fitted.curve.noise / fitted.value("length")[0]
+    assert smoothed.endswith(f"noise of a point {noise:.2g} BL") and level == "with intervals of 95 % of cases:"
+    assert rows[0].split()[0::4] == ["frequency", "Hz"] and rows[-1].split()[0] == "wavelength"
+    short = dataclasses.replace(fitted, used=fitted.used[:3], level=0.9)
+    lines = texts.text(question.result_of(short)).splitlines()
+    assert (
+        lines[0] == "synthetic: 3 full cycles of 30 points; 1 with gaps left out"
+        and lines[3] == "with intervals of 90 % of cases:"
+    )
+    pixels = dataclasses.replace(fitted, trial=dataclasses.replace(fitted.trial, timed=False, unit=""))
+    assert [question.units_of(pixels)[x] for x in ("frequency", "length", "speed")] == ["1/frame", "", "BL/frame"]
+    metres = dataclasses.replace(fitted, trial=dataclasses.replace(fitted.trial, unit="m"))
+    assert [question.units_of(metres)[x] for x in ("frequency", "length", "speed")] == ["Hz", "m", "m/s"]
+
+
+def test_the_mean_cycle_and_the_times_of_cycles_are_those_of_the_curve(fitted):
+    result, cycles = question.result_of(fitted), fitted.cycles(fitted.curve)
+    headings = np.unwrap(np.angle(cycles.tangent), axis=-1)
+    headings -= headings.mean((1, 2), keepdims=True)
+    np.testing.assert_allclose(result["mean_cycle"].values, headings.mean(0), atol=1e-9)
+    raw = cycles.headings
+    np.testing.assert_allclose(result["mean_cycle"].error, raw.std(0, ddof=1) / 2, atol=1e-9)
+    np.testing.assert_allclose(result["phase"].values, np.pi * np.arange(1, 96, 2) / 48, rtol=1e-12)
+    times = kinematics.times(fitted.clock, fitted.clock.phase(fitted.curve), fitted.marks)
+    np.testing.assert_allclose(result["cycle_start"].values, times[:-1], atol=1e-9)
+    np.testing.assert_allclose(result["s"].values, np.arange(0.05, 1, 0.1), atol=1e-12)
+    n = len(QUANTITIES)
+    for name, k in (("slip_along", n), ("amplitude_along", n + 10)):
+        np.testing.assert_array_equal(result[name].values, fitted.intervals.value[k : k + 10])
+        np.testing.assert_array_equal(result[name].error, fitted.intervals.half_width[k : k + 10])
+    one = dataclasses.replace(fitted, used=fitted.used[:1])
+    assert question._mean_cycle(one)[-1].error is None

@@ -11,6 +11,7 @@ from structs import cell, save
 import rft
 from geomech import Study, scenes
 from geomech.gaits import Butterfly, Circle, Shchf
+from geomech.io import shchf
 from geomech.scenes import Scene
 from geomech.systems import Swimmer
 from rft.refusal import Refusal
@@ -146,3 +147,65 @@ def test_files_without_a_gait_are_refused(variables, settings, said, tmp_path):
 def test_settings_that_make_no_gait_are_refused(settings, said):
     with pytest.raises(Refusal, match=said):
         Shchf(**settings)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"alpha1": 31.4 * np.sin(T)}, ""), ({"alpha1": 31.42 * np.sin(T)}, "up to 31.42 where angles are in rad: convert it"),
+        ({"alpha2": np.sin(T) + 1.9e-3 * T / T[-1]}, ""),
+        ({"alpha2": np.sin(T) + 2.1e-3 * T / T[-1]}, "do not close: .* is 0.0021 rad from"),
+        ({"alpha1": [[0, 1, 1, 0]], "alpha2": [[0, 0, 1, 0]], "t": [[1, 2, 3, 4]]}, ""),
+        ({"alpha1": [[0, 1, 0]], "alpha2": [[0, 0, 0]], "t": [[1, 2, 3]]}, "no four shapes or more"),
+        ({"t": [*T[:100], *T[99:-1]]}, "no four shapes or more at ascending times"),
+        ({"alpha2": np.sin(T[:-1])}, "no four shapes"),
+        ({"A1": [0.0, 1.0]}, ""), ({"alpha1": "words"}, "has alpha1 that is no array of real numbers"),
+    ],
+)  # fmt: skip
+def test_points_close_and_are_in_rad(changes, said, tmp_path):
+    """A gap of a thousandth of the size of the loop, 2 here, is none."""
+    if not said:
+        assert Shchf(file=points(tmp_path / "a.mat", **changes)).joints == 2
+        return
+    with pytest.raises(Refusal, match=said):
+        Shchf(file=points(tmp_path / "a.mat", **changes))
+
+
+def test_curves_run_from_the_first_time_to_the_last():
+    """At uneven times, too; and the last shape is the first."""
+    t = np.array([2.0, 3.0, 5.0, 6.0, 10.0])
+    alpha = np.array([[0.1, 0.2], [1.0, 0.0], [0.5, -1.0], [-0.5, 0.5], [0.1005, 0.2005]])
+    variables = {"alpha1": alpha[:, 0], "alpha2": alpha[:, 1]}
+    found = shchf._curve({**variables, "t": t}, 1)
+    np.testing.assert_allclose(found.phase, 2 * np.pi * np.array([0, 1, 3, 4, 8]) / 8, rtol=1e-12)
+    np.testing.assert_array_equal(found.points, [*alpha[:4], alpha[0]])
+    np.testing.assert_allclose(shchf._curve(variables, 1).phase, 2 * np.pi * np.arange(5) / 4, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("number", "size"), [(1, 0.4), (2, 0.8), (0, None), (3, None)])
+def test_paths_are_counted_from_one(number, size, tmp_path):
+    paths(tmp_path / "a.mat")
+    if size:
+        assert np.abs(shchf.read(tmp_path / "a.mat", number).points - CIRCLE.shape(T, size)).max() < 1e-12
+        return
+    with pytest.raises(Refusal, match=f"has 2 gaits, and no {number}: take number = 1 to 2"):
+        shchf.read(tmp_path / "a.mat", number)
+
+
+@pytest.mark.parametrize(
+    ("rows", "joints"),
+    [
+        ({"A1": [0.1, 1, 2], "A2": [0.2, 3, 4], "B1": [0, 5, 6], "B2": [0, 7, 8]}, 2), ({"A1": [0.1, 1], "B1": [0.0, 5]}, 1),
+        ({"A1": [0.1, 1, 2], "A2": [0.2, 3], "B1": [0, 5, 6], "B2": [0, 7, 8]}, 0), ({"A1": [0.1], "B1": [0.0]}, 0),
+        ({"A1": [0.1, 1], "A2": [0.1, 1], "B1": [0.0, 5]}, 0), ({"A2": [0.1, 1], "B2": [0.0, 5]}, 0),
+    ],
+)  # fmt: skip
+def test_coefficients_come_in_pairs_of_one_length(rows, joints):
+    variables = {name: np.array(row, float) for name, row in rows.items()}
+    if not joints:
+        with pytest.raises(Refusal, match="has no gait: one is alpha1"):
+            shchf._curve(variables, 1)
+        return
+    found = shchf._curve(variables, 1)
+    for letter, values in (("A", found.cos), ("B", found.sin)):
+        np.testing.assert_array_equal(values, [rows[f"{letter}{k + 1}"] for k in range(joints)])

@@ -11,10 +11,12 @@ import rft
 from geomech import Study
 from geomech.gaits import Circle
 from geomech.geometry import connection
+from geomech.geometry.connection import Connection
 from geomech.geometry.curvature import ccf
 from geomech.geometry.minimum_perturbation import minimum_perturbation
 from geomech.io import tables
-from geomech.io.tables import matlab
+from geomech.io.tables import matlab, sysplotter
+from geomech.io.tables.base import Stored
 from geomech.scenes import Scene
 from geomech.studies import fields
 from geomech.systems import DifferentialDrive, IdealFluidSwimmer, NoSlipSnake, Swimmer, Table
@@ -396,3 +398,192 @@ def test_systems_of_other_kinds_are_exported_with_what_is_known_of_them(system, 
         again.scene.system.chain == (None if modes is None or isinstance(modes, str) else system.body)
         or kind == "inertia"
     )
+
+
+# The struct part by part, on an uneven grid.
+
+AXES = np.array([-1.0, -0.2, 0.1, 0.5, 1.0]), np.array([-0.6, 0.0, 0.3, 0.9])
+OWN = np.linspace(-1.2, 1.0, 7), np.linspace(-0.7, 0.95, 6)
+
+
+def cubic(axes, seed):
+    """A cubic of two angles on a grid, which splines of degree 3 keep."""
+    a, b = np.meshgrid(*axes, indexing="ij")
+    c = np.random.default_rng(seed).normal(size=6)
+    return c[0] + c[1] * a + c[2] * b**2 + c[3] * a * b + c[4] * a**3 + c[5] * a * b**2
+
+
+def uneven(change=lambda s: None):
+    """A struct in which every array is another, of a body of three links 0.5 long in all."""
+    many = lambda lead, seed, axes=AXES: cell(
+        np.array([cubic(axes, seed + k) for k in range(np.prod(lead))]).reshape(*lead, *map(len, axes)), lead
+    )
+    metric = [many((1,), k, OWN)[0, 0] for k in (90, 91, 92)]
+    M = np.array([[metric[0], metric[1]], [metric[1], metric[2]]])
+    s = {
+        "geometry": {"linklengths": np.array([0.1, 0.15, 0.25]), "baseframe": "head", "length": 0.5},
+        "physics": {"drag_coefficient": 2.0},
+        "grid": {name: cell(np.array(np.meshgrid(*x, indexing="ij")), (2,)) for name,
+         x in (("eval", AXES), ("metric_eval", OWN))},
+        "vecfield": {"eval": {"content": {"Avec": many((3, 2), 0), "Avec_optimized": many((3, 2), 10)}}},
+        "DA": many((3, 1), 20),
+        "DA_optimized": many((3, 1), 30), "B_optimized": {"eval": {"Beta": many((3,), 40)}}, "system_type": "drag",
+        "geomech_fit_residual": many((3,), 50), "metricfield": {"metric_eval": {"content": {"metric": cell(M, (2, 2))}}},
+    }  # fmt: skip
+    change(s)
+    return s
+
+
+def read(change=lambda s: None):
+    return sysplotter.parse(uneven(change), "", "", "0f")
+
+
+def of(lead, seed):
+    return np.array([cubic(AXES, seed + k) for k in range(np.prod(lead))]).reshape(*lead, 5, 4)
+
+
+def test_every_array_of_a_struct_is_where_it_belongs():
+    """In body lengths, of a body 0.5 long; its metric is carried over to the grid of A."""
+    held, lengths = read(), np.array([2.0, 2.0, 1.0])
+    two, one = lengths[:, None, None, None], lengths[:, None, None]
+    for found, wanted in (
+        (held.connection.A, two * of((3, 2), 0)), (held.computed.A_optimised, two * of((3, 2), 10)),
+        (held.computed.ccf, two * of((3, 1), 20)), (held.computed.ccf_optimised, two * of((3, 1), 30)),
+        (held.computed.beta, one * of((3,), 40)), (held.connection.residual, one * of((3,), 50)),
+    ):  # fmt: skip
+        np.testing.assert_allclose(found, wanted, rtol=1e-13)
+    speed = np.sqrt((held.connection.A**2).mean(1) + held.connection.residual**2)
+    np.testing.assert_allclose(held.connection.speed, speed, rtol=1e-13)
+    scale = 2.0 * 0.5**3
+    M = [[cubic(AXES, 90), cubic(AXES, 91)], [cubic(AXES, 91), cubic(AXES, 92)]]
+    np.testing.assert_allclose(held.metric.M * scale, M, atol=1e-12)
+    for found, wanted in zip((*held.connection.axes, *held.computed.metric_axes), (*AXES, *OWN)):
+        np.testing.assert_array_equal(found, wanted)
+    np.testing.assert_allclose(held.computed.metric[0, 1] * scale, cubic(OWN, 91), rtol=1e-13)
+    assert (held.connection.degree, held.metric.degree, held.power_degree, held.sha256) == (3, 3, 2.0, "0f")
+    assert held.body == {"lengths": [0.1, 0.15, 0.25], "frame": "link-3"} and held.frame == "link-3"
+    assert (held.sized, held.connection.unit, held.connection.length, held.shapes) == (
+        True,
+        "BL",
+        1.0,
+        ("alpha_1", "alpha_2"),
+    )
+
+    def less(s):
+        del s["DA"], s["B_optimized"], s["metricfield"], s["geomech_fit_residual"], s["geometry"]["length"]
+        del s["DA_optimized"], s["vecfield"]["eval"]["content"]["Avec_optimized"]
+
+    bare = read(less)
+    assert np.isnan(bare.connection.residual).all() and bare.metric is bare.power_degree is None
+    assert all(
+        x is None
+        for x in (bare.computed.A_optimised, bare.computed.beta, bare.computed.ccf, bare.computed.ccf_optimised)
+    )
+    np.testing.assert_allclose(bare.connection.A, two * of((3, 2), 0), rtol=1e-13)  # by the lengths of its links
+    del (unknown := uneven(less))["geometry"]
+    plain = sysplotter.parse(unknown, "", "", "")
+    assert (plain.sized, plain.body, plain.frame, plain.connection.length) == (False, None, "that of the table", None)
+    np.testing.assert_array_equal(plain.connection.A, of((3, 2), 0))
+    inertia = read(lambda s: s.update(system_type="inertia"))
+    assert inertia.power_degree is None
+    np.testing.assert_allclose(inertia.metric.M, M, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("geometry", "body", "frame", "length"),
+    [
+        ({"baseframe": "center"}, None, "center of sysplotter", None), ({}, None, "center of sysplotter", None),
+        ({"baseframe": 2.0, "length": 0.3}, None, "that of the table", 0.3),
+        ({"baseframe": "minimum-perturbation"}, None, "minimum-perturbation", None),
+        ({"linklengths": [1.0, 2.0, 4.0]}, {"lengths": [1.0, 2.0, 4.0], "frame": "link-2"}, "link-2", 7.0),
+        ({"linklengths": [1.0, 2.0], "baseframe": "center"}, None, "center of sysplotter", 3.0),
+        ({"linklengths": [1.0, 2.0, 4.0], "baseframe": 4.0}, None, "that of the table", 7.0),
+        ({"linklengths": [1.0, 2.0, 4.0], "baseframe": 0.0}, None, "that of the table", 7.0),
+        ({"linklengths": [1.0, 2.0, 4.0], "baseframe": 1.0, "length": -1.0},
+         {"lengths": [1.0, 2.0, 4.0], "frame": "link-1"}, "link-1", 7.0),
+        ({"linklengths": [1.0, 2.0], "baseframe": "com-mean", "length": [1.0, 2.0]},
+         {"lengths": [1.0, 2.0], "frame": "mean"}, "mean", 3.0),
+        ({"linklengths": [1.0, 2.0, 3.0], "baseframe": "tail", "length": 1e9, "modes": [[1.0], [2.0]]},
+         {"lengths": [1.0, 2.0, 3.0], "frame": "link-1", "modes": [[1.0, 2.0]]}, "link-1", 6.0),
+        ({"linklengths": [1.0, 2.0, 3.0], "baseframe": "head", "length": 0.99e9, "modes": np.zeros((0, 0))},
+         {"lengths": [1.0, 2.0, 3.0], "frame": "link-3"}, "link-3", 0.99e9),
+    ],
+)  # fmt: skip
+def test_bodies_of_structs_are_chains_where_their_frame_is_known(geometry, body, frame, length):
+    assert sysplotter._body({"geometry": geometry}) == (body, frame, length)
+
+
+def put(path, value):
+    """A change of a struct: an entry at a path of names and indices."""
+
+    def change(s):
+        for name in path[:-1]:
+            s = s[name]
+        s[path[-1]] = value(s[path[-1]]) if callable(value) else value
+
+    return change
+
+
+AT = ("vecfield", "eval", "content")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (put(("grid", "eval"), np.ones((5, 4))),
+         "has s.grid.eval that is no cell of the grids of two angles or more: save it by"),
+        (put(("grid", "eval"), lambda x: x[:1]), "has s.grid.eval that is no cell"),
+        (put(("grid", "eval", (1, 0)), np.ones((4, 5))), "has s.grid.eval of shapes (5, 4), (4, 5)"),
+        (put(("grid", "eval", (0, 0)), lambda x: x + 2e-9 * np.eye(5, 4)),
+         "has s.grid.eval{1} that does not change along dimension 1 alone"),
+        (put(("grid", "eval", (0, 0)), lambda x: x + 0.5e-9 * np.eye(5, 4)), ""),
+        (put((*AT, "Avec", (2, 1)), np.ones((4, 5))),
+         "has s.vecfield.eval.content.Avec{3, 2} of shape (4, 5) where its grid makes it (5, 4)"),
+        (put((*AT, "Avec", (1, 0)), None), "has s.vecfield.eval.content.Avec{2, 1} that is not finite"),
+        (put(("DA",), lambda x: x[:2]), "has s.DA that is no cell of 3 x 1 arrays: save it by"),
+        (put((*AT, "A_num"), cell(-of((3, 2), 0), (3, 2))), ""),
+        (put((*AT, "A_num"), cell(of((3, 2), 0), (3, 2))),
+         "is damaged: s.vecfield.eval.content.Avec{1, 1} is not the negative of A_num at (1, 1)"),
+        (put((*AT, "A_num"), cell(-of((3, 2), 0) * (1 + 1e-10), (3, 2))), ""),
+        (put((*AT, "A_num"), cell(-of((3, 2), 0) * (1 + 1e-8), (3, 2))), "is damaged"),
+        (put(("metricfield", "metric_eval", "content", "metric", (0, 1)), lambda x: x + 1e-10), ""),
+        (put(("metricfield", "metric_eval", "content", "metric", (0, 1)), lambda x: x + 1e-7),
+         "has s.metricfield.metric_eval.content.metric that is not symmetric: {1, 2} at (1, 1)"),
+        (put(("grid", "metric_eval", (0, 0)), lambda x: x + 0.2 + 1e-9), ""),
+        (put(("grid", "metric_eval", (0, 0)), lambda x: x + 0.2 + 4e-9),
+         "has s.grid.metric_eval that does not cover s.grid.eval"),
+        (put(("grid", "metric_eval", (1, 0)), lambda x: x - 0.05 - 1e-9), ""),
+        (put(("grid", "metric_eval", (1, 0)), lambda x: x - 0.05 - 4e-9), "has s.grid.metric_eval that does"),
+    ],
+)  # fmt: skip
+def test_arrays_of_a_struct_fit_each_other_or_are_refused(change, said):
+    if not said:
+        read(change)
+        return
+    with pytest.raises(Refusal) as found:
+        read(change)
+    assert str(found.value).startswith(said)
+
+
+def test_what_is_compared_is_the_middle_half_of_the_grid():
+    """What another program computed is off by a known share of the largest value at one place, and by more at the edge."""
+    c = computed()[0]
+    frame = minimum_perturbation(c)
+    ours = (
+        ccf(c).values,
+        frame.field.values,
+        ccf(Connection(c.axes, frame.connection(c), c.residual, c.speed, c.degree)).values,
+    )
+    largest = [np.abs(x).max((1, 2)) for x in ours]
+    assert min(x.max() for x in largest) > 1e-3
+    for place, inside in ((3, True), (2, False), (11, True), (12, False)):
+        theirs = [x.copy() for x in ours]
+        for x, most, share in zip(theirs, largest, (0.02, -0.03, 0.04)):
+            x[0, place, 7] += share * most[0]
+            x[:, 0, 0] += 5 * most
+        known = sysplotter.Computed(beta=theirs[1], ccf=theirs[0][:, None], ccf_optimised=theirs[2][:, None])
+        found = sysplotter.compared(Stored(c, computed=known))
+        names = "CCF of joints 1 and 2", "minimum-perturbation frame", "CCF in that frame"
+        assert tuple(found) == names
+        np.testing.assert_allclose([*found.values()], [0.02, 0.03, 0.04] if inside else 0.0, atol=1e-9)
+    assert list(sysplotter.compared(Stored(c, computed=sysplotter.Computed(beta=ours[1])))) == [names[1]]

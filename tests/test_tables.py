@@ -1,11 +1,15 @@
 """Connections in files: read back as they were, predicting what the scene they came from predicts, and never believed."""
 
+import contextlib
 import dataclasses
 import io
 import json
 import pickle
+import re
 import shutil
+import struct
 import warnings
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -21,8 +25,9 @@ from geomech.gaits import Butterfly, Circle, Ellipse, Fourier
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
 from geomech.io import tables
-from geomech.io.tables import matlab
+from geomech.io.tables import base, mat, matlab, netcdf
 from geomech.io.tables.base import checked_names
+from geomech.io.tables.mat import ERROR
 from geomech.scenes import Numerics, Scene
 from geomech.studies import accuracy, choose, estimate, fields, tiered
 from geomech.studies.single import single
@@ -688,3 +693,572 @@ def test_what_accuracy_costs_includes_the_tables_own_error(made, monkeypatch):
     monkeypatch.setattr(choose, "MOST_PHASES", 256)
     with pytest.raises(Refusal, match="no tier gets to 1e-06 .*: raise tolerance, or take a finer table"):
         choose.cheapest(scene, [0.5], 1e-6)
+
+
+# What a NetCDF file holds, part by part.
+
+
+def parts_of_a_file():
+    """Variables, with their dimensions, units and attributes of a table of 5 by 4 shapes of a body 0.3 m long."""
+    rng = np.random.default_rng(0)
+    axes, over = (np.linspace(-1, 1, 5), np.array([-0.5, 0.0, 0.2, 0.9])), ("alpha_1", "alpha_2")
+    sizes = {"component": 3, "joint": 2, "other_joint": 2, "coefficient": 4, "norm_coefficient": 5, "pair": 1}
+    lead = {
+        "A": ("component", "joint"), "fit_residual": ("component",), "speed": ("component",), "even_part": ("component",),
+        "harmonics": ("component", "coefficient"), "harmonics_residual": ("component",), "A_error": ("component", "joint"),
+        "norm": ("norm_coefficient",), "norm_residual": (), "ccf_pairs": ("pair", "component"),
+    }  # fmt: skip
+    variables = {name: ((*x, *over), rng.uniform(0.1, 1.0, [*map(sizes.get, x), 5, 4])) for name, x in lead.items()}
+    variables |= {name: ((name,), axis) for name, axis in zip(over, axes)} | {"joint": (("joint",), np.arange(2))}
+    variables["component"] = (
+        ("component", "component_length"),
+        np.array([list("x".ljust(5, "\0")), list("y".ljust(5, "\0")), list("theta")], "S1"),
+    )
+    variables["pair_joints"] = (("pair", "pair_joint"), np.array([[1.0, 2.0]]))
+    attributes = {
+        "length_unit": b"m",
+        "body_length": 0.3,
+        "interpolation": 2,
+        "frame": b"mean",
+        "level": 0.9,
+        "power_degree": 1.5,
+    }
+    return variables, dict.fromkeys(variables, ""), attributes
+
+
+def read_parts(change=lambda variables, units, attributes: None, sign=""):
+    parts = parts_of_a_file()
+    change(*parts)
+    return netcdf._stored(*parts, sign, "0f")
+
+
+def test_every_part_of_a_file_is_where_it_belongs():
+    v = {name: values for name, (_, values) in parts_of_a_file()[0].items()}
+    for sign, stated, turn in (
+        ("", "", 1),
+        ("-", "", -1),
+        ("", "xi = - A alphadot", -1),
+        ("+", "xi = - A alphadot", 1),
+    ):
+        held = read_parts(lambda v, u, a, stated=stated: a.update(sign_of_A=stated.encode()), sign)
+        c = held.connection
+        for found, wanted in zip(
+            (*c.axes, c.A, c.residual, c.speed, held.harmonics.coefficients, held.harmonics.residual, held.even, held.A_error),
+            (v["alpha_1"], v["alpha_2"], turn * v["A"], v["fit_residual"], v["speed"], turn * v["harmonics"],
+             v["harmonics_residual"], v["even_part"], v["A_error"]),
+        ):  # fmt: skip
+            np.testing.assert_array_equal(found, wanted)
+        assert held.sign == "+-"[turn < 0]
+    assert (c.degree, held.harmonics.degree, c.unit, c.length, held.frame) == (2, 2, "m", 0.3, "mean")
+    assert (held.length, held.unit, held.order, held.sized, held.level) == (0.3, "m", "ndgrid", True, 0.9)
+    assert (held.sha256, held.body, held.power_degree) == ("0f", None, 1.5)
+    np.testing.assert_array_equal(held.metric.coefficients, v["norm"])
+    np.testing.assert_array_equal(held.metric.residual, v["norm_residual"])
+
+
+def less(*names):
+    def change(variables, _, attributes):
+        for name in names:
+            variables.pop(name, None)
+            attributes.pop(name, None)
+
+    return change
+
+
+def test_what_a_file_does_not_say_is_the_usual():
+    v = {name: values for name, (_, values) in parts_of_a_file()[0].items()}
+    held = read_parts(
+        less(
+            "speed",
+            "harmonics_residual",
+            "norm_residual",
+            "length_unit",
+            "body_length",
+            "interpolation",
+            "frame",
+            "level",
+        )
+    )
+    np.testing.assert_allclose(
+        held.connection.speed, np.sqrt((v["A"] ** 2).mean(1) + v["fit_residual"] ** 2), rtol=1e-12
+    )
+    np.testing.assert_array_equal(held.harmonics.residual, v["fit_residual"])
+    assert (held.metric.residual == 0).all() and held.metric.residual.shape == (5, 4)
+    assert (held.connection.degree, held.length, held.unit, held.sized, held.level) == (3, 1.0, "BL", False, None)
+    assert held.connection.length is None and held.frame == "that of the table"
+    held = read_parts(
+        less("harmonics", "even_part", "A_error", "power_degree", "component", "pair_joints", "ccf_pairs")
+    )
+    assert held.harmonics is held.even is held.A_error is held.metric is held.power_degree is None
+    metric = lambda v, u, a: v.update(metric=(("joint", "other_joint", "alpha_1", "alpha_2"), np.ones((2, 2, 5, 4))))
+    assert (read_parts(metric).power_degree, read_parts(metric).metric.M.shape) == (1.5, (2, 2, 5, 4))
+    assert read_parts(lambda v, u, a: (metric(v, u, a), a.pop("power_degree"))).power_degree is None
+
+
+def cut(name, where, dimensions=None):
+    def change(variables, *_):
+        over, values = variables[name]
+        variables[name] = (dimensions or over, np.array(values[where]))
+
+    return change
+
+
+def attribute(**values):
+    return lambda variables, units, attributes: attributes.update(values)
+
+
+def masked(*names, singular=True):
+    """The shape (1, 2) is singular, in some variables."""
+
+    def change(variables, units, attributes):
+        for name in names:
+            variables[name][1][..., 1, 2] = np.nan
+        attributes.update({"singular_shapes": b"nan"} if singular else {})
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (less("joint"), "holds no connection, joint is missing: write it anew"),
+        (less("alpha_2"), "holds no connection, alpha_2 is"),
+        (cut("joint", np.s_[:, None]), "has A over"), (less("fit_residual"), "holds no connection, fit_residual is missing"),
+        (lambda v, u, a: u.update(alpha_2="degrees"), "has alpha_2 in 'degrees': shapes are angles in rad"),
+        (lambda v, u, a: u.update(alpha_2="radians", alpha_1="rad"), ""),
+        (cut("A", np.s_[:2]), r"has A of shape (2, 2, 5, 4) where"),
+        (cut("A", np.s_[:, :1]), "has A of shape (3, 1, 5, 4) where it must be (3, 2, ...), rows x, y, theta"),
+        (cut("fit_residual", np.s_[:2]), "has A of shape (3, 2, 5, 4) where"),
+        (cut("component", np.s_[::-1]), "has A of shape"),
+        (cut("A", np.s_[..., :3]), "has A of shape (3, 2, 5, 3) that does not fit its grid"),
+        (cut("A", (), ("joint", "component", "alpha_1", "alpha_2")), "has A over (joint, component, alpha_1, alpha_2) where"),
+        (lambda v, u, a: v.update(A=(v["A"][0], np.ones((3, 2, 5, 4), int))), "has A of shape (3, 2, 5, 4) that"),
+        (attribute(length_unit=b"feet"), "has a body_length or length_unit that makes no sense"),
+        (attribute(body_length=1e9), "has a body"),
+        (attribute(body_length=0), "has a body_length"), (attribute(body_length=0.99e9), ""),
+        (attribute(body_length=b"1"), "has a body"),
+        (attribute(interpolation=4), "has too few shapes for a spline of degree 4: write"), (attribute(interpolation=3), ""),
+        (attribute(interpolation=6), ""), (attribute(interpolation=0), ""),
+        (cut("harmonics", np.s_[:, :3]), "has harmonics of shape (3, 3, 5"),
+        (cut("harmonics", np.s_[:2]), "has harmonics of shape (2, 4, 5, 4)"),
+        (cut("harmonics", np.s_[:, :0]), "has harmonics of shape (3, 0"),
+        (cut("harmonics_residual", np.s_[:2]), "has harmonics of shape"), (cut("harmonics", np.s_[:, :2]), ""),
+        (cut("even_part", np.s_[:2]), "has even_part of shape (2, 5, 4) where it must be (3, ...)"),
+        (cut("A_error", np.s_[:, :1]), "has A_error of shape (3, 1, 5, 4) where A has (3, 2, 5, 4)"),
+        (lambda v, u, a: v["A_error"][1].__setitem__((0, 1, 2, 3), -1e-9),
+        "has A_error below 0 where it is half of an interval of A"),
+        (lambda v, u, a: v["A_error"][1].fill(0.0), ""),
+        (cut("pair_joints", np.s_[:, ::-1]), "has pair_joints other than [[1, 2]]"),
+        (cut("ccf_pairs", np.s_[:, :2]), "has ccf_pairs of shape (1, 2, 5, 4) where it must be (1, 3, ...)"),
+        (cut("ccf_pairs", np.s_[[0, 0]]), "has ccf_pairs of shape (2, 3, 5, 4)"),
+        (lambda v, u, a: v["ccf_pairs"][1].__setitem__((0, 2, 1, 1), np.nan), "has ccf_pairs that is not finite"),
+        (attribute(power_degree=100.0), "has a power_degree that makes no sense"), (attribute(power_degree=99), ""),
+        (attribute(power_degree=0), "has a power_degree"), (attribute(power_degree=[1.0, 2.0]), "has a power_degree"),
+        (attribute(power_degree=b"1"), "has a power_degree"), (attribute(power_degree=0.1), ""),
+        (cut("norm", np.s_[:4]), "has a norm of shape (4, 5, 4) where it must be (an odd number, ...) of two joints"),
+        (cut("norm", np.s_[:3]), ""), (masked("A", "fit_residual", "speed", "A_error"), ""),
+        (masked("A", "fit_residual", "speed", "A_error", singular=False),
+        "has A that is not finite (nan or inf) at index (0, 0, 1, 2)"),
+        (masked("A", "A_error"), "has fit_residual at singular shapes, where A is nan: write it anew"),
+        (masked("A", "fit_residual"), "has A_error at singular shapes"),
+        (masked("fit_residual"), "has fit_residual that is not finite"),
+        (lambda v, u, a: v["fit_residual"][1].fill(np.nan), ""), (masked("A_error"), "has A_error that is not finite"),
+    ],
+)  # fmt: skip
+def test_parts_of_a_file_fit_each_other_or_are_refused(change, said):
+    if not said:
+        read_parts(change)
+        return
+    with pytest.raises(Refusal) as found:
+        read_parts(change)
+    assert str(found.value).startswith(said)
+
+
+def test_singular_shapes_leave_no_harmonics_nor_even_part():
+    held = read_parts(masked("A", "fit_residual", "harmonics", "even_part", "A_error"))
+    assert held.harmonics is held.even is None
+    assert np.argwhere(np.isnan(held.connection.A[0, 0])).tolist() == [[1, 2]] and np.isnan(held.A_error).sum() == 6
+
+
+def parts_of_a_gait(**changes):
+    """Of two joints, with one harmonic of the gait and two of A."""
+    rng = np.random.default_rng(0)
+    shapes = {
+        "gait": (2, 3),
+        "gait_A": (3, 2, 5),
+        "gait_slope": (3, 2, 1, 5),
+        "gait_errors": (4, 3, 2, 2, 5),
+        "gait_off": (3, 2, 7),
+    }
+    parts = {name: rng.normal(size=shape) for name, shape in shapes.items()}
+    parts |= {
+        "gait_spread": np.eye(2)[..., None] * [1.0, 2.0, 3.0],
+        "gait_beyond": np.array([-0.1, 0.2, 0.3]),
+    } | changes
+    return {name: ((), values) for name, values in parts.items() if values is not None}
+
+
+OF_A_GAIT = {"level": 0.9, "error_factor": 2.1}
+
+
+def test_parts_of_a_gait_are_where_they_belong():
+    parts = {name: values for name, (_, values) in parts_of_a_gait().items()}
+    for turn in (1.0, -1.0):
+        found = netcdf._taylor_series(parts_of_a_gait(), OF_A_GAIT, turn)
+        for name, values in (
+            ("A", turn * parts["gait_A"]), ("slope", turn * parts["gait_slope"]), ("errors", turn * parts["gait_errors"]),
+            ("spread", parts["gait_spread"]), ("beyond", [0.1, 0.2, 0.3]), ("standard_error", np.abs(parts["gait_off"])),
+        ):  # fmt: skip
+            np.testing.assert_array_equal(getattr(found, name), values)
+        np.testing.assert_array_equal(found.loop.coefficients, parts["gait"])
+        assert (found.level, found.factor) == (0.9, 2.1)
+    assert (
+        netcdf._taylor_series(parts_of_a_gait(gait_off=None), OF_A_GAIT, 1.0).standard_error == np.zeros((3, 2, 1))
+    ).all()
+
+
+@pytest.mark.parametrize(
+    ("changes", "facts", "said"),
+    [
+        ({"gait_A": np.ones((3, 2))}, {}, "has a gait, but no gait_A that fits it: write it anew with 'geomech fit-gait"),
+        ({"gait_spread": None}, {}, "has a gait, but no gait_spread"),
+        ({"gait": np.ones((1, 2, 3))}, {}, "has a gait, but no gait that"),
+        ({"gait_A": np.ones((2, 2, 5))}, {}, "parts"), ({"gait_A": np.ones((3, 3, 5))}, {}, "parts"),
+        ({"gait_A": np.ones((3, 2, 7))}, {}, "parts"),
+        ({"gait_slope": np.ones((3, 2, 2, 5))}, {}, "parts"), ({"gait_slope": np.ones((3, 2, 1, 3))}, {}, "parts"),
+        ({"gait_slope": np.ones((2, 2, 1, 5))}, {}, "parts"), ({"gait_errors": np.ones((4, 2, 2, 2, 5))}, {}, "parts"),
+        ({"gait_errors": np.ones((4, 3, 2, 1, 5))}, {}, "parts"), ({"gait_errors": np.ones((0, 3, 2, 2, 5))}, {}, ""),
+        ({"gait_spread": np.ones((2, 1, 3))}, {}, "parts"), ({"gait_spread": np.ones((2, 2, 3))}, {}, "parts"),
+        ({"gait_spread": np.eye(3)[..., None]}, {}, "parts"), ({"gait_beyond": np.ones(2)}, {}, "parts"),
+        ({"gait_off": np.ones((3, 2))}, {}, "parts"), ({"gait_off": np.ones((3, 1, 7))}, {}, "parts"),
+        ({"gait_off": np.ones((3, 2, 0))}, {}, "parts"),
+        ({"gait_off": np.ones((2, 2, 7))}, {}, "parts"), ({"gait": np.ones((2, 4))}, {}, "parts"),
+        ({"gait": np.ones((2, 5))}, {}, ""),
+        ({"gait": np.ones((2, 1))}, {}, "has a gait that does not move: write it"),
+        ({"gait": np.eye(2, 3)[:, ::-1] * 0}, {}, "has a gait that"),
+        ({"gait_A": np.ones((3, 2, 4)), "gait_slope": np.ones((3, 2, 1, 4)), "gait_errors": np.ones((1, 3, 2, 2, 4))}, {},
+         "parts"),
+        ({"gait": np.ones((1, 3)), "gait_A": np.ones((3, 1, 5)), "gait_slope": np.ones((3, 1, 0, 5)),
+        "gait_errors": np.ones((1, 3, 1, 1, 5)),
+          "gait_spread": np.ones((1, 1, 3))}, {}, "has a gait that does not move"),
+        ({}, {"level": 0.0}, "parts"), ({}, {"level": 1.0}, "parts"), ({}, {"level": 0.01, "error_factor": 0.99e6}, ""),
+        ({}, {"error_factor": 0.0}, "parts"), ({}, {"error_factor": 1e6}, "parts"), ({}, {"level": [0.9]}, "parts"),
+        ({}, {"level": b"1"}, "parts"),
+        ({}, {"error_factor": b"2"}, "parts"), ({}, {"error_factor": [2.0]}, "parts"), ({}, {"level": None}, "parts"),
+    ],
+)  # fmt: skip
+def test_parts_of_a_gait_fit_each_other_or_are_refused(changes, facts, said):
+    read = lambda: netcdf._taylor_series(parts_of_a_gait(**changes), {**OF_A_GAIT, **facts}, 1.0)
+    if not said:
+        read()
+        return
+    with pytest.raises(Refusal) as found:
+        read()
+    assert str(found.value).startswith(
+        said.replace("parts", "has a gait whose parts do not fit each other: write it anew")
+    )
+
+
+# Checks of what any file holds.
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ([0.0, 1.0, 2.0, 31.4], ""),
+        ([-31.42, 0.0, 1.0, 2.0], "has a up to 31.42 where angles are in rad: convert it if these are degrees"),
+        ([0.0, 1.0, 2.0], "has no grid: a must be at least 4 ascending angles in rad"), ([0.0, 1.0, 1.0, 2.0], "has no grid"),
+        ([[0.0, 1.0, 2.0, 3.0]] * 4, "has no grid"), ([0.0, 1.0, 2.0, 1e9 + 10], "has a above 1e+09 at index (3)"),
+        ([3, 4, 5, 6], ""),
+        (["a", "b", "c", "d"], "has a that is no array of real numbers"), ([1j, 2j, 3j, 4j], "has a that is no array"),
+    ],
+)  # fmt: skip
+def test_axes_are_ascending_angles(values, said):
+    with pytest.raises(Refusal, match=f"^{re.escape(said)}") if said else contextlib.nullcontext():
+        np.testing.assert_array_equal(base.checked_axis("a", np.array(values)), values)
+
+
+def test_levels_and_bodies_that_make_no_sense_are_left_out():
+    for level, found in (
+        (0.5, 0.5),
+        (np.float32(0.25), 0.25),
+        (0, None),
+        (1, None),
+        (1.5, None),
+        (-0.5, None),
+        ([0.5], None),
+        (b"1", None),
+        (None, None),
+    ):
+        assert base.checked_level({} if level is None else {"level": level}) == found
+    chain = {"lengths": [1, 2], "frame": "mean", "modes": [[1.0]], "waves": 1.0}
+    for body, found in (
+        (json.dumps(chain), chain), (json.dumps({"lengths": [1], "frame": "link-1"}), {"lengths": [1], "frame": "link-1"}),
+        (json.dumps({"lengths": [1]}), None), (json.dumps({"frame": "mean"}), None), (json.dumps({**chain, "radius": 1}), None),
+        ("[1, 2]", None), ("{", None), (None, None), ("[" * 100_000, None),
+    ):  # fmt: skip
+        assert base.checked_body(body) == found
+
+
+@pytest.mark.parametrize(("zero", "sign"), [(0.55, "+"), (0.49, ""), (0.31, ""), (0.29, "-")])
+def test_the_sign_is_that_of_loops_of_three_and_five_tenths_of_the_grid(zero, sign):
+    """Of a field by which a loop about the grid's middle moves by - r^2 (1 - r^2 / zero^2); none where their signs differ."""
+    axes = np.linspace(-1, 3, 9), np.linspace(0, 2, 7)
+    a, b = np.meshgrid(axes[0] - 1.0, axes[1] - 1.0, indexing="ij")
+    g = 1 - (a**2 + b**2) / zero**2
+    A = np.zeros((3, 2, 9, 7))
+    A[0] = g * b, -g * a
+    A[1, 0], A[1, 1] = 0.3, 0.5
+    for turn in (1.0, -1.0):
+        c = Connection(axes, turn * A, np.zeros((3, 9, 7)), np.ones((3, 9, 7)), 3)
+        if sign:
+            assert base.detected_sign(c) == (sign if turn > 0 else "+-"[sign == "+"])
+        else:
+            with pytest.raises(Refusal, match="does not tell the sign of A: say sign"):
+                base.detected_sign(c)
+    with pytest.raises(Refusal, match="does not tell the sign of A: say sign"):
+        base.detected_sign(Connection(axes, 0 * A, np.zeros((3, 9, 7)), np.ones((3, 9, 7)), 3))
+
+
+# MATLAB files, byte by byte.
+
+
+def element(kind, data, order="<", small=False):
+    """An element of a file; a small one has up to four bytes in the place of its size."""
+    if small:
+        return struct.pack(f"{order}I", kind | len(data) << 16) + data.ljust(4, b"\0")
+    return struct.pack(f"{order}II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+
+def matrix(kind, shape, *parts, name=b"abc", flags=0, order="<", lead=None):
+    """The bytes of a matrix of a class and a shape, without its own tag."""
+    lead = lead or [
+        element(6, struct.pack(f"{order}II", kind | flags, 0), order),
+        element(5, struct.pack(f"{order}{len(shape)}i", *shape), order), element(1, name, order, small=len(name) < 5),
+    ]  # fmt: skip
+    return b"".join([*lead, *parts])
+
+
+def number(value=1.5, order="<"):
+    return element(
+        14, matrix(6, (1, 1), element(9, struct.pack(f"{order}d", value), order), name=b"", order=order), order
+    )
+
+
+@pytest.mark.parametrize("order", "<>")
+def test_matrices_of_numbers_and_texts_are_read_in_either_order_of_bytes(order):
+    read = lambda *args, **others: matlab._matrix(matrix(*args, **others, order=order), order, 1)
+    for kind, code, values in (
+        (9, "d", range(6)),
+        (7, "f", range(6)),
+        (3, "h", range(-3, 3)),
+        (2, "B", range(250, 256)),
+        (13, "Q", range(6)),
+    ):
+        data = element(kind, struct.pack(f"{order}6{code}", *values), order)
+        name, found = read(6, (2, 3), data)
+        assert (
+            name == "abc"
+            and found.tolist() == np.reshape(values, (2, 3), order="F").tolist()
+            and found.dtype.kind == ("f" if kind in (7, 9) else "iu"[code in "BQ"])
+        )
+    assert (
+        read(6, (1, 2), element(4, struct.pack(f"{order}2H", 7, 300), order, small=True), name=b"longer name")[0]
+        == "longer name"
+    )
+    end = "le" if order == "<" else "be"
+    for kind, raw in ((16, "\u00e4b".encode()), (17, "\u00e4b".encode(f"utf-16-{end}")),
+    (4, "\u00e4b".encode(f"utf-16-{end}")), (2, b"\xe4b"),
+                      (18, "\u00e4b".encode(f"utf-32-{end}"))):  # fmt: skip
+        assert read(4, (1, 2), element(kind, raw, order)) == ("abc", "\u00e4b")
+    assert read(6, (0, 3), element(9, b"", order))[1].shape == (0, 3)
+
+
+ONE = element(9, struct.pack("<d", 1.0))
+
+
+@pytest.mark.parametrize(
+    ("data", "found"),
+    [
+        (matrix(6, (1, 1), ONE, flags=0x0800), None), (matrix(6, (1,), ONE), None), (matrix(6, (1,) * 32, ONE), 32),
+        (matrix(6, (1,) * 33, ONE), None), (matrix(6, (-1, 1), ONE), None), (matrix(6, (1, 1), ONE, ONE), None),
+        (matrix(5, (1, 1), ONE), None),
+        (matrix(16, (1, 1), ONE), None), (matrix(15, (1, 1), ONE), 2), (matrix(6, (1, 1), element(8, b"12345678")), None),
+        (matrix(4, (1, 1), element(5, b"1234")), None), (matrix(6, (1, 2), ONE), "damaged"),
+        (matrix(6, (1, 1), element(9, b"1234567")), "damaged"),
+        (matrix(17, (1,), lead=[element(6, struct.pack("<II", 17, 0)), element(1, b"obj"), element(1, b"x")]), None),
+        (matrix(6, (), lead=[element(6, struct.pack("<II", 6, 0)), element(5, b"12345678")]), "damaged"),
+        (matrix(6, (), lead=[element(6, b"1234"), element(5, b"12345678"), element(1, b"a")]), "damaged"),
+        (matrix(6, (), lead=[element(6, struct.pack("<II", 6, 0)), element(5, b"123456"), element(1, b"a")]), "damaged"),
+    ],
+)  # fmt: skip
+def test_what_is_no_plain_array_is_skipped_and_what_does_not_fit_is_damaged(data, found):
+    if found == "damaged":
+        with pytest.raises(Refusal, match="^damaged$"):
+            matlab._matrix(data, "<", 1)
+        return
+    name, values = matlab._matrix(data, "<", 1)
+    assert (values is None) if found is None else values.ndim == found
+    assert name == ("obj" if data[8] == 17 else "abc")
+
+
+def test_cells_and_structs_hold_others_to_a_depth():
+    cell = matrix(1, (2, 1), number(1.5), element(14, b""))
+    name, values = matlab._matrix(cell, "<", 2)
+    assert name == "abc" and values.shape == (2, 1) and values[0, 0] == 1.5 and values[1, 0].shape == (0, 0)
+    with pytest.raises(Refusal, match="^damaged$"):
+        matlab._matrix(cell, "<", 1)
+    fields = element(5, struct.pack("<i", 4), small=True), element(1, b"ab\0\0c\0\0\0")
+    found = matlab._matrix(matrix(2, (1, 1), *fields, number(2.5), number(3.5)), "<", 2)[1]
+    assert {key: float(x.item()) for key, x in found.items()} == {"ab": 2.5, "c": 3.5}
+    assert matlab._matrix(matrix(2, (1, 2), *fields, *[number()] * 4), "<", 2)[1] is None
+    for bad in (
+        matrix(1, (2, 2), number()), matrix(1, (1, 1), ONE), matrix(2, (1, 1), *fields, number()), matrix(2, (1, 1), fields[0]),
+        matrix(2, (1, 1), element(5, struct.pack("<i", 0), small=True), fields[1], number()), matrix(2, (1,
+         1), *fields, ONE, ONE),
+        matrix(2, (1, 1), element(5, struct.pack("<i", -4), small=True), fields[1], number(), number()),
+        matrix(2, (1, 1), element(5, struct.pack("<i", 3), small=True), fields[1], number(), number()),
+        matrix(2, (1, 1), element(5, b"12", small=True), fields[1], number(), number()),
+    ):  # fmt: skip
+        with pytest.raises(Refusal, match="^damaged$"):
+            matlab._matrix(bad, "<", 2)
+
+
+def test_elements_fill_a_file_and_are_not_longer(monkeypatch):
+    both = element(1, b"abcde") + element(2, b"xy", small=True) + element(3, b"12345678")
+    assert list(matlab._elements(both, "<")) == [(1, b"abcde"), (2, b"xy"), (3, b"12345678")]
+    for bad in (both + b"1234567", both[:-1], struct.pack("<I", 1 | 5 << 16) + b"12345678", element(1, b"a")[:4]):
+        with pytest.raises(Refusal, match="^cut short$"):
+            list(matlab._elements(bad, "<"))
+    head, whole = b"MATLAB".ljust(124) + b"\x00\x01IM", element(14, matrix(6, (1, 1), ONE))
+    packed = lambda data: struct.pack("<II", 15, len(x := zlib.compress(data))) + x
+    assert matlab.arrays(head + whole)["abc"] == 1.0 == matlab.arrays(head + packed(whole) + packed(whole))["abc"]
+    assert matlab.arrays(head + element(14, b"") + element(9, b"12345678")) == {}
+    with pytest.raises(Refusal, match="^no MATLAB file of version 5 to 7$"):
+        matlab.arrays(b"MATLAB".ljust(124) + b"\x00\x02IM" + whole)
+    with pytest.raises(Refusal, match="^damaged$"):
+        matlab.arrays(head + element(15, b"no zip at all..."))
+    cut = zlib.compress(whole)[:-6]
+    with pytest.raises(Refusal, match="^cut short, or too large$"):
+        matlab.arrays(head + struct.pack("<II", 15, len(cut)) + cut)
+    monkeypatch.setattr(matlab, "LARGEST", 2 * len(whole) + 1)
+    assert matlab.arrays(head + packed(whole) * 2)["abc"] == 1.0
+    monkeypatch.setattr(matlab, "LARGEST", 2 * len(whole))
+    with pytest.raises(Refusal, match="^cut short, or too large$"):
+        matlab.arrays(head + packed(whole) * 2)
+
+
+def mat_with(monkeypatch, about=None, sign="+", order="", left_out=(), **changes):
+    """A table of 5 by 4 shapes from variables of a MATLAB file, as of ndgrid, with A_x1 = 1, A_x2 = 2 ... at the first."""
+    axes = np.linspace(-1, 1, 5), np.array([-0.5, 0.0, 0.2, 0.9])
+    shapes = np.meshgrid(*axes, indexing="ij")
+    plain = np.arange(20.0).reshape(5, 4)
+    found = {"alpha1": shapes[0], "alpha2": shapes[1]}
+    found |= {name: k + 0.1 * plain for k, name in enumerate(("Ax1", "Ax2", "Ay1", "Ay2", "Atheta1", "Atheta2"), 1)}
+    found |= {
+        "M11": 2 + plain,
+        "M12": 0.5 + 0 * plain,
+        "M22": 1 + plain,
+        mat.RESIDUAL: np.stack([plain, plain + 1, plain + 2]),
+    }
+    found |= {ERROR: 0.1 + np.zeros((3, 2, 5, 4)), **changes}
+    if about is not None:
+        found[mat.ABOUT] = json.dumps(about)
+    monkeypatch.setattr(mat, "variables", lambda raw, names: {k: x for k, x in found.items() if k not in left_out})
+    return mat.parse(b"", sign, order, "0f")
+
+
+def test_parts_of_a_mat_file_are_where_they_belong(monkeypatch):
+    about = {
+        "unit": "m",
+        "length": 0.3,
+        "interpolation": 2,
+        "frame": "mean",
+        "level": 0.9,
+        "power_degree": 1.5,
+        "sign": "-",
+        "shapes": ["a", "b"],
+    }
+    plain = np.arange(20.0).reshape(5, 4)
+    for sign, turn in (("", -1), ("-", -1), ("+", 1)):
+        held = mat_with(monkeypatch, about, sign)
+        c = held.connection
+        np.testing.assert_allclose(turn * c.A, np.arange(1, 7).reshape(3, 2, 1, 1) + 0.1 * plain, rtol=1e-12)
+        assert held.sign == ("+" if turn > 0 else "-")
+    np.testing.assert_array_equal(c.residual, [plain, plain + 1, plain + 2])
+    np.testing.assert_allclose(c.speed, np.sqrt((c.A**2).mean(1) + c.residual**2), rtol=1e-12)
+    np.testing.assert_array_equal(held.metric.M, [[2 + plain, 0.5 + 0 * plain], [0.5 + 0 * plain, 1 + plain]])
+    assert (c.degree, held.metric.degree, c.unit, c.length, held.length, held.unit) == (2, 2, "m", 0.3, 0.3, "m")
+    assert (held.frame, held.level, held.power_degree, held.sized, held.shapes) == ("mean", 0.9, 1.5, True, ("a", "b"))
+    assert (held.order, held.assumptions, held.sha256, held.body) == ("ndgrid", (), "0f", None)
+    assert (held.A_error == 0.1).all() and held.A_error.shape == (3, 2, 5, 4)
+    bare = mat_with(monkeypatch, left_out=("M12", mat.RESIDUAL, ERROR))
+    assert (bare.unit, bare.length, bare.sized, bare.frame, bare.level) == ("BL", 1.0, False, "that of the table", None)
+    assert bare.metric is bare.A_error is bare.power_degree is None and np.isnan(bare.connection.residual).all()
+    assert bare.connection.degree == 3 and bare.shapes == ("alpha_1", "alpha_2")
+    np.testing.assert_allclose(bare.connection.speed, np.sqrt((bare.connection.A**2).mean(1)), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("about", "sized", "degree", "power"),
+    [
+        ({"unit": "m", "length": 0.99e9, "interpolation": 1, "power_degree": 99.0}, True, 1, 99.0),
+        ({"unit": "m", "length": 1e9, "interpolation": 4, "power_degree": 100.0}, False, 3, None),
+        ({"unit": "BL", "length": 1.0, "interpolation": 0, "power_degree": 0.0}, True, 3, None),
+        ({"unit": "m", "length": 0.0, "interpolation": 3, "power_degree": 2}, False, 3, None),
+        ({"unit": "m", "length": 2, "frame": 3, "level": "most"}, False, 3, None), ([1, 2], False, 3, None),
+        ({"unit": "mm", "length": 2.0}, False, 3, None), ({"power_degree": 0.1}, False, 3, 0.1),
+    ],
+)  # fmt: skip
+def test_what_a_mat_file_says_of_itself_is_taken_where_it_makes_sense(about, sized, degree, power, monkeypatch):
+    held = mat_with(monkeypatch, about)
+    size = (about["unit"], about["length"]) if sized else ("BL", 1.0)
+    assert (held.sized, held.unit, held.length, held.connection.degree, held.power_degree) == (
+        sized,
+        *size,
+        degree,
+        power,
+    )
+    assert held.frame == "that of the table" and held.level is None
+
+
+GRID = np.zeros((5, 4))
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"order": "meshgrid"}, "has arrays that run as ndgrid's: drop order"), ({"order": "ndgrid"}, ""),
+        ({"alpha1": np.linspace(0, 1, 5)[:, None], "alpha2": np.linspace(0, 1, 4)[None]},
+         "has alpha1 and alpha2 as rows, which leave the"),
+        ({"alpha1": np.linspace(0, 1, 5)[:, None], "alpha2": np.linspace(0, 1, 4)[None], "order": "ndgrid"}, ""),
+        ({"alpha1": np.linspace(0, 1, 5)[:, None], "alpha2": np.linspace(0, 1, 4)[None], "order": "meshgrid"},
+         "has Ax1 of shape (5, 4) where"),
+        ({"alpha1": GRID[:, :3]}, "has alpha1 (5, 3) and alpha2 (5, 4), which span no grid"),
+        ({"M11": 0.25 / (1 + np.arange(20.0).reshape(5, 4))}, "has M11, M12 and M22 that are no metric at"),
+        ({"M11": 0.26 / (1 + np.arange(20.0).reshape(5, 4))}, ""),
+        ({"M11": -1 - GRID, "M22": -1 - GRID}, "has M11, M12 and M22 that are"),
+        ({"M22": GRID}, "has M11, M12 and M22 that are no metric at"),
+        ({"M12": GRID[:4]}, "has M12 of shape (4, 4) where alpha1 and alpha2"),
+        ({"left_out": ("M11",), "M12": GRID[:4]}, ""),
+        ({"left_out": ("Ay1",)}, "has no Ay1: a connection is alpha1, alpha2, Ax1"),
+        (dict.fromkeys(("Ax1", "Ax2", "Ay1", "Ay2", "Atheta1", "Atheta2"), GRID), "has a connection that is zero everywhere"),
+        ({ERROR: np.zeros((3, 2, 4, 5))}, "has geomech_A_error of shape (3, 2, 4, 5) where A has (3, 2, 5, 4)"),
+        ({ERROR: "none"}, ""),
+        ({mat.RESIDUAL: np.zeros((3, 4, 5))}, ""),
+        ({mat.RESIDUAL: np.full((3, 5, 4), np.inf)}, "has geomech_fit_residual that is not finite"),
+        ({"alpha1": 3.1 * np.linspace(-2, 2, 5)[:, None] + GRID}, ""),
+        ({"alpha1": 3.2 * np.linspace(-2, 2, 5)[:, None] + GRID}, "has alpha1 up to"),
+        ({"alpha1": 3.2 * np.linspace(-2, 2, 5)[:, None] + GRID, "about": {}}, ""),
+        ({"alpha1": np.linspace(-1, 1, 5)[:, None] + GRID + 2e-9 * np.arange(4)},
+         "has alpha1 and alpha2 that span no grid: one must"),
+        ({"alpha1": np.linspace(-1, 1, 5)[:, None] + GRID + 2e-10 * np.arange(4)}, ""),
+    ],
+)  # fmt: skip
+def test_parts_of_a_mat_file_fit_each_other_or_are_refused(changes, said, monkeypatch):
+    if not said:
+        mat_with(monkeypatch, **changes)
+        return
+    with pytest.raises(Refusal) as found:
+        mat_with(monkeypatch, **changes)
+    assert str(found.value).startswith(said)

@@ -41,9 +41,8 @@ def protophase(t: np.ndarray, alpha: np.ndarray, period: float) -> np.ndarray:
     """
     from scipy.signal import butter, hilbert, sosfiltfilt
 
-    centred = alpha - alpha.mean(0)
     band = 2 * np.array([0.5, 1.5]) * (t[1] - t[0]) / period
-    slow = sosfiltfilt(butter(ORDER, band, "bandpass", output="sos"), centred, axis=0)
+    slow = sosfiltfilt(butter(ORDER, band, "bandpass", output="sos"), alpha, axis=0)
     z = hilbert(slow, axis=0)
     _, vectors = np.linalg.eigh(z.conj().T @ z)
     return np.unwrap(np.angle(z @ vectors[:, -1]))
