@@ -102,9 +102,10 @@ def test_a_plane_is_that_of_the_whole_field_in_sand():
         k = np.abs(axes[1] - at[1]).argmin()
         for name in ("A", "residual", "speed"):
             whole = getattr(fitted, name)[..., k, :]
-            np.testing.assert_allclose(
-                getattr(cut.connection, name), whole[:, [0, 2]] if name == "A" else whole, atol=1e-9
-            )
+            for some in (cut, interpolated_plane(fitted, (0, 2), at)):
+                np.testing.assert_allclose(
+                    getattr(some.connection, name), whole[:, [0, 2]] if name == "A" else whole, atol=1e-9
+                )
         assert sum(asked) == (13 if half else 25)  # through the straight shape, left and right are alike
 
 

@@ -488,6 +488,32 @@ def test_a_foot_meets_less_sand_in_its_print_and_prints_lie_on_slopes_and_hills(
 
 
 @needs_numba
+def test_prints_in_a_world_that_is_turned_are_turned():
+    """By quarters, of a box that tumbles through the side of a hill; in ground so steep that nothing slides."""
+    box = '<body><freejoint/><geom type="box" size="0.05 0.03 0.02" mass="1e6"/></body>'
+    rises, grounds = np.linspace(0.0, 1.0, 5) * np.ones((4, 1)), []
+    hills = '<asset><hfield name="hills" nrow="4" ncol="5" size="1 1 0.4 0.1" elevation="{}"/></asset>'
+    hills = hills.format(" ".join(map(str, rises.ravel())))
+    for quarters in range(4):
+        yaw = Rotation.from_euler("z", 90 * quarters, degrees=True)
+        field = f'<geom name="hills" type="hfield" hfield="hills" pos="0 0 -0.2" euler="0 0 {90 * quarters}"/>'
+        model = model_of(box + field, REMEMBERS.format(0.005), hills)
+        data, (x, y, _) = mujoco.MjData(model), yaw.apply([0.35, -0.15, 0])
+        data.qpos[:3], data.qvel[:3] = yaw.apply([0.31, -0.17, 0.08]), yaw.apply([0.3, 0.2, -0.1])
+        data.qpos[3:] = np.roll((yaw * Rotation.from_rotvec([0.5, -0.3, 0.4])).as_quat(), 1)
+        data.qvel[3:] = [3.0, -2.0, 4.0]
+        prints = rft.mujoco.Footprints(0.01, *((0.5, 0.4) if quarters % 2 == 0 else (0.4, 0.5)), x, y, repose=1.5)
+        with rft.mujoco.attach(model, MAP, geoms=[0], rounding=0.01, level="hills", footprints=prints) as sand:
+            undisturbed, known = sand.ground(data)[2], sand._bed.prints
+            assert known.first.tolist() == [0, len(known.points)]
+            mujoco.mj_step(model, data, 20)
+            grounds.append(np.rot90(sand.ground(data)[2] - undisturbed, quarters))
+    assert np.ptp(grounds[0]) > 0.03
+    for ground in grounds[1:]:
+        np.testing.assert_allclose(ground, grounds[0], rtol=0, atol=1e-13)
+
+
+@needs_numba
 def test_each_simulation_remembers_for_itself():
     """Data, copies, resets, rollouts and batches each have the ground of their own motion."""
     model = model_of(BALL, '<size nuserdata="9000"/>')

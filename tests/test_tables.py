@@ -74,6 +74,12 @@ def test_netcdf_gives_back_every_digit(made):
     np.testing.assert_array_equal(held.harmonics.residual, s.table("harmonic").residual)
     assert (held.length, held.unit, held.frame, held.sign, held.assumptions) == (0.3, "m", "link-1", "+", ())
     assert held.mirror and not tables.load(folder / "a.mat").harmonics
+    for off, mirror in ((1e-11, True), (1e-7, False)):  # of the largest A, where some are 0
+        A = held.connection.A + off * np.abs(held.connection.A).max() * (np.arange(s.fitted.A[0, 0].size) == 3).reshape(
+            s.fitted.A[0, 0].shape
+        )
+        moved = dataclasses.replace(held, connection=dataclasses.replace(held.connection, A=A))
+        assert moved.mirror == mirror and np.abs(A).min() < 1e-12
 
 
 def test_netcdf_of_three_joints_and_of_singular_shapes(tmp_path):
