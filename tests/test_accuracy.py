@@ -31,6 +31,14 @@ def line(results, label):
     return next(x for x in results["lines"] if x["label"] == label)
 
 
+def test_errors_are_root_mean_squares_over_amplitudes():
+    """Of distances, in body lengths; a turn is none."""
+    scene = scenes.parse(scenes.load("three-link-viscous").text.replace("[body]", "[body]\nlength = 2.0"))
+    away = np.array([[0.06, 0.08, 0.0], [0.0, -0.2, 0.1], [0.0, 0.0, 0.3]])
+    error = tiered.Settings(scene).errors([away + 0.5], [np.full((3, 3), 0.5)])["error"]
+    assert error == pytest.approx(np.sqrt((0.05**2 + 0.1**2) / 3))
+
+
 def test_every_setting_gets_better(glass):
     """Each setting's finest value beats its coarsest, but for those whose tier has an error of its own."""
     assert len(glass["lines"]) == len(tiered.SETTINGS) - 1  # no effect cuts the body into pieces
