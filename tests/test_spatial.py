@@ -450,6 +450,7 @@ def test_smooth_meshes_have_the_normals_of_their_surface():
         radial = ball.middles / np.linalg.norm(ball.middles, axis=-1, keepdims=True)
         assert np.abs(ball.middle_normals - radial).max() < off < np.abs(ball.normals - radial).max()
     finer = quartered(mesh)
+    np.testing.assert_allclose(np.linalg.norm(finer.smooth_normals, axis=-1), 1.0, atol=1e-15)
     middle = finer.middle_normals[3 * len(mesh.faces) :]  # of the triangle in the middle of each
     assert np.abs(middle - mesh.middle_normals).max() < 5e-3
     both = smooth(Mesh(mesh.vertices, mesh.faces[side], closed=False)).two_sided

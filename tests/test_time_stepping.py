@@ -241,7 +241,7 @@ def test_pauses_and_empty_batches():
     assert np.isfinite(found.xi).all()
     assert np.abs(found.xi[3]).max() < 1e-8
     nothing = time_steps(GLASS, Chain(), alpha[None][:0], alphadot[None][:0], effects=(Transient(travel=0.1),))
-    assert nothing.xi.shape == (0, 16, 3)
+    assert (nothing.xi.shape, nothing.pose.shape) == ((0, 16, 3), (0, 17, 3))
 
 
 HARD = {

@@ -328,3 +328,11 @@ def test_a_signal_that_comes_as_a_thread_ends_is_no_reason_to_wait_for_ever(monk
     with pytest.raises(terminal.Stopped):
         threaded.run_shares(lambda share, stop: stop.wait(0.2 * share) or ended.append(share), [0, 1, 5])
     assert ended == [0]  # the others were told to stop
+
+
+@pytest.mark.timeout(20)
+def test_an_error_in_a_thread_is_raised_and_stops_the_others():
+    stopped = []
+    with pytest.raises(ZeroDivisionError):
+        threaded.run_shares(lambda share, stop: stopped.append(stop.wait(5)) if share else 1 / share, [0, 1, 2])
+    assert stopped == [True, True]
