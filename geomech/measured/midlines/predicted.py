@@ -108,9 +108,7 @@ def _about_mean(xi: np.ndarray, net: np.ndarray) -> np.ndarray:
 
 def _bends(cycles: kinematics.Cycles, weights: np.ndarray, elements: int) -> tuple[np.ndarray, np.ndarray]:
     """Return bends and their rates (R, PHASES, elements - 1) of mean cycles, by HARMONICS harmonics."""
-    headings = cycles.headings
-    relative = np.tensordot(weights, headings - headings.mean(-1, keepdims=True), 1)
-    spectrum = np.fft.rfft(relative, axis=1)[:, : HARMONICS + 1]
+    spectrum = np.fft.rfft(np.tensordot(weights, cycles.headings, 1), axis=1)[:, : HARMONICS + 1]
     wave = np.arange(HARMONICS + 1)[:, None]
     restored = lambda s: np.fft.irfft(s, PHASES, axis=1)
     places = (np.arange(elements) + 0.5) / elements
