@@ -161,7 +161,7 @@ def test_run_leaves_everything(undrawn, tmp_path):
 def test_scenes_are_listed():
     code, out, _ = geomech("scenes")
     assert code == 0
-    heads = [line.split()[0] for line in out.splitlines() if line.strip()]
+    heads = [line.split()[0] for line in out.splitlines() if line[:1].strip()]
     assert {*scenes.builtin_names(), "c-leg", "xplorer", "glass-0.3mm-loose", "poppy-seeds-close"} <= {*heads}
     assert geomech("scenes", "--show", "three-link-glass")[1] == scenes.load("three-link-glass").text
 
