@@ -48,9 +48,13 @@ HARD = {
     "at random": lambda n: np.random.default_rng(n).normal(size=(2, 60, n)) * [[[2.0]], [[1.0]]],
 }
 
-# Others are between these. Of strange bodies one closed form and quadrature, of other sizes what rounds and what does not.
-SOME_LAWS = ("coulomb", "sharp", "strong", "viscous-1", "measured")
-STRANGE_LAWS = ("sharp", "viscous-1", "measured")
+SOME_LAWS = (
+    "coulomb",
+    "sharp",
+    "strong",
+    "viscous-1",
+    "measured",
+)  # for large and strange bodies: others are between these
 STRANGE_BODIES = {
     "a millionth of a link": Chain((1, 1e-6, 1)),
     "a millionth at the end": Chain((1, 1, 1e-6)),
@@ -84,8 +88,7 @@ def test_hard_cases(name):
     its residual leaves the sixth digit open; there the two are compared at a wider one."""
     body, ill = (BODIES | STRANGE_BODIES)[name], name in ILL_CONDITIONED
     backends = ("numpy", "numba") if backend.installed() else ("numpy",)
-    labels = SOME_LAWS if name in BODIES else STRANGE_LAWS[: 2 if body.length != 1 else 3]
-    for label, medium in (MEDIA if name == "three" else {label: MEDIA[label] for label in labels}).items():
+    for label, medium in (MEDIA if name == "three" else {label: MEDIA[label] for label in SOME_LAWS}).items():
         some = slice(None, None, 1 if body.joints < 5 or label in CLOSED else 3)  # quadrature takes its time
         cases, alpha, alphadot = (x[some] for x in hard(body.joints, ill))
         fastest = 3 * np.linalg.norm(alphadot, axis=-1, keepdims=True) * [body.length, body.length, 1] + 1e-300

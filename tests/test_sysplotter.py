@@ -1,7 +1,5 @@
 """sysplotter's struct s: read as it saves it, and what it computed agrees with ours of the same swimmer."""
 
-import struct as packed
-
 import numpy as np
 import pytest
 from scipy.io import loadmat
@@ -15,7 +13,7 @@ from geomech.geometry.connection import Connection
 from geomech.geometry.curvature import ccf
 from geomech.geometry.minimum_perturbation import minimum_perturbation
 from geomech.io import tables
-from geomech.io.tables import matlab, sysplotter
+from geomech.io.tables import sysplotter
 from geomech.io.tables.base import Stored
 from geomech.scenes import Scene
 from geomech.studies import fields
@@ -121,32 +119,6 @@ def test_what_it_computed_agrees_with_ours_but_for_its_elements(tmp_path):
         abs(best.curvature.values[0, 7, 7] + 0.0206) < 2e-4
         and abs(best.poses("area", None, [1.0])[0, 0] + 0.0518) < 3e-4
     )
-
-
-def element(kind, data):
-    return packed.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
-
-
-def matrix(kind, name, *parts, shape=(1, 1)):
-    head = element(6, packed.pack("<II", kind, 0)) + element(5, packed.pack("<ii", *shape))
-    return element(14, head + element(1, name.encode()) + b"".join(parts))
-
-
-def test_handles_and_instances_are_skipped_and_never_run():
-    """A function handle (class 16) and an instance of a class (17, which has no dimensions), in a struct and by themselves."""
-    double = matrix(6, "", element(9, packed.pack("<d", 2.5)))
-    handle = matrix(16, "f", matrix(4, "", element(4, "sf%0@()delete('*')".encode("utf-16-le")), shape=(1, 18)))
-    flags = element(6, packed.pack("<II", 17, 0))
-    instance = element(14, flags + element(1, b"space") + element(1, b"MCOS") + element(1, b"LieGroups") + double)
-    names = b"".join(name.ljust(8, b"\0") for name in (b"run", b"space", b"x"))
-    fields = (element(5, packed.pack("<i", 8)), element(1, names), handle, instance, double)
-    raw = bytes(124) + b"\x00\x01IM" + handle + instance + matrix(2, "s", *fields)
-    assert matlab.arrays(raw) == {"f": None, "space": None, "s": {"run": None, "space": None, "x": 2.5}}
-    deep = double
-    for _ in range(40):
-        deep = matrix(1, "c", deep)
-    with pytest.raises(Refusal, match="damaged"):
-        matlab.arrays(bytes(124) + b"\x00\x01IM" + deep)
 
 
 def changed(path, value):

@@ -1130,6 +1130,25 @@ def test_cells_and_structs_hold_others_to_a_depth():
             matlab._matrix(bad, "<", 2)
 
 
+def test_handles_and_instances_are_skipped_and_never_run():
+    """A function handle (class 16) and an instance of a class (17, which has no dimensions), in a struct and by themselves."""
+    whole = lambda kind, name, *parts, shape=(1, 1): element(14, matrix(kind, shape, *parts, name=name))
+    double = whole(6, b"", ONE)
+    handle = whole(16, b"f", whole(4, b"", element(4, "sf%0@()delete('*')".encode("utf-16-le")), shape=(1, 18)))
+    lead = [element(6, struct.pack("<II", 17, 0)), element(1, b"space"), element(1, b"MCOS"), element(1, b"LieGroups")]
+    instance = element(14, matrix(17, (), double, lead=lead))
+    names = b"".join(name.ljust(8, b"\0") for name in (b"run", b"space", b"x"))
+    fields = element(5, struct.pack("<i", 8)), element(1, names), handle, instance, double
+    head = bytes(124) + b"\x00\x01IM"
+    found = {"f": None, "space": None, "s": {"run": None, "space": None, "x": 1.0}}
+    assert matlab.arrays(head + handle + instance + whole(2, b"s", *fields)) == found
+    deep = double
+    for _ in range(40):
+        deep = whole(1, b"c", deep)
+    with pytest.raises(Refusal, match="damaged"):
+        matlab.arrays(head + deep)
+
+
 def test_elements_fill_a_file_and_are_not_longer(monkeypatch):
     both = element(1, b"abcde") + element(2, b"xy", small=True) + element(3, b"12345678")
     assert list(matlab._elements(both, "<")) == [(1, b"abcde"), (2, b"xy"), (3, b"12345678")]

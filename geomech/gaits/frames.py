@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-from weakref import WeakValueDictionary
 
 import numpy as np
 
@@ -22,9 +21,10 @@ MOST_FRAMES = 10_000
 FEWEST = 4  # frames, and points or places in each: what a cubic spline takes
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Frames:
-    """The rows of a file, sorted by t, then by s or point where the file has them, else in the file's order.
+    """The rows of a file, sorted by t, then by s or point where the file has them, else in the file's order. Frames are equal
+    if their files have one name and one content.
 
     name, sha256: of the file. columns: of its header, t for what stands there for it. timed: t may be in s. rows:
     (N, columns). lines: (N,), the rows' line numbers. t: (F,), ascending. starts: (F,), the first row of each frame.
@@ -32,12 +32,12 @@ class Frames:
 
     name: str
     sha256: str
-    columns: tuple[str, ...]
-    rows: np.ndarray
-    lines: np.ndarray
-    t: np.ndarray
-    starts: np.ndarray
-    timed: bool = True
+    columns: tuple[str, ...] = field(compare=False)
+    rows: np.ndarray = field(compare=False)
+    lines: np.ndarray = field(compare=False)
+    t: np.ndarray = field(compare=False)
+    starts: np.ndarray = field(compare=False)
+    timed: bool = field(default=True, compare=False)
 
     def wrong(self, what: str, row: int | None = None, **facts: Any) -> Refusal:
         """Return the refusal of a row, or of the whole file. facts: as of `Refusal`."""
@@ -49,18 +49,9 @@ class Frames:
         return np.diff(self.starts, append=len(self.rows))
 
 
-_READ: WeakValueDictionary[tuple[str, str], Frames] = WeakValueDictionary()
-
-
 def read(path: str | Path) -> Frames:
-    """Return the frames of a CSV file, of one that is in use the same object; Refusal if it has none that can be used."""
+    """Return the frames of a CSV file; Refusal if it has none that can be used."""
     source = read_rows(path, LARGEST_FILE, "file must be a CSV file of one period")
-    if (frames := _READ.get((source.name, source.sha256))) is None:
-        frames = _READ[source.name, source.sha256] = _frames(source)
-    return frames
-
-
-def _frames(source: Rows) -> Frames:
     columns = _header(source)
     rows = source.numbers(columns)
     keyed = columns[1] in ("s", "point")

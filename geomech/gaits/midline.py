@@ -30,6 +30,7 @@ def bends(frames: Frames, elements: int, modes: int) -> np.ndarray:
             f"elements bend by {abs(angles[worst]):.3g} rad, more than {LARGEST_BEND:.3g}",
             instead="mend that frame, or take more elements",
         )
+    angles.flags.writeable = False  # others get the same array
     return angles
 
 
