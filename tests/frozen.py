@@ -83,16 +83,10 @@ def place() -> Iterator[pathlib.Path]:
         yield here
 
 
-def files(folder: str = "") -> dict[str, int]:
-    """When each file below a folder, the one where we are, was written."""
-    found = {}
-    with os.scandir(folder or ".") as entries:
-        for entry in entries:
-            if entry.is_dir(follow_symlinks=False):
-                found |= files(f"{folder}{entry.name}/")
-            elif entry.is_file(follow_symlinks=False):
-                found[folder + entry.name] = entry.stat().st_mtime_ns
-    return found
+def files() -> dict[pathlib.Path, int]:
+    """When each file below the folder where we are was written."""
+    paths = (os.path.join(folder, name) for folder, _, names in os.walk(".") for name in names)
+    return {pathlib.Path(p): os.stat(p).st_mtime_ns for p in paths if os.path.isfile(p)}
 
 
 # commands.txt
@@ -113,7 +107,7 @@ def ran(line: str) -> list[str]:
         except ValueError:
             told += [f"| {x}" for x in masked(out).splitlines() if x.strip()]
     told += [f"! {x}" for x in masked(err).splitlines() if x.startswith(("error:", "note:"))]
-    for file in sorted(pathlib.Path(file) for file, time in files().items() if before.get(file) != time):
+    for file in sorted(file for file, time in files().items() if before.get(file) != time):
         told += [f"> {file}", *of_file(file)]
     return [*told, f"exit {code}"]
 

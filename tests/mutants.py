@@ -4,12 +4,12 @@
     python tests/mutants.py calls.txt --count 200 --seed 1 --jobs 2 [--only rft/loads.py rft/bodies]
 
 The first line runs the suite and the examples of docstrings once and notes which functions each test calls, and its
-seconds. A mutant then meets the tests that call the function in which it stands (of a constant: any of its class, file or
-folder), quickest first, and as far as `ENOUGH` seconds go, the rest of their files, which may look at what a fixture or a
-cache holds. `mutants.toml` beside
-this file names the tests of what Python does not see called, what is left out and which mutants are no bugs. Mutants
-live in copies of the tree in the system's temporary folder, one a worker; the checkout is only read. A mutant is killed
-when a test fails; time-outs, far longer than without it, are counted apart. Survivors are printed as what they change.
+seconds. A mutant then meets the tests that call the function in which it stands (of a constant: any of its class, file
+or folder), quickest first, and as far as `ENOUGH` seconds go, the rest of their files, which may look at what a fixture
+or a cache holds. `mutants.toml` beside this file names the tests of what Python does not see called, what is left out
+and which mutants are no bugs. Mutants live in copies of the tree in the system's temporary folder, one a worker; the
+checkout is only read. A mutant is killed when a test fails; time-outs, far longer than without it, are counted apart.
+Survivors are printed as what they change.
 `--done 50` goes on with a run that was stopped after 50.
 """
 
@@ -212,9 +212,8 @@ class Watch:
 
 def file_of(test: str) -> str:
     """The name of a test's file, as the table has it; examples of docstrings are one file."""
-    return (
-        test.partition("::")[0].removeprefix("tests/test_").removesuffix(".py") if test[:6] == "tests/" else "examples"
-    )
+    file = test.partition("::")[0]
+    return file.removeprefix("tests/test_").removesuffix(".py") if file.startswith("tests/") else "examples"
 
 
 def start(tree: Path, tests: list[str], seconds: float, *options: str, plugins=()) -> int:

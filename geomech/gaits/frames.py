@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +21,9 @@ MOST_FRAMES = 10_000
 FEWEST = 4  # frames, and points or places in each: what a cubic spline takes
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Frames:
-    """The rows of a file, sorted by t, then by s or point where the file has them, else in the file's order. Frames are equal
-    if their files have one name and one content.
+    """The rows of a file, sorted by t, then by s or point where the file has them, else in the file's order.
 
     name, sha256: of the file. columns: of its header, t for what stands there for it. timed: t may be in s. rows:
     (N, columns). lines: (N,), the rows' line numbers. t: (F,), ascending. starts: (F,), the first row of each frame.
@@ -32,12 +31,12 @@ class Frames:
 
     name: str
     sha256: str
-    columns: tuple[str, ...] = field(compare=False)
-    rows: np.ndarray = field(compare=False)
-    lines: np.ndarray = field(compare=False)
-    t: np.ndarray = field(compare=False)
-    starts: np.ndarray = field(compare=False)
-    timed: bool = field(default=True, compare=False)
+    columns: tuple[str, ...]
+    rows: np.ndarray
+    lines: np.ndarray
+    t: np.ndarray
+    starts: np.ndarray
+    timed: bool = True
 
     def wrong(self, what: str, row: int | None = None, **facts: Any) -> Refusal:
         """Return the refusal of a row, or of the whole file. facts: as of `Refusal`."""

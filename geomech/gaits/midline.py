@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-
 import numpy as np
 from numpy.polynomial import legendre
 
@@ -15,7 +13,6 @@ NODES, WEIGHTS = legendre.leggauss(5)
 PASSES = 3  # of making a spline's parameter its own arc length; 1e-7 rad is left at 30 points along a sandfish
 
 
-@functools.lru_cache(maxsize=4)  # scenes of a sweep have one file
 def bends(frames: Frames, elements: int, modes: int) -> np.ndarray:
     """Return the heading of each element minus that of the one before, (F, elements - 1), rad. modes: Legendre modes of
     the curvature along the body, fitted by least squares; 0: splines through the data."""
@@ -30,7 +27,6 @@ def bends(frames: Frames, elements: int, modes: int) -> np.ndarray:
             f"elements bend by {abs(angles[worst]):.3g} rad, more than {LARGEST_BEND:.3g}",
             instead="mend that frame, or take more elements",
         )
-    angles.flags.writeable = False  # others get the same array
     return angles
 
 
