@@ -15,8 +15,13 @@ def absolute(text: str, repository: str, version: str) -> str:
             return match[0]
         return f"{picture}[{label}]({repository}/{'raw' if picture else 'blob'}/v{version}/{target})"
 
-    pieces = re.split(r"(^```.*?^```$)", text, flags=re.M | re.S)  # blocks of code stand at odd places
-    pieces[::2] = [re.sub(r"(!?)\[([^]]*)\]\((?![a-z]+:)([^)\s]+)\)", link, prose) for prose in pieces[::2]]
+    pieces = re.split(
+        r"(^```.*?^```$)", text, flags=re.M | re.S
+    )  # blocks of code stand at odd places
+    pieces[::2] = [
+        re.sub(r"(!?)\[([^]]*)\]\((?![a-z]+:)([^)\s]+)\)", link, prose)
+        for prose in pieces[::2]
+    ]
     return "".join(pieces)
 
 
@@ -27,7 +32,9 @@ class Readme(MetadataHookInterface):
         """Set `metadata["readme"]` from README.md, project.urls and the version."""
         text = (pathlib.Path(self.root) / "README.md").read_text(encoding="utf-8")
         version = re.search(
-            r'^VERSION = "(.*)"', (pathlib.Path(self.root) / "geomech/core/version.py").read_text(), re.M
+            r'^VERSION = "(.*)"',
+            (pathlib.Path(self.root) / "geomech/core/version.py").read_text(),
+            re.M,
         )[1]
         text = absolute(text, metadata["urls"]["Repository"], version)
         metadata["readme"] = {"content-type": "text/markdown", "text": text}

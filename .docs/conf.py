@@ -6,7 +6,10 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", NO_COLOR="1")
-sys.path[:0] = [str(HERE), str(HERE.parent)]  # the extensions of this folder; `figures` is no package of the wheel
+sys.path[:0] = [
+    str(HERE),
+    str(HERE.parent),
+]  # the extensions of this folder; `figures` is no package of the wheel
 
 import geomech  # noqa: E402
 
@@ -27,7 +30,9 @@ extensions = [
 ]
 exclude_patterns = ["made/**"]
 nitpicky = True
-nitpick_ignore_regex = [("py:.*", ".*")]  # types in signatures; links of prose are checked by MyST, glossary terms here
+nitpick_ignore_regex = [
+    ("py:.*", ".*")
+]  # types in signatures; links of prose are checked by MyST, glossary terms here
 default_role = "code"
 
 autodoc_default_options = {"members": True, "member-order": "bysource"}
@@ -56,7 +61,16 @@ html_extra_path = ["generated/extra"]  # the gait lab, made before anything is r
 html_css_files = ["site.css"]
 html_show_sourcelink = False
 html_copy_source = False
-ALONE = ("index", "start", "lab", "tiers", "validation", "glossary", "changelog", "citing")
+ALONE = (
+    "index",
+    "start",
+    "lab",
+    "tiers",
+    "validation",
+    "glossary",
+    "changelog",
+    "citing",
+)
 html_sidebars = {page: [] for page in ALONE}
 html_context = {"default_mode": "light"}
 html_theme_options = {

@@ -10,7 +10,9 @@ import sys
 from collections.abc import Callable
 
 
-def main(name: str, compute: Callable, draw: Callable, table: Callable | None = None) -> None:
+def main(
+    name: str, compute: Callable, draw: Callable, table: Callable | None = None
+) -> None:
     """Compute, draw and save to the file named on the command line, or to <name>.png; print the table if there is one."""
     from geomech import plots
 

@@ -47,7 +47,9 @@ def one_scipy_solve(alpha, alphadot, segments=20):
         moment = place[..., 0] * f[..., 1] - place[..., 1] * f[..., 0]
         return [f[..., 0].sum(), f[..., 1].sum(), moment.sum()]
 
-    return fsolve(force, [0.02, 0.01, 0.1], full_output=True)  # off zero, where a link may stand still
+    return fsolve(
+        force, [0.02, 0.01, 0.1], full_output=True
+    )  # off zero, where a link may stand still
 
 
 def backends() -> list[str]:
@@ -63,7 +65,9 @@ def quickest(f: Callable, repeats: int = REPEATS) -> float:
 def random_samples(links: int, count: int):
     """Return shapes and rates (count, links - 1) within what such a body can bend."""
     rng, spread = np.random.default_rng(links), 2.5 / np.sqrt(links / 3)
-    return rng.uniform(-spread, spread, (count, links - 1)), rng.normal(size=(count, links - 1))
+    return rng.uniform(-spread, spread, (count, links - 1)), rng.normal(
+        size=(count, links - 1)
+    )
 
 
 def solver(how: str, threads: int | None = None) -> Callable:
@@ -71,7 +75,11 @@ def solver(how: str, threads: int | None = None) -> Callable:
 
     def velocity(alpha, alphadot):
         chain = Chain((1,) * (np.shape(alpha)[-1] + 1))
-        return body_velocity(GLASS, chain, alpha, alphadot, backend=how, threads=threads).checked().xi
+        return (
+            body_velocity(GLASS, chain, alpha, alphadot, backend=how, threads=threads)
+            .checked()
+            .xi
+        )
 
     return velocity
 
@@ -83,7 +91,9 @@ def batches(scale: int) -> dict:
         for threads, cores in ((1, "one core"), (None, f"{os.cpu_count()} cores")):
             velocity = solver(how, threads)
             velocity(*random_samples(3, 2))  # loads what is loaded once
-            series[f"{NAMES[how]}, {cores}"] = [quickest(lambda n=n: velocity(*random_samples(3, n))) for n in sizes]
+            series[f"{NAMES[how]}, {cores}"] = [
+                quickest(lambda n=n: velocity(*random_samples(3, n))) for n in sizes
+            ]
     samples = list(zip(*random_samples(3, 40 // scale + 1)))
     return {
         "x": sizes,
@@ -98,13 +108,25 @@ def compute(scale: int = 1) -> dict:
     The axis "samples" has "loop", too. scale: divides all sizes.
     """
     sizes = {
-        "links": ([3, 6, 12, 25, 50, 100], lambda f, n: f(*random_samples(n, 2000 // scale))),
-        "directions": ([4, 8, 16, 32, 64], lambda f, n: connection.fit(f, connection.grid(2, 31 // scale), n)),
-        "phases": ([n // scale for n in (500, 2000, 8000, 32000)], lambda f, n: direct(f, Circle(), phases=n)),
+        "links": (
+            [3, 6, 12, 25, 50, 100],
+            lambda f, n: f(*random_samples(n, 2000 // scale)),
+        ),
+        "directions": (
+            [4, 8, 16, 32, 64],
+            lambda f, n: connection.fit(f, connection.grid(2, 31 // scale), n),
+        ),
+        "phases": (
+            [n // scale for n in (500, 2000, 8000, 32000)],
+            lambda f, n: direct(f, Circle(), phases=n),
+        ),
     }
     out = {"samples": batches(scale)}
     for axis, (x, run) in sizes.items():
-        series = {NAMES[how]: [quickest(lambda n=n: run(solver(how), n)) for n in x] for how in backends()}
+        series = {
+            NAMES[how]: [quickest(lambda n=n: run(solver(how), n)) for n in x]
+            for how in backends()
+        }
         out[axis] = {"x": x, "seconds": series}
     for found in out.values():
         half, (seconds, *_) = len(found["x"]) // 2, found["seconds"].values()
@@ -125,11 +147,24 @@ def draw(numbers: dict):
             ax.loglog(x, seconds / per, color=colour, marker=marker, label=name, **look)
         if loop:
             ax.axhline(1e6 * loop, **style.GUIDE, ls=":")
-            ax.text(x[-1], 1.1e6 * loop, "a loop of scipy.optimize.fsolve", ha="right", va="bottom", fontsize=8)
-            ax.set(xlabel="samples in a batch", ylabel="microseconds a sample", title="Cost of a balance of forces")
+            ax.text(
+                x[-1],
+                1.1e6 * loop,
+                "a loop of scipy.optimize.fsolve",
+                ha="right",
+                va="bottom",
+                fontsize=8,
+            )
+            ax.set(
+                xlabel="samples in a batch",
+                ylabel="microseconds a sample",
+                title="Cost of a balance of forces",
+            )
             ax.set_ylim(top=1e7 * loop)
         else:
-            ax.set(xlabel=axis, ylabel="seconds", title=f"exponent {found['exponent']:.2f}")
+            ax.set(
+                xlabel=axis, ylabel="seconds", title=f"exponent {found['exponent']:.2f}"
+            )
         ticks = x[:: 1 if len(x) < 5 else 2]
         style.named_ticks(ax, ticks, [f"{v:,.0f}" for v in ticks])
         style.grid(ax)

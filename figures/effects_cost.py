@@ -14,7 +14,15 @@ import rft
 from figures import main, style
 from geomech import plots
 from geomech.scenes import load
-from rft import BodyInertia, DepthProfile, DisturbedGround, EndCaps, GrainInertia, SkinFriction, Transient
+from rft import (
+    BodyInertia,
+    DepthProfile,
+    DisturbedGround,
+    EndCaps,
+    GrainInertia,
+    SkinFriction,
+    Transient,
+)
 
 ALGEBRAIC = {
     "skin friction": SkinFriction(),
@@ -35,7 +43,11 @@ SETS = {
     **{name: (effect,) for name, effect in MARCHING.items()},
     "all but the slope": (*ALGEBRAIC.values(), *list(MARCHING.values())[1:]),
 }
-ENGINES = {"algebraic": (style.BLUE, ""), "time stepping": (style.VERMILION, "///"), "dynamic": (style.GREEN, "...")}
+ENGINES = {
+    "algebraic": (style.BLUE, ""),
+    "time stepping": (style.VERMILION, "///"),
+    "dynamic": (style.GREEN, "..."),
+}
 
 
 def compute(phases: int = 64, repeats: int = 5, cycles: int | None = None) -> dict:
@@ -45,7 +57,11 @@ def compute(phases: int = 64, repeats: int = 5, cycles: int | None = None) -> di
     """
     fish = load("sandfish-loose").with_numerics(cycles=cycles)
     scenes = {name: fish.changed(effects=effects) for name, effects in SETS.items()}
-    amplitudes, seconds, runs = np.linspace(0.1, 0.4, 7), {name: [] for name in SETS}, {}
+    amplitudes, seconds, runs = (
+        np.linspace(0.1, 0.4, 7),
+        {name: [] for name in SETS},
+        {},
+    )
     for repeat in range(repeats + 1):  # the first round warms up
         for name, scene in scenes.items():
             if repeat != 1 and rft.effects.engine(scene.system.effects) != "algebraic":
@@ -72,14 +88,26 @@ def draw(numbers: dict):
     ratios = [numbers[name]["ratio"] for name in names]
     for engine, (colour, hatch) in ENGINES.items():
         rows = [k for k, name in enumerate(names) if numbers[name]["engine"] == engine]
-        ax.barh(rows, [ratios[k] for k in rows], color=colour, hatch=hatch, edgecolor="white", height=0.6, label=engine)
+        ax.barh(
+            rows,
+            [ratios[k] for k in rows],
+            color=colour,
+            hatch=hatch,
+            edgecolor="white",
+            height=0.6,
+            label=engine,
+        )
     for k, name in enumerate(names):
         cycles = numbers[name]["cycles"]
         passes = f", {cycles} cycles" if cycles > 1 else ""
-        ax.text(ratios[k] * 1.08, k, f"{ratios[k]:.3g}{passes}", va="center", fontsize=8)
+        ax.text(
+            ratios[k] * 1.08, k, f"{ratios[k]:.3g}{passes}", va="center", fontsize=8
+        )
     ax.set_yticks(range(len(names)), names)
     ax.axvline(1.0, **style.GUIDE)
-    ax.set(xlabel="time / time with no effect", xscale="log", xlim=(0.5, 5 * max(ratios)))
+    ax.set(
+        xlabel="time / time with no effect", xscale="log", xlim=(0.5, 5 * max(ratios))
+    )
     style.legend_above(ax, 3, title="engine")
     return fig
 

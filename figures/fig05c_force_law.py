@@ -22,11 +22,23 @@ def compute(angles: int = 181) -> dict:
         "close": CATALOGUE["glass-0.3mm-close"].medium,
         "viscous": Viscous(2.0),
     }
-    curves = {name: np.array(law.traction(np.cos(psi), np.sin(psi))) for name, law in laws.items()}
+    curves = {
+        name: np.array(law.traction(np.cos(psi), np.sin(psi)))
+        for name, law in laws.items()
+    }
     fit = Calibration("short-rod-drag", "granular").ask().subject
-    bed = {"psi": fit.data.psi, "parallel": fit.data.forces[0], "perpendicular": fit.data.forces[1]}
+    bed = {
+        "psi": fit.data.psi,
+        "parallel": fit.data.forces[0],
+        "perpendicular": fit.data.forces[1],
+    }
     values = dict(zip(fit.names, fit.values.tolist()))
-    return {"psi": psi, **curves, "bed": bed, "fit": {**values, "axial_N": fit.axial_force, "rms_N": fit.rms}}
+    return {
+        "psi": psi,
+        **curves,
+        "bed": bed,
+        "fit": {**values, "axial_N": fit.axial_force, "rms_N": fit.rms},
+    }
 
 
 @plots.styled
@@ -46,9 +58,20 @@ def draw(numbers: dict):
     bed, fit = numbers["bed"], numbers["fit"]
     scale = fit["axial_N"]
     dots = {"color": style.BLACK, "ms": 4, "ls": "none"}
-    ax.plot(np.degrees(bed["psi"]), bed["perpendicular"] / scale, "o", label="6 mm grains,\ndiscrete elements", **dots)
+    ax.plot(
+        np.degrees(bed["psi"]),
+        bed["perpendicular"] / scale,
+        "o",
+        label="6 mm grains,\ndiscrete elements",
+        **dots,
+    )
     ax.plot(np.degrees(bed["psi"]), bed["parallel"] / scale, "o", mfc="white", **dots)
-    ax.set(xlabel="attack angle $\\psi$ (degrees)", ylabel="drag / axial drag", xlim=(-2, 92), ylim=(0, None))
+    ax.set(
+        xlabel="attack angle $\\psi$ (degrees)",
+        ylabel="drag / axial drag",
+        xlim=(-2, 92),
+        ylim=(0, None),
+    )
     ax.set_xticks(range(0, 91, 15))
     style.legend_right(ax, title="solid, filled: across\ndashed, open: along")
     return fig

@@ -19,10 +19,18 @@ from rft.plates import VERTICAL, Plate, loads
 
 LENGTH, WIDTH = 0.038, 0.025  # m, assumed
 DEEPEST = 0.08  # m, assumed
-ANGLES = ((0, 90), (30, 90), (60, 30), (90, 0), (0, -90))  # (beta, gamma) in degrees, assumed
+ANGLES = (
+    (0, 90),
+    (30, 90),
+    (60, 30),
+    (90, 0),
+    (0, -90),
+)  # (beta, gamma) in degrees, assumed
 
 
-def compute(medium: str = "poppy-seeds-loose", angles=ANGLES, depths: int = 161) -> dict:
+def compute(
+    medium: str = "poppy-seeds-loose", angles=ANGLES, depths: int = 161
+) -> dict:
     """Return stresses on each plate against depth.
 
     "depth": (D,) of its middle, m. "plates": by (beta, gamma) in degrees {"sigma_x", "sigma_z": (D,), Pa, against the motion's
@@ -36,15 +44,25 @@ def compute(medium: str = "poppy-seeds-loose", angles=ANGLES, depths: int = 161)
         velocity = np.cos(np.radians(gamma)), -np.sin(np.radians(gamma)), 0.0
         force = loads(stress, plate, pose, velocity).force / (LENGTH * WIDTH)
         slopes = np.polyfit(depth[under], force[under] * [-1, 1], 1)[0] / 1e6
-        plates[beta, gamma] = {"sigma_x": -force[:, 0], "sigma_z": force[:, 1], "alpha": slopes}
+        plates[beta, gamma] = {
+            "sigma_x": -force[:, 0],
+            "sigma_z": force[:, 1],
+            "alpha": slopes,
+        }
     return {"depth": depth, "plates": plates, "under": LENGTH / 2, "medium": medium}
 
 
 def table(numbers: dict) -> str:
     """Return the slopes of the straight lines."""
     heads = "beta (degrees)", "gamma (degrees)", "alpha_x (N/cm^3)", "alpha_z (N/cm^3)"
-    slopes = {angles: plate["alpha"].round(9) + 0.0 for angles, plate in numbers["plates"].items()}
-    rows = [(f"{beta}", f"{gamma}", f"{x:.4f}", f"{z:.4f}") for (beta, gamma), (x, z) in slopes.items()]
+    slopes = {
+        angles: plate["alpha"].round(9) + 0.0
+        for angles, plate in numbers["plates"].items()
+    }
+    rows = [
+        (f"{beta}", f"{gamma}", f"{x:.4f}", f"{z:.4f}")
+        for (beta, gamma), (x, z) in slopes.items()
+    ]
     return f"{numbers['medium']}\n{style.table(heads, rows)}"
 
 
@@ -55,13 +73,27 @@ def draw(numbers: dict):
     for ax, name, stress in zip(axes[0], "xz", ("drag stress", "lift stress")):
         ax.axvspan(1e2 * numbers["under"], depth[-1], **style.SHADED)
         for k, ((beta, gamma), plate) in enumerate(numbers["plates"].items()):
-            label = rf"$\beta$ = {beta}, $\gamma$ = ${gamma}$" + (", on the way up" if gamma < 0 else "")
-            look = style.sparse(k, len(depth)) | {"ls": "--" if gamma < 0 else "-", "label": label}
+            label = rf"$\beta$ = {beta}, $\gamma$ = ${gamma}$" + (
+                ", on the way up" if gamma < 0 else ""
+            )
+            look = style.sparse(k, len(depth)) | {
+                "ls": "--" if gamma < 0 else "-",
+                "label": label,
+            }
             ax.plot(depth, 1e-3 * plate[f"sigma_{name}"], **look)
         style.zero_line(ax)
-        ax.set(xlabel="depth |z| of the plate's middle (cm)", ylabel=rf"{stress} $\sigma_{name}$ (kPa)")
+        ax.set(
+            xlabel="depth |z| of the plate's middle (cm)",
+            ylabel=rf"{stress} $\sigma_{name}$ (kPa)",
+        )
         ax.set(xlim=(0, depth[-1]))
-    axes[0, 0].text(1e2 * numbers["under"] + 0.1, axes[0, 0].get_ylim()[1], "all plates under", va="top", **style.NOTE)
+    axes[0, 0].text(
+        1e2 * numbers["under"] + 0.1,
+        axes[0, 0].get_ylim()[1],
+        "all plates under",
+        va="top",
+        **style.NOTE,
+    )
     style.legend_right(axes[0, 1], title="tilt, direction (degrees)")
     return fig
 

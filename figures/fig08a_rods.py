@@ -52,7 +52,11 @@ def compute(medium: str = "glass-3mm", elements: int = 400, depths: int = 61) ->
     around = np.mod(np.arctan2(faces.n[0].ravel(), -faces.n[1].ravel())[leads], np.pi)
     a_x, a_z = (a.ravel()[leads] for a in stress.alpha(faces.n, faces.v))
     sin, cos = np.sin(around), np.cos(around)
-    cylinder = {"beta": around, "normal": cos * a_z + sin * a_x, "tangent": sin * a_z - cos * a_x}
+    cylinder = {
+        "beta": around,
+        "normal": cos * a_z + sin * a_x,
+        "tangent": sin * a_z - cos * a_x,
+    }
     return {
         "beta": beta, "normal": normal, "tangent": tangent, "cylinder": cylinder,
         "pulled": float(beta[(normal < 0) & (beta > np.pi / 2)].min()), "depth": np.linspace(RADIUS, DEEPEST, depths),
@@ -72,7 +76,9 @@ def on_face(stress, beta):
 def rod_forces(stress, outline, depths: int) -> dict:
     """Return drag and lift (D,) on a rod, N, and lift over drag deep down."""
     depth = np.append(np.linspace(RADIUS, DEEPEST, depths), DEEP)
-    force = loads(stress, outline, np.stack([0 * depth, -depth, 0 * depth], -1), LEVEL).force
+    force = loads(
+        stress, outline, np.stack([0 * depth, -depth, 0 * depth], -1), LEVEL
+    ).force
     drag, lift = -force[:, 0], force[:, 1]
     return {"drag": drag[:-1], "lift": lift[:-1], "ratio": float(lift[-1] / drag[-1])}
 
@@ -81,10 +87,17 @@ def table(numbers: dict) -> str:
     """Return lift over drag deep down, and the measured sign."""
     signs = {1: "up", -1: "down", 0: "not known"}
     rows = [
-        (name, f"{rod['keep']['ratio']:+.2f}", f"{rod['cut']['ratio']:+.2f}", signs[numbers["measured"][name]])
+        (
+            name,
+            f"{rod['keep']['ratio']:+.2f}",
+            f"{rod['cut']['ratio']:+.2f}",
+            signs[numbers["measured"][name]],
+        )
         for name, rod in numbers["rods"].items()
     ]
-    return style.table(("lift over drag", "map as it is", "tension cut", "measured"), rows)
+    return style.table(
+        ("lift over drag", "map as it is", "tension cut", "measured"), rows
+    )
 
 
 COLOURS = dict(zip(RODS, style.SEQUENCE))
@@ -98,8 +111,14 @@ def draw(numbers: dict):
         for k, (name, rod) in enumerate(numbers["rods"].items()):
             look = style.sparse(k, len(numbers["depth"]))
             ax.plot(1e2 * numbers["depth"], rod["keep"][what], label=name, **look)
-            ax.plot(1e2 * numbers["depth"], rod["cut"][what], "--", **look | {"marker": ""})
-        ax.set(xlabel="depth of the axis (cm)", ylabel=f"{what} (N)", xlim=(0, 1e2 * DEEPEST))
+            ax.plot(
+                1e2 * numbers["depth"], rod["cut"][what], "--", **look | {"marker": ""}
+            )
+        ax.set(
+            xlabel="depth of the axis (cm)",
+            ylabel=f"{what} (N)",
+            xlim=(0, 1e2 * DEEPEST),
+        )
         ax.set_xticks(range(0, 16, 5))
         style.zero_line(ax)
     style.entry(axes[0, 1], "tension cut", ls="--")
@@ -112,13 +131,24 @@ def draw(numbers: dict):
 def draw_stress(ax, numbers: dict) -> None:
     around = numbers["cylinder"]
     ax.axvspan(np.degrees(numbers["pulled"]), 180, **style.SHADED)
-    looks = (("normal", style.VERMILION, "o", "normal"), ("tangent", style.BLUE, "s", "tangential"))
+    looks = (
+        ("normal", style.VERMILION, "o", "normal"),
+        ("tangent", style.BLUE, "s", "tangential"),
+    )
     for what, colour, marker, name in looks:
-        ax.plot(np.degrees(numbers["beta"]), numbers[what], color=colour, label=f"{name}, plates")
+        ax.plot(
+            np.degrees(numbers["beta"]),
+            numbers[what],
+            color=colour,
+            label=f"{name}, plates",
+        )
         dots = {"color": colour, "mfc": "white", "ms": 4, "label": f"{name}, cylinder"}
         ax.plot(np.degrees(around["beta"]), around[what], marker, **dots)
     style.zero_line(ax)
-    ax.set(xlabel=r"tilt $\beta$ of the face: underside 0, front 90, top 180", ylabel="stress / depth (N/cm$^3$)")
+    ax.set(
+        xlabel=r"tilt $\beta$ of the face: underside 0, front 90, top 180",
+        ylabel="stress / depth (N/cm$^3$)",
+    )
     ax.set(xlim=(0, 180), xticks=range(0, 181, 45))
     ax.text(178, ax.get_ylim()[1], "grains pull", ha="right", va="top", **style.NOTE)
     ax.legend(loc="lower left")
@@ -132,11 +162,22 @@ def draw_ratios(ax, numbers: dict) -> None:
         if sign := numbers["measured"][name]:
             ax.annotate("", (k + 0.3, 0.3 * sign), (k + 0.3, 0.0), arrowprops=arrow)
             direction, side = ("up", "bottom") if sign > 0 else ("down", "top")
-            ax.text(k + 0.3, 0.34 * sign, f"measured:\n{direction}", fontsize=7, ha="center", va=side)
+            ax.text(
+                k + 0.3,
+                0.34 * sign,
+                f"measured:\n{direction}",
+                fontsize=7,
+                ha="center",
+                va=side,
+            )
     style.entry(ax, "map as it is", ls="", marker="o", ms=5)
     style.entry(ax, "tension cut", ls="", marker="o", ms=9, mfc="none")
     style.zero_line(ax)
-    ax.set(xticks=range(len(RODS)), xticklabels=[n.replace(", ", ",\n") for n in RODS], ylabel="lift / drag, deep down")
+    ax.set(
+        xticks=range(len(RODS)),
+        xticklabels=[n.replace(", ", ",\n") for n in RODS],
+        ylabel="lift / drag, deep down",
+    )
     ax.set(xlim=(-0.4, len(RODS) - 0.3), ylim=(-0.6, 1.3))
     ax.legend(loc="upper left", ncols=2)
 

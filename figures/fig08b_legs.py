@@ -37,7 +37,10 @@ def compute(legs=LEGS, hubs=HUBS, samples: int = 541) -> dict:
         scene = load(name)
         motion = replace(scene.motion, start=-np.pi, stop=np.pi, samples=samples)
         height = scene.motion.hub_height
-        runs = [replace(scene, motion=replace(motion, hub_height=height + add)).run() for add in hubs]
+        runs = [
+            replace(scene, motion=replace(motion, hub_height=height + add)).run()
+            for add in hubs
+        ]
         found[name] = {
             "outline": scene.outline.points, "hub": height, "angle": runs[0].pose[:, 2],
             "force": np.stack([run.force for run in runs]),
@@ -65,9 +68,23 @@ def peaks(numbers: dict, name: str) -> dict:
 
 def table(numbers: dict) -> str:
     """Return peaks, the angles at which they are, and asymmetry."""
-    heads = "leg", "force", "peak (N)", "at (degrees)", "least (N)", "odd / even in the angle"
+    heads = (
+        "leg",
+        "force",
+        "peak (N)",
+        "at (degrees)",
+        "least (N)",
+        "odd / even in the angle",
+    )
     rows = [
-        (name, f"F_{axis}", f"{p['peak']:.2f}", f"{p['at']:.0f}", f"{p['least'] + 0.0:.2f}", f"{p['asymmetry']:.2f}")
+        (
+            name,
+            f"F_{axis}",
+            f"{p['peak']:.2f}",
+            f"{p['at']:.0f}",
+            f"{p['least'] + 0.0:.2f}",
+            f"{p['asymmetry']:.2f}",
+        )
         for name in numbers["legs"]
         for axis, p in peaks(numbers, name).items()
     ]
@@ -87,15 +104,30 @@ def draw(numbers: dict):
         ax.set_title(LABELS[name])
     note = "light to dark: 75 degrees\nbefore to 75 after"
     axes[0, 0].text(-10.5, -9.2, note, va="bottom", **style.NOTE | {"fontsize": 7})
-    for ax, k, label in ((axes[1, 0], 0, "$F_x$, forwards (N)"), (axes[1, 1], 1, "$F_z$, upwards (N)")):
+    for ax, k, label in (
+        (axes[1, 0], 0, "$F_x$, forwards (N)"),
+        (axes[1, 1], 1, "$F_z$, upwards (N)"),
+    ):
         for name, leg in numbers["legs"].items():
             angle, (colour, marker) = np.degrees(leg["angle"]), LOOKS[name]
             ax.plot(angle, leg["force"][:, :, k].T, ":", color=colour, lw=0.8)
             reference = leg["force"][numbers["own"], :, k]
-            ax.plot(angle, reference, color=colour, lw=1.4, marker=marker, ms=4, markevery=[reference.argmax()])
+            ax.plot(
+                angle,
+                reference,
+                color=colour,
+                lw=1.4,
+                marker=marker,
+                ms=4,
+                markevery=[reference.argmax()],
+            )
         style.zero_line(ax)
         ax.axvline(0.0, **style.GUIDE)
-        ax.set(xlabel=r"angle $\theta$ (degrees), 0: straight down", ylabel=label, xlim=(-135, 135))
+        ax.set(
+            xlabel=r"angle $\theta$ (degrees), 0: straight down",
+            ylabel=label,
+            xlim=(-135, 135),
+        )
         ax.set_xticks(range(-90, 91, 45))
     draw_asymmetry(axes[1, 2], numbers)
     return fig
@@ -107,21 +139,45 @@ def draw_leg(ax, leg: dict, colour: str, marker: str) -> None:
         cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
         x, z = (leg["outline"] @ np.array([[cos, -sin], [sin, cos]])).T
         ax.plot(
-            1e2 * x, 1e2 * (z + leg["hub"]), color=colour, alpha=strength, lw=1.8, marker=marker, ms=5, markevery=[-1]
+            1e2 * x,
+            1e2 * (z + leg["hub"]),
+            color=colour,
+            alpha=strength,
+            lw=1.8,
+            marker=marker,
+            ms=5,
+            markevery=[-1],
         )
     ax.plot(0.0, 1e2 * leg["hub"], "o", color="0.3", ms=4)
     ax.axhline(0.0, **style.SURFACE)
-    ax.set(aspect="equal", xlabel="x (cm)", ylabel="z (cm)", xlim=(-11, 11), ylim=(-9.5, 5.5))
+    ax.set(
+        aspect="equal",
+        xlabel="x (cm)",
+        ylabel="z (cm)",
+        xlim=(-11, 11),
+        ylim=(-9.5, 5.5),
+    )
 
 
 def draw_asymmetry(ax, numbers: dict) -> None:
     for k, name in enumerate(numbers["legs"]):
         for axis, marker, right in (("x", "o", -0.1), ("z", "s", 0.1)):
             at = peaks(numbers, name)[axis]["asymmetry"]
-            ax.plot(k + right, at, marker, ms=6, color=LOOKS[name][0], mfc="white" if axis == "x" else None)
+            ax.plot(
+                k + right,
+                at,
+                marker,
+                ms=6,
+                color=LOOKS[name][0],
+                mfc="white" if axis == "x" else None,
+            )
     style.entry(ax, "$F_x$", ls="", marker="o", ms=6, mfc="white")
     style.entry(ax, "$F_z$", ls="", marker="s", ms=6)
-    ax.set(xticks=range(len(LEGS)), xticklabels=[LABELS[n].replace(" c", "\nc") for n in LEGS], ylim=(0, None))
+    ax.set(
+        xticks=range(len(LEGS)),
+        xticklabels=[LABELS[n].replace(" c", "\nc") for n in LEGS],
+        ylim=(0, None),
+    )
     ax.set(ylabel="odd / even part in the angle", xlim=(-0.5, len(LEGS) - 0.5))
     ax.legend(loc="upper right")
 

@@ -26,18 +26,32 @@ from geomech.gaits import Sine
 from geomech.scenes import load
 from geomech.studies import undulation
 
-SCENES = {"sandfish-loose": style.LOOSE, "sandfish-close": style.CLOSE, "shovel-nosed-snake": style.GREEN}
+SCENES = {
+    "sandfish-loose": style.LOOSE,
+    "sandfish-close": style.CLOSE,
+    "shovel-nosed-snake": style.GREEN,
+}
 ROUGHER = "shovel-nosed-snake, rod 0.2"  # the snake, if the law's rod had that friction, not the 0.15 of Fig. 5
 COLOURS = {**SCENES, ROUGHER: "#8FD3B6"}
 ENDLESS = {  # how an endless wave is drawn: with the head's drag, kinematics, dashes, label
     "endless": (False, "sliding", "--", "endless wave, sliding"),
     "endless_head": (True, "sliding", ":", "the same, head drag"),
-    "endless_sideways": (False, "sideways", (0, (4, 1, 1, 1, 1, 1)), "endless wave, sideways"),
+    "endless_sideways": (
+        False,
+        "sideways",
+        (0, (4, 1, 1, 1, 1, 1)),
+        "endless wave, sideways",
+    ),
 }
-AMPLITUDES = np.tan(np.linspace(0.7, 5.2, 46) / 4) / (2 * np.pi)  # equal steps of relative curvature
+AMPLITUDES = np.tan(np.linspace(0.7, 5.2, 46) / 4) / (
+    2 * np.pi
+)  # equal steps of relative curvature
 MEASURES = {  # what is best: the largest (1) or the least (-1)
     "arc_efficiency": (1, "progress per cycle\n" r"over $\lambda_s$"),
-    "efficiency": (1, "undulation efficiency,\n" r"progress over $\lambda$"),  # the paper's, which has no optimum here
+    "efficiency": (
+        1,
+        "undulation efficiency,\n" r"progress over $\lambda$",
+    ),  # the paper's, which has no optimum here
     "slip": (-1, "mean slip angle\n(degrees)"),
     "cost_of_transport": (-1, "cost of transport, work\nover drag x distance"),
 }
@@ -57,18 +71,27 @@ def compute(amplitudes=AMPLITUDES, finer: int = 3) -> dict:
         scene = undulation.refined(load(name.partition(",")[0]), finer)
         if name == ROUGHER:
             skin, *others = scene.system.effects
-            scene = scene.changed(effects=(dataclasses.replace(skin, reference=0.2), *others))
+            scene = scene.changed(
+                effects=(dataclasses.replace(skin, reference=0.2), *others)
+            )
         found = undulation.performance(scene, amplitudes)
         signs = {"progress": 1, **{key: sign for key, (sign, _) in MEASURES.items()}}
-        best = {key: undulation.optimum(amplitudes, found[key], sign) for key, sign in signs.items()}
+        best = {
+            key: undulation.optimum(amplitudes, found[key], sign)
+            for key, sign in signs.items()
+        }
         found["best"] = {key: place for key, place in best.items() if place is not None}
         if name.startswith("sandfish"):
             for key, (capped, kinematics, _, _) in ENDLESS.items():
                 cap = scene.system.effects[0] if capped else None
-                wave = functools.partial(undulation.endless_sine, scene.system.medium, kinematics=kinematics)
+                wave = functools.partial(
+                    undulation.endless_sine, scene.system.medium, kinematics=kinematics
+                )
                 found[key] = np.array([wave(a, cap) for a in amplitudes])
             found["animal"] = scene.gait.amplitude
-            found["cycle"] = undulation.performance(scene, [scene.gait.amplitude])["velocity"][0]
+            found["cycle"] = undulation.performance(scene, [scene.gait.amplitude])[
+                "velocity"
+            ][0]
         out[name] = found
     return out
 
@@ -80,12 +103,18 @@ def draw(numbers: dict):
         for ax, against in zip(row, ("relative_curvature", "amplitude")):
             draw_measure(ax, numbers, key, against)
             # A weak wave costs up to a hundred times its drag: cut off, to show the cheapest.
-            ax.set_ylim(0, 8 if key == "cost_of_transport" else 90 if key == "slip" else None)
+            ax.set_ylim(
+                0, 8 if key == "cost_of_transport" else 90 if key == "slip" else None
+            )
             ax.tick_params(labelbottom=key == "cost_of_transport")
         row[0].set_ylabel(MEASURES[key][1])
     note = "no optimum here;\nthe paper's is\nnear the animal"
-    axes[1, 1].text(0.98, 0.05, note, transform=axes[1, 1].transAxes, ha="right", fontsize=7)
-    axes[-2, 0].set_xlabel(r"mean relative curvature $\overline{|\kappa|}\,\lambda_s$ (rad)")
+    axes[1, 1].text(
+        0.98, 0.05, note, transform=axes[1, 1].transAxes, ha="right", fontsize=7
+    )
+    axes[-2, 0].set_xlabel(
+        r"mean relative curvature $\overline{|\kappa|}\,\lambda_s$ (rad)"
+    )
     axes[-2, 1].set_xlabel(r"$A/\lambda$")
     for ax, name in zip(axes[-1], ("sandfish-loose", "sandfish-close")):
         draw_cycle(ax, numbers[name]["cycle"], name)
@@ -105,13 +134,24 @@ def draw_measure(ax, numbers: dict, key: str, against: str):
         if key in found["best"]:
             a, top = found["best"][key]
             ax.plot(place(a), convert(top), "o", color=colour, ms=5)
-        unit = {"efficiency": 1.0, "arc_efficiency": Sine().wavelength(found["amplitude"])}.get(key)
+        unit = {
+            "efficiency": 1.0,
+            "arc_efficiency": Sine().wavelength(found["amplitude"]),
+        }.get(key)
         for endless, (_, _, dashes, _) in ENDLESS.items():
             if unit is not None and endless in found:
                 values = found[endless] * unit
                 ax.plot(x, values, color=colour, ls=dashes, lw=1.0)
                 if best := undulation.optimum(found["amplitude"], values):
-                    ax.plot(place(best[0]), best[1], "o", mfc="white", color=colour, ms=4, mew=1.0)
+                    ax.plot(
+                        place(best[0]),
+                        best[1],
+                        "o",
+                        mfc="white",
+                        color=colour,
+                        ms=4,
+                        mew=1.0,
+                    )
     ax.axvline(place(numbers["sandfish-loose"]["animal"]), **style.GUIDE, ls="-.")
     ax.set_xlim(0, place(0.6))
 
@@ -120,7 +160,11 @@ def draw_cycle(ax, velocity: np.ndarray, name: str):
     """Draw xi over a cycle, closed."""
     t = 2 * np.pi * np.arange(len(velocity) + 1) / len(velocity)
     closed = np.concatenate([velocity, velocity[:1]])
-    looks = (("-", r"$\xi_x$ (BL/rad)"), ("--", r"$\xi_y$ (BL/rad)"), ("-.", r"$\xi_\theta$ (rad/rad)"))
+    looks = (
+        ("-", r"$\xi_x$ (BL/rad)"),
+        ("--", r"$\xi_y$ (BL/rad)"),
+        ("-.", r"$\xi_\theta$ (rad/rad)"),
+    )
     for values, (dashes, label) in zip(closed.T, looks):
         ax.plot(t, values, ls=dashes, color=SCENES[name], label=label)
     style.zero_line(ax)

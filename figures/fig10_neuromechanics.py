@@ -48,13 +48,30 @@ def compute(waves=WAVES, elements: int = 100, phases: int = 128) -> dict:
 
     def run(count, effects=()):
         gait = Sine(waves=count, amplitude=fish.gait.amplitude, elements=elements)
-        return undulation.activation(fish.changed(body=Backbone(elements), effects=effects, gait=gait))
+        return undulation.activation(
+            fish.changed(body=Backbone(elements), effects=effects, gait=gait)
+        )
 
-    keys = {"lag": "lag", "speed": "speed_ratio", "fundamental_speed": "fundamental_speed_ratio"}
-    headless, head = ([run(w, effects) for w in waves] for effects in ((), fish.system.effects))
-    headless, head = ({k: np.array([r[old] for r in runs]) for k, old in keys.items()} for runs in (headless, head))
+    keys = {
+        "lag": "lag",
+        "speed": "speed_ratio",
+        "fundamental_speed": "fundamental_speed_ratio",
+    }
+    headless, head = (
+        [run(w, effects) for w in waves] for effects in ((), fish.system.effects)
+    )
+    headless, head = (
+        {k: np.array([r[old] for r in runs]) for k, old in keys.items()}
+        for runs in (headless, head)
+    )
     one = run(1.0)
-    return {"waves": np.array(waves), "s": one["s"], **headless, "one": one, "head": head}
+    return {
+        "waves": np.array(waves),
+        "s": one["s"],
+        **headless,
+        "one": one,
+        "head": head,
+    }
 
 
 def selected(numbers: dict) -> list[int]:
@@ -64,8 +81,19 @@ def selected(numbers: dict) -> list[int]:
 
 def table(numbers: dict) -> str:
     """Return speed ratios and the phase by which activation is ahead of curvature at three places."""
-    heads = "waves", "speed ratio: lines", "harmonic", "lines, head drag", *(f"ahead at s = {s} (rad)" for s in PLACES)
-    columns = numbers["waves"], numbers["speed"], numbers["fundamental_speed"], numbers["head"]["speed"]
+    heads = (
+        "waves",
+        "speed ratio: lines",
+        "harmonic",
+        "lines, head drag",
+        *(f"ahead at s = {s} (rad)" for s in PLACES),
+    )
+    columns = (
+        numbers["waves"],
+        numbers["speed"],
+        numbers["fundamental_speed"],
+        numbers["head"]["speed"],
+    )
     lags = np.array([np.interp(PLACES, numbers["s"], lag) for lag in numbers["lag"]])
     rows = np.column_stack([*columns, lags])[selected(numbers)]
     return style.table(heads, [[f"{x:.2f}" for x in row] for row in rows])
@@ -87,9 +115,17 @@ def draw_map(ax, one: dict):
     rate = np.concatenate([one["bend_rate"], one["bend_rate"][:1]])
     ax.contourf(s, t, rate, levels=[-np.inf, 0.0], colors=[style.SHADED["color"]])
     for key, dashes in (("onset", "-"), ("offset", "--")):
-        for turn in (-2 * np.pi, 0.0, 2 * np.pi):  # the lines leave the cycle and come back into it
+        for turn in (
+            -2 * np.pi,
+            0.0,
+            2 * np.pi,
+        ):  # the lines leave the cycle and come back into it
             ax.plot(
-                s, one[key] + turn, color=style.GREEN, ls=dashes, label=f"{key} of right side" if turn == 0 else None
+                s,
+                one[key] + turn,
+                color=style.GREEN,
+                ls=dashes,
+                label=f"{key} of right side" if turn == 0 else None,
             )
     ax.fill([], [], label="bending to the right", **style.SHADED)
     ax.set(xlabel="place on the body, tail 0 to head 1", xlim=(0, 1))
@@ -108,7 +144,9 @@ def draw_trace(ax, one: dict):
         trace = np.append(one[key][:, k], one[key][0, k])
         ax.plot(t, trace / np.abs(trace).max(), color=colour, lw=width, label=label)
     falls = np.append(one["bend_rate"][:, k], one["bend_rate"][0, k]) < 0
-    ax.fill_between(t, -1.1, 1.1, where=falls, label="bending to the right", **style.SHADED)
+    ax.fill_between(
+        t, -1.1, 1.1, where=falls, label="bending to the right", **style.SHADED
+    )
     for key, dashes in (("onset", "-"), ("offset", "--")):
         ax.axvline(np.mod(one[key][k], 2 * np.pi), color=style.GREEN, ls=dashes, lw=1.0)
     style.zero_line(ax)
@@ -120,24 +158,40 @@ def draw_trace(ax, one: dict):
 def draw_lag(ax, numbers: dict):
     rows = selected(numbers)
     for k, colour in zip(rows, style.shades(len(rows))):
-        ax.plot(numbers["s"], numbers["lag"][k], color=colour, label=f"{numbers['waves'][k]:g}")
+        ax.plot(
+            numbers["s"],
+            numbers["lag"][k],
+            color=colour,
+            label=f"{numbers['waves'][k]:g}",
+        )
     ax.axhline(np.pi / 2, **style.GUIDE)
     ax.text(0.02, np.pi / 2 - 0.08, "works while\nit shortens", va="top", **style.NOTE)
-    ax.set(xlabel="place on the body, tail 0 to head 1", ylabel="activation ahead of curvature (rad)", xlim=(0, 1))
+    ax.set(
+        xlabel="place on the body, tail 0 to head 1",
+        ylabel="activation ahead of curvature (rad)",
+        xlim=(0, 1),
+    )
     style.quarter_ticks(ax, "y", 4)
     ax.legend(title="waves on the body", loc="upper right", ncols=2)
 
 
 def draw_speed(ax, numbers: dict):
     waves, head = numbers["waves"], numbers["head"]
-    looks = ("speed", "o", style.BLACK, "onset, offset"), ("fundamental_speed", "^", style.VERMILION, "first harmonic")
+    looks = (
+        ("speed", "o", style.BLACK, "onset, offset"),
+        ("fundamental_speed", "^", style.VERMILION, "first harmonic"),
+    )
     for key, marker, colour, label in looks:
         look = {"color": colour, "marker": marker, "markevery": 4}
         ax.plot(waves, numbers[key], label=label, **look)
         ax.plot(waves, head[key], ls="--", lw=1.0, **look)
     style.entry(ax, "with head drag", ls="--", lw=1.0)
     ax.axhline(1.0, **style.GUIDE)
-    ax.set(xlabel="waves on the body", ylabel="speed of activation / curvature", ylim=(0, None))
+    ax.set(
+        xlabel="waves on the body",
+        ylabel="speed of activation / curvature",
+        ylim=(0, None),
+    )
     ax.legend(loc="lower left")
 
 

@@ -13,13 +13,19 @@ def compute(scene: str = "three-link-glass", **numerics) -> dict:
     """Return the CCF on its grid and its error (Fields with values (3, N, N)), and the gaits."""
     loaded = load(scene).with_numerics(**numerics)
     study = Study(loaded)
-    return {"ccf": study.curvature, "error": study.curvature_error, "gaits": [loaded.gait, Butterfly()]}
+    return {
+        "ccf": study.curvature,
+        "error": study.curvature_error,
+        "gaits": [loaded.gait, Butterfly()],
+    }
 
 
 @plots.styled
 def draw(numbers: dict):
     fig, axes = plots.figure(4.2, 3.4)
-    plots.ccf_map(numbers["ccf"], 0, numbers["gaits"], ax=axes[0, 0], error=numbers["error"])
+    plots.ccf_map(
+        numbers["ccf"], 0, numbers["gaits"], ax=axes[0, 0], error=numbers["error"]
+    )
     return fig
 
 

@@ -13,14 +13,19 @@ from geomech.studies.study import Study
 from geomech.tiers import TIERS
 
 GAITS = {"circle": Circle(reverse=True), "butterfly": Butterfly()}
-AMPLITUDES = {"circle": np.linspace(0.125, 2.25, 18), "butterfly": np.linspace(0.1, 1.3, 13)}
+AMPLITUDES = {
+    "circle": np.linspace(0.125, 2.25, 18),
+    "butterfly": np.linspace(0.1, 1.3, 13),
+}
 
 
 def compute(scene: str = "three-link-glass", amplitudes: dict | None = None) -> dict:
     """Return a table for each gait, as `Study.study` gives it."""
     loaded, amplitudes = load(scene), amplitudes or AMPLITUDES
     study = Study(loaded)
-    tables = {name: study.study(a, [*TIERS], GAITS[name]) for name, a in amplitudes.items()}
+    tables = {
+        name: study.study(a, [*TIERS], GAITS[name]) for name, a in amplitudes.items()
+    }
     return {"tables": tables}
 
 

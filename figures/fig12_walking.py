@@ -22,12 +22,21 @@ RATES = np.array([2.0, 4.0, 6.0, 8.0])  # rad/s
 AIR = np.linspace(0.0, 0.24, 9).tolist()  # m/s
 
 
-def compute(curvatures=CURVATURES, frequencies=FREQUENCIES, rates=RATES, air=AIR) -> dict:
+def compute(
+    curvatures=CURVATURES, frequencies=FREQUENCIES, rates=RATES, air=AIR
+) -> dict:
     """Return the walk of Xplorer as it is built in, and legs and flow as `geomech.studies.sweep.sweep` gives them."""
     xplorer, sandbot = load("xplorer"), load("sandbot")
     over = {"robot.legs.relative_curvature": curvatures, "gait.frequency": frequencies}
-    flows = {"effects.aeration.air_speed": air, "gait.frequency": (np.asarray(rates) / (2 * np.pi)).tolist()}
-    return {"walk": walking.run(xplorer), "legs": sweep(xplorer, over), "flow": sweep(sandbot, flows)}
+    flows = {
+        "effects.aeration.air_speed": air,
+        "gait.frequency": (np.asarray(rates) / (2 * np.pi)).tolist(),
+    }
+    return {
+        "walk": walking.run(xplorer),
+        "legs": sweep(xplorer, over),
+        "flow": sweep(sandbot, flows),
+    }
 
 
 @plots.styled
@@ -37,13 +46,29 @@ def draw(numbers: dict):
     early = walk.t <= 3.0
     ax.plot(walk.t[early], walk.twist[early, 0], color=style.BLACK, lw=0.9)
     ax.axhline(walk.speed, color=style.VERMILION, ls="--", lw=1.0)
-    ax.set(xlabel="$t$ (s)", ylabel="forward speed (m/s)", xlim=(0, 3), title="(b) Xplorer, 2 Hz; dashed: mean")
-    for ax, name, unit, scale in ((legs, "legs", "Hz", 1.0), (flow, "flow", "rad/s", 2 * np.pi)):
+    ax.set(
+        xlabel="$t$ (s)",
+        ylabel="forward speed (m/s)",
+        xlim=(0, 3),
+        title="(b) Xplorer, 2 Hz; dashed: mean",
+    )
+    for ax, name, unit, scale in (
+        (legs, "legs", "Hz", 1.0),
+        (flow, "flow", "rad/s", 2 * np.pi),
+    ):
         values, second = numbers[name]["over"].values()
-        curves(ax, list(values), numbers[name], [f"{scale * f:.3g} {unit}" for f in second])
+        curves(
+            ax, list(values), numbers[name], [f"{scale * f:.3g} {unit}" for f in second]
+        )
         style.zero_line(ax)
-    legs.set(xlabel="leg curvature $R/r$", ylabel="mean speed (m/s)", title="(d) Xplorer")
-    flow.set(xlabel="air speed (m/s)", ylabel="mean speed (m/s)", title="(f) SandBot; open: stuck or sunk")
+    legs.set(
+        xlabel="leg curvature $R/r$", ylabel="mean speed (m/s)", title="(d) Xplorer"
+    )
+    flow.set(
+        xlabel="air speed (m/s)",
+        ylabel="mean speed (m/s)",
+        title="(f) SandBot; open: stuck or sunk",
+    )
     return fig
 
 
@@ -52,9 +77,14 @@ def table(numbers: dict) -> str:
     tables = []
     for name, of in (("legs", "leg curvature"), ("flow", "air speed (m/s)")):
         values, frequencies = numbers[name]["over"].values()
-        status = np.where(numbers[name]["status"] == "walking", "", numbers[name]["status"])
+        status = np.where(
+            numbers[name]["status"] == "walking", "", numbers[name]["status"]
+        )
         rows = [
-            [f"at {f:.3g} Hz", *(f"{speed:.3f} {kind}".strip() for speed, kind in zip(speeds, kinds))]
+            [
+                f"at {f:.3g} Hz",
+                *(f"{speed:.3f} {kind}".strip() for speed, kind in zip(speeds, kinds)),
+            ]
             for f, speeds, kinds in zip(frequencies, numbers[name]["speed"].T, status.T)
         ]
         tables.append(style.table((of, *(f"{x:.3g}" for x in values)), rows))

@@ -12,7 +12,11 @@ from geomech.studies.study import Study
 def compute(scene: str = "butterfly-glass", cycles: int = 1, **numerics) -> dict:
     """Return the motion (`geomech.studies.motion.Motion`), and the CCF with its error."""
     study = Study(load(scene).with_numerics(**numerics))
-    return {"motion": motion(study.scene, cycles), "ccf": study.curvature, "error": study.curvature_error}
+    return {
+        "motion": motion(study.scene, cycles),
+        "ccf": study.curvature,
+        "error": study.curvature_error,
+    }
 
 
 def draw(numbers: dict):

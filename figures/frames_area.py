@@ -29,12 +29,17 @@ def compute(scene: str = "three-link-glass", count: int = 20, grid: int = 31) ->
     The field reaches as far as the gaits.
     """
     study = Study(load(scene)).with_numerics(grid=grid, extent=2.7)
-    found: dict = {name: {"amplitude": np.linspace(0, top, count + 1)[1:]} for name, (_, top, _) in GAITS.items()}
+    found: dict = {
+        name: {"amplitude": np.linspace(0, top, count + 1)[1:]}
+        for name, (_, top, _) in GAITS.items()
+    }
     for frame in FRAMES:
         bench = study if frame == study.scene.frame else study.in_frame(frame)
         for name, (gait, _, _) in GAITS.items():
             a = found[name]["amplitude"]
-            found[name][frame] = {tier: bench.poses(tier, gait, a) for tier in ("area", "path", "direct")}
+            found[name][frame] = {
+                tier: bench.poses(tier, gait, a) for tier in ("area", "path", "direct")
+            }
     return found
 
 
@@ -48,16 +53,29 @@ def draw(numbers: dict):
     fig, axes = plots.figure(7.4, 5.2, 2, 2)
     for (name, (_, _, label)), above, below in zip(GAITS.items(), *axes):
         a = numbers[name]["amplitude"]
-        above.plot(a, np.hypot(*numbers[name]["mean"]["direct"][:, :2].T), color="0.72", lw=4, label="force balance")
+        above.plot(
+            a,
+            np.hypot(*numbers[name]["mean"]["direct"][:, :2].T),
+            color="0.72",
+            lw=4,
+            label="force balance",
+        )
         for k, frame in enumerate(FRAMES, 1):
             poses, look = numbers[name][frame], style.sparse(k, len(a))
-            above.plot(a, np.hypot(*poses["area"][:, :2].T), label=f"area, {frame} frame", **look)
+            above.plot(
+                a,
+                np.hypot(*poses["area"][:, :2].T),
+                label=f"area, {frame} frame",
+                **look,
+            )
             below.plot(a, missed(poses, "area"), **look)
         below.plot(a, missed(numbers[name]["mean"], "path"), ":", color=style.BLACK)
         style.entry(above, "path, any frame", ls=":", color=style.BLACK)
         above.set(title=name, ylabel="net distance (BL)", ylim=(0, None))
         below.set(xlabel=label, ylabel="off the force balance by (BL)", ylim=(0, None))
-    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    fig.legend(
+        *axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3
+    )
     return fig
 
 

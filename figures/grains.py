@@ -35,7 +35,12 @@ AMPLITUDES = np.linspace(0.25, 2.1, 14)
 TIERS = "area", "harmonic", "direct"
 # Travels of the transient, body lengths: as the flank's drag comes back in these swims, and as on a rod to and fro.
 TRAVELS = 0.05, 0.21
-OTHERS = (grains.BUTTERFLY, 1.0), (grains.WAVE, 0.5), (grains.WAVE, 0.87), (grains.WAVE, 1.2)
+OTHERS = (
+    (grains.BUTTERFLY, 1.0),
+    (grains.WAVE, 0.5),
+    (grains.WAVE, 0.87),
+    (grains.WAVE, 1.2),
+)
 FLAT, FLAT_ENDS = "direct, flat ends", 1.71  # e of both, fitted to the same rods
 BARS = {  # by their names in the data
     "round": RoundRod(grains.BAR, 0.1),
@@ -60,7 +65,10 @@ def compute(amplitudes=AMPLITUDES, others=OTHERS, travels=TRAVELS) -> dict:
         "amplitude": np.asarray(amplitudes),
         "curves": predicted(grains.CIRCLE, amplitudes, travels),
         "others": {
-            case: {name: (float(c["distance"][0]), float(c["spread"][0])) for name, c in curves.items()}
+            case: {
+                name: (float(c["distance"][0]), float(c["spread"][0]))
+                for name, c in curves.items()
+            }
             for case, curves in found.items()
         },
         "swims": measured_swims(),
@@ -73,38 +81,62 @@ def compute(amplitudes=AMPLITUDES, others=OTHERS, travels=TRAVELS) -> dict:
 
 def predicted(scene_name: str, amplitudes, travels=TRAVELS) -> dict:
     """Return distances by tier, with flat ends and with transients, and their spread by the medium, body lengths."""
-    law, scene = Calibration("flank-drag", end_caps="fitted").ask().subject, load(scene_name)
+    law, scene = (
+        Calibration("flank-drag", end_caps="fitted").ask().subject,
+        load(scene_name),
+    )
     caps = law.caps(RADIUS / SIZE)
     medium = replace(law.medium, covariance=None)
     study = lambda medium, tiers, *effects: (
-        Study(scene.changed(system=replace(scene.system, medium=medium, effects=effects)))
+        Study(
+            scene.changed(system=replace(scene.system, medium=medium, effects=effects))
+        )
         .study(list(amplitudes), tiers)
         .result["net_distance"]
     )
     none = np.zeros(len(amplitudes))
     net = study(law.medium, TIERS, caps)
-    curves = {tier: {"distance": net.values[k], "spread": net.spread[k]} for k, tier in enumerate(TIERS)}
+    curves = {
+        tier: {"distance": net.values[k], "spread": net.spread[k]}
+        for k, tier in enumerate(TIERS)
+    }
     flat = EndCaps(caps.radius, FLAT_ENDS / 2, FLAT_ENDS / 2)
-    curves[FLAT] = {"distance": study(medium, ("direct",), flat).values[0], "spread": none}
+    curves[FLAT] = {
+        "distance": study(medium, ("direct",), flat).values[0],
+        "spread": none,
+    }
     for travel in travels:
         net = study(medium, ("direct",), caps, Transient(travel=travel))
-        curves[f"direct, transient {travel:g} BL"] = {"distance": net.values[0], "spread": none}
+        curves[f"direct, transient {travel:g} BL"] = {
+            "distance": net.values[0],
+            "spread": none,
+        }
     return curves
 
 
 def over_beds(values: np.ndarray, beds: np.ndarray) -> tuple[float, float]:
     """Return the mean over beds of their means, and its standard error; nan of one bed."""
     means = np.array([values[beds == bed].mean() for bed in np.unique(beds)])
-    return float(means.mean()), float(means.std(ddof=1) / np.sqrt(len(means))) if len(means) > 1 else np.nan
+    return float(means.mean()), float(means.std(ddof=1) / np.sqrt(len(means))) if len(
+        means
+    ) > 1 else np.nan
 
 
 def measured_swims() -> dict[tuple[str, float, float], tuple[float, float]]:
     """Return (distance, error), BL, by scene, amplitude, rad, and frequency, Hz."""
     data = grains.read("swims")
     distance = np.hypot(data["x_BL"], data["y_BL"])
-    cases = list(zip(*(data[key].tolist() for key in ("scene", "amplitude", "frequency_Hz"))))
-    mine = {case: np.array([other == case for other in cases]) for case in sorted(set(cases))}
-    return {case: over_beds(distance[rows], data["bed"][rows]) for case, rows in mine.items()}
+    cases = list(
+        zip(*(data[key].tolist() for key in ("scene", "amplitude", "frequency_Hz")))
+    )
+    mine = {
+        case: np.array([other == case for other in cases])
+        for case in sorted(set(cases))
+    }
+    return {
+        case: over_beds(distance[rows], data["bed"][rows])
+        for case, rows in mine.items()
+    }
 
 
 def lifts(name: str, bar) -> dict:
@@ -113,17 +145,24 @@ def lifts(name: str, bar) -> dict:
     mine = data["shape"] == name
     value, error = over_beds(data["lift_over_drag"][mine], data["bed"][mine])
     stress = VERTICAL["glass-3mm"].stress
-    by_map = {t: rod_forces(replace(stress, tension=t), bar.outline(200), 2)["ratio"] for t in ("keep", "cut")}
+    by_map = {
+        t: rod_forces(replace(stress, tension=t), bar.outline(200), 2)["ratio"]
+        for t in ("keep", "cut")
+    }
     return {"grains": value, "error": error, **by_map}
 
 
-def reversal_cases(depth: float, angle: float, part: str, beds=grains.BEDS, amplitudes=None) -> list[tuple]:
+def reversal_cases(
+    depth: float, angle: float, part: str, beds=grains.BEDS, amplitudes=None
+) -> list[tuple]:
     """Return (amplitude, travel, drag) of all ways at a depth, m, and an angle, degrees; means over beds."""
     data = grains.read("reversals")
     mine = (data["depth_m"] == depth) & (data["angle_deg"] == angle)
     found = []
     for a in np.unique(data["amplitude_m"][mine]) if amplitudes is None else amplitudes:
-        rows = [mine & (data["amplitude_m"] == a) & (data["bed"] == bed) for bed in beds]
+        rows = [
+            mine & (data["amplitude_m"] == a) & (data["bed"] == bed) for bed in beds
+        ]
         drag = np.mean([data[f"{part}_N"][r] for r in rows], 0)
         found.append((float(a), data["travel_m"][rows[0]], drag))
     return found
@@ -131,10 +170,20 @@ def reversal_cases(depth: float, angle: float, part: str, beds=grains.BEDS, ampl
 
 def measured_reversals() -> dict:
     found = {}
-    for depth, angle in dict.fromkeys((depth, angle) for _, depth, angle in grains.STROKES):
+    for depth, angle in dict.fromkeys(
+        (depth, angle) for _, depth, angle in grains.STROKES
+    ):
         for part in ("flank", "ends"):
-            fits = np.array([recovery(reversal_cases(depth, angle, part, (bed,))) for bed in grains.BEDS])
-            pairs = zip(fits.mean(0).tolist(), (fits.std(0, ddof=1) / np.sqrt(len(fits))).tolist())
+            fits = np.array(
+                [
+                    recovery(reversal_cases(depth, angle, part, (bed,)))
+                    for bed in grains.BEDS
+                ]
+            )
+            pairs = zip(
+                fits.mean(0).tolist(),
+                (fits.std(0, ddof=1) / np.sqrt(len(fits))).tolist(),
+            )
             found[depth, angle, part] = dict(zip(Recovery._fields, pairs))
     return found
 
@@ -153,9 +202,13 @@ def measured_stretches() -> dict:
             share = lambda x, at_once, length: 1 - (1 - at_once) * np.exp(-x / length)
             late = drag[x > 0.6 * 2 * a].mean()
             bounds = [-1, x[1] - x[0]], [1, 4 * a]  # nothing faster than a bin is seen
-            (at_once, length), _ = curve_fit(share, x, drag / late, (0.2, a / 2), bounds=bounds)
+            (at_once, length), _ = curve_fit(
+                share, x, drag / late, (0.2, a / 2), bounds=bounds
+            )
             fits.append((at_once, length * np.log((1 - at_once) / 0.05)))
-        pairs = np.transpose([np.mean(fits, 0), np.std(fits, 0, ddof=1) / np.sqrt(len(fits))])
+        pairs = np.transpose(
+            [np.mean(fits, 0), np.std(fits, 0, ddof=1) / np.sqrt(len(fits))]
+        )
         found[a, depth, angle] = {"at_once": tuple(pairs[0]), "travel": tuple(pairs[1])}
     return found
 
@@ -168,15 +221,24 @@ def ways(depth: float = 0.0245, fitted: float = 0.02) -> dict:
         for a, travel, drag in reversal_cases(depth, angle, "flank"):
             late = travel > 3 * a
             pair = drag[late] / law.plateau, law.drag(travel, a)[late] / law.plateau
-            found[a, angle] = {"travel": travel[late] - 3 * a, **dict(zip(("grains", "law"), pair))}
+            found[a, angle] = {
+                "travel": travel[late] - 3 * a,
+                **dict(zip(("grains", "law"), pair)),
+            }
     return found
 
 
 def named_swim(case: tuple[str, float, float]) -> str:
     """Return the name of a swim."""
     scene, amplitude, frequency = case
-    gait = {grains.CIRCLE: "circle", grains.BUTTERFLY: "butterfly", grains.WAVE: "seven links"}[scene]
-    return f"{gait} {amplitude:g} rad" + ("" if frequency == 1.0 else f", {frequency:g} Hz")
+    gait = {
+        grains.CIRCLE: "circle",
+        grains.BUTTERFLY: "butterfly",
+        grains.WAVE: "seven links",
+    }[scene]
+    return f"{gait} {amplitude:g} rad" + (
+        "" if frequency == 1.0 else f", {frequency:g} Hz"
+    )
 
 
 def by_curves(numbers: dict, case: tuple[str, float, float]) -> dict[str, float]:
@@ -184,8 +246,14 @@ def by_curves(numbers: dict, case: tuple[str, float, float]) -> dict[str, float]
     scene, amplitude, _ = case
     if scene == grains.CIRCLE:
         at = numbers["amplitude"]
-        return {name: float(np.interp(amplitude, at, c["distance"])) for name, c in numbers["curves"].items()}
-    return {name: x for name, (x, _) in numbers["others"].get((scene, amplitude), {}).items()}
+        return {
+            name: float(np.interp(amplitude, at, c["distance"]))
+            for name, c in numbers["curves"].items()
+        }
+    return {
+        name: x
+        for name, (x, _) in numbers["others"].get((scene, amplitude), {}).items()
+    }
 
 
 def table(numbers: dict) -> str:
@@ -202,7 +270,12 @@ def table(numbers: dict) -> str:
         )
     lines = style.table(("BL per cycle", "grains", *numbers["curves"]), rows)
     rows = [
-        (name, f"{x['grains']:+.2f} +- {x['error']:.2f}", f"{x['keep']:+.2f}", f"{x['cut']:+.2f}")
+        (
+            name,
+            f"{x['grains']:+.2f} +- {x['error']:.2f}",
+            f"{x['keep']:+.2f}",
+            f"{x['cut']:+.2f}",
+        )
         for name, x in numbers["lift"].items()
     ]
     lifted = style.table(("lift over drag", "grains", "map", "tension cut"), rows)
@@ -214,16 +287,22 @@ def table(numbers: dict) -> str:
         )
         for (depth, angle, part), x in numbers["reversal"].items()
     ]
-    back = style.table(("drag after a reversal", "plateau, N", "at once", "95 % after"), rows)
+    back = style.table(
+        ("drag after a reversal", "plateau, N", "at once", "95 % after"), rows
+    )
     rows = [
         (
             f"{1e3 * a:g} mm {'across' if angle else 'along'}, {1e3 * depth:.3g} mm deep",
             "{:.2f} +- {:.2f}".format(*x["at_once"]),
             "{:.1f} +- {:.1f} mm".format(*(1e3 * np.array(x["travel"]))),
         )
-        for (a, depth, angle), x in sorted(numbers["stretches"].items(), key=lambda item: item[0][1:] + item[0][:1])
+        for (a, depth, angle), x in sorted(
+            numbers["stretches"].items(), key=lambda item: item[0][1:] + item[0][:1]
+        )
     ]
-    each = style.table(("second reversal", "at once of the late drag", "95 % of it after"), rows)
+    each = style.table(
+        ("second reversal", "at once of the late drag", "95 % of it after"), rows
+    )
     return f"{lines}\n{lifted}\n{back}\n{each}"
 
 
@@ -239,7 +318,14 @@ def draw(numbers: dict):
     return fig
 
 
-DOTS = {"color": "black", "ls": "none", "marker": "o", "ms": 4, "capsize": 2, "zorder": 3}  # of grains
+DOTS = {
+    "color": "black",
+    "ls": "none",
+    "marker": "o",
+    "ms": 4,
+    "capsize": 2,
+    "zorder": 3,
+}  # of grains
 
 
 def looks(curves) -> dict[str, dict]:
@@ -248,7 +334,13 @@ def looks(curves) -> dict[str, dict]:
     lines, markers = ("-", ":", "-", "-", "--", ":"), "^Dsvx+"
     shape = {"mfc": "white", "ms": 4.5}
     return {
-        name: {"color": c, "ls": ls, "marker": m, "markevery": (k, len(colours)), **shape}
+        name: {
+            "color": c,
+            "ls": ls,
+            "marker": m,
+            "markevery": (k, len(colours)),
+            **shape,
+        }
         for k, (name, c, ls, m) in enumerate(zip(curves, colours, lines, markers))
     }
 
@@ -258,16 +350,28 @@ def draw_circles(ax, numbers: dict) -> None:
     for name, look in looks(numbers["curves"]).items():
         x, curve = numbers["amplitude"], numbers["curves"][name]
         if name == "direct":
-            low, high = curve["distance"] - curve["spread"], curve["distance"] + curve["spread"]
+            low, high = (
+                curve["distance"] - curve["spread"],
+                curve["distance"] + curve["spread"],
+            )
             ax.fill_between(x, low, high, color=look["color"], alpha=0.2, lw=0)
         ax.plot(x, curve["distance"], **look, label=name)
     for frequency, face in ((1.0, "black"), (0.5, "white")):
-        here = {a: x for (scene, a, f), x in numbers["swims"].items() if scene == grains.CIRCLE and f == frequency}
+        here = {
+            a: x
+            for (scene, a, f), x in numbers["swims"].items()
+            if scene == grains.CIRCLE and f == frequency
+        }
         if here:
             d, e = np.transpose(list(here.values()))
             label = "grains" if frequency == 1.0 else f"grains, {frequency:g} Hz"
             ax.errorbar(list(here), d, np.nan_to_num(e), label=label, mfc=face, **DOTS)
-    ax.set(xlabel="amplitude of the circle (rad)", ylabel="distance per cycle (BL)", ylim=(0, 0.4), xlim=(0.2, 2.15))
+    ax.set(
+        xlabel="amplitude of the circle (rad)",
+        ylabel="distance per cycle (BL)",
+        ylim=(0, 0.4),
+        xlim=(0.2, 2.15),
+    )
     ax.legend(loc="upper left", ncols=2)
 
 
@@ -281,16 +385,33 @@ def draw_others(ax, numbers: dict) -> None:
             ax.errorbar(swum[0], y, xerr=np.nan_to_num(swum[1]), **DOTS)
     names = [named_swim((*case, 1.0)) for case in numbers["others"]]
     ax.set_yticks(range(len(names)), names)
-    ax.set(xlabel="distance per cycle (BL)", ylim=(len(names) - 0.4, -0.6), xlim=(0, None), title="marks as in (a)")
+    ax.set(
+        xlabel="distance per cycle (BL)",
+        ylim=(len(names) - 0.4, -0.6),
+        xlim=(0, None),
+        title="marks as in (a)",
+    )
 
 
 def draw_lift(ax, lift: dict) -> None:
     """Draw lift over drag by shape."""
     y = np.arange(len(lift))
-    for key, marker, label in (("keep", "D", "nine-term map"), ("cut", "s", "tension cut")):
-        ax.plot([x[key] for x in lift.values()], y, marker, mfc="white", color=style.BLUE, label=label)
+    for key, marker, label in (
+        ("keep", "D", "nine-term map"),
+        ("cut", "s", "tension cut"),
+    ):
+        ax.plot(
+            [x[key] for x in lift.values()],
+            y,
+            marker,
+            mfc="white",
+            color=style.BLUE,
+            label=label,
+        )
     errors = np.nan_to_num([x["error"] for x in lift.values()])
-    ax.errorbar([x["grains"] for x in lift.values()], y, xerr=errors, label="grains", **DOTS)
+    ax.errorbar(
+        [x["grains"] for x in lift.values()], y, xerr=errors, label="grains", **DOTS
+    )
     ax.axvline(0.0, **style.GUIDE)
     ax.set_yticks(y, list(lift))
     ax.set(xlabel="lift over drag", ylim=(len(lift) - 0.5, -1.2))
@@ -302,10 +423,17 @@ def draw_reversals(ax, ways: dict) -> None:
     for (a, angle), way in ways.items():
         if angle or a == 0.02:
             colour = style.SEQUENCE[(0.01, 0.02, 0.04).index(a)] if angle else "0.5"
-            x, label = 1e3 * way["travel"], f"{1e3 * a:g} mm {'across' if angle else 'along'}"
+            x, label = (
+                1e3 * way["travel"],
+                f"{1e3 * a:g} mm {'across' if angle else 'along'}",
+            )
             ax.plot(x, way["grains"], ".", ms=3, color=colour)
             ax.plot(x, way["law"], color=colour, label=label)
-    ax.set(xlabel="travel since the reversal (mm)", ylabel="drag over that after a long way", xlim=(0, 80))
+    ax.set(
+        xlabel="travel since the reversal (mm)",
+        ylabel="drag over that after a long way",
+        xlim=(0, 80),
+    )
     ax.set(ylim=(0, 1.3))
     ax.legend(loc="lower right")
 

@@ -23,27 +23,39 @@ SHARE = 0.1  # of the force, from which an effect counts as seen; assumed
 PLACES = (-0.04, 0.0, 0.04)  # m
 
 
-def compute(rates=(30, 60, 115, 230, 460), strengths=(1.0, 2.0, 4.0), shares=(0, 0.2, 0.4, 0.6, 0.8)) -> dict:
+def compute(
+    rates=(30, 60, 115, 230, 460),
+    strengths=(1.0, 2.0, 4.0),
+    shares=(0, 0.2, 0.4, 0.6, 0.8),
+) -> dict:
     """Return rates (R,), rpm; added (S, R); at (S,): the rate at which SHARE is added. shares (N,), aerated, rising and
     falling (N,): peaks of the lift over that without, on ground that rises or falls ahead of the robot by shares of
     REPOSE. angle (T,), rad; lift {place: (T,)}, N."""
     leg = load("c-leg")
     without = leg.run()
     size = np.sqrt((without.force**2).sum(-1).mean())
-    added = np.array([[_added(leg, without, k, rpm) for rpm in rates] for k in strengths]) / size
-    peak = lambda effect: leg.changed(effects=(effect,)).run().force[:, 1].max() / without.force[:, 1].max()
+    added = (
+        np.array([[_added(leg, without, k, rpm) for rpm in rates] for k in strengths])
+        / size
+    )
+    peak = lambda effect: (
+        leg.changed(effects=(effect,)).run().force[:, 1].max()
+        / without.force[:, 1].max()
+    )
     ground = lambda x: DisturbedGround(places=(x,), radius=0.02, weakening=0.5)
     return {
         "rates": np.array(rates),
         "strengths": strengths,
         "added": added,
-        "at": rates[-1] * np.sqrt(SHARE / added[:, -1]),  # it grows with the square of the rate
+        "at": rates[-1]
+        * np.sqrt(SHARE / added[:, -1]),  # it grows with the square of the rate
         "shares": np.array(shares),
         "aerated": np.array([peak(Aeration(x * 0.03, 0.03)) for x in shares]),
         "rising": np.array([peak(Slope(x * REPOSE)) for x in shares]),
         "falling": np.array([peak(Slope(-x * REPOSE)) for x in shares]),
         "angle": without.pose[:, 2],
-        "lift": {None: without.force[:, 1]} | {x: leg.changed(effects=(ground(x),)).run().force[:, 1] for x in PLACES},
+        "lift": {None: without.force[:, 1]}
+        | {x: leg.changed(effects=(ground(x),)).run().force[:, 1] for x in PLACES},
     }
 
 
@@ -68,21 +80,46 @@ def draw(numbers: dict):
     fig, axes = plots.figure(10.2, 3.2, 3)
     left, middle, right = axes[0]
     strengths = numbers["strengths"]
-    for strength, added, shade in zip(strengths, numbers["added"], style.shades(len(strengths))):
-        left.loglog(numbers["rates"], added, "o-", lw=1.0, color=shade, label=rf"$\lambda$ = {strength:g}")
+    for strength, added, shade in zip(
+        strengths, numbers["added"], style.shades(len(strengths))
+    ):
+        left.loglog(
+            numbers["rates"],
+            added,
+            "o-",
+            lw=1.0,
+            color=shade,
+            label=rf"$\lambda$ = {strength:g}",
+        )
     left.axvline(SEEN, **style.GUIDE, ls="--")
     left.axhline(SHARE, **style.GUIDE)
-    left.set(xlabel="rate of turning (rpm)", ylabel="added by grain inertia / force without")
+    left.set(
+        xlabel="rate of turning (rpm)", ylabel="added by grain inertia / force without"
+    )
     style.named_ticks(left, numbers["rates"], [str(x) for x in numbers["rates"]])
     left.legend(loc="upper left")
     looks = (
         ("aerated", "o-", style.BLUE, "air speed / fluidisation"),
-        ("rising", "s-", style.VERMILION, "slope / angle of repose, leg sweeps downhill"),
-        ("falling", "s--", style.VERMILION, "slope / angle of repose, leg sweeps uphill"),
+        (
+            "rising",
+            "s-",
+            style.VERMILION,
+            "slope / angle of repose, leg sweeps downhill",
+        ),
+        (
+            "falling",
+            "s--",
+            style.VERMILION,
+            "slope / angle of repose, leg sweeps uphill",
+        ),
     )
     for name, line, colour, label in looks:
-        middle.plot(numbers["shares"], numbers[name], line, lw=1.0, color=colour, label=label)
-    middle.set(xlabel="share", ylabel="peak lift / that without", xlim=(0, 1), ylim=(0, 1.02))
+        middle.plot(
+            numbers["shares"], numbers[name], line, lw=1.0, color=colour, label=label
+        )
+    middle.set(
+        xlabel="share", ylabel="peak lift / that without", xlim=(0, 1), ylim=(0, 1.02)
+    )
     style.legend_above(middle)
     angle = np.degrees(numbers["angle"])
     for k, (place, lift) in enumerate(numbers["lift"].items()):

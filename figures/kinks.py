@@ -16,15 +16,29 @@ from geomech.geometry import connection, harmonics
 from geomech.scenes import load
 
 
-def compute(scene: str = "three-link-glass", grid: int = 51, directions: int = 48) -> dict:
+def compute(
+    scene: str = "three-link-glass", grid: int = 51, directions: int = 48
+) -> dict:
     """Return axes; stuck (N, N); residual: {1: (N, N), 15: (N, N)} in rad per rad."""
     loaded = load(scene).with_numerics(grid=grid)
     axes = connection.grid(2, grid, loaded.numerics.extent)
     alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1)[:, :, None]
-    solution = loaded.system.solve(alpha, connection.directions(2, directions)).checked()
-    fit = functools.partial(harmonics.fit, loaded.system.velocity, axes, directions, traits=loaded.system.traits)
+    solution = loaded.system.solve(
+        alpha, connection.directions(2, directions)
+    ).checked()
+    fit = functools.partial(
+        harmonics.fit,
+        loaded.system.velocity,
+        axes,
+        directions,
+        traits=loaded.system.traits,
+    )
     residual = {k: fit(highest=k).residual[2] for k in (1, 15)}
-    return {"axes": axes, "stuck": (solution.status == "stuck").mean(-1), "residual": residual}
+    return {
+        "axes": axes,
+        "stuck": (solution.status == "stuck").mean(-1),
+        "residual": residual,
+    }
 
 
 @plots.styled
@@ -38,7 +52,13 @@ def draw(numbers: dict):
     )
     for ax, (values, label, top) in zip(axes[0], maps):
         image = ax.pcolormesh(
-            *numbers["axes"], values.T, cmap="viridis", vmin=0, vmax=top, shading="nearest", rasterized=True
+            *numbers["axes"],
+            values.T,
+            cmap="viridis",
+            vmin=0,
+            vmax=top,
+            shading="nearest",
+            rasterized=True,
         )
         fig.colorbar(image, ax=ax, shrink=0.85).set_label(label)
         plots.shape_space(ax, numbers["axes"])

@@ -20,10 +20,16 @@ GAIT = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.2, -0.1))
 JOINTS = ("alpha_1", "alpha_2")
 
 
-def compute(scene: str = "three-link-viscous", cycles: int = 60, seed: int = 1) -> Fitted:
+def compute(
+    scene: str = "three-link-viscous", cycles: int = 60, seed: int = 1
+) -> Fitted:
     """Return the fit of a synthetic log."""
-    log = synthetic.made(load(scene).system.velocity, GAIT, cycles, spread=0.05, noise=1e-3, seed=seed)
-    return fit_log(Log("log.csv", log.t, log.alpha, log.pose, JOINTS, np.arange(len(log.t)) + 2))
+    log = synthetic.made(
+        load(scene).system.velocity, GAIT, cycles, spread=0.05, noise=1e-3, seed=seed
+    )
+    return fit_log(
+        Log("log.csv", log.t, log.alpha, log.pose, JOINTS, np.arange(len(log.t)) + 2)
+    )
 
 
 def draw(numbers: Fitted):

@@ -18,7 +18,9 @@ from geomech.systems.swimmer import MEDIA
 from rft import Backbone
 
 
-def compute(medium: str = "glass-0.3mm-close", cycles: float = 8.4, seed: int = 1) -> Result:
+def compute(
+    medium: str = "glass-0.3mm-close", cycles: float = 8.4, seed: int = 1
+) -> Result:
     """Return the kinematics of a synthetic trial in loose beads, with the prediction of a medium."""
     swimmer = Swimmer(MEDIA["glass-0.3mm-loose"], Backbone(40))
     fit = fit_midlines(made(swimmer, cycles, seed=seed).trial("trial.csv"))

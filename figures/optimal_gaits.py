@@ -22,7 +22,10 @@ from geomech.optimisation import optimise
 from geomech.optimisation.gain import PHASES
 from geomech.scenes import load
 
-SCENES = {"viscous fluid, ratio 2": "three-link-viscous", "loose 0.3 mm glass": "three-link-glass"}
+SCENES = {
+    "viscous fluid, ratio 2": "three-link-viscous",
+    "loose 0.3 mm glass": "three-link-glass",
+}
 OBJECTIVES = {"displacement": (style.BLACK, "-"), "efficiency": (style.GREEN, "--")}
 
 
@@ -32,7 +35,8 @@ def compute(harmonics: int = 5, starts: int | None = None, **numerics) -> dict:
     for medium, name in SCENES.items():
         scene = load(name).with_numerics(**numerics)
         out[medium] = {
-            objective: optimise(scene, objective, harmonics=harmonics, starts=starts) for objective in OBJECTIVES
+            objective: optimise(scene, objective, harmonics=harmonics, starts=starts)
+            for objective in OBJECTIVES
         }
         out[medium]["ccf"] = out[medium]["displacement"].gained
     return out
@@ -40,10 +44,27 @@ def compute(harmonics: int = 5, starts: int | None = None, **numerics) -> dict:
 
 def table(numbers: dict) -> str:
     """Return a line for each optimum."""
-    heads = "medium", "objective", "BL a cycle", "path length", "BL a unit", "reach (rad)"
-    best = {(medium, objective): found[objective].best for medium, found in numbers.items() for objective in OBJECTIVES}
+    heads = (
+        "medium",
+        "objective",
+        "BL a cycle",
+        "path length",
+        "BL a unit",
+        "reach (rad)",
+    )
+    best = {
+        (medium, objective): found[objective].best
+        for medium, found in numbers.items()
+        for objective in OBJECTIVES
+    }
     rows = [
-        (*names, f"{net(x):.4f}", f"{x.length:.4f}", f"{net(x) / x.length:.4f}", f"{reach(x.gait):.2f}")
+        (
+            *names,
+            f"{net(x):.4f}",
+            f"{x.length:.4f}",
+            f"{net(x) / x.length:.4f}",
+            f"{reach(x.gait):.2f}",
+        )
         for names, x in best.items()
     ]
     return style.table(heads, rows)

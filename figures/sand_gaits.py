@@ -14,7 +14,10 @@ from rft.walking import Tripod
 
 PHASES = 0.5 * np.array([0, 1, 1, 0, 0, 1])  # of the legs, cycles: a tripod
 MEDIUM = "poppy-seeds-loose"
-LOW, HIGH = np.array([1.0, 0.3, 0.6, -0.6]), np.array([4.0, 0.8, 2.4, 0.6])  # Hz, -, rad, rad: of the clock
+LOW, HIGH = (
+    np.array([1.0, 0.3, 0.6, -0.6]),
+    np.array([4.0, 0.8, 2.4, 0.6]),
+)  # Hz, -, rad, rad: of the clock
 SNAPSHOTS = 6  # of one cycle
 
 
@@ -22,21 +25,32 @@ def controls(clock: np.ndarray, seconds: float, step: float) -> np.ndarray:
     """Return the angles (n, steps, 6) of the legs, rad, by clocks (n, 4)."""
     time = step * np.arange(round(seconds / step))[:, None]
     gaits = [Tripod(*map(float, one)) for one in clock]
-    return np.stack([g.angle(g.frequency * time + PHASES, g.frequency * time + PHASES + 1e-9) for g in gaits])
+    return np.stack(
+        [
+            g.angle(g.frequency * time + PHASES, g.frequency * time + PHASES + 1e-9)
+            for g in gaits
+        ]
+    )
 
 
-def walk(batch, clock: np.ndarray, seconds: float, step: float) -> tuple[np.ndarray, np.ndarray]:
+def walk(
+    batch, clock: np.ndarray, seconds: float, step: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Return speeds (n,), m/s, over the last two thirds of walks, 0 for those that end upside down, and positions."""
     batch.reset()
     angles = controls(clock, seconds, step)
     path = batch.rollout(angles.shape[1], control=angles)["qpos"]
     upright = 1.0 - 2.0 * (path[:, -1, 4] ** 2 + path[:, -1, 5] ** 2)
     third = angles.shape[1] // 3
-    speed = (path[:, -1, 0] - path[:, third, 0]) / (seconds * (1 - third / angles.shape[1]))
+    speed = (path[:, -1, 0] - path[:, third, 0]) / (
+        seconds * (1 - third / angles.shape[1])
+    )
     return np.where((upright > 0.5) & np.isfinite(speed), speed, 0.0), path
 
 
-def search(batch, generations: int, seconds: float, step: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+def search(
+    batch, generations: int, seconds: float, step: float, seed: int = 0
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the best clock (4,) and the best speed of each generation, by the cross-entropy method."""
     rng, n = np.random.default_rng(seed), batch.nsim
     mean, deviation, best, speeds = (LOW + HIGH) / 2, (HIGH - LOW) / 4, None, []
@@ -46,7 +60,11 @@ def search(batch, generations: int, seconds: float, step: float, seed: int = 0) 
             clock[0] = best
         speed, _ = walk(batch, clock, seconds, step)
         elite = clock[np.argsort(-speed)[: max(2, n // 5)]]
-        mean, deviation, best = elite.mean(0), elite.std(0) + 0.02 * (HIGH - LOW), elite[0]
+        mean, deviation, best = (
+            elite.mean(0),
+            elite.std(0) + 0.02 * (HIGH - LOW),
+            elite[0],
+        )
         speeds.append(float(speed.max()))
     return best, np.array(speeds)
 
@@ -68,11 +86,19 @@ def compute(generations: int = 8, walks: int = 32, seconds: float = 3.0) -> dict
         warnings.simplefilter("ignore")  # the legs touch the floor no more
         sand = attach(soft, MEDIUM, element=0.03)
     with sand:
-        batches = {"sand": sand.batch(walks, persistent=True), "floor": Batch(hard, walks, persistent=True)}
-        results = {name: search(batch, generations, seconds, step) for name, batch in batches.items()}
+        batches = {
+            "sand": sand.batch(walks, persistent=True),
+            "floor": Batch(hard, walks, persistent=True),
+        }
+        results = {
+            name: search(batch, generations, seconds, step)
+            for name, batch in batches.items()
+        }
         clocks = {name: clock for name, (clock, _) in results.items()}
         both = np.stack([*clocks.values(), *[clocks["sand"]] * (walks - 2)])
-        tried = {name: walk(batch, both, seconds, step) for name, batch in batches.items()}
+        tried = {
+            name: walk(batch, both, seconds, step) for name, batch in batches.items()
+        }
     path, data = tried["sand"][1][0], mujoco.MjData(soft)
     cycle = round(1 / (clocks["sand"][0] * step))
     shapes = []
@@ -81,7 +107,12 @@ def compute(generations: int = 8, walks: int = 32, seconds: float = 3.0) -> dict
         mujoco.mj_kinematics(soft, data)
         shapes.append(_outline(soft, data))
     speeds = np.stack([speed[:2] for speed, _ in tried.values()], 1)
-    return {"clocks": clocks, "found": {k: x for k, (_, x) in results.items()}, "speeds": speeds, "strip": shapes}
+    return {
+        "clocks": clocks,
+        "found": {k: x for k, (_, x) in results.items()},
+        "speeds": speeds,
+        "strip": shapes,
+    }
 
 
 def _outline(robot, data) -> tuple[np.ndarray, np.ndarray]:
@@ -89,7 +120,14 @@ def _outline(robot, data) -> tuple[np.ndarray, np.ndarray]:
     turn, place = data.geom_xmat[1].reshape(3, 3), data.geom_xpos[1]
     half = robot.geom_size[1]
     corners = (
-        place + np.array([(a * half[0], 0, b * half[2]) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]) @ turn.T
+        place
+        + np.array(
+            [
+                (a * half[0], 0, b * half[2])
+                for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))
+            ]
+        )
+        @ turn.T
     )
     axes = data.geom_xmat[2:].reshape(-1, 3, 3)[:, :, 2] * robot.geom_size[2:, 1:2]
     legs = np.stack([data.geom_xpos[2:] - axes, data.geom_xpos[2:] + axes], 1)
@@ -99,10 +137,25 @@ def _outline(robot, data) -> tuple[np.ndarray, np.ndarray]:
 def table(numbers: dict) -> str:
     """Return the speeds of both gaits on both grounds, and their clocks."""
     rows = [
-        (f"for {name}", *(f"{x:.3f}" for x in speeds), *(f"{x:.2f}" for x in numbers["clocks"][name]))
+        (
+            f"for {name}",
+            *(f"{x:.3f}" for x in speeds),
+            *(f"{x:.2f}" for x in numbers["clocks"][name]),
+        )
         for name, speeds in zip(("sand", "floor"), numbers["speeds"])
     ]
-    return style.table(("gait", "in sand (m/s)", "on floor (m/s)", "Hz", "duty", "sweep (rad)", "middle (rad)"), rows)
+    return style.table(
+        (
+            "gait",
+            "in sand (m/s)",
+            "on floor (m/s)",
+            "Hz",
+            "duty",
+            "sweep (rad)",
+            "middle (rad)",
+        ),
+        rows,
+    )
 
 
 @plots.styled
@@ -115,11 +168,24 @@ def draw(numbers: dict):
     strip = fig.add_subplot(grid[1, :])
     colours = {"sand": style.LOOSE, "floor": style.BLUE}
     for (name, speeds), marker in zip(numbers["found"].items(), style.MARKERS):
-        axes[0, 0].plot(np.arange(1, len(speeds) + 1), speeds, color=colours[name], marker=marker, ms=4, label=name)
+        axes[0, 0].plot(
+            np.arange(1, len(speeds) + 1),
+            speeds,
+            color=colours[name],
+            marker=marker,
+            ms=4,
+            label=name,
+        )
     axes[0, 0].set(xlabel="generation", ylabel="best speed (m/s)", title="search")
     axes[0, 0].legend(title="ground")
     for row, (name, colour) in enumerate(colours.items()):
-        axes[0, 1].bar(np.arange(2) + 0.4 * row - 0.2, numbers["speeds"][row], 0.38, color=colour, label=f"for {name}")
+        axes[0, 1].bar(
+            np.arange(2) + 0.4 * row - 0.2,
+            numbers["speeds"][row],
+            0.38,
+            color=colour,
+            label=f"for {name}",
+        )
     axes[0, 1].set(ylabel="speed (m/s)", title="both gaits on both grounds")
     axes[0, 1].set_xticks([0, 1], ["in sand", "on the floor"])
     axes[0, 1].legend()
@@ -128,11 +194,19 @@ def draw(numbers: dict):
         shift = np.array([left - corners[0, 0] + 0.1, 0.0])
         strip.fill(*(corners + shift).T, color="0.8", ec="0.3", lw=0.8)
         for k, leg in enumerate(legs):
-            strip.plot(*(leg + shift).T, color=style.SEQUENCE[1 + int(2 * PHASES[k])], lw=2.0, solid_capstyle="round")
+            strip.plot(
+                *(leg + shift).T,
+                color=style.SEQUENCE[1 + int(2 * PHASES[k])],
+                lw=2.0,
+                solid_capstyle="round",
+            )
         left += 0.34
     strip.axhline(0.0, **style.SURFACE)
     strip.set(
-        aspect="equal", xlabel="a cycle of the gait for sand, in sand, from left to right", ylabel="z (m)", xticks=[]
+        aspect="equal",
+        xlabel="a cycle of the gait for sand, in sand, from left to right",
+        ylabel="z (m)",
+        xticks=[],
     )
     return fig
 

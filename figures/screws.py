@@ -21,10 +21,19 @@ from rft.walking.craft import PER_SQUARE
 HEIGHTS = (0.01, 0.0, -0.01, -0.03)  # m, of the axis over the surface
 MASSES = (0.5, 1.0, 2.0)  # kg
 PITCHES = (0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1, 0.12, 0.14, 0.16, 0.2, 0.24)  # m
-PATHS = {("mirrored", 1.0): 10, ("alike", 2.5): 10, ("alike", 1.0): 4}  # turns that are shown
+PATHS = {
+    ("mirrored", 1.0): 10,
+    ("alike", 2.5): 10,
+    ("alike", 1.0): 4,
+}  # turns that are shown
 
 
-def compute(slips: int = 49, pitches=PITCHES, tried=(0.03, 0.06, 0.12), fineness: Fineness | None = None) -> dict:
+def compute(
+    slips: int = 49,
+    pitches=PITCHES,
+    tried=(0.03, 0.06, 0.12),
+    fineness: Fineness | None = None,
+) -> dict:
     """Return what a screw pulls, how far craft advance a turn, and their paths.
 
     slip, pulled {height: Turning}; pitch, advance {mass: (P,)}, m a turn; found (T,): MuJoCo's at the pitches ``tried`` with
@@ -34,19 +43,35 @@ def compute(slips: int = 49, pitches=PITCHES, tried=(0.03, 0.06, 0.12), fineness
     fineness = fineness or scene.numerics
     triangles = PER_SQUARE * fineness.elements**2
     of = lambda mass, pitch: dataclasses.replace(
-        scene.robot, mass=mass, screw=dataclasses.replace(scene.robot.screw, pitch=pitch)
+        scene.robot,
+        mass=mass,
+        screw=dataclasses.replace(scene.robot.screw, pitch=pitch),
     )
-    walk = lambda robot: engine("mujoco").walk([Walker(robot, scene.gait, scene.medium)], fineness)[0]
-    pulled = {h: turning(scene.medium, scene.robot.screw, h, slip, triangles=triangles) for h in HEIGHTS}
+    walk = lambda robot: engine("mujoco").walk(
+        [Walker(robot, scene.gait, scene.medium)], fineness
+    )[0]
+    pulled = {
+        h: turning(scene.medium, scene.robot.screw, h, slip, triangles=triangles)
+        for h in HEIGHTS
+    }
     going = lambda robot: cruise(scene.medium, robot, scene.gait.frequency, triangles)
-    advance = {mass: np.array([going(of(mass, p)).advance for p in pitches]) for mass in MASSES}
-    found = np.array([walk(of(scene.robot.mass, p)).speed / scene.gait.frequency for p in tried])
+    advance = {
+        mass: np.array([going(of(mass, p)).advance for p in pitches]) for mass in MASSES
+    }
+    found = np.array(
+        [walk(of(scene.robot.mass, p)).speed / scene.gait.frequency for p in tried]
+    )
     paths = {}
     for (pair, mass), turns in PATHS.items():
         robot = dataclasses.replace(scene.robot, pair=pair, mass=mass)
         one = walk(robot)
         within = one.t * scene.gait.frequency <= turns + 1e-9
-        paths[pair, mass] = turns / scene.gait.frequency, one.pose[within, 0], one.spatial["y"][within], going(robot)
+        paths[pair, mass] = (
+            turns / scene.gait.frequency,
+            one.pose[within, 0],
+            one.spatial["y"][within],
+            going(robot),
+        )
     return {
         "slip": slip, "pulled": pulled, "pitch": np.array(pitches), "advance": advance, "tried": np.array(tried),
         "found": found, "paths": paths,
@@ -55,9 +80,14 @@ def compute(slips: int = 49, pitches=PITCHES, tried=(0.03, 0.06, 0.12), fineness
 
 def table(numbers: dict) -> str:
     """Return what MuJoCo finds beside the balance."""
-    lines, by_balance = [], np.interp(numbers["tried"], numbers["pitch"], numbers["advance"][1.0])
+    lines, by_balance = (
+        [],
+        np.interp(numbers["tried"], numbers["pitch"], numbers["advance"][1.0]),
+    )
     for p, found, expected in zip(numbers["tried"], numbers["found"], by_balance):
-        lines.append(f"pitch {p:g} m: advance {found:.4g} m a turn by MuJoCo, {expected:.4g} by the balance")
+        lines.append(
+            f"pitch {p:g} m: advance {found:.4g} m a turn by MuJoCo, {expected:.4g} by the balance"
+        )
     for (pair, mass), (time, x, y, steady) in numbers["paths"].items():
         lines.append(
             f"{pair}, {mass:g} kg, {time:g} s: to ({x[-1]:.4g}, {y[-1]:.4g}) m; {steady.velocity} m/s by balance"
@@ -68,8 +98,12 @@ def table(numbers: dict) -> str:
 @plots.styled
 def draw(numbers: dict):
     fig, ((thrust, advance), (torque, path)) = plots.figure(7.4, 5.6, 2, 2)
-    for (height, pulled), colour in zip(numbers["pulled"].items(), style.shades(len(numbers["pulled"]))):
-        thrust.plot(numbers["slip"], pulled.thrust, color=colour, label=described(height))
+    for (height, pulled), colour in zip(
+        numbers["pulled"].items(), style.shades(len(numbers["pulled"]))
+    ):
+        thrust.plot(
+            numbers["slip"], pulled.thrust, color=colour, label=described(height)
+        )
         torque.plot(numbers["slip"], 1e3 * pulled.torque, color=colour)
     style.zero_line(thrust)
     thrust.set(xlabel="slip", ylabel="thrust (N)", title="one screw")
@@ -79,16 +113,33 @@ def draw(numbers: dict):
     colours = dict(zip(numbers["advance"], style.shades(len(numbers["advance"]))))
     for mass, found in numbers["advance"].items():
         advance.plot(pitch, 1e3 * found, color=colours[mass], label=f"{mass:g} kg")
-    dots = {"color": colours[1.0], "ls": "", "marker": "o", "mfc": "white", "label": "1 kg, MuJoCo"}
+    dots = {
+        "color": colours[1.0],
+        "ls": "",
+        "marker": "o",
+        "mfc": "white",
+        "label": "1 kg, MuJoCo",
+    }
     advance.plot(1e3 * numbers["tried"], 1e3 * numbers["found"], **dots)
     advance.plot(pitch, pitch, **style.GUIDE, ls=":", label="as in a nut")
     top = 1.9e3 * max(np.nanmax(found) for found in numbers["advance"].values())
-    advance.set(xlabel="pitch (mm)", ylabel="advance a turn (mm)", title="craft on two", ylim=(0.0, top))
+    advance.set(
+        xlabel="pitch (mm)",
+        ylabel="advance a turn (mm)",
+        title="craft on two",
+        ylim=(0.0, top),
+    )
     advance.legend()
     shades = style.shades(len(numbers["paths"]))
-    for ((pair, mass), (time, x, y, steady)), colour in zip(numbers["paths"].items(), shades):
-        path.plot(1e2 * x, 1e2 * y, color=colour, label=f"{pair}, {mass:g} kg, {time:g} s")
-        arc = se2.exp(np.linspace(0.0, time, 200)[:, None] * [*steady.velocity, steady.yaw_rate])
+    for ((pair, mass), (time, x, y, steady)), colour in zip(
+        numbers["paths"].items(), shades
+    ):
+        path.plot(
+            1e2 * x, 1e2 * y, color=colour, label=f"{pair}, {mass:g} kg, {time:g} s"
+        )
+        arc = se2.exp(
+            np.linspace(0.0, time, 200)[:, None] * [*steady.velocity, steady.yaw_rate]
+        )
         path.plot(1e2 * arc[:, 0], 1e2 * arc[:, 1], "--", lw=0.8, color=colour)
     style.entry(path, "by balance", ls="--", lw=0.8)
     path.set(xlabel="$x$ (cm)", ylabel="$y$ (cm), to the left", aspect="equal")
@@ -98,7 +149,11 @@ def draw(numbers: dict):
 
 def described(height: float) -> str:
     """Return the height of an axis over the surface in words."""
-    return f"{abs(1e3 * height):.0f} mm {'above' if height > 0 else 'below'}" if height else "at the surface"
+    return (
+        f"{abs(1e3 * height):.0f} mm {'above' if height > 0 else 'below'}"
+        if height
+        else "at the surface"
+    )
 
 
 if __name__ == "__main__":

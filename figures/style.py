@@ -8,9 +8,19 @@ import numpy as np
 
 # Colours of Okabe and Ito (Color Universal Design, 2008), which readers who lack one of the cones tell apart; markers
 # tell the same curves apart in print without colour.
-SEQUENCE = BLACK, BLUE, GREEN, VERMILION, PINK = "black", "#0072B2", "#009E73", "#D55E00", "#CC79A7"
+SEQUENCE = BLACK, BLUE, GREEN, VERMILION, PINK = (
+    "black",
+    "#0072B2",
+    "#009E73",
+    "#D55E00",
+    "#CC79A7",
+)
 MARKERS = "osD^v"
-LOOSE, CLOSE, FLUID = VERMILION, BLUE, "0.5"  # two packings of grains, and a viscous fluid
+LOOSE, CLOSE, FLUID = (
+    VERMILION,
+    BLUE,
+    "0.5",
+)  # two packings of grains, and a viscous fluid
 GUIDE = {"color": "0.6", "lw": 0.8, "zorder": 0}  # of lines that are no results
 SHADED = {"color": "0.87", "lw": 0}  # of ranges that are no results
 SURFACE = {"color": "peru", "lw": 1.0, "zorder": 0}  # of the ground
@@ -27,8 +37,15 @@ def shades(count: int) -> list:
 
 def sparse(k: int, points: int) -> dict:
     """Return the look of curve ``k`` of several that have no order: a colour, and a marker at four of its points."""
-    first = points // 8 + k * points // 40  # markers of curves that coincide stand beside one another
-    return {"color": SEQUENCE[k], "marker": MARKERS[k], "ms": 4, "markevery": (first, max(1, points // 4))}
+    first = (
+        points // 8 + k * points // 40
+    )  # markers of curves that coincide stand beside one another
+    return {
+        "color": SEQUENCE[k],
+        "marker": MARKERS[k],
+        "ms": 4,
+        "markevery": (first, max(1, points // 4)),
+    }
 
 
 def zero_line(ax) -> None:
@@ -39,12 +56,19 @@ def zero_line(ax) -> None:
 def order_line(ax, x, error, order: int) -> None:
     """Draw errors that fall as x^-order from the first of those given, on logarithmic axes."""
     x = np.asarray(x, float)
-    ax.plot(x, error[0] * (x / x[0]) ** -order, **GUIDE, ls="--", label=f"order {order}")
+    ax.plot(
+        x, error[0] * (x / x[0]) ** -order, **GUIDE, ls="--", label=f"order {order}"
+    )
 
 
 def quarter_ticks(ax, which: str, count: int = 5) -> None:
     """Mark the first quarters of a cycle on an axis, "x" or "y"."""
-    ax.set(**{f"{which}ticks": np.pi / 2 * np.arange(count), f"{which}ticklabels": QUARTERS[:count]})
+    ax.set(
+        **{
+            f"{which}ticks": np.pi / 2 * np.arange(count),
+            f"{which}ticklabels": QUARTERS[:count],
+        }
+    )
 
 
 def phase_axis(ax, which: str = "x", label: str = "phase of the cycle (rad)") -> None:
@@ -89,5 +113,8 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return lines of text with the cells under their heads, the first column to the left and the others to the right."""
     lines = [heads, *rows]
     first, *others = (max(map(len, column)) for column in zip(*lines))
-    aligned = ([row[0].ljust(first), *(x.rjust(width) for x, width in zip(row[1:], others))] for row in lines)
+    aligned = (
+        [row[0].ljust(first), *(x.rjust(width) for x, width in zip(row[1:], others))]
+        for row in lines
+    )
     return "\n".join("   ".join(cells).rstrip() for cells in aligned)

@@ -19,8 +19,13 @@ from geomech.studies.batch import side_by_side
 from rft import Backbone, Transient
 
 AMPLITUDES = (0.1, 0.22, 0.4)  # A / lambda
-PUBLISHED = {"travel": 0.2, "excess": 0.3}  # of A; of resistive force theory over discrete elements
-GRAINS = 2.8 * 2 * 0.06  # body lengths: diameters of a rod, of an animal as thick as `sandfish-loose` assumes
+PUBLISHED = {
+    "travel": 0.2,
+    "excess": 0.3,
+}  # of A; of resistive force theory over discrete elements
+GRAINS = (
+    2.8 * 2 * 0.06
+)  # body lengths: diameters of a rod, of an animal as thick as `sandfish-loose` assumes
 VELOCITY = style.VERMILION  # of the animal's amplitude, whose velocity is shown
 SHARES = (0.0, 0.1, 0.2, 0.4, 0.6, 0.9, 1.3, 1.7, GRAINS / 0.16)
 
@@ -56,21 +61,45 @@ def compute(shares=SHARES, elements: int = 40, phases: int = 64) -> dict:
 def draw(numbers: dict):
     fig, axes = plots.figure(7.6, 3.0, 2)
     left, right = axes[0]
-    for a, net, colour, marker in zip(AMPLITUDES, numbers["net"], (style.BLUE, VELOCITY, style.GREEN), "os^"):
-        left.plot(numbers["shares"], net, color=colour, marker=marker, label=rf"$A/\lambda$ = {a:g}")
+    for a, net, colour, marker in zip(
+        AMPLITUDES, numbers["net"], (style.BLUE, VELOCITY, style.GREEN), "os^"
+    ):
+        left.plot(
+            numbers["shares"],
+            net,
+            color=colour,
+            marker=marker,
+            label=rf"$A/\lambda$ = {a:g}",
+        )
     left.axvline(PUBLISHED["travel"], **style.GUIDE, ls="--")
     left.axvline(GRAINS / 0.16, **style.GUIDE, ls=":")
     left.axhline(1 / (1 + PUBLISHED["excess"]), **style.GUIDE, ls="-.")
-    left.text(1.0, 1 / (1 + PUBLISHED["excess"]) + 0.012, "largest published excess", **style.NOTE)
+    left.text(
+        1.0,
+        1 / (1 + PUBLISHED["excess"]) + 0.012,
+        "largest published excess",
+        **style.NOTE,
+    )
     left.text(PUBLISHED["travel"] + 0.03, 0.42, "published travel", **style.NOTE)
-    left.text(GRAINS / 0.16 - 0.03, 0.98, r"in grains ($A/\lambda$ = 0.22)", ha="right", **style.NOTE)
-    left.set(xlabel="travel to 95 % of the drag / $A$", ylabel="displacement per cycle /\nthat with steady drag")
+    left.text(
+        GRAINS / 0.16 - 0.03,
+        0.98,
+        r"in grains ($A/\lambda$ = 0.22)",
+        ha="right",
+        **style.NOTE,
+    )
+    left.set(
+        xlabel="travel to 95 % of the drag / $A$",
+        ylabel="displacement per cycle /\nthat with steady drag",
+    )
     left.set(xlim=(0, None), ylim=(0.4, 1.02))
     left.legend(loc="lower left", bbox_to_anchor=(0.1, 0.05))
     for share, dashes in ((0.0, "-"), (0.2, "--"), (GRAINS / 0.16, ":")):
         k = int(np.argmin(np.abs(numbers["shares"] - share)))
         label = "steady drag" if share == 0 else f"travel {share:.1f} $A$"
-        right.plot(numbers["t"], numbers["velocity"][k], dashes, color=VELOCITY, label=label)
+        right.plot(
+            numbers["t"], numbers["velocity"][k], dashes, color=VELOCITY, label=label
+        )
     style.phase_axis(right)
     right.set(ylabel=r"$\xi_x$ (BL/rad), $A/\lambda$ = 0.22", ylim=(0, None))
     style.legend_above(right, 3)

@@ -15,11 +15,17 @@ from geomech import plots
 from geomech.scenes import load
 from rft.walking import Tripod, Walker, engine
 
-STEPS = {"implicit": (12, 16, 24, 32, 48, 64, 96, 128), "held": (128, 256, 512, 1024, 2048, 4096)}
+STEPS = {
+    "implicit": (12, 16, 24, 32, 48, 64, 96, 128),
+    "held": (128, 256, 512, 1024, 2048, 4096),
+}
 FINEST, FREQUENCY = 768, 2.0
 MOST_STRIDES = 6  # strides, at most, to the limit cycle
 HEAVY = 1e-4  # kg m^2, of a leg about its hip, where its forces are held: without, none of these steps stays finite
-FREQUENCIES = {"Xplorer": (1.0, 2.0, 3.0, 4.0), "SandBot": tuple(np.array([2.0, 4.0, 6.0, 8.0]) / (2 * np.pi))}
+FREQUENCIES = {
+    "Xplorer": (1.0, 2.0, 3.0, 4.0),
+    "SandBot": tuple(np.array([2.0, 4.0, 6.0, 8.0]) / (2 * np.pi)),
+}
 
 
 def _simulation(steps: int):
@@ -40,8 +46,13 @@ def stride_length(start, steps: int, how: str) -> float:
     data.qpos[:], data.qvel[:] = start
     mujoco.mj_forward(model, data)
     if how == "held":
-        model.opt.timestep, model.opt.integrator = h, int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
-        model.dof_armature[6:] = HEAVY  # of what turns as it is told, and so feels nothing of it
+        model.opt.timestep, model.opt.integrator = (
+            h,
+            int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST),
+        )
+        model.dof_armature[6:] = (
+            HEAVY  # of what turns as it is told, and so feels nothing of it
+        )
     for k in range(steps):
         if how == "implicit":
             body.step(h)
@@ -59,14 +70,22 @@ def compute(steps=STEPS, finest: int = FINEST, frequencies=FREQUENCIES) -> dict:
     """Return {"steps": {how: (steps, error of the way over it)}, "speeds": {robot: (frequencies, planar, MuJoCo)}}, Hz, m/s."""
     start = _simulation(64).walk(MOST_STRIDES).limit
     truth = stride_length(start, finest, "implicit")
-    study = {how: (n, np.array([abs(stride_length(start, k, how) / truth - 1) for k in n])) for how, n in steps.items()}
+    study = {
+        how: (n, np.array([abs(stride_length(start, k, how) / truth - 1) for k in n]))
+        for how, n in steps.items()
+    }
     speeds = {}
     for name, chosen in frequencies.items():
         scene = load(name.lower())
         walkers = [
-            dataclasses.replace(scene.walker, gait=dataclasses.replace(scene.gait, frequency=float(f))) for f in chosen
+            dataclasses.replace(
+                scene.walker, gait=dataclasses.replace(scene.gait, frequency=float(f))
+            )
+            for f in chosen
         ]
-        each = (engine(how).walk(walkers, scene.numerics, 3) for how in ("planar", "mujoco"))
+        each = (
+            engine(how).walk(walkers, scene.numerics, 3) for how in ("planar", "mujoco")
+        )
         speeds[name] = (chosen, *(np.array([w.speed for w in walks]) for walks in each))
     return {"steps": study, "speeds": speeds}
 
@@ -75,14 +94,26 @@ def compute(steps=STEPS, finest: int = FINEST, frequencies=FREQUENCIES) -> dict:
 def draw(numbers: dict):
     fig, axes = plots.figure(8.4, 2.8, 1 + len(numbers["speeds"]))
     ax = axes[0, 0]
-    looks = {"implicit": ("o-", style.BLUE, "implicit"), "held": ("s-", style.VERMILION, "grains' forces held")}
+    looks = {
+        "implicit": ("o-", style.BLUE, "implicit"),
+        "held": ("s-", style.VERMILION, "grains' forces held"),
+    }
     for how, (steps, error) in numbers["steps"].items():
         line, colour, label = looks[how]
-        ax.loglog(steps, np.where(np.isfinite(error), error, np.nan), line, color=colour, lw=1.0, label=label)
+        ax.loglog(
+            steps,
+            np.where(np.isfinite(error), error, np.nan),
+            line,
+            color=colour,
+            lw=1.0,
+            label=label,
+        )
     style.order_line(ax, *numbers["steps"]["implicit"], 2)
     ax.set(xlabel="steps of a cycle", ylabel="error of the way")
     ax.legend(loc="best", fontsize=7)
-    for ax, (name, (frequency, planar, full)) in zip(axes[0, 1:], numbers["speeds"].items()):
+    for ax, (name, (frequency, planar, full)) in zip(
+        axes[0, 1:], numbers["speeds"].items()
+    ):
         ax.plot(frequency, planar, color=style.BLACK, label="planar")
         ax.plot(frequency, full, "o", color=style.BLUE, ms=5, label="MuJoCo")
         ax.set(xlabel="frequency (Hz)", ylabel="speed (m/s)", ylim=(0, None))

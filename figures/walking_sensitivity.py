@@ -27,7 +27,10 @@ NAMES = {
     "robot.width": "body width", "robot.hips": "hip spacing", "robot.inertia": "inertia", "medium.zeta": "ground strength",
     "gait.duty": "share of stance", "medium.tension": "faces that pull", "belly": "belly",
 }  # fmt: skip
-CHOICES = {"medium.tension": ("keep", "cut"), "belly": ("box", "sheet")}  # as the scenes have it, and else
+CHOICES = {
+    "medium.tension": ("keep", "cut"),
+    "belly": ("box", "sheet"),
+}  # as the scenes have it, and else
 
 
 class Sheet(Rhex):
@@ -41,7 +44,11 @@ class Sheet(Rhex):
 def varied(scene, name: str, factor: float | str):
     """Return the scene with one of its assumed sizes times a factor, or with another choice."""
     if name == "belly":
-        return scene if factor == "box" else dataclasses.replace(scene, robot=Sheet(**vars(scene.robot)))
+        return (
+            scene
+            if factor == "box"
+            else dataclasses.replace(scene, robot=Sheet(**vars(scene.robot)))
+        )
     if name == "robot.legs.radius" and scene.robot.axle:
         scene = changed(scene, "robot.axle", factor)
     return changed(scene, name, factor)
@@ -56,7 +63,11 @@ def changed(part, name: str, factor: float | str):
     elif isinstance(factor, str):
         value = factor
     else:
-        value = tuple(np.multiply(value, factor)) if isinstance(value, tuple) else value * factor
+        value = (
+            tuple(np.multiply(value, factor))
+            if isinstance(value, tuple)
+            else value * factor
+        )
     return dataclasses.replace(part, **{first: value})
 
 
@@ -66,7 +77,9 @@ def compute(factors=FACTORS, names=NAMES) -> dict:
     legs = lambda c: dataclasses.replace(xplorer.robot.legs, relative_curvature=c)
     curves = {
         "Xplorer": {
-            name: dataclasses.replace(xplorer, robot=dataclasses.replace(xplorer.robot, legs=legs(c)))
+            name: dataclasses.replace(
+                xplorer, robot=dataclasses.replace(xplorer.robot, legs=legs(c))
+            )
             for name, c in (("c-leg", 1.0), ("flat", 0.0), ("reversed", -1.0))
         },
         "SandBot": {
@@ -76,12 +89,23 @@ def compute(factors=FACTORS, names=NAMES) -> dict:
     }
     out: dict = {}
     for robot, scenes_of in curves.items():
-        jobs = [(curve, name, f) for curve in scenes_of for name in names for f in CHOICES.get(name, factors)]
+        jobs = [
+            (curve, name, f)
+            for curve in scenes_of
+            for name in names
+            for f in CHOICES.get(name, factors)
+        ]
         scenes = [varied(scenes_of[curve], name, f) for curve, name, f in jobs]
-        found = [w for k in range(0, len(scenes), 32) for w in walking.walked(scenes[k : k + 32], settling=True)]
+        found = [
+            w
+            for k in range(0, len(scenes), 32)
+            for w in walking.walked(scenes[k : k + 32], settling=True)
+        ]
         for (curve, name, f), one in zip(jobs, found):
             row = (f, one.walk.speed, one.estimate, one.walk.status)
-            out.setdefault(robot, {}).setdefault(curve, {}).setdefault(name, []).append(row)
+            out.setdefault(robot, {}).setdefault(curve, {}).setdefault(name, []).append(
+                row
+            )
     return out
 
 
@@ -90,7 +114,11 @@ def table(numbers: dict) -> str:
     curves = [found for by_curve in numbers.values() for found in by_curve.values()]
     rows = [
         "| assumed | "
-        + " | ".join(f"{robot}: {curve}" for robot, by_curve in numbers.items() for curve in by_curve)
+        + " | ".join(
+            f"{robot}: {curve}"
+            for robot, by_curve in numbers.items()
+            for curve in by_curve
+        )
         + " |"
     ]
     rows.append("|---|" + "---|" * len(curves))
@@ -99,7 +127,11 @@ def table(numbers: dict) -> str:
         for found in curves:
             as_is = CHOICES.get(name, (1.0,))[0]
             (unchanged,) = [speed for value, speed, *_ in found[name] if value == as_is]
-            others = [speed / unchanged - 1 for value, speed, *_ in found[name] if value != as_is]
+            others = [
+                speed / unchanged - 1
+                for value, speed, *_ in found[name]
+                if value != as_is
+            ]
             cells.append(", ".join(f"{100 * x:+.0f}" for x in others))
         rows.append(f"| {NAMES[name]} | " + " | ".join(cells) + " |")
     return "\n".join(rows)
@@ -111,12 +143,30 @@ def draw(numbers: dict):
     fig, axes = plots.figure(1.2 * len(sizes), 4.8, len(sizes), len(numbers))
     for row, (robot, curves) in zip(axes, numbers.items()):
         for ax, name in zip(row, sizes):
-            for curve, colour, marker, dashes in zip(curves, style.SEQUENCE, style.MARKERS, ("-", "--", ":")):
+            for curve, colour, marker, dashes in zip(
+                curves, style.SEQUENCE, style.MARKERS, ("-", "--", ":")
+            ):
                 f, speed, error, status = zip(*curves[curve][name])
                 f = (1.0, 2.0) if name in CHOICES else f  # side by side
-                ax.errorbar(f, speed, yerr=error, color=colour, ls=dashes, lw=1.0, capsize=2, label=curve)
+                ax.errorbar(
+                    f,
+                    speed,
+                    yerr=error,
+                    color=colour,
+                    ls=dashes,
+                    lw=1.0,
+                    capsize=2,
+                    label=curve,
+                )
                 for x, y, kind in zip(f, speed, status):
-                    ax.plot(x, y, marker, ms=4, color=colour, mfc=colour if kind == "walking" else "white")
+                    ax.plot(
+                        x,
+                        y,
+                        marker,
+                        ms=4,
+                        color=colour,
+                        mfc=colour if kind == "walking" else "white",
+                    )
             ax.set(xscale="log", xlabel="", ylim=(min(0.0, ax.get_ylim()[0]), None))
             style.named_ticks(ax, f, CHOICES.get(name) or [f"{x:g}" for x in f])
             if name in CHOICES:

@@ -17,7 +17,10 @@ from rft.walking.march import step
 from rft.walking.planar import State
 from rft.walking.planar_walk import _strides
 
-STEPS = {"implicit": (12, 24, 48, 96, 192, 384), "explicit": (96, 192, 384, 768, 1536, 3072)}
+STEPS = {
+    "implicit": (12, 24, 48, 96, 192, 384),
+    "explicit": (96, 192, 384, 768, 1536, 3072),
+}
 FINEST = 1536
 FREQUENCIES = (1.0, 3.0)
 
@@ -40,7 +43,9 @@ def heun(robots, state: State, phase: float, of: float, dt: float) -> State:
 def progress(frequency: float, steps: int, how: str, cycles: float = 1.5):
     """Return the progress, m, and the residual of the balance of energy over the work, after some cycles from rest."""
     scene = load("xplorer")
-    robots = _strides([Walker(scene.robot, Tripod(frequency), scene.medium)], scene.numerics).robots
+    robots = _strides(
+        [Walker(scene.robot, Tripod(frequency), scene.medium)], scene.numerics
+    ).robots
     state = first = robots.start()
     count = round(cycles * steps)
     for k in range(count):
@@ -60,8 +65,14 @@ def compute(steps=STEPS, finest: int = FINEST, frequencies=FREQUENCIES) -> dict:
     out = {}
     for f in frequencies:
         truth = progress(f, finest, "implicit")[0]
-        out[f] = {how: (n, *np.array([progress(f, k, how) for k in n]).T) for how, n in steps.items()}
-        out[f] = {how: (n, np.abs(x / truth - 1), residual) for how, (n, x, residual) in out[f].items()}
+        out[f] = {
+            how: (n, *np.array([progress(f, k, how) for k in n]).T)
+            for how, n in steps.items()
+        }
+        out[f] = {
+            how: (n, np.abs(x / truth - 1), residual)
+            for how, (n, x, residual) in out[f].items()
+        }
     return out
 
 
@@ -69,8 +80,12 @@ def compute(steps=STEPS, finest: int = FINEST, frequencies=FREQUENCIES) -> dict:
 def draw(numbers: dict):
     fig, axes = plots.figure(7.2, 4.8, len(numbers), 2)
     for column, (f, lines) in zip(axes.T, numbers.items()):
-        for k, (ax, label) in enumerate(zip(column, ("error of the progress", "energy not accounted for")), 1):
-            for (how, found), line, colour in zip(lines.items(), ("o-", "s-"), (style.BLUE, style.VERMILION)):
+        for k, (ax, label) in enumerate(
+            zip(column, ("error of the progress", "energy not accounted for")), 1
+        ):
+            for (how, found), line, colour in zip(
+                lines.items(), ("o-", "s-"), (style.BLUE, style.VERMILION)
+            ):
                 values = np.where(np.isfinite(found[k]), found[k], np.nan)
                 ax.loglog(found[0], values, line, color=colour, lw=1.0, label=how)
             style.order_line(ax, lines["implicit"][0], lines["implicit"][k], 2)

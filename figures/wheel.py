@@ -34,7 +34,9 @@ def compute(slips: int = 23, load: float = 20.0, strength: float = 1.0) -> dict:
 def draw(numbers: dict):
     fig, axes = plots.figure(7.4, 5.0, 2, 2)
     for column, (name, lines) in zip(axes.T, numbers["found"].items()):
-        for (rate, found), colour in zip(lines.items(), (style.BLACK, *style.shades(len(RATES)))):
+        for (rate, found), colour in zip(
+            lines.items(), (style.BLACK, *style.shades(len(RATES)))
+        ):
             label = "no inertia, any rate" if rate == 0 else f"{rate:g} rad/s"
             look = {"color": colour, "lw": 2.0 if rate == 0 else 1.0, "label": label}
             column[0].plot(numbers["slip"], found.pull / numbers["load"], **look)

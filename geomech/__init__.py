@@ -62,8 +62,14 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
 __version__ = _version.VERSION
 
 _MODULES = {  # by their names here; none is imported before its first use
-    **{name: f"geomech.geometry.{name}" for name in ("connection", "curvature", "reconstruct")},
-    **{name: f"geomech.{name}" for name in ("gaits", "measured", "plots", "systems", "tiers")},
+    **{
+        name: f"geomech.geometry.{name}"
+        for name in ("connection", "curvature", "reconstruct")
+    },
+    **{
+        name: f"geomech.{name}"
+        for name in ("gaits", "measured", "plots", "systems", "tiers")
+    },
     **{name: f"rft.{name}" for name in ("bodies", "effects")},
     "media": "rft.laws",
     "undulation": "geomech.studies.undulation",
@@ -71,7 +77,17 @@ _MODULES = {  # by their names here; none is imported before its first use
 }
 _OBJECTS = {
     **dict.fromkeys(
-        ("Study", "accuracy", "fit_medium", "fit_midlines", "optimise", "optimize", "study", "sweep"), "geomech.app"
+        (
+            "Study",
+            "accuracy",
+            "fit_medium",
+            "fit_midlines",
+            "optimise",
+            "optimize",
+            "study",
+            "sweep",
+        ),
+        "geomech.app",
     ),
     **dict.fromkeys(("load", "toml", "Scene", "Numerics"), "geomech.scenes"),
     "medium": "geomech.scenes.stress",

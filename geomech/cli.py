@@ -18,7 +18,9 @@ app = typer.Typer(cls=Group, pretty_exceptions_enable=False, rich_markup_mode=No
 for heading, names in COMMANDS.items():
     for name in names:
         function = getattr(import_module(f"geomech.commands.{name}"), name)
-        app.command(name.replace("_", "-"), rich_help_panel=heading)(with_plugins(function))
+        app.command(name.replace("_", "-"), rich_help_panel=heading)(
+            with_plugins(function)
+        )
 
 
 def _version(requested: bool) -> None:
@@ -30,14 +32,22 @@ def _version(requested: bool) -> None:
 @app.callback()
 def geomech(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="print the version and exit")
+        bool,
+        typer.Option(
+            "--version",
+            callback=_version,
+            is_eager=True,
+            help="print the version and exit",
+        ),
     ] = False,
     plugin: PluginOption = None,
 ):
     """Geometric mechanics of locomotion: from a force law to displacement."""
     from geomech.run.backend import prefer
 
-    prefer("numpy")  # its first call takes half a second less; `commands.pipeline` knows who has much to do
+    prefer(
+        "numpy"
+    )  # its first call takes half a second less; `commands.pipeline` knows who has much to do
     load_plugins(plugin)
 
 
@@ -45,4 +55,6 @@ def main(argv: list[str] | None = None) -> None:
     """Run a command and exit: one line on standard error and code 2 for a mistake, 128 + its number for a signal."""
     terminal.limit_threads()
     arguments = (sys.argv[1:] if argv is None else argv) or ["--help"]
-    sys.exit(copy_context().run(terminal.exit_code, app, arguments))  # what the command prefers ends with it
+    sys.exit(
+        copy_context().run(terminal.exit_code, app, arguments)
+    )  # what the command prefers ends with it

@@ -28,7 +28,13 @@ from rft.refusal import Refusal, line, printable, worded
 __all__ = ["Stopped", "exit_code", "progress", "report", "stoppable"]
 
 LONGEST = 2000  # characters of an error
-PRINTING = "geomech.cli", "geomech.commands", "geomech.terminal", "click", "typer"  # modules that print; no files
+PRINTING = (
+    "geomech.cli",
+    "geomech.commands",
+    "geomech.terminal",
+    "click",
+    "typer",
+)  # modules that print; no files
 PATIENCE = 2.0  # s after a signal in which further ones are ignored: finished tasks are being stored
 
 
@@ -50,9 +56,21 @@ def stoppable() -> Iterator[None]:
             last[0] = time.monotonic()
             raise Stopped(number)
 
-    numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    before = {n: signal.getsignal(n) for n in numbers if threading.current_thread() is threading.main_thread()}
-    before = {n: handler for n, handler in before.items() if handler not in (signal.SIG_IGN, None)}
+    numbers = [
+        getattr(signal, name)
+        for name in ("SIGINT", "SIGTERM", "SIGHUP")
+        if hasattr(signal, name)
+    ]
+    before = {
+        n: signal.getsignal(n)
+        for n in numbers
+        if threading.current_thread() is threading.main_thread()
+    }
+    before = {
+        n: handler
+        for n, handler in before.items()
+        if handler not in (signal.SIG_IGN, None)
+    }
     for n in before:
         signal.signal(n, stop)
     try:
@@ -114,12 +132,21 @@ def _notes():
     notes: dict[str, str] = {}
     with warnings.catch_warnings():
         warnings.simplefilter("always", Note)
-        warnings.filterwarnings("always", category=UserWarning, module=r"rft\.")  # its notes; it takes NumPy to load
+        warnings.filterwarnings(
+            "always", category=UserWarning, module=r"rft\."
+        )  # its notes; it takes NumPy to load
         others = warnings.showwarning
 
         def show(message, category, *where, **options):
-            if issubclass(category, Note) or category.__module__.partition(".")[0] == "rft":
-                text = worded(message.args[0], _option) if isinstance(message, Note) else str(message)
+            if (
+                issubclass(category, Note)
+                or category.__module__.partition(".")[0] == "rft"
+            ):
+                text = (
+                    worded(message.args[0], _option)
+                    if isinstance(message, Note)
+                    else str(message)
+                )
                 notes.setdefault(re.split(r"[\d.]+ ", text)[0], text)
             else:
                 others(message, category, *where, **options)
@@ -137,7 +164,9 @@ def _run_noting(app: typer.Typer, argv: list[str], notes: dict[str, str]) -> int
             sys.stdout.flush()
         return code or 0
     except SystemExit as end:  # typer raises it for a closed pipe
-        return _pipe_closed() if isinstance(end.__context__, BrokenPipeError) else end.code
+        return (
+            _pipe_closed() if isinstance(end.__context__, BrokenPipeError) else end.code
+        )
     except (Stopped, KeyboardInterrupt) as stopped:
         return _stopped(stopped, argv)
     except typer.Abort as aborted:  # typer raises it for an interrupt, and for an EOFError, which is none
@@ -145,16 +174,29 @@ def _run_noting(app: typer.Typer, argv: list[str], notes: dict[str, str]) -> int
             return _stopped(aborted.__cause__, argv)
         raise (aborted.__cause__ or aborted) from None
     except MemoryError:
-        report("error: not enough memory: lower the grid, the phases or the number of amplitudes")
+        report(
+            "error: not enough memory: lower the grid, the phases or the number of amplitudes"
+        )
     except BrokenPipeError:
         return _pipe_closed()
     except Exception as error:
-        text = line(error.format_message()) if hasattr(error, "format_message") else _said(error)
-        if not isinstance(error, (ValueError, OSError, RuntimeError)) and not hasattr(error, "format_message"):
+        text = (
+            line(error.format_message())
+            if hasattr(error, "format_message")
+            else _said(error)
+        )
+        if not isinstance(error, (ValueError, OSError, RuntimeError)) and not hasattr(
+            error, "format_message"
+        ):
             raise
         if isinstance(error, OSError):
             text = _system_error(error)
-        report("error: " + "; ".join([line(text, LONGEST), *getattr(error, "__notes__", ()), *notes.values()]))
+        report(
+            "error: "
+            + "; ".join(
+                [line(text, LONGEST), *getattr(error, "__notes__", ()), *notes.values()]
+            )
+        )
         if isinstance(error, OSError):
             _discard(sys.stdout)
     return 2
@@ -182,7 +224,9 @@ def _option(argument: str) -> str:
 def _system_error(error: OSError) -> str:
     """Return the text of an error of the system, with its cure. Standard output, to which commands write, has no name."""
     if error.errno in (errno.EMFILE, errno.ENFILE):
-        return "too many files are open at once: raise the limit, as by 'ulimit -n 1024'"
+        return (
+            "too many files are open at once: raise the limit, as by 'ulimit -n 1024'"
+        )
     *_, (frame, _) = traceback.walk_tb(error.__traceback__)
     where = frame.f_globals["__name__"]
     if error.filename is None and where.startswith(PRINTING):
@@ -192,8 +236,15 @@ def _system_error(error: OSError) -> str:
 
 def _stopped(by: BaseException, argv: list[str]) -> int:
     """Report what is stored, as the notes of ``by`` say, and the command that resumes; return the exit code."""
-    stored, command = "; ".join(getattr(by, "__notes__", ())), shlex.join(["geomech", *argv])
-    text = f"{stored}: {command}" if stored else f"nothing is kept; the same command starts anew: {command}"
+    stored, command = (
+        "; ".join(getattr(by, "__notes__", ())),
+        shlex.join(["geomech", *argv]),
+    )
+    text = (
+        f"{stored}: {command}"
+        if stored
+        else f"nothing is kept; the same command starts anew: {command}"
+    )
     report(f"error: stopped by {getattr(by, 'name', 'SIGINT')}: {text}")
     return getattr(by, "code", 130)
 

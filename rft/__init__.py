@@ -46,7 +46,10 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return [*__all__, *(module.name for module in pkgutil.iter_modules(__path__) if module.ispkg)]
+    return [
+        *__all__,
+        *(module.name for module in pkgutil.iter_modules(__path__) if module.ispkg),
+    ]
 
 
 __all__ = [

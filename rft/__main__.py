@@ -22,18 +22,34 @@ try:
     check("numba")
 except ValueError as error:
     sys.exit(str(error))
-FOLDED = Granular(8.0, radians(35.0))  # whose solutions fold at the shape below, so that a walk is taken along them
-law, stress, leg = CATALOGUE["glass-0.3mm-loose"].medium, VERTICAL["generic"].stress, CLeg(0.02, 0.01)
+FOLDED = Granular(
+    8.0, radians(35.0)
+)  # whose solutions fold at the shape below, so that a walk is taken along them
+law, stress, leg = (
+    CATALOGUE["glass-0.3mm-loose"].medium,
+    VERTICAL["generic"].stress,
+    CLeg(0.02, 0.01),
+)
 with preferring("numba"):
     body_velocity(law, Chain(), (1.0, 1.0), (1.0, 1.0))
-    body_velocity(FOLDED, Chain(), (-1.47053323, -1.9356507), (-0.99735926, -0.07262584))
+    body_velocity(
+        FOLDED, Chain(), (-1.47053323, -1.9356507), (-0.99735926, -0.07262584)
+    )
     loads(stress, leg.outline(8), (0.0, -0.1, 0.0), (1.0, 0.0, 0.0))
-    engine("planar").step_cost([Walker(Rhex(0.1, 0.1, 0.02, 0.05, leg, (0.0,)), Tripod(1.0), stress)], Fineness(), 0.0)
+    engine("planar").step_cost(
+        [Walker(Rhex(0.1, 0.1, 0.02, 0.05, leg, (0.0,)), Tripod(1.0), stress)],
+        Fineness(),
+        0.0,
+    )
 
     box, still = shapes.box((1.0, 1.0, 1.0)), np.zeros((1, 1, 3))
     for form in (Extruded(stress), Spatial(1e5)):
         blocks = Blocks([faces.faces(box.vertices[box.faces], box.normals)])
-        blocks.loads(form, Ground(), faces.Motion(still, still, still[..., 0], still, still, still[..., 0]))
+        blocks.loads(
+            form,
+            Ground(),
+            faces.Motion(still, still, still[..., 0], still, still, still[..., 0]),
+        )
         if importlib.util.find_spec("mujoco"):
             from rft.mujoco import compiled as in_mujoco
 
@@ -43,5 +59,7 @@ with preferring("numba"):
 from rft.balance.compiled import kernel  # noqa: E402  # after the check, for the import loads numba
 
 path = kernel(type(record(law)))._cache.path
-not_stored = "compiled code is not kept: set NUMBA_CACHE_DIR to a folder that has room for it"
+not_stored = (
+    "compiled code is not kept: set NUMBA_CACHE_DIR to a folder that has room for it"
+)
 print(f"compiled code is kept in {path.parent}" if path.exists() else not_stored)

@@ -27,9 +27,14 @@ from rft.refusal import Refusal, require
 CAPS, ACROSS = "end_caps", "end_caps_across"
 MOST_CAPS = 10.0  # e of a hemisphere is 4
 AT_BOUND = 1e-6  # of a bound: a parameter that near lies on it
-CONVERGED = 1e-14  # relative change of parameters and of the sum of squares that ends a fit
+CONVERGED = (
+    1e-14  # relative change of parameters and of the sum of squares that ends a fit
+)
 DEPENDENT = 1e-7  # smallest singular value of the slopes, over the largest, below which parameters are not determined
-LEVEL, ONE_SIGMA = 0.95, 0.6827  # confidence of intervals and bands; of one standard deviation
+LEVEL, ONE_SIGMA = (
+    0.95,
+    0.6827,
+)  # confidence of intervals and bands; of one standard deviation
 
 
 def student_factor(degrees_of_freedom: float, level: float = LEVEL) -> float:
@@ -62,7 +67,9 @@ class FittedLaw:
 
 
 UNKNOWN_ROD = Rod()
-START_ANGLES = tuple(np.radians((1.0, 2.0, 4.0, 7.0, 10.0, 14.0, 20.0, 30.0, 45.0, 65.0)).tolist())
+START_ANGLES = tuple(
+    np.radians((1.0, 2.0, 4.0, 7.0, 10.0, 14.0, 20.0, 30.0, 45.0, 65.0)).tolist()
+)
 FITS = {
     "granular": FittedLaw(
         ("C", "gamma0"),
@@ -71,7 +78,9 @@ FITS = {
         ((0.0, 1e3), (math.radians(0.1), math.radians(89.0))),
         ((0.3, 1.0, 2.0, 5.0, 20.0), START_ANGLES),
     ),
-    "viscous": FittedLaw(("ratio",), Viscous, False, ((1e-6, 1e6),), ((0.3, 1.0, 2.0, 6.0),)),
+    "viscous": FittedLaw(
+        ("ratio",), Viscous, False, ((1e-6, 1e6),), ((0.3, 1.0, 2.0, 6.0),)
+    ),
     "coulomb": FittedLaw((), Coulomb, True),
 }
 
@@ -109,7 +118,10 @@ class Fit:
 
     def __repr__(self) -> str:
         rows = zip(self.names, self.values, self.intervals)
-        parameters = ", ".join(f"{name} {value:.4g} ({low:.4g} to {high:.4g})" for name, value, (low, high) in rows)
+        parameters = ", ".join(
+            f"{name} {value:.4g} ({low:.4g} to {high:.4g})"
+            for name, value, (low, high) in rows
+        )
         return f"Fit({self.law}, 95 %: {parameters}; {self.data.psi.size} rows, rms {self.rms:.3g} N)"
 
     @property
@@ -130,12 +142,16 @@ class Fit:
     @property
     def intervals(self) -> np.ndarray:
         """Confidence intervals of the parameters, 95 %, (n, 2)."""
-        return self.values[:, None] + student_factor(self.degrees_of_freedom) * self.errors[:, None] * [-1.0, 1.0]
+        return self.values[:, None] + student_factor(
+            self.degrees_of_freedom
+        ) * self.errors[:, None] * [-1.0, 1.0]
 
     @property
     def axial_force(self) -> float:
         """Drag on the whole rod at psi = 0 without its ends, N."""
-        return float(self.values[len(FITS[self.law].names)]) * _unit(self.law, self.rod)[1]
+        return (
+            float(self.values[len(FITS[self.law].names)]) * _unit(self.law, self.rod)[1]
+        )
 
     @property
     def axial_stress(self) -> float | None:
@@ -152,10 +168,18 @@ class Fit:
         """The law with the covariance of its parameters, widened by Student's distribution so that one standard deviation
         holds 68 %."""
         build = FITS[self.law].build
-        names = [name for name in self.names if name in build.__dataclass_fields__]  # k only where the law has it
+        names = [
+            name for name in self.names if name in build.__dataclass_fields__
+        ]  # k only where the law has it
         values, n = dict(zip(self.names, self.values.tolist())), len(names)
-        covariance = student_factor(self.degrees_of_freedom, ONE_SIGMA) ** 2 * self.covariance[:n, :n]
-        return build(**{name: values[name] for name in names}, **({"covariance": covariance} if names else {}))
+        covariance = (
+            student_factor(self.degrees_of_freedom, ONE_SIGMA) ** 2
+            * self.covariance[:n, :n]
+        )
+        return build(
+            **{name: values[name] for name in names},
+            **({"covariance": covariance} if names else {}),
+        )
 
     def caps(self, radius: float) -> EndCaps:
         """Return the end caps, half of e at each end, of a body of that radius in body lengths."""
@@ -168,25 +192,37 @@ class Fit:
         values = self.values if values is None else values
         values = _in_newton(self.law, self.rod, values)
         if self.data.ends is not None:
-            return _forces(self.law, self.rod, 0.0, psi, values[: len(FITS[self.law].names) + 1])
+            return _forces(
+                self.law, self.rod, 0.0, psi, values[: len(FITS[self.law].names) + 1]
+            )
         return _forces(self.law, self.rod, self.end_caps, psi, values)
 
     def band(self, psi) -> np.ndarray:
         """Return half the width (2, ...) of the 95 % confidence band of the law at angles psi (rad), N, by linear
         propagation of the covariance."""
         slopes = []
-        for value, error, step in zip(self.values, self.errors, np.eye(len(self.values))):
+        for value, error, step in zip(
+            self.values, self.errors, np.eye(len(self.values))
+        ):
             h = max(1e-3 * error, 1e-9 * abs(value)) or 1e-12
             slopes.append(
-                (self.forces(psi, self.values + h * step) - self.forces(psi, self.values - h * step)) / (2 * h)
+                (
+                    self.forces(psi, self.values + h * step)
+                    - self.forces(psi, self.values - h * step)
+                )
+                / (2 * h)
             )
         slopes = np.array(slopes)
         return student_factor(self.degrees_of_freedom) * np.sqrt(
-            np.maximum(np.einsum("i...,ij,j...->...", slopes, self.covariance, slopes), 0.0)
+            np.maximum(
+                np.einsum("i...,ij,j...->...", slopes, self.covariance, slopes), 0.0
+            )
         )
 
 
-def fit(law: str, data: RodDrag, rod: Rod = UNKNOWN_ROD, end_caps: float | str = 0.0) -> Fit:
+def fit(
+    law: str, data: RodDrag, rod: Rod = UNKNOWN_ROD, end_caps: float | str = 0.0
+) -> Fit:
     """Return the law of that name in `FITS` fitted to drag, by weighted least squares of both components.
 
     end_caps: e of both ends together (`EndCaps`; 1 for one flat end), 0 for none, or "fitted"; other than 0 only for the
@@ -207,20 +243,33 @@ def fit(law: str, data: RodDrag, rod: Rod = UNKNOWN_ROD, end_caps: float | str =
     """
     fitted_law = FITS[law]
     fits_caps = isinstance(end_caps, str)
-    require(not fits_caps or end_caps == "fitted", "end caps must be 'fitted' or a number", value=end_caps)
+    require(
+        not fits_caps or end_caps == "fitted",
+        "end caps must be 'fitted' or a number",
+        value=end_caps,
+    )
     if not fits_caps:
         in_range("end caps", end_caps, 0, MOST_CAPS)
     if end_caps:
-        require(law == "granular", f"end caps take the granular law, got {law}", instead="leave them out")
+        require(
+            law == "granular",
+            f"end caps take the granular law, got {law}",
+            instead="leave them out",
+        )
         require(
             rod.radius and rod.length,
             "end caps take the rod's radius and length",
             instead="give both, or leave the caps out",
         )
-        require(rod.radius <= rod.length, f"end caps take a rod longer than its radius, got {rod.length:g} m")
+        require(
+            rod.radius <= rod.length,
+            f"end caps take a rod longer than its radius, got {rod.length:g} m",
+        )
     if data.ends is not None and end_caps:
         require(
-            fits_caps, "these are forces on the flank and on the ends", instead="leave ``end_caps`` out or say 'fitted'"
+            fits_caps,
+            "these are forces on the flank and on the ends",
+            instead="leave ``end_caps`` out or say 'fitted'",
         )
         return _with_ends(fit(law, data, rod))
     names = (*fitted_law.names, "axial_force", *([CAPS] if fits_caps else []))
@@ -234,7 +283,9 @@ def fit(law: str, data: RodDrag, rod: Rod = UNKNOWN_ROD, end_caps: float | str =
     def residual(values):
         return _weighted(data, _forces(law, rod, fixed_caps, data.psi, values))
 
-    low, high = np.array([*fitted_law.bounds, (0.0, np.inf), *([(0.0, MOST_CAPS)] if fits_caps else [])]).T
+    low, high = np.array(
+        [*fitted_law.bounds, (0.0, np.inf), *([(0.0, MOST_CAPS)] if fits_caps else [])]
+    ).T
     best = _best(residual, _starts(fitted_law, data, residual, fits_caps), low, high)
     require(
         best.success,
@@ -271,28 +322,60 @@ def _with_ends(flank: Fit) -> Fit:
         medium = FITS[flank.law].build(*map(float, values[:n_law]))
 
         def residual(x):
-            end = EndCaps(flank.rod.radius / flank.rod.length, head=1.0, tail=0.0, across=float(x[1]))
-            return _weighted(data, values[n_law] * x[0] * np.array(end.traction(medium, *v)), data.ends)
+            end = EndCaps(
+                flank.rod.radius / flank.rod.length,
+                head=1.0,
+                tail=0.0,
+                across=float(x[1]),
+            )
+            return _weighted(
+                data,
+                values[n_law] * x[0] * np.array(end.traction(medium, *v)),
+                data.ends,
+            )
 
         start, bounds = [1.0, 1.0], ([-np.inf, 0.0], [np.inf, MOST_CAPS])
         return least_squares(
-            residual, start, jac="3-point", bounds=bounds, xtol=CONVERGED, ftol=CONVERGED, gtol=CONVERGED
+            residual,
+            start,
+            jac="3-point",
+            bounds=bounds,
+            xtol=CONVERGED,
+            ftol=CONVERGED,
+            gtol=CONVERGED,
         )
 
     best = caps(flank.values)
     e = float(best.x[0])
     require(
-        0 < e < MOST_CAPS, f"the force on the ends is that of {e:.2g} flat ends", because=f"e is 0 to {MOST_CAPS:g}"
+        0 < e < MOST_CAPS,
+        f"the force on the ends is that of {e:.2g} flat ends",
+        because=f"e is 0 to {MOST_CAPS:g}",
     )
-    steps = np.diag(1e-4 * np.where(flank.errors > 0, flank.errors, np.abs(flank.values)))
-    slope = np.array([(caps(flank.values + h).x - caps(flank.values - h).x) / (2 * h.max()) for h in steps])
+    steps = np.diag(
+        1e-4 * np.where(flank.errors > 0, flank.errors, np.abs(flank.values))
+    )
+    slope = np.array(
+        [
+            (caps(flank.values + h).x - caps(flank.values - h).x) / (2 * h.max())
+            for h in steps
+        ]
+    )
     covariance = np.zeros((n + 2, n + 2))
     covariance[:n, :n] = flank.covariance
     covariance[:n, n:] = flank.covariance @ slope
     covariance[n:, :n] = covariance[:n, n:].T
-    covariance[n:, n:] = slope.T @ flank.covariance @ slope + _covariance(names, best, data.n_forces)
+    covariance[n:, n:] = slope.T @ flank.covariance @ slope + _covariance(
+        names, best, data.n_forces
+    )
     values = np.append(flank.values, best.x)
-    return dataclasses.replace(flank, names=(*flank.names, *names), values=values, covariance=covariance, end_caps=e)
+    return dataclasses.replace(
+        flank,
+        names=(*flank.names, *names),
+        values=values,
+        covariance=covariance,
+        end_caps=e,
+    )
 
 
 def _unit(law: str, rod: Rod) -> tuple[str, float]:
@@ -318,24 +401,36 @@ def _forces(law: str, rod: Rod, end_caps: float, psi, values) -> np.ndarray:
     force = np.array(medium.traction(*v))
     e = float(values[n + 1]) if len(values) > n + 1 else end_caps
     if e:
-        force = force + EndCaps(rod.radius / rod.length, head=1.0, tail=0.0).traction(medium, *v) * np.array(e)
+        force = force + EndCaps(rod.radius / rod.length, head=1.0, tail=0.0).traction(
+            medium, *v
+        ) * np.array(e)
     return values[n] * force
 
 
-def _weighted(data: RodDrag, forces: np.ndarray, measured: np.ndarray | None = None) -> np.ndarray:
+def _weighted(
+    data: RodDrag, forces: np.ndarray, measured: np.ndarray | None = None
+) -> np.ndarray:
     """Return forces minus those measured, by default on the rod, in units of their errors."""
     measured = data.forces if measured is None else measured
     return (np.sqrt(data.weight) * (forces - measured))[:, data.weight > 0].ravel()
 
 
-def _starts(fitted_law: FittedLaw, data: RodDrag, residual: Callable, fits_caps: bool) -> list[np.ndarray]:
+def _starts(
+    fitted_law: FittedLaw, data: RodDrag, residual: Callable, fits_caps: bool
+) -> list[np.ndarray]:
     """Return the best four of all combinations of start values, each with the axial force that fits it best."""
     candidates = []
-    for values in itertools.product(*fitted_law.starts, *([(0.5, 1.0, 3.0)] if fits_caps else [])):
+    for values in itertools.product(
+        *fitted_law.starts, *([(0.5, 1.0, 3.0)] if fits_caps else [])
+    ):
         law, caps = values[: len(fitted_law.names)], values[len(fitted_law.names) :]
-        at_zero, at_one = (residual(np.array([*law, force, *caps])) for force in (0.0, 1.0))
+        at_zero, at_one = (
+            residual(np.array([*law, force, *caps])) for force in (0.0, 1.0)
+        )
         slope = at_one - at_zero
-        force = max(-(slope @ at_zero) / (slope @ slope), 1e-9 * np.abs(data.forces).max())
+        force = max(
+            -(slope @ at_zero) / (slope @ slope), 1e-9 * np.abs(data.forces).max()
+        )
         start = np.array([*law, force, *caps])
         candidates.append((float(np.sum((at_zero + force * slope) ** 2)), start))
     return [start for _, start in sorted(candidates, key=lambda x: x[0])[:4]]
@@ -360,9 +455,15 @@ def _check_inside(names, values, low, high) -> None:
     for name, x, *bounds in zip(names, values, low, high):
         for bound in bounds if name != "axial_force" else ():
             if abs(x - bound) <= AT_BOUND * max(abs(bound), 1.0):
-                instead = "leave the end caps out" if name == CAPS else "measure at more angles, or fit another law"
+                instead = (
+                    "leave the end caps out"
+                    if name == CAPS
+                    else "measure at more angles, or fit another law"
+                )
                 message = f"the fit ends at the edge of {_with_unit(name)}, {_degrees(name, bound):g}"
-                raise Refusal(message, because="these data do not settle it", instead=instead)
+                raise Refusal(
+                    message, because="these data do not settle it", instead=instead
+                )
 
 
 def _with_unit(name: str) -> str:
@@ -381,7 +482,8 @@ def _covariance(names, best, count: int) -> np.ndarray:
     _, s, right = np.linalg.svd(best.jac * size, full_matrices=False)
     if s[-1] < DEPENDENT * s[0]:
         raise Refusal(
-            f"these data do not tell {', '.join(map(_with_unit, names))} apart", instead="measure at more angles"
+            f"these data do not tell {', '.join(map(_with_unit, names))} apart",
+            instead="measure at more angles",
         )
     root = (right.T / s) * size[:, None]
     return root @ root.T * (2 * best.cost / (count - len(names)))

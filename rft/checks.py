@@ -38,10 +38,18 @@ def number_fields(kind: Any) -> dict[str, Number]:
     """Return the `Number` annotations of a class by field."""
     try:
         hints = get_type_hints(kind, include_extras=True)
-    except (NameError, TypeError):  # annotations of a user's class may name what is not importable
+    except (
+        NameError,
+        TypeError,
+    ):  # annotations of a user's class may name what is not importable
         return {}
-    numbers = {name: [x for x in get_args(hint) if isinstance(x, Number)] for name, hint in hints.items()}
-    return {name: annotations[0] for name, annotations in numbers.items() if annotations}
+    numbers = {
+        name: [x for x in get_args(hint) if isinstance(x, Number)]
+        for name, hint in hints.items()
+    }
+    return {
+        name: annotations[0] for name, annotations in numbers.items() if annotations
+    }
 
 
 def check_numbers(owner: Any) -> None:
@@ -63,7 +71,9 @@ def real_array(name: str, x: ArrayLike) -> np.ndarray:
 
     try:
         array = np.asarray(x)
-        if array.dtype.kind in "iuf" or (array.dtype.kind == "O" and all(map(is_number, array.flat))):
+        if array.dtype.kind in "iuf" or (
+            array.dtype.kind == "O" and all(map(is_number, array.flat))
+        ):
             return array.astype(float, copy=False)
     except (TypeError, ValueError, OverflowError):
         pass
@@ -77,15 +87,24 @@ def is_number(value: object) -> TypeGuard[float]:
 
 def is_whole(value: object) -> bool:
     """Return whether value is an integer, as an int or a float."""
-    return is_number(value) and (isinstance(value, numbers.Integral) or (math.isfinite(value) and value == int(value)))
+    return is_number(value) and (
+        isinstance(value, numbers.Integral)
+        or (math.isfinite(value) and value == int(value))
+    )
 
 
-def in_range(name: str, value: Any, low: float, high: float, whole: bool = False, unit: str = "-") -> None:
+def in_range(
+    name: str, value: Any, low: float, high: float, whole: bool = False, unit: str = "-"
+) -> None:
     """Raise ValueError with the name unless value is a number, if ``whole`` an integer, from low to high."""
-    exact = getattr(value, "item", lambda: value)() if is_number(value) else value  # float32 has no 1e-50
+    exact = (
+        getattr(value, "item", lambda: value)() if is_number(value) else value
+    )  # float32 has no 1e-50
     if not ((is_whole if whole else is_number)(value) and low <= exact <= high):
         bounds = f"{low:g} to {high:g}" + (f" {unit}" if unit != "-" else "")
-        raise Refusal(f"{name} must be a {'whole ' * whole}number from {bounds}", value=value)
+        raise Refusal(
+            f"{name} must be a {'whole ' * whole}number from {bounds}", value=value
+        )
 
 
 def checked_covariance(value, *sizes: int) -> tuple[tuple[float, ...], ...] | None:
@@ -95,7 +114,10 @@ def checked_covariance(value, *sizes: int) -> tuple[tuple[float, ...], ...] | No
         return None
     import numpy as np
 
-    matrix, allowed = real_array("covariance", value), " or ".join(f"{n} x {n}" for n in sizes)
+    matrix, allowed = (
+        real_array("covariance", value),
+        " or ".join(f"{n} x {n}" for n in sizes),
+    )
     require(
         matrix.shape in [(n, n) for n in sizes] and bool(np.isfinite(matrix).all()),
         f"covariance must be {allowed} finite numbers",

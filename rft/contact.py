@@ -49,7 +49,9 @@ class Contact(NamedTuple):
 
         def concatenated(a, b):
             columns = max(a.shape[-1], b.shape[-1])
-            return np.concatenate([np.broadcast_to(a, (n, columns)), np.broadcast_to(b, (m, columns))])
+            return np.concatenate(
+                [np.broadcast_to(a, (n, columns)), np.broadcast_to(b, (m, columns))]
+            )
 
         n, m = len(self.station), len(other.station)
         return mapped(concatenated, self, other) if n else other
@@ -99,18 +101,30 @@ class Problem(NamedTuple):
     def law_speed_scale(self) -> np.ndarray:
         """Scale (1, B or 1) of the velocities that loads are computed at; 1 where drag does not depend on the speed."""
         a = self.additions
-        return ONE if self.homogeneous and not (a.quadratic or a.memory or a.momentum) else self.frame.speed_scale
+        return (
+            ONE
+            if self.homogeneous and not (a.quadratic or a.memory or a.momentum)
+            else self.frame.speed_scale
+        )
 
     def take(self, index) -> Problem:
         """Return the problem of the samples ``index``."""
-        return Problem(*self[:6], *take(self[6:], index))  # the law is the same for all samples
+        return Problem(
+            *self[:6], *take(self[6:], index)
+        )  # the law is the same for all samples
 
-    def with_points(self, points: Contact, terms: Sequence[tuple[float, float, float]]) -> Problem:
+    def with_points(
+        self, points: Contact, terms: Sequence[tuple[float, float, float]]
+    ) -> Problem:
         """Return the problem with more points, each with all of these dry terms (q, k_t, k_n)."""
-        new = np.repeat(np.array(terms, float)[:, :, None, None], len(points.station), 2)
+        new = np.repeat(
+            np.array(terms, float)[:, :, None, None], len(points.station), 2
+        )
         if len(self.points.station):
             count = max(len(self.point_terms), len(new))
-            new = np.concatenate([_padded(x, count) for x in (self.point_terms, new)], 2)
+            new = np.concatenate(
+                [_padded(x, count) for x in (self.point_terms, new)], 2
+            )
         return self._replace(points=self.points.joined(points), point_terms=new)
 
 
@@ -120,7 +134,9 @@ NO_POINT_TERMS = np.zeros((0, 3, 0, 1))
 
 def _padded(terms: np.ndarray, count: int) -> np.ndarray:
     """Return dry terms (T, 3, n, 1) of points as ``count`` terms, the added ones without drag."""
-    return np.concatenate([terms, np.broadcast_to(NO_TERM, (count - len(terms), *terms.shape[1:]))])
+    return np.concatenate(
+        [terms, np.broadcast_to(NO_TERM, (count - len(terms), *terms.shape[1:]))]
+    )
 
 
 def mapped(function: Callable, *records):
@@ -137,7 +153,9 @@ def mapped(function: Callable, *records):
 
 def take(record, index) -> Any:
     """Return a record with the samples ``index`` of its arrays; arrays of one column stay as they are."""
-    return mapped(lambda x: x if x.shape[-1] == 1 and x.ndim > 1 else x[..., index], record)
+    return mapped(
+        lambda x: x if x.shape[-1] == 1 and x.ndim > 1 else x[..., index], record
+    )
 
 
 class Assembly(NamedTuple):
@@ -162,9 +180,15 @@ class Assembly(NamedTuple):
     n_elements: int
     n_law_points: int
 
-    def problem(self, alpha: np.ndarray, alphadot: np.ndarray, speed: np.ndarray | None = None) -> Problem:
+    def problem(
+        self, alpha: np.ndarray, alphadot: np.ndarray, speed: np.ndarray | None = None
+    ) -> Problem:
         """Return the balance at shapes and rates (joints, B), with a scale of speed (B,), by default the joint speed."""
-        problem = self.without_effects(alpha, alphadot, joint_speed(self.body, alphadot) if speed is None else speed)
+        problem = self.without_effects(
+            alpha,
+            alphadot,
+            joint_speed(self.body, alphadot) if speed is None else speed,
+        )
         for effect in self.effects:
             problem = effect.apply(problem, None, None)
         return problem
@@ -182,10 +206,21 @@ class Assembly(NamedTuple):
         speed, mean = speed[None], self.fraction.T
         frame = Frame(mean @ x, mean @ y, force_scale(self, speed), speed)
         sides = Contact(e, self.station, self.buried)
-        return Problem(*self[:6], sides, self.no_points, NO_POINT_TERMS, ZERO, NO_MEMORY, None, frame)
+        return Problem(
+            *self[:6],
+            sides,
+            self.no_points,
+            NO_POINT_TERMS,
+            ZERO,
+            NO_MEMORY,
+            None,
+            frame,
+        )
 
 
-def assemble(medium, body: Body, effects: Sequence = (), rule: str = "exact", pieces: int = 40) -> Assembly:
+def assemble(
+    medium, body: Body, effects: Sequence = (), rule: str = "exact", pieces: int = 40
+) -> Assembly:
     """Return the assembly of a medium, a body and effects, with averages by a rule ("exact", "midpoint:N", "gauss:N") and
     ``pieces`` to a body length where an effect varies along an element.
 
@@ -210,7 +245,10 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
     # Effects that add points act first, so that all others act on these points, whatever their order.
     ordered = tuple(sorted(effects, key=lambda effect: not effect.adds_points))
     fraction = e.half / e.half.sum()
-    along, across = (abs(float(medium.traction(*v)[i])) for i, v in enumerate(((1.0, 0.0), (0.0, 1.0))))
+    along, across = (
+        abs(float(medium.traction(*v)[i]))
+        for i, v in enumerate(((1.0, 0.0), (0.0, 1.0)))
+    )
     law_and_units = (
         medium,
         record(medium, rule),
@@ -220,10 +258,22 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
         is_linear(medium),
     )
     adding = tuple(effect for effect in ordered if effect.adds_points)
-    assembly = Assembly(*law_and_units, body, adding, station, fraction, np.ones_like(station), no_points, 0, 0)
+    assembly = Assembly(
+        *law_and_units,
+        body,
+        adding,
+        station,
+        fraction,
+        np.ones_like(station),
+        no_points,
+        0,
+        0,
+    )
     n_elements = len(station) + len(assembly.problem(zero, zero + 1.0).points.station)
     n_law_points = n_elements * np.size(getattr(assembly.law, "nodes", 0.0))
-    return assembly._replace(effects=ordered, n_elements=n_elements, n_law_points=n_law_points)
+    return assembly._replace(
+        effects=ordered, n_elements=n_elements, n_law_points=n_law_points
+    )
 
 
 def force_scale(assembly: Assembly, speed: np.ndarray) -> np.ndarray:
@@ -236,6 +286,9 @@ def force_scale(assembly: Assembly, speed: np.ndarray) -> np.ndarray:
         return unit * speed
     viscous = getattr(medium, "viscous", None)
     if viscous is None:
-        along, across = (np.abs(medium.traction(*v)[k]) for k, v in enumerate(((speed, 0 * speed), (0 * speed, speed))))
+        along, across = (
+            np.abs(medium.traction(*v)[k])
+            for k, v in enumerate(((speed, 0 * speed), (0 * speed, speed)))
+        )
         return np.where(along > 0, along, across)
     return unit + viscous[0] * np.maximum(speed - 1.0, 0.0)

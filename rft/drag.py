@@ -36,9 +36,19 @@ class Rod:
     density: float | None = None
 
     def __post_init__(self):
-        for name, high in (("radius", 1e3), ("length", 1e3), ("depth", 1e3), ("density", 1e6)):
+        for name, high in (
+            ("radius", 1e3),
+            ("length", 1e3),
+            ("depth", 1e3),
+            ("density", 1e6),
+        ):
             if getattr(self, name) is not None:
-                in_range(f"the rod's {name}" if name != "density" else name, getattr(self, name), 1e-9, high)
+                in_range(
+                    f"the rod's {name}" if name != "density" else name,
+                    getattr(self, name),
+                    1e-9,
+                    high,
+                )
 
     @property
     def area(self) -> float | None:
@@ -48,7 +58,9 @@ class Rod:
     @property
     def pressure(self) -> float | None:
         """Pressure rho g |z| of the grains above the axis, Pa."""
-        return self.density * GRAVITY * self.depth if self.density and self.depth else None
+        return (
+            self.density * GRAVITY * self.depth if self.density and self.depth else None
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,12 +113,23 @@ def rod_drag(psi_deg, along, across, weight=None, ends=None) -> RodDrag:
     """
     columns = {"psi_deg": psi_deg, "forces along": along, "forces across": across}
     psi, *forces = (real_array(name, x) for name, x in columns.items())
-    forces = np.array(forces) if all(x.shape == psi.shape for x in forces) else np.zeros(0)
+    forces = (
+        np.array(forces) if all(x.shape == psi.shape for x in forces) else np.zeros(0)
+    )
     weight = np.ones(psi.shape) if weight is None else real_array("weights", weight)
-    require(forces.shape == (2, psi.size) and weight.shape == psi.shape, "angles and forces must be rows of one length")
+    require(
+        forces.shape == (2, psi.size) and weight.shape == psi.shape,
+        "angles and forces must be rows of one length",
+    )
     finite = all(bool(np.isfinite(x).all()) for x in (psi, forces, weight))
-    require(finite and psi.size > 0, "angles, forces and weights must be finite numbers, one at least")
-    require(bool((weight >= 0).all() and weight.any()), "weights must be 0 or more, and not all 0")
+    require(
+        finite and psi.size > 0,
+        "angles, forces and weights must be finite numbers, one at least",
+    )
+    require(
+        bool((weight >= 0).all() and weight.any()),
+        "weights must be 0 or more, and not all 0",
+    )
     require(
         not 0 < np.abs(psi).max() <= LARGEST_IN_RADIANS,
         f"psi_deg reaches only {np.abs(psi).max():.3g}",
@@ -121,7 +144,9 @@ def rod_drag(psi_deg, along, across, weight=None, ends=None) -> RodDrag:
             "forces on the ends must be two rows of numbers",
         )
         ends = _signs(psi) * ends
-    data = RodDrag(angle, _opposing(psi, forces), weight / weight[weight > 0].mean(), ends)
+    data = RodDrag(
+        angle, _opposing(psi, forces), weight / weight[weight > 0].mean(), ends
+    )
     _require_not_exchanged(data)
     return data
 
@@ -164,7 +189,8 @@ def _require_not_exchanged(data: RodDrag) -> None:
 
     as_given = misfit(directions)
     require(
-        misfit(directions[::-1]) >= 0.25 * as_given or as_given < 1e-06 * (data.forces**2).sum(),
+        misfit(directions[::-1]) >= 0.25 * as_given
+        or as_given < 1e-06 * (data.forces**2).sum(),
         "the forces along the rod grow with psi and those across it fall",
         because="the columns are exchanged, or psi is measured from the rod's normal",
         instead="it is the angle between velocity and rod axis",

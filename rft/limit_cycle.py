@@ -20,7 +20,9 @@ FIRST_RATIO = 0.5  # of the second change of displacement to the first, assumed
 LARGEST_RATIO = 0.95  # of a change to the previous one, where changes hardly decrease
 N_RATIOS = 3  # last ratios that are averaged
 DIVERGED = 5.0  # times the least change of velocity so far: an extrapolation that led away from the limit
-MOST_FAILURES = 10  # extrapolations that led away, after which a sample takes plain cycles
+MOST_FAILURES = (
+    10  # extrapolations that led away, after which a sample takes plain cycles
+)
 
 
 class Cycles(NamedTuple):
@@ -46,7 +48,16 @@ def begin(samples: int) -> Cycles:
     """Return the record before the first cycle."""
     none, zero = np.full((3, HISTORY, 3, samples), np.nan), np.zeros((3, samples))
     steadiest = np.stack([zero, zero + np.inf, zero])
-    return Cycles(zero, zero + np.nan, none[0], none, steadiest, zero[:1], zero, np.full(samples, np.inf))
+    return Cycles(
+        zero,
+        zero + np.nan,
+        none[0],
+        none,
+        steadiest,
+        zero[:1],
+        zero,
+        np.full(samples, np.inf),
+    )
 
 
 def after_massless_cycle(c: Cycles, displacement: np.ndarray) -> Cycles:
@@ -56,36 +67,52 @@ def after_massless_cycle(c: Cycles, displacement: np.ndarray) -> Cycles:
     changes = changes[~np.isnan(changes).any((1, 2))]
     if not len(changes):
         return c
-    ratios = np.clip(changes[1:] / np.where(changes[:-1] == 0, 1.0, changes[:-1]), -1.0, 1.0)
+    ratios = np.clip(
+        changes[1:] / np.where(changes[:-1] == 0, 1.0, changes[:-1]), -1.0, 1.0
+    )
     ratio = np.clip(ratios.mean(0), 0.0, LARGEST_RATIO) if len(ratios) else FIRST_RATIO
     return c._replace(drift=np.max(np.abs(changes[-1]) / (1 - ratio), axis=0))
 
 
-def after_heavy_cycle(c: Cycles, displacement: np.ndarray, end: np.ndarray, tolerance: float) -> Cycles:
+def after_heavy_cycle(
+    c: Cycles, displacement: np.ndarray, end: np.ndarray, tolerance: float
+) -> Cycles:
     """Return the record after a cycle of a heavy body that ended with a velocity (3, B).
 
     tolerance: drift below which no extrapolation is needed. After an extrapolation that led away from the limit the next
     one leads back to the end of the steadiest cycle."""
-    last, c = c.displacements[-1], c._replace(displacements=_appended(c.displacements, displacement))
+    last, c = (
+        c.displacements[-1],
+        c._replace(displacements=_appended(c.displacements, displacement)),
+    )
     if np.isnan(c.start).any():  # the first cycle starts from rest
         return c
     cycle = np.stack([c.start, end - c.start, displacement])
     size, least = np.abs(cycle[1]).max(0), np.abs(c.steadiest[1]).max(0)
     diverged = (size > DIVERGED * least) & (c.extrapolation != 0).any(0)
-    steadiest, failures = np.where(size < least, cycle, c.steadiest), c.failures + diverged
+    steadiest, failures = (
+        np.where(size < least, cycle, c.steadiest),
+        c.failures + diverged,
+    )
     history = _appended(c.history, cycle)
     history = np.where(diverged & ~np.isnan(history), steadiest[:, None], history)
     c = c._replace(history=history, steadiest=steadiest, failures=failures)
     differences = np.diff(history, axis=1)
-    starts, changes, displacements = differences[:, ~np.isnan(differences).any((0, 2, 3))]
+    starts, changes, displacements = differences[
+        :, ~np.isnan(differences).any((0, 2, 3))
+    ]
     if not len(starts):
         return c
     weights = _mixing_weights(changes, history[1, -1])[:, None]
-    drift = np.maximum(np.abs((displacements * weights).sum(0)), np.abs(displacement - last)).max(0)
+    drift = np.maximum(
+        np.abs((displacements * weights).sum(0)), np.abs(displacement - last)
+    ).max(0)
     back = steadiest[0] + steadiest[1] - end
     extrapolation = np.where(diverged, back, ((starts + changes) * weights).sum(0))
     extrapolates = (drift > tolerance) & (diverged | (failures[0] < MOST_FAILURES))
-    return c._replace(drift=drift, extrapolation=np.where(extrapolates, extrapolation, 0.0))
+    return c._replace(
+        drift=drift, extrapolation=np.where(extrapolates, extrapolation, 0.0)
+    )
 
 
 def _appended(cycles: np.ndarray, cycle: np.ndarray) -> np.ndarray:

@@ -22,10 +22,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.vectors import absolute, copysign, exp, formula, log_ratio, maximum, minimum, polynomial, sqrt, where
+from rft.vectors import (
+    absolute,
+    copysign,
+    exp,
+    formula,
+    log_ratio,
+    maximum,
+    minimum,
+    polynomial,
+    sqrt,
+    where,
+)
 
 TINY = 1e-300  # added to divisors, for an element at rest without rounding; far below any speed that can matter
-SERIES_BELOW = 1.0 / 9.0  # t^2 below which k is a polynomial; above it atanh t - t loses at most one digit
+SERIES_BELOW = (
+    1.0 / 9.0
+)  # t^2 below which k is a polynomial; above it atanh t - t loses at most one digit
 
 
 def _series(count: int = 12) -> tuple[float, ...]:
@@ -35,7 +48,9 @@ def _series(count: int = 12) -> tuple[float, ...]:
     def k(t2):
         return sum(t2**j / (2 * j + 3) for j in range(40))
 
-    series = np.polynomial.Chebyshev.interpolate(k, count - 1, domain=[0.0, SERIES_BELOW])
+    series = np.polynomial.Chebyshev.interpolate(
+        k, count - 1, domain=[0.0, SERIES_BELOW]
+    )
     return tuple(map(float, series.convert(kind=np.polynomial.Polynomial).coef))
 
 
@@ -98,7 +113,9 @@ class EndCoordinates(NamedTuple):
 def end_coordinates(v_t, v_n, v_w, rounding, q):
     """Return the elliptic coordinates of an element, with 1 - mu^2 and 1 - t^2 to full precision."""
     A2 = q * q * v_t * v_t + rounding * rounding
-    margin = absolute(v_n) - absolute(v_w)  # negative where the pivot lies in the element
+    margin = absolute(v_n) - absolute(
+        v_w
+    )  # negative where the pivot lies in the element
     u_near, u_far = absolute(margin), absolute(v_n) + absolute(v_w)
     R_near, R_far = sqrt(A2 + u_near * u_near), sqrt(A2 + u_far * u_far)
     two_over_S = 2.0 / (R_near + R_far + TINY)
@@ -106,7 +123,9 @@ def end_coordinates(v_t, v_n, v_w, rounding, q):
     # 2 - 2 max(|mu|, |t|) as a sum of positive terms: a difference would have no digits left near 1.
     near, far = (R_near + u_near) * two_over_S, (R_far + u_far) * two_over_S
     excess = A2 * two_over_S * two_over_S * (near + far) / (near * far)
-    one_minus_mu2 = 0.5 * (excess + (u_near - margin) * two_over_S) * (1.0 + absolute(mu))
+    one_minus_mu2 = (
+        0.5 * (excess + (u_near - margin) * two_over_S) * (1.0 + absolute(mu))
+    )
     one_minus_t2 = 0.5 * (excess + (u_near + margin) * two_over_S) * (1.0 + absolute(t))
     return EndCoordinates(two_over_S, mu, t, one_minus_mu2, one_minus_t2)
 
@@ -119,13 +138,19 @@ def k_function(t, one_minus_t2):
     far = maximum(z, SERIES_BELOW)
     t = sqrt(far)
     atanh = 0.5 * log_ratio((1.0 + t) * (1.0 + t), maximum(one_minus_t2, TINY))
-    return where(z < SERIES_BELOW, polynomial(minimum(z, SERIES_BELOW), SERIES), (atanh - t) / (t * far))
+    return where(
+        z < SERIES_BELOW,
+        polynomial(minimum(z, SERIES_BELOW), SERIES),
+        (atanh - t) / (t * far),
+    )
 
 
 @formula
 def dry(v_t, v_n, v_w, rounding, q, k_t, k_n):
     """Return the load of f_t = k_t v_t / R, f_n = k_n u / R."""
-    two_over_S, mu, t, one_minus_mu2, one_minus_t2 = end_coordinates(v_t, v_n, v_w, rounding, q)
+    two_over_S, mu, t, one_minus_mu2, one_minus_t2 = end_coordinates(
+        v_t, v_n, v_w, rounding, q
+    )
     k = k_function(t, one_minus_t2)
     h, denominator = 1.0 - one_minus_t2 * k, one_minus_mu2 + mu * mu * one_minus_t2
     inverse = 1.0 / (denominator * one_minus_t2 + TINY)
@@ -189,7 +214,11 @@ def find_pivot(v_n, v_w):
     """Return the pivot s of an element, where u(s) = 0, or -1 without a pivot; whether there is one; and a number with
     the sign of u on the head's side of it."""
     inside = absolute(v_w) > absolute(v_n)
-    return where(inside, -v_n / where(inside, v_w, 1.0), -1.0), inside, where(inside, v_w, v_n)
+    return (
+        where(inside, -v_n / where(inside, v_w, 1.0), -1.0),
+        inside,
+        where(inside, v_w, v_n),
+    )
 
 
 @formula
@@ -251,8 +280,14 @@ def inclined_load(load, v, rounding, incline):
     loss = where(down > 0.0, downhill_loss, 0.0) * inverse
     # With wide rounding drag is viscous and weak, and the full weight would move the body at enormous speeds.
     weight = weight / sqrt(1.0 + rounding * rounding)
-    factor, cosine = level_factor - loss * down, down * inverse * inverse  # the cosine over the speed
-    slope_t, slope_n = loss * (cosine * v[0] - down_t), loss * (cosine * v[1] - down_n)  # of the factor
+    factor, cosine = (
+        level_factor - loss * down,
+        down * inverse * inverse,
+    )  # the cosine over the speed
+    slope_t, slope_n = (
+        loss * (cosine * v[0] - down_t),
+        loss * (cosine * v[1] - down_n),
+    )  # of the factor
     return Load(
         factor * load.t - weight * down_t, factor * load.t_t + slope_t * load.t, factor * load.t_n + slope_n * load.t,
         factor * load.t_w,
@@ -296,12 +331,17 @@ def developed_direction(direction, before, now, step):
     total = where(total == 0.0, 1.0, total)
     old, new = absolute(before) / total, now / total
     # Travels backward and forward, over total x the duration of the step / 2.
-    backward_travel, forward_travel = where(forward, 0.0, old * old), where(forward, old + new, new * new)
+    backward_travel, forward_travel = (
+        where(forward, 0.0, old * old),
+        where(forward, old + new, new * new),
+    )
     forward_slope = where(forward, 1.0, new * new + 2.0 * old * new)
     half_step = where(instant, 0.0, step) / 2.0
     turned = (1.0 + direction) * exp(-half_step * total * backward_travel)
     rest = where(instant, 0.0, exp(-half_step * total * forward_travel))
-    slope = rest * half_step * (forward_slope * (2.0 - turned) + backward_travel * turned)
+    slope = (
+        rest * half_step * (forward_slope * (2.0 - turned) + backward_travel * turned)
+    )
     return 1.0 - (2.0 - turned) * rest, slope
 
 
@@ -310,7 +350,9 @@ def developed_share(direction, before, now, at_once, step):
     """Return the share of the drag on motion with the velocity ``now`` >= 0 after the step of `developed_direction`, and
     its slope in ``now``."""
     after, slope = developed_direction(direction, before, now, step)
-    return at_once + (1.0 - at_once) * (0.5 + 0.5 * after), (1.0 - at_once) * (0.5 * slope)
+    return at_once + (1.0 - at_once) * (0.5 + 0.5 * after), (1.0 - at_once) * (
+        0.5 * slope
+    )
 
 
 @formula
@@ -318,11 +360,19 @@ def share_across(sign, intact, v_n, v_w, memory):
     """Return the share of the drag across on the part of an element that moves left (sign 1) or right (sign -1), and its
     slopes in v_n and v_w."""
     _, inside, _ = find_pivot(v_n, v_w)
-    now = where(inside, 0.5 * (sign * v_n + absolute(v_w)), maximum(sign * v_n, 0.0))  # mean velocity of the part
+    now = where(
+        inside, 0.5 * (sign * v_n + absolute(v_w)), maximum(sign * v_n, 0.0)
+    )  # mean velocity of the part
     direction, before = sign * memory.across, sign * memory.v_n_before
-    value, slope = developed_share(direction, before, now, memory.at_once_across, memory.step_across)
+    value, slope = developed_share(
+        direction, before, now, memory.at_once_across, memory.step_across
+    )
     slope = intact * slope
-    return intact * value, where(inside, 0.5, 1.0) * sign * slope, where(inside, copysign(0.5, v_w), 0.0) * slope
+    return (
+        intact * value,
+        where(inside, 0.5, 1.0) * sign * slope,
+        where(inside, copysign(0.5, v_w), 0.0) * slope,
+    )
 
 
 @formula
@@ -330,7 +380,9 @@ def with_share_along(load, v_t, memory):
     """Return a load with the share of the drag along that the ground has developed."""
     sign = where(v_t >= 0.0, 1.0, -1.0)
     direction, before = sign * memory.along, sign * memory.v_t_before
-    value, slope = developed_share(direction, before, absolute(v_t), memory.at_once_along, memory.step_along)
+    value, slope = developed_share(
+        direction, before, absolute(v_t), memory.at_once_along, memory.step_along
+    )
     return Load(
         value * load.t, value * load.t_t + sign * slope * load.t, value * load.t_n, value * load.t_w,
         load.n, load.n_t, load.n_n, load.n_w, load.w, load.w_t, load.w_n, load.w_w,
@@ -340,7 +392,11 @@ def with_share_along(load, v_t, memory):
 @formula
 def select_triple(condition, x, y):
     """Return the triple x where the condition holds, y elsewhere."""
-    return where(condition, x[0], y[0]), where(condition, x[1], y[1]), where(condition, x[2], y[2])
+    return (
+        where(condition, x[0], y[0]),
+        where(condition, x[1], y[1]),
+        where(condition, x[2], y[2]),
+    )
 
 
 @formula
@@ -350,7 +406,12 @@ def part_load(law, v_t, v_n, v_w, rounding, low, high, share):
     value, by_n, by_w = share
     c, h = 0.5 * (high + low), 0.5 * (high - low)  # centre and half length of the part
     f = law.average(v_t, v_n + v_w * c, h * v_w, rounding)
-    w, w_t, w_n, w_w = c * f.n + h * f.w, c * f.n_t + h * f.w_t, c * f.n_n + h * f.w_n, c * f.n_w + h * f.w_w
+    w, w_t, w_n, w_w = (
+        c * f.n + h * f.w,
+        c * f.n_t + h * f.w_t,
+        c * f.n_n + h * f.w_n,
+        c * f.n_w + h * f.w_w,
+    )
     return Load(
         h * f.t, h * f.t_t, h * f.t_n, h * (c * f.t_n + h * f.t_w),
         h * value * f.n, h * value * f.n_t, h * (value * f.n_n + by_n * f.n),
@@ -368,8 +429,12 @@ def two_sided_load(law, v_t, v_n, v_w, rounding, memory):
     left = share_across(1.0, memory.intact_left, v_n, v_w, memory)
     right = share_across(-1.0, memory.intact_right, v_n, v_w, memory)
     leftward = u_head > 0.0
-    head = part_load(law, v_t, v_n, v_w, rounding, pivot, 1.0, select_triple(leftward, left, right))
-    tail = part_load(law, v_t, v_n, v_w, rounding, -1.0, pivot, select_triple(leftward, right, left))
+    head = part_load(
+        law, v_t, v_n, v_w, rounding, pivot, 1.0, select_triple(leftward, left, right)
+    )
+    tail = part_load(
+        law, v_t, v_n, v_w, rounding, -1.0, pivot, select_triple(leftward, right, left)
+    )
     return with_share_along(sum_loads(head, tail), v_t, memory)
 
 

@@ -38,7 +38,9 @@ def frame_inertia(e: Elements, m: MomentumRate) -> Inertia:
     """Return the rate of change of momentum of all elements on the frame, strength (M xi + offset)."""
     zero, one = np.zeros_like(e.c), np.ones_like(e.c)
     units = (one, zero, zero), (zero, one, zero), (zero, zero, one)
-    M = m.rate * np.stack([element_momenta(e, to_element(e, *unit)).sum(1) for unit in units], 1)
+    M = m.rate * np.stack(
+        [element_momenta(e, to_element(e, *unit)).sum(1) for unit in units], 1
+    )
     past = np.stack([m.past_x.sum(0), m.past_y.sum(0), m.past_t.sum(0)])
     offset = m.rate * element_momenta(e, (e.v_t, e.v_n, e.v_w)).sum(1) - past
     return Inertia(*M.reshape(9, 1, -1), *offset[:, None], m.strength)
@@ -46,7 +48,9 @@ def frame_inertia(e: Elements, m: MomentumRate) -> Inertia:
 
 def element_momentum_rates(e: Elements, m: MomentumRate, v) -> np.ndarray:
     """Return the rate of change of momentum of each element on the frame, (3, n, B), at velocities (v_t, v_n, v_w)."""
-    return m.strength * (m.rate * element_momenta(e, v) - np.stack([m.past_x, m.past_y, m.past_t]))
+    return m.strength * (
+        m.rate * element_momenta(e, v) - np.stack([m.past_x, m.past_y, m.past_t])
+    )
 
 
 def frame_to_ground(pose: np.ndarray, p: np.ndarray) -> np.ndarray:

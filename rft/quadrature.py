@@ -18,8 +18,14 @@ DIFFERENCE = 1e-6  # step of central differences, over the speed
 def slopes_by_differences(law, v_t, v_n, rounding):
     """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n) of a law's traction, by central differences."""
     h = DIFFERENCE * sqrt(v_t * v_t + v_n * v_n + rounding * rounding) + TINY
-    (t1, n1), (t2, n2) = law.traction(v_t + h, v_n, rounding), law.traction(v_t - h, v_n, rounding)
-    (t3, n3), (t4, n4) = law.traction(v_t, v_n + h, rounding), law.traction(v_t, v_n - h, rounding)
+    (t1, n1), (t2, n2) = (
+        law.traction(v_t + h, v_n, rounding),
+        law.traction(v_t - h, v_n, rounding),
+    )
+    (t3, n3), (t4, n4) = (
+        law.traction(v_t, v_n + h, rounding),
+        law.traction(v_t, v_n - h, rounding),
+    )
     a = 0.5 / h
     return a * (t1 - t2), a * (t3 - t4), a * (n1 - n2), a * (n3 - n4)
 
@@ -33,7 +39,10 @@ def by_nodes(law, v_t, v_n, v_w, rounding):
     for j in range(len(law.nodes)):
         s, w = law.nodes[j, 0], law.weights[j, 0]
         u_t, u_n = v_t + 0.0 * s, v_n + s * v_w
-        (t, n), (tt, tn, nt, nn) = law.traction(u_t, u_n, rounding), law.slopes(u_t, u_n, rounding)
+        (t, n), (tt, tn, nt, nn) = (
+            law.traction(u_t, u_n, rounding),
+            law.slopes(u_t, u_n, rounding),
+        )
         k = w * s
         load = sum_loads(load, over_nodes(Load(
             w * t, w * tt, w * tn, k * tn,
@@ -62,6 +71,13 @@ def parse(text: str) -> tuple[str, int]:
     kind, _, count = str(text).partition(":")
     if isinstance(text, str) and text == "exact":
         return "exact", 1
-    if kind in ("midpoint", "gauss") and re.fullmatch(r"[1-9]\d{0,3}", count) and int(count) <= 1000:
+    if (
+        kind in ("midpoint", "gauss")
+        and re.fullmatch(r"[1-9]\d{0,3}", count)
+        and int(count) <= 1000
+    ):
         return kind, int(count)
-    raise Refusal("loads must be 'exact', 'midpoint:N' or 'gauss:N' with N from 1 to 1000", value=str(text)[:60])
+    raise Refusal(
+        "loads must be 'exact', 'midpoint:N' or 'gauss:N' with N from 1 to 1000",
+        value=str(text)[:60],
+    )

@@ -37,9 +37,22 @@ class Refusal(ValueError):
     ratio must be a number from 1e-08 to 1e+08, got -1.0
     """
 
-    def __init__(self, what: str, *, value: Any = ..., where: Any = (), because: str = "", instead: str = ""):
+    def __init__(
+        self,
+        what: str,
+        *,
+        value: Any = ...,
+        where: Any = (),
+        because: str = "",
+        instead: str = "",
+    ):
         super().__init__(what)
-        self.what, self.value, self.because, self.instead = what, value, because, instead
+        self.what, self.value, self.because, self.instead = (
+            what,
+            value,
+            because,
+            instead,
+        )
         self.where = tuple(map(str, where if isinstance(where, tuple) else (where,)))
 
     def __str__(self) -> str:
@@ -48,7 +61,11 @@ class Refusal(ValueError):
     def said(self, spelled: Callable[[str], str]) -> str:
         """Return the refusal as a line. spelled: returns what a reader types for the name of an argument."""
         named = lambda words: worded(words, spelled)
-        text = named(self.what) if self.value is ... else f"{named(self.what)}, got {formatted(self.value)}"
+        text = (
+            named(self.what)
+            if self.value is ...
+            else f"{named(self.what)}, got {formatted(self.value)}"
+        )
         if reasons := "; ".join(named(x) for x in (self.because, self.instead) if x):
             text = f"{text}: {reasons}"
         for place in map(named, reversed(self.where)):

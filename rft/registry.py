@@ -47,7 +47,11 @@ class Registry(Mapping[str, Any]):
     @property
     def built_in(self) -> frozenset[str]:
         """Names of the parts that ship with the toolkit."""
-        return frozenset(name for name, part in self.items() if home(part).partition(".")[0] in BUILT_IN)
+        return frozenset(
+            name
+            for name, part in self.items()
+            if home(part).partition(".")[0] in BUILT_IN
+        )
 
     @property
     def own(self) -> list[Any]:
@@ -58,7 +62,9 @@ class Registry(Mapping[str, Any]):
     def register(self, part: Part, /, **members: Any) -> Part: ...
 
     @overload
-    def register(self, part: None = None, /, **members: Any) -> Callable[[Part], Part]: ...
+    def register(
+        self, part: None = None, /, **members: Any
+    ) -> Callable[[Part], Part]: ...
 
     def register(self, part: Any = None, /, **members: Any) -> Any:
         """Add a part under its name and return it: a decorator. Of the same module and name it takes the place of the one
@@ -75,19 +81,35 @@ class Registry(Mapping[str, Any]):
         """Add a part under a name; ValueError as `register`."""
         who = f"{self.noun} of one's own, {getattr(part, '__name__', name)},"
         if isinstance(part, type):
-            if not dataclasses.is_dataclass(part) or not part.__dataclass_params__.frozen:  # type: ignore[attr-defined]
-                raise Refusal(f"{who} must be a value", instead="put @dataclass(frozen=True) above it")
+            if (
+                not dataclasses.is_dataclass(part)
+                or not part.__dataclass_params__.frozen
+            ):  # type: ignore[attr-defined]
+                raise Refusal(
+                    f"{who} must be a value",
+                    instead="put @dataclass(frozen=True) above it",
+                )
             if self.key in {f.name for f in dataclasses.fields(part)}:
                 raise Refusal(
-                    f"{who} has {self.key} as a parameter", instead=f"write {self.key} = {name!r} without a type"
+                    f"{who} has {self.key} as a parameter",
+                    instead=f"write {self.key} = {name!r} without a type",
                 )
         given = self.key in getattr(part, "__dict__", {}) or name in self
-        if not isinstance(name, str) or not name.strip() or (isinstance(part, type) and not given):
-            raise Refusal(f"{who} has no name", instead=f'give the class {self.key} = "..."')
+        if (
+            not isinstance(name, str)
+            or not name.strip()
+            or (isinstance(part, type) and not given)
+        ):
+            raise Refusal(
+                f"{who} has no name", instead=f'give the class {self.key} = "..."'
+            )
         registered = self._parts.get(name, part)
         if place(registered) != place(part):
             if name in self.built_in:
-                raise Refusal(f"{who} is named {name!r}, as one that is built in", instead="give it another name")
+                raise Refusal(
+                    f"{who} is named {name!r}, as one that is built in",
+                    instead="give it another name",
+                )
             raise Refusal(
                 f"{who} is named {name!r}, as the {place(registered)[1]} of {place(registered)[0]}",
                 instead="rename one",
@@ -105,7 +127,9 @@ class Registry(Mapping[str, Any]):
         own_parts: dict[str, Any] = {}
         for name, part in self.items():
             own = getattr(part, "examples", None)
-            own_parts |= own() if own else {name: part() if isinstance(part, type) else part}
+            own_parts |= (
+                own() if own else {name: part() if isinstance(part, type) else part}
+            )
         return own_parts
 
 
@@ -123,7 +147,11 @@ def functions_with(member: str, value: str | None = None) -> Callable[[Any], boo
     """Return whether an object is a function that has an attribute, of one value if that is given, as a function of it."""
 
     def admits(part: Any) -> bool:
-        return isinstance(part, FunctionType) and hasattr(part, member) and value in (None, getattr(part, member))
+        return (
+            isinstance(part, FunctionType)
+            and hasattr(part, member)
+            and value in (None, getattr(part, member))
+        )
 
     return admits
 

@@ -21,9 +21,13 @@ def _components(g):
     try:
         g = np.asarray(g, float)
     except (TypeError, ValueError, OverflowError):
-        raise Refusal("a pose or velocity of the plane has three real numbers (..., 3)") from None
+        raise Refusal(
+            "a pose or velocity of the plane has three real numbers (..., 3)"
+        ) from None
     if g.ndim == 0 or g.shape[-1] != 3:
-        raise Refusal("a pose or velocity of the plane has shape (..., 3)", value=g.shape)
+        raise Refusal(
+            "a pose or velocity of the plane has shape (..., 3)", value=g.shape
+        )
     return g[..., 0], g[..., 1], g[..., 2]
 
 

@@ -28,14 +28,19 @@ from numba.extending import (
 from rft import vectors
 
 WIDTH = 8
-DOUBLES, INTEGERS, BITS = (ir.VectorType(kind, WIDTH) for kind in (ir.DoubleType(), ir.IntType(64), ir.IntType(1)))
+DOUBLES, INTEGERS, BITS = (
+    ir.VectorType(kind, WIDTH)
+    for kind in (ir.DoubleType(), ir.IntType(64), ir.IntType(1))
+)
 
 
 class Vector(types.Type):
     """Eight doubles; a number converts to eight equal ones."""
 
     def can_convert_from(self, context, other):
-        return Conversion.safe if isinstance(other, (types.Float, types.Integer)) else None
+        return (
+            Conversion.safe if isinstance(other, (types.Float, types.Integer)) else None
+        )
 
 
 class Mask(types.Type):
@@ -81,7 +86,9 @@ def _mask_from_truth(context, builder, fromty, toty, x):
 
 
 def _takes_vectors(a, b):
-    return vector in (a, b) and all(isinstance(x, (Vector, types.Number)) for x in (a, b))
+    return vector in (a, b) and all(
+        isinstance(x, (Vector, types.Number)) for x in (a, b)
+    )
 
 
 def _takes_masks(a, b):
@@ -93,9 +100,13 @@ def _define_operator(function, takes, argument, result, emit):
 
     @type_callable(function)
     def typed(context):
-        return lambda a, b: signature(result, argument, argument) if takes(a, b) else None
+        return lambda a, b: (
+            signature(result, argument, argument) if takes(a, b) else None
+        )
 
-    lower_builtin(function, argument, argument)(lambda context, builder, sig, args: emit(builder, *args))
+    lower_builtin(function, argument, argument)(
+        lambda context, builder, sig, args: emit(builder, *args)
+    )
 
 
 def _arithmetic(name):
@@ -121,8 +132,12 @@ for _function, _sign in (
     (operator.eq, "=="),
 ):
     _define_operator(_function, _takes_vectors, vector, mask, _comparison(_sign))
-_define_operator(operator.and_, _takes_masks, mask, mask, lambda builder, x, y: builder.and_(x, y))
-_define_operator(operator.or_, _takes_masks, mask, mask, lambda builder, x, y: builder.or_(x, y))
+_define_operator(
+    operator.and_, _takes_masks, mask, mask, lambda builder, x, y: builder.and_(x, y)
+)
+_define_operator(
+    operator.or_, _takes_masks, mask, mask, lambda builder, x, y: builder.or_(x, y)
+)
 
 
 @type_callable(operator.neg)
@@ -144,7 +159,9 @@ def _intrinsic(name, count):
     def emit(builder, *args):
         full, module = f"llvm.{name}.v{WIDTH}f64", builder.module
         kind = ir.FunctionType(DOUBLES, [DOUBLES] * count)
-        return builder.call(module.globals.get(full) or ir.Function(module, kind, full), args)
+        return builder.call(
+            module.globals.get(full) or ir.Function(module, kind, full), args
+        )
 
     return emit
 
@@ -162,13 +179,25 @@ def _define(function, takes, emit, number):
         return result if vector in args or mask in args else None
 
     # numba reads the number of arguments from the signature of these functions.
-    typers = lambda x: typed(x), lambda x, y: typed(x, y), lambda x, y, z: typed(x, y, z)
+    typers = (
+        lambda x: typed(x),
+        lambda x, y: typed(x, y),
+        lambda x, y, z: typed(x, y, z),
+    )
     type_callable(function)(lambda context: typers[len(takes) - 1])
-    lower_builtin(function, *takes)(lambda context, builder, sig, args: emit(builder, *args))
+    lower_builtin(function, *takes)(
+        lambda context, builder, sig, args: emit(builder, *args)
+    )
     for_numbers = (
         lambda x: number if isinstance(x, types.Number) else None,
-        lambda x, y: number if isinstance(x, types.Number) and isinstance(y, types.Number) else None,
-        lambda condition, x, y: number if isinstance(condition, types.Boolean) else None,
+        lambda x, y: (
+            number
+            if isinstance(x, types.Number) and isinstance(y, types.Number)
+            else None
+        ),
+        lambda condition, x, y: (
+            number if isinstance(condition, types.Boolean) else None
+        ),
     )
     overload(function, strict=False)(for_numbers[len(takes) - 1])
 
@@ -177,9 +206,18 @@ _define(vectors.sqrt, (vector,), _intrinsic("sqrt", 1), lambda x: np.sqrt(x))
 _define(vectors.absolute, (vector,), _intrinsic("fabs", 1), lambda x: abs(x))
 _define(vectors.exp, (vector,), _intrinsic("exp", 1), lambda x: np.exp(x))
 _define(vectors.floor, (vector,), _intrinsic("floor", 1), lambda x: np.floor(x))
-_define(vectors.copysign, (vector, vector), _intrinsic("copysign", 2), lambda x, y: np.copysign(x, y))
-_define(vectors.maximum, (vector, vector), _selected(">"), lambda x, y: x if x > y else y)
-_define(vectors.minimum, (vector, vector), _selected("<"), lambda x, y: x if x < y else y)
+_define(
+    vectors.copysign,
+    (vector, vector),
+    _intrinsic("copysign", 2),
+    lambda x, y: np.copysign(x, y),
+)
+_define(
+    vectors.maximum, (vector, vector), _selected(">"), lambda x, y: x if x > y else y
+)
+_define(
+    vectors.minimum, (vector, vector), _selected("<"), lambda x, y: x if x < y else y
+)
 _define(
     vectors.where,
     (mask, vector, vector),
@@ -198,7 +236,9 @@ def _exponents(context, x):
     def emit(context, builder, sig, args):
         bits = builder.bitcast(args[0], INTEGERS)
         power = builder.sub(builder.lshr(bits, constant(52)), constant(1023))
-        mantissa = builder.or_(builder.and_(bits, constant((1 << 52) - 1)), constant(1023 << 52))
+        mantissa = builder.or_(
+            builder.and_(bits, constant((1 << 52) - 1)), constant(1023 << 52)
+        )
         pair = builder.sitofp(power, DOUBLES), builder.bitcast(mantissa, DOUBLES)
         return context.make_tuple(builder, sig.return_type, pair)
 
@@ -220,7 +260,12 @@ def _log_ratio(a, b):
         power_b, b = _exponents(b)
         large, small = a > 1.4142135623730951 * b, b > 1.4142135623730951 * a
         a, b = a * vectors.where(large, 0.5, 1.0), b * vectors.where(small, 0.5, 1.0)
-        power = power_a - power_b + vectors.where(large, 1.0, 0.0) - vectors.where(small, 1.0, 0.0)
+        power = (
+            power_a
+            - power_b
+            + vectors.where(large, 1.0, 0.0)
+            - vectors.where(small, 1.0, 0.0)
+        )
         s = (a - b) / (a + b)
         z = s * s
         return LN2 * power + (s + s) * (1.0 + z * vectors.polynomial(z, ATANH))
@@ -232,19 +277,34 @@ def _log_ratio(a, b):
 def _polynomial(z, coefficients):
     """Return Horner's rule without a loop, for numba would not unroll a loop over a tuple."""
     count = len(coefficients)
-    lines = [f"    value = value * z + coefficients[{j}]" for j in range(count - 2, -1, -1)]
+    lines = [
+        f"    value = value * z + coefficients[{j}]" for j in range(count - 2, -1, -1)
+    ]
     return _function_from_source(
-        "unrolled", ["z, coefficients", f"    value = coefficients[{count - 1}]", *lines, "    return value"]
+        "unrolled",
+        [
+            "z, coefficients",
+            f"    value = coefficients[{count - 1}]",
+            *lines,
+            "    return value",
+        ],
     )
 
 
 @overload(vectors.combinations, inline="never", jit_options={"forceinline": True})
 def _combinations(coefficients, terms):
     """Return the sums without loops, for numba would not unroll loops over tuples."""
-    row = lambda i: " + ".join([f"c[{i}][0]", *(f"c[{i}][{j + 1}] * t[{j}]" for j in range(len(terms)))])
+    row = lambda i: " + ".join(
+        [f"c[{i}][0]", *(f"c[{i}][{j + 1}] * t[{j}]" for j in range(len(terms)))]
+    )
     sums = ", ".join(row(i) for i in range(len(coefficients)))
     return _function_from_source(
-        "unrolled", ["coefficients, terms", "    c, t = coefficients, terms", f"    return ({sums},)"]
+        "unrolled",
+        [
+            "coefficients, terms",
+            "    c, t = coefficients, terms",
+            f"    return ({sums},)",
+        ],
     )
 
 
@@ -298,7 +358,9 @@ def add_lanes(context, x, i, value):
 
     def emit(context, builder, sig, args):
         double = ir.DoubleType()
-        first = builder.bitcast(_pointer(context, builder, sig, args), double.as_pointer())
+        first = builder.bitcast(
+            _pointer(context, builder, sig, args), double.as_pointer()
+        )
         name, module = f"llvm.vector.reduce.fadd.v{WIDTH}f64", builder.module
         kind = ir.FunctionType(double, [double, DOUBLES])
         add = module.globals.get(name) or ir.Function(module, kind, name)
@@ -310,7 +372,9 @@ def add_lanes(context, x, i, value):
 
 def _pointer(context, builder, sig, args):
     array = context.make_array(sig.args[0])(context, builder, args[0])
-    row = builder.mul(context.cast(builder, args[1], sig.args[1], types.int64), ir.IntType(64)(WIDTH))
+    row = builder.mul(
+        context.cast(builder, args[1], sig.args[1], types.int64), ir.IntType(64)(WIDTH)
+    )
     return builder.bitcast(builder.gep(array.data, [row]), DOUBLES.as_pointer())
 
 
@@ -319,7 +383,10 @@ def sum_of(context, x):
     """Return the sum of the eight numbers of a vector, pair by pair."""
 
     def emit(context, builder, sig, args):
-        lanes = [builder.extract_element(args[0], ir.IntType(32)(lane)) for lane in range(WIDTH)]
+        lanes = [
+            builder.extract_element(args[0], ir.IntType(32)(lane))
+            for lane in range(WIDTH)
+        ]
         while len(lanes) > 1:
             lanes = [builder.fadd(a, b) for a, b in zip(lanes[::2], lanes[1::2])]
         return lanes[0]
@@ -345,11 +412,18 @@ def _gather(context, table, row, column):
     def emit(context, builder, sig, args):
         array = context.make_array(sig.args[0])(context, builder, args[0])
         columns = builder.extract_value(array.shape, 1)
-        rows, column = builder.fptosi(args[1], INTEGERS), context.cast(builder, args[2], sig.args[2], types.int64)
+        rows, column = (
+            builder.fptosi(args[1], INTEGERS),
+            context.cast(builder, args[2], sig.args[2], types.int64),
+        )
         value = ir.Constant(DOUBLES, ir.Undefined)
         for lane in map(ir.IntType(32), range(WIDTH)):
-            offset = builder.add(builder.mul(builder.extract_element(rows, lane), columns), column)
-            value = builder.insert_element(value, builder.load(builder.gep(array.data, [offset])), lane)
+            offset = builder.add(
+                builder.mul(builder.extract_element(rows, lane), columns), column
+            )
+            value = builder.insert_element(
+                value, builder.load(builder.gep(array.data, [offset])), lane
+            )
         return value
 
     return vector(table, row, column), emit
@@ -366,10 +440,17 @@ def record_access(kind):
     """Return read(x, first) and write(x, first, record) of a NamedTuple of vectors that is stored in the rows of an array
     x (rows, 8) from the row ``first`` on."""
     reads = ", ".join(f"load(x, first + {i})" for i in range(len(kind._fields)))
-    writes = [f"    store(x, first + {i}, record.{name})" for i, name in enumerate(kind._fields)]
-    read = _function_from_source("read", ["x, first", f"    return kind({reads})"], kind=kind, load=load)
+    writes = [
+        f"    store(x, first + {i}, record.{name})"
+        for i, name in enumerate(kind._fields)
+    ]
+    read = _function_from_source(
+        "read", ["x, first", f"    return kind({reads})"], kind=kind, load=load
+    )
     write = _function_from_source("write", ["x, first, record", *writes], store=store)
-    return register_jitable(forceinline=True)(read), register_jitable(forceinline=True)(write)
+    return register_jitable(forceinline=True)(read), register_jitable(forceinline=True)(
+        write
+    )
 
 
 @overload(vectors.over_nodes, inline="never")
@@ -398,7 +479,9 @@ def _register_method(name: str, count: int) -> None:
         )
 
     typed = _function_from_source(
-        "typed", [f"law, {arguments}", "    return implementation(law)"], implementation=implementation
+        "typed",
+        [f"law, {arguments}", "    return implementation(law)"],
+        implementation=implementation,
     )
     for kind in (types.NamedTuple, types.NamedUniTuple):
         overload_method(kind, name, jit_options={"forceinline": True})(typed)

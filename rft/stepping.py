@@ -70,7 +70,10 @@ class TimeSteps(NamedTuple):
     path: np.ndarray | None = None
 
     def __repr__(self) -> str:
-        kinds = ", ".join(f"{n} {kind}" for kind, n in zip(*np.unique(self.status, return_counts=True)))
+        kinds = ", ".join(
+            f"{n} {kind}"
+            for kind, n in zip(*np.unique(self.status, return_counts=True))
+        )
         count = np.size(self.status)
         size = f"{count} gait{'s' * (count != 1)} of {np.shape(self.xi)[-2]} phases, {self.cycles} cycles: {kinds}"
         return f"TimeSteps({size}; residual up to {np.max(self.residual, initial=0.0):.1e})"
@@ -78,7 +81,13 @@ class TimeSteps(NamedTuple):
     @property
     def displacement(self) -> np.ndarray:
         """Pose after the cycle in the frame at its start, (..., 3)."""
-        return np.moveaxis(_relative_pose(*(np.moveaxis(self.pose[..., k, :], -1, 0) for k in (0, -1))), 0, -1)
+        return np.moveaxis(
+            _relative_pose(
+                *(np.moveaxis(self.pose[..., k, :], -1, 0) for k in (0, -1))
+            ),
+            0,
+            -1,
+        )
 
     def checked(self) -> TimeSteps:
         """Return these steps; RuntimeError if any sample is unconverged or not periodic."""
@@ -146,7 +155,10 @@ def time_steps(
     assembly = assemble(medium, body, effects, loads, pieces)
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
     check(backend)
-    require(alpha.ndim >= 2 and alpha.shape[-2] >= 8, f"time stepping takes 8 phases or more, got alpha {alpha.shape}")
+    require(
+        alpha.ndim >= 2 and alpha.shape[-2] >= 8,
+        f"time stepping takes 8 phases or more, got alpha {alpha.shape}",
+    )
     if cycles is not None:
         in_range("cycles", cycles, 1, 10_000, whole=True)
     batch, (phases, joints) = alpha.shape[:-2], alpha.shape[-2:]
@@ -154,9 +166,16 @@ def time_steps(
         return _no_steps(batch, phases)
     if cycles is None and broken & Premise.SE2_SYMMETRIC:
         cycles = 1
-    shapes = (np.moveaxis(x.reshape(-1, phases, joints), 0, -1) for x in (alpha, alphadot))  # (N, joints, B)
+    shapes = (
+        np.moveaxis(x.reshape(-1, phases, joints), 0, -1) for x in (alpha, alphadot)
+    )  # (N, joints, B)
     stepping = Stepping(
-        assembly, *shapes, Accuracy(regularisation, tolerance), backend, cycles is None, half_lengths(body)
+        assembly,
+        *shapes,
+        Accuracy(regularisation, tolerance),
+        backend,
+        cycles is None,
+        half_lengths(body),
     )
     steps = _cycles(stepping, cycles, with_work, with_path, advance or take_steps)
     return _with_batch_axes(steps, batch, body.length)
@@ -166,11 +185,19 @@ def _no_steps(batch: tuple, phases: int) -> TimeSteps:
     """Return the steps of an empty batch."""
     none = np.zeros(batch)
     return TimeSteps(
-        np.zeros((*batch, phases, 3)), np.zeros((*batch, phases + 1, 3)), none, none.astype(str), none, 0, None
+        np.zeros((*batch, phases, 3)),
+        np.zeros((*batch, phases + 1, 3)),
+        none,
+        none.astype(str),
+        none,
+        0,
+        None,
     )
 
 
-def take_steps(stepping: Stepping, state: State, count: int, with_work: bool = False) -> tuple[State, list[Row]]:
+def take_steps(
+    stepping: Stepping, state: State, count: int, with_work: bool = False
+) -> tuple[State, list[Row]]:
     """Return the state after ``count`` steps, and their rows."""
     rows = []
     for _ in range(count):
@@ -179,19 +206,31 @@ def take_steps(stepping: Stepping, state: State, count: int, with_work: bool = F
     return state, rows
 
 
-def _cycles(stepping: Stepping, cycles: int | None, with_work: bool, with_path: bool, advance: Callable) -> TimeSteps:
+def _cycles(
+    stepping: Stepping,
+    cycles: int | None,
+    with_work: bool,
+    with_path: bool,
+    advance: Callable,
+) -> TimeSteps:
     """Return the last of ``cycles`` cycles, or by default the first one that repeats; samples on the last axis."""
     path, state = [], stepping.begin()
     for cycle in itertools.count(1):
         state, rows = advance(stepping, state, stepping.phases, with_work)
         pose = np.stack([*(row.pose for row in rows), stepping.site(state).pose])
         path += [pose[:-1]] if with_path else []
-        if cycle == (cycles or MOST_CYCLES) or (cycles is None and stepping.is_periodic(state)):
+        if cycle == (cycles or MOST_CYCLES) or (
+            cycles is None and stepping.is_periodic(state)
+        ):
             break
     xi, residual, limit = (np.stack([x[i] for x in rows]) for i in (0, 2, 3))
     work = Work(*map(np.stack, zip(*(row.work for row in rows)))) if with_work else None
     worst, drift = np.max(residual, 0), state.cycles.drift
-    status = np.where(drift <= stepping.drift_tolerance, "periodic", "not periodic" if cycles is None else "running")
+    status = np.where(
+        drift <= stepping.drift_tolerance,
+        "periodic",
+        "not periodic" if cycles is None else "running",
+    )
     status = np.where(worst <= limit.max(), status, "unconverged")
     full_path = np.concatenate([*path, pose[-1:]]) if with_path else None
     return TimeSteps(xi, pose, worst, status, drift, cycle, work, full_path)
@@ -206,7 +245,12 @@ def _relative_pose(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def _integrated(pose: np.ndarray, xi: np.ndarray, dt: float) -> np.ndarray:
     """Return the pose (3, B) reached from a pose at a constant body velocity xi (3, B) after dt."""
     half = 0.5 * dt * xi[2]
-    z = dt * np.sinc(half / np.pi) * np.exp(1j * (pose[2] + half)) * (xi[0] + 1j * xi[1])
+    z = (
+        dt
+        * np.sinc(half / np.pi)
+        * np.exp(1j * (pose[2] + half))
+        * (xi[0] + 1j * xi[1])
+    )
     return pose + np.array([z.real, z.imag, dt * xi[2]])
 
 
@@ -221,7 +265,12 @@ def _with_batch_axes(steps: TimeSteps, batch: tuple, length: float) -> TimeSteps
     path = None if steps.path is None else samples_first(steps.path)
     work = steps.work
     if work is not None:  # (N, B, ...)
-        work = Work(*(np.moveaxis(x, 1, 0).reshape((*batch, len(x), *x.shape[2:])) for x in work))
+        work = Work(
+            *(
+                np.moveaxis(x, 1, 0).reshape((*batch, len(x), *x.shape[2:]))
+                for x in work
+            )
+        )
         work = work._replace(power=work.power * length)
     residual, status, drift = (x.reshape(batch) for x in steps[2:5])
     return TimeSteps(xi, pose, residual, status, drift, steps.cycles, work, path)
@@ -261,20 +310,38 @@ class Stepping:
     half lengths of the body's elements before these were cut into pieces."""
 
     def __init__(
-        self, assembly: Assembly, alpha, alphadot, accuracy: Accuracy, backend: str, to_limit: bool, body_halves
+        self,
+        assembly: Assembly,
+        alpha,
+        alphadot,
+        accuracy: Accuracy,
+        backend: str,
+        to_limit: bool,
+        body_halves,
     ):
         self.effects = stepwise_effects(assembly.effects)
-        self.assembly = assembly._replace(effects=tuple(e for e in assembly.effects if e not in self.effects))
-        self.alpha, self.alphadot, self.accuracy, self.backend = alpha, alphadot, accuracy, backend
+        self.assembly = assembly._replace(
+            effects=tuple(e for e in assembly.effects if e not in self.effects)
+        )
+        self.alpha, self.alphadot, self.accuracy, self.backend = (
+            alpha,
+            alphadot,
+            accuracy,
+            backend,
+        )
         self.to_limit, self.body_halves, self.phases = to_limit, body_halves, len(alpha)
         self.dt = 2 * np.pi / self.phases
         self.heavy = bool(broken_premises(self.effects) & Premise.QUASI_STATIC)
-        self.drift_tolerance = max([1e-6, *(e.drift_tolerance for e in assembly.effects)])
+        self.drift_tolerance = max(
+            [1e-6, *(e.drift_tolerance for e in assembly.effects)]
+        )
 
     @cached_property
     def scales(self) -> np.ndarray:
         """Scales of speed at all phases, (N, B)."""
-        speed = np.stack([joint_speed(self.assembly.body, rates) for rates in self.alphadot])
+        speed = np.stack(
+            [joint_speed(self.assembly.body, rates) for rates in self.alphadot]
+        )
         rms = np.sqrt((speed**2).mean(0))
         rms = np.where(rms > 0, rms, 1.0)
         if self.heavy:  # a heavy body moves while its joints pause
@@ -290,7 +357,10 @@ class Stepping:
 
     def problem(self, k: int) -> Problem:
         """Return the balance at the phase 2 pi k / N, without effects that depend on the past or the place."""
-        stored = self.assembly.n_law_points * self.phases * self.alpha.shape[-1] <= MOST_STORED
+        stored = (
+            self.assembly.n_law_points * self.phases * self.alpha.shape[-1]
+            <= MOST_STORED
+        )
         return self._stored_problems[k] if stored else self._problem(k)
 
     def guess(self, s: State) -> np.ndarray:
@@ -308,7 +378,15 @@ class Stepping:
         problem, zero = self.problem(0), np.zeros((3, self.alpha.shape[-1]))
         v = (np.zeros_like(problem.sides.elements.c),) * 3
         states = tuple(e.begin(problem, Site(0, 0.0, zero, v)) for e in self.effects)
-        return State(np.zeros((1, 1), int), zero, zero, zero, v, states, limit_cycle.begin(zero.shape[-1]))
+        return State(
+            np.zeros((1, 1), int),
+            zero,
+            zero,
+            zero,
+            v,
+            states,
+            limit_cycle.begin(zero.shape[-1]),
+        )
 
     def step(self, s: State, with_work: bool = False) -> tuple[State, Row]:
         """Return the state after the next step, and its row."""
@@ -316,36 +394,59 @@ class Stepping:
         k = site.count % self.phases
         undisturbed = problem = self.problem(k)
         for effect, state in zip(self.effects, s.effect_states):
-            if not first or not effect.breaks & PAST:  # memory and mass have no effect at the first step
+            if (
+                not first or not effect.breaks & PAST
+            ):  # memory and mass have no effect at the first step
                 problem = effect.apply(problem, site, state)
         solved = self._solved(problem, self.scales[k], None if first else self.guess(s))
         xi = solved.xi
         pose = s.pose if first else _integrated(s.pose, (s.xi + xi) / 2, self.dt)
         v = _velocities(problem, xi)
-        states = tuple(e.after(problem, site, state, v) for e, state in zip(self.effects, s.effect_states))
+        states = tuple(
+            e.after(problem, site, state, v)
+            for e, state in zip(self.effects, s.effect_states)
+        )
         rounding = self.accuracy.rounding * self.scales[k]
-        work = element_work(problem, self.body_halves, xi, rounding) if with_work else None
+        work = (
+            element_work(problem, self.body_halves, xi, rounding) if with_work else None
+        )
         after = State(s.count + 1, pose, xi, s.xi, v, states, s.cycles)
         if k == 0:
-            after = after._replace(cycles=s.cycles._replace(pose=pose, start=s.xi + np.where(first, np.nan, 0.0)))
+            after = after._replace(
+                cycles=s.cycles._replace(
+                    pose=pose, start=s.xi + np.where(first, np.nan, 0.0)
+                )
+            )
         if k == self.phases - 1:
             after = self._after_cycle(after, undisturbed, site)
         return after, Row(xi, pose, solved.residual, np.array([solved.limit]), work)
 
-    def _solved(self, problem: Problem, scale: np.ndarray, guess: np.ndarray | None) -> Solved:
+    def _solved(
+        self, problem: Problem, scale: np.ndarray, guess: np.ndarray | None
+    ) -> Solved:
         def problem_at(index):
             return problem if index.size == scale.size else problem.take(index)
 
-        return solve(problem_at, scale, self.accuracy, self.assembly, self.backend, 1, guess)
+        return solve(
+            problem_at, scale, self.accuracy, self.assembly, self.backend, 1, guess
+        )
 
     def _after_cycle(self, s: State, problem: Problem, site: Site) -> State:
         """Return the state at the end of a cycle with a new record of cycles, extrapolated if cycles are to repeat."""
         displacement = _relative_pose(s.cycles.pose, self.site(s).pose)
         if not self.heavy:
-            return s._replace(cycles=limit_cycle.after_massless_cycle(s.cycles, displacement))
-        cycles = limit_cycle.after_heavy_cycle(s.cycles, displacement, s.xi, self.drift_tolerance)
+            return s._replace(
+                cycles=limit_cycle.after_massless_cycle(s.cycles, displacement)
+            )
+        cycles = limit_cycle.after_heavy_cycle(
+            s.cycles, displacement, s.xi, self.drift_tolerance
+        )
         s = s._replace(cycles=cycles)
-        return self.with_velocity_change(s, problem, site) if self.to_limit and not self.is_periodic(s) else s
+        return (
+            self.with_velocity_change(s, problem, site)
+            if self.to_limit and not self.is_periodic(s)
+            else s
+        )
 
     def is_periodic(self, s: State) -> bool:
         """Return whether the cycles of all samples repeat."""
@@ -354,19 +455,29 @@ class Stepping:
     def with_velocity_change(self, s: State, problem: Problem, site: Site) -> State:
         """Return the state as if the body had moved faster in the last steps, by the extrapolation to the limit cycle."""
         change = s.cycles.extrapolation
-        v = tuple(a + b for a, b in zip(s.v, to_element(problem.sides.elements, *change)))
-        drag = (self._drag(problem, s.xi + change) - self._drag(problem, s.xi)) / problem.axial_drag
+        v = tuple(
+            a + b for a, b in zip(s.v, to_element(problem.sides.elements, *change))
+        )
+        drag = (
+            self._drag(problem, s.xi + change) - self._drag(problem, s.xi)
+        ) / problem.axial_drag
         states = tuple(
             e.with_velocity_change(problem, site, state, change, drag)
             for e, state in zip(self.effects, s.effect_states)
         )
-        return s._replace(xi=s.xi + change, xi_before=s.xi_before + change, v=v, effect_states=states)
+        return s._replace(
+            xi=s.xi + change, xi_before=s.xi_before + change, v=v, effect_states=states
+        )
 
     def _drag(self, problem: Problem, xi: np.ndarray) -> np.ndarray:
         """Return force and moment of undisturbed ground on the frame at a velocity, (3, B)."""
         scaled = xi / problem.frame.speed_scale
         v = with_frame_velocity(problem, velocities(problem), *scaled)
-        return np.stack(frame_net(problem, v, np.full(xi.shape[1], self.accuracy.rounding), *scaled).force)
+        return np.stack(
+            frame_net(
+                problem, v, np.full(xi.shape[1], self.accuracy.rounding), *scaled
+            ).force
+        )
 
 
 def _velocities(problem: Problem, xi: np.ndarray) -> tuple:

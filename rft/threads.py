@@ -77,12 +77,16 @@ def run_shares(function: Callable, shares: list) -> None:
                 raise error
     except BaseException:
         stop.set()
-        while len(ended) < started:  # not by results: a signal may arrive between a `get` and its assignment
+        while (
+            len(ended) < started
+        ):  # not by results: a signal may arrive between a `get` and its assignment
             time.sleep(POLL_INTERVAL)
         raise
 
 
-def _run(function: Callable, share, stop: threading.Event, results: SimpleQueue, ended: list) -> None:
+def _run(
+    function: Callable, share, stop: threading.Event, results: SimpleQueue, ended: list
+) -> None:
     try:
         function(share, stop)
         results.put(None)

@@ -10,7 +10,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-FORMULAS: list[Callable] = []  # formulas not yet registered with the compiler (`rft.simd.register_formulas`)
+FORMULAS: list[
+    Callable
+] = []  # formulas not yet registered with the compiler (`rft.simd.register_formulas`)
 
 
 def formula(function: Callable) -> Callable:

@@ -57,7 +57,11 @@ class Work(NamedTuple):
 
     def __repr__(self) -> str:
         names = zip(("power", "bending moment", "slip"), self)
-        sizes = [f"{name} {np.min(x):.3g} to {np.max(x):.3g}" for name, x in names if np.size(x)]
+        sizes = [
+            f"{name} {np.min(x):.3g} to {np.max(x):.3g}"
+            for name, x in names
+            if np.size(x)
+        ]
         return f"Work({np.shape(self.power)} samples of {np.shape(self.bending_moment)[-1]} joints; {', '.join(sizes)})"
 
 
@@ -87,20 +91,31 @@ def work_done(
     checked_body(body)
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, 1.0)
     batch, xi = alpha.shape[:-1], real_array("xi", xi)
-    require(xi.shape == (*batch, 3), f"xi must have shape {(*batch, 3)} for these alpha and alphadot", value=xi.shape)
+    require(
+        xi.shape == (*batch, 3),
+        f"xi must have shape {(*batch, 3)} for these alpha and alphadot",
+        value=xi.shape,
+    )
     broken_premises(effects)  # raises ValueError unless all are effects
     assembly = assemble(medium, body, effects, loads, pieces)
-    assembly = assembly._replace(effects=tuple(e for e in assembly.effects if not e.breaks & SHAPE_ALONE))
+    assembly = assembly._replace(
+        effects=tuple(e for e in assembly.effects if not e.breaks & SHAPE_ALONE)
+    )
     alpha, alphadot = (x.reshape(-1, body.joints).T for x in (alpha, alphadot))
     xi = xi.reshape(-1, 3).T / np.array([[body.length], [body.length], [1.0]])
     speed = joint_speed(body, alphadot)
     scale = np.where(speed > 0, speed, 1.0)  # of a body at rest any scale will do
     problem = assembly.problem(alpha, alphadot, scale)
     work = element_work(problem, half_lengths(body), xi, regularisation * scale)
-    return Work(work.power.reshape(batch) * body.length, *(x.reshape((*batch, *x.shape[1:])) for x in work[1:]))
+    return Work(
+        work.power.reshape(batch) * body.length,
+        *(x.reshape((*batch, *x.shape[1:])) for x in work[1:]),
+    )
 
 
-def element_work(problem: Problem, body_halves: np.ndarray, xi: np.ndarray, rounding: np.ndarray) -> Work:
+def element_work(
+    problem: Problem, body_halves: np.ndarray, xi: np.ndarray, rounding: np.ndarray
+) -> Work:
     """Return the work of B samples at body velocities xi (3, B), in body lengths.
 
     body_halves: (n,), half lengths of the body's elements before these were cut into pieces; bending moments are those
@@ -108,10 +123,19 @@ def element_work(problem: Problem, body_halves: np.ndarray, xi: np.ndarray, roun
     scale = problem.frame.speed_scale
     v = with_frame_velocity(problem, velocities(problem), *(xi / scale))
     wrenches, stations, forces, powers = [], [], [], []
-    for (e, load), u, contact in zip(loads_on(problem, v, rounding / scale[0]), v, (problem.sides, problem.points)):
+    for (e, load), u, contact in zip(
+        loads_on(problem, v, rounding / scale[0]), v, (problem.sides, problem.points)
+    ):
         force = [e.weight * x for x in (load.t, load.n, load.w)]
-        weight = [e.weight * contact.incline.weight * x for x in (contact.incline.down_t, contact.incline.down_n)]
-        drag = force[0] + weight[0], force[1] + weight[1], force[2]  # work against gravity is none against the medium
+        weight = [
+            e.weight * contact.incline.weight * x
+            for x in (contact.incline.down_t, contact.incline.down_n)
+        ]
+        drag = (
+            force[0] + weight[0],
+            force[1] + weight[1],
+            force[2],
+        )  # work against gravity is none against the medium
         powers.append(sum(f * scale * x for f, x in zip(drag, u)))
         forces.append(np.stack(np.broadcast_arrays(-drag[0], -drag[1])))
         wrenches.append(np.stack(np.broadcast_arrays(*to_frame(e, *force))))
@@ -119,11 +143,25 @@ def element_work(problem: Problem, body_halves: np.ndarray, xi: np.ndarray, roun
     e, (v_t, v_n, _) = problem.sides.elements, v[0]
     slip = np.average(np.arctan2(np.abs(v_n), np.abs(v_t)), 0, e.half[:, 0])
     if problem.momentum_rate is not None:
-        wrenches[0] = wrenches[0] + element_momentum_rates(e, problem.momentum_rate, times(scale, v[0]))
-    moment = _moments(e, np.concatenate(wrenches, 1), np.concatenate(stations), body_halves)
-    end_force, end_power = (np.moveaxis(_by_end(problem, x), -1, 0) for x in (forces, powers))
+        wrenches[0] = wrenches[0] + element_momentum_rates(
+            e, problem.momentum_rate, times(scale, v[0])
+        )
+    moment = _moments(
+        e, np.concatenate(wrenches, 1), np.concatenate(stations), body_halves
+    )
+    end_force, end_power = (
+        np.moveaxis(_by_end(problem, x), -1, 0) for x in (forces, powers)
+    )
     element_force, element_power = (np.moveaxis(x[0], -1, 0) for x in (forces, powers))
-    return Work(sum(x.sum(0) for x in powers), moment, slip, element_force, element_power, end_force, end_power)
+    return Work(
+        sum(x.sum(0) for x in powers),
+        moment,
+        slip,
+        element_force,
+        element_power,
+        end_force,
+        end_power,
+    )
 
 
 def _by_end(problem: Problem, values: Sequence[np.ndarray]) -> np.ndarray:
@@ -131,10 +169,14 @@ def _by_end(problem: Problem, values: Sequence[np.ndarray]) -> np.ndarray:
     sides and of the points, if there are any."""
     of_points = values[1] if len(values) > 1 else values[0][..., :0, :]
     at_head = problem.points.station[:, 0] > 0.5
-    return np.stack([of_points[..., at_end, :].sum(-2) for at_end in (~at_head, at_head)], -2)
+    return np.stack(
+        [of_points[..., at_end, :].sum(-2) for at_end in (~at_head, at_head)], -2
+    )
 
 
-def _moments(sides: Elements, wrenches: np.ndarray, stations: np.ndarray, body_halves: np.ndarray) -> np.ndarray:
+def _moments(
+    sides: Elements, wrenches: np.ndarray, stations: np.ndarray, body_halves: np.ndarray
+) -> np.ndarray:
     """Return the bending moments (B, n - 1) from the wrenches (3, k, B) on the frame that oppose the motion of elements.
 
     The bending moment at a point between two elements balances the moment about that point of the wrenches on all
@@ -142,7 +184,9 @@ def _moments(sides: Elements, wrenches: np.ndarray, stations: np.ndarray, body_h
     """
     ends = np.cumsum(2 * sides.half[:, 0])
     # The piece before each point between elements of the body.
-    last = np.searchsorted(ends, np.cumsum(2 * body_halves)[:-1] - 1e-9 * body_halves[0])
+    last = np.searchsorted(
+        ends, np.cumsum(2 * body_halves)[:-1] - 1e-9 * body_halves[0]
+    )
     order = np.argsort(stations, kind="stable")
     cumulative = np.cumsum(wrenches[:, order], 1)
     f_x, f_y, moment = cumulative[:, np.searchsorted(stations[order], ends[last]) - 1]

@@ -17,7 +17,9 @@ from geomech.scenes import kinds
 from rft.balance.backend import preferring
 from rft.registry import REGISTRIES
 
-PARSER = functools.cache(typer.main.get_command)  # it takes 20 ms, and is the same each time
+PARSER = functools.cache(
+    typer.main.get_command
+)  # it takes 20 ms, and is the same each time
 
 
 def unless_numpy(name, prefer=backend.prefer):
@@ -29,9 +31,13 @@ def unless_numpy(name, prefer=backend.prefer):
 def geomech(*args, cwd="."):
     """(exit code, standard output, standard error) of a command, run by `cli.main` in this process."""
     streams = [io.TextIOWrapper(io.BytesIO(), encoding="utf-8") for _ in range(2)]
-    handlers = {s: signal.getsignal(s) for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    handlers = {
+        s: signal.getsignal(s) for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    }
     for number in (s for s, handler in handlers.items() if handler is signal.SIG_IGN):
-        signal.signal(number, signal.SIG_DFL)  # tests may run in the background, where a command heeds what is ignored
+        signal.signal(
+            number, signal.SIG_DFL
+        )  # tests may run in the background, where a command heeds what is ignored
     try:
         with (
             mock.patch.object(sys, "argv", ["geomech", *map(str, args)]),
@@ -55,7 +61,10 @@ def geomech(*args, cwd="."):
 @contextlib.contextmanager
 def own_parts():
     """Parts of one's own, and the modules they came in, are forgotten at the end."""
-    before, modules = {group: dict(registry) for group, registry in REGISTRIES.items()}, set(sys.modules)
+    before, modules = (
+        {group: dict(registry) for group, registry in REGISTRIES.items()},
+        set(sys.modules),
+    )
     with mock.patch.multiple(kinds, _texts={}, _files={}):
         yield
     for group, registry in REGISTRIES.items():
@@ -67,5 +76,10 @@ def own_parts():
 
 def as_process(*args, cwd=None):
     """As `geomech`, by a Python of its own."""
-    done = subprocess.run([sys.executable, "-m", "geomech", *map(str, args)], capture_output=True, text=True, cwd=cwd)
+    done = subprocess.run(
+        [sys.executable, "-m", "geomech", *map(str, args)],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+    )
     return done.returncode, done.stdout, done.stderr

@@ -10,7 +10,9 @@ import sys
 import pytest
 
 for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(threads, "1")  # before NumPy loads: the processes share the cores already
+    os.environ.setdefault(
+        threads, "1"
+    )  # before NumPy loads: the processes share the cores already
 
 from rft.balance import backend  # noqa: E402
 
@@ -18,7 +20,11 @@ gc.disable()  # until all is read
 backend._preferred.set("numpy")  # "auto" is NumPy, but for `solved_by`
 TRUTHS, COMPILED = pytest.StashKey(), pytest.StashKey()
 BY_HAND = {"soak", "benchmark"}
-LAID_OUT = {"test_pictures", "test_figures", "test_shown"}  # files that look at pictures as they are
+LAID_OUT = {
+    "test_pictures",
+    "test_figures",
+    "test_shown",
+}  # files that look at pictures as they are
 
 
 @pytest.fixture
@@ -31,7 +37,11 @@ def own_parts():
 
 
 def pytest_addoption(parser):
-    parser.addoption("--renew-truths", action="store_true", help="compute what tests/data keeps, and write it anew")
+    parser.addoption(
+        "--renew-truths",
+        action="store_true",
+        help="compute what tests/data keeps, and write it anew",
+    )
 
 
 def pytest_configure(config):
@@ -44,10 +54,15 @@ def pytest_sessionstart(session):
     """Compile the balance once, while tests are read, before the processes of the whole suite would do so side by side."""
     full = session.config.args_source is session.config.ArgsSource.TESTPATHS
     if full and not hasattr(session.config, "workerinput"):
-        for folder in ("geomech", "rft"):  # for the processes that tests start, also where Python writes no bytecode
+        for folder in (
+            "geomech",
+            "rft",
+        ):  # for the processes that tests start, also where Python writes no bytecode
             compileall.compile_dir(pathlib.Path(__file__).parents[1] / folder, quiet=2)
         if backend.installed():
-            session.config.stash[COMPILED] = subprocess.Popen([sys.executable, "-m", "rft"], stdout=subprocess.DEVNULL)
+            session.config.stash[COMPILED] = subprocess.Popen(
+                [sys.executable, "-m", "rft"], stdout=subprocess.DEVNULL
+            )
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -87,18 +102,24 @@ def pytest_sessionfinish(session):
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node):
-    node.config.stash[TRUTHS].missing += getattr(node, "workeroutput", {}).get("missing", [])
+    node.config.stash[TRUTHS].missing += getattr(node, "workeroutput", {}).get(
+        "missing", []
+    )
 
 
 def pytest_terminal_summary(terminalreporter, config):
     if missing := config.stash[TRUTHS].missing:
         files = ", ".join(sorted({f"{name}.json" for name in missing}))
-        terminalreporter.write_line(f"{len(missing)} truths were computed, {files} lacks them: pytest --renew-truths")
+        terminalreporter.write_line(
+            f"{len(missing)} truths were computed, {files} lacks them: pytest --renew-truths"
+        )
 
 
 def pytest_collection_modifyitems(items):
     for item in items:
-        if BY_HAND & {mark.name for mark in item.iter_markers()} and not item.get_closest_marker("timeout"):
+        if BY_HAND & {
+            mark.name for mark in item.iter_markers()
+        } and not item.get_closest_marker("timeout"):
             item.add_marker(pytest.mark.timeout(4 * 3600))
 
 
@@ -107,7 +128,11 @@ def pytest_xdist_auto_num_workers(config):
     """None (a process for each core) for the whole suite; 0 for tests picked by hand, for what prints and what
     writes."""
     picked = config.args_source is not config.ArgsSource.TESTPATHS
-    return 0 if picked or config.option.capture == "no" or config.getoption("--renew-truths") else None
+    return (
+        0
+        if picked or config.option.capture == "no" or config.getoption("--renew-truths")
+        else None
+    )
 
 
 @pytest.fixture(scope="session")
@@ -130,7 +155,9 @@ def blank_pictures(request, monkeypatch):
     if agg and request.module.__name__ not in LAID_OUT:
         figure = sys.modules["matplotlib.figure"].Figure
         drawn = figure.draw
-        blank = lambda fig, renderer: None if isinstance(renderer, agg.RendererAgg) else drawn(fig, renderer)
+        blank = lambda fig, renderer: (
+            None if isinstance(renderer, agg.RendererAgg) else drawn(fig, renderer)
+        )
         monkeypatch.setattr(figure, "draw", blank)
 
 

@@ -32,10 +32,26 @@ from collections.abc import Iterator
 
 import commands
 import numpy as np
-from words import TOLERANCE, WORD, flat, line_holds, masked, names, number_of, numbers, of_file, text_holds
+from words import (
+    TOLERANCE,
+    WORD,
+    flat,
+    line_holds,
+    masked,
+    names,
+    number_of,
+    numbers,
+    of_file,
+    text_holds,
+)
 
 DATA = pathlib.Path(__file__).parent / "data"
-FOLDER, COMMANDS, REFUSALS, KEYS = DATA / "frozen", DATA / "commands.txt", DATA / "refusals.txt", DATA / "keys.txt"
+FOLDER, COMMANDS, REFUSALS, KEYS = (
+    DATA / "frozen",
+    DATA / "commands.txt",
+    DATA / "refusals.txt",
+    DATA / "keys.txt",
+)
 
 # The files in data/frozen that a command wrote, and which; `python tests/frozen.py --files` writes them anew.
 FILES = {
@@ -57,7 +73,15 @@ DOORS = [
     "rft.bodies",
     "rft.effects",
 ]
-DOORS += ["rft.grains", "rft.ground", "rft.laws", "rft.meshes", "rft.mujoco", "rft.plates", "rft.walking"]
+DOORS += [
+    "rft.grains",
+    "rft.ground",
+    "rft.laws",
+    "rft.meshes",
+    "rft.mujoco",
+    "rft.plates",
+    "rft.walking",
+]
 
 
 # What a command does.
@@ -85,7 +109,11 @@ def place() -> Iterator[pathlib.Path]:
 
 def files() -> dict[pathlib.Path, int]:
     """When each file below the folder where we are was written."""
-    paths = (os.path.join(folder, name) for folder, _, names in os.walk(".") for name in names)
+    paths = (
+        os.path.join(folder, name)
+        for folder, _, names in os.walk(".")
+        for name in names
+    )
     return {pathlib.Path(p): os.stat(p).st_mtime_ns for p in paths if os.path.isfile(p)}
 
 
@@ -100,14 +128,23 @@ def ran(line: str) -> list[str]:
     code, out, err = geomech(*shlex.split(line))
     told = []
     if line.endswith("--help"):
-        told += [f"= {x}" for x in re.findall(r"^  (-\S.*?|[\[{A-Z]\S*|[a-z][a-z-]*)(?: <|  |$)", out, re.M)]
+        told += [
+            f"= {x}"
+            for x in re.findall(
+                r"^  (-\S.*?|[\[{A-Z]\S*|[a-z][a-z-]*)(?: <|  |$)", out, re.M
+            )
+        ]
     else:
         try:
             told += [f"= {x}" for x in flat(json.loads(out))]
         except ValueError:
             told += [f"| {x}" for x in masked(out).splitlines() if x.strip()]
-    told += [f"! {x}" for x in masked(err).splitlines() if x.startswith(("error:", "note:"))]
-    for file in sorted(file for file, time in files().items() if before.get(file) != time):
+    told += [
+        f"! {x}" for x in masked(err).splitlines() if x.startswith(("error:", "note:"))
+    ]
+    for file in sorted(
+        file for file, time in files().items() if before.get(file) != time
+    ):
         told += [f"> {file}", *of_file(file)]
     return [*told, f"exit {code}"]
 
@@ -135,14 +172,19 @@ def read_commands() -> dict[str, list[str]]:
 def parts(lines: list[str]) -> list[str]:
     """Lines as they count: what is printed as one text, all others by themselves."""
     printed = "\n".join(line for line in lines if line.startswith("| "))
-    return [*([printed] if printed else []), *(line for line in lines if not line.startswith("| "))]
+    return [
+        *([printed] if printed else []),
+        *(line for line in lines if not line.startswith("| ")),
+    ]
 
 
 def differs(old: list[str], new: list[str]) -> str:
     """What of a command's outcome is not as it was; "" where that is at most wording."""
     was, now = parts(old), parts(new)
     for a, b in itertools.zip_longest(was, now, fillvalue="nothing"):
-        if a[:1] != b[:1] or not (text_holds(a, b) if a[0] in "|!~" else line_holds(a, b)):
+        if a[:1] != b[:1] or not (
+            text_holds(a, b) if a[0] in "|!~" else line_holds(a, b)
+        ):
             return f"was {a}\nnow {b}"
     return ""
 
@@ -183,14 +225,20 @@ def namespace() -> dict:
     found: dict = {"np": np, "math": math, "rft": rft, "geomech": top}
     for module in (rft, top.systems, top.gaits, top.bodies, top.media, top.effects):
         found |= {name: x for name, x in vars(module).items() if isinstance(x, type)}
-    return found | {name: getattr(top, name) for name in dir(top) if not name.startswith("_")}
+    return found | {
+        name: getattr(top, name) for name in dir(top) if not name.startswith("_")
+    }
 
 
 def raw(text: str) -> bytes:
     """A side of an edit as bytes: \\n, \\r, \\t, \\0, \\\\ and \\xNN are escapes."""
     pieces = re.split(r"\\(x[0-9a-f]{2}|.)", text)
     return b"".join(
-        piece.encode() if not k % 2 else bytes.fromhex(piece[1:]) if len(piece) == 3 else ESCAPES[piece]
+        piece.encode()
+        if not k % 2
+        else bytes.fromhex(piece[1:])
+        if len(piece) == 3
+        else ESCAPES[piece]
         for k, piece in enumerate(pieces)
     )
 
@@ -202,7 +250,13 @@ def edited(content: bytes, edits: str) -> bytes:
         old, _, new = edit.partition("=>")
         old, new = raw(old.strip(" ")), raw(new.strip(" "))
         assert old == b"*" or old in content, f"{old!r} is not there to be changed"
-        content = new if old == b"*" else content.replace(old, new, 1) if old else content + new
+        content = (
+            new
+            if old == b"*"
+            else content.replace(old, new, 1)
+            if old
+            else content + new
+        )
     return content
 
 
@@ -220,7 +274,9 @@ def refused(section: str, case: str) -> tuple[str, str]:
     if section == "geomech":
         return ended(case)
     command, _, name = section.partition(" | ")
-    file = pathlib.Path(name or next(word for word in command.split() if (FOLDER / word).is_file()))
+    file = pathlib.Path(
+        name or next(word for word in command.split() if (FOLDER / word).is_file())
+    )
     before = file.read_bytes()
     try:
         file.write_bytes(edited(before, case))
@@ -240,22 +296,37 @@ def ended(line: str) -> tuple[str, str]:
         "says too much": len(err) > 600,
         "writes": files() != before,
     }
-    return " and ".join([code, *(what for what, found in amiss.items() if found)]), message
+    return " and ".join(
+        [code, *(what for what, found in amiss.items() if found)]
+    ), message
 
 
 def named(message: str, given: str) -> list[str]:
     """What a refusal calls by name, in its order: what `names` finds, [sections], numbers, words and keys that were given."""
     given = given.replace("\\n", " ")
-    words = {*re.findall(r"[A-Za-z][\w-]+", given), *re.findall(r"(\w+) =", given)} - ORDINARY
+    words = {
+        *re.findall(r"[A-Za-z][\w-]+", given),
+        *re.findall(r"(\w+) =", given),
+    } - ORDINARY
     words &= set(re.findall(r"[A-Za-z](?:[\w-]*\w)?", message))
-    found = {word.strip("./") for word in names(message) | words} | set(re.findall(r"\[+[a-z.]+\]+", message))
+    found = {word.strip("./") for word in names(message) | words} | set(
+        re.findall(r"\[+[a-z.]+\]+", message)
+    )
     found = {
         word
         for word in found
-        if 0 < len(word) <= 60 and not re.search("#|_plugin_", word) and (word[1:] or word in words)
+        if 0 < len(word) <= 60
+        and not re.search("#|_plugin_", word)
+        and (word[1:] or word in words)
     } - TYPES
-    figures = {word.rstrip(".%") for word in WORD.findall(message) if number_of(word) is not None}
-    found = {word for word in found if not any(word in other for other in found - {word})} | figures
+    figures = {
+        word.rstrip(".%")
+        for word in WORD.findall(message)
+        if number_of(word) is not None
+    }
+    found = {
+        word for word in found if not any(word in other for other in found - {word})
+    } | figures
     return sorted(found, key=lambda word: (message.find(word), word))[:14]
 
 
@@ -310,7 +381,9 @@ def keys() -> Iterator[str]:
 
     table = ""
     for line in geomech("reference")[1].splitlines():
-        if line.startswith("  ") and (found := re.match(r"  (\w+)  +(\S.*?)  +(\S.*?)  +(\S.*?)(?:  |$)", line)):
+        if line.startswith("  ") and (
+            found := re.match(r"  (\w+)  +(\S.*?)  +(\S.*?)  +(\S.*?)(?:  |$)", line)
+        ):
             yield f"key {table}: {' | '.join(found.groups())}"
         elif line.startswith("["):
             table = line
@@ -320,19 +393,33 @@ def keys() -> Iterator[str]:
         f"schema {line}".replace("/$defs/", "/")
         for line in of_schema(json.loads(geomech("reference", "--json-schema")[1]))
     )
-    yield from (f"geomech.{name}" for name in sorted(dir(top)) if not name.startswith("_"))
-    yield from sorted({line for module in DOORS for line in defaults(importlib.import_module(module))})
+    yield from (
+        f"geomech.{name}" for name in sorted(dir(top)) if not name.startswith("_")
+    )
+    yield from sorted(
+        {line for module in DOORS for line in defaults(importlib.import_module(module))}
+    )
 
 
 def defaults(module) -> Iterator[str]:
     """The arguments with defaults of the functions, classes and methods that a module offers."""
-    for name, x in ((name, getattr(module, name)) for name in dir(module) if not name.startswith("_")):
-        if callable(x) and re.match("(geomech|rft)[.]", getattr(x, "__module__", None) or ""):
+    for name, x in (
+        (name, getattr(module, name))
+        for name in dir(module)
+        if not name.startswith("_")
+    ):
+        if callable(x) and re.match(
+            "(geomech|rft)[.]", getattr(x, "__module__", None) or ""
+        ):
             methods = vars(x) if isinstance(x, type) else {}
-            parts = {"": x} | {f".{k}": getattr(x, k) for k in methods if not k.startswith("_")}
+            parts = {"": x} | {
+                f".{k}": getattr(x, k) for k in methods if not k.startswith("_")
+            }
             for part, f in parts.items():
                 some = inspect.signature(f).parameters.values() if callable(f) else ()
-                if found := [f"{p.name}={p.default!r}" for p in some if p.default is not p.empty]:
+                if found := [
+                    f"{p.name}={p.default!r}" for p in some if p.default is not p.empty
+                ]:
                     line = f"default {x.__module__.partition('.')[0]}: {name}{part}({', '.join(found)})"
                     yield re.sub(" at 0x[0-9a-f]+", "", line)
 
@@ -361,13 +448,21 @@ def compact(node) -> str:
 
 
 def kind_of(node: dict) -> str:
-    consts = [x["const"] for x in node.get("properties", {}).values() if isinstance(x, dict) and "const" in x]
+    consts = [
+        x["const"]
+        for x in node.get("properties", {}).values()
+        if isinstance(x, dict) and "const" in x
+    ]
     return " ".join(consts)
 
 
 def undescribed(node):
     if isinstance(node, dict):
-        return {k: undescribed(x) for k, x in node.items() if k != "description" or not isinstance(x, str)}
+        return {
+            k: undescribed(x)
+            for k, x in node.items()
+            if k != "description" or not isinstance(x, str)
+        }
     return [undescribed(x) for x in node] if isinstance(node, list) else node
 
 
@@ -376,7 +471,10 @@ def undescribed(node):
 
 def words_of(lines: list[str]) -> list[str]:
     """Lines without their numbers, to see whether wording changed."""
-    return [WORD.sub(lambda word: "#" if number_of(word[0]) is not None else word[0], line) for line in lines]
+    return [
+        WORD.sub(lambda word: "#" if number_of(word[0]) is not None else word[0], line)
+        for line in lines
+    ]
 
 
 def write(say=print) -> None:
@@ -387,9 +485,15 @@ def write(say=print) -> None:
         old = recorded[command]
         if found := differs(old, new):
             say(f"geomech {command}: {found if old else 'new'}")
-        lines += [f"$ geomech {command}", *(new if found or words_of(old) != words_of(new) else old)]
+        lines += [
+            f"$ geomech {command}",
+            *(new if found or words_of(old) != words_of(new) else old),
+        ]
     COMMANDS.write_text("\n".join(lines) + "\n")
-    lines, last = [line for line in REFUSALS.read_text().splitlines() if line.startswith("#")], ""
+    lines, last = (
+        [line for line in REFUSALS.read_text().splitlines() if line.startswith("#")],
+        "",
+    )
     with place():
         for (section, case), old in read_refusals().items():
             if not old or (found := still(old, section, case)):

@@ -23,7 +23,16 @@ import tempfile
 import frozen
 import numpy as np
 import pytest
-from registry import BODIES, EFFECTS, GROUND_EFFECTS, MEDIA, OUTLINES, SOLIDS, STRESSES, WALKERS
+from registry import (
+    BODIES,
+    EFFECTS,
+    GROUND_EFFECTS,
+    MEDIA,
+    OUTLINES,
+    SOLIDS,
+    STRESSES,
+    WALKERS,
+)
 from scipy.io import netcdf_file
 from scipy.spatial.transform import Rotation
 
@@ -37,10 +46,21 @@ from rft.plates import loads
 from rft.walking import Fineness, engine
 
 FILE = pathlib.Path(__file__).parent / "data" / "golden.json"
-TOLERANCE, OF_ESTIMATES = 1e-12, 1e-8  # relative, of the largest number of an entry; the second for walks too
+TOLERANCE, OF_ESTIMATES = (
+    1e-12,
+    1e-8,
+)  # relative, of the largest number of an entry; the second for walks too
 OF_RESIDUALS = 1e-6  # of rod.csv: 2e-5 N of forces of 3.7 N, whose roundoff differs between processors by 4e-12 N
 SOLVED = {"regularisation": 1e-3, "tolerance": 1e-15}
-COARSE = {"regularisation": 1e-3, "tolerance": 1e-13, "grid": 7, "phases": 32, "curves": 6, "harmonics": 5, "cycles": 2}
+COARSE = {
+    "regularisation": 1e-3,
+    "tolerance": 1e-13,
+    "grid": 7,
+    "phases": 32,
+    "curves": 6,
+    "harmonics": 5,
+    "cycles": 2,
+}
 GEOMETRY = ("grid", "phases", "curves", "harmonics")
 SCENE = """[medium]\nlaw = "granular"\nC = 1.8\ngamma0_deg = 13.8
 [body]\nkind = "chain"\nlengths = [1, 1.4, 0.8]\nlength = 0.3\nframe = "link-1"
@@ -53,8 +73,18 @@ def shapes(joints: int) -> tuple[np.ndarray, np.ndarray]:
     """alpha, alphadot (4, joints): a generic pose, a straight body with one joint moving, a curled one whose joints move
     alike (links stick), and a zigzag with joints of very different speed."""
     k = np.arange(joints)
-    alpha = 0.8 * np.cos(1.7 * k + 0.4), 0.0 * k, np.full(joints, 1.5), 2.0 * (-1.0) ** k
-    alphadot = np.sin(2.3 * k + 0.9), k == 0, np.full(joints, 0.3), 10.0 ** (-2.0 * (k % 3))
+    alpha = (
+        0.8 * np.cos(1.7 * k + 0.4),
+        0.0 * k,
+        np.full(joints, 1.5),
+        2.0 * (-1.0) ** k,
+    )
+    alphadot = (
+        np.sin(2.3 * k + 0.9),
+        k == 0,
+        np.full(joints, 0.3),
+        10.0 ** (-2.0 * (k % 3)),
+    )
     return np.stack(alpha), np.stack(alphadot).astype(float)
 
 
@@ -63,14 +93,28 @@ def velocities():
         alpha, alphadot = shapes(body.joints)
         xi = rft.body_velocity(law, body, alpha, alphadot, **SOLVED).checked().xi
         yield f"velocity, {medium}, {name}", xi
-        done = rft.work_done(law, body, alpha[:1], alphadot[:1], xi[:1], regularisation=SOLVED["regularisation"])
-        yield f"work, {medium}, {name}", [*done.power, *done.slip, *done.bending_moment[0]]
+        done = rft.work_done(
+            law,
+            body,
+            alpha[:1],
+            alphadot[:1],
+            xi[:1],
+            regularisation=SOLVED["regularisation"],
+        )
+        yield (
+            f"work, {medium}, {name}",
+            [*done.power, *done.slip, *done.bending_moment[0]],
+        )
 
 
 def tiers():
     for name in shipped("gait"):
         scene = geomech.load(name)
-        own = COARSE if solver_of(scene.system) else {k: v for k, v in COARSE.items() if k in GEOMETRY}
+        own = (
+            COARSE
+            if solver_of(scene.system)
+            else {k: v for k, v in COARSE.items() if k in GEOMETRY}
+        )
         study = geomech.Study(scene.with_numerics(**own))
         amplitudes = scene.gait.amplitude * np.array([0.6, 1.0])
         for tier in study.tiers:
@@ -85,9 +129,20 @@ def march(names, cycles=2):
     )
     effects = [EFFECTS[name][0](0.05) for name in names]
     found = rft.time_steps(
-        MEDIA["glass-0.3mm-loose"], body, *gait.cycle(8), effects=effects, cycles=cycles, with_work=True, **SOLVED
+        MEDIA["glass-0.3mm-loose"],
+        body,
+        *gait.cycle(8),
+        effects=effects,
+        cycles=cycles,
+        with_work=True,
+        **SOLVED,
     )
-    return [*found.displacement, *found.xi[3], *found.work.power[[2, 6]], *found.work.bending_moment[[2, 6]].ravel()]
+    return [
+        *found.displacement,
+        *found.xi[3],
+        *found.work.power[[2, 6]],
+        *found.work.bending_moment[[2, 6]].ravel(),
+    ]
 
 
 def marches():
@@ -115,7 +170,9 @@ def shipped(kind: str) -> list[str]:
     """Names of the scenes that ship: of a "gait", an "intruder" or a "walker"."""
     sections = command("scenes").split("\n\n")  # each but the first under a heading
     lines = sections[("gait", "intruder", "walker").index(kind)].splitlines()
-    own = [line for line in lines[kind != "gait" :] if not line.startswith(" ")]  # others go on with a description
+    own = [
+        line for line in lines[kind != "gait" :] if not line.startswith(" ")
+    ]  # others go on with a description
     return [line.split()[0] for line in own]
 
 
@@ -133,13 +190,34 @@ def commands():
         for name, values in read(here / "out.nc").items():
             if values.dtype.kind == "f":
                 yield f"connection, {name}", values
-        command("sweep", scene, "--over", "gait.amplitude=0.5,1.0", "--over", "medium.C=1,3", "-o", file)
+        command(
+            "sweep",
+            scene,
+            "--over",
+            "gait.amplitude=0.5,1.0",
+            "--over",
+            "medium.C=1,3",
+            "-o",
+            file,
+        )
         found = read(here / "out.nc")
         yield "sweep", found["displacement"]
         yield "sweep, estimate", found["estimate"]
-        told = json.loads(command("velocity", scene, "--alpha", "0.4,-0.9", "--alphadot", "1,0.5", "--json"))
+        told = json.loads(
+            command(
+                "velocity",
+                scene,
+                "--alpha",
+                "0.4,-0.9",
+                "--alphadot",
+                "1,0.5",
+                "--json",
+            )
+        )
         yield "command, velocity", told["xi"]
-        told = json.loads(command("displacement", scene, "--amplitudes", "0.5,1.0", "--json"))
+        told = json.loads(
+            command("displacement", scene, "--amplitudes", "0.5,1.0", "--json")
+        )
         for tier, errors in told["estimate"].items():
             yield f"command, displacement, {tier}", told[tier]
             yield f"command, displacement, {tier}, estimate", errors
@@ -149,9 +227,14 @@ def intrusions():
     """Every stress map and outline: out of the ground, across the surface, deep and turning about itself, and at an angle."""
     pose = [(0.0, 0.1, 0.3), (0.1, -0.01, 0.7), (0.0, -0.2, -1.2), (-0.3, -0.04, 2.5)]
     twist = [(1.0, 0.0, 0.0), (0.02, -0.03, 1.1), (0.0, 0.0, -2.0), (-0.1, 0.04, 0.3)]
-    for (medium, stress), (name, shape) in itertools.product(STRESSES.items(), OUTLINES.items()):
+    for (medium, stress), (name, shape) in itertools.product(
+        STRESSES.items(), OUTLINES.items()
+    ):
         found = loads(stress, shape.outline(30), pose, twist)
-        yield f"intrusion, {medium}, {name}", np.column_stack([found.force, found.moment])
+        yield (
+            f"intrusion, {medium}, {name}",
+            np.column_stack([found.force, found.moment]),
+        )
 
 
 def solids():
@@ -159,16 +242,32 @@ def solids():
     medium, place = Spatial(3e5, 0.3), [(0.02, 0.1, -0.01), (-0.05, 0.0, -0.2)]
     turn = Rotation.from_rotvec([(0.3, -0.7, 0.2), (1.0, 2.0, -0.4)]).as_matrix()
     effects = {name: [make(0.4)] for name, (make, _) in GROUND_EFFECTS.items()}
-    for (name, body), (effect, some) in itertools.product(SOLIDS.items(), {"plain": [], **effects}.items()):
-        found = wrench(medium, body.mesh(300), turn, place, [-0.3, 0.1, -0.4], [2.0, 9.0, 1.0], some)
-        yield f"solid, {name}, {effect}", np.column_stack([found.force, found.moment, found.power])
+    for (name, body), (effect, some) in itertools.product(
+        SOLIDS.items(), {"plain": [], **effects}.items()
+    ):
+        found = wrench(
+            medium,
+            body.mesh(300),
+            turn,
+            place,
+            [-0.3, 0.1, -0.4],
+            [2.0, 9.0, 1.0],
+            some,
+        )
+        yield (
+            f"solid, {name}, {effect}",
+            np.column_stack([found.force, found.moment, found.power]),
+        )
 
 
 def walks():
     """Every robot after a cycle, and its speed in the end; steps are solved to 1e-3 of the rounding, not to the last digit."""
     walk, coarse = engine("planar").walk, Fineness(steps=8, elements=4, rounding=0.01)
     for name, one in zip(WALKERS, walk(list(WALKERS.values()), coarse, 1)):
-        yield f"walk, {name}", [*one.pose[-1], *one.twist[-1], one.work[-1], one.loss[-1], one.speed]
+        yield (
+            f"walk, {name}",
+            [*one.pose[-1], *one.twist[-1], one.work[-1], one.loss[-1], one.speed],
+        )
 
 
 def digest(values) -> list[float]:
@@ -177,11 +276,24 @@ def digest(values) -> list[float]:
     flat = np.ravel(np.array(values, float))
     if flat.size > 12:
         some = flat[np.linspace(0, flat.size - 1, 7).astype(int)]
-        flat = np.array([*some, np.sqrt((flat**2).mean()), (flat * np.cos(1.0 + np.arange(flat.size))).mean()])
+        flat = np.array(
+            [
+                *some,
+                np.sqrt((flat**2).mean()),
+                (flat * np.cos(1.0 + np.arange(flat.size))).mean(),
+            ]
+        )
     return np.where(np.abs(flat) < 1e-9, 0.0, flat).tolist()
 
 
-TOGETHER = {"x": "place", "y": "place", "z": "place", "pitch": "attitude", "roll": "attitude", "yaw": "attitude"}
+TOGETHER = {
+    "x": "place",
+    "y": "place",
+    "z": "place",
+    "pitch": "attitude",
+    "roll": "attitude",
+    "yaw": "attitude",
+}
 
 
 def of_json(name: str, told: dict):
@@ -190,8 +302,12 @@ def of_json(name: str, told: dict):
     for key, value in told.items():
         if isinstance(value, dict):
             yield from of_json(f"{name}, {key}", value)
-        elif np.array(value).dtype.kind in "if" and not re.fullmatch("seconds|residual|evaluations|kept", key):
-            found.setdefault(TOGETHER.get(key, re.sub("_[xyz]$", "", key)), []).extend(digest(value))
+        elif np.array(value).dtype.kind in "if" and not re.fullmatch(
+            "seconds|residual|evaluations|kept", key
+        ):
+            found.setdefault(TOGETHER.get(key, re.sub("_[xyz]$", "", key)), []).extend(
+                digest(value)
+            )
     yield from ((f"{name}, {key}", values) for key, values in found.items())
 
 
@@ -199,10 +315,18 @@ def intruders():
     """The intruder scenes that ship, of few pieces."""
     with tempfile.TemporaryDirectory() as folder:
         for name in shipped("intruder"):
-            numerics = "triangles = 400" if hasattr(geomech.load(name), "mesh") else "elements = 40"
+            numerics = (
+                "triangles = 400"
+                if hasattr(geomech.load(name), "mesh")
+                else "elements = 40"
+            )
             file = pathlib.Path(folder) / f"{name}.toml"
-            file.write_text(f"{command('scenes', '--show', name)}\n[numerics]\n{numerics}\n")
-            yield from of_json(f"intruder, {name}", json.loads(command("intrude", str(file), "--json")))
+            file.write_text(
+                f"{command('scenes', '--show', name)}\n[numerics]\n{numerics}\n"
+            )
+            yield from of_json(
+                f"intruder, {name}", json.loads(command("intrude", str(file), "--json"))
+            )
 
 
 def walkers():
@@ -253,15 +377,27 @@ def costs():
     """What is said to be needed before anything is computed: balances, memory, and, but for walks, of which some steps are
     timed, seconds, other seconds, and steps."""
     told: list[cost.Cost] = []
-    with pytest.MonkeyPatch.context() as patch, backend.preferring("numpy"), frozen.place():
-        patch.setattr(cost, "decide", lambda asked, judge: told.append(asked) or asked.check("", False))
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        backend.preferring("numpy"),
+        frozen.place(),
+    ):
+        patch.setattr(
+            cost,
+            "decide",
+            lambda asked, judge: told.append(asked) or asked.check("", False),
+        )
         patch.setattr(cost, "LONGEST", 0.0)  # nothing is begun
         for kind, lines in ASKED.items():
             for line in (line.format(name) for name in shipped(kind) for line in lines):
                 if not SLOW.search(line):
                     frozen.geomech(*line.split())
                     for asked in told:
-                        timed = () if kind == "walker" else (asked.seconds, asked.besides, asked.steps)
+                        timed = (
+                            ()
+                            if kind == "walker"
+                            else (asked.seconds, asked.besides, asked.steps)
+                        )
                         yield f"cost, {line}", [asked.balances, asked.memory, *timed]
                     told.clear()
 
@@ -286,7 +422,9 @@ PARTS = {
 def compute(*parts) -> dict[str, list[float]]:
     """Every entry's numbers as the code gives them now, of all parts if none is named."""
     every = itertools.chain.from_iterable(part() for part in parts or PARTS)
-    return {name: [float(f"{x:.15g}") for x in np.ravel(values)] for name, values in every}
+    return {
+        name: [float(f"{x:.15g}") for x in np.ravel(values)] for name, values in every
+    }
 
 
 def kept(*parts) -> dict[str, list[float]]:
@@ -300,17 +438,31 @@ def change(old: list[float] | None, new: list[float] | None) -> float:
     """Largest difference over the largest number; infinite where an entry is missing or has another size."""
     if old is None or new is None or len(old) != len(new):
         return np.inf
-    off, size = np.abs(np.subtract(old, new)).max(initial=0.0), np.abs([*old, *new]).max(initial=0.0)
+    off, size = (
+        np.abs(np.subtract(old, new)).max(initial=0.0),
+        np.abs([*old, *new]).max(initial=0.0),
+    )
     return off / size if size else 0.0
 
 
 def changed(old: dict, new: dict) -> dict[str, float]:
     """Entries that are not what they were, and by how much."""
-    every = {name: change(old.get(name), new.get(name)) for name in sorted({*old, *new})}
+    every = {
+        name: change(old.get(name), new.get(name)) for name in sorted({*old, *new})
+    }
     loose = lambda name: (
-        "estimate" in name or name.startswith(("walk", "measured, log", "measured, rod", "measured, plates"))
+        "estimate" in name
+        or name.startswith(
+            ("walk", "measured, log", "measured, rod", "measured, plates")
+        )
     )
-    allowed = lambda name: OF_RESIDUALS if "residuals, F_" in name else OF_ESTIMATES if loose(name) else TOLERANCE
+    allowed = lambda name: (
+        OF_RESIDUALS
+        if "residuals, F_" in name
+        else OF_ESTIMATES
+        if loose(name)
+        else TOLERANCE
+    )
     return {k: x for k, x in every.items() if not x <= allowed(k)}
 
 
@@ -320,18 +472,27 @@ def table(old: dict, new: dict) -> str:
     for name, x in changed(old, new).items():
         was, now = old.get(name), new.get(name)
         if was is None or now is None or len(was) != len(now):
-            said = [f"{len(v)} numbers" if v is not None else "none" for v in (was, now)]
+            said = [
+                f"{len(v)} numbers" if v is not None else "none" for v in (was, now)
+            ]
         else:
             most = np.abs(np.subtract(was, now)).argmax()
             said = [f"{v[most]:.15g}" for v in (was, now)]
         lines.append(f"{name:64} {said[0]:>22} {said[1]:>22} {x:9.1e}")
-    return "\n".join(lines) if len(lines) > 1 else f"all {len(new)} entries as recorded, to {TOLERANCE:g}"
+    return (
+        "\n".join(lines)
+        if len(lines) > 1
+        else f"all {len(new)} entries as recorded, to {TOLERANCE:g}"
+    )
 
 
 def write(old: dict, new: dict) -> None:
     """One entry a line, sorted; what did not change keeps its digits."""
     moved = changed(old, new)
-    lines = [f"{json.dumps(name)}: {json.dumps(new[name] if name in moved else old[name])}" for name in sorted(new)]
+    lines = [
+        f"{json.dumps(name)}: {json.dumps(new[name] if name in moved else old[name])}"
+        for name in sorted(new)
+    ]
     FILE.write_text("{\n" + ",\n".join(lines) + "\n}\n")
 
 

@@ -43,17 +43,34 @@ return times.slice(10);
 def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / "lab.html"
-        lab.write(Lab((scenes.load("three-link-glass"),), {"medium.C": [1.0, 1.5, 2.2, 3.0]}).ask(), page)
+        lab.write(
+            Lab(
+                (scenes.load("three-link-glass"),), {"medium.C": [1.0, 1.5, 2.2, 3.0]}
+            ).ask(),
+            page,
+        )
         options = webdriver.ChromeOptions()
         options.binary_location = shutil.which("chromium")
-        for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder}/profile"):
+        for argument in (
+            "--headless=new",
+            "--no-sandbox",
+            "--disable-gpu",
+            f"--user-data-dir={folder}/profile",
+        ):
             options.add_argument(argument)
-        browser = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
+        browser = webdriver.Chrome(
+            options=options, service=Service(shutil.which("chromedriver"))
+        )
         try:
             browser.get(page.as_uri())
-            for name, script in (("a frame with all tiers", FRAMES), ("a step of the family", FAMILY)):
+            for name, script in (
+                ("a frame with all tiers", FRAMES),
+                ("a step of the family", FAMILY),
+            ):
                 times = sorted(browser.execute_script(script))
-                print(f"{name}: median {statistics.median(times):.1f} ms, 95 % {times[int(0.95 * len(times))]:.1f} ms")
+                print(
+                    f"{name}: median {statistics.median(times):.1f} ms, 95 % {times[int(0.95 * len(times))]:.1f} ms"
+                )
         finally:
             browser.quit()
 

@@ -44,15 +44,42 @@ PYTEST += ["-o", "addopts=", "-o", "timeout=0", "-m", "not soak and not benchmar
 ENOUGH = 60  # s of CPU that the tests of one mutant may take
 # Loaded once, before each mutant's process splits off.
 HEAVY = "pytest numpy scipy.interpolate scipy.special scipy.stats sympy mpmath matplotlib.pyplot xarray"
-CLEAN = {"PYTHONDONTWRITEBYTECODE": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MPLBACKEND": "agg"}
+CLEAN = {
+    "PYTHONDONTWRITEBYTECODE": "1",
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MPLBACKEND": "agg",
+}
 
-SWAPPED = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Pow: ast.Mult}
-SWAPPED |= {ast.FloorDiv: ast.Mult, ast.Mod: ast.FloorDiv, ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd}
+SWAPPED = {
+    ast.Add: ast.Sub,
+    ast.Sub: ast.Add,
+    ast.Mult: ast.Div,
+    ast.Div: ast.Mult,
+    ast.Pow: ast.Mult,
+}
+SWAPPED |= {
+    ast.FloorDiv: ast.Mult,
+    ast.Mod: ast.FloorDiv,
+    ast.BitAnd: ast.BitOr,
+    ast.BitOr: ast.BitAnd,
+}
 BORDER = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt}
-OPPOSITE = {ast.Lt: ast.GtE, ast.LtE: ast.Gt, ast.Gt: ast.LtE, ast.GtE: ast.Lt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq}
+OPPOSITE = {
+    ast.Lt: ast.GtE,
+    ast.LtE: ast.Gt,
+    ast.Gt: ast.LtE,
+    ast.GtE: ast.Lt,
+    ast.Eq: ast.NotEq,
+    ast.NotEq: ast.Eq,
+}
 OPPOSITE |= {ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In}
 PAIRS = "minimum maximum, min max, sin cos, real imag, any all, zeros ones, zeros_like ones_like, floor ceil, sum mean"
-TWIN = {p[i]: p[1 - i] for p in map(str.split, (PAIRS + ", argmin argmax, exp expm1").split(",")) for i in (0, 1)}
+TWIN = {
+    p[i]: p[1 - i]
+    for p in map(str.split, (PAIRS + ", argmin argmax, exp expm1").split(","))
+    for i in (0, 1)
+}
 EITHER_WAY = "max min maximum minimum fmax fmin hypot distance pose_distance dot plus"  # functions of two arguments
 
 
@@ -65,7 +92,9 @@ class Mutant(NamedTuple):
 
     def change(self) -> str:
         """The lines taken away (-) and put in (+)."""
-        lines = difflib.unified_diff(self.source.splitlines(), self.mutated.splitlines(), n=0, lineterm="")
+        lines = difflib.unified_diff(
+            self.source.splitlines(), self.mutated.splitlines(), n=0, lineterm=""
+        )
         return "\n".join(x[0] + " " + x[1:].strip() for x in list(lines)[3:])
 
 
@@ -82,8 +111,14 @@ def variants(node):
             yield with_(op=SWAPPED[type(op)]())
         case ast.Compare(ops=ops):
             for k, op in enumerate(ops):
-                others = [table[type(op)]() for table in (BORDER, OPPOSITE) if type(op) in table]
-                yield from (with_(ops=[*ops[:k], other, *ops[k + 1 :]]) for other in others)
+                others = [
+                    table[type(op)]()
+                    for table in (BORDER, OPPOSITE)
+                    if type(op) in table
+                ]
+                yield from (
+                    with_(ops=[*ops[:k], other, *ops[k + 1 :]]) for other in others
+                )
         case ast.BoolOp(op=op):
             yield with_(op=ast.And() if isinstance(op, ast.Or) else ast.Or())
         case ast.UnaryOp(op=ast.USub() | ast.Not() | ast.Invert()):
@@ -95,16 +130,28 @@ def variants(node):
         case ast.Attribute(attr=name) if name in TWIN:
             yield with_(attr=TWIN[name])
         case ast.Call(args=args, keywords=given):
-            yield from (with_(keywords=[*given[:k], *given[k + 1 :]]) for k in range(len(given)))
-            either_way = len(args) == 2 and ast.unparse(node.func).rpartition(".")[2] in EITHER_WAY.split()
-            told_apart = len({*map(ast.dump, args[:2])}) == 2 and not any(isinstance(x, ast.Starred) for x in args[:2])
+            yield from (
+                with_(keywords=[*given[:k], *given[k + 1 :]]) for k in range(len(given))
+            )
+            either_way = (
+                len(args) == 2
+                and ast.unparse(node.func).rpartition(".")[2] in EITHER_WAY.split()
+            )
+            told_apart = len({*map(ast.dump, args[:2])}) == 2 and not any(
+                isinstance(x, ast.Starred) for x in args[:2]
+            )
             if told_apart and not either_way:
                 yield with_(args=[args[1], args[0], *args[2:]])
         case ast.If(test=test) | ast.IfExp(test=test):
             yield test, ast.UnaryOp(ast.Not(), test)
         case ast.Return(value=ast.BinOp() | ast.UnaryOp() | ast.Call() as value):
             yield value, ast.UnaryOp(ast.USub(), value)
-        case ast.AugAssign() | ast.Raise() | ast.Expr(value=ast.Call()) | ast.Assign(targets=[ast.Subscript()]):
+        case (
+            ast.AugAssign()
+            | ast.Raise()
+            | ast.Expr(value=ast.Call())
+            | ast.Assign(targets=[ast.Subscript()])
+        ):
             yield node, ast.Pass()
 
 
@@ -112,9 +159,21 @@ def nodes(tree):
     """The nodes of a tree that may be mutated: not texts, annotations, decorators, nor what the table says to skip."""
     for field, value in ast.iter_fields(tree):
         for node in value if isinstance(value, list) else [value]:
-            plain = isinstance(node, ast.AST) and field not in ("annotation", "returns", "decorator_list")
-            name = ast.unparse(node.targets[0]) if isinstance(node, ast.Assign) else getattr(node, "name", None)
-            if plain and name not in TABLE["skip"] and not isinstance(node, ast.JoinedStr):
+            plain = isinstance(node, ast.AST) and field not in (
+                "annotation",
+                "returns",
+                "decorator_list",
+            )
+            name = (
+                ast.unparse(node.targets[0])
+                if isinstance(node, ast.Assign)
+                else getattr(node, "name", None)
+            )
+            if (
+                plain
+                and name not in TABLE["skip"]
+                and not isinstance(node, ast.JoinedStr)
+            ):
                 yield node
                 yield from () if isinstance(node, ast.Raise) else nodes(node)
 
@@ -126,7 +185,9 @@ def scopes(node, name=""):
     for x in ast.iter_child_nodes(node):
         if isinstance(x, (ast.FunctionDef, ast.ClassDef)):
             yield x.lineno, x.end_lineno, name + x.name
-            yield from scopes(x, f"{name}{x.name}." + "<locals>." * isinstance(x, ast.FunctionDef))
+            yield from scopes(
+                x, f"{name}{x.name}." + "<locals>." * isinstance(x, ast.FunctionDef)
+            )
         else:
             yield from scopes(x, name)
 
@@ -137,11 +198,20 @@ def mutants_of(path: Path) -> list[Mutant]:
     tree, found = ast.parse(text), {}
     around = list(scopes(tree))
     for part, new in (v for node in nodes(tree) for v in variants(node)):
-        low, high = starts[part.lineno - 1] + part.col_offset, starts[part.end_lineno - 1] + part.end_col_offset
+        low, high = (
+            starts[part.lineno - 1] + part.col_offset,
+            starts[part.end_lineno - 1] + part.end_col_offset,
+        )
         code = ast.unparse(ast.fix_missing_locations(new))
-        bare = isinstance(new, (ast.stmt, ast.Name)) or (isinstance(new, ast.Constant) and "-" not in code)
-        mutated = (text[:low] + (code if bare else f"({code})").encode() + text[high:]).decode()
-        scope = [name for first, last, name in around if first <= part.lineno <= last][-1]
+        bare = isinstance(new, (ast.stmt, ast.Name)) or (
+            isinstance(new, ast.Constant) and "-" not in code
+        )
+        mutated = (
+            text[:low] + (code if bare else f"({code})").encode() + text[high:]
+        ).decode()
+        scope = [name for first, last, name in around if first <= part.lineno <= last][
+            -1
+        ]
         found[mutated] = Mutant(file, part.lineno, scope, text.decode(), mutated)
     return list(found.values())
 
@@ -175,20 +245,33 @@ class Calls:
         threading.settrace(None)
         calls = set()
         for code in self.codes.values():
-            if code.co_filename.startswith(self.tree) and code.co_flags & inspect.CO_OPTIMIZED:  # no class, no module
-                name = code.co_qualname.partition(".<locals>.<")[0]  # what is around a lambda
+            if (
+                code.co_filename.startswith(self.tree)
+                and code.co_flags & inspect.CO_OPTIMIZED
+            ):  # no class, no module
+                name = code.co_qualname.partition(".<locals>.<")[
+                    0
+                ]  # what is around a lambda
                 calls.add(f"{code.co_filename.removeprefix(self.tree)}.{name}")
         calls = sorted(x for x in calls if x.startswith(PACKAGES))
         if not self.failed:
             with self.file.open("a") as file:
-                print(json.dumps([nodeid, round(sum(os.times()[:4]) - self.start, 3), calls]), file=file)
+                print(
+                    json.dumps(
+                        [nodeid, round(sum(os.times()[:4]) - self.start, 3), calls]
+                    ),
+                    file=file,
+                )
 
 
 class Watch:
     """The tests that watch a mutant, from a file that `Calls` wrote."""
 
     def __init__(self, file: Path):
-        self.seconds, self.calling = {}, collections.defaultdict(set)  # by test; and tests by place
+        self.seconds, self.calling = (
+            {},
+            collections.defaultdict(set),
+        )  # by test; and tests by place
         for line in file.open():
             test, self.seconds[test], calls = json.loads(line)
             for place in {place for call in calls for place in outwards(call)}:
@@ -203,7 +286,9 @@ class Watch:
             near = next((self.calling[x] for x in places if x in self.calling), set())
         files, some, sums = {file_of(test) for test in near}, [], collections.Counter()
         every = (test for test in self.seconds if file_of(test) in files)
-        for test in sorted(every, key=lambda test: (test not in near, self.seconds[test])):
+        for test in sorted(
+            every, key=lambda test: (test not in near, self.seconds[test])
+        ):
             if sums.total() < ENOUGH:
                 some.append(test)
                 sums[file_of(test)] += self.seconds[test]
@@ -213,10 +298,16 @@ class Watch:
 def file_of(test: str) -> str:
     """The name of a test's file, as the table has it; examples of docstrings are one file."""
     file = test.partition("::")[0]
-    return file.removeprefix("tests/test_").removesuffix(".py") if file.startswith("tests/") else "examples"
+    return (
+        file.removeprefix("tests/test_").removesuffix(".py")
+        if file.startswith("tests/")
+        else "examples"
+    )
 
 
-def start(tree: Path, tests: list[str], seconds: float, *options: str, plugins=()) -> int:
+def start(
+    tree: Path, tests: list[str], seconds: float, *options: str, plugins=()
+) -> int:
     """The id of a new process that runs some tests in a copy of the tree, with so much CPU time at most."""
     if child := os.fork():
         return child
@@ -228,8 +319,12 @@ def start(tree: Path, tests: list[str], seconds: float, *options: str, plugins=(
         os.dup2(1, 2)
         os.chdir(tree)
         os.environ["PYTHONPATH"] = sys.path[0] = str(tree)
-        for _, some in itertools.groupby(tests, file_of):  # each is read when it is its turn
-            if status := importlib.import_module("pytest").main([*PYTEST, *options, *some], plugins):
+        for _, some in itertools.groupby(
+            tests, file_of
+        ):  # each is read when it is its turn
+            if status := importlib.import_module("pytest").main(
+                [*PYTEST, *options, *some], plugins
+            ):
                 os._exit(status)
         os._exit(0)
     finally:
@@ -237,7 +332,15 @@ def start(tree: Path, tests: list[str], seconds: float, *options: str, plugins=(
 
 
 def copied(tree: Path) -> Path:
-    left = (".git", ".venv", ".*_cache", "__pycache__", "build", "*.egg-info", "results")
+    left = (
+        ".git",
+        ".venv",
+        ".*_cache",
+        "__pycache__",
+        "build",
+        "*.egg-info",
+        "results",
+    )
     return Path(shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(*left)))
 
 
@@ -246,14 +349,26 @@ def measure(file: Path, folder: Path) -> None:
     tree = copied(folder / "0")
     file.write_text("")
     files = [f"tests/{path.name}" for path in sorted(ROOT.glob("tests/test_*.py"))]
-    for some in [[f] for f in files if file_of(f) not in TABLE["sources"]] + [list(PACKAGES)]:
+    for some in [[f] for f in files if file_of(f) not in TABLE["sources"]] + [
+        list(PACKAGES)
+    ]:
         child = start(tree, some, 1200, plugins=[Calls(tree, file.absolute())])
-        print(*some, "fails, or is skipped whole" if os.waitpid(child, 0)[1] else "", flush=True)
+        print(
+            *some,
+            "fails, or is skipped whole" if os.waitpid(child, 0)[1] else "",
+            flush=True,
+        )
 
 
-def hunted(some: list[Mutant], watch: Watch, folder: Path, jobs: int) -> Iterator[tuple[Mutant, str]]:
+def hunted(
+    some: list[Mutant], watch: Watch, folder: Path, jobs: int
+) -> Iterator[tuple[Mutant, str]]:
     """Each with "survived", "killed" or "time-out", so many at a time, each in a copy of the tree below ``folder``."""
-    trees, running, todo = [copied(folder / str(k)) for k in range(jobs)], {}, iter(some)
+    trees, running, todo = (
+        [copied(folder / str(k)) for k in range(jobs)],
+        {},
+        iter(some),
+    )
     tests = sorted({test for m in some for test in watch.over(m)})
     if os.waitpid(start(trees[0], tests, 600, "--collect-only"), 0)[1]:
         sys.exit("there are other tests now: --measure anew")
@@ -261,28 +376,53 @@ def hunted(some: list[Mutant], watch: Watch, folder: Path, jobs: int) -> Iterato
         if m:
             tree, tests = trees.pop(), watch.over(m)
             (tree / m.file).write_text(m.mutated)
-            running[start(tree, tests, 30 + 3 * sum(watch.seconds[x] for x in tests), "-x")] = m, tree
+            running[
+                start(tree, tests, 30 + 3 * sum(watch.seconds[x] for x in tests), "-x")
+            ] = m, tree
         if not trees or not m:
             child, status = os.wait()
             done, tree = running.pop(child)
             (tree / done.file).write_text(done.source)
             trees.append(tree)
-            late = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGKILL, signal.SIGXCPU, signal.SIGALRM)
+            late = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (
+                signal.SIGKILL,
+                signal.SIGXCPU,
+                signal.SIGALRM,
+            )
             yield done, "time-out" if late else "killed" if status else "survived"
 
 
 def report(asked: argparse.Namespace, folder: Path) -> None:
-    files = sorted(p.relative_to(ROOT).as_posix() for top in PACKAGES for p in (ROOT / top).rglob("*.py"))
-    files = [f for f in files if f.startswith(tuple(asked.only)) and not f.startswith(tuple(TABLE["unwatched"]))]
+    files = sorted(
+        p.relative_to(ROOT).as_posix()
+        for top in PACKAGES
+        for p in (ROOT / top).rglob("*.py")
+    )
+    files = [
+        f
+        for f in files
+        if f.startswith(tuple(asked.only))
+        and not f.startswith(tuple(TABLE["unwatched"]))
+    ]
     every = [m for f in files for m in mutants_of(ROOT / f)]
-    some = random.Random(asked.seed).sample(every, min(asked.count, len(every)))[asked.done :]
+    some = random.Random(asked.seed).sample(every, min(asked.count, len(every)))[
+        asked.done :
+    ]
     print(f"{len(some)} of {len(every)} mutants, seed {asked.seed}", flush=True)
-    known = {(x["file"], x["change"].strip()): x["why"] for x in TABLE.get("equivalent", ())}
+    known = {
+        (x["file"], x["change"].strip()): x["why"] for x in TABLE.get("equivalent", ())
+    }
     counts = collections.Counter()
     for m, outcome in hunted(some, Watch(asked.calls), folder, asked.jobs):
         why = known.get((m.file, m.change())) if outcome == "survived" else None
         counts["no bug" if why else outcome] += 1
-        more = f" no bug: {why}" if why else f"\n{m.change()}" if outcome == "survived" else ""
+        more = (
+            f" no bug: {why}"
+            if why
+            else f"\n{m.change()}"
+            if outcome == "survived"
+            else ""
+        )
         print(f"{outcome:8} {m.file}:{m.line}{more}", flush=True)
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     told = ", ".join(f"{count} {outcome}" for outcome, count in sorted(counts.items()))
@@ -290,12 +430,19 @@ def report(asked: argparse.Namespace, folder: Path) -> None:
 
 
 def main() -> None:
-    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    ask = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     ask.add_argument("calls", type=Path, help="the file of what each test calls")
     ask.add_argument("--measure", action="store_true", help="write it")
     ask.add_argument("--count", type=int, default=200, help="how many, at random")
     ask.add_argument("--seed", type=int, default=1)
-    ask.add_argument("--done", type=int, default=0, help="so many of them are left out: a stopped run had them")
+    ask.add_argument(
+        "--done",
+        type=int,
+        default=0,
+        help="so many of them are left out: a stopped run had them",
+    )
     ask.add_argument("--jobs", type=int, default=2)
     ask.add_argument("--only", nargs="+", default=[""], help="beginnings of file names")
     asked = ask.parse_args()
@@ -304,7 +451,9 @@ def main() -> None:
     for name in HEAVY.split():
         importlib.import_module(name)
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
-        measure(asked.calls, Path(folder)) if asked.measure else report(asked, Path(folder))
+        measure(asked.calls, Path(folder)) if asked.measure else report(
+            asked, Path(folder)
+        )
 
 
 if __name__ == "__main__":

@@ -24,19 +24,27 @@ def cell(values, lead):
 def differences(axes, A):
     """CCF by differences of neighbours, one-sided at the edge, as calc_ccf.m takes them: (3, 1, N, M)."""
     dA = np.gradient(A[:, 1], axes[0], axis=1) - np.gradient(A[:, 0], axes[1], axis=2)
-    return (dA + np.moveaxis(se2.bracket(*np.moveaxis(A, (1, 0), (0, -1))), -1, 0))[:, None]
+    return (dA + np.moveaxis(se2.bracket(*np.moveaxis(A, (1, 0), (0, -1))), -1, 0))[
+        :, None
+    ]
 
 
 @functools.cache
 def computed(points=15, coarse=7, extent=3.0, frame="link-2"):
     """(fitted connection, metric on a grid of its own, A and pose of the frame in linear elements)."""
     swimmer = Swimmer(rft.Viscous(2.0), rft.Chain((1, 1, 1), frame=frame))
-    fitted = connection.fit(swimmer.velocity, connection.grid(2, points, extent), 2, traits=swimmer.traits)
+    fitted = connection.fit(
+        swimmer.velocity, connection.grid(2, points, extent), 2, traits=swimmer.traits
+    )
     own = metric.fit(
-        lambda alpha, rates: swimmer.power(*np.broadcast_arrays(alpha, rates), swimmer.velocity(alpha, rates)),
+        lambda alpha, rates: swimmer.power(
+            *np.broadcast_arrays(alpha, rates), swimmer.velocity(alpha, rates)
+        ),
         connection.grid(2, coarse, extent),
     )
-    linear = minimum_perturbation(Connection(fitted.axes, fitted.A, fitted.residual, fitted.speed, 1))
+    linear = minimum_perturbation(
+        Connection(fitted.axes, fitted.A, fitted.residual, fitted.speed, 1)
+    )
     return fitted, own, linear.connection(fitted), linear.field.values
 
 
@@ -44,9 +52,16 @@ def struct(length=1.0, drag=1.0, frame="link-2", base="center", **more):
     """The struct, with lengths in a unit of which the body has ``length``."""
     fitted, own, A, pose = computed(frame=frame)
     unit = np.array([length, length, 1.0]).reshape(3, 1, 1, 1)
-    grids = [cell(np.array(np.meshgrid(*x.axes, indexing="ij")), (2,)) for x in (fitted, own)]
-    DA, DA_optimised = (cell(unit * differences(fitted.axes, x), (3, 1)) for x in (fitted.A, A))
-    content = {"A_num": cell(-unit * fitted.A, (3, 2)), "Avec": cell(unit * fitted.A, (3, 2))}
+    grids = [
+        cell(np.array(np.meshgrid(*x.axes, indexing="ij")), (2,)) for x in (fitted, own)
+    ]
+    DA, DA_optimised = (
+        cell(unit * differences(fitted.axes, x), (3, 1)) for x in (fitted.A, A)
+    )
+    content = {
+        "A_num": cell(-unit * fitted.A, (3, 2)),
+        "Avec": cell(unit * fitted.A, (3, 2)),
+    }
     content["Avec_optimized"] = cell(unit * A, (3, 2))
     return {
         "geometry": {"type": "n-link chain", "linklengths": [1, 1, 1], "baseframe": base, "length": length},
@@ -70,7 +85,9 @@ def save(path, s, version=5, **more):
         for name, value in {"s": s, **more}.items():
             _write(file, file, name, value)
     with open(path, "r+b") as file:
-        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Wed Nov 25 12:00:00 2026 HDF5 schema 1.00 .")
+        file.write(
+            b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Wed Nov 25 12:00:00 2026 HDF5 schema 1.00 ."
+        )
 
 
 def _write(file, group, name, value):
@@ -91,8 +108,12 @@ def _write(file, group, name, value):
         node = group.create_dataset(name, data=references, dtype=h5py.ref_dtype)
         node.attrs["MATLAB_class"] = np.bytes_("cell")
     elif isinstance(value, str):
-        node = group.create_dataset(name, data=np.frombuffer(value.encode("utf-16-le"), "<u2")[:, None])
+        node = group.create_dataset(
+            name, data=np.frombuffer(value.encode("utf-16-le"), "<u2")[:, None]
+        )
         node.attrs["MATLAB_class"] = np.bytes_("char")
     else:
-        node = group.create_dataset(name, data=np.atleast_2d(np.asarray(value, float)).T, compression="gzip")
+        node = group.create_dataset(
+            name, data=np.atleast_2d(np.asarray(value, float)).T, compression="gzip"
+        )
         node.attrs["MATLAB_class"] = np.bytes_("double")

@@ -19,7 +19,13 @@ def doubled(by, x):
 
 def who(_, x):
     """What a worker is, and what it may take."""
-    return os.getpid(), thread_count(None, 100), backend._preferred.get(), runner().executor, x
+    return (
+        os.getpid(),
+        thread_count(None, 100),
+        backend._preferred.get(),
+        runner().executor,
+        x,
+    )
 
 
 def meets(folder, x):

@@ -19,7 +19,9 @@ pytestmark = pytest.mark.usefixtures("fastest")
 
 @pytest.fixture(scope="module")
 def glass():
-    return work_precision.compute(runs=1)  # a first run times what it warms too: only errors are judged here
+    return work_precision.compute(
+        runs=1
+    )  # a first run times what it warms too: only errors are judged here
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +35,9 @@ def line(results, label):
 
 def test_errors_are_root_mean_squares_over_amplitudes():
     """Of distances, in body lengths; a turn is none."""
-    scene = scenes.parse(scenes.load("three-link-viscous").text.replace("[body]", "[body]\nlength = 2.0"))
+    scene = scenes.parse(
+        scenes.load("three-link-viscous").text.replace("[body]", "[body]\nlength = 2.0")
+    )
     away = np.array([[0.06, 0.08, 0.0], [0.0, -0.2, 0.1], [0.0, 0.0, 0.3]])
     error = tiered.Settings(scene).errors([away + 0.5], [np.full((3, 3), 0.5)])["error"]
     assert error == pytest.approx(np.sqrt((0.05**2 + 0.1**2) / 3))
@@ -41,8 +45,15 @@ def test_errors_are_root_mean_squares_over_amplitudes():
 
 def test_every_setting_gets_better(glass):
     """Each setting's finest value beats its coarsest, but for those whose tier has an error of its own."""
-    assert len(glass["lines"]) == len(tiered.SETTINGS) - 1  # no effect cuts the body into pieces
-    for name, factor in {"phases": 2, "segments": 2, "nodes": 2, "regularisation": 0.1}.items():
+    assert (
+        len(glass["lines"]) == len(tiered.SETTINGS) - 1
+    )  # no effect cuts the body into pieces
+    for name, factor in {
+        "phases": 2,
+        "segments": 2,
+        "nodes": 2,
+        "regularisation": 0.1,
+    }.items():
         values = line(glass, f"direct: {name}")["value"]
         assert np.divide(values[1:], values[:-1]) == pytest.approx(factor)
     for found in glass["lines"]:
@@ -53,19 +64,24 @@ def test_every_setting_gets_better(glass):
 
 def test_amplitudes_go_up_to_the_gaits_own(glass):
     assert glass["amplitudes"] == pytest.approx(
-        np.array([0.4, 0.55, 0.7, 0.85, 1.0]) * scenes.load(glass["scene"]).gait.amplitude
+        np.array([0.4, 0.55, 0.7, 0.85, 1.0])
+        * scenes.load(glass["scene"]).gait.amplitude
     )
 
 
 def test_the_truth_has_exact_integrals_whatever_rule_the_scene_takes():
-    ruled = scenes.load("three-link-glass").with_numerics(loads="midpoint:3", regularisation=1e-3)
+    ruled = scenes.load("three-link-glass").with_numerics(
+        loads="midpoint:3", regularisation=1e-3
+    )
     solver = tiered.Settings(ruled).at(None, None).system.solver
     assert (solver.loads, solver.regularisation) == ("exact", 1e-9)
 
 
 def test_tiers_rank_as_they_should(glass):
     """What each tier settles at: the direct one below the harmonic one below the path and the area."""
-    floor = {x["tier"]: min(x["error"]) for x in glass["lines"] if x["against"] == "truth"}
+    floor = {
+        x["tier"]: min(x["error"]) for x in glass["lines"] if x["against"] == "truth"
+    }
     assert floor["direct"] < 1e-6 < floor["harmonic"] < 2e-4 < floor["path"]
     assert floor["adapted"] < 2e-5
     assert floor["area"] > 5e-3
@@ -92,7 +108,9 @@ def test_interpolation_is_of_order_degree_plus_one(degree, order):
     for n in points:
         fitted = connection.fit(swimmer, connection.grid(2, n, 1.5), degree=degree)
         errors.append(np.sqrt(np.mean((fitted(shapes) - exact) ** 2)))
-    assert -np.polyfit(np.log(points - 1), np.log(errors), 1)[0] == pytest.approx(order, abs=0.1)
+    assert -np.polyfit(np.log(points - 1), np.log(errors), 1)[0] == pytest.approx(
+        order, abs=0.1
+    )
 
 
 def test_families_are_of_order_four_where_nothing_kinks():
@@ -102,16 +120,22 @@ def test_families_are_of_order_four_where_nothing_kinks():
     exact = direct(viscous.system.velocity, Circle(), a)
     errors = []
     for n in counts:
-        adapted = Study(viscous.with_numerics(curves=int(n))).poses("adapted", Circle(), a)
+        adapted = Study(viscous.with_numerics(curves=int(n))).poses(
+            "adapted", Circle(), a
+        )
         errors.append(np.abs(adapted - exact).max())
-    assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(4.0, abs=0.1)
+    assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(
+        4.0, abs=0.1
+    )
 
 
 def test_phases_are_spectral_where_nothing_kinks():
     swimmer = lambda a, d: body_velocity(Viscous(2.0), Chain(), a, d).xi
     gait = Ellipse(centre=(0.4, 0.2), semi_axes=(1.0, 0.8))
     exact = direct(swimmer, gait, phases=256)
-    errors = [np.abs(direct(swimmer, gait, phases=n) - exact).max() for n in (8, 16, 32, 64)]
+    errors = [
+        np.abs(direct(swimmer, gait, phases=n) - exact).max() for n in (8, 16, 32, 64)
+    ]
     assert errors[1] < errors[0] / 30
     assert errors[2] < errors[1] / 300
     assert errors[3] < 1e-15
@@ -122,9 +146,14 @@ def test_phases_are_of_order_two_across_kinks():
     glass = scenes.load("three-link-glass")
     radii, counts = np.linspace(0.4, 2.0, 25), np.array([32, 64, 128, 256, 512])
     exact = direct(glass.system.velocity, Circle(centre=(0.2, 0.1)), radii, 4096)
-    off = [direct(glass.system.velocity, Circle(centre=(0.2, 0.1)), radii, n) - exact for n in counts]
+    off = [
+        direct(glass.system.velocity, Circle(centre=(0.2, 0.1)), radii, n) - exact
+        for n in counts
+    ]
     errors = [np.exp(np.log(np.linalg.norm(x, axis=-1)).mean()) for x in off]
-    assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(2.0, abs=0.25)
+    assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(
+        2.0, abs=0.25
+    )
 
 
 def test_table_and_sentences(glass):
@@ -153,12 +182,26 @@ def test_the_cheapest_setting_is_the_quickest_that_is_good_enough():
         }
 
     lines = [
-        made("direct", "phases", "truth", (16, 3e-2, 1.0), (32, 2e-3, 2.0), (64, 5e-5, 4.0)),
+        made(
+            "direct",
+            "phases",
+            "truth",
+            (16, 3e-2, 1.0),
+            (32, 2e-3, 2.0),
+            (64, 5e-5, 4.0),
+        ),
         made("adapted", "curves", "truth", (6, 4e-3, 3.0), (12, 8e-4, 2.5)),
         made("direct", "segments", "limit", (4, 1e-9, 0.1)),
     ]
-    best = {c["tolerance"]: c for c in (tiered.cheapest(lines, tol) for tol in (0.1, 3e-2, 1e-2, 1e-3, 1e-4, 1e-5))}
-    assert {tol: (c["tier"], c.get("value"), c.get("seconds")) for tol, c in best.items()} == {
+    best = {
+        c["tolerance"]: c
+        for c in (
+            tiered.cheapest(lines, tol) for tol in (0.1, 3e-2, 1e-2, 1e-3, 1e-4, 1e-5)
+        )
+    }
+    assert {
+        tol: (c["tier"], c.get("value"), c.get("seconds")) for tol, c in best.items()
+    } == {
         0.1: ("direct", 16, 1.0),
         3e-2: ("direct", 16, 1.0),
         1e-2: ("direct", 32, 2.0),
@@ -175,13 +218,20 @@ def test_the_cheapest_setting_is_the_quickest_that_is_good_enough():
 def test_a_linear_medium_has_no_dry_settings(viscous):
     labels = {x["label"] for x in viscous["lines"]}
     assert "direct: phases" in labels
-    assert not any("regularisation" in x or "harmonic" in x or "path" in x for x in labels)
+    assert not any(
+        "regularisation" in x or "harmonic" in x or "path" in x for x in labels
+    )
 
 
 def test_the_diagram_draws(glass, tmp_path):
     phases = line(glass, "direct: phases")
-    drawn_lines = [x for ax in drawn(work_precision, glass, tmp_path).axes for x in ax.lines]
-    assert any(np.array_equal(x.get_xydata().T, [phases["seconds"], phases["error"]]) for x in drawn_lines)
+    drawn_lines = [
+        x for ax in drawn(work_precision, glass, tmp_path).axes for x in ax.lines
+    ]
+    assert any(
+        np.array_equal(x.get_xydata().T, [phases["seconds"], phases["error"]])
+        for x in drawn_lines
+    )
 
 
 def test_costs_are_drawn_by_the_sample(tmp_path):
@@ -189,7 +239,11 @@ def test_costs_are_drawn_by_the_sample(tmp_path):
     batches = {"NumPy, one core": [1e-4, 6.4e-4], "compiled, 2 cores": [2e-5, 6.4e-5]}
     numbers = {
         "samples": {"x": [1, 64], "seconds": batches, "loop": 5e-3, "exponent": 0.5},
-        "links": {"x": [3, 6], "seconds": {"NumPy": [0.1, 0.3], "compiled": [0.01, 0.02]}, "exponent": 1.1},
+        "links": {
+            "x": [3, 6],
+            "seconds": {"NumPy": [0.1, 0.3], "compiled": [0.01, 0.02]},
+            "exponent": 1.1,
+        },
     }
     samples, links, *_ = drawn(cost_scaling, numbers, tmp_path).axes
     np.testing.assert_allclose(curve(samples, "NumPy, one core"), [[1, 64], [100, 10]])

@@ -68,8 +68,14 @@ def test_the_same_marches(name, monkeypatch):
     alpha, alphadot = GAIT.cycle(8, np.array([0.4, 1.0]))
     effects = EFFECTS[name][0](0.2), EndCaps(radius=0.06, tail=1.0)
     effects = effects[:1] if name == "end-caps" else effects
-    given = {"effects": effects, "cycles": 1 + (Premise.MEMORYLESS in effects[0].breaks), "with_work": True}
-    plain, fast = (time_steps(GLASS, BODY, alpha, alphadot, backend=b, **given) for b in BOTH)
+    given = {
+        "effects": effects,
+        "cycles": 1 + (Premise.MEMORYLESS in effects[0].breaks),
+        "with_work": True,
+    }
+    plain, fast = (
+        time_steps(GLASS, BODY, alpha, alphadot, backend=b, **given) for b in BOTH
+    )
     np.testing.assert_allclose(plain.xi, fast.xi, rtol=0, atol=1e-10)
     np.testing.assert_allclose(plain.pose, fast.pose, rtol=0, atol=1e-10)
     np.testing.assert_array_equal(plain.status, fast.status)
@@ -91,13 +97,27 @@ def test_starts(how, compiled_code):
     steps from a good one. Asymmetric body, length not 1, rates from slow to fast, a viscous part in which speed
     counts."""
     rng = np.random.default_rng(11)
-    alpha, alphadot = rng.uniform(-2.6, 2.6, (90, 2)), rng.normal(size=(90, 2)) * 10.0 ** rng.uniform(-3, 3, (90, 1))
-    alpha[:6], alphadot[:6], alphadot[6] = 1.5, 0.3, 0.0  # links stick; a sample at rest
+    alpha, alphadot = (
+        rng.uniform(-2.6, 2.6, (90, 2)),
+        rng.normal(size=(90, 2)) * 10.0 ** rng.uniform(-3, 3, (90, 1)),
+    )
+    alpha[:6], alphadot[:6], alphadot[6] = (
+        1.5,
+        0.3,
+        0.0,
+    )  # links stick; a sample at rest
     for medium in (GLASS, Both()):
         given = {"backend": how, "tolerance": 1e-13}
-        solve = lambda a, start=None: body_velocity(medium, BODY, a, alphadot, start=start, **given)
+        solve = lambda a, start=None: body_velocity(
+            medium, BODY, a, alphadot, start=start, **given
+        )
         cold, near = solve(alpha), solve(alpha + 1e-3).xi
-        starts = {"near": near, "itself": cold.xi, "at rest": np.zeros(3), "absurd": 100.0 * near[::-1]}
+        starts = {
+            "near": near,
+            "itself": cold.xi,
+            "at rest": np.zeros(3),
+            "absurd": 100.0 * near[::-1],
+        }
         starts["of some"] = np.where(np.arange(90)[:, None] % 2, near, np.nan)
         found = {name: solve(alpha, start) for name, start in starts.items()}
         for name, one in found.items():
@@ -119,8 +139,13 @@ def test_starts_whose_squares_overflow(rate, solved_by):
     alpha, alphadot = rng.uniform(-2, 2, (20, 2)), rng.normal(size=(20, 2)) * rate
     sizes = [1e12, 1e31, 1e154, 1e155, 1e200, 1e300]
     for medium, size in itertools.product((GLASS, MEDIA["viscous-2"]), sizes):
-        start = size * np.eye(4)[np.arange(20) % 4, :3]  # along, across, turning, at rest
-        cold, found = (body_velocity(medium, BODY, alpha, alphadot, start=s, backend=solved_by) for s in (None, start))
+        start = (
+            size * np.eye(4)[np.arange(20) % 4, :3]
+        )  # along, across, turning, at rest
+        cold, found = (
+            body_velocity(medium, BODY, alpha, alphadot, start=s, backend=solved_by)
+            for s in (None, start)
+        )
         assert (found.status == cold.status).all()
         assert apart(found, cold, alphadot, BODY).max() < 1e-10
 
@@ -136,13 +161,18 @@ def test_no_overflow_is_a_solution(size, solved_by, monkeypatch):
     for name in ("WALKS", "SLOW"):
         monkeypatch.setattr(balance, name, ())
     monkeypatch.setattr(balance, "QUICK", balance.WARM)
-    monkeypatch.setattr(balance, "is_possible", lambda *xi: np.ones(8, bool))  # of the guess
+    monkeypatch.setattr(
+        balance, "is_possible", lambda *xi: np.ones(8, bool)
+    )  # of the guess
     with np.errstate(all="ignore"):
         solved = balance.solve(problem.take, *given, np.full((3, 8), size))
     assert not (solved.residual < 1e-10).any()
 
 
-@pytest.mark.parametrize("wrong", [np.zeros(2), np.zeros((4, 3)), [0.0, np.inf, 0.0], "here", np.zeros((2, 3, 3))])
+@pytest.mark.parametrize(
+    "wrong",
+    [np.zeros(2), np.zeros((4, 3)), [0.0, np.inf, 0.0], "here", np.zeros((2, 3, 3))],
+)
 def test_starts_that_are_none(wrong):
     with pytest.raises(ValueError, match="start must be"):
         body_velocity(GLASS, BODY, np.zeros((3, 2)), np.ones((3, 2)), start=wrong)
@@ -158,23 +188,41 @@ def test_parameters_of_each_sample_and_threads(monkeypatch):
     effects = (
         SkinFriction().with_parameters(forward=some[0], backward=some[1]),
         TowedSled(1.0, 0.3).with_parameters(pull=some[2]),
-        GrainInertia(frequency=1.2, length=0.4, depth=0.07, strength=1.0).with_parameters(strength=some[0]),
+        GrainInertia(
+            frequency=1.2, length=0.4, depth=0.07, strength=1.0
+        ).with_parameters(strength=some[0]),
     )
-    plain, fast = (body_velocity(GLASS, BODY, alpha, alphadot, effects=effects, backend=b, threads=3) for b in BOTH)
+    plain, fast = (
+        body_velocity(
+            GLASS, BODY, alpha, alphadot, effects=effects, backend=b, threads=3
+        )
+        for b in BOTH
+    )
     assert apart(plain, fast, alphadot, BODY).max() < 1e-10
     np.testing.assert_array_equal(plain.status, fast.status)
     monkeypatch.setattr("rft.balance.solver.COMPILED_WORTH", 10_000)
-    whole = body_velocity(GLASS, BODY, alpha, alphadot, effects=effects, backend="numba")
-    np.testing.assert_array_equal(whole.xi, fast.xi)  # to the last digit, whatever shares a lane or a thread
+    whole = body_velocity(
+        GLASS, BODY, alpha, alphadot, effects=effects, backend="numba"
+    )
+    np.testing.assert_array_equal(
+        whole.xi, fast.xi
+    )  # to the last digit, whatever shares a lane or a thread
     alone = body_velocity(
-        GLASS, BODY, alpha[7], alphadot[7], effects=[e.take(slice(7, 8)) for e in effects], backend="numba"
+        GLASS,
+        BODY,
+        alpha[7],
+        alphadot[7],
+        effects=[e.take(slice(7, 8)) for e in effects],
+        backend="numba",
     )
     np.testing.assert_allclose(alone.xi, fast.xi[7], rtol=0, atol=1e-15)
 
 
 @pytest.mark.usefixtures("compiled_code")
 @pytest.mark.parametrize(
-    "effects", [(), (EndCaps(radius=0.06, tail=1.0), SkinFriction(), TowedSled(1.0, 0.3))], ids=len
+    "effects",
+    [(), (EndCaps(radius=0.06, tail=1.0), SkinFriction(), TowedSled(1.0, 0.3))],
+    ids=len,
 )
 @pytest.mark.parametrize("body", [BODY, Backbone(19)], ids=["chain", "backbone"])
 def test_a_sample_alone_has_the_digits_that_it_has_among_others(body, effects):
@@ -182,7 +230,10 @@ def test_a_sample_alone_has_the_digits_that_it_has_among_others(body, effects):
     from rft.balance.compiled import solve
 
     rng = np.random.default_rng(8)
-    alpha, alphadot = rng.uniform(-0.4, 0.4, (body.joints, 40)), rng.normal(size=(body.joints, 40))
+    alpha, alphadot = (
+        rng.uniform(-0.4, 0.4, (body.joints, 40)),
+        rng.normal(size=(body.joints, 40)),
+    )
     problem = assemble(GLASS, body, effects).problem(alpha, alphadot)
     common = balance.QUICK, Limits(1e-6, 1e-10), None
     alone = [solve(problem.take(np.array([i])), *common) for i in range(40)]
@@ -190,7 +241,9 @@ def test_a_sample_alone_has_the_digits_that_it_has_among_others(body, effects):
 
 
 @pytest.mark.usefixtures("compiled_code")
-@pytest.mark.parametrize("effects", [(), (EndCaps(radius=0.06, tail=1.0), TowedSled(1.0, 0.3))], ids=len)
+@pytest.mark.parametrize(
+    "effects", [(), (EndCaps(radius=0.06, tail=1.0), TowedSled(1.0, 0.3))], ids=len
+)
 def test_forces_at_given_velocities_are_those_by_numpy(effects):
     """And their slopes, of elements and of points, in more samples than share a vector."""
     from rft.balance import arrays, compiled
@@ -198,9 +251,18 @@ def test_forces_at_given_velocities_are_those_by_numpy(effects):
     rng = np.random.default_rng(9)
     problem = assemble(GLASS, BODY, effects).problem(*rng.uniform(-1, 1, (2, 2, 21)))
     count = len(problem.sides.station) + len(problem.points.station)
-    v, xi, rounding = rng.normal(size=(3, count, 21)), rng.normal(size=(3, 21)), np.full(21, 1e-3)
-    wanted, found = (np.reshape(by.nets(problem, v, rounding, xi), (5, 3, -1)) for by in (arrays, compiled))
-    np.testing.assert_allclose(found, wanted, rtol=1e-11, atol=1e-12 * np.abs(wanted).max())
+    v, xi, rounding = (
+        rng.normal(size=(3, count, 21)),
+        rng.normal(size=(3, 21)),
+        np.full(21, 1e-3),
+    )
+    wanted, found = (
+        np.reshape(by.nets(problem, v, rounding, xi), (5, 3, -1))
+        for by in (arrays, compiled)
+    )
+    np.testing.assert_allclose(
+        found, wanted, rtol=1e-11, atol=1e-12 * np.abs(wanted).max()
+    )
 
 
 @pytest.mark.usefixtures("compiled_code")
@@ -216,8 +278,12 @@ def test_compiled_once_for_each_form_of_law():
         *((GLASS, [e]) for e in every),
         (MEDIA["viscous-2"], every[-1:]),
     ):
-        time_steps(medium, BODY, alpha, alphadot, effects=effects, cycles=1, backend="numba")
-    body_velocity(GLASS, BODY, np.asfortranarray(alpha), alphadot[:, ::-1], backend="numba")
+        time_steps(
+            medium, BODY, alpha, alphadot, effects=effects, cycles=1, backend="numba"
+        )
+    body_velocity(
+        GLASS, BODY, np.asfortranarray(alpha), alphadot[:, ::-1], backend="numba"
+    )
     assert len(kernel(type(record(GLASS))).signatures) == 1
 
 
@@ -232,18 +298,29 @@ class Sheared:
 def test_what_stays_with_numpy_and_why():
     scene = scenes.load("three-link-glass")
     swimmer = scene.system
-    line = lambda s: next(x for x in described(s) if x.startswith("back end: ")).removeprefix("back end: ")
+    line = lambda s: next(
+        x for x in described(s) if x.startswith("back end: ")
+    ).removeprefix("back end: ")
     assert line(swimmer).startswith("compiled code")
-    assert line(swimmer).endswith("commands take NumPy where there is little to compute")
+    assert line(swimmer).endswith(
+        "commands take NumPy where there is little to compute"
+    )
     assert line(swimmer) in explain(scene)
     assert line(scene.with_numerics(backend="numba").system).startswith("compiled code")
     assert line(scene.with_numerics(backend="numpy").system) == "NumPy, as asked for"
-    assert line(scene.with_numerics(loads="midpoint:20").system).startswith("compiled code")
+    assert line(scene.with_numerics(loads="midpoint:20").system).startswith(
+        "compiled code"
+    )
     by_numpy = line(dataclasses.replace(swimmer, medium=Sheared()))
-    assert by_numpy == "NumPy: compiled code does not know the law Sheared, whose traction is no formula"
+    assert (
+        by_numpy
+        == "NumPy: compiled code does not know the law Sheared, whose traction is no formula"
+    )
     assert not backend.compiles("numba", record(Sheared()))
     for make, _ in EFFECTS.values():
-        assert line(dataclasses.replace(swimmer, effects=(make(0.1),))).startswith("compiled code")
+        assert line(dataclasses.replace(swimmer, effects=(make(0.1),))).startswith(
+            "compiled code"
+        )
 
 
 def test_no_numba(monkeypatch):
@@ -252,7 +329,9 @@ def test_no_numba(monkeypatch):
     with backend.preferring(""):
         assert not backend.compiles("auto", record(GLASS))
         assert backend.fastest() == "numpy"
-    assert "numba is not installed (pip install 'geomech[fast]')" in explain(scenes.load("three-link-glass"))
+    assert "numba is not installed (pip install 'geomech[fast]')" in explain(
+        scenes.load("three-link-glass")
+    )
     with pytest.raises(ValueError, match=r"pip install 'geomech\[fast\]'"):
         body_velocity(GLASS, BODY, (0.1, 0.2), (1.0, 0.0), backend="numba")
     with pytest.raises(ValueError, match=r"pip install 'geomech\[fast\]'"):
@@ -275,9 +354,13 @@ def test_auto_is_compiled_code_unless_something_else_is_preferred():
 
 def test_backends_that_are_none(tmp_path):
     for wrong in ("cuda", 3, None):
-        with pytest.raises(ValueError, match="backend must be one of auto, numpy, numba, got"):
+        with pytest.raises(
+            ValueError, match="backend must be one of auto, numpy, numba, got"
+        ):
             body_velocity(GLASS, BODY, (0.1, 0.2), (1.0, 0.0), backend=wrong)
-    (tmp_path / "s.toml").write_text(scenes.load("three-link-glass").text + '[numerics]\nbackend = "Numba"\n')
+    (tmp_path / "s.toml").write_text(
+        scenes.load("three-link-glass").text + '[numerics]\nbackend = "Numba"\n'
+    )
     code, out, err = geomech("explain", tmp_path / "s.toml")
     assert (code, out) == (2, "")
     assert "backend must be one of auto, numpy, numba, got 'Numba'" in err
@@ -328,26 +411,47 @@ class Turtle:
     def motion(self, alpha, alphadot):
         along = np.exp(1j * np.stack([0 * alpha[0], 1.2 + alpha[0], -1.2 - alpha[1]]))
         turn = np.stack([0 * alphadot[0], alphadot[0], -alphadot[1]])
-        half, shoulder = np.array([[0.3], [0.1], [0.1]]), np.array([[0.0], [0.3], [0.3]])
+        half, shoulder = (
+            np.array([[0.3], [0.1], [0.1]]),
+            np.array([[0.0], [0.3], [0.3]]),
+        )
         arm = half * along * (shoulder > 0)
         return Elements.from_complex(along, shoulder + arm, 1j * turn * arm, turn, half)
 
 
 @pytest.mark.usefixtures("compiled_code")
-@pytest.mark.parametrize("effects", [(), (Softening(0.1),), (Softening(0.1), DisturbedGround(0.05, 0.5))], ids=len)
+@pytest.mark.parametrize(
+    "effects",
+    [(), (Softening(0.1),), (Softening(0.1), DisturbedGround(0.05, 0.5))],
+    ids=len,
+)
 def test_what_somebody_else_writes_runs_by_both(effects):
     """A law, an effect with a past and a body: balance, stepping, displacement and work, the same digits."""
     alpha, alphadot = GAIT.cycle(16, np.array([0.4, 0.9]))
     found = [
-        time_steps(Quartic(), Turtle(), alpha, alphadot, effects=effects, cycles=2, with_work=True, backend=b)
+        time_steps(
+            Quartic(),
+            Turtle(),
+            alpha,
+            alphadot,
+            effects=effects,
+            cycles=2,
+            with_work=True,
+            backend=b,
+        )
         for b in BOTH
     ]
     for name in ("xi", "pose", "displacement", "residual"):
-        np.testing.assert_allclose(*(getattr(x, name) for x in found), rtol=0, atol=1e-10, err_msg=name)
+        np.testing.assert_allclose(
+            *(getattr(x, name) for x in found), rtol=0, atol=1e-10, err_msg=name
+        )
     np.testing.assert_allclose(*(x.work.power for x in found), rtol=1e-10)
     assert found[0].residual.max() < 1e-9
     if not effects:
-        balanced = [body_velocity(Quartic(), Turtle(), alpha, alphadot, backend=b).checked() for b in BOTH]
+        balanced = [
+            body_velocity(Quartic(), Turtle(), alpha, alphadot, backend=b).checked()
+            for b in BOTH
+        ]
         np.testing.assert_allclose(*(x.xi for x in balanced), rtol=0, atol=1e-11)
         np.testing.assert_allclose(balanced[0].xi, found[0].xi, rtol=0, atol=1e-6)
 
@@ -355,7 +459,8 @@ def test_what_somebody_else_writes_runs_by_both(effects):
 def test_an_effect_of_ones_own_vanishes_at_its_limit():
     alpha, alphadot = GAIT.cycle(16)
     plain, soft = (
-        time_steps(GLASS, Turtle(), alpha, alphadot, effects=e, cycles=1).xi for e in ((), (Softening(1e9),))
+        time_steps(GLASS, Turtle(), alpha, alphadot, effects=e, cycles=1).xi
+        for e in ((), (Softening(1e9),))
     )
     np.testing.assert_allclose(soft, plain, rtol=0, atol=1e-7)
 
@@ -364,11 +469,18 @@ def test_an_effect_of_ones_own_vanishes_at_its_limit():
 def test_parameters_of_a_law_are_no_part_of_its_code():
     alpha, alphadot = (0.4, -0.7), (1.0, 0.3)
     for extra in (0.0, 1.0, 7.5):
-        one, other = (body_velocity(Quartic(extra), BODY, alpha, alphadot, backend=b).xi for b in BOTH)
+        one, other = (
+            body_velocity(Quartic(extra), BODY, alpha, alphadot, backend=b).xi
+            for b in BOTH
+        )
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-12)
-    isotropic = body_velocity(Quartic(0.0), BODY, alpha, alphadot, backend="numba", loads="gauss:24").xi
+    isotropic = body_velocity(
+        Quartic(0.0), BODY, alpha, alphadot, backend="numba", loads="gauss:24"
+    ).xi
     np.testing.assert_allclose(
-        isotropic, body_velocity(MEDIA["coulomb"], BODY, alpha, alphadot, loads="gauss:24").xi, atol=1e-10
+        isotropic,
+        body_velocity(MEDIA["coulomb"], BODY, alpha, alphadot, loads="gauss:24").xi,
+        atol=1e-10,
     )
 
 
@@ -400,7 +512,9 @@ def test_code_on_disk_is_that_of_the_formulas():
         own = types.ModuleType("own")
         with mock.patch.dict(sys.modules, own=own):
             exec(LAW.format(factor=factor), vars(own))
-        return [make(type(record(own.Own())))._cache.path for make in (kernel, net_kernel)]
+        return [
+            make(type(record(own.Own())))._cache.path for make in (kernel, net_kernel)
+        ]
 
     two, three = paths(2.0), paths(3.0)
     assert len({*two, *three}) == 4
@@ -422,7 +536,12 @@ def test_made_beforehand(capsys):
 
 def test_importing_loads_no_compiler():
     code = "import rft, geomech, sys; print([m for m in ('numba', 'llvmlite') if m in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True
+        ).stdout.strip()
+        == "[]"
+    )
 
 
 def doubled(x):
@@ -461,7 +580,10 @@ def test_code_has_another_key_once_a_function_that_it_names_changes(reached):
 
     def key(share, unused=1.0):
         module = types.ModuleType("formulas")
-        exec(f"def half(x):\n    return {share} * x\ndef other(x):\n    return {unused} * x", vars(module))
+        exec(
+            f"def half(x):\n    return {share} * x\ndef other(x):\n    return {unused} * x",
+            vars(module),
+        )
         own = {"formulas": module} if "." in reached else {"half": module.half}
         exec(f"def law(x):\n    return {reached}(x) + 1", own)
         return digest(own["law"])
@@ -470,7 +592,11 @@ def test_code_has_another_key_once_a_function_that_it_names_changes(reached):
 
 
 def flipped(at):
-    return lambda raw: raw[: int(at * len(raw))] + bytes([raw[int(at * len(raw))] ^ 8]) + raw[int(at * len(raw)) + 1 :]
+    return lambda raw: (
+        raw[: int(at * len(raw))]
+        + bytes([raw[int(at * len(raw))] ^ 8])
+        + raw[int(at * len(raw)) + 1 :]
+    )
 
 
 def unloadable(raw):
@@ -500,8 +626,14 @@ def test_damaged_code_is_set_aside_and_made_anew(damage, small):
     with pytest.warns(Note) as notes:
         assert not loaded()
     (note,) = (str(x.message) for x in notes)
-    why = "it cannot be loaded (UnpicklingError)" if damage == "unloadable" else "it is damaged"
-    assert note.startswith(f"the compiled code in {file.path} is not taken, {why}: renamed ")
+    why = (
+        "it cannot be loaded (UnpicklingError)"
+        if damage == "unloadable"
+        else "it is damaged"
+    )
+    assert note.startswith(
+        f"the compiled code in {file.path} is not taken, {why}: renamed "
+    )
     assert "python -m rft" in note and "\n" not in note
     assert file.path.with_name(file.path.name + ".damaged").read_bytes() == bad
     assert loaded()
@@ -515,7 +647,9 @@ def test_nothing_of_damaged_code_reaches_numba(small, monkeypatch):
     monkeypatch.setattr(file, "rename", lambda why: None)
     rng = np.random.default_rng(3)
     for at in [*range(82), *rng.integers(82, len(raw), 100)]:
-        file.path.write_bytes(raw[:at] + bytes([raw[at] ^ 1 << rng.integers(8)]) + raw[at + 1 :])
+        file.path.write_bytes(
+            raw[:at] + bytes([raw[at] ^ 1 << rng.integers(8)]) + raw[at + 1 :]
+        )
         assert file.read() is None
     file.path.write_bytes(raw)
     assert file.read() == good
@@ -528,7 +662,12 @@ def test_code_of_another_signature_is_not_taken(small):
     loaded, file = small
     loaded()
     raw = file.path.read_bytes()
-    assert file.load_overload("another signature", types.SimpleNamespace(refresh=lambda: None)) is None
+    assert (
+        file.load_overload(
+            "another signature", types.SimpleNamespace(refresh=lambda: None)
+        )
+        is None
+    )
     assert file.path.read_bytes() == raw
     assert loaded()
 
@@ -541,13 +680,21 @@ def test_code_that_cannot_be_kept_is_used_all_the_same(small, monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr("rft.balance.cache.os.replace", full)
-        with pytest.warns(Note, match="not kept in .*: No space left on device; make room"):
+        with pytest.warns(
+            Note, match="not kept in .*: No space left on device; make room"
+        ):
             assert not loaded()
         assert list(file.path.parent.iterdir()) == []
         file.path.write_bytes(b"")  # nor can it be renamed
         with pytest.warns(Note) as notes:
             assert not loaded()
-    assert sum("cannot be renamed (No space left on device): remove it" in str(x.message) for x in notes) == 1
+    assert (
+        sum(
+            "cannot be renamed (No space left on device): remove it" in str(x.message)
+            for x in notes
+        )
+        == 1
+    )
 
 
 def test_a_folder_that_cannot_be_made_costs_only_time(small, tmp_path, monkeypatch):
@@ -559,21 +706,46 @@ def test_a_folder_that_cannot_be_made_costs_only_time(small, tmp_path, monkeypat
 
 
 @pytest.mark.soak
-@pytest.mark.parametrize("damage", ["empty", "cut short", "a bit at 0.6", "unloadable", "full disk"])
+@pytest.mark.parametrize(
+    "damage", ["empty", "cut short", "a bit at 0.6", "unloadable", "full disk"]
+)
 def test_a_command_outlives_the_cache(damage, tmp_path, compiled_code):
     """Of the true code, in a process of its own; 20 s each. compiled_code: numba is there."""
-    (tmp_path / "s.toml").write_text(scenes.load("three-link-glass").text + '[numerics]\nbackend = "numba"\n')
-    env = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONWARNINGS": "error"}
-    args = ["-m", "geomech", "displacement", "s.toml", "--amplitudes", "1", "--tiers", "direct", "--json"]
+    (tmp_path / "s.toml").write_text(
+        scenes.load("three-link-glass").text + '[numerics]\nbackend = "numba"\n'
+    )
+    env = {
+        **os.environ,
+        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+        "PYTHONWARNINGS": "error",
+    }
+    args = [
+        "-m",
+        "geomech",
+        "displacement",
+        "s.toml",
+        "--amplitudes",
+        "1",
+        "--tiers",
+        "direct",
+        "--json",
+    ]
 
     def run(limit=resource.RLIM_INFINITY):
         small_files = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
         done = subprocess.run(
-            [sys.executable, *args], capture_output=True, text=True, env=env, cwd=tmp_path, preexec_fn=small_files
+            [sys.executable, *args],
+            capture_output=True,
+            text=True,
+            env=env,
+            cwd=tmp_path,
+            preexec_fn=small_files,
         )
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout)["direct"], [
-            x for x in done.stderr.splitlines() if " under way for " not in x and "compiling" not in x
+            x
+            for x in done.stderr.splitlines()
+            if " under way for " not in x and "compiling" not in x
         ]
 
     full = damage == "full disk"

@@ -26,7 +26,11 @@ GLASS = scenes.load("three-link-glass").with_numerics(grid=7)
 @pytest.fixture
 def fits(monkeypatch):
     counts, fit = [], connection.fit
-    monkeypatch.setattr(connection, "fit", lambda *args, **options: counts.append(1) or fit(*args, **options))
+    monkeypatch.setattr(
+        connection,
+        "fit",
+        lambda *args, **options: counts.append(1) or fit(*args, **options),
+    )
     return counts
 
 
@@ -42,7 +46,13 @@ def test_tables_are_kept_under_what_they_depend_on(fits):
         study.curvature_error,
     )
     assert len(fits) == 1
-    for changes in ({"grid": 9}, {"extent": 2.0}, {"directions": 4}, {"interpolation": 2}, {"regularisation": 1e-4}):
+    for changes in (
+        {"grid": 9},
+        {"extent": 2.0},
+        {"directions": 4},
+        {"interpolation": 2},
+        {"regularisation": 1e-4},
+    ):
         before = len(fits)
         other = study.with_numerics(**changes)
         assert np.abs(other.poses("path") - first).max() > 1e-9
@@ -62,7 +72,9 @@ def test_a_scene_is_small_and_remembers_nothing():
     for name in scenes.builtin_names():
         scene = scenes.load(name)
         held = dict(scene.__dict__)
-        study = Study(scene.with_numerics(phases=32, grid=5) if solver_of(scene.system) else scene)
+        study = Study(
+            scene.with_numerics(phases=32, grid=5) if solver_of(scene.system) else scene
+        )
         study.poses("direct", amplitudes=[scene.gait.amplitude / 2])
         if "path" in study.tiers:
             study.compute_field()
@@ -77,7 +89,9 @@ def made():
     numerics = Numerics(grid=9, extent=1.7, directions=12, phases=40)
     solver = Solver("gauss:7", 1e-4, 1e-9, 3, 21)
     for medium in MEDIA.values():
-        yield Scene(Swimmer(medium, rft.Chain(), solver=solver), Circle(amplitude=0.3), numerics)
+        yield Scene(
+            Swimmer(medium, rft.Chain(), solver=solver), Circle(amplitude=0.3), numerics
+        )
     for body in BODIES.values():
         wave = tuple((0.1 * k,) for k in range(body.joints))
         yield Scene(Swimmer(rft.Viscous(3.0), body), Fourier(cos=wave, sin=wave))
@@ -107,7 +121,9 @@ def test_what_is_written_reads_the_same():
         assert scenes.from_tables(scenes.tables(scene), scene.name) == scene
         if not scene.text:
             anew = scenes.toml(
-                dataclasses.replace(scene, text="# not its own\n" + scenes.load("three-link-glass").text)
+                dataclasses.replace(
+                    scene, text="# not its own\n" + scenes.load("three-link-glass").text
+                )
             )
             assert scenes.parse(anew, scene.name) == scene
 
@@ -116,9 +132,9 @@ def test_a_text_that_holds_is_kept_with_its_comments():
     glass = scenes.load("three-link-glass")
     assert scenes.toml(glass) == glass.text
     assert scenes.toml(glass.with_numerics(grid=31)) == glass.text
-    assert "#" not in scenes.toml(glass.with_numerics(grid=30)) and "grid = 30" in scenes.toml(
+    assert "#" not in scenes.toml(
         glass.with_numerics(grid=30)
-    )
+    ) and "grid = 30" in scenes.toml(glass.with_numerics(grid=30))
     changed = glass.changed(gait=Sine(elements=3, waves=0.5), body=rft.Backbone(3))
     assert scenes.parse(scenes.toml(changed), "three-link-glass") == changed
 
@@ -131,17 +147,28 @@ kind = "chain"
 [gait]
 kind = "circle"
 """
-MASS = '[[effects]]\nkind = "body-inertia"\ndrag = 2.1\n[[effects]]\nkind = "end-caps"\n'
+MASS = (
+    '[[effects]]\nkind = "body-inertia"\ndrag = 2.1\n[[effects]]\nkind = "end-caps"\n'
+)
 SIZES = "[physical]\nlength = 0.1\nfrequency = 3\nmass = 0.016\nradius = 0.06\n"
 
 
 def test_sizes_stand_once():
     scene = scenes.parse(PLAIN + SIZES + MASS)
-    assert scene.system.body == rft.Chain(length=0.1) and length_unit(scene.system) == "m"
-    assert scene.system.effects == (rft.BodyInertia(0.016, 3.0, 0.1, 2.1), rft.EndCaps(0.06))
+    assert (
+        scene.system.body == rft.Chain(length=0.1) and length_unit(scene.system) == "m"
+    )
+    assert scene.system.effects == (
+        rft.BodyInertia(0.016, 3.0, 0.1, 2.1),
+        rft.EndCaps(0.06),
+    )
     ground = '[[effects]]\nkind = "disturbed-ground"\nradius = 0.2\nweakening = 0.1\n'  # of the track, not the body
-    assert scenes.parse(PLAIN + SIZES + MASS + ground).system.effects[2] == rft.DisturbedGround(0.2, 0.1)
-    same = scenes.parse(PLAIN.replace('"chain"', '"chain"\nlength = 0.1') + SIZES + MASS)
+    assert scenes.parse(PLAIN + SIZES + MASS + ground).system.effects[
+        2
+    ] == rft.DisturbedGround(0.2, 0.1)
+    same = scenes.parse(
+        PLAIN.replace('"chain"', '"chain"\nlength = 0.1') + SIZES + MASS
+    )
     assert same == scene
 
 
@@ -181,7 +208,9 @@ def test_the_frame_is_the_scenes():
         and "frame" not in scenes.tables(top.changed(text=""))["body"]
     )
     turned = top.changed(system=in_frame(top.system, "link-3"))
-    assert turned.frame == "link-3" and Study(turned.with_numerics(phases=32)).poses("direct").shape == (3,)
+    assert turned.frame == "link-3" and Study(turned.with_numerics(phases=32)).poses(
+        "direct"
+    ).shape == (3,)
 
 
 def test_a_swimmer_may_be_told_in_full():
@@ -195,23 +224,40 @@ effects = [{kind = "end-caps", radius = 0.1}]
 kind = "circle"
 """
     short = PLAIN + '[[effects]]\nkind = "end-caps"\nradius = 0.1\n'
-    assert scenes.parse(nested) == scenes.parse(short) == scenes.parse('[system]\nkind = "swimmer"' + short)
+    assert (
+        scenes.parse(nested)
+        == scenes.parse(short)
+        == scenes.parse('[system]\nkind = "swimmer"' + short)
+    )
 
 
 def test_a_gait_that_leaves_the_field_between_few_phases_is_refused(monkeypatch):
     """Its largest angle lies at phase pi / 4096, between two of 4096; far inside the field not all phases are computed."""
     late, computed = np.pi / 4096, []
-    gait = Fourier(cos=((np.cos(late),), (0.5,)), sin=((np.sin(late),), (0.0,)), amplitude=2.5 * (1 + 1e-7))
+    gait = Fourier(
+        cos=((np.cos(late),), (0.5,)),
+        sin=((np.sin(late),), (0.0,)),
+        amplitude=2.5 * (1 + 1e-7),
+    )
     refuse_outside(GLASS, gait, phases=4096)
-    with pytest.raises(Refusal, match="alpha_1 = 2.5 rad lies outside the field's -2.5 to 2.5"):
+    with pytest.raises(
+        Refusal, match="alpha_1 = 2.5 rad lies outside the field's -2.5 to 2.5"
+    ):
         refuse_outside(GLASS, gait, phases=8192)
     mirrored = dataclasses.replace(
-        gait, cos=((-np.cos(late),), (0.5,)), sin=((-np.sin(late),), (0.0,)), centre=(-0.1, 0.0)
+        gait,
+        cos=((-np.cos(late),), (0.5,)),
+        sin=((-np.sin(late),), (0.0,)),
+        centre=(-0.1, 0.0),
     )
     mirrored = dataclasses.replace(mirrored, amplitude=gait.amplitude - 0.1)
-    with pytest.raises(Refusal, match="alpha_1 = -2.5 rad lies outside the field's -2.5 to 2.5"):
+    with pytest.raises(
+        Refusal, match="alpha_1 = -2.5 rad lies outside the field's -2.5 to 2.5"
+    ):
         refuse_outside(GLASS, mirrored, phases=8192)
     cycle = Fourier.cycle
-    monkeypatch.setattr(Fourier, "cycle", lambda *of: computed.append(of[1]) or cycle(*of))
+    monkeypatch.setattr(
+        Fourier, "cycle", lambda *of: computed.append(of[1]) or cycle(*of)
+    )
     refuse_outside(GLASS, gait, [0.5, 2.0], phases=10**6)
     assert computed == [4096]

@@ -48,18 +48,25 @@ def test_against_a_loop_of_fsolve():
     gait = Circle().cycle(64)
     alike = {"traits": Swimmer(GLASS, MIDDLE).traits}
     field = lambda how, threads, **known: connection.fit(
-        lambda a, d: body_velocity(GLASS, MIDDLE, a, d, backend=how, threads=threads).xi,
+        lambda a, d: (
+            body_velocity(GLASS, MIDDLE, a, d, backend=how, threads=threads).xi
+        ),
         connection.grid(2),
         8,
         trusted=True,
         **known,
     )
-    asked, samples = {"loop": lambda: [one_scipy_solve(alpha[i], alphadot[i]) for i in some]}, {"loop": len(some)}
+    asked, samples = (
+        {"loop": lambda: [one_scipy_solve(alpha[i], alphadot[i]) for i in some]},
+        {"loop": len(some)},
+    )
     for how in backends():
         for threads in sorted({1, os.cpu_count()}):
             for what, known in (("field", alike), ("field without symmetry", {})):
                 name = f"{what}, {NAMES[how]}, {threads} core{'s' * (threads > 1)}"
-                solve = lambda how=how, threads=threads, known=known: field(how, threads, **known)
+                solve = lambda how=how, threads=threads, known=known: field(
+                    how, threads, **known
+                )
                 asked[name], samples[name] = solve, len(alpha)
         swimmer = Swimmer(GLASS, MIDDLE, solver=Solver(backend=how))
         for name, f, (a, d) in (
@@ -68,12 +75,17 @@ def test_against_a_loop_of_fsolve():
             ("one velocity", swimmer.solve, (gait[0][3], gait[1][3])),
         ):
             solve = lambda f=f, a=a, d=d: [f(a, d) for _ in range(CALLS)]
-            asked[f"{name}, {NAMES[how]}"], samples[f"{name}, {NAMES[how]}"] = solve, CALLS * a[..., 0].size
+            asked[f"{name}, {NAMES[how]}"], samples[f"{name}, {NAMES[how]}"] = (
+                solve,
+                CALLS * a[..., 0].size,
+            )
     for f in asked.values():
         f()  # loads what is loaded once
     took = in_turn(asked)
     a_loop = took["loop"] / samples["loop"]
-    print(f"\nfsolve, 20 midpoints a link: {1e6 * a_loop:.0f} us a sample; what takes its time over ours:")
+    print(
+        f"\nfsolve, 20 midpoints a link: {1e6 * a_loop:.0f} us a sample; what takes its time over ours:"
+    )
     for name in list(asked)[1:]:
         ours = took[name] / samples[name]
         print(f"  {name:44} {a_loop / ours:8.0f}   ({1e6 * ours:.2f} us a sample)")
@@ -82,7 +94,10 @@ def test_against_a_loop_of_fsolve():
     solution = body_velocity(GLASS, MIDDLE, alpha, alphadot)
     flags = np.array([a[2] == 1 for a in answers])
     off = np.abs(np.array([a[0] for a in answers]) - solution.xi[some]).max(-1)
-    print(f"  the loop says it failed in {100 * np.mean(~flags):.0f} %, is off by more than 0.01 in", end=" ")
+    print(
+        f"  the loop says it failed in {100 * np.mean(~flags):.0f} %, is off by more than 0.01 in",
+        end=" ",
+    )
     print(f"{100 * np.mean(off > 0.01):.0f} %; ours all converged")
     assert (solution.status != "unconverged").all()
 
@@ -91,20 +106,37 @@ def test_starts():
     """Evaluations of a load a sample, from nothing and from velocities that are at hand anyway."""
     for name, gait in {"circle": Circle(), "butterfly": Butterfly()}.items():
         alpha, alphadot = gait.cycle(64)
-        solve = lambda step, first=0, alpha=alpha, alphadot=alphadot, **given: body_velocity(
-            GLASS, MIDDLE, alpha[first::step], alphadot[first::step], **given
+        solve = lambda step, first=0, alpha=alpha, alphadot=alphadot, **given: (
+            body_velocity(
+                GLASS, MIDDLE, alpha[first::step], alphadot[first::step], **given
+            )
         )
         xi = solve(1).xi
         between = (xi[::2] + np.roll(xi[::2], -1, 0)) / 2
         ways = {
-            "rounding ten times finer, from the usual one": (solve(4, regularisation=1e-7), {"start": xi[::4]}, 4, 0),
-            "every other phase, from its neighbours": (solve(2, 1), {"start": between}, 2, 1),
+            "rounding ten times finer, from the usual one": (
+                solve(4, regularisation=1e-7),
+                {"start": xi[::4]},
+                4,
+                0,
+            ),
+            "every other phase, from its neighbours": (
+                solve(2, 1),
+                {"start": between},
+                2,
+                1,
+            ),
         }
         for what, (cold, start, step, first) in ways.items():
-            warm = solve(step, first, **start, **({"regularisation": 1e-7} if step == 4 else {}))
+            warm = solve(
+                step, first, **start, **({"regularisation": 1e-7} if step == 4 else {})
+            )
             np.testing.assert_allclose(warm.xi, cold.xi, atol=1e-8)
             counts = cold.iterations.mean(), warm.iterations.mean()
-            print(f"\n{name}, {what}: {counts[0]:.1f} evaluations cold, {counts[1]:.1f} warm", end="")
+            print(
+                f"\n{name}, {what}: {counts[0]:.1f} evaluations cold, {counts[1]:.1f} warm",
+                end="",
+            )
             assert counts[1] <= counts[0]
 
 
@@ -112,14 +144,19 @@ def test_a_march_of_a_hundred_elements():
     """Steps with a transient, by both back ends."""
     alpha, alphadot = Sine(elements=100).cycle(32, 0.2)
     given = {"effects": (Transient(travel=0.05),), "cycles": 2}
-    march = lambda how: time_steps(GLASS, Backbone(100), alpha, alphadot, backend=how, **given)
+    march = lambda how: time_steps(
+        GLASS, Backbone(100), alpha, alphadot, backend=how, **given
+    )
     answers = [march(how).xi for how in backends()]
     for other in answers[1:]:
         np.testing.assert_allclose(other, answers[0], atol=1e-10)
     took = in_turn({how: lambda how=how: march(how) for how in backends()})
     for how, seconds in took.items():
         ratio = took["numpy"] / seconds
-        print(f"\n100 elements, transient, {NAMES[how]}: {1e3 * seconds / 64:.2f} ms a step, ratio {ratio:.1f}", end="")
+        print(
+            f"\n100 elements, transient, {NAMES[how]}: {1e3 * seconds / 64:.2f} ms a step, ratio {ratio:.1f}",
+            end="",
+        )
 
 
 def test_direct_tier_of_a_circle_to_four_digits():
@@ -149,8 +186,18 @@ def test_the_geometers_pipeline():
     def pipeline():
         study = Study(scene)
         seen = study.in_frame("minimum-perturbation")
-        tables = study.fitted, study.metric, study.curvature, seen.fitted, seen.curvature
-        return tables, seen.poses("area", amplitudes=[1.0]), study.poses("direct", amplitudes=[1.0])
+        tables = (
+            study.fitted,
+            study.metric,
+            study.curvature,
+            seen.fitted,
+            seen.curvature,
+        )
+        return (
+            tables,
+            seen.poses("area", amplitudes=[1.0]),
+            study.poses("direct", amplitudes=[1.0]),
+        )
 
     def cpu(f, count=1):
         start = time.process_time()
@@ -162,8 +209,13 @@ def test_the_geometers_pipeline():
     some = np.random.default_rng(0).choice(len(alpha), 50, replace=False)
     loop = lambda: [one_scipy_solve(alpha[i], alphadot[i]) for i in some]
     pipeline(), loop()  # loads what is loaded once
-    a_loop, ours = cpu(loop) * len(alpha) / len(some), min(cpu(pipeline) for _ in range(5))
-    print(f"\npipeline: {ours:.3f} CPU seconds, the loop for A alone {a_loop:.1f}, ratio {a_loop / ours:.0f}")
+    a_loop, ours = (
+        cpu(loop) * len(alpha) / len(some),
+        min(cpu(pipeline) for _ in range(5)),
+    )
+    print(
+        f"\npipeline: {ours:.3f} CPU seconds, the loop for A alone {a_loop:.1f}, ratio {a_loop / ours:.0f}"
+    )
     assert a_loop > 10 * ours
 
 
@@ -185,16 +237,31 @@ def test_a_sweep_of_ten_thousand_points_on_two_cores(over, tmp_path):
     ]
     wall, computing = {}, {}
     for count in (1, 2):
-        before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-        subprocess.run(
-            [*args, "-o", f"{count}.nc", "--workers", str(count)], cwd=tmp_path, check=True, capture_output=True
+        before, start = (
+            resource.getrusage(resource.RUSAGE_CHILDREN),
+            time.perf_counter(),
         )
-        wall[count], after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
-        computing[count] = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        subprocess.run(
+            [*args, "-o", f"{count}.nc", "--workers", str(count)],
+            cwd=tmp_path,
+            check=True,
+            capture_output=True,
+        )
+        wall[count], after = (
+            time.perf_counter() - start,
+            resource.getrusage(resource.RUSAGE_CHILDREN),
+        )
+        computing[count] = (
+            after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        )
     assert (tmp_path / "1.nc").read_bytes() == (tmp_path / "2.nc").read_bytes()
-    print(f"\n10,000 points: one process {wall[1]:.1f} s, two {wall[2]:.1f} s, ratio {wall[1] / wall[2]:.2f};", end=" ")
     print(
-        f"computing {computing[1]:.1f} and {computing[2]:.1f} s, at best {2 * computing[1] / computing[2]:.2f}", end=""
+        f"\n10,000 points: one process {wall[1]:.1f} s, two {wall[2]:.1f} s, ratio {wall[1] / wall[2]:.2f};",
+        end=" ",
+    )
+    print(
+        f"computing {computing[1]:.1f} and {computing[2]:.1f} s, at best {2 * computing[1] / computing[2]:.2f}",
+        end="",
     )
 
 
@@ -243,13 +310,23 @@ def test_sand_under_a_hexapod():
             with sand_under(model, law, how) as sand:
                 rates[name] = max(rate(model, steps) for _ in range(3))
                 if how == "numba":
-                    rates["compiled, above the sand"] = max(rate(model, steps, 30.0) for _ in range(3))
-        printed = mujoco.MjModel.from_xml_string(text.replace("<mujoco>", '<mujoco><size nuserdata="310000"/>'))
+                    rates["compiled, above the sand"] = max(
+                        rate(model, steps, 30.0) for _ in range(3)
+                    )
+        printed = mujoco.MjModel.from_xml_string(
+            text.replace("<mujoco>", '<mujoco><size nuserdata="310000"/>')
+        )
         for spacing in (0.02, 0.01):
-            with sand_under(printed, law, "numba", footprints=sands.Footprints(spacing, 3.0, 2.0)):
-                rates[f"compiled, footprints of {100 * spacing:.0f} cm"] = max(rate(printed, 4000) for _ in range(3))
+            with sand_under(
+                printed, law, "numba", footprints=sands.Footprints(spacing, 3.0, 2.0)
+            ):
+                rates[f"compiled, footprints of {100 * spacing:.0f} cm"] = max(
+                    rate(printed, 4000) for _ in range(3)
+                )
         with sand_under(model, law, "numba", regions={"y > 0": law}):
-            rates["compiled, a boundary below the robot"] = max(rate(model, 4000) for _ in range(3))
+            rates["compiled, a boundary below the robot"] = max(
+                rate(model, 4000) for _ in range(3)
+            )
         share = 1 / rates["compiled"] - 1 / rates["no floor"]  # s a step
         print(
             f"\n{type(law).__name__}: {sand.elements} elements, of which {sand.elements / share / 1e6:.0f} M a second"
@@ -261,7 +338,9 @@ def test_sand_under_a_hexapod():
                 batch.step(nstep=50)
                 begin = time.perf_counter()
                 batch.step(nstep=200)
-                rates[f"64 in a Batch on {os.cpu_count()} cores"] = 64 * 200 / (time.perf_counter() - begin)
+                rates[f"64 in a Batch on {os.cpu_count()} cores"] = (
+                    64 * 200 / (time.perf_counter() - begin)
+                )
         for name, x in rates.items():
             print(f"| {name} | {x:,.0f} | {x / rates['NumPy']:.1f} |")
         assert rates["compiled"] > 10 * rates["NumPy"]

@@ -46,10 +46,16 @@ def test_constants_of_the_scenes():
     heavy, slowed = scenes.load("sandfish-heavy"), scenes.load("sandfish-transient")
     mass = heavy.system.effects[1]
     assert (mass.mass, mass.frequency, mass.length, mass.drag) == (0.016, 3.0, 0.1, 2.1)
-    assert mass.inertia == pytest.approx(0.016 * 0.1 * (6 * math.pi) ** 2 / 2.1, rel=1e-12)
+    assert mass.inertia == pytest.approx(
+        0.016 * 0.1 * (6 * math.pi) ** 2 / 2.1, rel=1e-12
+    )
     # Eq. 2: 2 k rho g r |z| L with the numbers beside it in the scene.
-    assert mass.drag == pytest.approx(2 * 2.5 * 1450 * 9.81 * 0.006 * 0.05 * 0.1, rel=0.02)
-    skin = scenes.load("shovel-nosed-snake").system.effects[0]  # this snake never slides backwards
+    assert mass.drag == pytest.approx(
+        2 * 2.5 * 1450 * 9.81 * 0.006 * 0.05 * 0.1, rel=0.02
+    )
+    skin = scenes.load("shovel-nosed-snake").system.effects[
+        0
+    ]  # this snake never slides backwards
     assert (skin.forward, skin.backward, skin.reference) == (0.109, 0.137, 0.15)
     wave = 0.22 * float(slowed.gait.wavelength())
     assert slowed.system.effects[1].travel == pytest.approx(wave / 5, rel=0.01)
@@ -93,7 +99,11 @@ def granular(C, gamma0_deg):
     return law
 
 
-LOOSE, CLOSE, GRAINS = granular(1.8, 13.8), granular(0.77 / 0.59, 12.21), granular(1.49, 12.6)
+LOOSE, CLOSE, GRAINS = (
+    granular(1.8, 13.8),
+    granular(0.77 / 0.59, 12.21),
+    granular(1.49, 12.6),
+)
 VISCOUS, COULOMB = lambda a, u, eps: (a, 2 * u), granular(0.0, 10.0)
 
 
@@ -128,7 +138,9 @@ def sine(ratio, waves, elements):
     arc = np.concatenate([[0.0], np.cumsum(steps)])
     a_wave = arc[-1] / (waves + 3)
     s = waves * (np.arange(elements) + 0.5) / elements
-    return lambda t: np.arctan(slope * np.cos(np.interp((s + t[:, None] / (2 * np.pi) + 1) * a_wave, arc, p)))
+    return lambda t: np.arctan(
+        slope * np.cos(np.interp((s + t[:, None] / (2 * np.pi) + 1) * a_wave, arc, p))
+    )
 
 
 def serpenoid(size, elements):
@@ -157,10 +169,20 @@ INDEPENDENT = {
     "butterfly-glass": (LOOSE, three_links(butterfly), None, None),
     "serpenoid-glass": (LOOSE, serpenoid(6.0, 40), None, None),
     "sandfish-loose": (LOOSE, sine(0.22, 1.0, 100), head(0.06, 1.8, 13.8), None),
-    "sandfish-close": (CLOSE, sine(0.22, 1.0, 100), head(0.06, 0.77 / 0.59, 12.21), None),
+    "sandfish-close": (
+        CLOSE,
+        sine(0.22, 1.0, 100),
+        head(0.06, 0.77 / 0.59, 12.21),
+        None,
+    ),
     "seven-link-modes": (GRAINS, serpenoid(7 * 0.87, 7), None, None),
     "seven-link-wave": (GRAINS, serpenoid(7 * 0.87, 7), None, None),
-    "shovel-nosed-snake": (snake_skin, sine(0.2, 3.5, 140), head(0.014, 1.8, 13.8), None),
+    "shovel-nosed-snake": (
+        snake_skin,
+        sine(0.2, 3.5, 140),
+        head(0.014, 1.8, 13.8),
+        None,
+    ),
 }
 
 
@@ -175,20 +197,34 @@ def moving(headings, t, frame, points):
     share = (np.arange(points) + 0.5) / points
     place = ends[:, :-1, None] + share * np.diff(ends)[:, :, None]
     along = np.repeat(np.exp(1j * heading), points, 1)
-    return np.concatenate([place.reshape(len(t), -1), ends[:, -1:]], 1), np.concatenate([along, along[:, -1:]], 1)
+    return np.concatenate([place.reshape(len(t), -1), ends[:, -1:]], 1), np.concatenate(
+        [along, along[:, -1:]], 1
+    )
 
 
 def independent(law, headings, cap, frame, phases, points):
     """Net (x, y, theta) over a cycle: Newton with a Jacobian by differences at every phase, rounding off ever less."""
     t, h = 2 * np.pi * np.arange(phases) / phases, 1e-4
     points = max(2, points // headings(t).shape[1])
-    (before, _), (place, along), (after, _) = (moving(headings, t + k * h, frame, points) for k in (-1, 0, 1))
+    (before, _), (place, along), (after, _) = (
+        moving(headings, t + k * h, frame, points) for k in (-1, 0, 1)
+    )
     own = (after - before) / (2 * h)
 
     def net(xi, eps):
-        v = (own + xi[0, :, None] + 1j * xi[1, :, None] + 1j * xi[2, :, None] * place) * along.conj()
-        f = np.add(*(np.array(law(v.real, v.imag, eps)) * np.array([1, 1j])[:, None, None])) / (place.shape[1] - 1)
-        f[:, -1] = np.add(*(np.array(cap(v.real, v.imag, eps)) * np.array([1, 1j])[:, None, None]))[:, -1] if cap else 0
+        v = (
+            own + xi[0, :, None] + 1j * xi[1, :, None] + 1j * xi[2, :, None] * place
+        ) * along.conj()
+        f = np.add(
+            *(np.array(law(v.real, v.imag, eps)) * np.array([1, 1j])[:, None, None])
+        ) / (place.shape[1] - 1)
+        f[:, -1] = (
+            np.add(
+                *(np.array(cap(v.real, v.imag, eps)) * np.array([1, 1j])[:, None, None])
+            )[:, -1]
+            if cap
+            else 0
+        )
         f = f * along
         return np.stack([f.real.sum(1), f.imag.sum(1), (place.conj() * f).imag.sum(1)])
 
@@ -196,8 +232,13 @@ def independent(law, headings, cap, frame, phases, points):
     for eps in np.geomspace(1.0, 1e-4, 6):
         for _ in range(12):
             f, d = net(xi, eps), 1e-3 * eps
-            J = np.stack([(net(xi + d * e[:, None], eps) - f) / d for e in np.eye(3)], 1)
-            step, part = -np.linalg.solve(J.transpose(2, 0, 1), f.T[..., None])[..., 0].T, np.ones(phases)
+            J = np.stack(
+                [(net(xi + d * e[:, None], eps) - f) / d for e in np.eye(3)], 1
+            )
+            step, part = (
+                -np.linalg.solve(J.transpose(2, 0, 1), f.T[..., None])[..., 0].T,
+                np.ones(phases),
+            )
             for _ in range(8):
                 worse = np.abs(net(xi + part * step, eps)).max(0) > np.abs(f).max(0)
                 part = np.where(worse, part / 2, part)
@@ -218,5 +259,9 @@ def independent(law, headings, cap, frame, phases, points):
 @pytest.mark.parametrize("name", INDEPENDENT)
 def test_displacement_by_an_independent_sum(name):
     wanted = np.array(PINNED[name])
-    found = independent(*INDEPENDENT[name], phases=64, points=600 if name == "three-link-coulomb" else 240)
+    found = independent(
+        *INDEPENDENT[name],
+        phases=64,
+        points=600 if name == "three-link-coulomb" else 240,
+    )
     np.testing.assert_allclose(found, wanted, atol=3e-3 * np.abs(wanted).max())

@@ -41,18 +41,34 @@ def rows(kind, count=32, places=40, amplitude=0.1, noise=0.0, phases=None, seed=
     rng, s = np.random.default_rng(seed), np.linspace(0, 1, places)
     for share in np.arange(count) / count if phases is None else phases:
         if kind == "curvature":
-            values = sine_curvature(2 * np.pi * share, s, amplitude) + noise * rng.normal(size=places)
+            values = sine_curvature(
+                2 * np.pi * share, s, amplitude
+            ) + noise * rng.normal(size=places)
             yield from ((share, *pair) for pair in zip(s, values))
             continue
-        z = 12 * np.exp(1j * rng.uniform(0, 6)) * sine_points(2 * np.pi * share, s, amplitude) + 100 * rng.normal()
-        z += noise * np.abs(np.diff(z)).sum() * (rng.normal(size=places) + 1j * rng.normal(size=places))
-        number = [[k] for k in range(1, places + 1)] if kind == "numbered" else [[]] * places
+        z = (
+            12
+            * np.exp(1j * rng.uniform(0, 6))
+            * sine_points(2 * np.pi * share, s, amplitude)
+            + 100 * rng.normal()
+        )
+        z += (
+            noise
+            * np.abs(np.diff(z)).sum()
+            * (rng.normal(size=places) + 1j * rng.normal(size=places))
+        )
+        number = (
+            [[k] for k in range(1, places + 1)] if kind == "numbered" else [[]] * places
+        )
         yield from ((share, *n, x.real, x.imag) for n, x in zip(number, z))
 
 
 def write(folder, kind, table=None, name="swim.csv", **sizes):
     """A CSV file, and its path."""
-    lines = [",".join(f"{x:.17g}" for x in row) for row in (rows(kind, **sizes) if table is None else table)]
+    lines = [
+        ",".join(f"{x:.17g}" for x in row)
+        for row in (rows(kind, **sizes) if table is None else table)
+    ]
     path = folder / name
     path.write_text("\n".join(["# t in s, x and y in mm", HEADERS[kind], *lines, ""]))
     return path
@@ -74,7 +90,10 @@ def order(errors, counts):
 
 def test_order_in_frames(tmp_path):
     counts = [20, 40, 80]
-    errors = [off(write(tmp_path, "curvature", count=n, places=120, amplitude=0.05), 0.05) for n in counts]
+    errors = [
+        off(write(tmp_path, "curvature", count=n, places=120, amplitude=0.05), 0.05)
+        for n in counts
+    ]
     assert order(errors, counts) == pytest.approx(4.0, abs=0.4)
     assert errors[-1] < 2e-6
 
@@ -96,7 +115,9 @@ def test_order_along_the_body(kind, tmp_path):
 def sandfish():
     """The built-in sandfish with fewer elements, and its displacement."""
     full = scenes.load("sandfish-loose").with_numerics(phases=64)
-    made = full.changed(body=Backbone(ELEMENTS), gait=Sine(amplitude=0.2, elements=ELEMENTS))
+    made = full.changed(
+        body=Backbone(ELEMENTS), gait=Sine(amplitude=0.2, elements=ELEMENTS)
+    )
     return made, Study(made).poses("direct")
 
 
@@ -113,12 +134,23 @@ def test_smoothing_recovers_the_displacement(kind, noise, sandfish, tmp_path):
     """Noise of 5 % of the largest curvature, or of a thousandth of the body in every point; rms of two trials."""
     made, exact = sandfish
     paths = [
-        write(tmp_path, kind, name=f"{k}.csv", count=64, places=50, amplitude=0.2, noise=noise, seed=k)
+        write(
+            tmp_path,
+            kind,
+            name=f"{k}.csv",
+            count=64,
+            places=50,
+            amplitude=0.2,
+            noise=noise,
+            seed=k,
+        )
         for k in range(2)
     ]
 
     def error(**options):
-        poses = np.array([Study(made).poses("direct", gait(path, **options)) for path in paths])
+        poses = np.array(
+            [Study(made).poses("direct", gait(path, **options)) for path in paths]
+        )
         return np.sqrt(np.mean((poses - exact)[:, :2] ** 2) * 2)
 
     plain = error()
@@ -130,17 +162,34 @@ def test_smoothing_recovers_the_displacement(kind, noise, sandfish, tmp_path):
 def test_smoothing_is_least_squares(tmp_path):
     """With data in the span of the modes the fit is exact, and noise is left with its share of the degrees of freedom,
     three modes times three functions of time among all the numbers."""
-    phases, s = np.sort(np.random.default_rng(1).uniform(0, 1, 80)), np.linspace(0, 1, 60)
-    curvature = lambda share, s: (2 * s - 1) * np.cos(2 * np.pi * share) + 3 * (s - s**2) * np.sin(2 * np.pi * share)
+    phases, s = (
+        np.sort(np.random.default_rng(1).uniform(0, 1, 80)),
+        np.linspace(0, 1, 60),
+    )
+    curvature = lambda share, s: (
+        (2 * s - 1) * np.cos(2 * np.pi * share)
+        + 3 * (s - s**2) * np.sin(2 * np.pi * share)
+    )
     share, places = np.repeat(phases, 60), np.tile(s, 80)
     options = {"period": 1.0, "keep_harmonics": 1, "keep_modes": 3}
-    exact, noise = curvature(share, places), 0.5 * np.random.default_rng(2).normal(size=4800)
+    exact, noise = (
+        curvature(share, places),
+        0.5 * np.random.default_rng(2).normal(size=4800),
+    )
     clean = gait(write(tmp_path, "curvature", zip(share, places, exact)), **options)
-    t, joint = T - 2 * np.pi * phases[0], np.arange(1, ELEMENTS) / ELEMENTS  # phase 0 is the first frame
+    t, joint = (
+        T - 2 * np.pi * phases[0],
+        np.arange(1, ELEMENTS) / ELEMENTS,
+    )  # phase 0 is the first frame
     # The mean of a parabola over an element on either side is its value and 1/24 of its second derivative.
-    told = curvature(T[:, None] / (2 * np.pi), joint) - 6 * np.sin(T[:, None]) / 24 / ELEMENTS**2
+    told = (
+        curvature(T[:, None] / (2 * np.pi), joint)
+        - 6 * np.sin(T[:, None]) / 24 / ELEMENTS**2
+    )
     np.testing.assert_allclose(clean.shape(t) * ELEMENTS, told, atol=1e-10)
-    noisy = gait(write(tmp_path, "curvature", zip(share, places, exact + noise)), **options)
+    noisy = gait(
+        write(tmp_path, "curvature", zip(share, places, exact + noise)), **options
+    )
     left = np.sqrt(np.mean((noisy.shape(t) - clean.shape(t)) ** 2)) * ELEMENTS
     assert left == pytest.approx(0.5 * np.sqrt(9 / 4800), rel=0.4)
 
@@ -151,22 +200,39 @@ def test_modes_of_points_are_those_of_curvature(tmp_path):
     for share in np.arange(40) / 40:
         k = 0.3 + np.cos(2 * np.pi * share)
         table += [(share, z.real, z.imag) for z in np.expm1(1j * k * s) / (1j * k)]
-    found = gait(write(tmp_path, "points", table), keep_modes=1, keep_harmonics=1).shape(T) * ELEMENTS
-    np.testing.assert_allclose(found, np.repeat(0.3 + np.cos(T)[:, None], ELEMENTS - 1, 1), atol=2e-5)
+    found = (
+        gait(write(tmp_path, "points", table), keep_modes=1, keep_harmonics=1).shape(T)
+        * ELEMENTS
+    )
+    np.testing.assert_allclose(
+        found, np.repeat(0.3 + np.cos(T)[:, None], ELEMENTS - 1, 1), atol=2e-5
+    )
 
 
-@pytest.mark.parametrize("options", [{}, {"reverse": True}, {"keep_harmonics": 4, "keep_modes": 6, "reverse": True}])
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"reverse": True}, {"keep_harmonics": 4, "keep_modes": 6, "reverse": True}],
+)
 def test_it_is_a_gait(options, tmp_path):
-    made, h = gait(write(tmp_path, "points", amplitude=0.2), amplitude=0.7, **options), 1e-5
+    made, h = (
+        gait(write(tmp_path, "points", amplitude=0.2), amplitude=0.7, **options),
+        1e-5,
+    )
     slope = (made.shape(T + h) - made.shape(T - h)) / (2 * h)
     np.testing.assert_allclose(made.rate(T), slope, atol=1e-8)
     np.testing.assert_allclose(made.shape(0.0), made.shape(2 * np.pi), atol=1e-12)
     alpha, alphadot = made.cycle(16, [0.5, 2.0])
     assert alpha.shape == alphadot.shape == (2, 16, ELEMENTS - 1)
     np.testing.assert_allclose(alpha[1], 4 * alpha[0], atol=1e-14)
-    np.testing.assert_allclose(made.shape(T), 0.7 * dataclasses.replace(made, amplitude=1.0).shape(T), atol=1e-14)
+    np.testing.assert_allclose(
+        made.shape(T),
+        0.7 * dataclasses.replace(made, amplitude=1.0).shape(T),
+        atol=1e-14,
+    )
     forwards = dataclasses.replace(made, reverse=False)
-    np.testing.assert_allclose(made.shape(T), forwards.shape(-T if made.reverse else T), atol=1e-14)
+    np.testing.assert_allclose(
+        made.shape(T), forwards.shape(-T if made.reverse else T), atol=1e-14
+    )
     assert made.amplitude_label == "amplitude of the centreline (scale)"
 
 
@@ -177,20 +243,33 @@ def test_order_of_rows_and_marks_of_the_editor_do_not_matter(kind, tmp_path):
     # Without numbers the order within a frame is all there is: every frame's first row, every frame's second ...
     across = np.reshape(lines[:-1], (32, 40)).T.ravel()
     mixed = across if kind == "points" else np.random.default_rng(0).permutation(across)
-    path.write_bytes("\r\n".join(["\ufeff" + comment, "", header.upper(), *mixed, "# end"]).encode())
+    path.write_bytes(
+        "\r\n".join(["\ufeff" + comment, "", header.upper(), *mixed, "# end"]).encode()
+    )
     np.testing.assert_array_equal(gait(path).shape(T), plain)
 
 
 def test_ways_to_give_the_period(tmp_path):
     plain = gait(write(tmp_path, "points")).shape(T)
-    again = [*rows("points"), *((1.0, *row[1:]) for row in rows("points") if row[0] == 0)]
+    again = [
+        *rows("points"),
+        *((1.0, *row[1:]) for row in rows("points") if row[0] == 0),
+    ]
     for table, period in ((again, None), (again, 1.0), (list(rows("points")), 1.0)):
-        np.testing.assert_allclose(gait(write(tmp_path, "points", table), period=period).shape(T), plain, atol=1e-12)
+        np.testing.assert_allclose(
+            gait(write(tmp_path, "points", table), period=period).shape(T),
+            plain,
+            atol=1e-12,
+        )
         slower = [(7e5 + 20 * t, *z) for t, *z in table]
         found = gait(write(tmp_path, "points", slower), period=period and 20.0)
         np.testing.assert_allclose(found.shape(T), plain, atol=1e-8)
-    uneven = np.arange(64) / 64 + 0.005 * np.random.default_rng(0).uniform(-1, 1, 64) * (np.arange(64) > 0)
-    assert off(write(tmp_path, "curvature", phases=uneven, places=100), period=1.0) < 2e-3
+    uneven = np.arange(64) / 64 + 0.005 * np.random.default_rng(0).uniform(
+        -1, 1, 64
+    ) * (np.arange(64) > 0)
+    assert (
+        off(write(tmp_path, "curvature", phases=uneven, places=100), period=1.0) < 2e-3
+    )
 
 
 def test_equal_if_the_file_is(tmp_path):
@@ -200,7 +279,9 @@ def test_equal_if_the_file_is(tmp_path):
     assert first != gait(write(tmp_path, "points", amplitude=0.12))  # the same path
     with pytest.raises(ValueError, match="not the one whose sha256 is given"):
         dataclasses.replace(first, amplitude=0.5)
-    np.testing.assert_array_equal(first.shape(T), second.shape(T))  # a gait that has been read keeps what it has read
+    np.testing.assert_array_equal(
+        first.shape(T), second.shape(T)
+    )  # a gait that has been read keeps what it has read
 
 
 @pytest.mark.parametrize("share", [0.24, 0.26])
@@ -210,16 +291,29 @@ def test_a_quarter_of_the_period_without_a_frame_is_too_much(share, tmp_path):
     if share < 0.25:
         assert np.isfinite(gait(path, period=1.0).shape(T)).all()
     else:
-        with pytest.raises(ValueError, match="after t = 0.74 there is no frame for 0.26 of the period, more than 0.25"):
+        with pytest.raises(
+            ValueError,
+            match="after t = 0.74 there is no frame for 0.26 of the period, more than 0.25",
+        ):
             gait(path, period=1.0)
 
 
 @pytest.mark.parametrize(
     ("first", "last", "good"),
-    [(1e-6, 1, True), (1.001e-6, 1, False), (-1.001e-6, 1, False), (0, 1 + 9.99e-7, True), (0, 1 - 1.001e-6, False)],
+    [
+        (1e-6, 1, True),
+        (1.001e-6, 1, False),
+        (-1.001e-6, 1, False),
+        (0, 1 + 9.99e-7, True),
+        (0, 1 - 1.001e-6, False),
+    ],
 )
 def test_ends_of_the_body_may_be_off_by_a_millionth(first, last, good, tmp_path):
-    path = write(tmp_path, "curvature", [(t, {0: first, 1: last}.get(s, s), k) for t, s, k in rows("curvature")])
+    path = write(
+        tmp_path,
+        "curvature",
+        [(t, {0: first, 1: last}.get(s, s), k) for t, s, k in rows("curvature")],
+    )
     if good:
         assert off(path) < 1e-3
     else:
@@ -253,7 +347,9 @@ def test_file_lies_beside_the_scene(tmp_path, monkeypatch):
     toml = scene_in(tmp_path)
     write(tmp_path / "data", "points", count=64, places=80)
     (tmp_path / "elsewhere").mkdir()
-    code, out, err = geomech("displacement", "../snake.toml", "--amplitudes", "1", cwd=tmp_path / "elsewhere")
+    code, out, err = geomech(
+        "displacement", "../snake.toml", "--amplitudes", "1", cwd=tmp_path / "elsewhere"
+    )
     assert (code, err) == (0, "")
     made = scenes.load(toml)
     sine = Study(made).poses("direct", Sine(amplitude=0.1, elements=ELEMENTS))
@@ -272,13 +368,17 @@ def test_sweeps_are_taken_up_only_with_the_same_file(tmp_path, monkeypatch):
     over = {"body.length": [1.0, 2.0]}
     sweep.sweep(scenes.load(toml), over, partial)
     calls, solve = [], cycles._rows
-    monkeypatch.setattr(cycles, "_rows", lambda *some: calls.append(some) or solve(*some))
+    monkeypatch.setattr(
+        cycles, "_rows", lambda *some: calls.append(some) or solve(*some)
+    )
     sweep.sweep(scenes.load(toml), over, partial)
     assert calls == []
     write(tmp_path / "data", "points", count=12, places=20, amplitude=0.11)
     sweep.sweep(scenes.load(toml), over, partial)
     assert calls
-    swept = sweep.sweep(scenes.load(toml), {"body.length": [1.0, 2.0], "gait.amplitude": [0.5, 1.0]})
+    swept = sweep.sweep(
+        scenes.load(toml), {"body.length": [1.0, 2.0], "gait.amplitude": [0.5, 1.0]}
+    )
     assert np.isfinite(swept["displacement"]).all()
 
 
@@ -289,7 +389,9 @@ def edited(kind, edit, **sizes):
 
 
 def text(content):
-    return lambda path: path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return lambda path: path.write_bytes(
+        content if isinstance(content, bytes) else content.encode()
+    )
 
 
 def huge(path):
@@ -399,15 +501,25 @@ def test_bad_files_get_one_line(name, tmp_path):
 @pytest.mark.parametrize("noise", [0.0, 1.0])
 def test_a_wave_to_the_head_is_noted(kind, noise, tmp_path):
     """As of points that were given from the head, unless it is asked for."""
-    table = list(rows(kind, count=16, amplitude=0.2, noise=noise * {"curvature": 0.5, "points": 1e-3}[kind]))
+    table = list(
+        rows(
+            kind,
+            count=16,
+            amplitude=0.2,
+            noise=noise * {"curvature": 0.5, "points": 1e-3}[kind],
+        )
+    )
     gait(write(tmp_path, kind, table))  # warnings are errors here
     if kind == "points":
-        table = [row for k in range(0, len(table), 40) for row in table[k : k + 40][::-1]]
+        table = [
+            row for k in range(0, len(table), 40) for row in table[k : k + 40][::-1]
+        ]
     else:
         table = [(t, 1 - s, -value) for t, s, value in table]
     path = write(tmp_path, kind, table)
     with pytest.warns(
-        Note, match="^swim.csv: the wave runs from the tail to the head, .* give the points from the tail"
+        Note,
+        match="^swim.csv: the wave runs from the tail to the head, .* give the points from the tail",
     ):
         gait(path)
     gait(path, reverse=True)
@@ -418,11 +530,22 @@ def test_a_standing_wave_runs_nowhere_and_a_pause_is_no_end(tmp_path):
     s = np.linspace(0, 1, 12)
     for share in (1.0, 0.25):
         bend = [np.sin(np.pi * min(t / share, 1)) ** 2 for t in np.arange(24) / 24]
-        gait(write(tmp_path, "curvature", [(k / 24, x, 5 * b * np.cos(3 * x)) for k, b in enumerate(bend) for x in s]))
+        gait(
+            write(
+                tmp_path,
+                "curvature",
+                [
+                    (k / 24, x, 5 * b * np.cos(3 * x))
+                    for k, b in enumerate(bend)
+                    for x in s
+                ],
+            )
+        )
 
 
 @pytest.mark.parametrize(
-    ("column", "frequency"), [("t", 2.0), ("t", 1.02), ("t", None), ("frame", 2.0), ("phase", 2.0)]
+    ("column", "frequency"),
+    [("t", 2.0), ("t", 1.02), ("t", None), ("frame", 2.0), ("phase", 2.0)],
 )
 def test_a_frequency_that_is_not_that_of_t_is_noted(column, frequency, tmp_path):
     path = write(tmp_path, "points")
@@ -431,19 +554,25 @@ def test_a_frequency_that_is_not_that_of_t_is_noted(column, frequency, tmp_path)
         gait(path, frequency=frequency)
         return
     with pytest.warns(
-        UnitWarning, match="^swim.csv: the period is 1 in t, and frequency = 2 Hz makes it 0.5 s: mend one"
+        UnitWarning,
+        match="^swim.csv: the period is 1 in t, and frequency = 2 Hz makes it 0.5 s: mend one",
     ):
         gait(path, frequency=frequency)
 
 
 def test_what_an_estimate_leaves_out_is_told(tmp_path):
     """Of midlines that noise has moved by ten times the estimate and more."""
-    toml, said = scene_in(tmp_path, 12), "of the computation alone: what the measured midlines are off by is not in it"
+    toml, said = (
+        scene_in(tmp_path, 12),
+        "of the computation alone: what the measured midlines are off by is not in it",
+    )
     write(tmp_path / "data", "points", count=12, places=20)
     for more in ([], ["--json"]):
         told = geomech("displacement", toml, "--amplitudes", "1", *more)[1]
         assert (
-            json.loads(told)["estimate_is"] == said if more else f" estimated error: {said} " in " ".join(told.split())
+            json.loads(told)["estimate_is"] == said
+            if more
+            else f" estimated error: {said} " in " ".join(told.split())
         )
     measured = Study(scenes.load(toml))
     swept = lambda scene: Sweep(scene, {"gait.amplitude": [1.0]}).ask().attributes
@@ -456,14 +585,30 @@ def test_what_an_estimate_leaves_out_is_told(tmp_path):
 
 @pytest.mark.parametrize("elements", [2, 2001, 3.5, "x"])
 def test_elements_are_refused(elements, tmp_path):
-    with pytest.raises(ValueError, match="elements must be a whole number from 3 to 2000"):
+    with pytest.raises(
+        ValueError, match="elements must be a whole number from 3 to 2000"
+    ):
         gait(write(tmp_path, "points"), elements=elements)
 
 
 def test_mutated_files_run_or_are_refused(tmp_path):
     """Any warning is an error in the tests: nothing but a gait or a ValueError of one line comes out."""
     rng, ran, said = np.random.default_rng(0), 0, []
-    values = ["nan", "", "0", "-1", "1e12", "1e-320", "0.5", "x", "1,2", "#", "0.0833333333333", "1e400", "٣"]
+    values = [
+        "nan",
+        "",
+        "0",
+        "-1",
+        "1e12",
+        "1e-320",
+        "0.5",
+        "x",
+        "1,2",
+        "#",
+        "0.0833333333333",
+        "1e400",
+        "٣",
+    ]
     for k in range(60):
         path = write(tmp_path, list(HEADERS)[k % 3], count=8, places=6)
         lines = [line.split(",") for line in path.read_text().split("\n")]
@@ -472,10 +617,14 @@ def test_mutated_files_run_or_are_refused(tmp_path):
             if rng.random() < 0.3:
                 lines.insert(rng.integers(1, len(lines)), lines.pop(row))
             else:
-                lines[row][rng.integers(len(lines[row]))] = values[rng.integers(len(values))]
+                lines[row][rng.integers(len(lines[row]))] = values[
+                    rng.integers(len(values))
+                ]
         path.write_text("\n".join(map(",".join, lines)))
         try:
-            made = gait(path, period=[None, 1.0][k % 2], keep_modes=k % 4, keep_harmonics=k % 3)
+            made = gait(
+                path, period=[None, 1.0][k % 2], keep_modes=k % 4, keep_harmonics=k % 3
+            )
         except ValueError as error:
             said.append(str(error))
             continue
@@ -486,13 +635,23 @@ def test_mutated_files_run_or_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "line", ["root:x:0:0:secret", "secret", "password = secret", "t;secret", "secret,x", "[secret]"]
+    "line",
+    [
+        "root:x:0:0:secret",
+        "secret",
+        "password = secret",
+        "t;secret",
+        "secret,x",
+        "[secret]",
+    ],
 )
 def test_files_that_do_not_look_like_ours_are_not_quoted(line, tmp_path):
     (tmp_path / "data").mkdir()
     path = tmp_path / "data" / "theirs"
     path.write_text(f"{line}\nmore secret\n")
-    with pytest.raises(ValueError, match="the header must be t,s,curvature or") as caught:
+    with pytest.raises(
+        ValueError, match="the header must be t,s,curvature or"
+    ) as caught:
         Centreline(file=str(path))
     assert "secret" not in str(caught.value)
     path.write_text("t,s,kappa\n0,0,0\n")

@@ -30,7 +30,15 @@ SMALL = ["--grid", "9"]
 @pytest.mark.parametrize(
     "args",
     [
-        ["velocity", "three-link-viscous", "--alpha", "0,0", "--alphadot", "-1,0", "--json"],
+        [
+            "velocity",
+            "three-link-viscous",
+            "--alpha",
+            "0,0",
+            "--alphadot",
+            "-1,0",
+            "--json",
+        ],
         ["fly"],
     ],
 )
@@ -39,7 +47,15 @@ def test_a_process_says_what_the_tests_see(args):
 
 
 def test_velocity_speaks_json():
-    code, out, err = geomech("velocity", "three-link-viscous", "--alpha", "0,0", "--alphadot", "-1,0", "--json")
+    code, out, err = geomech(
+        "velocity",
+        "three-link-viscous",
+        "--alpha",
+        "0,0",
+        "--alphadot",
+        "-1,0",
+        "--json",
+    )
     assert (code, err) == (0, "")
     result = json.loads(out)
     np.testing.assert_allclose(result["xi"], [0, 1 / 18, -7 / 27], atol=1e-14)
@@ -49,15 +65,33 @@ def test_velocity_speaks_json():
 
 def test_connection_is_a_self_describing_file(tmp_path):
     file, plot = tmp_path / "a.nc", tmp_path / "a.svg"
-    code, _, err = geomech("connection", "three-link-glass", *SMALL, "--extent", "2.0", "-o", file, "--plot", plot)
+    code, _, err = geomech(
+        "connection",
+        "three-link-glass",
+        *SMALL,
+        "--extent",
+        "2.0",
+        "-o",
+        file,
+        "--plot",
+        plot,
+    )
     assert (code, err) == (0, "")
     with xarray.open_dataset(file) as data:
         assert data.A.dims == ("component", "joint", "alpha_1", "alpha_2")
-        assert data.ccf.dims == data.fit_residual.dims == ("component", "alpha_1", "alpha_2")
+        assert (
+            data.ccf.dims
+            == data.fit_residual.dims
+            == ("component", "alpha_1", "alpha_2")
+        )
         assert data.component.values.tolist() == ["x", "y", "theta"]
         assert (data.alpha_1.values[[0, -1]] == [-2.0, 2.0]).all()
-        assert all("units" in data[v].attrs for v in ("A", "ccf", "fit_residual", "alpha_1"))
-        again = Study(scenes.parse(data.attrs["scene"]).with_numerics(grid=9, extent=2.0)).fitted
+        assert all(
+            "units" in data[v].attrs for v in ("A", "ccf", "fit_residual", "alpha_1")
+        )
+        again = Study(
+            scenes.parse(data.attrs["scene"]).with_numerics(grid=9, extent=2.0)
+        ).fitted
         np.testing.assert_array_equal(data.A, again.A)
         np.testing.assert_array_equal(data.fit_residual, again.residual)
         np.testing.assert_allclose(data.ccf, curvature.ccf(again).values, rtol=1e-13)
@@ -69,7 +103,14 @@ def test_connection_is_a_self_describing_file(tmp_path):
 def test_displacement_by_every_tier(tmp_path):
     plot = tmp_path / "d.png"
     code, out, err = geomech(
-        "displacement", "three-link-glass", "--amplitudes", "0.5:1.0:2", *SMALL, "--json", "--plot", plot
+        "displacement",
+        "three-link-glass",
+        "--amplitudes",
+        "0.5:1.0:2",
+        *SMALL,
+        "--json",
+        "--plot",
+        plot,
     )
     assert (code, err) == (0, "")
     table = json.loads(out)
@@ -78,26 +119,55 @@ def test_displacement_by_every_tier(tmp_path):
         ("area", "path", "direct"), (2, 3)
     )
     assert math.hypot(*table["direct"][1][:2]) == pytest.approx(0.0638, rel=0.01)
-    assert {m: len(e) for m, e in table["estimate_heading"].items()} == dict.fromkeys(table["estimate"], 2)
+    assert {m: len(e) for m, e in table["estimate_heading"].items()} == dict.fromkeys(
+        table["estimate"], 2
+    )
     assert plot.is_file()
-    code, out, _ = geomech("displacement", "three-link-glass", "--amplitudes", "3.0", "--tiers", "direct")
+    code, out, _ = geomech(
+        "displacement", "three-link-glass", "--amplitudes", "3.0", "--tiers", "direct"
+    )
     assert code == 0
     assert "direct" in out
     assert "area" not in out
 
 
 def test_displacement_to_a_tolerance():
-    code, out, err = geomech("displacement", "three-link-glass", "--amplitudes", "0.5,1.0", "--tol", "1e-3", "--json")
+    code, out, err = geomech(
+        "displacement",
+        "three-link-glass",
+        "--amplitudes",
+        "0.5,1.0",
+        "--tol",
+        "1e-3",
+        "--json",
+    )
     assert (code, err) == (0, "")
     answer = json.loads(out)
     assert max(answer["estimate"][answer["tier"]]) <= 1e-3
-    assert {len(answer[key][answer["tier"]]) for key in ("estimate", "estimate_heading", "net_distance")} == {2}
-    plain = ("displacement", "three-link-glass", "--amplitudes", "0.5,1.0", "--tiers", "direct", "--json")
-    without = json.loads(geomech(*plain)[1])  # of one form, whether a tolerance is asked for or not
-    assert set(answer) - set(without) == {"tier", "tolerance", "settings"} and set(without) - set(answer) == {"kept"}
+    assert {
+        len(answer[key][answer["tier"]])
+        for key in ("estimate", "estimate_heading", "net_distance")
+    } == {2}
+    plain = (
+        "displacement",
+        "three-link-glass",
+        "--amplitudes",
+        "0.5,1.0",
+        "--tiers",
+        "direct",
+        "--json",
+    )
+    without = json.loads(
+        geomech(*plain)[1]
+    )  # of one form, whether a tolerance is asked for or not
+    assert set(answer) - set(without) == {"tier", "tolerance", "settings"} and set(
+        without
+    ) - set(answer) == {"kept"}
     assert all(type(answer[k]) is type(without[k]) for k in without if k != "kept")
     assert answer["units"] == {**without["units"], "tolerance": "BL"}
-    code, out, _ = geomech("displacement", "three-link-viscous", "--amplitudes", "1", "--tol", "1e-9")
+    code, out, _ = geomech(
+        "displacement", "three-link-viscous", "--amplitudes", "1", "--tol", "1e-9"
+    )
     assert code == 0
     assert "direct" in out
 
@@ -105,7 +175,9 @@ def test_displacement_to_a_tolerance():
 @pytest.fixture
 def undrawn(monkeypatch):
     """Figures are made and not drawn, which takes half a second each: data/commands.txt has those of these commands."""
-    monkeypatch.setattr(plots, "save", lambda fig, *paths: [path.touch() for path in paths])
+    monkeypatch.setattr(
+        plots, "save", lambda fig, *paths: [path.touch() for path in paths]
+    )
 
 
 def test_accuracy_leaves_its_study(undrawn, tmp_path):
@@ -121,16 +193,26 @@ def test_accuracy_leaves_its_study(undrawn, tmp_path):
     assert {x["label"] for x in found["lines"]} == {
         *(f"direct: {setting}" for setting in ("phases", "segments", "nodes")), "adapted: curves", "area: grid"
     }  # fmt: skip
-    assert all(len(x["value"]) == len(x["error"]) == len(x["seconds"]) for x in found["lines"])
+    assert all(
+        len(x["value"]) == len(x["error"]) == len(x["seconds"]) for x in found["lines"]
+    )
     written = (tmp_path / "out" / "accuracy.txt").read_text()
-    assert written == "\n".join([accuracy.table(found), "", *accuracy.sentences(found), ""])
-    assert " ".join(out.split()).startswith(" ".join(written.split()))  # lines are wrapped on a screen
+    assert written == "\n".join(
+        [accuracy.table(found), "", *accuracy.sentences(found), ""]
+    )
+    assert " ".join(out.split()).startswith(
+        " ".join(written.split())
+    )  # lines are wrapped on a screen
 
 
 def test_run_leaves_everything(undrawn, tmp_path):
-    glass = scenes.parse(scenes.load("three-link-glass").text + "\n[numerics]\ngrid = 9\n")
+    glass = scenes.parse(
+        scenes.load("three-link-glass").text + "\n[numerics]\ngrid = 9\n"
+    )
     (tmp_path / "s.toml").write_text(glass.text)
-    code, out, err = geomech("run", tmp_path / "s.toml", "-o", tmp_path / "deep" / "dir")
+    code, out, err = geomech(
+        "run", tmp_path / "s.toml", "-o", tmp_path / "deep" / "dir"
+    )
     assert (code, err) == (0, "")
     files = {p.name for p in (tmp_path / "deep" / "dir").iterdir()}
     assert files == {
@@ -143,12 +225,25 @@ def test_run_leaves_everything(undrawn, tmp_path):
     tables = json.loads((tmp_path / "deep" / "dir" / "displacement.json").read_text())
     assert set(tables) == {"circle", "butterfly"}
     for gait, table in tables.items():
-        run = {"circle": glass.gait, "butterfly": scenes.load("butterfly-glass").gait}[gait]
+        run = {"circle": glass.gait, "butterfly": scenes.load("butterfly-glass").gait}[
+            gait
+        ]
         wanted = Study(glass).poses("direct", run, np.array(table["amplitude"]))
         np.testing.assert_allclose(table["direct"], wanted, atol=1e-9)
         assert f"{wanted[-1, 0]:.6f}  +-" in out
         assert ("note" in table) == (gait == "butterfly")
-    assert tables["circle"]["amplitude"] == [0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5]
+    assert tables["circle"]["amplitude"] == [
+        0.25,
+        0.5,
+        0.75,
+        1.0,
+        1.25,
+        1.5,
+        1.75,
+        2.0,
+        2.25,
+        2.5,
+    ]
     assert tables["butterfly"]["amplitude"] == [k / 10 for k in range(1, 14)]
     assert (
         "butterfly: not in the scene, added to compare" in out
@@ -162,24 +257,41 @@ def test_scenes_are_listed():
     code, out, _ = geomech("scenes")
     assert code == 0
     heads = [line.split()[0] for line in out.splitlines() if line[:1].strip()]
-    assert {*scenes.builtin_names(), "c-leg", "xplorer", "glass-0.3mm-loose", "poppy-seeds-close"} <= {*heads}
-    assert geomech("scenes", "--show", "three-link-glass")[1] == scenes.load("three-link-glass").text
+    assert {
+        *scenes.builtin_names(),
+        "c-leg",
+        "xplorer",
+        "glass-0.3mm-loose",
+        "poppy-seeds-close",
+    } <= {*heads}
+    assert (
+        geomech("scenes", "--show", "three-link-glass")[1]
+        == scenes.load("three-link-glass").text
+    )
 
 
 PLAIN = '[medium]\nname = "glass-0.3mm-loose"\n[body]\nkind = "chain"\n[gait]\nkind = "circle"\n'
 BAD = [  # what frozen refusals cannot hold: files of other kinds, and what is long
-    (["connection", "three-link-glass", "-o", "pipe.nc"], "cannot write pipe.nc: it is no ordinary file"),
+    (
+        ["connection", "three-link-glass", "-o", "pipe.nc"],
+        "cannot write pipe.nc: it is no ordinary file",
+    ),
     (["run", "broken.toml"], "broken.toml is not TOML"),
     (["run", "-o", "broken.toml"], "cannot write the folder broken.toml"),
     (["explain", "a" * 5000], "scene"),
-    (["displacement", "deep.toml", "--amplitudes", "1", "--grid", "9" * 5000], "--grid"),
+    (
+        ["displacement", "deep.toml", "--amplitudes", "1", "--grid", "9" * 5000],
+        "--grid",
+    ),
     (["explain", "deep.toml"], "deep.toml is not TOML"),
     (["explain", "digits.toml"], "digits.toml is not TOML"),
     (["explain", "key.toml"], "key.toml: [gait]"),
 ]
 
 
-@pytest.mark.parametrize(("args", "said"), BAD, ids=[" ".join(args)[:40] for args, _ in BAD])
+@pytest.mark.parametrize(
+    ("args", "said"), BAD, ids=[" ".join(args)[:40] for args, _ in BAD]
+)
 def test_bad_input_gets_one_line_and_exit_code_2(args, said, tmp_path):
     (tmp_path / "broken.toml").write_text("[medium\n")
     (tmp_path / "deep.toml").write_text(PLAIN + "amplitude = " + "[" * 2000)
@@ -212,7 +324,10 @@ def test_a_failure_half_way_leaves_nothing(undrawn, tmp_path, monkeypatch):
 
     monkeypatch.setattr(plots, "displacement_figure", fail)
     small = scenes.load("three-link-viscous").with_numerics(grid=5)
-    with pytest.raises(ValueError, match="half way"), files.atomic_folder(tmp_path / "out") as folder:
+    with (
+        pytest.raises(ValueError, match="half way"),
+        files.atomic_folder(tmp_path / "out") as folder,
+    ):
         report.write(Report(small).ask(), folder)
     assert list(tmp_path.iterdir()) == []
 
@@ -233,10 +348,14 @@ def quick(monkeypatch):
 
     def write(result, folder, drawn=None):
         for name in (report.SCENE, report.TABLES):
-            (folder / name).write_text(result.subject.text if name == report.SCENE else "{}")
+            (folder / name).write_text(
+                result.subject.text if name == report.SCENE else "{}"
+            )
 
     monkeypatch.setattr(report, "write", write)
-    monkeypatch.setattr(Report, "answer", lambda self, *_: Result("report", (), {}, self.scene))
+    monkeypatch.setattr(
+        Report, "answer", lambda self, *_: Result("report", (), {}, self.scene)
+    )
     monkeypatch.setattr("geomech.text.report.text", lambda result: "")
 
 
@@ -245,19 +364,29 @@ def test_run_says_what_it_replaces(quick, tmp_path):
     (tmp_path / "results" / "mine.txt").write_text("mine")
     assert geomech("run", cwd=tmp_path)[::2] == (0, "")
     code, _, err = geomech("run", "three-link-viscous", cwd=tmp_path)
-    assert (code, err) == (0, "note: replaced in results: displacement.json, scene.toml\n")
-    assert (tmp_path / "results" / "scene.toml").read_text() == scenes.load("three-link-viscous").text
+    assert (code, err) == (
+        0,
+        "note: replaced in results: displacement.json, scene.toml\n",
+    )
+    assert (tmp_path / "results" / "scene.toml").read_text() == scenes.load(
+        "three-link-viscous"
+    ).text
     assert (tmp_path / "results" / "mine.txt").read_text() == "mine"
 
 
 def test_run_replaces_no_scene_that_it_did_not_leave(quick, tmp_path):
     mine = scenes.load("three-link-glass").text
     (tmp_path / "scene.toml").write_text(mine)
-    for name, said in (("three-link-viscous", "another scene stands there"), ("scene.toml", "it is an input")):
+    for name, said in (
+        ("three-link-viscous", "another scene stands there"),
+        ("scene.toml", "it is an input"),
+    ):
         code, _, err = geomech("run", name, "-o", ".", cwd=tmp_path)
         assert code == 2
         assert said in err
-    assert geomech("run", "three-link-glass", "-o", ".", cwd=tmp_path)[0] == 0  # the same text
+    assert (
+        geomech("run", "three-link-glass", "-o", ".", cwd=tmp_path)[0] == 0
+    )  # the same text
     assert (tmp_path / "scene.toml").read_text() == mine
 
 
@@ -293,7 +422,9 @@ def test_a_scene_is_not_written_over(command, how, tmp_path):
 
 def test_neither_are_its_measurements(tmp_path):
     rows = [
-        f"{k / 16},{s},{2 * math.sin(2 * math.pi * (k / 16 + s))}" for k in range(16) for s in (0, 0.25, 0.5, 0.75, 1)
+        f"{k / 16},{s},{2 * math.sin(2 * math.pi * (k / 16 + s))}"
+        for k in range(16)
+        for s in (0, 0.25, 0.5, 0.75, 1)
     ]
     (tmp_path / "swim.svg").write_text("\n".join(["t,s,curvature", *rows]))
     text = BACKBONE.replace('"sine"', '"centreline"\nfile = "swim.svg"')
@@ -302,7 +433,15 @@ def test_neither_are_its_measurements(tmp_path):
     code, _, err = geomech("sweep", *args, cwd=tmp_path)
     assert code == 2
     assert "cannot write swim.svg: it is an input" in err
-    code, _, err = geomech("displacement", "s.toml", "--amplitudes", "0.1", "--plot", "swim.svg", cwd=tmp_path)
+    code, _, err = geomech(
+        "displacement",
+        "s.toml",
+        "--amplitudes",
+        "0.1",
+        "--plot",
+        "swim.svg",
+        cwd=tmp_path,
+    )
     assert code == 2
     assert "cannot write swim.svg: it is an input" in err
     assert (tmp_path / "swim.svg").read_text().startswith("t,s,curvature")
@@ -311,7 +450,16 @@ def test_neither_are_its_measurements(tmp_path):
 def test_one_file_is_not_two_outputs(tmp_path):
     (tmp_path / "a.nc").write_text("")
     (tmp_path / "a.svg").symlink_to("a.nc")
-    code, _, err = geomech("connection", "three-link-viscous", *SMALL, "-o", "a.nc", "--plot", "a.svg", cwd=tmp_path)
+    code, _, err = geomech(
+        "connection",
+        "three-link-viscous",
+        *SMALL,
+        "-o",
+        "a.nc",
+        "--plot",
+        "a.svg",
+        cwd=tmp_path,
+    )
     assert code == 2
     assert "cannot write" in err
 
@@ -332,20 +480,38 @@ def test_names_that_are_not_text_are_kept(tmp_path):
             os.fsdecode(b"\xe9.png"),
         ),
         ("connection", name, *SMALL, "-o", "a.nc"),
-        ("displacement", name, "--amplitudes", "0.5", "--tiers", "direct", "--plot", "d.pdf"),
+        (
+            "displacement",
+            name,
+            "--amplitudes",
+            "0.5",
+            "--tiers",
+            "direct",
+            "--plot",
+            "d.pdf",
+        ),
         ("displacement", name, "--amplitudes", "0.5", "--tol", "0.1", "--json"),
         ("explain", name),
     ):
         code, _, err = geomech(*args, cwd=tmp_path)
         assert (code, err) == (0, "")
-    for file, start in ((os.fsdecode(b"\xe9.nc"), "Net displacement"), ("a.nc", "Local connection")):
-        with xarray.open_dataset(tmp_path / file, engine="scipy") as data:  # netCDF4, if it is there, takes text alone
+    for file, start in (
+        (os.fsdecode(b"\xe9.nc"), "Net displacement"),
+        ("a.nc", "Local connection"),
+    ):
+        with xarray.open_dataset(
+            tmp_path / file, engine="scipy"
+        ) as data:  # netCDF4, if it is there, takes text alone
             assert data.attrs["title"].startswith(start)
             assert data.attrs["title"].endswith("of the scene caf\\udce9.toml")
             said = scenes.parse(data.attrs["scene"], "three-link-viscous")
             wanted = scenes.load("three-link-viscous")
             assert said == (
-                wanted if file != "a.nc" else wanted.with_numerics(grid=int(SMALL[1]), extent=said.numerics.extent)
+                wanted
+                if file != "a.nc"
+                else wanted.with_numerics(
+                    grid=int(SMALL[1]), extent=said.numerics.extent
+                )
             )
     assert not any(p.name.startswith(".") for p in tmp_path.iterdir())
 
@@ -367,7 +533,10 @@ def pipe(content, endless=False):
     read, write = os.pipe()
 
     def bring():
-        with contextlib.suppress(BrokenPipeError), open(write, "wb", buffering=0) as file:
+        with (
+            contextlib.suppress(BrokenPipeError),
+            open(write, "wb", buffering=0) as file,
+        ):
             file.write(content)
             while endless:
                 file.write(content)
@@ -401,13 +570,29 @@ def test_a_scene_comes_through_a_pipe(tmp_path):
     for args, content, said in (
         (["explain"], text, "pipe: viscous (ratio = 2.0)"),
         (["connection", "--grid", "5", "-o", "a.nc"], text, ""),
-        (["explain"], b'[system]\nkind = "table"\nfile = "a.nc"\n[gait]\nkind = "circle"\n', "pipe: table ("),
+        (
+            ["explain"],
+            b'[system]\nkind = "table"\nfile = "a.nc"\n[gait]\nkind = "circle"\n',
+            "pipe: table (",
+        ),
     ):
         with pipe(content) as name:
             code, out, err = geomech(args[0], name, *args[1:], cwd=tmp_path)
         assert (code, err) == (0, "") and " ".join(out.split()).startswith(said)
-    sweep = [sys.executable, "-m", "geomech", "sweep", "/dev/stdin", "--over", "gait.amplitude=0.5,1", "-o", "b.nc"]
-    done = subprocess.run(sweep, input=text, capture_output=True, cwd=tmp_path, timeout=60)
+    sweep = [
+        sys.executable,
+        "-m",
+        "geomech",
+        "sweep",
+        "/dev/stdin",
+        "--over",
+        "gait.amplitude=0.5,1",
+        "-o",
+        "b.nc",
+    ]
+    done = subprocess.run(
+        sweep, input=text, capture_output=True, cwd=tmp_path, timeout=60
+    )
     assert (done.returncode, done.stderr) == (0, b"")
     assert done.stdout.startswith(b"2 points")
 
@@ -415,7 +600,12 @@ def test_a_scene_comes_through_a_pipe(tmp_path):
 def test_the_command_starts_without_the_heavy_libraries():
     heavy = ("numpy", "scipy", "matplotlib", "sympy", "rich.progress")
     code = f"import sys, geomech.cli; print([m for m in {heavy} if m in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "[]\n"
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True
+        ).stdout
+        == "[]\n"
+    )
 
 
 def test_commands_load_what_they_use_and_no_more(tmp_path):
@@ -424,12 +614,33 @@ def test_commands_load_what_they_use_and_no_more(tmp_path):
         ["velocity", "three-link-glass", "--alpha", "0.5,0.3", "--alphadot", "1,0"],
         ["explain", "three-link-glass"],
         ["scenes"],
-        ["displacement", "three-link-viscous", "--amplitudes", "0.5", "--tiers", "direct"],
+        [
+            "displacement",
+            "three-link-viscous",
+            "--amplitudes",
+            "0.5",
+            "--tiers",
+            "direct",
+        ],
         ["trajectory", "three-link-viscous", "-o", "t.csv"],
         ["sweep", "three-link-viscous", "--over", "gait.amplitude=0.5,1", "-o", "s.nc"],
     ]
-    heavy = ("matplotlib", "scipy.interpolate", "scipy.optimize", "scipy.spatial", "sympy", "numba", "distributed")
-    heavy += ("rft.walking", "rft.meshes", "geomech.scenes.walker", "concurrent.futures.process", "rich.progress")
+    heavy = (
+        "matplotlib",
+        "scipy.interpolate",
+        "scipy.optimize",
+        "scipy.spatial",
+        "sympy",
+        "numba",
+        "distributed",
+    )
+    heavy += (
+        "rft.walking",
+        "rft.meshes",
+        "geomech.scenes.walker",
+        "concurrent.futures.process",
+        "rich.progress",
+    )
     code = f"""if True:
         import os, sys
         from geomech import cli
@@ -443,13 +654,23 @@ def test_commands_load_what_they_use_and_no_more(tmp_path):
             assert not found, (args, found)
             assert os.environ["OPENBLAS_NUM_THREADS"] == "1"
     """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path
+    )
     assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.mark.parametrize(
     ("top", "step", "count"),
-    [(1.0, 0.1, 10), (1.3, 0.1, 13), (1.5, 0.2, 7), (0.07, 0.005, 14), (25.0, 2.5, 10), (3.0, 0.25, 12), (9.0, 1.0, 9)],
+    [
+        (1.0, 0.1, 10),
+        (1.3, 0.1, 13),
+        (1.5, 0.2, 7),
+        (0.07, 0.005, 14),
+        (25.0, 2.5, 10),
+        (3.0, 0.25, 12),
+        (9.0, 1.0, 9),
+    ],
 )
 def test_amplitudes_of_a_report_are_round_and_about_ten(top, step, count):
     assert steps(top) == pytest.approx(step * np.arange(1, count + 1), rel=1e-9)
@@ -462,12 +683,22 @@ def test_amplitudes_of_a_report_fill_the_field():
     for centre, amplitude, room in (((0.4, -0.8), 0.7, 1.2), ((0.8, -0.4), -0.7, 1.2)):
         gait = Circle(amplitude=amplitude, centre=centre, frequency=3.0)
         moved = scene.changed(gait=gait)
-        assert reachable(moved, gait) == pytest.approx(np.sign(amplitude) * np.array(steps(room)))
+        assert reachable(moved, gait) == pytest.approx(
+            np.sign(amplitude) * np.array(steps(room))
+        )
         own, other = _gaits(moved)
-        assert own is gait and (type(other).__name__, other.frequency) == ("Butterfly", 3.0)
-    with pytest.raises(Refusal, match="the gait's centre lies outside the field: raise \\[numerics\\] extent"):
+        assert own is gait and (type(other).__name__, other.frequency) == (
+            "Butterfly",
+            3.0,
+        )
+    with pytest.raises(
+        Refusal,
+        match="the gait's centre lies outside the field: raise \\[numerics\\] extent",
+    ):
         reachable(scene, Circle(centre=(0.0, 2.0)))
-    snake = scenes.load("no-slip-snake")  # with singular shapes the gait's own is the last
+    snake = scenes.load(
+        "no-slip-snake"
+    )  # with singular shapes the gait's own is the last
     gait = Circle(amplitude=-0.33, centre=snake.gait.centre)
     assert reachable(snake, gait) == pytest.approx([*(-np.array(steps(0.33))), -0.33])
     for still in (Circle(amplitude=0.0), Ellipse(semi_axes=(0.0, 0.0))):

@@ -23,7 +23,9 @@ from geomech.studies.study import Study
 GLASS = scenes.load("three-link-glass")
 VISCOUS = scenes.load("three-link-viscous")
 SLOPING = scenes.parse(
-    scenes.load("sandfish-loose").text.partition("[[effects]]")[0].replace("elements = 100", "elements = 10")
+    scenes.load("sandfish-loose")
+    .text.partition("[[effects]]")[0]
+    .replace("elements = 100", "elements = 10")
     + '\n[[effects]]\nkind = "transient"\ntravel = 0.1'
 )
 FIVE_LINKS = (
@@ -34,19 +36,73 @@ FIVE = scenes.parse(FIVE_LINKS)
 
 
 LARGE = {
-    "values of a sweep": ["sweep", "sandfish-transient", "--over", "medium.C=1:2:99999", "-o", "out.nc"],
-    "amplitudes of a sweep": ["sweep", "sandfish-loose", "--over", "gait.amplitude=0.1:2:99999", "-o", "out.nc"],
+    "values of a sweep": [
+        "sweep",
+        "sandfish-transient",
+        "--over",
+        "medium.C=1:2:99999",
+        "-o",
+        "out.nc",
+    ],
+    "amplitudes of a sweep": [
+        "sweep",
+        "sandfish-loose",
+        "--over",
+        "gait.amplitude=0.1:2:99999",
+        "-o",
+        "out.nc",
+    ],
     "a grid": ["connection", "three-link-glass", "--grid", "1414", "-o", "out.nc"],
-    "a field of four joints": ["connection", "finest.toml", "--grid", "36", "-o", "out.nc"],
-    "a connection around a gait": ["displacement", "five.toml", "--amplitudes", "0.1:0.5:99999", "--tiers", "path"],
+    "a field of four joints": [
+        "connection",
+        "finest.toml",
+        "--grid",
+        "36",
+        "-o",
+        "out.nc",
+    ],
+    "a connection around a gait": [
+        "displacement",
+        "five.toml",
+        "--amplitudes",
+        "0.1:0.5:99999",
+        "--tiers",
+        "path",
+    ],
     "a map": ["ccf", "directions.toml", "--grid", "301", "--plot", "out.png"],
     "directions": ["connection", "directions.toml", "-o", "out.nc", "--grid", "301"],
-    "harmonics": ["displacement", "harmonics.toml", "--amplitudes", "1", "--tiers", "harmonic", "--grid", "201"],
+    "harmonics": [
+        "displacement",
+        "harmonics.toml",
+        "--amplitudes",
+        "1",
+        "--tiers",
+        "harmonic",
+        "--grid",
+        "201",
+    ],
     "phases": ["run", "phases.toml", "-o", "out"],
-    "phases of many amplitudes": ["displacement", "phases.toml", "--amplitudes", "0.1:1:1000"],
+    "phases of many amplitudes": [
+        "displacement",
+        "phases.toml",
+        "--amplitudes",
+        "0.1:1:1000",
+    ],
     "elements": ["displacement", "elements.toml", "--amplitudes", "0.1:0.2:2000"],
-    "time stepping": ["displacement", "sandfish-transient", "--amplitudes", "0.1:0.2:9999"],
-    "a tolerance": ["displacement", "butterfly-glass", "--amplitudes", "0.1:1:99999", "--tol", "1e-5"],
+    "time stepping": [
+        "displacement",
+        "sandfish-transient",
+        "--amplitudes",
+        "0.1:0.2:9999",
+    ],
+    "a tolerance": [
+        "displacement",
+        "butterfly-glass",
+        "--amplitudes",
+        "0.1:1:99999",
+        "--tol",
+        "1e-5",
+    ],
     "accuracy": ["accuracy", "phases.toml", "-o", "out"],
 }
 
@@ -54,20 +110,32 @@ LARGE = {
 @pytest.fixture
 def large(tmp_path, monkeypatch):
     """A folder with scenes that ask for much."""
-    for name, value in (("directions", 2048), ("harmonics", 999), ("phases", 1_000_000)):
-        (tmp_path / f"{name}.toml").write_text(f"{GLASS.text}\n[numerics]\n{name} = {value}\n")
+    for name, value in (
+        ("directions", 2048),
+        ("harmonics", 999),
+        ("phases", 1_000_000),
+    ):
+        (tmp_path / f"{name}.toml").write_text(
+            f"{GLASS.text}\n[numerics]\n{name} = {value}\n"
+        )
     (tmp_path / "five.toml").write_text(FIVE_LINKS)
     (tmp_path / "finest.toml").write_text(f"{FIVE_LINKS}[numerics]\ndirections = 128\n")
     fish = scenes.load("sandfish-loose").text
-    (tmp_path / "elements.toml").write_text(fish.replace("elements = 100", "elements = 2000"))
+    (tmp_path / "elements.toml").write_text(
+        fish.replace("elements = 100", "elements = 2000")
+    )
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
 @pytest.mark.parametrize("name", [n for n in LARGE if n != "phases"])
 def test_large_requests_are_refused_without_yes(name, large, monkeypatch):
-    monkeypatch.setattr(run_cost, "ENOUGH", 0.05)  # what is refused is far beyond what may be
-    monkeypatch.setattr(connection, "SAMPLES_TOGETHER", 2000)  # three small batches tell
+    monkeypatch.setattr(
+        run_cost, "ENOUGH", 0.05
+    )  # what is refused is far beyond what may be
+    monkeypatch.setattr(
+        connection, "SAMPLES_TOGETHER", 2000
+    )  # three small batches tell
     monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", 4)
     monkeypatch.setattr("geomech.systems.capabilities.VALUES_TOGETHER", 1 << 15)
     before = sorted(p.name for p in large.iterdir())
@@ -82,28 +150,63 @@ def test_large_requests_are_refused_without_yes(name, large, monkeypatch):
 def test_yes_computes_and_says_what_is_to_come(large, monkeypatch):
     monkeypatch.setattr(run_cost, "LONGEST", 0.0)
     monkeypatch.setattr(run_cost, "WORTH_SAYING", 0.0)
-    args = ["displacement", "three-link-viscous", "--amplitudes", "1", "--tiers", "direct", "--json"]
+    args = [
+        "displacement",
+        "three-link-viscous",
+        "--amplitudes",
+        "1",
+        "--tiers",
+        "direct",
+        "--json",
+    ]
     assert run(*args)[0] == 2
     code, out, err = run(*args, "--yes")
     assert code == 0
-    assert err.startswith("three-link-viscous: 65 force balances, about 1 s of computing and 16")
-    assert np.hypot(*json.loads(out)["direct"][0][:2]) == pytest.approx(0.0512808, abs=1e-6)
-    for args in (["run", "three-link-viscous", "-o", "d"], ["accuracy", "three-link-viscous", "-o", "d"]):
+    assert err.startswith(
+        "three-link-viscous: 65 force balances, about 1 s of computing and 16"
+    )
+    assert np.hypot(*json.loads(out)["direct"][0][:2]) == pytest.approx(
+        0.0512808, abs=1e-6
+    )
+    for args in (
+        ["run", "three-link-viscous", "-o", "d"],
+        ["accuracy", "three-link-viscous", "-o", "d"],
+    ):
         assert "say --yes" in run(*args)[2]
 
 
 def test_a_field_of_four_joints_is_written(large, monkeypatch):
     """Said before it begins once it takes a second; least squares over the same directions at one of its shapes."""
     monkeypatch.setattr("geomech.studies.shape_space.ShapeSpace.worth_saying", 0.0)
-    code, out, err = run("connection", "five.toml", "--grid", "4", "--extent", "1.2", "-o", "out.nc")
+    code, out, err = run(
+        "connection", "five.toml", "--grid", "4", "--extent", "1.2", "-o", "out.nc"
+    )
     assert code == 0 and out.startswith("five.toml: local connection A")
     assert "\ncost: 8,704 force balances, " in out
-    assert err.startswith("five.toml: 8,704 force balances, about 1 s of computing and 16")
+    assert err.startswith(
+        "five.toml: 8,704 force balances, about 1 s of computing and 16"
+    )
     with netcdf_file(large / "out.nc", mmap=False) as file:
-        A, axes = file.variables["A"][:].copy(), [file.variables[f"alpha_{k}"][:].copy() for k in (1, 2, 3, 4)]
-        assert file.variables["A"].dimensions == ("component", "joint", "alpha_1", "alpha_2", "alpha_3", "alpha_4")
-        assert file.variables["fit_residual"].shape == (3, 4, 4, 4, 4) and "ccf" not in file.variables
-    unit, alpha = connection.directions(4, 64), np.array([axis[k] for axis, k in zip(axes, (3, 0, 2, 1))])
+        A, axes = (
+            file.variables["A"][:].copy(),
+            [file.variables[f"alpha_{k}"][:].copy() for k in (1, 2, 3, 4)],
+        )
+        assert file.variables["A"].dimensions == (
+            "component",
+            "joint",
+            "alpha_1",
+            "alpha_2",
+            "alpha_3",
+            "alpha_4",
+        )
+        assert (
+            file.variables["fit_residual"].shape == (3, 4, 4, 4, 4)
+            and "ccf" not in file.variables
+        )
+    unit, alpha = (
+        connection.directions(4, 64),
+        np.array([axis[k] for axis, k in zip(axes, (3, 0, 2, 1))]),
+    )
     wanted = np.linalg.lstsq(unit, FIVE.system.velocity(alpha, unit), rcond=None)[0].T
     np.testing.assert_allclose(A[:, :, 3, 0, 2, 1], wanted, atol=1e-12)
 
@@ -116,17 +219,35 @@ def test_pieces_change_no_numbers(monkeypatch):
 
     def everything():
         fresh = Study(scene.with_numerics(grid=7))
-        tiers = [fresh.poses(m, None, amplitudes) for m in ("area", "adapted", "path", "harmonic", "direct")]
-        fields = fresh.fitted.A, fresh.fitted.residual, fresh.fitted.speed, fresh.table("harmonic").residual
-        marched = Study(SLOPING.with_numerics(phases=16, cycles=2)).poses("direct", None, amplitudes / 5)
-        return [*tiers, *fields, marched, *estimate.direct(scene, scene.gait, amplitudes, 32)]
+        tiers = [
+            fresh.poses(m, None, amplitudes)
+            for m in ("area", "adapted", "path", "harmonic", "direct")
+        ]
+        fields = (
+            fresh.fitted.A,
+            fresh.fitted.residual,
+            fresh.fitted.speed,
+            fresh.table("harmonic").residual,
+        )
+        marched = Study(SLOPING.with_numerics(phases=16, cycles=2)).poses(
+            "direct", None, amplitudes / 5
+        )
+        return [
+            *tiers,
+            *fields,
+            marched,
+            *estimate.direct(scene, scene.gait, amplitudes, 32),
+        ]
 
     whole = everything()
     monkeypatch.setattr("geomech.systems.capabilities.VALUES_TOGETHER", 1)
     monkeypatch.setattr("geomech.systems.capabilities.STEPPED_TOGETHER", 1)
     for module in (
         connection,
-        *(sys.modules[f"geomech.{name}"] for name in ("tiers.area", "tiers.direct", "geometry.family")),
+        *(
+            sys.modules[f"geomech.{name}"]
+            for name in ("tiers.area", "tiers.direct", "geometry.family")
+        ),
     ):
         monkeypatch.setattr(module, "SAMPLES_TOGETHER", 17)
     monkeypatch.setattr(harmonics, "VALUES_TOGETHER", 23)
@@ -139,12 +260,17 @@ def test_a_large_map_is_drawn_on_fewer_points():
     drawn = plots.drawable(Field(axes, np.add.outer(axes[0], 2 * axes[1])[None]))
     assert [len(a) for a in drawn.axes] == [plots.FINEST, 31]
     np.testing.assert_array_equal([a[[0, -1]] for a in drawn.axes], [[-1, 1], [-2, 2]])
-    np.testing.assert_allclose(drawn.values[0], np.add.outer(drawn.axes[0], 2 * drawn.axes[1]))
+    np.testing.assert_allclose(
+        drawn.values[0], np.add.outer(drawn.axes[0], 2 * drawn.axes[1])
+    )
 
 
 def test_a_sweep_over_amplitude_goes_in_groups(tmp_path, monkeypatch):
     """Many amplitudes are many batches: a stop keeps those that are done, in the middle of a row too."""
-    over = {"medium.ratio": [2.0, 3.0], "gait.amplitude": np.linspace(0.2, 1.5, 7).tolist()}
+    over = {
+        "medium.ratio": [2.0, 3.0],
+        "gait.amplitude": np.linspace(0.2, 1.5, 7).tolist(),
+    }
     whole, kept = sweep.sweep(VISCOUS, over), tmp_path / ".s.partial"
     monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", 3)
     rows, calls = cycles._rows, []
@@ -159,9 +285,21 @@ def test_a_sweep_over_amplitude_goes_in_groups(tmp_path, monkeypatch):
     with pytest.raises(terminal.Stopped):
         sweep.sweep(VISCOUS, over, kept)
     again = sweep.sweep(VISCOUS, over, kept)
-    assert calls == [(2.0, 3), (2.0, 3), (2.0, 1), (3.0, 3), (3.0, 3), (3.0, 3), (3.0, 1)]
-    np.testing.assert_allclose(again["displacement"], whole["displacement"], rtol=1e-12, atol=1e-13)
-    np.testing.assert_allclose(again["estimate"], whole["estimate"], rtol=1e-6, atol=1e-14)
+    assert calls == [
+        (2.0, 3),
+        (2.0, 3),
+        (2.0, 1),
+        (3.0, 3),
+        (3.0, 3),
+        (3.0, 3),
+        (3.0, 1),
+    ]
+    np.testing.assert_allclose(
+        again["displacement"], whole["displacement"], rtol=1e-12, atol=1e-13
+    )
+    np.testing.assert_allclose(
+        again["estimate"], whole["estimate"], rtol=1e-6, atol=1e-14
+    )
 
 
 # Stopping.
@@ -177,7 +315,9 @@ def started(args, cwd):
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=cwd,
         )  # fmt: skip
     finally:
-        for number, handler in zip((signal.SIGHUP, signal.SIGTERM, signal.SIGINT), (*before, interrupt)):
+        for number, handler in zip(
+            (signal.SIGHUP, signal.SIGTERM, signal.SIGINT), (*before, interrupt)
+        ):
             signal.signal(number, handler)
 
 
@@ -196,11 +336,15 @@ def test_a_signal_stops_the_solvers_threads(large):
         except terminal.Stopped as stopped:
             print(stopped.code)
     """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=20)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=20
+    )
     assert (done.returncode, done.stdout, done.stderr) == (0, "143\n", "")
 
 
-@pytest.mark.parametrize("raised", [KeyboardInterrupt(), terminal.Stopped(signal.SIGINT)])
+@pytest.mark.parametrize(
+    "raised", [KeyboardInterrupt(), terminal.Stopped(signal.SIGINT)]
+)
 def test_an_interrupt_is_no_success(raised, monkeypatch):
     def stop(name):
         raise raised
@@ -208,7 +352,11 @@ def test_an_interrupt_is_no_success(raised, monkeypatch):
     monkeypatch.setattr(scenes, "load", stop)
     code, out, err = run("explain", "three-link-glass")
     again = "the same command starts anew: geomech explain three-link-glass"
-    assert (code, out, err) == (130, "", f"error: stopped by SIGINT: nothing is kept; {again}\n")
+    assert (code, out, err) == (
+        130,
+        "",
+        f"error: stopped by SIGINT: nothing is kept; {again}\n",
+    )
 
 
 def test_what_was_ignored_stays_ignored():
@@ -240,9 +388,15 @@ def test_a_second_signal_does_not_disturb_the_keeping():
 
 
 def test_a_terminal_without_letters_and_a_home_without_folders(tmp_path):
-    (tmp_path / "sch\u00f6n \u2603.toml").write_text(VISCOUS.text + "# \u2603\n", encoding="utf-8")
+    (tmp_path / "sch\u00f6n \u2603.toml").write_text(
+        VISCOUS.text + "# \u2603\n", encoding="utf-8"
+    )
     (tmp_path / "file").write_text("")
-    poor = {"PYTHONIOENCODING": "ascii", "LC_ALL": "C", "MPLCONFIGDIR": str(tmp_path / "file" / "no")}
+    poor = {
+        "PYTHONIOENCODING": "ascii",
+        "LC_ALL": "C",
+        "MPLCONFIGDIR": str(tmp_path / "file" / "no"),
+    }
     code = """if True:
         import sys
         from geomech import cli
@@ -256,21 +410,36 @@ def test_a_terminal_without_letters_and_a_home_without_folders(tmp_path):
                 print("code", ended.code)
     """
     env = {k: v for k, v in os.environ.items() if k != "HOME"} | poor
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, cwd=tmp_path, env=env, timeout=120)
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        cwd=tmp_path,
+        env=env,
+        timeout=120,
+    )
     lines = done.stdout.decode("ascii").splitlines()
     assert [line for line in lines if line.startswith("code")] == ["code 0", "code 2"]
-    assert any(line.startswith("sch\\xf6n \\u2603.toml: displacement per cycle") for line in lines)
+    assert any(
+        line.startswith("sch\\xf6n \\u2603.toml: displacement per cycle")
+        for line in lines
+    )
     assert (tmp_path / "\u2603.png").stat().st_size > 10_000
-    *_, error = done.stderr.decode("ascii").splitlines()  # on a slow machine how far it is comes before
+    *_, error = done.stderr.decode(
+        "ascii"
+    ).splitlines()  # on a slow machine how far it is comes before
     assert error.startswith("error: cannot read scene")
 
 
 def test_too_many_open_files_are_said_and_nothing_is_left(tmp_path):
     """Where a folder of ours needs two more to go than the file that is to be written."""
     line = f"ulimit -n 6; exec {sys.executable} -m geomech trajectory three-link-viscous -o a.csv"
-    done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, cwd=tmp_path, timeout=60)
+    done = subprocess.run(
+        ["bash", "-c", line], capture_output=True, text=True, cwd=tmp_path, timeout=60
+    )
     assert done.returncode == 2
-    assert done.stderr.startswith("error: too many files are open at once: raise the limit, as by 'ulimit -n 1024'")
+    assert done.stderr.startswith(
+        "error: too many files are open at once: raise the limit, as by 'ulimit -n 1024'"
+    )
     assert [p.name for p in tmp_path.iterdir() if not p.name.endswith(".partial")] == []
 
 
@@ -287,7 +456,13 @@ def test_nobody_need_listen(tmp_path):
         (f"{told} --version 2>&- >/dev/null", 0, ""),
         (f"{told} --version > /dev/full", 2, full),
     ):
-        done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, cwd=tmp_path, timeout=60)
+        done = subprocess.run(
+            ["bash", "-c", line],
+            capture_output=True,
+            text=True,
+            cwd=tmp_path,
+            timeout=60,
+        )
         assert (done.returncode, done.stderr) == (code, err), line
 
 
@@ -307,11 +482,11 @@ def test_nobody_need_listen(tmp_path):
     ids=lambda args: " ".join(args[:2]),
 )
 def test_memory_stays_below_what_was_said(args, large):
-    code = (
-        "import atexit, resource, sys; from geomech.cli import main; memory = lambda: resource.getrusage(0).ru_maxrss; "
-    )
+    code = "import atexit, resource, sys; from geomech.cli import main; memory = lambda: resource.getrusage(0).ru_maxrss; "
     code += "atexit.register(lambda: print(memory() * 1024, file=sys.stderr)); main(sys.argv[1:])"
-    done = subprocess.run([sys.executable, "-c", code, *args, "--yes"], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code, *args, "--yes"], capture_output=True, text=True
+    )
     used = int(done.stderr.splitlines()[-1])
     assert done.returncode == 0
     assert used < run_cost.LARGEST

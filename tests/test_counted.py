@@ -20,7 +20,9 @@ pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = scenes.load("three-link-glass")
 VISCOUS = scenes.load("three-link-viscous")
 SLOPING = scenes.parse(
-    scenes.load("sandfish-loose").text.partition("[[effects]]")[0].replace("elements = 100", "elements = 10")
+    scenes.load("sandfish-loose")
+    .text.partition("[[effects]]")[0]
+    .replace("elements = 100", "elements = 10")
     + '\n[[effects]]\nkind = "transient"\ntravel = 0.1'
 )
 FIVE_LINKS = (
@@ -38,28 +40,51 @@ def solved():
         yield counts
 
 
-SKIN = GLASS.changed(effects=(SkinFriction(0.109, 0.137, 1.0),)).with_numerics(grid=7, pieces=5)
+SKIN = GLASS.changed(effects=(SkinFriction(0.109, 0.137, 1.0),)).with_numerics(
+    grid=7, pieces=5
+)
 SNAKE = scenes.load("shovel-nosed-snake").with_numerics(phases=64)
-FIFTH = Fourier(cos=((0.6, 0, 0.1, 0, 0.05), (0,) * 5), sin=((0,) * 5, (0.6, 0, -0.1, 0, 0.05)))
+FIFTH = Fourier(
+    cos=((0.6, 0, 0.1, 0, 0.05), (0,) * 5), sin=((0,) * 5, (0.6, 0, -0.1, 0, 0.05))
+)
 UNSURE = dataclasses.replace(GLASS.system.medium, covariance=((0.01, 0.0), (0.0, 4e-4)))
-FRAMED = Study(GLASS.with_numerics(grid=7).changed(medium=UNSURE)).in_frame("minimum-perturbation").scene
+FRAMED = (
+    Study(GLASS.with_numerics(grid=7).changed(medium=UNSURE))
+    .in_frame("minimum-perturbation")
+    .scene
+)
 FOUND = {
     "tables": (GLASS.with_numerics(grid=9), ("area", "path", "harmonic", "direct")),
-    "no shape in the middle": (GLASS.with_numerics(grid=8), ("area", "path", "harmonic", "direct")),
+    "no shape in the middle": (
+        GLASS.with_numerics(grid=8),
+        ("area", "path", "harmonic", "direct"),
+    ),
     "errors alone": (GLASS.with_numerics(grid=9, phases=40), ("path",)),
     "a family": (GLASS.with_numerics(grid=9, curves=5), ("adapted", "direct")),
     "four joints": (FIVE.with_numerics(grid=4, directions=16), ("path", "direct")),
     "four joints, errors alone": (FIVE.with_numerics(grid=4, directions=16), ("path",)),
-    "few phases of a harmonic": (GLASS.changed(gait=FIFTH).with_numerics(phases=64), ("direct",)),
-    "around the gait": (FIVE.with_numerics(grid=15, directions=16, phases=16), ("area", "path", "direct")),
+    "few phases of a harmonic": (
+        GLASS.changed(gait=FIFTH).with_numerics(phases=64),
+        ("direct",),
+    ),
+    "around the gait": (
+        FIVE.with_numerics(grid=15, directions=16, phases=16),
+        ("area", "path", "direct"),
+    ),
     "linear": (VISCOUS, ("area", "path", "harmonic", "direct")),
     "by a rule": (VISCOUS.with_numerics(loads="midpoint:3"), ("direct",)),
     "pieces": (SKIN, ("area", "path", "harmonic", "direct")),
     "a backbone": (SNAKE, ("direct",)),
-    "a frame": (Study(GLASS.with_numerics(grid=9)).in_frame("minimum-perturbation").scene, ("harmonic", "direct")),
+    "a frame": (
+        Study(GLASS.with_numerics(grid=9)).in_frame("minimum-perturbation").scene,
+        ("harmonic", "direct"),
+    ),
     "a frame in sand that is not known": (FRAMED, ("direct",)),
     "time stepping": (SLOPING.with_numerics(phases=32, cycles=2), ("direct",)),
-    "place": (GLASS.changed(effects=(Slope(0.3, 2.0, 0.6, 0.3),)).with_numerics(phases=32), ("direct",)),
+    "place": (
+        GLASS.changed(effects=(Slope(0.3, 2.0, 0.6, 0.3),)).with_numerics(phases=32),
+        ("direct",),
+    ),
 }
 
 
@@ -71,7 +96,9 @@ def test_the_balances_foretold_are_those_solved(name, solved):
     assert foretold == sum(solved)
 
 
-@pytest.mark.parametrize("scene", [GLASS, SKIN, SLOPING.with_numerics(phases=32, cycles=2)])
+@pytest.mark.parametrize(
+    "scene", [GLASS, SKIN, SLOPING.with_numerics(phases=32, cycles=2)]
+)
 def test_what_moving_costs_takes_the_balances_foretold(scene, solved):
     foretold = cost.price(cost.of_effort(scene, 3)).balances
     effort.effort(scene, None, [0.1, 0.2, 0.3])
@@ -81,7 +108,9 @@ def test_what_moving_costs_takes_the_balances_foretold(scene, solved):
 PLACE = FOUND["place"][0]
 
 
-@pytest.mark.parametrize(("scene", "cycles"), [(GLASS, 3), (PLACE, 3), (PLACE.with_numerics(cycles=2), 2)])
+@pytest.mark.parametrize(
+    ("scene", "cycles"), [(GLASS, 3), (PLACE, 3), (PLACE.with_numerics(cycles=2), 2)]
+)
 def test_a_motion_takes_the_balances_foretold(scene, cycles, solved):
     foretold = motion.cost(scene, cycles).balances
     motion.motion(scene, cycles)
@@ -93,7 +122,10 @@ TABLES = {
     "harmonics": (cost.harmonics, lambda study: study.compute_harmonics()),
     "metric": (cost.of_metric, lambda study: study.metric),
     "even part": (cost.of_even_part, lambda study: study.even_part),
-    "plane": (lambda s: cost.of_planes(s, [(0, 1)], [s.gait.middle]), lambda study: study.plane((0, 1))),
+    "plane": (
+        lambda s: cost.of_planes(s, [(0, 1)], [s.gait.middle]),
+        lambda study: study.plane((0, 1)),
+    ),
 }
 
 
@@ -118,7 +150,10 @@ def test_accuracy_and_sweep_say_what_they_cost(solved):
     accuracy.study(scene)
     assert foretold == sum(solved)
     media = {"medium.ratio": [2.0, 3.0], "gait.amplitude": [0.5, 1.0, 1.5]}
-    for scene, over in ((VISCOUS, media), (SKIN, {"effects.skin-friction.backward": [0.2, 0.3]})):
+    for scene, over in (
+        (VISCOUS, media),
+        (SKIN, {"effects.skin-friction.backward": [0.2, 0.3]}),
+    ):
         foretold = sweep.Sweep(scene, over).cost().balances
         solved.clear()
         sweep.sweep(scene, over)
@@ -130,7 +165,12 @@ def test_a_balance_that_is_tried_twice_is_one(solved):
     rng = np.random.default_rng(3)
     alpha, alphadot = rng.uniform(-1, 1, (2, 12, 2))
     answer = body_velocity(VISCOUS.system.medium, Chain(), alpha, alphadot).xi
-    for start in (answer, np.where(np.arange(12)[:, None] < 6, answer, np.nan), 1e7 * answer, None):
+    for start in (
+        answer,
+        np.where(np.arange(12)[:, None] < 6, answer, np.nan),
+        1e7 * answer,
+        None,
+    ):
         solved.clear()
         body_velocity(GLASS.system.medium, Chain(), alpha, alphadot, start=start)
         assert sum(solved) == 12
@@ -176,7 +216,11 @@ def test_memory_is_foretold_too_large_rather_than_too_small():
 
 def test_a_look_up_reads_the_numbers_of_the_nodes_around():
     """3 d at each of (degree + 1)^d nodes; of harmonics 3 for each of their terms, cosine and sine of 1, 3 and 5."""
-    for scene, tier, count in ((FIVE, "path", 3 * 4 * 3**4), (GLASS, "path", 54), (GLASS, "harmonic", 3 * 6 * 9)):
+    for scene, tier, count in (
+        (FIVE, "path", 3 * 4 * 3**4),
+        (GLASS, "path", 54),
+        (GLASS, "harmonic", 3 * 6 * 9),
+    ):
         numerics = scene.with_numerics(grid=4, interpolation=2, harmonics=5).numerics
         plan = TIERS[tier].plan(scene.system, numerics, scene.gait, None)
         assert (plan.read, plan.balances(3, 64)) == (count, 0)

@@ -28,7 +28,11 @@ def local(scene, shapes, h=2e-4):
     unit = connection.directions(2, fitted.directions(scene.system, scene.numerics))
 
     def A(alpha):
-        return np.einsum("jc,...ci->...ij", np.linalg.pinv(unit), scene.system.velocity(alpha[..., None, :], unit))
+        return np.einsum(
+            "jc,...ci->...ij",
+            np.linalg.pinv(unit),
+            scene.system.velocity(alpha[..., None, :], unit),
+        )
 
     d1, d2 = ((A(shapes + step) - A(shapes - step)) / (2 * h) for step in h * np.eye(2))
     here = A(shapes)
@@ -38,14 +42,26 @@ def local(scene, shapes, h=2e-4):
 def test_every_pair_of_three_joints():
     """Against SymPy, for a connection of three joints in which no two columns are alike; pairs are antisymmetric."""
     a, b, c = alpha = sp.symbols("alpha_1:4", real=True)
-    A = sp.Matrix([[sp.cos(a + b), b * c, 1 + a], [sp.sin(c), a - c, b * b], [1 + a * b, 2 + c, sp.cos(a) - b]])
-    fitted = connection.fit(symbolic.velocity(A, alpha), (np.linspace(-0.5, 0.6, 13),) * 3, 16, degree=5)
+    A = sp.Matrix(
+        [
+            [sp.cos(a + b), b * c, 1 + a],
+            [sp.sin(c), a - c, b * b],
+            [1 + a * b, 2 + c, sp.cos(a) - b],
+        ]
+    )
+    fitted = connection.fit(
+        symbolic.velocity(A, alpha), (np.linspace(-0.5, 0.6, 13),) * 3, 16, degree=5
+    )
     shapes = np.meshgrid(*fitted.axes, indexing="ij")
     for i, j in ((0, 1), (0, 2), (1, 2)):
-        exact = np.broadcast_arrays(*sp.lambdify(alpha, list(symbolic.ccf(A, alpha, i, j)), "numpy")(*shapes))
+        exact = np.broadcast_arrays(
+            *sp.lambdify(alpha, list(symbolic.ccf(A, alpha, i, j)), "numpy")(*shapes)
+        )
         found = curvature.ccf(fitted, i, j).values
         np.testing.assert_allclose(found, exact, atol=1e-6)
-        np.testing.assert_allclose(curvature.ccf(fitted, j, i).values, -found, atol=1e-14)
+        np.testing.assert_allclose(
+            curvature.ccf(fitted, j, i).values, -found, atol=1e-14
+        )
         error = curvature.error(fitted, i, j).values
         assert error.shape == found.shape
         assert (np.abs(found - exact) <= error + 1e-12).all()
@@ -79,7 +95,9 @@ def test_wrong_signs_near_kinks_are_known_to_be_unknown():
     assert GLASS.numerics.grid == 31
     shapes = np.stack(np.meshgrid(*BENCH.fitted.axes, indexing="ij"), -1)[1:-1, 1:-1]
     truth = np.moveaxis(local(GLASS, shapes), -1, 0)
-    field, error = (x.values[:, 1:-1, 1:-1] for x in (BENCH.curvature, BENCH.curvature_error))
+    field, error = (
+        x.values[:, 1:-1, 1:-1] for x in (BENCH.curvature, BENCH.curvature_error)
+    )
     wrong = (field * truth < 0) & (np.minimum(np.abs(field), np.abs(truth)) > 0.003)
     assert wrong[2].sum() >= 8
     assert (error > np.abs(field))[wrong].all()
@@ -97,8 +115,12 @@ def test_the_smallest_grid_has_an_error_too():
 @pytest.mark.parametrize(("length", "unit"), [(1.0, "body length"), (0.4, "m")])
 def test_files_have_values_units_and_conventions(tmp_path, length, unit):
     """All of the file against the objects: an uneven body in a frame of its own, off the defaults."""
-    body = dataclasses.replace(GLASS.system.body, lengths=(1, 2, 3), length=length, frame="link-2")
-    scene = GLASS.changed(body=body).with_numerics(grid=7, extent=2.0, regularisation=1e-5)
+    body = dataclasses.replace(
+        GLASS.system.body, lengths=(1, 2, 3), length=length, frame="link-2"
+    )
+    scene = GLASS.changed(body=body).with_numerics(
+        grid=7, extent=2.0, regularisation=1e-5
+    )
     study = Study(scene)
     fields.save_connection(tmp_path / "a.nc", study)
     per = f"{unit} rad-1 (x, y), rad rad-1 (theta)"
@@ -113,10 +135,16 @@ def test_files_have_values_units_and_conventions(tmp_path, length, unit):
         ):
             np.testing.assert_array_equal(data[name], values)
             assert data[name].attrs["units"] == units
-        assert data.ccf_error.dims == data.ccf.dims == ("component", "alpha_1", "alpha_2")
+        assert (
+            data.ccf_error.dims == data.ccf.dims == ("component", "alpha_1", "alpha_2")
+        )
         assert data.component.values.tolist() == ["x", "y", "theta"]
         said = data.attrs
-    assert (said["frame"], said["length_unit"], said["body_length"]) == ("link-2", unit, length)
+    assert (said["frame"], said["length_unit"], said["body_length"]) == (
+        "link-2",
+        unit,
+        length,
+    )
     assert (said["loads"], said["regularisation"]) == ("exact", 1e-5)
     assert said["sign_of_A"] == "xi = + A alphadot"
     assert said["pair_of_ccf"].startswith("CCF_12 = dA_2 / dalpha_1 - dA_1 / dalpha_2")
@@ -130,7 +158,10 @@ AXES = np.linspace(-1.0, 1.5, 11), np.linspace(-1.2, 1.0, 12)
 def field_of(x, y=0.0, theta=0.0):
     """A CCF on AXES, x and y in metres."""
     values = [
-        np.broadcast_to(f(*np.meshgrid(*AXES, indexing="ij")) if callable(f) else f, (11, 12)) for f in (x, y, theta)
+        np.broadcast_to(
+            f(*np.meshgrid(*AXES, indexing="ij")) if callable(f) else f, (11, 12)
+        )
+        for f in (x, y, theta)
     ]
     return Field(AXES, np.array(values, float), 3, unit="m", length=0.3)
 
@@ -151,21 +182,70 @@ def field_of(x, y=0.0, theta=0.0):
 def test_the_zero_line_is_looked_for_around_the_gaits_middle(x, middle, said):
     """Up to the nearest edge, in 72 directions and 200 steps."""
     field = field_of(x)
-    field = dataclasses.replace(field, values=np.where(np.isnan(field.values[0]), np.nan, field.values))
-    assert words._zero_line(field, np.array(middle)) == ([] if said is None else [f"zero line of x: {said}"])
+    field = dataclasses.replace(
+        field, values=np.where(np.isnan(field.values[0]), np.nan, field.values)
+    )
+    assert words._zero_line(field, np.array(middle)) == (
+        [] if said is None else [f"zero line of x: {said}"]
+    )
 
 
 def test_extremes_of_a_ccf_are_told_with_their_places_and_the_larger_error():
-    field = field_of(lambda a, b: 2 * a - b, lambda a, b: -5e-13 + 0 * a, lambda a, b: a * b)
-    error = dataclasses.replace(field, values=1e-3 * np.arange(3 * 132.0).reshape(3, 11, 12))
+    field = field_of(
+        lambda a, b: 2 * a - b, lambda a, b: -5e-13 + 0 * a, lambda a, b: a * b
+    )
+    error = dataclasses.replace(
+        field, values=1e-3 * np.arange(3 * 132.0).reshape(3, 11, 12)
+    )
     head, x, y, theta = words._extremes(field, error)
-    assert head.split() == ["component", "least", "at", "(rad)", "largest", "at", "(rad)", "+-", "error"]
-    assert x.split() == ["x", "(m/rad2)", "-3", "-1.00,", "1.00", "4.2", "1.50,", "-1.20", "1.2e-01"]
+    assert head.split() == [
+        "component",
+        "least",
+        "at",
+        "(rad)",
+        "largest",
+        "at",
+        "(rad)",
+        "+-",
+        "error",
+    ]
+    assert x.split() == [
+        "x",
+        "(m/rad2)",
+        "-3",
+        "-1.00,",
+        "1.00",
+        "4.2",
+        "1.50,",
+        "-1.20",
+        "1.2e-01",
+    ]
     assert y.split() == ["y", "(m/rad2)", "zero"]
-    assert theta.split() == ["theta", "(rad/rad2)", "-1.8", "1.50,", "-1.20", "1.5", "1.50,", "1.00", "4.0e-01"]
-    seen = dataclasses.replace(field, values=np.where(field.values[0] > 4, np.nan, 3 * field.values))
-    assert list(words._extremes(seen, error))[1].split()[5:] == ["12", "1.50,", "-1.00", "1.2e-01"]
-    assert list(words._extremes(seen, error))[2].split()[:3] == ["y", "(m/rad2)", "-1.5e-12"]
+    assert theta.split() == [
+        "theta",
+        "(rad/rad2)",
+        "-1.8",
+        "1.50,",
+        "-1.20",
+        "1.5",
+        "1.50,",
+        "1.00",
+        "4.0e-01",
+    ]
+    seen = dataclasses.replace(
+        field, values=np.where(field.values[0] > 4, np.nan, 3 * field.values)
+    )
+    assert list(words._extremes(seen, error))[1].split()[5:] == [
+        "12",
+        "1.50,",
+        "-1.00",
+        "1.2e-01",
+    ]
+    assert list(words._extremes(seen, error))[2].split()[:3] == [
+        "y",
+        "(m/rad2)",
+        "-1.5e-12",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -177,10 +257,19 @@ def test_extremes_of_a_ccf_are_told_with_their_places_and_the_larger_error():
     ],
 )  # fmt: skip
 def test_what_a_gait_encloses_is_told_with_its_error(zero, said):
-    numbers = (("x", 0.123456, 2e-3, "m"), ("y", -0.02, 3e-4, "m"), ("heading", -1e-12, 0.04, "rad"))
-    moved = [Variable(name, ("tier", "amplitude"), [[x]], unit, error=[[e]]) for name, x, e, unit in numbers]
+    numbers = (
+        ("x", 0.123456, 2e-3, "m"),
+        ("y", -0.02, 3e-4, "m"),
+        ("heading", -1e-12, 0.04, "rad"),
+    )
+    moved = [
+        Variable(name, ("tier", "amplitude"), [[x]], unit, error=[[e]])
+        for name, x, e, unit in numbers
+    ]
     table = Result(
-        "displacement", (*moved, Variable("amplitude", ("amplitude",), [0.75])), {"zero_by_symmetry": list(zero)}
+        "displacement",
+        (*moved, Variable("amplitude", ("amplitude",), [0.75])),
+        {"zero_by_symmetry": list(zero)},
     )
     first, second = words._integral(types.SimpleNamespace(enclosed=table))
     assert first == "integral over the scene's gait, of amplitude 0.75 (the area tier):"

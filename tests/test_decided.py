@@ -25,16 +25,27 @@ def test_seconds_are_assumed_for_places_of_the_body_and_for_batches():
     """Ten times as many places, or batches, take ten times as long; a linear medium takes a tenth."""
     with preferring("numpy"):
         one, places, batches = (
-            run_cost.assumed(*x) for x in ((1e6, 3, False, 0), (1e6, 30, False, 0), (0, 0, False, 1e3))
+            run_cost.assumed(*x)
+            for x in ((1e6, 3, False, 0), (1e6, 30, False, 0), (0, 0, False, 1e3))
         )
-        assert places == pytest.approx(10 * one) and run_cost.assumed(1e6, 3, True, 0) == pytest.approx(one / 10)
+        assert places == pytest.approx(10 * one) and run_cost.assumed(
+            1e6, 3, True, 0
+        ) == pytest.approx(one / 10)
         assert run_cost.assumed(1e6, 3, False, 1e3) == pytest.approx(one + batches)
-    few, many = ({"medium.ratio": np.linspace(1, 3, n).tolist()} for n in (10, 100))  # each medium is a batch
+    few, many = (
+        {"medium.ratio": np.linspace(1, 3, n).tolist()} for n in (10, 100)
+    )  # each medium is a batch
     assert sweep.Sweep(VISCOUS, many).cost().seconds == pytest.approx(
         10 * sweep.Sweep(VISCOUS, few).cost().seconds, rel=0.01
     )
-    together = {"medium.ratio": many["medium.ratio"][:10], "gait.amplitude": np.linspace(0.1, 1, 10).tolist()}
-    assert sweep.Sweep(VISCOUS, together).cost().seconds < 0.4 * sweep.Sweep(VISCOUS, many).cost().seconds
+    together = {
+        "medium.ratio": many["medium.ratio"][:10],
+        "gait.amplitude": np.linspace(0.1, 1, 10).tolist(),
+    }
+    assert (
+        sweep.Sweep(VISCOUS, together).cost().seconds
+        < 0.4 * sweep.Sweep(VISCOUS, many).cost().seconds
+    )
 
 
 class Clock:
@@ -60,7 +71,9 @@ def clock(monkeypatch):
         yield Clock(monkeypatch)
 
 
-BATCH = 1000 * 3 * run_cost.BALANCE["numpy"] + run_cost.BATCH["numpy"]  # s that one is assumed to take
+BATCH = (
+    1000 * 3 * run_cost.BALANCE["numpy"] + run_cost.BATCH["numpy"]
+)  # s that one is assumed to take
 
 
 @pytest.mark.parametrize("factor", [0.1, 1.0, 3.0])
@@ -75,7 +88,9 @@ def test_the_first_batches_tell_what_the_others_take(factor, clock):
     assert judged == []
     clock.solve(factor * BATCH, count=500)
     (told,) = judged
-    assert told.seconds == pytest.approx(1 + factor * 30) and not run_cost.is_undecided()
+    assert (
+        told.seconds == pytest.approx(1 + factor * 30) and not run_cost.is_undecided()
+    )
     assert (told.balances, told.memory) == (10**6, 1e8)
 
 
@@ -83,13 +98,17 @@ def test_threads_of_the_solver_tell_by_the_back_end_of_the_request(clock):
     judged = []
     run_cost.decide(run_cost.Cost(10**6, 30.0, 1e8), judged.append)
     tell = listener()
-    run_shares(lambda share, stop: [clock.take(2 * BATCH, tell) for _ in range(500)], [0, 1])
+    run_shares(
+        lambda share, stop: [clock.take(2 * BATCH, tell) for _ in range(500)], [0, 1]
+    )
     assert judged[0].seconds == pytest.approx(60.0) and len(judged) == 1
 
 
 def test_what_is_decided_next_is_not_told_by_what_was_to_be_before(clock):
     judged = []
-    run_cost.decide(run_cost.Cost(10**6, 30.0, 1e8), lambda told: judged.append("first"))
+    run_cost.decide(
+        run_cost.Cost(10**6, 30.0, 1e8), lambda told: judged.append("first")
+    )
     run_cost.decide(run_cost.Cost(10, 1e-3, 1e8), lambda told: judged.append("second"))
     clock.solve(1.0, count=99)
     assert judged == ["second"]
@@ -99,11 +118,20 @@ def test_a_step_of_time_weighs_as_much_as_many_balances_of_a_batch():
     """As NumPy takes a batch's time for it; for the choice of the back end alone."""
     marched = scenes.load("sandfish-transient")
     found = Study(marched).cost([0.2], ["direct"])
-    assert found.steps > 500 and found.as_balances == found.balances + 200 * found.steps > 100_000 > found.balances
+    assert (
+        found.steps > 500
+        and found.as_balances
+        == found.balances + 200 * found.steps
+        > 100_000
+        > found.balances
+    )
     assert Study(scenes.load("three-link-glass")).cost([0.2], ["direct"]).steps == 0
 
 
-@pytest.mark.parametrize("cost", [(1, 2.0, 1e8), (10**9, 301.0, 1e8), (10**6, 30.0, 3e9), (0, 70.0, 1e8, 70.0)])
+@pytest.mark.parametrize(
+    "cost",
+    [(1, 2.0, 1e8), (10**9, 301.0, 1e8), (10**6, 30.0, 3e9), (0, 70.0, 1e8, 70.0)],
+)
 def test_what_is_sure_is_decided_at_once(cost, clock):
     """Little, very much, much memory, or much that is no balances."""
     judged = []
@@ -136,7 +164,9 @@ def test_others_compute_once_it_is_decided(clock):
         for x in jobs.runner().map(tasks.doubled, 2.0, range(8), 8):
             found.append(x)
             clock.solve(1.0)
-    assert found == [2.0 * x for x in range(8)] and others.given == 8 - 1 - run_cost.FEWEST
+    assert (
+        found == [2.0 * x for x in range(8)] and others.given == 8 - 1 - run_cost.FEWEST
+    )
 
 
 def test_what_is_refused_leaves_nothing(tmp_path, clock):
@@ -144,7 +174,9 @@ def test_what_is_refused_leaves_nothing(tmp_path, clock):
         with jobs.storing(tmp_path / ".a.partial", keep=True) as runner:
             runner.store.put(b"key", 1.0, float)
             runner.store.commit()
-            run_cost.decide(run_cost.Cost(10**6, 31.0, 1e8), lambda told: told.check("here", False))
+            run_cost.decide(
+                run_cost.Cost(10**6, 31.0, 1e8), lambda told: told.check("here", False)
+            )
             clock.solve(1.0, count=9)
 
     with pytest.raises(Refusal, match="here: 1,000,000 force balances, about"):
@@ -156,7 +188,9 @@ def test_a_cost_reads_well():
     assert str(run_cost.Cost(1_000_000, 90.0, 2.1e9)) == (
         "1,000,000 force balances, about 1.5 min of computing and 2.1 GB of memory"
     )
-    assert "about 14 h" in str(run_cost.Cost(1, 5e4, 0)) and "about 116 days" in str(run_cost.Cost(1, 1e7, 0))
+    assert "about 14 h" in str(run_cost.Cost(1, 5e4, 0)) and "about 116 days" in str(
+        run_cost.Cost(1, 1e7, 0)
+    )
     run_cost.Cost(1, 59.0, 1.9e9).check("here", False)
     for beyond in (run_cost.Cost(1, 61.0, 1.0), run_cost.Cost(1, 1.0, 2.1e9)):
         beyond.check("here", True)

@@ -14,7 +14,16 @@ from geomech.studies import cost, effort, fields
 from geomech.studies.results import Displacements
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from geomech.systems.capabilities import refined, velocity_and_power
-from rft import BodyInertia, Chain, DisturbedGround, Granular, Serpenoid, SkinFriction, Transient, Viscous
+from rft import (
+    BodyInertia,
+    Chain,
+    DisturbedGround,
+    Granular,
+    Serpenoid,
+    SkinFriction,
+    Transient,
+    Viscous,
+)
 from rft.balance.listening import listening
 from rft.refusal import Refusal
 
@@ -34,9 +43,16 @@ def test_table_and_gait_agree_and_do_not_see_size_or_frame(medium):
     study = geomech.Study(scene(Swimmer(medium, UNEVEN)))
     found = study.effort(amplitudes=[0.5, 1.2])
     looked_up = metric.path_length(study.metric.norm, GAIT, [0.5, 1.2])
-    assert looked_up == pytest.approx(found["path_length"], rel=1e-5 if medium is FLUID else 3e-3)
-    for other in (Chain((0.7, 1.4, 0.9)), Chain((0.7, 1.4, 0.9), length=0.3, frame="link-2")):
-        again = geomech.Study(scene(Swimmer(medium, other))).effort(amplitudes=[0.5, 1.2])
+    assert looked_up == pytest.approx(
+        found["path_length"], rel=1e-5 if medium is FLUID else 3e-3
+    )
+    for other in (
+        Chain((0.7, 1.4, 0.9)),
+        Chain((0.7, 1.4, 0.9), length=0.3, frame="link-2"),
+    ):
+        again = geomech.Study(scene(Swimmer(medium, other))).effort(
+            amplitudes=[0.5, 1.2]
+        )
         for key in ("path_length", "work"):
             assert again[key] == pytest.approx(found[key], rel=1e-9)
 
@@ -59,7 +75,11 @@ def test_a_norm_shares_the_velocities_of_the_harmonics():
     whole = Swimmer.velocity
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            Swimmer, "velocity", lambda self, a, u: calls.append(np.broadcast(a, u).size) or whole(self, a, u)
+            Swimmer,
+            "velocity",
+            lambda self, a, u: (
+                calls.append(np.broadcast(a, u).size) or whole(self, a, u)
+            ),
         )
         norm = study.metric
         before = sum(calls)
@@ -67,7 +87,10 @@ def test_a_norm_shares_the_velocities_of_the_harmonics():
         assert sum(calls) == before
     alone = geomech.Study(study.scene)
     assert np.array_equal(alone.table("harmonic").coefficients, table.coefficients)
-    assert np.abs(alone.metric.coefficients - norm.coefficients).max() < 1e-12 * norm.coefficients.max()
+    assert (
+        np.abs(alone.metric.coefficients - norm.coefficients).max()
+        < 1e-12 * norm.coefficients.max()
+    )
     assert study.metric is norm
     assert study.with_numerics(grid=15).metric is not norm
     assert study.with_numerics(phases=64).metric is norm
@@ -75,15 +98,23 @@ def test_a_norm_shares_the_velocities_of_the_harmonics():
 
 def test_work_and_cost_of_transport_of_known_motions():
     """Viscous: work over that of towing is path length^2 at best over distance^2, with equality at constant power."""
-    found = geomech.Study(scene(Swimmer(FLUID, Chain()), Circle())).effort(amplitudes=[0.05])
-    assert found["work"] * 2 * np.pi == pytest.approx(found["path_length"] ** 2, rel=0.1)
+    found = geomech.Study(scene(Swimmer(FLUID, Chain()), Circle())).effort(
+        amplitudes=[0.05]
+    )
+    assert found["work"] * 2 * np.pi == pytest.approx(
+        found["path_length"] ** 2, rel=0.1
+    )
     assert found["work"] * 2 * np.pi >= found["path_length"] ** 2
     study = geomech.Study(scene(Swimmer(SAND, UNEVEN)))
     table = study.study([0.5, 1.0], ["direct", "path"])
     table = Displacements(effort.with_effort(table.result))
     distance = np.array(table["net_distance"]["path"]) / 0.3
-    assert table["cost_of_transport"]["path"] == pytest.approx(np.array(table["work"]) / distance)
-    assert table["efficiency"]["path"] == pytest.approx(distance / np.array(table["path_length"]))
+    assert table["cost_of_transport"]["path"] == pytest.approx(
+        np.array(table["work"]) / distance
+    )
+    assert table["efficiency"]["path"] == pytest.approx(
+        distance / np.array(table["path_length"])
+    )
     assert table["path_length"] == table["work"]
     assert set(effort.units(study.scene.system)) <= set(table["units"])
 
@@ -94,13 +125,19 @@ def test_viscous_circle_is_as_efficient_as_published():
     table = Displacements(effort.with_effort(table.result))
     assert table["path_length"][0] == pytest.approx(0.512235, abs=1e-6)
     assert table["efficiency"]["direct"] == pytest.approx([0.1001, 0.1088], abs=6e-5)
-    towed = np.array(table["net_distance"]["direct"]) ** 2 / (2 * np.pi)  # at constant speed, through the same cycle
-    assert table["cost_of_transport"]["direct"] == pytest.approx(np.array(table["work"]) / towed)
+    towed = np.array(table["net_distance"]["direct"]) ** 2 / (
+        2 * np.pi
+    )  # at constant speed, through the same cycle
+    assert table["cost_of_transport"]["direct"] == pytest.approx(
+        np.array(table["work"]) / towed
+    )
 
 
 def test_errors_cover_four_times_as_many_phases():
     one = scene(Swimmer(SAND, UNEVEN))
-    coarse, fine = (effort.effort(one, GAIT, [0.4, 0.9, 1.5], phases) for phases in (64, 512))
+    coarse, fine = (
+        effort.effort(one, GAIT, [0.4, 0.9, 1.5], phases) for phases in (64, 512)
+    )
     for key in ("path_length", "work"):
         assert (np.abs(coarse[key] - fine[key]) <= coarse[f"{key}_error"]).all()
         assert (coarse[f"{key}_error"] < 1e-2 * fine[key]).all()
@@ -116,8 +153,13 @@ def test_errors_cover_four_times_as_many_phases():
 )
 def test_errors_of_work_in_time_stepping_cover_steps_and_pieces(effect):
     """The mean over every other step of the same march knows of neither."""
-    one = scene(Swimmer(Viscous(2.5), Chain((1, 1.4, 0.7)), (effect,))).with_numerics(pieces=20)
-    found, fine = (effort.effort(s, GAIT, [0.7], n) for s, n in ((one, 32), (one.with_numerics(pieces=80), 64)))
+    one = scene(Swimmer(Viscous(2.5), Chain((1, 1.4, 0.7)), (effect,))).with_numerics(
+        pieces=20
+    )
+    found, fine = (
+        effort.effort(s, GAIT, [0.7], n)
+        for s, n in ((one, 32), (one.with_numerics(pieces=80), 64))
+    )
     off = np.abs(found["work"] - fine["work"])
     assert off <= found["work_error"] < 0.05 * fine["work"]
 
@@ -127,12 +169,19 @@ def test_errors_of_work_in_time_stepping_cover_steps_and_pieces(effect):
     [
         (NoSlipSnake(), "nothing says what moving costs"),
         (Swimmer(SAND, Chain((1, 1, 1, 1))), "of 3 joints"),
-        (Swimmer(SAND, Chain(), (SkinFriction(0.3, 0.6),)), "another power than the way back"),
+        (
+            Swimmer(SAND, Chain(), (SkinFriction(0.3, 0.6),)),
+            "another power than the way back",
+        ),
         (Swimmer(SAND, Chain(), (Transient(travel=0.1),)), "not memoryless"),
     ],
 )
 def test_what_has_no_metric_says_why(system, said):
-    gait = Circle() if system.joints == 2 else geomech.gaits.Fourier(cos=((1,), (0,), (0,)), sin=((0,), (1,), (0.5,)))
+    gait = (
+        Circle()
+        if system.joints == 2
+        else geomech.gaits.Fourier(cos=((1,), (0,), (0,)), sin=((0,), (1,), (0.5,)))
+    )
     study = geomech.Study(scene(system, gait))
     with pytest.raises(Refusal, match=said):
         study.metric  # noqa: B018
@@ -140,9 +189,16 @@ def test_what_has_no_metric_says_why(system, said):
 
 def test_gaits_with_a_past_cost_work_all_the_same():
     past = Swimmer(SAND, Chain(), (Transient(travel=1e-9),))
-    with_past, plain = (effort.effort(scene(s, Circle()), None, [1.0], 32) for s in (past, Swimmer(SAND, Chain())))
+    with_past, plain = (
+        effort.effort(scene(s, Circle()), None, [1.0], 32)
+        for s in (past, Swimmer(SAND, Chain()))
+    )
     assert with_past["work"] == pytest.approx(plain["work"], rel=0.02)
-    heavy = Swimmer(SAND, Chain(length=0.3), (BodyInertia(mass=0.01, drag=1.0, frequency=1.0, length=0.3),))
+    heavy = Swimmer(
+        SAND,
+        Chain(length=0.3),
+        (BodyInertia(mass=0.01, drag=1.0, frequency=1.0, length=0.3),),
+    )
     found = effort.effort(scene(heavy, Circle()), None, [0.5], 32)
     assert np.isnan(found["path_length"]).all() and (found["work"] > 0).all()
 
@@ -155,9 +211,9 @@ def test_the_file_has_what_a_change_of_shape_costs(medium, tmp_path):
     table = Table(str(tmp_path / "made.nc"))
     own, back = study.metric, table.table("metric")
     name = "M" if medium is FLUID else "coefficients"
-    assert np.array_equal(getattr(back, name), getattr(own, name)) and table.traits.power_degree == (
-        2 if medium is FLUID else 1
-    )
+    assert np.array_equal(
+        getattr(back, name), getattr(own, name)
+    ) and table.traits.power_degree == (2 if medium is FLUID else 1)
     again = geomech.Study(scene(table)).effort(amplitudes=[1.0])
     there = study.effort(amplitudes=[1.0])
     assert again["path_length"] == pytest.approx(there["path_length"], rel=3e-3)
@@ -179,11 +235,16 @@ def test_a_damaged_metric_is_refused(tmp_path):
                 file.variables["metric"][0, 1] += 1.0
             else:
                 file.power_degree = -1.0
-        with pytest.raises(Refusal, match="symmetric" if what == "symmetry" else "power_degree"):
+        with pytest.raises(
+            Refusal, match="symmetric" if what == "symmetry" else "power_degree"
+        ):
             Table(str(path))
 
 
-@pytest.mark.parametrize(("medium", "body"), [(FLUID, UNEVEN), (SAND, UNEVEN), (FLUID, Serpenoid(elements=12))])
+@pytest.mark.parametrize(
+    ("medium", "body"),
+    [(FLUID, UNEVEN), (SAND, UNEVEN), (FLUID, Serpenoid(elements=12))],
+)
 def test_what_it_takes_is_foretold(medium, body):
     one, counts = scene(Swimmer(medium, body), Circle()), []
     foretold = cost.price(cost.of_metric(one)).balances
@@ -197,7 +258,18 @@ def test_by_command(capsys):
     from geomech.cli import main
 
     with pytest.raises(SystemExit) as ended:
-        main(["displacement", "three-link-viscous", "--amplitudes", "0,1", "--tiers", "direct", "--effort", "--json"])
+        main(
+            [
+                "displacement",
+                "three-link-viscous",
+                "--amplitudes",
+                "0,1",
+                "--tiers",
+                "direct",
+                "--effort",
+                "--json",
+            ]
+        )
     told = json.loads(capsys.readouterr().out)
     assert ended.value.code == 0
     assert told["path_length"] == pytest.approx([0.0, 0.512235], abs=1e-6)
@@ -205,7 +277,10 @@ def test_by_command(capsys):
     assert told["cost_of_transport"]["direct"][0] is None
     with pytest.raises(SystemExit) as ended:
         main(["displacement", "no-slip-snake", "--amplitudes", "1", "--effort"])
-    assert ended.value.code == 2 and "nothing says what moving costs" in capsys.readouterr().err
+    assert (
+        ended.value.code == 2
+        and "nothing says what moving costs" in capsys.readouterr().err
+    )
 
 
 @pytest.mark.parametrize("name", ["three-link-floating", "three-link-ideal-fluid"])
@@ -214,23 +289,48 @@ def test_a_metric_of_the_systems_own_has_lengths_and_no_work(name, capsys):
 
     study = geomech.Study(geomech.load(name).with_numerics(grid=31, extent=2.5))
     alpha, alphadot = study.scene.gait.cycle(256, 0.8)
-    length = 2 * np.pi * np.sqrt(study.scene.system.squared_speed(alpha, alphadot)).mean()
+    length = (
+        2 * np.pi * np.sqrt(study.scene.system.squared_speed(alpha, alphadot)).mean()
+    )
     found = study.effort(amplitudes=[0.8])
-    assert found["path_length"] == pytest.approx([length], rel=1e-12) and np.isnan(found["work"]).all()
-    assert metric.path_length(study.metric.norm, study.scene.gait, [0.8]) == pytest.approx([length], rel=1e-4)
+    assert (
+        found["path_length"] == pytest.approx([length], rel=1e-12)
+        and np.isnan(found["work"]).all()
+    )
+    assert metric.path_length(
+        study.metric.norm, study.scene.gait, [0.8]
+    ) == pytest.approx([length], rel=1e-4)
     with pytest.raises(SystemExit) as ended:
-        main(["displacement", name, "--amplitudes", "0.8", "--tiers", "direct", "--effort"])
-    assert ended.value.code == 0 and f"path length ({effort.METRIC})" in capsys.readouterr().out
+        main(
+            [
+                "displacement",
+                name,
+                "--amplitudes",
+                "0.8",
+                "--tiers",
+                "direct",
+                "--effort",
+            ]
+        )
+    assert (
+        ended.value.code == 0
+        and f"path length ({effort.METRIC})" in capsys.readouterr().out
+    )
     assert "metric" in study.to_xarray()
 
 
 def test_phases_of_a_cost_are_fours_and_its_errors_are_what_half_of_them_change():
-    fluid, past = scene(Swimmer(FLUID, UNEVEN)), scene(Swimmer(SAND, UNEVEN, (Transient(travel=0.1),)))
+    fluid, past = (
+        scene(Swimmer(FLUID, UNEVEN)),
+        scene(Swimmer(SAND, UNEVEN, (Transient(travel=0.1),))),
+    )
     assert [effort.phases_of(fluid, n) for n in (8, 9, 12, 13)] == [8, 12, 12, 16]
     assert [effort.phases_of(past, n) for n in (8, 32, 33)] == [32, 32, 36]
     assert effort.phases_of(fluid) == -(-fluid.numerics.phases // 4) * 4
     sand = scene(Swimmer(SAND, UNEVEN))
     fine, half = (effort.effort(sand, None, [0.4, 1.1], phases) for phases in (32, 16))
     for key in ("path_length", "work"):
-        assert fine[f"{key}_error"] == pytest.approx(np.abs(fine[key] - half[key]), rel=1e-9)
+        assert fine[f"{key}_error"] == pytest.approx(
+            np.abs(fine[key] - half[key]), rel=1e-9
+        )
         assert (fine[f"{key}_error"] > 1e-8).all()

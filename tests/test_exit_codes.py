@@ -24,8 +24,24 @@ SOLVING = {  # what each command that solves for velocities takes beside its sce
     "trajectory": ["-o", "out.csv", "--cycles", "2"],
     "trajectory --cycles 1": ["-o", "out.gif"],
     "accuracy": ["-o", "out"],
-    "sweep": ["--over", "gait.amplitude=0.5,1.0", "--over", "body.length=1,2", "-o", "out.nc"],
-    "optimize": ["--objective", "displacement", "--harmonics", "1", "-o", "out.toml", "--plot", "out.svg"],
+    "sweep": [
+        "--over",
+        "gait.amplitude=0.5,1.0",
+        "--over",
+        "body.length=1,2",
+        "-o",
+        "out.nc",
+    ],
+    "optimize": [
+        "--objective",
+        "displacement",
+        "--harmonics",
+        "1",
+        "-o",
+        "out.toml",
+        "--plot",
+        "out.svg",
+    ],
 }
 
 
@@ -39,13 +55,23 @@ def ended(tmp_path, monkeypatch):
 
 
 def test_every_command_has_its_answers_its_help_and_refusals():
-    commands = {command.name or command.callback.__name__ for command in cli.app.registered_commands}
+    commands = {
+        command.name or command.callback.__name__
+        for command in cli.app.registered_commands
+    }
     ends = frozen.read_commands()
-    well = {line.split()[0] for line, told in ends.items() if told[-1] == "exit 0" and "--help" not in line}
+    well = {
+        line.split()[0]
+        for line, told in ends.items()
+        if told[-1] == "exit 0" and "--help" not in line
+    }
     # The answer of the first is data/keys.txt; the others take LAMMPS.
     assert well | {"reference", "grains", "drag-grains"} >= commands
     assert {f"{name} --help" for name in commands} <= set(ends)
-    refused = [section if section != "geomech" else case for section, case in frozen.read_refusals()]
+    refused = [
+        section if section != "geomech" else case
+        for section, case in frozen.read_refusals()
+    ]
     assert {line.split()[0] for line in refused if "--fast" in line} == commands
 
 
@@ -94,11 +120,17 @@ def no_memory():
 
 @pytest.mark.parametrize(
     ("how", "ends", "said"),
-    [(interrupt, 130, ""), (no_memory, 2, "not enough memory"), (lambda: signal.raise_signal(signal.SIGTERM), 143, "")],
+    [
+        (interrupt, 130, ""),
+        (no_memory, 2, "not enough memory"),
+        (lambda: signal.raise_signal(signal.SIGTERM), 143, ""),
+    ],
     ids=["interrupt", "memory", "terminate"],
 )
 @pytest.mark.parametrize("name", SOLVING)
-def test_what_is_stopped_leaves_nothing_half_written(name, how, ends, said, ended, monkeypatch):
+def test_what_is_stopped_leaves_nothing_half_written(
+    name, how, ends, said, ended, monkeypatch
+):
     calls = failing(monkeypatch, how)
     code, out, err, files = ended(name)
     assert calls

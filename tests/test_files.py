@@ -27,7 +27,9 @@ WRITERS = ["atomic_file", "atomic_folder"]
 
 
 def start(writer, target, how, **options):
-    return subprocess.Popen([sys.executable, "-c", KILLED, writer, str(target), how], **options)
+    return subprocess.Popen(
+        [sys.executable, "-c", KILLED, writer, str(target), how], **options
+    )
 
 
 def write(writer, target, text="new"):
@@ -40,10 +42,14 @@ def write(writer, target, text="new"):
 def test_strays_of_a_kill_are_swept_by_the_next_writer(writer, tmp_path):
     for _ in range(2):
         assert start(writer, tmp_path / "out", "SIGKILL").wait() == -signal.SIGKILL
-    assert [p.name.startswith(".geomech-") for p in tmp_path.iterdir()] == [True]  # the second swept the first's
+    assert [p.name.startswith(".geomech-") for p in tmp_path.iterdir()] == [
+        True
+    ]  # the second swept the first's
     assert start(writer, tmp_path / "another", "SIGKILL").wait() == -signal.SIGKILL
     assert write(writer, tmp_path / "out").read_text() == "new"
-    assert len(list(tmp_path.iterdir())) == 2  # that of another target stays for its own
+    assert (
+        len(list(tmp_path.iterdir())) == 2
+    )  # that of another target stays for its own
 
 
 def test_a_stray_beside_a_folder_that_now_is_there(tmp_path):
@@ -83,7 +89,9 @@ def test_what_is_not_ours_stays(tmp_path):
     old = time.time() - 2 * files.ABANDONED
     os.utime(tmp_path / (prefix + "young"), (old, old))
     files.sweep_strays(target)
-    assert sorted(tmp_path.rglob("*")) == [p for p in before if not p.name.endswith("young")]
+    assert sorted(tmp_path.rglob("*")) == [
+        p for p in before if not p.name.endswith("young")
+    ]
 
 
 @pytest.mark.parametrize("writer", WRITERS)
@@ -102,7 +110,9 @@ def test_a_failure_leaves_what_was_there(writer, error, tmp_path):
     assert sorted(tmp_path.rglob("*")) == sorted({tmp_path / "out", file})
 
 
-@pytest.mark.parametrize("name", ["a" * 255, "é" * 127, "-", " ", "a\nb", ".hidden", "ä☃.nc"])
+@pytest.mark.parametrize(
+    "name", ["a" * 255, "é" * 127, "-", " ", "a\nb", ".hidden", "ä☃.nc"]
+)
 @pytest.mark.parametrize("writer", WRITERS)
 def test_any_name_that_the_file_system_takes(writer, name, tmp_path):
     assert write(writer, tmp_path / name).read_text() == "new"
@@ -111,7 +121,10 @@ def test_any_name_that_the_file_system_takes(writer, name, tmp_path):
 
 def test_modes_are_the_usual_ones(tmp_path):
     (tmp_path / "plain").write_text("")
-    assert write("atomic_file", tmp_path / "out").stat().st_mode == (tmp_path / "plain").stat().st_mode
+    assert (
+        write("atomic_file", tmp_path / "out").stat().st_mode
+        == (tmp_path / "plain").stat().st_mode
+    )
 
 
 def test_a_link_is_written_through(tmp_path):
@@ -124,8 +137,13 @@ def test_a_link_is_written_through(tmp_path):
 
 @pytest.mark.parametrize("writer", WRITERS)
 def test_a_folder_goes_where_few_files_can_be_open(writer, tmp_path, monkeypatch):
-    monkeypatch.setattr(files.shutil, "rmtree", lambda *_, **__: None)  # as it ends where none can be opened
-    with contextlib.suppress(KeyError), getattr(files, writer)(tmp_path / "out") as path:
+    monkeypatch.setattr(
+        files.shutil, "rmtree", lambda *_, **__: None
+    )  # as it ends where none can be opened
+    with (
+        contextlib.suppress(KeyError),
+        getattr(files, writer)(tmp_path / "out") as path,
+    ):
         (path / "b.txt" if writer == "atomic_folder" else path).write_text("half")
         raise KeyError
     assert not any(tmp_path.iterdir())
@@ -145,7 +163,10 @@ def test_a_folder_replaces_files_alone(kind, tmp_path):
 def test_a_folder_does_not_replace_an_input(tmp_path):
     file, source = write("atomic_folder", tmp_path / "out", "input"), tmp_path / "input"
     source.hardlink_to(file)
-    with pytest.raises(Refusal, match="it is an input"), files.atomic_folder(tmp_path / "out", [source]) as new:
+    with (
+        pytest.raises(Refusal, match="it is an input"),
+        files.atomic_folder(tmp_path / "out", [source]) as new,
+    ):
         (new / "a.txt").write_text("new")
     assert file.read_text() == "input"
 
@@ -181,7 +202,9 @@ def test_a_stop_at_any_moment_leaves_nothing(writer, heard, tmp_path):
         with contextlib.suppress(KeyboardInterrupt):
             write(writer, folder / "out")
         heard.clear()
-        assert not [p for p in folder.rglob("*") if p.name.startswith(".geomech-")], seen
+        assert not [p for p in folder.rglob("*") if p.name.startswith(".geomech-")], (
+            seen
+        )
 
 
 LIMITED = """
@@ -200,7 +223,9 @@ except files.Refusal as error:
 def test_a_full_disk_is_named_and_leaves_what_was_there(writer, tmp_path):
     file = write(writer, tmp_path / "out", "old")
     said = subprocess.run(
-        [sys.executable, "-c", LIMITED, writer, str(tmp_path / "out")], capture_output=True, text=True
+        [sys.executable, "-c", LIMITED, writer, str(tmp_path / "out")],
+        capture_output=True,
+        text=True,
     )
     assert said.stdout.startswith("cannot write ")
     assert f"{tmp_path / 'out'}: File too large; make room" in said.stdout

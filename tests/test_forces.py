@@ -19,21 +19,42 @@ from geomech.studies.forces import Forces, forces
 from geomech.studies.newtons import Sizes
 from geomech.systems import Swimmer
 from geomech.text import forces as texts
-from rft import Backbone, Chain, ConstantCurvature, DepthProfile, Granular, SkinFriction, Slope, Transient, Viscous
+from rft import (
+    Backbone,
+    Chain,
+    ConstantCurvature,
+    DepthProfile,
+    Granular,
+    SkinFriction,
+    Slope,
+    Transient,
+    Viscous,
+)
 from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 PARTS = "normal", "tangential", "ends"
 SAND, FLUID = Granular(C=1.8, gamma0=0.24), Viscous(3.0)
-LAW = geomech.media.Table((0.0, 0.5, 1.0, 1.5), (1.0, 0.9, 0.6, 0.1), (0.0, 1.8, 2.4, 2.7))  # without exact integrals
+LAW = geomech.media.Table(
+    (0.0, 0.5, 1.0, 1.5), (1.0, 0.9, 0.6, 0.1), (0.0, 1.8, 2.4, 2.7)
+)  # without exact integrals
 
 
 def midline(folder):
     """A bend that runs to the tail, as curvature at 21 places of 16 frames."""
     s = np.linspace(0, 1, 21)
-    rows = [(t, x, 5 * (1 - x / 2) * np.cos(2 * np.pi * (x + t))) for t in np.arange(16) / 16 for x in s]
+    rows = [
+        (t, x, 5 * (1 - x / 2) * np.cos(2 * np.pi * (x + t)))
+        for t in np.arange(16) / 16
+        for x in s
+    ]
     path = folder / "swim.csv"
-    path.write_text("\n".join(["t,s,curvature", *(",".join(map(repr, map(float, row))) for row in rows)]) + "\n")
+    path.write_text(
+        "\n".join(
+            ["t,s,curvature", *(",".join(map(repr, map(float, row))) for row in rows)]
+        )
+        + "\n"
+    )
     return Centreline(str(path), elements=30)
 
 
@@ -44,13 +65,17 @@ def cases(folder):
     sunk = (DepthProfile((1.0, 1.6)), SkinFriction(0.1, 0.2))
     return {
         "sine": fish,
-        "past": fish.changed(effects=(Transient(0.1),), body=Backbone(20), gait=Sine(elements=20)),
+        "past": fish.changed(
+            effects=(Transient(0.1),), body=Backbone(20), gait=Sine(elements=20)
+        ),
         "serpenoid": modes,
         "arcs": Scene(Swimmer(FLUID, ConstantCurvature(24, sections=2)), Circle(1.5)),
         "links": Scene(chain, Circle(1.2)),
         "measured law": Scene(Swimmer(LAW, Chain()), Circle(0.8)),
         "sunk": Scene(dataclasses.replace(chain, effects=sunk), Circle(1.2)),
-        "turning": Scene(Swimmer(SAND, Chain((1,) * 5)), Wave(0.6, 1.0, offset=0.3, joints=4)),
+        "turning": Scene(
+            Swimmer(SAND, Chain((1,) * 5)), Wave(0.6, 1.0, offset=0.3, joints=4)
+        ),
         "midline": Scene(Swimmer(SAND, Backbone(30)), midline(folder)),
     }
 
@@ -58,7 +83,9 @@ def cases(folder):
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
     scenes = cases(tmp_path_factory.mktemp("midline"))
-    return {name: forces(scene.with_numerics(phases=24)) for name, scene in scenes.items()}
+    return {
+        name: forces(scene.with_numerics(phases=24)) for name, scene in scenes.items()
+    }
 
 
 def places(scene, s):
@@ -67,13 +94,28 @@ def places(scene, s):
     pose = poses(scene.cycle().xi)[:-1]
     ends = scene.system.body.points(alpha, pose) @ [1, 1j] / scene.system.length
     along = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(ends[0])))])
-    place = np.stack([np.interp(s, along, row.real) + 1j * np.interp(s, along, row.imag) for row in ends])
+    place = np.stack(
+        [
+            np.interp(s, along, row.real) + 1j * np.interp(s, along, row.imag)
+            for row in ends
+        ]
+    )
     element = np.clip(np.searchsorted(along, s) - 1, 0, len(along) - 2)
     chord = np.diff(ends, axis=1)
     return place, (chord / np.abs(chord))[:, element], ends[:, -1]
 
 
-NAMES = "sine", "past", "serpenoid", "arcs", "links", "measured law", "sunk", "turning", "midline"
+NAMES = (
+    "sine",
+    "past",
+    "serpenoid",
+    "arcs",
+    "links",
+    "measured law",
+    "sunk",
+    "turning",
+    "midline",
+)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -81,13 +123,20 @@ def test_thrust_and_drag_balance_and_forces_do_the_work_of_the_joints(found, nam
     result = found[name]
     v = lambda key: result[key].values
     assert v("thrust_normal").shape == v("drag_ends").shape == v("phase").shape
-    thrust, drag = (sum(v(f"{kind}_{part}") for part in PARTS) for kind in ("thrust", "drag"))
+    thrust, drag = (
+        sum(v(f"{kind}_{part}") for part in PARTS) for kind in ("thrust", "drag")
+    )
     assert np.abs(thrust + drag).max() < 1e-8 < thrust.min()
-    assert v("medium_power") == pytest.approx(v("joint_power"), rel=1e-6) and v("medium_power").min() > 0
+    assert (
+        v("medium_power") == pytest.approx(v("joint_power"), rel=1e-6)
+        and v("medium_power").min() > 0
+    )
     ends = v("tail_forward") + v("head_forward")
     assert (v("forward") * v("length")).sum(-1) + ends == pytest.approx(0.0, abs=1e-8)
     assert v("forward") == pytest.approx(v("forward_normal") + v("forward_tangential"))
-    mean = sum(v(f"mean_{kind}_{part}") for kind in ("thrust", "drag") for part in PARTS[:2])
+    mean = sum(
+        v(f"mean_{kind}_{part}") for kind in ("thrust", "drag") for part in PARTS[:2]
+    )
     assert mean == pytest.approx(v("forward").mean(0), abs=1e-12)
     assert len(v("s")) >= 40 and v("length").sum() == pytest.approx(1.0)
     assert not (v("tangential") > 0).all() and {x.unit for x in result.variables} >= {
@@ -103,33 +152,63 @@ def test_forces_laid_out_in_the_plane_hold_the_moments_and_do_the_power(found, n
     power is minus force times the velocity of the points, by differences in phase."""
     result, scene = found[name], found[name].subject.scene
     place, heading, head = places(scene, result["s"].values)
-    force = (result["tangential"].values + 1j * result["normal"].values) * heading * result["length"].values
+    force = (
+        (result["tangential"].values + 1j * result["normal"].values)
+        * heading
+        * result["length"].values
+    )
     assert np.abs(force.sum(1)).max() < 1e-8
     about = lambda point: ((place - point[:, None]).conj() * force).imag
-    assert np.abs(about(head).sum(1)).max() < 1e-3  # elements have forces at their centres here
+    assert (
+        np.abs(about(head).sum(1)).max() < 1e-3
+    )  # elements have forces at their centres here
     k = 17
     point, _, _ = places(scene, result["point"].values[[k]])
     moment = about(point[:, 0])[:, : k + 1].sum(1)
     assert moment == pytest.approx(result["bending_moment"].values[:, k], abs=1e-3)
-    assert np.abs(result["bending_moment"].values[:, [0, -1]]).max() < 0.05 * np.abs(moment).max()
+    assert (
+        np.abs(result["bending_moment"].values[:, [0, -1]]).max()
+        < 0.05 * np.abs(moment).max()
+    )
     h, forwards = 1e-4, result.subject
     angle = forwards.direction + forwards.net[2] * (np.arange(24) / 24 - 0.5)
     assert (force * np.exp(-1j * angle)[:, None]).real == pytest.approx(
         result["forward"].values * result["length"].values, abs=1e-8
     )
     alpha, rate = scene.gait.cycle(24)
-    xi, pose = scene.cycle().xi / [scene.system.length, scene.system.length, 1], poses(scene.cycle().xi)[:-1]
+    xi, pose = (
+        scene.cycle().xi / [scene.system.length, scene.system.length, 1],
+        poses(scene.cycle().xi)[:-1],
+    )
     frame = np.exp(1j * pose[:, 2])[:, None]
     moved = []
     for step in (h, -h):
-        ends = scene.system.body.points(alpha + step * rate) @ [1, 1j] / scene.system.length
+        ends = (
+            scene.system.body.points(alpha + step * rate)
+            @ [1, 1j]
+            / scene.system.length
+        )
         along = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(ends[0])))])
         s = result["s"].values
-        moved.append(np.stack([np.interp(s, along, e.real) + 1j * np.interp(s, along, e.imag) for e in ends]))
+        moved.append(
+            np.stack(
+                [
+                    np.interp(s, along, e.real) + 1j * np.interp(s, along, e.imag)
+                    for e in ends
+                ]
+            )
+        )
     inside = (moved[0] + moved[1]) / 2
-    velocity = (moved[0] - moved[1]) / (2 * h) + xi[:, :1] + 1j * xi[:, 1:2] + 1j * xi[:, 2:] * inside
+    velocity = (
+        (moved[0] - moved[1]) / (2 * h)
+        + xi[:, :1]
+        + 1j * xi[:, 1:2]
+        + 1j * xi[:, 2:] * inside
+    )
     power = -(force * (frame * velocity).conj()).real.sum(1)
-    assert power == pytest.approx(result["medium_power"].values, rel=0.01)  # as do rotations here
+    assert power == pytest.approx(
+        result["medium_power"].values, rel=0.01
+    )  # as do rotations here
 
 
 def test_a_small_sine_in_a_fluid_has_the_forces_of_its_closed_form():
@@ -137,10 +216,14 @@ def test_a_small_sine_in_a_fluid_has_the_forces_of_its_closed_form():
     backwards by tangential ones, and power r A^2 cos^2; far from the ends, to the square of the slope."""
     r, waves, slope = 3.0, 8.0, 0.02
     gait = Sine(amplitude=slope / (2 * np.pi), waves=waves, elements=320)
-    result = forces(Scene(Swimmer(Viscous(r), Backbone(320)), gait).with_numerics(phases=16))
+    result = forces(
+        Scene(Swimmer(Viscous(r), Backbone(320)), gait).with_numerics(phases=16)
+    )
     k, s, t = 2 * np.pi * waves, result["s"].values, result["phase"].values
     A = slope / k
-    middle = np.abs(s - 0.5) < 0.5 / waves  # a wave, where the body's yaw, which a long one has little of, moves least
+    middle = (
+        np.abs(s - 0.5) < 0.5 / waves
+    )  # a wave, where the body's yaw, which a long one has little of, moves least
     cos2 = (np.cos(k * s + t[:, None]) ** 2)[:, middle]
     inner = lambda name: result[name].values[:, middle]
     size = r * k * A**2
@@ -148,7 +231,9 @@ def test_a_small_sine_in_a_fluid_has_the_forces_of_its_closed_form():
     assert inner("power") == pytest.approx(r * A**2 * cos2, abs=0.02 * r * A**2)
     assert inner("forward_tangential").mean() == pytest.approx(-size / 2, rel=0.02)
     assert result["thrust_normal"].values == pytest.approx(size / 2, rel=0.03)
-    assert np.hypot(*result.subject.net[:2]) == pytest.approx((r - 1) * k * A**2 / 2 * 2 * np.pi, rel=0.03)
+    assert np.hypot(*result.subject.net[:2]) == pytest.approx(
+        (r - 1) * k * A**2 / 2 * 2 * np.pi, rel=0.03
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -160,7 +245,10 @@ class Doubled:
 
 
 def test_forces_are_in_axial_drags_whatever_the_unit_of_a_law():
-    one, two = (forces(Scene(Swimmer(law, Chain()), Circle(0.7)).with_numerics(phases=8)) for law in (FLUID, Doubled()))
+    one, two = (
+        forces(Scene(Swimmer(law, Chain()), Circle(0.7)).with_numerics(phases=8))
+        for law in (FLUID, Doubled())
+    )
     for name in ("forward", "bending_moment", "medium_power"):
         np.testing.assert_allclose(two[name].values, one[name].values, atol=1e-9)
 
@@ -178,10 +266,15 @@ def test_forces_do_not_see_the_frame():
 def test_a_heavy_body_is_pushed_by_what_accelerates_it():
     """Thrust and drag balance in the mean alone; so do the powers."""
     heavy = geomech.load("sandfish-heavy")
-    small = heavy.changed(body=Backbone(20), gait=dataclasses.replace(heavy.gait, elements=20)).with_numerics(phases=32)
+    small = heavy.changed(
+        body=Backbone(20), gait=dataclasses.replace(heavy.gait, elements=20)
+    ).with_numerics(phases=32)
     v = {k: x.values for k, x in forces(small).items()}
     net = sum(v[f"{kind}_{part}"] for kind in ("thrust", "drag") for part in PARTS)
-    assert np.abs(net).max() > 0.01 and abs(net.mean()) < 2e-4 * np.abs(v["drag_tangential"]).max()
+    assert (
+        np.abs(net).max() > 0.01
+        and abs(net.mean()) < 2e-4 * np.abs(v["drag_tangential"]).max()
+    )
     assert v["joint_power"].mean() == pytest.approx(v["medium_power"].mean(), rel=1e-3)
     assert np.abs(v["joint_power"] - v["medium_power"]).max() > 1e-3
 
@@ -189,13 +282,15 @@ def test_a_heavy_body_is_pushed_by_what_accelerates_it():
 def test_on_a_slope_forces_hold_the_weight_in_the_world():
     """Where the place matters headings are those of the steps; the weight pulls downhill, and the ground holds it."""
     slope = Slope(angle=0.3, towards=2.0, weight=0.4)
-    scene = Scene(Swimmer(SAND, Chain((1,) * 5), (slope,)), Wave(0.6, 1.0, offset=0.3, joints=4)).with_numerics(
-        phases=32
-    )
+    scene = Scene(
+        Swimmer(SAND, Chain((1,) * 5), (slope,)), Wave(0.6, 1.0, offset=0.3, joints=4)
+    ).with_numerics(phases=32)
     result = forces(scene)
     v = {k: x.values for k, x in result.items()}
     net = sum(v[f"{kind}_{part}"] for kind in ("thrust", "drag") for part in PARTS)
-    ahead = result.subject.direction + result.subject.net[2] * (np.arange(32) / 32 - 0.5)
+    ahead = result.subject.direction + result.subject.net[2] * (
+        np.arange(32) / 32 - 0.5
+    )
     assert net == pytest.approx(0.4 * np.sin(0.3) * np.cos(ahead - 2.0), abs=2e-3)
     assert abs(result.subject.net[2]) > 0.1
 
@@ -206,7 +301,10 @@ def test_the_cost_counts_all_that_errors_take():
     solved = lambda scene: Forces(scene.with_numerics(phases=32)).cost().balances
     cycles = 3  # assumed, of what is run until it repeats
     once = 9  # of 32 phases, whose images the others are
-    assert solved(geomech.load("three-link-viscous")) == once and solved(geomech.load("three-link-glass")) == 2 * once
+    assert (
+        solved(geomech.load("three-link-viscous")) == once
+        and solved(geomech.load("three-link-glass")) == 2 * once
+    )
     assert solved(fish) == 16 + 32 and solved(steps) == cycles * (3 * 32 + 16)
 
 
@@ -221,66 +319,136 @@ def test_newtons_and_watts_follow_from_sizes():
         "medium_power": (drag * 0.1 * 6 * np.pi, "W"), "power": (drag * 6 * np.pi, "W/m"), "lag": (1.0, "rad"),
     }  # fmt: skip
     for name, (scale, unit) in scales.items():
-        np.testing.assert_allclose(known[name].values, scale * plain[name].values, rtol=1e-12)
+        np.testing.assert_allclose(
+            known[name].values, scale * plain[name].values, rtol=1e-12
+        )
         assert known[name].unit == unit
     by_stress = forces(fish, Sizes(length=0.1, stress=500.0))
-    np.testing.assert_allclose(by_stress["drag_ends"].values, 500 * 2 * 0.006 * 0.1 * plain["drag_ends"].values)
-    assert by_stress["medium_power"].unit == "J/rad" and by_stress["power"].unit == "N/rad"
+    np.testing.assert_allclose(
+        by_stress["drag_ends"].values, 500 * 2 * 0.006 * 0.1 * plain["drag_ends"].values
+    )
+    assert (
+        by_stress["medium_power"].unit == "J/rad" and by_stress["power"].unit == "N/rad"
+    )
     assert plain.subject.newtons.lacks == ("length", "radius", "depth")
-    fluid = geomech.load("three-link-viscous").changed(body=Chain(length=0.3)).with_numerics(phases=16)
+    fluid = (
+        geomech.load("three-link-viscous")
+        .changed(body=Chain(length=0.3))
+        .with_numerics(phases=16)
+    )
     assert forces(fluid).subject.newtons.lacks == ("radius", "stress")
     heavy = geomech.load("sandfish-heavy")
-    with pytest.raises(Refusal, match="sandfish-heavy: length is 0.2, but the scene has 0.1: drop length"):
+    with pytest.raises(
+        Refusal,
+        match="sandfish-heavy: length is 0.2, but the scene has 0.1: drop length",
+    ):
         Forces(heavy, Sizes(length=0.2)).check()
-    with pytest.raises(Refusal, match="differential-drive: force along the body is that of a body in a medium"):
+    with pytest.raises(
+        Refusal,
+        match="differential-drive: force along the body is that of a body in a medium",
+    ):
         geomech.study("differential-drive").forces()
 
 
-@pytest.mark.parametrize("name", ["sandfish-loose", "serpenoid-glass", "three-link-glass", "sandfish-transient"])
+@pytest.mark.parametrize(
+    "name",
+    ["sandfish-loose", "serpenoid-glass", "three-link-glass", "sandfish-transient"],
+)
 def test_errors_cover_what_finer_numerics_change(name):
     """Three times the elements, a hundredth of the regularisation, four times the steps in time: they cover these at nine
     points of ten, and are in the mean 20 times as large at most, along the body 30."""
     scene, phases = geomech.load(name).with_numerics(phases=32), 32
     if name == "sandfish-transient":
-        scene, phases = scene.changed(body=Backbone(40), gait=dataclasses.replace(scene.gait, elements=40)), 16
+        scene, phases = (
+            scene.changed(
+                body=Backbone(40), gait=dataclasses.replace(scene.gait, elements=40)
+            ),
+            16,
+        )
         scene = scene.with_numerics(phases=phases)
     found, body = Forces(scene).ask(), scene.system.body
-    finer = scene.with_numerics(regularisation=1e-8, phases=4 * phases if scene.system.traits.steps else phases)
+    finer = scene.with_numerics(
+        regularisation=1e-8, phases=4 * phases if scene.system.traits.steps else phases
+    )
     if count := getattr(body, "elements", None):
-        gait = dataclasses.replace(scene.gait, **{"elements": 3 * count} if hasattr(scene.gait, "elements") else {})
-        finer = finer.changed(body=dataclasses.replace(body, elements=3 * count), gait=gait)
+        gait = dataclasses.replace(
+            scene.gait,
+            **{"elements": 3 * count} if hasattr(scene.gait, "elements") else {},
+        )
+        finer = finer.changed(
+            body=dataclasses.replace(body, elements=3 * count), gait=gait
+        )
     truth = forces(finer)
-    sums = "thrust_normal", "drag_normal", "drag_tangential", "drag_ends", "medium_power", "joint_power"
+    sums = (
+        "thrust_normal",
+        "drag_normal",
+        "drag_tangential",
+        "drag_ends",
+        "medium_power",
+        "joint_power",
+    )
     for key in (*sums, "forward", "tangential", "power", "bending_moment"):
         values = truth[key].values[:: len(truth["phase"].values) // phases]
         for place in found[key].dims[1:]:
-            values = interp1d(truth[place].values, values, fill_value="extrapolate")(found[place].values)
+            values = interp1d(truth[place].values, values, fill_value="extrapolate")(
+                found[place].values
+            )
         off, error = np.abs(values - found[key].values), found[key].error
         assert (off <= error + 1e-9).mean() >= 0.9, key
-        assert off.mean() <= error.mean() < (30 if found[key].dims[1:] else 20) * off.mean() + 1e-9, key
+        assert (
+            off.mean()
+            <= error.mean()
+            < (30 if found[key].dims[1:] else 20) * off.mean() + 1e-9
+        ), key
 
 
 def test_a_stroke_that_goes_nowhere_says_so():
-    still = geomech.study(SAND, Chain((1, 1, 1)), Wave(0.5, waves=0.0, joints=2), phases=16).forces()
+    still = geomech.study(
+        SAND, Chain((1, 1, 1)), Wave(0.5, waves=0.0, joints=2), phases=16
+    ).forces()
     assert "no net displacement; forwards is where the frame points" in repr(still)
 
 
 def test_power_that_goes_elsewhere_is_said():
-    medium, joint = (types.SimpleNamespace(values=1e-8 * np.array(x), unit="W", error=None) for x in ([1, 2], [1, 2.6]))
+    medium, joint = (
+        types.SimpleNamespace(values=1e-8 * np.array(x), unit="W", error=None)
+        for x in ([1, 2], [1, 2.6])
+    )
     said = texts._power({"medium_power": medium, "joint_power": joint})
-    assert said == "power 1.5e-08 +-0e+00 W into the medium, largest 2e-08; at the joints 1.8e-08 W"
+    assert (
+        said
+        == "power 1.5e-08 +-0e+00 W into the medium, largest 2e-08; at the joints 1.8e-08 W"
+    )
 
 
 def test_the_command_prints_writes_and_draws(tmp_path):
     out, table = tmp_path / "f.nc", tmp_path / "f.csv"
-    given = ("forces", "three-link-glass", "--length", 0.3, "--radius", 0.02, "--depth", 0.05)
+    given = (
+        "forces",
+        "three-link-glass",
+        "--length",
+        0.3,
+        "--radius",
+        0.02,
+        "--depth",
+        0.05,
+    )
     code, text, err = run(*given, "--frequency", 1, "-o", table)
-    assert (code, err) == (0, "") and "W into the medium" in text and "at the joints the same" in text
+    assert (
+        (code, err) == (0, "")
+        and "W into the medium" in text
+        and "at the joints the same" in text
+    )
     data = np.genfromtxt(table, delimiter=",", names=True)
     code, text, _ = run(*given, "--json", "-o", out)
     numbers = json.loads(text)
-    assert (numbers["units"]["forward"], numbers["units"]["medium_power"]) == ("N/m", "J/rad")
-    np.testing.assert_allclose(data["forward"].reshape(len(numbers["phase"]), -1), numbers["forward"])
+    assert (numbers["units"]["forward"], numbers["units"]["medium_power"]) == (
+        "N/m",
+        "J/rad",
+    )
+    np.testing.assert_allclose(
+        data["forward"].reshape(len(numbers["phase"]), -1), numbers["forward"]
+    )
     code, _, err = run("forces", "three-link-glass", "-o", tmp_path / "f.txt")
     assert code == 2 and err.endswith("end the name in .nc or .csv\n")
 
@@ -298,8 +466,13 @@ def test_pictures_show_the_numbers(found):
     assert max(tops) == pytest.approx(result["thrust_normal"].values.max())
     assert f"head {result['head_forward'].values.mean():.3g} drag" in place.get_title()
     fig = geomech.plots.forces_figure(result, ("moment", "power"), clim="90%")
-    np.testing.assert_allclose(fig.axes[0].collections[0].get_array()[:-1, 1:-1], result["bending_moment"].values)
-    assert fig.axes[1].collections[0].get_clim()[1] == pytest.approx(np.percentile(result["power"].values, 90))
+    np.testing.assert_allclose(
+        fig.axes[0].collections[0].get_array()[:-1, 1:-1],
+        result["bending_moment"].values,
+    )
+    assert fig.axes[1].collections[0].get_clim()[1] == pytest.approx(
+        np.percentile(result["power"].values, 90)
+    )
     np.testing.assert_allclose(fig.axes[0].lines[1].get_ydata(), result["onset"].values)
     with pytest.raises(Refusal, match="'thrust' is unknown"):
         geomech.plots.forces_figure(result, ("thrust",))
@@ -307,7 +480,10 @@ def test_pictures_show_the_numbers(found):
 
 def test_a_study_has_forces_too(tmp_path):
     forces = geomech.study("three-link-viscous", phases=16).forces()
-    assert forces["forward"].shape == (16, 42) and "activation ahead of bending" in repr(forces)
+    assert forces["forward"].shape == (
+        16,
+        42,
+    ) and "activation ahead of bending" in repr(forces)
     assert len(forces.plot("phase").axes) == 1
     write_netcdf(tmp_path / "x.nc", forces.result)
     assert forces.to_xarray()["medium_power"].attrs["units"] == "drag x BL/rad"

@@ -43,10 +43,15 @@ def test_plain_text_stays_what_it_is():
         "\\x1b",
     ):
         assert errors.printable(text) == text
-    assert errors.printable("a\x1b[1mb\x07\x00\x7f\x9b\u202e\udce9\r") == r"a\x1b[1mb\x07\x00\x7f\x9b\u202e\udce9\r"
+    assert (
+        errors.printable("a\x1b[1mb\x07\x00\x7f\x9b\u202e\udce9\r")
+        == r"a\x1b[1mb\x07\x00\x7f\x9b\u202e\udce9\r"
+    )
     assert errors.line(" a\n\x1bb  c\n") == r"a \x1bb c"
     assert errors.line("x" * 400) == "x" * 400
-    assert len(errors.line(LONG)) < 400 and errors.line(LONG).startswith(r"\x1b]0;owned\x07")
+    assert len(errors.line(LONG)) < 400 and errors.line(LONG).startswith(
+        r"\x1b]0;owned\x07"
+    )
 
 
 @pytest.fixture(scope="module")
@@ -72,13 +77,26 @@ def test_attributes_of_a_table(kind, stored, geomech, tmp_path):
                 setattr(file, name, LONG.encode())
             file.variables["alpha_1"].long_name = ("shape variable " + ESC).encode()
     else:
-        about = json.dumps({"frame": LONG, "shapes": [ESC, "b"], "sign": "+", "unit": "BL", "length": 1.0})
-        (tmp_path / "a.mat").write_bytes((stored / "a.mat").read_bytes() + text_variable(ABOUT, about))
+        about = json.dumps(
+            {
+                "frame": LONG,
+                "shapes": [ESC, "b"],
+                "sign": "+",
+                "unit": "BL",
+                "length": 1.0,
+            }
+        )
+        (tmp_path / "a.mat").write_bytes(
+            (stored / "a.mat").read_bytes() + text_variable(ABOUT, about)
+        )
     held = tables.load(tmp_path / f"a.{kind}")
     assert held.frame.startswith(r"\x1b]0;owned\x07") and len(held.frame) == 60
     assert held.shapes[0] == "alpha_1"
     (tmp_path / "s.toml").write_text(table(f"a.{kind}"))
-    for command in (("explain", "s.toml"), ("displacement", "s.toml", "--amplitudes", "0.5")):
+    for command in (
+        ("explain", "s.toml"),
+        ("displacement", "s.toml", "--amplitudes", "0.5"),
+    ):
         code, out, err = geomech(*command)
         assert code == 0
         shown(out, err)
@@ -87,14 +105,20 @@ def test_attributes_of_a_table(kind, stored, geomech, tmp_path):
 
 def text_variable(name, text):
     """A line of text as MATLAB's version 5 has it, in UTF-8."""
-    element = lambda kind, data: struct.pack("<II", kind, len(data)) + data + b"\0" * (-len(data) % 8)
+    element = lambda kind, data: (
+        struct.pack("<II", kind, len(data)) + data + b"\0" * (-len(data) % 8)
+    )
     raw = text.encode()
-    parts = element(6, struct.pack("<II", 4, 0)) + element(5, struct.pack("<ii", 1, len(raw)))
+    parts = element(6, struct.pack("<II", 4, 0)) + element(
+        5, struct.pack("<ii", 1, len(raw))
+    )
     parts += element(1, name.encode()) + element(16, raw)
     return element(14, parts)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere no file may be called so")
+@pytest.mark.skipif(
+    sys.platform != "linux", reason="elsewhere no file may be called so"
+)
 def test_names_of_scene_files(geomech, tmp_path):
     file = f"{ESC}[red].toml"
     (tmp_path / file).write_text(SWIM)
@@ -111,7 +135,9 @@ def test_names_of_scene_files(geomech, tmp_path):
         code, out, err = geomech(*command)
         assert code == ends, err
         shown(out, err)
-        assert command[0] == "connection" or r"\x1b]0;owned\x07" in out + err  # which says nothing
+        assert (
+            command[0] == "connection" or r"\x1b]0;owned\x07" in out + err
+        )  # which says nothing
     with pytest.raises(errors.Refusal) as error:
         scenes.load(tmp_path / f"{ESC}-bad.toml")
     shown(str(error.value))
@@ -179,10 +205,20 @@ def test_pages_of_a_notebook():
     made = Study(Scene(scene.system, scene.gait, Numerics(grid=7), name=f"<b>{ESC}"))
     found = made.study([0.5], ["direct"])
     swept = sweep.sweep(made.scene, {"gait.amplitude": [0.5, 1.0]})
-    for page in (display.page(ESC, (ESC,), [(ESC,)]), display.study(made), display.displacements(found)):
+    for page in (
+        display.page(ESC, (ESC,), [(ESC,)]),
+        display.study(made),
+        display.displacements(found),
+    ):
         assert "&lt;b&gt;" in page or "<b>" not in page
         shown(page)
-    for text in (repr(made.scene), repr(made), repr(found), repr(swept), explain(made.scene)):
+    for text in (
+        repr(made.scene),
+        repr(made),
+        repr(found),
+        repr(swept),
+        explain(made.scene),
+    ):
         shown(text)
 
 
@@ -215,7 +251,9 @@ def test_messages_are_no_longer_than_may_be_read(geomech, tmp_path, monkeypatch)
         raise ValueError(LONG)
 
     monkeypatch.setattr(Study, "study", fails)
-    code, out, err = geomech("displacement", "three-link-viscous", "--amplitudes", "0.5")
+    code, out, err = geomech(
+        "displacement", "three-link-viscous", "--amplitudes", "0.5"
+    )
     assert (code, out, err.count("\n")) == (2, "", 1)
     shown(err)
     assert len(err) < 3000

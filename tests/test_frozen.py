@@ -25,18 +25,28 @@ RENEW = "if that is meant: python tests/golden.py --write"
 def test_commands_give_what_they_gave(tool, monkeypatch):
     monkeypatch.setattr(walks, "FRAMES", 3)  # of a film counts that it is one
     lines = [line for line in COMMANDS if line.split()[0] == tool]
-    found = {line: frozen.differs(COMMANDS[line], new) for line, new in frozen.outcomes(lines).items()}
+    found = {
+        line: frozen.differs(COMMANDS[line], new)
+        for line, new in frozen.outcomes(lines).items()
+    }
     changed = [f"geomech {line}\n{how}" for line, how in found.items() if how]
     assert not changed, "\n".join([*changed, RENEW])
 
 
 @pytest.mark.parametrize("piece", range(PIECES))
 def test_refusals_end_as_they_did_and_name_what_they_named(piece, monkeypatch):
-    monkeypatch.setattr(cost, "ENOUGH", 0.05)  # what takes too long does so by far: three small batches tell
+    monkeypatch.setattr(
+        cost, "ENOUGH", 0.05
+    )  # what takes too long does so by far: three small batches tell
     monkeypatch.setattr(connection, "SAMPLES_TOGETHER", 2000)
     with frozen.place():
-        found = {case: frozen.still(REFUSALS[case], *case) for case in list(REFUSALS)[piece::PIECES]}
-    changed = [f"[{section}] {case}\n{how}" for (section, case), how in found.items() if how]
+        found = {
+            case: frozen.still(REFUSALS[case], *case)
+            for case in list(REFUSALS)[piece::PIECES]
+        }
+    changed = [
+        f"[{section}] {case}\n{how}" for (section, case), how in found.items() if how
+    ]
     assert not changed, "\n".join([*changed, RENEW])
 
 
@@ -67,15 +77,27 @@ KEY = re.compile(r"key (\[+(\w*)\]+(.*)): (\w+) \|.*")
 def inline(value):
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key} = {inline(x)}" for key, x in value.items()) + "}"
-    return "[" + ", ".join(map(inline, value)) + "]" if isinstance(value, list) else json.dumps(value)
+    return (
+        "[" + ", ".join(map(inline, value)) + "]"
+        if isinstance(value, list)
+        else json.dumps(value)
+    )
 
 
 def with_wrong(head, table, kind, key):
     """A scene, as TOML, whose key in this table, of this kind, is a table where it takes none."""
-    base = next(name for where, name in BASES.items() if re.search(where.replace("[", r"\[").replace("]", r"\]"), head))
+    base = next(
+        name
+        for where, name in BASES.items()
+        if re.search(where.replace("[", r"\[").replace("]", r"\]"), head)
+    )
     tables = tomllib.loads((frozen.FOLDER / base).read_text())
     named = dict(re.findall(r'(\w+) = "([^"]*)"', kind))
-    wrong = dict.fromkeys(NINE, 0.1) if key in NINE else named or dict(tables.get(table, {}))
+    wrong = (
+        dict.fromkeys(NINE, 0.1)
+        if key in NINE
+        else named or dict(tables.get(table, {}))
+    )
     wrong |= BESIDE.get((table, named.get("kind")), {}) if "shape" not in named else {}
     wrong[key] = {"wrong": 1}
     if table == "system":
@@ -102,10 +124,22 @@ def test_a_wrong_type_of_any_key_is_refused_by_its_name():
 
 def test_a_script_without_a_guard_runs_once_and_on_two_workers():
     with frozen.place() as here:
-        path = os.pathsep.join([str(frozen.DATA.parents[1]), os.environ.get("PYTHONPATH", "")])
+        path = os.pathsep.join(
+            [str(frozen.DATA.parents[1]), os.environ.get("PYTHONPATH", "")]
+        )
         env = {**os.environ, "PYTHONPATH": path}
-        done = subprocess.run([sys.executable, "unguarded.py"], capture_output=True, text=True, cwd=here, env=env)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "once\n2 3740.53764\n", "")
+        done = subprocess.run(
+            [sys.executable, "unguarded.py"],
+            capture_output=True,
+            text=True,
+            cwd=here,
+            env=env,
+        )
+    assert (done.returncode, done.stdout, done.stderr) == (
+        0,
+        "once\n2 3740.53764\n",
+        "",
+    )
 
 
 def test_the_net_notices():
@@ -119,7 +153,10 @@ def test_the_net_notices():
     ]
     at = lambda k, line: [*old[:k], line, *old[k + 1 :]]
     for same in (
-        at(0, "| by --tol alpha_1 has 0.12346 BL as net, or +- 1.2e-03, for three: 3 cycles"),
+        at(
+            0,
+            "| by --tol alpha_1 has 0.12346 BL as net, or +- 1.2e-03, for three: 3 cycles",
+        ),
         at(1, "= a.b = 1 2.000001"),
         at(3, "~ :sign = plus A"),
     ):
@@ -157,6 +194,8 @@ def test_the_net_notices_what_a_refusal_names(recorded, how):
 
 
 def test_a_refusal_without_its_cure_is_noticed(monkeypatch):
-    monkeypatch.setattr(frozen, "refused", lambda *case: ("2", "error: s.toml: amplitude is 7"))
+    monkeypatch.setattr(
+        frozen, "refused", lambda *case: ("2", "error: s.toml: amplitude is 7")
+    )
     assert frozen.still('2 ["s.toml", "7.0"] cure', "", "").startswith("says no cure")
     assert frozen.still('2 ["s.toml", "7.0"]', "", "") == ""

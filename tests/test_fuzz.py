@@ -9,7 +9,10 @@ import pytest
 from geomech import scenes
 from geomech.studies.study import Study
 
-pytestmark = [pytest.mark.usefixtures("fastest"), pytest.mark.filterwarnings("ignore::geomech.core.errors.UnitWarning")]
+pytestmark = [
+    pytest.mark.usefixtures("fastest"),
+    pytest.mark.filterwarnings("ignore::geomech.core.errors.UnitWarning"),
+]
 
 VALUES = [
     "nan", "inf", "-inf", "0", "-0.0", "-1", "1e308", "-1e308", "1e-320", "1e6", "999999999999999999999999", "true",
@@ -38,7 +41,9 @@ def text_of(name):
 
 def with_effects(text, rng):
     """The text, half of the time with one or two effects more."""
-    more = rng.choice(EFFECTS, rng.integers(3), replace=False) if rng.integers(2) else []
+    more = (
+        rng.choice(EFFECTS, rng.integers(3), replace=False) if rng.integers(2) else []
+    )
     return "\n[[effects]]\n".join([text, *more])
 
 
@@ -52,13 +57,26 @@ def mutated(text, rng, keys=KEYS, values=VALUES):
             case 1:
                 lines.insert(k, lines[rng.integers(len(lines))])
             case 2 if "=" in lines[k]:
-                lines[k] = lines[k].split("=")[0] + "= " + values[rng.integers(len(values))]
+                lines[k] = (
+                    lines[k].split("=")[0] + "= " + values[rng.integers(len(values))]
+                )
             case 3 if "=" in lines[k]:
-                lines[k] = keys[rng.integers(len(keys))] + " =" + lines[k].split("=", 1)[1]
+                lines[k] = (
+                    keys[rng.integers(len(keys))] + " =" + lines[k].split("=", 1)[1]
+                )
             case 4:
-                lines.insert(k, keys[rng.integers(len(keys))] + " = " + values[rng.integers(len(values))])
+                lines.insert(
+                    k,
+                    keys[rng.integers(len(keys))]
+                    + " = "
+                    + values[rng.integers(len(values))],
+                )
             case 5 | 6 if "=" in lines[k]:
-                lines[k] = re.sub(r"\d+(\.\d+)?", lambda _: f"{10 ** rng.uniform(-2, 1):.3g}", lines[k])
+                lines[k] = re.sub(
+                    r"\d+(\.\d+)?",
+                    lambda _: f"{10 ** rng.uniform(-2, 1):.3g}",
+                    lines[k],
+                )
             case 7:
                 lines[k] = TABLES[rng.integers(len(TABLES))]
             case _:
@@ -71,12 +89,16 @@ def outcome(text):
     """'run', 'marched' or 'refused'; anything else raises."""
     try:
         read = scenes.parse(text)
-        read = read.with_numerics(phases=max(16, 2 * read.gait.harmonics + 1), loads="exact")
+        read = read.with_numerics(
+            phases=max(16, 2 * read.gait.harmonics + 1), loads="exact"
+        )
         if read.system.traits.steps:
             run = read.with_numerics(cycles=1).cycle(phases=8)
             assert np.isfinite(run.xi).all()
             return "marched"
-        solution = read.system.solve(*read.gait.cycle(16 if read.gait.harmonics < 8 else 64))
+        solution = read.system.solve(
+            *read.gait.cycle(16 if read.gait.harmonics < 8 else 64)
+        )
         assert (solution.status != "unconverged").all()
         assert np.isfinite(solution.xi).all()
         assert np.isfinite(Study(read).poses("direct")).all()
@@ -92,7 +114,10 @@ def outcome(text):
 @pytest.mark.parametrize("seed", range(4))
 def test_mutated_scenes_are_run_or_refused(seed):
     rng, names = np.random.default_rng(seed), scenes.builtin_names()
-    texts = [mutated(with_effects(text_of(names[rng.integers(len(names))]), rng), rng) for _ in range(500)]
+    texts = [
+        mutated(with_effects(text_of(names[rng.integers(len(names))]), rng), rng)
+        for _ in range(500)
+    ]
     seen = [outcome(text) for text in texts]
     assert seen.count("run") + seen.count("marched") > 30
     assert seen.count("marched") > 6

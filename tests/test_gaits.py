@@ -22,25 +22,41 @@ def test_amplitudes_are_a_batch_axis(name):
     gait = GAITS[name]
     alpha, alphadot = gait.cycle(16, [0.5, 2.0])
     assert alpha.shape == alphadot.shape == (2, 16, gait.joints)
-    np.testing.assert_allclose((alpha[1] - gait.middle) / 4, alpha[0] - gait.middle, atol=1e-15)
-    np.testing.assert_allclose(gait.cycle(16)[0], gait.shape(2 * np.pi * np.arange(16) / 16), atol=1e-12)
+    np.testing.assert_allclose(
+        (alpha[1] - gait.middle) / 4, alpha[0] - gait.middle, atol=1e-15
+    )
+    np.testing.assert_allclose(
+        gait.cycle(16)[0], gait.shape(2 * np.pi * np.arange(16) / 16), atol=1e-12
+    )
 
 
 def test_butterfly_is_the_published_one():
     a1, a2 = Butterfly().shape(T).T
     np.testing.assert_allclose(
-        (a1 + a2) / 2, 1.0908 * np.cos(T) - 0.2508 * np.cos(3 * T) - 0.18 * np.cos(5 * T), atol=1e-14
+        (a1 + a2) / 2,
+        1.0908 * np.cos(T) - 0.2508 * np.cos(3 * T) - 0.18 * np.cos(5 * T),
+        atol=1e-14,
     )
-    np.testing.assert_allclose((a1 - a2) / 2, 1.052 * np.sin(T) + 0.0859 * np.sin(3 * T), atol=1e-14)
+    np.testing.assert_allclose(
+        (a1 - a2) / 2, 1.052 * np.sin(T) + 0.0859 * np.sin(3 * T), atol=1e-14
+    )
 
 
 def test_orientation_start_and_reversal():
-    np.testing.assert_allclose(Circle(amplitude=2.0).shape([0, np.pi / 2]), [[2, 0], [0, 2]], atol=1e-15)
-    np.testing.assert_allclose(Circle(reverse=True).shape(T), Circle().shape(-T), atol=1e-15)
-    np.testing.assert_allclose(Ellipse(semi_axes=(2, 1), tilt=np.pi / 2).shape(0.0), [0, 2], atol=1e-15)
+    np.testing.assert_allclose(
+        Circle(amplitude=2.0).shape([0, np.pi / 2]), [[2, 0], [0, 2]], atol=1e-15
+    )
+    np.testing.assert_allclose(
+        Circle(reverse=True).shape(T), Circle().shape(-T), atol=1e-15
+    )
+    np.testing.assert_allclose(
+        Ellipse(semi_axes=(2, 1), tilt=np.pi / 2).shape(0.0), [0, 2], atol=1e-15
+    )
     a, b, tilt = 1.3, 0.4, 0.7
     quarter = Ellipse(semi_axes=(a, b), tilt=tilt).shape(np.pi / 2)
-    np.testing.assert_allclose(quarter, [-b * np.sin(tilt), b * np.cos(tilt)], atol=1e-15)
+    np.testing.assert_allclose(
+        quarter, [-b * np.sin(tilt), b * np.cos(tilt)], atol=1e-15
+    )
 
 
 def test_points_are_passed_through_in_order():
@@ -68,7 +84,10 @@ def test_points_are_reached_as_their_chords_are_run():
         (lambda: Fourier(cos=((1.0,),), sin=((1.0, 2.0),)), "one shape"),
         (lambda: Fourier(cos=((1.0,), (1.0, 2.0)), sin=((1.0,),)), "equal rows"),
         (lambda: Points(points=((0, 0), (1, 1))), "at least 3 shapes"),
-        (lambda: Points(points=((0, 0), (0, 0), (1, 1), (1, 0))), "neighbours distinct"),
+        (
+            lambda: Points(points=((0, 0), (0, 0), (1, 1), (1, 0))),
+            "neighbours distinct",
+        ),
         (lambda: Circle().cycle(3), "phases must"),
         (lambda: Butterfly().cycle(10), "at least 11 for this gait"),
         (lambda: Points(points=((1e20, 0), (0, 1), (1, 1))), "points must be"),

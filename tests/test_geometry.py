@@ -24,7 +24,9 @@ MIDDLE = symbolic.velocity(A_MIDDLE, ALPHA)
 
 
 def viscous(frame="mean", ratio=2.0):
-    return lambda a, d: body_velocity(Viscous(ratio), Chain(frame=frame), a, d).checked().xi
+    return lambda a, d: (
+        body_velocity(Viscous(ratio), Chain(frame=frame), a, d).checked().xi
+    )
 
 
 def around(centre, reach, points=41):
@@ -43,7 +45,9 @@ def test_fit_recovers_a_linear_swimmer():
 def test_fit_takes_any_number_of_joints(joints):
     rng = np.random.default_rng(1)
     M = rng.normal(size=(3, joints))
-    swimmer = lambda a, d: np.einsum("ij,...j->...i", M, np.broadcast_arrays(a, d)[1]) * np.cos(a[..., :1])
+    swimmer = lambda a, d: (
+        np.einsum("ij,...j->...i", M, np.broadcast_arrays(a, d)[1]) * np.cos(a[..., :1])
+    )
     fitted = connection.fit(swimmer, connection.grid(joints, 9, 1.0), 16)
     assert fitted.A.shape == (3, joints, *(9,) * joints)
     np.testing.assert_allclose(fitted(np.zeros(joints)), M, atol=1e-12)
@@ -63,9 +67,15 @@ def test_half_the_grid_tells_the_other_half(points):
 
     def glass(a, d):
         asked.append(len(a))
-        return body_velocity(MEDIA["glass-0.3mm-loose"], Chain((1, 2, 3)), a, d).checked().xi
+        return (
+            body_velocity(MEDIA["glass-0.3mm-loose"], Chain((1, 2, 3)), a, d)
+            .checked()
+            .xi
+        )
 
-    fit = lambda traits: connection.fit(glass, connection.grid(2, points), traits=traits, trusted=True)
+    fit = lambda traits: connection.fit(
+        glass, connection.grid(2, points), traits=traits, trusted=True
+    )
     whole, half = fit(Traits()), fit(Traits(mirror=True))
     for name in ("A", "residual", "speed"):
         np.testing.assert_allclose(getattr(half, name), getattr(whole, name), atol=1e-7)
@@ -73,13 +83,17 @@ def test_half_the_grid_tells_the_other_half(points):
 
 
 def test_fit_residual_is_the_rms_misfit():
-    swimmer = lambda a, d: np.stack([d[..., 0] ** 3, d[..., 0], 0 * d[..., 0]], -1) + 0 * a[..., :1]
+    swimmer = lambda a, d: (
+        np.stack([d[..., 0] ** 3, d[..., 0], 0 * d[..., 0]], -1) + 0 * a[..., :1]
+    )
     fitted = connection.fit(swimmer, connection.grid(2, 5, 1.0), 16, trusted=True)
     # cos^3 = (3 cos + cos 3)/4: the plane keeps 3/4 cos, the misfit is cos 3t / 4, rms sqrt(1/32).
     np.testing.assert_allclose(fitted.A[0, 0], 0.75, atol=1e-14)
     np.testing.assert_allclose(fitted.residual[0], np.sqrt(1 / 32), atol=1e-14)
     np.testing.assert_allclose(fitted.residual[1], 0, atol=1e-14)
-    np.testing.assert_allclose(fitted.speed[:, 2, 3], np.sqrt([5 / 16, 1 / 2, 0]), atol=1e-14)
+    np.testing.assert_allclose(
+        fitted.speed[:, 2, 3], np.sqrt([5 / 16, 1 / 2, 0]), atol=1e-14
+    )
 
 
 def test_scattered_directions_are_always_the_same_and_all_round():
@@ -87,7 +101,9 @@ def test_scattered_directions_are_always_the_same_and_all_round():
     np.testing.assert_array_equal(connection.directions(3, 200), unit)
     np.testing.assert_array_equal(connection.directions(3, 50), unit[:50])
     normal = ndtri(qmc.Halton(3, scramble=False).random(201)[1:])
-    np.testing.assert_array_equal(unit, normal / np.linalg.norm(normal, axis=-1, keepdims=True))
+    np.testing.assert_array_equal(
+        unit, normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    )
     np.testing.assert_allclose(unit.T @ unit / 200, np.eye(3) / 3, atol=0.02)
     np.testing.assert_allclose(unit.mean(0), 0, atol=0.02)
 
@@ -96,7 +112,9 @@ def test_scattered_directions_are_always_the_same_and_all_round():
 def test_angles_may_leave_the_grid_by_rounding_only(low, high):
     field = Field((np.linspace(low, high, 9),), np.linspace(0, 1, 9))
     slack = 1e-9 * (high - low)
-    assert field([[low - 0.99 * slack], [high + 0.99 * slack]]) == pytest.approx([0, 1], abs=1e-8)
+    assert field([[low - 0.99 * slack], [high + 0.99 * slack]]) == pytest.approx(
+        [0, 1], abs=1e-8
+    )
     for out in (low - 1.01 * slack, high + 1.01 * slack):
         with pytest.raises(ValueError, match="lies outside the field's"):
             field([out])
@@ -104,34 +122,53 @@ def test_angles_may_leave_the_grid_by_rounding_only(low, high):
 
 def test_values_off_the_grid_are_refused():
     axes = connection.grid(2, 5)
-    with pytest.raises(ValueError, match=r"values \(3, 5, 4\) do not end in the grid's shape \(5, 5\)"):
+    with pytest.raises(
+        ValueError, match=r"values \(3, 5, 4\) do not end in the grid's shape \(5, 5\)"
+    ):
         Field(axes, np.zeros((3, 5, 4)))
-    with pytest.raises(ValueError, match="degree 5 needs more than that many grid points"):
+    with pytest.raises(
+        ValueError, match="degree 5 needs more than that many grid points"
+    ):
         Field(axes, np.zeros((3, 5, 5)), 5)
 
 
 def test_ccf_at_the_straight_pose_for_any_ratio():
     r = sp.symbols("r", positive=True)
     A, (a, b) = symbolic.viscous_chain(ratio=r)
-    here, dA_1, dA_2 = A.subs({a: 0, b: 0}), A[:, 0].subs(a, 0).diff(b), A[:, 1].subs(b, 0).diff(a)
-    straight = dA_2.subs(a, 0) - dA_1.subs(b, 0) + symbolic.bracket(here[:, 0], here[:, 1])
+    here, dA_1, dA_2 = (
+        A.subs({a: 0, b: 0}),
+        A[:, 0].subs(a, 0).diff(b),
+        A[:, 1].subs(b, 0).diff(a),
+    )
+    straight = (
+        dA_2.subs(a, 0) - dA_1.subs(b, 0) + symbolic.bracket(here[:, 0], here[:, 1])
+    )
     assert sp.simplify(straight[0] + 5 * (r - 1) / 243) == 0
     assert sp.simplify(straight[1]) == 0
     fitted = connection.fit(viscous("link-2", 7.5), around((0, 0), 0.3), degree=5)
-    assert curvature.ccf(fitted).values[0, 20, 20] == pytest.approx(-5 * 6.5 / 243, abs=1e-9)
+    assert curvature.ccf(fitted).values[0, 20, 20] == pytest.approx(
+        -5 * 6.5 / 243, abs=1e-9
+    )
 
 
 def test_ccf_agrees_with_sympy_everywhere():
     fitted = connection.fit(MIDDLE, connection.grid(2, 37, 1.2), degree=5)
-    exact = sp.lambdify(ALPHA, list(symbolic.ccf(symbolic.simplified(A_MIDDLE, ALPHA), ALPHA)), "numpy")
+    exact = sp.lambdify(
+        ALPHA, list(symbolic.ccf(symbolic.simplified(A_MIDDLE, ALPHA), ALPHA)), "numpy"
+    )
     a1, a2 = np.meshgrid(*fitted.axes, indexing="ij")
-    np.testing.assert_allclose(curvature.ccf(fitted).values, np.broadcast_arrays(*exact(a1, a2)), atol=2e-6)
+    np.testing.assert_allclose(
+        curvature.ccf(fitted).values, np.broadcast_arrays(*exact(a1, a2)), atol=2e-6
+    )
 
 
 @pytest.mark.parametrize(("i", "j"), [(0, 1), (0, 2), (1, 2), (2, 1), (2, 0), (1, 0)])
 def test_small_loops_follow_the_ccf_of_their_joints(i, j):
     """Every component, about a bent shape of four unlike links, in the plane of every two joints and either way round."""
-    body, centre = Chain((1, 1.6, 0.7, 1.2), length=0.6, frame="link-2"), np.array([0.5, -0.8, 0.3])
+    body, centre = (
+        Chain((1, 1.6, 0.7, 1.2), length=0.6, frame="link-2"),
+        np.array([0.5, -0.8, 0.3]),
+    )
     solve = lambda a, d: body_velocity(Viscous(3.0), body, a, d).xi
     fitted = connection.fit(solve, around(centre, 0.1, 7), 16, degree=5)
     density = curvature.ccf(fitted, i, j).values[:, 3, 3, 3]
@@ -143,7 +180,9 @@ def test_small_loops_follow_the_ccf_of_their_joints(i, j):
     # From the loop's start, a displacement of order 1 in its size away from where the density is taken.
     start = fitted(centre)[:, i] * size
     moved = se2.compose(se2.compose(se2.exp(start), moved), se2.inverse(se2.exp(start)))
-    np.testing.assert_allclose(moved / (0.7 * np.pi * size**2), density, atol=2e-4 * np.abs(density).max())
+    np.testing.assert_allclose(
+        moved / (0.7 * np.pi * size**2), density, atol=2e-4 * np.abs(density).max()
+    )
     assert np.abs(density).min() > 1e-4
 
 
@@ -168,17 +207,30 @@ def slope(x, y):
     return np.polyfit(np.log(x), np.log(y), 1)[0]
 
 
-@pytest.mark.parametrize(("centre", "frame", "order"), [((0.5, -0.8), "link-1", 3.0), ((0.9, 0.4), "mean", 3.0)])
+@pytest.mark.parametrize(
+    ("centre", "frame", "order"),
+    [((0.5, -0.8), "link-1", 3.0), ((0.9, 0.4), "mean", 3.0)],
+)
 def test_area_tier_is_of_order_three_in_a_generic_frame(centre, frame, order):
     fitted = connection.fit(viscous(frame), around(centre, 0.35, 61), degree=5)
     ccf = curvature.ccf(fitted)
     sizes = np.geomspace(0.01, 0.05, 7)
     gait = Ellipse(centre=centre, semi_axes=(1.0, 0.7), tilt=0.3)
-    error = np.linalg.norm(area(ccf, gait, sizes) - path(viscous(frame), gait, sizes), axis=-1)
+    error = np.linalg.norm(
+        area(ccf, gait, sizes) - path(viscous(frame), gait, sizes), axis=-1
+    )
     assert slope(sizes, error) == pytest.approx(order, abs=0.1)
-    wrong = Field(fitted.axes, curvature.exterior_derivative(fitted) - curvature.lie_bracket(fitted), 5)
-    error = np.linalg.norm(area(wrong, gait, sizes) - path(viscous(frame), gait, sizes), axis=-1)
-    assert slope(sizes, error) == pytest.approx(2.0, abs=0.1)  # the test can tell the bracket's sign
+    wrong = Field(
+        fitted.axes,
+        curvature.exterior_derivative(fitted) - curvature.lie_bracket(fitted),
+        5,
+    )
+    error = np.linalg.norm(
+        area(wrong, gait, sizes) - path(viscous(frame), gait, sizes), axis=-1
+    )
+    assert slope(sizes, error) == pytest.approx(
+        2.0, abs=0.1
+    )  # the test can tell the bracket's sign
 
 
 def test_area_counts_winding_numbers():
@@ -200,7 +252,9 @@ def test_leaving_the_field_is_an_error_that_names_the_angle():
         lambda: path(fitted, Circle(amplitude=1.3)),
         lambda: area(curvature.ccf(fitted), Circle(), 1.3),
     ):
-        with pytest.raises(ValueError, match=r"alpha_1 = .*1\.3 rad lies outside the field's -1 to 1"):
+        with pytest.raises(
+            ValueError, match=r"alpha_1 = .*1\.3 rad lies outside the field's -1 to 1"
+        ):
             tier()
     for sign, joint in ((1, 0), (-1, 0), (1, 1), (-1, 1)):
         edge = np.array([0.3, 0.3])
@@ -212,7 +266,9 @@ def test_leaving_the_field_is_an_error_that_names_the_angle():
 
 
 @pytest.mark.parametrize("medium", ["viscous-2", "glass-0.3mm-loose"])
-@pytest.mark.parametrize("mean", [Chain((1, 2, 1), length=0.4), Serpenoid(elements=9, length=0.4, waves=0.8)])
+@pytest.mark.parametrize(
+    "mean", [Chain((1, 2, 1), length=0.4), Serpenoid(elements=9, length=0.4, waves=0.8)]
+)
 def test_changing_frame_is_solving_in_that_frame(medium, mean):
     """Links' headings and rates, through the modes of a backbone too."""
     rng = np.random.default_rng(2)
@@ -220,26 +276,44 @@ def test_changing_frame_is_solving_in_that_frame(medium, mean):
     solve = lambda body, a, d: body_velocity(MEDIA[medium], body, a, d).xi
     for frame in ("link-1", "link-2", "link-3"):
         other = dataclasses.replace(mean, frame=frame)
-        carried = coordinates.in_frame(lambda a, d: solve(mean, a, d), lambda a, d: mean.frame_pose(frame, a, d))
-        np.testing.assert_allclose(carried(alpha, alphadot), solve(other, alpha, alphadot), atol=1e-8)
+        carried = coordinates.in_frame(
+            lambda a, d: solve(mean, a, d), lambda a, d: mean.frame_pose(frame, a, d)
+        )
+        np.testing.assert_allclose(
+            carried(alpha, alphadot), solve(other, alpha, alphadot), atol=1e-8
+        )
 
 
 def test_connections_change_frame_like_velocities():
     body, alpha = Chain((1, 2, 1)), np.array([0.4, -1.1])
     A = np.stack([viscous()(alpha, e) for e in np.eye(2)], -1)
     poses = [Chain().frame_pose("link-3", alpha, e) for e in np.eye(2)]
-    changed = coordinates.change_connection(A, poses[0][0], np.stack([p[1] for p in poses], -1))
-    np.testing.assert_allclose(changed, np.stack([viscous("link-3")(alpha, e) for e in np.eye(2)], -1), atol=1e-12)
+    changed = coordinates.change_connection(
+        A, poses[0][0], np.stack([p[1] for p in poses], -1)
+    )
+    np.testing.assert_allclose(
+        changed,
+        np.stack([viscous("link-3")(alpha, e) for e in np.eye(2)], -1),
+        atol=1e-12,
+    )
     assert body.frame_pose("mean", alpha, alpha)[0] == pytest.approx(0.0)
 
 
 def test_connections_at_many_shapes_change_frame_one_by_one():
     rng = np.random.default_rng(6)
-    A, h, dh = rng.normal(size=(4, 5, 3, 2)), rng.normal(size=(4, 5, 3)), rng.normal(size=(4, 5, 3, 2))
+    A, h, dh = (
+        rng.normal(size=(4, 5, 3, 2)),
+        rng.normal(size=(4, 5, 3)),
+        rng.normal(size=(4, 5, 3, 2)),
+    )
     changed = coordinates.change_connection(A, h, dh)
     for at in np.ndindex(4, 5):
-        np.testing.assert_allclose(changed[at], coordinates.change_connection(A[at], h[at], dh[at]), rtol=1e-14)
-    assert coordinates.frame_velocity([9.0, 7.0, np.pi / 2], [1.0, 2.0, 3.0]) == pytest.approx([2.0, -1.0, 3.0])
+        np.testing.assert_allclose(
+            changed[at], coordinates.change_connection(A[at], h[at], dh[at]), rtol=1e-14
+        )
+    assert coordinates.frame_velocity(
+        [9.0, 7.0, np.pi / 2], [1.0, 2.0, 3.0]
+    ) == pytest.approx([2.0, -1.0, 3.0])
 
 
 @pytest.mark.parametrize("name", GAITS)
@@ -247,7 +321,9 @@ def test_displacement_is_conjugated_by_the_frame(name):
     gait = GAITS[name]
     mean, link = (direct(viscous(f), gait, phases=1024) for f in ("mean", "link-3"))
     h = Chain().frame_pose("link-3", gait.shape(0.0), gait.rate(0.0))[0]
-    np.testing.assert_allclose(se2.compose(se2.compose(se2.inverse(h), mean), h), link, atol=1e-9)
+    np.testing.assert_allclose(
+        se2.compose(se2.compose(se2.inverse(h), mean), h), link, atol=1e-9
+    )
 
 
 @pytest.mark.parametrize("name", GAITS)
@@ -275,7 +351,10 @@ def test_spectral_integration_against_short_steps():
 
 def test_trajectory_ends_where_the_displacement_says():
     gait = Circle(centre=(0.5, 0.2))
-    steps = stepwise(MIDDLE, gait, 800, end=np.pi), stepwise(MIDDLE, gait, 400, end=np.pi)
+    steps = (
+        stepwise(MIDDLE, gait, 800, end=np.pi),
+        stepwise(MIDDLE, gait, 400, end=np.pi),
+    )
     for phases in (50, 51, 200):
         xi = MIDDLE(*gait.cycle(phases))
         path = reconstruct.trajectory(xi, [0.0, np.pi, 2 * np.pi])
@@ -294,14 +373,18 @@ def test_a_trajectory_has_the_velocity_it_was_made_from(phases):
     x, y = se2.rotated(-at[..., 2], rate[..., 0], rate[..., 1])
     np.testing.assert_allclose(np.stack([x, y, rate[..., 2]], -1), xi, atol=1e-8)
     theta = at[..., 2] - t * xi[..., 2].mean(1)[:, None]
-    np.testing.assert_allclose(reconstruct.turning(xi), theta - theta.mean(1)[:, None], atol=1e-13)
+    np.testing.assert_allclose(
+        reconstruct.turning(xi), theta - theta.mean(1)[:, None], atol=1e-13
+    )
 
 
 def test_full_turns_are_integrated_too():
     """A constant turn: circles in closed form, whole turns included."""
     for turn in (0.0, 0.3, 1.0, 2.0, -1.5):
         xi = np.broadcast_to([0.2, -0.1, turn], (8, 3))
-        np.testing.assert_allclose(reconstruct.displacement(xi), se2.exp(2 * np.pi * xi[0]), atol=1e-14)
+        np.testing.assert_allclose(
+            reconstruct.displacement(xi), se2.exp(2 * np.pi * xi[0]), atol=1e-14
+        )
 
 
 def test_bad_shapes_are_refused():
@@ -326,6 +409,7 @@ def test_bad_shapes_are_refused():
     with pytest.raises(ValueError, match="two joints"):
         curvature.ccf(
             connection.fit(
-                lambda a, d: np.zeros((*np.broadcast_shapes(a.shape, d.shape)[:-1], 3)), (np.linspace(0, 1, 9),)
+                lambda a, d: np.zeros((*np.broadcast_shapes(a.shape, d.shape)[:-1], 3)),
+                (np.linspace(0, 1, 9),),
             )
         )

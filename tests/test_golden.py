@@ -49,9 +49,23 @@ def test_nor_of_what_is_made_of_them(part, least):
 
 def test_the_comparison_notices(tmp_path, monkeypatch):
     """A change in the twelfth digit of the largest number, a missing, a new and a shorter entry; and not less than that."""
-    old = {"a": [1.0, -200.0], "b": [0.0], "c": [1.0], "d": [1.0, 2.0], "e, estimate": [1.0]}
-    new = {"a": [1.0, -200.0000000003], "b": [0.0], "d": [1.0], "e, estimate": [1.0 + 1e-9], "f": [1.0]}
-    assert golden.changed(old, new) == {"a": pytest.approx(1.5e-12, rel=0.01)} | dict.fromkeys("cdf", math.inf)
+    old = {
+        "a": [1.0, -200.0],
+        "b": [0.0],
+        "c": [1.0],
+        "d": [1.0, 2.0],
+        "e, estimate": [1.0],
+    }
+    new = {
+        "a": [1.0, -200.0000000003],
+        "b": [0.0],
+        "d": [1.0],
+        "e, estimate": [1.0 + 1e-9],
+        "f": [1.0],
+    }
+    assert golden.changed(old, new) == {
+        "a": pytest.approx(1.5e-12, rel=0.01)
+    } | dict.fromkeys("cdf", math.inf)
     assert golden.changed(old, old | {"a": [1.0 + 1e-10, -200.0], "b": [0.0]}) == {}
     assert golden.changed({"x": [1.0]}, {"x": [math.nan]})
     lines = golden.table(old, new).splitlines()[1:]
@@ -60,5 +74,7 @@ def test_the_comparison_notices(tmp_path, monkeypatch):
     assert "all 5 entries as recorded" in golden.table(old, old)
     monkeypatch.setattr(golden, "FILE", tmp_path / "g.json")
     golden.write(old, new)
-    assert golden.kept() == new | {"e, estimate": [1.0]}  # what did not change keeps its digits
+    assert golden.kept() == new | {
+        "e, estimate": [1.0]
+    }  # what did not change keeps its digits
     assert (tmp_path / "g.json").read_text().count("\n") == len(new) + 2

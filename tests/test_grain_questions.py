@@ -40,16 +40,30 @@ def test_flank_and_ends_give_the_law_and_its_caps():
     flank, ends = forces()
     found = fit("granular", rod_drag(PSI, *flank, ends=ends), ROD, "fitted")
     assert found.names == ("C", "gamma0", "k", "end_caps", "end_caps_across")
-    np.testing.assert_allclose(found.values, [3.1, 0.3, 0.4 / ROD.area / ROD.pressure, 1.7, 0.8], rtol=1e-5)
-    assert found.caps(0.04) == EndCaps(0.04, found.end_caps / 2, found.end_caps / 2, found.values[-1])
+    np.testing.assert_allclose(
+        found.values, [3.1, 0.3, 0.4 / ROD.area / ROD.pressure, 1.7, 0.8], rtol=1e-5
+    )
+    assert found.caps(0.04) == EndCaps(
+        0.04, found.end_caps / 2, found.end_caps / 2, found.values[-1]
+    )
     np.testing.assert_allclose(found.forces(np.radians(PSI)), flank, rtol=1e-5)
-    flat = flank + forces(across=None)[1]  # the sum, as a rod without the columns has it, and flat ends
+    flat = (
+        flank + forces(across=None)[1]
+    )  # the sum, as a rod without the columns has it, and flat ends
     whole = fit("granular", rod_drag(PSI, *flat), ROD, "fitted")
     np.testing.assert_allclose(whole.values, found.values[:4], rtol=1e-4)
-    folded = fit("granular", rod_drag(180 - PSI, *(flank * [[-1], [1]]), ends=ends * [[-1], [1]]), ROD, "fitted")
+    folded = fit(
+        "granular",
+        rod_drag(180 - PSI, *(flank * [[-1], [1]]), ends=ends * [[-1], [1]]),
+        ROD,
+        "fitted",
+    )
     np.testing.assert_allclose(folded.values, found.values, rtol=1e-6)
     for caps in (1.0, 0.5):
-        with pytest.raises(ValueError, match="forces on the flank and on the ends: leave end_caps out or say 'fitted'"):
+        with pytest.raises(
+            ValueError,
+            match="forces on the flank and on the ends: leave end_caps out or say 'fitted'",
+        ):
             fit("granular", rod_drag(PSI, *flank, ends=ends), ROD, caps)
     with pytest.raises(ValueError, match=r"that of -1.7 flat ends: e is 0 to 10"):
         fit("granular", rod_drag(PSI, *flank, ends=-ends), ROD, "fitted")
@@ -62,11 +76,18 @@ def test_the_error_of_caps_is_their_scatter_over_many_fits():
     rng, values, covariance = np.random.default_rng(1), [], []
     for _ in range(300):
         noise = rng.normal(0, 0.01, (4, PSI.size))
-        found = fit("granular", rod_drag(PSI, *(flank + noise[:2]), ends=ends + 2 * noise[2:]), ROD, "fitted")
+        found = fit(
+            "granular",
+            rod_drag(PSI, *(flank + noise[:2]), ends=ends + 2 * noise[2:]),
+            ROD,
+            "fitted",
+        )
         values.append(found.values)
         covariance.append(found.covariance)
     expected, spread = np.mean(covariance, 0), np.cov(np.transpose(values))
-    np.testing.assert_allclose(np.sqrt(np.diag(expected)), np.sqrt(np.diag(spread)), rtol=0.2)
+    np.testing.assert_allclose(
+        np.sqrt(np.diag(expected)), np.sqrt(np.diag(spread)), rtol=0.2
+    )
     correlation = lambda m: m[3] / np.sqrt(m[3, 3] * np.diag(m))
     np.testing.assert_allclose(correlation(expected), correlation(spread), atol=0.2)
 
@@ -75,7 +96,11 @@ def test_the_error_of_caps_is_their_scatter_over_many_fits():
 def towed(monkeypatch):
     """Runs of rods that obey the law, with 5 % more drag in the second bed, in place of those of LAMMPS."""
     monkeypatch.setattr(grains, "lammps", lambda: None)
-    monkeypatch.setattr(grains, "settle", lambda *_: types.SimpleNamespace(facts={"packing": 0.6, "surface": 0.05}))
+    monkeypatch.setattr(
+        grains,
+        "settle",
+        lambda *_: types.SimpleNamespace(facts={"packing": 0.6, "surface": 0.05}),
+    )
 
     def run(experiment, folder, progress=None):
         tow, body = experiment.motion, experiment.body
@@ -86,13 +111,22 @@ def towed(monkeypatch):
         spacing = np.diff(body.along[1:-1]).mean()
         profile[..., :2] = -strength * spacing * np.array(LAW.traction(*v))
         rest = strength * (body.size - n * spacing) * np.array(LAW.traction(*v))
-        profile[:, -1, :2] -= strength * body.size * np.array(caps.traction(LAW, *v)) + rest
+        profile[:, -1, :2] -= (
+            strength * body.size * np.array(caps.traction(LAW, *v)) + rest
+        )
         profile[..., 2] = 0.5 / n
         t = np.linspace(0, experiment.duration, 201)[1:]
         nothing = np.zeros((200, 3))
         overlaps = np.full((2, 2), 0.04)
         return Run(
-            t, nothing, nothing, profile, body.along, *[nothing] * 6, overlaps, {"lammps": 20250722, "grains": 16225}
+            t,
+            nothing,
+            nothing,
+            profile,
+            body.along,
+            *[nothing] * 6,
+            overlaps,
+            {"lammps": 20250722, "grains": 16225},
         )
 
     monkeypatch.setattr(Experiment, "run", run)
@@ -100,27 +134,44 @@ def towed(monkeypatch):
 
 def test_a_drag_is_a_file_that_fit_medium_reads(towed, tmp_path):
     question = grains.DragGrains(0.18, 0.007, tuple(PSI), 2, 0.2, store=tmp_path)
-    question = dataclasses.replace(question, seed=4, bed=dataclasses.replace(question.bed, length=0.3, width=0.3))
+    question = dataclasses.replace(
+        question, seed=4, bed=dataclasses.replace(question.bed, length=0.3, width=0.3)
+    )
     result = question.ask()
-    assert result["flank"].values.shape == (2, 2, 6) and result["bed"].values.tolist() == [4, 5]
+    assert result["flank"].values.shape == (2, 2, 6) and result[
+        "bed"
+    ].values.tolist() == [4, 5]
     np.testing.assert_allclose(result["flank"].values[0, :, 0], [2.0, 2.1], rtol=1e-6)
     np.testing.assert_allclose(result["lift"].values, 0.5)
     law = result.subject[1]
     np.testing.assert_allclose(law.values[[0, 1, 3]], [3.1, 0.3, 1.7], rtol=2e-3)
     words = text.text(result)
-    assert "rod 14 x 180 mm, 25.5 mm deep, in 2 beds of 16,225 grains, packing 0.600" in words
+    assert (
+        "rod 14 x 180 mm, 25.5 mm deep, in 2 beds of 16,225 grains, packing 0.600"
+        in words
+    )
     rows = words.splitlines()
     assert max(map(len, rows)) < 100 and len(rows) == 14
     assert (
-        " ".join(rows[6].split()) == "65 0.87 +- 0.02 7.87 +- 0.19 96 +- 2 35 +- 1 500 +- 0"
+        " ".join(rows[6].split())
+        == "65 0.87 +- 0.02 7.87 +- 0.19 96 +- 2 35 +- 1 500 +- 0"
     )  # of 2.0 N/m and 5 % more
     assert " ".join(rows[8].split()) == "C 3.1, 2.91 to 3.29 with 95 %"
     assert " ".join(rows[9].split()) == "gamma0 17.2, 15.9 to 18.4 degrees with 95 %"
-    assert rows[13] == "ends: e = 1.70 of both together; largest overlap 0.040 grain diameters"
+    assert (
+        rows[13]
+        == "ends: e = 1.70 of both together; largest overlap 0.040 grain diameters"
+    )
     one_bed = text.text(dataclasses.replace(question, beds=1).ask())
-    assert "25.5 mm deep, in a bed of 16,225 grains, packing 0.600; +- error in time" in one_bed
+    assert (
+        "25.5 mm deep, in a bed of 16,225 grains, packing 0.600; +- error in time"
+        in one_bed
+    )
     numbers = text.numbers(result)
-    assert numbers["law"]["C"] == pytest.approx(3.1, rel=2e-3) and numbers["law_errors"]["end_caps"] > 0
+    assert (
+        numbers["law"]["C"] == pytest.approx(3.1, rel=2e-3)
+        and numbers["law_errors"]["end_caps"] > 0
+    )
     files.write_drag(result, tmp_path)
     told = (tmp_path / "drag.csv").read_text().splitlines()
     for line, said in (
@@ -133,12 +184,25 @@ def test_a_drag_is_a_file_that_fit_medium_reads(towed, tmp_path):
     ):  # fmt: skip
         assert said in told[line]
     read = drag.read(tmp_path / "drag.csv")
-    assert read.sizes == pytest.approx({"radius": 0.007, "length": 0.18, "depth": 0.0255, "density": 618.0})
-    np.testing.assert_allclose(read.rows[1:3], 0.18 * result["flank"].values.reshape(2, -1), atol=6e-5)
-    code, out, err = geomech("fit-medium", tmp_path / "drag.csv", "--end-caps", "fitted", "-o", tmp_path / "sand.toml")
+    assert read.sizes == pytest.approx(
+        {"radius": 0.007, "length": 0.18, "depth": 0.0255, "density": 618.0}
+    )
+    np.testing.assert_allclose(
+        read.rows[1:3], 0.18 * result["flank"].values.reshape(2, -1), atol=6e-5
+    )
+    code, out, err = geomech(
+        "fit-medium",
+        tmp_path / "drag.csv",
+        "--end-caps",
+        "fitted",
+        "-o",
+        tmp_path / "sand.toml",
+    )
     assert (code, err) == (0, "") and "end_caps" in out
     assert "Both ends together" in (tmp_path / "sand.toml").read_text()
-    assert drag_grains.command(result).endswith("--angles 0,10,20,40,65,90 --beds 2 --seed 4")
+    assert drag_grains.command(result).endswith(
+        "--angles 0,10,20,40,65,90 --beds 2 --seed 4"
+    )
 
 
 @pytest.mark.parametrize(
@@ -157,14 +221,21 @@ def test_drags_that_cannot_be_are_refused(change, words, towed, tmp_path):
         dataclasses.replace(grains.DragGrains(store=tmp_path), **change).check()
 
 
-def test_the_cost_is_said_before_and_refused_beyond_ten_minutes(towed, monkeypatch, tmp_path):
+def test_the_cost_is_said_before_and_refused_beyond_ten_minutes(
+    towed, monkeypatch, tmp_path
+):
     one = grains.DragGrains(beds=1, angles=(0.0, 30.0, 90.0), store=tmp_path)
     cost = one.cost()
     e = one.experiments()[0]
-    assert cost.balances == pytest.approx((16225 + 102) * (3 * e.n_steps + 0.7 / e.bed.step), rel=1e-3)
+    assert cost.balances == pytest.approx(
+        (16225 + 102) * (3 * e.n_steps + 0.7 / e.bed.step), rel=1e-3
+    )
     assert str(cost).endswith("about 3.2 min of computing")
     code, _, err = geomech("drag-grains", "-o", tmp_path / "out", "--store", tmp_path)
-    assert code == 2 and "for more than 10 min say --yes, or take fewer --beds or --angles" in err
+    assert (
+        code == 2
+        and "for more than 10 min say --yes, or take fewer --beds or --angles" in err
+    )
     assert not (tmp_path / "out").exists()
 
 
@@ -186,31 +257,74 @@ def test_a_swim_stands_beside_the_tiers(monkeypatch, tmp_path):
         place = -1j * np.exp(1j * theta) * 0.024 / abs(np.exp(0.2j) - 1)
         pose = np.column_stack([place.real, place.imag, theta])
         alpha = np.array([experiment.motion.joint_angles(x)[0] for x in t])
-        nothing, facts = np.zeros((1000, 3)), {"grains": 100, "packing": 0.6, "lammps": 1, "mass": 0.1}
-        series = t, nothing, t, np.zeros((1000, 1, 3)), np.zeros(1), pose, nothing[:, :2], alpha, 0.5 * t, t, nothing
+        nothing, facts = (
+            np.zeros((1000, 3)),
+            {"grains": 100, "packing": 0.6, "lammps": 1, "mass": 0.1},
+        )
+        series = (
+            t,
+            nothing,
+            t,
+            np.zeros((1000, 1, 3)),
+            np.zeros(1),
+            pose,
+            nothing[:, :2],
+            alpha,
+            0.5 * t,
+            t,
+            nothing,
+        )
         return Run(*series, np.ones((2, 2)), facts)
 
     monkeypatch.setattr(Experiment, "run", run)
     result = grain_swim.GrainSwim(scene, store=tmp_path).ask()
     (experiment,) = asked
-    assert experiment.body.size == 0.3 and experiment.body.half_width == pytest.approx(0.009)
-    assert experiment.bed.length == pytest.approx(0.418) and experiment.duration == pytest.approx(1.25)
+    assert experiment.body.size == 0.3 and experiment.body.half_width == pytest.approx(
+        0.009
+    )
+    assert experiment.bed.length == pytest.approx(
+        0.418
+    ) and experiment.duration == pytest.approx(1.25)
     alpha, _ = experiment.motion.joint_angles(0.25)
-    np.testing.assert_allclose(alpha, scene.gait.shape(0.0), atol=1e-12)  # full grown, at phase 0
-    assert result["method"].values.tolist()[-3:] == ["direct", grain_swim.GRAINS_LAW, "grains"]
+    np.testing.assert_allclose(
+        alpha, scene.gait.shape(0.0), atol=1e-12
+    )  # full grown, at phase 0
+    assert result["method"].values.tolist()[-3:] == [
+        "direct",
+        grain_swim.GRAINS_LAW,
+        "grains",
+    ]
     words = text.text(result).splitlines()
     assert words[0] == "scene in 100 grains, seed 1: body 300 mm long, 18 mm wide, 2 Hz"
-    assert " ".join(words[7].split()) == "grains 0.0796 +- 0.0000 0.0080 +- 0.0000 0.2000 +- 0.0000"
-    assert " ".join(words[8].split()) == "cycle 1 0.0796 0.0080 0.2000" and words[9].split()[:2] == ["cycle", "2"]
-    assert words[-1] == "work 0.25 J a cycle; packing 0.600; largest overlap 1.000 of a grain"
+    assert (
+        " ".join(words[7].split())
+        == "grains 0.0796 +- 0.0000 0.0080 +- 0.0000 0.2000 +- 0.0000"
+    )
+    assert " ".join(words[8].split()) == "cycle 1 0.0796 0.0080 0.2000" and words[
+        9
+    ].split()[:2] == ["cycle", "2"]
+    assert (
+        words[-1]
+        == "work 0.25 J a cycle; packing 0.600; largest overlap 1.000 of a grain"
+    )
     motion = swim_text.csv(result).splitlines()
-    assert motion[0] == "# geomech grains scene --cycles 2 --seed 1 --length 0.3 --radius 0.009" and len(motion) == 1002
+    assert (
+        motion[0]
+        == "# geomech grains scene --cycles 2 --seed 1 --length 0.3 --radius 0.009"
+        and len(motion) == 1002
+    )
     assert motion[1] == "t,x,y,theta,alpha_1,alpha_2,F_x,F_y,F_z,M,work,kinetic"
     row, theta = np.array(motion[-1].split(","), float), 0.4 * 1.25 + 0.3
-    np.testing.assert_allclose(row[[0, 1, 3, 10]], [1.25, 0.1201 * np.sin(theta), theta, 0.625], rtol=2e-3)
-    np.testing.assert_allclose(row[4:6], experiment.motion.joint_angles(1.25)[0], atol=1e-5)
+    np.testing.assert_allclose(
+        row[[0, 1, 3, 10]], [1.25, 0.1201 * np.sin(theta), theta, 0.625], rtol=2e-3
+    )
+    np.testing.assert_allclose(
+        row[4:6], experiment.motion.joint_angles(1.25)[0], atol=1e-5
+    )
     np.testing.assert_allclose(result["cycle_heading"].values, 0.2)
-    np.testing.assert_allclose(np.hypot(result["cycle_x"].values, result["cycle_y"].values), 0.08, rtol=1e-6)
+    np.testing.assert_allclose(
+        np.hypot(result["cycle_x"].values, result["cycle_y"].values), 0.08, rtol=1e-6
+    )
     np.testing.assert_allclose(result["cycle_y"].values, 0.08 * np.sin(0.1), rtol=1e-3)
     assert result.attributes["work"] == pytest.approx(0.25)
     k = result["method"].values.tolist().index("direct")
@@ -224,17 +338,28 @@ def test_a_swim_stands_beside_the_tiers(monkeypatch, tmp_path):
     one = dataclasses.replace(flank.caps(0.03), head=flank.end_caps, tail=0.0)
     ahead = dataclasses.replace(scene.system, medium=flank.medium, effects=(one,))
     one_end = Study(scene.changed(system=ahead)).study([0.9], ("direct",))
-    assert result["x"].values[k + 1] == pytest.approx(one_end["x"]["direct"][0] / 0.3, rel=0.03)
+    assert result["x"].values[k + 1] == pytest.approx(
+        one_end["x"]["direct"][0] / 0.3, rel=0.03
+    )
     words = text.text(result)
-    assert "body 300 mm long, 18 mm wide, 2 Hz" in words and "cycle 2" in words and "+-" in words
+    assert (
+        "body 300 mm long, 18 mm wide, 2 Hz" in words
+        and "cycle 2" in words
+        and "+-" in words
+    )
     assert json.dumps(text.numbers(result))
     files.write_swim(result, tmp_path)
     head, columns, row, *_ = (tmp_path / "motion.csv").read_text().splitlines()
-    assert "--cycles 2 --seed 1" in head and len(columns.split(",")) == len(row.split(",")) == 12
+    assert (
+        "--cycles 2 --seed 1" in head
+        and len(columns.split(",")) == len(row.split(",")) == 12
+    )
     assert (tmp_path / "grains.png").is_file()
     left, right = files.draw_swim(result).axes
     run, times = result.subject[1], (0.0, 0.25, 0.75, 1.25)
-    for line, row in zip(left.lines[1:], np.minimum(np.searchsorted(run.t, times), 999), strict=True):
+    for line, row in zip(
+        left.lines[1:], np.minimum(np.searchsorted(run.t, times), 999), strict=True
+    ):
         points = scene.system.body.points(run.alpha[row], run.pose[row])
         np.testing.assert_allclose(line.get_xydata(), points / 0.3, atol=1e-12)
     x, y = result["x"], result["y"]
@@ -246,7 +371,10 @@ def test_a_swim_stands_beside_the_tiers(monkeypatch, tmp_path):
 
 
 def test_sizes_that_are_none_are_refused():
-    for option, said in (("--length", "length must be > 0"), ("--radius", "radius must be > 0")):
+    for option, said in (
+        ("--length", "length must be > 0"),
+        ("--radius", "radius must be > 0"),
+    ):
         code, _, err = geomech("grains", "three-link-glass", option, "0")
         assert code == 2 and said in err and err.count("\n") == 1
 
@@ -259,12 +387,18 @@ def test_scenes_without_rigid_links_are_refused():
 
 
 def test_samples_have_names_that_say_what_they_are():
-    old, short = (Calibration(name).ask().subject for name in ("dem-rod-drag", "short-rod-drag"))
+    old, short = (
+        Calibration(name).ask().subject for name in ("dem-rod-drag", "short-rod-drag")
+    )
     np.testing.assert_array_equal(old.values, short.values)
     flank = Calibration("flank-drag", end_caps="fitted").ask().subject
     assert flank.data.n_angles == 6 and flank.rod.length == 0.162
-    np.testing.assert_allclose(flank.values, [4.54, 0.260, 0.981, 1.96, 1.21], rtol=3e-3)  # as written with the sample
-    assert flank.errors[-1] == pytest.approx(0.33, abs=0.02)  # flat ends have sin gamma0, 0.257: 2.9 of these less
+    np.testing.assert_allclose(
+        flank.values, [4.54, 0.260, 0.981, 1.96, 1.21], rtol=3e-3
+    )  # as written with the sample
+    assert flank.errors[-1] == pytest.approx(
+        0.33, abs=0.02
+    )  # flat ends have sin gamma0, 0.257: 2.9 of these less
 
 
 def test_the_figure_of_grains_shows_beds_beside_laws():
@@ -275,40 +409,77 @@ def test_the_figure_of_grains_shows_beds_beside_laws():
     numbers = figure.compute([0.5, 1.0], others=[], travels=[])
     curves, swims = numbers["curves"], numbers["swims"]
     area, harmonic, direct, flat = (c["distance"][1] for c in curves.values())
-    assert (area, harmonic, direct, flat) == pytest.approx((0.177, 0.152, 0.151, 0.107), abs=2e-3)
+    assert (area, harmonic, direct, flat) == pytest.approx(
+        (0.177, 0.152, 0.151, 0.107), abs=2e-3
+    )
     assert curves["direct"]["spread"][1] == pytest.approx(0.008, abs=1e-3)
-    numbers["others"] = {(CIRCLE, 0.5): {name: (c["distance"][0], c["spread"][0]) for name, c in curves.items()}}
+    numbers["others"] = {
+        (CIRCLE, 0.5): {
+            name: (c["distance"][0], c["spread"][0]) for name, c in curves.items()
+        }
+    }
     data = read("swims")
-    one = (data["scene"] == CIRCLE) & (data["amplitude"] == 1.0) & (data["frequency_Hz"] == 1.0)
-    of = lambda bed: np.hypot(data["x_BL"], data["y_BL"])[one & (data["bed"] == bed)].mean()
+    one = (
+        (data["scene"] == CIRCLE)
+        & (data["amplitude"] == 1.0)
+        & (data["frequency_Hz"] == 1.0)
+    )
+    of = lambda bed: np.hypot(data["x_BL"], data["y_BL"])[
+        one & (data["bed"] == bed)
+    ].mean()
     means = [of(bed) for bed in (1, 2, 3)]
-    assert swims[CIRCLE, 1.0, 1.0] == pytest.approx((np.mean(means), np.std(means, ddof=1) / np.sqrt(3)))
+    assert swims[CIRCLE, 1.0, 1.0] == pytest.approx(
+        (np.mean(means), np.std(means, ddof=1) / np.sqrt(3))
+    )
     assert {(CIRCLE, a, 1.0) for a in (0.5, 1.0, 1.5, 1.7, 2.0)} <= set(swims)
     lift = numbers["lift"]
-    assert list(lift) == list(figure.BARS) and lift["round"]["grains"] == pytest.approx(0.43, abs=0.1)
-    assert (lift["half round"]["keep"], lift["half round"]["cut"]) == pytest.approx((0.54, 0.04), abs=0.01)
+    assert list(lift) == list(figure.BARS) and lift["round"]["grains"] == pytest.approx(
+        0.43, abs=0.1
+    )
+    assert (lift["half round"]["keep"], lift["half round"]["cut"]) == pytest.approx(
+        (0.54, 0.04), abs=0.01
+    )
     across, along = (numbers["reversal"][0.0245, angle, "flank"] for angle in (90, 0))
     measured = AT_ONCE, AT_ONCE_ALONG, RATIO
     ratio = along["travel"][0] / across["travel"][0]
-    assert (across["at_once"][0], along["at_once"][0], ratio) == pytest.approx(measured, abs=0.006)
+    assert (across["at_once"][0], along["at_once"][0], ratio) == pytest.approx(
+        measured, abs=0.006
+    )
     rows = read("reversals")
     fits = []
     for bed in (1, 2, 3):
         mine = [
-            (rows["amplitude_m"] == a) & (rows["depth_m"] == 0.0245) & (rows["angle_deg"] == 90) & (rows["bed"] == bed)
+            (rows["amplitude_m"] == a)
+            & (rows["depth_m"] == 0.0245)
+            & (rows["angle_deg"] == 90)
+            & (rows["bed"] == bed)
             for a in (0.01, 0.02, 0.04)
         ]
-        fits.append(recovery([(rows["amplitude_m"][m][0], rows["travel_m"][m], rows["flank_N"][m]) for m in mine]))
+        fits.append(
+            recovery(
+                [
+                    (rows["amplitude_m"][m][0], rows["travel_m"][m], rows["flank_N"][m])
+                    for m in mine
+                ]
+            )
+        )
     travel = np.array([fit.travel for fit in fits])
-    assert across["travel"] == pytest.approx((travel.mean(), travel.std(ddof=1) / np.sqrt(3)))
-    late = {case: (x["at_once"][0], 1e3 * x["travel"][0]) for case, x in numbers["stretches"].items()}
+    assert across["travel"] == pytest.approx(
+        (travel.mean(), travel.std(ddof=1) / np.sqrt(3))
+    )
+    late = {
+        case: (x["at_once"][0], 1e3 * x["travel"][0])
+        for case, x in numbers["stretches"].items()
+    }
     assert late[0.04, 0.0245, 90] == pytest.approx((0.32, 61.4), abs=0.05)
     assert late[0.02, 0.0150, 90] == pytest.approx((-0.03, 36.8), abs=0.05)
     for (a, angle), way in numbers["ways"].items():  # fitted at 20 mm
         assert np.sqrt(np.mean((way["grains"] - way["law"]) ** 2)) < 0.11, (a, angle)
     assert "circle 1 rad" in figure.table(numbers)
     circles, others, lifts, right = figure.draw(numbers).axes
-    assert circles.lines[2].get_ydata().tolist() == curves["direct"]["distance"].tolist()
+    assert (
+        circles.lines[2].get_ydata().tolist() == curves["direct"]["distance"].tolist()
+    )
     assert others.lines[2].get_xdata()[0] == numbers["others"][CIRCLE, 0.5]["direct"][0]
     assert others.containers[0].lines[0].get_xdata()[0] == swims[CIRCLE, 0.5, 1.0][0]
     assert len(lifts.get_yticklabels()) == 3 and len(right.lines) == 8
@@ -319,16 +490,26 @@ def test_the_budget_of_a_swim_finds_which_force_is_another():
     from figures.campaigns import swim_budget as budget
 
     law = Calibration("flank-drag", end_caps="fitted").ask().subject
-    question = grain_swim.GrainSwim(scenes.load("three-link-glass"), cycles=1, radius=2e-3)
+    question = grain_swim.GrainSwim(
+        scenes.load("three-link-glass"), cycles=1, radius=2e-3
+    )
     caps = law.caps(2e-3 / 0.162)
     body, n = budget.points(question), budget.PHASES
     system = dataclasses.replace(question.swimmer, medium=law.medium)
     phases = 2 * np.pi * (np.arange(n) + 0.5) / n
-    alpha, alphadot = (np.array([g(t) for t in phases]) for g in (question.scene.gait.shape, question.scene.gait.rate))
+    alpha, alphadot = (
+        np.array([g(t) for t in phases])
+        for g in (question.scene.gait.shape, question.scene.gait.rate)
+    )
 
     def found(other):
         """Return distances by the law and of a swimmer that obeys it with end caps ``other``, and shares by part, m."""
-        xi = dataclasses.replace(system, effects=(other,)).velocity(alpha, alphadot) * 2 * np.pi * [0.162, 0.162, 1.0]
+        xi = (
+            dataclasses.replace(system, effects=(other,)).velocity(alpha, alphadot)
+            * 2
+            * np.pi
+            * [0.162, 0.162, 1.0]
+        )
         force = budget.law_forces(body, law, other, xi)
         force[:, 1] += force[:, 0]  # in grains the sphere at a tip bears its force
         force[:, -2] += force[:, -1]
@@ -337,27 +518,45 @@ def test_the_budget_of_a_swim_finds_which_force_is_another():
         later = lambda x: np.concatenate([np.zeros((before, *x.shape[1:]), x.dtype), x])
         theta = xi[:, 2].cumsum() / n
         turn = np.repeat(np.exp(1j * (theta - xi[:, 2] / n / 2)), samples)
-        place = later((np.repeat(xi[:, 0] + 1j * xi[:, 1], samples) * turn).cumsum() * h)
+        place = later(
+            (np.repeat(xi[:, 0] + 1j * xi[:, 1], samples) * turn).cumsum() * h
+        )
         heading = later(np.repeat(xi[:, 2], samples).cumsum() * h)
-        world = later(np.repeat((force * body.heading)[:, 1:-1], samples, 0) * turn[:, None])
+        world = later(
+            np.repeat((force * body.heading)[:, 1:-1], samples, 0) * turn[:, None]
+        )
         t, nothing = h * np.arange(1, len(place) + 1), np.zeros((len(place), 3))
         pose = np.column_stack([place.real, place.imag, heading])
         profile = np.stack([world.real, world.imag, 0 * world.real], -1)
-        run = Run(t, nothing, t, profile, t, pose, *[nothing] * 2, t, t, *[nothing] * 2, {})
+        run = Run(
+            t, nothing, t, profile, t, pose, *[nothing] * 2, t, t, *[nothing] * 2, {}
+        )
         (swum,) = budget.budget(question, run, law, caps)
-        assert list(budget.recovery(body, swum, 1 / n)) == pytest.approx(np.ones(len(budget.TRAVELS)), abs=0.05)
+        assert list(budget.recovery(body, swum, 1 / n)) == pytest.approx(
+            np.ones(len(budget.TRAVELS)), abs=0.05
+        )
         distances = [budget.distance(x, 1 / n)[0] for x in (swum.xi_0, swum.xi)]
         return distances, {name: x.sum() for name, x in swum.shares.items()}
 
     (by_law, same), parts = found(caps)
-    assert same == pytest.approx(by_law, rel=2e-3) and max(map(abs, parts.values())) < 0.01 * by_law
-    (by_law, other), parts = found(dataclasses.replace(caps, head=5 * caps.head, tail=5 * caps.tail))
+    assert (
+        same == pytest.approx(by_law, rel=2e-3)
+        and max(map(abs, parts.values())) < 0.01 * by_law
+    )
+    (by_law, other), parts = found(
+        dataclasses.replace(caps, head=5 * caps.head, tail=5 * caps.tail)
+    )
     assert other < 0.85 * by_law
     ends = parts["ends, along"] + parts["ends, across"]
     assert ends == pytest.approx(other - by_law, rel=0.1) and parts["ends, along"] < 0
-    assert max(abs(parts[name]) for name in ("flank, along", "flank, across", "rest")) < 0.03 * by_law
+    assert (
+        max(abs(parts[name]) for name in ("flank, along", "flank, across", "rest"))
+        < 0.03 * by_law
+    )
     assert sum(parts.values()) == pytest.approx(other - by_law, rel=1e-9)
-    assert 16 <= budget.near_singular(question, law, caps).sum() <= 18  # a quarter of 64, and pairs that are alike
+    assert (
+        16 <= budget.near_singular(question, law, caps).sum() <= 18
+    )  # a quarter of 64, and pairs that are alike
 
 
 def test_plates_in_grains_stand_beside_bars_and_the_map():
@@ -368,15 +567,25 @@ def test_plates_in_grains_stand_beside_bars_and_the_map():
 
     rows, lift = campaign.read("faces"), campaign.read("lift")
     for key in ("drag_N", "lift_N"):
-        sums = [rows[key][(rows["shape"] == s) & (rows["bed"] == b)].sum() for s, b in zip(lift["shape"], lift["bed"])]
-        np.testing.assert_allclose(sums, lift[key], rtol=0, atol=4e-4)  # blocks of a mean differ by a sample
+        sums = [
+            rows[key][(rows["shape"] == s) & (rows["bed"] == b)].sum()
+            for s, b in zip(lift["shape"], lift["bed"])
+        ]
+        np.testing.assert_allclose(
+            sums, lift[key], rtol=0, atol=4e-4
+        )  # blocks of a mean differ by a sample
     numbers = figure.compute()
     bar, maps = numbers["bar"], numbers["maps"]
     # One depth for all rows: lift over drag of Fig. 8(a), and of the two kinds of stress the force on the rows.
-    deep = bar | {"weight": bar["weight"] / (campaign.BAR_DEPTH + campaign.BAR * np.cos(bar["beta"]))}
+    deep = bar | {
+        "weight": bar["weight"]
+        / (campaign.BAR_DEPTH + campaign.BAR * np.cos(bar["beta"]))
+    }
     for rule, ratio in (("keep", 0.81), ("cut", 0.68)):
         stress = on_face(StressMap(tension=rule), figure.BETA)
-        assert figure.summed(deep, figure.BETA, *stress) == pytest.approx(ratio, abs=0.01)
+        assert figure.summed(deep, figure.BETA, *stress) == pytest.approx(
+            ratio, abs=0.01
+        )
     assert deep["weight"].sum() == pytest.approx(
         np.pi * campaign.BAR * campaign.TROUGH.length
     )  # half the bar's surface
@@ -384,16 +593,26 @@ def test_plates_in_grains_stand_beside_bars_and_the_map():
     assert one == pytest.approx(bar["lift"][:, 1].sum() / bar["drag"][:, 1].sum())
     pulls = maps["keep"]["normal"] < 0
     assert (
-        np.degrees(figure.BETA[pulls].min()) == pytest.approx(144, abs=1) and (maps["cut"]["normal"][pulls] == 0).all()
+        np.degrees(figure.BETA[pulls].min()) == pytest.approx(144, abs=1)
+        and (maps["cut"]["normal"][pulls] == 0).all()
     )
-    assert bar["normal"][bar["beta"] > np.radians(143)].min() > 0.009  # N/cm^3, in every bed
+    assert (
+        bar["normal"][bar["beta"] > np.radians(143)].min() > 0.009
+    )  # N/cm^3, in every bed
     plates = numbers["plates"][0.016]
     up = plates["beta"] > np.radians(143)
-    assert up.any() and plates["face"]["normal"][up].min() > 0.006 and plates["whole"]["normal"][up].min() > 0.005
+    assert (
+        up.any()
+        and plates["face"]["normal"][up].min() > 0.006
+        and plates["whole"]["normal"][up].min() > 0.005
+    )
     assert maps["cut"]["misfit"][1] < 0.75 * maps["keep"]["misfit"][1]
     bars = numbers["bars"]
     assert bars["half round"]["faces"] == pytest.approx((-0.62, 0.03), abs=0.01)
-    assert bars[campaign.SHELL]["whole"][0] == pytest.approx(0.27, abs=0.01) and bars[campaign.SHELL]["cut"] < 0.6
+    assert (
+        bars[campaign.SHELL]["whole"][0] == pytest.approx(0.27, abs=0.01)
+        and bars[campaign.SHELL]["cut"] < 0.6
+    )
 
 
 def test_a_cycle_in_grains_is_told_in_the_frame_at_its_start():
@@ -401,11 +620,17 @@ def test_a_cycle_in_grains_is_told_in_the_frame_at_its_start():
     t = np.linspace(0, 3, 3001)
     heading, start = 0.3 + 0.7 * t**2, 0.3 + 0.7 * np.array([0.5, 1.5, 2.5]) ** 2
     place = np.array([complex(0.2, -0.1), complex(0.5, 0.4)]) * np.exp(1j * start[:2])
-    way = np.interp(t, [0, 0.5, 1.5, 2.5, 3.0], np.cumsum([0.7j, 0.0, *place, 0.1]).real)
-    aside = np.interp(t, [0, 0.5, 1.5, 2.5, 3.0], np.cumsum([0.7j, 0.0, *place, 0.1]).imag)
+    way = np.interp(
+        t, [0, 0.5, 1.5, 2.5, 3.0], np.cumsum([0.7j, 0.0, *place, 0.1]).real
+    )
+    aside = np.interp(
+        t, [0, 0.5, 1.5, 2.5, 3.0], np.cumsum([0.7j, 0.0, *place, 0.1]).imag
+    )
     run = types.SimpleNamespace(t=t, pose=np.stack([way, aside, heading], -1))
     found = grain_swim.cycle_poses(run, np.array([0.5, 1.5, 2.5]))
-    np.testing.assert_allclose(found, [[0.2, -0.1, 0.7 * 2.0], [0.5, 0.4, 0.7 * 4.0]], atol=1e-9)
+    np.testing.assert_allclose(
+        found, [[0.2, -0.1, 0.7 * 2.0], [0.5, 0.4, 0.7 * 4.0]], atol=1e-9
+    )
 
 
 def test_sizes_of_a_swimmer_are_those_given_or_the_scenes():
@@ -419,7 +644,13 @@ def test_sizes_of_a_swimmer_are_those_given_or_the_scenes():
     ):  # fmt: skip
         question = grain_swim.GrainSwim(scenes.parse(text_), 3, 7, **given)
         one = question.experiment
-        assert (one.body.size, one.body.half_width, one.bed.seed) == pytest.approx((size, radius, 7))
-        assert (one.bed.length, one.bed.width) == pytest.approx((size + 0.118, size + 0.078))
-        assert one.bed.depth == pytest.approx(max(0.049, 2 * radius + 6 * one.bed.diameter))
+        assert (one.body.size, one.body.half_width, one.bed.seed) == pytest.approx(
+            (size, radius, 7)
+        )
+        assert (one.bed.length, one.bed.width) == pytest.approx(
+            (size + 0.118, size + 0.078)
+        )
+        assert one.bed.depth == pytest.approx(
+            max(0.049, 2 * radius + 6 * one.bed.diameter)
+        )
         assert (question.frequency, one.duration) == (1.0, 3.5)

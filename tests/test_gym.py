@@ -3,8 +3,12 @@
 import numpy as np
 import pytest
 
-mujoco = pytest.importorskip("mujoco", reason="needs the extra: pip install 'geomech[mujoco]'")
-gymnasium = pytest.importorskip("gymnasium", reason="needs the extra: pip install 'geomech[gym]'")
+mujoco = pytest.importorskip(
+    "mujoco", reason="needs the extra: pip install 'geomech[mujoco]'"
+)
+gymnasium = pytest.importorskip(
+    "gymnasium", reason="needs the extra: pip install 'geomech[gym]'"
+)
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
 import geomech.gym  # noqa: E402
@@ -12,7 +16,9 @@ from rft.plates import VERTICAL  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("fastest")
 NAME = "geomech/HexapodSand-v0"
-needs_batch = pytest.mark.skipif(int(mujoco.__version__.partition(".")[0]) < 4, reason="needs mujoco.batch")
+needs_batch = pytest.mark.skipif(
+    int(mujoco.__version__.partition(".")[0]) < 4, reason="needs mujoco.batch"
+)
 
 
 @pytest.mark.filterwarnings("ignore")  # the checker's advice about infinite bounds
@@ -32,7 +38,10 @@ def test_the_reward_is_the_sum_of_its_parts():
         seen, reward, ended, cut, parts = env.step(np.full(6, 0.5))
         assert reward == pytest.approx(sum(parts.values())) and not ended and not cut
         total = {name: total[name] + parts[name] for name in total}
-    assert 0.02 * total["forward"] == pytest.approx(env.data.qpos[0], abs=1e-9) and env.data.qpos[0] > 0.02
+    assert (
+        0.02 * total["forward"] == pytest.approx(env.data.qpos[0], abs=1e-9)
+        and env.data.qpos[0] > 0.02
+    )
     assert total["effort"] < 0.0 == total["fall"]
     mujoco.mj_forward(env.model, env.data)
     turn = env.data.xmat[1].reshape(3, 3)
@@ -47,8 +56,12 @@ def test_the_reward_is_the_sum_of_its_parts():
 @needs_batch
 def test_many_robots_go_as_each_alone():
     """Also in media of their own; an episode that has ended begins anew with the next step."""
-    media = [VERTICAL[name].stress for name in ("poppy-seeds-loose", "poppy-seeds-close")]
-    many = gymnasium.make_vec(NAME, 2, "vector_entry_point", media=media, max_episode_steps=20)
+    media = [
+        VERTICAL[name].stress for name in ("poppy-seeds-loose", "poppy-seeds-close")
+    ]
+    many = gymnasium.make_vec(
+        NAME, 2, "vector_entry_point", media=media, max_episode_steps=20
+    )
     many.reset(seed=3)
     starts, rng = many.unwrapped.qpos.copy(), np.random.default_rng(0)
     actions = rng.uniform(-1, 1, (20, 2, 6)).astype(np.float32)
@@ -66,5 +79,10 @@ def test_many_robots_go_as_each_alone():
         one.close()
     assert not rows[-2][3].any() and rows[-1][3].all() and not rows[-1][2].any()
     seen, reward, ended, cut, _ = many.step(actions[0])
-    assert not reward.any() and not ended.any() and not cut.any() and seen[0, 0] == pytest.approx(0.09)
+    assert (
+        not reward.any()
+        and not ended.any()
+        and not cut.any()
+        and seen[0, 0] == pytest.approx(0.09)
+    )
     many.close()

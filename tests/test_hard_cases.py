@@ -23,12 +23,17 @@ GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 def all_directions(joints, count=4):
     rng = np.random.default_rng(0)
     d = rng.normal(size=(count, joints))
-    axes = np.concatenate([np.eye(joints), np.ones((1, joints)), (-1.0) ** np.arange(joints)[None]])
+    axes = np.concatenate(
+        [np.eye(joints), np.ones((1, joints)), (-1.0) ** np.arange(joints)[None]]
+    )
     return np.concatenate([d / np.linalg.norm(d, axis=1, keepdims=True), axes, -axes])
 
 
 def at(pose):
-    return lambda joints: (np.broadcast_to(pose(joints), (1, joints)), all_directions(joints))
+    return lambda joints: (
+        np.broadcast_to(pose(joints), (1, joints)),
+        all_directions(joints),
+    )
 
 
 HARD = {
@@ -43,9 +48,14 @@ HARD = {
     "zigzag": at(lambda n: 2.0 * (-1.0) ** np.arange(n)),
     "slow": lambda n: (np.full(n, 0.7), 1e-12 * all_directions(n)),
     "fast": lambda n: (np.full(n, 0.7), 1e12 * all_directions(n)),
-    "one joint faster by 1e8": lambda n: (np.full(n, 0.4), np.concatenate([[1.0], np.full(n - 1, 1e-8)])),
+    "one joint faster by 1e8": lambda n: (
+        np.full(n, 0.4),
+        np.concatenate([[1.0], np.full(n - 1, 1e-8)]),
+    ),
     "wound up many turns": lambda n: (np.full(n, 40.0), all_directions(n)),
-    "at random": lambda n: np.random.default_rng(n).normal(size=(2, 60, n)) * [[[2.0]], [[1.0]]],
+    "at random": lambda n: (
+        np.random.default_rng(n).normal(size=(2, 60, n)) * [[[2.0]], [[1.0]]]
+    ),
 }
 
 SOME_LAWS = (
@@ -68,8 +78,12 @@ STRANGE_BODIES = {
 def hard(joints, ill):
     """Names, alpha and alphadot of all samples of HARD; those at random are for bodies that are not badly conditioned."""
     names = [name for name in HARD if not ill or name != "at random"]
-    problems = [np.broadcast_arrays(*map(np.atleast_2d, HARD[name](joints))) for name in names]
-    return np.repeat(names, [len(alpha) for alpha, _ in problems]), *(np.concatenate(x) for x in zip(*problems))
+    problems = [
+        np.broadcast_arrays(*map(np.atleast_2d, HARD[name](joints))) for name in names
+    ]
+    return np.repeat(names, [len(alpha) for alpha, _ in problems]), *(
+        np.concatenate(x) for x in zip(*problems)
+    )
 
 
 def apart(one, other, alphadot, body):
@@ -88,36 +102,61 @@ def test_hard_cases(name):
     its residual leaves the sixth digit open; there the two are compared at a wider one."""
     body, ill = (BODIES | STRANGE_BODIES)[name], name in ILL_CONDITIONED
     backends = ("numpy", "numba") if backend.installed() else ("numpy",)
-    for label, medium in (MEDIA if name == "three" else {label: MEDIA[label] for label in SOME_LAWS}).items():
-        some = slice(None, None, 1 if body.joints < 5 or label in CLOSED else 3)  # quadrature takes its time
+    for label, medium in (
+        MEDIA if name == "three" else {label: MEDIA[label] for label in SOME_LAWS}
+    ).items():
+        some = slice(
+            None, None, 1 if body.joints < 5 or label in CLOSED else 3
+        )  # quadrature takes its time
         cases, alpha, alphadot = (x[some] for x in hard(body.joints, ill))
-        fastest = 3 * np.linalg.norm(alphadot, axis=-1, keepdims=True) * [body.length, body.length, 1] + 1e-300
+        fastest = (
+            3
+            * np.linalg.norm(alphadot, axis=-1, keepdims=True)
+            * [body.length, body.length, 1]
+            + 1e-300
+        )
         for regularisation in (1e-6, 1e-3)[: 1 + ill]:
             given = {"regularisation": regularisation}
-            found = [body_velocity(medium, body, alpha, alphadot, backend=b, **given) for b in backends]
+            found = [
+                body_velocity(medium, body, alpha, alphadot, backend=b, **given)
+                for b in backends
+            ]
             plain = found[0]
             bad = (plain.status == "unconverged") | ~(plain.residual < 1e-9)
             assert not bad.any(), (label, set(cases[bad]))
             if label in LINEAR:
                 assert (plain.iterations[cases != "at rest"] == 1).all()
-            bad = (np.abs(plain.xi) > fastest).any(-1)  # no body moves faster than its joints drive it
+            bad = (np.abs(plain.xi) > fastest).any(
+                -1
+            )  # no body moves faster than its joints drive it
             assert not bad.any(), (label, set(cases[bad]))
             for fast in found[1:]:
                 assert (plain.status == fast.status).all()
                 assert fast.residual.max() < 1e-9
-                differ = np.sum(plain.iterations != fast.iterations)  # steps, by rounding where that is amplified
-                assert differ <= max(1, (0.02 if ill else 0.001) * plain.iterations.size)
-                bad = (apart(plain, fast, alphadot, body) > 1e-10) & (not ill or regularisation > 1e-6)
+                differ = np.sum(
+                    plain.iterations != fast.iterations
+                )  # steps, by rounding where that is amplified
+                assert differ <= max(
+                    1, (0.02 if ill else 0.001) * plain.iterations.size
+                )
+                bad = (apart(plain, fast, alphadot, body) > 1e-10) & (
+                    not ill or regularisation > 1e-6
+                )
                 assert not bad.any(), (label, set(cases[bad]))
 
 
 @pytest.mark.usefixtures("solved_by")
 @pytest.mark.parametrize("links", [2, 3, 10, 50, 200])
-@pytest.mark.parametrize("medium", ["glass-0.3mm-loose", "coulomb", "viscous-2", "strong"])
+@pytest.mark.parametrize(
+    "medium", ["glass-0.3mm-loose", "coulomb", "viscous-2", "strong"]
+)
 def test_from_two_to_two_hundred_links(links, medium):
     rng = np.random.default_rng(links)
     body, spread = Chain((1,) * links), 2.5 / np.sqrt(links)
-    alpha, alphadot = rng.uniform(-spread, spread, (20, links - 1)), rng.normal(size=(20, links - 1))
+    alpha, alphadot = (
+        rng.uniform(-spread, spread, (20, links - 1)),
+        rng.normal(size=(20, links - 1)),
+    )
     solution = body_velocity(MEDIA[medium], body, alpha, alphadot)
     assert (solution.status != "unconverged").all()
     assert solution.residual.max() < 1e-9
@@ -139,22 +178,40 @@ def test_large_ratios_approach_the_kinematic_limit():
     for b in range(20):
         J = np.stack(
             [
-                np.stack(np.broadcast_arrays(*to_element(motion, *e)[1:], motion.c)[:2])[..., b].ravel()
+                np.stack(
+                    np.broadcast_arrays(*to_element(motion, *e)[1:], motion.c)[:2]
+                )[..., b].ravel()
                 for e in np.eye(3)
             ],
             1,
         )
         weight = np.sqrt(np.concatenate([motion.half[:, 0], motion.half[:, 0] / 3]))
-        limit.append(np.linalg.lstsq(weight[:, None] * J, -weight * motion.v[1:, :, b].ravel(), rcond=None)[0])
+        limit.append(
+            np.linalg.lstsq(
+                weight[:, None] * J, -weight * motion.v[1:, :, b].ravel(), rcond=None
+            )[0]
+        )
     ratios = np.array([1e3, 1e4, 1e5, 1e6])
-    off = [np.abs(body_velocity(Viscous(r), body, alpha, alphadot).xi - limit).max() for r in ratios]
-    assert -np.polyfit(np.log(ratios), np.log(off), 1)[0] == pytest.approx(1.0, abs=0.05)
-    assert np.abs(body_velocity(Viscous(1e8), body, alpha, alphadot).xi - limit).max() < 1e-5
+    off = [
+        np.abs(body_velocity(Viscous(r), body, alpha, alphadot).xi - limit).max()
+        for r in ratios
+    ]
+    assert -np.polyfit(np.log(ratios), np.log(off), 1)[0] == pytest.approx(
+        1.0, abs=0.05
+    )
+    assert (
+        np.abs(body_velocity(Viscous(1e8), body, alpha, alphadot).xi - limit).max()
+        < 1e-5
+    )
 
 
 @pytest.mark.parametrize("amplitude", [1e-6, 1e-4, 1e-2])
 def test_tiny_gaits_keep_their_digits(amplitude):
-    g = direct(lambda a, d: body_velocity(Viscous(2.0), Chain(frame="link-2"), a, d).xi, Circle(), [amplitude])
+    g = direct(
+        lambda a, d: body_velocity(Viscous(2.0), Chain(frame="link-2"), a, d).xi,
+        Circle(),
+        [amplitude],
+    )
     limit = 5 / 243 * np.pi * amplitude**2
     assert np.hypot(*g[0, :2]) == pytest.approx(limit, rel=1e-8 + amplitude**2)
 
@@ -163,7 +220,9 @@ def test_tiny_gaits_in_sand():
     """Displacement per area settles as the circle shrinks, down to a millionth of a radian."""
     radii = np.array([1e-2, 1e-3, 1e-4, 1e-5, 1e-6])
     g = direct(
-        lambda a, d: body_velocity(GLASS, Chain((1, 1, 1.1)), a, d).checked().xi, Circle(centre=(0.7, -0.4)), radii
+        lambda a, d: body_velocity(GLASS, Chain((1, 1, 1.1)), a, d).checked().xi,
+        Circle(centre=(0.7, -0.4)),
+        radii,
     )
     per_radius = np.hypot(g[:, 0], g[:, 1]) / radii**2
     np.testing.assert_allclose(per_radius[2:], per_radius[1], rtol=0.02)
@@ -172,21 +231,30 @@ def test_tiny_gaits_in_sand():
 @pytest.mark.parametrize("medium", MEDIA)
 def test_scallops_go_nowhere(medium):
     """A gait of no area, and every gait followed by its reversal."""
-    velocity = lambda a, d: body_velocity(MEDIA[medium], Chain((1, 1.3, 0.8)), a, d).checked().xi
+    velocity = lambda a, d: (
+        body_velocity(MEDIA[medium], Chain((1, 1.3, 0.8)), a, d).checked().xi
+    )
     scallop = Fourier(centre=(0.3, 0.5), cos=((1.0,), (0.6,)), sin=((0.0,), (0.0,)))
     assert np.abs(direct(velocity, scallop, phases=64)).max() < 1e-9
-    forth, back = (direct(velocity, Circle(amplitude=0.8, reverse=r), phases=64) for r in (False, True))
+    forth, back = (
+        direct(velocity, Circle(amplitude=0.8, reverse=r), phases=64)
+        for r in (False, True)
+    )
     np.testing.assert_allclose(se2.compose(forth, back), 0, atol=1e-9)
 
 
-@pytest.mark.parametrize("medium", ["glass-0.3mm-loose", "coulomb", "glass-0.3mm-close"])
+@pytest.mark.parametrize(
+    "medium", ["glass-0.3mm-loose", "coulomb", "glass-0.3mm-close"]
+)
 def test_stuck_samples_approach_the_limit_monotonically(medium):
     rng = np.random.default_rng(11)
     alpha, alphadot = rng.uniform(-2.8, 2.8, (2000, 2)), rng.normal(size=(2000, 2))
     stuck = body_velocity(MEDIA[medium], Chain(), alpha, alphadot).status == "stuck"
     assert 10 < stuck.sum() < 400
     alpha, alphadot = alpha[stuck], alphadot[stuck]
-    solve = lambda eps: body_velocity(MEDIA[medium], Chain(), alpha, alphadot, regularisation=eps).checked()
+    solve = lambda eps: body_velocity(
+        MEDIA[medium], Chain(), alpha, alphadot, regularisation=eps
+    ).checked()
     limit = solve(1e-10).xi
     levels = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7]
     off = np.array([np.linalg.norm(solve(eps).xi - limit, axis=-1) for eps in levels])
@@ -201,7 +269,10 @@ def test_the_status_is_that_of_the_limit(medium):
     slip."""
     rng = np.random.default_rng(12)
     alpha, alphadot = rng.uniform(-2.8, 2.8, (4000, 2)), rng.normal(size=(4000, 2))
-    near, limit = (body_velocity(MEDIA[medium], Chain(), alpha, alphadot, regularisation=e) for e in (1e-6, 1e-10))
+    near, limit = (
+        body_velocity(MEDIA[medium], Chain(), alpha, alphadot, regularisation=e)
+        for e in (1e-6, 1e-10)
+    )
     assert np.mean(near.status != limit.status) < 0.005
 
 
@@ -211,7 +282,10 @@ def test_regularisation_is_reported_by_what_it_changes(medium):
     rng = np.random.default_rng(13)
     alpha, alphadot = rng.uniform(-1.5, 1.5, (300, 2)), rng.normal(size=(300, 2))
     alphadot /= np.linalg.norm(alphadot, axis=1, keepdims=True)
-    one, finer = (body_velocity(DRY[medium], Chain(), alpha, alphadot, regularisation=e) for e in (1e-6, 1e-7))
+    one, finer = (
+        body_velocity(DRY[medium], Chain(), alpha, alphadot, regularisation=e)
+        for e in (1e-6, 1e-7)
+    )
     sliding = one.status == "sliding"
     assert np.median(np.abs(one.xi - finer.xi)[sliding]) < 1e-8
 
@@ -219,12 +293,24 @@ def test_regularisation_is_reported_by_what_it_changes(medium):
 # Curves of solutions that fold on the way to the wanted rounding: a descent that only lowers it falls off.
 FOLDS = {
     "uneven": (
-        (Granular(8.081366032651289, 0.6101439803612351), Chain((0.77, 0.44, 1.82), frame="link-2")),
-        ((1.4618952868928987, 1.0483336749944137), (2.852759416671848, -0.013853068453873112)),
+        (
+            Granular(8.081366032651289, 0.6101439803612351),
+            Chain((0.77, 0.44, 1.82), frame="link-2"),
+        ),
+        (
+            (1.4618952868928987, 1.0483336749944137),
+            (2.852759416671848, -0.013853068453873112),
+        ),
     ),
-    "even": ((Granular(8, np.radians(35)), Chain()), ((-1.47053323, -1.9356507), (-0.99735926, -0.07262584))),
+    "even": (
+        (Granular(8, np.radians(35)), Chain()),
+        ((-1.47053323, -1.9356507), (-0.99735926, -0.07262584)),
+    ),
     "sharp turn": (
-        (Granular(5.980265998691821, 0.6236043450543391), Chain((0.71646314, 0.60005133, 0.33690735))),
+        (
+            Granular(5.980265998691821, 0.6236043450543391),
+            Chain((0.71646314, 0.60005133, 0.33690735)),
+        ),
         ((-2.672321485415303, -1.7777827133167854), (-0.0006543260192958726, -1.0)),
     ),
     "five links": (
@@ -233,7 +319,12 @@ FOLDS = {
             Chain((1.31967198, 0.19320949, 1.36708407, 1.68819898, 1.0321)),
         ),
         (
-            (2.404695543137478, -0.1323310137498579, 0.6528898645336709, 2.6018260660472747),
+            (
+                2.404695543137478,
+                -0.1323310137498579,
+                0.6528898645336709,
+                2.6018260660472747,
+            ),
             (0.0, -1.0, 0.0006417417292624078, 0.0),
         ),
     ),
@@ -248,7 +339,12 @@ def in_all_frames(medium, body, alpha, alphadot):
     for link in range(len(body.lengths)):
         body = dataclasses.replace(body, frame=f"link-{link + 1}")
         found = body_velocity(medium, body, alpha, alphadot)
-        yield coordinates.change_velocity(found.xi, *body.frame_pose("mean", alpha, alphadot)), found
+        yield (
+            coordinates.change_velocity(
+                found.xi, *body.frame_pose("mean", alpha, alphadot)
+            ),
+            found,
+        )
 
 
 @pytest.mark.parametrize("name", FOLDS)
@@ -261,14 +357,18 @@ def test_folds(name):
         assert (found.status, found.iterations) == (first.status, first.iterations)
     finer = body_velocity(*problem, regularisation=1e-8, tolerance=1e-12).checked()
     again = body_velocity(*problem, tolerance=1e-12).checked()
-    np.testing.assert_allclose(again.xi, finer.xi, atol=3e-4)  # the same branch: at a fold they part by much more
+    np.testing.assert_allclose(
+        again.xi, finer.xi, atol=3e-4
+    )  # the same branch: at a fold they part by much more
 
 
 @pytest.mark.parametrize("name", FOLDS)
 def test_neighbours_of_folds(name):
     """As many as share a batch: the way out is not for a few samples only."""
     rng = np.random.default_rng(4)
-    alpha, alphadot = (np.array(x) + rng.uniform(-1e-4, 1e-4, (300, len(x))) for x in FOLDS[name][1])
+    alpha, alphadot = (
+        np.array(x) + rng.uniform(-1e-4, 1e-4, (300, len(x))) for x in FOLDS[name][1]
+    )
     found = body_velocity(*FOLDS[name][0], alpha, alphadot).checked()
     assert found.iterations.max() <= 200
 
@@ -278,11 +378,20 @@ def hard_problem(rng, count):
     links = rng.integers(3, 6)
     frame = ("mean", f"link-{rng.integers(1, links + 1)}")[rng.integers(2)]
     body = Chain(tuple(10.0 ** rng.uniform(-1, 0.3, links)), frame=frame)
-    medium = Granular(10.0 ** rng.uniform(0, np.log10(50)), np.radians(rng.uniform(10, 85)))
+    medium = Granular(
+        10.0 ** rng.uniform(0, np.log10(50)), np.radians(rng.uniform(10, 85))
+    )
     spread = min(np.pi, 6.0 / np.sqrt(links))
-    alpha, alphadot = rng.uniform(-spread, spread, (count, links - 1)), rng.normal(size=(count, links - 1))
-    one = 10.0 ** rng.uniform(-8, -1, alpha.shape) * rng.choice([-1, 0, 1], size=alpha.shape)
-    one[np.arange(count), rng.integers(0, links - 1, count)] = rng.choice([-1, 1], count)
+    alpha, alphadot = (
+        rng.uniform(-spread, spread, (count, links - 1)),
+        rng.normal(size=(count, links - 1)),
+    )
+    one = 10.0 ** rng.uniform(-8, -1, alpha.shape) * rng.choice(
+        [-1, 0, 1], size=alpha.shape
+    )
+    one[np.arange(count), rng.integers(0, links - 1, count)] = rng.choice(
+        [-1, 1], count
+    )
     return medium, body, alpha, np.where(rng.random((count, 1)) < 0.5, one, alphadot)
 
 
@@ -304,16 +413,26 @@ def solutions(medium, body, alpha, alphadot, regularisation, starts, monkeypatch
     monkeypatch.setattr("rft.balance.solver.QUICK", QUICK._replace(budget=1.0))
     monkeypatch.setattr("rft.balance.solver.WALKS", ())
     monkeypatch.setattr("rft.balance.solver.SLOW", ())
-    alpha, alphadot = (np.array(x)[:, None] * np.ones(starts) for x in (alpha, alphadot))
+    alpha, alphadot = (
+        np.array(x)[:, None] * np.ones(starts) for x in (alpha, alphadot)
+    )
     alphadot /= np.linalg.norm(alphadot[:, 0])
     found = np.zeros((0, 3))
     for widest in (0.0, 1e-4, 1e-3, 1e-2):
-        monkeypatch.setattr("rft.balance.solver.WARM", Descent(widest, 0.1, 1e-4, np.inf, 100.0))
+        monkeypatch.setattr(
+            "rft.balance.solver.WARM", Descent(widest, 0.1, 1e-4, np.inf, 100.0)
+        )
         assembly = assemble(medium, body)
         problem = assembly.problem(alpha, alphadot)
-        guess = rng.normal(size=(3, starts)) * [[0.3], [0.3], [1.0]] * 10.0 ** rng.uniform(-4, 0, starts)
+        guess = (
+            rng.normal(size=(3, starts))
+            * [[0.3], [0.3], [1.0]]
+            * 10.0 ** rng.uniform(-4, 0, starts)
+        )
         accuracy = Accuracy(regularisation, 1e-10)
-        solved = solve(problem.take, np.ones(starts), accuracy, assembly, "auto", 1, guess)
+        solved = solve(
+            problem.take, np.ones(starts), accuracy, assembly, "auto", 1, guess
+        )
         for xi in solved.xi[:, solved.residual <= solved.limit].T:
             if (np.abs(found - xi).max(-1, initial=0.0) > 10 * regularisation).all():
                 found = np.concatenate([found, xi[None]])
@@ -325,7 +444,10 @@ def test_between_folds_there_are_three_solutions(monkeypatch):
     medium, body, alpha, alphadot = *FOLDS["uneven"][0], *FOLDS["uneven"][1]
     mean = dataclasses.replace(body, frame="mean")
     speed = np.linalg.norm(alphadot)
-    coarse, fine = (body_velocity(medium, mean, alpha, alphadot, regularisation=e).xi / speed for e in (1.5e-4, 1e-6))
+    coarse, fine = (
+        body_velocity(medium, mean, alpha, alphadot, regularisation=e).xi / speed
+        for e in (1.5e-4, 1e-6)
+    )
     with monkeypatch.context() as patch:
         three = solutions(medium, body, alpha, alphadot, 1.5e-4, 500, patch)
     with monkeypatch.context() as patch:
@@ -340,7 +462,8 @@ def test_between_folds_there_are_three_solutions(monkeypatch):
 def random_problem(rng, count):
     links = rng.integers(2, 13)
     body = Chain(
-        tuple(10.0 ** rng.uniform(-1, 0, links)), frame=("mean", f"link-{rng.integers(1, links + 1)}")[rng.integers(2)]
+        tuple(10.0 ** rng.uniform(-1, 0, links)),
+        frame=("mean", f"link-{rng.integers(1, links + 1)}")[rng.integers(2)],
     )
     medium = [
         Granular(10.0 ** rng.uniform(-2, 3), np.radians(10.0 ** rng.uniform(-1, 1.95))),
@@ -349,12 +472,19 @@ def random_problem(rng, count):
         Viscous(10.0 ** rng.uniform(-1, 3)),
     ][rng.choice(4, p=[0.4, 0.4, 0.15, 0.05])]
     spread = min(np.pi, 6.0 / np.sqrt(links))
-    return medium, body, rng.uniform(-spread, spread, (count, links - 1)), rng.normal(size=(count, links - 1))
+    return (
+        medium,
+        body,
+        rng.uniform(-spread, spread, (count, links - 1)),
+        rng.normal(size=(count, links - 1)),
+    )
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize("backend", ["numpy", "numba"])
-@pytest.mark.parametrize(("problem", "batches"), [(random_problem, 400), (hard_problem, 1600)])
+@pytest.mark.parametrize(
+    ("problem", "batches"), [(random_problem, 400), (hard_problem, 1600)]
+)
 def test_a_million_random_problems(problem, batches, backend):
     """Media and bodies, 500 samples each, to a normalised residual of 1e-10: prints rows of .docs/validation.md."""
     rng = np.random.default_rng(2026)
@@ -384,15 +514,21 @@ def test_no_sample_has_several_solutions(monkeypatch):
     while len(samples) < 40 + len(FOLDS):
         medium, body, alpha, alphadot = hard_problem(rng, 500)
         tries = body_velocity(medium, body, alpha, alphadot).iterations
-        samples += [(medium, body, alpha[k], alphadot[k]) for k in np.flatnonzero(tries > 60)]
+        samples += [
+            (medium, body, alpha[k], alphadot[k]) for k in np.flatnonzero(tries > 60)
+        ]
     missed = 0
     for medium, body, alpha, alphadot in samples:
-        taken = body_velocity(medium, dataclasses.replace(body, frame="mean"), alpha, alphadot).xi
+        taken = body_velocity(
+            medium, dataclasses.replace(body, frame="mean"), alpha, alphadot
+        ).xi
         with monkeypatch.context() as patch:
             found = solutions(medium, body, alpha, alphadot, 1e-6, 1000, patch)
         assert len(found) <= 1, (medium, body, alpha, alphadot, found)
         missed += len(found) == 0
         for xi in found:
             np.testing.assert_allclose(xi, taken / np.linalg.norm(alphadot), atol=1e-5)
-    print(f"\n{len(samples)} samples, one solution each; {missed} where no start led to it")
+    print(
+        f"\n{len(samples)} samples, one solution each; {missed} where no start led to it"
+    )
     assert missed < len(samples) / 2

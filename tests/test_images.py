@@ -19,7 +19,11 @@ from rft.laws.base import TermLaw, is_odd
 pytestmark = pytest.mark.usefixtures("fastest")
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
-MIRROR, BACKWARDS, BOTH = Traits(mirror=True), Traits(reversible=True), Traits(mirror=True, reversible=True)
+MIRROR, BACKWARDS, BOTH = (
+    Traits(mirror=True),
+    Traits(reversible=True),
+    Traits(mirror=True, reversible=True),
+)
 REVERSIBLE = {
     "two": False, "three": True, "three-middle": True, "uneven": False, "five": True, "modes": False,
     "serpenoid": False, "arcs": False, "backbone": True,
@@ -36,8 +40,12 @@ def test_what_else_tells_head_from_tail():
     chain = Chain((1, 2, 1))
     assert Swimmer(GLASS, chain).traits.reversible
     assert not Swimmer(GLASS, chain, (EndCaps(radius=0.06),)).traits.reversible
-    assert not Swimmer(GLASS, chain, (SkinFriction(forward=0.109, backward=0.137),)).traits.reversible
-    assert not Swimmer(GLASS, dataclasses.replace(chain, frame="link-1")).traits.reversible
+    assert not Swimmer(
+        GLASS, chain, (SkinFriction(forward=0.109, backward=0.137),)
+    ).traits.reversible
+    assert not Swimmer(
+        GLASS, dataclasses.replace(chain, frame="link-1")
+    ).traits.reversible
     assert not Swimmer(Scales(), chain).traits.reversible
     assert is_odd(GLASS)
     assert not is_reversible(Chain((1, 2, 1 + 1e-9)))
@@ -65,12 +73,22 @@ def test_fields_are_those_of_all_shapes(body, points, count):
         return xi
 
     axes = connection.grid(body.joints, points, 2.2)
-    whole, part = (connection.fit(velocity, axes, count, trusted=True, traits=traits) for traits in (NOTHING, BOTH))
+    whole, part = (
+        connection.fit(velocity, axes, count, trusted=True, traits=traits)
+        for traits in (NOTHING, BOTH)
+    )
     for name in ("A", "residual", "speed"):
-        np.testing.assert_allclose(getattr(part, name), getattr(whole, name), rtol=0, atol=1e-9)
+        np.testing.assert_allclose(
+            getattr(part, name), getattr(whole, name), rtol=0, atol=1e-9
+        )
     if body.joints == 2:
-        odd, alike = (harmonics.fit(velocity, axes, count, highest=3, traits=traits) for traits in (NOTHING, BOTH))
-        np.testing.assert_allclose(alike.coefficients, odd.coefficients, rtol=0, atol=1e-9)
+        odd, alike = (
+            harmonics.fit(velocity, axes, count, highest=3, traits=traits)
+            for traits in (NOTHING, BOTH)
+        )
+        np.testing.assert_allclose(
+            alike.coefficients, odd.coefficients, rtol=0, atol=1e-9
+        )
     share = 4 if body.joints == 2 else 2
     assert asked[1] / asked[0] < 1 / share + 0.6 / points
     assert to_solve([], 5).all()
@@ -81,23 +99,36 @@ def test_fields_are_those_of_all_shapes(body, points, count):
 ])  # fmt: skip
 def test_fields_of_bodies_that_slide_more_easily_forwards(medium, effects):
     """Their velocity does not turn round with the rates, so that a mirror tells nothing of the same directions."""
-    swimmer, axes = Swimmer(medium, Chain((1, 2, 1)), effects), connection.grid(2, 5, 1.5)
-    assert swimmer.traits.mirror and swimmer.traits.halved == (type(effects[0]) is EndCaps if effects else False)
+    swimmer, axes = (
+        Swimmer(medium, Chain((1, 2, 1)), effects),
+        connection.grid(2, 5, 1.5),
+    )
+    assert swimmer.traits.mirror and swimmer.traits.halved == (
+        type(effects[0]) is EndCaps if effects else False
+    )
     whole, part = (
         connection.fit(swimmer.velocity, axes, 5, trusted=True),
         connection.fit(swimmer.velocity, axes, 5, traits=swimmer.traits, trusted=True),
     )
     for name in ("A", "residual", "speed"):
-        np.testing.assert_allclose(getattr(part, name), getattr(whole, name), rtol=0, atol=1e-9)
+        np.testing.assert_allclose(
+            getattr(part, name), getattr(whole, name), rtol=0, atol=1e-9
+        )
 
 
 def test_axes_and_directions_that_do_not_match():
     square, unit = connection.grid(2, 6, 1.0), connection.directions(2, 8)
     assert len(images(square, unit, BOTH)) == 3
-    assert len(images(square, unit, BACKWARDS)) == len(images(square, unit, MIRROR)) == 1
-    assert len(images(square, connection.directions(2, 5), BOTH)) == 1  # the mirror alone
+    assert (
+        len(images(square, unit, BACKWARDS)) == len(images(square, unit, MIRROR)) == 1
+    )
+    assert (
+        len(images(square, connection.directions(2, 5), BOTH)) == 1
+    )  # the mirror alone
     shifted = tuple(a + 0.1 for a in square)
-    assert [x.factor[0].tolist() for x in images(shifted, unit, BOTH)] == [[-1.0, 1.0, -1.0]]
+    assert [x.factor[0].tolist() for x in images(shifted, unit, BOTH)] == [
+        [-1.0, 1.0, -1.0]
+    ]
     assert images((square[0], square[1][:5]), unit, BOTH) == []
 
 
@@ -118,42 +149,95 @@ def test_the_table_says_what_it_took():
 
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(Swimmer, "velocity", counted)
-            for table in (fitted.table(swimmer, scene.numerics), harmonic.table(swimmer, scene.numerics)):
+            for table in (
+                fitted.table(swimmer, scene.numerics),
+                harmonic.table(swimmer, scene.numerics),
+            ):
                 seen.clear()
                 table.build(None)
                 assert sum(seen) == table.balances
 
 
-ELLIPSE = Fourier(cos=((0.4,), (0.0,)), sin=((0.0,), (0.7,)))  # its second half is the first in a mirror, and no more
+ELLIPSE = Fourier(
+    cos=((0.4,), (0.0,)), sin=((0.0,), (0.7,))
+)  # its second half is the first in a mirror, and no more
 
 
 def cycles():
     """name: (body, effects, gait, amplitudes, phases, how many of these are solved)."""
     uneven, three = Chain((1, 2, 0.5), 0.3, "link-2"), Chain()
-    skin, caps = (SkinFriction(forward=0.109, backward=0.137),), (EndCaps(radius=0.06, tail=3.0),)
+    skin, caps = (
+        (SkinFriction(forward=0.109, backward=0.137),),
+        (EndCaps(radius=0.06, tail=3.0),),
+    )
     return {
         "circle": (three, (), Circle(), None, 64, 17),
-        "circle backwards": (three, (), Circle(amplitude=0.7, reverse=True), None, 48, 13),
+        "circle backwards": (
+            three,
+            (),
+            Circle(amplitude=0.7, reverse=True),
+            None,
+            48,
+            13,
+        ),
         "circles, one at rest": (three, (), Circle(), [0.0, -0.6, 1e-7, 1.4], 32, 9),
         "circle off the centre": (three, (), Circle(centre=(0.3, 0.1)), None, 32, 32),
-        "circle along the diagonal": (three, (), Circle(centre=(0.3, -0.3)), None, 32, 17),
-        "circle across the diagonal": (three, (), Circle(centre=(0.4, 0.4)), None, 32, 17),
+        "circle along the diagonal": (
+            three,
+            (),
+            Circle(centre=(0.3, -0.3)),
+            None,
+            32,
+            17,
+        ),
+        "circle across the diagonal": (
+            three,
+            (),
+            Circle(centre=(0.4, 0.4)),
+            None,
+            32,
+            17,
+        ),
         "circle of an odd number": (three, (), Circle(), None, 45, 45),
         "circle of two halves": (three, (), Circle(), None, 42, 21),
-        "circle of a body of three links that differ": (uneven, (), Circle(), None, 32, 16),
-        "circle of a skin that drags less forwards": (three, skin, Circle(), None, 32, 32),
+        "circle of a body of three links that differ": (
+            uneven,
+            (),
+            Circle(),
+            None,
+            32,
+            16,
+        ),
+        "circle of a skin that drags less forwards": (
+            three,
+            skin,
+            Circle(),
+            None,
+            32,
+            32,
+        ),
         "circle of a body with a heavier tail": (three, caps, Circle(), None, 32, 16),
         "butterfly": (three, (), Butterfly(), [0.5, 1.2], 32, 9),
         "ellipse": (three, (), ELLIPSE, None, 32, 16),
         "points": (three, (), GAITS["points"], None, 32, 32),
-        "travelling wave": (Chain((1,) * 6), (), Sine(elements=6, waves=1.0), [0.1, 0.3], 32, 9),
+        "travelling wave": (
+            Chain((1,) * 6),
+            (),
+            Sine(elements=6, waves=1.0),
+            [0.1, 0.3],
+            32,
+            9,
+        ),
     }
 
 
 @pytest.mark.parametrize("name", cycles())
 def test_gaits_are_those_of_all_phases(name):
     body, effects, gait, amplitudes, phases, count = cycles()[name]
-    swimmer, (alpha, alphadot) = Swimmer(GLASS, body, effects), gait.cycle(phases, amplitudes)
+    swimmer, (alpha, alphadot) = (
+        Swimmer(GLASS, body, effects),
+        gait.cycle(phases, amplitudes),
+    )
     assert cycle_images(alpha, alphadot, swimmer.traits).count == count
     run, xi = swimmer.run(alpha, alphadot, work=True), swimmer.velocity(alpha, alphadot)
     size = np.abs(xi).max((-1, -2), keepdims=True) + 1e-300
@@ -181,7 +265,10 @@ def symmetric_gaits():
             f"backwards in a mirror {n}": (cos[[0, 0]], sin[[0, 0]] * [[1], [-1]]),
             f"both {n}": (cos[[0, 0]] * odd, sin[[0, 0]] * odd * [[1], [-1]]),
         }
-    return {name: Fourier(cos=cos.tolist(), sin=sin.tolist()) for name, (cos, sin) in found.items()}
+    return {
+        name: Fourier(cos=cos.tolist(), sin=sin.tolist())
+        for name, (cos, sin) in found.items()
+    }
 
 
 class Late(Fourier):
@@ -234,7 +321,10 @@ def test_what_is_nearly_an_image_is_none():
     assert count(*map(np.stack, zip(circle, butterfly))) == 16
     backwards = cycle_images(*circle, BACKWARDS)
     assert cycle_images(*circle, NOTHING).count == 32 and backwards.count == 17
-    assert {*map(tuple, backwards.factor.tolist())} == {(1.0, 1.0, 1.0), (1.0, 1.0, -1.0)}
+    assert {*map(tuple, backwards.factor.tolist())} == {
+        (1.0, 1.0, 1.0),
+        (1.0, 1.0, -1.0),
+    }
 
 
 def test_gaits_side_by_side_have_their_own_parameters(monkeypatch):
@@ -246,8 +336,12 @@ def test_gaits_side_by_side_have_their_own_parameters(monkeypatch):
     assert cycle_images(alpha, alphadot, both.traits).count == 16
     run = both.run(alpha, alphadot)
     for k in range(2):
-        own = Swimmer(GLASS, body, (dataclasses.replace(effect, frequency=frequencies[k]),))
-        np.testing.assert_allclose(run.xi[k], own.velocity(alpha[k], alphadot[k]), rtol=0, atol=1e-10)
+        own = Swimmer(
+            GLASS, body, (dataclasses.replace(effect, frequency=frequencies[k]),)
+        )
+        np.testing.assert_allclose(
+            run.xi[k], own.velocity(alpha[k], alphadot[k]), rtol=0, atol=1e-10
+        )
     plain, solve, taken = Swimmer(GLASS, body), Swimmer.solve, []
 
     def watched(self, *asked):

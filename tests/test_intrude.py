@@ -16,11 +16,23 @@ from geomech import medium, plots
 from geomech.scenes.intruder import IntruderScene
 from geomech.studies.intrusion import Settings, estimate
 from geomech.studies.study import Study
-from rft.plates import VERTICAL, CLeg, Drag, Outline, Penetrate, PlateDrags, Rotate, StressMap, loads
+from rft.plates import (
+    VERTICAL,
+    CLeg,
+    Drag,
+    Outline,
+    Penetrate,
+    PlateDrags,
+    Rotate,
+    StressMap,
+    loads,
+)
 from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
-FLAT = [n for n in scenes.intruder_names() if isinstance(scenes.load(n), IntruderScene)]  # others are meshes
+FLAT = [
+    n for n in scenes.intruder_names() if isinstance(scenes.load(n), IntruderScene)
+]  # others are meshes
 MADE = """[medium]
 name = "poppy-seeds-close"
 zeta = 0.5
@@ -57,15 +69,25 @@ CHECKS = {
 
 def test_stress_tells_the_check_values(geomech):
     for (beta, gamma), wanted in CHECKS.items():
-        code, out, err = geomech("stress", "generic", "--beta", beta, "--gamma", gamma, "--json")
+        code, out, err = geomech(
+            "stress", "generic", "--beta", beta, "--gamma", gamma, "--json"
+        )
         assert (code, err) == (0, "")
         found = json.loads(out)
         assert list(found) == ["alpha_x", "alpha_z"]
         assert [round(found[k], 4) for k in found] == list(wanted)
-    assert json.loads(geomech("stress", "glass-3mm", "--beta", 0, "--gamma", 90, "--json")[1])["alpha_z"] == 0.224
+    assert (
+        json.loads(
+            geomech("stress", "glass-3mm", "--beta", 0, "--gamma", 90, "--json")[1]
+        )["alpha_z"]
+        == 0.224
+    )
     code, out, err = geomech("stress", "poppy-seeds-loose", "--beta", 0, "--gamma", 90)
     assert (code, err) == (0, "")
-    assert "alpha_z = 0.254 N/cm^3" in out and "takes power at all angles, pulls on 14.7 % of the plane" in out
+    assert (
+        "alpha_z = 0.254 N/cm^3" in out
+        and "takes power at all angles, pulls on 14.7 % of the plane" in out
+    )
 
 
 def test_media_from_files(geomech, tmp_path):
@@ -82,13 +104,19 @@ def test_media_from_files(geomech, tmp_path):
     }
     lines = "\n".join(f"{k} = {v}" for k, v in nine.items())
     (tmp_path / "bare.toml").write_text(lines)
-    (tmp_path / "own.toml").write_text(f"[medium]\n{lines}\nzeta = 2\ntension = 'cut'\ngrazing_deg = 3\n")
+    (tmp_path / "own.toml").write_text(
+        f"[medium]\n{lines}\nzeta = 2\ntension = 'cut'\ngrazing_deg = 3\n"
+    )
     wanted = StressMap(*nine.values(), zeta=2.0, grazing=math.radians(3), tension="cut")
     assert medium(str(tmp_path / "own.toml")) == wanted
     for name, times in (("bare.toml", 1), ("own.toml", 2)):
-        found = json.loads(geomech("stress", name, "--beta", 20, "--gamma", 50, "--json")[1])
+        found = json.loads(
+            geomech("stress", name, "--beta", 20, "--gamma", 50, "--json")[1]
+        )
         assert found["alpha_z"] == pytest.approx(
-            times * float(StressMap(*nine.values())(math.radians(20), math.radians(50))[1]), abs=1e-12
+            times
+            * float(StressMap(*nine.values())(math.radians(20), math.radians(50))[1]),
+            abs=1e-12,
         )
     (tmp_path / "scene.toml").write_text(MADE)
     assert medium(str(tmp_path / "scene.toml")).zeta == 0.5  # a scene has a medium, too
@@ -96,17 +124,30 @@ def test_media_from_files(geomech, tmp_path):
 
 def test_a_scene_takes_its_medium_from_a_file(tmp_path):
     """With what that says of tension and grazing, unless the scene says otherwise."""
-    (tmp_path / "own.toml").write_text("[medium]\nzeta = 0.4\ntension = 'cut'\ngrazing_deg = 3\n")
-    with_more = lambda more: MADE.replace('name = "poppy-seeds-close"', f'file = "own.toml"\n{more}')
-    for more, tension, grazing in (("", "cut", 3), ("tension = 'keep'", "keep", 3), ("grazing_deg = 1", "cut", 1)):
+    (tmp_path / "own.toml").write_text(
+        "[medium]\nzeta = 0.4\ntension = 'cut'\ngrazing_deg = 3\n"
+    )
+    with_more = lambda more: MADE.replace(
+        'name = "poppy-seeds-close"', f'file = "own.toml"\n{more}'
+    )
+    for more, tension, grazing in (
+        ("", "cut", 3),
+        ("tension = 'keep'", "keep", 3),
+        ("grazing_deg = 1", "cut", 1),
+    ):
         (tmp_path / "s.toml").write_text(with_more(more))
         wanted = StressMap(zeta=0.2, tension=tension, grazing=math.radians(grazing))
         assert scenes.load(tmp_path / "s.toml").medium == wanted
     (tmp_path / "own.toml").write_text("file = 'own.toml'\n")
-    with pytest.raises(Refusal, match="names another file, own.toml: copy the coefficients"):
+    with pytest.raises(
+        Refusal, match="names another file, own.toml: copy the coefficients"
+    ):
         scenes.load(tmp_path / "s.toml")
     (tmp_path / "own.toml").write_text("zetta = 1\n")
-    with pytest.raises(Refusal, match=r"s.toml: \[medium\]: own.toml: key: 'zetta' is unknown: did you mean 'zeta'"):
+    with pytest.raises(
+        Refusal,
+        match=r"s.toml: \[medium\]: own.toml: key: 'zetta' is unknown: did you mean 'zeta'",
+    ):
         scenes.load(tmp_path / "s.toml")
     (tmp_path / "own.toml").write_text("[medium\n")
     with pytest.raises(Refusal, match="it is not TOML"):
@@ -120,10 +161,14 @@ def test_a_medium_from_plate_drags(geomech, tmp_path):
             a_x, a_z = StressMap(zeta=0.3)(math.radians(beta), math.radians(gamma))
             rows.append(f"{gamma},{beta},{a_z},{a_x}  # one plate")
     (tmp_path / "plates.csv").write_text("\n".join(rows))
-    found = json.loads(geomech("stress", "plates.csv", "--beta", 30, "--gamma", -45, "--json")[1])
+    found = json.loads(
+        geomech("stress", "plates.csv", "--beta", 30, "--gamma", -45, "--json")[1]
+    )
     wanted = StressMap(zeta=0.3)(math.radians(30), math.radians(-45))
     assert tuple(found.values()) == pytest.approx(tuple(map(float, wanted)), abs=1e-9)
-    (tmp_path / "scene.toml").write_text(MADE.replace('name = "poppy-seeds-close"', 'file = "plates.csv"'))
+    (tmp_path / "scene.toml").write_text(
+        MADE.replace('name = "poppy-seeds-close"', 'file = "plates.csv"')
+    )
     scene = scenes.load(tmp_path / "scene.toml")
     assert isinstance(scene.medium, PlateDrags) and scene.medium.zeta == 0.5
     assert [p.name for p in scenes.inputs(scene)] == ["scene.toml", "plates.csv"]
@@ -133,16 +178,22 @@ def test_a_medium_from_plate_drags(geomech, tmp_path):
 def test_a_medium_that_drives_a_motion_on_is_told(geomech, tmp_path):
     lost = "A00 = 0.2\nA10 = 0.2\nB11 = 0.2\nB01 = -0.4\nBm11 = 0.05\nC11 = -0.1\nC01 = 0.2\nCm11 = 0\nD10 = 0.1\n"
     (tmp_path / "lost.toml").write_text(lost)
-    code, out, err = geomech("stress", "lost.toml", "--beta", 0, "--gamma", 90, "--json")
+    code, out, err = geomech(
+        "stress", "lost.toml", "--beta", 0, "--gamma", 90, "--json"
+    )
     assert code == 0 and "alpha_x" in json.loads(out)
-    assert err.startswith("note: lost.toml drives motion on over") and err.count("\n") == 1
+    assert (
+        err.startswith("note: lost.toml drives motion on over") and err.count("\n") == 1
+    )
 
 
 @pytest.mark.parametrize("name", FLAT)
 def test_intrude_gives_what_the_python_door_gives(name, geomech, tmp_path):
     scene = scenes.load(name)
     assert isinstance(scene, IntruderScene)
-    plot = ("--plot", "out.png") if name in ("c-leg", "half-cylinder") else ()  # one that turns, one that does not
+    plot = (
+        ("--plot", "out.png") if name in ("c-leg", "half-cylinder") else ()
+    )  # one that turns, one that does not
     code, out, err = geomech("intrude", name, "--json", "-o", "out.csv", *plot)
     assert (code, err) == (0, "")
     found = json.loads(out)
@@ -155,7 +206,9 @@ def test_intrude_gives_what_the_python_door_gives(name, geomech, tmp_path):
     assert list(found) == ["t", *place, "force_x", "force_z", "moment"]
     _, pose, twist = scene.motion.trajectory(scene.outline)
     wanted = loads(scene.medium, scene.outline, pose, twist)
-    np.testing.assert_allclose(np.stack([found["force_x"], found["force_z"]], -1), wanted.force, rtol=1e-14)
+    np.testing.assert_allclose(
+        np.stack([found["force_x"], found["force_z"]], -1), wanted.force, rtol=1e-14
+    )
     np.testing.assert_array_equal(found["moment"], wanted.moment)
     with open(tmp_path / "out.csv", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -167,19 +220,27 @@ def test_intrude_gives_what_the_python_door_gives(name, geomech, tmp_path):
         return
     code, out, err = geomech("intrude", name)
     assert (code, err) == (0, "") and "work     -" in out and "power at most" in out
-    assert f"error    force {error['force']:.1g} N, moment {error['moment']:.1g} N m at most, from up to 2" in out
+    assert (
+        f"error    force {error['force']:.1g} N, moment {error['moment']:.1g} N m at most, from up to 2"
+        in out
+    )
     assert name in geomech("scenes")[1]
     assert geomech("scenes", "--show", name)[1] == scene.text
 
 
 @pytest.mark.parametrize(
-    ("tension", "elements"), [("keep", 50), ("keep", 200), ("cut", 50), ("cut", 100), ("cut", 400)]
+    ("tension", "elements"),
+    [("keep", 50), ("keep", 200), ("cut", 50), ("cut", 100), ("cut", 400)],
 )
-@pytest.mark.parametrize("name", ["c-leg", "reversed-c-leg", "half-cylinder", "round-rod"])
+@pytest.mark.parametrize(
+    "name", ["c-leg", "reversed-c-leg", "half-cylinder", "round-rod"]
+)
 def test_the_error_of_the_elements_is_told(name, tension, elements):
     """From twice as many: of a reversed c-leg with tension cut of first order, else of second."""
     scene = scenes.load(name)
-    scene = scene.changed(medium=dataclasses.replace(scene.medium, tension=tension), elements=elements)
+    scene = scene.changed(
+        medium=dataclasses.replace(scene.medium, tension=tension), elements=elements
+    )
     found, exact = scene.run(), scene.run(3200)
     told = estimate(scene, found)
     force = np.linalg.norm(found.force - exact.force, axis=1).max()
@@ -188,8 +249,12 @@ def test_the_error_of_the_elements_is_told(name, tension, elements):
         <= told.force
         <= (4.0 if tension == "keep" else 15.0) * force + 1e-12
     )
-    assert (0.6 if tension == "keep" else 0.3) * np.abs(found.moment - exact.moment).max() <= told.moment
-    assert told.count == scene.actual_count((2 if tension == "keep" else 3) * scene.count)
+    assert (0.6 if tension == "keep" else 0.3) * np.abs(
+        found.moment - exact.moment
+    ).max() <= told.moment
+    assert told.count == scene.actual_count(
+        (2 if tension == "keep" else 3) * scene.count
+    )
     if (name, tension, elements) == ("reversed-c-leg", "cut", 100):
         assert 0.01 < force / np.linalg.norm(exact.force, axis=1).max() < 0.03
 
@@ -198,19 +263,28 @@ def test_the_error_is_not_known_where_a_body_has_no_more_elements(geomech, tmp_p
     (tmp_path / "s.toml").write_text(MADE.replace("elements = 40", "elements = 2499"))
     told = json.loads(geomech("intrude", "s.toml", "--json")[1])["estimate"]
     assert told == {"force": None, "moment": None, "from_elements": 2500}
-    assert "error    not known: finer elements are more than it takes" in geomech("intrude", "s.toml")[1]
+    assert (
+        "error    not known: finer elements are more than it takes"
+        in geomech("intrude", "s.toml")[1]
+    )
 
 
 def test_constants_of_the_intruder_scenes():
     legs = [scenes.load(name) for name in ("c-leg", "reversed-c-leg", "flat-leg")]
-    assert [getattr(leg.intruder, "relative_curvature", 0.0) for leg in legs] == [1.0, -1.0, 0.0]
+    assert [getattr(leg.intruder, "relative_curvature", 0.0) for leg in legs] == [
+        1.0,
+        -1.0,
+        0.0,
+    ]
     for leg in legs:
         assert leg.intruder.radius == 0.038  # caption of Fig. 8
         assert leg.motion.rate == pytest.approx(2 * math.pi, rel=1e-12)
         assert leg.medium == VERTICAL["poppy-seeds-loose"].stress
     for name in ("half-cylinder", "round-rod", "square-rod"):
         rod = scenes.load(name)
-        assert rod.medium == VERTICAL["glass-3mm"].stress and rod.motion.direction == 0.0
+        assert (
+            rod.medium == VERTICAL["glass-3mm"].stress and rod.motion.direction == 0.0
+        )
     assert scenes.load("half-cylinder").intruder.flat == "down"
 
 
@@ -226,14 +300,20 @@ def test_legs_differ_in_peak_and_in_phase():
     for name, (peak, angle, moment) in PEAKS.items():
         found = scenes.load(name).run()
         assert found.force[:, 1].max() == pytest.approx(peak, rel=1e-4)
-        assert np.degrees(found.pose[found.force[:, 1].argmax(), 2]) == pytest.approx(angle, abs=0.01)
+        assert np.degrees(found.pose[found.force[:, 1].argmax(), 2]) == pytest.approx(
+            angle, abs=0.01
+        )
         assert found.moment.min() == pytest.approx(moment, rel=1e-4)
         assert found.power.max() == 0.0
 
 
 def test_rods_deep_down_have_the_lift_of_one_depth(tmp_path):
     """As the radius is small against the depth; DESIGN section 9."""
-    for name, kept, cut in (("round-rod", 0.81, 0.68), ("half-cylinder", 0.54, 0.04), ("square-rod", 0.1, 0.1)):
+    for name, kept, cut in (
+        ("round-rod", 0.81, 0.68),
+        ("half-cylinder", 0.54, 0.04),
+        ("square-rod", 0.1, 0.1),
+    ):
         for tension, wanted in (("keep", kept), ("cut", cut)):
             text = (
                 scenes.load(name)
@@ -241,9 +321,13 @@ def test_rods_deep_down_have_the_lift_of_one_depth(tmp_path):
                 .replace("0.0127", "0.001")
                 .replace("0.0254", "0.002")
             )
-            text = text.replace('name = "glass-3mm"', f'name = "glass-3mm"\ntension = "{tension}"')
+            text = text.replace(
+                'name = "glass-3mm"', f'name = "glass-3mm"\ntension = "{tension}"'
+            )
             found = scenes.parse(text).run(400)
-            assert (-found.force[:, 1] / found.force[:, 0]).mean() == pytest.approx(wanted, abs=0.005)
+            assert (-found.force[:, 1] / found.force[:, 0]).mean() == pytest.approx(
+                wanted, abs=0.005
+            )
 
 
 def test_a_mirrored_scene_from_files(tmp_path):
@@ -253,9 +337,14 @@ def test_a_mirrored_scene_from_files(tmp_path):
     body = np.array([(0, 0), (0.02, -0.01), (0.05, 0.01), (0.02, 0.03)])
     runs = []
     for side in (1, -1):
-        rows = "\n".join(",".join(map(repr, row)) for row in np.stack([t, side * x, z, side * angle], -1).tolist())
+        rows = "\n".join(
+            ",".join(map(repr, row))
+            for row in np.stack([t, side * x, z, side * angle], -1).tolist()
+        )
         (tmp_path / "path.csv").write_text("t,x,z,angle\n" + rows)
-        rows = "\n".join(",".join(map(repr, row)) for row in (body * [side, 1]).tolist())
+        rows = "\n".join(
+            ",".join(map(repr, row)) for row in (body * [side, 1]).tolist()
+        )
         (tmp_path / "body.csv").write_text("x,z\n" + rows)
         (tmp_path / "s.toml").write_text(
             '[medium]\nzeta = 0.3\n[intruder]\nkind = "spline"\nfile = "body.csv"\nwidth = 0.02\n'
@@ -274,8 +363,15 @@ def test_what_is_written_reads_the_same():
         scene = scenes.load(name)
         assert scenes.toml(scene) == scene.text
         again = scenes.parse(scenes.toml(dataclasses.replace(scene, elements=77)))
-        assert (again.medium, again.intruder, again.motion, again.elements) == (*_parts(scene), 77)
-    motions = Drag(0.02, attitude=0.1), Penetrate(0.03, 1.1), Rotate(0.02, -3.0, 1.0, -2.0, 0.3, 55)
+        assert (again.medium, again.intruder, again.motion, again.elements) == (
+            *_parts(scene),
+            77,
+        )
+    motions = (
+        Drag(0.02, attitude=0.1),
+        Penetrate(0.03, 1.1),
+        Rotate(0.02, -3.0, 1.0, -2.0, 0.3, 55),
+    )
     stress = StressMap(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.1, 0.02, "cut")
     for k, shape in enumerate(OUTLINES.values()):
         scene = IntruderScene(stress, shape, motions[k % 3], elements=31)
@@ -289,15 +385,43 @@ def _parts(scene):
 
 
 REFUSED = [
-    ("[intruder]", "[motion.x]", "the table [intruder] is missing: add it, see 'geomech scenes --show c-leg'"),
+    (
+        "[intruder]",
+        "[motion.x]",
+        "the table [intruder] is missing: add it, see 'geomech scenes --show c-leg'",
+    ),
     ("[medium]", "[media]", "table: 'media' is unknown: did you mean 'medium'"),
-    ('name = "poppy-seeds-close"', 'name = "poppy"', "[medium] name: 'poppy' is unknown"),
-    ('name = "poppy-seeds-close"', 'name = "glass-0.3mm-loose"', "[medium] name: 'glass-0.3mm-loose' is unknown"),
-    ('name = "poppy-seeds-close"', "A00 = 0.1", "has no A10, B01, B11, Bm11, C01, C11, Cm11, D10: keep one of"),
-    ('name = "poppy-seeds-close"', 'name = "generic"\nA00 = 0.1', "keep one of 'name', 'file' and the nine"),
-    ("zeta = 0.5", "zeta = -0.5", "[medium] zeta must be a number from 0 to 1e+06, got -0.5"),
+    (
+        'name = "poppy-seeds-close"',
+        'name = "poppy"',
+        "[medium] name: 'poppy' is unknown",
+    ),
+    (
+        'name = "poppy-seeds-close"',
+        'name = "glass-0.3mm-loose"',
+        "[medium] name: 'glass-0.3mm-loose' is unknown",
+    ),
+    (
+        'name = "poppy-seeds-close"',
+        "A00 = 0.1",
+        "has no A10, B01, B11, Bm11, C01, C11, Cm11, D10: keep one of",
+    ),
+    (
+        'name = "poppy-seeds-close"',
+        'name = "generic"\nA00 = 0.1',
+        "keep one of 'name', 'file' and the nine",
+    ),
+    (
+        "zeta = 0.5",
+        "zeta = -0.5",
+        "[medium] zeta must be a number from 0 to 1e+06, got -0.5",
+    ),
     ("zeta = 0.5", 'zeta = "a"', "[medium] Expected `float`, got `str`"),
-    ("zeta = 0.5", "zetta = 0.5", "[medium] key: 'zetta' is unknown: did you mean 'zeta'"),
+    (
+        "zeta = 0.5",
+        "zetta = 0.5",
+        "[medium] key: 'zetta' is unknown: did you mean 'zeta'",
+    ),
     ("zeta = 0.5", 'tension = "pull"', "tension must be 'keep' or 'cut', got 'pull'"),
     ("zeta = 0.5", 'file = "no.csv"', "keep one of 'name', 'file'"),
     (
@@ -305,18 +429,42 @@ REFUSED = [
         'file = "no.csv"',
         "No such file or directory; give a CSV file with the header beta,gamma",
     ),
-    ('kind = "polygon"', 'kind = "poligon"', "[intruder] kind: 'poligon' is unknown: did you mean 'polygon'"),
-    ('kind = "polygon"', 'kind = "cyllinder"', "[intruder] kind: 'cyllinder' is unknown: did you mean 'cylinder'"),
-    ('kind = "polygon"', "", "[intruder] has no 'kind': add kind = one of plate, round-rod"),
+    (
+        'kind = "polygon"',
+        'kind = "poligon"',
+        "[intruder] kind: 'poligon' is unknown: did you mean 'polygon'",
+    ),
+    (
+        'kind = "polygon"',
+        'kind = "cyllinder"',
+        "[intruder] kind: 'cyllinder' is unknown: did you mean 'cylinder'",
+    ),
+    (
+        'kind = "polygon"',
+        "",
+        "[intruder] has no 'kind': add kind = one of plate, round-rod",
+    ),
     ("[0.03, 0.02]", "[0.03, 0.02], [0.01, -0.02]", "of the outline cross or touch"),
     ("[0.03, 0.02]", "[0.03]", "[intruder]"),
-    ("points = [[0, 0], [0.04, 0.0], [0.03, 0.02]]", 'file = "no.csv"', "[intruder] cannot read"),
+    (
+        "points = [[0, 0], [0.04, 0.0], [0.03, 0.02]]",
+        'file = "no.csv"',
+        "[intruder] cannot read",
+    ),
     ("width = 0.03", "width = 0.03\nfile = 'b.csv'", "give either 'file' or 'points'"),
     ("width = 0.03", "width = 30", "width must be a number from 1e-06 to 10 m, got 30"),
     ("width = 0.03", "", "[intruder] has no `width`: add"),
-    ('kind = "drag"', 'kind = "dragg"', "[motion] kind: 'dragg' is unknown: did you mean 'drag'"),
+    (
+        'kind = "drag"',
+        'kind = "dragg"',
+        "[motion] kind: 'dragg' is unknown: did you mean 'drag'",
+    ),
     ("depth = 0.01", "depth = nan", "depth must be a number"),
-    ("direction_deg = 30", "direction_deg = 30\ndirection = 1", "direction is given twice"),
+    (
+        "direction_deg = 30",
+        "direction_deg = 30\ndirection = 1",
+        "direction is given twice",
+    ),
     ("samples = 7", "samples = 1", "samples must be a whole number from 2"),
     ("samples = 7", "samples = 7\nrate = 3", "[motion] key: 'rate' is unknown"),
     ("elements = 40", "elements = 0", "elements must be a whole number from 1 to 5000"),
@@ -326,7 +474,9 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("old", "new", "said"), REFUSED, ids=[said for *_, said in REFUSED])
+@pytest.mark.parametrize(
+    ("old", "new", "said"), REFUSED, ids=[said for *_, said in REFUSED]
+)
 def test_what_makes_no_sense_is_refused(old, new, said):
     assert old in MADE
     with pytest.raises(Refusal) as caught:
@@ -339,7 +489,10 @@ TABLES = [
     ("", "header must be t,x,z, and angle if wanted"),
     ("t,x,y\n0,0,0\n", "path.csv, line 1: the header must be t,x,z"),
     ("t,x,z,z\n0,0,0,0\n", "line 1: the header must be t,x,z"),
-    ("t,x,z\n0,0,0\n1,1\n", "line 3: a row must be 3 finite numbers (t,x,z), at most 1e+12, got '1,1'"),
+    (
+        "t,x,z\n0,0,0\n1,1\n",
+        "line 3: a row must be 3 finite numbers (t,x,z), at most 1e+12, got '1,1'",
+    ),
     ("t,x,z\n0,0,0\n1,1,cm\n", "line 3: a row must be 3 finite numbers"),
     ("t,x,z\n0,0,0\n1,nan,0\n", "line 3: a row must be 3 finite numbers"),
     ("t,x,z\n0,0,0\n1,1,0\n", "a path takes 3 to 100000 poses, got 2"),
@@ -351,48 +504,80 @@ TABLES = [
 
 @pytest.mark.parametrize(("text", "said"), TABLES, ids=[said for _, said in TABLES])
 def test_bad_tables_are_refused_with_their_line(text, said, geomech, tmp_path):
-    (tmp_path / "path.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
-    (tmp_path / "s.toml").write_text(MADE[: MADE.index("[motion]")] + '[motion]\nkind = "csv"\nfile = "path.csv"\n')
+    (tmp_path / "path.csv").write_bytes(
+        text if isinstance(text, bytes) else text.encode()
+    )
+    (tmp_path / "s.toml").write_text(
+        MADE[: MADE.index("[motion]")] + '[motion]\nkind = "csv"\nfile = "path.csv"\n'
+    )
     code, out, err = geomech("intrude", "s.toml")
     assert (code, out) == (2, "") and said.replace("it is not text", "text") in err
     assert err.count("\n") == 1
 
 
 def test_scenes_of_the_other_kind_are_refused_with_the_command_for_them(geomech):
-    refused(geomech("intrude", "three-link-glass"), "three-link-glass: a scene with a gait has no [intruder]")
+    refused(
+        geomech("intrude", "three-link-glass"),
+        "three-link-glass: a scene with a gait has no [intruder]",
+    )
     for command in (
         ["run", "c-leg", "-o", "out"], ["velocity", "c-leg", "--alpha", "0", "--alphadot", "1"],
         ["connection", "c-leg", "-o", "a.nc"], ["ccf", "c-leg", "--plot", "a.png"],
         ["displacement", "c-leg", "--amplitudes", "1"],
         ["sweep", "c-leg", "--over", "gait.amplitude=1,2", "-o", "a.nc"],
     ):  # fmt: skip
-        refused(geomech(*command), "c-leg: an intruder scene has no gait: give it to 'geomech intrude'")
-    with pytest.raises(ValueError, match="a study is that of a Scene, got IntruderScene"):
+        refused(
+            geomech(*command),
+            "c-leg: an intruder scene has no gait: give it to 'geomech intrude'",
+        )
+    with pytest.raises(
+        ValueError, match="a study is that of a Scene, got IntruderScene"
+    ):
         Study(scenes.load("c-leg"))
 
 
-def test_options_of_stress_and_intrude_are_refused_before_anything_is_written(geomech, tmp_path):
-    refused(geomech("stress", "generic", "--beta", "10"), "give both --beta and --gamma")
+def test_options_of_stress_and_intrude_are_refused_before_anything_is_written(
+    geomech, tmp_path
+):
+    refused(
+        geomech("stress", "generic", "--beta", "10"), "give both --beta and --gamma"
+    )
     refused(geomech("stress", "generic"), "give both --beta and --gamma")
-    refused(geomech("stress", "generic", "--beta", "nan", "--gamma", "0"), "must be finite")
+    refused(
+        geomech("stress", "generic", "--beta", "nan", "--gamma", "0"), "must be finite"
+    )
     refused(
         geomech("stress", "generics", "--beta", "1", "--gamma", "0"),
         "medium: 'generics' is unknown: did you mean 'generic'",
     )
-    refused(geomech("stress", "no.csv", "--beta", "1", "--gamma", "0"), "No such file or directory")
+    refused(
+        geomech("stress", "no.csv", "--beta", "1", "--gamma", "0"),
+        "No such file or directory",
+    )
     refused(geomech("stress", "generic", "--plot", "a.gif"), "end the name in .png")
-    refused(geomech("intrude", "c-leg", "-o", "a.txt"), "end the name of a table in .csv")
+    refused(
+        geomech("intrude", "c-leg", "-o", "a.txt"), "end the name of a table in .csv"
+    )
     refused(geomech("intrude", "c-leg", "--plot", "a.gif"), "end the name in .png")
     refused(geomech("intrude", "c-leg", "-o", "no/a.csv"), "cannot write no/a.csv")
-    refused(geomech("intrude", "c-legs"), "scene: 'c-legs' is unknown: did you mean 'c-leg'")
+    refused(
+        geomech("intrude", "c-legs"), "scene: 'c-legs' is unknown: did you mean 'c-leg'"
+    )
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_tolerance_that_is_just_met_is_met():
     settings, seconds = Settings(scenes.load("c-leg")), [1.0, 2.0]
-    lines = [{"value": [8, 16], "error": error, "seconds": seconds} for error in ([5e-3, 2e-3], [1e-2, 1e-3])]
+    lines = [
+        {"value": [8, 16], "error": error, "seconds": seconds}
+        for error in ([5e-3, 2e-3], [1e-2, 1e-3])
+    ]
     found = [settings.cheapest(lines, tolerance) for tolerance in (1e-2, 9.9e-3, 1e-3)]
-    assert [(x["elements"], x.get("error")) for x in found] == [(8, 1e-2), (16, 2e-3), (None, None)]
+    assert [(x["elements"], x.get("error")) for x in found] == [
+        (8, 1e-2),
+        (16, 2e-3),
+        (None, None),
+    ]
 
 
 def test_accuracy_of_the_number_of_elements(geomech, tmp_path, monkeypatch):
@@ -408,7 +593,9 @@ def test_accuracy_of_the_number_of_elements(geomech, tmp_path, monkeypatch):
     error = scenes.load(tmp_path / "s.toml").run(12).moment - exact.moment
     wanted = np.sqrt(np.mean(error**2)) / np.abs(exact.moment).max()
     assert moment["error"][0] == pytest.approx(wanted, rel=1e-9)
-    assert {p.name for p in (tmp_path / "out").iterdir()} == {f"accuracy.{x}" for x in ("json", "txt", "png", "pdf")}
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {
+        f"accuracy.{x}" for x in ("json", "txt", "png", "pdf")
+    }
 
 
 def test_pictures_show_what_was_computed():
@@ -427,7 +614,12 @@ def test_pictures_show_what_was_computed():
 
 
 def test_a_scene_made_in_python_runs_and_says_what_is_wrong():
-    scene = IntruderScene(StressMap(zeta=0.3), CLeg(0.04, 0.02, 0.5), Drag(depth=0.02, distance=0.1), elements=30)
+    scene = IntruderScene(
+        StressMap(zeta=0.3),
+        CLeg(0.04, 0.02, 0.5),
+        Drag(depth=0.02, distance=0.1),
+        elements=30,
+    )
     assert scene.run().force.shape == (51, 2) and isinstance(scene.outline, Outline)
     for part, said in (
         ("medium", "a stress map such as"),
@@ -435,7 +627,14 @@ def test_a_scene_made_in_python_runs_and_says_what_is_wrong():
         ("motion", "a motion such as"),
     ):
         with pytest.raises(ValueError, match=said):
-            IntruderScene(**{"medium": scene.medium, "intruder": scene.intruder, "motion": scene.motion, part: 3})
+            IntruderScene(
+                **{
+                    "medium": scene.medium,
+                    "intruder": scene.intruder,
+                    "motion": scene.motion,
+                    part: 3,
+                }
+            )
 
 
 def outcome(text):
@@ -448,7 +647,11 @@ def outcome(text):
         assert "\n" not in message
         assert len(message) < 450
         return "refused"
-    assert np.isfinite(found.force).all() and np.isfinite(found.moment).all() and np.isfinite(found.power).all()
+    assert (
+        np.isfinite(found.force).all()
+        and np.isfinite(found.moment).all()
+        and np.isfinite(found.power).all()
+    )
     return "run"
 
 
@@ -456,18 +659,30 @@ def outcome(text):
 def test_mutated_intruder_scenes_are_run_or_refused(seed):
     rng = np.random.default_rng(seed)
     texts = [MADE, *(scenes.load(name).text for name in FLAT)]
-    values = [*VALUES, '"cut"', '"c-leg"', '"wheel"', '"penetrate"', '"up"', "360", "-0.04"]
-    keys = (
-        "kind zeta tension grazing_deg radius length width side flat lugs lug_height direction_deg rate start stop_deg"
-    )
+    values = [
+        *VALUES,
+        '"cut"',
+        '"c-leg"',
+        '"wheel"',
+        '"penetrate"',
+        '"up"',
+        "360",
+        "-0.04",
+    ]
+    keys = "kind zeta tension grazing_deg radius length width side flat lugs lug_height direction_deg rate start stop_deg"
     keys = f"{keys} samples elements closed points attitude A00 speed depth".split()
-    seen = [outcome(mutated(texts[rng.integers(len(texts))], rng, keys, values)) for _ in range(500)]
+    seen = [
+        outcome(mutated(texts[rng.integers(len(texts))], rng, keys, values))
+        for _ in range(500)
+    ]
     assert seen.count("run") > 50 and seen.count("refused") > 200
 
 
 def test_a_moment_of_roundoff_has_its_error_over_the_force_times_the_size():
     """And where there is no force, either, an error is a force."""
-    question = types.SimpleNamespace(measures=("force", "moment"), scene=types.SimpleNamespace(size=0.5))
+    question = types.SimpleNamespace(
+        measures=("force", "moment"), scene=types.SimpleNamespace(size=0.5)
+    )
     for force, over in ((4.0, 2.0), (0.0, 1.0)):
         truth = [np.array([[force, 0.0]]), np.array([1e-15 * force])]
         found = Settings.errors(question, [truth[0], truth[1] + 0.02], truth)

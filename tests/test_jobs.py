@@ -46,7 +46,9 @@ ASKED = Trajectory(VISCOUS)
 def own_cache(tmp_path_factory, monkeypatch):
     """In place of the user's cache folder, which has compiled code, too."""
     folder = tmp_path_factory.mktemp("cache")
-    monkeypatch.setattr(store, "in_cache", lambda question: folder / f"{question.hex()}.partial")
+    monkeypatch.setattr(
+        store, "in_cache", lambda question: folder / f"{question.hex()}.partial"
+    )
     return folder
 
 
@@ -87,7 +89,11 @@ def asked(path, ask, context=()):
 
 def stopped(path, after, ask, context=()):
     """What the stop says."""
-    with pytest.raises(terminal.Stopped) as ended, counted(after), jobs.storing(path, context):
+    with (
+        pytest.raises(terminal.Stopped) as ended,
+        counted(after),
+        jobs.storing(path, context),
+    ):
         ask()
     return "".join(getattr(ended.value, "__notes__", ""))
 
@@ -109,7 +115,11 @@ def within(by, x) -> float:
 
 def calls(task=doubled, of=(3, 2)):
     """Requests of some tasks each."""
-    return [x for k, n in enumerate(of) for x in runner().map(task, np.array([k + 1.0]), np.arange(n) / 7, n)]
+    return [
+        x
+        for k, n in enumerate(of)
+        for x in runner().map(task, np.array([k + 1.0]), np.arange(n) / 7, n)
+    ]
 
 
 @pytest.mark.parametrize("task", [doubled, hard, within])
@@ -118,7 +128,10 @@ def test_what_is_stopped_resumes_where_it_was(task, tmp_path):
     whole = ask()
     for stop in (1, 2, 3, 4):
         said = stopped(path, stop, ask)
-        assert said == f"{stop} results so far are kept in {path}: the same command goes on from there"
+        assert (
+            said
+            == f"{stop} results so far are kept in {path}: the same command goes on from there"
+        )
         again, computed = asked(path, ask)
         assert computed == 5 - stop and same(again, whole)
         assert not path.exists()
@@ -150,7 +163,13 @@ def test_results_are_found_by_what_they_follow_from_and_nothing_else(tmp_path):
         (lambda: calls(within, of=(2, 1)), (), 3),
         (lambda: list(runner().map(doubled, one, sevenths[[2, 0, 3, 1]], 4)), (), 1),
         (lambda: list(runner().map(doubled, one + 1e-15, sevenths[:2], 2)), (), 2),
-        (lambda: list(runner().map(doubled, one, [sevenths[0], sevenths[1] + 1e-15], 2)), (), 1),
+        (
+            lambda: list(
+                runner().map(doubled, one, [sevenths[0], sevenths[1] + 1e-15], 2)
+            ),
+            (),
+            1,
+        ),
     ):
         with counted() as done, jobs.storing(path, context, keep=True):
             ask()
@@ -216,19 +235,31 @@ def test_what_has_no_digest_is_computed_and_not_stored(tmp_path):
 def test_studies_resume_to_the_last_digit(tmp_path, monkeypatch):
     """Error studies, searches from several starts, fields with what moving costs; seconds are those of the first
     time."""
-    few = [dataclasses.replace(k, values=k.values[:2]) for k in tiered.SETTINGS if k.tier == "direct"]
+    few = [
+        dataclasses.replace(k, values=k.values[:2])
+        for k in tiered.SETTINGS
+        if k.tier == "direct"
+    ]
     monkeypatch.setattr(tiered, "SETTINGS", few)
     monkeypatch.setattr(tiered, "TRUTH_PHASES", 64)
     monkeypatch.setattr(connection, "SAMPLES_TOGETHER", 100)
     monkeypatch.setattr(type(scenes.load("c-leg")), "ladder", (4, 8, 16, 32))
     scene = GLASS.with_numerics(grid=5, phases=16, harmonics=3)
-    request = checked(VISCOUS.with_numerics(phases=32), "efficiency", harmonics=1, starts=2)
+    request = checked(
+        VISCOUS.with_numerics(phases=32), "efficiency", harmonics=1, starts=2
+    )
 
     def field():
         study = Study(scene)
-        return [study.compute_metric().coefficients, study.fitted.A, study.fitted.residual]
+        return [
+            study.compute_metric().coefficients,
+            study.fitted.A,
+            study.fitted.residual,
+        ]
 
-    numbers = lambda: [json.dumps({**text.numbers(result_of(search(request))), "seconds": 0.0})]
+    numbers = lambda: [
+        json.dumps({**text.numbers(result_of(search(request))), "seconds": 0.0})
+    ]
     errors = lambda *of: [np.array(x["error"]) for x in accuracy.study(*of)["lines"]]
     for ask, after in (
         (lambda: errors(scene, None, 1), 5),
@@ -241,7 +272,10 @@ def test_studies_resume_to_the_last_digit(tmp_path, monkeypatch):
             whole = ask()
         stopped(path, after, ask)
         again, computed = asked(path, ask)
-        assert all(map(np.array_equal, again, whole)) and computed == len(every) - after > 0
+        assert (
+            all(map(np.array_equal, again, whole))
+            and computed == len(every) - after > 0
+        )
 
 
 # One after the other.
@@ -249,7 +283,10 @@ def test_studies_resume_to_the_last_digit(tmp_path, monkeypatch):
 
 EFFECTS = {
     "transient": [Transient(travel=0.03)],
-    "heavy and disturbed": [Heavy(mass=0.4, frequency=0.7, length=0.3, drag=2.1), DisturbedGround(0.08, 0.6)],
+    "heavy and disturbed": [
+        Heavy(mass=0.4, frequency=0.7, length=0.3, drag=2.1),
+        DisturbedGround(0.08, 0.6),
+    ],
     "heavy": [Heavy(mass=0.4, frequency=0.7, length=0.3, drag=2.1)],
 }
 SOLVER = {"backend": "numpy", "pieces": 5}
@@ -259,10 +296,26 @@ T = 2 * np.pi * np.arange(8) / 8
 def march(effects, cycles=None):
     """All of a run of two gaits."""
     body = Backbone(elements=5, length=0.3)
-    system = dataclasses.replace(VISCOUS.system, medium=Granular(C=1.6, gamma0=0.3), body=body, effects=tuple(effects))
-    system, size = with_solver(system, {**SOLVER, "cycles": cycles}), np.array([0.5, -0.7])[:, None, None]
+    system = dataclasses.replace(
+        VISCOUS.system,
+        medium=Granular(C=1.6, gamma0=0.3),
+        body=body,
+        effects=tuple(effects),
+    )
+    system, size = (
+        with_solver(system, {**SOLVER, "cycles": cycles}),
+        np.array([0.5, -0.7])[:, None, None],
+    )
     turns = T[:, None] - 0.9 * np.arange(body.joints)
-    return tuple(system.time_steps(np.cos(turns) * size + 0.05, -np.sin(turns) * size, cycles, work=True, path=True))
+    return tuple(
+        system.time_steps(
+            np.cos(turns) * size + 0.05,
+            -np.sin(turns) * size,
+            cycles,
+            work=True,
+            path=True,
+        )
+    )
 
 
 @contextlib.contextmanager
@@ -289,13 +342,18 @@ def test_a_march_resumes_where_it_was(effects, tmp_path, monkeypatch):
     for after in (len(every) - 3,):
         said = stopped(tmp_path / str(after), after, ask)
         assert (
-            said == f"{after} results so far are kept in {tmp_path / str(after)}: the same command goes on from there"
+            said
+            == f"{after} results so far are kept in {tmp_path / str(after)}: the same command goes on from there"
         )
         with steps() as rest:
             found, _ = asked(tmp_path / str(after), ask)
         assert len(rest) == len(every) - after
         for a, b in zip(found, whole, strict=True):
-            assert np.array_equal(a, b) if not isinstance(a, tuple) else all(map(np.array_equal, a, b))
+            assert (
+                np.array_equal(a, b)
+                if not isinstance(a, tuple)
+                else all(map(np.array_equal, a, b))
+            )
 
 
 def test_a_march_loses_little(tmp_path, monkeypatch):
@@ -308,11 +366,22 @@ def test_a_march_loses_little(tmp_path, monkeypatch):
         return state + 1, np.array([state])
 
     with counted() as pieces, jobs.storing(tmp_path / "p", keep=True) as some:
-        assert some.iterate(step, 0, 10, ("test",), np.ndarray) == (10, [np.array([k]) for k in range(10)])
-        assert [len(rows) for _, rows in pieces] == [3, 3, 3, 1] and len(some.store.new) <= 1
+        assert some.iterate(step, 0, 10, ("test",), np.ndarray) == (
+            10,
+            [np.array([k]) for k in range(10)],
+        )
+        assert [len(rows) for _, rows in pieces] == [3, 3, 3, 1] and len(
+            some.store.new
+        ) <= 1
     with counted() as pieces, jobs.storing(tmp_path / "p"):
-        assert runner().iterate(step, 0, 10, ("test",), np.ndarray)[0] == 10 and pieces == []
-        assert runner().iterate(step, 0, 10, ("other",), np.ndarray)[0] == 10 and len(pieces) == 4
+        assert (
+            runner().iterate(step, 0, 10, ("test",), np.ndarray)[0] == 10
+            and pieces == []
+        )
+        assert (
+            runner().iterate(step, 0, 10, ("other",), np.ndarray)[0] == 10
+            and len(pieces) == 4
+        )
 
 
 class Named(NamedTuple):
@@ -337,7 +406,9 @@ class Own(Effect):
         return problem
 
     def after(self, problem, site, past, v):
-        return self.form(steps=(past["steps"] if isinstance(past, dict) else past.steps) + 1)
+        return self.form(
+            steps=(past["steps"] if isinstance(past, dict) else past.steps) + 1
+        )
 
 
 @pytest.mark.parametrize("form", [Named, dict])
@@ -354,15 +425,21 @@ def test_what_others_remember_is_kept(form, tmp_path, step_by_step):
 def test_a_walk_resumes_where_it_was(engine, tmp_path):
     """With its limit cycle and its errors, and in three dimensions with all that bodies do."""
     if engine == "mujoco":
-        pytest.importorskip("mujoco", reason="needs the extra: pip install 'geomech[mujoco]'")
+        pytest.importorskip(
+            "mujoco", reason="needs the extra: pip install 'geomech[mujoco]'"
+        )
     scene = scenes.load("xplorer")
     few = dataclasses.replace(scene.numerics, steps=8, elements=4, duration=0.3)
-    ask = lambda: walking.walked([dataclasses.replace(scene, numerics=few)], engine, settling=True)[0]
+    ask = lambda: walking.walked(
+        [dataclasses.replace(scene, numerics=few)], engine, settling=True
+    )[0]
     with counted() as every, jobs.storing(tmp_path / "p"):
         whole = ask()
     assert len(every) > 7  # of the walk and of those that tell its errors
     after = len(every) // 2
-    assert stopped(tmp_path / "p", after, ask).startswith(f"{after} results so far are kept")
+    assert stopped(tmp_path / "p", after, ask).startswith(
+        f"{after} results so far are kept"
+    )
     found, strides = asked(tmp_path / "p", ask)
     assert strides == len(every) - after and found[1:] == whole[1:]
     for a, b in zip(found.walk[:6], whole.walk[:6], strict=True):
@@ -392,7 +469,8 @@ HEAVY = "[[effects]]\nkind = 'body-inertia'\nmass = 0.1\nfrequency = 0.5\nlength
 FIELD = ["connection", "three-link-viscous", "--grid", "9", "-o"]
 SMALL = {
     "march.toml": f"{VISCOUS.text}[numerics]\nphases = 16\ncycles = 1\n{HEAVY}",
-    "walk.toml": scenes.load("xplorer").text + "\n[numerics]\nsteps = 8\nelements = 4\nduration = 1.0\n",
+    "walk.toml": scenes.load("xplorer").text
+    + "\n[numerics]\nsteps = 8\nelements = 4\nduration = 1.0\n",
     "rod.toml": scenes.load("c-leg").text,
     "s.toml": VISCOUS.text + "[numerics]\nphases = 64\ngrid = 9\n",
 }
@@ -445,8 +523,15 @@ def test_commands_resume(command, small, own_cache):
             code, out, err = geomech(*args, cwd=small)
         places = [*small.rglob("*.partial"), *own_cache.glob("*.partial")]
         assert (code, out, len(places)) == (143, "", 1), err
-        (name,) = {places[0].relative_to(small) if places[0].is_relative_to(small) else places[0]}
-        assert f" results so far are kept in {name}: the same command goes on from there: geomech {args[0]} " in err
+        (name,) = {
+            places[0].relative_to(small)
+            if places[0].is_relative_to(small)
+            else places[0]
+        }
+        assert (
+            f" results so far are kept in {name}: the same command goes on from there: geomech {args[0]} "
+            in err
+        )
         assert str(name) == f".{args[-1]}.partial" or "--json" in args
         counts.append(int(re.search(r"stopped by SIGTERM: (\d+) results", err)[1]))
     assert counts == [2, 3]
@@ -457,7 +542,11 @@ def test_a_command_that_resumes_leaves_its_results_and_nothing_else(small):
     with counted(30):
         assert geomech(*args, "t.csv", cwd=small)[0] == 143
     with steps() as taken:
-        assert geomech(*args, "t.csv", cwd=small)[0] == geomech(*args, "whole.csv", cwd=small)[0] == 0
+        assert (
+            geomech(*args, "t.csv", cwd=small)[0]
+            == geomech(*args, "whole.csv", cwd=small)[0]
+            == 0
+        )
     assert len(taken) % 32 == 2  # whole cycles twice, but for 30 steps
     assert (small / "t.csv").read_bytes() == (small / "whole.csv").read_bytes()
     assert {p.name for p in small.iterdir()} == {*SMALL, "t.csv", "whole.csv"}
@@ -468,23 +557,41 @@ def test_results_stay_until_they_are_saved(small, monkeypatch):
     args = ["displacement", "march.toml", "--amplitudes", "0.5", "--plot", "d.png"]
     monkeypatch.setattr(store, "CHECKPOINT", -1.0)
     with monkeypatch.context() as patch:
-        patch.setattr(plots, "save", lambda *some: (_ for _ in ()).throw(OSError(28, "No space left on device")))
+        patch.setattr(
+            plots,
+            "save",
+            lambda *some: (_ for _ in ()).throw(OSError(28, "No space left on device")),
+        )
         code, _, err = geomech(*args, cwd=small)
-    assert code == 2 and "left on device; " in err and " results so far are kept in .d.png.partial: " in err
+    assert (
+        code == 2
+        and "left on device; " in err
+        and " results so far are kept in .d.png.partial: " in err
+    )
     with steps() as taken:
         assert geomech(*args, cwd=small)[0] == 0
-    assert taken == [] and (small / "d.png").exists() and not (small / ".d.png.partial").exists()
+    assert (
+        taken == []
+        and (small / "d.png").exists()
+        and not (small / ".d.png.partial").exists()
+    )
 
 
-def test_what_is_printed_is_kept_in_the_cache_and_not_where_the_command_runs(small, own_cache):
+def test_what_is_printed_is_kept_in_the_cache_and_not_where_the_command_runs(
+    small, own_cache
+):
     args = ["displacement", "march.toml", "--amplitudes", "0.2", "--tiers", "direct"]
     with counted(20):
         assert geomech(*args, cwd=small)[0] == 143
     with counted(3):
-        assert geomech(*args, "--json", cwd=small)[0] == 143  # it is the same that is computed
+        assert (
+            geomech(*args, "--json", cwd=small)[0] == 143
+        )  # it is the same that is computed
     with counted(5):
         assert geomech(*args[:3], "0.3", *args[4:], cwd=small)[0] == 143
-    assert len(list(own_cache.iterdir())) == 2 and {p.name for p in small.iterdir()} == {*SMALL}
+    assert len(list(own_cache.iterdir())) == 2 and {
+        p.name for p in small.iterdir()
+    } == {*SMALL}
     assert geomech(*args, cwd=small)[0] == 0
     assert len(list(own_cache.iterdir())) == 1
 
@@ -494,7 +601,9 @@ def test_another_request_leaves_what_is_kept_of_the_first(tmp_path, fine):
     with counted(3):
         geomech(*FIELD, "f.nc", cwd=tmp_path)
     with counted(2):
-        code, _, err = geomech(*[x.replace("9", "8") for x in FIELD], "f.nc", cwd=tmp_path)
+        code, _, err = geomech(
+            *[x.replace("9", "8") for x in FIELD], "f.nc", cwd=tmp_path
+        )
     assert code == 143 and "5 results so far are kept in .f.nc.partial" in err
     with counted() as every:
         assert geomech(*FIELD, "whole.nc", cwd=tmp_path)[0] == 0
@@ -525,7 +634,9 @@ def test_edited_code_resumes_nothing(tmp_path, fine, monkeypatch):
     for name in ("_texts", "_files"):
         monkeypatch.setattr(kinds, name, {})
     monkeypatch.setattr(LAWS, "_parts", dict(LAWS))
-    text = VISCOUS.text.replace('law = "viscous"', 'law = "power-of-jobs"').replace("ratio = 2.0", "power = 1.0")
+    text = VISCOUS.text.replace('law = "viscous"', 'law = "power-of-jobs"').replace(
+        "ratio = 2.0", "power = 1.0"
+    )
     (tmp_path / "s.toml").write_text(text)
     args = ["connection", "s.toml", "--grid", "7", "-o", "f.nc", "--plugin", "power.py"]
     counts = []
@@ -546,11 +657,16 @@ def test_edited_code_resumes_nothing(tmp_path, fine, monkeypatch):
 def test_two_at_once_are_refused(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with storing(ASKED, Path("f.nc"), []):
-        for args in (FIELD, ["sweep", "three-link-viscous", "--over", "gait.amplitude=1", "-o"]):
+        for args in (
+            FIELD,
+            ["sweep", "three-link-viscous", "--over", "gait.amplitude=1", "-o"],
+        ):
             for name in ("f.nc", f"../{tmp_path.name}/f.nc"):
                 code, out, err = geomech(*args, name)
                 assert (code, out, err.count("\n")) == (2, "", 1)
-                assert err.startswith(f"error: another computation to {name} is under way: wait for it")
+                assert err.startswith(
+                    f"error: another computation to {name} is under way: wait for it"
+                )
         assert geomech(*FIELD, "g.nc")[::2] == (0, "")
     assert [p.name for p in tmp_path.iterdir()] == ["g.nc"]
 
@@ -587,4 +703,6 @@ def test_nothing_is_stored_over_an_input(tmp_path):
 
 
 def test_without_a_store_nothing_is_told_apart():
-    assert Runner().call(within, np.array([2.0]), 0.5) == 2.0 and Runner()._key(1) is None
+    assert (
+        Runner().call(within, np.array([2.0]), 0.5) == 2.0 and Runner()._key(1) is None
+    )

@@ -36,7 +36,9 @@ from rft.laws.base import TermLaw, is_rate_independent
 from rft.refusal import Refusal
 from rft.registry import REGISTRIES
 
-PAGE = (pathlib.Path(__file__).parents[1] / ".docs" / "how-it-works" / "extending.md").read_text()
+PAGE = (
+    pathlib.Path(__file__).parents[1] / ".docs" / "how-it-works" / "extending.md"
+).read_text()
 SMALL = Numerics(grid=7, phases=32)
 pytestmark = pytest.mark.usefixtures("own_parts", "fastest")
 
@@ -79,30 +81,67 @@ def test_the_law_of_the_page_runs_as_it_stands_there(tmp_path, monkeypatch):
     code, out, err = geomech(*command.split(), "--json", "--tiers", "direct")
     assert code == 0
     assert err.count("\n") == 1
-    assert "power has no closed form" in err and "gauss:24" in err and "five times" in err
-    for amplitudes, wanted in (("0.5", 0), ("2.6", 2)):  # said once by a search that asks often, and beside an error
-        args = "displacement", "power.toml", "--plugin", "power.py", "--amplitudes", amplitudes
-        code, out, err = geomech(*args, "--tol", "1e-2") if wanted == 0 else geomech(*args, "--tiers", "path")
-        assert (code, err.count("\n"), err.count("no closed form")) == (wanted, 1, int(wanted == 0))
+    assert (
+        "power has no closed form" in err and "gauss:24" in err and "five times" in err
+    )
+    for amplitudes, wanted in (
+        ("0.5", 0),
+        ("2.6", 2),
+    ):  # said once by a search that asks often, and beside an error
+        args = (
+            "displacement",
+            "power.toml",
+            "--plugin",
+            "power.py",
+            "--amplitudes",
+            amplitudes,
+        )
+        code, out, err = (
+            geomech(*args, "--tol", "1e-2")
+            if wanted == 0
+            else geomech(*args, "--tiers", "path")
+        )
+        assert (code, err.count("\n"), err.count("no closed form")) == (
+            wanted,
+            1,
+            int(wanted == 0),
+        )
     code, out, err = geomech(*command.split(), "--json", "--tiers", "direct")
     module = {}
     exec(law, module)
     shear = Swimmer(module["Power"](0.4), Chain())
     net = json.loads(out)["direct"]
-    np.testing.assert_allclose(net, shear.run(*Circle().cycle(256, [0.5, 1.0])).net, atol=1e-9)
-    assert {p.name for p in tmp_path.iterdir()} == {"power.py", "power.toml"}  # no cache beside them
+    np.testing.assert_allclose(
+        net, shear.run(*Circle().cycle(256, [0.5, 1.0])).net, atol=1e-9
+    )
+    assert {p.name for p in tmp_path.iterdir()} == {
+        "power.py",
+        "power.toml",
+    }  # no cache beside them
     # With the power 1 it is a viscous law of the same ratio, whose integrals are exact.
     alike = Swimmer(module["Power"](1.0), Chain()).run(*Circle().cycle(32)).net
-    np.testing.assert_allclose(alike, Swimmer(Viscous(3.0), Chain()).run(*Circle().cycle(32)).net, atol=1e-9)
+    np.testing.assert_allclose(
+        alike, Swimmer(Viscous(3.0), Chain()).run(*Circle().cycle(32)).net, atol=1e-9
+    )
 
 
-@pytest.mark.parametrize("law", [Viscous(3.7), Granular(C=2.3, gamma0=0.4)], ids=["viscous", "granular"])
+@pytest.mark.parametrize(
+    "law", [Viscous(3.7), Granular(C=2.3, gamma0=0.4)], ids=["viscous", "granular"]
+)
 def test_a_law_of_traction_alone_gives_every_tier_within_its_error(law):
-    gait, body, amplitudes = Circle(amplitude=0.8, centre=(0.3, -0.2)), Chain((1, 1.4, 0.8)), np.array([0.5, 0.9])
-    exact, bare = (Study(Scene(Swimmer(x, body), gait, SMALL)) for x in (law, Bare(law)))
+    gait, body, amplitudes = (
+        Circle(amplitude=0.8, centre=(0.3, -0.2)),
+        Chain((1, 1.4, 0.8)),
+        np.array([0.5, 0.9]),
+    )
+    exact, bare = (
+        Study(Scene(Swimmer(x, body), gait, SMALL)) for x in (law, Bare(law))
+    )
     finer = bare.with_numerics(loads="gauss:96")  # leaves a quarter
     for tier in ("area", "direct"):
-        ours, theirs, better = (x.poses(tier, amplitudes=amplitudes) for x in (exact, bare, finer))
+        ours, theirs, better = (
+            x.poses(tier, amplitudes=amplitudes) for x in (exact, bare, finer)
+        )
         size, off = np.hypot(*ours[-1, :2]), estimate.distance(ours, theirs).max()
         assert off < 0.04 * size
         assert estimate.distance(ours, better).max() <= max(off / 2, 1e-9)
@@ -115,24 +154,38 @@ def test_a_law_of_traction_alone_gives_every_tier_within_its_error(law):
 def test_a_law_of_traction_alone_takes_backbones_and_says_its_rule():
     fine = Swimmer(Bare(Coulomb()), Backbone(8, length=0.4))
     exact = Swimmer(Coulomb(), Backbone(8, length=0.4))
-    alpha, alphadot = np.full((2, 7), 0.3) * [[1], [-2]], np.cos(np.arange(14.0)).reshape(2, 7)
-    np.testing.assert_allclose(fine.velocity(alpha, alphadot), exact.velocity(alpha, alphadot), atol=2e-3)
+    alpha, alphadot = (
+        np.full((2, 7), 0.3) * [[1], [-2]],
+        np.cos(np.arange(14.0)).reshape(2, 7),
+    )
+    np.testing.assert_allclose(
+        fine.velocity(alpha, alphadot), exact.velocity(alpha, alphadot), atol=2e-3
+    )
     assert fine.balance_size.evaluations == 24 * exact.balance_size.evaluations
     assert "gauss:24" in explain(Scene(fine, Sine(elements=8), SMALL))
     assert fine.refined().solver.loads == "gauss:48"
     assert fine.about()["loads"] == "gauss:24"
     told_otherwise = fine.with_solver(Solver(loads="midpoint:10"))
-    assert (notes(told_otherwise), told_otherwise.refined().solver.loads) == ((), "midpoint:20")
+    assert (notes(told_otherwise), told_otherwise.refined().solver.loads) == (
+        (),
+        "midpoint:20",
+    )
 
 
 @pytest.mark.parametrize("name", [name for name in EFFECTS if name != "end-caps"])
 def test_a_law_of_traction_alone_takes_every_effect_and_does_work(name):
     """On 16 phases of an uneven chain; end caps alone take the numbers of a granular law."""
-    law, body, cycle = Granular(C=1.8, gamma0=0.24), Chain((1, 1.4, 0.8)), Circle(amplitude=0.9).cycle(16, [0.9])
+    law, body, cycle = (
+        Granular(C=1.8, gamma0=0.24),
+        Chain((1, 1.4, 0.8)),
+        Circle(amplitude=0.9).cycle(16, [0.9]),
+    )
     effects, finer = (EFFECTS[name][0](0.3),), Solver(cycles=1, loads="gauss:96")
     both = (law, body, effects, Solver(cycles=1)), (Bare(law), body, effects, finer)
     exact, bare = (Swimmer(*parts).run(*cycle, work=True) for parts in both)
-    np.testing.assert_allclose(bare.net, exact.net, atol=0.02 * np.abs(exact.net[0, :2]).max())
+    np.testing.assert_allclose(
+        bare.net, exact.net, atol=0.02 * np.abs(exact.net[0, :2]).max()
+    )
     np.testing.assert_allclose(bare.work.power, exact.work.power, rtol=0.02)
     with pytest.raises(ValueError, match="end caps take a granular medium, got Bare"):
         Swimmer(Bare(law), body, (EndCaps(0.1),))
@@ -151,7 +204,13 @@ def test_the_speed_matters_under_a_law_of_no_one_power():
             match="no connection or CCF with the law .*no one power of the speed: use the direct tier, or take another law",
         ):
             Study(Scene(swimmer, Circle(), SMALL)).poses("path")
-    for law in (Viscous(), Coulomb(), Bare(Viscous()), Bare(Granular(1.8, 0.24)), Bare(Coulomb())):
+    for law in (
+        Viscous(),
+        Coulomb(),
+        Bare(Viscous()),
+        Bare(Granular(1.8, 0.24)),
+        Bare(Coulomb()),
+    ):
         assert is_rate_independent(law)
 
 
@@ -207,7 +266,9 @@ class Peanut(Gait):
 
     def unit_rate(self, t):
         t = np.asarray(t, float)
-        return np.stack([-np.sin(t), np.cos(t) * (1 - 3 * self.waist * np.sin(t) ** 2)], -1)
+        return np.stack(
+            [-np.sin(t), np.cos(t) * (1 - 3 * self.waist * np.sin(t) ** 2)], -1
+        )
 
 
 @dataclass(frozen=True)
@@ -235,7 +296,9 @@ class Car:
     def velocity(self, alpha, alphadot):
         alpha, alphadot = np.broadcast_arrays(alpha, alphadot)
         v = alphadot[..., 0]
-        return np.stack([v, 0 * v, v * np.tan(0.3 * np.tanh(alpha[..., 1])) / self.base], -1)
+        return np.stack(
+            [v, 0 * v, v * np.tan(0.3 * np.tanh(alpha[..., 1])) / self.base], -1
+        )
 
 
 OWN = {
@@ -263,14 +326,26 @@ def test_one_of_each_family_runs_everywhere_and_round_trips(name):
     table = study.study([0.4, 0.7])
     assert np.isfinite(table["direct"]).all()
     with pytest.raises(ValueError, match="car|hinge|peanut|slick"):
-        register(type("Other", (PARTS[name],), {"__module__": "elsewhere"}))  # two of one name
+        register(
+            type("Other", (PARTS[name],), {"__module__": "elsewhere"})
+        )  # two of one name
 
 
-def test_a_file_registers_what_is_in_it_and_a_scene_alone_does_not(tmp_path, monkeypatch):
+def test_a_file_registers_what_is_in_it_and_a_scene_alone_does_not(
+    tmp_path, monkeypatch
+):
     (tmp_path / "thick.py").write_text(LAW)
     (tmp_path / "thick.toml").write_text(SCENE)
     monkeypatch.chdir(tmp_path)
-    velocity = ["velocity", "thick.toml", "--alpha", "0.3,0.2", "--alphadot", "1,0", "--json"]
+    velocity = [
+        "velocity",
+        "thick.toml",
+        "--alpha",
+        "0.3,0.2",
+        "--alphadot",
+        "1,0",
+        "--json",
+    ]
     code, out, err = geomech(*velocity)
     assert (code, out) == (2, "")
     assert err.count("\n") == 1 and "'thick' is unknown" in err and "--plugin" in err
@@ -279,35 +354,64 @@ def test_a_file_registers_what_is_in_it_and_a_scene_alone_does_not(tmp_path, mon
     xi = body_velocity(Viscous(2.5), Chain((1, 1.4, 0.8)), [0.3, 0.2], [1, 0]).xi
     np.testing.assert_allclose(json.loads(out)["xi"], xi, atol=1e-9)
     assert geomech("--plugin", "thick.py", *velocity)[:2] == (0, out)
-    (tmp_path / "more.py").write_text(LAW.replace("thick", "thin").replace("Thick", "Thin"))
-    assert geomech(*velocity, "--plugin", "more.py", "--plugin", "thick.py")[:2] == (0, out)
-    (tmp_path / "thick.py").write_text(LAW.replace("2.5", "1.0"))  # mended: the new one counts
+    (tmp_path / "more.py").write_text(
+        LAW.replace("thick", "thin").replace("Thick", "Thin")
+    )
+    assert geomech(*velocity, "--plugin", "more.py", "--plugin", "thick.py")[:2] == (
+        0,
+        out,
+    )
+    (tmp_path / "thick.py").write_text(
+        LAW.replace("2.5", "1.0")
+    )  # mended: the new one counts
     assert geomech(*velocity, "--plugin", "thick.py")[1] != out
 
 
 def test_every_command_that_takes_a_scene_takes_plugins():
     for command in cli.app.registered_commands:
         takes = set(inspect.signature(command.callback).parameters)
-        assert ("plugin" in takes) == ("name" in takes or command.callback.__name__ == "reference"), command.callback
+        assert ("plugin" in takes) == (
+            "name" in takes or command.callback.__name__ == "reference"
+        ), command.callback
 
 
 @pytest.mark.parametrize(
     ("text", "said"),
     [
         ("law = ", "line 1: SyntaxError"),
-        ("import nothing_of_that_name", "line 1: ModuleNotFoundError: No module named 'nothing_of_that_name'"),
+        (
+            "import nothing_of_that_name",
+            "line 1: ModuleNotFoundError: No module named 'nothing_of_that_name'",
+        ),
         ("x = 1\nraise SystemExit(3)", "line 2: SystemExit: 3"),
         ("x = 1", 'no class in it has a law = "..."'),
-        (LAW.replace('"thick"', '"granular"'), "is named 'granular', as one that is built in: give it another name"),
-        (LAW.replace("(frozen=True)", ""), "must be a value: put @dataclass(frozen=True) above it"),
-        (LAW.replace("law =", "law: str ="), "has law as a parameter: write law = 'thick' without a type"),
+        (
+            LAW.replace('"thick"', '"granular"'),
+            "is named 'granular', as one that is built in: give it another name",
+        ),
+        (
+            LAW.replace("(frozen=True)", ""),
+            "must be a value: put @dataclass(frozen=True) above it",
+        ),
+        (
+            LAW.replace("law =", "law: str ="),
+            "has law as a parameter: write law = 'thick' without a type",
+        ),
         (LAW.replace('"thick"', "3"), 'has no name: give the class law = "..."'),
-        (LAW.replace("traction", "drag"), "is no part of a scene: a law is a class with `traction`"),
+        (
+            LAW.replace("traction", "drag"),
+            "is no part of a scene: a law is a class with `traction`",
+        ),
         (LAW + LAW.replace("Thick", "Other"), "is named 'thick', as the Thick of"),
-        (LAW + LAW.replace("Thick", "Other").replace('"thick"', '"viscous"'), "built in"),
+        (
+            LAW + LAW.replace("Thick", "Other").replace('"thick"', '"viscous"'),
+            "built in",
+        ),
     ],
 )
-def test_files_that_cannot_be_registered_get_one_line_and_leave_nothing(text, said, tmp_path):
+def test_files_that_cannot_be_registered_get_one_line_and_leave_nothing(
+    text, said, tmp_path
+):
     path = tmp_path / "own.py"
     path.write_text(text)
     with pytest.raises(Refusal, match=".") as caught:
@@ -319,30 +423,48 @@ def test_files_that_cannot_be_registered_get_one_line_and_leave_nothing(text, sa
     assert not [name for name in sys.modules if name.startswith("geomech_plugin_own")]
 
 
-def test_a_file_tells_its_own_parts_and_not_those_of_a_module_beside_it(tmp_path, monkeypatch):
+def test_a_file_tells_its_own_parts_and_not_those_of_a_module_beside_it(
+    tmp_path, monkeypatch
+):
     monkeypatch.syspath_prepend(str(tmp_path))
     beside = LAW.replace("Thick", "Thin").replace('"thick"', '"thin"')
-    (tmp_path / "thin_beside.py").write_text(f"from rft.laws.base import LAWS\n{beside}\nLAWS.register(Thin)")
+    (tmp_path / "thin_beside.py").write_text(
+        f"from rft.laws.base import LAWS\n{beside}\nLAWS.register(Thin)"
+    )
     (tmp_path / "own.py").write_text("import thin_beside" + LAW)
-    assert load_file(tmp_path / "own.py") == ["thick"] and "thin" in REGISTRIES["geomech.media"]
+    assert (
+        load_file(tmp_path / "own.py") == ["thick"]
+        and "thin" in REGISTRIES["geomech.media"]
+    )
 
 
 @pytest.mark.parametrize("future", [False, True])
 def test_a_file_is_run_as_python_would_with_types_as_it_writes_them(future, tmp_path):
     types = "{'thickness': 'float'}" if future else "{'thickness': float}"
     head = "from __future__ import annotations\n" * future
-    (tmp_path / "own.py").write_text(f"{head}{LAW}assert Thick.__annotations__ == {types}, Thick.__annotations__\n")
+    (tmp_path / "own.py").write_text(
+        f"{head}{LAW}assert Thick.__annotations__ == {types}, Thick.__annotations__\n"
+    )
     assert load_file(tmp_path / "own.py") == ["thick"]
     assert parse(SCENE).system.medium.thickness == 3.0
-    with pytest.raises(Refusal, match=r"\[medium\] Expected `float`, got `str` - at `.thickness`"):
+    with pytest.raises(
+        Refusal, match=r"\[medium\] Expected `float`, got `str` - at `.thickness`"
+    ):
         parse(SCENE.replace("3.0", '"3"'))
 
 
 def test_names_of_no_python_file_are_refused(tmp_path):
-    for name, said in (("own.toml", "ends in .py"), ("missing.py", "No such file"), ("", "ends in .py")):
+    for name, said in (
+        ("own.toml", "ends in .py"),
+        ("missing.py", "No such file"),
+        ("", "ends in .py"),
+    ):
         with pytest.raises(Refusal, match=said):
             load_file(tmp_path / name if name else "")
-    for raw, said in ((b"\xff\xfe\x00", "it is not text"), (b"#" * 1_000_001, "it is larger than 1 MB")):
+    for raw, said in (
+        (b"\xff\xfe\x00", "it is not text"),
+        (b"#" * 1_000_001, "it is larger than 1 MB"),
+    ):
         (tmp_path / "own.py").write_bytes(raw)
         with pytest.raises(Refusal, match=f"plugin .*: {said}"):
             load_file(tmp_path / "own.py")
@@ -365,15 +487,21 @@ def test_digests_of_own_code_cover_its_sources(name, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(tmp_path))
     (tmp_path / "thick_package").mkdir()
     (tmp_path / "thick_package" / "__init__.py").write_text("")
-    (tmp_path / "thick_package" / "inner.py").write_text("def never():\n    from .. import none\nfrom . import leaf")
-    (tmp_path / "thick_package" / "leaf.py").write_text("from thick_factor import FACTOR")
+    (tmp_path / "thick_package" / "inner.py").write_text(
+        "def never():\n    from .. import none\nfrom . import leaf"
+    )
+    (tmp_path / "thick_package" / "leaf.py").write_text(
+        "from thick_factor import FACTOR"
+    )
     (tmp_path / "thick_many.py").write_text(
         "import functools, thick_factor\nMANY = [functools.partial(thick_factor.times)]"
     )
     found = []
     for law, factor in ((LAW, 1), (LAW.replace("2.5", "2.6"), 1), (LAW, 2), (LAW, 1)):
         (tmp_path / "thick.py").write_text(
-            f"{law}{IMPORTS[name]}\n" if "def" in IMPORTS[name] else f"{IMPORTS[name]}\n{law}"
+            f"{law}{IMPORTS[name]}\n"
+            if "def" in IMPORTS[name]
+            else f"{IMPORTS[name]}\n{law}"
         )
         (tmp_path / "thick_factor.py").write_text(
             f"import rft.laws\nFACTOR = {factor}\ndef times(x):\n    return FACTOR * x\n"
@@ -384,8 +512,16 @@ def test_digests_of_own_code_cover_its_sources(name, tmp_path, monkeypatch):
         importlib.invalidate_caches()
         load_file(tmp_path / "thick.py")
         found.append(kinds.code())
-    assert all("thick_factor" in one for one in found) and len({len(one) for one in found}) == 1
-    assert not [module for one in found for module in one if module.partition(".")[0] in ("rft", "geomech", "numpy")]
+    assert (
+        all("thick_factor" in one for one in found)
+        and len({len(one) for one in found}) == 1
+    )
+    assert not [
+        module
+        for one in found
+        for module in one
+        if module.partition(".")[0] in ("rft", "geomech", "numpy")
+    ]
     assert found[0] == found[3] and len({tuple(one.items()) for one in found}) == 3
 
 
@@ -423,13 +559,20 @@ def test_an_edited_script_resumes_nothing(tmp_path):
     def run(text, *arguments):
         (tmp_path / "script.py").write_text(text)
         return subprocess.run(
-            [sys.executable, "-B", "script.py", *arguments], cwd=tmp_path, capture_output=True, text=True, check=False
+            [sys.executable, "-B", "script.py", *arguments],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=False,
         )
 
     assert (
-        run(SCRIPT, "stop").stderr.endswith("the same command goes on from there\n") and (tmp_path / ".kept").exists()
+        run(SCRIPT, "stop").stderr.endswith("the same command goes on from there\n")
+        and (tmp_path / ".kept").exists()
     )
-    small, large = map(float, run(SCRIPT.replace("1.0 * np", "2.0 * np")).stdout.split())
+    small, large = map(
+        float, run(SCRIPT.replace("1.0 * np", "2.0 * np")).stdout.split()
+    )
     assert (small, large) == pytest.approx((2 * np.pi * 0.5**2, 2 * np.pi))
 
 
@@ -437,13 +580,19 @@ def test_an_edited_script_resumes_nothing(tmp_path):
 def package(tmp_path, monkeypatch):
     """Makes an installed package of this code that offers ``name`` in a group."""
 
-    def install(code, name="thick", group="geomech.media", dist="sands", value="{}:Thick"):
+    def install(
+        code, name="thick", group="geomech.media", dist="sands", value="{}:Thick"
+    ):
         module = f"{dist}_laws"
         (tmp_path / f"{module}.py").write_text(code)
         info = tmp_path / f"{dist}-1.2.dist-info"
         info.mkdir()
-        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {dist}\nVersion: 1.2\n")
-        (info / "entry_points.txt").write_text(f"[{group}]\n{name} = {value.format(module)}\n")
+        (info / "METADATA").write_text(
+            f"Metadata-Version: 2.1\nName: {dist}\nVersion: 1.2\n"
+        )
+        (info / "entry_points.txt").write_text(
+            f"[{group}]\n{name} = {value.format(module)}\n"
+        )
         monkeypatch.syspath_prepend(str(tmp_path))
         importlib.invalidate_caches()
         monkeypatch.delitem(sys.modules, module, raising=False)
@@ -464,8 +613,19 @@ def test_a_package_offers_a_law_that_is_loaded_when_asked_for(package):
 
 
 def test_entry_points_of_all_families_are_read(package):
-    for name, group in (("hinge", "bodies"), ("peanut", "gaits"), ("slick", "effects"), ("car", "systems")):
-        package("from test_kinds import *", name, f"geomech.{group}", group, f"{{}}:{PARTS[name].__name__}")
+    for name, group in (
+        ("hinge", "bodies"),
+        ("peanut", "gaits"),
+        ("slick", "effects"),
+        ("car", "systems"),
+    ):
+        package(
+            "from test_kinds import *",
+            name,
+            f"geomech.{group}",
+            group,
+            f"{{}}:{PARTS[name].__name__}",
+        )
         assert parse(OWN[name])
         assert type(parse(OWN[name])) is Scene
 
@@ -473,12 +633,28 @@ def test_entry_points_of_all_families_are_read(package):
 @pytest.mark.parametrize(
     ("code", "more", "said"),
     [
-        ("import no_such_thing", {}, "'thick' of the package sands 1.2 cannot be loaded: ModuleNotFoundError"),
+        (
+            "import no_such_thing",
+            {},
+            "'thick' of the package sands 1.2 cannot be loaded: ModuleNotFoundError",
+        ),
         ("x = 1", {}, "of the package sands 1.2 cannot be loaded: AttributeError"),
         ("Thick = 3", {}, "of the package sands 1.2: 3 is not a law"),
-        (LAW.replace('"thick"', '"thin"'), {}, "of the package sands 1.2: its law is 'thin': give both one name"),
-        (LAW.replace("(frozen=True)", ""), {}, "of the package sands 1.2: a law of one's own, Thick, must be a value"),
-        ("from test_kinds import Hinge as Thick", {}, "of the package sands 1.2: Hinge is not a law"),
+        (
+            LAW.replace('"thick"', '"thin"'),
+            {},
+            "of the package sands 1.2: its law is 'thin': give both one name",
+        ),
+        (
+            LAW.replace("(frozen=True)", ""),
+            {},
+            "of the package sands 1.2: a law of one's own, Thick, must be a value",
+        ),
+        (
+            "from test_kinds import Hinge as Thick",
+            {},
+            "of the package sands 1.2: Hinge is not a law",
+        ),
     ],
 )
 def test_a_broken_package_is_named_in_one_line(code, more, said, package):
@@ -492,15 +668,25 @@ def test_a_broken_package_is_named_in_one_line(code, more, said, package):
 def test_two_packages_of_one_name_and_built_in_names(package):
     package(LAW)
     package(LAW, dist="muds")
-    with pytest.raises(Refusal, match="is offered by the package .* 1.2 and the package .* 1.2: uninstall one"):
+    with pytest.raises(
+        Refusal,
+        match="is offered by the package .* 1.2 and the package .* 1.2: uninstall one",
+    ):
         parse(SCENE)
     package("raise RuntimeError", "viscous", dist="clash")
     told = text("medium")
     assert 'law = "thick"\nOf the package' in told
-    assert 'law = "viscous"\nNot that of the package clash 1.2, which is refused' in told
-    laws = [x["properties"].get("law") for x in schema()["$defs"]["gaits"]["medium"]["oneOf"]]
+    assert (
+        'law = "viscous"\nNot that of the package clash 1.2, which is refused' in told
+    )
+    laws = [
+        x["properties"].get("law")
+        for x in schema()["$defs"]["gaits"]["medium"]["oneOf"]
+    ]
     assert laws.count({"const": "thick"}) == laws.count({"const": "viscous"}) == 1
-    assert type(load("three-link-viscous").system.medium) is Viscous  # the built-in one stands
+    assert (
+        type(load("three-link-viscous").system.medium) is Viscous
+    )  # the built-in one stands
 
 
 def test_parts_are_values_and_need_not_be_registered_from_python():

@@ -30,8 +30,14 @@ from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 OFF_CENTRE = Circle(amplitude=0.7, centre=(0.3, -0.4))
-ALLOWED = {"profile.default_content_setting_values.automatic_downloads": 1}  # more than one file
-NEEDS = importlib.util.find_spec("selenium") and shutil.which("chromium") and shutil.which("chromedriver")
+ALLOWED = {
+    "profile.default_content_setting_values.automatic_downloads": 1
+}  # more than one file
+NEEDS = (
+    importlib.util.find_spec("selenium")
+    and shutil.which("chromium")
+    and shutil.which("chromedriver")
+)
 
 
 @pytest.fixture(scope="module")
@@ -39,12 +45,16 @@ def glass():
     return charts.chart(scenes.load("three-link-glass"))
 
 
-@pytest.mark.parametrize("name", ["three-link-glass", "three-link-viscous", "serpenoid-glass"])
+@pytest.mark.parametrize(
+    "name", ["three-link-glass", "three-link-viscous", "serpenoid-glass"]
+)
 def test_tiers_are_those_of_the_study(name):
     scene = scenes.load(name).with_numerics(grid=15)
     study, found = Study(scene), charts.tiers(charts.chart(scene), OFF_CENTRE)
     for tier, (net, _) in found.items():
-        near = 2e-6 if scene.system.traits.linear else 1e-7  # there a study solves, and looks nothing up
+        near = (
+            2e-6 if scene.system.traits.linear else 1e-7
+        )  # there a study solves, and looks nothing up
         np.testing.assert_allclose(net, study.poses(tier, OFF_CENTRE), atol=near)
 
 
@@ -58,7 +68,9 @@ def test_tiers_in_the_minimum_perturbation_frame(glass):
         ("area", 1e-7),
         ("harmonic", 3e-5),
     ):  # the study fits its harmonics in that frame
-        np.testing.assert_allclose(found[tier].net, study.poses(tier, OFF_CENTRE), atol=near)
+        np.testing.assert_allclose(
+            found[tier].net, study.poses(tier, OFF_CENTRE), atol=near
+        )
     own = charts.tiers(glass, OFF_CENTRE)
     assert np.abs(found["harmonic"].net - own["harmonic"].net).max() > 1e-3
 
@@ -70,8 +82,13 @@ def test_errors_hold_and_are_not_idle(name):
     chart, study, held, ratios = charts.chart(scene), Study(scene), [], []
     for gait in charts.loops(chart.axes, 40, seed=11):
         found, truth = charts.tiers(chart, gait), study.poses("direct", gait)
-        off = {tier: (np.hypot(*(net - truth)[:2]), abs(net[2] - truth[2])) for tier, (net, _) in found.items()}
-        held.append([x <= e for tier, p in found.items() for x, e in zip(off[tier], p.error)])
+        off = {
+            tier: (np.hypot(*(net - truth)[:2]), abs(net[2] - truth[2]))
+            for tier, (net, _) in found.items()
+        }
+        held.append(
+            [x <= e for tier, p in found.items() for x, e in zip(off[tier], p.error)]
+        )
         ratios.append(found["harmonic"].error[0] / off["harmonic"][0])
     assert (np.mean(held, 0) >= 0.9).all(), np.mean(held, 0)
     assert np.median(ratios) < 12
@@ -79,10 +96,17 @@ def test_errors_hold_and_are_not_idle(name):
 
 def test_harmonics_that_are_next_to_nothing_are_left_out(monkeypatch):
     monkeypatch.setattr(charts, "SMALL", 0.05)
-    series = Study(scenes.load("three-link-glass").with_numerics(grid=9)).compute_harmonics()
+    series = Study(
+        scenes.load("three-link-glass").with_numerics(grid=9)
+    ).compute_harmonics()
     size = np.abs(series.coefficients).max((0, 2, 3)).reshape(-1, 2).max(-1)
     found = charts.chart(scenes.load("three-link-glass").with_numerics(grid=9))
-    assert found.highest == 1 + 2 * np.flatnonzero(size > 0.05 * size.max()).max() == 7 < series.highest
+    assert (
+        found.highest
+        == 1 + 2 * np.flatnonzero(size > 0.05 * size.max()).max()
+        == 7
+        < series.highest
+    )
 
 
 def test_a_gait_that_is_no_series_is_one_for_the_page():
@@ -91,11 +115,15 @@ def test_a_gait_that_is_no_series_is_one_for_the_page():
     t = np.linspace(0, 2 * np.pi, 50)
     kt = np.outer(t, np.arange(1, cos.shape[1] + 1))
     assert np.abs(mean).min() > 0.01
-    np.testing.assert_allclose(mean + np.cos(kt) @ cos.T + np.sin(kt) @ sin.T, gait.unit(t), atol=2e-4)
+    np.testing.assert_allclose(
+        mean + np.cos(kt) @ cos.T + np.sin(kt) @ sin.T, gait.unit(t), atol=2e-4
+    )
 
 
 def test_a_loop_that_leaves_the_chart(glass):
-    with pytest.raises(Refusal, match=r"alpha_1 = 2.7 rad lies outside the field's -2.5 to 2.5"):
+    with pytest.raises(
+        Refusal, match=r"alpha_1 = 2.7 rad lies outside the field's -2.5 to 2.5"
+    ):
         charts.tiers(glass, Circle(amplitude=2.7))
 
 
@@ -111,11 +139,22 @@ def family():
 def test_a_family_has_the_scene_as_a_member(family):
     (chart,) = family.subject
     told = {v.name: (v.dims, v.values.tolist()) for v in family.variables}
-    assert told["shapes"] == (("scene",), [441]) and told["highest"] == (("scene",), [9])
-    assert [told[name][1] for name in ("grid_error", "grid_error_heading")] == [[x] for x in chart.grid_error]
-    assert chart.family.values.tolist() == [1.0, 1.5, 1.8, 2.2, 3.0] and family.attributes["members"] == 5
+    assert told["shapes"] == (("scene",), [441]) and told["highest"] == (
+        ("scene",),
+        [9],
+    )
+    assert [told[name][1] for name in ("grid_error", "grid_error_heading")] == [
+        [x] for x in chart.grid_error
+    ]
+    assert (
+        chart.family.values.tolist() == [1.0, 1.5, 1.8, 2.2, 3.0]
+        and family.attributes["members"] == 5
+    )
     line = f"three-link-glass over medium.C: 5 members, interpolated between them to {chart.family.error:.1e} BL"
-    assert lines.text(family).splitlines() == ["three-link-glass  441 shapes, harmonics to 9", line]
+    assert lines.text(family).splitlines() == [
+        "three-link-glass  441 shapes, harmonics to 9",
+        line,
+    ]
     own = charts.tiers(charts.chart(chart.scene), OFF_CENTRE)
     for tier, (net, _) in charts.tiers(chart.at(1.8), OFF_CENTRE).items():
         np.testing.assert_allclose(net, own[tier].net, atol=1e-6)
@@ -132,7 +171,9 @@ def test_between_members_the_error_says_how_far_off(family):
     assert 1e-7 < off < chart.family.error < 1e-3
     member = charts.tiers(chart.at(2.2), OFF_CENTRE)["harmonic"]
     assert chart.at(2.6).between == chart.family.error and chart.at(2.2).between == 0.0
-    assert guess.error[0] > chart.family.error > abs(guess.error[0] - member.error[0]) / 3
+    assert (
+        guess.error[0] > chart.family.error > abs(guess.error[0] - member.error[0]) / 3
+    )
     moved = (
         charts.tiers(chart.at(3.0), OFF_CENTRE)["harmonic"].net
         - charts.tiers(chart.at(1.0), OFF_CENTRE)["harmonic"].net
@@ -148,30 +189,52 @@ def test_one_file_without_network_markup_or_repetition(glass):
     odd = dataclasses.replace(glass, scene=glass.scene.changed(name=name))
     text = lab.page([glass, odd])
     policy = re.search(r'Content-Security-Policy" content="([^"]*)"', text)[1]
-    assert policy.startswith("default-src 'none'; script-src 'sha256-") and "unsafe" not in policy
+    assert (
+        policy.startswith("default-src 'none'; script-src 'sha256-")
+        and "unsafe" not in policy
+    )
     for element, kind in (("script", "script-src"), ("style", "style-src")):
         inside = re.findall(rf"<{element}>(.*?)</{element}>", text, re.DOTALL)
         assert len(inside) == 1
-        assert f"{kind} 'sha256-{base64.b64encode(hashlib.sha256(inside[0].encode()).digest()).decode()}'" in policy
-    assert "<img" not in text and "://" not in re.sub(r"http://www.w3.org/2000/svg", "", text)
+        assert (
+            f"{kind} 'sha256-{base64.b64encode(hashlib.sha256(inside[0].encode()).digest()).decode()}'"
+            in policy
+        )
+    assert "<img" not in text and "://" not in re.sub(
+        r"http://www.w3.org/2000/svg", "", text
+    )
     data = json.loads(re.search(r'id="data">(.*?)</script>', text, re.DOTALL)[1])
     assert [s["name"] for s in data["scenes"]] == ["three-link-glass", name]
     assert len(data["tables"]) == 10  # three of the scene, three and four of its frames
     assert len(text) < 600_000
-    harmonics = np.frombuffer(base64.b64decode(data["tables"][data["scenes"][0]["harmonics"]]), "<f4")
+    harmonics = np.frombuffer(
+        base64.b64decode(data["tables"][data["scenes"][0]["harmonics"]]), "<f4"
+    )
     np.testing.assert_array_equal(harmonics, glass.harmonics.ravel())
 
 
-@pytest.mark.parametrize("name", ["seven-link-wave", "no-slip-snake", "differential-drive"])
+@pytest.mark.parametrize(
+    "name", ["seven-link-wave", "no-slip-snake", "differential-drive"]
+)
 def test_scenes_without_a_chart_are_refused_before_others_are_computed(name):
     with pytest.raises(Refusal, match=f"^{name}: "):
         Lab((scenes.load("three-link-glass"), scenes.load(name))).check()
 
 
 def test_the_command(tmp_path):
-    code, out, _ = geomech("lab", "three-link-viscous", "seven-link-modes", "-o", "lab.html", cwd=tmp_path)
-    assert code == 0 and "three-link-viscous  961 shapes, harmonics to 1\n" in out and "page in lab.html" in out
-    assert (tmp_path / "lab.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    code, out, _ = geomech(
+        "lab", "three-link-viscous", "seven-link-modes", "-o", "lab.html", cwd=tmp_path
+    )
+    assert (
+        code == 0
+        and "three-link-viscous  961 shapes, harmonics to 1\n" in out
+        and "page in lab.html" in out
+    )
+    assert (
+        (tmp_path / "lab.html")
+        .read_text(encoding="utf-8")
+        .startswith("<!DOCTYPE html>")
+    )
 
 
 def test_without_a_file_a_browser_opens_the_gallery(monkeypatch, tmp_path):
@@ -191,8 +254,15 @@ def test_without_a_file_a_browser_opens_the_gallery(monkeypatch, tmp_path):
 @pytest.fixture(scope="module")
 def page(family, tmp_path_factory):
     path = tmp_path_factory.mktemp("lab") / "lab.html"
-    odd = dataclasses.replace(family.subject[0], scene=family.subject[0].scene.changed(name="<b onclick=alert(1)>"))
-    made = [*family.subject, *(charts.chart(scenes.load(name)) for name in GALLERY[1:]), odd]
+    odd = dataclasses.replace(
+        family.subject[0],
+        scene=family.subject[0].scene.changed(name="<b onclick=alert(1)>"),
+    )
+    made = [
+        *family.subject,
+        *(charts.chart(scenes.load(name)) for name in GALLERY[1:]),
+        odd,
+    ]
     path.write_text(lab.page(made), encoding="utf-8")
     assert path.stat().st_size < 4_000_000
     return path, {chart.scene.name: chart for chart in made}
@@ -218,8 +288,12 @@ def browser(tmp_path_factory):
         options.add_argument(argument)
     options.add_argument(f"--user-data-dir={folder / 'profile'}")
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    options.add_experimental_option("prefs", {"download.default_directory": str(folder), **ALLOWED})
-    driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
+    options.add_experimental_option(
+        "prefs", {"download.default_directory": str(folder), **ALLOWED}
+    )
+    driver = webdriver.Chrome(
+        options=options, service=Service(shutil.which("chromedriver"))
+    )
     driver.folder = folder
     yield driver
     driver.quit()
@@ -259,16 +333,38 @@ def test_the_page_computes_what_python_does(opened, page):
     worst, rng = 0.0, np.random.default_rng(5)
     for name, chart in page[1].items():
         values = [None] if chart.family is None else [1.8, 3.0, 2.45]
-        for k, (gait, frame) in enumerate(itertools.product(charts.loops(chart.axes, 25, seed=8), chart.frames)):
+        for k, (gait, frame) in enumerate(
+            itertools.product(charts.loops(chart.axes, 25, seed=8), chart.frames)
+        ):
             value = values[k % len(values)]
-            gait = Points(points=gait.points, amplitude=round(rng.uniform(0.4, 1.0), 3), reverse=bool(k % 2))
+            gait = Points(
+                points=gait.points,
+                amplitude=round(rng.uniform(0.4, 1.0), 3),
+                reverse=bool(k % 2),
+            )
             points = [list(p) for p in gait.points]
             got = opened.execute_script(
-                "return lab.predict(...arguments)", name, frame, points, gait.amplitude, [0, 0], gait.reverse, value
+                "return lab.predict(...arguments)",
+                name,
+                frame,
+                points,
+                gait.amplitude,
+                [0, 0],
+                gait.reverse,
+                value,
             )
-            expected = charts.tiers(chart if value is None else chart.at(value), gait, frame)
+            expected = charts.tiers(
+                chart if value is None else chart.at(value), gait, frame
+            )
             for tier, numbers in zip(("harmonic", "path", "area"), got):
-                worst = max(worst, np.abs(np.subtract(numbers, [*expected[tier].net, *expected[tier].error])).max())
+                worst = max(
+                    worst,
+                    np.abs(
+                        np.subtract(
+                            numbers, [*expected[tier].net, *expected[tier].error]
+                        )
+                    ).max(),
+                )
     assert worst < 1e-6
 
 
@@ -276,23 +372,35 @@ def test_dragging_keys_and_undo(opened):
     from selenium.webdriver import ActionChains, Keys
     from selenium.webdriver.common.by import By
 
-    first, handle = state(opened), opened.find_element(By.CSS_SELECTOR, "[data-handle='2'] .hit")
-    ActionChains(opened, duration=0).click_and_hold(handle).move_by_offset(15, -30).move_by_offset(
-        5, -3
-    ).release().perform()
+    first, handle = (
+        state(opened),
+        opened.find_element(By.CSS_SELECTOR, "[data-handle='2'] .hit"),
+    )
+    ActionChains(opened, duration=0).click_and_hold(handle).move_by_offset(
+        15, -30
+    ).move_by_offset(5, -3).release().perform()
     dragged = until(lambda: state(opened) != first and state(opened))
     assert "loop=points" in dragged
-    moved = [float(x) for x in re.search(r"points=([^&]*)", dragged)[1].split(";")[2].split(",")]
-    assert moved[0] > 0.05 and moved[1] > 1.1  # it was at (0, 1), the pixels are some 0.01 rad
+    moved = [
+        float(x)
+        for x in re.search(r"points=([^&]*)", dragged)[1].split(";")[2].split(",")
+    ]
+    assert (
+        moved[0] > 0.05 and moved[1] > 1.1
+    )  # it was at (0, 1), the pixels are some 0.01 rad
     click(opened, "#undo")
     assert state(opened) == first
-    ActionChains(opened).key_down(Keys.CONTROL).send_keys("y").key_up(Keys.CONTROL).perform()
+    ActionChains(opened).key_down(Keys.CONTROL).send_keys("y").key_up(
+        Keys.CONTROL
+    ).perform()
     assert state(opened) == dragged
     opened.execute_script("document.querySelector(\"[data-handle='1']\").focus()")
     ActionChains(opened).send_keys(Keys.ARROW_LEFT, Keys.ARROW_LEFT).perform()
     arrowed = state(opened)
     assert arrowed != dragged
-    count = lambda: opened.execute_script("return document.querySelectorAll('.handle').length")
+    count = lambda: opened.execute_script(
+        "return document.querySelectorAll('.handle').length"
+    )
     assert count() == 9
     ActionChains(opened).send_keys(Keys.INSERT).perform()
     assert count() == 10
@@ -312,7 +420,9 @@ def test_dragging_keys_and_undo(opened):
 
 
 def test_component_frame_family_and_play(opened):
-    first = opened.execute_script("return document.querySelector('#map image').getAttribute('href')")
+    first = opened.execute_script(
+        "return document.querySelector('#map image').getAttribute('href')"
+    )
     click(opened, "#component button:nth-child(3)")
     assert "component=heading" in state(opened)
     choose = (
@@ -322,8 +432,15 @@ def test_component_frame_family_and_play(opened):
     opened.execute_script(choose, "frame", MINIMUM_PERTURBATION, "change")
     opened.execute_script(choose, "value", "2.5", "input")
     assert f"frame={MINIMUM_PERTURBATION}&value=2.5" in state(opened)
-    assert opened.execute_script("return document.querySelector('#map image').getAttribute('href')") != first
-    assert "C" in opened.execute_script("return document.getElementById('family').innerText")
+    assert (
+        opened.execute_script(
+            "return document.querySelector('#map image').getAttribute('href')"
+        )
+        != first
+    )
+    assert "C" in opened.execute_script(
+        "return document.getElementById('family').innerText"
+    )
     phase = opened.execute_script("return lab.player.phase")
     until(lambda: opened.execute_script("return lab.player.phase") != phase)
     click(opened, "#play")
@@ -333,7 +450,11 @@ def test_component_frame_family_and_play(opened):
 
 
 def test_climbing_goes_further(opened):
-    own = lambda: float(opened.execute_script("return document.querySelector('tr.best td').textContent").split(" ")[0])
+    own = lambda: float(
+        opened.execute_script(
+            "return document.querySelector('tr.best td').textContent"
+        ).split(" ")[0]
+    )
     start = own()
     click(opened, "#climb")
     until(lambda: own() > 3 * start, 30)
@@ -348,11 +469,25 @@ def test_files_and_back(opened, page):
     )
     until(lambda: "butterfly" in state(opened))
     before = state(opened)
-    for kind, file in (("toml", "loop.toml"), ("svg", "map.svg"), ("png", "map.png"), ("csv", "loop.csv")):
+    for kind, file in (
+        ("toml", "loop.toml"),
+        ("svg", "map.svg"),
+        ("png", "map.png"),
+        ("csv", "loop.csv"),
+    ):
         click(opened, f"#save-{kind}")
-        until(lambda file=file: (opened.folder / file).exists() and (opened.folder / file).stat().st_size)
+        until(
+            lambda file=file: (
+                (opened.folder / file).exists()
+                and (opened.folder / file).stat().st_size
+            )
+        )
     saved = scenes.load(opened.folder / "loop.toml")
-    assert saved.system.medium.C == 2.5 and saved.gait.amplitude == 0.9 and saved.gait.centre == (0.1, -0.2)
+    assert (
+        saved.system.medium.C == 2.5
+        and saved.gait.amplitude == 0.9
+        and saved.gait.centre == (0.1, -0.2)
+    )
     assert (opened.folder / "map.png").read_bytes().startswith(b"\x89PNG")
     assert "loop=butterfly" in (opened.folder / "map.svg").read_text(encoding="utf-8")
     rows = (opened.folder / "loop.csv").read_text().splitlines()
@@ -363,7 +498,9 @@ def test_files_and_back(opened, page):
     opened.find_element("id", "open").send_keys(str(opened.folder / "loop.toml"))
     until(lambda: said(opened).startswith("Read the loop"))
     assert state(opened) == before
-    python = opened.execute_script("return document.getElementById('python').textContent")
+    python = opened.execute_script(
+        "return document.getElementById('python').textContent"
+    )
     assert "from geomech.gaits import Butterfly" in python
     opened.refresh()  # the state is in the address
     assert state(opened) == before
@@ -376,7 +513,12 @@ def test_loops_of_the_page_are_saved_as_they_are(opened, loop):
     before = state(opened)
     assert f"loop={loop}" in before
     click(opened, "#save-toml")
-    until(lambda: (opened.folder / "loop.toml").exists() and (opened.folder / "loop.toml").stat().st_size)
+    until(
+        lambda: (
+            (opened.folder / "loop.toml").exists()
+            and (opened.folder / "loop.toml").stat().st_size
+        )
+    )
     saved = scenes.load(opened.folder / "loop.toml")
     assert saved.frequency is None  # the page chooses one to play it at
     click(opened, "[data-loop='butterfly']")
@@ -390,13 +532,22 @@ def test_loops_of_the_page_are_saved_as_they_are(opened, loop):
     [
         ("nothing", "no [gait] in it"),
         ("[gait]\nkind = 'spiral'\n", "a loop is one of"),
-        ("[gait]\nkind = 'points'\npoints = [[1e999, 0], [0, 1], [1, 1]]\n", "is no number"),
+        (
+            "[gait]\nkind = 'points'\npoints = [[1e999, 0], [0, 1], [1, 1]]\n",
+            "is no number",
+        ),
         (
             "[gait]\nkind = 'points'\npoints = [[0, 0], [<img src=x onerror=alert(1)>\n",
             "cannot read the value of points",
         ),
-        ("[gait]\nkind = 'points'\npoints = [[0, 0], [0, 1]]\n", "a loop has 3 to 60 points"),
-        ("[gait]\nkind = 'circle'\namplitude_deg = 30\n", "cannot use amplitude_deg: give angles in radians"),
+        (
+            "[gait]\nkind = 'points'\npoints = [[0, 0], [0, 1]]\n",
+            "a loop has 3 to 60 points",
+        ),
+        (
+            "[gait]\nkind = 'circle'\namplitude_deg = 30\n",
+            "cannot use amplitude_deg: give angles in radians",
+        ),
     ],
 )
 def test_files_that_are_none(opened, text, reason):
@@ -417,7 +568,10 @@ def test_gaits_of_files_in_all_their_forms(opened):
     until(lambda: said(opened).startswith("Read"))
     gait = tomllib.loads(text)["gait"]
     assert opened.execute_script("return lab.player.frequency") == 2
-    assert f"points={';'.join(','.join(f'{x:g}' for x in p) for p in gait['points'])}&amplitude=1.2" in state(opened)
+    assert (
+        f"points={';'.join(','.join(f'{x:g}' for x in p) for p in gait['points'])}&amplitude=1.2"
+        in state(opened)
+    )
 
 
 @pytest.mark.parametrize(
@@ -447,16 +601,19 @@ def test_a_refusal_leaves_no_folder_behind(monkeypatch, tmp_path):
 def test_a_loop_that_leaves_the_map(opened, page):
     opened.get(f"{page[0].as_uri()}#loop=circle&amplitude=2.7")
     until(lambda: "amplitude=2.7" in state(opened))
-    assert opened.execute_script("return document.getElementById('verdict').textContent").startswith(
-        "The loop leaves the map"
-    )
+    assert opened.execute_script(
+        "return document.getElementById('verdict').textContent"
+    ).startswith("The loop leaves the map")
     click(opened, "#save-csv")
     assert said(opened) == "The loop leaves the map."
 
 
 def test_a_vertical_drag_by_touch_does_not_scroll(opened):
     command = opened.execute_cdp_cmd
-    command("Emulation.setDeviceMetricsOverride", {"width": 420, "height": 700, "deviceScaleFactor": 1, "mobile": True})
+    command(
+        "Emulation.setDeviceMetricsOverride",
+        {"width": 420, "height": 700, "deviceScaleFactor": 1, "mobile": True},
+    )
     command("Emulation.setTouchEmulationEnabled", {"enabled": True})
     try:
         box = (
@@ -465,7 +622,8 @@ def test_a_vertical_drag_by_touch_does_not_scroll(opened):
         )
         before, (x, y) = state(opened), opened.execute_script(box)
         touch = lambda kind, *at: command(
-            "Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": p, "y": q} for p, q in at]}
+            "Input.dispatchTouchEvent",
+            {"type": kind, "touchPoints": [{"x": p, "y": q} for p, q in at]},
         )
         touch("touchStart", (x, y))
         for k in range(1, 13):
@@ -482,7 +640,9 @@ def test_names_are_text_and_controls_have_labels(opened, page):
     opened.get(f"{page[0].as_uri()}#scene=%3Cb%20onclick%3Dalert(1)%3E")
     until(lambda: "onclick" in state(opened))
     assert opened.execute_script("return document.querySelectorAll('b').length") == 0
-    assert "<b onclick=alert(1)>" in opened.execute_script("return document.getElementById('foot').textContent")
+    assert "<b onclick=alert(1)>" in opened.execute_script(
+        "return document.getElementById('foot').textContent"
+    )
     nameless = opened.execute_script(
         "return [...document.querySelectorAll('button, input, select, [tabindex]')].filter((e) => e.getClientRects().length"
         " && !(e.textContent.trim() || e.ariaLabel || (e.labels && e.labels[0].textContent.trim()))).map((e) => e.outerHTML)"
@@ -497,11 +657,16 @@ def test_what_a_series_leaves_is_summed_along_the_loop():
     first, second = np.meshgrid(*axes, indexing="ij")
     left = 1 + 0.2 * first - 0.1 * second
     residual = np.stack([0.03 * left, 0.04 * left, 0.07 * (1 + 0.3 * second)], -1)
-    chart = types.SimpleNamespace(axes=axes, residual=residual, grid_error=(1e-3, 2e-3), between=0.5)
+    chart = types.SimpleNamespace(
+        axes=axes, residual=residual, grid_error=(1e-3, 2e-3), between=0.5
+    )
     length, (a, b) = 2 * np.pi * 0.6, (0.4, 0.7)
     found = charts.left_error(chart, *Circle(amplitude=0.6, centre=(a, b)).cycle(64))
     assert found == pytest.approx(
-        (length * (0.35 * 0.05 * (1 + 0.2 * a - 0.1 * b) + 1e-3) + 0.5, length * (0.45 * 0.07 * (1 + 0.3 * b) + 2e-3))
+        (
+            length * (0.35 * 0.05 * (1 + 0.2 * a - 0.1 * b) + 1e-3) + 0.5,
+            length * (0.45 * 0.07 * (1 + 0.3 * b) + 2e-3),
+        )
     )
 
 
@@ -513,6 +678,13 @@ def test_loops_of_a_chart_fill_its_field_and_stay_within():
     counts = sorted(map(len, shares))
     assert len(counts) == 20 and counts[0] == 3 and 7 <= counts[-1] <= 9
     every = np.concatenate(shares)
-    np.testing.assert_allclose([every.min(0), every.max(0)], [[-0.85, -0.85], [0.85, 0.85]], atol=0.06)
-    inside = np.array([(np.abs(gait.cycle(300)[0] - [1.0, -0.2]) / [2.0, 0.3]).max() for gait in found])
+    np.testing.assert_allclose(
+        [every.min(0), every.max(0)], [[-0.85, -0.85], [0.85, 0.85]], atol=0.06
+    )
+    inside = np.array(
+        [
+            (np.abs(gait.cycle(300)[0] - [1.0, -0.2]) / [2.0, 0.3]).max()
+            for gait in found
+        ]
+    )
     assert inside.max() < 1.001 and (inside > 0.9).any()

@@ -26,7 +26,9 @@ def reference(medium, a, m, w, eps):
         else:
             u1, u2 = m - w, m + w
             R1, R2 = mp.sqrt(A2 + u1**2), mp.sqrt(A2 + u2**2)
-            inverse = (mp.asinh(u2 / mp.sqrt(A2)) - mp.asinh(u1 / mp.sqrt(A2))) / (2 * w)
+            inverse = (mp.asinh(u2 / mp.sqrt(A2)) - mp.asinh(u1 / mp.sqrt(A2))) / (
+                2 * w
+            )
             u = (R2 - R1) / (2 * w)
             square = (u2 * R2 - u1 * R1) / (4 * w) - A2 * inverse / 2  # <u^2 / R>
             su = (square - m * u) / w
@@ -51,7 +53,9 @@ def test_over_sixteen_decades():
         np.testing.assert_allclose(got, reference(GLASS, a, m, w, 1e-20), rtol=1e-13)
 
 
-@pytest.mark.parametrize("t", [1e-12, 1e-5, 0.1, 0.1999999, 0.2, 0.2000001, 0.5, 0.9, 0.99999])
+@pytest.mark.parametrize(
+    "t", [1e-12, 1e-5, 0.1, 0.1999999, 0.2, 0.2000001, 0.5, 0.9, 0.99999]
+)
 def test_k_on_both_sides_of_its_branch(t):
     exact_k = (mp.atanh(mp.mpf(t)) - mp.mpf(t)) / mp.mpf(t) ** 3
     got = k_function(np.array([t]), np.array([(1 - t) * (1 + t)]))[0]
@@ -67,7 +71,9 @@ def test_tangent_is_the_slope_of_the_force(name):
     for j in range(3):
         step = h * np.eye(3)[j][:, None, None]
         slope = (load(*(v + step), eps)[:, 0] - load(*(v - step), eps)[:, 0]) / (2 * h)
-        np.testing.assert_allclose(tangent[:, j], slope, rtol=1e-5, atol=1e-6 * np.abs(tangent).max())
+        np.testing.assert_allclose(
+            tangent[:, j], slope, rtol=1e-5, atol=1e-6 * np.abs(tangent).max()
+        )
 
 
 @pytest.mark.parametrize("name", CLOSED)
@@ -79,7 +85,9 @@ def test_gauss_agrees_where_the_law_is_smooth(name):
         element_load(CLOSED[name], "gauss:40")(*v, np.full(30, 0.1)),
         element_load(CLOSED[name])(*v, np.full(30, 0.1)),
     )
-    np.testing.assert_allclose(fine, closed, rtol=1e-8, atol=1e-11 * np.abs(closed).max())
+    np.testing.assert_allclose(
+        fine, closed, rtol=1e-8, atol=1e-11 * np.abs(closed).max()
+    )
 
 
 def test_midpoint_is_of_order_two():
@@ -88,8 +96,13 @@ def test_midpoint_is_of_order_two():
     v[1] = 2.0 + np.abs(v[1] + v[2])
     truth = element_load(GLASS)(*v, eps)[:, 0]
     counts = np.array([20, 40, 80, 160])
-    errors = [np.abs(element_load(GLASS, f"midpoint:{n}")(*v, eps)[:, 0] - truth).max() for n in counts]
-    assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(2.0, abs=0.1)
+    errors = [
+        np.abs(element_load(GLASS, f"midpoint:{n}")(*v, eps)[:, 0] - truth).max()
+        for n in counts
+    ]
+    assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(
+        2.0, abs=0.1
+    )
 
 
 class CubicDrag:
@@ -120,7 +133,11 @@ def test_at_rest_there_is_no_force_and_no_nan():
     assert np.isfinite(load).all()
 
 
-@pytest.mark.parametrize("how", ["", "simpson:4", "gauss", "gauss:0", "midpoint:-3", "exact:2", None])
+@pytest.mark.parametrize(
+    "how", ["", "simpson:4", "gauss", "gauss:0", "midpoint:-3", "exact:2", None]
+)
 def test_unknown_rules_are_named(how):
-    with pytest.raises(ValueError, match="loads must be 'exact', 'midpoint:N' or 'gauss:N'"):
+    with pytest.raises(
+        ValueError, match="loads must be 'exact', 'midpoint:N' or 'gauss:N'"
+    ):
         element_load(GLASS, how)

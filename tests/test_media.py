@@ -10,7 +10,17 @@ from registry import DRY, MEDIA
 
 from geomech.gaits import Circle
 from geomech.studies.undulation import endless_efficiency
-from rft import CATALOGUE, Chain, Coulomb, Granular, Serpenoid, Surface, Viscous, body_velocity, time_steps
+from rft import (
+    CATALOGUE,
+    Chain,
+    Coulomb,
+    Granular,
+    Serpenoid,
+    Surface,
+    Viscous,
+    body_velocity,
+    time_steps,
+)
 from rft.balance.arrays import solve
 from rft.balance.newton import RESIDUAL, Limits
 from rft.balance.solver import QUICK
@@ -29,7 +39,12 @@ def test_granular_is_equation_3():
     v_t, v_n = speed * np.cos(DIRECTIONS), speed * np.sin(DIRECTIONS)
     f_t, f_n = Granular(C, gamma0).traction(v_t, v_n)
     sine = np.sin(DIRECTIONS)
-    np.testing.assert_allclose(f_n, (1 + C / np.sqrt(math.tan(gamma0) ** 2 + sine**2)) * sine, rtol=1e-14, atol=1e-15)
+    np.testing.assert_allclose(
+        f_n,
+        (1 + C / np.sqrt(math.tan(gamma0) ** 2 + sine**2)) * sine,
+        rtol=1e-14,
+        atol=1e-15,
+    )
     np.testing.assert_allclose(f_t, np.cos(DIRECTIONS), rtol=1e-14, atol=1e-15)
 
 
@@ -37,13 +52,21 @@ def test_granular_is_equation_3():
 def test_what_a_medium_claims_is_so(name):
     """Left and right alike, odd, linear, one power of the speed: yes or no, as its tractions have it."""
     law, v = MEDIA[name], (np.cos(DIRECTIONS), np.sin(DIRECTIONS))
-    f, back, left, fast = (np.stack(law.traction(a * v[0], b * v[1])) for a, b in ((1, 1), (-1, -1), (1, -1), (4, 4)))
+    f, back, left, fast = (
+        np.stack(law.traction(a * v[0], b * v[1]))
+        for a, b in ((1, 1), (-1, -1), (1, -1), (4, 4))
+    )
     same = lambda x, y: bool(np.allclose(x, y, rtol=0, atol=1e-12 * np.abs(y).max()))
-    assert base.is_mirror(law) in (same(left * [[1], [-1]], f), False) and type(base.is_mirror(law)) is bool
+    assert (
+        base.is_mirror(law) in (same(left * [[1], [-1]], f), False)
+        and type(base.is_mirror(law)) is bool
+    )
     assert base.is_odd(law) is same(-back, f)
     assert base.is_linear(law) is (base.is_closed(law) and same(fast, 4 * f))
     power = base.speed_exponent(law)
-    assert base.is_rate_independent(law) is (power is not None) and (power is None or same(fast, 4**power * f))
+    assert base.is_rate_independent(law) is (power is not None) and (
+        power is None or same(fast, 4**power * f)
+    )
 
 
 @pytest.mark.parametrize("name", DRY)
@@ -71,26 +94,41 @@ def test_derivatives_are_the_slopes_of_traction(name):
     tt, tn, nt, nn = MEDIA[name].slopes(*v, eps)
     for k, (dt, dn) in enumerate(((tt, nt), (tn, nn))):
         step = h * np.eye(2)[k][:, None]
-        up, down = (np.array(MEDIA[name].traction(*(v + sign * step), eps)) for sign in (1, -1))
-        np.testing.assert_allclose((up - down) / (2 * h), [dt, dn], rtol=2e-6, atol=2e-6 * np.abs(up).max())
+        up, down = (
+            np.array(MEDIA[name].traction(*(v + sign * step), eps)) for sign in (1, -1)
+        )
+        np.testing.assert_allclose(
+            (up - down) / (2 * h), [dt, dn], rtol=2e-6, atol=2e-6 * np.abs(up).max()
+        )
 
 
 def test_catalogue_agrees_with_its_sources():
-    loose, fitted = CATALOGUE["glass-0.3mm-loose"].medium, CATALOGUE["glass-0.3mm-loose-fitted"].medium
+    loose, fitted = (
+        CATALOGUE["glass-0.3mm-loose"].medium,
+        CATALOGUE["glass-0.3mm-loose-fitted"].medium,
+    )
     assert loose == Granular(1.8, math.radians(13.8), k=2.5)
     assert fitted.C == pytest.approx(1.844, abs=5e-4)
     psi = np.linspace(0, np.pi / 2, 50)
     form = np.sin(psi) + (0.5108 / 0.2770) * np.sin(np.arctan(4.0587 * np.sin(psi)))
-    np.testing.assert_allclose(fitted.traction(np.cos(psi), np.sin(psi))[1], form, rtol=1e-12, atol=1e-14)
-    np.testing.assert_allclose(loose.traction(np.cos(psi), np.sin(psi))[1], form, rtol=0.03, atol=1e-14)
+    np.testing.assert_allclose(
+        fitted.traction(np.cos(psi), np.sin(psi))[1], form, rtol=1e-12, atol=1e-14
+    )
+    np.testing.assert_allclose(
+        loose.traction(np.cos(psi), np.sin(psi))[1], form, rtol=0.03, atol=1e-14
+    )
     # The paper's k = 2.5 gives nearly the fitted axial stress at the fitted depth: k rho g |z|, glass at 2500 kg/m^3.
-    assert CATALOGUE["glass-0.3mm-loose"].axial_stress == pytest.approx(2.5 * 0.58 * 2500 * 9.81 * 0.0762, rel=1e-3)
+    assert CATALOGUE["glass-0.3mm-loose"].axial_stress == pytest.approx(
+        2.5 * 0.58 * 2500 * 9.81 * 0.0762, rel=1e-3
+    )
     assert "2710 Pa" in CATALOGUE["glass-0.3mm-loose"].source
     assert "third-party" in CATALOGUE["glass-0.3mm-loose-fitted"].source
     for name, k, packed in (("loose-fitted", 2.56, 0.58), ("close", 5.09, 0.62)):
         entry = CATALOGUE[f"glass-0.3mm-{name}"]
         assert entry.medium.k == pytest.approx(k, abs=0.005)
-        assert entry.medium.k * packed * 2500 * 9.81 * 0.0762 == pytest.approx(entry.axial_stress)
+        assert entry.medium.k * packed * 2500 * 9.81 * 0.0762 == pytest.approx(
+            entry.axial_stress
+        )
     assert all(entry.source for entry in CATALOGUE.values())
 
 
@@ -106,7 +144,9 @@ def speed_ratio(along):
 
     Points slide at speed 1 along a curve that itself drifts backwards at the speed ``drift``.
     """
-    headings = [math.radians(48.4) * math.sin(2 * math.pi * (k + 0.5) / 400) for k in range(400)]
+    headings = [
+        math.radians(48.4) * math.sin(2 * math.pi * (k + 0.5) / 400) for k in range(400)
+    ]
 
     def thrust(drift):
         total = 0.0
@@ -138,12 +178,18 @@ def test_surface_drag_carries_the_snakes_it_was_measured_for():
         for psi in DIRECTIONS:
             wanted = np.array(newtons(math.cos(psi), math.sin(psi), along)) / along
             np.testing.assert_allclose(
-                law.traction(2 * math.cos(psi), 2 * math.sin(psi)), wanted, rtol=1e-13, atol=1e-14
+                law.traction(2 * math.cos(psi), 2 * math.sin(psi)),
+                wanted,
+                rtol=1e-13,
+                atol=1e-14,
             )
         ratios.append(no_slip * endless_efficiency(law, headings[1:]))
         assert ratios[-1] == pytest.approx(speed_ratio(along), abs=1e-6)
     assert ratios == pytest.approx([0.783, 0.739], abs=5e-4)
-    assert SURFACE_ALONG == SURFACE_ALONG_RANGE[1] and medium.across == 0.15 / SURFACE_ALONG
+    assert (
+        SURFACE_ALONG == SURFACE_ALONG_RANGE[1]
+        and medium.across == 0.15 / SURFACE_ALONG
+    )
     body = Serpenoid(elements=960, waves=8)
     alpha, alphadot = Circle(amplitude=math.radians(48.4) * 2 * math.pi * 8).cycle(4)
     xi = body_velocity(medium, body, alpha, alphadot).checked().xi
@@ -152,8 +198,14 @@ def test_surface_drag_carries_the_snakes_it_was_measured_for():
 
 def test_limits():
     v = np.cos(DIRECTIONS), np.sin(DIRECTIONS)
-    np.testing.assert_allclose(Granular(0.0, 0.2).traction(*v), Coulomb().traction(*v), atol=1e-15)
-    np.testing.assert_allclose(Surface(1.8, 0.24, 1.0).traction(*v), Granular(1.8, 0.24).traction(*v), rtol=1e-15)
+    np.testing.assert_allclose(
+        Granular(0.0, 0.2).traction(*v), Coulomb().traction(*v), atol=1e-15
+    )
+    np.testing.assert_allclose(
+        Surface(1.8, 0.24, 1.0).traction(*v),
+        Granular(1.8, 0.24).traction(*v),
+        rtol=1e-15,
+    )
     np.testing.assert_allclose(Viscous(3.0).traction(*v), [v[0], 3 * v[1]], rtol=1e-15)
 
 
@@ -209,7 +261,9 @@ def test_a_medium_that_pushes_is_refused(name, solve):
 def test_the_velocity_at_which_it_pushes_is_named():
     with pytest.raises(ValueError, match=r"at velocity \((\S+), (\S+)\)") as caught:
         require_drag(Tilted())
-    v_t, v_n = (float(x) for x in re.search(r"\((\S+), (\S+)\)", str(caught.value)).groups())
+    v_t, v_n = (
+        float(x) for x in re.search(r"\((\S+), (\S+)\)", str(caught.value)).groups()
+    )
     assert np.hypot(v_t, v_n) > 1e3
     assert v_n == pytest.approx(v_t, rel=0.5)
 
@@ -217,7 +271,9 @@ def test_the_velocity_at_which_it_pushes_is_named():
 @pytest.mark.parametrize("name", MEDIA)
 def test_media_that_drag_pass(name):
     require_drag(MEDIA[name])
-    v = 10.0 ** np.random.default_rng(0).uniform(-9, 9, 200) * np.random.default_rng(1).normal(size=(2, 200))
+    v = 10.0 ** np.random.default_rng(0).uniform(-9, 9, 200) * np.random.default_rng(
+        1
+    ).normal(size=(2, 200))
     assert (np.multiply(MEDIA[name].traction(*v), v).sum(0) > 0).all()
 
 
@@ -234,7 +290,9 @@ def test_residuals_are_magnitudes():
 def test_a_law_without_axial_drag():
     """Sideways friction alone: residuals are then over the drag across."""
     medium = Law((1.0, 0.0, 2.0))
-    found = body_velocity(medium, Chain((1, 1.5, 0.8)), [0.9, 0.7], [1.0, -0.4]).checked()
+    found = body_velocity(
+        medium, Chain((1, 1.5, 0.8)), [0.9, 0.7], [1.0, -0.4]
+    ).checked()
     assert found.residual < 1e-9
 
 
@@ -259,21 +317,33 @@ def test_bad_parameters_are_named(make, said):
         make()
 
 
-SURE, OPEN = Granular(1.8, 0.24, 2.5), [[0.01, -2e-4, 3e-3], [-2e-4, 1e-4, 1e-5], [3e-3, 1e-5, 0.04]]
+SURE, OPEN = (
+    Granular(1.8, 0.24, 2.5),
+    [[0.01, -2e-4, 3e-3], [-2e-4, 1e-4, 1e-5], [3e-3, 1e-5, 0.04]],
+)
 
 
 def test_a_covariance_says_what_is_open_and_changes_no_force():
     v = np.cos(DIRECTIONS), np.sin(DIRECTIONS)
     two = [row[:2] for row in OPEN[:2]]
-    for covariance, names in ((None, ("C", "gamma0")), (two, ("C", "gamma0")), (OPEN, ("C", "gamma0", "k"))):
+    for covariance, names in (
+        (None, ("C", "gamma0")),
+        (two, ("C", "gamma0")),
+        (OPEN, ("C", "gamma0", "k")),
+    ):
         medium = Granular(1.8, 0.24, 2.5, np.array(covariance) if covariance else None)
         assert medium.uncertain == names
         assert medium.covariance == (covariance and tuple(map(tuple, covariance)))
         assert (hash(medium) == hash(SURE)) == (medium == SURE) == (covariance is None)
         np.testing.assert_array_equal(medium.traction(*v), SURE.traction(*v))
         assert medium.dry == SURE.dry
-    assert Viscous(2.5, [[0.3]]).covariance == ((0.3,),) and Viscous().uncertain == ("ratio",)
-    assert Granular(1.8, 0.24, covariance=np.zeros((2, 2))).covariance == ((0.0, 0.0), (0.0, 0.0))  # fixed, by the user
+    assert Viscous(2.5, [[0.3]]).covariance == ((0.3,),) and Viscous().uncertain == (
+        "ratio",
+    )
+    assert Granular(1.8, 0.24, covariance=np.zeros((2, 2))).covariance == (
+        (0.0, 0.0),
+        (0.0, 0.0),
+    )  # fixed, by the user
 
 
 @pytest.mark.parametrize(

@@ -20,9 +20,7 @@ pytestmark = pytest.mark.usefixtures("fastest")
 LOOSE = Granular(C=1.8, gamma0=math.radians(13.8))
 REST = '[body]\nkind = "chain"\nlengths = [1, 1.3, 0.8]\n[gait]\nkind = "circle"\namplitude = 0.9\n'
 GAUSS = '[numerics]\nloads = "gauss:12"\nphases = 32\ngrid = 7\nharmonics = 5\nextent = 1.5\n'
-MEDIUM = (
-    '[medium]\nlaw = "granular"\nC = 1.4\ngamma0_deg = 12.0\nk = 2.4\ncovariance = [[0.02, 0.001], [0.001, 0.002]]\n'
-)
+MEDIUM = '[medium]\nlaw = "granular"\nC = 1.4\ngamma0_deg = 12.0\nk = 2.4\ncovariance = [[0.02, 0.001], [0.001, 0.002]]\n'
 WRITTEN = Granular(1.4, math.radians(12.0), 2.4, ((0.02, 0.001), (0.001, 0.002)))
 
 
@@ -34,7 +32,9 @@ def rows(count, law=LOOSE, unit=3.3):
 def csv(columns="psi_deg,f_t,f_n", count=13, law=LOOSE):
     psi, t, n = rows(count, law)
     angle = psi if columns.startswith("psi,") else np.degrees(psi)
-    return f"# N\n{columns}\n" + "".join(f"{float(a)!r},{float(b)!r},{float(c)!r}\n" for a, b, c in zip(angle, t, n))
+    return f"# N\n{columns}\n" + "".join(
+        f"{float(a)!r},{float(b)!r},{float(c)!r}\n" for a, b, c in zip(angle, t, n)
+    )
 
 
 @pytest.fixture
@@ -62,26 +62,41 @@ def test_a_medium_is_read_from_beside_its_scene(folder):
     plain = written(folder, 'file = "M.toml"', M_toml=MEDIUM.replace("[medium]\n", ""))
     assert scene.load(plain).system.medium == WRITTEN
     named = written(folder, 'file = "M.toml"', M_toml='name = "glass-0.3mm-close"')
-    assert scene.load(named).system == scene.parse('[medium]\nname = "glass-0.3mm-close"\n' + REST).system
+    assert (
+        scene.load(named).system
+        == scene.parse('[medium]\nname = "glass-0.3mm-close"\n' + REST).system
+    )
     within = folder / "w.toml"
     within.write_text('[system]\nkind = "swimmer"\nmedium = {file = "M.toml"}\n' + REST)
     (folder / "M.toml").write_text(MEDIUM)
-    assert scene.load(within).system.medium == WRITTEN and folder / "M.toml" in scene.inputs(scene.load(within))
+    assert scene.load(
+        within
+    ).system.medium == WRITTEN and folder / "M.toml" in scene.inputs(scene.load(within))
 
 
 def test_a_scene_is_written_with_the_medium_in_it(folder):
     found = scene.load(written(folder, 'file = "M.toml"', M_toml=MEDIUM))
     for other in (found, found.with_numerics(grid=9)):
         again = scene.parse(scene.toml(other))
-        assert (again.system, again.gait, again.numerics) == (other.system, other.gait, other.numerics)
+        assert (again.system, again.gait, again.numerics) == (
+            other.system,
+            other.gait,
+            other.numerics,
+        )
         assert again.files == () and "file" not in scene.toml(other)
     assert found.with_numerics(grid=9).files == found.files != ()
 
 
 def test_parameters_of_a_medium_from_a_file_can_be_swept(folder):
-    found = scene.load(written(folder, 'file = "M.toml"', REST + "[numerics]\nphases = 16\n", M_toml=MEDIUM))
+    found = scene.load(
+        written(
+            folder, 'file = "M.toml"', REST + "[numerics]\nphases = 16\n", M_toml=MEDIUM
+        )
+    )
     plain = scene.parse(f"{MEDIUM}{REST}[numerics]\nphases = 16\n")
-    got, want = (sweep(x, {"medium.C": [1.4, 3.0]})["displacement"] for x in (found, plain))
+    got, want = (
+        sweep(x, {"medium.C": [1.4, 3.0]})["displacement"] for x in (found, plain)
+    )
     np.testing.assert_array_equal(got, want)
     assert abs(got[1, 0] - got[0, 0]) > 1e-3
 
@@ -93,11 +108,18 @@ def test_a_scene_goes_into_the_medium_of_a_file(folder, monkeypatch):
     monkeypatch.chdir(folder)
     glass = scene.load("three-link-glass")
     own = scene.in_medium(glass, "M.toml")
-    assert own == glass.changed(medium=WRITTEN) and scene.inputs(own) == [folder / "M.toml"]
-    assert scene.parse(scene.toml(own)).system == own.system  # and not the built-in text
+    assert own == glass.changed(medium=WRITTEN) and scene.inputs(own) == [
+        folder / "M.toml"
+    ]
+    assert (
+        scene.parse(scene.toml(own)).system == own.system
+    )  # and not the built-in text
     assert "1.4" in scene.toml(own) and scene.tables(own)["medium"]["C"] == 1.4
     table = scene.in_medium(glass.with_numerics(loads="gauss:12"), "T.csv")
-    assert table.system.medium == scene.load(written(folder, TABLE, REST + GAUSS)).system.medium
+    assert (
+        table.system.medium
+        == scene.load(written(folder, TABLE, REST + GAUSS)).system.medium
+    )
     with pytest.raises(Refusal, match="a no-slip-snake takes no medium"):
         scene.in_medium(scene.load("no-slip-snake"), "M.toml")
 
@@ -160,14 +182,24 @@ def test_outputs_do_not_replace_the_medium(folder):
     assert (folder / "T.csv").read_text() == csv()
 
 
-@pytest.mark.parametrize("columns", ["psi_deg,f_t,f_n", "psi,f_t,f_n", "psi_deg,F_parallel_N,F_perpendicular_N"])
+@pytest.mark.parametrize(
+    "columns",
+    ["psi_deg,f_t,f_n", "psi,f_t,f_n", "psi_deg,F_parallel_N,F_perpendicular_N"],
+)
 def test_a_table_is_read_from_any_of_its_columns(columns, folder):
     found = scene.load(written(folder, TABLE, REST + GAUSS, T_csv=csv(columns)))
     want = Table(*rows(13))
-    np.testing.assert_allclose(found.system.medium.traction(0.3, -0.4), want.traction(0.3, -0.4), rtol=1e-12)
+    np.testing.assert_allclose(
+        found.system.medium.traction(0.3, -0.4), want.traction(0.3, -0.4), rtol=1e-12
+    )
     np.testing.assert_allclose(found.system.medium.f_n, want.f_n, rtol=1e-12)
     assert scene.inputs(found)[1:] == [folder / "T.csv"]
-    inner = written(folder, 'file = "M.toml"', REST + GAUSS, M_toml='[medium]\nlaw = "table"\nfile = "T.csv"')
+    inner = written(
+        folder,
+        'file = "M.toml"',
+        REST + GAUSS,
+        M_toml='[medium]\nlaw = "table"\nfile = "T.csv"',
+    )
     assert scene.load(inner).system == found.system
     assert scene.inputs(scene.load(inner))[1:] == [folder / "M.toml", folder / "T.csv"]
     again = scene.parse(scene.toml(found))  # the numbers stand in it
@@ -183,24 +215,44 @@ def test_a_table_passes_through_its_rows_in_units_of_axial_drag():
     with pytest.raises(ValueError, match="f_n must be finite"):
         Table(psi, f_t, [*f_n[:-1], np.inf])
     table = Table(psi, f_t, f_n)
-    for sign_t, sign_n, speed in ((1, 1, 1.0), (-1, 1, 1e-9), (1, -1, 1e9), (-1, -1, 3.0)):
-        got = np.array(table.traction(sign_t * speed * np.cos(psi), sign_n * speed * np.sin(psi)))
-        want = np.array([np.append(f_t[:-1], 0.0) * sign_t, np.append(0.0, f_n[1:]) * sign_n]) / 0.5
+    for sign_t, sign_n, speed in (
+        (1, 1, 1.0),
+        (-1, 1, 1e-9),
+        (1, -1, 1e9),
+        (-1, -1, 3.0),
+    ):
+        got = np.array(
+            table.traction(sign_t * speed * np.cos(psi), sign_n * speed * np.sin(psi))
+        )
+        want = (
+            np.array(
+                [np.append(f_t[:-1], 0.0) * sign_t, np.append(0.0, f_n[1:]) * sign_n]
+            )
+            / 0.5
+        )
         np.testing.assert_allclose(got, want, rtol=1e-12, atol=1e-12)
     v = np.random.default_rng(0).normal(size=(2, 50))
     t, n = table.traction(*v)
-    np.testing.assert_array_equal(table.traction(-v[0], v[1]), [-t, n])  # and so mirror images mirror each other
+    np.testing.assert_array_equal(
+        table.traction(-v[0], v[1]), [-t, n]
+    )  # and so mirror images mirror each other
     np.testing.assert_array_equal(table.traction(v[0], -v[1]), [t, -n])
     assert (t * v[0] + n * v[1] > 0).all()
     fine = np.linspace(0, np.pi / 2, 2001)
     across = table.traction(np.cos(fine), np.sin(fine))[1]
-    for low, high, sign in zip(psi, psi[1:], np.sign(np.diff([0.0, *f_n[1:]]))):  # monotone between rows: no overshoot
+    for low, high, sign in zip(
+        psi, psi[1:], np.sign(np.diff([0.0, *f_n[1:]]))
+    ):  # monotone between rows: no overshoot
         between = across[(fine >= low) & (fine <= high)]
         assert (sign * np.diff(between) >= -1e-12).all()
     assert table.traction(0.0, 0.0) == (0.0, 0.0)
-    again = Table([*psi, psi[2], 2 * np.pi - psi[3]], [*f_t, 0.6, 0.5], [*f_n, 1.3, 1.4])  # measured again: averaged
+    again = Table(
+        [*psi, psi[2], 2 * np.pi - psi[3]], [*f_t, 0.6, 0.5], [*f_n, 1.3, 1.4]
+    )  # measured again: averaged
     got = again.traction(np.cos(psi[2:4]), np.sin(psi[2:4]))
-    np.testing.assert_allclose(got, np.array([[0.5, 0.4], [1.1, 1.3]]) / 0.5, rtol=1e-12)
+    np.testing.assert_allclose(
+        got, np.array([[0.5, 0.4], [1.1, 1.3]]) / 0.5, rtol=1e-12
+    )
 
 
 @pytest.mark.parametrize("eps", [0.0, 0.3])
@@ -210,10 +262,17 @@ def test_slopes_of_a_table_are_continuous_and_its_own(eps):
     slopes = np.array(table.slopes(*v, eps))
     for k in range(2):
         step = h * np.eye(2)[k][:, None]
-        up, down = (np.array(table.traction(*(v + sign * step), eps)) for sign in (1, -1))
-        np.testing.assert_allclose(slopes[k::2], (up - down) / (2 * h), rtol=1e-5, atol=1e-7)
+        up, down = (
+            np.array(table.traction(*(v + sign * step), eps)) for sign in (1, -1)
+        )
+        np.testing.assert_allclose(
+            slopes[k::2], (up - down) / (2 * h), rtol=1e-5, atol=1e-7
+        )
     for psi in (*rows(7)[0], -np.pi / 6, np.pi):  # where the cubics meet
-        sides = [np.array(table.slopes(np.cos(psi + d), np.sin(psi + d), eps)) for d in (-1e-9, 1e-9)]
+        sides = [
+            np.array(table.slopes(np.cos(psi + d), np.sin(psi + d), eps))
+            for d in (-1e-9, 1e-9)
+        ]
         np.testing.assert_allclose(*sides, atol=1e-6)
 
 
@@ -227,7 +286,9 @@ def test_a_dense_table_is_the_law_it_came_from():
     for count in (46, 91, 181):
         table = Table(*rows(count))
         require_drag(table)
-        error = np.array(table.traction(np.cos(fine), np.sin(fine))) - LOOSE.traction(np.cos(fine), np.sin(fine))
+        error = np.array(table.traction(np.cos(fine), np.sin(fine))) - LOOSE.traction(
+            np.cos(fine), np.sin(fine)
+        )
         found = body_velocity(table, body, alpha, alphadot, loads="gauss:16")
         sliding = (want.status == "sliding") & (found.status == "sliding")
         assert sliding.sum() > 30 and not (found.status == "unconverged").any()
@@ -239,10 +300,19 @@ def test_a_dense_table_is_the_law_it_came_from():
 
 def test_every_command_takes_a_table(folder):
     file = written(folder, TABLE, REST + GAUSS, T_csv=csv(count=181))
-    plain = scene.parse('[medium]\nlaw = "granular"\nC = 1.8\ngamma0_deg = 13.8\n' + REST + GAUSS)
+    plain = scene.parse(
+        '[medium]\nlaw = "granular"\nC = 1.8\ngamma0_deg = 13.8\n' + REST + GAUSS
+    )
     for args in (
         ["velocity", "--alpha", "0.5,0.3", "--alphadot", "1,0", "--json"],
-        ["displacement", "--amplitudes", "0.5,0.9", "--json", "--tiers", "direct,path,area"],
+        [
+            "displacement",
+            "--amplitudes",
+            "0.5,0.9",
+            "--json",
+            "--tiers",
+            "direct,path,area",
+        ],
         ["explain"],
     ):
         code, out, err = geomech(args[0], file, *args[1:])

@@ -18,7 +18,16 @@ from scipy.stats import multivariate_normal, norm
 import geomech
 from geomech.gaits import Sine
 from geomech.geometry.reconstruct import displacement
-from geomech.measured.midlines import fit, intervals, kinematics, predicted, question, reader, smooth, synthetic
+from geomech.measured.midlines import (
+    fit,
+    intervals,
+    kinematics,
+    predicted,
+    question,
+    reader,
+    smooth,
+    synthetic,
+)
 from geomech.measured.midlines.kinematics import QUANTITIES
 from geomech.measured.midlines.trial import Trial
 from geomech.scenes import Numerics, Scene
@@ -72,7 +81,14 @@ def along_a_sine(amplitude, waves, cycles=3.0, frames=32, count=24):
     wavelength = 1 / (waves * arc)
     x = np.linspace(-3, 9, 60001)
     rise = slope * np.cos(2 * np.pi * x)
-    u = np.concatenate([[0.0], np.cumsum((np.hypot(1, rise)[1:] + np.hypot(1, rise)[:-1]) / 2 * np.diff(x))])
+    u = np.concatenate(
+        [
+            [0.0],
+            np.cumsum(
+                (np.hypot(1, rise)[1:] + np.hypot(1, rise)[:-1]) / 2 * np.diff(x)
+            ),
+        ]
+    )
     t = np.arange(int(cycles * frames) + 1) / frames
     at = CubicSpline(u, x)(arc * (4 + t[:, None] + waves * np.linspace(0, 1, count)))
     z = wavelength * (at + 1j * amplitude * np.sin(2 * np.pi * at)) * np.exp(0.3j)
@@ -87,7 +103,9 @@ def test_a_body_that_slides_along_a_sine_has_the_numbers_of_the_sine(amplitude, 
                 "efficiency": 1.0, "wavelength": wavelength, "arc_wavelength": 1 / waves,
                 "amplitude": amplitude * wavelength}  # fmt: skip
     for name, value in expected.items():
-        assert f.value(name)[0] == pytest.approx(value, abs=0.012 * max(abs(value), 0.3)), name
+        assert f.value(name)[0] == pytest.approx(
+            value, abs=0.012 * max(abs(value), 0.3)
+        ), name
     assert f.value("slip")[0] < 0.03
 
 
@@ -112,7 +130,10 @@ def test_slip_and_efficiency_without_noise_are_those_of_the_balance():
 
 def test_cycles_that_repeat_without_noise_have_small_errors(exact):
     f, n = fit.fit_midlines(exact.trial()), len(QUANTITIES)
-    width, error = f.intervals.half_width[:n], (f.intervals.value - noiseless(exact))[:n]
+    width, error = (
+        f.intervals.half_width[:n],
+        (f.intervals.value - noiseless(exact))[:n],
+    )
     assert (np.abs(error) <= width + 2e-4).all() and width.max() < 0.04
 
 
@@ -120,29 +141,52 @@ def test_cycles_that_repeat_without_noise_have_small_errors(exact):
 
 
 def test_heads_of_files_tell_midlines_from_logs():
-    assert reader.is_midlines(("scorer", "a", "b")) and reader.is_midlines(("frame", "x", "y"))
-    assert not reader.is_midlines(("t", "coords", "alpha_1")) and not reader.is_midlines(("t", "x", "y", "theta"))
+    assert reader.is_midlines(("scorer", "a", "b")) and reader.is_midlines(
+        ("frame", "x", "y")
+    )
+    assert not reader.is_midlines(
+        ("t", "coords", "alpha_1")
+    ) and not reader.is_midlines(("t", "x", "y", "theta"))
 
 
 def wide(trial, names=None, t="t", unit=""):
     names = names or [f"p{k + 1}" for k in range(trial.points.shape[1])]
     rows = [",".join([t, *(f"{n}_{c}{unit}" for n in names for c in "xy")])]
-    return "\n".join(rows + [",".join(f"{v:.8g}" for v in (x, *p.ravel())) for x, p in zip(trial.t, trial.points)])
+    return "\n".join(
+        rows
+        + [
+            ",".join(f"{v:.8g}" for v in (x, *p.ravel()))
+            for x, p in zip(trial.t, trial.points)
+        ]
+    )
 
 
 def deeplabcut(trial, score=0.99):
     """A film of 600 pixels, in which the body is 300 long and y runs down."""
     names = [f"part{k}" for k in range(trial.points.shape[1])]
-    heads = {"scorer": ["net"] * 3, "bodyparts": None, "coords": ["x", "y", "likelihood"]}
-    rows = [",".join([word, *(x for n in names for x in cells or [n] * 3)]) for word, cells in heads.items()]
+    heads = {
+        "scorer": ["net"] * 3,
+        "bodyparts": None,
+        "coords": ["x", "y", "likelihood"],
+    }
+    rows = [
+        ",".join([word, *(x for n in names for x in cells or [n] * 3)])
+        for word, cells in heads.items()
+    ]
     for k, p in enumerate(trial.points):
-        cells = [f"{v:.8g}" for x, y in p for v in (100 + 300 * x, 700 - 300 * y, score)]
+        cells = [
+            f"{v:.8g}" for x, y in p for v in (100 + 300 * x, 700 - 300 * y, score)
+        ]
         rows.append(",".join([str(k), *cells]))
     return "\n".join(rows)
 
 
 def long(trial, order=1):
-    rows = [f"{t:.8g},{k + 1},{x:.8g},{y:.8g}" for t, p in zip(trial.t, trial.points) for k, (x, y) in enumerate(p)]
+    rows = [
+        f"{t:.8g},{k + 1},{x:.8g},{y:.8g}"
+        for t, p in zip(trial.t, trial.points)
+        for k, (x, y) in enumerate(p)
+    ]
     return "\n".join(["t,point,x_BL,y_BL", *rows[::order]])
 
 
@@ -157,8 +201,18 @@ def test_every_format_gives_the_same_trial(exact, tmp_path):
         (wide(scaled(120), unit="_mm"), {}, 0.12),
         (wide(scaled(12), unit=" (cm)"), {}, 0.12),
         (re.sub(r"p(\d+)_([xy])", r"\2_\1", wide(exact, unit="_bl")), {"y": "up"}, 1.0),
-        (re.sub("(?m)^([^,]*),[^,]*,", r"\1,", long(exact)).replace("t,", "time,"), {}, 1.0),  # points have no numbers
-        (re.sub("(?m)^([^,t]+)", lambda t: f"{1e3 * float(t[1]):.9g}", long(exact)).replace("t,", "t_ms,", 1), {}, 1.0),
+        (
+            re.sub("(?m)^([^,]*),[^,]*,", r"\1,", long(exact)).replace("t,", "time,"),
+            {},
+            1.0,
+        ),  # points have no numbers
+        (
+            re.sub(
+                "(?m)^([^,t]+)", lambda t: f"{1e3 * float(t[1]):.9g}", long(exact)
+            ).replace("t,", "t_ms,", 1),
+            {},
+            1.0,
+        ),
     )
     for text, options, size in forms:
         file.write_text(text)
@@ -168,7 +222,9 @@ def test_every_format_gives_the_same_trial(exact, tmp_path):
         assert trial.unit == ("m" if size < 1 else "BL") and trial.timed
     file.write_text(deeplabcut(exact))
     trial = reader.read(file, fps=30.0, scale=0.4)
-    assert trial.names[:2] == ("part0", "part1") and any("y is taken to run down" in x for x in trial.notes)
+    assert trial.names[:2] == ("part0", "part1") and any(
+        "y is taken to run down" in x for x in trial.notes
+    )
     moved = (trial.points - trial.points[0, 0]) / 0.12
     np.testing.assert_allclose(moved, exact.points - exact.points[0, 0], atol=1e-5)
     file.write_text(deeplabcut(exact, 0.3))
@@ -182,7 +238,11 @@ def test_every_format_gives_the_same_trial(exact, tmp_path):
         ("t,point", "s,place", "no column t or frame"),
         ("x_BL,y_BL", "x_mm,y_m", "columns in m and in mm"),
         ("t,point,x_BL,y_BL", "t,s,curvature,y_BL", "centreline"),
-        ("t,point,x_BL,y_BL\n0,1,", "t,point,x_BL,y_BL\n0,1,one", "line 2, column x_bl"),
+        (
+            "t,point,x_BL,y_BL\n0,1,",
+            "t,point,x_BL,y_BL\n0,1,one",
+            "line 2, column x_bl",
+        ),
         ("\n0,2,", "\n0,1,", "line 3: point 1 is given twice"),
         ("t,point,x_BL,y_BL", "t,point,x_BL,x_BL", "the column 'x_bl' is there twice"),
         ("t,point", "t_mm,point", "line 1: t_mm is in mm: give t in s or ms"),
@@ -228,7 +288,9 @@ SLIPS = {
 
 
 @pytest.mark.parametrize("said", SLIPS)
-def test_slips_of_tracking_are_refused_by_place_and_mended_on_request(noisy, fitted, said):
+def test_slips_of_tracking_are_refused_by_place_and_mended_on_request(
+    noisy, fitted, said
+):
     trial = changed(noisy.trial(), SLIPS[said])
     with pytest.raises(Refusal, match=r"line \d+ .*" + said + ".* mend"):
         fit.slips.checked(trial, False)
@@ -257,7 +319,9 @@ def test_trials_that_do_not_tell_are_refused(noisy, change, said):
 
 def at(places, value):
     """A change of a trial: its points at some places, (frames, points), have other values."""
-    return lambda t: changed(t, lambda p: p.__setitem__(places, value(p) if callable(value) else value))
+    return lambda t: changed(
+        t, lambda p: p.__setitem__(places, value(p) if callable(value) else value)
+    )
 
 
 def standing(trial):
@@ -268,7 +332,9 @@ def standing(trial):
 
 def without(trial, left_out):
     kept = ~left_out
-    return dataclasses.replace(trial, t=trial.t[kept], points=trial.points[kept], lines=trial.lines[kept])
+    return dataclasses.replace(
+        trial, t=trial.t[kept], points=trial.points[kept], lines=trial.lines[kept]
+    )
 
 
 def backwards(_):
@@ -300,11 +366,18 @@ def test_another_motion_within_a_trial_is_refused_by_its_times(noisy, fitted):
     other = synthetic.made(GLASS, 1.5, 30, waves=2.4, swing=0.5, seed=1)
     shift = noisy.points[-1].mean(0) - other.points[0].mean(0)
     points = np.concatenate([noisy.points, other.points + shift])
-    with pytest.raises(Refusal, match="the motion stands, or is another one, after t = [45]"):
+    with pytest.raises(
+        Refusal, match="the motion stands, or is another one, after t = [45]"
+    ):
         fit.fit_midlines(trial_of(np.arange(len(points)) / 30, points), mend=True)
     t = (cycles := fitted.cycles(fitted.curve)).tangent
-    mirrored = dataclasses.replace(cycles, tangent=np.stack([*t[:2], t[2].conj(), t[3]]))
-    with pytest.raises(Refusal, match=r"the cycle from t = 2\.\d+ to 3\.\d+ does not repeat .* \(correlation -0\.9"):
+    mirrored = dataclasses.replace(
+        cycles, tangent=np.stack([*t[:2], t[2].conj(), t[3]])
+    )
+    with pytest.raises(
+        Refusal,
+        match=r"the cycle from t = 2\.\d+ to 3\.\d+ does not repeat .* \(correlation -0\.9",
+    ):
         fit._check_alike(fitted.trial, mirrored)
 
 
@@ -313,7 +386,9 @@ def test_the_head_is_found_from_the_motion_and_said(exact, noisy, fitted):
     assert found.head.startswith("30, by the motion") and fitted.head.startswith("30")
     np.testing.assert_allclose(found.sample.value, fitted.sample.value, atol=1e-6)
     assert "tail first" in fit.fit_midlines(exact.trial(), head="first").head
-    back = dataclasses.replace(exact.trial(), t=exact.t, points=exact.points[::-1])  # a film run backwards
+    back = dataclasses.replace(
+        exact.trial(), t=exact.t, points=exact.points[::-1]
+    )  # a film run backwards
     assert fit.fit_midlines(back).head.startswith("1,")
 
 
@@ -321,34 +396,63 @@ def test_missing_points_and_gaps_are_bridged_and_said(noisy, fitted):
     points = noisy.points.copy()
     points[np.random.default_rng(0).random(points.shape[:2]) < 0.05] = np.nan
     found = fit.fit_midlines(dataclasses.replace(noisy.trial(), points=points))
-    assert (np.abs(found.intervals.value - fitted.intervals.value) <= fitted.intervals.half_width).all()
-    some = np.sort(np.random.default_rng(1).choice(len(noisy.t), 100, replace=False))  # uneven in time
+    assert (
+        np.abs(found.intervals.value - fitted.intervals.value)
+        <= fitted.intervals.half_width
+    ).all()
+    some = np.sort(
+        np.random.default_rng(1).choice(len(noisy.t), 100, replace=False)
+    )  # uneven in time
     t = noisy.trial()
-    found = fit.fit_midlines(dataclasses.replace(t, t=t.t[some], points=t.points[some], lines=t.lines[some]))
-    assert (np.abs(found.intervals.value - fitted.intervals.value) <= 1.5 * fitted.intervals.half_width).all()
+    found = fit.fit_midlines(
+        dataclasses.replace(t, t=t.t[some], points=t.points[some], lines=t.lines[some])
+    )
+    assert (
+        np.abs(found.intervals.value - fitted.intervals.value)
+        <= 1.5 * fitted.intervals.half_width
+    ).all()
     kept = np.r_[0:50, 62 : len(noisy.t)]
-    gap = fit.fit_midlines(dataclasses.replace(t, t=t.t[kept], points=t.points[kept], lines=t.lines[kept]))
+    gap = fit.fit_midlines(
+        dataclasses.replace(t, t=t.t[kept], points=t.points[kept], lines=t.lines[kept])
+    )
     assert len(gap.used) == len(fitted.used) - 1
 
 
 def test_five_points_have_modes_enough(noisy, fitted):
     found = fit.fit_midlines(trial_of(noisy.t, noisy.points[:, [0, 7, 15, 22, 29]]))
     assert found.curve.modes == 4
-    assert abs(found.value("speed")[0] - fitted.value("speed")[0]) < found.value("speed")[1]
+    assert (
+        abs(found.value("speed")[0] - fitted.value("speed")[0])
+        < found.value("speed")[1]
+    )
 
 
 def test_mirrored_trials_differ_in_the_sign_of_turns_alone(noisy, fitted):
-    mirrored = fit.fit_midlines(dataclasses.replace(noisy.trial(), points=noisy.points * [1, -1]))
-    sign = np.array([-1 if name in ("heading", "drift", "turn") else 1 for name in QUANTITIES])
+    mirrored = fit.fit_midlines(
+        dataclasses.replace(noisy.trial(), points=noisy.points * [1, -1])
+    )
+    sign = np.array(
+        [-1 if name in ("heading", "drift", "turn") else 1 for name in QUANTITIES]
+    )
     ours, theirs = (x.intervals.value[: len(QUANTITIES)] for x in (fitted, mirrored))
-    assert (np.abs(theirs - sign * ours) < 0.3 * fitted.intervals.half_width[: len(QUANTITIES)]).all()
+    assert (
+        np.abs(theirs - sign * ours)
+        < 0.3 * fitted.intervals.half_width[: len(QUANTITIES)]
+    ).all()
 
 
 def test_two_animals_in_a_file_are_refused_and_tracks_are_no_points(exact, tmp_path):
-    file, (head, *rows) = tmp_path / "trial.csv", wide(exact, t="frame_idx").splitlines()
+    file, (head, *rows) = (
+        tmp_path / "trial.csv",
+        wide(exact, t="frame_idx").splitlines(),
+    )
     file.write_text("\n".join(["track," + head, *("a," + row for row in rows)]))
     assert reader.read(file, units="BL", fps=1.0).points.shape == exact.points.shape
-    file.write_text("\n".join(["track," + head, *(f"{'ab'[k % 2]}," + row for k, row in enumerate(rows))]))
+    file.write_text(
+        "\n".join(
+            ["track," + head, *(f"{'ab'[k % 2]}," + row for k, row in enumerate(rows))]
+        )
+    )
     with pytest.raises(Refusal, match="2 animals are in it: a, b"):
         reader.read(file)
     scorer, *rest = deeplabcut(exact).splitlines()
@@ -373,7 +477,9 @@ def noiseless(made):
     clock = kinematics.clock(curve, fit.period(trial))
     marks, used = fit.full_cycles(trial, curve, clock)
     each = kinematics.averages(fit.used_cycles(curve, clock, marks, used))
-    return kinematics.quantities(each.weighted(np.full((1, len(used)), 1 / len(used))))[0]
+    return kinematics.quantities(each.weighted(np.full((1, len(used)), 1 / len(used))))[
+        0
+    ]
 
 
 def covered(system, known, seeds, cycles=8.4, frames=40, **options):
@@ -386,37 +492,61 @@ def covered(system, known, seeds, cycles=8.4, frames=40, **options):
         expected[k] = own[k] - own[k + 1] + known[k + 1]
         errors.append(f.intervals.value - expected)
         widths.append(f.intervals.half_width)
-    return np.array(errors)[:, : len(QUANTITIES)], np.array(widths)[:, : len(QUANTITIES)]
+    return np.array(errors)[:, : len(QUANTITIES)], np.array(widths)[
+        :, : len(QUANTITIES)
+    ]
 
 
 def test_cycles_too_few_to_show_how_they_vary_are_noted():
     one, two, three = (fit._notes(np.zeros(count)) for count in (1, 2, 3))
-    assert one[0].startswith("one full cycle") and two[0].startswith("two full cycles") and three == []
+    assert (
+        one[0].startswith("one full cycle")
+        and two[0].startswith("two full cycles")
+        and three == []
+    )
 
 
 @pytest.mark.parametrize(
-    ("variance", "alike", "width"), [(0.0, 0.0, 1.0), (0.3, 0.0, 1.32), (3.0, 0.0, 1.55), (30.0, 0.3, 1.6)]
+    ("variance", "alike", "width"),
+    [(0.0, 0.0, 1.0), (0.3, 0.0, 1.32), (3.0, 0.0, 1.55), (30.0, 0.3, 1.6)],
 )
 def test_intervals_of_samples_whose_truth_is_zero(variance, alike, width):
     """Noise that ends one cycle too far begins the next too late: it is less in the mean than its scatter says."""
     rng, count, sigma = np.random.default_rng(0), 8, 0.7
-    noise = lambda *lead: np.diff(sigma * rng.normal(size=(*lead, count + 1, 400)), axis=-2)
+    noise = lambda *lead: np.diff(
+        sigma * rng.normal(size=(*lead, count + 1, 400)), axis=-2
+    )
     apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
-    pseudo = np.sqrt(variance) * np.linalg.cholesky(alike**apart) @ rng.normal(size=(count, 400)) + noise()
+    pseudo = (
+        np.sqrt(variance)
+        * np.linalg.cholesky(alike**apart)
+        @ rng.normal(size=(count, 400))
+        + noise()
+    )
     noisy, none = pseudo + noise(40), np.zeros(400)
-    sample = intervals.Sample(pseudo.mean(0), pseudo, noisy.mean(1), noisy, none, np.zeros((40, 400)))
+    sample = intervals.Sample(
+        pseudo.mean(0), pseudo, noisy.mean(1), noisy, none, np.zeros((40, 400))
+    )
     found = intervals.intervals(sample, 0.95)
     assert 0.92 < (np.abs(found.value) <= found.half_width).mean() < 0.98
     assert np.median(found.noise) == pytest.approx(sigma * np.sqrt(2) / count, rel=0.05)
     deviation = np.sqrt(2 * sigma**2 / count**2 + variance / count)
-    assert np.median(found.half_width) == pytest.approx(1.96 * width * deviation, rel=0.05)
+    assert np.median(found.half_width) == pytest.approx(
+        1.96 * width * deviation, rel=0.05
+    )
 
 
 @pytest.mark.parametrize(("copies", "least", "most"), [(1, 0.0, 0.2), (12, 0.6, 0.8)])
 def test_contrasts_that_are_one_thing_seen_often_are_weak_evidence(copies, least, most):
     """Of 84 contrasts a mean square 1.5 times that of noise shows that cycles vary; of 7, twelve times over, it does not."""
     drawn = 2 * np.random.default_rng(0).normal(size=(400, 12 // copies, 7))
-    assert least < intervals._repeating(np.full((12, 7), np.sqrt(1.5)), np.repeat(drawn, copies, 1)) < most
+    assert (
+        least
+        < intervals._repeating(
+            np.full((12, 7), np.sqrt(1.5)), np.repeat(drawn, copies, 1)
+        )
+        < most
+    )
 
 
 def test_noise_that_is_alike_from_frame_to_frame_is_found(noisy):
@@ -424,30 +554,50 @@ def test_noise_that_is_alike_from_frame_to_frame_is_found(noisy):
     fresh = np.random.default_rng(0).normal(size=noisy.points.shape)
     noise = 0.01 * smooth._alike(fresh, 0.6)
     f = fit.fit_midlines(noisy._replace(points=noisy.exact + noise).trial())
-    assert f.curve.alike == pytest.approx(0.6, abs=0.03) and f.curve.noise == pytest.approx(0.01, rel=0.03)
-    put_on = np.array([f.curve.noisy(np.random.default_rng(k)).coefficients - f.curve.coefficients for k in range(40)])
+    assert f.curve.alike == pytest.approx(
+        0.6, abs=0.03
+    ) and f.curve.noise == pytest.approx(0.01, rel=0.03)
+    put_on = np.array(
+        [
+            f.curve.noisy(np.random.default_rng(k)).coefficients - f.curve.coefficients
+            for k in range(40)
+        ]
+    )
     slow = 0.01 * np.sqrt((1 + 0.6) / (1 - 0.6) / len(noisy.t))  # mean over the trial
     assert put_on.mean(1).std() == pytest.approx(slow, rel=0.1)
 
 
-def test_more_modes_and_knots_are_taken_than_leave_an_error_beside_that_of_noise(exact, fitted):
+def test_more_modes_and_knots_are_taken_than_leave_an_error_beside_that_of_noise(
+    exact, fitted
+):
     found, n = fitted.intervals, len(QUANTITIES)
     assert (found.smoothing < found.noise)[:n].all()
-    few = dataclasses.replace(exact.trial(), points=exact.points[:, ::3], lines=exact.trial().lines[:, ::3])
+    few = dataclasses.replace(
+        exact.trial(), points=exact.points[:, ::3], lines=exact.trial().lines[:, ::3]
+    )
     curve, few = smooth.fitted(smooth.filled(few), 1.0)
     assert (curve.modes, smooth.coarser(few, curve).modes) == (5, 4)
 
 
 def test_bodies_are_taken_to_keep_their_length(fitted):
-    alike = intervals.intervals(fitted.sample, 0.95).half_width / fitted.intervals.half_width
-    assert alike[1] > 1.02 and (np.delete(alike, 1) == 1).all() and QUANTITIES[1] == "length"
+    alike = (
+        intervals.intervals(fitted.sample, 0.95).half_width
+        / fitted.intervals.half_width
+    )
+    assert (
+        alike[1] > 1.02
+        and (np.delete(alike, 1) == 1).all()
+        and QUANTITIES[1] == "length"
+    )
 
 
 def test_what_smoothing_cuts_off_is_judged_from_its_change():
     """A change of 0.7 that noise of 0.1 explains in small part, where 3 modes more leave a seventh."""
     rng, one = np.random.default_rng(0), np.ones((1, 50))
     noise = 0.1 * rng.normal(size=(4000, 50))
-    sample = intervals.Sample(one[0], one, 1 + noise, (1 + noise)[:, None], 0.7 * one[0], 0.7 + noise)
+    sample = intervals.Sample(
+        one[0], one, 1 + noise, (1 + noise)[:, None], 0.7 * one[0], 0.7 + noise
+    )
     found = intervals.intervals(sample, 0.95)
     np.testing.assert_allclose(found.smoothing, np.sqrt(0.7**2 - 0.1**2), rtol=0.01)
     np.testing.assert_allclose(found.half_width, 1.96 * 0.7, rtol=0.02)
@@ -465,8 +615,13 @@ def test_intervals_cover_the_truth_in_a_few_trials():
 def test_intervals_cover_the_truth_in_90_to_98_percent(options, cycles):
     """Of 200 trials a share of 95 % has a standard error of 1.5 %. Turns of cycles that vary share their ends, as heading
     is what turns: few cycles do not show that, and their intervals are too wide."""
-    error, width = covered(GLASS, truth(GLASS, **options), range(40000, 40200), cycles, **options)
-    share, size = (np.abs(error) <= width).mean(0), np.median(width, 0) / 1.96 / np.sqrt((error**2).mean(0))
+    error, width = covered(
+        GLASS, truth(GLASS, **options), range(40000, 40200), cycles, **options
+    )
+    share, size = (
+        (np.abs(error) <= width).mean(0),
+        np.median(width, 0) / 1.96 / np.sqrt((error**2).mean(0)),
+    )
     print(options, cycles, *zip(QUANTITIES, share.round(3), size.round(2)), sep="\n")
     turn = QUANTITIES.index("turn")
     assert (share >= 0.9).all() and (np.delete(share, turn) <= 0.99).all()
@@ -478,14 +633,23 @@ def test_intervals_cover_the_truth_in_90_to_98_percent(options, cycles):
 
 def test_the_medium_of_the_trial_predicts_it_and_another_does_not(fitted):
     same = predicted.compare(fitted, MEDIA["glass-0.3mm-loose"])
-    apart = np.abs(same.measured - same.predicted) / np.hypot(same.measured_error, same.predicted_error)
+    apart = np.abs(same.measured - same.predicted) / np.hypot(
+        same.measured_error, same.predicted_error
+    )
     assert (apart < 1).all()
     other = predicted.compare(fitted, MEDIA["glass-0.3mm-close"])
     speed, slip = predicted.COMPARED.index("speed"), predicted.COMPARED.index("slip")
-    assert other.predicted[speed] + other.predicted_error[speed] < other.measured[speed] - other.measured_error[speed]
+    assert (
+        other.predicted[speed] + other.predicted_error[speed]
+        < other.measured[speed] - other.measured_error[speed]
+    )
     assert other.predicted[slip] > other.measured[slip]
     C, gamma0 = other.closing
-    assert (C.name, gamma0.name) == ("C", "gamma0") and 1.5 < C.value < 2.0 and np.isnan(gamma0.value)
+    assert (
+        (C.name, gamma0.name) == ("C", "gamma0")
+        and 1.5 < C.value < 2.0
+        and np.isnan(gamma0.value)
+    )
     assert 0.01 < C.error < 0.3
     closed = predicted.compare(fitted, dataclasses.replace(other.medium, C=C.value))
     assert closed.predicted[speed] == pytest.approx(closed.measured[speed], rel=0.02)
@@ -495,29 +659,67 @@ def test_the_command_prints_writes_and_draws(noisy, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     synthetic.save("mid.csv", noisy)
     code, out, _ = command(
-        "fit-gait", "mid.csv", "--medium", "glass-0.3mm-close", "-o", "mid.nc", "--plot", "mid.svg", "--json"
+        "fit-gait",
+        "mid.csv",
+        "--medium",
+        "glass-0.3mm-close",
+        "-o",
+        "mid.nc",
+        "--plot",
+        "mid.svg",
+        "--json",
     )
     numbers = json.loads(out)
-    assert not code and numbers["cycles"] == 4 and {*numbers["quantities"]} == {*QUANTITIES}
+    assert (
+        not code
+        and numbers["cycles"] == 4
+        and {*numbers["quantities"]} == {*QUANTITIES}
+    )
     speed = numbers["quantities"]["speed"]
-    assert {x["unit"] for x in numbers["quantities"].values()} == {"Hz", "BL", "BL/s", "rad", "1"}
+    assert {x["unit"] for x in numbers["quantities"].values()} == {
+        "Hz",
+        "BL",
+        "BL/s",
+        "rad",
+        "1",
+    }
     assert math.hypot(*speed["standard_error"].values()) < speed["half_width"]
     assert (
-        len(numbers["along"]["slip"]["value"]) == len(numbers["along"]["amplitude"]["half_width"]) == kinematics.PARTS
+        len(numbers["along"]["slip"]["value"])
+        == len(numbers["along"]["amplitude"]["half_width"])
+        == kinematics.PARTS
     )
-    assert np.mean(numbers["per_cycle"]["speed"]) == pytest.approx(speed["value"], rel=0.01)
-    assert numbers["predicted"]["speed"]["value"] < speed["value"] and numbers["predicted"]["heading"]["unit"] == "rad"
+    assert np.mean(numbers["per_cycle"]["speed"]) == pytest.approx(
+        speed["value"], rel=0.01
+    )
+    assert (
+        numbers["predicted"]["speed"]["value"] < speed["value"]
+        and numbers["predicted"]["heading"]["unit"] == "rad"
+    )
     C, gamma0 = numbers["closing"]
-    assert C["tried"][0] < C["present"] < C["value"] < C["tried"][1] and 0 < C["half_width"] < 0.5
+    assert (
+        C["tried"][0] < C["present"] < C["value"] < C["tried"][1]
+        and 0 < C["half_width"] < 0.5
+    )
     assert gamma0["unit"] == "rad" and gamma0["value"] is None is gamma0["half_width"]
     with netcdf_file("mid.nc", mmap=False) as file:
-        assert float(file.variables["speed"].data) == numbers["quantities"]["speed"]["value"]
-        assert float(file.variables["speed_error"].data) == numbers["quantities"]["speed"]["half_width"]
+        assert (
+            float(file.variables["speed"].data)
+            == numbers["quantities"]["speed"]["value"]
+        )
+        assert (
+            float(file.variables["speed_error"].data)
+            == numbers["quantities"]["speed"]["half_width"]
+        )
         assert file.variables["slip_along"].shape == (kinematics.PARTS,)
     assert "measured" in (tmp_path / "mid.svg").read_text()
     found = geomech.fit_midlines("mid.csv", "glass-0.3mm-close")
     assert found["speed"][0] == numbers["quantities"]["speed"]["value"]
-    assert "C = 1.305: " in repr(found) and "gives the measured distance" in repr(found) and "none from" in repr(found)
+    assert (
+        "C = 1.305: " in repr(found)
+        and "gives the measured distance" in repr(found)
+        and "none from" in repr(found)
+    )
     assert found.to_xarray()["slip_along"].attrs["units"] == "rad"
     code, _, err = command("fit-gait", "mid.csv", "--degrees")
     assert code == 2 and "--degrees" in err
@@ -538,15 +740,27 @@ def test_trials_that_are_made_are_what_they_say():
     middle = np.arange(23) / 23 + 0.5 / 23  # of the body, between two points
     headings = np.unwrap(np.angle(np.diff(z)), axis=1)
     headings -= 0.3 * (middle - 0.5)
-    basis = np.stack([np.ones(23), np.sin(2 * np.pi * 1.3 * (middle - 0.5)), np.cos(2 * np.pi * 1.3 * (middle - 0.5))])
+    basis = np.stack(
+        [
+            np.ones(23),
+            np.sin(2 * np.pi * 1.3 * (middle - 0.5)),
+            np.cos(2 * np.pi * 1.3 * (middle - 0.5)),
+        ]
+    )
     _, cos, sin = np.linalg.lstsq(basis.T, headings.T, rcond=None)[0]
     np.testing.assert_allclose(np.hypot(cos, sin), 0.6, rtol=0.01)
     np.testing.assert_allclose(
-        np.unwrap(np.arctan2(sin, cos)) - np.arctan2(sin[0], cos[0]), 4 * np.pi * made.t, atol=0.02
+        np.unwrap(np.arctan2(sin, cos)) - np.arctan2(sin[0], cos[0]),
+        4 * np.pi * made.t,
+        atol=0.02,
     )
-    net = displacement(swimmer.velocity(*one_cycle(swimmer, np.arctan2(sin[0], cos[0]), 0.6, 1.3, 0.3)))
+    net = displacement(
+        swimmer.velocity(*one_cycle(swimmer, np.arctan2(sin[0], cos[0]), 0.6, 1.3, 0.3))
+    )
     np.testing.assert_allclose(
-        z[30], np.exp(1j * net[2]) * z[0] + np.exp(0.7j) * (net[0] + 1j * net[1]) / 0.4, atol=2e-3
+        z[30],
+        np.exp(1j * net[2]) * z[0] + np.exp(0.7j) * (net[0] + 1j * net[1]) / 0.4,
+        atol=2e-3,
     )
     np.testing.assert_allclose(np.abs(np.diff(z, axis=1)).sum(1), 1.0, atol=0.01)
 
@@ -556,12 +770,20 @@ def test_trials_that_are_made_are_what_they_say():
     np.testing.assert_array_equal(still.exact, off.exact)
     assert (off.points - still.points).std() == pytest.approx(0.02, rel=0.03)
     varied = many(spread=1e-3)
-    bend = lambda trial: np.diff(np.unwrap(np.angle(np.diff(trial.exact @ [1.0, 1j])), axis=1))
+    bend = lambda trial: np.diff(
+        np.unwrap(np.angle(np.diff(trial.exact @ [1.0, 1j])), axis=1)
+    )
     rates = [
-        (bend(many(**{name: 1e-4 + value})) - bend(still)) / 1e-4 for name, value in (("swing", 0.9), ("waves", 1.1))
+        (bend(many(**{name: 1e-4 + value})) - bend(still)) / 1e-4
+        for name, value in (("swing", 0.9), ("waves", 1.1))
     ]
     rows = np.stack(rates, -1) * [0.9, 1.1]
-    found = np.array([np.linalg.lstsq(a, b, rcond=None)[0] for a, b in zip(rows, bend(varied) - bend(still))])
+    found = np.array(
+        [
+            np.linalg.lstsq(a, b, rcond=None)[0]
+            for a, b in zip(rows, bend(varied) - bend(still))
+        ]
+    )
     np.testing.assert_allclose(found.std(0), 1e-3, rtol=0.2)
     assert abs(np.corrcoef(found.T)[0, 1]) < 0.2
     np.testing.assert_allclose(
@@ -597,7 +819,9 @@ def one_cycle(swimmer, start, swing, waves, bend):
         (0.2, 1.0, (0.0, 900.0), 0.0, 0.2, 1e-3, 10**2.5),
     ],
 )  # fmt: skip
-def test_the_value_that_closes_a_gap_is_a_root(level, power, bounds, value, root, low, high):
+def test_the_value_that_closes_a_gap_is_a_root(
+    level, power, bounds, value, root, low, high
+):
     """Of a stride that is a power of a parameter, which a medium takes within bounds."""
 
     def gap(x):
@@ -610,16 +834,26 @@ def test_the_value_that_closes_a_gap_is_a_root(level, power, bounds, value, root
     slope = abs(power) * level ** (power - 1)
     wanted = (root, 0.01 / slope) if math.isfinite(root) else (math.nan, math.nan)
     np.testing.assert_allclose((found.value, found.error), wanted, rtol=2e-3)
-    tried = value * 2 ** (np.arange(25) / 2 - 6) if value else 10 ** (np.arange(13) / 2 - 3)
+    tried = (
+        value * 2 ** (np.arange(25) / 2 - 6) if value else 10 ** (np.arange(13) / 2 - 3)
+    )
     tried = tried[(tried >= bounds[0]) & (tried <= bounds[1])]
-    np.testing.assert_allclose((found.low, found.high), (tried[0], tried[-1]), rtol=1e-12)
+    np.testing.assert_allclose(
+        (found.low, found.high), (tried[0], tried[-1]), rtol=1e-12
+    )
 
 
 def test_of_several_roots_the_one_nearest_to_the_present_value_closes_a_gap():
     wave = lambda x: math.sin(math.pi * math.log2(x) / 3)  # zero at powers of 8
-    assert predicted._closed("C", "-", 3.0, wave, 0.1, None, 1.0).value == pytest.approx(8.0, rel=2e-3)
-    assert predicted._closed("C", "-", 2.0, wave, 0.1, None, 1.0).value == pytest.approx(1.0, rel=2e-3)
-    flat = lambda size: predicted._closed("C", "-", 2.0, lambda x: size * wave(x), 0.1, None, 0.5)
+    assert predicted._closed(
+        "C", "-", 3.0, wave, 0.1, None, 1.0
+    ).value == pytest.approx(8.0, rel=2e-3)
+    assert predicted._closed(
+        "C", "-", 2.0, wave, 0.1, None, 1.0
+    ).value == pytest.approx(1.0, rel=2e-3)
+    flat = lambda size: predicted._closed(
+        "C", "-", 2.0, lambda x: size * wave(x), 0.1, None, 0.5
+    )
     moves = np.ptp([wave(2 * x) for x in predicted.FACTORS])
     assert flat(0.49e-4 / moves) is None and flat(0.51e-4 / moves) is not None
 
@@ -646,21 +880,37 @@ def test_the_variances_of_cycles_have_their_likelihood(constant):
         same = (deviation[..., k] ** 2).sum(0).mean() / (number - 1)
         near = (deviation[:, 1:, k] * deviation[:, :-1, k]).sum(0).mean() / (number - 1)
         scatter = values[:, k].var(ddof=1)
-        knowns.append((same + 1e-9 * scatter) * (apart == 0) + np.clip(near, -same / 2, same / 2) * (apart == 1))
-    white = [np.linalg.inv(np.linalg.cholesky(contrasts.T @ x @ contrasts)) @ contrasts.T for x in knowns]
+        knowns.append(
+            (same + 1e-9 * scatter) * (apart == 0)
+            + np.clip(near, -same / 2, same / 2) * (apart == 1)
+        )
+    white = [
+        np.linalg.inv(np.linalg.cholesky(contrasts.T @ x @ contrasts)) @ contrasts.T
+        for x in knowns
+    ]
     drawn = np.stack([deviation[..., k] @ white[k].T for k in range(2)], 1)
-    exact = intervals._repeating(np.stack([white[k] @ values[:, k] for k in range(2)]), drawn)
+    exact = intervals._repeating(
+        np.stack([white[k] @ values[:, k] for k in range(2)]), drawn
+    )
     exact += (1 - exact) * constant
     found, by_cycles = intervals._of_cycles(values, noise, constant)
     for k, known in enumerate(knowns):
-        scatter, same = values[:, k].var(ddof=1), knowns[k][0, 0] - 1e-9 * values[:, k].var(ddof=1)
+        scatter, same = (
+            values[:, k].var(ddof=1),
+            knowns[k][0, 0] - 1e-9 * values[:, k].var(ddof=1),
+        )
         prior = intervals.TRIED * scatter / (intervals.TRIED * scatter + same)
         prior = [exact, *((1 - exact) * prior / prior.sum())]
         for correlation in (-0.5, 0.0, 0.5):
             alike = correlation ** apart.astype(float)
             for v, p in zip([0.0, *(intervals.TRIED * scatter)], prior):
                 covariance = contrasts.T @ (known + v * alike) @ contrasts
-                weights.append(p * multivariate_normal.pdf(contrasts.T @ values[:, k], cov=covariance))
+                weights.append(
+                    p
+                    * multivariate_normal.pdf(
+                        contrasts.T @ values[:, k], cov=covariance
+                    )
+                )
                 variances.append(v * alike.mean())
     weights = np.reshape(weights, (2, -1)).T
     np.testing.assert_allclose(found, weights / weights.sum(0), atol=1e-7)
@@ -672,7 +922,10 @@ def test_an_interval_has_its_share_of_the_mixture_of_normals():
     rng = np.random.default_rng(2)
     pseudo, noise = rng.normal(size=(4, 3)), 0.4 * rng.normal(size=(12, 4, 3))
     value, change = pseudo.mean(0) + 5.0, np.array([0.3, 0.0, -0.2])
-    noisy, moved = value + noise.mean(1) + [0.1, 0.0, -0.2], change + 0.05 * rng.normal(size=(12, 3)) + [0.0, 0.0, 0.05]
+    noisy, moved = (
+        value + noise.mean(1) + [0.1, 0.0, -0.2],
+        change + 0.05 * rng.normal(size=(12, 3)) + [0.0, 0.0, 0.05],
+    )
     sample = intervals.Sample(value, pseudo, noisy, pseudo + noise, change, moved)
     for level in (0.9, 0.95):
         found = intervals.intervals(sample, level)
@@ -686,11 +939,17 @@ def test_an_interval_has_its_share_of_the_mixture_of_normals():
         inside = 2 * norm.cdf(found.half_width / np.sqrt(by_cycles + known)) - 1
         np.testing.assert_allclose((weights * inside).sum(0), level, atol=1e-9)
         np.testing.assert_allclose(
-            found.half_width / norm.ppf((1 + level) / 2), np.sqrt(found.cycles**2 + known), rtol=1e-9
+            found.half_width / norm.ppf((1 + level) / 2),
+            np.sqrt(found.cycles**2 + known),
+            rtol=1e-9,
         )
-        one = intervals.Sample(value, pseudo[:1], noisy, (pseudo + noise)[:, :1], change, moved)
+        one = intervals.Sample(
+            value, pseudo[:1], noisy, (pseudo + noise)[:, :1], change, moved
+        )
         alone = intervals.intervals(one, level)
-        np.testing.assert_allclose(alone.half_width, norm.ppf((1 + level) / 2) * np.sqrt(known), rtol=1e-12)
+        np.testing.assert_allclose(
+            alone.half_width, norm.ppf((1 + level) / 2) * np.sqrt(known), rtol=1e-12
+        )
         np.testing.assert_allclose(alone.cycles, 0.0, atol=1e-7)
         np.testing.assert_array_equal(found.per_cycle, pseudo)
 
@@ -700,7 +959,12 @@ def test_an_interval_has_its_share_of_the_mixture_of_normals():
 
 def line_of(frames=40, count=11, move=0.0):
     """A straight body of length 1, tail at the origin and head at x = 1, that moves along y."""
-    points = np.stack(np.broadcast_arrays(np.linspace(0, 1, count), move * np.arange(frames)[:, None]), -1)
+    points = np.stack(
+        np.broadcast_arrays(
+            np.linspace(0, 1, count), move * np.arange(frames)[:, None]
+        ),
+        -1,
+    )
     return trial_of(np.arange(frames) / 10, points)
 
 
@@ -724,30 +988,43 @@ def test_frames_are_of_one_size(factor, said):
 
 
 @pytest.mark.parametrize(
-    ("degrees", "said"), [(119, ""), (121, "from 4 by 5 to 6 the body turns back in most frames: points")]
+    ("degrees", "said"),
+    [(119, ""), (121, "from 4 by 5 to 6 the body turns back in most frames: points")],
 )
 def test_points_run_along_the_body(degrees, said):
     turn = np.exp(1j * np.radians(degrees) * (np.arange(10) >= 4))
     z = np.concatenate([[0], np.cumsum(turn)]) / 10
-    trial = trial_of(np.arange(20.0), np.broadcast_to(np.stack([z.real, z.imag], -1), (20, 11, 2)))
+    trial = trial_of(
+        np.arange(20.0), np.broadcast_to(np.stack([z.real, z.imag], -1), (20, 11, 2))
+    )
     with refused(said):
         fit.slips._check_order(trial)
 
 
 def test_points_are_seen_in_half_of_the_frames_and_frames_have_most_of_their_points():
     fit.slips._check_points(at((slice(20), 4), np.nan)(line_of()))
-    with pytest.raises(Refusal, match="trial.csv: point 5 is missing in 52.5 % of the frames: leave it out"):
+    with pytest.raises(
+        Refusal,
+        match="trial.csv: point 5 is missing in 52.5 % of the frames: leave it out",
+    ):
         fit.slips._check_points(at((slice(21), 4), np.nan)(line_of()))
     trial = at((slice(20), [0, 1, 2, 3]), np.nan)(line_of())
     assert fit.slips._without_poor_frames(trial) is trial
     poor = at((slice(7, 35), [0, 1, 2, 3, 4]), np.nan)(line_of(move=0.1))
     left = fit.slips._without_poor_frames(poor)
     kept = [*range(7), *range(35, 40)]
-    assert left.notes == ("28 frames with fewer than 60% of the points are left out, the first at line 9",)
+    assert left.notes == (
+        "28 frames with fewer than 60% of the points are left out, the first at line 9",
+    )
     for name in ("t", "points", "lines"):
         np.testing.assert_array_equal(getattr(left, name), getattr(poor, name)[kept])
-    with pytest.raises(Refusal, match="11 frames have most of their points: track more points, or lower least_score"):
-        fit.slips._without_poor_frames(at((slice(7, 36), [0, 1, 2, 3, 4]), np.nan)(line_of()))
+    with pytest.raises(
+        Refusal,
+        match="11 frames have most of their points: track more points, or lower least_score",
+    ):
+        fit.slips._without_poor_frames(
+            at((slice(7, 36), [0, 1, 2, 3, 4]), np.nan)(line_of())
+        )
 
 
 @pytest.mark.parametrize(
@@ -763,10 +1040,15 @@ def test_frames_that_run_the_other_way_are_turned_round(aside, turned):
     if not turned:
         assert mended is trial is fit.slips._rotated(trial, False)
         return
-    np.testing.assert_array_equal(mended.points, np.concatenate([points[:12, ::-1], points[12:]]))  # the fewer
-    assert mended.notes == ("12 frames run from the other end of the body and are turned round, the first at line 2",)
+    np.testing.assert_array_equal(
+        mended.points, np.concatenate([points[:12, ::-1], points[12:]])
+    )  # the fewer
+    assert mended.notes == (
+        "12 frames run from the other end of the body and are turned round, the first at line 2",
+    )
     with pytest.raises(
-        Refusal, match=r"line 2 \(t = 0\): 12 frames run from the other end of the body, the first is this one: turn"
+        Refusal,
+        match=r"line 2 \(t = 0\): 12 frames run from the other end of the body, the first is this one: turn",
     ):
         fit.slips._rotated(trial, False)
 
@@ -789,7 +1071,9 @@ def test_ends_that_are_near_each_other_are_not_told_apart(wide, turned):
         (0.0, 0.01, 0.091, 1), (0.0, 0.02, -0.25, 1),
     ],
 )  # fmt: skip
-def test_points_jump_from_where_they_are_in_the_frames_around(wobble, move, jump, found):
+def test_points_jump_from_where_they_are_in_the_frames_around(
+    wobble, move, jump, found
+):
     """By more than 0.03 lengths, 8 times what they are off otherwise, and 6 times what the frames around are."""
     trial = line_of()
     points = trial.points.copy()
@@ -800,10 +1084,15 @@ def test_points_jump_from_where_they_are_in_the_frames_around(wobble, move, jump
     if not found:
         assert mended is trial
         return
-    assert mended.notes == ("1 points that jump or swap are taken for missing: 4 at line 22",)
-    np.testing.assert_array_equal(np.argwhere(np.isnan(mended.points[..., 1])), [[20, 3]])
+    assert mended.notes == (
+        "1 points that jump or swap are taken for missing: 4 at line 22",
+    )
+    np.testing.assert_array_equal(
+        np.argwhere(np.isnan(mended.points[..., 1])), [[20, 3]]
+    )
     with pytest.raises(
-        Refusal, match=rf"line 22 \(t = 2, point 4\): it jumps by {abs(jump):.2g} body lengths from where it is in"
+        Refusal,
+        match=rf"line 22 \(t = 2, point 4\): it jumps by {abs(jump):.2g} body lengths from where it is in",
     ):
         fit.slips._without_jumps(trial, False)
 
@@ -824,7 +1113,10 @@ def test_many_jumps_are_counted():
 )  # fmt: skip
 def test_cycles_are_of_one_pace(longer, said):
     with refused(said):
-        fit._check_pace(line_of(), np.array([0.0, 1.0, 2.0, 3.0 + longer, 4.0 + longer, 5.0 + longer]))
+        fit._check_pace(
+            line_of(),
+            np.array([0.0, 1.0, 2.0, 3.0 + longer, 4.0 + longer, 5.0 + longer]),
+        )
 
 
 def test_a_cycle_has_a_gap_where_an_eighth_of_it_has_no_frame():
@@ -838,7 +1130,9 @@ def test_a_cycle_has_a_gap_where_an_eighth_of_it_has_no_frame():
         (10, 0.98, 2.0, False),
         (10, 0.96, 2.0, True),
     ):
-        assert fit._gap(dataclasses.replace(trial, t=np.delete(t, out)), start, end) == gap
+        assert (
+            fit._gap(dataclasses.replace(trial, t=np.delete(t, out)), start, end) == gap
+        )
 
 
 @pytest.mark.parametrize(
@@ -854,24 +1148,38 @@ def test_a_cycle_has_a_gap_where_an_eighth_of_it_has_no_frame():
     ],
 )  # fmt: skip
 def test_bodies_have_the_length_of_one(unit, size, length, said):
-    trial = dataclasses.replace(line_of(), points=size * line_of().points, unit=unit, length=length)
+    trial = dataclasses.replace(
+        line_of(), points=size * line_of().points, unit=unit, length=length
+    )
     with refused(said):
-        assert fit._with_length(trial, smooth.curve_of(trial, np.linspace(0, 1, 11), 4, 4)) is trial
+        assert (
+            fit._with_length(trial, smooth.curve_of(trial, np.linspace(0, 1, 11), 4, 4))
+            is trial
+        )
 
 
 def test_motions_turn_evenly_or_have_no_period():
     t = np.arange(60) / 50
     at = lambda off: 2 * np.pi * t / 0.8 + off * np.sqrt(2) * np.cos(25 * t)
-    headings = lambda at: np.stack([np.cos(at), 0.9 * np.sin(at), 0.3 * np.cos(at + 1)], -1)
+    headings = lambda at: np.stack(
+        [np.cos(at), 0.9 * np.sin(at), 0.3 * np.cos(at + 1)], -1
+    )
     for sign in (1, -1):
-        assert fit._turning(t, headings(sign * at(0.0)) + 2.0) == pytest.approx(0.8, rel=0.05)
+        assert fit._turning(t, headings(sign * at(0.0)) + 2.0) == pytest.approx(
+            0.8, rel=0.05
+        )
     assert fit._turning(t, headings(at(0.6))) > 0 == fit._turning(t, headings(at(0.85)))
 
 
 def test_a_phase_grows_by_a_fifth_of_a_turn_in_half_a_cycle():
     t = np.arange(120) / 10
-    for least, said in ((0.41, ""), (0.39, "the motion stands, or is another one, after t = 3.1: cut pauses")):
-        phase = np.concatenate([np.arange(31) * 2, 60 + 2 + least * np.pi / 24 * np.arange(89)])
+    for least, said in (
+        (0.41, ""),
+        (0.39, "the motion stands, or is another one, after t = 3.1: cut pauses"),
+    ):
+        phase = np.concatenate(
+            [np.arange(31) * 2, 60 + 2 + least * np.pi / 24 * np.arange(89)]
+        )
         with refused(said):
             fit._check_growing(line_of(), t, phase)
 
@@ -887,22 +1195,36 @@ def test_a_phase_grows_by_a_fifth_of_a_turn_in_half_a_cycle():
         (0.1, 0.015, -1, "first", True, "1, as given"),
     ],
 )  # fmt: skip
-def test_a_body_moves_head_first_against_its_wave(course, stride, wave, head, turn, said, monkeypatch):
+def test_a_body_moves_head_first_against_its_wave(
+    course, stride, wave, head, turn, said, monkeypatch
+):
     """A wave that runs to the head, 1, or away from it, of a body of length 2."""
     numbers = np.tile([1.0, 2.0, 2 * stride, course, 0.0, 0.0, 1.0], (3, 1))
     s = (np.arange(kinematics.NODES) + 0.5) / kinematics.NODES
     first = np.tile(np.exp(-wave * 2j * np.pi * 1.2 * s), (3, 1))
-    monkeypatch.setattr(kinematics, "averages", lambda _: kinematics.Averages(numbers, first, None, None))
+    monkeypatch.setattr(
+        kinematics,
+        "averages",
+        lambda _: kinematics.Averages(numbers, first, None, None),
+    )
     found = fit._head(line_of(), None, head)
     assert (bool(found[0]), found[1]) == (turn, said)
     if head is None and stride > 0.02:
-        monkeypatch.setattr(kinematics, "averages", lambda _: kinematics.Averages(numbers, first.conj(), None, None))
+        monkeypatch.setattr(
+            kinematics,
+            "averages",
+            lambda _: kinematics.Averages(numbers, first.conj(), None, None),
+        )
         end = "11" if course < 1 else "1"
         with pytest.raises(
-            Refusal, match=f"the body moves towards its point {end}, and so does its wave: most swimmers"
+            Refusal,
+            match=f"the body moves towards its point {end}, and so does its wave: most swimmers",
         ):
             fit._head(line_of(), None, None)
-        assert fit._head(line_of(), None, "last") == (False, "11, as given" + "; it moves tail first" * (course > 1))
+        assert fit._head(line_of(), None, "last") == (
+            False,
+            "11, as given" + "; it moves tail first" * (course > 1),
+        )
 
 
 # Files: what is said of them.
@@ -910,7 +1232,9 @@ def test_a_body_moves_head_first_against_its_wave(course, stride, wave, head, tu
 
 def table_of(unit="", timed=True, frames=12, points=5):
     values = np.zeros((frames, points, 3))
-    return reader.Table(np.arange(frames), values, tuple("abcde"[:points]), values[..., 0], unit, timed)
+    return reader.Table(
+        np.arange(frames), values, tuple("abcde"[:points]), values[..., 0], unit, timed
+    )
 
 
 @pytest.mark.parametrize(
@@ -926,14 +1250,20 @@ def table_of(unit="", timed=True, frames=12, points=5):
         ("", "cm", 0.4, "f.csv: scale is that of pixels: drop it, x and y are in cm"),
     ],
 )  # fmt: skip
-def test_units_of_lengths_are_those_of_the_header_or_of_options(unit, units, scale, found):
+def test_units_of_lengths_are_those_of_the_header_or_of_options(
+    unit, units, scale, found
+):
     if isinstance(found, str):
         with pytest.raises(Refusal) as said:
             reader._unit(table_of(unit), "f.csv", units, scale)
         assert str(said.value) == found
     else:
         name, size, notes = reader._unit(table_of(unit), "f.csv", units, scale)
-        assert (name, size, "".join(notes)) == (found[0], pytest.approx(found[1]), found[2])
+        assert (name, size, "".join(notes)) == (
+            found[0],
+            pytest.approx(found[1]),
+            found[2],
+        )
 
 
 def test_times_are_those_of_the_file_or_of_frames():
@@ -943,10 +1273,14 @@ def test_times_are_those_of_the_file_or_of_frames():
     assert (
         not timed
         and t[-1] == 11
-        and notes == ["times are in frames: nobody says how many there are in a second, say fps"]
+        and notes
+        == ["times are in frames: nobody says how many there are in a second, say fps"]
     )
     assert reader._time(table_of(), None)[1:] == (True, [])
-    with pytest.raises(Refusal, match="fps is that of a file that counts frames: drop it, the file has a time"):
+    with pytest.raises(
+        Refusal,
+        match="fps is that of a file that counts frames: drop it, the file has a time",
+    ):
         reader._time(table_of(), 50.0)
 
 
@@ -970,12 +1304,25 @@ def csv_of(header, rows):
 def test_points_are_taken_by_name_in_their_order_and_with_the_bodys_length(tmp_path):
     """In mm, of a body of which the points are half; a likelihood at the limit is enough."""
     rows = [
-        [k, *(x for p in range(6) for x in (p + 0.1 * k, 10 * p, 0.6 if (k, p) != (3, 4) else 0.59)), 7]
+        [
+            k,
+            *(
+                x
+                for p in range(6)
+                for x in (p + 0.1 * k, 10 * p, 0.6 if (k, p) != (3, 4) else 0.59)
+            ),
+            7,
+        ]
         for k in range(12)
     ]
     names = ",".join(f"P{p}_x_mm,P{p}_y_mm,P{p}_score" for p in range(6))
     (tmp_path / "f.csv").write_text(csv_of(f"t,{names},more", rows))
-    trial = reader.read(tmp_path / "f.csv", points=["p5", "P4 ", "p3", "p2", "p0"], body_length=10.0, y="down")
+    trial = reader.read(
+        tmp_path / "f.csv",
+        points=["p5", "P4 ", "p3", "p2", "p0"],
+        body_length=10.0,
+        y="down",
+    )
     assert (trial.names, trial.unit, trial.timed, trial.length) == (
         ("p5", "p4", "p3", "p2", "p0"),
         "m",
@@ -983,7 +1330,10 @@ def test_points_are_taken_by_name_in_their_order_and_with_the_bodys_length(tmp_p
         pytest.approx(0.01),
     )
     order = np.array([5, 4, 3, 2, 0])
-    wanted = 1e-3 * np.stack([order + 0.1 * np.arange(12)[:, None], np.broadcast_to(-10 * order, (12, 5))], -1)
+    wanted = 1e-3 * np.stack(
+        [order + 0.1 * np.arange(12)[:, None], np.broadcast_to(-10 * order, (12, 5))],
+        -1,
+    )
     wanted[3, 1] = np.nan
     np.testing.assert_allclose(trial.points, wanted, atol=1e-12)
     assert trial.lines.tolist() == [[k] * 5 for k in range(2, 14)]
@@ -991,7 +1341,10 @@ def test_points_are_taken_by_name_in_their_order_and_with_the_bodys_length(tmp_p
         "0.017 of all points are missing, 0.017 of all by their likelihood: modes along the body stand for them",
         "columns that are not used: more",
     )
-    with pytest.raises(Refusal, match="f.csv: columns name a point twice: name each once, from one end of the body"):
+    with pytest.raises(
+        Refusal,
+        match="f.csv: columns name a point twice: name each once, from one end of the body",
+    ):
         reader.read(tmp_path / "f.csv", points=["p5", "p4", "p3", "p2", "p5"])
     with pytest.raises(Refusal, match="p7"):
         reader.read(tmp_path / "f.csv", points=["p5", "p4", "p3", "p2", "p7"])
@@ -1022,12 +1375,18 @@ def test_faults_of_files_are_told_by_line(header, change, said, tmp_path):
 
 @pytest.mark.parametrize(
     ("t", "said"),
-    [(2.0, "line 5: t = 2 comes after 2"), (1.5, "line 5: t = 1.5 comes after 2"), ("", "line 5: no time")],
+    [
+        (2.0, "line 5: t = 2 comes after 2"),
+        (1.5, "line 5: t = 1.5 comes after 2"),
+        ("", "line 5: no time"),
+    ],
 )
 def test_frames_come_in_their_order(t, said, tmp_path):
     rows = [[k, *range(10)] for k in range(12)]
     rows[3][0] = t
-    (tmp_path / "f.csv").write_text(csv_of("t," + ",".join(f"x{k},y{k}" for k in range(5)), rows))
+    (tmp_path / "f.csv").write_text(
+        csv_of("t," + ",".join(f"x{k},y{k}" for k in range(5)), rows)
+    )
     with pytest.raises(Refusal, match=said + ": sort the rows by time, one for each"):
         reader.read(tmp_path / "f.csv")
 
@@ -1045,24 +1404,45 @@ def test_frames_come_in_their_order(t, said, tmp_path):
     ],
 )  # fmt: skip
 def test_values_have_the_digits_of_their_errors(value, error, said):
-    assert texts.pair(value, error).strip() == said and len(texts.pair(value, error).partition(" +-")[0]) >= 10
+    assert (
+        texts.pair(value, error).strip() == said
+        and len(texts.pair(value, error).partition(" +-")[0]) >= 10
+    )
 
 
 def test_what_closes_the_gap_is_told_in_the_units_of_scenes():
-    of = lambda *numbers, unit="-": texts.closing_line(predicted.Closing("gamma0", numbers[0], unit, *numbers[1:]))
-    assert of(0.25, 0.5, 0.02, 0.01, 1.2) == "gamma0 = 0.25: 0.500 +- 0.020 gives the measured distance"
+    of = lambda *numbers, unit="-": texts.closing_line(
+        predicted.Closing("gamma0", numbers[0], unit, *numbers[1:])
+    )
+    assert (
+        of(0.25, 0.5, 0.02, 0.01, 1.2)
+        == "gamma0 = 0.25: 0.500 +- 0.020 gives the measured distance"
+    )
     turned = of(0.25, 0.5, 0.02, 0.01, 1.2, unit="rad")
     assert turned == "gamma0 = 14.32 deg: 28.6 +- 1.1 deg gives the measured distance"
     none = of(0.25, math.nan, math.nan, 0.012345, 1.2, unit="rad")
-    assert none == "gamma0 = 14.32 deg: none from 0.707 to 68.8 deg gives the measured distance"
+    assert (
+        none
+        == "gamma0 = 14.32 deg: none from 0.707 to 68.8 deg gives the measured distance"
+    )
     closing = predicted.Closing("gamma0", 0.25, "rad", math.nan, math.nan, 0.1, 1.2)
-    assert texts._numbers(closing)["value"] is None is texts._numbers(closing)["half_width"]
+    assert (
+        texts._numbers(closing)["value"]
+        is None
+        is texts._numbers(closing)["half_width"]
+    )
 
 
 def test_measured_and_predicted_agree_within_both_of_their_errors(fitted):
     number = len(predicted.COMPARED)
     of = lambda off: predicted.Comparison(
-        None, np.full(number, 0.5), np.full(number, 0.03), np.full(number, 0.5) + off, np.full(number, 0.04), None, ()
+        None,
+        np.full(number, 0.5),
+        np.full(number, 0.03),
+        np.full(number, 0.5) + off,
+        np.full(number, 0.04),
+        None,
+        (),
     )
     for off, said in (
         (0.0499, "they agree"),
@@ -1071,31 +1451,65 @@ def test_measured_and_predicted_agree_within_both_of_their_errors(fitted):
         (-0.0501, "they differ"),
     ):
         lines = texts._compared(of(off), dict.fromkeys(predicted.COMPARED, "BL"))
-        assert len(lines) == 2 + number and all(line.endswith(f"BL: {said}") for line in lines[2:])
-        assert lines[2].split()[:7] == ["speed", "0.500", "+-", "0.030", f"{0.5 + off:.3f}", "+-", "0.040"]
+        assert len(lines) == 2 + number and all(
+            line.endswith(f"BL: {said}") for line in lines[2:]
+        )
+        assert lines[2].split()[:7] == [
+            "speed",
+            "0.500",
+            "+-",
+            "0.030",
+            f"{0.5 + off:.3f}",
+            "+-",
+            "0.040",
+        ]
 
 
 def test_a_trial_is_told_in_lines(fitted):
     result = question.result_of(fitted)
     first, head, smoothed, level, *rows = texts.text(result).splitlines()
-    assert first == "synthetic: 4 full cycles of 30 points" and head == f"head: {fitted.head}" and len(rows) == 10
-    per_cycle = (len(fitted.curve.knots) - 12 + 1) / (fitted.trial.t[-1] * fitted.value("frequency")[0])
+    assert (
+        first == "synthetic: 4 full cycles of 30 points"
+        and head == f"head: {fitted.head}"
+        and len(rows) == 10
+    )
+    per_cycle = (len(fitted.curve.knots) - 12 + 1) / (
+        fitted.trial.t[-1] * fitted.value("frequency")[0]
+    )
     assert smoothed.startswith(
         f"smoothed by {fitted.curve.modes} modes along the body and {per_cycle:.3g} knots a cycle, more"
     )
     noise = fitted.curve.noise / fitted.value("length")[0]
-    assert smoothed.endswith(f"noise of a point {noise:.2g} BL") and level == "with intervals of 95 % of cases:"
-    assert rows[0].split()[0::4] == ["frequency", "Hz"] and rows[-1].split()[0] == "wavelength"
+    assert (
+        smoothed.endswith(f"noise of a point {noise:.2g} BL")
+        and level == "with intervals of 95 % of cases:"
+    )
+    assert (
+        rows[0].split()[0::4] == ["frequency", "Hz"]
+        and rows[-1].split()[0] == "wavelength"
+    )
     short = dataclasses.replace(fitted, used=fitted.used[:3], level=0.9)
     lines = texts.text(question.result_of(short)).splitlines()
     assert (
         lines[0] == "synthetic: 3 full cycles of 30 points; 1 with gaps left out"
         and lines[3] == "with intervals of 90 % of cases:"
     )
-    pixels = dataclasses.replace(fitted, trial=dataclasses.replace(fitted.trial, timed=False, unit=""))
-    assert [question.units_of(pixels)[x] for x in ("frequency", "length", "speed")] == ["1/frame", "", "BL/frame"]
-    metres = dataclasses.replace(fitted, trial=dataclasses.replace(fitted.trial, unit="m"))
-    assert [question.units_of(metres)[x] for x in ("frequency", "length", "speed")] == ["Hz", "m", "m/s"]
+    pixels = dataclasses.replace(
+        fitted, trial=dataclasses.replace(fitted.trial, timed=False, unit="")
+    )
+    assert [question.units_of(pixels)[x] for x in ("frequency", "length", "speed")] == [
+        "1/frame",
+        "",
+        "BL/frame",
+    ]
+    metres = dataclasses.replace(
+        fitted, trial=dataclasses.replace(fitted.trial, unit="m")
+    )
+    assert [question.units_of(metres)[x] for x in ("frequency", "length", "speed")] == [
+        "Hz",
+        "m",
+        "m/s",
+    ]
 
 
 def test_the_mean_cycle_and_the_times_of_cycles_are_those_of_the_curve(fitted):
@@ -1104,14 +1518,24 @@ def test_the_mean_cycle_and_the_times_of_cycles_are_those_of_the_curve(fitted):
     headings -= headings.mean((1, 2), keepdims=True)
     np.testing.assert_allclose(result["mean_cycle"].values, headings.mean(0), atol=1e-9)
     raw = cycles.headings
-    np.testing.assert_allclose(result["mean_cycle"].error, raw.std(0, ddof=1) / 2, atol=1e-9)
-    np.testing.assert_allclose(result["phase"].values, np.pi * np.arange(1, 96, 2) / 48, rtol=1e-12)
-    times = kinematics.times(fitted.clock, fitted.clock.phase(fitted.curve), fitted.marks)
+    np.testing.assert_allclose(
+        result["mean_cycle"].error, raw.std(0, ddof=1) / 2, atol=1e-9
+    )
+    np.testing.assert_allclose(
+        result["phase"].values, np.pi * np.arange(1, 96, 2) / 48, rtol=1e-12
+    )
+    times = kinematics.times(
+        fitted.clock, fitted.clock.phase(fitted.curve), fitted.marks
+    )
     np.testing.assert_allclose(result["cycle_start"].values, times[:-1], atol=1e-9)
     np.testing.assert_allclose(result["s"].values, np.arange(0.05, 1, 0.1), atol=1e-12)
     n = len(QUANTITIES)
     for name, k in (("slip_along", n), ("amplitude_along", n + 10)):
-        np.testing.assert_array_equal(result[name].values, fitted.intervals.value[k : k + 10])
-        np.testing.assert_array_equal(result[name].error, fitted.intervals.half_width[k : k + 10])
+        np.testing.assert_array_equal(
+            result[name].values, fitted.intervals.value[k : k + 10]
+        )
+        np.testing.assert_array_equal(
+            result[name].error, fitted.intervals.half_width[k : k + 10]
+        )
     one = dataclasses.replace(fitted, used=fitted.used[:1])
     assert question._mean_cycle(one)[-1].error is None

@@ -24,7 +24,12 @@ FLUID = Viscous(2.0)
 
 
 def fitted(body, points=31, extent=2.5, medium=FLUID, degree=3):
-    return connection.fit(Swimmer(medium, body).velocity, connection.grid(body.joints, points, extent), 16, degree)
+    return connection.fit(
+        Swimmer(medium, body).velocity,
+        connection.grid(body.joints, points, extent),
+        16,
+        degree,
+    )
 
 
 def smallest(first):
@@ -44,18 +49,29 @@ def test_viscous_three_link_swimmer():
     ccf = curvature.ccf(c)
     assert ccf.values[:, 15, 15] == pytest.approx([-0.0205761, 0, 0], abs=1e-6)
     assert area(ccf, Circle(), 1.0) == pytest.approx([-0.05164, 0, 0], abs=1e-4)
-    assert np.hypot(*direct(Swimmer(FLUID, Chain()).velocity, Circle(), 1.0)[:2]) == pytest.approx(0.0513, abs=1e-4)
+    assert np.hypot(
+        *direct(Swimmer(FLUID, Chain()).velocity, Circle(), 1.0)[:2]
+    ) == pytest.approx(0.0513, abs=1e-4)
 
 
 def test_work_is_the_same_in_every_frame():
     """Power and internal moments belong to no frame, whichever the velocity is told in."""
     scene = scenes.load("three-link-viscous").with_numerics(grid=9, extent=1.0)
     scene = scene.changed(system=Swimmer(FLUID, Chain((0.7, 1.4, 0.9), length=0.3)))
-    inner, outer = scene.system, Study(scene).in_frame("minimum-perturbation").scene.system
+    inner, outer = (
+        scene.system,
+        Study(scene).in_frame("minimum-perturbation").scene.system,
+    )
     alpha, alphadot = np.random.default_rng(4).uniform(-0.8, 0.8, (2, 20, 2))
-    here, there = (system.power(alpha, alphadot, system.velocity(alpha, alphadot)) for system in (inner, outer))
+    here, there = (
+        system.power(alpha, alphadot, system.velocity(alpha, alphadot))
+        for system in (inner, outer)
+    )
     np.testing.assert_allclose(there, here, rtol=1e-9)
-    assert np.abs(outer.velocity(alpha, alphadot) - inner.velocity(alpha, alphadot)).max() > 1e-3
+    assert (
+        np.abs(outer.velocity(alpha, alphadot) - inner.velocity(alpha, alphadot)).max()
+        > 1e-3
+    )
 
 
 @pytest.mark.parametrize("body", [Chain((0.7, 1.4, 0.9), length=0.3), Chain((1, 2, 3))])
@@ -79,10 +95,16 @@ def test_no_frame_nearby_has_a_smaller_connection():
     first = fitted(Chain((0.7, 1.4, 0.9)))
     frame, c = smallest(first)
     rng, basis = np.random.default_rng(3), Basis(first.axes, 3)
-    weight = lambda rows: sum(basis.weighted(basis.at_nodes(basis.coefficients(c2.A[k])) ** 2).sum() for k in rows)
+    weight = lambda rows: sum(
+        basis.weighted(basis.at_nodes(basis.coefficients(c2.A[k])) ** 2).sum()
+        for k in rows
+    )
     alpha = np.stack(np.meshgrid(*first.axes, indexing="ij"), -1)
     for _ in range(4):
-        waves = sum(rng.normal() * np.cos(alpha @ rng.normal(size=2) + rng.normal()) for _ in range(5))
+        waves = sum(
+            rng.normal() * np.cos(alpha @ rng.normal(size=2) + rng.normal())
+            for _ in range(5)
+        )
         for k, rows in ((0, (0, 1)), (1, (0, 1)), (2, (2,))):
             around = []
             for step in (-1e-3, 0.0, 1e-3):
@@ -100,9 +122,19 @@ def test_a_frame_that_only_turns_or_shifts_is_undone():
     """A connection that is all gauge, -h^-1 dh seen from h, vanishes in the frame that is found."""
     axes = connection.grid(2, 41, 1.5)
     a, b = np.meshgrid(*axes, indexing="ij")
-    values = np.stack([0.2 * np.sin(a - 0.5 * b), 0.3 * np.cos(0.7 * a) - 0.1 * b, 0.5 * np.sin(a + 0.4 * b)])
-    nothing = connection.Connection(axes, np.zeros((3, 2, 41, 41)), np.zeros((3, 41, 41)), np.zeros((3, 41, 41)))
-    gauge = dataclasses.replace(minimum_perturbation(nothing), field=Field(axes, values))
+    values = np.stack(
+        [
+            0.2 * np.sin(a - 0.5 * b),
+            0.3 * np.cos(0.7 * a) - 0.1 * b,
+            0.5 * np.sin(a + 0.4 * b),
+        ]
+    )
+    nothing = connection.Connection(
+        axes, np.zeros((3, 2, 41, 41)), np.zeros((3, 41, 41)), np.zeros((3, 41, 41))
+    )
+    gauge = dataclasses.replace(
+        minimum_perturbation(nothing), field=Field(axes, values)
+    )
     _, c = smallest(dataclasses.replace(nothing, A=gauge.connection(nothing)))
     assert np.abs(gauge.connection(nothing)).max() > 0.4
     assert np.abs(c.A).max() < 1e-4
@@ -119,14 +151,23 @@ def test_it_converges_with_the_grid():
     assert np.log2(errors[0] / errors[-1]) / 2 > 2.8
 
 
-@pytest.mark.parametrize("gait", [Circle(amplitude=0.9, centre=(0.2, -0.1)), Ellipse(semi_axes=(1.0, 0.4), tilt=0.7)])
+@pytest.mark.parametrize(
+    "gait",
+    [
+        Circle(amplitude=0.9, centre=(0.2, -0.1)),
+        Ellipse(semi_axes=(1.0, 0.4), tilt=0.7),
+    ],
+)
 def test_displacements_agree_with_other_frames(gait):
     body = Chain((0.7, 1.4, 0.9), frame="link-1")
     first, system = fitted(body, 61), Swimmer(FLUID, body)
     frame, c = smallest(first)
     own, start = direct(system.velocity, gait), gait.shape(np.zeros(1))[0]
     there = frame.net(own, start)
-    around = [direct(coordinates.in_frame(system.velocity, frame), gait, phases=n) - there for n in (128, 512)]
+    around = [
+        direct(coordinates.in_frame(system.velocity, frame), gait, phases=n) - there
+        for n in (128, 512)
+    ]
     assert np.abs(around[1]).max() < 1e-8  # all but the spline's own kinks
     assert np.abs(around[1]).max() < np.abs(around[0]).max()
     assert path(c, gait) == pytest.approx(there, abs=2e-5)
@@ -134,7 +175,12 @@ def test_displacements_agree_with_other_frames(gait):
 
 
 @pytest.mark.parametrize(
-    "body", [Serpenoid(elements=12, waves=1.2), ConstantCurvature(elements=12, sections=2), Chain((1, 1, 1, 2))]
+    "body",
+    [
+        Serpenoid(elements=12, waves=1.2),
+        ConstantCurvature(elements=12, sections=2),
+        Chain((1, 1, 1, 2)),
+    ],
 )
 def test_other_bodies(body):
     points = 11 if body.joints == 3 else 21
@@ -151,13 +197,19 @@ def test_sand_is_closer_to_its_area_integral():
     off = []
     for where in (first, c):
         exact = path(where, Circle(), [1.0, 1.5])
-        off.append(np.abs(area(curvature.ccf(where), Circle(), [1.0, 1.5]) - exact)[:, :2].max(-1))
+        off.append(
+            np.abs(area(curvature.ccf(where), Circle(), [1.0, 1.5]) - exact)[:, :2].max(
+                -1
+            )
+        )
     assert (off[1] < 0.5 * off[0]).all()
 
 
 def test_singular_shapes_are_refused():
     snake = NoSlipSnake((1, 1, 1))
-    first = connection.fit(snake.velocity, connection.grid(2, 21, 1.5), 4, traits=snake.traits)
+    first = connection.fit(
+        snake.velocity, connection.grid(2, 21, 1.5), 4, traits=snake.traits
+    )
     with pytest.raises(ValueError, match="singular shapes"):
         minimum_perturbation(first)
 
@@ -179,14 +231,18 @@ def test_a_scene_in_it(law):
     assert (scene.frame, own.frame) == ("minimum-perturbation", "mean")
     start = scene.gait.shape(np.zeros(1))[0]
     carried = lambda g: scene.system.field.net(g, start)
-    assert study.poses("direct") == pytest.approx(carried(plain.poses("direct")), abs=1e-14)
+    assert study.poses("direct") == pytest.approx(
+        carried(plain.poses("direct")), abs=1e-14
+    )
     for tier in ("path", "harmonic", "adapted"):
         there, here = carried(plain.poses(tier)), study.poses(tier)
         assert np.abs(here - there)[:2].max() < 3e-3 * 0.3, tier
     assert np.abs(study.poses("direct") - plain.poses("direct")).max() > 3e-4
     found, first = study.fitted, plain.fitted
     assert found.A == pytest.approx(scene.system.field.connection(first), abs=1e-12)
-    turned = np.abs(found.residual[2] - first.residual[2]).max()  # the heading's rate does not hang on the frame
+    turned = np.abs(
+        found.residual[2] - first.residual[2]
+    ).max()  # the heading's rate does not hang on the frame
     assert turned < 1e-12 and size(found) < size(first)
     assert scenes.parse(scenes.toml(scene)) == scene
     assert scene.with_numerics(grid=9).system.axes != scene.system.axes
@@ -196,20 +252,31 @@ def test_a_scene_in_it(law):
 
 def test_it_stands_wherever_any_frame_stands(tmp_path):
     """Above all tables, in [body], in [system] and its body; two that contradict each other are refused."""
-    above = SCENE.format(law="viscous", numbers=LAWS["viscous"]).replace("grid = 15", "grid = 7")
+    above = SCENE.format(law="viscous", numbers=LAWS["viscous"]).replace(
+        "grid = 15", "grid = 7"
+    )
     line, _, bare = above.partition("\n")
     scene = scenes.parse(above)
     within = bare.replace('kind = "chain"', f'kind = "chain"\n{line}')
     for text in (within, above.replace('kind = "chain"', f'kind = "chain"\n{line}')):
         found = scenes.parse(text)
-        assert found == scene and found.frame == "minimum-perturbation" and scenes.parse(scenes.toml(found)) == scene
-    nested = within.replace("[medium]", "[system.medium]").replace("[body]", "[system.body]")
+        assert (
+            found == scene
+            and found.frame == "minimum-perturbation"
+            and scenes.parse(scenes.toml(found)) == scene
+        )
+    nested = within.replace("[medium]", "[system.medium]").replace(
+        "[body]", "[system.body]"
+    )
     assert scenes.parse('[system]\nkind = "swimmer"\n' + nested) == scene
     afloat = '[system]\nkind = "floating-chain"\n{}\n[gait]\nkind = "circle"\n[numerics]\ngrid = 7\n'
-    assert scenes.parse(afloat.format(line)) == scenes.parse(f"{line}\n{afloat.format('')}")
+    assert scenes.parse(afloat.format(line)) == scenes.parse(
+        f"{line}\n{afloat.format('')}"
+    )
     for frame in ("mean", "link-2"):
         with pytest.raises(
-            Refusal, match=rf"\[body\] frame = 'minimum-perturbation', but the scene's frame = '{frame}'"
+            Refusal,
+            match=rf"\[body\] frame = 'minimum-perturbation', but the scene's frame = '{frame}'",
         ):
             scenes.parse(f'frame = "{frame}"\n{within}')
     (tmp_path / "a.toml").write_text(within)
@@ -224,7 +291,11 @@ def test_no_such_frame_where_there_is_none():
     ):
         text = SCENE.format(law="granular", numbers=LAWS["granular"]) + extra
         if not extra:
-            text = text[: text.index("[medium]")] + '[system]\nkind = "no-slip-snake"\n' + text[text.index("[gait]") :]
+            text = (
+                text[: text.index("[medium]")]
+                + '[system]\nkind = "no-slip-snake"\n'
+                + text[text.index("[gait]") :]
+            )
         with pytest.raises(Refusal, match=said):
             scenes.parse(text)
 
@@ -240,9 +311,16 @@ def test_its_file_and_pictures(tmp_path):
     with netcdf_file(tmp_path / "c.nc", mmap=False) as file:
         pose = file.variables["frame_pose"]
         assert np.array(pose[:]) == pytest.approx(scene.system.field.field.values)
-        assert (pose.units, file.frame) == (b"m (x, y), rad (theta)", b"minimum-perturbation")
+        assert (pose.units, file.frame) == (
+            b"m (x, y), rad (theta)",
+            b"minimum-perturbation",
+        )
     fig = plots.frame_figure(scene.system.field.field)
-    assert [ax.get_ylabel() for ax in fig.axes[3:]] == ["x (m)", "y (m)", "heading (rad)"]
+    assert [ax.get_ylabel() for ax in fig.axes[3:]] == [
+        "x (m)",
+        "y (m)",
+        "heading (rad)",
+    ]
     for k, ax in enumerate(fig.axes[:3]):
         drawn = np.reshape(np.ma.getdata(ax.collections[0].get_array()), (15, 15)).T
         assert drawn == pytest.approx(scene.system.field.field.values[k])

@@ -27,7 +27,11 @@ ROWS = ((1.4, 0.3, -0.5), (-0.2, 0.9, 2.1))
 MODES = Chain(LENGTHS, 0.3, FRAME, modes=ROWS)
 PLAIN = Chain(LENGTHS, 0.3, FRAME)
 SAND = Granular(1.8, 0.24)
-COS, SIN, CENTRE = np.array([[0.5, 0.1], [0.0, 0.2]]), np.array([[0.0, 0.1], [0.6, 0.0]]), np.array([0.1, -0.2])
+COS, SIN, CENTRE = (
+    np.array([[0.5, 0.1], [0.0, 0.2]]),
+    np.array([[0.0, 0.1], [0.6, 0.0]]),
+    np.array([0.1, -0.2]),
+)
 GAIT = Fourier(cos=COS.tolist(), sin=SIN.tolist(), centre=CENTRE.tolist())
 SAME = Fourier(cos=(np.transpose(ROWS) @ COS).tolist(), sin=(np.transpose(ROWS) @ SIN).tolist(),
                centre=(CENTRE @ ROWS).tolist())  # fmt: skip
@@ -40,29 +44,47 @@ def test_body_velocity_and_work_are_those_of_the_plain_chain():
     effects = SkinFriction(0.1, 0.15, 0.2), EndCaps(0.06)
     settings = {"effects": effects, "pieces": 7}
     found = rft.body_velocity(SAND, MODES, SHAPE, RATE, **settings).checked()
-    wanted = rft.body_velocity(SAND, PLAIN, SHAPE @ ROWS, RATE @ ROWS, **settings).checked()
+    wanted = rft.body_velocity(
+        SAND, PLAIN, SHAPE @ ROWS, RATE @ ROWS, **settings
+    ).checked()
     np.testing.assert_allclose(found.xi, wanted.xi, atol=1e-13)
     assert (found.status == wanted.status).all()
     work = rft.work_done(SAND, MODES, SHAPE, RATE, found.xi, **settings)
-    for a, b in zip(work, rft.work_done(SAND, PLAIN, SHAPE @ ROWS, RATE @ ROWS, found.xi, **settings), strict=True):
+    for a, b in zip(
+        work,
+        rft.work_done(SAND, PLAIN, SHAPE @ ROWS, RATE @ ROWS, found.xi, **settings),
+        strict=True,
+    ):
         np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-14)
     assert work.bending_moment.shape == (30, 3)
 
 
-@pytest.mark.parametrize("effects", [(), (EndCaps(0.06),), (Transient(0.1),)], ids=["plain", "caps", "transient"])
+@pytest.mark.parametrize(
+    "effects",
+    [(), (EndCaps(0.06),), (Transient(0.1),)],
+    ids=["plain", "caps", "transient"],
+)
 @pytest.mark.parametrize("tier", ["direct", "adapted"])
 def test_tiers_are_those_of_the_plain_chain(tier, effects):
     of_modes, plain = (
-        Study(Scene(Swimmer(SAND, body, effects), gait).with_numerics(phases=24, curves=6, cycles=1, pieces=9))
+        Study(
+            Scene(Swimmer(SAND, body, effects), gait).with_numerics(
+                phases=24, curves=6, cycles=1, pieces=9
+            )
+        )
         for body, gait in ((MODES, GAIT), (PLAIN, SAME))
     )
     if tier not in of_modes.tiers:
         assert effects and effects[0].kind == "transient"
         return
     a = [0.5, 1.0]
-    np.testing.assert_allclose(of_modes.poses(tier, None, a), plain.poses(tier, None, a), atol=1e-13)
+    np.testing.assert_allclose(
+        of_modes.poses(tier, None, a), plain.poses(tier, None, a), atol=1e-13
+    )
     if tier == "direct" and not of_modes.scene.system.traits.steps:
-        estimates = [s.study(a, ["direct"])["estimate"]["direct"] for s in (of_modes, plain)]
+        estimates = [
+            s.study(a, ["direct"])["estimate"]["direct"] for s in (of_modes, plain)
+        ]
         np.testing.assert_allclose(*estimates, rtol=1e-6, atol=1e-13)
 
 
@@ -71,12 +93,22 @@ def test_connection_and_ccf_are_pulled_back():
     wide, turn = np.diag([0.5, 0.25]), np.array([[0.0, 1.0], [1.0, 0.0]])
     body = Chain((1, 1.5, 0.8), frame="link-1", modes=turn @ wide)
     axes = connection.grid(2, 9, 2.0)
-    of = lambda body: lambda alpha, rate: rft.body_velocity(Viscous(3.0), body, alpha, rate).checked().xi
+    of = lambda body: (
+        lambda alpha, rate: (
+            rft.body_velocity(Viscous(3.0), body, alpha, rate).checked().xi
+        )
+    )
     fitted = connection.fit(of(body), axes)
-    plain = connection.fit(of(Chain((1, 1.5, 0.8), frame="link-1")), (axes[0] / 2, axes[1] / 4))
+    plain = connection.fit(
+        of(Chain((1, 1.5, 0.8), frame="link-1")), (axes[0] / 2, axes[1] / 4)
+    )
     # m_1 turns joint 2 by a quarter of itself, m_2 joint 1 by a half.
-    np.testing.assert_allclose(fitted.A[:, 0], 0.25 * plain.A[:, 1].swapaxes(1, 2), atol=1e-13)
-    np.testing.assert_allclose(fitted.A[:, 1], 0.5 * plain.A[:, 0].swapaxes(1, 2), atol=1e-13)
+    np.testing.assert_allclose(
+        fitted.A[:, 0], 0.25 * plain.A[:, 1].swapaxes(1, 2), atol=1e-13
+    )
+    np.testing.assert_allclose(
+        fitted.A[:, 1], 0.5 * plain.A[:, 0].swapaxes(1, 2), atol=1e-13
+    )
     found, wanted = (curvature.ccf(c).values for c in (fitted, plain))
     np.testing.assert_allclose(found, -wanted.swapaxes(1, 2) / 8, atol=1e-12)
 
@@ -85,11 +117,17 @@ def test_connection_and_ccf_are_pulled_back():
 def test_identity_modes_are_todays_chain(name):
     scene = scenes.load(name).with_numerics(grid=5, phases=32, curves=6, harmonics=5)
     eye = scenes.parse(scene.text.replace("[body]", "[body]\nmodes = [[1, 0], [0, 1]]"))
-    eye, n = Study(eye.with_numerics(grid=5, phases=32, curves=6, harmonics=5)), Study(scene)
+    eye, n = (
+        Study(eye.with_numerics(grid=5, phases=32, curves=6, harmonics=5)),
+        Study(scene),
+    )
     assert eye.tiers == n.tiers
     for tier in n.tiers:
         np.testing.assert_allclose(eye.poses(tier), n.poses(tier), atol=1e-15)
-    for found, wanted in ((eye.curvature, n.curvature), (eye.curvature_error, n.curvature_error)):
+    for found, wanted in (
+        (eye.curvature, n.curvature),
+        (eye.curvature_error, n.curvature_error),
+    ):
         np.testing.assert_allclose(found.values, wanted.values, atol=1e-13)
 
 
@@ -99,30 +137,40 @@ def test_one_mode_and_many_modes():
     back_and_forth = Fourier(cos=[[0.5, 0.1]], sin=[[0.2, 0.3]])
     assert tiers(one) == ("adapted", "path", "direct")
     for tier in ("path", "direct"):
-        moved = Study(Scene(one, back_and_forth).with_numerics(grid=9, phases=256)).poses(tier)
+        moved = Study(
+            Scene(one, back_and_forth).with_numerics(grid=9, phases=256)
+        ).poses(tier)
         np.testing.assert_allclose(moved, 0, atol=3e-5)
     all_of_them = Chain(LENGTHS, 0.3, FRAME, modes=(*ROWS, (1, -1, 1)))
     shape = np.linalg.solve(np.transpose(all_of_them.modes), (SHAPE @ ROWS).T).T
     rate = np.linalg.solve(np.transpose(all_of_them.modes), (RATE @ ROWS).T).T
     found = rft.body_velocity(SAND, all_of_them, shape, rate).checked().xi
-    np.testing.assert_allclose(found, rft.body_velocity(SAND, MODES, SHAPE, RATE).xi, atol=1e-12)
+    np.testing.assert_allclose(
+        found, rft.body_velocity(SAND, MODES, SHAPE, RATE).xi, atol=1e-12
+    )
 
 
 def test_modes_change_of_frame():
     h, hdot = MODES.frame_pose("link-4", SHAPE, RATE)
-    np.testing.assert_allclose(h, PLAIN.frame_pose("link-4", SHAPE @ ROWS, RATE @ ROWS)[0], atol=1e-15)
+    np.testing.assert_allclose(
+        h, PLAIN.frame_pose("link-4", SHAPE @ ROWS, RATE @ ROWS)[0], atol=1e-15
+    )
     xi = rft.body_velocity(SAND, MODES, SHAPE, RATE).xi
-    other = rft.body_velocity(SAND, Chain(LENGTHS, 0.3, "link-4", modes=ROWS), SHAPE, RATE).xi
+    other = rft.body_velocity(
+        SAND, Chain(LENGTHS, 0.3, "link-4", modes=ROWS), SHAPE, RATE
+    ).xi
     np.testing.assert_allclose(change_velocity(xi, h, hdot), other, atol=1e-12)
 
 
 @pytest.mark.parametrize("waves", [0.7, 1.0, 1.5])
 def test_a_serpenoid_chain_of_many_links_is_the_serpenoid_backbone(waves):
     """Its amplitude is the angle of a joint: the backbone's, curvature times length, over the number of links."""
-    of_backbone = lambda n: Swimmer(Viscous(2.5), Serpenoid(elements=n, waves=waves)).run(
-        *Circle(amplitude=5.0, centre=(1.0, -0.5), reverse=True).cycle(16)
-    )
-    of_chain = lambda n: Swimmer(Viscous(2.5), Chain((1,) * n, modes="serpenoid", waves=waves)).run(
+    of_backbone = lambda n: Swimmer(
+        Viscous(2.5), Serpenoid(elements=n, waves=waves)
+    ).run(*Circle(amplitude=5.0, centre=(1.0, -0.5), reverse=True).cycle(16))
+    of_chain = lambda n: Swimmer(
+        Viscous(2.5), Chain((1,) * n, modes="serpenoid", waves=waves)
+    ).run(
         *Circle(amplitude=5.0 / n, centre=(1.0 / n, -0.5 / n), reverse=True).cycle(16)
     )
     np.testing.assert_allclose(of_chain(30).net, of_backbone(30).net, atol=1e-13)
@@ -138,11 +186,19 @@ def test_a_serpenoid_chain_of_many_links_is_the_serpenoid_backbone(waves):
         ([[1, 2], [0, 0]], None, "mode 2 is zero"),
         ([[1, 2], [0]], None, "modes must be real numbers in equal rows"),
         ([[1, 2, 3]], None, "modes must be rows of 2 joint angles"),
-        ([[1, 0], [0, 1], [1, 1]], None, "3 modes of 2 joints are linearly dependent: give at most 2"),
+        (
+            [[1, 0], [0, 1], [1, 1]],
+            None,
+            "3 modes of 2 joints are linearly dependent: give at most 2",
+        ),
         ([], None, "modes must be rows of 2 joint angles"),
         (np.zeros((0, 2)), None, "modes must be rows of 2 joint angles"),
         ([[1, float("nan")]], None, "modes must be finite"),
-        ("snake", None, "modes must be rows of joint angles or 'serpenoid', got 'snake'"),
+        (
+            "snake",
+            None,
+            "modes must be rows of joint angles or 'serpenoid', got 'snake'",
+        ),
         (None, 1.0, "waves are those of modes = 'serpenoid'"),
         ([[1, 2]], 1.0, "waves are those of modes = 'serpenoid'"),
         ("serpenoid", 1.5, "mode 2 is zero"),
@@ -168,7 +224,9 @@ def test_modes_that_make_no_body_are_refused(modes, waves, said):
 )
 def test_scenes_with_bad_modes_get_one_line(line, said, tmp_path):
     file = tmp_path / "s.toml"
-    file.write_text(scenes.load("three-link-glass").text.replace("[body]", f"[body]\n{line}"))
+    file.write_text(
+        scenes.load("three-link-glass").text.replace("[body]", f"[body]\n{line}")
+    )
     code, out, err = geomech("displacement", file, "--amplitudes", "1")
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert said in err
@@ -177,10 +235,19 @@ def test_scenes_with_bad_modes_get_one_line(line, said, tmp_path):
 def test_modes_go_through_files(tmp_path):
     """TOML there and back, NetCDF whose axes are amplitudes, a sweep over the waves of the modes."""
     scene = scenes.load("seven-link-modes").with_numerics(grid=5, phases=32)
-    for body in (MODES, Chain((1,) * 5, modes="serpenoid", waves=1.2), Chain((1,) * 5, modes="serpenoid")):
+    for body in (
+        MODES,
+        Chain((1,) * 5, modes="serpenoid", waves=1.2),
+        Chain((1,) * 5, modes="serpenoid"),
+    ):
         there = Scene(Swimmer(SAND, body), Circle())
         assert scenes.parse(scenes.toml(there)).system == there.system
-    assert geomech("connection", "seven-link-modes", "--grid", 5, "-o", tmp_path / "c.nc")[0] == 0
+    assert (
+        geomech("connection", "seven-link-modes", "--grid", 5, "-o", tmp_path / "c.nc")[
+            0
+        ]
+        == 0
+    )
     with netcdf_file(tmp_path / "c.nc", mmap=False) as file:
         names = [file.variables[f"alpha_{k}"].long_name for k in (1, 2)]
         A = file.variables["A"][:].copy()
@@ -193,15 +260,26 @@ def test_modes_go_through_files(tmp_path):
 
 
 def test_a_serpenoid_has_one_wave_if_it_does_not_say():
-    found, wanted = (Chain((1,) * 5, modes="serpenoid", waves=w).joint_angles(np.eye(2)) for w in (None, 1.0))
+    found, wanted = (
+        Chain((1,) * 5, modes="serpenoid", waves=w).joint_angles(np.eye(2))
+        for w in (None, 1.0)
+    )
     np.testing.assert_array_equal(found, wanted)
-    np.testing.assert_allclose(found[0], [np.cos(2 * np.pi / 5), np.sin(2 * np.pi / 5)], atol=1e-15)
+    np.testing.assert_allclose(
+        found[0], [np.cos(2 * np.pi / 5), np.sin(2 * np.pi / 5)], atol=1e-15
+    )
 
 
 def test_names_of_shape_variables():
     assert shape_labels(Swimmer(SAND, MODES)) == (("m_1", "rad"), ("m_2", "rad"))
-    assert shape_labels(Swimmer(SAND, PLAIN)) == (("alpha_1", "rad"), ("alpha_2", "rad"), ("alpha_3", "rad"))
-    assert not is_three_link(Swimmer(SAND, Chain(modes="serpenoid")))  # no published gaits beside its own
+    assert shape_labels(Swimmer(SAND, PLAIN)) == (
+        ("alpha_1", "rad"),
+        ("alpha_2", "rad"),
+        ("alpha_3", "rad"),
+    )
+    assert not is_three_link(
+        Swimmer(SAND, Chain(modes="serpenoid"))
+    )  # no published gaits beside its own
 
 
 # Waves.
@@ -213,13 +291,19 @@ def test_a_wave_is_a_circle_in_serpenoid_modes(waves):
     wave = Wave(amplitude=a, waves=waves, joints=links - 1)
     body = Chain((1, 1.3, 0.8, 1, 0.7, 1.1), modes="serpenoid", waves=abs(waves))
     circle = Circle(amplitude=a, reverse=waves > 0)
-    for shapes, amplitudes in zip(wave.cycle(16, [0.3, a]), circle.cycle(16, [0.3, a]), strict=True):
+    for shapes, amplitudes in zip(
+        wave.cycle(16, [0.3, a]), circle.cycle(16, [0.3, a]), strict=True
+    ):
         np.testing.assert_allclose(shapes, np.moveaxis(body.joint_angles(np.moveaxis(amplitudes, -1, 0).reshape(2, -1))
                                    .reshape(links - 1, 2, 16), 0, -1), atol=1e-14)  # fmt: skip
     plain = Swimmer(SAND, Chain(body.lengths))
     for tier in ("direct", "adapted"):
-        of_wave = Study(Scene(plain, wave).with_numerics(phases=32, curves=6)).poses(tier)
-        of_modes = Study(Scene(Swimmer(SAND, body), circle).with_numerics(phases=32, curves=6)).poses(tier)
+        of_wave = Study(Scene(plain, wave).with_numerics(phases=32, curves=6)).poses(
+            tier
+        )
+        of_modes = Study(
+            Scene(Swimmer(SAND, body), circle).with_numerics(phases=32, curves=6)
+        ).poses(tier)
         np.testing.assert_allclose(of_wave, of_modes, atol=1e-13)
 
 
@@ -229,7 +313,10 @@ def test_a_wave_runs_to_the_tail_and_the_body_to_the_head():
     assert (np.diff(crests) <= 0).all() and crests[-1] < crests[0]
     forward = Study(ROBOT).poses("direct")
     assert forward[0] > 0.2
-    for backwards in (Wave(amplitude=0.87, waves=-1.0), Wave(amplitude=0.87, reverse=True)):
+    for backwards in (
+        Wave(amplitude=0.87, waves=-1.0),
+        Wave(amplitude=0.87, reverse=True),
+    ):
         assert Study(ROBOT.changed(gait=backwards)).poses("direct")[0] < -0.2
     still = Study(ROBOT.changed(gait=Wave(amplitude=0.87, waves=0.0))).poses("direct")
     np.testing.assert_allclose(still, 0, atol=1e-6)
@@ -246,16 +333,26 @@ def test_an_offset_turns_the_body():
     wave = Wave(joints=3, amplitude=0.4, offset=0.2, centre=(0.1, 0.0, -0.1))
     np.testing.assert_allclose(wave.cycle(64)[0].mean(0), [0.3, 0.2, 0.1], atol=1e-15)
     np.testing.assert_allclose(wave.shape(0.3, 0.0), [0.3, 0.2, 0.1], atol=1e-15)
-    assert scenes.parse(ROBOT.text + "offset_deg = 9.0\n").gait.offset == pytest.approx(np.pi / 20)
+    assert scenes.parse(ROBOT.text + "offset_deg = 9.0\n").gait.offset == pytest.approx(
+        np.pi / 20
+    )
 
 
 def test_a_wave_is_swept_and_asked_for(tmp_path):
-    over = {"gait.waves": [0.8, 1.0], "gait.offset": [0.0, 0.1], "gait.amplitude": [0.5, 0.87]}
+    over = {
+        "gait.waves": [0.8, 1.0],
+        "gait.offset": [0.0, 0.1],
+        "gait.amplitude": [0.5, 0.87],
+    }
     coarse = ROBOT.with_numerics(phases=32)
     found = sweep.sweep(coarse, over)
     one = coarse.changed(gait=Wave(amplitude=0.87, waves=0.8, offset=0.1))
-    np.testing.assert_allclose(found["displacement"][0, 1, 1], Study(one).poses("direct"), atol=1e-13)
-    code, out, _ = geomech("displacement", "seven-link-wave", "--amplitudes", "0.87", "--json")
+    np.testing.assert_allclose(
+        found["displacement"][0, 1, 1], Study(one).poses("direct"), atol=1e-13
+    )
+    code, out, _ = geomech(
+        "displacement", "seven-link-wave", "--amplitudes", "0.87", "--json"
+    )
     assert code == 0
     net = np.hypot(*json.loads(out)["direct"][0][:2])
     # Wave efficiency 0.34 +- 0.02 in grains (Maladen et al. 2011); a wave of A / lambda = 0.2 is 0.757 body lengths long.
@@ -278,7 +375,9 @@ def test_waves_that_make_no_gait_are_refused(wrong, said):
 
 @pytest.mark.parametrize("ending", ["nc", "mat"])
 def test_a_table_keeps_the_names_of_modes(tmp_path, ending):
-    scene = Scene(Swimmer(SAND, MODES), Circle(amplitude=0.4)).with_numerics(grid=5, extent=0.6, phases=16)
+    scene = Scene(Swimmer(SAND, MODES), Circle(amplitude=0.4)).with_numerics(
+        grid=5, extent=0.6, phases=16
+    )
     study = Study(scene)
     fields.save_connection(tmp_path / f"modes.{ending}", study)
     again = Table(tmp_path / f"modes.{ending}")

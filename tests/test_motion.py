@@ -46,7 +46,9 @@ def drawn(lengths, bends, length, frame, pose):
     headings = np.concatenate([[0.0], np.cumsum(bends)])
     ends = np.zeros((len(parts) + 1, 2))
     for k, part in enumerate(parts):
-        ends[k + 1] = ends[k] + part * np.array([np.cos(headings[k]), np.sin(headings[k])])
+        ends[k + 1] = ends[k] + part * np.array(
+            [np.cos(headings[k]), np.sin(headings[k])]
+        )
     centres = (ends[1:] + ends[:-1]) / 2
     if frame == "mean":
         origin, heading = parts @ centres / length, parts @ headings / length
@@ -65,7 +67,11 @@ def bends_of(body, alpha):
         at = 2 * np.pi * body.waves * np.arange(1, body.elements) / body.elements
         return (alpha[0] * np.cos(at) + alpha[1] * np.sin(at)) / body.elements
     if isinstance(body, ConstantCurvature):
-        curvature = np.repeat(alpha, body.elements // body.sections) * body.sections / body.elements  # of each element
+        curvature = (
+            np.repeat(alpha, body.elements // body.sections)
+            * body.sections
+            / body.elements
+        )  # of each element
         return (curvature[1:] + curvature[:-1]) / 2
     return alpha
 
@@ -79,14 +85,21 @@ def test_points_are_the_links_in_the_world(name, frame):
     rng = np.random.default_rng(0)
     for length in (1.0, 0.37):
         body = dataclasses.replace(BODIES[name], frame=frame, length=length)
-        alpha, pose = rng.uniform(-2, 2, (2, 3, body.joints)), rng.uniform(-4, 4, (3, 3))
+        alpha, pose = (
+            rng.uniform(-2, 2, (2, 3, body.joints)),
+            rng.uniform(-4, 4, (3, 3)),
+        )
         points = body.points(alpha, pose)
         lengths = getattr(body, "lengths", (1.0,) * getattr(body, "elements", 0))
         assert points.shape == (2, 3, len(lengths) + 1, 2)
         for at in np.ndindex(2, 3):
-            expected = drawn(lengths, bends_of(body, alpha[at]), length, frame, pose[at[1]])
+            expected = drawn(
+                lengths, bends_of(body, alpha[at]), length, frame, pose[at[1]]
+            )
             np.testing.assert_allclose(points[at], expected, atol=1e-13)
-        np.testing.assert_allclose(body.points(alpha[1, 2], pose), body.points(alpha[1, 2:], pose), atol=1e-15)
+        np.testing.assert_allclose(
+            body.points(alpha[1, 2], pose), body.points(alpha[1, 2:], pose), atol=1e-15
+        )
         here = drawn(lengths, bends_of(body, alpha[0, 0]), length, frame, np.zeros(3))
         np.testing.assert_allclose(body.points(alpha[0, 0]), here, atol=1e-13)
 
@@ -104,10 +117,18 @@ def test_poses_are_the_trajectory_at_the_samples():
     for n in (3, 8, 9, 40):
         xi = rng.normal(size=(6, n, 3))
         xi[..., 2] += np.array([0.0, 0.3, 0.5, -1.0, 3.2, 40.0])[:, None]
-        xi[..., 2] -= np.array([1.0, 0, 0, 0, 0, 0])[:, None] * xi[..., 2].mean(-1, keepdims=True)
+        xi[..., 2] -= np.array([1.0, 0, 0, 0, 0, 0])[:, None] * xi[..., 2].mean(
+            -1, keepdims=True
+        )
         found = reconstruct.poses(xi)
-        np.testing.assert_allclose(found, reconstruct.trajectory(xi, 2 * np.pi * np.arange(n + 1) / n), atol=1e-12)
-        np.testing.assert_allclose(found[:, -1], reconstruct.displacement(xi), atol=1e-12)
+        np.testing.assert_allclose(
+            found,
+            reconstruct.trajectory(xi, 2 * np.pi * np.arange(n + 1) / n),
+            atol=1e-12,
+        )
+        np.testing.assert_allclose(
+            found[:, -1], reconstruct.displacement(xi), atol=1e-12
+        )
 
 
 def test_cycles_follow_one_another():
@@ -118,7 +139,9 @@ def test_cycles_follow_one_another():
         for _ in range(cycles):
             expected += [se2.compose(end, pose) for pose in path[:-1]]
             end = se2.compose(end, path[-1])
-        np.testing.assert_allclose(reconstruct.repeated(path, cycles), [*expected, end], atol=1e-12)
+        np.testing.assert_allclose(
+            reconstruct.repeated(path, cycles), [*expected, end], atol=1e-12
+        )
 
 
 OVAL = Ellipse(semi_axes=(0.9, 0.5), centre=(0.2, -0.1), tilt=0.3)
@@ -151,7 +174,9 @@ def test_a_cycle_ends_where_the_direct_tier_says(name):
     np.testing.assert_allclose(two.pose[n], net, atol=1e-13 if repeats else 5e-3)
     np.testing.assert_array_equal(one.pose[0], 0.0)
     assert two.pose.shape == (2 * n + 1, 3) and two.cycles == 2
-    np.testing.assert_allclose(two.phase, np.linspace(0, 4 * np.pi, 2 * n + 1), atol=1e-13)
+    np.testing.assert_allclose(
+        two.phase, np.linspace(0, 4 * np.pi, 2 * n + 1), atol=1e-13
+    )
     np.testing.assert_allclose(two.alpha, scene.gait.shape(two.phase), atol=1e-13)
     again = np.abs(two.pose[-1] - se2.compose(net, net)).max()
     assert (again < 1e-12) == repeats, again
@@ -184,13 +209,24 @@ def test_wheels_do_not_slip_in_the_world(frame):
     found = moving.motion(Scene(snake, ZIGZAG, Numerics(phases=256)), 2)
     ends = found.points()
     step, weights = found.phase[1], (4 / 5, -1 / 5, 4 / 105, -1 / 280)
-    rate = sum(w * (np.roll(ends, -k, 0) - np.roll(ends, k, 0)) for k, w in enumerate(weights, 1)) / step
-    centre, along = ((rate[:, 1:] + rate[:, :-1]) / 2)[4:-4], np.diff(ends, axis=1)[4:-4]
+    rate = (
+        sum(
+            w * (np.roll(ends, -k, 0) - np.roll(ends, k, 0))
+            for k, w in enumerate(weights, 1)
+        )
+        / step
+    )
+    centre, along = (
+        ((rate[:, 1:] + rate[:, :-1]) / 2)[4:-4],
+        np.diff(ends, axis=1)[4:-4],
+    )
     across = centre[..., 1] * along[..., 0] - centre[..., 0] * along[..., 1]
     assert np.abs(centre).max() > 0.02
     assert np.abs(across).max() < 1e-10
     lengths = np.broadcast_to(0.4 * np.array([0.8, 1.3, 1.0]) / 3.1, along.shape[:2])
-    np.testing.assert_allclose(np.hypot(*np.moveaxis(along, -1, 0)), lengths, rtol=1e-12)
+    np.testing.assert_allclose(
+        np.hypot(*np.moveaxis(along, -1, 0)), lengths, rtol=1e-12
+    )
 
 
 def at_bench(scene, hertz):
@@ -216,9 +252,14 @@ def test_a_table_reads_back_with_every_digit(name, tmp_path):
     ends = columns(*(f"end_{k}_{axis}" for k in range(4) for axis in "xy"))
     np.testing.assert_array_equal(ends.reshape(-1, 4, 2), found.points())
     comments = [line for line in path.read_text().splitlines() if line.startswith("#")]
-    assert len(comments) == 5 and comments[2].startswith("# x (m), y (m), theta (rad): pose of the frame ")
+    assert len(comments) == 5 and comments[2].startswith(
+        "# x (m), y (m), theta (rad): pose of the frame "
+    )
     assert comments[1] == "# phase (rad): of the gait, 2 pi a cycle"
-    assert comments[3].startswith("# alpha_k (rad): joint angle, heading of link k+1") and "end_k_x" in comments[4]
+    assert (
+        comments[3].startswith("# alpha_k (rad): joint angle, heading of link k+1")
+        and "end_k_x" in comments[4]
+    )
     assert "time" not in found.columns
 
 
@@ -230,8 +271,16 @@ def test_time_where_the_gait_has_a_frequency(tmp_path):
     trajectories.save(tmp_path / "out.csv", found)
     table = np.genfromtxt(tmp_path / "out.csv", delimiter=",", names=True)
     np.testing.assert_allclose(table["time"], found.phase / (2 * np.pi * 2.5))
-    assert "# phase (rad): of the gait, 2 pi a cycle; time (s)\n" in (tmp_path / "out.csv").read_text()
-    assert plots.filmstrip(found).axes[1].get_title("left").endswith(f"t = {found.time[19]:.3g} s")
+    assert (
+        "# phase (rad): of the gait, 2 pi a cycle; time (s)\n"
+        in (tmp_path / "out.csv").read_text()
+    )
+    assert (
+        plots.filmstrip(found)
+        .axes[1]
+        .get_title("left")
+        .endswith(f"t = {found.time[19]:.3g} s")
+    )
 
 
 SCENE = """[medium]\nname = "glass-0.3mm-loose"\n[body]\nkind = "chain"\nlengths = [1, 1.4, 0.8]\n
@@ -258,12 +307,21 @@ def test_too_much_is_refused_before_it_begins(tmp_path):
     with pytest.raises(Refusal, match="say yes"):
         moving.cost(scene, 10_000).check("scene", False)
     moving.cost(scene, 10).check("scene", False)
-    for name, balances in (("swimmer", 33), ("slope", 100 * 32)):  # cycles that repeat are solved once
+    for name, balances in (
+        ("swimmer", 33),
+        ("slope", 100 * 32),
+    ):  # cycles that repeat are solved once
         assert moving.cost(SCENES[name], 100).balances == balances
-        assert moving.cost(SCENES[name], 100).seconds > moving.cost(SCENES[name], 1).seconds
+        assert (
+            moving.cost(SCENES[name], 100).seconds
+            > moving.cost(SCENES[name], 1).seconds
+        )
     with pytest.raises(Refusal, match="say yes"):
         animate.cost(256, 2000).check("scene", False)
-    for name, cure in (("out.txt", "end the name in .gif or .mp4"), ("out", "end the name")):
+    for name, cure in (
+        ("out.txt", "end the name in .gif or .mp4"),
+        ("out", "end the name"),
+    ):
         with pytest.raises(Refusal, match=cure):
             animate.check_format(tmp_path / name)
     with pytest.raises(Refusal, match="end the name of a table in .csv"):
@@ -280,7 +338,9 @@ def chain():
 def test_a_film_shows_body_track_and_shape(chain):
     found = moving.motion(chain[0].scene, 2)
     shown = animate.rows(32, 2)
-    np.testing.assert_array_equal(shown, np.arange(100) * 32 // 50)  # 25 a second, 2 s a cycle
+    np.testing.assert_array_equal(
+        shown, np.arange(100) * 32 // 50
+    )  # 25 a second, 2 s a cycle
     np.testing.assert_array_equal(animate.rows(100, 2, 1.0), np.arange(0, 200, 4))
     fig, put = plots.stage(found, shown, *chain[1:])
     world, shapes = fig.axes[:2]
@@ -293,10 +353,16 @@ def test_a_film_shows_body_track_and_shape(chain):
         assert text.get_text() == f"cycle {row / 32:.2f}"
         assert body.axes is world and dot.axes is shapes
     (mesh,) = (c for c in shapes.collections if isinstance(c, QuadMesh))
-    np.testing.assert_array_equal(np.ravel(mesh.get_array()), chain[1].values[0].T.ravel())
+    np.testing.assert_array_equal(
+        np.ravel(mesh.get_array()), chain[1].values[0].T.ravel()
+    )
     low, high = np.transpose([world.get_xlim(), world.get_ylim()])
     assert (found.points()[shown] > low).all() and (found.points()[shown] < high).all()
-    assert (world.get_xlabel(), world.get_ylabel(), world.get_aspect()) == ("x (BL)", "y (BL)", 1.0)
+    assert (world.get_xlabel(), world.get_ylabel(), world.get_aspect()) == (
+        "x (BL)",
+        "y (BL)",
+        1.0,
+    )
 
 
 @pytest.mark.parametrize(
@@ -316,7 +382,9 @@ def test_films_are_in_real_time_or_tell_their_speed(frequency, cycle, caption):
     assert (at.cycle, at.caption) == (pytest.approx(cycle), caption)
     shown = animate.rows(256, 3, frequency)
     assert len(shown) / at.rate == pytest.approx(3 * cycle, abs=1.0 / at.rate)
-    np.testing.assert_allclose(shown, np.arange(len(shown)) / at.rate / cycle * 256, atol=1.0)
+    np.testing.assert_allclose(
+        shown, np.arange(len(shown)) / at.rate / cycle * 256, atol=1.0
+    )
     assert len(shown) <= 302
 
 
@@ -329,16 +397,23 @@ def test_a_gif_shows_its_phases_and_takes_as_long_as_it_says(chain, tmp_path):
     told = []
     animate.save(tmp_path / "out.gif", *chain, progress=told.append)
     with Image.open(tmp_path / "out.gif") as film:
-        assert film.n_frames in (32, 33) and len(told) == 50  # a picture that is shown twice is stored once
+        assert (
+            film.n_frames in (32, 33) and len(told) == 50
+        )  # a picture that is shown twice is stored once
         assert film.size == (800, 360)
-        assert sum(frame.info["duration"] for frame in ImageSequence.Iterator(film)) == 2000
+        assert (
+            sum(frame.info["duration"] for frame in ImageSequence.Iterator(film))
+            == 2000
+        )
         film.seek(0)
         first = np.array(film.convert("RGB"), int)
         film.seek(10)
         later = np.array(film.convert("RGB"), int)
     moved = (np.abs(later - first).sum(-1) > 60).any(0)
     assert moved[:400].any() and moved[400:].any()
-    red = np.abs(first - [209, 73, 91]).sum(-1) < 40  # the head, and the point on the map
+    red = (
+        np.abs(first - [209, 73, 91]).sum(-1) < 40
+    )  # the head, and the point on the map
     assert red[:, :400].any() and red[:, 400:].any()
     assert told[-1] == 1.0
 
@@ -352,7 +427,10 @@ def test_a_strip_numbers_bodies_and_shapes_alike(chain, tmp_path):
     for k, (ax, row) in enumerate(zip(pictures, rows)):
         assert ax.get_title("left") == rf"$\bf{{{k + 1}}}$  cycle {row / 32:.2f}"
         np.testing.assert_array_equal(ax.lines[2].get_xydata(), found.points()[row])
-        assert (ax.get_xlim(), ax.get_ylim()) == (pictures[0].get_xlim(), pictures[0].get_ylim())
+        assert (ax.get_xlim(), ax.get_ylim()) == (
+            pictures[0].get_xlim(),
+            pictures[0].get_ylim(),
+        )
     numbers = {
         t.get_text(): t.xy
         for ax in fig.axes
@@ -384,20 +462,38 @@ def test_systems_without_a_map_are_shown_all_the_same(name, tmp_path):
     *_, mark, _ = put(found.scene.numerics.phases + 5)
     if joints == 2:
         np.testing.assert_array_equal(mark.get_xydata(), found.alpha[5:6])
-        assert shapes.get_xlim()[0] < found.alpha[:, 0].min() < found.alpha[:, 0].max() < shapes.get_xlim()[1]
-        assert shapes.get_ylim()[0] < found.alpha[:, 1].min() < found.alpha[:, 1].max() < shapes.get_ylim()[1]
+        assert (
+            shapes.get_xlim()[0]
+            < found.alpha[:, 0].min()
+            < found.alpha[:, 0].max()
+            < shapes.get_xlim()[1]
+        )
+        assert (
+            shapes.get_ylim()[0]
+            < found.alpha[:, 1].min()
+            < found.alpha[:, 1].max()
+            < shapes.get_ylim()[1]
+        )
     else:
         np.testing.assert_allclose(mark.get_xdata(), 5 / found.scene.numerics.phases)
         assert shapes.get_xlabel() == "phase (cycles)"
     if joints == 3:
         once = slice(0, found.scene.numerics.phases + 1)
         for k in range(3):
-            np.testing.assert_array_equal(shapes.lines[k].get_ydata(), found.alpha[once, k])
+            np.testing.assert_array_equal(
+                shapes.lines[k].get_ydata(), found.alpha[once, k]
+            )
     if joints > plots.LINES:
         (mesh,) = (c for c in shapes.collections if isinstance(c, QuadMesh))
-        curvature = found.alpha[: found.scene.numerics.phases + 1].T * (joints + 1) / 0.3
-        np.testing.assert_allclose(np.reshape(mesh.get_array(), curvature.shape), curvature, rtol=1e-9)
-        np.testing.assert_allclose(mesh.get_coordinates()[:, 0, 1], np.arange(1, joints + 1) / (joints + 1))
+        curvature = (
+            found.alpha[: found.scene.numerics.phases + 1].T * (joints + 1) / 0.3
+        )
+        np.testing.assert_allclose(
+            np.reshape(mesh.get_array(), curvature.shape), curvature, rtol=1e-9
+        )
+        np.testing.assert_allclose(
+            mesh.get_coordinates()[:, 0, 1], np.arange(1, joints + 1) / (joints + 1)
+        )
         assert fig.axes[2].get_ylabel() == "curvature (rad/m)"
     animate.save(tmp_path / "out.png", found)
 
@@ -409,7 +505,14 @@ class Sled:
 
     def velocity(self, alpha, alphadot):
         alpha, alphadot = np.broadcast_arrays(alpha, alphadot)
-        return np.stack([alphadot[..., 0] ** 2, 0.3 * alphadot[..., 1], alpha[..., 0] * alphadot[..., 1]], -1)
+        return np.stack(
+            [
+                alphadot[..., 0] ** 2,
+                0.3 * alphadot[..., 1],
+                alpha[..., 0] * alphadot[..., 1],
+            ],
+            -1,
+        )
 
 
 def test_a_system_without_a_body_is_an_arrow(tmp_path):
@@ -418,12 +521,16 @@ def test_a_system_without_a_body_is_an_arrow(tmp_path):
     assert found.points() is None
     assert list(found.columns) == ["phase", "x", "y", "theta", "alpha_1", "alpha_2"]
     trajectories.save(tmp_path / "out.csv", found)
-    np.testing.assert_array_equal(np.loadtxt(tmp_path / "out.csv", delimiter=",", skiprows=1)[:, 1:4], found.pose)
+    np.testing.assert_array_equal(
+        np.loadtxt(tmp_path / "out.csv", delimiter=",", skiprows=1)[:, 1:4], found.pose
+    )
     assert "end_k_x" not in (tmp_path / "out.csv").read_text()
     _, put = plots.stage(found, animate.rows(24, 1))
     body, (x, y, theta) = put(7)[1].get_xydata(), found.pose[7]
     np.testing.assert_allclose(body.mean(0), [x, y], atol=1e-14)
-    np.testing.assert_allclose(body[1] - body[0], 0.5 * np.array([np.cos(theta), np.sin(theta)]), atol=1e-14)
+    np.testing.assert_allclose(
+        body[1] - body[0], 0.5 * np.array([np.cos(theta), np.sin(theta)]), atol=1e-14
+    )
 
 
 FFMPEG = """#!/bin/sh
@@ -453,7 +560,9 @@ def test_an_mp4_hands_its_pictures_to_ffmpeg(chain, tmp_path, monkeypatch):
     installed(tmp_path, monkeypatch, 'cat > "$last"')
     animate.check_format(tmp_path / "out.mp4")
     laid_out = []
-    monkeypatch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: laid_out.append(True))
+    monkeypatch.setattr(
+        ConstrainedLayoutEngine, "execute", lambda *_: laid_out.append(True)
+    )
     animate.save(tmp_path / "out.mp4", *chain)
     assert laid_out == [True]  # once, and stays for all pictures
     raw = np.fromfile(tmp_path / "out.mp4", np.uint8).reshape(12, 360, 800, 3)
@@ -463,17 +572,26 @@ def test_an_mp4_hands_its_pictures_to_ffmpeg(chain, tmp_path, monkeypatch):
 
 def test_an_mp4_says_what_it_lacks(chain, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(Refusal, match="takes ffmpeg, which is not installed; end the name in .gif"):
+    with pytest.raises(
+        Refusal, match="takes ffmpeg, which is not installed; end the name in .gif"
+    ):
         animate.check_format(tmp_path / "out.mp4")
 
 
 @pytest.mark.usefixtures("brief")
 @pytest.mark.parametrize(
-    "does", ['cat > /dev/null; echo "first" >&2; echo "no such codec" >&2; exit 1', "echo no such codec >&2; exit 1"]
+    "does",
+    [
+        'cat > /dev/null; echo "first" >&2; echo "no such codec" >&2; exit 1',
+        "echo no such codec >&2; exit 1",
+    ],
 )
 def test_an_mp4_that_ffmpeg_refuses_is_not_left(does, chain, tmp_path, monkeypatch):
     installed(tmp_path, monkeypatch, does)
-    with pytest.raises(Refusal, match=r"cannot write out.mp4: ffmpeg failed: no such codec; end the name in .gif"):
+    with pytest.raises(
+        Refusal,
+        match=r"cannot write out.mp4: ffmpeg failed: no such codec; end the name in .gif",
+    ):
         animate.save(tmp_path / "out.mp4", *chain)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bin", "said"]
 
@@ -487,7 +605,9 @@ def test_a_film_that_is_stopped_leaves_nothing(ending, chain, tmp_path, monkeypa
         if fraction > 0.3:
             signal.raise_signal(signal.SIGINT)
 
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # which a job in the background does not have
+    before = signal.signal(
+        signal.SIGINT, signal.default_int_handler
+    )  # which a job in the background does not have
     try:
         with pytest.raises(KeyboardInterrupt):
             animate.save(tmp_path / f"out.{ending}", *chain, progress=stop)

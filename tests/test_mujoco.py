@@ -20,10 +20,21 @@ from rft.walking import Fineness, Rhex, Roller, Tripod, Walker, rolling
 from rft.walking.facets import Grains, Surface
 from rft.walking.planar_walk import walk as planar_walk
 
-mujoco = pytest.importorskip("mujoco", reason="needs the extra: pip install 'geomech[mujoco]'")
+mujoco = pytest.importorskip(
+    "mujoco", reason="needs the extra: pip install 'geomech[mujoco]'"
+)
 pytestmark = pytest.mark.usefixtures("fastest")
 from rft.walking import geoms, hexapod  # noqa: E402
-from rft.walking.mujoco_walk import ROW, Simulation, Start, _goes_straight, _moved, _until, rerun, walk  # noqa: E402
+from rft.walking.mujoco_walk import (  # noqa: E402
+    ROW,
+    Simulation,
+    Start,
+    _goes_straight,
+    _moved,
+    _until,
+    rerun,
+    walk,
+)
 from rft.walking.multibody import Multibody  # noqa: E402
 
 SAND = StressMap(zeta=0.3, grazing=math.radians(5))
@@ -38,13 +49,17 @@ TILTED = """<mujoco><option gravity="0 0 -9.81"/><worldbody><body name="a" pos="
 </body></worldbody></mujoco>"""
 
 
-def test_momenta_change_by_the_forces_and_moments_of_grains_and_weight(tmp_path, monkeypatch):
+def test_momenta_change_by_the_forces_and_moments_of_grains_and_weight(
+    tmp_path, monkeypatch
+):
     """Of a body whose centre of mass, origin and geom are three places with three frames, that tumbles; against the wrench of
     the geom's mesh by itself."""
     monkeypatch.chdir(tmp_path)
     model = mujoco.MjModel.from_xml_string(TILTED)
     mesh = geoms.geom_mesh(model, 0, 24)
-    body = Multibody(model, geoms.surfaces(model, {"g": mesh}), Grains(SPATIAL, rounding=1e-5))
+    body = Multibody(
+        model, geoms.surfaces(model, {"g": mesh}), Grains(SPATIAL, rounding=1e-5)
+    )
     data = body.data
     data.qvel[:] = [0.4, 0.2, -0.5, 3.0, -4.0, 2.0]
 
@@ -54,14 +69,23 @@ def test_momenta_change_by_the_forces_and_moments_of_grains_and_weight(tmp_path,
         return np.concatenate([0.3 * data.subtree_linvel[0], data.subtree_angmom[0]])
 
     before, h = momenta(), 1e-5
-    turn, place, com = data.geom_xmat[0].reshape(3, 3).copy(), data.geom_xpos[0].copy(), data.xipos[1].copy()
+    turn, place, com = (
+        data.geom_xmat[0].reshape(3, 3).copy(),
+        data.geom_xpos[0].copy(),
+        data.xipos[1].copy(),
+    )
     motion = np.zeros(6)
     mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_GEOM, 0, motion, 0)
     one = wrench(SPATIAL, mesh, turn, place, motion[3:], motion[:3])
     body.step(h)
-    wanted = [one.force + [0, 0, -0.3 * 9.81], one.moment + np.cross(place - com, one.force)]
+    wanted = [
+        one.force + [0, 0, -0.3 * 9.81],
+        one.moment + np.cross(place - com, one.force),
+    ]
     assert np.abs(wanted).min() > 1e-3
-    np.testing.assert_allclose((momenta() - before) / h, np.concatenate(wanted), rtol=0.02, atol=2e-3)
+    np.testing.assert_allclose(
+        (momenta() - before) / h, np.concatenate(wanted), rtol=0.02, atol=2e-3
+    )
     data.qpos[0] = np.nan
     mujoco.mj_step(model, data)  # warns, but in no file
     assert not [*tmp_path.iterdir()]
@@ -69,7 +93,11 @@ def test_momenta_change_by_the_forces_and_moments_of_grains_and_weight(tmp_path,
 
 def test_what_falls_free_falls_as_galilei_says():
     model = mujoco.MjModel.from_xml_string(TILTED)
-    body = Multibody(model, geoms.surfaces(model, {"g": geoms.geom_mesh(model, 0, 12)}), Grains(SPATIAL))
+    body = Multibody(
+        model,
+        geoms.surfaces(model, {"g": geoms.geom_mesh(model, 0, 12)}),
+        Grains(SPATIAL),
+    )
     data = body.data
     data.qpos[2], data.qvel[3:] = 3.0, [2.0, -1.0, 3.0]
     mujoco.mj_forward(model, data)
@@ -83,9 +111,16 @@ def test_what_falls_free_falls_as_galilei_says():
     for _ in range(40):
         body.step(0.005)
     mujoco.mj_subtreeVel(model, data)
-    np.testing.assert_allclose(data.xipos[1], com + 0.2 * start + [0, 0, -9.81 * 0.02], atol=1e-4)
-    np.testing.assert_allclose(data.subtree_angmom[0], spin, atol=1e-4 * np.linalg.norm(spin))
-    assert body.energy() == pytest.approx(energy, rel=1e-4) and (body.work, body.loss) == (0.0, 0.0)
+    np.testing.assert_allclose(
+        data.xipos[1], com + 0.2 * start + [0, 0, -9.81 * 0.02], atol=1e-4
+    )
+    np.testing.assert_allclose(
+        data.subtree_angmom[0], spin, atol=1e-4 * np.linalg.norm(spin)
+    )
+    assert body.energy() == pytest.approx(energy, rel=1e-4) and (
+        body.work,
+        body.loss,
+    ) == (0.0, 0.0)
 
 
 FLOORED = """<mujoco><option gravity="0 0 -9.81"/><worldbody><geom name="floor" type="plane" size="1 1 1"/>
@@ -101,25 +136,41 @@ def test_what_touches_grains_touches_no_floor():
     depths = []
     for text in (
         FLOORED.format(""),
-        FLOORED.format("").replace('name="floor"', 'name="floor" contype="0" conaffinity="0"'),
+        FLOORED.format("").replace(
+            'name="floor"', 'name="floor" contype="0" conaffinity="0"'
+        ),
     ):
         model = made(text)
-        body = Multibody(model, geoms.surfaces(model, {"foot": foot(model)}), Grains(SPATIAL))
+        body = Multibody(
+            model, geoms.surfaces(model, {"foot": foot(model)}), Grains(SPATIAL)
+        )
         assert body.data.ncon == 0
         for _ in range(100):
             body.step(0.005)
         depths.append(0.02 - body.data.qpos[2])
-        assert body.unsolved == 0 and body.evaluations < 335  # 323: steps of Newton's method that go astray are halved
-        assert body.data.ncon == 0 and body.wrenches[0, 2] == pytest.approx(model.body_mass[1] * 9.81, rel=0.02)
+        assert (
+            body.unsolved == 0 and body.evaluations < 335
+        )  # 323: steps of Newton's method that go astray are halved
+        assert body.data.ncon == 0 and body.wrenches[0, 2] == pytest.approx(
+            model.body_mass[1] * 9.81, rel=0.02
+        )
     assert depths[0] == depths[1] > 1e-3
     model = made(FLOORED.format("").replace('pos="0 0 0.05"', 'pos="0 0 -0.025"'))
-    body = Multibody(model, geoms.surfaces(model, {"foot": foot(model)}), Grains(SPATIAL))
+    body = Multibody(
+        model, geoms.surfaces(model, {"foot": foot(model)}), Grains(SPATIAL)
+    )
     assert body.data.ncon == 1 and model.geom_contype.tolist() == [1, 0, 1]
     whole = Multibody(model, [Surface.from_mesh(1, foot(model))], Grains(SPATIAL))
     assert whole.data.ncon == 0 and model.geom_contype.tolist() == [1, 0, 0]
-    paired = made(FLOORED.format('<contact><pair geom1="floor" geom2="foot"/></contact>'))
-    with pytest.raises(ValueError, match="a <pair> of <contact> names a geom that touches the ground"):
-        Multibody(paired, geoms.surfaces(paired, {"foot": foot(paired)}), Grains(SPATIAL))
+    paired = made(
+        FLOORED.format('<contact><pair geom1="floor" geom2="foot"/></contact>')
+    )
+    with pytest.raises(
+        ValueError, match="a <pair> of <contact> names a geom that touches the ground"
+    ):
+        Multibody(
+            paired, geoms.surfaces(paired, {"foot": foot(paired)}), Grains(SPATIAL)
+        )
 
 
 PENDULUM = """<mujoco><option gravity="0 0 -9.81"/><worldbody><body pos="0 0 5"><joint name="j" axis="0 1 0" stiffness="0.4"
@@ -130,7 +181,11 @@ def test_springs_keep_energy_and_dampers_take_it():
     """To the second order of the steps, which make no difference to what a halved step does."""
     model, left = mujoco.MjModel.from_xml_string(PENDULUM), []
     for steps in (20, 40):
-        body = Multibody(model, geoms.surfaces(model, {"g": geoms.geom_mesh(model, 0, 8)}), Grains(SPATIAL))
+        body = Multibody(
+            model,
+            geoms.surfaces(model, {"g": geoms.geom_mesh(model, 0, 8)}),
+            Grains(SPATIAL),
+        )
         body.data.qpos[0], body.data.qvel[0] = 0.3, 2.0
         first = body.energy()
         for _ in range(steps):
@@ -140,7 +195,11 @@ def test_springs_keep_energy_and_dampers_take_it():
     assert left[1] < 1e-4 and left[0] / left[1] > 3.5
     ends = []
     for fails in (0, 1):
-        body = Multibody(model, geoms.surfaces(model, {"g": geoms.geom_mesh(model, 0, 8)}), Grains(SPATIAL))
+        body = Multibody(
+            model,
+            geoms.surfaces(model, {"g": geoms.geom_mesh(model, 0, 8)}),
+            Grains(SPATIAL),
+        )
         body.data.qvel[0], solved, tried = 2.0, body._step, iter([fails, 0, 0])
         body._step = lambda *args: solved(*args) and not next(tried)
         for h in (0.04,) if fails else (0.02, 0.02):
@@ -152,15 +211,19 @@ def test_springs_keep_energy_and_dampers_take_it():
 def test_steps_are_of_order_two_and_energy_is_kept_to_that():
     """Xplorer in its plane at 4 Hz, after its fall: motors' work = losses + change of energy."""
     walker = dataclasses.replace(XPLORER.walker, gait=Tripod(4.0))
-    fallen = Simulation(walker, dataclasses.replace(QUICK, steps=48), planar=True).walk(1)
-    run = lambda steps: Simulation(walker, dataclasses.replace(QUICK, steps=steps), planar=True).walk(
-        1, start=fallen.limit
+    fallen = Simulation(walker, dataclasses.replace(QUICK, steps=48), planar=True).walk(
+        1
     )
+    run = lambda steps: Simulation(
+        walker, dataclasses.replace(QUICK, steps=steps), planar=True
+    ).walk(1, start=fallen.limit)
     finest, errors, audits = run(112), [], []
     np.testing.assert_allclose(finest.pose[0, 1:], fallen.pose[-1, 1:], atol=1e-12)
     for steps in (12, 24, 48):
         w = run(steps)
-        errors.append(np.abs(w.pose[-1] - finest.pose[-1]).max() / np.abs(finest.pose).max())
+        errors.append(
+            np.abs(w.pose[-1] - finest.pose[-1]).max() / np.abs(finest.pose).max()
+        )
         audits.append(abs((w.work - w.loss - w.energy)[-1] + w.energy[0]) / w.work[-1])
         assert w.unsolved == 0
     for values in (errors, audits):
@@ -178,11 +241,18 @@ def test_speeds_are_those_of_the_planar_engine(name, frequency):
     finely = dataclasses.replace(QUICK, steps=12, elements=12)
     wanted = planar_walk([walker], finely, 2)[0]
     free = walk([walker], finely, 2)[0]
-    assert free.status == wanted.status == "walking" and free.speed == pytest.approx(wanted.speed, rel=0.03)
-    assert np.abs(free.spatial["roll"]).max() < 0.06 and np.abs(free.spatial["yaw"]).max() < 0.06
+    assert free.status == wanted.status == "walking" and free.speed == pytest.approx(
+        wanted.speed, rel=0.03
+    )
+    assert (
+        np.abs(free.spatial["roll"]).max() < 0.06
+        and np.abs(free.spatial["yaw"]).max() < 0.06
+    )
     if name != "xplorer":
         return
-    assert free.pose[:, 2].min() == pytest.approx(wanted.pose[:, 2].min(), abs=0.02)  # nose up, by ten degrees
+    assert free.pose[:, 2].min() == pytest.approx(
+        wanted.pose[:, 2].min(), abs=0.02
+    )  # nose up, by ten degrees
     assert free.twist[:, 2].max() == pytest.approx(wanted.twist[:, 2].max(), rel=0.2)
     kept = Simulation(walker, finely, planar=True).walk(8)
     assert kept.speed == pytest.approx(wanted.speed, rel=0.025)
@@ -198,9 +268,16 @@ def test_the_hull_is_drawn_as_a_box():
 
 def test_a_robot_and_its_mirror_image_walk_as_mirror_images():
     """Legs swapped from left to right, by half a cycle; hips so near that they roll and yaw."""
-    robot = Rhex(0.15, 0.13, 0.03, 0.05, CLeg(0.0205, 0.01), (-0.05, 0.04), aside=(0.03, 0.04))
+    robot = Rhex(
+        0.15, 0.13, 0.03, 0.05, CLeg(0.0205, 0.01), (-0.05, 0.04), aside=(0.03, 0.04)
+    )
     right, left = (
-        Simulation(Walker(robot, Tripod(2.0, 0.5, math.pi, m), SAND, (GrainInertia(0.5, 300.0),)), QUICK)
+        Simulation(
+            Walker(
+                robot, Tripod(2.0, 0.5, math.pi, m), SAND, (GrainInertia(0.5, 300.0),)
+            ),
+            QUICK,
+        )
         for m in (0.0, math.pi)
     )
     first, other = (np.zeros(0),) * 2
@@ -214,23 +291,38 @@ def test_a_robot_and_its_mirror_image_walk_as_mirror_images():
     np.testing.assert_allclose(other[:, 1:4], first[:, 1:4], atol=1e-6)
 
 
-@pytest.mark.parametrize("aside", [(0.03,), (0.03, -0.04), (0.03, 2e3), ((0.03, 0.04),), (0.03, np.nan)])
+@pytest.mark.parametrize(
+    "aside", [(0.03,), (0.03, -0.04), (0.03, 2e3), ((0.03, 0.04),), (0.03, np.nan)]
+)
 def test_distances_of_legs_from_the_middle_plane_are_checked(aside):
-    with pytest.raises(ValueError, match="^aside must be 2 numbers from 0 to .* m, one for each hip, got"):
+    with pytest.raises(
+        ValueError,
+        match="^aside must be 2 numbers from 0 to .* m, one for each hip, got",
+    ):
         Rhex(0.15, 0.13, 0.03, 0.05, CLeg(0.0205, 0.01), (-0.05, 0.04), aside=aside)
 
 
 def test_distances_of_legs_may_be_listed():
     listed, told = (
-        Rhex(0.15, 0.13, 0.03, 0.05, CLeg(0.02, 0.01), (0.0,), aside=kind([0.03])) for kind in (list, tuple)
+        Rhex(0.15, 0.13, 0.03, 0.05, CLeg(0.02, 0.01), (0.0,), aside=kind([0.03]))
+        for kind in (list, tuple)
     )
     assert listed == told and hash(listed) == hash(told)
 
 
 def test_legs_alternate_as_in_the_plane():
     robot = XPLORER.robot
-    legs = dict(zip(map(tuple, np.sign(hexapod.hips(robot)).astype(int).tolist()), hexapod.phases(robot)))
-    assert {k for k, phase in legs.items() if phase} == {(-1, -1, 0), (0, 1, 0), (1, -1, 0)}
+    legs = dict(
+        zip(
+            map(tuple, np.sign(hexapod.hips(robot)).astype(int).tolist()),
+            hexapod.phases(robot),
+        )
+    )
+    assert {k for k, phase in legs.items() if phase} == {
+        (-1, -1, 0),
+        (0, 1, 0),
+        (1, -1, 0),
+    }
     out = np.array([(-1) ** k * y for k, y in enumerate(robot.sides)])
     assert out.sum() == pytest.approx(0.0) and robot.sides.min() == pytest.approx(0.03)
     assert hexapod.mjcf(robot).count('type="hinge"') == 6
@@ -243,7 +335,9 @@ def test_every_end_has_its_status_and_no_nan():
         "sunk": Walker(XPLORER.robot, Tripod(2.0), StressMap(zeta=0.005)),
         "stuck": Walker(still, Tripod(4.0), XPLORER.medium),
         "flipped": Walker(long, Tripod(4.0), XPLORER.medium),
-        "walking": Walker(Roller(2.0, RoundRod(0.1, 0.1), axle=0.02), Tripod(1.0), XPLORER.medium),
+        "walking": Walker(
+            Roller(2.0, RoundRod(0.1, 0.1), axle=0.02), Tripod(1.0), XPLORER.medium
+        ),
     }
     for status, walker in cases.items():
         found = walk([walker], QUICK, 1)[0]
@@ -255,13 +349,19 @@ def test_every_end_has_its_status_and_no_nan():
     thrown = Simulation(cases["stuck"], QUICK)
     start = Start(thrown.body.data.qpos, np.array([1.0, 0.0, 3.0, *np.zeros(9)]))
     found = thrown.walk(3, start=start)
-    assert found.status == "airborne" and found.limit is None and found.speed == pytest.approx(1.0, rel=1e-3)
+    assert (
+        found.status == "airborne"
+        and found.limit is None
+        and found.speed == pytest.approx(1.0, rel=1e-3)
+    )
 
 
 def test_the_state_of_a_stride_has_velocities_over_that_of_the_legs():
     states = []
     for frequency in (1.0, 2.0):
-        one = Simulation(Walker(XPLORER.robot, Tripod(frequency), XPLORER.medium), QUICK)
+        one = Simulation(
+            Walker(XPLORER.robot, Tripod(frequency), XPLORER.medium), QUICK
+        )
         one.body.data.qvel[:] = frequency * np.linspace(-1, 1, one.body.model.nv)
         states.append(one.scaled_state())
     np.testing.assert_allclose(*states, atol=1e-12)
@@ -282,9 +382,18 @@ def test_who_turns_is_not_told_by_strides_along_a_line(turn, monkeypatch):
         return ""
 
     monkeypatch.setattr(Simulation, "stride", stride)
-    found = walk([Walker(XPLORER.robot, Tripod(2.0), XPLORER.medium)], dataclasses.replace(QUICK, duration=5.0))[0]
-    assert found.periodic and found.speed == pytest.approx(0.2) and (found.cycles == 10) == (turn > 0.0)
-    assert (found.yaw_rate, found.lateral_speed, found.settling_time) == pytest.approx((2 * turn, 0.0, 0.0), abs=1e-9)
+    found = walk(
+        [Walker(XPLORER.robot, Tripod(2.0), XPLORER.medium)],
+        dataclasses.replace(QUICK, duration=5.0),
+    )[0]
+    assert (
+        found.periodic
+        and found.speed == pytest.approx(0.2)
+        and (found.cycles == 10) == (turn > 0.0)
+    )
+    assert (found.yaw_rate, found.lateral_speed, found.settling_time) == pytest.approx(
+        (2 * turn, 0.0, 0.0), abs=1e-9
+    )
     way = 0.1 * np.exp(1j * turn * np.arange(10)).cumsum()
     np.testing.assert_allclose(found.pose[1:, 0], way.real, atol=1e-9)
     np.testing.assert_allclose(found.spatial["y"][1:], way.imag, atol=1e-9)
@@ -293,11 +402,17 @@ def test_who_turns_is_not_told_by_strides_along_a_line(turn, monkeypatch):
 def test_a_plain_wheel_rolls_as_fast_as_the_grains_bear_it():
     """At the default grazing, where triangles lead or do not as a whole: against the balance of forces of a wheel of 400
     elements, with the slip at which it pulls nothing; both engines tell how far they are off."""
-    stress, wheel, turn = VERTICAL["poppy-seeds-loose"].stress, Wheel(0.1, 0.08), 2 * np.pi
+    stress, wheel, turn = (
+        VERTICAL["poppy-seeds-loose"].stress,
+        Wheel(0.1, 0.08),
+        2 * np.pi,
+    )
     slip = np.linspace(0.3, 0.33, 7)
     pull = rolling(stress, wheel, 2.0 * GRAVITY, turn, slip, elements=400).pull
     truth = (1 - np.interp(0.0, pull, slip)) * turn * 0.1
-    scene = WalkerScene(stress, Roller(2.0, wheel), Tripod(1.0), numerics=Fineness(elements=48))
+    scene = WalkerScene(
+        stress, Roller(2.0, wheel), Tripod(1.0), numerics=Fineness(elements=48)
+    )
     for engine, most in (("planar", 0.012), ("mujoco", 0.04)):
         (one,) = walked([scene], engine, settling=True)
         assert abs(one.walk.speed - truth) < one.estimate < most * truth
@@ -306,18 +421,31 @@ def test_a_plain_wheel_rolls_as_fast_as_the_grains_bear_it():
 def test_the_figure_compares_steps_and_engines(monkeypatch):
     from figures import walking_mujoco
 
-    coarse = dataclasses.replace(XPLORER, numerics=dataclasses.replace(QUICK, elements=4))
+    coarse = dataclasses.replace(
+        XPLORER, numerics=dataclasses.replace(QUICK, elements=4)
+    )
     monkeypatch.setattr(walking_mujoco, "load", lambda name: coarse)
     monkeypatch.setattr(walking_mujoco, "MOST_STRIDES", 1)
-    numbers = walking_mujoco.compute({"implicit": (12,), "held": (12,)}, 24, {"SandBot": ()})
+    numbers = walking_mujoco.compute(
+        {"implicit": (12,), "held": (12,)}, 24, {"SandBot": ()}
+    )
     (_, implicit), (_, held) = numbers["steps"].values()
     assert implicit.max() < 0.2 < held[0]
-    numbers["speeds"]["SandBot"] = (1.0, 2.0), np.array([0.1, 0.2]), np.array([0.1, 0.202])
+    numbers["speeds"]["SandBot"] = (
+        (1.0, 2.0),
+        np.array([0.1, 0.2]),
+        np.array([0.1, 0.202]),
+    )
     ways, speeds = walking_mujoco.draw(numbers).axes
     np.testing.assert_allclose(curve(ways, "implicit"), [[12], implicit])
     np.testing.assert_allclose(curve(speeds, "MuJoCo"), [[1.0, 2.0], [0.1, 0.202]])
-    assert (ways.get_ylabel(), speeds.get_title()) == ("error of the way", "SandBot: within 1.0 %")
-    assert {name.lower() for name in walking_mujoco.FREQUENCIES} <= {*scenes.walker_names()}
+    assert (ways.get_ylabel(), speeds.get_title()) == (
+        "error of the way",
+        "SandBot: within 1.0 %",
+    )
+    assert {name.lower() for name in walking_mujoco.FREQUENCIES} <= {
+        *scenes.walker_names()
+    }
 
 
 def course(t, yaw=0.0, ahead=0.3):
@@ -331,13 +459,23 @@ def course(t, yaw=0.0, ahead=0.3):
         "v_x": ahead + zero,
         "v_z": 0.4 * rocks,
     }
-    columns |= {"rate": rocks, "work": 2.0 * t, "loss": 1.5 * t, "energy": 0.3 + rocks, "y": -0.1 * t, "roll": -rocks}
+    columns |= {
+        "rate": rocks,
+        "work": 2.0 * t,
+        "loss": 1.5 * t,
+        "energy": 0.3 + rocks,
+        "y": -0.1 * t,
+        "roll": -rocks,
+    }
     return np.stack([columns.get(name, yaw + zero) for name in ROW], -1)
 
 
 def test_strides_are_repeated_until_the_walk_is_over():
     """What grows goes on growing, x and y and the sums of energies, and all else recurs; without strides a walk is cut."""
-    positions = lambda t: np.stack([0.3 * t, -0.1 * t, 0.1 + 0.01 * np.sin(4 * np.pi * t), np.cos(4 * np.pi * t)], -1)
+    positions = lambda t: np.stack(
+        [0.3 * t, -0.1 * t, 0.1 + 0.01 * np.sin(4 * np.pi * t), np.cos(4 * np.pi * t)],
+        -1,
+    )
     known, whole = np.arange(0, 1.26, 0.125), np.arange(0, 3.01, 0.125)
     for duration, steps, t in (
         (3.1, 4, whole),
@@ -354,31 +492,65 @@ def test_strides_are_repeated_until_the_walk_is_over():
 def test_a_way_is_along_and_to_the_left_of_the_first_heading():
     """And turns by less than half a turn."""
     before, after = np.zeros((2, len(ROW)))
-    before[[1, 10, 12]], after[[1, 10, 12]] = (2.0, -1.0, 3.0), (2.0 - 3.0, -1.0 + 0.5, -3.0)
+    before[[1, 10, 12]], after[[1, 10, 12]] = (
+        (2.0, -1.0, 3.0),
+        (2.0 - 3.0, -1.0 + 0.5, -3.0),
+    )
     way = complex(-3.0, 0.5) * np.exp(-3.0j)
-    np.testing.assert_allclose(_moved(before, after), [way.real, way.imag, 2 * np.pi - 6.0], rtol=1e-12)
+    np.testing.assert_allclose(
+        _moved(before, after), [way.real, way.imag, 2 * np.pi - 6.0], rtol=1e-12
+    )
 
 
 @pytest.mark.parametrize(
     ("turn", "straight"),
-    [(0.0083, True), (-0.0083, True), (0.0084, False), (2 * np.pi - 0.0084, False), (2 * np.pi - 0.0083, True)],
+    [
+        (0.0083, True),
+        (-0.0083, True),
+        (0.0084, False),
+        (2 * np.pi - 0.0084, False),
+        (2 * np.pi - 0.0083, True),
+    ],
 )
 def test_a_way_is_straight_that_turns_little_until_the_end(turn, straight):
     """By 0.05 rad in the six strides of half a second that are left, not in those that are over."""
     before, after = course(np.array([1.5, 2.0]))
     before[12], after[12] = 0.7, 0.7 + turn
     assert _goes_straight(before, after, 5.0) is straight
-    assert _goes_straight(before, after, 1.0) and not _goes_straight(before, after + 0.1, 1e3)
+    assert _goes_straight(before, after, 1.0) and not _goes_straight(
+        before, after + 0.1, 1e3
+    )
 
 
 def test_the_means_of_a_walk_are_those_of_its_last_strides():
     """Of the last one where it repeats itself, else of four; of a robot at its end of all its way."""
     robot = types.SimpleNamespace(gait=Tripod(2.0), reach=0.5)
-    moves = np.array([[9.0, 9.0, 9.0], [0.1, 0.01, -0.1], [0.2, 0.02, -0.2], [0.3, 0.03, 0.4], [0.2, 0.02, 0.1]])
-    means = lambda *arguments: Simulation.means(robot, course(np.linspace(0, 2, 9)), *arguments)
-    assert means(moves, True, 0.03, "") == (pytest.approx([0.4, 0.04, 0.2]), pytest.approx(0.06), "walking")
-    assert means(moves, False, 0.03, "") == (pytest.approx([0.4, 0.04, 0.1]), pytest.approx(0.4), "walking")
-    assert means(moves[1:2] * [-1, 1, 1], False, 0.0, "")[1:] == (pytest.approx(0.2), "walking")
+    moves = np.array(
+        [
+            [9.0, 9.0, 9.0],
+            [0.1, 0.01, -0.1],
+            [0.2, 0.02, -0.2],
+            [0.3, 0.03, 0.4],
+            [0.2, 0.02, 0.1],
+        ]
+    )
+    means = lambda *arguments: Simulation.means(
+        robot, course(np.linspace(0, 2, 9)), *arguments
+    )
+    assert means(moves, True, 0.03, "") == (
+        pytest.approx([0.4, 0.04, 0.2]),
+        pytest.approx(0.06),
+        "walking",
+    )
+    assert means(moves, False, 0.03, "") == (
+        pytest.approx([0.4, 0.04, 0.1]),
+        pytest.approx(0.4),
+        "walking",
+    )
+    assert means(moves[1:2] * [-1, 1, 1], False, 0.0, "")[1:] == (
+        pytest.approx(0.2),
+        "walking",
+    )
     for move, status in ((-0.0099, "stuck"), (0.0101, "walking")):
         assert means(np.array([[move, 0.5, 0.0]]), True, 0.0, "")[2] == status
     rows = course(np.linspace(0, 2, 9))
@@ -397,9 +569,9 @@ def test_a_row_tells_place_attitude_and_their_rates():
     data.qvel[:6], data.time = [1.0, 2.0, 3.0, 0.5, -0.6, 0.7], 0.25
     mujoco.mj_forward(one.body.model, data)
     row = dict(zip(ROW, one.row()))
-    assert [row[x] for x in ("t", "x", "y", "z", "yaw", "pitch", "roll")] == pytest.approx(
-        [0.25, 0.3, -0.4, 0.5, *angles]
-    )
+    assert [
+        row[x] for x in ("t", "x", "y", "z", "yaw", "pitch", "roll")
+    ] == pytest.approx([0.25, 0.3, -0.4, 0.5, *angles])
     spin = turn.apply([0.5, -0.6, 0.7])
     assert (row["v_x"], row["v_z"]) == pytest.approx((1.0, 3.0))
     assert row["rate"] == pytest.approx(spin @ [-math.sin(0.4), math.cos(0.4), 0.0])
@@ -407,19 +579,30 @@ def test_a_row_tells_place_attitude_and_their_rates():
         (XPLORER.robot.length, XPLORER.robot.width, XPLORER.robot.height),
         one.body.facets.bodies != one.machine.root,
     )
-    hips = np.linalg.norm(data.xpos[one.body.facets.bodies[legs]] - data.xpos[1], axis=1)
+    hips = np.linalg.norm(
+        data.xpos[one.body.facets.bodies[legs]] - data.xpos[1], axis=1
+    )
     diagonal = math.sqrt(x**2 + y**2 + z**2) / 2
-    assert one.ceiling == pytest.approx(max(diagonal, hips.max() + one.reach) + max(diagonal, one.reach))
+    assert one.ceiling == pytest.approx(
+        max(diagonal, hips.max() + one.reach) + max(diagonal, one.reach)
+    )
 
 
 @pytest.mark.parametrize(
-    ("height", "tilt", "status"), [(-0.497, 0.0, ""), (-0.503, 0.0, "sunk"), (-1.7, 1.0, ""), (-6.0, 1.6, "flipped")]
+    ("height", "tilt", "status"),
+    [(-0.497, 0.0, ""), (-0.503, 0.0, "sunk"), (-1.7, 1.0, ""), (-6.0, 1.6, "flipped")],
 )
 def test_a_robot_is_sunk_with_all_of_its_hull(height, tilt, status):
     """Whose highest corner counts, whichever way it is tilted. height: over that of the hull."""
     one = Simulation(XPLORER.walker, QUICK)
     data = one.body.data
-    data.qpos[2:7] = [height * XPLORER.robot.height, math.cos(tilt / 2), 0.0, math.sin(tilt / 2), 0.0]
+    data.qpos[2:7] = [
+        height * XPLORER.robot.height,
+        math.cos(tilt / 2),
+        0.0,
+        math.sin(tilt / 2),
+        0.0,
+    ]
     mujoco.mj_forward(one.body.model, data)
     assert one.end_status() == status
     data.qpos[2:7] = [one.ceiling + (0.001 if tilt else -0.001), 1.0, 0.0, 0.0, 0.0]
@@ -430,7 +613,12 @@ def test_a_robot_is_sunk_with_all_of_its_hull(height, tilt, status):
 def test_a_hull_pitches_as_its_robot_is_told_and_rolls_and_yaws_as_a_box_would():
     robot = Rhex(0.2, 0.15, 0.03, 0.06, CLeg(0.025, 0.012), (-0.05, 0.06), inertia=5e-4)
     x, y, z = 0.15**2, 0.06**2, 0.03**2
-    np.testing.assert_allclose(hexapod.inertia(robot, 0.1), 5e-4 / (x + z) * np.array([y + z, x + z, x + y]))
+    np.testing.assert_allclose(
+        hexapod.inertia(robot, 0.1), 5e-4 / (x + z) * np.array([y + z, x + z, x + y])
+    )
     wheel = Roller(2.0, RoundRod(0.1, 0.1))
     assert hexapod.inertia(wheel, 0.1).tolist() == pytest.approx([0.02] * 3)
-    assert (hexapod.hips(wheel), hexapod.phases(wheel).tolist()) == ([(0.0, 0.0, 0.0)], [0.0])
+    assert (hexapod.hips(wheel), hexapod.phases(wheel).tolist()) == (
+        [(0.0, 0.0, 0.0)],
+        [0.0],
+    )

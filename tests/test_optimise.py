@@ -79,13 +79,19 @@ def some_loop(seed=0, joints=2, harmonics=3, phases=32):
     return loops, p
 
 
-@pytest.mark.parametrize(("joints", "medium"), [(2, FLUID), (3, FLUID), (2, Granular(C=0.5, gamma0=0.6))])
+@pytest.mark.parametrize(
+    ("joints", "medium"), [(2, FLUID), (3, FLUID), (2, Granular(C=0.5, gamma0=0.6))]
+)
 def test_slopes_of_a_cycle_are_those_of_differences_of_whole_gaits(joints, medium):
     """Every number that `CycleValues` has, for an odd body off the centre."""
-    system = Swimmer(medium, ODD if joints == 2 else Chain((0.7, 1.4, 0.9, 0.5), frame="link-2"))
+    system = Swimmer(
+        medium, ODD if joints == 2 else Chain((0.7, 1.4, 0.9, 0.5), frame="link-2")
+    )
     loops, p = some_loop(joints=joints)
     degree = 2.0 if medium is FLUID else 1.0
-    power = lambda alpha, alphadot, xi: system.work(alpha, alphadot, xi).power / system.length
+    power = lambda alpha, alphadot, xi: (
+        system.work(alpha, alphadot, xi).power / system.length
+    )
     by_phase = Phases(loops, system.velocity, power, degree)(p)
     by_run = Runs(loops, system.run, True, degree, system.length, step=1e-6)(p)
     for name in ("net", "swing", "length", "power"):
@@ -94,15 +100,23 @@ def test_slopes_of_a_cycle_are_those_of_differences_of_whole_gaits(joints, mediu
         assert np.abs(np.asarray(found) - rise).max() < 2e-4 * np.abs(rise).max(), name
     uneven, found = by_phase.uneven
     for k in np.ndindex(p.shape):
-        e = 1e-6 * np.eye(p.size).reshape(p.size, *p.shape)[np.ravel_multi_index(k, p.shape)]
+        e = (
+            1e-6
+            * np.eye(p.size).reshape(p.size, *p.shape)[np.ravel_multi_index(k, p.shape)]
+        )
         sides = [np.sqrt((loops.cycle(q)[1] ** 2).sum(-1)) for q in (p + e, p - e)]
-        rise = np.subtract(*[(s**2).mean() * (1 / s.mean() ** 2 + 1) for s in sides]) / 2e-6  # the unit is 1
+        rise = (
+            np.subtract(*[(s**2).mean() * (1 / s.mean() ** 2 + 1) for s in sides])
+            / 2e-6
+        )  # the unit is 1
         assert found[k] == pytest.approx(rise, abs=1e-7)
     assert uneven > 0
 
 
 def test_slopes_through_a_table_are_those_of_differences():
-    table = Study(geomech.load("three-link-glass").with_numerics(grid=11, harmonics=7)).table("harmonic")
+    table = Study(
+        geomech.load("three-link-glass").with_numerics(grid=11, harmonics=7)
+    ).table("harmonic")
     loops, p = some_loop()
     net, found = Phases(loops, table.velocity)(p).net
     far = lambda q: displacement(table.velocity(*loops.cycle(q)))
@@ -127,7 +141,10 @@ def test_slopes_of_aims_are_those_of_differences(objective):
     cycles = Phases(loops, system.velocity, power, 2.0)
     value, found = objective.value(cycles(p), 1.7)
     way, h = np.random.default_rng(3).normal(size=p.shape), 1e-5
-    rise = (objective.value(cycles(p + h * way), 1.7)[0] - objective.value(cycles(p - h * way), 1.7)[0]) / (2 * h)
+    rise = (
+        objective.value(cycles(p + h * way), 1.7)[0]
+        - objective.value(cycles(p - h * way), 1.7)[0]
+    ) / (2 * h)
     assert value > 0
     assert (found * way).sum() == pytest.approx(rise, rel=1e-6)
 
@@ -138,16 +155,38 @@ def test_slopes_of_ascents_are_those_of_differences(rate, turn):
     system, (loops, p) = Swimmer(FLUID, ODD), some_loop(phases=16)
     power = lambda alpha, alphadot, xi: system.work(alpha, alphadot, xi).power
     objective = Objective("speed", rate=rate, power=0.3)
-    problem = Problem(Phases(loops, system.velocity, power, 2.0), objective, p, lambda: None, np.inf)
-    rules = problem.constraints(turn, Stroke(loops, p), lambda alpha: alpha @ [0.3, -0.2] + alpha[..., 1] ** 2 - 9, 0.1)
-    assert len(rules) == (4 if rate is None else 7) and [rule["type"] for rule in rules].count("eq") == (not turn)
+    problem = Problem(
+        Phases(loops, system.velocity, power, 2.0), objective, p, lambda: None, np.inf
+    )
+    rules = problem.constraints(
+        turn,
+        Stroke(loops, p),
+        lambda alpha: alpha @ [0.3, -0.2] + alpha[..., 1] ** 2 - 9,
+        0.1,
+    )
+    assert len(rules) == (4 if rate is None else 7) and [
+        rule["type"] for rule in rules
+    ].count("eq") == (not turn)
     if rate:  # one of the limits sets the time of the first loop
-        assert min(rule["fun"](problem.first).min() for rule in rules[1:3]) == pytest.approx(0.0, abs=1e-12)
-        assert problem.minimised(problem.first)[0] == -objective.value(problem.cycles(p), 1 / (2 * np.pi))[0]
-    x = problem.first * (1 + 0.1 * np.random.default_rng(5).normal(size=problem.first.shape))
-    values = lambda x: np.concatenate([[problem.minimised(x)[0]], *(rule["fun"](x) for rule in rules)])
-    found = np.concatenate([problem.minimised(x)[1][None], *(rule["jac"](x) for rule in rules)])
-    rise = np.stack([(values(x + e) - values(x - e)) / 2e-6 for e in 1e-6 * np.eye(len(x))], -1)
+        assert min(
+            rule["fun"](problem.first).min() for rule in rules[1:3]
+        ) == pytest.approx(0.0, abs=1e-12)
+        assert (
+            problem.minimised(problem.first)[0]
+            == -objective.value(problem.cycles(p), 1 / (2 * np.pi))[0]
+        )
+    x = problem.first * (
+        1 + 0.1 * np.random.default_rng(5).normal(size=problem.first.shape)
+    )
+    values = lambda x: np.concatenate(
+        [[problem.minimised(x)[0]], *(rule["fun"](x) for rule in rules)]
+    )
+    found = np.concatenate(
+        [problem.minimised(x)[1][None], *(rule["jac"](x) for rule in rules)]
+    )
+    rise = np.stack(
+        [(values(x + e) - values(x - e)) / 2e-6 for e in 1e-6 * np.eye(len(x))], -1
+    )
     assert found == pytest.approx(rise, rel=1e-5, abs=2e-6)
 
 
@@ -181,7 +220,9 @@ def test_what_is_told_is_what_the_scene_does(cheap):
     net = Study(scene).poses("direct", amplitudes=[1.0])[0]
     assert net == pytest.approx(cheap.best.displacement, abs=1e-12)
     alpha, alphadot = scene.gait.cycle(256)
-    power = scene.system.work(alpha, alphadot, scene.system.velocity(alpha, alphadot)).power
+    power = scene.system.work(
+        alpha, alphadot, scene.system.velocity(alpha, alphadot)
+    ).power
     length = 2 * np.pi * np.sqrt(power).mean()
     assert cheap.best.length == pytest.approx(length, rel=1e-10)
     assert cheap.best.work == pytest.approx(2 * np.pi * power.mean(), rel=1e-10)
@@ -200,7 +241,9 @@ def test_no_loop_near_the_best_is_better(stroke):
     """A search that knows nothing of slopes: none of 60 loops around it brings more and turns no more."""
     loops, system = Loops(2, 5, 2.5), stroke.scene.system
     p, rng = loops.of(stroke.gait), np.random.default_rng(0)
-    near = p + rng.choice([0.02, 0.1], (60, 1, 1)) * rng.normal(size=(60, *p.shape)) / (1 + np.arange(11)[:, None])
+    near = p + rng.choice([0.02, 0.1], (60, 1, 1)) * rng.normal(size=(60, *p.shape)) / (
+        1 + np.arange(11)[:, None]
+    )
     near[:, 3::4] = near[:, 4::4] = near[:, 0] = 0.0  # odd harmonics alone: no net turn
     net = displacement(system.velocity(*loops.cycle(near)))
     assert np.abs(net[:, 2]).max() < 1e-10
@@ -215,7 +258,10 @@ def test_more_harmonics_bring_more_and_converge(cheap):
     assert values[3] - values[2] < 0.1 * (values[2] - values[0])
 
 
-BY_HAND = [pytest.param(x, marks=pytest.mark.soak) for x in (("displacement", 2.5), ("efficiency", 2.5))]
+BY_HAND = [
+    pytest.param(x, marks=pytest.mark.soak)
+    for x in (("displacement", 2.5), ("efficiency", 2.5))
+]
 
 
 @pytest.fixture(scope="module", params=[("displacement", 3.0), *BY_HAND], ids=str)
@@ -226,8 +272,16 @@ def sand(request):
 
 
 # By default 9; 2 lead to the same gait. The second are those that narrower limits led to.
-STARTS = {("displacement", 3.0): (2, 2), ("displacement", 2.5): (9, 4), ("efficiency", 2.5): (9, 4)}
-LEAST = {("displacement", 2.5): 0.4415, ("displacement", 3.0): 0.6938, ("efficiency", 2.5): 0.2245}
+STARTS = {
+    ("displacement", 3.0): (2, 2),
+    ("displacement", 2.5): (9, 4),
+    ("efficiency", 2.5): (9, 4),
+}
+LEAST = {
+    ("displacement", 2.5): 0.4415,
+    ("displacement", 3.0): 0.6938,
+    ("efficiency", 2.5): 0.2245,
+}
 
 
 def test_best_gaits_in_sand(sand):
@@ -241,9 +295,14 @@ def test_best_gaits_in_sand(sand):
     starts, more = STARTS[asked]
     assert sum(times for _, times in sand.answers + sand.others) == starts + more
     told = optima.text(result_of(sand))
-    assert f"{starts} starts, and {more} that narrower limits led to, answers that differ: " in told
+    assert (
+        f"{starts} starts, and {more} that narrower limits led to, answers that differ: "
+        in told
+    )
     assert ("by a table alone, less: " in told) == bool(sand.others)
-    assert optima.numbers(result_of(sand))["answers"] == [list(x) for x in sand.answers + sand.others]
+    assert optima.numbers(result_of(sand))["answers"] == [
+        list(x) for x in sand.answers + sand.others
+    ]
 
 
 def test_best_gaits_in_sand_go_round_once_and_never_back(sand):
@@ -256,7 +315,9 @@ def test_best_gaits_in_sand_go_round_once_and_never_back(sand):
     assert steps.sum() == pytest.approx(2 * np.pi)
 
 
-def test_best_gaits_in_sand_turn_no_more_than_the_scene_and_so_have_one_net_distance(sand):
+def test_best_gaits_in_sand_turn_no_more_than_the_scene_and_so_have_one_net_distance(
+    sand,
+):
     assert abs(sand.start.displacement[2]) < 1e-12
     assert abs(sand.best.displacement[2]) < 1e-8
     far = np.hypot(*sand.best.displacement[:2])
@@ -273,9 +334,13 @@ def test_a_stroke_goes_back_nowhere_between_phases():
     p[1], p[2], p[5], p[6] = (1.0, 0.0), (0.0, 1.0), (b, 0.0), (0.0, -b)
     q = series.shifted(p, np.pi / 32)
     (u, v), (du, dv) = (x.T for x in loops.cycle(q))
-    assert (u * dv - v * du).min() == pytest.approx(1 - 3 * b**2 - 2 * b * np.cos(np.pi / 8))
+    assert (u * dv - v * du).min() == pytest.approx(
+        1 - 3 * b**2 - 2 * b * np.cos(np.pi / 8)
+    )
     assert (u * dv - v * du).min() > 0.02
-    assert Stroke(loops, q).swept(q).min() == pytest.approx(1 - 3 * b**2 - 2 * b, abs=1e-9)
+    assert Stroke(loops, q).swept(q).min() == pytest.approx(
+        1 - 3 * b**2 - 2 * b, abs=1e-9
+    )
     assert not Stroke.is_one(loops, q)
     q[5:] *= 0.333 / b
     assert Stroke.is_one(loops, q)
@@ -287,7 +352,12 @@ def short():
 
 
 def test_limits_hold_and_are_named(short):
-    assert set(short.active) == {"alpha_1 >= -1.2", "alpha_1 <= 1.2", "alpha_2 >= -1.2", "alpha_2 <= 1.2"}
+    assert set(short.active) == {
+        "alpha_1 >= -1.2",
+        "alpha_1 <= 1.2",
+        "alpha_2 >= -1.2",
+        "alpha_2 <= 1.2",
+    }
     assert np.abs(short.gait.cycle(2000)[0]).max() <= 1.2 + 1e-9
     best_circle = np.hypot(*Study(viscous()).poses("direct", Circle(), [1.2])[0, :2])
     assert short.value > best_circle
@@ -303,9 +373,14 @@ def test_a_start_beyond_the_limit_is_drawn_together(capsys):
 
 def test_never_worse_than_the_start(stroke):
     again = optimise(stroke.scene, "displacement")
-    assert again.value >= stroke.value and again.best.gait.harmonics == stroke.best.gait.harmonics
+    assert (
+        again.value >= stroke.value
+        and again.best.gait.harmonics == stroke.best.gait.harmonics
+    )
     butterfly = viscous(gait=Butterfly(amplitude=0.9))
-    assert (poor := optimise(butterfly, "displacement", harmonics=1)).value >= poor.start.value
+    assert (
+        poor := optimise(butterfly, "displacement", harmonics=1)
+    ).value >= poor.start.value
     still = optimise(viscous(gait=Circle(amplitude=1e-3)), "displacement", harmonics=1)
     assert still.value > 0.1
 
@@ -319,38 +394,53 @@ def test_turning_and_direction(stroke):
     assert ahead.value == pytest.approx(stroke.value, rel=1e-3)
 
 
-@pytest.mark.parametrize(("limit", "least"), [({"rate": 3.0}, 0.0), ({"power": 0.02}, 0.0), ({}, 0.0)])
+@pytest.mark.parametrize(
+    ("limit", "least"), [({"rate": 3.0}, 0.0), ({"power": 0.02}, 0.0), ({}, 0.0)]
+)
 def test_speed_keeps_its_limit(limit, least):
     found = optimise(viscous(), "speed", **limit)
     alpha, alphadot = found.gait.cycle(256)
     per_second = 2 * np.pi * found.gait.frequency
-    assert found.value == pytest.approx(np.hypot(*found.best.displacement[:2]) * found.gait.frequency)
+    assert found.value == pytest.approx(
+        np.hypot(*found.best.displacement[:2]) * found.gait.frequency
+    )
     assert found.value > 1.1 * found.start.value
     if "power" in limit:
-        power = found.scene.system.work(alpha, alphadot, found.scene.system.velocity(alpha, alphadot)).power
+        power = found.scene.system.work(
+            alpha, alphadot, found.scene.system.velocity(alpha, alphadot)
+        ).power
         assert power.mean() * per_second**2 == pytest.approx(0.02)
         # at best it runs at constant power: the square of the speed is power times that of the efficiency
         assert found.value == pytest.approx(np.sqrt(0.02) * 0.1112, rel=2e-3)
         assert found.active == ("power",)
     else:
-        assert np.abs(alphadot).max() * per_second == pytest.approx(limit.get("rate", 1.0), rel=1e-3)
+        assert np.abs(alphadot).max() * per_second == pytest.approx(
+            limit.get("rate", 1.0), rel=1e-3
+        )
         assert found.active == ("rate",)
 
 
 def test_without_a_limit_joints_are_as_fast_as_in_the_gait_of_the_scene():
     gait = Fourier(cos=((0.8,), (0.1,)), sin=((0.2,), (0.5,)), frequency=1.5)
     limit = checked(viscous(gait=gait), "speed").objective.rate
-    assert limit == pytest.approx(3 * np.pi * np.hypot(0.8, 0.2), rel=1e-4)  # of the faster joint
+    assert limit == pytest.approx(
+        3 * np.pi * np.hypot(0.8, 0.2), rel=1e-4
+    )  # of the faster joint
 
 
 def test_both_limits_of_speed_hold():
     found = optimise(viscous(), "speed", harmonics=1, rate=1.0, power=0.006)
     alpha, alphadot = found.gait.cycle(2048)
     per_second = 2 * np.pi * found.gait.frequency
-    power = found.scene.system.work(alpha, alphadot, found.scene.system.velocity(alpha, alphadot)).power
+    power = found.scene.system.work(
+        alpha, alphadot, found.scene.system.velocity(alpha, alphadot)
+    ).power
     assert np.abs(alphadot).max() * per_second <= 1.0 + 1e-5
     assert power.mean() * per_second**2 <= 0.006 + 1e-8
-    alone = [optimise(viscous(), "speed", harmonics=1, **one).value for one in ({"rate": 1.0}, {"power": 0.006})]
+    alone = [
+        optimise(viscous(), "speed", harmonics=1, **one).value
+        for one in ({"rate": 1.0}, {"power": 0.006})
+    ]
     assert found.value <= min(alone) * (1 + 1e-4)
 
 
@@ -369,12 +459,18 @@ def test_loops_that_are_one():
     assert not series.same(p, series.reversed_(series.shifted(p, 4.0)), odd=False)
     assert not series.same(p, -series.reversed_(p), odd=False)
     flat = loops.of(Ellipse(semi_axes=(1.0, 0.0)))
-    assert not series.same(flat, 0.5 * flat)  # a part of a curve is not the curve, either way
+    assert not series.same(
+        flat, 0.5 * flat
+    )  # a part of a curve is not the curve, either way
     assert not series.same(0.5 * flat, flat)
     gait = loops.gait(p)
     t = np.linspace(0, 6, 7)
-    assert loops.gait(series.shifted(p, 1.3)).shape(t) == pytest.approx(gait.shape(t + 1.3), abs=1e-12)
-    assert loops.gait(series.reversed_(p)).shape(t) == pytest.approx(gait.shape(-t), abs=1e-12)
+    assert loops.gait(series.shifted(p, 1.3)).shape(t) == pytest.approx(
+        gait.shape(t + 1.3), abs=1e-12
+    )
+    assert loops.gait(series.reversed_(p)).shape(t) == pytest.approx(
+        gait.shape(-t), abs=1e-12
+    )
     assert loops.of(gait) == pytest.approx(p, abs=1e-12)
 
 
@@ -386,7 +482,12 @@ def test_starts_go_along_the_limits_where_many_a_loop_is_the_best_near_by():
     asked = checked(geomech.load("three-link-glass"), "displacement", limits=lopsided)
     assert asked.starts == 11
     _, rim, *others = asked.loops.starts(asked.loops.of(Circle()), 11)
-    assert asked.loops.active(rim) == ["alpha_1 >= -2.5", "alpha_1 <= 1", "alpha_2 >= -2.5", "alpha_2 <= 2.5"]
+    assert asked.loops.active(rim) == [
+        "alpha_1 >= -2.5",
+        "alpha_1 <= 1",
+        "alpha_2 >= -2.5",
+        "alpha_2 <= 2.5",
+    ]
     for p in (rim, *others):
         assert Stroke.is_one(asked.loops, p)
         low, high = asked.loops.extremes(p)
@@ -408,20 +509,32 @@ def test_starts_are_the_same_every_time_and_answers_are_counted():
 def test_one_start_alone_is_finished_without_perturbations(starts, loops):
     """Loops are numbers here, and the larger the better; an ascent adds a half."""
     asked, ranked = types.SimpleNamespace(starts=starts, phases=64), []
-    search = types.SimpleNamespace(request=asked, _perturbed=lambda p: ([p + 0.5], [p - 3.0]))
+    search = types.SimpleNamespace(
+        request=asked, _perturbed=lambda p: ([p + 0.5], [p - 3.0])
+    )
     search._each = lambda starts, *_, **__: [p + 0.5 for p in starts]
     search._merit = lambda tier, p, turn: ranked.append(p) or p
-    assert _Search._polished(search, None, (), 0.0, 0.0) == (0.0, max(loops), max(loops) + 0.5)
+    assert _Search._polished(search, None, (), 0.0, 0.0) == (
+        0.0,
+        max(loops),
+        max(loops) + 0.5,
+    )
     assert ranked == loops
 
 
 def serpenoid(body=None):
     body = Serpenoid(elements=8, waves=1.0) if body is None else body
-    return Scene(Swimmer(SAND, body), Circle(amplitude=5.0), Numerics(phases=64, extent=7.0, grid=9))
+    return Scene(
+        Swimmer(SAND, body),
+        Circle(amplitude=5.0),
+        Numerics(phases=64, extent=7.0, grid=9),
+    )
 
 
 @pytest.mark.parametrize(
-    "body", [Serpenoid(elements=8, waves=1.0), ConstantCurvature(elements=8)], ids=["modes", "arcs"]
+    "body",
+    [Serpenoid(elements=8, waves=1.0), ConstantCurvature(elements=8)],
+    ids=["modes", "arcs"],
 )
 def test_bodies_of_few_shape_variables(body):
     found = optimise(serpenoid(body), "efficiency", harmonics=2, starts=1)
@@ -447,13 +560,18 @@ def test_waves_of_a_long_body():
 
 def test_three_joints_and_gaits_that_must_be_run_as_a_whole():
     four = Scene(
-        Swimmer(FLUID, Chain((1, 1, 1, 1))), Fourier(cos=((0.5,), (0.0,), (-0.5,)), sin=((0.0,), (0.5,), (0.0,)))
+        Swimmer(FLUID, Chain((1, 1, 1, 1))),
+        Fourier(cos=((0.5,), (0.0,), (-0.5,)), sin=((0.0,), (0.5,), (0.0,))),
     )
     found = optimise(four, "displacement", harmonics=2)
     assert found.value > 2 * found.start.value
     from rft.effects import Transient
 
-    past = Scene(Swimmer(SAND, Chain(), (Transient(travel=0.1),)), Circle(amplitude=0.8), Numerics(phases=64))
+    past = Scene(
+        Swimmer(SAND, Chain(), (Transient(travel=0.1),)),
+        Circle(amplitude=0.8),
+        Numerics(phases=64),
+    )
     assert checked(past, "efficiency").degree == 1.0
     assert checked(past, "displacement").by_runs
 
@@ -468,7 +586,8 @@ def test_a_gait_drawn_together_is_kept_clear_of_singular_shapes(monkeypatch):
 
 def test_a_rate_that_no_gait_can_keep_is_refused_before_the_search():
     with pytest.raises(
-        Refusal, match="three-link-viscous: its limits let a gait repeat more than 10000 times a second"
+        Refusal,
+        match="three-link-viscous: its limits let a gait repeat more than 10000 times a second",
     ):
         optimise(viscous(), "speed", rate=1e6)
 
@@ -476,9 +595,17 @@ def test_a_rate_that_no_gait_can_keep_is_refused_before_the_search():
 @pytest.mark.parametrize(
     ("name", "asked", "said"),
     [
-        ("three-link-viscous", {"objective": "distance"}, "objective: 'distance' is unknown"),
+        (
+            "three-link-viscous",
+            {"objective": "distance"},
+            "objective: 'distance' is unknown",
+        ),
         ("three-link-viscous", {"direction": "z"}, "direction: 'z' is unknown"),
-        ("three-link-viscous", {"objective": "turning", "direction": "x"}, "turning takes none"),
+        (
+            "three-link-viscous",
+            {"objective": "turning", "direction": "x"},
+            "turning takes none",
+        ),
         ("three-link-viscous", {"harmonics": 0}, "harmonics must be"),
         ("three-link-viscous", {"limits": 0.0}, "limits must be"),
         ("three-link-viscous", {"starts": 0}, "starts must be"),
@@ -491,9 +618,17 @@ def test_a_rate_that_no_gait_can_keep_is_refused_before_the_search():
         ("sandfish-loose", {"limits": 1.0}, "amplitude and waves are sought"),
         ("sandfish-loose", {"objective": "speed", "rate": 1.0}, "say power"),
         ("three-link-floating", {}, "goes nowhere: its mean frame stays"),
-        ("three-link-ideal-fluid", {"objective": "speed", "power": 1.0}, "has none: say rate"),
+        (
+            "three-link-ideal-fluid",
+            {"objective": "speed", "power": 1.0},
+            "has none: say rate",
+        ),
         ("three-link-viscous", {"limits": [1.0]}, "one for each of 2 joints"),
-        ("three-link-viscous", {"limits": [(1.0, 0.0), (-1.0, 1.0)]}, "or as many from low to high"),
+        (
+            "three-link-viscous",
+            {"limits": [(1.0, 0.0), (-1.0, 1.0)]},
+            "or as many from low to high",
+        ),
         ("sandfish-loose", {"objective": "turning"}, "does not turn"),
         ("sandfish-loose", {"direction": "y"}, "brings nothing across it"),
         (
@@ -512,7 +647,9 @@ def test_requests_that_make_no_sense(name, asked, said):
 def test_a_table_that_never_turns_is_refused_too(tmp_path):
     drive = geomech.load("differential-drive").with_numerics(extent=2.0, grid=7)
     fields.save_connection(tmp_path / "drive.nc", Study(drive))
-    with pytest.raises(Refusal, match="no gait turns it: the table's file tells a body whose heading"):
+    with pytest.raises(
+        Refusal, match="no gait turns it: the table's file tells a body whose heading"
+    ):
         checked(Scene(Table(tmp_path / "drive.nc"), Circle()), "turning")
     for name in ("three-link-viscous", "three-link-floating", "no-slip-snake"):
         assert checked(geomech.load(name), "turning")
@@ -521,11 +658,21 @@ def test_a_table_that_never_turns_is_refused_too(tmp_path):
 def test_where_one_sense_brings_more_it_is_the_one_found():
     """A skin that slides forwards more easily: its table, which is odd, leads to either sense alike."""
     skin = SkinFriction(forward=0.05, backward=0.3, reference=0.2)
-    scene = Scene(Swimmer(SAND, Chain((1, 1, 1)), effects=(skin,)), Circle(amplitude=1.0), numerics=Numerics(grid=9))
+    scene = Scene(
+        Swimmer(SAND, Chain((1, 1, 1)), effects=(skin,)),
+        Circle(amplitude=1.0),
+        numerics=Numerics(grid=9),
+    )
     assert not scene.system.traits.odd
     found = optimise(scene, harmonics=1, limits=1.2, starts=1)
-    back = found.request.loops.gait(series.reversed_(found.request.loops.of(found.gait)))
-    assert found.value > 0.48 > 5 * np.hypot(*displacement(scene.system.run(*back.cycle(128)).xi)[:2])
+    back = found.request.loops.gait(
+        series.reversed_(found.request.loops.of(found.gait))
+    )
+    assert (
+        found.value
+        > 0.48
+        > 5 * np.hypot(*displacement(scene.system.run(*back.cycle(128)).xi)[:2])
+    )
     assert len(found.answers) == 2
 
 
@@ -534,13 +681,18 @@ def test_a_cycle_without_slopes_is_that_with():
     run = system.run(*loops.cycle(p), True)
     b = Phases(loops, system.velocity, lambda *a: system.work(*a).power, 2.0)(p)
     net, swing, length, power, _ = cycle_values(run, run.work.power, 2.0)
-    assert (swing, length, power) == pytest.approx((b.swing[0], b.length[0], b.power[0]))
+    assert (swing, length, power) == pytest.approx(
+        (b.swing[0], b.length[0], b.power[0])
+    )
     assert net == pytest.approx(b.net[0])
 
 
 def test_a_scene_in_the_minimum_perturbation_frame(cheap):
     """The same stroke; its displacement is told in that frame."""
-    scene = parse('frame = "minimum-perturbation"\n' + optima.scene_toml(result_of(cheap)).split('frame = "link-2"')[1])
+    scene = parse(
+        'frame = "minimum-perturbation"\n'
+        + optima.scene_toml(result_of(cheap)).split('frame = "link-2"')[1]
+    )
     found = optimise(scene, "efficiency")
     assert cheap.value <= found.start.value * (1 + 1e-6)
     assert found.value == pytest.approx(cheap.value, rel=1e-3)
@@ -556,7 +708,16 @@ def test_a_scene_in_the_minimum_perturbation_frame(cheap):
     ids=lambda x: type(x).__name__,
 )
 def test_wrong_types_are_refused(wrong):
-    for name in ("objective", "direction", "harmonics", "limits", "starts", "rate", "power", "progress"):
+    for name in (
+        "objective",
+        "direction",
+        "harmonics",
+        "limits",
+        "starts",
+        "rate",
+        "power",
+        "progress",
+    ):
         if (name, wrong if isinstance(wrong, str) else "") == ("direction", "x"):
             continue
         objective = "speed" if name in ("rate", "power") else "displacement"
@@ -577,15 +738,24 @@ def test_the_loop_on_the_map(stroke, cheap, short, tmp_path):
     assert share(cheap, "zero") > 0.2
     assert share(short, "limit") > 0.15
     field, component = stroke.gained
-    assert component == 0 and field.values[0, 15, 15] == pytest.approx(-0.0204, abs=2e-4)
+    assert component == 0 and field.values[0, 15, 15] == pytest.approx(
+        -0.0204, abs=2e-4
+    )
     study = Study(stroke.scene).in_frame("minimum-perturbation")
     for clim in (None, 0.01):  # sign and colours are those of the CCF in that frame
         drawn = plots.optimum_map(stroke, clim=clim).collections[0]
-        ccf = plots.ccf_figure(study.curvature, components=("x",), clim=clim).axes[0].collections[0]
+        ccf = (
+            plots.ccf_figure(study.curvature, components=("x",), clim=clim)
+            .axes[0]
+            .collections[0]
+        )
         np.testing.assert_allclose(drawn.get_array(), ccf.get_array(), atol=1e-9)
         np.testing.assert_allclose(drawn.get_clim(), ccf.get_clim())
         assert drawn.cmap is ccf.cmap
-    for found, name in ((short, "two.svg"), (optimise(serpenoid(), "turning", harmonics=1, starts=1), "three.png")):
+    for found, name in (
+        (short, "two.svg"),
+        (optimise(serpenoid(), "turning", harmonics=1, starts=1), "three.png"),
+    ):
         plots.save(plots.optimum_figure(found), tmp_path / name)
         assert (tmp_path / name).is_file()
 
@@ -611,7 +781,9 @@ def test_steepest_way_from_a_gait_that_brings_nothing():
     cycles = Phases(loops, Swimmer(FLUID, ODD).velocity)
     value, found = objective.value(cycles(flat))
     assert value < 1e-12
-    far = lambda way: np.hypot(*cycles(flat + 1e-4 * way / np.linalg.norm(way)).net[0][:2]) / 1e-4
+    far = lambda way: (
+        np.hypot(*cycles(flat + 1e-4 * way / np.linalg.norm(way)).net[0][:2]) / 1e-4
+    )
     assert far(found) == pytest.approx(np.linalg.norm(found), rel=1e-3)
     rng = np.random.default_rng(0)
     assert max(far(rng.normal(size=flat.shape)) for _ in range(20)) < far(found)
@@ -640,11 +812,19 @@ def test_a_gait_at_rest_takes_no_work():
 
 def test_strokes():
     loops = Loops(2, 3, 2.5)
-    round_, back = loops.of(Ellipse(semi_axes=(1.0, 0.5), centre=(0.4, -0.2))), loops.of(Butterfly())
+    round_, back = (
+        loops.of(Ellipse(semi_axes=(1.0, 0.5), centre=(0.4, -0.2))),
+        loops.of(Butterfly()),
+    )
     assert Stroke.is_one(loops, round_)
     assert Stroke.is_one(loops, series.reversed_(round_))
     twice = np.zeros(loops.shape)
-    twice[3], twice[4], twice[1], twice[2] = (1.0, 0.0), (0.0, 1.0), (0.4, 0.0), (0.0, 0.4)
+    twice[3], twice[4], twice[1], twice[2] = (
+        (1.0, 0.0),
+        (0.0, 1.0),
+        (0.4, 0.0),
+        (0.0, 0.4),
+    )
     own = Stroke(loops, twice)
     assert own.swept(twice).min() > 0  # never back, and yet
     assert own.winding(twice) == 2
@@ -669,14 +849,24 @@ def test_limits_of_each_joint_and_side():
     assert "alpha_1 >= -0.5" in found.active
     assert found.value > found.start.value
     loops = Loops(2, 2, box)
-    assert all((loops.extremes(p)[0] >= loops.box[0]).all() for p in loops.starts(loops.of(Circle()), 5))
-    assert all((loops.extremes(p)[1] <= loops.box[1]).all() for p in loops.starts(loops.of(Circle()), 5))
+    assert all(
+        (loops.extremes(p)[0] >= loops.box[0]).all()
+        for p in loops.starts(loops.of(Circle()), 5)
+    )
+    assert all(
+        (loops.extremes(p)[1] <= loops.box[1]).all()
+        for p in loops.starts(loops.of(Circle()), 5)
+    )
     p = loops.of(Circle(amplitude=0.4, centre=(0.8, 0.0)))
     A, b = loops.limits()
     assert (A @ p.ravel() <= b).all()
     assert (A @ loops.of(Circle(amplitude=0.4)).ravel() <= b).all()
-    assert not (A @ loops.of(Circle(amplitude=0.4, centre=(0.8, 0.7))).ravel() <= b).all()
-    assert not (A @ loops.of(Circle(amplitude=0.4, centre=(-0.2, 0.0))).ravel() <= b).all()
+    assert not (
+        A @ loops.of(Circle(amplitude=0.4, centre=(0.8, 0.7))).ravel() <= b
+    ).all()
+    assert not (
+        A @ loops.of(Circle(amplitude=0.4, centre=(-0.2, 0.0))).ravel() <= b
+    ).all()
 
 
 @pytest.mark.parametrize(
@@ -690,7 +880,11 @@ def test_limits_as_they_are_typed(text, limits):
     from geomech.commands.options import joint_limits
 
     found = joint_limits(text, viscous())
-    assert found == limits if limits is None else np.asarray(found) == pytest.approx(np.asarray(limits))
+    assert (
+        found == limits
+        if limits is None
+        else np.asarray(found) == pytest.approx(np.asarray(limits))
+    )
     for wrong in ("", "x", "1:2:3", "1:", ":2"):
         with pytest.raises(Refusal, match="--limits"):
             joint_limits(wrong, viscous())
@@ -704,7 +898,9 @@ def test_chains_without_drag_cost_what_their_metric_says():
     length = 2 * np.pi * np.sqrt(scene.system.squared_speed(alpha, alphadot)).mean()
     assert found.best.work is None
     assert found.best.length == pytest.approx(length, rel=1e-10)
-    assert found.value == pytest.approx(np.hypot(*found.best.displacement[:2]) / length, rel=1e-10)
+    assert found.value == pytest.approx(
+        np.hypot(*found.best.displacement[:2]) / length, rel=1e-10
+    )
     assert found.value > 1.005 * found.start.value
     assert " own metric" in optima.text(result_of(found))
 
@@ -716,14 +912,23 @@ def test_a_table_is_searched_like_its_scene(name, tmp_path):
     scene = geomech.load(name).with_numerics(grid=21)
     save_connection(tmp_path / "field.nc", Study(scene))
     table = Scene(Table(str(tmp_path / "field.nc")), Circle())
-    own, found = (optimise(s, "efficiency", harmonics=2) for s in (scene.changed(gait=Circle()), table))
-    assert found.value == pytest.approx(own.value, abs=found.estimate + 1e-3 * own.value)
+    own, found = (
+        optimise(s, "efficiency", harmonics=2)
+        for s in (scene.changed(gait=Circle()), table)
+    )
+    assert found.value == pytest.approx(
+        own.value, abs=found.estimate + 1e-3 * own.value
+    )
     assert (found.best.work is None) == (own.best.work is None)
     metrics = [capability(s.system, OwnMetric) for s in (scene, table)]
     if None not in metrics:
-        own, found = (metric.squared_speed([0.3, -0.5], [1.0, 2.0]) for metric in metrics)
+        own, found = (
+            metric.squared_speed([0.3, -0.5], [1.0, 2.0]) for metric in metrics
+        )
         assert found == pytest.approx(own, rel=1e-4)
-    with pytest.raises(Refusal, match="outside the field that the scene has: -2.5 to 2.5"):
+    with pytest.raises(
+        Refusal, match="outside the field that the scene has: -2.5 to 2.5"
+    ):
         checked(table, "displacement", limits=3.0)
 
 
@@ -740,7 +945,9 @@ class Strips:
 
 
 def test_several_answers_are_told_from_one_found_again():
-    found = optimise(Scene(Strips(), Circle(amplitude=0.5)), harmonics=2, limits=2.0, starts=8)
+    found = optimise(
+        Scene(Strips(), Circle(amplitude=0.5)), harmonics=2, limits=2.0, starts=8
+    )
     values, counts = zip(*found.answers)
     assert sum(counts) == 8
     assert max(counts) > 1
@@ -770,7 +977,11 @@ def test_a_loop_that_cannot_be_run_ends_no_search():
     system = Swimmer(FLUID, Chain())
 
     def velocity(alpha, alphadot):
-        return np.where(np.abs(alpha).max(-1, keepdims=True) > 1.1, np.nan, system.velocity(alpha, alphadot))
+        return np.where(
+            np.abs(alpha).max(-1, keepdims=True) > 1.1,
+            np.nan,
+            system.velocity(alpha, alphadot),
+        )
 
     loops = Loops(2, 2, 2.5, 32)
     cycles, objective = Phases(loops, velocity), Objective("displacement")
@@ -788,14 +999,21 @@ def test_a_sine_has_the_power_of_its_own_gait_for_speed():
     asked = checked(Scene(system, sine), "speed")
     alpha, alphadot = (np.array(x) for x in sine.cycle(128))
     per_second = 2 * np.pi * 2.0 * alphadot
-    power = system.work(alpha, per_second, system.velocity(alpha, per_second)).power.mean()
+    power = system.work(
+        alpha, per_second, system.velocity(alpha, per_second)
+    ).power.mean()
     assert asked.objective.power == pytest.approx(power / 0.1, rel=1e-6)
 
 
 def test_other_starts_are_made_one_stroke():
     loops, first = Loops(2, 3, 2.5), Loops(2, 3, 2.5).of(Circle())
     twice = np.zeros(loops.shape)
-    twice[3], twice[4], twice[1], twice[2] = (1.0, 0.0), (0.0, 1.0), (0.4, 0.0), (0.0, 0.4)
+    twice[3], twice[4], twice[1], twice[2] = (
+        (1.0, 0.0),
+        (0.0, 1.0),
+        (0.4, 0.0),
+        (0.0, 0.4),
+    )
     for own, one in ((first, True), (twice, False)):
         constraints = Constraints(loops, None, own)
         assert constraints.stroke is one
@@ -817,7 +1035,9 @@ def test_loops_on_maps_of_all_kinds(stroke):
     assert "singular shapes" in snake.active
     assert 0.1 < (limiting(snake) == "singular").mean() < 0.5
     past = stroke.scene.changed(system=Swimmer(SAND, Chain(), (Transient(travel=0.1),)))
-    stepped = dataclasses.replace(stroke, request=dataclasses.replace(stroke.request, scene=past))
+    stepped = dataclasses.replace(
+        stroke, request=dataclasses.replace(stroke.request, scene=past)
+    )
     assert set(limiting(stepped)) == {"loop"}
     assert "no CCF" in plots.optimum_figure(stepped).axes[0].get_title()
     fig = plots.optimum_figure(stroke, stretched=True)
@@ -826,14 +1046,20 @@ def test_loops_on_maps_of_all_kinds(stroke):
 
 @pytest.mark.parametrize("larger", [1.0, 7.0])
 def test_the_first_start_keeps_the_better_of_its_two_sizes(larger):
-    search = types.SimpleNamespace(_rough=True, _larger=lambda p: larger, _each=lambda starts, *_: [*starts])
+    search = types.SimpleNamespace(
+        _rough=True, _larger=lambda p: larger, _each=lambda starts, *_: [*starts]
+    )
     search._merit = lambda cycles, p, turn: p
-    assert _Search._optima(search, None, [3.0, 5.0], 0.0, None, 1) == [max(3.0, larger), 5.0]
+    assert _Search._optima(search, None, [3.0, 5.0], 0.0, None, 1) == [
+        max(3.0, larger),
+        5.0,
+    ]
 
 
 def test_loops_are_ranked_by_their_worth():
     search = types.SimpleNamespace(
-        _different=lambda loops: [(p, 1) for p in loops], _merit=lambda tier, p, turn: -abs(p - 4)
+        _different=lambda loops: [(p, 1) for p in loops],
+        _merit=lambda tier, p, turn: -abs(p - 4),
     )
     assert _Search._ranked(search, None, [1.0, 5.0, 9.0, 4.5], 0.0) == [
         (4.5, 1, -0.5),
@@ -852,25 +1078,35 @@ def test_a_start_too_small_is_enlarged_and_one_at_rest_is_a_wave():
     sizes = {0.06: 0.375, 0.0626: 0.0626, 0.4: 0.4}
     for before, after in sizes.items():
         p = loops.of(Ellipse(semi_axes=(before, 0.7 * before), centre=(0.6, -0.2)))
-        assert loops.starts(p, 1)[0] == pytest.approx(p * np.r_[1.0, np.full(6, after / before)][:, None], abs=1e-12)
+        assert loops.starts(p, 1)[0] == pytest.approx(
+            p * np.r_[1.0, np.full(6, after / before)][:, None], abs=1e-12
+        )
     rest = np.zeros((7, 3))
     (wave,) = Loops(3, 3, 2.0).starts(rest, 1)
     t = 2 * np.pi * np.arange(8) / 8
     lagging = [np.cos(t), np.sin(t), -np.cos(t)]
-    assert Loops(3, 3, 2.0, 8).cycle(wave)[0].T == pytest.approx(np.array(lagging), abs=1e-12)
+    assert Loops(3, 3, 2.0, 8).cycle(wave)[0].T == pytest.approx(
+        np.array(lagging), abs=1e-12
+    )
 
 
 def test_outlines_go_round_their_corners_at_constant_speed():
     """In the box of the limits, with so many harmonics that corners are sharp."""
     loops = Loops(2, 40, LOPSIDED)
-    t, middle, half = np.linspace(0, 1, 41)[:-1] + 0.01, np.array([0.75, -0.1]), np.array([1.25, 1.1])
+    t, middle, half = (
+        np.linspace(0, 1, 41)[:-1] + 0.01,
+        np.array([0.75, -0.1]),
+        np.array([1.25, 1.1]),
+    )
     _, *outlines = loops.starts(loops.of(Circle()), 1 + len(series.OUTLINES))
     for corners, p in zip(series.OUTLINES, outlines, strict=True):
         ends = [*map(complex, *np.transpose(corners)), complex(*corners[0])]
         way = [0.0, *np.cumsum(np.abs(np.diff(ends)))]
         places = np.interp(t * way[-1], way, ends)
         found = loops.gait(p).shape(2 * np.pi * t)
-        assert found == pytest.approx(middle + half * np.stack([places.real, places.imag], -1), abs=0.05)
+        assert found == pytest.approx(
+            middle + half * np.stack([places.real, places.imag], -1), abs=0.05
+        )
         assert sum((np.conj(a) * b).imag for a, b in pairwise(ends)) > 0  # to the left
     *others, right, left = ({*corners} for corners in series.OUTLINES)
     assert all({(-x, -y) for x, y in last} in others for last in (right, left))
@@ -888,38 +1124,57 @@ def test_further_starts_are_waves_about_the_middle_of_the_limits():
     starts = np.array([loops.starts(own, 6, seed) for seed in range(100)])
     assert (starts[:, 0] == own).all()
     assert starts[:, 1] == pytest.approx(
-        np.array([[middle, *0.7 * half * [lag.real, lag.imag], *np.zeros((2, 3))]] * 100), abs=1e-12
+        np.array(
+            [[middle, *0.7 * half * [lag.real, lag.imag], *np.zeros((2, 3))]] * 100
+        ),
+        abs=1e-12,
     )
     first = (starts[:, :, 1] + 1j * starts[:, :, 2]) / half
     for k, angle in ((2, -np.pi / 2), (3, 2 * np.pi / 3), (4, np.pi / 4)):
-        assert first[:, k].mean(0) == pytest.approx(0.6 * np.exp(1j * angle * np.arange(3)), abs=0.12)
-    assert np.abs(first[:, 5].mean(0)[1:]).max() < 0.15 < 0.5 < first[:, 5, 0].mean().real
+        assert first[:, k].mean(0) == pytest.approx(
+            0.6 * np.exp(1j * angle * np.arange(3)), abs=0.12
+        )
+    assert (
+        np.abs(first[:, 5].mean(0)[1:]).max() < 0.15 < 0.5 < first[:, 5, 0].mean().real
+    )
     others = starts[:, 2:] / half
     assert others[:, :, 0].mean((0, 1)) == pytest.approx(middle / half, abs=0.03)
     assert others[:, :, 0].std((0, 1)) == pytest.approx(np.full(3, 0.1), rel=0.2)
-    assert others[:, :, 3:].std((0, 1, 2)) == pytest.approx(np.full(3, 0.3 / 4 * 0.6), rel=0.25)
+    assert others[:, :, 3:].std((0, 1, 2)) == pytest.approx(
+        np.full(3, 0.3 / 4 * 0.6), rel=0.25
+    )
 
 
 def searching(request, **parts):
     """A search of which a part is looked at alone."""
     search = _Search(request, None)
-    vars(search).update(constraints=types.SimpleNamespace(feasible=lambda p: p), **parts)
+    vars(search).update(
+        constraints=types.SimpleNamespace(feasible=lambda p: p), **parts
+    )
     return search
 
 
 def test_loops_tried_besides_have_their_sizes():
     """The first in another size, 0.6 of the range; others near the best by a tenth, and further by a fifth, of a rad."""
-    search = searching(checked(viscous(), harmonics=4, limits=5.0, objective="displacement"))
+    search = searching(
+        checked(viscous(), harmonics=4, limits=5.0, objective="displacement")
+    )
     loops = search.request.loops
     p = loops.of(Ellipse(semi_axes=(0.4, 0.2), tilt=0.3, centre=(0.3, -0.2)))
     larger = search._larger(p)
     assert larger[0] == pytest.approx(p[0]) and np.ptp(larger[1:3] / p[1:3]) < 1e-9
-    assert np.abs(loops.gait(larger).shape(np.linspace(0, 6.28, 500)) - p[0]).max() == pytest.approx(3.0, rel=1e-3)
+    assert np.abs(
+        loops.gait(larger).shape(np.linspace(0, 6.28, 500)) - p[0]
+    ).max() == pytest.approx(3.0, rel=1e-3)
     harmonic = np.array([1, 1, 1, 2, 2, 3, 3, 4, 4])[:, None]
     for others, size in zip(search._perturbed(p), (0.1, 0.2), strict=True):
-        spread = (np.array(others) - p) * harmonic / (size * 2.0)  # a range of 5 rad is twice that of 2.5
+        spread = (
+            (np.array(others) - p) * harmonic / (size * 2.0)
+        )  # a range of 5 rad is twice that of 2.5
         assert len(others) == 3 and np.abs(spread.mean()) < 0.3
-        assert spread.std((0, 2)) == pytest.approx(np.ones(9), rel=0.65) and spread.std() == pytest.approx(1.0, rel=0.2)
+        assert spread.std((0, 2)) == pytest.approx(
+            np.ones(9), rel=0.65
+        ) and spread.std() == pytest.approx(1.0, rel=0.2)
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.05])
@@ -929,20 +1184,30 @@ def test_a_loop_that_turns_too_much_is_worth_what_is_left_where_it_does_not(turn
     by_x, by_theta = rng.normal(size=(2, 3, 2))
     flat, count = np.zeros((3, 2)), 0
     net = lambda p: np.array([5.0 + (by_x * p).sum(), 0.0, (by_theta * p).sum()])
-    tier = lambda p: CycleValues((net(p), np.array([by_x, flat, by_theta])), (0.0, flat), None, None, (0.0, flat))
+    tier = lambda p: CycleValues(
+        (net(p), np.array([by_x, flat, by_theta])), (0.0, flat), None, None, (0.0, flat)
+    )
     search = searching(checked(viscous(), "displacement", "x"))
     for p in (rng.normal(size=(3, 2)), 0.01 * by_theta, -rng.normal(size=(3, 2))):
         theta, count = net(p)[2], count + 1
-        nearest = p - (theta - np.clip(theta, -turn, turn)) * by_theta / (by_theta**2).sum()
+        nearest = (
+            p - (theta - np.clip(theta, -turn, turn)) * by_theta / (by_theta**2).sum()
+        )
         assert abs(net(nearest)[2]) <= turn + 1e-12
         assert search._merit(tier, p, turn) == pytest.approx(net(nearest)[0], rel=1e-12)
         assert search.count == count
-    assert searching(checked(viscous(), "turning"))._merit(tier, p, turn) == abs(net(p)[2])
+    assert searching(checked(viscous(), "turning"))._merit(tier, p, turn) == abs(
+        net(p)[2]
+    )
 
     def fails(p):
         raise RuntimeError
 
-    assert search._merit(fails, p, turn) == -np.inf == search._merit(lambda p: tier(p * np.nan), p, turn)
+    assert (
+        search._merit(fails, p, turn)
+        == -np.inf
+        == search._merit(lambda p: tier(p * np.nan), p, turn)
+    )
 
 
 def test_a_direction_is_that_of_the_mean_heading():
@@ -950,15 +1215,21 @@ def test_a_direction_is_that_of_the_mean_heading():
     search = searching(checked(viscous(), "displacement", "x", harmonics=2))
     loops, system = search.request.loops, search.request.system
     for shift in (0.3, 2.9, 5.5):
-        p = series.shifted(loops.of(Ellipse(semi_axes=(1.0, 0.5), tilt=0.4, centre=(0.3, 0.1))), shift)
+        p = series.shifted(
+            loops.of(Ellipse(semi_axes=(1.0, 0.5), tilt=0.4, centre=(0.3, 0.1))), shift
+        )
         q = search._started_at_mean_heading(p)
         assert abs(turning(system.run(*loops.cycle(q)).xi)[0]) < 1e-8
         fine = dataclasses.replace(loops, phases=2000)
         ahead = turning(system.velocity(*fine.cycle(p)))
         crossings = np.flatnonzero(ahead * np.roll(ahead, -1) <= 0)
         k = crossings[np.minimum(crossings, 2000 - crossings).argmin()]
-        assert q == pytest.approx(series.shifted(p, 2 * np.pi * (k + 0.5) / 2000), abs=5e-3)
-    assert searching(checked(viscous(), "displacement"))._started_at_mean_heading(p) is p
+        assert q == pytest.approx(
+            series.shifted(p, 2 * np.pi * (k + 0.5) / 2000), abs=5e-3
+        )
+    assert (
+        searching(checked(viscous(), "displacement"))._started_at_mean_heading(p) is p
+    )
 
 
 @pytest.mark.parametrize(
@@ -968,9 +1239,13 @@ def test_a_direction_is_that_of_the_mean_heading():
         ("x", (0.2, -0.3, 0.0), 1.1, False), ("y", (-0.3, 0.2, 0.0), 1.1, False), (None, (-0.2, -0.3, 0.0), 1.1, False),
     ],
 )  # fmt: skip
-def test_a_gait_that_moves_backwards_is_reversed_unless_that_brings_less(direction, net, reverse, turned):
+def test_a_gait_that_moves_backwards_is_reversed_unless_that_brings_less(
+    direction, net, reverse, turned
+):
     search = searching(checked(viscous(), "displacement", direction))
-    evaluation = lambda value: types.SimpleNamespace(displacement=np.array(net), value=value)
+    evaluation = lambda value: types.SimpleNamespace(
+        displacement=np.array(net), value=value
+    )
     loop, own, other = np.eye(11, 2), evaluation(2.0), evaluation(2.0 * reverse)
     search._finished = lambda p, turn: (other, p)
     found, p = search._forwards(own, loop, 0.0)
@@ -980,7 +1255,10 @@ def test_a_gait_that_moves_backwards_is_reversed_unless_that_brings_less(directi
 
 def test_a_start_is_a_series_of_as_few_harmonics_as_it_has():
     """None of its own are cut, though the search has fewer; the limit of the search where these suffice."""
-    for gait, asked, harmonics in ((Butterfly(amplitude=0.9), 1, 16), (Circle(amplitude=0.9), 3, 3)):
+    for gait, asked, harmonics in (
+        (Butterfly(amplitude=0.9), 1, 16),
+        (Circle(amplitude=0.9), 3, 3),
+    ):
         search = searching(checked(viscous(gait=gait), "displacement", harmonics=asked))
         found = search._as_series(gait)
         assert (found.amplitude, found.harmonics) == (1.0, harmonics)
@@ -1006,10 +1284,21 @@ def test_an_evaluation_is_what_the_gait_does_by_itself(objective, pace):
     found = evaluate_gait(request, gait)
     (net,), ((error, heading),) = estimate.direct(scene, gait, [0.7], 128)
     alpha, alphadot = gait.cycle(128)
-    power = scene.system.work(alpha, alphadot, scene.system.velocity(alpha, alphadot)).power / 0.3
-    length, half, far = *(2 * np.pi * x.mean() for x in (power, power[::2])), np.hypot(*net[:2]) / 0.3
+    power = (
+        scene.system.work(alpha, alphadot, scene.system.velocity(alpha, alphadot)).power
+        / 0.3
+    )
+    length, half, far = (
+        *(2 * np.pi * x.mean() for x in (power, power[::2])),
+        np.hypot(*net[:2]) / 0.3,
+    )
     time = (
-        max(power.mean() / 0.4 * ("power" in pace), np.abs(gait.cycle(1024)[1]).max() / pace["rate"]) if pace else 1.0
+        max(
+            power.mean() / 0.4 * ("power" in pace),
+            np.abs(gait.cycle(1024)[1]).max() / pace["rate"],
+        )
+        if pace
+        else 1.0
     )
     known = {
         "displacement": (far, error), "turning": (abs(net[2]), heading), "speed": (far / (2 * np.pi * time),) * 2,
@@ -1018,7 +1307,9 @@ def test_an_evaluation_is_what_the_gait_does_by_itself(objective, pace):
     value, error_of_value = known[objective]
     if objective == "speed":
         error_of_value *= error / far
-    assert (found.value, found.error) == pytest.approx((value, error_of_value), rel=1e-6)
+    assert (found.value, found.error) == pytest.approx(
+        (value, error_of_value), rel=1e-6
+    )
     assert (found.heading, found.time, found.limits) == (
         pytest.approx(heading),
         pytest.approx(time),
@@ -1030,7 +1321,9 @@ def test_an_evaluation_is_what_the_gait_does_by_itself(objective, pace):
 
 def test_undulations_are_sines_within_their_bounds():
     """Limits are touched within 5e-3 of them; starts lie in the lower half of the range."""
-    sines = Undulations(Sine(elements=30, amplitude=0.3, waves=1.5, frequency=2.0), phases=16)
+    sines = Undulations(
+        Sine(elements=30, amplitude=0.3, waves=1.5, frequency=2.0), phases=16
+    )
     for p, names in (
         ((0.01004, 2.489), ["amplitude >= 0.01", "waves <= 2.5"]), ((0.996, 0.502), ["amplitude <= 1", "waves >= 0.5"]),
         ((0.01006, 2.487), []), ((0.994, 0.503), []),
@@ -1040,49 +1333,81 @@ def test_undulations_are_sines_within_their_bounds():
     rows = np.array([[0.2, 1.0], [0.5, 2.2]])
     for found, p in zip(zip(*sines.cycle(rows)), rows):
         one = Sine(elements=30, amplitude=p[0], waves=p[1]).cycle(16)
-        assert all(np.array_equal(x, y) for x, y in zip(found, one)) and np.array_equal(sines.cycle(p)[0], one[0])
-    assert sines.gait(rows[0]) == Sine(elements=30, amplitude=0.2, waves=1.0, frequency=2.0)
+        assert all(np.array_equal(x, y) for x, y in zip(found, one)) and np.array_equal(
+            sines.cycle(p)[0], one[0]
+        )
+    assert sines.gait(rows[0]) == Sine(
+        elements=30, amplitude=0.2, waves=1.0, frequency=2.0
+    )
     own, *others = sines.starts([2.0, 0.1], 200)
     low, high = map(np.array, sines.bounds)
     assert own.tolist() == [1.0, 0.5] and len(others) == 199
     share = (np.array(others) - low) / (high - low)
-    assert share.min(0) == pytest.approx([0.05, 0.05], abs=0.01) and share.max(0) == pytest.approx([0.5, 0.5], abs=0.01)
-    assert sines.same([0.2, 1.0], [0.2095, 1.0095]) and not sines.same([0.2, 1.0], [0.2, 1.0105])
+    assert share.min(0) == pytest.approx([0.05, 0.05], abs=0.01) and share.max(
+        0
+    ) == pytest.approx([0.5, 0.5], abs=0.01)
+    assert sines.same([0.2, 1.0], [0.2095, 1.0095]) and not sines.same(
+        [0.2, 1.0], [0.2, 1.0105]
+    )
 
 
 def test_loops_about_singular_shapes_are_made_smaller_until_they_are_clear():
     """Singular on a line at 1 rad from the first one's centre: others keep half of its distance, about that centre."""
     loops, centre = Loops(2, 2, 5.0), np.array([0.3, -0.2])
-    circle = lambda size, middle=centre: loops.of(Circle(amplitude=size, centre=tuple(middle)))
+    circle = lambda size, middle=centre: loops.of(
+        Circle(amplitude=size, centre=tuple(middle))
+    )
     singularity = lambda alpha: 1.3 - alpha[..., 0]
     found = Constraints(loops, singularity, circle(0.4))
-    assert found.first == pytest.approx(circle(0.4)) and found.away == pytest.approx(0.3, rel=1e-6)
-    for size, smaller in ((0.69, 0.69), (0.71, 0.7 * 0.71), (2.0, 0.7**3 * 2.0), (1e3, 0.4)):
+    assert found.first == pytest.approx(circle(0.4)) and found.away == pytest.approx(
+        0.3, rel=1e-6
+    )
+    for size, smaller in (
+        (0.69, 0.69),
+        (0.71, 0.7 * 0.71),
+        (2.0, 0.7**3 * 2.0),
+        (1e3, 0.4),
+    ):
         assert found.feasible(circle(size)) == pytest.approx(circle(smaller), abs=1e-12)
     far = circle(2.0, (-4.0, 0.1))
     assert found.feasible(far) is far
-    assert Constraints(loops, singularity, circle(1.5)).away == pytest.approx(0.5 * (1 - 0.49 * 1.5), rel=1e-6)
+    assert Constraints(loops, singularity, circle(1.5)).away == pytest.approx(
+        0.5 * (1 - 0.49 * 1.5), rel=1e-6
+    )
     for size, share in ((0.5, 1.6), (0.5, 1.7)):
         assert found.meets_singular(circle(size), share) == (share == 1.7)
-    assert found.meets_singular(circle(2.0), 0.0) and not Constraints(loops, None, circle(2.0)).meets_singular(
-        circle(2.0)
-    )
+    assert found.meets_singular(circle(2.0), 0.0) and not Constraints(
+        loops, None, circle(2.0)
+    ).meets_singular(circle(2.0))
 
 
 def test_the_shortest_step_onto_constraints():
     """Of an equation, of a bound that counts, of one that does not, and of two that exclude each other."""
     A, b = np.array([[0.6, -0.8, 0.0]]), np.array([[1.0, 0.0, 2.0], [0.0, 5.0, 0.0]])
-    assert _shortest([("eq", np.array([0.3]), A)]) == pytest.approx([-0.18, 0.24, 0.0], abs=1e-9)
-    assert _shortest([("ineq", np.array([-0.5, 0.2]), b)]) == pytest.approx([0.1, 0.0, 0.2], abs=1e-8)
+    assert _shortest([("eq", np.array([0.3]), A)]) == pytest.approx(
+        [-0.18, 0.24, 0.0], abs=1e-9
+    )
+    assert _shortest([("ineq", np.array([-0.5, 0.2]), b)]) == pytest.approx(
+        [0.1, 0.0, 0.2], abs=1e-8
+    )
     both = _shortest([("eq", np.array([0.3]), A), ("ineq", np.array([-0.5, 0.2]), b)])
-    assert both == pytest.approx(np.linalg.pinv([A[0], b[0]]) @ [-0.3, 0.5], abs=1e-8) and 5 * both[1] > -0.2
-    assert not _shortest([("ineq", np.array([-0.5, -0.5]), np.array([[1.0, 0.0], [-1.0, 0.0]]))]).any()
+    assert (
+        both == pytest.approx(np.linalg.pinv([A[0], b[0]]) @ [-0.3, 0.5], abs=1e-8)
+        and 5 * both[1] > -0.2
+    )
+    assert not _shortest(
+        [("ineq", np.array([-0.5, -0.5]), np.array([[1.0, 0.0], [-1.0, 0.0]]))]
+    ).any()
 
 
 def bowl(bound=0.4):
     """|x - (1, 2)|^2 with x_2 <= bound."""
     top = np.array([1.0, 2.0])
-    least = {"type": "ineq", "fun": lambda x: np.array([bound - x[1]]), "jac": lambda x: np.array([[0.0, -1.0]])}
+    least = {
+        "type": "ineq",
+        "fun": lambda x: np.array([bound - x[1]]),
+        "jac": lambda x: np.array([[0.0, -1.0]]),
+    }
     return lambda x: (((x - top) ** 2).sum(), 2 * (x - top)), [least]
 
 
@@ -1107,12 +1432,19 @@ def test_an_ascent_keeps_to_its_radius_and_says_how_it_ends():
         ascent = _Ascent(*bowl(bound), lambda x: True)
         assert ascent.run(start, radius, moving, 50, 1e-9) == ends
         assert ascent.best == pytest.approx(best, abs=1e-6) and ascent.steps > 0
-        assert ascent.least == pytest.approx((best[0] - 1) ** 2 + (best[1] - 2) ** 2, abs=1e-5)
+        assert ascent.least == pytest.approx(
+            (best[0] - 1) ** 2 + (best[1] - 2) ** 2, abs=1e-5
+        )
     valley = lambda x: (100 * (x[1] - x[0] ** 2) ** 2 + (value - x[0]) ** 2, np.array(
         [-400 * x[0] * (x[1] - x[0] ** 2) - 2 * (value - x[0]), 200 * (x[1] - x[0] ** 2)]))  # fmt: skip
-    assert (ascent := _Ascent(valley, bowl()[1], lambda x: True)).run(start, 9.0, 2, 3, 1e-12) == "unfinished"
+    assert (ascent := _Ascent(valley, bowl()[1], lambda x: True)).run(
+        start, 9.0, 2, 3, 1e-12
+    ) == "unfinished"
     assert ascent.steps == 3
-    assert _Ascent(*bowl(), lambda x: x[0] < 0.1).run(start, 9.0, 2, 50, 1e-9) == "infeasible"
+    assert (
+        _Ascent(*bowl(), lambda x: x[0] < 0.1).run(start, 9.0, 2, 50, 1e-9)
+        == "infeasible"
+    )
 
     def spent(x):
         raise Enough
@@ -1129,20 +1461,36 @@ def test_what_limits_a_loop_at_each_phase(objective, component):
     values[component] = axes[0][:, None]
     t = np.linspace(0, 2 * np.pi, 721)
     alpha_1, alpha_2 = np.cos(t), np.sin(t)
-    asked = types.SimpleNamespace(objective=Objective(objective), loops=Loops(2, 1, ((-2.0, 1.0), (-2.0, 2.0))))
-    singularity = types.SimpleNamespace(traits=types.SimpleNamespace(singularity=lambda alpha: -2.0 - alpha[..., 1]))
+    asked = types.SimpleNamespace(
+        objective=Objective(objective), loops=Loops(2, 1, ((-2.0, 1.0), (-2.0, 2.0)))
+    )
+    singularity = types.SimpleNamespace(
+        traits=types.SimpleNamespace(singularity=lambda alpha: -2.0 - alpha[..., 1])
+    )
     found = types.SimpleNamespace(
         gained=Gained(Field(axes, values), component), gait=Circle(), request=asked, active=(),
         scene=types.SimpleNamespace(system=singularity),
     )  # fmt: skip
-    rest = np.where(alpha_1 >= 1 - 7.5e-3, "limit", "length" if objective == "efficiency" else "else")
+    rest = np.where(
+        alpha_1 >= 1 - 7.5e-3,
+        "limit",
+        "length" if objective == "efficiency" else "else",
+    )
     known = np.where(np.abs(alpha_1) <= 0.15, "zero", rest)
     assert limiting(found).tolist() == known.tolist()
     found.active = ("singular shapes",)
-    assert limiting(found).tolist() == np.where(alpha_2 <= -0.95, "singular", known).tolist()
-    values[:, 8] = np.nan  # of a field with gaps the median counts, 0.5 in the loop's box
+    assert (
+        limiting(found).tolist()
+        == np.where(alpha_2 <= -0.95, "singular", known).tolist()
+    )
+    values[:, 8] = (
+        np.nan
+    )  # of a field with gaps the median counts, 0.5 in the loop's box
     found.gained, found.active = Gained(Field(axes, values), component), ()
-    assert limiting(found).tolist() == np.where(np.abs(alpha_1) <= 0.075, "zero", rest).tolist()
+    assert (
+        limiting(found).tolist()
+        == np.where(np.abs(alpha_1) <= 0.075, "zero", rest).tolist()
+    )
     found.gained = None
     assert set(limiting(found)) == {"loop", "limit"}
 
@@ -1151,15 +1499,19 @@ def test_without_limits_those_of_the_field_or_the_gait_hold():
     """The larger of the two; a table's own field, and a number where that is the same on all sides."""
     scene = viscous(gait=Ellipse(semi_axes=(0.7, 0.2), centre=(0.1, 0.0)))
     for extent, limit in ((0.5, 0.8), (2.0, 2.0)):
-        assert checked(scene.with_numerics(extent=extent), "displacement").loops.within == pytest.approx(
-            limit, rel=1e-3
-        )
+        assert checked(
+            scene.with_numerics(extent=extent), "displacement"
+        ).loops.within == pytest.approx(limit, rel=1e-3)
     within = lambda limits: checked(scene, "displacement", limits=limits).loops.within
     assert within([0.9, 0.9]) == 0.9 and within([(-0.4, 0.4), (-0.4, 0.4)]) == 0.4
     assert within([0.9, 0.5]) == ((-0.9, 0.9), (-0.5, 0.5))
     assert within([(-0.4, 0.9), (-0.4, 0.9)]) == ((-0.4, 0.9),) * 2
     for span, kept in ((1.01e-6, True), (0.99e-6, False)):
-        with contextlib.nullcontext() if kept else pytest.raises(Refusal, match="or as many from low to high"):
+        with (
+            contextlib.nullcontext()
+            if kept
+            else pytest.raises(Refusal, match="or as many from low to high")
+        ):
             assert within([(0.2, 0.2 + span), (-1.0, 1.0)])[0] == (0.2, 0.2 + span)
 
 
@@ -1168,14 +1520,23 @@ def test_balances_of_a_cycle_start_from_the_last_one_and_those_nearby_from_its_o
 
     def velocity(alpha, alphadot, start=None):
         starts.append(start)
-        found.append(np.stack([alphadot[..., 0], alpha[..., 1] * alphadot[..., 0], alphadot[..., 1]], -1))
+        found.append(
+            np.stack(
+                [alphadot[..., 0], alpha[..., 1] * alphadot[..., 0], alphadot[..., 1]],
+                -1,
+            )
+        )
         return found[-1]
 
     cycles = Phases(loops, velocity)
     for k in (1.0, 0.9):
         cycles(k * p)
     assert [len(x) for x in found] == [1, 8, 1, 8] and cycles.count == 2
-    assert starts[0] is None and starts[1] is starts[2] is found[0] and starts[3] is found[2]
+    assert (
+        starts[0] is None
+        and starts[1] is starts[2] is found[0]
+        and starts[3] is found[2]
+    )
     runs = Runs(loops, Swimmer(FLUID, ODD).run, True)
     runs(p)
     assert runs.count == 1
@@ -1185,13 +1546,23 @@ def test_balances_of_a_cycle_start_from_the_last_one_and_those_nearby_from_its_o
 @pytest.mark.parametrize("seed", range(3))
 def test_the_sense_of_any_loop_is_told(seed, joints):
     _, p = some_loop(seed, joints)
-    for q, there in ((p, True), (-p, True), (series.reversed_(p), False), (-series.reversed_(p), False)):
+    for q, there in (
+        (p, True),
+        (-p, True),
+        (series.reversed_(p), False),
+        (-series.reversed_(p), False),
+    ):
         assert series.same(p, series.shifted(q, 2.0 + seed), odd=False) is there
 
 
 def test_a_search_tells_how_far_it_is_and_never_that_it_is_done():
     told = []
-    search = searching(checked(viscous(), "displacement"), progress=told.append, completed=0, expected=10.0)
+    search = searching(
+        checked(viscous(), "displacement"),
+        progress=told.append,
+        completed=0,
+        expected=10.0,
+    )
     for cycles in (5, 4, 6):
         search._report(cycles)
     assert told == pytest.approx([0.5, 0.9, 1 / 1.1]) and search.completed == 15
@@ -1199,11 +1570,23 @@ def test_a_search_tells_how_far_it_is_and_never_that_it_is_done():
 
 def test_a_gait_has_the_frequency_that_its_time_allows_or_that_of_the_scene():
     scene = viscous(gait=Circle(frequency=3.0))
-    timed, free = (searching(checked(scene, name)) for name in ("speed", "displacement"))
-    evaluation = lambda time: types.SimpleNamespace(time=time, gait=Circle(amplitude=0.5))
-    assert timed._timed(evaluation(0.2)) == Circle(amplitude=0.5, frequency=1 / (2 * np.pi * 0.2))
-    assert timed._timed(evaluation(0.0)) == free._timed(evaluation(0.2)) == Circle(amplitude=0.5, frequency=3.0)
-    assert timed._timed(evaluation(1.0001e-4 / (2 * np.pi))).frequency == pytest.approx(1e4, rel=1e-3)
+    timed, free = (
+        searching(checked(scene, name)) for name in ("speed", "displacement")
+    )
+    evaluation = lambda time: types.SimpleNamespace(
+        time=time, gait=Circle(amplitude=0.5)
+    )
+    assert timed._timed(evaluation(0.2)) == Circle(
+        amplitude=0.5, frequency=1 / (2 * np.pi * 0.2)
+    )
+    assert (
+        timed._timed(evaluation(0.0))
+        == free._timed(evaluation(0.2))
+        == Circle(amplitude=0.5, frequency=3.0)
+    )
+    assert timed._timed(evaluation(1.0001e-4 / (2 * np.pi))).frequency == pytest.approx(
+        1e4, rel=1e-3
+    )
     with pytest.raises(Refusal, match="more than 10000 times a second"):
         timed._timed(evaluation(0.9999e-4 / (2 * np.pi)))
 
@@ -1214,18 +1597,29 @@ def test_a_turn_may_be_off_by_its_error_where_cycles_are_not_those_of_the_search
     past = viscous(system=Swimmer(SAND, Chain(), (Transient(travel=0.1),)))
     framed = Study(viscous()).in_frame("minimum-perturbation").scene
     evaluation = types.SimpleNamespace(heading=0.3)
-    slacks = [searching(checked(scene, "displacement"))._slack(evaluation) for scene in (viscous(), past, framed)]
+    slacks = [
+        searching(checked(scene, "displacement"))._slack(evaluation)
+        for scene in (viscous(), past, framed)
+    ]
     assert slacks == pytest.approx([1e-7, 0.3 + 1e-7, 0.3 + 1e-7], rel=1e-9)
 
 
 def test_phases_and_fields_of_a_search():
     """Phases are eights, as many as the scene or the search has; a field reaches a little beyond the farthest limit."""
-    asked = lambda phases, **more: checked(viscous().with_numerics(phases=phases), "displacement", **more)
+    asked = lambda phases, **more: checked(
+        viscous().with_numerics(phases=phases), "displacement", **more
+    )
     assert [asked(n).phases for n in (64, 128, 129)] == [128, 128, 136]
     assert asked(64, harmonics=9).phases == asked(64, harmonics=9).loops.phases == 144
-    assert asked(64, limits=[(-0.5, 1.0), (-1.5, 0.2)]).extent == pytest.approx(1.02 * 1.5)
+    assert asked(64, limits=[(-0.5, 1.0), (-1.5, 0.2)]).extent == pytest.approx(
+        1.02 * 1.5
+    )
     rests = viscous(gait=Circle(amplitude=0.0, frequency=2.0))
-    assert checked(rests, "speed").objective.rate == 1.0 == checked(viscous(gait=Circle()), "speed").objective.rate
+    assert (
+        checked(rests, "speed").objective.rate
+        == 1.0
+        == checked(viscous(gait=Circle()), "speed").objective.rate
+    )
 
 
 @pytest.mark.parametrize("pace", [{"rate": 0.5}, {"power": 0.01}])
@@ -1235,6 +1629,12 @@ def test_a_loop_is_worth_its_speed_in_the_time_that_its_limits_allow(pace):
     power = lambda alpha, alphadot, xi: system.work(alpha, alphadot, xi).power
     alpha, alphadot = loops.cycle(p)
     xi = system.velocity(alpha, alphadot)
-    time = np.sqrt(power(alpha, alphadot, xi).mean() / 0.01) if "power" in pace else np.abs(alphadot).max() / 0.5
+    time = (
+        np.sqrt(power(alpha, alphadot, xi).mean() / 0.01)
+        if "power" in pace
+        else np.abs(alphadot).max() / 0.5
+    )
     found = search._merit(Phases(loops, system.velocity, power, 2.0), p, 10.0)
-    assert found == pytest.approx(np.hypot(*displacement(xi)[:2]) / (2 * np.pi * time), rel=1e-9)
+    assert found == pytest.approx(
+        np.hypot(*displacement(xi)[:2]) / (2 * np.pi * time), rel=1e-9
+    )

@@ -23,8 +23,19 @@ pytestmark = pytest.mark.usefixtures("fastest")
 ROOT = pathlib.Path(__file__).parents[1]
 README, CONTRIBUTING = ROOT / "README.md", ROOT / "CONTRIBUTING.md"
 SITE = ROOT / ".docs"
-PAGES = [README, CONTRIBUTING, *sorted(p for p in SITE.rglob("*.md") if p.parent != SITE / "generated")]
-SHIPPED = {*names.scene_names(), *names.intruder_names(), *names.walker_names(), *CATALOGUE, *VERTICAL, *drag.SAMPLES}
+PAGES = [
+    README,
+    CONTRIBUTING,
+    *sorted(p for p in SITE.rglob("*.md") if p.parent != SITE / "generated"),
+]
+SHIPPED = {
+    *names.scene_names(),
+    *names.intruder_names(),
+    *names.walker_names(),
+    *CATALOGUE,
+    *VERTICAL,
+    *drag.SAMPLES,
+}
 COMMANDS = typer.main.get_command(cli.app).commands
 NUMBER = r"-?\d+(?:\.\d+)?(?:e[+-]\d+)?"
 
@@ -35,19 +46,29 @@ def text(page):
 
 def blocks(page, language=""):
     """Blocks of code on a page whose first line is ```language."""
-    return [code for first, code in re.findall(r"(?ms)^```([^\n]*)\n(.*?)^```$", text(page)) if first == language]
+    return [
+        code
+        for first, code in re.findall(r"(?ms)^```([^\n]*)\n(.*?)^```$", text(page))
+        if first == language
+    ]
 
 
 def prose(page):
     """Lines of a page outside of its blocks of code, without code within them."""
     outside = re.sub(r"(?ms)^```.*?^```$", "", text(page))
-    return re.sub(r"`[^`]*`", lambda code: code[0].strip("`") if "](" not in code[0] else "", outside)
+    return re.sub(
+        r"`[^`]*`",
+        lambda code: code[0].strip("`") if "](" not in code[0] else "",
+        outside,
+    )
 
 
 def anchors(page):
     """GitHub's anchors of the headings of a page; two headings of one name would have the same here."""
     titles = re.findall(r"^#+ (.+)$", prose(page), re.M)
-    found = [re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles]
+    found = [
+        re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles
+    ]
     assert len(set(found)) == len(found), page
     return set(found)
 
@@ -63,7 +84,10 @@ def links(page):
 def commands(page):
     """Command lines of geomech on a page, as words: of blocks, of tables and in sentences; templates with their brackets."""
     code = [
-        line for language in ("", "sh", "console") for block in blocks(page, language) for line in block.splitlines()
+        line
+        for language in ("", "sh", "console")
+        for block in blocks(page, language)
+        for line in block.splitlines()
     ]
     inline = re.findall(r"`([^`]+)`", re.sub(r"(?ms)^```.*?^```$", "", text(page)))
     for line in code + [" ".join(x.split()).replace("\\|", "|") for x in inline]:
@@ -101,7 +125,9 @@ def test_no_paragraph_and_no_row_stands_on_two_pages():
     for page in PAGES:
         for part in re.split(r"\n\n+|\n(?=\|)", text(page)):
             if len(part) > 100 and not part.startswith("!["):
-                seen.setdefault(" ".join(part.split()), []).append(page.relative_to(ROOT))
+                seen.setdefault(" ".join(part.split()), []).append(
+                    page.relative_to(ROOT)
+                )
     assert [pages for pages in seen.values() if len(pages) > 1] == []
 
 
@@ -109,21 +135,38 @@ def test_the_readme_is_short_and_begins_with_what_installs_and_what_tests():
     assert len(text(README).splitlines()) <= 140
     install, suite, tries = blocks(README, "sh")
     assert "pip install -q . &&" in install and "geomech run -o results" in install
-    assert "pip install -q -e '.[test]' &&" in suite and suite.endswith("-m pytest -q\n")
+    assert "pip install -q -e '.[test]' &&" in suite and suite.endswith(
+        "-m pytest -q\n"
+    )
     assert len(install.splitlines()) == len(suite.splitlines()) == 1
-    assert [line.split()[1] for line in tries.splitlines()] == ["displacement", "ccf", "trajectory", "scenes"]
+    assert [line.split()[1] for line in tries.splitlines()] == [
+        "displacement",
+        "ccf",
+        "trajectory",
+        "scenes",
+    ]
 
 
 def test_commands_on_all_pages_exist_with_their_options_and_names():
-    found = [(page.relative_to(ROOT), line) for page in PAGES for line in commands(page)]
+    found = [
+        (page.relative_to(ROOT), line) for page in PAGES for line in commands(page)
+    ]
     assert len(found) > 80
     assert {line[0] for _, line in found} == set(COMMANDS)
     for page, (name, *words) in found:
-        options = {option for x in COMMANDS[name].params for option in x.opts + x.secondary_opts} | {"--plugin"}
+        options = {
+            option
+            for x in COMMANDS[name].params
+            for option in x.opts + x.secondary_opts
+        } | {"--plugin"}
         for word in words:
             for option in re.findall(r"(?:^|(?<=[\[|]))--?[a-z][\w-]*", word):
                 assert option in options, (page, name, word)
-        if name not in ("scenes", "reference") and words and re.fullmatch(r"[a-z][\w-]+", words[0]):
+        if (
+            name not in ("scenes", "reference")
+            and words
+            and re.fullmatch(r"[a-z][\w-]+", words[0])
+        ):
             assert words[0] in SHIPPED, (page, name, words)
 
 
@@ -134,17 +177,33 @@ TYPED = {" ".join(line): line for line in commands(README) if len(line) > 1 and 
 
 
 def test_most_of_what_the_readme_says_to_type_is_run():
-    some = {"displacement", "fit-medium", "connection", "optimize", "symbolic", "intrude", "walk", "explain", "sweep"}
+    some = {
+        "displacement",
+        "fit-medium",
+        "connection",
+        "optimize",
+        "symbolic",
+        "intrude",
+        "walk",
+        "explain",
+        "sweep",
+    }
     assert len(TYPED) > 10 and some <= {line[0] for line in TYPED.values()}
 
 
-@pytest.mark.parametrize("line", [line for text, line in TYPED.items() if text not in read_commands()], ids=" ".join)
+@pytest.mark.parametrize(
+    "line",
+    [line for text, line in TYPED.items() if text not in read_commands()],
+    ids=" ".join,
+)
 def test_what_the_readme_says_to_type_runs(line, tmp_path, monkeypatch):
     """What is no line of data/commands.txt."""
     monkeypatch.chdir(tmp_path)
     code, out, err = geomech(*line)
     assert code == 0, err
-    files = {word for option, word in itertools.pairwise(line) if option in ("-o", "--plot")}
+    files = {
+        word for option, word in itertools.pairwise(line) if option in ("-o", "--plot")
+    }
     assert (out or files) and files == {p.name for p in tmp_path.iterdir()}
 
 
@@ -157,7 +216,9 @@ WITH_PYTHON = {page.relative_to(ROOT).as_posix(): page for page in PAGES
 def test_python_on_all_pages_runs(page, tmp_path, capsys, monkeypatch, own_parts):
     monkeypatch.chdir(tmp_path)
     for code in blocks(page, "python"):
-        own_law = "@formula" in code  # of no module, from which code compiled by an earlier run could be loaded
+        own_law = (
+            "@formula" in code
+        )  # of no module, from which code compiled by an earlier run could be loaded
         with backend.preferring("numpy" if own_law else backend.preferred()):
             exec(code, {"__name__": "page"})
     if page == README:
@@ -165,5 +226,8 @@ def test_python_on_all_pages_runs(page, tmp_path, capsys, monkeypatch, own_parts
         out = capsys.readouterr().out
         assert re.sub(NUMBER, "#", out) == re.sub(NUMBER, "#", said)
         for ours, theirs in zip(re.findall(NUMBER, out), re.findall(NUMBER, said)):
-            assert math.isclose(float(ours), float(theirs), rel_tol=1e-4), (ours, theirs)
+            assert math.isclose(float(ours), float(theirs), rel_tol=1e-4), (
+                ours,
+                theirs,
+            )
         assert (tmp_path / "swimmer.png").is_file()

@@ -139,7 +139,9 @@ def parse(raw, sign, order, sha256):
     return Stored(Connection(axes, A, left, left + 1.0, unit="m", length=0.5), length=0.5, unit="m", sha256=sha256)
 """,
 }
-SWIMMER = '[medium]\nlaw = "treacle"\n[body]\nkind = "knee"\n[[effects]]\nkind = "waxed"\n'
+SWIMMER = (
+    '[medium]\nlaw = "treacle"\n[body]\nkind = "knee"\n[[effects]]\nkind = "waxed"\n'
+)
 
 
 @pytest.fixture(autouse=True)
@@ -154,8 +156,12 @@ def folder(tmp_path, monkeypatch, own_parts):
     axis = np.linspace(-2, 2, 9)
     A = np.zeros((3, 2, 9, 9))
     A[0, 1] = np.sin(axis)[:, None]
-    (tmp_path / "own.json").write_text(json.dumps({"axes": [axis.tolist()] * 2, "A": A.tolist()}))
-    (tmp_path / "table.toml").write_text(f'[system]\nkind = "table"\nfile = "own.json"\n{end}')
+    (tmp_path / "own.json").write_text(
+        json.dumps({"axes": [axis.tolist()] * 2, "A": A.tolist()})
+    )
+    (tmp_path / "table.toml").write_text(
+        f'[system]\nkind = "table"\nfile = "own.json"\n{end}'
+    )
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -165,7 +171,15 @@ PLUGINS = [word for name in FILES for word in ("--plugin", f"own_{name}.py")]
 
 @pytest.mark.parametrize("name", ["swims", "trike", "skate", "table"])
 def test_commands_use_one_of_each(name):
-    argv = ["displacement", f"{name}.toml", "--amplitudes", "0.2,0.4", "--tiers", "leading,path,direct", "--json"]
+    argv = [
+        "displacement",
+        f"{name}.toml",
+        "--amplitudes",
+        "0.2,0.4",
+        "--tiers",
+        "leading,path,direct",
+        "--json",
+    ]
     code, _, err = geomech(*argv)
     assert code == 2 and "unknown" in err  # a scene alone runs no code
     code, out, err = geomech(*argv, *PLUGINS)
@@ -173,7 +187,9 @@ def test_commands_use_one_of_each(name):
     found = json.loads(out)
     assert np.isfinite([found["leading"], found["direct"]]).all()
     if name == "swims":
-        code, out, err = geomech("ccf", f"{name}.toml", "--style", "dots", "--plot", "ccf.png", *PLUGINS)
+        code, out, err = geomech(
+            "ccf", f"{name}.toml", "--style", "dots", "--plot", "ccf.png", *PLUGINS
+        )
         assert code == 0, err
     code, out, err = geomech("explain", f"{name}.toml", *PLUGINS)
     assert code == 0 and "egg gait" in out, err
@@ -182,18 +198,29 @@ def test_commands_use_one_of_each(name):
 def test_a_connection_is_written_in_a_format_of_ones_own(folder):
     """With its settings and its limits; without the plug-in the endings that there are."""
     argv = ["connection", "trike.toml", "-o", "made.json"]
-    assert "end the name of a connection in .nc or .mat" in geomech(*argv, *PLUGINS[:-2])[2]
+    assert (
+        "end the name of a connection in .nc or .mat"
+        in geomech(*argv, *PLUGINS[:-2])[2]
+    )
     assert geomech(*argv, "--sign", "-", *PLUGINS)[0] == 0
-    written, wanted = json.loads((folder / "made.json").read_text()), Study(library.load("trike.toml")).fitted
+    written, wanted = (
+        json.loads((folder / "made.json").read_text()),
+        Study(library.load("trike.toml")).fitted,
+    )
     np.testing.assert_array_equal(written["A"], -wanted.A)
     np.testing.assert_array_equal(written["axes"], wanted.axes)
-    assert "--order is that of a .mat file: drop it, a .json" in geomech(*argv, "--order", "ndgrid", *PLUGINS)[2]
-    body = (
-        '[medium]\nlaw = "viscous"\n[body]\nkind = "chain"\nlengths = [1, 1, 1, 1]\n[gait]\nkind = "wave"\njoints = 3\n'
+    assert (
+        "--order is that of a .mat file: drop it, a .json"
+        in geomech(*argv, "--order", "ndgrid", *PLUGINS)[2]
     )
+    body = '[medium]\nlaw = "viscous"\n[body]\nkind = "chain"\nlengths = [1, 1, 1, 1]\n[gait]\nkind = "wave"\njoints = 3\n'
     (folder / "four.toml").write_text(body)
     code, _, err = geomech("connection", "four.toml", "-o", "four.json", *PLUGINS)
-    assert code == 2 and "a .json file has a layout of 2 joints, and this body has 3: write a .nc file" in err
+    assert (
+        code == 2
+        and "a .json file has a layout of 2 joints, and this body has 3: write a .nc file"
+        in err
+    )
 
 
 def test_what_was_loaded_is_in_its_registry_and_in_scenes(folder):
@@ -207,11 +234,17 @@ def test_what_was_loaded_is_in_its_registry_and_in_scenes(folder):
         assert name in registry and name not in registry.built_in
     for name in ("swims", "trike", "skate"):
         scene = library.load(folder / f"{name}.toml")
-        again = library.toml(scene.changed(text="", numerics=Numerics(grid=8, phases=32)))
+        again = library.toml(
+            scene.changed(text="", numerics=Numerics(grid=8, phases=32))
+        )
         assert library.toml(parse(again)) == again
         study = Study(scene)
-        assert np.isfinite(study.study([0.3])["direct"]).all() and "leading" in study.tiers
-    assert library.load(folder / "skate.toml").changed(grip=0.7).system.wrapped.grip == 0.7
+        assert (
+            np.isfinite(study.study([0.3])["direct"]).all() and "leading" in study.tiers
+        )
+    assert (
+        library.load(folder / "skate.toml").changed(grip=0.7).system.wrapped.grip == 0.7
+    )
     assert tables.load(folder / "own.json").length == 0.5
 
 
@@ -221,7 +254,14 @@ class Cart:
     joints, length, traits = 2, 0.5, Traits(linear=True, joint_angles=True)
 
     def velocity(self, alpha, alphadot):
-        return np.stack([np.sin(alpha[..., 0]) * alphadot[..., 1], 0 * alpha[..., 0], 0.2 * alphadot[..., 0]], -1)
+        return np.stack(
+            [
+                np.sin(alpha[..., 0]) * alphadot[..., 1],
+                0 * alpha[..., 0],
+                0.2 * alphadot[..., 0],
+            ],
+            -1,
+        )
 
     def run(self, alpha, alphadot, work=False) -> Cycle:
         return integrated(self, alpha, alphadot)
@@ -235,7 +275,11 @@ def sled(alpha, alphadot):
 @pytest.mark.parametrize("system", [Cart(), sled])
 def test_five_members_and_functions_go_through_everything(system, tmp_path):
     """Study, every tier, errors, frames, the optimiser, plots and words; no base class and no name."""
-    scene = Scene(system, Circle(amplitude=0.5, centre=(0.1, 0.2)), Numerics(grid=7, extent=1.5, phases=32))
+    scene = Scene(
+        system,
+        Circle(amplitude=0.5, centre=(0.1, 0.2)),
+        Numerics(grid=7, extent=1.5, phases=32),
+    )
     study = Study(scene)
     assert study.tiers[-1] == "direct" and {"area", "adapted", "path"} <= {*study.tiers}
     table = study.study([0.3, 0.5], study.tiers)
@@ -250,25 +294,42 @@ def test_five_members_and_functions_go_through_everything(system, tmp_path):
         study.in_frame("link-1")
     found = optimise(scene, harmonics=1, limits=1.2)
     assert found.value > np.hypot(*truth[-1, :2])
-    plots.save(plots.displacement_figure({"circle": table}, [scene.gait]), tmp_path / "a.png")
+    plots.save(
+        plots.displacement_figure({"circle": table}, [scene.gait]), tmp_path / "a.png"
+    )
     plots.save(plots.ccf_figure(study.curvature), tmp_path / "b.png")
     assert single(scene.system, [0.1, 0.2], [1.0, 0.0])["status"] == "exact"
-    assert explain(scene).startswith(f"scene: {getattr(system, '__name__', 'Cart')}, circle gait")
+    assert explain(scene).startswith(
+        f"scene: {getattr(system, '__name__', 'Cart')}, circle gait"
+    )
     assert study.cost([0.3], study.tiers).balances > 0
 
 
 def test_a_function_says_what_it_does_not_take():
-    with pytest.raises(Refusal, match=r"the velocity of <lambda> must take \(alpha, alphadot\)"):
+    with pytest.raises(
+        Refusal, match=r"the velocity of <lambda> must take \(alpha, alphadot\)"
+    ):
         Scene(lambda alpha: alpha, Circle())
     with pytest.warns(VelocityWarning, match="not odd"):
-        _ = Study(Scene(lambda a, u: sled(a, u) + 0.1, Circle(), Numerics(grid=7, extent=1.5))).fitted
+        _ = Study(
+            Scene(lambda a, u: sled(a, u) + 0.1, Circle(), Numerics(grid=7, extent=1.5))
+        ).fitted
     one = lambda a, u: [a[0] * u[1], 0.0, u[0]]  # of a single shape
     many = lambda a, u: np.stack([a[..., 0] * u[..., 1], 0 * u[..., 0], u[..., 0]], -1)
     nets = [Scene(f, Ellipse(), Numerics(phases=16)).cycle().net for f in (one, many)]
     np.testing.assert_allclose(*nets, rtol=1e-14)
 
 
-GROUPS = ["media", "bodies", "effects", "ground_effects", "gaits", "systems", "tiers", "formats"]
+GROUPS = [
+    "media",
+    "bodies",
+    "effects",
+    "ground_effects",
+    "gaits",
+    "systems",
+    "tiers",
+    "formats",
+]
 
 
 @pytest.mark.parametrize("group", [f"geomech.{group}" for group in GROUPS])
@@ -385,7 +446,9 @@ def test_a_file_in_its_folder_is_found_and_held_to_the_laws_of_its_family(tmp_pa
     shutil.copytree(here.parent / "rft", tmp_path / "rft")
     (tmp_path / "geomech").symlink_to(here.parent / "geomech")
     for name, text in ADDED.items():
-        (tmp_path / "rft" / name).write_text("from dataclasses import dataclass\nimport numpy as np\n" + text)
+        (tmp_path / "rft" / name).write_text(
+            "from dataclasses import dataclass\nimport numpy as np\n" + text
+        )
     command = [sys.executable, "-c", LAWS_OF_FAMILIES, str(tmp_path), str(here)]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -42,8 +42,12 @@ def test_arrows_are_the_row_asked_for(component):
     ax = plots.vector_field(found, component, every=2)
     arrows = only(ax, Quiver)
     x, y = (s[1::2, 1::2] for s in SHAPES)
-    np.testing.assert_allclose(arrows.get_offsets(), np.stack([x.ravel(), y.ravel()], -1))
-    np.testing.assert_allclose([arrows.U, arrows.V], A[component, :, 1::2, 1::2].reshape(2, -1))
+    np.testing.assert_allclose(
+        arrows.get_offsets(), np.stack([x.ravel(), y.ravel()], -1)
+    )
+    np.testing.assert_allclose(
+        [arrows.U, arrows.V], A[component, :, 1::2, 1::2].reshape(2, -1)
+    )
     assert plots.COMPONENTS[component] in label_of(ax)
     assert ("(rad/rad)" if component == 2 else "(m/rad)") in label_of(ax)
 
@@ -59,17 +63,24 @@ def test_the_map_of_a_field_lies_as_the_field(component):
     ax = plots.ccf_map(field, component, [gait], error=error)
     x, y, values = mesh(ax)
     np.testing.assert_allclose(values, (1, 3, -1)[component] * (x + 2 * y))
-    assert only(ax, QuadMesh).get_clim() == pytest.approx((-np.abs(values).max(), np.abs(values).max()))
+    assert only(ax, QuadMesh).get_clim() == pytest.approx(
+        (-np.abs(values).max(), np.abs(values).max())
+    )
     hatched, zeros = (c for c in ax.collections if not isinstance(c, QuadMesh))
     line = np.concatenate([p.vertices for p in zeros.get_paths()])
     np.testing.assert_allclose(line[:, 0] + 2 * line[:, 1], 0, atol=1e-12)
     assert len(line) > 4
     assert hatched.hatches
-    inside = lambda points: np.any([p.contains_points(points) for p in hatched.get_paths()], axis=0)
+    inside = lambda points: np.any(
+        [p.contains_points(points) for p in hatched.get_paths()], axis=0
+    )
     assert inside([[0.9, 1.6], [-0.7, 1.5]]).all()
     assert not inside([[0.9, 0.9], [-0.7, 0.9]]).any()
     assert [t.get_text() for t in ax.get_legend().get_texts()] == [plots.HATCHED]
-    assert ax.get_title() == f"CCF$_{{{plots.COMPONENTS[component]}}}$: {('forward', 'sideways', 'turning')[component]}"
+    assert (
+        ax.get_title()
+        == f"CCF$_{{{plots.COMPONENTS[component]}}}$: {('forward', 'sideways', 'turning')[component]}"
+    )
     curve = gait.shape(np.linspace(0, 2 * np.pi, 400))
     np.testing.assert_allclose(ax.lines[0].get_xydata(), curve)
     np.testing.assert_allclose(ax.lines[1].get_xydata(), curve[:1])
@@ -102,23 +113,35 @@ def test_no_specks_on_the_default_map():
     exceeds them; on its map there are neither."""
     study = Study(scenes.load("three-link-glass"))
     field, error = study.curvature, study.curvature_error
-    raw = plots.figure(3, 3)[1][0, 0].contour(*field.axes, field.values[2].T, levels=[0.0])
+    raw = plots.figure(3, 3)[1][0, 0].contour(
+        *field.axes, field.values[2].T, levels=[0.0]
+    )
     assert min(sizes_of_loops(raw)) < 0.5
     for component in range(3):
         ax = plots.ccf_map(field, component, error=error)
         hatched, zeros = (c for c in ax.collections if not isinstance(c, QuadMesh))
         assert min(sizes_of_loops(zeros), default=1.0) > 0.5
-        patches = [np.ptp(p, axis=0).max() for path in hatched.get_paths() for p in pieces(path)]
+        patches = [
+            np.ptp(p, axis=0).max()
+            for path in hatched.get_paths()
+            for p in pieces(path)
+        ]
         assert min(patches, default=1.0) > 0.2
 
 
 def pieces(path):
     """Vertices of each unbroken part of a path, as they are."""
-    return [p for p in np.split(path.vertices, np.flatnonzero(path.codes == path.MOVETO)[1:]) if len(p)]
+    return [
+        p
+        for p in np.split(path.vertices, np.flatnonzero(path.codes == path.MOVETO)[1:])
+        if len(p)
+    ]
 
 
 def sizes_of_loops(contours):
-    parts = [p for path in contours.get_paths() if len(path.vertices) for p in pieces(path)]
+    parts = [
+        p for path in contours.get_paths() if len(path.vertices) for p in pieces(path)
+    ]
     return [np.ptp(p, axis=0).max() for p in parts if np.allclose(p[0], p[-1])]
 
 
@@ -136,7 +159,13 @@ def test_hatching_leaves_out_what_goes_along_with_a_line_of_zeros():
         (4, 11),
     )
     hatched = np.zeros((16, 14), bool)
-    for where, kept in ((along, False), (away, True), (beside, True), (patch, True), (speck, False)):
+    for where, kept in (
+        (along, False),
+        (away, True),
+        (beside, True),
+        (patch, True),
+        (speck, False),
+    ):
         error[where] = 2.0
         hatched[where] = kept
     np.testing.assert_array_equal(plots.unknown(values, error), hatched)
@@ -162,7 +191,9 @@ def test_a_gait_is_drawn_as_far_as_the_field_goes():
     assert -1 <= arrow.xy[0] <= 1.5
     within = plots.ccf_map(field, 0, [Ellipse(centre=(0.2, 0.5), semi_axes=(1.2, 0.4))])
     assert not [t for t in within.texts if t.get_text()]
-    nowhere = plots.ccf_map(field, 0, [Ellipse(centre=(9.0, 0.5), semi_axes=(1.3, 0.4))])
+    nowhere = plots.ccf_map(
+        field, 0, [Ellipse(centre=(9.0, 0.5), semi_axes=(1.3, 0.4))]
+    )
     assert not [t for t in nowhere.texts if getattr(t, "arrow_patch", None)]
 
 
@@ -204,7 +235,11 @@ def test_lines_of_displacement_are_a_quantity_of_each_tier(quantity):
     """With bands of the errors, in the unit of the quantity and the colour of the tier, and one of what the medium leaves
     open; the legend tells them apart."""
     label, direct, area, error = LINES[quantity]
-    table = {"amplitude": [0.5, 1.0], "direct": [[-0.3, 0.4, 0.1], [0.6, 0.8, 9.0]], "area": [[0.0, 1.0, 0], [2, 0, 0]]}
+    table = {
+        "amplitude": [0.5, 1.0],
+        "direct": [[-0.3, 0.4, 0.1], [0.6, 0.8, 9.0]],
+        "area": [[0.0, 1.0, 0], [2, 0, 0]],
+    }
     both = lambda x: {"direct": [x, x], "area": [x, x]}
     table |= {
         "units": dict.fromkeys(("x", "y", "net_distance"), "m"),
@@ -216,15 +251,24 @@ def test_lines_of_displacement_are_a_quantity_of_each_tier(quantity):
     ax = plots.displacement(table, gait=Ellipse(), quantity=quantity)
     lines = {line.get_label(): line for line in ax.lines}
     for tier, values in (("direct", direct), ("area", area)):
-        np.testing.assert_allclose(lines[TIERS[tier].label].get_xydata(), np.transpose([[0.5, 1.0], values]))
+        np.testing.assert_allclose(
+            lines[TIERS[tier].label].get_xydata(), np.transpose([[0.5, 1.0], values])
+        )
     assert (ax.get_xlabel(), ax.get_ylabel()) == (Ellipse().amplitude_label, label)
     bands = {c.get_label(): band(c) for c in ax.collections}
-    np.testing.assert_allclose(bands.pop(MEDIUM), [np.subtract(direct, [0.2, 0.4]), np.add(direct, [0.2, 0.4])])
+    np.testing.assert_allclose(
+        bands.pop(MEDIUM), [np.subtract(direct, [0.2, 0.4]), np.add(direct, [0.2, 0.4])]
+    )
     (of_area, of_direct) = bands.values()
     for found, values in ((of_area, area), (of_direct, direct)):
-        np.testing.assert_allclose(found, [np.subtract(values, error), np.add(values, error)])
+        np.testing.assert_allclose(
+            found, [np.subtract(values, error), np.add(values, error)]
+        )
     colours = [tuple(c.get_facecolor()[0]) for c in ax.collections]
-    assert colours[:2] == [to_rgba(TIERS[t].colour, 0.14) for t in ("area", "direct")] and len({*colours}) == 3
+    assert (
+        colours[:2] == [to_rgba(TIERS[t].colour, 0.14) for t in ("area", "direct")]
+        and len({*colours}) == 3
+    )
     legend = [t.get_text() for t in ax.get_legend().get_texts()]
     assert legend == [TIERS["area"].label, TIERS["direct"].label, ERROR, MEDIUM]
     alone = plots.displacement(one(table), quantity=quantity)
@@ -251,7 +295,10 @@ def test_tiers_of_one_amplitude_stand_side_by_side():
     ax = plots.displacement(table)
     points = [line.get_xdata().item() for line in ax.lines if line.get_marker() == "o"]
     bars = [bar.get_segments()[0][0, 0] for bar in ax.collections]
-    assert len({*points}) == len(points) == sum(tier in table for tier in TIERS) and bars == points
+    assert (
+        len({*points}) == len(points) == sum(tier in table for tier in TIERS)
+        and bars == points
+    )
     assert np.mean(points) == pytest.approx(0.5) and ax.get_xticks().tolist() == [0.5]
 
 
@@ -262,11 +309,20 @@ def test_measurements_are_points_with_bars_of_their_errors():
     (points,) = (c for c in ax.containers if c.get_label() == MEASURED)
     np.testing.assert_allclose(points.lines[0].get_xydata(), [[0.4, 0.1], [0.9, 0.2]])
     (bars,) = points.lines[2]
-    np.testing.assert_allclose([s[:, 1] for s in bars.get_segments()], [[0.08, 0.12], [0.17, 0.23]])
-    assert [t.get_text() for t in ax.get_legend().get_texts()] == [TIERS["direct"].label, MEASURED]
+    np.testing.assert_allclose(
+        [s[:, 1] for s in bars.get_segments()], [[0.08, 0.12], [0.17, 0.23]]
+    )
+    assert [t.get_text() for t in ax.get_legend().get_texts()] == [
+        TIERS["direct"].label,
+        MEASURED,
+    ]
     for names, where in (((), 0), (("y", "x"), 0)):
-        fig = plots.displacement_figure({"circle": table}, [Ellipse()], components=names, data=data)
-        assert [any(c.get_label() == MEASURED for c in ax.containers) for ax in fig.axes].index(True) == where
+        fig = plots.displacement_figure(
+            {"circle": table}, [Ellipse()], components=names, data=data
+        )
+        assert [
+            any(c.get_label() == MEASURED for c in ax.containers) for ax in fig.axes
+        ].index(True) == where
 
 
 def test_panels_that_are_zero_are_left_out_with_a_reason():
@@ -275,7 +331,11 @@ def test_panels_that_are_zero_are_left_out_with_a_reason():
         scenes.load("three-link-glass").system,
         "heading: zero, as the second half of the cycle mirrors the first",
     )
-    moves = {"amplitude": [0.5], "direct": [[0.1, 0.02, 1e-17]], "area": [[0.1, 0.0, 1e-7]]}
+    moves = {
+        "amplitude": [0.5],
+        "direct": [[0.1, 0.02, 1e-17]],
+        "area": [[0.1, 0.0, 1e-7]],
+    }
     shift = {"amplitude": [0.5], "direct": [[0.1, 0.0, 0.0]]}
     titles = lambda fig: [ax.get_ylabel().partition(" per")[0] for ax in fig.axes]
     fig = plots.displacement_figure({"circle": moves}, [Circle()], system=glass)
@@ -286,10 +346,21 @@ def test_panels_that_are_zero_are_left_out_with_a_reason():
     (word,) = (" ".join(t.get_text().split()) for t in fig.axes[4].texts)
     assert word == "y: zero, as the cycle run backwards is its own image, head for tail"
     fig = plots.displacement_figure({"butterfly": shift}, [Butterfly()], system=glass)
-    assert titles(fig) == ["x", "net distance"] and "y: zero" in fig.get_supxlabel() and turns in fig.get_supxlabel()
-    fig = plots.displacement_figure({"a": shift}, [Circle()])  # of a system that is not known
-    assert titles(fig) == ["x", "net distance"] and fig.get_supxlabel() == f"y and heading: zero, as {TO_ROUNDING}"
-    fig = plots.displacement_figure({"a": shift}, [Circle()], system=glass, components=("theta", "x"))
+    assert (
+        titles(fig) == ["x", "net distance"]
+        and "y: zero" in fig.get_supxlabel()
+        and turns in fig.get_supxlabel()
+    )
+    fig = plots.displacement_figure(
+        {"a": shift}, [Circle()]
+    )  # of a system that is not known
+    assert (
+        titles(fig) == ["x", "net distance"]
+        and fig.get_supxlabel() == f"y and heading: zero, as {TO_ROUNDING}"
+    )
+    fig = plots.displacement_figure(
+        {"a": shift}, [Circle()], system=glass, components=("theta", "x")
+    )
     assert titles(fig) == ["heading", "x"] and not fig.get_supxlabel()
     with pytest.raises(Refusal, match="component: 'z' is unknown"):
         plots.displacement_figure({"a": shift}, [Circle()], components=("z",))
@@ -304,13 +375,19 @@ def test_panels_that_are_zero_are_left_out_with_a_reason():
         ("amplitude,value_deg,error_rad", "1,90,0.1", True, (1, np.pi / 2, 0.1)),
     ],
 )
-def test_measurements_are_read_in_the_units_of_the_results(header, rows, angle, expected, tmp_path):
+def test_measurements_are_read_in_the_units_of_the_results(
+    header, rows, angle, expected, tmp_path
+):
     (tmp_path / "m.csv").write_text(f"# from the lab\n{header}\n{rows}\n")
     glass = scenes.load("three-link-glass")
-    scene = glass.changed(system=replace(glass.system, body=replace(glass.system.body, length=0.42)))
+    scene = glass.changed(
+        system=replace(glass.system, body=replace(glass.system.body, length=0.42))
+    )
     found = read(tmp_path / "m.csv", scene, angle)
     for name, value in zip(("amplitude", "value", "error"), expected):
-        assert found.get(name, [None])[0] == (value if value is None else pytest.approx(value))
+        assert found.get(name, [None])[0] == (
+            value if value is None else pytest.approx(value)
+        )
 
 
 def test_four_quantities_and_the_speed():
@@ -320,7 +397,9 @@ def test_four_quantities_and_the_speed():
     fig = plots.displacement_figure({"ellipse": table}, [glass.gait], components=names)
     assert [ax.get_ylabel() for ax in fig.axes] == [f"{q} per cycle ({u})" for q, u in (
         ("x", "BL"), ("y", "BL"), ("heading", "rad"), ("net distance", "BL"))]  # fmt: skip
-    assert len(plots.displacement_figure({"ellipse": table}, [glass.gait]).axes) == 3  # its heading is zero
+    assert (
+        len(plots.displacement_figure({"ellipse": table}, [glass.gait]).axes) == 3
+    )  # its heading is zero
     (right,) = fig.axes[3].child_axes
     assert right.get_ylabel() == "speed (BL/s) at 2.5 Hz"
     fig.draw_without_rendering()
@@ -338,7 +417,12 @@ def test_the_map_of_a_sweep_lies_as_its_parameters():
     moved = np.zeros((3, 2, 3))
     moved[..., 0] = [[1, -2], [3, 4], [5, 6]]
     errors = np.ones((3, 2)), np.ones((3, 2))
-    results = {"over": over, "displacement": moved, "estimate": errors[0], "estimate_heading": errors[1]}
+    results = {
+        "over": over,
+        "displacement": moved,
+        "estimate": errors[0],
+        "estimate_heading": errors[1],
+    }
     results["units"] = {"estimate": "m"}
     ax = plots.sweep_figure(scene, results).axes[0]
     x, y, values = mesh(ax)
@@ -346,40 +430,69 @@ def test_the_map_of_a_sweep_lies_as_its_parameters():
     np.testing.assert_allclose(y[:, 0], over["body.length"])
     np.testing.assert_allclose(values, moved[..., 0].T)
     assert fig_label(ax) == "net distance per cycle (m), backwards < 0"
-    assert (ax.get_xlabel(), ax.get_ylabel()) == (scene.gait.amplitude_label, "length (m)")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == (
+        scene.gait.amplitude_label,
+        "length (m)",
+    )
     assert (ax.get_xlim(), ax.get_ylim()) == ((0.5, 1.5), (2.0, 5.0))
-    shuffled = {**results, "over": {"gait.amplitude": [1.5, 0.5, 1.0], "body.length": [5.0, 2.0]}}
+    shuffled = {
+        **results,
+        "over": {"gait.amplitude": [1.5, 0.5, 1.0], "body.length": [5.0, 2.0]},
+    }
     x, y, values = mesh(plots.sweep_figure(scene, shuffled).axes[0])
     np.testing.assert_allclose(x[0], [0.5, 1.0, 1.5])
     np.testing.assert_allclose(y[:, 0], [2.0, 5.0])
     np.testing.assert_allclose(values, np.array([[4, 3], [6, 5], [-2, 1]]).T)
-    one = {"over": {"body.length": [2.0, 5.0]}, "displacement": moved[0], "estimate": np.array([0.2, 1.0])}
+    one = {
+        "over": {"body.length": [2.0, 5.0]},
+        "displacement": moved[0],
+        "estimate": np.array([0.2, 1.0]),
+    }
     one["units"] = {"estimate": "m"}
     ax = plots.sweep_figure(scene, one).axes[0]
     np.testing.assert_allclose(ax.lines[0].get_xydata(), [[2, 1], [5, -2]])
-    np.testing.assert_allclose(ax.collections[0].get_segments(), [[[2, 0.8], [2, 1.2]], [[5, -3], [5, -1]]])  # m
+    np.testing.assert_allclose(
+        ax.collections[0].get_segments(), [[[2, 0.8], [2, 1.2]], [[5, -3], [5, -1]]]
+    )  # m
     timed = {**one, "frequency": np.array([3.0, 4.0]), "speed": np.array([3.0, 8.0])}
     ax = plots.sweep_figure(scene, timed).axes[0]
     np.testing.assert_allclose(ax.lines[0].get_xydata(), [[2, 3], [5, -8]])
     assert ax.get_ylabel() == "speed (m/s), backwards < 0"
-    many = {"over": {"medium.C": np.arange(60.0)}, "displacement": np.ones((60, 3)), "estimate": np.ones(60)}
+    many = {
+        "over": {"medium.C": np.arange(60.0)},
+        "displacement": np.ones((60, 3)),
+        "estimate": np.ones(60),
+    }
     many["units"] = {"estimate": "BL"}
-    drawn = [plots.sweep_figure(scene, x).axes[0].lines[0].get_marker() for x in (one, many)]
+    drawn = [
+        plots.sweep_figure(scene, x).axes[0].lines[0].get_marker() for x in (one, many)
+    ]
     assert drawn == ["o", "None"]
 
 
 def test_a_work_precision_diagram_has_no_empty_axes_and_takes_errors_of_0(tmp_path):
     """As of systems that no setting approximates: warnings are errors here."""
-    line = {"tier": "direct", "setting": "phases", "value": [16, 64, 128], "seconds": [0.1, 0.3, 0.5], "slope": None}
+    line = {
+        "tier": "direct",
+        "setting": "phases",
+        "value": [16, 64, 128],
+        "seconds": [0.1, 0.3, 0.5],
+        "slope": None,
+    }
     for against, title in PANELS.items():
         for error in ([1e-3, 1e-5, 0.0], [0.0, 0.0, 0.0]):
             fig = plots.work_precision_figure(
-                {"lines": [{**line, "error": error, "against": against}], "amplitudes": [1.0]}
+                {
+                    "lines": [{**line, "error": error, "against": against}],
+                    "amplitudes": [1.0],
+                }
             )
             fig.canvas.draw()
             (ax,) = fig.axes
             assert (ax.get_title(), ax.get_ylabel(), ax.get_yscale()) == (*title, "log")
-            np.testing.assert_array_equal(ax.lines[0].get_ydata(), np.maximum(error, 1e-17))
+            np.testing.assert_array_equal(
+                ax.lines[0].get_ydata(), np.maximum(error, 1e-17)
+            )
 
 
 def test_the_work_precision_diagram_says_what_its_lines_are():
@@ -400,7 +513,14 @@ def test_the_work_precision_diagram_says_what_its_lines_are():
             "seconds": [0.2, 0.4],
             "slope": 0.04,
         },
-        {"tier": "path", "setting": "directions", "value": [2, 8], "error": [0.1, 0], "seconds": [1, 2], "slope": None},
+        {
+            "tier": "path",
+            "setting": "directions",
+            "value": [2, 8],
+            "error": [0.1, 0],
+            "seconds": [1, 2],
+            "slope": None,
+        },
     ]
     for line, against in zip(lines, ("truth", "truth", "limit")):
         line["against"] = against
@@ -409,15 +529,28 @@ def test_the_work_precision_diagram_says_what_its_lines_are():
     assert [t.get_text() for t in left.get_legend().get_texts()] == [
         "direct: phases a cycle, 16 to 64, order 2.3", "area: points a joint of the grid, 7 to 61, no gain",
     ]  # fmt: skip
-    assert [t.get_text() for t in right.get_legend().get_texts()] == ["path: directions of the fit, 2 to 8"]
-    assert [(t.get_text(), t.xy) for t in left.texts[:2]] == [("16", (0.1, 1e-3)), ("64", (0.3, 1e-5))]
+    assert [t.get_text() for t in right.get_legend().get_texts()] == [
+        "path: directions of the fit, 2 to 8"
+    ]
+    assert [(t.get_text(), t.xy) for t in left.texts[:2]] == [
+        ("16", (0.1, 1e-3)),
+        ("64", (0.3, 1e-5)),
+    ]
     assert left.get_xlabel() == "time for 3 amplitudes, tables included (s)"
-    assert "finer force balance (BL)" in left.get_ylabel() and "the setting leads (BL)" in right.get_ylabel()
-    np.testing.assert_array_equal(left.lines[1].get_xydata(), [[0.2, 0.02], [0.4, 0.01]])
+    assert (
+        "finer force balance (BL)" in left.get_ylabel()
+        and "the setting leads (BL)" in right.get_ylabel()
+    )
+    np.testing.assert_array_equal(
+        left.lines[1].get_xydata(), [[0.2, 0.02], [0.4, 0.01]]
+    )
     assert set(PRECISION) <= {setting.name for setting in SETTINGS}
     assert left.get_title() and right.get_title()
     fig.canvas.draw()
-    for ax in (left, right):  # two powers of ten on each axis, though the times span less than one
+    for ax in (
+        left,
+        right,
+    ):  # two powers of ten on each axis, though the times span less than one
         for axis, (low, high) in ((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())):
             assert len([x for x in axis.get_majorticklocs() if low <= x <= high]) >= 2
             assert not any(t.get_text() for t in axis.get_minorticklabels())
@@ -425,11 +558,26 @@ def test_the_work_precision_diagram_says_what_its_lines_are():
 
 def test_parameters_have_names_and_units():
     scene = scenes.load("sandfish-heavy")
-    names = ["medium.C", "effects.frequency", "medium.gamma0_deg", "effects.end-caps.radius", "gait.amplitude"]
-    named = ["C (-)", "frequency (Hz)", r"$\gamma_{0}$ (deg)", "radius (BL)", scene.gait.amplitude_label]
+    names = [
+        "medium.C",
+        "effects.frequency",
+        "medium.gamma0_deg",
+        "effects.end-caps.radius",
+        "gait.amplitude",
+    ]
+    named = [
+        "C (-)",
+        "frequency (Hz)",
+        r"$\gamma_{0}$ (deg)",
+        "radius (BL)",
+        scene.gait.amplitude_label,
+    ]
     assert plots.sweeps.labels(scene, names) == named
     both = ["effects.end-caps.radius", "effects.disturbed-ground.radius"]
-    assert plots.sweeps.labels(scene, both) == ["end-caps: radius (BL)", "disturbed-ground: radius (BL)"]
+    assert plots.sweeps.labels(scene, both) == [
+        "end-caps: radius (BL)",
+        "disturbed-ground: radius (BL)",
+    ]
 
 
 def test_panels_are_x_y_and_theta():
@@ -446,7 +594,9 @@ def test_panels_are_x_y_and_theta():
 
 def test_a_row_of_rounding_has_no_arrows():
     """A snake that cannot slip sideways, in the frame of a wheeled link: A^y is nothing."""
-    fitted = Study(scenes.load("no-slip-snake").changed(frame="link-2").with_numerics(grid=8)).fitted
+    fitted = Study(
+        scenes.load("no-slip-snake").changed(frame="link-2").with_numerics(grid=8)
+    ).fitted
     arrows = [plots.vector_field(fitted, row).collections[0] for row in range(3)]
     lengths = [np.hypot(a.U, a.V)[~np.broadcast_to(a.Umask, a.U.shape)] for a in arrows]
     assert not lengths[1].any()
@@ -455,7 +605,9 @@ def test_a_row_of_rounding_has_no_arrows():
         assert lengths[k].max() == pytest.approx(arrows[k].get_clim()[1])
 
 
-@pytest.mark.parametrize(("name", "rows"), [("three-link-floating", [2]), ("differential-drive", [1])])
+@pytest.mark.parametrize(
+    ("name", "rows"), [("three-link-floating", [2]), ("differential-drive", [1])]
+)
 def test_what_is_nothing_but_rounding_is_drawn_as_nothing(name, rows):
     """No patterns of 1e-16, no hatching over them; left out with a word unless it is asked for."""
     study = Study(scenes.load(name).with_numerics(grid=9, phases=16))
@@ -466,11 +618,15 @@ def test_what_is_nothing_but_rounding_is_drawn_as_nothing(name, rows):
     for k in range(3):
         colours = np.asarray(made.axes[k].collections[0].get_array())
         assert (np.abs(colours).max() > 1e-3) == (k in rows)
-        assert ([x.get_text() for x in made.axes[3 + k].get_yticklabels()] == ["0"]) == (k not in rows)
+        assert (
+            [x.get_text() for x in made.axes[3 + k].get_yticklabels()] == ["0"]
+        ) == (k not in rows)
     assert not made.get_supxlabel()
     made = draw()
     titles = [ax.get_title() for ax in made.axes if ax.get_title()]
-    assert [title.partition("$: ")[2] for title in titles] == [("forward", "sideways", "turning")[k] for k in rows]
+    assert [title.partition("$: ")[2] for title in titles] == [
+        ("forward", "sideways", "turning")[k] for k in rows
+    ]
     assert made.get_supxlabel().endswith(": zero everywhere")
     assert made.get_supxlabel().count("CCF") == 3 - len(rows)
 
@@ -478,19 +634,31 @@ def test_what_is_nothing_but_rounding_is_drawn_as_nothing(name, rows):
 def test_colours_have_a_limit():
     """A number or a percentile of the size; arrows of the bar say where there is more. One legend for all panels."""
     values = np.stack([SHAPES[0], 2 * SHAPES[1], SHAPES[0] + 9])
-    field, error = Field(AXES, values), Field(AXES, np.where(SHAPES[1] > 1.2, 50.0, 1e-3) * np.ones((3, 1, 1)))
+    field, error = (
+        Field(AXES, values),
+        Field(AXES, np.where(SHAPES[1] > 1.2, 50.0, 1e-3) * np.ones((3, 1, 1))),
+    )
     limits = lambda **o: [
-        only(ax, QuadMesh).get_clim()[1] for ax in plots.ccf_figure(field, **o).axes[: len(o["components"])]
+        only(ax, QuadMesh).get_clim()[1]
+        for ax in plots.ccf_figure(field, **o).axes[: len(o["components"])]
     ]
     assert limits(components=("theta", "x"), clim=0.25) == [0.25, 0.25]
     expected = [np.percentile(np.abs(x), 90) for x in values]
-    np.testing.assert_allclose(limits(components=("x", "y", "theta"), clim="90%"), expected)
-    assert only(plots.ccf_map(field, 1, clim="90%"), QuadMesh).get_clim()[1] == pytest.approx(expected[1])
+    np.testing.assert_allclose(
+        limits(components=("x", "y", "theta"), clim="90%"), expected
+    )
+    assert only(plots.ccf_map(field, 1, clim="90%"), QuadMesh).get_clim()[
+        1
+    ] == pytest.approx(expected[1])
     for clim, ends in ((None, "neither"), (1.2, "max"), (0.5, "both")):
-        bar = only(plots.ccf_figure(field, components=("x",), clim=clim).axes[0], QuadMesh).colorbar
+        bar = only(
+            plots.ccf_figure(field, components=("x",), clim=clim).axes[0], QuadMesh
+        ).colorbar
         assert bar.extend == ends
     fig = plots.ccf_figure(field, error=error)
-    assert [t.get_text() for legend in fig.legends for t in legend.get_texts()] == [plots.HATCHED]
+    assert [t.get_text() for legend in fig.legends for t in legend.get_texts()] == [
+        plots.HATCHED
+    ]
     assert not any(ax.get_legend() for ax in fig.axes)
 
 
@@ -498,8 +666,12 @@ def test_two_percentiles_are_ends_of_the_values():
     """Colours of a CCF stay centred on zero, as far as the further of the two; "5:9" and the like are no limits."""
     values = np.stack([SHAPES[0] + 0.5, SHAPES[1], SHAPES[0]])
     top = max(abs(np.percentile(values[0], p)) for p in (20, 90))
-    limits = only(plots.ccf_map(Field(AXES, values), 0, clim="20%:90%"), QuadMesh).get_clim()
-    assert limits == pytest.approx((-top, top)) and top == pytest.approx(np.percentile(values[0], 90))
+    limits = only(
+        plots.ccf_map(Field(AXES, values), 0, clim="20%:90%"), QuadMesh
+    ).get_clim()
+    assert limits == pytest.approx((-top, top)) and top == pytest.approx(
+        np.percentile(values[0], 90)
+    )
     assert colour_limit("5%:95%") == "5%:95%"
     assert colour_limit("0.3", ("theta",)) == colour_limit("0.3", ("x", "y")) == 0.3
     with pytest.raises(ValueError, match="one limit"):
@@ -510,9 +682,18 @@ def test_two_percentiles_are_ends_of_the_values():
 
 
 def test_each_row_of_a_connection_has_its_scale_whose_top_may_be_a_percentile():
-    A = np.random.default_rng(1).normal(size=(3, 2, 11, 9)) * np.array([1.0, 20.0, 300.0])[:, None, None, None]
-    fitted, sizes = Connection(AXES, A, np.abs(A[:, 0]), np.abs(A[:, 0])), np.hypot(A[:, 0], A[:, 1])
-    tops = lambda **o: [only(ax, Quiver).get_clim()[1] for ax in plots.connection_figure(fitted, **o).axes[:3]]
+    A = (
+        np.random.default_rng(1).normal(size=(3, 2, 11, 9))
+        * np.array([1.0, 20.0, 300.0])[:, None, None, None]
+    )
+    fitted, sizes = (
+        Connection(AXES, A, np.abs(A[:, 0]), np.abs(A[:, 0])),
+        np.hypot(A[:, 0], A[:, 1]),
+    )
+    tops = lambda **o: [
+        only(ax, Quiver).get_clim()[1]
+        for ax in plots.connection_figure(fitted, **o).axes[:3]
+    ]
     np.testing.assert_allclose(tops(), sizes.max((1, 2)))
     np.testing.assert_allclose(tops(clim="80%"), np.percentile(sizes, 80, axis=(1, 2)))
     np.testing.assert_allclose(tops(clim="5%:80%"), tops(clim="80%"))
@@ -520,7 +701,10 @@ def test_each_row_of_a_connection_has_its_scale_whose_top_may_be_a_percentile():
     arrows = only(plots.vector_field(fitted, 1, clim="80%"), Quiver)
     cut = np.fmin(1.0, np.percentile(sizes[1], 80) / sizes[1])
     np.testing.assert_allclose(arrows.U, (cut * A[1, 0]).ravel())
-    assert arrows.colorbar.extend == "max" and only(plots.vector_field(fitted, 1), Quiver).colorbar.extend == "neither"
+    assert (
+        arrows.colorbar.extend == "max"
+        and only(plots.vector_field(fitted, 1), Quiver).colorbar.extend == "neither"
+    )
 
 
 def test_components_choose_rows_of_the_connection():
@@ -528,17 +712,24 @@ def test_components_choose_rows_of_the_connection():
     A[1] = 0.0
     fitted = Connection(AXES, A, np.abs(A[:, 0]), np.abs(A[:, 0]))
     titles = lambda **o: [
-        ax.get_title().partition("$: ")[2] for ax in plots.connection_figure(fitted, **o).axes if ax.get_title()
+        ax.get_title().partition("$: ")[2]
+        for ax in plots.connection_figure(fitted, **o).axes
+        if ax.get_title()
     ]
     assert titles() == ["forward", "turning"]
     assert titles(components=("y", "theta")) == ["sideways", "turning"]
-    assert plots.connection_figure(fitted).get_supxlabel() == r"$\mathbf{A}^{y}$: zero everywhere"
+    assert (
+        plots.connection_figure(fitted).get_supxlabel()
+        == r"$\mathbf{A}^{y}$: zero everywhere"
+    )
 
 
 def test_options_of_figures_reach_them_from_commands(tmp_path, monkeypatch):
     drawn = []
     monkeypatch.setattr(plots, "save", lambda fig, *paths: drawn.append(fig))
-    (tmp_path / "own.csv").write_text("amplitude_deg,value,error\n30,-0.01,0.002\n60,-0.05,0.004\n")
+    (tmp_path / "own.csv").write_text(
+        "amplitude_deg,value,error\n30,-0.01,0.002\n60,-0.05,0.004\n"
+    )
 
     def figures(*args):
         drawn.clear()
@@ -548,27 +739,80 @@ def test_options_of_figures_reach_them_from_commands(tmp_path, monkeypatch):
 
     limit = lambda fig: only(fig.axes[0], QuadMesh).get_clim()[1]
     args = ("--plot", "a.png", "--component", "x", "--data", "own.csv")
-    (fig,) = figures("displacement", "three-link-viscous", "--amplitudes", "0.5,1", "--tiers", "direct", *args)
+    (fig,) = figures(
+        "displacement",
+        "three-link-viscous",
+        "--amplitudes",
+        "0.5,1",
+        "--tiers",
+        "direct",
+        *args,
+    )
     (ax,) = fig.axes
     (points,) = (c for c in ax.containers if c.get_label() == MEASURED)
-    np.testing.assert_allclose(points.lines[0].get_xydata(), [[np.pi / 6, -0.01], [np.pi / 3, -0.05]])
+    np.testing.assert_allclose(
+        points.lines[0].get_xydata(), [[np.pi / 6, -0.01], [np.pi / 3, -0.05]]
+    )
     assert ax.get_ylabel() == "x per cycle (BL)"
     (fig,) = figures(
-        "ccf", "three-link-viscous", "--grid", "7", "--plot", "a.png", "--component", "theta", "--clim", "0.5"
+        "ccf",
+        "three-link-viscous",
+        "--grid",
+        "7",
+        "--plot",
+        "a.png",
+        "--component",
+        "theta",
+        "--clim",
+        "0.5",
     )
     assert limit(fig) == 0.5 and "turning" in fig.axes[0].get_title()
     (fig,) = figures(
-        "connection", "three-link-viscous", "--grid", "7", "-o", "a.nc", "--plot", "a.png", "--component", "y,x"
+        "connection",
+        "three-link-viscous",
+        "--grid",
+        "7",
+        "-o",
+        "a.nc",
+        "--plot",
+        "a.png",
+        "--component",
+        "y,x",
     )
-    assert ["sideways" in fig.axes[0].get_title(), "forward" in fig.axes[1].get_title()] == [True, True]
+    assert [
+        "sideways" in fig.axes[0].get_title(),
+        "forward" in fig.axes[1].get_title(),
+    ] == [True, True]
     objective = ("--objective", "displacement", "--harmonics", "1")
-    (fig,) = figures("optimize", "three-link-viscous", *objective, "--plot", "a.png", "--clim", "0.01")
+    (fig,) = figures(
+        "optimize",
+        "three-link-viscous",
+        *objective,
+        "--plot",
+        "a.png",
+        "--clim",
+        "0.01",
+    )
     assert limit(fig) == 0.01
     rows, ccf, moved = figures(
-        "run", "three-link-viscous", "-o", "out", "--component", "x", "--clim", "0.02", "--data", "own.csv"
+        "run",
+        "three-link-viscous",
+        "-o",
+        "out",
+        "--component",
+        "x",
+        "--clim",
+        "0.02",
+        "--data",
+        "own.csv",
     )
-    assert limit(ccf) == 0.02 and sum(bool(ax.get_title()) for fig in (rows, ccf) for ax in fig.axes) == 2
-    assert [any(c.get_label() == MEASURED for c in ax.containers) for ax in moved.axes] == [True, False]
+    assert (
+        limit(ccf) == 0.02
+        and sum(bool(ax.get_title()) for fig in (rows, ccf) for ax in fig.axes) == 2
+    )
+    assert [
+        any(c.get_label() == MEASURED for c in ax.containers) for ax in moved.axes
+    ] == [True, False]
 
 
 def test_a_picture_in_a_file_has_200_dots_an_inch(tmp_path):

@@ -28,7 +28,9 @@ SPEED = Variable(
     np.ones((3, 2)),
 )
 TIER = Variable("tier", ("tier",), np.array(["area", "direct"]))
-RESULT = Result("velocity", (PHASE, TIER, SPEED), {"title": "t", "scale": 0.1}, "subject")
+RESULT = Result(
+    "velocity", (PHASE, TIER, SPEED), {"title": "t", "scale": 0.1}, "subject"
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,13 +74,19 @@ def output(question, name="out.csv", **how):
         question.note(f"write {name}")
         write_csv(path, Result("velocity", (PHASE,)))
 
-    return pipeline.Output(Path(name), write, lambda path: question.note(f"name {path}"), **how)
+    return pipeline.Output(
+        Path(name), write, lambda path: question.note(f"name {path}"), **how
+    )
 
 
 def test_every_command_has_one_order(asked, capsys):
     question = asked()
     said = lambda result, path: f"{result.kind} in {path}"
-    wanted = output(question, message=said), pipeline.Output(None, None), output(question, "more.csv")
+    wanted = (
+        output(question, message=said),
+        pipeline.Output(None, None),
+        output(question, "more.csv"),
+    )
     pipeline.execute(question, *wanted)
     assert question.told == [
         "name out.csv", "name more.csv", "check", "cost", "answer", "write out.csv", "write more.csv"
@@ -88,7 +96,9 @@ def test_every_command_has_one_order(asked, capsys):
     assert Path("out.csv").read_text() == "phase\n0.0\n1.5\n3.0\n"
 
 
-@pytest.mark.parametrize("fails", ["name out.csv", "check", "cost", "answer", "write out.csv"])
+@pytest.mark.parametrize(
+    "fails", ["name out.csv", "check", "cost", "answer", "write out.csv"]
+)
 def test_what_is_refused_ends_there_and_leaves_nothing(fails, asked):
     question = asked(fails=fails)
     with pytest.raises(Refusal, match=f"{fails} refuses"):
@@ -120,17 +130,33 @@ def test_outputs_are_refused_before_computing(asked):
 
 
 def test_a_result_is_a_mapping_of_variables():
-    assert list(RESULT) == ["phase", "tier", "speed"] and len(RESULT) == 3 and RESULT["speed"] is SPEED
+    assert (
+        list(RESULT) == ["phase", "tier", "speed"]
+        and len(RESULT) == 3
+        and RESULT["speed"] is SPEED
+    )
     assert RESULT.sizes == {"phase": 3, "tier": 2} and "pace" not in RESULT
-    assert repr(RESULT) == "Result(velocity: phase (phase), tier (tier), speed (phase, tier))"
-    assert (PHASE.is_coordinate, SPEED.is_coordinate, TIER.is_text, PHASE.is_text) == (True, False, True, False)
+    assert (
+        repr(RESULT)
+        == "Result(velocity: phase (phase), tier (tier), speed (phase, tier))"
+    )
+    assert (PHASE.is_coordinate, SPEED.is_coordinate, TIER.is_text, PHASE.is_text) == (
+        True,
+        False,
+        True,
+        False,
+    )
 
 
 def test_files_and_data_sets_have_values_errors_spreads_units_and_labels(tmp_path):
     write_netcdf(tmp_path / "a.nc", RESULT)
     with xarray.open_dataset(tmp_path / "a.nc") as data:
         xarray.testing.assert_identical(data.load(), to_xarray(RESULT))
-    assert set(data.data_vars) == {"speed", "speed_error", "speed_spread"} and data.attrs == {
+    assert set(data.data_vars) == {
+        "speed",
+        "speed_error",
+        "speed_spread",
+    } and data.attrs == {
         "title": "t",
         "scale": 0.1,
     }

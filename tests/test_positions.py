@@ -31,7 +31,9 @@ def hinged(alpha):
 
 def uneven(alpha):
     """Links from the tail on, many shapes at once, in an own frame that turns and moves with the shape."""
-    theta = np.concatenate([0 * alpha[..., :1], np.cumsum(alpha, -1)], -1) + np.sin(alpha[..., :1])
+    theta = np.concatenate([0 * alpha[..., :1], np.cumsum(alpha, -1)], -1) + np.sin(
+        alpha[..., :1]
+    )
     half = np.array([0.7, 1.4, 0.9]) / 2 * np.exp(1j * theta)
     z = np.cumsum(2 * half, -1) - half + alpha[..., 1:] ** 2
     return np.stack([z.real, z.imag, np.arctan2(np.sin(theta), np.cos(theta))], -1)
@@ -43,19 +45,33 @@ PAIRS = [(hinged, (1, 1, 1), 1.0), (uneven, (0.7, 1.4, 0.9), 0.3)]
 @pytest.mark.parametrize("frame", ["mean", "link-1", "link-2"])
 @pytest.mark.parametrize(("function", "lengths", "length"), PAIRS)
 def test_three_links_move_and_are_drawn_as_the_chain(function, lengths, length, frame):
-    body, chain = Positions(function, 2, lengths, length, frame), Chain(lengths, length, frame)
+    body, chain = (
+        Positions(function, 2, lengths, length, frame),
+        Chain(lengths, length, frame),
+    )
     for x, y in zip(body.motion(ALPHA, RATE), chain.motion(ALPHA, RATE)):
         np.testing.assert_allclose(np.broadcast_to(x, y.shape), y, atol=1e-11)
-    np.testing.assert_allclose(body.points(ALPHA.T, [1, 2, 0.3]), chain.points(ALPHA.T, [1, 2, 0.3]), atol=1e-14)
-    for one, two in zip(body.frame_pose("link-3", ALPHA.T, RATE.T), chain.frame_pose("link-3", ALPHA.T, RATE.T)):
+    np.testing.assert_allclose(
+        body.points(ALPHA.T, [1, 2, 0.3]),
+        chain.points(ALPHA.T, [1, 2, 0.3]),
+        atol=1e-14,
+    )
+    for one, two in zip(
+        body.frame_pose("link-3", ALPHA.T, RATE.T),
+        chain.frame_pose("link-3", ALPHA.T, RATE.T),
+    ):
         np.testing.assert_allclose(np.exp(1j * one), np.exp(1j * two), atol=1e-11)
 
 
 @pytest.mark.parametrize(("function", "lengths", "length"), PAIRS)
 @pytest.mark.parametrize("medium", [Viscous(2.0), SAND])
-def test_three_links_have_the_connection_of_the_chain(function, lengths, length, medium):
+def test_three_links_have_the_connection_of_the_chain(
+    function, lengths, length, medium
+):
     bodies = Positions(function, 2, lengths, length), Chain(lengths, length)
-    one, two = (geomech.study(medium, body, Circle(), grid=5, extent=2.0) for body in bodies)
+    one, two = (
+        geomech.study(medium, body, Circle(), grid=5, extent=2.0) for body in bodies
+    )
     np.testing.assert_allclose(one.fitted.A, two.fitted.A, atol=1e-11)
     assert one.scene.system.traits.mirror
     moved = [study.displacement([0.9], "direct")["direct"] for study in (one, two)]
@@ -69,7 +85,9 @@ def test_a_curve_converges_to_the_serpenoid_that_is_built_in():
         s = 2 * np.pi * (np.arange(elements) + 0.5) / elements
 
         def positions(alpha):
-            theta = (alpha[..., :1] * np.sin(s) - alpha[..., 1:] * np.cos(s)) / (2 * np.pi)
+            theta = (alpha[..., :1] * np.sin(s) - alpha[..., 1:] * np.cos(s)) / (
+                2 * np.pi
+            )
             step = np.exp(1j * theta) / elements
             z = np.cumsum(step, -1) - step / 2
             return np.stack([z.real, z.imag, theta], -1)
@@ -79,9 +97,14 @@ def test_a_curve_converges_to_the_serpenoid_that_is_built_in():
     difference = []
     for elements in (20, 40):
         bodies = curve(elements), Serpenoid(elements=elements)
-        A, B = (geomech.study(Viscous(2.0), x, Circle(6.0), grid=4, extent=6.0).fitted.A for x in bodies)
+        A, B = (
+            geomech.study(Viscous(2.0), x, Circle(6.0), grid=4, extent=6.0).fitted.A
+            for x in bodies
+        )
         difference.append(np.abs(A - B).max() / np.abs(B).max())
-    assert difference[1] < 2e-3 and difference[0] / difference[1] == pytest.approx(4.0, abs=0.2)
+    assert difference[1] < 2e-3 and difference[0] / difference[1] == pytest.approx(
+        4.0, abs=0.2
+    )
 
 
 @pytest.mark.parametrize("medium", [Viscous(2.0), SAND])
@@ -92,12 +115,20 @@ def test_a_body_that_is_bent_at_rest_has_no_mirror_image(medium):
     one = geomech.study(medium, bent, Circle(), grid=5, extent=1.0)
     assert not one.scene.system.traits.mirror
     swimmer = geomech.Swimmer(medium, Chain())
-    alpha, rate = np.array([[-0.5, 0.5], [1.0, -1.0], [0.0, 0.5]]), np.array([[1.0, 0.0], [0.3, -0.8], [0.0, 1.0]])
+    alpha, rate = (
+        np.array([[-0.5, 0.5], [1.0, -1.0], [0.0, 0.5]]),
+        np.array([[1.0, 0.0], [0.3, -0.8], [0.0, 1.0]]),
+    )
     np.testing.assert_allclose(
-        one.scene.system.velocity(alpha, rate), swimmer.velocity(alpha + shift, rate), rtol=0, atol=1e-9
+        one.scene.system.velocity(alpha, rate),
+        swimmer.velocity(alpha + shift, rate),
+        rtol=0,
+        atol=1e-9,
     )
     shifted = [a + d for a, d in zip(one.fitted.axes, shift)]
-    two = geomech.connection.fit(swimmer.velocity, shifted, directions(swimmer, one.scene.numerics))
+    two = geomech.connection.fit(
+        swimmer.velocity, shifted, directions(swimmer, one.scene.numerics)
+    )
     np.testing.assert_allclose(one.fitted.A, two.A, atol=1e-9)
 
 
@@ -110,27 +141,39 @@ def bent(alpha, rest=0.0):
     tail = [-(1 + np.cos(back)) / 2, -np.sin(back) / 2, back]
     return [tail, [0, 0, 0], [(1 + np.cos(front)) / 2, np.sin(front) / 2, front]]
 """
-SCENE = (
-    '[medium]\nname = "viscous-2"\n[body]\nkind = "bent"\n[gait]\nkind = "circle"\n[numerics]\ngrid = 7\nphases = 16\n'
-)
+SCENE = '[medium]\nname = "viscous-2"\n[body]\nkind = "bent"\n[gait]\nkind = "circle"\n[numerics]\ngrid = 7\nphases = 16\n'
 
 
 def test_scenes_name_a_function_of_a_file(tmp_path):
     (tmp_path / "bent.py").write_text(PLUGIN)
     (tmp_path / "bent.toml").write_text(SCENE)
     given = ("--amplitudes", "0.8", "--tiers", "direct", "--json")
-    code, text, err = run("displacement", "bent.toml", *given, "--plugin", "bent.py", cwd=tmp_path)
+    code, text, err = run(
+        "displacement", "bent.toml", *given, "--plugin", "bent.py", cwd=tmp_path
+    )
     assert (code, err) == (0, "")
     (tmp_path / "chain.toml").write_text(SCENE.replace("bent", "chain"))
     expected = run("displacement", "chain.toml", *given, cwd=tmp_path)[1]
-    np.testing.assert_allclose(*(json.loads(x)["direct"] for x in (text, expected)), atol=1e-11)
+    np.testing.assert_allclose(
+        *(json.loads(x)["direct"] for x in (text, expected)), atol=1e-11
+    )
     assert load_file(tmp_path / "bent.py") == ["bent"]
-    (tmp_path / "rest.toml").write_text(SCENE.replace('"bent"', '"bent"\nrest = 0.3\nlength = 0.2\nframe = "link-2"'))
+    (tmp_path / "rest.toml").write_text(
+        SCENE.replace('"bent"', '"bent"\nrest = 0.3\nlength = 0.2\nframe = "link-2"')
+    )
     scene = load(tmp_path / "rest.toml")
     body = scene.system.body
-    assert (body.rest, body.length, body.frame, body.joints, body.lengths) == (0.3, 0.2, "link-2", 2, (1.0, 1.0, 1.0))
+    assert (body.rest, body.length, body.frame, body.joints, body.lengths) == (
+        0.3,
+        0.2,
+        "link-2",
+        2,
+        (1.0, 1.0, 1.0),
+    )
     assert pickle.loads(pickle.dumps(body)) == body and "rest = 0.3" in toml(scene)
-    assert body.points([0.0, 0.0]) == pytest.approx(Chain(length=0.2, frame="link-2").points([0.3, 0.3]))
+    assert body.points([0.0, 0.0]) == pytest.approx(
+        Chain(length=0.2, frame="link-2").points([0.3, 0.3])
+    )
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,10 @@ def test_lines_in_a_pipe(monkeypatch, capsys):
     monkeypatch.setattr(progress, "EVERY", 0.02)
     said = ""
     with terminal.progress("field of <x>") as reached:
-        for fraction, line in ((0.0, "field of <x>: under way for "), (0.25, "field of <x>: 25 % after ")):
+        for fraction, line in (
+            (0.0, "field of <x>: under way for "),
+            (0.25, "field of <x>: 25 % after "),
+        ):
             reached(fraction)
             while line not in said:
                 time.sleep(0.01)
@@ -50,7 +53,9 @@ def test_the_time_to_go(monkeypatch):
 
 def test_a_part_has_its_own_title(monkeypatch):
     seen = []
-    monkeypatch.setattr(Computation, "reached", lambda course, f: seen.append((course.title, f)))
+    monkeypatch.setattr(
+        Computation, "reached", lambda course, f: seen.append((course.title, f))
+    )
     with terminal.progress("displacement") as reached:
         with progress.progress("table") as inner:
             inner(0.5)
@@ -76,7 +81,9 @@ def test_an_error_ends_it(capsys, monkeypatch):
     time.sleep(0.06)
     assert capsys.readouterr().err == ""
     with terminal.progress("next") as reached:  # is nobody's part
-        assert reached.__self__.title == "next" and reached.__self__ is not failed.__self__
+        assert (
+            reached.__self__.title == "next" and reached.__self__ is not failed.__self__
+        )
 
 
 @pytest.fixture
@@ -84,7 +91,9 @@ def notebook(monkeypatch):
     """What a notebook would have been shown."""
     shown, display = [], ModuleType("IPython.display")
     display.HTML = lambda text: text
-    display.display = lambda text, display_id: shown.append(text) or SimpleNamespace(update=shown.append)
+    display.display = lambda text, display_id: (
+        shown.append(text) or SimpleNamespace(update=shown.append)
+    )
     shell = ModuleType("IPython")
     shell.get_ipython, shell.display = (lambda: SimpleNamespace(kernel=1)), display
     monkeypatch.setitem(sys.modules, "IPython", shell)
@@ -100,7 +109,9 @@ def test_a_bar_in_a_notebook(notebook, monkeypatch, capsys):
     with progress.progress("field of <x>") as reached:
         reached(0.25)
         reached(0.5)
-    assert notebook[0].startswith('<progress max="1" value="0.2500"></progress> field of &lt;x&gt;: 25 % after 0 s')
+    assert notebook[0].startswith(
+        '<progress max="1" value="0.2500"></progress> field of &lt;x&gt;: 25 % after 0 s'
+    )
     assert [text[25:31] for text in notebook] == ["0.2500", "0.5000", "1.0000"]
     assert notebook[-1].endswith("field of &lt;x&gt;: done in 0 s")
     assert capsys.readouterr().err == ""
@@ -110,7 +121,10 @@ def test_a_table_from_python_shows_how_far_it_is(notebook, monkeypatch):
     monkeypatch.setattr(progress, "REDRAWN", 0.0)
     study = Study(VISCOUS)
     assert np.isfinite(study.fitted.A).all()
-    assert "connection of three-link-viscous, 72 force balances: done in 0 s" in notebook[-1]
+    assert (
+        "connection of three-link-viscous, 72 force balances: done in 0 s"
+        in notebook[-1]
+    )
     before = len(notebook)
     study.poses("path", None, [0.3])
     assert len(notebook) == before  # it is there already
@@ -126,8 +140,13 @@ def test_progress_may_be_taken_by_the_caller(notebook, monkeypatch):
 def test_a_command_in_a_pipe_says_how_far_its_tables_are(monkeypatch, capsys):
     monkeypatch.setattr(progress, "EVERY", 0.03)
     solve = Swimmer.velocity
-    monkeypatch.setattr(Swimmer, "velocity", lambda self, *x: time.sleep(0.1) or solve(self, *x))
+    monkeypatch.setattr(
+        Swimmer, "velocity", lambda self, *x: time.sleep(0.1) or solve(self, *x)
+    )
     with terminal.progress("displacement of x"):
         Study(scenes.load("three-link-glass").with_numerics(grid=5)).poses("harmonic")
     lines = capsys.readouterr().err.splitlines()
-    assert any(line.startswith("harmonics of three-link-glass, 216 force balances: under way") for line in lines)
+    assert any(
+        line.startswith("harmonics of three-link-glass, 216 force balances: under way")
+        for line in lines
+    )

@@ -15,20 +15,34 @@ def test_help_has_every_command_under_its_heading_with_its_whole_summary():
     _, out, _ = geomech("--help")
     found = {part.split(":")[0]: SUMMARIES.findall(part) for part in out.split("\n\n")}
     for heading, names in COMMANDS.items():
-        assert [name for name, _ in found[heading]] == [name.replace("_", "-") for name in names]
-        assert not [text for _, text in found[heading] if text.endswith("...") or not text.endswith(".")]
+        assert [name for name, _ in found[heading]] == [
+            name.replace("_", "-") for name in names
+        ]
+        assert not [
+            text
+            for _, text in found[heading]
+            if text.endswith("...") or not text.endswith(".")
+        ]
     assert max(map(len, out.splitlines())) <= 80
 
 
-@pytest.mark.parametrize("command", ["scenes", "explain sandfish-heavy", "explain c-leg", "explain xplorer"])
+@pytest.mark.parametrize(
+    "command", ["scenes", "explain sandfish-heavy", "explain c-leg", "explain xplorer"]
+)
 def test_lists_fit_a_screen(command):
     code, out, _ = geomech(*command.split())
     assert code == 0 and max(map(len, out.splitlines())) <= 80
 
 
 def test_every_option_and_argument_says_what_it_is_for():
-    every = [(name, x) for name, command in PARSER(cli.app).commands.items() for x in command.params]
-    assert len(every) > 100 and [(name, x.name) for name, x in every if not x.help] == []
+    every = [
+        (name, x)
+        for name, command in PARSER(cli.app).commands.items()
+        for x in command.params
+    ]
+    assert (
+        len(every) > 100 and [(name, x.name) for name, x in every if not x.help] == []
+    )
 
 
 @pytest.mark.parametrize("old", renamed.COMMANDS)
@@ -36,16 +50,38 @@ def test_an_old_name_of_a_command_is_the_new_one_with_a_note(old):
     new = renamed.COMMANDS[old]
     assert geomech(old, "--help")[:2] == geomech(new, "--help")[:2]
     assert (
-        geomech(old, "--help")[2].startswith(f"note: {old} is now {new}") and f"  {old}  " not in geomech("--help")[1]
+        geomech(old, "--help")[2].startswith(f"note: {old} is now {new}")
+        and f"  {old}  " not in geomech("--help")[1]
     )
 
 
 OLD = {  # a command for each old option, with its value
-    "--for": ["optimize", "three-link-viscous", "--harmonics", "0", "--for=displacement"],
+    "--for": [
+        "optimize",
+        "three-link-viscous",
+        "--harmonics",
+        "0",
+        "--for=displacement",
+    ],
     "--within": ["fit-gait", "nothing.csv", "--within", "5deg"],
     "--beside": ["ccf", "three-link-viscous", "--plot", "a.txt", "--beside", "link-1"],
-    "--methods": ["displacement", "three-link-viscous", "--amplitudes", "1", "--methods", "direct"],
-    "--cost": ["displacement", "three-link-viscous", "--amplitudes", "1", "--tiers", "direct", "--cost"],
+    "--methods": [
+        "displacement",
+        "three-link-viscous",
+        "--amplitudes",
+        "1",
+        "--methods",
+        "direct",
+    ],
+    "--cost": [
+        "displacement",
+        "three-link-viscous",
+        "--amplitudes",
+        "1",
+        "--tiers",
+        "direct",
+        "--cost",
+    ],
 }
 
 

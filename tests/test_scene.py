@@ -38,7 +38,9 @@ grid = 21
 """
 
 
-@pytest.mark.parametrize("name", ["three-link-glass", "three-link-viscous", "shovel-nosed-snake"])
+@pytest.mark.parametrize(
+    "name", ["three-link-glass", "three-link-viscous", "shovel-nosed-snake"]
+)
 def test_a_study_has_every_tier_its_errors_and_times(name):
     """Numbers of the scenes are pinned in test_builtin_scenes.py; a study's are those of `displacement`, tier by tier."""
     loaded = scenes.load(name).with_numerics(grid=11, phases=64)
@@ -59,16 +61,24 @@ def test_a_study_has_every_tier_its_errors_and_times(name):
     ]
     assert table["amplitude"] == amplitudes
     for tier in default_tiers(loaded.system):
-        np.testing.assert_allclose(table[tier], study.poses(tier, None, amplitudes), atol=1e-9)
+        np.testing.assert_allclose(
+            table[tier], study.poses(tier, None, amplitudes), atol=1e-9
+        )
         assert len(table["estimate"][tier]) == 2
         assert min(table["estimate"][tier]) > 0
-    looked_up = [plan.table.name for plan in map(study.plan, default_tiers(loaded.system)) if plan.table]
+    looked_up = [
+        plan.table.name
+        for plan in map(study.plan, default_tiers(loaded.system))
+        if plan.table
+    ]
     tables = {"field"} if "connection" in looked_up else set()
     tables |= {"harmonic table"} if name == "three-link-glass" else set()
     assert set(table["seconds"]) == {*default_tiers(loaded.system)} | tables
     again = study.study(amplitudes)
     assert table["kept"] == [] and set(again["kept"]) == tables
-    assert {k: table["seconds"][k] for k in tables} == {k: again["seconds"][k] for k in tables}  # what building took
+    assert {k: table["seconds"][k] for k in tables} == {
+        k: again["seconds"][k] for k in tables
+    }  # what building took
     assert all(v >= 0 for v in table["seconds"].values())
 
 
@@ -77,18 +87,32 @@ def test_every_key_arrives():
     assert read.system.medium == Granular(1.8, math.radians(13.8))
     assert read.system.body == Chain((1, 2, 1), 0.4, "link-2")
     assert read.gait.tilt == pytest.approx(math.pi / 4)
-    assert (read.numerics.grid, read.name, length_unit(read.system)) == (21, "good", "m")
-    assert scenes.parse(GOOD.replace("gamma0_deg = 13.8", "gamma0 = 0.24")).system.medium.gamma0 == 0.24
-    assert scenes.parse(GOOD.replace("C = 1.8", "C = 1.8\nk = 3")).system.medium.k == 3.0
-    assert scenes.parse(GOOD.replace("tilt_deg = 45", "centre_deg = [90, 0]")).gait.centre[0] == pytest.approx(
-        math.pi / 2
+    assert (read.numerics.grid, read.name, length_unit(read.system)) == (
+        21,
+        "good",
+        "m",
     )
+    assert (
+        scenes.parse(
+            GOOD.replace("gamma0_deg = 13.8", "gamma0 = 0.24")
+        ).system.medium.gamma0
+        == 0.24
+    )
+    assert (
+        scenes.parse(GOOD.replace("C = 1.8", "C = 1.8\nk = 3")).system.medium.k == 3.0
+    )
+    assert scenes.parse(
+        GOOD.replace("tilt_deg = 45", "centre_deg = [90, 0]")
+    ).gait.centre[0] == pytest.approx(math.pi / 2)
     assert scenes.load("three-link-viscous").system.medium == Viscous(2.0)
 
 
 BAD = [
     ("[medium", "scene is not TOML"),
-    (GOOD + "[water]\nx = 1", "table: 'water' is unknown: use one of medium, body, effects, system, gait"),
+    (
+        GOOD + "[water]\nx = 1",
+        "table: 'water' is unknown: use one of medium, body, effects, system, gait",
+    ),
     (GOOD.replace("[gait]", "[giat]"), "table: 'giat' is unknown: did you mean 'gait'"),
     ("x = 1", "table: 'x' is unknown"),
     (GOOD.split("[gait]")[0], r"the table \[gait\] is missing"),
@@ -98,19 +122,52 @@ BAD = [
         r"\[medium\] law: 'granluar' is unknown: did you mean 'granular'",
     ),
     (GOOD.replace('law = "granular"', ""), r"\[medium\] has no 'law'"),
-    (GOOD.replace('law = "granular"', 'name = "glass"'), r"'C' is unknown: use one of name \(no 'law'\)"),
-    (GOOD.replace("C = 1.8", "c = 1.8"), r"\[medium\] key: 'c' is unknown: use one of C, gamma0"),
+    (
+        GOOD.replace('law = "granular"', 'name = "glass"'),
+        r"'C' is unknown: use one of name \(no 'law'\)",
+    ),
+    (
+        GOOD.replace("C = 1.8", "c = 1.8"),
+        r"\[medium\] key: 'c' is unknown: use one of C, gamma0",
+    ),
     (GOOD.replace("C = 1.8", ""), r"\[medium\] has no `C`: add C = "),
-    (GOOD.replace("C = 1.8", 'C = "big"'), r"\[medium\] Expected `float`, got `str` - at `.C`"),
+    (
+        GOOD.replace("C = 1.8", 'C = "big"'),
+        r"\[medium\] Expected `float`, got `str` - at `.C`",
+    ),
     (GOOD.replace("C = 1.8", "C = nan"), r"\[medium\] C must be a number from 0"),
-    (GOOD.replace("gamma0_deg = 13.8", "gamma0_deg = 90"), "gamma0 must lie between 0 and 90 degrees, got 90 degrees"),
-    (GOOD.replace("gamma0_deg = 13.8", "gamma0_deg = 13.8\ngamma0 = 0.2"), "gamma0 is given twice"),
-    (GOOD.replace("lengths = [1, 2, 1]", "lengths = [1, -2, 1]"), r"\[body\] lengths must all be finite and > 0"),
-    (GOOD.replace("lengths = [1, 2, 1]", "lengths = [1, 2]"), r"ellipse moves 2 joints but \[body\] has 1"),
-    (GOOD.replace("length = 0.4", "lenght = 0.4"), "'lenght' is unknown: did you mean 'length"),
-    (GOOD.replace("link-2", "link-9"), "frame must be 'mean' or 'link-1' ... 'link-3', got 'link-9'"),
-    (GOOD.replace("tilt_deg = 45", "tilt_deg = inf"), r"\[gait\] tilt must be a number"),
-    (GOOD.replace("grid = 21", "grid = 3"), r"\[numerics\] grid must be a whole number from 4"),
+    (
+        GOOD.replace("gamma0_deg = 13.8", "gamma0_deg = 90"),
+        "gamma0 must lie between 0 and 90 degrees, got 90 degrees",
+    ),
+    (
+        GOOD.replace("gamma0_deg = 13.8", "gamma0_deg = 13.8\ngamma0 = 0.2"),
+        "gamma0 is given twice",
+    ),
+    (
+        GOOD.replace("lengths = [1, 2, 1]", "lengths = [1, -2, 1]"),
+        r"\[body\] lengths must all be finite and > 0",
+    ),
+    (
+        GOOD.replace("lengths = [1, 2, 1]", "lengths = [1, 2]"),
+        r"ellipse moves 2 joints but \[body\] has 1",
+    ),
+    (
+        GOOD.replace("length = 0.4", "lenght = 0.4"),
+        "'lenght' is unknown: did you mean 'length",
+    ),
+    (
+        GOOD.replace("link-2", "link-9"),
+        "frame must be 'mean' or 'link-1' ... 'link-3', got 'link-9'",
+    ),
+    (
+        GOOD.replace("tilt_deg = 45", "tilt_deg = inf"),
+        r"\[gait\] tilt must be a number",
+    ),
+    (
+        GOOD.replace("grid = 21", "grid = 3"),
+        r"\[numerics\] grid must be a whole number from 4",
+    ),
     (GOOD.replace("grid = 21", 'loads = "simpson"'), r"\[numerics\] loads must be"),
     (
         GOOD.replace("grid = 21", "regularisation = 0"),
@@ -123,10 +180,19 @@ BAD += [
     (GOOD.replace("gamma0_deg = 13.8", "gamma0_deg = 1" + "0" * 400), r"\[medium\]"),
     (GOOD.replace("C = 1.8", "C = 1" + "0" * 5000), "is not TOML"),
     (GOOD.replace("C = 1.8", "C_deg = 1.8"), "'C_deg' is unknown"),
-    (GOOD.replace("grid = 21", "extent = 5e-324"), "extent must be a number from 1e-06"),
+    (
+        GOOD.replace("grid = 21", "extent = 5e-324"),
+        "extent must be a number from 1e-06",
+    ),
     (GOOD.replace("grid = 21", "directions = 1"), r"\[numerics\] directions must be"),
-    (GOOD.replace("tilt_deg = 45", "centre = [" + "9.0, " * 4000 + "]"), "centre must have 2 angles"),
-    (GOOD.replace("tilt_deg = 45", "amplitude = 1e308"), "amplitude must be a number from"),
+    (
+        GOOD.replace("tilt_deg = 45", "centre = [" + "9.0, " * 4000 + "]"),
+        "centre must have 2 angles",
+    ),
+    (
+        GOOD.replace("tilt_deg = 45", "amplitude = 1e308"),
+        "amplitude must be a number from",
+    ),
 ]
 
 
@@ -148,7 +214,9 @@ def test_unknown_names_and_files():
 def test_numerics_reach_the_solver_and_the_work():
     """Loads and regularisation are the scene's, in body velocities, marches and what the body does."""
     n = {"loads": "midpoint:3", "regularisation": 1e-2}
-    scene = scenes.load("three-link-glass-close").with_numerics(phases=16, tolerance=1e-13, **n)
+    scene = scenes.load("three-link-glass-close").with_numerics(
+        phases=16, tolerance=1e-13, **n
+    )
     alpha, alphadot = scene.gait.cycle(16, 1.3)
     given = scene.system.medium, scene.system.body, alpha, alphadot
     wanted = rft.body_velocity(*given, tolerance=1e-13, **n)
@@ -160,15 +228,34 @@ def test_numerics_reach_the_solver_and_the_work():
     for got, want in zip(scene.system.work(alpha, alphadot, wanted.xi), moments):
         np.testing.assert_allclose(got, want, rtol=1e-12)
     for other in ({"loads": n["loads"]}, {"regularisation": n["regularisation"]}):
-        assert np.abs(rft.work_done(*given, wanted.xi, **other).bending_moment - moments.bending_moment).max() > 1e-4
+        assert (
+            np.abs(
+                rft.work_done(*given, wanted.xi, **other).bending_moment
+                - moments.bending_moment
+            ).max()
+            > 1e-4
+        )
     cycle = scene.cycle(amplitudes=1.3, work=True)
-    np.testing.assert_allclose(cycle.work.bending_moment, moments.bending_moment, atol=1e-12)
-    heavy = scene.changed(effects=(rft.BodyInertia(0.7, 0.5, 1.0, 1.3),)).with_numerics(cycles=2)
-    marched = rft.time_steps(*given, effects=heavy.system.effects, cycles=2, tolerance=1e-13, with_work=True, **n)
+    np.testing.assert_allclose(
+        cycle.work.bending_moment, moments.bending_moment, atol=1e-12
+    )
+    heavy = scene.changed(effects=(rft.BodyInertia(0.7, 0.5, 1.0, 1.3),)).with_numerics(
+        cycles=2
+    )
+    marched = rft.time_steps(
+        *given,
+        effects=heavy.system.effects,
+        cycles=2,
+        tolerance=1e-13,
+        with_work=True,
+        **n,
+    )
     cycle = heavy.cycle(amplitudes=1.3, work=True)
     np.testing.assert_allclose(cycle.xi, marched.xi, atol=1e-12)
     np.testing.assert_allclose(cycle.net, marched.displacement, atol=1e-12)
-    np.testing.assert_allclose(cycle.work.bending_moment, marched.work.bending_moment, atol=1e-12)
+    np.testing.assert_allclose(
+        cycle.work.bending_moment, marched.work.bending_moment, atol=1e-12
+    )
 
 
 def test_the_path_of_a_linear_medium_needs_no_field():
@@ -181,18 +268,27 @@ def test_the_path_of_a_linear_medium_needs_no_field():
 
 def test_four_links_have_an_area_tier_and_two_have_none():
     text = GOOD.replace("[1, 2, 1]", "[1, 1, 1, 1]").split("[gait]")[0]
-    four = scenes.parse(text + '[gait]\nkind = "fourier"\ncos = [[1.0], [0.5], [0.0]]\nsin = [[0.0], [0.5], [1.0]]')
+    four = scenes.parse(
+        text
+        + '[gait]\nkind = "fourier"\ncos = [[1.0], [0.5], [0.0]]\nsin = [[0.0], [0.5], [1.0]]'
+    )
     assert default_tiers(four.system) == ("area", "path", "direct")
     assert np.isfinite(Study(four).poses("direct")).all()
-    two = scenes.parse(text.replace("[1, 1, 1, 1]", "[1, 1]") + '[gait]\nkind = "wave"\njoints = 1\n')
+    two = scenes.parse(
+        text.replace("[1, 1, 1, 1]", "[1, 1]") + '[gait]\nkind = "wave"\njoints = 1\n'
+    )
     with pytest.raises(Refusal, match="the area tier takes two joints and more"):
         Study(two).poses("area")
 
 
 def test_loose_glass_circles():
     """Displacement per cycle on circles of 0.5, 1 and 1.75 rad, an independent computation's three digits."""
-    got = Study(scenes.load("three-link-glass")).poses("direct", amplitudes=np.array([0.5, 1.0, 1.75]))
-    np.testing.assert_allclose(np.hypot(got[:, 0], got[:, 1]), [0.0121, 0.0638, 0.1378], rtol=0.01)
+    got = Study(scenes.load("three-link-glass")).poses(
+        "direct", amplitudes=np.array([0.5, 1.0, 1.75])
+    )
+    np.testing.assert_allclose(
+        np.hypot(got[:, 0], got[:, 1]), [0.0121, 0.0638, 0.1378], rtol=0.01
+    )
 
 
 def test_a_large_field_converges_everywhere_in_little_memory():
@@ -202,7 +298,9 @@ def test_a_large_field_converges_everywhere_in_little_memory():
     angle = np.pi * np.arange(16) / 16
     tracemalloc.start()
     try:
-        solution = glass.system.solve(alpha, np.stack([np.cos(angle), np.sin(angle)], -1))
+        solution = glass.system.solve(
+            alpha, np.stack([np.cos(angle), np.sin(angle)], -1)
+        )
         most = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
@@ -211,7 +309,9 @@ def test_a_large_field_converges_everywhere_in_little_memory():
     assert most < 100e6
 
 
-@pytest.mark.parametrize("name", scenes.builtin_names() + scenes.intruder_names() + scenes.walker_names())
+@pytest.mark.parametrize(
+    "name", scenes.builtin_names() + scenes.intruder_names() + scenes.walker_names()
+)
 def test_a_scene_written_from_its_parts_reads_the_same(name):
     """Not from the text that it was read from; and its tables are a scene of the same parts."""
     scene = dataclasses.replace(scenes.load(name), text="")

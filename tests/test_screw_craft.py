@@ -25,9 +25,17 @@ COARSE = Fineness(steps=8, elements=4)
 
 
 def test_the_scene_is_the_craft_it_says():
-    assert isinstance(SCENE.robot, Screws) and SCENE.engine == "mujoco" and SCENE.robot.screw.thickness == 0.004
-    assert SCENE.medium.xi_n == pytest.approx(1500 * 9.81 * (894 / 8 - 386 / 4 + 89 / 2))
-    alike = dataclasses.replace(SCENE, robot=dataclasses.replace(SCENE.robot, pair="alike"), text="")
+    assert (
+        isinstance(SCENE.robot, Screws)
+        and SCENE.engine == "mujoco"
+        and SCENE.robot.screw.thickness == 0.004
+    )
+    assert SCENE.medium.xi_n == pytest.approx(
+        1500 * 9.81 * (894 / 8 - 386 / 4 + 89 / 2)
+    )
+    alike = dataclasses.replace(
+        SCENE, robot=dataclasses.replace(SCENE.robot, pair="alike"), text=""
+    )
     for scene in (SCENE, alike):
         assert scenes.parse(scenes.toml(scene), scene.name) == scene
     poppy = (
@@ -36,7 +44,9 @@ def test_the_scene_is_the_craft_it_says():
         .replace("surface_f", "# ")
     )
     named = scenes.parse(poppy)
-    assert named.medium.xi_n == pytest.approx(2.9e5, rel=0.01)  # by the law of three dimensions where none is named
+    assert named.medium.xi_n == pytest.approx(
+        2.9e5, rel=0.01
+    )  # by the law of three dimensions where none is named
     flat = scenes.parse(poppy.replace('name = "poppy', 'law = "planar"\nname = "poppy'))
     assert isinstance(flat.medium, StressMap)
 
@@ -54,21 +64,31 @@ def test_mujoco_goes_on_as_the_balance_says(pair):
     course = Simulation(Walker(robot, Tripod(0.7), SCENE.medium), COARSE)
     turn = np.roll(Rotation.from_euler("xy", [steady.roll, steady.pitch]).as_quat(), 1)
     qpos, qvel = course.body.data.qpos.copy(), course.body.data.qvel.copy()
-    qpos[:7], qvel[:6] = [0, 0, steady.height, *turn], [*steady.velocity, 0, 0, 0, steady.yaw_rate]
+    qpos[:7], qvel[:6] = (
+        [0, 0, steady.height, *turn],
+        [*steady.velocity, 0, 0, 0, steady.yaw_rate],
+    )
     rows, states = [], []
     course.body.data.qpos[:], course.body.data.qvel[:] = Start(qpos, qvel)
     for k in range(2):
         assert course.stride(k, rows, states) == ""
     before, after = (
-        dict(zip(("t", "x", "z", "pitch"), rows[k][:4])) | {"y": rows[k][10], "yaw": rows[k][12]} for k in (7, 15)
+        dict(zip(("t", "x", "z", "pitch"), rows[k][:4]))
+        | {"y": rows[k][10], "yaw": rows[k][12]}
+        for k in (7, 15)
     )
     time, yaw = after["t"] - before["t"], before["yaw"] + steady.yaw_rate / 1.4
     way = np.array([after["x"] - before["x"], after["y"] - before["y"]]) / time
     ahead, aside = way @ [np.cos(yaw), np.sin(yaw)], way @ [-np.sin(yaw), np.cos(yaw)]
-    assert time == pytest.approx(1 / 0.7) and ahead == pytest.approx(steady.velocity[0], rel=0.03)
+    assert time == pytest.approx(1 / 0.7) and ahead == pytest.approx(
+        steady.velocity[0], rel=0.03
+    )
     assert after["z"] == pytest.approx(steady.height, abs=0.1 * robot.screw.radius)
     if pair == "alike":
-        assert aside == pytest.approx(steady.velocity[1], rel=0.25) and steady.velocity[1] < -0.1 * ahead
+        assert (
+            aside == pytest.approx(steady.velocity[1], rel=0.25)
+            and steady.velocity[1] < -0.1 * ahead
+        )
     else:
         assert abs(aside) < 1e-6 * ahead and abs(after["yaw"]) < 1e-6
 
@@ -81,14 +101,30 @@ def test_a_craft_walks_as_a_command(geomech, tmp_path, monkeypatch):
     monkeypatch.setattr(mujoco_walk, "MOST_STRIDES", 1)
     monkeypatch.setattr(mujoco_walk, "FEW_STRIDES", 1)
     (tmp_path / "small.toml").write_text(SMALL)
-    code, out, err = geomech("walk", "small.toml", "--engine", "mujoco", "--json", "-o", "out")
+    code, out, err = geomech(
+        "walk", "small.toml", "--engine", "mujoco", "--json", "-o", "out"
+    )
     assert (code, err) == (0, "")
     found = json.loads(out)
-    assert list(found)[:8] == ["speed", "status", "t", "x", "z", "pitch", "cycles", "estimate"]
-    assert found["status"] == "walking" and 0.5 < found["speed"] / SCENE.robot.screw.pitch < 0.9
+    assert list(found)[:8] == [
+        "speed",
+        "status",
+        "t",
+        "x",
+        "z",
+        "pitch",
+        "cycles",
+        "estimate",
+    ]
+    assert (
+        found["status"] == "walking"
+        and 0.5 < found["speed"] / SCENE.robot.screw.pitch < 0.9
+    )
     table = np.genfromtxt(tmp_path / "out" / "walk.csv", delimiter=",", names=True)
     assert (
-        np.abs(table["y"]).max() < 1e-6 and np.isfinite(table["pitch"]).all() and table["t"][-1] == pytest.approx(1.0)
+        np.abs(table["y"]).max() < 1e-6
+        and np.isfinite(table["pitch"]).all()
+        and table["t"][-1] == pytest.approx(1.0)
     )
     assert (tmp_path / "out" / "walk.png").is_file()
 
@@ -96,10 +132,15 @@ def test_a_craft_walks_as_a_command(geomech, tmp_path, monkeypatch):
 def test_the_planar_engine_knows_no_screws(geomech, tmp_path):
     (tmp_path / "small.toml").write_text(SMALL)
     code, out, err = geomech("walk", "small.toml", "--engine", "planar")
-    assert (code, out) == (
-        2,
-        "",
-    ) and err == "error: small.toml: the planar engine knows no Screws robot: use --engine mujoco\n"
+    assert (
+        (code, out)
+        == (
+            2,
+            "",
+        )
+        and err
+        == "error: small.toml: the planar engine knows no Screws robot: use --engine mujoco\n"
+    )
 
 
 WRONG = {
@@ -125,17 +166,28 @@ def test_what_makes_no_craft_is_refused_with_one_line(right):
     assert right in SMALL
     with pytest.raises(Refusal) as caught:
         scenes.parse(SMALL.replace(right, wrong, 1), "small")
-    assert said in str(caught.value) and str(caught.value).startswith("small") and "\n" not in str(caught.value)
+    assert (
+        said in str(caught.value)
+        and str(caught.value).startswith("small")
+        and "\n" not in str(caught.value)
+    )
 
 
 def test_sizes_of_screws_are_swept():
     tables = changed(tomllib.loads(SMALL), "robot.screw.pitch", 0.04)
-    assert tables["robot"]["screw"]["pitch"] == 0.04 and scenes.from_tables(tables).robot.screw.core == 0.02
+    assert (
+        tables["robot"]["screw"]["pitch"] == 0.04
+        and scenes.from_tables(tables).robot.screw.core == 0.02
+    )
     assert changed(tables, "robot.track", 0.2)["robot"]["track"] == 0.2
     for wrong in ("robot.legs.width", "robot.mass.kg"):
         with pytest.raises(Refusal, match="name a parameter such as"):
             changed(tables, wrong, 1.0)
-    results = {"over": {"robot.screw.pitch": [0.04, 0.06]}, "speed": np.ones(2), "estimate": np.zeros(2)}
+    results = {
+        "over": {"robot.screw.pitch": [0.04, 0.06]},
+        "speed": np.ones(2),
+        "estimate": np.zeros(2),
+    }
     (ax,) = plots.sweep_figure(SCENE, results | {"status": np.full(2, "walking")}).axes
     assert ax.get_xlabel() == "pitch (m)"
 
@@ -144,7 +196,9 @@ def test_a_craft_without_screws_is_told_so():
     bare = SMALL[: SMALL.index("[robot.screw]")] + SMALL[SMALL.index("[gait]") :]
     asked = {
         bare: r"\[robot\] the table \[robot.screw\] is missing: add it",
-        bare.replace("mass = 1.0", "screw = 3\nmass = 1.0"): r"robot.screw must be a table \[robot.screw\], got int",
+        bare.replace(
+            "mass = 1.0", "screw = 3\nmass = 1.0"
+        ): r"robot.screw must be a table \[robot.screw\], got int",
     }
     for text, said in asked.items():
         with pytest.raises(Refusal, match=said):
@@ -160,16 +214,36 @@ def test_the_figure_of_screws_is_drawn(tmp_path, monkeypatch):
     monkeypatch.setattr(mujoco_walk, "MOST_STRIDES", 1)
     for name, less in (("HEIGHTS", (0.0,)), ("MASSES", (1.0,)), ("PATHS", {})):
         monkeypatch.setattr(screws, name, less)
-    numbers = screws.compute(3, (0.06,), (0.06,), dataclasses.replace(COARSE, duration=1.0))
-    assert numbers["found"] == pytest.approx(numbers["advance"][1.0], rel=0.2)  # in the first two turns
+    numbers = screws.compute(
+        3, (0.06,), (0.06,), dataclasses.replace(COARSE, duration=1.0)
+    )
+    assert numbers["found"] == pytest.approx(
+        numbers["advance"][1.0], rel=0.2
+    )  # in the first two turns
     assert "by MuJoCo" in screws.table(numbers)
     (vx, vy), rate, time = (0.03, -0.01), 0.4, 4.0
     steady = types.SimpleNamespace(velocity=np.array([vx, vy]), yaw_rate=rate)
-    numbers["paths"]["alike", 1.0] = time, np.array([0.0, 0.1, 0.2]), np.array([0.0, 0.02, 0.01]), steady
+    numbers["paths"]["alike", 1.0] = (
+        time,
+        np.array([0.0, 0.1, 0.2]),
+        np.array([0.0, 0.02, 0.01]),
+        steady,
+    )
     thrust, advance, _, path = drawn(screws, numbers, tmp_path).axes
-    np.testing.assert_allclose(curve(thrust, "at the surface"), [numbers["slip"], numbers["pulled"][0.0].thrust])
-    np.testing.assert_allclose(curve(advance, "1 kg, MuJoCo"), 1e3 * np.array([[0.06], numbers["found"]]))
-    np.testing.assert_allclose(curve(path, "alike, 1 kg, 4 s"), 1e2 * np.array([[0.0, 0.1, 0.2], [0.0, 0.02, 0.01]]))
-    sin, cos = np.sin(rate * time), np.cos(rate * time)  # a circle: the integral of the velocity as it turns
+    np.testing.assert_allclose(
+        curve(thrust, "at the surface"),
+        [numbers["slip"], numbers["pulled"][0.0].thrust],
+    )
+    np.testing.assert_allclose(
+        curve(advance, "1 kg, MuJoCo"), 1e3 * np.array([[0.06], numbers["found"]])
+    )
+    np.testing.assert_allclose(
+        curve(path, "alike, 1 kg, 4 s"),
+        1e2 * np.array([[0.0, 0.1, 0.2], [0.0, 0.02, 0.01]]),
+    )
+    sin, cos = (
+        np.sin(rate * time),
+        np.cos(rate * time),
+    )  # a circle: the integral of the velocity as it turns
     end = [(vx * sin - vy * (1 - cos)) / rate, (vx * (1 - cos) + vy * sin) / rate]
     np.testing.assert_allclose(curves(path)[1][-1], 1e2 * np.array(end))

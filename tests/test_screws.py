@@ -20,10 +20,14 @@ COARSE = {"triangles": 400, "angles": 4}
 
 def volume(screw):
     share, core = screw.thickness / screw.pitch, np.pi * screw.core**2
-    return screw.length * (core + share * (np.pi * screw.radius**2 - core)) + volume_of_cones(screw)
+    return screw.length * (
+        core + share * (np.pi * screw.radius**2 - core)
+    ) + volume_of_cones(screw)
 
 
-@pytest.mark.parametrize("screw", [SCREW, dataclasses.replace(SCREW, handed="left", nose=0.0, pitch=0.21)])
+@pytest.mark.parametrize(
+    "screw", [SCREW, dataclasses.replace(SCREW, handed="left", nose=0.0, pitch=0.21)]
+)
 def test_the_volume_of_a_screw_is_its_closed_form_and_normals_point_out(screw):
     errors = []
     for triangles in (1000, 4000, 16000):
@@ -31,7 +35,9 @@ def test_the_volume_of_a_screw_is_its_closed_form_and_normals_point_out(screw):
         assert 0.5 < len(mesh.faces) / triangles < 2.5
         errors.append(1 - mesh.volume / volume(screw))
     assert errors[2] < 8e-3
-    assert errors[0] > 3 * errors[1] > 9 * errors[2] > 0.0  # of order 1 in their number, below as chords are
+    assert (
+        errors[0] > 3 * errors[1] > 9 * errors[2] > 0.0
+    )  # of order 1 in their number, below as chords are
     assert (mesh.middle_normals * mesh.normals).sum(-1).min() > 0.995
     reach = np.hypot(mesh.vertices[:, 1], mesh.vertices[:, 2])
     assert reach.max() == pytest.approx(screw.radius)
@@ -40,7 +46,11 @@ def test_the_volume_of_a_screw_is_its_closed_form_and_normals_point_out(screw):
 
 def test_in_a_nut_nothing_but_the_ends_leads_or_trails():
     mesh = SCREW.mesh(800)
-    along = mesh.middle_normals @ [SCREW.pitch / (2 * np.pi), 0, 0] + mesh.normal_moments @ [1.0, 0, 0]
+    along = mesh.middle_normals @ [
+        SCREW.pitch / (2 * np.pi),
+        0,
+        0,
+    ] + mesh.normal_moments @ [1.0, 0, 0]
     inside = np.abs(mesh.middles[:, 0]) < SCREW.length / 2 * (1 - 1e-9)
     assert np.abs(along[inside]).max() < 1e-15 and inside.mean() > 0.7
     out = np.sign(mesh.middles[~inside, 0])
@@ -50,13 +60,20 @@ def test_in_a_nut_nothing_but_the_ends_leads_or_trails():
 def test_a_smooth_thread_has_either_hand_and_noses():
     screw = Screw(0.03, 0.018, 0.05, 0.13, nose=0.02, handed="left")
     blunt = dataclasses.replace(screw, nose=0.0, handed="right")
-    left, right = screw.mesh(4000), dataclasses.replace(screw, handed="right").mesh(4000)
+    left, right = (
+        screw.mesh(4000),
+        dataclasses.replace(screw, handed="right").mesh(4000),
+    )
     assert left.volume == pytest.approx(right.volume, rel=1e-12)
     ends = [abs(m.volume - blunt.mesh(4000).volume) for m in (left, right)]
     assert np.ptp(left.vertices[:, 0]) == pytest.approx(0.17)
     assert 0.8 * volume_of_cones(screw) < ends[0] < 1.5 * volume_of_cones(screw)
-    of = lambda mesh, spin: wrench(SAND, mesh, np.eye(3), [0, 0, -0.1], [0, 0, 0], [spin, 0, 0]).force[0]
-    assert of(left, -6.0) == pytest.approx(of(right, 6.0), rel=1e-9) and of(right, 6.0) > 1.0 > -1.0 > of(left, 6.0)
+    of = lambda mesh, spin: wrench(
+        SAND, mesh, np.eye(3), [0, 0, -0.1], [0, 0, 0], [spin, 0, 0]
+    ).force[0]
+    assert of(left, -6.0) == pytest.approx(of(right, 6.0), rel=1e-9) and of(
+        right, 6.0
+    ) > 1.0 > -1.0 > of(left, 6.0)
 
 
 def volume_of_cones(screw):
@@ -73,26 +90,61 @@ def surfaces(screw, n):
 
     def add(x, r, angle, normal, area):
         c, s = polar(angle)
-        at = np.stack(np.broadcast_arrays(x + 0 * angle, r * c + 0 * x, r * s + 0 * x), -1).reshape(-1, 3)
+        at = np.stack(
+            np.broadcast_arrays(x + 0 * angle, r * c + 0 * x, r * s + 0 * x), -1
+        ).reshape(-1, 3)
         n_x, n_r, n_a = (np.broadcast_to(v, c.shape) for v in normal)
         n = np.stack([n_x, n_r * c - n_a * s, n_r * s + n_a * c], -1).reshape(-1, 3)
-        out.append((at, n / np.linalg.norm(n, axis=-1, keepdims=True), np.broadcast_to(area, c.shape).ravel()))
+        out.append(
+            (
+                at,
+                n / np.linalg.norm(n, axis=-1, keepdims=True),
+                np.broadcast_to(area, c.shape).ravel(),
+            )
+        )
 
-    for r, low, high, m in ((screw.core, half, 2 * np.pi - half, 2 * n), (screw.radius, -half, half, n // 4)):
+    for r, low, high, m in (
+        (screw.core, half, 2 * np.pi - half, 2 * n),
+        (screw.radius, -half, half, n // 4),
+    ):
         angle = k * x[:, None] + middles(low, high, m)
-        add(x[:, None], r, angle, (0, 1, 0), screw.length / len(x) * r * (high - low) / m)
+        add(
+            x[:, None],
+            r,
+            angle,
+            (0, 1, 0),
+            screw.length / len(x) * r * (high - low) / m,
+        )
     r = middles(screw.core, screw.radius, n)
     slope = np.hypot(1, k * r) * screw.length / len(x) * (screw.radius - screw.core) / n
     for side in (-1, 1):
-        add(x[:, None], r, k * x[:, None] + side * half + 0 * r, (-side * k * r, 0, side), slope)
+        add(
+            x[:, None],
+            r,
+            k * x[:, None] + side * half + 0 * r,
+            (-side * k * r, 0, side),
+            slope,
+        )
         end = side * screw.length / 2
         angle = k * end + middles(-half, half, n // 2)[:, None]
-        add(end, r, angle + 0 * r, (side, 0, 0), r * (screw.radius - screw.core) / n * half * 2 / (n // 2) + 0 * angle)
+        add(
+            end,
+            r,
+            angle + 0 * r,
+            (side, 0, 0),
+            r * (screw.radius - screw.core) / n * half * 2 / (n // 2) + 0 * angle,
+        )
         r_cone, angle = middles(0, screw.core, n), middles(0, 2 * np.pi, 2 * n)[:, None]
         slant = np.hypot(screw.nose, screw.core) / screw.core
         tip = end + side * screw.nose * (1 - r_cone / screw.core)
         area = slant * r_cone * screw.core / n * 2 * np.pi / (2 * n)
-        add(tip, r_cone, angle + 0 * r_cone, (side * screw.core, screw.nose, 0), area + 0 * angle)
+        add(
+            tip,
+            r_cone,
+            angle + 0 * r_cone,
+            (side * screw.core, screw.nose, 0),
+            area + 0 * angle,
+        )
     return (np.concatenate(some) for some in zip(*out))
 
 
@@ -103,23 +155,40 @@ def test_forces_on_a_screw_are_the_integral_over_its_surfaces(height):
     at, n, area = surfaces(SCREW, 60)
     at, n = at @ turn.T, n @ turn.T
     z = at[:, 2] + height
-    force = SAND.stress(n, velocity + np.cross(spin, at)) * (np.where(z < 0, -z, 0) * area)[:, None]
+    force = (
+        SAND.stress(n, velocity + np.cross(spin, at))
+        * (np.where(z < 0, -z, 0) * area)[:, None]
+    )
     found = wrench(SAND, SCREW.mesh(20_000), turn, [0.3, -0.2, height], velocity, spin)
-    np.testing.assert_allclose(found.force, force.sum(0), atol=6e-3 * np.abs(force.sum(0)).max())
+    np.testing.assert_allclose(
+        found.force, force.sum(0), atol=6e-3 * np.abs(force.sum(0)).max()
+    )
     moment = np.cross(at, force).sum(0)
     np.testing.assert_allclose(found.moment, moment, atol=6e-3 * np.abs(moment).max())
-    assert np.abs(force.sum(0)).min() > 0.015 * np.abs(force.sum(0)).max()  # every component is tried
+    assert (
+        np.abs(force.sum(0)).min() > 0.015 * np.abs(force.sum(0)).max()
+    )  # every component is tried
 
 
 def test_a_mirror_shows_the_other_hand():
     """Vectors across it change sign, turns about axes along it do, too. What the surface cuts is cut otherwise."""
-    flip, mesh, other = np.array([1, -1, 1]), SCREW.mesh(1500), SCREW.mirrored.mesh(1500)
-    np.testing.assert_array_equal(mesh.vertices[mesh.faces] * flip, other.vertices[other.faces][:, ::-1])
-    np.testing.assert_array_equal(mesh.smooth_normals * flip, other.smooth_normals[:, ::-1])
+    flip, mesh, other = (
+        np.array([1, -1, 1]),
+        SCREW.mesh(1500),
+        SCREW.mirrored.mesh(1500),
+    )
+    np.testing.assert_array_equal(
+        mesh.vertices[mesh.faces] * flip, other.vertices[other.faces][:, ::-1]
+    )
+    np.testing.assert_array_equal(
+        mesh.smooth_normals * flip, other.smooth_normals[:, ::-1]
+    )
     velocity, spin = np.array([0.02, 0.01, 0.03]), np.array([6.0, 1.0, 2.0])
     for height, rel in ((-0.1, 1e-12), (0.0, 2e-3)):
         one = wrench(SAND, mesh, np.eye(3), [0, 0, height], velocity, spin)
-        two = wrench(SAND, other, np.eye(3), [0, 0, height], velocity * flip, -spin * flip)
+        two = wrench(
+            SAND, other, np.eye(3), [0, 0, height], velocity * flip, -spin * flip
+        )
         np.testing.assert_allclose(two.force, one.force * flip, rtol=rel)
         np.testing.assert_allclose(two.moment, -one.moment * flip, rtol=rel)
 
@@ -127,13 +196,33 @@ def test_a_mirror_shows_the_other_hand():
 def test_thrust_grows_with_slip_and_no_more_is_done_than_the_motor_gives():
     slip = np.array([-0.2, 0.1, 0.5, 1.0])
     found = turning(SAND, SCREW, -0.005, slip, 3.0, **COARSE)
-    assert (np.diff(found.thrust) > 0.3).all() and found.thrust[0] < 0 < found.thrust[-1]
-    assert (found.lift > 0.1).all() and (found.torque > 0).all() and (found.efficiency < 1).all()
-    np.testing.assert_allclose(found.efficiency[2], found.thrust[2] * 0.5 * SCREW.pitch / (2 * np.pi) / found.torque[2])
+    assert (np.diff(found.thrust) > 0.3).all() and found.thrust[0] < 0 < found.thrust[
+        -1
+    ]
+    assert (
+        (found.lift > 0.1).all()
+        and (found.torque > 0).all()
+        and (found.efficiency < 1).all()
+    )
+    np.testing.assert_allclose(
+        found.efficiency[2],
+        found.thrust[2] * 0.5 * SCREW.pitch / (2 * np.pi) / found.torque[2],
+    )
     one = turning(SAND, SCREW, -0.1, slip, 3.0, **COARSE)
-    two = turning(SAND, SCREW.mirrored, -0.1, slip, 0.01, **COARSE)  # the other hand, another rate
-    for name, way in (("thrust", 1), ("side", -1), ("lift", 1), ("torque", 1), ("pitching", 1), ("efficiency", 1)):
-        np.testing.assert_allclose(getattr(two, name), way * getattr(one, name), rtol=1e-9, atol=1e-12)
+    two = turning(
+        SAND, SCREW.mirrored, -0.1, slip, 0.01, **COARSE
+    )  # the other hand, another rate
+    for name, way in (
+        ("thrust", 1),
+        ("side", -1),
+        ("lift", 1),
+        ("torque", 1),
+        ("pitching", 1),
+        ("efficiency", 1),
+    ):
+        np.testing.assert_allclose(
+            getattr(two, name), way * getattr(one, name), rtol=1e-9, atol=1e-12
+        )
 
 
 def test_a_screw_runs_freely_where_it_pulls_nothing():
@@ -148,13 +237,25 @@ def test_limits_of_the_blade():
     at = lambda screw: turning(SAND, screw, -0.1, 1.0, 1.0, 1500, 4)
     whole = at(SCREW)
     heights = np.array([4e-4, 2e-4, 1e-4])
-    low = np.array([at(dataclasses.replace(SCREW, core=0.03 - h, nose=0.0)).thrust for h in heights])
-    np.testing.assert_allclose(low / heights, low[-1] / heights[-1], rtol=0.05)  # goes with the blade
+    low = np.array(
+        [
+            at(dataclasses.replace(SCREW, core=0.03 - h, nose=0.0)).thrust
+            for h in heights
+        ]
+    )
+    np.testing.assert_allclose(
+        low / heights, low[-1] / heights[-1], rtol=0.05
+    )  # goes with the blade
     assert low[-1] < 0.02 * whole.thrust
     rings = Screw(0.03, 0.018, 0.001, 0.004, 1e-4)
     assert at(rings).thrust / rings.turns < 0.02 * whole.thrust / SCREW.turns
     paddle = at(dataclasses.replace(SCREW, pitch=5.0, thickness=0.2))
-    assert abs(paddle.thrust) < 0.02 * whole.thrust < whole.thrust / 30 < paddle.torque / 0.03
+    assert (
+        abs(paddle.thrust)
+        < 0.02 * whole.thrust
+        < whole.thrust / 30
+        < paddle.torque / 0.03
+    )
 
 
 @pytest.mark.parametrize("pair", ["mirrored", "alike"])
@@ -171,25 +272,46 @@ def test_a_craft_is_in_balance_as_it_goes_on(pair):
             turn = body @ Rotation.from_rotvec([angle, 0, 0]).as_matrix()
             v = np.array([*found.velocity, 0.0]) + np.cross(spin, arm)
             one = wrench(
-                SAND, screw.mesh(400), turn, [0, 0, found.height] + arm, v, spin + way * 4 * np.pi * body[:, 0]
+                SAND,
+                screw.mesh(400),
+                turn,
+                [0, 0, found.height] + arm,
+                v,
+                spin + way * 4 * np.pi * body[:, 0],
             )
-            force, moment = force + one.force / 4, moment + (one.moment + np.cross(arm, one.force)) / 4
+            force, moment = (
+                force + one.force / 4,
+                moment + (one.moment + np.cross(arm, one.force)) / 4,
+            )
     weight = 9.81 * craft.mass
-    rest = 2e-3 if pair == "mirrored" else 1e-4  # of triangles that the surface cuts otherwise in the mirror
+    rest = (
+        2e-3 if pair == "mirrored" else 1e-4
+    )  # of triangles that the surface cuts otherwise in the mirror
     np.testing.assert_allclose(force / weight, [0, 0, 1], atol=rest)
     np.testing.assert_allclose(moment / weight / SCREW.length, 0, atol=rest)
     if pair == "mirrored":
         assert found.roll == found.velocity[1] == found.yaw_rate == 0
-        assert found.advance == pytest.approx((1 - found.slip) * SCREW.pitch) and 0.05 < found.slip < 0.6
+        assert (
+            found.advance == pytest.approx((1 - found.slip) * SCREW.pitch)
+            and 0.05 < found.slip < 0.6
+        )
     else:
-        assert -0.5 < found.velocity[1] / found.velocity[0] < -0.02 and found.roll * found.yaw_rate > 0
+        assert (
+            -0.5 < found.velocity[1] / found.velocity[0] < -0.02
+            and found.roll * found.yaw_rate > 0
+        )
 
 
 def test_the_other_hand_drifts_to_the_other_side():
     alike = dataclasses.replace(CRAFT, pair="alike")
-    one, two = (cruise(SAND, dataclasses.replace(alike, screw=s), **COARSE) for s in (SCREW, SCREW.mirrored))
+    one, two = (
+        cruise(SAND, dataclasses.replace(alike, screw=s), **COARSE)
+        for s in (SCREW, SCREW.mirrored)
+    )
     np.testing.assert_allclose(two.velocity, one.velocity * [1, -1], rtol=0.1)
-    np.testing.assert_allclose([two.roll, two.yaw_rate], [-one.roll, -one.yaw_rate], rtol=0.15)
+    np.testing.assert_allclose(
+        [two.roll, two.yaw_rate], [-one.roll, -one.yaw_rate], rtol=0.15
+    )
     np.testing.assert_allclose(two.torque, one.torque[::-1], rtol=0.02)
 
 
@@ -197,11 +319,22 @@ def test_craft_of_other_sizes_and_gravity_go_alike():
     """Lengths by L, mass by L^3 on the same ground, and ground as strong as the craft is heavy: the same slip, the granular
     scaling laws of Slonaker et al. (2017), found for craft on screws by Thoesen et al. (2019, 2020)."""
     one = cruise(SAND, CRAFT, **COARSE)
-    sizes = {k: 2.5 * getattr(SCREW, k) for k in ("radius", "core", "pitch", "length", "thickness", "nose")}
-    large = {k: 2.5 * getattr(CRAFT, k) for k in ("length", "width", "height", "track", "drop")}
+    sizes = {
+        k: 2.5 * getattr(SCREW, k)
+        for k in ("radius", "core", "pitch", "length", "thickness", "nose")
+    }
+    large = {
+        k: 2.5 * getattr(CRAFT, k)
+        for k in ("length", "width", "height", "track", "drop")
+    }
     craft = Screws(mass=2.5**3 * CRAFT.mass, screw=Screw(**sizes), **large)
     two = cruise(SAND, craft, 3.0, **COARSE)
-    three = cruise(dataclasses.replace(SAND, xi_n=6e5), dataclasses.replace(CRAFT, mass=0.5), 0.1, **COARSE)
+    three = cruise(
+        dataclasses.replace(SAND, xi_n=6e5),
+        dataclasses.replace(CRAFT, mass=0.5),
+        0.1,
+        **COARSE,
+    )
     for other, size in ((two, 2.5), (three, 1.0)):
         assert other.slip == pytest.approx(one.slip, abs=1e-4)
         assert other.advance / size == pytest.approx(one.advance, rel=1e-4)
@@ -209,11 +342,17 @@ def test_craft_of_other_sizes_and_gravity_go_alike():
 
 
 def test_a_craft_of_no_weight_floats_on_its_screws():
-    assert 1.9 < _Steady(SAND, dataclasses.replace(CRAFT, mass=1e-3), 1.0, **COARSE).floating() < 2.0  # radii
+    assert (
+        1.9
+        < _Steady(SAND, dataclasses.replace(CRAFT, mass=1e-3), 1.0, **COARSE).floating()
+        < 2.0
+    )  # radii
 
 
 def test_a_craft_that_nothing_bears_is_told_so():
-    found = cruise(SAND, dataclasses.replace(CRAFT, mass=500.0), triangles=200, angles=2)
+    found = cruise(
+        SAND, dataclasses.replace(CRAFT, mass=500.0), triangles=200, angles=2
+    )
     assert np.isnan(found.advance) and found.residual > 1e-3
 
 
@@ -239,7 +378,9 @@ def test_a_balance_is_found_by_short_steps_or_what_is_left_is_told():
     x, left = _solve(lambda x: tries.append(x) or A @ (x - [1.0, -2.0]), np.zeros(2))
     np.testing.assert_allclose(x, [1.0, -2.0], atol=1e-5)
     assert left < 1e-5 and np.abs(np.diff(tries[::3], axis=0)).max() <= 0.3 + 1e-9
-    x, left = _solve(lambda x: np.array([x[0] ** 2 - 2.0, x[0] * x[1] - 1.0]), np.array([0.5, 0.5]))
+    x, left = _solve(
+        lambda x: np.array([x[0] ** 2 - 2.0, x[0] * x[1] - 1.0]), np.array([0.5, 0.5])
+    )
     np.testing.assert_allclose(x, [2**0.5, 0.5**0.5], atol=1e-5)
     x, left = _solve(lambda x: x**2 + 0.3, np.array([0.8]))
     assert 0.3 <= left < 0.31 and abs(x[0]) < 0.1

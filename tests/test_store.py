@@ -27,7 +27,10 @@ class Row(NamedTuple):
 HARD = {
     np.ndarray: np.array([[np.nan, -0.0, np.inf], [1e-310, 1 / 3, -5.0]]),
     tuple[np.ndarray, float, int]: (np.zeros((0, 3)), 0.1 + 0.2, 7),
-    list[Row]: [Row(np.array(2.5), None), Row(np.arange(3), (np.array([True]), np.array(["a", "bc"])))],
+    list[Row]: [
+        Row(np.array(2.5), None),
+        Row(np.arange(3), (np.array([True]), np.array(["a", "bc"]))),
+    ],
     dict[str, list[float]]: {"x": [np.nan, -np.inf]},
     tuple[float, str | None]: (5e-324, None),
 }
@@ -40,7 +43,12 @@ def same(a, b):
     if isinstance(a, (tuple, list)):
         return type(a) is type(b) and len(a) == len(b) and all(map(same, a, b))
     one, two = np.array(a), np.array(b)
-    return type(a) is type(b) and one.dtype == two.dtype and one.shape == two.shape and one.tobytes() == two.tobytes()
+    return (
+        type(a) is type(b)
+        and one.dtype == two.dtype
+        and one.shape == two.shape
+        and one.tobytes() == two.tobytes()
+    )
 
 
 def key(k):
@@ -81,7 +89,9 @@ def test_results_come_back_to_the_last_bit(kind, tmp_path):
         some.close(done=False)
 
 
-def test_what_is_no_data_is_not_stored_and_another_type_than_declared_is_an_error(tmp_path):
+def test_what_is_no_data_is_not_stored_and_another_type_than_declared_is_an_error(
+    tmp_path,
+):
     some = Store(tmp_path / "p")
     some.put(key(1), lambda: 0, float)
     assert some.get(key(1), float) is None
@@ -114,8 +124,13 @@ def test_what_is_there_is_kept_by_a_request_that_adds_nothing(tmp_path):
 
 def test_one_at_a_time(tmp_path):
     first = Store(tmp_path / "p", hold=True)
-    assert first.db.execute("PRAGMA busy_timeout").fetchone() == (0,)  # none waits for the other
-    for again in (lambda: Store(tmp_path / "p", hold=True), lambda: _elsewhere(tmp_path / "p")):
+    assert first.db.execute("PRAGMA busy_timeout").fetchone() == (
+        0,
+    )  # none waits for the other
+    for again in (
+        lambda: Store(tmp_path / "p", hold=True),
+        lambda: _elsewhere(tmp_path / "p"),
+    ):
         with pytest.raises(Refusal, match="another computation has .*p open"):
             again()
     second = Store(tmp_path / "p")  # which need not store
@@ -153,12 +168,19 @@ def test_no_flipped_bit_is_believed(count, tmp_path, capsys):
         counts.append(found(tmp_path / "p", count))
     assert max(counts) == count and np.mean(np.array(counts) >= 0.9 * count) > 0.5
     said = capsys.readouterr().err.splitlines()
-    assert all(line.startswith(f"note: {tmp_path / 'p'} cannot be resumed, it is ") for line in said)
+    assert all(
+        line.startswith(f"note: {tmp_path / 'p'} cannot be resumed, it is ")
+        for line in said
+    )
     assert len(said) == len(list(tmp_path.glob("p.unreadable*")))
 
 
-@pytest.mark.parametrize("damage", ["cut", "index", "text", "empty", "other program", "other table"])
-def test_a_damaged_or_foreign_file_is_renamed_and_another_begun(damage, tmp_path, capsys):
+@pytest.mark.parametrize(
+    "damage", ["cut", "index", "text", "empty", "other program", "other table"]
+)
+def test_a_damaged_or_foreign_file_is_renamed_and_another_begun(
+    damage, tmp_path, capsys
+):
     path = filled(tmp_path / "p", 2000)
     raw = path.read_bytes()
     if damage in ("other program", "other table"):
@@ -170,9 +192,12 @@ def test_a_damaged_or_foreign_file_is_renamed_and_another_begun(damage, tmp_path
         other.close()
         raw = path.read_bytes()
     else:
-        raw = {"cut": raw[:-5000], "index": raw[:4096] + bytes(8192) + raw[12288:], "text": b"a scene\n", "empty": b""}[
-            damage
-        ]
+        raw = {
+            "cut": raw[:-5000],
+            "index": raw[:4096] + bytes(8192) + raw[12288:],
+            "text": b"a scene\n",
+            "empty": b"",
+        }[damage]
         path.write_bytes(raw)
     for _ in range(2):
         some = Store(path)
@@ -189,7 +214,9 @@ def test_a_damaged_or_foreign_file_is_renamed_and_another_begun(damage, tmp_path
         assert (tmp_path / "p.unreadable").read_bytes() == raw
 
 
-def test_a_full_disk_is_said_once_and_what_is_there_stays(tmp_path, capsys, monkeypatch):
+def test_a_full_disk_is_said_once_and_what_is_there_stays(
+    tmp_path, capsys, monkeypatch
+):
     path = filled(tmp_path / "p", 10)
     monkeypatch.setattr(store, "CHECKPOINT", -1.0)
     some = Store(path)
@@ -200,7 +227,9 @@ def test_a_full_disk_is_said_once_and_what_is_there_stays(tmp_path, capsys, monk
     assert some.lost and not some.new
     some.close(done=False)
     said = capsys.readouterr().err
-    assert said.startswith(f"note: what is done is not kept in {path}: database or disk is full")
+    assert said.startswith(
+        f"note: what is done is not kept in {path}: database or disk is full"
+    )
     assert said.count("\n") == 1
     assert found(path, 200) >= 10
 
@@ -220,8 +249,14 @@ def test_a_file_that_may_grow_no_more_is_said_once(tmp_path):
         print(some.lost)
     """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (0, "True\n", 1), done.stderr
-    assert done.stderr.startswith(f"note: what is done is not kept in {tmp_path / 'p'}: ")
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (
+        0,
+        "True\n",
+        1,
+    ), done.stderr
+    assert done.stderr.startswith(
+        f"note: what is done is not kept in {tmp_path / 'p'}: "
+    )
     assert found(tmp_path / "p", 300) > 5
 
 
@@ -235,11 +270,18 @@ def test_a_file_system_without_locks_is_said_once(tmp_path, capsys, monkeypatch)
             return super().execute(sql, *arguments)
 
     real = sqlite3.connect
-    monkeypatch.setattr(sqlite3, "connect", lambda *some, **options: real(*some, factory=Connection, **options))
+    monkeypatch.setattr(
+        sqlite3,
+        "connect",
+        lambda *some, **options: real(*some, factory=Connection, **options),
+    )
     some = Store(tmp_path / "p", hold=True)
     some.put(key(1), 1.0, float)
     some.close(done=False)
-    assert capsys.readouterr().err == f"note: what is done is not kept in {tmp_path / 'p'}: locking protocol\n"
+    assert (
+        capsys.readouterr().err
+        == f"note: what is done is not kept in {tmp_path / 'p'}: locking protocol\n"
+    )
 
 
 def test_a_folder_that_cannot_be_written_is_said_once(tmp_path, capsys):
@@ -248,7 +290,10 @@ def test_a_folder_that_cannot_be_written_is_said_once(tmp_path, capsys):
     some.put(key(1), 1.0, float)
     some.close(done=False)
     said = capsys.readouterr().err
-    assert said.startswith("note: what is done is not kept in ") and os.strerror(errno.EEXIST) in said
+    assert (
+        said.startswith("note: what is done is not kept in ")
+        and os.strerror(errno.EEXIST) in said
+    )
 
 
 @pytest.mark.parametrize("kind", ["fifo", "folder", "device", "dangling"])
@@ -282,7 +327,11 @@ def test_another_thread_may_store(tmp_path):
 def test_what_is_kept_for_a_folder_is_in_or_beside_it(folder, tmp_path, monkeypatch):
     (tmp_path / "there").mkdir()
     monkeypatch.chdir(tmp_path)
-    places = {".": f".{tmp_path.name}.partial", "out": ".out.partial", "a/b": ".a-b.partial"}
+    places = {
+        ".": f".{tmp_path.name}.partial",
+        "out": ".out.partial",
+        "a/b": ".a-b.partial",
+    }
     place = Path(places.get(folder, "there/.there.partial"))
     assert partial_file(Path(folder)) == place
     assert partial_file(Path(folder).absolute()) == place.absolute()
@@ -302,7 +351,9 @@ def test_names_of_one_file_keep_one_file(tmp_path):
     for length in (255, 246):
         name = "a" * (length - 3) + ".nc"
         filled(partial_file(tmp_path / name)).with_name(name).touch()
-        assert partial_file(tmp_path / name) != partial_file(tmp_path / ("b" + name[1:]))
+        assert partial_file(tmp_path / name) != partial_file(
+            tmp_path / ("b" + name[1:])
+        )
 
 
 def test_the_cache_is_the_users(tmp_path, monkeypatch):

@@ -48,10 +48,16 @@ def imports(path):
 def test_rft_does_not_import_geomech():
     files = list((ROOT / "rft").rglob("*.py"))
     assert len(files) > 8
-    assert [p.name for p in files if {"geomech", "figures"} & {x.partition(".")[0] for x in imports(p)}] == []
+    assert [
+        p.name
+        for p in files
+        if {"geomech", "figures"} & {x.partition(".")[0] for x in imports(p)}
+    ] == []
 
 
-ABSTRACT = tuple(f"rft.{name}" for name in ("checks", "premise", "refusal", "registry", "se2"))
+ABSTRACT = tuple(
+    f"rft.{name}" for name in ("checks", "premise", "refusal", "registry", "se2")
+)
 
 
 def test_pure_geometry_knows_planar_motions_alone():
@@ -59,24 +65,41 @@ def test_pure_geometry_knows_planar_motions_alone():
     users = {
         p.relative_to(folder).as_posix()
         for p in folder.rglob("*.py")
-        if any(x.partition(".")[0] == "rft" and not x.startswith(ABSTRACT) for x in imports(p))
+        if any(
+            x.partition(".")[0] == "rft" and not x.startswith(ABSTRACT)
+            for x in imports(p)
+        )
     }
     assert {x for x in users if not x.startswith("systems/")} == KNOW_MECHANICS
 
 
 def modules():
     """Files of all modules by their dotted names."""
-    names = lambda p: ".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
-    return {names(p): p for top in ("rft", "geomech", "figures") for p in (ROOT / top).rglob("*.py")}
+    names = lambda p: ".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(
+        ".__init__"
+    )
+    return {
+        names(p): p
+        for top in ("rft", "geomech", "figures")
+        for p in (ROOT / top).rglob("*.py")
+    }
 
 
 def arrows(path, known):
     """Modules that a file imports, inside functions too, but for type checkers alone."""
 
-    checked = (node for node in nodes(path) if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING")
+    checked = (
+        node
+        for node in nodes(path)
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+    )
     unloaded, found = {id(node) for one in checked for node in ast.walk(one)}, set()
     for node in nodes(path):
-        names = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []
+        names = (
+            [alias.name for alias in node.names]
+            if isinstance(node, ast.Import | ast.ImportFrom)
+            else []
+        )
         if isinstance(node, ast.ImportFrom):
             names = [f"{node.module}.{name}" for name in names]
         elif isinstance(node, ast.Call) and "import_module" in (
@@ -85,7 +108,10 @@ def arrows(path, known):
         ):
             names = [x.value for x in node.args if isinstance(x, ast.Constant)]
         if names and id(node) not in unloaded:
-            found |= {next((m for m in (name, name.rpartition(".")[0]) if m in known), None) for name in names}
+            found |= {
+                next((m for m in (name, name.rpartition(".")[0]) if m in known), None)
+                for name in names
+            }
     return found - {None}
 
 
@@ -110,13 +136,27 @@ LAYERS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["layers"][
 def layer(module):
     """The row of the longest name that a module's begins with."""
     held = lambda prefix: f"{module}.".startswith(f"{prefix}.")
-    return max((len(prefix), k) for k, row in enumerate(LAYERS) for prefix in row if held(prefix))[1]
+    return max(
+        (len(prefix), k)
+        for k, row in enumerate(LAYERS)
+        for prefix in row
+        if held(prefix)
+    )[1]
 
 
 def test_modules_import_from_their_own_layer_or_a_lower_one(imported):
-    upward = [f"{a} imports {b}" for a, some in imported.items() for b in some if layer(b) > layer(a)]
+    upward = [
+        f"{a} imports {b}"
+        for a, some in imported.items()
+        for b in some
+        if layer(b) > layer(a)
+    ]
     assert upward == []
-    folders = {name for name in FILES if name.count(".") == 1 and FILES[name].name == "__init__.py"}
+    folders = {
+        name
+        for name in FILES
+        if name.count(".") == 1 and FILES[name].name == "__init__.py"
+    }
     assert {name for name in folders if layer(name) == len(LAYERS) - 1} == {
         "geomech.app",
         "geomech.commands",
@@ -126,15 +166,34 @@ def test_modules_import_from_their_own_layer_or_a_lower_one(imported):
 
 def test_a_scene_is_a_small_class():
     tree = ast.parse((ROOT / "geomech" / "scenes" / "model.py").read_text())
-    (scene,) = (node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == "Scene")
+    (scene,) = (
+        node
+        for node in tree.body
+        if isinstance(node, ast.ClassDef) and node.name == "Scene"
+    )
     assert scene.end_lineno - scene.body[0].end_lineno < 60  # without its docstring
 
 
 def test_what_is_said_of_mutants_is_of_files_that_exist():
-    files = [p.relative_to(ROOT).as_posix() for top in ("rft", "geomech") for p in (ROOT / top).rglob("*.py")]
-    assert [key for key in mutants.TABLE["unwatched"] if not any(f.startswith(key) for f in files)] == []
-    assert {*mutants.TABLE["tests"], *(x["file"] for x in mutants.TABLE["equivalent"])} <= {*files}
-    named = {x for names in (mutants.TABLE["sources"], *mutants.TABLE["tests"].values()) for x in names}
+    files = [
+        p.relative_to(ROOT).as_posix()
+        for top in ("rft", "geomech")
+        for p in (ROOT / top).rglob("*.py")
+    ]
+    assert [
+        key
+        for key in mutants.TABLE["unwatched"]
+        if not any(f.startswith(key) for f in files)
+    ] == []
+    assert {
+        *mutants.TABLE["tests"],
+        *(x["file"] for x in mutants.TABLE["equivalent"]),
+    } <= {*files}
+    named = {
+        x
+        for names in (mutants.TABLE["sources"], *mutants.TABLE["tests"].values())
+        for x in names
+    }
     assert [x for x in named if not (ROOT / f"tests/test_{x}.py").exists()] == []
 
 
@@ -163,15 +222,36 @@ def test_a_command_is_the_function_of_its_file():
     assert files == {name for names in COMMANDS.values() for name in names}
 
 
-SPEAK_OF_OPTIONS = "commands/", "output/", "text/", "cli.py", "terminal.py"  # of geomech: parts of commands alone
+SPEAK_OF_OPTIONS = (
+    "commands/",
+    "output/",
+    "text/",
+    "cli.py",
+    "terminal.py",
+)  # of geomech: parts of commands alone
 
 
 def test_what_python_reaches_names_arguments_and_no_options():
     """A refusal marks an argument, which a command spells as its option (`geomech.terminal`)."""
     texts = []
     for path in sorted(p for x in ("rft", "geomech") for p in (ROOT / x).rglob("*.py")):
-        if not path.relative_to(ROOT).as_posix().removeprefix("geomech/").startswith(SPEAK_OF_OPTIONS):
-            prose = {id(node.value) for node in nodes(path) if isinstance(node, ast.Expr)}
-            found = (n for n in nodes(path) if isinstance(n, ast.Constant) and isinstance(n.value, str))
-            texts += [n.value for n in found if id(n) not in prose and re.search(r"(?<!\w)--[a-z]", n.value)]
+        if (
+            not path.relative_to(ROOT)
+            .as_posix()
+            .removeprefix("geomech/")
+            .startswith(SPEAK_OF_OPTIONS)
+        ):
+            prose = {
+                id(node.value) for node in nodes(path) if isinstance(node, ast.Expr)
+            }
+            found = (
+                n
+                for n in nodes(path)
+                if isinstance(n, ast.Constant) and isinstance(n.value, str)
+            )
+            texts += [
+                n.value
+                for n in found
+                if id(n) not in prose and re.search(r"(?<!\w)--[a-z]", n.value)
+            ]
     assert [x for x in texts if "geomech scenes --show" not in x] == []

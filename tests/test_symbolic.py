@@ -11,7 +11,13 @@ from geomech.gaits import Circle
 from geomech.scenes import Scene
 from geomech.studies.study import Study
 from geomech.symbolic import connections
-from geomech.systems import DifferentialDrive, FloatingChain, IdealFluidSwimmer, NoSlipSnake, Swimmer
+from geomech.systems import (
+    DifferentialDrive,
+    FloatingChain,
+    IdealFluidSwimmer,
+    NoSlipSnake,
+    Swimmer,
+)
 from geomech.systems.framed import formula
 from geomech.tiers.base import Numerics
 from rft import Backbone, Chain, Coulomb, SkinFriction, Viscous, se2
@@ -38,7 +44,9 @@ def test_formulas_give_the_numbers(name):
     wanted = system.velocity(shapes, rates)
     for matrix in (A, short):
         found = symbolic.velocity(matrix, alpha)(shapes, rates)
-        assert (np.abs(found - wanted).max(-1) < 1e-11 * (1 + np.abs(wanted).max(-1))).all()
+        assert (
+            np.abs(found - wanted).max(-1) < 1e-11 * (1 + np.abs(wanted).max(-1))
+        ).all()
     if system.joints == 1:
         return
     ccf = symbolic.ccf(short, alpha)
@@ -47,13 +55,21 @@ def test_formulas_give_the_numbers(name):
     here = np.array([1.1, -0.4])
     of = lambda shape: np.stack([system.velocity(shape, e) for e in np.eye(2)], -1)
     weights, h = (4 / 5, -1 / 5, 4 / 105, -1 / 280), 1e-2
-    slope = lambda e: sum(w * (of(here + k * h * e) - of(here - k * h * e)) for k, w in enumerate(weights, 1)) / h
+    slope = lambda e: (
+        sum(
+            w * (of(here + k * h * e) - of(here - k * h * e))
+            for k, w in enumerate(weights, 1)
+        )
+        / h
+    )
     (first, second), columns = np.eye(2), of(here).T
     dA = slope(first)[:, 1] - slope(second)[:, 0]
     (x1, y1, t1), (x2, y2, t2) = columns
     bracket = [t2 * y1 - t1 * y2, t1 * x2 - t2 * x1, 0]
     found = np.array(sp.lambdify(alpha, list(ccf))(*here), float)
-    np.testing.assert_allclose(found, dA + bracket, atol=1e-9 * np.abs(dA).max() + 1e-12)
+    np.testing.assert_allclose(
+        found, dA + bracket, atol=1e-9 * np.abs(dA).max() + 1e-12
+    )
 
 
 def test_what_floats_is_as_by_hand():
@@ -62,7 +78,9 @@ def test_what_floats_is_as_by_hand():
     D = 13 + 6 * sp.cos(a) + 6 * sp.cos(b) + 2 * sp.cos(a + b)
     A = symbolic.simplified(A, alpha)
     ccf = symbolic.simplified(symbolic.ccf(A, alpha), alpha)
-    wanted = sp.Mul(-4, 3 * sp.sin(a) + 3 * sp.sin(b) + sp.sin(a + b), D**-2, evaluate=False)
+    wanted = sp.Mul(
+        -4, 3 * sp.sin(a) + 3 * sp.sin(b) + sp.sin(a + b), D**-2, evaluate=False
+    )
     assert [str(x) for x in ccf] == ["0", "0", str(wanted)]
     assert A[:2, :] == sp.zeros(2, 2)
 
@@ -74,7 +92,9 @@ def test_the_snake_and_the_cart_are_as_by_hand():
     A, alpha = connections.differential_drive()
     r, w = sorted(A.free_symbols, key=str)
     assert symbolic.ccf(A, alpha) == sp.Matrix([0, -(r**2) / w, 0])
-    assert DifferentialDrive(0.3, 1.5).symbolic()[0] == A.subs({r: sp.Rational(3, 10), w: sp.Rational(3, 2)})
+    assert DifferentialDrive(0.3, 1.5).symbolic()[0] == A.subs(
+        {r: sp.Rational(3, 10), w: sp.Rational(3, 2)}
+    )
 
 
 def test_symbols_stay():
@@ -84,18 +104,35 @@ def test_symbols_stay():
     short = symbolic.simplified(A, alpha)
     assert short.free_symbols == {ratio, *alpha}
     for value in (1.5, 4.0):
-        xi = Swimmer(Viscous(value), Chain((1, 2), frame="link-1")).velocity([0.7], [1.0])
-        np.testing.assert_allclose(np.array(short.subs({ratio: value, alpha[0]: 0.7}), float)[:, 0], xi, atol=1e-13)
+        xi = Swimmer(Viscous(value), Chain((1, 2), frame="link-1")).velocity(
+            [0.7], [1.0]
+        )
+        np.testing.assert_allclose(
+            np.array(short.subs({ratio: value, alpha[0]: 0.7}), float)[:, 0],
+            xi,
+            atol=1e-13,
+        )
 
 
 def test_one_function_has_one_formula():
     """Written in two ways, by products and powers or by sums; what is not even, nor odd, nor of waves alone stays."""
     a, b = alpha = sp.symbols("alpha_1 alpha_2", real=True)
-    one = (sp.sin(a) * sp.cos(b) + sp.cos(a) * sp.sin(b)) * sp.sin(a + b) / (1 + sp.cos(a)) ** 2
+    one = (
+        (sp.sin(a) * sp.cos(b) + sp.cos(a) * sp.sin(b))
+        * sp.sin(a + b)
+        / (1 + sp.cos(a)) ** 2
+    )
     other = (1 - sp.cos(2 * a + 2 * b)) / (8 * sp.cos(a / 2) ** 4)
-    made = [symbolic.simplified(sp.Matrix([x]), alpha)[0] for x in (one, other, one - other)]
+    made = [
+        symbolic.simplified(sp.Matrix([x]), alpha)[0] for x in (one, other, one - other)
+    ]
     assert made == [made[0], made[0], 0] and made[0] != 0
-    assert symbolic.simplified(sp.Matrix([sp.sin(a) / sp.tan(b) ** 0 - sp.sin(b + a - b)]), alpha)[0] == 0
+    assert (
+        symbolic.simplified(
+            sp.Matrix([sp.sin(a) / sp.tan(b) ** 0 - sp.sin(b + a - b)]), alpha
+        )[0]
+        == 0
+    )
     odd = [
         sp.sin(a) + sp.cos(b),
         a * sp.sin(b),
@@ -106,7 +143,12 @@ def test_one_function_has_one_formula():
         0.1 * a,
     ]
     assert symbolic.simplified(sp.Matrix(odd), alpha) == sp.Matrix(odd)
-    third = sp.sin(a / 3) ** 2 + sp.cos(a / 3) ** 2 + sp.sin(a / 5) ** 2 + sp.cos(a / 5) ** 2
+    third = (
+        sp.sin(a / 3) ** 2
+        + sp.cos(a / 3) ** 2
+        + sp.sin(a / 5) ** 2
+        + sp.cos(a / 5) ** 2
+    )
     assert symbolic.simplified(sp.Matrix([third]), alpha)[0] == 2
 
 
@@ -119,12 +161,22 @@ def test_numbers_are_taken_as_they_are_written():
 
 def test_the_area_is_that_of_the_formula():
     """The integral of the exact CCF over a disc is the area tier's."""
-    swimmer, gait = IdealFluidSwimmer(frame="link-2"), Circle(amplitude=0.5, centre=(0.4, -0.1))
+    swimmer, gait = (
+        IdealFluidSwimmer(frame="link-2"),
+        Circle(amplitude=0.5, centre=(0.4, -0.1)),
+    )
     A, alpha = swimmer.symbolic()
-    density = sp.lambdify(alpha, list(symbolic.ccf(symbolic.simplified(A, alpha), alpha)), "numpy", cse=True)
+    density = sp.lambdify(
+        alpha,
+        list(symbolic.ccf(symbolic.simplified(A, alpha), alpha)),
+        "numpy",
+        cse=True,
+    )
     nodes, weights = np.polynomial.legendre.leggauss(12)
     r, t = 0.25 * (nodes + 1)[:, None], 2 * np.pi * np.arange(24) / 24
-    values = np.stack(np.broadcast_arrays(*density(0.4 + r * np.cos(t), -0.1 + r * np.sin(t))))
+    values = np.stack(
+        np.broadcast_arrays(*density(0.4 + r * np.cos(t), -0.1 + r * np.sin(t)))
+    )
     total = (values * r * 0.25 * weights[:, None]).sum((1, 2)) * 2 * np.pi / 24
     area = Study(Scene(swimmer, gait, Numerics(grid=61, extent=1.5))).poses("area")
     np.testing.assert_allclose(area, se2.exp(total), atol=2e-7)
@@ -133,13 +185,20 @@ def test_the_area_is_that_of_the_formula():
 def test_latex_has_one_denominator_in_front():
     A, alpha = FloatingChain().symbolic()
     text = symbolic.latex(symbolic.simplified(A, alpha))
-    assert text.startswith("A = \\frac{1}{D} \\begin{pmatrix}\n0 &\n0 \\\\\n0 &\n0 \\\\\n")
+    assert text.startswith(
+        "A = \\frac{1}{D} \\begin{pmatrix}\n0 &\n0 \\\\\n0 &\n0 \\\\\n"
+    )
     cos = r"\cos{\left(%s \right)}"
-    one, two, both = (cos % x for x in (r"\alpha_{1}", r"\alpha_{2}", r"\alpha_{1} + \alpha_{2}"))
+    one, two, both = (
+        cos % x for x in (r"\alpha_{1}", r"\alpha_{2}", r"\alpha_{1} + \alpha_{2}")
+    )
     assert text.endswith(f"D = 6 {one} + 6 {two} + 2 {both} + 13")
     assert text.count(r"\frac{1}{D}") == 1
     cart = symbolic.latex(DifferentialDrive(0.5).symbolic()[0], "B")
-    assert cart.splitlines()[:2] == [r"B = \begin{pmatrix}", r"\frac{1}{4} &"] and "D" not in cart
+    assert (
+        cart.splitlines()[:2] == [r"B = \begin{pmatrix}", r"\frac{1}{4} &"]
+        and "D" not in cart
+    )
     lone = symbolic.latex(sp.Matrix([1 / sp.cos(alpha[0]), 2 / sp.cos(alpha[0])]))
     lines = [
         r"A = \frac{1}{D} \begin{pmatrix}",
@@ -155,7 +214,9 @@ NONE = {
     "glass": Swimmer(Coulomb(), Chain()),
     "skin": Swimmer(Viscous(), Chain(), (SkinFriction(),)),
     "backbone": Swimmer(Viscous(), Backbone(8)),
-    "modes": Swimmer(Viscous(), Chain((1,) * 4, modes=((1.0, 0.0, 1.0), (0.0, 1.0, 0.0)))),
+    "modes": Swimmer(
+        Viscous(), Chain((1,) * 4, modes=((1.0, 0.0, 1.0), (0.0, 1.0, 0.0)))
+    ),
     "table": SYSTEMS["table"],
 }
 
@@ -174,18 +235,32 @@ def test_the_command_prints_formulas_that_sympy_reads():
         f"CCF_12_{x}" for x in ("x", "y", "theta")
     ]
     read = sp.lambdify(sp.symbols("alpha_1 alpha_2"), sp.sympify(told["A_theta_2"]))
-    assert read(0.3, -0.8) == pytest.approx(scenes.load("three-link-floating").system.velocity([0.3, -0.8], [0, 1])[2])
+    assert read(0.3, -0.8) == pytest.approx(
+        scenes.load("three-link-floating").system.velocity([0.3, -0.8], [0, 1])[2]
+    )
     code, out, err = geomech("symbolic", "differential-drive", "--latex")
     assert (code, err) == (0, "")
-    assert [line for line in out.splitlines() if "=" in line] == [r"A = \begin{pmatrix}", r"F_{12} = \begin{pmatrix}"]
+    assert [line for line in out.splitlines() if "=" in line] == [
+        r"A = \begin{pmatrix}",
+        r"F_{12} = \begin{pmatrix}",
+    ]
     assert len(out.splitlines()) == 2 * 2 + 6 + 3  # an entry a line
     assert "CCF" not in geomech("symbolic", "differential-drive", "--no-ccf")[1]
     code, out, err = geomech("symbolic", "three-link-glass")
-    assert (code, out) == (2, "") and "three-link-glass: a formula is that of a chain" in err
+    assert (code, out) == (
+        2,
+        "",
+    ) and "three-link-glass: a formula is that of a chain" in err
 
 
 def test_a_frame_of_numbers_has_no_formula(tmp_path):
     file = tmp_path / "s.toml"
-    file.write_text('frame = "minimum-perturbation"\n[system]\nkind = "floating-chain"\n[gait]\nkind = "circle"\n')
+    file.write_text(
+        'frame = "minimum-perturbation"\n[system]\nkind = "floating-chain"\n[gait]\nkind = "circle"\n'
+    )
     code, out, err = geomech("symbolic", str(file))
-    assert (code, out) == (2, "") and "no formula in the minimum-perturbation frame, which is a field of numbers" in err
+    assert (
+        (code, out) == (2, "")
+        and "no formula in the minimum-perturbation frame, which is a field of numbers"
+        in err
+    )

@@ -7,7 +7,14 @@ import pytest
 from registry import GAITS, SYSTEMS
 
 from geomech.gaits import Butterfly, Circle, Fourier, Wave
-from geomech.geometry.symmetry import ALWAYS, BACKWARDS, MIRRORED, REFLECTED, RETRACED, zero_components
+from geomech.geometry.symmetry import (
+    ALWAYS,
+    BACKWARDS,
+    MIRRORED,
+    REFLECTED,
+    RETRACED,
+    zero_components,
+)
 from geomech.geometry.traits import Traits
 from geomech.scenes.model import Scene
 from geomech.studies.study import Study
@@ -20,11 +27,21 @@ HEAD_FOR_TAIL = Fourier(cos=((1.0, 0.3), (1.0, -0.3)), sin=((0.2, 0.1), (0.2, -0
 ODD = Fourier(
     cos=((0.5, 0.0, 0.1), (0.1, 0.0, 0.2)), sin=((0.2, 0.0, 0.05), (0.5, 0.0, 0.1))
 )  # and else of no symmetry
-ALIKE = Fourier(cos=((0.5, 0.0), (0.5, 0.0)), sin=((0.0, 0.2), (0.0, 0.2)))  # alpha_1 = alpha_2
-OPPOSITE = Fourier(cos=((0.5, 0.0), (-0.5, 0.0)), sin=((0.0, 0.2), (0.0, -0.2)))  # alpha_1 = -alpha_2
-SINES = Fourier(cos=((0.0, 0.0), (0.0, 0.0)), sin=((0.5, 0.2), (-0.5, 0.2)))  # backwards their own mirror image
-RESTING = Fourier(cos=((0.5, 0.0), (0.0, 0.0)), sin=((0.0, 0.0), (0.3, -0.15)))  # at phase 0, and no retraced path
-BACK = Fourier(cos=((0.5, 0.3), (0.4, 0.1)), sin=((0.0, 0.0), (0.0, 0.0)))  # the same path there and back
+ALIKE = Fourier(
+    cos=((0.5, 0.0), (0.5, 0.0)), sin=((0.0, 0.2), (0.0, 0.2))
+)  # alpha_1 = alpha_2
+OPPOSITE = Fourier(
+    cos=((0.5, 0.0), (-0.5, 0.0)), sin=((0.0, 0.2), (0.0, -0.2))
+)  # alpha_1 = -alpha_2
+SINES = Fourier(
+    cos=((0.0, 0.0), (0.0, 0.0)), sin=((0.5, 0.2), (-0.5, 0.2))
+)  # backwards their own mirror image
+RESTING = Fourier(
+    cos=((0.5, 0.0), (0.0, 0.0)), sin=((0.0, 0.0), (0.3, -0.15))
+)  # at phase 0, and no retraced path
+BACK = Fourier(
+    cos=((0.5, 0.3), (0.4, 0.1)), sin=((0.0, 0.0), (0.0, 0.0))
+)  # the same path there and back
 
 
 @pytest.mark.parametrize(("gait", "traits", "zero"), [
@@ -50,7 +67,11 @@ BACK = Fourier(cos=((0.5, 0.3), (0.4, 0.1)), sin=((0.0, 0.0), (0.0, 0.0)))  # th
     (RESTING, Traits(), []),
 ])  # fmt: skip
 def test_zeros_follow_from_traits_and_curve(gait, traits, zero):
-    assert [*zero_components(traits, gait, [0.5, 1.0])] == [*zero_components(traits, gait)] == zero
+    assert (
+        [*zero_components(traits, gait, [0.5, 1.0])]
+        == [*zero_components(traits, gait)]
+        == zero
+    )
 
 
 @pytest.mark.parametrize(("gait", "reasons"), [
@@ -72,7 +93,9 @@ def test_displacements_have_the_zeros_that_are_claimed(name):
             continue
         small = dataclasses.replace(gait, amplitude=0.5 * gait.amplitude)
         try:
-            table = Study(Scene(system, small, name="s")).study([small.amplitude], ["direct"])
+            table = Study(Scene(system, small, name="s")).study(
+                [small.amplitude], ["direct"]
+            )
         except Refusal:
             continue
         for component in table["zero_by_symmetry"]:

@@ -17,7 +17,13 @@ from geomech.io.tables import sysplotter
 from geomech.io.tables.base import Stored
 from geomech.scenes import Scene
 from geomech.studies import fields
-from geomech.systems import DifferentialDrive, IdealFluidSwimmer, NoSlipSnake, Swimmer, Table
+from geomech.systems import (
+    DifferentialDrive,
+    IdealFluidSwimmer,
+    NoSlipSnake,
+    Swimmer,
+    Table,
+)
 from geomech.systems.table import LENGTHS
 from geomech.text.system import described
 from rft.refusal import Refusal
@@ -51,7 +57,9 @@ def test_a_struct_is_read_whole(version, tmp_path):
     np.testing.assert_array_equal(stored.computed.beta, pose)
     np.testing.assert_array_equal(stored.computed.metric, own.M)
     np.testing.assert_allclose(
-        stored.metric.field(np.zeros(2)), [[0.0073160, 0.0050297], [0.0050297, 0.0073160]], atol=6e-8
+        stored.metric.field(np.zeros(2)),
+        [[0.0073160, 0.0050297], [0.0050297, 0.0073160]],
+        atol=6e-8,
     )
 
 
@@ -62,9 +70,14 @@ def test_lengths_and_drag_are_those_of_its_geometry_and_physics(length, drag, tm
     other = study(write(tmp_path / "b.mat", length=length, drag=drag))
     np.testing.assert_allclose(other.fitted.A, one.fitted.A, rtol=1e-13)
     np.testing.assert_allclose(other.metric.M, one.metric.M, rtol=1e-13)
-    computed, true = other.scene.system.stored.computed, one.scene.system.stored.computed
+    computed, true = (
+        other.scene.system.stored.computed,
+        one.scene.system.stored.computed,
+    )
     np.testing.assert_allclose(computed.ccf, true.ccf, rtol=1e-13)
-    with pytest.raises(Refusal, match="says the body's length itself, 1 BL: drop body_length"):
+    with pytest.raises(
+        Refusal, match="says the body's length itself, 1 BL: drop body_length"
+    ):
         Table(tmp_path / "b.mat", body_length=length)
 
 
@@ -82,16 +95,25 @@ def test_lengths_and_drag_are_those_of_its_geometry_and_physics(length, drag, tm
 def test_base_frames_have_our_names(base, frame, tmp_path):
     table = Table(write(tmp_path / "s.mat", base=base, frame=frame))
     assert table.traits.frame == table.chain.frame == frame
-    np.testing.assert_allclose(table.in_frame("link-2").stored.connection.A, computed()[0].A, atol=1e-12)
+    np.testing.assert_allclose(
+        table.in_frame("link-2").stored.connection.A, computed()[0].A, atol=1e-12
+    )
 
 
 def test_a_base_frame_without_our_name_keeps_its_own(tmp_path):
     table = Table(write(tmp_path / "s.mat", base="tail-tip"))
     assert table.traits.frame == "tail-tip of sysplotter"
-    for base in ([[2.0, 0.5]], [[np.nan]], [[4.0]]):  # as a damaged one, or a matrix, reads
+    for base in (
+        [[2.0, 0.5]],
+        [[np.nan]],
+        [[4.0]],
+    ):  # as a damaged one, or a matrix, reads
         start = Table(write(tmp_path / "t.mat", base=np.array(base)))
         assert start.traits.frame == "that of the table" and start.chain is None
-    with pytest.raises(Refusal, match=r"no frame 'mean' of a table whose frame is 'tail-tip of sysplotter'"):
+    with pytest.raises(
+        Refusal,
+        match=r"no frame 'mean' of a table whose frame is 'tail-tip of sysplotter'",
+    ):
         table.in_frame("mean")
     assert study(tmp_path / "s.mat", frame="minimum-perturbation").fitted.A.any()
 
@@ -99,21 +121,38 @@ def test_a_base_frame_without_our_name_keeps_its_own(tmp_path):
 def test_what_it_computed_agrees_with_ours_but_for_its_elements(tmp_path):
     """On 15 points over +-3 rad differences of neighbours cost its CCF 3.8 % in the middle, linear elements its frame 1 to 2 %
     of the largest pose. A genuine file, on 31 points over +-pi, loses 0.9 and 0.5 %."""
-    source = Study(Scene(SWIMMER, Circle())).with_numerics(grid=61, extent=3.0, phases=64)
+    source = Study(Scene(SWIMMER, Circle())).with_numerics(
+        grid=61, extent=3.0, phases=64
+    )
     table = study(write(tmp_path / "s.mat")).with_numerics(phases=64)
     stored, amplitudes = table.scene.system.stored, [0.5, 1.0, 1.3]
     middle = (slice(None), 7, 7)
-    assert abs(stored.computed.ccf[:, 0][middle][0] / source.curvature.values[:, 30, 30][0] - 1) < 0.04
+    assert (
+        abs(
+            stored.computed.ccf[:, 0][middle][0] / source.curvature.values[:, 30, 30][0]
+            - 1
+        )
+        < 0.04
+    )
     ours = ccf(stored.connection).values
     inner = (slice(None), slice(3, 12), slice(3, 12))
-    off = np.abs(ours - stored.computed.ccf[:, 0])[inner].max((1, 2)) / np.abs(ours).max((1, 2))
+    off = np.abs(ours - stored.computed.ccf[:, 0])[inner].max((1, 2)) / np.abs(
+        ours
+    ).max((1, 2))
     assert (off < [0.12, 0.08, 0.07]).all()
     pose = minimum_perturbation(stored.connection).field.values
-    assert (np.abs(pose - stored.computed.beta).max((1, 2)) < 0.02 * np.abs(pose).max((1, 2))).all()
+    assert (
+        np.abs(pose - stored.computed.beta).max((1, 2))
+        < 0.02 * np.abs(pose).max((1, 2))
+    ).all()
     lengths = [x.effort(None, amplitudes)["path_length"] for x in (table, source)]
     np.testing.assert_allclose(lengths[0], lengths[1], rtol=2e-3)
     for tier in ("path", "direct"):
-        np.testing.assert_allclose(table.poses(tier, None, amplitudes), source.poses(tier, None, amplitudes), atol=2e-4)
+        np.testing.assert_allclose(
+            table.poses(tier, None, amplitudes),
+            source.poses(tier, None, amplitudes),
+            atol=2e-4,
+        )
     best = table.in_frame("minimum-perturbation")
     assert (
         abs(best.curvature.values[0, 7, 7] + 0.0206) < 2e-4
@@ -147,7 +186,10 @@ def spoiled(index, number):
 
 
 CONTENT = ("vecfield", "eval", "content")
-AVEC, METRIC = "s.vecfield.eval.content.Avec", ("metricfield", "metric_eval", "content", "metric")
+AVEC, METRIC = (
+    "s.vecfield.eval.content.Avec",
+    ("metricfield", "metric_eval", "content", "metric"),
+)
 BAD = {
     "not computed": (("vecfield",), None, f"has no {AVEC}: save it by sys_calcsystem, .* _calc.mat$"),
     "no grid": (("grid", "eval"), None, "has no s.grid.eval: save it by"),
@@ -185,36 +227,63 @@ def test_a_bad_struct_is_refused_by_place_and_cure(name, tmp_path):
 def test_a_struct_without_geometry_is_one_of_unknown_lengths_and_frame(tmp_path):
     save(tmp_path / "s.mat", changed(("geometry",), None))
     table = Table(tmp_path / "s.mat")
-    assert (table.assumed, table.traits.frame, table.chain) == ((LENGTHS,), "that of the table", None)
+    assert (table.assumed, table.traits.frame, table.chain) == (
+        (LENGTHS,),
+        "that of the table",
+        None,
+    )
     np.testing.assert_array_equal(table.stored.connection.A, computed()[0].A)
     np.testing.assert_allclose(
-        Table(tmp_path / "s.mat", body_length=2.0).stored.connection.A[:2], computed()[0].A[:2] / 2, rtol=1e-13
+        Table(tmp_path / "s.mat", body_length=2.0).stored.connection.A[:2],
+        computed()[0].A[:2] / 2,
+        rtol=1e-13,
     )
 
 
 def test_singular_shapes_are_not_exported(tmp_path):
-    source = Study(Scene(NoSlipSnake(), Circle(amplitude=0.5, centre=(1.5, -1.5)))).with_numerics(grid=7, extent=2.5)
-    with pytest.raises(Refusal, match="no minimum-perturbation frame of a field with singular shapes: shrink"):
+    source = Study(
+        Scene(NoSlipSnake(), Circle(amplitude=0.5, centre=(1.5, -1.5)))
+    ).with_numerics(grid=7, extent=2.5)
+    with pytest.raises(
+        Refusal,
+        match="no minimum-perturbation frame of a field with singular shapes: shrink",
+    ):
         fields.save_connection(tmp_path / "s.mat", source, layout="struct")
     assert not (tmp_path / "s.mat").exists()
 
 
 def test_sign_and_order_are_its_own(tmp_path):
-    with pytest.raises(Refusal, match="has a struct s, which says sign and order itself: drop sign and order"):
+    with pytest.raises(
+        Refusal,
+        match="has a struct s, which says sign and order itself: drop sign and order",
+    ):
         tables.load(write(tmp_path / "s.mat"), sign="-")
 
 
 def test_a_struct_of_inertia_has_a_metric_without_power(tmp_path):
     table = study(write(tmp_path / "s.mat", system_type="inertia"))
-    assert table.scene.system.traits.power_degree is None and table.metric.M.shape == (2, 2, 15, 15)
-    assert np.isnan(table.effort()["work"]).all() and np.isfinite(table.effort()["path_length"]).all()
+    assert table.scene.system.traits.power_degree is None and table.metric.M.shape == (
+        2,
+        2,
+        15,
+        15,
+    )
+    assert (
+        np.isnan(table.effort()["work"]).all()
+        and np.isfinite(table.effort()["path_length"]).all()
+    )
 
 
-def test_a_file_of_version_7_3_is_refused_in_one_line_where_h5py_is_missing(tmp_path, monkeypatch):
-    (tmp_path / "s.mat").write_bytes(b"MATLAB 7.3 MAT-file".ljust(512) + b"\x89HDF\r\n\x1a\n" + bytes(600))
+def test_a_file_of_version_7_3_is_refused_in_one_line_where_h5py_is_missing(
+    tmp_path, monkeypatch
+):
+    (tmp_path / "s.mat").write_bytes(
+        b"MATLAB 7.3 MAT-file".ljust(512) + b"\x89HDF\r\n\x1a\n" + bytes(600)
+    )
     monkeypatch.setitem(__import__("sys").modules, "h5py", None)
     with pytest.raises(
-        Refusal, match=r"is a MATLAB 7.3 \(HDF5\) file: .* h5py, .* is missing; pip install 'geomech\[hdf5\]', or save"
+        Refusal,
+        match=r"is a MATLAB 7.3 \(HDF5\) file: .* h5py, .* is missing; pip install 'geomech\[hdf5\]', or save",
     ):
         tables.load(tmp_path / "s.mat")
 
@@ -232,7 +301,9 @@ def test_damaged_files_of_version_7_3_are_refused_in_one_line(tmp_path):
             assert np.isfinite(tables.load(tmp_path / "s.mat").connection.A).all()
         except Refusal as refusal:
             said = str(refusal)
-        assert not said or (said.startswith(f"the table {tmp_path / 's.mat'} ") and "\n" not in said)
+        assert not said or (
+            said.startswith(f"the table {tmp_path / 's.mat'} ") and "\n" not in said
+        )
 
 
 def test_parts_of_version_7_3_are_refused_by_place(tmp_path):
@@ -246,7 +317,10 @@ def test_parts_of_version_7_3_are_refused_by_place(tmp_path):
     write(path, 7.3)
     with h5py.File(path, "r+") as file:
         file["s/B_optimized/self"] = file["s"]
-    with pytest.raises(Refusal, match="is damaged at s.B_optimized.self.*: it lies in itself; save it in MATLAB again"):
+    with pytest.raises(
+        Refusal,
+        match="is damaged at s.B_optimized.self.*: it lies in itself; save it in MATLAB again",
+    ):
         tables.load(path)
     write(path, 7.3)
     with h5py.File(path, "r+") as file:
@@ -254,11 +328,15 @@ def test_parts_of_version_7_3_are_refused_by_place(tmp_path):
     raw = bytearray(path.read_bytes())
     raw[place + 40] ^= 8
     path.write_bytes(raw)
-    with pytest.raises(Refusal, match=r"is damaged at s.grid.eval\{1, 1\}: save it in MATLAB again"):
+    with pytest.raises(
+        Refusal, match=r"is damaged at s.grid.eval\{1, 1\}: save it in MATLAB again"
+    ):
         tables.load(path)
 
 
-@pytest.mark.parametrize("frame", ["mean", "link-1", "link-2", "link-3", "minimum-perturbation"])
+@pytest.mark.parametrize(
+    "frame", ["mean", "link-1", "link-2", "link-3", "minimum-perturbation"]
+)
 def test_an_exported_struct_has_all_that_its_scripts_read(frame, tmp_path):
     """Of a body of 0.3 m: read again it is what it was, and loaded by SciPy it has the fields, shapes and signs."""
     uneven = Swimmer(rft.Viscous(2.0), rft.Chain((0.7, 1.4, 0.9), 0.3))
@@ -268,45 +346,91 @@ def test_an_exported_struct_has_all_that_its_scripts_read(frame, tmp_path):
     again = study(tmp_path / "s.mat")
     assert again.scene.frame == frame and again.scene.system.stored.power_degree == 2
     lengths = np.array([0.3, 0.3, 1.0]).reshape(3, 1, 1, 1)
-    np.testing.assert_allclose(again.fitted.A * lengths, source.fitted.A, rtol=1e-13, atol=1e-16)
+    np.testing.assert_allclose(
+        again.fitted.A * lengths, source.fitted.A, rtol=1e-13, atol=1e-16
+    )
     np.testing.assert_allclose(again.metric.M, source.metric.M, rtol=1e-13)
-    np.testing.assert_allclose(again.fitted.residual * lengths[..., 0], source.fitted.residual, rtol=1e-13, atol=1e-16)
+    np.testing.assert_allclose(
+        again.fitted.residual * lengths[..., 0],
+        source.fitted.residual,
+        rtol=1e-13,
+        atol=1e-16,
+    )
     known = again.scene.system.stored.computed
-    np.testing.assert_allclose(known.ccf[:, 0] * lengths[..., 0], source.curvature.values, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(
+        known.ccf[:, 0] * lengths[..., 0],
+        source.curvature.values,
+        rtol=1e-12,
+        atol=1e-15,
+    )
     if frame != "minimum-perturbation":  # which is kept but for the spline
-        np.testing.assert_allclose(known.A_optimised, again.in_frame("minimum-perturbation").fitted.A, atol=1e-9)
+        np.testing.assert_allclose(
+            known.A_optimised,
+            again.in_frame("minimum-perturbation").fitted.A,
+            atol=1e-9,
+        )
     s = loadmat(tmp_path / "s.mat", simplify_cells=True)["s"]
-    assert {"vector", "scalar", "eval", "metric_eval", "metric_display"} <= {*s["grid"]} and s["singularity"] == 0
-    for place, grid in (("eval", "eval"), ("display", "vector"), ("finite_element", "finite_element")):
+    assert {"vector", "scalar", "eval", "metric_eval", "metric_display"} <= {
+        *s["grid"]
+    } and s["singularity"] == 0
+    for place, grid in (
+        ("eval", "eval"),
+        ("display", "vector"),
+        ("finite_element", "finite_element"),
+    ):
         content = s["vecfield"][place]["content"]
         assert s["vecfield"][place]["type"] == grid and content["Avec"].shape == (3, 2)
-        np.testing.assert_array_equal(np.array(content["Avec"].tolist()), -np.array(content["A_num"].tolist()))
+        np.testing.assert_array_equal(
+            np.array(content["Avec"].tolist()), -np.array(content["A_num"].tolist())
+        )
     for ending in ("", "_optimized"):
-        DA, dA, lb = (np.array(s[f"{name}{ending}"].tolist()) for name in ("DA", "dA", "lb"))
+        DA, dA, lb = (
+            np.array(s[f"{name}{ending}"].tolist()) for name in ("DA", "dA", "lb")
+        )
         np.testing.assert_allclose(DA, dA - lb, atol=1e-15)
-    assert s["metricfield"]["metric_display"]["content"]["metric"][0, 0].shape == s["grid"]["metric_display"][0].shape
+    assert (
+        s["metricfield"]["metric_display"]["content"]["metric"][0, 0].shape
+        == s["grid"]["metric_display"][0].shape
+    )
 
 
 def test_an_exported_struct_of_sand_keeps_what_its_fit_left(tmp_path):
-    source = Study(Scene(Swimmer(rft.Granular(1.8, 0.24), SWIMMER.body), Circle())).with_numerics(grid=7, extent=1.5)
+    source = Study(
+        Scene(Swimmer(rft.Granular(1.8, 0.24), SWIMMER.body), Circle())
+    ).with_numerics(grid=7, extent=1.5)
     fields.save_connection(tmp_path / "s.mat", source, layout="struct")
     again = study(tmp_path / "s.mat")
     np.testing.assert_array_equal(again.fitted.residual, source.fitted.residual)
     assert (
-        again.scene.system.stored.metric is None and again.scene.system.table_error(*Circle().cycle(32, 1.0))[0] > 0.05
+        again.scene.system.stored.metric is None
+        and again.scene.system.table_error(*Circle().cycle(32, 1.0))[0] > 0.05
     )
 
 
 def test_a_struct_of_three_joints_is_read(tmp_path):
     four = Swimmer(rft.Viscous(2.0), rft.Chain((1, 1, 1, 1), frame="link-2"))
-    fitted = connection.fit(four.velocity, connection.grid(3, 5, 1.0), 12, traits=four.traits)
+    fitted = connection.fit(
+        four.velocity, connection.grid(3, 5, 1.0), 12, traits=four.traits
+    )
     grid = cell(np.array(np.meshgrid(*fitted.axes, indexing="ij")), (3,))
     content = {"Avec": cell(fitted.A, (3, 3))}
-    geometry = {"linklengths": [1.0, 1, 1, 1], "baseframe": 2.0}  # without a length links are not scaled
-    save(tmp_path / "s.mat", {"geometry": geometry, "grid": {"eval": grid}, "vecfield": {"eval": {"content": content}}})
+    geometry = {
+        "linklengths": [1.0, 1, 1, 1],
+        "baseframe": 2.0,
+    }  # without a length links are not scaled
+    save(
+        tmp_path / "s.mat",
+        {
+            "geometry": geometry,
+            "grid": {"eval": grid},
+            "vecfield": {"eval": {"content": content}},
+        },
+    )
     table = Table(tmp_path / "s.mat")
     assert (table.joints, table.traits.frame, table.chain) == (3, "link-2", four.body)
-    np.testing.assert_allclose(table.stored.connection.A[:2], fitted.A[:2] / 4, rtol=1e-13)
+    np.testing.assert_allclose(
+        table.stored.connection.A[:2], fitted.A[:2] / 4, rtol=1e-13
+    )
     np.testing.assert_array_equal(table.stored.connection.A[2], fitted.A[2])
     assert not [line for line in described(table) if "sysplotter's own" in line]
 
@@ -318,10 +442,15 @@ def test_a_struct_of_three_joints_is_read(tmp_path):
         (lambda A: -A, "of the other sign"),
         (lambda A: A[:, ::-1].swapaxes(-1, -2), "with alpha1 and alpha2 swapped"),
         (lambda A: A[..., ::-1, ::-1], "with both axes mirrored"),
-        (lambda A: -A[..., ::-1, ::-1], "with angles, or y and heading, positive clockwise"),
+        (
+            lambda A: -A[..., ::-1, ::-1],
+            "with angles, or y and heading, positive clockwise",
+        ),
     ],
 )
-def test_a_connection_that_its_body_would_have_with_other_axes_is_noted(change, said, tmp_path):
+def test_a_connection_that_its_body_would_have_with_other_axes_is_noted(
+    change, said, tmp_path
+):
     """By the swimmer in a fluid that its links are; nothing is changed, and a scene that loads it says so in a line."""
     A = change(computed()[0].A)
     content = {"A_num": cell(-A, (3, 2)), "Avec": cell(A, (3, 2))}
@@ -334,15 +463,24 @@ def test_a_connection_that_its_body_would_have_with_other_axes_is_noted(change, 
 
 def test_explain_says_how_far_its_own_numbers_are_from_ours(tmp_path):
     lines = described(Table(write(tmp_path / "s.mat")))
-    (line,) = [line for line in lines if line.startswith("largest difference of sysplotter's own from ours")]
+    (line,) = [
+        line
+        for line in lines
+        if line.startswith("largest difference of sysplotter's own from ours")
+    ]
     assert "CCF of joints 1 and 2 11 %, minimum-perturbation frame 1.6 %" in line
 
 
 def test_a_connection_with_a_denominator_is_that_of_avec(tmp_path):
     """A_num is then no negative of it."""
-    content = {name: cell(x, (3, 2)) for name, x in (("A_num", -2 * computed()[0].A), ("Avec", computed()[0].A))}
+    content = {
+        name: cell(x, (3, 2))
+        for name, x in (("A_num", -2 * computed()[0].A), ("Avec", computed()[0].A))
+    }
     content["A_den"] = cell(np.full_like(computed()[0].A, 2.0), (3, 2))
-    stored = tables.load(write(tmp_path / "s.mat", vecfield={"eval": {"content": content}}))
+    stored = tables.load(
+        write(tmp_path / "s.mat", vecfield={"eval": {"content": content}})
+    )
     np.testing.assert_array_equal(stored.connection.A, computed()[0].A)
 
 
@@ -352,22 +490,41 @@ def test_a_connection_with_a_denominator_is_that_of_avec(tmp_path):
         (DifferentialDrive(), "drag"),
         (IdealFluidSwimmer(), "inertia"),
         (Swimmer(rft.Viscous(2.0), rft.Chain((1,) * 4, modes="serpenoid")), "drag"),
-        (Swimmer(rft.Viscous(2.0), rft.Chain((1,) * 4, frame="link-2", modes=((1, 0, -1), (0, 1, 0)))), "drag"),
+        (
+            Swimmer(
+                rft.Viscous(2.0),
+                rft.Chain((1,) * 4, frame="link-2", modes=((1, 0, -1), (0, 1, 0))),
+            ),
+            "drag",
+        ),
     ],
 )
-def test_systems_of_other_kinds_are_exported_with_what_is_known_of_them(system, kind, tmp_path):
-    source = Study(Scene(system, Circle(amplitude=0.5))).with_numerics(grid=9, extent=1.0)
+def test_systems_of_other_kinds_are_exported_with_what_is_known_of_them(
+    system, kind, tmp_path
+):
+    source = Study(Scene(system, Circle(amplitude=0.5))).with_numerics(
+        grid=9, extent=1.0
+    )
     fields.save_connection(tmp_path / "s.mat", source, layout="struct")
-    s, again = loadmat(tmp_path / "s.mat", simplify_cells=True)["s"], study(tmp_path / "s.mat")
+    s, again = (
+        loadmat(tmp_path / "s.mat", simplify_cells=True)["s"],
+        study(tmp_path / "s.mat"),
+    )
     assert s["system_type"] == kind
-    np.testing.assert_allclose(again.fitted.A, source.fitted.A / [[[[system.length]]], [[[system.length]]], [[[1.0]]]])
+    np.testing.assert_allclose(
+        again.fitted.A,
+        source.fitted.A / [[[[system.length]]], [[[system.length]]], [[[1.0]]]],
+    )
     metric = again.scene.system.stored.metric
     if kind == "inertia":
         np.testing.assert_allclose(metric.M, source.metric.M)
-    assert again.scene.system.stored.power_degree == (2 if kind == "drag" and metric else None)
+    assert again.scene.system.stored.power_degree == (
+        2 if kind == "drag" and metric else None
+    )
     modes = getattr(getattr(system, "body", None), "modes", None)
     assert (
-        again.scene.system.chain == (None if modes is None or isinstance(modes, str) else system.body)
+        again.scene.system.chain
+        == (None if modes is None or isinstance(modes, str) else system.body)
         or kind == "inertia"
     )
 
@@ -388,7 +545,10 @@ def cubic(axes, seed):
 def uneven(change=lambda s: None):
     """A struct in which every array is another, of a body of three links 0.5 long in all."""
     many = lambda lead, seed, axes=AXES: cell(
-        np.array([cubic(axes, seed + k) for k in range(np.prod(lead))]).reshape(*lead, *map(len, axes)), lead
+        np.array([cubic(axes, seed + k) for k in range(np.prod(lead))]).reshape(
+            *lead, *map(len, axes)
+        ),
+        lead,
     )
     metric = [many((1,), k, OWN)[0, 0] for k in (90, 91, 92)]
     M = np.array([[metric[0], metric[1]], [metric[1], metric[2]]])
@@ -411,7 +571,9 @@ def read(change=lambda s: None):
 
 
 def of(lead, seed):
-    return np.array([cubic(AXES, seed + k) for k in range(np.prod(lead))]).reshape(*lead, 5, 4)
+    return np.array([cubic(AXES, seed + k) for k in range(np.prod(lead))]).reshape(
+        *lead, 5, 4
+    )
 
 
 def test_every_array_of_a_struct_is_where_it_belongs():
@@ -429,11 +591,23 @@ def test_every_array_of_a_struct_is_where_it_belongs():
     scale = 2.0 * 0.5**3
     M = [[cubic(AXES, 90), cubic(AXES, 91)], [cubic(AXES, 91), cubic(AXES, 92)]]
     np.testing.assert_allclose(held.metric.M * scale, M, atol=1e-12)
-    for found, wanted in zip((*held.connection.axes, *held.computed.metric_axes), (*AXES, *OWN)):
+    for found, wanted in zip(
+        (*held.connection.axes, *held.computed.metric_axes), (*AXES, *OWN)
+    ):
         np.testing.assert_array_equal(found, wanted)
-    np.testing.assert_allclose(held.computed.metric[0, 1] * scale, cubic(OWN, 91), rtol=1e-13)
-    assert (held.connection.degree, held.metric.degree, held.power_degree, held.sha256) == (3, 3, 2.0, "0f")
-    assert held.body == {"lengths": [0.1, 0.15, 0.25], "frame": "link-3"} and held.frame == "link-3"
+    np.testing.assert_allclose(
+        held.computed.metric[0, 1] * scale, cubic(OWN, 91), rtol=1e-13
+    )
+    assert (
+        held.connection.degree,
+        held.metric.degree,
+        held.power_degree,
+        held.sha256,
+    ) == (3, 3, 2.0, "0f")
+    assert (
+        held.body == {"lengths": [0.1, 0.15, 0.25], "frame": "link-3"}
+        and held.frame == "link-3"
+    )
     assert (held.sized, held.connection.unit, held.connection.length, held.shapes) == (
         True,
         "BL",
@@ -442,19 +616,40 @@ def test_every_array_of_a_struct_is_where_it_belongs():
     )
 
     def less(s):
-        del s["DA"], s["B_optimized"], s["metricfield"], s["geomech_fit_residual"], s["geometry"]["length"]
+        del (
+            s["DA"],
+            s["B_optimized"],
+            s["metricfield"],
+            s["geomech_fit_residual"],
+            s["geometry"]["length"],
+        )
         del s["DA_optimized"], s["vecfield"]["eval"]["content"]["Avec_optimized"]
 
     bare = read(less)
-    assert np.isnan(bare.connection.residual).all() and bare.metric is bare.power_degree is None
+    assert (
+        np.isnan(bare.connection.residual).all()
+        and bare.metric is bare.power_degree is None
+    )
     assert all(
         x is None
-        for x in (bare.computed.A_optimised, bare.computed.beta, bare.computed.ccf, bare.computed.ccf_optimised)
+        for x in (
+            bare.computed.A_optimised,
+            bare.computed.beta,
+            bare.computed.ccf,
+            bare.computed.ccf_optimised,
+        )
     )
-    np.testing.assert_allclose(bare.connection.A, two * of((3, 2), 0), rtol=1e-13)  # by the lengths of its links
+    np.testing.assert_allclose(
+        bare.connection.A, two * of((3, 2), 0), rtol=1e-13
+    )  # by the lengths of its links
     del (unknown := uneven(less))["geometry"]
     plain = sysplotter.parse(unknown, "", "", "")
-    assert (plain.sized, plain.body, plain.frame, plain.connection.length) == (False, None, "that of the table", None)
+    assert (plain.sized, plain.body, plain.frame, plain.connection.length) == (
+        False,
+        None,
+        "that of the table",
+        None,
+    )
     np.testing.assert_array_equal(plain.connection.A, of((3, 2), 0))
     inertia = read(lambda s: s.update(system_type="inertia"))
     assert inertia.power_degree is None
@@ -481,7 +676,9 @@ def test_every_array_of_a_struct_is_where_it_belongs():
          {"lengths": [1.0, 2.0, 3.0], "frame": "link-3"}, "link-3", 0.99e9),
     ],
 )  # fmt: skip
-def test_bodies_of_structs_are_chains_where_their_frame_is_known(geometry, body, frame, length):
+def test_bodies_of_structs_are_chains_where_their_frame_is_known(
+    geometry, body, frame, length
+):
     assert sysplotter._body({"geometry": geometry}) == (body, frame, length)
 
 
@@ -544,7 +741,9 @@ def test_what_is_compared_is_the_middle_half_of_the_grid():
     ours = (
         ccf(c).values,
         frame.field.values,
-        ccf(Connection(c.axes, frame.connection(c), c.residual, c.speed, c.degree)).values,
+        ccf(
+            Connection(c.axes, frame.connection(c), c.residual, c.speed, c.degree)
+        ).values,
     )
     largest = [np.abs(x).max((1, 2)) for x in ours]
     assert min(x.max() for x in largest) > 1e-3
@@ -553,9 +752,19 @@ def test_what_is_compared_is_the_middle_half_of_the_grid():
         for x, most, share in zip(theirs, largest, (0.02, -0.03, 0.04)):
             x[0, place, 7] += share * most[0]
             x[:, 0, 0] += 5 * most
-        known = sysplotter.Computed(beta=theirs[1], ccf=theirs[0][:, None], ccf_optimised=theirs[2][:, None])
+        known = sysplotter.Computed(
+            beta=theirs[1], ccf=theirs[0][:, None], ccf_optimised=theirs[2][:, None]
+        )
         found = sysplotter.compared(Stored(c, computed=known))
-        names = "CCF of joints 1 and 2", "minimum-perturbation frame", "CCF in that frame"
+        names = (
+            "CCF of joints 1 and 2",
+            "minimum-perturbation frame",
+            "CCF in that frame",
+        )
         assert tuple(found) == names
-        np.testing.assert_allclose([*found.values()], [0.02, 0.03, 0.04] if inside else 0.0, atol=1e-9)
-    assert list(sysplotter.compared(Stored(c, computed=sysplotter.Computed(beta=ours[1])))) == [names[1]]
+        np.testing.assert_allclose(
+            [*found.values()], [0.02, 0.03, 0.04] if inside else 0.0, atol=1e-9
+        )
+    assert list(
+        sysplotter.compared(Stored(c, computed=sysplotter.Computed(beta=ours[1])))
+    ) == [names[1]]

@@ -47,7 +47,13 @@ GAIT = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.3, -0.2))
 
 
 def study(medium=GLASS, body=UNEVEN, **numerics):
-    return Study(Scene(Swimmer(medium, body), GAIT, Numerics(**{"grid": 9, "extent": 2.0, "harmonics": 5, **numerics})))
+    return Study(
+        Scene(
+            Swimmer(medium, body),
+            GAIT,
+            Numerics(**{"grid": 9, "extent": 2.0, "harmonics": 5, **numerics}),
+        )
+    )
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +68,9 @@ def made(tmp_path_factory):
 def same(a: Connection, b: Connection):
     assert len(a.axes) == len(b.axes) and a.degree == b.degree
     assert a.size == b.size
-    for x, y in zip((*a.axes, a.A, a.residual, a.speed), (*b.axes, b.A, b.residual, b.speed)):
+    for x, y in zip(
+        (*a.axes, a.A, a.residual, a.speed), (*b.axes, b.A, b.residual, b.speed)
+    ):
         np.testing.assert_array_equal(x, y)
 
 
@@ -70,24 +78,48 @@ def test_netcdf_gives_back_every_digit(made):
     folder, s = made
     same(Connection.load(folder / "a.nc"), s.fitted)
     held = tables.load(folder / "a.nc")
-    np.testing.assert_array_equal(held.harmonics.coefficients, s.table("harmonic").coefficients)
+    np.testing.assert_array_equal(
+        held.harmonics.coefficients, s.table("harmonic").coefficients
+    )
     np.testing.assert_array_equal(held.harmonics.residual, s.table("harmonic").residual)
-    assert (held.length, held.unit, held.frame, held.sign, held.assumptions) == (0.3, "m", "link-1", "+", ())
+    assert (held.length, held.unit, held.frame, held.sign, held.assumptions) == (
+        0.3,
+        "m",
+        "link-1",
+        "+",
+        (),
+    )
     assert held.mirror and not tables.load(folder / "a.mat").harmonics
-    for off, mirror in ((1e-11, True), (1e-7, False)):  # of the largest A, where some are 0
-        A = held.connection.A + off * np.abs(held.connection.A).max() * (np.arange(s.fitted.A[0, 0].size) == 3).reshape(
-            s.fitted.A[0, 0].shape
+    for off, mirror in (
+        (1e-11, True),
+        (1e-7, False),
+    ):  # of the largest A, where some are 0
+        A = held.connection.A + off * np.abs(held.connection.A).max() * (
+            np.arange(s.fitted.A[0, 0].size) == 3
+        ).reshape(s.fitted.A[0, 0].shape)
+        moved = dataclasses.replace(
+            held, connection=dataclasses.replace(held.connection, A=A)
         )
-        moved = dataclasses.replace(held, connection=dataclasses.replace(held.connection, A=A))
         assert moved.mirror == mirror and np.abs(A).min() < 1e-12
 
 
 def test_netcdf_of_three_joints_and_of_singular_shapes(tmp_path):
     wave = Fourier(cos=((0.2,), (0.1,), (0.0,)), sin=((0.0,), (0.3,), (0.4,)))
-    five = Study(Scene(Swimmer(GLASS, rft.Chain((1, 2, 1.5, 1))), wave, Numerics(grid=5, extent=1.1, interpolation=2)))
+    five = Study(
+        Scene(
+            Swimmer(GLASS, rft.Chain((1, 2, 1.5, 1))),
+            wave,
+            Numerics(grid=5, extent=1.1, interpolation=2),
+        )
+    )
     fields.save_connection(tmp_path / "a.nc", five)
     same(Connection.load(tmp_path / "a.nc"), five.fitted)
-    assert Study(Scene(Table(tmp_path / "a.nc"), wave)).tiers == ("area", "adapted", "path", "direct")
+    assert Study(Scene(Table(tmp_path / "a.nc"), wave)).tiers == (
+        "area",
+        "adapted",
+        "path",
+        "direct",
+    )
     snake = Study(Scene(NoSlipSnake(), GAIT, Numerics(grid=7)))
     fields.save_connection(tmp_path / "b.nc", snake)
     same(Connection.load(tmp_path / "b.nc"), snake.fitted)
@@ -96,7 +128,10 @@ def test_netcdf_of_three_joints_and_of_singular_shapes(tmp_path):
     np.testing.assert_array_equal(again.A, snake.fitted.A)
     np.testing.assert_array_equal(again.residual, snake.fitted.residual)
     for name in ("b.nc", "b.mat"):
-        with pytest.raises(ValueError, match="has singular shapes .nan., and nothing is looked up between those$"):
+        with pytest.raises(
+            ValueError,
+            match="has singular shapes .nan., and nothing is looked up between those$",
+        ):
             Table(tmp_path / name)
 
 
@@ -113,7 +148,11 @@ def test_a_mat_round_trip_keeps_every_digit(sign, order, made, tmp_path):
     again = Study(Scene(Table(tmp_path / "a.mat"), GAIT))
     np.testing.assert_array_equal(again.fitted.A, s.fitted.A)
     np.testing.assert_array_equal(again.fitted.residual, s.fitted.residual)
-    assert (length_unit(again.scene.system), again.scene.system.length, again.scene.frame) == ("m", 0.3, "link-1")
+    assert (
+        length_unit(again.scene.system),
+        again.scene.system.length,
+        again.scene.frame,
+    ) == ("m", 0.3, "link-1")
     fields.save_connection(tmp_path / "b.mat", again, sign=sign, order=order)
     more = loadmat(tmp_path / "b.mat")
     for name in ("alpha1", "alpha2", "Ax1", "Ax2", "Ay1", "Ay2", "Atheta1", "Atheta2"):
@@ -126,7 +165,9 @@ def test_a_mat_file_takes_two_joints_and_says_why(links, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(Study, "compute_field", None)
     gait = Fourier(cos=((0.2,),) * (links - 1), sin=((0.1,),) * (links - 1))
-    scene = Scene(Swimmer(rft.Viscous(2.0), rft.Chain((1,) * links)), gait, Numerics(grid=5))
+    scene = Scene(
+        Swimmer(rft.Viscous(2.0), rft.Chain((1,) * links)), gait, Numerics(grid=5)
+    )
     Path("mine.toml").write_text(scenes.toml(scene))
     said = f"a .mat file has a layout of 2 joints, and this body has {links - 1}: write a .nc file"
     with pytest.raises(Refusal, match=said):
@@ -139,19 +180,29 @@ def test_a_mat_file_takes_two_joints_and_says_why(links, tmp_path, monkeypatch):
 
 def test_a_connection_of_one_joint_is_not_drawn(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    scene = Scene(Swimmer(rft.Viscous(2.0), rft.Chain((1, 1))), Fourier(cos=((0.2,),), sin=((0.1,),)), Numerics(grid=5))
+    scene = Scene(
+        Swimmer(rft.Viscous(2.0), rft.Chain((1, 1))),
+        Fourier(cos=((0.2,),), sin=((0.1,),)),
+        Numerics(grid=5),
+    )
     Path("mine.toml").write_text(scenes.toml(scene))
     for command in (
         ("connection", "mine.toml", "-o", "a.nc", "--plot", "a.png"),
         ("ccf", "mine.toml", "--plot", "a.png"),
     ):
         code, _, err = geomech(*command)
-        assert code == 2 and "mine.toml: a body of one joint has no map, a loop of it encloses no area" in err
+        assert (
+            code == 2
+            and "mine.toml: a body of one joint has no map, a loop of it encloses no area"
+            in err
+        )
     assert [*tmp_path.iterdir()] == [tmp_path / "mine.toml"]
 
 
 @pytest.mark.parametrize("ending", [".nc", ".mat"])
-def test_intervals_of_a_table_of_ones_own_are_kept_and_part_of_its_error(ending, made, tmp_path):
+def test_intervals_of_a_table_of_ones_own_are_kept_and_part_of_its_error(
+    ending, made, tmp_path
+):
     """Of whatever file has them beside A, on a grid of its own."""
     folder, s = made
     error = 0.01 * np.random.default_rng(0).uniform(1, 2, s.fitted.A.shape)
@@ -162,9 +213,16 @@ def test_intervals_of_a_table_of_ones_own_are_kept_and_part_of_its_error(ending,
         data.attrs["level"] = 0.9
         path.write_bytes(data.to_netcdf(engine="scipy", format="NETCDF3_64BIT"))
     else:
-        plain_mat(path, s.fitted, geomech_A_error=error, geomech_about=json.dumps({"sign": "+", "level": 0.9}))
+        plain_mat(
+            path,
+            s.fitted,
+            geomech_A_error=error,
+            geomech_about=json.dumps({"sign": "+", "level": 0.9}),
+        )
         halves = Table(path, body_length=2.0).table("A_error")
-        np.testing.assert_allclose(halves, error * np.array([0.5, 0.5, 1]).reshape(3, 1, 1, 1))
+        np.testing.assert_allclose(
+            halves, error * np.array([0.5, 0.5, 1]).reshape(3, 1, 1, 1)
+        )
     table = Study(Scene(Table(path), GAIT))
     np.testing.assert_array_equal(table.to_xarray().A_error, error)
     fields.save_connection(tmp_path / "b.nc", table)
@@ -187,13 +245,21 @@ def test_intervals_of_a_table_of_ones_own_are_kept_and_part_of_its_error(ending,
 @pytest.mark.parametrize(
     ("error", "said"),
     [
-        (np.ones((3, 2, 9, 8)), r"A_error of shape \(3, 2, 9, 8\) where A has \(3, 2, 9, 9\)"),
+        (
+            np.ones((3, 2, 9, 8)),
+            r"A_error of shape \(3, 2, 9, 8\) where A has \(3, 2, 9, 9\)",
+        ),
         (-np.ones((3, 2, 9, 9)), "A_error below 0"),
         (np.full((3, 2, 9, 9), np.nan), "A_error that is not finite"),
     ],
 )
 def test_intervals_that_are_none_are_refused(error, said, made, tmp_path):
-    plain_mat(tmp_path / "a.mat", made[1].fitted, geomech_A_error=error, geomech_about=json.dumps({"sign": "+"}))
+    plain_mat(
+        tmp_path / "a.mat",
+        made[1].fitted,
+        geomech_A_error=error,
+        geomech_about=json.dumps({"sign": "+"}),
+    )
     with pytest.raises(Refusal, match=said):
         tables.load(tmp_path / "a.mat")
 
@@ -202,7 +268,11 @@ def plain_mat(path, c: Connection, sign=1.0, order="ndgrid", **more):
     """As sysplotter has it, and nothing beside."""
     run = (lambda x: x) if order == "ndgrid" else np.transpose
     shapes = np.meshgrid(*c.axes, indexing="ij")
-    rows = {f"A{row}{k + 1}": run(sign * c.A[i, k]) for i, row in enumerate(("x", "y", "theta")) for k in (0, 1)}
+    rows = {
+        f"A{row}{k + 1}": run(sign * c.A[i, k])
+        for i, row in enumerate(("x", "y", "theta"))
+        for k in (0, 1)
+    }
     savemat(path, {"alpha1": run(shapes[0]), "alpha2": run(shapes[1]), **rows, **more})
 
 
@@ -242,8 +312,12 @@ def test_a_sign_that_is_made_out_is_noted_once(args, tmp_path, monkeypatch):
 
 def test_a_sign_that_cannot_be_made_out_is_asked_for(tmp_path):
     c = study().fitted
-    plain_mat(tmp_path / "a.mat", Connection(c.axes, np.ones_like(c.A), c.residual, c.speed))
-    with pytest.raises(Refusal, match=r"a\.mat does not tell the sign of A: say sign = '\+'"):
+    plain_mat(
+        tmp_path / "a.mat", Connection(c.axes, np.ones_like(c.A), c.residual, c.speed)
+    )
+    with pytest.raises(
+        Refusal, match=r"a\.mat does not tell the sign of A: say sign = '\+'"
+    ):
         tables.load(tmp_path / "a.mat")
     assert tables.load(tmp_path / "a.mat", "-").connection.A[0, 0, 0, 0] == -1
 
@@ -255,13 +329,19 @@ def test_rows_of_angles_need_an_order(tmp_path):
     savemat(tmp_path / "a.mat", {**found, "alpha1": c.axes[0], "alpha2": c.axes[1]})
     with pytest.raises(Refusal, match="leave the order open: say order"):
         tables.load(tmp_path / "a.mat")
-    np.testing.assert_array_equal(tables.load(tmp_path / "a.mat", order="ndgrid").connection.A, c.A)
+    np.testing.assert_array_equal(
+        tables.load(tmp_path / "a.mat", order="ndgrid").connection.A, c.A
+    )
     plain_mat(tmp_path / "a.mat", c)
     with pytest.raises(Refusal, match="arrays that run as ndgrid's"):
         tables.load(tmp_path / "a.mat", order="meshgrid")
 
 
-BODIES = {"even": rft.Chain((1, 1, 1)), "uneven": UNEVEN, "short head": rft.Chain((1, 1.3, 0.6), frame="link-2")}
+BODIES = {
+    "even": rft.Chain((1, 1, 1)),
+    "uneven": UNEVEN,
+    "short head": rft.Chain((1, 1.3, 0.6), frame="link-2"),
+}
 GAITS = (
     Circle(),
     Circle(centre=(0.4, -0.3), reverse=True),
@@ -277,7 +357,9 @@ GAITS = (
         ("uneven", CLOSE, ".mat"), ("even", rft.Viscous(3.0), ".mat"),
     ],
 )  # fmt: skip
-def test_a_table_predicts_what_its_scene_predicts_within_its_error(body, medium, ending, tmp_path):
+def test_a_table_predicts_what_its_scene_predicts_within_its_error(
+    body, medium, ending, tmp_path
+):
     source = study(medium, BODIES[body], grid=21, extent=2.3, harmonics=9)
     fields.save_connection(tmp_path / f"a{ending}", source)
     table = Study(Scene(Table(tmp_path / f"a{ending}"), GAIT))
@@ -288,36 +370,72 @@ def test_a_table_predicts_what_its_scene_predicts_within_its_error(body, medium,
         told = table.study(amplitudes, ["area", "path", "harmonic", "direct"], gait)
         for tier in ("area", "path", "harmonic", "direct"):
             off = np.array(told[tier]) - true
-            assert (np.hypot(*off.T[:2]) <= np.array(told["estimate"][tier]) + 1e-12).all(), (tier, gait)
-            assert (np.abs(off[:, 2]) <= np.array(told["estimate_heading"][tier]) + 1e-12).all(), (tier, gait)
-        ratios += list(np.array(told["estimate"]["direct"]) / np.hypot(*(np.array(told["direct"]) - true).T[:2]))
+            assert (
+                np.hypot(*off.T[:2]) <= np.array(told["estimate"][tier]) + 1e-12
+            ).all(), (tier, gait)
+            assert (
+                np.abs(off[:, 2]) <= np.array(told["estimate_heading"][tier]) + 1e-12
+            ).all(), (tier, gait)
+        ratios += list(
+            np.array(told["estimate"]["direct"])
+            / np.hypot(*(np.array(told["direct"]) - true).T[:2])
+        )
         for tier in ("area", "path"):  # of the same connection
             np.testing.assert_allclose(
-                told[tier], source.with_numerics(interpolation=3).poses(tier, gait, amplitudes), atol=2e-5
+                told[tier],
+                source.with_numerics(interpolation=3).poses(tier, gait, amplitudes),
+                atol=2e-5,
             )
     assert np.median(ratios) < 60  # honest, not helpless
     if ending == ".nc" and medium.dry:
-        assert max(told["estimate"]["direct"]) < 0.02 * length  # by its harmonics: of A alone it is 0.1 or more
+        assert (
+            max(told["estimate"]["direct"]) < 0.02 * length
+        )  # by its harmonics: of A alone it is 0.1 or more
 
 
 def random_scene(rng):
     """A three-link swimmer in any medium, half of those in sand with skin friction, a gait that reaches the field's edge."""
     k = rng.integers(4)
-    sands = rft.Granular(10 ** rng.uniform(-1, 1), rng.uniform(0.1, 1.2)), GLASS, rft.Coulomb()
+    sands = (
+        rft.Granular(10 ** rng.uniform(-1, 1), rng.uniform(0.1, 1.2)),
+        GLASS,
+        rft.Coulomb(),
+    )
     medium = sands[k] if k < 3 else rft.Viscous(10 ** rng.uniform(0.1, 1.5))
     skin = rft.SkinFriction(*rng.uniform(0.05, 0.3, 2))
     body = rft.Chain(
-        tuple(rng.uniform(0.5, 2, 3)), rng.uniform(0.1, 3), ("mean", "link-1", "link-2", "link-3")[rng.integers(4)]
+        tuple(rng.uniform(0.5, 2, 3)),
+        rng.uniform(0.1, 3),
+        ("mean", "link-1", "link-2", "link-3")[rng.integers(4)],
     )
     extent = rng.uniform(1.2, 2.6)
-    numerics = Numerics(grid=int(rng.integers(9, 33)), extent=extent, harmonics=int(2 * rng.integers(0, 8) + 1))
-    where = {"centre": tuple(0.3 * extent * rng.uniform(-1, 1, 2)), "reverse": bool(rng.integers(2))}
-    ellipse = Ellipse(semi_axes=tuple(rng.uniform(0.2, 1, 2)), tilt=rng.uniform(0, 3), **where)
-    fourier = Fourier(cos=((0.5, 0.1), (0.0, 0.2)), sin=((0.0, 0.3), (0.6, 0.0)), **where)
+    numerics = Numerics(
+        grid=int(rng.integers(9, 33)),
+        extent=extent,
+        harmonics=int(2 * rng.integers(0, 8) + 1),
+    )
+    where = {
+        "centre": tuple(0.3 * extent * rng.uniform(-1, 1, 2)),
+        "reverse": bool(rng.integers(2)),
+    }
+    ellipse = Ellipse(
+        semi_axes=tuple(rng.uniform(0.2, 1, 2)), tilt=rng.uniform(0, 3), **where
+    )
+    fourier = Fourier(
+        cos=((0.5, 0.1), (0.0, 0.2)), sin=((0.0, 0.3), (0.6, 0.0)), **where
+    )
     gait = (Circle(**where), ellipse, Butterfly(**where), fourier)[rng.integers(4)]
-    room = 0.98 * (extent - np.abs(gait.centre).max()) / np.abs(gait.unit(np.linspace(0, 2 * np.pi, 500))).max()
+    room = (
+        0.98
+        * (extent - np.abs(gait.centre).max())
+        / np.abs(gait.unit(np.linspace(0, 2 * np.pi, 500))).max()
+    )
     effects = (skin,) if k < 3 and rng.integers(2) else ()
-    return Scene(Swimmer(medium, body, effects), dataclasses.replace(gait, amplitude=room), numerics)
+    return Scene(
+        Swimmer(medium, body, effects),
+        dataclasses.replace(gait, amplitude=room),
+        numerics,
+    )
 
 
 @pytest.mark.soak
@@ -329,13 +447,19 @@ def test_errors_of_tables_of_random_scenes_cover(tmp_path):
         amplitudes = gait.amplitude * np.array([0.3, 0.7, 1.0])
         for ending in ratios:
             fields.save_connection(tmp_path / f"a{ending}", source)
-            poses, errors = estimate.direct(Scene(Table(tmp_path / f"a{ending}"), gait), gait, amplitudes, 256)
-            off = estimate.pose_distance(poses, source.poses("direct", None, amplitudes), length)
+            poses, errors = estimate.direct(
+                Scene(Table(tmp_path / f"a{ending}"), gait), gait, amplitudes, 256
+            )
+            off = estimate.pose_distance(
+                poses, source.poses("direct", None, amplitudes), length
+            )
             ratios[ending].append(errors / np.maximum(off, 1e-12))
     for ending, found in ratios.items():
         found = np.array(found)
         covered, median = (found >= 1).mean((0, 1)), np.median(found[..., 0])
-        print(f"{ending}: {found.size // 2} positions and headings, covered {covered}, median {median:.3g} errors")
+        print(
+            f"{ending}: {found.size // 2} positions and headings, covered {covered}, median {median:.3g} errors"
+        )
         assert (covered >= 0.98).all() and median < 25
 
 
@@ -344,9 +468,14 @@ def test_what_is_even_in_alphadot_is_part_of_the_error(ending, tmp_path):
     """Skin friction that tells forwards from backwards: A, and odd harmonics, know nothing of it."""
     swimmer = Swimmer(GLASS, UNEVEN, (rft.SkinFriction(0.05, 0.25),))
     source = Study(Scene(swimmer, GAIT, Numerics(grid=15, extent=2.0, harmonics=9)))
-    alpha, unit = np.array([source.fitted.axes[0][3], source.fitted.axes[1][10]]), connection.directions(2, 8)
+    alpha, unit = (
+        np.array([source.fitted.axes[0][3], source.fitted.axes[1][10]]),
+        connection.directions(2, 8),
+    )
     both = swimmer.velocity(alpha, unit) + swimmer.velocity(alpha, -unit)
-    np.testing.assert_allclose(source.even_part[:, 3, 10], np.sqrt((both**2).mean(0)), rtol=1e-6)
+    np.testing.assert_allclose(
+        source.even_part[:, 3, 10], np.sqrt((both**2).mean(0)), rtol=1e-6
+    )
     assert study().even_part is None
     fields.save_connection(tmp_path / f"a{ending}", source)
     table = Scene(Table(tmp_path / f"a{ending}"), GAIT)
@@ -354,11 +483,15 @@ def test_what_is_even_in_alphadot_is_part_of_the_error(ending, tmp_path):
     for gait in (GAIT, Circle(amplitude=1.2), Butterfly(amplitude=0.8)):
         amplitudes = gait.amplitude * np.array([0.3, 0.8, 1.1])
         poses, errors = estimate.direct(table, gait, amplitudes, 128)
-        off = estimate.pose_distance(poses, source.poses("direct", gait, amplitudes), 0.3)
+        off = estimate.pose_distance(
+            poses, source.poses("direct", gait, amplitudes), 0.3
+        )
         assert (off <= errors).all()
     if ending == ".nc":
         fields.save_connection(tmp_path / "b.nc", Study(table))
-        np.testing.assert_array_equal(tables.load(tmp_path / "b.nc").even, source.even_part)
+        np.testing.assert_array_equal(
+            tables.load(tmp_path / "b.nc").even, source.even_part
+        )
 
 
 def test_a_bare_mat_file_becomes_netcdf_that_says_what_it_does_not_know(made, tmp_path):
@@ -376,7 +509,9 @@ def test_a_bare_mat_file_becomes_netcdf_that_says_what_it_does_not_know(made, tm
 def test_every_command_works_on_a_table_or_says_why_not(made, tmp_path, monkeypatch):
     folder, s = made
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(plots, "save", lambda fig, *paths: [Path(path).touch() for path in paths])
+    monkeypatch.setattr(
+        plots, "save", lambda fig, *paths: [Path(path).touch() for path in paths]
+    )
     (tmp_path / "t").mkdir()
     (tmp_path / "t" / "a.nc").write_bytes((folder / "a.nc").read_bytes())
     text = '[system]\nkind = "table"\nfile = "a.nc"\n[gait]\nkind = "circle"\namplitude = 0.8\n'
@@ -396,15 +531,23 @@ def test_every_command_works_on_a_table_or_says_why_not(made, tmp_path, monkeypa
         code, out, err = geomech(*args)
         assert (code, err) == (0, ""), (args, err)
         if args[0] == "velocity":
-            xi = tables.load(folder / "a.nc").harmonics.velocity(np.array([0.5, 0.3]), np.array([1.0, 0.0]))
+            xi = tables.load(folder / "a.nc").harmonics.velocity(
+                np.array([0.5, 0.3]), np.array([1.0, 0.0])
+            )
             np.testing.assert_allclose(json.loads(out)["xi"], xi)
     same(Connection.load("b.nc"), s.fitted)
     assert geomech("displacement", "t/t.toml", "--amplitudes", "5")[0] == 2
     before = (tmp_path / "t" / "a.nc").read_bytes()
     for args, said in (
         (("connection", "t/t.toml", "-o", "t/a.nc"), "it is an input"),
-        (("ccf", "t/t.toml", "--plot", "a.png", "--grid", "9"), "has its file's own grid: drop --grid"),
-        (("connection", "t/t.toml", "-o", "c.nc", "--sign", "-"), "--sign is that of a .mat file"),
+        (
+            ("ccf", "t/t.toml", "--plot", "a.png", "--grid", "9"),
+            "has its file's own grid: drop --grid",
+        ),
+        (
+            ("connection", "t/t.toml", "-o", "c.nc", "--sign", "-"),
+            "--sign is that of a .mat file",
+        ),
         (("connection", "t/t.toml", "-o", "c.mat", "--sign", "x"), "use one of +, -"),
     ):
         code, out, err = geomech(*args)
@@ -424,7 +567,9 @@ def test_every_command_works_on_a_table_or_says_why_not(made, tmp_path, monkeypa
 
 def test_a_table_is_told_its_unit_once(made, tmp_path):
     folder, s = made
-    with pytest.raises(ValueError, match="says the body's length itself, 0.3 m: drop body_length"):
+    with pytest.raises(
+        ValueError, match="says the body's length itself, 0.3 m: drop body_length"
+    ):
         Table(folder / "a.mat", body_length=3.0)
     with pytest.raises(ValueError, match="is not the file whose sha256 is given"):
         Table(folder / "a.mat", sha256="0" * 64)
@@ -432,20 +577,30 @@ def test_a_table_is_told_its_unit_once(made, tmp_path):
     thirds, ones = Table(tmp_path / "a.mat", body_length=3.0), Table(tmp_path / "a.mat")
     assert length_unit(thirds) == length_unit(ones) == "BL"
     xi = ones.velocity([0.2, 0.4], [1.0, -0.5])
-    np.testing.assert_allclose(thirds.velocity([0.2, 0.4], [1.0, -0.5]), xi / [3, 3, 1], rtol=1e-13)
+    np.testing.assert_allclose(
+        thirds.velocity([0.2, 0.4], [1.0, -0.5]), xi / [3, 3, 1], rtol=1e-13
+    )
     with pytest.raises(
-        ValueError, match="no frame .mean. of a table whose frame is .that of the table.: drop frame, or take"
+        ValueError,
+        match="no frame .mean. of a table whose frame is .that of the table.: drop frame, or take",
     ):
         ones.in_frame("mean")
 
 
-def test_lengths_that_a_file_does_not_tell_are_assumed_in_a_note(made, tmp_path, capsys):
+def test_lengths_that_a_file_does_not_tell_are_assumed_in_a_note(
+    made, tmp_path, capsys
+):
     """As the sign that is made out; nothing is noted of what the scene or the file says."""
     folder, s = made
     plain_mat(tmp_path / "a.mat", s.fitted)
     with netcdf_file(folder / "a.nc", mmap=False) as data:
         assert data.length_unit == b"m"
-    raw = (folder / "a.nc").read_bytes().replace(b"length_unit", b"length_UNIT").replace(b"body_length", b"body_LENGTH")
+    raw = (
+        (folder / "a.nc")
+        .read_bytes()
+        .replace(b"length_unit", b"length_UNIT")
+        .replace(b"body_length", b"body_LENGTH")
+    )
     (tmp_path / "a.nc").write_bytes(raw)
     for ending in ("mat", "nc"):
         file = tmp_path / f"a.{ending}"
@@ -453,25 +608,48 @@ def test_lengths_that_a_file_does_not_tell_are_assumed_in_a_note(made, tmp_path,
         told = [line for line in bare.assumed if "body_length" in line]
         assert told == [LENGTHS] and LENGTHS in described(bare)
         assert (length_unit(bare), bare.length) == ("BL", 1.0)
-        assert (bare.stored.connection.unit, bare.stored.connection.length) == ("BL", 1.0)
-        assert (Connection.load(file).unit, Connection.load(file).length) == ("length", None)
+        assert (bare.stored.connection.unit, bare.stored.connection.length) == (
+            "BL",
+            1.0,
+        )
+        assert (Connection.load(file).unit, Connection.load(file).length) == (
+            "length",
+            None,
+        )
         for length in (1.0, 3.0):
             said = Table(file, body_length=length)
-            assert not [line for line in said.assumed if "body_length" in line] and LENGTHS not in described(said)
-            np.testing.assert_allclose(said.stored.connection.A[0] * length, bare.stored.connection.A[0], rtol=1e-13)
+            assert not [
+                line for line in said.assumed if "body_length" in line
+            ] and LENGTHS not in described(said)
+            np.testing.assert_allclose(
+                said.stored.connection.A[0] * length,
+                bare.stored.connection.A[0],
+                rtol=1e-13,
+            )
     for file in ("a.nc", "a.mat"):
         whole = Table(folder / file)
-        assert whole.assumed == () and (whole.stored.connection.unit, whole.stored.connection.length) == ("m", 0.3)
-    (tmp_path / "a.toml").write_text('[system]\nkind = "table"\nfile = "a.mat"\n[gait]\nkind = "circle"\n')
+        assert whole.assumed == () and (
+            whole.stored.connection.unit,
+            whole.stored.connection.length,
+        ) == ("m", 0.3)
+    (tmp_path / "a.toml").write_text(
+        '[system]\nkind = "table"\nfile = "a.mat"\n[gait]\nkind = "circle"\n'
+    )
     assert scenes.load(tmp_path / "a.toml").system.body_length is None
     noted = capsys.readouterr().err.splitlines()
-    assert [("sign" in line, LENGTHS in line) for line in noted] == [(True, False), (False, True)]
+    assert [("sign" in line, LENGTHS in line) for line in noted] == [
+        (True, False),
+        (False, True),
+    ]
 
 
 def altered(raw, **changes):
     """The bytes of a NetCDF file with variables replaced, renamed or left out (None), or their dimensions turned round."""
     out = io.BytesIO()
-    with netcdf_file(io.BytesIO(raw), mmap=False) as old, netcdf_file(out, "w", version=2) as new:
+    with (
+        netcdf_file(io.BytesIO(raw), mmap=False) as old,
+        netcdf_file(out, "w", version=2) as new,
+    ):
         for key, value in vars(old).items():
             if key.startswith("_") or key in (
                 "fp",
@@ -491,7 +669,11 @@ def altered(raw, **changes):
             change = changes.get(name, lambda x: x)
             if change is None:
                 continue
-            dims = tuple(reversed(v.dimensions)) if changes.get("turned") == name else v.dimensions
+            dims = (
+                tuple(reversed(v.dimensions))
+                if changes.get("turned") == name
+                else v.dimensions
+            )
             values = np.asarray(change(v[:].copy()))
             w = new.createVariable(name, v.typecode(), dims)
             w[:] = values.transpose() if changes.get("turned") == name else values
@@ -503,17 +685,23 @@ def altered(raw, **changes):
 def test_files_of_less_and_files_that_xarray_wrote_are_read(made, tmp_path):
     folder, s = made
     raw = (folder / "a.nc").read_bytes()
-    (tmp_path / "a.nc").write_bytes(altered(raw, speed=None, harmonics=None, harmonics_residual=None))
+    (tmp_path / "a.nc").write_bytes(
+        altered(raw, speed=None, harmonics=None, harmonics_residual=None)
+    )
     held = tables.load(tmp_path / "a.nc")
     assert held.harmonics is None
     np.testing.assert_allclose(held.connection.speed, s.fitted.speed, rtol=1e-12)
     with xarray.open_dataset(folder / "a.nc") as data:
-        turned = data.assign(A=-data.A, harmonics=-data.harmonics).assign_attrs(sign_of_A="xi = - A alphadot")
+        turned = data.assign(A=-data.A, harmonics=-data.harmonics).assign_attrs(
+            sign_of_A="xi = - A alphadot"
+        )
         turned.to_netcdf(tmp_path / "b.nc", engine="scipy")
     assert tables.load(tmp_path / "b.nc").sign == "-"
     same(Connection.load(tmp_path / "b.nc"), s.fitted)
     harmonics = tables.load(tmp_path / "b.nc").harmonics
-    np.testing.assert_array_equal(harmonics.coefficients, s.table("harmonic").coefficients)
+    np.testing.assert_array_equal(
+        harmonics.coefficients, s.table("harmonic").coefficients
+    )
 
 
 def put(where, value):
@@ -527,17 +715,32 @@ def put(where, value):
 BAD = {
     "missing": ({"A": None}, "A is missing"),
     "no axis": ({"alpha_2": None}, "alpha_2 is missing"),
-    "nan": ({"A": put((1, 0, 2, 3), np.nan)}, r"A that is not finite \(nan or inf\) at index \(1, 0, 2, 3\)"),
-    "inf": ({"fit_residual": put((1, 2, 3), np.inf)}, "fit_residual that is not finite"),
-    "nan of harmonics": ({"harmonics": put((1, 2, 3, 0), np.nan)}, "harmonics that is not finite"),
+    "nan": (
+        {"A": put((1, 0, 2, 3), np.nan)},
+        r"A that is not finite \(nan or inf\) at index \(1, 0, 2, 3\)",
+    ),
+    "inf": (
+        {"fit_residual": put((1, 2, 3), np.inf)},
+        "fit_residual that is not finite",
+    ),
+    "nan of harmonics": (
+        {"harmonics": put((1, 2, 3, 0), np.nan)},
+        "harmonics that is not finite",
+    ),
     "huge": ({"A": lambda x: 1e200 * x}, "above 1e\\+09"),
     "degrees": (
         {"alpha_1": np.degrees},
         "alpha_1 up to 114.6 where angles are in rad: convert it if these are degrees",
     ),
     "units": ({"units": {"alpha_1": "degrees"}}, "alpha_1 in 'degrees'"),
-    "not ascending": ({"alpha_2": lambda x: x[::-1]}, "alpha_2 must be at least 4 ascending"),
-    "turned": ({"turned": "A"}, r"A over \(alpha_2, alpha_1, joint, component\) where it must be"),
+    "not ascending": (
+        {"alpha_2": lambda x: x[::-1]},
+        "alpha_2 must be at least 4 ascending",
+    ),
+    "turned": (
+        {"turned": "A"},
+        r"A over \(alpha_2, alpha_1, joint, component\) where it must be",
+    ),
     "unit": ({"length_unit": b"furlong"}, "length_unit that makes no sense"),
     "length": ({"body_length": -1.0}, "body_length"),
     "lengths": ({"body_length": [0.3, 0.3]}, "body_length"),
@@ -556,7 +759,9 @@ def test_bad_netcdf_is_refused_in_one_line(name, made, tmp_path):
     with pytest.raises(Refusal, match=said) as caught:
         tables.load(tmp_path / "a.nc")
     assert str(caught.value).startswith(f"the table {tmp_path / 'a.nc'} ")
-    text = f'[system]\nkind = "table"\nfile = "{tmp_path}/a.nc"\n[gait]\nkind = "circle"\n'
+    text = (
+        f'[system]\nkind = "table"\nfile = "{tmp_path}/a.nc"\n[gait]\nkind = "circle"\n'
+    )
     with pytest.raises(Refusal, match=said):
         scenes.parse(text, "s.toml")
 
@@ -566,7 +771,10 @@ def test_a_metric_of_a_file_is_a_quadratic_form(tmp_path):
     raw = (tmp_path / "a.nc").read_bytes()
     assert tables.load(tmp_path / "a.nc").metric is not None
     (tmp_path / "a.nc").write_bytes(altered(raw, metric=put((0, 1, 2, 3), 9.0)))
-    with pytest.raises(Refusal, match=r"a metric of shape \(2, 2, 5, 5\) where it must be .* and symmetric"):
+    with pytest.raises(
+        Refusal,
+        match=r"a metric of shape \(2, 2, 5, 5\) where it must be .* and symmetric",
+    ):
         tables.load(tmp_path / "a.nc")
 
 
@@ -575,7 +783,9 @@ def test_damaged_files_are_refused_in_one_line(ending, made, tmp_path):
     """Cut short anywhere, or with bytes changed: refused in one line, or read as a table that is finite."""
     raw, path = (made[0] / f"a.{ending}").read_bytes(), tmp_path / f"a.{ending}"
     rng = np.random.default_rng(1)
-    cuts = [raw[:n] for n in (0, 3, 10, 127, 130, 500, 2000, len(raw) // 2, len(raw) - 9)]
+    cuts = [
+        raw[:n] for n in (0, 3, 10, 127, 130, 500, 2000, len(raw) // 2, len(raw) - 9)
+    ]
     some = [bytearray(raw) for _ in range(150)]
     for changed in some:
         for k in rng.integers(0, 4000, rng.integers(1, 6)):
@@ -586,7 +796,9 @@ def test_damaged_files_are_refused_in_one_line(ending, made, tmp_path):
             warnings.simplefilter("error")
             held, said = read(path)
         assert (held is None) != (said == "")
-        assert said == "" or (said.startswith(f"the table {path} ") and "\n" not in said)
+        assert said == "" or (
+            said.startswith(f"the table {path} ") and "\n" not in said
+        )
         assert held is None or (k >= len(cuts) and np.isfinite(held.connection.A).all())
 
 
@@ -610,13 +822,26 @@ def test_endings_that_lie(made, tmp_path):
     folder, _ = made
     nc, mat_file = (folder / "a.nc").read_bytes(), (folder / "a.mat").read_bytes()
     hdf = b"\x89HDF\r\n\x1a\n" + bytes(600)
-    old = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM" + bytes(384) + hdf
+    old = (
+        b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124)
+        + b"\x00\x02IM"
+        + bytes(384)
+        + hdf
+    )
     for name, raw, said in (
         ("a.mat", nc, "is no MATLAB file, but a NetCDF one: end its name in .nc"),
         ("a.nc", mat_file, "is no NetCDF file, but a MATLAB one: end its name in .mat"),
         ("a.nc", hdf, r"is NetCDF-4 \(HDF5\): save it as classic NetCDF"),
-        ("a.mat", hdf, r"is a MATLAB 7.3 \(HDF5\) file: the package h5py|damaged MATLAB 7.3"),
-        ("a.mat", old, r"is a MATLAB 7.3 \(HDF5\) file: the package h5py|damaged MATLAB 7.3"),
+        (
+            "a.mat",
+            hdf,
+            r"is a MATLAB 7.3 \(HDF5\) file: the package h5py|damaged MATLAB 7.3",
+        ),
+        (
+            "a.mat",
+            old,
+            r"is a MATLAB 7.3 \(HDF5\) file: the package h5py|damaged MATLAB 7.3",
+        ),
         ("a.mat", b"t,x,y\n1,2,3\n", "no MATLAB file"),
         ("a.nc", b"t,x,y\n1,2,3\n", "is no NetCDF file: write it anew"),
         ("a.csv", b"t,x,y\n1,2,3\n", r"end the name in .nc or .mat"),
@@ -635,14 +860,20 @@ def test_endings_that_lie(made, tmp_path):
     ("changes", "said"),
     [
         ({"Ay2": None}, "has no Ay2: a connection is alpha1, alpha2, Ax1"),
-        ({"Ay2": np.zeros((9, 8))}, r"Ay2 of shape \(9, 8\) where alpha1 and alpha2 make it \(9, 9\)"),
+        (
+            {"Ay2": np.zeros((9, 8))},
+            r"Ay2 of shape \(9, 8\) where alpha1 and alpha2 make it \(9, 9\)",
+        ),
         ({"Ax1": np.full((9, 9), np.nan)}, "Ax1 that is not finite"),
         ({"Ax1": np.full((9, 9), 1j)}, "Ax1 that is no array of real numbers"),
         ({"Ax1": "text"}, "Ax1 that is no array of real numbers"),
         ({"Ax1": {"a": 1}}, "Ax1 that is no array of real numbers"),
         ({"alpha1": np.ones((9, 9))}, "alpha1 must be at least 4 ascending angles"),
         ({"alpha1": np.arange(81.0).reshape(9, 9) / 81}, "span no grid"),
-        ({"alpha2": np.linspace(-2, 2, 9) + 0.01 * np.outer(*np.eye(9)[[0, 0]])}, "span no grid"),  # but for one corner
+        (
+            {"alpha2": np.linspace(-2, 2, 9) + 0.01 * np.outer(*np.eye(9)[[0, 0]])},
+            "span no grid",
+        ),  # but for one corner
         ({"alpha1": np.ones((3, 3, 3))}, "span no grid"),
         ({"degrees": True}, "alpha1 up to 114.6 where angles are in rad"),
     ],
@@ -659,7 +890,9 @@ def test_bad_mat_is_refused_in_one_line(changes, said, made, tmp_path):
             tables.load(tmp_path / "a.mat")
 
 
-def test_a_mat_file_may_be_compressed_or_of_version_4_but_no_bomb(made, tmp_path, monkeypatch):
+def test_a_mat_file_may_be_compressed_or_of_version_4_but_no_bomb(
+    made, tmp_path, monkeypatch
+):
     c = made[1].fitted
     plain_mat(tmp_path / "a.mat", c)
     found = {k: v for k, v in loadmat(tmp_path / "a.mat").items() if k[0] != "_"}
@@ -676,7 +909,9 @@ def test_a_mat_file_may_be_compressed_or_of_version_4_but_no_bomb(made, tmp_path
 
 def test_a_scene_that_is_written_elsewhere_finds_its_file(tmp_path):
     shutil.copy(SYSTEMS["table"].file, tmp_path / "t.nc")
-    text = '# my table\n[system]\nkind = "table"\nfile = "{}"\n[gait]\nkind = "circle"\n'
+    text = (
+        '# my table\n[system]\nkind = "table"\nfile = "{}"\n[gait]\nkind = "circle"\n'
+    )
     (tmp_path / "s.toml").write_text(text.format("t.nc"))
     made = scenes.load(tmp_path / "s.toml")
     (tmp_path / "results").mkdir()
@@ -688,16 +923,25 @@ def test_a_scene_that_is_written_elsewhere_finds_its_file(tmp_path):
 
 def test_what_accuracy_costs_includes_the_tables_own_error(made, monkeypatch):
     scene = Scene(Table(made[0] / "a.nc"), GAIT).with_numerics(phases=64)
-    monkeypatch.setattr(tiered, "SETTINGS", [k for k in tiered.SETTINGS if k.label == "direct: phases"])
+    monkeypatch.setattr(
+        tiered, "SETTINGS", [k for k in tiered.SETTINGS if k.label == "direct: phases"]
+    )
     found = accuracy.study(scene, runs=1)
     amplitudes = np.array(found["amplitudes"])
     own = scene.system.table_error(*GAIT.cycle(64, amplitudes))[:, 0].max()
     assert found["own_error"] == own and 1e-4 < own < 0.1
-    assert {c["tier"] is None for c in found["cheapest"] if c["tolerance"] < own} == {True}
-    assert all(own < c["error"] <= c["tolerance"] for c in found["cheapest"] if c["tier"])
+    assert {c["tier"] is None for c in found["cheapest"] if c["tolerance"] < own} == {
+        True
+    }
+    assert all(
+        own < c["error"] <= c["tolerance"] for c in found["cheapest"] if c["tier"]
+    )
     assert f"the table's own, {own:.1e} BL" in text.table(found)
     monkeypatch.setattr(choose, "MOST_PHASES", 256)
-    with pytest.raises(Refusal, match="no tier gets to 1e-06 .*: raise tolerance, or take a finer table"):
+    with pytest.raises(
+        Refusal,
+        match="no tier gets to 1e-06 .*: raise tolerance, or take a finer table",
+    ):
         choose.cheapest(scene, [0.5], 1e-6)
 
 
@@ -707,18 +951,35 @@ def test_what_accuracy_costs_includes_the_tables_own_error(made, monkeypatch):
 def parts_of_a_file():
     """Variables, with their dimensions, units and attributes of a table of 5 by 4 shapes of a body 0.3 m long."""
     rng = np.random.default_rng(0)
-    axes, over = (np.linspace(-1, 1, 5), np.array([-0.5, 0.0, 0.2, 0.9])), ("alpha_1", "alpha_2")
-    sizes = {"component": 3, "joint": 2, "other_joint": 2, "coefficient": 4, "norm_coefficient": 5, "pair": 1}
+    axes, over = (
+        (np.linspace(-1, 1, 5), np.array([-0.5, 0.0, 0.2, 0.9])),
+        ("alpha_1", "alpha_2"),
+    )
+    sizes = {
+        "component": 3,
+        "joint": 2,
+        "other_joint": 2,
+        "coefficient": 4,
+        "norm_coefficient": 5,
+        "pair": 1,
+    }
     lead = {
         "A": ("component", "joint"), "fit_residual": ("component",), "speed": ("component",), "even_part": ("component",),
         "harmonics": ("component", "coefficient"), "harmonics_residual": ("component",), "A_error": ("component", "joint"),
         "norm": ("norm_coefficient",), "norm_residual": (), "ccf_pairs": ("pair", "component"),
     }  # fmt: skip
-    variables = {name: ((*x, *over), rng.uniform(0.1, 1.0, [*map(sizes.get, x), 5, 4])) for name, x in lead.items()}
-    variables |= {name: ((name,), axis) for name, axis in zip(over, axes)} | {"joint": (("joint",), np.arange(2))}
+    variables = {
+        name: ((*x, *over), rng.uniform(0.1, 1.0, [*map(sizes.get, x), 5, 4]))
+        for name, x in lead.items()
+    }
+    variables |= {name: ((name,), axis) for name, axis in zip(over, axes)} | {
+        "joint": (("joint",), np.arange(2))
+    }
     variables["component"] = (
         ("component", "component_length"),
-        np.array([list("x".ljust(5, "\0")), list("y".ljust(5, "\0")), list("theta")], "S1"),
+        np.array(
+            [list("x".ljust(5, "\0")), list("y".ljust(5, "\0")), list("theta")], "S1"
+        ),
     )
     variables["pair_joints"] = (("pair", "pair_joint"), np.array([[1.0, 2.0]]))
     attributes = {
@@ -746,7 +1007,9 @@ def test_every_part_of_a_file_is_where_it_belongs():
         ("", "xi = - A alphadot", -1),
         ("+", "xi = - A alphadot", 1),
     ):
-        held = read_parts(lambda v, u, a, stated=stated: a.update(sign_of_A=stated.encode()), sign)
+        held = read_parts(
+            lambda v, u, a, stated=stated: a.update(sign_of_A=stated.encode()), sign
+        )
         c = held.connection
         for found, wanted in zip(
             (*c.axes, c.A, c.residual, c.speed, held.harmonics.coefficients, held.harmonics.residual, held.even, held.A_error),
@@ -755,8 +1018,20 @@ def test_every_part_of_a_file_is_where_it_belongs():
         ):  # fmt: skip
             np.testing.assert_array_equal(found, wanted)
         assert held.sign == "+-"[turn < 0]
-    assert (c.degree, held.harmonics.degree, c.unit, c.length, held.frame) == (2, 2, "m", 0.3, "mean")
-    assert (held.length, held.unit, held.order, held.sized, held.level) == (0.3, "m", "ndgrid", True, 0.9)
+    assert (c.degree, held.harmonics.degree, c.unit, c.length, held.frame) == (
+        2,
+        2,
+        "m",
+        0.3,
+        "mean",
+    )
+    assert (held.length, held.unit, held.order, held.sized, held.level) == (
+        0.3,
+        "m",
+        "ndgrid",
+        True,
+        0.9,
+    )
     assert (held.sha256, held.body, held.power_degree) == ("0f", None, 1.5)
     np.testing.assert_array_equal(held.metric.coefficients, v["norm"])
     np.testing.assert_array_equal(held.metric.residual, v["norm_residual"])
@@ -786,19 +1061,52 @@ def test_what_a_file_does_not_say_is_the_usual():
         )
     )
     np.testing.assert_allclose(
-        held.connection.speed, np.sqrt((v["A"] ** 2).mean(1) + v["fit_residual"] ** 2), rtol=1e-12
+        held.connection.speed,
+        np.sqrt((v["A"] ** 2).mean(1) + v["fit_residual"] ** 2),
+        rtol=1e-12,
     )
     np.testing.assert_array_equal(held.harmonics.residual, v["fit_residual"])
     assert (held.metric.residual == 0).all() and held.metric.residual.shape == (5, 4)
-    assert (held.connection.degree, held.length, held.unit, held.sized, held.level) == (3, 1.0, "BL", False, None)
+    assert (held.connection.degree, held.length, held.unit, held.sized, held.level) == (
+        3,
+        1.0,
+        "BL",
+        False,
+        None,
+    )
     assert held.connection.length is None and held.frame == "that of the table"
     held = read_parts(
-        less("harmonics", "even_part", "A_error", "power_degree", "component", "pair_joints", "ccf_pairs")
+        less(
+            "harmonics",
+            "even_part",
+            "A_error",
+            "power_degree",
+            "component",
+            "pair_joints",
+            "ccf_pairs",
+        )
     )
-    assert held.harmonics is held.even is held.A_error is held.metric is held.power_degree is None
-    metric = lambda v, u, a: v.update(metric=(("joint", "other_joint", "alpha_1", "alpha_2"), np.ones((2, 2, 5, 4))))
-    assert (read_parts(metric).power_degree, read_parts(metric).metric.M.shape) == (1.5, (2, 2, 5, 4))
-    assert read_parts(lambda v, u, a: (metric(v, u, a), a.pop("power_degree"))).power_degree is None
+    assert (
+        held.harmonics
+        is held.even
+        is held.A_error
+        is held.metric
+        is held.power_degree
+        is None
+    )
+    metric = lambda v, u, a: v.update(
+        metric=(("joint", "other_joint", "alpha_1", "alpha_2"), np.ones((2, 2, 5, 4)))
+    )
+    assert (read_parts(metric).power_degree, read_parts(metric).metric.M.shape) == (
+        1.5,
+        (2, 2, 5, 4),
+    )
+    assert (
+        read_parts(
+            lambda v, u, a: (metric(v, u, a), a.pop("power_degree"))
+        ).power_degree
+        is None
+    )
 
 
 def cut(name, where, dimensions=None):
@@ -883,7 +1191,10 @@ def test_parts_of_a_file_fit_each_other_or_are_refused(change, said):
 def test_singular_shapes_leave_no_harmonics_nor_even_part():
     held = read_parts(masked("A", "fit_residual", "harmonics", "even_part", "A_error"))
     assert held.harmonics is held.even is None
-    assert np.argwhere(np.isnan(held.connection.A[0, 0])).tolist() == [[1, 2]] and np.isnan(held.A_error).sum() == 6
+    assert (
+        np.argwhere(np.isnan(held.connection.A[0, 0])).tolist() == [[1, 2]]
+        and np.isnan(held.A_error).sum() == 6
+    )
 
 
 def parts_of_a_gait(**changes):
@@ -919,7 +1230,10 @@ def test_parts_of_a_gait_are_where_they_belong():
         np.testing.assert_array_equal(found.loop.coefficients, parts["gait"])
         assert (found.level, found.factor) == (0.9, 2.1)
     assert (
-        netcdf._taylor_series(parts_of_a_gait(gait_off=None), OF_A_GAIT, 1.0).standard_error == np.zeros((3, 2, 1))
+        netcdf._taylor_series(
+            parts_of_a_gait(gait_off=None), OF_A_GAIT, 1.0
+        ).standard_error
+        == np.zeros((3, 2, 1))
     ).all()
 
 
@@ -954,14 +1268,18 @@ def test_parts_of_a_gait_are_where_they_belong():
     ],
 )  # fmt: skip
 def test_parts_of_a_gait_fit_each_other_or_are_refused(changes, facts, said):
-    read = lambda: netcdf._taylor_series(parts_of_a_gait(**changes), {**OF_A_GAIT, **facts}, 1.0)
+    read = lambda: netcdf._taylor_series(
+        parts_of_a_gait(**changes), {**OF_A_GAIT, **facts}, 1.0
+    )
     if not said:
         read()
         return
     with pytest.raises(Refusal) as found:
         read()
     assert str(found.value).startswith(
-        said.replace("parts", "has a gait whose parts do not fit each other: write it anew")
+        said.replace(
+            "parts", "has a gait whose parts do not fit each other: write it anew"
+        )
     )
 
 
@@ -980,7 +1298,11 @@ def test_parts_of_a_gait_fit_each_other_or_are_refused(changes, facts, said):
     ],
 )  # fmt: skip
 def test_axes_are_ascending_angles(values, said):
-    with pytest.raises(Refusal, match=f"^{re.escape(said)}") if said else contextlib.nullcontext():
+    with (
+        pytest.raises(Refusal, match=f"^{re.escape(said)}")
+        if said
+        else contextlib.nullcontext()
+    ):
         np.testing.assert_array_equal(base.checked_axis("a", np.array(values)), values)
 
 
@@ -1006,7 +1328,9 @@ def test_levels_and_bodies_that_make_no_sense_are_left_out():
         assert base.checked_body(body) == found
 
 
-@pytest.mark.parametrize(("zero", "sign"), [(0.55, "+"), (0.49, ""), (0.31, ""), (0.29, "-")])
+@pytest.mark.parametrize(
+    ("zero", "sign"), [(0.55, "+"), (0.49, ""), (0.31, ""), (0.29, "-")]
+)
 def test_the_sign_is_that_of_loops_of_three_and_five_tenths_of_the_grid(zero, sign):
     """Of a field by which a loop about the grid's middle moves by - r^2 (1 - r^2 / zero^2); none where their signs differ."""
     axes = np.linspace(-1, 3, 9), np.linspace(0, 2, 7)
@@ -1023,7 +1347,9 @@ def test_the_sign_is_that_of_loops_of_three_and_five_tenths_of_the_grid(zero, si
             with pytest.raises(Refusal, match="does not tell the sign of A: say sign"):
                 base.detected_sign(c)
     with pytest.raises(Refusal, match="does not tell the sign of A: say sign"):
-        base.detected_sign(Connection(axes, 0 * A, np.zeros((3, 9, 7)), np.ones((3, 9, 7)), 3))
+        base.detected_sign(
+            Connection(axes, 0 * A, np.zeros((3, 9, 7)), np.ones((3, 9, 7)), 3)
+        )
 
 
 # MATLAB files, byte by byte.
@@ -1047,13 +1373,23 @@ def matrix(kind, shape, *parts, name=b"abc", flags=0, order="<", lead=None):
 
 def number(value=1.5, order="<"):
     return element(
-        14, matrix(6, (1, 1), element(9, struct.pack(f"{order}d", value), order), name=b"", order=order), order
+        14,
+        matrix(
+            6,
+            (1, 1),
+            element(9, struct.pack(f"{order}d", value), order),
+            name=b"",
+            order=order,
+        ),
+        order,
     )
 
 
 @pytest.mark.parametrize("order", "<>")
 def test_matrices_of_numbers_and_texts_are_read_in_either_order_of_bytes(order):
-    read = lambda *args, **others: matlab._matrix(matrix(*args, **others, order=order), order, 1)
+    read = lambda *args, **others: matlab._matrix(
+        matrix(*args, **others, order=order), order, 1
+    )
     for kind, code, values in (
         (9, "d", range(6)),
         (7, "f", range(6)),
@@ -1069,7 +1405,12 @@ def test_matrices_of_numbers_and_texts_are_read_in_either_order_of_bytes(order):
             and found.dtype.kind == ("f" if kind in (7, 9) else "iu"[code in "BQ"])
         )
     assert (
-        read(6, (1, 2), element(4, struct.pack(f"{order}2H", 7, 300), order, small=True), name=b"longer name")[0]
+        read(
+            6,
+            (1, 2),
+            element(4, struct.pack(f"{order}2H", 7, 300), order, small=True),
+            name=b"longer name",
+        )[0]
         == "longer name"
     )
     end = "le" if order == "<" else "be"
@@ -1098,7 +1439,9 @@ ONE = element(9, struct.pack("<d", 1.0))
         (matrix(6, (), lead=[element(6, struct.pack("<II", 6, 0)), element(5, b"123456"), element(1, b"a")]), "damaged"),
     ],
 )  # fmt: skip
-def test_what_is_no_plain_array_is_skipped_and_what_does_not_fit_is_damaged(data, found):
+def test_what_is_no_plain_array_is_skipped_and_what_does_not_fit_is_damaged(
+    data, found
+):
     if found == "damaged":
         with pytest.raises(Refusal, match="^damaged$"):
             matlab._matrix(data, "<", 1)
@@ -1111,13 +1454,22 @@ def test_what_is_no_plain_array_is_skipped_and_what_does_not_fit_is_damaged(data
 def test_cells_and_structs_hold_others_to_a_depth():
     cell = matrix(1, (2, 1), number(1.5), element(14, b""))
     name, values = matlab._matrix(cell, "<", 2)
-    assert name == "abc" and values.shape == (2, 1) and values[0, 0] == 1.5 and values[1, 0].shape == (0, 0)
+    assert (
+        name == "abc"
+        and values.shape == (2, 1)
+        and values[0, 0] == 1.5
+        and values[1, 0].shape == (0, 0)
+    )
     with pytest.raises(Refusal, match="^damaged$"):
         matlab._matrix(cell, "<", 1)
     fields = element(5, struct.pack("<i", 4), small=True), element(1, b"ab\0\0c\0\0\0")
-    found = matlab._matrix(matrix(2, (1, 1), *fields, number(2.5), number(3.5)), "<", 2)[1]
+    found = matlab._matrix(
+        matrix(2, (1, 1), *fields, number(2.5), number(3.5)), "<", 2
+    )[1]
     assert {key: float(x.item()) for key, x in found.items()} == {"ab": 2.5, "c": 3.5}
-    assert matlab._matrix(matrix(2, (1, 2), *fields, *[number()] * 4), "<", 2)[1] is None
+    assert (
+        matlab._matrix(matrix(2, (1, 2), *fields, *[number()] * 4), "<", 2)[1] is None
+    )
     for bad in (
         matrix(1, (2, 2), number()), matrix(1, (1, 1), ONE), matrix(2, (1, 1), *fields, number()), matrix(2, (1, 1), fields[0]),
         matrix(2, (1, 1), element(5, struct.pack("<i", 0), small=True), fields[1], number()), matrix(2, (1,
@@ -1132,13 +1484,32 @@ def test_cells_and_structs_hold_others_to_a_depth():
 
 def test_handles_and_instances_are_skipped_and_never_run():
     """A function handle (class 16) and an instance of a class (17, which has no dimensions), in a struct and by themselves."""
-    whole = lambda kind, name, *parts, shape=(1, 1): element(14, matrix(kind, shape, *parts, name=name))
+    whole = lambda kind, name, *parts, shape=(1, 1): element(
+        14, matrix(kind, shape, *parts, name=name)
+    )
     double = whole(6, b"", ONE)
-    handle = whole(16, b"f", whole(4, b"", element(4, "sf%0@()delete('*')".encode("utf-16-le")), shape=(1, 18)))
-    lead = [element(6, struct.pack("<II", 17, 0)), element(1, b"space"), element(1, b"MCOS"), element(1, b"LieGroups")]
+    handle = whole(
+        16,
+        b"f",
+        whole(
+            4, b"", element(4, "sf%0@()delete('*')".encode("utf-16-le")), shape=(1, 18)
+        ),
+    )
+    lead = [
+        element(6, struct.pack("<II", 17, 0)),
+        element(1, b"space"),
+        element(1, b"MCOS"),
+        element(1, b"LieGroups"),
+    ]
     instance = element(14, matrix(17, (), double, lead=lead))
     names = b"".join(name.ljust(8, b"\0") for name in (b"run", b"space", b"x"))
-    fields = element(5, struct.pack("<i", 8)), element(1, names), handle, instance, double
+    fields = (
+        element(5, struct.pack("<i", 8)),
+        element(1, names),
+        handle,
+        instance,
+        double,
+    )
     head = bytes(124) + b"\x00\x01IM"
     found = {"f": None, "space": None, "s": {"run": None, "space": None, "x": 1.0}}
     assert matlab.arrays(head + handle + instance + whole(2, b"s", *fields)) == found
@@ -1150,14 +1521,32 @@ def test_handles_and_instances_are_skipped_and_never_run():
 
 
 def test_elements_fill_a_file_and_are_not_longer(monkeypatch):
-    both = element(1, b"abcde") + element(2, b"xy", small=True) + element(3, b"12345678")
-    assert list(matlab._elements(both, "<")) == [(1, b"abcde"), (2, b"xy"), (3, b"12345678")]
-    for bad in (both + b"1234567", both[:-1], struct.pack("<I", 1 | 5 << 16) + b"12345678", element(1, b"a")[:4]):
+    both = (
+        element(1, b"abcde") + element(2, b"xy", small=True) + element(3, b"12345678")
+    )
+    assert list(matlab._elements(both, "<")) == [
+        (1, b"abcde"),
+        (2, b"xy"),
+        (3, b"12345678"),
+    ]
+    for bad in (
+        both + b"1234567",
+        both[:-1],
+        struct.pack("<I", 1 | 5 << 16) + b"12345678",
+        element(1, b"a")[:4],
+    ):
         with pytest.raises(Refusal, match="^cut short$"):
             list(matlab._elements(bad, "<"))
-    head, whole = b"MATLAB".ljust(124) + b"\x00\x01IM", element(14, matrix(6, (1, 1), ONE))
+    head, whole = (
+        b"MATLAB".ljust(124) + b"\x00\x01IM",
+        element(14, matrix(6, (1, 1), ONE)),
+    )
     packed = lambda data: struct.pack("<II", 15, len(x := zlib.compress(data))) + x
-    assert matlab.arrays(head + whole)["abc"] == 1.0 == matlab.arrays(head + packed(whole) + packed(whole))["abc"]
+    assert (
+        matlab.arrays(head + whole)["abc"]
+        == 1.0
+        == matlab.arrays(head + packed(whole) + packed(whole))["abc"]
+    )
     assert matlab.arrays(head + element(14, b"") + element(9, b"12345678")) == {}
     with pytest.raises(Refusal, match="^no MATLAB file of version 5 to 7$"):
         matlab.arrays(b"MATLAB".ljust(124) + b"\x00\x02IM" + whole)
@@ -1179,7 +1568,10 @@ def mat_with(monkeypatch, about=None, sign="+", order="", left_out=(), **changes
     shapes = np.meshgrid(*axes, indexing="ij")
     plain = np.arange(20.0).reshape(5, 4)
     found = {"alpha1": shapes[0], "alpha2": shapes[1]}
-    found |= {name: k + 0.1 * plain for k, name in enumerate(("Ax1", "Ax2", "Ay1", "Ay2", "Atheta1", "Atheta2"), 1)}
+    found |= {
+        name: k + 0.1 * plain
+        for k, name in enumerate(("Ax1", "Ax2", "Ay1", "Ay2", "Atheta1", "Atheta2"), 1)
+    }
     found |= {
         "M11": 2 + plain,
         "M12": 0.5 + 0 * plain,
@@ -1189,7 +1581,11 @@ def mat_with(monkeypatch, about=None, sign="+", order="", left_out=(), **changes
     found |= {ERROR: 0.1 + np.zeros((3, 2, 5, 4)), **changes}
     if about is not None:
         found[mat.ABOUT] = json.dumps(about)
-    monkeypatch.setattr(mat, "variables", lambda raw, names: {k: x for k, x in found.items() if k not in left_out})
+    monkeypatch.setattr(
+        mat,
+        "variables",
+        lambda raw, names: {k: x for k, x in found.items() if k not in left_out},
+    )
     return mat.parse(b"", sign, order, "0f")
 
 
@@ -1208,20 +1604,55 @@ def test_parts_of_a_mat_file_are_where_they_belong(monkeypatch):
     for sign, turn in (("", -1), ("-", -1), ("+", 1)):
         held = mat_with(monkeypatch, about, sign)
         c = held.connection
-        np.testing.assert_allclose(turn * c.A, np.arange(1, 7).reshape(3, 2, 1, 1) + 0.1 * plain, rtol=1e-12)
+        np.testing.assert_allclose(
+            turn * c.A, np.arange(1, 7).reshape(3, 2, 1, 1) + 0.1 * plain, rtol=1e-12
+        )
         assert held.sign == ("+" if turn > 0 else "-")
     np.testing.assert_array_equal(c.residual, [plain, plain + 1, plain + 2])
-    np.testing.assert_allclose(c.speed, np.sqrt((c.A**2).mean(1) + c.residual**2), rtol=1e-12)
-    np.testing.assert_array_equal(held.metric.M, [[2 + plain, 0.5 + 0 * plain], [0.5 + 0 * plain, 1 + plain]])
-    assert (c.degree, held.metric.degree, c.unit, c.length, held.length, held.unit) == (2, 2, "m", 0.3, 0.3, "m")
-    assert (held.frame, held.level, held.power_degree, held.sized, held.shapes) == ("mean", 0.9, 1.5, True, ("a", "b"))
-    assert (held.order, held.assumptions, held.sha256, held.body) == ("ndgrid", (), "0f", None)
+    np.testing.assert_allclose(
+        c.speed, np.sqrt((c.A**2).mean(1) + c.residual**2), rtol=1e-12
+    )
+    np.testing.assert_array_equal(
+        held.metric.M, [[2 + plain, 0.5 + 0 * plain], [0.5 + 0 * plain, 1 + plain]]
+    )
+    assert (c.degree, held.metric.degree, c.unit, c.length, held.length, held.unit) == (
+        2,
+        2,
+        "m",
+        0.3,
+        0.3,
+        "m",
+    )
+    assert (held.frame, held.level, held.power_degree, held.sized, held.shapes) == (
+        "mean",
+        0.9,
+        1.5,
+        True,
+        ("a", "b"),
+    )
+    assert (held.order, held.assumptions, held.sha256, held.body) == (
+        "ndgrid",
+        (),
+        "0f",
+        None,
+    )
     assert (held.A_error == 0.1).all() and held.A_error.shape == (3, 2, 5, 4)
     bare = mat_with(monkeypatch, left_out=("M12", mat.RESIDUAL, ERROR))
-    assert (bare.unit, bare.length, bare.sized, bare.frame, bare.level) == ("BL", 1.0, False, "that of the table", None)
-    assert bare.metric is bare.A_error is bare.power_degree is None and np.isnan(bare.connection.residual).all()
+    assert (bare.unit, bare.length, bare.sized, bare.frame, bare.level) == (
+        "BL",
+        1.0,
+        False,
+        "that of the table",
+        None,
+    )
+    assert (
+        bare.metric is bare.A_error is bare.power_degree is None
+        and np.isnan(bare.connection.residual).all()
+    )
     assert bare.connection.degree == 3 and bare.shapes == ("alpha_1", "alpha_2")
-    np.testing.assert_allclose(bare.connection.speed, np.sqrt((bare.connection.A**2).mean(1)), rtol=1e-12)
+    np.testing.assert_allclose(
+        bare.connection.speed, np.sqrt((bare.connection.A**2).mean(1)), rtol=1e-12
+    )
 
 
 @pytest.mark.parametrize(
@@ -1235,10 +1666,18 @@ def test_parts_of_a_mat_file_are_where_they_belong(monkeypatch):
         ({"unit": "mm", "length": 2.0}, False, 3, None), ({"power_degree": 0.1}, False, 3, 0.1),
     ],
 )  # fmt: skip
-def test_what_a_mat_file_says_of_itself_is_taken_where_it_makes_sense(about, sized, degree, power, monkeypatch):
+def test_what_a_mat_file_says_of_itself_is_taken_where_it_makes_sense(
+    about, sized, degree, power, monkeypatch
+):
     held = mat_with(monkeypatch, about)
     size = (about["unit"], about["length"]) if sized else ("BL", 1.0)
-    assert (held.sized, held.unit, held.length, held.connection.degree, held.power_degree) == (
+    assert (
+        held.sized,
+        held.unit,
+        held.length,
+        held.connection.degree,
+        held.power_degree,
+    ) == (
         sized,
         *size,
         degree,

@@ -27,13 +27,22 @@ def assert_is_slope(load, v, rtol=2e-6):
     h = 1e-6
     tangent = load(v)[:, 1:]
     steps = h * np.eye(3)[:, :, None, None]
-    slopes = np.stack([(load(v + step)[:, 0] - load(v - step)[:, 0]) / (2 * h) for step in steps], 1)
+    slopes = np.stack(
+        [(load(v + step)[:, 0] - load(v - step)[:, 0]) / (2 * h) for step in steps], 1
+    )
     for k, (got, wanted) in enumerate(zip(tangent, slopes)):
-        assert np.abs(got - wanted).max() <= rtol * np.abs(wanted).max(), (k, np.abs(got - wanted).max((1, 2)))
-    assert (np.abs(slopes).max((2, 3)) > 0).any(1).all()  # every row has something to tell
+        assert np.abs(got - wanted).max() <= rtol * np.abs(wanted).max(), (
+            k,
+            np.abs(got - wanted).max((1, 2)),
+        )
+    assert (
+        (np.abs(slopes).max((2, 3)) > 0).any(1).all()
+    )  # every row has something to tell
 
 
-@pytest.mark.parametrize(("law", "how"), [r for r in RULES if r != ("no closed form", "exact")])
+@pytest.mark.parametrize(
+    ("law", "how"), [r for r in RULES if r != ("no closed form", "exact")]
+)
 def test_laws(law, how):
     rng = np.random.default_rng(2)
     v, eps = rng.normal(size=(3, 2, 30)), rng.uniform(0.05, 0.2, 30)
@@ -45,13 +54,19 @@ def at_one_step(effects, body, medium, samples, rng):
     """The balance with effects within a gait whose ground, place and past are not those of its start."""
     assembly = assemble(medium, body, effects)
     stepwise = stepwise_effects(assembly.effects)
-    always = assembly._replace(effects=tuple(e for e in assembly.effects if e not in stepwise))
+    always = assembly._replace(
+        effects=tuple(e for e in assembly.effects if e not in stepwise)
+    )
     problem = always.problem(*rng.uniform(-1, 1, (2, body.joints, samples)))
-    pose = np.stack([*rng.uniform(-0.2, 0.2, (2, samples)), rng.uniform(-0.5, 0.5, samples)])
+    pose = np.stack(
+        [*rng.uniform(-0.2, 0.2, (2, samples)), rng.uniform(-0.5, 0.5, samples)]
+    )
     site = Site(5, 0.2, pose, tuple(0.4 * problem.sides.elements.v))
     pasts = [e.begin(problem, site) for e in stepwise]
     for count, step in enumerate((0.12, -0.12, 0.0)):
-        there = site._replace(count=count + 1, pose=pose + np.array([0, step, 0])[:, None])
+        there = site._replace(
+            count=count + 1, pose=pose + np.array([0, step, 0])[:, None]
+        )
         v = tuple(rng.normal(size=problem.sides.elements.v.shape))
         pasts = [e.after(problem, there, past, v) for e, past in zip(stepwise, pasts)]
     for effect, past in zip(stepwise, pasts):
@@ -64,22 +79,33 @@ def loads_on(problem, v, eps):
     n, scale = len(problem.sides.station), problem.law_speed_scale
     halves = tuple(v[:, :n] / scale), tuple(v[:, n:] / scale)
     found = loads(problem, halves, eps / scale)
-    return np.concatenate([as_array(load, part[0]) for (_, load), part in zip(found, halves)], 2)
+    return np.concatenate(
+        [as_array(load, part[0]) for (_, load), part in zip(found, halves)], 2
+    )
 
 
 @pytest.mark.parametrize("medium", [GLASS, Mud()], ids=["glass", "mud"])
 @pytest.mark.parametrize("name", [*EFFECTS, "all"])
 def test_effects(name, medium):
     rng, samples = np.random.default_rng(3), 40
-    effects = [make(0.4) for make, _ in (EFFECTS.values() if name == "all" else [EFFECTS[name]])]
+    effects = [
+        make(0.4)
+        for make, _ in (EFFECTS.values() if name == "all" else [EFFECTS[name]])
+    ]
     if name == "all":
-        effects = [e for k, e in enumerate(effects) if type(e) not in {type(x) for x in effects[:k]}]
+        effects = [
+            e
+            for k, e in enumerate(effects)
+            if type(e) not in {type(x) for x in effects[:k]}
+        ]
     if not isinstance(medium, Granular):
         effects = [e for e in effects if e.kind not in ("end-caps", "towed-sled")]
     problem = at_one_step(effects, BODIES["uneven"], medium, samples, rng)
     n = len(problem.sides.station) + len(problem.points.station)
     v, eps = rng.normal(size=(3, n, samples)), rng.uniform(0.05, 0.2, samples)
-    v[0] = np.sign(v[0]) * (0.01 + np.abs(v[0]))  # skin friction steps where an element slides neither way
+    v[0] = np.sign(v[0]) * (
+        0.01 + np.abs(v[0])
+    )  # skin friction steps where an element slides neither way
     load = lambda v: loads_on(problem, v, eps)
     assert_is_slope(load, v)
     # Samples in another order have their own memories and places.
@@ -102,15 +128,27 @@ def test_mass(name):
         """(3, 4, B): rate of change of momentum, and its slopes in the true velocity."""
         m = row(frame_inertia(problem.sides.elements, problem.momentum_rate))
         nothing = Net(*[(np.zeros(xi.shape[-1]),) * 3] * 5)
-        return np.stack([np.stack(column) for column in with_momentum(nothing, *xi, m, 1.0)[:4]], 1)
+        return np.stack(
+            [np.stack(column) for column in with_momentum(nothing, *xi, m, 1.0)[:4]], 1
+        )
 
     assert_is_slope(lambda x: term(problem, x[:, 0])[:, :, None], xi[:, None])
-    np.testing.assert_allclose(term(problem.take(index), xi[:, index]), term(problem, xi)[..., index], rtol=1e-14)
+    np.testing.assert_allclose(
+        term(problem.take(index), xi[:, index]),
+        term(problem, xi)[..., index],
+        rtol=1e-14,
+    )
     e = problem.sides.elements
-    borne = element_momentum_rates(e, problem.momentum_rate, plus((e.v_t, e.v_n, e.v_w), to_element(e, *xi)))
-    np.testing.assert_allclose(borne.sum(1), term(problem, xi)[:, 0], rtol=1e-12, atol=1e-13)
+    borne = element_momentum_rates(
+        e, problem.momentum_rate, plus((e.v_t, e.v_n, e.v_w), to_element(e, *xi))
+    )
+    np.testing.assert_allclose(
+        borne.sum(1), term(problem, xi)[:, 0], rtol=1e-12, atol=1e-13
+    )
     exact = Accuracy(1e-9, 0.0)  # but for roundoff of the largest forces of all samples
-    assert _limits(problem, exact).residual == max(_limits(problem.take([k]), exact).residual for k in range(samples))
+    assert _limits(problem, exact).residual == max(
+        _limits(problem.take([k]), exact).residual for k in range(samples)
+    )
 
 
 def test_every_dry_law_is_homogeneous():
@@ -121,7 +159,9 @@ def test_every_dry_law_is_homogeneous():
         load = element_load(medium)
         change = (load(*v, eps + h)[:, 0] - load(*v, eps - h)[:, 0]) / (2 * h)
         along = np.einsum("ijnb,jnb->inb", load(*v, eps)[:, 1:], v)
-        np.testing.assert_allclose(eps * change, -along, atol=1e-6 * np.abs(along).max(), err_msg=name)
+        np.testing.assert_allclose(
+            eps * change, -along, atol=1e-6 * np.abs(along).max(), err_msg=name
+        )
 
 
 @pytest.mark.parametrize("how", ["exact", "gauss:5", "midpoint:4"])
@@ -133,4 +173,9 @@ def test_loads_take_velocities_as_they_are(how):
     c_t, c_n = mud.viscous
     square = 5 / 16 if how == "midpoint:4" else 1 / 3  # mean of s^2
     viscous = np.array([c_t, c_n, square * c_n])[:, None, None] * v
-    np.testing.assert_allclose(load(*(2 * v), 2 * eps)[:, 0] - load(*v, eps)[:, 0], viscous, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(
+        load(*(2 * v), 2 * eps)[:, 0] - load(*v, eps)[:, 0],
+        viscous,
+        rtol=1e-9,
+        atol=1e-12,
+    )

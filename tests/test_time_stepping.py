@@ -56,7 +56,9 @@ def test_without_effects_time_stepping_is_the_balance(medium):
         t = 2 * np.pi * np.arange(16) / 16
         k = np.arange(body.joints)
         alpha, alphadot = 0.4 * np.cos(t[:, None] - k), -0.4 * np.sin(t[:, None] - k)
-        found = time_steps(MEDIA[medium], body, alpha, alphadot, cycles=1, tolerance=1e-12).checked()
+        found = time_steps(
+            MEDIA[medium], body, alpha, alphadot, cycles=1, tolerance=1e-12
+        ).checked()
         wanted = body_velocity(MEDIA[medium], body, alpha, alphadot, tolerance=1e-12).xi
         np.testing.assert_allclose(found.xi, wanted, atol=1e-8)
 
@@ -75,7 +77,9 @@ def newton(medium, inertia, gait, cycles, eps):
         turn = np.concatenate([[0.0], np.cumsum(rate)])
         unit = np.exp(1j * heading)
         centre = np.cumsum(unit / 3) - unit / 6
-        flow = np.cumsum(1j * turn * unit / 3) - 1j * turn * unit / 6  # while the first link keeps its heading
+        flow = (
+            np.cumsum(1j * turn * unit / 3) - 1j * turn * unit / 6
+        )  # while the first link keeps its heading
         place = centre[:, None] + offset * unit[:, None]
         velocity = flow[:, None] + offset * (1j * turn * unit)[:, None]
         middle = place.mean()
@@ -85,7 +89,9 @@ def newton(medium, inertia, gait, cycles, eps):
         unit, place, velocity = parts(t, y[2])
         # Momenta of the centre of mass and about it give its velocity and the turning of the first link.
         v = y[3] + 1j * y[4]
-        spin = (y[5] - np.mean((place.conj() * velocity).imag)) / np.mean(np.abs(place) ** 2)
+        spin = (y[5] - np.mean((place.conj() * velocity).imag)) / np.mean(
+            np.abs(place) ** 2
+        )
         flow = v + 1j * spin * place + velocity
         along = (flow * unit.conj()[:, None]).real
         across = (flow * unit.conj()[:, None]).imag
@@ -95,9 +101,18 @@ def newton(medium, inertia, gait, cycles, eps):
         return [v.real, v.imag, spin, force.mean().real, force.mean().imag, moment]
 
     _, place, velocity = parts(0.0, -gait.shape(0.0) @ [2 / 3, 1 / 3])
-    start = [0.0, 0.0, -gait.shape(0.0) @ [2 / 3, 1 / 3], 0.0, 0.0, np.mean((place.conj() * velocity).imag)]
+    start = [
+        0.0,
+        0.0,
+        -gait.shape(0.0) @ [2 / 3, 1 / 3],
+        0.0,
+        0.0,
+        np.mean((place.conj() * velocity).imag),
+    ]
     times = 2 * np.pi * np.arange(cycles + 1)
-    found = solve_ivp(rate, (0, times[-1]), start, "LSODA", times, rtol=1e-8, atol=1e-10)
+    found = solve_ivp(
+        rate, (0, times[-1]), start, "LSODA", times, rtol=1e-8, atol=1e-10
+    )
     assert found.success
     x, y, theta = found.y[:3]
     theta = theta + gait.shape(0.0) @ [2 / 3, 1 / 3]
@@ -106,7 +121,8 @@ def newton(medium, inertia, gait, cycles, eps):
 
 
 @pytest.mark.parametrize(
-    ("medium", "inertia", "eps"), [(Viscous(2.0), 0.5, 0.0), (Viscous(2.0), 4.0, 0.0), (GLASS, 3.0, 1e-3)]
+    ("medium", "inertia", "eps"),
+    [(Viscous(2.0), 0.5, 0.0), (Viscous(2.0), 4.0, 0.0), (GLASS, 3.0, 1e-3)],
 )
 def test_motion_by_an_independent_integrator(medium, inertia, eps, truths):
     gait = Circle(amplitude=1.0)
@@ -114,7 +130,12 @@ def test_motion_by_an_independent_integrator(medium, inertia, eps, truths):
     wanted = truths("newton", newton, medium, inertia, gait, 8, eps * speed)[-1]
     alpha, alphadot = gait.cycle(128)
     found = time_steps(
-        medium, Chain(), alpha, alphadot, effects=(heavy(inertia),), regularisation=max(eps, 1e-6)
+        medium,
+        Chain(),
+        alpha,
+        alphadot,
+        effects=(heavy(inertia),),
+        regularisation=max(eps, 1e-6),
     ).checked()
     np.testing.assert_allclose(displacement(found.xi), wanted, atol=2e-5)
     plain = displacement(body_velocity(medium, Chain(), alpha, alphadot).xi)
@@ -124,11 +145,17 @@ def test_motion_by_an_independent_integrator(medium, inertia, eps, truths):
 def test_a_body_in_almost_nothing_keeps_its_momentum():
     """With a millionth of drag the momentum over the ground stays what it was at the start."""
     alpha, alphadot = Circle(amplitude=1.0).cycle(256)
-    found = time_steps(Viscous(2.0), Chain(), alpha, alphadot, effects=(heavy(1e6),), cycles=1)
+    found = time_steps(
+        Viscous(2.0), Chain(), alpha, alphadot, effects=(heavy(1e6),), cycles=1
+    )
     xi, theta = found.xi, found.pose[:-1, 2]
-    over_ground = (xi[:, 0] + 1j * xi[:, 1]) * np.exp(1j * theta)  # the mean frame moves with the centre of mass
+    over_ground = (xi[:, 0] + 1j * xi[:, 1]) * np.exp(
+        1j * theta
+    )  # the mean frame moves with the centre of mass
     np.testing.assert_allclose(over_ground, over_ground[0], atol=1e-4)
-    assert np.abs(xi[:, 2] - xi[0, 2]).max() > 0.1  # it turns with its shape all the same
+    assert (
+        np.abs(xi[:, 2] - xi[0, 2]).max() > 0.1
+    )  # it turns with its shape all the same
 
 
 @pytest.mark.parametrize("medium", [GLASS, Viscous(2.0)])
@@ -138,7 +165,11 @@ def test_massless_comes_back_at_order_one(medium):
     plain = time_steps(medium, Backbone(30), alpha, alphadot, cycles=1).xi
     sizes = np.array([0.04, 0.02, 0.01])
     off = [
-        np.abs(time_steps(medium, Backbone(30), alpha, alphadot, effects=(heavy(m),)).xi - plain).max() for m in sizes
+        np.abs(
+            time_steps(medium, Backbone(30), alpha, alphadot, effects=(heavy(m),)).xi
+            - plain
+        ).max()
+        for m in sizes
     ]
     assert np.polyfit(np.log(sizes), np.log(off), 1)[0] == pytest.approx(1, abs=0.05)
 
@@ -150,14 +181,22 @@ def net(effects, gait, body, phases):
 
 @pytest.mark.parametrize(
     ("effect", "fewest"),
-    [(heavy(3.0), 32), (Transient(travel=0.05), 32), (DepthProfile(slope=0.3, towards=1.0), 64)],
+    [
+        (heavy(3.0), 32),
+        (Transient(travel=0.05), 32),
+        (DepthProfile(slope=0.3, towards=1.0), 64),
+    ],
     ids=["BodyInertia", "Transient", "DepthProfile"],
 )
 def test_order_two_in_the_step(effect, fewest, truths):
     gait, phases = Sine(elements=20), fewest * np.array([1, 2, 4])
     true = truths("marches", net, (effect,), gait, Backbone(20), 1024)
-    errors = [np.hypot(*(net((effect,), gait, Backbone(20), n) - true)[:2]) for n in phases]
-    assert -np.polyfit(np.log(phases), np.log(errors), 1)[0] == pytest.approx(2, abs=0.35)
+    errors = [
+        np.hypot(*(net((effect,), gait, Backbone(20), n) - true)[:2]) for n in phases
+    ]
+    assert -np.polyfit(np.log(phases), np.log(errors), 1)[0] == pytest.approx(
+        2, abs=0.35
+    )
 
 
 def test_transients_slow_the_sandfish():
@@ -185,8 +224,20 @@ def test_the_built_in_march_is_slower_than_the_plain_sandfish():
 def test_work_is_done_by_the_joints_in_time_stepping_too():
     """Without mass, what the joints put in goes into the ground at every phase, memories and caps included."""
     alpha, alphadot = Butterfly(amplitude=0.8).cycle(32)
-    effects = (Transient(travel=0.05), EndCaps(radius=0.05), DisturbedGround(radius=0.05, weakening=0.2))
-    found = time_steps(GLASS, Chain((1, 2, 1), length=0.2), alpha, alphadot, effects=effects, cycles=2, with_work=True)
+    effects = (
+        Transient(travel=0.05),
+        EndCaps(radius=0.05),
+        DisturbedGround(radius=0.05, weakening=0.2),
+    )
+    found = time_steps(
+        GLASS,
+        Chain((1, 2, 1), length=0.2),
+        alpha,
+        alphadot,
+        effects=effects,
+        cycles=2,
+        with_work=True,
+    )
     put_in = (found.work.bending_moment * alphadot).sum(-1) * 0.2
     np.testing.assert_allclose(put_in, found.work.power, rtol=1e-6)
     assert found.work.bending_moment.shape == (32, 2)
@@ -196,18 +247,39 @@ def test_work_is_done_by_the_joints_in_time_stepping_too():
 def test_work_moves_the_mass(medium, phases):
     """With mass the joints put in what the ground takes in the mean over a cycle, and it does not matter from which end
     the links are counted: the moments include what moves them."""
-    gait, effects = Ellipse(semi_axes=(1, 0.5), tilt=0.7, centre=(0.2, -0.3)), (heavy(3.0),)
+    gait, effects = (
+        Ellipse(semi_axes=(1, 0.5), tilt=0.7, centre=(0.2, -0.3)),
+        (heavy(3.0),),
+    )
     alpha, alphadot = gait.cycle(phases)
-    found = time_steps(medium, Chain((1, 2, 1.5)), alpha, alphadot, effects=effects, with_work=True).checked().work
-    assert (found.bending_moment * alphadot).sum(-1).mean() == pytest.approx(found.power.mean(), rel=1e-3)
+    found = (
+        time_steps(
+            medium, Chain((1, 2, 1.5)), alpha, alphadot, effects=effects, with_work=True
+        )
+        .checked()
+        .work
+    )
+    assert (found.bending_moment * alphadot).sum(-1).mean() == pytest.approx(
+        found.power.mean(), rel=1e-3
+    )
     turned = time_steps(
-        medium, Chain((1.5, 2, 1)), alpha[:, ::-1], alphadot[:, ::-1], effects=effects, with_work=True
+        medium,
+        Chain((1.5, 2, 1)),
+        alpha[:, ::-1],
+        alphadot[:, ::-1],
+        effects=effects,
+        with_work=True,
     ).work
     np.testing.assert_allclose(
-        found.bending_moment, turned.bending_moment[:, ::-1], atol=2e-3 * np.abs(found.bending_moment).max()
+        found.bending_moment,
+        turned.bending_moment[:, ::-1],
+        atol=2e-3 * np.abs(found.bending_moment).max(),
     )
     light = time_steps(medium, Chain((1, 2, 1.5)), alpha, alphadot, with_work=True).work
-    assert np.abs(found.bending_moment - light.bending_moment).max() > 0.05 * np.abs(light.bending_moment).max()
+    assert (
+        np.abs(found.bending_moment - light.bending_moment).max()
+        > 0.05 * np.abs(light.bending_moment).max()
+    )
 
 
 def test_a_first_cycle_is_of_order_two_as_well(truths):
@@ -217,14 +289,24 @@ def test_a_first_cycle_is_of_order_two_as_well(truths):
         np.array([64, 128, 256]),
     )
     true = truths("marches", net, effects, gait, Backbone(20), 1024)
-    errors = [np.hypot(*(net(effects, gait, Backbone(20), n) - true)[:2]) for n in phases]
-    assert -np.polyfit(np.log(phases), np.log(errors), 1)[0] == pytest.approx(2, abs=0.4)
+    errors = [
+        np.hypot(*(net(effects, gait, Backbone(20), n) - true)[:2]) for n in phases
+    ]
+    assert -np.polyfit(np.log(phases), np.log(errors), 1)[0] == pytest.approx(
+        2, abs=0.4
+    )
 
 
 def test_cycles_that_do_not_repeat_are_not_taken_for_periodic():
-    slow = scenes.load("three-link-glass").changed(effects=(heavy(20.0),)).with_numerics(cycles=1, phases=64)
+    slow = (
+        scenes.load("three-link-glass")
+        .changed(effects=(heavy(20.0),))
+        .with_numerics(cycles=1, phases=64)
+    )
     alpha, alphadot = slow.gait.cycle(64)
-    wanted = time_steps(GLASS, slow.system.body, alpha, alphadot, effects=slow.system.effects, cycles=1).displacement
+    wanted = time_steps(
+        GLASS, slow.system.body, alpha, alphadot, effects=slow.system.effects, cycles=1
+    ).displacement
     np.testing.assert_allclose(Study(slow).poses("direct"), wanted, atol=1e-12)
 
 
@@ -237,10 +319,18 @@ def test_a_tolerance_below_what_time_stepping_repeats_to_is_refused():
 def test_pauses_and_empty_batches():
     alpha, alphadot = Circle().cycle(16)
     alphadot[3] = [1e-99, 0.0]
-    found = time_steps(GLASS, Chain(), alpha, alphadot, effects=(Transient(travel=0.1),)).checked()
+    found = time_steps(
+        GLASS, Chain(), alpha, alphadot, effects=(Transient(travel=0.1),)
+    ).checked()
     assert np.isfinite(found.xi).all()
     assert np.abs(found.xi[3]).max() < 1e-8
-    nothing = time_steps(GLASS, Chain(), alpha[None][:0], alphadot[None][:0], effects=(Transient(travel=0.1),))
+    nothing = time_steps(
+        GLASS,
+        Chain(),
+        alpha[None][:0],
+        alphadot[None][:0],
+        effects=(Transient(travel=0.1),),
+    )
     assert (nothing.xi.shape, nothing.pose.shape) == ((0, 16, 3), (0, 17, 3))
 
 
@@ -269,11 +359,15 @@ def test_hard_marches_converge(case, medium):
     gaits = {
         "both joints alike": np.stack([np.cos(t), np.cos(t)], -1),
         "one joint": np.stack([1.5 * np.sin(t), 0 * t], -1),
-        "pauses": np.stack([np.clip(2 * np.cos(t), -1, 1), np.clip(2 * np.sin(t), -1, 1)], -1),
+        "pauses": np.stack(
+            [np.clip(2 * np.cos(t), -1, 1), np.clip(2 * np.sin(t), -1, 1)], -1
+        ),
     }
     alpha = np.stack(list(gaits.values()))
     alphadot = (np.roll(alpha, -1, 1) - np.roll(alpha, 1, 1)) / (2 * t[1])
-    found = time_steps(MEDIA[medium], Chain(), alpha, alphadot, effects=HARD[case], cycles=1)
+    found = time_steps(
+        MEDIA[medium], Chain(), alpha, alphadot, effects=HARD[case], cycles=1
+    )
     assert (found.status != "unconverged").all()
     assert found.residual.max() < 1e-9
     assert np.isfinite(found.xi).all()
@@ -282,15 +376,23 @@ def test_hard_marches_converge(case, medium):
 
 def test_status_and_refusals():
     alpha, alphadot = Circle().cycle(16)
-    running = time_steps(GLASS, Chain(), alpha, alphadot, effects=(Transient(travel=0.3),), cycles=1)
+    running = time_steps(
+        GLASS, Chain(), alpha, alphadot, effects=(Transient(travel=0.3),), cycles=1
+    )
     assert running.status == "running"
     assert np.isinf(running.drift)
     running.checked()
-    coasting = time_steps(Viscous(2.0), Chain(), alpha[::2], alphadot[::2], effects=(heavy(1e4),))
+    coasting = time_steps(
+        Viscous(2.0), Chain(), alpha[::2], alphadot[::2], effects=(heavy(1e4),)
+    )
     assert coasting.status == "not periodic"
-    with pytest.raises(RuntimeError, match="give 'cycles' to take it as it is, or lower the mass"):
+    with pytest.raises(
+        RuntimeError, match="give 'cycles' to take it as it is, or lower the mass"
+    ):
         coasting.checked()
-    once = time_steps(GLASS, Chain(), alpha, alphadot, effects=(DepthProfile(slope=0.1),))
+    once = time_steps(
+        GLASS, Chain(), alpha, alphadot, effects=(DepthProfile(slope=0.1),)
+    )
     assert once.cycles == 1
     with pytest.raises(ValueError, match="takes 8 phases or more"):
         time_steps(GLASS, Chain(), alpha[:4], alphadot[:4])
@@ -303,43 +405,72 @@ def test_status_and_refusals():
 def test_batches_march_as_each_alone():
     effects = (Transient(travel=0.04), EndCaps(radius=0.05), heavy(0.2))
     gait, amplitudes = Sine(elements=15), np.array([[0.1, 0.2], [0.3, 0.4]])
-    together = time_steps(GLASS, Backbone(15), *gait.cycle(16, amplitudes), effects=effects, cycles=2, tolerance=1e-12)
+    together = time_steps(
+        GLASS,
+        Backbone(15),
+        *gait.cycle(16, amplitudes),
+        effects=effects,
+        cycles=2,
+        tolerance=1e-12,
+    )
     assert together.xi.shape == (2, 2, 16, 3)
     assert together.pose.shape == (2, 2, 17, 3)
-    alone = time_steps(GLASS, Backbone(15), *gait.cycle(16, 0.3), effects=effects, cycles=2, tolerance=1e-12)
+    alone = time_steps(
+        GLASS,
+        Backbone(15),
+        *gait.cycle(16, 0.3),
+        effects=effects,
+        cycles=2,
+        tolerance=1e-12,
+    )
     np.testing.assert_allclose(together.xi[1, 0], alone.xi, atol=1e-9)
 
 
 def periodic(effects, gait, body, phases, amplitudes):
     """Poses after a settled cycle of the sandfish, as its scene gives them."""
-    scene = SANDFISH.changed(body=body, effects=effects, gait=gait).with_numerics(phases=phases)
+    scene = SANDFISH.changed(body=body, effects=effects, gait=gait).with_numerics(
+        phases=phases
+    )
     return Study(scene).poses("direct", None, amplitudes)
 
 
 def test_estimates_of_marches_cover_the_truth(truths):
     """Against four times the phases."""
     for effect in (Transient(travel=0.05), heavy(2.0), DepthProfile(slope=0.2)):
-        scene = SANDFISH.changed(body=Backbone(30), effects=(effect,), gait=Sine(elements=30))
+        scene = SANDFISH.changed(
+            body=Backbone(30), effects=(effect,), gait=Sine(elements=30)
+        )
         a = np.array([0.12, 0.22, 0.35])
         found, error = estimate.direct(scene, scene.gait, a, 64)
         truth = truths("marches", periodic, (effect,), scene.gait, Backbone(30), 256, a)
         off = estimate.pose_distance(found, truth, scene.system.body.length)
         assert (off <= error).all(), type(effect)
         assert (error[:, 0] <= 100 * off[:, 0] + 1e-4).all(), type(effect)
-        assert error[:, 1].max() <= 100 * off[:, 1].max() + 1e-4, type(effect)  # one heading may be right by chance
+        assert error[:, 1].max() <= 100 * off[:, 1].max() + 1e-4, type(
+            effect
+        )  # one heading may be right by chance
 
 
 def pieced_scene(rng, kind):
     """A random chain in a random medium on a random ellipse, with an effect that varies along its links."""
-    medium = [GLASS, Viscous(2.0), Granular(C=rng.uniform(0.5, 5), gamma0=rng.uniform(0.1, 0.6))][rng.integers(3)]
+    medium = [
+        GLASS,
+        Viscous(2.0),
+        Granular(C=rng.uniform(0.5, 5), gamma0=rng.uniform(0.1, 0.6)),
+    ][rng.integers(3)]
     body = Chain(tuple(rng.uniform(0.4, 1.5, 3)))
     axes, centre = tuple(rng.uniform(0.3, 1, 2)), tuple(rng.uniform(-0.4, 0.4, 2))
     effect = {
         "transient": Transient(travel=10 ** rng.uniform(-2.5, -0.7)),
-        "disturbed": DisturbedGround(radius=rng.uniform(0.04, 0.1), weakening=rng.uniform(0.1, 0.6)),
+        "disturbed": DisturbedGround(
+            radius=rng.uniform(0.04, 0.1), weakening=rng.uniform(0.1, 0.6)
+        ),
         "depth": DepthProfile(along=tuple(rng.uniform(0.5, 2, 4))),
     }[kind]
-    return Scene(Swimmer(medium, body, (effect,)), Ellipse(semi_axes=axes, tilt=rng.uniform(0, 3), centre=centre))
+    return Scene(
+        Swimmer(medium, body, (effect,)),
+        Ellipse(semi_axes=axes, tilt=rng.uniform(0, 3), centre=centre),
+    )
 
 
 def second_cycle(medium, body, gait, effects, pieces, phases, amplitudes):
@@ -354,13 +485,28 @@ def errors_over_estimates(scene, pieces, phases, finer, truths):
     a = np.array([0.5, 1.0, 1.4])
     scene = scene.with_numerics(pieces=pieces, tolerance=1e-9, cycles=2)
     found, error = estimate.direct(scene, scene.gait, a, phases)
-    fine = scene.system.medium, scene.system.body, scene.gait, scene.system.effects, finer * pieces, finer * phases, a
-    return estimate.pose_distance(found, truths("pieces", second_cycle, *fine), 1.0) / (error + 1e-9)
+    fine = (
+        scene.system.medium,
+        scene.system.body,
+        scene.gait,
+        scene.system.effects,
+        finer * pieces,
+        finer * phases,
+        a,
+    )
+    return estimate.pose_distance(found, truths("pieces", second_cycle, *fine), 1.0) / (
+        error + 1e-9
+    )
 
 
 @pytest.mark.parametrize(("kind", "seeds"), [("depth", range(10)), ("transient", [0])])
 def test_estimates_cover_what_pieces_leave(kind, seeds, truths):
-    found = [errors_over_estimates(pieced_scene(np.random.default_rng(k), kind), 10, 64, 4, truths) for k in seeds]
+    found = [
+        errors_over_estimates(
+            pieced_scene(np.random.default_rng(k), kind), 10, 64, 4, truths
+        )
+        for k in seeds
+    ]
     assert np.max(found) <= 1
     assert np.median(found) > 0.02
 
@@ -372,7 +518,9 @@ def test_estimates_cover_what_pieces_leave_of_many_random_chains():
     found, at_once = {}, lambda _, compute, *question: compute(*question)
     for kind in ("transient", "disturbed", "depth"):
         for k in range(20):
-            some = errors_over_estimates(pieced_scene(np.random.default_rng([7, k]), kind), 20, 64, 4, at_once)
+            some = errors_over_estimates(
+                pieced_scene(np.random.default_rng([7, k]), kind), 20, 64, 4, at_once
+            )
             found.setdefault(kind, []).extend(some.ravel())
         print(
             f"\n{kind}: error over estimate {np.median(found[kind]):.2f} in the middle, {max(found[kind]):.2f} at most"
@@ -383,7 +531,8 @@ def test_estimates_cover_what_pieces_leave_of_many_random_chains():
 def test_a_tolerance_refines_pieces_or_is_refused(monkeypatch):
     """Depth that differs along long links, all else being exact enough long before."""
     scene = Scene(
-        Swimmer(Viscous(2.0), Chain((1, 1.4, 0.8)), (DepthProfile(along=(0.5, 2, 1)),)), Circle(amplitude=1.2)
+        Swimmer(Viscous(2.0), Chain((1, 1.4, 0.8)), (DepthProfile(along=(0.5, 2, 1)),)),
+        Circle(amplitude=1.2),
     )
     scene = scene.with_numerics(pieces=5)
     found = cheapest(scene, [1.2], 1e-5)
@@ -393,26 +542,41 @@ def test_a_tolerance_refines_pieces_or_is_refused(monkeypatch):
     assert (off <= found["estimate"][found["tier"]]).all()
     assert max(found["estimate"][found["tier"]]) <= 1e-5
     monkeypatch.setattr("geomech.studies.choose.FINEST_PIECES", 40)
-    with pytest.raises(Refusal, match="no tier gets to 1e-08 body lengths .* with .* phases and 40 pieces"):
+    with pytest.raises(
+        Refusal,
+        match="no tier gets to 1e-08 body lengths .* with .* phases and 40 pieces",
+    ):
         cheapest(scene, [1.2], 1e-8)
 
 
 def test_a_setting_for_pieces():
-    depth = scenes.load("three-link-glass").changed(effects=(DepthProfile(along=(0.5, 2, 1)),))
+    depth = scenes.load("three-link-glass").changed(
+        effects=(DepthProfile(along=(0.5, 2, 1)),)
+    )
     setting = next(k for k in tiered.SETTINGS if k.name == "pieces")
     assert tiered.applies(setting, depth)
     assert not tiered.applies(setting, depth.changed(effects=()))
     a = np.linspace(0.5, 1.5, 8)
     far = Study(depth.with_numerics(pieces=320, phases=64)).poses("direct", Circle(), a)
     coarse = [
-        Study(tiered.Settings(depth.with_numerics(phases=64)).at(setting, n)).poses("direct", Circle(), a)
+        Study(tiered.Settings(depth.with_numerics(phases=64)).at(setting, n)).poses(
+            "direct", Circle(), a
+        )
         for n in setting.values
     ]
     errors = [np.sqrt(np.mean(estimate.distance(x, far) ** 2)) for x in coarse]
-    assert -np.polyfit(np.log(setting.values), np.log(errors), 1)[0] == pytest.approx(2, abs=0.35)
-    with pytest.raises(ValueError, match="pieces must be a whole number from 1 to 10000, got 0"):
-        body_velocity(GLASS, Chain(), [0.1, 0.2], [1, 0], effects=depth.system.effects, pieces=0)
-    with pytest.raises(Refusal, match="pieces must be a whole number from 1 to 10000, got 0.5"):
+    assert -np.polyfit(np.log(setting.values), np.log(errors), 1)[0] == pytest.approx(
+        2, abs=0.35
+    )
+    with pytest.raises(
+        ValueError, match="pieces must be a whole number from 1 to 10000, got 0"
+    ):
+        body_velocity(
+            GLASS, Chain(), [0.1, 0.2], [1, 0], effects=depth.system.effects, pieces=0
+        )
+    with pytest.raises(
+        Refusal, match="pieces must be a whole number from 1 to 10000, got 0.5"
+    ):
         depth.with_numerics(pieces=0.5)
 
 
@@ -438,7 +602,9 @@ def test_cells_of_the_ground_do_not_keep_a_march_from_settling():
     cells, cycles, settled = np.array([0.4e-4, 0.9e-4, 3e-4]), limit_cycle.begin(7), []
     for k in range(40):
         left = 0.02 * slow**k * np.array([[1.0], [-0.5], [0.2]])
-        cycles = limit_cycle.after_massless_cycle(cycles, 0.3 + left + cells[:, None] * rng.normal(size=(3, 7)))
+        cycles = limit_cycle.after_massless_cycle(
+            cycles, 0.3 + left + cells[:, None] * rng.normal(size=(3, 7))
+        )
         settled.append((cycles.drift <= 1e-3).all())
         assert k < 2 or (cycles.drift > 0.4 * np.abs(left).max(0) - 2e-4).all(), k
     assert not any(settled[:10])
@@ -447,14 +613,18 @@ def test_cells_of_the_ground_do_not_keep_a_march_from_settling():
 
 def last_of(cycles, medium, body, gait, phases, effects):
     """(phases + 1, 3): xi through the last of so many cycles, and the pose after it."""
-    found = time_steps(medium, body, *gait.cycle(phases), effects=effects, cycles=cycles)
+    found = time_steps(
+        medium, body, *gait.cycle(phases), effects=effects, cycles=cycles
+    )
     return [*found.xi, found.displacement]
 
 
 def test_heavy_bodies_know_how_far_they_are(truths):
     """Plain cycles of a viscous swimmer that forgets slowly: after each, what is left of the way is what is said."""
     problem = Viscous(2.0), Chain((1, 2, 1.5)), HEAVY, 16, (heavy(20.0),)
-    march_on = lambda **how: time_steps(*problem[:2], *HEAVY.cycle(16), effects=problem[4], **how)
+    march_on = lambda **how: time_steps(
+        *problem[:2], *HEAVY.cycle(16), effects=problem[4], **how
+    )
     limit = march_on().checked()
     assert limit.cycles < 15
     for cycles in (8, 12):
@@ -462,15 +632,21 @@ def test_heavy_bodies_know_how_far_they_are(truths):
         off = np.abs(some.displacement - limit.displacement).max()
         assert off > 1e-5
         assert some.drift == pytest.approx(off, rel=0.2)
-    *xi, displacement = truths("marches", last_of, 60, *problem)  # nothing was led to another limit
+    *xi, displacement = truths(
+        "marches", last_of, 60, *problem
+    )  # nothing was led to another limit
     assert np.abs(limit.displacement - displacement).max() <= limit.drift + 1e-9
     np.testing.assert_allclose(limit.xi, xi, atol=2e-6)
 
 
 def test_estimates_hold_what_is_left_of_the_way(monkeypatch):
-    scene = Scene(Swimmer(Viscous(2.0), Chain((1, 2, 1.5)), (heavy(5.0),)), HEAVY).with_numerics(phases=32)
+    scene = Scene(
+        Swimmer(Viscous(2.0), Chain((1, 2, 1.5)), (heavy(5.0),)), HEAVY
+    ).with_numerics(phases=32)
     a, shapes = np.array([1.0]), HEAVY.cycle(32, np.array([1.0]))
-    left = time_steps(scene.system.medium, scene.system.body, *shapes, effects=scene.system.effects).drift
+    left = time_steps(
+        scene.system.medium, scene.system.body, *shapes, effects=scene.system.effects
+    ).drift
     assert scene.system.run(*shapes).to_come == left > 0
     assert (scene.with_numerics(cycles=3).system.run(*shapes).to_come == 0).all()
     scene = scene.with_numerics(cycles=1)
@@ -478,26 +654,44 @@ def test_estimates_hold_what_is_left_of_the_way(monkeypatch):
     monkeypatch.setattr(
         Swimmer,
         "run",
-        lambda *args, run=Swimmer.run, **more: (c := run(*args, **more))._replace(to_come=c.to_come + 0.125),
+        lambda *args, run=Swimmer.run, **more: (c := run(*args, **more))._replace(
+            to_come=c.to_come + 0.125
+        ),
     )
-    np.testing.assert_allclose(estimate.direct(scene, HEAVY, a, 32)[1], of_steps + 0.125, rtol=1e-6)
+    np.testing.assert_allclose(
+        estimate.direct(scene, HEAVY, a, 32)[1], of_steps + 0.125, rtol=1e-6
+    )
 
 
 def test_a_kicked_body_coasts():
     """In almost nothing, a kick that turns the frame changes the momentum over the ground once, not step by step
     after."""
-    alpha, alphadot = (x.T[:, :, None].transpose(1, 0, 2) for x in Circle(amplitude=1.0).cycle(64))
+    alpha, alphadot = (
+        x.T[:, :, None].transpose(1, 0, 2) for x in Circle(amplitude=1.0).cycle(64)
+    )
     body, effects = Chain(), (heavy(1e6),)
     assembly = assemble(Viscous(2.0), body, effects)
-    steps = Stepping(assembly, alpha, alphadot, Accuracy(1e-6, 1e-10), "numpy", True, half_lengths(body))
-    over_ground = lambda s: s.effect_states[0][-1][:, :, 0].sum(1)  # momentum, and its moment
+    steps = Stepping(
+        assembly,
+        alpha,
+        alphadot,
+        Accuracy(1e-6, 1e-10),
+        "numpy",
+        True,
+        half_lengths(body),
+    )
+    over_ground = lambda s: s.effect_states[0][-1][:, :, 0].sum(
+        1
+    )  # momentum, and its moment
     state = steps.begin()
     for _ in range(5):
         site = steps.site(state)
         state, _ = steps.step(state)
     before, change = over_ground(state), np.array([[0.3], [-0.2], [0.4]])
     state = steps.with_velocity_change(
-        state._replace(cycles=state.cycles._replace(extrapolation=change)), steps.problem(4), site
+        state._replace(cycles=state.cycles._replace(extrapolation=change)),
+        steps.problem(4),
+        site,
     )
     kicked = over_ground(state)
     np.testing.assert_array_less(0.02, np.abs(kicked - before))
@@ -517,15 +711,36 @@ def test_moments_of_a_heavy_body_move_its_elements(medium, off):
     body, inertia, N = Chain((1, 1.4, 0.8), frame="link-1"), 3.0, 32
     alpha, alphadot = HEAVY.cycle(N)
     found = time_steps(
-        medium, body, alpha, alphadot, effects=(heavy(inertia),), cycles=1, tolerance=1e-13, with_work=True
+        medium,
+        body,
+        alpha,
+        alphadot,
+        effects=(heavy(inertia),),
+        cycles=1,
+        tolerance=1e-13,
+        with_work=True,
     )
     medium_alone = work_done(medium, body, alpha, alphadot, found.xi).bending_moment
-    dt, motion, (x, y, turn) = 2 * np.pi / N, body.motion(alpha.T, alphadot.T), found.xi.T
-    ahead = np.concatenate([found.xi[:1], 1.5 * found.xi[1:-1] - 0.5 * found.xi[:-2]])  # mean of the last and the next
+    dt, motion, (x, y, turn) = (
+        2 * np.pi / N,
+        body.motion(alpha.T, alphadot.T),
+        found.xi.T,
+    )
+    ahead = np.concatenate(
+        [found.xi[:1], 1.5 * found.xi[1:-1] - 0.5 * found.xi[:-2]]
+    )  # mean of the last and the next
     pose = np.concatenate([found.pose[:1], compose(found.pose[:-2], exp(dt * ahead))])
     at, facing = pose[:, 0] + 1j * pose[:, 1], np.exp(1j * pose[:, 2])
-    along, half, place = facing * (motion.c + 1j * motion.s), motion.half, at + facing * motion.centres
-    velocity = (motion.v[0] + 1j * motion.v[1]) * along + facing * (x + 1j * y) + 1j * turn * (place - at)
+    along, half, place = (
+        facing * (motion.c + 1j * motion.s),
+        motion.half,
+        at + facing * motion.centres,
+    )
+    velocity = (
+        (motion.v[0] + 1j * motion.v[1]) * along
+        + facing * (x + 1j * y)
+        + 1j * turn * (place - at)
+    )
     spin = motion.v[2] / half + turn
     p = 2 * half * velocity
     L = (place.conj() * p).imag + 2 * half * half**2 / 3 * spin
@@ -543,7 +758,9 @@ def test_a_kick_that_leads_astray_is_taken_back():
     kick. It goes on from the end of its calmest cycle, and both get there."""
     limit, zero = np.array([[1.0], [-1.0], [2.0]]), np.zeros((3, 2))
     halved = lambda x: x + 0.5 * (limit - x)
-    after = lambda c, start, end: limit_cycle.after_heavy_cycle(c._replace(start=start), end - limit, end, 0.0)
+    after = lambda c, start, end: limit_cycle.after_heavy_cycle(
+        c._replace(start=start), end - limit, end, 0.0
+    )
     cycles = limit_cycle.after_heavy_cycle(limit_cycle.begin(2), zero, zero, 0.0)
     assert np.isinf(cycles.drift).all()
     x = zero
@@ -570,17 +787,23 @@ def test_no_kick_leads_a_body_astray(inertia, phases):
     """Drag acts between the step before a kick and the next one; a velocity far from the limit once led to fast
     spin."""
     shapes = Circle(amplitude=1.2).cycle(phases)
-    found = time_steps(Viscous(2.0), Chain(), *shapes, effects=(heavy(inertia),)).checked()
+    found = time_steps(
+        Viscous(2.0), Chain(), *shapes, effects=(heavy(inertia),)
+    ).checked()
     assert found.cycles <= 45
     assert np.abs(found.xi).max() < 0.2
-    np.testing.assert_allclose(found.displacement[:2], [-0.05785, -0.00554], atol=1e-3)  # of 128 phases
+    np.testing.assert_allclose(
+        found.displacement[:2], [-0.05785, -0.00554], atol=1e-3
+    )  # of 128 phases
 
 
 @pytest.mark.parametrize("medium", [GLASS, Viscous(2.0)])
 def test_heavy_bodies_settle_in_tens_of_cycles(medium):
     alpha, alphadot = HEAVY.cycle(16, np.linspace(0.3, 1.2, 6))
     for inertia in (60.0, 300.0):
-        found = time_steps(medium, Chain((1, 2, 1.5)), alpha, alphadot, effects=(heavy(inertia),)).checked()
+        found = time_steps(
+            medium, Chain((1, 2, 1.5)), alpha, alphadot, effects=(heavy(inertia),)
+        ).checked()
         assert found.cycles <= 40
         assert found.drift.max() <= 1e-6
 
@@ -590,13 +813,19 @@ def test_time_stepping_that_fails_says_so(monkeypatch):
     import rft.balance.solver
 
     monkeypatch.setattr(
-        rft.balance.solver, "QUICK", rft.balance.solver.Descent(0.03, 0.03, 2e-2, 5.0, 5.0)
+        rft.balance.solver,
+        "QUICK",
+        rft.balance.solver.Descent(0.03, 0.03, 2e-2, 5.0, 5.0),
     )  # enough at rest
-    monkeypatch.setattr(rft.balance.solver, "WARM", rft.balance.solver.WARM._replace(budget=1.0))
+    monkeypatch.setattr(
+        rft.balance.solver, "WARM", rft.balance.solver.WARM._replace(budget=1.0)
+    )
     for name in ("WALKS", "SLOW"):
         monkeypatch.setattr(rft.balance.solver, name, ())
     alpha, alphadot = Circle().cycle(8, np.array([0.0, 1.0]))
-    found = time_steps(GLASS, Chain(), alpha, alphadot, effects=(Transient(travel=0.1),), cycles=1)
+    found = time_steps(
+        GLASS, Chain(), alpha, alphadot, effects=(Transient(travel=0.1),), cycles=1
+    )
     assert list(found.status) == ["running", "unconverged"]
     assert found.residual[1] > 1e-9
     with pytest.raises(RuntimeError, match="did not converge"):
@@ -606,8 +835,18 @@ def test_time_stepping_that_fails_says_so(monkeypatch):
 @pytest.mark.parametrize("kept", [True, False])
 def test_what_does_not_change_is_not_built_again(kept, monkeypatch):
     """One motion a phase for all cycles, or one a step where phases are too many to keep; the same answer by both."""
-    effects, counts = (Transient(travel=0.05), DisturbedGround(0.05, 0.2), EndCaps(radius=0.05), heavy(1.0)), []
-    usual = time_steps(GLASS, Chain(), *HEAVY.cycle(8), effects=effects, cycles=2, with_work=True)
+    effects, counts = (
+        (
+            Transient(travel=0.05),
+            DisturbedGround(0.05, 0.2),
+            EndCaps(radius=0.05),
+            heavy(1.0),
+        ),
+        [],
+    )
+    usual = time_steps(
+        GLASS, Chain(), *HEAVY.cycle(8), effects=effects, cycles=2, with_work=True
+    )
     made = []
     for owner, what in ((Stepping, "__init__"), (Chain, "motion")):
         original = getattr(owner, what)
@@ -617,7 +856,14 @@ def test_what_does_not_change_is_not_built_again(kept, monkeypatch):
         monkeypatch.setattr("rft.stepping.MOST_STORED", 0)
     for phases in (8, 16):
         made.clear()
-        found = time_steps(GLASS, Chain(), *HEAVY.cycle(phases), effects=effects, cycles=2, with_work=True)
+        found = time_steps(
+            GLASS,
+            Chain(),
+            *HEAVY.cycle(phases),
+            effects=effects,
+            cycles=2,
+            with_work=True,
+        )
         assert made.count("__init__") == 1
         counts.append(made.count("motion"))
         if phases == 8:
@@ -641,17 +887,26 @@ def random_march(rng):
         GLASS,
     ][rng.integers(3)]
     joints = int(rng.integers(1, 6))
-    body = Chain(tuple(many(-1, 0) for _ in range(joints + 1)), frame=["mean", "link-1"][rng.integers(2)])
+    body = Chain(
+        tuple(many(-1, 0) for _ in range(joints + 1)),
+        frame=["mean", "link-1"][rng.integers(2)],
+    )
     t = 2 * np.pi * np.arange(16) / 16
     waves = rng.normal(size=(4, 8, 1, joints)) * rng.uniform(0, 1.5)
     basis = np.cos(t), np.sin(t), np.cos(2 * t), np.sin(2 * t)
     rates = -np.sin(t), np.cos(t), -2 * np.sin(2 * t), 2 * np.cos(2 * t)
-    alpha, alphadot = (sum(w * f[:, None] for w, f in zip(waves, fs)) for fs in (basis, rates))
+    alpha, alphadot = (
+        sum(w * f[:, None] for w, f in zip(waves, fs)) for fs in (basis, rates)
+    )
     choices = [
         heavy(many(-6, 3)),
         Transient(travel=many(-6, 0)),
         DisturbedGround(radius=many(-1.7, -0.7), weakening=rng.uniform()),
-        DepthProfile(slope=rng.uniform(0, 0.02), towards=rng.uniform(-3, 3), along=(1.0, many(0, 1))),
+        DepthProfile(
+            slope=rng.uniform(0, 0.02),
+            towards=rng.uniform(-3, 3),
+            along=(1.0, many(0, 1)),
+        ),
         SkinFriction(*(many(-2, 0) for _ in range(3))),
         GrainInertia(frequency=many(-1, 1), length=0.3, depth=0.05),
     ]
@@ -668,7 +923,9 @@ def test_fast_spinning_heavy_bodies_are_solved():
     for k, sample in (250, 0), (343, 0):
         medium, body, alpha, alphadot, effects = marches[k]
         alpha, alphadot = alpha[sample], alphadot[sample]
-        time_steps(medium, body, alpha, alphadot, effects=effects, cycles=2, tolerance=8e-11).checked()
+        time_steps(
+            medium, body, alpha, alphadot, effects=effects, cycles=2, tolerance=8e-11
+        ).checked()
 
 
 @pytest.mark.soak
@@ -680,7 +937,14 @@ def test_two_hundred_thousand_steps_of_random_marches(backend):
         medium, body, alpha, alphadot, effects = random_march(rng)
         try:
             found = time_steps(
-                medium, body, alpha, alphadot, effects=effects, cycles=2, tolerance=8e-11, backend=backend
+                medium,
+                body,
+                alpha,
+                alphadot,
+                effects=effects,
+                cycles=2,
+                tolerance=8e-11,
+                backend=backend,
             )
         except ValueError as error:
             if "comes to the surface" not in str(error):
@@ -689,5 +953,7 @@ def test_two_hundred_thousand_steps_of_random_marches(backend):
         residuals.append(found.residual)
         failures += np.count_nonzero(found.status == "unconverged")
     residuals = np.concatenate(residuals)
-    print(f"\n{backend}: {residuals.size * 32:,} steps: {failures} marches failed, residuals to {residuals.max():.1e}")
+    print(
+        f"\n{backend}: {residuals.size * 32:,} steps: {failures} marches failed, residuals to {residuals.max():.1e}"
+    )
     assert failures == 0

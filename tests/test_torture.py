@@ -20,7 +20,9 @@ from commands import geomech
 from geomech import scenes
 from geomech.run.store import Store
 
-pytestmark = pytest.mark.skipif(not Path("/proc").is_dir(), reason="sees by /proc what is left of a process")
+pytestmark = pytest.mark.skipif(
+    not Path("/proc").is_dir(), reason="sees by /proc what is left of a process"
+)
 COMMAND = """
 import sys
 from geomech import cli, connection
@@ -32,9 +34,23 @@ connection.SAMPLES_TOGETHER, cycles.SAMPLES_TOGETHER = 400, 8
 print("begun", flush=True)
 cli.main()
 """
-SANDFISH = scenes.load("sandfish-transient").text.replace("= 100", "= 5").replace("phases = 64", "phases = 32")
+SANDFISH = (
+    scenes.load("sandfish-transient")
+    .text.replace("= 100", "= 5")
+    .replace("phases = 64", "phases = 32")
+)
 REQUESTS = {  # with the name of the output
-    "sweep": (["sweep", "glass.toml", "--over", "medium.C=1:3:4", "--over", "gait.amplitude=0.3:1.2:40"], "out.nc"),
+    "sweep": (
+        [
+            "sweep",
+            "glass.toml",
+            "--over",
+            "medium.C=1:3:4",
+            "--over",
+            "gait.amplitude=0.3:1.2:40",
+        ],
+        "out.nc",
+    ),
     "field": (["connection", "glass.toml", "--grid", "31"], "out.nc"),
     "march": (["trajectory", "sandfish.toml", "--cycles", "2"], "out.csv"),
 }
@@ -42,7 +58,9 @@ REQUESTS = {  # with the name of the output
 
 def scenes_in(folder):
     (folder / "sandfish.toml").write_text(SANDFISH)
-    (folder / "glass.toml").write_text(scenes.load("three-link-glass").text + "[numerics]\nphases = 32\n")
+    (folder / "glass.toml").write_text(
+        scenes.load("three-link-glass").text + "[numerics]\nphases = 32\n"
+    )
     return folder
 
 
@@ -55,11 +73,15 @@ def begun(args, out, cwd, workers, **options):
     """The command as a process, in a session of its own."""
     more = [] if args[0] == "trajectory" else ["--workers", str(workers)]
     command = [sys.executable, "-c", COMMAND, *args, *more, "-o", out]
-    plain = lambda: [signal.signal(n, signal.SIG_DFL) for n in (signal.SIGINT, signal.SIGTERM)]
+    plain = lambda: [
+        signal.signal(n, signal.SIG_DFL) for n in (signal.SIGINT, signal.SIGTERM)
+    ]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     before = options.pop("preexec_fn", None)
     prepare = lambda: (plain(), before and before())
-    return subprocess.Popen(command, cwd=cwd, start_new_session=True, preexec_fn=prepare, **pipes, **options)
+    return subprocess.Popen(
+        command, cwd=cwd, start_new_session=True, preexec_fn=prepare, **pipes, **options
+    )
 
 
 def session(process):
@@ -67,8 +89,14 @@ def session(process):
     found = []
     for place in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError, ValueError):
-            state, _, _, leader = place.joinpath("stat").read_text().rpartition(")")[2].split()[:4]
-            if int(leader) == process.pid and state != "Z" and int(place.name) != process.pid:
+            state, _, _, leader = (
+                place.joinpath("stat").read_text().rpartition(")")[2].split()[:4]
+            )
+            if (
+                int(leader) == process.pid
+                and state != "Z"
+                and int(place.name) != process.pid
+            ):
                 found.append(int(place.name))
     return found
 
@@ -102,7 +130,9 @@ def tortured(name, place, whole, kills, seed, early=False):
         process = begun(args, out, place, 1 + bout % 2)
         assert process.stdout.readline() == "begun\n"
         until = time.monotonic() + rng.uniform(0.05, 0.8)
-        while process.poll() is None and (size() <= before if early else time.monotonic() < until):
+        while process.poll() is None and (
+            size() <= before if early else time.monotonic() < until
+        ):
             time.sleep(0.005)
         if process.poll() is not None:  # it was through
             process.communicate()
@@ -114,8 +144,12 @@ def tortured(name, place, whole, kills, seed, early=False):
         if number != signal.SIGKILL:
             if not err:  # it had not yet begun to hear
                 continue
-            assert err.splitlines()[-1].startswith(f"error: stopped by {number.name}: "), err
-            kept = re.search(r"(\d+) results so far are kept in (.*): the same command", err)
+            assert err.splitlines()[-1].startswith(
+                f"error: stopped by {number.name}: "
+            ), err
+            kept = re.search(
+                r"(\d+) results so far are kept in (.*): the same command", err
+            )
             assert kept is None or (kept[2] == partial.name and partial.exists())
         if size():
             if bout % 5 == 2:
@@ -130,7 +164,10 @@ def tortured(name, place, whole, kills, seed, early=False):
     assert process.returncode == 0, err
     assert (place / out).read_bytes() == whole
     left = {p.name for p in place.iterdir()} - {"glass.toml", "sandfish.toml", out}
-    assert all(re.fullmatch(rf"\.{out}\.partial\.unreadable(-\d)?|\.geomech-.*", x) for x in left), left
+    assert all(
+        re.fullmatch(rf"\.{out}\.partial\.unreadable(-\d)?|\.geomech-.*", x)
+        for x in left
+    ), left
     (place / out).unlink()
     return seen
 
@@ -181,6 +218,9 @@ def test_a_rival_is_refused_and_a_full_disk_is_no_obstacle(place, whole):
     assert second == (2, "", f"error: another computation to {out} is under way: wait for it, stop "
         "it, or choose another output with -o\n")  # fmt: skip
     _, err = first.communicate(timeout=100)
-    assert first.returncode == 0 and err.count("note: what is done is not kept in .out.nc.partial: ") == 1, err
+    assert (
+        first.returncode == 0
+        and err.count("note: what is done is not kept in .out.nc.partial: ") == 1
+    ), err
     assert (place / out).read_bytes() == whole
     assert {p.name for p in place.iterdir()} == {"glass.toml", "sandfish.toml", out}

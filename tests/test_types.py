@@ -99,18 +99,32 @@ def test_no_constructor_takes_a_wrong_type(kind):
 def test_every_public_class_is_in_the_table():
     public = [getattr(rft, name) for name in rft.__all__] + list(KINDS.values())
     outputs = {rft.Refusal, rft.Solution, rft.TimeSteps, rft.Work}
-    made = {c for c in public if isinstance(c, type) and not getattr(c, "_is_protocol", False)} - outputs
-    assert made - {type(part) for part in PARTS.values()} == {Coulomb, Centreline}  # without parameters; with a file
+    made = {
+        c
+        for c in public
+        if isinstance(c, type) and not getattr(c, "_is_protocol", False)
+    } - outputs
+    assert made - {type(part) for part in PARTS.values()} == {
+        Coulomb,
+        Centreline,
+    }  # without parameters; with a file
 
 
-@pytest.mark.parametrize("value", [0.5, 1, np.float32(0.5), np.float64(0.5), np.int64(1)])
+@pytest.mark.parametrize(
+    "value", [0.5, 1, np.float32(0.5), np.float64(0.5), np.int64(1)]
+)
 def test_numbers_of_every_make_are_taken(value):
     assert Granular(C=value, gamma0=0.24).C == value
     assert Chain(length=value).length == value
     assert repr(Circle(amplitude=value, frequency=value)) == repr(
         Circle(amplitude=float(value), frequency=float(value))
     )
-    assert rft.Backbone(np.int32(5)).joints == rft.Backbone(5.0).joints == Sine(elements=5.0, waves=1).joints == 4
+    assert (
+        rft.Backbone(np.int32(5)).joints
+        == rft.Backbone(5.0).joints
+        == Sine(elements=5.0, waves=1).joints
+        == 4
+    )
     assert Chain(np.array([1, 2])) == Chain([1, 2]) == Chain((1.0, 2.0))
     assert Numerics(grid=np.int64(9)).grid == 9
 
@@ -124,10 +138,20 @@ def body_velocities(value):
     yield "alpha", lambda: body_velocity(Coulomb(), Chain(), value, STILL)
     yield "alphadot", lambda: body_velocity(Coulomb(), Chain(), STILL, value)
     for name in ("loads", "regularisation", "tolerance", "threads", "effects"):
-        yield name, lambda name=name: body_velocity(Coulomb(), Chain(), STILL, STILL + 1, **{name: value})
+        yield (
+            name,
+            lambda name=name: body_velocity(
+                Coulomb(), Chain(), STILL, STILL + 1, **{name: value}
+            ),
+        )
     still = np.zeros((8, 2))
     for name in ("loads", "regularisation", "tolerance", "cycles", "effects"):
-        yield name, lambda name=name: rft.time_steps(Coulomb(), Chain(), still, still + 1, **{name: value})
+        yield (
+            name,
+            lambda name=name: rft.time_steps(
+                Coulomb(), Chain(), still, still + 1, **{name: value}
+            ),
+        )
     yield "medium", lambda: rft.time_steps(value, Chain(), still, still + 1)
     yield "body", lambda: rft.time_steps(Coulomb(), value, still, still)
     yield "alpha of a gait", lambda: rft.time_steps(Coulomb(), Chain(), value, still)
@@ -158,7 +182,12 @@ def geometries(value):
     yield "phases", lambda: family.fit(velocity, Circle(), 1.0, 4, value)
     yield "least", lambda: family.fit(velocity, Circle(), 1.0, 4, 8, least=value)
     yield "family's amplitudes", lambda: table.area(value)
-    for of in (curvature.ccf, curvature.error, curvature.exterior_derivative, curvature.lie_bracket):
+    for of in (
+        curvature.ccf,
+        curvature.error,
+        curvature.exterior_derivative,
+        curvature.lie_bracket,
+    ):
         yield "connection", lambda of=of: of(value)
         yield "joint", lambda of=of: of(fitted, value)
     yield "axes", lambda: Field(value, fitted.A)
@@ -171,7 +200,13 @@ def geometries(value):
     yield "xi", lambda: reconstruct.turning(value)
     yield "pose", lambda: se2.exp(value)
     yield "a scene", lambda: explain(value)
-    for of in (scenes.toml, scenes.tables, scenes.inputs, accuracy.study, undulation.activation):
+    for of in (
+        scenes.toml,
+        scenes.tables,
+        scenes.inputs,
+        accuracy.study,
+        undulation.activation,
+    ):
         yield "a scene", lambda of=of: of(value)
     yield "a scene", lambda: cheapest(value, [1.0], 0.1)
     yield "a scene", lambda: sweep.sweep(value, {"gait.amplitude": [1.0]})
@@ -246,17 +281,29 @@ def test_the_place_is_named():
             lambda: scenes.load("three-link-glass").with_numerics(grid="a"),
             "three-link-glass: grid must be a whole number",
         ),
-        (lambda: Chain(length="x"), "length must be a number from 1e-15 to 1e+15 m, got 'x'"),
+        (
+            lambda: Chain(length="x"),
+            "length must be a number from 1e-15 to 1e+15 m, got 'x'",
+        ),
         (lambda: Chain(lengths=[[1]]), "lengths must be a list of numbers, got [[1]]"),
-        (lambda: body_velocity("sand", Chain(), STILL, STILL), "medium must be a force law"),
+        (
+            lambda: body_velocity("sand", Chain(), STILL, STILL),
+            "medium must be a force law",
+        ),
         (lambda: Swimmer(lambda v: v, Chain()), "medium must be a force law"),
         (
             lambda: Scene(Swimmer(Coulomb(), Chain()), [1, 2]),
             "gait must be a gait such as Circle(amplitude=0.5), got [1, 2]",
         ),
         (lambda: direct(len, [1, 2]), "gait must be a gait"),
-        (lambda: connection.grid(2, 5, "a"), "extent must be a number from 1e-09 to 1e+06, got 'a'"),
-        (lambda: Swimmer(Coulomb(), Chain(), effects=["caps"]), "effects must be a list of effects"),
+        (
+            lambda: connection.grid(2, 5, "a"),
+            "extent must be a number from 1e-09 to 1e+06, got 'a'",
+        ),
+        (
+            lambda: Swimmer(Coulomb(), Chain(), effects=["caps"]),
+            "effects must be a list of effects",
+        ),
     ):
         with pytest.raises(ValueError, match=".") as caught:
             call()
@@ -265,12 +312,31 @@ def test_the_place_is_named():
 
 
 def test_refusals_carry_facts_and_go_to_other_processes():
-    with pytest.raises(Refusal) as caught, located("own.toml"), located("own.toml: [medium]"):
-        raise Refusal("C must be > 0", value=-3, because="it is a stress", instead="give a positive one")
+    with (
+        pytest.raises(Refusal) as caught,
+        located("own.toml"),
+        located("own.toml: [medium]"),
+    ):
+        raise Refusal(
+            "C must be > 0",
+            value=-3,
+            because="it is a stress",
+            instead="give a positive one",
+        )
     refusal = pickle.loads(pickle.dumps(caught.value))
-    assert (refusal.what, refusal.value, refusal.where) == ("C must be > 0", -3, ("own.toml: [medium]",))
-    assert (refusal.because, refusal.instead) == ("it is a stress", "give a positive one")
-    assert str(refusal) == "own.toml: [medium] C must be > 0, got -3: it is a stress; give a positive one"
+    assert (refusal.what, refusal.value, refusal.where) == (
+        "C must be > 0",
+        -3,
+        ("own.toml: [medium]",),
+    )
+    assert (refusal.because, refusal.instead) == (
+        "it is a stress",
+        "give a positive one",
+    )
+    assert (
+        str(refusal)
+        == "own.toml: [medium] C must be > 0, got -3: it is a stress; give a positive one"
+    )
 
 
 PUBLIC = [
@@ -291,7 +357,11 @@ def functions(part):
         member for base in part.__mro__ if own(base) for name, member in vars(base).items() if not name.startswith("_")
     ]  # fmt: skip
     for member in members:
-        inner = getattr(member, "fget", None) or getattr(member, "func", None) or getattr(member, "__func__", member)
+        inner = (
+            getattr(member, "fget", None)
+            or getattr(member, "func", None)
+            or getattr(member, "__func__", member)
+        )
         if inspect.isfunction(inner) and own(inner) and inner.__name__ != "<lambda>":
             yield inspect.unwrap(inner)
 
@@ -300,11 +370,23 @@ def functions(part):
 def test_public_signatures_are_annotated(name):
     """Every parameter and every returned value of what a user can name, so that editors and type checkers know them."""
     module = importlib.import_module(name)
-    names = getattr(module, "__all__", None) or [x for x in dir(module) if not x.startswith("_")]
+    names = getattr(module, "__all__", None) or [
+        x for x in dir(module) if not x.startswith("_")
+    ]
     missing = []
-    for function in {f for x in names if own(part := getattr(module, x)) for f in functions(part)}:
+    for function in {
+        f for x in names if own(part := getattr(module, x)) for f in functions(part)
+    }:
         signature = inspect.signature(function)
-        parameters = [p for p in signature.parameters.values() if p.name not in ("self", "cls")]
-        known = {p.name: p.annotation for p in parameters} | {"return": signature.return_annotation}
-        missing += [f"{function.__qualname__}: {k}" for k, x in known.items() if x is inspect.Signature.empty]
+        parameters = [
+            p for p in signature.parameters.values() if p.name not in ("self", "cls")
+        ]
+        known = {p.name: p.annotation for p in parameters} | {
+            "return": signature.return_annotation
+        }
+        missing += [
+            f"{function.__qualname__}: {k}"
+            for k, x in known.items()
+            if x is inspect.Signature.empty
+        ]
     assert missing == []

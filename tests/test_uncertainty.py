@@ -22,7 +22,9 @@ from rft import Chain, Granular, SkinFriction, Transient, Viscous
 from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
-GAIT = Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2))  # moves along, sideways and turns
+GAIT = Ellipse(
+    semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2)
+)  # moves along, sideways and turns
 BODY = Chain((1, 1.4, 0.8), length=0.3, frame="link-1")
 COVARIANCE = ((0.012, -0.0012), (-0.0012, 0.0004))  # correlated
 
@@ -46,7 +48,12 @@ def whitened(count, size, seed):
     """Normal draws (count, size) whose own mean and covariance are exactly 0 and 1, so that few are many."""
     z = np.random.default_rng(seed).normal(size=(count, size))
     z -= z.mean(0)
-    return z @ np.linalg.inv(np.linalg.cholesky(np.cov(z.T, bias=True).reshape(size, size))).T
+    return (
+        z
+        @ np.linalg.inv(
+            np.linalg.cholesky(np.cov(z.T, bias=True).reshape(size, size))
+        ).T
+    )
 
 
 def test_media_drawn_from_the_covariance_scatter_as_told(monkeypatch):
@@ -55,11 +62,18 @@ def test_media_drawn_from_the_covariance_scatter_as_told(monkeypatch):
     told = uncertainty.of_medium(sand, GAIT, np.array(amplitudes))
     media = whitened(100, 2, seed=1) @ uncertainty.root(COVARIANCE).T
     nets = drawn(sand, np.concatenate([media, -media]), amplitudes)
-    scatter, shift = nets.std(0), nets.mean(0) - drawn(sand, [[0.0, 0.0]], amplitudes)[0]
+    scatter, shift = (
+        nets.std(0),
+        nets.mean(0) - drawn(sand, [[0.0, 0.0]], amplitudes)[0],
+    )
     assert told["rule"] == ["second order", "second order"]  # of the heading, 3 % of it
     for k, quantity in enumerate(QUANTITIES):
         np.testing.assert_allclose(told[quantity], scatter[:, k], rtol=0.03)
-        np.testing.assert_allclose(told["shift"][quantity] / scatter[:, k], shift[:, k] / scatter[:, k], atol=0.03)
+        np.testing.assert_allclose(
+            told["shift"][quantity] / scatter[:, k],
+            shift[:, k] / scatter[:, k],
+            atol=0.03,
+        )
     np.testing.assert_allclose(told["position"], np.hypot(told["x"], told["y"]))
     assert (scatter > 1e-4).all()  # of every quantity there is something to see
 
@@ -67,17 +81,28 @@ def test_media_drawn_from_the_covariance_scatter_as_told(monkeypatch):
 def test_in_a_frame_that_depends_on_the_medium_media_have_their_own(monkeypatch):
     monkeypatch.setattr(uncertainty, "PHASES", 16)
     sand, amplitudes = scene(granular()).with_numerics(grid=7), np.array([0.7, 1.2])
-    in_frame = lambda system: Study(sand.changed(system=system)).in_frame("minimum-perturbation").scene
+    in_frame = lambda system: (
+        Study(sand.changed(system=system)).in_frame("minimum-perturbation").scene
+    )
     told = uncertainty.of_medium(in_frame(sand.system), GAIT, amplitudes)
     media = whitened(12, 2, seed=2) @ uncertainty.root(COVARIANCE).T
     at = lambda d: (
-        in_frame(Swimmer(Granular(1.49 + d[0], 0.22 + d[1]), BODY)).system.run(*GAIT.cycle(16, amplitudes)).net
+        in_frame(Swimmer(Granular(1.49 + d[0], 0.22 + d[1]), BODY))
+        .system.run(*GAIT.cycle(16, amplitudes))
+        .net
     )
-    nets = np.stack([np.stack(list(of_pose(at(d)).values()), -1) for d in [[0.0, 0.0], *media, *-media]])
+    nets = np.stack(
+        [
+            np.stack(list(of_pose(at(d)).values()), -1)
+            for d in [[0.0, 0.0], *media, *-media]
+        ]
+    )
     for k, quantity in enumerate(QUANTITIES):
         scatter, shift = nets[1:, :, k].std(0), nets[1:, :, k].mean(0) - nets[0, :, k]
         np.testing.assert_allclose(told[quantity], scatter, rtol=0.03)
-        np.testing.assert_allclose(told["shift"][quantity] / scatter, shift / scatter, atol=0.03)
+        np.testing.assert_allclose(
+            told["shift"][quantity] / scatter, shift / scatter, atol=0.03
+        )
 
 
 def test_the_second_order_of_a_quadratic_is_exact(monkeypatch):
@@ -102,8 +127,12 @@ def test_the_second_order_of_a_quadratic_is_exact(monkeypatch):
     told = uncertainty.of_medium(sand, GAIT, np.array([1.0, 3.0]))
     assert told["rule"] == ["second order"] * 2
     np.testing.assert_allclose(told["x"], 0.5 * np.array([1, 3]))
-    np.testing.assert_allclose(told["y"], np.sqrt(0.25 + np.trace(bend @ bend) / 2) * np.array([1, 3]))
-    np.testing.assert_allclose(told["shift"]["y"], np.trace(bend) / 2 * np.array([1, 3]))
+    np.testing.assert_allclose(
+        told["y"], np.sqrt(0.25 + np.trace(bend @ bend) / 2) * np.array([1, 3])
+    )
+    np.testing.assert_allclose(
+        told["shift"]["y"], np.trace(bend) / 2 * np.array([1, 3])
+    )
     np.testing.assert_allclose(told["shift"]["x"], 0.0, atol=1e-12)
     assert (told["heading"] == 0).all()
     bend *= 0.01
@@ -117,7 +146,9 @@ def test_a_wide_covariance_is_carried_on_to_second_order(monkeypatch):
     monkeypatch.setattr(uncertainty, "PHASES", 16)
     wide = scene(Viscous(1.15, ((0.3**2,),)))
     told = uncertainty.of_medium(wide, GAIT, np.array([0.7]))
-    near = uncertainty.of_medium(scene(Viscous(1.15, ((0.03**2,),))), GAIT, np.array([0.7]))
+    near = uncertainty.of_medium(
+        scene(Viscous(1.15, ((0.03**2,),))), GAIT, np.array([0.7])
+    )
     assert (told["rule"], near["rule"]) == (["second order"], ["linear"])
     scatter = drawn(wide, 0.3 * whitened(100, 1, seed=3), [0.7]).std(0)[0]
     linear = [10 * near[q][0] for q in ("x", "y", "heading")]
@@ -132,7 +163,9 @@ def test_wide_media_shift_the_mean_and_it_is_told(monkeypatch):
     tables, errors = {}, {}
     for share in (1.0, 0.1):
         medium = Granular(1.8, 0.24, covariance=np.diag((share * spread) ** 2))
-        sand = Scene(Swimmer(medium, Chain()), gait, name="sand").with_numerics(phases=64)
+        sand = Scene(Swimmer(medium, Chain()), gait, name="sand").with_numerics(
+            phases=64
+        )
         told = uncertainty.of_medium(sand, gait, np.array([1.2]))
         assert told["x"] == pytest.approx(told["net_distance"], rel=1e-3)
         media = np.concatenate([d := whitened(60, 2, seed=5), -d]) * share * spread
@@ -140,13 +173,19 @@ def test_wide_media_shift_the_mean_and_it_is_told(monkeypatch):
         nets = drawn(sand, media, [1.2], 32)[:, 0, 3]
         shift = nets.mean() - drawn(sand, [[0.0, 0.0]], [1.2], 32)[0, 0, 3]
         assert told["net_distance"][0] == pytest.approx(nets.std(), rel=0.06)
-        assert told["shift"]["net_distance"][0] == pytest.approx(shift, abs=0.03 * nets.std())
+        assert told["shift"]["net_distance"][0] == pytest.approx(
+            shift, abs=0.03 * nets.std()
+        )
         tables[share] = Study(sand).study([1.2], ["direct"])
         errors[share] = told["shift"]["net_distance"][0] / told["net_distance"][0]
     assert errors[1.0] < -0.3 and -uncertainty.SHIFTED < errors[0.1] < 0
-    wide, narrow = (displacement.full(tables[share].result, "sand") for share in (1.0, 0.1))
+    wide, narrow = (
+        displacement.full(tables[share].result, "sand") for share in (1.0, 0.1)
+    )
     row = next(x for x in wide.splitlines() if x.startswith("      1.2"))
-    assert row.endswith(f"  mean {tables[1.0]['medium_shift_of']['net_distance'][0]:+.1e}")
+    assert row.endswith(
+        f"  mean {tables[1.0]['medium_shift_of']['net_distance'][0]:+.1e}"
+    )
     assert "\nmean: how far the mean over the media" in wide and "mean" not in narrow
     assert tables[1.0].result["quantity"].values.tolist() == list(QUANTITIES)
     assert tables[1.0]["units"]["medium_shift_of"] == "that of the quantity"
@@ -156,8 +195,13 @@ def test_media_that_end_before_the_points_are_carried_on_from_nearer_ones():
     """C = 1.49 +- 1: at sqrt(3) deviations there is no medium, at one there is."""
     sand = scene(Granular(1.49, 0.22, covariance=((1.0, 0.0), (0.0, 1e-6))))
     reach, near, both = uncertainty.sigma_points(sand)
-    assert reach == 1.0 and sorted(round(s.medium.C, 9) for pair in near for s in pair) == [0.49, 1.49, 1.49, 2.49]
-    assert len(both) == 1 and uncertainty.sigma_points(scene(granular()))[0] == uncertainty.DEVIATIONS
+    assert reach == 1.0 and sorted(
+        round(s.medium.C, 9) for pair in near for s in pair
+    ) == [0.49, 1.49, 1.49, 2.49]
+    assert (
+        len(both) == 1
+        and uncertainty.sigma_points(scene(granular()))[0] == uncertainty.DEVIATIONS
+    )
     assert np.isfinite(uncertainty.of_medium(sand, GAIT, np.array([1.0]))["x"]).all()
 
 
@@ -169,7 +213,9 @@ def test_roots():
         np.testing.assert_allclose(root @ root.T, matrix, rtol=1e-12, atol=1e-30)
         assert root.shape == (2, rank)
     assert uncertainty.root(((0.0, 0.0), (0.0, 0.0))).shape == (2, 0)
-    certain = uncertainty.of_medium(scene(Granular(1.49, 0.22, covariance=np.zeros((2, 2)))), GAIT, np.array([1.0]))
+    certain = uncertainty.of_medium(
+        scene(Granular(1.49, 0.22, covariance=np.zeros((2, 2)))), GAIT, np.array([1.0])
+    )
     assert certain["position"] == [0.0] and certain["rule"] == ["linear"]
 
 
@@ -180,9 +226,15 @@ def test_every_tier_has_it_beside_its_own_error():
     for tier in ("area", "direct"):
         np.testing.assert_allclose(table["medium_error"][tier], told["position"])
         np.testing.assert_allclose(table["medium_error_heading"][tier], told["heading"])
-    assert {q: table["medium_error_of"][q] for q in QUANTITIES} == {q: told[q].tolist() for q in QUANTITIES}
-    plain = Study(sand.changed(medium=Granular(1.49, 0.22))).study([0.5, 1.0], ["area", "direct"])
-    assert {k: plain[k] for k in ("area", "direct", "x")} == {k: table[k] for k in ("area", "direct", "x")}
+    assert {q: table["medium_error_of"][q] for q in QUANTITIES} == {
+        q: told[q].tolist() for q in QUANTITIES
+    }
+    plain = Study(sand.changed(medium=Granular(1.49, 0.22))).study(
+        [0.5, 1.0], ["area", "direct"]
+    )
+    assert {k: plain[k] for k in ("area", "direct", "x")} == {
+        k: table[k] for k in ("area", "direct", "x")
+    }
     assert not [key for key in plain if key.startswith("medium")]
     answer = cheapest(sand, [0.5, 1.0], 1e-2)
     np.testing.assert_allclose(answer["medium_error"][answer["tier"]], told["position"])
@@ -195,33 +247,55 @@ def test_every_tier_has_it_beside_its_own_error():
         and text[-3].startswith("mean: ")
     )
     short = displacement.text(table.result, "sand", rows=2)
-    assert short.count("+- medium") > 1 and ", 1 of 2" not in short, "tables below each other keep both amplitudes"
+    assert short.count("+- medium") > 1 and ", 1 of 2" not in short, (
+        "tables below each other keep both amplitudes"
+    )
 
 
 def test_effects_and_time_stepping_feel_it(monkeypatch):
     """By central differences of the whole cycle in the ratio, the one parameter of a viscous medium."""
     monkeypatch.setattr(uncertainty, "PHASES", 16)
     for effects in ((SkinFriction(0.1, 0.15),), (Transient(0.1),)):
-        sand = scene(Viscous(2.5, ((0.04**2,),))).changed(effects=effects).with_numerics(cycles=1)
+        sand = (
+            scene(Viscous(2.5, ((0.04**2,),)))
+            .changed(effects=effects)
+            .with_numerics(cycles=1)
+        )
         told = uncertainty.of_medium(sand, GAIT, np.array([1.0]))
-        nets = [sand.changed(medium=Viscous(2.5 + h)).cycle(phases=16).net for h in (0.01, -0.01)]
+        nets = [
+            sand.changed(medium=Viscous(2.5 + h)).cycle(phases=16).net
+            for h in (0.01, -0.01)
+        ]
         np.testing.assert_allclose(
-            [told[q][0] for q in QUANTITIES[:3]], np.abs(nets[0] - nets[1]) * 2, rtol=0.01, atol=1e-7
+            [told[q][0] for q in QUANTITIES[:3]],
+            np.abs(nets[0] - nets[1]) * 2,
+            rtol=0.01,
+            atol=1e-7,
         )
 
 
 def test_it_costs_what_is_told():
     sand = scene(granular()).with_numerics(phases=64)
     certain = sand.changed(medium=Granular(1.49, 0.22))
-    more = Study(sand).cost([1.0, 1.5], ["direct"]).balances - Study(certain).cost([1.0, 1.5], ["direct"]).balances
-    assert more == 6 * 2 * uncertainty.PHASES == uncertainty.points(sand.system) * 2 * uncertainty.PHASES
+    more = (
+        Study(sand).cost([1.0, 1.5], ["direct"]).balances
+        - Study(certain).cost([1.0, 1.5], ["direct"]).balances
+    )
+    assert (
+        more
+        == 6 * 2 * uncertainty.PHASES
+        == uncertainty.points(sand.system) * 2 * uncertainty.PHASES
+    )
 
 
-def test_a_covariance_that_reaches_no_medium_is_refused_before_computing(monkeypatch, tmp_path):
+def test_a_covariance_that_reaches_no_medium_is_refused_before_computing(
+    monkeypatch, tmp_path
+):
     wide = scene(Granular(1.49, 0.22, covariance=((4.0, 0.0), (0.0, 1e-4))))
     monkeypatch.setattr(Swimmer, "run", lambda *args: pytest.fail("computed"))
     with pytest.raises(
-        Refusal, match=r"sand: \[medium\] covariance: a standard deviation away there is no medium \(C "
+        Refusal,
+        match=r"sand: \[medium\] covariance: a standard deviation away there is no medium \(C ",
     ):
         Study(wide).study([1.0], ["direct"])
     with pytest.raises(Refusal, match="there is no medium"):
@@ -237,7 +311,17 @@ def test_the_command_gives_it(tmp_path):
         '[medium]\nlaw = "granular"\nC = 1.49\ngamma0_deg = 12.6\ncovariance = [[0.012, -0.0012], [-0.0012, 0.0004]]\n'
         '[body]\nkind = "chain"\n[gait]\nkind = "circle"\n[numerics]\nphases = 64\n'
     )
-    args = ("displacement", "s.toml", "--amplitudes", "1.0", "--tiers", "direct", "--json", "--plot", "d.svg")
+    args = (
+        "displacement",
+        "s.toml",
+        "--amplitudes",
+        "1.0",
+        "--tiers",
+        "direct",
+        "--json",
+        "--plot",
+        "d.svg",
+    )
     code, out, err = geomech(*args, cwd=tmp_path)
     assert (code, err) == (0, "")
     table, loaded = json.loads(out), scenes.load(tmp_path / "s.toml")
@@ -248,19 +332,35 @@ def test_the_command_gives_it(tmp_path):
 
 
 def test_sweeps_have_it(tmp_path):
-    sand = scene(granular()).with_numerics(phases=32).changed(gait=dataclasses.replace(GAIT, frequency=2.0))
+    sand = (
+        scene(granular())
+        .with_numerics(phases=32)
+        .changed(gait=dataclasses.replace(GAIT, frequency=2.0))
+    )
     over = {"body.length": [0.3, 0.6], "gait.amplitude": [0.5, 1.0]}
     found = sweep.sweep(sand, over)
     told = uncertainty.of_medium(sand, GAIT, np.array([0.5, 1.0]))
-    np.testing.assert_allclose(found["medium_error"], [told["position"], 2 * told["position"]], rtol=1e-6)
-    np.testing.assert_allclose(found["medium_error_heading"], [told["heading"]] * 2, rtol=1e-6)
-    again = sweep.sweep(sand, {"gait.tilt": [0.4, 0.5], "gait.amplitude": [1.0]})  # two gaits in one batch
-    np.testing.assert_allclose(again["medium_error"][0, 0], told["position"][1], rtol=1e-6)
+    np.testing.assert_allclose(
+        found["medium_error"], [told["position"], 2 * told["position"]], rtol=1e-6
+    )
+    np.testing.assert_allclose(
+        found["medium_error_heading"], [told["heading"]] * 2, rtol=1e-6
+    )
+    again = sweep.sweep(
+        sand, {"gait.tilt": [0.4, 0.5], "gait.amplitude": [1.0]}
+    )  # two gaits in one batch
+    np.testing.assert_allclose(
+        again["medium_error"][0, 0], told["position"][1], rtol=1e-6
+    )
     turned = dataclasses.replace(GAIT, tilt=0.5)
     told = uncertainty.of_medium(sand, turned, np.array([1.0]))["position"]
     np.testing.assert_allclose(again["medium_error"][1], told, rtol=1e-6)
-    many = sweep.sweep(sand, {"gait.amplitude": np.linspace(0.1, 1.0, 70).tolist()})  # more than go together
-    np.testing.assert_allclose(many["medium_error"][-1], found["medium_error"][0, 1], rtol=1e-6)
+    many = sweep.sweep(
+        sand, {"gait.amplitude": np.linspace(0.1, 1.0, 70).tolist()}
+    )  # more than go together
+    np.testing.assert_allclose(
+        many["medium_error"][-1], found["medium_error"][0, 1], rtol=1e-6
+    )
     write_netcdf(tmp_path / "s.nc", sweep.as_stored(found.result))
     with xarray.open_dataset(tmp_path / "s.nc") as data:
         np.testing.assert_allclose(data.medium_error, found["medium_error"])
@@ -270,8 +370,13 @@ def test_sweeps_have_it(tmp_path):
     net, _, medium, _ = plots.sweeps.drawn(sand, one)
     np.testing.assert_allclose(medium, one["frequency"] * one["medium_error"])
     box = band.get_datalim(band.axes.transData)
-    assert (box.y0, box.y1) == (pytest.approx((net - medium).min()), pytest.approx((net + medium).max()))
-    assert "medium_error" not in sweep.sweep(sand.changed(medium=Viscous()), {"gait.amplitude": [0.5]})
+    assert (box.y0, box.y1) == (
+        pytest.approx((net - medium).min()),
+        pytest.approx((net + medium).max()),
+    )
+    assert "medium_error" not in sweep.sweep(
+        sand.changed(medium=Viscous()), {"gait.amplitude": [0.5]}
+    )
     more = (
         sweep.Sweep(sand, over).cost().balances
         - sweep.Sweep(sand.changed(medium=Granular(1.49, 0.22)), over).cost().balances

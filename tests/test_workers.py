@@ -15,7 +15,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tasks import always_dies, dies, doubled, fails, fails_oddly, meets, notes, waits, who
+from tasks import (
+    always_dies,
+    dies,
+    doubled,
+    fails,
+    fails_oddly,
+    meets,
+    notes,
+    waits,
+    who,
+)
 
 from geomech import scenes, terminal, text
 from geomech.core.errors import Note, UnitWarning
@@ -69,10 +79,19 @@ def test_an_executor_is_looked_at_while_nothing_comes():
     assert jobs._Part(Slow(2), None, b"").result() == b"done"
 
 
-def test_what_is_left_to_do_decides_whether_processes_are_worth_their_start(monkeypatch):
+def test_what_is_left_to_do_decides_whether_processes_are_worth_their_start(
+    monkeypatch,
+):
     asked = []
-    monkeypatch.setattr(jobs._Queue, "_is_worth_it", lambda self, remaining: asked.append(remaining))
-    assert each(executors.Processes(2), doubled, 2, range(4), total=4) == [0, 2, 4, 6] and asked == [4, 3, 2, 1]
+    monkeypatch.setattr(
+        jobs._Queue, "_is_worth_it", lambda self, remaining: asked.append(remaining)
+    )
+    assert each(executors.Processes(2), doubled, 2, range(4), total=4) == [
+        0,
+        2,
+        4,
+        6,
+    ] and asked == [4, 3, 2, 1]
 
 
 def test_results_come_in_order(two):
@@ -80,34 +99,53 @@ def test_results_come_in_order(two):
     np.testing.assert_array_equal(found, np.outer(range(40), [1.0, 2.0]))
 
 
-def test_a_worker_takes_one_thread_and_one_back_end_and_no_workers_of_its_own(two, tmp_path):
+def test_a_worker_takes_one_thread_and_one_back_end_and_no_workers_of_its_own(
+    two, tmp_path
+):
     found = each(two, meets, str(tmp_path), range(20))
     assert {x[1:4] for x in found} == {(1, "numpy", None)}
     pids = {x[0] for x in found}
     assert len(pids) == 2 and os.getpid() not in pids
     with backend.preferring("numba"):
-        assert {x[:4] for x in each(None, who, None, range(2))} == {(os.getpid(), 1, "numba", None)}
-    assert thread_count(None, 100) == cores() and backend.preferred() == "numpy"  # and it is over
+        assert {x[:4] for x in each(None, who, None, range(2))} == {
+            (os.getpid(), 1, "numba", None)
+        }
+    assert (
+        thread_count(None, 100) == cores() and backend.preferred() == "numpy"
+    )  # and it is over
 
 
 def test_what_is_small_is_done_here(two):
     here = each(two, who, None, range(5), 5, seconds=None)
     assert {x[0] for x in here} == {os.getpid()}
-    assert {x[0] for x in each(two, who, None, range(5), 5, seconds=1.0)} == {os.getpid()}
-    assert {x[0] for x in each(two, who, None, [7], 1, seconds=1e9)} == {os.getpid()}  # there is nothing to share
+    assert {x[0] for x in each(two, who, None, range(5), 5, seconds=1.0)} == {
+        os.getpid()
+    }
+    assert {x[0] for x in each(two, who, None, [7], 1, seconds=1e9)} == {
+        os.getpid()
+    }  # there is nothing to share
 
 
 def test_what_turns_out_to_take_long_is_given_away(two, monkeypatch):
     monkeypatch.setattr(jobs, "WORTH", 1e-9)
     found = each(two, who, None, range(6), 6, seconds=None)
     assert [x[-1] for x in found] == [*range(6)]
-    assert [x[0] == os.getpid() for x in found] == [True, True, False, False, False, False]
+    assert [x[0] == os.getpid() for x in found] == [
+        True,
+        True,
+        False,
+        False,
+        False,
+        False,
+    ]
 
 
 def test_an_ended_worker_loses_nothing(tmp_path):
     with contextlib.closing(executors.Processes(1)) as executor:
         assert each(executor, dies, str(tmp_path), range(8)) == [*range(8)]
-        with pytest.raises(RuntimeError, match="ended 3 times at the same part: out of memory"):
+        with pytest.raises(
+            RuntimeError, match="ended 3 times at the same part: out of memory"
+        ):
             each(executor, always_dies, None, [0])
         assert each(executor, doubled, 2, range(4)) == [0, 2, 4, 6]
 
@@ -126,7 +164,10 @@ def test_what_others_cannot_know_is_done_here(two, monkeypatch):
     """Without a word for a function that is made inside another; a class that only the program has is worth saying."""
     assert each(two, lambda c, x: c + x, 1, range(4)) == [1, 2, 3, 4]
     monkeypatch.setattr(kinds, "registered", lambda: (("__main__", "Own"),))
-    with pytest.warns(Note, match="computed by one process, others cannot know it: the class Own is of the program"):
+    with pytest.warns(
+        Note,
+        match="computed by one process, others cannot know it: the class Own is of the program",
+    ):
         assert {x[0] for x in each(two, who, None, range(4))} == {os.getpid()}
 
 
@@ -167,7 +208,11 @@ def test_workers_end_with_whoever_started_them(tmp_path):
     left = {int(mark.name) for mark in tmp_path.iterdir()}
     until = time.monotonic() + 20
     while left and time.monotonic() < until:
-        left = {pid for pid in left if Path(f"/proc/{pid}").exists() and "Z" not in status(pid)}
+        left = {
+            pid
+            for pid in left
+            if Path(f"/proc/{pid}").exists() and "Z" not in status(pid)
+        }
         time.sleep(0.02)
     assert left == set()
 
@@ -179,11 +224,17 @@ def status(pid):
         return "Z"
 
 
-OVER = {"body.length": [1.0, 2.0, 3.0], "medium.C": [1.5, 2.5], "gait.amplitude": [0.4, 0.8, 1.2]}
+OVER = {
+    "body.length": [1.0, 2.0, 3.0],
+    "medium.C": [1.5, 2.5],
+    "gait.amplitude": [0.4, 0.8, 1.2],
+}
 
 
 @pytest.mark.parametrize("at_once", [2, 64])
-def test_a_sweep_has_the_same_digits_whoever_computes(at_once, two, given_away, monkeypatch):
+def test_a_sweep_has_the_same_digits_whoever_computes(
+    at_once, two, given_away, monkeypatch
+):
     monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", at_once)
     here, shared = both(two, lambda: sweep.sweep(GLASS, OVER), at_once < 64)
     for key in ("displacement", "estimate", "estimate_heading"):
@@ -208,9 +259,14 @@ def both(two, ask, shared=True):
 
 def test_fields_have_the_same_digits_whoever_computes(two, given_away, monkeypatch):
     """With what moving costs, whose powers come beside the velocities."""
-    monkeypatch.setattr(connection, "SAMPLES_TOGETHER", 20)  # a quarter of the viscous field has 36
+    monkeypatch.setattr(
+        connection, "SAMPLES_TOGETHER", 20
+    )  # a quarter of the viscous field has 36
     monkeypatch.setattr(metric, "SAMPLES_TOGETHER", 30)
-    for scene in (GLASS.with_numerics(grid=5, harmonics=3), scenes.load("three-link-viscous").with_numerics(grid=5)):
+    for scene in (
+        GLASS.with_numerics(grid=5, harmonics=3),
+        scenes.load("three-link-viscous").with_numerics(grid=5),
+    ):
 
         def ask():
             study = Study(scene)
@@ -224,20 +280,31 @@ def test_fields_have_the_same_digits_whoever_computes(two, given_away, monkeypat
         np.testing.assert_array_equal(getattr(shared[2], name), getattr(cost, name))
 
 
-def test_error_studies_have_the_same_digits_whoever_computes(two, given_away, monkeypatch):
-    few = [dataclasses.replace(k, values=k.values[:2]) for k in tiered.SETTINGS if k.tier in ("direct", "path")]
+def test_error_studies_have_the_same_digits_whoever_computes(
+    two, given_away, monkeypatch
+):
+    few = [
+        dataclasses.replace(k, values=k.values[:2])
+        for k in tiered.SETTINGS
+        if k.tier in ("direct", "path")
+    ]
     monkeypatch.setattr(tiered, "SETTINGS", few)
     monkeypatch.setattr(tiered, "TRUTH_PHASES", 64)
     scene, told = scenes.load("three-link-viscous").with_numerics(grid=5, phases=32), []
     here, shared = both(two, lambda: accuracy.study(scene, told.append, runs=1))
     assert [x["error"] for x in shared["lines"]] == [x["error"] for x in here["lines"]]
-    assert len(here["lines"]) == 3 and all(t > 0 for x in shared["lines"] for t in x["seconds"])
+    assert len(here["lines"]) == 3 and all(
+        t > 0 for x in shared["lines"] for t in x["seconds"]
+    )
     parts = len(told) // 2  # each tells, whoever has done it
     assert parts >= 2 * 3 and told == 2 * [(k + 1) / parts for k in range(parts)]
 
 
 def test_searches_have_the_same_digits_whoever_computes(two, given_away, monkeypatch):
-    for names in (search.__globals__, vars(sys.modules["geomech.optimisation.request"])):
+    for names in (
+        search.__globals__,
+        vars(sys.modules["geomech.optimisation.request"]),
+    ):
         monkeypatch.setitem(names, "MORE", 1)  # perturbation of each size
         monkeypatch.setitem(names, "LED", 1)  # start from narrower limits
     scene, told = GLASS.with_numerics(grid=5), []
@@ -279,14 +346,20 @@ def power(tmp_path, own_parts):
 def test_plugins_are_known_to_workers(power, two, given_away, monkeypatch):
     """By their text, which need not be a file where they are."""
     monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", 1)
-    scene, over = GLASS.changed(medium=power(1.0)), {"medium.power": [0.8, 0.9, 1.0, 1.1, 1.2]}
+    scene, over = (
+        GLASS.changed(medium=power(1.0)),
+        {"medium.power": [0.8, 0.9, 1.0, 1.1, 1.2]},
+    )
     here, shared = both(two, lambda: sweep.sweep(scene, over))
     np.testing.assert_array_equal(shared["displacement"], here["displacement"])
 
 
 def test_processes_are_not_started_before_they_are_asked():
     with using(3):
-        assert isinstance(runner().executor, executors.Processes) and runner().executor.pool is None
+        assert (
+            isinstance(runner().executor, executors.Processes)
+            and runner().executor.pool is None
+        )
 
 
 def test_a_signal_at_any_moment_leaves_nobody_waiting(monkeypatch):
@@ -302,7 +375,10 @@ def test_a_signal_at_any_moment_leaves_nobody_waiting(monkeypatch):
     before = signal.signal(signal.SIGALRM, ring)
     try:
         for k in (0, 2):
-            with contextlib.suppress(Rung), contextlib.closing(executors.Processes(1)) as executor:
+            with (
+                contextlib.suppress(Rung),
+                contextlib.closing(executors.Processes(1)) as executor,
+            ):
                 assert each(executor, doubled, 2, range(3)) == [0, 2, 4]
                 pool = executor.pool
                 signal.setitimer(signal.ITIMER_REAL, 1e-3 * (1 + 13 * k))
@@ -315,7 +391,9 @@ def test_a_signal_at_any_moment_leaves_nobody_waiting(monkeypatch):
         signal.signal(signal.SIGALRM, before)
 
 
-def test_a_signal_that_comes_as_a_thread_ends_is_no_reason_to_wait_for_ever(monkeypatch):
+def test_a_signal_that_comes_as_a_thread_ends_is_no_reason_to_wait_for_ever(
+    monkeypatch,
+):
     """Between what the thread says and our hearing it: a queue that was emptied has nothing more to say."""
 
     class Deaf(queue.SimpleQueue):
@@ -326,7 +404,9 @@ def test_a_signal_that_comes_as_a_thread_ends_is_no_reason_to_wait_for_ever(monk
     ended = []
     monkeypatch.setattr(threaded, "SimpleQueue", Deaf)
     with pytest.raises(terminal.Stopped):
-        threaded.run_shares(lambda share, stop: stop.wait(0.2 * share) or ended.append(share), [0, 1, 5])
+        threaded.run_shares(
+            lambda share, stop: stop.wait(0.2 * share) or ended.append(share), [0, 1, 5]
+        )
     assert ended == [0]  # the others were told to stop
 
 
@@ -334,5 +414,8 @@ def test_a_signal_that_comes_as_a_thread_ends_is_no_reason_to_wait_for_ever(monk
 def test_an_error_in_a_thread_is_raised_and_stops_the_others():
     stopped = []
     with pytest.raises(ZeroDivisionError):
-        threaded.run_shares(lambda share, stop: stopped.append(stop.wait(5)) if share else 1 / share, [0, 1, 2])
+        threaded.run_shares(
+            lambda share, stop: stopped.append(stop.wait(5)) if share else 1 / share,
+            [0, 1, 2],
+        )
     assert stopped == [True, True]

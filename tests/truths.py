@@ -30,11 +30,17 @@ def spelled(value) -> str:
             return spelled(sorted(value.items()))
         case _ if dataclasses.is_dataclass(value):
             fields = {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
-            fields = {name: x for name, x in fields.items() if x is not None or name not in LATER}
+            fields = {
+                name: x
+                for name, x in fields.items()
+                if x is not None or name not in LATER
+            }
             return type(value).__name__ + spelled(fields)
         case str() | int() | None:
             return repr(value)
-    raise TypeError(f"a question cannot hold {value!r}: its text must say all there is to it")
+    raise TypeError(
+        f"a question cannot hold {value!r}: its text must say all there is to it"
+    )
 
 
 class Truths:
@@ -66,6 +72,9 @@ class Truths:
         self.folder.mkdir(exist_ok=True)
         for name, answers in self.asked.items():
             rows = [
-                f'"{key}": {json.dumps(answer.round(DECIMALS).tolist())}' for key, answer in sorted(answers.items())
+                f'"{key}": {json.dumps(answer.round(DECIMALS).tolist())}'
+                for key, answer in sorted(answers.items())
             ]
-            (self.folder / f"{name}.json").write_text("{\n" + ",\n".join(rows) + "\n}\n")
+            (self.folder / f"{name}.json").write_text(
+                "{\n" + ",\n".join(rows) + "\n}\n"
+            )

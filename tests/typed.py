@@ -14,7 +14,16 @@ from geomech.app import Displacements
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Gait, Points, Sine
 from geomech.geometry import family, harmonics
 from geomech.geometry.traits import Traits
-from geomech.scenes import Numerics, Scene, from_tables, inputs, load, parse, tables, toml
+from geomech.scenes import (
+    Numerics,
+    Scene,
+    from_tables,
+    inputs,
+    load,
+    parse,
+    tables,
+    toml,
+)
 from geomech.studies import accuracy, cost, undulation
 from geomech.studies.choose import cheapest
 from geomech.studies.study import Study
@@ -53,16 +62,24 @@ class Cart:
     run = integrated
 
     def velocity(self, alpha: Array, alphadot: Array) -> Array:
-        return np.stack([alphadot[..., 0], 0 * alphadot[..., 0], 0 * alphadot[..., 0]], -1)
+        return np.stack(
+            [alphadot[..., 0], 0 * alphadot[..., 0], 0 * alphadot[..., 0]], -1
+        )
 
 
 def geometry() -> list[Any]:
     fitted = connection.fit(velocity, connection.grid(joints=2, points=5))
     ccf = curvature.ccf(fitted)
     figure, axes = geomech.plots.figure(3.0, 3.0)
-    plots.displacement({"amplitude": [0.5, 1.0], "area": np.zeros((2, 3))}, ax=axes[0, 0])
+    plots.displacement(
+        {"amplitude": [0.5, 1.0], "area": np.zeros((2, 3))}, ax=axes[0, 0]
+    )
     plots.ccf_figure(ccf, [Circle()])
-    nets: list[Array] = [area(ccf, Circle(), [0.5]), path(fitted, Circle(), [0.5]), direct(velocity, Circle(), [0.5])]
+    nets: list[Array] = [
+        area(ccf, Circle(), [0.5]),
+        path(fitted, Circle(), [0.5]),
+        direct(velocity, Circle(), [0.5]),
+    ]
     table = family.fit(velocity, Circle(), 1.0, 6)
     return [
         *nets,
@@ -120,11 +137,28 @@ def scenes() -> list[Any]:
 
 def mechanics() -> list[Any]:
     gaits: list[Gait] = [Butterfly(), Ellipse(semi_axes=(1.0, 0.3)), Sine(elements=8)]
-    gaits += [Points(points=((1, 0), (0, 1), (-1, 0))), Fourier(cos=((1.0,), (0.0,)), sin=((0.0,), (1.0,)))]
-    cycle = Swimmer(sand, swimmer, (rft.EndCaps(radius=0.06),)).run(*Circle().cycle(32, [0.5]))
-    steps = time_steps(sand, swimmer, np.zeros((8, 2)), np.ones((8, 2)), effects=[rft.Transient(0.1)], cycles=1)
-    power: Array = work_done(sand, swimmer, [0.0, 0.1], [1.0, 0.0], [0.0, 0.0, 0.0]).power
-    own = Scene(Swimmer(Mine(), swimmer), Circle(), Numerics(grid=7)), Scene(Cart(), Circle()).cycle(phases=8).net
+    gaits += [
+        Points(points=((1, 0), (0, 1), (-1, 0))),
+        Fourier(cos=((1.0,), (0.0,)), sin=((0.0,), (1.0,))),
+    ]
+    cycle = Swimmer(sand, swimmer, (rft.EndCaps(radius=0.06),)).run(
+        *Circle().cycle(32, [0.5])
+    )
+    steps = time_steps(
+        sand,
+        swimmer,
+        np.zeros((8, 2)),
+        np.ones((8, 2)),
+        effects=[rft.Transient(0.1)],
+        cycles=1,
+    )
+    power: Array = work_done(
+        sand, swimmer, [0.0, 0.1], [1.0, 0.0], [0.0, 0.0, 0.0]
+    ).power
+    own = (
+        Scene(Swimmer(Mine(), swimmer), Circle(), Numerics(grid=7)),
+        Scene(Cart(), Circle()).cycle(phases=8).net,
+    )
     media = (
         rft.CATALOGUE["coulomb"].medium.traction(1.0, 0.5),
         rft.Viscous(2.0).slopes(1.0, 2.0, 0.0),

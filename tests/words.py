@@ -18,16 +18,38 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.io import loadmat, netcdf_file
 
-TOLERANCE, FLOOR = 1e-6, 1e-9  # relative, of the largest number of a line; what is smaller is rounding
+TOLERANCE, FLOOR = (
+    1e-6,
+    1e-9,
+)  # relative, of the largest number of a line; what is smaller is rounding
 
 PLAIN_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.I)
 WORD = re.compile(r"[^\s()\[\]{},;:=<>|*/^\"'`]+")
-UNITS = {"BL", "m", "rad", "deg", "degrees", "s", "Hz", "N", "J", "W", "kg", "Pa", "N/cm^3", "N/m^3", "kg/m^3", "m/s"}
+UNITS = {
+    "BL",
+    "m",
+    "rad",
+    "deg",
+    "degrees",
+    "s",
+    "Hz",
+    "N",
+    "J",
+    "W",
+    "kg",
+    "Pa",
+    "N/cm^3",
+    "N/m^3",
+    "kg/m^3",
+    "m/s",
+}
 LISTED = {  # words of an answer that programs look for
     "area", "adapted", "path", "harmonic", "direct", "sliding", "stuck", "walking", "algebraic", "planar", "mujoco",
     "granular", "viscous", "coulomb", "circle", "ellipse", "butterfly", "fourier", "points", "chain", "serpenoid",
 }  # fmt: skip
-FILE = re.compile(r"[\w./~-]*\w\.(?:toml|nc|mat|csv|png|svg|pdf|gif|mp4|json|txt|stl|obj|ply|xml|py)\b")
+FILE = re.compile(
+    r"[\w./~-]*\w\.(?:toml|nc|mat|csv|png|svg|pdf|gif|mp4|json|txt|stl|obj|ply|xml|py)\b"
+)
 OPTION = re.compile(r"(?<![\w-])--?[a-z][\w-]*")
 QUOTED = re.compile(r"(?<!\w)'([^']+)'(?!\w)|`([^`]+)`|\"([^\"]+)\"")
 CODE = re.compile(r"(?<![\w.])[A-Za-z]\w*_\w+|\b[A-Za-z]+\d\w*")
@@ -64,7 +86,9 @@ def numbers(text: str) -> list[tuple[float, float]]:
     found = []
     for word in WORD.findall(text):
         if (x := number_of(word)) is not None:
-            digits, _, power = word.rstrip(".%?!").removesuffix("deg").lower().partition("e")
+            digits, _, power = (
+                word.rstrip(".%?!").removesuffix("deg").lower().partition("e")
+            )
             decimals = len(digits.partition(".")[2])
             found.append((x, 10.0 ** (int(power or 0) - decimals) if decimals else 0.0))
     return found
@@ -72,22 +96,34 @@ def numbers(text: str) -> list[tuple[float, float]]:
 
 def names(text: str) -> set[str]:
     """What a text calls by name: options, files, what stands in quotes or looks like code, units, and `LISTED`."""
-    words = {word.rstrip(".") for word in WORD.findall(text)} | set(re.findall(r"[^\s(),;:]+", text))
+    words = {word.rstrip(".") for word in WORD.findall(text)} | set(
+        re.findall(r"[^\s(),;:]+", text)
+    )
     quoted = {next(filter(None, found)) for found in QUOTED.findall(text)}
-    return {*OPTION.findall(text), *FILE.findall(text), *CODE.findall(text), *quoted, *(words & (UNITS | LISTED))}
+    return {
+        *OPTION.findall(text),
+        *FILE.findall(text),
+        *CODE.findall(text),
+        *quoted,
+        *(words & (UNITS | LISTED)),
+    }
 
 
 def near(one: float, other: float, unit: float = 0.0, size: float = 0.0) -> bool:
     """Equal, but for a last digit or rounding."""
     if not (math.isfinite(one) and math.isfinite(other)):
         return one == other or (math.isnan(one) and math.isnan(other))
-    return abs(one - other) <= max(1.01 * unit, TOLERANCE * max(abs(one), abs(other), size), FLOOR)
+    return abs(one - other) <= max(
+        1.01 * unit, TOLERANCE * max(abs(one), abs(other), size), FLOOR
+    )
 
 
 def text_holds(old: str, new: str) -> bool:
     """Whether the numbers of a text are as they were, and what it named is named."""
     was, now = numbers(old), numbers(new)
-    same = len(was) == len(now) and all(near(a, b, unit) for (a, unit), (b, _) in zip(was, now))
+    same = len(was) == len(now) and all(
+        near(a, b, unit) for (a, unit), (b, _) in zip(was, now)
+    )
     return same and names(old) <= names(new)
 
 
@@ -97,15 +133,25 @@ def line_holds(old: str, new: str) -> bool:
         return True
     was, now = numbers(old), numbers(new)
     size = max((abs(x) for x, _ in was), default=0.0)
-    bare = lambda text: WORD.sub(lambda word: "#" if number_of(word[0]) is not None else word[0], text)
-    return bare(old) == bare(new) and all(near(a, b, 0.0, size) for (a, _), (b, _) in zip(was, now))
+    bare = lambda text: WORD.sub(
+        lambda word: "#" if number_of(word[0]) is not None else word[0], text
+    )
+    return bare(old) == bare(new) and all(
+        near(a, b, 0.0, size) for (a, _), (b, _) in zip(was, now)
+    )
 
 
 # Structures: JSON and files, as lines.
 
 
 def short(x) -> str:
-    return x if isinstance(x, str) else f"{x:.8g}" if isinstance(x, (float, np.floating)) else str(x)
+    return (
+        x
+        if isinstance(x, str)
+        else f"{x:.8g}"
+        if isinstance(x, (float, np.floating))
+        else str(x)
+    )
 
 
 def of_array(values) -> str:
@@ -114,11 +160,16 @@ def of_array(values) -> str:
     array = np.asarray(values)
     flat = array.ravel()
     if flat.dtype.kind not in "iufb" or flat.size <= 12:
-        return " ".join(map(short, flat.tolist())) if array.ndim else short(array.item())
+        return (
+            " ".join(map(short, flat.tolist())) if array.ndim else short(array.item())
+        )
     flat = flat.astype(float)
     some = flat[np.linspace(0, flat.size - 1, 7).astype(int)]
     good = np.nan_to_num(flat)
-    mean = [np.sqrt((good**2).mean()), (good * np.cos(1.0 + np.arange(good.size))).mean()]
+    mean = [
+        np.sqrt((good**2).mean()),
+        (good * np.cos(1.0 + np.arange(good.size))).mean(),
+    ]
     return f"{'x'.join(map(str, array.shape))} numbers: {' '.join(map(short, [*some, *mean]))}"
 
 
@@ -146,7 +197,9 @@ def is_array(value: list) -> bool:
 def of_text(name: str, text: str) -> Iterator[str]:
     """An attribute: a scene in TOML by its keys, other text as it is."""
     try:
-        yield from (f"= {line}" for line in flat(tomllib.loads(text), name) if "\n" in text)
+        yield from (
+            f"= {line}" for line in flat(tomllib.loads(text), name) if "\n" in text
+        )
     except tomllib.TOMLDecodeError:
         yield f"~ {name} = {' '.join(text.split())}"
     else:
@@ -161,13 +214,20 @@ def of_netcdf(file: pathlib.Path) -> Iterator[str]:
             yield from of_text(f":{key}", masked(short(decoded(data._attributes[key]))))
         for name in sorted(data.variables):
             variable = data.variables[name]
-            yield f"= {name}({', '.join(f'{d} {n}' for d, n in zip(variable.dimensions, variable.shape))}) " + (
-                f"{variable.data.dtype.kind}{variable.data.dtype.itemsize} in {decoded(getattr(variable, 'units', b'-'))}"
+            yield (
+                f"= {name}({', '.join(f'{d} {n}' for d, n in zip(variable.dimensions, variable.shape))}) "
+                + (
+                    f"{variable.data.dtype.kind}{variable.data.dtype.itemsize} in {decoded(getattr(variable, 'units', b'-'))}"
+                )
             )
             for key in sorted(set(variable._attributes) - {"units"}):
                 yield f"~ {name}:{key} = {decoded(variable._attributes[key])}"
             text = variable.data.dtype.kind == "S"
-            rows = [b"".join(row).decode() for row in variable.data] if text else variable.data
+            rows = (
+                [b"".join(row).decode() for row in variable.data]
+                if text
+                else variable.data
+            )
             yield f"= {name} = {' '.join(rows) if text else of_array(np.array(rows))}"
 
 
@@ -181,20 +241,38 @@ def of_file(file: pathlib.Path) -> Iterator[str]:
                 if not key.startswith("__"):
                     yield f"= {key} {value.dtype.kind}{value.dtype.itemsize} = {of_array(value)}"
         case ".toml":
-            yield from (f"= {line}" for line in flat(tomllib.loads(masked(file.read_text()))))
+            yield from (
+                f"= {line}" for line in flat(tomllib.loads(masked(file.read_text())))
+            )
         case ".json":
-            yield from (f"= {line}" for line in flat(json.loads(masked(file.read_text()))))
+            yield from (
+                f"= {line}" for line in flat(json.loads(masked(file.read_text())))
+            )
         case ".csv":
-            rows = [line for line in file.read_text().splitlines() if not line.startswith("#")]
+            rows = [
+                line
+                for line in file.read_text().splitlines()
+                if not line.startswith("#")
+            ]
             yield f"= {len(rows)} lines of {rows[0]}"
             with contextlib.suppress(ValueError):
-                for name, column in zip(rows[0].split(","), np.array([row.split(",") for row in rows[1:]], float).T):
+                for name, column in zip(
+                    rows[0].split(","),
+                    np.array([row.split(",") for row in rows[1:]], float).T,
+                ):
                     yield f"= {name} = {of_array(column)}"
         case ".html":  # test_lab.py opens it
             yield f"= {file.read_text().splitlines()[0]}"
         case ".png" | ".gif" | ".pdf" | ".svg":
             begin = file.read_bytes()[:6]
-            kinds = {b"\x89PNG\r\n": "PNG", b"GIF89a": "GIF", b"%PDF-1": "PDF", b"<?xml ": "XML"}
+            kinds = {
+                b"\x89PNG\r\n": "PNG",
+                b"GIF89a": "GIF",
+                b"%PDF-1": "PDF",
+                b"<?xml ": "XML",
+            }
             yield f"= {kinds.get(begin, 'something else')}"
         case _:
-            yield from (f"~ {line}" for line in masked(file.read_text()).splitlines() if line)
+            yield from (
+                f"~ {line}" for line in masked(file.read_text()).splitlines() if line
+            )

@@ -18,7 +18,11 @@ def notebooks() -> str:
     """Return the tree of contents of all notebooks, or that there are none."""
     folder = Path(__file__).parents[1] / "notebooks"
     names = sorted(path.stem for path in folder.glob("*.md") if path.stem != "index")
-    return "```{toctree}\n" + "\n".join(names) + "\n```" if names else "There are none yet."
+    return (
+        "```{toctree}\n" + "\n".join(names) + "\n```"
+        if names
+        else "There are none yet."
+    )
 
 
 MADE = {
@@ -36,10 +40,15 @@ MADE = {
 
 def fill_in(app, docname: str, source: list[str]) -> None:
     """Replace the blocks {made} of a page, and add what its commands print, or the pictures of the gallery."""
-    if docname.startswith("gallery/") and docname not in ("gallery/index", "gallery/figures"):
+    if docname.startswith("gallery/") and docname not in (
+        "gallery/index",
+        "gallery/figures",
+    ):
         source[0] = examples.shown(docname)
     elif not docname.startswith("generated/"):
-        text = re.sub(r"(?m)^```\{made\} (\w+)\n```$", lambda block: MADE[block[1]](), source[0])
+        text = re.sub(
+            r"(?m)^```\{made\} (\w+)\n```$", lambda block: MADE[block[1]](), source[0]
+        )
         source[0] = examples.with_output(text)
 
 
@@ -59,7 +68,9 @@ def setup(app) -> dict[str, bool]:
     """Register the computations with Sphinx."""
     app.connect("builder-inited", compute)
     app.connect("source-read", fill_in)
-    app.connect("autodoc-process-docstring", api.readable, priority=400)  # before numpydoc
+    app.connect(
+        "autodoc-process-docstring", api.readable, priority=400
+    )  # before numpydoc
     app.connect("autodoc-process-docstring", api.with_parameters, priority=401)
     app.connect("autodoc-process-signature", api.plain_types)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -55,9 +55,14 @@ def index() -> str:
     """Return the table of all pages and the tree of contents that leads to them."""
     parts = []
     for heading, names in PACKAGES.items():
-        rows = [f"| [{name}](/generated/api/{name}.rst) | {_summary(name)} |" for name in names]
+        rows = [
+            f"| [{name}](/generated/api/{name}.rst) | {_summary(name)} |"
+            for name in names
+        ]
         tree = "\n".join(f"/generated/api/{name}" for name in names)
-        parts.append(f"## {heading}\n\n| module | contents |\n|---|---|\n" + "\n".join(rows))
+        parts.append(
+            f"## {heading}\n\n| module | contents |\n|---|---|\n" + "\n".join(rows)
+        )
         parts.append(f"```{{toctree}}\n:hidden:\n\n{tree}\n```")
     return "\n\n".join(parts)
 
@@ -74,9 +79,18 @@ def write(folder: Path) -> None:
 
 def readable(app, what: str, name: str, obj, options, lines: list[str]) -> None:
     """Turn a docstring of plain sentences into reStructuredText: |x| is no substitution, and a table stays as it is."""
-    escaped = lambda some: [re.sub(r"(``.*?``)|\|", lambda x: x[1] or r"\|", line) for line in some]
-    heads = {lines[k - 1].strip(): k - 1 for k, line in enumerate(lines) if re.fullmatch(r"\s*-{3,}", line)}
-    begin, examples = min(heads.values(), default=len(lines)), heads.get("Examples", len(lines))
+    escaped = lambda some: [
+        re.sub(r"(``.*?``)|\|", lambda x: x[1] or r"\|", line) for line in some
+    ]
+    heads = {
+        lines[k - 1].strip(): k - 1
+        for k, line in enumerate(lines)
+        if re.fullmatch(r"\s*-{3,}", line)
+    }
+    begin, examples = (
+        min(heads.values(), default=len(lines)),
+        heads.get("Examples", len(lines)),
+    )
     sections = escaped(lines[begin:examples]) + lines[examples:]  # numpydoc's
     lines[:] = escaped(lines[:begin])
     table = {k for k, line in enumerate(lines) if line.startswith(" ")}
@@ -91,7 +105,9 @@ def readable(app, what: str, name: str, obj, options, lines: list[str]) -> None:
     lines += sections
 
 
-def plain_types(app, what: str, name: str, obj, options, signature: str | None, returned: str | None):
+def plain_types(
+    app, what: str, name: str, obj, options, signature: str | None, returned: str | None
+):
     """Drop bounds and meanings from the types of a signature, as they stand in the list of parameters."""
     return tuple(text and _without_annotations(text) for text in (signature, returned))
 
@@ -119,7 +135,11 @@ def _without_annotations(text: str) -> str:
 
 def with_parameters(app, what: str, name: str, obj, options, lines: list[str]) -> None:
     """Add the list of parameters of a class whose fields are annotated with bounds, unit and meaning."""
-    if what != "class" or not (numbers := number_fields(obj)) or any(line.startswith("Parameters") for line in lines):
+    if (
+        what != "class"
+        or not (numbers := number_fields(obj))
+        or any(line.startswith("Parameters") for line in lines)
+    ):
         return
     lines += ["", "Parameters", "----------"]
     for field, number in numbers.items():
@@ -140,24 +160,53 @@ def _summary(name: str) -> str:
 
 def _page(name: str) -> str:
     module = importlib.import_module(name)
-    objects = {public: getattr(module, public) for public in _public(module) if not public.isupper()}
+    objects = {
+        public: getattr(module, public)
+        for public in _public(module)
+        if not public.isupper()
+    }
     objects = {public: value for public, value in objects.items() if _home(name, value)}
     classes = [public for public, value in objects.items() if inspect.isclass(value)]
-    functions = [public for public, value in objects.items() if inspect.isroutine(value)]
+    functions = [
+        public for public, value in objects.items() if inspect.isroutine(value)
+    ]
     lines = [name, "=" * len(name), "", _summary(name), ""]
     if name == "geomech":
-        lines += ["Its names are those of the modules below, imported at their first use.", "", *_top(module), ""]
-        lines += [line for public in _nowhere_else(module) for line in (f".. autofunction:: geomech.{public}", "")]
+        lines += [
+            "Its names are those of the modules below, imported at their first use.",
+            "",
+            *_top(module),
+            "",
+        ]
+        lines += [
+            line
+            for public in _nowhere_else(module)
+            for line in (f".. autofunction:: geomech.{public}", "")
+        ]
         return "\n".join(lines)
     for heading, names, directive in (
         ("Classes", classes, "autoclass"),
         ("Functions", functions, "autofunction"),
     ):
         if names:
-            lines += [heading, "-" * len(heading), "", ".. list-table::", "   :widths: auto", ""]
+            lines += [
+                heading,
+                "-" * len(heading),
+                "",
+                ".. list-table::",
+                "   :widths: auto",
+                "",
+            ]
             for public in names:
-                about = first_sentence(objects[public]).replace("|", r"\|").replace("*", r"\*")
-                lines += [f"   * - :py:obj:`~{name}.{public}`", f"     - {about or '..'}"]
+                about = (
+                    first_sentence(objects[public])
+                    .replace("|", r"\|")
+                    .replace("*", r"\*")
+                )
+                lines += [
+                    f"   * - :py:obj:`~{name}.{public}`",
+                    f"     - {about or '..'}",
+                ]
             lines.append("")
             for public in names:
                 lines += [f".. {directive}:: {name}.{public}", ""]
@@ -167,7 +216,12 @@ def _page(name: str) -> str:
 def _home(name: str, value) -> bool:
     """Return whether the page of a package is the one of all pages that documents an object it offers."""
     module = getattr(value, "__module__", name)
-    pages = [page for group in PACKAGES.values() for page in group if f"{module}.".startswith(f"{page}.")]
+    pages = [
+        page
+        for group in PACKAGES.values()
+        for page in group
+        if f"{module}.".startswith(f"{page}.")
+    ]
     return not pages or max(pages, key=len) == name
 
 
@@ -176,12 +230,21 @@ def _public(module) -> list[str]:
     if hasattr(module, "__all__"):
         return sorted(module.__all__)
     own = lambda value: getattr(value, "__module__", "") == module.__name__
-    return sorted(name for name, value in vars(module).items() if not name.startswith("_") and own(value))
+    return sorted(
+        name
+        for name, value in vars(module).items()
+        if not name.startswith("_") and own(value)
+    )
 
 
 def _nowhere_else(module) -> list[str]:
     """Return the functions of `geomech` that no other page documents."""
-    shown = [f"{page}.{public}" for page in _pages() if page != "geomech" for public in _public(_imported(page))]
+    shown = [
+        f"{page}.{public}"
+        for page in _pages()
+        if page != "geomech"
+        for public in _public(_imported(page))
+    ]
     names = [name for name in dir(module) if inspect.isfunction(getattr(module, name))]
     return [name for name in names if not any(x.endswith(f".{name}") for x in shown)]
 
@@ -195,7 +258,11 @@ def wrong_examples() -> list[str]:
             value = getattr(module, public)
             if inspect.isclass(value) or inspect.isroutine(value):
                 objects.setdefault(id(value), (f"{page}.{public}", value))
-    finder, runner, failures = doctest.DocTestFinder(exclude_empty=True), doctest.DocTestRunner(verbose=False), []
+    finder, runner, failures = (
+        doctest.DocTestFinder(exclude_empty=True),
+        doctest.DocTestRunner(verbose=False),
+        [],
+    )
     for name, value in objects.values():
         for test in finder.find(value, name, globs={}):
             out = io.StringIO()
@@ -218,7 +285,23 @@ def _top(module) -> list[str]:
     for public in sorted(name for name in dir(module) if not name.startswith("_")):
         value = getattr(module, public)
         home = value.__name__ if inspect.ismodule(value) else value.__module__
-        pages = [page for group in PACKAGES.values() for page in group if f"{home}.".startswith(f"{page}.")]
+        pages = [
+            page
+            for group in PACKAGES.values()
+            for page in group
+            if f"{home}.".startswith(f"{page}.")
+        ]
         page = max(pages, key=len)
-        rows += [f"   * - ``geomech.{public}``", f"     - :doc:`{page}`" if page != "geomech" else f"     - ``{home}``"]
-    return [".. list-table::", "   :header-rows: 1", "", "   * - name", "     - defined in", *rows, ""]
+        rows += [
+            f"   * - ``geomech.{public}``",
+            f"     - :doc:`{page}`" if page != "geomech" else f"     - ``{home}``",
+        ]
+    return [
+        ".. list-table::",
+        "   :header-rows: 1",
+        "",
+        "   * - name",
+        "     - defined in",
+        *rows,
+        "",
+    ]

@@ -16,16 +16,33 @@ def page() -> str:
     commands = typer.main.get_command(cli.app).commands
     parts = []
     for heading, names in COMMANDS.items():
-        parts += [f"## {heading}", *(_command(commands[name.replace("_", "-")]) for name in names)]
+        parts += [
+            f"## {heading}",
+            *(_command(commands[name.replace("_", "-")]) for name in names),
+        ]
     return "\n\n".join(parts)
 
 
 def _command(command) -> str:
     arguments = [p for p in command.params if p.param_type_name == "argument"]
-    options = [p for p in command.params if p.param_type_name == "option" and not p.hidden and "--help" not in p.opts]
-    usage = " ".join(["geomech", command.name, *(_placeholder(p) for p in arguments), *["[OPTIONS]"] * bool(options)])
+    options = [
+        p
+        for p in command.params
+        if p.param_type_name == "option" and not p.hidden and "--help" not in p.opts
+    ]
+    usage = " ".join(
+        [
+            "geomech",
+            command.name,
+            *(_placeholder(p) for p in arguments),
+            *["[OPTIONS]"] * bool(options),
+        ]
+    )
     text = " ".join(inspect.cleandoc(command.help or "").split())
-    rows = [f"| {_names(p)} | {_text(p.help)}{' (required)' * p.required} |" for p in arguments + options]
+    rows = [
+        f"| {_names(p)} | {_text(p.help)}{' (required)' * p.required} |"
+        for p in arguments + options
+    ]
     table = "| argument or option | meaning |\n|---|---|\n" + "\n".join(rows)
     return f"### `{command.name}`\n\n{text}\n\n```text\n{usage}\n```\n\n{table}"
 

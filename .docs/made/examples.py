@@ -25,7 +25,9 @@ LONGEST = 40  # lines of output that a page shows
 
 def run(code: str, folder: Path, program: bool = False) -> str:
     """Return what a program, or commands, print in a folder; RuntimeError where they fail."""
-    command = [sys.executable, "-c", code] if program else ["bash", "-euc", SHELL + code]
+    command = (
+        [sys.executable, "-c", code] if program else ["bash", "-euc", SHELL + code]
+    )
     paths = f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
     env = {**os.environ, "PYTHONPATH": paths, "MPLBACKEND": "agg", "COLUMNS": "100"}
     ran = subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True)
@@ -69,7 +71,9 @@ class Example:
         self.anchor = re.sub(r"[^\w -]", "", self.title.lower()).replace(" ", "-")
         self.picture = re.search(r"[\w-]+\.(?:png|gif)\b", text)[0]
         self.text = BLOCK.sub("", text.partition("\n")[2]).strip()
-        self.blocks = {language: (name, code) for language, name, code in BLOCK.findall(text)}
+        self.blocks = {
+            language: (name, code) for language, name, code in BLOCK.findall(text)
+        }
 
     def compute(self) -> None:
         """Run the command and the program, and store the command's picture."""
@@ -88,12 +92,19 @@ class Example:
         for language in {"toml", "csv"} & {*self.blocks}:
             return self.blocks[language][1]
         words = self.blocks["sh"][1].split()
-        return run(f"geomech scenes --show {words[2]}", ROOT) if words[1] not in ("stress", "fit-medium") else ""
+        return (
+            run(f"geomech scenes --show {words[2]}", ROOT)
+            if words[1] not in ("stress", "fit-medium")
+            else ""
+        )
 
     def markdown(self) -> str:
         """Return the section of the site."""
         data = "Data" if "csv" in self.blocks else "Scene"
-        tabs = {"Command": ("sh", self.blocks["sh"][1]), data: ("toml" if data == "Scene" else "text", self.scene)}
+        tabs = {
+            "Command": ("sh", self.blocks["sh"][1]),
+            data: ("toml" if data == "Scene" else "text", self.scene),
+        }
         tabs["Python"] = ("python", self.blocks["python"][1])
         items = [f":::{{tab-item}} {title}\n```{language}\n{code.strip()}\n```\n:::"
                  for title, (language, code) in tabs.items() if code]  # fmt: skip
@@ -110,7 +121,9 @@ def sections(page: Path) -> tuple[str, list[Example]]:
 
 def pages() -> list[Path]:
     """Return the pages of the gallery in the order of its index."""
-    names = re.findall(r"(?m)^\w[\w-]*$", (GALLERY / "index.md").read_text().partition("{toctree}")[2])
+    names = re.findall(
+        r"(?m)^\w[\w-]*$", (GALLERY / "index.md").read_text().partition("{toctree}")[2]
+    )
     return [GALLERY / f"{name}.md" for name in names if name != "figures"]
 
 
@@ -119,9 +132,15 @@ def compute_all(workers: int = 2) -> None:
     PICTURES.mkdir(parents=True, exist_ok=True)
     all_examples = [example for page in pages() for example in sections(page)[1]]
     names = [example.picture for example in all_examples]
-    assert len({*names}) == len(names), f"two examples draw one picture: {sorted(names)}"
+    assert len({*names}) == len(names), (
+        f"two examples draw one picture: {sorted(names)}"
+    )
     if os.environ.get("QUICK"):  # while pages are written
-        all_examples = [example for example in all_examples if not (PICTURES / example.picture).exists()]
+        all_examples = [
+            example
+            for example in all_examples
+            if not (PICTURES / example.picture).exists()
+        ]
     with ThreadPoolExecutor(workers) as pool:
         list(pool.map(Example.compute, all_examples))
 
@@ -140,5 +159,9 @@ def thumbnails() -> str:
         title = head.partition("\n")[0].lstrip("# ")
         cards = [f":::{{grid-item-card}} {x.title}\n:link: {x.page}.html#{x.anchor}\n:link-type: url\n"
                  f":img-top: /generated/gallery/{x.picture}\n:::" for x in examples]  # fmt: skip
-        parts.append(f"## {title}\n\n::::{{grid}} 1 2 3 3\n:gutter: 2\n\n" + "\n".join(cards) + "\n::::")
+        parts.append(
+            f"## {title}\n\n::::{{grid}} 1 2 3 3\n:gutter: 2\n\n"
+            + "\n".join(cards)
+            + "\n::::"
+        )
     return "\n\n".join(parts)

@@ -33,24 +33,42 @@ def draw_missing() -> None:
     for name in scripts():
         if not _committed(name).exists():
             target = DRAWN / f"{name}.png"
-            if not target.exists() or target.stat().st_mtime < (ROOT / "figures" / f"{name}.py").stat().st_mtime:
+            if (
+                not target.exists()
+                or target.stat().st_mtime
+                < (ROOT / "figures" / f"{name}.py").stat().st_mtime
+            ):
                 env = {**os.environ, "PYTHONPATH": str(ROOT)}
                 command = [sys.executable, "-m", f"figures.{name}", str(target)]
-                subprocess.run(command, check=True, cwd=ROOT, env=env, stdout=subprocess.DEVNULL)
+                subprocess.run(
+                    command, check=True, cwd=ROOT, env=env, stdout=subprocess.DEVNULL
+                )
 
 
 def scripts() -> list[str]:
     """Return the names of all scripts that draw a figure, those of no group last."""
-    found = {path.stem for path in (ROOT / "figures").glob("*.py")} - {"__init__", "style"}
+    found = {path.stem for path in (ROOT / "figures").glob("*.py")} - {
+        "__init__",
+        "style",
+    }
     grouped = [name for names in GROUPS.values() for name in names]
     return [name for name in grouped if name in found] + sorted(found - {*grouped})
 
 
 def page() -> str:
     """Return a section for each group, with title, text, picture and command of every figure."""
-    rest = [name for name in scripts() if not any(name in names for names in GROUPS.values())]
+    rest = [
+        name
+        for name in scripts()
+        if not any(name in names for names in GROUPS.values())
+    ]
     groups = {**GROUPS, **({"Others": rest} if rest else {})}
-    return "\n\n".join([f"## {title}\n\n" + "\n\n".join(map(_figure, names)) for title, names in groups.items()])
+    return "\n\n".join(
+        [
+            f"## {title}\n\n" + "\n\n".join(map(_figure, names))
+            for title, names in groups.items()
+        ]
+    )
 
 
 def _committed(name: str) -> Path:
@@ -58,10 +76,16 @@ def _committed(name: str) -> Path:
 
 
 def _figure(name: str) -> str:
-    text = ast.get_docstring(ast.parse((ROOT / "figures" / f"{name}.py").read_text(encoding="utf-8")))
+    text = ast.get_docstring(
+        ast.parse((ROOT / "figures" / f"{name}.py").read_text(encoding="utf-8"))
+    )
     title, _, about = " ".join(text.partition("\n\n")[0].split()).partition(": ")
     about = about[:1].upper() + about[1:]
     picture = _committed(name)
-    target = f"../../figures/{picture.name}" if picture.exists() else f"/generated/figures/{name}.png"
+    target = (
+        f"../../figures/{picture.name}"
+        if picture.exists()
+        else f"/generated/figures/{name}.png"
+    )
     alt = title.replace("[", "(").replace("]", ")")
     return f"### {title.rstrip('.')}\n\n{about}\n\n![{alt}]({target})\n\n```sh\npython -m figures.{name}\n```"

@@ -18,12 +18,24 @@ def _part(part: keys.Part) -> str:
     about = " ".join(part.about.split())
     if not part.keys:
         return f"### `{part.title}`\n\n{about}"
-    rows = [_row(key.name, keys.worded(key.schema), key.unit, key.value, key.meaning, key.degrees) for key in part.keys]
+    rows = [
+        _row(
+            key.name,
+            keys.worded(key.schema),
+            key.unit,
+            key.value,
+            key.meaning,
+            key.degrees,
+        )
+        for key in part.keys
+    ]
     head = "| key | type | unit | default | meaning |\n|---|---|---|---|---|\n"
     return f"### `{part.title}`\n\n{about}\n\n{head}" + "\n".join(rows)
 
 
-def _row(name: str, kind: str, unit: str, value: str, meaning: str, degrees: bool) -> str:
+def _row(
+    name: str, kind: str, unit: str, value: str, meaning: str, degrees: bool
+) -> str:
     cell = lambda text: text.replace("|", r"\|")
     meaning += f"; in degrees as `{name}_deg`" * degrees
     value = value if value in ("required", "none") else f"`{cell(value)}`"

@@ -25,15 +25,28 @@ from rft.plates import VERTICAL
 
 def table() -> str:
     """Return the rows of all checks as a Markdown table."""
-    rows = [row for check in (viscous_geometry, viscous_cost, strokes, stress, waves) for row in check()]
-    lines = [f"| {check} | {source} | {ours} | {theirs} |" for check, source, ours, theirs in rows]
-    return "\n".join(["| check | source | geomech | source says |", "|---|---|---|---|", *lines])
+    rows = [
+        row
+        for check in (viscous_geometry, viscous_cost, strokes, stress, waves)
+        for row in check()
+    ]
+    lines = [
+        f"| {check} | {source} | {ours} | {theirs} |"
+        for check, source, ours, theirs in rows
+    ]
+    return "\n".join(
+        ["| check | source | geomech | source says |", "|---|---|---|---|", *lines]
+    )
 
 
 def viscous_geometry():
     """Yield the CCF and the area of the viscous swimmer in its minimum-perturbation frame, and its true displacement."""
-    study = geomech.Study(geomech.load("three-link-viscous").with_numerics(grid=31, extent=2.5))
-    field = dataclasses.replace(study.fitted, A=minimum_perturbation(study.fitted).connection(study.fitted))
+    study = geomech.Study(
+        geomech.load("three-link-viscous").with_numerics(grid=31, extent=2.5)
+    )
+    field = dataclasses.replace(
+        study.fitted, A=minimum_perturbation(study.fitted).connection(study.fitted)
+    )
     source = "reference value of an earlier, coarser discretisation, 31 x 31"
     curvature = ccf(field)
     yield (
@@ -43,7 +56,12 @@ def viscous_geometry():
         "-0.0204",
     )
     moved = area(curvature, Circle(), [1.0])[0]
-    yield "the same: area integral over the circle of 1 rad", source, _(np.hypot(*moved[:2]), 4), "0.0510"
+    yield (
+        "the same: area integral over the circle of 1 rad",
+        source,
+        _(np.hypot(*moved[:2]), 4),
+        "0.0510",
+    )
     net = study.poses("direct", Circle(), [1.0])[0]
     yield (
         "the same circle: net distance by the balance of forces",
@@ -57,11 +75,28 @@ def viscous_cost():
     """Yield the dissipation metric of the straight viscous swimmer and the path length of a circle."""
     study = geomech.Study(geomech.load("three-link-viscous"))
     M = study.metric.field([0.0, 0.0])
-    source = "metric in the system that sysplotter saves; 16/2187 and 11/2187 in closed form"
-    yield "the same: dissipation metric M(0, 0), diagonal entry", source, _(M.ravel()[0], 7), "0.0073160"
-    yield "the same: dissipation metric M(0, 0), off-diagonal entry", source, _(M.ravel()[1], 7), "0.0050297"
+    source = (
+        "metric in the system that sysplotter saves; 16/2187 and 11/2187 in closed form"
+    )
+    yield (
+        "the same: dissipation metric M(0, 0), diagonal entry",
+        source,
+        _(M.ravel()[0], 7),
+        "0.0073160",
+    )
+    yield (
+        "the same: dissipation metric M(0, 0), off-diagonal entry",
+        source,
+        _(M.ravel()[1], 7),
+        "0.0050297",
+    )
     length = metric.path_length(study.metric.norm, Circle(), [1.0])[0]
-    yield "the same: path length of the circle of 1 rad", CLOSED, _(length, 6), _(closed_path_length(), 6)
+    yield (
+        "the same: path length of the circle of 1 rad",
+        CLOSED,
+        _(length, 6),
+        _(closed_path_length(), 6),
+    )
 
 
 CLOSED = "connection in closed form by sympy, integrated by SciPy to 1e-12"
@@ -76,7 +111,9 @@ def closed_distance() -> float:
         c, s = np.cos(pose[2]), np.sin(pose[2])
         return [c * x - s * y, s * x + c * y, turn]
 
-    path = solve_ivp(rate, (0.0, 2 * np.pi), [0.0, 0.0, 0.0], method="DOP853", rtol=1e-12, atol=1e-14)
+    path = solve_ivp(
+        rate, (0.0, 2 * np.pi), [0.0, 0.0, 0.0], method="DOP853", rtol=1e-12, atol=1e-14
+    )
     return float(np.hypot(*path.y[:2, -1]))
 
 
@@ -84,7 +121,9 @@ def closed_path_length() -> float:
     """Return the path length of the same circle: sqrt(power) by the drag of links on their velocities J A + B."""
     A, alpha = viscous_chain()
     third = sp.Rational(1, 3)
-    drag = sp.diag(third, 2 * third, 2 * third**3 / 12)  # along, across and about the centre of a link
+    drag = sp.diag(
+        third, 2 * third, 2 * third**3 / 12
+    )  # along, across and about the centre of a link
     columns = [link.J * A + link.B for link in links((1, 1, 1), 2)]
     M = sp.lambdify(alpha, sum((v.T * drag * v for v in columns), sp.zeros(2, 2)))
 

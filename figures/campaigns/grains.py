@@ -62,7 +62,10 @@ BAR, BAR_DEPTH = 8e-3, 0.016  # m, radius and depth of the axis
 PLATES = (  # height, m, and tilts of the face from the underside of a cylinder, degrees; 90 is upright, 180 its top
     (0.016, (15, 30, 50, 90, 130, 150, 165)),
 )
-THICKNESS, EDGE = 3e-3, 3e-3  # m, of plates, and of the strips along their edges that are no middle: half a grain
+THICKNESS, EDGE = (
+    3e-3,
+    3e-3,
+)  # m, of plates, and of the strips along their edges that are no middle: half a grain
 GRAIN = 1e-3  # m, radius of the spheres of bars and plates
 TEXTS = "scene", "change", "shape", "part"  # columns that are no numbers
 Rows = Iterator[tuple]
@@ -95,7 +98,11 @@ def swims(store: Path) -> Rows:
 def swim(scene: str, amplitude: float, frequency: float, seed: int) -> GrainSwim:
     """Return a swim of a built-in scene with another amplitude (rad) and frequency (Hz)."""
     built_in = load(scene)
-    gait = replace(built_in.gait, amplitude=amplitude, frequency=None if frequency == 1.0 else frequency)
+    gait = replace(
+        built_in.gait,
+        amplitude=amplitude,
+        frequency=None if frequency == 1.0 else frequency,
+    )
     return GrainSwim(built_in.changed(gait=gait), seed=seed)
 
 
@@ -104,13 +111,24 @@ def cycles(question: GrainSwim, run: Run) -> Rows:
     starts = (RAMP + np.arange(question.cycles + 1)) / question.frequency
     size = question.experiment.body.size
     work = np.diff(np.interp(starts, run.t, run.work))
-    for k, (pose, joule) in enumerate(zip(cycle_poses(run, starts) / [size, size, 1.0], work), 1):
+    for k, (pose, joule) in enumerate(
+        zip(cycle_poses(run, starts) / [size, size, 1.0], work), 1
+    ):
         yield k, *pose, joule
 
 
 def swim_convergence(store: Path) -> Rows:
     """Yield the displacement of every cycle of a circle of 1 rad, with one number of its bed changed at a time."""
-    yield "change", "cycle", "x_BL", "y_BL", "heading_rad", "work_J", "mean_overlap", "largest_overlap"
+    yield (
+        "change",
+        "cycle",
+        "x_BL",
+        "y_BL",
+        "heading_rad",
+        "work_J",
+        "mean_overlap",
+        "largest_overlap",
+    )
     question = swim(CIRCLE, 1.0, 1.0, BEDS[0])
     experiment, bed = question.experiment, question.experiment.bed
     changes = {
@@ -118,7 +136,9 @@ def swim_convergence(store: Path) -> Rows:
         "half the time step": replace(bed, time_step=bed.step / 2),
         "young 5 MPa": replace(bed, young=5e6),
         "16 mm deeper": replace(bed, depth=bed.depth + DEEPER),
-        "60 mm longer and wider": replace(bed, length=bed.length + 0.06, width=bed.width + 0.06),
+        "60 mm longer and wider": replace(
+            bed, length=bed.length + 0.06, width=bed.width + 0.06
+        ),
     }
     for name, changed in changes.items():
         run = replace(experiment, bed=changed, depth=bed.depth / 2).run(store)
@@ -147,7 +167,9 @@ def reversals(store: Path) -> Rows:
         for seed in BEDS:
             stroke = Stroke(SPEED, math.radians(angle), amplitude)
             duration = round(5 * amplitude / SPEED, 6)  # out, and twice across
-            run = Experiment(Bed(seed=seed), rod(0.162, radius), stroke, duration, depth).run(store)
+            run = Experiment(
+                Bed(seed=seed), rod(0.162, radius), stroke, duration, depth
+            ).run(store)
             found = drags(run, stroke, radius, min(amplitude / 10, LONGEST_BIN))
             for row in zip(*(x.tolist() for x in found[1:])):
                 yield amplitude, depth, angle, seed, *row
@@ -160,7 +182,14 @@ def lift(store: Path) -> Rows:
         for seed in BEDS:
             bar = rod(TROUGH.length, BAR, shape, through=True, grain=GRAIN)
             found = steady_towed(bar, seed, store)
-            yield f'"{shape}"', seed, -found.force[1], found.force[2], found.lift, found.lift_error
+            yield (
+                f'"{shape}"',
+                seed,
+                -found.force[1],
+                found.force[2],
+                found.lift,
+                found.lift_error,
+            )
 
 
 def plates(store: Path) -> Rows:
@@ -168,10 +197,20 @@ def plates(store: Path) -> Rows:
     the edges, and on the whole plate, both faces and edges, over the area of one face.
 
     Of either face, normal stress is positive where grains push the plate back, tangential stress where they push it up."""
-    names = [f"{part}_{way}_N/cm3" for part in ("face", "rear", "whole") for way in ("normal", "tangent")]
+    names = [
+        f"{part}_{way}_N/cm3"
+        for part in ("face", "rear", "whole")
+        for way in ("normal", "tangent")
+    ]
     yield "height_m", "beta_deg", "bed", *names
     for height, beta in ((height, beta) for height, tilts in PLATES for beta in tilts):
-        body = plate(TROUGH.length, height, math.radians(beta - 90), grain=GRAIN, thickness=THICKNESS)
+        body = plate(
+            TROUGH.length,
+            height,
+            math.radians(beta - 90),
+            grain=GRAIN,
+            thickness=THICKNESS,
+        )
         sin, cos = math.sin(math.radians(beta)), math.cos(math.radians(beta))
         back, up = np.array([-sin, cos]), np.array([cos, sin])
         middle = np.abs(body.at[:, 1:] @ up) < height / 2 - EDGE
@@ -182,14 +221,21 @@ def plates(store: Path) -> Rows:
         for seed in BEDS:
             force = steady_towed(body, seed, store).profile[:, 1:]
             over_depth = 1e-6 * force / (BAR_DEPTH - body.at[:, 2:])
-            stress = [over_depth[mine].sum(0) @ way / area for mine, area in parts for way in (back, up)]
+            stress = [
+                over_depth[mine].sum(0) @ way / area
+                for mine, area in parts
+                for way in (back, up)
+            ]
             yield height, beta, seed, *map(float, stress)
 
 
 def faces(store: Path) -> Rows:
     """Yield the force on every row of spheres along the bars of `lift` and a shell, at y and z from the axis."""
     yield "shape", "bed", "y_m", "z_m", "drag_N", "lift_N"
-    bars = {shape: rod(TROUGH.length, BAR, shape, through=True, grain=GRAIN) for shape in BARS}
+    bars = {
+        shape: rod(TROUGH.length, BAR, shape, through=True, grain=GRAIN)
+        for shape in BARS
+    }
     for shape, bar in {**bars, SHELL: rear_half(bars["round"])}.items():
         rows = np.unique(bar.at[:, 1:], axis=0)
         for seed in BEDS[:2] if shape == SHELL else BEDS:
@@ -209,13 +255,23 @@ def rear_half(bar: Spheres) -> Spheres:
 def steady_towed(body: Spheres, seed: int, store: Path) -> Steady:
     """Return the steady force on a body that is towed across the trough."""
     tow = Tow(SPEED, math.pi / 2)
-    run = Experiment(replace(TROUGH, seed=seed), body, tow, 0.6, depth=BAR_DEPTH).run(store)
+    run = Experiment(replace(TROUGH, seed=seed), body, tow, 0.6, depth=BAR_DEPTH).run(
+        store
+    )
     return steady(run, body.half_width, tow.angle, SPEED)
 
 
 def convergence(store: Path) -> Rows:
     """Yield drag and lift on a round bar in one bed, with one number of the bed changed at a time."""
-    yield "change", "drag_N", "drag_error_N", "lift_N", "lift_error_N", "lift_over_drag", "largest_overlap"
+    yield (
+        "change",
+        "drag_N",
+        "drag_error_N",
+        "lift_N",
+        "lift_error_N",
+        "lift_over_drag",
+        "largest_overlap",
+    )
     changes = {
         "none": TROUGH,
         "half the time step": replace(TROUGH, time_step=TROUGH.step / 2),
@@ -223,7 +279,10 @@ def convergence(store: Path) -> Rows:
         "width 0.45 m": replace(TROUGH, width=0.45),
         "16 mm deeper": replace(TROUGH, depth=TROUGH.depth + 0.016),
     }
-    bar, tow = rod(TROUGH.length, BAR, through=True, grain=GRAIN), Tow(SPEED, math.pi / 2)
+    bar, tow = (
+        rod(TROUGH.length, BAR, through=True, grain=GRAIN),
+        Tow(SPEED, math.pi / 2),
+    )
     for name, bed in changes.items():
         run = Experiment(bed, bar, tow, 0.6, depth=BAR_DEPTH).run(store)
         found = steady(run, BAR, tow.angle, SPEED)
@@ -248,9 +307,14 @@ def main(name: str, store: str) -> None:
     """Run a campaign and write its file."""
     bed = TROUGH if name in ("lift", "plates", "faces", "convergence") else Bed()
     seeds = "" if name.endswith("convergence") else f", seeds {BEDS}"
-    lines = [f"# python -m figures.campaigns.grains {name} STORE", f"# {replace(bed, seed=BEDS[0])!r}{seeds}"]
+    lines = [
+        f"# python -m figures.campaigns.grains {name} STORE",
+        f"# {replace(bed, seed=BEDS[0])!r}{seeds}",
+    ]
     for row in CAMPAIGNS[name](Path(store)):
-        lines.append(",".join(f"{x:.5g}" if isinstance(x, float) else str(x) for x in row))
+        lines.append(
+            ",".join(f"{x:.5g}" if isinstance(x, float) else str(x) for x in row)
+        )
         print(lines[-1], flush=True)
     write_text(FOLDER / f"grains_{name.replace('-', '_')}.csv", "\n".join(lines) + "\n")
 
@@ -262,7 +326,10 @@ def read(name: str) -> dict[str, np.ndarray]:
     with open(FOLDER / f"grains_{name}.csv") as file:
         rows = list(DictReader(line for line in file if not line.startswith("#")))
     as_column = lambda key: np.array([row[key] for row in rows])
-    return {key: as_column(key) if key in TEXTS else as_column(key).astype(float) for key in rows[0]}
+    return {
+        key: as_column(key) if key in TEXTS else as_column(key).astype(float)
+        for key in rows[0]
+    }
 
 
 if __name__ == "__main__":

@@ -40,9 +40,13 @@ from rft.grains.experiment import Run
 
 PHASES = 64
 ROUNDING = 1e-4  # m/s, below which dry friction is linear here; points of the body move at some 0.1 m/s
-NODES, WEIGHTS = (x / 2 + 0.5 * (k == 0) for k, x in enumerate(np.polynomial.legendre.leggauss(6)))
+NODES, WEIGHTS = (
+    x / 2 + 0.5 * (k == 0) for k, x in enumerate(np.polynomial.legendre.leggauss(6))
+)
 TRAVELS = 1, 2, 3, 6, 9, 15, 40  # mm since a reversal
-DIRECTIONS = 2 * np.pi * (np.arange(24) + 0.5) / 24  # of joint rates, to which A is fitted
+DIRECTIONS = (
+    2 * np.pi * (np.arange(24) + 0.5) / 24
+)  # of joint rates, to which A is fitted
 COLUMNS = "scene", "amplitude", "frequency_Hz", "bed", "cycle", "part", "value"
 
 
@@ -66,7 +70,9 @@ class Points(NamedTuple):
     def wrench(self, force: np.ndarray) -> np.ndarray:
         """Return force, N, and moment about the frame's origin, N m, (N, 3) of forces f_t + i f_n (N, P), N."""
         f = force * self.heading
-        return np.stack([f.real.sum(1), f.imag.sum(1), (self.place.conj() * f).imag.sum(1)], 1)
+        return np.stack(
+            [f.real.sum(1), f.imag.sum(1), (self.place.conj() * f).imag.sum(1)], 1
+        )
 
 
 def points(question: GrainSwim, phases: int = PHASES) -> Points:
@@ -76,7 +82,10 @@ def points(question: GrainSwim, phases: int = PHASES) -> Points:
     times = (RAMP + (np.arange(phases) + 0.5) / phases) / f
     links = [body.links(*experiment.motion.joint_angles(t)) for t in times]
     heading, rates, centres, velocities = (np.array(x) for x in zip(*links))
-    link, at = np.r_[0, body.link, body.n_links - 1], np.r_[-half[0], body.at[:, 0], half[-1]]
+    link, at = (
+        np.r_[0, body.link, body.n_links - 1],
+        np.r_[-half[0], body.at[:, 0], half[-1]],
+    )
     lever = heading[:, link] * at
     edges = np.r_[-body.size / 2, (body.along[1:] + body.along[:-1]) / 2, body.size / 2]
     return Points(
@@ -84,7 +93,8 @@ def points(question: GrainSwim, phases: int = PHASES) -> Points:
         centres[:, link] + lever,
         velocities[:, link] + 1j * rates[:, link] * lever,
         np.r_[0.0, np.diff(edges), 0.0],
-        np.abs(np.r_[-body.size / 2, body.along, body.size / 2]) > body.size / 2 - END * body.half_width,
+        np.abs(np.r_[-body.size / 2, body.along, body.size / 2])
+        > body.size / 2 - END * body.half_width,
     )
 
 
@@ -94,23 +104,34 @@ def law_forces(body: Points, law: Fit, caps: EndCaps, xi: np.ndarray) -> np.ndar
     t, n = law.medium.traction(v.real, v.imag, ROUNDING)
     force = -axial * body.length * (t + 1j * n)
     for tip, e in ((0, caps.tail), (-1, caps.head)):
-        t, n = replace(caps, head=e, tail=0.0).traction(law.medium, v[:, tip].real, v[:, tip].imag, ROUNDING)
+        t, n = replace(caps, head=e, tail=0.0).traction(
+            law.medium, v[:, tip].real, v[:, tip].imag, ROUNDING
+        )
         force[:, tip] = -axial * body.length.sum() * (t + 1j * n)
     return force
 
 
-def measured(question: GrainSwim, run: Run, body: Points) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def measured(
+    question: GrainSwim, run: Run, body: Points
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield xi (N, 3), m/s and rad/s, and forces f_t + i f_n (N, P), N, of every cycle, as means over the parts of it."""
     phases, f = len(body.place), question.frequency
     step = run.t[1] - run.t[0]
     impulse = np.cumsum(run.profile[..., 0] + 1j * run.profile[..., 1], 0) * step
-    impulse, times = np.concatenate([0 * impulse[:1], impulse]), np.r_[run.t[0] - step, run.t]
+    impulse, times = (
+        np.concatenate([0 * impulse[:1], impulse]),
+        np.r_[run.t[0] - step, run.t],
+    )
     for cycle in range(question.cycles):
         edges = (RAMP + cycle + np.arange(phases + 1) / phases) / f
         x, y, theta = (np.interp(edges, run.t, run.pose[:, k]) for k in range(3))
         k = np.clip(np.searchsorted(times, edges) - 1, 0, len(times) - 2)
         part = ((edges - times[k]) / step)[:, None]
-        force = np.diff(impulse[k] * (1 - part) + impulse[k + 1] * part, axis=0) * phases * f
+        force = (
+            np.diff(impulse[k] * (1 - part) + impulse[k + 1] * part, axis=0)
+            * phases
+            * f
+        )
         turn = np.exp(-1j * (theta[1:] + theta[:-1]) / 2)
         v = np.diff(x + 1j * y) * turn * phases * f
         force = np.pad(force, ((0, 0), (1, 1))) * turn[:, None] * body.heading.conj()
@@ -118,7 +139,12 @@ def measured(question: GrainSwim, run: Run, body: Points) -> Iterator[tuple[np.n
 
 
 def contributions(
-    body: Points, law: Fit, caps: EndCaps, xi_0: np.ndarray, xi: np.ndarray, force: np.ndarray
+    body: Points,
+    law: Fit,
+    caps: EndCaps,
+    xi_0: np.ndarray,
+    xi: np.ndarray,
+    force: np.ndarray,
 ) -> dict[str, np.ndarray]:
     """Return the shares (N, 3) of xi - xi_0 by part of the body; xi_0 (N, 3): of the balance of the law."""
     excess, ends = force - law_forces(body, law, caps, xi), body.is_end
@@ -129,15 +155,23 @@ def contributions(
         "flank, across": body.wrench(np.where(ends, 0.0, 1j * excess.imag)),
         "mass of the body": -body.wrench(force),
     }
-    slope = sum(w * slopes(body, law, caps, xi_0 + node * (xi - xi_0)) for node, w in zip(NODES, WEIGHTS))
-    return {name: -np.linalg.solve(slope, wrench[..., None])[..., 0] for name, wrench in wrenches.items()}
+    slope = sum(
+        w * slopes(body, law, caps, xi_0 + node * (xi - xi_0))
+        for node, w in zip(NODES, WEIGHTS)
+    )
+    return {
+        name: -np.linalg.solve(slope, wrench[..., None])[..., 0]
+        for name, wrench in wrenches.items()
+    }
 
 
 def slopes(body: Points, law: Fit, caps: EndCaps, xi: np.ndarray) -> np.ndarray:
     """Return dW/dxi (N, 3, 3) of the wrench of the law."""
     steps = 2 * ROUNDING * np.diag([1.0, 1.0, 2 / body.length.sum()])
     wrench = lambda x: body.wrench(law_forces(body, law, caps, x))
-    return np.stack([(wrench(xi + h) - wrench(xi - h)) / (2 * h.sum()) for h in steps], -1)
+    return np.stack(
+        [(wrench(xi + h) - wrench(xi - h)) / (2 * h.sum()) for h in steps], -1
+    )
 
 
 def distance(xi: np.ndarray, step: float) -> tuple[float, np.ndarray]:
@@ -146,16 +180,27 @@ def distance(xi: np.ndarray, step: float) -> tuple[float, np.ndarray]:
     heading = np.exp(1j * step * (np.cumsum(xi[:, 2]) - xi[:, 2] / 2))
     moves = step * heading * (xi[:, 0] + 1j * xi[:, 1])
     net = moves.sum()
-    to_come = net - np.cumsum(moves) + moves / 2  # which a rotation at a phase carries along
+    to_come = (
+        net - np.cumsum(moves) + moves / 2
+    )  # which a rotation at a phase carries along
     slopes = step * np.stack([heading, 1j * heading, 1j * to_come], 1)
     return abs(net), (slopes * net.conj() / abs(net)).real
 
 
-def shares(xi_0: np.ndarray, xi: np.ndarray, parts: dict[str, np.ndarray], step: float) -> dict[str, np.ndarray]:
+def shares(
+    xi_0: np.ndarray, xi: np.ndarray, parts: dict[str, np.ndarray], step: float
+) -> dict[str, np.ndarray]:
     """Return the shares (N,) of phases and parts of the body in the difference between the distances of xi and xi_0, m."""
-    slope = sum(w * distance(xi_0 + node * (xi - xi_0), step)[1] for node, w in zip(NODES, WEIGHTS))
+    slope = sum(
+        w * distance(xi_0 + node * (xi - xi_0), step)[1]
+        for node, w in zip(NODES, WEIGHTS)
+    )
     found = {name: (slope * part).sum(1) for name, part in parts.items()}
-    rest = distance(xi, step)[0] - distance(xi_0, step)[0] - sum(x.sum() for x in found.values())
+    rest = (
+        distance(xi, step)[0]
+        - distance(xi_0, step)[0]
+        - sum(x.sum() for x in found.values())
+    )
     return {**found, "rest": np.full(len(xi), rest / len(xi))}
 
 
@@ -173,7 +218,13 @@ def budget(question: GrainSwim, run: Run, law: Fit, caps: EndCaps) -> Iterator[S
     """Yield every cycle beside the direct tier with a law and its end caps."""
     body, f, size = points(question), question.frequency, question.experiment.body.size
     alpha, alphadot = gait(question)
-    xi_0 = ruled(question, law, caps).velocity(alpha, alphadot) * 2 * np.pi * f * [size, size, 1.0]
+    xi_0 = (
+        ruled(question, law, caps).velocity(alpha, alphadot)
+        * 2
+        * np.pi
+        * f
+        * [size, size, 1.0]
+    )
     for xi, force in measured(question, run, body):
         parts = contributions(body, law, caps, xi_0, xi, force)
         forces = np.array([force, law_forces(body, law, caps, xi)])
@@ -209,7 +260,10 @@ def recovery(body: Points, swum: Swum, step: float) -> Iterator[float]:
     grains, law = swum.forces[..., flank].imag * -np.sign(v)
     travel, since = np.zeros_like(v), np.zeros(v.shape[1])
     for k in 2 * list(range(len(v))):  # once more, for what came before the first phase
-        since = np.where(np.sign(v[k]) == np.sign(v[k - 1]), since, 0.0) + np.abs(v[k]) * step
+        since = (
+            np.where(np.sign(v[k]) == np.sign(v[k - 1]), since, 0.0)
+            + np.abs(v[k]) * step
+        )
         travel[k] = since - np.abs(v[k]) * step / 2
     for low, high in zip((0.0, *TRAVELS), TRAVELS):
         inside = (travel > 1e-3 * low) & (travel <= 1e-3 * high)
@@ -228,21 +282,43 @@ def rows(store: Path) -> Iterator[tuple]:
                 continue
             run, step = question.experiment.run(store), 1 / (PHASES * frequency)
             caps, points_of = law.caps(body.half_width / body.size), points(question)
-            near = near_singular(question, law, caps) if body.joints == 2 else np.zeros(PHASES, bool)
+            near = (
+                near_singular(question, law, caps)
+                if body.joints == 2
+                else np.zeros(PHASES, bool)
+            )
             for cycle, swum in enumerate(budget(question, run, law, caps), 1):
-                found = {"law": distance(swum.xi_0, step)[0], "grains": distance(swum.xi, step)[0]}
+                found = {
+                    "law": distance(swum.xi_0, step)[0],
+                    "grains": distance(swum.xi, step)[0],
+                }
                 found |= {part: x.sum() for part, x in swum.shares.items()}
-                found["near a singularity"] = sum(x[near].sum() for x in swum.shares.values())
+                found["near a singularity"] = sum(
+                    x[near].sum() for x in swum.shares.values()
+                )
                 ratios = zip(TRAVELS, recovery(points_of, swum, step))
                 of_length = {part: x / body.size for part, x in found.items()}
-                for part, x in (of_length | {f"flank across, {t} mm": x for t, x in ratios}).items():
-                    yield scene, amplitude, frequency, question.seed, cycle, f'"{part}"', float(x)
+                for part, x in (
+                    of_length | {f"flank across, {t} mm": x for t, x in ratios}
+                ).items():
+                    yield (
+                        scene,
+                        amplitude,
+                        frequency,
+                        question.seed,
+                        cycle,
+                        f'"{part}"',
+                        float(x),
+                    )
 
 
 def main(store: str) -> None:
     """Compute the budgets and write the file."""
     lines = ["# python -m figures.campaigns.swim_budget STORE"]
-    lines += [",".join(f"{x:.5g}" if isinstance(x, float) else str(x) for x in row) for row in rows(Path(store))]
+    lines += [
+        ",".join(f"{x:.5g}" if isinstance(x, float) else str(x) for x in row)
+        for row in rows(Path(store))
+    ]
     write_text(FOLDER / "grains_swim_budget.csv", "\n".join(lines) + "\n")
 
 

@@ -50,7 +50,15 @@ def optimise(
     (0.101, True)
     """
     found = optimisation.optimise(
-        as_scene(scene), objective, direction, harmonics, limits, starts, rate=rate, power=power, progress=progress
+        as_scene(scene),
+        objective,
+        direction,
+        harmonics,
+        limits,
+        starts,
+        rate=rate,
+        power=power,
+        progress=progress,
     )
     return Optimum(**vars(found))
 
@@ -70,7 +78,9 @@ def sweep(scene: Any, over: Mapping[str, Sequence[float]], **options: Any) -> Sw
     return Swept(sweeps.sweep(as_scene(scene), over, **options).result)
 
 
-def accuracy(scene: Any, *, runs: int | None = None, progress: Callable | None = None) -> dict[str, Any]:
+def accuracy(
+    scene: Any, *, runs: int | None = None, progress: Callable | None = None
+) -> dict[str, Any]:
     """Return error and seconds at every setting of a scene as a table; see `geomech.studies.accuracy.study`.
 
     Examples
@@ -96,11 +106,15 @@ def fit_midlines(midlines: Any, medium: Any = None, **options: Any) -> FittedMid
     **options : columns, units, scale, fps, y, head, least_score, body_length, mend, level
         See `geomech.measured.midlines.fit.fit_midlines`.
     """
-    fitted = FittedMidlines(of_midlines.result_of(fit.fit_midlines(midlines, **options)))
+    fitted = FittedMidlines(
+        of_midlines.result_of(fit.fit_midlines(midlines, **options))
+    )
     return fitted if medium is None else fitted.against(medium)
 
 
-def fit_medium(drag: Any, law: str | None = None, *, end_caps: float | str = 0.0, **sizes: float) -> FittedMedium:
+def fit_medium(
+    drag: Any, law: str | None = None, *, end_caps: float | str = 0.0, **sizes: float
+) -> FittedMedium:
     """Return the medium fitted to drag measurements, as `geomech fit-medium` does.
 
     Parameters
@@ -127,4 +141,6 @@ def fit_medium(drag: Any, law: str | None = None, *, end_caps: float | str = 0.0
     """
     for name in sizes:
         choose("size", name, (*SIZES, "area"))
-    return FittedMedium(Calibration(str(drag), law, tuple(sizes.items()), end_caps).ask())
+    return FittedMedium(
+        Calibration(str(drag), law, tuple(sizes.items()), end_caps).ask()
+    )

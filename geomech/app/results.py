@@ -39,9 +39,13 @@ class Displacements(results.Displacements):
     def _repr_html_(self) -> str:
         return display.displacements(self)
 
-    def plot(self, quantity: str = "net_distance", *, ax: Any = None, **options: Any) -> Any:
+    def plot(
+        self, quantity: str = "net_distance", *, ax: Any = None, **options: Any
+    ) -> Any:
         """Draw x, y, heading or net_distance against amplitude, a line a tier with its errors; return the Axes."""
-        return plots.displacement(self, quantity=quantity, gait=self.gait, ax=ax, **options)
+        return plots.displacement(
+            self, quantity=quantity, gait=self.gait, ax=ax, **options
+        )
 
     def to_xarray(self) -> Any:
         """Return a Dataset over tier, amplitude and component, with units and error estimates."""
@@ -90,7 +94,9 @@ class Optimum(optimisation.Optimum):
 
     def plot(self, *, ax: Any = None) -> Any:
         """Draw the loop on the CCF that it gains from, or, without a map, its joint angles; return the Axes."""
-        draw = plots.optimum_map if self.scene.system.joints == 2 else plots.optimum_angles
+        draw = (
+            plots.optimum_map if self.scene.system.joints == 2 else plots.optimum_angles
+        )
         return draw(self, ax)
 
 
@@ -144,7 +150,10 @@ class FittedMidlines:
         """Return the same beside its prediction in a medium, or a medium's name or file, with effects on the body."""
         known = medium_of(medium) if isinstance(medium, (str, Path)) else medium
         return FittedMidlines(
-            midlines.result_of(self.kinematics, predicted.compare(self.kinematics, known, tuple(effects)))
+            midlines.result_of(
+                self.kinematics,
+                predicted.compare(self.kinematics, known, tuple(effects)),
+            )
         )
 
     def plot(self) -> Any:
@@ -174,7 +183,11 @@ class FittedMedium:
 
     def __init__(self, result: Result):
         self.result = result
-        self.medium = result.subject.medium if result.kind == "rod_drag" else result.subject.stress
+        self.medium = (
+            result.subject.medium
+            if result.kind == "rod_drag"
+            else result.subject.stress
+        )
 
     def __repr__(self) -> str:
         return printable(text.text(self.result))

@@ -91,10 +91,14 @@ class Study(studies.Study):
         [0.0153, 0.0513]
         """
         chosen = self.scene.gait if gait is None else gait
-        amplitudes = getattr(chosen, "amplitude", 1.0) if amplitudes is None else amplitudes
+        amplitudes = (
+            getattr(chosen, "amplitude", 1.0) if amplitudes is None else amplitudes
+        )
         values: Any = [amplitudes] if is_number(amplitudes) else amplitudes
         if tolerance is None:
-            return self.study(values, [tiers] if isinstance(tiers, str) else tiers, gait)
+            return self.study(
+                values, [tiers] if isinstance(tiers, str) else tiers, gait
+            )
         if tiers is not None:
             raise Refusal("tolerance chooses the tier", instead="drop tiers")
         return Displacements(cheapest(self.scene, values, tolerance, gait).result)
@@ -108,7 +112,9 @@ class Study(studies.Study):
     ) -> Displacements:
         return Displacements(super().study(amplitudes, tiers, gait, progress).result)
 
-    def ccf(self, pair: Sequence[int] | None = None, at: Sequence[float] | None = None) -> Field:
+    def ccf(
+        self, pair: Sequence[int] | None = None, at: Sequence[float] | None = None
+    ) -> Field:
         """Return the CCF, values (3, N, N) on a grid of two shape variables.
 
         pair: two joints, the first is 1; needed where there are more than two. at: (joints,), rad, a shape where the
@@ -125,7 +131,9 @@ class Study(studies.Study):
         """
         return self._plane(pair, at).ccf if self._is_slice(pair) else self.curvature
 
-    def ccf_error(self, pair: Sequence[int] | None = None, at: Sequence[float] | None = None) -> Field:
+    def ccf_error(
+        self, pair: Sequence[int] | None = None, at: Sequence[float] | None = None
+    ) -> Field:
         """Return the estimated error of `ccf`.
 
         Examples
@@ -135,7 +143,11 @@ class Study(studies.Study):
         >>> round(float(study.ccf_error()([0.0, 0.0])[2]), 5)  # of theta, rad per rad^2
         0.00137
         """
-        return self._plane(pair, at).error if self._is_slice(pair) else self.curvature_error
+        return (
+            self._plane(pair, at).error
+            if self._is_slice(pair)
+            else self.curvature_error
+        )
 
     def plot_ccf(
         self, component: int | str = "x", pair: Sequence[int] | None = None, at: Sequence[float] | None = None, *,
@@ -152,8 +164,15 @@ class Study(studies.Study):
         >>> ax = study.plot_ccf("theta")
         """
         gait, labels = self._drawn(pair, at)
-        options = {"gaits": [gait], "labels": labels, "error": self.ccf_error(pair, at), **options}
-        return plots.ccf_map(self.ccf(pair, at), _component(component), ax=ax, **options)
+        options = {
+            "gaits": [gait],
+            "labels": labels,
+            "error": self.ccf_error(pair, at),
+            **options,
+        }
+        return plots.ccf_map(
+            self.ccf(pair, at), _component(component), ax=ax, **options
+        )
 
     def plot_connection(
         self, component: int | str = "x", pair: Sequence[int] | None = None, at: Sequence[float] | None = None, *,
@@ -189,7 +208,9 @@ class Study(studies.Study):
         """
         chosen = self.scene.gait if gait is None else gait
         amplitudes = reachable(self.scene, chosen) if amplitudes is None else amplitudes
-        return self.displacement(amplitudes, tiers, gait=gait).plot(quantity, ax=ax, **options)
+        return self.displacement(amplitudes, tiers, gait=gait).plot(
+            quantity, ax=ax, **options
+        )
 
     def animate(self, path: str | Path = "swim.gif", *, cycles: int = 1) -> Path:
         """Write a film of the body beside its gait on the CCF, .gif or .mp4, or a strip of it, .png, .pdf or .svg;
@@ -266,7 +287,9 @@ class Study(studies.Study):
                 raise Refusal("pair must be two joints such as (1, 2)", value=pair)
         return self.plane([int(k) - 1 for k in pair], at)
 
-    def _drawn(self, pair: Sequence[int] | None, at: Sequence[float] | None) -> tuple[Any, list]:
+    def _drawn(
+        self, pair: Sequence[int] | None, at: Sequence[float] | None
+    ) -> tuple[Any, list]:
         """Return the gait as a map shows it, and the labels of its axes."""
         labels, gait = list(shape_labels(self.scene.system)), self.scene.gait
         if not self._is_slice(pair):

@@ -2,7 +2,17 @@
 one is a file and its name here; `geomech.commands.options` and `loading` have what they share."""
 
 COMMANDS = {  # by the headings of `geomech --help`, in its order
-    "Analyse": ("run", "displacement", "ccf", "connection", "velocity", "symbolic", "sweep", "accuracy", "lab"),
+    "Analyse": (
+        "run",
+        "displacement",
+        "ccf",
+        "connection",
+        "velocity",
+        "symbolic",
+        "sweep",
+        "accuracy",
+        "lab",
+    ),
     "Gaits": ("trajectory", "forces", "optimize"),
     "Grains and robots": ("stress", "intrude", "walk", "grains", "drag_grains"),
     "Your own data": ("fit_medium", "fit_gait"),

@@ -5,7 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from geomech.commands.loading import load_any
-from geomech.commands.options import EitherArgument, FolderOption, JsonOption, YesOption, with_workers
+from geomech.commands.options import (
+    EitherArgument,
+    FolderOption,
+    JsonOption,
+    YesOption,
+    with_workers,
+)
 from geomech.commands.pipeline import Output, execute
 
 

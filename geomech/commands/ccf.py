@@ -34,13 +34,24 @@ def ccf(
     extent: ExtentOption = None,
     plot: PlotOption = None,
     style: Annotated[
-        Optional[str], typer.Option(metavar="STYLE", help="draw a map (colours, the default), contours or a surface")
+        Optional[str],
+        typer.Option(
+            metavar="STYLE",
+            help="draw a map (colours, the default), contours or a surface",
+        ),
     ] = None,
     metric: Annotated[
-        bool, typer.Option("--metric", help="draw rings of joint rates that take the same effort")
+        bool,
+        typer.Option(
+            "--metric", help="draw rings of joint rates that take the same effort"
+        ),
     ] = False,
     stretch: Annotated[
-        bool, typer.Option("--stretch", help="redraw shape space so that equal lengths take equal effort")
+        bool,
+        typer.Option(
+            "--stretch",
+            help="redraw shape space so that equal lengths take equal effort",
+        ),
     ] = False,
     pair: PairOption = None,
     slice_: SliceOption = None,
@@ -60,6 +71,10 @@ def ccf(
     )  # fmt: skip
     scene = load_scene(name, grid, extent)
     panels = components(component)
-    drawn = pictures.Ccf(style, metric, stretch, other_frame, panels, colour_limit(clim, panels))
-    question = ccf(scene, pair, angles(scene, "--slice", slice_), other_frame, metric, stretch)
+    drawn = pictures.Ccf(
+        style, metric, stretch, other_frame, panels, colour_limit(clim, panels)
+    )
+    question = ccf(
+        scene, pair, angles(scene, "--slice", slice_), other_frame, metric, stretch
+    )
     execute(question, Output(plot, drawn, pictures.check), yes=yes)

@@ -32,23 +32,41 @@ def connection(
     name: SceneArgument,
     out: Annotated[
         Optional[Path],
-        typer.Option("-o", "--output", metavar="FILE", help="write the connection to .nc (NetCDF) or .mat"),
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="write the connection to .nc (NetCDF) or .mat",
+        ),
     ] = None,
     grid: GridOption = None,
     extent: ExtentOption = None,
     plot: PlotOption = None,
     sign: Annotated[
-        Optional[str], typer.Option(metavar="+|-", help="sign of A in a .mat file: + (the default) or -")
+        Optional[str],
+        typer.Option(
+            metavar="+|-", help="sign of A in a .mat file: + (the default) or -"
+        ),
     ] = None,
     order: Annotated[
-        Optional[str], typer.Option(metavar="ORDER", help="order of a .mat file: ndgrid (the default) or meshgrid")
+        Optional[str],
+        typer.Option(
+            metavar="ORDER",
+            help="order of a .mat file: ndgrid (the default) or meshgrid",
+        ),
     ] = None,
     layout: Annotated[
         Optional[str],
-        typer.Option(metavar="LAYOUT", help="layout of a .mat file: arrays (the default) or struct, sysplotter's s"),
+        typer.Option(
+            metavar="LAYOUT",
+            help="layout of a .mat file: arrays (the default) or struct, sysplotter's s",
+        ),
     ] = None,
     style: Annotated[
-        Optional[str], typer.Option(metavar="STYLE", help="draw arrows (quiver, the default) or streamlines")
+        Optional[str],
+        typer.Option(
+            metavar="STYLE", help="draw arrows (quiver, the default) or streamlines"
+        ),
     ] = None,
     pair: PairOption = None,
     slice_: SliceOption = None,
@@ -64,8 +82,12 @@ def connection(
 
     file = parts.Connection(out, sign, order, layout)
     panels = components(component)
-    drawn = pictures.Connection(style, plot, pair, slice_, other_frame, panels, colour_limit(clim, panels))
+    drawn = pictures.Connection(
+        style, plot, pair, slice_, other_frame, panels, colour_limit(clim, panels)
+    )
     scene = load_scene(name, grid, extent)
     held = angles(scene, "--slice", slice_)
-    question = connection(scene, file.format, layout, plot is not None, pair, held, other_frame)
+    question = connection(
+        scene, file.format, layout, plot is not None, pair, held, other_frame
+    )
     execute(question, Output(out, file), Output(plot, drawn, pictures.check), yes=yes)

@@ -32,16 +32,30 @@ from geomech.commands.pipeline import Output, drawing, execute
 @with_workers
 def displacement(
     name: SceneArgument,
-    amplitudes: Annotated[str, typer.Option(metavar="LIST", help="amplitudes, as 0.5,1,30deg or START:STOP:COUNT")],
+    amplitudes: Annotated[
+        str,
+        typer.Option(
+            metavar="LIST", help="amplitudes, as 0.5,1,30deg or START:STOP:COUNT"
+        ),
+    ],
     tiers: Annotated[
-        Optional[str], typer.Option(metavar="LIST", help="tiers, of area,adapted,path,harmonic,direct")
+        Optional[str],
+        typer.Option(
+            metavar="LIST", help="tiers, of area,adapted,path,harmonic,direct"
+        ),
     ] = None,
     grid: GridOption = None,
     extent: ExtentOption = None,
     tol: Annotated[
-        Optional[float], typer.Option(metavar="E", help="use the cheapest tier with an error of at most E BL")
+        Optional[float],
+        typer.Option(
+            metavar="E", help="use the cheapest tier with an error of at most E BL"
+        ),
     ] = None,
-    effort: Annotated[bool, typer.Option("--effort", help="add path length, work and cost of transport")] = False,
+    effort: Annotated[
+        bool,
+        typer.Option("--effort", help="add path length, work and cost of transport"),
+    ] = False,
     everything: AllOption = False,
     as_json: JsonOption = False,
     plot: PlotOption = None,
@@ -60,5 +74,7 @@ def displacement(
     panels = components(component, CURVES)
     options = {"components": panels, "data": measurements(data, scene, panels)}
     question = displacement(scene, values, tiers, tol, effort)
-    figure = Output(plot, drawing("pictures.displacement", **options), drawing("pictures.check"))
+    figure = Output(
+        plot, drawing("pictures.displacement", **options), drawing("pictures.check")
+    )
     execute(question, figure, as_json=as_json, yes=yes, everything=everything)

@@ -14,25 +14,48 @@ from geomech.commands.pipeline import Output, drawing, execute
 
 def fit_gait(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE.csv", help="table of joint angles, x, y, heading, or points of midlines")
+        Path,
+        typer.Argument(
+            metavar="FILE.csv",
+            help="table of joint angles, x, y, heading, or points of midlines",
+        ),
     ],
     out: Annotated[
-        Optional[Path], typer.Option("-o", "--output", metavar="FILE.nc", help="write the result to .nc (NetCDF)")
+        Optional[Path],
+        typer.Option(
+            "-o", "--output", metavar="FILE.nc", help="write the result to .nc (NetCDF)"
+        ),
     ] = None,
     scene: Annotated[
         Optional[Path],
-        typer.Option("--scene", metavar="FILE.toml", help="write a scene of the mean gait, which takes FILE.nc"),
+        typer.Option(
+            "--scene",
+            metavar="FILE.toml",
+            help="write a scene of the mean gait, which takes FILE.nc",
+        ),
     ] = None,
     plot: PlotOption = None,
     columns: Annotated[
-        Optional[str], typer.Option(metavar="LIST", help="columns T,A1,A2,...,X,Y,HEADING, or points along the body")
+        Optional[str],
+        typer.Option(
+            metavar="LIST",
+            help="columns T,A1,A2,...,X,Y,HEADING, or points along the body",
+        ),
     ] = None,
-    degrees: Annotated[bool, typer.Option("--degrees", help="read joint angles and heading in degrees")] = False,
+    degrees: Annotated[
+        bool, typer.Option("--degrees", help="read joint angles and heading in degrees")
+    ] = False,
     level: Annotated[
-        float, typer.Option(metavar="SHARE", help="share of cases in which intervals cover the truth")
+        float,
+        typer.Option(
+            metavar="SHARE", help="share of cases in which intervals cover the truth"
+        ),
     ] = 0.95,
     harmonics: Annotated[
-        Optional[int], typer.Option(metavar="N", help="harmonics of A in the phase, cross-validated if left out")
+        Optional[int],
+        typer.Option(
+            metavar="N", help="harmonics of A in the phase, cross-validated if left out"
+        ),
     ] = None,
     limits: Annotated[
         Optional[float],
@@ -43,25 +66,51 @@ def fit_gait(
         ),
     ] = None,
     body_length: Annotated[
-        Optional[float], typer.Option(metavar="M", help="length of the body, in the unit of x and y")
+        Optional[float],
+        typer.Option(metavar="M", help="length of the body, in the unit of x and y"),
     ] = None,
     medium: Annotated[
-        Optional[str], typer.Option(metavar="NAME", help="medium, or its file, in which midlines are predicted")
+        Optional[str],
+        typer.Option(
+            metavar="NAME", help="medium, or its file, in which midlines are predicted"
+        ),
     ] = None,
     units: Annotated[
-        Optional[str], typer.Option(metavar="UNIT", help="unit of x and y of midlines: m, cm, mm, px or BL")
+        Optional[str],
+        typer.Option(
+            metavar="UNIT", help="unit of x and y of midlines: m, cm, mm, px or BL"
+        ),
     ] = None,
-    scale: Annotated[Optional[float], typer.Option(metavar="MM", help="mm per pixel of midlines")] = None,
-    fps: Annotated[Optional[float], typer.Option(metavar="N", help="frames per second of midlines")] = None,
-    y: Annotated[Optional[str], typer.Option("--y", metavar="SENSE", help="y of midlines runs up or down")] = None,
+    scale: Annotated[
+        Optional[float], typer.Option(metavar="MM", help="mm per pixel of midlines")
+    ] = None,
+    fps: Annotated[
+        Optional[float], typer.Option(metavar="N", help="frames per second of midlines")
+    ] = None,
+    y: Annotated[
+        Optional[str],
+        typer.Option("--y", metavar="SENSE", help="y of midlines runs up or down"),
+    ] = None,
     head: Annotated[
-        Optional[str], typer.Option(metavar="END", help="the first or last point is the head, else by the motion")
+        Optional[str],
+        typer.Option(
+            metavar="END",
+            help="the first or last point is the head, else by the motion",
+        ),
     ] = None,
     least_score: Annotated[
-        Optional[float], typer.Option(metavar="P", help="likelihood from which on points are taken, 0.6 if left out")
+        Optional[float],
+        typer.Option(
+            metavar="P",
+            help="likelihood from which on points are taken, 0.6 if left out",
+        ),
     ] = None,
     mend: Annotated[
-        bool, typer.Option("--mend", help="leave out points that jump or swap, turn reversed frames round")
+        bool,
+        typer.Option(
+            "--mend",
+            help="leave out points that jump or swap, turn reversed frames round",
+        ),
     ] = False,
     as_json: JsonOption = False,
 ):
@@ -78,4 +127,6 @@ def fit_gait(
     )  # fmt: skip
     field = Output(out, parts.write_measured, formats.netcdf)
     figure = Output(plot, drawing("pictures.measured"), drawing("pictures.check"))
-    execute(request, field, Output(scene, *parts.mean_gait(out)), figure, as_json=as_json)
+    execute(
+        request, field, Output(scene, *parts.mean_gait(out)), figure, as_json=as_json
+    )

@@ -15,28 +15,61 @@ Size = Optional[float]
 
 def fit_medium(
     drag: Annotated[
-        str, typer.Argument(metavar="DRAG.csv", help="CSV file, or short-rod-drag or flank-drag, samples that ship")
+        str,
+        typer.Argument(
+            metavar="DRAG.csv",
+            help="CSV file, or short-rod-drag or flank-drag, samples that ship",
+        ),
     ],
     out: Annotated[
-        Optional[Path], typer.Option("-o", "--output", metavar="FILE.toml", help="write the medium to .toml")
+        Optional[Path],
+        typer.Option(
+            "-o", "--output", metavar="FILE.toml", help="write the medium to .toml"
+        ),
     ] = None,
     plot: PlotOption = None,
     law: Annotated[
         Optional[str],
-        typer.Option(metavar="LAW", help="granular, viscous, coulomb, stress-map or zeta"),
+        typer.Option(
+            metavar="LAW", help="granular, viscous, coulomb, stress-map or zeta"
+        ),
     ] = None,
     end_caps: Annotated[
-        str, typer.Option(metavar="E", help="ends of the rod: left-out, fitted or 1 for a flat end")
+        str,
+        typer.Option(
+            metavar="E", help="ends of the rod: left-out, fitted or 1 for a flat end"
+        ),
     ] = "left-out",
-    radius: Annotated[Size, typer.Option(metavar="SIZE", help="radius of the rod in m, in place of the file's")] = None,
-    length: Annotated[Size, typer.Option(metavar="SIZE", help="length of the rod in m, in place of the file's")] = None,
+    radius: Annotated[
+        Size,
+        typer.Option(
+            metavar="SIZE", help="radius of the rod in m, in place of the file's"
+        ),
+    ] = None,
+    length: Annotated[
+        Size,
+        typer.Option(
+            metavar="SIZE", help="length of the rod in m, in place of the file's"
+        ),
+    ] = None,
     depth: Annotated[
-        Size, typer.Option(metavar="SIZE", help="depth of the rod's axis in m, in place of the file's")
+        Size,
+        typer.Option(
+            metavar="SIZE", help="depth of the rod's axis in m, in place of the file's"
+        ),
     ] = None,
     density: Annotated[
-        Size, typer.Option(metavar="SIZE", help="density of the bed in kg/m^3, in place of the file's")
+        Size,
+        typer.Option(
+            metavar="SIZE", help="density of the bed in kg/m^3, in place of the file's"
+        ),
     ] = None,
-    area: Annotated[Size, typer.Option(metavar="SIZE", help="area of the plate in m^2, in place of the file's")] = None,
+    area: Annotated[
+        Size,
+        typer.Option(
+            metavar="SIZE", help="area of the plate in m^2, in place of the file's"
+        ),
+    ] = None,
     everything: AllOption = False,
     as_json: JsonOption = False,
 ):
@@ -46,10 +79,20 @@ def fit_medium(
     from geomech.output import parts, pictures
     from geomech.studies.calibration import Calibration
 
-    sizes = {"radius": radius, "length": length, "depth": depth, "density": density, "area": area}
+    sizes = {
+        "radius": radius,
+        "length": length,
+        "depth": depth,
+        "density": density,
+        "area": area,
+    }
     known = tuple((key, x) for key, x in sizes.items() if x is not None)
     file = Output(out, parts.write_medium, message=parts.about_medium)
     figure = Output(plot, pictures.calibration, pictures.check)
     execute(
-        Calibration(drag, law, known, parse_end_caps(end_caps)), file, figure, as_json=as_json, everything=everything
+        Calibration(drag, law, known, parse_end_caps(end_caps)),
+        file,
+        figure,
+        as_json=as_json,
+        everything=everything,
     )

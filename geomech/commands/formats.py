@@ -9,7 +9,9 @@ from rft.refusal import Refusal
 
 def netcdf(path: Path) -> None:
     if path.suffix != ".nc":
-        raise Refusal(f"cannot write {path}", instead="end the name of a NetCDF file in .nc")
+        raise Refusal(
+            f"cannot write {path}", instead="end the name of a NetCDF file in .nc"
+        )
 
 
 def csv(path: Path) -> None:
@@ -19,4 +21,6 @@ def csv(path: Path) -> None:
 
 def toml(path: Path) -> None:
     if path.suffix != ".toml":
-        raise Refusal(f"cannot write {path}", instead="end the name of a scene in .toml")
+        raise Refusal(
+            f"cannot write {path}", instead="end the name of a scene in .toml"
+        )

@@ -14,9 +14,17 @@ class Group(TyperGroup):
 
     def format_commands(self, ctx, formatter) -> None:
         wide = max(map(len, self.commands))
-        for heading, some in groupby(self.commands.values(), lambda command: command.rich_help_panel):
+        for heading, some in groupby(
+            self.commands.values(), lambda command: command.rich_help_panel
+        ):
             with formatter.section(heading):
-                rows = [(c.name.ljust(wide), c.get_short_help_str(formatter.width - 6 - wide)) for c in some]
+                rows = [
+                    (
+                        c.name.ljust(wide),
+                        c.get_short_help_str(formatter.width - 6 - wide),
+                    )
+                    for c in some
+                ]
                 formatter.write_dl(rows)
 
     def resolve_command(self, ctx, args: list[str]) -> tuple:

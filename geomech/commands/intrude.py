@@ -17,7 +17,10 @@ def intrude(
     name: IntruderArgument,
     as_json: JsonOption = False,
     out: Annotated[
-        Optional[Path], typer.Option("-o", "--output", metavar="FILE.csv", help="write the table to .csv")
+        Optional[Path],
+        typer.Option(
+            "-o", "--output", metavar="FILE.csv", help="write the table to .csv"
+        ),
     ] = None,
     plot: PlotOption = None,
 ):

@@ -39,4 +39,6 @@ def lab(
     scenes = load_scenes(names or GALLERY)
     question = Lab(scenes, parameters(over or (), scenes[0]))
     with lab.opened(out) as path:
-        execute(question, Output(path, lab.write, lab.check_format, lab.message), yes=yes)
+        execute(
+            question, Output(path, lab.write, lab.check_format, lab.message), yes=yes
+        )

@@ -27,34 +27,63 @@ from geomech.commands.pipeline import Output, execute
 def optimize(
     name: SceneArgument,
     objective: Annotated[
-        str, typer.Option("--objective", metavar="NAME", help="maximise displacement, efficiency, turning or speed")
+        str,
+        typer.Option(
+            "--objective",
+            metavar="NAME",
+            help="maximise displacement, efficiency, turning or speed",
+        ),
     ],
     direction: Annotated[
-        Optional[str], typer.Option(metavar="x|y", help="take the displacement along x or y of the body")
+        Optional[str],
+        typer.Option(
+            metavar="x|y", help="take the displacement along x or y of the body"
+        ),
     ] = None,
     harmonics: Annotated[
-        Optional[int], typer.Option(metavar="N", help="harmonics of the Fourier series, 5 if left out")
+        Optional[int],
+        typer.Option(
+            metavar="N", help="harmonics of the Fourier series, 5 if left out"
+        ),
     ] = None,
     limits: Annotated[
         Optional[str],
-        typer.Option(metavar="ANGLES", help="joint limits, as 2.5, 120deg, -0.5:2 or 1,2 for each"),
+        typer.Option(
+            metavar="ANGLES",
+            help="joint limits, as 2.5, 120deg, -0.5:2 or 1,2 for each",
+        ),
     ] = None,
     starts: Annotated[
-        Optional[int], typer.Option(metavar="N", help="number of starts, 9 in dry media and else 1 if left out")
+        Optional[int],
+        typer.Option(
+            metavar="N", help="number of starts, 9 in dry media and else 1 if left out"
+        ),
     ] = None,
     rate: Annotated[
-        Optional[float], typer.Option(metavar="RATE", help="largest joint rate in rad/s, for speed")
+        Optional[float],
+        typer.Option(metavar="RATE", help="largest joint rate in rad/s, for speed"),
     ] = None,
     power: Annotated[
-        Optional[float], typer.Option(metavar="POWER", help="largest mean power in drag x BL/s, for speed")
+        Optional[float],
+        typer.Option(
+            metavar="POWER", help="largest mean power in drag x BL/s, for speed"
+        ),
     ] = None,
     out: Annotated[
         Optional[Path],
-        typer.Option("-o", "--output", metavar="FILE.toml", help="write the scene with the best gait to .toml"),
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE.toml",
+            help="write the scene with the best gait to .toml",
+        ),
     ] = None,
     plot: PlotOption = None,
     stretch: Annotated[
-        bool, typer.Option("--stretch", help="draw it also where equal lengths take equal effort")
+        bool,
+        typer.Option(
+            "--stretch", help="draw it also where equal lengths take equal effort"
+        ),
     ] = False,
     clim: ClimOption = None,
     as_json: JsonOption = False,
@@ -68,7 +97,10 @@ def optimize(
     refuse_without_figure(plot, clim=clim)
     scene = load_scene(name)
     drawn = pictures.Optimum(stretch, plot, colour_limit(clim))
-    file, figure = Output(out, parts.write_best, formats.toml), Output(plot, drawn, pictures.check)
+    file, figure = (
+        Output(out, parts.write_best, formats.toml),
+        Output(plot, drawn, pictures.check),
+    )
     question = Optimize(
         scene,
         objective,

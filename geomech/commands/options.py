@@ -26,14 +26,24 @@ IntruderArgument = Annotated[str, _scene(intruder_names)]
 WalkerArgument = Annotated[str, _scene(walker_names)]
 EitherArgument = Annotated[str, _scene(lambda: scene_names() + intruder_names())]
 GridOption = Annotated[
-    Optional[int], typer.Option("--grid", metavar="N", help="points of the grid per joint, in place of the scene's")
+    Optional[int],
+    typer.Option(
+        "--grid",
+        metavar="N",
+        help="points of the grid per joint, in place of the scene's",
+    ),
 ]
 PlotOption = Annotated[
-    Optional[Path], typer.Option("--plot", metavar="FILE", help="draw a figure to .png, .pdf or .svg")
+    Optional[Path],
+    typer.Option("--plot", metavar="FILE", help="draw a figure to .png, .pdf or .svg"),
 ]
 MediumOption = Annotated[
     Optional[Path],
-    typer.Option("--medium", metavar="FILE", help="file of a medium or of drag, in place of the scene's"),
+    typer.Option(
+        "--medium",
+        metavar="FILE",
+        help="file of a medium or of drag, in place of the scene's",
+    ),
 ]
 
 
@@ -45,32 +55,63 @@ def folder(text: str | Path) -> Path:
 
 
 FolderOption = Annotated[
-    Path, typer.Option("-o", "--output", metavar="DIR", help="folder to write the results to", parser=folder)
+    Path,
+    typer.Option(
+        "-o",
+        "--output",
+        metavar="DIR",
+        help="folder to write the results to",
+        parser=folder,
+    ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON and nothing else")]
-AllOption = Annotated[bool, typer.Option("--all", help="print all lines, not only those that fit a screen")]
-YesOption = Annotated[bool, typer.Option("--yes", help="compute even if it takes over a minute or over 2 GB")]
+AllOption = Annotated[
+    bool,
+    typer.Option("--all", help="print all lines, not only those that fit a screen"),
+]
+YesOption = Annotated[
+    bool,
+    typer.Option("--yes", help="compute even if it takes over a minute or over 2 GB"),
+]
 
 
 OtherFrameOption = Annotated[
     Optional[str],
-    typer.Option("--compare-frame", metavar="FRAME", help="draw another body frame below, on the same scales"),
+    typer.Option(
+        "--compare-frame",
+        metavar="FRAME",
+        help="draw another body frame below, on the same scales",
+    ),
 ]
 ComponentOption = Annotated[
     Optional[str],
-    typer.Option("--component", metavar="NAMES", help="panels to draw, such as x or x,theta"),
+    typer.Option(
+        "--component", metavar="NAMES", help="panels to draw, such as x or x,theta"
+    ),
 ]
 ClimOption = Annotated[
     Optional[str],
-    typer.Option("--clim", metavar="LIMIT", help="limit of the colours, a number or percentiles as 98% or 5%:95%"),
+    typer.Option(
+        "--clim",
+        metavar="LIMIT",
+        help="limit of the colours, a number or percentiles as 98% or 5%:95%",
+    ),
 ]
 DataOption = Annotated[
     Optional[Path],
-    typer.Option("--data", metavar="FILE.csv", help="draw points, of columns amplitude,value,error"),
+    typer.Option(
+        "--data",
+        metavar="FILE.csv",
+        help="draw points, of columns amplitude,value,error",
+    ),
 ]
 PairOption = Annotated[
     Optional[str],
-    typer.Option("--pair", metavar="I,J", help="joints on the axes, as 1,3; all pairs if left out"),
+    typer.Option(
+        "--pair",
+        metavar="I,J",
+        help="joints on the axes, as 1,3; all pairs if left out",
+    ),
 ]
 SliceOption = Annotated[
     Optional[str],
@@ -82,7 +123,11 @@ SliceOption = Annotated[
 ]
 PluginOption = Annotated[
     Optional[list[Path]],
-    typer.Option("--plugin", metavar="FILE.py", help="Python file with parts of your own, such as laws"),
+    typer.Option(
+        "--plugin",
+        metavar="FILE.py",
+        help="Python file with parts of your own, such as laws",
+    ),
 ]
 
 
@@ -97,7 +142,10 @@ def load_plugins(files: list[Path] | None) -> None:
 def with_plugins(command: Callable) -> Callable:
     """Return a command that also takes ``--plugin`` if it takes a scene; any other as it is."""
     signature = inspect.signature(command, eval_str=True)
-    if not {"name", "plugins"} & {*signature.parameters} or "plugin" in signature.parameters:
+    if (
+        not {"name", "plugins"} & {*signature.parameters}
+        or "plugin" in signature.parameters
+    ):
         return command
 
     @functools.wraps(command)
@@ -105,19 +153,33 @@ def with_plugins(command: Callable) -> Callable:
         load_plugins(plugin)
         return command(**arguments)
 
-    more = inspect.Parameter("plugin", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=PluginOption)
-    run.__signature__ = signature.replace(parameters=[*signature.parameters.values(), more])
-    run.__annotations__ = {p.name: p.annotation for p in run.__signature__.parameters.values()}
+    more = inspect.Parameter(
+        "plugin", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=PluginOption
+    )
+    run.__signature__ = signature.replace(
+        parameters=[*signature.parameters.values(), more]
+    )
+    run.__annotations__ = {
+        p.name: p.annotation for p in run.__signature__.parameters.values()
+    }
     return run
 
 
 WorkersOption = Annotated[
     Optional[int],
-    typer.Option("--workers", metavar="N", help="processes for long computations, one a core if left out"),
+    typer.Option(
+        "--workers",
+        metavar="N",
+        help="processes for long computations, one a core if left out",
+    ),
 ]
 SchedulerOption = Annotated[
     Optional[str],
-    typer.Option("--scheduler", metavar="ADDRESS", help="Dask cluster to compute on, as tcp://10.0.0.1:8786"),
+    typer.Option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Dask cluster to compute on, as tcp://10.0.0.1:8786",
+    ),
 ]
 
 
@@ -133,9 +195,16 @@ def with_workers(command: Callable) -> Callable:
 
     signature = inspect.signature(command, eval_str=True)
     more = {"workers": WorkersOption, "scheduler": SchedulerOption}
-    last = [inspect.Parameter(k, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=a) for k, a in more.items()]
-    run.__signature__ = signature.replace(parameters=[*signature.parameters.values(), *last])
-    run.__annotations__ = {p.name: p.annotation for p in run.__signature__.parameters.values()}
+    last = [
+        inspect.Parameter(k, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=a)
+        for k, a in more.items()
+    ]
+    run.__signature__ = signature.replace(
+        parameters=[*signature.parameters.values(), *last]
+    )
+    run.__annotations__ = {
+        p.name: p.annotation for p in run.__signature__.parameters.values()
+    }
     return run
 
 
@@ -155,7 +224,9 @@ class _NoAngle(Exception):
     """Degrees were given where they are refused; its text says why."""
 
 
-def numbers(option: str, text: str, count: int | None = None, angle: str | None = NO_ANGLE) -> list[float]:
+def numbers(
+    option: str, text: str, count: int | None = None, angle: str | None = NO_ANGLE
+) -> list[float]:
     """Return the numbers of 0.5,0.3, ``count`` of them if that is given. angle: None for angles, which may be 30deg; else why
     degrees are refused."""
     try:
@@ -164,12 +235,15 @@ def numbers(option: str, text: str, count: int | None = None, angle: str | None 
             raise ValueError
     except _NoAngle as no_angle:
         raise Refusal(
-            f"{text!r} is in degrees, but {no_angle}", where=option, instead="give a number without 'deg'"
+            f"{text!r} is in degrees, but {no_angle}",
+            where=option,
+            instead="give a number without 'deg'",
         ) from None
     except ValueError:
         such = "0.5,0.3 or 30deg,20deg" if angle is None else "0.5,0.3"
         raise Refusal(
-            f"{text!r} is not {('a number' if count else f'a list of numbers such as {such}')}", where=option
+            f"{text!r} is not {('a number' if count else f'a list of numbers such as {such}')}",
+            where=option,
         ) from None
     return values
 
@@ -179,7 +253,9 @@ def an_angle(text: str | float) -> float:
     try:
         return _number(str(text), None)
     except ValueError:
-        raise typer.BadParameter(f"{text!r} is no angle: give one such as 2.5 (rad) or 120deg") from None
+        raise typer.BadParameter(
+            f"{text!r} is no angle: give one such as 2.5 (rad) or 120deg"
+        ) from None
 
 
 def angles(scene, option: str, text: str | None) -> tuple[float, ...] | None:
@@ -195,9 +271,17 @@ def joint_limits(text: str | None, scene) -> float | list[tuple[float, float]] |
         return None
     pairs = []
     for part in text.split(","):
-        ends = [number for end in part.split(":") for number in numbers("--limits", end, 1, None)]
+        ends = [
+            number
+            for end in part.split(":")
+            for number in numbers("--limits", end, 1, None)
+        ]
         if len(ends) > 2:
-            raise Refusal(f"{part!r} is no limit", where="--limits", instead="give one such as 2.5, 120deg or -0.5:2")
+            raise Refusal(
+                f"{part!r} is no limit",
+                where="--limits",
+                instead="give one such as 2.5, 120deg or -0.5:2",
+            )
         pairs.append((-ends[0], ends[0]) if len(ends) == 1 else tuple(ends))
     if len(pairs) == 1:
         return pairs[0][1] if ":" not in text else pairs * scene.system.joints
@@ -206,7 +290,12 @@ def joint_limits(text: str | None, scene) -> float | list[tuple[float, float]] |
 
 ExtentOption = Annotated[
     Optional[float],
-    typer.Option("--extent", metavar="ANGLE", help="half width of the grid in rad, or as 120deg", parser=an_angle),
+    typer.Option(
+        "--extent",
+        metavar="ANGLE",
+        help="half width of the grid in rad, or as 120deg",
+        parser=an_angle,
+    ),
 ]
 
 
@@ -225,15 +314,31 @@ def parameter_kind(scene, parameter: str) -> str | None:
 
     section, *_, key = parameter.split(".") if "." in parameter else (parameter, "")
     if hasattr(scene, "robot"):
-        of = {"robot": getattr(scene.robot, "legs", None), "gait": scene.gait, "medium": scene.medium}.get(section)
+        of = {
+            "robot": getattr(scene.robot, "legs", None),
+            "gait": scene.gait,
+            "medium": scene.medium,
+        }.get(section)
         angle = key in angles_of(type(of))
-        return None if angle else "this key takes degrees as they are" if key.endswith("_deg") else NO_ANGLE
+        return (
+            None
+            if angle
+            else "this key takes degrees as they are"
+            if key.endswith("_deg")
+            else NO_ANGLE
+        )
     if parameter == "gait.amplitude":
         return amplitude_kind(scene)
     system = scene.system
-    owners = {"gait": [scene.gait], "system": [system], "effects": getattr(system, "effects", ())}
+    owners = {
+        "gait": [scene.gait],
+        "system": [system],
+        "effects": getattr(system, "effects", ()),
+    }
     of = owners.get(section, [getattr(system, section, None)])
-    if parameter == "numerics.extent" or any(key in angles_of(type(owner)) for owner in of):
+    if parameter == "numerics.extent" or any(
+        key in angles_of(type(owner)) for owner in of
+    ):
         return None
     return "this key takes degrees as they are" if key.endswith("_deg") else NO_ANGLE
 
@@ -248,23 +353,37 @@ def spread(option: str, text: str, angle: str | None = NO_ANGLE) -> list[float]:
         count = int(parts[2])
         values = [start + (stop - start) * k / max(1, count - 1) for k in range(count)]
     else:
-        raise Refusal(f"{text!r} is neither a list such as 0.5,1.0 nor START:STOP:COUNT such as 0.2:2:10", where=option)
+        raise Refusal(
+            f"{text!r} is neither a list such as 0.5,1.0 nor START:STOP:COUNT such as 0.2:2:10",
+            where=option,
+        )
     if not all(map(math.isfinite, values)):
         raise Refusal(f"{text!r} must be finite", where=option)
     return values
 
 
-def parameters(over: Sequence[str], scene, drawn: bool = False) -> dict[str, list[float]]:
+def parameters(
+    over: Sequence[str], scene, drawn: bool = False
+) -> dict[str, list[float]]:
     """Return the values by parameter of texts such as gait.amplitude=0.5:1.5:3. drawn: in a figure, which takes one or two."""
     axes = {}
     for text in over:
         parameter, equals, values = text.partition("=")
         if not equals or parameter in axes:
-            raise Refusal(f"--over {text!r}", instead="give each parameter once, as PARAM=START:STOP:COUNT")
+            raise Refusal(
+                f"--over {text!r}",
+                instead="give each parameter once, as PARAM=START:STOP:COUNT",
+            )
         axes[parameter] = values
     if drawn and len(axes) > 2:
-        raise Refusal(f"cannot draw {len(axes)} parameters", instead="sweep one or two, or leave --plot out")
-    return {p: spread(f"--over {p}", values, parameter_kind(scene, p)) for p, values in axes.items()}
+        raise Refusal(
+            f"cannot draw {len(axes)} parameters",
+            instead="sweep one or two, or leave --plot out",
+        )
+    return {
+        p: spread(f"--over {p}", values, parameter_kind(scene, p))
+        for p, values in axes.items()
+    }
 
 
 def column_names(text: str | None) -> tuple[str, ...]:
@@ -279,23 +398,36 @@ def parse_end_caps(text: str) -> float | str:
     try:
         return float(text)
     except ValueError:
-        raise Refusal(f"--end-caps {text!r} is neither left-out, fitted nor a number") from None
+        raise Refusal(
+            f"--end-caps {text!r} is neither left-out, fitted nor a number"
+        ) from None
 
 
-MAPS, CURVES = ("x", "y", "theta"), ("x", "y", "theta", "distance")  # panels of figures, by the words of --component
+MAPS, CURVES = (
+    ("x", "y", "theta"),
+    ("x", "y", "theta", "distance"),
+)  # panels of figures, by the words of --component
 
 
 def components(text: str | None, names: Sequence[str] = MAPS) -> tuple[str, ...]:
     """Return the panels in x,theta; none for an option that is left out."""
     from geomech.core.errors import choose
 
-    found = () if text is None else tuple(choose("--component", word.strip(), names) for word in text.split(","))
+    found = (
+        ()
+        if text is None
+        else tuple(
+            choose("--component", word.strip(), names) for word in text.split(",")
+        )
+    )
     if len({*found}) < len(found):
         raise Refusal("name each panel once", where="--component", value=text)
     return found
 
 
-def colour_limit(text: str | None, panels: Sequence[str] = ("x",)) -> float | str | None:
+def colour_limit(
+    text: str | None, panels: Sequence[str] = ("x",)
+) -> float | str | None:
     """Return a limit of colours: a positive number, a percentile such as "98%", or two such as "5%:95%". panels: on which it
     holds, none for all; one number has one unit."""
     if text is None:
@@ -309,7 +441,11 @@ def colour_limit(text: str | None, panels: Sequence[str] = ("x",)) -> float | st
     except ValueError:
         values = [math.nan]
     least = 0.0 if len(values) == 1 else -1e-9
-    if not (least < values[0] and values == sorted({*values}) and values[-1] < (100.0 + 1e-9 if percent else math.inf)):
+    if not (
+        least < values[0]
+        and values == sorted({*values})
+        and values[-1] < (100.0 + 1e-9 if percent else math.inf)
+    ):
         instead = "give a number above 0, or a percentile such as 98% or 5%:95%"
         raise Refusal(f"{text!r} is no limit", where="--clim", instead=instead)
     if not percent and "theta" in (panels or MAPS) and len(panels or MAPS) > 1:
@@ -325,8 +461,12 @@ def colour_limit(text: str | None, panels: Sequence[str] = ("x",)) -> float | st
 
 def refuse_without_figure(plot: Path | None, **options: object) -> None:
     """Refuse options of a figure where none is drawn."""
-    if plot is None and (names := [f"--{name}" for name, value in options.items() if value is not None]):
-        what = f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'} for a figure"
+    if plot is None and (
+        names := [f"--{name}" for name, value in options.items() if value is not None]
+    ):
+        what = (
+            f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'} for a figure"
+        )
         raise Refusal(what, instead="say --plot FILE, too")
 
 
@@ -337,5 +477,8 @@ def measurements(path: Path | None, scene, panels: Sequence[str]):
     from geomech.scenes.measurements import read
 
     if len(panels) > 1:
-        raise Refusal("--data FILE is of one quantity", instead="name its panel alone with --component, such as x")
+        raise Refusal(
+            "--data FILE is of one quantity",
+            instead="name its panel alone with --component, such as x",
+        )
     return read(path, scene, angle=panels == ("theta",))

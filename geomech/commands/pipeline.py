@@ -42,13 +42,19 @@ def drawing(function: str, **options: Any) -> Callable:
     module, name = function.split(".")
 
     def call(*arguments: Any) -> Any:
-        return getattr(import_module(f"geomech.output.{module}"), name)(*arguments, **options)
+        return getattr(import_module(f"geomech.output.{module}"), name)(
+            *arguments, **options
+        )
 
     return call
 
 
 def execute(
-    question: Question, *outputs: Output, as_json: bool = False, yes: bool = False, everything: bool = False
+    question: Question,
+    *outputs: Output,
+    as_json: bool = False,
+    yes: bool = False,
+    everything: bool = False,
 ) -> None:
     """Answer a question as a command does: check, cost, compute, write, print.
 
@@ -99,7 +105,9 @@ def _note(scene: Any) -> None:
     """Warn of what is likely not meant, once a command."""
     from geomech.text.system import notes
 
-    for line in notes(scene.system) if hasattr(scene, "system") else ():  # an intruder scene has no system
+    for line in (
+        notes(scene.system) if hasattr(scene, "system") else ()
+    ):  # an intruder scene has no system
         warnings.warn(f"{scene.name}: {line}", Note, stacklevel=4)
 
 
@@ -108,7 +116,10 @@ def _check_outputs(outputs: list[Output], inputs: list[Path]) -> None:
     files = [output.path for output in outputs if not output.folder]
     for k, path in enumerate(files):
         if path in files[:k]:
-            raise Refusal(f"cannot write {path} twice", instead="give --plot, or another output, another name")
+            raise Refusal(
+                f"cannot write {path} twice",
+                instead="give --plot, or another output, another name",
+            )
     refuse_inputs(files, inputs)
     for k, path in enumerate(files):
         refuse_inputs([path], files[:k])
@@ -121,17 +132,27 @@ class _Unused(Exception):
 
 
 @contextlib.contextmanager
-def _computing(question: Question, outputs: list[Output], inputs: list[Path], yes: bool) -> Iterator[Callable]:
+def _computing(
+    question: Question, outputs: list[Output], inputs: list[Path], yes: bool
+) -> Iterator[Callable]:
     """Show the progress of a question, once its cost is allowed, and store finished tasks next to its first output or, of
     results that are only printed, in the user's cache folder; the same command resumes from there."""
     with contextlib.ExitStack() as stack:
-        bar = stack.enter_context(terminal.progress(question.title)) if hasattr(question, "scene") else _quiet
+        bar = (
+            stack.enter_context(terminal.progress(question.title))
+            if hasattr(question, "scene")
+            else _quiet
+        )
         cost = question.cost()
         if cost is None:
             _note(getattr(question, "scene", None))
         else:
             allow(question, cost, yes)
-            stack.enter_context(storing(question, next((output.path for output in outputs), None), inputs))
+            stack.enter_context(
+                storing(
+                    question, next((output.path for output in outputs), None), inputs
+                )
+            )
         yield bar
 
 
@@ -144,14 +165,20 @@ def _quiet(fraction: float) -> None: ...
 
 
 @contextlib.contextmanager
-def storing(question: Question, output: Path | None, inputs: list[Path]) -> Iterator[None]:
+def storing(
+    question: Question, output: Path | None, inputs: list[Path]
+) -> Iterator[None]:
     """Store the results of tasks that run in the body of the statement; at its end they are removed. Refusal while another
     computation for the output is running."""
     from geomech.run import jobs, store
     from geomech.run.digest import digest
 
     context = jobs.context_of([x for x in inputs if x != Path(question.scene.name)])
-    path = store.in_cache(digest(context, question)) if output is None else store.partial_file(output)
+    path = (
+        store.in_cache(digest(context, question))
+        if output is None
+        else store.partial_file(output)
+    )
     refuse_inputs([path] if path else [], inputs)
     with jobs.storing(path, context, output):
         yield
@@ -159,10 +186,16 @@ def storing(question: Question, output: Path | None, inputs: list[Path]) -> Iter
 
 def _place(output: Output, inputs: list[Path], stack: contextlib.ExitStack) -> Path:
     """Return the path to write to: a folder is filled elsewhere, and appears whole or not at all."""
-    return stack.enter_context(atomic_folder(output.path, inputs)) if output.folder else output.path
+    return (
+        stack.enter_context(atomic_folder(output.path, inputs))
+        if output.folder
+        else output.path
+    )
 
 
-def _print(result: Result, outputs: list[Output], as_json: bool, everything: bool) -> None:
+def _print(
+    result: Result, outputs: list[Output], as_json: bool, everything: bool
+) -> None:
     from geomech import text
     from geomech.core.summary import wrapped
 
@@ -171,5 +204,7 @@ def _print(result: Result, outputs: list[Output], as_json: bool, everything: boo
         return
     lines = (text.full if everything else text.text)(result).splitlines()
     lines += [more] if not everything and (more := text.more(result)) else []
-    lines += [output.message(result, output.path) for output in outputs if output.message]
+    lines += [
+        output.message(result, output.path) for output in outputs if output.message
+    ]
     print("\n".join(lines if everything else wrapped(lines)))

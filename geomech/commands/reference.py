@@ -20,7 +20,9 @@ def reference(
             autocompletion=section_names,
         ),
     ] = None,
-    json_schema: Annotated[bool, typer.Option("--json-schema", help="print a JSON Schema of scene files")] = False,
+    json_schema: Annotated[
+        bool, typer.Option("--json-schema", help="print a JSON Schema of scene files")
+    ] = False,
     plugin: PluginOption = None,
 ):
     """Print every key of a scene file. Each has its type, unit, default and meaning."""

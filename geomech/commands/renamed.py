@@ -6,7 +6,12 @@ import warnings
 
 from geomech.core.errors import Note
 
-COMMANDS = {"fit": "fit-gait", "calibrate": "fit-medium", "keys": "reference", "animate": "trajectory"}
+COMMANDS = {
+    "fit": "fit-gait",
+    "calibrate": "fit-medium",
+    "keys": "reference",
+    "animate": "trajectory",
+}
 OPTIONS = {
     "--for": "--objective",
     "--within": "--limits",
@@ -20,7 +25,11 @@ def current(words: list[str]) -> list[str]:
     """Return a command's name and its arguments in the current spelling; `Note` for each old one."""
     name, *arguments = words
     options = arguments[: arguments.index("--")] if "--" in arguments else arguments
-    return [_current(name, COMMANDS), *(_current(x, OPTIONS) for x in options), *arguments[len(options) :]]
+    return [
+        _current(name, COMMANDS),
+        *(_current(x, OPTIONS) for x in options),
+        *arguments[len(options) :],
+    ]
 
 
 def _current(word: str, renamed: dict[str, str]) -> str:
@@ -28,5 +37,9 @@ def _current(word: str, renamed: dict[str, str]) -> str:
     old, equals, value = word.partition("=")
     if old not in renamed:
         return word
-    warnings.warn(f"{old} is now {renamed[old]}: the old spelling goes with the next version", Note, stacklevel=3)
+    warnings.warn(
+        f"{old} is now {renamed[old]}: the old spelling goes with the next version",
+        Note,
+        stacklevel=3,
+    )
     return renamed[old] + equals + value

@@ -28,7 +28,9 @@ from geomech.commands.pipeline import Output, execute
 DEFAULT_SCENE = "three-link-glass"
 SceneOrOurs = Annotated[
     str,
-    typer.Argument(metavar="[SCENE]", help="built-in name or TOML file", autocompletion=scene_names),
+    typer.Argument(
+        metavar="[SCENE]", help="built-in name or TOML file", autocompletion=scene_names
+    ),
 ]
 
 
@@ -48,6 +50,16 @@ def run(
     from geomech.studies.report import Report
 
     question, panels = Report(load_scene(name, medium=medium)), components(component)
-    drawn = report.Drawn(panels, colour_limit(clim, panels), measurements(data, question.scene, panels))
-    write, check = partial(report.write, drawn=drawn), partial(report.refuse_folder, question.scene)
-    execute(question, Output(out, write, check, report.files, True), yes=yes, everything=everything)
+    drawn = report.Drawn(
+        panels, colour_limit(clim, panels), measurements(data, question.scene, panels)
+    )
+    write, check = (
+        partial(report.write, drawn=drawn),
+        partial(report.refuse_folder, question.scene),
+    )
+    execute(
+        question,
+        Output(out, write, check, report.files, True),
+        yes=yes,
+        everything=everything,
+    )

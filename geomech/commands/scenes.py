@@ -13,7 +13,11 @@ from geomech.commands.pipeline import show as print_lines
 def scenes(
     show: Annotated[
         Optional[str],
-        typer.Option(metavar="NAME", help="print the TOML of a scene or a medium", autocompletion=printable_names),
+        typer.Option(
+            metavar="NAME",
+            help="print the TOML of a scene or a medium",
+            autocompletion=printable_names,
+        ),
     ] = None,
 ):
     """List the built-in scenes and the named media."""

@@ -21,10 +21,16 @@ def stress(
         ),
     ],
     beta: Annotated[
-        Optional[float], typer.Option(metavar="ANGLE", help="tilt of the plate in degrees, 0 if it lies flat")
+        Optional[float],
+        typer.Option(
+            metavar="ANGLE", help="tilt of the plate in degrees, 0 if it lies flat"
+        ),
     ] = None,
     gamma: Annotated[
-        Optional[float], typer.Option(metavar="ANGLE", help="direction of motion in degrees below the horizontal")
+        Optional[float],
+        typer.Option(
+            metavar="ANGLE", help="direction of motion in degrees below the horizontal"
+        ),
     ] = None,
     as_json: JsonOption = False,
     plot: PlotOption = None,

@@ -9,16 +9,33 @@ import typer
 
 from geomech.commands import formats
 from geomech.commands.loading import load_moving
-from geomech.commands.options import PlotOption, SceneArgument, YesOption, parameters, with_workers
+from geomech.commands.options import (
+    PlotOption,
+    SceneArgument,
+    YesOption,
+    parameters,
+    with_workers,
+)
 from geomech.commands.pipeline import Output, drawing, execute, path_message
 
 
 @with_workers
 def sweep(
     name: SceneArgument,
-    over: Annotated[list[str], typer.Option(metavar="KEY=VALUES", help="parameter and its values; may be repeated")],
+    over: Annotated[
+        list[str],
+        typer.Option(
+            metavar="KEY=VALUES", help="parameter and its values; may be repeated"
+        ),
+    ],
     out: Annotated[
-        Optional[Path], typer.Option("-o", "--output", metavar="FILE.nc", help="write the results to .nc (NetCDF)")
+        Optional[Path],
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE.nc",
+            help="write the results to .nc (NetCDF)",
+        ),
     ] = None,
     plot: PlotOption = None,
     yes: YesOption = False,
@@ -31,6 +48,14 @@ def sweep(
     scene = load_moving(name)
     axes = parameters(over, scene, drawn=plot is not None)
     file = Output(
-        out, lambda result, path: write_netcdf(path, as_stored(result)), formats.netcdf, path_message("results in")
+        out,
+        lambda result, path: write_netcdf(path, as_stored(result)),
+        formats.netcdf,
+        path_message("results in"),
     )
-    execute(Sweep(scene, axes), file, Output(plot, drawing("pictures.sweep"), drawing("pictures.check")), yes=yes)
+    execute(
+        Sweep(scene, axes),
+        file,
+        Output(plot, drawing("pictures.sweep"), drawing("pictures.check")),
+        yes=yes,
+    )

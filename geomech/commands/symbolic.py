@@ -14,7 +14,9 @@ from geomech.commands.pipeline import show
 def symbolic(
     name: SceneArgument,
     latex: Annotated[bool, typer.Option("--latex", help="print LaTeX")] = False,
-    ccf: Annotated[bool, typer.Option(help="print the CCF of every two joints, too")] = True,
+    ccf: Annotated[
+        bool, typer.Option(help="print the CCF of every two joints, too")
+    ] = True,
 ):
     """Print connection and CCF in closed form. Chains in a viscous or ideal fluid, afloat and on wheels have one."""
     from geomech.text.formulas import formulas

@@ -16,10 +16,18 @@ def trajectory(
     name: SceneArgument,
     out: Annotated[
         Optional[Path],
-        typer.Option("-o", "--output", metavar="FILE", help="write a table (.csv), film (.gif, .mp4) or strip (.png)"),
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="write a table (.csv), film (.gif, .mp4) or strip (.png)",
+        ),
     ] = None,
     cycles: Annotated[
-        Optional[int], typer.Option(metavar="N", help="cycles of the gait, 3 in a film and else 1 if left out")
+        Optional[int],
+        typer.Option(
+            metavar="N", help="cycles of the gait, 3 in a film and else 1 if left out"
+        ),
     ] = None,
     yes: YesOption = False,
 ):
@@ -28,4 +36,10 @@ def trajectory(
     from geomech.output import trajectories
 
     question = trajectories.question(load_scene(name), out, cycles)
-    execute(question, Output(out, trajectories.write, trajectories.check_format, trajectories.message), yes=yes)
+    execute(
+        question,
+        Output(
+            out, trajectories.write, trajectories.check_format, trajectories.message
+        ),
+        yes=yes,
+    )

@@ -13,13 +13,25 @@ from geomech.commands.pipeline import execute
 
 def velocity(
     name: SceneArgument,
-    alpha: Annotated[str, typer.Option(metavar="ANGLES", help="joint angles in rad, as 0.5,0.3 or 30deg,20deg")],
-    alphadot: Annotated[str, typer.Option(metavar="RATES", help="joint rates in rad per unit of time, as 1,0")],
+    alpha: Annotated[
+        str,
+        typer.Option(
+            metavar="ANGLES", help="joint angles in rad, as 0.5,0.3 or 30deg,20deg"
+        ),
+    ],
+    alphadot: Annotated[
+        str,
+        typer.Option(
+            metavar="RATES", help="joint rates in rad per unit of time, as 1,0"
+        ),
+    ],
     as_json: JsonOption = False,
 ):
     """Compute the body velocity of one shape and its rate. The answer has a residual and a status."""
     from geomech.studies.velocity import Velocity
 
     scene = load_with_gait(name)
-    question = Velocity(scene, angles(scene, "--alpha", alpha), angles(scene, "--alphadot", alphadot))
+    question = Velocity(
+        scene, angles(scene, "--alpha", alpha), angles(scene, "--alphadot", alphadot)
+    )
     execute(question, as_json=as_json)

@@ -47,5 +47,9 @@ def choose(place: str, word: object, choices: Iterable[str]) -> str:
     if isinstance(word, str) and word in choices:
         return word
     nearest = difflib.get_close_matches(str(word), choices, 1, 0.5)
-    instead = f"did you mean {nearest[0]!r}?" if nearest else f"use one of {', '.join(choices)}"
+    instead = (
+        f"did you mean {nearest[0]!r}?"
+        if nearest
+        else f"use one of {', '.join(choices)}"
+    )
     raise Refusal(f"{formatted(word)} is unknown", where=place, instead=instead)

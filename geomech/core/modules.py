@@ -8,7 +8,9 @@ from importlib import import_module
 from types import ModuleType
 
 
-def of_package(name: str, path: Iterable[str]) -> tuple[Callable[[str], ModuleType], Callable[[], list[str]]]:
+def of_package(
+    name: str, path: Iterable[str]
+) -> tuple[Callable[[str], ModuleType], Callable[[], list[str]]]:
     """Return (__getattr__, __dir__) of a package from its __name__ and __path__."""
     names = sorted(module.name for module in pkgutil.iter_modules(path))
 

@@ -17,9 +17,17 @@ WIDTH = 80  # characters of a line on a small screen
 
 def part(kind: str, thing) -> str:
     """Return the kind and the numbers of a part of a scene, to six digits, as a scene has them; no key that is None."""
-    names = [f.name for f in dataclasses.fields(thing)] if dataclasses.is_dataclass(thing) else []
+    names = (
+        [f.name for f in dataclasses.fields(thing)]
+        if dataclasses.is_dataclass(thing)
+        else []
+    )
     values = [(name, getattr(thing, name)) for name in names]
-    given = [f"{name} = {formatted(_six_digits(value))}" for name, value in values if value is not None]
+    given = [
+        f"{name} = {formatted(_six_digits(value))}"
+        for name, value in values
+        if value is not None
+    ]
     return f"{kind} ({', '.join(given)})" if given else kind
 
 
@@ -34,8 +42,14 @@ def grid(axes: Sequence[np.ndarray], names: Sequence[str] = ()) -> str:
     ranges = [f"{a[0]:.4g} to {a[-1]:.4g}" for a in axes]
     equal = len(set(ranges)) == 1 and len(ranges) > 1
     names = names or [f"alpha_{k + 1}" for k in range(len(axes))]
-    described = f"{names[0]}{' and ' if len(names) == 2 else ' to '}{names[-1]} from {ranges[0]}" if equal else ""
-    described = described or ", ".join(f"{name} from {r}" for name, r in zip(names, ranges))
+    described = (
+        f"{names[0]}{' and ' if len(names) == 2 else ' to '}{names[-1]} from {ranges[0]}"
+        if equal
+        else ""
+    )
+    described = described or ", ".join(
+        f"{name} from {r}" for name, r in zip(names, ranges)
+    )
     return f"{' x '.join(str(len(a)) for a in axes)} shapes, {described} rad"
 
 
@@ -64,8 +78,15 @@ def fit_residual(residual, speed) -> str:
     """Return the residual of a fit by component, rms over all shapes, over the rms of xi."""
     if np.isnan(residual).all():
         return "fit residual unknown"
-    parts = [np.sqrt(np.nanmean(r**2) / max(np.nanmean(s**2), 1e-300)) for r, s in zip(residual, speed)]
-    return "fit leaves " + ", ".join(f"{row} {_percent(x)}" for row, x in zip(ROWS, parts)) + " of the rms of xi"
+    parts = [
+        np.sqrt(np.nanmean(r**2) / max(np.nanmean(s**2), 1e-300))
+        for r, s in zip(residual, speed)
+    ]
+    return (
+        "fit leaves "
+        + ", ".join(f"{row} {_percent(x)}" for row, x in zip(ROWS, parts))
+        + " of the rms of xi"
+    )
 
 
 def _percent(x: float) -> str:
@@ -81,13 +102,23 @@ def lengths(unit: str, length: float | None) -> str:
 
 def poses(values) -> str:
     """Return the ranges of x, y and theta of poses or velocities (..., 3)."""
-    return spans(np.moveaxis(np.round(np.asarray(values, float).reshape(-1, 3), 12) + 0.0, -1, 0))
+    return spans(
+        np.moveaxis(np.round(np.asarray(values, float).reshape(-1, 3), 12) + 0.0, -1, 0)
+    )
 
 
 def moved(pose: Sequence[tuple[float, str]], zero: Sequence[str] = ()) -> str:
     """Return x, y and heading, each a number and its unit, in words. zero: those of POSE that are 0 by symmetry."""
-    shown = [(n, round(float(x), 9) + 0.0, u) for n, (x, u) in zip(POSE, pose) if n not in zero]
-    parts = [", ".join(f"{name} {x:.6g} {unit}" for name, x, unit in shown)] if shown else []
+    shown = [
+        (n, round(float(x), 9) + 0.0, u)
+        for n, (x, u) in zip(POSE, pose)
+        if n not in zero
+    ]
+    parts = (
+        [", ".join(f"{name} {x:.6g} {unit}" for name, x, unit in shown)]
+        if shown
+        else []
+    )
     return "; ".join([*parts, *zero_words(zero)])
 
 
@@ -103,5 +134,14 @@ def listed(names: Sequence[str]) -> str:
 
 def wrapped(lines: Iterable[str], indent: int = 2) -> list[str]:
     """Return lines of WIDTH at most; of a longer one the rest follows, indented."""
-    fill = textwrap.TextWrapper(WIDTH, subsequent_indent=" " * indent, break_long_words=False, break_on_hyphens=False)
-    return [part for line in lines for part in (fill.wrap(line) if len(line) > WIDTH else [line])]
+    fill = textwrap.TextWrapper(
+        WIDTH,
+        subsequent_indent=" " * indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return [
+        part
+        for line in lines
+        for part in (fill.wrap(line) if len(line) > WIDTH else [line])
+    ]

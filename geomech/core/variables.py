@@ -69,10 +69,15 @@ class Result(Mapping[str, Variable]):
         return len(self.variables)
 
     def __repr__(self) -> str:
-        parts = (f"{v.name} ({', '.join(v.dims)})" if v.dims else v.name for v in self.variables)
+        parts = (
+            f"{v.name} ({', '.join(v.dims)})" if v.dims else v.name
+            for v in self.variables
+        )
         return f"Result({self.kind}: {', '.join(parts)})"
 
     @property
     def sizes(self) -> dict[str, int]:
         """The length of every dimension."""
-        return {dim: n for v in self.variables for dim, n in zip(v.dims, v.values.shape)}
+        return {
+            dim: n for v in self.variables for dim, n in zip(v.dims, v.values.shape)
+        }

@@ -10,22 +10,32 @@ from typing import Any, Protocol, TypeVar
 
 Item = TypeVar("Item")
 Outcome = TypeVar("Outcome")
-Map = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]  # as the builtin `map`, of one sequence
+Map = Callable[
+    [Callable[[Any], Any], Sequence[Any]], Iterable[Any]
+]  # as the builtin `map`, of one sequence
 
 
 class Worker(Protocol):
     """An object that computes tasks."""
 
-    def each(self, function: Callable[[Item], Outcome], items: Sequence[Item]) -> Iterable[Outcome]: ...
+    def each(
+        self, function: Callable[[Item], Outcome], items: Sequence[Item]
+    ) -> Iterable[Outcome]: ...
 
-    def iterate(self, step: Callable, state: Any, count: int, context: tuple, row: Any) -> tuple[Any, list]: ...
+    def iterate(
+        self, step: Callable, state: Any, count: int, context: tuple, row: Any
+    ) -> tuple[Any, list]: ...
 
 
 class _Serial:
-    def each(self, function: Callable[[Item], Outcome], items: Sequence[Item]) -> Iterable[Outcome]:
+    def each(
+        self, function: Callable[[Item], Outcome], items: Sequence[Item]
+    ) -> Iterable[Outcome]:
         return map(function, items)
 
-    def iterate(self, step: Callable, state: Any, count: int, context: tuple, row: Any) -> tuple[Any, list]:
+    def iterate(
+        self, step: Callable, state: Any, count: int, context: tuple, row: Any
+    ) -> tuple[Any, list]:
         rows = []
         for _ in range(count):
             state, one = step(state)
@@ -36,14 +46,18 @@ class _Serial:
 _worker: ContextVar[Worker] = ContextVar("worker", default=_Serial())  # noqa: B039  it has no state
 
 
-def each(function: Callable[[Item], Outcome], items: Sequence[Item]) -> Iterable[Outcome]:
+def each(
+    function: Callable[[Item], Outcome], items: Sequence[Item]
+) -> Iterable[Outcome]:
     """Return function(item) of every item, in their order, as the builtin `map` does.
 
     `functools.partial` of a module's function and one argument is a task with what all items share."""
     return _worker.get().each(function, items)
 
 
-def iterate(step: Callable, state: Any, count: int, context: tuple, row: Any = Any) -> tuple[Any, list]:
+def iterate(
+    step: Callable, state: Any, count: int, context: tuple, row: Any = Any
+) -> tuple[Any, list]:
     """Return the state after ``count`` times step(state) -> (state, row), and the rows.
 
     context: everything besides the state on which steps depend; the state consists of arrays and numbers. row: the type

@@ -19,13 +19,17 @@ from rft.checks import Number
 from rft.refusal import Refusal
 
 LARGEST_GAP = 0.25  # of the period, between neighbouring frames
-UNEQUAL = 0.05  # spread of the frames' spacing, over its mean, that still counts as equal
+UNEQUAL = (
+    0.05  # spread of the frames' spacing, over its mean, that still counts as equal
+)
 REPEATED = 0.1  # share of the headings' squares that differ, below which the body does the same again; noise is less
 PLACES = 240  # of the period, at which that is looked for
 LONGEST = 0.75  # of the period: what repeats later has too little left to compare
 FURTHER = 1.5  # times the largest move between neighbouring frames, that a last one beyond the period is from the first
 BACKWARDS = 1.0  # rad of phase along the body, by which a wave surely runs from the tail to the head
-FREQUENCY_TOLERANCE = 0.05  # of a period, by which the frequency may contradict the file
+FREQUENCY_TOLERANCE = (
+    0.05  # of a period, by which the frequency may contradict the file
+)
 
 
 @GAITS.register
@@ -72,10 +76,14 @@ class Centreline(Gait):
     kind = "centreline"
     _curve: ClassVar[Any]  # of the data, set once they are read
 
-    estimate_is = "of the computation alone: what the measured midlines are off by is not in it"
+    estimate_is = (
+        "of the computation alone: what the measured midlines are off by is not in it"
+    )
 
     file: str = field(kw_only=False)
-    elements: Annotated[int, Number(3, 2000, "-", "as many as the body has", whole=True)] = 100
+    elements: Annotated[
+        int, Number(3, 2000, "-", "as many as the body has", whole=True)
+    ] = 100
     period: Annotated[
         float | None,
         Number(
@@ -84,17 +92,27 @@ class Centreline(Gait):
             "spaced, it is their number times their spacing",
         ),
     ] = None  # fmt: skip
-    amplitude: Annotated[float, Number(-LARGEST, LARGEST, "-", "scales the bends")] = 1.0
+    amplitude: Annotated[float, Number(-LARGEST, LARGEST, "-", "scales the bends")] = (
+        1.0
+    )
     keep_harmonics: Annotated[
         int,
         Number(
-            0, 2000, "-", "smooth by least squares instead, with that many harmonics in time; 0 for none", whole=True
+            0,
+            2000,
+            "-",
+            "smooth by least squares instead, with that many harmonics in time; 0 for none",
+            whole=True,
         ),
     ] = 0
     keep_modes: Annotated[
         int,
         Number(
-            0, 2000, "-", "and with that many Legendre modes of the curvature along the body; 0 for none", whole=True
+            0,
+            2000,
+            "-",
+            "and with that many Legendre modes of the curvature along the body; 0 for none",
+            whole=True,
         ),
     ] = 0
     sha256: str = ""
@@ -105,14 +123,22 @@ class Centreline(Gait):
         object.__setattr__(self, "file", str(self.file))
         super().__post_init__()
         if self.centre:
-            raise Refusal("a measured centreline takes no centre", because="it undulates about the straight body")
+            raise Refusal(
+                "a measured centreline takes no centre",
+                because="it undulates about the straight body",
+            )
         if not isinstance(self.sha256, str):
             raise Refusal("sha256 must be text", value=self.sha256)
         data = frames.read(self.file)
         if self.sha256.lower() not in ("", data.sha256):
-            raise data.wrong("the file is not the one whose sha256 is given", instead="restore it, or leave sha256 out")
+            raise data.wrong(
+                "the file is not the one whose sha256 is given",
+                instead="restore it, or leave sha256 out",
+            )
         object.__setattr__(self, "sha256", data.sha256)
-        phase, bends = one_period(data, midline.bends(data, self.elements, self.keep_modes), self.period)
+        phase, bends = one_period(
+            data, midline.bends(data, self.elements, self.keep_modes), self.period
+        )
         object.__setattr__(self, "_curve", self._through(data, phase, bends))
         period = 2 * np.pi * (data.t[1] - data.t[0]) / phase[1]
         _check_once(data, period, phase, bends)
@@ -133,17 +159,32 @@ class Centreline(Gait):
 
         _check_order(data, bends)
         # Two frames a wave, in the widest gap too: then the least squares are well posed.
-        most = min((len(bends) - 1) // 2, int(np.pi / np.diff(phase).max() * (1 + 1e-9)))
+        most = min(
+            (len(bends) - 1) // 2, int(np.pi / np.diff(phase).max() * (1 + 1e-9))
+        )
         if self.keep_harmonics not in range(most + 1):
             message = f"keep_harmonics must be a whole number from 0 to {most} for these {len(bends)} frames"
             raise data.wrong(message, value=self.keep_harmonics)
         if not self.keep_harmonics:
-            return CubicSpline(phase, np.concatenate([bends, bends[:1]]), bc_type="periodic")
-        return partial(_series, np.linalg.lstsq(_waves(phase[:-1], self.keep_harmonics, 0), bends, rcond=None)[0])
+            return CubicSpline(
+                phase, np.concatenate([bends, bends[:1]]), bc_type="periodic"
+            )
+        return partial(
+            _series,
+            np.linalg.lstsq(
+                _waves(phase[:-1], self.keep_harmonics, 0), bends, rcond=None
+            )[0],
+        )
 
-    def _note(self, data: frames.Frames, period: float, phase: np.ndarray, bends: np.ndarray) -> None:
+    def _note(
+        self, data: frames.Frames, period: float, phase: np.ndarray, bends: np.ndarray
+    ) -> None:
         """Warn of a wave that runs to the head, and of a period that is not that of the frequency."""
-        if self.frequency and data.timed and abs(period * self.frequency - 1) > FREQUENCY_TOLERANCE:
+        if (
+            self.frequency
+            and data.timed
+            and abs(period * self.frequency - 1) > FREQUENCY_TOLERANCE
+        ):
             warnings.warn(
                 f"{data.name}: the period is {period:.4g} in t, and frequency = {self.frequency:g} Hz makes it "
                 f"{1 / self.frequency:.4g} s: mend one if t is in s, or call the column frame or phase",
@@ -155,7 +196,9 @@ class Centreline(Gait):
         along = np.imag(first[:-1].conj() @ first[1:]) / max(
             (np.abs(first) ** 2).mean(), 1e-300
         )  # rad, towards the tail
-        if along < -BACKWARDS and not self.reverse and self.keep_modes not in (1, 2):  # of which no wave can be made
+        if (
+            along < -BACKWARDS and not self.reverse and self.keep_modes not in (1, 2)
+        ):  # of which no wave can be made
             warnings.warn(
                 f"{data.name}: the wave runs from the tail to the head, which swims backwards: if the animal swam "
                 "forwards, give the points from the tail to the head, and s from 0 at the tail",
@@ -187,7 +230,9 @@ def _waves(t: np.ndarray, harmonics: int, order: int) -> np.ndarray:
     return np.concatenate([one, *parts], -1)
 
 
-def one_period(data: frames.Frames, bends: np.ndarray, period: float | None) -> tuple[np.ndarray, np.ndarray]:
+def one_period(
+    data: frames.Frames, bends: np.ndarray, period: float | None
+) -> tuple[np.ndarray, np.ndarray]:
     """Return phases (N + 1,) from 0 to 2 pi and the bends (N, joints) at all but the last; Refusal if the frames do not
     make up one period. A frame that repeats the first is left out."""
     t, moves = data.t - data.t[0], np.abs(np.diff(bends, axis=0)).max(1)
@@ -199,13 +244,18 @@ def one_period(data: frames.Frames, bends: np.ndarray, period: float | None) -> 
         repeats = abs(t[-1] - period) <= 1e-6 * period
         if t[-1] > period and not repeats:
             raise data.wrong(
-                f"the frames run over {t[-1]:g} in t, more than period = {period:g}", instead="keep one period"
+                f"the frames run over {t[-1]:g} in t, more than period = {period:g}",
+                instead="keep one period",
             )
     if repeats:
         t, bends = t[:-1], bends[:-1]
     gaps = np.diff(t, append=period) / period
     _check_gaps(data, gaps)
-    allowed = moves.max() if repeats else 3 * moves.max() * max(1.0, gaps[-1] / gaps[:-1].max())
+    allowed = (
+        moves.max()
+        if repeats
+        else 3 * moves.max() * max(1.0, gaps[-1] / gaps[:-1].max())
+    )
     if closing_gap > allowed + 1e-9:
         raise data.wrong(
             "the gait does not close",
@@ -223,12 +273,16 @@ def _headings(bends: np.ndarray) -> np.ndarray:
     return heading - heading.mean(1, keepdims=True)
 
 
-def _check_once(data: frames.Frames, period: float, phase: np.ndarray, bends: np.ndarray) -> None:
+def _check_once(
+    data: frames.Frames, period: float, phase: np.ndarray, bends: np.ndarray
+) -> None:
     """Raise Refusal if the body repeats its motion within the period."""
     from scipy.interpolate import CubicSpline
 
     heading = _headings(bends)
-    closed = CubicSpline(phase, np.concatenate([heading, heading[:1]]), bc_type="periodic")
+    closed = CubicSpline(
+        phase, np.concatenate([heading, heading[:1]]), bc_type="periodic"
+    )
     shape = closed(2 * np.pi * np.arange(PLACES) / PLACES)
     shape = shape - shape.mean(0)
     products = shape @ shape.T
@@ -237,7 +291,9 @@ def _check_once(data: frames.Frames, period: float, phase: np.ndarray, bends: np
         ends = square[k:].mean(), square[:-k].mean()
         if min(ends) > 0.5 * square.mean():  # neither is a pause
             differ[k] = 1 - 2 * products.diagonal(k).mean() / sum(ends)
-    repeats = np.flatnonzero((differ < REPEATED) & (np.maximum.accumulate(differ) > 0.5))
+    repeats = np.flatnonzero(
+        (differ < REPEATED) & (np.maximum.accumulate(differ) > 0.5)
+    )
     if repeats.size:
         lag = (repeats[0] + int((np.diff(differ[repeats[0] :]) > 0).argmax())) / PLACES
         raise data.wrong(
@@ -261,7 +317,8 @@ def _inferred(data: frames.Frames, t, moves, closing_gap) -> float:
     """Return the period of equally spaced frames of which the last is one spacing before the first repeats."""
     if np.ptp(np.diff(t)) > UNEQUAL * t[-1] / (len(t) - 1):
         raise data.wrong(
-            "the last frame does not repeat the first, and they are not equally spaced in t", instead="give period"
+            "the last frame does not repeat the first, and they are not equally spaced in t",
+            instead="give period",
         )
     if closing_gap < moves.min() / 3:
         raise data.wrong(
@@ -276,10 +333,13 @@ def _check_order(data: frames.Frames, bends: np.ndarray) -> None:
     """Raise Refusal for a frame whose points run from the head to the tail: it has the bends of its neighbours in
     reverse, with the other sign."""
     between = (np.roll(bends, 1, 0) + np.roll(bends, -1, 0)) / 2
-    distance, reversed_distance = (np.abs(x - between).max(1) for x in (bends, -bends[:, ::-1]))
+    distance, reversed_distance = (
+        np.abs(x - between).max(1) for x in (bends, -bends[:, ::-1])
+    )
     if (bad := np.flatnonzero(3 * reversed_distance < distance)).size:
         raise data.wrong(
-            f"the frame at t = {data.t[bad[0]]:g} seems to run from head to tail", instead="turn its rows round"
+            f"the frame at t = {data.t[bad[0]]:g} seems to run from head to tail",
+            instead="turn its rows round",
         )
 
 
@@ -292,5 +352,6 @@ def _check_gaps(data: frames.Frames, gaps: np.ndarray) -> None:
         )
     if gaps[least] < 0.01 / len(gaps):
         raise data.wrong(
-            f"the frame after t = {data.t[least]:g} comes at almost the same time", instead="drop one of the two"
+            f"the frame after t = {data.t[least]:g} comes at almost the same time",
+            instead="drop one of the two",
         )

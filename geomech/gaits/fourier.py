@@ -94,7 +94,13 @@ class Ellipse(Series):
 
     semi_axes: tuple[float, float] = (1.0, 0.5)
     tilt: Annotated[
-        float, Number(-LARGEST, LARGEST, "rad", "by which the first is turned counter-clockwise from alpha_1")
+        float,
+        Number(
+            -LARGEST,
+            LARGEST,
+            "rad",
+            "by which the first is turned counter-clockwise from alpha_1",
+        ),
     ] = 0.0
 
     def __post_init__(self):
@@ -164,7 +170,9 @@ class Fourier(Series):
     def __post_init__(self):
         cos, sin = finite_array("cos", self.cos, 2), finite_array("sin", self.sin, 2)
         if cos.shape != sin.shape:
-            raise Refusal(f"cos and sin must have one shape (joints, harmonics), got {cos.shape} and {sin.shape}")
+            raise Refusal(
+                f"cos and sin must have one shape (joints, harmonics), got {cos.shape} and {sin.shape}"
+            )
         for name, x in (("cos", cos), ("sin", sin)):
             object.__setattr__(self, name, tuple(map(tuple, x.tolist())))
         super().__post_init__()
@@ -174,4 +182,6 @@ class Fourier(Series):
 
     @classmethod
     def examples(cls) -> dict[str, Fourier]:
-        return {"fourier": cls(cos=((0.5, 0.1), (0.0, 0.2)), sin=((0.0, 0.3), (0.6, 0.0)))}
+        return {
+            "fourier": cls(cos=((0.5, 0.1), (0.0, 0.2)), sin=((0.0, 0.3), (0.6, 0.0)))
+        }

@@ -40,7 +40,11 @@ class Frames:
 
     def wrong(self, what: str, row: int | None = None, **facts: Any) -> Refusal:
         """Return the refusal of a row, or of the whole file. facts: as of `Refusal`."""
-        return Refusal(what, where=self.name if row is None else f"{self.name}, line {self.lines[row]}", **facts)
+        return Refusal(
+            what,
+            where=self.name if row is None else f"{self.name}, line {self.lines[row]}",
+            **facts,
+        )
 
     @property
     def counts(self) -> np.ndarray:
@@ -58,7 +62,9 @@ def read(path: str | Path) -> Frames:
     rows, numbers = rows[order], source.lines[order]
     t, starts = np.unique(rows[:, 0], return_index=True)
     timed = source.header[1][0] not in UNTIMED
-    frames = Frames(source.name, source.sha256, columns, rows, numbers, t, starts, timed)
+    frames = Frames(
+        source.name, source.sha256, columns, rows, numbers, t, starts, timed
+    )
     _check_counts(frames)
     if keyed:
         _check_grid(frames)
@@ -73,14 +79,23 @@ def _header(rows: Rows) -> tuple[str, ...]:
     if columns not in HEADERS:
         headers = " or ".join(",".join(h) for h in HEADERS)
         quoted = rows.filled[0][1][:40] if rows.filled else ""
-        received = f", got {quoted!r}" if len(set(itertools.chain(*HEADERS)) & set(columns)) > 1 else ""
-        raise Refusal(f"the header must be {headers}{received}", where=f"{rows.name}, line {line}")
+        received = (
+            f", got {quoted!r}"
+            if len(set(itertools.chain(*HEADERS)) & set(columns)) > 1
+            else ""
+        )
+        raise Refusal(
+            f"the header must be {headers}{received}", where=f"{rows.name}, line {line}"
+        )
     return columns
 
 
 def _check_counts(frames: Frames) -> None:
     if not FEWEST <= len(frames.t) <= MOST_FRAMES:
-        raise frames.wrong(f"one period must have {FEWEST} to {MOST_FRAMES} frames (values of t)", value=len(frames.t))
+        raise frames.wrong(
+            f"one period must have {FEWEST} to {MOST_FRAMES} frames (values of t)",
+            value=len(frames.t),
+        )
     if (frames.counts < FEWEST).any():
         k = int(frames.counts.argmin())
         items = "values of s" if frames.columns[1] == "s" else "points"
@@ -95,13 +110,13 @@ def _check_grid(frames: Frames) -> None:
     if twice.size:
         row = max(twice[0], twice[0] + 1, key=lambda r: frames.lines[r])
         raise frames.wrong(
-            f"t = {frames.rows[row, 0]:g}, {key} = {keys[row]:g} is given twice", row, instead="keep one"
+            f"t = {frames.rows[row, 0]:g}, {key} = {keys[row]:g} is given twice",
+            row,
+            instead="keep one",
         )
     places = np.unique(keys)
     if (frames.counts != len(places)).any():
         k = int(frames.counts.argmin())
         missing = np.setdiff1d(places, keys[frames.starts[k] :][: frames.counts[k]])[0]
-        message = (
-            f"the frame at t = {frames.t[k]:g} has no {key} = {missing:g}: give every {key} at every t, or at none"
-        )
+        message = f"the frame at t = {frames.t[k]:g} has no {key} = {missing:g}: give every {key} at every t, or at none"
         raise frames.wrong(message, frames.starts[k])

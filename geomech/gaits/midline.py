@@ -7,7 +7,9 @@ from numpy.polynomial import legendre
 
 from geomech.gaits.frames import Frames
 
-LARGEST_BEND = np.pi / 2  # rad, between neighbouring elements, and between neighbouring chords from point to point
+LARGEST_BEND = (
+    np.pi / 2
+)  # rad, between neighbouring elements, and between neighbouring chords from point to point
 LENGTH_SPREAD = 0.2  # of a frame's length about the mean of all; beyond it the tracking has lost a part of the body
 NODES, WEIGHTS = legendre.leggauss(5)
 PASSES = 3  # of making a spline's parameter its own arc length; 1e-7 rad is left at 30 points along a sandfish
@@ -18,7 +20,9 @@ def bends(frames: Frames, elements: int, modes: int) -> np.ndarray:
     the curvature along the body, fitted by least squares; 0: splines through the data."""
     _check_modes(frames, modes)
     centres = (np.arange(elements) + 0.5) / elements
-    heading = (_from_curvature if "curvature" in frames.columns else _from_points)(frames, centres, modes)
+    heading = (_from_curvature if "curvature" in frames.columns else _from_points)(
+        frames, centres, modes
+    )
     angles = np.diff(heading)
     worst = np.unravel_index(np.abs(angles).argmax(), angles.shape)
     if not abs(angles[worst]) <= LARGEST_BEND:
@@ -35,7 +39,10 @@ def _check_modes(frames: Frames, modes: int) -> None:
     count = int(frames.counts.min())
     most = min(int(2 * np.sqrt(count)), count - 1)
     if modes not in range(most + 1):
-        raise frames.wrong(f"keep_modes must be a whole number from 0 to {most} for {count} places", value=modes)
+        raise frames.wrong(
+            f"keep_modes must be a whole number from 0 to {most} for {count} places",
+            value=modes,
+        )
 
 
 def _from_curvature(frames: Frames, centres, modes: int) -> np.ndarray:
@@ -45,7 +52,9 @@ def _from_curvature(frames: Frames, centres, modes: int) -> np.ndarray:
     curvature = frames.rows[:, 2].reshape(len(frames.t), -1)
     s = frames.rows[: curvature.shape[1], 1]
     if max(abs(s[0]), abs(s[-1] - 1)) > 1e-6:
-        raise frames.wrong(f"s must run from 0 (tail) to 1 (head), got {s[0]:g} to {s[-1]:g}")
+        raise frames.wrong(
+            f"s must run from 0 (tail) to 1 (head), got {s[0]:g} to {s[-1]:g}"
+        )
     if modes:
         fitted = legendre.legfit(2 * s - 1, curvature.T, modes - 1)
         return legendre.legval(2 * centres - 1, legendre.legint(fitted) / 2)
@@ -63,7 +72,9 @@ def _from_points(frames: Frames, centres, modes: int) -> np.ndarray:
         _check_points(frames, start, points)
         s, tangent, lengths[k] = _arc(points)
         if modes:
-            heading[k] = legendre.legval(2 * centres - 1, legendre.legfit(2 * s - 1, tangent, modes))
+            heading[k] = legendre.legval(
+                2 * centres - 1, legendre.legfit(2 * s - 1, tangent, modes)
+            )
         else:
             heading[k] = CubicSpline(s, tangent)(centres)
     _check_lengths(frames, lengths)
@@ -88,7 +99,11 @@ def _check_points(frames: Frames, start: int, points: np.ndarray) -> None:
     chord = np.diff(points)
     same = np.flatnonzero(np.abs(chord) <= 1e-9 * np.abs(chord).sum())
     if same.size:
-        raise frames.wrong("the point is where its neighbour is", start + same[0] + 1, instead="drop one of the two")
+        raise frames.wrong(
+            "the point is where its neighbour is",
+            start + same[0] + 1,
+            instead="drop one of the two",
+        )
     turn = np.abs(np.angle(chord[1:] / chord[:-1]))
     if turn.max() > LARGEST_BEND:
         raise frames.wrong(

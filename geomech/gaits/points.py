@@ -36,7 +36,10 @@ class Points(Gait):
             points = points[:-1]
         steps = np.linalg.norm(np.diff(points, axis=0, append=points[:1]), axis=1)
         if len(points) < 3 or not (steps > 1e-12 * steps.sum()).all():
-            raise Refusal("points must be at least 3 shapes, neighbours distinct", value=self.points)
+            raise Refusal(
+                "points must be at least 3 shapes, neighbours distinct",
+                value=self.points,
+            )
         object.__setattr__(self, "points", tuple(map(tuple, points.tolist())))
         super().__post_init__()
 
@@ -48,7 +51,9 @@ class Points(Gait):
         from scipy.interpolate import CubicSpline
 
         loop = np.array([*self.points, self.points[0]])
-        length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(loop, axis=0), axis=1))])
+        length = np.concatenate(
+            [[0.0], np.cumsum(np.linalg.norm(np.diff(loop, axis=0), axis=1))]
+        )
         return CubicSpline(2 * np.pi * length / length[-1], loop, bc_type="periodic")
 
     def unit(self, t: ArrayLike) -> np.ndarray:

@@ -39,7 +39,10 @@ class Shchf(Gait):
 
     XV: tuple[float, ...] = ()
     file: str | None = None
-    number: Annotated[int, Number(1, 10_000, "-", "of the gait, where the file has several", whole=True)] = 1
+    number: Annotated[
+        int,
+        Number(1, 10_000, "-", "of the gait, where the file has several", whole=True),
+    ] = 1
     amplitude: Scale = 1.0
     sha256: str = ""
 
@@ -55,7 +58,9 @@ class Shchf(Gait):
         if self.sha256 and self.file is None:
             raise Refusal("sha256 is that of a file", instead="drop it")
         object.__setattr__(self, "file", self.file and str(self.file))
-        object.__setattr__(self, "_curve", self._of_file() if self.file else self._of_numbers())
+        object.__setattr__(
+            self, "_curve", self._of_file() if self.file else self._of_numbers()
+        )
         super().__post_init__()
 
     def _of_numbers(self) -> Fourier:
@@ -64,7 +69,8 @@ class Shchf(Gait):
             raise Refusal("XV must be pairs a1, b1, a3, b3 ...", value=self.XV)
         object.__setattr__(self, "XV", tuple(values.tolist()))
         a, b = (
-            np.repeat(x, 2)[:-1] * (np.arange(values.size - 1) % 2 == 0) for x in values.reshape(-1, 2).T / np.sqrt(2)
+            np.repeat(x, 2)[:-1] * (np.arange(values.size - 1) % 2 == 0)
+            for x in values.reshape(-1, 2).T / np.sqrt(2)
         )
         return Fourier(cos=(a, a), sin=(b, -b))
 
@@ -74,7 +80,8 @@ class Shchf(Gait):
         curve: Any = shchf.read(self.file or "", self.number)
         if self.sha256.lower() not in ("", curve.sha256):
             raise Refusal(
-                f"{self.file} is not the file whose sha256 is given", instead="restore it, or leave sha256 out"
+                f"{self.file} is not the file whose sha256 is given",
+                instead="restore it, or leave sha256 out",
             )
         object.__setattr__(self, "sha256", curve.sha256)
         if curve.points is not None:
@@ -85,7 +92,11 @@ class Shchf(Gait):
 
     @property
     def joints(self) -> int:
-        return self._curve.joints if isinstance(self._curve, Fourier) else self._curve.c.shape[-1]
+        return (
+            self._curve.joints
+            if isinstance(self._curve, Fourier)
+            else self._curve.c.shape[-1]
+        )
 
     @property
     def harmonics(self) -> int:  # type: ignore[override]  # of most gaits it is a number of the class
@@ -93,10 +104,18 @@ class Shchf(Gait):
         return self._curve.harmonics if isinstance(self._curve, Fourier) else 1
 
     def unit(self, t: ArrayLike) -> np.ndarray:
-        return self._curve.unit(t) if isinstance(self._curve, Fourier) else self._curve(np.asarray(t, float))
+        return (
+            self._curve.unit(t)
+            if isinstance(self._curve, Fourier)
+            else self._curve(np.asarray(t, float))
+        )
 
     def unit_rate(self, t: ArrayLike) -> np.ndarray:
-        return self._curve.unit_rate(t) if isinstance(self._curve, Fourier) else self._curve(np.asarray(t, float), 1)
+        return (
+            self._curve.unit_rate(t)
+            if isinstance(self._curve, Fourier)
+            else self._curve(np.asarray(t, float), 1)
+        )
 
     @classmethod
     def examples(cls) -> dict[str, Shchf]:

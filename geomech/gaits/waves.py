@@ -34,9 +34,16 @@ class Wave(Series):
     kind = "wave"
 
     amplitude: Annotated[float, Number(-LARGEST, LARGEST, "rad", "of each joint")] = 0.5
-    waves: Annotated[float, Number(-5000.5, 5000.5, "-", "on the body, at most half as many as links")] = 1.0
-    offset: Annotated[float, Number(-LARGEST, LARGEST, "rad", "of all joints, which turns the body")] = 0.0
-    joints: Annotated[int, Number(1, 10_000, "-", "of the body, one fewer than links", whole=True)] = 6
+    waves: Annotated[
+        float,
+        Number(-5000.5, 5000.5, "-", "on the body, at most half as many as links"),
+    ] = 1.0
+    offset: Annotated[
+        float, Number(-LARGEST, LARGEST, "rad", "of all joints, which turns the body")
+    ] = 0.0
+    joints: Annotated[
+        int, Number(1, 10_000, "-", "of the body, one fewer than links", whole=True)
+    ] = 6
 
     def __post_init__(self):
         super().__post_init__()
@@ -52,7 +59,9 @@ class Wave(Series):
         return "amplitude of the joint angles (rad)"
 
     def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
-        phase = 2 * np.pi * self.waves * np.arange(1, self.joints + 1) / (self.joints + 1)
+        phase = (
+            2 * np.pi * self.waves * np.arange(1, self.joints + 1) / (self.joints + 1)
+        )
         return np.cos(phase)[:, None], -np.sin(phase)[:, None]
 
     def wavelength(self, amplitudes: ArrayLike | None = None) -> np.ndarray:
@@ -71,7 +80,11 @@ class Wave(Series):
         return 2 / np.pi * self._sizes(amplitudes) * (self.joints + 1) / abs(self.waves)
 
     def _sizes(self, amplitudes) -> np.ndarray:
-        return np.abs(real_array("amplitudes", self.amplitude if amplitudes is None else amplitudes))
+        return np.abs(
+            real_array(
+                "amplitudes", self.amplitude if amplitudes is None else amplitudes
+            )
+        )
 
     @classmethod
     def examples(cls) -> dict[str, Wave]:
@@ -89,12 +102,16 @@ def arc_to_phase(u: np.ndarray, slope: np.ndarray) -> np.ndarray:
 
     m = slope**2 / (1 + slope**2)
     length = u / (2 * np.pi) * (4 * ellipe(m))
-    p = np.array(np.broadcast_to(u, np.broadcast_shapes(u.shape, np.shape(slope))), float)
+    p = np.array(
+        np.broadcast_to(u, np.broadcast_shapes(u.shape, np.shape(slope))), float
+    )
     for _ in range(50):
         sin = np.sin(p)
         D2 = 1 - m * sin * sin
         newton = (ellipeinc(p, m) - length) / np.sqrt(D2)
-        step = np.clip(newton / (1 + 0.5 * newton * m * sin * np.cos(p) / D2), -0.5, 0.5)
+        step = np.clip(
+            newton / (1 + 0.5 * newton * m * sin * np.cos(p) / D2), -0.5, 0.5
+        )
         p -= step
         if np.abs(step).max() < 1e-6:
             break
@@ -121,18 +138,36 @@ class Sine(Gait):
     kind = "sine"
 
     amplitude: Annotated[
-        float, Number(-10, 10, "-", "A / lambda, the sine's amplitude over its wavelength, 0 to 10")
+        float,
+        Number(
+            -10,
+            10,
+            "-",
+            "A / lambda, the sine's amplitude over its wavelength, 0 to 10",
+        ),
     ] = 0.2
-    waves: Annotated[float, Number(0, 500, "-", "wavelengths of arc on the body, > 0 and at most elements / 4")] = 1.0
-    elements: Annotated[int, Number(3, 2000, "-", "as many as the body has", whole=True)] = 100
+    waves: Annotated[
+        float,
+        Number(
+            0, 500, "-", "wavelengths of arc on the body, > 0 and at most elements / 4"
+        ),
+    ] = 1.0
+    elements: Annotated[
+        int, Number(3, 2000, "-", "as many as the body has", whole=True)
+    ] = 100
 
     def __post_init__(self):
         super().__post_init__()
         if self.centre:
-            raise Refusal("a sine wave takes no centre", because="it undulates about the straight body")
+            raise Refusal(
+                "a sine wave takes no centre",
+                because="it undulates about the straight body",
+            )
         in_range("waves", self.waves, 0, self.elements / 4)
         if not self.waves > 0:
-            raise Refusal("waves must be > 0 and at most elements / 4", value=self.waves)
+            raise Refusal(
+                "waves must be > 0 and at most elements / 4", value=self.waves
+            )
 
     @property
     def joints(self) -> int:
@@ -143,9 +178,13 @@ class Sine(Gait):
         return r"amplitude over wavelength $A/\lambda$"
 
     def _slopes(self, amplitudes) -> np.ndarray:
-        a = real_array("amplitudes", self.amplitude if amplitudes is None else amplitudes)
+        a = real_array(
+            "amplitudes", self.amplitude if amplitudes is None else amplitudes
+        )
         if not (np.abs(a) <= 10).all():
-            raise Refusal(f"amplitudes (A / lambda) must lie from -10 to 10, got {a.ravel()[:4]}")
+            raise Refusal(
+                f"amplitudes (A / lambda) must lie from -10 to 10, got {a.ravel()[:4]}"
+            )
         return 2 * np.pi * a
 
     def _headings(self, t, amplitudes):
@@ -158,7 +197,9 @@ class Sine(Gait):
         p = arc_to_phase(2 * np.pi * self.waves * s + t[..., None], slope)
         rise = slope * np.cos(p)
         m = slope**2 / (1 + slope**2)
-        speed = np.sqrt(1 + slope**2) * 4 * ellipe(m) / (2 * np.pi) / np.sqrt(1 + rise**2)  # dp/du
+        speed = (
+            np.sqrt(1 + slope**2) * 4 * ellipe(m) / (2 * np.pi) / np.sqrt(1 + rise**2)
+        )  # dp/du
         return np.arctan(rise), -slope * np.sin(p) / (1 + rise**2) * speed
 
     def headings(self, t: ArrayLike, amplitudes: ArrayLike | None = None) -> np.ndarray:
@@ -172,8 +213,12 @@ class Sine(Gait):
         return self._shape_and_rate(t, amplitudes)[1]
 
     def _shape_and_rate(self, t, amplitudes) -> tuple[np.ndarray, np.ndarray]:
-        headings, rates = self._headings(t, amplitudes)  # which takes as long as to solve for the body's motion
-        return np.diff(headings, axis=-1), np.diff(rates, axis=-1) * (-1.0 if self.reverse else 1.0)
+        headings, rates = self._headings(
+            t, amplitudes
+        )  # which takes as long as to solve for the body's motion
+        return np.diff(headings, axis=-1), np.diff(rates, axis=-1) * (
+            -1.0 if self.reverse else 1.0
+        )
 
     def largest(self, amplitudes: ArrayLike | None = None) -> float:
         """Return an upper bound of the joint angles, rad: headings stay between -pi/2 and pi/2."""
@@ -190,7 +235,9 @@ class Sine(Gait):
         from scipy.special import ellipe
 
         slope = self._slopes(amplitudes)
-        arc = np.sqrt(1 + slope**2) * 4 * ellipe(slope**2 / (1 + slope**2)) / (2 * np.pi)  # of a wave of unit length
+        arc = (
+            np.sqrt(1 + slope**2) * 4 * ellipe(slope**2 / (1 + slope**2)) / (2 * np.pi)
+        )  # of a wave of unit length
         return 1 / (self.waves * arc)
 
     def relative_curvature(self, amplitudes: ArrayLike | None = None) -> np.ndarray:

@@ -96,12 +96,16 @@ class Connection:
 
     def velocity(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
         """Return xi = A(alpha) alphadot, (..., 3)."""
-        return np.einsum("...ij,...j->...i", self(alpha), real_array("alphadot", alphadot))
+        return np.einsum(
+            "...ij,...j->...i", self(alpha), real_array("alphadot", alphadot)
+        )
 
     def half(self, first: int) -> Connection:
         """Return the connection on every second point of each axis from ``first``, and on both ends
         (`field.half_grid`)."""
-        axes, arrays, degree = half_grid(self.axes, (self.A, self.residual, self.speed), self.degree, first)
+        axes, arrays, degree = half_grid(
+            self.axes, (self.A, self.residual, self.speed), self.degree, first
+        )
         return Connection(axes, *arrays, degree, **self.size)
 
 
@@ -118,14 +122,18 @@ def grid(joints: int, points: int = 31, extent: float = 2.5) -> tuple[np.ndarray
     in_range("grid", points, 4, 1e6, whole=True)
     in_range("extent", extent, 1e-9, 1e6)
     axis = np.linspace(-extent, extent, int(points))
-    return ((axis - axis[::-1]) / 2,) * int(joints)  # symmetric to the last digit, for `fit`'s mirror
+    return ((axis - axis[::-1]) / 2,) * int(
+        joints
+    )  # symmetric to the last digit, for `fit`'s mirror
 
 
 def check_fit_options(degree: object, progress: object) -> None:
     """Raise Refusal for no degree of a spline, or for progress that is no function of the fraction done."""
     in_range("degree", degree, 1, 5, whole=True)
     if not (progress is None or callable(progress)):
-        raise Refusal("progress must be a function of the fraction done", value=progress)
+        raise Refusal(
+            "progress must be a function of the fraction done", value=progress
+        )
 
 
 def directions(joints: int, count: int) -> np.ndarray:
@@ -142,9 +150,14 @@ def directions(joints: int, count: int) -> np.ndarray:
            [-0.707,  0.707]])
     """
     in_range("joints", joints, 1, 10_000, whole=True)
-    least = joints if joints <= 2 else 4 * joints  # a scattered set of fewer may nearly miss a direction
+    least = (
+        joints if joints <= 2 else 4 * joints
+    )  # a scattered set of fewer may nearly miss a direction
     if not (is_whole(count) and count >= least):
-        raise Refusal(f"directions must be a whole number of at least {least} for {joints} joints", value=count)
+        raise Refusal(
+            f"directions must be a whole number of at least {least} for {joints} joints",
+            value=count,
+        )
     if joints == 1:
         return np.ones((1, 1))
     if joints == 2:
@@ -152,7 +165,9 @@ def directions(joints: int, count: int) -> np.ndarray:
         return np.stack([np.cos(angle), np.sin(angle)], -1)
     from scipy.special import ndtri
 
-    normal = ndtri(np.stack([_van_der_corput(count, base) for base in _primes(joints)], -1))
+    normal = ndtri(
+        np.stack([_van_der_corput(count, base) for base in _primes(joints)], -1)
+    )
     return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
 
 
@@ -171,7 +186,10 @@ def _primes(count: int) -> list[int]:
     primes: list[int] = []
     number = 2
     while len(primes) < count:
-        if all(number % prime for prime in itertools.takewhile(lambda prime: prime**2 <= number, primes)):
+        if all(
+            number % prime
+            for prime in itertools.takewhile(lambda prime: prime**2 <= number, primes)
+        ):
             primes.append(number)
         number += 1
     return primes
@@ -200,10 +218,14 @@ def sampled(
     """
     for a in axes:
         if a.ndim != 1 or len(a) <= degree or not (np.diff(a) > 0).all():
-            raise Refusal(f"each axis must be more than {degree} ascending angles, got {a}")
+            raise Refusal(
+                f"each axis must be more than {degree} ascending angles, got {a}"
+            )
     alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
     symmetries = images(axes, unit, traits)
-    return sampled_on(velocity, alpha, unit, reduce, progress, symmetries, traits.singularity, map)
+    return sampled_on(
+        velocity, alpha, unit, reduce, progress, symmetries, traits.singularity, map
+    )
 
 
 def sampled_on(
@@ -230,7 +252,9 @@ def sampled_on(
     ((3, 2, 3, 4), (3, 3, 4))
     """
     flat, shape = alpha.reshape(-1, alpha.shape[-1]), alpha.shape[:-1]
-    fields = sampled_at(velocity, flat, unit, reduce, progress, symmetries, singularity is not None, map)
+    fields = sampled_at(
+        velocity, flat, unit, reduce, progress, symmetries, singularity is not None, map
+    )
     fields = [x.reshape(*x.shape[:-1], *shape) for x in fields]
     if singularity is not None:
         mask = sign_changes(singularity(alpha))
@@ -270,7 +294,13 @@ def sampled_at(
     step = max(1, SAMPLES_TOGETHER // len(unit))
     fields: list[np.ndarray] = []
     batches = [to_compute[k : k + step] for k in range(0, len(to_compute), step)]
-    done, results = 0, map(partial(_velocities, (velocity, unit, masked)), [alpha[x, None] for x in batches])
+    done, results = (
+        0,
+        map(
+            partial(_velocities, (velocity, unit, masked)),
+            [alpha[x, None] for x in batches],
+        ),
+    )
     for indices, (xi, *extra) in zip(batches, results):
         if extra:
             velocity.receive(*extra)
@@ -301,7 +331,10 @@ def _velocities(shared: tuple, alpha: np.ndarray) -> tuple[np.ndarray, ...]:
 
 
 def even_part(
-    velocity: Velocity, axes: Sequence[ArrayLike], traits: Traits = NOTHING, map: Map = each
+    velocity: Velocity,
+    axes: Sequence[ArrayLike],
+    traits: Traits = NOTHING,
+    map: Map = each,
 ) -> np.ndarray | None:
     """Return the rms (3, N_1, ..., N_d) over directions of xi(alpha, alphadot) + xi(alpha, -alphadot), |alphadot| = 1.
     A fit from half of the directions takes it for 0. None where it is roundoff at a few shapes that stand for all.
@@ -318,14 +351,23 @@ def even_part(
     rng = np.random.default_rng(0)
     shapes = np.stack([rng.uniform(a[0], a[-1], (EVEN_SHAPES, 1)) for a in axes], -1)
     forwards, backwards = (
-        evaluate(velocity, shapes, sign * unit, masked=traits.singularity is not None) for sign in (1.0, -1.0)
+        evaluate(velocity, shapes, sign * unit, masked=traits.singularity is not None)
+        for sign in (1.0, -1.0)
     )
     if np.nanmax(np.abs(forwards + backwards)) <= EVEN * np.nanmax(np.abs(forwards)):
         return None
-    sum_of_directions = lambda alpha, alphadot: velocity(alpha, alphadot) + velocity(alpha, -alphadot)
+    sum_of_directions = lambda alpha, alphadot: (
+        velocity(alpha, alphadot) + velocity(alpha, -alphadot)
+    )
     singular = Traits(singularity=traits.singularity)  # what is even has no images
     return sampled(
-        sum_of_directions, axes, unit, lambda xi: (np.sqrt((xi**2).mean(1)).T,), 1, traits=singular, map=map
+        sum_of_directions,
+        axes,
+        unit,
+        lambda xi: (np.sqrt((xi**2).mean(1)).T,),
+        1,
+        traits=singular,
+        map=map,
     )[0]
 
 
@@ -342,7 +384,10 @@ def sign_changes(d: np.ndarray) -> np.ndarray:
     """
     mask = d == 0
     for axis in range(d.ndim):
-        low, high = (np.moveaxis(mask, axis, 0)[part] for part in (slice(None, -1), slice(1, None)))
+        low, high = (
+            np.moveaxis(mask, axis, 0)[part]
+            for part in (slice(None, -1), slice(1, None))
+        )
         ordered = np.moveaxis(d, axis, 0)
         changes = ordered[:-1] * ordered[1:] < 0
         low |= changes
@@ -391,12 +436,18 @@ def fit(
     rates = directions(len(axes), count)
     if callable(velocity) and not trusted and all(a.ndim == 1 and a.size for a in axes):
         velocity = checked_velocity(velocity, axes, traits.singularity is not None)
-    fields = sampled(velocity, axes, rates, least_squares(rates), degree, progress, traits, map)
+    fields = sampled(
+        velocity, axes, rates, least_squares(rates), degree, progress, traits, map
+    )
     return Connection(axes, *fields, degree, unit=unit, length=length)
 
 
 def connection_function(
-    velocity: Velocity, joints: int, count: int, degree_one: bool = False, map: Map = each
+    velocity: Velocity,
+    joints: int,
+    count: int,
+    degree_one: bool = False,
+    map: Map = each,
 ) -> Callable:
     """Return the least-squares A (..., 3, d) as a function of shapes (..., d), solved at every call from ``count``
     directions; from d where the velocity is linear in alphadot (``degree_one``).
@@ -416,7 +467,13 @@ def connection_function(
 
     def A(alpha):
         alpha = real_array("alpha", alpha)
-        values = sampled_at(velocity, alpha.reshape(-1, joints), unit, lambda xi: reduce(xi)[:1], map=map)[0]
+        values = sampled_at(
+            velocity,
+            alpha.reshape(-1, joints),
+            unit,
+            lambda xi: reduce(xi)[:1],
+            map=map,
+        )[0]
         return np.moveaxis(values, -1, 0).reshape(*alpha.shape[:-1], 3, joints)
 
     return A

@@ -23,18 +23,24 @@ def frame_velocity(h, hdot) -> np.ndarray:
 
 def change_velocity(xi, h, hdot) -> np.ndarray:
     """Return the body velocity (..., 3) of the frame g h from that of the frame g."""
-    carried = np.einsum("...ij,...j->...i", se2.adjoint(se2.inverse(h)), np.asarray(xi, float))
+    carried = np.einsum(
+        "...ij,...j->...i", se2.adjoint(se2.inverse(h)), np.asarray(xi, float)
+    )
     return carried + frame_velocity(h, hdot)
 
 
 def change_connection(A, h, dh) -> np.ndarray:
     """Return the connection (..., 3, d) of the frame g h. A: (..., 3, d); h: (..., 3); dh = d h / d alpha: (..., 3,
     d)."""
-    columns = [change_velocity(A[..., k], h, dh[..., k]) for k in range(np.shape(A)[-1])]
+    columns = [
+        change_velocity(A[..., k], h, dh[..., k]) for k in range(np.shape(A)[-1])
+    ]
     return np.stack(columns, -1)
 
 
 def in_frame(velocity: Velocity, frame: Callable) -> Velocity:
     """Return the velocity of another frame. frame(alpha, alphadot) -> (h, hdot): the frame's pose in the first, and its
     rate."""
-    return lambda alpha, alphadot: change_velocity(velocity(alpha, alphadot), *frame(alpha, alphadot))
+    return lambda alpha, alphadot: change_velocity(
+        velocity(alpha, alphadot), *frame(alpha, alphadot)
+    )

@@ -25,10 +25,21 @@ from rft.refusal import Refusal, formatted
 def _checked(connection, i, j) -> None:
     """Raise Refusal for no connection, or for no two of its joints."""
     if not isinstance(connection, Connection):
-        raise Refusal("a CCF is that of a Connection, such as connection.fit gives", value=connection)
+        raise Refusal(
+            "a CCF is that of a Connection, such as connection.fit gives",
+            value=connection,
+        )
     joints = connection.field.joints
-    if not (is_whole(i) and is_whole(j) and i != j and 0 <= min(i, j) and max(i, j) < max(joints, 2)):
-        raise Refusal(f"i and j must be two of the joints 0 to {joints - 1}, got {formatted(i)} and {formatted(j)}")
+    if not (
+        is_whole(i)
+        and is_whole(j)
+        and i != j
+        and 0 <= min(i, j)
+        and max(i, j) < max(joints, 2)
+    ):
+        raise Refusal(
+            f"i and j must be two of the joints 0 to {joints - 1}, got {formatted(i)} and {formatted(j)}"
+        )
 
 
 def exterior_derivative(connection: Connection, i: int = 0, j: int = 1) -> np.ndarray:
@@ -80,10 +91,22 @@ def ccf(connection: Connection, i: int = 0, j: int = 1) -> Field:
     """
     _checked(connection, i, j)
     if connection.field.joints < 2:
-        raise Refusal("a CCF needs at least two joints", because="a loop of one joint encloses no area")
+        raise Refusal(
+            "a CCF needs at least two joints",
+            because="a loop of one joint encloses no area",
+        )
     if isinstance(connection, Tube) and connection.field.joints == 2:
-        taylor_ccf = connection.taylor.ccf if (i, j) == (0, 1) else lambda shapes: -connection.taylor.ccf(shapes)
-        return Field(connection.axes, connection.at_grid(taylor_ccf), connection.degree, **connection.size)
+        taylor_ccf = (
+            connection.taylor.ccf
+            if (i, j) == (0, 1)
+            else lambda shapes: -connection.taylor.ccf(shapes)
+        )
+        return Field(
+            connection.axes,
+            connection.at_grid(taylor_ccf),
+            connection.degree,
+            **connection.size,
+        )
     values = exterior_derivative(connection, i, j) + lie_bracket(connection, i, j)
     return Field(connection.axes, values, connection.degree, **connection.size)
 
@@ -113,9 +136,14 @@ def error(connection: Connection, i: int = 0, j: int = 1) -> Field:
     if full.masked:
         return _masked_error(connection, full, i, j)
     shapes = np.stack(np.meshgrid(*connection.axes, indexing="ij"), -1)
-    halves = (np.moveaxis(ccf(connection.half(first), i, j)(shapes), -1, 0) for first in (0, 1))
+    halves = (
+        np.moveaxis(ccf(connection.half(first), i, j)(shapes), -1, 0)
+        for first in (0, 1)
+    )
     difference = np.maximum(*(np.abs(half - full.values) for half in halves))
-    return replace(full, values=maximum_filter(difference, (1, *(3,) * len(connection.axes))))
+    return replace(
+        full, values=maximum_filter(difference, (1, *(3,) * len(connection.axes)))
+    )
 
 
 def _masked_error(connection: Connection, full: Field, i: int, j: int) -> Field:
@@ -126,7 +154,9 @@ def _masked_error(connection: Connection, full: Field, i: int, j: int) -> Field:
     difference = np.zeros(full.values.shape)
     for first in (0, 1):
         picks = (..., *np.ix_(*(every_second(axis, first) for axis in connection.axes)))
-        half_difference = np.abs(ccf(connection.half(first), i, j).values - full.values[picks])
+        half_difference = np.abs(
+            ccf(connection.half(first), i, j).values - full.values[picks]
+        )
         difference[picks] = np.fmax(difference[picks], half_difference)
     worst = maximum_filter(difference, (1, *(3,) * len(connection.axes)))
     return replace(full, values=np.where(np.isnan(full.values), np.nan, worst))

@@ -53,13 +53,18 @@ class Family:
     @cached_property
     def heading(self) -> np.ndarray:
         """Heading (M, N) of the body in the family's frame, rad; of zero mean over each curve from phase 0 to 2 pi."""
-        return turning(self.xi) + self.xi[..., 2].mean(-1, keepdims=True) * (self.phases - np.pi)
+        return turning(self.xi) + self.xi[..., 2].mean(-1, keepdims=True) * (
+            self.phases - np.pi
+        )
 
     @cached_property
     def A(self) -> np.ndarray:
         """A_t in the family's frame, (M, N, 3), with the net turn spread evenly along each curve."""
         x, y = se2.rotated(self.heading, self.xi[..., 0], self.xi[..., 1])
-        return np.stack([x, y, np.broadcast_to(self.xi[..., 2].mean(-1, keepdims=True), x.shape)], -1)
+        return np.stack(
+            [x, y, np.broadcast_to(self.xi[..., 2].mean(-1, keepdims=True), x.shape)],
+            -1,
+        )
 
     def _sides(self, values: np.ndarray):
         """Yield (sign, nodes, spline through values (M, ...) in |amplitude|) on each side of 0 that has curves."""
@@ -68,19 +73,34 @@ class Family:
         for sign in (-1, 1):
             nodes = np.flatnonzero(sign * self.amplitudes >= 0)[::sign]
             if len(nodes) > 1:
-                yield sign, nodes, make_interp_spline(np.abs(self.amplitudes[nodes]), values[nodes], 3)
+                yield (
+                    sign,
+                    nodes,
+                    make_interp_spline(
+                        np.abs(self.amplitudes[nodes]), values[nodes], 3
+                    ),
+                )
 
     def ccf(self) -> tuple[np.ndarray, np.ndarray]:
         """Return (alpha (M, N, 2), CCF (M, N, 3)) per rad^2 of shape space for a two-joint family, nan where its curves
         fold; for maps. Its sign is that of `curvature.ccf`: positive for counter-clockwise loops."""
         t = self.phases
-        unit, rate = self.gait.shape(t, [1.0])[0] - self.gait.shape(t, [0.0])[0], self.gait.rate(t, [1.0])[0]
-        jacobian = self.amplitudes[:, None] * (unit[:, 0] * rate[:, 1] - unit[:, 1] * rate[:, 0])
+        unit, rate = (
+            self.gait.shape(t, [1.0])[0] - self.gait.shape(t, [0.0])[0],
+            self.gait.rate(t, [1.0])[0],
+        )
+        jacobian = self.amplitudes[:, None] * (
+            unit[:, 0] * rate[:, 1] - unit[:, 1] * rate[:, 0]
+        )
         density = np.zeros_like(self.A)
         for sign, nodes, spline in self._sides(self.A):
             density[nodes] = sign * spline.derivative()(np.abs(self.amplitudes[nodes]))
         small = np.abs(jacobian) < 1e-6 * np.abs(jacobian).max()
-        values = np.where(small[..., None], np.nan, density / np.where(small, 1.0, jacobian)[..., None])
+        values = np.where(
+            small[..., None],
+            np.nan,
+            density / np.where(small, 1.0, jacobian)[..., None],
+        )
         return self.gait.shape(t, self.amplitudes), values
 
     def area(self, amplitudes) -> np.ndarray:
@@ -89,10 +109,14 @@ class Family:
         a = real_array("amplitudes", amplitudes)
         low, high = self.amplitudes[[0, -1]]
         if not ((a >= low * (1 + 1e-12)) & (a <= high * (1 + 1e-12))).all():
-            raise Refusal(f"amplitudes must lie from {low:g} to the family's {high:g}, got {a.ravel()[:4]}")
+            raise Refusal(
+                f"amplitudes must lie from {low:g} to the family's {high:g}, got {a.ravel()[:4]}"
+            )
         moved, start = displacement(self.xi), self.heading[:, 0]
         integral = np.zeros((*a.shape, 4))
-        for sign, _, spline in self._sides(np.stack([*se2.rotated(start, *moved.T[:2]), moved[:, 2], start], -1)):
+        for sign, _, spline in self._sides(
+            np.stack([*se2.rotated(start, *moved.T[:2]), moved[:, 2], start], -1)
+        ):
             integral[sign * a > 0] = spline(np.abs(a[sign * a > 0]))
         x, y, turn, start = np.moveaxis(integral, -1, 0)
         return np.stack([*se2.rotated(-start, x, y), turn], -1)
@@ -121,7 +145,10 @@ def fit(
     in_range("curves", count, 4, 1e6, whole=True)
     in_range("phases", phases, 4, 1e9, whole=True)
     count, phases = int(count), int(phases)
-    below, above = (x * np.arange(1, count + 1) / count if x else np.zeros(0) for x in (least, largest))
+    below, above = (
+        x * np.arange(1, count + 1) / count if x else np.zeros(0)
+        for x in (least, largest)
+    )
     amplitudes = np.concatenate([below[::-1], [0.0], above])
     xi, moving = np.zeros((len(amplitudes), phases, 3)), np.flatnonzero(amplitudes)
     step = max(1, SAMPLES_TOGETHER // phases)

@@ -41,9 +41,13 @@ class Field:
         in_range("degree", self.degree, 0, 5, whole=True)
         shape = tuple(len(a) for a in self.axes)
         if self.values.shape[-len(shape) :] != shape:
-            raise Refusal(f"values {self.values.shape} do not end in the grid's shape {shape}")
+            raise Refusal(
+                f"values {self.values.shape} do not end in the grid's shape {shape}"
+            )
         if min(shape) <= self.degree:
-            raise Refusal(f"a spline of degree {self.degree} needs more than that many grid points, got {shape}")
+            raise Refusal(
+                f"a spline of degree {self.degree} needs more than that many grid points, got {shape}"
+            )
 
     def __repr__(self) -> str:
         lead = self.values.shape[: -self.joints]
@@ -83,7 +87,9 @@ class Field:
         in_range("axis", axis, 0, self.joints - 1, whole=True)
         if self.masked:
             return self._between_masks(axis)
-        return np.moveaxis(self._along(axis).derivative()(self.axes[axis]), 0, axis - self.joints)
+        return np.moveaxis(
+            self._along(axis).derivative()(self.axes[axis]), 0, axis - self.joints
+        )
 
     @property
     def masked(self) -> bool:
@@ -95,15 +101,22 @@ class Field:
         from scipy.interpolate import make_interp_spline
 
         x, out = self.axes[axis], np.full(self.values.shape, np.nan)
-        rows, slopes = (np.moveaxis(a, axis - self.joints, -1) for a in (self.values, out))
+        rows, slopes = (
+            np.moveaxis(a, axis - self.joints, -1) for a in (self.values, out)
+        )
         lead = rows.ndim - self.joints
         for place in np.ndindex(rows.shape[lead:-1]):
-            row, slope = rows[(slice(None),) * lead + place], slopes[(slice(None),) * lead + place]
+            row, slope = (
+                rows[(slice(None),) * lead + place],
+                slopes[(slice(None),) * lead + place],
+            )
             good = np.flatnonzero(np.isfinite(row).all(tuple(range(lead))))
             for run in np.split(good, np.flatnonzero(np.diff(good) > 1) + 1):
                 if len(run) > 1:
                     degree = min(self.degree, len(run) - 1)
-                    slope[..., run] = make_interp_spline(x[run], row[..., run], degree, axis=-1).derivative()(x[run])
+                    slope[..., run] = make_interp_spline(
+                        x[run], row[..., run], degree, axis=-1
+                    ).derivative()(x[run])
         return out
 
     @cached_property
@@ -124,7 +137,8 @@ class Field:
     def _refuse_masks(self) -> None:
         if self.masked:
             raise Refusal(
-                "a field with singular shapes is not looked up between its points", instead="use the direct tier"
+                "a field with singular shapes is not looked up between its points",
+                instead="use the direct tier",
             )
 
     def inside(self, alpha: ArrayLike) -> np.ndarray:
@@ -139,7 +153,9 @@ def as_axes(axes: Sequence[ArrayLike]) -> tuple[np.ndarray, ...]:
     except TypeError:
         arrays = ()
     if not arrays or any(a.ndim != 1 for a in arrays):
-        raise Refusal("axes must be rows of ascending angles, one for each joint", value=axes)
+        raise Refusal(
+            "axes must be rows of ascending angles, one for each joint", value=axes
+        )
     return arrays
 
 
@@ -148,9 +164,14 @@ def inside(axes, alpha, names: Sequence[str] = ()) -> np.ndarray:
     ``names`` where given."""
     alpha = real_array("alpha", alpha)
     if alpha.ndim == 0 or alpha.shape[-1] != len(axes) or not np.isfinite(alpha).all():
-        raise Refusal(f"alpha must be finite and of shape (..., {len(axes)})", value=alpha.shape)
+        raise Refusal(
+            f"alpha must be finite and of shape (..., {len(axes)})", value=alpha.shape
+        )
     for k, axis in enumerate(axes):
-        low, high = alpha[..., k].min(initial=np.inf), alpha[..., k].max(initial=-np.inf)
+        low, high = (
+            alpha[..., k].min(initial=np.inf),
+            alpha[..., k].max(initial=-np.inf),
+        )
         slack = 1e-9 * (axis[-1] - axis[0])
         if low < axis[0] - slack or high > axis[-1] + slack:
             worst = low if axis[0] - low > high - axis[-1] else high
@@ -175,7 +196,11 @@ def half_grid(
     that leaves too few points for the spline."""
     picks = [every_second(axis, first) for axis in axes]
     coarse = tuple(axis[pick] for axis, pick in zip(axes, picks))
-    return coarse, [x[(..., *np.ix_(*picks))] for x in arrays], min(degree, min(map(len, picks)) - 1)
+    return (
+        coarse,
+        [x[(..., *np.ix_(*picks))] for x in arrays],
+        min(degree, min(map(len, picks)) - 1),
+    )
 
 
 def _tensor_spline(field: Field, integrate: int | None = None):

@@ -86,13 +86,21 @@ class Gait:
 
     def shape(self, t: ArrayLike, amplitudes: ArrayLike | None = None) -> np.ndarray:
         """Return alpha at phases t (T...), for amplitudes (B...) or the gait's own: (B..., T..., joints), rad."""
-        return self.middle + self._times(amplitudes, self.unit((-1.0 if self.reverse else 1.0) * real_array("t", t)))
+        return self.middle + self._times(
+            amplitudes, self.unit((-1.0 if self.reverse else 1.0) * real_array("t", t))
+        )
 
     def largest(self, amplitudes: ArrayLike | None = None) -> float:
         """Return the largest of its shape variables in size, at 32 phases, for amplitudes (B...) or the gait's own."""
-        a = real_array("amplitudes", self.amplitude if amplitudes is None else amplitudes).ravel()
-        ends = a[[a.argmin(), a.argmax()]] if a.size else a  # between them no shape is further from the middle
-        return float(np.abs(self.shape(np.linspace(0.0, 2 * np.pi, 32), ends)).max(initial=0.0))
+        a = real_array(
+            "amplitudes", self.amplitude if amplitudes is None else amplitudes
+        ).ravel()
+        ends = (
+            a[[a.argmin(), a.argmax()]] if a.size else a
+        )  # between them no shape is further from the middle
+        return float(
+            np.abs(self.shape(np.linspace(0.0, 2 * np.pi, 32), ends)).max(initial=0.0)
+        )
 
     def rate(self, t: ArrayLike, amplitudes: ArrayLike | None = None) -> np.ndarray:
         """Return d alpha / dt, shaped like `shape`."""
@@ -100,16 +108,25 @@ class Gait:
         return self._times(amplitudes, sign * self.unit_rate(sign * real_array("t", t)))
 
     def _times(self, amplitudes, curve):
-        a = real_array("amplitudes", self.amplitude if amplitudes is None else amplitudes)
+        a = real_array(
+            "amplitudes", self.amplitude if amplitudes is None else amplitudes
+        )
         if not (np.abs(a) <= LARGEST).all():
-            raise Refusal(f"amplitudes must be finite and at most {LARGEST:g}, got {a.ravel()[:4]}")
+            raise Refusal(
+                f"amplitudes must be finite and at most {LARGEST:g}, got {a.ravel()[:4]}"
+            )
         return a[(..., *([None] * curve.ndim))] * curve
 
-    def cycle(self, phases: int, amplitudes: ArrayLike | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def cycle(
+        self, phases: int, amplitudes: ArrayLike | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return (alpha, alphadot) at ``phases`` equally spaced phases from 0, each (B..., phases, joints)."""
         least = max(4, 2 * self.harmonics + 1)
         if not (is_whole(phases) and phases >= least):
-            raise Refusal(f"phases must be a whole number of at least {least} for this gait", value=phases)
+            raise Refusal(
+                f"phases must be a whole number of at least {least} for this gait",
+                value=phases,
+            )
         t = 2 * np.pi * np.arange(phases) / phases
         return self._shape_and_rate(t, amplitudes)
 
@@ -124,12 +141,16 @@ def finite_array(name: str, values: Sequence, ndim: int) -> np.ndarray:
     """Return values as a float array of ``ndim`` dimensions; Refusal by ``name`` if they are none."""
     array = real_array(name, values)
     if array.ndim != ndim or not array.size or not (np.abs(array) <= LARGEST).all():
-        raise Refusal(f"{name} must be {ndim}-dimensional, finite and not empty", value=values)
+        raise Refusal(
+            f"{name} must be {ndim}-dimensional, finite and not empty", value=values
+        )
     return array
 
 
 def checked_gait(gait) -> Gait:
     """Return the gait; Refusal if it is none."""
-    if isinstance(gait, type) or not (hasattr(gait, "joints") and hasattr(gait, "cycle")):
+    if isinstance(gait, type) or not (
+        hasattr(gait, "joints") and hasattr(gait, "cycle")
+    ):
         raise Refusal("gait must be a gait such as Circle(amplitude=0.5)", value=gait)
     return gait

@@ -56,25 +56,39 @@ class Harmonics:
     @property
     def highest(self) -> int:
         count, d = self.coefficients.shape[1], len(self.axes)
-        return count - 1 if d == 2 else next(k for k in range(1, count + 1) if terms(d, k) == count)
+        return (
+            count - 1
+            if d == 2
+            else next(k for k in range(1, count + 1) if terms(d, k) == count)
+        )
 
     def half(self, first: int) -> Harmonics:
         """Return the harmonics on half of the grid, as `Connection.half` does."""
-        axes, arrays, degree = half_grid(self.axes, (self.coefficients, self.residual), self.degree, first)
+        axes, arrays, degree = half_grid(
+            self.axes, (self.coefficients, self.residual), self.degree, first
+        )
         return Harmonics(axes, *arrays, degree)
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
         """Return xi (..., 3) at alpha, alphadot (..., d); ValueError outside the grid."""
-        alpha, alphadot = np.broadcast_arrays(self.field.inside(alpha), real_array("alphadot", alphadot))
+        alpha, alphadot = np.broadcast_arrays(
+            self.field.inside(alpha), real_array("alphadot", alphadot)
+        )
         points = [x.reshape(-1, len(self.axes)) for x in (alpha, alphadot)]
         step = max(1, VALUES_TOGETHER // self.coefficients.shape[1])
-        parts = [self._velocity(*(x[k : k + step] for x in points)) for k in range(0, len(points[0]), step)]
+        parts = [
+            self._velocity(*(x[k : k + step] for x in points))
+            for k in range(0, len(points[0]), step)
+        ]
         return np.concatenate(parts or [np.zeros((0, 3))]).reshape(*alpha.shape[:-1], 3)
 
     def _velocity(self, alpha, alphadot) -> np.ndarray:
         speed = np.linalg.norm(alphadot, axis=-1)
         unit = alphadot / np.where(speed > 0, speed, 1.0)[..., None]
-        return np.einsum("...ij,...j->...i", self.field(alpha), basis(unit, self.highest)) * speed[..., None]
+        return (
+            np.einsum("...ij,...j->...i", self.field(alpha), basis(unit, self.highest))
+            * speed[..., None]
+        )
 
 
 def terms(joints: int, highest: int) -> int:
@@ -88,7 +102,12 @@ def powers(joints: int, degree: int) -> tuple[np.ndarray, np.ndarray]:
     bars = np.array(list(combinations(range(degree + joints - 1), joints - 1)))
     ends = np.full((len(bars), 1), degree + joints - 1)
     exponents = np.diff(np.concatenate([-np.ones_like(ends), bars, ends], 1)) - 1
-    return exponents, np.array([np.sqrt(factorial(degree) / prod(map(factorial, map(int, row)))) for row in exponents])
+    return exponents, np.array(
+        [
+            np.sqrt(factorial(degree) / prod(map(factorial, map(int, row))))
+            for row in exponents
+        ]
+    )
 
 
 def basis(unit: np.ndarray, highest: int) -> np.ndarray:
@@ -96,14 +115,19 @@ def basis(unit: np.ndarray, highest: int) -> np.ndarray:
     if unit.shape[-1] == 2:
         return _basis(np.arctan2(unit[..., 1], unit[..., 0]), highest)
     exponents, roots = powers(unit.shape[-1], highest)
-    powers_of_unit = np.cumprod(np.concatenate([np.ones((1, *unit.shape)), np.repeat(unit[None], highest, 0)]), 0)
+    powers_of_unit = np.cumprod(
+        np.concatenate([np.ones((1, *unit.shape)), np.repeat(unit[None], highest, 0)]),
+        0,
+    )
     products = (
         roots * powers_of_unit[exponents[:, 0], ..., 0].T
         if unit.ndim == 1
         else roots * np.moveaxis(powers_of_unit[exponents[:, 0], ..., 0], 0, -1)
     )
     for k in range(1, unit.shape[-1]):
-        products = products * np.moveaxis(powers_of_unit[exponents[:, k], ..., k], 0, -1)
+        products = products * np.moveaxis(
+            powers_of_unit[exponents[:, k], ..., k], 0, -1
+        )
     return products
 
 
@@ -134,7 +158,10 @@ def fit(
     """
     in_range("directions", count, 2, 1e6, whole=True)
     if not is_whole(highest) or highest % 2 == 0 or not 1 <= highest < count:
-        raise Refusal(f"harmonics must be odd and below the number of directions ({count})", value=highest)
+        raise Refusal(
+            f"harmonics must be odd and below the number of directions ({count})",
+            value=highest,
+        )
     axes = as_axes(axes)
     check_fit_options(degree, progress)
     d = len(axes)
@@ -146,7 +173,9 @@ def fit(
         )
     unit = directions(d, count)
     sampled_basis = basis(unit, highest)
-    inverse = sampled_basis.T * (2.0 / count) if d == 2 else np.linalg.pinv(sampled_basis)
+    inverse = (
+        sampled_basis.T * (2.0 / count) if d == 2 else np.linalg.pinv(sampled_basis)
+    )
     residual_scale = (
         1.0 if d == 2 else count / max(1, count - sampled_basis.shape[1])
     )  # what the fit leaves of directions that it has not seen

@@ -18,9 +18,7 @@ import numpy as np
 from geomech.geometry.gait import Gait
 from geomech.geometry.traits import Traits
 
-SAME = (
-    1e-12  # difference of two directions that are one, and, over the largest of a gait, of two of its shapes or rates
-)
+SAME = 1e-12  # difference of two directions that are one, and, over the largest of a gait, of two of its shapes or rates
 FEW = 1024  # phases, at least, from which `solved_count` tells the symmetries of a gait
 
 
@@ -46,7 +44,13 @@ def images(axes: Sequence[np.ndarray], unit: np.ndarray, traits: Traits) -> list
     backwards = axes[::-1]
     moves = (
         (mirror, [-a[::-1] for a in axes], np.flip(index), -unit, (1.0, -1.0, -1.0)),
-        (reversible, [-a[::-1] for a in backwards], np.flip(index).T, -unit[:, ::-1], (-1.0, -1.0, 1.0)),
+        (
+            reversible,
+            [-a[::-1] for a in backwards],
+            np.flip(index).T,
+            -unit[:, ::-1],
+            (-1.0, -1.0, 1.0),
+        ),
         (mirror and reversible, backwards, index.T, unit[:, ::-1], (-1.0, 1.0, -1.0)),
     )
     result = []
@@ -64,15 +68,23 @@ def mirrored(alpha: np.ndarray, count: int) -> list[Image]:
     directions; [] if they are not."""
     if not np.array_equal(alpha, -alpha[::-1]):
         return []
-    return [Image(np.arange(len(alpha))[::-1], np.arange(count), np.array([[-1.0, 1.0, 1.0]]))]
+    return [
+        Image(
+            np.arange(len(alpha))[::-1], np.arange(count), np.array([[-1.0, 1.0, 1.0]])
+        )
+    ]
 
 
-def _matched(unit: np.ndarray, image_unit: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+def _matched(
+    unit: np.ndarray, image_unit: np.ndarray
+) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return [(source, sign (C, 1))] with unit = sign turned[source], or [] if the turned directions are others."""
     products = unit @ image_unit.T
     source = np.abs(products).argmax(1)
     sign = np.sign(np.take_along_axis(products, source[:, None], 1))
-    good = np.abs(unit - sign * image_unit[source]).max() < SAME and np.unique(source).size == len(source)
+    good = np.abs(unit - sign * image_unit[source]).max() < SAME and np.unique(
+        source
+    ).size == len(source)
     return [(source, sign)] if good else []
 
 
@@ -103,17 +115,24 @@ class CycleImages(NamedTuple):
         return self.factor * xi[..., self.source, :]
 
 
-def cycle_images(alpha: np.ndarray, alphadot: np.ndarray, traits: Traits) -> CycleImages:
+def cycle_images(
+    alpha: np.ndarray, alphadot: np.ndarray, traits: Traits
+) -> CycleImages:
     """Return the symmetries that cycles (..., N, d) have in common, for a body whose left and right
     (``traits.halved``), head and tail (``traits.reversible``) are alike."""
     phases, joints = alpha.shape[-2:]
     if not (traits.halved or traits.reversible):
         return _cycle_images(phases, False, ())
     sizes = [np.abs(x).max((-2, -1), keepdims=True) for x in (alpha, alphadot)]
-    scaled = [x / np.where(size > 0, size, 1.0) for x, size in zip((alpha, alphadot), sizes)]
+    scaled = [
+        x / np.where(size > 0, size, 1.0) for x, size in zip((alpha, alphadot), sizes)
+    ]
     path = np.concatenate(scaled, -1).reshape(-1, phases, 2 * joints)
     moving = sizes[1].argmax() if len(path) else 0
-    return _cycle_images(phases, *_symmetries(lambda k: path.take(k, 1, mode="wrap"), phases, 1, moving, traits))
+    return _cycle_images(
+        phases,
+        *_symmetries(lambda k: path.take(k, 1, mode="wrap"), phases, 1, moving, traits),
+    )
 
 
 def solved_count(gait: Gait, phases: int, traits: Traits) -> int:
@@ -125,26 +144,39 @@ def solved_count(gait: Gait, phases: int, traits: Traits) -> int:
     if step < 2:
         return cycle_images(*gait.cycle(phases, a), traits).count
     t = lambda k: 2 * np.pi * (k % phases) / phases
-    sizes = [np.abs(curve(t(np.arange(0, phases, step)), a)).max() or 1.0 for curve in (gait.shape, gait.rate)]
-    path = lambda k: np.concatenate([gait.shape(t(k), a) / sizes[0], gait.rate(t(k), a) / sizes[1]], -1)[None]
+    sizes = [
+        np.abs(curve(t(np.arange(0, phases, step)), a)).max() or 1.0
+        for curve in (gait.shape, gait.rate)
+    ]
+    path = lambda k: np.concatenate(
+        [gait.shape(t(k), a) / sizes[0], gait.rate(t(k), a) / sizes[1]], -1
+    )[None]
     return _orbits(phases, *_symmetries(path, phases, step, 0, traits))
 
 
-def _symmetries(path: Callable, phases: int, step: int, moving: int, traits: Traits) -> tuple[bool, tuple]:
+def _symmetries(
+    path: Callable, phases: int, step: int, moving: int, traits: Traits
+) -> tuple[bool, tuple]:
     """Return (shifted, turned), arguments of `_cycle_images`, of cycles path(k) (B, n, 2 d), shapes and rates at phases
     k (n,), from every ``step``-th of N phases. moving: a cycle that is not at rest."""
     mirror, sampled = traits.halved, np.arange(0, phases, step)
     samples = path(sampled)
     joints = samples.shape[-1] // 2
     same = lambda x, y: not x.size or bool(max((d := x - y).max(), -d.min()) <= SAME)
-    nearest = lambda k, x: k[np.einsum("kj,kj->k", d := path(k)[moving] - x, d).argmin()]
+    nearest = lambda k, x: k[
+        np.einsum("kj,kj->k", d := path(k)[moving] - x, d).argmin()
+    ]
     shifted = mirror and phases % 2 == 0 and same(path(sampled + phases // 2), -samples)
     # Where the halves are images of each other, one sign follows from the other.
     signs = (-1.0, 1.0) if mirror and not shifted else (-1.0,)
     for sign in signs if traits.reversible and len(samples) else ():
-        image = sign * np.concatenate([samples[..., joints - 1 :: -1], -samples[..., : joints - 1 : -1]], -1)
+        image = sign * np.concatenate(
+            [samples[..., joints - 1 :: -1], -samples[..., : joints - 1 : -1]], -1
+        )
         closest = nearest(sampled, image[moving, 0])
-        first = int(nearest(closest + np.arange(1 - step, step), image[moving, 0])) % phases
+        first = (
+            int(nearest(closest + np.arange(1 - step, step), image[moving, 0])) % phases
+        )
         if same(path(first - sampled), image):
             return shifted, (first, sign)
     return shifted, ()

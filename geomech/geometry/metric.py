@@ -53,7 +53,9 @@ class Metric:
     def norm(self, alpha, alphadot) -> np.ndarray:
         """Return F (...,) at alpha, alphadot (..., d); ValueError outside the grid."""
         alphadot = real_array("alphadot", alphadot)
-        square = np.einsum("...i,...ij,...j->...", alphadot, self.field(alpha), alphadot)
+        square = np.einsum(
+            "...i,...ij,...j->...", alphadot, self.field(alpha), alphadot
+        )
         return np.sqrt(np.maximum(square, 0.0))
 
     def indicatrix(self, alpha, count: int = 64) -> np.ndarray:
@@ -86,8 +88,12 @@ class Finsler:
     def norm(self, alpha, alphadot) -> np.ndarray:
         """Return F (...,) at alpha, alphadot (..., 2); ValueError outside the grid."""
         alphadot = real_array("alphadot", alphadot)
-        basis = _even(np.arctan2(alphadot[..., 1], alphadot[..., 0]), len(self.coefficients) - 1)
-        return np.maximum((self.field(alpha) * basis).sum(-1), 0.0) * np.hypot(alphadot[..., 0], alphadot[..., 1])
+        basis = _even(
+            np.arctan2(alphadot[..., 1], alphadot[..., 0]), len(self.coefficients) - 1
+        )
+        return np.maximum((self.field(alpha) * basis).sum(-1), 0.0) * np.hypot(
+            alphadot[..., 0], alphadot[..., 1]
+        )
 
     def indicatrix(self, alpha, count: int = 64) -> np.ndarray:
         """Return (..., count, 2): alphadot of unit cost in every direction."""
@@ -110,7 +116,13 @@ def _even(beta, highest: int) -> np.ndarray:
     return np.concatenate([np.ones((*np.shape(beta), 1)), pairs], -1)
 
 
-def fit(power: Power, axes, degree: int = 3, progress: Callable | None = None, map: Map = each) -> Metric:
+def fit(
+    power: Power,
+    axes,
+    degree: int = 3,
+    progress: Callable | None = None,
+    map: Map = each,
+) -> Metric:
     """Fit M on the grid spanned by ``axes`` exactly, from d (d + 1) / 2 powers at each shape. power: (...,), quadratic
     in alphadot.
 
@@ -161,15 +173,24 @@ def fit_norm(
     (15, 5, 5)
     """
     if not is_whole(highest) or highest % 2 or not 0 <= highest < count:
-        raise Refusal(f"harmonics must be even and below the number of directions ({count})", value=highest)
+        raise Refusal(
+            f"harmonics must be even and below the number of directions ({count})",
+            value=highest,
+        )
     axes = as_axes(axes)
     if len(axes) != 2:
-        raise Refusal(f"harmonics are those of a plane of two joint rates, got {len(axes)} joints")
+        raise Refusal(
+            f"harmonics are those of a plane of two joint rates, got {len(axes)} joints"
+        )
     unit = directions(2, count)
-    return norm_from_samples(_sampled(norm, axes, unit, progress, map), axes, unit, degree, highest=highest)
+    return norm_from_samples(
+        _sampled(norm, axes, unit, progress, map), axes, unit, degree, highest=highest
+    )
 
 
-def norm_from_samples(F: np.ndarray, axes, unit: np.ndarray, degree: int = 3, *, highest: int = 14) -> Finsler:
+def norm_from_samples(
+    F: np.ndarray, axes, unit: np.ndarray, degree: int = 3, *, highest: int = 14
+) -> Finsler:
     """Return the series of `fit_norm` from norms F (C, N_1, N_2) of the rates ``unit`` (C, 2).
 
     Examples
@@ -189,12 +210,16 @@ def norm_from_samples(F: np.ndarray, axes, unit: np.ndarray, degree: int = 3, *,
     return Finsler(axes, coefficients, residual, degree)
 
 
-def _sampled(power: Power, axes, unit: np.ndarray, progress: Callable | None, map: Map) -> np.ndarray:
+def _sampled(
+    power: Power, axes, unit: np.ndarray, progress: Callable | None, map: Map
+) -> np.ndarray:
     """Return (C, N_1, ..., N_d): powers at every shape for the rates ``unit`` (C, d)."""
     alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 1, len(axes))
     out, step = np.empty((len(unit), len(alpha))), max(1, SAMPLES_TOGETHER // len(unit))
     parts = [slice(k, min(k + step, len(alpha))) for k in range(0, len(alpha), step)]
-    for part, powers in zip(parts, map(partial(_powers, (power, unit)), [alpha[x] for x in parts])):
+    for part, powers in zip(
+        parts, map(partial(_powers, (power, unit)), [alpha[x] for x in parts])
+    ):
         out[:, part] = powers.T
         if progress:
             progress(part.stop / len(alpha))
@@ -206,11 +231,16 @@ def _powers(shared: tuple, alpha: np.ndarray) -> np.ndarray:
     power, unit = shared
     powers = np.asarray(power(alpha, unit))
     if powers.shape != (len(alpha), len(unit)) or not np.isfinite(powers).all():
-        raise Refusal(f"power must be finite, of shape {(len(alpha), len(unit))} for these rates", value=powers.shape)
+        raise Refusal(
+            f"power must be finite, of shape {(len(alpha), len(unit))} for these rates",
+            value=powers.shape,
+        )
     return powers
 
 
-def path_length(norm: Power, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
+def path_length(
+    norm: Power, gait: Gait, amplitudes=None, phases: int = 256
+) -> np.ndarray:
     """Return length of a gait's cycle, for amplitudes (...,) or the gait's own. norm: F(alpha, alphadot) -> (...,).
 
     Examples

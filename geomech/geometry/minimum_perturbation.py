@@ -26,7 +26,10 @@ from rft.checks import real_array
 from rft.refusal import Refusal
 
 ROUNDING = 1e-10  # of A^theta: above what the linear solve leaves of a gradient
-TOLERANCE, STEPS = 1e-12, 1000  # of conjugate gradients: residual over the right side; some twenty steps are usual
+TOLERANCE, STEPS = (
+    1e-12,
+    1000,
+)  # of conjugate gradients: residual over the right side; some twenty steps are usual
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +43,9 @@ class Frame:
     def __call__(self, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
         """Return (h, dh/dt), (..., 3) each, for alpha, alphadot (..., d), as `geomech.geometry.coordinates.in_frame`
         takes them; ValueError outside the grid."""
-        slopes = np.einsum("...ij,...j->...i", self.slopes(alpha), real_array("alphadot", alphadot))
+        slopes = np.einsum(
+            "...ij,...j->...i", self.slopes(alpha), real_array("alphadot", alphadot)
+        )
         return np.broadcast_arrays(self.pose(alpha), slopes)
 
     def pose(self, alpha) -> np.ndarray:
@@ -50,7 +55,13 @@ class Frame:
     def slopes(self, alpha) -> np.ndarray:
         """Return dh / d alpha (..., 3, d) at shapes alpha (..., d)."""
         alpha = self.field.inside(alpha)
-        return np.stack([self.field.spline(alpha, nu=nu) for nu in np.eye(self.field.joints, dtype=int)], -1)
+        return np.stack(
+            [
+                self.field.spline(alpha, nu=nu)
+                for nu in np.eye(self.field.joints, dtype=int)
+            ],
+            -1,
+        )
 
     def net(self, g, alpha) -> np.ndarray:
         """Return displacement (..., 3) of this frame over a cycle from shape alpha (..., d), from that of the first
@@ -61,11 +72,20 @@ class Frame:
     @property
     def grid_slopes(self) -> np.ndarray:
         """dh / d alpha (N_1, ..., N_d, 3, d) on the grid."""
-        return np.stack([np.moveaxis(self.field.derivative(k), 0, -1) for k in range(self.field.joints)], -1)
+        return np.stack(
+            [
+                np.moveaxis(self.field.derivative(k), 0, -1)
+                for k in range(self.field.joints)
+            ],
+            -1,
+        )
 
     def connection(self, first: Connection) -> np.ndarray:
         """Return A (3, d, N_1, ..., N_d) in this frame on its grid, from the connection in the first frame."""
-        h, A = np.moveaxis(self.field.values, 0, -1), np.moveaxis(first.A, (0, 1), (-2, -1))
+        h, A = (
+            np.moveaxis(self.field.values, 0, -1),
+            np.moveaxis(first.A, (0, 1), (-2, -1)),
+        )
         return np.moveaxis(change_connection(A, h, self.grid_slopes), (-2, -1), (0, 1))
 
 
@@ -77,7 +97,8 @@ def minimum_perturbation(connection: Connection) -> Frame:
     """
     if connection.field.masked:
         raise Refusal(
-            "no minimum-perturbation frame of a field with singular shapes", instead="shrink the extent around them"
+            "no minimum-perturbation frame of a field with singular shapes",
+            instead="shrink the extent around them",
         )
     basis = Basis(connection.axes, connection.degree)
     w = connection.A[0] + 1j * connection.A[1], connection.A[2]
@@ -86,18 +107,24 @@ def minimum_perturbation(connection: Connection) -> Frame:
     beta = beta - _middle(connection, basis.on_grid(beta))
     remainder = a + basis.gradient(beta)
     a = (
-        remainder if np.abs(remainder).max() > ROUNDING * np.abs(a).max() else np.zeros_like(a)
+        remainder
+        if np.abs(remainder).max() > ROUNDING * np.abs(a).max()
+        else np.zeros_like(a)
     )  # of a pure gradient nothing is left
     z, shift_residual = basis.least(np.exp(-1j * basis.at_nodes(beta)) * flat, a)
     beta, z = basis.on_grid(beta), basis.on_grid(z)
     z = np.exp(1j * beta) * z
     h = np.stack([z.real, z.imag, beta])
-    return Frame(replace(connection.field, values=h), max(turn_residual, shift_residual))
+    return Frame(
+        replace(connection.field, values=h), max(turn_residual, shift_residual)
+    )
 
 
 def _middle(connection: Connection, values: np.ndarray) -> float:
     """Return the value of a function on the grid at the grid's middle."""
-    return replace(connection.field, values=values)(np.array([(a[0] + a[-1]) / 2 for a in connection.axes]))
+    return replace(connection.field, values=values)(
+        np.array([(a[0] + a[-1]) / 2 for a in connection.axes])
+    )
 
 
 class Basis:
@@ -127,7 +154,9 @@ class Basis:
 
         for k, axis in enumerate(self.axes):
             rows = np.moveaxis(values, k - self.d, 0)
-            values = np.moveaxis(make_interp_spline(axis, rows, self.degree).c, 0, k - self.d)
+            values = np.moveaxis(
+                make_interp_spline(axis, rows, self.degree).c, 0, k - self.d
+            )
         return values
 
     def on_grid(self, c: np.ndarray) -> np.ndarray:
@@ -148,7 +177,10 @@ class Basis:
 
     def flux(self, f: np.ndarray) -> np.ndarray:
         """Return integrals of every basis function's gradient times the vector field f (d, Q_1, ..., Q_d)."""
-        return sum(self._along(self.weighted(f[k]), [v.T for v in self._slope(k)]) for k in range(self.d))
+        return sum(
+            self._along(self.weighted(f[k]), [v.T for v in self._slope(k)])
+            for k in range(self.d)
+        )
 
     def weighted(self, f: np.ndarray) -> np.ndarray:
         """Return f at the nodes times the weights of the rule."""
@@ -175,7 +207,9 @@ class Basis:
 
         vectors, total = [], np.zeros((1,) * self.d)
         for k, (v, s, w) in enumerate(zip(self.values, self.slopes, self.weights)):
-            mass, stiff = ((m.T @ m.multiply(w[:, None]).tocsr()).toarray() for m in (v, s))
+            mass, stiff = (
+                (m.T @ m.multiply(w[:, None]).tocsr()).toarray() for m in (v, s)
+            )
             values, v = eigh(stiff, mass)
             values[0] = 0.0
             vectors.append(v)
@@ -190,28 +224,48 @@ class Basis:
         Conjugate gradients on the normal equations, preconditioned by those with the mean of |a|^2 in place of a, which
         separate by axes."""
         shape, (vectors, squares) = tuple(map(len, self.axes)), self.modes
-        squares = squares + self.weighted((a**2).sum(0)).sum() / self.weighted(np.ones(a.shape[1:])).sum()
+        squares = (
+            squares
+            + self.weighted((a**2).sum(0)).sum()
+            / self.weighted(np.ones(a.shape[1:])).sum()
+        )
         inverse = np.where(squares > 0, 1.0 / np.where(squares > 0, squares, 1.0), 0.0)
         onto = [v.T for v in vectors]
         bent = np.any(a)
 
         def normal(z):
             z = z.reshape(shape)
-            e = self.gradient(z) + 1j * a * self.at_nodes(z) if bent else self.gradient(z)
+            e = (
+                self.gradient(z) + 1j * a * self.at_nodes(z)
+                if bent
+                else self.gradient(z)
+            )
             return self._adjoint(e, a, bent).ravel()
 
         def precondition(r):
-            return self._along(inverse * self._along(r.reshape(shape), onto), vectors).ravel()
+            return self._along(
+                inverse * self._along(r.reshape(shape), onto), vectors
+            ).ravel()
 
         from scipy.sparse.linalg import LinearOperator, cg
 
         right = -self._adjoint(w, a, bent).ravel()
-        size, kind = np.linalg.norm(right), complex if bent or np.iscomplexobj(w) else float
-        operator, preconditioner = (LinearOperator(2 * (right.size,), f, dtype=kind) for f in (normal, precondition))
+        size, kind = (
+            np.linalg.norm(right),
+            complex if bent or np.iscomplexobj(w) else float,
+        )
+        operator, preconditioner = (
+            LinearOperator(2 * (right.size,), f, dtype=kind)
+            for f in (normal, precondition)
+        )
         z, failed = cg(operator, right, rtol=TOLERANCE, maxiter=STEPS, M=preconditioner)
         if failed:
-            raise RuntimeError("the minimum-perturbation frame did not converge: lower the grid or the extent")
-        return z.reshape(shape), float(np.linalg.norm(normal(z) - right) / size) if size else 0.0
+            raise RuntimeError(
+                "the minimum-perturbation frame did not converge: lower the grid or the extent"
+            )
+        return z.reshape(shape), float(
+            np.linalg.norm(normal(z) - right) / size
+        ) if size else 0.0
 
     def _adjoint(self, e: np.ndarray, a: np.ndarray, bent: bool) -> np.ndarray:
         return self.flux(e) - 1j * self.load((a * e).sum(0)) if bent else self.flux(e)

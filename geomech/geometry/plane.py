@@ -10,7 +10,14 @@ from functools import cached_property
 import numpy as np
 
 from geomech.core.work import Map, each
-from geomech.geometry.connection import Connection, Velocity, as_axes, directions, least_squares, sampled_on
+from geomech.geometry.connection import (
+    Connection,
+    Velocity,
+    as_axes,
+    directions,
+    least_squares,
+    sampled_on,
+)
 from geomech.geometry.curvature import ccf, error
 from geomech.geometry.field import UNKNOWN_UNIT, Field
 from geomech.geometry.gait import Gait
@@ -71,7 +78,11 @@ class ProjectedGait:
 
 def checked_pair(pair: Sequence[int], joints: int) -> tuple[int, int]:
     """Return pair as two different joints from 0; Refusal, which counts them from 1, for any other."""
-    if len(pair) != 2 or not all(is_whole(k) and 0 <= k < joints for k in pair) or pair[0] == pair[1]:
+    if (
+        len(pair) != 2
+        or not all(is_whole(k) and 0 <= k < joints for k in pair)
+        or pair[0] == pair[1]
+    ):
         raise Refusal(
             f"a pair must be two of the joints 1 to {joints}, got {', '.join(formatted(k + 1) for k in pair)}"
         )
@@ -109,31 +120,55 @@ def plane(
     rates = directions(len(at), count)
     symmetries = mirrored(alpha.reshape(-1, len(at)), count) if traits.halved else ()
     A, residual, speed = sampled_on(
-        velocity, alpha, rates, least_squares(rates), progress, symmetries, traits.singularity, map
+        velocity,
+        alpha,
+        rates,
+        least_squares(rates),
+        progress,
+        symmetries,
+        traits.singularity,
+        map,
     )
-    fitted = Connection(axes, A[:, list(pair)], residual, speed, degree, unit=unit, length=length)
+    fitted = Connection(
+        axes, A[:, list(pair)], residual, speed, degree, unit=unit, length=length
+    )
     return Plane(pair, tuple(at.tolist()), fitted)
 
 
 def interpolated_plane(fitted: Connection, pair: tuple[int, int], at) -> Plane:
     """Return the plane in a field of all joints, on its axes, interpolated between its points; near a measured gait nan
     where the data do not reach. Refusal off the field, or for a plane that meets nothing of it."""
-    at, pair = fitted.field.inside(real_array("at", at)), checked_pair(pair, len(fitted.axes))
+    at, pair = (
+        fitted.field.inside(real_array("at", at)),
+        checked_pair(pair, len(fitted.axes)),
+    )
     axes = tuple(fitted.axes[k] for k in pair)
     alpha = plane_shapes(axes, pair, at)
-    A = fitted.taylor.connection_within_reach(alpha) if isinstance(fitted, Tube) else fitted(alpha)
+    A = (
+        fitted.taylor.connection_within_reach(alpha)
+        if isinstance(fitted, Tube)
+        else fitted(alpha)
+    )
     if np.isnan(A).all():
-        fixed = ", ".join(f"alpha_{k + 1} = {x:.3g}" for k, x in enumerate(at) if k not in pair)
+        fixed = ", ".join(
+            f"alpha_{k + 1} = {x:.3g}" for k, x in enumerate(at) if k not in pair
+        )
         start = ",".join(f"{x:.3f}" for x in fitted.taylor.loop.shape(np.array(0.0)))
         raise Refusal(
             f"the data do not reach the plane of {fixed}",
             instead=f"slice it at a shape of the mean gait, ``at`` {start}",
         )
     A = np.moveaxis(A, (-2, -1), (0, 1))[:, list(pair)]
-    has_residual = np.isfinite(fitted.residual).all()  # files from elsewhere tell nothing of their fit
+    has_residual = np.isfinite(
+        fitted.residual
+    ).all()  # files from elsewhere tell nothing of their fit
     fit_fields = [
         Field(fitted.axes, x, 1) if has_residual else lambda a: np.full(a.shape, np.nan)
         for x in (fitted.residual, fitted.speed)
     ]
     residual, speed = (np.moveaxis(f(alpha)[..., :3], -1, 0) for f in fit_fields)
-    return Plane(pair, tuple(at.tolist()), Connection(axes, A, residual, speed, fitted.degree, **fitted.size))
+    return Plane(
+        pair,
+        tuple(at.tolist()),
+        Connection(axes, A, residual, speed, fitted.degree, **fitted.size),
+    )

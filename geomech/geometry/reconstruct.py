@@ -39,7 +39,9 @@ def _waves(n: int) -> _Waves:
     share = np.full(len(k), 1 / n)
     if n % 2 == 0:
         share[[0, -1]] /= 2
-    return _Waves(k, k % n, share, np.where(k == 0, 0.0, 1 / np.where(k == 0, 1, 1j * k)))
+    return _Waves(
+        k, k % n, share, np.where(k == 0, 0.0, 1 / np.where(k == 0, 1, 1j * k))
+    )
 
 
 def turning(xi: ArrayLike) -> np.ndarray:
@@ -64,7 +66,9 @@ def turning(xi: ArrayLike) -> np.ndarray:
 class _Spectrum(NamedTuple):
     mean_turn: np.ndarray  # (..., 1) mean of xi_theta
     k: np.ndarray  # (M,) wave numbers, symmetric about 0
-    wave: np.ndarray  # (..., M) Fourier coefficients of e^(i (theta - mean)) (xi_x + i xi_y)
+    wave: (
+        np.ndarray
+    )  # (..., M) Fourier coefficients of e^(i (theta - mean)) (xi_x + i xi_y)
 
 
 def displacement(xi: ArrayLike) -> np.ndarray:
@@ -129,11 +133,15 @@ def poses(xi: ArrayLike) -> np.ndarray:
     closed = lambda x: np.take(x, np.arange(n + 1) % n, -1)
     turns = s.mean_turn + s.k
     slow = np.abs(turns) < 0.5  # of one term or none the integral is no quotient
-    carried = closed(_values(np.where(slow, 0.0, s.wave / np.where(slow, 1.0, 1j * turns)), s.k, n))
+    carried = closed(
+        _values(np.where(slow, 0.0, s.wave / np.where(slow, 1.0, 1j * turns)), s.k, n)
+    )
     carried = carried * np.exp(1j * s.mean_turn * span)
     z = carried - carried[..., :1]
     drift, turn = (np.where(slow, x, 0.0).sum(-1)[..., None] for x in (s.wave, turns))
-    z = z + drift * span * np.exp(0.5j * turn * span) * np.sinc(turn * span / (2 * np.pi))
+    z = z + drift * span * np.exp(0.5j * turn * span) * np.sinc(
+        turn * span / (2 * np.pi)
+    )
     swing = closed(turning(xi))
     return np.stack([z.real, z.imag, s.mean_turn * span + swing - swing[..., :1]], -1)
 
@@ -151,7 +159,9 @@ def repeated(path: np.ndarray, cycles: int) -> np.ndarray:
     """
     starts, net = np.zeros((1, 3)), path[-1]
     while len(starts) <= cycles:
-        starts = np.concatenate([starts, se2.compose(se2.compose(starts[-1], net), starts)])
+        starts = np.concatenate(
+            [starts, se2.compose(se2.compose(starts[-1], net), starts)]
+        )
     earlier = se2.compose(starts[:cycles, None], path[:-1]).reshape(-1, 3)
     return np.concatenate([earlier, starts[cycles : cycles + 1]])
 
@@ -163,7 +173,9 @@ def _spectrum(xi) -> _Spectrum:
     if not np.isfinite(xi).all():
         raise Refusal("xi must be finite")
     waves, swing = _waves(xi.shape[-2]), turning(xi)
-    wave = waves.coefficients(np.exp(1j * (swing - swing[..., :1])) * (xi[..., 0] + 1j * xi[..., 1]))
+    wave = waves.coefficients(
+        np.exp(1j * (swing - swing[..., :1])) * (xi[..., 0] + 1j * xi[..., 1])
+    )
     return _Spectrum(xi[..., 2].mean(-1, keepdims=True), waves.k, wave)
 
 
@@ -192,13 +204,28 @@ def slopes(xi: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     reach, step = _reach(turns), 1e-5
     net = np.array([*_parts((s.wave * reach).sum()), 2 * np.pi * s.mean_turn[0]])
     share = np.where((n % 2 == 0) & (np.abs(s.k) == n // 2), 0.5, 1.0)
-    factors = _phase_factors(n) @ (share * reach) / n  # of e^(i theta) (xi_x + i xi_y) at each phase
+    factors = (
+        _phase_factors(n) @ (share * reach) / n
+    )  # of e^(i theta) (xi_x + i xi_y) at each phase
     heading = turning(xi) - turning(xi)[0]
     wave, velocity = np.exp(1j * heading) * factors, xi[:, 0] + 1j * xi[:, 1]
-    rotation_slope = (s.wave * (_reach(turns + step) - _reach(turns - step)) / (2 * step)).sum() / n
-    spread = _turning_response(n)  # heading at one phase by the turning velocity at another
-    dz = np.stack([wave, 1j * wave, (1j * wave * velocity) @ (spread - spread[0]) + rotation_slope], -1)
-    return net, np.stack([dz.real, dz.imag, np.broadcast_to([0.0, 0.0, 2 * np.pi / n], (n, 3))])
+    rotation_slope = (
+        s.wave * (_reach(turns + step) - _reach(turns - step)) / (2 * step)
+    ).sum() / n
+    spread = _turning_response(
+        n
+    )  # heading at one phase by the turning velocity at another
+    dz = np.stack(
+        [
+            wave,
+            1j * wave,
+            (1j * wave * velocity) @ (spread - spread[0]) + rotation_slope,
+        ],
+        -1,
+    )
+    return net, np.stack(
+        [dz.real, dz.imag, np.broadcast_to([0.0, 0.0, 2 * np.pi / n], (n, 3))]
+    )
 
 
 def _parts(z: complex) -> tuple[float, float]:

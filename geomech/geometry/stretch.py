@@ -19,7 +19,10 @@ from rft.checks import in_range
 from rft.refusal import Refusal
 
 POINTS = 61  # an axis, at most: what a picture shows
-STEPS, TOLERANCE = 200, 1e-12  # of the least squares; relative change of the sum of squares
+STEPS, TOLERANCE = (
+    200,
+    1e-12,
+)  # of the least squares; relative change of the sum of squares
 NODES = np.polynomial.legendre.leggauss(3)  # along an edge
 
 
@@ -52,7 +55,11 @@ class Stretch:
     def density(self, field: Field) -> np.ndarray:
         """Return a two-form (..., N_1, N_2) on this grid per area on paper, from its ``field`` per rad^2."""
         shapes = np.stack(np.meshgrid(*self.field.axes, indexing="ij"), -1)
-        values = np.moveaxis(field(shapes), (0, 1), (-2, -1)) if field.values.ndim > 2 else field(shapes)
+        values = (
+            np.moveaxis(field(shapes), (0, 1), (-2, -1))
+            if field.values.ndim > 2
+            else field(shapes)
+        )
         return values / np.where(self.area.values > 0, self.area.values, np.nan)
 
 
@@ -60,16 +67,27 @@ def stretch(metric: Metric | Finsler, points: int | None = None) -> Stretch:
     """Return the plane in which lengths come nearest to those of ``metric``, of two joints. points: an axis of the
     grid, POINTS or those of the metric's own grid if these are fewer."""
     if len(metric.axes) != 2:
-        raise Refusal("shape space is redrawn on a plane", because=f"two joints, got {len(metric.axes)}")
+        raise Refusal(
+            "shape space is redrawn on a plane",
+            because=f"two joints, got {len(metric.axes)}",
+        )
     metric_points = [len(a) for a in metric.axes]
-    in_range("points", metric_points[0] if points is None else points, 5, 401, whole=True)
+    in_range(
+        "points", metric_points[0] if points is None else points, 5, 401, whole=True
+    )
     counts = [min(n, POINTS) if points is None else int(points) for n in metric_points]
-    axes = tuple(np.interp(np.linspace(0, len(a) - 1, n), np.arange(len(a)), a) for a, n in zip(metric.axes, counts))
+    axes = tuple(
+        np.interp(np.linspace(0, len(a) - 1, n), np.arange(len(a)), a)
+        for a, n in zip(metric.axes, counts)
+    )
     alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
     ends = _edges(counts)
     length = _lengths(metric, alpha.reshape(-1, 2), ends)
     u = _aligned(_relaxed(_first(metric, alpha).reshape(-1, 2), ends, length), alpha)
-    relative_error = np.linalg.norm(np.diff(u.reshape(-1, 2)[ends], axis=1)[:, 0], axis=-1) / length - 1
+    relative_error = (
+        np.linalg.norm(np.diff(u.reshape(-1, 2)[ends], axis=1)[:, 0], axis=-1) / length
+        - 1
+    )
     square, times = (
         np.bincount(ends.ravel(), np.repeat(w, 2), alpha[..., 0].size)
         for w in (relative_error**2, np.ones(len(relative_error)))
@@ -88,17 +106,27 @@ def stretch(metric: Metric | Finsler, points: int | None = None) -> Stretch:
 def _edges(counts) -> np.ndarray:
     """Return (E, 2): points of a grid, in C order, that are neighbours along an axis or a diagonal of a cell."""
     k = np.arange(np.prod(counts)).reshape(counts)
-    pairs = (k[1:], k[:-1]), (k[:, 1:], k[:, :-1]), (k[1:, 1:], k[:-1, :-1]), (k[1:, :-1], k[:-1, 1:])
+    pairs = (
+        (k[1:], k[:-1]),
+        (k[:, 1:], k[:, :-1]),
+        (k[1:, 1:], k[:-1, :-1]),
+        (k[1:, :-1], k[:-1, 1:]),
+    )
     return np.concatenate([np.stack([a.ravel(), b.ravel()], -1) for a, b in pairs])
 
 
 def _lengths(metric, alpha: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """Return the lengths (E,) of the straight lines between shapes alpha (n, 2)."""
     start, step = alpha[ends[:, 0]], alpha[ends[:, 1]] - alpha[ends[:, 0]]
-    along = [w / 2 * metric.norm(start + (x + 1) / 2 * step, step) for x, w in zip(*NODES)]
+    along = [
+        w / 2 * metric.norm(start + (x + 1) / 2 * step, step) for x, w in zip(*NODES)
+    ]
     length = np.sum(along, axis=0)
     if not (length > 0).all():
-        raise Refusal("shape space is not redrawn where a change of shape costs nothing", instead="narrow the extent")
+        raise Refusal(
+            "shape space is not redrawn where a change of shape costs nothing",
+            instead="narrow the extent",
+        )
     return length
 
 
@@ -108,10 +136,14 @@ def _first(metric, alpha: np.ndarray) -> np.ndarray:
     beta = np.pi * np.arange(12) / 12
     unit = np.stack([np.cos(beta), np.sin(beta)], -1)
     F2 = (metric.norm(alpha[:, :, None], unit) ** 2).mean((0, 1))
-    forms = np.stack([unit[:, 0] ** 2, 2 * unit[:, 0] * unit[:, 1], unit[:, 1] ** 2], -1)
+    forms = np.stack(
+        [unit[:, 0] ** 2, 2 * unit[:, 0] * unit[:, 1], unit[:, 1] ** 2], -1
+    )
     a, b, c = np.linalg.lstsq(forms, F2, rcond=None)[0]
     values, vectors = np.linalg.eigh([[a, b], [b, c]])
-    return alpha @ ((vectors * np.sqrt(np.maximum(values, 1e-6 * values[-1]))) @ vectors.T)
+    return alpha @ (
+        (vectors * np.sqrt(np.maximum(values, 1e-6 * values[-1]))) @ vectors.T
+    )
 
 
 def _relaxed(u: np.ndarray, ends: np.ndarray, length: np.ndarray) -> np.ndarray:
@@ -131,10 +163,14 @@ def _relaxed(u: np.ndarray, ends: np.ndarray, length: np.ndarray) -> np.ndarray:
     damping, (d, size, r) = 1e-3, residuals(u)
     for _ in range(STEPS):
         slope = scale * d / (size * length)[:, None]
-        J = coo_array((np.stack([-slope, slope], 1).ravel(), (rows, columns)), (len(ends), u.size)).tocsr()
+        J = coo_array(
+            (np.stack([-slope, slope], 1).ravel(), (rows, columns)), (len(ends), u.size)
+        ).tocsr()
         normal, right, before = (J.T @ J).tocsc(), J.T @ r, r @ r
         while damping < 1e12:
-            step = spsolve(normal + damping * diags_array(normal.diagonal(), format="csc"), -right).reshape(-1, 2)
+            step = spsolve(
+                normal + damping * diags_array(normal.diagonal(), format="csc"), -right
+            ).reshape(-1, 2)
             d, size, r = residuals(u + scale * step)
             if r @ r <= before:
                 break
@@ -150,7 +186,10 @@ def _relaxed(u: np.ndarray, ends: np.ndarray, length: np.ndarray) -> np.ndarray:
 def _aligned(u: np.ndarray, alpha: np.ndarray) -> np.ndarray:
     """Return u (N_1, N_2, 2) shifted so that the grid's middle lies at 0, and rotated so that its linear fit in alpha
     has no rotation."""
-    u, flat = u.reshape(alpha.shape), alpha.reshape(-1, 2) - alpha.reshape(-1, 2).mean(0)
+    u, flat = (
+        u.reshape(alpha.shape),
+        alpha.reshape(-1, 2) - alpha.reshape(-1, 2).mean(0),
+    )
     linear = np.linalg.lstsq(flat, (u - u.mean((0, 1))).reshape(-1, 2), rcond=None)[0].T
     v, _, w = np.linalg.svd(linear)
     n, m = alpha.shape[:2]

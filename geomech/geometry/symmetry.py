@@ -35,24 +35,42 @@ RETRACED = "the cycle retraces its path"
 def zero_components(traits: Traits, gait: Gait, amplitudes=None) -> dict[str, str]:
     """Return the reason by component, of those of COMPONENTS that are 0 by symmetry at each of the amplitudes (B,), or at the
     gait's own; none where the velocity does not follow from shape alone."""
-    amplitudes = np.atleast_1d(gait.amplitude if amplitudes is None else amplitudes).astype(float)
+    amplitudes = np.atleast_1d(
+        gait.amplitude if amplitudes is None else amplitudes
+    ).astype(float)
     if traits.steps or not amplitudes.size:
         return {}
     phases = PHASES * -(-(2 * gait.harmonics + 1) // PHASES)
-    cycles = np.concatenate([x / (np.abs(x).max() or 1.0) for x in gait.cycle(phases, amplitudes)], -1)
-    found = [(sign, D, first) for sign, L, D in _moves(traits) for first in _firsts(cycles, sign, L)]
+    cycles = np.concatenate(
+        [x / (np.abs(x).max() or 1.0) for x in gait.cycle(phases, amplitudes)], -1
+    )
+    found = [
+        (sign, D, first)
+        for sign, L, D in _moves(traits)
+        for first in _firsts(cycles, sign, L)
+    ]
     why: dict[int, str] = {}
     for sign, D, first in found:
         if sign == 1:
             of_halves = [2] if D[2] == -1 and 2 * first == phases else []
-            zero, reason = (np.flatnonzero(D == -1), ALWAYS) if first == 0 else (of_halves, MIRRORED)
+            zero, reason = (
+                (np.flatnonzero(D == -1), ALWAYS)
+                if first == 0
+                else (of_halves, MIRRORED)
+            )
         else:
             retraced = (D == 1).all()
-            zero, reason = (range(3), RETRACED) if retraced else ([2] if D[2] == 1 else [], BACKWARDS)
+            zero, reason = (
+                (range(3), RETRACED)
+                if retraced
+                else ([2] if D[2] == 1 else [], BACKWARDS)
+            )
         for k in zero:
             why.setdefault(int(k), reason)
     for sign, D, first in found if 2 in why else ():  # x and y need a heading of 0
-        for k in np.flatnonzero(D[:2] == 1) if (sign, D[2], first) == (-1, -1, 0) else ():
+        for k in (
+            np.flatnonzero(D[:2] == 1) if (sign, D[2], first) == (-1, -1, 0) else ()
+        ):
             why.setdefault(int(k), BACKWARDS if D[0] == -1 else REFLECTED)
     return {name: why[k] for k, name in enumerate(COMPONENTS) if k in why}
 
@@ -76,8 +94,15 @@ def _firsts(cycles: np.ndarray, sign: int, L: tuple[int, int]) -> Iterator[int]:
     phases, joints = cycles.shape[1], cycles.shape[2] // 2
     factor, step = L
     alpha, alphadot = cycles[..., :joints], cycles[..., joints:]
-    image = factor * np.concatenate([alpha[..., ::step], sign * alphadot[..., ::step]], -1)
+    image = factor * np.concatenate(
+        [alpha[..., ::step], sign * alphadot[..., ::step]], -1
+    )
     moving = np.abs(alphadot).max((1, 2)).argmax()
-    for first in np.flatnonzero(np.abs(cycles[moving] - image[moving, 0]).max(-1) <= SAME):
-        if (np.abs(cycles[:, (first + sign * np.arange(phases)) % phases] - image) <= SAME).all():
+    for first in np.flatnonzero(
+        np.abs(cycles[moving] - image[moving, 0]).max(-1) <= SAME
+    ):
+        if (
+            np.abs(cycles[:, (first + sign * np.arange(phases)) % phases] - image)
+            <= SAME
+        ).all():
             yield int(first)

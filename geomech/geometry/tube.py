@@ -22,7 +22,9 @@ from rft.checks import real_array
 from rft.refusal import Refusal
 
 BEYOND = "nan, where the data of the log do not reach"
-PLACES = 512  # of the gait, at which the nearest one is looked for, and normals are kept
+PLACES = (
+    512  # of the gait, at which the nearest one is looked for, and normals are kept
+)
 NEWTON = 6  # steps to the nearest point from there
 SHAPES_TOGETHER = 256  # whose distances from all places, 1 MB, are held at a time: a fourth of the time that 4096 take
 
@@ -33,14 +35,20 @@ def waves(t, harmonics: int, order: int = 0) -> np.ndarray:
     turns = np.cumprod(np.broadcast_to(turn, (*np.shape(t), harmonics)), -1)
     turns *= (1j * np.arange(1.0, harmonics + 1)) ** order
     found = np.empty((*np.shape(t), 2 * harmonics + 1))
-    found[..., 0], found[..., 1::2], found[..., 2::2] = float(order == 0), turns.real, turns.imag
+    found[..., 0], found[..., 1::2], found[..., 2::2] = (
+        float(order == 0),
+        turns.real,
+        turns.imag,
+    )
     return found
 
 
 def series(coefficients: np.ndarray, t, order: int = 0) -> np.ndarray:
     """Return (..., *lead): a Fourier series with coefficients (*lead, 2 K + 1) as in `waves`, or a derivative, at
     phases t (...)."""
-    return np.tensordot(waves(t, coefficients.shape[-1] // 2, order), coefficients, (-1, -1))
+    return np.tensordot(
+        waves(t, coefficients.shape[-1] // 2, order), coefficients, (-1, -1)
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,10 +94,15 @@ class Loop:
         tangent = rate / np.linalg.norm(rate, axis=1, keepdims=True)
         frames_along = [_complement(tangent[0])]
         for t in [*tangent[1:], tangent[0]]:
-            u, _, v = np.linalg.svd(frames_along[-1] - np.outer(t, t @ frames_along[-1]), full_matrices=False)
+            u, _, v = np.linalg.svd(
+                frames_along[-1] - np.outer(t, t @ frames_along[-1]),
+                full_matrices=False,
+            )
             frames_along.append(u @ v)
         holonomy = np.real(logm(frames_along[0].T @ frames_along[-1]))
-        return np.array([n @ expm(-k / PLACES * holonomy) for k, n in enumerate(frames_along)])
+        return np.array(
+            [n @ expm(-k / PLACES * holonomy) for k, n in enumerate(frames_along)]
+        )
 
     def normals(self, t) -> np.ndarray:
         """Return (..., d, d - 1): orthonormal, and normal to the curve, at phases t (...)."""
@@ -106,17 +119,27 @@ class Loop:
         """Return phases (...,) of the points of the curve nearest to shapes alpha (..., d)."""
         flat = np.reshape(alpha, (-1, np.shape(alpha)[-1]))
         t, places = self._places
-        rows = [flat[k : k + SHAPES_TOGETHER] for k in range(0, len(flat), SHAPES_TOGETHER)]
-        half_square = (places**2).sum(1) / 2  # of the distance, less that of the shape and its product with the place
-        nearest_places = [t[(half_square - shapes @ places.T).argmin(1)] for shapes in rows]
+        rows = [
+            flat[k : k + SHAPES_TOGETHER] for k in range(0, len(flat), SHAPES_TOGETHER)
+        ]
+        half_square = (places**2).sum(
+            1
+        ) / 2  # of the distance, less that of the shape and its product with the place
+        nearest_places = [
+            t[(half_square - shapes @ places.T).argmin(1)] for shapes in rows
+        ]
         start = np.concatenate(nearest_places) if rows else np.zeros(0)
-        return self.projected(alpha, start.reshape(np.shape(alpha)[:-1]), np.pi / PLACES)
+        return self.projected(
+            alpha, start.reshape(np.shape(alpha)[:-1]), np.pi / PLACES
+        )
 
     def projected(self, alpha, t, step: float = 0.1) -> np.ndarray:
         """Return phases (...,) near t at which alpha - theta is normal to the curve: Newton, at most ``step`` rad at a
         time."""
         for _ in range(NEWTON):
-            shape, rate, bend = np.moveaxis(series(self._twice_differentiated, t), -2, 0)
+            shape, rate, bend = np.moveaxis(
+                series(self._twice_differentiated, t), -2, 0
+            )
             deviation = alpha - shape
             square = (rate**2).sum(-1)
             slope = np.maximum(
@@ -131,7 +154,9 @@ def _between(values: np.ndarray, t) -> np.ndarray:
     count = values.shape[-1]
     places = 2 * np.pi * np.arange(count + 1) / count
     closed = np.concatenate([values, values[..., :1]], -1).reshape(-1, count + 1)
-    values_at = np.stack([np.interp(np.asarray(t) % (2 * np.pi), places, row) for row in closed], -1)
+    values_at = np.stack(
+        [np.interp(np.asarray(t) % (2 * np.pi), places, row) for row in closed], -1
+    )
     return values_at.reshape(*np.shape(t), *values.shape[:-1])
 
 
@@ -178,19 +203,29 @@ class TaylorSeries:
         """Return the standard errors (..., 3, d) of A at phases t (...), as `standard_error`."""
         rate = self.loop.shape(t, 1)
         along = rate**2 / (rate**2).sum(-1, keepdims=True)
-        return np.sqrt(_between(self.standard_error**2, t) @ np.stack([along, 1 - along], -2))
+        return np.sqrt(
+            _between(self.standard_error**2, t) @ np.stack([along, 1 - along], -2)
+        )
 
     def reach(self, alpha) -> np.ndarray:
         """Return the distances (...,) of shapes (..., d) from the gait, 1 where the data end."""
         t, delta = self._deviation(real_array("alpha", alpha))
-        return np.sqrt(np.einsum("...i,...ij,...j->...", delta, np.linalg.inv(self.spread_at(t)), delta))
+        return np.sqrt(
+            np.einsum(
+                "...i,...ij,...j->...", delta, np.linalg.inv(self.spread_at(t)), delta
+            )
+        )
 
     def terms(self, t, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
         """Return (waves (..., 2 K + 1), terms (..., d, d)), such that xi_i = sum of combined_i,j,m,k terms_j,m waves_k,
         at shapes and rates (..., d) whose nearest points of the gait have phases t (...)."""
-        normal = np.einsum("...ik,...i->...k", self.loop.normals(t), alpha - self.loop.shape(t))
+        normal = np.einsum(
+            "...ik,...i->...k", self.loop.normals(t), alpha - self.loop.shape(t)
+        )
         one = np.concatenate([np.ones((*normal.shape[:-1], 1)), normal], -1)
-        return waves(t, self.A.shape[-1] // 2), alphadot[..., :, None] * one[..., None, :]
+        return waves(t, self.A.shape[-1] // 2), alphadot[..., :, None] * one[
+            ..., None, :
+        ]
 
     @cached_property
     def combined(self) -> np.ndarray:
@@ -213,7 +248,9 @@ class TaylorSeries:
         """Return the errors (..., 3, d) of `connection`."""
         t = self.loop.nearest(alpha)
         w, terms = self.terms(t, alpha, np.ones(np.shape(alpha)))
-        squares = (np.einsum("ijmk,...k,...jm->...ij", x, w, terms) ** 2 for x in self.errors)
+        squares = (
+            np.einsum("ijmk,...k,...jm->...ij", x, w, terms) ** 2 for x in self.errors
+        )
         return self.factor * np.sqrt(sum(squares) + self.standard_error_at(t) ** 2)
 
     def ccf(self, alpha) -> np.ndarray:
@@ -224,7 +261,9 @@ class TaylorSeries:
         """Return the errors (..., 3) of `ccf`."""
         of = self._ccf_at(alpha)
         value = of(self.combined)
-        return self.factor * np.sqrt(sum((of(self.combined + x) - value) ** 2 for x in self.errors))
+        return self.factor * np.sqrt(
+            sum((of(self.combined + x) - value) ** 2 for x in self.errors)
+        )
 
     def _ccf_at(self, alpha) -> Callable:
         """Return a function that gives the CCF (..., 3) at shapes (..., 2) of any connection along the gait, from its
@@ -232,14 +271,21 @@ class TaylorSeries:
 
         alpha = theta(phi) + s n(phi) has d alpha / d phi = theta' (1 - curvature s), and dA/ds is the slope."""
         t, delta = self._deviation(alpha)
-        rate, bend, n = self.loop.shape(t, 1), self.loop.shape(t, 2), self.loop.normals(t)[..., 0]
+        rate, bend, n = (
+            self.loop.shape(t, 1),
+            self.loop.shape(t, 2),
+            self.loop.normals(t)[..., 0],
+        )
         speed, s = np.linalg.norm(rate, axis=-1), (n * delta).sum(-1)
         ahead = speed - s * (bend * n).sum(-1) / speed  # |d alpha / d phi|
-        waves_at, rates_at = (waves(t, self.A.shape[-1] // 2, order) for order in (0, 1))
+        waves_at, rates_at = (
+            waves(t, self.A.shape[-1] // 2, order) for order in (0, 1)
+        )
 
         def ccf(combined: np.ndarray) -> np.ndarray:
             (A, slope), (A_on, slope_on) = (
-                [np.tensordot(w, combined[:, :, m], (-1, -1)) for m in (0, 1)] for w in (waves_at, rates_at)
+                [np.tensordot(w, combined[:, :, m], (-1, -1)) for m in (0, 1)]
+                for w in (waves_at, rates_at)
             )
             along = (A_on + slope_on * s[..., None, None]) / ahead[..., None, None]
             derivative = np.einsum("...ij,...j->...i", along, n) - np.einsum(
@@ -255,8 +301,12 @@ class TaylorSeries:
         w, terms = self.terms(self.loop.nearest(alpha), alpha, alphadot)
         velocity = lambda x: np.einsum("ijmk,...nk,...njm->...ni", x, w, terms)
         net = displacement(velocity(self.combined))
-        differences = [displacement(velocity(self.combined + x)) - net for x in self.errors]
-        return np.hypot(self.factor * np.sqrt(np.sum(np.square(differences), 0)), self.beyond)
+        differences = [
+            displacement(velocity(self.combined + x)) - net for x in self.errors
+        ]
+        return np.hypot(
+            self.factor * np.sqrt(np.sum(np.square(differences), 0)), self.beyond
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -300,13 +350,24 @@ class Tube(Connection):
 def covering_grid(taylor: TaylorSeries, points: int) -> tuple[np.ndarray, ...]:
     """Return axes of ``points`` points each that span all that the data reach."""
     t = 2 * np.pi * np.arange(PLACES) / PLACES
-    step = np.abs(taylor.loop.shape(t, 2)).max(0) * (np.pi / PLACES) ** 2 / 2  # what a curve may do between two places
+    step = (
+        np.abs(taylor.loop.shape(t, 2)).max(0) * (np.pi / PLACES) ** 2 / 2
+    )  # what a curve may do between two places
     wide = np.sqrt(np.einsum("tii->ti", taylor.spread_at(t))) + step
-    low, high = (taylor.loop.shape(t) - wide).min(0), (taylor.loop.shape(t) + wide).max(0)
+    low, high = (
+        (taylor.loop.shape(t) - wide).min(0),
+        (taylor.loop.shape(t) + wide).max(0),
+    )
     return tuple(np.linspace(a, b, points) for a, b in zip(low, high))
 
 
-def tube(taylor: TaylorSeries, axes: Sequence[np.ndarray], residual: np.ndarray, unit: str, length: float) -> Tube:
+def tube(
+    taylor: TaylorSeries,
+    axes: Sequence[np.ndarray],
+    residual: np.ndarray,
+    unit: str,
+    length: float,
+) -> Tube:
     """Return the connection on a grid, nan where the data do not reach. residual: (3,), of the fit of xi for |alphadot|
     = 1. unit, length: as of `Connection`."""
     axes = tuple(axes)
@@ -314,5 +375,10 @@ def tube(taylor: TaylorSeries, axes: Sequence[np.ndarray], residual: np.ndarray,
     A = np.moveaxis(taylor.connection_within_reach(shapes), (-2, -1), (0, 1))
     masked = np.isnan(A[:, 0])
     masked_residual = np.where(masked, np.nan, residual.reshape(3, *[1] * len(axes)))
-    speed, degree = np.sqrt((A**2).mean(1) + masked_residual**2), min(3, min(map(len, axes)) - 1)
-    return Tube(axes, A, masked_residual, speed, degree, taylor, unit=unit, length=length)
+    speed, degree = (
+        np.sqrt((A**2).mean(1) + masked_residual**2),
+        min(3, min(map(len, axes)) - 1),
+    )
+    return Tube(
+        axes, A, masked_residual, speed, degree, taylor, unit=unit, length=length
+    )

@@ -47,7 +47,9 @@ class TwoForm:
     def pair(self, i: int, j: int) -> Field:
         """Return CCF_ij, values (3, N_1, ..., N_d); that of (j, i) has the other sign."""
         if {i, j} not in map(set, self.pairs) or i == j:
-            raise Refusal(f"i and j must be two of the joints 0 to {self.field.joints - 1}, got {i} and {j}")
+            raise Refusal(
+                f"i and j must be two of the joints 0 to {self.field.joints - 1}, got {i} and {j}"
+            )
         sign = 1.0 if i < j else -1.0
         values = sign * self.field.values[self.pairs.index((min(i, j), max(i, j)))]
         return replace(self.field, values=values)
@@ -59,7 +61,9 @@ class TwoForm:
         axes = self.field.axes[i], self.field.axes[j]
         shapes = np.broadcast_to(at, (len(axes[0]), len(axes[1]), len(at))).copy()
         shapes[..., i], shapes[..., j] = np.meshgrid(*axes, indexing="ij")
-        return replace(self.field, axes=axes, values=np.moveaxis(self.pair(i, j)(shapes), -1, 0))
+        return replace(
+            self.field, axes=axes, values=np.moveaxis(self.pair(i, j)(shapes), -1, 0)
+        )
 
     @property
     def joints(self) -> int:
@@ -89,7 +93,10 @@ def error(connection: Connection) -> TwoForm:
 def _from_pairs(component: Callable, connection: Connection) -> TwoForm:
     pairs = tuple(combinations(range(len(connection.axes)), 2))
     if not pairs:
-        raise Refusal("a CCF needs at least two joints", because="a loop of one joint encloses no area")
+        raise Refusal(
+            "a CCF needs at least two joints",
+            because="a loop of one joint encloses no area",
+        )
     values = np.stack([component(connection, i, j).values for i, j in pairs])
     return TwoForm(replace(connection.field, values=values), pairs)
 
@@ -104,34 +111,62 @@ class Spanned(NamedTuple):
     spread: np.ndarray
 
 
-def spanned(form: TwoForm, gait: Gait, amplitudes=None, phases: int = 256, tips: int = 4) -> Spanned:
+def spanned(
+    form: TwoForm, gait: Gait, amplitudes=None, phases: int = 256, tips: int = 4
+) -> Spanned:
     """Return the displacements by the area tier of a gait of any number of joints, for amplitudes (B,) or its own, and
     how much depends on the surface, by ``tips`` others. Refusal where the gait leaves the field, whose box holds every
     cone over a loop in it."""
     in_range("phases", phases, 8, 1e6, whole=True)
     in_range("tips", tips, 0, phases, whole=True)
     if checked_gait(gait).joints != form.joints:
-        raise Refusal(f"the gait moves {gait.joints} joints, the field has {form.joints}")
-    amplitudes = np.atleast_1d(real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes))
+        raise Refusal(
+            f"the gait moves {gait.joints} joints, the field has {form.joints}"
+        )
+    amplitudes = np.atleast_1d(
+        real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes)
+    )
     batch = max(1, SAMPLES_TOGETHER // int(phases))
-    groups = [amplitudes[k : k + batch] for k in range(0, max(1, len(amplitudes)), batch)]
-    net, others = map(np.concatenate, zip(*(_cones(form, gait, group, int(phases), int(tips)) for group in groups)))
+    groups = [
+        amplitudes[k : k + batch] for k in range(0, max(1, len(amplitudes)), batch)
+    ]
+    net, others = map(
+        np.concatenate,
+        zip(*(_cones(form, gait, group, int(phases), int(tips)) for group in groups)),
+    )
     return _with_spread(net, others)
 
 
-def spanned_by(A: Callable, gait: Gait, amplitudes=None, phases: int = 256, tips: int = 2, around: int = 64) -> Spanned:
+def spanned_by(
+    A: Callable,
+    gait: Gait,
+    amplitudes=None,
+    phases: int = 256,
+    tips: int = 2,
+    around: int = 64,
+) -> Spanned:
     """Return `spanned` without a field: A (..., 3, d) is evaluated at shapes (..., d) of the cones. By Stokes's theorem
     the integral of dA is that of A along the loop, of ``phases``, whatever the surface; only [A, A] is integrated over
     each cone, at ``around`` phases."""
     in_range("phases", phases, 8, 1e6, whole=True)
     in_range("tips", tips, 0, around, whole=True)
-    amplitudes = np.atleast_1d(real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes))
+    amplitudes = np.atleast_1d(
+        real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes)
+    )
     alpha, alphadot = checked_gait(gait).cycle(int(phases), amplitudes)
     along = np.einsum("...ij,...j->...i", A(alpha), alphadot).mean(1)
     alpha, alphadot = gait.cycle(max(int(around), 4 * gait.harmonics + 2), amplitudes)
-    tips_at = [alpha.mean(1, keepdims=True), *(alpha[:, k * alpha.shape[1] // max(1, tips), None] for k in range(tips))]
-    net, *others = (se2.exp(2 * np.pi * (along + _brackets(A, alpha, alphadot, tip))) for tip in tips_at)
-    return _with_spread(net, np.stack(others, 1) if others else np.zeros((len(net), 0, 3)))
+    tips_at = [
+        alpha.mean(1, keepdims=True),
+        *(alpha[:, k * alpha.shape[1] // max(1, tips), None] for k in range(tips)),
+    ]
+    net, *others = (
+        se2.exp(2 * np.pi * (along + _brackets(A, alpha, alphadot, tip)))
+        for tip in tips_at
+    )
+    return _with_spread(
+        net, np.stack(others, 1) if others else np.zeros((len(net), 0, 3))
+    )
 
 
 def _brackets(A: Callable, alpha, alphadot, tip) -> np.ndarray:
@@ -140,7 +175,10 @@ def _brackets(A: Callable, alpha, alphadot, tip) -> np.ndarray:
     total = 0.0
     for s, w in zip((nodes + 1) / 2, weights / 2):
         A_cone = A(tip + s * (alpha - tip))
-        u, v = (np.einsum("...ij,...j->...i", A_cone, x) for x in (alpha - tip, s * alphadot))
+        u, v = (
+            np.einsum("...ij,...j->...i", A_cone, x)
+            for x in (alpha - tip, s * alphadot)
+        )
         total = total + w * se2.bracket(u, v).mean(1)
     return total
 
@@ -148,19 +186,25 @@ def _brackets(A: Callable, alpha, alphadot, tip) -> np.ndarray:
 def _with_spread(net: np.ndarray, others: np.ndarray) -> Spanned:
     """Return the displacement with the spread of poses (B, tips, 3) from net (B, 3)."""
     difference = others - net[:, None]
-    spread = np.stack([np.hypot(difference[..., 0], difference[..., 1]), np.abs(difference[..., 2])], -1).max(
-        1, initial=0.0
-    )
+    spread = np.stack(
+        [np.hypot(difference[..., 0], difference[..., 1]), np.abs(difference[..., 2])],
+        -1,
+    ).max(1, initial=0.0)
     return Spanned(net, others, spread)
 
 
-def _cones(form: TwoForm, gait: Gait, amplitudes, phases: int, tips: int) -> tuple[np.ndarray, np.ndarray]:
+def _cones(
+    form: TwoForm, gait: Gait, amplitudes, phases: int, tips: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Return exp of the integrals over the cone from the mean shape (B, 3), and over those from shapes on the loop (B,
     tips, 3)."""
     alpha, alphadot = gait.cycle(phases, amplitudes)  # (B, N, d)
     form.inside(alpha)
     on_loop = [alpha[:, k * phases // tips, None] for k in range(tips)]
-    first, *others = (_cone(form, alpha, alphadot, tip) for tip in (alpha.mean(1, keepdims=True), *on_loop))
+    first, *others = (
+        _cone(form, alpha, alphadot, tip)
+        for tip in (alpha.mean(1, keepdims=True), *on_loop)
+    )
     return first, np.stack(others, 1) if others else np.zeros((len(alpha), 0, 3))
 
 
@@ -169,5 +213,7 @@ def _cone(form: TwoForm, alpha, alphadot, tip) -> np.ndarray:
     nodes, weights = np.polynomial.legendre.leggauss(RADII)
     total = 0.0
     for s, w in zip((nodes + 1) / 2, weights / 2):
-        total = total + w * form(tip + s * (alpha - tip), alpha - tip, s * alphadot).mean(1)
+        total = total + w * form(
+            tip + s * (alpha - tip), alpha - tip, s * alphadot
+        ).mean(1)
     return se2.exp(2 * np.pi * total)

@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 
 __all__ = ["HexapodSand", "HexapodSands"]
 
-with contextlib.suppress(ModuleNotFoundError):  # what is missing is told at the first use
+with contextlib.suppress(
+    ModuleNotFoundError
+):  # what is missing is told at the first use
     from gymnasium.envs.registration import register
 
     register(
@@ -41,7 +43,10 @@ def __getattr__(name: str) -> Any:
     except ModuleNotFoundError as error:
         if error.name not in ("gymnasium", "mujoco"):
             raise
-        raise Refusal("geomech.gym needs Gymnasium and MuJoCo", instead="pip install 'geomech[gym]'") from None
+        raise Refusal(
+            "geomech.gym needs Gymnasium and MuJoCo",
+            instead="pip install 'geomech[gym]'",
+        ) from None
 
 
 def __dir__() -> list[str]:

@@ -29,7 +29,9 @@ def _sand(medium: Any) -> tuple[mujoco.MjModel, Sand]:
     """Return the robot and the sand under it."""
     model = hexapod()
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", Note)  # that the legs do not touch the floor is what it is for
+        warnings.simplefilter(
+            "ignore", Note
+        )  # that the legs do not touch the floor is what it is for
         return model, attach(model, medium, element=ELEMENT)
 
 
@@ -44,11 +46,25 @@ def observation(qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
     ], -2)  # fmt: skip
     velocity = np.einsum("...ij,...i->...j", turn, qvel[..., :3])
     legs = qpos[..., 7:]
-    parts = qpos[..., 2:3], turn[..., 2, :], velocity, qvel[..., 3:6], np.cos(legs), np.sin(legs), qvel[..., 6:]
+    parts = (
+        qpos[..., 2:3],
+        turn[..., 2, :],
+        velocity,
+        qvel[..., 3:6],
+        np.cos(legs),
+        np.sin(legs),
+        qvel[..., 6:],
+    )
     return np.concatenate(parts, -1).astype(np.float32)
 
 
-def rewards(moved: np.ndarray, seconds: float, force: np.ndarray, rate: np.ndarray, upright: np.ndarray) -> dict:
+def rewards(
+    moved: np.ndarray,
+    seconds: float,
+    force: np.ndarray,
+    rate: np.ndarray,
+    upright: np.ndarray,
+) -> dict:
     """Return the parts of the reward (...,): progress along x, m/s; the motors' work; and a fall."""
     power = np.maximum(force * rate, 0.0).sum(-1)
     return dict(zip(PARTS, (moved / seconds, -EFFORT * power, -FALL * (upright < 0.0))))
@@ -62,17 +78,27 @@ class HexapodSand(gymnasium.Env):
 
     metadata = {"render_modes": []}
 
-    def __init__(self, medium: Any = "poppy-seeds-loose", render_mode: str | None = None):
+    def __init__(
+        self, medium: Any = "poppy-seeds-loose", render_mode: str | None = None
+    ):
         self.render_mode = render_mode
         self.model, self.sand = _sand(medium)
         self.data = mujoco.MjData(self.model)
-        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.model.nu,), np.float32)
-        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (SIZE,), np.float32)
+        self.action_space = gymnasium.spaces.Box(
+            -1.0, 1.0, (self.model.nu,), np.float32
+        )
+        self.observation_space = gymnasium.spaces.Box(
+            -np.inf, np.inf, (SIZE,), np.float32
+        )
 
-    def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[np.ndarray, dict]:
+    def reset(
+        self, *, seed: int | None = None, options: dict | None = None
+    ) -> tuple[np.ndarray, dict]:
         super().reset(seed=seed)
         mujoco.mj_resetData(self.model, self.data)
-        self.data.qpos[7:] = self.data.ctrl[:] = self.np_random.uniform(-NOISE, NOISE, self.model.nu)
+        self.data.qpos[7:] = self.data.ctrl[:] = self.np_random.uniform(
+            -NOISE, NOISE, self.model.nu
+        )
         mujoco.mj_forward(self.model, self.data)
         return observation(self.data.qpos, self.data.qvel), {}
 
@@ -80,8 +106,13 @@ class HexapodSand(gymnasium.Env):
         before, seconds = self.data.qpos[0], STEPS * self.model.opt.timestep
         self.data.ctrl[:] += FASTEST_LEG * seconds * np.clip(action, -1.0, 1.0)
         mujoco.mj_step(self.model, self.data, STEPS)
-        seen, force = observation(self.data.qpos, self.data.qvel), self.data.actuator_force
-        parts = rewards(self.data.qpos[0] - before, seconds, force, self.data.qvel[6:], seen[3])
+        seen, force = (
+            observation(self.data.qpos, self.data.qvel),
+            self.data.actuator_force,
+        )
+        parts = rewards(
+            self.data.qpos[0] - before, seconds, force, self.data.qvel[6:], seen[3]
+        )
         parts = {name: float(x) for name, x in parts.items()}
         return seen, sum(parts.values()), bool(seen[3] < 0.0), False, parts
 
@@ -95,7 +126,10 @@ class HexapodSands(gymnasium.vector.VectorEnv):
     media: one for each robot, such as `rft.mujoco.sample` draws; None for the one medium of all. An episode that has ended
     begins anew with the next step."""
 
-    metadata = {"render_modes": [], "autoreset_mode": gymnasium.vector.AutoresetMode.NEXT_STEP}
+    metadata = {
+        "render_modes": [],
+        "autoreset_mode": gymnasium.vector.AutoresetMode.NEXT_STEP,
+    }
 
     def __init__(
         self,
@@ -105,17 +139,29 @@ class HexapodSands(gymnasium.vector.VectorEnv):
         max_episode_steps: int = 250,
         render_mode: str | None = None,
     ):
-        self.num_envs, self.max_episode_steps, self.render_mode = num_envs, max_episode_steps, render_mode
+        self.num_envs, self.max_episode_steps, self.render_mode = (
+            num_envs,
+            max_episode_steps,
+            render_mode,
+        )
         self.model, self.sand = _sand(medium)
         self.batch = self.sand.batch(num_envs, persistent=True, media=media)
-        self.qpos, self.qvel, self.ctrl, self.force = map(self.batch.bind, ("qpos", "qvel", "ctrl", "actuator_force"))
-        self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.model.nu,), np.float32)
-        self.single_observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (SIZE,), np.float32)
+        self.qpos, self.qvel, self.ctrl, self.force = map(
+            self.batch.bind, ("qpos", "qvel", "ctrl", "actuator_force")
+        )
+        self.single_action_space = gymnasium.spaces.Box(
+            -1.0, 1.0, (self.model.nu,), np.float32
+        )
+        self.single_observation_space = gymnasium.spaces.Box(
+            -np.inf, np.inf, (SIZE,), np.float32
+        )
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.ended, self.age = np.zeros(num_envs, bool), np.zeros(num_envs, int)
 
-    def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[np.ndarray, dict]:
+    def reset(
+        self, *, seed: int | None = None, options: dict | None = None
+    ) -> tuple[np.ndarray, dict]:
         super().reset(seed=seed)
         self._begin(np.arange(self.num_envs))
         return observation(self.qpos, self.qvel), {}
@@ -123,12 +169,20 @@ class HexapodSands(gymnasium.vector.VectorEnv):
     def _begin(self, robots: np.ndarray) -> None:
         """Set some robots to the start of an episode."""
         self.batch.reset(robots)
-        self.qpos[robots, 7:] = self.np_random.uniform(-NOISE, NOISE, (len(robots), self.model.nu))
+        self.qpos[robots, 7:] = self.np_random.uniform(
+            -NOISE, NOISE, (len(robots), self.model.nu)
+        )
         self.ctrl[robots] = self.qpos[robots, 7:]
         self.ended[robots], self.age[robots] = False, 0
 
-    def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict]:
-        before, begun, seconds = self.qpos[:, 0].copy(), self.ended.copy(), STEPS * self.model.opt.timestep
+    def step(
+        self, actions: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict]:
+        before, begun, seconds = (
+            self.qpos[:, 0].copy(),
+            self.ended.copy(),
+            STEPS * self.model.opt.timestep,
+        )
         going = np.flatnonzero(~begun)
         self.ctrl[going] += FASTEST_LEG * seconds * np.clip(actions[going], -1.0, 1.0)
         if len(going):
@@ -137,11 +191,19 @@ class HexapodSands(gymnasium.vector.VectorEnv):
             self._begin(np.flatnonzero(begun))
         self.age[going] += 1
         seen = observation(self.qpos, self.qvel)
-        parts = rewards(self.qpos[:, 0] - before, seconds, self.force, self.qvel[:, 6:], seen[:, 3])
+        parts = rewards(
+            self.qpos[:, 0] - before, seconds, self.force, self.qvel[:, 6:], seen[:, 3]
+        )
         parts = {name: np.where(begun, 0.0, x) for name, x in parts.items()}
         fallen, late = seen[:, 3] < 0.0, self.age >= self.max_episode_steps
         self.ended = (fallen | late) & ~begun
-        return seen, sum(parts.values()), fallen & ~begun, late & ~fallen & ~begun, parts
+        return (
+            seen,
+            sum(parts.values()),
+            fallen & ~begun,
+            late & ~fallen & ~begun,
+            parts,
+        )
 
     def close_extras(self, **_: Any) -> None:
         self.sand.detach()

@@ -39,7 +39,10 @@ def read(path: str | Path, largest: int, pipes: bool = False) -> bytes:
     if path.stat() and not (path.is_file() or (pipes and path.is_fifo())):
         raise OSError(errno.EINVAL, "it is no ordinary file")
     with open(path, "rb", opener=_opened if path.is_fifo() else None) as file:
-        if os.fstat(file.fileno()).st_size > largest or len(raw := file.read(largest + 1)) > largest:
+        if (
+            os.fstat(file.fileno()).st_size > largest
+            or len(raw := file.read(largest + 1)) > largest
+        ):
             raise OSError(errno.EFBIG, f"it is larger than {largest / 1e6:g} MB")
         if not raw and path.is_fifo():
             raise OSError(errno.EPIPE, "nothing came through this pipe")
@@ -55,7 +58,12 @@ def _opened(path: str, flags: int) -> int:
 
 def read_text(path: str | Path, largest: int, pipes: bool = False) -> str:
     """Return the text of an ordinary file, or a pipe, in UTF-8, as `read`, with equal line ends."""
-    return read(path, largest, pipes).decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    return (
+        read(path, largest, pipes)
+        .decode("utf-8-sig")
+        .replace("\r\n", "\n")
+        .replace("\r", "\n")
+    )
 
 
 def reason_of(error: Exception) -> str:
@@ -87,7 +95,9 @@ def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
             with contextlib.suppress(OSError):
                 if os.path.samefile(output, source):
                     raise Refusal(
-                        f"cannot write {output}", because=f"it is an input, {source}", instead="choose another output"
+                        f"cannot write {output}",
+                        because=f"it is an input, {source}",
+                        instead="choose another output",
                     )
 
 
@@ -95,7 +105,11 @@ def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
 def atomic_file(path: str | Path) -> Iterator[Path]:
     """Yield a path to write to, of the same name; moved to ``path`` on success, removed on failure. Refusal if nothing
     can be written there."""
-    refused = lambda error: Refusal(f"cannot write {path}", because=reason_of(error), instead="choose another output")
+    refused = lambda error: Refusal(
+        f"cannot write {path}",
+        because=reason_of(error),
+        instead="choose another output",
+    )
     try:
         target = Path(path).resolve()
         if target.exists() and not target.is_file():
@@ -122,7 +136,9 @@ def atomic_folder(path: str | Path, inputs: Iterable[Path] = ()) -> Iterator[Pat
     """Yield a folder to fill; its files move to ``path`` on success, with a note of the files they replace, and vanish
     on failure. Refusal if that is impossible, or if one would replace an input."""
     refused = lambda error: Refusal(
-        f"cannot write the folder {path}", because=reason_of(error), instead="choose another with -o"
+        f"cannot write the folder {path}",
+        because=reason_of(error),
+        instead="choose another with -o",
     )
     try:
         target = Path(path).resolve()
@@ -143,7 +159,9 @@ def _move(files: list[Path], target: Path, path: Path, inputs: Iterable[Path]) -
     replaced = [file.name for file in files if os.path.lexists(target / file.name)]
     if blocked := [name for name in replaced if not (target / name).is_file()]:
         raise Refusal(
-            f"cannot write {path / blocked[0]}", because="it is no ordinary file", instead="choose another with -o"
+            f"cannot write {path / blocked[0]}",
+            because="it is no ordinary file",
+            instead="choose another with -o",
         )
     refuse_inputs([path / name for name in replaced], inputs)
     target.mkdir(parents=True, exist_ok=True)
@@ -157,7 +175,11 @@ def _unwritten(what: object, error: OSError) -> Exception:
     """Return the error to raise: for a full disk a Refusal with the file's name; others unchanged."""
     if error.errno not in DISK_FULL:
         return error
-    return Refusal(f"cannot write {what}", because=error.strerror, instead="make room, or choose another output")
+    return Refusal(
+        f"cannot write {what}",
+        because=error.strerror,
+        instead="make room, or choose another output",
+    )
 
 
 class _StagingFolder:
@@ -168,7 +190,9 @@ class _StagingFolder:
     moment removes it, too. refused: returns the exception for an error of the file system at the start.
     """
 
-    def __init__(self, target: Path, parent: Path, refused: Callable[[Exception], Exception]):
+    def __init__(
+        self, target: Path, parent: Path, refused: Callable[[Exception], Exception]
+    ):
         self.target, self.parent, self.refused = target, parent, refused
         self.folder = parent / f"{_prefix(target)}{secrets.token_hex(8)}"
         self.mark = None
@@ -197,7 +221,9 @@ class _StagingFolder:
         finally:
             if self.mark:
                 self.mark.close()
-            if self.folder.is_dir():  # too many files are open: now there is one fewer, which is enough
+            if (
+                self.folder.is_dir()
+            ):  # too many files are open: now there is one fewer, which is enough
                 _discard_plainly(self.folder)
 
 
@@ -245,7 +271,9 @@ def sweep_strays(target: Path, *more: Path) -> None:
     """Remove the folders of killed writers to ``target``, and no others, from its folder and ``more``."""
     for place in {target.parent, *more}:
         with contextlib.suppress(OSError, ValueError):
-            for path in [p for p in place.iterdir() if p.name.startswith(_prefix(target))]:
+            for path in [
+                p for p in place.iterdir() if p.name.startswith(_prefix(target))
+            ]:
                 _sweep(path, target)
 
 

@@ -27,7 +27,10 @@ def file_variables(result: Result) -> Iterator[Variable]:
     """Yield the variables of a file: errors and spreads follow their values as NAME_error and NAME_spread."""
     for v in result.variables:
         yield replace(v, error=None, spread=None)
-        labels = v.error_label or f"estimated error of {v.name}", f"standard deviation of {v.name}"
+        labels = (
+            v.error_label or f"estimated error of {v.name}",
+            f"standard deviation of {v.name}",
+        )
         for values, ending, label in zip((v.error, v.spread), ENDINGS, labels):
             if values is not None:
                 yield Variable(v.name + ending, v.dims, values, v.unit, label)
@@ -57,17 +60,23 @@ def _write(file: Any, v: Variable) -> None:
         width = v.values.dtype.itemsize // 4
         file.createDimension(f"{v.name}_length", width)
         variable = file.createVariable(v.name, "c", (*v.dims, f"{v.name}_length"))
-        variable[:] = np.array([list(word.ljust(width, "\0")) for word in v.values.tolist()], "S1")
+        variable[:] = np.array(
+            [list(word.ljust(width, "\0")) for word in v.values.tolist()], "S1"
+        )
         variable._Encoding = "ascii"
     else:
-        variable = file.createVariable(v.name, "i4" if v.values.dtype.kind == "i" else "f8", v.dims)
+        variable = file.createVariable(
+            v.name, "i4" if v.values.dtype.kind == "i" else "f8", v.dims
+        )
         variable[...] = v.values
     for key, text in _described(v).items():
         setattr(variable, key, _encoded(text))
 
 
 def _described(v: Variable) -> dict[str, str]:
-    return {key: text for key, text in (("units", v.unit), ("long_name", v.label)) if text}
+    return {
+        key: text for key, text in (("units", v.unit), ("long_name", v.label)) if text
+    }
 
 
 def _encoded(text: str) -> bytes:
@@ -80,7 +89,10 @@ def write_csv(path: str | Path, result: Result) -> None:
     whole or not at all."""
     columns = [v for v in result.variables if v.dims == result.variables[0].dims]
     rows = np.stack([v.values for v in columns], -1).tolist()
-    lines = [",".join(v.name for v in columns), *(",".join(map(repr, row)) for row in rows)]
+    lines = [
+        ",".join(v.name for v in columns),
+        *(",".join(map(repr, row)) for row in rows),
+    ]
     write_text(path, "\n".join(lines) + "\n")
 
 
@@ -89,7 +101,9 @@ def xarray() -> Any:
     try:
         import xarray
     except ImportError:
-        raise ImportError("to_xarray needs the package xarray: pip install xarray") from None
+        raise ImportError(
+            "to_xarray needs the package xarray: pip install xarray"
+        ) from None
     return xarray
 
 

@@ -29,9 +29,13 @@ class Rows:
     def header(self) -> tuple[int, tuple[str, ...]]:
         """Line number and words of the first line that is no comment, in small letters, without quotes."""
         line, text = self.filled[0] if self.filled else (1, "")
-        return line, tuple(word.strip().strip('"').strip().lower() for word in text.split(","))
+        return line, tuple(
+            word.strip().strip('"').strip().lower() for word in text.split(",")
+        )
 
-    def numbers(self, columns: tuple[str, ...], selected: tuple[str, ...] | None = None) -> np.ndarray:
+    def numbers(
+        self, columns: tuple[str, ...], selected: tuple[str, ...] | None = None
+    ) -> np.ndarray:
         """Return the numbers under the header (N, columns), or in ``selected`` columns; Refusal naming the line of a
         row with anything else."""
         selected = columns if selected is None else selected
@@ -55,14 +59,20 @@ def read(path: str | Path, largest: int, what: str) -> Rows:
             raise ValueError
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is not text"
-        raise Refusal(f"cannot read {str(path)!r}", because=reason, instead=what) from None
+        raise Refusal(
+            f"cannot read {str(path)!r}", because=reason, instead=what
+        ) from None
     parts = [line.partition("#") for line in text.split("\n")]
-    filled = [(k, line.strip()) for k, (line, _, _) in enumerate(parts, 1) if line.strip()]
+    filled = [
+        (k, line.strip()) for k, (line, _, _) in enumerate(parts, 1) if line.strip()
+    ]
     comments = [comment.strip() for _, _, comment in parts if comment.strip()]
     return Rows(Path(path).name, hashlib.sha256(raw).hexdigest(), filled, comments)
 
 
-def _row(name: str, line: int, text: str, columns: tuple[str, ...], picks: list[int]) -> list[float]:
+def _row(
+    name: str, line: int, text: str, columns: tuple[str, ...], picks: list[int]
+) -> list[float]:
     cells = text.split(",")
     if len(cells) == len(columns):
         row = [_cell(cells[k]) for k in picks]
@@ -70,10 +80,17 @@ def _row(name: str, line: int, text: str, columns: tuple[str, ...], picks: list[
             return row
     expected = f"{len(columns)} finite numbers ({','.join(columns)}), at most {LARGEST_NUMBER:g}"
     column = next(
-        (columns[k] for k in picks if len(cells) == len(columns) and not abs(_cell(cells[k])) <= LARGEST_NUMBER), ""
+        (
+            columns[k]
+            for k in picks
+            if len(cells) == len(columns) and not abs(_cell(cells[k])) <= LARGEST_NUMBER
+        ),
+        "",
     )
     raise Refusal(
-        f"a row must be {expected}" + f", column {column}" * bool(column), value=text[:40], where=f"{name}, line {line}"
+        f"a row must be {expected}" + f", column {column}" * bool(column),
+        value=text[:40],
+        where=f"{name}, line {line}",
     )
 
 

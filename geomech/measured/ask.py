@@ -18,17 +18,31 @@ OF_MIDLINES = "medium", "units", "scale", "fps", "y", "head", "least_score", "me
 def question(file: Path, scene: Path | None = None, **options: Any) -> Fit | Midlines:
     """Return the question of a file; Refusal for options of the other kind. options: those that are None or False are left
     out."""
-    given = {name: value for name, value in options.items() if value is not None and value is not False and value != ()}
+    given = {
+        name: value
+        for name, value in options.items()
+        if value is not None and value is not False and value != ()
+    }
     midlines = _is_midlines(file)
-    wrong = [x for x in (OF_LOGS if midlines else OF_MIDLINES) if x in given or (x == "scene" and scene is not None)]
+    wrong = [
+        x
+        for x in (OF_LOGS if midlines else OF_MIDLINES)
+        if x in given or (x == "scene" and scene is not None)
+    ]
     if wrong:
         what = "a log of joint angles" if midlines else "midlines"
-        raise Refusal(f"``{wrong[0]}`` is that of {what}", where=line(file.name), instead="drop it")
+        raise Refusal(
+            f"``{wrong[0]}`` is that of {what}",
+            where=line(file.name),
+            instead="drop it",
+        )
     return Midlines(file, **given) if midlines else Fit(file, **given)
 
 
 def _is_midlines(file: Path) -> bool:
     try:
-        return reader.is_midlines(read_rows(file, reader.LARGEST_FILE, reader.WHAT).header[1])
+        return reader.is_midlines(
+            read_rows(file, reader.LARGEST_FILE, reader.WHAT).header[1]
+        )
     except ValueError:
         return False

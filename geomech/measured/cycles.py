@@ -11,12 +11,18 @@ from geomech.measured.log import Log, check_rows
 from geomech.measured.smooth import Smoothed
 
 FEWEST = 8  # full cycles: fewer do not show their scatter
-ENOUGH = FEWEST + 2  # cycles of a log for that many full ones: half a cycle at each end is not used
+ENOUGH = (
+    FEWEST + 2
+)  # cycles of a log for that many full ones: half a cycle at each end is not used
 ROWS = 12  # per cycle, at least
 GAP = 1 / 8  # of a cycle without a row, at most
-PERIOD_RATIO = 1.25  # ratio of the periods of the first and the last quarter of a log of two gaits
+PERIOD_RATIO = (
+    1.25  # ratio of the periods of the first and the last quarter of a log of two gaits
+)
 TWO = 0.9  # of the spread of cycles of two gaits is that between them; 2/3 of normal ones, 3/4 of a steady drift
-AFTER = 0.8  # the same share where all cycles of one gait come before those of the other
+AFTER = (
+    0.8  # the same share where all cycles of one gait come before those of the other
+)
 LEAST_DISTANCE = 0.05  # of the gait's size, between the means of two gaits
 STEADY = 4  # least drift over the scatter of a joint's cycles about it
 SURELY = 1.5  # standard deviations of noise that may look like a motion
@@ -33,7 +39,10 @@ def period(log: Log) -> float:
     repeat = phase.period_of(t, alpha)
     quarter = len(t) // 4
     if repeat and 3 * repeat < t[quarter] - t[0]:
-        first, last = (phase.period_of(t[k], alpha[k]) for k in (slice(0, quarter), slice(-quarter, None)))
+        first, last = (
+            phase.period_of(t[k], alpha[k])
+            for k in (slice(0, quarter), slice(-quarter, None))
+        )
         if first and last and max(first, last) > PERIOD_RATIO * min(first, last):
             raise log.wrong(
                 f"the joints repeat every {first:.3g} in the first quarter of the log and every {last:.3g} in the last",
@@ -42,14 +51,24 @@ def period(log: Log) -> float:
             )
     count = (log.t[-1] - log.t[0]) / repeat if repeat else 0.0
     if count < FEWEST + 1:
-        what = f"the joints repeat {count:.1f} times" if count else "the joints do not repeat"
-        raise log.wrong(what, instead=f"give at least {ENOUGH} cycles of one gait, some dozens are better")
+        what = (
+            f"the joints repeat {count:.1f} times"
+            if count
+            else "the joints do not repeat"
+        )
+        raise log.wrong(
+            what,
+            instead=f"give at least {ENOUGH} cycles of one gait, some dozens are better",
+        )
     if repeat * FASTEST < 1.0:
         raise log.wrong(
-            f"the joints repeat every {repeat:.3g} where t is in s", instead="give t in s, or in any longer unit"
+            f"the joints repeat every {repeat:.3g} where t is in s",
+            instead="give t in s, or in any longer unit",
         )
     if (rows := len(log.t) / count) < ROWS:
-        raise log.wrong(f"{rows:.1f} rows a cycle are too few", instead=f"give at least {ROWS}")
+        raise log.wrong(
+            f"{rows:.1f} rows a cycle are too few", instead=f"give at least {ROWS}"
+        )
     gaps = np.diff(log.t)
     k = int(gaps.argmax())
     if many := int((gaps > max(GAP * repeat, 2.5 * np.median(gaps))).sum()):
@@ -66,10 +85,16 @@ def period(log: Log) -> float:
 def check_a_loop(log: Log, joints: Smoothed, rows: float) -> None:
     """Refuse a joint that shows nothing but noise, and joints that are all proportional: motion to and fro on a line is
     no loop. rows: per cycle."""
-    deviations, noise_sizes = joints.values - joints.values.mean(0), _noise(joints, rows)
+    deviations, noise_sizes = (
+        joints.values - joints.values.mean(0),
+        _noise(joints, rows),
+    )
     for name, size, noise in zip(log.joints, deviations.std(0), noise_sizes):
         if size <= noise:
-            raise log.wrong(f"{name} does not move beyond its noise", instead="leave it out with ``columns``")
+            raise log.wrong(
+                f"{name} does not move beyond its noise",
+                instead="leave it out with ``columns``",
+            )
     _, size, axes = np.linalg.svd(deviations, full_matrices=False)
     if size[1] > max(THIN * size[0], np.sqrt(len(deviations)) * noise_sizes.max()):
         return
@@ -96,16 +121,25 @@ def combined(joints: Smoothed, rows: float) -> dict[int, np.ndarray]:
     others, factors_of = [0], {}
     for k in range(1, deviations.shape[1]):
         factors = np.zeros(deviations.shape[1])
-        factors[others] = np.linalg.lstsq(deviations[:, others], deviations[:, k], rcond=None)[0]
+        factors[others] = np.linalg.lstsq(
+            deviations[:, others], deviations[:, k], rcond=None
+        )[0]
         residual = (deviations[:, k] - deviations @ factors).std()
-        if residual <= max(THIN * deviations[:, k].std(), np.hypot(noise[k], np.linalg.norm(factors * noise))):
-            factors_of[k] = factors * (np.abs(factors) * deviations.std(0) > SLIGHT * deviations[:, k].std())
+        if residual <= max(
+            THIN * deviations[:, k].std(),
+            np.hypot(noise[k], np.linalg.norm(factors * noise)),
+        ):
+            factors_of[k] = factors * (
+                np.abs(factors) * deviations.std(0) > SLIGHT * deviations[:, k].std()
+            )
         else:
             others.append(k)
     return factors_of
 
 
-def phased(log: Log, joints: Smoothed, period: float, harmonics: int) -> tuple[np.ndarray, Loop]:
+def phased(
+    log: Log, joints: Smoothed, period: float, harmonics: int
+) -> tuple[np.ndarray, Loop]:
     """Return the phase (N,) of each row, rad, increasing, and the mean gait.
 
     The phase is that of a sine through the joints at first, then that of the nearest point of the mean gait,
@@ -133,7 +167,9 @@ def _start(at: np.ndarray, alpha: np.ndarray) -> float:
 
 def _check_growing(log: Log, at: np.ndarray, period: float) -> None:
     """Refuse a log whose phase stands or runs back: over half a cycle it must grow by at least a fifth of one."""
-    inside = np.flatnonzero((log.t > log.t[0] + period / 2) & (log.t < log.t[-1] - period))
+    inside = np.flatnonzero(
+        (log.t > log.t[0] + period / 2) & (log.t < log.t[-1] - period)
+    )
     ahead = np.interp(log.t[inside] + period / 2, log.t, at) - at[inside]
     if (bad := np.flatnonzero(ahead < 0.4 * np.pi)).size:
         row = inside[bad[0]]
@@ -159,7 +195,10 @@ def check_no_drift(log: Log, number: np.ndarray, alpha: np.ndarray) -> None:
     c = np.arange(number.max() + 1)
     for name, x in zip(log.joints, alpha.T):
         each = [x[number == k] for k in c]
-        means, swing = np.array([a.mean() for a in each]), float(np.median([np.ptp(a) for a in each]))
+        means, swing = (
+            np.array([a.mean() for a in each]),
+            float(np.median([np.ptp(a) for a in each])),
+        )
         slope, start = np.polyfit(c, means, 1)
         if abs(slope) * c[-1] > max(swing, STEADY * (means - start - slope * c).std()):
             raise log.wrong(
@@ -169,12 +208,19 @@ def check_no_drift(log: Log, number: np.ndarray, alpha: np.ndarray) -> None:
             )
 
 
-def check_one_gait(log: Log, at: np.ndarray, number: np.ndarray, alpha: np.ndarray) -> None:
+def check_one_gait(
+    log: Log, at: np.ndarray, number: np.ndarray, alpha: np.ndarray
+) -> None:
     """Refuse cycles of two kinds: along the direction in which first harmonics differ most, almost all variance is
     between two groups."""
     count = number.max() + 1
     w = waves(at, 2)
-    each = np.array([np.linalg.lstsq(w[number == c], alpha[number == c], rcond=None)[0].ravel() for c in range(count)])
+    each = np.array(
+        [
+            np.linalg.lstsq(w[number == c], alpha[number == c], rcond=None)[0].ravel()
+            for c in range(count)
+        ]
+    )
     deviations = each - each.mean(0)
     size = np.linalg.norm(each.mean(0).reshape(5, -1)[1:])
     score = deviations @ np.linalg.svd(deviations, full_matrices=False)[2][0]
@@ -186,7 +232,10 @@ def check_one_gait(log: Log, at: np.ndarray, number: np.ndarray, alpha: np.ndarr
     best = int(between[2:-2].argmax()) + 2 if count > 5 else 0
     kind = score > (order[best] + order[best + 1]) / 2
     share = AFTER if (kind[1:] != kind[:-1]).sum() == 1 else TWO
-    distinct = high[best] - low[best] > LEAST_DISTANCE * size and min(k[best], count - k[best]) > 2
+    distinct = (
+        high[best] - low[best] > LEAST_DISTANCE * size
+        and min(k[best], count - k[best]) > 2
+    )
     if distinct and between[best] > share * (order**2).sum():
         change = int(np.flatnonzero(kind != kind[0])[0])
         row = int(np.flatnonzero(number == change)[0])

@@ -80,7 +80,9 @@ class Fitted:
         c = self.known.loop.coefficients
         cos, sin = (tuple(map(tuple, c[:, k::2].tolist())) for k in (1, 2))
         frequency = self.frequency if self.log.seconds else None
-        return Fourier(cos=cos, sin=sin, centre=tuple(c[:, 0].tolist()), frequency=frequency)
+        return Fourier(
+            cos=cos, sin=sin, centre=tuple(c[:, 0].tolist()), frequency=frequency
+        )
 
     @cached_property
     def displacement(self) -> tuple[np.ndarray, np.ndarray]:
@@ -101,12 +103,20 @@ class Fitted:
         joints = len(self.log.joints)
         most = min(MOST_POINTS, int(MOST_SHAPES ** (1 / joints)))
         points = int(np.clip(np.ceil(3 * extent / wide), min(31, most), most))
-        return tube(self.known, covering_grid(self.known, points), self.residual, self.unit, self.length)
+        return tube(
+            self.known,
+            covering_grid(self.known, points),
+            self.residual,
+            self.unit,
+            self.length,
+        )
 
     def along(self, t: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Return A (T, 3, d) at phases t of the mean gait, and half widths of its interval."""
         known = self.known
-        variance = (series(known.errors[:, :, :, 0], t) ** 2).sum(-3) + known.standard_error_at(t) ** 2
+        variance = (series(known.errors[:, :, :, 0], t) ** 2).sum(
+            -3
+        ) + known.standard_error_at(t) ** 2
         return series(known.A, t), known.factor * np.sqrt(variance)
 
     @property
@@ -163,33 +173,77 @@ def fit_log(
     cycles.check_one_gait(log, phase, count, joints.values)
     plausibility.check_right_handed(log, loop, phase, joints, pose, count)
     combined = cycles.combined(joints, rows)
-    fit = _regressed(log, loop, phase, count, joints, pose, combined, level, harmonics, limits, body_length)
+    fit = _regressed(
+        log,
+        loop,
+        phase,
+        count,
+        joints,
+        pose,
+        combined,
+        level,
+        harmonics,
+        limits,
+        body_length,
+    )
     plausibility.note_units(log, joints, pose, period, body_length)
     return fit
 
 
-def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, harmonics, limits, length) -> Fitted:
+def _regressed(
+    log,
+    loop: Loop,
+    phase,
+    count,
+    joints,
+    pose,
+    combined,
+    level,
+    harmonics,
+    limits,
+    length,
+) -> Fitted:
     inside = count >= 0
-    xi, *xi_halves = (_in_the_body(*x)[inside] for x in ((pose.values, pose.rates), *pose.halves))
+    xi, *xi_halves = (
+        _in_the_body(*x)[inside] for x in ((pose.values, pose.rates), *pose.halves)
+    )
     halves = tuple((a[inside], u[inside]) for a, u in joints.halves)
     nearest = loop.projected(joints.values, phase)
     samples = regression.Samples(
-        nearest[inside], count[inside], joints.values[inside], joints.rates[inside], xi, halves, tuple(xi_halves)
+        nearest[inside],
+        count[inside],
+        joints.values[inside],
+        joints.rates[inside],
+        xi,
+        halves,
+        tuple(xi_halves),
     )
     varies = regression.varied(loop, samples)
     most = int(min(HARMONICS, len(samples.phase) / (samples.cycle[-1] + 1) / 4))
     if harmonics is not None and harmonics > most:
-        raise log.wrong(f"``harmonics`` must be at most {most}, a quarter of the rows of a cycle, got {harmonics}")
+        raise log.wrong(
+            f"``harmonics`` must be at most {most}, a quarter of the rows of a cycle, got {harmonics}"
+        )
     size = joints.knots * (samples.cycle[-1] + 1)
     try:
-        equations, varies = unknowns.selected(loop, samples, most, harmonics, varies, size)
+        equations, varies = unknowns.selected(
+            loop, samples, most, harmonics, varies, size
+        )
         coefficients, errors = regression.solution(equations)
     except np.linalg.LinAlgError:
         raise log.wrong(
-            "its cycles do not settle so many unknowns", instead="lower ``harmonics``, or give more cycles"
+            "its cycles do not settle so many unknowns",
+            instead="lower ``harmonics``, or give more cycles",
         ) from None
-    across, others = varies == regression.RATES, [k for k in range(len(log.joints)) if k not in combined]
-    if not combined or across or regression.varied(*regression.of_joints(loop, samples, others)) == varies:
+    across, others = (
+        varies == regression.RATES,
+        [k for k in range(len(log.joints)) if k not in combined],
+    )
+    if (
+        not combined
+        or across
+        or regression.varied(*regression.of_joints(loop, samples, others)) == varies
+    ):
         combined = {}  # leaving them out would not help
     A, errors = (equations.split(x, loop) for x in (coefficients, errors))
     if not across:
@@ -198,7 +252,9 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
         loop, A[:, :, 0], A[:, :, 1:], errors, spread(loop, samples, limits, varies > regression.NOTHING), np.zeros(3),
         np.zeros((3, 2, 1)), regression.factor(len(equations.square), level), level,
     )  # fmt: skip
-    if (largest := max(np.abs(known.combined).max(), np.abs(known.errors).max())) > LARGEST_ENTRY:
+    if (
+        largest := max(np.abs(known.combined).max(), np.abs(known.errors).max())
+    ) > LARGEST_ENTRY:
         raise log.wrong(
             f"entries of A come out as large as {largest:.1g}",
             instead="give x and y in body lengths or m, and joints that move",
@@ -209,7 +265,9 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
     beyond = SAFETY * np.sqrt(np.maximum(square, 0.0))
     residual = residual_of(known, samples, varies)
     outward = _outward(known, spread(loop, samples, None, varies > regression.NOTHING))
-    beyond = np.sqrt(beyond**2 + outward**2 + (known.factor * _by_gait(known, samples)) ** 2)
+    beyond = np.sqrt(
+        beyond**2 + outward**2 + (known.factor * _by_gait(known, samples)) ** 2
+    )
     known = replace(known, beyond=beyond, standard_error=residual.standard_error)
     frequency = (len(times) - 1) / (times[-1] - times[0])
     uniform = np.interp(log.t, times, np.interp(times, log.t, phase))
@@ -229,14 +287,20 @@ def mean_of(poses: np.ndarray, level: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the mean of net poses (C, 3) of cycles, and half width of its interval. Neighbouring cycles are
     correlated."""
     errors = regression.lagged((poses - poses.mean(0)) / len(poses))
-    return poses.mean(0), regression.factor(len(poses), level) * np.sqrt((errors**2).sum(0))
+    return poses.mean(0), regression.factor(len(poses), level) * np.sqrt(
+        (errors**2).sum(0)
+    )
 
 
 def _net(known: TaylorSeries) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the net pose (3,) of the mean gait, its shapes and their rates (PHASES, d)."""
     t = 2 * np.pi * np.arange(PHASES) / PHASES
     alpha, alphadot = known.loop.shape(t), known.loop.shape(t, 1)
-    return displacement(np.einsum("nij,nj->ni", known.connection(alpha), alphadot)), alpha, alphadot
+    return (
+        displacement(np.einsum("nij,nj->ni", known.connection(alpha), alphadot)),
+        alpha,
+        alphadot,
+    )
 
 
 def _outward(known: TaylorSeries, extent: np.ndarray) -> np.ndarray:
@@ -252,7 +316,10 @@ def _outward(known: TaylorSeries, extent: np.ndarray) -> np.ndarray:
     inside = alpha + across / 2 * curvature
     wave = 1j * np.arange(PHASES // 2 + 1)[:, None]
     inside_rate = np.fft.irfft(wave * np.fft.rfft(inside, axis=0), PHASES, axis=0)
-    return displacement(np.einsum("nij,nj->ni", known.connection(inside), inside_rate)) - _net(known)[0]
+    return (
+        displacement(np.einsum("nij,nj->ni", known.connection(inside), inside_rate))
+        - _net(known)[0]
+    )
 
 
 def _by_gait(known: TaylorSeries, samples: regression.Samples) -> np.ndarray:
@@ -262,9 +329,17 @@ def _by_gait(known: TaylorSeries, samples: regression.Samples) -> np.ndarray:
     t, each = 2 * np.pi * np.arange(PHASES) / PHASES, []
     for k in range(cycles):
         rows = samples.cycle == k
-        each.append(phase_module.fitted_loop(samples.phase[rows], deviation[rows], DEVIATING))
+        each.append(
+            phase_module.fitted_loop(samples.phase[rows], deviation[rows], DEVIATING)
+        )
     each = np.array(each) - np.mean(each, 0)
-    loops = [(known.loop.shape(t) + PART * series(x, t), known.loop.shape(t, 1) + PART * series(x, t, 1)) for x in each]
+    loops = [
+        (
+            known.loop.shape(t) + PART * series(x, t),
+            known.loop.shape(t, 1) + PART * series(x, t, 1),
+        )
+        for x in each
+    ]
     alpha, alphadot = (np.array(x) for x in zip(*loops))
     net = displacement(np.einsum("knij,knj->kni", known.connection(alpha), alphadot))
     errors = regression.lagged((net - _net(known)[0]) / PART / cycles)
@@ -279,10 +354,14 @@ def _cycles(log: Log, known: TaylorSeries, phase, count, joints, pose):
     marks = 2 * np.pi * (first + np.arange(count.max() + 2))
     growing = np.maximum.accumulate(phase)
     times = np.interp(marks, growing, log.t)
-    w, terms = known.terms(known.loop.projected(joints.values, phase), joints.values, joints.rates)
+    w, terms = known.terms(
+        known.loop.projected(joints.values, phase), joints.values, joints.rates
+    )
     xi = np.einsum("ijmk,nk,njm->ni", known.combined, w, terms)
     heading = CubicSpline(log.t, xi[:, 2]).antiderivative()(log.t)
-    path = CubicSpline(log.t, np.exp(1j * heading) * (xi[:, 0] + 1j * xi[:, 1])).antiderivative()(log.t)
+    path = CubicSpline(
+        log.t, np.exp(1j * heading) * (xi[:, 0] + 1j * xi[:, 1])
+    ).antiderivative()(log.t)
     poses = (pose.values, np.stack([path.real, path.imag, heading], -1))
     each = []
     for g in poses:

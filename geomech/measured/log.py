@@ -26,8 +26,16 @@ POSE = {
     "heading": ("heading", "theta", "yaw"),
 }
 JOINT = re.compile(r"(alpha|joint|angle|a|q)_?(\d+)(_rad|_deg)?")
-UNTIMED = ("phase", "frame", "frames", "sample", "index")  # columns in place of t that are no times
-ELSEWHERE = re.compile(r".*_(mm|cm|km|px|pixels?|ms)")  # units that are not those of t, x and y
+UNTIMED = (
+    "phase",
+    "frame",
+    "frames",
+    "sample",
+    "index",
+)  # columns in place of t that are no times
+ELSEWHERE = re.compile(
+    r".*_(mm|cm|km|px|pixels?|ms)"
+)  # units that are not those of t, x and y
 SPIKE = 20.0  # deviation from neighbouring rows over that of nine in ten rows
 LARGE = 0.05  # of a column's range: least deviation of an outlier
 WHAT = "give a CSV file with a header such as t,alpha_1,alpha_2,x,y,heading"
@@ -65,7 +73,11 @@ class Log:
 
     def wrong(self, what: str, row: int | None = None, **facts: Any) -> Refusal:
         """Return a Refusal about a row, or about the whole file. facts: keywords of `Refusal`."""
-        return Refusal(what, where=self.name if row is None else f"{self.name}, line {self.lines[row]}", **facts)
+        return Refusal(
+            what,
+            where=self.name if row is None else f"{self.name}, line {self.lines[row]}",
+            **facts,
+        )
 
 
 def read(path: str | Path, columns: Sequence[str] = (), degrees: bool = False) -> Log:
@@ -91,32 +103,53 @@ def read(path: str | Path, columns: Sequence[str] = (), degrees: bool = False) -
     try:
         source = read_rows(path, LARGEST_FILE, WHAT)
         line, header = source.header
-        picked = _picked(source.name, line, header, [c.strip().lower() for c in columns])
+        picked = _picked(
+            source.name, line, header, [c.strip().lower() for c in columns]
+        )
         if len(source.filled) - 1 > MOST_ROWS:
             raise Refusal(
-                f"{len(source.filled) - 1} rows, more than {MOST_ROWS}", where=source.name, instead="thin them out"
+                f"{len(source.filled) - 1} rows, more than {MOST_ROWS}",
+                where=source.name,
+                instead="thin them out",
             )
         rows = source.numbers(header, picked)
     except ValueError as error:
         if "a row must be" in error.what:
             error.instead = "mend that row, or drop it"
         raise
-    turn = np.where([degrees or name.endswith("_deg") for name in picked], np.pi / 180, 1.0)
+    turn = np.where(
+        [degrees or name.endswith("_deg") for name in picked], np.pi / 180, 1.0
+    )
     turn[[0, -3, -2]] = 1.0
     rows = rows * turn
-    flags = {"seconds": picked[0] not in UNTIMED, "metres": all(name.endswith("_m") for name in picked[-3:-1])}
-    log = Log(source.name, rows[:, 0], rows[:, 1:-3], rows[:, -3:], picked[1:-3], source.lines, **flags)
+    flags = {
+        "seconds": picked[0] not in UNTIMED,
+        "metres": all(name.endswith("_m") for name in picked[-3:-1]),
+    }
+    log = Log(
+        source.name,
+        rows[:, 0],
+        rows[:, 1:-3],
+        rows[:, -3:],
+        picked[1:-3],
+        source.lines,
+        **flags,
+    )
     _check_times(log)
     _check_units(log, picked, turn)
     return _checked(log)
 
 
-def _picked(name: str, line: int, header: tuple[str, ...], columns: list[str]) -> tuple[str, ...]:
+def _picked(
+    name: str, line: int, header: tuple[str, ...], columns: list[str]
+) -> tuple[str, ...]:
     """Return the names of the columns of the time, the joints, x, y and the heading; Refusal if one is missing or
     ambiguous."""
     if twice := [c for k, c in enumerate(header) if c in header[:k]]:
         raise Refusal(
-            f"the column {formatted(twice[0])} is there twice", where=f"{name}, line {line}", instead="rename one"
+            f"the column {formatted(twice[0])} is there twice",
+            where=f"{name}, line {line}",
+            instead="rename one",
         )
     if columns:
         if missing := [c for c in columns if c not in header]:
@@ -126,14 +159,24 @@ def _picked(name: str, line: int, header: tuple[str, ...], columns: list[str]) -
             )
         if len(columns) < 6 or len({*columns}) < len(columns):
             raise Refusal(
-                "``columns`` are those of t, two joint angles or more, x, y and heading, in this order", where=name
+                "``columns`` are those of t, two joint angles or more, x, y and heading, in this order",
+                where=name,
             )
         return _of_joints(name, columns)
     if len(header) < 2:
-        other = "; columns must be parted by commas" if re.search("[;\\t]", header[0]) else ""
-        raise Refusal(f"no header of columns{other}", where=f"{name}, line {line}", instead=WHAT)
+        other = (
+            "; columns must be parted by commas"
+            if re.search("[;\\t]", header[0])
+            else ""
+        )
+        raise Refusal(
+            f"no header of columns{other}", where=f"{name}, line {line}", instead=WHAT
+        )
     bare = {c: re.sub("_(rad|deg)$", "", c) for c in header}
-    roles = {role: next((c for c in header if bare[c] in names), None) for role, names in POSE.items()}
+    roles = {
+        role: next((c for c in header if bare[c] in names), None)
+        for role, names in POSE.items()
+    }
     roles["t"] = roles["t"] or ("phase" if "phase" in header else None)
     matches = [(int(m[2]), m[1], c) for c in header if (m := JOINT.fullmatch(c))]
     kind = next((m[1] for m in matches), None)
@@ -145,7 +188,9 @@ def _picked(name: str, line: int, header: tuple[str, ...], columns: list[str]) -
         cure = "name them t,alpha_1,alpha_2,x,y,heading, or say ``columns``"
         known = f"it has {formatted(', '.join(header), 120)}"
         raise Refusal(what, where=f"{name}, line {line}", because=known, instead=cure)
-    return _of_joints(name, [roles["t"], *joints, roles["x"], roles["y"], roles["heading"]])
+    return _of_joints(
+        name, [roles["t"], *joints, roles["x"], roles["y"], roles["heading"]]
+    )
 
 
 def _of_joints(name: str, columns: list[str]) -> tuple[str, ...]:
@@ -155,7 +200,9 @@ def _of_joints(name: str, columns: list[str]) -> tuple[str, ...]:
             where=name,
             instead="give the shape in a few modes as columns",
         )
-    if other := [m for c in (columns[0], *columns[-3:-1]) if (m := ELSEWHERE.fullmatch(c))]:
+    if other := [
+        m for c in (columns[0], *columns[-3:-1]) if (m := ELSEWHERE.fullmatch(c))
+    ]:
         raise Refusal(
             f"{other[0][0]} is in {other[0][1]} by its name",
             where=name,
@@ -166,13 +213,24 @@ def _of_joints(name: str, columns: list[str]) -> tuple[str, ...]:
 
 def _check_times(log: Log) -> None:
     if len(log.t) < FEWEST_ROWS:
-        raise log.wrong(f"{len(log.t)} rows are too few", instead=f"give at least {FEWEST_ROWS}, of many cycles")
+        raise log.wrong(
+            f"{len(log.t)} rows are too few",
+            instead=f"give at least {FEWEST_ROWS}, of many cycles",
+        )
     step = np.diff(log.t)
     if (bad := np.flatnonzero(step <= 0)).size:
         k = bad[0]
         if step[k] == 0:
-            raise log.wrong(f"t = {log.t[k]:.6g} is given twice", k + 1, instead="keep one of the rows")
-        raise log.wrong(f"t = {log.t[k + 1]:.6g} comes after {log.t[k]:.6g}", k + 1, instead="sort the rows by time")
+            raise log.wrong(
+                f"t = {log.t[k]:.6g} is given twice",
+                k + 1,
+                instead="keep one of the rows",
+            )
+        raise log.wrong(
+            f"t = {log.t[k + 1]:.6g} comes after {log.t[k]:.6g}",
+            k + 1,
+            instead="sort the rows by time",
+        )
 
 
 def _check_units(log: Log, picked: Sequence[str], turn: np.ndarray) -> None:
@@ -180,17 +238,27 @@ def _check_units(log: Log, picked: Sequence[str], turn: np.ndarray) -> None:
     step = np.abs(np.diff(log.pose[:, 2]))
     if turn[-1] == 1.0 and (jumps := np.flatnonzero(np.abs(step - 360) < 30)).size:
         k = jumps[0] + 1
-        raise log.wrong(f"{picked[-1]} jumps by {step[k - 1]:.4g}, a turn in degrees", k, instead="say ``degrees``")
+        raise log.wrong(
+            f"{picked[-1]} jumps by {step[k - 1]:.4g}, a turn in degrees",
+            k,
+            instead="say ``degrees``",
+        )
     for k, name in enumerate(log.joints):
         row = int(np.abs(log.alpha[:, k]).argmax())
         if turn[k + 1] == 1.0 and abs(log.alpha[row, k]) > 2 * np.pi:
-            what = f"{name} reaches {log.alpha[row, k]:.4g} where joint angles are in rad"
+            what = (
+                f"{name} reaches {log.alpha[row, k]:.4g} where joint angles are in rad"
+            )
             raise log.wrong(what, row, instead="say ``degrees`` if these are degrees")
         if abs(log.alpha[row, k]) > LARGEST_ANGLE:
             raise log.wrong(
-                f"{name} reaches {np.degrees(log.alpha[row, k]):.4g} degrees", row, because="no joint turns so far"
+                f"{name} reaches {np.degrees(log.alpha[row, k]):.4g} degrees",
+                row,
+                because="no joint turns so far",
             )
-    if (turn[1:-3] != 1.0).all() and (size := np.abs(log.alpha).max()) < np.radians(2 * np.pi):
+    if (turn[1:-3] != 1.0).all() and (size := np.abs(log.alpha).max()) < np.radians(
+        2 * np.pi
+    ):
         what = f"joint angles of at most {np.degrees(size):.3g} degrees: drop ``degrees`` if these are rad"
         warnings.warn(f"{log.name}: {what}", UnitWarning, stacklevel=3)
 
@@ -201,9 +269,14 @@ def _checked(log: Log) -> Log:
     alpha = np.unwrap(log.alpha, axis=0)
     for name, values in zip(log.joints, alpha.T):
         if np.ptp(values) < 1e-6:
-            raise log.wrong(f"{name} does not move", instead="leave it out with ``columns``")
+            raise log.wrong(
+                f"{name} does not move", instead="leave it out with ``columns``"
+            )
     if (np.ptp(pose, axis=0) == 0).all():
-        raise log.wrong("x, y and heading do not move", because="nothing was measured of the body's motion")
+        raise log.wrong(
+            "x, y and heading do not move",
+            because="nothing was measured of the body's motion",
+        )
     return replace(log, alpha=alpha, pose=pose)
 
 
@@ -212,10 +285,14 @@ def check_rows(log: Log) -> None:
     step = np.diff(log.t)
     part = step[:-1] / (step[:-1] + step[1:])
     near = np.maximum(step[:-1], step[1:]) <= 2.5 * np.median(step)
-    for name, v in zip((*log.joints, "x", "y", "heading"), np.column_stack([log.alpha, log.pose]).T):
+    for name, v in zip(
+        (*log.joints, "x", "y", "heading"), np.column_stack([log.alpha, log.pose]).T
+    ):
         deviation = np.where(near, v[1:-1] - (1 - part) * v[:-2] - part * v[2:], 0.0)
         k = int(np.abs(deviation).argmax())
-        if abs(deviation[k]) <= max(SPIKE * np.quantile(np.abs(deviation), 0.9), LARGE * np.ptp(v)):
+        if abs(deviation[k]) <= max(
+            SPIKE * np.quantile(np.abs(deviation), 0.9), LARGE * np.ptp(v)
+        ):
             continue
         if abs(deviation[k]) > abs(v[k + 2] - v[k]):
             raise log.wrong(
@@ -224,7 +301,14 @@ def check_rows(log: Log) -> None:
                 instead="mend that row, or drop it",
             )
         jump = k + 1 if abs(v[k + 1] - v[k]) > abs(v[k + 2] - v[k + 1]) else k + 2
-        what = "two gaits are in the file, or the tracking slipped" if name in log.joints else "the tracking slipped"
+        what = (
+            "two gaits are in the file, or the tracking slipped"
+            if name in log.joints
+            else "the tracking slipped"
+        )
         raise log.wrong(
-            f"{name} jumps by {v[jump] - v[jump - 1]:.3g} to this row", jump, because=what, instead="cut the log there"
+            f"{name} jumps by {v[jump] - v[jump - 1]:.3g} to this row",
+            jump,
+            because=what,
+            instead="cut the log there",
         )

@@ -6,7 +6,9 @@ import numpy as np
 
 from geomech.geometry.tube import waves
 
-LIKELY = 0.9  # of the highest autocorrelation: the shortest shift above this is the period
+LIKELY = (
+    0.9  # of the highest autocorrelation: the shortest shift above this is the period
+)
 ORDER = 4  # of the Butterworth filter about the cycle's frequency
 DENSITY = 8  # harmonics of the density of a protophase
 
@@ -25,7 +27,11 @@ def period_of(t: np.ndarray, alpha: np.ndarray) -> float:
     tail = correlation.copy()
     tail[: below[0]] = -np.inf
     peaks = 1 + np.flatnonzero((tail[1:-1] > tail[:-2]) & (tail[1:-1] >= tail[2:]))
-    peaks = peaks[tail[peaks] >= LIKELY * tail[peaks].max(initial=0.0)] if peaks.size else peaks
+    peaks = (
+        peaks[tail[peaks] >= LIKELY * tail[peaks].max(initial=0.0)]
+        if peaks.size
+        else peaks
+    )
     if not peaks.size or tail[peaks[0]] <= 0:
         return 0.0
     k = peaks[0]
@@ -53,7 +59,9 @@ def uniform(phase: np.ndarray) -> np.ndarray:
 
     Kralemann et al., Phys. Rev. E 77, 066205 (2008); Revzen and Guckenheimer, Phys. Rev. E 78, 051907 (2008)."""
     k = np.arange(1, DENSITY + 1)
-    full_cycles = phase[phase < phase[0] + 2 * np.pi * np.floor((phase[-1] - phase[0]) / (2 * np.pi))]
+    full_cycles = phase[
+        phase < phase[0] + 2 * np.pi * np.floor((phase[-1] - phase[0]) / (2 * np.pi))
+    ]
     density = np.exp(-1j * full_cycles[:, None] * k).mean(0)
     correction = (density / (1j * k) * (np.exp(1j * phase[:, None] * k) - 1)).sum(1)
     return phase + 2 * correction.real

@@ -12,26 +12,34 @@ from geomech.measured import regression
 from geomech.measured.log import Log
 from geomech.measured.smooth import Smoothed
 
-TURNS = (
-    4.0  # rad of the heading per rad of the joints, rms, at most: no link of a body turns much faster than its joints
-)
+TURNS = 4.0  # rad of the heading per rad of the joints, rms, at most: no link of a body turns much faster than its joints
 MOVES = 2.0  # body lengths per rad of the joints, rms, at most: 0.02 to 0.07 in sand and fluid
 SLOWEST = 300.0  # s of a cycle
 HARMONICS = 3  # of the body velocity over the phase, for the test of handedness
 MIRRORED = 0.5  # residual of the mirror image over that of the velocity in a left-handed frame, at most
 
 
-def note_units(log: Log, joints: Smoothed, pose: Smoothed, period: float, length: float) -> None:
+def note_units(
+    log: Log, joints: Smoothed, pose: Smoothed, period: float, length: float
+) -> None:
     """Warn of numbers that are likely in another unit. length: of the body, in the unit of x and y."""
     rms = lambda rates: float(np.sqrt((rates**2).sum(-1).mean()))
-    joint_speed, speed, turning = rms(joints.rates), rms(pose.rates[:, :2]) / length, rms(pose.rates[:, 2:])
+    joint_speed, speed, turning = (
+        rms(joints.rates),
+        rms(pose.rates[:, :2]) / length,
+        rms(pose.rates[:, 2:]),
+    )
     notes = []
     if turning > TURNS * joint_speed:
         cure = "end the name of its column in _deg if it is in degrees"
-        notes.append(f"the heading turns {turning / joint_speed:.3g} times as fast as the joints: {cure}")
+        notes.append(
+            f"the heading turns {turning / joint_speed:.3g} times as fast as the joints: {cure}"
+        )
     if speed > MOVES * joint_speed:
         cure = "give them in body lengths, or in m with ``body_length``"
-        notes.append(f"x and y move by {speed / joint_speed:.3g} body lengths where the joints turn by 1 rad: {cure}")
+        notes.append(
+            f"x and y move by {speed / joint_speed:.3g} body lengths where the joints turn by 1 rad: {cure}"
+        )
     if length == 1.0 and log.metres:
         notes.append(
             "x and y are in m by the names of their columns, and are taken for body lengths: say ``body_length``"
@@ -44,18 +52,30 @@ def note_units(log: Log, joints: Smoothed, pose: Smoothed, period: float, length
         warnings.warn(f"{log.name}: {line}", UnitWarning, stacklevel=3)
 
 
-def check_right_handed(log: Log, loop: Loop, phase: np.ndarray, joints: Smoothed, pose: Smoothed, count) -> None:
+def check_right_handed(
+    log: Log, loop: Loop, phase: np.ndarray, joints: Smoothed, pose: Smoothed, count
+) -> None:
     """Refuse a pose whose mirror image fits much better.
 
     In the body frame the velocity follows from phase and rate. If y or the heading has the wrong sign, that holds for
     velocities rotated by the heading in the wrong sense."""
     rows = np.flatnonzero(count >= 0)
     known = regression.columns(
-        loop, phase[rows], joints.values[rows], joints.rates[rows], HARMONICS, regression.NOTHING
+        loop,
+        phase[rows],
+        joints.values[rows],
+        joints.rates[rows],
+        HARMONICS,
+        regression.NOTHING,
     )
-    velocity, turn = pose.rates[rows, 0] + 1j * pose.rates[rows, 1], np.exp(-1j * pose.values[rows, 2])
+    velocity, turn = (
+        pose.rates[rows, 0] + 1j * pose.rates[rows, 1],
+        np.exp(-1j * pose.values[rows, 2]),
+    )
     both = np.stack([velocity * turn, velocity / turn], -1)
-    residual = np.abs(both - known @ np.linalg.lstsq(known.astype(complex), both, rcond=None)[0])
+    residual = np.abs(
+        both - known @ np.linalg.lstsq(known.astype(complex), both, rcond=None)[0]
+    )
     plain, mirrored = (residual**2).sum(0)
     if mirrored < MIRRORED * plain:
         raise log.wrong(

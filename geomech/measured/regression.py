@@ -22,7 +22,9 @@ MOST_BLOCKS = 120  # of cycles in the jackknife
 MOST_NUMBERS = 20_000_000  # of all their matrices
 SECOND = 2  # harmonics of the terms of the second order in the deviation, at most
 LAGS = 8  # blocks over which errors are correlated
-CROSSWISE = 0.01  # least singular value, relative, of a series of A acting along the gait
+CROSSWISE = (
+    0.01  # least singular value, relative, of a series of A acting along the gait
+)
 CERTAIN = 5.0  # standard errors by which the cycles must vary
 LEAST_VARIED = 3e-3  # least deviation across the gait, over joint rates or the gait's size: splines cause as much
 NOTHING, SHAPES, RATES = range(
@@ -65,18 +67,31 @@ class Sums:
     def truncated(self, harmonics: int) -> Sums:
         """Return the equations without higher harmonics of the connection."""
         wide, all_columns = 2 * self.harmonics + 1, np.arange(self.matrix.shape[1])
-        pick = all_columns[(all_columns >= self.terms * wide) | (all_columns % wide <= 2 * harmonics)]
-        return Sums(self.matrix[:, pick][:, :, pick], self.right[:, pick], self.square, self.kinds, harmonics)
+        pick = all_columns[
+            (all_columns >= self.terms * wide) | (all_columns % wide <= 2 * harmonics)
+        ]
+        return Sums(
+            self.matrix[:, pick][:, :, pick],
+            self.right[:, pick],
+            self.square,
+            self.kinds,
+            harmonics,
+        )
 
     @property
     def plain(self) -> Sums:
         """Equations without terms of the second order."""
         first = self.terms * (2 * self.harmonics + 1)
-        return replace(self, matrix=self.matrix[:, :first, :first], right=self.right[:, :first])
+        return replace(
+            self, matrix=self.matrix[:, :first, :first], right=self.right[:, :first]
+        )
 
     def solved(self, weights: np.ndarray) -> np.ndarray:
         """Return solutions (..., P, 3) for weights (..., B) of the blocks."""
-        matrix, right = np.tensordot(weights, self.matrix, 1), np.tensordot(weights, self.right, 1)
+        matrix, right = (
+            np.tensordot(weights, self.matrix, 1),
+            np.tensordot(weights, self.right, 1),
+        )
         size = np.sqrt(np.maximum(np.abs(np.einsum("...pp->...p", matrix)), 1e-300))
         scaled = matrix / size[..., :, None] / size[..., None, :]
         return np.linalg.solve(scaled, right / size[..., None]) / size[..., None]
@@ -84,12 +99,18 @@ class Sums:
     def residual(self, solution: np.ndarray) -> np.ndarray:
         """Return sums of squares (B, 3) of the residual of xi with a solution (P, 3)."""
         cross = np.einsum("pi,bpi->bi", solution, self.right)
-        return self.square - 2 * cross + np.einsum("pi,bpi->bi", solution, self.matrix @ solution)
+        return (
+            self.square
+            - 2 * cross
+            + np.einsum("pi,bpi->bi", solution, self.matrix @ solution)
+        )
 
     def split(self, solution: np.ndarray, loop: Loop) -> np.ndarray:
         """Return A and its slopes along the normals, (..., 3, d, d, 2 K + 1), from solutions (..., P, 3)."""
         wide, d = 2 * self.harmonics + 1, len(loop.coefficients)
-        solution = solution[..., : self.terms * wide, :].reshape(*solution.shape[:-2], *self.kinds, wide, 3)
+        solution = solution[..., : self.terms * wide, :].reshape(
+            *solution.shape[:-2], *self.kinds, wide, 3
+        )
         solution = np.moveaxis(solution, -1, -4)
         if self.kinds[0] == 1:
             solution = _spread_out(loop, solution[..., 0, :, :])
@@ -104,12 +125,16 @@ def _spread_out(loop: Loop, along: np.ndarray) -> np.ndarray:
     entries across the gait are left out."""
     d, wide = len(loop.coefficients), max(along.shape[-1], loop.coefficients.shape[1])
     t = 2 * np.pi * np.arange(8 * wide) / (8 * wide)
-    rows = np.einsum("td,tw->tdw", loop.shape(t, 1), waves(t, wide // 2)).reshape(len(t), -1)
+    rows = np.einsum("td,tw->tdw", loop.shape(t, 1), waves(t, wide // 2)).reshape(
+        len(t), -1
+    )
     least = np.linalg.lstsq(rows, waves(t, along.shape[-1] // 2), rcond=CROSSWISE)[0]
     return np.moveaxis((along @ least.T).reshape(*along.shape[:-1], d, wide), -2, -3)
 
 
-def columns(loop: Loop, phase, alpha, rate, harmonics: int, varies: int, second: int = SECOND) -> np.ndarray:
+def columns(
+    loop: Loop, phase, alpha, rate, harmonics: int, varies: int, second: int = SECOND
+) -> np.ndarray:
     """Return the regressors (..., N, P) of alpha and rate (..., N, d): alphadot_j and s_k alphadot_j times waves in phase
     (N,), and s_k s_l alphadot_j times ``second`` harmonics, none if that is -1.
 
@@ -119,33 +144,58 @@ def columns(loop: Loop, phase, alpha, rate, harmonics: int, varies: int, second:
         rate = ((rate * mean).sum(-1) / (mean**2).sum(-1))[..., None]
     if varies == NOTHING:
         return _times(rate, one, waves(phase, harmonics))
-    normal = np.einsum("nik,...ni->...nk", loop.normals(phase), alpha - loop.shape(phase))
+    normal = np.einsum(
+        "nik,...ni->...nk", loop.normals(phase), alpha - loop.shape(phase)
+    )
     k, m = np.triu_indices(normal.shape[-1])
-    groups = ((np.concatenate([one, normal], -1), harmonics), (normal[..., k] * normal[..., m], second))
-    return np.concatenate([_times(rate, s, waves(phase, h)) for s, h in groups if h >= 0], -1)
+    groups = (
+        (np.concatenate([one, normal], -1), harmonics),
+        (normal[..., k] * normal[..., m], second),
+    )
+    return np.concatenate(
+        [_times(rate, s, waves(phase, h)) for s, h in groups if h >= 0], -1
+    )
 
 
 def _times(rate, s, w) -> np.ndarray:
     """Return all products (..., N, d S W) of rates (..., N, d), deviations (..., N, S) and waves (N, W)."""
-    return np.einsum("...nj,...ns,nw->...njsw", rate, s, w).reshape(*rate.shape[:-1], -1)
+    return np.einsum("...nj,...ns,nw->...njsw", rate, s, w).reshape(
+        *rate.shape[:-1], -1
+    )
 
 
-def sums(loop: Loop, samples: Samples, harmonics: int, varies: int = RATES, second: int = SECOND) -> Sums:
+def sums(
+    loop: Loop,
+    samples: Samples,
+    harmonics: int,
+    varies: int = RATES,
+    second: int = SECOND,
+) -> Sums:
     """Return the normal equations of blocks of cycles.
 
     The product of a regressor with itself is that of its two halves. Their noise is independent and biases nothing
     (instrumental variables); noise in a regressor would draw its coefficient to 0."""
     d = samples.alpha.shape[1]
     count = columns(
-        loop, *(x[:1] for x in (samples.phase, samples.alpha, samples.rate)), harmonics, varies, second
+        loop,
+        *(x[:1] for x in (samples.phase, samples.alpha, samples.rate)),
+        harmonics,
+        varies,
+        second,
     ).shape[1]
     most = min(MOST_BLOCKS, max(FOLDS * LAGS, MOST_NUMBERS // count**2))
     products = []
     for block in blocks(samples, most):
-        alpha, rate = (np.stack([x[block] for x in both]) for both in zip(*samples.halves))
-        one, other = columns(loop, samples.phase[block], alpha, rate, harmonics, varies, second)
+        alpha, rate = (
+            np.stack([x[block] for x in both]) for both in zip(*samples.halves)
+        )
+        one, other = columns(
+            loop, samples.phase[block], alpha, rate, harmonics, varies, second
+        )
         product, xi = one.T @ other, samples.xi[block]
-        products.append(((product + product.T) / 2, (one + other).T @ xi / 2, (xi**2).sum(0)))
+        products.append(
+            ((product + product.T) / 2, (one + other).T @ xi / 2, (xi**2).sum(0))
+        )
     kinds = d if varies == RATES else 1, 1 if varies == NOTHING else d
     return Sums(*map(np.array, zip(*products)), kinds, harmonics)
 
@@ -160,20 +210,38 @@ def blocks(samples: Samples, most: int = MOST_BLOCKS) -> list[slice]:
 
 def varied(loop: Loop, samples: Samples) -> int:
     """Return what varies in every direction across the gait beyond noise: RATES, SHAPES alone, or NOTHING."""
-    normal, theta, mean = loop.normals(samples.phase), loop.shape(samples.phase), loop.shape(samples.phase, 1)
+    normal, theta, mean = (
+        loop.normals(samples.phase),
+        loop.shape(samples.phase),
+        loop.shape(samples.phase, 1),
+    )
     rate_along = (samples.rate * mean).sum(-1) / (mean**2).sum(-1)
     across = lambda x: np.einsum("nik,ni->nk", normal, x)
-    if _sure(samples, [across(u - rate_along[:, None] * mean) for _, u in samples.halves], (samples.rate**2).sum()):
+    if _sure(
+        samples,
+        [across(u - rate_along[:, None] * mean) for _, u in samples.halves],
+        (samples.rate**2).sum(),
+    ):
         return RATES
     size = ((theta - theta.mean(0)) ** 2).sum()
-    return SHAPES if _sure(samples, [across(x - theta) for x, _ in samples.halves], size) else NOTHING
+    return (
+        SHAPES
+        if _sure(samples, [across(x - theta) for x, _ in samples.halves], size)
+        else NOTHING
+    )
 
 
-def of_joints(loop: Loop, samples: Samples, joints: Sequence[int]) -> tuple[Loop, Samples]:
+def of_joints(
+    loop: Loop, samples: Samples, joints: Sequence[int]
+) -> tuple[Loop, Samples]:
     """Return the mean gait and the samples of some joints alone."""
     joints = list(joints)
-    halves = tuple((alpha[:, joints], rate[:, joints]) for alpha, rate in samples.halves)
-    selected = samples._replace(alpha=samples.alpha[:, joints], rate=samples.rate[:, joints], halves=halves)
+    halves = tuple(
+        (alpha[:, joints], rate[:, joints]) for alpha, rate in samples.halves
+    )
+    selected = samples._replace(
+        alpha=samples.alpha[:, joints], rate=samples.rate[:, joints], halves=halves
+    )
     return Loop(loop.coefficients[joints]), selected
 
 
@@ -184,7 +252,12 @@ def _sure(samples: Samples, halves, size: float) -> bool:
     each = np.array([one[block].T @ other[block] for block in blocks(samples)])
     least = np.linalg.eigh((each + each.swapaxes(1, 2)).mean(0))[1][:, 0]
     q = np.einsum("bij,i,j->b", each, least, least)
-    return bool(q.mean() > max(CERTAIN * q.std(ddof=1) / np.sqrt(len(q)), LEAST_VARIED**2 * size / len(q)))
+    return bool(
+        q.mean()
+        > max(
+            CERTAIN * q.std(ddof=1) / np.sqrt(len(q)), LEAST_VARIED**2 * size / len(q)
+        )
+    )
 
 
 def unknown(loop: Loop, A: np.ndarray, varies: int) -> np.ndarray:
@@ -196,21 +269,28 @@ def unknown(loop: Loop, A: np.ndarray, varies: int) -> np.ndarray:
     t = 2 * np.pi * np.arange(4 * wide) / (4 * wide)
     rate = loop.shape(t, 1)
     speed = np.linalg.norm(rate, axis=-1)
-    along = np.einsum("ijk,tk,tj->ti", A[:, :, 0], waves(t, wide // 2), rate) / speed[:, None]
-    size, extent = np.sqrt((along**2).mean(0)), np.linalg.norm(loop.coefficients[:, 1:])
-    directions = np.concatenate([loop.normals(t) * speed[:, None, None], rate[..., None]], -1) / np.sqrt(
-        (speed**2).mean()
+    along = (
+        np.einsum("ijk,tk,tj->ti", A[:, :, 0], waves(t, wide // 2), rate)
+        / speed[:, None]
     )
-    directions = np.linalg.lstsq(waves(t, wide // 2), directions.reshape(len(t), -1), rcond=None)[
-        0
-    ].T  # no more harmonics than the gait
+    size, extent = np.sqrt((along**2).mean(0)), np.linalg.norm(loop.coefficients[:, 1:])
+    directions = np.concatenate(
+        [loop.normals(t) * speed[:, None, None], rate[..., None]], -1
+    ) / np.sqrt((speed**2).mean())
+    directions = np.linalg.lstsq(
+        waves(t, wide // 2), directions.reshape(len(t), -1), rcond=None
+    )[0].T  # no more harmonics than the gait
     directions, errors = np.moveaxis(directions.reshape(d, d, wide), 1, 0), []
-    for i, (direction, k) in itertools.product(range(3), itertools.product(range(d), range(d))):
+    for i, (direction, k) in itertools.product(
+        range(3), itertools.product(range(d), range(d))
+    ):
         if direction < d - 1 or (
             varies == NOTHING and k > 0
         ):  # the last direction is along the gait, k = 0 is A itself
             errors.append(np.zeros((3, d, d, wide)))
-            errors[-1][i, :, k] = directions[direction] * size[i] / (extent if k else 1.0)
+            errors[-1][i, :, k] = (
+                directions[direction] * size[i] / (extent if k else 1.0)
+            )
     return np.array(errors)
 
 
@@ -221,14 +301,22 @@ def solution(equations: Sums) -> tuple[np.ndarray, np.ndarray]:
     neighbours: noise of a pose ends one cycle too far and begins the next. Correlations fall to 0 over LAGS blocks
     (Bartlett's weights, by which no variance becomes negative; Newey and West 1987). The last error is half of the
     change by terms of the second order: where links begin or cease to stick, the series does not end there."""
-    count, first = len(equations.square), equations.terms * (2 * equations.harmonics + 1)
+    count, first = (
+        len(equations.square),
+        equations.terms * (2 * equations.harmonics + 1),
+    )
     coefficients = equations.solved(np.ones(count))
     without = np.array([equations.solved(row) for row in 1 - np.eye(count)])
     errors = lagged(without - coefficients)
     if first == len(coefficients):
         return coefficients, errors
     plain = equations.plain.solved(np.ones(count))
-    change = np.concatenate([coefficients[:first] - plain, np.zeros_like(coefficients[first:])]) / 2
+    change = (
+        np.concatenate(
+            [coefficients[:first] - plain, np.zeros_like(coefficients[first:])]
+        )
+        / 2
+    )
     return coefficients, np.concatenate([errors, change[None]])
 
 

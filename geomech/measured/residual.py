@@ -47,16 +47,29 @@ def residual_of(known: TaylorSeries, samples: Samples, varies: int) -> Residual:
     misfit = samples.xi - predicted(samples.alpha, samples.rate)
     residual = np.sqrt((misfit**2).mean(0) / (samples.rate**2).sum(-1).mean())
     explained = 1 - (misfit**2).mean(0) / samples.xi.var(0).clip(1e-300)
-    halves = [xi - predicted(*half) for half, xi in zip(samples.halves, samples.xi_halves)]
-    places, speed = _Places(samples.phase), (known.loop.shape(samples.phase, 1) ** 2).sum(-1, keepdims=True)
-    common, noise = places.product(*halves), places.product(*[halves[0] - halves[1]] * 2) / 4
+    halves = [
+        xi - predicted(*half) for half, xi in zip(samples.halves, samples.xi_halves)
+    ]
+    places, speed = (
+        _Places(samples.phase),
+        (known.loop.shape(samples.phase, 1) ** 2).sum(-1, keepdims=True),
+    )
+    common, noise = (
+        places.product(*halves),
+        places.product(*[halves[0] - halves[1]] * 2) / 4,
+    )
     mean = np.multiply(*map(places.mean, halves)) - (common + noise) / places.count
     along = COARSE**2 * _near(mean) / _near(places.mean(speed))
     across = np.zeros_like(along)
     if varies == RATES:
-        swings = (np.einsum("nik,ni->nk", known.loop.normals(samples.phase), u) for _, u in samples.halves)
+        swings = (
+            np.einsum("nik,ni->nk", known.loop.normals(samples.phase), u)
+            for _, u in samples.halves
+        )
         swing = _near(places.mean(np.multiply(*swings).mean(-1, keepdims=True)))
-        across = _near(common - NOISE * noise) / np.maximum(swing, SLOWEST**2 * swing.mean())
+        across = _near(common - NOISE * noise) / np.maximum(
+            swing, SLOWEST**2 * swing.mean()
+        )
     square = np.maximum(np.stack([along, across]), 0.0) + TAIL**2 * _truncation(known)
     return Residual(residual, explained, np.sqrt(square).transpose(2, 0, 1))
 
@@ -72,10 +85,14 @@ def _truncation(known: TaylorSeries) -> np.ndarray:
     def squares(coefficients: np.ndarray) -> np.ndarray:
         A = series(coefficients * upper, t)
         across = np.einsum("t...ij,tjk->t...ik", A, normals)
-        return np.stack([np.einsum("t...ij,tj->t...i", A, tangent) ** 2, (across**2).mean(-1)])
+        return np.stack(
+            [np.einsum("t...ij,tj->t...i", A, tangent) ** 2, (across**2).mean(-1)]
+        )
 
     noise = squares(known.errors[:, :, :, 0]).sum(2)
-    return np.stack([np.maximum(_near(a - b), 0.0) for a, b in zip(squares(known.A), noise)])
+    return np.stack(
+        [np.maximum(_near(a - b), 0.0) for a, b in zip(squares(known.A), noise)]
+    )
 
 
 class _Places:
@@ -87,11 +104,18 @@ class _Places:
 
     def mean(self, values: np.ndarray) -> np.ndarray:
         """Return means (PLACES, C) of values (N, C)."""
-        return np.stack([np.bincount(self.bins, x, PLACES) for x in values.T], -1) / self.count
+        return (
+            np.stack([np.bincount(self.bins, x, PLACES) for x in values.T], -1)
+            / self.count
+        )
 
     def product(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Return covariances (PLACES, C) of a and b (N, C)."""
-        return (self.mean(a * b) - self.mean(a) * self.mean(b)) * self.count / (self.count - 1)
+        return (
+            (self.mean(a * b) - self.mean(a) * self.mean(b))
+            * self.count
+            / (self.count - 1)
+        )
 
 
 def _near(values: np.ndarray) -> np.ndarray:

@@ -29,7 +29,10 @@ def status(fit: Fitted) -> str:
         return "fitted"
     if not fit.combined:
         return f"{ALONG}: its cycles do not vary enough to tell A across it"
-    combinations = ", ".join(f"{fit.log.joints[k]} is {_sum(fit, factors)}" for k, factors in fit.combined.items())
+    combinations = ", ".join(
+        f"{fit.log.joints[k]} is {_sum(fit, factors)}"
+        for k, factors in fit.combined.items()
+    )
     names = ", ".join(fit.log.joints[k] for k in fit.combined)
     return (
         f"{ALONG}: {combinations}, but for constants and noise, which leaves A across it open: "
@@ -72,8 +75,22 @@ class Fit(Question):
         over, unit = ("component",), f"{fit.unit} (x, y), rad (theta)"
         variables = (
             Variable("component", over, np.array(COMPONENTS)),
-            Variable("displacement_measured", over, mean, unit, "mean of the log's cycles", mean_error),
-            Variable("displacement_predicted", over, net, unit, "of the mean gait, by the connection", error),
+            Variable(
+                "displacement_measured",
+                over,
+                mean,
+                unit,
+                "mean of the log's cycles",
+                mean_error,
+            ),
+            Variable(
+                "displacement_predicted",
+                over,
+                net,
+                unit,
+                "of the mean gait, by the connection",
+                error,
+            ),
         )
         return Result("measured", variables, {"status": status(fit)}, fit)
 
@@ -84,10 +101,18 @@ def of_fit(fit: Fitted) -> Result:
     `Connection.load` and [system] kind = "table" read it from NetCDF."""
     tube, unit = fit.tube, fit.unit
     error = tube.at_grid(tube.taylor.connection_error)
-    variables = [*fields.of_connection(tube, error), *fields.of_known(tube.taylor, unit), fields.of_reach(tube)]
+    variables = [
+        *fields.of_connection(tube, error),
+        *fields.of_known(tube.taylor, unit),
+        fields.of_reach(tube),
+    ]
     if len(tube.axes) == 2:
-        variables.append(fields.of_ccf(ccf(tube), curvature_error(tube), INTERVAL_OF_CCF))
-    axes = fields.coordinates(tube.axes, [(name, "rad") for name in angles_of(tube.axes)])
+        variables.append(
+            fields.of_ccf(ccf(tube), curvature_error(tube), INTERVAL_OF_CCF)
+        )
+    axes = fields.coordinates(
+        tube.axes, [(name, "rad") for name in angles_of(tube.axes)]
+    )
     return Result("connection", (*axes, *variables), _about(fit), fit)
 
 
@@ -120,4 +145,10 @@ def scene_toml(fit: Fitted, field: Path, scene: Path) -> str:
     """Return a scene of the mean gait with the field's file, named relative to the scene."""
     file = os.path.relpath(field.resolve(), scene.resolve().parent)
     head = f"# The mean gait of {len(fit.measured)} cycles of {fit.log.name}, and the connection near it.\n"
-    return "\n".join([head, table("system", {"kind": "table", "file": file}), table("gait", gait_table(fit.gait))])
+    return "\n".join(
+        [
+            head,
+            table("system", {"kind": "table", "file": file}),
+            table("gait", gait_table(fit.gait)),
+        ]
+    )

@@ -34,10 +34,16 @@ def smoothed(t: np.ndarray, channels: np.ndarray, period: float) -> Smoothed:
     Knots are at rows; their number per cycle minimises the geometric mean over the channels of the generalised
     cross-validation."""
     rows = len(t) * period / (t[-1] - t[0])  # per cycle
-    step = _spacing(t[:TRIED], channels[:TRIED], sorted({max(FEWEST, round(rows / k)) for k in KNOTS}, reverse=True))
+    step = _spacing(
+        t[:TRIED],
+        channels[:TRIED],
+        sorted({max(FEWEST, round(rows / k)) for k in KNOTS}, reverse=True),
+    )
     values, rates = _through(t, channels, step, t)
     noise = np.sqrt(((channels - values) ** 2).sum(0) / (len(t) * (1 - 1 / step)))
-    halves = tuple(_through(t[k::2], channels[k::2], max(2, -(-step // 2)), t) for k in (0, 1))
+    halves = tuple(
+        _through(t[k::2], channels[k::2], max(2, -(-step // 2)), t) for k in (0, 1)
+    )
     return Smoothed(values, rates, halves, rows / step, noise)
 
 
@@ -47,11 +53,15 @@ def _spacing(t: np.ndarray, channels: np.ndarray, steps: list[int]) -> int:
     for step in steps:
         curve = _spline(t, channels, step)
         residual, free = channels - curve(t), 1 - len(curve.c) / len(t)
-        scores[step] = np.log(np.maximum((residual**2).mean(0), 1e-300) / free**2).mean()
+        scores[step] = np.log(
+            np.maximum((residual**2).mean(0), 1e-300) / free**2
+        ).mean()
     return max(FEWEST, round(min(scores, key=scores.get) / CLOSER))
 
 
-def _through(t: np.ndarray, channels: np.ndarray, step: int, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _through(
+    t: np.ndarray, channels: np.ndarray, step: int, at: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return values and rates at ascending times ``at`` (M,) of the spline with a knot at every ``step``-th row.
 
     It is assembled from pieces of PIECE rows with margins, as the solver's time grows with the square of a piece."""
@@ -60,7 +70,9 @@ def _through(t: np.ndarray, channels: np.ndarray, step: int, at: np.ndarray) -> 
     ends = np.searchsorted(at, [*t[starts[1:]], np.inf])
     for a, low, high in zip(starts, [0, *ends[:-1]], ends):
         last = len(t) if high == len(at) else min(len(t), a + PIECE + margin)
-        window = slice(max(0, a - margin) // step * step, last)  # knots stay where they are
+        window = slice(
+            max(0, a - margin) // step * step, last
+        )  # knots stay where they are
         curve = _spline(t[window], channels[window], step)
         inside = np.clip(at[low:high], curve.t[0], curve.t[-1])
         parts.append((curve(inside), curve.derivative()(inside)))

@@ -13,7 +13,9 @@ WIDTH = 0.3  # rad of phase, over which it is averaged
 LEAST = 0.02  # of the gait's size: range of A at the gait where cycles do not vary
 
 
-def spread(loop: Loop, samples: Samples, limits: float | None, varied: bool) -> np.ndarray:
+def spread(
+    loop: Loop, samples: Samples, limits: float | None, varied: bool
+) -> np.ndarray:
     """Return the spread (d, d, P) of `tube.TaylorSeries`: DEVIATIONS^2 times the covariance of deviations without noise, by
     phase; or the square of ``limits``, rad, in all directions.
 
@@ -21,7 +23,11 @@ def spread(loop: Loop, samples: Samples, limits: float | None, varied: bool) -> 
     d = samples.alpha.shape[1]
     least = LEAST * np.sqrt((loop.coefficients[:, 1:] ** 2).sum() / 2)
     if limits is not None or not varied:
-        return np.repeat((np.eye(d) * (least if limits is None else limits) ** 2)[..., None], PLACES, -1)
+        return np.repeat(
+            (np.eye(d) * (least if limits is None else limits) ** 2)[..., None],
+            PLACES,
+            -1,
+        )
     (one, _), (other, _) = samples.halves
     theta, normal = loop.shape(samples.phase), loop.normals(samples.phase)
     one, other = (np.einsum("nik,ni->nk", normal, x - theta) for x in (one, other))

@@ -37,11 +37,17 @@ def made(
     spread (rad): standard deviation of smooth deviations of each joint from the gait, which decorrelate within a
     quarter of a cycle. jitter: relative standard deviation of the rate of the phase, over a cycle. noise (rad),
     pose_noise (the velocity's length, and rad): white noise of each row."""
-    for name, value, low in (("cycles", cycles, 2), ("samples", samples, 8), ("seed", seed, 0)):
+    for name, value, low in (
+        ("cycles", cycles, 2),
+        ("samples", samples, 8),
+        ("seed", seed, 0),
+    ):
         in_range(name, value, low, 1e7, whole=True)
     rng, count = np.random.default_rng(seed), int(cycles * samples * FINER) + 1
     t = np.arange(count) / (samples * FINER * frequency)
-    smooth = lambda width, columns: _smooth(rng, count, width * samples * FINER, columns)
+    smooth = lambda width, columns: _smooth(
+        rng, count, width * samples * FINER, columns
+    )
     rate = 2 * np.pi * frequency * (1 + jitter * smooth(1.0, 1)[0][:, 0])
     step = t[1]
     phase = np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2)]) * step
@@ -50,18 +56,26 @@ def made(
     alphadot = gait.rate(phase) * rate[:, None] + spread * deviation_rate / step
     pose = _integrated(velocity(alpha, alphadot), step)[::FINER]
     alpha, pose = alpha[::FINER], pose + pose_noise * rng.normal(size=pose.shape)
-    return SyntheticLog(t[::FINER], alpha + noise * rng.normal(size=alpha.shape), pose, phase[::FINER])
+    return SyntheticLog(
+        t[::FINER], alpha + noise * rng.normal(size=alpha.shape), pose, phase[::FINER]
+    )
 
 
-def _smooth(rng, count: int, width: float, columns: int) -> tuple[np.ndarray, np.ndarray]:
+def _smooth(
+    rng, count: int, width: float, columns: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Return values and their derivatives by the step, (count, columns) each, of unit variance, correlated over
     ``width`` steps."""
-    k = 2 * np.pi * np.fft.rfftfreq(2 * count)[:, None]  # twice as long, so that end and beginning are uncorrelated
-    waves = (rng.normal(size=(len(k), columns)) + 1j * rng.normal(size=(len(k), columns))) * np.exp(
-        -((k * width) ** 2) / 2
-    )
+    k = (
+        2 * np.pi * np.fft.rfftfreq(2 * count)[:, None]
+    )  # twice as long, so that end and beginning are uncorrelated
+    waves = (
+        rng.normal(size=(len(k), columns)) + 1j * rng.normal(size=(len(k), columns))
+    ) * np.exp(-((k * width) ** 2) / 2)
     waves[0] = 0.0
-    values, rates = (np.fft.irfft(w, 2 * count, axis=0)[:count] for w in (waves, 1j * k * waves))
+    values, rates = (
+        np.fft.irfft(w, 2 * count, axis=0)[:count] for w in (waves, 1j * k * waves)
+    )
     size = np.fft.irfft(waves, 2 * count, axis=0).std(0)
     return values / size, rates / size
 
@@ -79,7 +93,13 @@ def _integrated(xi: np.ndarray, step: float) -> np.ndarray:
 
 def save(path: str | Path, log: SyntheticLog) -> None:
     """Write a log as CSV: t, alpha_1 ..., x, y, heading."""
-    names = ["t", *(f"alpha_{k + 1}" for k in range(log.alpha.shape[1])), "x", "y", "heading"]
+    names = [
+        "t",
+        *(f"alpha_{k + 1}" for k in range(log.alpha.shape[1])),
+        "x",
+        "y",
+        "heading",
+    ]
     rows = np.column_stack([log.t, log.alpha, log.pose])
     with atomic_file(path) as part:
         np.savetxt(part, rows, "%.9g", ",", header=",".join(names), comments="")

@@ -22,7 +22,9 @@ class Constraints:
     def __init__(self, loops, singularity, first: np.ndarray):
         self.loops, self.singularity, self.away = loops, singularity, 0.0
         self.first = self._clear(first, first)
-        self.stroke = isinstance(loops, Loops) and Stroke.is_one(loops, self.first, SLIGHTLY)
+        self.stroke = isinstance(loops, Loops) and Stroke.is_one(
+            loops, self.first, SLIGHTLY
+        )
         if singularity is not None:
             self.away = MARGIN * float(np.abs(self._distance(self.first)).min())
 

@@ -42,8 +42,19 @@ class Phases:
 
     exact = 1e-10  # rad: tolerance of a net turn of 0
 
-    def __init__(self, loops: Loops, velocity: Callable, power: Callable | None = None, degree: float = 1.0):
-        self.loops, self.velocity, self.power, self.degree = loops, velocity, power, degree
+    def __init__(
+        self,
+        loops: Loops,
+        velocity: Callable,
+        power: Callable | None = None,
+        degree: float = 1.0,
+    ):
+        self.loops, self.velocity, self.power, self.degree = (
+            loops,
+            velocity,
+            power,
+            degree,
+        )
         self.count, self.last, self.warm = 0, None, takes_start(velocity)
 
     def __call__(self, p: np.ndarray) -> CycleValues:
@@ -51,7 +62,9 @@ class Phases:
         alpha, alphadot = loops.cycle(p)
         speed = np.sqrt((alphadot**2).sum(-1).mean()) or 1.0
         axes, steps = np.eye(2 * d), np.repeat([STEP, STEP * speed], d)
-        moves = np.concatenate([np.zeros((1, 2 * d)), steps * axes, -steps * axes])[:, None]
+        moves = np.concatenate([np.zeros((1, 2 * d)), steps * axes, -steps * axes])[
+            :, None
+        ]
         samples = alpha + moves[..., :d], alphadot + moves[..., d:]
         spans = 2 * steps[:, None]
         self.count += 1
@@ -72,9 +85,18 @@ class Phases:
             power = mean, self._in_p(dP / n)
             root = np.maximum(P[0], 1e-12 * mean + 1e-300) ** (1 / q)
             by_P = root / np.maximum(P[0], 1e-12 * mean + 1e-300) / q
-            length = 2 * np.pi * root.mean(), self._in_p(2 * np.pi / n * by_P[:, None] * dP)
+            length = (
+                2 * np.pi * root.mean(),
+                self._in_p(2 * np.pi / n * by_P[:, None] * dP),
+            )
         swing = float(swing_by @ xi[0][:, 2])
-        return CycleValues((net, chain(by_xi)), (swing, chain(zero)), length, power, uneven(loops, alphadot))
+        return CycleValues(
+            (net, chain(by_xi)),
+            (swing, chain(zero)),
+            length,
+            power,
+            uneven(loops, alphadot),
+        )
 
     def _velocities(self, alpha, alphadot) -> np.ndarray:
         """Return xi (1 + 4 d, N, 3) of a loop and of its perturbations. Balances start from the last loop, then from
@@ -83,7 +105,9 @@ class Phases:
             return self.velocity(alpha, alphadot)
         unmoved = self.velocity(alpha[:1], alphadot[:1], start=self.last)
         self.last = unmoved
-        return np.concatenate([unmoved, self.velocity(alpha[1:], alphadot[1:], start=unmoved)])
+        return np.concatenate(
+            [unmoved, self.velocity(alpha[1:], alphadot[1:], start=unmoved)]
+        )
 
     def _in_p(self, by: np.ndarray) -> np.ndarray:
         """Return slopes (..., 2 K + 1, d) in p from slopes by shape and rate at every phase, (..., N, 2 d)."""
@@ -100,7 +124,14 @@ class Runs:
         self, loops, run: Callable, work: bool = False, degree: float = 1.0, length: float = 1.0,
         step: float = STEP_OF_RUNS,
     ):  # fmt: skip
-        self.loops, self.run, self.work, self.degree, self.length, self.step = loops, run, work, degree, length, step
+        self.loops, self.run, self.work, self.degree, self.length, self.step = (
+            loops,
+            run,
+            work,
+            degree,
+            length,
+            step,
+        )
         self.count = 0
 
     def __call__(self, p: np.ndarray) -> CycleValues:
@@ -110,7 +141,9 @@ class Runs:
         run = self.run(*self.loops.cycle(samples), self.work)
         power = None if run.work is None else run.work.power / self.length
         values = cycle_values(run, power, self.degree)
-        return CycleValues(*(None if x is None else self._with_slopes(x, p.shape) for x in values))
+        return CycleValues(
+            *(None if x is None else self._with_slopes(x, p.shape) for x in values)
+        )
 
     def _with_slopes(self, x: np.ndarray, shape: tuple) -> tuple:
         """Return value and slopes, from values (2 n + 1, ...) of the gait, of n perturbed ones, and of their opposites."""
@@ -135,7 +168,13 @@ def cycle_values(run, power, degree: float) -> tuple:
     if power is not None:
         P = np.maximum(power, 0.0)
         length, mean = 2 * np.pi * (P ** (1 / degree)).mean(-1), P.mean(-1)
-    return run.net, turning(run.xi)[..., 0], length, mean, np.zeros(np.shape(run.net)[:-1])
+    return (
+        run.net,
+        turning(run.xi)[..., 0],
+        length,
+        mean,
+        np.zeros(np.shape(run.net)[:-1]),
+    )
 
 
 def _first_of_turning(n: int) -> np.ndarray:
@@ -150,5 +189,9 @@ def uneven(loops: Loops, alphadot: np.ndarray) -> tuple:
     slopes."""
     n, speed = len(alphadot), np.sqrt((alphadot**2).sum(-1)) + 1e-300
     mean, square = speed.mean(), (speed**2).mean()
-    by = (2 * alphadot / mean**2 - 2 * square / mean**3 * alphadot / speed[:, None] + 2 * alphadot / loops.unit**2) / n
+    by = (
+        2 * alphadot / mean**2
+        - 2 * square / mean**3 * alphadot / speed[:, None]
+        + 2 * alphadot / loops.unit**2
+    ) / n
     return square / mean**2 - 1 + square / loops.unit**2, loops.rates.T @ by

@@ -17,7 +17,9 @@ def evaluate_gait(r: Request, gait: Gait) -> Evaluation:
     """Return the evaluation of a gait at its own amplitude."""
     system, objective = r.scene.system, r.objective
     phases = max(r.phases, 4 * gait.harmonics)
-    (net,), (errors,) = estimate.direct(r.scene, gait, np.array([gait.amplitude]), phases)
+    (net,), (errors,) = estimate.direct(
+        r.scene, gait, np.array([gait.amplitude]), phases
+    )
     alpha, alphadot = gait.cycle(phases)
     degree = r.degree if r.power else 1.0
     run = system.run(alpha, alphadot, r.power is not None)
@@ -25,7 +27,9 @@ def evaluate_gait(r: Request, gait: Gait) -> Evaluation:
     b = _without_slopes(net, *cycle_values(run, P, degree)[1:])
     period, limits = 1.0, []
     if objective.timed:
-        period, limits = objective.time(np.abs(gait.cycle(series.DENSE)[1]).max(), b.power and b.power[0], degree)
+        period, limits = objective.time(
+            np.abs(gait.cycle(series.DENSE)[1]).max(), b.power and b.power[0], degree
+        )
     value = objective.value(b, period)[0]
     error = errors[1] if objective.name == "turning" else errors[0]
     length = b.length and b.length[0]
@@ -34,9 +38,21 @@ def evaluate_gait(r: Request, gait: Gait) -> Evaluation:
         error = (error + value * abs(length - coarse)) / (length or 1.0)
     if objective.timed:
         error = error / (2 * np.pi * (period or 1.0))
-    work = 2 * np.pi * b.power[0] if b.power and capability(system, OwnMetric) is None else None
+    work = (
+        2 * np.pi * b.power[0]
+        if b.power and capability(system, OwnMetric) is None
+        else None
+    )
     return Evaluation(
-        gait, float(value), float(error), float(errors[1]), net, length, work, float(period), tuple(limits)
+        gait,
+        float(value),
+        float(error),
+        float(errors[1]),
+        net,
+        length,
+        work,
+        float(period),
+        tuple(limits),
     )
 
 
@@ -44,9 +60,15 @@ def _power(r: Request, run, alpha, alphadot) -> np.ndarray | None:
     """Return the power (N,) of a gait that was run, in body drag x body length / time; None where it is not known."""
     if run.work is not None:
         return np.maximum(run.work.power / r.system.length, 0.0)
-    return None if r.power is None else np.maximum(r.power(alpha, alphadot, run.xi), 0.0)
+    return (
+        None if r.power is None else np.maximum(r.power(alpha, alphadot, run.xi), 0.0)
+    )
 
 
 def _without_slopes(*numbers) -> CycleValues:
-    flat = lambda x: None if x is None else (x if np.ndim(x) else float(x), np.zeros((*np.shape(x), 1)))
+    flat = lambda x: (
+        None
+        if x is None
+        else (x if np.ndim(x) else float(x), np.zeros((*np.shape(x), 1)))
+    )
     return CycleValues(*map(flat, numbers))

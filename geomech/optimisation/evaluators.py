@@ -19,7 +19,9 @@ def direct(r: Request, phases: int | None = None) -> Phases | Runs:
     loops = r.loops if phases is None else dataclasses.replace(r.loops, phases=phases)
     if r.by_runs:
         return Runs(loops, r.system.run, r.objective.costs, degree, r.system.length)
-    velocity = _inside(r.system.velocity, r.loops.box) if r.stored else r.system.velocity
+    velocity = (
+        _inside(r.system.velocity, r.loops.box) if r.stored else r.system.velocity
+    )
     return Phases(loops, velocity, r.power if r.objective.costs else None, degree)
 
 
@@ -29,7 +31,9 @@ def build_tables(r: Request) -> tuple:
     harmonics = study.compute_harmonics()
     if not r.objective.costs:
         return harmonics, None
-    run = lambda alpha, alphadot: r.power(alpha, alphadot, r.system.velocity(alpha, alphadot)) ** (1 / r.degree)
+    run = lambda alpha, alphadot: (
+        r.power(alpha, alphadot, r.system.velocity(alpha, alphadot)) ** (1 / r.degree)
+    )
     return harmonics, metric.fit_norm(run, harmonics.axes)
 
 
@@ -39,7 +43,12 @@ def from_tables(r: Request, harmonics, norm) -> Phases:
     if norm is not None:
         cost = _inside(norm.norm, box)
         power = lambda alpha, alphadot, xi: cost(alpha, alphadot) ** r.degree
-    return Phases(r.loops, _inside(harmonics.velocity, box), power, r.degree if r.objective.costs else 1.0)
+    return Phases(
+        r.loops,
+        _inside(harmonics.velocity, box),
+        power,
+        r.degree if r.objective.costs else 1.0,
+    )
 
 
 def _inside(look_up: Callable, box) -> Callable:

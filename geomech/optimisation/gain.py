@@ -36,7 +36,9 @@ def gained_ccf(optimum: Optimum) -> Gained:
     if not fitted.field.masked:
         frame = minimum_perturbation(fitted)
         A = frame.connection(fitted)
-        connection = Connection(fitted.axes, A, fitted.residual, fitted.speed, fitted.degree, **fitted.size)
+        connection = Connection(
+            fitted.axes, A, fitted.residual, fitted.speed, fitted.degree, **fitted.size
+        )
         x, y, _ = frame.net(best.displacement, best.gait.shape(0.0))
     turning = optimum.request.objective.name == "turning"
     return Gained(ccf(connection), 2 if turning else int(abs(y) > abs(x)))
@@ -53,17 +55,24 @@ def limiting(optimum: Optimum) -> np.ndarray:
     causes = np.full(PHASES, "loop" if gained is None else rest, dtype="<U8")
     if gained is not None:
         field, value = gained.field, np.abs(_nearest_values(*gained, alpha))
-        inside = [(a >= lo) & (a <= hi) for a, lo, hi in zip(field.axes, alpha.min(0), alpha.max(0))]
+        inside = [
+            (a >= lo) & (a <= hi)
+            for a, lo, hi in zip(field.axes, alpha.min(0), alpha.max(0))
+        ]
         around = np.abs(field.values[gained.component][np.ix_(*inside)])
         # next to singular shapes the largest value may be any
         top = np.nanmedian(around) if field.masked else around.max(initial=value.max())
         causes = np.where(value <= NEAR_ZERO * top, "zero", causes)
     if "singular shapes" in optimum.active:
         distance = np.abs(optimum.scene.system.traits.singularity(alpha))
-        causes = np.where(distance <= distance.min() * (1 + NEAR_SINGULAR), "singular", causes)
+        causes = np.where(
+            distance <= distance.min() * (1 + NEAR_SINGULAR), "singular", causes
+        )
     box = getattr(optimum.request.loops, "box", np.array([[-np.inf], [np.inf]]))
     near = TOUCHING * (box[1] - box[0]) / 2 if np.isfinite(box).all() else 0.0
-    return np.where(((alpha <= box[0] + near) | (alpha >= box[1] - near)).any(-1), "limit", causes)
+    return np.where(
+        ((alpha <= box[0] + near) | (alpha >= box[1] - near)).any(-1), "limit", causes
+    )
 
 
 def _nearest_values(field: Field, component: int, alpha) -> np.ndarray:

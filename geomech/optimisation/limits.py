@@ -32,7 +32,8 @@ def checked_limits(scene: Scene, limits: LimitsArgument, phases: int) -> Limits:
             return _simplified(low, high)
         n = scene.numerics
         limits = min(
-            max(n.extent, float(np.abs(scene.gait.cycle(phases)[0]).max())), float(np.minimum(-low, high).min())
+            max(n.extent, float(np.abs(scene.gait.cycle(phases)[0]).max())),
+            float(np.minimum(-low, high).min()),
         )
     if is_number(limits):
         in_range("``limits``", limits, LEAST, MOST)
@@ -42,10 +43,13 @@ def checked_limits(scene: Scene, limits: LimitsArgument, phases: int) -> Limits:
     if system.traits.joint_angles:
         check_angle("a limit of joints", float(np.abs(pairs).max()))
     slack = 1e-9 * (1 + np.abs(pairs))
-    if (pairs[:, 0] < low - slack[:, 0]).any() or (pairs[:, 1] > high + slack[:, 1]).any():
+    if (pairs[:, 0] < low - slack[:, 0]).any() or (
+        pairs[:, 1] > high + slack[:, 1]
+    ).any():
         field = ", ".join(f"{a:g} to {b:g}" for a, b in zip(low, high))
         raise Refusal(
-            f"``limits`` {_text(limits)} lies outside the field that the scene has", instead=f"{field}; keep to it"
+            f"``limits`` {_text(limits)} lies outside the field that the scene has",
+            instead=f"{field}; keep to it",
         )
     return _simplified(np.maximum(pairs[:, 0], low), np.minimum(pairs[:, 1], high))
 
@@ -53,7 +57,13 @@ def checked_limits(scene: Scene, limits: LimitsArgument, phases: int) -> Limits:
 def edges(system: System) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest and highest shapes, (joints,) each, of the field of a table or a frame; infinite without one."""
     own = stored_table(system, "connection")
-    axes = own.axes if own else system.axes if isinstance(system, Framed) else [(-np.inf, np.inf)] * system.joints
+    axes = (
+        own.axes
+        if own
+        else system.axes
+        if isinstance(system, Framed)
+        else [(-np.inf, np.inf)] * system.joints
+    )
     return np.array([a[0] for a in axes]), np.array([a[-1] for a in axes])
 
 
@@ -61,10 +71,15 @@ def _pairs(limits, joints: int) -> np.ndarray:
     """Return (joints, 2) from pairs, or from one number for each joint."""
     x = real_array("``limits``", limits)
     x = np.stack([-x, x], -1) if x.ndim == 1 else x
-    good = x.shape == (joints, 2) and (np.abs(x) <= MOST).all() and (x[:, 1] - x[:, 0] >= LEAST).all()
+    good = (
+        x.shape == (joints, 2)
+        and (np.abs(x) <= MOST).all()
+        and (x[:, 1] - x[:, 0] >= LEAST).all()
+    )
     if not good:
         raise Refusal(
-            f"``limits`` takes a number, one for each of {joints} joints, or as many from low to high", value=limits
+            f"``limits`` takes a number, one for each of {joints} joints, or as many from low to high",
+            value=limits,
         )
     return x
 

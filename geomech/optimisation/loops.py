@@ -16,7 +16,10 @@ from geomech.gaits import Fourier, Gait
 DENSE = 1024  # phases at which limits hold and loops are compared
 TOUCHING = 5e-3  # of a limit: a loop this near touches it
 NARROWER = 1e-4  # of a limit: a curve may exceed it by this between phases
-SMALL, SIZEABLE = 0.05, 0.3  # of the range: a start that is too small, and its size after enlargement
+SMALL, SIZEABLE = (
+    0.05,
+    0.3,
+)  # of the range: a start that is too small, and its size after enlargement
 NOTHING = 1e-11  # of the largest coefficient: a smaller one is rounding
 SAME = 0.02  # of its size: largest distance between two loops that count as the same
 OUTLINES = (  # initial polygons of two joints with limits -1 and 1: the largest and shorter ones
@@ -55,7 +58,12 @@ class Loops:
     def box(self) -> np.ndarray:
         """Lowest and highest shapes, (2, joints)."""
         w = self.within
-        return np.array([[-w] * self.joints, [w] * self.joints] if np.ndim(w) == 0 else np.transpose(w), float)
+        return np.array(
+            [[-w] * self.joints, [w] * self.joints]
+            if np.ndim(w) == 0
+            else np.transpose(w),
+            float,
+        )
 
     @property
     def middle(self) -> np.ndarray:
@@ -92,8 +100,13 @@ class Loops:
     def limits(self, dense: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Return (A, b) with A p <= b, p as a row, at some 512 phases; dense: at so many that `fitted` changes no such
         loop."""
-        rows = waves(DENSE if dense else max(512 // self.joints, 4 * self.harmonics), self.harmonics)
-        A = np.concatenate([np.kron(rows, unit) for unit in np.eye(self.joints)[:, None]])
+        rows = waves(
+            DENSE if dense else max(512 // self.joints, 4 * self.harmonics),
+            self.harmonics,
+        )
+        A = np.concatenate(
+            [np.kron(rows, unit) for unit in np.eye(self.joints)[:, None]]
+        )
         sides = self.half * (1 - NARROWER) + [[1.0], [-1.0]] * self.middle
         return np.concatenate([A, -A]), np.repeat(sides, len(rows), 1).ravel()
 
@@ -101,7 +114,9 @@ class Loops:
         """Return the limits that the loop touches, as text."""
         names = []
         (low, high), near, reached = self.box, TOUCHING * self.half, self.extremes(p)
-        for j, (down, up) in enumerate(zip(reached[0] <= low + near, reached[1] >= high - near)):
+        for j, (down, up) in enumerate(
+            zip(reached[0] <= low + near, reached[1] >= high - near)
+        ):
             names += [f"alpha_{j + 1} >= {low[j]:g}"] if down else []
             names += [f"alpha_{j + 1} <= {high[j]:g}"] if up else []
         return names
@@ -133,13 +148,18 @@ class Loops:
         room = self.half * (1 - NARROWER / 2)
         size = min(1.0, float((2 * room / np.maximum(high - low, 1e-300)).min()))
         p[1:] *= size
-        p[0] = np.clip(p[0], self.middle - room - size * low, self.middle + room - size * high)
+        p[0] = np.clip(
+            p[0], self.middle - room - size * low, self.middle + room - size * high
+        )
         return p
 
     def _sizeable(self, p) -> np.ndarray:
         """Return p, enlarged where it is too small for useful slopes; a travelling wave where it does not move."""
         p = np.array(p)
-        size, room = np.abs(waves(DENSE, self.harmonics)[:, 1:] @ p[1:]).max(), self.half.max()
+        size, room = (
+            np.abs(waves(DENSE, self.harmonics)[:, 1:] @ p[1:]).max(),
+            self.half.max(),
+        )
         if size == 0:
             lag = np.pi / 2 * np.arange(self.joints)
             p[1], p[2], size = np.cos(lag), np.sin(lag), 1.0
@@ -160,12 +180,21 @@ class Loops:
         lags = [np.pi / 2, -np.pi / 2, 2 * np.pi / 3, np.pi / 4]
         for k in range(count - len(loops)):
             p = np.zeros(self.shape)
-            lag = np.arange(self.joints) * (lags[k] if k < len(lags) else rng.uniform(-np.pi, np.pi))
+            lag = np.arange(self.joints) * (
+                lags[k] if k < len(lags) else rng.uniform(-np.pi, np.pi)
+            )
             size = self.half * (0.7 if k == 0 else rng.uniform(0.4, 0.9))
             p[0], p[1], p[2] = self.middle, size * np.cos(lag), size * np.sin(lag)
             if k > 0:
-                falling = 1 / np.repeat(np.arange(1, self.harmonics + 1), 2)[:, None] ** 2
-                p[1:] += 0.3 * size * falling * rng.normal(size=(2 * self.harmonics, self.joints))
+                falling = (
+                    1 / np.repeat(np.arange(1, self.harmonics + 1), 2)[:, None] ** 2
+                )
+                p[1:] += (
+                    0.3
+                    * size
+                    * falling
+                    * rng.normal(size=(2 * self.harmonics, self.joints))
+                )
                 p[0] += 0.1 * self.half * rng.normal(size=self.joints)
             loops.append(self.fitted(p))
         return loops
@@ -173,7 +202,9 @@ class Loops:
     def _outline(self, corners) -> np.ndarray:
         """Return the loop round a polygon of `OUTLINES` at constant speed."""
         closed = np.array([*corners, corners[0]], float)
-        path = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
+        path = np.concatenate(
+            [[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))]
+        )
         along = path[-1] * np.arange(DENSE) / DENSE
         curve = np.stack([np.interp(along, path, x) for x in closed.T], -1)
         return self.fitted(self._series(self.middle + self.half * curve))
@@ -182,7 +213,13 @@ class Loops:
 def waves(phases: int, harmonics: int) -> np.ndarray:
     """Return (N, 2 K + 1): 1, cos t, sin t, cos 2t ... at equally spaced phases."""
     kt = 2 * np.pi * np.outer(np.arange(phases) / phases, np.arange(1, harmonics + 1))
-    return np.concatenate([np.ones((phases, 1)), np.stack([np.cos(kt), np.sin(kt)], -1).reshape(phases, -1)], 1)
+    return np.concatenate(
+        [
+            np.ones((phases, 1)),
+            np.stack([np.cos(kt), np.sin(kt)], -1).reshape(phases, -1),
+        ],
+        1,
+    )
 
 
 def shifted(p: np.ndarray, t: float) -> np.ndarray:
@@ -195,10 +232,21 @@ def shifted(p: np.ndarray, t: float) -> np.ndarray:
 
 def reversed_(p: np.ndarray) -> np.ndarray:
     """Return the loop run backwards from the same start."""
-    return np.concatenate([p[:1], (p[1:].reshape(-1, 2, p.shape[1]) * [[1.0], [-1.0]]).reshape(p[1:].shape)])
+    return np.concatenate(
+        [
+            p[:1],
+            (p[1:].reshape(-1, 2, p.shape[1]) * [[1.0], [-1.0]]).reshape(p[1:].shape),
+        ]
+    )
 
 
-def same(p: np.ndarray, q: np.ndarray, mirror: bool = True, odd: bool = True, tolerance: float = SAME) -> bool:
+def same(
+    p: np.ndarray,
+    q: np.ndarray,
+    mirror: bool = True,
+    odd: bool = True,
+    tolerance: float = SAME,
+) -> bool:
     """Return whether two loops are the same curve: no point of either is further from the other than ``tolerance`` of
     its size.
 
@@ -209,7 +257,10 @@ def same(p: np.ndarray, q: np.ndarray, mirror: bool = True, odd: bool = True, to
     forwards = seen @ ahead - first
     for other in (seen @ q, -seen @ q) if mirror else (seen @ q,):
         distances = np.linalg.norm(first[:, None] - other[None], axis=-1)
-        near = max(distances.min(0).max(), distances.min(1).max()) <= tolerance * size + np.pi * size / len(seen) / 2
+        near = (
+            max(distances.min(0).max(), distances.min(1).max())
+            <= tolerance * size + np.pi * size / len(seen) / 2
+        )
         along = (np.roll(other, -1, 0) - np.roll(other, 1, 0))[distances.argmin(1)]
         if near and (odd or (forwards * along).sum() > 0):
             return True

@@ -41,19 +41,31 @@ class Objective:
             choose("``direction``", self.direction, DIRECTIONS)
             if self.name == "turning":
                 raise Refusal(
-                    "``direction`` is that of a displacement", because="turning takes none", instead="drop it"
+                    "``direction`` is that of a displacement",
+                    because="turning takes none",
+                    instead="drop it",
                 )
         for name in ("rate", "power"):
             if getattr(self, name) is not None:
                 in_range(f"``{name}``", getattr(self, name), 1e-9, 1e9)
                 if self.name != "speed":
-                    raise Refusal(f"``{name}`` limits speed", instead="say ``objective`` speed, or drop it")
+                    raise Refusal(
+                        f"``{name}`` limits speed",
+                        instead="say ``objective`` speed, or drop it",
+                    )
 
-    straight = property(lambda self: self.name != "turning", doc="Whether the objective is a distance, not an angle.")
-    costs = property(
-        lambda self: self.name == "efficiency" or self.power is not None, doc="Whether the value depends on power."
+    straight = property(
+        lambda self: self.name != "turning",
+        doc="Whether the objective is a distance, not an angle.",
     )
-    timed = property(lambda self: self.name == "speed", doc="Whether the value depends on the time of a cycle.")
+    costs = property(
+        lambda self: self.name == "efficiency" or self.power is not None,
+        doc="Whether the value depends on power.",
+    )
+    timed = property(
+        lambda self: self.name == "speed",
+        doc="Whether the value depends on the time of a cycle.",
+    )
     unit = property(
         lambda self: {"turning": "rad per cycle", "speed": "BL/s"}.get(
             self.name, "BL per cycle" if self.name == "displacement" else "BL/BL"
@@ -79,11 +91,17 @@ class Objective:
         (x, y, _), (dx, dy, _) = b.net
         if not self.direction:
             size = np.hypot(x, y)
-            if size < TINY * self.length:  # at the tip of a cone: the direction of steepest ascent
-                x, y = np.linalg.svd(np.stack([dx.ravel(), dy.ravel()]), full_matrices=False)[0][:, 0]
+            if (
+                size < TINY * self.length
+            ):  # at the tip of a cone: the direction of steepest ascent
+                x, y = np.linalg.svd(
+                    np.stack([dx.ravel(), dy.ravel()]), full_matrices=False
+                )[0][:, 0]
             return size / self.length, (x * dx + y * dy) / np.hypot(x, y) / self.length
         value, slopes = self.along(b)
-        return abs(value) / self.length, (-1.0 if value < 0 else 1.0) * slopes / self.length
+        return abs(value) / self.length, (
+            -1.0 if value < 0 else 1.0
+        ) * slopes / self.length
 
     def along(self, b: CycleValues) -> tuple[float, np.ndarray]:
         """Return the displacement along the direction, with its sign and in the system's unit, and its slopes."""
@@ -94,11 +112,15 @@ class Objective:
             return along, c * dx - s * dy - across * d_swing
         return across, s * dx + c * dy + along * d_swing
 
-    def time(self, fastest: float, power: float | None, degree: float) -> tuple[float, list[str]]:
+    def time(
+        self, fastest: float, power: float | None, degree: float
+    ) -> tuple[float, list[str]]:
         """Return the least time of a rad of phase that the limits allow, and the names of the limits that set it.
         fastest: largest rate of any shape variable, power: mean power, both at one rad of phase per unit of time; the
         power is of ``degree`` in the rate."""
         times = {"rate": fastest / self.rate if self.rate else 0.0}
         times["power"] = (power / self.power) ** (1 / degree) if self.power else 0.0
         longest = max(times.values())
-        return longest, [name for name, x in times.items() if 0 < longest <= x * (1 + 1e-2)]
+        return longest, [
+            name for name, x in times.items() if 0 < longest <= x * (1 + 1e-2)
+        ]

@@ -74,7 +74,9 @@ class Optimum:
         if isinstance(gait, Sine) or stored_table(scene.system, "connection"):
             return scene
         largest = np.abs(gait.shape(np.linspace(0, 2 * np.pi, 721))).max()
-        return scene.with_numerics(extent=max(scene.numerics.extent, 1.0001 * float(largest)))
+        return scene.with_numerics(
+            extent=max(scene.numerics.extent, 1.0001 * float(largest))
+        )
 
     @cached_property
     def study(self) -> Study:

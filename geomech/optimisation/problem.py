@@ -26,7 +26,13 @@ class Problem:
     the penalty of uneven pacing and long loops, as a share of the value."""
 
     def __init__(
-        self, cycles, objective: Objective, p: np.ndarray, on_cycle: Callable, max_cycles: float, even: float = EVEN
+        self,
+        cycles,
+        objective: Objective,
+        p: np.ndarray,
+        on_cycle: Callable,
+        max_cycles: float,
+        even: float = EVEN,
     ):
         self.cycles, self.objective, self.loops, self.on_cycle, self.last = (
             cycles,
@@ -37,14 +43,24 @@ class Problem:
         )
         self.unit, self.shape, self.count = cycles.loops.unit, p.shape, p.size
         self.paced = objective.timed and objective.rate is not None
-        self.first = np.append(p.ravel() / self.unit, 1.0) if self.paced else p.ravel() / self.unit
+        self.first = (
+            np.append(p.ravel() / self.unit, 1.0)
+            if self.paced
+            else p.ravel() / self.unit
+        )
         self._at, self._values = None, None
         b = self.values_at(self.first)
         power = b.power[0] if b.power else None
         self.time = (
-            objective.time(np.abs(self.loops.cycle(p)[1]).max(), power, cycles.degree)[0] if objective.timed else 1.0
+            objective.time(np.abs(self.loops.cycle(p)[1]).max(), power, cycles.degree)[
+                0
+            ]
+            if objective.timed
+            else 1.0
         )
-        self.weight = 0.0 if self.paced else even * max(objective.value(b, 1.0)[0], 0.01)
+        self.weight = (
+            0.0 if self.paced else even * max(objective.value(b, 1.0)[0], 0.01)
+        )
 
     def loop(self, x: np.ndarray) -> np.ndarray:
         """Return p of numbers x."""
@@ -52,8 +68,12 @@ class Problem:
 
     def slopes(self, by: np.ndarray) -> np.ndarray:
         """Return slopes (..., len(x)) in x of slopes (..., *shape) in p; those in the time are 0."""
-        rows = self.unit * np.reshape(by, (*np.shape(by)[: np.ndim(by) - len(self.shape)], self.count))
-        return np.concatenate([rows, np.zeros((*rows.shape[:-1], len(self.first) - self.count))], -1)
+        rows = self.unit * np.reshape(
+            by, (*np.shape(by)[: np.ndim(by) - len(self.shape)], self.count)
+        )
+        return np.concatenate(
+            [rows, np.zeros((*rows.shape[:-1], len(self.first) - self.count))], -1
+        )
 
     def values_at(self, x: np.ndarray):
         """Return the cycle of x, computed once for the number to be minimised and all constraints."""
@@ -87,7 +107,12 @@ class Problem:
         return slower, slower / P / self.cycles.degree * dP
 
     def constraints(
-        self, turn: float, stroke: Stroke | None, singularity: Callable | None, away: float, dense: bool = False
+        self,
+        turn: float,
+        stroke: Stroke | None,
+        singularity: Callable | None,
+        away: float,
+        dense: bool = False,
     ) -> list[dict]:
         """Return the constraints, as `scipy.optimize.minimize` takes them.
 
@@ -98,7 +123,9 @@ class Problem:
             out.append(_rates(self))
             out += [_power(self)] if self.objective.power is not None else []
         theta = self.values_at(self.first).net[1][2]
-        if self.objective.straight and np.abs(theta).max() > STRAIGHT**2:  # else no loop near turns, as with sines
+        if (
+            self.objective.straight and np.abs(theta).max() > STRAIGHT**2
+        ):  # else no loop near turns, as with sines
             out += _straight(self, turn)
         out += [] if stroke is None else [_one_stroke(self, stroke)]
         return out + ([] if singularity is None else [_away(self, singularity, away)])
@@ -122,7 +149,12 @@ def _limits(problem: Problem, dense: bool) -> dict:
 
 def _rates(problem: Problem) -> dict:
     """Return the constraint that no shape variable is faster than the limit, in the time that the last of x sets."""
-    A = np.concatenate([np.kron(problem.loops.rates, unit) for unit in np.eye(problem.loops.joints)[:, None]])
+    A = np.concatenate(
+        [
+            np.kron(problem.loops.rates, unit)
+            for unit in np.eye(problem.loops.joints)[:, None]
+        ]
+    )
     A = problem.slopes(np.concatenate([A, -A]).reshape(-1, *problem.shape))
     A[:, -1] = -problem.objective.rate * problem.time
     return _linear(A, 0.0)
@@ -148,25 +180,43 @@ def _straight(problem: Problem, turn: float) -> list[dict]:
     if turn < STRAIGHT:
         return [{"type": "eq", "fun": theta, "jac": slopes}]
     return [
-        {"type": "ineq", "fun": lambda x, s=s: turn - s * theta(x), "jac": lambda x, s=s: -s * slopes(x)}
+        {
+            "type": "ineq",
+            "fun": lambda x, s=s: turn - s * theta(x),
+            "jac": lambda x, s=s: -s * slopes(x),
+        }
         for s in (1.0, -1.0)
     ]
 
 
 def _one_stroke(problem: Problem, stroke: Stroke) -> dict:
     """Return the constraint that the loop never goes back."""
-    swept, slopes = lambda x: stroke.swept(problem.loop(x)), lambda x: problem.slopes(stroke.slopes(problem.loop(x)))
+    swept, slopes = (
+        lambda x: stroke.swept(problem.loop(x)),
+        lambda x: problem.slopes(stroke.slopes(problem.loop(x))),
+    )
     return {"type": "ineq", "fun": swept, "jac": slopes}
 
 
 def _away(problem: Problem, singularity: Callable, distance: float) -> dict:
     """Return the constraint that shapes stay on one side of the singular ones, at a distance."""
     shapes, h = lambda x: problem.loops.cycle(problem.loop(x))[0], 1e-6
-    side, steps = np.sign(singularity(shapes(problem.first))[0]), h * np.eye(problem.loops.joints)
+    side, steps = (
+        np.sign(singularity(shapes(problem.first))[0]),
+        h * np.eye(problem.loops.joints),
+    )
 
     def slopes(x):
         alpha = shapes(x)
-        by = [(singularity(alpha + e) - singularity(alpha - e)) / (2 * h) for e in steps]
-        return problem.slopes(side * np.einsum("nk,nj->nkj", problem.loops.basis, np.stack(by, -1)))
+        by = [
+            (singularity(alpha + e) - singularity(alpha - e)) / (2 * h) for e in steps
+        ]
+        return problem.slopes(
+            side * np.einsum("nk,nj->nkj", problem.loops.basis, np.stack(by, -1))
+        )
 
-    return {"type": "ineq", "fun": lambda x: side * singularity(shapes(x)) - distance, "jac": slopes}
+    return {
+        "type": "ineq",
+        "fun": lambda x: side * singularity(shapes(x)) - distance,
+        "jac": slopes,
+    }

@@ -42,14 +42,25 @@ class Optimize(Question):
     @cached_property
     def request(self) -> Request:
         return checked(
-            self.scene, self.objective, self.direction, self.harmonics, self.limits, self.starts, self.rate, self.power
+            self.scene,
+            self.objective,
+            self.direction,
+            self.harmonics,
+            self.limits,
+            self.starts,
+            self.rate,
+            self.power,
         )
 
     def check(self) -> None:
         _ = self.request  # refuses what makes no sense
         name, joints = self.scene.name, self.scene.system.joints
         if self.stretch and joints != 2:
-            raise Refusal(f"``stretch`` takes two joints, this one has {joints}", where=name, instead="drop it")
+            raise Refusal(
+                f"``stretch`` takes two joints, this one has {joints}",
+                where=name,
+                instead="drop it",
+            )
         if self.stretch and (reason := why_none(self.scene.system)):
             raise Refusal(reason, where=name, instead="drop ``stretch``")
 
@@ -65,9 +76,15 @@ class Optimize(Question):
 
 def result_of(optimum: Optimum) -> Result:
     """Return an optimum as variables; the value of a distance is over the body's length, the displacement is not."""
-    best, objective, unit = optimum.best, optimum.request.objective, length_unit(optimum.scene.system)
+    best, objective, unit = (
+        optimum.best,
+        optimum.request.objective,
+        length_unit(optimum.scene.system),
+    )
     of_effort = units(optimum.scene.system)
-    value_unit = of_effort[objective.name] if objective.name == "efficiency" else objective.unit
+    value_unit = (
+        of_effort[objective.name] if objective.name == "efficiency" else objective.unit
+    )
     variables = [
         Variable("value", (), best.value, value_unit, objective.name, best.error),
         Variable(
@@ -82,7 +99,13 @@ def result_of(optimum: Optimum) -> Result:
     for name, x, u in zip(("x", "y", "theta"), best.displacement, (unit, unit, "rad")):
         variables.append(Variable(name, (), x, u, "net displacement per cycle"))
     for name, x in (("path_length", best.length), ("work", best.work)):
-        variables += [] if x is None else [Variable(name, (), x, of_effort.get(name, ""))]
+        variables += (
+            [] if x is None else [Variable(name, (), x, of_effort.get(name, ""))]
+        )
     zero = [*zero_components(optimum.scene.system.traits, optimum.gait)]
-    facts = {"active": optimum.active, "evaluations": optimum.evaluations, "zero_by_symmetry": zero}
+    facts = {
+        "active": optimum.active,
+        "evaluations": optimum.evaluations,
+        "zero_by_symmetry": zero,
+    }
     return Result("optimum", tuple(variables), facts, optimum)

@@ -20,7 +20,13 @@ from geomech.optimisation.undulations import Undulations
 from geomech.scenes.model import Scene, checked_scene
 from geomech.studies import cost
 from geomech.systems.base import System, kind_of
-from geomech.systems.capabilities import Dissipative, OwnMetric, capability, near_gait, stored_table
+from geomech.systems.capabilities import (
+    Dissipative,
+    OwnMetric,
+    capability,
+    near_gait,
+    stored_table,
+)
 from geomech.systems.framed import Framed, in_frame
 from geomech.systems.premises import listed, refuse
 from rft.checks import in_range
@@ -30,9 +36,15 @@ from rft.refusal import Refusal, located
 JOINTS = 12  # with more, loops have too many parameters for this search
 PHASES = 128  # of a cycle in the search
 FINISHED = 3  # optima by tables that the direct tier improves
-PERTURBATIONS = 0.1, 0.2  # rad, if joints have 2.5: of the best loop; the larger ones are first improved by tables
+PERTURBATIONS = (
+    0.1,
+    0.2,
+)  # rad, if joints have 2.5: of the best loop; the larger ones are first improved by tables
 MORE = 3  # loops for each of these sizes
-SHARE, LED = 0.8, 4  # narrower limits for a first search, relative; and the number of its optima that are start values
+SHARE, LED = (
+    0.8,
+    4,
+)  # narrower limits for a first search, relative; and the number of its optima that are start values
 ROOM = 1.02  # extent of tables over the limit, as iterates exceed it
 NEAR, FINISH, POLISH, RUNS = (
     100,
@@ -90,8 +102,16 @@ class Request:
         speed for a system with its own metric; None where the cost of moving is not known."""
         system = self.system
         if self.stored:
-            metric, degree, box = stored_table(system, "metric"), system.traits.power_degree or 2.0, self.loops.box
-            return metric and (lambda alpha, alphadot, xi: metric.norm(np.clip(alpha, *box), alphadot) ** degree)
+            metric, degree, box = (
+                stored_table(system, "metric"),
+                system.traits.power_degree or 2.0,
+                self.loops.box,
+            )
+            return metric and (
+                lambda alpha, alphadot, xi: (
+                    metric.norm(np.clip(alpha, *box), alphadot) ** degree
+                )
+            )
         if own := capability(system, OwnMetric):
             return lambda alpha, alphadot, xi: own.squared_speed(alpha, alphadot)
         dissipative = capability(system, Dissipative)
@@ -102,14 +122,21 @@ class Request:
         """Degree of the power in the rate of shape: 2 in a linear medium, 1 in a dry one; Refusal if it has none."""
         objective, system = self.objective, self.system
         if self.power is None:
-            instead = "say ``rate``" if objective.timed else "optimize for displacement, turning or speed"
+            instead = (
+                "say ``rate``"
+                if objective.timed
+                else "optimize for displacement, turning or speed"
+            )
             raise Refusal(
                 f"``objective`` {objective.name} asks for power, which {source_name(system)} does not tell",
                 instead=instead,
             )
         if capability(system, OwnMetric) is not None:
             if objective.power is not None:
-                raise Refusal(f"``power`` is that of drag, and the {kind_of(system)} has none", instead="say ``rate``")
+                raise Refusal(
+                    f"``power`` is that of drag, and the {kind_of(system)} has none",
+                    instead="say ``rate``",
+                )
             return 2.0
         if self.stored:
             return system.traits.power_degree
@@ -120,7 +147,10 @@ class Request:
             self.loops.unit * rng.normal(size=(8, self.system.joints)),
             rng.normal(size=(8, self.system.joints)),
         )
-        slow, fast = (self.power(alpha, u, evaluate(self.system.velocity, alpha, u)) for u in (rate, 2 * rate))
+        slow, fast = (
+            self.power(alpha, u, evaluate(self.system.velocity, alpha, u))
+            for u in (rate, 2 * rate)
+        )
         degrees = np.log2(fast / slow)
         if np.ptp(degrees) > DEGREES:
             raise Refusal(
@@ -151,17 +181,27 @@ class Request:
         numbers = int(np.prod(loops.shape))
         each = 1 + 2 * numbers if self.by_runs else 1 + 4 * self.system.joints
         finished = min(FINISHED, self.starts) if self.looks_up else self.starts
-        jobs = cost.direct(scene, gait, 3 + finished, max(scene.numerics.phases, PHASES))
+        jobs = cost.direct(
+            scene, gait, 3 + finished, max(scene.numerics.phases, PHASES)
+        )
         if self.looks_up:
-            jobs += cost.harmonics(scene.changed(system=self.system).with_numerics(extent=self.extent))
+            jobs += cost.harmonics(
+                scene.changed(system=self.system).with_numerics(extent=self.extent)
+            )
             perturbed = 2 * MORE * (self.starts > 1)
-            steps = (finished + 2 * perturbed) * FINISH + POLISH * self.phases / loops.phases
+            steps = (
+                finished + 2 * perturbed
+            ) * FINISH + POLISH * self.phases / loops.phases
         else:
             steps = self.starts * (RUNS if self.by_runs else NEAR)
         gaits = int(steps * TRIES * each)
-        jobs += cost.direct(scene, gait, gaits, loops.phases, each, checked=False, all_phases=True)
+        jobs += cost.direct(
+            scene, gait, gaits, loops.phases, each, checked=False, all_phases=True
+        )
         total, ascents = cost.price(jobs), ASCENT * (self.ascents + 1)
-        return total._replace(seconds=total.seconds + ascents, besides=total.besides + ascents)
+        return total._replace(
+            seconds=total.seconds + ascents, besides=total.besides + ascents
+        )
 
     @property
     def ascents(self) -> int:
@@ -206,27 +246,45 @@ def checked(
         maximised = Objective(objective, towards, system.length, **pace)
         if maximised.timed:
             if system.traits.lacks & Premise.RATE_INDEPENDENT:
-                refuse(system, "speed", Premise.RATE_INDEPENDENT, "optimize for displacement, at the scene's frequency")
+                refuse(
+                    system,
+                    "speed",
+                    Premise.RATE_INDEPENDENT,
+                    "optimize for displacement, at the scene's frequency",
+                )
             if rate is None and power is None:
                 waves = isinstance(scene.gait, Sine)
-                own = {"power": _own_power(scene)} if waves else {"rate": _own_rate(scene)}
+                own = (
+                    {"power": _own_power(scene)}
+                    if waves
+                    else {"rate": _own_rate(scene)}
+                )
                 maximised = Objective(objective, towards, system.length, **own)
         loops = _loops(scene, harmonics, limits)
         if isinstance(loops, Undulations) and not maximised.straight:
             raise Refusal(
-                "a sine along a straight axis does not turn", because="``objective`` turning takes a gait of few joints"
+                "a sine along a straight axis does not turn",
+                because="``objective`` turning takes a gait of few joints",
             )
-        if isinstance(loops, Undulations) and maximised.direction == "y" and system.traits.mirror:
+        if (
+            isinstance(loops, Undulations)
+            and maximised.direction == "y"
+            and system.traits.mirror
+        ):
             raise Refusal(
-                "a sine along a straight axis brings nothing across it", instead="drop ``direction``, or say x"
+                "a sine along a straight axis brings nothing across it",
+                instead="drop ``direction``, or say x",
             )
         if isinstance(loops, Undulations) and maximised.rate is not None:
             raise Refusal(
-                "a wave is as fast as its power allows", instead="say ``power``, a limit of rate is that of joints"
+                "a wave is as fast as its power allows",
+                instead="say ``power``, a limit of rate is that of joints",
             )
         request = Request(scene, maximised, loops, 1 if starts is None else int(starts))
         if starts is None and request.looks_up:
-            request = dataclasses.replace(request, starts=1 + len(OUTLINES) - IN_MIRROR * _in_mirror(request))
+            request = dataclasses.replace(
+                request, starts=1 + len(OUTLINES) - IN_MIRROR * _in_mirror(request)
+            )
         if maximised.costs:
             request.degree  # noqa: B018 - refuses what has none
         if maximised.straight and _stays(system):
@@ -251,7 +309,11 @@ def checked(
 
 def source_name(system: System) -> str:
     """Return the name of a system, or of its file."""
-    return "the table's file" if stored_table(system, "connection") else f"the {kind_of(system)}"
+    return (
+        "the table's file"
+        if stored_table(system, "connection")
+        else f"the {kind_of(system)}"
+    )
 
 
 def _in_mirror(request: Request) -> bool:
@@ -261,19 +323,29 @@ def _in_mirror(request: Request) -> bool:
 
 def _stays(system: System) -> bool:
     """Return whether no change of shape moves its mean frame, or its own if it has none, tested at a few shapes."""
-    if system.traits.steps or not system.traits.linear or stored_table(system, "connection"):
+    if (
+        system.traits.steps
+        or not system.traits.linear
+        or stored_table(system, "connection")
+    ):
         return False
     with contextlib.suppress(ValueError, TypeError):
         system = in_frame(system, "mean")
     rng = np.random.default_rng(0)
     xi = evaluate(system.velocity, *rng.normal(size=(2, 16, system.joints)))
-    return bool(np.nanmax(np.abs(xi[:, :2])) <= STILL * system.length * np.nanmax(np.abs(xi)))
+    return bool(
+        np.nanmax(np.abs(xi[:, :2])) <= STILL * system.length * np.nanmax(np.abs(xi))
+    )
 
 
 def _never_turns(request: Request) -> bool:
     """Return whether the heading is a function of the shape, dA_theta = 0, tested on a few loops."""
     system, loops = request.system, request.loops
-    if system.traits.steps or not system.traits.linear or system.traits.singularity is not None:
+    if (
+        system.traits.steps
+        or not system.traits.linear
+        or system.traits.singularity is not None
+    ):
         return False
     samples = np.array(loops.starts(loops.of(request.gait), LOOPS))
     turning = evaluate(system.velocity, *loops.cycle(samples))[..., 2]
@@ -282,7 +354,15 @@ def _never_turns(request: Request) -> bool:
 
 def _own_rate(scene: Scene) -> float:
     """Return the fastest rate of shape in the scene's gait, rad/s; 1 without a frequency, or for a gait that rests."""
-    return float(2 * np.pi * (scene.frequency or 0.0) * np.abs(scene.gait.cycle(PHASES)[1]).max()) or 1.0
+    return (
+        float(
+            2
+            * np.pi
+            * (scene.frequency or 0.0)
+            * np.abs(scene.gait.cycle(PHASES)[1]).max()
+        )
+        or 1.0
+    )
 
 
 def _own_power(scene: Scene) -> float:
@@ -291,10 +371,19 @@ def _own_power(scene: Scene) -> float:
     gait, system = scene.gait, scene.system
     work = system.run(*gait.cycle(PHASES), True).work
     per_second = 2 * np.pi * scene.frequency if scene.frequency else 1.0
-    return float(np.maximum(work.power, 0.0).mean() / system.length * per_second**system.traits.power_degree) or 1.0
+    return (
+        float(
+            np.maximum(work.power, 0.0).mean()
+            / system.length
+            * per_second**system.traits.power_degree
+        )
+        or 1.0
+    )
 
 
-def _loops(scene: Scene, harmonics: int | None, limits: LimitsArgument) -> Loops | Undulations:
+def _loops(
+    scene: Scene, harmonics: int | None, limits: LimitsArgument
+) -> Loops | Undulations:
     gait, system, n = scene.gait, scene.system, scene.numerics
     if isinstance(gait, Sine):
         for name, value in (("harmonics", harmonics), ("limits", limits)):
@@ -307,11 +396,17 @@ def _loops(scene: Scene, harmonics: int | None, limits: LimitsArgument) -> Loops
         return Undulations(gait, max(64, min(n.phases, PHASES)))
     if system.joints > JOINTS:
         raise Refusal(
-            f"a loop of {system.joints} joints is too much to search", because=f"at most {JOINTS}, or a sine gait"
+            f"a loop of {system.joints} joints is too much to search",
+            because=f"at most {JOINTS}, or a sine gait",
         )
     in_range("``harmonics``", 5 if harmonics is None else harmonics, 1, 32, whole=True)
     harmonics = 5 if harmonics is None else int(harmonics)
-    return Loops(system.joints, harmonics, checked_limits(scene, limits, PHASES), max(PHASES, 16 * harmonics))
+    return Loops(
+        system.joints,
+        harmonics,
+        checked_limits(scene, limits, PHASES),
+        max(PHASES, 16 * harmonics),
+    )
 
 
 def _inner(system: System) -> System:

@@ -41,11 +41,17 @@ from geomech.run.jobs import runner
 from geomech.scenes.model import Scene
 from rft.refusal import Refusal, located
 
-NEAR_TOLERANCE, TOLERANCE = 1e-7, 1e-5  # change of the value in a step at which an ascent ends
+NEAR_TOLERANCE, TOLERANCE = (
+    1e-7,
+    1e-5,
+)  # change of the value in a step at which an ascent ends
 NO_TURN = 1e-7  # rad: smaller net turns count as 0
 AS_MUCH = 1e-3  # of the value: a reverse that loses less counts as good
 LARGER = 0.6  # of the range: size of the scene's gait as a second start
-POLISHED, EVEN_AT_LAST = 1e-7, EVEN / 10  # tolerance and weight of the last ascent, at the phases of evaluations
+POLISHED, EVEN_AT_LAST = (
+    1e-7,
+    EVEN / 10,
+)  # tolerance and weight of the last ascent, at the phases of evaluations
 FINISHING = 1.0  # s of other work per ascent by the direct tier, likewise
 ENOUGH = 64  # harmonics that suffice for any initial gait
 
@@ -71,7 +77,9 @@ def optimise(
     >>> round(best.value, 3)  # displacement over path length
     0.11
     """
-    request = checked(scene, objective, direction, harmonics, limits, starts, rate, power)
+    request = checked(
+        scene, objective, direction, harmonics, limits, starts, rate, power
+    )
     return search(request, progress)
 
 
@@ -95,37 +103,55 @@ class _Search:
     """One search, with its number of cycles."""
 
     def __init__(self, request: Request, progress: Callable | None):
-        self.request, self.progress, self.began, self.count = request, progress, time.perf_counter(), 0
+        self.request, self.progress, self.began, self.count = (
+            request,
+            progress,
+            time.perf_counter(),
+            0,
+        )
         self.completed = 0
         ascents = request.ascents + self._rough
-        self.cycles_per_ascent = TRIES * (RUNS if request.by_runs else FINISH)  # a rough estimate
+        self.cycles_per_ascent = TRIES * (
+            RUNS if request.by_runs else FINISH
+        )  # a rough estimate
         self.expected = ascents * self.cycles_per_ascent
 
     @property
     def _rough(self) -> bool:
         """Whether there are many local optima."""
-        return self.request.looks_up or self.request.system.traits.singularity is not None
+        return (
+            self.request.looks_up or self.request.system.traits.singularity is not None
+        )
 
     def optimum(self) -> Optimum:
         r = self.request
         own = r.loops.of(r.scene.gait)
         self.origin, *others = r.loops.starts(own, r.starts)
-        self.constraints = Constraints(r.loops, r.system.traits.singularity, self.origin)
+        self.constraints = Constraints(
+            r.loops, r.system.traits.singularity, self.origin
+        )
         start = self._evaluated(self._start())
         self._timed(start)  # refuses impossible frequencies
         turn = abs(float(start.displacement[2]))
-        loops, others = self._ascended([self.constraints.first, *map(self.constraints.feasible, others)], turn)
+        loops, others = self._ascended(
+            [self.constraints.first, *map(self.constraints.feasible, others)], turn
+        )
         best, answers, p = start, [], None
         for q, times in loops:
             if self.constraints.meets_singular(q, NEARLY):
                 continue
             evaluation, q = self._forwards(*self._finished(q, turn), turn)
             answers.append((evaluation.value, times))
-            straight = not r.objective.straight or abs(evaluation.displacement[2]) <= turn + self._slack(evaluation)
+            straight = not r.objective.straight or abs(
+                evaluation.displacement[2]
+            ) <= turn + self._slack(evaluation)
             if straight and evaluation.value > best.value:
                 best, p = evaluation, q
         if p is None:
-            best, p = dataclasses.replace(start, gait=self._as_series(start.gait)), r.loops.fitted(own)
+            best, p = (
+                dataclasses.replace(start, gait=self._as_series(start.gait)),
+                r.loops.fitted(own),
+            )
         active = [
             *r.loops.active(p),
             *["singular shapes"] * self.constraints.meets_singular(p, 1 / NEARLY),
@@ -142,22 +168,39 @@ class _Search:
         those that a table led to and the direct tier did not finish."""
         r, tier = self.request, evaluators.direct(self.request)
         if not r.looks_up:
-            return self._different(self._optima(tier, starts, turn, None, RUNS if r.by_runs else NEAR)), ()
+            return self._different(
+                self._optima(tier, starts, turn, None, RUNS if r.by_runs else NEAR)
+            ), ()
         tables = evaluators.build_tables(r)
         optima = self._optima(
-            evaluators.from_tables(r, *tables), starts + self._from_narrower(tables, starts, turn), turn, tables, NEAR
+            evaluators.from_tables(r, *tables),
+            starts + self._from_narrower(tables, starts, turn),
+            turn,
+            tables,
+            NEAR,
         )
-        if not r.system.traits.odd:  # the table is odd and so does not distinguish the senses
+        if (
+            not r.system.traits.odd
+        ):  # the table is odd and so does not distinguish the senses
             optima += [series.reversed_(p) for p in optima]
         ranked = self._ranked(tier, optima, turn)
-        improved = self._each([p for p, *_ in ranked[:FINISHED]], turn, None, FINISH, TOLERANCE)
+        improved = self._each(
+            [p for p, *_ in ranked[:FINISHED]], turn, None, FINISH, TOLERANCE
+        )
         better = self._better(turn)
         finished = [(better(q, p), times) for q, (p, times, _) in zip(improved, ranked)]
-        k = max(range(len(finished)), key=lambda k: self._merit(tier, finished[k][0], turn))
-        finished[k] = better(*self._polished(tier, tables, finished[k][0], turn)), finished[k][1]
+        k = max(
+            range(len(finished)), key=lambda k: self._merit(tier, finished[k][0], turn)
+        )
+        finished[k] = (
+            better(*self._polished(tier, tables, finished[k][0], turn)),
+            finished[k][1],
+        )
         return finished, tuple((worth, times) for _, times, worth in ranked[FINISHED:])
 
-    def _polished(self, tier, tables: tuple, p: np.ndarray, turn: float) -> tuple[np.ndarray, ...]:
+    def _polished(
+        self, tier, tables: tuple, p: np.ndarray, turn: float
+    ) -> tuple[np.ndarray, ...]:
         """Return p and the loop it leads to at the phases of evaluations; with several starts from the best
         perturbation of p."""
         loops = [p]
@@ -166,12 +209,21 @@ class _Search:
             near += self._each(further, turn, tables, NEAR, NEAR_TOLERANCE)
             loops += self._each(near, turn, None, 2 * FINISH, TOLERANCE / 10)
         best = max(loops, key=lambda q: self._merit(tier, q, turn))
-        return p, best, *self._each([best], turn, None, POLISH, POLISHED, phases=self.request.phases)
+        return (
+            p,
+            best,
+            *self._each(
+                [best], turn, None, POLISH, POLISHED, phases=self.request.phases
+            ),
+        )
 
     def _better(self, turn: float) -> Callable:
         """Return a function that projects loops onto the constraints and returns the best."""
         tier = evaluators.direct(self.request, self.request.phases)
-        return lambda *loops: max((self._projected(p, turn) for p in loops), key=lambda p: self._merit(tier, p, turn))
+        return lambda *loops: max(
+            (self._projected(p, turn) for p in loops),
+            key=lambda p: self._merit(tier, p, turn),
+        )
 
     def _perturbed(self, p: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
         """Return loops next to p, and others further off, without its symmetry.
@@ -183,38 +235,66 @@ class _Search:
         perturbed = lambda size: self.constraints.feasible(
             loops.fitted(p + size * loops.unit * falling * rng.normal(size=p.shape))
         )
-        near, further = ([perturbed(size) for _ in range(MORE)] for size in PERTURBATIONS)
+        near, further = (
+            [perturbed(size) for _ in range(MORE)] for size in PERTURBATIONS
+        )
         return near, further
 
-    def _from_narrower(self, tables: tuple, starts: list[np.ndarray], turn: float) -> list[np.ndarray]:
+    def _from_narrower(
+        self, tables: tuple, starts: list[np.ndarray], turn: float
+    ) -> list[np.ndarray]:
         """Return the best loops within narrower limits, or none for one start.
 
         The best one there is so far from other optima that a search within the wider limits alone may miss it."""
         if self.request.starts == 1:
             return []
-        narrow = dataclasses.replace(self.request, loops=self.request.loops.narrower(SHARE))
-        starts_inside = [self.constraints.feasible(narrow.loops.fitted(p)) for p in starts]
+        narrow = dataclasses.replace(
+            self.request, loops=self.request.loops.narrower(SHARE)
+        )
+        starts_inside = [
+            self.constraints.feasible(narrow.loops.fitted(p)) for p in starts
+        ]
         optima = self._each(starts_inside, turn, tables, NEAR, NEAR_TOLERANCE, narrow)
-        return [p for p, *_ in self._ranked(evaluators.from_tables(narrow, *tables), optima, turn)[:LED]]
+        return [
+            p
+            for p, *_ in self._ranked(
+                evaluators.from_tables(narrow, *tables), optima, turn
+            )[:LED]
+        ]
 
-    def _ranked(self, tier, loops: list[np.ndarray], turn: float) -> list[tuple[np.ndarray, int, float]]:
+    def _ranked(
+        self, tier, loops: list[np.ndarray], turn: float
+    ) -> list[tuple[np.ndarray, int, float]]:
         """Return the different loops, the number of starts that led to each and their worth, best first."""
-        worth = [(p, times, self._merit(tier, p, turn)) for p, times in self._different(loops)]
+        worth = [
+            (p, times, self._merit(tier, p, turn))
+            for p, times in self._different(loops)
+        ]
         return sorted(worth, key=lambda x: x[2], reverse=True)
 
-    def _optima(self, cycles, starts: list[np.ndarray], turn: float, tables, max_steps: int) -> list[np.ndarray]:
+    def _optima(
+        self, cycles, starts: list[np.ndarray], turn: float, tables, max_steps: int
+    ) -> list[np.ndarray]:
         """Return the loop that each start leads to; where there are many optima, the first start is tried in two sizes."""
         other_size = [self._larger(starts[0])] if self._rough else []
-        optima = self._each([*starts, *other_size], turn, tables, max_steps, NEAR_TOLERANCE)
+        optima = self._each(
+            [*starts, *other_size], turn, tables, max_steps, NEAR_TOLERANCE
+        )
         if other_size:
-            optima[0] = max(optima[0], optima.pop(), key=lambda p: self._merit(cycles, p, turn))
+            optima[0] = max(
+                optima[0], optima.pop(), key=lambda p: self._merit(cycles, p, turn)
+            )
         return optima
 
     def _larger(self, p: np.ndarray) -> np.ndarray:
         """Return the loop in another size: a small one may lead to a poor optimum."""
         size = np.abs(self.request.loops.cycle(p)[0] - p[0]).max()
         return self.constraints.feasible(
-            self.request.loops.fitted(np.concatenate([p[:1], p[1:] * LARGER * self.request.loops.half.max() / size]))
+            self.request.loops.fitted(
+                np.concatenate(
+                    [p[:1], p[1:] * LARGER * self.request.loops.half.max() / size]
+                )
+            )
         )
 
     def _each(
@@ -234,12 +314,23 @@ class _Search:
             self._report if is_single else None,
             phases,
         )
-        results, done_before, seconds = [], self.completed, len(starts) * (ASCENT if tables else FINISHING)
-        for p, count in runner().map(_ascend_from, ascent, starts, len(starts), seconds):
+        results, done_before, seconds = (
+            [],
+            self.completed,
+            len(starts) * (ASCENT if tables else FINISHING),
+        )
+        for p, count in runner().map(
+            _ascend_from, ascent, starts, len(starts), seconds
+        ):
             results.append(p)
             self.count += count
             self._report(
-                max(0, done_before + len(results) * self.cycles_per_ascent - self.completed)
+                max(
+                    0,
+                    done_before
+                    + len(results) * self.cycles_per_ascent
+                    - self.completed,
+                )
             )  # the same by any executor, however soon it ended
         return results
 
@@ -254,7 +345,11 @@ class _Search:
         power = b.power[0] if b.power else None
         timed = self.request.objective.timed
         period = (
-            self.request.objective.time(np.abs(tier.loops.cycle(p)[1]).max(), power, tier.degree)[0] if timed else 1.0
+            self.request.objective.time(
+                np.abs(tier.loops.cycle(p)[1]).max(), power, tier.degree
+            )[0]
+            if timed
+            else 1.0
         )
         value, by = self.request.objective.value(b, period)
         if self.request.objective.straight:
@@ -279,7 +374,9 @@ class _Search:
             even=EVEN_AT_LAST if ascent.phases else EVEN,
         )
         self.count += cycles.count - before
-        return p if isinstance(self.request.loops, Loops) else self.request.loops.fitted(p)  # loops are projected later
+        return (
+            p if isinstance(self.request.loops, Loops) else self.request.loops.fitted(p)
+        )  # loops are projected later
 
     def _finished(self, p: np.ndarray, turn: float) -> tuple[Evaluation, np.ndarray]:
         """Return the evaluation of the projected loop, and the loop."""
@@ -292,7 +389,9 @@ class _Search:
         if not isinstance(r.loops, Loops):
             return p
         cycles = evaluators.direct(r, r.phases)
-        with contextlib.suppress(RuntimeError):  # raised for a loop nearby that cannot be run
+        with contextlib.suppress(
+            RuntimeError
+        ):  # raised for a loop nearby that cannot be run
             p = project(
                 cycles, r.objective, p, turn=turn, stroke=self.constraints.stroke, singularity=r.system.traits.singularity,
                 away=self.constraints.away,
@@ -304,7 +403,10 @@ class _Search:
         """Return the allowed excess of a net turn, rad: roundoff and, where cycles are not those of the search, their
         error."""
         return NO_TURN + (
-            evaluation.heading if self.request.by_runs or self.request.system is not self.request.scene.system else 0.0
+            evaluation.heading
+            if self.request.by_runs
+            or self.request.system is not self.request.scene.system
+            else 0.0
         )
 
     def _report(self, cycles: int = 1) -> None:
@@ -327,15 +429,23 @@ class _Search:
     def _same(self, p, q) -> bool:
         loops, system = self.request.loops, self.request.system
         return (
-            series.same(p, q, system.traits.mirror, system.traits.odd) if isinstance(loops, Loops) else loops.same(p, q)
+            series.same(p, q, system.traits.mirror, system.traits.odd)
+            if isinstance(loops, Loops)
+            else loops.same(p, q)
         )
 
     def _start(self) -> Gait:
         """Return the initial gait, with a note where it is not the scene's."""
         r = self.request
         if r.gait is not r.scene.gait:
-            limit = f"{r.loops.within:g} rad" if np.ndim(r.loops.within) == 0 else "its limits"
-            note(f"{r.scene.name}: its gait reaches beyond {limit}: the search starts from a smaller one")
+            limit = (
+                f"{r.loops.within:g} rad"
+                if np.ndim(r.loops.within) == 0
+                else "its limits"
+            )
+            note(
+                f"{r.scene.name}: its gait reaches beyond {limit}: the search starts from a smaller one"
+            )
             return r.loops.gait(self.constraints.first)
         return r.gait
 
@@ -353,17 +463,29 @@ class _Search:
             p = series.shifted(p, 2 * np.pi / n * (k + share))
         return p
 
-    def _forwards(self, evaluation: Evaluation, p: np.ndarray, turn: float) -> tuple[Evaluation, np.ndarray]:
+    def _forwards(
+        self, evaluation: Evaluation, p: np.ndarray, turn: float
+    ) -> tuple[Evaluation, np.ndarray]:
         """Return the gait, or its reverse where it moves against the direction and the reverse is about as good."""
         k = "xy".find(self.request.objective.direction or "-")
-        if k < 0 or evaluation.displacement[k] >= 0 or not isinstance(self.request.loops, Loops):
+        if (
+            k < 0
+            or evaluation.displacement[k] >= 0
+            or not isinstance(self.request.loops, Loops)
+        ):
             return evaluation, p
         reverse, q = self._finished(series.reversed_(p), turn)
-        return (reverse, q) if reverse.value >= evaluation.value * (1 - AS_MUCH) else (evaluation, p)
+        return (
+            (reverse, q)
+            if reverse.value >= evaluation.value * (1 - AS_MUCH)
+            else (evaluation, p)
+        )
 
     def _timed(self, evaluation: Evaluation) -> Gait:
         """Return the gait with the frequency that its limits allow."""
-        if self.request.objective.timed and 0 < evaluation.time < 1 / (2 * np.pi * FASTEST):
+        if self.request.objective.timed and 0 < evaluation.time < 1 / (
+            2 * np.pi * FASTEST
+        ):
             raise Refusal(
                 f"its limits let a gait repeat more than {FASTEST:g} times a second",
                 instead="lower ``rate``, or ``power``",
@@ -412,7 +534,9 @@ class Ascent:
 def _ascend_from(ascent: Ascent, p: np.ndarray) -> tuple[np.ndarray, int]:
     """Return the loop that a start leads to, and the number of cycles."""
     search = _Search(ascent.request, None)
-    search.constraints = Constraints(ascent.request.loops, ascent.request.system.traits.singularity, ascent.origin)
+    search.constraints = Constraints(
+        ascent.request.loops, ascent.request.system.traits.singularity, ascent.origin
+    )
     cycles = (
         evaluators.from_tables(ascent.request, *ascent.tables)
         if ascent.tables

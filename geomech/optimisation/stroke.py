@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-FLAT, BACK = 0.05, 1e-9  # of the first harmonic: thinner ellipses span no plane; of its sweep: tolerance
+FLAT, BACK = (
+    0.05,
+    1e-9,
+)  # of the first harmonic: thinner ellipses span no plane; of its sweep: tolerance
 NEWTON = 3  # steps to the least sweep in an interval
 
 
@@ -15,8 +18,13 @@ class Stroke:
     intervals between phases; where all minima are positive, the loop never goes back."""
 
     def __init__(self, loops, p: np.ndarray):
-        self.plane, size, _ = np.linalg.svd(p[1:3].T, full_matrices=False)  # (joints, 2)
-        self.thin, self.size = size[-1] < FLAT * size[0] or len(size) < 2, float(np.prod(size)) or 1.0
+        self.plane, size, _ = np.linalg.svd(
+            p[1:3].T, full_matrices=False
+        )  # (joints, 2)
+        self.thin, self.size = (
+            size[-1] < FLAT * size[0] or len(size) < 2,
+            float(np.prod(size)) or 1.0,
+        )
         self.k, self.width = np.arange(1, loops.harmonics + 1), 2 * np.pi / loops.phases
         self.phases = self.width * np.arange(loops.phases)
         self.side, self._of, self._lowest = 1.0, None, None
@@ -27,8 +35,12 @@ class Stroke:
     def _going(self, p: np.ndarray, phases: np.ndarray) -> list[np.ndarray]:
         """Return the loop about its centre at the phases (N,), and its first three derivatives, (2, N) each."""
         q = p @ self.plane
-        each = [(1j * self.k[:, None]) ** n * (q[1::2] - 1j * q[2::2]) for n in range(4)]
-        return np.split((np.exp(1j * np.outer(phases, self.k)) @ np.concatenate(each, 1)).real.T, 4)
+        each = [
+            (1j * self.k[:, None]) ** n * (q[1::2] - 1j * q[2::2]) for n in range(4)
+        ]
+        return np.split(
+            (np.exp(1j * np.outer(phases, self.k)) @ np.concatenate(each, 1)).real.T, 4
+        )
 
     def lowest(self, p: np.ndarray) -> np.ndarray:
         """Return the phase (N,) of least sweep in each interval between phases."""
@@ -44,7 +56,9 @@ class Stroke:
             x, dx, ddx, dddx = self._going(p, self.phases + shift)
             rise, bend = cross(x, ddx), cross(dx, ddx) + cross(x, dddx)
             step = -rise / np.where(bend > 0, bend, 1.0)
-            step = np.where(bend > 0, step, -np.sign(rise) * self.width)  # to an edge, where there is no minimum
+            step = np.where(
+                bend > 0, step, -np.sign(rise) * self.width
+            )  # to an edge, where there is no minimum
             shift = np.clip(shift + step, -self.width / 2, self.width / 2)
         return self.phases + shift
 
@@ -71,7 +85,11 @@ class Stroke:
         """Return how often the loop goes round its centre, in the sense of the first."""
         u, v = self._going(p, self.phases)[0]
         q = u + 1j * v
-        return int(np.rint(self.side * np.angle(np.roll(q, -1) * np.conj(q)).sum() / (2 * np.pi)))
+        return int(
+            np.rint(
+                self.side * np.angle(np.roll(q, -1) * np.conj(q)).sum() / (2 * np.pi)
+            )
+        )
 
     @classmethod
     def is_one(cls, loops, p: np.ndarray, back: float = BACK) -> bool:

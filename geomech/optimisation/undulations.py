@@ -29,12 +29,17 @@ class Undulations:
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest parameters, (2,) each."""
-        return np.array(LEAST), np.array([MOST[0], min(MOST[1], self.first.elements / ELEMENTS_PER_WAVE)])
+        return np.array(LEAST), np.array(
+            [MOST[0], min(MOST[1], self.first.elements / ELEMENTS_PER_WAVE)]
+        )
 
     def cycle(self, p) -> tuple[np.ndarray, np.ndarray]:
         """Return alpha and alphadot (..., N, joints) of sines p (..., 2)."""
         cycles = [self.gait(x).cycle(self.phases) for x in np.reshape(p, (-1, 2))]
-        return tuple(np.stack(x).reshape(*np.shape(p)[:-1], self.phases, -1) for x in zip(*cycles))
+        return tuple(
+            np.stack(x).reshape(*np.shape(p)[:-1], self.phases, -1)
+            for x in zip(*cycles)
+        )
 
     def limits(self, dense: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Return (A, b) with A p <= b, which holds at all phases."""
@@ -61,7 +66,9 @@ class Undulations:
     def starts(self, own, count: int, seed: int = 0) -> list[np.ndarray]:
         """Return ``count`` initial sines, ``own`` the first."""
         rng, (low, high) = np.random.default_rng(seed), self.bounds
-        return [self.fitted(own)] + [low + (high - low) * rng.uniform(0.05, 0.5, 2) for _ in range(count - 1)]
+        return [self.fitted(own)] + [
+            low + (high - low) * rng.uniform(0.05, 0.5, 2) for _ in range(count - 1)
+        ]
 
     def same(self, p, q) -> bool:
         """Return whether two sines are the same."""

@@ -24,7 +24,10 @@ FILMS, STRIPS = (".gif", ".mp4"), (".png", ".pdf", ".svg")
 RATE, SLOW_RATE = 25, 10  # frames a second; of cycles that take long
 LONG = 4.0  # s: the longest cycle at RATE
 CYCLE = 2.0  # s that a cycle takes without a frequency
-SHORTEST, LONGEST = 0.4, 10.0  # s that a cycle takes: ten pictures to see it by, and patience
+SHORTEST, LONGEST = (
+    0.4,
+    10.0,
+)  # s that a cycle takes: ten pictures to see it by, and patience
 STEPS = (1.0, 2.0, 5.0)  # of speeds, times a power of ten
 DOTS = 100  # an inch
 DRAWING = 0.012  # s a frame takes, some two times what it took
@@ -37,7 +40,9 @@ def check_format(path: Path, *others: str) -> None:
     ending = path.suffix.lower()
     if ending not in FILMS + STRIPS:
         endings = [".gif or .mp4 for a film", ".png, .pdf or .svg for a strip", *others]
-        raise Refusal(f"cannot draw {path}", instead=f"end the name in {', '.join(endings)}")
+        raise Refusal(
+            f"cannot draw {path}", instead=f"end the name in {', '.join(endings)}"
+        )
     if ending == ".mp4" and shutil.which("ffmpeg") is None:
         raise Refusal(
             f"cannot write {path}",
@@ -66,7 +71,11 @@ def pace(frequency: float | None) -> Pace:
     takes = 1 / frequency
     speed = _speed(takes)
     cycle = takes / speed
-    return Pace(cycle, RATE if cycle <= LONG else SLOW_RATE, "real time" if speed == 1.0 else f"{speed:g} × real time")
+    return Pace(
+        cycle,
+        RATE if cycle <= LONG else SLOW_RATE,
+        "real time" if speed == 1.0 else f"{speed:g} × real time",
+    )
 
 
 def _speed(takes: float) -> float:
@@ -75,7 +84,11 @@ def _speed(takes: float) -> float:
     speeds, slack = np.outer(10.0 ** np.arange(-12, 13), STEPS).ravel(), 1 + 1e-9
     if takes > LONGEST:
         return float(speeds[takes / speeds <= LONGEST * slack].min())
-    return 1.0 if takes >= SHORTEST else float(speeds[takes / speeds >= SHORTEST / slack].max())
+    return (
+        1.0
+        if takes >= SHORTEST
+        else float(speeds[takes / speeds >= SHORTEST / slack].max())
+    )
 
 
 def rows(phases: int, cycles: int, frequency: float | None = None) -> np.ndarray:
@@ -83,7 +96,9 @@ def rows(phases: int, cycles: int, frequency: float | None = None) -> np.ndarray
     out."""
     at = pace(frequency)
     count = max(1, round(cycles * at.cycle * at.rate))
-    return np.minimum(np.arange(count) * phases / (at.cycle * at.rate), phases * cycles - 1).astype(int)
+    return np.minimum(
+        np.arange(count) * phases / (at.cycle * at.rate), phases * cycles - 1
+    ).astype(int)
 
 
 def cost(phases: int, cycles: int, frequency: float | None = None) -> Cost:
@@ -98,13 +113,20 @@ def write(result: Result, path: Path) -> None:
         save(path, *result.subject, progress=bar)
 
 
-def save(path: Path, motion: Motion, field=None, error=None, progress: Callable | None = None) -> None:
+def save(
+    path: Path, motion: Motion, field=None, error=None, progress: Callable | None = None
+) -> None:
     """Write the film or strip of a motion, next to its shapes on a map of the CCF if there is one; whole or not at all."""
     if not is_film(path):
         plots.save(plots.filmstrip(motion, field, error), path)
         return
-    at, drawn = pace(motion.frequency), rows(motion.scene.numerics.phases, motion.cycles, motion.frequency)
-    film = counted(_frames(motion, drawn, field, error, at.caption), len(drawn), progress)
+    at, drawn = (
+        pace(motion.frequency),
+        rows(motion.scene.numerics.phases, motion.cycles, motion.frequency),
+    )
+    film = counted(
+        _frames(motion, drawn, field, error, at.caption), len(drawn), progress
+    )
     with atomic_file(path) as part:
         encode(part, film, at.rate, path.suffix.lower())
 
@@ -114,7 +136,9 @@ def encode(path: Path, frames: Iterator[np.ndarray], rate: int, ending: str) -> 
     (_gif if ending == ".gif" else _mp4)(path, frames, rate)
 
 
-def _frames(motion: Motion, rows: np.ndarray, field, error, caption: str) -> Iterator[np.ndarray]:
+def _frames(
+    motion: Motion, rows: np.ndarray, field, error, caption: str
+) -> Iterator[np.ndarray]:
     """Yield pictures (height, width, 3), bytes. Artists that stand still are drawn once."""
     canvas, update, background = _set(motion, rows, field, error, caption)
     for row in rows:
@@ -145,20 +169,49 @@ def _gif(path: Path, frames: Iterator[np.ndarray], rate: int) -> None:
     """Write a GIF with one palette for all frames, so that nothing flickers."""
     from PIL import Image
 
-    first = Image.fromarray(next(frames)).quantize(255, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-    rest = (Image.fromarray(frame).quantize(palette=first, dither=Image.Dither.NONE) for frame in frames)
+    first = Image.fromarray(next(frames)).quantize(
+        255, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE
+    )
+    rest = (
+        Image.fromarray(frame).quantize(palette=first, dither=Image.Dither.NONE)
+        for frame in frames
+    )
     with path.open("wb") as file:
-        first.save(file, "GIF", save_all=True, append_images=rest, duration=1000 // rate, loop=0)
+        first.save(
+            file,
+            "GIF",
+            save_all=True,
+            append_images=rest,
+            duration=1000 // rate,
+            loop=0,
+        )
 
 
 def _mp4(path: Path, frames: Iterator[np.ndarray], rate: int) -> None:
     """Write an MP4 by handing frames to ffmpeg one by one; Refusal with its last line if it fails."""
     first = next(frames)
-    tall, wide = (2 * (x // 2) for x in first.shape[:2])  # its usual colours take even sizes
-    raw_input = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{wide}x{tall}", "-r", str(rate), "-i", "-"]
+    tall, wide = (
+        2 * (x // 2) for x in first.shape[:2]
+    )  # its usual colours take even sizes
+    raw_input = [
+        "-f",
+        "rawvideo",
+        "-pix_fmt",
+        "rgb24",
+        "-s",
+        f"{wide}x{tall}",
+        "-r",
+        str(rate),
+        "-i",
+        "-",
+    ]
     encoding = ["-an", "-pix_fmt", "yuv420p", "-y", str(path)]
     command = ["ffmpeg", "-loglevel", "error", *raw_input, *encoding]
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+    pipes = {
+        "stdin": subprocess.PIPE,
+        "stdout": subprocess.DEVNULL,
+        "stderr": subprocess.PIPE,
+    }
     with subprocess.Popen(command, **pipes) as ffmpeg:
         try:
             _hand(ffmpeg.stdin, first, frames, tall, wide)
@@ -169,11 +222,19 @@ def _mp4(path: Path, frames: Iterator[np.ndarray], rate: int) -> None:
             ffmpeg.kill()
             raise
     if ffmpeg.returncode or not path.exists():
-        words = message.decode(errors="replace").strip().splitlines()[-1:] or ["it says nothing"]
-        raise Refusal(f"cannot write {path.name}", because=f"ffmpeg failed: {words[0]}", instead="end the name in .gif")
+        words = message.decode(errors="replace").strip().splitlines()[-1:] or [
+            "it says nothing"
+        ]
+        raise Refusal(
+            f"cannot write {path.name}",
+            because=f"ffmpeg failed: {words[0]}",
+            instead="end the name in .gif",
+        )
 
 
-def _hand(pipe, first: np.ndarray, rest: Iterator[np.ndarray], tall: int, wide: int) -> None:
+def _hand(
+    pipe, first: np.ndarray, rest: Iterator[np.ndarray], tall: int, wide: int
+) -> None:
     pipe.write(first[:tall, :wide].tobytes())
     for frame in rest:
         pipe.write(frame[:tall, :wide].tobytes())

@@ -24,19 +24,28 @@ MOST_ROWS = 40
 DPI = 90
 
 
-def page(line: str, head: Sequence[str] = (), rows: Iterable[Sequence] = (), picture=None) -> str:
+def page(
+    line: str, head: Sequence[str] = (), rows: Iterable[Sequence] = (), picture=None
+) -> str:
     """Return a line, a table of at most MOST_ROWS rows and a Figure as HTML."""
-    rows, cell = list(rows), lambda tag, x: f"<{tag}>{html.escape(printable(_text(x)))}</{tag}>"
+    rows, cell = (
+        list(rows),
+        lambda tag, x: f"<{tag}>{html.escape(printable(_text(x)))}</{tag}>",
+    )
     line = html.escape(printable(line))
     parts = [f"<p>{line}</p>"]
     if rows:
         lines = [("th", head)] * bool(head) + [("td", row) for row in rows[:MOST_ROWS]]
-        body = "".join(f"<tr>{''.join(cell(tag, x) for x in row)}</tr>" for tag, row in lines)
+        body = "".join(
+            f"<tr>{''.join(cell(tag, x) for x in row)}</tr>" for tag, row in lines
+        )
         parts.append(f'<table cellpadding="4">{body}</table>')
         if len(rows) > MOST_ROWS:
             parts.append(f"<p>and {len(rows) - MOST_ROWS} rows more</p>")
     if picture is not None:
-        parts.append(f'<img alt="{line}" src="data:image/png;base64,{_encoded(picture)}"/>')
+        parts.append(
+            f'<img alt="{line}" src="data:image/png;base64,{_encoded(picture)}"/>'
+        )
     return "<div>" + "".join(parts) + "</div>"
 
 
@@ -52,12 +61,17 @@ def _encoded(picture) -> str:
 
 def connection(fitted: Connection) -> str:
     """Return the rows of A as arrows over shape space, or a line where shape space is no plane."""
-    return page(repr(fitted), picture=plots.connection_figure(fitted) if len(fitted.axes) == 2 else None)
+    return page(
+        repr(fitted),
+        picture=plots.connection_figure(fitted) if len(fitted.axes) == 2 else None,
+    )
 
 
 def field(values: Field) -> str:
     """Return the components of a CCF as colours over shape space; a line for any other field."""
-    drawn = values.joints == 2 and values.values.shape[0] == 3 and values.values.ndim == 3
+    drawn = (
+        values.joints == 2 and values.values.shape[0] == 3 and values.values.ndim == 3
+    )
     return page(repr(values), picture=plots.ccf_figure(values) if drawn else None)
 
 
@@ -72,7 +86,9 @@ def study(bench: Study) -> str:
         ("computed", ", ".join(sorted(computed)) or "nothing yet"),
     ]
     drawn = {"ccf", "error of the ccf"} <= computed and scene.system.joints == 2
-    maps = lambda: plots.ccf_figure(bench.curvature, [scene.gait], error=bench.curvature_error)
+    maps = lambda: plots.ccf_figure(
+        bench.curvature, [scene.gait], error=bench.curvature_error
+    )
     return page(f"Study of {scene.name}", (), rows, maps() if drawn else None)
 
 
@@ -82,10 +98,20 @@ def displacements(table: Displacements) -> str:
     net, heading = result["net_distance"], result["heading"]
     zero = result.attributes["zero_by_symmetry"]
     moving = [q for q in ("x", "y", "heading") if q not in zero]
-    columns = {f"error ({net.unit})": net.error, "error of heading (rad)": heading.error}
+    columns = {
+        f"error ({net.unit})": net.error,
+        "error of heading (rad)": heading.error,
+    }
     if net.spread is not None:
-        columns |= {f"medium ({net.unit})": position_spread(result), "medium, heading (rad)": heading.spread}
-    columns = {name: x for name, x in columns.items() if "heading" not in name or "heading" in moving}
+        columns |= {
+            f"medium ({net.unit})": position_spread(result),
+            "medium, heading (rad)": heading.spread,
+        }
+    columns = {
+        name: x
+        for name, x in columns.items()
+        if "heading" not in name or "heading" in moving
+    }
     styles = dict.fromkeys(columns, ".1e")
     if "speed" in result:
         columns[f"speed ({result['speed'].unit})"] = result["speed"].values
@@ -93,15 +119,27 @@ def displacements(table: Displacements) -> str:
     for k, amplitude in enumerate(result["amplitude"].values.tolist()):
         for j, tier in enumerate(result["tier"].values.tolist()):
             pose = (float(np.round(result[q].values[j, k], 12)) + 0.0 for q in moving)
-            rows.append((amplitude, tier, *pose, *(f"{x[j, k]:{styles.get(n, '.4g')}}" for n, x in columns.items())))
+            rows.append(
+                (
+                    amplitude,
+                    tier,
+                    *pose,
+                    *(f"{x[j, k]:{styles.get(n, '.4g')}}" for n, x in columns.items()),
+                )
+            )
     units = {"x": net.unit, "y": net.unit, "heading": "rad"}
     head = ("amplitude", "tier", *(f"{q} ({units[q]})" for q in moving), *columns)
     note = "".join(f"; {line}" for line in zero_words(zero))
-    note += f"; estimated error: {table['estimate_is']}" if "estimate_is" in table else ""
+    note += (
+        f"; estimated error: {table['estimate_is']}" if "estimate_is" in table else ""
+    )
     return page(f"Net displacement per cycle of {table.scene.name}{note}", head, rows)
 
 
 def swept(results: Swept) -> str:
     """Return a picture against one parameter, or a map over two; a line for more."""
     drawn = len(results["over"]) <= 2
-    return page(repr(results), picture=plots.sweep_figure(results.scene, results) if drawn else None)
+    return page(
+        repr(results),
+        picture=plots.sweep_figure(results.scene, results) if drawn else None,
+    )

@@ -50,13 +50,26 @@ def draw_swim(result: Result):
         left.plot(*points.T, color="black", lw=1.2, alpha=0.3 + 0.7 * k / len(starts))
     left.set(xlabel="$x$ (BL)", ylabel="$y$ (BL)", aspect="equal")
     names = result["method"].values.tolist()
-    x, y, dx, dy = (v for v in (result["x"].values, result["y"].values, result["x"].error, result["y"].error))
+    x, y, dx, dy = (
+        v
+        for v in (
+            result["x"].values,
+            result["y"].values,
+            result["x"].error,
+            result["y"].error,
+        )
+    )
     distance = np.hypot(x, y)
-    error = np.nan_to_num(np.hypot(x * dx, y * dy) / np.where(distance > 0, distance, 1.0))
+    error = np.nan_to_num(
+        np.hypot(x * dx, y * dy) / np.where(distance > 0, distance, 1.0)
+    )
     colours = ["0.6"] * (len(names) - 1) + ["#D55E00"]
     right.barh(range(len(names)), distance, xerr=error, color=colours, height=0.6)
     right.set_yticks(range(len(names)), names)
     right.invert_yaxis()
-    right.set(xlabel="distance per cycle (BL)", xlim=(0, 1.15 * (distance + error).max() or None))
+    right.set(
+        xlabel="distance per cycle (BL)",
+        xlim=(0, 1.15 * (distance + error).max() or None),
+    )
     right.locator_params(axis="x", nbins=5)
     return fig

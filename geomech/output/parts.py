@@ -31,8 +31,13 @@ class Connection:
 
     def __post_init__(self) -> None:
         if self.out and not hasattr(self.format, "write"):
-            endings = [ending for ending, known in FORMATS.items() if hasattr(known, "write")]
-            raise Refusal(f"cannot write {self.out}", instead=f"end the name of a connection in {' or '.join(endings)}")
+            endings = [
+                ending for ending, known in FORMATS.items() if hasattr(known, "write")
+            ]
+            raise Refusal(
+                f"cannot write {self.out}",
+                instead=f"end the name of a connection in {' or '.join(endings)}",
+            )
         for name, word, known in (
             ("sign", self.sign, SIGNS),
             ("order", self.order, ORDERS),
@@ -41,11 +46,24 @@ class Connection:
             if word is not None:
                 choose(f"--{name}", word, known)
                 if name not in self._settings(self.format):
-                    taking = " or ".join(ending for ending, other in FORMATS.items() if name in self._settings(other))
-                    instead = f"drop it, a {self.out.suffix} file says what it has" if self.out else "drop it"
-                    raise Refusal(f"--{name} is that of a {taking} file", instead=instead)
+                    taking = " or ".join(
+                        ending
+                        for ending, other in FORMATS.items()
+                        if name in self._settings(other)
+                    )
+                    instead = (
+                        f"drop it, a {self.out.suffix} file says what it has"
+                        if self.out
+                        else "drop it"
+                    )
+                    raise Refusal(
+                        f"--{name} is that of a {taking} file", instead=instead
+                    )
         if self.layout == LAYOUTS[1] and (self.sign or self.order):
-            raise Refusal("a struct s has its own sign and order", instead="drop --sign and --order")
+            raise Refusal(
+                "a struct s has its own sign and order",
+                instead="drop --sign and --order",
+            )
 
     @property
     def format(self) -> Callable | None:
@@ -57,28 +75,46 @@ class Connection:
         return getattr(file, "settings", ())
 
     def __call__(self, result: Result, path: Path) -> None:
-        given = {name: word for name in ("sign", "order", "layout") if (word := getattr(self, name))}
+        given = {
+            name: word
+            for name in ("sign", "order", "layout")
+            if (word := getattr(self, name))
+        }
         self.format.write(path, result, **given)
-        if "sign" in self._settings(self.format) and not self.sign and self.layout != LAYOUTS[1]:
+        if (
+            "sign" in self._settings(self.format)
+            and not self.sign
+            and self.layout != LAYOUTS[1]
+        ):
             note(f"{path} has {SIGNS['+']}; --sign - gives the other")
 
 
 def write_measured(result: Result, path: Path) -> None:
     """Write the connection near a measured gait, or the kinematics of midlines."""
-    write_netcdf(path, result if result.kind == "midlines" else results.of_fit(result.subject))
+    write_netcdf(
+        path, result if result.kind == "midlines" else results.of_fit(result.subject)
+    )
 
 
-def mean_gait(field: Path | None) -> tuple[Callable[[Result, Path], None], Callable[[Path], Any]]:
+def mean_gait(
+    field: Path | None,
+) -> tuple[Callable[[Result, Path], None], Callable[[Path], Any]]:
     """Return a function that writes a scene of a measured gait, whose connection is in the file ``field``, and a check of the
     name of that scene."""
 
     def check(path: Path) -> None:
         if path.suffix != ".toml":
-            raise Refusal(f"cannot write {path}", instead="end the name of a scene in .toml")
+            raise Refusal(
+                f"cannot write {path}", instead="end the name of a scene in .toml"
+            )
         if field is None:
-            raise Refusal("--scene names the field's file", instead="say -o FIELD.nc, too")
+            raise Refusal(
+                "--scene names the field's file", instead="say -o FIELD.nc, too"
+            )
 
-    return lambda result, path: write_text(path, results.scene_toml(result.subject, field, path)), check
+    return lambda result, path: write_text(
+        path, results.scene_toml(result.subject, field, path)
+    ), check
 
 
 def write_best(result: Result, path: Path) -> None:

@@ -28,7 +28,9 @@ def displacement(result: Result, path: Path, **options: Any) -> None:
     """Draw net displacements against amplitude. options: of `plots.displacement_figure`."""
     scene, gait = result.subject
     table = {type(gait).__name__.lower(): tables.table(result)}
-    plots.save(plots.displacement_figure(table, [gait], system=scene.system, **options), path)
+    plots.save(
+        plots.displacement_figure(table, [gait], system=scene.system, **options), path
+    )
 
 
 def sweep(result: Result, path: Path) -> None:
@@ -50,7 +52,11 @@ def stress(result: Result, path: Path) -> None:
 
 def measured(result: Result, path: Path) -> None:
     """Draw a measured gait, or midlines."""
-    figure = plots.midlines_figure(result) if result.kind == "midlines" else plots.measured_figure(result.subject)
+    figure = (
+        plots.midlines_figure(result)
+        if result.kind == "midlines"
+        else plots.measured_figure(result.subject)
+    )
     plots.save(figure, path)
 
 
@@ -77,7 +83,9 @@ class Optimum:
             raise Refusal("--stretch is a way to draw", instead="say --plot FILE, too")
 
     def __call__(self, result: Result, path: Path) -> None:
-        plots.save(plots.optimum_figure(result.subject, self.stretch, clim=self.clim), path)
+        plots.save(
+            plots.optimum_figure(result.subject, self.stretch, clim=self.clim), path
+        )
 
 
 @dataclass(frozen=True)
@@ -94,7 +102,14 @@ class Connection:
     clim: float | str | None = None
 
     def __post_init__(self) -> None:
-        options = (self.style, self.pair, self.slice_, self.other_frame, self.components or None, self.clim)
+        options = (
+            self.style,
+            self.pair,
+            self.slice_,
+            self.other_frame,
+            self.components or None,
+            self.clim,
+        )
         if self.plot is None and any(option is not None for option in options):
             raise Refusal(
                 "--style, --component, --pair, --slice, --compare-frame and --clim are those of a figure",
@@ -106,13 +121,19 @@ class Connection:
     def __call__(self, result: Result, path: Path) -> None:
         space: Space = result.subject
         scene = space.study.scene
-        options: dict[str, Any] = {"labels": shape_labels(scene.system), "style": self.style or "quiver"}
+        options: dict[str, Any] = {
+            "labels": shape_labels(scene.system),
+            "style": self.style or "quiver",
+        }
         options |= {"components": self.components, "clim": self.clim}
         if space.planes:
             plots.save(plots.plane_connection_figure(space.planes, **options), path)
             return
         if space.other:
-            options |= {"beside": space.other.fitted, "names": [scene.frame, self.other_frame]}
+            options |= {
+                "beside": space.other.fitted,
+                "names": [scene.frame, self.other_frame],
+            }
         plots.save(plots.connection_figure(space.study.fitted, **options), path)
 
 
@@ -131,10 +152,17 @@ class Ccf:
     def __post_init__(self) -> None:
         if self.style is not None:
             choose("--style", self.style, plots.CCF_STYLES)
-        if self.stretch and (self.metric or self.other_frame or self.style not in (None, "map")):
-            raise Refusal("--stretch is a map of its own", instead="drop --style, --metric and --compare-frame")
+        if self.stretch and (
+            self.metric or self.other_frame or self.style not in (None, "map")
+        ):
+            raise Refusal(
+                "--stretch is a map of its own",
+                instead="drop --style, --metric and --compare-frame",
+            )
         if self.metric and self.style not in (None, "map"):
-            raise Refusal("--metric draws on a map", instead=f"drop --style {self.style}")
+            raise Refusal(
+                "--metric draws on a map", instead=f"drop --style {self.style}"
+            )
 
     def __call__(self, result: Result, path: Path) -> None:
         space: Space = result.subject
@@ -145,10 +173,18 @@ class Ccf:
         return {"components": self.components, "clim": self.clim}
 
     def _slices(self, space: Space) -> Any:
-        scene, options = space.study.scene, {"style": self.style or "map", **self._panels}
+        scene, options = (
+            space.study.scene,
+            {"style": self.style or "map", **self._panels},
+        )
         if space.other_planes:
-            options |= {"beside": space.other_planes[0], "names": [scene.frame, self.other_frame]}
-        return plots.planes_figure(space.planes, scene.gait, labels=shape_labels(scene.system), **options)
+            options |= {
+                "beside": space.other_planes[0],
+                "names": [scene.frame, self.other_frame],
+            }
+        return plots.planes_figure(
+            space.planes, scene.gait, labels=shape_labels(scene.system), **options
+        )
 
     def _map(self, space: Space) -> Any:
         study, scene, other = space.study, space.study.scene, space.other
@@ -159,8 +195,17 @@ class Ccf:
         }
         if self.stretch:
             options["unit"] = units(scene.system)["path_length"]
-            return plots.stretched_figure(study.curvature, space.stretch, **options, **self._panels)
-        options |= {"style": self.style or "map", "metric": study.metric if self.metric else None, **self._panels}
+            return plots.stretched_figure(
+                study.curvature, space.stretch, **options, **self._panels
+            )
+        options |= {
+            "style": self.style or "map",
+            "metric": study.metric if self.metric else None,
+            **self._panels,
+        }
         if other:
-            options |= {"beside": (other.curvature, other.curvature_error), "names": [scene.frame, self.other_frame]}
+            options |= {
+                "beside": (other.curvature, other.curvature_error),
+                "names": [scene.frame, self.other_frame],
+            }
         return plots.ccf_figure(study.curvature, **options)

@@ -28,9 +28,15 @@ def refuse_folder(scene: Scene, folder: Path) -> None:
     """Refuse a folder in which `write` would replace an input, or a scene that no `run` has written."""
     path = folder / SCENE
     refuse_inputs([path, folder / TABLES], inputs(scene))
-    if os.path.lexists(path) and not os.path.lexists(folder / TABLES) and not _holds(path, toml(scene)):
+    if (
+        os.path.lexists(path)
+        and not os.path.lexists(folder / TABLES)
+        and not _holds(path, toml(scene))
+    ):
         raise Refusal(
-            f"cannot write {path}", because="another scene stands there", instead="choose another folder with -o"
+            f"cannot write {path}",
+            because="another scene stands there",
+            instead="choose another folder with -o",
         )
 
 
@@ -61,8 +67,15 @@ def write(result: Result, folder: Path, drawn: Drawn = ALL) -> None:
         write_netcdf(folder / "connection.nc", fields.of_study(found.study))
         _maps(found, folder, drawn)
     numbers = {title: tables.table(table) for title, table in found.tables.items()}
-    options = {"system": scene.system, "components": drawn.components, "data": drawn.data}
-    _save(plots.displacement_figure(numbers, found.gaits, **options), folder / "displacement")
+    options = {
+        "system": scene.system,
+        "components": drawn.components,
+        "data": drawn.data,
+    }
+    _save(
+        plots.displacement_figure(numbers, found.gaits, **options),
+        folder / "displacement",
+    )
     (folder / TABLES).write_text(json.dumps(numbers, indent=1) + "\n")
     (folder / SCENE).write_text(toml(scene), encoding="utf-8")
 
@@ -70,15 +83,33 @@ def write(result: Result, folder: Path, drawn: Drawn = ALL) -> None:
 def _maps(found: Reported, folder: Path, drawn: Drawn) -> None:
     """Draw the connection and the CCF, of three joints for every pair."""
     study, scene = found.study, found.study.scene
-    options: dict[str, Any] = {"labels": shape_labels(scene.system), "components": drawn.components}
+    options: dict[str, Any] = {
+        "labels": shape_labels(scene.system),
+        "components": drawn.components,
+    }
     if found.planes:
-        _save(plots.plane_connection_figure(found.planes, **options), folder / "connection")
-        _save(plots.planes_figure(found.planes, scene.gait, clim=drawn.clim, **options), folder / "ccf")
+        _save(
+            plots.plane_connection_figure(found.planes, **options),
+            folder / "connection",
+        )
+        _save(
+            plots.planes_figure(found.planes, scene.gait, clim=drawn.clim, **options),
+            folder / "ccf",
+        )
         return
     _save(plots.connection_figure(study.fitted, **options), folder / "connection")
     if isinstance(scene.system, Framed):
-        _save(plots.frame_figure(scene.system.field.field, labels=options["labels"]), folder / "frame")
-    maps = plots.ccf_figure(study.curvature, found.gaits, error=study.curvature_error, clim=drawn.clim, **options)
+        _save(
+            plots.frame_figure(scene.system.field.field, labels=options["labels"]),
+            folder / "frame",
+        )
+    maps = plots.ccf_figure(
+        study.curvature,
+        found.gaits,
+        error=study.curvature_error,
+        clim=drawn.clim,
+        **options,
+    )
     _save(maps, folder / "ccf")
 
 
@@ -86,7 +117,9 @@ def write_accuracy(result: Result, folder: Path) -> None:
     """Write an accuracy study into a folder."""
     numbers = accuracy.table(result)
     (folder / "accuracy.json").write_text(json.dumps(numbers, indent=1) + "\n")
-    (folder / "accuracy.txt").write_text(text.text(result) + "\n", encoding="utf-8", errors="backslashreplace")
+    (folder / "accuracy.txt").write_text(
+        text.text(result) + "\n", encoding="utf-8", errors="backslashreplace"
+    )
     draw: Callable = getattr(plots, result.subject.picture)
     _save(draw(numbers), folder / "accuracy")
 

@@ -45,7 +45,9 @@ def draw(scene: WalkerScene, found: Walked):
     )
     for ax, (label, values) in zip(axes.ravel(), lines):
         ax.plot(w.t, values, color="black", lw=0.8)
-        ax.set(xlabel="$t$ (s)", ylabel=label, xlim=(0, w.t[-1] or scene.numerics.duration))
+        ax.set(
+            xlabel="$t$ (s)", ylabel=label, xlim=(0, w.t[-1] or scene.numerics.duration)
+        )
     axes[0, 0].axhline(w.speed, color="C3", lw=1.0, ls="--")
     axes[0, 0].set_title(f"mean {w.speed:.3g} m/s, {w.status}", color="C3")
     _stage(axes[1, 1], scene, found, np.array([len(w.t) - 1]))(len(w.t) - 1)
@@ -61,7 +63,9 @@ def film(result: Result, path: Path, follow: bool = False) -> None:
         return
     at = animate.pace(scene.gait.frequency)
     with atomic_file(path) as part:
-        animate.encode(part, _frames(scene, found, at, follow), at.rate, path.suffix.lower())
+        animate.encode(
+            part, _frames(scene, found, at, follow), at.rate, path.suffix.lower()
+        )
 
 
 @plots.styled
@@ -78,38 +82,53 @@ def strip(scene: WalkerScene, found: Walked):
     return fig
 
 
-def _frames(scene: WalkerScene, found: Walked, at: animate.Pace, follow: bool) -> Iterator[np.ndarray]:
+def _frames(
+    scene: WalkerScene, found: Walked, at: animate.Pace, follow: bool
+) -> Iterator[np.ndarray]:
     """Yield pictures (height, width, 3), bytes, at the rate of the film: by MuJoCo for a walk of three dimensions where there
     is a GL to draw with."""
     w, speed = found.walk, 1 / (scene.gait.frequency * at.cycle)
     times = np.arange(min(FRAMES, 1 + int(w.t[-1] / speed * at.rate))) * speed / at.rate
     rows = np.searchsorted(w.t, times - 1e-9).clip(0, len(w.t) - 1)
     pictures = w.spatial and walking.view(scene).pictures(w.spatial["states"][rows])
-    return _captioned(pictures, w.t[rows], at.caption) if pictures else _drawn(scene, found, rows, at.caption, follow)
+    return (
+        _captioned(pictures, w.t[rows], at.caption)
+        if pictures
+        else _drawn(scene, found, rows, at.caption, follow)
+    )
 
 
-def _captioned(pictures: Iterator[np.ndarray], times: np.ndarray, caption: str) -> Iterator[np.ndarray]:
+def _captioned(
+    pictures: Iterator[np.ndarray], times: np.ndarray, caption: str
+) -> Iterator[np.ndarray]:
     """Yield pictures with the time and the speed of the film in their upper corners."""
     from PIL import Image, ImageDraw, ImageFont
 
     font = ImageFont.load_default(14)
     for picture, t in zip(pictures, times):
         image = Image.fromarray(picture)
-        draw, words = ImageDraw.Draw(image), {"fill": "white", "font": font, "stroke_width": 1, "stroke_fill": "black"}
+        draw, words = (
+            ImageDraw.Draw(image),
+            {"fill": "white", "font": font, "stroke_width": 1, "stroke_fill": "black"},
+        )
         draw.text((10, 8), f"t = {t:.2f} s", **words)
         draw.text((image.width - 10, 8), caption, anchor="ra", **words)
         yield np.array(image)
 
 
 @plots.styled
-def _drawn(scene: WalkerScene, found: Walked, rows: np.ndarray, caption: str, follow: bool) -> Iterator[np.ndarray]:
+def _drawn(
+    scene: WalkerScene, found: Walked, rows: np.ndarray, caption: str, follow: bool
+) -> Iterator[np.ndarray]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     fig, axes = plots.figure(WIDE, TALL[1])
     ax = axes[0, 0]
     update = _stage(ax, scene, found, rows, follow)
     (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
-    fig.set_figheight(float(np.clip((WIDE - LABELS) * (high - low) / (right - left) + LABELS, *TALL)))
+    fig.set_figheight(
+        float(np.clip((WIDE - LABELS) * (high - low) / (right - left) + LABELS, *TALL))
+    )
     ax.set_title(caption, loc="right", fontsize=8, color="0.3")
     fig.set_dpi(animate.DOTS)
     canvas = FigureCanvasAgg(fig)
@@ -120,7 +139,9 @@ def _drawn(scene: WalkerScene, found: Walked, rows: np.ndarray, caption: str, fo
         yield np.array(canvas.buffer_rgba())[..., :3]
 
 
-def _stage(ax, scene: WalkerScene, found: Walked, rows: np.ndarray, follow: bool = False):
+def _stage(
+    ax, scene: WalkerScene, found: Walked, rows: np.ndarray, follow: bool = False
+):
     """Draw the ground on axes that hold the robot at these rows of its walk; return a function that draws it at one. follow:
     the axes move with the robot."""
     robot = _Solid(scene, found) if found.walk.spatial else _Flat(scene, found)
@@ -128,7 +149,10 @@ def _stage(ax, scene: WalkerScene, found: Walked, rows: np.ndarray, follow: bool
     x = found.walk.pose[rows, 0]
     ax.axhspan(-3 * reach, 0.0, color="peru", alpha=0.35, lw=0)
     seen = x[:1] if follow else x
-    limits = {"xlim": (seen.min() - room, seen.max() + room), "ylim": (-1.2 * reach, 3.2 * reach)}
+    limits = {
+        "xlim": (seen.min() - room, seen.max() + room),
+        "ylim": (-1.2 * reach, 3.2 * reach),
+    }
     ax.set(**limits, aspect="equal", xlabel="$x$ (m)", ylabel="$z$ (m)")
     draw, label = robot.on(ax), ax.set_title("", loc="left", fontsize=8)
 
@@ -147,21 +171,40 @@ class _Flat:
     def __init__(self, scene: WalkerScene, found: Walked):
         self.robot, self.gait, self.walk = scene.robot, scene.gait, found.walk
         self.leg, self.belly = scene.robot.leg(40).points, scene.robot.belly(8)
-        self.reach, self.hips = np.abs(self.leg).max(), [(h, scene.robot.hip_height) for h in scene.robot.hips]
-        extents = [self.reach, *(abs(h) + self.reach for h, _ in self.hips), getattr(scene.robot, "length", 0.0) / 2]
+        self.reach, self.hips = (
+            np.abs(self.leg).max(),
+            [(h, scene.robot.hip_height) for h in scene.robot.hips],
+        )
+        extents = [
+            self.reach,
+            *(abs(h) + self.reach for h, _ in self.hips),
+            getattr(scene.robot, "length", 0.0) / 2,
+        ]
         self.room = max(extents)
 
     def on(self, ax):
         legs = [(k, at) for k in range(len(self.hips)) for at in self.robot.hip_phases]
-        lines = [ax.plot([], [], color=TRIPODS[int((k + 2 * at) % 2)], lw=1.2)[0] for k, at in legs]
+        lines = [
+            ax.plot([], [], color=TRIPODS[int((k + 2 * at) % 2)], lw=1.2)[0]
+            for k, at in legs
+        ]
         box = ax.plot([], [], color="black", lw=1.2)[0]
 
         def draw(row):
             pose, t = self.walk.pose[row], self.walk.t[row]
             for line, (k, at) in zip(lines, legs):
-                phase = self.gait.frequency * t + (k * self.robot.hip_phases[-1] + at) % 1.0
+                phase = (
+                    self.gait.frequency * t + (k * self.robot.hip_phases[-1] + at) % 1.0
+                )
                 hip = _rotated(np.array([self.hips[k]]), pose[2]) + pose[:2]
-                line.set_data(*(_rotated(self.leg, pose[2] + float(self.gait.angle(phase, phase))) + hip).T)
+                line.set_data(
+                    *(
+                        _rotated(
+                            self.leg, pose[2] + float(self.gait.angle(phase, phase))
+                        )
+                        + hip
+                    ).T
+                )
             if self.belly is not None:
                 box.set_data(*(_rotated(self.belly.points, pose[2]) + pose[:2]).T)
 
@@ -181,11 +224,15 @@ class _Solid:
         from matplotlib.collections import PolyCollection
 
         colours = np.array([to_rgba(c) for c in ("0.75", *TRIPODS)])[self.view.groups]
-        drawn = ax.add_collection(PolyCollection([], lw=1.0))  # sheets are seen by their edges
+        drawn = ax.add_collection(
+            PolyCollection([], lw=1.0)
+        )  # sheets are seen by their edges
 
         def draw(row):
             triangles = self.view.triangles(self.walk.spatial["states"][row])
-            order = np.argsort(-triangles[..., 1].mean(1), kind="stable")  # what is farther off first
+            order = np.argsort(
+                -triangles[..., 1].mean(1), kind="stable"
+            )  # what is farther off first
             drawn.set_verts(triangles[order][..., [0, 2]])
             drawn.set_facecolor(colours[order])
             drawn.set_edgecolor(colours[order])
@@ -194,4 +241,6 @@ class _Solid:
 
 
 def _rotated(points: np.ndarray, angle: float) -> np.ndarray:
-    return points @ np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return points @ np.array(
+        [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    )

@@ -2,7 +2,13 @@
 is open, else on a new one, which a notebook shows. Nothing here imports pyplot or changes its state.
 """
 
-from geomech.plots.displacements import PANELS, displacement, displacement_figure, medium_band, net
+from geomech.plots.displacements import (
+    PANELS,
+    displacement,
+    displacement_figure,
+    medium_band,
+    net,
+)
 from geomech.plots.drag import drag_figure
 from geomech.plots.figures import (
     ccf_figure,
@@ -11,7 +17,12 @@ from geomech.plots.figures import (
     plane_connection_figure,
     planes_figure,
 )
-from geomech.plots.forces import force_map, forces_figure, stacked_by_phase, stacked_by_place
+from geomech.plots.forces import (
+    force_map,
+    forces_figure,
+    stacked_by_phase,
+    stacked_by_place,
+)
 from geomech.plots.maps import (
     COMPONENTS,
     FINEST,
@@ -33,10 +44,31 @@ from geomech.plots.midlines import midlines_figure
 from geomech.plots.motion import LINES, filmstrip, stage
 from geomech.plots.optimum import optimum_angles, optimum_figure, optimum_map
 from geomech.plots.plates import penetration_figure, plates_figure
-from geomech.plots.precision import SETTING_MARKER, walk_accuracy_figure, work_precision, work_precision_figure
+from geomech.plots.precision import (
+    SETTING_MARKER,
+    walk_accuracy_figure,
+    work_precision,
+    work_precision_figure,
+)
 from geomech.plots.stretched import stretched_figure, stretched_map
-from geomech.plots.style import MARKED, STYLE, check_format, figure, quantity, save, shared_legend, styled
-from geomech.plots.styles import CCF_STYLES, CONNECTION_STYLES, ccf_contours, ccf_surface, streamlines, winding
+from geomech.plots.style import (
+    MARKED,
+    STYLE,
+    check_format,
+    figure,
+    quantity,
+    save,
+    shared_legend,
+    styled,
+)
+from geomech.plots.styles import (
+    CCF_STYLES,
+    CONNECTION_STYLES,
+    ccf_contours,
+    ccf_surface,
+    streamlines,
+    winding,
+)
 from geomech.plots.sweeps import curves, sweep_figure
 from geomech.plots.terradynamics import (
     draw_stress,

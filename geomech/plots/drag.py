@@ -24,7 +24,9 @@ def drag_figure(result: Result) -> Figure:
     """
     fig, axes = figure(4.4, 4.6, 1, 2)
     (top,), (bottom,) = axes
-    angle, psi, forces, residuals = (result[name].values for name in ("angle", "folded_psi", "force", "residual"))
+    angle, psi, forces, residuals = (
+        result[name].values for name in ("angle", "folded_psi", "force", "residual")
+    )
     for name, colour, marker in PARTS:
         k = 1 if name == "across" else 0
         law, band = result["law"].values[k], result["law"].error[k]

@@ -65,10 +65,18 @@ def connection_figure(
     rows = [connection] if beside is None else [connection, beside]
     panels = panels_of(components, [[has_row(c, k) for k in range(3)] for c in rows])
     fig, axes = figure(
-        0.3 + 3.5 * len(panels), 3.0 + 2.7 * (len(rows) - 1), len(panels), len(rows), layout="compressed"
+        0.3 + 3.5 * len(panels),
+        3.0 + 2.7 * (len(rows) - 1),
+        len(panels),
+        len(rows),
+        layout="compressed",
     )
     for k, component in enumerate(panels):
-        tops = [limit_of(np.hypot(*c.A[component]), clim) for c in rows if has_row(c, component)]
+        tops = [
+            limit_of(np.hypot(*c.A[component]), clim)
+            for c in rows
+            if has_row(c, component)
+        ]
         top = None if beside is None and clim is None else max(tops, default=None)
         for c, ax in zip(rows, axes[:, k]):
             draw(c, component, ax=ax, labels=labels, top=top)
@@ -78,7 +86,13 @@ def connection_figure(
 
 
 @styled
-def pairs_figure(form: TwoForm, at: Sequence[float], component: int = 0, *, labels: Labels | None = None) -> Figure:
+def pairs_figure(
+    form: TwoForm,
+    at: Sequence[float],
+    component: int = 0,
+    *,
+    labels: Labels | None = None,
+) -> Figure:
     """Draw one component of the CCF of all pairs of joints, on the planes through the shape ``at`` (d,), on one scale.
 
     labels: (name, unit) of each shape variable."""
@@ -95,7 +109,9 @@ def pairs_figure(form: TwoForm, at: Sequence[float], component: int = 0, *, labe
             for k in range(len(labels))
             if k not in (i, j)
         )
-        ax.set_title(f"{ax.get_title()}, {i + 1}{j + 1}" + f"; {fixed}" * bool(fixed), fontsize=8)
+        ax.set_title(
+            f"{ax.get_title()}, {i + 1}{j + 1}" + f"; {fixed}" * bool(fixed), fontsize=8
+        )
     for ax in axes.ravel()[len(fields) :]:
         ax.set_axis_off()
     return fig
@@ -131,7 +147,9 @@ def ccf_figure(
     >>> study = geomech.study("three-link-viscous", grid=15)
     >>> fig = geomech.plots.ccf_figure(study.ccf(), gaits=[study.scene.gait], error=study.ccf_error(), components=["x"])
     """
-    rows = [Row(field, error, gaits, labels)] + ([] if beside is None else [Row(*beside, gaits, labels)])
+    rows = [Row(field, error, gaits, labels)] + (
+        [] if beside is None else [Row(*beside, gaits, labels)]
+    )
     return _ccf_rows(rows, style, metric, names, True, components, clim)
 
 
@@ -156,9 +174,16 @@ def planes_figure(
     labels, rows = labels or _angles(planes), []
     for one in [*planes, *([] if beside is None else [beside])]:
         seen = [] if gait is None else [ProjectedGait(gait, one)]
-        on_plane, shadows = ([x for x in seen if x.lies_in_plane == lies] for lies in (True, False))
-        rows.append(Row(one.ccf, one.error, on_plane, [labels[k] for k in one.pair], shadows))
-    titles = [f"{plane_title(one, labels)}; frame {name}" for one, name in zip([planes[0], beside], names)]
+        on_plane, shadows = (
+            [x for x in seen if x.lies_in_plane == lies] for lies in (True, False)
+        )
+        rows.append(
+            Row(one.ccf, one.error, on_plane, [labels[k] for k in one.pair], shadows)
+        )
+    titles = [
+        f"{plane_title(one, labels)}; frame {name}"
+        for one, name in zip([planes[0], beside], names)
+    ]
     titles = titles or [plane_title(one, labels) for one in planes]
     return _ccf_rows(rows, style, None, titles, beside is not None, components, clim)
 
@@ -181,14 +206,30 @@ def plane_connection_figure(
     """
     draw = CONNECTION_STYLES[choose("style", style, CONNECTION_STYLES)]
     labels = labels or _angles(planes)
-    panels = panels_of(components, [[has_row(one.connection, k) for k in range(3)] for one in planes])
+    panels = panels_of(
+        components, [[has_row(one.connection, k) for k in range(3)] for one in planes]
+    )
     fig, axes = figure(
-        0.3 + 3.5 * len(panels), 3.0 + 2.7 * (len(planes) - 1), len(panels), len(planes), layout="compressed"
+        0.3 + 3.5 * len(panels),
+        3.0 + 2.7 * (len(planes) - 1),
+        len(panels),
+        len(planes),
+        layout="compressed",
     )
     for one, row in zip(planes, axes):
         for component, ax in zip(panels, row):
-            top = None if clim is None else limit_of(np.hypot(*one.connection.A[component][:2]), clim)
-            draw(one.connection, component, ax=ax, labels=[labels[k] for k in one.pair], top=top)
+            top = (
+                None
+                if clim is None
+                else limit_of(np.hypot(*one.connection.A[component][:2]), clim)
+            )
+            draw(
+                one.connection,
+                component,
+                ax=ax,
+                labels=[labels[k] for k in one.pair],
+                top=top,
+            )
     _name(axes, [plane_title(one, labels) for one in planes])
     say_left_out(fig, panels, components, row_name)
     return fig
@@ -201,11 +242,22 @@ def _angles(planes: Sequence[Plane]) -> Labels:
 
 def plane_title(plane: Plane, labels: Labels) -> str:
     """Return the angles of the fixed joints of a plane as a title."""
-    angles = ", ".join(f"{quantity(labels[k][0])} = {plane.at[k]:.3g}".replace("-", MINUS_SIGN) for k in plane.fixed)
+    angles = ", ".join(
+        f"{quantity(labels[k][0])} = {plane.at[k]:.3g}".replace("-", MINUS_SIGN)
+        for k in plane.fixed
+    )
     return f"{angles} {labels[plane.fixed[0]][1]}" if plane.fixed else ""
 
 
-def _ccf_rows(rows: Sequence[Row], style: str, metric, names: Sequence[str], same: bool, components, clim):
+def _ccf_rows(
+    rows: Sequence[Row],
+    style: str,
+    metric,
+    names: Sequence[str],
+    same: bool,
+    components,
+    clim,
+):
     """Draw maps of the components, a line of them for each row. same: on the same scales."""
     draw = CCF_STYLES[choose("style", style, CCF_STYLES)]
     solid = getattr(draw, "projection", "") == "3d"
@@ -213,24 +265,60 @@ def _ccf_rows(rows: Sequence[Row], style: str, metric, names: Sequence[str], sam
     count = len(panels)
     if solid:
         fig = blank(1.0 + 3.6 * count, 3.6 * len(rows))
-        axes = fig.subplots(len(rows), count, squeeze=False, subplot_kw={"projection": "3d"})
+        axes = fig.subplots(
+            len(rows), count, squeeze=False, subplot_kw={"projection": "3d"}
+        )
         fig.get_layout_engine().set(w_pad=0.25)
     else:
-        fig, axes = figure(0.3 + 3.5 * count, 3.2 + 2.75 * (len(rows) - 1), count, len(rows), layout="compressed")
-        fig.get_layout_engine().set(rect=(0.0, 0.0, 0.97 if len(rows) > 1 else 1.0, 1.0))  # room for the widest labels
+        fig, axes = figure(
+            0.3 + 3.5 * count,
+            3.2 + 2.75 * (len(rows) - 1),
+            count,
+            len(rows),
+            layout="compressed",
+        )
+        fig.get_layout_engine().set(
+            rect=(0.0, 0.0, 0.97 if len(rows) > 1 else 1.0, 1.0)
+        )  # room for the widest labels
     more = {"metric": metric} if style == "map" else {}
     for k, component in enumerate(panels):
-        tops = [limit_of(r.field.values[component], clim) if has(r.field, component) else None for r in rows]
+        tops = [
+            limit_of(r.field.values[component], clim)
+            if has(r.field, component)
+            else None
+            for r in rows
+        ]
         if same:
             tops = [max((x for x in tops if x), default=None)] * len(rows)
         for r, ax, top in zip(rows, axes[:, k], tops):
-            draw(r.field, component, r.gaits, ax=ax, error=r.error, labels=r.labels, clim=top, **more)
+            draw(
+                r.field,
+                component,
+                r.gaits,
+                ax=ax,
+                error=r.error,
+                labels=r.labels,
+                clim=top,
+                **more,
+            )
             for shadow in r.shadows:
                 if solid:
-                    ax.plot(*shadow.shape(PHASES).T, ax.get_zlim()[0], "--", color="black", lw=1.0)
+                    ax.plot(
+                        *shadow.shape(PHASES).T,
+                        ax.get_zlim()[0],
+                        "--",
+                        color="black",
+                        lw=1.0,
+                    )
                 else:
                     draw_gait(shadow, ax, within=r.field.axes, line="--")
-    say_left_out(fig, panels, components, ccf_name, *([SHADOW] if any(r.shadows for r in rows) else []))
+    say_left_out(
+        fig,
+        panels,
+        components,
+        ccf_name,
+        *([SHADOW] if any(r.shadows for r in rows) else []),
+    )
     if style == "map":
         _one_legend(fig, axes, "upper" if fig.get_supxlabel() else "lower")
     _name(axes, names)
@@ -245,12 +333,28 @@ def _one_legend(fig, axes, where: str) -> None:
             handles |= {h.get_label(): h for h in legend.legend_handles}
             legend.remove()
     if handles:
-        fig.legend(handles=[*handles.values()], loc=f"outside {where} center", ncols=len(handles))
+        fig.legend(
+            handles=[*handles.values()],
+            loc=f"outside {where} center",
+            ncols=len(handles),
+        )
 
 
 def _name(axes, names: Sequence[str]) -> None:
     """Write the frame of each row at its left."""
     for row, name in zip(axes, names):
-        options = {"transform": row[0].transAxes, "rotation": 90, "ha": "center", "va": "center", "fontsize": 10}
+        options = {
+            "transform": row[0].transAxes,
+            "rotation": 90,
+            "ha": "center",
+            "va": "center",
+            "fontsize": 10,
+        }
         write = row[0].text2D if hasattr(row[0], "text2D") else row[0].text
-        write(-0.33 if write.__name__ == "text" else 0.03, 0.5, name, in_layout=write.__name__ == "text", **options)
+        write(
+            -0.33 if write.__name__ == "text" else 0.03,
+            0.5,
+            name,
+            in_layout=write.__name__ == "text",
+            **options,
+        )

@@ -26,13 +26,21 @@ MAPS = {  # titles, and what the colour bar says of the sign
 STACKS = ("phase", "place")
 DEFAULT = ("forward", "phase", "place")
 COLOURS = {"normal": "#0072B2", "tangential": "#D55E00", "ends": "#009E73"}
-TICKS = {0.0: "0", np.pi / 2: r"$\pi/2$", np.pi: r"$\pi$", 3 * np.pi / 2: r"$3\pi/2$", 2 * np.pi: r"$2\pi$"}
+TICKS = {
+    0.0: "0",
+    np.pi / 2: r"$\pi/2$",
+    np.pi: r"$\pi$",
+    3 * np.pi / 2: r"$3\pi/2$",
+    2 * np.pi: r"$2\pi$",
+}
 PLACE, PHASE = "place on the body, tail 0 to head 1", "phase of the cycle (rad)"
 COLUMNS = 3  # of panels
 
 
 @styled
-def forces_figure(result: Result, panels: Sequence[str] = (), *, clim: float | str | None = None) -> Figure:
+def forces_figure(
+    result: Result, panels: Sequence[str] = (), *, clim: float | str | None = None
+) -> Figure:
     """Draw forces along a body: maps over place and phase ("forward", "normal", "tangential", "power", "moment"), and thrust
     and drag stacked by their parts against "phase" or "place".
 
@@ -59,19 +67,28 @@ def forces_figure(result: Result, panels: Sequence[str] = (), *, clim: float | s
     return fig
 
 
-def force_map(result: Result, name: str, ax: Axes, clim: float | str | None = None) -> Axes:
+def force_map(
+    result: Result, name: str, ax: Axes, clim: float | str | None = None
+) -> Axes:
     """Draw a quantity of MAPS over place and phase; on that of the moment also where the right side starts (solid) and ends
     (dashed) to work."""
     from cmcrameri import cm
 
     v = result["bending_moment" if name == "moment" else name]
     values = np.concatenate([v.values, v.values[:1]])
-    phase = (np.arange(len(values) + 1) - 0.5) * 2 * np.pi / len(v.values)  # ends of the rows
+    phase = (
+        (np.arange(len(values) + 1) - 0.5) * 2 * np.pi / len(v.values)
+    )  # ends of the rows
     place = np.append(0.0, np.cumsum(result["length"].values))
     if name == "moment":  # at the points between elements; at the ends it vanishes
-        place, values = np.concatenate([[0.0], (place[1:] + place[:-1]) / 2, [1.0]]), np.pad(values, ((0, 0), (1, 1)))
+        place, values = (
+            np.concatenate([[0.0], (place[1:] + place[:-1]) / 2, [1.0]]),
+            np.pad(values, ((0, 0), (1, 1))),
+        )
     top = limit_of(v.values, clim)
-    image = ax.pcolormesh(place, phase, values, cmap=cm.vik, vmin=-top, vmax=top, rasterized=True)
+    image = ax.pcolormesh(
+        place, phase, values, cmap=cm.vik, vmin=-top, vmax=top, rasterized=True
+    )
     title, sign = MAPS[name]
     ax.set_title(title)
     bar = ax.figure.colorbar(image, ax=ax, extend=extend(v.values, top))
@@ -88,7 +105,14 @@ def _lines_of_activation(result: Result, ax: Axes) -> None:
     for name, dashes in (("onset", "-"), ("offset", "--")):
         for turn in (-2 * np.pi, 0.0, 2 * np.pi):
             label = f"{name} of the right side" if turn == 0 else None
-            ax.plot(result["joint"].values, result[name].values + turn, color="black", lw=1.0, ls=dashes, label=label)
+            ax.plot(
+                result["joint"].values,
+                result[name].values + turn,
+                color="black",
+                lw=1.0,
+                ls=dashes,
+                label=label,
+            )
 
 
 def stacked_by_phase(result: Result, ax: Axes) -> Axes:
@@ -96,9 +120,17 @@ def stacked_by_phase(result: Result, ax: Axes) -> Axes:
     their sum."""
     phase = np.append(result["phase"].values, 2 * np.pi)
     closed = lambda name: np.append(result[name].values, result[name].values[0])
-    total = _stack(ax, phase, {part: (closed(f"thrust_{part}"), closed(f"drag_{part}")) for part in COLOURS})
+    total = _stack(
+        ax,
+        phase,
+        {part: (closed(f"thrust_{part}"), closed(f"drag_{part}")) for part in COLOURS},
+    )
     ax.plot(phase, total, color="black", lw=1.2, label="sum")
-    ax.set(xlabel=PHASE, ylabel=f"force forwards ({_unit(result['thrust_normal'].unit)})", xlim=(0, 2 * np.pi))
+    ax.set(
+        xlabel=PHASE,
+        ylabel=f"force forwards ({_unit(result['thrust_normal'].unit)})",
+        xlim=(0, 2 * np.pi),
+    )
     ax.set_xticks(list(TICKS), list(TICKS.values()))
     ax.set_title("thrust and drag through the cycle")
     return ax
@@ -110,24 +142,34 @@ def stacked_by_place(result: Result, ax: Axes) -> Axes:
     edges = np.append(0.0, np.cumsum(result["length"].values))
     steps = lambda name: np.repeat(result[name].values, 2)
     place = np.repeat(edges, 2)[1:-1]
-    parts = {part: (steps(f"mean_thrust_{part}"), steps(f"mean_drag_{part}")) for part in ("normal", "tangential")}
+    parts = {
+        part: (steps(f"mean_thrust_{part}"), steps(f"mean_drag_{part}"))
+        for part in ("normal", "tangential")
+    }
     total = _stack(ax, place, parts)
     ax.plot(place, total, color="black", lw=1.2, label="sum")
     density, unit = _unit(result["forward"].unit), _unit(result["thrust_ends"].unit)
     ax.set(xlabel=PLACE, ylabel=f"force forwards per length ({density})", xlim=(0, 1))
     ends = {end: result[f"{end}_forward"].values.mean() for end in ("tail", "head")}
     named = [f"{end} {x:.3g}" for end, x in ends.items() if x]
-    ax.set_title("mean thrust and drag" + (f"\nbesides, on the ends: {', '.join(named)} {unit}" if named else ""))
+    ax.set_title(
+        "mean thrust and drag"
+        + (f"\nbesides, on the ends: {', '.join(named)} {unit}" if named else "")
+    )
     return ax
 
 
-def _stack(ax: Axes, x: np.ndarray, parts: dict[str, tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+def _stack(
+    ax: Axes, x: np.ndarray, parts: dict[str, tuple[np.ndarray, np.ndarray]]
+) -> np.ndarray:
     """Fill thrust upwards and drag downwards, part on part; return their sum."""
     up, down = np.zeros_like(x), np.zeros_like(x)
     for part, (thrust, drag) in parts.items():
         if thrust.any() or drag.any():
             label = f"by {part} forces" if part != "ends" else "on the ends"
-            ax.fill_between(x, up, up + thrust, color=COLOURS[part], alpha=0.75, lw=0, label=label)
+            ax.fill_between(
+                x, up, up + thrust, color=COLOURS[part], alpha=0.75, lw=0, label=label
+            )
             ax.fill_between(x, down, down + drag, color=COLOURS[part], alpha=0.4, lw=0)
         up, down = up + thrust, down + drag
     ax.axhline(0.0, color="0.3", lw=0.6)

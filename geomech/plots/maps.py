@@ -33,7 +33,10 @@ RINGS = "joint rates of equal effort"
 SHORT = 0.06  # of the map's width: a shorter bit of a line of zeros is no line
 PATCH = 6  # points of one
 FINER = 4  # points of a line for each of the grid
-ARROWS, LONGEST = 13, 1.5  # arrows along an axis; the longest, in units of their distance
+ARROWS, LONGEST = (
+    13,
+    1.5,
+)  # arrows along an axis; the longest, in units of their distance
 FINEST = 400  # grid points along an axis of a map: about the dots of its picture
 
 
@@ -84,12 +87,27 @@ def vector_field(
     size = np.hypot(u, v)
     if not has_row(connection, component):
         u, v, size = 0 * u, 0 * v, 0 * size
-    most = top or (limit_of(np.hypot(*connection.A[component][:2]), clim) if clim else largest(size))
+    most = top or (
+        limit_of(np.hypot(*connection.A[component][:2]), clim)
+        if clim
+        else largest(size)
+    )
     cut, lengths = np.fmin(1.0, most / np.fmax(size, 1e-300)), size
     u, v, size = cut * u, cut * v, cut * size
     spacing = step * max(np.ptp(a) / max(1, len(a) - 1) for a in connection.axes)
-    look = {"cmap": arrow_colours(), "pivot": "mid", "width": 0.0085, "headwidth": 3.6, "headlength": 4.0}
-    look |= {"headaxislength": 3.6, "minshaft": 1.6, "minlength": 0.8, "scale_units": "xy"}
+    look = {
+        "cmap": arrow_colours(),
+        "pivot": "mid",
+        "width": 0.0085,
+        "headwidth": 3.6,
+        "headlength": 4.0,
+    }
+    look |= {
+        "headaxislength": 3.6,
+        "minshaft": 1.6,
+        "minlength": 0.8,
+        "scale_units": "xy",
+    }
     arrows = ax.quiver(x, y, u, v, size, scale=most / (LONGEST * spacing), **look)
     arrows.set_clim(0.0, most)
     return label_row(ax, arrows, component, connection, labels, lengths)
@@ -103,11 +121,26 @@ def arrow_colours() -> ListedColormap:
     return ListedColormap(colormaps["viridis"](np.linspace(0.86, 0.0, 256)), "arrows")
 
 
-def label_row(ax, arrows, component: int, connection: Connection, labels: Labels, lengths: np.ndarray):
+def label_row(
+    ax,
+    arrows,
+    component: int,
+    connection: Connection,
+    labels: Labels,
+    lengths: np.ndarray,
+):
     """Set title, colour bar and axes of a map of a row of A with arrows of these lengths."""
     ax.set_title(f"{row_name(component)}: {TITLES[component]}")
-    colorbar = ax.figure.colorbar(arrows, ax=ax, shrink=0.85, extend=extend(lengths, arrows.get_clim()[1] * (1 + 1e-9)))
-    colorbar.set_label(f"|{row_name(component)}| ({unit_of(component, connection.unit)}/{labels[0][1]})", labelpad=8)
+    colorbar = ax.figure.colorbar(
+        arrows,
+        ax=ax,
+        shrink=0.85,
+        extend=extend(lengths, arrows.get_clim()[1] * (1 + 1e-9)),
+    )
+    colorbar.set_label(
+        f"|{row_name(component)}| ({unit_of(component, connection.unit)}/{labels[0][1]})",
+        labelpad=8,
+    )
     return shape_space(ax, connection.axes, labels)
 
 
@@ -129,14 +162,19 @@ def unit_of(component: int, unit: str) -> str:
 
 def drawable(field: Field) -> Field:
     """Return the field on at most FINEST points an axis: a finer mesh shows no more and fills gigabytes."""
-    picks = [np.unique(np.linspace(0, len(a) - 1, min(len(a), FINEST)).round().astype(int)) for a in field.axes]
+    picks = [
+        np.unique(np.linspace(0, len(a) - 1, min(len(a), FINEST)).round().astype(int))
+        for a in field.axes
+    ]
     axes = tuple(a[p] for a, p in zip(field.axes, picks))
     return replace(field, axes=axes, values=field.values[(..., *np.ix_(*picks))])
 
 
 def has(field: Field, component: int) -> bool:
     """Return whether a component of a CCF is more than rounding."""
-    size = np.nanmax(np.abs(field.values), axis=tuple(range(1, field.values.ndim)), initial=0.0)
+    size = np.nanmax(
+        np.abs(field.values), axis=tuple(range(1, field.values.ndim)), initial=0.0
+    )
     return bool(size[component] > OF_CCF * size.max())
 
 
@@ -167,8 +205,19 @@ def ccf_map(
     values, drawn = field.values[component], has(field, component)
     if not drawn:
         values, error = 0 * values, None
-    top, smooth = limit_of(values, clim) if drawn else 1.0, "nearest" if field.masked else "gouraud"
-    image = ax.pcolormesh(*field.axes, values.T, cmap=cm.vik, vmin=-top, vmax=top, shading=smooth, rasterized=True)
+    top, smooth = (
+        limit_of(values, clim) if drawn else 1.0,
+        "nearest" if field.masked else "gouraud",
+    )
+    image = ax.pcolormesh(
+        *field.axes,
+        values.T,
+        cmap=cm.vik,
+        vmin=-top,
+        vmax=top,
+        shading=smooth,
+        rasterized=True,
+    )
     hidden, handles = None, []
     if error is not None:
         hidden = unknown(values, error.values[component])
@@ -185,10 +234,21 @@ def ccf_map(
         draw_gait(gait, ax, within=field.axes)
     if not all(inside_of(gait.shape(PHASES), field.axes).all() for gait in gaits):
         paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
-        ax.text(0.02, 0.02, "gait leaves the field", transform=ax.transAxes, fontsize=7, bbox=paper)
+        ax.text(
+            0.02,
+            0.02,
+            "gait leaves the field",
+            transform=ax.transAxes,
+            fontsize=7,
+            bbox=paper,
+        )
     ax.set_title(f"{ccf_name(component)}: {TITLES[component]}")
     bar = ax.figure.colorbar(
-        image, ax=ax, shrink=0.85, ticks=None if drawn else [0.0], extend=extend(image.get_array(), top)
+        image,
+        ax=ax,
+        shrink=0.85,
+        ticks=None if drawn else [0.0],
+        extend=extend(image.get_array(), top),
     )
     bar.set_label(ccf_label(component, field.unit, labels))
     return ax
@@ -197,7 +257,9 @@ def ccf_map(
 def extend(values: np.ndarray, top: float) -> str:
     """Return at which ends of a colour bar from -top to top there are values beyond it."""
     above, below = bool((values > top).any()), bool((values < -top).any())
-    return {(True, True): "both", (True, False): "max", (False, True): "min"}.get((above, below), "neither")
+    return {(True, True): "both", (True, False): "max", (False, True): "min"}.get(
+        (above, below), "neither"
+    )
 
 
 def ccf_name(component: int) -> str:
@@ -207,11 +269,17 @@ def ccf_name(component: int) -> str:
 
 def ccf_label(component: int, unit: str, labels: Labels) -> str:
     """Return the label of a scale: the name with its unit."""
-    per = f"{labels[0][1]}$^2$" if labels[0][1] == labels[1][1] else f"({labels[0][1]} {labels[1][1]})"
+    per = (
+        f"{labels[0][1]}$^2$"
+        if labels[0][1] == labels[1][1]
+        else f"({labels[0][1]} {labels[1][1]})"
+    )
     return f"{ccf_name(component)} ({unit_of(component, unit)}/{per})"
 
 
-def indicatrices(metric: Metric | Finsler, ax: Axes, axes: Sequence[np.ndarray], count: int = 7) -> Any:
+def indicatrices(
+    metric: Metric | Finsler, ax: Axes, axes: Sequence[np.ndarray], count: int = 7
+) -> Any:
     """Draw rings around ``count`` x ``count`` shapes: rates that take the same effort, so that a ring is long in directions in
     which shape changes cheaply. All have one scale. Return a handle for the legend.
 
@@ -227,11 +295,21 @@ def indicatrices(metric: Metric | Finsler, ax: Axes, axes: Sequence[np.ndarray],
     spots = [a[0] + np.ptp(a) * (np.arange(count) + 0.5) / count for a in axes]
     places = np.stack(np.meshgrid(*spots, indexing="ij"), -1).reshape(-1, 2)
     rings = metric.indicatrix(places, 72)
-    rings *= 0.46 * min(np.ptp(a) for a in axes) / count / np.nanmax(np.linalg.norm(rings, axis=-1))
-    closed = np.concatenate([rings, rings[:, :1], np.full_like(rings[:, :1], np.nan)], 1) + places[:, None]
+    rings *= (
+        0.46
+        * min(np.ptp(a) for a in axes)
+        / count
+        / np.nanmax(np.linalg.norm(rings, axis=-1))
+    )
+    closed = (
+        np.concatenate([rings, rings[:, :1], np.full_like(rings[:, :1], np.nan)], 1)
+        + places[:, None]
+    )
     style = {"color": "black", "lw": 0.7}
     ax.plot(*closed.reshape(-1, 2).T, **style)
-    return Line2D([], [], marker="o", ls="", mfc="none", mec="black", mew=0.7, ms=6, label=RINGS)
+    return Line2D(
+        [], [], marker="o", ls="", mfc="none", mec="black", mew=0.7, ms=6, label=RINGS
+    )
 
 
 def _hatch(ax, field: Field, hidden: np.ndarray) -> list:
@@ -241,7 +319,9 @@ def _hatch(ax, field: Field, hidden: np.ndarray) -> list:
     axes, mask = _rounded(field, hidden)
     upright = "||||||"  # lines of symmetry of chains are diagonal
     ax.contourf(*axes, mask.T, levels=[0.5, 2.0], colors="none", hatches=[upright])
-    return [Patch(facecolor="none", edgecolor="black", lw=0.3, hatch=upright, label=HATCHED)] * bool(hidden.any())
+    return [
+        Patch(facecolor="none", edgecolor="black", lw=0.3, hatch=upright, label=HATCHED)
+    ] * bool(hidden.any())
 
 
 def _zeros(ax, field: Field, values: np.ndarray, hidden: np.ndarray | None) -> None:
@@ -259,7 +339,9 @@ def _zeros(ax, field: Field, values: np.ndarray, hidden: np.ndarray | None) -> N
     codes = np.array([] if path.codes is None else path.codes)
     cuts = np.flatnonzero(codes == Path.MOVETO)[1:]
     parts = zip(np.split(path.vertices, cuts), np.split(codes, cuts))
-    long = [Path(*p) for p in parts if len(p[0]) and np.ptp(p[0], axis=0).max() >= short]
+    long = [
+        Path(*p) for p in parts if len(p[0]) and np.ptp(p[0], axis=0).max() >= short
+    ]
     line.set_paths([Path.make_compound_path(*long)] if long else [])
 
 
@@ -268,7 +350,9 @@ def _rounded(field: Field, hidden: np.ndarray):
     from scipy.ndimage import gaussian_filter
 
     axes, mask = finer(field, hidden.astype(float), degree=1)
-    return axes, gaussian_filter(mask, 0.7 * FINER, mode="nearest") if len(axes[0]) > len(field.axes[0]) else mask
+    return axes, gaussian_filter(mask, 0.7 * FINER, mode="nearest") if len(
+        axes[0]
+    ) > len(field.axes[0]) else mask
 
 
 def finer(field: Field, values: np.ndarray, degree: int = 3):
@@ -277,7 +361,10 @@ def finer(field: Field, values: np.ndarray, degree: int = 3):
 
     if field.masked or max(values.shape) * FINER > FINEST or min(values.shape) < 4:
         return field.axes, values
-    axes = [np.interp(np.arange(FINER * (len(a) - 1) + 1) / FINER, np.arange(len(a)), a) for a in field.axes]
+    axes = [
+        np.interp(np.arange(FINER * (len(a) - 1) + 1) / FINER, np.arange(len(a)), a)
+        for a in field.axes
+    ]
     return axes, RectBivariateSpline(*field.axes, values, kx=degree, ky=degree)(*axes)
 
 
@@ -308,7 +395,9 @@ def largest(values: np.ndarray) -> float:
     size = np.abs(values[np.isfinite(values)])
     if not size.size:
         return 1.0
-    return float(size.max() if size.size == values.size else np.quantile(size, 0.9)) or 1.0
+    return (
+        float(size.max() if size.size == values.size else np.quantile(size, 0.9)) or 1.0
+    )
 
 
 def limit_of(values: np.ndarray, clim: float | str | None = None) -> float:
@@ -333,7 +422,9 @@ def panels_of(components: Sequence[str], drawn: Sequence[Sequence[bool]]) -> lis
     return [k for k in range(3) if any(row[k] for row in drawn)] or [0, 1, 2]
 
 
-def say_left_out(fig, panels: Sequence[int], components: Sequence[str], name: Callable, *notes: str) -> None:
+def say_left_out(
+    fig, panels: Sequence[int], components: Sequence[str], name: Callable, *notes: str
+) -> None:
     """Write below the panels which are left out as they are zero, after some notes."""
     absent = [] if components else [name(k) for k in range(3) if k not in panels]
     zero = [f"{' and '.join(absent)}: zero everywhere"] if absent else []
@@ -347,7 +438,9 @@ def certain(values: np.ndarray, error: np.ndarray) -> np.ndarray:
     from scipy.ndimage import gaussian_filter, label
 
     known = np.abs(values) > error
-    beyond = np.pad(values, 3, "reflect", reflect_type="odd")  # so that a slope is kept up to the edge
+    beyond = np.pad(
+        values, 3, "reflect", reflect_type="odd"
+    )  # so that a slope is kept up to the edge
     values = np.where(known, values, gaussian_filter(beyond, 1.0, radius=3)[3:-3, 3:-3])
     for sign in (1, -1):
         patches, count = label(sign * values > 0)
@@ -379,8 +472,17 @@ def draw_gait(
     curve[~inside_of(curve, within or ())] = np.nan
     ax.plot(*curve.T, line, color=color, lw=1.2)
     ax.plot(*curve[0], "o", color=color, ms=3)
-    ahead = np.roll(np.arange(392), -50)  # an eighth of the way, or the next place inside
-    start = next((k for k in ahead if np.isfinite(curve[[k, k + 8]]).all() and (curve[k] != curve[k + 8]).any()), None)
+    ahead = np.roll(
+        np.arange(392), -50
+    )  # an eighth of the way, or the next place inside
+    start = next(
+        (
+            k
+            for k in ahead
+            if np.isfinite(curve[[k, k + 8]]).all() and (curve[k] != curve[k + 8]).any()
+        ),
+        None,
+    )
     if start is not None:
         style = {"arrowstyle": "-|>", "color": color, "shrinkA": 0, "shrinkB": 0}
         ax.annotate("", curve[start + 8], curve[start], arrowprops=style)
@@ -407,9 +509,17 @@ def frame_figure(pose: Field, *, labels: Labels = ANGLES) -> Figure:
         values, name = pose.values[component], ("x", "y", "heading")[component]
         top = largest(values)
         image = ax.pcolormesh(
-            *pose.axes, values.T, cmap=cm.vik, vmin=-top, vmax=top, shading="gouraud", rasterized=True
+            *pose.axes,
+            values.T,
+            cmap=cm.vik,
+            vmin=-top,
+            vmax=top,
+            shading="gouraud",
+            rasterized=True,
         )
-        fig.colorbar(image, ax=ax, shrink=0.85).set_label(f"{name} ({unit_of(component, pose.unit)})")
+        fig.colorbar(image, ax=ax, shrink=0.85).set_label(
+            f"{name} ({unit_of(component, pose.unit)})"
+        )
         ax.set_title(f"{name} of the frame")
         shape_space(ax, pose.axes, labels)
     return fig

@@ -34,7 +34,14 @@ def measured_figure(fit: Fitted) -> Figure:
     for component in range(3):
         _row(fit, component, axes[component, 1])
         _cycles(fit, component, axes[component, 2])
-    axes[0, 1].fill_between([], [], color="0.5", alpha=0.25, lw=0, label=f"{100 * fit.known.level:.3g} % intervals")
+    axes[0, 1].fill_between(
+        [],
+        [],
+        color="0.5",
+        alpha=0.25,
+        lw=0,
+        label=f"{100 * fit.known.level:.3g} % intervals",
+    )
     axes[0, 1].legend(loc="lower center", bbox_to_anchor=(0.5, 1.12), ncols=4)
     axes[2, 1].set(xlabel=r"phase of the mean gait $\varphi$ (rad)")
     return fig
@@ -42,22 +49,41 @@ def measured_figure(fit: Fitted) -> Figure:
 
 def _shapes(fit: Fitted, ax) -> None:
     alpha, t = fit.samples.alpha, np.linspace(0, 2 * np.pi, 400)
-    ax.plot(*alpha[:: max(1, len(alpha) // DOTS), :2].T, ".", ms=1.2, color="0.6", label="rows of the log")
+    ax.plot(
+        *alpha[:: max(1, len(alpha) // DOTS), :2].T,
+        ".",
+        ms=1.2,
+        color="0.6",
+        label="rows of the log",
+    )
     loop = fit.known.loop.shape(t)
     if loop.shape[1] == 2:
         normal = fit.known.loop.normals(t)[..., 0]
         wide = np.einsum("tij,ti,tj->t", fit.known.spread_at(t), normal, normal) ** 0.5
         for sign, label in ((1, "where the data end"), (-1, None)):
-            ax.plot(*(loop + sign * wide[:, None] * normal).T, "--", lw=0.8, color=COLOURS[1], label=label)
+            ax.plot(
+                *(loop + sign * wide[:, None] * normal).T,
+                "--",
+                lw=0.8,
+                color=COLOURS[1],
+                label=label,
+            )
     ax.plot(*loop[:, :2].T, color="black", lw=1.4, label="mean gait")
     ax.plot(*loop[0, :2], "o", color="black", ms=4)
     arrow = {"arrowstyle": "-|>", "color": "black", "shrinkA": 0, "shrinkB": 0}
     ax.annotate("", loop[58, :2], loop[50, :2], arrowprops=arrow)
     first, second = (quantity(name, "rad") for name in fit.log.joints[:2])
     ax.set(xlabel=first, ylabel=second, aspect="equal")
-    ax.set_title(f"{len(fit.measured)} cycles at {fit.frequency:.4g} per unit of t", loc="left")
+    ax.set_title(
+        f"{len(fit.measured)} cycles at {fit.frequency:.4g} per unit of t", loc="left"
+    )
     ax.legend(
-        loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, markerscale=4, handlelength=1.2, columnspacing=1.0
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.16),
+        ncols=3,
+        markerscale=4,
+        handlelength=1.2,
+        columnspacing=1.0,
     )
 
 
@@ -68,7 +94,12 @@ def _noted(fit: Fitted, ax) -> None:
     head = f"net displacement per cycle, {100 * fit.known.level:.3g} % intervals"
     rows = [("", "mean of the log", "mean gait, predicted")]
     for name, u, a, b, c, d in zip(
-        ("x", "y", "heading"), (fit.unit, fit.unit, "rad"), mean, mean_half_width, net, half_width
+        ("x", "y", "heading"),
+        (fit.unit, fit.unit, "rad"),
+        mean,
+        mean_half_width,
+        net,
+        half_width,
     ):
         pair = lambda value, error: rf"${value:.5f} \pm {error:.5f}$"
         rows.append((f"{name} ({u})", pair(a, b), pair(c, d)))
@@ -87,7 +118,8 @@ def _row(fit: Fitted, component: int, ax) -> None:
         ax.plot(t, a, color=colour, lw=1.2, label=f"by {quantity(name)}")
     ax.axhline(0.0, color="0.7", lw=0.6, zorder=0)
     ax.set(
-        xlim=(0, 2 * np.pi), ylabel=rf"$\mathbf{{A}}^{{{COMPONENTS[component]}}}$ ({unit_of(component, fit.unit)}/rad)"
+        xlim=(0, 2 * np.pi),
+        ylabel=rf"$\mathbf{{A}}^{{{COMPONENTS[component]}}}$ ({unit_of(component, fit.unit)}/rad)",
     )
     ax.set_xticks(list(TICKS), list(TICKS.values()))
     ax.set_title(TITLES[component], loc="left")
@@ -102,6 +134,12 @@ def _cycles(fit: Fitted, component: int, ax) -> None:
     ax.plot(x, y, ".", ms=4, color=COLOURS[0])
     unit = unit_of(component, fit.unit)
     name = ("x", "y", "heading")[component]
-    ax.set(xlim=ends, ylim=ends, aspect="equal", xlabel=f"{name} predicted ({unit})", ylabel=f"{name} logged ({unit})")
+    ax.set(
+        xlim=ends,
+        ylim=ends,
+        aspect="equal",
+        xlabel=f"{name} predicted ({unit})",
+        ylabel=f"{name} logged ({unit})",
+    )
     ax.locator_params(nbins=4)
     ax.tick_params(axis="x", rotation=30)

@@ -48,12 +48,29 @@ def world(ax, motion: Motion, rows, limits=None) -> Callable:
     returns the artists that it moved."""
     low, high = reach(motion, rows) if limits is None else limits
     unit = length_unit(motion.scene.system)
-    ax.set(xlabel=f"x ({unit})", ylabel=f"y ({unit})", aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    ax.set(
+        xlabel=f"x ({unit})",
+        ylabel=f"y ({unit})",
+        aspect="equal",
+        xlim=(low[0], high[0]),
+        ylim=(low[1], high[1]),
+    )
     ax.plot(*motion.pose[:, :2].T, color="0.6", lw=0.6)
     (track,) = ax.plot([], [], color=HEAD, lw=1.0, zorder=3)
-    few = motion.points(slice(0, 1)) is not None and motion.points(slice(0, 1)).shape[-2] <= MOST_JOINTS + 1
+    few = (
+        motion.points(slice(0, 1)) is not None
+        and motion.points(slice(0, 1)).shape[-2] <= MOST_JOINTS + 1
+    )
     (body,) = ax.plot(
-        [], [], color=BODY, lw=2.5, solid_capstyle="round", marker="o" if few else "", ms=3, mfc="white", mew=0.8
+        [],
+        [],
+        color=BODY,
+        lw=2.5,
+        solid_capstyle="round",
+        marker="o" if few else "",
+        ms=3,
+        mfc="white",
+        mew=0.8,
     )
     (head,) = ax.plot([], [], "o", color=HEAD, ms=5)
 
@@ -67,7 +84,9 @@ def world(ax, motion: Motion, rows, limits=None) -> Callable:
     return update
 
 
-def shape(ax, motion: Motion, field: Field | None = None, error: Field | None = None) -> Callable:
+def shape(
+    ax, motion: Motion, field: Field | None = None, error: Field | None = None
+) -> Callable:
     """Draw the gait among all shapes: on the map of the CCF along x, or of the first component that exists, or on the bare
     plane of two shape variables; for more, against phase, a line each for few, a map along the body for many. Return a
     function as `world` does."""
@@ -75,14 +94,27 @@ def shape(ax, motion: Motion, field: Field | None = None, error: Field | None = 
     if system.joints == 2:
         if field is not None:
             component = next((k for k in range(3) if has(field, k)), 0)
-            ccf_map(field, component, [scene.gait], ax=ax, error=error, labels=shape_labels(system))
+            ccf_map(
+                field,
+                component,
+                [scene.gait],
+                ax=ax,
+                error=error,
+                labels=shape_labels(system),
+            )
         else:
             draw_gait(scene.gait, ax)
             low, high = motion.alpha.min(0), motion.alpha.max(0)
             room = 0.15 * max(high - low) + 1e-9
-            shape_space(ax, [np.array(x) for x in zip(low - room, high + room)], shape_labels(system))
+            shape_space(
+                ax,
+                [np.array(x) for x in zip(low - room, high + room)],
+                shape_labels(system),
+            )
         (dot,) = ax.plot([], [], "o", color=HEAD, ms=7, mec="white", mew=0.8)
-        return _moving(dot, lambda row: ([motion.alpha[row, 0]], [motion.alpha[row, 1]]))
+        return _moving(
+            dot, lambda row: ([motion.alpha[row, 0]], [motion.alpha[row, 1]])
+        )
     turns = motion.phase / (2 * np.pi)
     once = turns <= 1 + 1e-9
     ax.set(xlabel="phase (cycles)", xlim=(0, 1))
@@ -101,14 +133,30 @@ def _bends(ax, motion: Motion, turns) -> None:
     """Draw the curvature over phase and place along the body: angles between elements over the distance of their centres."""
     from cmcrameri import cm
 
-    values, name, ends = motion.alpha[: len(turns)].T, "angle between elements (rad)", motion.points(slice(0, 1))
+    values, name, ends = (
+        motion.alpha[: len(turns)].T,
+        "angle between elements (rad)",
+        motion.points(slice(0, 1)),
+    )
     place = np.arange(1, len(values) + 1) / (len(values) + 1)
     if ends is not None and ends.shape[-2] == len(values) + 2:
         parts = np.hypot(*np.diff(ends[0], axis=0).T)
-        values, place = values / ((parts[1:] + parts[:-1]) / 2)[:, None], np.cumsum(parts[:-1]) / parts.sum()
+        values, place = (
+            values / ((parts[1:] + parts[:-1]) / 2)[:, None],
+            np.cumsum(parts[:-1]) / parts.sum(),
+        )
         name = f"curvature (rad/{length_unit(motion.scene.system)})"
     top = np.abs(values).max() or 1.0
-    image = ax.pcolormesh(turns, place, values, cmap=cm.vik, vmin=-top, vmax=top, shading="gouraud", rasterized=True)
+    image = ax.pcolormesh(
+        turns,
+        place,
+        values,
+        cmap=cm.vik,
+        vmin=-top,
+        vmax=top,
+        shading="gouraud",
+        rasterized=True,
+    )
     ax.figure.colorbar(image, ax=ax, shrink=0.85).set_label(name)
     ax.set(ylabel="place, tail 0 to head 1", ylim=(place[0], place[-1]))
 
@@ -129,14 +177,23 @@ def clock(motion: Motion, row: int) -> str:
 
 
 @styled
-def stage(motion: Motion, rows: Any, field: Field | None = None, error: Field | None = None, caption: str = "") -> Any:
+def stage(
+    motion: Motion,
+    rows: Any,
+    field: Field | None = None,
+    error: Field | None = None,
+    caption: str = "",
+) -> Any:
     """Return (Figure, function that moves its artists to a row and returns them): the world next to the shapes. caption: of the
     film, such as its speed."""
     fig, axes = figure(8.0, 3.6, 2, width_ratios=[1.25, 1.0])
     track_ax, shape_ax = axes[0]
     if motion.scene.system.joints != 2:
         shape_ax.set_box_aspect(0.8)
-    move_body, move_shape = world(track_ax, motion, rows), shape(shape_ax, motion, field, error)
+    move_body, move_shape = (
+        world(track_ax, motion, rows),
+        shape(shape_ax, motion, field, error),
+    )
     text = track_ax.set_title("", loc="left")
     track_ax.set_title(caption, loc="right", color="0.3")
 
@@ -148,7 +205,12 @@ def stage(motion: Motion, rows: Any, field: Field | None = None, error: Field | 
 
 
 @styled
-def filmstrip(motion: Motion, field: Field | None = None, error: Field | None = None, pictures: int = STRIP) -> Figure:
+def filmstrip(
+    motion: Motion,
+    field: Field | None = None,
+    error: Field | None = None,
+    pictures: int = STRIP,
+) -> Figure:
     """Draw the body at some phases, equally spaced from start to end and to one scale, and its shapes in a panel next to them,
     with the same numbers.
 
@@ -163,10 +225,14 @@ def filmstrip(motion: Motion, field: Field | None = None, error: Field | None = 
     tall = max((high - low)[1] / (high - low)[0], 0.12)  # of a picture, for its width
     columns = min(pictures, max(1, round(1.2 * np.sqrt(tall * pictures))))
     lines = -(-pictures // columns)
-    height = float(np.clip(lines * (tall * (3.9 / columns - 0.15) + 0.3) + 0.45, MAP, 8.0))
+    height = float(
+        np.clip(lines * (tall * (3.9 / columns - 0.15) + 0.3) + 0.45, MAP, 8.0)
+    )
     fig = blank(7.2, height)
     strip_cell, shape_cell = fig.add_gridspec(1, 2, width_ratios=[4.2, 3.0])
-    axes = strip_cell.subgridspec(lines, columns).subplots(squeeze=False, sharex=True, sharey=True)
+    axes = strip_cell.subgridspec(lines, columns).subplots(
+        squeeze=False, sharex=True, sharey=True
+    )
     for ax in axes.flat[pictures:]:
         ax.remove()
     for k, (ax, row) in enumerate(zip(axes.flat, rows)):
@@ -174,7 +240,9 @@ def filmstrip(motion: Motion, field: Field | None = None, error: Field | None = 
         ax.set_title(rf"$\bf{{{k + 1}}}$  {clock(motion, row)}", loc="left", fontsize=8)
         ax.label_outer()
     around = max(1e-3, (height - MAP) / 2)
-    panel = fig.add_subplot(shape_cell.subgridspec(3, 1, height_ratios=[around, MAP, around])[1])
+    panel = fig.add_subplot(
+        shape_cell.subgridspec(3, 1, height_ratios=[around, MAP, around])[1]
+    )
     shape(panel, motion, field, error)
     _numbers(panel, motion, rows)
     return fig
@@ -185,7 +253,11 @@ def _numbers(ax, motion: Motion, rows) -> None:
     numbers: dict[tuple, list[str]] = {}
     for k, row in enumerate(rows):
         turn = float(motion.phase[row] / (2 * np.pi) % 1)
-        at = tuple(np.round(motion.alpha[row], 9)) if motion.scene.system.joints == 2 else (round(turn, 9),)
+        at = (
+            tuple(np.round(motion.alpha[row], 9))
+            if motion.scene.system.joints == 2
+            else (round(turn, 9),)
+        )
         numbers.setdefault(at, []).append(str(k + 1))
     middle = motion.alpha.mean(0)
     for at, texts in numbers.items():
@@ -195,6 +267,15 @@ def _numbers(ax, motion: Motion, rows) -> None:
             where = {"xy": at, "xytext": 11 * away / (np.hypot(*away) or 1.0)}
         else:
             ax.axvline(at[0], color=HEAD, lw=1.0)
-            where = {"xy": (at[0], 1.0), "xycoords": ("data", "axes fraction"), "xytext": (0, 6)}
-        style = {"textcoords": "offset points", "ha": "center", "va": "center", "weight": "bold"}
+            where = {
+                "xy": (at[0], 1.0),
+                "xycoords": ("data", "axes fraction"),
+                "xytext": (0, 6),
+            }
+        style = {
+            "textcoords": "offset points",
+            "ha": "center",
+            "va": "center",
+            "weight": "bold",
+        }
         ax.annotate(",".join(texts), **where, **style)

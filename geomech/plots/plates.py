@@ -22,7 +22,12 @@ def plates_figure(result: Result) -> Figure:
     residuals = result["residual"].values * np.stack([side, np.ones_like(side)])
     for ax, name, residual in zip(axes[0], "zx", residuals[::-1]):
         _residuals(ax, beta, gamma, residual, np.abs(residuals).max(), name)
-    axes[0, 0].set_title(f"rms of both {result.attributes['rms']:.3g} N/cm$^3$", loc="left", fontsize=8, pad=9)
+    axes[0, 0].set_title(
+        f"rms of both {result.attributes['rms']:.3g} N/cm$^3$",
+        loc="left",
+        fontsize=8,
+        pad=9,
+    )
     _coefficients(axes[0, 2], result)
     return fig
 
@@ -31,33 +36,65 @@ def _residuals(ax, beta, gamma, residual, top: float, name: str) -> None:
     from cmcrameri import cm
 
     top = top or 1e-12
-    style = {"cmap": cm.vik, "vmin": -top, "vmax": top, "s": 28, "edgecolors": "0.3", "linewidths": 0.4, "zorder": 3}
+    style = {
+        "cmap": cm.vik,
+        "vmin": -top,
+        "vmax": top,
+        "s": 28,
+        "edgecolors": "0.3",
+        "linewidths": 0.4,
+        "zorder": 3,
+    }
     dots = ax.scatter(beta, gamma, c=residual, clip_on=False, **style)
     square_of_angles(ax)
     ax.set_facecolor("0.97")
-    ax.figure.colorbar(dots, ax=ax, shrink=0.85).set_label(rf"data minus map, $\alpha_{name}$ (N/cm$^3$)")
+    ax.figure.colorbar(dots, ax=ax, shrink=0.85).set_label(
+        rf"data minus map, $\alpha_{name}$ (N/cm$^3$)"
+    )
 
 
 def _ahead(beta, gamma):
     """Return tilts and directions within +-90 degrees, and the sign of alpha_x there: motion backwards is the mirror image."""
     beta, gamma = beta - 180 * np.round(beta / 180), gamma - 360 * np.round(gamma / 360)
     back = np.abs(gamma) > 90
-    mirrored = np.where(back, -beta, beta), np.where(back, np.copysign(180.0, gamma) - gamma, gamma)
+    mirrored = (
+        np.where(back, -beta, beta),
+        np.where(back, np.copysign(180.0, gamma) - gamma, gamma),
+    )
     return *mirrored, np.where(back, -1.0, 1.0)
 
 
 def _coefficients(ax, result: Result) -> None:
-    names, undetermined = result["coefficient"].values, result.attributes["undetermined"]
+    names, undetermined = (
+        result["coefficient"].values,
+        result.attributes["undetermined"],
+    )
     at, low, high = np.arange(len(names)), *result["interval"].values.T
     ax.axhline(0.0, color="0.6", lw=0.6)
     generic = rf"generic set, $\zeta$ = {result.subject.zeta:.3g}"
     ax.plot(at, result["generic"].values, "_", color="#D55E00", ms=12, label=generic)
     for k, (value, name) in enumerate(zip(result["value"].values, names)):
         ax.plot([k, k], [low[k], high[k]], color="black", lw=1.0)
-        ax.plot(k, value, "o", color="black", ms=4, mfc="white" if name in undetermined else None)
+        ax.plot(
+            k,
+            value,
+            "o",
+            color="black",
+            ms=4,
+            mfc="white" if name in undetermined else None,
+        )
     ax.plot([], [], "o-", color="black", ms=4, lw=1.0, label="fitted, with 95 %")
     if undetermined:
-        ax.plot([], [], "o-", color="black", ms=4, lw=1.0, mfc="white", label="not determined")
+        ax.plot(
+            [],
+            [],
+            "o-",
+            color="black",
+            ms=4,
+            lw=1.0,
+            mfc="white",
+            label="not determined",
+        )
     labels = [f"${name[0]}_{{{name[1:]}}}$" for name in names]
     ax.set(xticks=at, xticklabels=labels, ylabel="coefficient (N/cm$^3$)")
     ax.tick_params(axis="x", labelsize=7.5)
@@ -69,10 +106,22 @@ def penetration_figure(result: Result) -> Figure:
     """Draw the force on a plate against depth with the law and its 95 % interval, and the residuals below."""
     fig, axes = figure(4.4, 4.6, 1, 2)
     (top,), (bottom,) = axes
-    depth, force, law = 1e2 * result["depth"].values, result["force"].values, result["law"].values
+    depth, force, law = (
+        1e2 * result["depth"].values,
+        result["force"].values,
+        result["law"].values,
+    )
     from_zero = lambda y: np.append(0.0, y)
     at, centre, half_width = map(from_zero, (depth, law, result["law"].error))
-    top.fill_between(at, centre - half_width, centre + half_width, color="#0072B2", alpha=0.25, lw=0, label="95 %")
+    top.fill_between(
+        at,
+        centre - half_width,
+        centre + half_width,
+        color="#0072B2",
+        alpha=0.25,
+        lw=0,
+        label="95 %",
+    )
     top.plot(at, centre, color="#0072B2", lw=1.2, label=r"$\zeta$ |z| A, in N and cm")
     top.plot(depth, force, "o", color="black", ms=3, label="measured")
     top.set(ylabel="force upwards (N)", xlim=(0, None))

@@ -27,5 +27,8 @@ class ShownAxes(Axes):
 
     def _update_title_position(self, renderer) -> None:
         """Place titles only where there are any: matplotlib measures all ticks for it, a tenth of a drawing."""
-        if any(title.get_text() for title in (self.title, self._left_title, self._right_title)):
+        if any(
+            title.get_text()
+            for title in (self.title, self._left_title, self._right_title)
+        ):
             super()._update_title_position(renderer)

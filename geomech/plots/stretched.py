@@ -56,24 +56,49 @@ def stretched_map(
     """
     from cmcrameri import cm
 
-    ax, values = axes_of(ax), stretch.density(Field(field.axes, field.values[component], field.degree))
+    ax, values = (
+        axes_of(ax),
+        stretch.density(Field(field.axes, field.values[component], field.degree)),
+    )
     most = limit_of(values, clim)
     u, v = stretch.field.values
-    image = ax.pcolormesh(u, v, values, cmap=cm.vik, vmin=-most, vmax=most, shading="gouraud", rasterized=True)
+    image = ax.pcolormesh(
+        u,
+        v,
+        values,
+        cmap=cm.vik,
+        vmin=-most,
+        vmax=most,
+        shading="gouraud",
+        rasterized=True,
+    )
     if error is not None:
         limit = stretch.density(Field(error.axes, error.values[component], 1))
-        ax.contourf(u, v, unknown(values, limit).astype(float), levels=[0.5, 2.0], colors="none", hatches=["||||||"])
+        ax.contourf(
+            u,
+            v,
+            unknown(values, limit).astype(float),
+            levels=[0.5, 2.0],
+            colors="none",
+            hatches=["||||||"],
+        )
         values = np.where(unknown(values, limit), np.nan, certain(values, limit))
     if np.nanmin(values) < 0 < np.nanmax(values):
         ax.contour(u, v, values, levels=[0.0], colors="0.35", linewidths=0.6)
     _angles(ax, stretch, labels)
     for gait in gaits:
         _draw(gait, ax, stretch)
-    ax.set(aspect="equal", xlabel=quantity("path length", unit), ylabel=quantity("path length", unit))
+    ax.set(
+        aspect="equal",
+        xlabel=quantity("path length", unit),
+        ylabel=quantity("path length", unit),
+    )
     ax.set_title(f"{ccf_name(component)}: {TITLES[component]}")
     per = f"{unit}$^2$" if unit.isalpha() else f"({unit})$^2$"
     label = f"{ccf_name(component)} / area ({unit_of(component, field.unit)}/{per})"
-    ax.figure.colorbar(image, ax=ax, shrink=0.85, extend=extend(image.get_array(), most)).set_label(label)
+    ax.figure.colorbar(
+        image, ax=ax, shrink=0.85, extend=extend(image.get_array(), most)
+    ).set_label(label)
     return ax
 
 
@@ -85,21 +110,52 @@ def _angles(ax, stretch: Stretch, labels: Labels) -> None:
     for k, (axis, other) in enumerate(zip(axes, axes[::-1])):
         along = np.linspace(other[0], other[-1], 121)
         ticks = [
-            x for x in MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(axis[0], axis[-1]) if axis[0] <= x <= axis[-1]
+            x
+            for x in MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(axis[0], axis[-1])
+            if axis[0] <= x <= axis[-1]
         ]
         for x in sorted({*ticks, axis[0], axis[-1]}):
-            shape = np.stack([np.full_like(along, x), along][:: 1 if k == 0 else -1], -1)
+            shape = np.stack(
+                [np.full_like(along, x), along][:: 1 if k == 0 else -1], -1
+            )
             edge = x in (axis[0], axis[-1])
-            ax.plot(*stretch(shape).T, color="0.15", lw=0.9 if edge or x == 0 else 0.3, alpha=1.0 if edge else 0.6)
-        end = stretch(np.stack([[x, other[0]] for x in ticks])[:, :: 1 if k == 0 else -1])
-        inner = stretch(np.stack([[x, other[0] + 0.02 * np.ptp(other)] for x in ticks])[:, :: 1 if k == 0 else -1])
+            ax.plot(
+                *stretch(shape).T,
+                color="0.15",
+                lw=0.9 if edge or x == 0 else 0.3,
+                alpha=1.0 if edge else 0.6,
+            )
+        end = stretch(
+            np.stack([[x, other[0]] for x in ticks])[:, :: 1 if k == 0 else -1]
+        )
+        inner = stretch(
+            np.stack([[x, other[0] + 0.02 * np.ptp(other)] for x in ticks])[
+                :, :: 1 if k == 0 else -1
+            ]
+        )
         out = end - inner
-        out *= 0.045 * np.ptp(stretch.field.values, axis=(1, 2)).max() / np.linalg.norm(out, axis=-1, keepdims=True)
+        out *= (
+            0.045
+            * np.ptp(stretch.field.values, axis=(1, 2)).max()
+            / np.linalg.norm(out, axis=-1, keepdims=True)
+        )
         for x, at in zip(ticks, end + out):
-            ax.text(*at, f"{x:g}".replace("-", "\N{MINUS SIGN}"), fontsize=6, ha="center", va="center", color="0.3")
+            ax.text(
+                *at,
+                f"{x:g}".replace("-", "\N{MINUS SIGN}"),
+                fontsize=6,
+                ha="center",
+                va="center",
+                color="0.3",
+            )
         middle = len(ticks) // 2
         tilt = np.degrees(np.arctan2(*(end[middle + 1] - end[middle - 1])[::-1]))
-        name = {"rotation": (tilt + 80) % 180 - 80, "rotation_mode": "anchor", "ha": "center", "va": "center"}
+        name = {
+            "rotation": (tilt + 80) % 180 - 80,
+            "rotation_mode": "anchor",
+            "ha": "center",
+            "va": "center",
+        }
         ax.text(*(end + 3.4 * out)[middle], quantity(*labels[k]), fontsize=8, **name)
     spans = np.array([[x.min(), x.max()] for x in stretch.field.values])
     pad = 0.2 * np.ptp(spans, axis=1).max()
@@ -111,7 +167,9 @@ def _draw(gait: Gait, ax, stretch: Stretch) -> None:
     curve = gait.shape(PHASES)
     inside = inside_of(curve, stretch.field.axes)
     seen = np.full(curve.shape, np.nan)
-    clipped = np.clip(curve, [a[0] for a in stretch.field.axes], [a[-1] for a in stretch.field.axes])
+    clipped = np.clip(
+        curve, [a[0] for a in stretch.field.axes], [a[-1] for a in stretch.field.axes]
+    )
     seen[inside] = stretch(clipped[inside])
     ax.plot(*seen.T, color="black", lw=1.2)
     ax.plot(*seen[0], "o", color="black", ms=3)
@@ -140,6 +198,10 @@ def stretched_figure(
     for component, ax in zip(panels, axes[0]):
         stretched_map(field, stretch, component, gaits, ax=ax, **look)
     caption = f"lengths on paper are off by {100 * stretch.rms:.2g} % rms, {100 * stretch.largest:.2g} % at most"
-    fold = f"; {100 * stretch.folded:.2g} % of the plane is folded over" if stretch.folded else ""
+    fold = (
+        f"; {100 * stretch.folded:.2g} % of the plane is folded over"
+        if stretch.folded
+        else ""
+    )
     say_left_out(fig, panels, components, ccf_name, caption + fold)
     return fig

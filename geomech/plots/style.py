@@ -15,7 +15,11 @@ from rft.refusal import Refusal
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-GREEK = ("alpha", "gamma", "theta")  # letters that names of shape variables and parameters begin with
+GREEK = (
+    "alpha",
+    "gamma",
+    "theta",
+)  # letters that names of shape variables and parameters begin with
 MARKED = 40  # points of a line up to which each has its marker
 SOURCES = {  # what is drawn, by its class
     "Connection": "a Connection such as study.fitted",
@@ -94,7 +98,12 @@ def blank(width: float, height: float, layout: str = "constrained") -> Any:
 
 @styled
 def figure(
-    width: float, height: float, columns: int = 1, rows: int = 1, layout: str = "constrained", **grid: Any
+    width: float,
+    height: float,
+    columns: int = 1,
+    rows: int = 1,
+    layout: str = "constrained",
+    **grid: Any,
 ) -> tuple[Any, Any]:
     """Return (Figure, array of Axes (rows, columns)) as `blank` does; both show in a notebook. ``grid`` as for matplotlib's
     GridSpec.
@@ -109,7 +118,9 @@ def figure(
     from geomech.plots.shown import ShownAxes
 
     fig, subplot = blank(width, height, layout), {"axes_class": ShownAxes}
-    return fig, fig.subplots(rows, columns, squeeze=False, gridspec_kw=grid, subplot_kw=subplot)
+    return fig, fig.subplots(
+        rows, columns, squeeze=False, gridspec_kw=grid, subplot_kw=subplot
+    )
 
 
 def quantity(name: str, unit: str = "") -> str:
@@ -123,7 +134,11 @@ def quantity(name: str, unit: str = "") -> str:
     """
     letter, _, index = name.partition("_")
     if index.isalnum() and (letter in GREEK or len(letter) == 1):
-        name = rf"$\{letter}_{{{index}}}$" if letter in GREEK else f"${letter}_{{{index}}}$"
+        name = (
+            rf"$\{letter}_{{{index}}}$"
+            if letter in GREEK
+            else f"${letter}_{{{index}}}$"
+        )
     return f"{name} ({unit})" if unit else name
 
 
@@ -133,11 +148,20 @@ ENTRY = 2.2  # in, of the width of a figure for an entry of its legend
 def shared_legend(fig: Any, place: str = "outside upper center") -> None:
     """Draw one legend for all panels of a figure, with every label once; above or below them in as many columns as fit."""
     handles = {
-        label: line for ax in fig.axes for line, label in zip(*ax.get_legend_handles_labels()) if label.strip("_")
+        label: line
+        for ax in fig.axes
+        for line, label in zip(*ax.get_legend_handles_labels())
+        if label.strip("_")
     }
-    rows = len(handles) if "right" in place else -(-len(handles) // max(1, int(fig.get_figwidth() / ENTRY)))
+    rows = (
+        len(handles)
+        if "right" in place
+        else -(-len(handles) // max(1, int(fig.get_figwidth() / ENTRY)))
+    )
     if handles:
-        fig.legend(handles.values(), handles.keys(), loc=place, ncols=-(-len(handles) // rows))
+        fig.legend(
+            handles.values(), handles.keys(), loc=place, ncols=-(-len(handles) // rows)
+        )
 
 
 def axes_of(ax: Any, width: float = 3.4, height: float = 3.0) -> Any:
@@ -146,7 +170,11 @@ def axes_of(ax: Any, width: float = 3.4, height: float = 3.0) -> Any:
     if ax is not None:
         return ax
     pyplot = sys.modules.get("matplotlib.pyplot")
-    return pyplot.gca() if pyplot and pyplot.get_fignums() else figure(width, height)[1][0, 0]
+    return (
+        pyplot.gca()
+        if pyplot and pyplot.get_fignums()
+        else figure(width, height)[1][0, 0]
+    )
 
 
 def check_format(path: str | Path) -> Path:
@@ -154,7 +182,9 @@ def check_format(path: str | Path) -> Path:
     formats = (".png", ".pdf", ".svg")
     path = Path(path)
     if path.suffix.lower() not in formats:
-        raise Refusal(f"cannot draw {path}", instead=f"end the name in {', '.join(formats)}")
+        raise Refusal(
+            f"cannot draw {path}", instead=f"end the name in {', '.join(formats)}"
+        )
     return path
 
 

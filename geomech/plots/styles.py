@@ -35,17 +35,29 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 CONNECTION_STYLES = Registry(
-    "geomech.connection_styles", "style", "a way to draw a connection", functions_with("draws", "connection")
+    "geomech.connection_styles",
+    "style",
+    "a way to draw a connection",
+    functions_with("draws", "connection"),
 )
-CCF_STYLES = Registry("geomech.ccf_styles", "style", "a way to draw a CCF", functions_with("draws", "ccf"))
+CCF_STYLES = Registry(
+    "geomech.ccf_styles", "style", "a way to draw a CCF", functions_with("draws", "ccf")
+)
 CONNECTION_STYLES.register(vector_field, style="quiver")
 CCF_STYLES.register(ccf_map, style="map")
 LINES = 61  # points an axis that streamlines are drawn on
 LEVELS = 6  # contours of either sign
 AREA = 240  # points an axis on which a gait's area is shaded
 MINUS_SIGN = "\N{MINUS SIGN}"
-DIRECTIONS = ("ahead", "backwards"), ("to the left", "to the right"), ("turns left", "turns right")
-PLUS, MINUS = "#B2182B", "#2166AC"  # of areas that carry forwards and backwards, or to either side
+DIRECTIONS = (
+    ("ahead", "backwards"),
+    ("to the left", "to the right"),
+    ("turns left", "turns right"),
+)
+PLUS, MINUS = (
+    "#B2182B",
+    "#2166AC",
+)  # of areas that carry forwards and backwards, or to either side
 
 
 @CONNECTION_STYLES.register(style="streamlines")
@@ -71,14 +83,26 @@ def streamlines(
     if row.masked:
         axes, values = list(connection.axes), row.values
     else:
-        values = np.moveaxis(row(np.stack(np.meshgrid(*axes, indexing="ij"), -1)), -1, 0)
-    even = [np.linspace(a[0], a[-1], len(a)) for a in axes]  # to the last digit, as streamplot asks
+        values = np.moveaxis(
+            row(np.stack(np.meshgrid(*axes, indexing="ij"), -1)), -1, 0
+        )
+    even = [
+        np.linspace(a[0], a[-1], len(a)) for a in axes
+    ]  # to the last digit, as streamplot asks
     u, v = values
     size = np.hypot(u, v)
     most = top or limit_of(size, clim)
-    if np.nanmax(size, initial=0.0) <= 1e-13 * np.nanmax(np.abs(connection.A), initial=0.0):
+    if np.nanmax(size, initial=0.0) <= 1e-13 * np.nanmax(
+        np.abs(connection.A), initial=0.0
+    ):
         u, v, size = 0 * u, 0 * v, 0 * size
-    look = {"cmap": arrow_colours(), "norm": Normalize(0.0, most), "density": 1.1, "linewidth": 0.9, "arrowsize": 0.8}
+    look = {
+        "cmap": arrow_colours(),
+        "norm": Normalize(0.0, most),
+        "density": 1.1,
+        "linewidth": 0.9,
+        "arrowsize": 0.8,
+    }
     lines = ax.streamplot(*even, u.T, v.T, color=np.nan_to_num(size.T), **look)
     return label_row(ax, lines.lines, component, connection, labels, size)
 
@@ -105,18 +129,36 @@ def ccf_contours(
     ax, field = axes_of(ax), drawable(field)
     axes, values = finer(field, field.values[component])
     most = limit_of(values, clim)
-    levels = MaxNLocator(2 * LEVELS, steps=[1, 2, 2.5, 5, 10], symmetric=True).tick_values(-most, most)
+    levels = MaxNLocator(
+        2 * LEVELS, steps=[1, 2, 2.5, 5, 10], symmetric=True
+    ).tick_values(-most, most)
     looks = {0: ("0.6", 1.4, "-"), 1: ("0.25", 0.6, "-"), -1: ("0.25", 0.6, "--")}
-    colours, widths, dashes = zip(*(looks[int(np.sign(x)) if abs(x) > 1e-9 * most else 0] for x in levels))
-    lines = ax.contour(*axes, values.T, levels=levels, colors=colours, linewidths=widths, linestyles=dashes)
-    ax.clabel(lines, levels[::2], fmt=lambda x: f"{x:g}".replace("-", MINUS_SIGN), fontsize=6)
+    colours, widths, dashes = zip(
+        *(looks[int(np.sign(x)) if abs(x) > 1e-9 * most else 0] for x in levels)
+    )
+    lines = ax.contour(
+        *axes,
+        values.T,
+        levels=levels,
+        colors=colours,
+        linewidths=widths,
+        linestyles=dashes,
+    )
+    ax.clabel(
+        lines, levels[::2], fmt=lambda x: f"{x:g}".replace("-", MINUS_SIGN), fontsize=6
+    )
     shape_space(ax, field.axes, labels)
     signs = set()
     for gait in gaits:
         signs |= _shaded(ax, field, component, gait, error)
         draw_gait(gait, ax, within=field.axes)
     if signs:
-        ax.legend(handles=_legend_patches(component, signs), loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
+        ax.legend(
+            handles=_legend_patches(component, signs),
+            loc="upper center",
+            bbox_to_anchor=(0.5, -0.2),
+            ncols=2,
+        )
     ax.set_title(f"{ccf_label(component, field.unit, labels)}: {TITLES[component]}")
     return ax
 
@@ -127,11 +169,15 @@ def _legend_patches(component: int, signs: set[int]) -> list:
 
     looks = ((1, PLUS), (-1, MINUS))
     return [
-        Patch(facecolor=c, alpha=0.35, label=DIRECTIONS[component][k]) for k, (s, c) in enumerate(looks) if s in signs
+        Patch(facecolor=c, alpha=0.35, label=DIRECTIONS[component][k])
+        for k, (s, c) in enumerate(looks)
+        if s in signs
     ]
 
 
-def _shaded(ax, field: Field, component: int, gait: Gait, error: Field | None) -> set[int]:
+def _shaded(
+    ax, field: Field, component: int, gait: Gait, error: Field | None
+) -> set[int]:
     """Shade the area of a gait by the sign of CCF times winding number; return the signs that occur."""
     x, y = (np.linspace(a[0], a[-1], AREA) for a in field.axes)
     shapes = np.stack(np.meshgrid(x, y, indexing="ij"), -1)
@@ -140,11 +186,20 @@ def _shaded(ax, field: Field, component: int, gait: Gait, error: Field | None) -
         return set()
     density = Field(field.axes, field.values[component], 1)(shapes) * times
     if error is not None:
-        density[np.abs(density) <= np.abs(times) * Field(error.axes, error.values[component], 1)(shapes)] = 0.0
+        density[
+            np.abs(density)
+            <= np.abs(times) * Field(error.axes, error.values[component], 1)(shapes)
+        ] = 0.0
     found = {s for s in (1, -1) if (s * density > 0).any()}
     for s in found:
         ax.contourf(
-            x, y, (s * density > 0).T, levels=[0.5, 2.0], colors=[PLUS if s > 0 else MINUS], alpha=0.35, zorder=0
+            x,
+            y,
+            (s * density > 0).T,
+            levels=[0.5, 2.0],
+            colors=[PLUS if s > 0 else MINUS],
+            alpha=0.35,
+            zorder=0,
         )
     return found
 
@@ -195,13 +250,24 @@ def ccf_surface(
         curve = gait.shape(PHASES)
         ax.plot(*curve.T, floor, color="black", lw=1.0)
         if not field.masked:
-            inside = ((curve >= [a[0] for a in axes]) & (curve <= [a[-1] for a in axes])).all(-1)
+            inside = (
+                (curve >= [a[0] for a in axes]) & (curve <= [a[-1] for a in axes])
+            ).all(-1)
             height = np.full(len(curve), np.nan)
-            height[inside] = Field(field.axes, field.values[component], field.degree)(curve[inside])
-            ax.plot(*curve.T, np.clip(height, -most, most), color="black", lw=1.4, zorder=10)
+            height[inside] = Field(field.axes, field.values[component], field.degree)(
+                curve[inside]
+            )
+            ax.plot(
+                *curve.T, np.clip(height, -most, most), color="black", lw=1.4, zorder=10
+            )
             signs |= _floor(ax, field, component, gait, floor)
     if signs:
-        ax.legend(handles=_legend_patches(component, signs), loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=2)
+        ax.legend(
+            handles=_legend_patches(component, signs),
+            loc="upper center",
+            bbox_to_anchor=(0.5, 0.0),
+            ncols=2,
+        )
     ax.set(
         xlabel=quantity(*labels[0]), ylabel=quantity(*labels[1]), zlim=(floor, most),
         title=f"{ccf_name(component)}: {TITLES[component]}",
@@ -218,7 +284,9 @@ def _floor(ax, field: Field, component: int, gait: Gait, floor: float) -> set[in
     """Shade the area of a gait on the plane below a surface; return the signs that occur."""
     x, y = (np.linspace(a[0], a[-1], AREA // 2) for a in field.axes)
     shapes = np.stack(np.meshgrid(x, y, indexing="ij"), -1)
-    density = Field(field.axes, field.values[component], 1)(shapes) * winding(gait.shape(PHASES), x, y)
+    density = Field(field.axes, field.values[component], 1)(shapes) * winding(
+        gait.shape(PHASES), x, y
+    )
     for s, colour in ((1, PLUS), (-1, MINUS)):
         if (s * density > 0).any():
             ax.contourf(
@@ -228,4 +296,12 @@ def _floor(ax, field: Field, component: int, gait: Gait, floor: float) -> set[in
     return {s for s in (1, -1) if (s * density > 0).any()}
 
 
-__all__ = ["CCF_STYLES", "CONNECTION_STYLES", "ccf_contours", "ccf_surface", "streamlines", "unit_of", "winding"]
+__all__ = [
+    "CCF_STYLES",
+    "CONNECTION_STYLES",
+    "ccf_contours",
+    "ccf_surface",
+    "streamlines",
+    "unit_of",
+    "winding",
+]

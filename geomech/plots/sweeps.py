@@ -43,7 +43,10 @@ def sweep_figure(scene: Any, results: Mapping) -> Figure:
     >>> fig = geomech.plots.sweep_figure(swept.scene, swept)
     """
     if len(over := results["over"]) > 2:
-        raise Refusal(f"cannot draw {len(over)} parameters", instead="sweep one or two, or leave ``plot`` out")
+        raise Refusal(
+            f"cannot draw {len(over)} parameters",
+            instead="sweep one or two, or leave ``plot`` out",
+        )
     return (_speed_figure if "status" in results else _net_figure)(scene, results)
 
 
@@ -56,7 +59,14 @@ def _net_figure(scene: Scene, results: Mapping):
     order = np.ix_(*(np.argsort(x, kind="stable") for x in over.values()))
     rising = [np.sort(x) for x in over.values()]
     if len(over) == 1:
-        _line(ax, *rising, values[order], error[order], None if medium is None else medium[order], label)
+        _line(
+            ax,
+            *rising,
+            values[order],
+            error[order],
+            None if medium is None else medium[order],
+            label,
+        )
     else:
         _map(ax, *rising, values[order], label)
     ax.set(**{f"{axis}label": named[name] for axis, name in zip("xy", over)})
@@ -67,18 +77,37 @@ def drawn(scene: Scene, results: Mapping):
     """Return (values, their errors, the medium's or None, a label): the net distance per cycle or, where the frequency differs
     from point to point, the speed; negative where it is backwards."""
     distance, frequency = net(results["displacement"]), results.get("frequency")
-    unit, timed = results["units"]["estimate"], frequency is not None and np.ptp(frequency) > 0
+    unit, timed = (
+        results["units"]["estimate"],
+        frequency is not None and np.ptp(frequency) > 0,
+    )
     factor = frequency if timed else 1.0
     medium = results["medium_error"] * factor if "medium_error" in results else None
     distance = distance * factor
     label = f"speed ({unit}/s)" if timed else f"net distance per cycle ({unit})"
-    return distance, results["estimate"] * factor, medium, label + ", backwards < 0" * bool((distance < 0).any())
+    return (
+        distance,
+        results["estimate"] * factor,
+        medium,
+        label + ", backwards < 0" * bool((distance < 0).any()),
+    )
 
 
 @styled
-def _line(ax, x, values: np.ndarray, errors: np.ndarray, medium: np.ndarray | None, label: str) -> None:
+def _line(
+    ax, x, values: np.ndarray, errors: np.ndarray, medium: np.ndarray | None, label: str
+) -> None:
     marker = "o" if len(x) <= MARKED else ""
-    ax.errorbar(x, values, yerr=errors, fmt=f"{marker}-", color="black", ms=3, lw=1, label="with estimated error")
+    ax.errorbar(
+        x,
+        values,
+        yerr=errors,
+        fmt=f"{marker}-",
+        color="black",
+        ms=3,
+        lw=1,
+        label="with estimated error",
+    )
     if medium is not None:
         medium_band(ax, x, values, medium)
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))
@@ -91,7 +120,11 @@ def _map(ax, x, y, net: np.ndarray, label: str) -> None:
     from cmcrameri import cm
 
     top = np.abs(net).max() or 1.0
-    signs = {"cmap": cm.vik, "vmin": -top, "vmax": top} if net.min() < 0 < net.max() else {"cmap": "viridis"}
+    signs = (
+        {"cmap": cm.vik, "vmin": -top, "vmax": top}
+        if net.min() < 0 < net.max()
+        else {"cmap": "viridis"}
+    )
     image = ax.pcolormesh(x, y, net.T, shading="nearest", rasterized=True, **signs)
     for values, limit in ((x, ax.set_xlim), (y, ax.set_ylim)):
         if values[0] < values[-1]:
@@ -99,7 +132,9 @@ def _map(ax, x, y, net: np.ndarray, label: str) -> None:
     ax.figure.colorbar(image, ax=ax).set_label(label)
 
 
-def labels(scene, parameters: list[str], units: Mapping[str, str] = PARAMETERS) -> list[str]:
+def labels(
+    scene, parameters: list[str], units: Mapping[str, str] = PARAMETERS
+) -> list[str]:
     """Return labels of axes: names with units; by their last part where that is unique, else as "body-inertia: frequency
     (Hz)"."""
     last = [name.rpartition(".")[2] for name in parameters]
@@ -109,7 +144,9 @@ def labels(scene, parameters: list[str], units: Mapping[str, str] = PARAMETERS) 
         text = short if last.count(short) == 1 else f"{owner}: {short}"
         unit = "deg" if short.endswith("_deg") else units.get(short, "-")
         angle = text.removesuffix("_deg").replace("gamma0", "gamma_0")
-        out.append(scene.gait.amplitude_label if name == AMPLITUDE else quantity(angle, unit))
+        out.append(
+            scene.gait.amplitude_label if name == AMPLITUDE else quantity(angle, unit)
+        )
     return out
 
 
@@ -120,7 +157,12 @@ def _speed_figure(scene: Any, results: Mapping):
     name, *second = labels(scene, list(over), OF_ROBOTS)
     values, *others = over.values()
     fig, axes = figure(4.6, 3.2)
-    curves(axes[0, 0], values, results, [f"{second[0]}: {v:g}" for v in others[0]] if others else [""])
+    curves(
+        axes[0, 0],
+        values,
+        results,
+        [f"{second[0]}: {v:g}" for v in others[0]] if others else [""],
+    )
     axes[0, 0].set(xlabel=name, ylabel="mean speed (m/s)")
     return fig
 
@@ -129,11 +171,32 @@ def curves(ax: Axes, values: Any, results: Mapping, names: Any) -> None:
     """Draw speed (N, ...) over ``values``, a curve for each name, with its error; open markers: not walking."""
     from cmcrameri import cm
 
-    speed, error, status = (np.asarray(results[x]).reshape(len(values), -1) for x in ("speed", "estimate", "status"))
+    speed, error, status = (
+        np.asarray(results[x]).reshape(len(values), -1)
+        for x in ("speed", "estimate", "status")
+    )
     for k, label in enumerate(names):
         colour = cm.batlow(0.85 * k / max(1, len(names) - 1))
-        ax.errorbar(values, speed[:, k], yerr=error[:, k], color=colour, lw=1.0, capsize=2, label=label)
-        for fill, mask in ((colour, status[:, k] == "walking"), ("white", status[:, k] != "walking")):
-            ax.plot(np.array(values)[mask], speed[mask, k], "o", ms=4, color=colour, mfc=fill)
+        ax.errorbar(
+            values,
+            speed[:, k],
+            yerr=error[:, k],
+            color=colour,
+            lw=1.0,
+            capsize=2,
+            label=label,
+        )
+        for fill, mask in (
+            (colour, status[:, k] == "walking"),
+            ("white", status[:, k] != "walking"),
+        ):
+            ax.plot(
+                np.array(values)[mask],
+                speed[mask, k],
+                "o",
+                ms=4,
+                color=colour,
+                mfc=fill,
+            )
     if any(names):
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))

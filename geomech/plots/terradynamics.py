@@ -37,7 +37,15 @@ def stress_figure(survey: Any, point: tuple[float, float] | None = None) -> Figu
         if survey.pulling:
             ax.set_title("hatched: pulls on the leading face", loc="left", fontsize=8)
         if point:
-            ax.plot(*_point_on_map(*point), "o", mfc="white", mec="black", ms=5, clip_on=False, zorder=5)
+            ax.plot(
+                *_point_on_map(*point),
+                "o",
+                mfc="white",
+                mec="black",
+                ms=5,
+                clip_on=False,
+                zorder=5,
+            )
     return fig
 
 
@@ -56,29 +64,43 @@ def stress_map(ax: Axes, survey: Any, name: str) -> Axes:
 
     ahead = np.abs(survey.gamma) < np.pi / 2
     beta, gamma = np.degrees(survey.beta), np.degrees(survey.gamma[ahead])
-    values, top = getattr(survey, f"alpha_{name}")[:, ahead].T, largest(np.stack([survey.alpha_x, survey.alpha_z]))
+    values, top = (
+        getattr(survey, f"alpha_{name}")[:, ahead].T,
+        largest(np.stack([survey.alpha_x, survey.alpha_z])),
+    )
     colours = {"cmap": cm.vik, "vmin": -top, "vmax": top}
-    image = ax.pcolormesh(beta, gamma, values, shading="nearest", rasterized=True, **colours)
+    image = ax.pcolormesh(
+        beta, gamma, values, shading="nearest", rasterized=True, **colours
+    )
     ax.contour(beta, gamma, values, levels=[0.0], colors="0.35", linewidths=0.6)
     if survey.pulling:
         pulled = (survey.normal[:, ahead] > 0).T
-        ax.contourf(beta, gamma, pulled, levels=[0.5, 1.5], colors="none", hatches=["////"])
+        ax.contourf(
+            beta, gamma, pulled, levels=[0.5, 1.5], colors="none", hatches=["////"]
+        )
     square_of_angles(ax)
-    ax.figure.colorbar(image, ax=ax, shrink=0.85).set_label(rf"$\alpha_{name}$ (N/cm$^3$)")
+    ax.figure.colorbar(image, ax=ax, shrink=0.85).set_label(
+        rf"$\alpha_{name}$ (N/cm$^3$)"
+    )
     return ax
 
 
 def square_of_angles(ax: Axes) -> None:
     """Set the axes of tilt and direction of motion."""
     ticks = [-90, -45, 0, 45, 90]
-    ax.set(xlabel=r"tilt $\beta$ (degrees)", ylabel=r"direction $\gamma$ below the horizontal (degrees)")
+    ax.set(
+        xlabel=r"tilt $\beta$ (degrees)",
+        ylabel=r"direction $\gamma$ below the horizontal (degrees)",
+    )
     ax.set(aspect="equal", xlim=(-90, 90), ylim=(-90, 90), xticks=ticks, yticks=ticks)
 
 
 def _point_on_map(beta: float, gamma: float) -> tuple[float, float]:
     """Return the point of the map for any angles: motion backwards is the mirror image."""
     beta, gamma = beta - 180 * round(beta / 180), gamma - 360 * round(gamma / 360)
-    return (beta, gamma) if abs(gamma) <= 90 else (-beta, np.copysign(180, gamma) - gamma)
+    return (
+        (beta, gamma) if abs(gamma) <= 90 else (-beta, np.copysign(180, gamma) - gamma)
+    )
 
 
 @styled
@@ -100,20 +122,40 @@ def intrusion_figure(scene: Any, found: Any) -> Any:
         axes[0, 0].remove()
         ax = fig.add_subplot(1, 3, 1, projection="3d")
         draw_stress(ax, *scene.faces(found, step))
-        ax.set_title(f"where the force is largest, t = {found.t[step]:.3g} s", fontsize=8)
-        names = {"force": [f"force_{a}" for a in "xyz"], "moment": [f"moment_{a}" for a in "xyz"]}
+        ax.set_title(
+            f"where the force is largest, t = {found.t[step]:.3g} s", fontsize=8
+        )
+        names = {
+            "force": [f"force_{a}" for a in "xyz"],
+            "moment": [f"moment_{a}" for a in "xyz"],
+        }
     else:
         _poses(axes[0, 0], scene.outline.points, found.pose)
         names = {"force": ["force_x", "force_z"], "moment": ["moment"]}
     place, label, scale = _abscissa(columns)
-    for ax, (what, unit), letter in zip(axes[0, 1:], (("force", "N"), ("moment", "N m")), "FM"):
+    for ax, (what, unit), letter in zip(
+        axes[0, 1:], (("force", "N"), ("moment", "N m")), "FM"
+    ):
         for name in names[what]:
             axis = name[-1]
-            text = f"${letter}_{axis}$" + {"force_x": ", forwards", "force_z": ", upwards"}.get(name, "")
-            ax.plot(scale * columns[place], columns[name], color=COLOURS.get(axis, "0.2"), label=text)
+            text = f"${letter}_{axis}$" + {
+                "force_x": ", forwards",
+                "force_z": ", upwards",
+            }.get(name, "")
+            ax.plot(
+                scale * columns[place],
+                columns[name],
+                color=COLOURS.get(axis, "0.2"),
+                label=text,
+            )
         if len(names[what]) > 1:
             ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
-        ax.set(xlabel=label, ylabel=f"{what} ({unit})" if what == "force" else f"moment about the origin ({unit})")
+        ax.set(
+            xlabel=label,
+            ylabel=f"{what} ({unit})"
+            if what == "force"
+            else f"moment about the origin ({unit})",
+        )
         ax.axhline(0.0, color="0.7", lw=0.6, zorder=0)
         ax.margins(x=0.02)
     return fig
@@ -129,47 +171,91 @@ def draw_stress(ax: Any, faces: Any, above: np.ndarray, unit: float = 1e3) -> No
 
     a, b, c = faces.corners.swapaxes(0, 1)
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=-1) / 2
-    stress = np.linalg.norm(faces.force, axis=-1) / np.where(areas > 0, areas, 1.0) / unit
-    shades = ScalarMappable(Normalize(0.0, max(stress.max(initial=0.0), 1e-12)), cm.lajolla_r)
-    colours = np.concatenate([shades.to_rgba(stress), np.full((len(above), 4), [0.87, 0.87, 0.87, 1.0])])
+    stress = (
+        np.linalg.norm(faces.force, axis=-1) / np.where(areas > 0, areas, 1.0) / unit
+    )
+    shades = ScalarMappable(
+        Normalize(0.0, max(stress.max(initial=0.0), 1e-12)), cm.lajolla_r
+    )
+    colours = np.concatenate(
+        [shades.to_rgba(stress), np.full((len(above), 4), [0.87, 0.87, 0.87, 1.0])]
+    )
     corners = np.concatenate([faces.corners, above])
-    ax.add_collection3d(Poly3DCollection(corners, facecolors=colours, edgecolors=colours, lw=0.2, rasterized=True))
+    ax.add_collection3d(
+        Poly3DCollection(
+            corners, facecolors=colours, edgecolors=colours, lw=0.2, rasterized=True
+        )
+    )
     x, y, z = faces.force.sum(0)  # seen a little from the side of what bears it
     if x or y or z:
-        ax.view_init(elev=-np.degrees(np.arctan2(z, 2 * np.hypot(x, y))) / 2, azim=np.degrees(np.arctan2(-y, -x)) - 35)
+        ax.view_init(
+            elev=-np.degrees(np.arctan2(z, 2 * np.hypot(x, y))) / 2,
+            azim=np.degrees(np.arctan2(-y, -x)) - 35,
+        )
     low, high = corners.min((0, 1)), corners.max((0, 1))
     _scale(ax, low, high - low)
-    ax.figure.colorbar(shades, ax=ax, shrink=0.7, pad=0.02).set_label("stress below the surface (kPa)")
+    ax.figure.colorbar(shades, ax=ax, shrink=0.7, pad=0.02).set_label(
+        "stress below the surface (kPa)"
+    )
 
 
 def _scale(ax, low, span) -> None:
     """Set axes that hold a body that begins at ``low`` and is as large as ``span``, with arrows of a round length in place of
     ticks."""
     length = 0.3 * span.max()
-    length = max(k for k in (10.0 ** np.arange(-9, 3)[:, None] * [1, 2, 5]).flat if k <= length)
+    length = max(
+        k for k in (10.0 ** np.arange(-9, 3)[:, None] * [1, 2, 5]).flat if k <= length
+    )
     corner = low - 0.1 * length
     for axis, arrow in zip("xyz", np.eye(3) * length):
         ax.plot(*np.stack([corner, corner + arrow], 1), color="0.3", lw=1.0)
-        ax.text(*(corner + 1.25 * arrow), f"${axis}$", color="0.3", fontsize=8, ha="center", va="center")
+        ax.text(
+            *(corner + 1.25 * arrow),
+            f"${axis}$",
+            color="0.3",
+            fontsize=8,
+            ha="center",
+            va="center",
+        )
     low = corner - 0.1 * length
     high = np.maximum(low + span + 0.2 * length, corner + 1.3 * length)
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     ax.set_box_aspect(high - low, zoom=0.95)
     ax.set_axis_off()
-    ax.text2D(0.0, 0.02, f"axes: {1e3 * length:g} mm", transform=ax.transAxes, fontsize=8, color="0.3")
+    ax.text2D(
+        0.0,
+        0.02,
+        f"axes: {1e3 * length:g} mm",
+        transform=ax.transAxes,
+        fontsize=8,
+        color="0.3",
+    )
 
 
 def _poses(ax, points, pose) -> None:
-    for shade, k in zip(np.linspace(0.75, 0.0, POSES), np.linspace(0, len(pose) - 1, POSES).round().astype(int)):
+    for shade, k in zip(
+        np.linspace(0.75, 0.0, POSES),
+        np.linspace(0, len(pose) - 1, POSES).round().astype(int),
+    ):
         x, z, angle = pose[k]
         cos, sin = np.cos(angle), np.sin(angle)
         at = points @ np.array([[cos, -sin], [sin, cos]]) + [x, z]
         ax.plot(*at.T, color=str(shade), lw=1.0)
     ax.plot(
-        pose[:, 0], pose[:, 1], color="C0", lw=0.8, ls=":", marker="o" if np.ptp(pose[:, :2], axis=0).max() == 0 else ""
+        pose[:, 0],
+        pose[:, 1],
+        color="C0",
+        lw=0.8,
+        ls=":",
+        marker="o" if np.ptp(pose[:, :2], axis=0).max() == 0 else "",
     )
     ax.axhline(0.0, color="peru", lw=1.0, zorder=0)
-    ax.set(xlabel="x (m)", ylabel="z (m)", aspect="equal", title="light to dark: poses in time; brown: surface")
+    ax.set(
+        xlabel="x (m)",
+        ylabel="z (m)",
+        aspect="equal",
+        title="light to dark: poses in time; brown: surface",
+    )
     ax.title.set(fontsize=8)
     ax.margins(0.08)
 
@@ -195,11 +281,22 @@ def elements_figure(results: Mapping) -> Figure:
         order = "" if line["slope"] is None else f", order {line['slope']:.1f}"
         for ax, at in zip(axes[0], (line["value"], line["seconds"])):
             error = np.maximum(line["error"], 1e-17)
-            ax.loglog(at, error, color=colour, marker=marker, lw=1.0, label=line["label"] + order)
-    for ax, label in zip(axes[0], (results["parts"], f"seconds for {results['poses']} poses")):
+            ax.loglog(
+                at,
+                error,
+                color=colour,
+                marker=marker,
+                lw=1.0,
+                label=line["label"] + order,
+            )
+    for ax, label in zip(
+        axes[0], (results["parts"], f"seconds for {results['poses']} poses")
+    ):
         ax.set(xlabel=label, ylabel="rms error / largest of the motion")
         ax.grid(True, which="major", lw=0.3, color="0.85")
-    axes[0, 0].set_xticks(results["lines"][0]["value"], map(str, results["lines"][0]["value"]))
+    axes[0, 0].set_xticks(
+        results["lines"][0]["value"], map(str, results["lines"][0]["value"])
+    )
     axes[0, 0].minorticks_off()
     axes[0, 1].xaxis.set_minor_formatter(NullFormatter())
     axes[0, 0].legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)

@@ -20,7 +20,9 @@ __all__ = [
 
 VERSION = f"geomech {version.VERSION}, solver {SOLVER}"
 BACKENDS = "numpy", "numba"  # slowest first
-MANY = 100_000  # balances, which take NumPy about as long as compiled code takes to load
+MANY = (
+    100_000  # balances, which take NumPy about as long as compiled code takes to load
+)
 
 _most: ContextVar[str] = ContextVar("most", default="numba")
 

@@ -18,9 +18,17 @@ LONGEST = 60.0  # s of computing that a command begins without consent
 LARGEST = 2e9  # bytes of memory, likewise
 WORTH_SAYING = 5.0  # s
 BASE = 1.6e8  # bytes: Python, its libraries, and a batch of the solver
-SLOW, FAST = 10.0, 5.0  # most and one over the least that balances may take, over the assumed seconds
-ENOUGH, FEWEST = 0.25, 3  # s of computing, and batches of balances, that suffice to time them
-LOADING = 20.0  # times the median: a batch that takes longer has loaded or compiled code
+SLOW, FAST = (
+    10.0,
+    5.0,
+)  # most and one over the least that balances may take, over the assumed seconds
+ENOUGH, FEWEST = (
+    0.25,
+    3,
+)  # s of computing, and batches of balances, that suffice to time them
+LOADING = (
+    20.0  # times the median: a batch that takes longer has loaded or compiled code
+)
 
 # Assumed seconds, for each place of the body where forces are evaluated; measured, with the work around a balance, 2e-6 to
 # 5e-6 by NumPy and 0.3e-6 to 1.2e-6 compiled in dry media, 0.8e-6 and 0.5e-6 in a linear one, whose bodies were small; and
@@ -28,7 +36,9 @@ LOADING = 20.0  # times the median: a batch that takes longer has loaded or comp
 BALANCE = {"numpy": 5e-6, "numba": 0.8e-6}
 LINEAR = 0.1
 BATCH = {"numpy": 2e-3, "numba": 5e-4}
-STEP = 200  # balances of large batches that take NumPy as long as one batch, however small
+STEP = (
+    200  # balances of large batches that take NumPy as long as one batch, however small
+)
 
 
 class TooLong(Refusal):
@@ -61,26 +71,41 @@ class Cost(NamedTuple):
 
     def scaled(self, factor: float) -> Cost:
         """Return the cost if balances take ``factor`` times as long."""
-        return self._replace(seconds=self.besides + factor * (self.seconds - self.besides))
+        return self._replace(
+            seconds=self.besides + factor * (self.seconds - self.besides)
+        )
 
     def check(self, place: str, yes: bool, less: str = "ask for less") -> None:
         """Raise `TooLong` beyond the limits unless ``yes``. less: advice on a smaller request."""
         if not yes and (self.seconds > LONGEST or self.memory > LARGEST):
             limits = f"{duration(LONGEST)} or {_size(LARGEST)}"
-            raise TooLong(str(self), where=place, instead=f"to compute for more than {limits} say ``yes``, or {less}")
+            raise TooLong(
+                str(self),
+                where=place,
+                instead=f"to compute for more than {limits} say ``yes``, or {less}",
+            )
 
 
-def assumed(samples: float, points: int, linear: bool, batches: float, back_end: str = "") -> float:
+def assumed(
+    samples: float, points: int, linear: bool, batches: float, back_end: str = ""
+) -> float:
     """Return the assumed seconds of so many balances in so many batches, by the preferred back end or another."""
     back_end = back_end or preferred()
-    return samples * points * (LINEAR if linear else 1.0) * BALANCE[back_end] + batches * BATCH[back_end]
+    return (
+        samples * points * (LINEAR if linear else 1.0) * BALANCE[back_end]
+        + batches * BATCH[back_end]
+    )
 
 
 def decide(cost: Cost, judge: Callable[[Cost], None]) -> None:
     """Call judge(cost) at once where the assumed seconds decide, else once the first balances have been timed; an
     exception from it ends the request."""
     of_balances = cost.seconds - cost.besides
-    is_clear = of_balances > FAST * LONGEST or cost.seconds < LONGEST / SLOW or cost.besides > LONGEST
+    is_clear = (
+        of_balances > FAST * LONGEST
+        or cost.seconds < LONGEST / SLOW
+        or cost.besides > LONGEST
+    )
     decided = is_clear or cost.memory > LARGEST
     listen(
         nobody if decided else _Watch(cost, judge)
@@ -108,9 +133,14 @@ class _Watch:
             return
         now = time.process_time()
         if self.last is not None:
-            self.batches.append((now - self.last, assumed(samples, points, linear, 1, self.back_end)))
+            self.batches.append(
+                (now - self.last, assumed(samples, points, linear, 1, self.back_end))
+            )
         self.last = now
-        if len(self.batches) >= FEWEST and sum(took for took, _ in self.batches) >= ENOUGH:
+        if (
+            len(self.batches) >= FEWEST
+            and sum(took for took, _ in self.batches) >= ENOUGH
+        ):
             self.over = True
             self.judge(self.cost.scaled(self._factor()))
 
@@ -118,7 +148,10 @@ class _Watch:
         """Return the seconds of balances over those assumed."""
         factors = sorted(took / each for took, each in self.batches)
         most = LOADING * factors[len(factors) // 2]
-        took, expected = map(sum, zip(*((took, each) for took, each in self.batches if took <= most * each)))
+        took, expected = map(
+            sum,
+            zip(*((took, each) for took, each in self.batches if took <= most * each)),
+        )
         return took / expected
 
 
@@ -126,7 +159,11 @@ def duration(seconds: float) -> str:
     """Return a time in words, at least a second, in the largest unit that makes a few of it."""
     for unit, size in (("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
         if seconds >= 1.5 * size:
-            return f"{seconds / size:.2g} {unit}" if seconds < 100 * size else f"{seconds / size:,.0f} {unit}"
+            return (
+                f"{seconds / size:.2g} {unit}"
+                if seconds < 100 * size
+                else f"{seconds / size:,.0f} {unit}"
+            )
     return f"{max(1.0, seconds):.0f} s"
 
 

@@ -79,19 +79,41 @@ def _contents(x: Any) -> tuple:
     if isinstance(x, types.FunctionType):
         return _code(x)
     if isinstance(x, types.BuiltinFunctionType | np.ufunc):
-        return "built in", getattr(x, "__module__", ""), getattr(x, "__self__", None), x.__name__
+        return (
+            "built in",
+            getattr(x, "__module__", ""),
+            getattr(x, "__self__", None),
+            x.__name__,
+        )
     if isinstance(x, types.ModuleType):
         return "module", x.__name__
     if isinstance(x, types.CodeType):
         return "code", x.co_code, x.co_names, x.co_consts
     kind = type(x)
     if dataclasses.is_dataclass(kind):
-        return "object", kind, *(getattr(x, f.name) for f in dataclasses.fields(x) if f.compare)
+        return (
+            "object",
+            kind,
+            *(getattr(x, f.name) for f in dataclasses.fields(x) if f.compare),
+        )
     if isinstance(vars(kind).get("__reduce__"), types.FunctionType):
         return "object", kind, x.__reduce__()
     if kind.__module__ != "builtins" and hasattr(x, "__dict__"):
-        cached = {name for base in kind.__mro__ for name, f in vars(base).items() if _caches(f)}
-        return "object", kind, {name: value for name, value in sorted(vars(x).items()) if name not in cached}
+        cached = {
+            name
+            for base in kind.__mro__
+            for name, f in vars(base).items()
+            if _caches(f)
+        }
+        return (
+            "object",
+            kind,
+            {
+                name: value
+                for name, value in sorted(vars(x).items())
+                if name not in cached
+            },
+        )
     raise Undigestible(f"the content of a {kind.__qualname__} cannot be told")
 
 

@@ -19,8 +19,14 @@ AHEAD = 4  # tasks for each worker that are submitted before the oldest is back
 LONGEST_END = 2.0  # s for a pool to notice that its processes were killed
 PATIENCE = 0.2  # s for a pool to drop cancelled tasks
 WAIT = 3.0  # s for the scheduler to answer, and for a first worker
-SEEN = 10.0  # s after which workers of a cluster are counted again: they may come and go
-SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+SEEN = (
+    10.0  # s after which workers of a cluster are counted again: they may come and go
+)
+SIGNALS = [
+    getattr(signal, name)
+    for name in ("SIGINT", "SIGTERM", "SIGHUP")
+    if hasattr(signal, name)
+]
 
 
 class Processes:
@@ -61,7 +67,10 @@ class Processes:
         if pool is None:
             return
         with undisturbed():
-            manager, processes = pool._executor_manager_thread, list((pool._processes or {}).values())
+            manager, processes = (
+                pool._executor_manager_thread,
+                list((pool._processes or {}).values()),
+            )
             pool.shutdown(wait=False, cancel_futures=True)
             until = time.monotonic() + PATIENCE
             while (
@@ -124,13 +133,21 @@ class Cluster:
     def _connected(self, distributed):
         """Return the client; Refusal if nothing answers, or something else does that says nothing."""
         for name in ("distributed", "distributed.client"):
-            logging.getLogger(name).setLevel(logging.CRITICAL)  # errors are one line here
+            logging.getLogger(name).setLevel(
+                logging.CRITICAL
+            )  # errors are one line here
         answer: Future = Future()
-        threading.Thread(target=self._connect, args=(distributed, answer), daemon=True).start()
+        threading.Thread(
+            target=self._connect, args=(distributed, answer), daemon=True
+        ).start()
         try:
             return answer.result(2 * WAIT)
         except Exception as error:
-            why = "nothing answers there" if isinstance(error, OSError) else formatted(str(error), 120)
+            why = (
+                "nothing answers there"
+                if isinstance(error, OSError)
+                else formatted(str(error), 120)
+            )
             raise Refusal(
                 why,
                 where=self.place,
@@ -141,11 +158,15 @@ class Cluster:
     def _connect(self, distributed, answer: Future) -> None:
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # on different versions: `_checked` refuses those that matter
+                warnings.simplefilter(
+                    "ignore"
+                )  # on different versions: `_checked` refuses those that matter
                 distributed.comm.resolve_address(
                     self.address
                 )  # a client of another server prints an error when it is deleted
-                answer.set_result(distributed.Client(self.address, timeout=WAIT, set_as_default=False))
+                answer.set_result(
+                    distributed.Client(self.address, timeout=WAIT, set_as_default=False)
+                )
         except Exception as error:
             answer.set_exception(error)
 
@@ -155,7 +176,9 @@ class Cluster:
         while not self._count():
             if time.monotonic() > until:
                 raise Refusal(
-                    "it has no workers", where=self.place, instead=f"start some ('dask worker {self.address}')"
+                    "it has no workers",
+                    where=self.place,
+                    instead=f"start some ('dask worker {self.address}')",
                 )
             time.sleep(0.05)
         try:
@@ -179,7 +202,10 @@ class Cluster:
         """Return the number of threads of all workers."""
         if time.monotonic() > self.seen + SEEN or not self.threads:
             try:
-                self.threads, self.seen = sum(self.client.nthreads().values()), time.monotonic()
+                self.threads, self.seen = (
+                    sum(self.client.nthreads().values()),
+                    time.monotonic(),
+                )
             except Exception as error:
                 raise self.failure(error) from error
         return self.threads
@@ -190,14 +216,23 @@ class Cluster:
     def look(self, future: Future) -> None:
         """Note, once, that all workers are gone; others may come."""
         if not future.done() and not self._count() and not self.waited:
-            note(f"{worded(self.place)}: no workers are left: waiting for others ('dask worker {self.address}')")
+            note(
+                f"{worded(self.place)}: no workers are left: waiting for others ('dask worker {self.address}')"
+            )
             self.waited = True
 
     def failure(self, error: Exception) -> Exception:
         name = type(error).__name__
         if name == "KilledWorker":
-            meaning = "workers were ended again and again at the same part: out of memory?"
-        elif name in ("CancelledError", "FutureCancelledError", "CommClosedError", "ClosedClientError"):
+            meaning = (
+                "workers were ended again and again at the same part: out of memory?"
+            )
+        elif name in (
+            "CancelledError",
+            "FutureCancelledError",
+            "CommClosedError",
+            "ClosedClientError",
+        ):
             meaning = "the scheduler, or the connection to it, was lost"
         else:
             meaning = f"{name}: {formatted(str(error), 120)}"
@@ -213,7 +248,8 @@ def _distributed():
         import distributed
     except ImportError as error:
         raise Refusal(
-            f"``scheduler`` takes the package distributed ({error})", instead="pip install 'geomech[distributed]'"
+            f"``scheduler`` takes the package distributed ({error})",
+            instead="pip install 'geomech[distributed]'",
         ) from None
     return distributed
 

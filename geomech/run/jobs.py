@@ -88,8 +88,14 @@ class Runner:
 
     def each(self, function: Callable, items: Sequence) -> Iterator:
         """Yield function(item) of every item; see `geomech.core.work.each`."""
-        is_task = isinstance(function, functools.partial) and len(function.args) == 1 and not function.keywords
-        task, common = (function.func, function.args[0]) if is_task else (_applied, function)
+        is_task = (
+            isinstance(function, functools.partial)
+            and len(function.args) == 1
+            and not function.keywords
+        )
+        task, common = (
+            (function.func, function.args[0]) if is_task else (_applied, function)
+        )
         return self.map(task, common, items, len(items))
 
     def call(self, task: Callable, *arguments) -> Any:
@@ -101,18 +107,28 @@ class Runner:
             self._store(key, stored[0], kind)
         return stored[0]
 
-    def iterate(self, step: Callable, state: Any, count: int, of: tuple, row: Any = Any) -> tuple[Any, list]:
+    def iterate(
+        self, step: Callable, state: Any, count: int, of: tuple, row: Any = Any
+    ) -> tuple[Any, list]:
         """Return the state after ``count`` times step(state) -> (state, row), and the rows.
 
         Every `CHECKPOINT` seconds the state is stored, and a stopped request resumes from there. of: all data that
         steps depend on besides the state, which consists of arrays and numbers. row: the type of a row."""
         rows: list = []
         while (remaining := count - len(rows)) > 0:
-            key, kind = self._key(Runner.iterate, (of, state, remaining)), tuple[Any, list[row]]
+            key, kind = (
+                self._key(Runner.iterate, (of, state, remaining)),
+                tuple[Any, list[row]],
+            )
             stored = self._stored(key, kind)
             if stored is None:
-                piece, until = [], math.inf if key is None else time.monotonic() + CHECKPOINT
-                while not piece or (len(piece) < remaining and time.monotonic() < until):
+                piece, until = (
+                    [],
+                    math.inf if key is None else time.monotonic() + CHECKPOINT,
+                )
+                while not piece or (
+                    len(piece) < remaining and time.monotonic() < until
+                ):
                     state, one = step(state)
                     piece.append(one)
                 self._store(key, (state, piece), kind)
@@ -160,9 +176,20 @@ def _like(example: Any, tree: Any) -> Any:
 class _Queue:
     """The tasks of one `Runner.map`, in their order: stored, computed here, or submitted to an executor."""
 
-    def __init__(self, runner: Runner, task: Callable, common: Any, total: int, seconds: float | None):
+    def __init__(
+        self,
+        runner: Runner,
+        task: Callable,
+        common: Any,
+        total: int,
+        seconds: float | None,
+    ):
         self.runner, self.task, self.common, self.total = runner, task, common, total
-        self.executor, self.back_end, self.kind = runner.executor, preferred(), _kind(task)
+        self.executor, self.back_end, self.kind = (
+            runner.executor,
+            preferred(),
+            _kind(task),
+        )
         self.common_key = runner._key(task, common)
         self.each, self.took, self.begun = seconds and seconds / total, [], 0
         self.order: Order | None = None
@@ -193,14 +220,20 @@ class _Queue:
             return key, _Part(self.executor, self.order, pickle.dumps(item))
         start = time.perf_counter()
         with unaided():
-            result = compute_here(self.task, self.common, item, self.back_end, self.total > 1)
+            result = compute_here(
+                self.task, self.common, item, self.back_end, self.total > 1
+            )
         self.took.append(time.perf_counter() - start)
         self.runner._store(key, result, self.kind)
         return None, (result,)
 
     def _is_due(self) -> bool:
         result = self.waiting[0][1]
-        return not isinstance(result, _Part) or result.is_ready() or len(self.waiting) >= self.executor.ahead()
+        return (
+            not isinstance(result, _Part)
+            or result.is_ready()
+            or len(self.waiting) >= self.executor.ahead()
+        )
 
     def _finish(self) -> Any:
         key, result = self.waiting.popleft()
@@ -228,10 +261,16 @@ class _Queue:
             cure = "put it in a module"
             if self.executor.remote:
                 raise Refusal(
-                    "a cluster cannot know what is to be computed", because=str(error), instead=cure
+                    "a cluster cannot know what is to be computed",
+                    because=str(error),
+                    instead=cure,
                 ) from None
             if error.worth_saying:
-                warnings.warn(f"computed by one process, others cannot know it: {error}: {cure}", Note, stacklevel=6)
+                warnings.warn(
+                    f"computed by one process, others cannot know it: {error}: {cure}",
+                    Note,
+                    stacklevel=6,
+                )
             self.executor = None
         return self.order is not None
 
@@ -243,8 +282,14 @@ class _Queue:
             return True
         if len(self.took) < 2 or remaining < 2:
             return False
-        each = sum(self.took[1:]) / (len(self.took) - 1)  # the first one also loads what is needed
-        each = max(each, sum(self.took) / len(self.took)) if sum(self.took) > WORTH else each
+        each = sum(self.took[1:]) / (
+            len(self.took) - 1
+        )  # the first one also loads what is needed
+        each = (
+            max(each, sum(self.took) / len(self.took))
+            if sum(self.took) > WORTH
+            else each
+        )
         return each * remaining > WORTH
 
 
@@ -316,11 +361,20 @@ def context_of(files: Iterable[Path]) -> tuple:
     """Return all data that results depend on besides tasks and arguments: plug-ins, and files."""
     from geomech.scenes.kinds import code
 
-    return code(), [hashlib.sha256(path.read_bytes()).hexdigest() for path in files if path.is_file()]
+    return code(), [
+        hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in files
+        if path.is_file()
+    ]
 
 
 @contextlib.contextmanager
-def storing(path: Path | None, context: tuple = (), output: Path | None = None, keep: bool = False) -> Iterator[Runner]:
+def storing(
+    path: Path | None,
+    context: tuple = (),
+    output: Path | None = None,
+    keep: bool = False,
+) -> Iterator[Runner]:
     """Store results of tasks in ``path`` in the body of the statement; None: nowhere. At its end the file is removed,
     unless ``keep``.
 
@@ -337,7 +391,9 @@ def storing(path: Path | None, context: tuple = (), output: Path | None = None, 
         ) from None
     with at_most(BACKENDS[min(store.mark, len(BACKENDS) - 1)]):
         try:
-            with running(dataclasses.replace(runner(), store=store, context=(VERSION, *context))) as new:
+            with running(
+                dataclasses.replace(runner(), store=store, context=(VERSION, *context))
+            ) as new:
                 yield new
         except TooLong:
             store.close(done=True)

@@ -114,7 +114,9 @@ def _in_notebook(computation: Computation):
             if last
             else (str(computation), computation.fraction)
         )
-        text = HTML(f'<progress max="1" value="{part:.4f}"></progress> {html.escape(text)}')
+        text = HTML(
+            f'<progress max="1" value="{part:.4f}"></progress> {html.escape(text)}'
+        )
         if handle is None:
             handle = display(text, display_id=True)
         else:
@@ -132,7 +134,9 @@ def _in_pipe(computation: Computation):
 
     def speak():
         while not over.wait(EVERY):
-            with contextlib.suppress(OSError, ValueError, AttributeError):  # the pipe may be closed
+            with contextlib.suppress(
+                OSError, ValueError, AttributeError
+            ):  # the pipe may be closed
                 print(computation, file=sys.stderr, flush=True)
 
     speaker = threading.Thread(target=speak, daemon=True)

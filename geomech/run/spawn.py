@@ -14,12 +14,16 @@ from multiprocessing import context, parent_process, resource_tracker
 
 from geomech.run import BELOW
 
-UNHEARD = [getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(signal, name)]  # the terminal's signals
+UNHEARD = [
+    getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(signal, name)
+]  # the terminal's signals
 
 
 def pool(count: int) -> ProcessPoolExecutor:
     """Return so many processes, each of one thread of BLAS, that start with the tasks they get."""
-    with _environment({"PYTHONWARNINGS": "ignore"}):  # else it warns, after a kill, of the resources that it removes
+    with _environment(
+        {"PYTHONWARNINGS": "ignore"}
+    ):  # else it warns, after a kill, of the resources that it removes
         resource_tracker.ensure_running()
     return ProcessPoolExecutor(count, Context(), begin)
 

@@ -21,7 +21,11 @@ from rft.refusal import Refusal
 CHECKPOINT = 2.0  # s between writes; a request that takes less writes nothing
 LARGEST = 6_000_000_000  # bytes of results in a file, as of the largest sweep; further ones are not stored
 OURS = 0x67656F6D  # application_id of our files
-DAMAGED = sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR  # the last where tables are not ours
+DAMAGED = (
+    sqlite3.SQLITE_CORRUPT,
+    sqlite3.SQLITE_NOTADB,
+    sqlite3.SQLITE_ERROR,
+)  # the last where tables are not ours
 ARRAY = 1  # code of arrays in a value
 KINDS = "fiubcU"  # of dtypes of arrays
 T = TypeVar("T")
@@ -46,7 +50,9 @@ def _as_plain(x: Any) -> Any:
         return msgspec.msgpack.Ext(ARRAY, msgspec.msgpack.encode(parts))
     if isinstance(x, np.generic):
         return x.item()
-    raise TypeError(f"a result of a task must be numbers, arrays and containers of these, got {type(x).__name__}")
+    raise TypeError(
+        f"a result of a task must be numbers, arrays and containers of these, got {type(x).__name__}"
+    )
 
 
 def decoded(raw: bytes, kind: Any) -> Any:
@@ -108,7 +114,9 @@ class Store:
             try:
                 decoded(raw, kind)
             except (ValueError, TypeError) as error:
-                raise TypeError(f"a task declares {kind} and returns something else: {error}") from None
+                raise TypeError(
+                    f"a task declares {kind} and returns something else: {error}"
+                ) from None
             self.readable.add(repr(kind))
         self.new[key] = raw, _checksum(key, raw)
         self.size += len(raw)
@@ -129,11 +137,15 @@ class Store:
             self.commit()
         if self.db is not None:
             empty = done or not self.written
-            for step in (self._unlink,) * empty + (self._disconnect,) + (self._unlink,) * empty:
+            for step in (
+                (self._unlink,) * empty + (self._disconnect,) + (self._unlink,) * empty
+            ):
                 step()  # an open file goes under its lock, but on Windows, where it must be closed first
 
     def _row(self, key: bytes) -> tuple | None:
-        return self.db.execute("SELECT value, checksum FROM result WHERE key = ?", (key,)).fetchone()
+        return self.db.execute(
+            "SELECT value, checksum FROM result WHERE key = ?", (key,)
+        ).fetchone()
 
     def _write(self) -> None:
         if not self.db.in_transaction:
@@ -141,7 +153,9 @@ class Store:
         if not self.written:
             self.db.execute(f"PRAGMA application_id = {OURS}")
             self.db.execute(f"PRAGMA user_version = {self.mark}")
-            self.db.execute("CREATE TABLE IF NOT EXISTS result (key BLOB PRIMARY KEY, value BLOB, checksum BLOB)")
+            self.db.execute(
+                "CREATE TABLE IF NOT EXISTS result (key BLOB PRIMARY KEY, value BLOB, checksum BLOB)"
+            )
         rows = [(key, *row) for key, row in self.new.items()]
         self.db.executemany("INSERT OR REPLACE INTO result VALUES (?, ?, ?)", rows)
         self.db.execute("COMMIT")
@@ -155,13 +169,17 @@ class Store:
                 instead="remove it, or choose another output",
             )
         self._try(self._connect)
-        while self.db is not None and not self.path.exists():  # its owner has removed it a moment ago
+        while (
+            self.db is not None and not self.path.exists()
+        ):  # its owner has removed it a moment ago
             self._disconnect()
             self._try(self._connect)
 
     def _connect(self) -> None:
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        self.db = sqlite3.connect(self.path, isolation_level=None, timeout=0, check_same_thread=False)
+        self.db = sqlite3.connect(
+            self.path, isolation_level=None, timeout=0, check_same_thread=False
+        )
         self.db.execute("PRAGMA locking_mode = EXCLUSIVE")
         self.db.execute("BEGIN EXCLUSIVE")
         if self.db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
@@ -186,18 +204,25 @@ class Store:
         """Return act(...); None after an error of the file, which is then replaced or given up."""
         try:
             return act(*arguments)
-        except (sqlite3.Error, OSError, UnicodeError) as error:  # UnicodeError: of names in a damaged file
+        except (
+            sqlite3.Error,
+            OSError,
+            UnicodeError,
+        ) as error:  # UnicodeError: of names in a damaged file
             code = getattr(error, "sqlite_errorcode", 0) & 0xFF
             if code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
                 self._disconnect()
                 self.lost, self.new = True, {}
                 if self.hold:
                     raise Busy(
-                        f"another computation has {self.path} open", instead="wait for it, stop it, or name another"
+                        f"another computation has {self.path} open",
+                        instead="wait for it, stop it, or name another",
                     ) from None
             elif isinstance(error, Foreign | UnicodeError) or code in DAMAGED:
                 self._disconnect()
-                self._begin_anew(str(error) if isinstance(error, Foreign) else "it is damaged")
+                self._begin_anew(
+                    str(error) if isinstance(error, Foreign) else "it is damaged"
+                )
             else:
                 if act == self._connect:
                     self._disconnect()
@@ -207,7 +232,8 @@ class Store:
     def _begin_anew(self, reason: str) -> None:
         """Rename the file to the first name that is free, and begin another."""
         names = (
-            self.path.with_name(f"{self.path.name}.unreadable{k}") for k in ("", *(f"-{k}" for k in range(2, 999)))
+            self.path.with_name(f"{self.path.name}.unreadable{k}")
+            for k in ("", *(f"-{k}" for k in range(2, 999)))
         )
         try:
             other = next(name for name in names if not os.path.lexists(name))
@@ -224,7 +250,9 @@ class Store:
         self.lost, self.new = True, {}
         if self.db is not None:
             with contextlib.suppress(sqlite3.Error):
-                self.db.execute("ROLLBACK")  # earlier results stay, and so does the lock
+                self.db.execute(
+                    "ROLLBACK"
+                )  # earlier results stay, and so does the lock
 
 
 def partial_file(output: Path) -> Path:
@@ -232,7 +260,9 @@ def partial_file(output: Path) -> Path:
     it."""
     if output.is_dir():
         place = output / (output.resolve().name or "geomech")
-    elif ".." in output.parts or output.is_symlink():  # one file for all names of an output
+    elif (
+        ".." in output.parts or output.is_symlink()
+    ):  # one file for all names of an output
         place = Path(os.path.realpath(output))
     else:
         place = output
@@ -243,7 +273,9 @@ def partial_file(output: Path) -> Path:
 def cache_folder() -> Path | None:
     """Return geomech's folder in the user's cache folder; None where there is none."""
     named = {"win32": os.environ.get("LOCALAPPDATA"), "darwin": "~/Library/Caches"}
-    folder = Path(os.environ.get("XDG_CACHE_HOME") or named.get(sys.platform) or "~/.cache")
+    folder = Path(
+        os.environ.get("XDG_CACHE_HOME") or named.get(sys.platform) or "~/.cache"
+    )
     try:
         folder = folder.expanduser()
     except RuntimeError:  # there is no home

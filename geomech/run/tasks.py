@@ -52,8 +52,13 @@ def packed(task: Callable, common: Any, back_end: str) -> Order:
     from geomech.scenes import kinds
 
     classes = kinds.registered()
-    if own := [name for module, name in classes if module == "__main__" or "<locals>" in name]:
-        raise Alone(f"the class {own[0]} is of the program that runs, or of a function in it", True)
+    if own := [
+        name for module, name in classes if module == "__main__" or "<locals>" in name
+    ]:
+        raise Alone(
+            f"the class {own[0]} is of the program that runs, or of a function in it",
+            True,
+        )
     try:
         work = pickle.dumps((task, common))
     except (pickle.PicklingError, AttributeError, TypeError) as error:
@@ -63,9 +68,14 @@ def packed(task: Callable, common: Any, back_end: str) -> Order:
     return Order(VERSION, back_end, kinds.files(), classes, work)
 
 
-def compute_here(task: Callable, common: Any, item: Any, back_end: str, one_of_many: bool = True) -> Any:
+def compute_here(
+    task: Callable, common: Any, item: Any, back_end: str, one_of_many: bool = True
+) -> Any:
     """Return task(common, item), computed as in a worker; the only task of a request may use all threads."""
-    with one_thread() if one_of_many else contextlib.nullcontext(), preferring(back_end):
+    with (
+        one_thread() if one_of_many else contextlib.nullcontext(),
+        preferring(back_end),
+    ):
         return task(common, item)
 
 
@@ -73,7 +83,10 @@ def compute_here(task: Callable, common: Any, item: Any, back_end: str, one_of_m
 def _known(order: Order) -> tuple[Callable, Any]:
     """Return (task, common), after registering all classes that they need."""
     if order.version != VERSION:
-        raise Refusal(f"a worker has {VERSION}, this command {order.version}", instead="install the same there")
+        raise Refusal(
+            f"a worker has {VERSION}, this command {order.version}",
+            instead="install the same there",
+        )
     if order.plugins or order.classes:
         _learn(order)
     return pickle.loads(order.work)
@@ -86,7 +99,9 @@ def _learn(order: Order) -> None:
     for name, text in order.plugins:
         kinds.load_text(name, text)
     for module, name in order.classes:
-        kinds.register(functools.reduce(getattr, name.split("."), importlib.import_module(module)))
+        kinds.register(
+            functools.reduce(getattr, name.split("."), importlib.import_module(module))
+        )
 
 
 def perform(order: Order, item: bytes) -> bytes:
@@ -98,7 +113,9 @@ def perform(order: Order, item: bytes) -> bytes:
             value = compute_here(task, common, pickle.loads(item), order.back_end)
         except Exception as raised:
             error, where = _sendable(raised), traceback.format_exc()
-    notes = tuple((str(w.message.args[0]), w.category, w.filename, w.lineno) for w in notes or ())
+    notes = tuple(
+        (str(w.message.args[0]), w.category, w.filename, w.lineno) for w in notes or ()
+    )
     return pickle.dumps(Outcome(value, error, where, notes))
 
 

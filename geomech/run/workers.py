@@ -56,7 +56,8 @@ def _executor(count: int | None, scheduler: str | None) -> Executor | None:
         in_range("``workers``", count, 1, MOST, whole=True)
     if scheduler is not None and count is not None:
         raise Refusal(
-            "``workers`` are processes of this machine, ``scheduler`` has its own", instead="give one of the two"
+            "``workers`` are processes of this machine, ``scheduler`` has its own",
+            instead="give one of the two",
         )
     if scheduler is None and (count or cores()) == 1:
         return None

@@ -4,7 +4,16 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from geomech.scenes.model import Numerics, Scene
-from geomech.scenes.read import builtin_names, from_tables, in_medium, inputs, intruder_names, load, parse, walker_names
+from geomech.scenes.read import (
+    builtin_names,
+    from_tables,
+    in_medium,
+    inputs,
+    intruder_names,
+    load,
+    parse,
+    walker_names,
+)
 from geomech.scenes.write import tables, toml
 
 if TYPE_CHECKING:
@@ -18,7 +27,12 @@ __all__ = [
     "inputs", "intruder_names", "load", "parse", "tables", "toml", "walker_names",
 ]  # fmt: skip
 
-_OTHER = {"IntruderScene": "intruder", "Intruding": "intruding", "MeshScene": "solid", "WalkerScene": "walker"}
+_OTHER = {
+    "IntruderScene": "intruder",
+    "Intruding": "intruding",
+    "MeshScene": "solid",
+    "WalkerScene": "walker",
+}
 
 
 def __getattr__(name: str) -> type:
@@ -26,7 +40,9 @@ def __getattr__(name: str) -> type:
     here."""
     if name not in _OTHER:
         raise AttributeError(f"module 'geomech.scenes' has no attribute {name!r}")
-    globals()[name] = kind = getattr(import_module(f"geomech.scenes.{_OTHER[name]}"), name)
+    globals()[name] = kind = getattr(
+        import_module(f"geomech.scenes.{_OTHER[name]}"), name
+    )
     return kind
 
 

@@ -13,7 +13,9 @@ from rft.refusal import Refusal, located
 LARGEST_FILE = 20_000_000  # bytes
 
 
-def columns(place: str, path, required: tuple, optional: tuple[str, ...] = ()) -> dict[str, np.ndarray]:
+def columns(
+    place: str, path, required: tuple, optional: tuple[str, ...] = ()
+) -> dict[str, np.ndarray]:
     """Return the columns ``required``, and those of ``optional`` that the file has. A required column may be a tuple of
     names for the same, returned under the first. Refusal, with ``place`` and the line, for any other file."""
     if not isinstance(path, (str, Path)):
@@ -21,7 +23,9 @@ def columns(place: str, path, required: tuple, optional: tuple[str, ...] = ()) -
     words = [(w,) if isinstance(w, str) else w for w in required]
     header = ",".join(w[0] for w in words)
     with located(place):
-        source = rows.read(path, LARGEST_FILE, f"give a CSV file with the header {header}")
+        source = rows.read(
+            path, LARGEST_FILE, f"give a CSV file with the header {header}"
+        )
         line, names = source.header
         allowed = [n for w in words for n in w] + [*optional]
         if (
@@ -30,17 +34,28 @@ def columns(place: str, path, required: tuple, optional: tuple[str, ...] = ()) -
             or any(not {*w} & {*names} for w in words)
         ):
             more = f", and {','.join(optional)} if wanted" if optional else ""
-            raise Refusal(f"the header must be {header}{more}", where=f"{source.name}, line {line}")
+            raise Refusal(
+                f"the header must be {header}{more}",
+                where=f"{source.name}, line {line}",
+            )
         values = dict(zip(names, source.numbers(names).T))
     result = {w[0]: next(values[n] for n in w if n in values) for w in words}
     return result | {n: values[n] for n in optional if n in values}
 
 
-def columns_reader(required: tuple[str, ...], optional: tuple[str, ...] = ()) -> Callable[[str, str], dict[str, list]]:
+def columns_reader(
+    required: tuple[str, ...], optional: tuple[str, ...] = ()
+) -> Callable[[str, str], dict[str, list]]:
     """Return a function (place, file) that reads a column of a CSV file for each key."""
-    return lambda place, file: {key: x.tolist() for key, x in columns(place, file, required, optional).items()}
+    return lambda place, file: {
+        key: x.tolist() for key, x in columns(place, file, required, optional).items()
+    }
 
 
-def rows_reader(key: str, required: tuple[str, ...]) -> Callable[[str, str], dict[str, list]]:
+def rows_reader(
+    key: str, required: tuple[str, ...]
+) -> Callable[[str, str], dict[str, list]]:
     """Return a function (place, file) that reads columns of a CSV file as the rows of one key."""
-    return lambda place, file: {key: np.stack([*columns(place, file, required).values()], -1).tolist()}
+    return lambda place, file: {
+        key: np.stack([*columns(place, file, required).values()], -1).tolist()
+    }

@@ -17,21 +17,36 @@ from rft.refusal import Refusal
 
 LARGEST_FILE = 10_000_000  # bytes
 MOST_ROWS = 100_000
-MOST_COMMENTS, LONGEST_COMMENT = 100, 1000  # lines, and letters of each, that are looked through for sizes
+MOST_COMMENTS, LONGEST_COMMENT = (
+    100,
+    1000,
+)  # lines, and letters of each, that are looked through for sizes
 ANGLE, ALONG, ACROSS, WEIGHT = "psi_deg", "F_parallel_N", "F_perpendicular_N", "weight"
 NEEDED = (ANGLE, ALONG, ACROSS)
-ENDS = "end_parallel_N", "end_perpendicular_N"  # where the others are those on a flank as long as the rod
+ENDS = (
+    "end_parallel_N",
+    "end_perpendicular_N",
+)  # where the others are those on a flank as long as the rod
 SAMPLES = {  # that ship with the package
     "short-rod-drag": "short_rod_drag.csv",
     "flank-drag": "flank_drag.csv",
     "dem-rod-drag": "short_rod_drag.csv",  # its name before
 }
 
-NUMBER, CONNECTIVE = r"((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)", r"\s*(?:of|is|=|:|about)?\s*"
+NUMBER, CONNECTIVE = (
+    r"((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)",
+    r"\s*(?:of|is|=|:|about)?\s*",
+)
 LENGTHS = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "": 1.0}
 DENSITIES = {"kg/m": 1.0, "kg m": 1.0, "g/c": 1000.0, "": 1.0}
-LENGTH, PER_VOLUME = NUMBER + r"\s*(um|mm|cm|m)\b", r"\s*\(?(kg/m|kg m|g/c)\^?[^\s,;:=)]*\)?"
-DENSITY, PACKING = r"(?<!packing )(?<!relative )\bdensity", r"\b(?:packing|volume|solid)(?: (?:fraction|density))?"
+LENGTH, PER_VOLUME = (
+    NUMBER + r"\s*(um|mm|cm|m)\b",
+    r"\s*\(?(kg/m|kg m|g/c)\^?[^\s,;:=)]*\)?",
+)
+DENSITY, PACKING = (
+    r"(?<!packing )(?<!relative )\bdensity",
+    r"\b(?:packing|volume|solid)(?: (?:fraction|density))?",
+)
 SIZES = {  # words of a header line, and the share of the number beside them that is meant
     "radius": (("radius", 1.0), ("diameter", 0.5)),
     "length": (("length", 1.0), ("long", 1.0)),
@@ -42,7 +57,11 @@ OWNERS = {  # what a size belongs to, by the nearest of these words
     "grain": r"\b(?:grain|particle|bead|sphere)s?\b",
     "box": r"\b(?:bed|box|tank|container)s?\b",
 }
-EXCLUDED_OWNERS = {"radius": ("grain", "box"), "length": ("grain", "box"), "depth": ("box",)}
+EXCLUDED_OWNERS = {
+    "radius": ("grain", "box"),
+    "length": ("grain", "box"),
+    "depth": ("box",),
+}
 
 
 class Measured(NamedTuple):
@@ -70,7 +89,11 @@ def read(path: str | Path) -> Measured:
             return _measured(read_rows(file, LARGEST_FILE, ""))
     if Path(path).suffix != ".csv" and not Path(path).exists():
         choose("drag", str(path), [*SAMPLES, "a CSV file"])
-    return _measured(read_rows(path, LARGEST_FILE, f"give a CSV file with columns {','.join(NEEDED)}"))
+    return _measured(
+        read_rows(
+            path, LARGEST_FILE, f"give a CSV file with columns {','.join(NEEDED)}"
+        )
+    )
 
 
 def _measured(source: Rows) -> Measured:
@@ -80,12 +103,20 @@ def _measured(source: Rows) -> Measured:
     if any(name in columns for name in lowered):
         header(source, ENDS)
         ends = source.numbers(columns, lowered).T
-    rows = source.numbers(columns, tuple(x.lower() for x in NEEDED) + (WEIGHT,) * weighed).T
+    rows = source.numbers(
+        columns, tuple(x.lower() for x in NEEDED) + (WEIGHT,) * weighed
+    ).T
     if not 0 < rows.shape[1] <= MOST_ROWS:
-        raise Refusal(f"it must have 1 to {MOST_ROWS} rows of drag, got {rows.shape[1]}", where=source.name)
+        raise Refusal(
+            f"it must have 1 to {MOST_ROWS} rows of drag, got {rows.shape[1]}",
+            where=source.name,
+        )
     if (far := np.flatnonzero(np.abs(rows[0]) > 360)).size:
         line = source.lines[far[0]]
-        raise Refusal(f"{ANGLE} must be from -360 to 360, got {rows[0, far[0]]:g}", where=f"{source.name}, line {line}")
+        raise Refusal(
+            f"{ANGLE} must be from -360 to 360, got {rows[0, far[0]]:g}",
+            where=f"{source.name}, line {line}",
+        )
     rows = rows if weighed else np.vstack([rows, np.ones(rows.shape[1])])
     return Measured(rows, sizes(source), source.name, ends)
 
@@ -97,8 +128,14 @@ def header(source: Rows, needed: tuple[str, ...]) -> tuple[str, ...]:
         if (count := columns.count(name.lower())) != 1:
             # What is found is quoted only if it is near: another file's first line may be nobody's business.
             resembles = any(word.startswith(("psi", "f_")) for word in columns)
-            received = f", got {source.filled[0][1][:60]!r}" if resembles and source.filled else ""
-            problem = f"has no column {name}" if not count else f"has {count} columns {name}"
+            received = (
+                f", got {source.filled[0][1][:60]!r}"
+                if resembles and source.filled
+                else ""
+            )
+            problem = (
+                f"has no column {name}" if not count else f"has {count} columns {name}"
+            )
             raise Refusal(
                 f"the header {problem}",
                 where=f"{source.name}, line {line}",
@@ -112,22 +149,35 @@ def sizes(source: Rows) -> dict[str, float]:
     one."""
     values_by_name: dict[str, set[float]] = {}
     bulk = False
-    for part, before in _parts([line[:LONGEST_COMMENT] for line in source.comments[:MOST_COMMENTS]]):
+    for part, before in _parts(
+        [line[:LONGEST_COMMENT] for line in source.comments[:MOST_COMMENTS]]
+    ):
         for name, value, place in _lengths(part):
             if _owner(part, place, before) not in EXCLUDED_OWNERS[name]:
                 values_by_name.setdefault(name, set()).add(value)
         if "rod density" not in part and "density of the rod" not in part:
             values_by_name.setdefault("density", set()).update(_densities(part))
             bulk |= "density" in part and bool(re.search("bulk|effective", part))
-        for number, percent in re.findall(PACKING + CONNECTIVE + NUMBER + r"\s*(%?)", part):
-            values_by_name.setdefault("packing", set()).add(float(number) / (100 if percent else 1))
+        for number, percent in re.findall(
+            PACKING + CONNECTIVE + NUMBER + r"\s*(%?)", part
+        ):
+            values_by_name.setdefault("packing", set()).add(
+                float(number) / (100 if percent else 1)
+            )
     for name, values in values_by_name.items():
         if len(values) > 1:
             listed = " and ".join(f"{x:g}" for x in sorted(values))
-            raise Refusal(f"the header lines give {name} = {listed}", where=source.name, instead="keep one")
+            raise Refusal(
+                f"the header lines give {name} = {listed}",
+                where=source.name,
+                instead="keep one",
+            )
     out = {name: value for name, values in values_by_name.items() for value in values}
     packing = out.pop("packing", 1.0)
-    return {name: x * packing if name == "density" and not bulk else x for name, x in out.items()}
+    return {
+        name: x * packing if name == "density" and not bulk else x
+        for name, x in out.items()
+    }
 
 
 def _parts(comments: list[str]):
@@ -142,7 +192,11 @@ def _parts(comments: list[str]):
 
 
 def _owner(part: str, place: int, before: str) -> str:
-    candidates = [(abs(m.start() - place), owner) for owner, words in OWNERS.items() for m in re.finditer(words, part)]
+    candidates = [
+        (abs(m.start() - place), owner)
+        for owner, words in OWNERS.items()
+        for m in re.finditer(words, part)
+    ]
     return min(candidates)[1] if candidates else before
 
 
@@ -151,12 +205,21 @@ def _lengths(part: str):
     for name, words in SIZES.items():
         for word, share in words:
             pattern = rf"\b{word}\b"
-            matches = [(*m.groups(), m.start()) for m in re.finditer(LENGTH + r"\s*(?:in\s+)?" + pattern, part)]
-            matches += [(*m.groups(), m.start()) for m in re.finditer(pattern + CONNECTIVE + LENGTH, part)]
+            matches = [
+                (*m.groups(), m.start())
+                for m in re.finditer(LENGTH + r"\s*(?:in\s+)?" + pattern, part)
+            ]
+            matches += [
+                (*m.groups(), m.start())
+                for m in re.finditer(pattern + CONNECTIVE + LENGTH, part)
+            ]
             # radius_mm = 8, radius = 0.008
             in_unit = rf"{pattern}\s*\(?(um|mm|cm|m|)\)?\s*[=:]\s*{NUMBER}\s*(?![\s\d.e]*[cmu]?m)"
             matches += [(m[2], m[1], m.start()) for m in re.finditer(in_unit, part)]
-            yield from ((name, _rounded(float(x) * LENGTHS[str(unit)] * share), place) for x, unit, place in matches)
+            yield from (
+                (name, _rounded(float(x) * LENGTHS[str(unit)] * share), place)
+                for x, unit, place in matches
+            )
     for m in re.finditer(r"(?:diameter|radius)\s*(?:x|by|times)\s*" + LENGTH, part):
         yield "length", _rounded(float(m[1]) * LENGTHS[m[2]]), m.start()
 
@@ -165,8 +228,13 @@ def _densities(part: str) -> set[float]:
     """Return densities, kg/m^3."""
     matches = re.findall(DENSITY + CONNECTIVE + NUMBER + PER_VOLUME, part)
     matches += re.findall(NUMBER + PER_VOLUME + r"\s+density", part)
-    matches += [(x, per) for per, x in re.findall(DENSITY + PER_VOLUME + CONNECTIVE + NUMBER, part)]
-    matches = matches or [(x, "") for x in re.findall(DENSITY + CONNECTIVE + NUMBER, part)]
+    matches += [
+        (x, per)
+        for per, x in re.findall(DENSITY + PER_VOLUME + CONNECTIVE + NUMBER, part)
+    ]
+    matches = matches or [
+        (x, "") for x in re.findall(DENSITY + CONNECTIVE + NUMBER, part)
+    ]
     return {_rounded(float(x) * DENSITIES[per]) for x, per in matches}
 
 

@@ -17,7 +17,9 @@ def framed(system: System, numerics: Numerics) -> System:
     if isinstance(system, Table):
         return system.in_frame(NAME)  # on the grid of its file
     inner = system.inner if isinstance(system, Framed) else system
-    if (count := numerics.grid**inner.joints) > LARGEST_GRID or (inner.joints > 3 and count > FIELD):
+    if (count := numerics.grid**inner.joints) > LARGEST_GRID or (
+        inner.joints > 3 and count > FIELD
+    ):
         raise Refusal(
             f"a frame on a grid of {numerics.grid}^{inner.joints} shapes is too large",
             instead="lower [numerics] grid, or take a body of two shape variables, such as a chain with "

@@ -17,7 +17,10 @@ RULES = (
     (r"[“”„«»‘’]", 'put text in straight "quotes"'),
     (r"=\s*[-+]?\.\d", "a number has a digit before its point"),
     (r"=\s*[-+]?\d+,\d+\s*$", "a number has a point, no comma"),
-    (r"=\s*[-+]?[\d.]+\s*(deg|°)", "a number has no unit: a key that ends in _deg takes degrees"),
+    (
+        r"=\s*[-+]?[\d.]+\s*(deg|°)",
+        "a number has no unit: a key that ends in _deg takes degrees",
+    ),
     (r"=\s*[-+]?[\d.]+\s*[A-Za-z]", "a number has no unit"),
     (r"=\s*[A-Za-z][^\"]*$", 'put text in "quotes"'),
     (r"=\s*$", "give the key a value"),
@@ -43,12 +46,22 @@ def value_hint(message: str, table: Mapping, kind: type) -> str:
     if missing := re.search(r"missing required field `(\w+)`", message):
         unit, _ = meanings(kind).get(missing[1], ("-", ""))
         return f"add {missing[1]} = ..." + f", in {unit}" * (unit not in ("-", ""))
-    if mismatch := re.search(r"Expected `(\w+)(?: \| null)?`.* at `\.(\w+)((?:\[\d+\])*)", message):
+    if mismatch := re.search(
+        r"Expected `(\w+)(?: \| null)?`.* at `\.(\w+)((?:\[\d+\])*)", message
+    ):
         expected, key, places = mismatch.groups()
         value = table.get(key, table.get(f"{key}_deg"))
         for place in re.findall(r"\d+", places):
-            value = value[int(place)] if isinstance(value, list) and int(place) < len(value) else value
+            value = (
+                value[int(place)]
+                if isinstance(value, list) and int(place) < len(value)
+                else value
+            )
         return f"give {EXPECTED.get(expected, expected)} in place of {formatted(value)}"
     key = message.partition(" must ")[0]
     given = is_number(table.get(key)) and abs(table[key]) < float("inf")
-    return f"{key} is in rad, write {key}_deg for degrees" if given and key in angles_of(kind) else ""
+    return (
+        f"{key} is in rad, write {key}_deg for degrees"
+        if given and key in angles_of(kind)
+        else ""
+    )

@@ -14,11 +14,24 @@ from geomech.scenes.sections import Each, FromFile, Keys, OneOf, Within
 from geomech.scenes.stress import StressKeys
 from rft.checks import Number
 from rft.ground import GROUND_EFFECTS, GroundEffect
-from rft.plates import MOTIONS, SHAPES, Loads, Motion, Outline, PlateStress, Shape, loads
+from rft.plates import (
+    MOTIONS,
+    SHAPES,
+    Loads,
+    Motion,
+    Outline,
+    PlateStress,
+    Shape,
+    loads,
+)
 from rft.plates.loads import ORDER
 from rft.refusal import located
 
-POINTS = FromFile(rows_reader("points", ("x", "z")), "CSV with the header x,z (m), in place of points", ("points",))
+POINTS = FromFile(
+    rows_reader("points", ("x", "z")),
+    "CSV with the header x,z (m), in place of points",
+    ("points",),
+)
 COURSE = FromFile(
     columns_reader(("t", "x", "z"), ("angle",)),
     "CSV with the header t,x,z or t,x,z,angle (s, m, rad); velocities are differences of order 2 in the spacing of t",
@@ -62,9 +75,13 @@ class IntruderScene(Intruding):
     intruder: Annotated[Shape, OUTLINES]
     motion: Annotated[Motion, OneOf(MOTIONS, files={"csv": COURSE})]
     elements: Annotated[
-        int, Within("numerics", owner="an intruder scene"), Number(1, 5000, "-", ELEMENTS, whole=True)
+        int,
+        Within("numerics", owner="an intruder scene"),
+        Number(1, 5000, "-", ELEMENTS, whole=True),
     ] = 100
-    effects: Annotated[tuple[GroundEffect, ...], Each(GROUND_EFFECTS, owner="an intruder scene")] = ()
+    effects: Annotated[
+        tuple[GroundEffect, ...], Each(GROUND_EFFECTS, owner="an intruder scene")
+    ] = ()
     name: str = "scene"
     text: str = field(default="", repr=False, compare=False)
     files: tuple[str, ...] = field(default=(), repr=False, compare=False)
@@ -99,7 +116,9 @@ class IntruderScene(Intruding):
 
     @property
     def per_part(self) -> float:
-        return 6e-8 * (2 if self.medium.tension == "cut" and not self.outline.closed else 1)
+        return 6e-8 * (
+            2 if self.medium.tension == "cut" and not self.outline.closed else 1
+        )
 
     @property
     def finer(self) -> tuple[int, ...]:
@@ -116,11 +135,22 @@ class IntruderScene(Intruding):
         outline = self.outline if elements is None else self.intruder.outline(elements)
         t, pose, twist = self.motion.trajectory(outline)
         result: Loads = loads(self.medium, outline, pose, twist, self.effects)
-        return Intrusion(t, pose, twist, self.weighed(result.force), result.moment, result.power(twist))
+        return Intrusion(
+            t,
+            pose,
+            twist,
+            self.weighed(result.force),
+            result.moment,
+            result.power(twist),
+        )
 
     def table(self, result: Intrusion) -> dict[str, np.ndarray]:
         """Return the columns of a result: t, angle (or x and z, if the body does not turn about a hub), force_x,
         force_z, moment."""
-        place = {"angle": result.pose[:, 2]} if self.motion.turns else {"x": result.pose[:, 0], "z": result.pose[:, 1]}
+        place = (
+            {"angle": result.pose[:, 2]}
+            if self.motion.turns
+            else {"x": result.pose[:, 0], "z": result.pose[:, 1]}
+        )
         force = {"force_x": result.force[:, 0], "force_z": result.force[:, 1]}
         return {"t": result.t, **place, **force, "moment": result.moment}

@@ -29,10 +29,17 @@ class Intruding:
 
     def _check(self) -> None:
         """Raise Refusal for fields of wrong types."""
-        for name, (kind, example) in {**self.field_types, "name": (str, "text"), "text": (str, "text")}.items():
+        for name, (kind, example) in {
+            **self.field_types,
+            "name": (str, "text"),
+            "text": (str, "text"),
+        }.items():
             if not isinstance(getattr(self, name), kind):
                 raise Refusal(f"{name} must be {example}", value=getattr(self, name))
-        if not (isinstance(self.files, tuple) and all(isinstance(x, str) for x in self.files)):
+        if not (
+            isinstance(self.files, tuple)
+            and all(isinstance(x, str) for x in self.files)
+        ):
             raise Refusal("files must be a tuple of names", value=self.files)
         check_numbers(self)
         with located("[[effects]]"):

@@ -13,16 +13,40 @@ from geomech.core.errors import choose
 from geomech.scenes.intruder import IntruderScene
 from geomech.scenes.key import Key, first_sentence
 from geomech.scenes.model import SWIMMER, Scene
-from geomech.scenes.sections import Each, Keys, OneOf, Section, Variant, file_sections, keys_in, variants
+from geomech.scenes.sections import (
+    Each,
+    Keys,
+    OneOf,
+    Section,
+    Variant,
+    file_sections,
+    keys_in,
+    variants,
+)
 from geomech.scenes.solid import MeshScene
 from geomech.scenes.swimming import solvers
 from geomech.scenes.walker import WalkerScene
 from geomech.tiers.base import Numerics
 from rft.registry import Registry
 
-SCENES = {"gaits": Scene, "outlines": IntruderScene, "meshes": MeshScene, "walkers": WalkerScene}
-WORDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false"}
-PLURALS = {"number": "numbers", "integer": "whole numbers", "string": "texts", "boolean": "truths"}
+SCENES = {
+    "gaits": Scene,
+    "outlines": IntruderScene,
+    "meshes": MeshScene,
+    "walkers": WalkerScene,
+}
+WORDS = {
+    "number": "number",
+    "integer": "whole number",
+    "string": "text",
+    "boolean": "true or false",
+}
+PLURALS = {
+    "number": "numbers",
+    "integer": "whole numbers",
+    "string": "texts",
+    "boolean": "truths",
+}
 WIDTH = 120
 
 
@@ -47,7 +71,11 @@ def sections() -> dict[str, list[Part]]:
             if isinstance(section, OneOf) and section.meaning:
                 names = {"type": "string", "enum": [*section.kinds]}
                 key = Key(section.key, names, "-", section.meaning, False, None, False)
-                parts.append(Part(f"[{name}] of {section.owner}", "Besides the keys above.", [key]))
+                parts.append(
+                    Part(
+                        f"[{name}] of {section.owner}", "Besides the keys above.", [key]
+                    )
+                )
                 continue
             for variant in all_variants(section):
                 if (name, variant.label, variant.kind) not in listed:
@@ -59,7 +87,11 @@ def sections() -> dict[str, list[Part]]:
 
 def all_variants(section: Section) -> list[Variant]:
     """Return the variants of a section; [numerics] has those of the tiers and of systems' solvers together."""
-    kinds = [Numerics, *solvers()] if isinstance(section, Keys) and section.kind is Numerics else []
+    kinds = (
+        [Numerics, *solvers()]
+        if isinstance(section, Keys) and section.kind is Numerics
+        else []
+    )
     return [Variant({}, kind) for kind in kinds] or [*variants(section)]
 
 
@@ -67,7 +99,10 @@ def _part(name: str, section: Section, variant: Variant) -> Part:
     head = f"[[{name}]]" if isinstance(section, Each) else f"[{name}]"
     about = [first_sentence(variant.kind)]
     if isinstance(section, OneOf) and section.short in variant.named.values():
-        inner = ", ".join(f"[[{x}]]" if isinstance(part, Each) else f"[{x}]" for x, part in variant.inner.items())
+        inner = ", ".join(
+            f"[[{x}]]" if isinstance(part, Each) else f"[{x}]"
+            for x, part in variant.inner.items()
+        )
         about.append(f"Its tables, {inner}, may as well stand by themselves.")
     elif variant.inner:
         inner = " and ".join(f"[{name}.{part}]" for part in variant.inner)
@@ -76,7 +111,11 @@ def _part(name: str, section: Section, variant: Variant) -> Part:
     if variant.implied:
         about.append(f"It need not say its {section.key}.")
     owner = f" of {section.owner}" if section.owner else ""
-    return Part(f"{head} {variant.label}".strip() + owner, "\n".join(about).strip(), keys_in(variant))
+    return Part(
+        f"{head} {variant.label}".strip() + owner,
+        "\n".join(about).strip(),
+        keys_in(variant),
+    )
 
 
 def _package_parts(section: Section, entries: EntryPoints) -> Iterator[Part]:
@@ -84,7 +123,11 @@ def _package_parts(section: Section, entries: EntryPoints) -> Iterator[Part]:
     if (registry := registry_of(section)) is not None:
         new, refused = unloaded(registry, entries)
         for name, package in new.items():
-            yield Part(f'{section.key} = "{name}"', f"Of {package}, which is loaded when a scene asks for it.", [])
+            yield Part(
+                f'{section.key} = "{name}"',
+                f"Of {package}, which is loaded when a scene asks for it.",
+                [],
+            )
         for name, package in refused.items():
             reason = f"Not that of {package}, which is refused: the one that is built in has this name."
             yield Part(f'{section.key} = "{name}"', reason, [])
@@ -92,7 +135,11 @@ def _package_parts(section: Section, entries: EntryPoints) -> Iterator[Part]:
 
 def registry_of(section: Section) -> Registry | None:
     """Return the registry of the names that a section may have, None if these are fixed."""
-    return section.kinds if isinstance(section, OneOf) and isinstance(section.kinds, Registry) else None
+    return (
+        section.kinds
+        if isinstance(section, OneOf) and isinstance(section.kinds, Registry)
+        else None
+    )
 
 
 def names() -> list[str]:
@@ -117,14 +164,21 @@ def _lines(part: Part) -> str:
     for key, row in zip(part.keys, rows):
         start = "  " + "".join(f"{x:{width}}  " for x, width in zip(row, widths))
         meaning = key.meaning + f"; in degrees as {key.name}_deg" * key.degrees
-        lines += textwrap.wrap(meaning, WIDTH, initial_indent=start, subsequent_indent=" " * min(len(start), 60))
+        lines += textwrap.wrap(
+            meaning,
+            WIDTH,
+            initial_indent=start,
+            subsequent_indent=" " * min(len(start), 60),
+        )
     return "\n".join(lines)
 
 
 def worded(schema: dict[str, Any], several: bool = False) -> str:
     """Return the values that a JSON Schema admits, in words."""
     if "anyOf" in schema:
-        return " or ".join(worded(x, several) for x in schema["anyOf"] if x.get("type") != "null")
+        return " or ".join(
+            worded(x, several) for x in schema["anyOf"] if x.get("type") != "null"
+        )
     if schema.get("type") == "array":
         inner = schema.get("items") or schema["prefixItems"][0]
         count = f"{schema['minItems']} " if "minItems" in schema else ""

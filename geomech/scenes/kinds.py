@@ -54,7 +54,11 @@ def register(part: Any = None, /, **members: Any) -> Any:
         return lambda function: register(function, **members)
     for name, value in members.items():
         setattr(part, name, value)
-    registered = class_from_function(part) if isinstance(part, types.FunctionType) and hasattr(part, "joints") else part
+    registered = (
+        class_from_function(part)
+        if isinstance(part, types.FunctionType) and hasattr(part, "joints")
+        else part
+    )
     registry_of(registered).register(registered)
     return part
 
@@ -86,7 +90,9 @@ def load_file(path: str | Path) -> list[str]:
     try:
         text = read_text(path, LARGEST)
     except (OSError, ValueError) as error:
-        raise Refusal(getattr(error, "strerror", None) or "it is not text", where=place) from None
+        raise Refusal(
+            getattr(error, "strerror", None) or "it is not text", where=place
+        ) from None
     return _load(path, str(path.resolve()), text)
 
 
@@ -110,26 +116,42 @@ def _load(path: Path, full_name: str, text: str) -> list[str]:
         before = _named()
         _run(place, path, text, module)
         for part in vars(module).values():
-            if isinstance(part, type) and part.__module__ == name and {"law", "kind"} & {*vars(part)}:
+            if (
+                isinstance(part, type)
+                and part.__module__ == name
+                and {"law", "kind"} & {*vars(part)}
+            ):
                 with located(place):
                     register(part)
         registered_names = [
-            n for (_, n), part in _named().items() if home(part) == name and before.get((_, n)) is not part
+            n
+            for (_, n), part in _named().items()
+            if home(part) == name and before.get((_, n)) is not part
         ]
         if not registered_names:
-            raise Refusal('no class in it has a law = "..." (a force law) or kind = "..." (all else)', where=place)
+            raise Refusal(
+                'no class in it has a law = "..." (a force law) or kind = "..." (all else)',
+                where=place,
+            )
     _texts[name], _files[full_name] = text.encode(), text
     return sorted(registered_names)
 
 
 def _named() -> dict[tuple[str, str], Any]:
-    return {(group, name): part for group, registry in REGISTRIES.items() for name, part in registry.items()}
+    return {
+        (group, name): part
+        for group, registry in REGISTRIES.items()
+        for name, part in registry.items()
+    }
 
 
 @contextlib.contextmanager
 def _all_or_none(name: str, module: types.ModuleType) -> Iterator[None]:
     """Add the module to `sys.modules` while it is used; on failure restore it and all registries."""
-    before, parts = sys.modules.get(name), {group: dict(registry) for group, registry in REGISTRIES.items()}
+    before, parts = (
+        sys.modules.get(name),
+        {group: dict(registry) for group, registry in REGISTRIES.items()},
+    )
     sys.modules[name] = module  # where dataclasses look their types up
     try:
         yield
@@ -144,11 +166,21 @@ def _all_or_none(name: str, module: types.ModuleType) -> Iterator[None]:
 
 def _run(place: str, path: Path, text: str, module: types.ModuleType) -> None:
     try:
-        exec(compile(text, str(path), "exec", dont_inherit=True), module.__dict__)  # leaves no cache beside the file
+        exec(
+            compile(text, str(path), "exec", dont_inherit=True), module.__dict__
+        )  # leaves no cache beside the file
     except (Exception, SystemExit) as error:
         lines = [f.lineno for f in _frames(error) if f.filename == str(path)]
-        line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
-        raise Refusal(type(error).__name__, where=f"{place}, line {line}", because=str(error)) from error
+        line = (
+            error.lineno
+            if isinstance(error, SyntaxError)
+            else lines[-1]
+            if lines
+            else None
+        )
+        raise Refusal(
+            type(error).__name__, where=f"{place}, line {line}", because=str(error)
+        ) from error
 
 
 def _frames(error: BaseException):
@@ -166,12 +198,18 @@ def code() -> dict[str, str]:
 def files() -> tuple[tuple[str, str], ...]:
     """Return (full name, text) of the custom files whose classes scenes may name."""
     modules = {home(part) for part in _custom_parts()}
-    return tuple((full_name, text) for full_name, text in _files.items() if _module(full_name) in modules)
+    return tuple(
+        (full_name, text)
+        for full_name, text in _files.items()
+        if _module(full_name) in modules
+    )
 
 
 def registered() -> tuple[tuple[str, str], ...]:
     """Return (module, name) of the custom parts that come from no such file."""
-    return tuple(place(part) for part in _custom_parts() if not home(part).startswith(PLUGIN))
+    return tuple(
+        place(part) for part in _custom_parts() if not home(part).startswith(PLUGIN)
+    )
 
 
 def _custom_parts() -> list[Any]:

@@ -30,20 +30,36 @@ def read(path: str | Path, scene: Scene, angle: bool = False) -> dict[str, np.nd
     line, words = source.header
     units, found = _units(scene, angle), {}
     for word in words:
-        match = re.fullmatch(r"(amplitude|value|error)(?:[ _]*[\(\[]?([a-z]+)[\)\]]?)?", word)
+        match = re.fullmatch(
+            r"(amplitude|value|error)(?:[ _]*[\(\[]?([a-z]+)[\)\]]?)?", word
+        )
         if match is None or match[1] in found:
-            raise Refusal(f"the header must be {HEADER}", value=word, where=f"{source.name}, line {line}")
+            raise Refusal(
+                f"the header must be {HEADER}",
+                value=word,
+                where=f"{source.name}, line {line}",
+            )
         with located(f"{source.name}, line {line}"):
             found[match[1]] = _scale(match[1], match[2] or "", units[match[1]], scene)
     if not {"amplitude", "value"} <= {*found}:
-        raise Refusal(f"the header must be {HEADER}", value=",".join(words), where=f"{source.name}, line {line}")
+        raise Refusal(
+            f"the header must be {HEADER}",
+            value=",".join(words),
+            where=f"{source.name}, line {line}",
+        )
     table = source.numbers(words)
     if not len(table):
-        raise Refusal("it has no measurement", where=source.name, instead=f"add rows below the header {HEADER}")
+        raise Refusal(
+            "it has no measurement",
+            where=source.name,
+            instead=f"add rows below the header {HEADER}",
+        )
     columns = {name: scale * x for (name, scale), x in zip(found.items(), table.T)}
     if (columns.get("error", np.zeros(1)) < 0).any():
         bad = int(source.lines[int((columns["error"] < 0).argmax())])
-        raise Refusal("an error must not be negative", where=f"{source.name}, line {bad}")
+        raise Refusal(
+            "an error must not be negative", where=f"{source.name}, line {bad}"
+        )
     return columns
 
 
@@ -61,6 +77,18 @@ def _scale(name: str, unit: str, units: dict[str, float], scene: Scene) -> float
     if unit in units:
         return units[unit]
     such = [f"{name}_{'BL' if x == 'bl' else x}" for x in units if x]
-    why = f"lengths of {scene.name} are in body lengths" if unit in METRES and "bl" in units else ""
-    instead = f"give {' or '.join(such)}" if such else f"give {name} alone, it has no unit here"
-    raise Refusal(f"column {name}_{unit} has another unit than the scene's", because=why, instead=instead)
+    why = (
+        f"lengths of {scene.name} are in body lengths"
+        if unit in METRES and "bl" in units
+        else ""
+    )
+    instead = (
+        f"give {' or '.join(such)}"
+        if such
+        else f"give {name} alone, it has no unit here"
+    )
+    raise Refusal(
+        f"column {name}_{unit} has another unit than the scene's",
+        because=why,
+        instead=instead,
+    )

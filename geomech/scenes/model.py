@@ -20,7 +20,14 @@ from geomech.scenes.medium import MEDIUM
 from geomech.scenes.sections import Each, Keys, OneOf
 from geomech.scenes.sizes import Physical
 from geomech.systems import KINDS as SYSTEMS
-from geomech.systems.base import Cycle, System, as_system, kind_of, note_angles, unwrapped
+from geomech.systems.base import (
+    Cycle,
+    System,
+    as_system,
+    kind_of,
+    note_angles,
+    unwrapped,
+)
 from geomech.systems.capabilities import solver_of, with_solver
 from geomech.systems.swimmer import PARTS
 from geomech.tiers.base import Numerics
@@ -36,7 +43,10 @@ SWIMMER = {
     "body": OneOf(PARTS["body"], sized=True),
     "effects": Each(PARTS["effects"], sized=True),
 }
-TABLE = {"body": OneOf({"chain": PARTS["body"]["chain"]}), "medium": MEDIUM}  # of a table whose file does not say them
+TABLE = {
+    "body": OneOf({"chain": PARTS["body"]["chain"]}),
+    "medium": MEDIUM,
+}  # of a table whose file does not say them
 
 
 class Displayed:
@@ -66,20 +76,33 @@ class Scene(Displayed):
     (2, 256)
     """
 
-    system: Annotated[System, OneOf(SYSTEMS, inner={SHORT: SWIMMER, "table": TABLE}, sized=True, short=SHORT)]
+    system: Annotated[
+        System,
+        OneOf(SYSTEMS, inner={SHORT: SWIMMER, "table": TABLE}, sized=True, short=SHORT),
+    ]
     gait: Annotated[Gait, OneOf(GAITS, sized=True)]
     numerics: Annotated[Numerics, Keys(Numerics)] = field(default_factory=Numerics)
     name: str = "scene"
     text: str = field(default="", compare=False)
     files: tuple[str, ...] = field(default=(), compare=False)
     example: ClassVar[str] = "NAME"
-    once: ClassVar = {"physical": Keys(Physical), "frame": text_key("frame", FRAME)._replace(default="mean")}
+    once: ClassVar = {
+        "physical": Keys(Physical),
+        "frame": text_key("frame", FRAME)._replace(default="mean"),
+    }
 
     def __post_init__(self):
         with located(self.name):
-            for name, kind in (("name", str), ("text", str), ("files", tuple), ("numerics", Numerics)):
+            for name, kind in (
+                ("name", str),
+                ("text", str),
+                ("files", tuple),
+                ("numerics", Numerics),
+            ):
                 if not isinstance(getattr(self, name), kind):
-                    raise Refusal(f"{name} must be {kind.__name__}", value=getattr(self, name))
+                    raise Refusal(
+                        f"{name} must be {kind.__name__}", value=getattr(self, name)
+                    )
             gait = checked_gait(self.gait)
             object.__setattr__(self, "system", as_system(self.system, gait.joints))
             _check_joints(self.system, gait)
@@ -92,28 +115,56 @@ class Scene(Displayed):
         if hasattr(gait, "largest"):
             note_angles(self.system, gait.largest(amplitudes))
 
-    frame = property(lambda self: self.system.traits.frame, doc="The body frame of all velocities and displacements.")
-    frequency = property(lambda self: frequency_of(self.system, self.gait), doc="Hz; None where nothing says one.")
+    frame = property(
+        lambda self: self.system.traits.frame,
+        doc="The body frame of all velocities and displacements.",
+    )
+    frequency = property(
+        lambda self: frequency_of(self.system, self.gait),
+        doc="Hz; None where nothing says one.",
+    )
 
     def with_numerics(self, **changes: Any) -> Scene:
         """Return the scene with some of its [numerics], or of its system's, changed; None leaves an entry."""
         own_keys = {f.name for f in _fields(solver_of(self.system))}
         changes = {k: v for k, v in changes.items() if v is not None}
         with located(self.name):
-            system = with_solver(self.system, {k: v for k, v in changes.items() if k in own_keys})
+            system = with_solver(
+                self.system, {k: v for k, v in changes.items() if k in own_keys}
+            )
             tier_changes = {k: v for k, v in changes.items() if k not in own_keys}
             for name in tier_changes:
-                choose("numerics", name, [*own_keys, *self.numerics.__dataclass_fields__])
-            return dataclasses.replace(self, system=system, numerics=dataclasses.replace(self.numerics, **tier_changes))
+                choose(
+                    "numerics", name, [*own_keys, *self.numerics.__dataclass_fields__]
+                )
+            return dataclasses.replace(
+                self,
+                system=system,
+                numerics=dataclasses.replace(self.numerics, **tier_changes),
+            )
 
     def changed(self, **changes: Any) -> Scene:
         """Return the scene with some of its parts, or of its system's, changed."""
-        parts = {k: v for k, v in changes.items() if k in ("system", "gait", "numerics", "name", "text", "files")}
+        parts = {
+            k: v
+            for k, v in changes.items()
+            if k in ("system", "gait", "numerics", "name", "text", "files")
+        }
         with located(self.name):
             system_changes = {k: v for k, v in changes.items() if k not in parts}
             system = unwrapped(parts.get("system", self.system))
             for name in system_changes:
-                choose("part", name, ["system", "gait", "numerics", "name", *(f.name for f in _fields(system))])
+                choose(
+                    "part",
+                    name,
+                    [
+                        "system",
+                        "gait",
+                        "numerics",
+                        "name",
+                        *(f.name for f in _fields(system)),
+                    ],
+                )
             if system_changes:
                 parts["system"] = dataclasses.replace(system, **system_changes)
             return dataclasses.replace(self, **parts)
@@ -123,7 +174,9 @@ class Scene(Displayed):
     ) -> Cycle:  # fmt: skip
         """Run a gait, or the scene's own, for amplitudes (...,), all at once."""
         gait = checked_gait(self.gait if gait is None else gait)
-        return self.system.run(*gait.cycle(phases or self.numerics.phases, amplitudes), work)
+        return self.system.run(
+            *gait.cycle(phases or self.numerics.phases, amplitudes), work
+        )
 
 
 def _fields(thing) -> tuple:
@@ -145,14 +198,19 @@ def _check_joints(system: System, gait: Gait) -> None:
 def checked_scene(scene) -> Scene:
     """Return the scene; Refusal if it is none."""
     if not isinstance(scene, Scene):
-        raise Refusal("scene must be a Scene, such as geomech.scenes.load gives", value=scene)
+        raise Refusal(
+            "scene must be a Scene, such as geomech.scenes.load gives", value=scene
+        )
     return scene
 
 
 def frequency_of(system: System, gait: Gait) -> float | None:
     """Return the cycles per second of a system that runs a gait: the gait's, or that of effects which have one; None
     without either. Refusal if the two contradict each other."""
-    gait_frequency, effect_frequency = getattr(gait, "frequency", None), system.traits.frequency
+    gait_frequency, effect_frequency = (
+        getattr(gait, "frequency", None),
+        system.traits.frequency,
+    )
     if gait_frequency is None or effect_frequency is None:
         return effect_frequency if gait_frequency is None else gait_frequency
     if np.any(np.asarray(effect_frequency) != gait_frequency):

@@ -34,7 +34,10 @@ def as_scene(*parts: Any, effects: Sequence = (), **numerics: Any) -> Any:
     if scene is None:
         scene = _assembled(parts, tuple(effects))
     elif effects:
-        raise Refusal("effects are those of a medium and a body", instead="add [[effects]] to the scene")
+        raise Refusal(
+            "effects are those of a medium and a body",
+            instead="add [[effects]] to the scene",
+        )
     return scene.with_numerics(**numerics) if numerics else scene
 
 
@@ -43,18 +46,29 @@ def _whole(part: Any) -> Any:
     if isinstance(part, (str, Path)):
         return load(part)
     part = getattr(part, "scene", part)
-    return part if hasattr(type(part), "example") else None  # of any kind, with a gait or without
+    return (
+        part if hasattr(type(part), "example") else None
+    )  # of any kind, with a gait or without
 
 
 def _assembled(parts: Sequence, effects: tuple) -> Scene:
     """Return the scene of a medium and a body, a system or a velocity, and a gait where there is one."""
     gaits = [p for p in parts if _is_gait(p)]
-    media = [medium_of(p) if isinstance(p, (str, Path)) else p for p in parts if _is_medium(p)]
+    media = [
+        medium_of(p) if isinstance(p, (str, Path)) else p
+        for p in parts
+        if _is_medium(p)
+    ]
     bodies = [p for p in parts if _is_body(p)]
     others = [p for p in parts if not (_is_gait(p) or _is_medium(p) or _is_body(p))]
     if (len(media), len(bodies), len(others)) == (1, 1, 0) and len(gaits) <= 1:
         system: System = Swimmer(media[0], bodies[0], effects)
-    elif (media, bodies, effects) == ([], [], ()) and len(others) == 1 and len(gaits) <= 1 and _moves(others[0]):
+    elif (
+        (media, bodies, effects) == ([], [], ())
+        and len(others) == 1
+        and len(gaits) <= 1
+        and _moves(others[0])
+    ):
         system = as_system(others[0], gaits[0].joints if gaits else 2)
     else:
         given = ", ".join(formatted(p, LONG) for p in parts) or "nothing"
@@ -63,7 +77,9 @@ def _assembled(parts: Sequence, effects: tuple) -> Scene:
 
 
 def _is_gait(part: Any) -> bool:
-    return isinstance(part, Gait) or (hasattr(part, "joints") and hasattr(part, "cycle"))
+    return isinstance(part, Gait) or (
+        hasattr(part, "joints") and hasattr(part, "cycle")
+    )
 
 
 def _is_medium(part: Any) -> bool:
@@ -81,5 +97,8 @@ def _moves(part: Any) -> bool:
 def _usual_gait(joints: int) -> Gait:
     """Return the gait of a system that comes without one."""
     if joints > JOINTS:
-        raise Refusal(f"a body of {joints} joints has no usual gait", instead="give one, such as Wave or Sine")
+        raise Refusal(
+            f"a body of {joints} joints has no usual gait",
+            instead="give one, such as Wave or Sine",
+        )
     return Circle() if joints == 2 else Wave(joints=joints)

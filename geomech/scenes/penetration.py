@@ -8,7 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from geomech.io.rows import Rows
-from geomech.scenes.drag import CONNECTIVE, LENGTHS, LONGEST_COMMENT, MOST_COMMENTS, NUMBER
+from geomech.scenes.drag import (
+    CONNECTIVE,
+    LENGTHS,
+    LONGEST_COMMENT,
+    MOST_COMMENTS,
+    NUMBER,
+)
 from rft.refusal import Refusal
 
 UNITS = {  # in small letters; without one it is the SI unit
@@ -48,19 +54,33 @@ def read(source: Rows) -> Penetration:
         named = quantity(word)
         if named and named[0] in columns:
             raise Refusal(
-                f"the header has two columns of {named[0]}", where=f"{source.name}, line {line}", instead="keep one"
+                f"the header has two columns of {named[0]}",
+                where=f"{source.name}, line {line}",
+                instead="keep one",
             )
         if named:
             columns[named[0]] = (word, named[1])
     for name in ("depth", "force"):
         if name not in columns:
-            instead = "it must have depth_m,force_N (or depth_mm, depth_cm; z_m, force_z)"
-            raise Refusal(f"the header has no column {name}", where=f"{source.name}, line {line}", instead=instead)
+            instead = (
+                "it must have depth_m,force_N (or depth_mm, depth_cm; z_m, force_z)"
+            )
+            raise Refusal(
+                f"the header has no column {name}",
+                where=f"{source.name}, line {line}",
+                instead=instead,
+            )
     rows = source.numbers(words, tuple(word for word, _ in columns.values())).T
-    values = {name: scale * row for (name, (_, scale)), row in zip(columns.items(), rows)}
+    values = {
+        name: scale * row for (name, (_, scale)), row in zip(columns.items(), rows)
+    }
     written = _area(source)
     if written is not None and "area" in values:
-        raise Refusal("the area is given in a column and in a header line", where=source.name, instead="keep one")
+        raise Refusal(
+            "the area is given in a column and in a header line",
+            where=source.name,
+            instead="keep one",
+        )
     area = values.get("area", None if written is None else np.array([written]))
     return Penetration(values["depth"], values["force"], area, source.name)
 
@@ -69,7 +89,9 @@ def quantity(word: str) -> tuple[str, float] | None:
     """Return (depth, force or area; its unit in SI) of a column, None if it is none of them."""
     for name, words in WORDS.items():
         match = re.fullmatch(words + r"[ _]*[\(\[]?([a-z]*)\s*\^?([2²]?)[\)\]]?", word)
-        scale = UNITS[name].get(match[1] + match[2].replace("²", "2")) if match else None
+        scale = (
+            UNITS[name].get(match[1] + match[2].replace("²", "2")) if match else None
+        )
         if scale is not None:
             return ("depth" if name == "z" else name), scale
     return None
@@ -82,17 +104,32 @@ def _area(source: Rows) -> float | None:
         text = line[:LONGEST_COMMENT].lower()
         after = re.findall(r"\barea" + CONNECTIVE + NUMBER + r"\s*" + SQUARE, text)
         before = [
-            (x, unit) for unit, x in re.findall(r"\barea[ _]*[\(\[]?" + SQUARE + r"[\)\]]?\s*[=:]?\s*" + NUMBER, text)
+            (x, unit)
+            for unit, x in re.findall(
+                r"\barea[ _]*[\(\[]?" + SQUARE + r"[\)\]]?\s*[=:]?\s*" + NUMBER, text
+            )
         ]
         areas |= {_rounded(float(x) * LENGTHS[unit] ** 2) for x, unit in after + before}
         if not after and not before:
-            areas |= {float(x) for x in re.findall(r"\barea\s*[=:]\s*" + NUMBER + r"\s*$", text)}
+            areas |= {
+                float(x)
+                for x in re.findall(r"\barea\s*[=:]\s*" + NUMBER + r"\s*$", text)
+            }
         side = NUMBER + r"\s*(mm|cm|m)"
-        sides = re.findall(r"\bplate\b[^\d]*" + side + r"?\s*(?:x|by|times)\s*" + side + r"\b", text)
-        areas |= {_rounded(float(a) * LENGTHS[ua or ub] * float(b) * LENGTHS[ub]) for a, ua, b, ub in sides}
+        sides = re.findall(
+            r"\bplate\b[^\d]*" + side + r"?\s*(?:x|by|times)\s*" + side + r"\b", text
+        )
+        areas |= {
+            _rounded(float(a) * LENGTHS[ua or ub] * float(b) * LENGTHS[ub])
+            for a, ua, b, ub in sides
+        }
     if len(areas) > 1:
         listed = " and ".join(f"{x:g}" for x in sorted(areas))
-        raise Refusal(f"the header lines give areas {listed} m^2", where=source.name, instead="keep one")
+        raise Refusal(
+            f"the header lines give areas {listed} m^2",
+            where=source.name,
+            instead="keep one",
+        )
     return areas.pop() if areas else None
 
 

@@ -67,7 +67,11 @@ def _folder(name: str) -> Traversable:
 
 
 def _names(folder: str) -> list[str]:
-    return sorted(p.name.removesuffix(".toml") for p in _folder(folder).iterdir() if p.name.endswith(".toml"))
+    return sorted(
+        p.name.removesuffix(".toml")
+        for p in _folder(folder).iterdir()
+        if p.name.endswith(".toml")
+    )
 
 
 def builtin_text(name: str) -> str | None:
@@ -98,7 +102,9 @@ def load(scene: str | Path) -> Scene | Any:
         if path.suffix != ".toml" and not path.exists():
             choose("scene", str(scene), names + intruder_names() + walker_names())
         text = read_text(path, LARGEST, pipes=True)
-        scene = PIPE if path.is_fifo() else scene  # files that it names are looked for from here
+        scene = (
+            PIPE if path.is_fifo() else scene
+        )  # files that it names are looked for from here
     except Refusal:
         raise
     except (OSError, ValueError) as error:
@@ -164,8 +170,20 @@ def inputs(scene: Scene | Intruding | WalkerScene) -> list[Path]:
     """
     alone = hasattr(scene, "intruder") or hasattr(scene, "robot")
     parts: tuple = () if alone else ((whole := checked_scene(scene)).gait, whole.system)
-    own_file = [] if scene.name in [PIPE, *builtin_names(), *intruder_names(), *walker_names()] else [scene.name]
-    return [Path(x) for x in (*own_file, *scene.files, *(getattr(part, "file", None) for part in parts)) if x]
+    own_file = (
+        []
+        if scene.name in [PIPE, *builtin_names(), *intruder_names(), *walker_names()]
+        else [scene.name]
+    )
+    return [
+        Path(x)
+        for x in (
+            *own_file,
+            *scene.files,
+            *(getattr(part, "file", None) for part in parts),
+        )
+        if x
+    ]
 
 
 def parse(text: str, name: str = "scene") -> Scene | Any:
@@ -190,8 +208,13 @@ def parse(text: str, name: str = "scene") -> Scene | Any:
         raise Refusal("a scene is a TOML text", value=text, where=formatted(name))
     try:
         tables = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # a ValueError may be an integer of too many digits
-        raise Refusal(f"{name} is not TOML", because=f"{error}{hints.line_hint(text, error)}") from None
+    except (
+        ValueError,
+        RecursionError,
+    ) as error:  # a ValueError may be an integer of too many digits
+        raise Refusal(
+            f"{name} is not TOML", because=f"{error}{hints.line_hint(text, error)}"
+        ) from None
     return from_tables(tables, name, text)
 
 
@@ -218,7 +241,9 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | An
     2.0
     """
     if not isinstance(tables, Mapping):
-        raise Refusal("a scene is a dict of tables", value=tables, where=formatted(name))
+        raise Refusal(
+            "a scene is a dict of tables", value=tables, where=formatted(name)
+        )
     if "robot" in tables:
         from geomech.scenes.walker import WalkerScene, spelled_out
 

@@ -16,12 +16,24 @@ from geomech.core.entry_points import choose_part
 from geomech.core.errors import UnitWarning, choose
 from geomech.scenes import hints
 from geomech.scenes.key import Key, spellings, words_of
-from geomech.scenes.sections import Each, Keys, OneOf, Section, Variant, file_sections, sections_of, variant_of
+from geomech.scenes.sections import (
+    Each,
+    Keys,
+    OneOf,
+    Section,
+    Variant,
+    file_sections,
+    sections_of,
+    variant_of,
+)
 from geomech.scenes.sizes import Sizes
 from rft.refusal import Refusal, located
 from rft.registry import Registry
 
-FILES = ("file", "mjcf")  # keys that name a file, looked for from the folder of the scene's
+FILES = (
+    "file",
+    "mjcf",
+)  # keys that name a file, looked for from the folder of the scene's
 Built = TypeVar("Built")
 
 
@@ -46,7 +58,9 @@ class Source:
         table = dict(table)
         for key in FILES:
             if isinstance(table.get(key), str):
-                table[key] = str((self.folder or Path(self.name).absolute().parent) / table[key])
+                table[key] = str(
+                    (self.folder or Path(self.name).absolute().parent) / table[key]
+                )
                 self.files.append(table[key])
         return table
 
@@ -56,7 +70,12 @@ def read(scene: type[Built], tables: Mapping, name: str, text: str) -> Built:
     source = Source(name, scene.example)
     check(scene, tables, source)
     with located(name):
-        return scene(**read_sections(scene, tables, source), name=name, text=text, files=tuple(source.files))
+        return scene(
+            **read_sections(scene, tables, source),
+            name=name,
+            text=text,
+            files=tuple(source.files),
+        )
 
 
 def check(scene: type, tables: Mapping, source: Source) -> None:
@@ -68,17 +87,27 @@ def check(scene: type, tables: Mapping, source: Source) -> None:
         if name in tables:
             _check_form(source, name, tables[name], section)
         elif required and instead not in tables:
-            raise Refusal(f"the table [{name}] is missing", where=source.name, instead=f"add it, {source.cure}")
+            raise Refusal(
+                f"the table [{name}] is missing",
+                where=source.name,
+                instead=f"add it, {source.cure}",
+            )
 
 
 def _check_form(source: Source, path: str, table: Any, section: Section | Key) -> None:
     """Raise Refusal unless a table is one, or a list of tables where a section is one for each part."""
     if isinstance(section, Each):
-        if not (isinstance(table, list) and all(isinstance(each, Mapping) for each in table)):
-            raise Refusal(f"{path} must be tables [[{path}]], one for each", where=source.name)
+        if not (
+            isinstance(table, list) and all(isinstance(each, Mapping) for each in table)
+        ):
+            raise Refusal(
+                f"{path} must be tables [[{path}]], one for each", where=source.name
+            )
     elif not isinstance(section, Key) and not isinstance(table, Mapping):
         raise Refusal(
-            f"{path} must be a table [{path}], got {type(table).__name__}", where=source.name, instead=source.cure
+            f"{path} must be a table [{path}], got {type(table).__name__}",
+            where=source.name,
+            instead=source.cure,
         )
 
 
@@ -104,23 +133,36 @@ def _read_one(source: Source, path: str, table: Mapping, section: Section) -> An
     variant, table = _chosen(place, source.located(table), section)
     if isinstance(section, OneOf) and section.sized and source.sizes:
         table = source.sizes.fill(place, table, variant.kind)
-    label, inner = variant.label or (f"no {section.key!r}" if isinstance(section, OneOf) else ""), {}
+    label, inner = (
+        variant.label or (f"no {section.key!r}" if isinstance(section, OneOf) else ""),
+        {},
+    )
     if variant.inner:
         _check_keys(place, table, variant.kind, label)
     for field, part in variant.inner.items():
-        within = field if variant.named.get("kind") == section.short else f"{path}.{field}"
+        within = (
+            field if variant.named.get("kind") == section.short else f"{path}.{field}"
+        )
         if field in table:
             _check_form(source, within, table[field], part)
             inner[field] = read_section(source, within, table.pop(field), part)
         elif field in variant.needed:
-            raise Refusal(f"the table [{within}] is missing", where=place, instead=f"add it, {source.cure}")
+            raise Refusal(
+                f"the table [{within}] is missing",
+                where=place,
+                instead=f"add it, {source.cure}",
+            )
     if variant.file:
         table = _from_file(place, table, variant)
     return build(source, place, table, variant.kind, inner, label)
 
 
 def _choose(place: str, word: object, kinds: Mapping[str, Any]) -> str:
-    return choose_part(kinds, place, word) if isinstance(kinds, Registry) else choose(place, word, kinds)
+    return (
+        choose_part(kinds, place, word)
+        if isinstance(kinds, Registry)
+        else choose(place, word, kinds)
+    )
 
 
 def _chosen(place: str, table: dict, section: Keys | OneOf) -> tuple[Variant, dict]:
@@ -134,7 +176,9 @@ def _chosen(place: str, table: dict, section: Keys | OneOf) -> tuple[Variant, di
             return variant_of(section, name), table
         variant, table = _chosen(place, table, section.kinds[name])
         return variant._replace(named={section.key: name} | dict(variant.named)), table
-    alternatives = {dataclasses.fields(kind)[0].name: kind for kind in section.otherwise}
+    alternatives = {
+        dataclasses.fields(kind)[0].name: kind for kind in section.otherwise
+    }
     for key, kind in alternatives.items():
         if key in table:
             return Variant({}, kind), table
@@ -150,12 +194,16 @@ def _from_file(place: str, table: dict, variant: Variant) -> dict:
     """Return the keys of a section with those of its file in place of the file."""
     if not variant.file.keys and {*table} != {"file"}:
         raise Refusal(
-            f"{variant.label} takes 'file' and nothing else", where=place, because=f"a {variant.file.meaning}"
+            f"{variant.label} takes 'file' and nothing else",
+            where=place,
+            because=f"a {variant.file.meaning}",
         )
     if "file" not in table:
         return table
     if variant.file.keys:
-        variant.alternatives.check(place, [spellings(variant.kind).get(key, (key,))[0] for key in table])
+        variant.alternatives.check(
+            place, [spellings(variant.kind).get(key, (key,))[0] for key in table]
+        )
     file = table.pop("file")
     if not isinstance(file, str):
         raise Refusal("file must be the name of a file", value=file, where=place)
@@ -179,7 +227,11 @@ def build(
         field, in_degrees = spellings(kind)[key]
         if field in values:
             both = [other for other in table if spellings(kind)[other][0] == field]
-            raise Refusal(f"{field} is given twice", where=place, instead=f"keep one of {' and '.join(both)}")
+            raise Refusal(
+                f"{field} is given twice",
+                where=place,
+                instead=f"keep one of {' and '.join(both)}",
+            )
         values[field] = _radians(value) if in_degrees else value
         if key == "gamma0_deg":
             _check_degrees(f"{place} {key}", value)
@@ -188,20 +240,32 @@ def build(
     for field, word in words_of(kind).items():
         if field in values:
             choose(f"{place} {field}", values[field], word.choices)
-    if inner and {f.name for f in dataclasses.fields(kind) if f.default is f.default_factory} <= {*inner}:
+    if inner and {
+        f.name for f in dataclasses.fields(kind) if f.default is f.default_factory
+    } <= {*inner}:
         return kind(**inner | values)  # a swimmer, of types that msgspec does not know
     try:
         part = msgspec.convert({**values, **(inner or {})}, kind)
-        return part.to_part(source, place, {*values}) if hasattr(kind, "to_part") else part
+        return (
+            part.to_part(source, place, {*values}) if hasattr(kind, "to_part") else part
+        )
     except Refusal as refusal:
         raise refusal.within(place) from None
     except (ValueError, OverflowError) as error:
-        if isinstance(refusal := error.__cause__, Refusal):  # of a class that checks its own values
-            refusal.instead = refusal.instead or hints.value_hint(refusal.what, table, kind)
+        if isinstance(
+            refusal := error.__cause__, Refusal
+        ):  # of a class that checks its own values
+            refusal.instead = refusal.instead or hints.value_hint(
+                refusal.what, table, kind
+            )
             raise refusal.within(place) from None
         reason = str(error).replace(" - at `$", " - at `").replace(" - at ``", "")
-        message = reason.replace("Object missing required field", "has no")  # msgspec's words
-        raise Refusal(message, where=place, instead=hints.value_hint(reason, table, kind)) from None
+        message = reason.replace(
+            "Object missing required field", "has no"
+        )  # msgspec's words
+        raise Refusal(
+            message, where=place, instead=hints.value_hint(reason, table, kind)
+        ) from None
 
 
 def _check_keys(place: str, table: Mapping, kind: type, label: str) -> None:
@@ -225,6 +289,10 @@ def _radians(degrees):
     """Return numbers, and numbers in lists, converted from degrees; other values unchanged, to be refused later."""
     if isinstance(degrees, list):
         return [_radians(x) for x in degrees]
-    if isinstance(degrees, (int, float)) and not isinstance(degrees, bool) and abs(degrees) < 1e300:
+    if (
+        isinstance(degrees, (int, float))
+        and not isinstance(degrees, bool)
+        and abs(degrees) < 1e300
+    ):
         return math.radians(degrees)
     return degrees

@@ -11,7 +11,16 @@ from typing import Any
 from geomech.core.entry_points import unloaded
 from geomech.scenes.key import Key, first_sentence, keys_of
 from geomech.scenes.keys import SCENES, all_variants, registry_of
-from geomech.scenes.sections import Alternatives, Declared, Each, OneOf, Section, Variant, file_sections, keys_in
+from geomech.scenes.sections import (
+    Alternatives,
+    Declared,
+    Each,
+    OneOf,
+    Section,
+    Variant,
+    file_sections,
+    keys_in,
+)
 from geomech.scenes.sizes import NOT_OF_THE_BODY, Physical
 from geomech.scenes.solid import KINDS as SOLIDS
 
@@ -25,7 +34,8 @@ def schema() -> dict[str, Any]:
         for group, sections in declared.items()
     }
     named = {
-        group: {name: {"$ref": f"#/$defs/{group}/{name}"} for name in sections} for group, sections in groups.items()
+        group: {name: {"$ref": f"#/$defs/{group}/{name}"} for name in sections}
+        for group, sections in groups.items()
     }
     schemas = {group: _scene_schema(named[group], declared[group]) for group in groups}
     solid = {"required": ["kind"], "properties": {"kind": {"enum": [*SOLIDS]}}}
@@ -35,7 +45,12 @@ def schema() -> dict[str, Any]:
         "title": "geomech scene",
         "type": "object",
         "properties": {
-            name: {"anyOf": [sections[name] for sections in named.values() if name in sections]} for name in all_names
+            name: {
+                "anyOf": [
+                    sections[name] for sections in named.values() if name in sections
+                ]
+            }
+            for name in all_names
         },
         "additionalProperties": False,
         "if": {"required": ["robot"]},
@@ -53,13 +68,31 @@ def schema() -> dict[str, Any]:
     }
 
 
-def _scene_schema(named: dict[str, Any], declared: dict[str, Declared]) -> dict[str, Any]:
+def _scene_schema(
+    named: dict[str, Any], declared: dict[str, Declared]
+) -> dict[str, Any]:
     """Return the schema of a scene of sections, by their names in ``named``."""
-    scene = _table("", named, [name for name, (_, required, instead) in declared.items() if required and not instead])
+    scene = _table(
+        "",
+        named,
+        [
+            name
+            for name, (_, required, instead) in declared.items()
+            if required and not instead
+        ],
+    )
     for name in {each.instead for each in declared.values() if each.instead}:
-        parts = [part for part, (_, required, instead) in declared.items() if required and instead == name]
+        parts = [
+            part
+            for part, (_, required, instead) in declared.items()
+            if required and instead == name
+        ]
         scene |= {"if": {"required": [name]}, "else": {"required": parts}}
-    sizes = [rule for name, (section, *_) in declared.items() for rule in _sizes_needed(name, section)]
+    sizes = [
+        rule
+        for name, (section, *_) in declared.items()
+        for rule in _sizes_needed(name, section)
+    ]
     return scene | ({"allOf": sizes} if sizes else {})
 
 
@@ -71,30 +104,54 @@ def _section(section: Section | Key) -> dict[str, Any]:
         for other in others:
             one["properties"] |= other["properties"]
         return one
-    kinds = [_variant(each, _shared(each) if section.sized else (), section.short) for each in all_variants(section)]
-    if (registry := registry_of(section)) is not None:  # the keys of what packages offer are known when it is loaded
+    kinds = [
+        _variant(each, _shared(each) if section.sized else (), section.short)
+        for each in all_variants(section)
+    ]
+    if (
+        registry := registry_of(section)
+    ) is not None:  # the keys of what packages offer are known when it is loaded
         for other in unloaded(registry)[0]:
-            kinds.append({"type": "object", "properties": {section.key: {"const": other}}, "required": [section.key]})
+            kinds.append(
+                {
+                    "type": "object",
+                    "properties": {section.key: {"const": other}},
+                    "required": [section.key],
+                }
+            )
     one = {"anyOf" if len(section.implied) > 1 else "oneOf": kinds}
     return {"type": "array", "items": one} if isinstance(section, Each) else one
 
 
-def _variant(variant: Variant, elsewhere: Collection[str] = (), short: str = "") -> dict[str, Any]:
+def _variant(
+    variant: Variant, elsewhere: Collection[str] = (), short: str = ""
+) -> dict[str, Any]:
     """Return the schema of a section of one class. elsewhere: keys that may be given in another section. short: the kind
     whose inner sections may be, too."""
     alternatives = variant.alternatives
     either = alternatives.keys if alternatives else ()
-    keys = [key._replace(required=key.required and key.name not in either) for key in keys_in(variant)]
+    keys = [
+        key._replace(required=key.required and key.name not in either)
+        for key in keys_in(variant)
+    ]
     named = {key: {"const": name} for key, name in variant.named.items()}
     inner = {field: _section(section) for field, section in variant.inner.items()}
     needed = [*(named if not variant.implied else ())]
-    needed += [key.name for key in keys if key.required and not key.degrees and key.name not in elsewhere]
+    needed += [
+        key.name
+        for key in keys
+        if key.required and not key.degrees and key.name not in elsewhere
+    ]
     if short not in variant.named.values():
         needed += variant.needed
     rules = [_spelled(key) for key in keys if len(key.spellings) > 1]
     if alternatives:
-        rules.append(_alternatives(alternatives, {key.alias or key.name: key for key in keys}))
-    table = _table(first_sentence(variant.kind), {**named, **_properties(keys), **inner}, needed)
+        rules.append(
+            _alternatives(alternatives, {key.alias or key.name: key for key in keys})
+        )
+    table = _table(
+        first_sentence(variant.kind), {**named, **_properties(keys), **inner}, needed
+    )
     return table | ({"allOf": rules} if rules else {})
 
 
@@ -103,12 +160,28 @@ def _properties(keys: list[Key]) -> dict[str, Any]:
     schemas = {}
     for key in keys:
         unit = f" ({key.unit})" if key.unit not in ("", "-") else ""
-        more = {} if key.required or key.default is None else {"default": json.loads(key.value)}
+        more = (
+            {}
+            if key.required or key.default is None
+            else {"default": json.loads(key.value)}
+        )
         for name in (key.name, *[key.alias] * bool(key.alias)):
-            schemas[name] = {**key.schema, "description": f"{key.meaning}{unit}", **more}
+            schemas[name] = {
+                **key.schema,
+                "description": f"{key.meaning}{unit}",
+                **more,
+            }
         if key.degrees:
-            bounds = {x: math.degrees(key.schema[x]) for x in ("minimum", "maximum") if x in key.schema}
-            schemas[f"{key.name}_deg"] = {**key.schema, **bounds, "description": f"{key.meaning} (degrees)"}
+            bounds = {
+                x: math.degrees(key.schema[x])
+                for x in ("minimum", "maximum")
+                if x in key.schema
+            }
+            schemas[f"{key.name}_deg"] = {
+                **key.schema,
+                **bounds,
+                "description": f"{key.meaning} (degrees)",
+            }
     return schemas
 
 
@@ -121,13 +194,26 @@ def _spelled(key: Key) -> dict[str, Any]:
 def _alternatives(alternatives: Alternatives, keys: dict[str, Key]) -> dict[str, Any]:
     """Return the rule that one group of keys is given, and none of the others."""
     given = {
-        name: [{"required": [spelling]} for spelling in keys[name].spellings] for name in sorted(alternatives.keys)
+        name: [{"required": [spelling]} for spelling in keys[name].spellings]
+        for name in sorted(alternatives.keys)
     }
     groups = []
     for needed, allowed in alternatives.groups:
-        several = [{"anyOf": given[name]} for name in sorted(needed) if len(given[name]) > 1]
-        others = [rule for name in given if name not in needed | allowed for rule in given[name]]
-        groups.append({"required": sorted(name for name in needed if len(given[name]) == 1), "not": {"anyOf": others}})
+        several = [
+            {"anyOf": given[name]} for name in sorted(needed) if len(given[name]) > 1
+        ]
+        others = [
+            rule
+            for name in given
+            if name not in needed | allowed
+            for rule in given[name]
+        ]
+        groups.append(
+            {
+                "required": sorted(name for name in needed if len(given[name]) == 1),
+                "not": {"anyOf": others},
+            }
+        )
         groups[-1] |= {"allOf": several} if several else {}
     return {"oneOf": groups}
 
@@ -135,21 +221,38 @@ def _alternatives(alternatives: Alternatives, keys: dict[str, Key]) -> dict[str,
 def _shared(variant: Variant) -> set[str]:
     """Return the keys of a kind that [physical] may give; `_sizes_needed` asks for them there."""
     names = {*variant.named.values()}
-    return {f.name for f in dataclasses.fields(Physical) if not names & {*NOT_OF_THE_BODY.get(f.name, ())}}
+    return {
+        f.name
+        for f in dataclasses.fields(Physical)
+        if not names & {*NOT_OF_THE_BODY.get(f.name, ())}
+    }
 
 
 def _sizes_needed(name: str, section: Section | Key) -> Iterator[dict[str, Any]]:
     """Yield the rules that a size which a kind must have is given there or in [physical]."""
-    for variant in all_variants(section) if isinstance(section, OneOf) and section.sized else ():
+    for variant in (
+        all_variants(section) if isinstance(section, OneOf) and section.sized else ()
+    ):
         for size in keys_of(variant.kind):
             if size.required and size.name in _shared(variant):
-                given = {"required": ["physical"], "properties": {"physical": {"required": [size.name]}}}
+                given = {
+                    "required": ["physical"],
+                    "properties": {"physical": {"required": [size.name]}},
+                }
                 named = {key: {"const": kind} for key, kind in variant.named.items()}
-                rule = {"if": {"required": [*named], "properties": named}, "then": {"required": [size.name]}}
+                rule = {
+                    "if": {"required": [*named], "properties": named},
+                    "then": {"required": [size.name]},
+                }
                 within = {"items": rule} if isinstance(section, Each) else rule
                 yield {"if": {"not": given}, "then": {"properties": {name: within}}}
 
 
 def _table(about: str, values: dict[str, Any], required: list[str]) -> dict[str, Any]:
-    schema = {"type": "object", "properties": values, "required": required, "additionalProperties": False}
+    schema = {
+        "type": "object",
+        "properties": values,
+        "required": required,
+        "additionalProperties": False,
+    }
     return {"description": about, **schema} if about else schema

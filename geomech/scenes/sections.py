@@ -95,9 +95,15 @@ class Alternatives:
     def check(self, place: str, given: Collection[str]) -> None:
         """Raise Refusal unless the keys given make one of the groups."""
         present = self.keys & {*given}
-        if any(needed <= present <= needed | allowed for needed, allowed in self.groups):
+        if any(
+            needed <= present <= needed | allowed for needed, allowed in self.groups
+        ):
             return
-        lacking = [sorted(needed - present) for needed, allowed in self.groups if present <= needed | allowed]
+        lacking = [
+            sorted(needed - present)
+            for needed, allowed in self.groups
+            if present <= needed | allowed
+        ]
         reason = f" has no {', '.join(lacking[0])}" if len(lacking) == 1 else ""
         raise Refusal(f"{place}{reason}", instead=self.cure)
 
@@ -129,7 +135,11 @@ class Variant(NamedTuple):
     @property
     def needed(self) -> list[str]:
         """Names of the sections within it that a file must have."""
-        optional = {f.name for f in dataclasses.fields(self.kind) if f.default is not f.default_factory}
+        optional = {
+            f.name
+            for f in dataclasses.fields(self.kind)
+            if f.default is not f.default_factory
+        }
         return [name for name in self.inner if name not in optional]
 
     @property
@@ -189,9 +199,14 @@ def sections_of(scene: type) -> dict[str, Declared]:
                 required = part.default is part.default_factory is dataclasses.MISSING
                 declared[part.name] = Declared(mark, required)
             elif isinstance(mark, Within):
-                within.setdefault(mark, []).append((part.name, hints[part.name], part.default))
+                within.setdefault(mark, []).append(
+                    (part.name, hints[part.name], part.default)
+                )
     for (name, owner), keys in within.items():
-        form = {"makes": scene, "to_part": lambda self, source, place, given: vars(self)}
+        form = {
+            "makes": scene,
+            "to_part": lambda self, source, place, given: vars(self),
+        }
         kind = dataclasses.make_dataclass(name.title(), keys, namespace=form)
         kind.__doc__ = ""  # in place of a signature
         declared[name] = Declared(Keys(kind, owner))
@@ -203,7 +218,16 @@ def file_sections(scene: type) -> dict[str, Declared]:
     that apply to the whole scene (``once``)."""
     declared: dict[str, Declared] = {}
     for name, (section, required, _) in sections_of(scene).items():
-        parts = section.inner[section.short] if isinstance(section, OneOf) and section.short else {}
-        declared |= {part: Declared(inner, not isinstance(inner, Each), name) for part, inner in parts.items()}
+        parts = (
+            section.inner[section.short]
+            if isinstance(section, OneOf) and section.short
+            else {}
+        )
+        declared |= {
+            part: Declared(inner, not isinstance(inner, Each), name)
+            for part, inner in parts.items()
+        }
         declared[name] = Declared(section, required and not parts)
-    return declared | {name: Declared(section) for name, section in getattr(scene, "once", {}).items()}
+    return declared | {
+        name: Declared(section) for name, section in getattr(scene, "once", {}).items()
+    }

@@ -8,7 +8,9 @@ from collections.abc import Mapping
 from geomech.core.errors import choose
 from rft.refusal import Refusal
 
-NOT_OF_THE_BODY = {"radius": ("disturbed-ground",)}  # that one is of the track it leaves
+NOT_OF_THE_BODY = {
+    "radius": ("disturbed-ground",)
+}  # that one is of the track it leaves
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,30 +31,45 @@ class Sizes:
     well."""
 
     def __init__(self, name: str, tables: Mapping):
-        physical, frame, frequency = tables.get("physical", {}), tables.get("frame"), tables["gait"].get("frequency")
+        physical, frame, frequency = (
+            tables.get("physical", {}),
+            tables.get("frame"),
+            tables["gait"].get("frequency"),
+        )
         for key in physical:
             choose(f"{name}: [physical] key", key, Physical.__dataclass_fields__)
         self.name, self.given, self.unused = name, dict(physical), {*physical}
-        self.places = {key: f"[physical] {key}" for key in physical} | {"frame": "the scene's frame"}
+        self.places = {key: f"[physical] {key}" for key in physical} | {
+            "frame": "the scene's frame"
+        }
         if frame is not None:
             self.given["frame"] = frame
             self.unused.add("frame")
         if frequency is not None:
             self._check(f"{name}: [gait]", "frequency", frequency)
-            self.given["frequency"], self.places["frequency"] = frequency, "[gait] frequency"
+            self.given["frequency"], self.places["frequency"] = (
+                frequency,
+                "[gait] frequency",
+            )
 
     def _check(self, place: str, key: str, value) -> None:
         given = self.given.get(key, value)
-        if given is not value and given != value:  # a nan is left to the bounds of its own section
+        if (
+            given is not value and given != value
+        ):  # a nan is left to the bounds of its own section
             raise Refusal(
-                f"{key} = {value!r}, but {self.places[key]} = {self.given[key]!r}", where=place, instead="keep one"
+                f"{key} = {value!r}, but {self.places[key]} = {self.given[key]!r}",
+                where=place,
+                instead="keep one",
             )
 
     def fill(self, place: str, table: dict, kind: type) -> dict:
         """Return the table with the sizes that its class has; Refusal if the table contradicts them."""
         names = [f.name for f in dataclasses.fields(kind)]
         for key, value in self.given.items():
-            if key not in names or getattr(kind, "kind", "") in NOT_OF_THE_BODY.get(key, ()):
+            if key not in names or getattr(kind, "kind", "") in NOT_OF_THE_BODY.get(
+                key, ()
+            ):
                 continue
             self.unused.discard(key)
             self._check(place, key, table.get(key, value))

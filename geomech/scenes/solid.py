@@ -41,7 +41,9 @@ COURSE = FromFile(
     "CSV with the header t,x,y,z or t,x,y,z,rx,ry,rz (rotation vector) (s, m, rad); velocities are differences of order 2 in "
     "the spacing of t",
 )
-TRIANGLES = "of the mesh, about, 1 to 2,000,000; a mesh from a file has at least its own"
+TRIANGLES = (
+    "of the mesh, about, 1 to 2,000,000; a mesh from a file has at least its own"
+)
 
 
 class Passed(NamedTuple):
@@ -59,7 +61,10 @@ class Passed(NamedTuple):
 
     def __repr__(self) -> str:
         span = summary.span
-        force, moment = (", ".join(f"{a} {span(f)}" for a, f in zip("xyz", x.T)) for x in (self.force, self.moment))
+        force, moment = (
+            ", ".join(f"{a} {span(f)}" for a, f in zip("xyz", x.T))
+            for x in (self.force, self.moment)
+        )
         described = f"force {force} N; moment {moment} N m; power {span(self.power)} W"
         return f"Passed({len(self.t)} poses, t {span(self.t)} s; {described})"
 
@@ -84,7 +89,9 @@ class MeshScene(Intruding):
         Within("numerics", owner="an intruder scene of a mesh"),
         Number(1, 2_000_000, "-", TRIANGLES, whole=True),
     ] = 5000
-    effects: Annotated[tuple[GroundEffect, ...], Each(GROUND_EFFECTS, owner="an intruder scene")] = ()
+    effects: Annotated[
+        tuple[GroundEffect, ...], Each(GROUND_EFFECTS, owner="an intruder scene")
+    ] = ()
     name: str = "scene"
     text: str = field(default="", repr=False, compare=False)
     files: tuple[str, ...] = field(default=(), repr=False, compare=False)
@@ -96,7 +103,10 @@ class MeshScene(Intruding):
     field_types = {
         "medium": (Spatial, "a medium such as Spatial(xi_n=3e5)"),
         "intruder": (Solid, "a solid such as Sphere(radius=0.02)"),
-        "motion": (tuple(MOTIONS.values()), "a motion of rft.meshes such as Drag(depth=0.05)"),
+        "motion": (
+            tuple(MOTIONS.values()),
+            "a motion of rft.meshes such as Drag(depth=0.05)",
+        ),
         "matched": (str, "text"),
     }
 
@@ -128,21 +138,37 @@ class MeshScene(Intruding):
         """Return forces along the motion, with the scene's number of triangles or another."""
         mesh = self.mesh if triangles is None else self.intruder.mesh(triangles)
         trajectory = self.motion.trajectory(mesh)
-        result = wrench(self.medium, mesh, *trajectory[2:0:-1], *trajectory[3:5], self.effects)
-        return Passed(trajectory, self.weighed(result.force), result.moment, result.power)
+        result = wrench(
+            self.medium, mesh, *trajectory[2:0:-1], *trajectory[3:5], self.effects
+        )
+        return Passed(
+            trajectory, self.weighed(result.force), result.moment, result.power
+        )
 
     def faces(self, result: Passed, k: int) -> tuple[Faces, np.ndarray]:
         """Return the loads on each face below the surface at step k, and the triangles (Q, 3, 3) above it."""
         _, place, rotation, velocity, spin, _ = (x[k] for x in result.trajectory)
         world = (self.mesh.vertices @ rotation.T + place)[self.mesh.faces]
         above = below(world, -world[..., 2])[0]
-        return bearing(self.medium, self.mesh, rotation, place, velocity, spin, self.effects), above
+        return bearing(
+            self.medium, self.mesh, rotation, place, velocity, spin, self.effects
+        ), above
 
     def table(self, result: Passed) -> dict[str, np.ndarray]:
         """Return the columns of a result: t, angle (or x, y, z, if the body does not turn about a hub), force_x,
         force_y, force_z, moment_x, moment_y, moment_z, and once more the one about y as moment."""
         trajectory = result.trajectory
-        place = {"angle": trajectory.angle} if self.motion.turns else dict(zip("xyz", trajectory.place.T))
+        place = (
+            {"angle": trajectory.angle}
+            if self.motion.turns
+            else dict(zip("xyz", trajectory.place.T))
+        )
         force = {f"force_{a}": f for a, f in zip("xyz", result.force.T)}
         moment = {f"moment_{a}": m for a, m in zip("xyz", result.moment.T)}
-        return {"t": trajectory.t, **place, **force, **moment, "moment": result.moment[:, 1]}
+        return {
+            "t": trajectory.t,
+            **place,
+            **force,
+            **moment,
+            "moment": result.moment[:, 1],
+        }

@@ -12,8 +12,15 @@ from collections.abc import Iterable, Iterator
 from importlib.machinery import PathFinder
 from pathlib import Path
 
-INSTALLED = tuple({sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")})
-UNKNOWN = secrets.token_hex()  # of a module without a file, as of a notebook: no other process has it
+INSTALLED = tuple(
+    {
+        sysconfig.get_path(name)
+        for name in ("stdlib", "platstdlib", "purelib", "platlib")
+    }
+)
+UNKNOWN = (
+    secrets.token_hex()
+)  # of a module without a file, as of a notebook: no other process has it
 
 
 def digests(modules: Iterable[str], texts: dict[str, bytes]) -> dict[str, str]:
@@ -28,8 +35,12 @@ def digests(modules: Iterable[str], texts: dict[str, bytes]) -> dict[str, str]:
         for name in remaining:
             text = texts.get(name) or texts.setdefault(name, _text(name))
             result[name] = hashlib.sha256(text).hexdigest() if text else UNKNOWN
-        imported = {other for name in remaining for other in _imported(name, texts[name])}
-        remaining = sorted(name for name in imported - {*result} if _is_own(name, packages))
+        imported = {
+            other for name in remaining for other in _imported(name, texts[name])
+        }
+        remaining = sorted(
+            name for name in imported - {*result} if _is_own(name, packages)
+        )
     return result
 
 
@@ -44,7 +55,9 @@ def _imported(module: str, text: bytes) -> Iterator[str]:
     for node in nodes:
         base: list[str] = []
         if isinstance(node, ast.ImportFrom):
-            base = package[: len(package) + 1 - node.level] * bool(node.level) + [node.module or ""] * bool(node.module)
+            base = package[: len(package) + 1 - node.level] * bool(node.level) + [
+                node.module or ""
+            ] * bool(node.module)
         if isinstance(node, ast.Import | ast.ImportFrom):
             for alias in node.names:
                 yield from _with_packages(".".join([*base, alias.name]))
@@ -61,7 +74,9 @@ def _file(module: str) -> str | None:
         return getattr(sys.modules[module], "__file__", None)
     path = spec = None
     for name in _with_packages(module):
-        if (spec := PathFinder.find_spec(name, path)) is None or (path := spec.submodule_search_locations) is None:
+        if (spec := PathFinder.find_spec(name, path)) is None or (
+            path := spec.submodule_search_locations
+        ) is None:
             break
     return spec.origin if spec and spec.name == module else None
 
@@ -78,4 +93,6 @@ def _is_own(module: str, packages: set[str]) -> bool:
     package = module.partition(".")[0]
     if package in ("rft", "geomech") or not (file := _file(module)):
         return False
-    return package in packages or not any(Path(file).is_relative_to(folder) for folder in INSTALLED)
+    return package in packages or not any(
+        Path(file).is_relative_to(folder) for folder in INSTALLED
+    )

@@ -26,7 +26,10 @@ from rft.refusal import Refusal, located
 
 LARGEST = 10_000_000  # bytes of a TOML file
 RADIANS = 3.2  # a table of angles within this is likely not in degrees
-Named = Annotated[str | None, Word(VERTICAL, f"{', '.join(VERTICAL)}; 'geomech scenes --show NAME' prints one")]
+Named = Annotated[
+    str | None,
+    Word(VERTICAL, f"{', '.join(VERTICAL)}; 'geomech scenes --show NAME' prints one"),
+]
 
 
 def _optional_field(kind: type, name: str):
@@ -35,7 +38,9 @@ def _optional_field(kind: type, name: str):
     return Annotated[(get_args(hint)[0] | None, *hint.__metadata__)]
 
 
-def _strengths(*groups: Collection[str], more: Collection[str] = (), cure: str) -> Alternatives:
+def _strengths(
+    *groups: Collection[str], more: Collection[str] = (), cure: str
+) -> Alternatives:
     """Return the keys that a strength is given by: a name or a file, either with ``more``, or one of the groups."""
     by_name = [({key}, {*more}) for key in ("name", "file")]
     return Alternatives((*by_name, *(({*group}, set()) for group in groups)), cure)
@@ -57,23 +62,41 @@ class StressKeys(_Coefficients):
     tension (-): "keep", or "cut" for no stress on faces that the map pulls on.
     """
 
-    zeta: Annotated[float, Number(0, 1e6, "-", "strength of the medium, which multiplies what its other keys say")] = (
-        1.0
-    )
+    zeta: Annotated[
+        float,
+        Number(
+            0,
+            1e6,
+            "-",
+            "strength of the medium, which multiplies what its other keys say",
+        ),
+    ] = 1.0
     name: Named = None
     file: str | None = None
     aliases = {key: key.replace("m", "-") for key in COEFFICIENTS if "m" in key}
     makes = StressMap
     alternatives = _strengths(
-        COEFFICIENTS, (), cure="keep one of 'name', 'file' and the nine coefficients, in N/cm^3; or give zeta alone"
+        COEFFICIENTS,
+        (),
+        cure="keep one of 'name', 'file' and the nine coefficients, in N/cm^3; or give zeta alone",
     )
 
-    def to_part(self, source: Source, place: str, given: Collection[str]) -> PlateStress:
+    def to_part(
+        self, source: Source, place: str, given: Collection[str]
+    ) -> PlateStress:
         """Return the stress map. What is given beside its name, file or coefficients takes the place of its own."""
-        base = StressMap(**{key: getattr(self, key) for key in COEFFICIENTS if key in given})
+        base = StressMap(
+            **{key: getattr(self, key) for key in COEFFICIENTS if key in given}
+        )
         if {"name", "file"} & {*given}:
-            base = VERTICAL[self.name].stress if self.name else _read_stress(source, place, self.file)
-        changed = {key: getattr(self, key) for key in ("grazing", "tension") if key in given}
+            base = (
+                VERTICAL[self.name].stress
+                if self.name
+                else _read_stress(source, place, self.file)
+            )
+        changed = {
+            key: getattr(self, key) for key in ("grazing", "tension") if key in given
+        }
         return dataclasses.replace(base, zeta=base.zeta * self.zeta, **changed)
 
 
@@ -88,10 +111,17 @@ class SpatialKeys(Spatial):
     xi_n: _optional_field(Spatial, "xi_n") = None  # type: ignore[valid-type]
     name: Named = None
     file: str | None = None
-    zeta: Annotated[float, Number(0, 1e6, "-", "times the strength of the name or file")] = 1.0
+    zeta: Annotated[
+        float, Number(0, 1e6, "-", "times the strength of the name or file")
+    ] = 1.0
     density: Annotated[
         float | None,
-        Number(1, 1e5, "kg/m^3", "critical density of the grains, 1 to 1e5; with internal_friction, in place of xi_n"),
+        Number(
+            1,
+            1e5,
+            "kg/m^3",
+            "critical density of the grains, 1 to 1e5; with internal_friction, in place of xi_n",
+        ),
     ] = None
     internal_friction: Annotated[
         float | None,
@@ -110,11 +140,16 @@ class SpatialKeys(Spatial):
 
     def to_part(self, source: Source, place: str, given: Collection[str]) -> Spatial:
         """Return the medium, as strong as the grains, or as a map of the vertical plane on a plate pushed down."""
-        more = {key: getattr(self, key) for key in ("surface_friction", "tension", "grazing")}
+        more = {
+            key: getattr(self, key)
+            for key in ("surface_friction", "tension", "grazing")
+        }
         if self.density is not None:
             return Spatial.from_grains(self.density, self.internal_friction, **more)
         if strength := {*given} & {"name", "file", "zeta"}:
-            vertical = build(source, place, {key: getattr(self, key) for key in strength}, StressKeys)
+            vertical = build(
+                source, place, {key: getattr(self, key) for key in strength}, StressKeys
+            )
             return Spatial(matched_strength(vertical), **more)
         return Spatial(self.xi_n, **more)
 
@@ -127,7 +162,9 @@ class MatchedKeys(SpatialKeys):
         medium = super().to_part(source, place, given)
         source_name = self.name or Path(self.file or "").name
         times = f"{self.zeta:g} times " if self.zeta != 1.0 else ""
-        vertical = f"{times}alpha_z(0, 90 degrees) of {source_name} in the vertical plane"
+        vertical = (
+            f"{times}alpha_z(0, 90 degrees) of {source_name} in the vertical plane"
+        )
         match = f"xi_n = {medium.xi_n:.4g} N/m^3, matched to {vertical}"
         return {"medium": medium, "matched": match if source_name else ""}
 
@@ -141,13 +178,22 @@ def matched_strength(stress: PlateStress) -> float:
 
 def plate_rows(place: str, file) -> np.ndarray:
     """Return plate drags of a CSV file, (4, N): beta, gamma in degrees, alpha_x, alpha_z in N/cm^3."""
-    drags = columns(place, file, (("beta", "beta_deg"), ("gamma", "gamma_deg"), "alpha_x", "alpha_z"))
+    drags = columns(
+        place,
+        file,
+        (("beta", "beta_deg"), ("gamma", "gamma_deg"), "alpha_x", "alpha_z"),
+    )
     rows = np.stack(list(drags.values()))
     if rows.size and np.abs(rows[:2]).max() < RADIANS:
-        raise Refusal("beta and gamma look like radians", where=(place, Path(file).name), instead="give degrees")
+        raise Refusal(
+            "beta and gamma look like radians",
+            where=(place, Path(file).name),
+            instead="give degrees",
+        )
     if rows.size and (largest := np.abs(rows[:2]).max()) > 360:
         raise Refusal(
-            f"beta and gamma must be from -360 to 360 degrees, got {largest:g}", where=(place, Path(file).name)
+            f"beta and gamma must be from -360 to 360 degrees, got {largest:g}",
+            where=(place, Path(file).name),
         )
     return rows
 
@@ -187,10 +233,15 @@ def _read_stress(source: Source, place: str, file: str) -> PlateStress:
     except (OSError, ValueError, RecursionError) as error:
         reason = getattr(error, "strerror", None) or "it is not TOML"
         cure = f"give a TOML or CSV file or one of {', '.join(VERTICAL)}"
-        raise Refusal(f"cannot read {file!r}", where=place, because=reason, instead=cure) from None
+        raise Refusal(
+            f"cannot read {file!r}", where=place, because=reason, instead=cure
+        ) from None
     table = tables.get("medium", tables)
     if not isinstance(table, Mapping):
-        raise Refusal(f"medium must be a table [medium], got {type(table).__name__}", where=(place, path.name))
+        raise Refusal(
+            f"medium must be a table [medium], got {type(table).__name__}",
+            where=(place, path.name),
+        )
     if isinstance(table.get("file"), str):
         table = {**table, "file": str(path.absolute().parent / table["file"])}
         if not table["file"].endswith(".csv"):

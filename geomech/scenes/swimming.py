@@ -33,42 +33,76 @@ def from_tables(tables: Mapping, name: str, text: str) -> Scene:
     source.sizes = Sizes(name, tables)
     with located(name):
         section = sections_of(Scene)["gait"].section
-        gait = reader.read_section(dataclasses.replace(source, files=[]), "gait", tables["gait"], section)
-        system = reader.read_sections(Scene, {"system": _system(tables, name)}, source)["system"]
+        gait = reader.read_section(
+            dataclasses.replace(source, files=[]), "gait", tables["gait"], section
+        )
+        system = reader.read_sections(Scene, {"system": _system(tables, name)}, source)[
+            "system"
+        ]
         source.sizes.all_used()
         system, numerics = _with_numerics(system, tables.get("numerics", {}), source)
-        files = tuple(file for file in source.files if file != getattr(system, "file", None))  # which it knows itself
-        return Scene(framed(system, numerics) if fitted else system, gait, numerics, name, text, files)
+        files = tuple(
+            file for file in source.files if file != getattr(system, "file", None)
+        )  # which it knows itself
+        return Scene(
+            framed(system, numerics) if fitted else system,
+            gait,
+            numerics,
+            name,
+            text,
+            files,
+        )
 
 
 def _system(tables: Mapping, name: str) -> dict:
     """Return the table of the system. [medium], [body] and [[effects]] are short for a swimmer, in whose own table they
     may also stand."""
     table = tables.get("system", {"kind": SHORT})
-    short, kind = {part: tables[part] for part in SWIMMER if part in tables}, table.get("kind")
+    short, kind = (
+        {part: tables[part] for part in SWIMMER if part in tables},
+        table.get("kind"),
+    )
     if short and isinstance(kind, str) and kind in {*SYSTEMS} - {SHORT}:
-        raise Refusal(f"a {kind} takes no {sorted(short)[0]!r}", where=name, instead="drop it, or the table [system]")
+        raise Refusal(
+            f"a {kind} takes no {sorted(short)[0]!r}",
+            where=name,
+            instead="drop it, or the table [system]",
+        )
     return short | dict(table)
 
 
-def _with_numerics(system: System, given: Mapping, source: reader.Source) -> tuple[System, Numerics]:
+def _with_numerics(
+    system: System, given: Mapping, source: reader.Source
+) -> tuple[System, Numerics]:
     """Return a system with its part of [numerics], and the rest, for the tiers."""
     place = f"{source.name}: [numerics]"
     solver_class = NoSolver if (solver := solver_of(system)) is None else type(solver)
-    names = [field.name for kind in (Numerics, solver_class) for field in dataclasses.fields(kind)]
+    names = [
+        field.name
+        for kind in (Numerics, solver_class)
+        for field in dataclasses.fields(kind)
+    ]
     by_solver = {True: {}, False: {}}
     for key, value in given.items():
         if key not in spellings(Numerics) and key not in spellings(solver_class):
             choose(f"{place} key", key, names)
         by_solver[key in spellings(solver_class)][key] = value
     if by_solver[True]:
-        system = system.with_solver(reader.build(source, place, by_solver[True], solver_class))
+        system = system.with_solver(
+            reader.build(source, place, by_solver[True], solver_class)
+        )
     return system, reader.build(source, place, by_solver[False], Numerics)
 
 
 def solvers() -> list[type]:
     """Return the classes of keys in [numerics] that systems have beside those of the tiers."""
-    return [*dict.fromkeys(type(kind.solver) for kind in SYSTEMS.values() if getattr(kind, "solver", None))]
+    return [
+        *dict.fromkeys(
+            type(kind.solver)
+            for kind in SYSTEMS.values()
+            if getattr(kind, "solver", None)
+        )
+    ]
 
 
 def _without_fitted(tables: Mapping, name: str) -> tuple[dict, bool]:
@@ -82,11 +116,19 @@ def _without_fitted(tables: Mapping, name: str) -> tuple[dict, bool]:
         places.append(place)
         return {k: v for k, v in table.items() if k != "frame"}
 
-    tables = {k: plain(k, v) if k in ("body", "system") else v for k, v in plain("", tables).items()}
+    tables = {
+        k: plain(k, v) if k in ("body", "system") else v
+        for k, v in plain("", tables).items()
+    }
     if "body" in tables.get("system", {}):
-        tables["system"] = {**tables["system"], "body": plain("system.body", tables["system"]["body"])}
+        tables["system"] = {
+            **tables["system"],
+            "body": plain("system.body", tables["system"]["body"]),
+        }
     if places and scene_frame not in (None, FITTED):
         raise Refusal(
-            f"[{places[0]}] frame = {FITTED!r}, but the scene's frame = {scene_frame!r}", where=name, instead="keep one"
+            f"[{places[0]}] frame = {FITTED!r}, but the scene's frame = {scene_frame!r}",
+            where=name,
+            instead="keep one",
         )
     return tables, bool(places)

@@ -17,7 +17,12 @@ from rft.walking import ROBOTS, Fineness, Mjcf, Robot, Screws, Tripod, Walker
 
 KINDS = {kind: effect for kind, effect in GROUND_EFFECTS.items() if effect.walks}
 LAWS = {"planar": StressKeys, "3d": SpatialKeys}
-OF_THREE = {"xi_n", "density", "internal_friction", "surface_friction"}  # keys of a [medium] of three dimensions alone
+OF_THREE = {
+    "xi_n",
+    "density",
+    "internal_friction",
+    "surface_friction",
+}  # keys of a [medium] of three dimensions alone
 LEGS = {"legs": OUTLINES}
 SCREW = {"screw": OneOf({"screw": Screw}, implied=("screw",))}
 LAW = "stress maps of the vertical plane, or the law of three dimensions, for the engine mujoco; if left out what the keys tell"
@@ -37,14 +42,23 @@ class WalkerScene:
     (0.15, 2.0)
     """
 
-    medium: Annotated[PlateStress | Spatial, OneOf(LAWS, "law", implied=tuple(LAWS), owner=OWNER, meaning=LAW)]
+    medium: Annotated[
+        PlateStress | Spatial,
+        OneOf(LAWS, "law", implied=tuple(LAWS), owner=OWNER, meaning=LAW),
+    ]
     robot: Annotated[
         Robot,
-        OneOf(ROBOTS | {"mjcf": Mjcf}, inner={"rhex": LEGS, "wheel": LEGS, "screws": SCREW}, implied=("mjcf",)),
+        OneOf(
+            ROBOTS | {"mjcf": Mjcf},
+            inner={"rhex": LEGS, "wheel": LEGS, "screws": SCREW},
+            implied=("mjcf",),
+        ),
     ]
     gait: Annotated[Tripod, Keys(Tripod, owner=OWNER)]
     effects: Annotated[tuple[GroundEffect, ...], Each(KINDS)] = ()
-    numerics: Annotated[Fineness, Keys(Fineness, owner=OWNER)] = field(default_factory=Fineness)
+    numerics: Annotated[Fineness, Keys(Fineness, owner=OWNER)] = field(
+        default_factory=Fineness
+    )
     name: str = "scene"
     text: str = field(default="", repr=False, compare=False)
     files: tuple[str, ...] = field(default=(), repr=False, compare=False)
@@ -55,8 +69,13 @@ class WalkerScene:
         with located(self.name):
             for name, kind in (("numerics", Fineness), ("name", str), ("text", str)):
                 if not isinstance(getattr(self, name), kind):
-                    raise Refusal(f"{name} must be {kind.__name__}", value=getattr(self, name))
-            if not (isinstance(self.files, tuple) and all(isinstance(x, str) for x in self.files)):
+                    raise Refusal(
+                        f"{name} must be {kind.__name__}", value=getattr(self, name)
+                    )
+            if not (
+                isinstance(self.files, tuple)
+                and all(isinstance(x, str) for x in self.files)
+            ):
                 raise Refusal("files must be a tuple of names", value=self.files)
             object.__setattr__(self, "effects", self.walker.effects)
             self.robot.check(self.numerics.elements)
@@ -64,7 +83,9 @@ class WalkerScene:
     @property
     def engine(self) -> str:
         """The engine that computes it by default."""
-        spatial = isinstance(self.robot, Mjcf | Screws) or isinstance(self.medium, Spatial)
+        spatial = isinstance(self.robot, Mjcf | Screws) or isinstance(
+            self.medium, Spatial
+        )
         return self.numerics.engine or ("mujoco" if spatial else "planar")
 
     @property
@@ -74,8 +95,14 @@ class WalkerScene:
 
 def spelled_out(tables: Mapping, name: str) -> dict:
     """Return the tables of a scene with the names that they omit: those of the robot's kind, its screw, and the law."""
-    tables = {key: dict(table) if isinstance(table, Mapping) else table for key, table in tables.items()}
-    medium, robot = (tables.get(key) if isinstance(tables.get(key), dict) else {} for key in ("medium", "robot"))
+    tables = {
+        key: dict(table) if isinstance(table, Mapping) else table
+        for key, table in tables.items()
+    }
+    medium, robot = (
+        tables.get(key) if isinstance(tables.get(key), dict) else {}
+        for key in ("medium", "robot")
+    )
     if "mjcf" in robot and robot.setdefault("kind", "mjcf") != "mjcf":
         raise Refusal(
             "[robot]",

@@ -42,8 +42,14 @@ def toml(scene: Scene | Intruding | WalkerScene) -> str:
     law = "viscous"
     ratio = 3.0
     """
-    self_contained = not isinstance(_checked(scene), Scene) or not (scene.files or _names_relative_file(scene.text))
-    if scene.text and self_contained and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene:
+    self_contained = not isinstance(_checked(scene), Scene) or not (
+        scene.files or _names_relative_file(scene.text)
+    )
+    if (
+        scene.text
+        and self_contained
+        and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene
+    ):
         return scene.text
     return _text(_written_tables(scene))
 
@@ -74,9 +80,12 @@ def medium_toml(name: str, entry) -> str:
     """Return the table of a medium of the catalogue (`rft.laws.catalogue.Entry`), with its source above."""
     lines = textwrap.wrap(f"{name}: {entry.source}", 110)
     if entry.axial_stress is not None:
-        lines.append(f"axial drag over projected area at 7.62 cm depth: {entry.axial_stress:g} Pa")
+        lines.append(
+            f"axial drag over projected area at 7.62 cm depth: {entry.axial_stress:g} Pa"
+        )
     angles = [
-        f"{x} = {math.degrees(getattr(entry.medium, x)):.6g} degrees" for x in sorted(angles_of(type(entry.medium)))
+        f"{x} = {math.degrees(getattr(entry.medium, x)):.6g} degrees"
+        for x in sorted(angles_of(type(entry.medium)))
     ]
     head = "".join(f"# {line}\n" for line in [*lines, *angles])
     return head + table("medium", _section(entry.medium, MEDIUM))
@@ -84,11 +93,16 @@ def medium_toml(name: str, entry) -> str:
 
 def vertical_toml(name: str, entry) -> str:
     """Return the table of a medium of intruder scenes (`rft.plates.VerticalEntry`), with its source above."""
-    head = "".join(f"# {line}\n" for line in textwrap.wrap(f"{name}: {entry.source}", 110))
+    head = "".join(
+        f"# {line}\n" for line in textwrap.wrap(f"{name}: {entry.source}", 110)
+    )
     from rft.plates.stress import COEFFICIENTS
 
     stress = dataclasses.asdict(entry.stress)
-    values = {**{key.replace("m", "-"): stress[key] for key in COEFFICIENTS}, "zeta": stress["zeta"]}
+    values = {
+        **{key.replace("m", "-"): stress[key] for key in COEFFICIENTS},
+        "zeta": stress["zeta"],
+    }
     return f"{head}# coefficients in N/cm^3, times zeta\n{table('medium', values)}"
 
 
@@ -105,10 +119,14 @@ def tables(scene: Scene | Intruding | WalkerScene) -> dict:
     read = tomllib.loads(_checked(scene).text)
     if isinstance(scene, Scene):
         read["numerics"] = _numerics(scene)
-    self_contained = not (isinstance(scene, Scene) and scene.files)  # whose medium can be swept only where it stands
+    self_contained = not (
+        isinstance(scene, Scene) and scene.files
+    )  # whose medium can be swept only where it stands
     return (
         read
-        if scene.text and self_contained and from_tables(read, scene.name, scene.text) == scene
+        if scene.text
+        and self_contained
+        and from_tables(read, scene.name, scene.text) == scene
         else _written_tables(scene)
     )
 
@@ -125,33 +143,51 @@ def _written_tables(scene: Scene | Intruding | WalkerScene) -> dict:
     with located(scene.name):
         out = {}
         for name, (section, *_) in sections_of(type(scene)).items():
-            part = getattr(scene, name, scene)  # the scene itself where its own fields are keys
+            part = getattr(
+                scene, name, scene
+            )  # the scene itself where its own fields are keys
             if table := section_tables(_named(part), section):
                 out[name] = table
         if isinstance(scene, Scene):
             out = _short(out, scene)
         if from_tables(out, scene.name) != scene:
-            raise Refusal("a part of this scene is of no kind that a scene file can name")
+            raise Refusal(
+                "a part of this scene is of no kind that a scene file can name"
+            )
         return out
 
 
 def section_tables(part: Any, section: Section) -> dict | list[dict]:
     """Return the table of a section, or the tables of one for each part; Refusal if no file can name the part."""
-    return [_section(each, section) for each in part] if isinstance(section, Each) else _section(part, section)
+    return (
+        [_section(each, section) for each in part]
+        if isinstance(section, Each)
+        else _section(part, section)
+    )
 
 
 def _section(part: Any, section: Section) -> dict:
     for variant in variants(section):
         is_one = type(part) is getattr(variant.kind, "makes", variant.kind)
         if is_one and not (variant.file and not variant.file.keys):
-            parts = {field: (getattr(part, field), one) for field, one in variant.inner.items()}
-            inner = {field: section_tables(*each) for field, each in parts.items() if each[0] is not None}
+            parts = {
+                field: (getattr(part, field), one)
+                for field, one in variant.inner.items()
+            }
+            inner = {
+                field: section_tables(*each)
+                for field, each in parts.items()
+                if each[0] is not None
+            }
             return {**variant.named, **_fields(part, variant.kind), **inner}
         if is_one or isinstance(section, Keys):
             raise Refusal(
-                f"a {type(part).__name__} has a CSV file of its own", instead="write the scene that names it by hand"
+                f"a {type(part).__name__} has a CSV file of its own",
+                instead="write the scene that names it by hand",
             )
-    reason = f"a {name_in(section.kinds, part)} is of no kind that a scene file can name"
+    reason = (
+        f"a {name_in(section.kinds, part)} is of no kind that a scene file can name"
+    )
     raise Refusal(reason, instead=f"use one of {', '.join(section.kinds)}")
 
 
@@ -164,7 +200,9 @@ def _short(tables: dict, scene: Scene) -> dict:
     else:
         tables = {"system": system} | tables
     for part in ("body", "system"):
-        if "frame" in tables.get(part, {}) and tables[part].get("kind") != Table.kind:  # which has its file's otherwise
+        if (
+            "frame" in tables.get(part, {}) and tables[part].get("kind") != Table.kind
+        ):  # which has its file's otherwise
             del tables[part]["frame"]
             if scene.frame != "mean":
                 tables = {"frame": scene.frame} | tables
@@ -183,13 +221,22 @@ def _named(part: Any) -> Any:
 
 def _numerics(scene: Scene) -> dict:
     parts = [scene.numerics, solver_of(scene.system)]
-    return {key: value for part in parts if part for key, value in _fields(part, type(part)).items()}
+    return {
+        key: value
+        for part in parts
+        if part
+        for key, value in _fields(part, type(part)).items()
+    }
 
 
 def _fields(part: Any, kind: type) -> dict:
     """Return the keys of a class, as in a file, for which a part has a value."""
     keys = [f.name for f in dataclasses.fields(kind) if f.init and f.name != "solver"]
-    return {name: _plain(value) for name in keys if (value := getattr(part, name, None)) is not None}
+    return {
+        name: _plain(value)
+        for name in keys
+        if (value := getattr(part, name, None)) is not None
+    }
 
 
 def _plain(value):
@@ -200,9 +247,19 @@ def _plain(value):
 
 
 def _text(tables: dict) -> str:
-    lines = [f"{key} = {_value(x)}" for key, x in tables.items() if not isinstance(x, (dict, list))]
+    lines = [
+        f"{key} = {_value(x)}"
+        for key, x in tables.items()
+        if not isinstance(x, (dict, list))
+    ]
     for name, table in tables.items():
-        for each in table if isinstance(table, list) else [table] if isinstance(table, dict) else []:
+        for each in (
+            table
+            if isinstance(table, list)
+            else [table]
+            if isinstance(table, dict)
+            else []
+        ):
             lines += ["", f"[[{name}]]" if isinstance(table, list) else f"[{name}]"]
             lines += [f"{key} = {_value(x)}" for key, x in each.items()]
     return "\n".join(lines).lstrip("\n") + "\n"

@@ -47,7 +47,9 @@ class Adjustable(Protocol):
     def numbers(self, setting: Setting | None, value: Any) -> list[np.ndarray]:
         """Return the answer at a value of a setting; for None the limit of the setting, without a setting the truth."""
 
-    def errors(self, numbers_: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
+    def errors(
+        self, numbers_: list[np.ndarray], truth: list[np.ndarray]
+    ) -> dict[str, float]:
         """Return the error of an answer by measure."""
 
     def describe(self, setting: Setting, measure: str) -> dict[str, Any]:
@@ -64,7 +66,9 @@ def adjustable(scene: Any, runs: int | None = None) -> Adjustable:
     """Return the question of an accuracy study of a scene: a displacement, forces along a motion, or the speed of a
     robot."""
     kinds = {"robot": "walking", "intruder": "intrusion"}  # loaded only where needed
-    module = next((module for part, module in kinds.items() if hasattr(scene, part)), "tiered")
+    module = next(
+        (module for part, module in kinds.items() if hasattr(scene, part)), "tiered"
+    )
     kind = import_module(f"geomech.studies.{module}").Settings
     return kind(scene) if runs is None else kind(scene, runs)
 
@@ -104,7 +108,14 @@ class Accuracy(Question):
             truth = next(answers)[0] if setting.against == "limit" else true
             for value in setting.values:
                 numbers, seconds = next(answers)
-                rows.append((setting.label, value, seconds, *question.errors(numbers, truth).values()))
+                rows.append(
+                    (
+                        setting.label,
+                        value,
+                        seconds,
+                        *question.errors(numbers, truth).values(),
+                    )
+                )
         return _result(question, settings, rows)
 
 
@@ -115,19 +126,32 @@ def _result(question: Adjustable, settings: list[Setting], rows: list[tuple]) ->
         Variable("setting", over, np.array(labels)),
         Variable("value", over, np.array(values, float)),
         Variable("seconds", over, np.array(seconds), "s"),
-        *(Variable(measure, over, np.array(e)) for measure, e in zip(question.measures, errors)),
+        *(
+            Variable(measure, over, np.array(e))
+            for measure, e in zip(question.measures, errors)
+        ),
     ]
     descriptions = [
-        (setting, measure, question.describe(setting, measure)) for measure in question.measures for setting in settings
+        (setting, measure, question.describe(setting, measure))
+        for measure in question.measures
+        for setting in settings
     ]
     bare = Result("accuracy", tuple(variables), {"settings": descriptions}, question)
-    choices = [question.cheapest(lines(bare), float(tolerance)) for tolerance in question.tolerances]
+    choices = [
+        question.cheapest(lines(bare), float(tolerance))
+        for tolerance in question.tolerances
+    ]
     return Result(
-        "accuracy", tuple(variables), {**question.facts(), "settings": descriptions, "cheapest": choices}, question
+        "accuracy",
+        tuple(variables),
+        {**question.facts(), "settings": descriptions, "cheapest": choices},
+        question,
     )
 
 
-def answered(question: Any, task: tuple[Setting | None, Any, int]) -> tuple[list[np.ndarray], float]:
+def answered(
+    question: Any, task: tuple[Setting | None, Any, int]
+) -> tuple[list[np.ndarray], float]:
     """Return the answer at a setting, and the seconds that the quickest of its runs took."""
     (setting, value, runs), times = task, []
     for _ in range(runs):
@@ -142,7 +166,10 @@ def lines(result: Result) -> list[dict[str, Any]]:
     out = []
     for setting, measure, description in result.attributes["settings"]:
         rows = result["setting"].values == setting.label
-        errors, seconds = result[measure].values[rows].tolist(), result["seconds"].values[rows].tolist()
+        errors, seconds = (
+            result[measure].values[rows].tolist(),
+            result["seconds"].values[rows].tolist(),
+        )
         numbers = {
             "value": list(setting.values),
             "error": errors,
@@ -173,7 +200,9 @@ def table(result: Result) -> dict[str, Any]:
     return {**head, "lines": lines(result), "cheapest": last, **facts}
 
 
-def study(scene: Any, progress: Callable | None = None, runs: int | None = None) -> dict[str, Any]:
+def study(
+    scene: Any, progress: Callable | None = None, runs: int | None = None
+) -> dict[str, Any]:
     """Return the accuracy study of a scene of any kind as a table. Executors: see `geomech.run.workers`."""
     question = Accuracy(scene, runs)
     return table(question.answer(progress or (lambda done: None), lambda cost: None))

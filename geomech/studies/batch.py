@@ -16,7 +16,14 @@ from rft.effects import batched_effect
 def kind(scene: Scene) -> str:
     """Return a text that is equal for scenes that can share a batch."""
     effects = [
-        (type(e), [getattr(e, f.name) for f in dataclasses.fields(e) if f.name not in e.batched])
+        (
+            type(e),
+            [
+                getattr(e, f.name)
+                for f in dataclasses.fields(e)
+                if f.name not in e.batched
+            ],
+        )
         for e in getattr(scene.system, "effects", ())
     ]
     s = scene.system
@@ -31,7 +38,10 @@ def side_by_side(scenes: list[Scene], amplitudes=None) -> Scene:
     joined = dataclasses.replace(scenes[0], gait=gaits)
     if not isinstance(joined.system, Swimmer):
         return joined
-    effects = tuple(batched_effect(same, [count] * len(scenes)) for same in zip(*(s.system.effects for s in scenes)))
+    effects = tuple(
+        batched_effect(same, [count] * len(scenes))
+        for same in zip(*(s.system.effects for s in scenes))
+    )
     return joined.changed(effects=effects)
 
 
@@ -52,5 +62,10 @@ class GaitBatch:
 
     def cycle(self, phases: int, amplitudes=None) -> tuple[np.ndarray, np.ndarray]:
         """Return alpha and alphadot (gaits x amplitudes, phases, joints)."""
-        each = [g.cycle(phases, [g.amplitude] if self.amplitudes is None else self.amplitudes) for g in self.gaits]
+        each = [
+            g.cycle(
+                phases, [g.amplitude] if self.amplitudes is None else self.amplitudes
+            )
+            for g in self.gaits
+        ]
         return tuple(np.concatenate(x) for x in zip(*each))

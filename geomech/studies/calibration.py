@@ -20,50 +20,90 @@ from rft.calibrate import FITS, Fit, fit
 from rft.drag import Rod, rod_drag
 from rft.refusal import Refusal, located
 
-SIZES = "radius", "length", "depth", "density"  # of the rod and the bed, as options have them
+SIZES = (
+    "radius",
+    "length",
+    "depth",
+    "density",
+)  # of the rod and the bed, as options have them
 CURVE = np.linspace(0.0, np.pi / 2, 181)  # attack angles at which a law is drawn, rad
 
 
-def rod_drags(law: str, source: str, sizes: Mapping[str, float], end_caps: float | str) -> Result:
+def rod_drags(
+    law: str, source: str, sizes: Mapping[str, float], end_caps: float | str
+) -> Result:
     """Return a law fitted to the drag on a rod (`rft.calibrate`), from a file or the sample ``source``.
 
     sizes: those of `SIZES` that overrule the header lines. Refusal, one line that names the file, if the data are bad or
     do not determine the law."""
     if "area" in sizes:
-        raise Refusal("``area`` belongs to another measurement", instead=f"leave it out for ``law`` {law}")
+        raise Refusal(
+            "``area`` belongs to another measurement",
+            instead=f"leave it out for ``law`` {law}",
+        )
     measured = drag.read(source)
     with located(measured.name):
-        f = fit(law, rod_drag(*measured.rows, measured.ends), Rod(**{**measured.sizes, **sizes}), end_caps)
+        f = fit(
+            law,
+            rod_drag(*measured.rows, measured.ends),
+            Rod(**{**measured.sizes, **sizes}),
+            end_caps,
+        )
         facts = {
             "name": measured.name,
-            "medium": _medium(f),  # what no medium can be, such as a k of thousands, is refused here
+            "medium": _medium(
+                f
+            ),  # what no medium can be, such as a k of thousands, is refused here
             "rod": {name: getattr(f.rod, name) for name in SIZES},
-            "lacks": [name for name in SIZES if FITS[law].granular and not getattr(f.rod, name)],
+            "lacks": [
+                name
+                for name in SIZES
+                if FITS[law].granular and not getattr(f.rod, name)
+            ],
             "repeats_rms": repeats(f.data.psi, f.data.forces),
         }
     rows, over = ("component", "row"), ("parameter",)
     variables = (
         Variable("parameter", over, np.array([_in_degrees(name) for name in f.names])),
         Variable("value", over, _displayed(f, f.values), error=_displayed(f, f.errors)),
-        Variable("interval", (*over, "bound"), _displayed(f, f.intervals), label="with 95 %"),
+        Variable(
+            "interval", (*over, "bound"), _displayed(f, f.intervals), label="with 95 %"
+        ),
         Variable("component", ("component",), np.array(["parallel", "perpendicular"])),
         Variable("psi", ("row",), measured.rows[0], "degrees", "attack angle"),
         Variable(
-            "folded_psi", ("row",), np.degrees(f.data.psi), "degrees", "attack angle, folded into 0 to 90 degrees"
+            "folded_psi",
+            ("row",),
+            np.degrees(f.data.psi),
+            "degrees",
+            "attack angle, folded into 0 to 90 degrees",
         ),
         Variable("force", rows, f.data.forces, "N"),
         Variable("residual", rows, f.residuals, "N", "force minus law"),
         Variable("angle", ("angle",), np.degrees(CURVE), "degrees", "attack angle"),
-        Variable("law", ("component", "angle"), f.forces(CURVE), "N", error=f.band(CURVE), error_label="95 %"),
+        Variable(
+            "law",
+            ("component", "angle"),
+            f.forces(CURVE),
+            "N",
+            error=f.band(CURVE),
+            error_label="95 %",
+        ),
     )
     return Result("rod_drag", variables, facts, f)
 
 
 def _medium(f: Fit) -> dict:
     """Return the table [medium] of a fitted law."""
-    values = {field.name: getattr(f.medium, field.name) for field in dataclasses.fields(f.medium)}
+    values = {
+        field.name: getattr(f.medium, field.name)
+        for field in dataclasses.fields(f.medium)
+    }
     if "gamma0" in values:
-        values = {_in_degrees(k): math.degrees(x) if k == "gamma0" else x for k, x in values.items()}
+        values = {
+            _in_degrees(k): math.degrees(x) if k == "gamma0" else x
+            for k, x in values.items()
+        }
     if "covariance" in values:
         values["covariance"] = [list(row) for row in values["covariance"]]
     return {"law": f.law, **{k: x for k, x in values.items() if x is not None}}
@@ -71,7 +111,9 @@ def _medium(f: Fit) -> dict:
 
 def _displayed(f: Fit, values: np.ndarray) -> np.ndarray:
     """Return values (n, ...) of the parameters with gamma0 in degrees."""
-    return np.array([np.degrees(x) if name == "gamma0" else x for name, x in zip(f.names, values)])
+    return np.array(
+        [np.degrees(x) if name == "gamma0" else x for name, x in zip(f.names, values)]
+    )
 
 
 def _in_degrees(name: str) -> str:
@@ -110,10 +152,16 @@ class Calibration(Question):
 
     @cached_property
     def chosen(self) -> str:
-        return choose("``law``", law_of(self.source) if self.law is None else self.law, CALIBRATIONS)
+        return choose(
+            "``law``",
+            law_of(self.source) if self.law is None else self.law,
+            CALIBRATIONS,
+        )
 
     def check(self) -> None:
         _ = self.chosen
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        return CALIBRATIONS[self.chosen](self.chosen, self.source, dict(self.sizes), self.end_caps)
+        return CALIBRATIONS[self.chosen](
+            self.chosen, self.source, dict(self.sizes), self.end_caps
+        )

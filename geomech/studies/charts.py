@@ -101,18 +101,32 @@ class Chart:
         f = self.family
         between = 0.0 if value in f.values else f.error * self.scene.system.length
         return _mapped(
-            replace(self, family=None, between=between), lambda x: _spline((f.knots,), (f.degree,), x)([[value]])[0]
+            replace(self, family=None, between=between),
+            lambda x: _spline((f.knots,), (f.degree,), x)([[value]])[0],
         )
 
     @cached_property
     def _splines(self) -> dict[tuple, Any]:
         of = lambda x: _spline(self.knots, (self.degree,) * 2, x)
-        made = {(name, part): of(getattr(t, part)) for name, t in self.frames.items() for part in ("A", "ccf")}
-        poses = {(name, "pose"): of(t.pose) for name, t in self.frames.items() if t.pose is not None}
-        areas = {(name, "area"): _area(self.knots, self.degree, t.ccf) for name, t in self.frames.items()}
+        made = {
+            (name, part): of(getattr(t, part))
+            for name, t in self.frames.items()
+            for part in ("A", "ccf")
+        }
+        poses = {
+            (name, "pose"): of(t.pose)
+            for name, t in self.frames.items()
+            if t.pose is not None
+        }
+        areas = {
+            (name, "area"): _area(self.knots, self.degree, t.ccf)
+            for name, t in self.frames.items()
+        }
         return {**made, **poses, **areas, "harmonics": of(self.harmonics)}
 
-    def xi(self, tier: str, alpha: np.ndarray, alphadot: np.ndarray, frame: str) -> np.ndarray:
+    def xi(
+        self, tier: str, alpha: np.ndarray, alphadot: np.ndarray, frame: str
+    ) -> np.ndarray:
         """Return body velocities (..., 3) by the harmonics, in the scene's frame, or by the connection in another."""
         if tier == "path":
             A = self._splines[frame, "A"](alpha).reshape(*alpha.shape[:-1], 3, 2)
@@ -120,7 +134,10 @@ class Chart:
         speed = np.linalg.norm(alphadot, axis=-1)
         unit = alphadot / np.where(speed > 0, speed, 1.0)[..., None]
         series = self._splines["harmonics"](alpha).reshape(*alpha.shape[:-1], 3, -1)
-        return np.einsum("...ij,...j->...i", series, basis(unit, self.highest)) * speed[..., None]
+        return (
+            np.einsum("...ij,...j->...i", series, basis(unit, self.highest))
+            * speed[..., None]
+        )
 
 
 class Prediction(NamedTuple):
@@ -131,7 +148,9 @@ class Prediction(NamedTuple):
     error: tuple[float, float]
 
 
-def tiers(chart: Chart, gait: Gait, frame: str | None = None, phases: int = 256) -> dict[str, Prediction]:
+def tiers(
+    chart: Chart, gait: Gait, frame: str | None = None, phases: int = 256
+) -> dict[str, Prediction]:
     """Return what a chart predicts of a cycle of a gait by the area, the path and the harmonic tier. Refusal for a gait that
     leaves the chart.
 
@@ -142,18 +161,30 @@ def tiers(chart: Chart, gait: Gait, frame: str | None = None, phases: int = 256)
     frame = frame or chart.scene.frame
     alpha, alphadot = gait.cycle(phases)
     inside(chart.axes, alpha)
-    net = _in_frame(chart, frame, displacement(chart.xi("harmonic", alpha, alphadot, frame)), alpha[0])
+    net = _in_frame(
+        chart,
+        frame,
+        displacement(chart.xi("harmonic", alpha, alphadot, frame)),
+        alpha[0],
+    )
     own = left_error(chart, alpha, alphadot)
     found = {"harmonic": Prediction(net, own)}
-    area = 2 * np.pi * (chart._splines[frame, "area"](alpha) * alphadot[..., 1:]).mean(-2)
-    others = {"path": displacement(chart.xi("path", alpha, alphadot, frame)), "area": se2.exp(area)}
+    area = (
+        2 * np.pi * (chart._splines[frame, "area"](alpha) * alphadot[..., 1:]).mean(-2)
+    )
+    others = {
+        "path": displacement(chart.xi("path", alpha, alphadot, frame)),
+        "area": se2.exp(area),
+    }
     for name, x in others.items():
         off = np.hypot(*(x - net)[:2]), abs(x[2] - net[2])
         found[name] = Prediction(x, (float(off[0]) + own[0], float(off[1]) + own[1]))
     return found
 
 
-def left_error(chart: Chart, alpha: np.ndarray, alphadot: np.ndarray) -> tuple[float, float]:
+def left_error(
+    chart: Chart, alpha: np.ndarray, alphadot: np.ndarray
+) -> tuple[float, float]:
     """Return the error of the harmonic tier for one cycle (P, 2): of position, and of heading."""
     from scipy.interpolate import RegularGridInterpolator
 
@@ -161,12 +192,18 @@ def left_error(chart: Chart, alpha: np.ndarray, alphadot: np.ndarray) -> tuple[f
         np.clip(alpha, *np.array([a[[0, -1]] for a in chart.axes]).T)
     )
     speed = np.linalg.norm(alphadot, axis=-1)
-    along = np.array([speed @ np.hypot(rms[:, 0], rms[:, 1]), speed @ rms[:, 2]]) / len(speed)
-    position, heading = 2 * np.pi * (SHARES * along + speed.mean() * np.array(chart.grid_error))
+    along = np.array([speed @ np.hypot(rms[:, 0], rms[:, 1]), speed @ rms[:, 2]]) / len(
+        speed
+    )
+    position, heading = (
+        2 * np.pi * (SHARES * along + speed.mean() * np.array(chart.grid_error))
+    )
     return float(position) + chart.between, float(heading)
 
 
-def _in_frame(chart: Chart, frame: str, net: np.ndarray, start: np.ndarray) -> np.ndarray:
+def _in_frame(
+    chart: Chart, frame: str, net: np.ndarray, start: np.ndarray
+) -> np.ndarray:
     """Return a net pose of the scene's frame in another one."""
     if chart.frames[frame].pose is None:
         return net
@@ -177,7 +214,9 @@ def _in_frame(chart: Chart, frame: str, net: np.ndarray, start: np.ndarray) -> n
 def _spline(knots, degrees, coefficients: np.ndarray) -> Any:
     from scipy.interpolate import NdBSpline
 
-    return NdBSpline(tuple(knots), np.ascontiguousarray(coefficients, float), tuple(degrees))
+    return NdBSpline(
+        tuple(knots), np.ascontiguousarray(coefficients, float), tuple(degrees)
+    )
 
 
 def _area(knots, degree: int, coefficients: np.ndarray) -> Any:
@@ -195,11 +234,14 @@ def refuse(scene: Scene) -> None:
     with located(scene.name):
         if system.joints != 2:
             raise Refusal(
-                f"a chart has two shape variables, this body {system.joints}", instead="see 'geomech displacement'"
+                f"a chart has two shape variables, this body {system.joints}",
+                instead="see 'geomech displacement'",
             )
         harmonic.HARMONIC.refuse(system)
         if capability(system, Drawable) is None:
-            raise Refusal("this system has no body to draw", instead="see 'geomech ccf'")
+            raise Refusal(
+                "this system has no body to draw", instead="see 'geomech ccf'"
+            )
 
 
 def chart(scene: Scene) -> Chart:
@@ -210,7 +252,9 @@ def chart(scene: Scene) -> Chart:
     frames = {scene.frame: _frame(fitted)}
     if scene.frame != MINIMUM_PERTURBATION:
         other = study.in_frame(MINIMUM_PERTURBATION)
-        frames[MINIMUM_PERTURBATION] = _frame(other.fitted, other.scene.system.field.field)
+        frames[MINIMUM_PERTURBATION] = _frame(
+            other.fitted, other.scene.system.field.field
+        )
     field = series.field
     made = Chart(
         scene, series.axes, tuple(field.spline.t), series.degree, _coefficients(field), _single(_last(series.residual)),
@@ -241,18 +285,32 @@ def _frame(connection: Connection, pose: Field | None = None) -> FrameTables:
 def _outline(scene: Scene, series: Harmonics) -> Field:
     """Return the ends of the links in the body frame at every shape of the grid."""
     grid = np.stack(np.meshgrid(*series.axes, indexing="ij"), -1)
-    ends = capability(scene.system, Drawable).points(grid, np.zeros((*grid.shape[:2], 3)))
-    some = np.unique(np.linspace(0, ends.shape[-2] - 1, min(ENDS, ends.shape[-2])).round().astype(int))
-    return Field(series.axes, np.moveaxis(ends[..., some, :].reshape(*grid.shape[:2], -1), -1, 0), series.degree)
+    ends = capability(scene.system, Drawable).points(
+        grid, np.zeros((*grid.shape[:2], 3))
+    )
+    some = np.unique(
+        np.linspace(0, ends.shape[-2] - 1, min(ENDS, ends.shape[-2]))
+        .round()
+        .astype(int)
+    )
+    return Field(
+        series.axes,
+        np.moveaxis(ends[..., some, :].reshape(*grid.shape[:2], -1), -1, 0),
+        series.degree,
+    )
 
 
-def loops(axes: tuple[np.ndarray, ...], count: int = TRIED, seed: int = 1) -> list[Points]:
+def loops(
+    axes: tuple[np.ndarray, ...], count: int = TRIED, seed: int = 1
+) -> list[Points]:
     """Return closed curves through random shapes, within a field."""
     rng, found = np.random.default_rng(seed), []
     low, high = np.array([(a[0], a[-1]) for a in axes]).T
     middle, half = (low + high) / 2, (high - low) / 2
     while len(found) < count:
-        points = middle + REACH * half * rng.uniform(-1, 1, (int(rng.integers(3, 10)), 2))
+        points = middle + REACH * half * rng.uniform(
+            -1, 1, (int(rng.integers(3, 10)), 2)
+        )
         gait = Points(points=tuple(map(tuple, points.round(3).tolist())))
         if (np.abs(gait.cycle(256)[0] - middle) < half).all():
             found.append(gait)
@@ -274,14 +332,21 @@ def _grid_error(series: Harmonics) -> tuple[float, float]:
     half, rates = series.half(0), []
     for gait in loops(series.axes):
         alpha, alphadot = gait.cycle(256)
-        off = displacement(series.velocity(alpha, alphadot)) - displacement(half.velocity(alpha, alphadot))
+        off = displacement(series.velocity(alpha, alphadot)) - displacement(
+            half.velocity(alpha, alphadot)
+        )
         length = 2 * np.pi * np.linalg.norm(alphadot, axis=-1).mean()
         rates.append(np.array([np.hypot(*off[:2]), abs(off[2])]) / length)
     return tuple((HALVED * np.median(rates, 0)).tolist())
 
 
 def family(
-    scene: Scene, key: str, values: list[float], own: float, members: list[Chart], between: list[Chart]
+    scene: Scene,
+    key: str,
+    values: list[float],
+    own: float,
+    members: list[Chart],
+    between: list[Chart],
 ) -> Chart:
     """Return the charts of scenes that differ in one parameter as one. between: those halfway from member to member, by which
     the error of interpolation is measured."""
@@ -290,7 +355,10 @@ def family(
     degree = min(3, len(values) - 1)
     knots = make_interp_spline(values, np.asarray(values), degree).t
     stacked = lambda some: _single(make_interp_spline(values, np.stack(some), degree).c)
-    parts = {name: stacked([getattr(m, name) for m in members]) for name in ("harmonics", "residual", "outline")}
+    parts = {
+        name: stacked([getattr(m, name) for m in members])
+        for name in ("harmonics", "residual", "outline")
+    }
     frames = {
         frame: FrameTables(*(
             None if getattr(tables, part) is None else stacked([getattr(m.frames[frame], part) for m in members])
@@ -300,7 +368,11 @@ def family(
     worst = tuple(np.max([m.grid_error for m in members], 0).tolist())
     first = members[values.index(own)]
     made = replace(
-        first, **parts, frames=frames, grid_error=worst, family=Family(key, np.array(values), knots, degree, own)
+        first,
+        **parts,
+        frames=frames,
+        grid_error=worst,
+        family=Family(key, np.array(values), knots, degree, own),
     )
     off = max(_off(made.at(v), one) for v, one in zip(middles(values), between))
     return replace(made, family=replace(made.family, error=off))
@@ -313,15 +385,27 @@ def middles(values: list[float]) -> list[float]:
 
 def _off(one: Chart, other: Chart) -> float:
     """Return the largest distance, body lengths, between net positions of two charts."""
-    nets = [[tiers(c, gait)["harmonic"].net for gait in loops(one.axes)] for c in (one, other)]
-    return float(np.hypot(*(np.array(nets[0]) - nets[1])[:, :2].T).max() / one.scene.system.length)
+    nets = [
+        [tiers(c, gait)["harmonic"].net for gait in loops(one.axes)]
+        for c in (one, other)
+    ]
+    return float(
+        np.hypot(*(np.array(nets[0]) - nets[1])[:, :2].T).max()
+        / one.scene.system.length
+    )
 
 
 def _mapped(chart: Chart, f) -> Chart:
     """Return the chart with all of its tables through a function."""
-    parts = {name: f(getattr(chart, name)) for name in ("harmonics", "residual", "outline")}
-    of = lambda t: FrameTables(f(t.A), f(t.ccf), f(t.ccf_error), None if t.pose is None else f(t.pose))
-    return replace(chart, **parts, frames={name: of(t) for name, t in chart.frames.items()})
+    parts = {
+        name: f(getattr(chart, name)) for name in ("harmonics", "residual", "outline")
+    }
+    of = lambda t: FrameTables(
+        f(t.A), f(t.ccf), f(t.ccf_error), None if t.pose is None else f(t.pose)
+    )
+    return replace(
+        chart, **parts, frames={name: of(t) for name, t in chart.frames.items()}
+    )
 
 
 def _coefficients(field: Field) -> np.ndarray:

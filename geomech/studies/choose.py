@@ -11,7 +11,13 @@ from geomech.gaits import Gait
 from geomech.geometry.gait import checked_gait
 from geomech.scenes.model import Scene
 from geomech.studies import cost, tables, uncertainty
-from geomech.studies.estimate import CHECKED, FEWEST_STEPS, against_direct, in_groups, pose_distance
+from geomech.studies.estimate import (
+    CHECKED,
+    FEWEST_STEPS,
+    against_direct,
+    in_groups,
+    pose_distance,
+)
 from geomech.studies.results import Displacements
 from geomech.studies.study import Study
 from geomech.systems.capabilities import pieces_per_length, settling, solver_of
@@ -25,7 +31,11 @@ FINEST_PIECES = 640  # of body, for a tolerance
 
 
 def cheapest(
-    scene: Scene, amplitudes: Sequence[float], tol: float, gait: Gait | None = None, ask: Callable = lambda jobs: None
+    scene: Scene,
+    amplitudes: Sequence[float],
+    tol: float,
+    gait: Gait | None = None,
+    ask: Callable = lambda jobs: None,
 ) -> Displacements:
     """Return a table as of `Study.study` for the cheapest tier with errors of position of at most ``tol`` body lengths,
     with {"tier", "tolerance", "settings"} besides.
@@ -39,7 +49,11 @@ def cheapest(
     system, gait = scene.system, checked_gait(scene.gait if gait is None else gait)
     amplitudes = real_array("amplitudes", amplitudes)
     if amplitudes.ndim != 1 or not amplitudes.size:
-        raise Refusal("amplitudes must be a list of numbers", value=amplitudes.tolist(), where=scene.name)
+        raise Refusal(
+            "amplitudes must be a list of numbers",
+            value=amplitudes.tolist(),
+            where=scene.name,
+        )
     scene.note_turns(gait, amplitudes)
     if tol <= settling(system):
         raise Refusal(
@@ -57,16 +71,38 @@ def cheapest(
             "settings": settings,
             "seconds": {tier: time.perf_counter() - start},
         }
-        return Displacements(tables.result(scene, gait, amplitudes, {tier: poses}, {tier: error}, medium, **attributes))
+        return Displacements(
+            tables.result(
+                scene,
+                gait,
+                amplitudes,
+                {tier: poses},
+                {tier: error},
+                medium,
+                **attributes,
+            )
+        )
 
-    sampled = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))
+    sampled = np.unique(
+        np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int)
+    )
     phases = max(FEWEST_STEPS if system.traits.steps else 32, 8 * gait.harmonics)
-    plans = {m: plan for m in study.tiers if not (plan := study.plan(m, gait, amplitudes)).exact}
+    plans = {
+        m: plan
+        for m in study.tiers
+        if not (plan := study.plan(m, gait, amplitudes)).exact
+    }
     if plans:
-        pilot, settings = _refined(scene, gait, amplitudes[sampled], tol / 4, phases, ask)
+        pilot, settings = _refined(
+            scene, gait, amplitudes[sampled], tol / 4, phases, ask
+        )
         phases = settings["phases"]
-    balances = {m: cost.balances(plan, len(amplitudes), phases) for m, plan in plans.items()}
-    enough = len(amplitudes) * solved_phases(system, gait, phases)  # of the system itself
+    balances = {
+        m: cost.balances(plan, len(amplitudes), phases) for m, plan in plans.items()
+    }
+    enough = len(amplitudes) * solved_phases(
+        system, gait, phases
+    )  # of the system itself
     for tier in sorted(plans, key=balances.get):
         if balances[tier] >= enough:
             break
@@ -75,9 +111,14 @@ def cheapest(
             checked = study.poses(tier, gait, amplitudes[sampled])
         except ValueError:  # the gait leaves the field or the family of this tier
             continue
-        if (pose_distance(checked, pilot[0], system.length) + pilot[1])[:, 0].max() <= tol:
+        if (pose_distance(checked, pilot[0], system.length) + pilot[1])[
+            :, 0
+        ].max() <= tol:
             poses = study.poses(tier, gait, amplitudes)
-            error, spread = against_direct(scene, poses, gait, amplitudes), study.spread(tier, gait, amplitudes)
+            error, spread = (
+                against_direct(scene, poses, gait, amplitudes),
+                study.spread(tier, gait, amplitudes),
+            )
             if spread is not None:
                 error = np.maximum(error, spread / [system.length, 1.0])
             if error[:, 0].max() <= tol:
@@ -85,7 +126,11 @@ def cheapest(
     (poses, error), settings = _refined(scene, gait, amplitudes, tol, phases, ask)
     if error[:, 0].max() > tol:
         settings_text = " and ".join(f"{n} {name}" for name, n in settings.items())
-        finer = "lower [numerics] regularisation and tolerance" if solver_of(system) else "take a finer table"
+        finer = (
+            "lower [numerics] regularisation and tolerance"
+            if solver_of(system)
+            else "take a finer table"
+        )
         raise Refusal(
             f"no tier gets to {tol:g} body lengths (best estimate {error[:, 0].max():.1e} with {settings_text})",
             where=scene.name,
@@ -94,24 +139,50 @@ def cheapest(
     return answer(DIRECT.name, poses, error, settings)
 
 
-def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask: Callable):
+def _refined(
+    scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask: Callable
+):
     """Return (poses, errors) of the direct tier with twice the phases, or pieces of body where these cause the larger
     error, again and again, and {"phases": ..., "pieces": ... if any}.
 
     Only amplitudes that need it are refined, until all positions are within ``tol`` or doubling no longer helps."""
     ask(cost.direct(scene, gait, len(amplitudes), phases))
     poses, error, of_pieces = in_groups(scene, gait, amplitudes, phases)
-    error, open_, pieces = error + of_pieces, np.arange(len(amplitudes)), getattr(solver_of(scene.system), "pieces", 0)
+    error, open_, pieces = (
+        error + of_pieces,
+        np.arange(len(amplitudes)),
+        getattr(solver_of(scene.system), "pieces", 0),
+    )
     while (worse := open_[error[open_, 0] > tol]).size:
         coarse_pieces = of_pieces[worse, 0].max() > 0.5 * error[worse, 0].max()
-        if (2 * pieces > FINEST_PIECES) if coarse_pieces else (2 * phases > MOST_PHASES):
+        if (
+            (2 * pieces > FINEST_PIECES)
+            if coarse_pieces
+            else (2 * phases > MOST_PHASES)
+        ):
             break
         pieces, phases = (2 * pieces, phases) if coarse_pieces else (pieces, 2 * phases)
-        finer_scene = scene.with_numerics(pieces=pieces) if pieces_per_length(scene.system) else scene
+        finer_scene = (
+            scene.with_numerics(pieces=pieces)
+            if pieces_per_length(scene.system)
+            else scene
+        )
         ask(cost.direct(finer_scene, gait, len(worse), phases))
-        finer, finer_error, finer_pieces = in_groups(finer_scene, gait, amplitudes[worse], phases)
-        stalled = (finer_error + finer_pieces > 0.9 * error[worse])[:, 0].all() and phases > 1024
-        poses[worse], error[worse], of_pieces[worse], open_ = finer, finer_error + finer_pieces, finer_pieces, worse
+        finer, finer_error, finer_pieces = in_groups(
+            finer_scene, gait, amplitudes[worse], phases
+        )
+        stalled = (finer_error + finer_pieces > 0.9 * error[worse])[
+            :, 0
+        ].all() and phases > 1024
+        poses[worse], error[worse], of_pieces[worse], open_ = (
+            finer,
+            finer_error + finer_pieces,
+            finer_pieces,
+            worse,
+        )
         if stalled:
             break
-    return (poses, error), {"phases": phases, **({"pieces": pieces} if pieces_per_length(scene.system) else {})}
+    return (poses, error), {
+        "phases": phases,
+        **({"pieces": pieces} if pieces_per_length(scene.system) else {}),
+    }

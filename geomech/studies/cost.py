@@ -34,9 +34,14 @@ from geomech.tiers import fitted, harmonic
 from geomech.tiers.base import Plan, Table, solved_phases
 
 CLOSED = 1e-6  # s of a velocity without balance of forces, measured for built-in systems, assumed for others
-LOOK, READ = 2.2e-7, 1.1e-9  # s for each look-up in a table, and for each number that it sums; measured
+LOOK, READ = (
+    2.2e-7,
+    1.1e-9,
+)  # s for each look-up in a table, and for each number that it sums; measured
 CYCLES = 3  # until they repeat, assumed
-COPIES = 14  # of the angles and velocities of a gait while they are solved and integrated
+COPIES = (
+    14  # of the angles and velocities of a gait while they are solved and integrated
+)
 TABLES = 4  # of a table while it is built, interpolated and written
 ROW = 800  # bytes of an amplitude's results by all tiers, as lists and as text
 
@@ -57,7 +62,11 @@ class Job(NamedTuple):
 
 def price(jobs: Sequence[Job]) -> Cost:
     """Return the cost of jobs that are done one after the other."""
-    balances, seconds, besides = math.ceil(sum(job.count for job in jobs)), 0.0, sum(job.besides for job in jobs)
+    balances, seconds, besides = (
+        math.ceil(sum(job.count for job in jobs)),
+        0.0,
+        sum(job.besides for job in jobs),
+    )
     steps = sum(job.batches for job in jobs if job.scene.system.traits.steps)
     with suiting(Cost(balances, 0.0, 0.0, steps=steps).as_balances):
         for job in jobs:
@@ -66,12 +75,24 @@ def price(jobs: Sequence[Job]) -> Cost:
                 besides += CLOSED * job.count
             else:
                 points = balance_size(system).evaluations
-                seconds += assumed(job.weight * job.count, points, system.traits.linear, job.batches)
-    return Cost(balances, seconds + besides, max((job.memory for job in jobs), default=BASE), besides, steps)
+                seconds += assumed(
+                    job.weight * job.count, points, system.traits.linear, job.batches
+                )
+    return Cost(
+        balances,
+        seconds + besides,
+        max((job.memory for job in jobs), default=BASE),
+        besides,
+        steps,
+    )
 
 
 def study(
-    scene: Scene, plans: Mapping[str, Plan], count: int, gait: Gait | None = None, tables: bool = True
+    scene: Scene,
+    plans: Mapping[str, Plan],
+    count: int,
+    gait: Gait | None = None,
+    tables: bool = True,
 ) -> list[Job]:
     """Return the jobs of `Study.study` for ``count`` amplitudes of a gait, or the scene's own, by plans of tiers;
     without tables if these are stored."""
@@ -89,7 +110,9 @@ def study(
     if len(guesses) < len(plans):
         return jobs + (len(plans) - len(guesses)) * direct(scene, gait, count, phases)
     fewer = max(estimate.REFERENCE_PHASES, 8 * gait.harmonics)
-    return jobs + len(guesses) * direct(scene, gait, min(count, estimate.CHECKED), fewer)
+    return jobs + len(guesses) * direct(
+        scene, gait, min(count, estimate.CHECKED), fewer
+    )
 
 
 def predicted(scene: Scene, plan: Plan, count: int) -> list[Job]:
@@ -120,13 +143,20 @@ def frame(scene: Scene) -> list[Job]:
     return connection(scene) if isinstance(scene.system, Framed) else []
 
 
-def of_medium(scene: Scene, gait: Gait, count: int, together: int = sys.maxsize) -> list[Job]:
+def of_medium(
+    scene: Scene, gait: Gait, count: int, together: int = sys.maxsize
+) -> list[Job]:
     """Return the jobs of an uncertain medium for ``count`` amplitudes (`uncertainty.of_medium`), at most ``together``
     in a batch."""
     if not uncertainty.uncertain(scene.system):
         return []
-    phases, points = max(uncertainty.PHASES, 8 * gait.harmonics), uncertainty.points(scene.system)
-    return points * direct(scene, gait, count, phases, together, checked=False) + (points - 1) * frame(scene)
+    phases, points = (
+        max(uncertainty.PHASES, 8 * gait.harmonics),
+        uncertainty.points(scene.system),
+    )
+    return points * direct(scene, gait, count, phases, together, checked=False) + (
+        points - 1
+    ) * frame(scene)
 
 
 def direct(
@@ -142,12 +172,22 @@ def direct(
     group = min(max(1, count), together, gaits_per_batch(system, phases))
     size = balance_size(system)
     stored = group * (60 * size.elements + size.memory) if stepping else 0
-    memory = BASE + 8 * (COPIES * group * phases * (system.joints + 6) + stored) + count * ROW
+    memory = (
+        BASE
+        + 8 * (COPIES * group * phases * (system.joints + 6) + stored)
+        + count * ROW
+    )
     solves = (lambda n: n) if all_phases else (lambda n: solved_phases(system, gait, n))
     runs = _runs(scene, phases) if checked else [(phases, 1.0)]
     groups, cycles = -(-count // group), cycles_of(system)
     jobs = [
-        Job(scene, cycles * count * solves(n), groups * (cycles * n if stepping else 1), weight, memory=memory)
+        Job(
+            scene,
+            cycles * count * solves(n),
+            groups * (cycles * n if stepping else 1),
+            weight,
+            memory=memory,
+        )
         for n, weight in runs
     ]
     return jobs + (
@@ -158,7 +198,11 @@ def direct(
 def cycles_of(system: System) -> int:
     """Return the number of cycles that a gait is run for: the setting, one where every cycle differs, else an
     assumption."""
-    return CYCLES if settling(system) else (system.traits.steps and solver_of(system).cycles) or 1
+    return (
+        CYCLES
+        if settling(system)
+        else (system.traits.steps and solver_of(system).cycles) or 1
+    )
 
 
 def _runs(scene: Scene, phases: int) -> list[tuple[int, float]]:
@@ -168,7 +212,11 @@ def _runs(scene: Scene, phases: int) -> list[tuple[int, float]]:
     quarter, system = phases // 4, scene.system
     runs = [(phases, 1.0)]
     runs += [(phases // k, 1.0) for k in (2, 4, 8)] if system.traits.steps else []
-    runs += [(quarter, 2.0), (phases, 0.5), (phases, 0.25)] if pieces_per_length(system) else []
+    runs += (
+        [(quarter, 2.0), (phases, 0.5), (phases, 0.25)]
+        if pieces_per_length(system)
+        else []
+    )
     return runs + ([(quarter, 1.0)] if refined(system) else [])
 
 
@@ -186,7 +234,9 @@ def built(scene: Scene, table: Table, numbers: int = 0) -> list[Job]:
     """Return the jobs of a table. numbers: stored besides."""
     if table.axes:
         table.axes()  # refuses a field that is too large
-    return _spread_out(scene, table.balances, BASE + 8 * TABLES * (table.numbers + numbers))
+    return _spread_out(
+        scene, table.balances, BASE + 8 * TABLES * (table.numbers + numbers)
+    )
 
 
 def of_even_part(scene: Scene) -> list[Job]:
@@ -197,12 +247,21 @@ def of_even_part(scene: Scene) -> list[Job]:
         return []
     shapes = math.prod(len(a) for a in fitted.axes(system, scene.numerics))
     looked_at = EVEN_SHAPES + (0 if system.traits.odd else shapes)
-    return _spread_out(scene, 2 * looked_at * EVEN_DIRECTIONS * system.joints, BASE + 8 * TABLES * 3 * shapes)
+    return _spread_out(
+        scene,
+        2 * looked_at * EVEN_DIRECTIONS * system.joints,
+        BASE + 8 * TABLES * 3 * shapes,
+    )
 
 
-def of_planes(scene: Scene, pairs: Sequence[tuple[int, int]], at: Sequence) -> list[Job]:
+def of_planes(
+    scene: Scene, pairs: Sequence[tuple[int, int]], at: Sequence
+) -> list[Job]:
     """Return the jobs of planes of pairs of joints through shapes (`Study.plane`)."""
-    balances = [fitted.plane_balances(scene.system, scene.numerics, *one) for one in zip(pairs, at)]
+    balances = [
+        fitted.plane_balances(scene.system, scene.numerics, *one)
+        for one in zip(pairs, at)
+    ]
     return [job for count in balances for job in _spread_out(scene, count, BASE)]
 
 
@@ -213,9 +272,18 @@ def of_metric(scene: Scene) -> list[Job]:
         return []
     if effort.shared(system):
         return built(scene, effort.shared_table(system, n))
-    rates = system.joints * (system.joints + 1) // 2 if system.traits.linear else harmonic.directions(system, n)
-    count, numbers = np.prod([len(a) for a in fitted.axes(system, n)]), max(system.joints**2, effort.HIGHEST + 1)
-    return _spread_out(scene, float(count * rates), BASE + 8 * TABLES * float(count * numbers))
+    rates = (
+        system.joints * (system.joints + 1) // 2
+        if system.traits.linear
+        else harmonic.directions(system, n)
+    )
+    count, numbers = (
+        np.prod([len(a) for a in fitted.axes(system, n)]),
+        max(system.joints**2, effort.HIGHEST + 1),
+    )
+    return _spread_out(
+        scene, float(count * rates), BASE + 8 * TABLES * float(count * numbers)
+    )
 
 
 def of_effort(scene: Scene, count: int, gait: Gait | None = None) -> list[Job]:
@@ -225,4 +293,8 @@ def of_effort(scene: Scene, count: int, gait: Gait | None = None) -> list[Job]:
     once = lambda n: direct(scene, gait or scene.gait, count, n, checked=False)
     jobs = once(phases)
     jobs += once(phases // 2) + once(phases // 4) if system.traits.steps else []
-    return jobs + ([job._replace(weight=2.0) for job in once(phases // 4)] if pieces_per_length(system) else [])
+    return jobs + (
+        [job._replace(weight=2.0) for job in once(phases // 4)]
+        if pieces_per_length(system)
+        else []
+    )

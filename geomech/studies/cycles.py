@@ -26,7 +26,12 @@ MAKING = 6e-4  # s to build a scene from its tables, measured
 SAMPLES_TOGETHER = 64  # gaits of a batch: enough to fill the solver, few enough to lose little when stopped
 WIDTH = 5  # numbers of a point: x, y, theta and the errors of position and heading
 AMPLITUDE = "gait.amplitude"
-FREQUENCIES = "gait", "physical", "effects", "frequency"  # sections that have one, and its key
+FREQUENCIES = (
+    "gait",
+    "physical",
+    "effects",
+    "frequency",
+)  # sections that have one, and its key
 
 
 @dataclass(frozen=True)
@@ -46,7 +51,9 @@ class Cycles:
         return grid
 
     def together(self, scene: Scene) -> int:
-        return min(SAMPLES_TOGETHER, gaits_per_batch(scene.system, scene.numerics.phases))
+        return min(
+            SAMPLES_TOGETHER, gaits_per_batch(scene.system, scene.numerics.phases)
+        )
 
     def rows(self, scenes: list[Scene], amplitudes: list[float] | None) -> np.ndarray:
         """Return x, y, theta, errors of position and heading, and standard deviations of QUANTITIES where the medium is
@@ -60,16 +67,37 @@ class Cycles:
         """Return a forecast from some of the points."""
         points, at, total = grid.points, grid.at, grid.total
         first = [at(points[k]) for k in range(min(points.total, SAMPLES_TOGETHER))]
-        together = max(1, min(SAMPLES_TOGETHER, total // points.total * len(first) // len(set(map(kind, first)))))
+        together = max(
+            1,
+            min(
+                SAMPLES_TOGETHER,
+                total // points.total * len(first) // len(set(map(kind, first))),
+            ),
+        )
         samples = [at(points[k]) for k in {0, points.total // 2, points.total - 1}]
         requests = [(s, s.gait, total, s.numerics.phases) for s in samples]
-        jobs = [direct(*one, together) + of_medium(*one[:3], together) for one in requests]
-        balances, seconds, _, besides, steps = np.mean(list(map(price, jobs)), 0).tolist()
-        memory = [direct(s, s.gait, min(total, SAMPLES_TOGETHER), s.numerics.phases)[0].memory for s in samples]
+        jobs = [
+            direct(*one, together) + of_medium(*one[:3], together) for one in requests
+        ]
+        balances, seconds, _, besides, steps = np.mean(
+            list(map(price, jobs)), 0
+        ).tolist()
+        memory = [
+            direct(s, s.gait, min(total, SAMPLES_TOGETHER), s.numerics.phases)[0].memory
+            for s in samples
+        ]
         making = MAKING * points.total
-        return Cost(round(balances), seconds + making, max(memory) + POINT_BYTES * total, besides + making, steps)
+        return Cost(
+            round(balances),
+            seconds + making,
+            max(memory) + POINT_BYTES * total,
+            besides + making,
+            steps,
+        )
 
-    def variables(self, grid: Grid, rows: np.ndarray, dims: tuple[str, ...]) -> tuple[list[Variable], dict]:
+    def variables(
+        self, grid: Grid, rows: np.ndarray, dims: tuple[str, ...]
+    ) -> tuple[list[Variable], dict]:
         """Return net poses with their errors, the body's length, and frequency and speed where there is a frequency."""
         scene, length = grid.scene, _lengths(grid)
         unit = (
@@ -78,14 +106,24 @@ class Cycles:
         errors = np.stack([length * rows[..., 3], rows[..., 4]], -1)
         sizes = [length, length, np.ones_like(length), length]
         spread = {
-            name: x * size for name, x, size in zip(tables.QUANTITIES, np.moveaxis(rows[..., WIDTH:], -1, 0), sizes)
+            name: x * size
+            for name, x, size in zip(
+                tables.QUANTITIES, np.moveaxis(rows[..., WIDTH:], -1, 0), sizes
+            )
         }
         frequency = at_points(grid.over, FREQUENCIES, scene.frequency)
-        out = tables.pose_variables(dims, rows[..., :3], errors, unit, spread or None, frequency)
+        out = tables.pose_variables(
+            dims, rows[..., :3], errors, unit, spread or None, frequency
+        )
         out.append(Variable("length", dims, length, unit, "of the body"))
-        out += [] if frequency is None else [Variable("frequency", dims, frequency, "Hz")]
+        out += (
+            [] if frequency is None else [Variable("frequency", dims, frequency, "Hz")]
+        )
         note = getattr(scene.gait, "estimate_is", "")
-        title = {"title": f"Net displacement per cycle of the scene {scene.name}", "scene": written.toml(scene)}
+        title = {
+            "title": f"Net displacement per cycle of the scene {scene.name}",
+            "scene": written.toml(scene),
+        }
         return out, {**title, **({"estimate_is": note} if note else {})}
 
     def as_stored(self, result: Result) -> Result:
@@ -93,7 +131,13 @@ class Cycles:
         variables = tables.poses_as_stored(result)
         unit = unit_name(result["length"].unit)
         variables.append(
-            Variable("length", result["length"].dims, result["length"].values, unit, result["length"].label)
+            Variable(
+                "length",
+                result["length"].dims,
+                result["length"].values,
+                unit,
+                result["length"].label,
+            )
         )
         variables += [result["frequency"]] if "frequency" in result else []
         return Result(result.kind, tuple(variables), result.attributes, result.subject)
@@ -105,9 +149,22 @@ class Cycles:
 
         Where the swimmer has a frequency also "frequency", Hz, and "speed", the net distance times it; where the medium
         is uncertain "medium_error", of the position, and "medium_error_heading", rad (`geomech.studies.uncertainty`)."""
-        unit, variables = result["net_distance"].unit, {v.name: v for v in self.as_stored(result).variables}
-        units = {"displacement": [unit, unit, "rad"], "estimate": unit, "estimate_heading": "rad", "length": unit}
-        units |= {"frequency": "Hz", "speed": f"{unit}/s", "medium_error": unit, "medium_error_heading": "rad"}
+        unit, variables = (
+            result["net_distance"].unit,
+            {v.name: v for v in self.as_stored(result).variables},
+        )
+        units = {
+            "displacement": [unit, unit, "rad"],
+            "estimate": unit,
+            "estimate_heading": "rad",
+            "length": unit,
+        }
+        units |= {
+            "frequency": "Hz",
+            "speed": f"{unit}/s",
+            "medium_error": unit,
+            "medium_error_heading": "rad",
+        }
         units = {key: unit for key, unit in units.items() if key in variables}
         return {**{key: variables[key].values for key in units}, "units": units}
 
@@ -127,7 +184,11 @@ def _lengths(grid: Grid) -> np.ndarray:
     for name in grid.over:
         other = next((x for x in values[name] if x != first[name]), first[name])
         fixed = name == AMPLITUDE or of(name, other) == length
-        along = np.ones(len(values[name])) if fixed else np.array([of(name, x) for x in values[name]]) / length
+        along = (
+            np.ones(len(values[name]))
+            if fixed
+            else np.array([of(name, x) for x in values[name]]) / length
+        )
         lengths = lengths[..., None] * along
     return lengths
 
@@ -135,13 +196,19 @@ def _lengths(grid: Grid) -> np.ndarray:
 def _idle(scene: Scene, names) -> tuple[str, ...]:
     """Return the parameters that change no displacement: the frequency, where no effect has one."""
     timed = [f"{section}.frequency" for section in ("gait", "physical")]
-    return tuple(name for name in names if name in timed and scene.system.traits.frequency is None)
+    return tuple(
+        name
+        for name in names
+        if name in timed and scene.system.traits.frequency is None
+    )
 
 
 def _rows(scenes: list[Scene], amplitudes) -> list:
     """Return [[x, y, theta, error, error of theta], ...] for all amplitudes of every scene, solved in batches; errors
     in body lengths and rad."""
-    solve = lambda joined: np.column_stack(estimate.direct(joined, joined.gait, None, joined.numerics.phases))
+    solve = lambda joined: np.column_stack(
+        estimate.direct(joined, joined.gait, None, joined.numerics.phases)
+    )
     return _together(scenes, amplitudes, solve)
 
 
@@ -160,5 +227,10 @@ def _together(scenes: list[Scene], amplitudes, solve: Callable) -> list:
 
 def _doubt(joined: Scene) -> np.ndarray:
     """Return the standard deviations of QUANTITIES by the medium's uncertainty, (N, 4), body lengths and rad."""
-    deviations, length = uncertainty.of_medium(joined, joined.gait, None), joined.system.length
-    return np.column_stack([deviations[q] / (1.0 if q == "heading" else length) for q in tables.QUANTITIES])
+    deviations, length = (
+        uncertainty.of_medium(joined, joined.gait, None),
+        joined.system.length,
+    )
+    return np.column_stack(
+        [deviations[q] / (1.0 if q == "heading" else length) for q in tables.QUANTITIES]
+    )

@@ -43,11 +43,15 @@ class Displacement(Question):
             refuse_costless(self.scene)
 
     def cost(self) -> Cost:
-        effort_jobs = cost.of_effort(self.scene, len(self.amplitudes)) if self.effort else []
+        effort_jobs = (
+            cost.of_effort(self.scene, len(self.amplitudes)) if self.effort else []
+        )
         return self.study.cost(self.amplitudes, self.chosen, more=effort_jobs)
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        result = self.study.study(self.amplitudes, self.chosen, progress=progress).result
+        result = self.study.study(
+            self.amplitudes, self.chosen, progress=progress
+        ).result
         return with_effort(result) if self.effort else result
 
 
@@ -90,7 +94,13 @@ def displacement(
     effort: bool = False,
 ) -> Question:
     """Return the question of a command. tiers: their names, with commas between them."""
-    chosen = () if tiers is None else tuple(choose("``tiers``", name.strip(), TIERS) for name in tiers.split(","))
+    chosen = (
+        ()
+        if tiers is None
+        else tuple(
+            choose("``tiers``", name.strip(), TIERS) for name in tiers.split(",")
+        )
+    )
     if tolerance is None:
         return Displacement(scene, tuple(amplitudes), chosen, effort)
     if chosen:

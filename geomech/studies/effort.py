@@ -46,9 +46,13 @@ from rft.premise import ALL, SHAPE_ALONE
 from rft.refusal import Refusal
 
 DEPENDS_ON = ("grid", "extent", "interpolation")  # of [numerics]
-HIGHEST = 14  # harmonic of a norm that the 24 directions of the harmonic table resolve well
+HIGHEST = (
+    14  # harmonic of a norm that the 24 directions of the harmonic table resolve well
+)
 METRIC = "own metric"  # unit of path lengths by the metric of the system itself
-WORK = "drag x BL"  # the axial drag of the whole body, in a fluid at 1 BL per rad of phase
+WORK = (
+    "drag x BL"  # the axial drag of the whole body, in a fluid at 1 BL per rad of phase
+)
 EVEN = 1e-6  # of the power: above a solver's tolerance
 
 
@@ -62,7 +66,11 @@ def why_none(system: System) -> str:
         return "no metric with this table: its file tells no power, and the scene no medium"
     if system.traits.power_degree is None:
         has_power = capability(system, Dissipative) is not None
-        power = "its power is of no one degree in the rate" if has_power else "nothing says what moving costs"
+        power = (
+            "its power is of no one degree in the rate"
+            if has_power
+            else "nothing says what moving costs"
+        )
         return f"no metric with {_responsible_parts(system)}: {power}"
     if not is_quadratic(system) and system.joints != 2:
         return f"no metric of {system.joints} joints where power is not quadratic: its norm is told for two"
@@ -89,12 +97,17 @@ def _even(system: System) -> bool:
     if system.traits.linear:
         return True
     rng = np.random.default_rng(0)
-    alpha, alphadot = rng.uniform(-1.0, 1.0, (connection.EVEN_SHAPES, 1, 2)), connection.directions(2, 8)
+    alpha, alphadot = (
+        rng.uniform(-1.0, 1.0, (connection.EVEN_SHAPES, 1, 2)),
+        connection.directions(2, 8),
+    )
     forth, back = (power(system, alpha, sign * alphadot) for sign in (1, -1))
     return bool(np.abs(forth - back).max() <= EVEN * np.abs(forth).max())
 
 
-def table(system: System, numerics: Numerics, progress: Callable | None = None) -> Metric | Finsler:
+def table(
+    system: System, numerics: Numerics, progress: Callable | None = None
+) -> Metric | Finsler:
     """Return the metric on the field's grid: quadratic where xi = A alphadot, else a norm. Refusal if there is none."""
     if reason := why_none(system):
         raise Refusal(reason)
@@ -103,7 +116,9 @@ def table(system: System, numerics: Numerics, progress: Callable | None = None) 
     grid, degree = axes(system, numerics), numerics.interpolation
     own = capability(system, OwnMetric)
     if own is not None or is_quadratic(system):
-        return metric.fit(own.squared_speed if own else partial(power, system), grid, degree, progress)
+        return metric.fit(
+            own.squared_speed if own else partial(power, system), grid, degree, progress
+        )
     norm = partial(_norm_of, system)
     count = harmonic.directions(system, numerics)
     return metric.fit_norm(norm, grid, count, degree, progress, highest=HIGHEST)
@@ -111,7 +126,11 @@ def table(system: System, numerics: Numerics, progress: Callable | None = None) 
 
 def shared(system: System) -> bool:
     """Return whether the metric can be computed from the velocities of the harmonic table."""
-    of_its_own = system.traits.linear or capability(system, OwnMetric) is not None or stored_table(system, "connection")
+    of_its_own = (
+        system.traits.linear
+        or capability(system, OwnMetric) is not None
+        or stored_table(system, "connection")
+    )
     return not of_its_own and HARMONIC.is_offered(system)
 
 
@@ -129,10 +148,14 @@ def with_harmonics(
     watched = _Watched(system)
     harmonics = harmonic.table(watched, numerics).build(progress)
     P, size = np.concatenate(watched.powers), np.prod([len(a) for a in harmonics.axes])
-    P = np.concatenate([P, P[: size - len(P)][::-1]])  # with mirror symmetry half of the grid is solved
+    P = np.concatenate(
+        [P, P[: size - len(P)][::-1]]
+    )  # with mirror symmetry half of the grid is solved
     F = _norm(P, system.traits.power_degree).T.reshape(-1, *map(len, harmonics.axes))
     unit = connection.directions(2, len(F))
-    return harmonics, metric.norm_from_samples(F, harmonics.axes, unit, harmonics.degree, highest=HIGHEST)
+    return harmonics, metric.norm_from_samples(
+        F, harmonics.axes, unit, harmonics.degree, highest=HIGHEST
+    )
 
 
 class _Watched:
@@ -154,7 +177,10 @@ class _Driven(connection.Reporting):
     """The velocity of a system, which also passes on the power."""
 
     def __init__(self, system: System, powers: list):
-        self.with_report, self.receive = partial(velocity_and_power, system), powers.append
+        self.with_report, self.receive = (
+            partial(velocity_and_power, system),
+            powers.append,
+        )
 
     def __reduce__(self) -> tuple:
         return _Driven, (self.with_report.args[0], [])
@@ -172,11 +198,21 @@ def refuse_costless(scene: Scene) -> None:
     """Refuse a scene whose cost of moving is not known."""
     system = scene.system
     if not any(capability(system, kind) for kind in (Dissipative, OwnMetric)):
-        what = "its file does not tell it" if stored_table(system, "connection") else "nothing says what moving costs"
-        raise Refusal(f"no path length or work with the {kind_of(system)}", where=scene.name, instead=what)
+        what = (
+            "its file does not tell it"
+            if stored_table(system, "connection")
+            else "nothing says what moving costs"
+        )
+        raise Refusal(
+            f"no path length or work with the {kind_of(system)}",
+            where=scene.name,
+            instead=what,
+        )
 
 
-def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int | None = None) -> dict[str, np.ndarray]:
+def effort(
+    scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int | None = None
+) -> dict[str, np.ndarray]:
     """Return {"path_length", "work", "path_length_error", "work_error"} (B,) of a gait, or the scene's own, by the
     direct tier.
 
@@ -185,11 +221,15 @@ def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int 
     are not included. Path lengths are nan where power has no one degree in the rate. Refusal where the cost of moving
     is not known."""
     system, gait = scene.system, checked_gait(scene.gait if gait is None else gait)
-    amplitudes = real_array("amplitudes", [gait.amplitude] if amplitudes is None else amplitudes).ravel()
+    amplitudes = real_array(
+        "amplitudes", [gait.amplitude] if amplitudes is None else amplitudes
+    ).ravel()
     in_range("phases", phases or 8, 8, 1e6, whole=True)
     phases = phases_of(scene, phases)
     finer = (
-        scene.with_numerics(pieces=min(2 * pieces_per_length(system), MOST_PIECES)).system
+        scene.with_numerics(
+            pieces=min(2 * pieces_per_length(system), MOST_PIECES)
+        ).system
         if pieces_per_length(system)
         else None
     )
@@ -201,7 +241,9 @@ def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int 
         rates = _rates(system, *shapes)
         fine = integral(rates)
         fewer = [tuple(x[..., ::step, :] for x in shapes) for step in (2, 4)]
-        if system.traits.steps:  # each step depends on the one before: fewer phases are other steps
+        if (
+            system.traits.steps
+        ):  # each step depends on the one before: fewer phases are other steps
             half, quarter = (integral(_rates(system, *coarser)) for coarser in fewer)
             error = np.maximum(np.abs(fine - half), np.abs(half - quarter) / 4)
         else:
@@ -212,12 +254,20 @@ def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int 
         return np.concatenate([fine, error], 1)
 
     names = ("path_length", "work", "path_length_error", "work_error")
-    return dict(zip(names, in_groups(integrals, amplitudes, gaits_per_batch(system, phases))[:, :4].T))
+    return dict(
+        zip(
+            names,
+            in_groups(integrals, amplitudes, gaits_per_batch(system, phases))[:, :4].T,
+        )
+    )
 
 
 def phases_of(scene: Scene, phases: int | None = None) -> int:
     """Return the number of phases of `effort`, rounded up, from the number given or the scene's own."""
-    return max(32 if scene.system.traits.steps else 8, -(-(phases or scene.numerics.phases) // 4) * 4)
+    return max(
+        32 if scene.system.traits.steps else 8,
+        -(-(phases or scene.numerics.phases) // 4) * 4,
+    )
 
 
 def _rates(system: System, alpha, alphadot) -> np.ndarray:
@@ -229,7 +279,9 @@ def _rates(system: System, alpha, alphadot) -> np.ndarray:
         return np.stack([_norm(square, 2.0), np.full_like(square, np.nan)], 1)
     work = system.run(alpha, alphadot, True).work
     P = power(system, alpha, alphadot) if work is None else work.power / system.length
-    return np.stack([np.full_like(P, np.nan) if degree is None else _norm(P, degree), P], 1)
+    return np.stack(
+        [np.full_like(P, np.nan) if degree is None else _norm(P, degree), P], 1
+    )
 
 
 def with_effort(result: Result) -> Result:
@@ -238,15 +290,34 @@ def with_effort(result: Result) -> Result:
     where undefined."""
     scene, gait = result.subject
     efforts, unit = effort(scene, gait, result["amplitude"].values), units(scene.system)
-    degree, distance = scene.system.traits.power_degree, result["net_distance"].values / scene.system.length
+    degree, distance = (
+        scene.system.traits.power_degree,
+        result["net_distance"].values / scene.system.length,
+    )
     with np.errstate(divide="ignore", invalid="ignore"):
-        towed = np.nan * distance if degree is None else distance * (distance / (2 * np.pi)) ** (degree - 1)
-        ratios = {"efficiency": distance / efforts["path_length"], "cost_of_transport": efforts["work"] / towed}
+        towed = (
+            np.nan * distance
+            if degree is None
+            else distance * (distance / (2 * np.pi)) ** (degree - 1)
+        )
+        ratios = {
+            "efficiency": distance / efforts["path_length"],
+            "cost_of_transport": efforts["work"] / towed,
+        }
     extra = [
-        Variable(key, ("amplitude",), efforts[key], unit.get(key, ""), "", efforts[f"{key}_error"])
+        Variable(
+            key,
+            ("amplitude",),
+            efforts[key],
+            unit.get(key, ""),
+            "",
+            efforts[f"{key}_error"],
+        )
         for key in ("path_length", "work")
     ]
-    extra += [Variable(key, tables.OVER, x, unit.get(key, "")) for key, x in ratios.items()]
+    extra += [
+        Variable(key, tables.OVER, x, unit.get(key, "")) for key, x in ratios.items()
+    ]
     return replace(result, variables=(*result.variables, *extra))
 
 
@@ -254,4 +325,9 @@ def units(system: System) -> dict[str, str]:
     """Return the units of the variables that `with_effort` adds."""
     if capability(system, OwnMetric) is not None:
         return {"path_length": METRIC, "efficiency": f"BL / {METRIC}"}
-    return {"path_length": "BL", "work": WORK, "efficiency": "BL/BL", "cost_of_transport": "1"}
+    return {
+        "path_length": "BL",
+        "work": WORK,
+        "efficiency": "BL/BL",
+        "cost_of_transport": "1",
+    }

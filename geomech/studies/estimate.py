@@ -16,20 +16,24 @@ from geomech.gaits import Gait
 from geomech.geometry.reconstruct import displacement
 from geomech.run.jobs import runner
 from geomech.scenes.model import Scene
-from geomech.systems.capabilities import gaits_per_batch, is_closed, pieces_per_length, refined, table_error
+from geomech.systems.capabilities import (
+    gaits_per_batch,
+    is_closed,
+    pieces_per_length,
+    refined,
+    table_error,
+)
 from rft.refusal import located
 
-CHECKED = (
-    33  # amplitudes at which a look-up tier is compared with the direct one; between them the worse neighbour counts
+CHECKED = 33  # amplitudes at which a look-up tier is compared with the direct one; between them the worse neighbour counts
+FEWEST_STEPS = (
+    64  # of time stepping that is refined: an eighth of them still resolves a gait
 )
-FEWEST_STEPS = 64  # of time stepping that is refined: an eighth of them still resolves a gait
 REFERENCE_PHASES = 64  # of that comparison without the direct tier in the request
 MOST_PIECES = 10_000  # per body length
 SAFETY = 2.5  # covers the truth in more than 95 % of random scenes while the median estimate stays below ten errors
 SEEN = 1.2  # times the difference from smaller regularisation and exact integrals, which is nearly all of the error
-SEEN_BY_RULES = (
-    3.5  # likewise between two rules, of order 1 in dry media; at least half of the larger of both, as they scatter
-)
+SEEN_BY_RULES = 3.5  # likewise between two rules, of order 1 in dry media; at least half of the larger of both, as they scatter
 ROUNDING = 2e-16  # of a velocity
 
 
@@ -43,7 +47,9 @@ def pose_distance(a, b, length: float) -> np.ndarray:
     return np.stack([distance(a, b) / length, np.abs(a[..., 2] - b[..., 2])], -1)
 
 
-def direct(scene: Scene, gait: Gait, amplitudes: np.ndarray, phases: int) -> tuple[np.ndarray, np.ndarray]:
+def direct(
+    scene: Scene, gait: Gait, amplitudes: np.ndarray, phases: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Return poses (B, 3) and errors (B, 2), body lengths and rad, of the direct tier.
 
     phases is rounded up to a multiple of 8, >= 32. Many amplitudes are computed in groups, so that memory is bounded.
@@ -52,18 +58,25 @@ def direct(scene: Scene, gait: Gait, amplitudes: np.ndarray, phases: int) -> tup
     return poses, sum(errors)
 
 
-def in_groups(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int) -> tuple[np.ndarray, ...]:
+def in_groups(
+    scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int
+) -> tuple[np.ndarray, ...]:
     """Return poses, errors without those of the pieces of body, and errors of these, of the direct tier. amplitudes:
     None for the gait's own."""
     size = gaits_per_batch(scene.system, phases)
     groups = (
-        [None] if amplitudes is None else [amplitudes[k : k + size] for k in range(0, max(1, len(amplitudes)), size)]
+        [None]
+        if amplitudes is None
+        else [amplitudes[k : k + size] for k in range(0, max(1, len(amplitudes)), size)]
     )
     compute = (
         _direct if scene.system.traits.steps else partial(runner().call, _direct)
     )  # time stepping stores its own checkpoints
     with located(scene.name):
-        return tuple(np.concatenate(x) for x in zip(*(compute(scene, gait, group, phases) for group in groups)))
+        return tuple(
+            np.concatenate(x)
+            for x in zip(*(compute(scene, gait, group, phases) for group in groups))
+        )
 
 
 def _direct(
@@ -76,21 +89,34 @@ def _direct(
     strided = [tuple(x[..., ::step, :] for x in shapes) for step in (8, 4, 2, 1)]
     run = system.run(*shapes)
     if stepping:  # each step depends on the one before: fewer phases are other steps
-        eighth, coarse, half, full = *(_with_fewer(system, *fewer) for fewer in strided[:3]), run.net
+        eighth, coarse, half, full = (
+            *(_with_fewer(system, *fewer) for fewer in strided[:3]),
+            run.net,
+        )
     else:
-        eighth, coarse, half = (displacement(run.xi[..., ::step, :]) for step in (8, 4, 2))
+        eighth, coarse, half = (
+            displacement(run.xi[..., ::step, :]) for step in (8, 4, 2)
+        )
         full = run.net
     error = _remaining(
-        *(pose_distance(*pair, scene.system.length) for pair in ((coarse, eighth), (half, coarse), (full, half))),
+        *(
+            pose_distance(*pair, scene.system.length)
+            for pair in ((coarse, eighth), (half, coarse), (full, half))
+        ),
         stepping or not system.traits.smooth,
     )
     error += 2 * np.pi * (np.maximum(run.residual, ROUNDING) * run.speed)[:, None]
     if finer := refined(system):
-        difference = pose_distance(finer.run(*strided[1], start=run.xi[..., ::4, :]).net, coarse, scene.system.length)
+        difference = pose_distance(
+            finer.run(*strided[1], start=run.xi[..., ::4, :]).net,
+            coarse,
+            scene.system.length,
+        )
         error += (
             SEEN * difference
             if is_closed(system)
-            else SEEN_BY_RULES * np.maximum(difference, difference.max(-1, keepdims=True) / 2)
+            else SEEN_BY_RULES
+            * np.maximum(difference, difference.max(-1, keepdims=True) / 2)
         )
     error += np.asarray(run.to_come)[..., None] + table_error(system, *strided[2])
     return full, error, pieces_error(scene, shapes, strided[1], coarse)
@@ -116,7 +142,9 @@ def pieces_error(scene: Scene, shapes, fewer, coarse: np.ndarray) -> np.ndarray:
     cut = pieces_per_length(scene.system)
     if not cut:
         return np.zeros((*coarse.shape[:-1], 2))
-    net = lambda n, cycle: scene.with_numerics(pieces=min(max(1, n), MOST_PIECES)).system.run(*cycle).net
+    net = lambda n, cycle: (
+        scene.with_numerics(pieces=min(max(1, n), MOST_PIECES)).system.run(*cycle).net
+    )
     length = scene.system.length
     doubled = pose_distance(net(2 * cut, fewer), coarse, length)
     chance = pose_distance(net(cut // 2, shapes), net(cut // 4, shapes), length) / 8
@@ -135,15 +163,25 @@ def _remaining(d0, d1, d2, kinks: bool) -> np.ndarray:
     return SAFETY * move * r / (1.0 - r)
 
 
-def against_direct(scene: Scene, poses, gait: Gait, amplitudes: np.ndarray, reference=None) -> np.ndarray:
+def against_direct(
+    scene: Scene, poses, gait: Gait, amplitudes: np.ndarray, reference=None
+) -> np.ndarray:
     """Return errors (B, 2), as in `direct`, of poses (B, 3) by any other tier. reference: (poses, errors) of the direct
     tier at the same amplitudes; computed at some of them if None."""
     if reference is None:
-        checked = np.unique(np.linspace(0, len(amplitudes) - 1, CHECKED).round().astype(int))
-        reference = direct(scene, gait, amplitudes[checked], max(REFERENCE_PHASES, 8 * gait.harmonics))
+        checked = np.unique(
+            np.linspace(0, len(amplitudes) - 1, CHECKED).round().astype(int)
+        )
+        reference = direct(
+            scene, gait, amplitudes[checked], max(REFERENCE_PHASES, 8 * gait.harmonics)
+        )
     else:
         checked = np.arange(len(amplitudes))
-    checked_errors = pose_distance(poses[checked], reference[0], scene.system.length) + reference[1]
+    checked_errors = (
+        pose_distance(poses[checked], reference[0], scene.system.length) + reference[1]
+    )
     lower = np.searchsorted(checked, np.arange(len(amplitudes)), side="right") - 1
-    upper = np.minimum(lower + (checked[lower] < np.arange(len(amplitudes))), len(checked) - 1)
+    upper = np.minimum(
+        lower + (checked[lower] < np.arange(len(amplitudes))), len(checked) - 1
+    )
     return np.maximum(checked_errors[lower], checked_errors[upper])

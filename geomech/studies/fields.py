@@ -29,7 +29,13 @@ from geomech.studies import effort
 from geomech.studies.study import Study
 from geomech.studies.tables import COMPONENTS
 from geomech.systems.base import System, length_unit, shape_labels
-from geomech.systems.capabilities import OwnMetric, Recorded, capability, solver_of, stored_table
+from geomech.systems.capabilities import (
+    OwnMetric,
+    Recorded,
+    capability,
+    solver_of,
+    stored_table,
+)
 from geomech.systems.framed import Framed
 from rft.refusal import Refusal
 
@@ -47,16 +53,30 @@ def of_study(study: Study) -> Result:
     With units, conventions (`about`) and the scene's text. `Connection.load` and [system] kind = "table" read it from a
     file."""
     labels = shape_labels(study.scene.system)
-    return Result("connection", (*coordinates(study.fitted.axes, labels), *variables(study)), attributes(study), study)
+    return Result(
+        "connection",
+        (*coordinates(study.fitted.axes, labels), *variables(study)),
+        attributes(study),
+        study,
+    )
 
 
 def of_connection_alone(study: Study) -> Result:
     """Return what `of_study` has of A, its errors and its axes, and of a metric that is a quadratic form."""
     labels = shape_labels(study.scene.system)
-    variables = of_connection(study.fitted, stored_table(study.scene.system, "A_error")) + of_even_part(study)
+    variables = of_connection(
+        study.fitted, stored_table(study.scene.system, "A_error")
+    ) + of_even_part(study)
     if has_matrix(study.scene.system):
-        variables += of_metric(study.metric, capability(study.scene.system, OwnMetric) is None)
-    return Result("connection", (*coordinates(study.fitted.axes, labels), *variables), attributes(study), study)
+        variables += of_metric(
+            study.metric, capability(study.scene.system, OwnMetric) is None
+        )
+    return Result(
+        "connection",
+        (*coordinates(study.fitted.axes, labels), *variables),
+        attributes(study),
+        study,
+    )
 
 
 def of_struct(study: Study) -> Result:
@@ -65,10 +85,18 @@ def of_struct(study: Study) -> Result:
     alone, fitted = of_connection_alone(study), study.fitted
     frame = minimum_perturbation(fitted)
     optimised = replace(fitted, A=frame.connection(fitted))
-    variables = [replace(of_connection(optimised)[0], name="A_optimised"), of_frame(frame.field)]
+    variables = [
+        replace(of_connection(optimised)[0], name="A_optimised"),
+        of_frame(frame.field),
+    ]
     for ending, each in (("", fitted), ("_optimized", optimised)):
         variables.append(of_ccf(ccf(each), name=f"ccf{ending}"))
-        variables.append(of_ccf(replace(fitted.field, values=exterior_derivative(each)), name=f"exterior{ending}"))
+        variables.append(
+            of_ccf(
+                replace(fitted.field, values=exterior_derivative(each)),
+                name=f"exterior{ending}",
+            )
+        )
     return Result(alone.kind, (*alone.variables, *variables), alone.attributes, study)
 
 
@@ -77,7 +105,13 @@ CONTENTS = {WHOLE: of_study, A_ALONE: of_connection_alone, STRUCT: of_struct}
 
 def contents(file: Callable, layout: str | None = None) -> str:
     """Return which of CONTENTS a format writes, in a layout that it may have."""
-    return STRUCT if layout == LAYOUTS[1] else WHOLE if getattr(file, "whole", True) else A_ALONE
+    return (
+        STRUCT
+        if layout == LAYOUTS[1]
+        else WHOLE
+        if getattr(file, "whole", True)
+        else A_ALONE
+    )
 
 
 def save_connection(path: str | Path, study: Study, **settings: str) -> None:
@@ -85,27 +119,39 @@ def save_connection(path: str | Path, study: Study, **settings: str) -> None:
     whole or not at all."""
     file = FORMATS[Path(path).suffix]
     check_joints(study.scene, file)
-    file.write(path, CONTENTS[contents(file, settings.get("layout"))](study), **settings)
+    file.write(
+        path, CONTENTS[contents(file, settings.get("layout"))](study), **settings
+    )
 
 
 def has_matrix(system: System) -> bool:
     """Return whether a system has a metric that is a quadratic form of the rates of shape."""
     own = stored_table(system, "metric")
-    return isinstance(own, Metric) if own else not effort.why_none(system) and effort.is_quadratic(system)
+    return (
+        isinstance(own, Metric)
+        if own
+        else not effort.why_none(system) and effort.is_quadratic(system)
+    )
 
 
 def check_joints(scene: Scene, file: Callable | None) -> None:
     """Refuse a body of more or fewer joints than a format (`geomech.io.tables.FORMATS`), if there is one, takes."""
     if (only := getattr(file, "joints", None)) not in (None, scene.system.joints):
         why = f"a {file.suffix} file has a layout of {only} joints, and this body has {scene.system.joints}"
-        raise Refusal(why, where=scene.name, instead="write a .nc file, which takes any number of joints")
+        raise Refusal(
+            why,
+            where=scene.name,
+            instead="write a .nc file, which takes any number of joints",
+        )
 
 
 def attributes(study: Study) -> dict:
     """Return title, conventions, numerics and text of a scene, as attributes of a file of its connection."""
     scene = study.scene
     numerics = (
-        repr(scene.numerics) if solver_of(scene.system) is None else f"{scene.numerics}, {solver_of(scene.system)}"
+        repr(scene.numerics)
+        if solver_of(scene.system) is None
+        else f"{scene.numerics}, {solver_of(scene.system)}"
     )
     return {
         "title": f"Local connection and curvature constraint function of the scene {scene.name}",
@@ -115,7 +161,8 @@ def attributes(study: Study) -> dict:
         "interpolation": int(study.fitted.degree),
         **(
             {}
-            if (degree := scene.system.traits.power_degree) is None or effort.why_none(scene.system)
+            if (degree := scene.system.traits.power_degree) is None
+            or effort.why_none(scene.system)
             else {"power_degree": degree}
         ),
     }
@@ -147,12 +194,20 @@ def of_even_part(study: Study) -> list[Variable]:
     """Return the part of the velocity that is even in alphadot, if there is one."""
     if (even := study.even_part) is None:
         return []
-    units = f"{unit_name(length_unit(study.scene.system))} rad-1 (x, y), rad rad-1 (theta)"
+    units = (
+        f"{unit_name(length_unit(study.scene.system))} rad-1 (x, y), rad rad-1 (theta)"
+    )
     name = "rms over directions of xi(alphadot) + xi(-alphadot), |alphadot| = 1, which A takes for 0"
-    return [Variable("even_part", ("component", *angles_of(study.fitted.axes)), even, units, name)]
+    return [
+        Variable(
+            "even_part", ("component", *angles_of(study.fitted.axes)), even, units, name
+        )
+    ]
 
 
-def of_connection(fitted: Connection, error: np.ndarray | None = None) -> list[Variable]:
+def of_connection(
+    fitted: Connection, error: np.ndarray | None = None
+) -> list[Variable]:
     """Return A, its fit residual, and the rms of xi. error: half widths (3, d, N_1, ...) of intervals of A."""
     angles = angles_of(fitted.axes)
     units = f"{unit_name(fitted.unit)} rad-1 (x, y), rad rad-1 (theta)"
@@ -160,9 +215,17 @@ def of_connection(fitted: Connection, error: np.ndarray | None = None) -> list[V
     speed = "rms of xi over directions of alphadot, |alphadot| = 1"
     return [
         Variable(
-            "A", ("component", "joint", *angles), fitted.A, units, "local connection", error, error_label=INTERVAL_OF_A
+            "A",
+            ("component", "joint", *angles),
+            fitted.A,
+            units,
+            "local connection",
+            error,
+            error_label=INTERVAL_OF_A,
         ),
-        Variable("fit_residual", ("component", *angles), fitted.residual, units, residual),
+        Variable(
+            "fit_residual", ("component", *angles), fitted.residual, units, residual
+        ),
         Variable("speed", ("component", *angles), fitted.speed, units, speed),
     ]
 
@@ -170,7 +233,9 @@ def of_connection(fitted: Connection, error: np.ndarray | None = None) -> list[V
 def of_reach(tube: Tube) -> Variable:
     """Return the distance of the grid of a connection near one gait from it."""
     shapes = np.stack(np.meshgrid(*tube.axes, indexing="ij"), -1)
-    label = "distance from the mean gait over that which the data reach: A is nan beyond 1"
+    label = (
+        "distance from the mean gait over that which the data reach: A is nan beyond 1"
+    )
     return Variable("reach", angles_of(tube.axes), tube.reach(shapes), "1", label)
 
 
@@ -207,21 +272,46 @@ def of_known(known: TaylorSeries, unit: str) -> list[Variable]:
     ]  # fmt: skip
 
 
-def of_ccf(field: Field, error: Field | None = None, what: str = ERROR_OF_CCF, name: str = "ccf") -> Variable:
+def of_ccf(
+    field: Field,
+    error: Field | None = None,
+    what: str = ERROR_OF_CCF,
+    name: str = "ccf",
+) -> Variable:
     """Return a CCF as a variable. what: text on the kind of its error."""
     units = f"{unit_name(field.unit)} rad-2 (x, y), rad rad-2 (theta)"
-    label, dims = "curvature constraint function of joints 1 and 2", ("component", *angles_of(field.axes))
-    return Variable(name, dims, field.values, units, label, None if error is None else error.values, error_label=what)
+    label, dims = (
+        "curvature constraint function of joints 1 and 2",
+        ("component", *angles_of(field.axes)),
+    )
+    return Variable(
+        name,
+        dims,
+        field.values,
+        units,
+        label,
+        None if error is None else error.values,
+        error_label=what,
+    )
 
 
 def of_pairs(form: TwoForm, error: TwoForm) -> list[Variable]:
     """Return the CCF of all pairs of joints, its error, and the pairs."""
     units = f"{unit_name(form.field.unit)} rad-2 (x, y), rad rad-2 (theta)"
-    pairs, over = np.array(form.pairs) + 1.0, ("pair", "component", *angles_of(form.field.axes))
+    pairs, over = (
+        np.array(form.pairs) + 1.0,
+        ("pair", "component", *angles_of(form.field.axes)),
+    )
     order = ", ".join(f"{i:g} {j:g}" for i, j in pairs)
     label = f"curvature constraint function of joints {order}, in this order"
     return [
-        Variable("pair_joints", ("pair", "first_and_second"), pairs, "1", "joints i < j of each pair"),
+        Variable(
+            "pair_joints",
+            ("pair", "first_and_second"),
+            pairs,
+            "1",
+            "joints i < j of each pair",
+        ),
         Variable(
             "ccf_pairs",
             over,
@@ -238,7 +328,9 @@ def of_frame(pose: Field) -> Variable:
     """Return the pose of a minimum-perturbation frame in the original frame."""
     units = f"{unit_name(pose.unit)} (x, y), rad (theta)"
     name = "pose of this frame in the mean frame of the body, h with g_this = g_mean h"
-    return Variable("frame_pose", ("component", *angles_of(pose.axes)), pose.values, units, name)
+    return Variable(
+        "frame_pose", ("component", *angles_of(pose.axes)), pose.values, units, name
+    )
 
 
 def of_harmonics(table: Harmonics, unit: str) -> list[Variable]:
@@ -248,28 +340,57 @@ def of_harmonics(table: Harmonics, unit: str) -> list[Variable]:
     name = "coefficients of cos(k beta), sin(k beta), k = 1, 3, 5 ..., of xi for alphadot = (cos beta, sin beta)"
     residual = "rms over directions of alphadot of what the harmonics leave of xi, |alphadot| = 1"
     return [
-        Variable("harmonics", ("component", "coefficient", *angles), table.coefficients, units, name),
-        Variable("harmonics_residual", ("component", *angles), table.residual, units, residual),
+        Variable(
+            "harmonics",
+            ("component", "coefficient", *angles),
+            table.coefficients,
+            units,
+            name,
+        ),
+        Variable(
+            "harmonics_residual",
+            ("component", *angles),
+            table.residual,
+            units,
+            residual,
+        ),
     ]
 
 
 def of_metric(metric: Metric | Finsler, power: bool = True) -> list[Variable]:
     """Return M, or the coefficients of a norm and their residual. power: it is the power of drag, not the system's own
     metric."""
-    angles, size = angles_of(metric.axes), "drag that of the whole body along itself, lengths those of the body"
+    angles, size = (
+        angles_of(metric.axes),
+        "drag that of the whole body along itself, lengths those of the body",
+    )
     if isinstance(metric, Metric):
         if not power:
             own = "metric M of the system itself: alphadot . M alphadot is what it costs to change shape"
-            return [Variable("metric", ("joint", "other_joint", *angles), metric.M, effort.METRIC, own)]
+            return [
+                Variable(
+                    "metric",
+                    ("joint", "other_joint", *angles),
+                    metric.M,
+                    effort.METRIC,
+                    own,
+                )
+            ]
         name = f"dissipation metric M, power = alphadot . M alphadot; {size}"
         units = "axial drag at 1 body length per time x body length x time rad-2"
-        return [Variable("metric", ("joint", "other_joint", *angles), metric.M, units, name)]
+        return [
+            Variable("metric", ("joint", "other_joint", *angles), metric.M, units, name)
+        ]
     name = "coefficients of 1, cos(k beta), sin(k beta), k = 2, 4 ..., of F = power^(1 / power_degree) for alphadot = "
     units = "(axial drag x body length)^(1 / power_degree) rad-1"
     residual = "rms over directions of alphadot of what the coefficients leave of F, |alphadot| = 1"
     return [
         Variable(
-            "norm", ("norm_coefficient", *angles), metric.coefficients, units, f"{name}(cos beta, sin beta); {size}"
+            "norm",
+            ("norm_coefficient", *angles),
+            metric.coefficients,
+            units,
+            f"{name}(cos beta, sin beta); {size}",
         ),
         Variable("norm_residual", angles, metric.residual, units, residual),
     ]
@@ -280,7 +401,9 @@ def angles_of(axes) -> tuple[str, ...]:
     return tuple(f"alpha_{k + 1}" for k in range(len(axes)))
 
 
-def coordinates(axes: Sequence[np.ndarray], labels: Sequence[tuple[str, str]]) -> list[Variable]:
+def coordinates(
+    axes: Sequence[np.ndarray], labels: Sequence[tuple[str, str]]
+) -> list[Variable]:
     """Return components, joints and the axes of shape space; labels: (name, unit) of each shape variable, alpha_k for an
     angle between links."""
     variables = [
@@ -289,25 +412,48 @@ def coordinates(axes: Sequence[np.ndarray], labels: Sequence[tuple[str, str]]) -
     ]
     for k, (name, axis, (label, unit)) in enumerate(zip(angles_of(axes), axes, labels)):
         joint = f"angle of joint {k + 1}, heading of link {k + 2} minus link {k + 1}"
-        variables.append(Variable(name, (name,), axis, unit, joint if label == name else f"{SHAPE}{label}"))
+        variables.append(
+            Variable(
+                name, (name,), axis, unit, joint if label == name else f"{SHAPE}{label}"
+            )
+        )
     return variables
 
 
 def of_fitted(fitted: Connection, shapes: Sequence[str] = ()) -> Result:
     """Return A, its fit residual and the rms of xi. shapes: names of the shape variables, where these are no joint angles."""
     sized = (
-        {} if fitted.length is None else {"body_length": float(fitted.length), "length_unit": unit_name(fitted.unit)}
+        {}
+        if fitted.length is None
+        else {
+            "body_length": float(fitted.length),
+            "length_unit": unit_name(fitted.unit),
+        }
     )
-    variables = (*coordinates(fitted.axes, _labels(fitted.axes, shapes)), *of_connection(fitted))
-    return Result("connection", variables, {"sign_of_A": "xi = + A alphadot", **sized}, fitted)
+    variables = (
+        *coordinates(fitted.axes, _labels(fitted.axes, shapes)),
+        *of_connection(fitted),
+    )
+    return Result(
+        "connection", variables, {"sign_of_A": "xi = + A alphadot", **sized}, fitted
+    )
 
 
 def of_field(values: Field, name: str, shapes: Sequence[str] = ()) -> Result:
     """Return a field; with rows x, y and theta it is a CCF, in its units."""
     lead = values.values.shape[: -values.joints]
     dims = (*(f"dimension_{k}" for k in range(len(lead))), *angles_of(values.axes))
-    field = of_ccf(values, name=name) if lead == (3,) else Variable(name, dims, values.values)
-    return Result("field", (*coordinates(values.axes, _labels(values.axes, shapes)), field), {}, values)
+    field = (
+        of_ccf(values, name=name)
+        if lead == (3,)
+        else Variable(name, dims, values.values)
+    )
+    return Result(
+        "field",
+        (*coordinates(values.axes, _labels(values.axes, shapes)), field),
+        {},
+        values,
+    )
 
 
 def _labels(axes, names: Sequence[str]) -> list[tuple[str, str]]:
@@ -329,8 +475,13 @@ def _body(system: System) -> Any:
 def about(scene: Scene) -> dict:
     """Return the conventions of a connection as attributes of a file: frame, length, forces and signs."""
     system = scene.system
-    meanings = {"mean": "centre of mass, length-weighted mean heading", UNKNOWN_FRAME: "not told by its file"}
-    meanings["minimum-perturbation"] = "the one in which the squares of A, integrated over the grid, are least"
+    meanings = {
+        "mean": "centre of mass, length-weighted mean heading",
+        UNKNOWN_FRAME: "not told by its file",
+    }
+    meanings["minimum-perturbation"] = (
+        "the one in which the squares of A, integrated over the grid, are least"
+    )
     meanings["that of the log"] = "the one whose x, y and heading were logged"
     meaning = meanings.get(scene.frame, "centre and heading of that link, 1 the tail")
     return {

@@ -25,9 +25,7 @@ from rft.premise import Premise
 from rft.refusal import located
 
 FLANK, PARTS = ("normal", "tangential"), ("normal", "tangential", "ends")
-SEEN = (
-    1.2  # times a change: that to a law computed more exactly is nearly all of the error (`geomech.studies.estimate`)
-)
+SEEN = 1.2  # times a change: that to a law computed more exactly is nearly all of the error (`geomech.studies.estimate`)
 NEAR = 1 / 32  # cycle
 LEAST_STEPS = 8  # of time stepping
 STILL = 1e-6  # body lengths per cycle, below which there is no direction of travel
@@ -54,7 +52,9 @@ class Forces(Question):
 
     def cost(self) -> Cost:
         scenes = [self.scene, *_variants(self.scene)]
-        once = lambda scene: direct(_divided(scene), scene.gait, 1, scene.numerics.phases, checked=False)
+        once = lambda scene: direct(
+            _divided(scene), scene.gait, 1, scene.numerics.phases, checked=False
+        )
         return price([job for scene in scenes for job in once(scene)])
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
@@ -85,11 +85,17 @@ def with_errors(result: Result) -> Result:
     phase, as changes pass through zero. Errors of order 2 are a third of these changes; near stuck links they scatter."""
     scene, unit = result.subject.scene, result.subject.newtons
     others = [forces(other, unit=unit) for other in _variants(scene)]
-    return replace(result, variables=tuple(_with_error(v, result, others) for v in result.variables))
+    return replace(
+        result,
+        variables=tuple(_with_error(v, result, others) for v in result.variables),
+    )
 
 
 def _with_error(v: Variable, result: Result, others: list[Result]) -> Variable:
-    if v.dims not in (("phase",), ("phase", "s"), ("phase", "point")) or v.is_coordinate:
+    if (
+        v.dims not in (("phase",), ("phase", "s"), ("phase", "point"))
+        or v.is_coordinate
+    ):
         return v
     from scipy.interpolate import make_interp_spline
     from scipy.ndimage import maximum_filter1d
@@ -98,9 +104,13 @@ def _with_error(v: Variable, result: Result, others: list[Result]) -> Variable:
     for other in others:
         values = other[v.name].values
         for place in v.dims[1:]:
-            values = make_interp_spline(other[place].values, values, 1, axis=1)(result[place].values)
+            values = make_interp_spline(other[place].values, values, 1, axis=1)(
+                result[place].values
+            )
         change = SEEN * np.abs(v.values[:: len(error) // len(values)] - values)
-        near = maximum_filter1d(change, 2 * round(NEAR * len(change)) + 1, axis=0, mode="wrap")
+        near = maximum_filter1d(
+            change, 2 * round(NEAR * len(change)) + 1, axis=0, mode="wrap"
+        )
         error += near if len(near) == len(error) else near.max(0)
     return replace(v, error=error)
 
@@ -156,10 +166,19 @@ def forces(scene: Scene, sizes: Sizes = UNKNOWN, unit: Newtons | None = None) ->
     pose = _poses(system, gait, cycle.xi)
     unit = unit or newtons(scene, system, sizes)
     run = Run(scene, pose[-1], _direction(pose[-1]), unit, activation_of(bent, moment))
-    ahead = _ahead(run, pose)[:, None] * (elements.c + 1j * elements.s).T  # elements, the real axis that of travel
-    of_ends = work.end_force[:, 0] * ahead[:, [0, -1]].real - work.end_force[:, 1] * ahead[:, [0, -1]].imag
+    ahead = (
+        _ahead(run, pose)[:, None] * (elements.c + 1j * elements.s).T
+    )  # elements, the real axis that of travel
+    of_ends = (
+        work.end_force[:, 0] * ahead[:, [0, -1]].real
+        - work.end_force[:, 1] * ahead[:, [0, -1]].imag
+    )
     along, across = work.element_force[:, 0], work.element_force[:, 1]
-    parts = {"normal": -across * ahead.imag, "tangential": along * ahead.real, "ends": of_ends}
+    parts = {
+        "normal": -across * ahead.imag,
+        "tangential": along * ahead.real,
+        "ends": of_ends,
+    }
     variables = [
         *_coordinates(len(pose) - 1, length, points, bent.s),
         *_maps(parts, along, across, work, length),
@@ -167,11 +186,19 @@ def forces(scene: Scene, sizes: Sizes = UNKNOWN, unit: Newtons | None = None) ->
         *_by_place(parts, length),
         *_of_joints(run.activation),
     ]
-    facts = {"name": scene.name, "axial_drag": run.newtons.how, "direction": run.direction}
-    return Result("forces", tuple(_converted(v, run.newtons) for v in variables), facts, run)
+    facts = {
+        "name": scene.name,
+        "axial_drag": run.newtons.how,
+        "direction": run.direction,
+    }
+    return Result(
+        "forces", tuple(_converted(v, run.newtons) for v in variables), facts, run
+    )
 
 
-def _poses(system: Any, gait: tuple[np.ndarray, np.ndarray], xi: np.ndarray) -> np.ndarray:
+def _poses(
+    system: Any, gait: tuple[np.ndarray, np.ndarray], xi: np.ndarray
+) -> np.ndarray:
     """Return the poses (N + 1, 3) of the frame during a cycle of shapes and rates with body velocities (N, 3)."""
     stepped = capability(system, Stepped)
     if stepped is None or not system.traits.lacks & Premise.SE2_SYMMETRIC:
@@ -191,50 +218,105 @@ def _ahead(run: Run, pose: np.ndarray) -> np.ndarray:
     return np.exp(1j * (pose[:-1, 2] - travel))
 
 
-def _coordinates(phases: int, length: np.ndarray, points: np.ndarray, joints: np.ndarray) -> list[Variable]:
+def _coordinates(
+    phases: int, length: np.ndarray, points: np.ndarray, joints: np.ndarray
+) -> list[Variable]:
     place = "from tail 0 to head 1"
     return [
-        Variable("phase", ("phase",), 2 * np.pi * np.arange(phases) / phases, "rad", "phase of the gait"),
-        Variable("s", ("s",), np.cumsum(length) - length / 2, "BL", f"centres of elements, {place}"),
-        Variable("point", ("point",), points, "BL", f"points between elements, {place}"),
+        Variable(
+            "phase",
+            ("phase",),
+            2 * np.pi * np.arange(phases) / phases,
+            "rad",
+            "phase of the gait",
+        ),
+        Variable(
+            "s",
+            ("s",),
+            np.cumsum(length) - length / 2,
+            "BL",
+            f"centres of elements, {place}",
+        ),
+        Variable(
+            "point", ("point",), points, "BL", f"points between elements, {place}"
+        ),
         Variable("joint", ("joint",), joints, "BL", f"joints, {place}"),
         Variable("length", ("s",), length, "BL", "length of each element"),
     ]
 
 
-def _maps(parts: dict, along: np.ndarray, across: np.ndarray, work: Any, length: np.ndarray) -> list[Variable]:
+def _maps(
+    parts: dict, along: np.ndarray, across: np.ndarray, work: Any, length: np.ndarray
+) -> list[Variable]:
     dims, density = ("phase", "s"), "drag/BL"
-    of = lambda name, values, label: Variable(name, dims, values / length, density, f"{label}, per length of body")
+    of = lambda name, values, label: Variable(
+        name, dims, values / length, density, f"{label}, per length of body"
+    )
     return [
-        of("forward", parts["normal"] + parts["tangential"], "force in the direction of travel"),
+        of(
+            "forward",
+            parts["normal"] + parts["tangential"],
+            "force in the direction of travel",
+        ),
         of("forward_normal", parts["normal"], "its part by forces across the body"),
-        of("forward_tangential", parts["tangential"], "its part by forces along the body"),
+        of(
+            "forward_tangential",
+            parts["tangential"],
+            "its part by forces along the body",
+        ),
         of("normal", across, "force across the body, to its left"),
         of("tangential", along, "force along the body, to its head"),
-        replace(of("power", work.element_power, "work against the medium"), unit="drag/rad"),
+        replace(
+            of("power", work.element_power, "work against the medium"), unit="drag/rad"
+        ),
         Variable(
-            "bending_moment", ("phase", "point"), work.bending_moment, "drag x BL", "positive where the left side works"
+            "bending_moment",
+            ("phase", "point"),
+            work.bending_moment,
+            "drag x BL",
+            "positive where the left side works",
         ),
     ]
 
 
-SIDES = {"thrust": (np.maximum, "forwards"), "drag": (np.minimum, "backwards")}  # what pushes, and what holds back
+SIDES = {
+    "thrust": (np.maximum, "forwards"),
+    "drag": (np.minimum, "backwards"),
+}  # what pushes, and what holds back
 
 
 def _by_phase(parts: dict, work: Any, joint_power: np.ndarray) -> list[Variable]:
     dims, total = ("phase",), work.element_power.sum(-1) + work.end_power.sum(-1)
     sums = [
-        Variable(f"{kind}_{name}", dims, side(x, 0.0).sum(-1), "drag", f"sum of {name} forces {words}")
+        Variable(
+            f"{kind}_{name}",
+            dims,
+            side(x, 0.0).sum(-1),
+            "drag",
+            f"sum of {name} forces {words}",
+        )
         for kind, (side, words) in SIDES.items()
         for name, x in parts.items()
     ]
     of_ends = [
-        Variable(f"{end}_forward", dims, parts["ends"][:, k], "drag", f"force on the {end} in the direction of travel")
+        Variable(
+            f"{end}_forward",
+            dims,
+            parts["ends"][:, k],
+            "drag",
+            f"force on the {end} in the direction of travel",
+        )
         for k, end in enumerate(("tail", "head"))
     ]
     powers = [
         Variable("medium_power", dims, total, WORK, "work against the medium"),
-        Variable("joint_power", dims, joint_power, WORK, "work of the bending moments at the joints"),
+        Variable(
+            "joint_power",
+            dims,
+            joint_power,
+            WORK,
+            "work of the bending moments at the joints",
+        ),
     ]
     return [*sums, *of_ends, *powers]
 
@@ -243,7 +325,11 @@ def _by_place(parts: dict, length: np.ndarray) -> list[Variable]:
     label = "mean over the cycle of {} forces {}, per length of body"
     return [
         Variable(
-            f"mean_{kind}_{name}", ("s",), side(parts[name], 0.0).mean(0) / length, "drag/BL", label.format(name, words)
+            f"mean_{kind}_{name}",
+            ("s",),
+            side(parts[name], 0.0).mean(0) / length,
+            "drag/BL",
+            label.format(name, words),
         )
         for kind, (side, words) in SIDES.items()
         for name in FLANK
@@ -257,12 +343,30 @@ def _of_joints(activation: dict[str, Any]) -> list[Variable]:
         "onset": "phase at which the right side begins to work",
         "offset": "phase at which the right side ends to work",
     }
-    variables = [Variable(name, ("joint",), activation[name], "rad", label) for name, label in labels.items()]
+    variables = [
+        Variable(name, ("joint",), activation[name], "rad", label)
+        for name, label in labels.items()
+    ]
     variables += [
-        Variable(name, (), activation[name], "1", "speed of the wave of activation over that of curvature")
+        Variable(
+            name,
+            (),
+            activation[name],
+            "1",
+            "speed of the wave of activation over that of curvature",
+        )
         for name in ("speed_ratio", "fundamental_speed_ratio")
     ]
-    return [Variable("bend", ("phase", "joint"), activation["bend"], "rad", "positive to the left"), *variables]
+    return [
+        Variable(
+            "bend",
+            ("phase", "joint"),
+            activation["bend"],
+            "rad",
+            "positive to the left",
+        ),
+        *variables,
+    ]
 
 
 def _converted(v: Variable, unit: Newtons) -> Variable:

@@ -26,7 +26,11 @@ from rft.grains.spheres import chain
 from rft.refusal import Refusal, located, require
 
 RAMP = 0.5  # cycles in which the gait grows from the straight body
-SIZE, RADIUS, FREQUENCY = 0.162, 6e-3, 1.0  # m, m and Hz of a scene that gives none: those of the shipped flank's rod
+SIZE, RADIUS, FREQUENCY = (
+    0.162,
+    6e-3,
+    1.0,
+)  # m, m and Hz of a scene that gives none: those of the shipped flank's rod
 ROOM = 0.118, 0.078  # m of bed beyond the body along and across it
 DEPTH = 0.049  # m of bed, or as much as a thick body takes
 FLANK = "flank-drag"  # the sample of drag in such beds
@@ -75,7 +79,9 @@ class GrainSwim(Question):
     @cached_property
     def experiment(self) -> Experiment:
         body = self.swimmer.body
-        caps = next((e.radius for e in self.swimmer.effects if isinstance(e, EndCaps)), None)
+        caps = next(
+            (e.radius for e in self.swimmer.effects if isinstance(e, EndCaps)), None
+        )
         size = self.size
         if size is None:
             size = SIZE if body.length == 1.0 else body.length
@@ -83,13 +89,24 @@ class GrainSwim(Question):
         radius = self.radius
         if radius is None:
             radius = RADIUS if caps is None else caps * size
-        require(0 < radius < size / 2, "radius must be > 0 and below half of the length", value=radius)
+        require(
+            0 < radius < size / 2,
+            "radius must be > 0 and below half of the length",
+            value=radius,
+        )
         bed = Bed(seed=self.seed)
         depth = max(DEPTH, round(2 * radius + 6 * bed.diameter, 6))
-        bed = replace(bed, length=round(size + ROOM[0], 6), width=round(size + ROOM[1], 6), depth=depth)
+        bed = replace(
+            bed,
+            length=round(size + ROOM[0], 6),
+            width=round(size + ROOM[1], 6),
+            depth=depth,
+        )
         gait, f = self.scene.gait, self.frequency
         swim = Swim(gait.shape, gait.rate, f, RAMP / f, -2 * np.pi * RAMP)
-        return Experiment(bed, chain(body, size, radius), swim, (RAMP + self.cycles) / f, self.depth)
+        return Experiment(
+            bed, chain(body, size, radius), swim, (RAMP + self.cycles) / f, self.depth
+        )
 
     def check(self) -> None:
         require(1 <= self.cycles <= 1000, "cycles must be 1 to 1000", value=self.cycles)
@@ -102,11 +119,17 @@ class GrainSwim(Question):
         return price([self.experiment], store_folder(self.store))
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        tiers = predictions(self)  # before the grains: a scene that no tier takes is refused at once
-        return result(self, self.experiment.run(store_folder(self.store), progress), tiers)
+        tiers = predictions(
+            self
+        )  # before the grains: a scene that no tier takes is refused at once
+        return result(
+            self, self.experiment.run(store_folder(self.store), progress), tiers
+        )
 
 
-Predictions = dict[str, tuple[list[float], list[float]]]  # (x, y, heading) in body lengths and rad, and errors, by tier
+Predictions = dict[
+    str, tuple[list[float], list[float]]
+]  # (x, y, heading) in body lengths and rad, and errors, by tier
 
 
 def result(question: GrainSwim, run: Run, tiers: Predictions) -> Result:
@@ -133,7 +156,9 @@ def result(question: GrainSwim, run: Run, tiers: Predictions) -> Result:
         Variable("method", ("method",), np.array(names)),
         *columns,
         Variable("cycle", ("cycle",), np.arange(1, question.cycles + 1)),
-        Variable("cycle_x", ("cycle",), poses[:, 0], "BL", "displacement of each cycle"),
+        Variable(
+            "cycle_x", ("cycle",), poses[:, 0], "BL", "displacement of each cycle"
+        ),
         Variable("cycle_y", ("cycle",), poses[:, 1], "BL"),
         Variable("cycle_heading", ("cycle",), poses[:, 2], "rad"),
     )
@@ -145,7 +170,9 @@ def cycle_poses(run: Run, starts: np.ndarray) -> np.ndarray:
     pose = np.column_stack([np.interp(starts, run.t, run.pose[:, k]) for k in range(3)])
     d, theta = np.diff(pose, axis=0), pose[:-1, 2]
     c, s = np.cos(theta), np.sin(theta)
-    return np.column_stack([c * d[:, 0] + s * d[:, 1], c * d[:, 1] - s * d[:, 0], d[:, 2]])
+    return np.column_stack(
+        [c * d[:, 0] + s * d[:, 1], c * d[:, 1] - s * d[:, 0], d[:, 2]]
+    )
 
 
 def predictions(question: GrainSwim) -> Predictions:
@@ -155,8 +182,14 @@ def predictions(question: GrainSwim) -> Predictions:
     body = question.experiment.body
     law = Calibration(FLANK, end_caps="fitted").ask().subject
     others = tuple(e for e in question.swimmer.effects if not isinstance(e, EndCaps))
-    system = replace(question.swimmer, medium=law.medium, effects=(*others, law.caps(body.half_width / body.size)))
-    found[GRAINS_LAW] = dict(_predicted(scene.changed(system=system), ("direct",)))["direct"]
+    system = replace(
+        question.swimmer,
+        medium=law.medium,
+        effects=(*others, law.caps(body.half_width / body.size)),
+    )
+    found[GRAINS_LAW] = dict(_predicted(scene.changed(system=system), ("direct",)))[
+        "direct"
+    ]
     return found
 
 

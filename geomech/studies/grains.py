@@ -38,15 +38,22 @@ class GrainSteps(Cost):
 
     def check(self, place: str, yes: bool, less: str = "ask for less") -> None:
         if not yes and self.seconds > LONGEST:
-            instead = f"to compute for more than {duration(LONGEST)} say ``yes``, or {less}"
+            instead = (
+                f"to compute for more than {duration(LONGEST)} say ``yes``, or {less}"
+            )
             raise TooLong(str(self), where=place, instead=instead)
 
 
 def price(experiments: Sequence[Experiment], store: Path) -> GrainSteps:
     """Return the cost of experiments, as far as their settled beds and runs are not in a store."""
     missing = {e.bed: e for e in experiments if not e.is_settled(store)}
-    settling = sum(e.grain_steps / e.n_steps * sum(SETTLING) / e.bed.step for e in missing.values())
-    steps = sum(e.grain_steps * e.steps_left(store) / e.n_steps for e in experiments) + settling
+    settling = sum(
+        e.grain_steps / e.n_steps * sum(SETTLING) / e.bed.step for e in missing.values()
+    )
+    steps = (
+        sum(e.grain_steps * e.steps_left(store) / e.n_steps for e in experiments)
+        + settling
+    )
     return GrainSteps(round(steps), steps / RATE, BASE, steps / RATE)
 
 
@@ -56,7 +63,10 @@ def store_folder(given: Path | None) -> Path:
         return Path(given)
     folder = cache_folder()
     if folder is None:
-        raise Refusal("there is no cache folder for beds of grains", instead="name one with ``store``")
+        raise Refusal(
+            "there is no cache folder for beds of grains",
+            instead="name one with ``store``",
+        )
     return folder / "grains"
 
 
@@ -111,11 +121,23 @@ class DragGrains(Question):
         ]  # fmt: skip
 
     def check(self) -> None:
-        require(len(set(self.angles)) >= 3, "a law takes three angles or more", value=list(self.angles))
-        require(all(0 <= psi <= 90 for psi in self.angles), "angles must be 0 to 90 degrees", value=list(self.angles))
+        require(
+            len(set(self.angles)) >= 3,
+            "a law takes three angles or more",
+            value=list(self.angles),
+        )
+        require(
+            all(0 <= psi <= 90 for psi in self.angles),
+            "angles must be 0 to 90 degrees",
+            value=list(self.angles),
+        )
         require(1 <= self.beds <= 100, "beds must be 1 to 100", value=self.beds)
         require(self.speed > 0, "speed must be > 0", value=self.speed)
-        require(self.length >= 20 * self.radius, "a rod must be ten times as long as it is wide", value=self.length)
+        require(
+            self.length >= 20 * self.radius,
+            "a rod must be ten times as long as it is wide",
+            value=self.length,
+        )
         for experiment in self.experiments()[: len(self.angles)]:
             experiment.check()
         store_folder(self.store)
@@ -126,14 +148,30 @@ class DragGrains(Question):
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
         folder, experiments = store_folder(self.store), self.experiments()
-        first, runner, share = experiments[:: len(self.angles)], jobs.runner(), 1.0 / (1 + len(self.angles))
+        first, runner, share = (
+            experiments[:: len(self.angles)],
+            jobs.runner(),
+            1.0 / (1 + len(self.angles)),
+        )
         each = price(experiments, folder).seconds / (len(first) + len(experiments))
         settled = list(
-            runner.map(_settle, folder, first, len(first), each * len(first), lambda done: progress(share * done))
+            runner.map(
+                _settle,
+                folder,
+                first,
+                len(first),
+                each * len(first),
+                lambda done: progress(share * done),
+            )
         )
         rest = lambda done: progress(share + (1 - share) * done)
-        rows = runner.map(_drag, folder, experiments, len(experiments), each * len(experiments), rest)
-        return self._result(np.array(settled), np.array(list(rows)).reshape(self.beds, len(self.angles), -1))
+        rows = runner.map(
+            _drag, folder, experiments, len(experiments), each * len(experiments), rest
+        )
+        return self._result(
+            np.array(settled),
+            np.array(list(rows)).reshape(self.beds, len(self.angles), -1),
+        )
 
     def _result(self, settled: np.ndarray, rows: np.ndarray) -> Result:
         """Return the result of settled beds (beds, packing and surface) and rows (beds, angles, numbers of a `Drag`)."""
@@ -147,20 +185,47 @@ class DragGrains(Question):
         }  # fmt: skip
         across, over = ("component", "bed", "angle"), ("bed", "angle")
         variables = (
-            Variable("angle", ("angle",), np.array(self.angles), "degrees", "attack angle"),
+            Variable(
+                "angle", ("angle",), np.array(self.angles), "degrees", "attack angle"
+            ),
             Variable("bed", ("bed",), self.seed + np.arange(self.beds), "1", "seed"),
-            Variable("component", ("component",), np.array(["parallel", "perpendicular"])),
-            Variable("flank", across, drags.flank, "N/m", "drag on the flank", drags.flank_error),
-            Variable("ends", across, drags.ends, "N", "drag on both ends beyond that", drags.ends_error),
-            Variable("lift", over, drags.lift, "N", "lift of the whole rod", drags.lift_error),
+            Variable(
+                "component", ("component",), np.array(["parallel", "perpendicular"])
+            ),
+            Variable(
+                "flank",
+                across,
+                drags.flank,
+                "N/m",
+                "drag on the flank",
+                drags.flank_error,
+            ),
+            Variable(
+                "ends",
+                across,
+                drags.ends,
+                "N",
+                "drag on both ends beyond that",
+                drags.ends_error,
+            ),
+            Variable(
+                "lift", over, drags.lift, "N", "lift of the whole rod", drags.lift_error
+            ),
         )
         return Result("drag_grains", variables, facts, (self, self.law(drags, facts)))
 
     def law(self, drags: Drag, facts: dict[str, float]) -> Fit:
         """Return the granular law of the flank with e of the ends, fitted to all beds."""
         psi = np.tile(self.angles, self.beds)
-        flank, ends = (x.reshape(2, -1) for x in (self.length * drags.flank, drags.ends))
-        size = Rod(self.radius, self.length, facts["depth"], facts["packing"] * self.bed.density)
+        flank, ends = (
+            x.reshape(2, -1) for x in (self.length * drags.flank, drags.ends)
+        )
+        size = Rod(
+            self.radius,
+            self.length,
+            facts["depth"],
+            facts["packing"] * self.bed.density,
+        )
         return fit("granular", rod_drag(psi, *flank, ends=ends), size, "fitted")
 
 
@@ -176,4 +241,9 @@ def _drag(folder: Path, experiment: Experiment) -> list[float]:
     tow, body = experiment.motion, experiment.body
     drag = flank_and_ends(run, body.size, body.half_width, tow.angle, tow.speed)
     numbers = np.concatenate([np.atleast_1d(x) for x in drag]).tolist()
-    return [*numbers, float(run.overlaps[:, 0].max()), float(run.facts["lammps"]), float(run.facts["grains"])]
+    return [
+        *numbers,
+        float(run.overlaps[:, 0].max()),
+        float(run.facts["lammps"]),
+        float(run.facts["grains"]),
+    ]

@@ -16,7 +16,9 @@ from rft.checks import real_array
 from rft.refusal import Refusal
 
 LARGEST = 100_000_000  # points
-MOST = 200  # values of a parameter for which a scene is built as a test, some 0.5 ms each
+MOST = (
+    200  # values of a parameter for which a scene is built as a test, some 0.5 ms each
+)
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,9 @@ class Grid:
     @property
     def names(self) -> list[str]:
         """Names of the parameters, the inner one last."""
-        return [k for k in self.over if k != self.inner] + [k for k in self.over if k == self.inner]
+        return [k for k in self.over if k != self.inner] + [
+            k for k in self.over if k == self.inner
+        ]
 
     @property
     def values(self) -> dict[str, list[float]]:
@@ -59,7 +63,12 @@ class Grid:
     def points(self) -> Points:
         """Points of the parameters other than the inner one."""
         outer = [name for name in self.names if name != self.inner]
-        return Points([self.over[name][:1] if name in self.idle else self.over[name] for name in outer])
+        return Points(
+            [
+                self.over[name][:1] if name in self.idle else self.over[name]
+                for name in outer
+            ]
+        )
 
     @cached_property
     def at(self) -> At:
@@ -71,22 +80,34 @@ class Grid:
         outer = [self.over[name] for name in self.names if name != self.inner]
         yield from itertools.product(*([v[0], v[-1]] for v in outer))
         for k, values in enumerate(outer):
-            tested = values if len(values) <= MOST else [min(values), max(values), *values[:: -(-len(values) // MOST)]]
-            yield from ((*(v[0] for v in outer[:k]), x, *(v[0] for v in outer[k + 1 :])) for x in tested)
+            tested = (
+                values
+                if len(values) <= MOST
+                else [min(values), max(values), *values[:: -(-len(values) // MOST)]]
+            )
+            yield from (
+                (*(v[0] for v in outer[:k]), x, *(v[0] for v in outer[k + 1 :]))
+                for x in tested
+            )
 
     def arranged(self, rows: np.ndarray) -> np.ndarray:
         """Return rows (`total`, width) as an array (N_1, ..., width) over the parameters in the order given."""
         names = self.names
         computed = [1 if name in self.idle else len(self.over[name]) for name in names]
         full = [len(self.over[name]) for name in names]
-        flat = np.broadcast_to(np.reshape(rows, (*computed, -1)), (*full, np.shape(rows)[-1]))
+        flat = np.broadcast_to(
+            np.reshape(rows, (*computed, -1)), (*full, np.shape(rows)[-1])
+        )
         return np.transpose(flat, (*(names.index(k) for k in self.over), len(names)))
 
 
 def listed(over: Mapping[str, Any]) -> dict[str, list[float]]:
     """Return the values by parameter; Refusal unless they form a grid."""
     if not (isinstance(over, Mapping) and all(isinstance(k, str) for k in over)):
-        raise Refusal("over must be values by parameter, such as {'gait.amplitude': [0.5, 1.0]}", value=over)
+        raise Refusal(
+            "over must be values by parameter, such as {'gait.amplitude': [0.5, 1.0]}",
+            value=over,
+        )
     values = {name: _listed(name, x) for name, x in over.items()}
     total = math.prod(map(len, values.values())) if values else 0
     if not 0 < total <= LARGEST:
@@ -97,7 +118,11 @@ def listed(over: Mapping[str, Any]) -> dict[str, list[float]]:
 def _listed(name: str, values: Any) -> list[float]:
     array = real_array(name, values)
     if array.ndim != 1 or not np.isfinite(array).all():
-        raise Refusal("values must be a list of finite numbers", value=values, where=f"``over`` {name}")
+        raise Refusal(
+            "values must be a list of finite numbers",
+            value=values,
+            where=f"``over`` {name}",
+        )
     return array.tolist()
 
 
@@ -123,26 +148,62 @@ class Points:
         self.total = math.prod(self.sizes)
 
     def __getitem__(self, k: int) -> tuple[float, ...]:
-        return tuple(axis[i] for axis, i in zip(self.axes, np.unravel_index(k, self.sizes))) if self.axes else ()
+        return (
+            tuple(
+                axis[i] for axis, i in zip(self.axes, np.unravel_index(k, self.sizes))
+            )
+            if self.axes
+            else ()
+        )
 
 
 def changed(tables: dict, parameter: str, value: float) -> dict:
     """Return the tables with one parameter set: "section.key", "effects.KIND.key" for an effect that is on, or
     "effects.key" for all effects that give that key."""
     parts = parameter.split(".")
-    within = tables.get("robot", {}).get(parts[1]) if len(parts) == 3 and parts[0] == "robot" else None
+    within = (
+        tables.get("robot", {}).get(parts[1])
+        if len(parts) == 3 and parts[0] == "robot"
+        else None
+    )
     if isinstance(within, dict):  # a table inside a table
         inner = changed({"robot": within}, f"robot.{parts[2]}", value)
         return {**tables, "robot": {**tables["robot"], parts[1]: inner["robot"]}}
-    if len(parts) == 2 and parts[0] in ("medium", "body", "gait", "numerics", "system", "physical", "robot"):
+    if len(parts) == 2 and parts[0] in (
+        "medium",
+        "body",
+        "gait",
+        "numerics",
+        "system",
+        "physical",
+        "robot",
+    ):
         old = tables.get(parts[0], {}).get(parts[1])
-        tables = {**tables, parts[0]: {k: v for k, v in tables.get(parts[0], {}).items() if k != _twin(parts[1])}}
-        value = int(value) if isinstance(old, int) and not isinstance(old, bool) and value == int(value) else value
+        tables = {
+            **tables,
+            parts[0]: {
+                k: v
+                for k, v in tables.get(parts[0], {}).items()
+                if k != _twin(parts[1])
+            },
+        }
+        value = (
+            int(value)
+            if isinstance(old, int)
+            and not isinstance(old, bool)
+            and value == int(value)
+            else value
+        )
         return {**tables, parts[0]: {**tables.get(parts[0], {}), parts[1]: value}}
     if len(parts) == 2 and parts[0] == "effects":
         effects = tables.get("effects", [])
         if any(parts[1] in e for e in effects):
-            return {**tables, "effects": [{**e, parts[1]: value} if parts[1] in e else e for e in effects]}
+            return {
+                **tables,
+                "effects": [
+                    {**e, parts[1]: value} if parts[1] in e else e for e in effects
+                ],
+            }
         raise Refusal(
             f"no effect of the scene gives {parts[1]!r}",
             where=f"``over`` {parameter}",
@@ -151,12 +212,21 @@ def changed(tables: dict, parameter: str, value: float) -> dict:
     if len(parts) == 3 and parts[0] == "effects":
         effects = tables.get("effects", [])
         if any(e.get("kind") == parts[1] for e in effects):
-            return {**tables, "effects": [{**e, parts[2]: value} if e["kind"] == parts[1] else e for e in effects]}
+            return {
+                **tables,
+                "effects": [
+                    {**e, parts[2]: value} if e["kind"] == parts[1] else e
+                    for e in effects
+                ],
+            }
         raise Refusal(
-            f"the scene has no effect {parts[1]!r}", where=f"``over`` {parameter}", instead="add it as [[effects]]"
+            f"the scene has no effect {parts[1]!r}",
+            where=f"``over`` {parameter}",
+            instead="add it as [[effects]]",
         )
     raise Refusal(
-        "name a parameter such as gait.amplitude, medium.C or effects.end-caps.radius", where=f"``over`` {parameter}"
+        "name a parameter such as gait.amplitude, medium.C or effects.end-caps.radius",
+        where=f"``over`` {parameter}",
     )
 
 
@@ -170,6 +240,12 @@ def at_points(over: Mapping[str, list[float]], names: tuple[str, ...], value):
     or None."""
     for axis, (name, values) in enumerate(over.items()):
         if name.partition(".")[0] in names and name.rpartition(".")[2] == names[-1]:
-            along = np.reshape(values, [-1 if k == axis else 1 for k in range(len(over))])
+            along = np.reshape(
+                values, [-1 if k == axis else 1 for k in range(len(over))]
+            )
             return np.broadcast_to(along, [len(v) for v in over.values()]).copy()
-    return None if value is None else np.full([len(v) for v in over.values()], float(value))
+    return (
+        None
+        if value is None
+        else np.full([len(v) for v in over.values()], float(value))
+    )

@@ -39,8 +39,16 @@ class Intrusion(Question):
         scene = self.scene
         run = scene.run()
         error, columns = estimate(scene, run), scene.table(run)
-        table = [Variable(name, ("t",), values, UNITS[name.partition("_")[0]]) for name, values in columns.items()]
-        return Result("intrusion", tuple(table), {"name": scene.name, "error": error}, (scene, run))
+        table = [
+            Variable(name, ("t",), values, UNITS[name.partition("_")[0]])
+            for name, values in columns.items()
+        ]
+        return Result(
+            "intrusion",
+            tuple(table),
+            {"name": scene.name, "error": error},
+            (scene, run),
+        )
 
 
 class Estimate(NamedTuple):
@@ -62,9 +70,17 @@ def estimate(scene: Intruding, run) -> Estimate:
     if counts[0] == scene.count:
         return Estimate(np.nan, np.nan, scene.count)
     for times, count in zip(scene.finer, counts):
-        finer, factor = scene.run(times * scene.count), MARGIN / (1.0 - (scene.count / count) ** scene.order)
-        pairs = ((x.reshape(len(x), -1), y.reshape(len(y), -1)) for x, y in zip(_loads(finer), _loads(run)))
-        change = np.maximum(change, [factor * np.linalg.norm(x - y, axis=1).max() for x, y in pairs])
+        finer, factor = (
+            scene.run(times * scene.count),
+            MARGIN / (1.0 - (scene.count / count) ** scene.order),
+        )
+        pairs = (
+            (x.reshape(len(x), -1), y.reshape(len(y), -1))
+            for x, y in zip(_loads(finer), _loads(run))
+        )
+        change = np.maximum(
+            change, [factor * np.linalg.norm(x - y, axis=1).max() for x, y in pairs]
+        )
     return Estimate(*change.tolist(), counts[-1])
 
 
@@ -101,14 +117,20 @@ class Settings:
     def numbers(self, setting: Setting | None, value: Any) -> list[np.ndarray]:
         """Return force (T, 2 or 3), N, and moment (T,) or (T, 3), N m, along the motion."""
         *counts, finest = self.scene.ladder
-        run = self.scene.run(finest if value is None else counts[self.settings()[0].values.index(value)])
+        run = self.scene.run(
+            finest if value is None else counts[self.settings()[0].values.index(value)]
+        )
         return [run.force, run.moment]
 
-    def errors(self, numbers: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
+    def errors(
+        self, numbers: list[np.ndarray], truth: list[np.ndarray]
+    ) -> dict[str, float]:
         """Return the error of force and moment; a moment that is only roundoff is compared to the force times the
         body's size."""
         errors, most = {}, np.abs(truth[0]).max()
-        for what, arm, one, exact in zip(self.measures, (1.0, self.scene.size), numbers, truth):
+        for what, arm, one, exact in zip(
+            self.measures, (1.0, self.scene.size), numbers, truth
+        ):
             largest, bound = np.abs(exact).max(), arm * most
             largest = largest if largest > ROUNDING * bound else bound or 1.0
             errors[what] = float(np.sqrt(np.mean((one - exact) ** 2)) / largest)
@@ -122,13 +144,23 @@ class Settings:
         parts = self.scene.parts
         for k, count in enumerate(lines[0]["value"]):
             if (error := max(line["error"][k] for line in lines)) <= tolerance:
-                return {"tolerance": tolerance, parts: count, "error": error, "seconds": lines[0]["seconds"][k]}
+                return {
+                    "tolerance": tolerance,
+                    parts: count,
+                    "error": error,
+                    "seconds": lines[0]["seconds"][k],
+                }
         return {"tolerance": tolerance, parts: None}
 
     def facts(self) -> dict[str, Any]:
         scene = self.scene
         finest = scene.actual_count(scene.ladder[-1])
-        return {"scene": scene.name, "parts": scene.parts, "poses": scene.motion.samples, "finest": finest}
+        return {
+            "scene": scene.name,
+            "parts": scene.parts,
+            "poses": scene.motion.samples,
+            "finest": finest,
+        }
 
 
 class Elements(Cost):

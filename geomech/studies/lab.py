@@ -57,7 +57,11 @@ class Lab(Question):
     def _own(self) -> float:
         """Value of the parameter in the scene itself."""
         if len(self.over) != 1:
-            raise Refusal("a family has one parameter", value=list(self.over), instead="give ``over`` once")
+            raise Refusal(
+                "a family has one parameter",
+                value=list(self.over),
+                instead="give ``over`` once",
+            )
         key = next(iter(self.over))
         section, _, name = key.partition(".")
         if section not in SECTIONS:
@@ -69,7 +73,9 @@ class Lab(Question):
         own = self._grid.tables.get(section, {}).get(name)
         if isinstance(own, bool) or not isinstance(own, (int, float)):
             raise Refusal(
-                f"the scene gives no number for {key}", where=self.scene.name, instead="name a key of its file"
+                f"the scene gives no number for {key}",
+                where=self.scene.name,
+                instead="name a key of its file",
             )
         return float(own)
 
@@ -88,13 +94,19 @@ class Lab(Question):
 
     def cost(self) -> Cost:
         times = 2 * len(self._values) - 1 if self.over else 1
-        jobs = [job for k, scene in enumerate(self.scenes) for job in (1 if k else times) * _jobs(scene)]
+        jobs = [
+            job
+            for k, scene in enumerate(self.scenes)
+            for job in (1 if k else times) * _jobs(scene)
+        ]
         return cost.price(jobs)
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
         made = []
         for k, scene in enumerate(self.scenes):
-            made.append(self._family(progress) if self.over and k == 0 else charts.chart(scene))
+            made.append(
+                self._family(progress) if self.over and k == 0 else charts.chart(scene)
+            )
             progress((k + 1) / len(self.scenes))
         return _result(made)
 
@@ -105,12 +117,22 @@ class Lab(Question):
             made[value] = charts.chart(self._grid.at((value,)))
             progress(len(made) / (len(values) + len(between)) / len(self.scenes))
         some = [made[v] for v in values]
-        family = charts.family(self.scene, next(iter(self.over)), values, self._own, some, [made[v] for v in between])
+        family = charts.family(
+            self.scene,
+            next(iter(self.over)),
+            values,
+            self._own,
+            some,
+            [made[v] for v in between],
+        )
         return replace(family, scene=self.scene)
 
 
 def _jobs(scene: Scene) -> list[cost.Job]:
-    jobs = [*cost.connection(scene), *([] if scene.system.traits.linear else cost.harmonics(scene))]
+    jobs = [
+        *cost.connection(scene),
+        *([] if scene.system.traits.linear else cost.harmonics(scene)),
+    ]
     if scene.frame != charts.MINIMUM_PERTURBATION:
         jobs += cost.connection(scene)  # that of the minimum-perturbation frame
     return jobs
@@ -121,13 +143,31 @@ def _result(made: list[Chart]) -> Result:
     dims, size = ("scene",), lambda k: np.array([x.grid_error[k] for x in made])
     variables = [
         Variable("scene", dims, np.array([x.scene.name for x in made])),
-        Variable("shapes", dims, np.array([prod(map(len, x.axes)) for x in made]), "1", "shapes of the grid"),
-        Variable("highest", dims, np.array([x.highest for x in made]), "1", "highest harmonic of alphadot's direction"),
+        Variable(
+            "shapes",
+            dims,
+            np.array([prod(map(len, x.axes)) for x in made]),
+            "1",
+            "shapes of the grid",
+        ),
+        Variable(
+            "highest",
+            dims,
+            np.array([x.highest for x in made]),
+            "1",
+            "highest harmonic of alphadot's direction",
+        ),
         Variable("grid_error", dims, size(0), "BL/rad", "error of the grid, position"),
-        Variable("grid_error_heading", dims, size(1), "1", "error of the grid, heading"),
+        Variable(
+            "grid_error_heading", dims, size(1), "1", "error of the grid, heading"
+        ),
     ]
     facts = {}
     if made[0].family:
         family = made[0].family
-        facts = {"over": family.key, "members": len(family.values), "between_members": family.error}
+        facts = {
+            "over": family.key,
+            "members": len(family.values),
+            "between_members": family.error,
+        }
     return Result("lab", tuple(variables), facts, made)

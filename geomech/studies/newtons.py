@@ -31,11 +31,16 @@ class Sizes:
 
     length: Annotated[float | None, Number(1e-9, 1e6, "m", "length of the body")] = None
     radius: Annotated[float | None, Number(1e-9, 1e6, "m", "radius of the body")] = None
-    depth: Annotated[float | None, Number(1e-9, 1e6, "m", "depth of the body's axis")] = None
-    stress: Annotated[float | None, Number(1e-12, 1e12, "Pa", "axial drag over 2 radius x length, at that depth")] = (
-        None
-    )
-    frequency: Annotated[float | None, Number(1e-12, 1e4, "Hz", "cycles per second")] = None
+    depth: Annotated[
+        float | None, Number(1e-9, 1e6, "m", "depth of the body's axis")
+    ] = None
+    stress: Annotated[
+        float | None,
+        Number(1e-12, 1e12, "Pa", "axial drag over 2 radius x length, at that depth"),
+    ] = None
+    frequency: Annotated[
+        float | None, Number(1e-12, 1e4, "Hz", "cycles per second")
+    ] = None
 
     def __post_init__(self) -> None:
         check_numbers(self)
@@ -59,7 +64,11 @@ class Newtons(NamedTuple):
         power, timed, untimed = UNITS[unit]
         factor = self.drag * self.length**power
         per_second = timed != untimed and self.frequency
-        return (factor * 2 * math.pi * self.frequency, timed) if per_second else (factor, untimed)
+        return (
+            (factor * 2 * math.pi * self.frequency, timed)
+            if per_second
+            else (factor, untimed)
+        )
 
 
 def newtons(scene: Scene, system: Loaded, sizes: Sizes) -> Newtons:
@@ -76,22 +85,49 @@ def newtons(scene: Scene, system: Loaded, sizes: Sizes) -> Newtons:
         how = f"stress {stress:.4g} Pa{place} x 2 x radius {radius:g} m x length {length:g} m"
         return Newtons(stress * 2 * radius * length, length, given["frequency"], how)
     if drag is not None and length is not None:
-        return Newtons(float(drag), length, given["frequency"], "as the effect body-inertia has it")
+        return Newtons(
+            float(drag), length, given["frequency"], "as the effect body-inertia has it"
+        )
     lacks = [name for name in ("length", "radius") if given[name] is None]
-    lacks += [] if stress is not None else ["depth" if system.axial_stress(1.0) else "stress"]
+    lacks += (
+        []
+        if stress is not None
+        else ["depth" if system.axial_stress(1.0) else "stress"]
+    )
     return Newtons(None, length, given["frequency"], "unknown in N", tuple(lacks))
 
 
 def _merged(scene: Scene, sizes: Sizes) -> dict[str, float | None]:
     """Return the sizes in the scene and those given besides, by name; None for what neither has."""
     effects = getattr(scene.system, "effects", ())
-    of_effects = lambda name: next((getattr(e, name) for e in effects if hasattr(e, name)), None)
-    length = scene.system.length if length_unit(scene.system) == "m" else of_effects("length")
-    radius = next((e.radius for e in effects if e.kind == "end-caps"), None)  # body lengths
+    of_effects = lambda name: next(
+        (getattr(e, name) for e in effects if hasattr(e, name)), None
+    )
+    length = (
+        scene.system.length
+        if length_unit(scene.system) == "m"
+        else of_effects("length")
+    )
+    radius = next(
+        (e.radius for e in effects if e.kind == "end-caps"), None
+    )  # body lengths
     known = sizes.length if length is None else length
     radius = None if radius is None or known is None else radius * known
-    own = {"length": length, "radius": radius, "depth": of_effects("depth"), "frequency": scene.frequency}
+    own = {
+        "length": length,
+        "radius": radius,
+        "depth": of_effects("depth"),
+        "frequency": scene.frequency,
+    }
     for name, value in asdict(sizes).items():
-        if None not in (value, own.get(name)) and not math.isclose(value, own[name], rel_tol=1e-6):
-            raise Refusal(f"``{name}`` is {value:g}, but the scene has {own[name]:g}", instead=f"drop ``{name}``")
-    return {name: value if own.get(name) is None else own[name] for name, value in asdict(sizes).items()}
+        if None not in (value, own.get(name)) and not math.isclose(
+            value, own[name], rel_tol=1e-6
+        ):
+            raise Refusal(
+                f"``{name}`` is {value:g}, but the scene has {own[name]:g}",
+                instead=f"drop ``{name}``",
+            )
+    return {
+        name: value if own.get(name) is None else own[name]
+        for name, value in asdict(sizes).items()
+    }

@@ -72,17 +72,25 @@ class Report(Question):
         for gait, values in zip(gaits, amplitudes):
             result = study.study(values, gait=gait).result
             if gait is not scene.gait:
-                result = replace(result, attributes={**result.attributes, "note": ADDED})
+                result = replace(
+                    result, attributes={**result.attributes, "note": ADDED}
+                )
             tables[type(gait).__name__.lower()] = result
         pairs = combinations(range(3), 2) if mapped and scene.system.joints == 3 else ()
         planes = [study.plane(pair) for pair in pairs]
         first = next(iter(tables.values()))
-        return replace(first, kind="report", subject=Reported(study, gaits, tables, mapped, planes))
+        return replace(
+            first, kind="report", subject=Reported(study, gaits, tables, mapped, planes)
+        )
 
 
 def is_mapped(system: System) -> bool:
     """Return whether all of shape space is drawn; for more joints there is `geomech ccf --pair`."""
-    return {2: PATH, 3: AREA}[system.joints].is_offered(system) if system.joints in (2, 3) else False
+    return (
+        {2: PATH, 3: AREA}[system.joints].is_offered(system)
+        if system.joints in (2, 3)
+        else False
+    )
 
 
 def cost(scene: Scene) -> Cost:
@@ -95,15 +103,29 @@ def cost(scene: Scene) -> Cost:
         parts += jobs(scene, plans, len(amplitudes), gait, tables=k == 0)
     if is_mapped(system):
         pairs = [*combinations(range(3), 2)] if system.joints == 3 else []
-        parts += of_even_part(scene) + of_planes(scene, pairs, [scene.gait.middle] * len(pairs))
-        parts += [] if effort.why_none(system) or effort.shared(system) else of_metric(scene)
+        parts += of_even_part(scene) + of_planes(
+            scene, pairs, [scene.gait.middle] * len(pairs)
+        )
+        parts += (
+            [] if effort.why_none(system) or effort.shared(system) else of_metric(scene)
+        )
     return price(parts)
 
 
 def _gaits(scene: Scene) -> list[Gait]:
     """Return the scene's gait and, for the three-link swimmer, those of Fig. 11(e), at the same frequency."""
-    more = (Circle(reverse=True, frequency=scene.frequency), Butterfly(frequency=scene.frequency))
-    return [scene.gait, *(g for g in more if type(g) is not type(scene.gait) and is_three_link(scene.system))]
+    more = (
+        Circle(reverse=True, frequency=scene.frequency),
+        Butterfly(frequency=scene.frequency),
+    )
+    return [
+        scene.gait,
+        *(
+            g
+            for g in more
+            if type(g) is not type(scene.gait) and is_three_link(scene.system)
+        ),
+    ]
 
 
 def reachable(scene: Scene, gait: Gait) -> list[float]:
@@ -112,28 +134,48 @@ def reachable(scene: Scene, gait: Gait) -> list[float]:
     Without a field, or with singular shapes, the last is the gait's own. Refusal for a gait that does not move or lies
     outside."""
     system, n = scene.system, scene.numerics
-    own = not PATH.is_offered(system) or system.traits.singularity is not None or is_too_large(system, n)
+    own = (
+        not PATH.is_offered(system)
+        or system.traits.singularity is not None
+        or is_too_large(system, n)
+    )
     unit = gait.unit(np.linspace(0, 2 * np.pi, 721))
     if np.ptp(unit, axis=0).max() == 0 or (own and gait.amplitude == 0):
-        raise Refusal("[gait] does not move", where=scene.name, instead="give it a size")
+        raise Refusal(
+            "[gait] does not move", where=scene.name, instead="give it a size"
+        )
     if own:
         size = abs(gait.amplitude)
         if near_gait(scene.system):
             return _near(scene, gait)
         amplitudes = [a for a in steps(size) if a < size * (1 - 1e-9)] + [size]
         return [float(np.copysign(a, gait.amplitude)) for a in amplitudes]
-    room = min(min(a[-1] - x, x - a[0]) for a, x in zip(field_axes(scene.system, scene.numerics), gait.middle))
+    room = min(
+        min(a[-1] - x, x - a[0])
+        for a, x in zip(field_axes(scene.system, scene.numerics), gait.middle)
+    )
     if room <= 0:
-        raise Refusal("the gait's centre lies outside the field", where=scene.name, instead="raise [numerics] extent")
-    return [float(np.copysign(a, gait.amplitude)) for a in steps(room / np.abs(unit).max())]
+        raise Refusal(
+            "the gait's centre lies outside the field",
+            where=scene.name,
+            instead="raise [numerics] extent",
+        )
+    return [
+        float(np.copysign(a, gait.amplitude)) for a in steps(room / np.abs(unit).max())
+    ]
 
 
 def _near(scene: Scene, gait: Gait) -> list[float]:
     """Return amplitudes about the gait's own for which the system is known; Refusal where there are none."""
-    amplitudes = [round(1 + 0.05 * k, 2) * gait.amplitude for k in range(-AMPLITUDES, AMPLITUDES + 1)]
+    amplitudes = [
+        round(1 + 0.05 * k, 2) * gait.amplitude
+        for k in range(-AMPLITUDES, AMPLITUDES + 1)
+    ]
     with located(scene.name):
         refuse_singular(scene.system, gait.cycle(scene.numerics.phases)[0])
-    reached = lambda a: (scene.system.traits.singularity(gait.cycle(scene.numerics.phases, a)[0]) >= 0).all()
+    reached = lambda a: (
+        scene.system.traits.singularity(gait.cycle(scene.numerics.phases, a)[0]) >= 0
+    ).all()
     return [a for a in amplitudes if reached(a)]
 
 

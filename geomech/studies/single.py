@@ -13,14 +13,23 @@ from rft.refusal import Refusal, formatted
 
 def single(system: System, alpha, alphadot) -> dict:
     """Return {"xi", "status", "residual"} for one shape (joints,) and its rate; ValueError if it is singular."""
-    alpha, alphadot = (_checked_numbers(system, name, x) for name, x in (("alpha", alpha), ("alphadot", alphadot)))
+    alpha, alphadot = (
+        _checked_numbers(system, name, x)
+        for name, x in (("alpha", alpha), ("alphadot", alphadot))
+    )
     note_angles(system, np.abs(alpha).max())
     traits = system.traits
     if traits.singularity is not None and not traits.singularity(alpha):
-        raise Refusal("the shape is singular", because=traits.singular, instead="move a joint")
+        raise Refusal(
+            "the shape is singular", because=traits.singular, instead="move a joint"
+        )
     if (diagnosed := capability(system, Diagnosed)) is not None:
         return diagnosed.diagnosed(alpha, alphadot)
-    return {"xi": evaluate(system.velocity, alpha, alphadot).tolist(), "status": "exact", "residual": 0.0}
+    return {
+        "xi": evaluate(system.velocity, alpha, alphadot).tolist(),
+        "status": "exact",
+        "residual": 0.0,
+    }
 
 
 def _checked_numbers(system: System, name: str, x) -> np.ndarray:

@@ -12,16 +12,27 @@ from geomech.io.rows import read as read_rows
 from geomech.scenes import penetration
 from geomech.scenes.drag import LARGEST_FILE
 from geomech.scenes.stress import plate_rows
-from rft.plates.calibrate import COEFFICIENTS, GENERIC, StressFit, ZetaFit, fit_stress, fit_zeta
+from rft.plates.calibrate import (
+    COEFFICIENTS,
+    GENERIC,
+    StressFit,
+    ZetaFit,
+    fit_stress,
+    fit_zeta,
+)
 from rft.plates.survey import survey
 from rft.refusal import Refusal, located
 
-KEYS = tuple(name.replace("m", "-") for name in COEFFICIENTS)  # as files have them: B-11 for Bm11
+KEYS = tuple(
+    name.replace("m", "-") for name in COEFFICIENTS
+)  # as files have them: B-11 for Bm11
 SEEN = 3.0  # standard errors beyond which the depth of zero force is noted
 GIVEN = "give a CSV file with columns depth_m,force_N"
 
 
-def plate_drags(law: str, source: str, sizes: Mapping[str, float], end_caps: float | str) -> Result:
+def plate_drags(
+    law: str, source: str, sizes: Mapping[str, float], end_caps: float | str
+) -> Result:
     """Return nine coefficients fitted to a CSV file of plate drags. Refusal, one line that names the file, for bad ones."""
     _refuse(law, sizes, end_caps, ())
     beta, gamma, *alpha = plate_rows("plate drags", source)
@@ -44,7 +55,9 @@ def plate_drags(law: str, source: str, sizes: Mapping[str, float], end_caps: flo
         Variable("coefficient", over, np.array(KEYS)),
         Variable("value", over, f.values, "N/cm^3", error=f.errors),
         Variable("interval", (*over, "bound"), f.intervals, "N/cm^3", "with 95 %"),
-        Variable("resolution", over, f.resolution, "1", "share that comes from the data"),
+        Variable(
+            "resolution", over, f.resolution, "1", "share that comes from the data"
+        ),
         Variable("generic", over, f.zeta * GENERIC, "N/cm^3", "generic set times zeta"),
         Variable("beta", ("row",), beta, "degrees"),
         Variable("gamma", ("row",), gamma, "degrees"),
@@ -66,7 +79,9 @@ def _lacking(name: str, f: StressFit, undetermined: list[str]) -> list[str]:
     ]
 
 
-def penetration_test(law: str, source: str, sizes: Mapping[str, float], end_caps: float | str) -> Result:
+def penetration_test(
+    law: str, source: str, sizes: Mapping[str, float], end_caps: float | str
+) -> Result:
     """Return zeta fitted to a plate that was pushed straight down, from a CSV file.
 
     sizes: "area", m^2, which overrules the file's. Refusal, one line that names the file, for bad ones."""
@@ -80,14 +95,30 @@ def penetration_test(law: str, source: str, sizes: Mapping[str, float], end_caps
                 instead="give ``area`` in m^2, or a header line '# plate area = 9.5 cm^2'",
             )
         f = fit_zeta(test.depth, test.force, area)
-    facts = {"name": test.name, "rms": _rms(f.force - f.law), "notes": _shifted(test.name, f)}
+    facts = {
+        "name": test.name,
+        "rms": _rms(f.force - f.law),
+        "notes": _shifted(test.name, f),
+    }
     variables = (
         Variable("zeta", (), f.zeta, "1", error=f.error),
         Variable("interval", ("bound",), f.interval, "1", "of zeta, with 95 %"),
-        Variable("area", ("plate",), np.unique(area) if len({*area.tolist()}) == 1 else area, "m^2"),
+        Variable(
+            "area",
+            ("plate",),
+            np.unique(area) if len({*area.tolist()}) == 1 else area,
+            "m^2",
+        ),
         Variable("depth", ("row",), f.depth, "m"),
         Variable("force", ("row",), f.force, "N"),
-        Variable("law", ("row",), f.law, "N", error=f.law * (f.interval[1] / f.zeta - 1), error_label="95 %"),
+        Variable(
+            "law",
+            ("row",),
+            f.law,
+            "N",
+            error=f.law * (f.interval[1] / f.zeta - 1),
+            error_label="95 %",
+        ),
     )
     return Result("penetration", variables, facts, f)
 
@@ -106,11 +137,16 @@ def _rms(residuals: np.ndarray) -> float:
     return float(np.sqrt(np.mean(residuals**2)))
 
 
-def _refuse(law: str, sizes: Mapping[str, float], end_caps, known: tuple[str, ...]) -> None:
+def _refuse(
+    law: str, sizes: Mapping[str, float], end_caps, known: tuple[str, ...]
+) -> None:
     """Refuse options that belong to a rod."""
     for name in (*sizes, *(["end_caps"] if end_caps else [])):
         if name not in known:
-            raise Refusal(f"``{name}`` belongs to another measurement", instead=f"leave it out for ``law`` {law}")
+            raise Refusal(
+                f"``{name}`` belongs to another measurement",
+                instead=f"leave it out for ``law`` {law}",
+            )
 
 
 def law_of(source: str) -> str:

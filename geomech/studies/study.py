@@ -69,7 +69,11 @@ class Study:
         with located(s.name):
             if frame == s.frame:
                 raise Refusal(f"the frame is {frame!r} already", instead="name another")
-            system = framed(s.system, s.numerics) if frame == MINIMUM_PERTURBATION else in_frame(s.system, frame)
+            system = (
+                framed(s.system, s.numerics)
+                if frame == MINIMUM_PERTURBATION
+                else in_frame(s.system, frame)
+            )
             return self._of(s.changed(system=system))
 
     def _of(self, scene: Scene) -> Self:
@@ -95,7 +99,10 @@ class Study:
         def build():
             if progress:
                 return table.build(progress)
-            with shown(f"{table.name} of {self.scene.name}, {table.balances:,} force balances", bar=False) as bar:
+            with shown(
+                f"{table.name} of {self.scene.name}, {table.balances:,} force balances",
+                bar=False,
+            ) as bar:
                 return table.build(bar)
 
         return self._stored(table.name, table.key, build)
@@ -103,18 +110,28 @@ class Study:
     def _connection(self) -> Table:
         return fitted.table(self.scene.system, self.scene.numerics)
 
-    def plan(self, tier: str, gait: Gait | None = None, amplitudes: ArrayLike | None = None) -> Plan:
+    def plan(
+        self, tier: str, gait: Gait | None = None, amplitudes: ArrayLike | None = None
+    ) -> Plan:
         """Return how a tier predicts displacements of a gait, or of the scene's own; Refusal if it is not available."""
         with located(self.scene.name):
             chosen = _tier(tier)
             chosen.refuse(self.scene.system)
-            return self._plan(chosen, self.scene.gait if gait is None else checked_gait(gait), amplitudes)
+            return self._plan(
+                chosen,
+                self.scene.gait if gait is None else checked_gait(gait),
+                amplitudes,
+            )
 
     def _plan(self, tier: Tier, gait: Gait, amplitudes) -> Plan:
         return tier.plan(self.scene.system, self.scene.numerics, gait, amplitudes)
 
     def table(
-        self, tier: str, gait: Gait | None = None, amplitudes: ArrayLike | None = None, progress: Callable | None = None
+        self,
+        tier: str,
+        gait: Gait | None = None,
+        amplitudes: ArrayLike | None = None,
+        progress: Callable | None = None,
     ) -> Any:
         """Return the table of a tier, computed once: a Connection, Harmonics or a Family; None for a tier without one.
         Refusal if the tier is not available."""
@@ -138,26 +155,41 @@ class Study:
     def compute_harmonics(self, progress: Callable | None = None) -> Harmonics:
         """Return the odd harmonics of the velocity on the scene's grid. progress: called with the fraction done."""
         with located(self.scene.name):
-            return self._built(harmonic.table(self.scene.system, self.scene.numerics), progress)[0]
+            return self._built(
+                harmonic.table(self.scene.system, self.scene.numerics), progress
+            )[0]
 
     @property
     def harmonics(self) -> Harmonics | None:
         """Harmonics of the velocity in a plain study; None where it is linear, or has too many joints."""
-        return self.compute_harmonics() if harmonic.is_looked_up(self.scene.system) else None
+        return (
+            self.compute_harmonics()
+            if harmonic.is_looked_up(self.scene.system)
+            else None
+        )
 
-    def plane(self, pair: Sequence[int], at: ArrayLike | None = None, progress: Callable | None = None) -> Plane:
+    def plane(
+        self,
+        pair: Sequence[int],
+        at: ArrayLike | None = None,
+        progress: Callable | None = None,
+    ) -> Plane:
         """Return a plane of shape space in which two joints move, counted from 0, through a shape or the gait's middle:
         the CCF of that pair, without a field of all joints (`geomech.geometry.plane`)."""
         s, both = self.scene, cast(tuple[int, int], tuple(pair))
         place: Any = s.gait.middle if at is None else at
         with located(s.name):
             build = lambda: fitted.plane(s.system, s.numerics, both, place, progress)
-            return self._stored("plane", (*self._connection().key, *both, *place), build)[0]
+            return self._stored(
+                "plane", (*self._connection().key, *both, *place), build
+            )[0]
 
     @property
     def two_form(self) -> TwoForm:
         """CCF of all pairs of joints, of any number (`geomech.geometry.two_form`)."""
-        return self._stored("two-form", self._connection().key, lambda: two_form(self.fitted))[0]
+        return self._stored(
+            "two-form", self._connection().key, lambda: two_form(self.fitted)
+        )[0]
 
     def compute_metric(self, progress: Callable | None = None) -> Metric | Finsler:
         """Return `metric`. progress: called with the fraction done. Where it needs the velocities of the harmonic
@@ -170,9 +202,14 @@ class Study:
     def _new_metric(self, progress: Callable | None) -> Metric | Finsler:
         system, n = self.scene.system, self.scene.numerics
         shared = harmonic.table(system, n)
-        if not effort.shared(system) or (shared.name, system, shared.key) in self._tables:
+        if (
+            not effort.shared(system)
+            or (shared.name, system, shared.key) in self._tables
+        ):
             return effort.table(system, n, progress)
-        (harmonics, norm), took = timed(lambda: effort.with_harmonics(system, n, progress))
+        (harmonics, norm), took = timed(
+            lambda: effort.with_harmonics(system, n, progress)
+        )
         self._tables[shared.name, system, shared.key] = harmonics, took
         return norm
 
@@ -182,11 +219,15 @@ class Study:
         alphadot, else a norm. Refusal if the system has none."""
         return self.compute_metric()
 
-    def effort(self, gait: Gait | None = None, amplitudes: ArrayLike | None = None) -> dict[str, np.ndarray]:
+    def effort(
+        self, gait: Gait | None = None, amplitudes: ArrayLike | None = None
+    ) -> dict[str, np.ndarray]:
         """Return path length and work of a gait, or the scene's own, with their errors: see
         `geomech.studies.effort.effort`."""
         with located(self.scene.name):
-            self.scene.note_turns(self.scene.gait if gait is None else checked_gait(gait), amplitudes)
+            self.scene.note_turns(
+                self.scene.gait if gait is None else checked_gait(gait), amplitudes
+            )
             return effort.effort(self.scene, gait, amplitudes)
 
     @property
@@ -197,7 +238,9 @@ class Study:
         if stored_table(system, "connection"):
             return stored_table(system, "even part")
         build = lambda: even_part(system.velocity, self.fitted.axes, system.traits)
-        return self._stored("even part", fitted.key(self.scene.numerics, ("grid", "extent")), build)[0]
+        return self._stored(
+            "even part", fitted.key(self.scene.numerics, ("grid", "extent")), build
+        )[0]
 
     @property
     def curvature(self) -> Field:
@@ -207,29 +250,42 @@ class Study:
     @property
     def curvature_error(self) -> Field:
         """Estimated error of `curvature`."""
-        return self._stored("error of the ccf", self._connection().key, lambda: ccf_error(self.fitted))[0]
+        return self._stored(
+            "error of the ccf", self._connection().key, lambda: ccf_error(self.fitted)
+        )[0]
 
-    def poses(self, tier: str, gait: Gait | None = None, amplitudes: ArrayLike | None = None) -> np.ndarray:
+    def poses(
+        self, tier: str, gait: Gait | None = None, amplitudes: ArrayLike | None = None
+    ) -> np.ndarray:
         """Return the net pose per cycle (..., 3) by one tier of TIERS for amplitudes (...,), of a gait or the scene's
         own."""
-        scene, gait = self.scene, self.scene.gait if gait is None else checked_gait(gait)
+        scene, gait = (
+            self.scene,
+            self.scene.gait if gait is None else checked_gait(gait),
+        )
         with located(scene.name):
             plan = self.plan(tier, gait, amplitudes)
             scene.note_turns(gait, amplitudes)
             self._refuse_singular(plan, gait, amplitudes)
             return plan.predict(self._table_of(plan), amplitudes)
 
-    def spread(self, tier: str, gait: Gait | None = None, amplitudes: ArrayLike | None = None) -> np.ndarray | None:
+    def spread(
+        self, tier: str, gait: Gait | None = None, amplitudes: ArrayLike | None = None
+    ) -> np.ndarray | None:
         """Return how far `poses` depend on an arbitrary choice of the tier, such as a surface spanned by the
         loop: (B, 2), in the system's unit and rad; None without one. Estimates include it."""
         plan = self.plan(tier, gait, amplitudes)
         return plan.spread(self._table_of(plan), amplitudes)
 
-    def _refuse_singular(self, plan: Plan, gait: Gait, amplitudes, phases: int | None = None) -> None:
+    def _refuse_singular(
+        self, plan: Plan, gait: Gait, amplitudes, phases: int | None = None
+    ) -> None:
         """Refuse a gait, or a curve of the family of the table, that meets a singular shape."""
         system, phases = self.scene.system, phases or self.scene.numerics.phases
         if system.traits.singularity is not None:
-            a = real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes)
+            a = real_array(
+                "amplitudes", gait.amplitude if amplitudes is None else amplitudes
+            )
             if plan.table and plan.table.amplitudes is not None:
                 a = plan.table.amplitudes
             refuse_singular(system, gait.cycle(phases, a)[0])
@@ -250,7 +306,9 @@ class Study:
         the errors of an uncertain one. kept: the tables that were stored before, whose seconds are not part of this
         call."""
         gait, values, chosen = self._checked(gait, amplitudes, tiers)
-        medium, took = timed(lambda: uncertainty.of_medium(self.scene, gait, values))  # first, as it may refuse
+        medium, took = timed(
+            lambda: uncertainty.of_medium(self.scene, gait, values)
+        )  # first, as it may refuse
         seconds, stored = self._build_all(chosen, progress)
         if medium:
             seconds["medium"] = took
@@ -261,28 +319,45 @@ class Study:
             chosen, key=lambda m: (not chosen[m].exact, -order.index(m))
         ):  # the direct tier first, as the reference of others
             if chosen[tier].exact:
-                direct = lambda: estimate.direct(self.scene, gait, values, self.scene.numerics.phases)
+                direct = lambda: estimate.direct(
+                    self.scene, gait, values, self.scene.numerics.phases
+                )
                 reference, seconds[tier] = timed(direct)
                 poses[tier], errors[tier] = reference
             else:
-                poses[tier], seconds[tier] = timed(lambda m=tier: self.poses(m, gait, values))
-                check = lambda m=tier: estimate.against_direct(self.scene, poses[m], gait, values, reference)
+                poses[tier], seconds[tier] = timed(
+                    lambda m=tier: self.poses(m, gait, values)
+                )
+                check = lambda m=tier: estimate.against_direct(
+                    self.scene, poses[m], gait, values, reference
+                )
                 errors[tier], took = timed(check)
                 if (spread := self.spread(tier, gait, values)) is not None:
-                    spreads[tier], errors[tier] = spread, np.maximum(errors[tier], spread / size)
+                    spreads[tier], errors[tier] = (
+                        spread,
+                        np.maximum(errors[tier], spread / size),
+                    )
                 if reference is None:
                     seconds["errors"] = seconds.get("errors", 0.0) + took
         poses, errors = ({m: x[m] for m in chosen} for x in (poses, errors))
         facts = {"seconds": seconds, "kept": stored}
-        return Displacements(tables.result(self.scene, gait, values, poses, errors, medium, spreads, **facts))
+        return Displacements(
+            tables.result(
+                self.scene, gait, values, poses, errors, medium, spreads, **facts
+            )
+        )
 
-    def _build_all(self, chosen: dict[str, Plan], progress) -> tuple[dict[str, float], list[str]]:
+    def _build_all(
+        self, chosen: dict[str, Plan], progress
+    ) -> tuple[dict[str, float], list[str]]:
         """Build the tables of tiers; return the seconds that each took, even if before, and the names of those that
         were stored."""
         field, seconds, stored = self._connection(), {}, []
         tables = {m: plan.table for m, plan in chosen.items() if plan.table}
         of_field = lambda m: tables[m].name == field.name
-        for tier in sorted(tables, key=of_field, reverse=True):  # the field first, as it is also drawn
+        for tier in sorted(
+            tables, key=of_field, reverse=True
+        ):  # the field first, as it is also drawn
             name = "field" if of_field(tier) else f"{tier} table"
             if name not in seconds:
                 with located(self.scene.name):
@@ -301,27 +376,52 @@ class Study:
         `geomech.studies.cost`."""
         gait, amplitudes, plans = self._checked(gait, amplitudes, tiers, *SAMPLES)
         with located(self.scene.name):
-            return cost.price([*cost.study(self.scene, plans, len(amplitudes), gait), *more])
+            return cost.price(
+                [*cost.study(self.scene, plans, len(amplitudes), gait), *more]
+            )
 
-    def _checked(self, gait, amplitudes, tiers, samples: int = sys.maxsize, phases: int = sys.maxsize):
+    def _checked(
+        self,
+        gait,
+        amplitudes,
+        tiers,
+        samples: int = sys.maxsize,
+        phases: int = sys.maxsize,
+    ):
         """Return the gait, or the scene's own, amplitudes (B,) and plans by tier of a request.
 
         Refusal for one that makes no sense, such as a gait that leaves the field at one of ``samples`` amplitudes, at so
         many phases."""
         scene = self.scene
-        gait, amplitudes = checked_gait(scene.gait if gait is None else gait), real_array("amplitudes", amplitudes)
+        gait, amplitudes = (
+            checked_gait(scene.gait if gait is None else gait),
+            real_array("amplitudes", amplitudes),
+        )
         if amplitudes.ndim != 1:
-            raise Refusal("amplitudes must be a list of numbers", value=amplitudes, where=scene.name)
+            raise Refusal(
+                "amplitudes must be a list of numbers",
+                value=amplitudes,
+                where=scene.name,
+            )
         tiers = default_tiers(scene.system) if tiers is None else tiers
         if isinstance(tiers, str) or not isinstance(tiers, Sequence):
-            raise Refusal(f"tiers must be a list of {', '.join(TIERS)}", value=tiers, where=scene.name)
+            raise Refusal(
+                f"tiers must be a list of {', '.join(TIERS)}",
+                value=tiers,
+                where=scene.name,
+            )
         with located(scene.name):
             frequency_of(scene.system, gait)
             scene.note_turns(gait, amplitudes)
             sampled = np.sort(amplitudes)[
-                np.linspace(0, len(amplitudes) - 1, min(len(amplitudes), samples)).astype(int)
+                np.linspace(
+                    0, len(amplitudes) - 1, min(len(amplitudes), samples)
+                ).astype(int)
             ]
-            phases, chosen = min(scene.numerics.phases, max(phases, 4 * gait.harmonics)), {}
+            phases, chosen = (
+                min(scene.numerics.phases, max(phases, 4 * gait.harmonics)),
+                {},
+            )
             for tier in [_tier(m) for m in tiers]:
                 tier.refuse(scene.system)
                 chosen[tier.name] = plan = self._plan(tier, gait, amplitudes)
@@ -331,15 +431,22 @@ class Study:
         return gait, amplitudes, chosen
 
 
-def refuse_outside(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int | None = None) -> None:
+def refuse_outside(
+    scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int | None = None
+) -> None:
     """Refuse a gait, or the scene's own, that leaves the field of the tables. phases: the scene's if None."""
     system, n, gait = scene.system, scene.numerics, scene.gait if gait is None else gait
-    field, chosen = fitted.axes(system, n), np.atleast_1d(gait.amplitude if amplitudes is None else amplitudes)
+    field, chosen = (
+        fitted.axes(system, n),
+        np.atleast_1d(gait.amplitude if amplitudes is None else amplitudes),
+    )
     names, phases = [name for name, _ in shape_labels(system)], phases or n.phases
     few = max(FEW_PHASES, 64 * gait.harmonics)
     if phases > few:
         leaves = lambda group: _may_leave(field, *gait.cycle(few, group))[:, None]
-        chosen = chosen[in_groups(leaves, chosen, gaits_per_batch(system, few))[:, 0] > 0]
+        chosen = chosen[
+            in_groups(leaves, chosen, gaits_per_batch(system, few))[:, 0] > 0
+        ]
     shapes = lambda group: inside(field, gait.cycle(phases, group)[0], names)[:, 0]
     in_groups(shapes, chosen, gaits_per_batch(system, phases))
 

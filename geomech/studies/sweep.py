@@ -32,7 +32,9 @@ class Swept(dict):
         super().__init__({"over": over, **batched(self.scene).table(result)})
 
     def __repr__(self) -> str:
-        over = " x ".join(f"{name} ({len(v)}: {span(v)})" for name, v in self["over"].items())
+        over = " x ".join(
+            f"{name} ({len(v)}: {span(v)})" for name, v in self["over"].items()
+        )
         return f"Swept({printable(self.scene.name)} over {over}; {batched(self.scene).summary(self)})"
 
 
@@ -58,7 +60,9 @@ class Batched(Protocol):
     def rows(self, scenes: list, inner_values: list[float] | None) -> np.ndarray:
         """Return the numbers (N, width) of every scene, for each value of the inner parameter or the scene's own."""
 
-    def variables(self, grid: Grid, rows: np.ndarray, dims: tuple[str, ...]) -> tuple[list[Variable], dict]:
+    def variables(
+        self, grid: Grid, rows: np.ndarray, dims: tuple[str, ...]
+    ) -> tuple[list[Variable], dict]:
         """Return the answer from rows (N_1, ..., width) as variables, and attributes of the whole sweep."""
 
     def as_stored(self, result: Result) -> Result:
@@ -73,7 +77,9 @@ class Batched(Protocol):
 
 def batched(scene: Any) -> Batched:
     """Return the question of sweeps over a scene: the displacement of a gait, or the speed of a robot."""
-    kind, module = ("Walks", "walking") if hasattr(scene, "robot") else ("Cycles", "cycles")
+    kind, module = (
+        ("Walks", "walking") if hasattr(scene, "robot") else ("Cycles", "cycles")
+    )
     return getattr(
         import_module(f"geomech.studies.{module}"), kind
     )()  # loaded only where needed: robots take as long to load as all else
@@ -110,14 +116,25 @@ class Sweep(Question):
         grid, completed, parts_ = self.grid, 0, []
         seconds = self.seconds if "_cost" not in vars(self) else self._cost.seconds
         parts = -(-grid.total // self.question.together(self.scene))
-        for rows in runner().map(answered, (self.question, grid.at), batches(self.question, grid), parts, seconds):
+        for rows in runner().map(
+            answered,
+            (self.question, grid.at),
+            batches(self.question, grid),
+            parts,
+            seconds,
+        ):
             parts_.append(rows)
             completed += len(rows)
             progress(completed / grid.total)
         names = {name: name.replace(".", "_").replace("-", "_") for name in grid.over}
-        axes = [Variable(names[p], (names[p],), np.array(v, float), "", p) for p, v in grid.over.items()]
+        axes = [
+            Variable(names[p], (names[p],), np.array(v, float), "", p)
+            for p, v in grid.over.items()
+        ]
         rows = grid.arranged(np.concatenate(parts_))
-        variables, attributes = self.question.variables(grid, rows, tuple(names.values()))
+        variables, attributes = self.question.variables(
+            grid, rows, tuple(names.values())
+        )
         return Result("sweep", (*axes, *variables), attributes, self.scene)
 
 
@@ -128,7 +145,9 @@ def batches(question: Batched, grid: Grid) -> Iterator[tuple]:
     while completed < grid.total:
         k, j = divmod(completed, count)  # inner values vary fastest
         most = question.together(grid.at(points[k]))
-        indices = range(k, min(k + max(1, most // count), points.total) if j == 0 else k + 1)
+        indices = range(
+            k, min(k + max(1, most // count), points.total) if j == 0 else k + 1
+        )
         values = inner_values[j : j + most] if inner_values else None
         batch = [points[i] for i in indices]
         # Workers may lack the files, so they receive scenes.
@@ -158,7 +177,9 @@ def sweep(
     question = Sweep(scene, over)
     question.check()
     with _stored_in(partial, scene):
-        return Swept(question.answer(progress or (lambda done: None), lambda cost: None))
+        return Swept(
+            question.answer(progress or (lambda done: None), lambda cost: None)
+        )
 
 
 def _stored_in(partial: Path | None, scene: Any) -> contextlib.AbstractContextManager:

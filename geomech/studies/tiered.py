@@ -17,7 +17,13 @@ from geomech.studies import cost as foretold
 from geomech.studies import estimate
 from geomech.studies.available import tiers
 from geomech.studies.study import Study, refuse_outside
-from geomech.systems.capabilities import is_closed, pieces_per_length, solver_of, stored_table, table_error
+from geomech.systems.capabilities import (
+    is_closed,
+    pieces_per_length,
+    solver_of,
+    stored_table,
+    table_error,
+)
 from geomech.tiers import TIERS
 from geomech.tiers.base import Plan
 from geomech.tiers.direct import DIRECT
@@ -27,10 +33,18 @@ FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
 TRUTH_PHASES = 4096
 TRUTH_STEPS = 1024  # of time stepping, which is sequential
 FINE_PIECES = 320  # of body, where effects cut it
-FINEST = {"loads": "exact", "regularisation": 1e-9, "directions": 192, "pieces": FINE_PIECES}
+FINEST = {
+    "loads": "exact",
+    "regularisation": 1e-9,
+    "directions": 192,
+    "pieces": FINE_PIECES,
+}
 SETTINGS = tuple(
     replace(setting, tier=tier.name)
-    for tier in sorted(TIERS.values(), key=lambda tier: (tier is not DIRECT, tier.common, -[*TIERS].index(tier.name)))
+    for tier in sorted(
+        TIERS.values(),
+        key=lambda tier: (tier is not DIRECT, tier.common, -[*TIERS].index(tier.name)),
+    )
     for setting in tier.settings
 )  # the direct tier's first, then those of one gait's family, then those of fields
 
@@ -58,7 +72,9 @@ class Settings:
         """Refuse a gait that does not move, or leaves a field that a setting changes."""
         scene = self.scene
         if np.ptp(scene.gait.cycle(_truth_phases(scene))[0], axis=0).max() == 0:
-            raise Refusal("[gait] does not move", where=scene.name, instead="give it a size")
+            raise Refusal(
+                "[gait] does not move", where=scene.name, instead="give it a size"
+            )
         tables = [_plan(scene, setting.tier).table for setting in self.settings()]
         if any(table and table.axes for table in tables):
             with located(scene.name):
@@ -66,9 +82,15 @@ class Settings:
 
     def cost(self) -> Cost:
         scene = self.scene
-        jobs = foretold.direct(scene, scene.gait, len(FRACTIONS), _truth_phases(scene), checked=False)
+        jobs = foretold.direct(
+            scene, scene.gait, len(FRACTIONS), _truth_phases(scene), checked=False
+        )
         for setting in self.settings():
-            jobs += [job for value in setting.values for job in self.runs * self._jobs(setting, value)]
+            jobs += [
+                job
+                for value in setting.values
+                for job in self.runs * self._jobs(setting, value)
+            ]
             jobs += self._jobs(setting, None) if setting.against == "limit" else []
         return foretold.price(jobs)
 
@@ -78,27 +100,48 @@ class Settings:
         plan = _plan(scene, setting.tier)
         if not plan.exact:
             return foretold.predicted(scene, plan, len(FRACTIONS))
-        return foretold.direct(scene, scene.gait, len(FRACTIONS), scene.numerics.phases, checked=False)
+        return foretold.direct(
+            scene, scene.gait, len(FRACTIONS), scene.numerics.phases, checked=False
+        )
 
     def prepared(self) -> Settings:
         return self
 
     def settings(self) -> list[Setting]:
-        return [k for k in SETTINGS if applies(k, self.scene) and not (k.rule and not is_closed(self.scene.system))]
+        return [
+            k
+            for k in SETTINGS
+            if applies(k, self.scene)
+            and not (k.rule and not is_closed(self.scene.system))
+        ]
 
     def at(self, setting: Setting | None, value: Any) -> Scene:
         """Return the scene at a value of a setting; for None at the limit of the setting, without a setting at what the
         truth takes."""
         scene = self.scene
         if setting is None:
-            finest = scene.with_numerics(loads="exact", regularisation=1e-9) if is_closed(scene.system) else scene
-            finest = finest.with_numerics(pieces=FINE_PIECES) if pieces_per_length(scene.system) else finest
+            finest = (
+                scene.with_numerics(loads="exact", regularisation=1e-9)
+                if is_closed(scene.system)
+                else scene
+            )
+            finest = (
+                finest.with_numerics(pieces=FINE_PIECES)
+                if pieces_per_length(scene.system)
+                else finest
+            )
             return finest.with_numerics(phases=_truth_phases(scene))
         key = setting.key or setting.name
         if value is not None:
-            return scene.with_numerics(**{key: f"{setting.rule}:{value}" if setting.rule else value})
-        if key == "interpolation":  # an exact fit at the gait's own shapes would cost more than a far finer grid
-            return scene.with_numerics(interpolation=5, grid=4 * scene.numerics.grid - 3)
+            return scene.with_numerics(
+                **{key: f"{setting.rule}:{value}" if setting.rule else value}
+            )
+        if (
+            key == "interpolation"
+        ):  # an exact fit at the gait's own shapes would cost more than a far finer grid
+            return scene.with_numerics(
+                interpolation=5, grid=4 * scene.numerics.grid - 3
+            )
         return scene.with_numerics(**{key: FINEST[key]})
 
     def numbers(self, setting: Setting | None, value: Any) -> list[np.ndarray]:
@@ -106,7 +149,9 @@ class Settings:
         tier = setting.tier if setting else DIRECT.name
         return [Study(self.at(setting, value)).poses(tier, None, self.amplitudes)]
 
-    def errors(self, numbers: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
+    def errors(
+        self, numbers: list[np.ndarray], truth: list[np.ndarray]
+    ) -> dict[str, float]:
         distances = estimate.distance(numbers[0], truth[0]) / self.scene.system.length
         return {"error": float(np.sqrt(np.mean(distances**2)))}
 
@@ -132,7 +177,11 @@ class Settings:
     def facts(self) -> dict[str, Any]:
         own = self.own_error
         units = {"error": "BL", "tolerance": "BL", "own_error": "BL", "seconds": "s"}
-        facts = {"scene": self.scene.name, "amplitudes": self.amplitudes.tolist(), "units": units}
+        facts = {
+            "scene": self.scene.name,
+            "amplitudes": self.amplitudes.tolist(),
+            "units": units,
+        }
         return {**facts, **({"own_error": own} if own else {})}
 
 
@@ -146,15 +195,21 @@ def applies(setting: Setting, scene: Scene) -> bool:
     if setting.tier not in tiers(system):
         return False
     if setting.tier != DIRECT.name:
-        of_a_field = TIERS[setting.tier].common and (stored_table(system, "connection") or system.joints > 2)
-        if of_a_field or _plan(scene, setting.tier).exact:  # from 7 to 61 points per joint: hours
+        of_a_field = TIERS[setting.tier].common and (
+            stored_table(system, "connection") or system.joints > 2
+        )
+        if (
+            of_a_field or _plan(scene, setting.tier).exact
+        ):  # from 7 to 61 points per joint: hours
             return False
     return key != "pieces" or pieces_per_length(system) > 0
 
 
 def _plan(scene: Scene, tier: str) -> Plan:
     """Return the plan of a tier for the amplitudes of the study."""
-    return TIERS[tier].plan(scene.system, scene.numerics, scene.gait, scene.gait.amplitude * FRACTIONS)
+    return TIERS[tier].plan(
+        scene.system, scene.numerics, scene.gait, scene.gait.amplitude * FRACTIONS
+    )
 
 
 def _truth_phases(scene: Scene) -> int:

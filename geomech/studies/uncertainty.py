@@ -24,7 +24,9 @@ from geomech.tiers.base import in_groups
 from rft.refusal import Refusal, located
 
 PHASES = 64  # of a cycle: enough for changes of displacement to a per cent
-NONLINEAR = 1.02  # times the linear standard deviation, from which on the second order counts
+NONLINEAR = (
+    1.02  # times the linear standard deviation, from which on the second order counts
+)
 DEVIATIONS = np.sqrt(3.0)  # standard deviations, of sigma points
 SHIFTED = 0.1  # of a standard deviation, from which on a shift of the mean is printed
 SEEN = 1e-6  # body lengths or rad: smaller standard deviations of second order are roundoff
@@ -39,7 +41,9 @@ def root(covariance) -> np.ndarray:
     unit = np.where(spread > 0, spread, 1.0)
     variances, directions = np.linalg.eigh(covariance / unit[:, None] / unit)
     varying = variances > 1e-12  # of correlations, whose sum is n
-    return (unit[:, None] * directions * np.sqrt(np.maximum(variances, 0.0)))[:, varying]
+    return (unit[:, None] * directions * np.sqrt(np.maximum(variances, 0.0)))[
+        :, varying
+    ]
 
 
 def uncertain(system: System) -> bool:
@@ -53,7 +57,9 @@ def points(system: System) -> int:
     return 1 + 2 * n + n * (n - 1) // 2
 
 
-def sigma_points(scene: Scene) -> tuple[float, list[tuple[System, System]], dict[tuple[int, int], System]]:
+def sigma_points(
+    scene: Scene,
+) -> tuple[float, list[tuple[System, System]], dict[tuple[int, int], System]]:
     """Return the number of standard deviations to either side, the systems there in every direction, and those in every
     pair of directions, by their numbers. Refusal if one is no system a standard deviation away: the covariance then
     allows impossible media."""
@@ -69,10 +75,16 @@ def _points(scene: Scene, deviations: float):
     pairs = itertools.combinations(range(len(steps)), 2)
     with located(scene.name):
         near = [(system.varied(s), system.varied(-s)) for s in steps]
-        return deviations, near, {(i, j): system.varied(steps[i] + steps[j]) for i, j in pairs}
+        return (
+            deviations,
+            near,
+            {(i, j): system.varied(steps[i] + steps[j]) for i, j in pairs},
+        )
 
 
-def of_medium(scene: Scene, gait: Gait, amplitudes) -> dict[str, np.ndarray | list[str]] | None:
+def of_medium(
+    scene: Scene, gait: Gait, amplitudes
+) -> dict[str, np.ndarray | list[str]] | None:
     """Return standard deviations of the net pose by the medium; None for a certain medium. Refusal as of
     `sigma_points`.
 
@@ -91,11 +103,19 @@ def of_medium(scene: Scene, gait: Gait, amplitudes) -> dict[str, np.ndarray | li
     along = lambda change: _with_distance(mid, change)
     slopes = [along((p - m) / (2 * deviations)) for p, m in sides]
     curves = [along((p + m - 2 * mid) / deviations**2) for p, m in sides]
-    mixed = [along(_moved(s, gait, amplitudes) - sides[i][0] - sides[j][0] + mid) for (i, j), s in both.items()]
+    mixed = [
+        along(_moved(s, gait, amplitudes) - sides[i][0] - sides[j][0] + mid)
+        for (i, j), s in both.items()
+    ]
     bends = [c / np.sqrt(2) for c in curves] + [c / deviations**2 for c in mixed]
-    linear, more = (sum((d * d for d in changes), np.zeros((len(mid), 4))) for changes in (slopes, bends))
+    linear, more = (
+        sum((d * d for d in changes), np.zeros((len(mid), 4)))
+        for changes in (slopes, bends)
+    )
     size = np.array([system.length, system.length, 1.0])
-    bent = (linear + more > NONLINEAR**2 * linear)[:, :3] & (np.sqrt((linear + more)[:, :3]) / size > SEEN)
+    bent = (linear + more > NONLINEAR**2 * linear)[:, :3] & (
+        np.sqrt((linear + more)[:, :3]) / size > SEEN
+    )
     variance = linear + np.where(bent.any(1)[:, None], more, 0.0)
     spread = dict(zip(QUANTITIES, np.sqrt(variance).T))
     spread["position"] = np.hypot(spread["x"], spread["y"])
@@ -108,7 +128,9 @@ def of_medium(scene: Scene, gait: Gait, amplitudes) -> dict[str, np.ndarray | li
 
 def _with_distance(poses: np.ndarray, change: np.ndarray) -> np.ndarray:
     """Return changes (B, 3) of net poses (B, 3) with the change along the net displacement, QUANTITIES (B, 4)."""
-    direction = poses[:, :2] / np.maximum(of_pose(poses)["net_distance"], 1e-300)[:, None]
+    direction = (
+        poses[:, :2] / np.maximum(of_pose(poses)["net_distance"], 1e-300)[:, None]
+    )
     return np.column_stack([change, (change[:, :2] * direction).sum(1)])
 
 

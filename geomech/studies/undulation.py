@@ -18,7 +18,10 @@ from rft.refusal import Refusal
 if TYPE_CHECKING:
     from geomech.scenes.model import Scene
 
-MIDDLE = (0.1, 0.9)  # share of the body over which speeds of waves are fitted: at its ends the moment vanishes
+MIDDLE = (
+    0.1,
+    0.9,
+)  # share of the body over which speeds of waves are fitted: at its ends the moment vanishes
 
 
 def performance(scene: Scene, amplitudes: ArrayLike) -> dict[str, np.ndarray]:
@@ -63,7 +66,10 @@ def performance(scene: Scene, amplitudes: ArrayLike) -> dict[str, np.ndarray]:
     timed = {}
     if (frequency := scene.frequency) is not None:
         timed["distance"] = progress * length
-        timed["speed"], timed["speed_body_lengths"] = timed["distance"] * frequency, progress * frequency
+        timed["speed"], timed["speed_body_lengths"] = (
+            timed["distance"] * frequency,
+            progress * frequency,
+        )
         timed["velocity_per_second"] = run.xi * (2 * np.pi * frequency)
     return {
         "amplitude": amplitudes,
@@ -100,14 +106,18 @@ def _known_wave(scene: Scene, amplitudes: np.ndarray) -> BodyWave | None:
     if not known:
         return None
     waves = np.full(amplitudes.shape, abs(gait.waves))
-    return BodyWave(waves, gait.wavelength(amplitudes), gait.relative_curvature(amplitudes))
+    return BodyWave(
+        waves, gait.wavelength(amplitudes), gait.relative_curvature(amplitudes)
+    )
 
 
 def _moving_wave(system: Loaded, alpha: np.ndarray, alphadot: np.ndarray) -> BodyWave:
     """Return the wave that gaits (B, N, d) send along the body."""
     s, bend, _, chord = bends(system, alpha, alphadot)
     first = np.fft.fft(bend, axis=-2)[:, 1]
-    slopes = np.array([_slope(s, np.unwrap(np.angle(x))) if x.any() else np.nan for x in first])
+    slopes = np.array(
+        [_slope(s, np.unwrap(np.angle(x))) if x.any() else np.nan for x in first]
+    )
     waves = np.abs(slopes) / (2 * np.pi)
     curved = np.abs(bend).mean((-2, -1)) * (len(s) + 1)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -132,27 +142,35 @@ def bends(system: Loaded, alpha: np.ndarray, alphadot: np.ndarray) -> Bends:
     bend, rate = np.angle(heading[1:] * heading[:-1].conj()), np.diff(rotation, axis=0)
     bend, rate = (x.T.reshape(*batch, -1) for x in (bend, rate))
     chord = np.abs((2 * e.half * heading).sum(0)).reshape(batch)
-    return Bends(np.cumsum(2 * e.half[:, 0])[:-1], np.unwrap(bend, axis=-2), rate, chord)
+    return Bends(
+        np.cumsum(2 * e.half[:, 0])[:-1], np.unwrap(bend, axis=-2), rate, chord
+    )
 
 
 def loaded(scene: Any, what: str) -> Loaded:
     """Return the scene's system as a body under forces; Refusal, which names ``what`` cannot be, without one."""
     system = getattr(scene, "system", None)
     if (found := system and capability(system, Loaded)) is None:
-        raise Refusal(f"{what} is that of a body in a medium, got a {kind_of(scene if system is None else system)}")
+        raise Refusal(
+            f"{what} is that of a body in a medium, got a {kind_of(scene if system is None else system)}"
+        )
     return found
 
 
 def _sine(scene: Scene, what: str) -> Sine:
     if not isinstance(getattr(scene, "gait", None), Sine):
-        raise Refusal(f"{what} is that of a sine wave, got a {type(getattr(scene, 'gait', scene)).__name__.lower()}")
+        raise Refusal(
+            f"{what} is that of a sine wave, got a {type(getattr(scene, 'gait', scene)).__name__.lower()}"
+        )
     return scene.gait
 
 
 KINEMATICS = ("sliding", "sideways")
 
 
-def endless_efficiency(medium: Any, headings: np.ndarray, cap: Any = None, kinematics: str = "sliding") -> float:
+def endless_efficiency(
+    medium: Any, headings: np.ndarray, cap: Any = None, kinematics: str = "sliding"
+) -> float:
     """Return the efficiency, progress over wavelength, of an endless wave by the balance of force along it alone: no
     yaw.
 
@@ -178,14 +196,22 @@ def endless_efficiency(medium: Any, headings: np.ndarray, cap: Any = None, kinem
     from scipy.optimize import brentq
 
     if kinematics not in KINEMATICS:
-        raise Refusal(f"kinematics must be one of {', '.join(KINEMATICS)}", value=kinematics)
+        raise Refusal(
+            f"kinematics must be one of {', '.join(KINEMATICS)}", value=kinematics
+        )
     sliding = kinematics == "sliding"
     c, s = np.cos(headings), np.sin(headings)
     speed = c.mean()  # of the wave
-    passing = 1.0 if sliding else c / speed  # share of the cycle that an end of the body spends at each heading
+    passing = (
+        1.0 if sliding else c / speed
+    )  # share of the cycle that an end of the body spends at each heading
 
     def along(efficiency):
-        v_x, v_y = (c - (1 - efficiency) * speed, s) if sliding else (efficiency * speed, speed * s / c)
+        v_x, v_y = (
+            (c - (1 - efficiency) * speed, s)
+            if sliding
+            else (efficiency * speed, speed * s / c)
+        )
         v_t, v_n = v_x * c + v_y * s, v_y * c - v_x * s
         f_t, f_n = medium.traction(v_t, v_n, 1e-12)
         if cap is not None:
@@ -197,7 +223,11 @@ def endless_efficiency(medium: Any, headings: np.ndarray, cap: Any = None, kinem
 
 
 def endless_sine(
-    medium: Any, amplitude: float, cap: Any = None, elements: int = 2000, kinematics: str = "sliding"
+    medium: Any,
+    amplitude: float,
+    cap: Any = None,
+    elements: int = 2000,
+    kinematics: str = "sliding",
 ) -> float:
     """Return `endless_efficiency` of a sine of this A / lambda, with one wave on the body where ends count. Sliding, it
     is the endless limit of the gait `Sine`.
@@ -217,7 +247,9 @@ def endless_sine(
     return endless_efficiency(medium, gait.headings(0.0), cap, kinematics)
 
 
-def optimum(x: ArrayLike, values: ArrayLike, sign: int = 1) -> tuple[float, float] | None:
+def optimum(
+    x: ArrayLike, values: ArrayLike, sign: int = 1
+) -> tuple[float, float] | None:
     """Return the place and height of the largest (sign 1) or least (-1) of positive values (B,) at x (B,).
 
     Both are those of the parabola through the logarithms of that value and its neighbours. None if it is the first or the
@@ -252,7 +284,9 @@ def refined(scene: Scene, finer: int) -> Scene:
     """
     elements = finer * _sine(scene, "refined").elements
     gait = dataclasses.replace(scene.gait, elements=elements)
-    return scene.changed(body=dataclasses.replace(scene.system.body, elements=elements), gait=gait)
+    return scene.changed(
+        body=dataclasses.replace(scene.system.body, elements=elements), gait=gait
+    )
 
 
 def activation(scene: Scene) -> dict[str, np.ndarray | float]:
@@ -282,17 +316,26 @@ def activation(scene: Scene) -> dict[str, np.ndarray | float]:
     """
     system = loaded(scene, "activation")
     cycle = scene.gait.cycle(scene.numerics.phases)
-    return activation_of(bends(system, *cycle), scene.system.run(*cycle, work=True).work.bending_moment)
+    return activation_of(
+        bends(system, *cycle), scene.system.run(*cycle, work=True).work.bending_moment
+    )
 
 
 def activation_of(bent: Bends, moment: np.ndarray) -> dict[str, np.ndarray | float]:
     """Return `activation` from the bends and the bending moments (N, S) of a cycle."""
     s, bend, rate, _ = bent
     if not bend.any() or not np.ptp(bend, axis=0).any():
-        raise Refusal("activation takes a wave of amplitude > 0", because="a body at rest needs no muscles")
+        raise Refusal(
+            "activation takes a wave of amplitude > 0",
+            because="a body at rest needs no muscles",
+        )
     onset, offset, changes = _zeros(moment)
     to_right, to_left, _ = _zeros(bend)
-    onset, to_right, to_left = _continuous(onset), _continuous(to_right), _continuous(to_left)
+    onset, to_right, to_left = (
+        _continuous(onset),
+        _continuous(to_right),
+        _continuous(to_left),
+    )
     offset = onset + _continuous(offset - onset)
     waves = [np.fft.fft(x, axis=0)[1] for x in (moment, bend)]
     slopes = [_slope(s, x) for x in (onset, offset, to_right, to_left)]
@@ -307,7 +350,11 @@ def activation_of(bent: Bends, moment: np.ndarray) -> dict[str, np.ndarray | flo
         "onset": onset,
         "offset": offset,
         "changes": changes,
-        "lag": (_continuous(to_right - onset, -np.pi) + _continuous(to_left - offset, -np.pi)) / 2,
+        "lag": (
+            _continuous(to_right - onset, -np.pi)
+            + _continuous(to_left - offset, -np.pi)
+        )
+        / 2,
         "fundamental_lag": _continuous(np.angle(waves[0] * waves[1].conj()), -np.pi),
         "speed_ratio": ratio(slopes[2] + slopes[3], slopes[0] + slopes[1]),
         "fundamental_speed_ratio": ratio(harmonics[1], harmonics[0]),

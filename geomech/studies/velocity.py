@@ -26,5 +26,16 @@ class Velocity(Question):
         with located(self.scene.name):
             solution = single(self.scene.system, self.alpha, self.alphadot)
         unit = length_unit(self.scene.system)
-        xi = Variable("xi", ("component",), np.array(solution["xi"]), f"{unit}, {unit}, rad", "per unit time")
-        return Result("velocity", (xi,), {"found": solution, "units": {"xi": [unit, unit, "rad"]}}, self.scene)
+        xi = Variable(
+            "xi",
+            ("component",),
+            np.array(solution["xi"]),
+            f"{unit}, {unit}, rad",
+            "per unit time",
+        )
+        return Result(
+            "velocity",
+            (xi,),
+            {"found": solution, "units": {"xi": [unit, unit, "rad"]}},
+            self.scene,
+        )

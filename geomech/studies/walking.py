@@ -36,7 +36,9 @@ SETTLING = 3  # cycles from rest in a sweep, before the limit cycle is looked fo
 STEP = 200.0  # balances that take NumPy as long as a time step
 HARD = 30.0  # evaluations of forces in a step; the first steps of the built-in robots take 7 to 14
 PUSHED = 0.2  # acceleration of a body by much faster legs over gravity, measured
-IN_VAIN = 40  # cycles of a failing search for a limit cycle with its errors, many at once
+IN_VAIN = (
+    40  # cycles of a failing search for a limit cycle with its errors, many at once
+)
 TO_COME = 1.5  # error over the change with twice the elements; up to 1.49 measured, 4/3 for order 2
 WALKING = 0.7  # share of the time before the errors are computed
 UNITS = {  # of a walk's table; a positive pitch is nose down
@@ -69,26 +71,53 @@ class Walked(NamedTuple):
 
 
 def walked(
-    scenes: Sequence[WalkerScene], by: str | None = None, settling: bool = False, progress: Callable | None = None
+    scenes: Sequence[WalkerScene],
+    by: str | None = None,
+    settling: bool = False,
+    progress: Callable | None = None,
 ) -> list[Walked]:
     """Return the walks of scenes with equal numerics and engines, computed in batches. settling: a few cycles from rest
     suffice. progress: called with the fraction done."""
-    numerics, chosen, walkers = scenes[0].numerics, engine(by or scenes[0].engine), [s.walker for s in scenes]
+    numerics, chosen, walkers = (
+        scenes[0].numerics,
+        engine(by or scenes[0].engine),
+        [s.walker for s in scenes],
+    )
     callback = {"progress": lambda done: progress(WALKING * done)} if progress else {}
-    walks = chosen.walk(walkers, numerics, SETTLING if settling else None, advance=jobs.runner().call, **callback)
-    refinements = [("steps", max(8, numerics.steps // 2)), ("steps", max(8, 3 * numerics.steps // 4))]
+    walks = chosen.walk(
+        walkers,
+        numerics,
+        SETTLING if settling else None,
+        advance=jobs.runner().call,
+        **callback,
+    )
+    refinements = [
+        ("steps", max(8, numerics.steps // 2)),
+        ("steps", max(8, 3 * numerics.steps // 4)),
+    ]
     refinements += [("elements", min(1000, 2 * numerics.elements))]
     changes = []
     for k, (name, other) in enumerate(refinements):
         finer = dataclasses.replace(numerics, **{name: other})
-        rerun = chosen.rerun(walkers, finer, walks, SETTLING if settling else None, advance=jobs.runner().call)
-        changes.append(np.abs([np.subtract(_means(a), _means(b)) for a, b in zip(rerun, walks)]))
+        rerun = chosen.rerun(
+            walkers,
+            finer,
+            walks,
+            SETTLING if settling else None,
+            advance=jobs.runner().call,
+        )
+        changes.append(
+            np.abs([np.subtract(_means(a), _means(b)) for a, b in zip(rerun, walks)])
+        )
         if progress:
             progress(WALKING + (1.0 - WALKING) * (k + 1) / len(refinements))
     half, three_quarters, finer = changes
     error = np.maximum(half, three_quarters) + TO_COME * finer
     error[:, 0] += [w.drift + w.unsolved_error for w in walks]
-    return [Walked(w, *e, TO_COME * float(x)) for w, e, x in zip(walks, error.tolist(), finer[:, 0])]
+    return [
+        Walked(w, *e, TO_COME * float(x))
+        for w, e, x in zip(walks, error.tolist(), finer[:, 0])
+    ]
 
 
 def _means(walk: Walk) -> tuple[float, float, float]:
@@ -101,12 +130,21 @@ def cost_of_transport(scene: WalkerScene, walk: Walk) -> float:
     chords of the cycles. inf for a robot that does not move."""
     at = np.append(np.arange(0.0, walk.t[-1], 1 / scene.gait.frequency), walk.t[-1])
     y = walk.spatial["y"] if walk.spatial else np.zeros_like(walk.t)
-    path = np.hypot(*(np.diff(np.interp(at, walk.t, x)) for x in (walk.pose[:, 0], y))).sum()
-    return float(walk.work[-1] / (scene.robot.mass * GRAVITY * path)) if path > 0.0 else math.inf
+    path = np.hypot(
+        *(np.diff(np.interp(at, walk.t, x)) for x in (walk.pose[:, 0], y))
+    ).sum()
+    return (
+        float(walk.work[-1] / (scene.robot.mass * GRAVITY * path))
+        if path > 0.0
+        else math.inf
+    )
 
 
 def run(
-    scene: WalkerScene, by: str | None = None, progress: Callable | None = None, longest: float = math.inf
+    scene: WalkerScene,
+    by: str | None = None,
+    progress: Callable | None = None,
+    longest: float = math.inf,
 ) -> Walked:
     """Return the walk of one scene.
 
@@ -118,7 +156,8 @@ def run(
         if time.process_time() - begin > longest and done < WALKING:
             cure = "lower [numerics] duration, or lift the limit (``longest``)"
             raise Refusal(
-                f"after {longest:.0f} s of computing {done:.0%} is done, and no cycle repeats itself", instead=cure
+                f"after {longest:.0f} s of computing {done:.0%} is done, and no cycle repeats itself",
+                instead=cure,
             )
         if progress:
             progress(done)
@@ -146,18 +185,37 @@ class Walking(Question):
         return price(self.scene, by=self.engine)
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        return of_walk(self.scene, run(self.scene, self.engine, progress, LONGEST if self.limited else math.inf))
+        return of_walk(
+            self.scene,
+            run(
+                self.scene, self.engine, progress, LONGEST if self.limited else math.inf
+            ),
+        )
 
 
 def of_walk(scene: WalkerScene, run: Walked) -> Result:
     """Return the table of a walk, and its speed, drift and turning with their errors."""
     w, over = run.walk, ("t",)
-    more = {name: values for name, values in (w.spatial or {}).items() if values.ndim == 1}
-    columns = dict(zip(UNITS, (w.t, *w.pose.T, *w.twist.T, w.work, w.loss, w.energy))) | more
-    table = [Variable(name, over, values, UNITS.get(name, "")) for name, values in columns.items()]
+    more = {
+        name: values for name, values in (w.spatial or {}).items() if values.ndim == 1
+    }
+    columns = (
+        dict(zip(UNITS, (w.t, *w.pose.T, *w.twist.T, w.work, w.loss, w.energy))) | more
+    )
+    table = [
+        Variable(name, over, values, UNITS.get(name, ""))
+        for name, values in columns.items()
+    ]
     table += [
         Variable("speed", (), w.speed, "m/s", "mean speed", run.estimate),
-        Variable("aside", (), w.lateral_speed, "m/s", "to the left of its heading", run.lateral),
+        Variable(
+            "aside",
+            (),
+            w.lateral_speed,
+            "m/s",
+            "to the left of its heading",
+            run.lateral,
+        ),
         Variable("turning", (), w.yaw_rate, "rad/s", "to the left", run.turning),
     ]
     return Result("walk", tuple(table), {"name": scene.name}, (scene, run))
@@ -172,10 +230,14 @@ class Steps(Cost):
         return STEP * self.balances
 
     def __str__(self) -> str:
-        return f"{self.balances:,} time steps, about {duration(self.seconds)} of computing"
+        return (
+            f"{self.balances:,} time steps, about {duration(self.seconds)} of computing"
+        )
 
 
-def price(scene: WalkerScene, count: int = 1, settling: bool = False, by: str | None = None) -> Steps:
+def price(
+    scene: WalkerScene, count: int = 1, settling: bool = False, by: str | None = None
+) -> Steps:
     """Return the cost of ``count`` scenes like this one, estimated from its first time steps.
 
     Where these take many times as many evaluations as usual, as for robots so light that they bounce or stick at every
@@ -188,7 +250,9 @@ def price(scene: WalkerScene, count: int = 1, settling: bool = False, by: str | 
     cycles = min(most, 2 * LIMIT + _speeding_up(scene))
     least = (cycles + 2.75 * LIMIT) * numerics.steps * count
     with located(scene.name), suiting(STEP * least if planar else 0.0):
-        step_seconds, tries = engine(engine_name).step_cost([scene.walker] * together, numerics, PILOT)
+        step_seconds, tries = engine(engine_name).step_cost(
+            [scene.walker] * together, numerics, PILOT
+        )
     vain = IN_VAIN if tries > HARD else MOST_STRIDES if own else 0
     cycles = most + vain if vain else cycles
     steps = (cycles + 2.75 * LIMIT) * numerics.steps
@@ -200,7 +264,10 @@ def _speeding_up(scene: WalkerScene) -> float:
     """Return the number of cycles in which legs bring a body to their speed, at a fraction of gravity."""
     if not isinstance(scene.robot, Rhex | Roller):
         return 0.0
-    radius, f = np.abs(scene.robot.leg(scene.numerics.elements).points).max(), scene.gait.frequency
+    radius, f = (
+        np.abs(scene.robot.leg(scene.numerics.elements).points).max(),
+        scene.gait.frequency,
+    )
     return float(2 * np.pi * radius * f**2 / (PUSHED * 9.81))
 
 
@@ -226,14 +293,25 @@ class Walks:
     def rows(self, scenes: list[WalkerScene], inner_values: None) -> np.ndarray:
         """Return speed, its error, status and cycles."""
         groups = itertools.groupby(scenes, key=lambda s: (s.numerics, s.engine))
-        walks = [one for _, group in groups for one in walked(list(group), settling=True)]
-        return np.array([[w.walk.speed, w.estimate, STATUSES.index(w.walk.status), w.walk.cycles] for w in walks])
+        walks = [
+            one for _, group in groups for one in walked(list(group), settling=True)
+        ]
+        return np.array(
+            [
+                [w.walk.speed, w.estimate, STATUSES.index(w.walk.status), w.walk.cycles]
+                for w in walks
+            ]
+        )
 
     def cost(self, grid: Grid) -> Steps:
         ends = (grid.at(grid.points[k]) for k in (0, grid.total - 1))
-        return max((price(s, grid.total, settling=True) for s in ends), key=lambda c: c.seconds)
+        return max(
+            (price(s, grid.total, settling=True) for s in ends), key=lambda c: c.seconds
+        )
 
-    def variables(self, grid: Grid, rows: np.ndarray, dims: tuple[str, ...]) -> tuple[list[Variable], dict]:
+    def variables(
+        self, grid: Grid, rows: np.ndarray, dims: tuple[str, ...]
+    ) -> tuple[list[Variable], dict]:
         speed, estimate, kinds, cycles = np.moveaxis(rows, -1, 0)
         variables = [
             Variable("speed", dims, speed, "m/s", "mean speed", estimate),
@@ -247,10 +325,18 @@ class Walks:
         """Return a sweep as data for a file: the error as estimate, the status as a number explained by its label."""
         speed, status = result["speed"], result["status"]
         meanings = ", ".join(f"{k}: {name}" for k, name in enumerate(STATUSES))
-        index = np.argmax(np.array(STATUSES) == status.values[..., None], -1).astype(float)
+        index = np.argmax(np.array(STATUSES) == status.values[..., None], -1).astype(
+            float
+        )
         stored = [v for v in result.variables if v.is_coordinate]
-        stored += [dataclasses.replace(speed, error=None), Variable("estimate", speed.dims, speed.error, "m/s")]
-        stored += [result["cycles"], Variable("status", speed.dims, index, "1", meanings)]
+        stored += [
+            dataclasses.replace(speed, error=None),
+            Variable("estimate", speed.dims, speed.error, "m/s"),
+        ]
+        stored += [
+            result["cycles"],
+            Variable("status", speed.dims, index, "1", meanings),
+        ]
         return dataclasses.replace(result, variables=tuple(stored))
 
     def table(self, result: Result) -> dict:
@@ -260,7 +346,9 @@ class Walks:
 
     def summary(self, table: Mapping) -> str:
         worst = np.max(table["estimate"], initial=0.0)
-        return f"speed {span(table['speed'])} m/s; estimated error up to {worst:.1e} m/s"
+        return (
+            f"speed {span(table['speed'])} m/s; estimated error up to {worst:.1e} m/s"
+        )
 
 
 @dataclass(frozen=True)
@@ -279,15 +367,22 @@ class Settings:
         refuse_engine(self.scene)
 
     def cost(self) -> Steps:
-        finest = {setting.name: (*setting.values, FINEST[setting.name]) for setting in SETTINGS}
+        finest = {
+            setting.name: (*setting.values, FINEST[setting.name])
+            for setting in SETTINGS
+        }
         shares = sum(v / self.scene.numerics.steps for v in finest["steps"])
-        shares += sum(0.5 + v / 32 for v in finest["elements"]) + 2 * (len(finest["rounding"]) - 1)
+        shares += sum(0.5 + v / 32 for v in finest["elements"]) + 2 * (
+            len(finest["rounding"]) - 1
+        )
         one = price(self.scene, settling=True)
         seconds = one.seconds * shares / 2
         return Steps(round(one.balances * shares / 2), seconds, BASE, seconds)
 
     def prepared(self) -> Settings:
-        (walk,) = engine(self.scene.engine).walk([self.scene.walker], self.scene.numerics, SETTLING)
+        (walk,) = engine(self.scene.engine).walk(
+            [self.scene.walker], self.scene.numerics, SETTLING
+        )
         return dataclasses.replace(self, near=walk)
 
     def settings(self) -> list[Setting]:
@@ -297,10 +392,14 @@ class Settings:
         """Return the speed with one setting at another value."""
         value = FINEST[setting.name] if value is None else value
         numerics = dataclasses.replace(self.scene.numerics, **{setting.name: value})
-        (walk,) = engine(self.scene.engine).rerun([self.scene.walker], numerics, [self.near], SETTLING)
+        (walk,) = engine(self.scene.engine).rerun(
+            [self.scene.walker], numerics, [self.near], SETTLING
+        )
         return [np.array(walk.speed)]
 
-    def errors(self, numbers: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
+    def errors(
+        self, numbers: list[np.ndarray], truth: list[np.ndarray]
+    ) -> dict[str, float]:
         return {"error": float(abs(numbers[0] - truth[0]))}
 
     def describe(self, setting: Setting, measure: str) -> dict[str, Any]:
@@ -310,7 +409,11 @@ class Settings:
         """Return for each setting the coarsest value from which on the error is within the tolerance; None if there is none."""
         out: dict[str, Any] = {"tolerance": tolerance}
         for line in lines:
-            good = [v for k, v in enumerate(line["value"]) if max(line["error"][k:]) <= tolerance]
+            good = [
+                v
+                for k, v in enumerate(line["value"])
+                if max(line["error"][k:]) <= tolerance
+            ]
             out[line["label"]] = good[0] if good else None
         return out
 

@@ -5,7 +5,12 @@ A = symbolic.simplified(A, alpha)
 print(symbolic.latex(symbolic.ccf(A, alpha)))
 """
 
-from geomech.symbolic.connections import chain_connection, differential_drive, no_slip_snake, viscous_chain
+from geomech.symbolic.connections import (
+    chain_connection,
+    differential_drive,
+    no_slip_snake,
+    viscous_chain,
+)
 from geomech.symbolic.matrices import bracket, ccf, latex, simplified, velocity
 
 __all__ = [

@@ -52,8 +52,13 @@ def links(lengths, reference: int) -> list[Link]:
     """
     alpha = shape_angles(len(lengths) - 1)
     lengths = [exact(x) / sum(map(exact, lengths)) for x in lengths]
-    headings = [sp.Add(*alpha[:k]) - sp.Add(*alpha[: reference - 1]) for k in range(len(lengths))]
-    halves = [x / 2 * sp.Matrix([sp.cos(h), sp.sin(h)]) for x, h in zip(lengths, headings)]
+    headings = [
+        sp.Add(*alpha[:k]) - sp.Add(*alpha[: reference - 1])
+        for k in range(len(lengths))
+    ]
+    halves = [
+        x / 2 * sp.Matrix([sp.cos(h), sp.sin(h)]) for x, h in zip(lengths, headings)
+    ]
     places = [sp.zeros(2, 1)]
     for tail, head in itertools.pairwise(halves):
         places.append(places[-1] + tail + head)
@@ -86,7 +91,9 @@ def solve_chain(lengths, frame: str, weights, equations: Callable) -> Formula:
     The equations are solved in the frame of a link in any case, where they are short.
     """
     alpha, mean = shape_angles(len(lengths) - 1), frame == "mean"
-    chain = links(lengths, (len(lengths) + 1) // 2 if mean else int(frame.removeprefix("link-")))
+    chain = links(
+        lengths, (len(lengths) + 1) // 2 if mean else int(frame.removeprefix("link-"))
+    )
     M, C = equations(chain)
     A = -M.LUsolve(C)
     if mean:
@@ -102,7 +109,10 @@ def solve_chain(lengths, frame: str, weights, equations: Callable) -> Formula:
 
 
 def chain_connection(
-    lengths: Sequence, resistances: Sequence, frame: str = "mean", weights: Sequence | None = None
+    lengths: Sequence,
+    resistances: Sequence,
+    frame: str = "mean",
+    weights: Sequence | None = None,
 ) -> Formula:
     """Return A = -(sum J_i^T R_i J_i)^-1 sum J_i^T R_i B_i of a chain whose links resist their velocity v_i by R_i v_i.
 
@@ -122,13 +132,20 @@ def chain_connection(
 
     def balance(chain):
         R = [sp.diag(*map(exact, x)) for x in resistances]
-        total = sum((link.J.T * r * link.J for link, r in zip(chain, R)), sp.zeros(3, 3))
-        return total, sum((link.J.T * r * link.B for link, r in zip(chain, R)), sp.zeros(3, len(chain) - 1))
+        total = sum(
+            (link.J.T * r * link.J for link, r in zip(chain, R)), sp.zeros(3, 3)
+        )
+        return total, sum(
+            (link.J.T * r * link.B for link, r in zip(chain, R)),
+            sp.zeros(3, len(chain) - 1),
+        )
 
     return solve_chain(lengths, frame, weights, balance)
 
 
-def viscous_chain(lengths: Sequence = (1, 1, 1), ratio: Any = 2, frame: str = "link-2") -> Formula:
+def viscous_chain(
+    lengths: Sequence = (1, 1, 1), ratio: Any = 2, frame: str = "link-2"
+) -> Formula:
     """Return the connection of a chain of links in a linear medium.
 
     lengths: of the links, divided by their sum. ratio: drag across over drag along. frame: as in `solve_chain`.
@@ -156,7 +173,10 @@ def no_slip_snake(lengths: Sequence = (1, 1, 1), frame: str = "mean") -> Formula
     >>> A.shape
     (3, 2)
     """
-    rolling = lambda chain: tuple(sp.Matrix.vstack(*(x[1, :] for x in each)) for each in zip(*(x[2:] for x in chain)))
+    rolling = lambda chain: tuple(
+        sp.Matrix.vstack(*(x[1, :] for x in each))
+        for each in zip(*(x[2:] for x in chain))
+    )
     return solve_chain(lengths, frame, None, rolling)
 
 
@@ -173,5 +193,8 @@ def differential_drive(radius: Any = None, track: Any = None) -> Formula:
     [   0,   0],
     [-r/w, r/w]])
     """
-    r, w = (sp.Symbol(name, positive=True) if x is None else exact(x) for name, x in (("r", radius), ("w", track)))
+    r, w = (
+        sp.Symbol(name, positive=True) if x is None else exact(x)
+        for name, x in (("r", radius), ("w", track))
+    )
     return sp.Matrix([[r / 2, r / 2], [0, 0], [-r / w, r / w]]), shape_angles(2)

@@ -60,7 +60,9 @@ def velocity(A: sp.Matrix, alpha: Sequence[sp.Symbol]) -> Callable[..., Any]:
 
     def xi(a, adot):
         a, adot = np.broadcast_arrays(np.asarray(a, float), np.asarray(adot, float))
-        flat = [np.broadcast_to(e, a.shape[:-1]) for e in entries(*np.moveaxis(a, -1, 0))]
+        flat = [
+            np.broadcast_to(e, a.shape[:-1]) for e in entries(*np.moveaxis(a, -1, 0))
+        ]
         matrix = np.stack(flat, -1).reshape(*a.shape[:-1], rows, columns)
         return np.einsum("...ij,...j->...i", matrix, adot)
 
@@ -94,12 +96,26 @@ def latex(A: sp.Matrix, name: str = "A") -> str:
     >>> A, alpha = differential_drive(radius=1, track=1)
     >>> text = latex(A)  # a matrix of amsmath
     """
-    below = lambda x: sp.Mul(*(f for f in sp.Mul.make_args(x) if f.is_Pow and f.exp.is_negative and not f.is_number))
+    below = lambda x: sp.Mul(
+        *(
+            f
+            for f in sp.Mul.make_args(x)
+            if f.is_Pow and f.exp.is_negative and not f.is_number
+        )
+    )
     common = {below(x) for x in A if x != 0}
     if len(common) != 1 or common == {1}:
         return f"{name} = {_pmatrix(A)}"
     (one_over,) = common
-    above = A.applyfunc(lambda x: sp.Mul(*(f for f in sp.Mul.make_args(x) if f not in one_over.args and f != one_over)))
+    above = A.applyfunc(
+        lambda x: sp.Mul(
+            *(
+                f
+                for f in sp.Mul.make_args(x)
+                if f not in one_over.args and f != one_over
+            )
+        )
+    )
     return f"{name} = \\frac{{1}}{{D}} {_pmatrix(above)},\n\\qquad D = {sp.latex(1 / one_over)}"
 
 

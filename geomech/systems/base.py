@@ -49,7 +49,9 @@ class Cycle(NamedTuple):
     def __repr__(self) -> str:
         count = np.size(self.speed)
         size = f"{count} gait{'s' * (count != 1)} of {np.shape(self.xi)[-2]} phases, net {summary.poses(self.net)}"
-        more = f"; {self.cycles} cycles" * (self.cycles > 1) + "; with work" * (self.work is not None)
+        more = f"; {self.cycles} cycles" * (self.cycles > 1) + "; with work" * (
+            self.work is not None
+        )
         return f"Cycle({size}; residual up to {np.max(self.residual, initial=0.0):.1e}{more})"
 
 
@@ -91,7 +93,9 @@ class System(Protocol):
         """Return the cycle of a gait with shapes and rates (..., N, d) at N equally spaced phases."""
 
 
-def integrated(system: System, alpha: np.ndarray, alphadot: np.ndarray, work: bool = False) -> Cycle:
+def integrated(
+    system: System, alpha: np.ndarray, alphadot: np.ndarray, work: bool = False
+) -> Cycle:
     """Return the cycle of a velocity that follows from shape alone, by integration. Classes take this as their ``run``.
 
     Refusal at a singular shape.
@@ -105,7 +109,10 @@ def integrated(system: System, alpha: np.ndarray, alphadot: np.ndarray, work: bo
     array([0.063, 0.009])
     """
     refuse_singular(system, alpha)
-    xi, speed = evaluate(system.velocity, alpha, alphadot), np.sqrt((alphadot**2).sum(-1)).mean(-1)
+    xi, speed = (
+        evaluate(system.velocity, alpha, alphadot),
+        np.sqrt((alphadot**2).sum(-1)).mean(-1),
+    )
     return Cycle(xi, displacement(xi), 0.0 * speed, speed, None, 1, 0.0 * speed)
 
 
@@ -143,12 +150,20 @@ class WrappedSystem:
         return in_batches(self._velocity, *np.broadcast_arrays(alpha[:, None], rates))
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
-        alpha, alphadot = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
-        return evaluate(self._batched, alpha, alphadot, masked=self.traits.singularity is not None)
+        alpha, alphadot = np.broadcast_arrays(
+            np.asarray(alpha, float), np.asarray(alphadot, float)
+        )
+        return evaluate(
+            self._batched, alpha, alphadot, masked=self.traits.singularity is not None
+        )
 
     def run(self, alpha, alphadot, work: bool = False) -> Cycle:
         method = getattr(self.wrapped, "run", None)
-        return integrated(self, alpha, alphadot) if method is None else method(alpha, alphadot)
+        return (
+            integrated(self, alpha, alphadot)
+            if method is None
+            else method(alpha, alphadot)
+        )
 
     def __reduce__(self) -> tuple:
         return WrappedSystem, (self.wrapped, self.joints, self.length, self.traits)
@@ -186,7 +201,10 @@ def as_system(system: Any, joints: int | None = None) -> System:
     if not isinstance(system, type) and all(hasattr(system, name) for name in MEMBERS):
         refuse_mutable(system)
         if not isinstance(system.traits, Traits):
-            raise Refusal(f"traits of the {kind_of(system)} must be Traits(...)", value=system.traits)
+            raise Refusal(
+                f"traits of the {kind_of(system)} must be Traits(...)",
+                value=system.traits,
+            )
         return system
     function = getattr(system, "velocity", system)
     joints = getattr(system, "joints", joints)
@@ -196,7 +214,12 @@ def as_system(system: Any, joints: int | None = None) -> System:
             value=system,
         )
     refuse_mutable(system)
-    return WrappedSystem(system, joints, getattr(system, "length", 1.0), getattr(system, "traits", NOTHING))
+    return WrappedSystem(
+        system,
+        joints,
+        getattr(system, "length", 1.0),
+        getattr(system, "traits", NOTHING),
+    )
 
 
 def unwrapped(system: Any) -> Any:
@@ -206,7 +229,9 @@ def unwrapped(system: Any) -> Any:
 
 def kind_of(system: Any) -> str:
     """Return the name of a kind of system, for messages."""
-    return getattr(system, "kind", None) or getattr(system, "__name__", type(system).__name__)
+    return getattr(system, "kind", None) or getattr(
+        system, "__name__", type(system).__name__
+    )
 
 
 def note_angles(system: System, largest: float) -> None:
@@ -225,7 +250,9 @@ def length_unit(system: System) -> str:
 
 def shape_labels(system: System) -> tuple[tuple[str, str], ...]:
     """Return (name, unit) of each shape variable of a system, for axes."""
-    return system.traits.labels or tuple((f"alpha_{k + 1}", "rad") for k in range(system.joints))
+    return system.traits.labels or tuple(
+        (f"alpha_{k + 1}", "rad") for k in range(system.joints)
+    )
 
 
 def refuse_singular(system: System, alpha) -> None:
@@ -251,5 +278,6 @@ def refuse_mutable(*parts) -> None:
     for part in parts:
         if type(part).__hash__ is None:
             raise Refusal(
-                f"{type(part).__name__} must be a value", instead="put @dataclass(frozen=True) above the class"
+                f"{type(part).__name__} must be a value",
+                instead="put @dataclass(frozen=True) above the class",
             )

@@ -22,7 +22,9 @@ T = TypeVar("T")
 # Of gaits run side by side, angles and velocities, a batch of which takes some 120 MB with what is made of them: more take
 # no less time each, and the first of a long request is soon done, which tells how long the others take.
 VALUES_TOGETHER = 1 << 20
-STEPPED_TOGETHER = 1 << 22  # likewise of time steps, each of which takes its time however few gaits take it
+STEPPED_TOGETHER = (
+    1 << 22
+)  # likewise of time steps, each of which takes its time however few gaits take it
 
 
 def capability(system: System, kind: type[T]) -> T | None:
@@ -74,7 +76,9 @@ class Loaded(Protocol):
     """A body under forces along its length, of which its `run` with work tells; read by `geomech.studies.forces` and
     `undulation`."""
 
-    axial_drag: float  # on the whole straight body along itself, in the law's unit of force
+    axial_drag: (
+        float  # on the whole straight body along itself, in the law's unit of force
+    )
 
     def axial_stress(self, depth: float) -> float | None:
         """Return the axial drag over projected area, Pa, at a depth, m, where the medium is a measured one."""
@@ -223,11 +227,16 @@ def power(system: System, alpha, alphadot) -> np.ndarray:
     return velocity_and_power(system, alpha, alphadot)[1]
 
 
-def velocity_and_power(system: System, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
+def velocity_and_power(
+    system: System, alpha, alphadot
+) -> tuple[np.ndarray, np.ndarray]:
     """Return xi (..., 3) and power (...) of the same solutions; Refusal for a system without a power."""
     dissipative = capability(system, Dissipative)
     if dissipative is None:
-        raise Refusal(f"no power with the {kind_of(system)}", because="nothing says what a change of shape costs it")
+        raise Refusal(
+            f"no power with the {kind_of(system)}",
+            because="nothing says what a change of shape costs it",
+        )
     xi = system.velocity(alpha, alphadot)
     return xi, dissipative.power(alpha, alphadot, xi)
 
@@ -246,7 +255,9 @@ def solver_of(system: System) -> Any:
 
 def with_solver(system: System, changes: Mapping[str, Any]) -> System:
     """Return a system with some of its own [numerics] changed."""
-    return system.with_solver(replace(solver_of(system), **changes)) if changes else system
+    return (
+        system.with_solver(replace(solver_of(system), **changes)) if changes else system
+    )
 
 
 def gaits_per_batch(system: System, phases: int) -> int:
@@ -255,9 +266,15 @@ def gaits_per_batch(system: System, phases: int) -> int:
     if size.batched:
         return sys.maxsize
     if not system.traits.steps:
-        return max(1, VALUES_TOGETHER // (phases * max(system.joints + 6, 2 * size.elements)))
+        return max(
+            1, VALUES_TOGETHER // (phases * max(system.joints + 6, 2 * size.elements))
+        )
     # Time stepping has some thirty arrays of elements beside what effects hold, where a gait has some ten of angles.
-    return max(1, STEPPED_TOGETHER // max(phases * (system.joints + 6), 4 * size.elements + size.memory // 8))
+    return max(
+        1,
+        STEPPED_TOGETHER
+        // max(phases * (system.joints + 6), 4 * size.elements + size.memory // 8),
+    )
 
 
 def near_gait(system: System) -> str:
@@ -270,7 +287,11 @@ def table_error(system: System, alpha, alphadot) -> np.ndarray:
     """Return the errors (..., 2), body lengths and rad, of the net pose of cycles (..., N, d) that tables cause; 0
     without tables."""
     tabulated = capability(system, Tabulated)
-    return np.zeros((*np.shape(alpha)[:-2], 2)) if tabulated is None else tabulated.table_error(alpha, alphadot)
+    return (
+        np.zeros((*np.shape(alpha)[:-2], 2))
+        if tabulated is None
+        else tabulated.table_error(alpha, alphadot)
+    )
 
 
 def is_closed(system: System) -> bool:

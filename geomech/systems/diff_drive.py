@@ -33,10 +33,17 @@ class DifferentialDrive:
     array([0.5, 0. , 0. ])
     """
 
-    wheel_radius: Annotated[float, Number(1e-9, 1e9, "m", "of both, in the unit of track")] = 0.5
+    wheel_radius: Annotated[
+        float, Number(1e-9, 1e9, "m", "of both, in the unit of track")
+    ] = 0.5
     track: Annotated[
         float,
-        Number(1e-9, 1e9, "m", "between the wheels, in the unit wanted for displacement; 1 for body lengths"),
+        Number(
+            1e-9,
+            1e9,
+            "m",
+            "between the wheels, in the unit wanted for displacement; 1 for body lengths",
+        ),
     ] = 1.0
     frame: str = "mean"
 
@@ -58,7 +65,9 @@ class DifferentialDrive:
 
     def velocity(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
         """Return xi (..., 3), (track/time, track/time, rad/time): (r (w_1 + w_2) / 2, 0, r (w_2 - w_1) / track)."""
-        _, rates = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
+        _, rates = np.broadcast_arrays(
+            np.asarray(alpha, float), np.asarray(alphadot, float)
+        )
         return rates @ self._matrix.T
 
     def symbolic(self) -> tuple[Any, tuple[Any, ...]]:

@@ -47,8 +47,15 @@ class FloatingChain(Momentum):
         inertias = [number(x) for x in self.inertias] or [rod] * len(lengths)
         body, total = sum(lengths), sum(masses)
         masses = [m / total for m in masses]
-        return masses, [[m, m, k * m * (x / body) ** 2] for m, k, x in zip(masses, inertias, lengths)]
+        return masses, [
+            [m, m, k * m * (x / body) ** 2]
+            for m, k, x in zip(masses, inertias, lengths)
+        ]
 
     @classmethod
     def examples(cls) -> dict[str, FloatingChain]:
-        return {"floating-chain": cls((0.8, 1.3, 1.0), 0.4, "mean", (1.0, 0.5, 2.0), (0.1, 0.2, 0.05))}
+        return {
+            "floating-chain": cls(
+                (0.8, 1.3, 1.0), 0.4, "mean", (1.0, 0.5, 2.0), (0.1, 0.2, 0.05)
+            )
+        }

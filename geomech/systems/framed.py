@@ -49,7 +49,12 @@ class Framed:
     degree: int
 
     def __post_init__(self):
-        refuse(self.inner, "minimum-perturbation frame", SHAPE_ALONE, f"drop frame = {NAME!r}")
+        refuse(
+            self.inner,
+            "minimum-perturbation frame",
+            SHAPE_ALONE,
+            f"drop frame = {NAME!r}",
+        )
         if self.inner.traits.singularity is not None:
             raise Refusal(
                 f"no minimum-perturbation frame of the {kind_of(self.inner)}, which has singular shapes",
@@ -57,7 +62,8 @@ class Framed:
             )
         if stored_table(self.inner, "connection"):
             raise Refusal(
-                "a table keeps the frame it was made in", instead=f"drop frame = {NAME!r}, or make the table in it"
+                "a table keeps the frame it was made in",
+                instead=f"drop frame = {NAME!r}, or make the table in it",
             )
 
     kind = property(lambda self: kind_of(self.inner))
@@ -69,10 +75,18 @@ class Framed:
     def capability(self, kind: type) -> Any:
         """Return the ability of the inner system, transformed to this frame where that makes a difference."""
         inner = capability(self.inner, kind)
-        if kind is Stepped:  # its frame turns with the shape: poses are carried over, not integrated
+        if (
+            kind is Stepped
+        ):  # its frame turns with the shape: poses are carried over, not integrated
             return self
         carried_over = (Dissipative, Drawable, Refinable, Diagnosed, Uncertain)
-        return None if inner is None or kind is Symbolic else self if kind in carried_over else inner
+        return (
+            None
+            if inner is None or kind is Symbolic
+            else self
+            if kind in carried_over
+            else inner
+        )
 
     @property
     def traits(self) -> Traits:
@@ -84,18 +98,42 @@ class Framed:
 
     def _build(self, progress: Callable | None) -> tuple[Frame, Connection]:
         """Return the frame, and the connection in it: of the same velocities, transformed."""
-        axes, unit = tuple(map(np.array, self.axes)), connection.directions(self.joints, self.directions)
+        axes, unit = (
+            tuple(map(np.array, self.axes)),
+            connection.directions(self.joints, self.directions),
+        )
         inverse = np.linalg.pinv(unit)
-        reduce = lambda xi: (np.einsum("jc,sci->ijs", inverse, xi), xi.transpose(1, 2, 0))
-        A, xi = connection.sampled(self.inner.velocity, axes, unit, reduce, self.degree, progress, self.inner.traits)
+        reduce = lambda xi: (
+            np.einsum("jc,sci->ijs", inverse, xi),
+            xi.transpose(1, 2, 0),
+        )
+        A, xi = connection.sampled(
+            self.inner.velocity,
+            axes,
+            unit,
+            reduce,
+            self.degree,
+            progress,
+            self.inner.traits,
+        )
         nothing = np.zeros_like(A[:, 0])
         size = {"unit": length_unit(self), "length": self.length}
-        frame = minimum_perturbation(Connection(axes, A, nothing, nothing, self.degree, **size))
+        frame = minimum_perturbation(
+            Connection(axes, A, nothing, nothing, self.degree, **size)
+        )
         h, dh = np.moveaxis(frame.field.values, 0, -1), frame.grid_slopes
-        in_frame_xi = np.stack([change_velocity(np.moveaxis(x, 0, -1), h, dh @ u) for x, u in zip(xi, unit)])
+        in_frame_xi = np.stack(
+            [
+                change_velocity(np.moveaxis(x, 0, -1), h, dh @ u)
+                for x, u in zip(xi, unit)
+            ]
+        )
         A = np.einsum("jc,c...i->ij...", inverse, in_frame_xi)
         remainder = in_frame_xi - np.einsum("ij...,cj->c...i", A, unit)
-        rms = [np.moveaxis(np.sqrt((x**2).mean(0)), -1, 0) for x in (remainder, in_frame_xi)]
+        rms = [
+            np.moveaxis(np.sqrt((x**2).mean(0)), -1, 0)
+            for x in (remainder, in_frame_xi)
+        ]
         return frame, Connection(axes, A, *rms, self.degree, **size)
 
     @property
@@ -111,23 +149,38 @@ class Framed:
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
         """Return xi (..., 3) in the frame; ValueError outside its grid."""
-        return change_velocity(self.inner.velocity(alpha, alphadot), *self.field(alpha, alphadot))
+        return change_velocity(
+            self.inner.velocity(alpha, alphadot), *self.field(alpha, alphadot)
+        )
 
     def power(self, alpha, alphadot, xi) -> np.ndarray:
         # The same in every frame, for xi (..., 3) in this one.
         h, hdot = self.field(alpha, alphadot)
-        inner = np.einsum("...ij,...j->...i", se2.adjoint(h), np.asarray(xi, float) - frame_velocity(h, hdot))
+        inner = np.einsum(
+            "...ij,...j->...i",
+            se2.adjoint(h),
+            np.asarray(xi, float) - frame_velocity(h, hdot),
+        )
         return capability(self.inner, Dissipative).power(alpha, alphadot, inner)
 
     def diagnosed(self, alpha, alphadot) -> dict:
         inner = capability(self.inner, Diagnosed).diagnosed(alpha, alphadot)
-        return {**inner, "xi": change_velocity(inner["xi"], *self.field(alpha, alphadot)).tolist()}
+        return {
+            **inner,
+            "xi": change_velocity(inner["xi"], *self.field(alpha, alphadot)).tolist(),
+        }
 
     def run(self, alpha, alphadot, work: bool = False, start=None) -> Cycle:
         """Return the inner system's cycle, transformed; ``start``, of this frame's velocities, is of no use to that."""
-        cycle = self.inner.run(alpha, alphadot, work) if work else self.inner.run(alpha, alphadot)
+        cycle = (
+            self.inner.run(alpha, alphadot, work)
+            if work
+            else self.inner.run(alpha, alphadot)
+        )
         xi = change_velocity(cycle.xi, *self.field(alpha, alphadot))
-        return cycle._replace(xi=xi, net=self.field.net(cycle.net, np.asarray(alpha)[..., 0, :]))
+        return cycle._replace(
+            xi=xi, net=self.field.net(cycle.net, np.asarray(alpha)[..., 0, :])
+        )
 
     def path(self, alpha, alphadot, cycles: int = 1) -> np.ndarray:
         """Return the poses g h (cycles N + 1, 3), with g those of the inner frame, relative to the first."""
@@ -149,7 +202,9 @@ class Framed:
 
     def varied(self, step) -> Framed:
         # With a frame of its own, as the system would have if its parameters were these.
-        return dataclasses.replace(self, inner=capability(self.inner, Uncertain).varied(step))
+        return dataclasses.replace(
+            self, inner=capability(self.inner, Uncertain).varied(step)
+        )
 
     def with_solver(self, solver) -> Framed:
         return dataclasses.replace(self, inner=self.inner.with_solver(solver))
@@ -161,17 +216,25 @@ def in_frame(system: System, frame: str) -> System:
         return system if frame == NAME else in_frame(system.inner, frame)
     if method := getattr(system, "in_frame", None):
         return method(frame)
-    if dataclasses.is_dataclass(system) and "frame" in {f.name for f in dataclasses.fields(system)}:
+    if dataclasses.is_dataclass(system) and "frame" in {
+        f.name for f in dataclasses.fields(system)
+    }:
         return dataclasses.replace(system, frame=frame)
-    raise Refusal(f"the {kind_of(system)} has one frame, {system.traits.frame!r}, and no {frame!r}")
+    raise Refusal(
+        f"the {kind_of(system)} has one frame, {system.traits.frame!r}, and no {frame!r}"
+    )
 
 
 def formula(system: System) -> tuple[Any, tuple[Any, ...]]:
     """Return A (3, joints) as a sympy Matrix and its shape variables (`geomech.symbolic`); Refusal if there is none."""
     if isinstance(system, Framed):
-        raise Refusal(f"no formula in the {NAME} frame, which is a field of numbers", instead="take another frame")
+        raise Refusal(
+            f"no formula in the {NAME} frame, which is a field of numbers",
+            instead="take another frame",
+        )
     if (symbolic := capability(system, Symbolic)) is None:
         raise Refusal(
-            f"no formula of the connection of a {kind_of(system)}", because="'geomech connection' has its numbers"
+            f"no formula of the connection of a {kind_of(system)}",
+            because="'geomech connection' has its numbers",
         )
     return symbolic.symbolic()

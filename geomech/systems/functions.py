@@ -19,7 +19,11 @@ def class_from_function(function: Callable) -> type:
     """Return a class from a function that has an attribute ``joints``: of bodies if it has ``lengths`` of links, whose poses
     it then returns for a shape alpha, else of systems, whose velocity it returns for alpha and alphadot. Further parameters
     are fields of the class."""
-    return _body_class(function) if hasattr(function, "lengths") else _system_class(function)
+    return (
+        _body_class(function)
+        if hasattr(function, "lengths")
+        else _system_class(function)
+    )
 
 
 def _system_class(function: Callable) -> type:
@@ -32,15 +36,24 @@ def _system_class(function: Callable) -> type:
         "length": getattr(function, "length", 1.0),
         "traits": getattr(function, "traits", NOTHING),
         "velocity": velocity,
-        "__reduce__": lambda self: (_rebuild, (SYSTEMS.group, self.kind, _values(self, more))),
+        "__reduce__": lambda self: (
+            _rebuild,
+            (SYSTEMS.group, self.kind, _values(self, more)),
+        ),
     }
     return _built(function, _fields(more), members)
 
 
 def _body_class(function: Callable) -> type:
     _, *more = inspect.signature(function, eval_str=True).parameters.values()
-    of_bodies = [("length", Length, dataclasses.field(default=1.0)), ("frame", str, dataclasses.field(default="mean"))]
-    fields = [*_fields(more), *(field for field in of_bodies if field[0] not in {p.name for p in more})]
+    of_bodies = [
+        ("length", Length, dataclasses.field(default=1.0)),
+        ("frame", str, dataclasses.field(default="mean")),
+    ]
+    fields = [
+        *_fields(more),
+        *(field for field in of_bodies if field[0] not in {p.name for p in more}),
+    ]
 
     def positions(self, alpha):
         return function(alpha, **_values(self, more))
@@ -50,7 +63,11 @@ def _body_class(function: Callable) -> type:
         "positions": positions,
         "__reduce__": lambda self: (
             _rebuild,
-            (BODIES.group, self.kind, {name: getattr(self, name) for name, *_ in fields}),
+            (
+                BODIES.group,
+                self.kind,
+                {name: getattr(self, name) for name, *_ in fields},
+            ),
         ),
     }
     return _built(function, fields, members, Posed)
@@ -70,10 +87,14 @@ def _values(part: Any, parameters: list[inspect.Parameter]) -> dict[str, Any]:
     return {p.name: getattr(part, p.name) for p in parameters}
 
 
-def _built(function: Callable, fields: list[tuple], members: dict[str, Any], *bases: type) -> type:
+def _built(
+    function: Callable, fields: list[tuple], members: dict[str, Any], *bases: type
+) -> type:
     kind = getattr(function, "kind", function.__name__.replace("_", "-"))
     members |= {"kind": kind, "joints": function.joints, "__doc__": function.__doc__}
-    built = dataclasses.make_dataclass(function.__name__, fields, bases=bases, namespace=members, frozen=True)
+    built = dataclasses.make_dataclass(
+        function.__name__, fields, bases=bases, namespace=members, frozen=True
+    )
     built.__module__, built.__qualname__ = function.__module__, function.__qualname__
     return built
 

@@ -35,7 +35,9 @@ class IdealFluidSwimmer(Momentum):
     array([-0.0141, -0.0066, -0.0998])
     """
 
-    aspect: Annotated[float, Number(1e-3, 1, "-", "width over length of every link, 0.001 to 1")] = 0.1
+    aspect: Annotated[
+        float, Number(1e-3, 1, "-", "width over length of every link, 0.001 to 1")
+    ] = 0.1
     masses: tuple[float, ...] = ()
     inertias: tuple[float, ...] = ()
 
@@ -62,4 +64,8 @@ class IdealFluidSwimmer(Momentum):
 
     @classmethod
     def examples(cls) -> dict[str, IdealFluidSwimmer]:
-        return {"ideal-fluid-swimmer": cls((0.8, 1.3, 1.0), 0.4, "link-1", 0.2, (1.0, 0.5, 2.0))}
+        return {
+            "ideal-fluid-swimmer": cls(
+                (0.8, 1.3, 1.0), 0.4, "link-1", 0.2, (1.0, 0.5, 2.0)
+            )
+        }

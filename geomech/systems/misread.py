@@ -18,7 +18,10 @@ POINTS, LARGEST, SMALLEST = (
     1.5,
     0.2,
 )  # an axis; rad, of the shapes that are compared, and the least that tells anything
-LIKE, BETTER = 0.85, 0.4  # correlation of another reading, and how much above that of the file as it is
+LIKE, BETTER = (
+    0.85,
+    0.4,
+)  # correlation of another reading, and how much above that of the file as it is
 READINGS = {
     (1, 0, 0): "of the other sign", (0, 1, 0): "with alpha1 and alpha2 swapped", (0, 0, 1): "with both axes mirrored",
     (1, 0, 1): "with angles, or y and heading, positive clockwise",
@@ -35,11 +38,16 @@ def misread(table: Connection, bodies: Sequence[Chain]) -> str:
     alpha = np.stack(np.meshgrid(axis, axis, indexing="ij"), -1)
     A = np.moveaxis(table(alpha), (-2, -1), (0, 1))
     models = [_model(body, alpha) for body in bodies]
-    scores = {r: max(_likeness(_read(A, *r), model) for model in models) for r in product((0, 1), repeat=3)}
+    scores = {
+        r: max(_likeness(_read(A, *r), model) for model in models)
+        for r in product((0, 1), repeat=3)
+    }
     best = max(scores, key=scores.get)
     if scores[best] < LIKE or scores[best] < scores[0, 0, 0] + BETTER:
         return ""
-    words = READINGS.get(best) or " and ".join(READINGS[one] for one in READINGS if sum(one) == 1 and np.dot(one, best))
+    words = READINGS.get(best) or " and ".join(
+        READINGS[one] for one in READINGS if sum(one) == 1 and np.dot(one, best)
+    )
     numbers = f"{scores[best]:.2f}, as it stands {scores[0, 0, 0]:.2f}"
     return f"its A is that of a body of links {words} (correlation {numbers}): check sign, axes and angles"
 
@@ -47,7 +55,9 @@ def misread(table: Connection, bodies: Sequence[Chain]) -> str:
 def _model(body: Chain, alpha: np.ndarray) -> np.ndarray:
     """Return A (3, 2, N, N) of a body in a fluid."""
     swimmer = Swimmer(Viscous(2.0), body)
-    return np.stack([np.moveaxis(swimmer.velocity(alpha, unit), -1, 0) for unit in np.eye(2)], 1)
+    return np.stack(
+        [np.moveaxis(swimmer.velocity(alpha, unit), -1, 0) for unit in np.eye(2)], 1
+    )
 
 
 def _read(A: np.ndarray, sign: int, swapped: int, mirrored: int) -> np.ndarray:

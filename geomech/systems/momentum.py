@@ -53,12 +53,17 @@ class Momentum:
 
     def __post_init__(self):
         check_numbers(self)
-        object.__setattr__(self, "lengths", Chain(self.lengths, self.length, self.frame).lengths)
+        object.__setattr__(
+            self, "lengths", Chain(self.lengths, self.length, self.frame).lengths
+        )
 
     def check_per_link(self, name: str, least: float, most: float) -> None:
         """Raise Refusal if the field of this name is neither empty nor a number from least to most for each link."""
         x = real_array(name, getattr(self, name))
-        if x.shape not in ((0,), (len(self.lengths),)) or not ((least <= x) & (x <= most)).all():
+        if (
+            x.shape not in ((0,), (len(self.lengths),))
+            or not ((least <= x) & (x <= most)).all()
+        ):
             raise Refusal(
                 f"{name} must be {len(self.lengths)} numbers from {least:g} to {most:g}, one for each link, or left out",
                 value=x.tolist(),
@@ -81,13 +86,17 @@ class Momentum:
 
     @property
     def _chain(self) -> Linkage:
-        return Linkage(self.lengths, self.length, self.frame, masses=tuple(self.inertia()[0]))
+        return Linkage(
+            self.lengths, self.length, self.frame, masses=tuple(self.inertia()[0])
+        )
 
     def points(self, alpha: ArrayLike, pose: ArrayLike = (0.0, 0.0, 0.0)) -> np.ndarray:
         """Return the ends of the links in the world, as `rft.Chain.points`."""
         return self._chain.points(alpha, pose)
 
-    def frame_pose(self, frame: str, alpha: ArrayLike, alphadot: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    def frame_pose(
+        self, frame: str, alpha: ArrayLike, alphadot: ArrayLike
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return the pose of a frame and its rate, as `rft.Chain.frame_pose`."""
         return self._chain.frame_pose(frame, alpha, alphadot)
 
@@ -114,20 +123,34 @@ class Momentum:
         return motion, weights, -np.linalg.solve(locked, momentum[..., None])[..., 0].T
 
     def _flat(self, alpha, alphadot) -> tuple[np.ndarray, np.ndarray, tuple[int, ...]]:
-        alpha, alphadot = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
-        return alpha.reshape(-1, self.joints), alphadot.reshape(-1, self.joints), alpha.shape[:-1]
+        alpha, alphadot = np.broadcast_arrays(
+            np.asarray(alpha, float), np.asarray(alphadot, float)
+        )
+        return (
+            alpha.reshape(-1, self.joints),
+            alphadot.reshape(-1, self.joints),
+            alpha.shape[:-1],
+        )
 
     def velocity(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
         """Return xi (..., 3) in the frame, (length/time, length/time, rad/time)."""
         alpha, alphadot, shape = self._flat(alpha, alphadot)
-        return self._moving(alpha, alphadot)[2].T.reshape(*shape, 3) * [self.length, self.length, 1.0]
+        return self._moving(alpha, alphadot)[2].T.reshape(*shape, 3) * [
+            self.length,
+            self.length,
+            1.0,
+        ]
 
     def squared_speed(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
         """Return alphadot^T M alphadot (...,): twice the kinetic energy, in the unit of `inertia` and body lengths."""
         alpha, alphadot, shape = self._flat(alpha, alphadot)
         motion, weights, xi = self._moving(alpha, alphadot)
         return (
-            (weights * (motion.v + np.stack(np.broadcast_arrays(*to_element(motion, *xi)))) ** 2)
+            (
+                weights
+                * (motion.v + np.stack(np.broadcast_arrays(*to_element(motion, *xi))))
+                ** 2
+            )
             .sum((0, 1))
             .reshape(shape)
         )
@@ -137,5 +160,7 @@ class Momentum:
         from geomech.symbolic import connections
 
         masses, inertia = self.inertia(connections.exact)
-        A, alpha = connections.chain_connection(self.lengths, inertia, self.frame, masses)
+        A, alpha = connections.chain_connection(
+            self.lengths, inertia, self.frame, masses
+        )
         return connections.in_length(self.length, A), alpha

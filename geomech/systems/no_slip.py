@@ -48,12 +48,19 @@ class NoSlipSnake:
     def __post_init__(self):
         object.__setattr__(self, "lengths", self._chain.lengths)
         if len(self.lengths) != 3:
-            raise Refusal("lengths must be those of three links", value=len(self.lengths))
+            raise Refusal(
+                "lengths must be those of three links", value=len(self.lengths)
+            )
 
     @property
     def traits(self) -> Traits:
-        where = {"singularity": self._determinant, "singular": "the wheels' axles meet in one point"}
-        return Traits(linear=True, mirror=True, joint_angles=True, frame=self.frame, **where)
+        where = {
+            "singularity": self._determinant,
+            "singular": "the wheels' axles meet in one point",
+        }
+        return Traits(
+            linear=True, mirror=True, joint_angles=True, frame=self.frame, **where
+        )
 
     @property
     def _chain(self) -> Chain:
@@ -66,7 +73,9 @@ class NoSlipSnake:
     def _rolling(self, alpha, alphadot):
         """Return rows (..., 3, 3) and sides (..., 3): velocity across each link's centre = row . xi + side, body
         lengths."""
-        alpha, alphadot = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
+        alpha, alphadot = np.broadcast_arrays(
+            np.asarray(alpha, float), np.asarray(alphadot, float)
+        )
         m = self._chain.motion(*(x.reshape(-1, 2).T for x in (alpha, alphadot)))
         rows, shape = np.stack([-m.s, m.c, m.r_n], -1).swapaxes(0, 1), alpha.shape[:-1]
         return rows.reshape(*shape, 3, 3), m.v[1].T.reshape(*shape, 3)
@@ -85,7 +94,9 @@ class NoSlipSnake:
         """Return xi (..., 3) in the frame, (length/time, length/time, rad/time); nan at singular shapes."""
         rows, side = self._rolling(alpha, alphadot)
         good = np.abs(np.linalg.det(rows)) >= 1e-14
-        xi = np.linalg.solve(np.where(good[..., None, None], rows, np.eye(3)), -side[..., None])[..., 0]
+        xi = np.linalg.solve(
+            np.where(good[..., None, None], rows, np.eye(3)), -side[..., None]
+        )[..., 0]
         return np.where(good[..., None], xi, np.nan) * [self.length, self.length, 1.0]
 
     def symbolic(self) -> tuple[Any, tuple[Any, ...]]:

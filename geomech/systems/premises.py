@@ -13,7 +13,11 @@ CURES = {"law": ", or take another law", "effect": ", or drop the effect"}
 def broken(system: System, premises: Premise) -> list[Part]:
     """Return the parts of a system that break one of some premises; the whole system where it has no parts."""
     composite = capability(system, Composite)
-    parts = [Part("", kind_of(system), system.traits.lacks)] if composite is None else composite.parts
+    parts = (
+        [Part("", kind_of(system), system.traits.lacks)]
+        if composite is None
+        else composite.parts
+    )
     return [part for part in parts if part.breaks & premises]
 
 
@@ -28,7 +32,9 @@ def because(system: System, premises: Premise) -> str:
 
 def listed(system: System, premises: Premise) -> str:
     """Return all parts that break one of some premises, by name; the whole system where none does."""
-    names = [_named(part).removeprefix("the effect ") for part in broken(system, premises)]
+    names = [
+        _named(part).removeprefix("the effect ") for part in broken(system, premises)
+    ]
     return ", ".join(names) or f"the {kind_of(system)}"
 
 
@@ -36,7 +42,10 @@ def refuse(system: System, what: str, premises: Premise, instead: str) -> None:
     """Raise Refusal if there is no such result because a premise of it does not hold."""
     if system.traits.lacks & premises:
         parts = broken(system, premises)
-        raise Refusal(f"no {what} with {because(system, premises)}", instead=f"{instead}{CURES.get(parts[0].role, '')}")
+        raise Refusal(
+            f"no {what} with {because(system, premises)}",
+            instead=f"{instead}{CURES.get(parts[0].role, '')}",
+        )
 
 
 def _named(part: Part) -> str:

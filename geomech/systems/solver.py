@@ -31,7 +31,13 @@ class Solver:
 
     loads: str = "exact"
     regularisation: Annotated[
-        float, Number(1e-12, 1, "body lengths per rad", "speed below which dry friction is rounded off (rft.balance)")
+        float,
+        Number(
+            1e-12,
+            1,
+            "body lengths per rad",
+            "speed below which dry friction is rounded off (rft.balance)",
+        ),
     ] = 1e-6
     tolerance: Annotated[float, Number(1e-13, 1, "-", "normalised residual")] = 1e-10
     cycles: Annotated[
@@ -66,5 +72,9 @@ class Solver:
             return f"NumPy: compiled code does not know the law {law}, whose traction is no formula"
         if not installed():
             return "NumPy: numba is not installed (pip install 'geomech[fast]')"
-        small = "" if self.backend == "numba" else "; commands take NumPy where there is little to compute"
+        small = (
+            ""
+            if self.backend == "numba"
+            else "; commands take NumPy where there is little to compute"
+        )
         return f"compiled code{small}"

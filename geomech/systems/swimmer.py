@@ -20,11 +20,25 @@ from geomech.systems.capabilities import BalanceSize, Drawable, Part, Stepped, U
 from geomech.systems.premises import refuse
 from geomech.systems.solver import Solver
 from rft.bodies import BODIES
-from rft.bodies.base import checked_body, half_lengths, is_reversible, is_symmetric, joint_speed
+from rft.bodies.base import (
+    checked_body,
+    half_lengths,
+    is_reversible,
+    is_symmetric,
+    joint_speed,
+)
 from rft.bodies.pieces import PIECES, subdivide
 from rft.contact import assemble
 from rft.effects import EFFECTS
-from rft.laws import CATALOGUE, LAWS, is_closed, is_linear, is_mirror, is_rate_independent, speed_exponent
+from rft.laws import (
+    CATALOGUE,
+    LAWS,
+    is_closed,
+    is_linear,
+    is_mirror,
+    is_rate_independent,
+    speed_exponent,
+)
 from rft.laws.base import is_odd, require_law
 from rft.laws.catalogue import DEPTH
 from rft.laws.records import record, rule_for
@@ -35,7 +49,9 @@ from rft.stepping import Row, State, Stepping
 
 PARTS = {"medium": LAWS, "body": BODIES, "effects": EFFECTS}  # of a scene's tables
 RATES = Premise.RATE_INDEPENDENT
-MEDIA = {name: entry.medium for name, entry in CATALOGUE.items()}  # by the name a scene may give
+MEDIA = {
+    name: entry.medium for name, entry in CATALOGUE.items()
+}  # by the name a scene may give
 
 
 @SYSTEMS.register
@@ -64,7 +80,9 @@ class Swimmer:
         checked_body(self.body)
         refuse_mutable(self.medium, self.body)
         rft.effects.broken_premises(self.effects)
-        object.__setattr__(self, "effects", tuple(self.effects))  # a list has no hash, by which tables are kept
+        object.__setattr__(
+            self, "effects", tuple(self.effects)
+        )  # a list has no hash, by which tables are kept
         if not isinstance(self.solver, Solver):
             raise Refusal("solver must be Solver(...)", value=self.solver)
         with located("[numerics]"):
@@ -73,18 +91,29 @@ class Swimmer:
         kinds = [type(e) for e in self.effects]
         for effect in self.effects:
             if kinds.count(type(effect)) > 1:
-                raise Refusal(f"[[effects]] {effect.kind} is asked for twice", instead="keep one")
+                raise Refusal(
+                    f"[[effects]] {effect.kind} is asked for twice", instead="keep one"
+                )
             with located("[[effects]]"):
                 effect.check(self.medium)
 
     def __getstate__(self) -> dict:
-        return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}  # not what is cached
+        return {
+            f.name: getattr(self, f.name) for f in dataclasses.fields(self)
+        }  # not what is cached
 
     def _agree(self) -> None:
         """Raise Refusal if effects, or the body, contradict each other about the swimmer's frequency or length."""
         sized = self.body.length != 1.0
-        for quantity, values in (("frequency", []), ("length", [("[body]", self.body.length)] if sized else [])):
-            values += [(e.kind, getattr(e, quantity)) for e in self.effects if hasattr(e, quantity)]
+        for quantity, values in (
+            ("frequency", []),
+            ("length", [("[body]", self.body.length)] if sized else []),
+        ):
+            values += [
+                (e.kind, getattr(e, quantity))
+                for e in self.effects
+                if hasattr(e, quantity)
+            ]
             for name, value in values[1:]:
                 if np.any(np.asarray(value) != values[0][1]):
                     raise Refusal(
@@ -112,7 +141,9 @@ class Swimmer:
             joint_angles=_has_joint_angles(body),
             frame=getattr(body, "frame", MEAN),
             labels=getattr(body, "shape_labels", ()),
-            frequency=next((e.frequency for e in effects if hasattr(e, "frequency")), None),
+            frequency=next(
+                (e.frequency for e in effects if hasattr(e, "frequency")), None
+            ),
         )
 
     def capability(self, kind: type) -> Any:
@@ -121,7 +152,8 @@ class Swimmer:
         if kind is Drawable:
             return self.body if isinstance(self.body, Drawable) else None
         has = {
-            Uncertain: hasattr(medium, "uncertain") and getattr(medium, "covariance", None) is not None,
+            Uncertain: hasattr(medium, "uncertain")
+            and getattr(medium, "covariance", None) is not None,
             Stepped: self.traits.steps,
         }
         return self if has.get(kind, isinstance(self, kind)) else None
@@ -129,7 +161,11 @@ class Swimmer:
     @property
     def parts(self) -> tuple[Part, ...]:
         """Parts that break premises: the law whose drag is of no one power of the speed, and effects."""
-        law = () if is_rate_independent(self.medium) else (Part("law", name_in(LAWS, self.medium), RATES),)
+        law = (
+            ()
+            if is_rate_independent(self.medium)
+            else (Part("law", name_in(LAWS, self.medium), RATES),)
+        )
         return law + tuple(Part("effect", e.kind, e.breaks) for e in self.effects)
 
     def about(self) -> dict:
@@ -148,9 +184,15 @@ class Swimmer:
     def varied(self, step: np.ndarray) -> Swimmer:
         """Return the swimmer in a medium whose uncertain parameters are changed by ``step`` (n,); Refusal if that is no
         medium."""
-        changed = {name: getattr(self.medium, name) + float(d) for name, d in zip(self.medium.uncertain, step)}
+        changed = {
+            name: getattr(self.medium, name) + float(d)
+            for name, d in zip(self.medium.uncertain, step)
+        }
         try:
-            return dataclasses.replace(self, medium=dataclasses.replace(self.medium, covariance=None, **changed))
+            return dataclasses.replace(
+                self,
+                medium=dataclasses.replace(self.medium, covariance=None, **changed),
+            )
         except ValueError as error:
             raise Refusal(
                 "[medium] covariance",
@@ -167,32 +209,56 @@ class Swimmer:
     @property
     def balance_size(self) -> BalanceSize:
         solver, effects, pieces = self.solver, self.effects, 0
-        assembly = assemble(self.medium, self.body, effects, solver.loads, solver.pieces)
-        if any(e.varies_along for e in effects):  # see elements that are shorter than a piece whole
-            pieces = max(solver.pieces, int(np.ceil(0.5 / half_lengths(self.body).max() - 1e-9)))
+        assembly = assemble(
+            self.medium, self.body, effects, solver.loads, solver.pieces
+        )
+        if any(
+            e.varies_along for e in effects
+        ):  # see elements that are shorter than a piece whole
+            pieces = max(
+                solver.pieces, int(np.ceil(0.5 / half_lengths(self.body).max() - 1e-9))
+            )
         batched = any(np.ndim(getattr(e, name)) for e in effects for name in e.batched)
         memory = sum(e.memory_size for e in effects)
-        return BalanceSize(assembly.n_elements, assembly.n_law_points, pieces, memory, batched)
+        return BalanceSize(
+            assembly.n_elements, assembly.n_law_points, pieces, memory, batched
+        )
 
     def with_solver(self, solver: Solver) -> Swimmer:
         return dataclasses.replace(self, solver=solver)
 
     def in_frame(self, frame: str) -> Swimmer:
-        return dataclasses.replace(self, body=dataclasses.replace(self.body, frame=frame))
+        return dataclasses.replace(
+            self, body=dataclasses.replace(self.body, frame=frame)
+        )
 
     def _settings(self, *names: str) -> dict:
         """Return settings of the solver, and the effects, as arguments of rft's functions."""
         names = ("loads", "regularisation", "pieces", *names)
-        return {"effects": self.effects, **{name: getattr(self.solver, name) for name in names}}
+        return {
+            "effects": self.effects,
+            **{name: getattr(self.solver, name) for name in names},
+        }
 
-    def solve(self, alpha: ArrayLike, alphadot: ArrayLike, start: ArrayLike | None = None) -> rft.Solution:
+    def solve(
+        self, alpha: ArrayLike, alphadot: ArrayLike, start: ArrayLike | None = None
+    ) -> rft.Solution:
         """Return body velocities with residual and status for alpha, alphadot (..., joints), begun from ``start`` (...,
         3) where given; see `rft.body_velocity`. Refusal if they do not follow from shape alone."""
-        refuse(self, "body velocity from shape alone", SHAPE_ALONE, "run a whole gait by the direct tier")
+        refuse(
+            self,
+            "body velocity from shape alone",
+            SHAPE_ALONE,
+            "run a whole gait by the direct tier",
+        )
         settings = self._settings("tolerance", "backend")
-        return rft.body_velocity(self.medium, self.body, alpha, alphadot, start=start, **settings)
+        return rft.body_velocity(
+            self.medium, self.body, alpha, alphadot, start=start, **settings
+        )
 
-    def velocity(self, alpha: ArrayLike, alphadot: ArrayLike, start: ArrayLike | None = None) -> np.ndarray:
+    def velocity(
+        self, alpha: ArrayLike, alphadot: ArrayLike, start: ArrayLike | None = None
+    ) -> np.ndarray:
         """Return xi (..., 3) in the body's frame, begun from ``start`` as in `solve`; RuntimeError if any sample did
         not converge."""
         return self.solve(alpha, alphadot, start).checked().xi
@@ -200,8 +266,15 @@ class Swimmer:
     def diagnosed(self, alpha: ArrayLike, alphadot: ArrayLike) -> dict:
         s = self.solve(alpha, alphadot)
         if str(s.status) == "unconverged":
-            raise Refusal("the force balance did not converge", instead="raise [numerics] regularisation")
-        status = {"status": str(s.status), "residual": float(s.residual), "iterations": int(s.iterations)}
+            raise Refusal(
+                "the force balance did not converge",
+                instead="raise [numerics] regularisation",
+            )
+        status = {
+            "status": str(s.status),
+            "residual": float(s.residual),
+            "iterations": int(s.iterations),
+        }
         return {"xi": s.xi.tolist(), **status}
 
     def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
@@ -209,8 +282,12 @@ class Swimmer:
 
         plain = type(self.body) is rft.Chain and self.body.modes is None
         if not (self.traits.linear and plain and type(self.medium) is rft.Viscous):
-            raise Refusal("a formula is that of a chain of links in a viscous medium without effects")
-        A, alpha = connections.viscous_chain(self.body.lengths, self.medium.ratio, self.body.frame)
+            raise Refusal(
+                "a formula is that of a chain of links in a viscous medium without effects"
+            )
+        A, alpha = connections.viscous_chain(
+            self.body.lengths, self.medium.ratio, self.body.frame
+        )
         return connections.in_length(self.body.length, A), alpha
 
     def power(self, alpha: ArrayLike, alphadot: ArrayLike, xi: ArrayLike) -> np.ndarray:
@@ -218,36 +295,66 @@ class Swimmer:
 
     def work(self, alpha: ArrayLike, alphadot: ArrayLike, xi: ArrayLike) -> rft.Work:
         """Return power, internal moments and slip of a solution of `solve`; see `rft.work_done`."""
-        return rft.work_done(self.medium, self.body, alpha, alphadot, xi, **self._settings())
+        return rft.work_done(
+            self.medium, self.body, alpha, alphadot, xi, **self._settings()
+        )
 
     def elements(self, alpha: ArrayLike, alphadot: ArrayLike) -> rft.bodies.Elements:
         return self.body.motion(*(np.asarray(x, float).T for x in (alpha, alphadot)))
 
     def subdivided(self) -> Swimmer:
-        return dataclasses.replace(self, body=subdivide(self.body, max(PIECES, self.balance_size.pieces)))
+        return dataclasses.replace(
+            self, body=subdivide(self.body, max(PIECES, self.balance_size.pieces))
+        )
 
     @property
     def axial_drag(self) -> float:
         return assemble(self.medium, self.body).axial_drag
 
     def axial_stress(self, depth: float) -> float | None:
-        stresses = (entry.axial_stress for entry in CATALOGUE.values() if entry.medium == self.medium)
-        return None if (stress := next(stresses, None)) is None else stress * depth / DEPTH
+        stresses = (
+            entry.axial_stress
+            for entry in CATALOGUE.values()
+            if entry.medium == self.medium
+        )
+        return (
+            None if (stress := next(stresses, None)) is None else stress * depth / DEPTH
+        )
 
     def time_steps(
-        self, alpha: ArrayLike, alphadot: ArrayLike, cycles: int | None, work: bool = False, path: bool = False
+        self,
+        alpha: ArrayLike,
+        alphadot: ArrayLike,
+        cycles: int | None,
+        work: bool = False,
+        path: bool = False,
     ) -> rft.TimeSteps:
         """Return the gait computed phase after phase (`rft.time_steps`), without checking convergence."""
-        settings = {"cycles": cycles, "with_work": work, "with_path": path, **self._settings("tolerance", "backend")}
+        settings = {
+            "cycles": cycles,
+            "with_work": work,
+            "with_path": path,
+            **self._settings("tolerance", "backend"),
+        }
         context = Swimmer.time_steps, self, alpha, alphadot, cycles is None
 
-        def advance(stepping: Stepping, state: State, count: int, with_work: bool) -> tuple[State, list[Row]]:
+        def advance(
+            stepping: Stepping, state: State, count: int, with_work: bool
+        ) -> tuple[State, list[Row]]:
             step = partial(stepping.step, with_work=with_work)
             return iterate(step, state, count, (*context, with_work), Row)
 
-        return rft.time_steps(self.medium, self.body, alpha, alphadot, advance=advance, **settings)
+        return rft.time_steps(
+            self.medium, self.body, alpha, alphadot, advance=advance, **settings
+        )
 
-    def run(self, alpha: ArrayLike, alphadot: ArrayLike, work: bool = False, start: ArrayLike | None = None) -> Cycle:
+    def run(
+        self,
+        alpha: ArrayLike,
+        alphadot: ArrayLike,
+        work: bool = False,
+        start: ArrayLike | None = None,
+    ) -> Cycle:
         """Run a gait given by alpha, alphadot (..., N, joints) at N equally spaced phases, by the cheapest engine that
         is right. Balances begin from ``start`` as in `solve`, steps of time from the step before. RuntimeError if a
         force balance did not converge or cycles did not become periodic."""
@@ -256,28 +363,51 @@ class Swimmer:
         if not self.traits.steps:
             images = cycle_images(alpha, alphadot, self.traits)
             samples = (images.select(x) for x in (alpha, alphadot, start))
-            solution = self._for_gaits(speed.size, images.count).solve(*samples).checked()
+            solution = (
+                self._for_gaits(speed.size, images.count).solve(*samples).checked()
+            )
             xi = images.expand(solution.xi)
-            work_done = self._for_gaits(speed.size, alpha.shape[-2]).work(alpha, alphadot, xi) if work else None
-            return Cycle(xi, displacement(xi), solution.residual.max(-1), speed, work_done, 1, 0.0 * speed)
+            work_done = (
+                self._for_gaits(speed.size, alpha.shape[-2]).work(alpha, alphadot, xi)
+                if work
+                else None
+            )
+            return Cycle(
+                xi,
+                displacement(xi),
+                solution.residual.max(-1),
+                speed,
+                work_done,
+                1,
+                0.0 * speed,
+            )
         steps = self.time_steps(alpha, alphadot, self.solver.cycles, work).checked()
         net = displacement(steps.xi) if self._repeats(steps) else steps.displacement
         to_come = steps.drift if self.settling else 0.0 * speed
-        return Cycle(steps.xi, net, steps.residual, speed, steps.work, steps.cycles, to_come)
+        return Cycle(
+            steps.xi, net, steps.residual, speed, steps.work, steps.cycles, to_come
+        )
 
     def _for_gaits(self, count: int, phases: int) -> Swimmer:
         """Return the swimmer for ``count`` gaits of ``phases`` phases each, where effects have a parameter for each
         gait."""
-        effects = tuple(e.take(np.repeat(np.arange(count), phases)) for e in self.effects)
+        effects = tuple(
+            e.take(np.repeat(np.arange(count), phases)) for e in self.effects
+        )
         unchanged = all(a is b for a, b in zip(effects, self.effects))
         return self if unchanged else dataclasses.replace(self, effects=effects)
 
     def _repeats(self, steps: rft.TimeSteps) -> bool:
         """Return whether cycles are equal: the velocity is then periodic, and its integral exact for the series through
         it."""
-        return not self.traits.lacks & Premise.SE2_SYMMETRIC and (steps.status == "periodic").all()
+        return (
+            not self.traits.lacks & Premise.SE2_SYMMETRIC
+            and (steps.status == "periodic").all()
+        )
 
-    def path(self, alpha: ArrayLike, alphadot: ArrayLike, cycles: int = 1) -> np.ndarray:
+    def path(
+        self, alpha: ArrayLike, alphadot: ArrayLike, cycles: int = 1
+    ) -> np.ndarray:
         """Return poses of the limit cycle; where cycles do not repeat, from the cycle that `run` returns."""
         before = (self.solver.cycles or 1) - 1
         if not self.traits.lacks & Premise.SE2_SYMMETRIC:
@@ -290,20 +420,36 @@ class Swimmer:
 
     def refined(self) -> Swimmer | None:
         rule, count = rule_for(self.medium, self.solver.loads)
-        finer = {} if rule == "exact" else {"loads": "exact" if self.closed else f"{rule}:{min(2 * count, 1000)}"}
+        finer = (
+            {}
+            if rule == "exact"
+            else {"loads": "exact" if self.closed else f"{rule}:{min(2 * count, 1000)}"}
+        )
         if not self.traits.linear:
             finer["regularisation"] = max(self.solver.regularisation / 10, 1e-12)
-        return self.with_solver(dataclasses.replace(self.solver, **finer)) if finer else None
+        return (
+            self.with_solver(dataclasses.replace(self.solver, **finer))
+            if finer
+            else None
+        )
 
     @classmethod
     def examples(cls) -> dict[str, Swimmer]:
-        return {"swimmer": cls(MEDIA["glass-0.3mm-loose"], rft.Chain((0.7, 1.4, 0.9), frame="link-1", length=0.3))}
+        return {
+            "swimmer": cls(
+                MEDIA["glass-0.3mm-loose"],
+                rft.Chain((0.7, 1.4, 0.9), frame="link-1", length=0.3),
+            )
+        }
 
 
 def _has_joint_angles(body: rft.Body) -> bool:
     """Return whether shape variables are angles of joints; bodies with few have amplitudes of bends, or of modes,
     instead."""
-    plain = isinstance(body, (rft.Chain, rft.Backbone)) and getattr(body, "bends", None) is None
+    plain = (
+        isinstance(body, (rft.Chain, rft.Backbone))
+        and getattr(body, "bends", None) is None
+    )
     return plain and getattr(body, "modes", None) is None
 
 
@@ -315,4 +461,7 @@ def is_three_link(system: System) -> bool:
 
 def name_in(kinds: dict, part) -> str:
     """Return the name of a part in ``kinds``, or that of its class."""
-    return next((name for name, kind in kinds.items() if type(part) is kind), type(part).__name__)
+    return next(
+        (name for name, kind in kinds.items() if type(part) is kind),
+        type(part).__name__,
+    )

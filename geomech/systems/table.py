@@ -29,16 +29,20 @@ from rft.bodies import Chain
 from rft.checks import Number, check_numbers
 from rft.refusal import Refusal
 
-LENGTHS = (
-    "its lengths are taken for body lengths; say body_length = 1 if they are, 3 if one is a link of three equal ones"
-)
-THREE_LINKS = [Chain(frame=frame) for frame in ("mean", "link-1", "link-2", "link-3")]  # a bare file is likely of one
+LENGTHS = "its lengths are taken for body lengths; say body_length = 1 if they are, 3 if one is a link of three equal ones"
+THREE_LINKS = [
+    Chain(frame=frame) for frame in ("mean", "link-1", "link-2", "link-3")
+]  # a bare file is likely of one
 
 
 def _chain(stored: tables.Stored) -> Chain | None:
     """Return the body of a table, with its length; None where nothing says it, or no chain."""
     try:
-        chain = None if stored.body is None else Chain(**{**stored.body, "length": stored.length})
+        chain = (
+            None
+            if stored.body is None
+            else Chain(**{**stored.body, "length": stored.length})
+        )
     except (ValueError, TypeError):
         return None
     return chain if chain and chain.joints == len(stored.connection.axes) else None
@@ -86,7 +90,9 @@ class Table:
 
     def __post_init__(self):
         if not isinstance(self.file, (str, Path)):
-            raise Refusal("file must be the name of a .nc or .mat file", value=self.file)
+            raise Refusal(
+                "file must be the name of a .nc or .mat file", value=self.file
+            )
         object.__setattr__(self, "file", str(Path(self.file).absolute()))
         for name in ("sign", "order", "sha256", "frame"):
             if not isinstance(getattr(self, name), str):
@@ -95,24 +101,35 @@ class Table:
         stored = tables.load(self.file, self.sign, self.order)
         if self.sha256.lower() not in ("", stored.sha256):
             raise Refusal(
-                f"{self.file} is not the file whose sha256 is given", instead="restore it, or leave sha256 out"
+                f"{self.file} is not the file whose sha256 is given",
+                instead="restore it, or leave sha256 out",
             )
         if stored.connection.field.masked and not isinstance(stored.connection, Tube):
             cure = (
-                "" if stored.A_error is None else ": give the .nc file of the measured gait, which has what lies there"
+                ""
+                if stored.A_error is None
+                else ": give the .nc file of the measured gait, which has what lies there"
             )
-            raise Refusal(f"{self.file} has singular shapes (nan), and nothing is looked up between those{cure}")
-        stated = (stored.unit, stored.length) != ("BL", 1.0) or (stored.sized and stored.computed is not None)
+            raise Refusal(
+                f"{self.file} has singular shapes (nan), and nothing is looked up between those{cure}"
+            )
+        stated = (stored.unit, stored.length) != ("BL", 1.0) or (
+            stored.sized and stored.computed is not None
+        )
         if self.body_length is not None and stated:
             raise Refusal(
                 f"{self.file} says the body's length itself, {stored.length:g} {stored.unit}",
                 instead="drop body_length",
             )
         object.__setattr__(self, "sha256", stored.sha256)
-        original = self._with_body(tables.scaled(stored, 1.0 / (self.body_length or 1.0)))
+        original = self._with_body(
+            tables.scaled(stored, 1.0 / (self.body_length or 1.0))
+        )
         object.__setattr__(self, "original", original)
         object.__setattr__(self, "chain", _chain(original))
-        object.__setattr__(self, "stored", tables.in_frame(original, self.frame, self.chain))
+        object.__setattr__(
+            self, "stored", tables.in_frame(original, self.frame, self.chain)
+        )
         object.__setattr__(self, "swimmer", self._swimmer())
 
     def _with_body(self, stored: tables.Stored) -> tables.Stored:
@@ -124,12 +141,20 @@ class Table:
         if stored.body is not None:
             raise Refusal(f"{self.file} says its body itself", instead="drop the body")
         if (joints := len(stored.connection.axes)) != self.body.joints:
-            raise Refusal(f"the body has {self.body.joints} shape variables, {self.file} {joints}", instead="mend one")
+            raise Refusal(
+                f"the body has {self.body.joints} shape variables, {self.file} {joints}",
+                instead="mend one",
+            )
         if self.body.length != 1.0:
-            raise Refusal("the body of a table has no length", value=self.body.length, instead="say body_length")
+            raise Refusal(
+                "the body of a table has no length",
+                value=self.body.length,
+                instead="say body_length",
+            )
         if stored.frame not in (UNKNOWN_FRAME, self.body.frame):
             raise Refusal(
-                f"the body has the frame {self.body.frame!r}, {self.file} {stored.frame!r}", instead="mend one"
+                f"the body has the frame {self.body.frame!r}, {self.file} {stored.frame!r}",
+                instead="mend one",
             )
         known = {name: getattr(self.body, name) for name in BODY}
         return replace(stored, frame=self.body.frame, body=known)
@@ -146,19 +171,45 @@ class Table:
         return Swimmer(self.medium, self.chain)
 
     def __reduce__(self):
-        values = self.file, self.sign, self.order, self.body_length, self.sha256, self.frame, self.body, self.medium
+        values = (
+            self.file,
+            self.sign,
+            self.order,
+            self.body_length,
+            self.sha256,
+            self.frame,
+            self.body,
+            self.medium,
+        )
         return Table, values
 
-    tube = property(lambda self: self.stored.connection if isinstance(self.stored.connection, Tube) else None)
-    near_gait = property(lambda self: f"the mean gait that {self.file} was measured at" if self.tube else "")
+    tube = property(
+        lambda self: (
+            self.stored.connection if isinstance(self.stored.connection, Tube) else None
+        )
+    )
+    near_gait = property(
+        lambda self: (
+            f"the mean gait that {self.file} was measured at" if self.tube else ""
+        )
+    )
     joints = property(lambda self: len(self.stored.connection.axes))
     length = property(lambda self: self.stored.length)
 
     @property
     def traits(self) -> Traits:
         stored = self.stored
-        limits = {"singularity": self._beyond, "singular": "the data of the log do not reach"} if self.tube else {}
-        degree = self.swimmer.traits.power_degree if self.swimmer else stored.power_degree
+        limits = (
+            {
+                "singularity": self._beyond,
+                "singular": "the data of the log do not reach",
+            }
+            if self.tube
+            else {}
+        )
+        degree = (
+            self.swimmer.traits.power_degree if self.swimmer else stored.power_degree
+        )
         return Traits(
             linear=stored.harmonics is None, mirror=stored.mirror, smooth=False, power_degree=degree,
             frame=stored.frame, unit=stored.unit, labels=tuple((name, "rad") for name in stored.shapes), **limits,
@@ -176,7 +227,9 @@ class Table:
     def squared_speed(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
         return self.stored.metric.norm(alpha, alphadot) ** 2
 
-    def power(self, alpha: ArrayLike, alphadot: ArrayLike, xi: ArrayLike | None = None) -> np.ndarray:
+    def power(
+        self, alpha: ArrayLike, alphadot: ArrayLike, xi: ArrayLike | None = None
+    ) -> np.ndarray:
         if self.swimmer:  # of the file's own velocity, in the frame of the body; power is the same in every frame
             own = self.original.table.velocity(alpha, alphadot)
             return self.swimmer.power(*np.broadcast_arrays(alpha, alphadot), own)
@@ -196,9 +249,17 @@ class Table:
 
     def table(self, name: str) -> Any:
         stored = self.stored
-        tables = {"connection": stored.connection, "harmonics": stored.harmonics, "even part": stored.even}
+        tables = {
+            "connection": stored.connection,
+            "harmonics": stored.harmonics,
+            "even part": stored.even,
+        }
         metric = None if self.swimmer else stored.metric
-        return self.A_error if name == "A_error" else {**tables, "metric": metric}.get(name)
+        return (
+            self.A_error
+            if name == "A_error"
+            else {**tables, "metric": metric}.get(name)
+        )
 
     @cached_property
     def A_error(self) -> np.ndarray | None:
@@ -221,15 +282,26 @@ class Table:
             else None
         )
         xi = evaluate(self.velocity, alpha, alphadot).tolist()
-        return {"xi": xi, "status": "looked up", "residual": residual if residual is None else float(residual)}
+        return {
+            "xi": xi,
+            "status": "looked up",
+            "residual": residual if residual is None else float(residual),
+        }
 
     def _times(self, values, alpha, alphadot) -> np.ndarray:
         """Return values (3, N_1, ...) at a shape times |alphadot|: (..., 3); near one gait they are the same
         everywhere."""
         if self.tube is not None:
-            known = values[:, np.isfinite(values[0])]  # nowhere, where the data reach no point of the grid
-            return (known[:, 0] if known.size else np.zeros(3)) * np.linalg.norm(alphadot, axis=-1)[..., None]
-        return Field(self.stored.table.axes, values, 1)(alpha) * np.linalg.norm(alphadot, axis=-1)[..., None]
+            known = values[
+                :, np.isfinite(values[0])
+            ]  # nowhere, where the data reach no point of the grid
+            return (known[:, 0] if known.size else np.zeros(3)) * np.linalg.norm(
+                alphadot, axis=-1
+            )[..., None]
+        return (
+            Field(self.stored.table.axes, values, 1)(alpha)
+            * np.linalg.norm(alphadot, axis=-1)[..., None]
+        )
 
     def table_error(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
         """Return (..., 2), body lengths and rad: the fit's residual summed along the gait, the error of the heading
@@ -243,38 +315,74 @@ class Table:
             return np.stack([np.hypot(x, y) / self.length, theta], -1)
         xi, phases = self.velocity(alpha, alphadot), np.shape(alpha)[-2]
         net = displacement(xi)
-        halves = [displacement(half.velocity(alpha, alphadot)) for half in self.stored.halves]
+        halves = [
+            displacement(half.velocity(alpha, alphadot)) for half in self.stored.halves
+        ]
         differences = [
-            np.stack([np.hypot(*np.moveaxis(h - net, -1, 0)[:2]), np.abs(h - net)[..., 2]], -1) for h in halves
+            np.stack(
+                [np.hypot(*np.moveaxis(h - net, -1, 0)[:2]), np.abs(h - net)[..., 2]],
+                -1,
+            )
+            for h in halves
         ]
         error, stored = np.maximum(*differences), self.stored
         pose = trajectory(xi, 2 * np.pi * np.arange(phases) / phases)
         lever = np.hypot(*np.moveaxis(net[..., None, :] - pose, -1, 0)[:2])
-        contributions = [(stored.table.residual, 1 / np.sqrt(stored.highest))] if stored.has_residual else []
+        contributions = (
+            [(stored.table.residual, 1 / np.sqrt(stored.highest))]
+            if stored.has_residual
+            else []
+        )
         contributions += [(stored.even, np.sqrt(2))] if stored.even is not None else []
-        contributions += [(np.linalg.norm(stored.A_error, axis=1), 1.0)] if stored.A_error is not None else []
+        contributions += (
+            [(np.linalg.norm(stored.A_error, axis=1), 1.0)]
+            if stored.A_error is not None
+            else []
+        )
         for values, factor in contributions:
             x, y, theta = np.moveaxis(self._times(values, alpha, alphadot), -1, 0)
-            error += 2 * np.pi * factor * np.stack([np.hypot(x, y) + lever * theta, theta], -1).mean(-2)
+            error += (
+                2
+                * np.pi
+                * factor
+                * np.stack([np.hypot(x, y) + lever * theta, theta], -1).mean(-2)
+            )
         return error / [self.length, 1.0]
 
     def about(self) -> dict:
         attributes = {"table": self.file, "table_sha256": self.sha256}
         if self.tube is None:
-            return attributes if self.stored.level is None else {**attributes, "level": self.stored.level}
+            return (
+                attributes
+                if self.stored.level is None
+                else {**attributes, "level": self.stored.level}
+            )
         taylor = self.tube.taylor
-        return {**attributes, "singular_shapes": BEYOND, "level": taylor.level, "error_factor": taylor.factor}
+        return {
+            **attributes,
+            "singular_shapes": BEYOND,
+            "level": taylor.level,
+            "error_factor": taylor.factor,
+        }
 
     @cached_property
     def assumed(self) -> tuple[str, ...]:
         """Assumptions about facts that the file does not state, and what contradicts those that it states, one a line."""
         stored = self.original
-        lines = stored.assumptions if stored.sized or self.body_length is not None else (*stored.assumptions, LENGTHS)
+        lines = (
+            stored.assumptions
+            if stored.sized or self.body_length is not None
+            else (*stored.assumptions, LENGTHS)
+        )
         ours = stored.sized and stored.computed is None  # a file of geomech's
-        drag = stored.metric is None or stored.power_degree is not None or not stored.sized
+        drag = (
+            stored.metric is None or stored.power_degree is not None or not stored.sized
+        )
         if self.tube is not None or ours or not drag:
             return lines
-        misread_as = misread(stored.connection, [self.chain] if self.chain else THREE_LINKS)
+        misread_as = misread(
+            stored.connection, [self.chain] if self.chain else THREE_LINKS
+        )
         return (*lines, misread_as) if misread_as else lines
 
     @classmethod

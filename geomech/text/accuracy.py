@@ -28,12 +28,16 @@ def table(found: Mapping[str, Any]) -> str:
     names = max((list(row) for row in rows), key=len)
     scale, _ = _scale(found)
     heads = {name: scale if name == "tolerance" else name for name in names}
-    wide = {n: max(len(heads[n]), *(len(row.get(n, "")) for row in rows)) for n in names}
+    wide = {
+        n: max(len(heads[n]), *(len(row.get(n, "")) for row in rows)) for n in names
+    }
     lines = [f"speed {found['speed']:.6g} m/s"] if "speed" in found else []
     lines.append("  ".join(f"{heads[n]:>{wide[n]}}" for n in names))
     for row in rows:
         cells = (f"{row[n]:>{wide[n]}}" for n in names if n in row)
-        lines.append("  ".join([*cells, *["none of those tried"] * (len(row) < len(names))]))
+        lines.append(
+            "  ".join([*cells, *["none of those tried"] * (len(row) < len(names))])
+        )
     if error := found.get("own_error"):
         lines.append(
             f"errors here include the table's own, {error:.1e} BL, which no setting takes away; those below do not"
@@ -45,14 +49,21 @@ def _cells(choice: Mapping[str, Any]) -> dict[str, str]:
     """Return a row of the table by column; its tolerance alone where nothing meets that."""
     cells = {"tolerance": f"{choice['tolerance']:.0e}"}
     if choice.get("tier"):
-        cells["setting"] = f"{choice['tier']}, {choice['setting']} = {choice['value']:g}"
+        cells["setting"] = (
+            f"{choice['tier']}, {choice['setting']} = {choice['value']:g}"
+        )
     settings = {
-        k: x for k, x in choice.items() if k not in ("tolerance", "tier", "setting", "value", "error", "seconds")
+        k: x
+        for k, x in choice.items()
+        if k not in ("tolerance", "tier", "setting", "value", "error", "seconds")
     }
     if any(x is not None for x in settings.values()) or len(settings) > 1:
         cells |= {name: "-" if x is None else f"{x:g}" for name, x in settings.items()}
     if "error" in choice:
-        cells |= {"error": f"{choice['error']:.1e}", "seconds": f"{choice['seconds']:.4f}"}
+        cells |= {
+            "error": f"{choice['error']:.1e}",
+            "seconds": f"{choice['seconds']:.4f}",
+        }
     return cells
 
 
@@ -61,8 +72,14 @@ def sentences(found: Mapping[str, Any]) -> list[str]:
     lines, (_, of) = [], _scale(found)
     for line in found["lines"]:
         e, t, v = line["error"], line["seconds"], line["value"]
-        slope = "no slope, all rounding" if line["slope"] is None else f"measured order {line['slope']:.1f}"
-        settings = f"{line['label']} {v[0]:g} to {v[-1]:g}" + (f" {found['parts']}" if "parts" in found else "")
+        slope = (
+            "no slope, all rounding"
+            if line["slope"] is None
+            else f"measured order {line['slope']:.1f}"
+        )
+        settings = f"{line['label']} {v[0]:g} to {v[-1]:g}" + (
+            f" {found['parts']}" if "parts" in found else ""
+        )
         against = " of its own limit" * (line.get("against") == "limit")
         buys = f"; buys {line['buys']}" if "buys" in line else ""
         error = f"error {e[0]:.1e} to {e[-1]:.1e}{of}{against}"
@@ -73,4 +90,6 @@ def sentences(found: Mapping[str, Any]) -> list[str]:
 
 
 def _scale(found: Mapping[str, Any]) -> tuple[str, str]:
-    return next((scale for key, scale in SCALES.items() if key in found), SCALES["amplitudes"])
+    return next(
+        (scale for key, scale in SCALES.items() if key in found), SCALES["amplitudes"]
+    )

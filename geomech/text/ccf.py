@@ -12,21 +12,38 @@ from geomech.geometry.field import Field
 from geomech.studies.shape_space import Space
 
 ROUNDING = 1e-12  # largest size of a component that is nothing but roundoff
-RAYS, STEPS = 72, 200  # directions from the gait's middle in which the zero line is looked for, and places along each
+RAYS, STEPS = (
+    72,
+    200,
+)  # directions from the gait's middle in which the zero line is looked for, and places along each
 
 
 def text(result: Result) -> str:
     """Return the extremes of each component with their places and errors, or of slices their ranges."""
     space: Space = result.subject
     scene = space.study.scene
-    lines = [f"{scene.name}: CCF in the frame {scene.frame}, positive for counter-clockwise loops"]
+    lines = [
+        f"{scene.name}: CCF in the frame {scene.frame}, positive for counter-clockwise loops"
+    ]
     if space.planes:
         axes = space.planes[0].ccf.axes
         unit = f"x and y in {space.planes[0].ccf.unit}/rad2, theta in rad/rad2"
         lines += [f"slices: {grid(axes, ('the first', 'the second joint'))}", unit]
-        return "\n".join([*lines, *(f"{v.label.removeprefix('CCF of ')}: {spans(v.values)}" for v in result.variables)])
+        return "\n".join(
+            [
+                *lines,
+                *(
+                    f"{v.label.removeprefix('CCF of ')}: {spans(v.values)}"
+                    for v in result.variables
+                ),
+            ]
+        )
     ccf, error = space.study.curvature, space.study.curvature_error
-    lines += [f"grid: {grid(ccf.axes)}", *_extremes(ccf, error), *_zero_line(ccf, scene.gait.middle)]
+    lines += [
+        f"grid: {grid(ccf.axes)}",
+        *_extremes(ccf, error),
+        *_zero_line(ccf, scene.gait.middle),
+    ]
     return "\n".join([*lines, *_integral(space)])
 
 
@@ -38,7 +55,10 @@ def _extremes(ccf: Field, error: Field) -> Iterator[str]:
         if np.nanmax(np.abs(values), initial=0.0) < ROUNDING:
             yield f"{name:16}{'zero':>10}"
             continue
-        places = [np.unravel_index(find(values), values.shape) for find in (np.nanargmin, np.nanargmax)]
+        places = [
+            np.unravel_index(find(values), values.shape)
+            for find in (np.nanargmin, np.nanargmax)
+        ]
         cells = (f"{values[at]:10.4g}  {_shape(ccf, at):>14}" for at in places)
         yield f"{name:16}{'  '.join(cells)}  {max(errors[at] for at in places):8.1e}"
 
@@ -55,14 +75,23 @@ def _zero_line(ccf: Field, middle: np.ndarray) -> list[str]:
     if not x.values.min() < 0 < x.values.max():
         return ["zero line of x: none, x has one sign"]
     room = min(min(a[-1] - m, m - a[0]) for a, m in zip(x.axes, middle))
-    angles, steps = 2 * np.pi * np.arange(RAYS) / RAYS, np.linspace(0.02, 1, STEPS) * room
+    angles, steps = (
+        2 * np.pi * np.arange(RAYS) / RAYS,
+        np.linspace(0.02, 1, STEPS) * room,
+    )
     rays = np.stack([np.cos(angles), np.sin(angles)], -1)[:, None] * steps[:, None]
     changed = np.diff(np.sign(x(middle + rays)), axis=1) != 0
     if not changed.any():
         return [f"zero line of x: further than {room:.3g} rad from the gait's middle"]
     first = steps[changed.argmax(1)[changed.any(1)]]
-    some = "" if changed.any(1).all() else f", in {100 * changed.any(1).mean():.0f} % of directions"
-    return [f"zero line of x: {first.min():.2g} to {first.max():.2g} rad from the gait's middle{some}"]
+    some = (
+        ""
+        if changed.any(1).all()
+        else f", in {100 * changed.any(1).mean():.0f} % of directions"
+    )
+    return [
+        f"zero line of x: {first.min():.2g} to {first.max():.2g} rad from the gait's middle{some}"
+    ]
 
 
 def _integral(space: Space) -> Iterator[str]:

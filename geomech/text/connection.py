@@ -18,9 +18,14 @@ def text(result: Result) -> str:
     """Return the grid, the range of A by joint, the residual of its fit, its symmetries and its cost."""
     space: Space = result.subject
     scene, fitted = space.study.scene, space.study.fitted
-    lines = [f"{scene.name}: local connection A, xi = A alphadot, in the frame {scene.frame}"]
+    lines = [
+        f"{scene.name}: local connection A, xi = A alphadot, in the frame {scene.frame}"
+    ]
     lines += [f"grid: {grid(fitted.axes)}"]
-    lines += [*_ranges(fitted, shape_labels(scene.system)), f"fit: {_fit(scene.system, fitted)}"]
+    lines += [
+        *_ranges(fitted, shape_labels(scene.system)),
+        f"fit: {_fit(scene.system, fitted)}",
+    ]
     lines += [f"symmetry: {line}" for line in symmetries(scene.system)]
     if space.balances:
         lines.append(f"cost: {space.balances:,} force balances, {space.seconds:.2g} s")
@@ -30,11 +35,17 @@ def text(result: Result) -> str:
 def _ranges(fitted: Connection, labels: list[tuple[str, str]]) -> list[str]:
     """Return the least and largest entries of A, a row a joint."""
     units = [fitted.unit, fitted.unit, "rad"]
-    heads = (f"A_{row} ({unit} per {labels[0][1]})" for row, unit in zip(("x", "y", "theta"), units))
+    heads = (
+        f"A_{row} ({unit} per {labels[0][1]})"
+        for row, unit in zip(("x", "y", "theta"), units)
+    )
     lines = ["rate of   " + "".join(f"{head:>23}" for head in heads)]
     for k, (name, _) in enumerate(labels[:ROWS]):
         both = ((np.nanmin(row[k]) + 0.0, np.nanmax(row[k]) + 0.0) for row in fitted.A)
-        lines.append(f"{name:10}" + "".join(f"{low:>11.4g} to {high:>8.4g}" for low, high in both))
+        lines.append(
+            f"{name:10}"
+            + "".join(f"{low:>11.4g} to {high:>8.4g}" for low, high in both)
+        )
     return lines + [f"and {len(labels) - ROWS} joints more"] * (len(labels) > ROWS)
 
 
@@ -43,9 +54,9 @@ def _fit(system: System, fitted: Connection) -> str:
     if system.traits.linear and not stored_table(system, "connection"):
         return "exact, xi is linear in alphadot"
     singular = int(np.isnan(fitted.A).any((0, 1)).sum())
-    return fit_residual(fitted.residual, fitted.speed).removeprefix("fit ") + f"; {singular} singular shapes" * bool(
-        singular
-    )
+    return fit_residual(fitted.residual, fitted.speed).removeprefix(
+        "fit "
+    ) + f"; {singular} singular shapes" * bool(singular)
 
 
 def symmetries(system: System) -> list[str]:
@@ -54,5 +65,7 @@ def symmetries(system: System) -> list[str]:
     if traits.halved:
         lines.append("A_x is odd in alpha, A_y and A_theta even (left and right alike)")
     if traits.reversible:
-        lines.append("the last joint's column follows from the first's (head and tail alike)")
+        lines.append(
+            "the last joint's column follows from the first's (head and tail alike)"
+        )
     return lines

@@ -16,7 +16,11 @@ from geomech.studies import tables, uncertainty
 numbers = tables.table
 MORE = "--all prints every tier, the net distance and the seconds"
 FRAME = "x ahead, y to the left, as the body frame points at the start of the cycle"
-ROWS, COMPARED, LEAST = 14, 4, 3  # amplitudes in a table that fits a screen; with x by every tier; below each other
+ROWS, COMPARED, LEAST = (
+    14,
+    4,
+    3,
+)  # amplitudes in a table that fits a screen; with x by every tier; below each other
 
 
 def text(result: Result, title: str = "", rows: int = ROWS) -> str:
@@ -29,14 +33,24 @@ def text(result: Result, title: str = "", rows: int = ROWS) -> str:
 def gait_lines(result: Result, title: str = "", rows: int = ROWS) -> list[str]:
     """Return the lines of `text`, without the one that tells x from y."""
     facts, title = result.attributes, title or result.attributes["name"]
-    tier, unit, shown = exact_tier(result), result["x"].unit, shown_rows(len(result["amplitude"].values), rows)
+    tier, unit, shown = (
+        exact_tier(result),
+        result["x"].unit,
+        shown_rows(len(result["amplitude"].values), rows),
+    )
     lines = [f"{title}: {facts['note']}"] if "note" in facts else []
-    lines.append(f"{title}: displacement per cycle ({unit}), {_tier_words(result, tier)}")
+    lines.append(
+        f"{title}: displacement per cycle ({unit}), {_tier_words(result, tier)}"
+    )
     zeros, moving = _zeros(result, tier)
     moving += ["speed"] if "speed" in result else []
-    tables = lambda at: list(_side_by_side([_column(result, tier, name, at) for name in moving], result, at))
+    tables = lambda at: list(
+        _side_by_side([_column(result, tier, name, at) for name in moving], result, at)
+    )
     if len(stacked := tables(shown)) > 1:
-        shown = shown_rows(len(result["amplitude"].values), max(LEAST, rows // len(stacked)))
+        shown = shown_rows(
+            len(result["amplitude"].values), max(LEAST, rows // len(stacked))
+        )
         stacked = tables(shown)
     for columns in stacked:
         lines += ["".join(cells) for cells in zip(*columns)]
@@ -47,7 +61,9 @@ def gait_lines(result: Result, title: str = "", rows: int = ROWS) -> list[str]:
         lines.append("medium: one standard deviation by its covariance")
     lines += _effort(result, [tier], shown)
     some = len(shown) < (count := len(result["amplitude"].values))
-    lines.append(f"amplitude: {_amplitude(result)}" + f", {len(shown)} of {count}" * some)
+    lines.append(
+        f"amplitude: {_amplitude(result)}" + f", {len(shown)} of {count}" * some
+    )
     if "estimate_is" in facts:
         lines.append(f"estimated error: {facts['estimate_is']}")
     return lines
@@ -71,9 +87,13 @@ def _zeros(result: Result, tier: int) -> tuple[list[str], list[str]]:
     lines, moving = zero_words(symmetric), []
     for name in (n for n in POSE if n not in symmetric):
         values, errors = result[name].values[tier], result[name].error[tier]
-        zero = (np.abs(values) <= errors).all() and (np.abs(values) < 5e-7 * _scale(result, name)).all()
+        zero = (np.abs(values) <= errors).all() and (
+            np.abs(values) < 5e-7 * _scale(result, name)
+        ).all()
         if zero:
-            lines.append(f"{name}: zero within its error, {errors.max(initial=0.0):.0e} {result[name].unit}")
+            lines.append(
+                f"{name}: zero within its error, {errors.max(initial=0.0):.0e} {result[name].unit}"
+            )
         else:
             moving.append(name)
     return lines, moving
@@ -95,20 +115,31 @@ def _column(result: Result, tier: int, name: str, shown: np.ndarray) -> list[str
     """Return the cells of a quantity under its name: values, errors and what an uncertain medium adds."""
     v, facts = result[name], result.attributes
     places = 6 if v.unit == "rad" else _decimals(result)
-    head = {"heading": "heading (rad)", "speed": f"speed ({v.unit}) at {facts.get('frequency', 0.0):g} Hz"}.get(
-        name, name
-    )
+    head = {
+        "heading": "heading (rad)",
+        "speed": f"speed ({v.unit}) at {facts.get('frequency', 0.0):g} Hz",
+    }.get(name, name)
     wide = max(places + 8, len(head) + 2)
-    cells = [f"{head:>{wide}}{'+- error':>11}" + f"{'+- medium':>12}" * (v.spread is not None)]
+    cells = [
+        f"{head:>{wide}}{'+- error':>11}"
+        + f"{'+- medium':>12}" * (v.spread is not None)
+    ]
     for k in shown:
         cell = f"{np.round(v.values[tier, k], places) + 0.0:{wide}.{places}f}  +-{v.error[tier, k]:7.1e}"
-        cells.append(cell + (f"   +-{v.spread[tier, k]:7.1e}" if v.spread is not None else ""))
+        cells.append(
+            cell + (f"   +-{v.spread[tier, k]:7.1e}" if v.spread is not None else "")
+        )
     return cells
 
 
-def _side_by_side(columns: list[list[str]], result: Result, shown: np.ndarray) -> Iterator[list[list[str]]]:
+def _side_by_side(
+    columns: list[list[str]], result: Result, shown: np.ndarray
+) -> Iterator[list[list[str]]]:
     """Yield columns behind that of amplitudes, as many together as fit WIDTH."""
-    amplitudes = ["amplitude", *(f"{a:9.6g}" for a in result["amplitude"].values[shown])]
+    amplitudes = [
+        "amplitude",
+        *(f"{a:9.6g}" for a in result["amplitude"].values[shown]),
+    ]
     while columns:
         group = [amplitudes, columns.pop(0)]
         while columns and sum(len(c[0]) for c in group) + len(columns[0][0]) <= WIDTH:
@@ -118,13 +149,19 @@ def _side_by_side(columns: list[list[str]], result: Result, shown: np.ndarray) -
 
 def _others(result: Result, tier: int, shown: np.ndarray) -> Iterator[str]:
     """Yield x by the other tiers with its errors where amplitudes are few and all shown, else the largest error of each."""
-    others = [(str(name), k) for k, name in enumerate(result["tier"].values) if k != tier]
+    others = [
+        (str(name), k) for k, name in enumerate(result["tier"].values) if k != tier
+    ]
     x, places = result["x"], _decimals(result)
     if not others:
         return
     wide = places + 12
     few = len(shown) == len(result["amplitude"].values) <= COMPARED
-    if not few or 9 + wide * len(others) > WIDTH or "x" in result.attributes["zero_by_symmetry"]:
+    if (
+        not few
+        or 9 + wide * len(others) > WIDTH
+        or "x" in result.attributes["zero_by_symmetry"]
+    ):
         errors = (f"{name} {x.error[k].max(initial=0.0):.1e}" for name, k in others)
         yield f"other tiers, largest error ({x.unit}): {', '.join(errors)}"
         return
@@ -132,7 +169,9 @@ def _others(result: Result, tier: int, shown: np.ndarray) -> Iterator[str]:
     for row in shown:
         values, errors = np.round(x.values[:, row], places) + 0.0, x.error[:, row]
         cells = (f"{values[k]:.{places}f} +-{errors[k]:.0e}" for _, k in others)
-        yield f"{result['amplitude'].values[row]:9.6g}" + "".join(f"{cell:>{wide}}" for cell in cells)
+        yield f"{result['amplitude'].values[row]:9.6g}" + "".join(
+            f"{cell:>{wide}}" for cell in cells
+        )
 
 
 def _amplitude(result: Result) -> str:
@@ -156,8 +195,13 @@ def full(result: Result, title: str = "") -> str:
                 "mean: how far the mean over the media of that covariance lies from the displacement in their mean"
             )
     every = np.arange(len(result["amplitude"].values))
-    lines += [*_surfaces(result), *_effort(result, range(len(result["tier"].values)), every)]
-    lines.append(f"amplitude: {_amplitude(result)}; x, y, heading: the pose after a cycle, in the frame at its start")
+    lines += [
+        *_surfaces(result),
+        *_effort(result, range(len(result["tier"].values)), every),
+    ]
+    lines.append(
+        f"amplitude: {_amplitude(result)}; x, y, heading: the pose after a cycle, in the frame at its start"
+    )
     lines += zero_words(facts["zero_by_symmetry"])
     if "estimate_is" in facts:
         lines.append(f"estimated error: {facts['estimate_is']}")
@@ -170,12 +214,19 @@ def _blocks(result: Result) -> Iterator[tuple[Variable, str, float, int]]:
     facts, unit = result.attributes, result["x"].unit
     length, decimals = facts["body_length"], _decimals(result)
     per_cycle = f"displacement per cycle ({unit}) +- estimated error"
-    yield result["net_distance"], f"{per_cycle}: net distance, sqrt(x^2 + y^2)", 1.0, decimals
+    yield (
+        result["net_distance"],
+        f"{per_cycle}: net distance, sqrt(x^2 + y^2)",
+        1.0,
+        decimals,
+    )
     yield result["x"], f"{per_cycle}: x", 1.0, decimals
     yield result["y"], f"{per_cycle}: y", 1.0, decimals
     yield result["heading"], "heading gained (rad) +- estimated error", 1.0, 6
     if (f := facts.get("frequency")) is not None:
-        speed = lambda u: f"speed ({u}/s) at {f:g} Hz +- estimated error: net distance times frequency"
+        speed = lambda u: (
+            f"speed ({u}/s) at {f:g} Hz +- estimated error: net distance times frequency"
+        )
         if unit != "BL":
             yield result["net_distance"], speed(unit), f, decimals
         yield result["net_distance"], speed("BL"), f / length, 6
@@ -189,21 +240,39 @@ def _decimals(result: Result) -> int:
 def _block(result: Result, variable: Variable, by: float, places: int) -> Iterator[str]:
     """Yield a head and a row an amplitude, a column a tier."""
     uncertain = variable.spread is not None
-    yield "amplitude" + "".join(f"{m:>{places + 15}}" for m in result["tier"].values) + "     medium" * uncertain
-    values, errors = np.round(by * variable.values, places) + 0.0, by * variable.error  # no -0.000
+    yield (
+        "amplitude"
+        + "".join(f"{m:>{places + 15}}" for m in result["tier"].values)
+        + "     medium" * uncertain
+    )
+    values, errors = (
+        np.round(by * variable.values, places) + 0.0,
+        by * variable.error,
+    )  # no -0.000
     shifts = _shifts(result, variable) if uncertain else {}
     for k, amplitude in enumerate(result["amplitude"].values):
-        row = "".join(f"{x:{places + 6}.{places}f} +-{e:7.1e}" for x, e in zip(values[:, k], errors[:, k]))
+        row = "".join(
+            f"{x:{places + 6}.{places}f} +-{e:7.1e}"
+            for x, e in zip(values[:, k], errors[:, k])
+        )
         medium = f"  +-{by * variable.spread[0, k]:7.1e}" if uncertain else ""
-        yield f"{amplitude:9.6g}{row}{medium}" + (f"  mean {by * shifts[k]:+.1e}" if k in shifts else "")
+        yield f"{amplitude:9.6g}{row}{medium}" + (
+            f"  mean {by * shifts[k]:+.1e}" if k in shifts else ""
+        )
 
 
 def _shifts(result: Result, variable: Variable) -> dict[int, float]:
     """Return, by the numbers of amplitudes at which it matters, how far an uncertain medium shifts the mean of a quantity."""
-    least = uncertainty.SEEN * (1.0 if variable.unit == "rad" else result.attributes["body_length"])
+    least = uncertainty.SEEN * (
+        1.0 if variable.unit == "rad" else result.attributes["body_length"]
+    )
     shift = result["medium_shift"].values[tables.QUANTITIES.index(variable.name)]
     both = zip(shift.tolist(), variable.spread[0].tolist())
-    return {k: x for k, (x, sd) in enumerate(both) if abs(x) > max(uncertainty.SHIFTED * sd, least)}
+    return {
+        k: x
+        for k, (x, sd) in enumerate(both)
+        if abs(x) > max(uncertainty.SHIFTED * sd, least)
+    }
 
 
 def _surfaces(result: Result) -> Iterator[str]:
@@ -227,23 +296,35 @@ def _effort(result: Result, tiers: Sequence[int], shown: np.ndarray) -> Iterator
         return
     names = result["tier"].values
     columns = [
-        (f"{v.name.replace('_', ' ')} ({v.unit})", v.values, ".6f") for v in (result["path_length"], result["work"])
+        (f"{v.name.replace('_', ' ')} ({v.unit})", v.values, ".6f")
+        for v in (result["path_length"], result["work"])
     ]
-    columns += [(str(names[t]), result["cost_of_transport"].values[t], ".4g") for t in tiers]
+    columns += [
+        (str(names[t]), result["cost_of_transport"].values[t], ".4g") for t in tiers
+    ]
     columns = [x for x in columns if np.isfinite(x[1]).any()]
     of_tiers = (
-        "" if np.isnan(result["work"].values).all() else ", cost of transport by tier (drag: the body's along itself)"
+        ""
+        if np.isnan(result["work"].values).all()
+        else ", cost of transport by tier (drag: the body's along itself)"
     )
     yield f"effort per cycle{of_tiers}"
     wide = [max(10, len(head)) + 2 for head, *_ in columns]
     yield "amplitude" + "".join(f"{head:>{w}}" for (head, *_), w in zip(columns, wide))
     for k in shown:
-        cells = (format(x[k], form) if np.isfinite(x[k]) else "-" for _, x, form in columns)
-        yield f"{result['amplitude'].values[k]:9.6g}" + "".join(f"{cell:>{w}}" for cell, w in zip(cells, wide))
+        cells = (
+            format(x[k], form) if np.isfinite(x[k]) else "-" for _, x, form in columns
+        )
+        yield f"{result['amplitude'].values[k]:9.6g}" + "".join(
+            f"{cell:>{w}}" for cell, w in zip(cells, wide)
+        )
 
 
 def _times(facts: Any) -> str:
     """Return the seconds that tables took to build and tiers to look up, in words."""
     stored = facts.get("kept", ())
-    times = [f"{name} {took:.3g}{' (built before)' * (name in stored)}" for name, took in facts["seconds"].items()]
+    times = [
+        f"{name} {took:.3g}{' (built before)' * (name in stored)}"
+        for name, took in facts["seconds"].items()
+    ]
     return f"seconds: {', '.join(times)}{' with the search for it' * ('tier' in facts)}"

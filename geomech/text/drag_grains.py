@@ -15,7 +15,9 @@ def numbers(result: Result) -> dict[str, Any]:
     return {
         **result.attributes,
         **{v.name: v.values.tolist() for v in result.variables},
-        "errors": {v.name: v.error.tolist() for v in result.variables if v.error is not None},
+        "errors": {
+            v.name: v.error.tolist() for v in result.variables if v.error is not None
+        },
         "law": dict(zip(law.names, law.values.tolist())),
         "law_errors": dict(zip(law.names, law.errors.tolist())),
         "units": {v.name: v.unit for v in result.variables if v.unit},
@@ -34,13 +36,20 @@ def text(result: Result) -> str:
         f"psi_deg{'flank along':>15}{'across (N/m)':>15}{'ends along':>13}{'across (mN)':>13}{'lift (mN)':>13}",
     ]
     forms = (1.0, "6.2f", "4.2f"), (1.0, "6.2f", "4.2f"), *[(1e3, "5.0f", "3.0f")] * 3
-    columns = [x for name in ("flank", "ends", "lift") for x in _with_errors(result, name)]
+    columns = [
+        x for name in ("flank", "ends", "lift") for x in _with_errors(result, name)
+    ]
     for psi, *cells in zip(result["angle"].values, *columns):
-        words = [f" {unit * v:{form}} +- {unit * e:{short}}" for (v, e), (unit, form, short) in zip(cells, forms)]
+        words = [
+            f" {unit * v:{form}} +- {unit * e:{short}}"
+            for (v, e), (unit, form, short) in zip(cells, forms)
+        ]
         lines.append(f"{psi:7.4g}" + "".join(words))
     for name, x, (low, high) in zip(law.names, law.values, law.intervals):
         scale, unit = (np.degrees(1.0), " degrees") if name == "gamma0" else (1.0, "")
-        lines.append(f"{name:9}{x * scale:9.3g}, {low * scale:.3g} to {high * scale:.3g}{unit} with 95 %")
+        lines.append(
+            f"{name:9}{x * scale:9.3g}, {low * scale:.3g} to {high * scale:.3g}{unit} with 95 %"
+        )
     lines.append(
         f"ends: e = {law.end_caps:.2f} of both together; largest overlap {facts['overlap']:.3f} grain diameters"
     )
@@ -50,7 +59,9 @@ def text(result: Result) -> str:
 def _with_errors(result: Result, name: str) -> list[list[tuple[float, float]]]:
     """Return (value, error) by angle, of each component: over beds, or in time where there is one bed."""
     over = (-1, *result["lift"].values.shape)
-    values, errors = (x.reshape(over) for x in (result[name].values, result[name].error))
+    values, errors = (
+        x.reshape(over) for x in (result[name].values, result[name].error)
+    )
     beds = over[1]
     errors = values.std(1, ddof=1) / np.sqrt(beds) if beds > 1 else errors[:, 0]
     return [list(zip(v, e)) for v, e in zip(values.mean(1).tolist(), errors.tolist())]
@@ -61,7 +72,11 @@ def csv(result: Result) -> str:
     question, _ = result.subject
     facts, bed, length = result.attributes, question.bed, question.length
     walls = "walled" if bed.walled else "periodic"
-    settled = "" if bed.settling_friction is None else f", settled with friction {bed.settling_friction:g}"
+    settled = (
+        ""
+        if bed.settling_friction is None
+        else f", settled with friction {bed.settling_friction:g}"
+    )
     lines = [
         f"# {command(result)}",
         "# Drag on the flank of a rod, and on both its ends together beyond that, in beds of grains (LAMMPS "
@@ -80,9 +95,18 @@ def csv(result: Result) -> str:
     flank, ends, lift = (result[name] for name in ("flank", "ends", "lift"))
     for i, seed in enumerate(result["bed"].values):
         for j, psi in enumerate(result["angle"].values):
-            cells = [*(length * flank.values[:, i, j]), *ends.values[:, i, j], lift.values[i, j]]
+            cells = [
+                *(length * flank.values[:, i, j]),
+                *ends.values[:, i, j],
+                lift.values[i, j],
+            ]
             errors = [*(length * flank.error[:, i, j]), *ends.error[:, i, j]]
-            numbers_ = [f"{psi:g}", *(f"{x:.4f}" for x in cells), f"{seed}", *(f"{x:.4f}" for x in errors)]
+            numbers_ = [
+                f"{psi:g}",
+                *(f"{x:.4f}" for x in cells),
+                f"{seed}",
+                *(f"{x:.4f}" for x in errors),
+            ]
             lines.append(",".join(numbers_))
     return "\n".join(lines) + "\n"
 

@@ -26,19 +26,34 @@ def explain(scene: Scene | Intruding | WalkerScene) -> str:
     """Return the system with its effects on and off, the engine and why, and the results that exist, as plain text.
 
     Of an intruder scene: its law, body and motion, and effects on and off; of a robot that walks its engine, too."""
-    if not isinstance(scene, Scene) and hasattr(type(scene), "example"):  # of bodies in grains
+    if not isinstance(scene, Scene) and hasattr(
+        type(scene), "example"
+    ):  # of bodies in grains
         return printable("\n".join(grains.described(scene)))
     system = checked_scene(scene).system
     first, *rest = described(system)
-    gait = next((name for name, kind in GAITS.items() if type(scene.gait) is kind), type(scene.gait).__name__)
+    gait = next(
+        (name for name, kind in GAITS.items() if type(scene.gait) is kind),
+        type(scene.gait).__name__,
+    )
     timed = "" if scene.frequency is None else f" at {scene.frequency:g} Hz"
     lines = [f"{scene.name}: {first}, {gait} gait{timed}", *rest]
     lines.append(f"engine: {engine(system)}")
     phases = scene.numerics.phases
     if (count := solved_phases(system, scene.gait, phases)) < phases:
-        lines.append(f"by symmetry: {count} of {phases} phases of the gait are solved, the others are images of these")
-    by_name = [m for m, tier in TIERS.items() if tier.is_possible(system) and not tier.is_offered(system)]
-    lines.append("tiers: " + ", ".join(tiers(system)) + f"; by name: {', '.join(by_name)}" * bool(by_name))
+        lines.append(
+            f"by symmetry: {count} of {phases} phases of the gait are solved, the others are images of these"
+        )
+    by_name = [
+        m
+        for m, tier in TIERS.items()
+        if tier.is_possible(system) and not tier.is_offered(system)
+    ]
+    lines.append(
+        "tiers: "
+        + ", ".join(tiers(system))
+        + f"; by name: {', '.join(by_name)}" * bool(by_name)
+    )
     return printable("\n".join([*lines, *_unavailable(system)]))
 
 
@@ -46,16 +61,23 @@ def _unavailable(system) -> list[str]:
     """Return a line for each reason for which results do not exist, with these results."""
     reasons: dict[str, list[str]] = {}
     if system.traits.lacks & ALL:
-        first = reasons[f"{listed(system, ALL)} takes away what they rest on"] = ["connection", "CCF"]
+        first = reasons[f"{listed(system, ALL)} takes away what they rest on"] = [
+            "connection",
+            "CCF",
+        ]
         first += ["velocity at a single shape"] if system.traits.steps else []
     elif system.joints < 2:
         reasons["a loop of one joint encloses no area"] = ["CCF maps"]
     elif system.joints > MOST_JOINTS:
-        reasons[f"of {system.joints} joints there are slices, pair by pair (geomech ccf --pair)"] = ["CCF maps"]
+        reasons[
+            f"of {system.joints} joints there are slices, pair by pair (geomech ccf --pair)"
+        ] = ["CCF maps"]
     for tier in TIERS.values():
         if not tier.is_possible(system):
             reasons.setdefault(_why(tier, system), []).append(tier.name)
-    return [f"not available: {_listed(results)}: {why}" for why, results in reasons.items()]
+    return [
+        f"not available: {_listed(results)}: {why}" for why, results in reasons.items()
+    ]
 
 
 def _listed(results: list[str]) -> str:
@@ -79,5 +101,9 @@ def _why(tier, system) -> str:
 
 
 def _joints(system, taken: range) -> str:
-    count = f"{taken[0]} to {taken[-1]} joints" if taken[-1] < 100 else f"{taken[0]} joints and more"
+    count = (
+        f"{taken[0]} to {taken[-1]} joints"
+        if taken[-1] < 100
+        else f"{taken[0]} joints and more"
+    )
     return f"they take {count}, this body has {system.joints}"

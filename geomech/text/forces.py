@@ -15,15 +15,28 @@ PLACES = (0.25, 0.5, 0.75)  # of the body, at which the lag of activation is pri
 
 def numbers(result: Result) -> dict[str, Any]:
     """Return all variables by name, None for nan, with errors and units."""
-    values = {v.name: np.where(np.isfinite(v.values), v.values, None).tolist() for v in result.variables}
+    values = {
+        v.name: np.where(np.isfinite(v.values), v.values, None).tolist()
+        for v in result.variables
+    }
     errors = {v.name: v.error.tolist() for v in result.variables if v.error is not None}
-    return {**result.attributes, **values, "errors": errors, "units": {v.name: v.unit for v in result.variables}}
+    return {
+        **result.attributes,
+        **values,
+        "errors": errors,
+        "units": {v.name: v.unit for v in result.variables},
+    }
 
 
 def text(result: Result) -> str:
     """Return means over the cycle of thrust and drag by their parts, power, bending moment and activation."""
-    rows = [(name, [_mean(result[f"{kind}_{name}"]) for kind in ("thrust", "drag")]) for name in PARTS]
-    rows.append(("sum", [tuple(map(sum, zip(*(row[k] for _, row in rows)))) for k in (0, 1)]))
+    rows = [
+        (name, [_mean(result[f"{kind}_{name}"]) for kind in ("thrust", "drag")])
+        for name in PARTS
+    ]
+    rows.append(
+        ("sum", [tuple(map(sum, zip(*(row[k] for _, row in rows)))) for k in (0, 1)])
+    )
     unit = f"mean of a cycle, {result['thrust_normal'].unit}:"
     return "\n".join([
         _travel(result),
@@ -58,7 +71,11 @@ def _power(result: Result) -> str:
     medium, joints = (result[f"{name}_power"] for name in ("medium", "joint"))
     most = np.abs(medium.values).max() or 1.0
     difference = np.abs(medium.values - joints.values).max() / most
-    same = "at the joints the same" if difference < 1e-6 else f"at the joints {joints.values.mean():.4g} {joints.unit}"
+    same = (
+        "at the joints the same"
+        if difference < 1e-6
+        else f"at the joints {joints.values.mean():.4g} {joints.unit}"
+    )
     return f"power {_digits(*_mean(medium))} {medium.unit} into the medium, largest {medium.values.max():.4g}; {same}"
 
 
@@ -71,13 +88,20 @@ def _moment(result: Result) -> str:
 
 
 def _activation(result: Result) -> str:
-    joint, lag, ratio = (result[name].values for name in ("joint", "fundamental_lag", "fundamental_speed_ratio"))
+    joint, lag, ratio = (
+        result[name].values
+        for name in ("joint", "fundamental_lag", "fundamental_speed_ratio")
+    )
     if len(joint) < 2:
         return f"activation ahead of bending by {float(lag[0]):.3g} rad"
     places = joint if len(joint) <= len(PLACES) else np.array(PLACES)
     ahead = ", ".join(f"{x:.3g}" for x in np.interp(places, joint, lag))
     at = ", ".join(f"{x:.3g}" for x in places)
-    speed = f"; its wave runs {float(ratio):.3g} times as fast as that of curvature" if np.isfinite(ratio) else ""
+    speed = (
+        f"; its wave runs {float(ratio):.3g} times as fast as that of curvature"
+        if np.isfinite(ratio)
+        else ""
+    )
     return f"activation ahead of bending by {ahead} rad at s = {at}{speed}"
 
 

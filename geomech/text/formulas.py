@@ -24,10 +24,14 @@ def formulas(scene: Scene, ccf: bool = True, latex: bool = False) -> Iterator[st
     if ccf:
         for i, j in itertools.combinations(range(len(alpha)), 2):
             of_two = symbolic.simplified(symbolic.ccf(A, alpha, i, j), alpha)
-            yield formatted(of_two, f"F_{{{i + 1}{j + 1}}}" if latex else f"CCF_{i + 1}{j + 1}")
+            yield formatted(
+                of_two, f"F_{{{i + 1}{j + 1}}}" if latex else f"CCF_{i + 1}{j + 1}"
+            )
 
 
 def _text(matrix, name: str) -> str:
     entries = [(r, k) for r in range(3) for k in range(matrix.shape[1])]
     column = lambda k: f"_{k + 1}" if name == "A" else ""
-    return "\n".join(f"{name}_{ROWS[r]}{column(k)} = {matrix[r, k]}" for r, k in entries)
+    return "\n".join(
+        f"{name}_{ROWS[r]}{column(k)} = {matrix[r, k]}" for r, k in entries
+    )

@@ -14,7 +14,9 @@ def numbers(result: Result) -> dict[str, Any]:
     return {
         **result.attributes,
         **{v.name: v.values.tolist() for v in result.variables},
-        "errors": {v.name: v.error.tolist() for v in result.variables if v.error is not None},
+        "errors": {
+            v.name: v.error.tolist() for v in result.variables if v.error is not None
+        },
         "units": {v.name: v.unit for v in result.variables if v.unit},
     }
 
@@ -27,11 +29,24 @@ def text(result: Result) -> str:
         f"{2e3 * facts['radius']:g} mm wide, {facts['frequency']:g} Hz",
         f"{'BL per cycle':24}{'x':>18}{'y':>18}{'heading (rad)':>18}",
     ]
-    rows = zip(result["method"].values, *(zip(result[n].values, result[n].error) for n in ("x", "y", "heading")))
-    lines += [f"{name:24}" + "".join(f"{_cell(value, error):>18}" for value, error in cells) for name, *cells in rows]
-    for k, *pose in zip(*(result[n].values for n in ("cycle", "cycle_x", "cycle_y", "cycle_heading"))):
-        lines.append(f"{f'  cycle {k}':24}" + "".join(f"{f'{x:.4f}          ':>18}" for x in pose).rstrip())
-    lines.append("+-: error of tiers with that of the medium, deviation of cycles in grains; beds")
+    rows = zip(
+        result["method"].values,
+        *(zip(result[n].values, result[n].error) for n in ("x", "y", "heading")),
+    )
+    lines += [
+        f"{name:24}" + "".join(f"{_cell(value, error):>18}" for value, error in cells)
+        for name, *cells in rows
+    ]
+    for k, *pose in zip(
+        *(result[n].values for n in ("cycle", "cycle_x", "cycle_y", "cycle_heading"))
+    ):
+        lines.append(
+            f"{f'  cycle {k}':24}"
+            + "".join(f"{f'{x:.4f}          ':>18}" for x in pose).rstrip()
+        )
+    lines.append(
+        "+-: error of tiers with that of the medium, deviation of cycles in grains; beds"
+    )
     lines.append("differ by more than cycles: take other seeds, too")
     lines.append(
         f"work {facts['work']:.3g} J a cycle; packing {facts['packing']:.3f}; largest overlap {facts['overlap']:.3f} "
@@ -41,19 +56,40 @@ def text(result: Result) -> str:
 
 
 def _cell(value: float, error: float) -> str:
-    return f"{round(value, 4) + 0.0:.4f}" + (f" +- {error:.4f}" if np.isfinite(error) else "")
+    return f"{round(value, 4) + 0.0:.4f}" + (
+        f" +- {error:.4f}" if np.isfinite(error) else ""
+    )
 
 
 def csv(result: Result) -> str:
     """Return the motion in time: pose of the frame, shape, force of the grains, moment, work; SI units."""
     _, run = result.subject
     joints = [f"alpha_{k + 1}" for k in range(run.alpha.shape[1])]
-    columns = np.column_stack([run.t, run.pose, run.alpha, run.force, run.moment, run.work, run.kinetic])
+    columns = np.column_stack(
+        [run.t, run.pose, run.alpha, run.force, run.moment, run.work, run.kinetic]
+    )
     lines = [
         f"# {command(result)}",
-        ",".join(["t", "x", "y", "theta", *joints, "F_x", "F_y", "F_z", "M", "work", "kinetic"]),
+        ",".join(
+            [
+                "t",
+                "x",
+                "y",
+                "theta",
+                *joints,
+                "F_x",
+                "F_y",
+                "F_z",
+                "M",
+                "work",
+                "kinetic",
+            ]
+        ),
     ]
-    return "\n".join([*lines, *(",".join(f"{x:.6g}" for x in row) for row in columns)]) + "\n"
+    return (
+        "\n".join([*lines, *(",".join(f"{x:.6g}" for x in row) for row in columns)])
+        + "\n"
+    )
 
 
 def command(result: Result) -> str:

@@ -14,5 +14,7 @@ def reference(section: str | None, json_schema: bool) -> str:
     if not json_schema:
         return keys.text(section).removesuffix("\n")
     if section is not None:
-        raise Refusal("--json-schema is that of whole scene files", instead="drop SECTION")
+        raise Refusal(
+            "--json-schema is that of whole scene files", instead="drop SECTION"
+        )
     return json.dumps(schema(), indent=1)

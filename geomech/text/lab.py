@@ -13,14 +13,24 @@ def text(result: Result) -> str:
     wide = max(map(len, names))
     lines = [
         f"{name:{wide}}  {shapes} shapes, harmonics to {highest}"
-        for name, shapes, highest in zip(names, result["shapes"].values, result["highest"].values)
+        for name, shapes, highest in zip(
+            names, result["shapes"].values, result["highest"].values
+        )
     ]
     if over := result.attributes.get("over"):
-        error, members = result.attributes["between_members"], result.attributes["members"]
-        lines.append(f"{names[0]} over {over}: {members} members, interpolated between them to {error:.1e} BL")
+        error, members = (
+            result.attributes["between_members"],
+            result.attributes["members"],
+        )
+        lines.append(
+            f"{names[0]} over {over}: {members} members, interpolated between them to {error:.1e} BL"
+        )
     return "\n".join(lines)
 
 
 def numbers(result: Result) -> dict[str, Any]:
     """Return the lines as numbers."""
-    return {**{v.name: v.values.tolist() for v in result.variables}, **result.attributes}
+    return {
+        **{v.name: v.values.tolist() for v in result.variables},
+        **result.attributes,
+    }

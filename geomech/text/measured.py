@@ -23,7 +23,10 @@ def fit_numbers(fit: Fitted) -> dict[str, Any]:
     (net, half_width), (mean, mean_half_width) = fit.displacement, fit.mean
     t = 2 * np.pi * np.arange(PRINTED_PHASES) / PRINTED_PHASES
     A, error = fit.along(t)
-    residual, rates = fit.measured - fit.predicted, [f"{fit.unit}/rad", f"{fit.unit}/rad", "rad/rad"]
+    residual, rates = (
+        fit.measured - fit.predicted,
+        [f"{fit.unit}/rad", f"{fit.unit}/rad", "rad/rad"],
+    )
     return {
         "log": fit.log.name,
         "rows": len(fit.log.t),
@@ -72,7 +75,11 @@ def text(result: Result) -> str:
 
 def described(fit: Fitted) -> str:
     """Return displacement, connection and reach of a measured gait, in lines."""
-    (net, half_width), (mean, mean_half_width), unit = fit.displacement, fit.mean, fit.unit
+    (net, half_width), (mean, mean_half_width), unit = (
+        fit.displacement,
+        fit.mean,
+        fit.unit,
+    )
     residual, wide = np.sqrt(((fit.measured - fit.predicted) ** 2).mean(0)), reach(fit)
     lines = [
         f"{fit.log.name}: {len(fit.measured)} whole cycles of {', '.join(fit.log.joints)}, {fit.frequency:.6g} per unit of t",
@@ -82,8 +89,13 @@ def described(fit: Fitted) -> str:
     ]
     for k, (name, u) in enumerate((("x", unit), ("y", unit), ("heading", "rad"))):
         pair = f"{mean[k]:11.6f} +-{mean_half_width[k]:7.1e}  {net[k]:11.6f} +-{half_width[k]:7.1e}"
-        lines.append(f"{name:>8}{pair}   {residual[k]:.2g} of {fit.measured[:, k].std():.2g} {u}")
-    explained = "  ".join(f"{name} {100 * x:.3g} %" for name, x in zip(("x", "y", "heading"), fit.explained))
+        lines.append(
+            f"{name:>8}{pair}   {residual[k]:.2g} of {fit.measured[:, k].std():.2g} {u}"
+        )
+    explained = "  ".join(
+        f"{name} {100 * x:.3g} %"
+        for name, x in zip(("x", "y", "heading"), fit.explained)
+    )
     return "\n".join([
         *lines,
         f"connection: {fit.known.A.shape[-1] // 2} harmonics in the phase; explained of the body velocity:",

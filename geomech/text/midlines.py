@@ -25,22 +25,43 @@ def numbers(result: Result) -> dict[str, Any]:
             "value": float(result[name].values),
             "half_width": float(result[name].error),
             "unit": units[name],
-            "standard_error": dict(zip(SOURCES, result["standard_error"].values[k].tolist())),
+            "standard_error": dict(
+                zip(SOURCES, result["standard_error"].values[k].tolist())
+            ),
         }
         for k, name in enumerate(QUANTITIES)
     }
     along = {
-        name: {"value": result[f"{name}_along"].values.tolist(), "half_width": result[f"{name}_along"].error.tolist()}
+        name: {
+            "value": result[f"{name}_along"].values.tolist(),
+            "half_width": result[f"{name}_along"].error.tolist(),
+        }
         for name in ("slip", "amplitude")
     }
     per_cycle = dict(zip(QUANTITIES, result["per_cycle"].values.T.tolist()))
-    facts = {key: value for key, value in result.attributes.items() if key not in ("title", "frame_meaning", "notes")}
+    facts = {
+        key: value
+        for key, value in result.attributes.items()
+        if key not in ("title", "frame_meaning", "notes")
+    }
     facts["notes"] = list(result.attributes["notes"])
-    out = {**facts, "quantities": quantities, "s": result["s"].values.tolist(), "along": along, "per_cycle": per_cycle}
+    out = {
+        **facts,
+        "quantities": quantities,
+        "s": result["s"].values.tolist(),
+        "along": along,
+        "per_cycle": per_cycle,
+    }
     if comparison is not None:
         out["predicted"] = {
-            name: {"value": float(value), "half_width": float(error), "unit": units[name]}
-            for name, value, error in zip(COMPARED, comparison.predicted, comparison.predicted_error)
+            name: {
+                "value": float(value),
+                "half_width": float(error),
+                "unit": units[name],
+            }
+            for name, value, error in zip(
+                COMPARED, comparison.predicted, comparison.predicted_error
+            )
         }
         out["closing"] = [_numbers(x) for x in comparison.closing]
     return out
@@ -65,8 +86,13 @@ def text(result: Result) -> str:
         f"by cross-validation; noise of a point {about['noise']:.2g} BL",
         f"with intervals of {100 * about['level']:.3g} % of cases:",
     ]
-    lines += [f"  {name:<12}{pair(result[name].values, result[name].error)} {units[name]}" for name in SHOWN]
-    return "\n".join(lines + (_compared(comparison, units) if comparison is not None else []))
+    lines += [
+        f"  {name:<12}{pair(result[name].values, result[name].error)} {units[name]}"
+        for name in SHOWN
+    ]
+    return "\n".join(
+        lines + (_compared(comparison, units) if comparison is not None else [])
+    )
 
 
 def pair(value: float, error: float) -> str:
@@ -80,10 +106,14 @@ def pair(value: float, error: float) -> str:
 
 def _compared(c: Any, units: dict[str, str]) -> list[str]:
     lines = ["", f"{'':<12}{'measured':>12}{'predicted':>24}"]
-    for name, *x in zip(COMPARED, c.measured, c.measured_error, c.predicted, c.predicted_error):
+    for name, *x in zip(
+        COMPARED, c.measured, c.measured_error, c.predicted, c.predicted_error
+    ):
         apart = abs(x[0] - x[2]) / math.hypot(x[1], x[3])
         said = "they agree" if apart <= 1 else "they differ"
-        lines.append(f"  {name:<10}{pair(x[0], x[1]):<23} {pair(x[2], x[3]):<20} {units[name]}: {said}")
+        lines.append(
+            f"  {name:<10}{pair(x[0], x[1]):<23} {pair(x[2], x[3]):<20} {units[name]}: {said}"
+        )
     return [*lines, *map(closing_line, c.closing)]
 
 

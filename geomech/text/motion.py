@@ -13,6 +13,12 @@ def text(result: Result) -> str:
     zero = [*zero_components(motion.scene.system.traits, motion.scene.gait)]
     if "heading" not in zero:  # else x and y of one cycle are those of all
         zero = zero if motion.cycles == 1 else []
-    pose = moved([(v.values[-1], v.unit) for v in (result[name] for name in ("x", "y", "theta"))], zero)
+    pose = moved(
+        [
+            (v.values[-1], v.unit)
+            for v in (result[name] for name in ("x", "y", "theta"))
+        ],
+        zero,
+    )
     ends = f"after {motion.cycles} cycle{'s' * (motion.cycles > 1)}: {pose}"
     return f"{ends}\n{len(motion.phase)} rows of {len(motion.columns)} columns"

@@ -27,7 +27,10 @@ def numbers(result: Result) -> dict[str, Any]:
         "resolution": by_name(result["resolution"].values),
         "undetermined": result.attributes["undetermined"],
         "residuals": {
-            **{f"{name}_deg": result[name].values.tolist() for name in ("beta", "gamma")},
+            **{
+                f"{name}_deg": result[name].values.tolist()
+                for name in ("beta", "gamma")
+            },
             **dict(zip(("alpha_x", "alpha_z"), result["residual"].values.tolist())),
         },
         "status": "converged",
@@ -50,15 +53,26 @@ def _lines(result: Result, most: int) -> str:
         f"stress map fitted to {facts['name']}: {beta.size} plate drags",
         "         N/cm^3   95 % interval        from the data   generic set times zeta",
     ]
-    for name, x, (low, high), share, y in zip(*(result[v].values for v in (*OF_COEFFICIENTS, "generic"))):
-        lines.append(f"{name:5}{x:10.4f}   {low:7.4f} to {high:7.4f}{100 * abs(share):13.0f} %{y:16.4f}")
-    lines.append(f"zeta of the generic set that comes nearest: {zeta:.4g}; rms residual {facts['rms']:.3g} N/cm^3")
+    for name, x, (low, high), share, y in zip(
+        *(result[v].values for v in (*OF_COEFFICIENTS, "generic"))
+    ):
+        lines.append(
+            f"{name:5}{x:10.4f}   {low:7.4f} to {high:7.4f}{100 * abs(share):13.0f} %{y:16.4f}"
+        )
+    lines.append(
+        f"zeta of the generic set that comes nearest: {zeta:.4g}; rms residual {facts['rms']:.3g} N/cm^3"
+    )
     lines.append(f"the map {facts['map']}")
     if beta.size > most:
         return "\n".join([*lines, RESIDUALS])
     lines.append("    beta   gamma   alpha_x       map   alpha_z       map")
-    stress, fitted = result["stress"].values, result["stress"].values - result["residual"].values
-    for b, g, (x, z), (map_x, map_z) in zip(beta, result["gamma"].values, stress.T, fitted.T):
+    stress, fitted = (
+        result["stress"].values,
+        result["stress"].values - result["residual"].values,
+    )
+    for b, g, (x, z), (map_x, map_z) in zip(
+        beta, result["gamma"].values, stress.T, fitted.T
+    ):
         lines.append(f"{b:8.4g}{g:8.4g}{x:10.4f}{map_x:10.4f}{z:10.4f}{map_z:10.4f}")
     return "\n".join(lines)
 
@@ -70,7 +84,13 @@ def medium(result: Result) -> str:
         f"# Fitted to {json.dumps(facts['name'])}: {n_drags} plate drags, rms residual {facts['rms']:.3g} N/cm^3.",
         "[medium]  # N/cm^3; within, with 95 %:",
     ]
-    for name, x, (low, high), share in zip(*(result[v].values.tolist() for v in OF_COEFFICIENTS)):
-        lacking = f"; {100 * (1 - share):.0f} % of it from the generic shape" if name in facts["undetermined"] else ""
+    for name, x, (low, high), share in zip(
+        *(result[v].values.tolist() for v in OF_COEFFICIENTS)
+    ):
+        lacking = (
+            f"; {100 * (1 - share):.0f} % of it from the generic shape"
+            if name in facts["undetermined"]
+            else ""
+        )
         lines.append(f"{name} = {x!r}  # {low:.4g} to {high:.4g}{lacking}")
     return "\n".join(lines) + "\n"

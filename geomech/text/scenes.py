@@ -44,7 +44,13 @@ def _entry(name: str, about: str) -> list[str]:
 
 def toml_of(name: str) -> str:
     """Return the TOML of a scene or medium, without its last line's end."""
-    known = [*builtin_names(), *intruder_names(), *walker_names(), *rft.CATALOGUE, *VERTICAL]
+    known = [
+        *builtin_names(),
+        *intruder_names(),
+        *walker_names(),
+        *rft.CATALOGUE,
+        *VERTICAL,
+    ]
     name = choose("--show", name, known)
     if name in rft.CATALOGUE:
         text = medium_toml(name, rft.CATALOGUE[name])

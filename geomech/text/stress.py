@@ -15,5 +15,9 @@ def numbers(result: Result) -> dict[str, Any]:
 def text(result: Result) -> str:
     """Return the stress at one plate, and the signs of the map over its whole plane."""
     at_one = result.subject[1] is not None
-    parts = [f"{v.name} = {v.values:.4g} {v.unit}, {v.label}" for v in result.variables if at_one]
+    parts = [
+        f"{v.name} = {v.values:.4g} {v.unit}, {v.label}"
+        for v in result.variables
+        if at_one
+    ]
     return "\n".join([*["; ".join(parts)] * at_one, result.attributes["description"]])

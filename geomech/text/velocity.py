@@ -9,7 +9,9 @@ from geomech.core.variables import Result
 
 def numbers(result: Result) -> dict[str, Any]:
     """Return the velocity with its residual and status."""
-    numbers = {key: x for key, x in result.attributes["found"].items() if key != "iterations"}
+    numbers = {
+        key: x for key, x in result.attributes["found"].items() if key != "iterations"
+    }
     return {**numbers, "units": result.attributes["units"]}
 
 
@@ -19,4 +21,6 @@ def text(result: Result) -> str:
     steps = f", {found['iterations']} iterations" if "iterations" in found else ""
     residual = "unknown" if found["residual"] is None else f"{found['residual']:.1e}"
     first = "xi = ({:.9g}, {:.9g}, {:.9g})".format(*xi.values)
-    return f"{first} {xi.unit} {xi.label}\n{found['status']}, residual {residual}{steps}"
+    return (
+        f"{first} {xi.unit} {xi.label}\n{found['status']}, residual {residual}{steps}"
+    )

@@ -39,9 +39,17 @@ def numbers(result: Result) -> dict[str, Any]:
 def text(result: Result) -> str:
     """Return speed, status and energy of a walk."""
     scene, found = result.subject
-    w, f, cost = found.walk, scene.gait.frequency, walking.cost_of_transport(scene, found.walk)
+    w, f, cost = (
+        found.walk,
+        scene.gait.frequency,
+        walking.cost_of_transport(scene, found.walk),
+    )
     known = w.status == "walking" and np.isfinite(cost)
-    share = f", cost of transport {cost:.3g} (work over weight times distance, from rest)" if known else ""
+    share = (
+        f", cost of transport {cost:.3g} (work over weight times distance, from rest)"
+        if known
+        else ""
+    )
     return "\n".join([
         f"{scene.name}: {w.status} at {w.speed:.4g} +- {found.estimate:.1g} m/s at {f:g} Hz ({_regular(w)}{_settling(w)})",
         f"of the error {found.elements:.1g} m/s are of the elements, from twice as many",
@@ -56,7 +64,11 @@ def text(result: Result) -> str:
 
 
 def _regular(walk) -> str:
-    return "limit cycle" if walk.periodic else "no limit cycle found: mean of what there is"
+    return (
+        "limit cycle"
+        if walk.periodic
+        else "no limit cycle found: mean of what there is"
+    )
 
 
 def _settling(walk) -> str:
@@ -67,7 +79,9 @@ def _settling(walk) -> str:
     if np.isinf(walk.settling_time):
         return f"; from rest it does not come {within}"
     return (
-        f"; from rest {within} after {walk.settling_time:.2g} s" if walk.settling_time else f"; {within} from the start"
+        f"; from rest {within} after {walk.settling_time:.2g} s"
+        if walk.settling_time
+        else f"; {within} from the start"
     )
 
 
@@ -78,7 +92,9 @@ def _turning(found: Walked) -> list[str]:
         return []
     turning, error = np.degrees([w.yaw_rate, found.turning])
     drift = f"drifting aside at {w.lateral_speed:.2g} +- {found.lateral:.1g} m/s"
-    return [f"turning at {turning:.2g} +- {error:.1g} degrees/s, {drift} (positive: to the left of its heading)"]
+    return [
+        f"turning at {turning:.2g} +- {error:.1g} degrees/s, {drift} (positive: to the left of its heading)"
+    ]
 
 
 def _unsolved(walk) -> str:
@@ -92,6 +108,9 @@ def _lateral(walk) -> list[str]:
         return []
     y, roll, yaw = (walk.spatial[name] for name in ("y", "roll", "yaw"))
     angles = ", ".join(
-        f"{name} {np.degrees(a.min()):.2g} to {np.degrees(a.max()):.2g}" for name, a in (("roll", roll), ("yaw", yaw))
+        f"{name} {np.degrees(a.min()):.2g} to {np.degrees(a.max()):.2g}"
+        for name, a in (("roll", roll), ("yaw", yaw))
     )
-    return [f"aside to y {y[-1]:.2g} m, {angles} degrees (positive: left side up, turning left)"]
+    return [
+        f"aside to y {y[-1]:.2g} m, {angles} degrees (positive: left side up, turning left)"
+    ]

@@ -31,10 +31,14 @@ def table(system, numerics, gait, amplitudes) -> Table:
     )
 
 
-def _build(system, gait, least, largest, count, phases, progress: Callable | None) -> Family:
+def _build(
+    system, gait, least, largest, count, phases, progress: Callable | None
+) -> Family:
     if least == largest:  # rest, and nothing else
         return Family(gait, np.zeros(1), np.zeros((1, phases, 3)))
-    return family.fit(partial(_run, system), gait, largest, count, phases, progress, least=least)
+    return family.fit(
+        partial(_run, system), gait, largest, count, phases, progress, least=least
+    )
 
 
 def _run(system, alpha, alphadot) -> np.ndarray:
@@ -42,7 +46,9 @@ def _run(system, alpha, alphadot) -> np.ndarray:
 
 
 def _plan(system, numerics, gait, amplitudes) -> Plan:
-    area = lambda curves, batch: curves.area(np.asarray(gait.amplitude if batch is None else batch, float))
+    area = lambda curves, batch: curves.area(
+        np.asarray(gait.amplitude if batch is None else batch, float)
+    )
     return Plan(area, table(system, numerics, gait, amplitudes))
 
 

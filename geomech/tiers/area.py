@@ -18,7 +18,10 @@ from rft import se2
 from rft.checks import in_range
 from rft.refusal import Refusal
 
-TIPS, AROUND = 2, 64  # surfaces besides the one that is taken; phases on one where there is no field
+TIPS, AROUND = (
+    2,
+    64,
+)  # surfaces besides the one that is taken; phases on one where there is no field
 
 
 def area(field: Field, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
@@ -31,36 +34,59 @@ def area(field: Field, gait: Gait, amplitudes=None, phases: int = 256) -> np.nda
     checked_gait(gait)
     in_range("phases", phases, 1, 1e9, whole=True)
     if not isinstance(field, Field):
-        raise Refusal("the area tier sums up a Field, such as curvature.ccf gives", value=field)
+        raise Refusal(
+            "the area tier sums up a Field, such as curvature.ccf gives", value=field
+        )
     if field.joints != 2 or gait.joints != 2:
-        raise Refusal(f"the area tier needs two joints, got a field of {field.joints} and a gait of {gait.joints}")
+        raise Refusal(
+            f"the area tier needs two joints, got a field of {field.joints} and a gait of {gait.joints}"
+        )
     potential = field.antiderivative(0)
 
     def enclosed(batch):
         alpha, alphadot = gait.cycle(phases, batch)
-        return se2.exp((potential(field.inside(alpha)) * alphadot[..., 1:]).mean(-2) * 2 * np.pi)
+        return se2.exp(
+            (potential(field.inside(alpha)) * alphadot[..., 1:]).mean(-2) * 2 * np.pi
+        )
 
-    return in_groups(enclosed, gait.amplitude if amplitudes is None else amplitudes, SAMPLES_TOGETHER // phases)
+    return in_groups(
+        enclosed,
+        gait.amplitude if amplitudes is None else amplitudes,
+        SAMPLES_TOGETHER // phases,
+    )
 
 
 def _plan(system, numerics, gait, amplitudes) -> Plan:
     d, phases = system.joints, numerics.phases
-    read = 3 * (d * (d - 1) // 2) * (numerics.interpolation + 1) ** d * (1 if d == 2 else RADII)
+    read = (
+        3
+        * (d * (d - 1) // 2)
+        * (numerics.interpolation + 1) ** d
+        * (1 if d == 2 else RADII)
+    )
     memory = {"numbers": 3 * (d * (d - 1) // 2) * numerics.grid**d, "read": read}
     if d == 2:
         enclosed = lambda table, batch: area(ccf(table), gait, batch, phases)
         return Plan(enclosed, fitted.table(system, numerics), **memory)
     if not fitted.is_too_large(system, numerics):
-        surfaces = lambda table, batch, tips: spanned(two_form(table), gait, batch, phases, tips)
-        return _surface_plan(surfaces, gait, table=fitted.table(system, numerics), **memory)
+        surfaces = lambda table, batch, tips: spanned(
+            two_form(table), gait, batch, phases, tips
+        )
+        return _surface_plan(
+            surfaces, gait, table=fitted.table(system, numerics), **memory
+        )
     A = fitted.without_field(system, numerics)
 
     def balances(count, phases):
         on_cones = RADII * max(AROUND, 4 * gait.harmonics + 2)
-        shapes = 2 * phases + (2 + TIPS) * on_cones  # for the displacement, and once more with its spread
+        shapes = (
+            2 * phases + (2 + TIPS) * on_cones
+        )  # for the displacement, and once more with its spread
         return count * shapes * fitted.balances_per_shape(system, numerics)
 
-    surfaces = lambda table, batch, tips: spanned_by(A, gait, batch, phases, tips, AROUND)
+    surfaces = lambda table, batch, tips: spanned_by(
+        A, gait, batch, phases, tips, AROUND
+    )
     return _surface_plan(surfaces, gait, balances=balances)
 
 
@@ -71,7 +97,9 @@ def _surface_plan(surfaces, gait, **plan) -> Plan:
         shape = np.shape(gait.amplitude if amplitudes is None else amplitudes)
         return surfaces(table, amplitudes, 0).net.reshape(*shape, 3)
 
-    return Plan(net, spread=lambda table, batch: surfaces(table, batch, TIPS).spread, **plan)
+    return Plan(
+        net, spread=lambda table, batch: surfaces(table, batch, TIPS).spread, **plan
+    )
 
 
 AREA = Tier(
@@ -84,5 +112,12 @@ AREA = Tier(
     takes="takes two joints and more, of which a loop encloses area",
     instead="use path or direct",
     regular=True,
-    settings=(Setting("grid", fitted.GRIDS, "3 or 4 in amplitude, set by the gait", "a map to read, not digits"),),
+    settings=(
+        Setting(
+            "grid",
+            fitted.GRIDS,
+            "3 or 4 in amplitude, set by the gait",
+            "a map to read, not digits",
+        ),
+    ),
 )

@@ -46,8 +46,12 @@ class Numerics:
         ),
     ] = None  # fmt: skip
     grid: Annotated[int, Number(4, 4096, "-", "points per joint", whole=True)] = 31
-    extent: Annotated[float, Number(1e-6, 100, "rad", "of the field, on either side of 0")] = 2.5
-    interpolation: Annotated[int, Number(1, 5, "-", "degree of the field's splines", whole=True)] = 3
+    extent: Annotated[
+        float, Number(1e-6, 100, "rad", "of the field, on either side of 0")
+    ] = 2.5
+    interpolation: Annotated[
+        int, Number(1, 5, "-", "degree of the field's splines", whole=True)
+    ] = 3
     phases: Annotated[int, Number(8, 1_000_000, "-", "per cycle", whole=True)] = 256
     harmonics: Annotated[
         int | None,
@@ -56,14 +60,21 @@ class Numerics:
             "the highest kept, odd; if left out 15 of two joint rates, 9 of three, 5 beyond", whole=True,
         ),
     ] = None  # fmt: skip
-    curves: Annotated[int, Number(4, 4096, "-", "in the table of a family of gaits", whole=True)] = 24
+    curves: Annotated[
+        int, Number(4, 4096, "-", "in the table of a family of gaits", whole=True)
+    ] = 24
 
     def __post_init__(self):
         check_numbers(self)
         if self.harmonics is not None and self.harmonics % 2 == 0:
-            raise Refusal("harmonics must be an odd number from 1 to 999", value=self.harmonics)
+            raise Refusal(
+                "harmonics must be an odd number from 1 to 999", value=self.harmonics
+            )
         if self.interpolation >= self.grid:
-            raise Refusal("interpolation must be from 1 to 5 and less than grid", value=self.interpolation)
+            raise Refusal(
+                "interpolation must be from 1 to 5 and less than grid",
+                value=self.interpolation,
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,11 +174,21 @@ class Tier:
         """Raise Refusal if the tier does not apply to this system."""
         refuse(system, self.result, self.rests_on, "use the direct tier")
         if system.joints not in self.joints:
-            raise Refusal(f"the {self.name} tier {self.takes}, this body has {system.joints}", instead=self.instead)
+            raise Refusal(
+                f"the {self.name} tier {self.takes}, this body has {system.joints}",
+                instead=self.instead,
+            )
         if self.meets_singular_shapes(system):
             gait = near_gait(system)
-            reason = f"A is known near {gait} alone" if gait else f"the {kind_of(system)} has singular shapes"
-            raise Refusal(f"the {self.name} tier sums a field up, and {reason}", instead="use path or direct")
+            reason = (
+                f"A is known near {gait} alone"
+                if gait
+                else f"the {kind_of(system)} has singular shapes"
+            )
+            raise Refusal(
+                f"the {self.name} tier sums a field up, and {reason}",
+                instead="use path or direct",
+            )
 
     def meets_singular_shapes(self, system: System) -> bool:
         """Return whether singular shapes keep the tier from applying to this system."""
@@ -175,7 +196,9 @@ class Tier:
 
     def is_possible(self, system: System) -> bool:
         """Return whether the tier applies to this system."""
-        possible = system.joints in self.joints and not system.traits.lacks & self.rests_on
+        possible = (
+            system.joints in self.joints and not system.traits.lacks & self.rests_on
+        )
         return possible and not self.meets_singular_shapes(system)
 
     def is_offered(self, system: System) -> bool:
@@ -183,12 +206,16 @@ class Tier:
         return system.joints in self.offered and self.is_possible(system)
 
 
-TIERS = Registry("geomech.tiers", "name", "a tier", lambda part: isinstance(part, Tier))  # cheapest look-up first
+TIERS = Registry(
+    "geomech.tiers", "name", "a tier", lambda part: isinstance(part, Tier)
+)  # cheapest look-up first
 
 
 def solved_phases(system: System, gait: Gait, phases: int) -> int:
     """Return at how many phases of a gait the system's velocity is solved; the others are images of these."""
-    if system.traits.steps or phases < max(4, 2 * gait.harmonics + 1):  # the least that show a gait
+    if system.traits.steps or phases < max(
+        4, 2 * gait.harmonics + 1
+    ):  # the least that show a gait
         return phases
     costed = capability(system, Costed)
     return phases if costed is None else solved_count(gait, phases, costed.traits)
@@ -200,4 +227,8 @@ def in_groups(f: Callable, amplitudes, size: int) -> np.ndarray:
     amplitudes = real_array("amplitudes", amplitudes)
     flat, size = amplitudes.reshape(-1), max(1, size)
     results = [f(flat[k : k + size]) for k in range(0, flat.size, size)]
-    return np.concatenate(results).reshape(*amplitudes.shape, -1) if results else np.zeros((*amplitudes.shape, 3))
+    return (
+        np.concatenate(results).reshape(*amplitudes.shape, -1)
+        if results
+        else np.zeros((*amplitudes.shape, 3))
+    )

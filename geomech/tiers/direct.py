@@ -18,20 +18,28 @@ COUNTS = 2, 4, 8, 16, 32, 64  # of segments or nodes of a link
 NOTHING = "nothing that exact link integrals do not give for less"
 
 
-def direct(velocity: Velocity, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
+def direct(
+    velocity: Velocity, gait: Gait, amplitudes=None, phases: int = 256
+) -> np.ndarray:
     """Return the net poses (..., 3) by the velocity integrated along the gait, for amplitudes (...,) or the gait's own,
     many phases in one batch."""
     checked_gait(gait)
     amplitudes = gait.amplitude if amplitudes is None else amplitudes
     in_range("phases", phases, 1, 1e9, whole=True)
     step = SAMPLES_TOGETHER // int(phases)
-    return in_groups(lambda batch: _cycle(velocity, gait, batch, phases), amplitudes, step)
+    return in_groups(
+        lambda batch: _cycle(velocity, gait, batch, phases), amplitudes, step
+    )
 
 
 def _cycle(velocity: Velocity, gait: Gait, amplitudes, phases: int) -> np.ndarray:
     alpha, alphadot = gait.cycle(phases, amplitudes)
     parts = (slice(k, k + SAMPLES_TOGETHER) for k in range(0, phases, SAMPLES_TOGETHER))
-    return displacement(np.concatenate([evaluate(velocity, alpha[:, p], alphadot[:, p]) for p in parts], -2))
+    return displacement(
+        np.concatenate(
+            [evaluate(velocity, alpha[:, p], alphadot[:, p]) for p in parts], -2
+        )
+    )
 
 
 def direct_plan(system, numerics, gait: Gait) -> Plan:
@@ -50,7 +58,9 @@ def _plan(system, numerics, gait: Gait, amplitudes) -> Plan:
     phases = numerics.phases
     run = lambda batch: system.run(*gait.cycle(phases, batch)).net
     predict = lambda table, batch: (
-        run(None) if batch is None else in_groups(run, batch, gaits_per_batch(system, phases))
+        run(None)
+        if batch is None
+        else in_groups(run, batch, gaits_per_batch(system, phases))
     )
     return Plan(predict, balances=_balances(system, gait), exact=True)
 
@@ -64,8 +74,21 @@ DIRECT = Tier(
     rests_on=NONE,
     markers="black",
     settings=(
-        Setting("phases", (16, 32, 64, 128, 256, 512), "spectral if smooth, else 2", "the true answer"),
-        Setting("segments", COUNTS, "2; less with pivots in links", NOTHING, "limit", key="loads", rule="midpoint"),
+        Setting(
+            "phases",
+            (16, 32, 64, 128, 256, 512),
+            "spectral if smooth, else 2",
+            "the true answer",
+        ),
+        Setting(
+            "segments",
+            COUNTS,
+            "2; less with pivots in links",
+            NOTHING,
+            "limit",
+            key="loads",
+            rule="midpoint",
+        ),
         Setting(
             "nodes",
             COUNTS,
@@ -75,7 +98,13 @@ DIRECT = Tier(
             key="loads",
             rule="gauss",
         ),
-        Setting("regularisation", (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6), "1", "links that really stand still", "limit"),
+        Setting(
+            "regularisation",
+            (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6),
+            "1",
+            "links that really stand still",
+            "limit",
+        ),
         Setting(
             "pieces",
             (5, 10, 20, 40, 80),

@@ -39,7 +39,9 @@ def refuse(system: System) -> None:
 
 def directions(system: System, numerics: Numerics) -> int:
     """Return the number of directions of alphadot at each shape."""
-    return numerics.directions or (8 if system.joints <= 2 else (4 if system.traits.linear else 16) * system.joints)
+    return numerics.directions or (
+        8 if system.joints <= 2 else (4 if system.traits.linear else 16) * system.joints
+    )
 
 
 def axes(system: System, numerics: Numerics) -> tuple[np.ndarray, ...]:
@@ -56,7 +58,9 @@ def axes(system: System, numerics: Numerics) -> tuple[np.ndarray, ...]:
             if coarse_fits
             else "give a chain two [body] modes, "
         )
-        raise Refusal(f"a field of {n}^{d} shapes is too large{cost}", instead=f"{lower}{INSTEAD}")
+        raise Refusal(
+            f"a field of {n}^{d} shapes is too large{cost}", instead=f"{lower}{INSTEAD}"
+        )
     return connection.grid(system.joints, numerics.grid, numerics.extent)
 
 
@@ -68,7 +72,11 @@ def finest_grid(joints: int) -> int:
 def is_too_large(system: System, numerics: Numerics) -> bool:
     """Return whether tiers do without the field of so many shapes, and solve for A at those of the gait and of the
     surfaces that it spans."""
-    return system.joints > 3 and not stored_table(system, "connection") and numerics.grid**system.joints > FIELD
+    return (
+        system.joints > 3
+        and not stored_table(system, "connection")
+        and numerics.grid**system.joints > FIELD
+    )
 
 
 def table(system: System, numerics: Numerics) -> Table:
@@ -77,7 +85,10 @@ def table(system: System, numerics: Numerics) -> Table:
     return Table(
         "connection",
         key(numerics, DEPENDS_ON),
-        solved_shapes(system.inner if isinstance(system, Framed) else system, numerics, count) * count,
+        solved_shapes(
+            system.inner if isinstance(system, Framed) else system, numerics, count
+        )
+        * count,
         (d + 3) * 3 * numerics.grid**d,
         partial(_build, system, numerics),
         partial(axes, system, numerics),
@@ -91,20 +102,37 @@ def key(numerics: Numerics, names: tuple[str, ...]) -> tuple:
 
 def _build(system: System, numerics: Numerics, progress: Callable | None) -> Connection:
     if stored := stored_table(system, "connection"):
-        return stored if stored.length else replace(stored, unit=length_unit(system), length=system.length)
+        return (
+            stored
+            if stored.length
+            else replace(stored, unit=length_unit(system), length=system.length)
+        )
     if isinstance(system, Framed):
         return system.fitted(progress)
     count, trusted = directions(system, numerics), not isinstance(system, WrappedSystem)
-    options: dict[str, Any] = {"traits": system.traits, "unit": length_unit(system), "length": system.length}
+    options: dict[str, Any] = {
+        "traits": system.traits,
+        "unit": length_unit(system),
+        "length": system.length,
+    }
     return connection.fit(
-        system.velocity, axes(system, numerics), count, numerics.interpolation, progress, trusted=trusted, **options
+        system.velocity,
+        axes(system, numerics),
+        count,
+        numerics.interpolation,
+        progress,
+        trusted=trusted,
+        **options,
     )
 
 
 def without_field(system: System, numerics: Numerics) -> Callable:
     """Return the connection as a function of shapes (..., d), without a field."""
     return connection.connection_function(
-        system.velocity, system.joints, directions(system, numerics), system.traits.linear
+        system.velocity,
+        system.joints,
+        directions(system, numerics),
+        system.traits.linear,
     )
 
 
@@ -113,7 +141,13 @@ def balances_per_shape(system: System, numerics: Numerics) -> int:
     return system.joints if system.traits.linear else directions(system, numerics)
 
 
-def plane(system: System, numerics: Numerics, pair: tuple[int, int], at, progress: Callable | None = None) -> Plane:
+def plane(
+    system: System,
+    numerics: Numerics,
+    pair: tuple[int, int],
+    at,
+    progress: Callable | None = None,
+) -> Plane:
     """Return the plane of shape space on which two joints move (`geomech.geometry.plane`), interpolated in a stored
     field.
 
@@ -124,17 +158,42 @@ def plane(system: System, numerics: Numerics, pair: tuple[int, int], at, progres
     axis = connection.grid(1, numerics.grid, numerics.extent)[0]
     at = inside((axis,) * system.joints, at, [name for name, _ in shape_labels(system)])
     count = directions(system, numerics)
-    options: dict[str, Any] = {"traits": system.traits, "unit": length_unit(system), "length": system.length}
-    return fit_plane(system.velocity, (axis, axis), pair, at, count, numerics.interpolation, progress, **options)
+    options: dict[str, Any] = {
+        "traits": system.traits,
+        "unit": length_unit(system),
+        "length": system.length,
+    }
+    return fit_plane(
+        system.velocity,
+        (axis, axis),
+        pair,
+        at,
+        count,
+        numerics.interpolation,
+        progress,
+        **options,
+    )
 
 
-def plane_balances(system: System, numerics: Numerics, pair: tuple[int, int], at) -> int:
+def plane_balances(
+    system: System, numerics: Numerics, pair: tuple[int, int], at
+) -> int:
     """Return the velocities that `plane` takes."""
     if stored_table(system, "connection"):
         return 0
-    axis, count = connection.grid(1, numerics.grid, numerics.extent)[0], directions(system, numerics)
+    axis, count = (
+        connection.grid(1, numerics.grid, numerics.extent)[0],
+        directions(system, numerics),
+    )
     alpha = plane_shapes((axis, axis), pair, np.asarray(at)).reshape(-1, system.joints)
-    return int(to_solve(mirrored(alpha, count) if system.traits.halved else (), len(alpha)).sum()) * count
+    return (
+        int(
+            to_solve(
+                mirrored(alpha, count) if system.traits.halved else (), len(alpha)
+            ).sum()
+        )
+        * count
+    )
 
 
 def solved_shapes(system: System, numerics: Numerics, count: int) -> int:
@@ -142,11 +201,19 @@ def solved_shapes(system: System, numerics: Numerics, count: int) -> int:
     stored."""
     if stored_table(system, "connection"):
         return 0
-    return _solved_shapes(system.joints, numerics.grid, count, system.traits.halved, system.traits.reversible)
+    return _solved_shapes(
+        system.joints,
+        numerics.grid,
+        count,
+        system.traits.halved,
+        system.traits.reversible,
+    )
 
 
 @lru_cache
-def _solved_shapes(joints: int, points: int, count: int, mirror: bool, reversible: bool) -> int:
+def _solved_shapes(
+    joints: int, points: int, count: int, mirror: bool, reversible: bool
+) -> int:
     if points**joints > LARGEST_GRID:  # which is refused before it is solved
         return points**joints // (2 if mirror else 1)
     grid, unit = connection.grid(joints, points), connection.directions(joints, count)

@@ -31,7 +31,11 @@ def directions(system, numerics) -> int:
     """Return the number of directions of alphadot at each shape: enough above the highest harmonic for aliasing to stay
     small."""
     most = highest(system, numerics)
-    return max(24, (8 * most) // 5) if system.joints == 2 else 2 * harmonics.terms(system.joints, most)
+    return (
+        max(24, (8 * most) // 5)
+        if system.joints == 2
+        else 2 * harmonics.terms(system.joints, most)
+    )
 
 
 def table(system, numerics) -> Table:
@@ -63,14 +67,20 @@ def _build(system, numerics, progress: Callable | None) -> Harmonics:
         return stored
     count, degree = directions(system, numerics), numerics.interpolation
     options = {"highest": highest(system, numerics), "traits": system.traits}
-    return harmonics.fit(system.velocity, _axes(system, numerics), count, degree, progress, **options)
+    return harmonics.fit(
+        system.velocity, _axes(system, numerics), count, degree, progress, **options
+    )
 
 
 def _plan(system, numerics, gait, amplitudes) -> Plan:
     if system.traits.linear:  # there are none beyond the first
         return direct_plan(system, numerics, gait)
     d = system.joints
-    read = 3 * harmonics.terms(d, highest(system, numerics)) * (numerics.interpolation + 1) ** d
+    read = (
+        3
+        * harmonics.terms(d, highest(system, numerics))
+        * (numerics.interpolation + 1) ** d
+    )
     predict = lambda fitted, batch: path(fitted.velocity, gait, batch, numerics.phases)
     return Plan(predict, table(system, numerics), read=read)
 
@@ -86,7 +96,12 @@ HARMONIC = Tier(
     instead="use path, adapted or direct",
     regular=True,
     settings=(
-        Setting("grid", fitted.GRIDS, "4 if smooth, 1 to 2 across kinks", "any gait inside the field from one table"),
+        Setting(
+            "grid",
+            fitted.GRIDS,
+            "4 if smooth, 1 to 2 across kinks",
+            "any gait inside the field from one table",
+        ),
         Setting(
             "harmonics",
             (1, 3, 5, 9, 15, 21),

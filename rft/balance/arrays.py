@@ -32,25 +32,47 @@ COMPACT_BELOW, COMPACT_ABOVE = 0.65, 200
 def velocities(problem: Problem) -> tuple[tuple, tuple]:
     """Return (v_t, v_n, v_w) over the scale of speed, of the body's sides and of its points, with the frame held."""
     speed = problem.frame.speed_scale
-    return tuple(tuple(x / speed for x in contact.elements[6:]) for contact in (problem.sides, problem.points))
+    return tuple(
+        tuple(x / speed for x in contact.elements[6:])
+        for contact in (problem.sides, problem.points)
+    )
 
 
 def with_frame_velocity(problem: Problem, v, x, y, theta) -> tuple[tuple, tuple]:
     """Return the velocities v of sides and points plus those due to a velocity (x, y, theta) of the frame."""
     contacts = problem.sides, problem.points
-    return tuple(plus(u, to_element(contact.elements, x, y, theta)) for u, contact in zip(v, contacts))
+    return tuple(
+        plus(u, to_element(contact.elements, x, y, theta))
+        for u, contact in zip(v, contacts)
+    )
 
 
 def loads(problem: Problem, v, rounding) -> list:
     """Return pairs of `Elements` and their `Load`, for the sides and, if there are any, for the points, at velocities v
     over the scale of speed."""
-    p, sides, points, speed = problem, problem.sides, problem.points, problem.law_speed_scale
+    p, sides, points, speed = (
+        problem,
+        problem.sides,
+        problem.points,
+        problem.law_speed_scale,
+    )
     v_sides, v_points = (times(speed, u) for u in v)
     rounding, additions = rounding * speed, p.additions
-    load = side_load(p.law, v_sides, rounding, sides.factor, sides.incline, p.quadratic_drag, p.memory, additions)
+    load = side_load(
+        p.law,
+        v_sides,
+        rounding,
+        sides.factor,
+        sides.incline,
+        p.quadratic_drag,
+        p.memory,
+        additions,
+    )
     if not len(points.station):
         return [(sides.elements, load)]
-    on_points = point_load(p.point_terms, v_points, rounding, points.factor, points.incline, additions)
+    on_points = point_load(
+        p.point_terms, v_points, rounding, points.factor, points.incline, additions
+    )
     return [(sides.elements, load), (points.elements, on_points)]
 
 
@@ -60,20 +82,31 @@ def frame_net(problem: Problem, v, rounding, x, y, theta, mass=None) -> Net:
     v, (x, y, theta): velocities of elements and of the frame, over the scale of speed. mass: `rft.momentum.frame_inertia`,
     computed by default."""
     speed = problem.law_speed_scale
-    net, *of_points = (sum_elements(element_net(e, f, u, speed)) for (e, f), u in zip(loads(problem, v, rounding), v))
+    net, *of_points = (
+        sum_elements(element_net(e, f, u, speed))
+        for (e, f), u in zip(loads(problem, v, rounding), v)
+    )
     for other in of_points:
         net = Net(*map(plus, net, other))
     if problem.momentum_rate is not None:
-        mass = frame_inertia(problem.sides.elements, problem.momentum_rate) if mass is None else mass
+        mass = (
+            frame_inertia(problem.sides.elements, problem.momentum_rate)
+            if mass is None
+            else mass
+        )
         net = with_momentum(net, x, y, theta, row(mass), speed[0])
     return net
 
 
-def nets(problem: Problem, v: np.ndarray, rounding: np.ndarray, xi: np.ndarray) -> np.ndarray:
+def nets(
+    problem: Problem, v: np.ndarray, rounding: np.ndarray, xi: np.ndarray
+) -> np.ndarray:
     """Return the entries of `Net` (5, 3, B) at velocities v (3, n, B) of elements, those of points last, and xi (3, B)
     of the frame."""
     n = len(problem.sides.station)
-    return np.array(frame_net(problem, (tuple(v[:, :n]), tuple(v[:, n:])), rounding, *xi))
+    return np.array(
+        frame_net(problem, (tuple(v[:, :n]), tuple(v[:, n:])), rounding, *xi)
+    )
 
 
 def sum_elements(net: Net) -> Net:
@@ -83,7 +116,11 @@ def sum_elements(net: Net) -> Net:
 
 def slowest2(v) -> np.ndarray:
     """Return the square of the slowest element's speed (B,), each by its faster end."""
-    least = [(v_t * v_t + (np.abs(v_n) + np.abs(v_w)) ** 2).min(0) for v_t, v_n, v_w in v if len(v_t)]
+    least = [
+        (v_t * v_t + (np.abs(v_n) + np.abs(v_w)) ** 2).min(0)
+        for v_t, v_n, v_w in v
+        if len(v_t)
+    ]
     return least[0] if len(least) == 1 else np.minimum(*least)
 
 
@@ -92,13 +129,23 @@ def row(record) -> Any:
     return mapped(lambda x: x[0], record)
 
 
-def solve(problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray | None) -> np.ndarray:
+def solve(
+    problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray | None
+) -> np.ndarray:
     """Return the results of all samples after one descent, the rows (6, B) of `rft.balance.newton.result`.
 
     guess: (3, B) or None. Velocities are over the scale of speed."""
     size, fresh = problem.n_samples, guess is None
-    iterate = first_iterate(*(np.zeros((3, size)) if fresh else guess), descent.first, np.full(size, float(fresh)))
-    mass = None if problem.momentum_rate is None else frame_inertia(problem.sides.elements, problem.momentum_rate)
+    iterate = first_iterate(
+        *(np.zeros((3, size)) if fresh else guess),
+        descent.first,
+        np.full(size, float(fresh)),
+    )
+    mass = (
+        None
+        if problem.momentum_rate is None
+        else frame_inertia(problem.sides.elements, problem.momentum_rate)
+    )
     active, index, v = np.ones(size, bool), np.arange(size), velocities(problem)
     out = np.empty((RESULT_ROWS, size))
     while index.size:
@@ -106,8 +153,14 @@ def solve(problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray 
         v_next = with_frame_velocity(problem, v, *step)
         xi_next = plus((iterate.x, iterate.y, iterate.theta), step)
         net = frame_net(problem, v_next, iterate.rounding_next, *xi_next, mass)
-        iterate, accepted, finished = newton_step(iterate, net, slowest2(v_next), row(problem.frame), descent, limits)
-        v = v_next if accepted.all() else mapped(lambda a, b: np.where(accepted, a, b), v_next, v)
+        iterate, accepted, finished = newton_step(
+            iterate, net, slowest2(v_next), row(problem.frame), descent, limits
+        )
+        v = (
+            v_next
+            if accepted.all()
+            else mapped(lambda a, b: np.where(accepted, a, b), v_next, v)
+        )
         ended = finished & active
         if ended.any():
             out[:, index[ended]] = np.stack(result(take(iterate, ended), limits))

@@ -27,7 +27,11 @@ from numba.misc.appdirs import user_cache_dir
 from rft import simd, vectors
 from rft.balance.backend import Note
 
-KNOWN = {"math", "numba", "numpy"}  # packages whose functions numba has its own code for
+KNOWN = {
+    "math",
+    "numba",
+    "numpy",
+}  # packages whose functions numba has its own code for
 
 
 def folder() -> Path:
@@ -66,7 +70,11 @@ class Cache(_Cache):
         target_context.refresh()
         try:
             saved, reduced = pickle.loads(data)
-            return CompileResult._rebuild(target_context, *reduced) if saved == str(sig) else None
+            return (
+                CompileResult._rebuild(target_context, *reduced)
+                if saved == str(sig)
+                else None
+            )
         except Exception as error:  # an undamaged file may still be one that LLVM or pickle cannot load
             return self.rename(f"it cannot be loaded ({type(error).__name__})")
 
@@ -80,7 +88,9 @@ class Cache(_Cache):
             os.replace(part, self.path)
         except OSError as error:
             cure = "make room there, or set NUMBA_CACHE_DIR"
-            note(f"compiled code is not kept in {self.path.parent}: {error.strerror}; {cure}")
+            note(
+                f"compiled code is not kept in {self.path.parent}: {error.strerror}; {cure}"
+            )
         finally:
             with contextlib.suppress(OSError):
                 part.unlink()
@@ -125,12 +135,18 @@ def note(text: str) -> None:
 
 def digest(function) -> str:
     """Return a digest of the code and the constants of a function and, recursively, of every function that it names."""
-    parts, seen = [Path(module.__file__).read_bytes() for module in (vectors, simd)], set()
+    parts, seen = (
+        [Path(module.__file__).read_bytes() for module in (vectors, simd)],
+        set(),
+    )
 
     def visit(x):
         x = getattr(x, "py_func", x)
         if isinstance(x, types.FunctionType):
-            if id(x) not in seen and x.__module__ not in (vectors.__name__, simd.__name__):
+            if id(x) not in seen and x.__module__ not in (
+                vectors.__name__,
+                simd.__name__,
+            ):
                 seen.add(id(x))
                 visit_code(x.__code__, x)
                 for cell in x.__closure__ or ():
@@ -138,7 +154,9 @@ def digest(function) -> str:
                 visit(x.__defaults__)
         elif isinstance(x, type) and issubclass(x, tuple):
             # Compiled code refers to the module of a record's class.
-            parts.append(repr((x.__module__, x.__name__, getattr(x, "_fields", ()))).encode())
+            parts.append(
+                repr((x.__module__, x.__name__, getattr(x, "_fields", ()))).encode()
+            )
             for name, value in sorted(vars(x).items()):
                 if isinstance(value, types.FunctionType) and not name.startswith("_"):
                     parts.append(name.encode())
@@ -151,11 +169,16 @@ def digest(function) -> str:
     def visit_code(code, function):
         parts.append(code.co_code)
         for constant in code.co_consts:
-            visit_code(constant, function) if isinstance(constant, types.CodeType) else parts.append(
-                repr(constant).encode()
-            )
+            visit_code(constant, function) if isinstance(
+                constant, types.CodeType
+            ) else parts.append(repr(constant).encode())
         named = [function.__globals__.get(name) for name in code.co_names]
-        modules = [x for x in named if isinstance(x, types.ModuleType) and x.__name__.partition(".")[0] not in KNOWN]
+        modules = [
+            x
+            for x in named
+            if isinstance(x, types.ModuleType)
+            and x.__name__.partition(".")[0] not in KNOWN
+        ]
         for name, value in zip(code.co_names, named):
             parts.append(name.encode())
             visit(value)

@@ -34,7 +34,16 @@ from rft.bodies.base import Elements
 from rft.contact import NO_FACTOR, Problem, mapped
 from rft.link import Factor, Incline, Memory, point_load, side_load
 from rft.momentum import frame_inertia
-from rft.simd import WIDTH, add_lanes, add_vector, any_of, load, record_access, register_formulas, store
+from rft.simd import (
+    WIDTH,
+    add_lanes,
+    add_vector,
+    any_of,
+    load,
+    record_access,
+    register_formulas,
+    store,
+)
 from rft.vectors import absolute, minimum, where
 
 # First rows of the records of an element: `Elements`, `Factor`, quadratic drag, `Memory`, `Incline`; of the records of a
@@ -48,7 +57,9 @@ ROUNDING_NEXT = 7  # place in `Iterate`
 (read_elements, _), (read_factor, _), (read_memory, _), (read_incline, _) = map(
     record_access, (Elements, Factor, Memory, Incline)
 )
-(read_iterate, write_iterate), (read_frame, _), (read_mass, _) = map(record_access, (Iterate, Frame, Inertia))
+(read_iterate, write_iterate), (read_frame, _), (read_mass, _) = map(
+    record_access, (Iterate, Frame, Inertia)
+)
 DOUBLE = np.dtype(float)
 NO_GUESS = np.zeros((3, 0))
 NO_ROWS = np.zeros((0, 1, 1))
@@ -115,7 +126,19 @@ def evaluator(Law: type):
     register_formulas()
 
     @njit(nogil=True, error_model="numpy", forceinline=True)
-    def evaluate(law, point_terms, n_sides, rows, v, v_next, iterate, speed, additions, by_elements, sums):
+    def evaluate(
+        law,
+        point_terms,
+        n_sides,
+        rows,
+        v,
+        v_next,
+        iterate,
+        speed,
+        additions,
+        by_elements,
+        sums,
+    ):
         """Compute the `Net` on the frame after the next step, and the square of the slowest element's speed, as the rows
         of ``sums``; write the velocities of elements after that step to v_next.
 
@@ -130,12 +153,27 @@ def evaluator(Law: type):
             store(v_next[k], 1, u[1])
             store(v_next[k], 2, u[2])
             scaled = speed * u[0], speed * u[1], speed * u[2]
-            factor, incline = read_factor(rows[k], FACTOR), read_incline(rows[k], INCLINE)
+            factor, incline = (
+                read_factor(rows[k], FACTOR),
+                read_incline(rows[k], INCLINE),
+            )
             if k < n_sides:
-                quadratic, memory = load(rows[k], QUADRATIC), read_memory(rows[k], MEMORY)
-                f = side_load(law, scaled, rounding, factor, incline, quadratic, memory, additions)
+                quadratic, memory = (
+                    load(rows[k], QUADRATIC),
+                    read_memory(rows[k], MEMORY),
+                )
+                f = side_load(
+                    law, scaled, rounding, factor, incline, quadratic, memory, additions
+                )
             else:
-                f = point_load(point_terms[k - n_sides], scaled, rounding, factor, incline, additions)
+                f = point_load(
+                    point_terms[k - n_sides],
+                    scaled,
+                    rounding,
+                    factor,
+                    incline,
+                    additions,
+                )
             net = element_net(element, f, u, speed)
             across = absolute(u[1]) + absolute(u[2])
             slowest2 = minimum(slowest2, u[0] * u[0] + across * across)
@@ -163,8 +201,12 @@ def kernel(Law: type):
         numbers, sides, points, point_terms, frame, additions = loads
         law, size = Law(*numbers), out.shape[1]
         n, m = len(sides[0][0]), points[0].shape[1]
-        by_elements = size * (ceil_divide(n, WIDTH) + m) < ceil_divide(size, WIDTH) * (n + m)
-        slots, count = (1, WIDTH) if by_elements else (WIDTH, 1)  # samples at once, elements of one in a vector
+        by_elements = size * (ceil_divide(n, WIDTH) + m) < ceil_divide(size, WIDTH) * (
+            n + m
+        )
+        slots, count = (
+            (1, WIDTH) if by_elements else (WIDTH, 1)
+        )  # samples at once, elements of one in a vector
         n_sides = ceil_divide(n, count)
         rows = np.ones((n_sides + m, ROWS, WIDTH))
         v, v_next = np.zeros((len(rows), 3, WIDTH)), np.zeros((len(rows), 3, WIDTH))
@@ -181,25 +223,52 @@ def kernel(Law: type):
                     i, end = next_sample, WIDTH if by_elements else slot + 1
                     fill_contact(rows[:n_sides], sides, count, slot, end, i)
                     fill_contact(rows[n_sides:], points, 1, slot, end, i)
-                    dx, dy, dtheta = (0.0, 0.0, 0.0) if fresh else (guess[0, i], guess[1, i], guess[2, i])
-                    first = first_iterate(dx, dy, dtheta, descent.first, 1.0 if fresh else 0.0)
+                    dx, dy, dtheta = (
+                        (0.0, 0.0, 0.0)
+                        if fresh
+                        else (guess[0, i], guess[1, i], guess[2, i])
+                    )
+                    first = first_iterate(
+                        dx, dy, dtheta, descent.first, 1.0 if fresh else 0.0
+                    )
                     for lane in range(slot, end):
                         for k in range(len(rows)):
                             for j in range(3):
-                                v[k, j, lane] = rows[k, ELEMENTS + V_T + j, lane] / frame[SPEED_SCALE][0, i]
+                                v[k, j, lane] = (
+                                    rows[k, ELEMENTS + V_T + j, lane]
+                                    / frame[SPEED_SCALE][0, i]
+                                )
                         fill(samples, FRAME, frame, 0, lane, i)
                         fill(samples, MASS, mass, 0, lane, i)
                         for j in range(len(first)):
                             samples[ITERATE + j, lane] = first[j]
                     sample_of_slot[slot], next_sample = i, next_sample + 1
             iterate, speed = read_iterate(samples, ITERATE), load(samples, SPEED)
-            evaluate(law, point_terms, n_sides, rows, v, v_next, iterate, speed, additions, by_elements, sums)
+            evaluate(
+                law,
+                point_terms,
+                n_sides,
+                rows,
+                v,
+                v_next,
+                iterate,
+                speed,
+                additions,
+                by_elements,
+                sums,
+            )
             net = net_of(sums)
             if additions.momentum:
-                x, y, theta = iterate.x + iterate.dx, iterate.y + iterate.dy, iterate.theta + iterate.dtheta
+                x, y, theta = (
+                    iterate.x + iterate.dx,
+                    iterate.y + iterate.dy,
+                    iterate.theta + iterate.dtheta,
+                )
                 net = with_momentum(net, x, y, theta, read_mass(samples, MASS), speed)
             slowest2, scales = load(sums, SLOWEST2), read_frame(samples, FRAME)
-            iterate, accepted, finished = newton_step(iterate, net, slowest2, scales, descent, limits)
+            iterate, accepted, finished = newton_step(
+                iterate, net, slowest2, scales, descent, limits
+            )
             write_iterate(samples, ITERATE, iterate)
             for k in range(len(rows)):
                 for j in range(3):
@@ -228,8 +297,15 @@ def net_kernel(Law: type):
     def net_at(loads, v, rounding, out):
         numbers, sides, points, point_terms, frame, additions = loads
         law, n, size = Law(*numbers), len(sides[0][0]), v.shape[2]
-        rows, v_lanes = np.ones((v.shape[1], ROWS, WIDTH)), np.zeros((v.shape[1], 3, WIDTH))
-        v_next, samples, sums = np.zeros_like(v_lanes), np.zeros((SAMPLE_ROWS, WIDTH)), np.zeros((SUM_ROWS, WIDTH))
+        rows, v_lanes = (
+            np.ones((v.shape[1], ROWS, WIDTH)),
+            np.zeros((v.shape[1], 3, WIDTH)),
+        )
+        v_next, samples, sums = (
+            np.zeros_like(v_lanes),
+            np.zeros((SAMPLE_ROWS, WIDTH)),
+            np.zeros((SUM_ROWS, WIDTH)),
+        )
         samples[SPEED] = 1.0
         for first in range(0, size, WIDTH):
             count = min(WIDTH, size - first)
@@ -241,7 +317,19 @@ def net_kernel(Law: type):
                 samples[ITERATE + ROUNDING_NEXT, lane] = rounding[i]
                 v_lanes[:, :, lane] = v[:, :, i].T
             iterate, speed = read_iterate(samples, ITERATE), load(samples, SPEED)
-            evaluate(law, point_terms, n, rows, v_lanes, v_next, iterate, speed, additions, False, sums)
+            evaluate(
+                law,
+                point_terms,
+                n,
+                rows,
+                v_lanes,
+                v_next,
+                iterate,
+                speed,
+                additions,
+                False,
+                sums,
+            )
             out[:, first : first + count] = sums[:SLOWEST2, :count]
 
     return cached(net_at, f"walks along solutions for laws of the form {Law.__name__}")
@@ -278,17 +366,34 @@ def load_arguments(problem: Problem) -> tuple:
     the scale of speed; additions. Records that do not apply have no rows, for speed."""
     p, additions = problem, problem.additions
     has_points = len(p.points.station) > 0
-    ground = stacked((p.quadratic_drag, *p.memory)) if additions.quadratic or additions.memory else NO_ROWS
-    factors = [NO_ROWS if c.factor is NO_FACTOR else stacked(c.factor) for c in (p.sides, p.points)]
-    inclines = [stacked(c.incline) if additions.incline else NO_ROWS for c in (p.sides, p.points)]
+    ground = (
+        stacked((p.quadratic_drag, *p.memory))
+        if additions.quadratic or additions.memory
+        else NO_ROWS
+    )
+    factors = [
+        NO_ROWS if c.factor is NO_FACTOR else stacked(c.factor)
+        for c in (p.sides, p.points)
+    ]
+    inclines = [
+        stacked(c.incline) if additions.incline else NO_ROWS
+        for c in (p.sides, p.points)
+    ]
     sides = plain_arrays(p.sides.elements), factors[0], ground, inclines[0]
-    points = stacked(p.points.elements) if has_points else NO_POINTS, factors[1], NO_ROWS, inclines[1]
+    points = (
+        stacked(p.points.elements) if has_points else NO_POINTS,
+        factors[1],
+        NO_ROWS,
+        inclines[1],
+    )
     terms = plain(p.point_terms[..., 0].transpose(2, 0, 1)) if has_points else NO_TERMS
     frame = (*plain_arrays(p.frame), plain(p.law_speed_scale))
     return tuple(map(kernel_number, p.law)), sides, points, terms, frame, additions
 
 
-def nets(problem: Problem, v: np.ndarray, rounding: np.ndarray, xi: np.ndarray) -> np.ndarray:
+def nets(
+    problem: Problem, v: np.ndarray, rounding: np.ndarray, xi: np.ndarray
+) -> np.ndarray:
     """Return the entries of `Net` as `rft.balance.arrays.nets` does."""
     p, out = problem, np.empty((SLOWEST2, problem.n_samples))
     net_kernel(type(p.law))(load_arguments(p), plain(v), rounding, out)
@@ -296,13 +401,21 @@ def nets(problem: Problem, v: np.ndarray, rounding: np.ndarray, xi: np.ndarray) 
     if p.momentum_rate is None:
         return out
     mass = mapped(lambda x: x[0], frame_inertia(p.sides.elements, p.momentum_rate))
-    return np.array(with_momentum(Net(*map(tuple, out)), *xi, mass, p.law_speed_scale[0]))
+    return np.array(
+        with_momentum(Net(*map(tuple, out)), *xi, mass, p.law_speed_scale[0])
+    )
 
 
-def solve(problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray | None) -> np.ndarray:
+def solve(
+    problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray | None
+) -> np.ndarray:
     """Solve all samples by one descent as `rft.balance.arrays.solve` does."""
     p, out = problem, np.empty((RESULT_ROWS, problem.n_samples))
-    mass = NO_ROWS if p.momentum_rate is None else stacked(frame_inertia(p.sides.elements, p.momentum_rate))
+    mass = (
+        NO_ROWS
+        if p.momentum_rate is None
+        else stacked(frame_inertia(p.sides.elements, p.momentum_rate))
+    )
     guess = NO_GUESS if guess is None else plain(guess)
     kernel(type(p.law))(load_arguments(p), mass, guess, descent, limits, out)
     return out

@@ -7,7 +7,9 @@ import contextlib
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 
-Listener = Callable[[int, int, bool], None]  # samples, places of each where the law is evaluated, whether it is linear
+Listener = Callable[
+    [int, int, bool], None
+]  # samples, places of each where the law is evaluated, whether it is linear
 
 
 def nobody(samples: int, points: int, linear: bool) -> None:

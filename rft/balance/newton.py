@@ -134,7 +134,11 @@ def times(k, a):
 @formula
 def cross(a, b):
     """Return the cross product."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
 
 
 @formula
@@ -149,7 +153,11 @@ def solve3(a, b, c, right):
     bc = cross(b, c)
     det = dot(a, bc)
     inverse = where(det == 0.0, 0.0, 1.0) / where(det == 0.0, 1.0, det)
-    return dot(right, bc) * inverse, dot(right, cross(c, a)) * inverse, dot(right, cross(a, b)) * inverse
+    return (
+        dot(right, bc) * inverse,
+        dot(right, cross(c, a)) * inverse,
+        dot(right, cross(a, b)) * inverse,
+    )
 
 
 # Between elements and the frame.
@@ -158,7 +166,11 @@ def solve3(a, b, c, right):
 @formula
 def to_element(e, x, y, theta):
     """Return the contribution J xi of the frame's velocity xi = (x, y, theta) to an element's velocity (v_t, v_n, v_w)."""
-    return e.c * x + e.s * y + e.r_t * theta, e.c * y - e.s * x + e.r_n * theta, e.half * theta
+    return (
+        e.c * x + e.s * y + e.r_t * theta,
+        e.c * y - e.s * x + e.r_n * theta,
+        e.half * theta,
+    )
 
 
 @formula
@@ -172,7 +184,11 @@ def element_net(e, f, v, speed):
     """Return the `Net` of an element with load f at velocities v: J^T f, J^T H J and J^T H v, with H the slopes of f.
 
     speed: scale of the velocities that the load is computed at."""
-    t, n, w = to_frame(e, f.t_t, f.t_n, f.t_w), to_frame(e, f.n_t, f.n_n, f.n_w), to_frame(e, f.w_t, f.w_n, f.w_w)
+    t, n, w = (
+        to_frame(e, f.t_t, f.t_n, f.t_w),
+        to_frame(e, f.n_t, f.n_n, f.n_w),
+        to_frame(e, f.w_t, f.w_n, f.w_w),
+    )
     by_speed = to_frame(
         e,
         f.t_t * v[0] + f.t_n * v[1] + f.t_w * v[2],
@@ -196,7 +212,13 @@ def with_momentum(net, x, y, theta, inertia, speed):
     by_x, by_y, by_theta = (m.xx, m.yx, m.tx), (m.xy, m.yy, m.ty), (m.xt, m.yt, m.tt)
     M_xi = plus(plus(times(x, by_x), times(y, by_y)), times(theta, by_theta))
     return Net(
-        plus(net.force, plus(times(slope, M_xi), times(m.strength, (m.offset_x, m.offset_y, m.offset_t)))),
+        plus(
+            net.force,
+            plus(
+                times(slope, M_xi),
+                times(m.strength, (m.offset_x, m.offset_y, m.offset_t)),
+            ),
+        ),
         plus(net.by_x, times(slope, by_x)),
         plus(net.by_y, times(slope, by_y)),
         plus(net.by_theta, times(slope, by_theta)),
@@ -225,7 +247,11 @@ def newton_step(iterate, net, slowest2, frame, descent, limits):
     residual, slowest = residual_norm(net.force, frame), sqrt(slowest2)
     fresh = iterate.fresh > 0.0
     rounding = iterate.rounding_next
-    helps = (rounding < iterate.rounding) | (residual < iterate.residual) | (iterate.damping <= limits.least_damping)
+    helps = (
+        (rounding < iterate.rounding)
+        | (residual < iterate.residual)
+        | (iterate.damping <= limits.least_damping)
+    )
     accepted = where(fresh, 0.0, where(helps, 1.0, 0.0)) > 0.0
     # Where every element moves much faster than the rounding, its kinks no longer matter and the next level is the last. The
     # velocity of an element at rest is linear in the rounding, that of a sliding element quadratic.
@@ -233,8 +259,12 @@ def newton_step(iterate, net, slowest2, frame, descent, limits):
     free = slowest > descent.free_ratio * rounding
     lower = where(free, last, maximum(descent.ratio * rounding, last))
     ratio = lower / rounding
-    prediction = where(ends_level, where(free, 0.5 * (ratio * ratio - 1.0), ratio - 1.0), 0.0)
-    damping = where(fresh, iterate.damping, minimum(1.0, limits.damping_growth * iterate.damping))
+    prediction = where(
+        ends_level, where(free, 0.5 * (ratio * ratio - 1.0), ratio - 1.0), 0.0
+    )
+    damping = where(
+        fresh, iterate.damping, minimum(1.0, limits.damping_growth * iterate.damping)
+    )
     right = plus(times(prediction, net.by_speed), times(-damping, net.force))
     x, y, theta = solve3(net.by_x, net.by_y, net.by_theta, right)
     fraction = where(fresh, 1.0, step_fraction(x, y, theta, frame, limits.largest_step))
@@ -263,15 +293,26 @@ def newton_step(iterate, net, slowest2, frame, descent, limits):
 def result(iterate, limits):
     """Return the rows of a sample's result; the residual is infinite unless the rounding is the required one and the
     velocity is possible."""
-    valid = (iterate.rounding <= limits.rounding) & is_possible(iterate.x, iterate.y, iterate.theta)
+    valid = (iterate.rounding <= limits.rounding) & is_possible(
+        iterate.x, iterate.y, iterate.theta
+    )
     residual = where(valid, iterate.residual, np.inf)
-    return iterate.x, iterate.y, iterate.theta, residual, iterate.evaluations, iterate.slowest
+    return (
+        iterate.x,
+        iterate.y,
+        iterate.theta,
+        residual,
+        iterate.evaluations,
+        iterate.slowest,
+    )
 
 
 @formula
 def is_possible(x, y, theta):
     """Return whether a velocity is finite and below FASTEST."""
-    return (absolute(x) < FASTEST) & (absolute(y) < FASTEST) & (absolute(theta) < FASTEST)
+    return (
+        (absolute(x) < FASTEST) & (absolute(y) < FASTEST) & (absolute(theta) < FASTEST)
+    )
 
 
 @formula

@@ -21,18 +21,39 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.balance.arrays import row, velocities
-from rft.balance.newton import VISCOUS, Limits, is_possible, residual_norm, solve3, to_element, to_frame
+from rft.balance.newton import (
+    VISCOUS,
+    Limits,
+    is_possible,
+    residual_norm,
+    solve3,
+    to_element,
+    to_frame,
+)
 from rft.contact import Problem
 
-WIDEST = 10.0  # rounding to start from, over the scale of speed: no element is that fast
+WIDEST = (
+    10.0  # rounding to start from, over the scale of speed: no element is that fast
+)
 FIRST_STEP = 2.0
 LARGEST_CORRECTION = 1.0  # first correction of a step that is not refused
 # Size of a correction that is the last of a step: over that of the previous correction, or absolute.
 CONVERGED_RATIO, CONVERGED = 0.25, 1e-6
-MOST_CORRECTIONS, MOST_AT_THE_END = 5, 8  # of a step; of the step that reaches the required rounding
-FINE_STEP, MOST_FINE = 1e-5, 30  # steps below this size may take so many corrections, damped
-GROWTH, SHRINKAGE = 3.0, 0.5  # factor of the step, at most after a success, at least after a failure
-LEAST_DAMPING = 2.0**-10  # a correction with so little is accepted though the next one is no smaller
+MOST_CORRECTIONS, MOST_AT_THE_END = (
+    5,
+    8,
+)  # of a step; of the step that reaches the required rounding
+FINE_STEP, MOST_FINE = (
+    1e-5,
+    30,
+)  # steps below this size may take so many corrections, damped
+GROWTH, SHRINKAGE = (
+    3.0,
+    0.5,
+)  # factor of the step, at most after a success, at least after a failure
+LEAST_DAMPING = (
+    2.0**-10
+)  # a correction with so little is accepted though the next one is no smaller
 DIFFERENCE = 1e-6  # of the rounding, for the derivative with respect to it
 
 
@@ -44,27 +65,38 @@ def _stacked(triples) -> np.ndarray:
 
 
 def _contacts(problem: Problem) -> list:
-    return [contact for contact in (problem.sides, problem.points) if len(contact.station)]
+    return [
+        contact for contact in (problem.sides, problem.points) if len(contact.station)
+    ]
 
 
 def _to_elements(problem: Problem, xi: np.ndarray) -> np.ndarray:
     """Return the contribution of a velocity xi (3, B) of the frame to the velocities of all elements, (3, n, B)."""
-    return _stacked([to_element(contact.elements, *xi) for contact in _contacts(problem)])
+    return _stacked(
+        [to_element(contact.elements, *xi) for contact in _contacts(problem)]
+    )
 
 
 def _wrench(problem: Problem, force: np.ndarray) -> np.ndarray:
     """Return force and moment on the frame (3, B) of forces on all elements (3, n, B), with their weights."""
     n = len(problem.sides.station)
-    by_contact = [(contact.elements, f) for contact, f in zip(_contacts(problem), (force[:, :n], force[:, n:]))]
+    by_contact = [
+        (contact.elements, f)
+        for contact, f in zip(_contacts(problem), (force[:, :n], force[:, n:]))
+    ]
     return sum(np.array(to_frame(e, *(e.weight * f))).sum(1) for e, f in by_contact)
 
 
-def _with_slope(nets: Callable, problem: Problem, xi, v, rounding) -> tuple[np.ndarray, np.ndarray, int]:
+def _with_slope(
+    nets: Callable, problem: Problem, xi, v, rounding
+) -> tuple[np.ndarray, np.ndarray, int]:
     """Return force and moment on the frame followed by their slopes in xi, (3, 4, B), their slope (3, B) in the logarithm
     of the rounding, and the number of evaluations."""
     *net, by_speed = nets(problem, v, rounding, xi)
     net = np.array(net).transpose(1, 0, 2)
-    if problem.law_speed_scale.shape[-1] == 1:  # drag stays if velocities and rounding double
+    if (
+        problem.law_speed_scale.shape[-1] == 1
+    ):  # drag stays if velocities and rounding double
         return net, -by_speed, 1
     wider = nets(problem, v, (1.0 + DIFFERENCE) * rounding, xi)[0]
     return net, (wider - net[:, 0]) / DIFFERENCE, 2
@@ -109,7 +141,9 @@ class _Point(NamedTuple):
     def size(self, problem: Problem, change: np.ndarray) -> np.ndarray:
         """Return the size (B,) of a change (4, B), as the module heading defines it."""
         v = _to_elements(problem, change[:3])
-        return np.maximum(np.sqrt(((v * v).sum(0) / self.squared_scale()).max(0)), np.abs(change[3]))
+        return np.maximum(
+            np.sqrt(((v * v).sum(0) / self.squared_scale()).max(0)), np.abs(change[3])
+        )
 
 
 @dataclass
@@ -135,10 +169,17 @@ class _Walk:
     def take(self, index: np.ndarray) -> _Walk:
         """Return the walk of some of the samples."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
-        return _Walk(**{k: x[..., index] if isinstance(x, np.ndarray) else x.take(index) for k, x in values.items()})
+        return _Walk(
+            **{
+                k: x[..., index] if isinstance(x, np.ndarray) else x.take(index)
+                for k, x in values.items()
+            }
+        )
 
 
-def follow(problem: Problem, limits: Limits, nets: Callable, correction: float, budget: int) -> Iterator[tuple]:
+def follow(
+    problem: Problem, limits: Limits, nets: Callable, correction: float, budget: int
+) -> Iterator[tuple]:
     """Solve all samples of a problem. Yields their indices and their results, rows (6, b) as those of
     `rft.balance.newton.result`, as they end, with an infinite residual where the budget is spent.
 
@@ -158,7 +199,10 @@ def follow(problem: Problem, limits: Limits, nets: Callable, correction: float, 
             i = np.flatnonzero(ended)
             residual = np.where(solved & is_possible(*new.xi), residual, np.inf)
             slowest = np.sqrt(new.squared_speed().min(0))
-            yield walk.index[i], np.stack([*new.xi, residual, walk.evaluations, slowest])[:, i]
+            yield (
+                walk.index[i],
+                np.stack([*new.xi, residual, walk.evaluations, slowest])[:, i],
+            )
             walk = walk.take(np.flatnonzero(~ended))
 
 
@@ -193,11 +237,18 @@ def _predict(walk: _Walk, mask: np.ndarray, last: float) -> None:
     walk.point = walk.base.where(mask, walk.point)
     walk.change = np.where(mask, change, walk.change)
     walk.last = np.where(mask, reaches_last, walk.last)
-    walk.damping, walk.corrections = np.where(mask, 1.0, walk.damping), np.where(mask, 0, walk.corrections)
+    walk.damping, walk.corrections = (
+        np.where(mask, 1.0, walk.damping),
+        np.where(mask, 0, walk.corrections),
+    )
 
 
-@np.errstate(over="ignore", invalid="ignore")  # corrections that fail may be of any size
-def _correct(walk: _Walk, new: _Point, net, slope, intended: float, last: float) -> None:
+@np.errstate(
+    over="ignore", invalid="ignore"
+)  # corrections that fail may be of any size
+def _correct(
+    walk: _Walk, new: _Point, net, slope, intended: float, last: float
+) -> None:
     """Accept or refuse the new points, and choose the next changes."""
     matrix = _bordered(walk, net, slope)
     right = np.zeros((4, 2, walk.index.size))
@@ -208,25 +259,46 @@ def _correct(walk: _Walk, new: _Point, net, slope, intended: float, last: float)
     walk.first_size = np.where(first, size, walk.first_size)
     # Natural monotonicity: with the previous matrix, a correction must be smaller by about half the damping.
     previous_matrix = np.where(first, np.eye(4)[..., None], walk.matrix)
-    simplified = walk.point.size(walk.problem, solve4(previous_matrix, right[:, :1])[:, 0])
-    smaller = first | (simplified <= (1.0 - 0.5 * walk.damping) * walk.size) | (walk.damping <= LEAST_DAMPING)
-    most = np.where(fine, MOST_FINE, np.where(walk.last, MOST_AT_THE_END, MOST_CORRECTIONS))
+    simplified = walk.point.size(
+        walk.problem, solve4(previous_matrix, right[:, :1])[:, 0]
+    )
+    smaller = (
+        first
+        | (simplified <= (1.0 - 0.5 * walk.damping) * walk.size)
+        | (walk.damping <= LEAST_DAMPING)
+    )
+    most = np.where(
+        fine, MOST_FINE, np.where(walk.last, MOST_AT_THE_END, MOST_CORRECTIONS)
+    )
     failed = ~np.isfinite(size) | (first & (size > LARGEST_CORRECTION))
     failed |= ~(smaller | fine) | (walk.corrections >= most)
-    converged = (walk.damping == 1.0) & (size <= np.maximum(CONVERGED_RATIO * walk.size, CONVERGED))
+    converged = (walk.damping == 1.0) & (
+        size <= np.maximum(CONVERGED_RATIO * walk.size, CONVERGED)
+    )
     on_curve = ~failed & smaller & ~first & ~walk.last & converged
     accepted = ~failed & smaller & ~on_curve
-    damping = np.where(accepted, np.where(first, 1.0, np.minimum(1.0, 2.0 * walk.damping)), 0.5 * walk.damping)
+    damping = np.where(
+        accepted,
+        np.where(first, 1.0, np.minimum(1.0, 2.0 * walk.damping)),
+        0.5 * walk.damping,
+    )
     walk.change = np.where(accepted, damping * correction, 0.5 * walk.change)
     walk.change[3] = np.clip(walk.change[3], -1.0, 1.0)
     walk.point = new.where(accepted, walk.point)
-    walk.size, walk.matrix = np.where(accepted, size, walk.size), np.where(accepted, matrix, walk.matrix)
+    walk.size, walk.matrix = (
+        np.where(accepted, size, walk.size),
+        np.where(accepted, matrix, walk.matrix),
+    )
     walk.damping, walk.corrections = damping, walk.corrections + 1
     if on_curve.any():
         _rebase(walk, on_curve, new, correction, tangent)
     factor = np.sqrt(intended / np.fmax(walk.first_size, 1e-9))
-    walk.step = np.where(on_curve, walk.step * np.clip(factor, 1 / GROWTH, GROWTH), walk.step)
-    walk.step = np.where(failed, walk.step * np.fmin(np.fmax(factor, 0.1), SHRINKAGE), walk.step)
+    walk.step = np.where(
+        on_curve, walk.step * np.clip(factor, 1 / GROWTH, GROWTH), walk.step
+    )
+    walk.step = np.where(
+        failed, walk.step * np.fmin(np.fmax(factor, 0.1), SHRINKAGE), walk.step
+    )
     if (failed | on_curve).any():
         _predict(walk, failed | on_curve, last)
 
@@ -244,7 +316,9 @@ def _rebase(walk: _Walk, mask: np.ndarray, new: _Point, correction, tangent) -> 
     """Make the corrected points of the masked samples the base, with the tangents there."""
     base = new.shifted(walk.problem, np.where(mask, correction, 0.0))
     tangent = tangent / base.size(walk.problem, tangent)
-    metric = _wrench(walk.problem, _to_elements(walk.problem, tangent[:3]) / base.squared_scale())
+    metric = _wrench(
+        walk.problem, _to_elements(walk.problem, tangent[:3]) / base.squared_scale()
+    )
     walk.base = base.where(mask, walk.base)
     walk.tangent = np.where(mask, tangent, walk.tangent)
     walk.border = np.where(mask, np.concatenate([metric, tangent[3:]]), walk.border)

@@ -16,7 +16,14 @@ import numpy as np
 from rft.balance import arrays
 from rft.balance.backend import compiles
 from rft.balance.listening import listener
-from rft.balance.newton import EVALUATIONS, RESIDUAL, RESULT_ROWS, Descent, Limits, is_possible
+from rft.balance.newton import (
+    EVALUATIONS,
+    RESIDUAL,
+    RESULT_ROWS,
+    Descent,
+    Limits,
+    is_possible,
+)
 from rft.balance.path import follow
 from rft.contact import Assembly, Problem
 from rft.threads import keep_freed_memory, run_shares, split, thread_count
@@ -92,7 +99,11 @@ def solve(
             index = slice(None) if index.size == size else index  # a slice is quicker
             first = guess[:, index] if method is WARM else None
             n_new = problem.n_samples - np.count_nonzero(results[EVALUATIONS, index])
-            store(index, driver.solve(problem, _begin(method, linear, limits), limits, first), limits)
+            store(
+                index,
+                driver.solve(problem, _begin(method, linear, limits), limits, first),
+                limits,
+            )
             if n_new:
                 report(n_new, assembly.n_law_points, linear)
 
@@ -110,9 +121,13 @@ def solve(
         with np.errstate(over="ignore"):
             guess = guess / scale
     for method in (WARM,) * (guess is not None) + (QUICK, *WALKS, *SLOW):
-        active = unsolved[is_possible(*guess[:, unsolved])] if method is WARM else unsolved
+        active = (
+            unsolved[is_possible(*guess[:, unsolved])] if method is WARM else unsolved
+        )
         if active.size and isinstance(method, Descent):
-            run_shares(descend, split(active, thread_count(threads, active.size // worth)))
+            run_shares(
+                descend, split(active, thread_count(threads, active.size // worth))
+            )
         elif active.size:
             walk(active)
         solved = results[RESIDUAL] <= limit
@@ -121,7 +136,13 @@ def solve(
         unsolved = np.flatnonzero(~solved)
     residual, evaluations, slowest = results[RESIDUAL:]
     stuck = (slowest < STUCK_BELOW * accuracy.rounding) & (not linear)
-    return Solved(results[:3] * scale, residual, evaluations.astype(int), stuck, float(limit.max(initial=0.0)))
+    return Solved(
+        results[:3] * scale,
+        residual,
+        evaluations.astype(int),
+        stuck,
+        float(limit.max(initial=0.0)),
+    )
 
 
 @functools.cache
@@ -134,13 +155,19 @@ def compiled_driver() -> ModuleType:
 
 def _begin(descent: Descent, linear: bool, limits: Limits) -> Descent:
     """Return the descent with the rounding of its first level, which is also the last level in a linear medium."""
-    return descent._replace(first=limits.rounding if linear else max(descent.first, limits.rounding))
+    return descent._replace(
+        first=limits.rounding if linear else max(descent.first, limits.rounding)
+    )
 
 
 def _limits(problem: Problem, accuracy: Accuracy) -> Limits:
     """Return the limits of a problem, whose residual allows for roundoff of the largest forces."""
-    residual = accuracy.tolerance + 1e-14 * max(1.0, problem.lateral_drag / problem.axial_drag)
+    residual = accuracy.tolerance + 1e-14 * max(
+        1.0, problem.lateral_drag / problem.axial_drag
+    )
     if problem.momentum_rate is not None:
         frame, m = problem.frame, problem.momentum_rate
-        residual += 1e-14 * np.max(m.rate * m.strength * frame.speed_scale / frame.force_scale)
+        residual += 1e-14 * np.max(
+            m.rate * m.strength * frame.speed_scale / frame.force_scale
+        )
     return Limits(float(accuracy.rounding), float(residual))

@@ -49,7 +49,10 @@ class Solution(NamedTuple):
         if np.ndim(self.status) == 0:
             xi = ", ".join(f"{x:.6g}" for x in self.xi)
             return f"Solution(xi = ({xi}), {self.status}, residual {self.residual:.1e}, {self.iterations} iterations)"
-        kinds = ", ".join(f"{n} {kind}" for kind, n in zip(*np.unique(self.status, return_counts=True)))
+        kinds = ", ".join(
+            f"{n} {kind}"
+            for kind, n in zip(*np.unique(self.status, return_counts=True))
+        )
         worst = f"residual up to {np.max(self.residual, initial=0.0):.1e}"
         return f"Solution({self.status.shape} samples: {kinds or 'none'}; {worst})"
 
@@ -113,7 +116,8 @@ def body_velocity(
     if effects != () and engine(effects) != "algebraic":
         broken = negated(broken_premises(effects))
         raise Refusal(
-            f"no body velocity follows from shape alone where effects are {broken}", instead="use rft.time_steps"
+            f"no body velocity follows from shape alone where effects are {broken}",
+            instead="use rft.time_steps",
         )
     assembly = assemble(medium, body, effects, loads, pieces)
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
@@ -122,22 +126,41 @@ def body_velocity(
         in_range("threads", threads, 1, 1024, whole=True)
     batch = alpha.shape[:-1]
     guess = None if start is None else _guess(start, batch, body.length)
-    alpha, alphadot = (np.ascontiguousarray(x.reshape(-1, body.joints).T) for x in (alpha, alphadot))
+    alpha, alphadot = (
+        np.ascontiguousarray(x.reshape(-1, body.joints).T) for x in (alpha, alphadot)
+    )
     speed = joint_speed(body, alphadot)
     moving = speed > 0
     if not moving.all():  # a body whose joints are at rest is at rest
         index = np.flatnonzero(moving)
-        assembly, alpha, alphadot, speed = assembly.take(index), alpha[:, index], alphadot[:, index], speed[index]
+        assembly, alpha, alphadot, speed = (
+            assembly.take(index),
+            alpha[:, index],
+            alphadot[:, index],
+            speed[index],
+        )
         guess = None if guess is None else guess[:, index]
 
     def problem_at(index):
         if index.size == speed.size:
             return assembly.problem(alpha, alphadot, speed)
-        return assembly.take(index).problem(alpha[:, index], alphadot[:, index], speed[index])
+        return assembly.take(index).problem(
+            alpha[:, index], alphadot[:, index], speed[index]
+        )
 
-    solved = solve(problem_at, speed, Accuracy(regularisation, tolerance), assembly, backend, threads, guess)
+    solved = solve(
+        problem_at,
+        speed,
+        Accuracy(regularisation, tolerance),
+        assembly,
+        backend,
+        threads,
+        guess,
+    )
     xi, residual, iterations, stuck, limit = _with_samples_at_rest(solved, moving)
-    xi = (xi.T if body.length == 1.0 else xi.T * [body.length, body.length, 1.0]).reshape(*batch, 3)
+    xi = (
+        xi.T if body.length == 1.0 else xi.T * [body.length, body.length, 1.0]
+    ).reshape(*batch, 3)
     status = STATUSES[np.where(residual <= limit, stuck, UNCONVERGED)]
     return Solution(xi, *(x.reshape(batch) for x in (residual, status, iterations)))
 
@@ -147,7 +170,13 @@ def _with_samples_at_rest(solved: Solved, moving: np.ndarray) -> Solved:
     size = moving.size
     if solved.stuck.size == size:
         return solved
-    full = Solved(np.zeros((3, size)), np.zeros(size), np.zeros(size, int), np.ones(size, bool), solved.limit)
+    full = Solved(
+        np.zeros((3, size)),
+        np.zeros(size),
+        np.zeros(size, int),
+        np.ones(size, bool),
+        solved.limit,
+    )
     for array, values in zip(full[:4], solved[:4]):
         array[..., moving] = values
     return full
@@ -156,13 +185,19 @@ def _with_samples_at_rest(solved: Solved, moving: np.ndarray) -> Solved:
 def _guess(start, batch: tuple, length: float) -> np.ndarray:
     """Return ``start`` as a guess (3, B) in body lengths; ValueError if it does not broadcast to xi."""
     start = real_array("start", start)
-    fits = start.shape[-1:] == (3,) and not np.isinf(start).any() and start.ndim <= len(batch) + 1
+    fits = (
+        start.shape[-1:] == (3,)
+        and not np.isinf(start).any()
+        and start.ndim <= len(batch) + 1
+    )
     try:
         start = np.broadcast_to(start, (*batch, 3)) if fits else None
     except ValueError:
         start = None
     if start is None:
-        raise Refusal(f"start must be body velocities, {(*batch, 3)}, finite or nan where none is known")
+        raise Refusal(
+            f"start must be body velocities, {(*batch, 3)}, finite or nan where none is known"
+        )
     with np.errstate(over="ignore"):
         return start.reshape(-1, 3).T / [[length], [length], [1.0]]
 
@@ -176,22 +211,33 @@ def checked_input(body, alpha, alphadot, regularisation, tolerance) -> list[np.n
     for name, x, largest in (("alpha", alpha, 1e6), ("alphadot", alphadot, 1e100)):
         x = real_array(name, x)
         if x.ndim == 0 or x.shape[-1] != body.joints:
-            raise Refusal(f"{name} must have shape (..., {body.joints}) for this body", value=x.shape)
+            raise Refusal(
+                f"{name} must have shape (..., {body.joints}) for this body",
+                value=x.shape,
+            )
         size = np.abs(x)
         if not size.max(initial=0.0) <= largest:
             if not np.isfinite(x).all():
-                raise Refusal(f"{name} must be finite, got {float(x[~np.isfinite(x)][0])}")
-            raise Refusal(f"{name} must be 0 or of a size that leaves digits to compute with, got {x.ravel()[:4]}")
+                raise Refusal(
+                    f"{name} must be finite, got {float(x[~np.isfinite(x)][0])}"
+                )
+            raise Refusal(
+                f"{name} must be 0 or of a size that leaves digits to compute with, got {x.ravel()[:4]}"
+            )
         if (
             name == "alphadot"
             and size.min(initial=1.0) < LEAST_RATE
             and size.min(initial=1.0, where=size > 0) < LEAST_RATE
         ):
-            raise Refusal(f"{name} must be 0 or of a size that leaves digits to compute with, got {x.ravel()[:4]}")
+            raise Refusal(
+                f"{name} must be 0 or of a size that leaves digits to compute with, got {x.ravel()[:4]}"
+            )
         arrays.append(x)
     if arrays[0].shape == arrays[1].shape:
         return arrays
     try:
         return np.broadcast_arrays(*arrays)
     except ValueError:
-        raise Refusal(f"alpha {arrays[0].shape} and alphadot {arrays[1].shape} do not broadcast") from None
+        raise Refusal(
+            f"alpha {arrays[0].shape} and alphadot {arrays[1].shape} do not broadcast"
+        ) from None

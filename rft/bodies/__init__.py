@@ -8,7 +8,16 @@ from rft.registry import load_all
 
 load_all(__name__, __path__)
 
-__all__ = ["BODIES", "Backbone", "Body", "Chain", "ConstantCurvature", "Elements", "Positions", "Serpenoid"]
+__all__ = [
+    "BODIES",
+    "Backbone",
+    "Body",
+    "Chain",
+    "ConstantCurvature",
+    "Elements",
+    "Positions",
+    "Serpenoid",
+]
 
 
 def __dir__() -> list[str]:

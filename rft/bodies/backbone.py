@@ -33,7 +33,9 @@ class Backbone:
     49
     """
 
-    elements: Annotated[int, Number(3, 2000, "-", "elements of the body, 3 to 2000", whole=True)] = 100
+    elements: Annotated[
+        int, Number(3, 2000, "-", "elements of the body, 3 to 2000", whole=True)
+    ] = 100
     length: Length = 1.0
     frame: str = "mean"
     kind = "backbone"
@@ -66,15 +68,24 @@ class Backbone:
             return self.chain.motion(alpha, alphadot)
         return self.chain.motion(self.bends @ alpha, self.bends @ alphadot)
 
-    def frame_pose(self, frame: str, alpha: np.ndarray, alphadot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def frame_pose(
+        self, frame: str, alpha: np.ndarray, alphadot: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return the pose of another frame as `Chain.frame_pose` does; "link-k" is the k-th element."""
         if self.bends is None:
             return self.chain.frame_pose(frame, alpha, alphadot)
-        return self.chain.frame_pose(frame, np.asarray(alpha) @ self.bends.T, np.asarray(alphadot) @ self.bends.T)
+        return self.chain.frame_pose(
+            frame, np.asarray(alpha) @ self.bends.T, np.asarray(alphadot) @ self.bends.T
+        )
 
-    def points(self, alpha: np.ndarray, pose: ArrayLike = (0.0, 0.0, 0.0)) -> np.ndarray:
+    def points(
+        self, alpha: np.ndarray, pose: ArrayLike = (0.0, 0.0, 0.0)
+    ) -> np.ndarray:
         """Return the ends of the elements in the world, (..., elements + 1, 2), as `Chain.points` does."""
-        return self.chain.points(alpha if self.bends is None else np.asarray(alpha, float) @ self.bends.T, pose)
+        return self.chain.points(
+            alpha if self.bends is None else np.asarray(alpha, float) @ self.bends.T,
+            pose,
+        )
 
     @classmethod
     def examples(cls) -> dict[str, Backbone]:
@@ -98,13 +109,17 @@ class Serpenoid(Backbone):
     (2, (41, 2))
     """
 
-    waves: Annotated[float, Number(0, 500, "-", "waves on the body, > 0 and at most elements / 4")] = 1.0
+    waves: Annotated[
+        float, Number(0, 500, "-", "waves on the body, > 0 and at most elements / 4")
+    ] = 1.0
     kind = "serpenoid"
 
     def __post_init__(self):
         super().__post_init__()
         in_bounds = 0 < self.waves <= self.elements / 4
-        require(in_bounds, "waves must be > 0 and at most elements / 4", value=self.waves)
+        require(
+            in_bounds, "waves must be > 0 and at most elements / 4", value=self.waves
+        )
 
     @property
     def joints(self) -> int:
@@ -112,7 +127,10 @@ class Serpenoid(Backbone):
 
     @property
     def shape_labels(self) -> tuple[tuple[str, str], ...]:
-        return ("curvature x length, cosine", "rad"), ("curvature x length, sine", "rad")
+        return ("curvature x length, cosine", "rad"), (
+            "curvature x length, sine",
+            "rad",
+        )
 
     @cached_property
     def bends(self) -> np.ndarray:
@@ -137,13 +155,19 @@ class ConstantCurvature(Backbone):
     (2, (41, 2))
     """
 
-    sections: Annotated[int, Number(1, 2000, "-", "arcs, a divisor of elements", whole=True)] = 2
+    sections: Annotated[
+        int, Number(1, 2000, "-", "arcs, a divisor of elements", whole=True)
+    ] = 2
     kind = "constant-curvature"
 
     def __post_init__(self):
         super().__post_init__()
         divides = self.elements % self.sections == 0
-        require(divides, f"sections must divide elements ({self.elements})", value=self.sections)
+        require(
+            divides,
+            f"sections must divide elements ({self.elements})",
+            value=self.sections,
+        )
 
     @property
     def joints(self) -> int:

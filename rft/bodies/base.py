@@ -15,7 +15,13 @@ from rft.registry import Registry, classes_with
 BODIES = Registry("geomech.bodies", "kind", "a body", classes_with("motion"))
 
 Length = Annotated[
-    float, Number(1e-15, 1e15, "m", "length of the body, in the unit wanted for displacement; 1 for body lengths")
+    float,
+    Number(
+        1e-15,
+        1e15,
+        "m",
+        "length of the body, in the unit wanted for displacement; 1 for body lengths",
+    ),
 ]
 
 
@@ -47,14 +53,24 @@ class Elements(NamedTuple):
     v_w: np.ndarray
 
     @classmethod
-    def from_complex(cls, heading: Any, centre: Any, velocity: Any, rotation: Any, half: Any) -> Elements:
+    def from_complex(
+        cls, heading: Any, centre: Any, velocity: Any, rotation: Any, half: Any
+    ) -> Elements:
         """Return elements from complex numbers (n, B): exp(i theta) of their headings, their centres x + i y and the
         velocities of the centres. rotation: (n, B), rates of theta. half: (n, 1), half lengths."""
         back = heading.conj()
         v, lever = velocity * back, centre * back
         c, s = heading.real.copy(), heading.imag.copy()
         return cls(
-            c, s, -lever.imag, lever.real.copy(), half, 2.0 * half, v.real.copy(), v.imag.copy(), rotation * half
+            c,
+            s,
+            -lever.imag,
+            lever.real.copy(),
+            half,
+            2.0 * half,
+            v.real.copy(),
+            v.imag.copy(),
+            rotation * half,
         )
 
     @property
@@ -67,12 +83,24 @@ class Elements(NamedTuple):
         """Centres in the frame, complex (n, B): r_t + i r_n = i centre conj(heading)."""
         return (self.r_t + 1j * self.r_n) * (self.c + 1j * self.s) / 1j
 
-    def attached_points(self, owner: list[int], ahead: np.ndarray, weight: np.ndarray) -> Elements:
+    def attached_points(
+        self, owner: list[int], ahead: np.ndarray, weight: np.ndarray
+    ) -> Elements:
         """Return k points attached to the elements ``owner``, each a distance ``ahead`` (k, 1) before the centre; weight:
         (k, 1), factors of their drag."""
         indices = np.array(owner)
         c, s, r_t, r_n, half, _, v_t, v_n, v_w = (x[indices] for x in self)
-        return Elements(c, s, r_t, r_n + ahead, 0.0 * ahead, weight, v_t, v_n + v_w * ahead / half, 0.0 * v_w)
+        return Elements(
+            c,
+            s,
+            r_t,
+            r_n + ahead,
+            0.0 * ahead,
+            weight,
+            v_t,
+            v_n + v_w * ahead / half,
+            0.0 * v_w,
+        )
 
 
 class Body(Protocol):
@@ -102,7 +130,9 @@ class Body(Protocol):
 
 def checked_body(body) -> Body:
     """Return the body; ValueError unless it has the members of `Body`."""
-    is_body = all(hasattr(body, name) for name in ("joints", "length", "motion")) and not isinstance(body, type)
+    is_body = all(
+        hasattr(body, name) for name in ("joints", "length", "motion")
+    ) and not isinstance(body, type)
     require(is_body, "body must be a body such as Chain((1, 1, 1))", value=body)
     return body
 
@@ -114,9 +144,16 @@ def is_reversible(body: Body) -> bool:
     The exchange rotates the frame by pi and maps the joints alpha_1 ... alpha_d to -alpha_d ... -alpha_1."""
     rng = np.random.default_rng(0)
     alpha, rates = rng.uniform(-1.5, 1.5, (2, body.joints, 5))
-    elements, exchanged = body.motion(alpha, rates), body.motion(-alpha[::-1], -rates[::-1])
-    rotated = elements._replace(r_t=-elements.r_t, r_n=-elements.r_n, v_t=-elements.v_t, v_n=-elements.v_n)
-    return all(bool((np.abs(x[::-1] - y) <= 1e-12).all()) for x, y in zip(rotated, exchanged))
+    elements, exchanged = (
+        body.motion(alpha, rates),
+        body.motion(-alpha[::-1], -rates[::-1]),
+    )
+    rotated = elements._replace(
+        r_t=-elements.r_t, r_n=-elements.r_n, v_t=-elements.v_t, v_n=-elements.v_n
+    )
+    return all(
+        bool((np.abs(x[::-1] - y) <= 1e-12).all()) for x, y in zip(rotated, exchanged)
+    )
 
 
 @cached_if_immutable
@@ -130,7 +167,9 @@ def is_symmetric(body: Body) -> bool:
     return all(bool((np.abs(x - y) <= 1e-10).all()) for x, y in zip(elements, image))
 
 
-def numbered_labels(joints: int, name: str = "alpha_{}", unit: str = "rad") -> tuple[tuple[str, str], ...]:
+def numbered_labels(
+    joints: int, name: str = "alpha_{}", unit: str = "rad"
+) -> tuple[tuple[str, str], ...]:
     """Return (name, unit) of each shape variable, numbered from 1."""
     return tuple((name.format(k + 1), unit) for k in range(joints))
 

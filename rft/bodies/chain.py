@@ -44,14 +44,17 @@ class Chain(Links):
     length: Length = 1.0
     frame: str = "mean"
     modes: tuple[tuple[float, ...], ...] | str | None = None
-    waves: Annotated[float | None, Number(1e-6, 1e6, "-", "waves on the body, of serpenoid modes, 1 if left out")] = (
-        None
-    )
+    waves: Annotated[
+        float | None,
+        Number(1e-6, 1e6, "-", "waves on the body, of serpenoid modes, 1 if left out"),
+    ] = None
     kind = "chain"
 
     def __post_init__(self):
         self._check_lengths()
-        object.__setattr__(self, "modes", checked_modes(self.modes, self.waves, len(self.lengths)))
+        object.__setattr__(
+            self, "modes", checked_modes(self.modes, self.waves, len(self.lengths))
+        )
         check_numbers(self)
         self._frame_link(self.frame)
 
@@ -71,7 +74,9 @@ class Chain(Links):
     @property
     def shape_labels(self) -> tuple[tuple[str, str], ...]:
         """(name, unit) of each shape variable, for the axes of pictures."""
-        return numbered_labels(self.joints, "alpha_{}" if self.modes is None else "m_{}")
+        return numbered_labels(
+            self.joints, "alpha_{}" if self.modes is None else "m_{}"
+        )
 
     def _in_frame(self, differences: np.ndarray, link: int | None) -> np.ndarray:
         """Return values of all links (n, B), less the frame's, from the differences (n - 1, B) between neighbours."""
@@ -82,12 +87,17 @@ class Chain(Links):
 
     def _links(self, alpha, alphadot):
         size, link = alpha.shape[1], self._link
-        angles = self._in_frame(np.concatenate([self.joint_angles(alpha), self.joint_angles(alphadot)], 1), link)
+        angles = self._in_frame(
+            np.concatenate([self.joint_angles(alpha), self.joint_angles(alphadot)], 1),
+            link,
+        )
         theta, rotation = angles[:, :size], angles[:, size:]
         heading = np.empty(theta.shape, complex)
         np.cos(theta, out=heading.real)
         np.sin(theta, out=heading.imag)
-        halves = np.empty((len(theta), 2 * size), complex)  # half links as vectors, and their velocities
+        halves = np.empty(
+            (len(theta), 2 * size), complex
+        )  # half links as vectors, and their velocities
         np.multiply(self._half_lengths, heading, out=halves[:, :size])
         np.multiply(1j * rotation, halves[:, :size], out=halves[:, size:])
         centres = self._in_frame(halves[:-1] + halves[1:], link)
@@ -101,5 +111,10 @@ class Chain(Links):
             "three-middle": cls((1, 1, 1), frame="link-2"),
             "uneven": cls((0.7, 1.4, 0.9), frame="link-1", length=0.3),
             "five": cls((1,) * 5),
-            "modes": cls((0.8, 1.3, 1.0, 0.7), 0.3, "link-2", modes=((1.4, 0.3, -0.5), (-0.2, 0.9, 2.1))),
+            "modes": cls(
+                (0.8, 1.3, 1.0, 0.7),
+                0.3,
+                "link-2",
+                modes=((1.4, 0.3, -0.5), (-0.2, 0.9, 2.1)),
+            ),
         }

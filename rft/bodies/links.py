@@ -29,13 +29,26 @@ class Links:
     def _check_lengths(self) -> None:
         """Store the lengths as a tuple; ValueError unless they are lengths of two links or more."""
         lengths = real_array("lengths", self.lengths)
-        require(lengths.ndim == 1, "lengths must be a list of numbers", value=self.lengths)
+        require(
+            lengths.ndim == 1, "lengths must be a list of numbers", value=self.lengths
+        )
         object.__setattr__(self, "lengths", tuple(lengths.tolist()))
-        require(len(self.lengths) >= 2, "lengths needs at least two links", value=len(self.lengths))
-        are_lengths = all(0 < x < math.inf for x in self.lengths) and sum(self.lengths) < 1e100
-        require(are_lengths, "lengths must all be finite and > 0", value=list(self.lengths))
+        require(
+            len(self.lengths) >= 2,
+            "lengths needs at least two links",
+            value=len(self.lengths),
+        )
+        are_lengths = (
+            all(0 < x < math.inf for x in self.lengths) and sum(self.lengths) < 1e100
+        )
+        require(
+            are_lengths, "lengths must all be finite and > 0", value=list(self.lengths)
+        )
         shortest = min(self.lengths) / sum(self.lengths)
-        require(shortest >= 1e-12, f"the shortest link must be at least 1e-12 of the body, got {shortest:.3g}")
+        require(
+            shortest >= 1e-12,
+            f"the shortest link must be at least 1e-12 of the body, got {shortest:.3g}",
+        )
 
     def __getstate__(self) -> dict:
         """Return the fields alone for copies and workers, without cached properties."""
@@ -64,7 +77,11 @@ class Links:
             return None
         found, n = re.fullmatch(r"link-([1-9]\d{0,6})", text), len(self.lengths)
         number = int(found[1]) if found else 0
-        require(0 < number <= n, f"frame must be 'mean' or 'link-1' ... 'link-{n}'", value=frame)
+        require(
+            0 < number <= n,
+            f"frame must be 'mean' or 'link-1' ... 'link-{n}'",
+            value=frame,
+        )
         return number - 1
 
     @cached_property
@@ -78,35 +95,56 @@ class Links:
     def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Elements:
         """Return the links at shapes (rad) and rates (rad per unit time), (joints, B) each, with the body frame held."""
         heading, rotation, centre, velocity, _ = self._links(alpha, alphadot)
-        return Elements.from_complex(heading, centre, velocity, rotation, self._half_lengths)
+        return Elements.from_complex(
+            heading, centre, velocity, rotation, self._half_lengths
+        )
 
-    def frame_pose(self, frame: str, alpha: np.ndarray, alphadot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def frame_pose(
+        self, frame: str, alpha: np.ndarray, alphadot: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return the pose h of another frame of this body in the body frame, and dh/dt: each (..., 3), in length units and
         rad.
 
         alpha, alphadot: (..., joints). `geomech.geometry.coordinates` uses it to change the frame of velocities and
         connections.
         """
-        alpha, alphadot = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
-        _, *links = self._links(*(x.reshape(-1, self.joints).T for x in (alpha, alphadot)))
+        alpha, alphadot = np.broadcast_arrays(
+            np.asarray(alpha, float), np.asarray(alphadot, float)
+        )
+        _, *links = self._links(
+            *(x.reshape(-1, self.joints).T for x in (alpha, alphadot))
+        )
         link = self._frame_link(frame)
-        rotation, centre, velocity, theta = (self._frame_value(x, link).reshape(alpha.shape[:-1]) for x in links)
+        rotation, centre, velocity, theta = (
+            self._frame_value(x, link).reshape(alpha.shape[:-1]) for x in links
+        )
         centre, velocity = self.length * centre, self.length * velocity
-        h, hdot = (centre.real, centre.imag, theta), (velocity.real, velocity.imag, rotation)
+        h, hdot = (
+            (centre.real, centre.imag, theta),
+            (velocity.real, velocity.imag, rotation),
+        )
         return np.stack(h, -1), np.stack(hdot, -1)
 
-    def points(self, alpha: np.ndarray, pose: ArrayLike = (0.0, 0.0, 0.0)) -> np.ndarray:
+    def points(
+        self, alpha: np.ndarray, pose: ArrayLike = (0.0, 0.0, 0.0)
+    ) -> np.ndarray:
         """Return the ends of the links in the world, tail to head, (..., links + 1, 2), in length units.
 
         alpha: (..., joints), rad. pose: (..., 3), pose of the body frame in the world, (x, y) in length units, theta in
         rad."""
         alpha, pose = np.asarray(alpha, float), np.asarray(pose, float)
-        require(alpha.shape[-1:] == (self.joints,), f"alpha must have {self.joints} angles last", value=alpha.shape)
+        require(
+            alpha.shape[-1:] == (self.joints,),
+            f"alpha must have {self.joints} angles last",
+            value=alpha.shape,
+        )
         require(pose.shape[-1:] == (3,), "pose must be (x, y, theta)", value=pose.shape)
         flat = alpha.reshape(-1, self.joints).T
         heading, _, centre, *_ = self._links(flat, np.zeros_like(flat))
         half = self._half_lengths * heading
-        ends = self.length * np.concatenate([centre - half, (centre + half)[-1:]]).T.reshape(*alpha.shape[:-1], -1)
+        ends = self.length * np.concatenate(
+            [centre - half, (centre + half)[-1:]]
+        ).T.reshape(*alpha.shape[:-1], -1)
         x, y, theta = np.moveaxis(pose[..., None], -2, 0)
         dx, dy = rotated(theta, ends.real, ends.imag)
         return np.stack([x + dx, y + dy], -1)

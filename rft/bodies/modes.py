@@ -12,18 +12,32 @@ ROUNDOFF = 1e-12  # of the largest mode: a smaller mode is roundoff
 DEPENDENT = 1e-9  # smallest singular value over the largest, of rows of unit length, at which modes are dependent
 
 
-def checked_modes(modes, waves, links: int) -> tuple[tuple[float, ...], ...] | str | None:
+def checked_modes(
+    modes, waves, links: int
+) -> tuple[tuple[float, ...], ...] | str | None:
     """Return modes as tuples, a name or None as they are; ValueError unless they are modes of a chain of ``links``
     links."""
     if modes is None:
-        require(waves is None, "waves are those of modes = 'serpenoid'", instead="add that, or drop waves")
+        require(
+            waves is None,
+            "waves are those of modes = 'serpenoid'",
+            instead="add that, or drop waves",
+        )
         return None
     if isinstance(modes, str):
-        require(modes == "serpenoid", "modes must be rows of joint angles or 'serpenoid'", value=modes)
+        require(
+            modes == "serpenoid",
+            "modes must be rows of joint angles or 'serpenoid'",
+            value=modes,
+        )
         if waves is not None:
             in_range("waves", waves, 1e-6, links / 2)
     else:
-        require(waves is None, "waves are those of modes = 'serpenoid'", instead="drop waves, or the rows of modes")
+        require(
+            waves is None,
+            "waves are those of modes = 'serpenoid'",
+            instead="drop waves, or the rows of modes",
+        )
         modes = tuple(map(tuple, _checked_rows(modes, links - 1).tolist()))
     _require_independent(mode_rows(modes, waves, links))
     return modes
@@ -43,19 +57,33 @@ def mode_rows(modes, waves: float | None, links: int) -> np.ndarray:
 def _checked_rows(modes, joints: int) -> np.ndarray:
     array = real_array("modes", modes)
     has_shape = array.ndim == 2 and len(array) > 0 and array.shape[1] == joints
-    require(has_shape, f"modes must be rows of {joints} joint angles, one row a mode", value=modes)
-    require(bool((np.abs(array) <= LARGEST).all()), f"modes must be finite and at most {LARGEST:g}", value=modes)
+    require(
+        has_shape,
+        f"modes must be rows of {joints} joint angles, one row a mode",
+        value=modes,
+    )
+    require(
+        bool((np.abs(array) <= LARGEST).all()),
+        f"modes must be finite and at most {LARGEST:g}",
+        value=modes,
+    )
     return array
 
 
 def _require_independent(rows: np.ndarray) -> None:
     count, joints = rows.shape
     require(
-        count <= joints, f"{count} modes of {joints} joints are linearly dependent", instead=f"give at most {joints}"
+        count <= joints,
+        f"{count} modes of {joints} joints are linearly dependent",
+        instead=f"give at most {joints}",
     )
     size = np.linalg.norm(rows, axis=1)
     if size.min() <= ROUNDOFF * size.max():
-        raise Refusal(f"mode {size.argmin() + 1} is zero", because="it moves no joint", instead="drop it")
+        raise Refusal(
+            f"mode {size.argmin() + 1} is zero",
+            because="it moves no joint",
+            instead="drop it",
+        )
     singular = np.linalg.svd(rows / size[:, None], compute_uv=False)
     require(
         singular[-1] > DEPENDENT * singular[0],

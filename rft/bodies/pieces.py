@@ -21,20 +21,42 @@ class Pieces(WrappedBody):
     @cached_property
     def _cuts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Element, centre and half length of each piece; the latter two in the element's coordinate s in [-1, 1]."""
-        counts = np.maximum(1, np.ceil(2 * half_lengths(self.inner) / self.longest - 1e-9).astype(int))
+        counts = np.maximum(
+            1, np.ceil(2 * half_lengths(self.inner) / self.longest - 1e-9).astype(int)
+        )
         owner = np.repeat(np.arange(counts.size), counts)
         rank = np.arange(owner.size) - np.repeat(np.cumsum(counts) - counts, counts)
-        return owner, ((2 * rank + 1) / counts[owner] - 1)[:, None], (1 / counts[owner])[:, None]
+        return (
+            owner,
+            ((2 * rank + 1) / counts[owner] - 1)[:, None],
+            (1 / counts[owner])[:, None],
+        )
 
     def motion(self, alpha, alphadot) -> Elements:
         owner, centre, fraction = self._cuts
-        c, s, r_t, r_n, half, weight, v_t, v_n, v_w = (x[owner] for x in self.inner.motion(alpha, alphadot))
+        c, s, r_t, r_n, half, weight, v_t, v_n, v_w = (
+            x[owner] for x in self.inner.motion(alpha, alphadot)
+        )
         v_n = v_n + v_w * centre
-        return Elements(c, s, r_t, r_n + half * centre, half * fraction, weight * fraction, v_t, v_n, v_w * fraction)
+        return Elements(
+            c,
+            s,
+            r_t,
+            r_n + half * centre,
+            half * fraction,
+            weight * fraction,
+            v_t,
+            v_n,
+            v_w * fraction,
+        )
 
 
 def subdivide(body: Body, pieces: int) -> Body:
     """Return the body with at least ``pieces`` elements to its length; the body itself where its elements are short
     enough."""
     longest = 1 / pieces
-    return Pieces(body, longest) if (2 * half_lengths(body) > longest * (1 + 1e-9)).any() else body
+    return (
+        Pieces(body, longest)
+        if (2 * half_lengths(body) > longest * (1 + 1e-9)).any()
+        else body
+    )

@@ -14,7 +14,9 @@ from rft.checks import check_numbers, in_range, real_array
 from rft.refusal import Refusal, require
 
 STEP = 0.01  # of the shape variables, of differences of order 6: errors of 1e-14 for functions that vary over 1 rad
-WEIGHTS = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0  # of values at -3 to 3 steps
+WEIGHTS = (
+    np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
+)  # of values at -3 to 3 steps
 SHAPES = 5, 7  # batch on which a function shows whether it takes many shapes
 
 
@@ -37,7 +39,9 @@ class Posed(Links):
         except Refusal:
             raise
         except Exception as error:
-            raise Refusal("positions fails", because=f"{type(error).__name__}: {error}") from error
+            raise Refusal(
+                "positions fails", because=f"{type(error).__name__}: {error}"
+            ) from error
 
     @property
     def shape_labels(self) -> tuple[tuple[str, str], ...]:
@@ -52,7 +56,9 @@ class Posed(Links):
         except (TypeError, ValueError, IndexError):
             return False
         one = np.asarray(self.positions(alpha[-1, -1]), float)
-        return all_at_once.shape == (*SHAPES, *one.shape) and np.allclose(all_at_once[-1, -1], one, rtol=1e-9)
+        return all_at_once.shape == (*SHAPES, *one.shape) and np.allclose(
+            all_at_once[-1, -1], one, rtol=1e-9
+        )
 
     def _at(self, alpha: np.ndarray) -> np.ndarray:
         """Return the poses (..., n, 3) at shapes (..., joints), in body lengths; ValueError unless they are n poses."""
@@ -60,11 +66,18 @@ class Posed(Links):
         if self._takes_batches:
             poses = real_array("positions", self.positions(alpha))
         else:
-            poses = real_array("positions", [self.positions(x.copy()) for x in alpha.reshape(-1, self.joints)])
+            poses = real_array(
+                "positions",
+                [self.positions(x.copy()) for x in alpha.reshape(-1, self.joints)],
+            )
             poses = poses.reshape(*batch, *poses.shape[1:])
         expected = len(self.lengths), 3
         is_right = poses.shape == (*batch, *expected)
-        require(is_right, f"positions must return poses (x, y, theta) of the links, {expected}", value=poses.shape)
+        require(
+            is_right,
+            f"positions must return poses (x, y, theta) of the links, {expected}",
+            value=poses.shape,
+        )
         require(bool(np.isfinite(poses).all()), "positions must return finite numbers")
         total = sum(self.lengths)
         return poses / np.array([total, total, 1.0])
@@ -73,7 +86,9 @@ class Posed(Links):
         size = np.sqrt((alphadot * alphadot).sum(0))
         direction = alphadot / np.where(size > 0, size, 1.0)
         near = STEP * np.arange(-3, 4)[:, None, None] * direction
-        poses = np.moveaxis(self._at(np.moveaxis(alpha + near, 1, -1)), 1, -1)  # (7, n, 3, B)
+        poses = np.moveaxis(
+            self._at(np.moveaxis(alpha + near, 1, -1)), 1, -1
+        )  # (7, n, 3, B)
         poses[:, :, 2] = np.unwrap(np.unwrap(poses[:, :, 2], axis=1), axis=0)
         centres, theta = poses[:, :, 0] + 1j * poses[:, :, 1], poses[:, :, 2]
         rate = lambda x: np.tensordot(WEIGHTS, x, 1) * (size / STEP)
@@ -81,10 +96,23 @@ class Posed(Links):
 
     def _in_frame(self, centre, velocity, theta, rotation) -> tuple[np.ndarray, ...]:
         """Return what `_links` does from centres, headings and their rates (n, B) in any one frame."""
-        origin, drift, angle, spin = (self._frame_value(x, self._link) for x in (centre, velocity, theta, rotation))
+        origin, drift, angle, spin = (
+            self._frame_value(x, self._link)
+            for x in (centre, velocity, theta, rotation)
+        )
         back = np.exp(-1j * angle)
-        centre, theta, rotation = back * (centre - origin), theta - angle, rotation - spin
-        return np.exp(1j * theta), rotation, centre, back * (velocity - drift) - 1j * spin * centre, theta
+        centre, theta, rotation = (
+            back * (centre - origin),
+            theta - angle,
+            rotation - spin,
+        )
+        return (
+            np.exp(1j * theta),
+            rotation,
+            centre,
+            back * (velocity - drift) - 1j * spin * centre,
+            theta,
+        )
 
 
 @dataclass(frozen=True)

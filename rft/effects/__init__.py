@@ -1,6 +1,15 @@
 """Effects beyond the plain force law, one a file; only those that a scene lists are computed."""
 
-from rft.effects.base import EFFECTS, ENGINES, Effect, Site, batched_effect, broken_premises, engine, stepwise_effects
+from rft.effects.base import (
+    EFFECTS,
+    ENGINES,
+    Effect,
+    Site,
+    batched_effect,
+    broken_premises,
+    engine,
+    stepwise_effects,
+)
 from rft.effects.body_inertia import BodyInertia
 from rft.effects.depth import DepthProfile
 from rft.effects.disturbed import DisturbedGround

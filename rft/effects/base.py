@@ -104,7 +104,12 @@ class Effect:
         return state
 
     def with_velocity_change(
-        self, problem: Problem, site: Site, state: Any, change: np.ndarray, drag: np.ndarray
+        self,
+        problem: Problem,
+        site: Site,
+        state: Any,
+        change: np.ndarray,
+        drag: np.ndarray,
     ) -> Any:
         """Return the state as if the body had moved faster by ``change`` (3, B) up to and including the step at
         ``site``, with an additional ``drag`` (3, B) over the axial drag; the state of the ground stays as it is."""
@@ -116,9 +121,17 @@ class Effect:
 
     def take(self, index: Any) -> Self:
         """Return the effect with its parameters at the samples ``index``."""
-        arrays = {f.name: x for f in fields(self) if isinstance(x := getattr(self, f.name), np.ndarray)}
+        arrays = {
+            f.name: x
+            for f in fields(self)
+            if isinstance(x := getattr(self, f.name), np.ndarray)
+        }
         return self.with_parameters(
-            **{name: x[..., index] for name, x in arrays.items() if x.ndim > 0 and x.shape[-1] != 1}
+            **{
+                name: x[..., index]
+                for name, x in arrays.items()
+                if x.ndim > 0 and x.shape[-1] != 1
+            }
         )
 
     def with_parameters(self, **values: Any) -> Self:
@@ -162,7 +175,9 @@ def batched_effect(effects: Sequence[Effect], counts: Sequence[int]) -> Effect:
         values = [getattr(e, field.name) for e in effects]
         if any(v != values[0] for v in values):
             if field.name not in first.batched:
-                raise Refusal(first.kind, instead=f"{field.name} cannot differ within a batch")
+                raise Refusal(
+                    first.kind, instead=f"{field.name} cannot differ within a batch"
+                )
             joined[field.name] = np.repeat(np.array(values, float), counts)
     return first.with_parameters(**joined)
 
@@ -176,8 +191,14 @@ def broken_premises(effects: Sequence[Effect]) -> Premise:
     >>> broken_premises([Transient(travel=0.12)])
     <Premise.MEMORYLESS: 4>
     """
-    is_list = isinstance(effects, Sequence) and all(isinstance(e, Effect) for e in effects)
-    require(is_list, "effects must be a list of effects such as EndCaps(radius=0.06)", value=effects)
+    is_list = isinstance(effects, Sequence) and all(
+        isinstance(e, Effect) for e in effects
+    )
+    require(
+        is_list,
+        "effects must be a list of effects such as EndCaps(radius=0.06)",
+        value=effects,
+    )
     return functools.reduce(operator.or_, (e.breaks for e in effects), NONE)
 
 

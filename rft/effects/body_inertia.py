@@ -32,16 +32,27 @@ class BodyInertia(Effect):
     """
 
     mass: Annotated[float, Number(0, 1e9, "kg", "mass of the body")]
-    frequency: Annotated[float, Number(0, 1e4, "1/s", "cycles per second, alphadot being per radian of phase")]
+    frequency: Annotated[
+        float,
+        Number(0, 1e4, "1/s", "cycles per second, alphadot being per radian of phase"),
+    ]
     length: Annotated[float, Number(1e-9, 1e6, "m", "length of the body")]
     drag: Annotated[
-        float, Number(1e-12, 1e12, "N", "drag on the straight body along itself, 2 k rho g r |z| L by Eq. 2")
+        float,
+        Number(
+            1e-12,
+            1e12,
+            "N",
+            "drag on the straight body along itself, 2 k rho g r |z| L by Eq. 2",
+        ),
     ]
 
     kind = "body-inertia"
     breaks = Premise.QUASI_STATIC | Premise.RATE_INDEPENDENT
     limit = "mass = 0"
-    cost = "a step at a time in place of all phases at once; a dozen operations a sample"
+    cost = (
+        "a step at a time in place of all phases at once; a dozen operations a sample"
+    )
     batched = ("mass", "frequency", "length", "drag")
 
     def __post_init__(self):
@@ -68,25 +79,43 @@ class BodyInertia(Effect):
         past = last / site.dt if first_order else (2 * last - 0.5 * older) / site.dt
         strength = np.atleast_2d(self.inertia * problem.axial_drag)
         return problem._replace(
-            momentum_rate=MomentumRate(np.full((1, 1), rate), *ground_to_frame(site.pose, past), strength)
+            momentum_rate=MomentumRate(
+                np.full((1, 1), rate), *ground_to_frame(site.pose, past), strength
+            )
         )
 
-    def after(self, problem: Problem, site: Site, state: np.ndarray, v: np.ndarray) -> np.ndarray:
-        return np.stack([state[1], frame_to_ground(site.pose, element_momenta(problem.sides.elements, v))])
+    def after(
+        self, problem: Problem, site: Site, state: np.ndarray, v: np.ndarray
+    ) -> np.ndarray:
+        return np.stack(
+            [
+                state[1],
+                frame_to_ground(site.pose, element_momenta(problem.sides.elements, v)),
+            ]
+        )
 
     def with_velocity_change(
-        self, problem: Problem, site: Site, state: np.ndarray, change: np.ndarray, drag: np.ndarray
+        self,
+        problem: Problem,
+        site: Site,
+        state: np.ndarray,
+        change: np.ndarray,
+        drag: np.ndarray,
     ) -> np.ndarray:
         # Drag reduced the change of momentum during the last step, so that it was larger one step earlier.
         e = problem.sides.elements
         last = element_momenta(e, to_element(e, *change))
         loss = site.dt / (self.inertia + site.dt) * drag
         older = last + e.half / e.half.sum(0) * loss[:, None]
-        return state + np.stack([frame_to_ground(site.pose, older), frame_to_ground(site.pose, last)])
+        return state + np.stack(
+            [frame_to_ground(site.pose, older), frame_to_ground(site.pose, last)]
+        )
 
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, BodyInertia]:
         return {
             "body-inertia": cls(mass=x, frequency=0.6, length=0.8, drag=1.3),
-            "body-inertia, frequency": cls(mass=0.7, frequency=0.6 * x, length=0.8, drag=1.3),
+            "body-inertia, frequency": cls(
+                mass=0.7, frequency=0.6 * x, length=0.8, drag=1.3
+            ),
         }

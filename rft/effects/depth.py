@@ -33,9 +33,20 @@ class DepthProfile(Effect):
     """
 
     along: tuple[float, ...] = (1.0, 1.0)
-    slope: Annotated[float, Number(0, 1000, "per body length", "rise of |z| over that depth along the ground")] = 0.0
+    slope: Annotated[
+        float,
+        Number(
+            0, 1000, "per body length", "rise of |z| over that depth along the ground"
+        ),
+    ] = 0.0
     towards: Annotated[
-        float, Number(-1e6, 1e6, "rad", "direction of the rise, from the frame's heading at the start")
+        float,
+        Number(
+            -1e6,
+            1e6,
+            "rad",
+            "direction of the rise, from the frame's heading at the start",
+        ),
     ] = 0.0
 
     kind = "depth-profile"
@@ -48,7 +59,9 @@ class DepthProfile(Effect):
     def __post_init__(self):
         along = real_array("along", self.along)
         require(
-            along.ndim == 1 and along.size >= 2 and bool(((along > 0) & (along <= 1000)).all()),
+            along.ndim == 1
+            and along.size >= 2
+            and bool(((along > 0) & (along <= 1000)).all()),
             "along must be two depths or more, over the reference depth, > 0 to 1000",
             value=self.along,
         )
@@ -64,21 +77,33 @@ class DepthProfile(Effect):
             depth = np.where(contact.buried > 0, self.depths(contact, site), 1.0)
             return contact.with_factors(depth, depth, depth)
 
-        return problem._replace(sides=with_depths(problem.sides), points=with_depths(problem.points))
+        return problem._replace(
+            sides=with_depths(problem.sides), points=with_depths(problem.points)
+        )
 
     def depths(self, contact: Contact, site: Site | None) -> np.ndarray:
         """Return the depths of a contact's elements over the reference depth, (n, 1), or (n, B) with a slope; ValueError
         where a buried element comes to the surface."""
-        level = np.interp(contact.station, np.linspace(0, 1, len(self.along)), self.along)
+        level = np.interp(
+            contact.station, np.linspace(0, 1, len(self.along)), self.along
+        )
         if not self.breaks:
             return level
-        depth = level + self.slope * (site.centres(contact.elements) * np.exp(-1j * self.towards)).real
+        depth = (
+            level
+            + self.slope
+            * (site.centres(contact.elements) * np.exp(-1j * self.towards)).real
+        )
         if not (depth > 0).all(where=contact.buried > 0):
             raise Refusal(
-                "the body comes to the surface", instead="lower the slope of the depth profile, or run fewer cycles"
+                "the body comes to the surface",
+                instead="lower the slope of the depth profile, or run fewer cycles",
             )
         return depth
 
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, DepthProfile]:
-        return {"depth-profile": cls(along=(1, 1 + x)), "depth-profile, slope": cls(slope=x, towards=1.0)}
+        return {
+            "depth-profile": cls(along=(1, 1 + x)),
+            "depth-profile, slope": cls(slope=x, towards=1.0),
+        }

@@ -16,7 +16,9 @@ from rft.premise import Premise
 PATCH = 4.0  # body lengths, least side of the square
 CELLS = 2.0  # cells to a radius
 TILE = 32  # cells along a side of a tile; a step copies only the tiles that it marks
-LOOK_AHEAD = 2.0  # radii from the body's axis to the ground that an element is about to meet
+LOOK_AHEAD = (
+    2.0  # radii from the body's axis to the ground that an element is about to meet
+)
 
 
 @EFFECTS.register
@@ -43,8 +45,15 @@ class DisturbedGround(Effect):
     array([-0.119, -0.007])
     """
 
-    radius: Annotated[float, Number(0.01, 0.25, "body lengths", "half width of the track that the body leaves")]
-    weakening: Annotated[float, Number(0, 1, "-", "share of the drag lost in fully disturbed ground")]
+    radius: Annotated[
+        float,
+        Number(
+            0.01, 0.25, "body lengths", "half width of the track that the body leaves"
+        ),
+    ]
+    weakening: Annotated[
+        float, Number(0, 1, "-", "share of the drag lost in fully disturbed ground")
+    ]
 
     kind = "disturbed-ground"
     breaks = Premise.MEMORYLESS
@@ -73,14 +82,22 @@ class DisturbedGround(Effect):
 
     def begin(self, problem: Problem, site: Site) -> Tiles:
         count, samples = self.tiles_along**2, site.pose.shape[1]
-        return Tiles((np.zeros((TILE**2, samples)),) * count, np.full((count, samples), -1, np.int64))
+        return Tiles(
+            (np.zeros((TILE**2, samples)),) * count,
+            np.full((count, samples), -1, np.int64),
+        )
 
     def apply(self, problem: Problem, site: Site, state: Tiles) -> Problem:
         points, m = self.points(problem, site), problem.memory
         offset = 1j * LOOK_AHEAD * self.radius * site.headings(problem.sides.elements)
-        left, right = (1 - self.weakening * self.disturbance(state, points + x).mean(0) for x in (offset, -offset))
+        left, right = (
+            1 - self.weakening * self.disturbance(state, points + x).mean(0)
+            for x in (offset, -offset)
+        )
         return problem._replace(
-            memory=m._replace(intact_left=m.intact_left * left, intact_right=m.intact_right * right)
+            memory=m._replace(
+                intact_left=m.intact_left * left, intact_right=m.intact_right * right
+            )
         )
 
     def after(self, problem: Problem, site: Site, state: Tiles, v: np.ndarray) -> Tiles:
@@ -92,14 +109,25 @@ class DisturbedGround(Effect):
         """Return k points along every element on the ground, complex (k, n, B), at most half a radius apart."""
         e = problem.sides.elements
         k = int(np.ceil(4 * e.half.max() / self.radius))
-        return site.centres(e) + (np.arange(k)[:, None, None] * 2 + 1 - k) / k * e.half * site.headings(e)
+        return site.centres(e) + (
+            np.arange(k)[:, None, None] * 2 + 1 - k
+        ) / k * e.half * site.headings(e)
 
-    def location(self, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def location(
+        self, i: np.ndarray, j: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the tile and the row in the tile that store the cells (i, j) of the plane, and their patch of the
         plane."""
         (tile_i, i), (tile_j, j) = np.divmod(i, TILE), np.divmod(j, TILE)
-        (patch_i, tile_i), (patch_j, tile_j) = np.divmod(tile_i, self.tiles_along), np.divmod(tile_j, self.tiles_along)
-        return tile_i * self.tiles_along + tile_j, i * TILE + j, (patch_i + 2**20) * 2**21 + (patch_j + 2**20)
+        (patch_i, tile_i), (patch_j, tile_j) = (
+            np.divmod(tile_i, self.tiles_along),
+            np.divmod(tile_j, self.tiles_along),
+        )
+        return (
+            tile_i * self.tiles_along + tile_j,
+            i * TILE + j,
+            (patch_i + 2**20) * 2**21 + (patch_j + 2**20),
+        )
 
     def disturbance(self, tiles: Tiles, place: np.ndarray) -> np.ndarray:
         """Return the disturbance, 0 to 1, at complex places (..., B), bilinear between cell centres."""
@@ -107,25 +135,39 @@ class DisturbedGround(Effect):
         i, j = np.floor(x), np.floor(y)
         x, y = x - i, y - j
         i, j = i.astype(np.int64), j.astype(np.int64)
-        tile, row, patch = self.location(np.stack([i, i + 1])[:, None], np.stack([j, j + 1]))  # (2, 2, ..., B)
-        share, sample = np.stack([1 - x, x])[:, None] * np.stack([1 - y, y]), np.arange(tiles.owner.shape[1])
+        tile, row, patch = self.location(
+            np.stack([i, i + 1])[:, None], np.stack([j, j + 1])
+        )  # (2, 2, ..., B)
+        share, sample = (
+            np.stack([1 - x, x])[:, None] * np.stack([1 - y, y]),
+            np.arange(tiles.owner.shape[1]),
+        )
         _, value, index = tiles.copied(tile)
-        return np.where(tiles.owner[tile, sample] == patch, share * value[index, row, sample], 0.0).sum((0, 1))
+        return np.where(
+            tiles.owner[tile, sample] == patch, share * value[index, row, sample], 0.0
+        ).sum((0, 1))
 
     def with_track(self, tiles: Tiles, place: np.ndarray) -> Tiles:
         """Return the map with a track at complex places (..., B): disturbance 1 up to radius / 2, 0 beyond 3 radius /
         2."""
         reach = int(np.ceil(1.5 * self.radius / self.cell))
         around = np.arange(-reach, reach + 1).reshape(-1, *[1] * place.ndim)
-        i, j = (np.floor(x / self.cell).astype(np.int64) + around for x in (place.real, place.imag))
+        i, j = (
+            np.floor(x / self.cell).astype(np.int64) + around
+            for x in (place.real, place.imag)
+        )
         i = i[:, None]
-        distance = np.hypot((i + 0.5) * self.cell - place.real, (j + 0.5) * self.cell - place.imag)
+        distance = np.hypot(
+            (i + 0.5) * self.cell - place.real, (j + 0.5) * self.cell - place.imag
+        )
         tile, row, patch = self.location(i, j)  # (cells along, cells across, ..., B)
         owner, sample = tiles.owner.copy(), np.arange(tiles.owner.shape[1])
         owner[tile, sample] = patch
         touched, value, index = tiles.copied(tile)
         value *= (owner == tiles.owner)[touched, None]
-        np.maximum.at(value, (index, row, sample), np.clip(1.5 - distance / self.radius, 0.0, 1.0))
+        np.maximum.at(
+            value, (index, row, sample), np.clip(1.5 - distance / self.radius, 0.0, 1.0)
+        )
         new = list(tiles.value)
         for k, x in zip(touched, value):
             new[k] = x.copy()

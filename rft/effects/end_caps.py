@@ -36,10 +36,20 @@ class EndCaps(Effect):
     """
 
     radius: Annotated[float, Number(0, 1, "body lengths", "radius of the body")]
-    head: Annotated[float, Number(0, 100, "-", "factor e of the head: 0 none, 1 flat, 4 hemisphere")] = 1.0
-    tail: Annotated[float, Number(0, 100, "-", "factor e of the tail: 0 none, 1 flat, 4 hemisphere")] = 1.0
+    head: Annotated[
+        float, Number(0, 100, "-", "factor e of the head: 0 none, 1 flat, 4 hemisphere")
+    ] = 1.0
+    tail: Annotated[
+        float, Number(0, 100, "-", "factor e of the tail: 0 none, 1 flat, 4 hemisphere")
+    ] = 1.0
     across: Annotated[
-        float | None, Number(0, 100, "-", "q of the axial force: sin gamma0 if not given, 1 for one as cos psi")
+        float | None,
+        Number(
+            0,
+            100,
+            "-",
+            "q of the axial force: sin gamma0 if not given, 1 for one as cos psi",
+        ),
     ] = None
 
     kind = "end-caps"
@@ -51,19 +61,31 @@ class EndCaps(Effect):
         check_numbers(self)
 
     def check(self, medium: Any) -> None:
-        require(isinstance(medium, Granular), f"end caps take a granular medium, got {type(medium).__name__}")
+        require(
+            isinstance(medium, Granular),
+            f"end caps take a granular medium, got {type(medium).__name__}",
+        )
 
     def apply(self, problem: Problem, site: Any = None, state: Any = None) -> Problem:
         e = problem.sides.elements
         # In units of the whole body's axial drag 2 r C_F L: e pi r^2 C_F / (2 r C_F L) = e pi (r / L) / 2.
         weight = math.pi * self.radius / 2 * np.array([[self.tail], [self.head]])
         ends = e.attached_points([0, -1], e.half[[0, -1]] * [[-1.0], [1.0]], weight)
-        return problem.with_points(Contact(ends, np.array([[0.0], [1.0]]), np.ones((2, 1))), self.terms(problem.medium))
+        return problem.with_points(
+            Contact(ends, np.array([[0.0], [1.0]]), np.ones((2, 1))),
+            self.terms(problem.medium),
+        )
 
-    def traction(self, medium: Granular, v_t: Any, v_n: Any, rounding: Any = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    def traction(
+        self, medium: Granular, v_t: Any, v_n: Any, rounding: Any = 0.0
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return the force (along, across) of both ends together at velocities (v_t, v_n), in units of the body's axial
         drag."""
-        load = dry_point(*(np.asarray(v, float) for v in (v_t, v_n)), rounding, np.array(self.terms(medium)))
+        load = dry_point(
+            *(np.asarray(v, float) for v in (v_t, v_n)),
+            rounding,
+            np.array(self.terms(medium)),
+        )
         factor = (self.head + self.tail) * math.pi * self.radius / 2
         return factor * load.t, factor * load.n
 

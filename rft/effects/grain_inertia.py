@@ -36,11 +36,17 @@ class GrainInertia(Effect):
     <Premise.RATE_INDEPENDENT: 1>
     """
 
-    frequency: Annotated[float, Number(0, 1e4, "1/s", "cycles per second, alphadot being per radian of phase")]
+    frequency: Annotated[
+        float,
+        Number(0, 1e4, "1/s", "cycles per second, alphadot being per radian of phase"),
+    ]
     length: Annotated[float, Number(1e-9, 1e6, "m", "length of the body")]
     depth: Annotated[float, Number(1e-9, 1e6, "m", "depth |z|")]
     strength: Annotated[float, Number(0, 1e6, "-", "lambda; 1 is assumed")] = 1.0
-    k: Annotated[float | None, Number(1e-3, 1e3, "-", "factor of Eq. 2, in place of the medium's own")] = None
+    k: Annotated[
+        float | None,
+        Number(1e-3, 1e3, "-", "factor of Eq. 2, in place of the medium's own"),
+    ] = None
 
     kind = "grain-inertia"
     odd = True
@@ -57,21 +63,36 @@ class GrainInertia(Effect):
         return getattr(medium, "k", None) if self.k is None else self.k
 
     def assumes(self, medium: Any) -> str:
-        return f"k = {ASSUMED_K:g}, that of loose glass" if self._known_k(medium) is None else ""
+        return (
+            f"k = {ASSUMED_K:g}, that of loose glass"
+            if self._known_k(medium) is None
+            else ""
+        )
 
     def check(self, medium: Any) -> None:
-        require(not is_linear(medium), f"grain inertia takes a medium of grains, got {type(medium).__name__}")
+        require(
+            not is_linear(medium),
+            f"grain inertia takes a medium of grains, got {type(medium).__name__}",
+        )
 
     def apply(self, problem: Problem, site: Any = None, state: Any = None) -> Problem:
         speed_per_rad = 2 * np.pi * self.frequency * self.length
         k = self._known_k(problem.medium)
-        strength = self.strength * speed_per_rad**2 / ((ASSUMED_K if k is None else k) * GRAVITY * self.depth)
+        strength = (
+            self.strength
+            * speed_per_rad**2
+            / ((ASSUMED_K if k is None else k) * GRAVITY * self.depth)
+        )
         # The flux of momentum does not depend on the pressure of the ground, so the factors of the drag leave it alone.
-        return problem._replace(quadratic_drag=problem.quadratic_drag + np.atleast_2d(strength))
+        return problem._replace(
+            quadratic_drag=problem.quadratic_drag + np.atleast_2d(strength)
+        )
 
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, GrainInertia]:
         return {
             "grain-inertia": cls(frequency=x, length=0.7, depth=0.07, strength=1.5),
-            "grain-inertia, strength": cls(frequency=1.2, length=0.4, depth=0.07, strength=x),
+            "grain-inertia, strength": cls(
+                frequency=1.2, length=0.4, depth=0.07, strength=x
+            ),
         }

@@ -30,14 +30,23 @@ class SkinFriction(Effect):
     array([ 0.0154,  0.0148, -0.1879])
     """
 
-    forward: Annotated[float, Number(1e-3, 100, "-", "coefficient of friction with the grains towards the head")] = (
-        0.109
-    )
-    backward: Annotated[float, Number(1e-3, 100, "-", "coefficient of friction with the grains towards the tail")] = (
-        0.137
-    )
+    forward: Annotated[
+        float,
+        Number(
+            1e-3, 100, "-", "coefficient of friction with the grains towards the head"
+        ),
+    ] = 0.109
+    backward: Annotated[
+        float,
+        Number(
+            1e-3, 100, "-", "coefficient of friction with the grains towards the tail"
+        ),
+    ] = 0.137
     reference: Annotated[
-        float, Number(1e-3, 100, "-", "coefficient of friction of the rod whose drag was measured")
+        float,
+        Number(
+            1e-3, 100, "-", "coefficient of friction of the rod whose drag was measured"
+        ),
     ] = 0.15
 
     kind = "skin-friction"

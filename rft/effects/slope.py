@@ -41,16 +41,33 @@ class Slope(Effect):
     array([-0.086,  0.002])
     """
 
-    angle: Annotated[float, Number(0, math.pi / 2, "rad", "angle by which the surface rises")]
+    angle: Annotated[
+        float, Number(0, math.pi / 2, "rad", "angle by which the surface rises")
+    ]
     towards: Annotated[
-        float, Number(-1e6, 1e6, "rad", "direction of the rise, from the frame's heading at the start")
+        float,
+        Number(
+            -1e6,
+            1e6,
+            "rad",
+            "direction of the rise, from the frame's heading at the start",
+        ),
     ] = 0.0
-    repose: Annotated[float, Number(0.01, 1.5, "rad", "angle at which the ground slides by itself, above angle")] = (
-        REPOSE
-    )
-    weight: Annotated[float, Number(0, 1e6, "-", "weight of the body over the drag on it, straight, along itself")] = (
-        0.0
-    )
+    repose: Annotated[
+        float,
+        Number(
+            0.01, 1.5, "rad", "angle at which the ground slides by itself, above angle"
+        ),
+    ] = REPOSE
+    weight: Annotated[
+        float,
+        Number(
+            0,
+            1e6,
+            "-",
+            "weight of the body over the drag on it, straight, along itself",
+        ),
+    ] = 0.0
 
     kind = "slope"
     breaks = Premise.SE2_SYMMETRIC
@@ -67,7 +84,10 @@ class Slope(Effect):
             f"a slope of {angle:.3g} degrees slides by itself",
             because=f"it must be below the angle of repose, {repose:.3g} degrees",
         )
-        pull, drag = self.weight * math.sin(self.angle), math.sin(self.repose - self.angle) / math.sin(self.repose)
+        pull, drag = (
+            self.weight * math.sin(self.angle),
+            math.sin(self.repose - self.angle) / math.sin(self.repose),
+        )
         require(
             pull < drag,
             "a body of this weight slides down",
@@ -76,7 +96,10 @@ class Slope(Effect):
         )
 
     def check(self, medium: Any) -> None:
-        require(not is_linear(medium), f"a slope takes a medium of grains, got {type(medium).__name__}")
+        require(
+            not is_linear(medium),
+            f"a slope takes a medium of grains, got {type(medium).__name__}",
+        )
 
     def assumes(self, medium: Any) -> str:
         repose = f"an angle of repose of {math.degrees(REPOSE):.1f} degrees, from half the drag downhill at 20, and "
@@ -86,13 +109,19 @@ class Slope(Effect):
         cos, sin = np.cos(self.angle), np.sin(self.angle)
 
         def inclined(contact, weight):
-            downhill = -np.exp(1j * np.asarray(self.towards)) * np.conj(site.headings(contact.elements))
+            downhill = -np.exp(1j * np.asarray(self.towards)) * np.conj(
+                site.headings(contact.elements)
+            )
             rows = map(np.atleast_2d, (cos, sin / np.tan(self.repose), weight))
-            return contact._replace(incline=Incline(downhill.real, downhill.imag, *rows))
+            return contact._replace(
+                incline=Incline(downhill.real, downhill.imag, *rows)
+            )
 
         weight = self.weight * sin * problem.axial_drag
 
-        return problem._replace(sides=inclined(problem.sides, weight), points=inclined(problem.points, 0.0))
+        return problem._replace(
+            sides=inclined(problem.sides, weight), points=inclined(problem.points, 0.0)
+        )
 
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, Slope]:

@@ -32,8 +32,18 @@ class TowedSled(Effect):
     array([ 0.0071, -0.0021, -0.1022])
     """
 
-    pull: Annotated[float, Number(0, 1000, "-", "friction of the sled over the drag on the straight body along itself")]
-    distance: Annotated[float, Number(0, 10, "body lengths", "distance of the sled behind the tail")] = 0.0
+    pull: Annotated[
+        float,
+        Number(
+            0,
+            1000,
+            "-",
+            "friction of the sled over the drag on the straight body along itself",
+        ),
+    ]
+    distance: Annotated[
+        float, Number(0, 10, "body lengths", "distance of the sled behind the tail")
+    ] = 0.0
 
     kind = "towed-sled"
     adds_points = odd = True
@@ -47,13 +57,16 @@ class TowedSled(Effect):
     def check(self, medium: Any) -> None:
         name = type(medium).__name__
         require(
-            speed_exponent(medium) == 0, f"a towed sled takes a medium without viscous drag, dry as itself, got {name}"
+            speed_exponent(medium) == 0,
+            f"a towed sled takes a medium without viscous drag, dry as itself, got {name}",
         )
 
     def apply(self, problem: Problem, site: Any = None, state: Any = None) -> Problem:
         e = problem.sides.elements
         point = e.attached_points([0], -(e.half[:1] + self.distance), np.ones((1, 1)))
-        sled = Contact(point, np.zeros((1, 1)), np.zeros((1, 1))).with_factors(self.pull, self.pull, self.pull)
+        sled = Contact(point, np.zeros((1, 1)), np.zeros((1, 1))).with_factors(
+            self.pull, self.pull, self.pull
+        )
         return problem.with_points(sled, Coulomb().dry)
 
     @classmethod

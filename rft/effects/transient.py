@@ -13,7 +13,9 @@ from rft.effects.base import EFFECTS, Effect, Site
 from rft.link import Memory, developed_direction, find_pivot
 from rft.premise import Premise
 
-SHORTEST = 1e-6  # body lengths, least travel: an element at rest creeps at the regularisation
+SHORTEST = (
+    1e-6  # body lengths, least travel: an element at rest creeps at the regularisation
+)
 SIGN = np.array([1.0, -1.0])[:, None, None]  # of v_n towards the left and the right
 E_FOLDINGS = 3.0  # of a direction over the travel: of what is missing after a reversal exp(-3) = 5 % is still missing
 # Of the flank of a rod 12 mm in diameter that goes to and fro 24.5 mm deep in beds of 6 mm grains, by three amplitudes
@@ -49,15 +51,31 @@ class Transient(Effect):
     'time stepping'
     """
 
-    travel: Annotated[float, Number(0, 10, "body lengths", "travel over which 95 % of the drag across comes back")]
-    at_once: Annotated[float, Number(0, 1, "-", "share of the drag across that is there at once")] = AT_ONCE
-    ratio: Annotated[float, Number(0, 10, "-", "travel along over travel across")] = RATIO
-    at_once_along: Annotated[float, Number(0, 1, "-", "share of the drag along that is there at once")] = AT_ONCE_ALONG
+    travel: Annotated[
+        float,
+        Number(
+            0,
+            10,
+            "body lengths",
+            "travel over which 95 % of the drag across comes back",
+        ),
+    ]
+    at_once: Annotated[
+        float, Number(0, 1, "-", "share of the drag across that is there at once")
+    ] = AT_ONCE
+    ratio: Annotated[float, Number(0, 10, "-", "travel along over travel across")] = (
+        RATIO
+    )
+    at_once_along: Annotated[
+        float, Number(0, 1, "-", "share of the drag along that is there at once")
+    ] = AT_ONCE_ALONG
 
     kind = "transient"
     breaks = Premise.MEMORYLESS
     limit = "travel = 0"
-    cost = "two directions an element, one link integral more where its pivot lies inside"
+    cost = (
+        "two directions an element, one link integral more where its pivot lies inside"
+    )
     batched = ("travel", "at_once", "ratio", "at_once_along")
     varies_along = True
 
@@ -72,16 +90,33 @@ class Transient(Effect):
         at_once = np.atleast_2d(self.at_once_along), np.atleast_2d(self.at_once)
         v_before = site.v_before[0], site.v_before[1]
         m = problem.memory
-        memory = Memory(*state, *v_before, m.intact_left, m.intact_right, *at_once, *self.steps(site.dt))
+        memory = Memory(
+            *state,
+            *v_before,
+            m.intact_left,
+            m.intact_right,
+            *at_once,
+            *self.steps(site.dt),
+        )
         return problem._replace(memory=memory)
 
-    def after(self, problem: Problem, site: Site, state: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def after(
+        self, problem: Problem, site: Site, state: np.ndarray, v: np.ndarray
+    ) -> np.ndarray:
         step_along, step_across = self.steps(site.dt)
         sign = np.where(v[0] >= 0, 1.0, -1.0)
-        along = sign * developed_direction(sign * state[0], sign * site.v_before[0], np.abs(v[0]), step_along)[0]
+        along = (
+            sign
+            * developed_direction(
+                sign * state[0], sign * site.v_before[0], np.abs(v[0]), step_along
+            )[0]
+        )
         parts, left = part_velocities(v[1], v[2])
         before = SIGN * site.v_before[1]
-        across = SIGN * developed_direction(SIGN * state[1], before, SIGN * parts, step_across)[0]
+        across = (
+            SIGN
+            * developed_direction(SIGN * state[1], before, SIGN * parts, step_across)[0]
+        )
         return np.array([along, left * across[0] + (1 - left) * across[1]])
 
     def steps(self, dt: float) -> tuple[np.ndarray, np.ndarray]:
@@ -89,7 +124,9 @@ class Transient(Effect):
         and at the first step: a body begins as if it had always moved as it does then."""
         travel = np.atleast_2d(self.travel)
         along, across = (
-            np.where((x > 0) & (dt > 0), E_FOLDINGS * dt / np.maximum(x, SHORTEST), np.inf)
+            np.where(
+                (x > 0) & (dt > 0), E_FOLDINGS * dt / np.maximum(x, SHORTEST), np.inf
+            )
             for x in (self.ratio * travel, travel)
         )
         return along, across
@@ -106,4 +143,6 @@ def part_velocities(v_n: np.ndarray, v_w: np.ndarray) -> tuple[np.ndarray, np.nd
     difference = np.abs(v_w)  # of v_n, between centre and end
     left = np.where(inside, (v_n + difference) / 2, np.maximum(v_n, 0.0))
     right = np.where(inside, (v_n - difference) / 2, np.minimum(v_n, 0.0))
-    return np.array([left, right]), np.where(inside, (1 + v_n / np.where(inside, difference, 1.0)) / 2, v_n > 0)
+    return np.array([left, right]), np.where(
+        inside, (1 + v_n / np.where(inside, difference, 1.0)) / 2, v_n > 0
+    )

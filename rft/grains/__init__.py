@@ -12,7 +12,18 @@ from rft.grains.experiment import Experiment, Run
 from rft.grains.motions import Stroke, Swim, Tow
 from rft.grains.spheres import Spheres, chain, plate, rod
 
-__all__ = ["Bed", "Experiment", "Run", "Spheres", "Stroke", "Swim", "Tow", "chain", "plate", "rod"]
+__all__ = [
+    "Bed",
+    "Experiment",
+    "Run",
+    "Spheres",
+    "Stroke",
+    "Swim",
+    "Tow",
+    "chain",
+    "plate",
+    "rod",
+]
 
 
 def __dir__() -> list[str]:

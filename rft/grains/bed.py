@@ -63,7 +63,11 @@ class Bed:
 
     def __post_init__(self):
         check_numbers(self)
-        require(isinstance(self.walled, bool), "walled must be True or False", value=self.walled)
+        require(
+            isinstance(self.walled, bool),
+            "walled must be True or False",
+            value=self.walled,
+        )
         require(
             self.step <= SHARE * self.rayleigh_time * (1 + 1e-9),
             f"a time step of {self.step:.3g} s is {self.step / self.rayleigh_time:.2f} of the Rayleigh time",
@@ -71,8 +75,16 @@ class Bed:
             instead=f"take {SHARE * self.rayleigh_time:.2g} s or less, or softer grains",
         )
         narrow = min(self.length, self.width) / self.diameter
-        require(narrow >= 6, f"a bed {narrow:.1f} grains wide is too small", instead="take six grains or more")
-        require(self.grains <= MOST_GRAINS, f"{self.grains:,} grains are too many", instead="take a smaller bed")
+        require(
+            narrow >= 6,
+            f"a bed {narrow:.1f} grains wide is too small",
+            instead="take six grains or more",
+        )
+        require(
+            self.grains <= MOST_GRAINS,
+            f"{self.grains:,} grains are too many",
+            instead="take a smaller bed",
+        )
 
     @property
     def rayleigh_time(self) -> float:
@@ -80,7 +92,12 @@ class Bed:
         0.8766)."""
         shear = self.young / (2 * (1 + self.poisson))
         smallest = self.diameter / 2 * (1 - self.spread)
-        return math.pi * smallest * math.sqrt(self.density / shear) / (0.1631 * self.poisson + 0.8766)
+        return (
+            math.pi
+            * smallest
+            * math.sqrt(self.density / shear)
+            / (0.1631 * self.poisson + 0.8766)
+        )
 
     @property
     def step(self) -> float:
@@ -98,7 +115,9 @@ class Bed:
         """Weight of a grain of mean size, N."""
         return math.pi / 6 * self.diameter**3 * self.density * GRAVITY
 
-    def lattice(self, body: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def lattice(
+        self, body: np.ndarray, radius: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return centres (N, 3), m, and diameters (N,), m, of grains on a cubic lattice with some jitter, layer by layer from
         the floor at z = 0, none of which touches the spheres of a body.
 
@@ -106,23 +125,37 @@ class Bed:
         from scipy.spatial import cKDTree
 
         rng = np.random.default_rng(self.seed)
-        pitch, largest = PITCH * self.diameter * (1 + self.spread), self.diameter * (1 + self.spread)
+        pitch, largest = (
+            PITCH * self.diameter * (1 + self.spread),
+            self.diameter * (1 + self.spread),
+        )
         nx, ny = int(self.length / pitch), int(self.width / pitch)
         span = np.array([self.length, self.width])
         x, y = ((np.arange(n) + 0.5) * s / n - s / 2 for n, s in zip((nx, ny), span))
         layer = np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2)
-        images = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)] if not self.walled else [(0, 0)]
-        tree = cKDTree(np.concatenate([body + [*(span * image), 0.0] for image in images]))
+        images = (
+            [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+            if not self.walled
+            else [(0, 0)]
+        )
+        tree = cKDTree(
+            np.concatenate([body + [*(span * image), 0.0] for image in images])
+        )
         radii, found, height = np.tile(radius, len(images)), [], 0.52 * largest
         while sum(map(len, found)) < self.grains:
             points = np.column_stack([layer, np.full(len(layer), height)])
             points += rng.uniform(-JITTER / 2, JITTER / 2, points.shape) * self.diameter
             near = tree.query_ball_point(points, radius.max() + largest)
             clear = [
-                all(np.linalg.norm(points[k] - tree.data[j]) > radii[j] + 0.55 * largest for j in some)
+                all(
+                    np.linalg.norm(points[k] - tree.data[j]) > radii[j] + 0.55 * largest
+                    for j in some
+                )
                 for k, some in enumerate(near)
             ]
             found.append(points[clear])
             height += pitch
         centres = np.concatenate(found)[: self.grains]
-        return centres, self.diameter * rng.uniform(1 - self.spread, 1 + self.spread, len(centres))
+        return centres, self.diameter * rng.uniform(
+            1 - self.spread, 1 + self.spread, len(centres)
+        )

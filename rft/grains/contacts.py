@@ -39,14 +39,20 @@ def contacts(bed: Bed, p: Particles) -> Contacts:
     span = np.array([bed.length, bed.width, 0.0])
     if bed.walled:
         span[:] = 0.0
-    place = np.where(span > 0, np.mod(p.x + span / 2, np.where(span > 0, span, 1.0)), p.x)
-    pairs = cKDTree(place, boxsize=span).query_pairs(2 * p.radius.max(), output_type="ndarray")
+    place = np.where(
+        span > 0, np.mod(p.x + span / 2, np.where(span > 0, span, 1.0)), p.x
+    )
+    pairs = cKDTree(place, boxsize=span).query_pairs(
+        2 * p.radius.max(), output_type="ndarray"
+    )
     pairs = pairs[~p.body[pairs].all(1)]
     d = place[pairs[:, 0]] - place[pairs[:, 1]]
     d -= span * np.round(d / np.where(span > 0, span, 1.0))
     r = p.radius[pairs]
     grains = ~p.body
-    overlap = np.concatenate([r.sum(1) - np.linalg.norm(d, axis=1), (p.radius - p.x[:, 2])[grains]])
+    overlap = np.concatenate(
+        [r.sum(1) - np.linalg.norm(d, axis=1), (p.radius - p.x[:, 2])[grains]]
+    )
     reduced = np.concatenate([r.prod(1) / r.sum(1), p.radius[grains]])
     touching = overlap > 0
     overlap, reduced = overlap[touching], reduced[touching]
@@ -60,5 +66,7 @@ def motion_energy(bed: Bed, p: Particles) -> float:
     """Return the kinetic energy of the grains and their energy in gravity over the floor, J."""
     g = ~p.body
     mass, r2 = bed.density * 4 / 3 * np.pi * p.radius[g] ** 3, p.radius[g] ** 2
-    kinetic = 0.5 * mass @ (p.v[g] ** 2).sum(1) + 0.2 * (mass * r2) @ (p.spin[g] ** 2).sum(1)
+    kinetic = 0.5 * mass @ (p.v[g] ** 2).sum(1) + 0.2 * (mass * r2) @ (
+        p.spin[g] ** 2
+    ).sum(1)
     return float(kinetic + GRAVITY * mass @ p.x[g, 2])

@@ -49,7 +49,11 @@ def steady(run: Run, half_width: float, angle: float, speed: float) -> Steady:
     lift = blocks[:, 2] / -(blocks[:, :2] @ direction)
     mean = blocks.mean(0)
     return Steady(
-        mean, _error(blocks), run.profile[kept].mean(0), float(mean[2] / -(mean[:2] @ direction)), float(_error(lift))
+        mean,
+        _error(blocks),
+        run.profile[kept].mean(0),
+        float(mean[2] / -(mean[:2] @ direction)),
+        float(_error(lift)),
     )
 
 
@@ -69,20 +73,36 @@ def _steady(run: Run, half_width: float, speed: float) -> np.ndarray:
     return kept
 
 
-def flank_and_ends(run: Run, length: float, half_width: float, angle: float, speed: float) -> Drag:
+def flank_and_ends(
+    run: Run, length: float, half_width: float, angle: float, speed: float
+) -> Drag:
     """Return the drag on a round rod that was towed along a line.
 
     length, half_width (m): of the rod, which lay along x. angle (rad): of its velocity from x. speed (m/s)."""
     kept = _steady(run, half_width, speed)
     reach = length / 2 - END * half_width
     flank = np.abs(run.along) < reach
-    require(bool(flank.sum() >= 8), "the rod is too short to have a flank", instead="take one of ten radii or more")
+    require(
+        bool(flank.sum() >= 8),
+        "the rod is too short to have a flank",
+        instead="take one of ten radii or more",
+    )
     spacing = np.diff(np.sort(run.along[flank])).mean()
     signs = np.array([-np.sign(np.cos(angle)) or -1.0, -np.sign(np.sin(angle)) or -1.0])
     blocks = np.array_split(run.profile[kept], BLOCKS)
-    per_length = signs * [b[:, flank, :2].sum(1).mean(0) / (flank.sum() * spacing) for b in blocks]
+    per_length = signs * [
+        b[:, flank, :2].sum(1).mean(0) / (flank.sum() * spacing) for b in blocks
+    ]
     whole = signs * [b[..., :2].sum(1).mean(0) for b in blocks]
-    ends, lift = whole - length * per_length, np.array([b[..., 2].sum(1).mean() for b in blocks])
+    ends, lift = (
+        whole - length * per_length,
+        np.array([b[..., 2].sum(1).mean() for b in blocks]),
+    )
     return Drag(
-        per_length.mean(0), ends.mean(0), float(lift.mean()), _error(per_length), _error(ends), float(_error(lift))
+        per_length.mean(0),
+        ends.mean(0),
+        float(lift.mean()),
+        _error(per_length),
+        _error(ends),
+        float(_error(lift)),
     )

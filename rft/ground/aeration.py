@@ -26,8 +26,15 @@ class Aeration(GroundEffect):
     0.6
     """
 
-    air_speed: Annotated[float, Number(0, 1e3, "m/s", "upward speed of the air over the bed's whole cross section")]
-    fluidisation: Annotated[float, Number(1e-6, 1e3, "m/s", "air speed from which the ground is fluidised")]
+    air_speed: Annotated[
+        float,
+        Number(
+            0, 1e3, "m/s", "upward speed of the air over the bed's whole cross section"
+        ),
+    ]
+    fluidisation: Annotated[
+        float, Number(1e-6, 1e3, "m/s", "air speed from which the ground is fluidised")
+    ]
 
     kind = "aeration"
     limit = "air_speed = 0"
@@ -38,11 +45,15 @@ class Aeration(GroundEffect):
         check_numbers(self)
         message = f"air_speed = {self.air_speed:g} m/s: the ground is fluidised from {self.fluidisation:g} m/s on"
         require(
-            self.air_speed < self.fluidisation, f"{message}, and no longer bears as this law says", instead="give less"
+            self.air_speed < self.fluidisation,
+            f"{message}, and no longer bears as this law says",
+            instead="give less",
         )
 
     def apply(self, ground: Ground) -> Ground:
-        return ground._replace(strength=ground.strength * (1.0 - self.air_speed / self.fluidisation))
+        return ground._replace(
+            strength=ground.strength * (1.0 - self.air_speed / self.fluidisation)
+        )
 
     @property
     def assumes(self) -> str:

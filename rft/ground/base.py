@@ -125,7 +125,12 @@ class GroundEffect:
         return ""
 
 
-GROUND_EFFECTS = Registry("geomech.ground_effects", "kind", "an effect on the ground", subclasses(GroundEffect))
+GROUND_EFFECTS = Registry(
+    "geomech.ground_effects",
+    "kind",
+    "an effect on the ground",
+    subclasses(GroundEffect),
+)
 
 
 def ground_of(effects: Sequence[GroundEffect], ground: Ground | None = None) -> Ground:
@@ -166,9 +171,21 @@ def checked_effects(effects) -> tuple[GroundEffect, ...]:
     >>> checked_effects([Aeration(0.1, 0.25)])[0].kind
     'aeration'
     """
-    valid = isinstance(effects, Sequence) and all(isinstance(e, GroundEffect) for e in effects)
-    require(valid, "effects must be a list of effects such as Aeration(0.01, 0.03)", value=effects)
+    valid = isinstance(effects, Sequence) and all(
+        isinstance(e, GroundEffect) for e in effects
+    )
+    require(
+        valid,
+        "effects must be a list of effects such as Aeration(0.01, 0.03)",
+        value=effects,
+    )
     kinds = [e.kind for e in effects]
-    duplicates = sorted({k for k in kinds if kinds.count(k) > 1 and k != "disturbed-ground"})
-    require(not duplicates, f"{', '.join(duplicates)} stands twice in effects", instead="keep one")
+    duplicates = sorted(
+        {k for k in kinds if kinds.count(k) > 1 and k != "disturbed-ground"}
+    )
+    require(
+        not duplicates,
+        f"{', '.join(duplicates)} stands twice in effects",
+        instead="keep one",
+    )
     return tuple(effects)

@@ -36,8 +36,18 @@ class DisturbedGround(GroundEffect):
     """
 
     places: tuple[float, ...]
-    radius: Annotated[float, Number(1e-6, 1e3, "m", "distance along the ground to which intrusions disturb it, about")]
-    weakening: Annotated[float, Number(0, 1, "-", "share of the strength lost in fully disturbed ground")]
+    radius: Annotated[
+        float,
+        Number(
+            1e-6,
+            1e3,
+            "m",
+            "distance along the ground to which intrusions disturb it, about",
+        ),
+    ]
+    weakening: Annotated[
+        float, Number(0, 1, "-", "share of the strength lost in fully disturbed ground")
+    ]
 
     kind = "disturbed-ground"
     breaks = Premise.SE2_SYMMETRIC
@@ -46,13 +56,24 @@ class DisturbedGround(GroundEffect):
 
     def __post_init__(self):
         places = real_array("places", self.places)
-        valid = places.ndim == 1 and 1 <= places.size <= MOST_PLACES and bool((np.abs(places) <= 1e3).all())
-        require(valid, f"places must be 1 to {MOST_PLACES} numbers in m, within 1000", value=self.places)
+        valid = (
+            places.ndim == 1
+            and 1 <= places.size <= MOST_PLACES
+            and bool((np.abs(places) <= 1e3).all())
+        )
+        require(
+            valid,
+            f"places must be 1 to {MOST_PLACES} numbers in m, within 1000",
+            value=self.places,
+        )
         object.__setattr__(self, "places", tuple(places.tolist()))
         check_numbers(self)
 
     def apply(self, ground: Ground) -> Ground:
-        rows = [*ground.disturbed, np.array([self.radius, self.weakening, *self.places])]
+        rows = [
+            *ground.disturbed,
+            np.array([self.radius, self.weakening, *self.places]),
+        ]
         size = max(map(len, rows))
         padded = [np.append(row, np.full(size - len(row), np.inf)) for row in rows]
         return ground._replace(disturbed=np.array(padded))

@@ -27,9 +27,17 @@ class GrainInertia(GroundEffect):
     1276.0
     """
 
-    strength: Annotated[float, Number(0, 1e6, "-", "lambda, 1 to 4 by grains and body; 1 is assumed")] = 1.0
+    strength: Annotated[
+        float, Number(0, 1e6, "-", "lambda, 1 to 4 by grains and body; 1 is assumed")
+    ] = 1.0
     density: Annotated[
-        float, Number(0, 1e5, "kg/m^3", "density of the packed grains; that of loose poppy seeds if left out")
+        float,
+        Number(
+            0,
+            1e5,
+            "kg/m^3",
+            "density of the packed grains; that of loose poppy seeds if left out",
+        ),
     ] = POPPY_SEEDS
 
     kind = "grain-inertia"
@@ -46,12 +54,17 @@ class GrainInertia(GroundEffect):
 
     @property
     def assumes(self) -> str:
-        defaults = {"strength": self.strength == 1.0, "density": self.density == POPPY_SEEDS}
+        defaults = {
+            "strength": self.strength == 1.0,
+            "density": self.density == POPPY_SEEDS,
+        }
         descriptions = {
             "strength": "lambda = 1 (1 to 4 are known)",
             "density": f"{POPPY_SEEDS:g} kg/m^3, of loose poppy seeds",
         }
-        return ", ".join(descriptions[name] for name, is_default in defaults.items() if is_default)
+        return ", ".join(
+            descriptions[name] for name, is_default in defaults.items() if is_default
+        )
 
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, GrainInertia]:

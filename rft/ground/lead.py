@@ -26,7 +26,9 @@ def smoothstep(n_dot_v, grazing_sine):
 @formula
 def rounded(n_dot_v, grazing_sine):
     """Return n_dot_v / sqrt(n_dot_v^2 + grazing_sine^2), and 0 where a face trails."""
-    return maximum(n_dot_v, 0.0) / maximum(sqrt(n_dot_v * n_dot_v + grazing_sine * grazing_sine), TINY)
+    return maximum(n_dot_v, 0.0) / maximum(
+        sqrt(n_dot_v * n_dot_v + grazing_sine * grazing_sine), TINY
+    )
 
 
 @formula
@@ -35,7 +37,14 @@ def mean_ramp(first, last, grazing_sine):
     ``first`` to ``last``, both at least 0."""
     scale = 1.0 / grazing_sine
     a, b = maximum(first * scale, 0.0), maximum(last * scale, 0.0)
-    below_a, below_b = where(a < 1.0, 0.5 * a * a, a - 0.5), where(b < 1.0, 0.5 * b * b, b - 0.5)
+    below_a, below_b = (
+        where(a < 1.0, 0.5 * a * a, a - 0.5),
+        where(b < 1.0, 0.5 * b * b, b - 0.5),
+    )
     step = b - a
     constant = absolute(step) < 1e-6
-    return where(constant, minimum(0.5 * (a + b), 1.0), (below_b - below_a) / where(constant, 1.0, step))
+    return where(
+        constant,
+        minimum(0.5 * (a + b), 1.0),
+        (below_b - below_a) / where(constant, 1.0, step),
+    )

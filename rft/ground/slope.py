@@ -40,10 +40,22 @@ class Slope(GroundEffect):
     """
 
     angle: Annotated[
-        float, Number(-math.pi / 2, math.pi / 2, "rad", "angle by which the surface rises; it falls if negative")
+        float,
+        Number(
+            -math.pi / 2,
+            math.pi / 2,
+            "rad",
+            "angle by which the surface rises; it falls if negative",
+        ),
     ]
     repose: Annotated[
-        float, Number(0.01, 1.5, "rad", "angle at which the ground slides by itself, above that of the slope")
+        float,
+        Number(
+            0.01,
+            1.5,
+            "rad",
+            "angle at which the ground slides by itself, above that of the slope",
+        ),
     ] = REPOSE
     mass: Annotated[float, Number(0, 1e6, "kg", "mass of the body")] = 0.0
 
@@ -59,7 +71,9 @@ class Slope(GroundEffect):
 
     def apply(self, ground: Ground) -> Ground:
         loss = -math.tan(self.angle) / math.tan(self.repose)
-        return ground._replace(strength=ground.strength * math.cos(self.angle), downhill_loss=loss)
+        return ground._replace(
+            strength=ground.strength * math.cos(self.angle), downhill_loss=loss
+        )
 
     def weight(self) -> tuple[float, float]:
         return -self.mass * GRAVITY * math.sin(self.angle), 0.0

@@ -1,6 +1,15 @@
 """Force laws, one a file, and the catalogue of named media."""
 
-from rft.laws.base import LAWS, Medium, TermLaw, is_closed, is_linear, is_mirror, is_rate_independent, speed_exponent
+from rft.laws.base import (
+    LAWS,
+    Medium,
+    TermLaw,
+    is_closed,
+    is_linear,
+    is_mirror,
+    is_rate_independent,
+    speed_exponent,
+)
 from rft.laws.catalogue import CATALOGUE
 from rft.laws.coulomb import Coulomb
 from rft.laws.granular import Granular

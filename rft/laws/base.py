@@ -50,7 +50,9 @@ class Medium(Protocol):
     array([-0.0014, -0.0035, -0.0817])
     """
 
-    def traction(self, v_t: Any, v_n: Any, rounding: Any = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    def traction(
+        self, v_t: Any, v_n: Any, rounding: Any = 0.0
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return the drag per unit length (f_t, f_n) opposing the velocity (v_t, v_n); arrays broadcast together."""
         ...
 
@@ -78,8 +80,14 @@ def terms_slopes(law, v_t, v_n, rounding):
         R2 = q * q * v_t * v_t + v_n * v_n + rounding * rounding
         inverse = where(R2 > 0.0, 1.0, 0.0) / sqrt(where(R2 > 0.0, R2, 1.0))
         e_t, e_n, e = v_t * inverse, v_n * inverse, rounding * inverse
-        tt, tn = tt + k_t * (e_n * e_n + e * e) * inverse, tn - k_t * e_t * e_n * inverse
-        nt, nn = nt - k_n * q * q * e_t * e_n * inverse, nn + k_n * (q * q * e_t * e_t + e * e) * inverse
+        tt, tn = (
+            tt + k_t * (e_n * e_n + e * e) * inverse,
+            tn - k_t * e_t * e_n * inverse,
+        )
+        nt, nn = (
+            nt - k_n * q * q * e_t * e_n * inverse,
+            nn + k_n * (q * q * e_t * e_t + e * e) * inverse,
+        )
     return tt, tn, nt, nn
 
 
@@ -98,7 +106,9 @@ class TermLaw:
     viscous: tuple[float, float] = (0.0, 0.0)
     mirror = True
 
-    def traction(self, v_t: Any, v_n: Any, rounding: Any = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    def traction(
+        self, v_t: Any, v_n: Any, rounding: Any = 0.0
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return the drag per unit length (f_t, f_n) opposing (v_t, v_n), in units of the axial drag; zero at rest."""
         v_t, v_n = np.asarray(v_t, float), np.asarray(v_n, float)
         return terms_traction(term_numbers(self), v_t, v_n, rounding)
@@ -119,7 +129,9 @@ class TermNumbers(NamedTuple):
 def term_numbers(medium) -> TermNumbers:
     """Return the terms of a medium in closed form as arrays, those that act along the element first."""
     terms = sorted(medium.dry, key=lambda term: term[1] == 0.0)
-    return TermNumbers(np.array([medium.viscous], float), np.array(terms, float).reshape(-1, 3))
+    return TermNumbers(
+        np.array([medium.viscous], float), np.array(terms, float).reshape(-1, 3)
+    )
 
 
 def dry_terms(medium) -> tuple[tuple[float, float, float], ...] | None:
@@ -182,11 +194,16 @@ def cached_if_immutable(function: Callable) -> Callable:
 
 
 def _is_immutable(x) -> bool:
-    return type(x) in (str, int) or (all(map(_is_immutable, x)) if type(x) is tuple else is_frozen(x))
+    return type(x) in (str, int) or (
+        all(map(_is_immutable, x)) if type(x) is tuple else is_frozen(x)
+    )
 
 
 # Velocities at which properties of a law are checked: 48 directions at 13 speeds, (13, 48).
-SPEEDS, DIRECTIONS = np.logspace(-12, 12, 13)[:, None], np.linspace(0.0, 2 * np.pi, 48, endpoint=False)
+SPEEDS, DIRECTIONS = (
+    np.logspace(-12, 12, 13)[:, None],
+    np.linspace(0.0, 2 * np.pi, 48, endpoint=False),
+)
 VELOCITIES = SPEEDS * np.cos(DIRECTIONS), SPEEDS * np.sin(DIRECTIONS)
 
 
@@ -195,14 +212,21 @@ def is_odd(medium: Medium) -> bool:
     """Return whether f(-v) = -f(v) at VELOCITIES, so that the ends of an element are alike."""
     v_t, v_n = VELOCITIES
     with np.errstate(all="ignore"):
-        forward, backward = (np.stack(np.broadcast_arrays(*medium.traction(k * v_t, k * v_n))) for k in (1, -1))
+        forward, backward = (
+            np.stack(np.broadcast_arrays(*medium.traction(k * v_t, k * v_n)))
+            for k in (1, -1)
+        )
     return bool((np.abs(forward + backward) <= 1e-13 * np.abs(forward).max(0)).all())
 
 
 def require_law(medium: Medium) -> None:
     """Raise ValueError unless a medium has a `traction` that takes and returns arrays."""
     is_law = hasattr(medium, "traction") and not isinstance(medium, type)
-    require(is_law, "medium must be a force law such as Granular(C=1.8, gamma0=0.24)", value=medium)
+    require(
+        is_law,
+        "medium must be a force law such as Granular(C=1.8, gamma0=0.24)",
+        value=medium,
+    )
     if is_closed(medium):
         return
     name = f"{type(medium).__name__}.traction"
@@ -217,10 +241,15 @@ def require_law(medium: Medium) -> None:
             because=str(error),
         ) from error
     except Exception as error:
-        raise Refusal(f"{name} fails", because=f"{type(error).__name__}: {error}") from error
+        raise Refusal(
+            f"{name} fails", because=f"{type(error).__name__}: {error}"
+        ) from error
     shapes = np.shape(f_t), np.shape(f_n)
     broadcasts = set(shapes) <= {(), (1,), (2, 3)}
-    require(broadcasts, f"{name} must return arrays of the velocities' shape (2, 3), got {shapes[0]} and {shapes[1]}")
+    require(
+        broadcasts,
+        f"{name} must return arrays of the velocities' shape (2, 3), got {shapes[0]} and {shapes[1]}",
+    )
 
 
 def _has_only_drags(medium: TermLaw) -> bool:
@@ -233,14 +262,22 @@ def require_drag(medium: Medium) -> None:
     """Raise ValueError if the medium pushes at one of VELOCITIES, that is if its force there has a part along the motion,
     or if it has no drag at all."""
     require_law(medium)
-    if getattr(type(medium), "traction", None) is TermLaw.traction and _has_only_drags(medium):
+    if getattr(type(medium), "traction", None) is TermLaw.traction and _has_only_drags(
+        medium
+    ):
         return
     v_t, v_n = VELOCITIES
     with np.errstate(all="ignore"):
         f_t, f_n = medium.traction(v_t, v_n)
-        cosine = (f_t * v_t + f_n * v_n) / (np.hypot(f_t, f_n) * SPEEDS)  # 1 straight against the motion
+        cosine = (f_t * v_t + f_n * v_n) / (
+            np.hypot(f_t, f_n) * SPEEDS
+        )  # 1 straight against the motion
     name, cosine = type(medium).__name__, np.nan_to_num(cosine)
-    require(bool((cosine > 0).any()), f"{name} has no drag at any velocity", instead="give its traction a positive one")
+    require(
+        bool((cosine > 0).any()),
+        f"{name} has no drag at any velocity",
+        instead="give its traction a positive one",
+    )
     worst = np.unravel_index(np.argmin(cosine), cosine.shape)
     require(
         cosine[worst] > -1e-09,
@@ -289,10 +326,18 @@ def speed_exponent(medium: Medium) -> float | None:
         return (None if any(medium.viscous) else 0.0) if medium.dry else 1.0
     speeds = np.logspace(-3, 1, 5)[:, None]
     with np.errstate(all="ignore"):
-        f = np.stack(np.broadcast_arrays(*medium.traction(speeds * np.cos(DIRECTIONS), speeds * np.sin(DIRECTIONS))))
+        f = np.stack(
+            np.broadcast_arrays(
+                *medium.traction(
+                    speeds * np.cos(DIRECTIONS), speeds * np.sin(DIRECTIONS)
+                )
+            )
+        )
     size = np.sqrt((f**2).sum((0, 2)))
     if not np.isfinite(size).all() or not size.all():
         return None
     form, growth = f / size[:, None], size[1:] / size[:-1]
-    has_power = np.ptp(form, axis=1).max() < 1e-6 and np.ptp(growth) < 1e-6 * growth.max()
+    has_power = (
+        np.ptp(form, axis=1).max() < 1e-6 and np.ptp(growth) < 1e-6 * growth.max()
+    )
     return round(float(np.log10(growth.mean())), 6) + 0.0 if has_power else None

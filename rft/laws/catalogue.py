@@ -23,10 +23,15 @@ class Entry:
 
 
 # From the paper's one datum: on a surface tilted by 20 degrees motion downhill has 50 % less drag (Sec. IV B).
-REPOSE = math.atan(math.sin(math.radians(20.0)) / (math.cos(math.radians(20.0)) - 0.5))  # rad, 37.9 degrees
+REPOSE = math.atan(
+    math.sin(math.radians(20.0)) / (math.cos(math.radians(20.0)) - 0.5)
+)  # rad, 37.9 degrees
 DEPTH = 0.0762  # m, of the rods whose drag gave the axial stresses of the catalogue
 GLASS = 2500.0  # kg/m^3, soda-lime glass, assumed
-PACKED = {"loose": 0.58, "close": 0.62}  # volume fractions, Zhang and Goldman (2014), caption of Fig. 9
+PACKED = {
+    "loose": 0.58,
+    "close": 0.62,
+}  # volume fractions, Zhang and Goldman (2014), caption of Fig. 9
 
 
 def pressure_factor(axial_stress: float, packed: str) -> float:
@@ -35,7 +40,9 @@ def pressure_factor(axial_stress: float, packed: str) -> float:
     return axial_stress / (GLASS * PACKED[packed] * GRAVITY * DEPTH)
 
 
-SURFACE_ACROSS = 0.15  # N, A of the drag across a plate 8 mm deep, Schiebel et al. (2020)
+SURFACE_ACROSS = (
+    0.15  # N, A of the drag across a plate 8 mm deep, Schiebel et al. (2020)
+)
 # N, drag along that plate, of the assumed form cos psi: about 0.017 in their figure; their fit is not known here. Their
 # snakes move at 0.81 of the speed along their own track (0.74 to 0.89), to which 0.010 (0.78) is nearer than 0.017 (0.74).
 SURFACE_ALONG, SURFACE_ALONG_RANGE = 0.017, (0.010, 0.017)  # assumed
@@ -54,20 +61,39 @@ CATALOGUE = {
         2710.0,
     ),
     "glass-0.3mm-loose-fitted": Entry(
-        Granular(C=0.5108 / 0.2770, gamma0=math.atan(1 / 4.0587), k=pressure_factor(2770.0, "loose")),
-        FITTED + "C_S = 0.5108, C_F = 0.2770 (1e4 Pa), cot g0 = 4.0587; agrees with glass-0.3mm-loose",
+        Granular(
+            C=0.5108 / 0.2770,
+            gamma0=math.atan(1 / 4.0587),
+            k=pressure_factor(2770.0, "loose"),
+        ),
+        FITTED
+        + "C_S = 0.5108, C_F = 0.2770 (1e4 Pa), cot g0 = 4.0587; agrees with glass-0.3mm-loose",
         2770.0,
     ),
     "glass-0.3mm-close": Entry(
-        Granular(C=0.77 / 0.59, gamma0=math.radians(12.21), k=pressure_factor(5900.0, "close")),
-        FITTED + "C_S = 0.77, C_F = 0.59 (1e4 Pa), g0 = 12.21 degrees; that it is the close packing is an inference",
+        Granular(
+            C=0.77 / 0.59,
+            gamma0=math.radians(12.21),
+            k=pressure_factor(5900.0, "close"),
+        ),
+        FITTED
+        + "C_S = 0.77, C_F = 0.59 (1e4 Pa), g0 = 12.21 degrees; that it is the close packing is an inference",
         5900.0,
     ),
     "glass-0.3mm-surface": Entry(
-        Surface(C=0.198, gamma0=math.atan(math.sqrt(0.00389)), across=SURFACE_ACROSS / SURFACE_ALONG),
+        Surface(
+            C=0.198,
+            gamma0=math.atan(math.sqrt(0.00389)),
+            across=SURFACE_ACROSS / SURFACE_ALONG,
+        ),
         "Schiebel et al., eLife 9, e51412 (2020): plate 8 mm deep at the surface of 0.3 mm glass; drag across 0.15 N, "
         "C = 0.198, tan^2 g0 = 0.00389; drag along of the form 0.017 N cos psi is assumed (0.010 to 0.017 N)",
     ),
-    "viscous-2": Entry(Viscous(2.0), "Gray and Hancock, J. Exp. Biol. 32, 802 (1955): slender-body limit, 2 : 1"),
-    "coulomb": Entry(Coulomb(), "isotropic dry friction; a model, no measured constant"),
+    "viscous-2": Entry(
+        Viscous(2.0),
+        "Gray and Hancock, J. Exp. Biol. 32, 802 (1955): slender-body limit, 2 : 1",
+    ),
+    "coulomb": Entry(
+        Coulomb(), "isotropic dry friction; a model, no measured constant"
+    ),
 }

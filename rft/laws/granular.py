@@ -35,8 +35,16 @@ class Granular(TermLaw):
     """
 
     C: Annotated[float, Number(0, 1e6, "-", "the extra normal force")]
-    gamma0: Annotated[float, Number(-1e6, 1e6, "rad", "angle at which it saturates, strictly between 0 and pi/2")]
-    k: Annotated[float | None, Number(1e-3, 1e3, "-", "pressure across over the weight of the grains above")] = None
+    gamma0: Annotated[
+        float,
+        Number(
+            -1e6, 1e6, "rad", "angle at which it saturates, strictly between 0 and pi/2"
+        ),
+    ]
+    k: Annotated[
+        float | None,
+        Number(1e-3, 1e3, "-", "pressure across over the weight of the grains above"),
+    ] = None
     covariance: tuple[tuple[float, ...], ...] | None = None
     law = "granular"
 
@@ -47,7 +55,9 @@ class Granular(TermLaw):
             f"gamma0 must lie between 0 and 90 degrees, got {math.degrees(self.gamma0):g} degrees ({self.gamma0:g} rad)",
         )
         sizes = (2,) if self.k is None else (2, 3)
-        object.__setattr__(self, "covariance", checked_covariance(self.covariance, *sizes))
+        object.__setattr__(
+            self, "covariance", checked_covariance(self.covariance, *sizes)
+        )
 
     @property
     def uncertain(self) -> tuple[str, ...]:
@@ -58,7 +68,11 @@ class Granular(TermLaw):
     def dry(self) -> tuple[tuple[float, float, float], ...]:
         # With v_t^2 + v_n^2 written out, C (v.n) / sqrt(tan^2 g0 + (v.n)^2)
         # = C cos g0 v_n / sqrt(sin^2 g0 v_t^2 + v_n^2): a second dry term.
-        return (1.0, 1.0, 1.0), (math.sin(self.gamma0), 0.0, self.C * math.cos(self.gamma0))
+        return (1.0, 1.0, 1.0), (
+            math.sin(self.gamma0),
+            0.0,
+            self.C * math.cos(self.gamma0),
+        )
 
     @classmethod
     def examples(cls) -> dict[str, Granular]:

@@ -14,9 +14,22 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rft.checks import is_number
-from rft.laws.base import cached_if_immutable, is_closed, require_law, term_numbers, terms_slopes, terms_traction
+from rft.laws.base import (
+    cached_if_immutable,
+    is_closed,
+    require_law,
+    term_numbers,
+    terms_slopes,
+    terms_traction,
+)
 from rft.link import dry, sum_loads, viscous
-from rft.quadrature import QUADRATURE, by_nodes, nodes_and_weights, parse, slopes_by_differences
+from rft.quadrature import (
+    QUADRATURE,
+    by_nodes,
+    nodes_and_weights,
+    parse,
+    slopes_by_differences,
+)
 from rft.vectors import formula, is_formula
 
 
@@ -25,7 +38,10 @@ def closed_form(law, v_t, v_n, v_w, rounding):
     """Return the exact load of viscous and dry terms."""
     load = viscous(v_t, v_n, v_w, law.viscous[0, 0], law.viscous[0, 1])
     for j in range(len(law.dry)):
-        load = sum_loads(load, dry(v_t, v_n, v_w, rounding, law.dry[j, 0], law.dry[j, 1], law.dry[j, 2]))
+        load = sum_loads(
+            load,
+            dry(v_t, v_n, v_w, rounding, law.dry[j, 0], law.dry[j, 1], law.dry[j, 2]),
+        )
     return load
 
 
@@ -57,15 +73,27 @@ def record(law, rule: str = "exact") -> Any:
         numbers = term_numbers(law)._asdict()
         if kind == "exact":
             return Terms(**numbers)
-        formulas = {"traction": terms_traction, "slopes": terms_slopes, "average": by_nodes}
-    nodes, weights = (x.reshape(1, 1, -1, 1, 1) for x in nodes_and_weights((kind, count)))
+        formulas = {
+            "traction": terms_traction,
+            "slopes": terms_slopes,
+            "average": by_nodes,
+        }
+    nodes, weights = (
+        x.reshape(1, 1, -1, 1, 1) for x in nodes_and_weights((kind, count))
+    )
     if not is_closed(law):
         if not is_formula(type(law).traction):
             return Uncompiled(law, nodes, weights)
         numbers = law_numbers(law)
         slopes = getattr(type(law), "slopes", slopes_by_differences)
-        formulas = {"traction": type(law).traction, "slopes": slopes, "average": by_nodes}
-    cls = record_class(type(law).__name__, (*numbers, "nodes", "weights"), tuple(formulas.items()))
+        formulas = {
+            "traction": type(law).traction,
+            "slopes": slopes,
+            "average": by_nodes,
+        }
+    cls = record_class(
+        type(law).__name__, (*numbers, "nodes", "weights"), tuple(formulas.items())
+    )
     return cls(*numbers.values(), nodes, weights)
 
 
@@ -74,11 +102,15 @@ def law_numbers(law) -> dict[str, np.ndarray | float]:
     if hasattr(law, "numbers"):
         return law.numbers
     law_fields = fields(law) if is_dataclass(law) else ()
-    return {f.name: float(x) for f in law_fields if is_number(x := getattr(law, f.name))}
+    return {
+        f.name: float(x) for f in law_fields if is_number(x := getattr(law, f.name))
+    }
 
 
 @functools.cache
-def record_class(name: str, names: tuple[str, ...], formulas: tuple[tuple[str, Callable], ...]) -> type:
+def record_class(
+    name: str, names: tuple[str, ...], formulas: tuple[tuple[str, Callable], ...]
+) -> type:
     """Return the class of records with these numbers and formulas; a kernel is compiled for each class."""
     cls = NamedTuple(name, [(field, np.ndarray) for field in names])
     for field, function in formulas:

@@ -33,8 +33,21 @@ class Surface(TermLaw):
     """
 
     C: Annotated[float, Number(0, 1e6, "-", "the extra normal force")]
-    gamma0: Annotated[float, Number(-1e6, 1e6, "rad", "angle at which it saturates, strictly between 0 and pi/2")]
-    across: Annotated[float, Number(1e-6, 1e6, "-", "strength of the drag across, A of that fit, over the axial drag")]
+    gamma0: Annotated[
+        float,
+        Number(
+            -1e6, 1e6, "rad", "angle at which it saturates, strictly between 0 and pi/2"
+        ),
+    ]
+    across: Annotated[
+        float,
+        Number(
+            1e-6,
+            1e6,
+            "-",
+            "strength of the drag across, A of that fit, over the axial drag",
+        ),
+    ]
     covariance: tuple[tuple[float, ...], ...] | None = None
     uncertain = ("C", "gamma0", "across")
     law = "surface"

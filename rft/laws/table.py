@@ -16,7 +16,9 @@ from rft.vectors import absolute, copysign, floor, formula, gather, minimum, sqr
 
 MOST_ROWS = 10_000
 MOST_CELLS = 4096  # of a curve on [0, 1]
-LARGEST_GAP = np.radians(15.0)  # from 0 to the smallest angle, and from the largest angle to pi/2
+LARGEST_GAP = np.radians(
+    15.0
+)  # from 0 to the smallest angle, and from the largest angle to pi/2
 
 
 @LAWS.register
@@ -73,10 +75,16 @@ class Table:
             and (len(np.unique(data.psi.round(9))) > 2),
             "the angles must come within 15 degrees of 0 and of 90, with at least one more between",
         )
-        along, across = (_monotone_curve(x, f) for x, f in zip((np.cos(data.psi), np.sin(data.psi)), data.forces))
+        along, across = (
+            _monotone_curve(x, f)
+            for x, f in zip((np.cos(data.psi), np.sin(data.psi)), data.forces)
+        )
         unit = float(along(1.0)) if along(1.0) > 0 else float(across(1.0))
         require(unit > 0, "there is no drag at psi = 0 nor at psi = 90 degrees")
-        numbers = {**_curve_arrays("along", along, unit), **_curve_arrays("across", across, unit)}
+        numbers = {
+            **_curve_arrays("along", along, unit),
+            **_curve_arrays("across", across, unit),
+        }
         object.__setattr__(self, "numbers", numbers)
         for name, x in self.numbers.items():
             object.__setattr__(self, name, x)
@@ -86,8 +94,20 @@ class Table:
     def traction(self, v_t: Any, v_n: Any, rounding: Any = 0.0) -> Any:
         """Return the drag per unit length (f_t, f_n) opposing (v_t, v_n), in units of the axial drag; zero at rest."""
         inverse = inverse_speed(v_t, v_n, rounding)
-        f_t, _ = curve(v_t * inverse, self.along, self.along_cells, self.along_knots, self.along_steps)
-        f_n, _ = curve(v_n * inverse, self.across, self.across_cells, self.across_knots, self.across_steps)
+        f_t, _ = curve(
+            v_t * inverse,
+            self.along,
+            self.along_cells,
+            self.along_knots,
+            self.along_steps,
+        )
+        f_n, _ = curve(
+            v_n * inverse,
+            self.across,
+            self.across_cells,
+            self.across_knots,
+            self.across_steps,
+        )
         return f_t, f_n
 
     @formula
@@ -95,15 +115,28 @@ class Table:
         """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n); infinite slopes at rest are returned as 0."""
         inverse = inverse_speed(v_t, v_n, rounding)
         c, s, e = v_t * inverse, v_n * inverse, rounding * inverse
-        _, by_c = curve(c, self.along, self.along_cells, self.along_knots, self.along_steps)
-        _, by_s = curve(s, self.across, self.across_cells, self.across_knots, self.across_steps)
+        _, by_c = curve(
+            c, self.along, self.along_cells, self.along_knots, self.along_steps
+        )
+        _, by_s = curve(
+            s, self.across, self.across_cells, self.across_knots, self.across_steps
+        )
         by_c, by_s = by_c * inverse, by_s * inverse
-        return by_c * (s * s + e * e), -by_c * c * s, -by_s * c * s, by_s * (c * c + e * e)
+        return (
+            by_c * (s * s + e * e),
+            -by_c * c * s,
+            -by_s * c * s,
+            by_s * (c * c + e * e),
+        )
 
     @classmethod
     def examples(cls) -> dict[str, Table]:
         psi = np.linspace(0.0, np.pi / 2, 12)
-        return {"measured": cls(psi, *Granular(C=1.4, gamma0=0.25).traction(np.cos(psi), np.sin(psi)))}
+        return {
+            "measured": cls(
+                psi, *Granular(C=1.4, gamma0=0.25).traction(np.cos(psi), np.sin(psi))
+            )
+        }
 
 
 @formula
@@ -127,7 +160,9 @@ def curve(x, pieces, cells, knots, steps):
     d = a - gather(knots, piece, 0)
     c3, c2 = gather(pieces, piece, 0), gather(pieces, piece, 1)
     c1, c0 = gather(pieces, piece, 2), gather(pieces, piece, 3)
-    return copysign(c0 + d * (c1 + d * (c2 + d * c3)), x), c1 + d * (2.0 * c2 + d * (3.0 * c3))
+    return copysign(c0 + d * (c1 + d * (c2 + d * c3)), x), c1 + d * (
+        2.0 * c2 + d * (3.0 * c3)
+    )
 
 
 def _curve_arrays(name: str, polynomial, unit: float) -> dict[str, np.ndarray]:
@@ -136,9 +171,14 @@ def _curve_arrays(name: str, polynomial, unit: float) -> dict[str, np.ndarray]:
     knots, pieces = polynomial.x[half], polynomial.c.T[half[:-1]] / unit
     count = min(MOST_CELLS, 1 << int(np.ceil(np.log2(1.0 / np.diff(knots).min()))))
     first = np.searchsorted(knots, np.arange(count + 1) / count, side="right") - 1
-    cells, steps = np.minimum(first, len(pieces) - 1), np.zeros(max(1, np.diff(first).max()))
+    cells, steps = (
+        np.minimum(first, len(pieces) - 1),
+        np.zeros(max(1, np.diff(first).max())),
+    )
     columns = {"cells": cells, "knots": [*knots[:-1], 2.0], "steps": steps}
-    columns = {f"{name}_{key}": np.array(x, float).reshape(-1, 1) for key, x in columns.items()}
+    columns = {
+        f"{name}_{key}": np.array(x, float).reshape(-1, 1) for key, x in columns.items()
+    }
     return {name: np.ascontiguousarray(pieces), **columns}
 
 
@@ -153,5 +193,6 @@ def _monotone_curve(x: np.ndarray, f: np.ndarray):
     if knots[-1] < 1.0:
         knots, values = np.append(knots, 1.0), np.append(values, values[-1])
     return PchipInterpolator(
-        np.concatenate([-knots[::-1], [0.0], knots]), np.concatenate([-values[::-1], [0.0], values])
+        np.concatenate([-knots[::-1], [0.0], knots]),
+        np.concatenate([-values[::-1], [0.0], values]),
     )

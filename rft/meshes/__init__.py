@@ -3,7 +3,15 @@
 from rft.meshes.intrusion import Faces, Wrench, bearing, wrench
 from rft.meshes.law import Spatial
 from rft.meshes.mesh import Mesh, below, read
-from rft.meshes.motions import MOTIONS, Drag, Motion, Path, Penetrate, Rotate, Trajectory
+from rft.meshes.motions import (
+    MOTIONS,
+    Drag,
+    Motion,
+    Path,
+    Penetrate,
+    Rotate,
+    Trajectory,
+)
 from rft.meshes.solids import SOLIDS, Cylinder, Leg, MeshFile, Screw, Solid, Sphere
 
 __all__ = [

@@ -32,9 +32,13 @@ def blade(
     free = np.linspace(half, 2 * np.pi - half, around + 1)[1:-1]
     x = length * np.linspace(-0.5, 0.5, along + 1)
     turn = (2 * np.pi / pitch) * x[:, None]
-    discs = _ring(x[:, None], core, turn + np.concatenate([foot, free]))  # (along + 1, thick + around, 3)
+    discs = _ring(
+        x[:, None], core, turn + np.concatenate([foot, free])
+    )  # (along + 1, thick + around, 3)
     levels = np.linspace(core, radius, high + 1)[1:, None]
-    fins = _ring(x[:, None, None], levels, turn[:, None] + foot)  # (along + 1, high, thick + 1, 3)
+    fins = _ring(
+        x[:, None, None], levels, turn[:, None] + foot
+    )  # (along + 1, high, thick + 1, 3)
     tips = AXIS * (x[[0, -1], None] + [[-nose], [nose]])
     shares = np.linspace(0.0, 1.0, across + 1)[1:-1, None, None]
     cones = [tip + shares * (disc - tip) for tip, disc in zip(tips, discs[[0, -1]])]
@@ -42,10 +46,14 @@ def blade(
     # Indices of the points, in arrays of the shapes of the points.
     parts = [discs, fins, *cones, tips]
     starts = np.cumsum([0, *(p.size // 3 for p in parts)])
-    indices = [s + np.arange(p.size // 3).reshape(p.shape[:-1]) for s, p in zip(starts, parts)]
+    indices = [
+        s + np.arange(p.size // 3).reshape(p.shape[:-1]) for s, p in zip(starts, parts)
+    ]
     disc, fin, near, far, ends = indices
     near, far = np.concatenate([near, disc[:1]]), np.concatenate([far, disc[-1:]])
-    sides = np.concatenate([disc[:, None, : thick + 1], fin], 1)  # with the foot on the core
+    sides = np.concatenate(
+        [disc[:, None, : thick + 1], fin], 1
+    )  # with the foot on the core
     core_rows = np.concatenate([disc[:, thick:], disc[:, :1]], 1)
     points = np.concatenate([p.reshape(-1, 3) for p in parts])
     strips = [
@@ -58,9 +66,17 @@ def blade(
         (_cap(ends[0], near), lambda p: _conical(p, core, nose, -1.0)),
         (_cap(ends[1], far)[:, ::-1], lambda p: _conical(p, core, nose, 1.0)),
     ]  # fmt: skip
-    normals = np.concatenate([normal(points[faces].mean(1)) for faces, normal in strips])
-    used, faces = np.unique(np.concatenate([faces for faces, _ in strips]), return_inverse=True)
-    return Mesh(points[used], faces.reshape(-1, 3), smooth_normals=np.repeat(normals[:, None], 3, 1))
+    normals = np.concatenate(
+        [normal(points[faces].mean(1)) for faces, normal in strips]
+    )
+    used, faces = np.unique(
+        np.concatenate([faces for faces, _ in strips]), return_inverse=True
+    )
+    return Mesh(
+        points[used],
+        faces.reshape(-1, 3),
+        smooth_normals=np.repeat(normals[:, None], 3, 1),
+    )
 
 
 def _ring(x, r, angle) -> np.ndarray:
@@ -75,7 +91,9 @@ def _along_short_diagonals(rows: np.ndarray) -> np.ndarray:
 
 def _cap(point: int, rings: np.ndarray) -> np.ndarray:
     """Return the triangles (F, 3) from a point to the first of rings (M, K), and from each ring to the next."""
-    fan = np.stack([np.full(rings.shape[1], point), np.roll(rings[0], -1), rings[0]], -1)
+    fan = np.stack(
+        [np.full(rings.shape[1], point), np.roll(rings[0], -1), rings[0]], -1
+    )
     return np.concatenate([fan, triangles(rings)])
 
 

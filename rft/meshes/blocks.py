@@ -9,7 +9,16 @@ import numpy as np
 
 from rft.balance.backend import compiles
 from rft.ground import Ground
-from rft.meshes.contact import Face, FaceLaw, Motion, corner_heights, load, part_below, record, velocity_of_middle
+from rft.meshes.contact import (
+    Face,
+    FaceLaw,
+    Motion,
+    corner_heights,
+    load,
+    part_below,
+    record,
+    velocity_of_middle,
+)
 from rft.meshes.zones import shared
 
 WIDTH = 8  # faces that compiled code computes at once, `rft.simd.WIDTH`
@@ -25,7 +34,9 @@ class Blocks:
         orders = [_clusters(faces) for faces in bodies]
         sizes = [len(order) for order in orders]
         self.first = np.concatenate([[0], np.cumsum(sizes)])
-        self.order = np.concatenate([order + first for order, first in zip(orders, self.first)])
+        self.order = np.concatenate(
+            [order + first for order, first in zip(orders, self.first)]
+        )
         self.faces = Face(*(np.concatenate(x)[self.order] for x in zip(*bodies)))
         self.owner = np.repeat(np.arange(len(sizes)), sizes)
 
@@ -53,7 +64,11 @@ class Blocks:
         return self.loads_by_numpy(law, ground, motions)
 
     def loads_by_numpy(
-        self, law: FaceLaw, ground: Ground, motions: Motion, shares: np.ndarray | None = None
+        self,
+        law: FaceLaw,
+        ground: Ground,
+        motions: Motion,
+        shares: np.ndarray | None = None,
     ) -> np.ndarray:
         """Return the same as `loads`; faces that are above the surface in the first motion bear nothing. shares: (T,), of
         each face, that the law acts upon."""
@@ -62,12 +77,21 @@ class Blocks:
         owner, out = self.owner[under], np.zeros((*motions.height.shape, 6))
         if not under.size:
             return out
-        motion = Motion(*(np.moveaxis(x[owner], (0, 1), (-1, -2)) for x in motions))  # (..., C, T)
+        motion = Motion(
+            *(np.moveaxis(x[owner], (0, 1), (-1, -2)) for x in motions)
+        )  # (..., C, T)
         face = Face(*(x[under] for x in self.faces))
         part = part_below(face, corner_heights(face, motion))
         if shares is not None:
             part = shared(part, shares[under])
-        force, moment, _ = load(law, ground, part, motion, velocity_of_middle(part, motion), face.sheet > 0.0)
+        force, moment, _ = load(
+            law,
+            ground,
+            part,
+            motion,
+            velocity_of_middle(part, motion),
+            face.sheet > 0.0,
+        )
         begin = np.flatnonzero(np.diff(owner, prepend=-1))
         sums = np.add.reduceat(np.stack(force + moment), begin, axis=2)
         out[owner[begin]] = sums.transpose(2, 1, 0)

@@ -10,7 +10,14 @@ from numba.extending import register_jitable
 
 from rft.balance.cache import cached
 from rft.ground import Ground
-from rft.meshes.contact import Face, Motion, corner_heights, load, part_below, velocity_of_middle
+from rft.meshes.contact import (
+    Face,
+    Motion,
+    corner_heights,
+    load,
+    part_below,
+    velocity_of_middle,
+)
 from rft.meshes.triples import dot, plus
 from rft.meshes.zones import share_in, shared
 from rft.simd import any_of, record_access, register_formulas, sum_of
@@ -35,7 +42,9 @@ def on_faces(law, ground, table, begin, end, motion, zones=None, zone=-1, place=
                 if zone >= 0:
                     part = shared(part, share_in(zones, zone, face, place))
             v = velocity_of_middle(part, motion)
-            if any_of(((dot(part.n, v) >= 0.0) | sheet) & (absolute(part.depth) > 0.0)):  # others bear nothing
+            if any_of(
+                ((dot(part.n, v) >= 0.0) | sheet) & (absolute(part.depth) > 0.0)
+            ):  # others bear nothing
                 f, m, _ = load(law, ground, part, motion, v, sheet)
                 force, moment = plus(force, f), plus(moment, m)
     return (
@@ -50,10 +59,25 @@ def kernel(Law: type):
     register_formulas()
 
     @njit(nogil=True, error_model="numpy")
-    def total(numbers, ground_numbers, disturbed, table, first, velocity, spin, x, up, ahead, height, out):
+    def total(
+        numbers,
+        ground_numbers,
+        disturbed,
+        table,
+        first,
+        velocity,
+        spin,
+        x,
+        up,
+        ahead,
+        height,
+        out,
+    ):
         law = Law(*numbers)
         strength, flux, rounding, grazing_sine, downhill_loss = ground_numbers
-        ground = Ground(strength, flux, rounding, grazing_sine, downhill_loss, disturbed)
+        ground = Ground(
+            strength, flux, rounding, grazing_sine, downhill_loss, disturbed
+        )
         for b in range(len(first) - 1):
             for c in range(height.shape[1]):
                 motion = Motion(
@@ -64,14 +88,18 @@ def kernel(Law: type):
                     (ahead[b, c, 0], ahead[b, c, 1], ahead[b, c, 2]),
                     height[b, c],
                 )
-                force, moment = on_faces(law, ground, table, first[b], first[b + 1], motion)
+                force, moment = on_faces(
+                    law, ground, table, first[b], first[b + 1], motion
+                )
                 out[b, c, 0], out[b, c, 1], out[b, c, 2] = force
                 out[b, c, 3], out[b, c, 4], out[b, c, 5] = moment
 
     return cached(total, f"the contact of faces with ground of the form {Law.__name__}")
 
 
-def sum_loads(law, ground: Ground, table: np.ndarray, first: np.ndarray, motions: Motion) -> np.ndarray:
+def sum_loads(
+    law, ground: Ground, table: np.ndarray, first: np.ndarray, motions: Motion
+) -> np.ndarray:
     """Return (B, C, 6): the same as `rft.meshes.blocks.Blocks.loads`, by the record of a law."""
     out, numbers = np.empty((*motions.height.shape, 6)), tuple(map(float, ground[:-1]))
     arrays = (np.ascontiguousarray(x, float) for x in motions)

@@ -94,10 +94,20 @@ def corner_heights(face, motion):
 def part_below(face, heights):
     """Return the `Part` of a face below the surface, from the heights of its corners, m."""
     share, middle, moments = part_of_triangle(-heights[0], -heights[1], -heights[2])
-    a, b, c = (face.x1, face.y1, face.z1), (face.x2, face.y2, face.z2), (face.x3, face.y3, face.z3)
+    a, b, c = (
+        (face.x1, face.y1, face.z1),
+        (face.x2, face.y2, face.z2),
+        (face.x3, face.y3, face.z3),
+    )
     depth = face.area * (moments[0] + moments[1] + moments[2])
     arms = times(face.area, weighted(moments, a, b, c))
-    return Part((face.nx, face.ny, face.nz), weighted(middle, a, b, c), face.area * share, depth, arms)
+    return Part(
+        (face.nx, face.ny, face.nz),
+        weighted(middle, a, b, c),
+        face.area * share,
+        depth,
+        arms,
+    )
 
 
 @formula
@@ -118,7 +128,9 @@ def load(law, ground, part, motion, v, sheet):
     if ground.downhill_loss == 0.0 and len(ground.disturbed) == 0:
         share = share * ground.strength
     else:
-        share = share * strength_at(ground, motion.x + dot(motion.ahead, part.middle), dot(motion.ahead, unit))
+        share = share * strength_at(
+            ground, motion.x + dot(motion.ahead, part.middle), dot(motion.ahead, unit)
+        )
     stress = times(share, law.traction(n, unit, motion.up))
     force, moment = times(part.depth, stress), cross(part.arms, stress)
     if ground.flux != 0.0:
@@ -135,9 +147,18 @@ def record(law: FaceLaw):
     return record_class(type(law).__name__, tuple(numbers), formulas)(*numbers.values())
 
 
-def faces(corners: np.ndarray, normals: np.ndarray, sheet: np.ndarray | bool = False) -> Face:
+def faces(
+    corners: np.ndarray, normals: np.ndarray, sheet: np.ndarray | bool = False
+) -> Face:
     """Return the faces (T,) with corners (T, 3, 3), m, and outward unit normals (T, 3)."""
     a, b, c = corners.swapaxes(0, 1)
     across = np.cross(b - a, c - a)
     area = np.copysign(np.linalg.norm(across, axis=1) / 2, (across * normals).sum(1))
-    return Face(*a.T, *b.T, *c.T, *normals.T, area, np.broadcast_to(sheet, area.shape).astype(float))
+    return Face(
+        *a.T,
+        *b.T,
+        *c.T,
+        *normals.T,
+        area,
+        np.broadcast_to(sheet, area.shape).astype(float),
+    )

@@ -33,10 +33,20 @@ def traction_of_map(s, n, v, up=UP):
     """Return the force per area and depth, N/m^3, by the numbers of a stress map on faces with unit normals n and unit
     velocities v, whether or not they lead; ``up`` is the unit vector upwards."""
     n_z, v_z, along = dot(up, n), dot(up, v), dot(n, v)
-    n_h, v_h, inner = minus(n, times(n_z, up)), minus(v, times(v_z, up)), along - n_z * v_z
+    n_h, v_h, inner = (
+        minus(n, times(n_z, up)),
+        minus(v, times(v_z, up)),
+        along - n_z * v_z,
+    )
     cos_2b = n_z * n_z - dot(n_h, n_h)
     total, difference = s.C11 + s.Cm11, s.Cm11 - s.C11
-    a_z = s.A00 + s.A10 * cos_2b - (s.B11 + s.Bm11) * cos_2b * v_z - (s.B11 - s.Bm11) * 2.0 * n_z * inner - s.B01 * v_z
+    a_z = (
+        s.A00
+        + s.A10 * cos_2b
+        - (s.B11 + s.Bm11) * cos_2b * v_z
+        - (s.B11 - s.Bm11) * 2.0 * n_z * inner
+        - s.B01 * v_z
+    )
     a_h = plus(
         times((s.C01 + total) * n_z * n_z, v_h),
         times((s.C01 - total) * inner + 2.0 * n_z * (difference * v_z - s.D10), n_h),
@@ -55,9 +65,7 @@ class Extruded:
     stress: StressMap
 
     def __post_init__(self):
-        message = (
-            f"stress must be a StressMap, nine coefficients, got {formatted(self.stress)}: fit some to plate drags"
-        )
+        message = f"stress must be a StressMap, nine coefficients, got {formatted(self.stress)}: fit some to plate drags"
         require(isinstance(self.stress, StressMap), message)
 
     def __getattr__(self, name: str) -> float:

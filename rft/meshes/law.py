@@ -51,7 +51,9 @@ COEFFICIENTS = (
 def fitted(n, v, up):
     """Return `alpha` for unit normals n and unit velocities v; ``up`` is the unit vector upwards."""
     height, along = dot(up, n), dot(n, v)
-    down = where((height > UPRIGHT) | ((absolute(height) <= UPRIGHT) & (along < 0.0)), -1.0, 1.0)
+    down = where(
+        (height > UPRIGHT) | ((absolute(height) <= UPRIGHT) & (along < 0.0)), -1.0, 1.0
+    )
     x1, x2, x3 = -dot(up, v), -(down * height), down * along
     a, b, c = x1 * x1, x2 * x2, x3 * x3
     f1, f2, f3 = combinations(
@@ -104,7 +106,13 @@ class Spatial:
     """
 
     xi_n: Annotated[
-        float, Number(1, 1e12, "N/m^3", "strength, 1 to 1e12: a plate pushed straight down bears 0.875 xi_n |z|")
+        float,
+        Number(
+            1,
+            1e12,
+            "N/m^3",
+            "strength, 1 to 1e12: a plate pushed straight down bears 0.875 xi_n |z|",
+        ),
     ]
     surface_friction: Annotated[
         float,
@@ -124,7 +132,11 @@ class Spatial:
 
     def __post_init__(self):
         check_numbers(self)
-        require(self.tension in TENSION, f"tension must be one of {', '.join(TENSION)}", value=self.tension)
+        require(
+            self.tension in TENSION,
+            f"tension must be one of {', '.join(TENSION)}",
+            value=self.tension,
+        )
 
     @classmethod
     def from_grains(cls, density: float, friction: float, **more) -> Spatial:
@@ -154,7 +166,9 @@ class Spatial:
         """Return `stress` (3, N) for n and v (3, N)."""
         speed = np.sqrt(dot(v, v))
         v = v / np.where(speed > 0, speed, 1.0)
-        return np.stack(self.traction(n, v)) * (self.lead(dot(n, v), self.grazing_sine) * (speed > 0))
+        return np.stack(self.traction(n, v)) * (
+            self.lead(dot(n, v), self.grazing_sine) * (speed > 0)
+        )
 
     @property
     def cut(self) -> float:
@@ -199,7 +213,11 @@ class Spatial:
 def alpha_of_angles(beta, gamma, psi) -> np.ndarray:
     """Return alpha (..., 3) along r, theta, z of a plate tilted by beta that moves gamma below the horizontal, with its
     normal at the angle psi from that direction about the vertical; rad."""
-    beta, gamma, psi = np.broadcast_arrays(*(np.asarray(x, float) for x in (beta, gamma, psi)))
-    n = np.stack([np.sin(beta) * np.cos(psi), np.sin(beta) * np.sin(psi), -np.cos(beta)], -1)
+    beta, gamma, psi = np.broadcast_arrays(
+        *(np.asarray(x, float) for x in (beta, gamma, psi))
+    )
+    n = np.stack(
+        [np.sin(beta) * np.cos(psi), np.sin(beta) * np.sin(psi), -np.cos(beta)], -1
+    )
     v = np.stack([np.cos(gamma), np.zeros_like(gamma), -np.sin(gamma)], -1)
     return alpha(n, v)

@@ -44,21 +44,47 @@ class Mesh:
 
     def __post_init__(self):
         vertices, faces = real_array("vertices", self.vertices), np.asarray(self.faces)
-        require(vertices.ndim == 2 and vertices.shape[1:] == (3,), "vertices must be (V, 3)", value=vertices.shape)
+        require(
+            vertices.ndim == 2 and vertices.shape[1:] == (3,),
+            "vertices must be (V, 3)",
+            value=vertices.shape,
+        )
         valid = faces.ndim == 2 and faces.shape[1:] == (3,) and faces.dtype.kind in "iu"
-        require(valid, f"faces must be (F, 3) whole numbers, got {faces.dtype} {faces.shape}")
-        require(0 < len(faces) <= MOST_TRIANGLES, f"a mesh has 1 to {MOST_TRIANGLES:,} triangles, got {len(faces):,}")
+        require(
+            valid,
+            f"faces must be (F, 3) whole numbers, got {faces.dtype} {faces.shape}",
+        )
+        require(
+            0 < len(faces) <= MOST_TRIANGLES,
+            f"a mesh has 1 to {MOST_TRIANGLES:,} triangles, got {len(faces):,}",
+        )
         require(bool(np.isfinite(vertices).all()), "vertices must be finite")
         _require_known(faces, len(vertices))
-        require(isinstance(self.closed, bool), "closed must be true or false", value=self.closed)
-        normals = None if self.smooth_normals is None else real_array("smooth_normals", self.smooth_normals)
-        valid = normals is None or (normals.shape == (len(faces), 3, 3) and bool(np.isfinite(normals).all()))
-        require(valid, f"smooth_normals must be unit normals of shape ({len(faces)}, 3, 3)")
+        require(
+            isinstance(self.closed, bool),
+            "closed must be true or false",
+            value=self.closed,
+        )
+        normals = (
+            None
+            if self.smooth_normals is None
+            else real_array("smooth_normals", self.smooth_normals)
+        )
+        valid = normals is None or (
+            normals.shape == (len(faces), 3, 3) and bool(np.isfinite(normals).all())
+        )
+        require(
+            valid, f"smooth_normals must be unit normals of shape ({len(faces)}, 3, 3)"
+        )
         object.__setattr__(self, "smooth_normals", normals)
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", faces.astype(np.int64))
         flat = int((self.areas <= 1e-14 * np.ptp(vertices, axis=0).max() ** 2).sum())
-        require(not flat, f"{flat} of {len(faces)} triangles have no area", because="clean the mesh")
+        require(
+            not flat,
+            f"{flat} of {len(faces)} triangles have no area",
+            because="clean the mesh",
+        )
         if self.closed:
             self._require_closed()
 
@@ -127,7 +153,9 @@ class Mesh:
     def second_moments(self) -> np.ndarray:
         """Integrals (F, 3, 3) of x x^T over the triangles, m^4."""
         corners = self.vertices[self.faces]
-        sums = np.einsum("fci,fcj->fij", corners, corners) + 9 * np.einsum("fi,fj->fij", self.middles, self.middles)
+        sums = np.einsum("fci,fcj->fij", corners, corners) + 9 * np.einsum(
+            "fi,fj->fij", self.middles, self.middles
+        )
         return sums * (self.areas / 12)[:, None, None]
 
     @property
@@ -141,7 +169,12 @@ class Mesh:
         """An open mesh with a second triangle on the back of each, so that the side which leads bears."""
         smooth = self.smooth_normals
         normals = None if smooth is None else np.concatenate([smooth, -smooth[:, ::-1]])
-        return Mesh(self.vertices, np.concatenate([self.faces, self.faces[:, ::-1]]), False, normals)
+        return Mesh(
+            self.vertices,
+            np.concatenate([self.faces, self.faces[:, ::-1]]),
+            False,
+            normals,
+        )
 
 
 def below(corners: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -162,13 +195,22 @@ def below(corners: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndar
     full, tips, pairs = (np.flatnonzero(count == k) for k in (3, 1, 2))
     # The vertex that is alone on its side comes first; the sense of the triangle stays.
     (a, p, q), (lone, b, c) = (
-        _starting_at(corners[index], heights[index], np.argmax(under[index] == alone, -1))
+        _starting_at(
+            corners[index], heights[index], np.argmax(under[index] == alone, -1)
+        )
         for index, alone in ((tips, True), (pairs, False))
     )
     small = np.stack([a[0], _crossing(a, p), _crossing(a, q)], 1)
     p, q = _crossing(b, lone), _crossing(c, lone)
     return (
-        np.concatenate([corners[full], small, np.stack([p, b[0], c[0]], 1), np.stack([p, c[0], q], 1)]),
+        np.concatenate(
+            [
+                corners[full],
+                small,
+                np.stack([p, b[0], c[0]], 1),
+                np.stack([p, c[0], q], 1),
+            ]
+        ),
         np.concatenate([full, tips, pairs, pairs]),
     )
 
@@ -187,13 +229,17 @@ def _crossing(under: tuple, over: tuple) -> np.ndarray:
     return under[0] + share[:, None] * (over[0] - under[0])
 
 
-def subdivided(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def subdivided(
+    vertices: np.ndarray, faces: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return vertices and faces of a mesh with every triangle cut in four flat ones at the middles of its edges."""
     pairs = np.sort(np.stack([faces, faces[:, [1, 2, 0]]], -1).reshape(-1, 2), -1)
     edges, index = np.unique(pairs, axis=0, return_inverse=True)
     ab, bc, ca = len(vertices) + index.reshape(-1, 3).T
     a, b, c = faces.T
-    cut = np.concatenate([np.stack(t, -1) for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))])
+    cut = np.concatenate(
+        [np.stack(t, -1) for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))]
+    )
     return np.concatenate([vertices, vertices[edges].mean(1)]), cut
 
 
@@ -202,26 +248,49 @@ def quartered(mesh: Mesh) -> Mesh:
     normals = mesh.smooth_normals
     if normals is not None:
         a, b, c = normals.swapaxes(0, 1)
-        ab, bc, ca = (x / np.linalg.norm(x, axis=-1, keepdims=True) for x in (a + b, b + c, c + a))
-        normals = np.concatenate([np.stack(t, 1) for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))])
+        ab, bc, ca = (
+            x / np.linalg.norm(x, axis=-1, keepdims=True) for x in (a + b, b + c, c + a)
+        )
+        normals = np.concatenate(
+            [
+                np.stack(t, 1)
+                for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))
+            ]
+        )
     return Mesh(*subdivided(mesh.vertices, mesh.faces), mesh.closed, normals)
 
 
 def mirrored(mesh: Mesh) -> Mesh:
     """Return the mirror image of a mesh in the plane of x and z."""
-    normals = None if mesh.smooth_normals is None else mesh.smooth_normals[:, ::-1] * [1.0, -1.0, 1.0]
-    return Mesh(mesh.vertices * [1.0, -1.0, 1.0], mesh.faces[:, ::-1], mesh.closed, normals)
+    normals = (
+        None
+        if mesh.smooth_normals is None
+        else mesh.smooth_normals[:, ::-1] * [1.0, -1.0, 1.0]
+    )
+    return Mesh(
+        mesh.vertices * [1.0, -1.0, 1.0], mesh.faces[:, ::-1], mesh.closed, normals
+    )
 
 
 def read(path, closed: bool = True, scale: float = 1.0) -> Mesh:
     """Return the mesh of an STL, OBJ or PLY file, with lengths times ``scale``, 0.001 for millimetres. Needs trimesh."""
     kind = str(path).rpartition(".")[2].lower()
-    require(kind in ("stl", "obj", "ply"), "a mesh is an .stl, .obj or .ply file", where=path)
+    require(
+        kind in ("stl", "obj", "ply"),
+        "a mesh is an .stl, .obj or .ply file",
+        where=path,
+    )
     vertices, faces = _loaded(Path(path), kind)
-    require(faces.ndim == 2 and len(faces) > 0, f"{path} is no {kind.upper()} mesh", because="it has no triangles")
+    require(
+        faces.ndim == 2 and len(faces) > 0,
+        f"{path} is no {kind.upper()} mesh",
+        because="it has no triangles",
+    )
     with located(path):
         _require_known(faces, len(vertices))
-    merged, index = np.unique(vertices, axis=0, return_inverse=True)  # an STL file has three vertices for each triangle
+    merged, index = np.unique(
+        vertices, axis=0, return_inverse=True
+    )  # an STL file has three vertices for each triangle
     size = scale * float(np.ptp(merged, axis=0).max())
     with located(path):
         require(
@@ -235,23 +304,33 @@ def read(path, closed: bool = True, scale: float = 1.0) -> Mesh:
 def _require_known(faces: np.ndarray, count: int) -> None:
     """Raise ValueError if faces name vertices other than 0 to count - 1."""
     for bad in faces[(faces < 0) | (faces >= count)][:1]:
-        raise Refusal(f"a face names vertex {bad}, where vertices are 0 to {count - 1}", instead="mend the mesh")
+        raise Refusal(
+            f"a face names vertex {bad}, where vertices are 0 to {count - 1}",
+            instead="mend the mesh",
+        )
 
 
 # Lines of an OBJ file: a face with a vertex 0, a face with a vertex below 0, and a vertex.
 ZERO, BACK, VERTEX = (
-    re.compile(rb"^[ \t]*" + line, re.M) for line in (rb"f[^\n]*[ \t]0+(?=[/\s]|\Z)", rb"f[^\n]*[ \t]-", rb"v[ \t]")
+    re.compile(rb"^[ \t]*" + line, re.M)
+    for line in (rb"f[^\n]*[ \t]0+(?=[/\s]|\Z)", rb"f[^\n]*[ \t]-", rb"v[ \t]")
 )
 
 
 def _require_read_rightly(data: bytes) -> None:
     """Raise ValueError for an OBJ file that trimesh misreads: it takes vertex 0 for the last one, and counts vertices below 0
     back from the end of the file, where OBJ counts back from the face."""
-    require(not ZERO.search(data), "a face names vertex 0, where vertices count from 1", instead="mend the mesh")
+    require(
+        not ZERO.search(data),
+        "a face names vertex 0, where vertices count from 1",
+        instead="mend the mesh",
+    )
     back = BACK.search(data)
     valid = back is None or not VERTEX.search(data, back.end())
     require(
-        valid, "a face counts vertices back, and vertices follow it", instead="count from 1, or put all vertices first"
+        valid,
+        "a face counts vertices back, and vertices follow it",
+        instead="count from 1, or put all vertices first",
     )
 
 
@@ -260,7 +339,11 @@ def _loaded(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
     try:
         import trimesh
     except ImportError:
-        raise Refusal("reading a mesh needs trimesh", where=path, instead="pip install 'geomech[mesh]'") from None
+        raise Refusal(
+            "reading a mesh needs trimesh",
+            where=path,
+            instead="pip install 'geomech[mesh]'",
+        ) from None
     try:
         size = path.stat().st_size
         require(path.is_file(), f"{path} is no ordinary file")
@@ -276,7 +359,13 @@ def _loaded(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
         with located(path):
             _require_read_rightly(data)
     try:
-        mesh = trimesh.load(io.BytesIO(data), file_type=kind, force="mesh", process=False)
+        mesh = trimesh.load(
+            io.BytesIO(data), file_type=kind, force="mesh", process=False
+        )
         return np.asarray(mesh.vertices, float), np.asarray(getattr(mesh, "faces", ()))
-    except Exception as error:  # trimesh raises many kinds of errors for a file that is no mesh
-        raise Refusal(f"{path} is no {kind.upper()} mesh", because=formatted(str(error))) from None
+    except (
+        Exception
+    ) as error:  # trimesh raises many kinds of errors for a file that is no mesh
+        raise Refusal(
+            f"{path} is no {kind.upper()} mesh", because=formatted(str(error))
+        ) from None

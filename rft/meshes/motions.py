@@ -15,7 +15,16 @@ import numpy as np
 from rft.checks import Number, check_numbers, real_array
 from rft.meshes.mesh import Mesh
 from rft.metres import LARGEST, metres
-from rft.prescribed import FARTHEST, MOST_SAMPLES, Depth, Direction, Distance, Height, Motion, Samples
+from rft.prescribed import (
+    FARTHEST,
+    MOST_SAMPLES,
+    Depth,
+    Direction,
+    Distance,
+    Height,
+    Motion,
+    Samples,
+)
 from rft.refusal import require
 
 if TYPE_CHECKING:
@@ -23,9 +32,23 @@ if TYPE_CHECKING:
 
 WIDEST = 2.0  # rad between two poses of a path
 
-Speed = Annotated[float, Number(1e-9, 1e3, "m/s", "speed; it changes no force but that of grain inertia")]
-Heading = Annotated[float, Number(-10, 10, "rad", "heading of the motion along the ground, from x towards y")]
-Angle = Annotated[float, Number(-1e3, 1e3, "rad", "angle about the axis, from the attitude, at one end of the motion")]
+Speed = Annotated[
+    float,
+    Number(1e-9, 1e3, "m/s", "speed; it changes no force but that of grain inertia"),
+]
+Heading = Annotated[
+    float,
+    Number(-10, 10, "rad", "heading of the motion along the ground, from x towards y"),
+]
+Angle = Annotated[
+    float,
+    Number(
+        -1e3,
+        1e3,
+        "rad",
+        "angle about the axis, from the attitude, at one end of the motion",
+    ),
+]
 
 
 class Trajectory(NamedTuple):
@@ -132,11 +155,19 @@ class Rotate(Motion):
     hub_height: Height
     axis: tuple[float, ...] = (0.0, 1.0, 0.0)
     rate: Annotated[
-        float, Number(-1e3, 1e3, "rad/s", "rate of rotation, right-handed about the axis; positive if stop > start")
+        float,
+        Number(
+            -1e3,
+            1e3,
+            "rad/s",
+            "rate of rotation, right-handed about the axis; positive if stop > start",
+        ),
     ] = 2 * math.pi
     start: Angle = -math.pi
     stop: Angle = math.pi
-    speed: Annotated[float, Number(-1e3, 1e3, "m/s", "speed of the origin along the ground")] = 0.0
+    speed: Annotated[
+        float, Number(-1e3, 1e3, "m/s", "speed of the origin along the ground")
+    ] = 0.0
     heading: Heading = 0.0
     attitude: float | tuple[float, ...] = (0.0, 0.0, 0.0)
     samples: Samples = 361
@@ -148,7 +179,11 @@ class Rotate(Motion):
         axis = real_array("axis", self.axis)
         size = float(np.linalg.norm(axis)) if axis.shape == (3,) else 0.0
         valid = 1e-9 < size < 1e9
-        require(valid, "axis must be three numbers that are not all 0, such as [0, 1, 0]", value=self.axis)
+        require(
+            valid,
+            "axis must be three numbers that are not all 0, such as [0, 1, 0]",
+            value=self.axis,
+        )
         object.__setattr__(self, "axis", tuple(axis.tolist()))
         _set_attitude(self)
 
@@ -158,9 +193,18 @@ class Rotate(Motion):
         angle = np.linspace(self.start, self.stop, self.samples)
         t = (angle - self.start) / self.rate
         rotation = rotations(angle[:, None] * axis).as_matrix() @ _matrix(self.attitude)
-        velocity = np.broadcast_to(self.speed * _unit_vector(self.heading, 0.0), rotation.shape[:2])
+        velocity = np.broadcast_to(
+            self.speed * _unit_vector(self.heading, 0.0), rotation.shape[:2]
+        )
         place = velocity * t[:, None] + [0.0, 0.0, self.hub_height]
-        return Trajectory(t, place, rotation, velocity, np.broadcast_to(self.rate * axis, velocity.shape), angle)
+        return Trajectory(
+            t,
+            place,
+            rotation,
+            velocity,
+            np.broadcast_to(self.rate * axis, velocity.shape),
+            angle,
+        )
 
 
 @dataclass(frozen=True)
@@ -191,21 +235,36 @@ class Path(Motion):
             values = real_array(name, getattr(self, name))
             require(values.ndim == 1, f"{name} must be a list of numbers")
             object.__setattr__(self, name, tuple(values.tolist()))
-            largest, unit = {"x": (FARTHEST, " m"), "y": (FARTHEST, " m"), "z": (LARGEST, " m")}.get(name, (1e9, ""))
+            largest, unit = {
+                "x": (FARTHEST, " m"),
+                "y": (FARTHEST, " m"),
+                "z": (LARGEST, " m"),
+            }.get(name, (1e9, ""))
             within = bool((np.abs(values) <= largest).all())
             require(within, f"{name} must be finite and within {largest:g}{unit}")
-        require(3 <= len(self.t) <= MOST_SAMPLES, f"a path takes 3 to {MOST_SAMPLES} poses", value=len(self.t))
+        require(
+            3 <= len(self.t) <= MOST_SAMPLES,
+            f"a path takes 3 to {MOST_SAMPLES} poses",
+            value=len(self.t),
+        )
         same = len(self.x) == len(self.y) == len(self.z) == len(self.t)
         all_or_none = {len(self.rx), len(self.ry), len(self.rz)} in ({0}, {len(self.t)})
         require(same and all_or_none, "t, x, y, z and rx, ry, rz must be equally many")
         late = np.flatnonzero(np.diff(self.t) <= 0)
         require(
-            not late.size, f"t must ascend, but t = {(self.t[late[0]] if late.size else 0):g} is not before the next"
+            not late.size,
+            f"t must ascend, but t = {(self.t[late[0]] if late.size else 0):g} is not before the next",
         )
         rotation = self._rotations()
-        wide = np.flatnonzero((rotation[1:] * rotation[:-1].inv()).magnitude() >= WIDEST)
+        wide = np.flatnonzero(
+            (rotation[1:] * rotation[:-1].inv()).magnitude() >= WIDEST
+        )
         after = f"after t = {self.t[wide[0]] if wide.size else 0:g}"
-        require(not wide.size, f"the body turns by {WIDEST:g} rad or more {after}", instead="give poses between")
+        require(
+            not wide.size,
+            f"the body turns by {WIDEST:g} rad or more {after}",
+            instead="give poses between",
+        )
 
     @property
     def samples(self) -> int:
@@ -213,13 +272,28 @@ class Path(Motion):
 
     def _rotations(self) -> Rotation:
         """Return the rotations (T,) of the poses."""
-        return rotations(np.stack([self.rx, self.ry, self.rz], -1) if self.rx else np.zeros((len(self.t), 3)))
+        return rotations(
+            np.stack([self.rx, self.ry, self.rz], -1)
+            if self.rx
+            else np.zeros((len(self.t), 3))
+        )
 
     def trajectory(self, mesh: Mesh) -> Trajectory:
         """Return the motion of a mesh in time."""
-        t, place, rotation = np.array(self.t), np.stack([self.x, self.y, self.z], -1), self._rotations()
+        t, place, rotation = (
+            np.array(self.t),
+            np.stack([self.x, self.y, self.z], -1),
+            self._rotations(),
+        )
         velocity = np.gradient(place, t, axis=0, edge_order=2)
-        return Trajectory(t, place, rotation.as_matrix(), velocity, _spins(t, rotation), np.zeros_like(t))
+        return Trajectory(
+            t,
+            place,
+            rotation.as_matrix(),
+            velocity,
+            _spins(t, rotation),
+            np.zeros_like(t),
+        )
 
 
 MOTIONS = {"drag": Drag, "penetrate": Penetrate, "rotate": Rotate, "csv": Path}
@@ -243,7 +317,9 @@ def _spins(t, rotation: Rotation) -> np.ndarray:
     spins = 0.0
     for k in range(3):
         i, j = (three[:, m] for m in range(3) if m != k)
-        slope = (2 * t - t[i] - t[j]) / ((t[three[:, k]] - t[i]) * (t[three[:, k]] - t[j]))
+        slope = (2 * t - t[i] - t[j]) / (
+            (t[three[:, k]] - t[i]) * (t[three[:, k]] - t[j])
+        )
         spins = spins + slope[:, None] * vectors[:, k]
     return spins
 
@@ -267,7 +343,9 @@ def _matrix(vector) -> np.ndarray:
 def _unit_vector(heading: float, direction: float) -> np.ndarray:
     """Return the unit vector (3,) with a heading along the ground and a direction below the horizontal, rad."""
     level = math.cos(direction)
-    along = np.array([level * math.cos(heading), level * math.sin(heading), -math.sin(direction)])
+    along = np.array(
+        [level * math.cos(heading), level * math.sin(heading), -math.sin(direction)]
+    )
     along[np.abs(along) < 1e-15] = 0.0  # straight down, or level, to the last digit
     return along
 
@@ -279,4 +357,11 @@ def _straight(motion, z: float, distance: float) -> Trajectory:
     place = np.array([0.0, 0.0, z]) + s[:, None] * along
     rotation = np.broadcast_to(_matrix(motion.attitude), (len(s), 3, 3))
     velocity = np.broadcast_to(motion.speed * along, place.shape)
-    return Trajectory(s / motion.speed, place, rotation, velocity, np.zeros_like(place), np.zeros_like(s))
+    return Trajectory(
+        s / motion.speed,
+        place,
+        rotation,
+        velocity,
+        np.zeros_like(place),
+        np.zeros_like(s),
+    )

@@ -29,23 +29,32 @@ def sphere(radius: float, fineness: int = 4) -> Mesh:
     ])  # fmt: skip
     for _ in range(int(fineness)):
         vertices, faces = _quartered(vertices, faces)
-    return Mesh(radius * vertices / np.linalg.norm(vertices, axis=-1, keepdims=True), faces)
+    return Mesh(
+        radius * vertices / np.linalg.norm(vertices, axis=-1, keepdims=True), faces
+    )
 
 
-def _quartered(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _quartered(
+    vertices: np.ndarray, faces: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return vertices and faces with every triangle cut in four at the middles of its edges, all on one sphere."""
     size = np.linalg.norm(vertices[0])
     vertices, faces = subdivided(vertices, faces)
     return vertices * (size / np.linalg.norm(vertices, axis=-1, keepdims=True)), faces
 
 
-def cylinder(radius: float, length: float, around: int = 64, along: int = 32, across: int = 8) -> Mesh:
+def cylinder(
+    radius: float, length: float, around: int = 64, along: int = 32, across: int = 8
+) -> Mesh:
     """Return a cylinder along y. around, along, across: numbers of quadrilaterals, the last from rim to middle of an end."""
     _check_sizes(radius=radius, length=length)
     turn = 2 * np.pi * np.arange(_count("around", around, 3)) / around
     circle = np.stack([np.cos(turn), 0 * turn, -np.sin(turn)], -1)
     y = length * np.linspace(-0.5, 0.5, _count("along", along, 1) + 1)
-    return _tube(np.array([radius * circle + [0, place, 0] for place in y]), _count("across", across, 1))
+    return _tube(
+        np.array([radius * circle + [0, place, 0] for place in y]),
+        _count("across", across, 1),
+    )
 
 
 def screw(
@@ -55,13 +64,19 @@ def screw(
     """Return a right-handed Archimedean screw along x: a core with one thread of a smooth profile, ``radius`` - ``core``
     high and ``pitch`` from turn to turn, and cones of length ``nose`` at its ends."""
     _check_sizes(radius=radius, core=core, pitch=pitch, length=length)
-    require(core < radius, f"core must be less than the radius, got {core:g} and {radius:g}")
+    require(
+        core < radius, f"core must be less than the radius, got {core:g} and {radius:g}"
+    )
     turn = 2 * np.pi * np.arange(_count("around", around, 3)) / around
     rings = []
     for x in length * np.linspace(-0.5, 0.5, _count("along", along, 1) + 1):
-        height = np.exp(6.0 * (np.cos(turn - 2 * np.pi * x / pitch) - 1.0))  # profile; the sharpness 6 is assumed
+        height = np.exp(
+            6.0 * (np.cos(turn - 2 * np.pi * x / pitch) - 1.0)
+        )  # profile; the sharpness 6 is assumed
         r = core + (radius - core) * height
-        rings.append(np.stack([np.full_like(turn, x), r * np.cos(turn), r * np.sin(turn)], -1))
+        rings.append(
+            np.stack([np.full_like(turn, x), r * np.cos(turn), r * np.sin(turn)], -1)
+        )
     return _tube(np.array(rings), _count("across", across, 1), nose)
 
 
@@ -71,10 +86,29 @@ def capsule(radius: float, half: float, around: int = 24, along: int = 4) -> Mes
     _check_sizes(radius=radius, half=half)
     turn = 2 * np.pi * np.arange(_count("around", around, 4)) / around
     polar = np.linspace(0.25, around / 4, max(2, around // 4)) * 2 * np.pi / around
-    z = [-half - radius * np.cos(polar), np.linspace(-half, half, _count("along", along, 1) + 1)[1:-1]]
+    z = [
+        -half - radius * np.cos(polar),
+        np.linspace(-half, half, _count("along", along, 1) + 1)[1:-1],
+    ]
     z = np.concatenate([*z, -z[0][::-1]])
-    r = np.concatenate([radius * np.sin(polar), np.full(along - 1, radius), radius * np.sin(polar)[::-1]])
-    return _tube(np.stack([np.outer(r, np.cos(turn)), np.outer(r, np.sin(turn)), z[:, None] + 0 * turn], -1), 1)
+    r = np.concatenate(
+        [
+            radius * np.sin(polar),
+            np.full(along - 1, radius),
+            radius * np.sin(polar)[::-1],
+        ]
+    )
+    return _tube(
+        np.stack(
+            [
+                np.outer(r, np.cos(turn)),
+                np.outer(r, np.sin(turn)),
+                z[:, None] + 0 * turn,
+            ],
+            -1,
+        ),
+        1,
+    )
 
 
 def box(sides, m: int | Sequence[int] = 1) -> Mesh:
@@ -86,18 +120,37 @@ def box(sides, m: int | Sequence[int] = 1) -> Mesh:
         along, across = (pieces[(axis + k) % 3] for k in (1, 2))
         for out in (-1.0, 1.0):
             lines = (np.arange(-one, one + 1, 2) / one for one in (along, across))
-            u, v = np.meshgrid(*(side * line for side, line in zip((1.0, out), lines)), indexing="ij")
+            u, v = np.meshgrid(
+                *(side * line for side, line in zip((1.0, out), lines)), indexing="ij"
+            )
             index = n + np.arange(u.size).reshape(u.shape)
             n += u.size
-            a, b, c, d = (x.ravel() for x in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
-            points.append(np.roll(np.stack([out + 0 * u, u, v], -1).reshape(-1, 3), axis, 1) * half)
+            a, b, c, d = (
+                x.ravel()
+                for x in (
+                    index[:-1, :-1],
+                    index[1:, :-1],
+                    index[1:, 1:],
+                    index[:-1, 1:],
+                )
+            )
+            points.append(
+                np.roll(np.stack([out + 0 * u, u, v], -1).reshape(-1, 3), axis, 1)
+                * half
+            )
             faces += [np.stack([a, b, c], -1), np.stack([a, c, d], -1)]
     vertices, index = np.unique(np.concatenate(points), axis=0, return_inverse=True)
     return Mesh(vertices, index.reshape(-1)[np.concatenate(faces)])
 
 
 def leg(
-    reach: float, curvature: float, thickness: float, width: float, along: int = 64, across: int = 8, thick: int = 2
+    reach: float,
+    curvature: float,
+    thickness: float,
+    width: float,
+    along: int = 64,
+    across: int = 8,
+    thick: int = 2,
 ) -> Mesh:
     """Return a strip that hangs from the hip, at the origin, to (0, 0, -2 reach), bent to an arc of radius reach / curvature.
 
@@ -105,19 +158,33 @@ def leg(
     along, across, thick: numbers of quadrilaterals along the strip, across its width and through its thickness."""
     _check_sizes(reach=reach, thickness=thickness, width=width)
     in_range("curvature", curvature, -1, 1)
-    require(thickness < reach, f"thickness must be less than the reach, got {thickness:g} and {reach:g}")
+    require(
+        thickness < reach,
+        f"thickness must be less than the reach, got {thickness:g} and {reach:g}",
+    )
     s = np.linspace(-1.0, 1.0, _count("along", along, 2) + 1)
     half = np.arcsin(abs(curvature))
-    bend = np.sign(curvature) * half * s  # angle of the strip's direction from straight down
+    bend = (
+        np.sign(curvature) * half * s
+    )  # angle of the strip's direction from straight down
     if half:
         r = reach / np.sin(half)
-        x, z = np.sign(curvature) * r * (np.cos(half * s) - np.cos(half)), -reach - r * np.sin(half * s)
+        x, z = (
+            np.sign(curvature) * r * (np.cos(half * s) - np.cos(half)),
+            -reach - r * np.sin(half * s),
+        )
     else:
         x, z = 0 * s, -reach - reach * s
-    normal = np.stack([np.cos(bend), 0 * s, -np.sin(bend)], -1)  # through the strip, forwards
-    corners = _rectangle(thickness, width, _count("thick", thick, 1), _count("across", across, 1))
+    normal = np.stack(
+        [np.cos(bend), 0 * s, -np.sin(bend)], -1
+    )  # through the strip, forwards
+    corners = _rectangle(
+        thickness, width, _count("thick", thick, 1), _count("across", across, 1)
+    )
     rings = (
-        np.stack([x, 0 * s, z], -1)[:, None] + corners[None, :, :1] * normal[:, None] + corners[:, 1:] * [0.0, 1.0, 0.0]
+        np.stack([x, 0 * s, z], -1)[:, None]
+        + corners[None, :, :1] * normal[:, None]
+        + corners[:, 1:] * [0.0, 1.0, 0.0]
     )
     return _tube(rings, max(1, round(across / 2)))
 
@@ -136,7 +203,9 @@ def _tube(rings: np.ndarray, across: int, nose: float = 0.0) -> Mesh:
     share = np.linspace(0.0, 1.0, across + 1)[1:-1][:, None, None]
     first, last = rings[0], rings[-1]
     near, far = first.mean(0) - [nose, 0.0, 0.0], last.mean(0) + [nose, 0.0, 0.0]
-    rings = np.concatenate([near + share * (first - near), rings, far + share[::-1] * (last - far)])
+    rings = np.concatenate(
+        [near + share * (first - near), rings, far + share[::-1] * (last - far)]
+    )
     m, k, _ = rings.shape
     i = np.arange(m * k).reshape(m, k)
     tip, end, ahead = m * k, m * k + 1, np.roll(np.arange(k), -1)
@@ -145,7 +214,9 @@ def _tube(rings: np.ndarray, across: int, nose: float = 0.0) -> Mesh:
         np.stack([np.full(k, tip), ahead, np.arange(k)], -1),
         np.stack([np.full(k, end), i[-1], i[-1][ahead]], -1),
     ]  # fmt: skip
-    return outward(np.concatenate([rings.reshape(-1, 3), [near, far]]), np.concatenate(faces))
+    return outward(
+        np.concatenate([rings.reshape(-1, 3), [near, far]]), np.concatenate(faces)
+    )
 
 
 def triangles(rows: np.ndarray, closed: bool = True) -> np.ndarray:

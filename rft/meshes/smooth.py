@@ -12,7 +12,9 @@ import numpy as np
 
 from rft.meshes.mesh import Mesh
 
-CREASE = np.radians(40.0)  # assumed: triangles that meet at a larger angle meet at an edge
+CREASE = np.radians(
+    40.0
+)  # assumed: triangles that meet at a larger angle meet at an edge
 CHUNK = 200_000  # corners at a time, for memory
 
 
@@ -24,9 +26,15 @@ def smooth(mesh: Mesh, crease: float = CREASE) -> Mesh:
     triangles where these are regular, else of order 1."""
     corners = mesh.vertices[mesh.faces]
     to, back = (np.roll(corners, -k, 1) - corners for k in (1, 2))
-    angle = np.arctan2(np.linalg.norm(np.cross(to, back), axis=-1), (to * back).sum(-1)).ravel()
-    order = np.argsort(mesh.faces.ravel(), kind="stable")  # corners (3 F), vertex by vertex
-    n_corners = np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))  # at each vertex
+    angle = np.arctan2(
+        np.linalg.norm(np.cross(to, back), axis=-1), (to * back).sum(-1)
+    ).ravel()
+    order = np.argsort(
+        mesh.faces.ravel(), kind="stable"
+    )  # corners (3 F), vertex by vertex
+    n_corners = np.bincount(
+        mesh.faces.ravel(), minlength=len(mesh.vertices)
+    )  # at each vertex
     first = np.cumsum(n_corners) - n_corners
     out = np.empty((mesh.faces.size, 3))
     for begin in range(0, mesh.faces.size, CHUNK):

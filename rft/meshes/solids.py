@@ -17,7 +17,9 @@ from rft.meshes.smooth import smooth
 from rft.metres import metres
 from rft.refusal import require
 
-FINEST = 327_680  # triangles of the mesh that stands for the truth in studies of accuracy
+FINEST = (
+    327_680  # triangles of the mesh that stands for the truth in studies of accuracy
+)
 HANDS = ("right", "left")
 MOST_TURNS = 100  # of a thread: more turns need more than `MOST_TRIANGLES` triangles
 
@@ -67,10 +69,14 @@ class Sphere(Solid):
     def mesh(self, triangles: int = 5000) -> Mesh:
         in_range("triangles", triangles, 1, MOST_TRIANGLES, whole=True)
         flat = self.build(int(triangles))
-        return dataclasses.replace(flat, smooth_normals=flat.vertices[flat.faces] / self.radius)
+        return dataclasses.replace(
+            flat, smooth_normals=flat.vertices[flat.faces] / self.radius
+        )
 
     def build(self, triangles: int) -> Mesh:
-        return shapes.sphere(self.radius, min(7, max(0, math.ceil(math.log(triangles / 20, 4) - 0.01))))
+        return shapes.sphere(
+            self.radius, min(7, max(0, math.ceil(math.log(triangles / 20, 4) - 0.01)))
+        )
 
 
 @dataclass(frozen=True)
@@ -88,8 +94,12 @@ class Cylinder(Solid):
     length: Annotated[float, metres("length along y")]
 
     def build(self, triangles: int) -> Mesh:
-        size = math.sqrt(4 * math.pi * self.radius * (self.length + 2 * self.radius) / triangles)
-        counts = _divisions(size, (2 * math.pi * self.radius, 8), (self.length, 1), (self.radius, 1))
+        size = math.sqrt(
+            4 * math.pi * self.radius * (self.length + 2 * self.radius) / triangles
+        )
+        counts = _divisions(
+            size, (2 * math.pi * self.radius, 8), (self.length, 1), (self.radius, 1)
+        )
         return shapes.cylinder(self.radius, self.length, *counts)
 
 
@@ -111,20 +121,37 @@ class Screw(Solid):
     pitch: Annotated[float, metres("length along x of one turn of the thread")]
     length: Annotated[float, metres("length of core and thread along x")]
     thickness: Annotated[
-        float, metres("thickness of the blade along x, less than the pitch; 0 for a thread of a smooth profile", 0)
+        float,
+        metres(
+            "thickness of the blade along x, less than the pitch; 0 for a thread of a smooth profile",
+            0,
+        ),
     ] = 0.0
     nose: Annotated[
-        float, metres("length of a cone at either end of the core, beyond the thread; 0 for flat ends", 0)
+        float,
+        metres(
+            "length of a cone at either end of the core, beyond the thread; 0 for flat ends",
+            0,
+        ),
     ] = 0.0
     handed: str = "right"
 
     def __post_init__(self):
         super().__post_init__()
-        require(self.core < self.radius, f"core must be less than the radius, got {self.core:g} and {self.radius:g}")
-        message = "thickness must be 0, or from a thousandth of the pitch to less than that"
+        require(
+            self.core < self.radius,
+            f"core must be less than the radius, got {self.core:g} and {self.radius:g}",
+        )
+        message = (
+            "thickness must be 0, or from a thousandth of the pitch to less than that"
+        )
         within = self.thickness == 0 or 1e-3 * self.pitch <= self.thickness < self.pitch
         require(within, f"{message}, got {self.thickness:g} and {self.pitch:g}")
-        require(self.handed in HANDS, f"handed must be one of {', '.join(HANDS)}", value=self.handed)
+        require(
+            self.handed in HANDS,
+            f"handed must be one of {', '.join(HANDS)}",
+            value=self.handed,
+        )
         require(
             self.turns <= MOST_TURNS,
             f"the thread has {self.turns:.4g} turns, beyond {MOST_TURNS}",
@@ -144,7 +171,9 @@ class Screw(Solid):
     @property
     def mirrored(self) -> Screw:
         """The screw of the other hand."""
-        return dataclasses.replace(self, handed="left" if self.handed == "right" else "right")
+        return dataclasses.replace(
+            self, handed="left" if self.handed == "right" else "right"
+        )
 
     def build(self, triangles: int) -> Mesh:
         right = self._bladed(triangles) if self.thickness else self._smooth(triangles)
@@ -152,20 +181,47 @@ class Screw(Solid):
 
     def _smooth(self, triangles: int) -> Mesh:
         """Return the right-handed screw with a thread of a smooth profile."""
-        size = math.sqrt(4 * math.pi * self.core * (self.length + 2 * self.core) / triangles)
-        counts = _divisions(
-            size, (2 * math.pi * self.core, 12), (self.length, 4), (math.hypot(self.core, self.nose), 1)
+        size = math.sqrt(
+            4 * math.pi * self.core * (self.length + 2 * self.core) / triangles
         )
-        return shapes.screw(self.radius, self.core, self.pitch, self.length, *counts, self.nose)
+        counts = _divisions(
+            size,
+            (2 * math.pi * self.core, 12),
+            (self.length, 4),
+            (math.hypot(self.core, self.nose), 1),
+        )
+        return shapes.screw(
+            self.radius, self.core, self.pitch, self.length, *counts, self.nose
+        )
 
     def _bladed(self, triangles: int) -> Mesh:
         """Return the right-handed screw whose thread is a blade."""
         high, slope = self.radius - self.core, 2 * math.pi * self.radius / self.pitch
-        edge, slant = self.length * math.hypot(1.0, slope), math.hypot(self.core, self.nose)
-        sides = edge * (2 * math.pi * self.core + 2 * high + self.thickness) + 2 * math.pi * self.core * slant
-        lengths = (2 * math.pi * self.core, 8), (edge, 8), (slant, 1), (high, 1), (self.thickness * slope, 1)
+        edge, slant = (
+            self.length * math.hypot(1.0, slope),
+            math.hypot(self.core, self.nose),
+        )
+        sides = (
+            edge * (2 * math.pi * self.core + 2 * high + self.thickness)
+            + 2 * math.pi * self.core * slant
+        )
+        lengths = (
+            (2 * math.pi * self.core, 8),
+            (edge, 8),
+            (slant, 1),
+            (high, 1),
+            (self.thickness * slope, 1),
+        )
         counts = _divisions(math.sqrt(2 * sides / triangles), *lengths)
-        return blade(self.radius, self.core, self.pitch, self.length, self.thickness, self.nose, *counts)
+        return blade(
+            self.radius,
+            self.core,
+            self.pitch,
+            self.length,
+            self.thickness,
+            self.nose,
+            *counts,
+        )
 
 
 @dataclass(frozen=True)
@@ -201,7 +257,9 @@ class Leg(Solid):
         length = 2 * self.radius * (bend / math.sin(bend) if bend else 1.0)
         size = math.sqrt(4 * length * (self.width + self.thickness) / triangles)
         counts = _divisions(size, (length, 4), (self.width, 1), (self.thickness, 1))
-        return shapes.leg(self.radius, -self.relative_curvature, self.thickness, self.width, *counts)
+        return shapes.leg(
+            self.radius, -self.relative_curvature, self.thickness, self.width, *counts
+        )
 
 
 @dataclass(frozen=True)
@@ -216,15 +274,30 @@ class MeshFile(Solid):
     """
 
     file: str
-    scale: Annotated[float, Number(1e-9, 1e9, "m", "length of a unit of the file, 0.001 if that is in mm")] = 1.0
+    scale: Annotated[
+        float,
+        Number(1e-9, 1e9, "m", "length of a unit of the file, 0.001 if that is in mm"),
+    ] = 1.0
     closed: bool = True
     smooth: bool = False
 
     def __post_init__(self):
-        require(isinstance(self.file, str), "file must be the name of a mesh", value=self.file)
+        require(
+            isinstance(self.file, str),
+            "file must be the name of a mesh",
+            value=self.file,
+        )
         check_numbers(self)
-        require(isinstance(self.closed, bool), "closed must be true or false", value=self.closed)
-        require(isinstance(self.smooth, bool), "smooth must be true or false", value=self.smooth)
+        require(
+            isinstance(self.closed, bool),
+            "closed must be true or false",
+            value=self.closed,
+        )
+        require(
+            isinstance(self.smooth, bool),
+            "smooth must be true or false",
+            value=self.smooth,
+        )
         mesh = read(self.file, self.closed, self.scale)
         mesh = smooth(mesh) if self.smooth else mesh
         object.__setattr__(self, "_mesh", mesh if self.closed else mesh.two_sided)
@@ -239,7 +312,11 @@ class MeshFile(Solid):
     @property
     def ladder(self) -> tuple[int, ...]:
         coarsest = len(self._mesh.faces)
-        ladder = [coarsest * 4**k for k in range(8) if coarsest * 4**k <= max(FINEST, coarsest)]
+        ladder = [
+            coarsest * 4**k
+            for k in range(8)
+            if coarsest * 4**k <= max(FINEST, coarsest)
+        ]
         return tuple(ladder) if len(ladder) > 1 else (coarsest, coarsest)
 
 
@@ -248,4 +325,6 @@ SOLIDS = {"sphere": Sphere, "cylinder": Cylinder, "screw": Screw, "c-leg": Leg}
 
 def _divisions(size: float, *lengths: tuple[float, int]) -> list[int]:
     """Return the number of pieces of about ``size``, m, in each length, at least the number given with it."""
-    return [int(np.clip(round(length / size), fewest, 4096)) for length, fewest in lengths]
+    return [
+        int(np.clip(round(length / size), fewest, 4096)) for length, fewest in lengths
+    ]

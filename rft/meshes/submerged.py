@@ -32,7 +32,11 @@ def part_of_triangle(d1, d2, d3):
     tip1, s1, t1 = _tip(d1, d2, d3)
     tip2, s2, t2 = _tip(d2, d3, d1)
     tip3, s3, t3 = _tip(d3, d1, d2)
-    count = where(d1 > 0.0, 1.0, 0.0) + where(d2 > 0.0, 1.0, 0.0) + where(d3 > 0.0, 1.0, 0.0)
+    count = (
+        where(d1 > 0.0, 1.0, 0.0)
+        + where(d2 > 0.0, 1.0, 0.0)
+        + where(d3 > 0.0, 1.0, 0.0)
+    )
     mostly_under = where(count > 1.0, 1.0, 0.0)
     share = tip1 + tip2 + tip3 + mostly_under
     third = 1.0 / (3.0 * where(share > 0.0, share, 1.0))

@@ -42,7 +42,9 @@ def extent_in(zones, zone, x, y, radius):
     for s in range(zone + 1):
         own = 2
         for h in range(zones.first[s], zones.first[s + 1]):
-            distance = zones.planes[h, 0] * x + zones.planes[h, 1] * y - zones.planes[h, 2]
+            distance = (
+                zones.planes[h, 0] * x + zones.planes[h, 1] * y - zones.planes[h, 2]
+            )
             own = min(own, 0 if distance <= -radius else 1 if distance < radius else 2)
         extent = min(extent, own if s == zone else 2 - own)
     return extent
@@ -83,4 +85,10 @@ def share_beyond(face, normal, offset):
 @formula
 def shared(part, share):
     """Return a share of parts of faces."""
-    return Part(part.n, part.middle, share * part.area, share * part.depth, times(share, part.arms))
+    return Part(
+        part.n,
+        part.middle,
+        share * part.area,
+        share * part.depth,
+        times(share, part.arms),
+    )

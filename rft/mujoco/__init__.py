@@ -26,7 +26,9 @@ def __getattr__(name: str) -> Any:
     except ModuleNotFoundError as error:
         if error.name != "mujoco":
             raise
-        raise Refusal("rft.mujoco needs MuJoCo", instead="pip install 'geomech[mujoco]'") from None
+        raise Refusal(
+            "rft.mujoco needs MuJoCo", instead="pip install 'geomech[mujoco]'"
+        ) from None
     return getattr(sand, name)
 
 

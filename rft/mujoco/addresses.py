@@ -32,11 +32,17 @@ class Arrays(NamedTuple):
         views = []
         for offset, shape in zip(offsets(), shapes):
             first = ctypes.c_uint64.from_address(data + 8 * int(offset)).value
-            views.append(np.ctypeslib.as_array((ctypes.c_double * math.prod(shape)).from_address(first)).reshape(shape))
+            views.append(
+                np.ctypeslib.as_array(
+                    (ctypes.c_double * math.prod(shape)).from_address(first)
+                ).reshape(shape)
+            )
         return cls(*views)
 
 
-FARTHEST = 400_000  # bytes: where the search in a structure of 4.0, some 165 kB long, gives up
+FARTHEST = (
+    400_000  # bytes: where the search in a structure of 4.0, some 165 kB long, gives up
+)
 POINTERS = 30  # words after the first that may hold the same address
 # Models of different parts. An array without entries has the address of the next one that has some, so that one model alone
 # does not tell them apart.
@@ -59,12 +65,20 @@ def offsets() -> np.ndarray:
 
     The address of each array is looked up in the structures of data of several models. Where it stands at more than one
     place in all of them, the last is right: empty arrays come before the one whose address they share."""
-    all_data = [mujoco.MjData(mujoco.MjModel.from_xml_string(f"<mujoco>{text}</mujoco>")) for text in MODELS]
+    all_data = [
+        mujoco.MjData(mujoco.MjModel.from_xml_string(f"<mujoco>{text}</mujoco>"))
+        for text in MODELS
+    ]
     found = []
     for name in Arrays._fields:
         places = [_places(data, name) for data in all_data]
         found.append(max(functools.reduce(set.intersection, places), default=None))
-    require(None not in found, UNKNOWN, because="its arrays are not where they are looked for", instead="report it")
+    require(
+        None not in found,
+        UNKNOWN,
+        because="its arrays are not where they are looked for",
+        instead="report it",
+    )
     return np.array(found)
 
 
@@ -73,15 +87,22 @@ def memory_offsets() -> tuple[int, int]:
     """Return the places of the time and of the pointer to userdata in an mjData, in units of 8 bytes."""
     found = []
     for k, text in enumerate(MODELS):
-        model = mujoco.MjModel.from_xml_string(f'<mujoco><size nuserdata="{k + 5}"/>{text}</mujoco>')
+        model = mujoco.MjModel.from_xml_string(
+            f'<mujoco><size nuserdata="{k + 5}"/>{text}</mujoco>'
+        )
         data = mujoco.MjData(model)
         data.time = 0.1234567 * (k + 1)
         time = struct.unpack("<q", struct.pack("<d", data.time))[0]
-        words = next(({j} for j in range(FARTHEST // 8) if _word(data, j) == time), set())
+        words = next(
+            ({j} for j in range(FARTHEST // 8) if _word(data, j) == time), set()
+        )
         found.append((words, _places(data, "userdata")))
     times, pointers = (set.intersection(*x) for x in zip(*found))
     require(
-        bool(times and pointers), UNKNOWN, because="its userdata are not where they are looked for", instead="report it"
+        bool(times and pointers),
+        UNKNOWN,
+        because="its userdata are not where they are looked for",
+        instead="report it",
     )
     return max(times), max(pointers)
 
@@ -94,10 +115,21 @@ def time_step(model: mujoco.MjModel) -> np.ndarray:
 @functools.cache
 def _step_offset() -> int:
     """Return how many numbers the time step stands before gravity in an mjOption."""
-    model = mujoco.MjModel.from_xml_string('<mujoco><option timestep="0.1234567"/></mujoco>')
-    found = (k for k in range(1, POINTERS) if _before_gravity(model, k)[0] == model.opt.timestep)
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><option timestep="0.1234567"/></mujoco>'
+    )
+    found = (
+        k
+        for k in range(1, POINTERS)
+        if _before_gravity(model, k)[0] == model.opt.timestep
+    )
     offset = next(found, 0)
-    require(offset > 0, UNKNOWN, because="its time step is not where it is looked for", instead="report it")
+    require(
+        offset > 0,
+        UNKNOWN,
+        because="its time step is not where it is looked for",
+        instead="report it",
+    )
     return offset
 
 
@@ -112,9 +144,19 @@ UNKNOWN = f"MuJoCo {mujoco.__version__} is unknown"
 
 def check_offsets(data: mujoco.MjData, with_memory: bool = False) -> None:
     """Raise Refusal unless the arrays of data of a model lie where `offsets` says; also userdata, with its memory."""
-    right = all(_word(data, int(k)) == _address(data, name) for k, name in zip(offsets(), Arrays._fields))
-    right = right and not (with_memory and _word(data, memory_offsets()[1]) != _address(data, "userdata"))
-    require(right, UNKNOWN, because="its arrays are not where they are looked for", instead="report it")
+    right = all(
+        _word(data, int(k)) == _address(data, name)
+        for k, name in zip(offsets(), Arrays._fields)
+    )
+    right = right and not (
+        with_memory and _word(data, memory_offsets()[1]) != _address(data, "userdata")
+    )
+    require(
+        right,
+        UNKNOWN,
+        because="its arrays are not where they are looked for",
+        instead="report it",
+    )
 
 
 def _address(data: mujoco.MjData, name: str) -> int:

@@ -67,7 +67,10 @@ class Bed:
         """Return the bed under geoms with these meshes. slope: rad, by which the surface rises along x. level: m, the height
         of the surface at x = 0. hills: the surface in place of this plane, or `FLAT`."""
         bodies = np.array([model.geom_bodyid[g] for g in geoms], np.int64)
-        up, ahead = np.array([-np.sin(slope), 0.0, np.cos(slope)]), np.array([np.cos(slope), 0.0, np.sin(slope)])
+        up, ahead = (
+            np.array([-np.sin(slope), 0.0, np.cos(slope)]),
+            np.array([np.cos(slope), 0.0, np.sin(slope)]),
+        )
         spheres = [_sphere(mesh) for mesh in meshes]
         blocks = Blocks([faces(m.vertices[m.faces], m.middle_normals) for m in meshes])
         return cls(
@@ -87,16 +90,25 @@ class Bed:
         arm = data.geom_xpos[self.geoms] - data.subtree_com[self.roots]
         return twist[:, 3:] + _cross(twist[:, :3], arm), twist[:, :3]
 
-    def wrenches(self, data: mujoco.MjData | Arrays, velocity=None, spin=None, sunk: float = 0.0) -> np.ndarray:
+    def wrenches(
+        self, data: mujoco.MjData | Arrays, velocity=None, spin=None, sunk: float = 0.0
+    ) -> np.ndarray:
         """Return force, N, and moment about the geom's origin, N m, on each geom, (G, 6), in the world.
 
         velocity, spin: (G, 3), by default those of the data. sunk: m, by which all geoms lie deeper than in the data."""
         holds = velocity is None and self.rest is not None
         if velocity is None:
             velocity, spin = self.twists(data)
-        turn, place = data.geom_xmat[self.geoms].reshape(-1, 3, 3), data.geom_xpos[self.geoms]
-        along_axes = lambda x: np.einsum("gij,gi->gj", turn, np.broadcast_to(x, place.shape))[:, None]
-        up, level = self.surface(place + np.einsum("gij,gj->gi", turn, self.spheres[:, :3]))
+        turn, place = (
+            data.geom_xmat[self.geoms].reshape(-1, 3, 3),
+            data.geom_xpos[self.geoms],
+        )
+        along_axes = lambda x: np.einsum(
+            "gij,gi->gj", turn, np.broadcast_to(x, place.shape)
+        )[:, None]
+        up, level = self.surface(
+            place + np.einsum("gij,gj->gi", turn, self.spheres[:, :3])
+        )
         if self.prints:
             level = level + up[:, 2] * self.prints.memory(data.userdata).levels
         motions = Motion(
@@ -121,12 +133,18 @@ class Bed:
         """Return what holds the geoms, from the userdata (N,) of a simulation."""
         return held_of(userdata[len(userdata) - self.remembered :], len(self.geoms))
 
-    def _loads(self, motions: Motion, turn: np.ndarray, place: np.ndarray) -> np.ndarray:
+    def _loads(
+        self, motions: Motion, turn: np.ndarray, place: np.ndarray
+    ) -> np.ndarray:
         """Return force and moment on each geom along its own axes, (G, 6), summed over the zones."""
-        grounds = [self.ground._replace(grazing_sine=law.grazing_sine) for law in self.laws]
+        grounds = [
+            self.ground._replace(grazing_sine=law.grazing_sine) for law in self.laws
+        ]
         if len(self.laws) == 1:
             return self.blocks.loads(self.laws[0], grounds[0], motions)[:, 0]
-        where = Place(np.moveaxis(turn[self.blocks.owner], 0, -1), place[self.blocks.owner].T)
+        where = Place(
+            np.moveaxis(turn[self.blocks.owner], 0, -1), place[self.blocks.owner].T
+        )
         total = np.zeros((len(self.geoms), 6))
         for zone, (law, ground) in enumerate(zip(self.laws, grounds)):
             share = share_in(self.zones, zone, self.blocks.faces, where)
@@ -136,9 +154,13 @@ class Bed:
     def surface(self, middles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the planes up . x = level, (G, 3) and (G,), that geoms with these middles (G, 3) see."""
         if not self.hills.grid.size:
-            return np.broadcast_to(self.up, middles.shape), np.full(len(middles), self.level)
+            return np.broadcast_to(self.up, middles.shape), np.full(
+                len(middles), self.level
+            )
         planes = [tangent_plane(*self.hills, x, y) for x, y, _ in middles]
-        return np.array([n for n, _ in planes]), np.array([level for _, level in planes])
+        return np.array([n for n, _ in planes]), np.array(
+            [level for _, level in planes]
+        )
 
     @cached_property
     def moved_by(self) -> np.ndarray:
@@ -151,7 +173,10 @@ class Bed:
 
     def add_forces(self, data: Arrays) -> None:
         """Add the forces of the grains to qfrc_passive."""
-        wrench, arm = self.wrenches(data), data.geom_xpos[self.geoms] - data.subtree_com[self.roots]
+        wrench, arm = (
+            self.wrenches(data),
+            data.geom_xpos[self.geoms] - data.subtree_com[self.roots],
+        )
         moment = wrench[:, 3:] + _cross(arm, wrench[:, :3])
         along = moment @ data.cdof[:, :3].T + wrench[:, :3] @ data.cdof[:, 3:].T
         data.qfrc_passive[:] += (along * self.moved_by).sum(0)

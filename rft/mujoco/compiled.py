@@ -24,7 +24,14 @@ from rft.meshes.contact import Motion
 from rft.meshes.triples import cross, dot, minus, plus, times
 from rft.meshes.zones import NOWHERE, PARTLY, Place, Zones, extent_in
 from rft.mujoco.addresses import FARTHEST
-from rft.mujoco.footprints import COMPILED, HEAD, PER_CELL, PER_GEOM, memory_of, remember
+from rft.mujoco.footprints import (
+    COMPILED,
+    HEAD,
+    PER_CELL,
+    PER_GEOM,
+    memory_of,
+    remember,
+)
 from rft.mujoco.hills import tangent_plane
 from rft.mujoco.rest import COMPILED as HOLDING
 from rft.mujoco.rest import PER_GEOM as NUMBERS
@@ -95,39 +102,69 @@ def kernel(Law: type, has_regions: bool = False) -> CFunc:
         spheres = carray(_pointer(row[14]), (groups, 4), np.float64)
         parents = carray(_pointer(row[15]), nv, np.int64)
         zones = Zones(
-            carray(_pointer(row[27]), (row[29], 3), np.float64), carray(_pointer(row[28]), row[30] + 1, np.int64)
+            carray(_pointer(row[27]), (row[29], 3), np.float64),
+            carray(_pointer(row[28]), row[30] + 1, np.int64),
         )
         laws = carray(_pointer(row[16]), (row[30], count + 1), np.float64)
         g = carray(_pointer(row[17]), 13, np.float64)
         disturbed = carray(_pointer(row[18]), (row[19], row[20]), np.float64)
-        up, ahead, level, fastest = (g[5], g[6], g[7]), (g[8], g[9], g[10]), g[11], g[12]
+        up, ahead, level, fastest = (
+            (g[5], g[6], g[7]),
+            (g[8], g[9], g[10]),
+            g[11],
+            g[12],
+        )
         grid = carray(_pointer(row[23]), (row[24], row[25], 3), np.float64)
         field = carray(_pointer(row[26]), 7, np.float64)
         fast = carray(_pointer(row[21]), 1, np.int64)
         levels = g[:0]
         if row[31] != 0:
             _call(row[31], data, _address(layout))
-            levels = carray(_pointer(fields[row[32]] + 8 * (row[33] + HEAD)), groups, np.float64)
+            levels = carray(
+                _pointer(fields[row[32]] + 8 * (row[33] + HEAD)), groups, np.float64
+            )
         only_law = Law(*to_fixed_tuple(laws[0, :count], count))
         only_ground = Ground(g[0], g[1], g[2], laws[0, count], g[4], disturbed)
         passed, holds = 0.0, row[41] != 0
         if holds:
-            held = held_of(carray(_pointer(fields[row[42]] + 8 * row[43]), 1 + NUMBERS * groups, np.float64), groups)
+            held = held_of(
+                carray(
+                    _pointer(fields[row[42]] + 8 * row[43]),
+                    1 + NUMBERS * groups,
+                    np.float64,
+                ),
+                groups,
+            )
             holding = Rest(
                 carray(_pointer(row[44]), groups, np.float64),
                 carray(_pointer(row[45]), groups, np.float64),
                 carray(_pointer(row[46]), groups, np.int64),
                 carray(_pointer(row[47]), 1, np.float64),
             )
-            passed = begin(held, holding, carray(_pointer(_address(data) + 8 * row[41]), 1, np.float64)[0])
+            passed = begin(
+                held,
+                holding,
+                carray(_pointer(_address(data) + 8 * row[41]), 1, np.float64)[0],
+            )
         for k in range(groups):
-            geom, body, root, dof = numbers[k, 0], numbers[k, 1], numbers[k, 2], numbers[k, 3]
+            geom, body, root, dof = (
+                numbers[k, 0],
+                numbers[k, 1],
+                numbers[k, 2],
+                numbers[k, 3],
+            )
             turn, place = xmat[geom], (xpos[geom, 0], xpos[geom, 1], xpos[geom, 2])
             x_axis = (turn[0, 0], turn[1, 0], turn[2, 0])
             y_axis = (turn[0, 1], turn[1, 1], turn[2, 1])
             z_axis = (turn[0, 2], turn[1, 2], turn[2, 2])
-            center, radius = (spheres[k, 0], spheres[k, 1], spheres[k, 2]), spheres[k, 3]
-            middle = plus(plus(times(center[0], x_axis), times(center[1], y_axis)), times(center[2], z_axis))
+            center, radius = (
+                (spheres[k, 0], spheres[k, 1], spheres[k, 2]),
+                spheres[k, 3],
+            )
+            middle = plus(
+                plus(times(center[0], x_axis), times(center[1], y_axis)),
+                times(center[2], z_axis),
+            )
             middle = plus(place, middle)
             if row[24] > 0:
                 up, level = tangent_plane(grid, field, middle[0], middle[1])
@@ -141,8 +178,13 @@ def kernel(Law: type, has_regions: bool = False) -> CFunc:
                 continue
             spin = (cvel[body, 0], cvel[body, 1], cvel[body, 2])
             arm = minus(place, (com[root, 0], com[root, 1], com[root, 2]))
-            velocity = plus((cvel[body, 3], cvel[body, 4], cvel[body, 5]), cross(spin, arm))
-            if not dot(velocity, velocity) + dot(spin, spin) * radius**2 < fastest * fastest:
+            velocity = plus(
+                (cvel[body, 3], cvel[body, 4], cvel[body, 5]), cross(spin, arm)
+            )
+            if (
+                not dot(velocity, velocity) + dot(spin, spin) * radius**2
+                < fastest * fastest
+            ):
                 if holds:
                     let_go(held, k)
                 fast[0] += 1
@@ -164,14 +206,32 @@ def kernel(Law: type, has_regions: bool = False) -> CFunc:
                     if extent == NOWHERE:
                         continue
                     law = Law(*to_fixed_tuple(laws[zone, :count], count))
-                    ground = Ground(g[0], g[1], g[2], laws[zone, count], g[4], disturbed)
+                    ground = Ground(
+                        g[0], g[1], g[2], laws[zone, count], g[4], disturbed
+                    )
                     only, at = zone if extent == PARTLY else -1, Place(turn, place)
-                    df, dm = on_faces(law, ground, table, first[k], first[k + 1], motion, zones, only, at)
+                    df, dm = on_faces(
+                        law,
+                        ground,
+                        table,
+                        first[k],
+                        first[k + 1],
+                        motion,
+                        zones,
+                        only,
+                        at,
+                    )
                     f, m = plus(f, df), plus(m, dm)
             else:
-                f, m = on_faces(only_law, only_ground, table, first[k], first[k + 1], motion)
-            force = plus(plus(times(f[0], x_axis), times(f[1], y_axis)), times(f[2], z_axis))
-            moment = plus(plus(times(m[0], x_axis), times(m[1], y_axis)), times(m[2], z_axis))
+                f, m = on_faces(
+                    only_law, only_ground, table, first[k], first[k + 1], motion
+                )
+            force = plus(
+                plus(times(f[0], x_axis), times(f[1], y_axis)), times(f[2], z_axis)
+            )
+            moment = plus(
+                plus(times(m[0], x_axis), times(m[1], y_axis)), times(m[2], z_axis)
+            )
             if holds:
                 speed = math.sqrt(dot(velocity, velocity) + dot(spin, spin) * radius**2)
                 hold(held, holding, k, passed, speed, g[2], (*force, *moment))
@@ -181,10 +241,14 @@ def kernel(Law: type, has_regions: bool = False) -> CFunc:
             moment = plus(moment, cross(arm, force))
             while dof >= 0:
                 c = cdof[dof]
-                qfrc[dof] += dot((c[0], c[1], c[2]), moment) + dot((c[3], c[4], c[5]), force)
+                qfrc[dof] += dot((c[0], c[1], c[2]), moment) + dot(
+                    (c[3], c[4], c[5]), force
+                )
                 dof = parents[dof]
 
-    return _compiled(add_forces, f"the forces of grains in MuJoCo of the form {Law.__name__}")
+    return _compiled(
+        add_forces, f"the forces of grains in MuJoCo of the form {Law.__name__}"
+    )
 
 
 @functools.cache
@@ -194,8 +258,16 @@ def recorder() -> CFunc:
     def record(data, layout):
         row = carray(layout, LAYOUT, np.int64)
         fields = carray(data, FARTHEST // 8, np.int64)
-        ngeom, nbody, groups, g = row[7], row[8], row[10], carray(_pointer(row[17]), 13, np.float64)
-        shape, first = (row[34], row[35]), carray(_pointer(row[39]), groups + 1, np.int64)
+        ngeom, nbody, groups, g = (
+            row[7],
+            row[8],
+            row[10],
+            carray(_pointer(row[17]), 13, np.float64),
+        )
+        shape, first = (
+            (row[34], row[35]),
+            carray(_pointer(row[39]), groups + 1, np.int64),
+        )
         size = HEAD + PER_GEOM * groups + PER_CELL * shape[0] * shape[1]
         numbers = carray(_pointer(fields[row[32]] + 8 * row[33]), size, np.float64)
         prints = (
@@ -204,17 +276,30 @@ def recorder() -> CFunc:
             carray(_pointer(row[38]), (first[groups], 3), np.float64),
             first,
         )
-        bodies = carray(_pointer(row[13]), (groups, 4), np.int64), carray(_pointer(row[14]), (groups, 4), np.float64)
+        bodies = (
+            carray(_pointer(row[13]), (groups, 4), np.int64),
+            carray(_pointer(row[14]), (groups, 4), np.float64),
+        )
         poses = (
             carray(_pointer(fields[row[1]]), (ngeom, 3), np.float64),
             carray(_pointer(fields[row[2]]), (ngeom, 3, 3), np.float64),
             carray(_pointer(fields[row[3]]), (nbody, 6), np.float64),
             carray(_pointer(fields[row[5]]), (nbody, 3), np.float64),
         )
-        hills = carray(_pointer(row[23]), (row[24], row[25], 3), np.float64), carray(_pointer(row[26]), 7, np.float64)
+        hills = (
+            carray(_pointer(row[23]), (row[24], row[25], 3), np.float64),
+            carray(_pointer(row[26]), 7, np.float64),
+        )
         time = carray(_pointer(_address(data) + 8 * row[40]), 1, np.float64)[0]
         slopes = hills[0], hills[1], (g[5], g[6], g[7]), g[11]
-        remember(memory_of(numbers, groups, shape[0], shape[1]), time, prints, bodies, poses, slopes)
+        remember(
+            memory_of(numbers, groups, shape[0], shape[1]),
+            time,
+            prints,
+            bodies,
+            poses,
+            slopes,
+        )
 
     return _compiled(record, "footprints in the ground of MuJoCo")
 
@@ -246,6 +331,11 @@ def dispatcher(table: np.ndarray) -> CFunc:
             if entries[k, 0] == wanted:
                 _call(entries[k, 1], data, entries[k, 2])
 
-    compiled = CFunc(passive, sigutils.normalize_signature(types.void(types.voidptr, types.voidptr)), {}, OPTIONS)
+    compiled = CFunc(
+        passive,
+        sigutils.normalize_signature(types.void(types.voidptr, types.voidptr)),
+        {},
+        OPTIONS,
+    )
     compiled.compile()
     return compiled

@@ -16,4 +16,6 @@ ROBOT = """<mujoco><option timestep="0.002"/><default><geom contype="2" conaffin
 def hexapod() -> mujoco.MjModel:
     """Return the compiled robot, with a floor at z = 0; positive rates of its legs drive it along x."""
     legs = "".join(LEG.format(x, y, k) for k, (x, y) in enumerate(HIPS))
-    return mujoco.MjModel.from_xml_string(ROBOT.format(legs, "".join(map(MOTOR.format, range(len(HIPS))))))
+    return mujoco.MjModel.from_xml_string(
+        ROBOT.format(legs, "".join(map(MOTOR.format, range(len(HIPS)))))
+    )

@@ -27,7 +27,12 @@ class Masks(NamedTuple):
     @classmethod
     def of(cls, model: mujoco.MjModel) -> Masks:
         """Return the masks of a model, views of its arrays."""
-        return cls(model.geom_contype, model.geom_conaffinity, model.flex_contype, model.flex_conaffinity)
+        return cls(
+            model.geom_contype,
+            model.geom_conaffinity,
+            model.flex_contype,
+            model.flex_conaffinity,
+        )
 
     def copied(self) -> Masks:
         """Return copies of the arrays."""
@@ -41,7 +46,11 @@ def floors(model: mujoco.MjModel, up: np.ndarray, level: float) -> list[int]:
     for geom in np.flatnonzero(model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)):
         along = data.geom_xmat[geom].reshape(3, 3)[:, 2] @ up
         fixed = model.body_weldid[model.geom_bodyid[geom]] == 0
-        if fixed and along > np.cos(PARALLEL) and abs(up @ data.geom_xpos[geom] - level) < NEAR:
+        if (
+            fixed
+            and along > np.cos(PARALLEL)
+            and abs(up @ data.geom_xpos[geom] - level) < NEAR
+        ):
             found.append(int(geom))
     return found
 
@@ -61,8 +70,14 @@ _apart: weakref.WeakKeyDictionary[mujoco.MjModel, Apart] = weakref.WeakKeyDictio
 def apart(model: mujoco.MjModel, geoms: Sequence[int], planes: Sequence[int]) -> Apart:
     """Return what touches no floor once these geoms do not touch these planes either; nothing is changed yet."""
     known = _apart.get(model) or Apart(Masks.of(model).copied(), Masks.of(model), ())
-    named = [x for x in zip(model.pair_geom1, model.pair_geom2) if {*x} & {*planes} and {*x} & {*geoms}]
-    names = " and ".join(formatted(geom_name(model, g)) for pair in named[:1] for g in pair)
+    named = [
+        x
+        for x in zip(model.pair_geom1, model.pair_geom2)
+        if {*x} & {*planes} and {*x} & {*geoms}
+    ]
+    names = " and ".join(
+        formatted(geom_name(model, g)) for pair in named[:1] for g in pair
+    )
     require(not named, f"a <pair> of <contact> makes {names} touch", instead="drop it")
     pairs = (*known.pairs, (tuple(geoms), tuple(planes)))
     return Apart(known.old, _masks(known.old, pairs), pairs)
@@ -77,7 +92,9 @@ def part(model: mujoco.MjModel, separation: Apart) -> None:
 def rejoin(model: mujoco.MjModel, geoms: Sequence[int], planes: Sequence[int]) -> None:
     """Let these geoms touch these planes again; masks that the user has set since stay."""
     known = _apart.get(model)
-    if known is None or not all(np.array_equal(a, b) for a, b in zip(Masks.of(model), known.new)):
+    if known is None or not all(
+        np.array_equal(a, b) for a, b in zip(Masks.of(model), known.new)
+    ):
         return
     pairs = tuple(pair for pair in known.pairs if pair != (tuple(geoms), tuple(planes)))
     _write(model, _masks(known.old, pairs))
@@ -91,16 +108,28 @@ def _masks(old: Masks, pairs) -> Masks:
     """Return masks with which geoms touch none of their planes, and everything else touches as before.
 
     Each plane has one bit, which no contype has; what touched it, but for those geoms, gets the bit in its conaffinity."""
-    new, used = old.copied(), int(np.bitwise_or.reduce([*map(int, np.concatenate(old)), 0]) & 0xFFFFFFFF)
+    new, used = (
+        old.copied(),
+        int(np.bitwise_or.reduce([*map(int, np.concatenate(old)), 0]) & 0xFFFFFFFF),
+    )
     for plane in sorted({plane for _, planes in pairs for plane in planes}):
         free = next((bit for bit in range(31) if not used >> bit & 1), None)
-        require(free is not None, "no bit is free to tell the floor from other geoms", instead="use fewer contypes")
+        require(
+            free is not None,
+            "no bit is free to tell the floor from other geoms",
+            instead="use fewer contypes",
+        )
         used |= 1 << free
         contype, conaffinity = old.contype[plane], old.conaffinity[plane]
         touched = ((old.contype & conaffinity) | (old.conaffinity & contype)) != 0
-        touched[[geom for geoms, planes in pairs if plane in planes for geom in geoms] + [plane]] = False
+        touched[
+            [geom for geoms, planes in pairs if plane in planes for geom in geoms]
+            + [plane]
+        ] = False
         new.conaffinity[touched] |= 1 << free
-        touched = ((old.flex_contype & conaffinity) | (old.flex_conaffinity & contype)) != 0
+        touched = (
+            (old.flex_contype & conaffinity) | (old.flex_conaffinity & contype)
+        ) != 0
         new.flex_conaffinity[touched] |= 1 << free
         new.contype[plane], new.conaffinity[plane] = 1 << free, 0
     return new

@@ -32,7 +32,9 @@ MOST_CELLS = 1_000_000
 EVERY = 256.0  # steps: how often the highest ground is looked for again
 RIM = 2  # cells: how far around a geom its heap is raised at once, assumed
 SHARE = 0.25  # of the excess of a slope that slides in one step at most; with more, left and right differ more
-SLIDES = 0.1  # time in which an excess slides over that in which grains fall by one cell
+SLIDES = (
+    0.1  # time in which an excess slides over that in which grains fall by one cell
+)
 STEEPER = 1e-3  # share by which a slope may be steeper than it should
 HEAD, PER_GEOM, PER_CELL = 8, 7, 5  # numbers that a simulation remembers
 TIME, STAMP, TOP, BOX, FORM = 0, 1, 2, 3, 7  # places in the head; the box takes four
@@ -57,23 +59,32 @@ class Footprints:
     width: Annotated[float, Number(1e-3, 1e4, "m", "of the grid along y")]
     x: Annotated[float, Number(-1e6, 1e6, "m", "middle of the grid")] = 0.0
     y: Annotated[float, Number(-1e6, 1e6, "m", "middle of the grid")] = 0.0
-    repose: Annotated[float, Number(0.01, 1.5, "rad", "angle at which the ground slides by itself")] = REPOSE
+    repose: Annotated[
+        float, Number(0.01, 1.5, "rad", "angle at which the ground slides by itself")
+    ] = REPOSE
 
     def __post_init__(self):
         check_numbers(self)
         rows, columns = self.shape
-        require(rows * columns <= MOST_CELLS, f"footprints have {rows * columns} cells, more than {MOST_CELLS}")
+        require(
+            rows * columns <= MOST_CELLS,
+            f"footprints have {rows * columns} cells, more than {MOST_CELLS}",
+        )
 
     @property
     def shape(self) -> tuple[int, int]:
         """Number of rows, along y, and of columns, along x."""
-        return max(1, round(self.width / self.spacing)), max(1, round(self.length / self.spacing))
+        return max(1, round(self.width / self.spacing)), max(
+            1, round(self.length / self.spacing)
+        )
 
     @property
     def middles(self) -> tuple[np.ndarray, np.ndarray]:
         """Places x (C,) and y (R,) of the middles of the cells, m."""
         rows, columns = self.shape
-        along = lambda count, middle: middle + self.spacing * (np.arange(count) - (count - 1) / 2)
+        along = lambda count, middle: (
+            middle + self.spacing * (np.arange(count) - (count - 1) / 2)
+        )
         return along(columns, self.x), along(rows, self.y)
 
     @property
@@ -82,7 +93,9 @@ class Footprints:
         time in which an excess slides, s."""
         x, y = self.middles
         half, time = self.spacing / 2, SLIDES * math.sqrt(2 * self.spacing / GRAVITY)
-        return np.array([x[0] - half, y[0] - half, self.spacing, math.tan(self.repose), time])
+        return np.array(
+            [x[0] - half, y[0] - half, self.spacing, math.tan(self.repose), time]
+        )
 
 
 class Prints(NamedTuple):
@@ -104,7 +117,9 @@ class Prints(NamedTuple):
 
     def memory(self, userdata: np.ndarray) -> Memory:
         """Return the memory in the userdata (N,) of a simulation."""
-        return memory_of(userdata[len(userdata) - self.numbers :], self.geoms, *self.shape)
+        return memory_of(
+            userdata[len(userdata) - self.numbers :], self.geoms, *self.shape
+        )
 
 
 class Memory(NamedTuple):
@@ -151,10 +166,19 @@ def begin_step(memory, time, form) -> float:
     """Return the time, s, since the last step that was remembered, at most 1 s; negative if there is nothing to do. At time 0,
     and where the memory is of another grid than that with the number ``form``, the ground is undisturbed."""
     passed = time - memory.head[TIME]
-    if (time == 0.0 and passed != 0.0) or memory.head[FORM] != form:  # a rollout leaves userdata as they are
+    if (time == 0.0 and passed != 0.0) or memory.head[
+        FORM
+    ] != form:  # a rollout leaves userdata as they are
         for numbers in (memory.levels, memory.carried, memory.visits):
             numbers[:] = 0.0
-        for cells in (memory.boxes, memory.ground, memory.pressed, memory.marks, memory.owners, memory.floors):
+        for cells in (
+            memory.boxes,
+            memory.ground,
+            memory.pressed,
+            memory.marks,
+            memory.owners,
+            memory.floors,
+        ):
             cells[:] = 0.0
         memory.head[:] = 0.0
         memory.head[FORM] = form
@@ -184,23 +208,46 @@ def remember(memory, time, prints, bodies, poses, slopes) -> None:
     for k in range(len(numbers)):
         turn, place = xmat[numbers[k, 0]], xpos[numbers[k, 0]]
         center, radius = spheres[k, :3], spheres[k, 3]
-        x = place[0] + turn[0, 0] * center[0] + turn[0, 1] * center[1] + turn[0, 2] * center[2]
-        y = place[1] + turn[1, 0] * center[0] + turn[1, 1] * center[1] + turn[1, 2] * center[2]
-        z = place[2] + turn[2, 0] * center[0] + turn[2, 1] * center[1] + turn[2, 2] * center[2]
+        x = (
+            place[0]
+            + turn[0, 0] * center[0]
+            + turn[0, 1] * center[1]
+            + turn[0, 2] * center[2]
+        )
+        y = (
+            place[1]
+            + turn[1, 0] * center[0]
+            + turn[1, 1] * center[1]
+            + turn[1, 2] * center[2]
+        )
+        z = (
+            place[2]
+            + turn[2, 0] * center[0]
+            + turn[2, 1] * center[1]
+            + turn[2, 2] * center[2]
+        )
         if hills.shape[0] > 0:
             up, level = tangent_plane(hills, frame, x, y)
         memory.boxes[k] = 0.0
         if memory.visits[k] == 0.0:
             leave(memory, k)
-        if (up[0] * x + up[1] * y + up[2] * z - level - radius) / up[2] < memory.head[TOP]:
-            press(memory, grid, k, points[first[k] : first[k + 1]], turn, place, up, level)
+        if (up[0] * x + up[1] * y + up[2] * z - level - radius) / up[2] < memory.head[
+            TOP
+        ]:
+            press(
+                memory, grid, k, points[first[k] : first[k + 1]], turn, place, up, level
+            )
         else:
             memory.levels[k] = 0.0
             leave(memory, k)
     release(memory)
     for k in range(len(numbers)):
         geom, body, root = numbers[k, 0], numbers[k, 1], numbers[k, 2]
-        r_x, r_y, r_z = xpos[geom, 0] - com[root, 0], xpos[geom, 1] - com[root, 1], xpos[geom, 2] - com[root, 2]
+        r_x, r_y, r_z = (
+            xpos[geom, 0] - com[root, 0],
+            xpos[geom, 1] - com[root, 1],
+            xpos[geom, 2] - com[root, 2],
+        )
         v_x = cvel[body, 3] + cvel[body, 1] * r_z - cvel[body, 2] * r_y
         v_y = cvel[body, 4] + cvel[body, 2] * r_x - cvel[body, 0] * r_z
         v_z = cvel[body, 5] + cvel[body, 0] * r_y - cvel[body, 1] * r_x
@@ -266,8 +313,14 @@ def extend(box, i, j, margin, rows, columns) -> None:
     """Let a box of cells hold a cell and its neighbours within a margin."""
     if box[1] <= box[0]:
         box[0], box[1], box[2], box[3] = rows, 0.0, columns, 0.0
-    box[0], box[1] = min(box[0], max(i - margin, 0)), max(box[1], min(i + margin + 1, rows))
-    box[2], box[3] = min(box[2], max(j - margin, 0)), max(box[3], min(j + margin + 1, columns))
+    box[0], box[1] = (
+        min(box[0], max(i - margin, 0)),
+        max(box[1], min(i + margin + 1, rows)),
+    )
+    box[2], box[3] = (
+        min(box[2], max(j - margin, 0)),
+        max(box[3], min(j + margin + 1, columns)),
+    )
 
 
 def release(memory) -> None:
@@ -291,7 +344,11 @@ def heap(memory, k, v_x, v_y, v_z) -> None:
     extend(active, int(box[1]) - 1, int(box[3]) - 1, RIM + 1, rows, columns)
     if memory.carried[k] == 0.0:
         return
-    middle_i, middle_j, total = 0.5 * (box[0] + box[1] - 1.0), 0.5 * (box[2] + box[3] - 1.0), 0.0
+    middle_i, middle_j, total = (
+        0.5 * (box[0] + box[1] - 1.0),
+        0.5 * (box[2] + box[3] - 1.0),
+        0.0,
+    )
     for sweep in range(2):
         if sweep == 1 and total == 0.0:
             return
@@ -300,7 +357,9 @@ def heap(memory, k, v_x, v_y, v_z) -> None:
                 if memory.pressed[i, j] < 0.0 or not beside(memory.marks, stamp, i, j):
                     continue
                 d_i, d_j = i - middle_i, j - middle_j
-                ahead = (d_j * v_x + d_i * v_y) / max(math.sqrt(d_i * d_i + d_j * d_j), 1e-9)
+                ahead = (d_j * v_x + d_i * v_y) / max(
+                    math.sqrt(d_i * d_i + d_j * d_j), 1e-9
+                )
                 weight = max(ahead, 0.0) + max(-v_z, 0.0) + 1e-9
                 if sweep == 0:
                     total += weight
@@ -362,4 +421,16 @@ def slide(memory, grid, surface, passed) -> None:
                     extend(box, i, j, 2, rows, columns)
 
 
-COMPILED = memory_of, remember, begin_step, press, leave, extend, release, heap, own, beside, slide
+COMPILED = (
+    memory_of,
+    remember,
+    begin_step,
+    press,
+    leave,
+    extend,
+    release,
+    heap,
+    own,
+    beside,
+    slide,
+)

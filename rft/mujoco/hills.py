@@ -29,7 +29,9 @@ class Hills(NamedTuple):
 FLAT = Hills(np.zeros((0, 0, 3)), np.zeros(7))
 
 
-def tangent_plane(grid: np.ndarray, frame: np.ndarray, x: float, y: float) -> tuple[tuple, float]:
+def tangent_plane(
+    grid: np.ndarray, frame: np.ndarray, x: float, y: float
+) -> tuple[tuple, float]:
     """Return the unit normal n and the distance n . x of the plane that touches the surface at a place (x, y), m.
 
     Heights and slopes are linear along rows and columns between the nodes. Compiled code takes this function, too."""
@@ -43,9 +45,24 @@ def tangent_plane(grid: np.ndarray, frame: np.ndarray, x: float, y: float) -> tu
     i, j = min(int(r), rows - 2), min(int(c), columns - 2)
     s, t = r - i, c - j
     a, b, d, e = (1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t
-    height = a * grid[i, j, 0] + b * grid[i, j + 1, 0] + d * grid[i + 1, j, 0] + e * grid[i + 1, j + 1, 0]
-    along = a * grid[i, j, 1] + b * grid[i, j + 1, 1] + d * grid[i + 1, j, 1] + e * grid[i + 1, j + 1, 1]
-    across = a * grid[i, j, 2] + b * grid[i, j + 1, 2] + d * grid[i + 1, j, 2] + e * grid[i + 1, j + 1, 2]
+    height = (
+        a * grid[i, j, 0]
+        + b * grid[i, j + 1, 0]
+        + d * grid[i + 1, j, 0]
+        + e * grid[i + 1, j + 1, 0]
+    )
+    along = (
+        a * grid[i, j, 1]
+        + b * grid[i, j + 1, 1]
+        + d * grid[i + 1, j, 1]
+        + e * grid[i + 1, j + 1, 1]
+    )
+    across = (
+        a * grid[i, j, 2]
+        + b * grid[i, j + 1, 2]
+        + d * grid[i + 1, j, 2]
+        + e * grid[i + 1, j + 1, 2]
+    )
     if not inside:
         along, across = 0.0, 0.0
     by_x, by_y = cos * along - sin * across, sin * along + cos * across
@@ -57,18 +74,40 @@ def tangent_plane(grid: np.ndarray, frame: np.ndarray, x: float, y: float) -> tu
 def hills_of(model: mujoco.MjModel, name: str) -> tuple[Hills, int]:
     """Return the surface of a height field, given by the name of its geom, and the number of the geom."""
     geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)
-    require(geom >= 0, f"the model has no geom {formatted(name)}", instead="``level`` names a height field")
+    require(
+        geom >= 0,
+        f"the model has no geom {formatted(name)}",
+        instead="``level`` names a height field",
+    )
     kind = geom_kind(model, geom)
-    require(kind == "hfield", f"the geom {formatted(name)} is a {kind}", instead="``level`` names a height field")
+    require(
+        kind == "hfield",
+        f"the geom {formatted(name)} is a {kind}",
+        instead="``level`` names a height field",
+    )
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     turn, place = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
-    upright = turn[2, 2] > 1.0 - UPRIGHT**2 and model.body_weldid[model.geom_bodyid[geom]] == 0
-    require(bool(upright), f"the height field {formatted(geom_name(model, geom))} is tilted or moves")
+    upright = (
+        turn[2, 2] > 1.0 - UPRIGHT**2
+        and model.body_weldid[model.geom_bodyid[geom]] == 0
+    )
+    require(
+        bool(upright),
+        f"the height field {formatted(geom_name(model, geom))} is tilted or moves",
+    )
     field = model.geom_dataid[geom]
-    rows, columns, first = model.hfield_nrow[field], model.hfield_ncol[field], model.hfield_adr[field]
+    rows, columns, first = (
+        model.hfield_nrow[field],
+        model.hfield_ncol[field],
+        model.hfield_adr[field],
+    )
     half_x, half_y, top, _ = model.hfield_size[field]
-    height = top * model.hfield_data[first : first + rows * columns].astype(float).reshape(rows, columns)
-    by_y, by_x = np.gradient(height, 2 * half_y / (rows - 1), 2 * half_x / (columns - 1))
+    height = top * model.hfield_data[first : first + rows * columns].astype(
+        float
+    ).reshape(rows, columns)
+    by_y, by_x = np.gradient(
+        height, 2 * half_y / (rows - 1), 2 * half_x / (columns - 1)
+    )
     grid = np.ascontiguousarray(np.stack([height, by_x, by_y], -1))
     return Hills(grid, np.array([*place, turn[0, 0], turn[1, 0], half_x, half_y])), geom

@@ -19,7 +19,13 @@ import numpy as np
 
 from rft.balance.backend import Note, compiles
 from rft.meshes.contact import record
-from rft.mujoco.addresses import Arrays, check_offsets, memory_offsets, offsets, time_step
+from rft.mujoco.addresses import (
+    Arrays,
+    check_offsets,
+    memory_offsets,
+    offsets,
+    time_step,
+)
 from rft.mujoco.bed import FASTEST, Bed
 from rft.mujoco.footprints import Prints
 from rft.refusal import require
@@ -69,7 +75,9 @@ def install(model: mujoco.MjModel, bed: Bed) -> int:
         require(row < ROWS, f"{ROWS} beds of sand are in use", instead="detach some")
         end = weakref.finalize(model, remove, row)
         end.atexit = False
-        _entries[row] = Entry(model._address, (model.nv, model.ngeom, model.nbody), bed, layout, end)
+        _entries[row] = Entry(
+            model._address, (model.nv, model.ngeom, model.nbody), bed, layout, end
+        )
         if layout:
             from rft.mujoco.compiled import kernel
 
@@ -117,7 +125,11 @@ def times_too_fast(row: int) -> int:
 
 def serves_compiled() -> bool:
     """Return whether the callback is compiled code, or would be."""
-    return next(iter(_entries.values())).layout is not None if _entries else compiles("auto", ())
+    return (
+        next(iter(_entries.values())).layout is not None
+        if _entries
+        else compiles("auto", ())
+    )
 
 
 def _set_callback(compiled: bool) -> None:
@@ -163,7 +175,11 @@ def _by_python(model: int, data: int) -> None:
                 entry.bed.add_forces(Arrays.at(data, *entry.sizes))
             except Exception as error:
                 remove(row)
-                warnings.warn(f"the sand is detached: {type(error).__name__}: {error}", Note, stacklevel=2)
+                warnings.warn(
+                    f"the sand is detached: {type(error).__name__}: {error}",
+                    Note,
+                    stacklevel=2,
+                )
 
 
 @ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
@@ -198,15 +214,28 @@ def layout_of(model: mujoco.MjModel, bed: Bed) -> Layout:
     arrays = [np.ascontiguousarray(x) for x in arrays]
     addresses = [x.ctypes.data for x in arrays]
     sizes = [model.nv, model.ngeom, model.nbody, len(table), len(bed.geoms)]
-    numbers = [*offsets(), *sizes, *addresses[:8], *arrays[7].shape, addresses[8], report]
+    numbers = [
+        *offsets(),
+        *sizes,
+        *addresses[:8],
+        *arrays[7].shape,
+        addresses[8],
+        report,
+    ]
     numbers += [addresses[9], *bed.hills.grid.shape[:2], addresses[10]]
     numbers += [*addresses[11:13], len(bed.zones.planes), len(bed.laws)]
-    numbers += _print_numbers(model, bed.prints, addresses[13:17]) if bed.prints else [0] * 10
-    numbers += [*_memory(model, bed.remembered), *addresses[-4:]] if bed.rest else [0] * 7
+    numbers += (
+        _print_numbers(model, bed.prints, addresses[13:17]) if bed.prints else [0] * 10
+    )
+    numbers += (
+        [*_memory(model, bed.remembered), *addresses[-4:]] if bed.rest else [0] * 7
+    )
     return Layout(np.array(numbers, np.int64), tuple(arrays), arrays[8])
 
 
-def _print_numbers(model: mujoco.MjModel, prints: Prints, addresses: list[int]) -> list[int]:
+def _print_numbers(
+    model: mujoco.MjModel, prints: Prints, addresses: list[int]
+) -> list[int]:
     """Return the numbers of a layout by which footprints are remembered."""
     from rft.mujoco.compiled import recorder
 

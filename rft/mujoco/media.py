@@ -22,28 +22,42 @@ from rft.plates.calibrate import StressFit, ZetaFit
 from rft.plates.stress import COEFFICIENTS
 from rft.refusal import Refusal, formatted, require
 
-MOST_DRAWS = 100  # times n; draws that do not bear a plate pushed straight down are drawn again
+MOST_DRAWS = (
+    100  # times n; draws that do not bear a plate pushed straight down are drawn again
+)
 
 
 def law_of(medium: object) -> Extruded | Spatial:
     """Return the law of three dimensions of a medium; Refusal for one without a vertical law."""
     if isinstance(medium, str):
         if medium in CATALOGUE and medium not in VERTICAL:
-            raise Refusal(f"{medium} has no vertical law", instead=f"take one of {', '.join(VERTICAL)}")
+            raise Refusal(
+                f"{medium} has no vertical law",
+                instead=f"take one of {', '.join(VERTICAL)}",
+            )
         near = difflib.get_close_matches(medium, VERTICAL, 1, 0.5)
-        cure = f"did you mean {near[0]}?" if near else f"take one of {', '.join(VERTICAL)}"
-        require(medium in VERTICAL, f"there is no medium {formatted(medium)}", instead=cure)
+        cure = (
+            f"did you mean {near[0]}?" if near else f"take one of {', '.join(VERTICAL)}"
+        )
+        require(
+            medium in VERTICAL, f"there is no medium {formatted(medium)}", instead=cure
+        )
         return Extruded(VERTICAL[medium].stress)
     if isinstance(medium, Spatial | Extruded):
         return medium
     if isinstance(medium, PlateStress):
         return Extruded(medium)  # refuses all but nine coefficients
     cure = "give a name of rft.plates.VERTICAL, a StressMap or a Spatial"
-    raise Refusal("the medium has no vertical law in three dimensions", value=medium, instead=cure)
+    raise Refusal(
+        "the medium has no vertical law in three dimensions", value=medium, instead=cure
+    )
 
 
 def sample(
-    medium: str | StressMap | Spatial | StressFit | ZetaFit, n: int, seed: int = 0, spread: float | None = None
+    medium: str | StressMap | Spatial | StressFit | ZetaFit,
+    n: int,
+    seed: int = 0,
+    spread: float | None = None,
 ) -> list[StressMap | Spatial]:
     """Return n media within the uncertainty of one, the same for the same seed.
 
@@ -53,30 +67,56 @@ def sample(
     in_range("n", n, 1, 1_000_000, whole=True)
     rng = np.random.default_rng(seed)
     if isinstance(medium, StressFit):
-        require(spread is None, "a fit has its own covariance", instead="drop ``spread``")
-        return _maps(lambda count: rng.multivariate_normal(medium.values, medium.covariance, count), n)
+        require(
+            spread is None, "a fit has its own covariance", instead="drop ``spread``"
+        )
+        return _maps(
+            lambda count: rng.multivariate_normal(
+                medium.values, medium.covariance, count
+            ),
+            n,
+        )
     if isinstance(medium, ZetaFit):
         require(spread is None, "a fit has its own error", instead="drop ``spread``")
         medium, spread = StressMap(zeta=medium.zeta), medium.error / medium.zeta
-    medium = VERTICAL[medium].stress if isinstance(medium, str) and medium in VERTICAL else medium
-    require(isinstance(medium, StressMap | Spatial), "the medium has no strength to draw", value=medium)
+    medium = (
+        VERTICAL[medium].stress
+        if isinstance(medium, str) and medium in VERTICAL
+        else medium
+    )
+    require(
+        isinstance(medium, StressMap | Spatial),
+        "the medium has no strength to draw",
+        value=medium,
+    )
     cure = "give ``spread``, the standard deviation of the logarithm of its strength, or a fit with its covariance"
-    require(spread is not None, "the uncertainty of the medium is unknown", instead=cure)
+    require(
+        spread is not None, "the uncertainty of the medium is unknown", instead=cure
+    )
     in_range("spread", spread, 0, 2)
     strength = "zeta" if isinstance(medium, StressMap) else "xi_n"
     factors = np.exp(spread * rng.standard_normal(int(n)))
-    return [replace(medium, **{strength: getattr(medium, strength) * float(factor)}) for factor in factors]
+    return [
+        replace(medium, **{strength: getattr(medium, strength) * float(factor)})
+        for factor in factors
+    ]
 
 
 def _maps(draw: Callable[[int], np.ndarray], n: int) -> list[StressMap]:
     """Return n maps of drawn coefficients (count, 9) that bear a plate pushed straight down."""
     maps: list[StressMap] = []
     for _ in range(MOST_DRAWS):
-        drawn = [StressMap(**dict(zip(COEFFICIENTS, map(float, row)))) for row in draw(int(n))]
+        drawn = [
+            StressMap(**dict(zip(COEFFICIENTS, map(float, row))))
+            for row in draw(int(n))
+        ]
         maps += [one for one in drawn if one.alpha((0.0, -1.0), (0.0, -1.0))[1] > 0.0]
         if len(maps) >= n:
             return maps[: int(n)]
-    raise Refusal("hardly any drawn map bears a plate", because="the covariance is larger than the coefficients")
+    raise Refusal(
+        "hardly any drawn map bears a plate",
+        because="the covariance is larger than the coefficients",
+    )
 
 
 class Media(Sequence):
@@ -88,7 +128,11 @@ class Media(Sequence):
     def __init__(self, model: mujoco.MjModel, bed: Bed, media: Sequence[Any]):
         beds = [with_medium(bed, medium) for medium in media]
         kinds = {type(one.laws[0]) for one in beds}
-        require(len(kinds) == 1, "media of one batch must have one form", instead="give stress maps, or laws, alone")
+        require(
+            len(kinds) == 1,
+            "media of one batch must have one form",
+            instead="give stress maps, or laws, alone",
+        )
         self._beds, self.models = beds, [copy.copy(model) for _ in beds]
         self._rows = [installed.install(*pair) for pair in zip(self.models, self._beds)]
 
@@ -98,17 +142,25 @@ class Media(Sequence):
     def __getitem__(self, i: Any) -> Any:
         if isinstance(i, slice):
             return [self[k] for k in range(*i.indices(len(self)))]
-        *regions, medium = (law.stress if isinstance(law, Extruded) else law for law in self._beds[i].laws)
+        *regions, medium = (
+            law.stress if isinstance(law, Extruded) else law
+            for law in self._beds[i].laws
+        )
         return (medium, *regions) if regions else medium
 
     def __iter__(self) -> Iterator[Any]:
         return (self[i] for i in range(len(self)))
 
     def __setitem__(self, i: int, medium: Any) -> None:
-        require(isinstance(i, int) and -len(self) <= i < len(self), f"there is no simulation {formatted(i)}")
+        require(
+            isinstance(i, int) and -len(self) <= i < len(self),
+            f"there is no simulation {formatted(i)}",
+        )
         bed = with_medium(self._beds[i], medium)
         same = type(bed.laws[0]) is type(self._beds[i].laws[0])
-        require(same, "media of one batch must have one form", instead="make another batch")
+        require(
+            same, "media of one batch must have one form", instead="make another batch"
+        )
         self._beds[i] = bed
         installed.change(self._rows[i], bed)
 
@@ -123,7 +175,10 @@ def with_medium(bed: Bed, medium: Any) -> Bed:
     if not isinstance(medium, tuple | list):
         return replace(bed, laws=one_form((*bed.laws[:-1], law_of(medium))))
     count = len(bed.laws)
-    require(len(medium) == count, f"media of a simulation must be {count}, the medium and one for each region")
+    require(
+        len(medium) == count,
+        f"media of a simulation must be {count}, the medium and one for each region",
+    )
     base, *regions = map(law_of, medium)
     return replace(bed, laws=one_form((*regions, base)))
 
@@ -131,5 +186,9 @@ def with_medium(bed: Bed, medium: Any) -> Bed:
 def one_form(laws: tuple[Extruded | Spatial, ...]) -> tuple[Extruded | Spatial, ...]:
     """Return the laws; Refusal unless all are stress maps or all laws of three dimensions."""
     alike = len({type(law) for law in laws}) == 1
-    require(alike, "media of all regions must have one form", instead="give stress maps, or laws, alone")
+    require(
+        alike,
+        "media of all regions must have one form",
+        instead="give stress maps, or laws, alone",
+    )
     return laws

@@ -93,10 +93,19 @@ def hold(held, rest, k, passed, speed, rounding, wrench) -> None:
     if passed == 0.0:
         return
     size, own = math.sqrt(speed * speed + rounding * rounding), held.wrenches[k]
-    moving = math.sqrt(wrench[0] ** 2 + wrench[1] ** 2 + wrench[2] ** 2) * size / max(speed, 1e-9)
+    moving = (
+        math.sqrt(wrench[0] ** 2 + wrench[1] ** 2 + wrench[2] ** 2)
+        * size
+        / max(speed, 1e-9)
+    )
     load = max(moving, RELEASE * math.sqrt(own[0] ** 2 + own[1] ** 2 + own[2] ** 2))
-    total = held.totals[rest.robots[k]] - held.loads[k] + load  # of other geoms in the last step
-    held.loads[k], held.speeds[k] = load, SHARE * rest.step[0] * total * rest.inverse_masses[k]
+    total = (
+        held.totals[rest.robots[k]] - held.loads[k] + load
+    )  # of other geoms in the last step
+    held.loads[k], held.speeds[k] = (
+        load,
+        SHARE * rest.step[0] * total * rest.inverse_masses[k],
+    )
     share = passed / max(STIFFNESS / SHARE * rest.step[0] * held.speeds[k], 1e-9)
     for i in range(6):
         own[i] = (own[i] + share * wrench[i] * size) / (1.0 + share * speed)
@@ -117,7 +126,10 @@ def damping(speed, own_speed, rounding):
         SHARE
         * fade
         * fade
-        * sqrt((speed * speed + rounding * rounding) / (speed * speed + own_speed * own_speed + 1e-18))
+        * sqrt(
+            (speed * speed + rounding * rounding)
+            / (speed * speed + own_speed * own_speed + 1e-18)
+        )
     )
 
 

@@ -47,13 +47,24 @@ class Sand:
     All that is read from data holds for data whose positions and velocities are up to date, as after ``mj_forward``.
     """
 
-    def __init__(self, model: mujoco.MjModel, bed: Bed, element: float, notes: Sequence[str], separation: Apart | None):
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        bed: Bed,
+        element: float,
+        notes: Sequence[str],
+        separation: Apart | None,
+    ):
         self._model, self._bed, self.element = weakref.ref(model), bed, element
         self.geoms = tuple(geom_name(model, g) for g in bed.geoms)
         self.rounding, self.elements = bed.ground.rounding, len(bed.blocks.owner)
         self._form, self._step = _form(model, bed.geoms), model.opt.timestep
         self._row = installed.install(model, bed)
-        self.notes, self.media, self._parted = tuple(notes), None, separation.pairs[-1] if separation else None
+        self.notes, self.media, self._parted = (
+            tuple(notes),
+            None,
+            separation.pairs[-1] if separation else None,
+        )
         if separation:
             part(model, separation)
 
@@ -92,7 +103,11 @@ class Sand:
     def wrench(self, data: mujoco.MjData, body: str | int) -> np.ndarray:
         """Return force, N, and moment about the body's origin, N m, of the grains on a body, (6,), in the world."""
         model = self._check(data)
-        number = body if isinstance(body, int) else mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body)
+        number = (
+            body
+            if isinstance(body, int)
+            else mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body)
+        )
         require(0 <= number < model.nbody, f"the model has no body {formatted(body)}")
         own = self._bed.bodies == number
         force, moment = np.split(self._bed.wrenches(data)[own], 2, axis=1)
@@ -105,21 +120,34 @@ class Sand:
         twist = np.concatenate(self._bed.twists(data), axis=1)
         return float((self._bed.wrenches(data) * twist).sum())
 
-    def ground(self, data: mujoco.MjData | np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def ground(
+        self, data: mujoco.MjData | np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the ground that footprints have left: x (C,), y (R,) and heights (R, C), m, as if the geoms were not in it.
 
         data: of a simulation, or its userdata, (N,), such as a row of what ``bind("userdata")`` of a Batch gives."""
         prints = self._bed.prints
-        require(prints is not None, "the ground remembers nothing", instead="give ``footprints`` to attach")
+        require(
+            prints is not None,
+            "the ground remembers nothing",
+            instead="give ``footprints`` to attach",
+        )
         userdata = getattr(data, "userdata", data)
         enough = np.ndim(userdata) == 1 and len(userdata) >= prints.numbers
-        require(enough, f"data must be an MjData, or its userdata, {prints.numbers} numbers or more")
+        require(
+            enough,
+            f"data must be an MjData, or its userdata, {prints.numbers} numbers or more",
+        )
         memory = prints.memory(userdata)
         x_0, y_0, size = prints.grid[:3]
         along = lambda count, start: start + size * (np.arange(count) + 0.5)
         rows, columns = prints.shape
         own = memory.head[FORM] == prints.grid[-1]
-        return along(columns, x_0), along(rows, y_0), prints.surface + own * (memory.ground + memory.pressed)
+        return (
+            along(columns, x_0),
+            along(rows, y_0),
+            prints.surface + own * (memory.ground + memory.pressed),
+        )
 
     def sinkage(self, data: mujoco.MjData, time: float = 1.0) -> tuple[float, float]:
         """Return how deep, m, the geoms sink from where they are in the data, straight down under the weight of their
@@ -128,18 +156,34 @@ class Sand:
         in_range("time", time, 0, 1e6, unit="s")
         return sinkage(model, data, self._bed, 0.0 if self._bed.rest else time)
 
-    def batch(self, nsim: int, nthread: int = 0, persistent: bool = False, media: Sequence[Any] | None = None) -> Any:
+    def batch(
+        self,
+        nsim: int,
+        nthread: int = 0,
+        persistent: bool = False,
+        media: Sequence[Any] | None = None,
+    ) -> Any:
         """Return a ``mujoco.batch.Batch`` of simulations of the model in this sand.
 
         media: one for each simulation, of one form, such as `sample` draws; ``sand.media[i] = medium`` changes one later. With
         regions, one may be a list of the medium and those of the regions; a single medium leaves those of the regions."""
         model = self._model()
-        require(model is not None and self.is_attached, "the sand is detached", instead="attach it anew")
+        require(
+            model is not None and self.is_attached,
+            "the sand is detached",
+            instead="attach it anew",
+        )
         try:
             from mujoco.batch import Batch
         except ImportError:
-            raise Refusal(f"MuJoCo {mujoco.__version__} has no Batch", instead="pip install 'mujoco>=4.0'") from None
-        require(media is None or len(media) == nsim, f"media must be {nsim}, one for each simulation")
+            raise Refusal(
+                f"MuJoCo {mujoco.__version__} has no Batch",
+                instead="pip install 'mujoco>=4.0'",
+            ) from None
+        require(
+            media is None or len(media) == nsim,
+            f"media must be {nsim}, one for each simulation",
+        )
         batch = Batch(model, nsim, nthread, persistent)
         if media is not None:
             new = Media(model, self._bed, media)
@@ -158,9 +202,20 @@ class Sand:
     def _check(self, data: mujoco.MjData) -> mujoco.MjModel:
         """Return the model; Refusal for a detached sand, other models' data, and geoms that have changed."""
         model = self._model()
-        require(model is not None and self._row >= 0, "the sand is detached", instead="attach it anew")
-        require(self.is_attached, "another passive callback took the place of the sand's", instead="attach it anew")
-        require(len(data.qvel) == model.nv and data.geom_xpos.shape[0] == model.ngeom, "the data are of another model")
+        require(
+            model is not None and self._row >= 0,
+            "the sand is detached",
+            instead="attach it anew",
+        )
+        require(
+            self.is_attached,
+            "another passive callback took the place of the sand's",
+            instead="attach it anew",
+        )
+        require(
+            len(data.qvel) == model.nv and data.geom_xpos.shape[0] == model.ngeom,
+            "the data are of another model",
+        )
         now = _form(model, self._bed.geoms)
         changed = np.flatnonzero((now != self._form).any(1))
         require(
@@ -170,7 +225,11 @@ class Sand:
         )
         if model.opt.timestep != self._step:
             self._step = model.opt.timestep
-            line = "" if self._bed.rest else step_note(model, list(self._bed.geoms), self.rounding)
+            line = (
+                ""
+                if self._bed.rest
+                else step_note(model, list(self._bed.geoms), self.rounding)
+            )
             if line:
                 warnings.warn(line, Note, stacklevel=3)
         return model
@@ -236,18 +295,29 @@ def attach(
     The geoms no longer touch planes that lie in the surface; a plane below it remains, as the bottom of a shallow bed. What
     is changed or inexact is a `rft.balance.backend.Note`, a warning of one line.
     """
-    require(isinstance(model, mujoco.MjModel), "model must be a mujoco.MjModel", value=model)
+    require(
+        isinstance(model, mujoco.MjModel), "model must be a mujoco.MjModel", value=model
+    )
     require(isinstance(rest, bool | np.bool_), "rest must be True or False", value=rest)
     require(model.nv > 0, "nothing in the model can move", because="it has no joints")
-    hills, field = (FLAT, []) if not isinstance(level, str) else _field(model, level, slope)
+    hills, field = (
+        (FLAT, []) if not isinstance(level, str) else _field(model, level, slope)
+    )
     level = 0.0 if field else level
     in_range("level", level, -1e6, 1e6, unit="m")
     regions = {} if regions is None else regions
     zones = zones_of(regions)
-    laws, chosen = one_form((*map(law_of, regions.values()), law_of(medium))), chosen_geoms(model, geoms)
+    laws, chosen = (
+        one_form((*map(law_of, regions.values()), law_of(medium))),
+        chosen_geoms(model, geoms),
+    )
     taken = {int(g) for bed in installed.beds(model) for g in bed.geoms} & {*chosen}
     names = ", ".join(formatted(geom_name(model, g)) for g in sorted(taken)[:3])
-    require(not taken, f"sand is attached to {names} already", instead="detach it, or name other geoms")
+    require(
+        not taken,
+        f"sand is attached to {names} already",
+        instead="detach it, or name other geoms",
+    )
     _require_passive(model)
     if element is None:
         element = float(np.mean(model.geom_rbound[chosen])) / PER_GEOM
@@ -259,47 +329,93 @@ def attach(
         rounding = ROUNDING if rest else max(needed, 1e-6)
     effects = (*effects, Slope(slope)) if slope else tuple(effects)
     ground = ground_of(effects, Ground(rounding=rounding))
-    bed = Bed.under(model, chosen, meshes(model, chosen, element), laws, zones, ground, slope, level, hills)
+    bed = Bed.under(
+        model,
+        chosen,
+        meshes(model, chosen, element),
+        laws,
+        zones,
+        ground,
+        slope,
+        level,
+        hills,
+    )
     if footprints is not None or rest:
         bed = remembering(model, bed, footprints, rest)
-    planes = [g for g in field or floors(model, bed.up, bed.level) if _touch(model, chosen, g)]
+    planes = [
+        g for g in field or floors(model, bed.up, bed.level) if _touch(model, chosen, g)
+    ]
     separation = apart(model, chosen, planes) if planes else None
     notes = [_contact_note(model, chosen, planes)] if planes else []
-    notes += [line for line in (step_note(model, chosen, max(rounding, needed * rest)), _python_note()) if line]
-    for line in notes:  # before anything is changed: a filter may turn warnings into errors
+    notes += [
+        line
+        for line in (
+            step_note(model, chosen, max(rounding, needed * rest)),
+            _python_note(),
+        )
+        if line
+    ]
+    for (
+        line
+    ) in notes:  # before anything is changed: a filter may turn warnings into errors
         warnings.warn(line, Note, stacklevel=2)
     return Sand(model, bed, element, notes, separation)
 
 
-def remembering(model: mujoco.MjModel, bed: Bed, footprints: Footprints | None, rest: bool) -> Bed:
+def remembering(
+    model: mujoco.MjModel, bed: Bed, footprints: Footprints | None, rest: bool
+) -> Bed:
     """Return a bed that remembers footprints, and what holds bodies at rest; Refusal where there is no memory for that."""
     what = "footprints need" if footprints is not None else "rest needs"
-    require(installed.serves_compiled(), f"{what} compiled code", instead="pip install 'geomech[fast]'")
+    require(
+        installed.serves_compiled(),
+        f"{what} compiled code",
+        instead="pip install 'geomech[fast]'",
+    )
     others = any(other.remembered for other in installed.beds(model))
-    require(not others, "another sand under the model remembers", instead="attach all geoms at once")
+    require(
+        not others,
+        "another sand under the model remembers",
+        instead="attach all geoms at once",
+    )
     if footprints is not None:
         bed = replace(bed, prints=prints_under(model, bed, footprints))
     if rest:
         inverse = model.body_invweight0[bed.bodies, 0]
-        robots = np.array([np.flatnonzero(bed.roots == root)[0] for root in bed.roots], np.int64)
+        robots = np.array(
+            [np.flatnonzero(bed.roots == root)[0] for root in bed.roots], np.int64
+        )
         bed = replace(bed, rest=Rest(inverse, bed.spheres[:, 3], robots))
     cure = f'write <size nuserdata="{bed.remembered}"/> in its MJCF, or spec.nuserdata'
-    what = f"{what} {bed.remembered} numbers of userdata, the model has {model.nuserdata}"
+    what = (
+        f"{what} {bed.remembered} numbers of userdata, the model has {model.nuserdata}"
+    )
     require(model.nuserdata >= bed.remembered, what, instead=cure)
     return bed
 
 
 def prints_under(model: mujoco.MjModel, bed: Bed, footprints: Footprints) -> Prints:
     """Return what footprints in a bed follow from."""
-    require(isinstance(footprints, Footprints), "footprints must be rft.mujoco.Footprints", value=footprints)
-    points = [mesh.vertices for mesh in meshes(model, list(bed.geoms), footprints.spacing / 2)]
+    require(
+        isinstance(footprints, Footprints),
+        "footprints must be rft.mujoco.Footprints",
+        value=footprints,
+    )
+    points = [
+        mesh.vertices for mesh in meshes(model, list(bed.geoms), footprints.spacing / 2)
+    ]
     places = np.stack(np.meshgrid(*footprints.middles), -1).reshape(-1, 2)
     up, level = bed.surface(np.concatenate([places, np.zeros((len(places), 1))], 1))
     heights = (level - (up[:, :2] * places).sum(-1)) / up[:, 2]
     first = np.cumsum([0, *map(len, points)]).astype(np.int64)
     shape = footprints.shape
-    grid = np.append(footprints.grid, zlib.crc32(repr((shape, len(points), *footprints.grid[:3])).encode()) + 1)
-    return Prints(shape, len(points), grid, heights.reshape(shape), np.concatenate(points), first)
+    grid = np.append(
+        footprints.grid,
+        zlib.crc32(repr((shape, len(points), *footprints.grid[:3])).encode()) + 1,
+    )
+    return Prints(
+        shape, len(points), grid, heights.reshape(shape), np.concatenate(points), first
+    )
 
 
 def _field(model: mujoco.MjModel, name: str, slope: float) -> tuple[Hills, list[int]]:
@@ -327,13 +443,21 @@ def _form(model: mujoco.MjModel, geoms: Sequence[int]) -> np.ndarray:
 def _touch(model: mujoco.MjModel, geoms: Sequence[int], plane: int) -> bool:
     """Return whether any of the geoms may touch a plane."""
     contype, conaffinity = model.geom_contype, model.geom_conaffinity
-    touch = (contype[geoms] & conaffinity[plane]) | (conaffinity[geoms] & contype[plane])
+    touch = (contype[geoms] & conaffinity[plane]) | (
+        conaffinity[geoms] & contype[plane]
+    )
     return bool(touch.any())
 
 
-def _contact_note(model: mujoco.MjModel, geoms: Sequence[int], planes: Sequence[int]) -> str:
+def _contact_note(
+    model: mujoco.MjModel, geoms: Sequence[int], planes: Sequence[int]
+) -> str:
     names = " and ".join(formatted(geom_name(model, g)) for g in planes)
-    count = f"{len(geoms)} geoms no longer touch" if len(geoms) > 1 else "the geom no longer touches"
+    count = (
+        f"{len(geoms)} geoms no longer touch"
+        if len(geoms) > 1
+        else "the geom no longer touches"
+    )
     return f"{count} the floor {names}, which lies in the surface of the sand"
 
 
@@ -347,4 +471,8 @@ def _require_passive(model: mujoco.MjModel) -> None:
     """Raise Refusal if the model's flags switch passive forces off."""
     flag = getattr(mujoco.mjtDisableBit, "mjDSBL_PASSIVE", None)
     disabled = flag is not None and model.opt.disableflags & int(flag)
-    require(not disabled, "passive forces are disabled in the model", instead='drop <flag passive="disable"/>')
+    require(
+        not disabled,
+        "passive forces are disabled in the model",
+        instead='drop <flag passive="disable"/>',
+    )

@@ -31,10 +31,14 @@ ROOM = 1.01  # a rounding that is short of what is needed by less than that is n
 DEPTHS = 200  # at which bearing forces are computed
 
 
-def loads_and_masses(model: mujoco.MjModel, geoms: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+def loads_and_masses(
+    model: mujoco.MjModel, geoms: Sequence[int]
+) -> tuple[np.ndarray, np.ndarray]:
     """Return for each geom the weight of its robot, N, and the inverse mass of its body as joints let it move, 1/kg, (G,)."""
     bodies = model.geom_bodyid[list(geoms)]
-    weight = model.body_subtreemass[model.body_rootid[bodies]] * np.linalg.norm(model.opt.gravity)
+    weight = model.body_subtreemass[model.body_rootid[bodies]] * np.linalg.norm(
+        model.opt.gravity
+    )
     return weight, model.body_invweight0[bodies, 0]
 
 
@@ -47,7 +51,9 @@ def needed_rounding(model: mujoco.MjModel, geoms: Sequence[int]) -> float:
 def step_note(model: mujoco.MjModel, geoms: Sequence[int], rounding: float) -> str:
     """Return a line about a time step that is too long for a rounding, m/s, or for the robot; "" for none."""
     needed, step = needed_rounding(model, geoms), model.opt.timestep
-    coarse = COARSE * float(np.sqrt(np.linalg.norm(model.opt.gravity) * 2 * model.stat.extent))
+    coarse = COARSE * float(
+        np.sqrt(np.linalg.norm(model.opt.gravity) * 2 * model.stat.extent)
+    )
     described = f"a time step of {1e3 * step:.3g} ms"
     if rounding * ROOM < needed:
         return (
@@ -62,11 +68,22 @@ def step_note(model: mujoco.MjModel, geoms: Sequence[int], rounding: float) -> s
     return ""
 
 
-def sinkage(model: mujoco.MjModel, data: mujoco.MjData, bed: Bed, time: float) -> tuple[float, float]:
+def sinkage(
+    model: mujoco.MjModel, data: mujoco.MjData, bed: Bed, time: float
+) -> tuple[float, float]:
     """Return `rft.mujoco.sand.Sand.sinkage`; (inf, inf) where the grains bear less than the weight at any depth."""
-    weight = float(model.body_subtreemass[np.unique(bed.roots)].sum() * np.linalg.norm(model.opt.gravity))
-    down, still, fast = -np.broadcast_to(bed.up, (len(bed.geoms), 3)), np.zeros((len(bed.geoms), 3)), bed.rounded(0.0)
-    force = lambda depth: float((fast.wrenches(data, down, still, depth)[:, :3] @ bed.up).sum())
+    weight = float(
+        model.body_subtreemass[np.unique(bed.roots)].sum()
+        * np.linalg.norm(model.opt.gravity)
+    )
+    down, still, fast = (
+        -np.broadcast_to(bed.up, (len(bed.geoms), 3)),
+        np.zeros((len(bed.geoms), 3)),
+        bed.rounded(0.0),
+    )
+    force = lambda depth: float(
+        (fast.wrenches(data, down, still, depth)[:, :3] @ bed.up).sum()
+    )
     deepest = float(model.stat.extent) + 1e-3
     low, high = -deepest, deepest
     if force(high) < weight:
@@ -76,6 +93,11 @@ def sinkage(model: mujoco.MjModel, data: mujoco.MjData, bed: Bed, time: float) -
         low, high = (middle, high) if force(middle) < weight else (low, middle)
     depth = np.linspace(high, high + deepest, DEPTHS) if time else np.array([high])
     depth = high + (depth - high) ** 2 / deepest  # finer where it begins
-    slowness = np.sqrt(np.maximum(np.array([force(z) for z in depth]) ** 2 - weight**2, 0.0)) / weight
-    passed = np.concatenate([[0.0], np.cumsum(np.diff(depth) * (slowness[1:] + slowness[:-1]) / 2)])
+    slowness = (
+        np.sqrt(np.maximum(np.array([force(z) for z in depth]) ** 2 - weight**2, 0.0))
+        / weight
+    )
+    passed = np.concatenate(
+        [[0.0], np.cumsum(np.diff(depth) * (slowness[1:] + slowness[:-1]) / 2)]
+    )
     return high, float(np.interp(time * bed.ground.rounding, passed, depth))

@@ -4,7 +4,15 @@ from rft.plates.catalogue import VERTICAL, VerticalEntry
 from rft.plates.contact import Part
 from rft.plates.loads import Loads, loads, parts
 from rft.plates.measured import PlateDrags
-from rft.plates.motions import MOTIONS, Drag, Motion, Path, Penetrate, Rotate, Trajectory
+from rft.plates.motions import (
+    MOTIONS,
+    Drag,
+    Motion,
+    Path,
+    Penetrate,
+    Rotate,
+    Trajectory,
+)
 from rft.plates.outline import Outline
 from rft.plates.shapes import (
     SHAPES,

@@ -23,7 +23,10 @@ DETERMINED = 0.9  # share of a coefficient that must come from the data, assumed
 FEWEST_DRAGS, FEWEST_DEPTHS = 6, 3
 MOST_ROWS = 100_000
 LARGEST = 1e12  # of any number; numbers below 1 / LARGEST count as 0
-STRENGTHS = (0.01, 100.0)  # bounds of zeta, more than a factor of 20 beyond all named media: else units are wrong
+STRENGTHS = (
+    0.01,
+    100.0,
+)  # bounds of zeta, more than a factor of 20 beyond all named media: else units are wrong
 EXACT = 1e-6  # least noise, over zeta
 STRAY = 0.5  # misfit of the generic shape, rms over that of the drags, from which on slips are looked for
 
@@ -58,12 +61,18 @@ class StressFit:
     @property
     def intervals(self) -> np.ndarray:
         """Intervals (9, 2) of 95 %, N/cm^3."""
-        return self.values[:, None] + student_factor(self.free) * self.errors[:, None] * [-1.0, 1.0]
+        return self.values[:, None] + student_factor(self.free) * self.errors[
+            :, None
+        ] * [-1.0, 1.0]
 
     @property
     def undetermined(self) -> list[str]:
         """Names of the coefficients that the data do not determine."""
-        return [name for name, share in zip(COEFFICIENTS, self.resolution) if share < DETERMINED]
+        return [
+            name
+            for name, share in zip(COEFFICIENTS, self.resolution)
+            if share < DETERMINED
+        ]
 
     def least_known(self) -> tuple[float, float]:
         """Return the (beta, gamma), rad in steps of 15 degrees, at which the map has the largest variance."""
@@ -99,7 +108,9 @@ class ZetaFit:
     @property
     def interval(self) -> np.ndarray:
         """Interval (2,) of 95 % of zeta."""
-        return self.zeta + student_factor(self.free) * self.error * np.array([-1.0, 1.0])
+        return self.zeta + student_factor(self.free) * self.error * np.array(
+            [-1.0, 1.0]
+        )
 
 
 def fit_stress(beta, gamma, alpha_x, alpha_z) -> StressFit:
@@ -112,43 +123,70 @@ def fit_stress(beta, gamma, alpha_x, alpha_z) -> StressFit:
     design, y = _design(*rows[:2]), rows[2:].ravel()
     zeta, misfit = _generic(design, y)
     _check_mistakes(rows, misfit)
-    check_strength(zeta, "angles in degrees, stresses in N/cm^3 (1e-6 of those in N/m^3)")
+    check_strength(
+        zeta, "angles in degrees, stresses in N/cm^3 (1e-6 of those in N/m^3)"
+    )
     unit = GENERIC / np.linalg.norm(GENERIC)
     prior = (np.eye(len(unit)) - np.outer(unit, unit)) / (SPREAD * zeta)
     noise = max(misfit * np.sqrt(np.mean(y * y)), EXACT * zeta)
     for _ in range(100):
         values, covariance, resolution = _solve(design, y, prior, noise)
         free = len(y) - np.trace(resolution)
-        last, noise = noise, max(math.sqrt(np.sum((y - design @ values) ** 2) / free), EXACT * zeta)
+        last, noise = (
+            noise,
+            max(math.sqrt(np.sum((y - design @ values) ** 2) / free), EXACT * zeta),
+        )
         if abs(noise - last) <= 1e-9 * last:
             break
     residuals = (y - design @ values).reshape(2, -1)
-    return StressFit(values, covariance, np.diag(resolution), zeta, residuals, noise, float(free))
+    return StressFit(
+        values, covariance, np.diag(resolution), zeta, residuals, noise, float(free)
+    )
 
 
 def fit_zeta(depth, force, area) -> ZetaFit:
     """Return zeta fitted to (N,) forces, N upwards, on a level plate of ``area``, m^2, one number or (N,), that is pushed
     straight down to ``depth``, m: F = zeta alpha_z(0, 90 degrees) |z| A. Rows above the surface do not count."""
-    depth, force, area = (np.atleast_1d(real_array(*x)) for x in (("depth", depth), ("force", force), ("area", area)))
-    require(depth.ndim == 1 and depth.shape == force.shape, "depth and force must be equally many numbers")
-    require(area.shape in ((1,), depth.shape), "area must be one number, or as many as depths")
+    depth, force, area = (
+        np.atleast_1d(real_array(*x))
+        for x in (("depth", depth), ("force", force), ("area", area))
+    )
+    require(
+        depth.ndim == 1 and depth.shape == force.shape,
+        "depth and force must be equally many numbers",
+    )
+    require(
+        area.shape in ((1,), depth.shape),
+        "area must be one number, or as many as depths",
+    )
     within = all(bool((np.abs(x) <= LARGEST).all()) for x in (depth, force, area))
-    require(within, f"depths, forces and areas must be finite numbers of at most {LARGEST:g}")
+    require(
+        within,
+        f"depths, forces and areas must be finite numbers of at most {LARGEST:g}",
+    )
     require(bool((area >= 1 / LARGEST).all()), "the area of the plate must be above 0")
     order = np.argsort(depth, kind="stable")
     order = order[depth[order] > 1 / LARGEST]
     needed = f"{FEWEST_DEPTHS} to {MOST_ROWS} depths below the surface are needed"
     within = FEWEST_DEPTHS <= order.size <= MOST_ROWS
-    require(within, f"{needed}, got {order.size}", because="depth is positive downwards")
+    require(
+        within, f"{needed}, got {order.size}", because="depth is positive downwards"
+    )
     d, f, a = depth[order], force[order], np.broadcast_to(area, depth.shape)[order]
     per_zeta = float(StressMap()(0.0, math.pi / 2)[1]) * PER_CUBIC_METRE * a * d
     zeta = float(per_zeta @ f / (per_zeta @ per_zeta))
-    require(zeta > 0, "the force is against the law", because="it must be positive where grains push the plate upwards")
+    require(
+        zeta > 0,
+        "the force is against the law",
+        because="it must be positive where grains push the plate upwards",
+    )
     check_strength(zeta, "depth in m, force in N, area in m^2")
     residuals = f - zeta * per_zeta
     error = math.sqrt((residuals @ residuals) / (len(f) - 1) / (per_zeta @ per_zeta))
     error = max(error * _correlation_factor(residuals), EXACT**2 * zeta)
-    return ZetaFit(zeta, error, float(len(f) - 1), d, f, zeta * per_zeta, *_zero(d, f / a))
+    return ZetaFit(
+        zeta, error, float(len(f) - 1), d, f, zeta * per_zeta, *_zero(d, f / a)
+    )
 
 
 def check_strength(zeta: float, units: str) -> None:
@@ -161,19 +199,34 @@ def check_strength(zeta: float, units: str) -> None:
 def _drags(beta, gamma, alpha_x, alpha_z) -> np.ndarray:
     """Return the drags as rows (4, N); ValueError for wrong lengths, too few or too many, or numbers out of range."""
     names = ("beta", "gamma", "alpha_x", "alpha_z")
-    rows = [np.atleast_1d(real_array(name, x)) for name, x in zip(names, (beta, gamma, alpha_x, alpha_z))]
+    rows = [
+        np.atleast_1d(real_array(name, x))
+        for name, x in zip(names, (beta, gamma, alpha_x, alpha_z))
+    ]
     same = all(x.ndim == 1 and x.shape == rows[0].shape for x in rows)
     require(same, "beta, gamma, alpha_x and alpha_z must be equally many numbers")
     rows = np.stack(rows)
-    require(bool((np.abs(rows) <= LARGEST).all()), f"plate drags must be finite numbers of at most {LARGEST:g}")
-    in_range("number of plate drags", rows.shape[1], FEWEST_DRAGS, MOST_ROWS, whole=True)
-    require(bool((np.abs(rows[2:]) > 1 / LARGEST).any()), "the plate drags are all 0", instead="measure some force")
+    require(
+        bool((np.abs(rows) <= LARGEST).all()),
+        f"plate drags must be finite numbers of at most {LARGEST:g}",
+    )
+    in_range(
+        "number of plate drags", rows.shape[1], FEWEST_DRAGS, MOST_ROWS, whole=True
+    )
+    require(
+        bool((np.abs(rows[2:]) > 1 / LARGEST).any()),
+        "the plate drags are all 0",
+        instead="measure some force",
+    )
     return rows
 
 
 def _design(beta, gamma) -> np.ndarray:
     """Return the derivatives (2 N, 9) of alpha_x, then of alpha_z, by the coefficients, at any angles (N,)."""
-    unit_maps = [StressMap(**dict.fromkeys(COEFFICIENTS, 0.0) | {name: 1.0}) for name in COEFFICIENTS]
+    unit_maps = [
+        StressMap(**dict.fromkeys(COEFFICIENTS, 0.0) | {name: 1.0})
+        for name in COEFFICIENTS
+    ]
     return np.stack([np.concatenate(stress(beta, gamma)) for stress in unit_maps], -1)
 
 
@@ -181,19 +234,51 @@ def _generic(design, y) -> tuple[float, float]:
     """Return zeta of the nearest generic set, and the rms of its residuals over that of the drags ``y``."""
     shape = design @ GENERIC
     zeta = float(shape @ y / (shape @ shape))
-    return zeta, float(np.sqrt(np.mean((y - max(zeta, 0.0) * shape) ** 2) / np.mean(y * y)))
+    return zeta, float(
+        np.sqrt(np.mean((y - max(zeta, 0.0) * shape) ** 2) / np.mean(y * y))
+    )
 
 
 MISTAKES = {
     "alpha_x and alpha_z are swapped": lambda b, g, x, z: (b, g, z, x),
     "beta and gamma are swapped": lambda b, g, x, z: (g, b, x, z),
-    "alpha_x has the other sign: positive is against the motion's x": lambda b, g, x, z: (b, g, -x, z),
+    "alpha_x has the other sign: positive is against the motion's x": lambda b, g, x, z: (
+        b,
+        g,
+        -x,
+        z,
+    ),
     "alpha_z has the other sign: positive is upwards": lambda b, g, x, z: (b, g, x, -z),
-    "both stresses have the other sign: they are those on the plate": lambda b, g, x, z: (b, g, -x, -z),
-    "gamma has the other sign: positive is below the horizontal": lambda b, g, x, z: (b, -g, x, z),
-    "beta has the other sign: positive if the forward edge is up": lambda b, g, x, z: (-b, g, x, z),
-    "beta is from the vertical: 0 is a plate that lies flat": lambda b, g, x, z: (np.pi / 2 - b, g, x, z),
-    "gamma is from the vertical: 90 degrees is straight down": lambda b, g, x, z: (b, np.pi / 2 - g, x, z),
+    "both stresses have the other sign: they are those on the plate": lambda b, g, x, z: (
+        b,
+        g,
+        -x,
+        -z,
+    ),
+    "gamma has the other sign: positive is below the horizontal": lambda b, g, x, z: (
+        b,
+        -g,
+        x,
+        z,
+    ),
+    "beta has the other sign: positive if the forward edge is up": lambda b, g, x, z: (
+        -b,
+        g,
+        x,
+        z,
+    ),
+    "beta is from the vertical: 0 is a plate that lies flat": lambda b, g, x, z: (
+        np.pi / 2 - b,
+        g,
+        x,
+        z,
+    ),
+    "gamma is from the vertical: 90 degrees is straight down": lambda b, g, x, z: (
+        b,
+        np.pi / 2 - g,
+        x,
+        z,
+    ),
 }
 
 
@@ -206,7 +291,10 @@ def _check_mistakes(rows, misfit: float) -> None:
         b, g, x, z = undo(*rows)
         misfits[mistake] = _generic(_design(b, g), np.concatenate([x, z]))[1]
     best = min(misfits, key=misfits.get)
-    require(misfits[best] > misfit / 2, f"these drags are like those of no grains, but would be if {best}")
+    require(
+        misfits[best] > misfit / 2,
+        f"these drags are like those of no grains, but would be if {best}",
+    )
 
 
 def _solve(design, y, prior, noise: float):
@@ -214,13 +302,21 @@ def _solve(design, y, prior, noise: float):
     rows = np.concatenate([design / noise, prior])
     u, s, vt = np.linalg.svd(rows, full_matrices=False)
     root = vt.T / s
-    return root @ (u[: len(y)].T @ (y / noise)), root @ root.T, root @ (u[: len(y)].T @ design) / noise
+    return (
+        root @ (u[: len(y)].T @ (y / noise)),
+        root @ root.T,
+        root @ (u[: len(y)].T @ design) / noise,
+    )
 
 
 def _correlation_factor(residuals) -> float:
     """Return the factor of a standard error by which correlated neighbouring residuals widen it."""
     size = residuals @ residuals
-    correlation = min(max(float(residuals[1:] @ residuals[:-1] / size), 0.0), 0.99) if size else 0.0
+    correlation = (
+        min(max(float(residuals[1:] @ residuals[:-1] / size), 0.0), 0.99)
+        if size
+        else 0.0
+    )
     return math.sqrt((1 + correlation) / (1 - correlation))
 
 
@@ -231,6 +327,12 @@ def _zero(depth, stress) -> tuple[float, float]:
     rows = np.stack([depth, np.ones_like(depth)], -1)
     (slope, intercept), *_ = np.linalg.lstsq(rows, stress, rcond=None)
     residuals = stress - rows @ [slope, intercept]
-    variance = (residuals @ residuals) / (len(depth) - 2) * np.linalg.inv(rows.T @ rows)[1, 1]
+    variance = (
+        (residuals @ residuals) / (len(depth) - 2) * np.linalg.inv(rows.T @ rows)[1, 1]
+    )
     error = math.sqrt(variance) * _correlation_factor(residuals)
-    return (-float(intercept / slope), float(abs(error / slope))) if slope else (math.nan, math.nan)
+    return (
+        (-float(intercept / slope), float(abs(error / slope)))
+        if slope
+        else (math.nan, math.nan)
+    )

@@ -26,7 +26,10 @@ class VerticalEntry:
 
 def _scaled(zeta: float, grains: str) -> VerticalEntry:
     """Return the generic set times zeta, fitted to some grains."""
-    return VerticalEntry(StressMap(zeta=zeta), f"generic set M0 times zeta = {zeta:g}, fitted to {grains}; {LI}")
+    return VerticalEntry(
+        StressMap(zeta=zeta),
+        f"generic set M0 times zeta = {zeta:g}, fitted to {grains}; {LI}",
+    )
 
 
 LOOSE = StressMap(0.051, 0.047, 0.053, 0.083, 0.020, -0.026, 0.057, 0.0, 0.025)
@@ -36,12 +39,16 @@ CLOSE = StressMap(0.094, 0.092, 0.092, 0.151, 0.035, -0.039, 0.086, 0.018, 0.046
 OWN = f"its own nine coefficients; {LI}; a level plate bears"
 
 VERTICAL = {
-    "generic": VerticalEntry(StressMap(), f"the generic set M0, zeta = 1 (1 N/cm^3 straight down); {LI}"),
+    "generic": VerticalEntry(
+        StressMap(), f"the generic set M0, zeta = 1 (1 N/cm^3 straight down); {LI}"
+    ),
     "poppy-seeds-loose": VerticalEntry(
-        LOOSE, f"{OWN} 6 % more than by poppy-seeds-loose-scaled, in three dimensions too"
+        LOOSE,
+        f"{OWN} 6 % more than by poppy-seeds-loose-scaled, in three dimensions too",
     ),
     "poppy-seeds-close": VerticalEntry(
-        CLOSE, f"{OWN} 10 % more than by poppy-seeds-close-scaled, in three dimensions too"
+        CLOSE,
+        f"{OWN} 10 % more than by poppy-seeds-close-scaled, in three dimensions too",
     ),
     "glass-3mm": _scaled(0.224, "3 mm glass spheres"),
     "poppy-seeds-loose-scaled": _scaled(0.240, "loose poppy seeds"),

@@ -23,7 +23,10 @@ def on_elements(law, ground, table, begin, end, g, side, lead_of_middle, sums):
     x = z = moment = 0.0 * read(sums, 0)
     for k in range(begin, end):
         e = read_element(table[k], 0)
-        if any_of((g.z + g.cos * e.z1 - g.sin * e.x1 < 0.0) | (g.z + g.cos * e.z2 - g.sin * e.x2 < 0.0)):
+        if any_of(
+            (g.z + g.cos * e.z1 - g.sin * e.x1 < 0.0)
+            | (g.z + g.cos * e.z2 - g.sin * e.x2 < 0.0)
+        ):
             f = load(law, ground, e, g, side, side != 0.0, lead_of_middle)
             x, z, moment = x + f.x, z + f.z, moment + f.moment
     store(sums, 0, x)
@@ -41,11 +44,21 @@ def kernel(Law: type):
     def total(numbers, ground_numbers, disturbed, table, side, motions, out):
         law, sums = Law(*numbers), np.zeros((3, WIDTH))
         strength, flux, rounding, grazing_sine, downhill_loss = ground_numbers
-        ground = Ground(strength, flux, rounding, grazing_sine, downhill_loss, disturbed)
+        ground = Ground(
+            strength, flux, rounding, grazing_sine, downhill_loss, disturbed
+        )
         for i in range(len(motions)):
             x, z, cos, sin, v_x, v_z, rate = motions[i]
             f = on_elements(
-                law, ground, table, 0, len(table), Motion(x, z, cos, sin, v_x, v_z, rate), side, False, sums
+                law,
+                ground,
+                table,
+                0,
+                len(table),
+                Motion(x, z, cos, sin, v_x, v_z, rate),
+                side,
+                False,
+                sums,
             )
             out[0, i] += f.x
             out[1, i] += f.z
@@ -60,13 +73,23 @@ def rows_of_eight(elements: Element) -> np.ndarray:
     if short := -table.shape[-1] % WIDTH:
         table = np.concatenate([table, table[..., :1].repeat(short, -1)], -1)
         table[..., -1, -short:] = 0.0
-    return np.ascontiguousarray(np.moveaxis(table.reshape(*table.shape[:-1], -1, WIDTH), -2, -3))
+    return np.ascontiguousarray(
+        np.moveaxis(table.reshape(*table.shape[:-1], -1, WIDTH), -2, -3)
+    )
 
 
-def sum_forces(law, ground: Ground, outline: Element, motions: Motion, sides: tuple[float, ...]) -> np.ndarray:
+def sum_forces(
+    law, ground: Ground, outline: Element, motions: Motion, sides: tuple[float, ...]
+) -> np.ndarray:
     """Return (3, M): the same as `rft.plates.loads.sum_forces_by_numpy`."""
-    table, moves, out = rows_of_eight(outline), np.stack(motions, -1), np.zeros((3, len(motions.x)))
+    table, moves, out = (
+        rows_of_eight(outline),
+        np.stack(motions, -1),
+        np.zeros((3, len(motions.x))),
+    )
     numbers = tuple(map(float, ground[:-1]))
     for side in sides:
-        kernel(type(law))(tuple(law), numbers, ground.disturbed, table, side, moves, out)
+        kernel(type(law))(
+            tuple(law), numbers, ground.disturbed, table, side, moves, out
+        )
     return out

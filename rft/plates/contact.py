@@ -91,7 +91,9 @@ def negative_part(a, b):
     nowhere."""
     drop = a - b
     zero = a / where(drop == 0.0, 1.0, drop)
-    return where(a < 0.0, 0.0, where(b < 0.0, zero, 1.0)), where(b < 0.0, 1.0, where(a < 0.0, zero, 0.0))
+    return where(a < 0.0, 0.0, where(b < 0.0, zero, 1.0)), where(
+        b < 0.0, 1.0, where(a < 0.0, zero, 0.0)
+    )
 
 
 @formula
@@ -106,7 +108,11 @@ def speeds_across(e, g, side):
     v_x, v_z = g.cos * g.v_x - g.sin * g.v_z, g.cos * g.v_z + g.sin * g.v_x
     across1 = e.nx1 * v_x + e.nz1 * v_z + g.rate * (e.nx1 * e.z1 - e.nz1 * e.x1)
     across2 = e.nx2 * v_x + e.nz2 * v_z + g.rate * (e.nx2 * e.z2 - e.nz2 * e.x2)
-    size = absolute(v_x) + absolute(v_z) + absolute(g.rate) * (absolute(e.x1) + absolute(e.z1))
+    size = (
+        absolute(v_x)
+        + absolute(v_z)
+        + absolute(g.rate) * (absolute(e.x1) + absolute(e.z1))
+    )
     return side * across1, side * across2, ROUNDOFF * size
 
 
@@ -114,17 +120,26 @@ def speeds_across(e, g, side):
 def leading_part(e, g, side, one_sided):
     """Return the `Part` of an element. side: 1 or -1 for the face along or against the normal alone, 0 for whichever
     leads. one_sided: whether any side is not 0."""
-    first, last = negative_part(g.z + g.cos * e.z1 - g.sin * e.x1, g.z + g.cos * e.z2 - g.sin * e.x2)
+    first, last = negative_part(
+        g.z + g.cos * e.z1 - g.sin * e.x1, g.z + g.cos * e.z2 - g.sin * e.x2
+    )
     if one_sided:
         across1, across2, roundoff = speeds_across(e, g, side)
         least = where(side == 0.0, -1.0, roundoff)  # speed across of a face that leads
         first_leading, last_leading = negative_part(least - across1, least - across2)
         first, last = maximum(first, first_leading), minimum(last, last_leading)
     share, middle = maximum(last - first, 0.0), 0.5 * (first + last)
-    a_x, a_z = rotated(interpolated(e.x1, e.x2, middle), interpolated(e.z1, e.z2, middle), g)
-    n_x, n_z = rotated(interpolated(e.nx1, e.nx2, middle), interpolated(e.nz1, e.nz2, middle), g)
+    a_x, a_z = rotated(
+        interpolated(e.x1, e.x2, middle), interpolated(e.z1, e.z2, middle), g
+    )
+    n_x, n_z = rotated(
+        interpolated(e.nx1, e.nx2, middle), interpolated(e.nz1, e.nz2, middle), g
+    )
     v_x, v_z = g.v_x + g.rate * a_z, g.v_z - g.rate * a_x
-    speed, to_unit = sqrt(v_x * v_x + v_z * v_z), where(side < 0.0, -1.0, 1.0) / sqrt(n_x * n_x + n_z * n_z)
+    speed, to_unit = (
+        sqrt(v_x * v_x + v_z * v_z),
+        where(side < 0.0, -1.0, 1.0) / sqrt(n_x * n_x + n_z * n_z),
+    )
     slowness = 1.0 / where(speed == 0.0, 1.0, speed)
     depth = where(share > 0.0, -(g.z + a_z), 0.0)
     n, v = (to_unit * n_x, to_unit * n_z), (slowness * v_x, slowness * v_z)
@@ -138,17 +153,36 @@ def load(law, ground, e, g, side, one_sided, lead_of_middle):
     side, one_sided: see `leading_part`. lead_of_middle: True for the lead `rounded` at the part's middle, which is
     smooth where a body comes to rest; False for the mean over the part of a lead that rises linearly."""
     p = leading_part(e, g, side, one_sided)
-    across, slowness = p.speed * (p.n[0] * p.v[0] + p.n[1] * p.v[1]), inverse_speed(ground, p.speed)
-    stress = PER_CUBIC_METRE * p.depth * p.speed * slowness * strength_at(ground, g.x + p.arm[0], p.v[0])
+    across, slowness = (
+        p.speed * (p.n[0] * p.v[0] + p.n[1] * p.v[1]),
+        inverse_speed(ground, p.speed),
+    )
+    stress = (
+        PER_CUBIC_METRE
+        * p.depth
+        * p.speed
+        * slowness
+        * strength_at(ground, g.x + p.arm[0], p.v[0])
+    )
     if one_sided and lead_of_middle:
-        stress = stress * where(side == 0.0, 1.0, rounded(slowness * across, ground.grazing_sine))
+        stress = stress * where(
+            side == 0.0, 1.0, rounded(slowness * across, ground.grazing_sine)
+        )
     elif one_sided and ground.grazing_sine > 0.0:
         across1, across2, _ = speeds_across(e, g, side)
-        first, last = interpolated(across1, across2, p.first), interpolated(across1, across2, p.last)
-        stress = stress * mean_ramp(slowness * first, slowness * last, ground.grazing_sine)
+        first, last = (
+            interpolated(across1, across2, p.first),
+            interpolated(across1, across2, p.last),
+        )
+        stress = stress * mean_ramp(
+            slowness * first, slowness * last, ground.grazing_sine
+        )
     a_x, a_z = alpha(law, p.n, p.v)
     push = where(p.depth > 0.0, ground.flux * across * absolute(across), 0.0)
-    f_x, f_z = -p.area * (stress * a_x + push * p.n[0]), p.area * (stress * a_z - push * p.n[1])
+    f_x, f_z = (
+        -p.area * (stress * a_x + push * p.n[0]),
+        p.area * (stress * a_z - push * p.n[1]),
+    )
     return Force(f_x, f_z, p.arm[1] * f_x - p.arm[0] * f_z)
 
 

@@ -16,12 +16,24 @@ import numpy as np
 from rft.balance.backend import check, compiles
 from rft.checks import real_array
 from rft.ground import Ground, GroundEffect, ground_of
-from rft.plates.contact import Element, Motion, Part, elements, leading_part, load, record, sides
+from rft.plates.contact import (
+    Element,
+    Motion,
+    Part,
+    elements,
+    leading_part,
+    load,
+    record,
+    sides,
+)
 from rft.plates.outline import Outline
 from rft.plates.stress import PlateStress
 from rft.refusal import require
 
-ORDER = {"keep": 2, "cut": 1}  # of the error in 1 / elements, by `PlateStress.tension`: a cut jumps inside an element
+ORDER = {
+    "keep": 2,
+    "cut": 1,
+}  # of the error in 1 / elements, by `PlateStress.tension`: a cut jumps inside an element
 
 CHUNK = 50_000  # elements times motions that are computed at once, for memory
 
@@ -72,17 +84,26 @@ def loads(
     check(backend)
     pose, twist = np.broadcast_arrays(_triples("pose", pose), _triples("twist", twist))
     shape, law = pose.shape[:-1], record(stress)
-    ground = ground_of(effects, Ground(grazing_sine=math.sin(stress.grazing) if outline.closed else 0.0))
+    ground = ground_of(
+        effects,
+        Ground(grazing_sine=math.sin(stress.grazing) if outline.closed else 0.0),
+    )
     motions = motion(pose.reshape(-1, 3), twist.reshape(-1, 3))
     if compiles(backend, law):
         from rft.plates.compiled import sum_forces
     else:
         sum_forces = sum_forces_by_numpy
-    force = sum_forces(law, ground, elements(outline), motions, sides(outline.closed, stress.tension))
-    return Loads(np.moveaxis(force[:2], 0, -1).reshape(*shape, 2), force[2].reshape(shape))
+    force = sum_forces(
+        law, ground, elements(outline), motions, sides(outline.closed, stress.tension)
+    )
+    return Loads(
+        np.moveaxis(force[:2], 0, -1).reshape(*shape, 2), force[2].reshape(shape)
+    )
 
 
-def sum_forces_by_numpy(law, ground: Ground, outline: Element, motions: Motion, sides: tuple[float, ...]) -> np.ndarray:
+def sum_forces_by_numpy(
+    law, ground: Ground, outline: Element, motions: Motion, sides: tuple[float, ...]
+) -> np.ndarray:
     """Return (3, M): force (x, z), N, and moment, N m, of the elements (E,) of an outline on these sides, in M motions."""
     size, step = len(motions.x), max(1, CHUNK // len(outline.area))
     out = np.zeros((3, size))
@@ -90,7 +111,10 @@ def sum_forces_by_numpy(law, ground: Ground, outline: Element, motions: Motion, 
         chunk = slice(begin, begin + step)
         g = Motion(*(x[chunk, None] for x in motions))
         for side in sides:
-            out[:, chunk] += [x.sum(-1) for x in load(law, ground, outline, g, side, side != 0.0, False)]
+            out[:, chunk] += [
+                x.sum(-1)
+                for x in load(law, ground, outline, g, side, side != 0.0, False)
+            ]
     return out
 
 
@@ -111,12 +135,18 @@ def parts(outline: Outline, pose, twist, side: float = 1.0) -> Part:
     array([0.0002, 0.0002, 0.0002, 0.0002])
     """
     motions = motion(_triples("pose", pose), _triples("twist", twist))
-    return leading_part(elements(outline), Motion(*(x[..., None] for x in motions)), side, side != 0.0)
+    return leading_part(
+        elements(outline), Motion(*(x[..., None] for x in motions)), side, side != 0.0
+    )
 
 
 def _triples(name: str, values) -> np.ndarray:
     """Return poses or twists as an array (..., 3); ValueError unless they are finite numbers of that shape."""
     values = real_array(name, values)
-    require(values.ndim > 0 and values.shape[-1] == 3, f"{name} must have shape (..., 3)", value=values.shape)
+    require(
+        values.ndim > 0 and values.shape[-1] == 3,
+        f"{name} must have shape (..., 3)",
+        value=values.shape,
+    )
     require(bool(np.isfinite(values).all()), f"{name} must be finite")
     return values

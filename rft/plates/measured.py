@@ -46,19 +46,32 @@ class PlateDrags(PlateStress):
         for name in ("beta", "gamma", "alpha_x", "alpha_z"):
             values = real_array(name, getattr(self, name))
             require(values.ndim == 1, f"{name} must be a list of numbers")
-            require(bool((np.abs(values) <= 1000000.0).all()), f"{name} must be finite numbers of at most 1e6")
+            require(
+                bool((np.abs(values) <= 1000000.0).all()),
+                f"{name} must be finite numbers of at most 1e6",
+            )
             object.__setattr__(self, name, tuple(map(float, values)))
         sizes = {len(x) for x in (self.beta, self.gamma, self.alpha_x, self.alpha_z)}
-        require(len(sizes) == 1, "beta, gamma, alpha_x and alpha_z must be equally many")
+        require(
+            len(sizes) == 1, "beta, gamma, alpha_x and alpha_z must be equally many"
+        )
         count = sizes.pop()
         message = f"plate drags must be {FEWEST_PLATES} to {MOST_PLATES}, got {count}"
         require(FEWEST_PLATES <= count <= MOST_PLATES, message)
         self._check()
-        object.__setattr__(self, "_interpolant", _interpolant(self.beta, self.gamma, self.alpha_x, self.alpha_z))
+        object.__setattr__(
+            self,
+            "_interpolant",
+            _interpolant(self.beta, self.gamma, self.alpha_x, self.alpha_z),
+        )
 
     def alpha_ahead(self, n, v) -> tuple[np.ndarray, np.ndarray]:
-        beta, gamma = np.broadcast_arrays(np.arctan2(n[0], -n[1]), np.arctan2(-v[1], v[0]))
-        alpha = self._interpolant(np.stack([_wrapped(beta), gamma], axis=-1)).reshape(*beta.shape, 2)
+        beta, gamma = np.broadcast_arrays(
+            np.arctan2(n[0], -n[1]), np.arctan2(-v[1], v[0])
+        )
+        alpha = self._interpolant(np.stack([_wrapped(beta), gamma], axis=-1)).reshape(
+            *beta.shape, 2
+        )
         return self.zeta * alpha[..., 0], self.zeta * alpha[..., 1]
 
 
@@ -77,13 +90,24 @@ def _interpolant(beta, gamma, a_x, a_z):
     gamma = gamma - 2 * np.pi * np.round(gamma / (2 * np.pi))
     rows = np.stack([beta, gamma, a_x, a_z], -1)
     mirrored = np.stack([-beta, np.pi - gamma, -a_x, a_z], -1)
-    rows = np.concatenate([rows + [0, 2 * np.pi * k, 0, 0] for rows in (rows, mirrored) for k in (-1, 0, 1)])
+    rows = np.concatenate(
+        [
+            rows + [0, 2 * np.pi * k, 0, 0]
+            for rows in (rows, mirrored)
+            for k in (-1, 0, 1)
+        ]
+    )
     rows[:, 0] = _wrapped(rows[:, 0])
     rows = np.concatenate([rows + [np.pi * k, 0, 0, 0] for k in (-1, 0, 1)])
-    rows = rows[(np.abs(rows[:, 0]) < np.pi + 1e-9) & (np.abs(rows[:, 1]) < np.pi + 1e-9)]
+    rows = rows[
+        (np.abs(rows[:, 0]) < np.pi + 1e-9) & (np.abs(rows[:, 1]) < np.pi + 1e-9)
+    ]
     angles, index = np.unique(rows[:, :2].round(9), axis=0, return_inverse=True)
     index = index.ravel()
-    means = np.stack([np.bincount(index, rows[:, k]) for k in (2, 3)], -1) / np.bincount(index)[:, None]
+    means = (
+        np.stack([np.bincount(index, rows[:, k]) for k in (2, 3)], -1)
+        / np.bincount(index)[:, None]
+    )
     _check_gaps(angles)
     return LinearNDInterpolator(angles, means)
 
@@ -96,7 +120,5 @@ def _check_gaps(angles) -> None:
     square = np.stack(np.meshgrid(line, line, indexing="ij"), -1)
     distance = cKDTree(angles).query(square.reshape(-1, 2))[0]
     b, g = np.degrees(square.reshape(-1, 2)[distance.argmax()])
-    message = (
-        f"no plate drag within {FARTHEST:g} degrees of beta = {b:.0f}, gamma = {g:.0f} degrees: measure some there"
-    )
+    message = f"no plate drag within {FARTHEST:g} degrees of beta = {b:.0f}, gamma = {g:.0f} degrees: measure some there"
     require(np.degrees(distance.max()) <= FARTHEST, message)

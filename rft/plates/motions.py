@@ -12,12 +12,26 @@ import numpy as np
 from rft.checks import Number, check_numbers, real_array
 from rft.metres import LARGEST, metres
 from rft.plates.outline import Outline
-from rft.prescribed import FARTHEST, MOST_SAMPLES, Depth, Direction, Distance, Height, Motion, Samples
+from rft.prescribed import (
+    FARTHEST,
+    MOST_SAMPLES,
+    Depth,
+    Direction,
+    Distance,
+    Height,
+    Motion,
+    Samples,
+)
 from rft.refusal import require
 
 Speed = Annotated[float, Number(1e-9, 1e3, "m/s", "speed; it changes no force")]
 Attitude = Annotated[float, Number(-10, 10, "rad", "angle at which the body is held")]
-Angle = Annotated[float, Number(-1e3, 1e3, "rad", "angle at one end of the motion, 0 where a leg points down")]
+Angle = Annotated[
+    float,
+    Number(
+        -1e3, 1e3, "rad", "angle at one end of the motion, 0 where a leg points down"
+    ),
+]
 
 
 class Trajectory(NamedTuple):
@@ -107,11 +121,19 @@ class Rotate(Motion):
 
     hub_height: Height
     rate: Annotated[
-        float, Number(-1e3, 1e3, "rad/s", "rate of rotation, positive as it sweeps a leg that points down backwards")
+        float,
+        Number(
+            -1e3,
+            1e3,
+            "rad/s",
+            "rate of rotation, positive as it sweeps a leg that points down backwards",
+        ),
     ] = 2 * math.pi
     start: Angle = -math.pi
     stop: Angle = math.pi
-    speed: Annotated[float, Number(-1e3, 1e3, "m/s", "speed of the hub, forwards")] = 0.0
+    speed: Annotated[float, Number(-1e3, 1e3, "m/s", "speed of the hub, forwards")] = (
+        0.0
+    )
     samples: Samples = 361
     turns = True
 
@@ -124,7 +146,9 @@ class Rotate(Motion):
         angle = np.linspace(self.start, self.stop, self.samples)
         t = (angle - self.start) / self.rate
         pose = np.stack([self.speed * t, np.full_like(t, self.hub_height), angle], -1)
-        return Trajectory(t, pose, np.broadcast_to([self.speed, 0.0, self.rate], pose.shape))
+        return Trajectory(
+            t, pose, np.broadcast_to([self.speed, 0.0, self.rate], pose.shape)
+        )
 
 
 @dataclass(frozen=True)
@@ -151,15 +175,25 @@ class Path(Motion):
             values = real_array(name, getattr(self, name))
             require(values.ndim == 1, f"{name} must be a list of numbers")
             object.__setattr__(self, name, tuple(map(float, values)))
-            largest, unit = {"x": (FARTHEST, " m"), "z": (LARGEST, " m")}.get(name, (1e9, ""))
+            largest, unit = {"x": (FARTHEST, " m"), "z": (LARGEST, " m")}.get(
+                name, (1e9, "")
+            )
             within = all(abs(v) <= largest for v in getattr(self, name))
             require(within, f"{name} must be finite and within {largest:g}{unit}")
-        require(3 <= len(self.t) <= MOST_SAMPLES, f"a path takes 3 to {MOST_SAMPLES} poses", value=len(self.t))
-        same = len(self.x) == len(self.z) == len(self.t) and len(self.angle) in (0, len(self.t))
+        require(
+            3 <= len(self.t) <= MOST_SAMPLES,
+            f"a path takes 3 to {MOST_SAMPLES} poses",
+            value=len(self.t),
+        )
+        same = len(self.x) == len(self.z) == len(self.t) and len(self.angle) in (
+            0,
+            len(self.t),
+        )
         require(same, "t, x, z and angle must be equally many")
         late = np.flatnonzero(np.diff(self.t) <= 0)
         require(
-            not late.size, f"t must ascend, but t = {(self.t[late[0]] if late.size else 0):g} is not before the next"
+            not late.size,
+            f"t must ascend, but t = {(self.t[late[0]] if late.size else 0):g} is not before the next",
         )
 
     @property
@@ -182,4 +216,6 @@ def _straight(motion, x: float, z: float, distance: float) -> Trajectory:
     along[np.abs(along) < 1e-15] = 0.0  # straight down, or level, to the last digit
     s = np.linspace(0.0, distance, motion.samples)
     pose = np.array([x, z, motion.attitude]) + s[:, None] * along
-    return Trajectory(s / motion.speed, pose, np.broadcast_to(motion.speed * along, pose.shape))
+    return Trajectory(
+        s / motion.speed, pose, np.broadcast_to(motion.speed * along, pose.shape)
+    )

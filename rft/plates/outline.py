@@ -40,17 +40,35 @@ class Outline:
     def __post_init__(self):
         check_numbers(self)
         points = real_array("points", self.points)
-        require(points.ndim == 2 and points.shape[1] == 2, "points must be a list of (x, z)")
+        require(
+            points.ndim == 2 and points.shape[1] == 2, "points must be a list of (x, z)"
+        )
         require(
             2 <= len(points) <= MOST_ELEMENTS + 1,
             f"an outline takes 1 to {MOST_ELEMENTS} elements, got {len(points) - 1}",
         )
-        require(bool((np.abs(points) <= LARGEST).all()), f"points must be finite and within {LARGEST:g} m")
-        normals = None if self.smooth_normals is None else real_array("smooth_normals", self.smooth_normals)
-        valid = normals is None or (normals.shape == (len(points) - 1, 2, 2) and bool(np.isfinite(normals).all()))
-        require(valid, f"smooth_normals must be unit normals of shape ({len(points) - 1}, 2, 2)")
+        require(
+            bool((np.abs(points) <= LARGEST).all()),
+            f"points must be finite and within {LARGEST:g} m",
+        )
+        normals = (
+            None
+            if self.smooth_normals is None
+            else real_array("smooth_normals", self.smooth_normals)
+        )
+        valid = normals is None or (
+            normals.shape == (len(points) - 1, 2, 2)
+            and bool(np.isfinite(normals).all())
+        )
+        require(
+            valid,
+            f"smooth_normals must be unit normals of shape ({len(points) - 1}, 2, 2)",
+        )
         if self.closed and _area(points) < 0.0:
-            points, normals = points[::-1], None if normals is None else normals[::-1, ::-1]
+            points, normals = (
+                points[::-1],
+                None if normals is None else normals[::-1, ::-1],
+            )
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "smooth_normals", normals)
         _check_simple(points, self.closed)
@@ -58,7 +76,9 @@ class Outline:
     @property
     def closed(self) -> bool:
         """True if the last point is the first."""
-        return len(self.points) > 3 and bool((np.asarray(self.points[0]) == np.asarray(self.points[-1])).all())
+        return len(self.points) > 3 and bool(
+            (np.asarray(self.points[0]) == np.asarray(self.points[-1])).all()
+        )
 
     @property
     def elements(self) -> int:
@@ -84,7 +104,11 @@ class Outline:
     @property
     def end_normals(self) -> np.ndarray:
         """Unit normals (N, 2, 2) at the start and at the end of each element."""
-        return np.repeat(self.normals[:, None], 2, 1) if self.smooth_normals is None else self.smooth_normals
+        return (
+            np.repeat(self.normals[:, None], 2, 1)
+            if self.smooth_normals is None
+            else self.smooth_normals
+        )
 
 
 def _area(points) -> float:
@@ -103,10 +127,16 @@ def _check_simple(points, closed: bool) -> None:
     along = np.diff(points, axis=0)
     lengths, size = np.hypot(*along.T), np.ptp(points, axis=0).max()
     short = np.flatnonzero(lengths <= 1e-12 * size)
-    require(not short.size, f"points {short[:1]} and the next are the same", instead="keep one")
+    require(
+        not short.size,
+        f"points {short[:1]} and the next are the same",
+        instead="keep one",
+    )
     last = along[1:] if not closed else np.roll(along, -1, 0)
     first = along[:-1] if not closed else along
-    back = (np.abs(_cross(first, last)) <= 1e-12 * size**2) & ((first * last).sum(-1) < 0)
+    back = (np.abs(_cross(first, last)) <= 1e-12 * size**2) & (
+        (first * last).sum(-1) < 0
+    )
     require(
         not back.any(),
         f"the outline turns back onto itself after element {np.flatnonzero(back)[:1]}",
@@ -124,7 +154,11 @@ def _close(points, reach: float) -> np.ndarray:
     """Return the pairs (2, K) of points at most ``reach`` from each other, as indices, the smaller first."""
     if len(points) <= FEW_ELEMENTS:
         difference = points[:, None] - points
-        return np.array(np.nonzero(np.triu(np.hypot(difference[..., 0], difference[..., 1]) <= reach, 1)))
+        return np.array(
+            np.nonzero(
+                np.triu(np.hypot(difference[..., 0], difference[..., 1]) <= reach, 1)
+            )
+        )
     from scipy.spatial import cKDTree
 
     return cKDTree(points).query_pairs(reach, output_type="ndarray").T
@@ -136,7 +170,12 @@ def _crossings(points, along, closed: bool):
     no_neighbours = (j > i + 1) & ~((i == 0) & (j == len(along) - 1) & closed)
     i, j = i[no_neighbours], j[no_neighbours]
     a, d, b, e = points[i], along[i], points[j], along[j]
-    sides = _cross(d, b - a) * _cross(d, b + e - a), _cross(e, a - b) * _cross(e, a + d - b)
-    overlap = (np.minimum(a, a + d) <= np.maximum(b, b + e)) & (np.minimum(b, b + e) <= np.maximum(a, a + d))
+    sides = (
+        _cross(d, b - a) * _cross(d, b + e - a),
+        _cross(e, a - b) * _cross(e, a + d - b),
+    )
+    overlap = (np.minimum(a, a + d) <= np.maximum(b, b + e)) & (
+        np.minimum(b, b + e) <= np.maximum(a, a + d)
+    )
     crosses = overlap.all(-1) & (sides[0] <= 0) & (sides[1] <= 0)
     return i[crosses], j[crosses]

@@ -108,7 +108,9 @@ class HalfCylinder(Shape):
     def __post_init__(self):
         super().__post_init__()
         require(
-            isinstance(self.flat, str) and self.flat in ("down", "up"), "flat must be 'down' or 'up'", value=self.flat
+            isinstance(self.flat, str) and self.flat in ("down", "up"),
+            "flat must be 'down' or 'up'",
+            value=self.flat,
         )
 
     def curve(self, elements: int):
@@ -144,7 +146,9 @@ class SquareRod(Shape):
 
     def curve(self, elements: int):
         h = self.side / 2
-        return _subdivided(np.array([[-h, -h], [h, -h], [h, h], [-h, h], [-h, -h]]), elements), None
+        return _subdivided(
+            np.array([[-h, -h], [h, -h], [h, h], [-h, h], [-h, -h]]), elements
+        ), None
 
 
 @dataclass(frozen=True)
@@ -177,7 +181,11 @@ class CLeg(Shape):
         angle = half * s
         # sin(s asin c) / c and (cos(s asin c) - cos(asin c)) / c, both regular as c -> 0
         along = np.sinc(angle / np.pi) * s * (half / c if c else 1.0)
-        across = 2 * np.sin((half + angle) / 2) * np.sin((half - angle) / 2) / c if c else 0.0 * s
+        across = (
+            2 * np.sin((half + angle) / 2) * np.sin((half - angle) / 2) / c
+            if c
+            else 0.0 * s
+        )
         points = self.radius * np.stack([-across, -1.0 - along], -1)
         normal = np.stack([-np.cos(angle), -np.sin(angle)], -1)
         return points, np.stack([normal[:-1], normal[1:]], 1)
@@ -214,7 +222,9 @@ class Wheel(Shape):
 
     radius: Annotated[float, metres("radius of the rim")]
     width: Width
-    lugs: Annotated[int, Number(0, 200, "-", "number of lugs, 0 to 200", whole=True)] = 0
+    lugs: Annotated[
+        int, Number(0, 200, "-", "number of lugs, 0 to 200", whole=True)
+    ] = 0
     lug_height: Annotated[float, metres("height of a lug; 0 without lugs", 0)] = 0.0
     lug_width: Annotated[float, metres("width of a lug; 0 without lugs", 0)] = 0.0
 
@@ -222,7 +232,9 @@ class Wheel(Shape):
         super().__post_init__()
         if not self.lugs:
             require(
-                self.lug_height == self.lug_width == 0, "lug_height and lug_width need lugs", instead="say how many"
+                self.lug_height == self.lug_width == 0,
+                "lug_height and lug_width need lugs",
+                instead="say how many",
             )
             return
         for name in ("lug_height", "lug_width"):
@@ -234,20 +246,39 @@ class Wheel(Shape):
     def curve(self, elements: int):
         if not self.lugs:
             return _arc(self.radius, 0.0, 2 * math.pi, elements)
-        half = math.asin(self.lug_width / (2 * self.radius))  # half the angle of a lug at the rim
-        pitch, top = 2 * math.pi / self.lugs, self.radius * math.cos(half) + self.lug_height
+        half = math.asin(
+            self.lug_width / (2 * self.radius)
+        )  # half the angle of a lug at the rim
+        pitch, top = (
+            2 * math.pi / self.lugs,
+            self.radius * math.cos(half) + self.lug_height,
+        )
         rim = self.lugs * (pitch - 2 * half) * self.radius
         bars = self.lugs * (2 * self.lug_height + self.lug_width)
         arc_elements = max(1, round(elements * rim / (rim + bars) / self.lugs))
-        bar = np.array([[self.radius * math.cos(half), -1], [top, -1], [top, 1], [self.radius * math.cos(half), 1]])
-        bar = _subdivided(bar * [1.0, self.lug_width / 2], max(3, round(elements * bars / (rim + bars) / self.lugs)))
+        bar = np.array(
+            [
+                [self.radius * math.cos(half), -1],
+                [top, -1],
+                [top, 1],
+                [self.radius * math.cos(half), 1],
+            ]
+        )
+        bar = _subdivided(
+            bar * [1.0, self.lug_width / 2],
+            max(3, round(elements * bars / (rim + bars) / self.lugs)),
+        )
         points, normals = [], []
         for k in range(self.lugs):
             cos, sin = math.cos(k * pitch), math.sin(k * pitch)
             lug = bar @ np.array([[cos, sin], [-sin, cos]])
-            arc, arc_normals = _arc(self.radius, k * pitch + half, (k + 1) * pitch - half, arc_elements)
+            arc, arc_normals = _arc(
+                self.radius, k * pitch + half, (k + 1) * pitch - half, arc_elements
+            )
             along = np.diff(lug, axis=0)
-            lug_normals = np.stack([along[:, 1], -along[:, 0]], -1) / np.hypot(*along.T)[:, None]
+            lug_normals = (
+                np.stack([along[:, 1], -along[:, 0]], -1) / np.hypot(*along.T)[:, None]
+            )
             points += [lug, arc[1:-1]]
             normals += [np.repeat(lug_normals[:, None], 2, 1), arc_normals]
         return np.concatenate([*points, points[0][:1]]), np.concatenate(normals)
@@ -300,14 +331,18 @@ class Spline(Shape):
         super().__post_init__()
         object.__setattr__(self, "points", _checked_points(self.points, self.closed))
         Polygon(self.points, self.width, self.closed)
-        self.outline(min(4 * len(self.points), MOST_ELEMENTS))  # a spline may cross itself where its chords do not
+        self.outline(
+            min(4 * len(self.points), MOST_ELEMENTS)
+        )  # a spline may cross itself where its chords do not
 
     def curve(self, elements: int):
         from scipy.interpolate import CubicSpline
 
         points = _corners(self.points, self.closed)
         s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-        spline = CubicSpline(s, points, bc_type="periodic" if self.closed else "not-a-knot")
+        spline = CubicSpline(
+            s, points, bc_type="periodic" if self.closed else "not-a-knot"
+        )
         ends = np.linspace(0.0, s[-1], max(elements, FEWEST_ROUND) + 1)
         curve, along = spline(ends), spline(ends, 1)
         if self.closed:
@@ -316,7 +351,9 @@ class Spline(Shape):
         normals = np.stack([normal[:-1], normal[1:]], 1)
         x, z = curve.T
         if self.closed and np.sum(x[:-1] * z[1:] - x[1:] * z[:-1]) < 0:
-            normals = -normals  # `Outline` reverses clockwise points; normals have to point outwards
+            normals = (
+                -normals
+            )  # `Outline` reverses clockwise points; normals have to point outwards
         return curve, normals
 
 
@@ -330,7 +367,9 @@ def _arc(radius: float, begin: float, end: float, elements: int):
     """Return points (N + 1, 2) and outward normals (N, 2, 2) of a counter-clockwise arc about the origin between two
     angles, closed if it is a full circle."""
     full_circle = end - begin > 6.28
-    angle = np.linspace(begin, end, max(elements, FEWEST_ROUND if full_circle else 1) + 1)
+    angle = np.linspace(
+        begin, end, max(elements, FEWEST_ROUND if full_circle else 1) + 1
+    )
     normal = np.stack([np.cos(angle), np.sin(angle)], -1)
     if full_circle:
         normal[-1] = normal[0]
@@ -340,8 +379,13 @@ def _arc(radius: float, begin: float, end: float, elements: int):
 def _subdivided(points, elements: int):
     """Return the ends of elements, equal on each edge, whose number is the edge's share of the length, rounded up."""
     lengths = np.hypot(*np.diff(points, axis=0).T)
-    pieces = np.maximum(1, np.ceil(elements * lengths / lengths.sum() - 1e-9)).astype(int)
-    cut = [np.linspace(a, b, k, endpoint=False) for a, b, k in zip(points[:-1], points[1:], pieces)]
+    pieces = np.maximum(1, np.ceil(elements * lengths / lengths.sum() - 1e-9)).astype(
+        int
+    )
+    cut = [
+        np.linspace(a, b, k, endpoint=False)
+        for a, b, k in zip(points[:-1], points[1:], pieces)
+    ]
     return np.concatenate([*cut, points[-1:]])
 
 
@@ -349,14 +393,25 @@ def _checked_points(points, closed) -> tuple[tuple[float, float], ...]:
     """Return the points as pairs of numbers, without a last one that repeats the first; ValueError for bad ones."""
     require(isinstance(closed, bool), "closed must be true or false", value=closed)
     array = real_array("points", points)
-    require(array.ndim == 2 and array.shape[1] == 2, "points must be a list of (x, z)", value=points)
+    require(
+        array.ndim == 2 and array.shape[1] == 2,
+        "points must be a list of (x, z)",
+        value=points,
+    )
     if closed and len(array) > 1 and (array[0] == array[-1]).all():
         array = array[:-1]
     fewest = 3 if closed else 2
     kind = "closed" if closed else "open"
     valid = fewest <= len(array) <= MOST_POINTS
-    require(valid, f"a {kind} outline takes {fewest} to {MOST_POINTS} points", value=len(array))
-    require(bool((np.abs(array) <= LARGEST).all()), f"points must be finite and within {LARGEST:g} m")
+    require(
+        valid,
+        f"a {kind} outline takes {fewest} to {MOST_POINTS} points",
+        value=len(array),
+    )
+    require(
+        bool((np.abs(array) <= LARGEST).all()),
+        f"points must be finite and within {LARGEST:g} m",
+    )
     return tuple(map(tuple, array.tolist()))
 
 

@@ -19,7 +19,9 @@ from rft.vectors import absolute, formula, where
 
 PER_CUBIC_METRE = 1e6  # N/m^3 in one N/cm^3
 TENSION = ("keep", "cut")
-GRAZING = math.radians(0.25)  # assumed; the drag of smooth rods is 0.2 % less than with a jump
+GRAZING = math.radians(
+    0.25
+)  # assumed; the drag of smooth rods is 0.2 % less than with a jump
 
 
 def _coefficient(meaning: str) -> Number:
@@ -27,10 +29,15 @@ def _coefficient(meaning: str) -> Number:
 
 
 CosineZ = Annotated[float, _coefficient("coefficient of a cosine of alpha_z")]
-SineZ = Annotated[float, _coefficient("coefficient of a sine of alpha_z, m = -1 written m1")]
+SineZ = Annotated[
+    float, _coefficient("coefficient of a sine of alpha_z, m = -1 written m1")
+]
 CosineX = Annotated[float, _coefficient("coefficient of a cosine of alpha_x")]
 SineX = Annotated[float, _coefficient("coefficient of a sine of alpha_x")]
-Zeta = Annotated[float, Number(1e-6, 1e6, "-", "strength of the medium over that of its coefficients")]
+Zeta = Annotated[
+    float,
+    Number(1e-6, 1e6, "-", "strength of the medium over that of its coefficients"),
+]
 Grazing = Annotated[
     float,
     Number(
@@ -84,7 +91,9 @@ class PlateStress:
     def __call__(self, beta, gamma) -> tuple[np.ndarray, np.ndarray]:
         """Return (alpha_x, alpha_z), N/cm^3, for angles in radians, of any size, that broadcast together."""
         beta, gamma = real_array("beta", beta), real_array("gamma", gamma)
-        return self.alpha((np.sin(beta), -np.cos(beta)), (np.cos(gamma), -np.sin(gamma)))
+        return self.alpha(
+            (np.sin(beta), -np.cos(beta)), (np.cos(gamma), -np.sin(gamma))
+        )
 
     def alpha(self, n, v) -> tuple[np.ndarray, np.ndarray]:
         """Return (alpha_x, alpha_z), N/cm^3, for unit normals n = (n_x, n_z) and unit velocities v = (v_x, v_z), pairs of
@@ -100,7 +109,11 @@ class PlateStress:
         """Raise ValueError for numbers out of range and for an unknown tension."""
         check_numbers(self)
         valid = isinstance(self.tension, str) and self.tension in TENSION
-        require(valid, f"tension must be {' or '.join(map(repr, TENSION))}", value=self.tension)
+        require(
+            valid,
+            f"tension must be {' or '.join(map(repr, TENSION))}",
+            value=self.tension,
+        )
 
 
 @dataclass(frozen=True)
@@ -143,9 +156,24 @@ class StressMap(PlateStress):
         cos_2b, sin_2b = n[1] * n[1] - n[0] * n[0], -2.0 * n[0] * n[1]
         cos_g, sin_g = v[0], -v[1]
         # sin(gamma +- 2 beta) = cos_sin +- sin_cos, cos(gamma +- 2 beta) = cos_cos -+ sin_sin
-        cos_sin, sin_cos, cos_cos, sin_sin = cos_2b * sin_g, sin_2b * cos_g, cos_2b * cos_g, sin_2b * sin_g
-        a_z = self.A00 + self.A10 * cos_2b + (self.B11 + self.Bm11) * cos_sin + (self.B11 - self.Bm11) * sin_cos
-        a_x = (self.C11 + self.Cm11) * cos_cos + (self.Cm11 - self.C11) * sin_sin + self.C01 * cos_g + self.D10 * sin_2b
+        cos_sin, sin_cos, cos_cos, sin_sin = (
+            cos_2b * sin_g,
+            sin_2b * cos_g,
+            cos_2b * cos_g,
+            sin_2b * sin_g,
+        )
+        a_z = (
+            self.A00
+            + self.A10 * cos_2b
+            + (self.B11 + self.Bm11) * cos_sin
+            + (self.B11 - self.Bm11) * sin_cos
+        )
+        a_x = (
+            (self.C11 + self.Cm11) * cos_cos
+            + (self.Cm11 - self.C11) * sin_sin
+            + self.C01 * cos_g
+            + self.D10 * sin_2b
+        )
         return self.zeta * a_x, self.zeta * (a_z + self.B01 * sin_g)
 
 

@@ -44,7 +44,11 @@ class Survey:
 
     def description(self) -> str:
         """Return one line on where the map drives motion and where it pulls."""
-        pulls = f"pulls on {100 * self.pulling:.1f} % of the plane" if self.pulling else "pulls nowhere"
+        pulls = (
+            f"pulls on {100 * self.pulling:.1f} % of the plane"
+            if self.pulling
+            else "pulls nowhere"
+        )
         if not self.pushing:
             return f"takes power at all angles, {pulls}"
         b, g = np.unravel_index(self.power.argmax(), self.power.shape)
@@ -64,7 +68,10 @@ def survey(stress: PlateStress, cells: int = 180) -> Survey:
     """
     beta = (np.arange(cells) + 0.5) / cells * np.pi - np.pi / 2
     gamma = (np.arange(2 * cells) + 0.5) / cells * np.pi - np.pi
-    n, v = (np.sin(beta)[:, None], -np.cos(beta)[:, None]), (np.cos(gamma), -np.sin(gamma))
+    n, v = (
+        (np.sin(beta)[:, None], -np.cos(beta)[:, None]),
+        (np.cos(gamma), -np.sin(gamma)),
+    )
     a_x, a_z = replace(stress, tension="keep").alpha(n, v)
     leading = np.sign((n[0] * v[0] + n[1] * v[1]).round(12))  # 0 at grazing incidence
     normal, power = leading * (n[1] * a_z - n[0] * a_x), v[1] * a_z - v[0] * a_x

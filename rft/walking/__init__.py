@@ -8,7 +8,11 @@ from rft.walking.screws import Cruise, Turning, cruise, free_turning, turning
 from rft.walking.stride import Walk
 from rft.walking.wheel import Rolling, rolling
 
-ROBOTS: dict[str, type[Robot]] = {"rhex": Rhex, "wheel": Roller, "screws": Screws}  # by the name that scenes give
+ROBOTS: dict[str, type[Robot]] = {
+    "rhex": Rhex,
+    "wheel": Roller,
+    "screws": Screws,
+}  # by the name that scenes give
 
 __all__ = [
     "ENGINES",

@@ -44,9 +44,15 @@ def on_robot(law, ground, disturbed, robot, pose, twist, angle, rate, sums):
     strength, flux, rounding, grazing_sine, downhill_loss = ground
     for p in range(len(side)):
         leg_rate = rate[leg[p]]
-        g, r_x, r_z = part_motion(pose, twist, hips[0, p], hips[1, p], angle[leg[p]], leg_rate)
-        part_ground = Ground(strength, flux, rounding, grazing_sine * closed[p], downhill_loss, disturbed)
-        f = on_elements(law, part_ground, table, blocks[p, 0], blocks[p, 1], g, side[p], True, sums)
+        g, r_x, r_z = part_motion(
+            pose, twist, hips[0, p], hips[1, p], angle[leg[p]], leg_rate
+        )
+        part_ground = Ground(
+            strength, flux, rounding, grazing_sine * closed[p], downhill_loss, disturbed
+        )
+        f = on_elements(
+            law, part_ground, table, blocks[p, 0], blocks[p, 1], g, side[p], True, sums
+        )
         total = added(total, body_load(f, g, r_x, r_z, leg_rate))
     return total
 
@@ -54,7 +60,11 @@ def on_robot(law, ground, disturbed, robot, pose, twist, angle, rate, sums):
 @register_jitable(error_model="numpy")
 def difference(residual, changed, nudge):
     """Return (changed - residual) / nudge of triples."""
-    return (changed[0] - residual[0]) / nudge, (changed[1] - residual[1]) / nudge, (changed[2] - residual[2]) / nudge
+    return (
+        (changed[0] - residual[0]) / nudge,
+        (changed[1] - residual[1]) / nudge,
+        (changed[2] - residual[2]) / nudge,
+    )
 
 
 @register_jitable(error_model="numpy")
@@ -65,7 +75,11 @@ def residual_of(law, ground, disturbed, robot, body, step, k, angle, rate, sums)
     residual = by_x = by_z = by_pitch = (0.0, 0.0, 0.0)
     power = (0.0, 0.0)
     for c in range(4):
-        change = (nudge[0] if c == 1 else 0.0, nudge[1] if c == 2 else 0.0, nudge[2] if c == 3 else 0.0)
+        change = (
+            nudge[0] if c == 1 else 0.0,
+            nudge[1] if c == 2 else 0.0,
+            nudge[2] if c == 3 else 0.0,
+        )
         v = plus(step.newton.trial, change)
         pose = plus(step.stage.base, times(k, v))
         load = on_robot(law, ground, disturbed, robot, pose, v, angle, rate, sums)
@@ -86,7 +100,13 @@ def store(out, state):
     """Write an accepted state into a row (11,)."""
     out[0], out[1], out[2] = state.pose
     out[3], out[4], out[5] = state.twist
-    out[6], out[7], out[8], out[9], out[10] = state.work, state.loss, state.unsolved, state.defect, state.residual
+    out[6], out[7], out[8], out[9], out[10] = (
+        state.work,
+        state.loss,
+        state.unsolved,
+        state.defect,
+        state.residual,
+    )
 
 
 @functools.cache
@@ -95,32 +115,73 @@ def kernel(Law: type):
     register_formulas()
 
     @njit(nogil=True, error_model="numpy")
-    def run(numbers, grounds, disturbed, elements, parts, bodies, start, clock, lengths, ends, effort, states, tries):
+    def run(
+        numbers,
+        grounds,
+        disturbed,
+        elements,
+        parts,
+        bodies,
+        start,
+        clock,
+        lengths,
+        ends,
+        effort,
+        states,
+        tries,
+    ):
         law, sums, count = Law(*numbers), np.zeros((3, WIDTH)), len(lengths)
-        (table, blocks, hips), (side, leg, closed), (angles, rates) = elements, parts, clock
+        (table, blocks, hips), (side, leg, closed), (angles, rates) = (
+            elements,
+            parts,
+            clock,
+        )
         angle = np.zeros(angles.shape[2])
         for b in range(len(start)):
             x = start[b]
-            step = start_of_step((x[0], x[1], x[2]), (x[3], x[4], x[5]), x[6], x[7], x[8], x[9], x[10])
-            robot, reach = (table, blocks[b], side, leg, closed, hips[:, b]), bodies[b][2]
+            step = start_of_step(
+                (x[0], x[1], x[2]), (x[3], x[4], x[5]), x[6], x[7], x[8], x[9], x[10]
+            )
+            robot, reach = (
+                (table, blocks[b], side, leg, closed, hips[:, b]),
+                bodies[b][2],
+            )
             strength, flux, rounding, grazing_sine, downhill_loss = grounds[b]
             s = 0
             while s < count:
                 rate, time = rates[s, b], stage_time(step.stage) * lengths[s, b]
                 for j in range(len(angle)):
                     angle[j] = angles[s, b, j] + time * rate[j]
-                h, width, over = step.stage.part * lengths[s, b], effort.widths[int(step.newton.width), 0], False
+                h, width, over = (
+                    step.stage.part * lengths[s, b],
+                    effort.widths[int(step.newton.width), 0],
+                    False,
+                )
                 k, tolerance = GAMMA * h, TOLERANCE * (rounding * width)
-                ground = (strength, flux, rounding * width, grazing_sine * np.sqrt(width), downhill_loss)
-                evaluation = residual_of(law, ground, disturbed, robot, bodies[b], step, k, angle, rate, sums)
+                ground = (
+                    strength,
+                    flux,
+                    rounding * width,
+                    grazing_sine * np.sqrt(width),
+                    downhill_loss,
+                )
+                evaluation = residual_of(
+                    law, ground, disturbed, robot, bodies[b], step, k, angle, rate, sums
+                )
                 residual, slopes, power = evaluation
-                newton, solved, failed = newton_step(step.newton, residual, slopes, power, k, reach, tolerance, effort)
+                newton, solved, failed = newton_step(
+                    step.newton, residual, slopes, power, k, reach, tolerance, effort
+                )
                 step = Step(step.accepted, step.stage, newton)
                 if solved or failed:
-                    step, over = next_problem(step, solved, failed, tolerance, k, h, effort)
+                    step, over = next_problem(
+                        step, solved, failed, tolerance, k, h, effort
+                    )
                 tries[b] += 1
                 if over:
-                    last = has_ended(step.accepted.pose[1], step.accepted.pose[2], ends[:, b])
+                    last = has_ended(
+                        step.accepted.pose[1], step.accepted.pose[2], ends[:, b]
+                    )
                     for i in range(s, count if last else s + 1):
                         store(states[i, b], step.accepted)
                     s = count if last else s + 1
@@ -128,15 +189,31 @@ def kernel(Law: type):
     return cached(run, f"the steps of robots on ground of the form {Law.__name__}")
 
 
-def run_steps(robots: Robots, index, start: np.ndarray, angles, rates, lengths, ends, effort: Effort):
+def run_steps(
+    robots: Robots,
+    index,
+    start: np.ndarray,
+    angles,
+    rates,
+    lengths,
+    ends,
+    effort: Effort,
+):
     """Return (states, evaluations): the same as `rft.walking.march.run_steps_by_numpy`."""
     elements, ground = robots.elements, robots.ground_under(index)
     states, tries = np.empty((len(lengths), *start.shape)), np.zeros(len(start), int)
     grounds = np.stack([np.broadcast_to(x, len(index)) for x in ground[:-1]], -1)
-    bodies = np.stack([robots.masses[index, 0], robots.masses[index, 2], robots.reach[index]], -1)
+    bodies = np.stack(
+        [robots.masses[index, 0], robots.masses[index, 2], robots.reach[index]], -1
+    )
     # The belly is the last "leg" and does not rotate.
-    angles, rates = (np.concatenate([x, np.zeros_like(x[..., :1])], -1) for x in (angles, rates))
-    (table, blocks), hips = elements.table, np.ascontiguousarray(elements.hips[:, index])
+    angles, rates = (
+        np.concatenate([x, np.zeros_like(x[..., :1])], -1) for x in (angles, rates)
+    )
+    (table, blocks), hips = (
+        elements.table,
+        np.ascontiguousarray(elements.hips[:, index]),
+    )
     kernel(type(elements.law))(
         tuple(elements.law), grounds, ground.disturbed, (table, blocks[index], hips),
         (elements.side, elements.leg, elements.closed), bodies, np.ascontiguousarray(start), (angles, rates), lengths, ends,

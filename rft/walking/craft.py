@@ -41,7 +41,9 @@ class Screws(Robot):
     height: Annotated[float, metres("height of the box about the centre of mass")]
     screw: Screw
     track: Annotated[float, metres("distance from one axis to the other")]
-    drop: Annotated[float, metres("depth of the axes below the centre of mass", -LARGEST)] = 0.0
+    drop: Annotated[
+        float, metres("depth of the axes below the centre of mass", -LARGEST)
+    ] = 0.0
     pair: str = "mirrored"
     part = "screw"
     parts = "screws"
@@ -54,7 +56,11 @@ class Screws(Robot):
             "a robot without screws",
             because=f"screw must be a Screw, got {formatted(self.screw)}",
         )
-        require(self.pair in PAIRS, f"pair must be one of {', '.join(PAIRS)}", value=self.pair)
+        require(
+            self.pair in PAIRS,
+            f"pair must be one of {', '.join(PAIRS)}",
+            value=self.pair,
+        )
         message = f"screws of radius {self.screw.radius:g} m meet: track must be more than {2 * self.screw.radius:g} m"
         require(self.track > 2 * self.screw.radius, message)
 
@@ -62,7 +68,10 @@ class Screws(Robot):
     def screws(self) -> tuple[tuple[Screw, tuple[float, float, float]], ...]:
         """The left and the right screw, each with its middle from the centre of mass, m."""
         right = self.screw.mirrored if self.pair == "mirrored" else self.screw
-        return (self.screw, (0.0, self.track / 2, -self.drop)), (right, (0.0, -self.track / 2, -self.drop))
+        return (self.screw, (0.0, self.track / 2, -self.drop)), (
+            right,
+            (0.0, -self.track / 2, -self.drop),
+        )
 
     @property
     def inertia(self) -> np.ndarray:
@@ -79,7 +88,9 @@ class Screws(Robot):
         return shapes.box((self.length, self.width, self.height), max(1, elements // 6))
 
     def check(self, elements: int) -> None:
-        _mesh(self.screw, PER_SQUARE * elements**2)  # the right screw is the same, or its mirror image
+        _mesh(
+            self.screw, PER_SQUARE * elements**2
+        )  # the right screw is the same, or its mirror image
 
 
 @lru_cache(maxsize=2)

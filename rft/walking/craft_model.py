@@ -40,22 +40,33 @@ def mjcf(robot: Screws) -> str:
     stiffness = robot.mass * GRAVITY * robot.screw.radius / DEFLECTION
     for k, (screw, place) in enumerate(robot.screws):
         name = f"screw{k}"
-        ET.SubElement(assets, "mesh", name=name, inertia="shell", **_mesh_text(screw.mesh(DRAWN)))
+        ET.SubElement(
+            assets, "mesh", name=name, inertia="shell", **_mesh_text(screw.mesh(DRAWN))
+        )
         body = ET.SubElement(hull, "body", name=name, pos=text(place))
-        ET.SubElement(body, "joint", name=name, type="hinge", axis=text((screw.sense, 0.0, 0.0)))
+        ET.SubElement(
+            body, "joint", name=name, type="hinge", axis=text((screw.sense, 0.0, 0.0))
+        )
         mass = robot.mass * LEG_MASS
         add_inertia(body, mass, np.full(3, mass * screw.length**2 / 12))
-        ET.SubElement(body, "geom", type="mesh", mesh=name, rgba=COLOURS[k], **NO_CONTACT)
+        ET.SubElement(
+            body, "geom", type="mesh", mesh=name, rgba=COLOURS[k], **NO_CONTACT
+        )
         add_servo(motors, name, stiffness)
     return ET.tostring(root, encoding="unicode")
 
 
 def surfaces(robot: Screws, elements: int) -> list[Surface]:
     """Return the surfaces that touch the ground: the hull, body 1 of the model, and its screws."""
-    screws = [Surface.from_mesh(2 + k, mesh) for k, mesh in enumerate(robot.meshes(elements))]
+    screws = [
+        Surface.from_mesh(2 + k, mesh) for k, mesh in enumerate(robot.meshes(elements))
+    ]
     return [Surface.from_mesh(1, robot.hull(elements)), *screws]
 
 
 def _mesh_text(mesh: Mesh) -> dict[str, str]:
     """Return the XML attributes of a mesh."""
-    return {"vertex": text(mesh.vertices.ravel()), "face": " ".join(map(str, mesh.faces.ravel()))}
+    return {
+        "vertex": text(mesh.vertices.ravel()),
+        "face": " ".join(map(str, mesh.faces.ravel())),
+    }

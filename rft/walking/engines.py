@@ -38,8 +38,15 @@ class Walker:
     effects: tuple[GroundEffect, ...] = ()
 
     def __post_init__(self):
-        for name, kind in (("robot", Robot), ("gait", Tripod), ("stress", PlateStress | Spatial)):
-            value, kinds = getattr(self, name), getattr(kind, "__name__", "PlateStress or Spatial")
+        for name, kind in (
+            ("robot", Robot),
+            ("gait", Tripod),
+            ("stress", PlateStress | Spatial),
+        ):
+            value, kinds = (
+                getattr(self, name),
+                getattr(kind, "__name__", "PlateStress or Spatial"),
+            )
             require(isinstance(value, kind), f"{name} must be a {kinds}", value=value)
         object.__setattr__(self, "effects", checked_effects(self.effects))
         for effect in self.effects:
@@ -68,10 +75,19 @@ class Fineness:
     12
     """
 
-    steps: Annotated[int, Number(8, 10_000, "-", "time steps of a cycle", whole=True)] = 32
-    elements: Annotated[int, Number(4, 1000, "-", "elements of a leg's outline; the belly has as many", whole=True)] = (
-        12
-    )
+    steps: Annotated[
+        int, Number(8, 10_000, "-", "time steps of a cycle", whole=True)
+    ] = 32
+    elements: Annotated[
+        int,
+        Number(
+            4,
+            1000,
+            "-",
+            "elements of a leg's outline; the belly has as many",
+            whole=True,
+        ),
+    ] = 12
     rounding: Annotated[
         float,
         Number(
@@ -80,11 +96,15 @@ class Fineness:
             "their ends",
         ),
     ] = 3e-3  # fmt: skip
-    duration: Annotated[float, Number(1e-3, 1e4, "s", "time of walking from rest, at most")] = 10.0
+    duration: Annotated[
+        float, Number(1e-3, 1e4, "s", "time of walking from rest, at most")
+    ] = 10.0
     engine: str | None = None
 
     def __post_init__(self):
-        valid = self.engine is None or (isinstance(self.engine, str) and self.engine in ENGINES)
+        valid = self.engine is None or (
+            isinstance(self.engine, str) and self.engine in ENGINES
+        )
         require(valid, f"engine must be one of {', '.join(ENGINES)}", value=self.engine)
         check_numbers(self)
 
@@ -122,7 +142,9 @@ class Engine(Protocol):
         cycle change; others are computed from rest."""
         ...
 
-    def step_cost(self, walkers: Sequence[Walker], numerics: Fineness, seconds: float) -> tuple[float, float]:
+    def step_cost(
+        self, walkers: Sequence[Walker], numerics: Fineness, seconds: float
+    ) -> tuple[float, float]:
         """Return s of computing in a time step of equal walkers side by side, and number of evaluations of forces for one,
         from the first steps of their walks: those of a stride, or as many as ``seconds`` s of computing allow."""
         ...
@@ -137,16 +159,27 @@ def engine(name: str) -> Engine:
     >>> list(ENGINES), callable(engine("planar").walk)
     (['planar', 'mujoco'], True)
     """
-    require(isinstance(name, str) and name in ENGINES, f"engine must be one of {', '.join(ENGINES)}", value=name)
+    require(
+        isinstance(name, str) and name in ENGINES,
+        f"engine must be one of {', '.join(ENGINES)}",
+        value=name,
+    )
     try:
         return importlib.import_module(ENGINES[name])
     except ModuleNotFoundError as error:
         if error.name != name:
             raise
-        raise Refusal(f"the {name} engine is not installed", instead=f"pip install 'geomech[{name}]'") from None
-    except Exception as error:  # importing MuJoCo loads the library that MUJOCO_GL names
         raise Refusal(
-            f"the {name} engine cannot be loaded", because=formatted(str(error)), instead="is MUJOCO_GL right?"
+            f"the {name} engine is not installed",
+            instead=f"pip install 'geomech[{name}]'",
+        ) from None
+    except (
+        Exception
+    ) as error:  # importing MuJoCo loads the library that MUJOCO_GL names
+        raise Refusal(
+            f"the {name} engine cannot be loaded",
+            because=formatted(str(error)),
+            instead="is MUJOCO_GL right?",
         ) from None
 
 

@@ -29,4 +29,6 @@ def surface(model: mujoco.MjModel, geom: int, mesh: Mesh) -> Surface:
     """Return the surface of a geom from a mesh in the geom's frame."""
     rotation = np.zeros(9)
     mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
-    return Surface.from_mesh(int(model.geom_bodyid[geom]), mesh, rotation, model.geom_pos[geom])._replace(geom=geom)
+    return Surface.from_mesh(
+        int(model.geom_bodyid[geom]), mesh, rotation, model.geom_pos[geom]
+    )._replace(geom=geom)

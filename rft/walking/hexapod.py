@@ -39,7 +39,9 @@ def mjcf(robot: Robot, elements: int = 12, planar: bool = False) -> str:
         ET.SubElement(hull, "joint", type=kind, axis=axis)
     if not (planar or level):
         ET.SubElement(hull, "freejoint")
-    add_inertia(hull, robot.mass * (1 - len(hips(robot)) * LEG_MASS), inertia(robot, reach))
+    add_inertia(
+        hull, robot.mass * (1 - len(hips(robot)) * LEG_MASS), inertia(robot, reach)
+    )
     if not level:
         add_box(hull, [robot.length, robot.width, robot.height])
     stiffness = robot.mass * GRAVITY * reach / DEFLECTION
@@ -60,8 +62,17 @@ def empty_model() -> tuple[ET.Element, ET.Element]:
     root = ET.Element("mujoco", model="robot")
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     ET.SubElement(root, "option", gravity=f"0 0 {-GRAVITY!r}")
-    ET.SubElement(ET.SubElement(root, "visual"), "global", offwidth="1280", offheight="960")
-    sky = {"type": "skybox", "builtin": "flat", "rgb1": "1 1 1", "rgb2": "1 1 1", "width": "8", "height": "8"}
+    ET.SubElement(
+        ET.SubElement(root, "visual"), "global", offwidth="1280", offheight="960"
+    )
+    sky = {
+        "type": "skybox",
+        "builtin": "flat",
+        "rgb1": "1 1 1",
+        "rgb2": "1 1 1",
+        "width": "8",
+        "height": "8",
+    }
     ET.SubElement(ET.SubElement(root, "asset"), "texture", **sky)
     world = ET.SubElement(root, "worldbody")
     ET.SubElement(world, "light", pos="0 0 2", dir="0.2 0.3 -1", directional="true")
@@ -70,13 +81,22 @@ def empty_model() -> tuple[ET.Element, ET.Element]:
 
 def add_box(hull: ET.Element, sides) -> None:
     """Add a box with these sides (3,), m, about the hull's middle, which is drawn and touches nothing."""
-    ET.SubElement(hull, "geom", type="box", size=text(np.array(sides) / 2), rgba="0.25 0.3 0.4 1", **NO_CONTACT)
+    ET.SubElement(
+        hull,
+        "geom",
+        type="box",
+        size=text(np.array(sides) / 2),
+        rgba="0.25 0.3 0.4 1",
+        **NO_CONTACT,
+    )
 
 
 def add_servo(motors: ET.Element, name: str, stiffness: float) -> None:
     """Add a position actuator of the joint of the same name. stiffness: N m/rad."""
     damping = repr(stiffness * SERVO_TIME)
-    ET.SubElement(motors, "position", name=name, joint=name, kp=repr(stiffness), kv=damping)
+    ET.SubElement(
+        motors, "position", name=name, joint=name, kp=repr(stiffness), kv=damping
+    )
 
 
 def inertia(robot: Robot, reach: float) -> np.ndarray:
@@ -92,7 +112,11 @@ def inertia(robot: Robot, reach: float) -> np.ndarray:
 def hips(robot: Robot) -> list[tuple[float, float, float]]:
     """Return the hip of each leg from the hull's middle, m: left (y > 0) and right of one hip after the other."""
     sides = (0.0,) if isinstance(robot, Roller) else robot.sides
-    return [(x, side * y, robot.hip_height) for x, y in zip(robot.hips, sides) for side in _sides(robot)]
+    return [
+        (x, side * y, robot.hip_height)
+        for x, y in zip(robot.hips, sides)
+        for side in _sides(robot)
+    ]
 
 
 def _sides(robot: Robot) -> tuple[int, ...]:
@@ -103,14 +127,22 @@ def _sides(robot: Robot) -> tuple[int, ...]:
 def phases(robot: Robot) -> np.ndarray:
     """Return the phases of all legs, cycles."""
     count = len(robot.hip_phases)
-    return np.array([(k // count + k % count) % count / count for k in range(count * len(robot.hips))])
+    return np.array(
+        [
+            (k // count + k % count) % count / count
+            for k in range(count * len(robot.hips))
+        ]
+    )
 
 
 def surfaces(robot: Robot, elements: int) -> list[Surface]:
     """Return the surfaces that touch the ground: the hull, body 1 of the model, and its legs."""
     leg, belly, sides = robot.leg(elements), robot.belly(elements), _sides(robot)
     hull = [Surface.from_outline(1, belly)] if belly else []
-    return hull + [Surface.from_outline(2 + k, leg, side=sides[k % len(sides)]) for k in range(len(hips(robot)))]
+    return hull + [
+        Surface.from_outline(2 + k, leg, side=sides[k % len(sides)])
+        for k in range(len(hips(robot)))
+    ]
 
 
 def _leg_geoms(legs, thick: float):
@@ -129,7 +161,9 @@ def _leg_geoms(legs, thick: float):
 def add_inertia(body: ET.Element, mass: float, moments) -> None:
     """Add a mass, kg, and moments of inertia (3,), kg m^2, about the body's origin."""
     moments = text(np.maximum(moments, LEAST_INERTIA))
-    ET.SubElement(body, "inertial", pos="0 0 0", mass=repr(float(mass)), diaginertia=moments)
+    ET.SubElement(
+        body, "inertial", pos="0 0 0", mass=repr(float(mass)), diaginertia=moments
+    )
 
 
 def text(numbers) -> str:

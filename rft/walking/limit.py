@@ -38,7 +38,9 @@ class Limit(NamedTuple):
     gains: np.ndarray | None = None
 
 
-def predicted_progress(strides: Strides, limit: Limit, state: State, k: int, progress: float) -> np.ndarray:
+def predicted_progress(
+    strides: Strides, limit: Limit, state: State, k: int, progress: float
+) -> np.ndarray:
     """Return the progress (N,), m, of the next strides of robot k from ``state`` (1,), by the slopes at its limit, where a
     stride has ``progress``, m."""
     now, fixed = (strides.scaled(x, np.array([k]))[:, 0] for x in (state, limit.state))
@@ -79,14 +81,21 @@ class _Search:
     def __init__(self, strides: Strides, limits: list[Limit]):
         self.strides, self.limits, count = strides, limits, len(limits)
         self.state = _concatenated([limit.state for limit in limits])
-        self.period, self.start = np.array([x.period for x in limits]), strides.scaled(self.state, np.arange(count))
+        self.period, self.start = (
+            np.array([x.period for x in limits]),
+            strides.scaled(self.state, np.arange(count)),
+        )
         size = len(self.start)
         self.slopes, self.gains = np.zeros((count, size, size)), np.zeros((count, size))
         self.unknown = np.array([limit.slopes is None for limit in limits])
         for k in np.flatnonzero(~self.unknown):
             self.slopes[k], self.gains[k] = limits[k][2:]
         self.active, self.periodic = np.ones(count, bool), np.zeros(count, bool)
-        self.computed, self.ends, self.last = np.zeros(count, int), np.full(count, "", "U10"), np.full(count, np.inf)
+        self.computed, self.ends, self.last = (
+            np.zeros(count, int),
+            np.full(count, "", "U10"),
+            np.full(count, np.inf),
+        )
         self.progress, self.drift, self.unsolved_error = np.zeros((3, count))
 
     def stride(self, active):
@@ -97,7 +106,10 @@ class _Search:
         begin[:, len(active) :] += np.tile(NUDGE * np.eye(numbers), len(unknown))
         before = self.strides.with_scaled(self.state.take(index), begin, index)
         after = self._mapped(before, index)
-        end, moved = self.strides.scaled(after, index), after.pose[:, 0] - before.pose[:, 0]
+        end, moved = (
+            self.strides.scaled(after, index),
+            after.pose[:, 0] - before.pose[:, 0],
+        )
 
         def differences(x):
             copies = x[..., len(active) :].reshape(*x.shape[:-1], len(unknown), numbers)
@@ -107,7 +119,12 @@ class _Search:
         self.gains[unknown] = differences(moved)
         now, count = after.take(slice(len(active))), len(active)
         self.progress[active] = moved[:count] / self.period[active]
-        self._step(active, begin[:, :count], (end - begin)[:, :count], now.defect - before.defect[:count])
+        self._step(
+            active,
+            begin[:, :count],
+            (end - begin)[:, :count],
+            now.defect - before.defect[:count],
+        )
         ends = self.strides.end_status(now, active)
         # A later start is Newton's, not one that the robot has come to: its end tells nothing of the robot.
         self.ends[active] = np.where(self.computed[active] == 0, ends, "")
@@ -119,19 +136,28 @@ class _Search:
         """Return the states of robots after the strides of their maps."""
         for k in range(self.period[index].max()):
             rows = np.flatnonzero(self.period[index] > k)
-            state = state.put(rows, self.strides.run(state.take(rows), 0, index[rows])[1].take(-1))
+            state = state.put(
+                rows, self.strides.run(state.take(rows), 0, index[rows])[1].take(-1)
+            )
         return state
 
     def _step(self, r, begin, residual, defect):
         """Step to the next start of the robots r, from ``begin`` and the residual of the map there, (n, B)."""
         matrix = np.eye(len(residual)) - self.slopes[r]
         step = solve(matrix, residual.T)
-        response = solve(np.moveaxis(matrix, 1, 2), self.gains[r])  # of all later progress to a push
+        response = solve(
+            np.moveaxis(matrix, 1, 2), self.gains[r]
+        )  # of all later progress to a push
         self.drift[r] = np.abs((self.gains[r] * step).sum(-1)) / self.period[r]
         most = np.abs(response[:, self.strides.free >= 2]).max(-1)
-        self.unsolved_error[r] = defect * most / self.strides.leg_speed[r] / self.period[r]
+        self.unsolved_error[r] = (
+            defect * most / self.strides.leg_speed[r] / self.period[r]
+        )
         far, size = np.abs(step).max(-1), np.abs(residual).max(0)
-        self.start[:, r] = begin + (step * np.minimum(1.0, FARTHEST / np.maximum(far, FARTHEST))[:, None]).T
+        self.start[:, r] = (
+            begin
+            + (step * np.minimum(1.0, FARTHEST / np.maximum(far, FARTHEST))[:, None]).T
+        )
         many = self.computed[r] // self.period[r] % FEW_STRIDES == FEW_STRIDES - 1
         self.unknown[r] = (far > SHORT) | (size > SLOW * self.last[r]) | many
         self.last[r] = size
@@ -139,21 +165,38 @@ class _Search:
         failed = ~np.isfinite(step).all(-1) | (np.abs(np.linalg.det(matrix)) < NEUTRAL)
         near = ~failed & (np.maximum(far, size) <= SHORT)
         near &= self.drift[r] <= SETTLED * self.strides.reach[r] * self.strides.period
-        self.periodic[r] = near & (np.abs(np.linalg.eigvals(self.slopes[r])).max(-1) <= LARGEST_EIGENVALUE)
+        self.periodic[r] = near & (
+            np.abs(np.linalg.eigvals(self.slopes[r])).max(-1) <= LARGEST_EIGENVALUE
+        )
         self.active[r] = ~near & ~failed
 
     def result(self) -> LimitCycles:
         """Return the limit cycles, with means over a few more cycles for robots without one."""
         maps = enumerate(zip(self.period, self.slopes, self.gains))
-        limits = [Limit(self.state.take([k]), int(period), *slopes) for k, (period, *slopes) in maps]
+        limits = [
+            Limit(self.state.take([k]), int(period), *slopes)
+            for k, (period, *slopes) in maps
+        ]
         cycles = LimitCycles(
-            self.progress, self.drift, self.unsolved_error, self.periodic, self.computed, self.ends, limits
+            self.progress,
+            self.drift,
+            self.unsolved_error,
+            self.periodic,
+            self.computed,
+            self.ends,
+            limits,
         )
         rest = np.flatnonzero(~self.periodic & (self.ends == ""))
-        return _with_means(self.strides, self.limits, rest, cycles) if rest.size else cycles
+        return (
+            _with_means(self.strides, self.limits, rest, cycles)
+            if rest.size
+            else cycles
+        )
 
 
-def _with_means(strides: Strides, limits: list[Limit], r, cycles: LimitCycles) -> LimitCycles:
+def _with_means(
+    strides: Strides, limits: list[Limit], r, cycles: LimitCycles
+) -> LimitCycles:
     """Fill in the means over a few cycles of the robots r, from the states of ``limits``."""
     first = state = _concatenated([limits[k].state for k in r])
     places, count = [first.pose[:, 0]], strides.cycle
@@ -162,7 +205,13 @@ def _with_means(strides: Strides, limits: list[Limit], r, cycles: LimitCycles) -
         places.append(state.pose[:, 0])
     moved = np.diff(places[::count], axis=0) * strides.period
     cycles.progress[r], cycles.drift[r] = moved.mean(0), np.ptp(moved, axis=0)
-    error = (state.defect - first.defect) / LAST_CYCLES / count * strides.period / strides.frequency[r]
+    error = (
+        (state.defect - first.defect)
+        / LAST_CYCLES
+        / count
+        * strides.period
+        / strides.frequency[r]
+    )
     cycles.unsolved_error[r] = error
     cycles.strides[r] += LAST_CYCLES * count
     cycles.ends[r] = strides.end_status(state, r)
@@ -183,5 +232,7 @@ def solve(slopes, residual) -> np.ndarray:
     except np.linalg.LinAlgError:
         regular = np.linalg.det(slopes) != 0.0
         solution = np.zeros_like(residual)
-        solution[regular] = np.linalg.solve(slopes[regular], residual[regular][..., None])[..., 0]
+        solution[regular] = np.linalg.solve(
+            slopes[regular], residual[regular][..., None]
+        )[..., 0]
         return solution

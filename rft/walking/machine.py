@@ -15,8 +15,13 @@ from rft.walking.multibody import Multibody
 from rft.walking.robot import Robot, Tripod
 
 JOINT = int(mujoco.mjtTrn.mjTRN_JOINT)
-FREE, SLIDE, HINGE = (int(getattr(mujoco.mjtJoint, f"mjJNT_{kind}")) for kind in ("FREE", "SLIDE", "HINGE"))
-VERTICAL = 0.99  # least cosine of an axis with the vertical, for it to count as vertical
+FREE, SLIDE, HINGE = (
+    int(getattr(mujoco.mjtJoint, f"mjJNT_{kind}"))
+    for kind in ("FREE", "SLIDE", "HINGE")
+)
+VERTICAL = (
+    0.99  # least cosine of an axis with the vertical, for it to count as vertical
+)
 
 
 class Machine(NamedTuple):
@@ -36,13 +41,19 @@ def machine(robot: Robot, elements: int, planar: bool = False) -> Machine:
     if isinstance(robot, Mjcf):
         surfaces = robot.surfaces(elements)
         root = int(robot.model.body_rootid[surfaces[0].body])
-        return Machine(robot.model, surfaces, root, robot.driven, np.array(robot.phases, float))
+        return Machine(
+            robot.model, surfaces, root, robot.driven, np.array(robot.phases, float)
+        )
     if isinstance(robot, Screws):
         model = mujoco.MjModel.from_xml_string(craft_model.mjcf(robot))
-        return Machine(model, craft_model.surfaces(robot, elements), 1, np.arange(2), np.zeros(2))
+        return Machine(
+            model, craft_model.surfaces(robot, elements), 1, np.arange(2), np.zeros(2)
+        )
     model = mujoco.MjModel.from_xml_string(hexapod.mjcf(robot, elements, planar))
     phases = hexapod.phases(robot)
-    return Machine(model, hexapod.surfaces(robot, elements), 1, np.arange(len(phases)), phases)
+    return Machine(
+        model, hexapod.surfaces(robot, elements), 1, np.arange(len(phases)), phases
+    )
 
 
 class Clock:
@@ -53,19 +64,27 @@ class Clock:
     def __init__(self, machine: Machine, gait: Tripod):
         model, self.machine, self.gait = machine.model, machine, gait
         self.rest = model.key_ctrl[0].copy() if model.nkey else np.zeros(model.nu)
-        self.gain, self.bias = model.actuator_gainprm[machine.driven, 0], model.actuator_biasprm[machine.driven, :3]
+        self.gain, self.bias = (
+            model.actuator_gainprm[machine.driven, 0],
+            model.actuator_biasprm[machine.driven, :3],
+        )
 
-    def actuator_motion(self, time: float, rate_time: float) -> tuple[np.ndarray, np.ndarray]:
+    def actuator_motion(
+        self, time: float, rate_time: float
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return lengths and rates (K,) of the driven actuators at a time, s, by the rates of the clock at ``rate_time``, s."""
         f, phases = self.gait.frequency, self.machine.phases
-        return self.gait.angle(f * time + phases, f * rate_time + phases), f * self.gait.rate(f * rate_time + phases)
+        return self.gait.angle(
+            f * time + phases, f * rate_time + phases
+        ), f * self.gait.rate(f * rate_time + phases)
 
     def __call__(self, time: float, rate_time: float) -> np.ndarray:
         """Return the controls (nu,) at a time, s, by the rates of the clock at ``rate_time``, s."""
         angle, rate = self.actuator_motion(time, rate_time)
         controls = self.rest.copy()
         controls[self.machine.driven] = (
-            -(self.bias[:, 0] + self.bias[:, 1] * angle + self.bias[:, 2] * rate) / self.gain
+            -(self.bias[:, 0] + self.bias[:, 1] * angle + self.bias[:, 2] * rate)
+            / self.gain
         )
         return controls
 
@@ -73,7 +92,11 @@ class Clock:
         """Return the phases, from 0 to 1, at which an actuator's rate may jump, with both ends."""
         if len(self.gait.kinks) == 2:
             return [0.0, 1.0]
-        ends = [(side * self.gait.duty / 2 - p) % 1.0 for p in self.machine.phases for side in (-1, 1)]
+        ends = [
+            (side * self.gait.duty / 2 - p) % 1.0
+            for p in self.machine.phases
+            for side in (-1, 1)
+        ]
         return sorted({0.0, 1.0, *(round(e, 12) % 1.0 for e in ends)})
 
     def set_start(self, body: Multibody) -> None:
@@ -85,14 +108,23 @@ class Clock:
         data.time, data.qvel[:] = 0.0, 0.0
         lengths, rates = self.actuator_motion(0.0, 1e-9)
         for actuator, length, rate in zip(self.machine.driven, lengths, rates):
-            joint, gear = model.actuator_trnid[actuator, 0], model.actuator_gear[actuator, 0]
-            if model.actuator_trntype[actuator] == JOINT and model.jnt_type[joint] in (SLIDE, HINGE) and gear:
+            joint, gear = (
+                model.actuator_trnid[actuator, 0],
+                model.actuator_gear[actuator, 0],
+            )
+            if (
+                model.actuator_trntype[actuator] == JOINT
+                and model.jnt_type[joint] in (SLIDE, HINGE)
+                and gear
+            ):
                 if model.actuator_biasprm[actuator, 1]:
                     data.qpos[model.jnt_qposadr[joint]] = length / gear
                 data.qvel[model.jnt_dofadr[joint]] = rate / gear
         mujoco.mj_forward(model, data)
         bodies = body.facets.bodies
-        lowest = body.facets.heights(data.xmat[bodies].reshape(-1, 3, 3), data.xpos[bodies]).min()
+        lowest = body.facets.heights(
+            data.xmat[bodies].reshape(-1, 3, 3), data.xpos[bodies]
+        ).min()
         if (height := self._height_index()) is not None:
             data.qpos[height] -= lowest
             mujoco.mj_forward(model, data)

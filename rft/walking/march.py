@@ -29,7 +29,9 @@ from rft.walking.sdirk import (
 UNENDING = np.inf, np.inf  # `rft.walking.sdirk.has_ended`: robots neither sink nor fly
 
 
-def march(robots: Robots, index, state: State, phases, rate_phases, ends=UNENDING) -> tuple[State, np.ndarray]:
+def march(
+    robots: Robots, index, state: State, phases, rate_phases, ends=UNENDING
+) -> tuple[State, np.ndarray]:
     """Return the states after every step (S, B) of the robots ``index`` from a state, and how often forces were evaluated
     (B,).
 
@@ -38,25 +40,40 @@ def march(robots: Robots, index, state: State, phases, rate_phases, ends=UNENDIN
     there."""
     index, phases = np.asarray(index), np.asarray(phases)
     starts = np.broadcast_to(phases[:-1, None], (len(rate_phases), len(index)))
-    angles, rates = robots.leg_motion(starts, np.broadcast_to(np.asarray(rate_phases)[:, None], starts.shape), index)
+    angles, rates = robots.leg_motion(
+        starts, np.broadcast_to(np.asarray(rate_phases)[:, None], starts.shape), index
+    )
     lengths = np.diff(phases)[:, None] / robots.frequency[index, 0]
     ends = np.stack([np.broadcast_to(x, len(index)) for x in ends])
     if compiles("auto", robots.elements.law):
         from rft.walking.compiled import run_steps
     else:
         run_steps = run_steps_by_numpy
-    states, tries = run_steps(robots, index, state.packed(), angles, rates, lengths, ends, EFFORT)
+    states, tries = run_steps(
+        robots, index, state.packed(), angles, rates, lengths, ends, EFFORT
+    )
     return State.unpacked(states), tries
 
 
-def step(robots: Robots, state: State, phase: float, rate_phase: float, dt: float) -> State:
+def step(
+    robots: Robots, state: State, phase: float, rate_phase: float, dt: float
+) -> State:
     """Return the state of robots of one frequency after a time step dt, s, from a phase, with the legs at the rates of the
     clock at ``rate_phase``."""
     phases = phase, phase + dt * robots.frequency[0, 0]
     return march(robots, range(len(robots)), state, phases, [rate_phase])[0].take(0)
 
 
-def run_steps_by_numpy(robots: Robots, index, start: np.ndarray, angles, rates, lengths, ends, effort: Effort):
+def run_steps_by_numpy(
+    robots: Robots,
+    index,
+    start: np.ndarray,
+    angles,
+    rates,
+    lengths,
+    ends,
+    effort: Effort,
+):
     """Return the states after each step (S, B, 11) and the numbers of evaluations (B,), from packed states (B, 11).
 
     angles: (S, B, K), of the legs at the beginning of each step, rad. rates: (S, B, K), rad/s. lengths: (S, B), s. ends:
@@ -68,7 +85,10 @@ def run_steps_by_numpy(robots: Robots, index, start: np.ndarray, angles, rates, 
     while column.size:
         robot, length = index[column], lengths[number, column]
         h, time = steps.stage.part * length, (stage_time(steps.stage) * length)[:, None]
-        width, rate = gather(effort.widths, steps.newton.width, 0), rates[number, column]
+        width, rate = (
+            gather(effort.widths, steps.newton.width, 0),
+            rates[number, column],
+        )
         ground, k = robots.ground_under(robot, width), GAMMA * h
         residual, slopes, power = robots.residual(
             robot, steps.stage.base, steps.stage.start, steps.newton.trial, angles[number, column] + time * rate, rate, k,
@@ -76,7 +96,14 @@ def run_steps_by_numpy(robots: Robots, index, start: np.ndarray, angles, rates, 
         )  # fmt: skip
         tolerance = TOLERANCE * ground.rounding
         newton, solved, failed = newton_step(
-            steps.newton, residual, slopes, power, k, robots.reach[robot], tolerance, effort
+            steps.newton,
+            residual,
+            slopes,
+            power,
+            k,
+            robots.reach[robot],
+            tolerance,
+            effort,
         )
         steps = Step(steps.accepted, steps.stage, newton)
         tries[column] += 1
@@ -92,7 +119,11 @@ def run_steps_by_numpy(robots: Robots, index, start: np.ndarray, angles, rates, 
                 states[number[j] :, column[j]] = row[j]
             active = ~ended & (number < count)
             if not active.all():
-                steps, column, number = select(steps, active), column[active], number[active]
+                steps, column, number = (
+                    select(steps, active),
+                    column[active],
+                    number[active],
+                )
     return states, tries
 
 

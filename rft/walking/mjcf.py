@@ -40,16 +40,34 @@ class Mjcf(Robot):
     period = 1.0
 
     def __post_init__(self):
-        require(isinstance(self.mjcf, str), "mjcf must be the name of an MJCF file", value=self.mjcf)
+        require(
+            isinstance(self.mjcf, str),
+            "mjcf must be the name of an MJCF file",
+            value=self.mjcf,
+        )
         for name in ("geoms", "actuators"):
             value = getattr(self, name)
             if value is None and name == "actuators":
                 continue
-            valid = isinstance(value, tuple | list) and all(isinstance(x, str) for x in value)
-            require(valid and len(value) <= MOST_NAMES, f"{name} must be a list of names", value=value)
-            require(len({*value}) == len(value), f"{name} names one twice", instead=formatted(value))
+            valid = isinstance(value, tuple | list) and all(
+                isinstance(x, str) for x in value
+            )
+            require(
+                valid and len(value) <= MOST_NAMES,
+                f"{name} must be a list of names",
+                value=value,
+            )
+            require(
+                len({*value}) == len(value),
+                f"{name} names one twice",
+                instead=formatted(value),
+            )
             object.__setattr__(self, name, tuple(value))
-        require(len(self.geoms) > 0, "a robot without legs", because="geoms must name those that touch the ground")
+        require(
+            len(self.geoms) > 0,
+            "a robot without legs",
+            because="geoms must name those that touch the ground",
+        )
         model, digest = _compiled(self.mjcf)
         object.__setattr__(self, "digest", digest)
         object.__setattr__(self, "model", model)
@@ -72,7 +90,12 @@ class Mjcf(Robot):
     def _find_geoms(self) -> None:
         """Set the numbers of the geoms; ValueError for unknown ones and for those of the world."""
         model = self.model
-        require(model.nv > 0, "nothing can move", where=self.mjcf, because="it has no joints")
+        require(
+            model.nv > 0,
+            "nothing can move",
+            where=self.mjcf,
+            because="it has no joints",
+        )
         numbers = []
         for name in self.geoms:
             geom = self._number("geom", name, model.ngeom)
@@ -93,9 +116,16 @@ class Mjcf(Robot):
         kinds = getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
         number = mujoco.mj_name2id(self.model, kinds, name)
         if number < 0:
-            names = [x for x in (mujoco.mj_id2name(self.model, kinds, k) for k in range(count)) if x]
+            names = [
+                x
+                for x in (mujoco.mj_id2name(self.model, kinds, k) for k in range(count))
+                if x
+            ]
             near = difflib.get_close_matches(name, names, 1, 0.5)
-            few = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "") or "none with a name"
+            few = (
+                ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
+                or "none with a name"
+            )
             cure = f"did you mean {formatted(near[0])}?" if near else f"it has {few}"
             raise Refusal(f"{self.mjcf} has no {kind} {formatted(name)}", instead=cure)
         return number
@@ -111,16 +141,29 @@ class Mjcf(Robot):
             because="nothing turns its legs",
             instead="add <position> or <velocity> ones",
         )
-        require(model.na == 0, f"{self.mjcf} has actuators with a state of their own", instead="drop their dyntype")
+        require(
+            model.na == 0,
+            f"{self.mjcf} has actuators with a state of their own",
+            instead="drop their dyntype",
+        )
         affine = (model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE) & (
             model.actuator_gaintype == mujoco.mjtGain.mjGAIN_FIXED
         )
-        able = affine & (model.actuator_biasprm[:, 1:3] != 0.0).any(1) & (model.actuator_gainprm[:, 0] != 0.0)
+        able = (
+            affine
+            & (model.actuator_biasprm[:, 1:3] != 0.0).any(1)
+            & (model.actuator_gainprm[:, 0] != 0.0)
+        )
         cure = "make it <position> or <velocity>"
         if self.actuators is None:
             driven = np.flatnonzero(able)
             cure = f"{cure}, or actuators = [] for the first keyframe's controls"
-            require(len(driven) > 0, "no actuator can follow the clock", where=self.mjcf, instead=cure)
+            require(
+                len(driven) > 0,
+                "no actuator can follow the clock",
+                where=self.mjcf,
+                instead=cure,
+            )
         else:
             ids = [self._number("actuator", name, model.nu) for name in self.actuators]
             for name, k in zip(self.actuators, ids):
@@ -132,12 +175,23 @@ class Mjcf(Robot):
                 )
             driven = np.array(ids, int)
         for k in driven:
-            name = formatted(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, k) or f"number {k + 1}")
+            name = formatted(
+                mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, k)
+                or f"number {k + 1}"
+            )
             message = f"{self.mjcf}: the actuator {name} has a ctrlrange: a leg that turns round needs none; drop it"
             require(not model.actuator_ctrllimited[k], message)
-        phases = np.zeros(len(driven)) if self.phases is None else real_array("phases", self.phases)
+        phases = (
+            np.zeros(len(driven))
+            if self.phases is None
+            else real_array("phases", self.phases)
+        )
         valid = phases.shape == (len(driven),) and bool((np.abs(phases) <= 100).all())
-        require(valid, f"phases must be {len(driven)} numbers, one for each actuator", value=self.phases)
+        require(
+            valid,
+            f"phases must be {len(driven)} numbers, one for each actuator",
+            value=self.phases,
+        )
         object.__setattr__(self, "phases", tuple(map(float, phases)))
         object.__setattr__(self, "driven", driven)
 
@@ -149,9 +203,15 @@ class Mjcf(Robot):
         out = []
         for name, geom in zip(self.geoms, self.geom_numbers):
             try:
-                out.append(geoms.surface(self.model, geom, geoms.geom_mesh(self.model, geom, elements)))
+                out.append(
+                    geoms.surface(
+                        self.model, geom, geoms.geom_mesh(self.model, geom, elements)
+                    )
+                )
             except ValueError as error:
-                raise Refusal(f"geom {formatted(name)}", where=self.mjcf, because=str(error)) from None
+                raise Refusal(
+                    f"geom {formatted(name)}", where=self.mjcf, because=str(error)
+                ) from None
         return out
 
     def check(self, elements: int) -> None:
@@ -168,7 +228,12 @@ def _compiled(file: str):
     mujoco.set_mju_user_warning(lambda _: None)
     path = Path(file)
     try:
-        require(path.is_file(), f"{file} is no ordinary file" if path.exists() else f"there is no MJCF file {file}")
+        require(
+            path.is_file(),
+            f"{file} is no ordinary file"
+            if path.exists()
+            else f"there is no MJCF file {file}",
+        )
         require(
             path.stat().st_size <= LARGEST_FILE,
             f"{file} is larger than {LARGEST_FILE / 1000000.0:.0f} MB",
@@ -179,15 +244,27 @@ def _compiled(file: str):
         raise Refusal(f"cannot read MJCF {file}", because=error.strerror) from None
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
-    except Exception as error:  # MuJoCo raises many kinds of errors for a file that is no MJCF
+    except (
+        Exception
+    ) as error:  # MuJoCo raises many kinds of errors for a file that is no MJCF
         message = " ".join(str(error).split())
-        raise Refusal(f"{file} is no MJCF that MuJoCo reads", because=message[:300]) from None
+        raise Refusal(
+            f"{file} is no MJCF that MuJoCo reads", because=message[:300]
+        ) from None
     if names := _not_finite(model):
-        raise Refusal(f"nan or inf in {names}", where=file, because="every number of an MJCF must be finite")
+        raise Refusal(
+            f"nan or inf in {names}",
+            where=file,
+            because="every number of an MJCF must be finite",
+        )
     down = model.opt.gravity
     upright = down[2] < 0 and abs(down[0]) + abs(down[1]) <= 1e-9 * abs(down[2])
-    require(bool(upright), "gravity must be along -z, the ground is at z = 0", where=file)
-    content = np.empty(mujoco.mj_sizeModel(model), np.uint8)  # with that of included files and meshes
+    require(
+        bool(upright), "gravity must be along -z, the ground is at z = 0", where=file
+    )
+    content = np.empty(
+        mujoco.mj_sizeModel(model), np.uint8
+    )  # with that of included files and meshes
     mujoco.mj_saveModel(model, None, content)
     return model, hashlib.sha256(content).hexdigest()[:16]
 
@@ -195,6 +272,18 @@ def _compiled(file: str):
 def _not_finite(model) -> str:
     """Return the names of arrays with nan or inf, as "keyframe qpos, body_pos", but for those that MuJoCo computes from
     others."""
-    arrays = {name: getattr(model, name) for name in dir(model) if not name.endswith(("0", "_spring"))}
-    floats = {name: x for name, x in arrays.items() if isinstance(x, np.ndarray) and x.dtype.kind == "f"}
-    return ", ".join(name.replace("key_", "keyframe ") for name, x in floats.items() if not np.isfinite(x).all())
+    arrays = {
+        name: getattr(model, name)
+        for name in dir(model)
+        if not name.endswith(("0", "_spring"))
+    }
+    floats = {
+        name: x
+        for name, x in arrays.items()
+        if isinstance(x, np.ndarray) and x.dtype.kind == "f"
+    }
+    return ", ".join(
+        name.replace("key_", "keyframe ")
+        for name, x in floats.items()
+        if not np.isfinite(x).all()
+    )

@@ -19,10 +19,23 @@ import numpy as np
 
 from rft.refusal import require
 from rft.walking.facets import Facets, Grains, Poses, Surface
-from rft.walking.sdirk import FARTHEST, GAMMA, HALVINGS, LEAST_DECREASE, LEAST_SHARE, TOLERANCE
+from rft.walking.sdirk import (
+    FARTHEST,
+    GAMMA,
+    HALVINGS,
+    LEAST_DECREASE,
+    LEAST_SHARE,
+    TOLERANCE,
+)
 
 ITERATIONS = 12  # of Newton's method
-WIDTHS = (30.0, 8.0, 3.0, 1.5, 1.0)  # factors of the rounding, one after another where Newton's method fails
+WIDTHS = (
+    30.0,
+    8.0,
+    3.0,
+    1.5,
+    1.0,
+)  # factors of the rounding, one after another where Newton's method fails
 NUDGE = 1e-6  # change of a velocity for differences of MuJoCo's forces, m/s
 
 
@@ -62,15 +75,27 @@ class Multibody:
         grains: Grains,
         control: Callable[[float, float], np.ndarray] | None = None,
     ):
-        require(model.nv > 0, "nothing in the model can move", because="it has no joints")
-        require(model.na == 0, "the model has actuators with a state of their own", instead="drop their dyntype")
+        require(
+            model.nv > 0, "nothing in the model can move", because="it has no joints"
+        )
+        require(
+            model.na == 0,
+            "the model has actuators with a state of their own",
+            instead="drop their dyntype",
+        )
         mujoco.set_mju_user_warning(_ignore)
         _remove_contacts(model, surfaces)
         model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
         self.model, self.data = model, mujoco.MjData(model)
         self.facets, self.grains, self.control = Facets(surfaces), grains, control
         self.work = self.loss = 0.0
-        self.unsolved, self.residual, self.defect, self._step_residual, self.evaluations = 0, 0.0, 0.0, 0.0, 0
+        (
+            self.unsolved,
+            self.residual,
+            self.defect,
+            self._step_residual,
+            self.evaluations,
+        ) = 0, 0.0, 0.0, 0.0, 0
         self.wrenches = np.zeros((len(self.facets.bodies), 6))
         self.jacobians = np.zeros((len(self.facets.bodies), 6, model.nv))
         mujoco.mj_forward(model, self.data)
@@ -81,8 +106,13 @@ class Multibody:
         """Return the speed, m/s, per unit of each velocity (nv,): 1, or a reach, m, for rotations."""
         model, data = self.model, self.data
         places = data.xpos[self.facets.bodies]
-        reach = float((np.linalg.norm(places - places.mean(0), axis=1) + self.facets.reach).max())
-        rotating = [int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)]  # NumPy compares no enumerations
+        reach = float(
+            (np.linalg.norm(places - places.mean(0), axis=1) + self.facets.reach).max()
+        )
+        rotating = [
+            int(mujoco.mjtJoint.mjJNT_HINGE),
+            int(mujoco.mjtJoint.mjJNT_BALL),
+        ]  # NumPy compares no enumerations
         size = np.where(np.isin(model.jnt_type[model.dof_jntid], rotating), reach, 1.0)
         for joint in np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE):
             first = model.jnt_dofadr[joint] + 3
@@ -99,16 +129,34 @@ class Multibody:
     def state(self) -> tuple:
         """Return the numbers that all further steps depend on."""
         data, sums = self.data, (self.work, self.loss, self.residual, self.defect)
-        return data.time, data.qpos.copy(), data.qvel.copy(), *map(float, sums), self.unsolved, self.evaluations
+        return (
+            data.time,
+            data.qpos.copy(),
+            data.qvel.copy(),
+            *map(float, sums),
+            self.unsolved,
+            self.evaluations,
+        )
 
     def restore(self, state: tuple) -> None:
         """Set the body to a `state`."""
         data = self.data
-        data.time, data.qpos[:], data.qvel[:], self.work, self.loss, self.residual, self.defect, *counts = state
+        (
+            data.time,
+            data.qpos[:],
+            data.qvel[:],
+            self.work,
+            self.loss,
+            self.residual,
+            self.defect,
+            *counts,
+        ) = state
         self.unsolved, self.evaluations = counts
         mujoco.mj_fwdPosition(self.model, data)
 
-    def step(self, h: float, rate_time: float | None = None, halvings: int = HALVINGS) -> None:
+    def step(
+        self, h: float, rate_time: float | None = None, halvings: int = HALVINGS
+    ) -> None:
         """Take a time step h, s, with the controls' rates at ``rate_time``, s, by default the middle of the step; a step that
         cannot be solved is halved."""
         data = self.data
@@ -123,9 +171,18 @@ class Multibody:
             self.step(h / 2, rate_time, halvings - 1)
             self.step(h / 2, rate_time, halvings - 1)
             return
-        finite = np.isfinite(data.qpos).all() and np.isfinite([self.work, self.loss]).all()
-        require(bool(finite), f"the time step at {start[0]:.4g} s cannot be solved", instead="make steps shorter")
-        self.unsolved, self.defect = self.unsolved + 1, self.defect + self._step_residual
+        finite = (
+            np.isfinite(data.qpos).all() and np.isfinite([self.work, self.loss]).all()
+        )
+        require(
+            bool(finite),
+            f"the time step at {start[0]:.4g} s cannot be solved",
+            instead="make steps shorter",
+        )
+        self.unsolved, self.defect = (
+            self.unsolved + 1,
+            self.defect + self._step_residual,
+        )
         self.residual = max(self.residual, self._step_residual)
 
     def _step(self, t, q, v, h, rate_time) -> bool:
@@ -135,7 +192,9 @@ class Multibody:
         first, solved, *powers = self._stage(q, v, v, k, t + k, rate_time)
         q_2, v_2 = self._integrated(q, first, h - k), v + (h - k) / k * (first - v)
         _, solved_2, *powers_2 = self._stage(q_2, v_2, first, k, t + h, rate_time)
-        work, loss = (h * ((1 - GAMMA) * a + GAMMA * b) for a, b in zip(powers, powers_2))
+        work, loss = (
+            h * ((1 - GAMMA) * a + GAMMA * b) for a, b in zip(powers, powers_2)
+        )
         self.work, self.loss = self.work + work, self.loss + loss
         return solved and solved_2
 
@@ -157,12 +216,19 @@ class Multibody:
             plain = self.grains
             for width in WIDTHS:
                 self.grains = replace(plain, rounding=width * plain.rounding)
-                velocity, residual = self._newton(q, v, velocity if np.isfinite(velocity).all() else guess, k)
+                velocity, residual = self._newton(
+                    q, v, velocity if np.isfinite(velocity).all() else guess, k
+                )
             self.grains = plain
         self._step_residual = max(self._step_residual, residual)
         solved = residual <= TOLERANCE * self.grains.rounding
         motor_power = float(data.qfrc_actuator @ data.qvel)
-        losses = data.qfrc_applied + data.qfrc_passive - data.qfrc_spring + data.qfrc_constraint
+        losses = (
+            data.qfrc_applied
+            + data.qfrc_passive
+            - data.qfrc_spring
+            + data.qfrc_constraint
+        )
         return velocity, solved, motor_power, -float(losses @ data.qvel)
 
     def _newton(self, q, v, guess, k) -> tuple[np.ndarray, float]:
@@ -178,7 +244,11 @@ class Multibody:
         size = np.abs(step * self.size).max()
         share = largest_share(size)
         for _ in range(ITERATIONS):
-            if size <= tolerance or share < LEAST_SHARE * largest_share(size) or not np.isfinite(size):
+            if (
+                size <= tolerance
+                or share < LEAST_SHARE * largest_share(size)
+                or not np.isfinite(size)
+            ):
                 break
             trial = velocity + share * step
             residual, trial_slope = self._residual(q, v, trial, k)
@@ -221,7 +291,9 @@ class Multibody:
         for j in range(len(velocity)):
             changed = velocity.copy()
             changed[j] += NUDGE / self.size[j]
-            slopes[:, j] = (self._required_force(q, v, changed, k) - required) * (self.size[j] / NUDGE)
+            slopes[:, j] = (self._required_force(q, v, changed, k) - required) * (
+                self.size[j] / NUDGE
+            )
         return slopes
 
     def _loads(self, k) -> tuple[np.ndarray, np.ndarray]:
@@ -233,14 +305,20 @@ class Multibody:
         rotation = data.xmat[facets.bodies].reshape(-1, 3, 3)
         poses = Poses(rotation, data.xpos[facets.bodies], twist[:, :3], twist[:, 3:])
         self.wrenches, slopes = facets.loads(self.grains, poses, k)
-        return np.einsum("bij,bi->j", j, self.wrenches), (j.swapaxes(1, 2) @ slopes @ j).sum(0)
+        return np.einsum("bij,bi->j", j, self.wrenches), (
+            j.swapaxes(1, 2) @ slopes @ j
+        ).sum(0)
 
 
 def _remove_contacts(model: mujoco.MjModel, surfaces: Sequence[Surface]) -> None:
     """Remove all contacts of the surfaces' geoms from a model; ValueError where a <pair> names one."""
     own = np.zeros(model.ngeom, bool)
     for surface in surfaces:
-        own |= model.geom_bodyid == surface.body if surface.geom is None else np.arange(model.ngeom) == surface.geom
+        own |= (
+            model.geom_bodyid == surface.body
+            if surface.geom is None
+            else np.arange(model.ngeom) == surface.geom
+        )
     model.geom_contype[own] = model.geom_conaffinity[own] = 0
     paired = own[model.pair_geom1] | own[model.pair_geom2]
     require(

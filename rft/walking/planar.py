@@ -18,7 +18,9 @@ from rft.vectors import formula
 from rft.walking.elements import Elements, Outlines
 from rft.walking.robot import Robot, Tripod, leg_angle, leg_rate, walking_rounding
 
-CHANGED = np.eye(4)[1:, :, None]  # which rate is changed in each of four residuals; none in the first
+CHANGED = np.eye(4)[
+    1:, :, None
+]  # which rate is changed in each of four residuals; none in the first
 NUDGE = 1e-3  # change of a rate for differences, over the rounding
 
 
@@ -43,12 +45,16 @@ class State(NamedTuple):
 
     def packed(self) -> np.ndarray:
         """Return the state as one array (..., B, 11)."""
-        return np.concatenate([self.pose, self.twist, *(x[..., None] for x in self[2:])], -1)
+        return np.concatenate(
+            [self.pose, self.twist, *(x[..., None] for x in self[2:])], -1
+        )
 
     @classmethod
     def unpacked(cls, numbers: np.ndarray) -> State:
         """Return the state that `packed` has put into an array (..., B, 11)."""
-        return cls(numbers[..., :3], numbers[..., 3:6], *np.moveaxis(numbers[..., 6:], -1, 0))
+        return cls(
+            numbers[..., :3], numbers[..., 3:6], *np.moveaxis(numbers[..., 6:], -1, 0)
+        )
 
     def take(self, index) -> State:
         """Return the states at an index of the first axis."""
@@ -69,18 +75,40 @@ class Robots:
     inertia: those of x, z and pitch. frequency: (B, 1), Hz. hips: (2, B, K), x and z from the centre of mass, m.
     leg_phases: (K,), cycles. reach: (B,), m, of the legs from their hips."""
 
-    def __init__(self, robots: list[Robot], gaits: list[Tripod], stress: PlateStress, ground: Ground, elements: int):
+    def __init__(
+        self,
+        robots: list[Robot],
+        gaits: list[Tripod],
+        stress: PlateStress,
+        ground: Ground,
+        elements: int,
+    ):
         self.masses = _columns(robots, ("mass", "mass", "inertia"))
-        self.frequency, *self.clock = _columns(gaits, ("frequency", "duty", "sweep", "middle")).T[..., None]
+        self.frequency, *self.clock = _columns(
+            gaits, ("frequency", "duty", "sweep", "middle")
+        ).T[..., None]
         first, count = robots[0], len(robots[0].hip_phases)
-        self.leg_phases = np.array([(k + j) % count / count for k in range(len(first.hips)) for j in range(count)])
+        self.leg_phases = np.array(
+            [
+                (k + j) % count / count
+                for k in range(len(first.hips))
+                for j in range(count)
+            ]
+        )
         hip_x = np.array([np.repeat(r.hips, count) for r in robots])
-        self.hips = np.stack([hip_x, np.zeros_like(hip_x) + _columns(robots, ("hip_height",))])
-        self.legs, belly = Outlines.from_list(_outlines(robots, "leg", elements)), _outlines(robots, "belly", elements)
+        self.hips = np.stack(
+            [hip_x, np.zeros_like(hip_x) + _columns(robots, ("hip_height",))]
+        )
+        self.legs, belly = (
+            Outlines.from_list(_outlines(robots, "leg", elements)),
+            _outlines(robots, "belly", elements),
+        )
         self.belly = None if belly[0] is None else Outlines.from_list(belly)
         self.elements = Elements(self.legs, self.belly, self.hips, stress)
         self.reach = np.abs(self.legs.points).max((1, 2)) + np.zeros(len(robots))
-        self.ground = ground._replace(rounding=walking_rounding(ground.rounding, self.frequency[:, 0], self.reach))
+        self.ground = ground._replace(
+            rounding=walking_rounding(ground.rounding, self.frequency[:, 0], self.reach)
+        )
 
     def __len__(self) -> int:
         return len(self.masses)
@@ -88,7 +116,10 @@ class Robots:
     def ground_under(self, index, width=1.0) -> Ground:
         """Return the ground of these robots (B,), with the rounding times a width and the grazing sine times its root."""
         g = self.ground
-        wide = {"rounding": g.rounding[index] * width, "grazing_sine": g.grazing_sine * np.sqrt(width)}
+        wide = {
+            "rounding": g.rounding[index] * width,
+            "grazing_sine": g.grazing_sine * np.sqrt(width),
+        }
         return g._replace(strength=g.strength[index], flux=g.flux[index], **wide)
 
     def energy(self, state: State, index=slice(None)) -> np.ndarray:
@@ -96,32 +127,51 @@ class Robots:
         mass, inertia = self.masses[index, 0], self.masses[index, 2]
         v_x, v_z, rate = np.moveaxis(state.twist, -1, 0)
         turning = np.where(np.isfinite(inertia), inertia, 0.0) * rate**2
-        return mass * (v_x**2 + v_z**2) / 2 + turning / 2 + mass * GRAVITY * state.pose[..., 1]
+        return (
+            mass * (v_x**2 + v_z**2) / 2
+            + turning / 2
+            + mass * GRAVITY * state.pose[..., 1]
+        )
 
     def start(self) -> State:
         """Return the state at rest at phase 0: level, with the lowest point of legs and body on the surface."""
         angles = self.leg_motion(np.zeros(len(self)), 0.0)[0]
-        low = [z + self.legs.lowest(angle) for z, angle in zip(self.hips[1].T, angles.T)]
+        low = [
+            z + self.legs.lowest(angle) for z, angle in zip(self.hips[1].T, angles.T)
+        ]
         if self.belly:
             low.append(self.belly.lowest(np.zeros(len(self))) + np.zeros(len(self)))
         pose = np.zeros((len(self), 3))
         pose[:, 1] = -np.min(low, axis=0)
         return State.at_rest(pose)
 
-    def leg_motion(self, phase, rate_phase, index=slice(None)) -> tuple[np.ndarray, np.ndarray]:
+    def leg_motion(
+        self, phase, rate_phase, index=slice(None)
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return angles (..., B, K), rad, and rates (..., B, K), rad/s, of the legs of these robots at phases (..., B), by
         the rates of the clock at ``rate_phase``, (..., B) or a number."""
-        rate_phase, clock = np.asarray(rate_phase)[..., None] + self.leg_phases, [x[index] for x in self.clock]
-        angle = leg_angle(np.asarray(phase)[..., None] + self.leg_phases, rate_phase, *clock)
-        return angle, self.frequency[index] * leg_rate(rate_phase, *clock[:2]) + 0.0 * angle
+        rate_phase, clock = (
+            np.asarray(rate_phase)[..., None] + self.leg_phases,
+            [x[index] for x in self.clock],
+        )
+        angle = leg_angle(
+            np.asarray(phase)[..., None] + self.leg_phases, rate_phase, *clock
+        )
+        return angle, self.frequency[index] * leg_rate(
+            rate_phase, *clock[:2]
+        ) + 0.0 * angle
 
-    def accelerations(self, pose, twist, angle, rate, index=None, ground: Ground | None = None):
+    def accelerations(
+        self, pose, twist, angle, rate, index=None, ground: Ground | None = None
+    ):
         """Return accelerations (C, B, 3) of these robots, and power of the motors and into the ground, W, (C, B).
 
         pose, twist: (C, B, 3); the C motions of a robot hardly differ. angle, rate: (B, K), of the legs, rad and rad/s."""
         index = np.arange(len(self)) if index is None else index
         pose, twist = (tuple(np.moveaxis(x, -1, 0)) for x in (pose, twist))
-        load = self.elements.load(ground or self.ground_under(index), index, pose, twist, angle, rate)
+        load = self.elements.load(
+            ground or self.ground_under(index), index, pose, twist, angle, rate
+        )
         a = accelerations(load, self.masses[index, 0], self.masses[index, 2])
         return np.stack(a, -1), load.motor_power, load.ground_power
 
@@ -132,9 +182,17 @@ class Robots:
         trial = tuple(x + CHANGED[j] * y for j, (x, y) in enumerate(zip(v, nudge)))
         pose = plus(base, times(k, trial))
         load = self.elements.load(ground, index, pose, trial, angle, rate)
-        residual = stage_residual(load, trial, start, k, self.masses[index, 0], self.masses[index, 2])
-        slopes = tuple(tuple((x[j + 1] - x[0]) / y for x in residual) for j, y in enumerate(nudge))
-        return tuple(x[0] for x in residual), slopes, (load.motor_power[0], load.ground_power[0])
+        residual = stage_residual(
+            load, trial, start, k, self.masses[index, 0], self.masses[index, 2]
+        )
+        slopes = tuple(
+            tuple((x[j + 1] - x[0]) / y for x in residual) for j, y in enumerate(nudge)
+        )
+        return (
+            tuple(x[0] for x in residual),
+            slopes,
+            (load.motor_power[0], load.ground_power[0]),
+        )
 
 
 @formula

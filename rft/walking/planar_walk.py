@@ -16,14 +16,28 @@ from rft.walking.limit import Limit, LimitCycles, limit_cycles, predicted_progre
 from rft.walking.march import march
 from rft.walking.planar import Robots, State
 from rft.walking.robot import Rhex, Roller
-from rft.walking.stride import STUCK, Strides, Walk, compute_stride, cycles_to_settle, from_rest
+from rft.walking.stride import (
+    STUCK,
+    Strides,
+    Walk,
+    compute_stride,
+    cycles_to_settle,
+    from_rest,
+)
 
 
 def refuse(walker: Walker) -> None:
     """Raise ValueError for a walker that this engine cannot compute."""
     planar = isinstance(walker.robot, Rhex | Roller)
-    require(planar, f"the planar engine knows no {type(walker.robot).__name__} robot", instead="use ``engine`` mujoco")
-    require(isinstance(walker.stress, PlateStress), "a law of three dimensions takes ``engine`` mujoco")
+    require(
+        planar,
+        f"the planar engine knows no {type(walker.robot).__name__} robot",
+        instead="use ``engine`` mujoco",
+    )
+    require(
+        isinstance(walker.stress, PlateStress),
+        "a law of three dimensions takes ``engine`` mujoco",
+    )
 
 
 def walk(
@@ -44,7 +58,10 @@ def walk(
             if progress:
                 progress((k + fraction) / len(batches))
 
-        for j, one in zip(members, _walk([walkers[j] for j in members], numerics, cycles, report, advance)):
+        for j, one in zip(
+            members,
+            _walk([walkers[j] for j in members], numerics, cycles, report, advance),
+        ):
             walks[j] = one
     return walks
 
@@ -53,61 +70,132 @@ def _batches(walkers: Sequence[Walker], numerics: Fineness) -> list[list[int]]:
     """Return the indices of walkers that can be computed as one batch, a list for each batch."""
     batches: dict = {}
     for k, w in enumerate(walkers):
-        outlines = [o for o in (w.robot.leg(numerics.elements), w.robot.belly(numerics.elements)) if o is not None]
-        shapes = tuple((o.elements, o.closed, o.smooth_normals is None) for o in outlines)
-        key = repr((type(w.robot), len(w.robot.hips), shapes, replace(w.stress, zeta=1.0), w.gait.kinks))
+        outlines = [
+            o
+            for o in (w.robot.leg(numerics.elements), w.robot.belly(numerics.elements))
+            if o is not None
+        ]
+        shapes = tuple(
+            (o.elements, o.closed, o.smooth_normals is None) for o in outlines
+        )
+        key = repr(
+            (
+                type(w.robot),
+                len(w.robot.hips),
+                shapes,
+                replace(w.stress, zeta=1.0),
+                w.gait.kinks,
+            )
+        )
         batches.setdefault(key, []).append(k)
     return list(batches.values())
 
 
-def _strides(walkers: Sequence[Walker], numerics: Fineness, advance: Callable = compute_stride) -> Strides:
+def _strides(
+    walkers: Sequence[Walker], numerics: Fineness, advance: Callable = compute_stride
+) -> Strides:
     """Return the strides of a batch of walkers."""
     stress, grounds = replace(walkers[0].stress, zeta=1.0), [w.ground for w in walkers]
     strength = np.array([g.strength * w.stress.zeta for g, w in zip(grounds, walkers)])
-    ground = Ground(strength, np.array([g.flux for g in grounds]), numerics.rounding, np.sin(stress.grazing))
+    ground = Ground(
+        strength,
+        np.array([g.flux for g in grounds]),
+        numerics.rounding,
+        np.sin(stress.grazing),
+    )
     robots, gaits = [w.robot for w in walkers], [w.gait for w in walkers]
-    return Strides(Robots(robots, gaits, stress, ground, numerics.elements), robots, gaits, numerics.steps, advance)
+    return Strides(
+        Robots(robots, gaits, stress, ground, numerics.elements),
+        robots,
+        gaits,
+        numerics.steps,
+        advance,
+    )
 
 
 def _walk(
-    walkers: Sequence[Walker], numerics: Fineness, cycles: int | None, progress: Callable, advance: Callable
+    walkers: Sequence[Walker],
+    numerics: Fineness,
+    cycles: int | None,
+    progress: Callable,
+    advance: Callable,
 ) -> list[Walk]:
     """Return the walks of one batch of walkers."""
     strides = _strides(walkers, numerics, advance)
-    durations = cycles / strides.frequency if cycles else np.full(len(walkers), numerics.duration)
+    durations = (
+        cycles / strides.frequency
+        if cycles
+        else np.full(len(walkers), numerics.duration)
+    )
     state, blocks, computed, status, period = from_rest(strides, durations, progress)
     on = np.flatnonzero(np.isin(status, ("", "periodic")))
     limits = [Limit(state.take([k]), period[k]) for k in on]
-    at_limit = dict(zip(on, _at_limits([walkers[k] for k in on], numerics, limits, advance))) if on.size else {}
+    at_limit = (
+        dict(zip(on, _at_limits([walkers[k] for k in on], numerics, limits, advance)))
+        if on.size
+        else {}
+    )
     walks = []
     for k in range(len(walkers)):
-        rows = _rows(blocks[k], strides.cycle if status[k] == "periodic" else 0, durations[k])
-        states = State(rows[:, 1:4], rows[:, 4:7], rows[:, 7], rows[:, 8], *np.zeros((3, len(rows))))
+        rows = _rows(
+            blocks[k], strides.cycle if status[k] == "periodic" else 0, durations[k]
+        )
+        states = State(
+            rows[:, 1:4],
+            rows[:, 4:7],
+            rows[:, 7],
+            rows[:, 8],
+            *np.zeros((3, len(rows))),
+        )
         energy, time = strides.robots.energy(states, k), rows[-1, 0]
         speed = rows[-1, 1] / time if time else 0.0
-        own = float(speed), str(status[k]), 0.0, False, 0.0, None, int(state.unsolved[k]), float(state.residual[k])
+        own = (
+            float(speed),
+            str(status[k]),
+            0.0,
+            False,
+            0.0,
+            None,
+            int(state.unsolved[k]),
+            float(state.residual[k]),
+        )
         one = Walk(rows[:, 0], *states[:4], energy, *own)
         one = one._replace(**at_limit[k]) if k in at_limit else one
         if one.periodic and one.status == "walking":
             last = state.take([k]) if status[k] == "" else None
-            one = one._replace(settling_time=_settling_time(strides, k, [b[-1, 1] for b in blocks[k]], last, one))
+            one = one._replace(
+                settling_time=_settling_time(
+                    strides, k, [b[-1, 1] for b in blocks[k]], last, one
+                )
+            )
         walks.append(one._replace(cycles=one.cycles + computed[k] * strides.period))
     return walks
 
 
-def _settling_time(strides: Strides, k: int, x: list, last: State | None, walk: Walk) -> float:
+def _settling_time(
+    strides: Strides, k: int, x: list, last: State | None, walk: Walk
+) -> float:
     """Return `Walk.settling_time` from the places x, m, of robot k at the ends of its strides from rest.
 
     last: its state at the last one, from which the slopes at the limit predict further strides; None where the strides
     repeat themselves."""
     cycle = 1.0 / strides.frequency[k]
     if last is not None:
-        moves = predicted_progress(strides, walk.limit, last, k, walk.speed * cycle / strides.cycle)
+        moves = predicted_progress(
+            strides, walk.limit, last, k, walk.speed * cycle / strides.cycle
+        )
         x = np.append(x, x[-1] + moves.cumsum())
-    return float(cycles_to_settle(np.diff(x[:: strides.cycle]), walk.speed * cycle) * cycle)
+    return float(
+        cycles_to_settle(np.diff(x[:: strides.cycle]), walk.speed * cycle) * cycle
+    )
 
 
-def _at_limits(walkers: Sequence[Walker], numerics: Fineness, limits: list[Limit], advance: Callable) -> list[dict]:
+def _at_limits(
+    walkers: Sequence[Walker],
+    numerics: Fineness,
+    limits: list[Limit],
+    advance: Callable,
+) -> list[dict]:
     """Return the fields of `Walk` that belong to the limit cycles, from states near them."""
     strides = _strides(walkers, numerics, advance)
     cycles = limit_cycles(strides, limits)
@@ -140,7 +228,9 @@ def _rows(blocks, cycle: int, duration: float) -> np.ndarray:
         gain = np.zeros(9)
         gain[[0, 1, 7, 8]] = (last[-1] - before)[[0, 1, 7, 8]]
         repetitions = int(np.ceil((duration - rows[-1, 0]) / gain[0]))
-        rows = np.concatenate([rows, *(last + k * gain for k in range(1, repetitions + 1))])
+        rows = np.concatenate(
+            [rows, *(last + k * gain for k in range(1, repetitions + 1))]
+        )
     return rows[rows[:, 0] <= duration + 1e-9]
 
 
@@ -154,31 +244,53 @@ def rerun(
     """Return walks with other numerics; see `rft.walking.engines.Engine.rerun`."""
     others: list = [None] * len(walkers)
     ended = [k for k, w in enumerate(walks) if w.limit is None]
-    for k, one in zip(ended, walk([walkers[k] for k in ended], numerics, cycles, advance=advance)):
+    for k, one in zip(
+        ended, walk([walkers[k] for k in ended], numerics, cycles, advance=advance)
+    ):
         others[k] = one
     rest = [k for k, w in enumerate(walks) if w.limit is not None]
     for batch in _batches([walkers[k] for k in rest], numerics):
         members = [rest[m] for m in batch]
         limits = [walks[k].limit for k in members]
-        for k, fields in zip(members, _at_limits([walkers[k] for k in members], numerics, limits, advance)):
+        for k, fields in zip(
+            members,
+            _at_limits([walkers[k] for k in members], numerics, limits, advance),
+        ):
             others[k] = walks[k]._replace(**fields)
     return others
 
 
-def step_cost(walkers: Sequence[Walker], numerics: Fineness, seconds: float) -> tuple[float, float]:
+def step_cost(
+    walkers: Sequence[Walker], numerics: Fineness, seconds: float
+) -> tuple[float, float]:
     """Return the cost of a time step; see `rft.walking.engines.Engine.step_cost`."""
     strides, robots = _strides(walkers, numerics), np.arange(len(walkers))
-    ends, state, done, tries = (strides.top, strides.out_of_reach), strides.robots.start(), 0, 0
+    ends, state, done, tries = (
+        (strides.top, strides.out_of_reach),
+        strides.robots.start(),
+        0,
+        0,
+    )
 
     def steps(begin, count):
-        phases, rate_phases = strides.phases[begin : begin + count + 1], strides.rate_phases[begin : begin + count]
+        phases, rate_phases = (
+            strides.phases[begin : begin + count + 1],
+            strides.rate_phases[begin : begin + count],
+        )
         return march(strides.robots, robots, state, phases, rate_phases, ends)
 
     steps(0, 1)  # compiled code is loaded
     begin = time.process_time()
     while done < len(strides.rate_phases):
         states, evaluations = steps(done, max(1, done))  # one by one they take longer
-        state, tries, done = states.take(-1), tries + int(evaluations[0]), done + len(states.pose)
-        if time.process_time() - begin >= seconds or strides.end_status(state, robots)[0]:
+        state, tries, done = (
+            states.take(-1),
+            tries + int(evaluations[0]),
+            done + len(states.pose),
+        )
+        if (
+            time.process_time() - begin >= seconds
+            or strides.end_status(state, robots)[0]
+        ):
             break
     return (time.process_time() - begin) / done, tries / done

@@ -21,12 +21,20 @@ from rft.plates.shapes import Polygon, Shape
 from rft.refusal import formatted, require
 
 MOST_HIPS = 20
-SHORTEST = 1 / 8  # of a cycle: shorter parts get as many time steps, since all of the motion may lie in them
+SHORTEST = (
+    1 / 8
+)  # of a cycle: shorter parts get as many time steps, since all of the motion may lie in them
 SMALLEST = 1e-7  # m/s, least rounding
 CREEP = 0.05  # largest rounding over the speed of the legs' ends: with more, slow legs sink as they stand
 
 Mass = Annotated[float, Number(1e-6, 1e4, "kg", "mass of all that moves")]
-Axle = Annotated[float, metres("height of the axle about which legs turn, above the origin of their outline", -LARGEST)]
+Axle = Annotated[
+    float,
+    metres(
+        "height of the axle about which legs turn, above the origin of their outline",
+        -LARGEST,
+    ),
+]
 
 
 @dataclass(frozen=True)
@@ -46,11 +54,22 @@ class Tripod:
     """
 
     frequency: Annotated[float, Number(1e-3, 200, "Hz", "turns a second")]
-    duty: Annotated[float, Number(0.01, 0.99, "-", "share of the cycle in which a leg stands, 0.01 to 0.99")] = 0.5
-    sweep: Annotated[float, Number(0.01, 2 * math.pi - 0.01, "rad", "angle by which a leg turns as it stands")] = (
-        math.pi
-    )
-    middle: Annotated[float, Number(-math.pi, math.pi, "rad", "angle of a leg in the middle of its stance")] = 0.0
+    duty: Annotated[
+        float,
+        Number(
+            0.01, 0.99, "-", "share of the cycle in which a leg stands, 0.01 to 0.99"
+        ),
+    ] = 0.5
+    sweep: Annotated[
+        float,
+        Number(
+            0.01, 2 * math.pi - 0.01, "rad", "angle by which a leg turns as it stands"
+        ),
+    ] = math.pi
+    middle: Annotated[
+        float,
+        Number(-math.pi, math.pi, "rad", "angle of a leg in the middle of its stance"),
+    ] = 0.0
 
     def __post_init__(self):
         check_numbers(self)
@@ -61,7 +80,11 @@ class Tripod:
         if abs(self.sweep - 2 * math.pi * self.duty) < 1e-12:
             return 0.0, 0.5
         first = min(self.duty, 1.0 - self.duty) / 2
-        return (0.0, first, 0.5) if abs(first - 0.25) < 1e-12 else (0.0, first, 0.5 - first, 0.5)
+        return (
+            (0.0, first, 0.5)
+            if abs(first - 0.25) < 1e-12
+            else (0.0, first, 0.5 - first, 0.5)
+        )
 
     def angle(self, phase, rate_phase) -> np.ndarray:
         """Return the angle of a leg at ``phase``, cycles, by the rate at ``rate_phase``, which tells the side of a kink."""
@@ -75,22 +98,35 @@ class Tripod:
 def intervals(kinks: Sequence[float], steps: int) -> list[tuple[float, float, int]]:
     """Return (begin, end, number of time steps) between neighbouring kinks of a clock: about ``steps`` to a cycle, and in each
     interval at least those of `SHORTEST`, so that half of the steps are half of them in every interval."""
-    return [(a, b, max(1, round(steps * max(b - a, SHORTEST)))) for a, b in pairwise(kinks)]
+    return [
+        (a, b, max(1, round(steps * max(b - a, SHORTEST)))) for a, b in pairwise(kinks)
+    ]
 
 
 def leg_angle(phase, rate_phase, duty, sweep, middle) -> np.ndarray:
     """Return `Tripod.angle` of many clocks."""
     turns = np.floor(np.asarray(rate_phase) + 0.5)
-    phase, within = np.asarray(phase) - turns, np.asarray(rate_phase) - turns  # the second from -0.5 to 0.5
+    phase, within = (
+        np.asarray(phase) - turns,
+        np.asarray(rate_phase) - turns,
+    )  # the second from -0.5 to 0.5
     stance = sweep / duty * phase
-    recovery = np.sign(within) * math.pi + _recovery_rate(duty, sweep) * (phase - np.sign(within) * 0.5)
-    return middle + 2 * math.pi * turns + np.where(np.abs(within) <= duty / 2, stance, recovery)
+    recovery = np.sign(within) * math.pi + _recovery_rate(duty, sweep) * (
+        phase - np.sign(within) * 0.5
+    )
+    return (
+        middle
+        + 2 * math.pi * turns
+        + np.where(np.abs(within) <= duty / 2, stance, recovery)
+    )
 
 
 def leg_rate(phase, duty, sweep) -> np.ndarray:
     """Return `Tripod.rate` of many clocks."""
     within = np.asarray(phase) - np.floor(np.asarray(phase) + 0.5)
-    return np.where(np.abs(within) <= duty / 2, sweep / duty, _recovery_rate(duty, sweep))
+    return np.where(
+        np.abs(within) <= duty / 2, sweep / duty, _recovery_rate(duty, sweep)
+    )
 
 
 def _recovery_rate(duty, sweep):
@@ -100,7 +136,9 @@ def _recovery_rate(duty, sweep):
 
 def walking_rounding(rounding: float, frequency, reach):
     """Return the rounding, m/s, for legs of a reach, m, at a frequency, Hz: less than ``rounding`` for slow legs."""
-    return np.clip(CREEP * 2 * math.pi * np.asarray(frequency) * reach, SMALLEST, rounding)
+    return np.clip(
+        CREEP * 2 * math.pi * np.asarray(frequency) * reach, SMALLEST, rounding
+    )
 
 
 class Robot:
@@ -118,7 +156,9 @@ class Robot:
     mass: float
     legs: Shape
     axle: float
-    part: ClassVar[str] = "legs"  # field, and table of a scene, of the parts that drive the robot
+    part: ClassVar[str] = (
+        "legs"  # field, and table of a scene, of the parts that drive the robot
+    )
     parts: ClassVar[str] = "legs"  # name of these parts in messages
     hip_phases: ClassVar[tuple[float, ...]]  # phases of the legs at a hip, cycles
     period: ClassVar[float]  # cycles after which the robot looks the same
@@ -127,7 +167,11 @@ class Robot:
         """Return the outline of a leg about its hip."""
         outline = self.legs.outline(elements)
         return (
-            Outline(outline.points - [0.0, self.axle], outline.width, outline.smooth_normals) if self.axle else outline
+            Outline(
+                outline.points - [0.0, self.axle], outline.width, outline.smooth_normals
+            )
+            if self.axle
+            else outline
         )
 
     def belly(self, elements: int) -> Outline | None:
@@ -173,9 +217,17 @@ class Rhex(Robot):
     width: Annotated[float, metres("width of the box about the centre of mass")]
     legs: Shape
     hips: tuple[float, ...]
-    hip_height: Annotated[float, metres("height of the hips above the centre of mass", -LARGEST)] = 0.0
+    hip_height: Annotated[
+        float, metres("height of the hips above the centre of mass", -LARGEST)
+    ] = 0.0
     inertia: Annotated[
-        float | None, Number(1e-12, 1e5, "kg m^2", "moment of inertia of pitching; that of the box where none is given")
+        float | None,
+        Number(
+            1e-12,
+            1e5,
+            "kg m^2",
+            "moment of inertia of pitching; that of the box where none is given",
+        ),
     ] = None
     axle: Axle = 0.0
     aside: tuple[float, ...] | None = None
@@ -192,14 +244,21 @@ class Rhex(Robot):
             because=f"hips must be 1 to {MOST_HIPS} numbers, got {len(hips)}",
         )
         within = bool((np.abs(hips) <= self.length).all())
-        require(within, f"hips must be within a body length, {self.length:g} m, of the centre of mass (in m)")
+        require(
+            within,
+            f"hips must be within a body length, {self.length:g} m, of the centre of mass (in m)",
+        )
         object.__setattr__(self, "hips", tuple(map(float, hips)))
         if self.inertia is None:
-            object.__setattr__(self, "inertia", self.mass * (self.length**2 + self.height**2) / 12)
+            object.__setattr__(
+                self, "inertia", self.mass * (self.length**2 + self.height**2) / 12
+            )
             check_numbers(self)
         if self.aside is not None:
             aside = real_array("aside", self.aside)
-            valid = aside.shape == hips.shape and bool(((aside >= 0) & (aside <= LARGEST)).all())
+            valid = aside.shape == hips.shape and bool(
+                ((aside >= 0) & (aside <= LARGEST)).all()
+            )
             message = f"aside must be {len(hips)} numbers from 0 to {LARGEST:g} m, one for each hip"
             require(valid, message, value=self.aside)
             object.__setattr__(self, "aside", tuple(map(float, aside)))
@@ -215,7 +274,9 @@ class Rhex(Robot):
 
     def belly(self, elements: int) -> Outline:
         x, z = self.length / 2, self.height / 2
-        return Polygon(((-x, -z), (x, -z), (x, z), (-x, z)), self.width).outline(elements)
+        return Polygon(((-x, -z), (x, -z), (x, z), (-x, z)), self.width).outline(
+            elements
+        )
 
 
 @dataclass(frozen=True)
@@ -233,7 +294,10 @@ class Roller(Robot):
     'walking'
     """
 
-    mass: Annotated[float, Number(1e-6, 1e4, "kg", "mass of all that the wheel carries, and its own")]
+    mass: Annotated[
+        float,
+        Number(1e-6, 1e4, "kg", "mass of all that the wheel carries, and its own"),
+    ]
     legs: Shape
     axle: Axle = 0.0
     hips = (0.0,)

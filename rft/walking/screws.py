@@ -22,10 +22,15 @@ from rft.walking.craft import Screws
 
 TRIANGLES = 2000
 ANGLES = 12  # of a turn; 24 change the means by 5e-4
-BALANCED = 1e-5  # largest residual, of the weight, and of the weight times the screws' length
+BALANCED = (
+    1e-5  # largest residual, of the weight, and of the weight times the screws' length
+)
 EASY = 0.7  # first guess of the speed, over that without slip
 NOSE_UP = -0.03  # rad, first guess of the pitch: at 0 upright faces begin to look down all at once, and the law jumps
-ABOVE = (0.3, 0.0)  # first guesses of the height, screw radii above `_Steady.floating`: there the box touches down
+ABOVE = (
+    0.3,
+    0.0,
+)  # first guesses of the height, screw radii above `_Steady.floating`: there the box touches down
 DEEPEST = 20.0  # depth of the axes that is searched, screw radii
 HALVINGS = 16  # of the interval that holds a slip; half as many of that of a height, a first guess
 STEPS = 30  # of Newton's method
@@ -80,16 +85,31 @@ def turning(
     speed = ((1.0 - slip) * rate * screw.pitch / (2 * np.pi))[..., None]
     turns = _turns(angles)
     force, moment, _, _ = wrench(
-        medium, mesh, turns, [0.0, 0.0, height], speed[..., None] * [1.0, 0.0, 0.0], [sense * rate, 0.0, 0.0]
+        medium,
+        mesh,
+        turns,
+        [0.0, 0.0, height],
+        speed[..., None] * [1.0, 0.0, 0.0],
+        [sense * rate, 0.0, 0.0],
     )
     force, moment = force.mean(-2), moment.mean(-2)
     torque = -sense * moment[..., 0]
     power = np.where(torque == 0.0, np.nan, torque * rate)
-    return Turning(slip, *np.moveaxis(force, -1, 0), torque, moment[..., 1], force[..., 0] * speed[..., 0] / power)
+    return Turning(
+        slip,
+        *np.moveaxis(force, -1, 0),
+        torque,
+        moment[..., 1],
+        force[..., 0] * speed[..., 0] / power,
+    )
 
 
 def free_turning(
-    medium: Spatial, screw: Screw, height: float, triangles: int = TRIANGLES, angles: int = ANGLES
+    medium: Spatial,
+    screw: Screw,
+    height: float,
+    triangles: int = TRIANGLES,
+    angles: int = ANGLES,
 ) -> Turning:
     """Return the mean forces of `turning` at the slip without thrust, where nothing pulls the screw and it pulls nothing; nan
     where that slip is beyond 1.
@@ -111,12 +131,18 @@ def free_turning(
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         low, high = (low, middle) if forces(middle).thrust > 0.0 else (middle, high)
-    return forces((low + high) / 2) if moves else Turning(*np.full(len(Turning._fields), np.nan))
+    return (
+        forces((low + high) / 2)
+        if moves
+        else Turning(*np.full(len(Turning._fields), np.nan))
+    )
 
 
 def _turns(angles: int) -> np.ndarray:
     """Return the rotations (angles, 3, 3) of a turn about x."""
-    return rotations(np.outer(2 * np.pi * np.arange(angles) / angles, [1.0, 0.0, 0.0])).as_matrix()
+    return rotations(
+        np.outer(2 * np.pi * np.arange(angles) / angles, [1.0, 0.0, 0.0])
+    ).as_matrix()
 
 
 class Cruise(NamedTuple):
@@ -148,7 +174,11 @@ class Cruise(NamedTuple):
 
 
 def cruise(
-    medium: Spatial, craft: Screws, frequency: float = 1.0, triangles: int = TRIANGLES, angles: int = ANGLES
+    medium: Spatial,
+    craft: Screws,
+    frequency: float = 1.0,
+    triangles: int = TRIANGLES,
+    angles: int = ANGLES,
 ) -> Cruise:
     """Return the steady motion of a craft on level ground whose screws turn ``frequency`` times a second.
 
@@ -166,8 +196,13 @@ def cruise(
     (0.029, 0.52)
     """
     in_range("frequency", frequency, 1e-9, 1e3)
-    steady, mirrored = _Steady(medium, craft, frequency, triangles, angles), craft.pair == "mirrored"
-    free, equations = ([0, 2, 3], [2, 4, 0]) if mirrored else ([*range(6)], [*range(6)])  # the rest is 0 by symmetry
+    steady, mirrored = (
+        _Steady(medium, craft, frequency, triangles, angles),
+        craft.pair == "mirrored",
+    )
+    free, equations = (
+        ([0, 2, 3], [2, 4, 0]) if mirrored else ([*range(6)], [*range(6)])
+    )  # the rest is 0 by symmetry
     on_cores = 2 * np.pi * craft.screw.core / craft.screw.pitch
 
     def full(x):
@@ -176,42 +211,97 @@ def cruise(
         return q
 
     floating = steady.floating()
-    for sideways, above in itertools.product((0.0,) if mirrored else (0.1, on_cores), ABOVE):
-        start = np.array([floating + above, 0.0, NOSE_UP, EASY, -craft.screw.sense * sideways, 0.0])
+    for sideways, above in itertools.product(
+        (0.0,) if mirrored else (0.1, on_cores), ABOVE
+    ):
+        start = np.array(
+            [floating + above, 0.0, NOSE_UP, EASY, -craft.screw.sense * sideways, 0.0]
+        )
         x, residual = _solve(lambda x: steady.residual(full(x))[equations], start[free])
         if residual < BALANCED:
             break
     else:
-        return Cruise(*3 * [np.nan], np.full(2, np.nan), *3 * [np.nan], np.full(2, np.nan), residual)
-    height, roll, pitch, *velocity, yaw_rate = (float(value) for value in full(x) * steady.units)
-    advance, slip = float(np.hypot(*velocity)) / frequency, 1.0 - velocity[0] / (craft.screw.pitch * frequency)
-    return Cruise(height, roll, pitch, np.array(velocity), yaw_rate, advance, slip, steady.sums(full(x))[1], residual)
+        return Cruise(
+            *3 * [np.nan],
+            np.full(2, np.nan),
+            *3 * [np.nan],
+            np.full(2, np.nan),
+            residual,
+        )
+    height, roll, pitch, *velocity, yaw_rate = (
+        float(value) for value in full(x) * steady.units
+    )
+    advance, slip = (
+        float(np.hypot(*velocity)) / frequency,
+        1.0 - velocity[0] / (craft.screw.pitch * frequency),
+    )
+    return Cruise(
+        height,
+        roll,
+        pitch,
+        np.array(velocity),
+        yaw_rate,
+        advance,
+        slip,
+        steady.sums(full(x))[1],
+        residual,
+    )
 
 
 class _Steady:
     """A craft that moves steadily at q (6,): height, roll, pitch, velocity forwards and to the left, and yaw rate, in
     ``units``: a screw's radius, radians, the velocity in a nut, and that over the screws' length."""
 
-    def __init__(self, medium: Spatial, craft: Screws, frequency: float, triangles: int, angles: int):
+    def __init__(
+        self,
+        medium: Spatial,
+        craft: Screws,
+        frequency: float,
+        triangles: int,
+        angles: int,
+    ):
         self.medium, self.craft, self.rate = medium, craft, 2 * np.pi * frequency
         nut = craft.screw.pitch * frequency
-        self.units = np.array([craft.screw.radius, 1.0, 1.0, nut, nut, nut / craft.screw.length])
+        self.units = np.array(
+            [craft.screw.radius, 1.0, 1.0, nut, nut, nut / craft.screw.length]
+        )
         self.weight = craft.mass * GRAVITY
-        self.screws = [(s.sense, s.mesh(triangles), np.array(place)) for s, place in craft.screws]
+        self.screws = [
+            (s.sense, s.mesh(triangles), np.array(place)) for s, place in craft.screws
+        ]
         self.turns, self.hull = _turns(angles), craft.hull(6)
 
     def sums(self, q) -> tuple[np.ndarray, np.ndarray]:
         """Return force and moment of the grains about the centre of mass (6,), and the motors' torques (2,), in the mean over a
         turn."""
         height, roll, pitch, *velocity, yaw_rate = q * self.units
-        body = rotations([0.0, pitch, 0.0]).as_matrix() @ rotations([roll, 0.0, 0.0]).as_matrix()
-        velocity, spin, torques = np.array([*velocity, 0.0]), np.array([0.0, 0.0, yaw_rate]), []
-        on_hull = wrench(self.medium, self.hull, body, [0.0, 0.0, height], velocity, spin)
+        body = (
+            rotations([0.0, pitch, 0.0]).as_matrix()
+            @ rotations([roll, 0.0, 0.0]).as_matrix()
+        )
+        velocity, spin, torques = (
+            np.array([*velocity, 0.0]),
+            np.array([0.0, 0.0, yaw_rate]),
+            [],
+        )
+        on_hull = wrench(
+            self.medium, self.hull, body, [0.0, 0.0, height], velocity, spin
+        )
         total = np.concatenate([on_hull.force, on_hull.moment])
         for sense, mesh, place in self.screws:
             arm = body @ place
-            v, relative_spin = velocity + np.cross(spin, arm), sense * self.rate * body[:, 0]
-            on_screw = wrench(self.medium, mesh, body @ self.turns, [0.0, 0.0, height] + arm, v, spin + relative_spin)
+            v, relative_spin = (
+                velocity + np.cross(spin, arm),
+                sense * self.rate * body[:, 0],
+            )
+            on_screw = wrench(
+                self.medium,
+                mesh,
+                body @ self.turns,
+                [0.0, 0.0, height] + arm,
+                v,
+                spin + relative_spin,
+            )
             force, moment = on_screw.force.mean(0), on_screw.moment.mean(0)
             total += [*force, *(moment + np.cross(arm, force))]
             torques.append(-sense * moment @ body[:, 0])
@@ -220,7 +310,9 @@ class _Steady:
     def residual(self, q) -> np.ndarray:
         """Return the sums with the weight (6,), over the weight, and over the weight times the screws' length."""
         arm = self.craft.screw.length
-        scaled = self.sums(q)[0] / (self.weight * np.array([1.0, 1.0, 1.0, arm, arm, arm]))
+        scaled = self.sums(q)[0] / (
+            self.weight * np.array([1.0, 1.0, 1.0, arm, arm, arm])
+        )
         return scaled - np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
     def floating(self) -> float:
@@ -229,7 +321,10 @@ class _Steady:
         low, high = axes - DEEPEST, axes + 1.0
         for _ in range(HALVINGS // 2):
             middle = (low + high) / 2
-            bears = self.residual(np.array([middle, 0.0, NOSE_UP, EASY, 0.0, 0.0]))[2] >= 0.0
+            bears = (
+                self.residual(np.array([middle, 0.0, NOSE_UP, EASY, 0.0, 0.0]))[2]
+                >= 0.0
+            )
             low, high = (middle, high) if bears else (low, middle)
         return (low + high) / 2
 
@@ -240,7 +335,10 @@ def _solve(function, x: np.ndarray) -> tuple[np.ndarray, float]:
     for _ in range(STEPS):
         if np.abs(f).max() < BALANCED:
             break
-        slopes = np.stack([(function(x + h) - f) / DIFFERENCE for h in DIFFERENCE * np.eye(len(x))], -1)
+        slopes = np.stack(
+            [(function(x + h) - f) / DIFFERENCE for h in DIFFERENCE * np.eye(len(x))],
+            -1,
+        )
         step = -np.linalg.lstsq(slopes, f, rcond=None)[0]
         step *= min(1.0, FARTHEST / max(np.abs(step).max(), 1e-300))
         for _ in range(6):

@@ -22,7 +22,9 @@ GAMMA = 1.0 - 0.5**0.5
 TOLERANCE = 1e-3  # largest residual of a solved stage, over the rounding
 HALVINGS = 3  # of a step
 FARTHEST = 0.5  # of a leg's reach, that a step of Newton's method moves a body by
-LEAST_SHARE = 0.05  # share of a step of Newton's method, below which the method has failed
+LEAST_SHARE = (
+    0.05  # share of a step of Newton's method, below which the method has failed
+)
 LEAST_DECREASE = 0.1  # of the residual, over the decrease that Newton's method predicts
 
 
@@ -35,7 +37,9 @@ class Effort(NamedTuple):
     smallest: float
 
 
-EFFORT = Effort(np.array([[1.0, 30.0, 10.0, 5.0, 3.0, 2.0, 1.5, 1.2, 1.0]]).T, 14.0, 0.5**HALVINGS)
+EFFORT = Effort(
+    np.array([[1.0, 30.0, 10.0, 5.0, 3.0, 2.0, 1.5, 1.2, 1.0]]).T, 14.0, 0.5**HALVINGS
+)
 
 
 class Accepted(NamedTuple):
@@ -107,7 +111,11 @@ def start_of_step(pose, twist, work, loss, unsolved, defect, residual):
 @formula
 def pick(condition, a, b):
     """Return the triple a where the condition holds, b elsewhere."""
-    return where(condition, a[0], b[0]), where(condition, a[1], b[1]), where(condition, a[2], b[2])
+    return (
+        where(condition, a[0], b[0]),
+        where(condition, a[1], b[1]),
+        where(condition, a[2], b[2]),
+    )
 
 
 @formula
@@ -128,19 +136,33 @@ def newton_step(newton, residual, slopes, power, k, reach, tolerance, effort):
 
     residual: a triple, m/s. slopes: of the residual, three columns. tolerance: of the residual, m/s."""
     # Not a number where any of the three is not.
-    size = largest_speed(residual, reach) + 0.0 * (residual[0] + residual[1] + residual[2])
+    size = largest_speed(residual, reach) + 0.0 * (
+        residual[0] + residual[1] + residual[2]
+    )
     better = size <= (1.0 - LEAST_DECREASE * newton.share) * newton.residual
     x, z, pitch = solve3(slopes[0], slopes[1], slopes[2], residual)
     step = pick(better, (-x, -z, -pitch), newton.step)
     longest = 1.0 / maximum(1.0, largest_speed(step, reach) * k / (FARTHEST * reach))
     largest = where(better, longest, newton.largest)
-    share, best = where(better, largest, 0.5 * newton.share), pick(better, newton.trial, newton.best)
-    power = where(better, power[0], newton.power[0]), where(better, power[1], newton.power[1])
+    share, best = (
+        where(better, largest, 0.5 * newton.share),
+        pick(better, newton.trial, newton.best),
+    )
+    power = (
+        where(better, power[0], newton.power[0]),
+        where(better, power[1], newton.power[1]),
+    )
     tries, size = newton.tries + 1.0, where(better, size, newton.residual)
     solved = better & (size <= tolerance)
-    failed = (where(solved, np.inf, share) <= LEAST_SHARE * largest) | (where(solved, 0.0, tries) >= effort.iterations)
+    failed = (where(solved, np.inf, share) <= LEAST_SHARE * largest) | (
+        where(solved, 0.0, tries) >= effort.iterations
+    )
     trial = plus(best, times(share, step))
-    return Newton(newton.width, tries, best, trial, step, size, share, largest, power), solved, failed
+    return (
+        Newton(newton.width, tries, best, trial, step, size, share, largest, power),
+        solved,
+        failed,
+    )
 
 
 @formula
@@ -157,7 +179,11 @@ def end_of_part(old, stage, newton, ended, tolerance, k, h):
         old.loss + where(ended, loss, 0.0),
         old.unsolved + where(ended, where(unsolved > 0.0, 1.0, 0.0), 0.0),
         old.defect + where(ended, unsolved, 0.0),
-        where(ended, maximum(old.residual, maximum(newton.residual, stage.first[2])), old.residual),
+        where(
+            ended,
+            maximum(old.residual, maximum(newton.residual, stage.first[2])),
+            old.residual,
+        ),
     )
 
 
@@ -179,19 +205,32 @@ def next_problem(step, solved, failed, tolerance, k, h, effort):
     failed, and whether the time step is over; elsewhere the robot as it is. h: s, of the present part of the step."""
     old, stage, newton = step.accepted, step.stage, step.newton
     at_last, at_first = newton.width >= len(effort.widths) - 1.0, newton.width <= 0.0
-    ready = (solved & (at_first | at_last)) | (failed & at_last & (stage.part <= effort.smallest))
-    halved, next_width = where(ready, False, failed & at_last), where(ready | at_last, False, solved | failed)
+    ready = (solved & (at_first | at_last)) | (
+        failed & at_last & (stage.part <= effort.smallest)
+    )
+    halved, next_width = (
+        where(ready, False, failed & at_last),
+        where(ready | at_last, False, solved | failed),
+    )
     second, ended = ready & (stage.second <= 0.0), ready & (stage.second > 0.0)
     restarts = ended | halved
 
     accepted = end_of_part(old, stage, newton, ended, tolerance, k, h)
     part, elapsed, over = next_part(stage, ended, halved)
     rest = h - k
-    base = pick(restarts, accepted.pose, pick(second, plus(old.pose, times(rest, newton.best)), stage.base))
-    explicit = plus(old.twist, times(rest / k, plus(newton.best, times(-1.0, stage.start))))
+    base = pick(
+        restarts,
+        accepted.pose,
+        pick(second, plus(old.pose, times(rest, newton.best)), stage.base),
+    )
+    explicit = plus(
+        old.twist, times(rest / k, plus(newton.best, times(-1.0, stage.start)))
+    )
     start = pick(restarts, accepted.twist, pick(second, explicit, stage.start))
     guess = pick(restarts, accepted.twist, pick(second, newton.best, stage.guess))
-    first = pick(second, (newton.power[0], newton.power[1], newton.residual), stage.first)
+    first = pick(
+        second, (newton.power[0], newton.power[1], newton.residual), stage.first
+    )
     second_stage = where(restarts, 0.0, where(second, 1.0, stage.second))
 
     fresh = restarts | second | next_width
@@ -207,7 +246,11 @@ def next_problem(step, solved, failed, tolerance, k, h, effort):
         where(fresh, 1.0, newton.largest),
         newton.power,
     )
-    return Step(accepted, Stage(part, elapsed, second_stage, base, start, guess, first), next_newton), over
+    return Step(
+        accepted,
+        Stage(part, elapsed, second_stage, base, start, guess, first),
+        next_newton,
+    ), over
 
 
 @formula

@@ -19,7 +19,9 @@ SETTLED = 1e-3  # largest change, in all, of a cycle's progress still to come at
 MOST_STRIDES = 10  # on the way to the limit cycle
 FEW_STRIDES = 4  # on the way to the limit cycle from a state near it
 LAST_CYCLES = 4  # of a walk without a limit cycle, whose mean is its speed
-LIMPING = 0.5  # change over two strides over that of one stride, below which a robot limps
+LIMPING = (
+    0.5  # change over two strides over that of one stride, below which a robot limps
+)
 STUCK = 0.02  # progress in a cycle over a leg's reach, below which a robot is stuck, assumed
 NEAR = 0.05  # largest difference of a settled cycle's progress from that of the limit cycle, over the latter
 
@@ -112,49 +114,87 @@ class Strides:
     designs: the `Robot` of each of ``robots``. steps: about as many to a cycle. advance: computes a stride, as
     `compute_stride`."""
 
-    def __init__(self, robots: Robots, designs: list[Robot], gaits: list[Tripod], steps: int, advance=compute_stride):
+    def __init__(
+        self,
+        robots: Robots,
+        designs: list[Robot],
+        gaits: list[Tripod],
+        steps: int,
+        advance=compute_stride,
+    ):
         self.advance = advance
-        self.robots, self.period = robots, designs[0].period / len(designs[0].hip_phases)
+        self.robots, self.period = (
+            robots,
+            designs[0].period / len(designs[0].hip_phases),
+        )
         self.cycle = round(1 / self.period)  # strides
         self.frequency, self.reach = robots.frequency[:, 0], robots.reach
-        self.leg_speed = 2 * np.pi * self.frequency * self.reach  # of the legs' ends, m/s
+        self.leg_speed = (
+            2 * np.pi * self.frequency * self.reach
+        )  # of the legs' ends, m/s
         speed = self.leg_speed
-        self.scale = np.stack([self.reach, np.ones(len(robots)), speed, speed, speed / self.reach])
+        self.scale = np.stack(
+            [self.reach, np.ones(len(robots)), speed, speed, speed / self.reach]
+        )
         # Of height, pitch and the three rates those that can change.
         self.free = np.flatnonzero(np.isfinite(robots.masses[0])[[1, 2, 0, 1, 2]])
         height = np.array([r.height for r in designs])
         self.top = height / 2
         self.out_of_reach = self.reach + np.hypot(*np.abs(robots.hips)).max(1) + height
         kinks = gaits[0].kinks if self.cycle == 2 else _kinks_of_cycle(gaits[0].kinks)
-        spans = [np.linspace(a, b, count + 1) for a, b, count in intervals(kinks, steps)]
+        spans = [
+            np.linspace(a, b, count + 1) for a, b, count in intervals(kinks, steps)
+        ]
         self.phases = np.concatenate([[0.0], *(x[1:] for x in spans)])
-        self.rate_phases = np.concatenate([np.full(len(x) - 1, (x[0] + x[-1]) / 2) for x in spans])
+        self.rate_phases = np.concatenate(
+            [np.full(len(x) - 1, (x[0] + x[-1]) / 2) for x in spans]
+        )
 
-    def run(self, state: State, stride: int, index: np.ndarray) -> tuple[np.ndarray, State]:
+    def run(
+        self, state: State, stride: int, index: np.ndarray
+    ) -> tuple[np.ndarray, State]:
         """Return phases (S,), cycles, and states (S, B) after each step of a stride of the robots ``index`` from a state; a
         robot at an end stays there."""
-        return stride * self.period + self.phases[1:], self.advance(self.states, stride, index, state)
+        return stride * self.period + self.phases[1:], self.advance(
+            self.states, stride, index, state
+        )
 
     def states(self, stride: int, index: np.ndarray, state: State) -> State:
         """Return the states (S, B) after each step of a stride, as `run`."""
         begin = stride * self.period
         ends = self.top[index], self.out_of_reach[index]
-        return march(self.robots, index, state, begin + self.phases, begin + self.rate_phases, ends)[0]
+        return march(
+            self.robots,
+            index,
+            state,
+            begin + self.phases,
+            begin + self.rate_phases,
+            ends,
+        )[0]
 
     def scaled(self, state: State, index) -> np.ndarray:
         """Return height, pitch and rates (n, B), those that can change, over their scales for the robots ``index``."""
-        return np.concatenate([state.pose[:, 1:], state.twist], 1).T[self.free] / self.scale[self.free][:, index]
+        return (
+            np.concatenate([state.pose[:, 1:], state.twist], 1).T[self.free]
+            / self.scale[self.free][:, index]
+        )
 
     def with_scaled(self, state: State, numbers: np.ndarray, index) -> State:
         """Return the state with the scaled numbers (n, B) of `scaled`."""
         new = np.concatenate([state.pose[:, 1:], state.twist], 1)
         new[:, self.free] = (numbers * self.scale[self.free][:, index]).T
-        return state._replace(pose=np.concatenate([state.pose[:, :1], new[:, :2]], 1), twist=new[:, 2:])
+        return state._replace(
+            pose=np.concatenate([state.pose[:, :1], new[:, :2]], 1), twist=new[:, 2:]
+        )
 
     def end_status(self, state: State, index) -> np.ndarray:
         """Return "sunk", "airborne" or "flipped" (B,) for robots that are at an end, "" for the others."""
         z, pitch = state.pose[:, 1], np.abs(state.pose[:, 2])
-        status = np.where(z + self.top[index] < 0.0, "sunk", np.where(z > self.out_of_reach[index], "airborne", ""))
+        status = np.where(
+            z + self.top[index] < 0.0,
+            "sunk",
+            np.where(z > self.out_of_reach[index], "airborne", ""),
+        )
         return np.where(pitch > np.pi / 2, "flipped", status)
 
 
@@ -183,16 +223,26 @@ class FromRest(NamedTuple):
     period: np.ndarray
 
 
-def from_rest(strides: Strides, durations: np.ndarray, progress: Callable = lambda fraction: None) -> FromRest:
+def from_rest(
+    strides: Strides, durations: np.ndarray, progress: Callable = lambda fraction: None
+) -> FromRest:
     """Return the walks of robots from rest until a cycle repeats itself, the robot is at an end, or its duration (B,), s, is
     over. progress: receives the finished fraction."""
     count, state = len(strides.robots), strides.robots.start()
     blocks = [[_rows(np.zeros(1), state.take([[k]]), 0)] for k in range(count)]
     most = np.ceil(durations * strides.frequency / strides.period - 1e-9).astype(int)
-    computed, status, active = np.zeros(count, int), np.full(count, "", "U10"), np.arange(count)
+    computed, status, active = (
+        np.zeros(count, int),
+        np.full(count, "", "U10"),
+        np.arange(count),
+    )
     starts, period = [strides.scaled(state, active)] * 5, np.ones(count, int)
     # Rates count over the speed of a fall for a cycle where the legs are faster.
-    weight = np.where(strides.free[:, None] >= 2, np.maximum(1.0, strides.leg_speed * strides.frequency / GRAVITY), 1.0)
+    weight = np.where(
+        strides.free[:, None] >= 2,
+        np.maximum(1.0, strides.leg_speed * strides.frequency / GRAVITY),
+        1.0,
+    )
     for stride in range(most.max()):
         phases, states = strides.run(state.take(active), stride, active)
         state = state.put(active, states.take(-1))
@@ -202,9 +252,15 @@ def from_rest(strides: Strides, durations: np.ndarray, progress: Callable = lamb
         computed[active] = stride + 1
         period[active] = map_period(*(x[:, active] for x in starts[-3:]))
         status[active] = strides.end_status(state.take(active), active)
-        now, last, before = ((x * weight)[:, active] for x in starts[:: -strides.cycle][:3])
-        change = remaining_change(now - last, last - before, (most - computed)[active] / strides.cycle)
-        repeats = (status[active] == "") & (change < PERIODIC) & (stride >= strides.cycle)
+        now, last, before = (
+            (x * weight)[:, active] for x in starts[:: -strides.cycle][:3]
+        )
+        change = remaining_change(
+            now - last, last - before, (most - computed)[active] / strides.cycle
+        )
+        repeats = (
+            (status[active] == "") & (change < PERIODIC) & (stride >= strides.cycle)
+        )
         status[active] = np.where(repeats, "periodic", status[active])
         active = active[(status[active] == "") & (computed[active] < most[active])]
         progress((stride + 1) / most[active].max(initial=stride + 1))
@@ -220,7 +276,11 @@ def remaining_change(change, before, cycles) -> np.ndarray:
     least the last change."""
     now, then = np.abs(change).max(0), np.abs(before).max(0)
     shrinks = now < then
-    series = np.where(shrinks, now / np.where(shrinks, 1 - now / np.where(shrinks, then, 1.0), 1.0), np.inf)
+    series = np.where(
+        shrinks,
+        now / np.where(shrinks, 1 - now / np.where(shrinks, then, 1.0), 1.0),
+        np.inf,
+    )
     return np.minimum(series, now * np.maximum(1.0, cycles))
 
 
@@ -233,4 +293,6 @@ def map_period(before, last, now) -> np.ndarray:
 
 def _rows(t, states: State, k: int) -> np.ndarray:
     """Return rows (T, 9) of t, pose, twist, work and loss of robot k."""
-    return np.column_stack([t, states.pose[:, k], states.twist[:, k], states.work[:, k], states.loss[:, k]])
+    return np.column_stack(
+        [t, states.pose[:, k], states.twist[:, k], states.work[:, k], states.loss[:, k]]
+    )

@@ -58,17 +58,28 @@ def rolling(
     """
     slip, points = real_array("slip", slip), wheel.outline(elements)
     radius = getattr(wheel, "radius", None) if radius is None else radius
-    require(radius is not None, f"a {type(wheel).__name__} has no radius", instead="give one")
+    require(
+        radius is not None,
+        f"a {type(wheel).__name__} has no radius",
+        instead="give one",
+    )
     require(bool((np.abs(slip) <= 100).all()), "slip must be within +-100", value=slip)
     in_range("load", load, 1e-6, 1e6)
     in_range("rate", rate, 1e-9, 1e4)
     reach = float(np.hypot(*points.points.T).max())
-    angle = np.linspace(0.0, 2 * np.pi, ANGLES if getattr(wheel, "lugs", 1) else 1, endpoint=False)
-    twist = np.stack([(1.0 - slip) * rate * radius, np.zeros_like(slip), np.full_like(slip, rate)], -1)[..., None, :]
+    angle = np.linspace(
+        0.0, 2 * np.pi, ANGLES if getattr(wheel, "lugs", 1) else 1, endpoint=False
+    )
+    twist = np.stack(
+        [(1.0 - slip) * rate * radius, np.zeros_like(slip), np.full_like(slip, rate)],
+        -1,
+    )[..., None, :]
 
     def mean_loads(height):
         pose = np.stack(np.broadcast_arrays(0.0, height[..., None], angle), -1)
-        force, moment = loads(stress, points, pose, np.broadcast_to(twist, pose.shape), effects)
+        force, moment = loads(
+            stress, points, pose, np.broadcast_to(twist, pose.shape), effects
+        )
         return force.mean(-2), moment.mean(-1)
 
     low, high = np.full(slip.shape, -2 * reach), np.full(slip.shape, reach)

@@ -8,7 +8,16 @@ from rft.registry import load_all
 
 load_all(__name__, __path__)
 
-__all__ = ["FORMATS", "LAYOUTS", "ORDERS", "SIGNS", "Stored", "in_frame", "load", "scaled"]
+__all__ = [
+    "FORMATS",
+    "LAYOUTS",
+    "ORDERS",
+    "SIGNS",
+    "Stored",
+    "in_frame",
+    "load",
+    "scaled",
+]
 
 
 def __dir__() -> list[str]:

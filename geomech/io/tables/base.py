@@ -21,7 +21,9 @@ from rft.registry import Registry, functions_with
 LONGEST_NAME = 60  # characters of what a file calls a frame, or a shape variable
 MINIMUM_PERTURBATION = "minimum-perturbation"
 UNKNOWN_FRAME = "that of the table"  # of a file that does not say it
-LARGEST_ANGLE = 10 * np.pi  # rad of a shape variable, a joint angle or a bend; beyond it is taken for degrees
+LARGEST_ANGLE = (
+    10 * np.pi
+)  # rad of a shape variable, a joint angle or a bend; beyond it is taken for degrees
 LARGEST_ENTRY = 1e9  # of A, body lengths or m or rad per rad
 SIGNS = {"+": "xi = + A alphadot", "-": "xi = - A alphadot"}
 BODY = ("lengths", "frame", "modes", "waves")  # what files say of a chain of links
@@ -31,7 +33,9 @@ ORDERS = ("ndgrid", "meshgrid")
 # where a result as of `geomech.studies.fields.of_study` can be written; settings, names of those that it takes ("sign",
 # "order", "layout"); joints, the only number that it takes; whole, False where it takes no more than A, what is known of its
 # error, and a quadratic metric.
-FORMATS = Registry("geomech.formats", "suffix", "a file format", functions_with("suffix"))
+FORMATS = Registry(
+    "geomech.formats", "suffix", "a file format", functions_with("suffix")
+)
 ROWS = ("x", "y", "theta")
 ROUNDING = 1e-9  # of the largest velocity: a displacement below it has no sign
 
@@ -72,7 +76,9 @@ class Stored:
     computed: Any = None
 
     def __post_init__(self):
-        object.__setattr__(self, "frame", printable(" ".join(self.frame.split()))[:LONGEST_NAME])
+        object.__setattr__(
+            self, "frame", printable(" ".join(self.frame.split()))[:LONGEST_NAME]
+        )
 
     @property
     def table(self) -> Connection | Harmonics:
@@ -100,9 +106,9 @@ class Stored:
         c = self.connection
         if not all(np.allclose(a, -a[::-1], rtol=0, atol=1e-12) for a in c.axes):
             return False
-        mirrored = np.flip(c.A, tuple(range(2, c.A.ndim))) * np.array([-1.0, 1.0, 1.0]).reshape(
-            3, 1, *[1] * len(c.axes)
-        )
+        mirrored = np.flip(c.A, tuple(range(2, c.A.ndim))) * np.array(
+            [-1.0, 1.0, 1.0]
+        ).reshape(3, 1, *[1] * len(c.axes))
         return bool(np.abs(mirrored - c.A).max() <= 1e-9 * np.abs(c.A).max())
 
 
@@ -115,19 +121,28 @@ def scaled(stored: Stored, factor: float) -> Stored:
     c, h = stored.connection, stored.harmonics
     size = {"unit": stored.unit, "length": stored.length}
     if isinstance(c, Tube):
-        series = {name: times(getattr(c.taylor, name)) for name in ("A", "slope", "beyond", "standard_error")}
-        size["taylor"] = replace(c.taylor, errors=c.taylor.errors * by[:, None, None, None], **series)
+        series = {
+            name: times(getattr(c.taylor, name))
+            for name in ("A", "slope", "beyond", "standard_error")
+        }
+        size["taylor"] = replace(
+            c.taylor, errors=c.taylor.errors * by[:, None, None, None], **series
+        )
     c = type(c)(c.axes, times(c.A), times(c.residual), times(c.speed), c.degree, **size)
     h = h and Harmonics(h.axes, times(h.coefficients), times(h.residual), h.degree)
     even, error = (x if x is None else times(x) for x in (stored.even, stored.A_error))
     return replace(stored, connection=c, harmonics=h, even=even, A_error=error)
 
 
-def checked_axis(name: str, values: np.ndarray, largest: float = LARGEST_ANGLE) -> np.ndarray:
+def checked_axis(
+    name: str, values: np.ndarray, largest: float = LARGEST_ANGLE
+) -> np.ndarray:
     """Return values (N,) as ascending angles; Refusal if they are none."""
     axis = numbers(name, values)
     if axis.ndim != 1 or len(axis) < 4 or not (np.diff(axis) > 0).all():
-        raise Refusal("has no grid", instead=f"{name} must be at least 4 ascending angles in rad")
+        raise Refusal(
+            "has no grid", instead=f"{name} must be at least 4 ascending angles in rad"
+        )
     if np.abs(axis).max() > largest:
         raise Refusal(
             f"has {name} up to {np.abs(axis).max():.4g} where angles are in rad",
@@ -138,8 +153,14 @@ def checked_axis(name: str, values: np.ndarray, largest: float = LARGEST_ANGLE) 
 
 def checked_names(names, defaults: list[str]) -> tuple[str, ...]:
     """Return names of shape variables from a file, or ``defaults`` where they make no sense."""
-    words = isinstance(names, list) and all(isinstance(x, str) for x in names) and len({*names}) == len(defaults)
-    good = words and all(x.isprintable() and 0 < len(x) <= LONGEST_NAME and "$" not in x for x in names)
+    words = (
+        isinstance(names, list)
+        and all(isinstance(x, str) for x in names)
+        and len({*names}) == len(defaults)
+    )
+    good = words and all(
+        x.isprintable() and 0 < len(x) <= LONGEST_NAME and "$" not in x for x in names
+    )
     return tuple(names if good else defaults)
 
 
@@ -150,25 +171,35 @@ def numbers(name: str, values) -> np.ndarray:
         raise Refusal(f"has {name} that is no array of real numbers")
     array = array.astype(float)
     if not np.isfinite(array).all():
-        raise Refusal(f"has {name} that is not finite (nan or inf) at {_first(~np.isfinite(array))}", instead="mend it")
+        raise Refusal(
+            f"has {name} that is not finite (nan or inf) at {_first(~np.isfinite(array))}",
+            instead="mend it",
+        )
     if np.abs(array).max(initial=0.0) > LARGEST_ENTRY:
         raise Refusal(
-            f"has {name} above {LARGEST_ENTRY:g} at {_first(np.abs(array) > LARGEST_ENTRY)}", instead="mend it"
+            f"has {name} above {LARGEST_ENTRY:g} at {_first(np.abs(array) > LARGEST_ENTRY)}",
+            instead="mend it",
         )
     return array
 
 
-def masks(name: str, values: np.ndarray, masked: np.ndarray, attributes: Mapping) -> None:
+def masks(
+    name: str, values: np.ndarray, masked: np.ndarray, attributes: Mapping
+) -> None:
     """Raise Refusal where values (..., N_1, ...) are nan elsewhere than at ``masked`` shapes (N_1, ...), or not at all
     of them. The file must have singular shapes among its ``attributes``."""
     if masked.any() and "singular_shapes" not in attributes:
         numbers(name, values)
     if not np.isnan(values[..., masked]).all():
-        raise Refusal(f"has {name} at singular shapes, where A is nan", instead="write it anew")
+        raise Refusal(
+            f"has {name} at singular shapes, where A is nan", instead="write it anew"
+        )
     numbers(name, np.where(masked, 0.0, values))
 
 
-def checked_error(name: str, error: np.ndarray, A: np.ndarray, attributes: Mapping) -> np.ndarray:
+def checked_error(
+    name: str, error: np.ndarray, A: np.ndarray, attributes: Mapping
+) -> np.ndarray:
     """Return half widths of intervals of A, both (3, d, N_1, ...) and nan at the same shapes; Refusal otherwise."""
     if error.shape != A.shape:
         raise Refusal(f"has {name} of shape {error.shape} where A has {A.shape}")
@@ -180,8 +211,16 @@ def checked_error(name: str, error: np.ndarray, A: np.ndarray, attributes: Mappi
 
 def body_text(body: Any) -> str:
     """Return a chain of links, and the frame in which A is, as the text that files have; "" for another body."""
-    body = {key: getattr(body, key) for key in BODY} if getattr(body, "kind", "") == "chain" else body
-    return json.dumps({k: x for k, x in body.items() if x is not None}) if isinstance(body, Mapping) else ""
+    body = (
+        {key: getattr(body, key) for key in BODY}
+        if getattr(body, "kind", "") == "chain"
+        else body
+    )
+    return (
+        json.dumps({k: x for k, x in body.items() if x is not None})
+        if isinstance(body, Mapping)
+        else ""
+    )
 
 
 def checked_body(text: Any) -> dict | None:
@@ -190,13 +229,19 @@ def checked_body(text: Any) -> dict | None:
         body = json.loads(text)
     except (ValueError, TypeError, RecursionError):
         return None
-    return body if isinstance(body, dict) and {"lengths", "frame"} <= {*body} <= {*BODY} else None
+    return (
+        body
+        if isinstance(body, dict) and {"lengths", "frame"} <= {*body} <= {*BODY}
+        else None
+    )
 
 
 def checked_level(attributes: Mapping) -> float | None:
     """Return the share of cases that intervals cover, from a file's attributes; None where it makes no sense."""
     level = attributes.get("level")
-    good = np.ndim(level) == 0 and np.asarray(level).dtype.kind in "iuf" and 0 < level < 1
+    good = (
+        np.ndim(level) == 0 and np.asarray(level).dtype.kind in "iuf" and 0 < level < 1
+    )
     return float(level) if good else None
 
 
@@ -219,14 +264,20 @@ def detected_sign(connection: Connection) -> str:
     ValueError where both signs, or neither, would have it so."""
     half = min(float(a[-1] - a[0]) / 2 for a in connection.axes)
     centre = np.array([a[0] + a[-1] for a in connection.axes]) / 2
-    t, radius = 2 * np.pi * np.arange(64) / 64, np.array([0.3, 0.5])[:, None, None] * half
+    t, radius = (
+        2 * np.pi * np.arange(64) / 64,
+        np.array([0.3, 0.5])[:, None, None] * half,
+    )
     alpha = centre + radius * np.stack([np.cos(t), np.sin(t)], -1)
     alphadot = radius * np.stack([-np.sin(t), np.cos(t)], -1)
     xi = connection.velocity(alpha, alphadot)
     least = ROUNDING * np.abs(xi).max(initial=0.0)
     for sign, value in (("+", 1.0), ("-", -1.0)):
-        if (displacement(value * xi)[:, 0] < -least).all() and (displacement(-value * xi)[:, 0] > least).all():
+        if (displacement(value * xi)[:, 0] < -least).all() and (
+            displacement(-value * xi)[:, 0] > least
+        ).all():
             return sign
     raise Refusal(
-        "does not tell the sign of A", instead="say sign = '+' for xi = + A alphadot, '-' for xi = - A alphadot"
+        "does not tell the sign of A",
+        instead="say sign = '+' for xi = + A alphadot, '-' for xi = - A alphadot",
     )

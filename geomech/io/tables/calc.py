@@ -15,7 +15,10 @@ from geomech.io.files import atomic_file
 from geomech.io.tables.sysplotter import DRAG, INERTIA, RESIDUAL
 
 SHOWN = 11  # points an axis, about, of the grid of metric ellipses
-BASES = {"mean": "com-mean", "link-1": "tail"}  # its names of our frames, of any number of links
+BASES = {
+    "mean": "com-mean",
+    "link-1": "tail",
+}  # its names of our frames, of any number of links
 TICKS = np.array([-1.0, 0.0, 1.0])
 
 
@@ -23,10 +26,18 @@ def write_struct(path: str | Path, result: Result) -> None:
     """Write s, of the variables of `geomech.studies.fields.of_struct`; it appears whole or not at all."""
     from scipy.io import savemat
 
-    axes = [v.values for v in result.variables if v.is_coordinate and v.name.startswith("alpha_")]
+    axes = [
+        v.values
+        for v in result.variables
+        if v.is_coordinate and v.name.startswith("alpha_")
+    ]
     pick = lambda name: result[name].values if name in result else None
     A, optimised, metric = pick("A"), pick("A_optimised"), pick("metric")
-    content = {"A_num": _cell(-A, 2), "Avec": _cell(A, 2), "Avec_optimized": _cell(optimised, 2)}
+    content = {
+        "A_num": _cell(-A, 2),
+        "Avec": _cell(A, 2),
+        "Avec_optimized": _cell(optimised, 2),
+    }
     beta = _cell(pick("frame_pose"), 1)
     drag = "power_degree" in result.attributes or metric is None
     s: dict[str, Any] = {
@@ -42,12 +53,17 @@ def write_struct(path: str | Path, result: Result) -> None:
     for ending in ("", "_optimized"):
         ccf, exterior = pick(f"ccf{ending}"), pick(f"exterior{ending}")
         parts = {"DA": ccf, "dA": exterior, "lb": exterior - ccf}
-        s |= {f"{name}{ending}": _cell(values[:, None], 2) for name, values in parts.items()}
+        s |= {
+            f"{name}{ending}": _cell(values[:, None], 2)
+            for name, values in parts.items()
+        }
     if metric is not None:
         shown = tuple(slice(None, None, step) for step in _steps(axes))
         scaled = metric * (result.attributes["body_length"] ** 3 if drag else 1.0)
         parts = {"metric_eval": scaled, "metric_display": scaled[(..., *shown)]}
-        s["metricfield"] = {k: {"content": {"metric": _cell(x, 2)}, "type": k} for k, x in parts.items()}
+        s["metricfield"] = {
+            k: {"content": {"metric": _cell(x, 2)}, "type": k} for k, x in parts.items()
+        }
     if np.isfinite(residual := result["fit_residual"].values).all():
         s[RESIDUAL] = _cell(residual, 1)
     with atomic_file(path) as part:
@@ -72,11 +88,19 @@ def _grids(axes: list[np.ndarray], metric: bool) -> dict:
     """Return s.grid and what says how fine it is: all fields are on one grid."""
     names = ["vector", "scalar", "eval", "finite_element", *["metric_eval"] * metric]
     grids = dict.fromkeys(names, axes) | (
-        {"metric_display": [a[::k] for a, k in zip(axes, _steps(axes))]} if metric else {}
+        {"metric_display": [a[::k] for a, k in zip(axes, _steps(axes))]}
+        if metric
+        else {}
     )
     return {
-        "grid": {name: _cell(np.array(np.meshgrid(*each, indexing="ij")), 1) for name, each in grids.items()},
-        "density": {name: np.array([float(len(axis)) for axis in each]) for name, each in grids.items()},
+        "grid": {
+            name: _cell(np.array(np.meshgrid(*each, indexing="ij")), 1)
+            for name, each in grids.items()
+        },
+        "density": {
+            name: np.array([float(len(axis)) for axis in each])
+            for name, each in grids.items()
+        },
         "grid_range": np.array([end for axis in axes for end in (axis[0], axis[-1])]),
         "tic_locs": {"x": TICKS, "y": TICKS},
     }
@@ -86,7 +110,10 @@ def _geometry(attributes: Mapping) -> dict:
     """Return s.geometry: what is known of body, length and frame."""
     body = json.loads(attributes.get("body") or "{}")
     frame, links = attributes["frame"], len(body.get("lengths", ()))
-    geometry = {"length": float(attributes["body_length"]), "baseframe": BASES.get(frame, frame)}
+    geometry = {
+        "length": float(attributes["body_length"]),
+        "baseframe": BASES.get(frame, frame),
+    }
     if links and frame == f"link-{(links + 1) / 2:g}":
         geometry["baseframe"] = "center"
     elif links and frame == f"link-{links}":
@@ -94,6 +121,12 @@ def _geometry(attributes: Mapping) -> dict:
     elif links and frame.startswith("link-") and frame not in BASES:
         geometry["baseframe"] = float(frame.removeprefix("link-"))
     if links and not isinstance(body.get("modes"), str):
-        modes = {} if body.get("modes") is None else {"modes": np.array(body["modes"]).T}
-        geometry |= {"type": "n-link chain", "linklengths": np.array(body["lengths"]), **modes}
+        modes = (
+            {} if body.get("modes") is None else {"modes": np.array(body["modes"]).T}
+        )
+        geometry |= {
+            "type": "n-link chain",
+            "linklengths": np.array(body["lengths"]),
+            **modes,
+        }
     return geometry

@@ -28,10 +28,16 @@ def in_frame(stored: Stored, frame: str, chain: Any = None) -> Stored:
     if frame in ("", stored.frame):
         return stored
     h, dh = _pose(stored, frame, chain)
-    carried = np.moveaxis(se2.adjoint(se2.inverse(h)), (-2, -1), (0, 1))  # (3, 3, N_1, ...)
-    bound = lambda x: None if x is None else np.einsum("ij...,j...->i...", np.abs(carried), x)
+    carried = np.moveaxis(
+        se2.adjoint(se2.inverse(h)), (-2, -1), (0, 1)
+    )  # (3, 3, N_1, ...)
+    bound = lambda x: (
+        None if x is None else np.einsum("ij...,j...->i...", np.abs(carried), x)
+    )
     c, residual = stored.connection, bound(stored.connection.residual)
-    A = np.moveaxis(change_connection(np.moveaxis(c.A, (0, 1), (-2, -1)), h, dh), (-2, -1), (0, 1))
+    A = np.moveaxis(
+        change_connection(np.moveaxis(c.A, (0, 1), (-2, -1)), h, dh), (-2, -1), (0, 1)
+    )
     error = stored.A_error
     return replace(
         stored, connection=Connection(c.axes, A, residual, rms(A, np.nan_to_num(residual)), c.degree, **c.size), frame=frame,
@@ -50,7 +56,10 @@ def _pose(stored: Stored, frame: str, chain: Any) -> tuple[np.ndarray, np.ndarra
     """Return the pose h (N_1, ..., 3) of a frame in the table's on its grid, and dh / d alpha (N_1, ..., 3, d)."""
     c = stored.connection
     if isinstance(c, Tube):
-        raise Refusal(f"a table near a measured gait keeps its frame, {stored.frame!r}", instead="drop frame")
+        raise Refusal(
+            f"a table near a measured gait keeps its frame, {stored.frame!r}",
+            instead="drop frame",
+        )
     if frame == MINIMUM_PERTURBATION:
         field = minimum_perturbation(c)
         return np.moveaxis(field.field.values, 0, -1), field.grid_slopes
@@ -58,7 +67,10 @@ def _pose(stored: Stored, frame: str, chain: Any) -> tuple[np.ndarray, np.ndarra
         cure = f"drop frame, or take {MINIMUM_PERTURBATION!r}"
         if chain is None:
             cure += ", or add [system.body], with the frame that A has"
-        raise Refusal(f"no frame {frame!r} of a table whose frame is {stored.frame!r}", instead=cure)
+        raise Refusal(
+            f"no frame {frame!r} of a table whose frame is {stored.frame!r}",
+            instead=cure,
+        )
     alpha = np.stack(np.meshgrid(*c.axes, indexing="ij"), -1)
     h, columns = None, []
     for unit in np.eye(len(c.axes)):
@@ -67,10 +79,16 @@ def _pose(stored: Stored, frame: str, chain: Any) -> tuple[np.ndarray, np.ndarra
     return h, np.stack(columns, -1)
 
 
-def _harmonics(table: Harmonics, carried: np.ndarray, added: np.ndarray, bound) -> Harmonics:
+def _harmonics(
+    table: Harmonics, carried: np.ndarray, added: np.ndarray, bound
+) -> Harmonics:
     """Return the harmonics of the other frame: their velocity carried over, and ``added`` (3, d, N_1, ...) times alphadot."""
     d = len(table.axes)
     unit = directions(d, max(2, 4 * table.coefficients.shape[1]))
-    linear = np.linalg.pinv(basis(unit, table.highest)) @ unit  # (terms, d): alphadot as a series of the same basis
-    coefficients = _times(carried, table.coefficients) + np.einsum("ik...,tk->it...", added, linear)
+    linear = (
+        np.linalg.pinv(basis(unit, table.highest)) @ unit
+    )  # (terms, d): alphadot as a series of the same basis
+    coefficients = _times(carried, table.coefficients) + np.einsum(
+        "ik...,tk->it...", added, linear
+    )
     return Harmonics(table.axes, coefficients, bound(table.residual), table.degree)

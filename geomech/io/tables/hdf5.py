@@ -25,16 +25,24 @@ def arrays(raw: bytes, names: Collection[str]) -> dict[str, Any]:
         import h5py
     except ImportError:
         raise Refusal(
-            "is a MATLAB 7.3 (HDF5) file", because="the package h5py, which reads it, is missing", instead=CURE
+            "is a MATLAB 7.3 (HDF5) file",
+            because="the package h5py, which reads it, is missing",
+            instead=CURE,
         ) from None
     try:
         with h5py.File(io.BytesIO(raw), "r") as file:
             reader = Reader(file)
-            return {name: reader.member(file, name, DEEPEST) for name in file if name in names}
+            return {
+                name: reader.member(file, name, DEEPEST)
+                for name in file
+                if name in names
+            }
     except Refusal:
         raise
     except Exception:  # what is damaged makes HDF5 raise whatever comes first
-        raise Refusal("is a damaged MATLAB 7.3 (HDF5) file, or cut short", instead=ANEW) from None
+        raise Refusal(
+            "is a damaged MATLAB 7.3 (HDF5) file, or cut short", instead=ANEW
+        ) from None
 
 
 class Reader:
@@ -62,7 +70,9 @@ class Reader:
         import h5py
 
         if not depth:
-            raise Refusal(f"is damaged at {place}", because="it lies in itself", instead=ANEW)
+            raise Refusal(
+                f"is damaged at {place}", because="it lies in itself", instead=ANEW
+            )
         if "MATLAB_object_decode" in node.attrs:
             return None
         if isinstance(node, h5py.Group):
@@ -91,9 +101,13 @@ class Reader:
         for index in np.ndindex(references.shape):
             label = ", ".join(str(k + 1) for k in index)
             try:
-                values[index] = self.value(self.file[references[index]], f"{place}{{{label}}}", depth - 1)
+                values[index] = self.value(
+                    self.file[references[index]], f"{place}{{{label}}}", depth - 1
+                )
             except Refusal:
                 raise
             except Exception:
-                raise Refusal(f"is damaged at {place}{{{label}}}", instead=ANEW) from None
+                raise Refusal(
+                    f"is damaged at {place}{{{label}}}", instead=ANEW
+                ) from None
         return values

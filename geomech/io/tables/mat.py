@@ -49,12 +49,23 @@ ANGLES = ("alpha1", "alpha2")
 ENTRIES = tuple(f"A{row}{joint}" for row in ("x", "y", "theta") for joint in (1, 2))
 METRIC = ("M11", "M12", "M22")
 STRUCT = "s"
-OPTIONAL = ("singular_shapes", "level", "body", "power_degree")  # attributes that ABOUT has where they are known
+OPTIONAL = (
+    "singular_shapes",
+    "level",
+    "body",
+    "power_degree",
+)  # attributes that ABOUT has where they are known
 ABOUT, RESIDUAL, ERROR = "geomech_about", "geomech_fit_residual", "geomech_A_error"
 SAVE = "save it in MATLAB by save(FILE, ..., '-v7')"
 
 
-def write(path: str | Path, result: Result, sign: str = "+", order: str = "ndgrid", layout: str = LAYOUTS[0]) -> None:
+def write(
+    path: str | Path,
+    result: Result,
+    sign: str = "+",
+    order: str = "ndgrid",
+    layout: str = LAYOUTS[0],
+) -> None:
     """Write A, each entry (N, M), for xi = ``sign`` A alphadot; rows run over alpha1 as of ndgrid, or over alpha2 as of
     meshgrid.
 
@@ -78,10 +89,14 @@ def write(path: str | Path, result: Result, sign: str = "+", order: str = "ndgri
     if "metric" in result:
         extra |= dict(zip(METRIC, result["metric"].values[np.triu_indices(2)]))
     factor = 1.0 if sign == "+" else -1.0
-    shapes = dict(zip(ANGLES, np.meshgrid(*(axis.values for axis in axes), indexing="ij")))
+    shapes = dict(
+        zip(ANGLES, np.meshgrid(*(axis.values for axis in axes), indexing="ij"))
+    )
     entries = dict(zip(ENTRIES, factor * A.values.reshape(6, *A.values.shape[2:])))
     ordered = (lambda x: x) if order == "ndgrid" else (lambda x: x.swapaxes(-1, -2))
-    arrays = {name: np.array(ordered(x)) for name, x in {**shapes, **entries, **extra}.items()}
+    arrays = {
+        name: np.array(ordered(x)) for name, x in {**shapes, **entries, **extra}.items()
+    }
     about = _written_about(result.attributes, [shape_name(axis) for axis in axes], sign)
     with atomic_file(path) as part:
         savemat(part, {**arrays, ABOUT: json.dumps(about)}, appendmat=False)
@@ -100,7 +115,13 @@ def _written_about(attributes: Mapping, names: list[str], sign: str) -> dict:
     }  # fmt: skip
 
 
-@FORMATS.register(suffix=".mat", write=write, settings=("sign", "order", "layout"), joints=2, whole=False)
+@FORMATS.register(
+    suffix=".mat",
+    write=write,
+    settings=("sign", "order", "layout"),
+    joints=2,
+    whole=False,
+)
 def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     """Return the table in the bytes of a file; Refusal, to follow the file's name, if there is none."""
     found = variables(raw, (STRUCT, *ANGLES, *ENTRIES, *METRIC, ABOUT, RESIDUAL, ERROR))
@@ -115,14 +136,28 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     residual, error = _residual(found, A, order, about), _error(found, A, order, about)
     degree = about.get("interpolation", 3)
     degree = degree if degree in (1, 2, 3, 4, 5) and min(map(len, axes)) > degree else 3
-    sized = about.get("unit") in ("BL", "m") and isinstance(about.get("length"), float) and 0 < about["length"] < 1e9
+    sized = (
+        about.get("unit") in ("BL", "m")
+        and isinstance(about.get("length"), float)
+        and 0 < about["length"] < 1e9
+    )
     length, unit = (about["length"], about["unit"]) if sized else (1.0, "BL")
     size = {"unit": unit, "length": length} if sized else {}
-    plain = Connection(axes, A, residual, rms(A, np.nan_to_num(residual)), degree, **size)
-    assumptions = () if found[ANGLES[0]].ndim == 1 or order == "ndgrid" else ("its arrays run as meshgrid's",)
+    plain = Connection(
+        axes, A, residual, rms(A, np.nan_to_num(residual)), degree, **size
+    )
+    assumptions = (
+        ()
+        if found[ANGLES[0]].ndim == 1 or order == "ndgrid"
+        else ("its arrays run as meshgrid's",)
+    )
     if not sign and about.get("sign") not in SIGNS:
-        assumptions += (f"its sign is made out as {SIGNS[detected_sign(plain)]}; say sign = '+' or '-' if you know it",)
-    sign = sign or (about["sign"] if about.get("sign") in SIGNS else detected_sign(plain))
+        assumptions += (
+            f"its sign is made out as {SIGNS[detected_sign(plain)]}; say sign = '+' or '-' if you know it",
+        )
+    sign = sign or (
+        about["sign"] if about.get("sign") in SIGNS else detected_sign(plain)
+    )
     frame = about["frame"] if isinstance(about.get("frame"), str) else UNKNOWN_FRAME
     connection = plain if sign == "+" else replace(plain, A=-A)
     shapes = checked_names(about.get("shapes"), ["alpha_1", "alpha_2"])
@@ -130,7 +165,20 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
         "A_error": error, "level": checked_level(about), "sized": sized, "body": checked_body(about.get("body")),
         **_metric(found, axes, order, about, degree),
     }  # fmt: skip
-    return Stored(connection, None, None, length, unit, frame, sign, order, assumptions, sha256, shapes, **optional)
+    return Stored(
+        connection,
+        None,
+        None,
+        length,
+        unit,
+        frame,
+        sign,
+        order,
+        assumptions,
+        sha256,
+        shapes,
+        **optional,
+    )
 
 
 def variables(raw: bytes, names: Collection[str]) -> dict[str, Any]:
@@ -139,11 +187,19 @@ def variables(raw: bytes, names: Collection[str]) -> dict[str, Any]:
     if raw[:4] == b"\x89HDF" or raw[:10] == b"MATLAB 7.3":
         return hdf5.arrays(raw, names)
     if raw[:3] == b"CDF":
-        raise Refusal("is no MATLAB file, but a NetCDF one", instead="end its name in .nc")
+        raise Refusal(
+            "is no MATLAB file, but a NetCDF one", instead="end its name in .nc"
+        )
     try:
-        return _read_version_4(raw, names) if raw[:4] and 0 in raw[:4] else matlab.arrays(raw)
+        return (
+            _read_version_4(raw, names)
+            if raw[:4] and 0 in raw[:4]
+            else matlab.arrays(raw)
+        )
     except ValueError:
-        raise Refusal("is damaged, cut short, or no MATLAB file", instead=SAVE) from None
+        raise Refusal(
+            "is damaged, cut short, or no MATLAB file", instead=SAVE
+        ) from None
 
 
 def _check(variables: dict) -> None:
@@ -152,7 +208,10 @@ def _check(variables: dict) -> None:
         if name not in variables:
             connection = f"a connection is {', '.join((*ANGLES, *ENTRIES))}, or sysplotter's struct s"
             raise Refusal(f"has no {name}", because=connection)
-        if not isinstance(variables[name], np.ndarray) or variables[name].dtype == object:
+        if (
+            not isinstance(variables[name], np.ndarray)
+            or variables[name].dtype == object
+        ):
             raise Refusal(f"has {name} that is no array of real numbers")
 
 
@@ -170,7 +229,9 @@ def _read_version_4(raw: bytes, names: Collection[str]) -> dict[str, np.ndarray]
 
 def _axes(variables: dict, order: str) -> tuple[tuple[np.ndarray, np.ndarray], str]:
     """Return the angles of both axes, and the order in which arrays run over them."""
-    angles = functools.partial(checked_axis, largest=LARGEST_ANGLE if ABOUT in variables else 2 * np.pi)
+    angles = functools.partial(
+        checked_axis, largest=LARGEST_ANGLE if ABOUT in variables else 2 * np.pi
+    )
     first, second = (numbers(name, variables[name]) for name in ANGLES)
     if first.ndim == second.ndim == 2 and min(*first.shape, *second.shape) == 1:
         if not order:
@@ -178,16 +239,22 @@ def _axes(variables: dict, order: str) -> tuple[tuple[np.ndarray, np.ndarray], s
                 "has alpha1 and alpha2 as rows, which leave the order open",
                 instead="say order = 'ndgrid' or 'meshgrid'",
             )
-        return (angles("alpha1", first.ravel()), angles("alpha2", second.ravel())), order
+        return (
+            angles("alpha1", first.ravel()),
+            angles("alpha2", second.ravel()),
+        ), order
     if first.ndim != 2 or first.shape != second.shape:
-        raise Refusal(f"has alpha1 {first.shape} and alpha2 {second.shape}, which span no grid")
+        raise Refusal(
+            f"has alpha1 {first.shape} and alpha2 {second.shape}, which span no grid"
+        )
     for name, (a, b) in zip(ORDERS, ((first, second), (first.T, second.T))):
         if max(np.ptp(a, axis=1).max(), np.ptp(b, axis=0).max()) <= 1e-9:
             if order not in ("", name):
                 raise Refusal(f"has arrays that run as {name}'s", instead="drop order")
             return (angles("alpha1", a[:, 0]), angles("alpha2", b[0])), name
     raise Refusal(
-        "has alpha1 and alpha2 that span no grid", because="one must change along rows alone, the other along columns"
+        "has alpha1 and alpha2 that span no grid",
+        because="one must change along rows alone, the other along columns",
     )
 
 
@@ -202,11 +269,20 @@ def _about(variables: dict) -> dict:
 
 def _entries(variables: dict, axes, order: str, about: dict) -> np.ndarray:
     """Return A (3, 2, N, M); nan in all entries at singular shapes, if the file declares any."""
-    arrays, expected = {}, tuple(len(a) for a in (axes if order == "ndgrid" else axes[::-1]))
+    arrays, expected = (
+        {},
+        tuple(len(a) for a in (axes if order == "ndgrid" else axes[::-1])),
+    )
     for name in ENTRIES:
-        values = variables[name] if variables[name].dtype.kind == "f" else numbers(name, variables[name])
+        values = (
+            variables[name]
+            if variables[name].dtype.kind == "f"
+            else numbers(name, variables[name])
+        )
         if values.shape != expected:
-            raise Refusal(f"has {name} of shape {values.shape} where alpha1 and alpha2 make it {expected}")
+            raise Refusal(
+                f"has {name} of shape {values.shape} where alpha1 and alpha2 make it {expected}"
+            )
         arrays[name] = _as_ndgrid(values, order).astype(float)
     masked = np.isnan([*arrays.values()]).any(0)
     for name, values in arrays.items():
@@ -222,17 +298,26 @@ def _as_ndgrid(values: np.ndarray, order: str) -> np.ndarray:
 def _residual(variables: dict, A: np.ndarray, order: str, about: dict) -> np.ndarray:
     """Return the rms residual of the fit (3, N, M), nan where the file has none."""
     values = variables.get(RESIDUAL)
-    if not isinstance(values, np.ndarray) or _as_ndgrid(values, order).shape != (3, *A.shape[2:]):
+    if not isinstance(values, np.ndarray) or _as_ndgrid(values, order).shape != (
+        3,
+        *A.shape[2:],
+    ):
         return np.full((3, *A.shape[2:]), np.nan)
     values = _as_ndgrid(values, order)
     masks(RESIDUAL, values, np.isnan(A).any((0, 1)), about)
     return values.astype(float)
 
 
-def _error(variables: dict, A: np.ndarray, order: str, about: dict) -> np.ndarray | None:
+def _error(
+    variables: dict, A: np.ndarray, order: str, about: dict
+) -> np.ndarray | None:
     """Return half widths of intervals of A (3, 2, N, M), None where the file has none."""
     values = variables.get(ERROR)
-    return checked_error(ERROR, _as_ndgrid(values, order), A, about) if isinstance(values, np.ndarray) else None
+    return (
+        checked_error(ERROR, _as_ndgrid(values, order), A, about)
+        if isinstance(values, np.ndarray)
+        else None
+    )
 
 
 def _metric(variables: dict, axes, order: str, about: dict, degree: int) -> dict:
@@ -245,14 +330,20 @@ def _metric(variables: dict, axes, order: str, about: dict, degree: int) -> dict
     shape = tuple(map(len, axes))
     for name, values in given.items():
         if values.shape != shape:
-            raise Refusal(f"has {name} of shape {values.shape} where alpha1 and alpha2 make it {shape}")
+            raise Refusal(
+                f"has {name} of shape {values.shape} where alpha1 and alpha2 make it {shape}"
+            )
     a, b, c = given.values()
     indefinite = (a <= 0) | (c <= 0) | (a * c <= b * b)
     if indefinite.any():
         place = ", ".join(map(str, np.argwhere(indefinite)[0]))
         raise Refusal(
-            f"has M11, M12 and M22 that are no metric at index ({place})", because="it must be positive definite"
+            f"has M11, M12 and M22 that are no metric at index ({place})",
+            because="it must be positive definite",
         )
     power = about.get("power_degree")
     power = power if isinstance(power, float) and 0 < power < 100 else None
-    return {"metric": Metric(axes, np.array([[a, b], [b, c]]), degree), "power_degree": power}
+    return {
+        "metric": Metric(axes, np.array([[a, b], [b, c]]), degree),
+        "power_degree": power,
+    }

@@ -18,9 +18,25 @@ from rft.refusal import Refusal
 LARGEST = 500_000_000  # bytes of a file, inflated
 HEADER = 128  # bytes before the first element
 MATRIX, COMPRESSED = 14, 15  # types of elements
-NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}  # by type
+NUMBERS = {
+    1: "i1",
+    2: "u1",
+    3: "i2",
+    4: "u2",
+    5: "i4",
+    6: "u4",
+    7: "f4",
+    9: "f8",
+    12: "i8",
+    13: "u8",
+}  # by type
 TEXTS = {2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
-CELL, STRUCT, CHAR, REAL = 1, 2, 4, range(6, 16)  # classes of arrays: of arrays, of fields, of characters, of numbers
+CELL, STRUCT, CHAR, REAL = (
+    1,
+    2,
+    4,
+    range(6, 16),
+)  # classes of arrays: of arrays, of fields, of characters, of numbers
 OPAQUE = 17  # class of an instance of a class, which has no dimensions
 COMPLEX = 0x0800  # among an array's flags
 MOST_DIMENSIONS = 32
@@ -86,21 +102,29 @@ def _matrix(data: bytes, order: str, depth: int) -> tuple[str, Any]:
     if flags & COMPLEX or not 2 <= len(shape) <= MOST_DIMENSIONS or min(shape) < 0:
         return name, None
     if kind in (CELL, STRUCT):
-        return name, (_cell if kind == CELL else _struct)(parts, shape, order, depth - 1)
+        return name, (_cell if kind == CELL else _struct)(
+            parts, shape, order, depth - 1
+        )
     return name, _array(kind, shape, *parts[0], order) if len(parts) == 1 else None
 
 
-def _array(kind: int, shape: tuple[int, ...], stored_as: int, raw: bytes, order: str) -> np.ndarray | str | None:
+def _array(
+    kind: int, shape: tuple[int, ...], stored_as: int, raw: bytes, order: str
+) -> np.ndarray | str | None:
     """Return an array of numbers of a shape, or a text, from the bytes of its element; None for another class."""
     if kind == CHAR and stored_as in TEXTS:
         wide = TEXTS[stored_as].startswith("utf-") and TEXTS[stored_as] != "utf-8"
         end = "-le" if order == "<" else "-be"
-        return raw.decode(f"{TEXTS[stored_as]}{end}" if wide else TEXTS[stored_as], "replace")
+        return raw.decode(
+            f"{TEXTS[stored_as]}{end}" if wide else TEXTS[stored_as], "replace"
+        )
     if kind not in REAL or stored_as not in NUMBERS:
         return None
     if len(raw) != _count(shape) * np.dtype(NUMBERS[stored_as]).itemsize:
         raise Refusal("damaged")
-    return np.frombuffer(raw, np.dtype(NUMBERS[stored_as]).newbyteorder(order)).reshape(shape, order="F")
+    return np.frombuffer(raw, np.dtype(NUMBERS[stored_as]).newbyteorder(order)).reshape(
+        shape, order="F"
+    )
 
 
 def _count(shape: tuple[int, ...]) -> int:
@@ -119,17 +143,26 @@ def _cell(parts: list, shape: tuple[int, ...], order: str, depth: int) -> np.nda
     return values.reshape(shape, order="F")
 
 
-def _struct(parts: list, shape: tuple[int, ...], order: str, depth: int) -> dict[str, Any] | None:
+def _struct(
+    parts: list, shape: tuple[int, ...], order: str, depth: int
+) -> dict[str, Any] | None:
     """Return the fields of a struct by name; None of an array of structs."""
     if len(parts) < 2 or len(parts[0][1]) != 4:
         raise Refusal("damaged")
     (width,) = struct.unpack_from(f"{order}i", parts[0][1])
     names, values = parts[1][1], parts[2:]
-    if width <= 0 or len(names) % width or len(names) // width * _count(shape) != len(values):
+    if (
+        width <= 0
+        or len(names) % width
+        or len(names) // width * _count(shape) != len(values)
+    ):
         raise Refusal("damaged")
     if _count(shape) != 1:
         return None
-    fields = [names[k : k + width].partition(b"\0")[0].decode("latin-1") for k in range(0, len(names), width)]
+    fields = [
+        names[k : k + width].partition(b"\0")[0].decode("latin-1")
+        for k in range(0, len(names), width)
+    ]
     return {name: _value(part, order, depth) for name, part in zip(fields, values)}
 
 

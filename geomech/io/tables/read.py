@@ -22,16 +22,23 @@ def load(path: str | Path, sign: str = "", order: str = "") -> Stored:
         raise Refusal("a table is a .nc or .mat file", value=path)
     path = Path(path)
     if path.suffix.lower() not in FORMATS:
-        raise Refusal(f"cannot read the table {path}", instead=f"end the name in {' or '.join(FORMATS)}")
+        raise Refusal(
+            f"cannot read the table {path}",
+            instead=f"end the name in {' or '.join(FORMATS)}",
+        )
     for key, value, choices in (("sign", sign, SIGNS), ("order", order, ORDERS)):
         if value != "":
             choose(key, value, choices)
     try:
         raw = read(path, LARGEST)
     except (OSError, ValueError) as error:
-        raise Refusal(f"cannot read the table {path}", because=reason_of(error)) from None
+        raise Refusal(
+            f"cannot read the table {path}", because=reason_of(error)
+        ) from None
     try:
-        return FORMATS[path.suffix.lower()](raw, sign, order, hashlib.sha256(raw).hexdigest())
+        return FORMATS[path.suffix.lower()](
+            raw, sign, order, hashlib.sha256(raw).hexdigest()
+        )
     except Refusal as refusal:
         refusal.what = f"the table {path} {refusal.what}"
         raise

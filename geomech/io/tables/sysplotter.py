@@ -27,15 +27,28 @@ from geomech.geometry.curvature import ccf
 from geomech.geometry.field import Field
 from geomech.geometry.metric import Metric
 from geomech.geometry.minimum_perturbation import minimum_perturbation
-from geomech.io.tables.base import MINIMUM_PERTURBATION, UNKNOWN_FRAME, Stored, checked_axis, numbers, rms
+from geomech.io.tables.base import (
+    MINIMUM_PERTURBATION,
+    UNKNOWN_FRAME,
+    Stored,
+    checked_axis,
+    numbers,
+    rms,
+)
 from rft.refusal import Refusal
 
 CALC = "save it by sys_calcsystem, in a file whose name ends in _calc.mat"
 CONTENT = "vecfield.eval.content"
 DRAG, INERTIA = "drag", "inertia"  # s.system_type
 RESIDUAL = "geomech_fit_residual"  # a field that sysplotter has not: rms of xi - A alphadot, as of `Connection`
-OURS = (MINIMUM_PERTURBATION, UNKNOWN_FRAME)  # names of frames in files of ours that sysplotter has not
-FRAMES = {"com-mean": "mean", "tail": "link-1"}  # our names of its base frames, of any number of links
+OURS = (
+    MINIMUM_PERTURBATION,
+    UNKNOWN_FRAME,
+)  # names of frames in files of ours that sysplotter has not
+FRAMES = {
+    "com-mean": "mean",
+    "tail": "link-1",
+}  # our names of its base frames, of any number of links
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,29 +74,45 @@ def compared(stored: Stored) -> dict[str, float]:
     ours = {"CCF of joints 1 and 2": (ccf(c).values, theirs.ccf)}
     frame = minimum_perturbation(c)
     ours["minimum-perturbation frame"] = frame.field.values, theirs.beta
-    ours["CCF in that frame"] = ccf(replace(c, A=frame.connection(c))).values, theirs.ccf_optimised
+    ours["CCF in that frame"] = (
+        ccf(replace(c, A=frame.connection(c))).values,
+        theirs.ccf_optimised,
+    )
     inner = (..., *(slice(len(a) // 4, -(len(a) // 4) or None) for a in c.axes))
     found = {}
     for name, (values, other) in ours.items():
         if other is not None:
             other = other[:, 0] if other.ndim > values.ndim else other
-            largest = np.abs(values).reshape(3, -1).max(1).reshape(3, *[1] * len(c.axes))
-            found[name] = float((np.abs(values - other) / np.where(largest > 1e-9, largest, np.inf))[inner].max())
+            largest = (
+                np.abs(values).reshape(3, -1).max(1).reshape(3, *[1] * len(c.axes))
+            )
+            found[name] = float(
+                (np.abs(values - other) / np.where(largest > 1e-9, largest, np.inf))[
+                    inner
+                ].max()
+            )
     return found
 
 
 def parse(s: Mapping, sign: str, order: str, sha256: str) -> Stored:
     """Return the system of a struct s; Refusal, to follow the file's name, if it has none."""
     if sign not in ("", "+") or order not in ("", "ndgrid"):
-        raise Refusal("has a struct s, which says sign and order itself", instead="drop sign and order")
+        raise Refusal(
+            "has a struct s, which says sign and order itself",
+            instead="drop sign and order",
+        )
     axes = _axes(s, "grid.eval")
     shape, d = tuple(map(len, axes)), len(axes)
     A = _cells(s, f"{CONTENT}.Avec", (3, d), shape)
     _check_negative(s, A)
     body, frame, length = _body(s)
-    unit = np.array([1.0, 1.0, 1.0] if length is None else [1 / length, 1 / length, 1.0])
+    unit = np.array(
+        [1.0, 1.0, 1.0] if length is None else [1 / length, 1 / length, 1.0]
+    )
     scaled = lambda x: None if x is None else x * unit.reshape(3, *[1] * (x.ndim - 1))
-    optional = lambda path, lead: _cells(s, path, lead, shape) if _has(s, path) else None
+    optional = lambda path, lead: (
+        _cells(s, path, lead, shape) if _has(s, path) else None
+    )
     pairs = d * (d - 1) // 2
     metric, degree, axes_of_metric = _metric(s, d, length)
     computed = Computed(
@@ -94,7 +123,9 @@ def parse(s: Mapping, sign: str, order: str, sha256: str) -> Stored:
     spline = min(3, min(shape) - 1)
     A, residual = scaled(A), scaled(optional(RESIDUAL, (3,)))
     residual = np.full((3, *shape), np.nan) if residual is None else residual
-    connection = Connection(axes, A, residual, rms(A, np.nan_to_num(residual)), spline, **size)
+    connection = Connection(
+        axes, A, residual, rms(A, np.nan_to_num(residual)), spline, **size
+    )
     return Stored(
         connection, frame=frame, sha256=sha256, shapes=tuple(f"alpha_{k + 1}" for k in range(d)), sized=length is not None,
         metric=None if metric is None else _on_grid(axes_of_metric, metric, axes, spline), power_degree=degree, body=body,
@@ -120,26 +151,42 @@ def _get(s: Mapping, path: str) -> Any:
     return s
 
 
-def _cells(s: Mapping, path: str, lead: tuple[int, ...], shape: tuple[int, ...]) -> np.ndarray:
+def _cells(
+    s: Mapping, path: str, lead: tuple[int, ...], shape: tuple[int, ...]
+) -> np.ndarray:
     """Return a cell (lead) of arrays of a shape as numbers (*lead, *shape)."""
     cell, count = _get(s, path), int(np.prod(lead))
     if not isinstance(cell, np.ndarray) or cell.dtype != object or cell.size != count:
-        raise Refusal(f"has s.{path} that is no cell of {' x '.join(map(str, lead))} arrays", instead=CALC)
+        raise Refusal(
+            f"has s.{path} that is no cell of {' x '.join(map(str, lead))} arrays",
+            instead=CALC,
+        )
     out = np.empty((count, *shape))
     for k, values in enumerate(cell.reshape(count)):
-        place = f"s.{path}{{{', '.join(str(i + 1) for i in np.unravel_index(k, lead))}}}"
+        place = (
+            f"s.{path}{{{', '.join(str(i + 1) for i in np.unravel_index(k, lead))}}}"
+        )
         values = _numbers(place, np.nan if values is None else values)
         if values.shape != shape:
-            raise Refusal(f"has {place} of shape {values.shape} where its grid makes it {shape}", instead=CALC)
+            raise Refusal(
+                f"has {place} of shape {values.shape} where its grid makes it {shape}",
+                instead=CALC,
+            )
         out[k] = values
     return out.reshape(*lead, *shape)
 
 
 def _numbers(place: str, values: Any) -> np.ndarray:
     """Return `numbers`, with the place of the first that is not finite as MATLAB counts, from 1."""
-    if getattr(values, "dtype", np.dtype(object)).kind == "f" and not np.isfinite(values).all():
+    if (
+        getattr(values, "dtype", np.dtype(object)).kind == "f"
+        and not np.isfinite(values).all()
+    ):
         index = ", ".join(str(k + 1) for k in np.argwhere(~np.isfinite(values))[0])
-        raise Refusal(f"has {place} that is not finite (nan or inf) at ({index})", instead="mend it")
+        raise Refusal(
+            f"has {place} that is not finite (nan or inf) at ({index})",
+            instead="mend it",
+        )
     return numbers(place, values)
 
 
@@ -147,10 +194,16 @@ def _axes(s: Mapping, path: str) -> tuple[np.ndarray, ...]:
     """Return the axes of a grid; Refusal unless its arrays run as ndgrid's."""
     cell = _get(s, path)
     if not isinstance(cell, np.ndarray) or cell.dtype != object or cell.size < 2:
-        raise Refusal(f"has s.{path} that is no cell of the grids of two angles or more", instead=CALC)
+        raise Refusal(
+            f"has s.{path} that is no cell of the grids of two angles or more",
+            instead=CALC,
+        )
     grids = [_numbers(f"s.{path}{{{k + 1}}}", x) for k, x in enumerate(cell.ravel())]
     if any(x.ndim != len(grids) or x.shape != grids[0].shape for x in grids):
-        raise Refusal(f"has s.{path} of shapes {', '.join(str(x.shape) for x in grids)}", instead=CALC)
+        raise Refusal(
+            f"has s.{path} of shapes {', '.join(str(x.shape) for x in grids)}",
+            instead=CALC,
+        )
     axes = []
     for k, x in enumerate(grids):
         axis = np.moveaxis(x, k, 0).reshape(x.shape[k], -1)
@@ -167,7 +220,10 @@ def _check_negative(s: Mapping, A: np.ndarray) -> None:
     """Raise Refusal where Avec is not the negative of A_num, if that is there without a denominator."""
     if not _has(s, f"{CONTENT}.A_num") or _has(s, f"{CONTENT}.A_den"):
         return
-    bad = np.abs(_cells(s, f"{CONTENT}.A_num", A.shape[:2], A.shape[2:]) + A) > 1e-9 * np.abs(A).max()
+    bad = (
+        np.abs(_cells(s, f"{CONTENT}.A_num", A.shape[:2], A.shape[2:]) + A)
+        > 1e-9 * np.abs(A).max()
+    )
     if bad.any():
         i, k, *index = np.argwhere(bad)[0] + 1
         raise Refusal(
@@ -193,7 +249,13 @@ def _body(s: Mapping) -> tuple[dict | None, str, float | None]:
     if not _has(s, "geometry"):
         return None, UNKNOWN_FRAME, None
     base = _get(s, "geometry.baseframe") if _has(s, "geometry.baseframe") else "center"
-    named = UNKNOWN_FRAME if not isinstance(base, str) else base if base in OURS else f"{base} of sysplotter"
+    named = (
+        UNKNOWN_FRAME
+        if not isinstance(base, str)
+        else base
+        if base in OURS
+        else f"{base} of sysplotter"
+    )
     length = _number(s, "geometry.length")
     if not _has(s, "geometry.linklengths"):
         return None, named, length
@@ -201,7 +263,9 @@ def _body(s: Mapping) -> tuple[dict | None, str, float | None]:
     frame, modes = _frame(base, lengths.size), np.zeros(0)
     if _has(s, "geometry.modes"):
         modes = numbers("s.geometry.modes", _get(s, "geometry.modes"))
-    body = {"lengths": lengths.tolist(), "frame": frame} | ({"modes": modes.T.tolist()} if modes.size else {})
+    body = {"lengths": lengths.tolist(), "frame": frame} | (
+        {"modes": modes.T.tolist()} if modes.size else {}
+    )
     return body if frame else None, frame or named, length or float(lengths.sum())
 
 
@@ -209,7 +273,11 @@ def _frame(base: Any, links: int) -> str:
     """Return our name of a base frame; its own where we have none."""
     if not isinstance(base, str):
         number = np.asarray(base)
-        numbered = number.size == 1 and number.dtype.kind in "iuf" and number.item() in range(1, links + 1)
+        numbered = (
+            number.size == 1
+            and number.dtype.kind in "iuf"
+            and number.item() in range(1, links + 1)
+        )
         return f"link-{int(number.item())}" if numbered else ""
     if base in ("center", "centered") and links % 2:
         return f"link-{(links + 1) // 2}"
@@ -227,9 +295,12 @@ def _metric(
     axes = _axes(s, "grid.metric_eval")
     M = _cells(s, path, (joints, joints), tuple(map(len, axes)))
     if not np.allclose(M, M.swapaxes(0, 1), rtol=0, atol=1e-9 * np.abs(M).max()):
-        i, k, *index = np.argwhere(np.abs(M - M.swapaxes(0, 1)) > 1e-9 * np.abs(M).max())[0] + 1
+        i, k, *index = (
+            np.argwhere(np.abs(M - M.swapaxes(0, 1)) > 1e-9 * np.abs(M).max())[0] + 1
+        )
         raise Refusal(
-            f"has s.{path} that is not symmetric: {{{i}, {k}}} at ({', '.join(map(str, index))})", instead="mend it"
+            f"has s.{path} that is not symmetric: {{{i}, {k}}} at ({', '.join(map(str, index))})",
+            instead="mend it",
         )
     if _has(s, "system_type") and _get(s, "system_type") == INERTIA:
         return M, None, axes
@@ -244,7 +315,9 @@ def _on_grid(axes: tuple, M: np.ndarray, grid: tuple, degree: int) -> Metric:
     shapes = np.stack(np.meshgrid(*grid, indexing="ij"), -1)
     slack = [1e-9 * np.ptp(a) for a in axes]
     if any(b[0] < a[0] - e or b[-1] > a[-1] + e for a, b, e in zip(axes, grid, slack)):
-        raise Refusal("has s.grid.metric_eval that does not cover s.grid.eval", instead=CALC)
+        raise Refusal(
+            "has s.grid.metric_eval that does not cover s.grid.eval", instead=CALC
+        )
     inside = np.clip(shapes, [a[0] for a in axes], [a[-1] for a in axes])
     values = Field(axes, M, min(3, min(map(len, axes)) - 1))(inside)
     return Metric(grid, np.moveaxis(values, (-2, -1), (0, 1)), degree)

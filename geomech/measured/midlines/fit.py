@@ -46,7 +46,9 @@ class Kinematics:
     level: float
     head: str
 
-    def cycles(self, curve: smooth.Curve, near: np.ndarray | None = None) -> kinematics.Cycles:
+    def cycles(
+        self, curve: smooth.Curve, near: np.ndarray | None = None
+    ) -> kinematics.Cycles:
         """Return the used cycles of a curve. near: as of `kinematics.Clock.phase`."""
         return used_cycles(curve, self.clock, self.marks, self.used, near)
 
@@ -91,7 +93,14 @@ def fit_midlines(
     in_range("``level``", level, 0.5, 0.999)
     if head is not None:
         choose("``head``", head, ("first", "last"))
-    options = {"points": columns, "units": units, "scale": scale, "fps": fps, "y": y, "least_score": least_score}
+    options = {
+        "points": columns,
+        "units": units,
+        "scale": scale,
+        "fps": fps,
+        "y": y,
+        "least_score": least_score,
+    }
     trial = midlines
     if not isinstance(trial, Trial):
         trial = reader.read(midlines, **options, body_length=body_length)
@@ -102,7 +111,8 @@ def fit_midlines(
     clock = kinematics.clock(curve, repeat)
     if clock.ratio < kinematics.STANDING:
         raise trial.wrong(
-            "the body bends in one shape to and fro", because="no wave runs along it, and has a wavelength"
+            "the body bends in one shape to and fro",
+            because="no wave runs along it, and has a wavelength",
         )
     marks, used = full_cycles(trial, curve, clock)
     turn, words = _head(trial, used_cycles(curve, clock, marks, used), head)
@@ -116,19 +126,27 @@ def fit_midlines(
 
     def values(curve: smooth.Curve) -> tuple[np.ndarray, np.ndarray]:
         each = kinematics.averages(used_cycles(curve, clock, marks, used, near))
-        weighted = lambda w: kinematics.quantities(each.weighted(w), trial.length, trial.unit == "m")
+        weighted = lambda w: kinematics.quantities(
+            each.weighted(w), trial.length, trial.unit == "m"
+        )
         return kinematics.pseudo_values(weighted, len(used))
 
     sample = intervals.sampled(curve, coarse, values)
     constant = np.full(len(sample.value), intervals.CONSTANT)
     constant[kinematics.QUANTITIES.index("length")] = STRETCHLESS
     found = intervals.intervals(sample, level, constant)
-    return Kinematics(trial, curve, coarse, clock, marks, used, sample, found, level, words)
+    return Kinematics(
+        trial, curve, coarse, clock, marks, used, sample, found, level, words
+    )
 
 
-def used_cycles(curve, clock: kinematics.Clock, marks, used, near=None) -> kinematics.Cycles:
+def used_cycles(
+    curve, clock: kinematics.Clock, marks, used, near=None
+) -> kinematics.Cycles:
     """Return the cycles that have no gap. near: as of `kinematics.Clock.phase`."""
-    return kinematics.cycles(curve, kinematics.times(clock, clock.phase(curve, near), marks)).selected(used)
+    return kinematics.cycles(
+        curve, kinematics.times(clock, clock.phase(curve, near), marks)
+    ).selected(used)
 
 
 def period(trial: Trial) -> float:
@@ -139,10 +157,14 @@ def period(trial: Trial) -> float:
     repeat = phase.period_of(t, even) or _turning(t, even)
     if not repeat:
         raise trial.wrong(
-            "the body does not repeat its motion", instead="give one cycle at least, better eight, of one gait"
+            "the body does not repeat its motion",
+            instead="give one cycle at least, better eight, of one gait",
         )
     if (rows := repeat / np.median(np.diff(trial.t))) < ROWS:
-        raise trial.wrong(f"{rows:.2g} frames a cycle are too few", instead=f"give at least {ROWS}, better 30")
+        raise trial.wrong(
+            f"{rows:.2g} frames a cycle are too few",
+            instead=f"give at least {ROWS}, better 30",
+        )
     return repeat
 
 
@@ -157,13 +179,19 @@ def _turning(t: np.ndarray, headings: np.ndarray) -> float:
 
 def _with_length(trial: Trial, curve: smooth.Curve) -> Trial:
     """Refuse lengths that no body has, or that contradict each other."""
-    length = float(np.abs(smooth.placed(curve.basis(curve.places, 1), curve.at(curve.t))).mean())
+    length = float(
+        np.abs(smooth.placed(curve.basis(curve.places, 1), curve.at(curve.t))).mean()
+    )
     if trial.unit == "m" and not SHORTEST < length < LONGEST:
         raise trial.wrong(
-            f"the body is {length:.3g} m long", instead="say the unit of x and y: mm, cm or px by ``units``"
+            f"the body is {length:.3g} m long",
+            instead="say the unit of x and y: mm, cm or px by ``units``",
         )
     if trial.unit == "BL" and not 1 / AGREED < length < AGREED:
-        raise trial.wrong(f"the body is {length:.3g} body lengths long", instead="say the unit of x and y by ``units``")
+        raise trial.wrong(
+            f"the body is {length:.3g} body lengths long",
+            instead="say the unit of x and y by ``units``",
+        )
     if trial.length is not None and length > AGREED * trial.length:
         raise trial.wrong(
             f"the points lie along {length:.3g} and the body is {trial.length:.3g} long",
@@ -172,17 +200,25 @@ def _with_length(trial: Trial, curve: smooth.Curve) -> Trial:
     return trial
 
 
-def full_cycles(trial: Trial, curve, clock: kinematics.Clock) -> tuple[np.ndarray, np.ndarray]:
+def full_cycles(
+    trial: Trial, curve, clock: kinematics.Clock
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the phases that begin and end full cycles, and the numbers of those that have no gap and are like the others."""
     phase = clock.phase(curve)
     _check_growing(trial, clock.t, phase)
     marks = kinematics.marks(clock, phase)
     if len(marks) < 2:
         turns = (phase[-1] - phase[0]) / (2 * np.pi)
-        raise trial.wrong(f"the trial has {turns:.2g} cycles", instead="give one full cycle at least, better eight")
+        raise trial.wrong(
+            f"the trial has {turns:.2g} cycles",
+            instead="give one full cycle at least, better eight",
+        )
     times = kinematics.times(clock, phase, marks)
     _check_pace(trial, times)
-    used = np.array([k for k in range(len(marks) - 1) if not _gap(trial, times[k], times[k + 1])], int)
+    used = np.array(
+        [k for k in range(len(marks) - 1) if not _gap(trial, times[k], times[k + 1])],
+        int,
+    )
     if not used.size:
         widest = int(np.diff(trial.t).argmax())
         raise trial.wrong(
@@ -225,7 +261,9 @@ def _check_alike(trial: Trial, cycles: kinematics.Cycles) -> None:
     """Refuse a cycle whose bends have little in common with the mean of all."""
     headings = cycles.headings - cycles.headings.mean(-1, keepdims=True)
     mean = np.median(headings, 0)
-    like = (headings * mean).sum((1, 2)) / np.sqrt((headings**2).sum((1, 2)) * (mean**2).sum())
+    like = (headings * mean).sum((1, 2)) / np.sqrt(
+        (headings**2).sum((1, 2)) * (mean**2).sum()
+    )
     k = int(like.argmin())
     if like[k] < LIKE:
         start, end = cycles.t[k, [0, -1]]
@@ -235,7 +273,9 @@ def _check_alike(trial: Trial, cycles: kinematics.Cycles) -> None:
         )
 
 
-def _head(trial: Trial, cycles: kinematics.Cycles, head: str | None) -> tuple[bool, str]:
+def _head(
+    trial: Trial, cycles: kinematics.Cycles, head: str | None
+) -> tuple[bool, str]:
     """Return whether the first point is the head, and how that was found: a body moves head first, and the wave that drives it
     runs to the tail."""
     ends = trial.names[0], trial.names[-1]
@@ -248,7 +288,8 @@ def _head(trial: Trial, cycles: kinematics.Cycles, head: str | None) -> tuple[bo
         backwards = motion and (motion > 0) == (head == "first")
         return (
             head == "first",
-            f"{ends[0] if head == 'first' else ends[1]}, as given" + backwards * "; it moves tail first",
+            f"{ends[0] if head == 'first' else ends[1]}, as given"
+            + backwards * "; it moves tail first",
         )
     if motion and motion != wave:
         raise trial.wrong(
@@ -256,14 +297,20 @@ def _head(trial: Trial, cycles: kinematics.Cycles, head: str | None) -> tuple[bo
             because="most swimmers move head first against their wave",
             instead="say which end is the head, ``head`` first or last",
         )
-    shown = "it moves there, against its wave" if motion else "the wave runs away from it; the body hardly moves"
+    shown = (
+        "it moves there, against its wave"
+        if motion
+        else "the wave runs away from it; the body hardly moves"
+    )
     return wave < 0, f"{ends[wave > 0]}, by the motion: {shown}"
 
 
 def _notes(used: np.ndarray) -> list[str]:
     notes, count = [], len(used)
     if count == 1:
-        notes.append("one full cycle does not show how cycles vary: intervals are of the tracking's noise alone")
+        notes.append(
+            "one full cycle does not show how cycles vary: intervals are of the tracking's noise alone"
+        )
     elif count < FEWEST:
         notes.append("two full cycles hardly show how cycles vary")
     return notes

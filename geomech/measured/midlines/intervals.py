@@ -18,7 +18,9 @@ from geomech.measured.midlines import smooth
 Values = Callable[[smooth.Curve], tuple[np.ndarray, np.ndarray]]
 
 RESAMPLED = 40  # times that noise is put on
-TRIED = np.geomspace(1e-3, 100, 40)  # variances of cycles over that of the pseudo-values, and over that of noise
+TRIED = np.geomspace(
+    1e-3, 100, 40
+)  # variances of cycles over that of the pseudo-values, and over that of noise
 REPEATING = 0.5  # prior probability that all cycles repeat exactly, as a robot's
 CONSTANT = 0.2  # prior probability that a quantity repeats exactly where others do not; found by coverage
 ALIKE = -0.5, 0.0, 0.5  # correlations of neighbouring cycles
@@ -56,7 +58,9 @@ class Sample:
     noisy_change: np.ndarray
 
 
-def intervals(sample: Sample, level: float, constant: float | np.ndarray = CONSTANT) -> Intervals:
+def intervals(
+    sample: Sample, level: float, constant: float | np.ndarray = CONSTANT
+) -> Intervals:
     """Return intervals that cover the truth in a share ``level`` of cases.
 
     constant: prior probability that a quantity repeats where others do not; of all, or (Q,)."""
@@ -69,7 +73,9 @@ def intervals(sample: Sample, level: float, constant: float | np.ndarray = CONST
     known = np.maximum(noise + cut_off, 1e-300)
     half_width = ndtri((1 + level) / 2) * np.sqrt(known)
     if len(sample.pseudo) > 1:
-        weights, by_cycles = _of_cycles(sample.pseudo, sample.noisy_pseudo - sample.pseudo, constant)
+        weights, by_cycles = _of_cycles(
+            sample.pseudo, sample.noisy_pseudo - sample.pseudo, constant
+        )
         deviation = np.sqrt(by_cycles + known)
         low, high = half_width, FURTHEST * deviation.max(0)
         for _ in range(40):
@@ -79,10 +85,14 @@ def intervals(sample: Sample, level: float, constant: float | np.ndarray = CONST
         half_width = high
     cycles = np.maximum((half_width / ndtri((1 + level) / 2)) ** 2 - known, 0.0)
     value = sample.value - by_noise.mean(0)
-    return Intervals(value, *np.sqrt((cycles, noise, cut_off)), half_width, sample.pseudo)
+    return Intervals(
+        value, *np.sqrt((cycles, noise, cut_off)), half_width, sample.pseudo
+    )
 
 
-def _of_cycles(values: np.ndarray, noise: np.ndarray, constant: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _of_cycles(
+    values: np.ndarray, noise: np.ndarray, constant: float | np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return weights and variances (M, Q) that the mean of pseudo-values (C, Q) may have by cycles, beyond noise (B, C, Q).
 
     The weights are the likelihood of the contrasts between cycles times a prior: v = 0 if `_repeating` or ``constant``,
@@ -91,14 +101,22 @@ def _of_cycles(values: np.ndarray, noise: np.ndarray, constant: float | np.ndarr
     too late."""
     count = len(values)
     apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
-    contrasts = np.linalg.qr(np.column_stack([np.ones(count), np.eye(count)[:, 1:]]))[0][:, 1:]
+    contrasts = np.linalg.qr(np.column_stack([np.ones(count), np.eye(count)[:, 1:]]))[
+        0
+    ][:, 1:]
     deviation = noise - noise.mean(0)
     same = np.maximum((deviation**2).sum(0).mean(0) / (len(noise) - 1), TINY)
     near = (deviation[:, 1:] * deviation[:, :-1]).sum(0).mean(0) / (len(noise) - 1)
     near = np.clip(near, -0.5 * same, 0.5 * same)
     scatter = np.maximum(values.var(0, ddof=1), TINY)
-    known = np.where(apart == 0, (same + 1e-9 * scatter)[:, None, None], (apart == 1) * near[:, None, None])
-    whitening = np.linalg.inv(np.linalg.cholesky(contrasts.T @ known @ contrasts)) @ contrasts.T
+    known = np.where(
+        apart == 0,
+        (same + 1e-9 * scatter)[:, None, None],
+        (apart == 1) * near[:, None, None],
+    )
+    whitening = (
+        np.linalg.inv(np.linalg.cholesky(contrasts.T @ known @ contrasts)) @ contrasts.T
+    )
     white = (whitening @ values.T[..., None])[..., 0]
     repeating = _repeating(white, np.einsum("qkc,bcq->bqk", whitening, deviation))
     exact = repeating + (1 - repeating) * constant
@@ -107,13 +125,18 @@ def _of_cycles(values: np.ndarray, noise: np.ndarray, constant: float | np.ndarr
     prior = np.vstack([exact + 0 * scatter, (1 - exact) * prior / prior.sum(0)])
     likelihood, by_cycles = [], []
     for correlation in np.power.outer(ALIKE, apart):
-        sizes, axes = np.linalg.eigh(whitening @ correlation @ whitening.transpose(0, 2, 1))
+        sizes, axes = np.linalg.eigh(
+            whitening @ correlation @ whitening.transpose(0, 2, 1)
+        )
         square = (axes.transpose(0, 2, 1) @ white[..., None])[..., 0] ** 2
         spread = 1 + variances[..., None] * sizes
         likelihood.append(-0.5 * (np.log(spread) + square / spread).sum(-1))
         by_cycles.append(variances * correlation.mean())
     weights = prior * np.exp(likelihood - np.max(likelihood, (0, 1)))
-    return tuple(x.reshape(-1, len(scatter)) for x in (weights / weights.sum((0, 1)), np.array(by_cycles)))
+    return tuple(
+        x.reshape(-1, len(scatter))
+        for x in (weights / weights.sum((0, 1)), np.array(by_cycles))
+    )
 
 
 def _repeating(white: np.ndarray, drawn: np.ndarray) -> float:
@@ -132,16 +155,31 @@ def _repeating(white: np.ndarray, drawn: np.ndarray) -> float:
 
 
 def sampled(
-    curve: smooth.Curve, coarse: smooth.Curve, values: Values, resampled: int | None = None, seed: int = 0
+    curve: smooth.Curve,
+    coarse: smooth.Curve,
+    values: Values,
+    resampled: int | None = None,
+    seed: int = 0,
 ) -> Sample:
     """Return the quantities of a curve, and the same with noise put on once more, as often as ``resampled`` or RESAMPLED.
 
     coarse: the same `smooth.coarser`. values: returns quantities (Q,) and pseudo-values (C, Q) of a curve."""
     (value, pseudo), noisy, changes = values(curve), [], []
-    rest = 1 / (2 ** (curve.modes - coarse.modes) - 1)  # of a series that halves with each mode
+    rest = 1 / (
+        2 ** (curve.modes - coarse.modes) - 1
+    )  # of a series that halves with each mode
     for k in range(RESAMPLED if resampled is None else resampled):
-        one, other = (c.noisy(np.random.default_rng((seed, k))) for c in (curve, coarse))
+        one, other = (
+            c.noisy(np.random.default_rng((seed, k))) for c in (curve, coarse)
+        )
         noisy.append(values(one))
         changes.append(rest * (noisy[-1][0] - values(other)[0]))
     each, every = (np.array([x[k] for x in noisy]) for k in (0, 1))
-    return Sample(value, pseudo, each, every, rest * (value - values(coarse)[0]), np.array(changes))
+    return Sample(
+        value,
+        pseudo,
+        each,
+        every,
+        rest * (value - values(coarse)[0]),
+        np.array(changes),
+    )

@@ -21,8 +21,13 @@ QUANTITIES = (
 )  # fmt: skip
 PARTS = 10  # of the body, in which slip and amplitude are told, from tail to head
 WAVES = np.arange(0.3, 8.001, 0.05)  # wave numbers that are tried, per body
-MIDDLE = 0.1, 0.9  # of the body, where the wave is fitted: slopes at its ends have most noise
-STANDING = 0.15  # second over first principal size of the headings, below which a wave stands
+MIDDLE = (
+    0.1,
+    0.9,
+)  # of the body, where the wave is fitted: slopes at its ends have most noise
+STANDING = (
+    0.15  # second over first principal size of the headings, below which a wave stands
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,18 +45,31 @@ class Clock:
         """Return the phase (T,) of a curve at the times t, rad. near: another phase, of which it is less than half a turn
         off."""
         z = (relative_headings(curve, self.t) - self.mean) @ self.plane @ [1.0, 1j]
-        return np.unwrap(np.angle(z)) if near is None else near + np.angle(z * np.exp(-1j * near))
+        return (
+            np.unwrap(np.angle(z))
+            if near is None
+            else near + np.angle(z * np.exp(-1j * near))
+        )
 
 
 def relative_headings(curve: Curve, t: np.ndarray) -> np.ndarray:
     """Return headings (T, PLACES) along the body at times t, less their mean, rad."""
-    heading = np.unwrap(np.angle(placed(curve.basis((np.arange(PLACES) + 0.5) / PLACES, 1), curve.at(t))), axis=1)
+    heading = np.unwrap(
+        np.angle(
+            placed(curve.basis((np.arange(PLACES) + 0.5) / PLACES, 1), curve.at(t))
+        ),
+        axis=1,
+    )
     return heading - heading.mean(1, keepdims=True)
 
 
 def clock(curve: Curve, period: float) -> Clock:
     """Return the clock of a curve."""
-    t = np.linspace(curve.t[0], curve.t[-1], int(np.ceil((curve.t[-1] - curve.t[0]) / period * PHASES)) + 1)
+    t = np.linspace(
+        curve.t[0],
+        curve.t[-1],
+        int(np.ceil((curve.t[-1] - curve.t[0]) / period * PHASES)) + 1,
+    )
     headings = relative_headings(curve, t)
     mean = headings.mean(0)
     scores, sizes, axes = np.linalg.svd(headings - mean, full_matrices=False)
@@ -97,7 +115,9 @@ class Cycles:
     def headings(self) -> np.ndarray:
         """Headings (C, PHASES, NODES), rad, continuous."""
         angle = np.unwrap(np.angle(self.tangent), axis=-1)
-        return angle + (np.unwrap(angle.mean(-1).ravel()) - angle.mean(-1).ravel()).reshape(*angle.shape[:2], 1)
+        return angle + (
+            np.unwrap(angle.mean(-1).ravel()) - angle.mean(-1).ravel()
+        ).reshape(*angle.shape[:2], 1)
 
 
 def cycles(curve: Curve, at: np.ndarray) -> Cycles:
@@ -106,7 +126,9 @@ def cycles(curve: Curve, at: np.ndarray) -> Cycles:
     z, rate, ends = curve.at(t.ravel()), curve.at(t.ravel(), 1), curve.at(at)
     shape = (*t.shape, len(curve.places))
     value, slope = curve.basis(curve.places), curve.basis(curve.places, 1)
-    place, tangent, velocity = (placed(b, c).reshape(shape) for b, c in ((value, z), (slope, z), (value, rate)))
+    place, tangent, velocity = (
+        placed(b, c).reshape(shape) for b, c in ((value, z), (slope, z), (value, rate))
+    )
     poses = _poses(placed(value, ends), placed(slope, ends))
     return Cycles(t, place, tangent, velocity, poses[:-1], poses[1:], np.diff(at))
 
@@ -137,7 +159,11 @@ class Averages(NamedTuple):
 
 def averages(c: Cycles) -> Averages:
     """Return what is averaged, of each cycle."""
-    start, moved, headings = c.starts[:, 0] + 1j * c.starts[:, 1], c.ends - c.starts, c.headings
+    start, moved, headings = (
+        c.starts[:, 0] + 1j * c.starts[:, 1],
+        c.ends - c.starts,
+        c.headings,
+    )
     step, turn = moved[:, 0] + 1j * moved[:, 1], moved[:, 2]
     axis = headings.mean((1, 2))
     course = axis[:, None] + turn[:, None] * _share()
@@ -150,10 +176,14 @@ def averages(c: Cycles) -> Averages:
     path = start[:, None] + step[:, None] * (_share() + 0.5)
     lateral = ((c.place - path[..., None]) * np.exp(-1j * course)[..., None]).imag
     slip = np.minimum(slip, np.pi - slip).mean(1)
-    return Averages(np.stack(numbers, -1), np.exp(-2j * np.pi * _share()) @ relative, slip, lateral)
+    return Averages(
+        np.stack(numbers, -1), np.exp(-2j * np.pi * _share()) @ relative, slip, lateral
+    )
 
 
-def quantities(a: Averages, length: float | None = None, absolute: bool = True) -> np.ndarray:
+def quantities(
+    a: Averages, length: float | None = None, absolute: bool = True
+) -> np.ndarray:
     """Return the numbers of QUANTITIES, then slip and amplitude of PARTS of the body, (R, Q), of averages over cycles.
 
     length: of the body in the trial's unit; that of the midlines if None. absolute: speed is in that unit, else in body
@@ -167,7 +197,11 @@ def quantities(a: Averages, length: float | None = None, absolute: bool = True) 
     arc = own * arc_waves(a.first)
     wavelength = arc * cosine
     slip = a.slip.reshape(len(a.slip), PARTS, -1).mean(-1)
-    amplitude = np.ptp(a.lateral, axis=1).reshape(slip.shape[0], PARTS, -1).mean(-1) / 2 / body[:, None]
+    amplitude = (
+        np.ptp(a.lateral, axis=1).reshape(slip.shape[0], PARTS, -1).mean(-1)
+        / 2
+        / body[:, None]
+    )
     numbers = np.stack(
         [
             1 / time, body, distance / time / (1.0 if absolute else body), distance / body, axis + drift,
@@ -178,7 +212,9 @@ def quantities(a: Averages, length: float | None = None, absolute: bool = True) 
     return np.concatenate([numbers, slip, amplitude], -1)
 
 
-def pseudo_values(values: Callable[[np.ndarray], np.ndarray], count: int) -> tuple[np.ndarray, np.ndarray]:
+def pseudo_values(
+    values: Callable[[np.ndarray], np.ndarray], count: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Return quantities (Q,) of all cycles, and the pseudo-values (C, Q) of the jackknife: C times those of all less C - 1
     times those without one cycle. Of a mean they are its terms; their scatter is that of the quantity.
 
@@ -197,7 +233,9 @@ def _share() -> np.ndarray:
 def wave_sign(first: np.ndarray) -> int:
     """Return 1 for a wave of headings' first harmonic (NODES,) that runs to the point 0 of the body, -1 for the other way."""
     inside = first[_middle(len(first))]
-    powers = [(np.abs(_waves(NODES) @ x) ** 2).sum(-1).max() for x in (inside, inside.conj())]
+    powers = [
+        (np.abs(_waves(NODES) @ x) ** 2).sum(-1).max() for x in (inside, inside.conj())
+    ]
     return 1 if powers[0] >= powers[1] else -1
 
 
@@ -211,7 +249,9 @@ def arc_waves(first: np.ndarray) -> np.ndarray:
     left = (np.abs(first) ** 2).sum(-1) - (np.abs(_waves(NODES) @ first.T) ** 2).sum(1)
     k = np.clip(left.argmin(0), 1, len(WAVES) - 2)
     before, least, after = left[k + np.arange(-1, 2)[:, None], np.arange(left.shape[1])]
-    waves = WAVES[k] + 0.5 * (WAVES[1] - WAVES[0]) * (before - after) / np.maximum(before - 2 * least + after, 1e-300)
+    waves = WAVES[k] + 0.5 * (WAVES[1] - WAVES[0]) * (before - after) / np.maximum(
+        before - 2 * least + after, 1e-300
+    )
     return 1 / np.abs(waves)
 
 

@@ -23,7 +23,9 @@ ELEMENTS = smooth.NODES  # of the body; twice as many tell the error
 RESAMPLED = 12  # times that noise is put on the midlines
 COMPARED = "speed", "stride", "heading", "turn", "slip", "efficiency"
 FACTORS = np.geomspace(1 / 64, 64, 25)  # of a parameter, that are tried first
-MOVED = 1e-4  # relative change of the stride, below which a parameter does not change it
+MOVED = (
+    1e-4  # relative change of the stride, below which a parameter does not change it
+)
 FINE = 1e-3  # relative accuracy of a parameter that closes the gap
 
 
@@ -63,25 +65,36 @@ def compare(fit: Kinematics, medium: Any, effects: tuple = ()) -> Comparison:
     swimmer = Swimmer(medium, Backbone(ELEMENTS), effects)
     near = fit.clock.phase(fit.curve)
 
-    def values(swimmer: Swimmer) -> Callable[[smooth.Curve], tuple[np.ndarray, np.ndarray]]:
+    def values(
+        swimmer: Swimmer,
+    ) -> Callable[[smooth.Curve], tuple[np.ndarray, np.ndarray]]:
         def of(curve: smooth.Curve) -> tuple[np.ndarray, np.ndarray]:
             cycles = fit.cycles(curve, near)
-            return kinematics.pseudo_values(lambda w: _predicted(swimmer, cycles, w, fit), len(fit.used))
+            return kinematics.pseudo_values(
+                lambda w: _predicted(swimmer, cycles, w, fit), len(fit.used)
+            )
 
         return of
 
     sample = intervals.sampled(fit.curve, fit.coarse, values(swimmer), RESAMPLED)
     found = intervals.intervals(sample, fit.level)
-    finer = values(Swimmer(medium, Backbone(2 * ELEMENTS), effects))(fit.curve)[0] - sample.value
+    finer = (
+        values(Swimmer(medium, Backbone(2 * ELEMENTS), effects))(fit.curve)[0]
+        - sample.value
+    )
     k = [QUANTITIES.index(name) for name in COMPARED]
     predicted_error = np.hypot(found.half_width, finer)
     measured, error = fit.intervals.value[k], fit.intervals.half_width[k]
     value = found.value + 4 / 3 * finer  # elements are chords: errors of order 2
-    comparison = Comparison(medium, measured, error, value, predicted_error, found.per_cycle, ())
+    comparison = Comparison(
+        medium, measured, error, value, predicted_error, found.per_cycle, ()
+    )
     return replace(comparison, closing=_closing(comparison, swimmer, fit, effects))
 
 
-def _predicted(swimmer: Swimmer, cycles: kinematics.Cycles, weights: np.ndarray, fit: Kinematics) -> np.ndarray:
+def _predicted(
+    swimmer: Swimmer, cycles: kinematics.Cycles, weights: np.ndarray, fit: Kinematics
+) -> np.ndarray:
     """Return COMPARED (R, Q) of the mean cycles with weights (R, C)."""
     each = kinematics.averages(cycles)
     time, own, _, _, axis, _, cosine = each.weighted(weights).numbers.T
@@ -92,9 +105,14 @@ def _predicted(swimmer: Swimmer, cycles: kinematics.Cycles, weights: np.ndarray,
     slip = swimmer.work(alpha, alphadot, xi).slip.mean(-1)
     net_in_mean_axis = _about_mean(xi, net)
     stride = np.hypot(net[:, 0], net[:, 1])
-    wavelength = own / body * cosine * kinematics.arc_waves(each.weighted(weights).first)
+    wavelength = (
+        own / body * cosine * kinematics.arc_waves(each.weighted(weights).first)
+    )
     speed = stride / time * (body if fit.trial.unit == "m" else 1.0)
-    return np.stack([speed, stride, axis + net_in_mean_axis, net[:, 2], slip, stride / wavelength], -1)
+    return np.stack(
+        [speed, stride, axis + net_in_mean_axis, net[:, 2], slip, stride / wavelength],
+        -1,
+    )
 
 
 def _about_mean(xi: np.ndarray, net: np.ndarray) -> np.ndarray:
@@ -106,9 +124,13 @@ def _about_mean(xi: np.ndarray, net: np.ndarray) -> np.ndarray:
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
-def _bends(cycles: kinematics.Cycles, weights: np.ndarray, elements: int) -> tuple[np.ndarray, np.ndarray]:
+def _bends(
+    cycles: kinematics.Cycles, weights: np.ndarray, elements: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Return bends and their rates (R, PHASES, elements - 1) of mean cycles, by HARMONICS harmonics."""
-    spectrum = np.fft.rfft(np.tensordot(weights, cycles.headings, 1), axis=1)[:, : HARMONICS + 1]
+    spectrum = np.fft.rfft(np.tensordot(weights, cycles.headings, 1), axis=1)[
+        :, : HARMONICS + 1
+    ]
     wave = np.arange(HARMONICS + 1)[:, None]
     restored = lambda s: np.fft.irfft(s, PHASES, axis=1)
     places = (np.arange(elements) + 0.5) / elements
@@ -123,19 +145,28 @@ def _at(headings: np.ndarray, places: np.ndarray) -> np.ndarray:
     count = headings.shape[-1]
     s = (np.arange(count) + 0.5) / count
     degree = min(16, int(2 * np.sqrt(count)) + 4)
-    matrix = legendre.legvander(2 * places - 1, degree) @ np.linalg.pinv(legendre.legvander(2 * s - 1, degree))
+    matrix = legendre.legvander(2 * places - 1, degree) @ np.linalg.pinv(
+        legendre.legvander(2 * s - 1, degree)
+    )
     return headings @ matrix.T
 
 
-def _closing(comparison: Comparison, swimmer: Swimmer, fit: Kinematics, effects: tuple) -> tuple[Closing, ...]:
+def _closing(
+    comparison: Comparison, swimmer: Swimmer, fit: Kinematics, effects: tuple
+) -> tuple[Closing, ...]:
     """Return, for every parameter of the medium that changes the stride, the value that makes it the measured one."""
-    cycles, weights = fit.cycles(fit.curve), np.full((1, len(fit.used)), 1 / len(fit.used))
+    cycles, weights = (
+        fit.cycles(fit.curve),
+        np.full((1, len(fit.used)), 1 / len(fit.used)),
+    )
     alpha, alphadot = _bends(cycles, weights, swimmer.joints + 1)
     present, wanted = comparison.predicted[1], comparison.measured[1]
     error = math.hypot(comparison.measured_error[1], comparison.predicted_error[1])
 
     def stride(medium: Any) -> float:
-        net = displacement(Swimmer(medium, swimmer.body, effects).velocity(alpha, alphadot))
+        net = displacement(
+            Swimmer(medium, swimmer.body, effects).velocity(alpha, alphadot)
+        )
         return float(np.hypot(net[0, 0], net[0, 1]))
 
     offset = present - stride(swimmer.medium)  # of elements and noise, the same for all
@@ -144,14 +175,24 @@ def _closing(comparison: Comparison, swimmer: Swimmer, fit: Kinematics, effects:
         value = getattr(swimmer.medium, name)
         if value is None or name == "k":
             continue
-        gap = lambda x, name=name: stride(_changed(swimmer.medium, name, x)) + offset - wanted
-        if (closing := _closed(name, number.unit, float(value), gap, error, swimmer.medium, present)) is not None:
+        gap = lambda x, name=name: (
+            stride(_changed(swimmer.medium, name, x)) + offset - wanted
+        )
+        if (
+            closing := _closed(
+                name, number.unit, float(value), gap, error, swimmer.medium, present
+            )
+        ) is not None:
             found.append(closing)
     return tuple(found)
 
 
 def _changed(medium: Any, name: str, value: float) -> Any:
-    return replace(medium, **{name: value}, **({"covariance": None} if hasattr(medium, "covariance") else {}))
+    return replace(
+        medium,
+        **{name: value},
+        **({"covariance": None} if hasattr(medium, "covariance") else {}),
+    )
 
 
 def _closed(name, unit, value, gap, error, medium, stride) -> Closing | None:
@@ -172,7 +213,11 @@ def _closed(name, unit, value, gap, error, medium, stride) -> Closing | None:
     changes = np.flatnonzero(np.sign(gaps[1:]) != np.sign(gaps[:-1]))
     if not changes.size:
         return closing
-    k = changes[np.abs(np.log(tried[changes] / value)).argmin()] if value else changes[0]
+    k = (
+        changes[np.abs(np.log(tried[changes] / value)).argmin()]
+        if value
+        else changes[0]
+    )
     root = float(brentq(gap, tried[k], tried[k + 1], xtol=1e-12, rtol=FINE))
     slope = (gap(root * 1.02) - gap(root * 0.98)) / (0.04 * root)
     return replace(closing, value=root, error=float(error / max(abs(slope), 1e-300)))

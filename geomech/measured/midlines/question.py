@@ -66,7 +66,9 @@ class Midlines(Question):
             self.midlines, columns=self.columns, units=self.units, scale=self.scale, fps=self.fps, y=self.y, head=self.head,
             least_score=self.least_score, body_length=self.body_length, mend=self.mend, level=self.level,
         )  # fmt: skip
-        return result_of(fit, None if self.medium is None else compare(fit, medium_of(self.medium)))
+        return result_of(
+            fit, None if self.medium is None else compare(fit, medium_of(self.medium))
+        )
 
 
 def units_of(fit: Kinematics) -> dict[str, str]:
@@ -84,11 +86,21 @@ def result_of(fit: Kinematics, comparison: Comparison | None = None) -> Result:
     found, units = fit.intervals, units_of(fit)
     label = f"half width of the interval of {100 * fit.level:.3g} % of cases"
     variables = [
-        Variable(name, (), found.value[k], units[name], LABELS[name], found.half_width[k], error_label=label)
+        Variable(
+            name,
+            (),
+            found.value[k],
+            units[name],
+            LABELS[name],
+            found.half_width[k],
+            error_label=label,
+        )
         for k, name in enumerate(QUANTITIES)
     ]
     place, n = (np.arange(PARTS) + 0.5) / PARTS, len(QUANTITIES)
-    variables.append(Variable("s", ("s",), place, "1", "place on the body, tail 0 to head 1"))
+    variables.append(
+        Variable("s", ("s",), place, "1", "place on the body, tail 0 to head 1")
+    )
     for name, k in (("slip", n), ("amplitude", n + PARTS)):
         profile, words = slice(k, k + PARTS), f"{name} of a tenth of the body"
         along = found.value[profile], units[name], words, found.half_width[profile]
@@ -97,16 +109,34 @@ def result_of(fit: Kinematics, comparison: Comparison | None = None) -> Result:
     variables += [
         Variable("quantity", ("quantity",), np.array(QUANTITIES)),
         Variable("source", ("source",), np.array(SOURCES)),
-        Variable("standard_error", ("quantity", "source"), parts, "", "of each source, in the unit of the quantity"),
         Variable(
-            "per_cycle", ("cycle", "quantity"), found.per_cycle[:, :n], "", "pseudo-values, in the unit of the quantity"
+            "standard_error",
+            ("quantity", "source"),
+            parts,
+            "",
+            "of each source, in the unit of the quantity",
         ),
-        Variable("cycle_start", ("cycle",), _starts(fit), fit.trial.unit_of_time, "time when a cycle begins"),
+        Variable(
+            "per_cycle",
+            ("cycle", "quantity"),
+            found.per_cycle[:, :n],
+            "",
+            "pseudo-values, in the unit of the quantity",
+        ),
+        Variable(
+            "cycle_start",
+            ("cycle",),
+            _starts(fit),
+            fit.trial.unit_of_time,
+            "time when a cycle begins",
+        ),
         *_mean_cycle(fit),
     ]
     if comparison is not None:
         variables += _compared(comparison, units, label)
-    return Result("midlines", tuple(variables), _about(fit, comparison), (fit, comparison))
+    return Result(
+        "midlines", tuple(variables), _about(fit, comparison), (fit, comparison)
+    )
 
 
 def _starts(fit: Kinematics) -> np.ndarray:
@@ -118,7 +148,9 @@ def _mean_cycle(fit: Kinematics) -> list[Variable]:
     """Return the mean cycle: headings along the body, less their mean over the cycle."""
     headings = fit.cycles(fit.curve).headings
     mean = (headings - headings.mean((1, 2), keepdims=True)).mean(0)
-    error = headings.std(0, ddof=1) / np.sqrt(len(headings)) if len(headings) > 1 else None
+    error = (
+        headings.std(0, ddof=1) / np.sqrt(len(headings)) if len(headings) > 1 else None
+    )
     phase = 2 * np.pi * (np.arange(kinematics.PHASES) + 0.5) / kinematics.PHASES
     return [
         Variable("phase", ("phase",), phase, "rad", "of the mean cycle"),
@@ -158,7 +190,10 @@ def _about(fit: Kinematics, comparison: Comparison | None) -> dict[str, Any]:
         "cycles_left_out": len(fit.marks) - 1 - len(fit.used),
         "head": fit.head,
         "modes": curve.modes,
-        "knots_per_cycle": float((len(curve.knots) - 11) / ((trial.t[-1] - trial.t[0]) * fit.value("frequency")[0])),
+        "knots_per_cycle": float(
+            (len(curve.knots) - 11)
+            / ((trial.t[-1] - trial.t[0]) * fit.value("frequency")[0])
+        ),
         "noise": float(curve.noise / fit.value("length")[0]),
         "level": float(fit.level),
         "frame_meaning": "mean of the body's points and mean heading; heading counter-clockwise from x",

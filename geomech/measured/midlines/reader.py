@@ -57,9 +57,18 @@ class Table(NamedTuple):
 def is_midlines(header: tuple[str, ...]) -> bool:
     """Return whether the header of a file is that of points along a body, not of a log of joint angles."""
     bare = {_split(name)[0] for name in header}
-    if {*header[:1]} & {*HEADS} or {"s", "curvature"} <= bare or {*POINTS[:2]} & bare or len(_pairs(header)) > 1:
+    if (
+        {*header[:1]} & {*HEADS}
+        or {"s", "curvature"} <= bare
+        or {*POINTS[:2]} & bare
+        or len(_pairs(header)) > 1
+    ):
         return True
-    return {"x", "y"} <= bare and not {"heading", "theta", "yaw"} & bare and not any(map(JOINT.fullmatch, bare))
+    return (
+        {"x", "y"} <= bare
+        and not {"heading", "theta", "yaw"} & bare
+        and not any(map(JOINT.fullmatch, bare))
+    )
 
 
 def read(
@@ -72,7 +81,10 @@ def read(
     header does not say. scale: mm per pixel. fps: frames per second, of a file that counts frames. least_score: points
     of a lower likelihood are taken for missing. y: up, or down as in images, which pixels are taken for. body_length:
     in ``units``, where the points do not reach both ends."""
-    for name, value, low, high in (("scale", scale, 1e-9, 1e6), ("fps", fps, 1e-6, 1e6)):
+    for name, value, low, high in (
+        ("scale", scale, 1e-9, 1e6),
+        ("fps", fps, 1e-6, 1e6),
+    ):
         if value is not None:
             in_range(f"``{name}``", value, low, high)
     in_range("``least_score``", least_score, 0, 1)
@@ -90,15 +102,29 @@ def read(
     if y is not None:
         choose("``y``", y, ("up", "down"))
     elif pixels:
-        notes.append("y is taken to run down, as in images, else heading and turn have the other sign: say y up")
+        notes.append(
+            "y is taken to run down, as in images, else heading and turn have the other sign: say y up"
+        )
     if y == "down" or (y is None and pixels):
         xy[..., 1] *= -1
     xy[np.isnan(xy).any(-1)] = np.nan
     notes = [*timing, *notes, *_missing_note(xy, low)]
     if table.unused:
         notes.append(f"columns that are not used: {', '.join(table.unused[:6])}")
-    length = body_length * size if body_length is not None and unit != "BL" else body_length
-    return Trial(source.name, t, xy, table.names, table.lines, unit, timed, length, notes=tuple(notes))
+    length = (
+        body_length * size if body_length is not None and unit != "BL" else body_length
+    )
+    return Trial(
+        source.name,
+        t,
+        xy,
+        table.names,
+        table.lines,
+        unit,
+        timed,
+        length,
+        notes=tuple(notes),
+    )
 
 
 def _missing_note(xy: np.ndarray, low: np.ndarray) -> list[str]:
@@ -106,7 +132,9 @@ def _missing_note(xy: np.ndarray, low: np.ndarray) -> list[str]:
     if not lost.any():
         return []
     score = f", {low.mean():.2g} of all by their likelihood" if low.any() else ""
-    return [f"{lost.mean():.2g} of all points are missing{score}: modes along the body stand for them"]
+    return [
+        f"{lost.mean():.2g} of all points are missing{score}: modes along the body stand for them"
+    ]
 
 
 def _table(source: Rows) -> Table:
@@ -123,7 +151,11 @@ def _table(source: Rows) -> Table:
             instead='give points of the midline, or take the file for [gait] kind = "centreline"',
         )
     if twice := [c for k, c in enumerate(header) if c in header[:k]]:
-        raise Refusal(f"the column {formatted(twice[0])} is there twice", where=where, instead="rename one")
+        raise Refusal(
+            f"the column {formatted(twice[0])} is there twice",
+            where=where,
+            instead="rename one",
+        )
     if {"x", "y"} <= {*bare}:
         return _long(source, header, bare)
     return _wide(source, header, _pairs(header))
@@ -132,7 +164,11 @@ def _table(source: Rows) -> Table:
 def _split(name: str) -> tuple[str, str]:
     """Return the name of a column without its unit, and the unit."""
     match = UNIT.search(name)
-    return (name[: match.start()], match[1] or match[2]) if match and match.start() else (name, "")
+    return (
+        (name[: match.start()], match[1] or match[2])
+        if match and match.start()
+        else (name, "")
+    )
 
 
 def _pairs(header: Sequence[str]) -> dict[str, dict[str, int]]:
@@ -147,7 +183,9 @@ def _pairs(header: Sequence[str]) -> dict[str, dict[str, int]]:
         else:
             continue
         found.setdefault(point, {})["score" if coordinate in SCORES else coordinate] = k
-    return {point: columns for point, columns in found.items() if {"x", "y"} <= {*columns}}
+    return {
+        point: columns for point, columns in found.items() if {"x", "y"} <= {*columns}
+    }
 
 
 def _clock(header: Sequence[str], name: str, line: int) -> tuple[int, float, bool]:
@@ -156,7 +194,11 @@ def _clock(header: Sequence[str], name: str, line: int) -> tuple[int, float, boo
         bare, unit = _split(word)
         if bare in TIMES:
             if unit not in ("", "s", "ms"):
-                raise Refusal(f"{word} is in {unit}", where=f"{name}, line {line}", instead="give t in s or ms")
+                raise Refusal(
+                    f"{word} is in {unit}",
+                    where=f"{name}, line {line}",
+                    instead="give t in s or ms",
+                )
             return k, 1e-3 if unit == "ms" else 1.0, True
     for k, word in enumerate(header):
         if word in FRAMES:
@@ -219,11 +261,21 @@ def _long(source: Rows, header: tuple[str, ...], bare: dict[str, int]) -> Table:
     clock, second, timed = _clock(header, source.name, line)
     key = next((bare[name] for name in POINTS if name in bare), None)
     score = next((bare[name] for name in SCORES if name in bare), None)
-    unit = _common_unit([header[bare["x"]], header[bare["y"]]], f"{source.name}, line {line}")
+    unit = _common_unit(
+        [header[bare["x"]], header[bare["y"]]], f"{source.name}, line {line}"
+    )
     if key is not None:  # names need not be numbers
-        labels = [text.split(",")[key].strip(' "') if text.count(",") >= key else "" for _, text in source.filled[1:]]
-        blank = [(n, ",".join("0" if k == key else c for k, c in enumerate(x.split(",")))) for n, x in source.filled]
-        source = Rows(source.name, source.sha256, [source.filled[0], *blank[1:]], source.comments)
+        labels = [
+            text.split(",")[key].strip(' "') if text.count(",") >= key else ""
+            for _, text in source.filled[1:]
+        ]
+        blank = [
+            (n, ",".join("0" if k == key else c for k, c in enumerate(x.split(","))))
+            for n, x in source.filled
+        ]
+        source = Rows(
+            source.name, source.sha256, [source.filled[0], *blank[1:]], source.comments
+        )
     rows = _cells(source, 1, header)
     moments = _moments(rows[:, clock] * second, source)
     t, frame = np.unique(moments, return_inverse=True)
@@ -234,7 +286,10 @@ def _long(source: Rows, header: tuple[str, ...], bare: dict[str, int]) -> Table:
         names = sorted({*labels}, key=float) if numeric else list(dict.fromkeys(labels))
         point = np.array([names.index(label) for label in labels])
         _check_once(t, frame, point, names, source)
-    values, lines = np.full((len(t), len(names), 3), np.nan), np.zeros((len(t), len(names)), int)
+    values, lines = (
+        np.full((len(t), len(names), 3), np.nan),
+        np.zeros((len(t), len(names)), int),
+    )
     values[..., 2] = np.inf
     columns = [bare["x"], bare["y"], *([] if score is None else [score])]
     values[frame, point, : len(columns)] = rows[:, columns]
@@ -248,12 +303,16 @@ def _long(source: Rows, header: tuple[str, ...], bare: dict[str, int]) -> Table:
 def _moments(t: np.ndarray, source: Rows) -> np.ndarray:
     if (bad := np.flatnonzero(np.isnan(t))).size:
         raise Refusal(
-            "no time", where=f"{source.name}, line {source.lines[bad[0]]}", instead="give every row its t or frame"
+            "no time",
+            where=f"{source.name}, line {source.lines[bad[0]]}",
+            instead="give every row its t or frame",
         )
     return t
 
 
-def _unnamed(t: np.ndarray, frame: np.ndarray, source: Rows) -> tuple[list[str], np.ndarray]:
+def _unnamed(
+    t: np.ndarray, frame: np.ndarray, source: Rows
+) -> tuple[list[str], np.ndarray]:
     counts = np.bincount(frame)
     if (bad := np.flatnonzero(counts != np.bincount(counts).argmax())).size:
         line = source.lines[np.flatnonzero(frame == bad[0])[0]]
@@ -280,11 +339,17 @@ def _check_once(t, frame, point, names, source: Rows) -> None:
         )
 
 
-def _wide(source: Rows, header: tuple[str, ...], pairs: dict[str, dict[str, int]]) -> Table:
+def _wide(
+    source: Rows, header: tuple[str, ...], pairs: dict[str, dict[str, int]]
+) -> Table:
     """Return the table of a file with a row for each frame."""
     line = source.header[0]
     if len(pairs) < 2:
-        other = "; columns must be parted by commas" if re.search("[;\\t]", ",".join(header)) else ""
+        other = (
+            "; columns must be parted by commas"
+            if re.search("[;\\t]", ",".join(header))
+            else ""
+        )
         raise Refusal(
             f"no columns of points{other}",
             where=f"{source.name}, line {line}",
@@ -297,33 +362,72 @@ def _wide(source: Rows, header: tuple[str, ...], pairs: dict[str, dict[str, int]
     return _framed(source, 1, header, pairs, clock, second, timed, unit)
 
 
-def _framed(source: Rows, first: int, header, pairs, clock: int, second: float, timed: bool, unit: str) -> Table:
-    texts = [k for k, name in enumerate(header) if name in ("track", "individual", "scorer")]
+def _framed(
+    source: Rows,
+    first: int,
+    header,
+    pairs,
+    clock: int,
+    second: float,
+    timed: bool,
+    unit: str,
+) -> Table:
+    texts = [
+        k for k, name in enumerate(header) if name in ("track", "individual", "scorer")
+    ]
     used = {clock, *(k for columns in pairs.values() for k in columns.values())}
     if texts:  # names of tracks are no numbers
-        numbers = lambda text: ",".join("0" if k in texts else c for k, c in enumerate(text.split(",")))
-        many = {text.split(",")[k] for _, text in source.filled[first:] for k in texts if text.count(",") >= k}
+        numbers = lambda text: ",".join(
+            "0" if k in texts else c for k, c in enumerate(text.split(","))
+        )
+        many = {
+            text.split(",")[k]
+            for _, text in source.filled[first:]
+            for k in texts
+            if text.count(",") >= k
+        }
         if len(many) > 1:
             raise Refusal(
                 f"{len(many)} animals are in it: {', '.join(sorted(many)[:4])}",
                 where=source.name,
                 instead="give each a file",
             )
-        filled = [*source.filled[:first], *((n, numbers(x)) for n, x in source.filled[first:])]
+        filled = [
+            *source.filled[:first],
+            *((n, numbers(x)) for n, x in source.filled[first:]),
+        ]
         source = Rows(source.name, source.sha256, filled, source.comments)
     rows = _cells(source, first, header)
     t = rows[:, clock] * second
     lines = np.array([k for k, _ in source.filled[first:]], int)
     for k in np.flatnonzero(~(np.diff(t, prepend=-np.inf) > 0)):
-        what = "no time" if np.isnan(t[k]) else f"t = {t[k]:.6g} comes after {t[k - 1]:.6g}"
-        raise Refusal(what, where=f"{source.name}, line {lines[k]}", instead="sort the rows by time, one for each")
+        what = (
+            "no time"
+            if np.isnan(t[k])
+            else f"t = {t[k]:.6g} comes after {t[k - 1]:.6g}"
+        )
+        raise Refusal(
+            what,
+            where=f"{source.name}, line {lines[k]}",
+            instead="sort the rows by time, one for each",
+        )
     values = np.full((len(t), len(pairs), 3), np.inf)
     for p, columns in enumerate(pairs.values()):
         for j, coordinate in enumerate(("x", "y", "score")):
             if coordinate in columns:
                 values[:, p, j] = rows[:, columns[coordinate]]
-    unused = tuple(name for k, name in enumerate(header) if k not in used and k not in texts)
-    return Table(t, values, tuple(pairs), np.repeat(lines[:, None], len(pairs), 1), unit, timed, unused)
+    unused = tuple(
+        name for k, name in enumerate(header) if k not in used and k not in texts
+    )
+    return Table(
+        t,
+        values,
+        tuple(pairs),
+        np.repeat(lines[:, None], len(pairs), 1),
+        unit,
+        timed,
+        unused,
+    )
 
 
 def _deeplabcut(source: Rows) -> Table:
@@ -333,7 +437,10 @@ def _deeplabcut(source: Rows) -> Table:
         words = [word.strip(' "') for word in text.split(",")]
         if words[0].lower() in HEADS:
             heads[words[0].lower()] = words[1:]
-    if not {"bodyparts", "coords"} <= {*heads} or len({len(x) for x in heads.values()}) > 1:
+    if (
+        not {"bodyparts", "coords"} <= {*heads}
+        or len({len(x) for x in heads.values()}) > 1
+    ):
         raise Refusal(
             "a file of DeepLabCut has header rows scorer, bodyparts and coords of equal length",
             where=f"{source.name}, line {source.filled[0][0]}",
@@ -346,7 +453,13 @@ def _deeplabcut(source: Rows) -> Table:
             where=source.name,
             instead="give each a file",
         )
-    header = ("frame", *(f"{part}.{c.lower()}" for part, c in zip(heads["bodyparts"], heads["coords"])))
+    header = (
+        "frame",
+        *(
+            f"{part}.{c.lower()}"
+            for part, c in zip(heads["bodyparts"], heads["coords"])
+        ),
+    )
     return _framed(source, len(heads), header, _pairs(header), 0, 1.0, False, "px")
 
 
@@ -358,33 +471,51 @@ def _selected(table: Table, name: str, points: Sequence[str]) -> Table:
     for x in points:
         choose(f"{name}: ``columns``", x.strip().lower(), lower)
     if len({x.strip().lower() for x in points}) < len(points):
-        raise Refusal("``columns`` name a point twice", where=name, instead="name each once, from one end of the body")
+        raise Refusal(
+            "``columns`` name a point twice",
+            where=name,
+            instead="name each once, from one end of the body",
+        )
     picks = [lower.index(x.strip().lower()) for x in points]
     names = tuple(table.names[k] for k in picks)
-    return table._replace(values=table.values[:, picks], names=names, lines=table.lines[:, picks])
+    return table._replace(
+        values=table.values[:, picks], names=names, lines=table.lines[:, picks]
+    )
 
 
 def _check(table: Table, name: str) -> None:
     frames, points = table.values.shape[:2]
     if not FEWEST_POINTS <= points <= MOST_POINTS:
         raise Refusal(
-            f"{points} points along the body", where=name, instead=f"give {FEWEST_POINTS} to {MOST_POINTS}, better 10"
+            f"{points} points along the body",
+            where=name,
+            instead=f"give {FEWEST_POINTS} to {MOST_POINTS}, better 10",
         )
     if frames < FEWEST_FRAMES:
         raise Refusal(
-            f"{frames} frames", where=name, instead="give a whole trial, 20 frames a cycle for at least one cycle"
+            f"{frames} frames",
+            where=name,
+            instead="give a whole trial, 20 frames a cycle for at least one cycle",
         )
 
 
-def _unit(table: Table, name: str, units: str | None, scale: float | None) -> tuple[str, float, list[str]]:
+def _unit(
+    table: Table, name: str, units: str | None, scale: float | None
+) -> tuple[str, float, list[str]]:
     """Return the unit of lengths, m or BL or "", that of the file in it, and what was taken for granted."""
     if units and table.unit and units != table.unit and table.unit != "px":
         raise Refusal(
-            f"x and y are in {table.unit} by the names of their columns", where=name, instead="drop ``units``"
+            f"x and y are in {table.unit} by the names of their columns",
+            where=name,
+            instead="drop ``units``",
         )
     unit = units or table.unit
     if scale is not None and unit not in ("px", ""):
-        raise Refusal("``scale`` is that of pixels", where=name, instead=f"drop it, x and y are in {unit}")
+        raise Refusal(
+            "``scale`` is that of pixels",
+            where=name,
+            instead=f"drop it, x and y are in {unit}",
+        )
     if scale is not None:
         return "m", scale * 1e-3, []
     if unit in UNITS:
@@ -399,8 +530,15 @@ def _time(table: Table, fps: float | None) -> tuple[np.ndarray, bool, list[str]]
     """Return times (F,), whether they are in s, and what was taken for granted."""
     if table.timed:
         if fps is not None:
-            raise Refusal("``fps`` is that of a file that counts frames", instead="drop it, the file has a time")
+            raise Refusal(
+                "``fps`` is that of a file that counts frames",
+                instead="drop it, the file has a time",
+            )
         return table.t, True, []
     if fps is not None:
         return table.t / fps, True, []
-    return table.t, False, ["times are in frames: nobody says how many there are in a second, say fps"]
+    return (
+        table.t,
+        False,
+        ["times are in frames: nobody says how many there are in a second, say fps"],
+    )

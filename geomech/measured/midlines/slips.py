@@ -6,7 +6,9 @@ import numpy as np
 
 from geomech.measured.midlines.trial import Trial
 
-OTHER_SCALE = 4.0  # ratio of a frame's size to the usual, from which on it is in another unit
+OTHER_SCALE = (
+    4.0  # ratio of a frame's size to the usual, from which on it is in another unit
+)
 REVERSED = 0.4  # of the distance to the frame before, that a reversed frame has
 JUMP = 8.0  # times the usual distance of a point from where it is in the frames around
 MOVES = 6.0  # times the distance of the frames around from each other
@@ -40,10 +42,15 @@ def _check_points(trial: Trial) -> None:
             f"point {trial.names[k]} is missing in {100 * lost[k]:.3g} % of the frames",
             instead="leave it out with ``columns``, or lower ``least_score``",
         )
-    still = np.nanmax(np.ptp(trial.points, axis=0), -1) if not lost.any() else np.ones(len(lost))
+    still = (
+        np.nanmax(np.ptp(trial.points, axis=0), -1)
+        if not lost.any()
+        else np.ones(len(lost))
+    )
     if still.min() == 0:
         raise trial.wrong(
-            f"point {trial.names[int(still.argmin())]} never moves", instead="leave it out with ``columns``"
+            f"point {trial.names[int(still.argmin())]} never moves",
+            instead="leave it out with ``columns``",
         )
 
 
@@ -71,22 +78,34 @@ def _check_scale(trial: Trial) -> None:
     if (usual_chords(trial.points) == 0).any():
         k = int(usual_chords(trial.points).argmin())
         raise trial.wrong(
-            f"points {trial.names[k]} and {trial.names[k + 1]} are in one place", instead="drop one with ``columns``"
+            f"points {trial.names[k]} and {trial.names[k + 1]} are in one place",
+            instead="drop one with ``columns``",
         )
-    size = np.nansum(chords, 1) / np.nansum(np.where(np.isnan(chords), np.nan, usual_chords(trial.points)), 1)
+    size = np.nansum(chords, 1) / np.nansum(
+        np.where(np.isnan(chords), np.nan, usual_chords(trial.points)), 1
+    )
     bad = np.flatnonzero((size > OTHER_SCALE) | (size < 1 / OTHER_SCALE))
     if bad.size:
         k = int(bad[0])
         factor = size[k] if size[k] > 1 else 1 / size[k]
-        like = ": mm for m, or another such unit" if any(abs(factor / x - 1) < 0.3 for x in (10, 100, 1000)) else ""
+        like = (
+            ": mm for m, or another such unit"
+            if any(abs(factor / x - 1) < 0.3 for x in (10, 100, 1000))
+            else ""
+        )
         raise trial.wrong(
-            f"the body is {size[k]:.3g} times as long as in most frames{like}", k, instead="mend or drop that frame"
+            f"the body is {size[k]:.3g} times as long as in most frames{like}",
+            k,
+            instead="mend or drop that frame",
         )
 
 
 def _check_order(trial: Trial) -> None:
     """Refuse points that are out of order along the body, as of its left and right sides."""
-    chord = np.diff(trial.points, axis=1)[..., 0] + 1j * np.diff(trial.points, axis=1)[..., 1]
+    chord = (
+        np.diff(trial.points, axis=1)[..., 0]
+        + 1j * np.diff(trial.points, axis=1)[..., 1]
+    )
     forth = np.nanmedian(np.cos(np.angle(chord[:, 1:]) - np.angle(chord[:, :-1])), 0)
     if forth.min() < -0.5:
         k = int(forth.argmin())
@@ -112,10 +131,15 @@ def _rotated(trial: Trial, mend: bool) -> Trial:
     what = f"{state.sum()} frames run from the other end of the body"
     if not mend:
         raise trial.wrong(
-            f"{what}, the first is this one", k, instead="turn the order of their points round, or say ``mend``"
+            f"{what}, the first is this one",
+            k,
+            instead="turn the order of their points round, or say ``mend``",
         )
     points = np.where(state[:, None, None], x[:, ::-1], x)
-    return trial.with_notes(f"{what} and are turned round, the first at line {trial.lines[k, 0]}", points=points)
+    return trial.with_notes(
+        f"{what} and are turned round, the first at line {trial.lines[k, 0]}",
+        points=points,
+    )
 
 
 def _without_jumps(trial: Trial, mend: bool) -> Trial:
@@ -123,7 +147,9 @@ def _without_jumps(trial: Trial, mend: bool) -> Trial:
     x = trial.points
     around = np.stack([np.roll(x, k, 0) for k in (-2, -1, 1, 2)])
     for neighbour, k in zip(around, (-2, -1, 1, 2)):
-        neighbour[np.abs(np.roll(trial.t, k) - trial.t) > NEAR * np.median(np.diff(trial.t))] = np.nan
+        neighbour[
+            np.abs(np.roll(trial.t, k) - trial.t) > NEAR * np.median(np.diff(trial.t))
+        ] = np.nan
     with np.errstate(all="ignore"):
         expected = np.nanmedian(around, 0)
         moves = np.nanmedian(np.hypot(*np.moveaxis(around - expected, -1, 0)), 0)
@@ -136,7 +162,9 @@ def _without_jumps(trial: Trial, mend: bool) -> Trial:
     places = np.argwhere(bad)
     if not mend:
         raise _jump(trial, expected, bad, distance, *map(int, places[0]))
-    named = ", ".join(f"{trial.names[p]} at line {trial.lines[f, p]}" for f, p in places[:NAMED])
+    named = ", ".join(
+        f"{trial.names[p]} at line {trial.lines[f, p]}" for f, p in places[:NAMED]
+    )
     more = f" and {len(places) - NAMED} more" if len(places) > NAMED else ""
     return trial.with_notes(
         f"{len(places)} points that jump or swap are taken for missing: {named}{more}",
@@ -144,15 +172,33 @@ def _without_jumps(trial: Trial, mend: bool) -> Trial:
     )
 
 
-def _jump(trial: Trial, expected: np.ndarray, bad: np.ndarray, distance: np.ndarray, frame: int, point: int):
+def _jump(
+    trial: Trial,
+    expected: np.ndarray,
+    bad: np.ndarray,
+    distance: np.ndarray,
+    frame: int,
+    point: int,
+):
     """Return the Refusal of a point that jumps, and with which other one it may have swapped."""
     x, others = trial.points[frame], np.flatnonzero(bad[frame])
     cure = "mend them, leave their cells empty, or say ``mend`` to have such points left out"
     for other in others[others != point]:
-        swapped = np.hypot(*(x[point] - expected[frame, other])), np.hypot(*(x[other] - expected[frame, point]))
+        swapped = (
+            np.hypot(*(x[point] - expected[frame, other])),
+            np.hypot(*(x[other] - expected[frame, point])),
+        )
         if max(swapped) < 0.5 * min(distance[frame, point], distance[frame, other]):
-            return trial.wrong(f"points {trial.names[point]} and {trial.names[other]} swap", frame, point, instead=cure)
+            return trial.wrong(
+                f"points {trial.names[point]} and {trial.names[other]} swap",
+                frame,
+                point,
+                instead=cure,
+            )
     size = distance[frame, point] / usual_chords(trial.points).sum()
     return trial.wrong(
-        f"it jumps by {size:.2g} body lengths from where it is in the frames around", frame, point, instead=cure
+        f"it jumps by {size:.2g} body lengths from where it is in the frames around",
+        frame,
+        point,
+        instead=cure,
     )

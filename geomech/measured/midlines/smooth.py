@@ -18,7 +18,9 @@ from numpy.polynomial import legendre
 
 from geomech.measured.midlines.trial import Trial
 
-DEGREE = 5  # of the splines in time: their rates are of order 5 in the spacing of the knots
+DEGREE = (
+    5  # of the splines in time: their rates are of order 5 in the spacing of the knots
+)
 KNOTS = (6, 7, 8, 10, 12, 14, 16, 20, 24, 32)  # per cycle, that are tried
 MODES = 4, 14  # of x and of y along the body, that are tried
 SAFE = 2.2  # times the root of the number of points: more modes through equal distances oscillate at the ends (Runge)
@@ -69,8 +71,12 @@ class Curve:
         """Return the curve with the effect of new noise on top: rows of the residual drawn with replacement, with random
         signs, and as alike as the noise."""
         frames = len(self.t)
-        rows = self.residual[rng.integers(frames, size=frames)] * rng.choice([-1.0, 1.0], (frames, 1, 1))
-        return replace(self, coefficients=self.coefficients + self.solver(_alike(rows, self.alike)))
+        rows = self.residual[rng.integers(frames, size=frames)] * rng.choice(
+            [-1.0, 1.0], (frames, 1, 1)
+        )
+        return replace(
+            self, coefficients=self.coefficients + self.solver(_alike(rows, self.alike))
+        )
 
 
 def _alike(rows: np.ndarray, correlation: float) -> np.ndarray:
@@ -78,7 +84,9 @@ def _alike(rows: np.ndarray, correlation: float) -> np.ndarray:
     from scipy.signal import lfilter
 
     fresh = np.sqrt(1 - correlation**2)
-    return lfilter([1.0], [1.0, -correlation], np.concatenate([rows[:1], fresh * rows[1:]]), axis=0)
+    return lfilter(
+        [1.0], [1.0, -correlation], np.concatenate([rows[:1], fresh * rows[1:]]), axis=0
+    )
 
 
 def placed(basis: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -102,7 +110,9 @@ class Solver:
         from scipy.linalg import cholesky_banded
 
         inner = t[step : len(t) - step : step]
-        self.knots = np.concatenate([[t[0]] * (DEGREE + 1), inner, [t[-1]] * (DEGREE + 1)])
+        self.knots = np.concatenate(
+            [[t[0]] * (DEGREE + 1), inner, [t[-1]] * (DEGREE + 1)]
+        )
         self.design = BSpline.design_matrix(t, self.knots, DEGREE).tocsr()
         normal = (self.design.T @ self.design).todia()
         self.count = self.design.shape[1]
@@ -118,7 +128,9 @@ class Solver:
         from scipy.linalg import cho_solve_banded
 
         flat = rows.reshape(len(rows), -1)
-        return cho_solve_banded((self.factor, False), self.design.T @ flat).reshape(-1, *rows.shape[1:])
+        return cho_solve_banded((self.factor, False), self.design.T @ flat).reshape(
+            -1, *rows.shape[1:]
+        )
 
     def smoothed(self, rows: np.ndarray) -> np.ndarray:
         """Return the splines through rows (F, C) at the rows."""
@@ -141,7 +153,9 @@ def _chord_places(points: np.ndarray) -> np.ndarray:
     return s / s[-1]
 
 
-def projected(points: np.ndarray, s: np.ndarray, modes: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def projected(
+    points: np.ndarray, s: np.ndarray, modes: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return orthonormal coefficients (F, modes, 2) of frames, what makes them from Legendre's, and what they leave of
     the frames (F, P, 2)."""
     q, triangle = np.linalg.qr(_legendre(s, modes, 0))
@@ -158,7 +172,9 @@ def filled(trial: Trial) -> Trial:
         known = ~missing[:, p]
         inside = np.clip(trial.t, *trial.t[known][[0, -1]])
         points[:, p] = np.where(
-            known[:, None], points[:, p], PchipInterpolator(trial.t[known], points[known, p])(inside)
+            known[:, None],
+            points[:, p],
+            PchipInterpolator(trial.t[known], points[known, p])(inside),
         )
     return replace(trial, points=points, filled=missing)
 
@@ -169,14 +185,18 @@ def fitted(trial: Trial, period: float) -> tuple[Curve, Trial]:
     s = _chord_places(trial.points)
     rows = len(trial.t) * period / (trial.t[-1] - trial.t[0])
     most = min(MODES[1], int(SAFE * np.sqrt(len(s))), len(s) - 1)
-    solvers = {k: Solver(trial.t, k) for k in sorted({max(2, round(rows / n)) for n in KNOTS})}
+    solvers = {
+        k: Solver(trial.t, k) for k in sorted({max(2, round(rows / n)) for n in KNOTS})
+    }
     modes, step = _chosen(trial, s, most, solvers)
     for _ in range(PASSES):
         curve = _curve(trial, s, modes, step, solvers[step])
         trial = _completed(trial, curve)
         s = _arc_places(curve, s)
     modes, step = _chosen(trial, s, most, solvers)
-    return curve_of(trial, s, min(modes + MORE, most), max(2, round(step / CLOSER))), trial
+    return curve_of(
+        trial, s, min(modes + MORE, most), max(2, round(step / CLOSER))
+    ), trial
 
 
 def _completed(trial: Trial, curve: Curve) -> Trial:
@@ -184,7 +204,9 @@ def _completed(trial: Trial, curve: Curve) -> Trial:
     if not trial.filled.any():
         return trial
     smooth = curve.basis(curve.s) @ curve.at(trial.t)
-    return replace(trial, points=np.where(trial.filled[..., None], smooth, trial.points))
+    return replace(
+        trial, points=np.where(trial.filled[..., None], smooth, trial.points)
+    )
 
 
 def coarser(trial: Trial, curve: Curve) -> Curve:
@@ -198,15 +220,21 @@ def curve_of(trial: Trial, s: np.ndarray, modes: int, step: int) -> Curve:
     return _curve(trial, s, modes, step, Solver(trial.t, step))
 
 
-def _chosen(trial: Trial, s: np.ndarray, most: int, solvers: dict[int, Solver]) -> tuple[int, int]:
+def _chosen(
+    trial: Trial, s: np.ndarray, most: int, solvers: dict[int, Solver]
+) -> tuple[int, int]:
     """Return modes and rows between knots of the least generalised cross-validation."""
     z, _, left = projected(trial.points, s, most)
     count = trial.known
     scores = {}
     for step, solver in solvers.items():
-        square = ((z - solver.smoothed(z.reshape(len(z), -1)).reshape(z.shape)) ** 2).sum((0, 2))
+        square = (
+            (z - solver.smoothed(z.reshape(len(z), -1)).reshape(z.shape)) ** 2
+        ).sum((0, 2))
         for modes in range(min(MODES[0], most), most + 1):
-            residual = (left**2).sum() + square[:modes].sum() + (z[:, modes:] ** 2).sum()
+            residual = (
+                (left**2).sum() + square[:modes].sum() + (z[:, modes:] ** 2).sum()
+            )
             scores[modes, step] = residual / (1 - 2 * modes * solver.count / count) ** 2
     return min(scores, key=scores.get)
 
@@ -214,15 +242,33 @@ def _chosen(trial: Trial, s: np.ndarray, most: int, solvers: dict[int, Solver]) 
 def _curve(trial: Trial, s: np.ndarray, modes: int, step: int, solver: Solver) -> Curve:
     z, triangle, left = projected(trial.points, s, modes)
     coefficients = solver(z)
-    residual = z - (solver.design @ coefficients.reshape(solver.count, -1)).reshape(z.shape)
+    residual = z - (solver.design @ coefficients.reshape(solver.count, -1)).reshape(
+        z.shape
+    )
     # What modes leave of the frames shows how alike noise is from one to the next; the more it is, the more of it a
     # spline takes along.
-    alike = float(np.clip((left[1:] * left[:-1]).sum() / max((left**2).sum(), 1e-300), 0.0, ALIKE))
+    alike = float(
+        np.clip((left[1:] * left[:-1]).sum() / max((left**2).sum(), 1e-300), 0.0, ALIKE)
+    )
     drawn = np.random.default_rng(0).normal(size=(len(trial.t), 2 * NODES))
-    kept, white = (((x - solver.smoothed(x)) ** 2).sum() for x in (_alike(drawn, alike), drawn))
+    kept, white = (
+        ((x - solver.smoothed(x)) ** 2).sum() for x in (_alike(drawn, alike), drawn)
+    )
     residual = residual / np.sqrt((1 - solver.count / len(trial.t)) * kept / white)
     noise = np.sqrt(((left**2).sum() + (residual**2).sum()) / trial.known)
-    return Curve(trial.t, s, modes, step, solver.knots, coefficients, residual, float(noise), alike, triangle, solver)
+    return Curve(
+        trial.t,
+        s,
+        modes,
+        step,
+        solver.knots,
+        coefficients,
+        residual,
+        float(noise),
+        alike,
+        triangle,
+        solver,
+    )
 
 
 def _arc_places(curve: Curve, s: np.ndarray) -> np.ndarray:

@@ -29,7 +29,14 @@ class SyntheticTrial(NamedTuple):
         """Return the trial as `geomech.measured.midlines.reader.read` gives it."""
         frames, points = self.points.shape[:2]
         lines = 2 + np.arange(frames * points).reshape(frames, points)
-        return Trial(name, self.t, self.points, tuple(str(k + 1) for k in range(points)), lines, "BL")
+        return Trial(
+            name,
+            self.t,
+            self.points,
+            tuple(str(k + 1) for k in range(points)),
+            lines,
+            "BL",
+        )
 
 
 def made(
@@ -48,18 +55,27 @@ def made(
     t = np.arange(count) / (frames * FINER * frequency)
     varying = smooth_noise(rng, LONGER * count, MEMORY * frames * FINER, 3)[0][:count]
     rate = 2 * np.pi * frequency * (1 + jitter * varying[:, 0])
-    phase = rng.uniform(0, 2 * np.pi) + np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2) * t[1]])
-    swings, wavenumbers = swing * (1 + spread * varying[:, 1]), 2 * np.pi * waves * (1 + spread * varying[:, 2])
+    phase = rng.uniform(0, 2 * np.pi) + np.concatenate(
+        [[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2) * t[1]]
+    )
+    swings, wavenumbers = (
+        swing * (1 + spread * varying[:, 1]),
+        2 * np.pi * waves * (1 + spread * varying[:, 2]),
+    )
     elements = system.joints + 1
     s = (np.arange(elements) + 0.5) / elements
-    headings = swings[:, None] * np.sin(phase[:, None] + wavenumbers[:, None] * (s - 0.5)) + bend * (s - 0.5)
+    headings = swings[:, None] * np.sin(
+        phase[:, None] + wavenumbers[:, None] * (s - 0.5)
+    ) + bend * (s - 0.5)
     alpha = np.diff(headings, axis=-1)
     alphadot = _rates(t, alpha)
     pose = integrated(system.velocity(alpha, alphadot), t[1]) + [0.0, 0.0, heading]
     pose[:, :2] = pose[:, :2] @ _turn(heading).T
     ends = system.body.points(alpha[::FINER], pose[::FINER])
     exact = _at(ends, np.linspace(0, 1, points)) / system.length
-    return SyntheticTrial(t[::FINER], exact + noise * rng.normal(size=exact.shape), exact)
+    return SyntheticTrial(
+        t[::FINER], exact + noise * rng.normal(size=exact.shape), exact
+    )
 
 
 def _turn(angle: float) -> np.ndarray:
@@ -83,7 +99,18 @@ def save(path: str | Path, trial: SyntheticTrial) -> None:
     """Write a trial as CSV: t, point, x, y, in body lengths."""
     frames, points = trial.points.shape[:2]
     rows = np.column_stack(
-        [np.repeat(trial.t, points), np.tile(np.arange(1, points + 1), frames), trial.points.reshape(-1, 2)]
+        [
+            np.repeat(trial.t, points),
+            np.tile(np.arange(1, points + 1), frames),
+            trial.points.reshape(-1, 2),
+        ]
     )
     with atomic_file(path) as part:
-        np.savetxt(part, rows, ("%.6g", "%d", "%.6g", "%.6g"), ",", header="t,point,x_BL,y_BL", comments="")
+        np.savetxt(
+            part,
+            rows,
+            ("%.6g", "%d", "%.6g", "%.6g"),
+            ",",
+            header="t,point,x_BL,y_BL",
+            comments="",
+        )

@@ -9,7 +9,11 @@ import numpy as np
 
 from rft.refusal import Refusal
 
-UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}  # m; px needs a scale, and BL is the body's own length
+UNITS = {
+    "m": 1.0,
+    "cm": 1e-2,
+    "mm": 1e-3,
+}  # m; px needs a scale, and BL is the body's own length
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +37,22 @@ class Trial:
     filled: np.ndarray | None = None
     notes: tuple[str, ...] = ()
 
-    def wrong(self, what: str, frame: int | None = None, point: int | None = None, **facts: Any) -> Refusal:
+    def wrong(
+        self,
+        what: str,
+        frame: int | None = None,
+        point: int | None = None,
+        **facts: Any,
+    ) -> Refusal:
         """Return a Refusal about a point of a frame, a frame, or the file. facts: keywords of `Refusal`."""
         places = [self.name]
         if frame is not None:
-            places = [f"{self.name}, line {self.lines[frame, 0 if point is None else point]}"]
-            places[0] += f" ({self.frame(frame)}" + (")" if point is None else f", point {self.names[point]})")
+            places = [
+                f"{self.name}, line {self.lines[frame, 0 if point is None else point]}"
+            ]
+            places[0] += f" ({self.frame(frame)}" + (
+                ")" if point is None else f", point {self.names[point]})"
+            )
         return Refusal(what, where=places[0], **facts)
 
     def frame(self, frame: int) -> str:
@@ -56,7 +70,11 @@ class Trial:
     @property
     def known(self) -> int:
         """Number of coordinates that the tracker gave."""
-        return 2 * int((~(np.isnan(self.points[..., 0]) if self.filled is None else self.filled)).sum())
+        return 2 * int(
+            (
+                ~(np.isnan(self.points[..., 0]) if self.filled is None else self.filled)
+            ).sum()
+        )
 
     def reversed(self) -> Trial:
         """Return the trial with its points in the other order."""

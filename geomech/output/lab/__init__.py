@@ -28,15 +28,33 @@ from geomech.systems.base import length_unit, shape_labels
 from rft.refusal import Refusal
 
 FOLDER = Path(__file__).parent
-SCRIPTS = ("numbers", "loops", "chart", "state", "files", "map", "swimmer", "curve", "page")  # in this order
+SCRIPTS = (
+    "numbers",
+    "loops",
+    "chart",
+    "state",
+    "files",
+    "map",
+    "swimmer",
+    "curve",
+    "page",
+)  # in this order
 COLOURS = 65  # of the map's scale
-ESCAPED = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026"}  # in JSON, so that no text can end its element
+ESCAPED = {
+    "<": "\\u003c",
+    ">": "\\u003e",
+    "&": "\\u0026",
+}  # in JSON, so that no text can end its element
 
 
 def check_format(path: Path) -> None:
     """Refuse a name of another format."""
     if path.suffix.lower() not in (".html", ".htm"):
-        raise Refusal("the gait lab is a page", value=str(path), instead="name a file that ends in .html")
+        raise Refusal(
+            "the gait lab is a page",
+            value=str(path),
+            instead="name a file that ends in .html",
+        )
 
 
 def message(result: Result, path: Path) -> str:
@@ -67,11 +85,15 @@ def write(result: Result, path: Path) -> None:
 def page(charts: list[Chart]) -> str:
     """Return the page of some charts as HTML."""
     style = (FOLDER / "lab.css").read_text(encoding="utf-8")
-    script = "".join(['"use strict";\n(() => {\n', *(_script(name) for name in SCRIPTS), "})();\n"])
+    script = "".join(
+        ['"use strict";\n(() => {\n', *(_script(name) for name in SCRIPTS), "})();\n"]
+    )
     parts = {
         "STYLE_HASH": _hash(style), "SCRIPT_HASH": _hash(script), "STYLE": style, "SCRIPT": script, "DATA": _json(data(charts)),
     }  # fmt: skip
-    pieces = (FOLDER / "lab.html").read_text(encoding="utf-8").split("%%")  # text, name, text, name ...
+    pieces = (
+        (FOLDER / "lab.html").read_text(encoding="utf-8").split("%%")
+    )  # text, name, text, name ...
     return "".join(parts[x] if k % 2 else x for k, x in enumerate(pieces))
 
 
@@ -95,15 +117,25 @@ def data(charts: list[Chart]) -> dict[str, Any]:
     from cmcrameri import cm
 
     tables: dict[str, str] = {}
-    colours = (255 * cm.vik(np.linspace(0, 1, COLOURS))[:, :3]).round().astype(int).tolist()
+    colours = (
+        (255 * cm.vik(np.linspace(0, 1, COLOURS))[:, :3]).round().astype(int).tolist()
+    )
     scenes = [_scene(chart, tables) for chart in charts]
-    return {"version": VERSION, "colours": colours, "shares": SHARES, "scenes": scenes, "tables": tables}
+    return {
+        "version": VERSION,
+        "colours": colours,
+        "shares": SHARES,
+        "scenes": scenes,
+        "tables": tables,
+    }
 
 
 def _scene(chart: Chart, tables: dict[str, str]) -> dict[str, Any]:
     scene, system = chart.scene, chart.scene.system
     family = chart.family
-    text = toml(scene if family is None else scene.changed(text=""))  # of a family every key is spelled out
+    text = toml(
+        scene if family is None else scene.changed(text="")
+    )  # of a family every key is spelled out
     first = toml(scene).split("\n", 1)[0]
 
     def stored(values: np.ndarray) -> str:
@@ -114,7 +146,9 @@ def _scene(chart: Chart, tables: dict[str, str]) -> dict[str, Any]:
 
     parts = ("A", "ccf", "ccf_error", "pose")
     frames = {
-        name: {part: stored(x) for part in parts if (x := getattr(frame, part)) is not None}
+        name: {
+            part: stored(x) for part in parts if (x := getattr(frame, part)) is not None
+        }
         for name, frame in chart.frames.items()
     }
     return {
@@ -161,5 +195,9 @@ def _without_gait(text: str) -> str:
     for line in text.splitlines():
         sections += [[]] if line.startswith("[") else []
         sections[-1].append(line)
-    rest = ["\n".join(lines).rstrip() for lines in sections if not lines or not lines[0].startswith("[gait")]
+    rest = [
+        "\n".join(lines).rstrip()
+        for lines in sections
+        if not lines or not lines[0].startswith("[gait")
+    ]
     return "\n\n".join(part for part in rest if part) + "\n"
