@@ -88,19 +88,57 @@ def _loaded(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
         data = path.read_bytes()
     except OSError as error:
         raise Refusal(f"cannot read mesh {path}", because=error.strerror) from None
-    if kind == "obj":
-        with located(path):
+    with located(path):
+        data = _plain(kind, data)
+        if kind == "obj":
             _require_read_rightly(data)
     with _silent():
         vertices, faces = _parsed(path, kind, data)
-    expected = _count(kind, data)
+    least, most = _count(kind, data)
     require(
-        expected is None or len(faces) in (0, expected),
+        least <= len(faces) <= most or not len(faces),
         f"{path} is no {kind.upper()} mesh",
-        because=f"{len(faces):,} of its {expected} triangles can be read",
+        because=f"it announces {least:,} triangles, and {len(faces):,} can be read",
         instead="write it anew in the program that made it",
     )
     return vertices, faces
+
+
+def _plain(kind: str, data: bytes) -> bytes:
+    """Return a file as trimesh reads it rightly: texts in UTF-8 with line feeds, without names and comments; Refusal
+    for a binary STL file that is cut off."""
+    is_text = kind == "obj" or b"\0" not in data or data[:2] in UTF_16
+    if kind == "stl" and (not is_text or _has_records(data)):
+        records = int.from_bytes(data[80:84], "little")
+        require(
+            _has_records(data),
+            "the file is cut off, or is no STL mesh",
+            because=f"it announces {records:,} triangles in {len(data):,} bytes",
+            instead="write it anew in the program that made it",
+        )
+        return data
+    if not is_text or (kind == "ply" and b"format binary" in data[:200]):
+        return data
+    try:
+        text = data.decode("utf-16" if data[:2] in UTF_16 else "utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    if kind == "stl":  # names may hold any word
+        text = re.sub(r"^(\s*(?:end)?solid)\b.*$", r"\1", text, flags=re.M | re.I)
+    if kind == "obj":
+        text = text.replace("\\\n", " ")
+        text = re.sub(r"[ \t]*#.*", "", text)
+        text = re.sub(r"^[ \t]+", "", text, flags=re.M)
+    return text.encode()
+
+
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+
+
+def _has_records(data: bytes) -> bool:
+    """Return whether a file is as long as a binary STL file of as many triangles as it announces."""
+    return len(data) == 84 + 50 * int.from_bytes(data[80:84], "little") > 84
 
 
 def _parsed(path: Path, kind: str, data: bytes) -> tuple[np.ndarray, np.ndarray]:
@@ -143,21 +181,19 @@ def _silent() -> Iterator[None]:
         logger.disabled = before
 
 
-def _count(kind: str, data: bytes) -> int | None:
-    """Return the number of triangles that the text of a file announces; None where trimesh compares it."""
-    if kind == "stl" and (facets := len(FACET.findall(data))):
-        records = int.from_bytes(data[80:84], "little")
-        return None if len(data) == 84 + 50 * records else facets
+def _count(kind: str, data: bytes) -> tuple[float, float]:
+    """Return the least and the largest number of triangles that a file of `_plain` text announces."""
+    if kind == "stl":
+        count = len(FACET.findall(data))
+        return (0, np.inf) if _has_records(data) else (count, count)
     if kind == "obj":
-        corners = [len(line.split()) - 1 for line in FACE.findall(_joined(data))]
-        return sum(max(0, n - 2) for n in corners)
-    return None
+        corners = [len(line.split()) - 1 for line in FACE.findall(data)]
+        count = sum(max(0, n - 2) for n in corners)
+        return count, count
+    count = sum(map(int, POLYGONS.findall(data[: data.find(b"end_header")])))
+    return count, np.inf
 
 
 FACET = re.compile(rb"^[ \t]*facet\b", re.M | re.I)
-FACE = re.compile(rb"^[ \t]*(f[ \t][^\r\n#]*)", re.M)
-
-
-def _joined(data: bytes) -> bytes:
-    """Return the text of an OBJ file with lines joined that end in a backslash."""
-    return data.replace(b"\\\r\n", b"").replace(b"\\\n", b"")
+FACE = re.compile(rb"^f[ \t].*", re.M)
+POLYGONS = re.compile(rb"^element[ \t]+face[ \t]+(\d{1,18})", re.M)

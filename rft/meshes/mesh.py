@@ -92,10 +92,11 @@ class Mesh:
         if len(surplus := shells.excess(faces)):
             raise self._open(surplus)
         parts = [faces[part] for part in shells.shells(faces)]
+        n_outside = [len(shells.without_walls(self.vertices, part)) for part in parts]
         is_hidden = shells.is_enclosed(self.vertices, parts)
         require(
-            not is_hidden.any(),
-            "a shell of the mesh lies inside another",
+            sum(n_outside) == len(faces) and not is_hidden.any(),
+            "a shell or wall lies inside the mesh",
             because="no grains touch it",
             instead="leave it out, as rft.meshes.sound does",
         )

@@ -30,16 +30,23 @@ def directed_edges(faces: np.ndarray) -> np.ndarray:
     return np.stack([faces, faces[:, [1, 2, 0]]], -1).reshape(-1, 2)
 
 
+def edge_codes(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return one whole number (3 F,) for each edge, whichever way it is run, and whether
+    it is run from the lower vertex to the higher."""
+    count = int(faces.max(initial=-1)) + 1
+    a, b = directed_edges(faces).T
+    return np.minimum(a, b) * count + np.maximum(a, b), a < b
+
+
 def excess(faces: np.ndarray) -> np.ndarray:
     """Return the edges (E, 2) that are run more often this way than the other.
 
     An edge occurs as often as it lacks a triangle on its other side.
     """
-    edges = directed_edges(faces)
     count = int(faces.max(initial=-1)) + 1
-    codes = edges.min(1) * count + edges.max(1)
+    codes, forward = edge_codes(faces)
     unique, index = np.unique(codes, return_inverse=True)
-    sense = np.where(edges[:, 0] < edges[:, 1], 1, -1)
+    sense = np.where(forward, 1, -1)
     surplus = np.bincount(index.reshape(-1), sense, len(unique)).astype(int)
     ends = np.stack([unique // count, unique % count], -1)
     ends[surplus < 0] = ends[surplus < 0, ::-1]
@@ -49,15 +56,12 @@ def excess(faces: np.ndarray) -> np.ndarray:
 def neighbours(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return pairs (P, 2) of triangles across edges that two share, and whether both
     run along theirs the same way (P,)."""
-    edges = directed_edges(faces)
-    count = int(faces.max(initial=-1)) + 1
-    codes = edges.min(1) * count + edges.max(1)
+    codes, forward = edge_codes(faces)
     order = np.argsort(codes, kind="stable")
     starts = np.flatnonzero(np.diff(codes[order], prepend=-1))
     uses = np.diff(starts, append=len(order))
     first = order[starts[uses == 2]]
     second = order[starts[uses == 2] + 1]
-    forward = edges[:, 0] < edges[:, 1]
     return np.stack([first, second], -1) // 3, forward[first] == forward[second]
 
 
@@ -72,9 +76,7 @@ def shells(faces: np.ndarray) -> list[np.ndarray]:
         return [np.arange(len(faces))]
     members = _members(piece)
     is_open = np.array([len(excess(faces[member])) > 0 for member in members])
-    edges = directed_edges(faces)
-    count = int(faces.max()) + 1
-    codes = edges.min(1) * count + edges.max(1)
+    codes, _ = edge_codes(faces)
     owner = np.repeat(piece, 3)
     loose = is_open[owner]
     order = np.argsort(codes[loose], kind="stable")
@@ -210,6 +212,28 @@ def nearly_closes(vertices: np.ndarray, faces: np.ndarray) -> bool:
     return area(points[added]) <= NEARLY * area(vertices[faces])
 
 
+def without_walls(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Return a closed shell (F, 3) without its pieces that have the body on both sides;
+    Refusal if one has it in part."""
+    piece = pieces(faces)
+    if piece.max() == 0:
+        return faces
+    corners = vertices[faces]
+    a, b, c = np.moveaxis(corners, 1, 0)
+    normal = np.cross(b - a, c - a)
+    size = np.linalg.norm(normal, axis=-1)
+    normal /= np.maximum(size, np.finfo(float).tiny)[:, None]
+    gap = CLEARANCE * float(np.ptp(corners, axis=(0, 1)).max())
+    sense = np.sign(volume(corners))
+    is_wall = winding(corners.mean(1) + sense * gap * normal, corners) != 0
+    is_wall &= size > 1e-14 * size.max()
+    hidden = np.bincount(piece, is_wall * size)
+    share = hidden / np.bincount(piece, size)
+    if ((share > 0.01) & (share < 0.99)).any():
+        raise _crossing()
+    return faces[share[piece] < 0.5]
+
+
 def is_enclosed(vertices: np.ndarray, parts: list[np.ndarray]) -> np.ndarray:
     """Return which of some closed shells, each as triangles (F_k, 3), lie inside
     others; Refusal if two cross or touch."""
@@ -243,8 +267,8 @@ def is_enclosed(vertices: np.ndarray, parts: list[np.ndarray]) -> np.ndarray:
 
 def _crossing() -> Refusal:
     return Refusal(
-        "two closed shells of the mesh cross or touch",
-        because="grains touch no face inside the other",
+        "parts of the mesh cross or touch",
+        because="grains do not touch the faces of one that lie in another",
         instead="unite them (Boolean union) in the program that made the mesh",
     )
 
@@ -262,7 +286,12 @@ def _is_inside(corners: np.ndarray, others: np.ndarray, gap: float) -> bool:
     size = np.linalg.norm(normal, axis=-1)
     flat = size <= 1e-14 * size.max()
     out = normal[~flat] / size[~flat, None] * np.sign(volume(corners))
-    found = winding(corners[~flat].mean(1) + gap * out, others) != 0
+    points = corners[~flat].mean(1) + gap * out
+    low, high = others.min((0, 1)), others.max((0, 1))
+    near = ((points >= low) & (points <= high)).all(-1)
+    found = np.zeros(len(points), bool)
+    if near.any():
+        found[near] = winding(points[near], others) != 0
     if found.any() and not found.all():
         raise _crossing()
     return bool(found.all())
@@ -307,6 +336,8 @@ def _cross(corners: np.ndarray, others: np.ndarray, gap: float) -> bool:
     others = (others - others[0, 0]) @ GENERIC_TURN
     start = turned.reshape(-1, 3)
     end = np.roll(turned, -1, 1).reshape(-1, 3)
+    once = start[:, 0] < end[:, 0]  # of the two triangles of an edge
+    start, end = start[once], end[once]
     a, b, c = np.moveaxis(others, 1, 0)
     normal = np.cross(b - a, c - a)
     size = np.linalg.norm(normal, axis=-1)

@@ -20,6 +20,7 @@ ROUNDINGS = (1e-7, 1e-6, 1e-5)  # of the size: distances within which corners ar
 SINGLE = 2.0**-23  # of a coordinate: rounding of single precision, that of STL files
 FOLDED = -0.99999  # cosine of the angle between normals, 0.26 degrees from a fold
 FOLDS = 1e-4  # of the surface: area of folds below which they are rounding
+MOST_FLAT = 1000  # triangles without area that are merged, each in a search
 MOST_WALLS = 20  # within a body, which are tried in turn
 OPEN_CURE = "close it, or say closed = false if it is a sheet"
 
@@ -77,6 +78,11 @@ def size_note(mesh: Mesh, cure: str) -> list[str]:
     return [f"the mesh is {size:.3g} m large: {cure}"]
 
 
+def _counted(count: int, noun: str) -> str:
+    """Return a number with its noun, such as "2 holes"."""
+    return f"{count:,} {noun}" if count == 1 else f"{count:,} {noun}s"
+
+
 class _Mender:
     """Mends a mesh step by step, and keeps notes."""
 
@@ -87,9 +93,9 @@ class _Mender:
         self.faces = index.reshape(-1)[faces]
         self.size = float(np.ptp(self.vertices[self.faces], axis=(0, 1)).max())
 
-    def note(self, count: int, what: str) -> None:
+    def note(self, count: int, noun: str, done: str) -> None:
         if count:
-            self.notes.append(f"{count:,} {what}")
+            self.notes.append(f"{_counted(count, noun)} {done}")
 
     def mended(self, closed: bool) -> Sound:
         self.drop_points()
@@ -97,7 +103,8 @@ class _Mender:
         if self.weld():
             self.drop_doubles(closed)
         self.turn(closed)
-        self.drop_walls(closed)
+        if closed:
+            self.drop_single_walls()
         parts = shells.shells(self.faces)
         is_open = [len(shells.excess(self.faces[part])) > 0 for part in parts]
         solids = [part for part, loose in zip(parts, is_open) if not loose]
@@ -123,7 +130,7 @@ class _Mender:
             because="clean the mesh",
         )
         self.faces = self.faces[proper]
-        self.note(flat, "triangles without area are left out")
+        self.note(flat, "triangle", "without area left out")
 
     def weld(self) -> bool:
         """Weld corners of open edges within rounding; return whether that closes any."""
@@ -131,10 +138,10 @@ class _Mender:
         from scipy.sparse.csgraph import connected_components
         from scipy.spatial import cKDTree
 
-        loose = self.loose()
+        loose = self.loose(self.faces)
         if not len(loose):
             return False
-        corners = np.unique(loose)
+        corners = np.unique([loose // len(self.vertices), loose % len(self.vertices)])
         rounding = 2 * SINGLE * float(np.abs(self.vertices[self.faces]).max())
         tree = cKDTree(self.vertices[corners])
         best = None
@@ -160,26 +167,27 @@ class _Mender:
             return False
         dropped = len(self.faces) - len(best[1])
         self.faces = best[1]
-        self.note(best[2], f"vertices within {best[3]:.2g} m of others are welded")
-        self.note(dropped, "triangles without area are left out")
+        self.notes.append(
+            f"corners within {best[3]:.2g} m of others welded: {best[2]:,}"
+        )
+        self.note(dropped, "triangle", "without area left out")
         return True
 
-    def loose(self, faces: np.ndarray | None = None) -> np.ndarray:
-        """Return the edges (E, 2) that an odd number of triangles share."""
-        edges = np.sort(
-            shells.directed_edges(self.faces if faces is None else faces), 1
-        )
-        unique, uses = np.unique(edges, axis=0, return_counts=True)
+    def loose(self, faces: np.ndarray) -> np.ndarray:
+        """Return codes of the edges that an odd number of triangles share."""
+        a, b = shells.directed_edges(faces).T
+        codes = np.minimum(a, b) * len(self.vertices) + np.maximum(a, b)
+        unique, uses = np.unique(codes, return_counts=True)
         return unique[uses % 2 == 1]
 
     def drop_doubles(self, closed: bool) -> None:
         """Leave out triangles that stand twice. Of triangles back to back one stays, if
-        they are sheets or such triangles form a closed surface by themselves."""
+        they are sheets, or if they close a surface, by themselves or with others."""
         a, b, c = self.faces.T
         is_even = np.sum([a < b, b < c, c < a], axis=0) == 2
-        key = np.column_stack([np.sort(self.faces, 1), is_even])
-        _, first = np.unique(key, axis=0, return_index=True)
-        self.note(len(key) - len(first), "triangles that stand twice are left out")
+        number = self.numbers()
+        _, first = np.unique(2 * number + is_even, return_index=True)
+        self.note(len(number) - len(first), "double triangle", "left out")
         self.faces = self.faces[np.sort(first)]
         back = self.back_to_back()
         if not len(back):
@@ -187,18 +195,27 @@ class _Mender:
         surface = self.faces[back[:, 0]]
         parts = shells.shells(surface)
         if closed:
-            parts = [part for part in parts if not len(self.loose(surface[part]))]
+            open_edges = self.loose(np.delete(self.faces, back.ravel(), axis=0))
+            rims = [self.loose(surface[part]) for part in parts]
+            parts = [p for p, rim in zip(parts, rims) if np.isin(rim, open_edges).all()]
         if parts:
             gone = back[np.concatenate(parts), 1]
-            self.note(len(gone), "triangles back to back with others are left out")
+            self.note(len(gone), "triangle", "back to back with others left out")
             self.faces = np.delete(self.faces, gone, axis=0)
+
+    def numbers(self) -> np.ndarray:
+        """Return the same whole number (F,) for triangles with the same corners."""
+        low, middle, high = np.sort(self.faces, 1).T
+        count = len(self.vertices)
+        _, pair = np.unique(low * count + middle, return_inverse=True)
+        _, number = np.unique(pair.reshape(-1) * count + high, return_inverse=True)
+        return number.reshape(-1)
 
     def back_to_back(self) -> np.ndarray:
         """Return the pairs (P, 2) of triangles with the same corners."""
-        _, index, uses = np.unique(
-            np.sort(self.faces, 1), axis=0, return_inverse=True, return_counts=True
-        )
-        order = np.argsort(index.reshape(-1), kind="stable")
+        number = self.numbers()
+        uses = np.bincount(number)
+        order = np.argsort(number, kind="stable")
         starts = np.cumsum(uses) - uses
         first = starts[uses == 2]
         return np.stack([order[first], order[first + 1]], -1)
@@ -214,29 +231,12 @@ class _Mender:
             instead="mend it in the program that made it",
         )
         self.faces[turned] = self.faces[turned][:, ::-1]
-        self.note(int(turned.sum()), "triangles wound against the others are turned")
-
-    def drop_walls(self, closed: bool) -> None:
-        """Leave out walls within a body: pairs of triangles back to back, and single
-        triangles that an odd number of triangles meets at each edge of."""
-        if not closed:
-            return
-        back = self.back_to_back()
-        if len(back):
-            rest = np.delete(self.faces, back.ravel(), axis=0)
-            if len(rest) and not len(shells.excess(rest)):
-                middles = self.vertices[self.faces[back[:, 0]]].mean(1)
-                inside = shells.winding(middles, self.vertices[rest]) != 0
-                self.note(int(inside.sum()), "walls within the body are left out")
-                self.faces = np.delete(self.faces, back[inside].ravel(), axis=0)
-        self.drop_single_walls()
+        self.note(int(turned.sum()), "triangle", "wound against the others turned")
 
     def drop_single_walls(self) -> None:
         """Leave out surfaces that end at edges of others, if a body closes without."""
-        edges = np.sort(shells.directed_edges(self.faces), 1)
-        _, index, uses = np.unique(
-            edges, axis=0, return_inverse=True, return_counts=True
-        )
+        codes, _ = shells.edge_codes(self.faces)
+        _, index, uses = np.unique(codes, return_inverse=True, return_counts=True)
         odd = (uses % 2 == 1) & (uses > 2)
         touched = odd[index.reshape(-1)].reshape(-1, 3).any(1)
         if not touched.any():
@@ -256,18 +256,19 @@ class _Mender:
         wall = self.faces[label == best[1]]
         middles = self.vertices[wall].mean(1)
         if (shells.winding(middles, self.vertices[best[2]]) != 0).all():
-            self.note(len(wall), "triangles of a wall within the body are left out")
+            self.note(len(wall), "triangle", "of a wall within the body left out")
             self.faces = best[2]
 
     def closed(self, solids: list, sheets: list) -> list[np.ndarray]:
         """Return the triangles (F, 3) of the outermost shells."""
         solids = [self.faces[part] for part in solids]
-        filled = holes = 0
+        filled = holes = inner = 0
         added_area = 0.0
         for part in sheets:
             faces = self.faces[part]
             if not shells.nearly_closes(self.vertices, faces):
-                self.drop_or_refuse(faces, solids)
+                self.require_inside(faces, solids)
+                inner += len(faces)
                 continue
             self.vertices, added, count = shells.caps(self.vertices, faces)
             added_area += shells.area(self.vertices[added])
@@ -278,14 +279,15 @@ class _Mender:
             total = sum(shells.area(self.vertices[faces]) for faces in solids)
             self.note(
                 holes,
-                f"holes are filled by {filled:,} triangles, "
+                "hole",
+                f"filled by {_counted(filled, 'triangle')}, "
                 f"{100 * added_area / total:.2g} % of the surface",
             )
-        require(len(solids) > 0, "the mesh encloses nothing", instead=self.cure)
+        self.note(inner, "triangle", "of open surfaces within the body left out")
         return self.outermost(solids)
 
-    def drop_or_refuse(self, faces: np.ndarray, solids: list[np.ndarray]) -> None:
-        """Leave out an open surface inside closed shells; Refusal for another."""
+    def require_inside(self, faces: np.ndarray, solids: list[np.ndarray]) -> None:
+        """Raise Refusal unless an open surface lies inside closed shells."""
         middles = self.vertices[faces].mean(1)
         inside = np.zeros(len(middles), bool)
         for solid in solids:
@@ -297,10 +299,13 @@ class _Mender:
                 because=f"{count} edges have one triangle",
                 instead=self.cure,
             )
-        self.note(len(faces), "triangles of open surfaces inside are left out")
 
     def outermost(self, solids: list[np.ndarray]) -> list[np.ndarray]:
         """Return the shells that no other encloses, with their outside out."""
+        count = sum(map(len, solids))
+        solids = [shells.without_walls(self.vertices, faces) for faces in solids]
+        count -= sum(map(len, solids))
+        self.note(count, "triangle", "of walls within the body left out")
         enclosed = shells.is_enclosed(self.vertices, solids)
         kept = []
         hidden = turned = 0
@@ -319,10 +324,11 @@ class _Mender:
             kept.append(faces if content > 0 else faces[:, ::-1])
         self.note(
             hidden,
-            f"triangles of {enclosed.sum()} shells inside another are left out, "
+            "triangle",
+            f"of {_counted(int(enclosed.sum()), 'shell')} inside another left out, "
             "as no grains touch them",
         )
-        self.note(turned, "triangles of shells that were inside out are turned")
+        self.note(turned, "triangle", "of shells that were inside out turned")
         return kept
 
     def with_sheets(self, solids: list, sheets: list) -> list[np.ndarray]:
@@ -342,7 +348,7 @@ class _Mender:
         kept = [self.faces[part] for part in sheets]
         if solids:
             kept += self.outermost([self.faces[part] for part in solids])
-            self.note(len(solids), "closed shells beside sheets are solid")
+            self.note(len(solids), "closed shell", "beside sheets taken as solid")
         return kept
 
     def without_flat(self, faces: np.ndarray) -> np.ndarray:
@@ -353,12 +359,12 @@ class _Mender:
         """
         flat = np.flatnonzero(self.is_flat(faces))
         count = len(flat)
-        for _ in range(10 * count):
+        for _ in range(10 * count if count <= MOST_FLAT else 0):
             if not len(flat):
                 break
             faces = self.flipped(faces, flat)
             flat = np.flatnonzero(self.is_flat(faces))
-        self.note(count, "triangles without area are merged with others")
+        self.note(count, "triangle", "without area merged with others")
         return faces
 
     def flipped(self, faces: np.ndarray, flat: np.ndarray) -> np.ndarray:
