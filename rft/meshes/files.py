@@ -160,9 +160,10 @@ def _parsed(path: Path, kind: str, data: bytes) -> tuple[np.ndarray, np.ndarray]
     except (
         Exception
     ) as error:  # trimesh raises many kinds of errors for a file that is no mesh
-        raise Refusal(
-            f"{path} is no {kind.upper()} mesh", because=formatted(str(error))
-        ) from None
+        reason = formatted(str(error))
+        if "could not be read" in str(error):
+            reason = "a number in it cannot be read"
+        raise Refusal(f"{path} is no {kind.upper()} mesh", because=reason) from None
 
 
 @contextlib.contextmanager
