@@ -170,16 +170,25 @@ def _parsed(path: Path, kind: str, data: bytes) -> tuple[np.ndarray, np.ndarray]
 def _silent() -> Iterator[None]:
     """Keep trimesh from printing tracebacks, log records and warnings of its own. A text of which NumPy reads a part
     is an error, where NumPy only warns."""
-    logger = logging.getLogger("trimesh")
-    before = logger.disabled
-    logger.disabled = True
-    try:
-        with warnings.catch_warnings(), contextlib.redirect_stderr(io.StringIO()):
-            warnings.simplefilter("ignore")
-            warnings.filterwarnings("error", "string or file could not be read")
+    with warnings.catch_warnings(), contextlib.redirect_stderr(io.StringIO()):
+        warnings.simplefilter("ignore")
+        warnings.filterwarnings("error", "string or file could not be read")
+        with contextlib.suppress(ImportError):  # refused later
+            import trimesh  # noqa: F401  (its loggers exist from here on)
+        names = logging.root.manager.loggerDict
+        loggers = [
+            logging.getLogger(name)
+            for name in [*names]
+            if name.split(".")[0] == "trimesh"
+        ]
+        before = [logger.disabled for logger in loggers]
+        for logger in loggers:
+            logger.disabled = True
+        try:
             yield
-    finally:
-        logger.disabled = before
+        finally:
+            for logger, disabled in zip(loggers, before):
+                logger.disabled = disabled
 
 
 def _count(kind: str, data: bytes) -> tuple[float, float]:
