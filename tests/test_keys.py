@@ -17,7 +17,6 @@ from geomech.scenes import (
     kinds,
     load,
     parse,
-    solid,
     walker_names,
 )
 from geomech.scenes.key import Key, aliases, keys_of, meanings
@@ -225,17 +224,7 @@ def test_built_in_scenes_are_valid_and_wrong_keys_are_not(name, valid):
                     k,
                     {x: v for x, v in part.items() if x not in kind},
                 )
-                # without a name that of an outline is the generic set; that of a mesh may be told by numbers
-                assert bare == (
-                    table == "medium"
-                    and (
-                        "robot" in scene or ("intruder" in scene and not of_mesh(scene))
-                    )
-                )
-
-
-def of_mesh(scene):
-    return scene["intruder"]["kind"] in solid.KINDS
+                assert not bare or {*part} & {"zeta", "xi_n", "density"}
 
 
 def both(valid, scene, table, k, part):
@@ -321,7 +310,9 @@ PLATE, STEP = 'kind = "plate"\nlength = 0.1\nwidth = 0.1', 'kind = "drag"\ndepth
 @pytest.mark.parametrize(
     ("medium", "intruder", "motion", "more", "good"),
     [
-        ("", PLATE, STEP, "", True),
+        ("zeta = 1", PLATE, STEP, "", True),
+        ("", PLATE, STEP, "", False),
+        ('tension = "cut"', PLATE, STEP, "", False),
         (NINE, PLATE, STEP, "", True),
         (
             NINE.replace("m1", "-1"),
@@ -344,27 +335,27 @@ PLATE, STEP = 'kind = "plate"\nlength = 0.1\nwidth = 0.1', 'kind = "drag"\ndepth
         ('name = "glass-3mm"\ngrazing_deg = 0\ngrazing = 0', PLATE, STEP, "", False),
         ('name = "glass-0.3mm-loose"', PLATE, STEP, "", False),
         ('law = "coulomb"', PLATE, STEP, "", False),
-        ("", PLATE + "\ntilt = 1\ntilt_deg = 1", STEP, "", False),
+        ("zeta = 1", PLATE + "\ntilt = 1\ntilt_deg = 1", STEP, "", False),
         (
-            "",
+            "zeta = 1",
             'kind = "polygon"\nwidth = 1\npoints = [[0, 0], [1, 0], [0, 1]]',
             STEP,
             "",
             True,
         ),
-        ("", 'kind = "polygon"\nwidth = 1', STEP, "", False),
+        ("zeta = 1", 'kind = "polygon"\nwidth = 1', STEP, "", False),
         (
-            "",
+            "zeta = 1",
             'kind = "spline"\nwidth = 1\nfile = "a.csv"\npoints = [[0, 0], [1, 0], [0, 1]]',
             STEP,
             "",
             False,
         ),
-        ("", PLATE, 'kind = "csv"', "", False),
-        ("", PLATE, STEP, "[numerics]\nphases = 20", False),
-        ("", PLATE, STEP, '[gait]\nkind = "circle"', False),
-        ("", None, STEP, "", False),
-        ("", PLATE, None, "", False),
+        ("zeta = 1", PLATE, 'kind = "csv"', "", False),
+        ("zeta = 1", PLATE, STEP, "[numerics]\nphases = 20", False),
+        ("zeta = 1", PLATE, STEP, '[gait]\nkind = "circle"', False),
+        ("zeta = 1", None, STEP, "", False),
+        ("zeta = 1", PLATE, None, "", False),
     ],
 )
 def test_the_schema_agrees_with_the_reader_of_intruders(
@@ -456,21 +447,21 @@ BALL, ROLL = (
         ('name = "glass-3mm"', PLATE, STEP, "[numerics]\ntriangles = 20", False),
         ("xi_n = 3e5", BALL, ROLL, '[[effects]]\nkind = "slope"\nangle_deg = 5', True),
         (
-            "",
+            "zeta = 1",
             PLATE,
             STEP,
             '[[effects]]\nkind = "disturbed-ground"\nplaces = [0.1]\nradius = 0.1\nweakening = 1',
             True,
         ),
         (
-            "",
+            "zeta = 1",
             PLATE,
             STEP,
             '[[effects]]\nkind = "disturbed-ground"\nradius = 0.1\nweakening = 1',
             False,
         ),
         (
-            "",
+            "zeta = 1",
             PLATE,
             STEP,
             '[[effects]]\nkind = "end-caps"\nhead = 3\nradius = 0.1',

@@ -379,7 +379,7 @@ SIDES = np.array([
 @pytest.mark.parametrize(
     ("vertices", "faces", "said"),
     [
-        (CUBE, SIDES[:-1], "open: 3 edges have one triangle; close it, or say"),
+        (CUBE, SIDES[:-1], "open: 3 edges have one triangle; close it, as"),
         (
             CUBE,
             SIDES[:, ::-1],

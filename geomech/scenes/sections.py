@@ -81,11 +81,13 @@ Section = Keys | OneOf
 class Alternatives:
     """Groups of keys of which a section has one.
 
-    groups: the keys that each must have, and those that it may have. cure: what to give.
+    groups: the keys that each must have, and those that it may have. cure: what to give. missing: what a section
+    without any of the keys lacks.
     """
 
     groups: tuple[tuple[set[str], set[str]], ...]
     cure: str
+    missing: str = ""
 
     @property
     def keys(self) -> set[str]:
@@ -105,6 +107,8 @@ class Alternatives:
             if present <= needed | allowed
         ]
         reason = f" has no {', '.join(lacking[0])}" if len(lacking) == 1 else ""
+        if self.missing and not present:
+            reason = f" has no {self.missing}"
         raise Refusal(f"{place}{reason}", instead=self.cure)
 
 

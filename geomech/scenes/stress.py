@@ -39,11 +39,12 @@ def _optional_field(kind: type, name: str):
 
 
 def _strengths(
-    *groups: Collection[str], more: Collection[str] = (), cure: str
+    *groups: Collection[str], more: Collection[str], cure: str
 ) -> Alternatives:
     """Return the keys that a strength is given by: a name or a file, either with ``more``, or one of the groups."""
     by_name = [({key}, {*more}) for key in ("name", "file")]
-    return Alternatives((*by_name, *(({*group}, set()) for group in groups)), cure)
+    exact = [({*group}, set()) for group in groups]
+    return Alternatives((*by_name, *exact), cure, "strength")
 
 
 _Coefficients = dataclasses.make_dataclass(
@@ -75,10 +76,17 @@ class StressKeys(_Coefficients):
     file: str | None = None
     aliases = {key: key.replace("m", "-") for key in COEFFICIENTS if "m" in key}
     makes = StressMap
-    alternatives = _strengths(
-        COEFFICIENTS,
-        (),
-        cure="keep one of 'name', 'file' and the nine coefficients, in N/cm^3; or give zeta alone",
+    # Something must be given: a file that is empty or cut off is no medium.
+    alternatives = Alternatives(
+        (
+            ({"name"}, {"zeta"}),
+            ({"file"}, {"zeta"}),
+            ({*COEFFICIENTS}, {"zeta"}),
+            ({"zeta"}, set()),
+        ),
+        "keep one of 'name', 'file' and the nine coefficients, in N/cm^3; or give zeta alone, "
+        "times the generic set (zeta = 1 is the generic set)",
+        "strength",
     )
 
     def to_part(

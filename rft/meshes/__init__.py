@@ -1,8 +1,9 @@
 """Forces of grains on bodies of any form in three dimensions: the law, triangle meshes, and their motions."""
 
+from rft.meshes.files import read
 from rft.meshes.intrusion import Faces, Wrench, bearing, wrench
 from rft.meshes.law import Spatial
-from rft.meshes.mesh import Mesh, below, read
+from rft.meshes.mesh import Mesh, below
 from rft.meshes.motions import (
     MOTIONS,
     Drag,
@@ -13,11 +14,12 @@ from rft.meshes.motions import (
     Trajectory,
 )
 from rft.meshes.solids import SOLIDS, Cylinder, Leg, MeshFile, Screw, Solid, Sphere
+from rft.meshes.sound import Sound, sound
 
 __all__ = [
     "MOTIONS", "SOLIDS", "Cylinder", "Drag", "Faces", "Leg", "Mesh", "MeshFile", "Motion", "Path", "Penetrate",
-    "Rotate", "Screw", "Solid", "Spatial", "Sphere", "Trajectory", "Wrench", "bearing", "below", "read",
-    "wrench",
+    "Rotate", "Screw", "Solid", "Sound", "Spatial", "Sphere", "Trajectory", "Wrench", "bearing", "below", "read",
+    "sound", "wrench",
 ]  # fmt: skip
 
 

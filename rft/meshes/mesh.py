@@ -1,31 +1,28 @@
-"""Triangle meshes: their geometry, the parts of triangles below the surface, copies, and reading from files."""
+"""Triangle meshes: their geometry, the parts of triangles below the surface, and copies."""
 
 from __future__ import annotations
 
-import io
-import re
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
 from rft.checks import real_array
-from rft.metres import LARGEST
-from rft.refusal import Refusal, formatted, located, require
+from rft.meshes import shells
+from rft.refusal import Refusal, require
 
 MOST_TRIANGLES = 2_000_000  # triangles
-LARGEST_FILE = 500_000_000  # bytes
+FLAT = 1e-14  # of the square of the size: area of a triangle that counts as none
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """A surface of triangles, in its own frame.
 
-    vertices: (V, 3), m. faces: (F, 3), indices of vertices, counter-clockwise as seen from outside. closed: whether every
-    edge must be shared by two triangles that agree on which side is out; False for a thin plate, of which either side may
-    lead. smooth_normals: (F, 3, 3), unit normals at the corners of the triangles of a mesh that stands for a smooth
-    surface; None for the normals of the triangles.
+    vertices: (V, 3), m. faces: (F, 3), indices of vertices, counter-clockwise as seen from outside. closed: whether triangles
+    must run along every edge as often one way as the other, in shells of which none lies inside another; False for a thin
+    plate, of which either side may lead. smooth_normals: (F, 3, 3), unit normals at the corners of the triangles of a mesh
+    that stands for a smooth surface; None for the normals of the triangles.
 
     Examples
     --------
@@ -59,7 +56,7 @@ class Mesh:
             f"a mesh has 1 to {MOST_TRIANGLES:,} triangles, got {len(faces):,}",
         )
         require(bool(np.isfinite(vertices).all()), "vertices must be finite")
-        _require_known(faces, len(vertices))
+        require_known(faces, len(vertices))
         require(
             isinstance(self.closed, bool),
             "closed must be true or false",
@@ -79,7 +76,7 @@ class Mesh:
         object.__setattr__(self, "smooth_normals", normals)
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", faces.astype(np.int64))
-        flat = int((self.areas <= 1e-14 * np.ptp(vertices, axis=0).max() ** 2).sum())
+        flat = int((self.areas <= FLAT * np.ptp(vertices, axis=0).max() ** 2).sum())
         require(
             not flat,
             f"{flat} of {len(faces)} triangles have no area",
@@ -89,31 +86,62 @@ class Mesh:
             self._require_closed()
 
     def _require_closed(self) -> None:
-        """Raise ValueError if the mesh is not closed, or its triangles do not agree on which side is out."""
-        edges = np.sort(self._codes(self.faces, self.faces[:, [1, 2, 0]]))
-        reversed_edges = np.sort(self._codes(self.faces[:, [1, 2, 0]], self.faces))
+        """Raise ValueError unless grains touch all triangles, and these agree on which
+        side is out."""
+        faces = self.faces
+        if len(surplus := shells.excess(faces)):
+            raise self._open(surplus)
+        parts = [faces[part] for part in shells.shells(faces)]
+        n_outside = [len(shells.without_walls(self.vertices, part)) for part in parts]
+        is_hidden = shells.is_enclosed(self.vertices, parts)
         require(
-            bool((np.diff(edges) > 0).all()),
-            "the mesh has an edge that two triangles run along the same way",
-            because="some are turned inside out, or there are doubles",
+            sum(n_outside) == len(faces) and not is_hidden.any(),
+            "a shell or wall lies inside the mesh",
+            because="no grains touch it",
+            instead="leave it out, as rft.meshes.sound does",
         )
-        if not np.array_equal(edges, reversed_edges):
-            open_edges = np.setdiff1d(edges, reversed_edges).size
-            raise Refusal(
-                "the mesh is open",
-                because=f"{open_edges} edges have one triangle",
-                instead="close it, or say closed = false",
-            )
         require(
-            self.volume > 0,
+            all(shells.volume(self.vertices[part]) > 0 for part in parts),
             "the mesh is inside out",
             because="its normals point inwards",
             instead="turn the triangles round",
         )
 
-    def _codes(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Return one whole number for each pair of vertices."""
-        return (a * len(self.vertices) + b).ravel()
+    def _open(self, surplus: np.ndarray) -> Refusal:
+        """Return the refusal of a mesh with edges that are run more often one way."""
+        _, uses = np.unique(surplus, axis=0, return_counts=True)
+        if (uses > 1).any() or self._has_doubles():
+            return Refusal(
+                "the mesh has an edge that two triangles run along the same way",
+                because="some are turned inside out, or there are doubles",
+                instead="mend them, as rft.meshes.sound does",
+            )
+        cure = "close it, or say closed = false if it is a sheet"
+        if shells.nearly_closes(self.vertices, self.faces):
+            cure = "close it, as rft.meshes.sound does"
+        return Refusal(
+            "the mesh is open",
+            because=f"{len(surplus)} edges have one triangle",
+            instead=cure,
+        )
+
+    def _has_doubles(self) -> bool:
+        """Return whether a triangle stands twice."""
+        return len(np.unique(np.sort(self.faces, 1), axis=0)) < len(self.faces)
+
+    def _copy(self, vertices: np.ndarray, faces: np.ndarray, normals) -> Mesh:
+        """Return a mesh that is as sound as this one, unchecked: its checks take longer
+        than its making."""
+        mesh = object.__new__(Mesh)
+        values = {
+            "vertices": vertices,
+            "faces": faces,
+            "closed": self.closed,
+            "smooth_normals": normals,
+        }
+        for name, value in values.items():
+            object.__setattr__(mesh, name, value)
+        return mesh
 
     @cached_property
     def _cross(self) -> np.ndarray:
@@ -166,15 +194,26 @@ class Mesh:
 
     @property
     def two_sided(self) -> Mesh:
-        """An open mesh with a second triangle on the back of each, so that the side which leads bears."""
-        smooth = self.smooth_normals
-        normals = None if smooth is None else np.concatenate([smooth, -smooth[:, ::-1]])
-        return Mesh(
-            self.vertices,
-            np.concatenate([self.faces, self.faces[:, ::-1]]),
-            False,
-            normals,
-        )
+        """An open mesh with a second triangle on the back of each, so that the side which leads bears. Shells that
+        close stay; ValueError if one nearly closes."""
+        sheets = [
+            part
+            for part in shells.shells(self.faces)
+            if len(shells.excess(self.faces[part]))
+        ]
+        for part in sheets:
+            require(
+                not shells.nearly_closes(self.vertices, self.faces[part]),
+                "closed = false is for sheets, and the mesh nearly closes",
+                because="its inside would bear, too",
+                instead="close it, as rft.meshes.sound does",
+            )
+        back = np.sort(np.concatenate([*sheets, np.empty(0, int)]))
+        normals = self.smooth_normals
+        if normals is not None:
+            normals = np.concatenate([normals, -normals[back][:, ::-1]])
+        faces = np.concatenate([self.faces, self.faces[back][:, ::-1]])
+        return self._copy(self.vertices, faces, normals)
 
 
 def below(corners: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -257,7 +296,7 @@ def quartered(mesh: Mesh) -> Mesh:
                 for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))
             ]
         )
-    return Mesh(*subdivided(mesh.vertices, mesh.faces), mesh.closed, normals)
+    return mesh._copy(*subdivided(mesh.vertices, mesh.faces), normals)
 
 
 def mirrored(mesh: Mesh) -> Mesh:
@@ -267,105 +306,13 @@ def mirrored(mesh: Mesh) -> Mesh:
         if mesh.smooth_normals is None
         else mesh.smooth_normals[:, ::-1] * [1.0, -1.0, 1.0]
     )
-    return Mesh(
-        mesh.vertices * [1.0, -1.0, 1.0], mesh.faces[:, ::-1], mesh.closed, normals
-    )
+    return mesh._copy(mesh.vertices * [1.0, -1.0, 1.0], mesh.faces[:, ::-1], normals)
 
 
-def read(path, closed: bool = True, scale: float = 1.0) -> Mesh:
-    """Return the mesh of an STL, OBJ or PLY file, with lengths times ``scale``, 0.001 for millimetres. Needs trimesh."""
-    kind = str(path).rpartition(".")[2].lower()
-    require(
-        kind in ("stl", "obj", "ply"),
-        "a mesh is an .stl, .obj or .ply file",
-        where=path,
-    )
-    vertices, faces = _loaded(Path(path), kind)
-    require(
-        faces.ndim == 2 and len(faces) > 0,
-        f"{path} is no {kind.upper()} mesh",
-        because="it has no triangles",
-    )
-    with located(path):
-        _require_known(faces, len(vertices))
-    merged, index = np.unique(
-        vertices, axis=0, return_inverse=True
-    )  # an STL file has three vertices for each triangle
-    size = scale * float(np.ptp(merged, axis=0).max())
-    with located(path):
-        require(
-            not size > LARGEST,
-            f"the mesh is {size:.4g} m large, beyond {LARGEST:g} m",
-            instead="give scale, 0.001 if it is in mm",
-        )
-        return Mesh(merged * scale, index.reshape(-1)[faces], closed)
-
-
-def _require_known(faces: np.ndarray, count: int) -> None:
+def require_known(faces: np.ndarray, count: int) -> None:
     """Raise ValueError if faces name vertices other than 0 to count - 1."""
     for bad in faces[(faces < 0) | (faces >= count)][:1]:
         raise Refusal(
             f"a face names vertex {bad}, where vertices are 0 to {count - 1}",
             instead="mend the mesh",
         )
-
-
-# Lines of an OBJ file: a face with a vertex 0, a face with a vertex below 0, and a vertex.
-ZERO, BACK, VERTEX = (
-    re.compile(rb"^[ \t]*" + line, re.M)
-    for line in (rb"f[^\n]*[ \t]0+(?=[/\s]|\Z)", rb"f[^\n]*[ \t]-", rb"v[ \t]")
-)
-
-
-def _require_read_rightly(data: bytes) -> None:
-    """Raise ValueError for an OBJ file that trimesh misreads: it takes vertex 0 for the last one, and counts vertices below 0
-    back from the end of the file, where OBJ counts back from the face."""
-    require(
-        not ZERO.search(data),
-        "a face names vertex 0, where vertices count from 1",
-        instead="mend the mesh",
-    )
-    back = BACK.search(data)
-    valid = back is None or not VERTEX.search(data, back.end())
-    require(
-        valid,
-        "a face counts vertices back, and vertices follow it",
-        instead="count from 1, or put all vertices first",
-    )
-
-
-def _loaded(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return (vertices, faces) of an ordinary file of at most `LARGEST_FILE` bytes."""
-    try:
-        import trimesh
-    except ImportError:
-        raise Refusal(
-            "reading a mesh needs trimesh",
-            where=path,
-            instead="pip install 'geomech[mesh]'",
-        ) from None
-    try:
-        size = path.stat().st_size
-        require(path.is_file(), f"{path} is no ordinary file")
-        require(
-            size <= LARGEST_FILE,
-            f"{path} is larger than {LARGEST_FILE / 1000000.0:.0f} MB",
-            instead="give fewer triangles",
-        )
-        data = path.read_bytes()
-    except OSError as error:
-        raise Refusal(f"cannot read mesh {path}", because=error.strerror) from None
-    if kind == "obj":
-        with located(path):
-            _require_read_rightly(data)
-    try:
-        mesh = trimesh.load(
-            io.BytesIO(data), file_type=kind, force="mesh", process=False
-        )
-        return np.asarray(mesh.vertices, float), np.asarray(getattr(mesh, "faces", ()))
-    except (
-        Exception
-    ) as error:  # trimesh raises many kinds of errors for a file that is no mesh
-        raise Refusal(
-            f"{path} is no {kind.upper()} mesh", because=formatted(str(error))
-        ) from None

@@ -12,7 +12,8 @@ import numpy as np
 from rft.checks import Number, check_numbers, in_range
 from rft.meshes import shapes
 from rft.meshes.blade import blade
-from rft.meshes.mesh import MOST_TRIANGLES, Mesh, mirrored, quartered, read
+from rft.meshes.files import read
+from rft.meshes.mesh import MOST_TRIANGLES, Mesh, mirrored, quartered
 from rft.meshes.smooth import smooth
 from rft.metres import metres
 from rft.refusal import require

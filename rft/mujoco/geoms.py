@@ -5,15 +5,18 @@ from __future__ import annotations
 import difflib
 import fnmatch
 import math
+import warnings
 from collections.abc import Iterable, Sequence
 
 import mujoco
 import numpy as np
 
+from rft.balance.backend import Note
 from rft.meshes import shapes
 from rft.meshes.mesh import Mesh, quartered
 from rft.meshes.smooth import smooth
-from rft.refusal import Refusal, formatted, require
+from rft.meshes.sound import size_note, sound
+from rft.refusal import Refusal, formatted, located, require
 
 MOST_FACES = 20_000  # of a geom's mesh
 MOST_ELEMENTS = 100_000  # of a geom
@@ -194,7 +197,7 @@ def _matching(model: mujoco.MjModel, one: str | int) -> list[int]:
 
 
 def _model_mesh(model: mujoco.MjModel, k: int) -> Mesh:
-    """Return mesh number k of a model, with equal corners merged."""
+    """Return mesh number k of a model, mended as by `sound`."""
     first, start, faces = (
         model.mesh_vertadr[k],
         model.mesh_faceadr[k],
@@ -206,5 +209,12 @@ def _model_mesh(model: mujoco.MjModel, k: int) -> Mesh:
         instead="give fewer",
     )
     vertices = np.array(model.mesh_vert[first : first + model.mesh_vertnum[k]], float)
-    merged, index = np.unique(vertices, axis=0, return_inverse=True)
-    return Mesh(merged, index.reshape(-1)[model.mesh_face[start : start + faces]])
+    name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_MESH, k) or k
+    with located(f"mesh {formatted(name)}"):
+        mesh, notes = sound(
+            vertices, model.mesh_face[start : start + faces], cure="close it"
+        )
+    notes = [*notes, *size_note(mesh, "is the scale of its asset right?")]
+    if notes:
+        warnings.warn(f"mesh {formatted(name)}: {'; '.join(notes)}", Note, stacklevel=2)
+    return mesh
