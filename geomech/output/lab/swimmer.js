@@ -23,7 +23,7 @@ const world = { trail: [], ghosts: [], width: 560 };
 
 /** Take a frequency, Hz, of a scene, a file or the slider; without one the page chooses it. */
 function play(frequency) {
-  Object.assign(player, { frequency: frequency || 0.5, stated: Boolean(frequency) });
+  Object.assign(player, { frequency: frequency ?? 0.5, stated: frequency !== null });
 }
 
 /** Begin again at the origin. */
