@@ -28,7 +28,7 @@ from geomech.scenes.key import keys_of
 from geomech.scenes.write import text_of, without_gait
 from geomech.studies.charts import SHARES, Chart, series_of
 from geomech.systems.base import length_unit, shape_labels
-from rft.refusal import Refusal
+from rft.refusal import Refusal, in_line
 
 FOLDER = Path(__file__).parent
 SCRIPTS = (
@@ -69,7 +69,7 @@ def check_format(path: Path) -> None:
 
 
 def message(result: Result, path: Path) -> str:
-    return f"page in {path}"
+    return f"page in {in_line(path)}"
 
 
 @contextmanager
