@@ -777,7 +777,43 @@ def test_points_that_meet_are_refused_and_leave_nothing_to_undo(opened, page):
     opened.execute_script("document.querySelector(\"[data-handle='1']\").focus()")
     ActionChains(opened).send_keys(Keys.ARROW_LEFT, Keys.DELETE).perform()
     assert state(opened) == before and "3 to 60 points" in said(opened)
-    assert not opened.find_element("id", "undo").is_enabled()
+    click(opened, "#undo")
+    assert "loop=circle" in state(opened)  # before the address was given
+
+
+def test_a_frequency_belongs_to_the_state(opened):
+    first = state(opened)
+    (opened.folder / "f.toml").write_text("gait = {kind = 'circle', frequency = 0}")
+    opened.find_element("id", "open").send_keys(str(opened.folder / "f.toml"))
+    until(lambda: said(opened).startswith("Read"))
+    still = state(opened)
+    assert still.endswith("&frequency=0")
+    until(lambda: opened.current_url.endswith(still))
+    opened.refresh()
+    assert state(opened) == still
+    assert opened.execute_script("return lab.player.frequency") == 0
+    opened.execute_script("location.hash = arguments[0]", first)
+    until(lambda: state(opened) == first)
+    click(opened, "#undo")
+    assert state(opened) == still
+
+
+def test_another_address_stops_a_climb(opened):
+    click(opened, "#climb")
+    other = "scene=three-link-viscous&loop=circle&amplitude=0.5"
+    opened.execute_script("location.hash = arguments[0]", other)
+    until(lambda: state(opened).startswith(other))
+    assert opened.execute_script(
+        "return document.getElementById('climb').textContent"
+    ) == ("Climb")
+
+
+def test_deleting_the_last_point_keeps_the_focus(opened):
+    from selenium.webdriver import ActionChains, Keys
+
+    opened.execute_script("document.querySelector(\"[data-handle='7']\").focus()")
+    ActionChains(opened).send_keys(Keys.DELETE, Keys.DELETE).perform()
+    assert len(re.search(r"points=([^&]*)", state(opened))[1].split(";")) == 6
 
 
 def test_a_refusal_leaves_no_folder_behind(monkeypatch, tmp_path):

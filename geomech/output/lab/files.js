@@ -17,7 +17,7 @@ function described() {
 function asToml() {
   const chart = chartOf(), [kind, own] = described();
   const keys = { kind: `"${kind}"`, ...own, amplitude: literal(state.amplitude), centre: row(state.centre), reverse: String(state.reverse) };
-  if (player.stated) keys.frequency = literal(player.frequency);
+  if (state.frequency !== null) keys.frequency = literal(state.frequency);
   const lines = Object.entries(keys).map(([name, value]) => `${name} = ${value}`);
   const rest = chart.family ? chart.toml.join(literal(state.value)) : chart.toml[0];
   return `${rest}\n[gait]\n${lines.join("\n")}\n`;
@@ -61,16 +61,15 @@ function asCsv() {
 }
 
 /**
- * Return the state with the loop of a file, the frequency that it gives or null, and what the page changes in the loop, in words. An
- * Error says what is wrong.
+ * Return the state with the loop of a file, and what the page changes in it, in words. An Error says what is wrong.
  */
 function opened(text) {
-  if (text.length > LONGEST_FILE) throw new Error("the file is too long for a scene");
   const tables = tablesOf(text);
   if (tables.gait === undefined) throw new Error("no [gait] in it");
   const [kind, keys] = gaitOf(tables.gait), s = JSON.parse(JSON.stringify(state));
   const { amplitude, centre, reverse } = keys;
   Object.assign(s, { loop: kind, points: [], amplitude, reverse, centre: centre.length ? centre : [0, 0] });
+  s.frequency = keys.frequency ?? state.frequency;
   if (s.centre.length !== 2) throw new Error("centre has two angles");
   let change = "";
   if (kind === "points") s.points = checkPoints(withoutRepeat(keys.points));
@@ -79,7 +78,7 @@ function opened(text) {
     s.loop = name || "points";
     if (!name) [s.points, change] = around(series, amplitude);
   }
-  return [s, keys.frequency, change];
+  return [s, change];
 }
 
 /** Return points without the last where it is the first again. */

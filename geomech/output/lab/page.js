@@ -8,6 +8,7 @@ const CLIMB_PHASES = 128;
 /** Compute and draw all that follows from the loop. */
 function update() {
   const chart = chartOf();
+  player.frequency = state.frequency ?? USUAL;
   shown.curve = curve(loopOf());
   shown.loop = scaled(sampled(loopOf(), PHASES, state.reverse), state.amplitude, state.centre);
   shown.prediction = chart.predict(shown.loop, state.frame, true);
@@ -171,7 +172,10 @@ function pressed(event) {
     change(`arrow ${name}`, () => move(k, now.map((x, d) => x + arrows[event.key][d])));
   } else if (event.key === "Insert" && k !== "centre") {
     change("", () => { const all = handles(), next = all[(k + 1) % all.length]; insert(k, toShape(all[k].map((x, d) => (x + next[d]) / 2))); });
-  } else if ((event.key === "Delete" || event.key === "Backspace") && k !== "centre") change("", () => remove(k));
+  } else if ((event.key === "Delete" || event.key === "Backspace") && k !== "centre") {
+    change("", () => remove(k));
+    map.parts.handles.children[Math.min(k + 1, handles().length)].focus();  // the last one may be gone
+  }
   else return;
   event.preventDefault();
 }
@@ -226,7 +230,7 @@ function climb() {
 
 function controls() {
   PAGE.scenes.forEach((scene, k) => $("scene").append(new Option(visible(scene.name), k)));
-  $("scene").addEventListener("change", () => change("", () => { state = initial(Number($("scene").value)); play(chartOf().gait.frequency); }, redraw));
+  $("scene").addEventListener("change", () => change("", () => { state = initial(Number($("scene").value)); }, redraw));
   DIRECTIONS.forEach((direction, k) => {
     const button = Object.assign(document.createElement("button"), { type: "button", textContent: direction });
     button.addEventListener("click", () => change("", () => { state.component = k; }, () => { drawMap(); update(); }));
@@ -239,7 +243,7 @@ function controls() {
   $("amplitude").addEventListener("input", () => change("amplitude", () => { state.amplitude = Number($("amplitude").value); }));
   [0, 1].forEach((d) => $(`centre-${d + 1}`).addEventListener("input", (event) => change(`centre-${d + 1}`, () => { state.centre[d] = Number(event.target.value); })));
   $("reverse").addEventListener("change", () => change("", () => { state.reverse = $("reverse").checked; }, () => { restart(); update(); }));
-  $("frequency").addEventListener("input", () => { play(Number($("frequency").value)); showControls(); });
+  $("frequency").addEventListener("input", () => change("frequency", () => { state.frequency = Number($("frequency").value); }));
   $("value").addEventListener("input", () => change("value", () => { state.value = Number($("value").value); }, () => { chartOf().choose(state.value); drawMap(); update(); }));
   $("undo").addEventListener("click", () => { stopClimb(); step(past, future); redraw(); });
   $("redo").addEventListener("click", () => { stopClimb(); step(future, past); redraw(); });
@@ -285,8 +289,8 @@ function saving() {
 
 async function read(file) {
   try {
-    const [next, frequency, changed] = opened(await file.text());
-    if (frequency !== null) play(frequency);
+    if (file.size > LONGEST_FILE) throw new Error("the file is too long for a scene");
+    const [next, changed] = opened(await file.text());
     change("", () => { state = next; }, redraw);
     say(`Read the loop of ${visible(file.name)}.${changed}`);
   } catch (error) {
@@ -322,12 +326,16 @@ function savePicture() {
 /** Take the state of an address; one that cannot be read leaves the first scene, and says why. */
 function take(address) {
   if (address === addressOf(state)) return;
+  stopClimb();
+  const before = JSON.stringify(state);
+  say("");
   try {
     state = stateOf(address);
   } catch (error) {
     state = initial(0);
     say(`The address is not used: ${visible(error.message)}.`);
   }
+  if (shown.loop) remember(before);
   redraw();
 }
 
@@ -345,8 +353,6 @@ player.playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
 controls();
 if (location.hash.length > 1) take(location.hash.slice(1));
 if (!shown.loop) redraw();
-play(chartOf().gait.frequency);
-showControls();
 requestAnimationFrame(frame);
 window.lab = {  // for tests, and for whoever opens the console
   state: () => addressOf(state), update, player, opened, tables: tablesOf,

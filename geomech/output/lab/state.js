@@ -15,7 +15,7 @@ function initial(scene) {
   const { gait, frame, family } = CHARTS[scene];
   return {
     scene, loop: presetOf(gait) || "own", points: presetOf(gait) === "points" ? gait.points : [], amplitude: gait.amplitude, centre: [...gait.centre],
-    reverse: gait.reverse, component: 0, frame, value: family ? family.own : null,
+    reverse: gait.reverse, frequency: gait.frequency, component: 0, frame, value: family ? family.own : null,
   };
 }
 
@@ -39,6 +39,7 @@ function addressOf(s) {
     amplitude: s.amplitude, centre: s.centre.join(","), reverse: Number(s.reverse), component: COMPONENTS[s.component], frame: s.frame,
   });
   if (s.value !== null) parts.value = s.value;
+  if (s.frequency !== null) parts.frequency = s.frequency;
   const plain = (text) => encodeURIComponent(wellFormed(text)).replace(/%2C/g, ",").replace(/%3B/g, ";");
   return Object.entries(parts).map(([name, value]) => `${name}=${plain(value)}`).join("&");
 }
@@ -73,6 +74,7 @@ function stateOf(address) {
   if (given.has("component")) s.component = COMPONENTS.indexOf(chosen(given.get("component"), COMPONENTS, "component"));
   if (given.has("frame")) s.frame = chosen(given.get("frame"), Object.keys(frames), "frame");
   if (family && given.has("value")) s.value = withinFamily(family, number(given.get("value"), Number.MAX_VALUE));
+  if (given.has("frequency")) s.frequency = checkedValue(number(given.get("frequency")), PAGE.gaits.circle.frequency.schema, "frequency");
   return s;
 }
 
