@@ -111,6 +111,19 @@ def printable(text: str) -> str:
     return re.sub(r"[^ -~\n\t]", _escaped, text)
 
 
+def in_line(name: object) -> str:
+    """Return the name of a file, or another that others chose, as it may stand within a
+    line: `printable`, and lines and tabs in it as escapes.
+
+    Examples
+    --------
+    >>> from rft.refusal import in_line
+    >>> in_line("a\\nb.toml")
+    'a\\\\nb.toml'
+    """
+    return re.sub(r"[\n\t]", lambda match: repr(match[0])[1:-1], printable(str(name)))
+
+
 def _escaped(match: re.Match[str]) -> str:
     letter = match[0]
     is_shown = letter.isprintable() or unicodedata.category(letter) == "Zs"

@@ -144,6 +144,31 @@ def test_names_of_scene_files(geomech, tmp_path):
     assert str(error.value).count("-bad.toml") == 1  # named once
 
 
+@pytest.mark.skipif(
+    sys.platform != "linux", reason="elsewhere no file may be called so"
+)
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("explain",),
+        ("displacement", "--amplitudes", "0.5"),
+        ("connection", "--grid", "7"),
+        ("ccf", "--grid", "7"),
+        ("forces",),
+        ("sweep", "--over", "gait.amplitude=0.5,1", "-o", "a\nb.nc"),
+        ("lab", "-o", "a\nb.html"),
+    ],
+)
+def test_names_of_files_stay_within_their_line(command, geomech, tmp_path):
+    name = "three\nb\tc.toml"
+    (tmp_path / name).write_text(SWIM)
+    first, *rest = command
+    code, out, err = geomech(first, name, *rest)
+    assert code == 0, err
+    lines = out.splitlines()
+    assert not [line for line in lines if line.startswith("b.") or "b\tc" in line]
+
+
 def test_keys_and_strings_of_a_scene(geomech, tmp_path):
     for text in (
         SWIM + f'["{TOML}"]\na = 1\n',

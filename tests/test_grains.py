@@ -392,6 +392,12 @@ def test_a_stopped_run_goes_on_to_the_same_digits(
     assert (
         towed.run(tmp_path, pytest.fail).force.tolist() == whole.force.tolist()
     )  # read, not computed
+    (sheet,) = tmp_path.glob("bed-*.json")
+    known = json.loads(sheet.read_text())
+    known["facts"]["packing"] /= 2
+    sheet.write_text(json.dumps(known))
+    again = experiments.settle(SMALL, ROD, towed.height, tmp_path)
+    assert again.facts["packing"] == settled["packing"]
 
 
 @needs_lammps

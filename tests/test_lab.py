@@ -8,6 +8,7 @@ import hashlib
 import importlib.util
 import itertools
 import json
+import math
 import re
 import shutil
 import time
@@ -19,8 +20,9 @@ import pytest
 from commands import geomech
 
 from geomech import scenes
-from geomech.gaits import Circle, Points
+from geomech.gaits import Butterfly, Circle, Points
 from geomech.output import lab
+from geomech.scenes.write import text_of, without_gait
 from geomech.studies import charts
 from geomech.studies.lab import GALLERY, Lab
 from geomech.studies.study import Study
@@ -530,24 +532,22 @@ def test_loops_of_the_page_are_saved_as_they_are(opened, loop):
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("nothing", "no [gait] in it"),
+        ("nothing", "it is not TOML"),
+        ("[medium]\nlaw = 'viscous'\n", "no [gait] in it"),
         ("[gait]\nkind = 'spiral'\n", "a loop is one of"),
         (
             "[gait]\nkind = 'points'\npoints = [[1e999, 0], [0, 1], [1, 1]]\n",
-            "is no number",
+            "points is a number from",
         ),
         (
             "[gait]\nkind = 'points'\npoints = [[0, 0], [<img src=x onerror=alert(1)>\n",
-            "cannot read the value of points",
+            "a value cannot be read in line 3",
         ),
         (
             "[gait]\nkind = 'points'\npoints = [[0, 0], [0, 1]]\n",
             "a loop has 3 to 60 points",
         ),
-        (
-            "[gait]\nkind = 'circle'\namplitude_deg = 30\n",
-            "cannot use amplitude_deg: give angles in radians",
-        ),
+        ("[gait]\nkind = 'butterfly'\namplitude_deg = 30\n", "cannot use"),
     ],
 )
 def test_files_that_are_none(opened, text, reason):
@@ -556,6 +556,157 @@ def test_files_that_are_none(opened, text, reason):
     opened.find_element("id", "open").send_keys(str(opened.folder / "bad.toml"))
     until(lambda: said(opened).startswith("Cannot use bad.toml"))
     assert reason in said(opened) and state(opened) == before
+
+
+SPELLED = (
+    "[gait]\nkind = 'points'\npoints = [\n[1, 0],\n[0, 1],  # ]\n[-1, -1]\n]\n",
+    "gait = { kind = 'circle', amplitude = 0.5 }\n",
+    "gait.kind = 'circle'\ngait.'amplitude' = 5e-1\n",
+    "['gait']  # [medium]\n'kind' = 'circle'\namplitude_deg = +30\n",
+    ' [ gait ]\n\tkind = """\\\n  \\u0063ircle"""\n',
+    "[gait]\nkind = '''\ncircle'''\namplitude = 1_0e-1 # [[x]]\n",
+)
+REST_OF_SCENE = "\n[medium]\nlaw = 'viscous'\n[body]\nkind = 'chain'\n"
+
+
+@pytest.mark.parametrize("spelled", SPELLED)
+def test_a_scene_is_saved_without_its_gait_however_that_is_spelled(glass, spelled):
+    scene = scenes.parse(spelled + REST_OF_SCENE)
+    chart = dataclasses.replace(glass, scene=scene)
+    (text,) = lab.data([chart])["scenes"][0]["toml"]
+    saved = scenes.parse(text + "[gait]\nkind = 'butterfly'\n")
+    assert saved == scene.changed(gait=Butterfly())
+
+
+def test_a_scene_is_saved_whose_gait_no_file_can_name(glass):
+    class Own(Circle):
+        pass
+
+    scene = glass.scene.changed(gait=Own(0.5, frequency=2.0))
+    saved = text_of(without_gait(scene) | {"gait": {"kind": "circle"}})
+    assert scenes.parse(saved, scene.name) == scene.changed(gait=Circle())
+
+
+@pytest.mark.parametrize("key", ["medium.C", "medium.gamma0_deg"])
+def test_a_family_of_any_key_is_saved_with_its_value(family, key):
+    scene = scenes.parse(
+        "[gait]\nkind = 'circle'\n[medium]\nlaw = 'granular'\nC = 1.8\ngamma0_deg = 13\n"
+        "[body]\nkind = 'chain'\n"
+    )
+    (chart,) = family.subject
+    changed = dataclasses.replace(chart.family, key=key)
+    chart = dataclasses.replace(chart, scene=scene, family=changed)
+    parts = lab.data([chart])["scenes"][0]["toml"]
+    saved = tomllib.loads("1.25".join(parts))
+    section, name = key.split(".")
+    assert len(parts) == 2 and saved[section][name] == 1.25
+
+
+TOML = (
+    *SPELLED,
+    "",
+    "a.b.c = 1\na.b.d = 2\n[a.e]\nf = 'x'",
+    "[[a]]\nb = 1\n[[a]]\n[a.c]\nd = [[], [1, [2.5]],]\n[[a.e]]\n",
+    "a = {b = {c = 1}, d.e = 2}\nb = [{}, {x = 1}]",
+    "a = '''\n'x\ny'''''\nb = \"\"\"a\\\n\n   b\\\"\"\"\"\"\"",
+    "a = [0x_1]",
+    "a = [0xff, 0o17, 0b1_0, 1_000, -0, +1.5e-3, 1e6]\r\nb = true",
+    "[a.b]\n[a]\nc = 1",
+    "a = \"\\u00e9\\U0001F600\\t\"\n'' = 1\n__proto__ = 2\nconstructor = 3",
+    "[a]\n[a]",
+    "a = 1\na = 2",
+    "a = 1\na.b = 2",
+    "[a]\nb.c = 1\n[a.b]",
+    "a.b = 1\n[a]",
+    "a = {b = 1}\n[a.c]",
+    "a = []\n[[a]]",
+    "[a.b]\n[[a]]",
+    "a = {b = 1,}",
+    "a = {b = 1\n}",
+    "a = 01",
+    "a = 1.",
+    "a = .5",
+    "a = 1__0",
+    "a = 'x\ny'",
+    'a = "\\x41"',
+    'a = "\\uD800"',
+    "a = 1 b = 2",
+    "a = [1 2]",
+    "a = [1, , 2]",
+    "a",
+    "= 1",
+    "a = ",
+    "[a",
+    "[]",
+    'a = "\x00"',
+    "# \x7f",
+    "a = tru",
+    "a = [" * 300 + "]" * 300,
+)
+
+
+def test_the_page_reads_the_toml_that_python_reads(opened):
+    read = (
+        "try { return JSON.stringify(lab.tables(arguments[0])) }"
+        "catch (error) { return String(error.message) }"
+    )
+    for text in TOML:
+        found = opened.execute_script(read, text)
+        try:
+            expected = tomllib.loads(text)
+        except (ValueError, RecursionError):
+            assert found.startswith("it is not TOML"), text
+        else:
+            assert json.loads(found) == expected, text
+
+
+@pytest.mark.parametrize(
+    "kind", ["circle", "ellipse", "butterfly", "fourier", "points"]
+)
+@pytest.mark.filterwarnings("ignore::geomech.core.errors.UnitWarning")
+def test_the_page_takes_and_refuses_what_the_reader_does(opened, kind):
+    """Values of every key in turn, of right and of wrong types, within and beyond bounds."""
+    good = {
+        "fourier": {"cos": [[1.0], [0.5]], "sin": [[0.0], [1.0]]},
+        "points": {"points": [[0, 0], [1, 0], [0, 1], [0, 0]]},
+    }.get(kind, {})
+    odd = [
+        0, 1, -1, 0.5, 1e4, 1.1e4, 1e7, -1e7, math.inf, math.nan, True, False, "true",
+        "", [], [0.1, -0.2], [0.1], [0.1, "a"], [0.1, True], [1, 2, 3], [[0.1, 0.2]], {},
+    ]  # fmt: skip
+    rows = [[], [[]], [[1], [2]], [[1, 2], [3]], [[0, 1], [0, 1], [1, 0]], [["1"], [0]]]
+    keys = ["amplitude", "centre", "reverse", "frequency", "tilt", "semi_axes", "cos"]
+    keys += ["points", "centre_deg", "amplitude_deg", "frequency_deg", "nothing"]
+    tried, differing = 0, []
+    read = (
+        "try { lab.opened(arguments[0]); return true } catch (error) { return false }"
+    )
+    for key, value in itertools.product(keys, odd + rows):
+        rest = {name: x for name, x in good.items() if name != key}
+        text = text_of({"gait": {"kind": kind, **rest, key: value}})
+        try:
+            scenes.parse(text + REST_OF_SCENE)
+            expected = True
+        except Refusal:
+            expected = False
+        tried += expected
+        if opened.execute_script(read, text) != expected:
+            differing.append((key, value, expected))
+    assert tried > 10 and differing == []
+
+
+def test_long_files_are_read_at_once(opened):
+    """Of a loop after many blank lines, and of texts that are nearly TOML."""
+    read = "try { return lab.opened(arguments[0])[0].loop } catch (error) { return '' }"
+    many = 60_000
+    for filler in ("\n", " ", "\t\n", "#", "a = 1\n#\n", "0", "1_", "a.", "'", "["):
+        text = filler * (many // len(filler))
+        assert opened.execute_script(read, text + "\n[gait]\nkind = 'circle'\n") in (
+            "",
+            "circle",
+        )
+    text = "\n" * many + "[gait]\nkind = 'circle'" + "\n" * many
+    assert opened.execute_script(read, text) == "circle"
 
 
 def test_gaits_of_files_in_all_their_forms(opened):
@@ -583,6 +734,9 @@ def test_gaits_of_files_in_all_their_forms(opened):
         "amplitude=1e99",
         "%E0%A4%A",
         "centre=NaN,0",
+        "reverse=true",
+        "amplitude=0x1",
+        "amplitude=+%201",
     ],
 )
 def test_addresses_that_say_nothing(opened, page, address):
@@ -590,6 +744,76 @@ def test_addresses_that_say_nothing(opened, page, address):
     opened.get(f"{page[0].as_uri()}#{address}")
     assert state(opened).startswith("scene=three-link-glass&loop=circle")
     assert said(opened).startswith("The address is not used") or address.startswith("%")
+
+
+def test_points_at_the_edge_stay_in_the_address(opened, page):
+    """Of a small loop, whose unit curve reaches far; and rest, where no point moves."""
+    from selenium.webdriver import ActionChains, Keys
+
+    opened.get(f"{page[0].as_uri()}#loop=circle&amplitude=0.05&centre=2.3,0")
+    until(lambda: "amplitude=0.05" in state(opened))
+    opened.execute_script("document.querySelector(\"[data-handle='2']\").focus()")
+    keys = ActionChains(opened).key_down(Keys.SHIFT)
+    keys.send_keys(*[Keys.ARROW_DOWN] * 30).key_up(Keys.SHIFT).perform()
+    moved = state(opened)
+    points = re.search(r"points=([^&]*)", moved)[1].split(";")
+    assert float(points[2].split(",")[1]) == -50
+    until(lambda: opened.current_url.endswith(moved))
+    opened.refresh()
+    assert state(opened) == moved and said(opened) == ""
+    opened.get(f"{page[0].as_uri()}#loop=circle&amplitude=0")
+    until(lambda: "amplitude=0&" in state(opened))
+    opened.execute_script("document.querySelector(\"[data-handle='2']\").focus()")
+    ActionChains(opened).send_keys(Keys.ARROW_DOWN, Keys.DELETE).perform()
+    assert "raise the amplitude" in said(opened)
+
+
+def test_points_that_meet_are_refused_and_leave_nothing_to_undo(opened, page):
+    from selenium.webdriver import ActionChains, Keys
+
+    opened.get(f"{page[0].as_uri()}#loop=points&points=0,0;0.02,0;0,1&amplitude=1")
+    until(lambda: "0.02,0" in state(opened))
+    before = state(opened)
+    opened.execute_script("document.querySelector(\"[data-handle='1']\").focus()")
+    ActionChains(opened).send_keys(Keys.ARROW_LEFT, Keys.DELETE).perform()
+    assert state(opened) == before and "3 to 60 points" in said(opened)
+    click(opened, "#undo")
+    assert "loop=circle" in state(opened)  # before the address was given
+
+
+def test_a_frequency_belongs_to_the_state(opened):
+    first = state(opened)
+    (opened.folder / "f.toml").write_text("gait = {kind = 'circle', frequency = 0}")
+    opened.find_element("id", "open").send_keys(str(opened.folder / "f.toml"))
+    until(lambda: said(opened).startswith("Read"))
+    still = state(opened)
+    assert still.endswith("&frequency=0")
+    until(lambda: opened.current_url.endswith(still))
+    opened.refresh()
+    assert state(opened) == still
+    assert opened.execute_script("return lab.player.frequency") == 0
+    opened.execute_script("location.hash = arguments[0]", first)
+    until(lambda: state(opened) == first)
+    click(opened, "#undo")
+    assert state(opened) == still
+
+
+def test_another_address_stops_a_climb(opened):
+    click(opened, "#climb")
+    other = "scene=three-link-viscous&loop=circle&amplitude=0.5"
+    opened.execute_script("location.hash = arguments[0]", other)
+    until(lambda: state(opened).startswith(other))
+    assert opened.execute_script(
+        "return document.getElementById('climb').textContent"
+    ) == ("Climb")
+
+
+def test_deleting_the_last_point_keeps_the_focus(opened):
+    from selenium.webdriver import ActionChains, Keys
+
+    opened.execute_script("document.querySelector(\"[data-handle='7']\").focus()")
+    ActionChains(opened).send_keys(Keys.DELETE, Keys.DELETE).perform()
+    assert len(re.search(r"points=([^&]*)", state(opened))[1].split(";")) == 6
 
 
 def test_a_refusal_leaves_no_folder_behind(monkeypatch, tmp_path):

@@ -11,10 +11,11 @@ import threading
 from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 import pytest
 
-from geomech.run import store
+from geomech.run import jobs, store
 from geomech.run.store import Store, decoded, encoded, in_cache, partial_file
 from rft.refusal import Refusal
 
@@ -173,6 +174,50 @@ def test_no_flipped_bit_is_believed(count, tmp_path, capsys):
         for line in said
     )
     assert len(said) == len(list(tmp_path.glob("p.unreadable*")))
+
+
+@pytest.mark.parametrize("place", [18, 60])
+def test_every_bit_of_the_header_may_be_flipped(place, tmp_path):
+    """That of the version that may write, and that of the mark, which is then none."""
+    raw = filled(tmp_path / "p").read_bytes()
+    for bit in range(8):
+        flipped = bytearray(raw)
+        flipped[place] ^= 1 << bit
+        (tmp_path / "p").write_bytes(flipped)
+        with jobs.storing(tmp_path / "p", keep=True) as runner:
+            runner.store.put(key(0), value(0), np.ndarray)
+            runner.store.commit()
+            assert not runner.store.lost
+        assert found(tmp_path / "p", 1) == 1
+
+
+@pytest.mark.parametrize("column", ["value", "checksum"])
+@pytest.mark.parametrize("other", ["NULL", "7", "1.5", "'text'"])
+def test_a_value_that_is_none_of_ours_is_damage(column, other, tmp_path, capsys):
+    with sqlite3.connect(filled(tmp_path / "p")) as file:
+        file.execute(f"UPDATE result SET {column} = {other}")
+    file.close()
+    some = Store(tmp_path / "p")
+    assert some.get(key(3), np.ndarray) is None
+    some.put(key(3), value(3), np.ndarray)
+    some.close(done=False)
+    assert found(tmp_path / "p", 4) == 1 and (tmp_path / "p.unreadable").exists()
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [("O8", [1], b"x" * 8), (["<f8"], [1], b"x" * 8), ("<f8", [2], b"x" * 8),
+     ("<f8", 1, b"x" * 8), ("<f8,", [1], b"x" * 8), ("<U999999999", [1], b""), 3],
+)  # fmt: skip
+def test_a_value_that_is_no_array_is_not_read(parts):
+    raw = msgspec.msgpack.encode(
+        msgspec.msgpack.Ext(store.ARRAY, msgspec.msgpack.encode(parts))
+    )
+    with pytest.raises(store.UNREADABLE):
+        decoded(raw, np.ndarray)
+    nested = b"\x91" * 100_000 + b"\x01"
+    with pytest.raises(store.UNREADABLE):
+        decoded(nested, object)
 
 
 @pytest.mark.parametrize(

@@ -1388,7 +1388,7 @@ def number(value=1.5, order="<"):
 @pytest.mark.parametrize("order", "<>")
 def test_matrices_of_numbers_and_texts_are_read_in_either_order_of_bytes(order):
     read = lambda *args, **others: matlab._matrix(
-        matrix(*args, **others, order=order), order, 1
+        matrix(*args, **others, order=order), matlab.Source(order), 1
     )
     for kind, code, values in (
         (9, "d", range(6)),
@@ -1444,16 +1444,16 @@ def test_what_is_no_plain_array_is_skipped_and_what_does_not_fit_is_damaged(
 ):
     if found == "damaged":
         with pytest.raises(Refusal, match="^damaged$"):
-            matlab._matrix(data, "<", 1)
+            matlab._matrix(data, matlab.Source("<"), 1)
         return
-    name, values = matlab._matrix(data, "<", 1)
+    name, values = matlab._matrix(data, matlab.Source("<"), 1)
     assert (values is None) if found is None else values.ndim == found
     assert name == ("obj" if data[8] == 17 else "abc")
 
 
 def test_cells_and_structs_hold_others_to_a_depth():
     cell = matrix(1, (2, 1), number(1.5), element(14, b""))
-    name, values = matlab._matrix(cell, "<", 2)
+    name, values = matlab._matrix(cell, matlab.Source("<"), 2)
     assert (
         name == "abc"
         and values.shape == (2, 1)
@@ -1461,14 +1461,17 @@ def test_cells_and_structs_hold_others_to_a_depth():
         and values[1, 0].shape == (0, 0)
     )
     with pytest.raises(Refusal, match="^damaged$"):
-        matlab._matrix(cell, "<", 1)
+        matlab._matrix(cell, matlab.Source("<"), 1)
     fields = element(5, struct.pack("<i", 4), small=True), element(1, b"ab\0\0c\0\0\0")
     found = matlab._matrix(
-        matrix(2, (1, 1), *fields, number(2.5), number(3.5)), "<", 2
+        matrix(2, (1, 1), *fields, number(2.5), number(3.5)), matlab.Source("<"), 2
     )[1]
     assert {key: float(x.item()) for key, x in found.items()} == {"ab": 2.5, "c": 3.5}
     assert (
-        matlab._matrix(matrix(2, (1, 2), *fields, *[number()] * 4), "<", 2)[1] is None
+        matlab._matrix(
+            matrix(2, (1, 2), *fields, *[number()] * 4), matlab.Source("<"), 2
+        )[1]
+        is None
     )
     for bad in (
         matrix(1, (2, 2), number()), matrix(1, (1, 1), ONE), matrix(2, (1, 1), *fields, number()), matrix(2, (1, 1), fields[0]),
@@ -1479,7 +1482,7 @@ def test_cells_and_structs_hold_others_to_a_depth():
         matrix(2, (1, 1), element(5, b"12", small=True), fields[1], number(), number()),
     ):  # fmt: skip
         with pytest.raises(Refusal, match="^damaged$"):
-            matlab._matrix(bad, "<", 2)
+            matlab._matrix(bad, matlab.Source("<"), 2)
 
 
 def test_handles_and_instances_are_skipped_and_never_run():
@@ -1524,7 +1527,7 @@ def test_elements_fill_a_file_and_are_not_longer(monkeypatch):
     both = (
         element(1, b"abcde") + element(2, b"xy", small=True) + element(3, b"12345678")
     )
-    assert list(matlab._elements(both, "<")) == [
+    assert list(matlab.Source("<").elements(both)) == [
         (1, b"abcde"),
         (2, b"xy"),
         (3, b"12345678"),
@@ -1536,7 +1539,7 @@ def test_elements_fill_a_file_and_are_not_longer(monkeypatch):
         element(1, b"a")[:4],
     ):
         with pytest.raises(Refusal, match="^cut short$"):
-            list(matlab._elements(bad, "<"))
+            list(matlab.Source("<").elements(bad))
     head, whole = (
         b"MATLAB".ljust(124) + b"\x00\x01IM",
         element(14, matrix(6, (1, 1), ONE)),

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from geomech import terminal
 from geomech.core.errors import Note
 from geomech.io.files import atomic_file, atomic_folder, note, refuse_inputs
-from rft.refusal import Refusal
+from rft.refusal import Refusal, in_line
 
 if TYPE_CHECKING:  # commands start without NumPy
     from geomech.core.variables import Result
@@ -158,7 +158,7 @@ def _computing(
 
 def path_message(words: str) -> Callable[[Result, Path], str]:
     """Return the message of an output: some words before its path."""
-    return lambda result, path: f"{words} {path}"
+    return lambda result, path: f"{words} {in_line(path)}"
 
 
 def _quiet(fraction: float) -> None: ...

@@ -19,7 +19,7 @@ from geomech.studies import accuracy, fields, tables
 from geomech.studies.report import Reported
 from geomech.systems.base import shape_labels
 from geomech.systems.framed import Framed
-from rft.refusal import Refusal
+from rft.refusal import Refusal, in_line
 
 SCENE, TABLES = "scene.toml", "displacement.json"
 
@@ -127,7 +127,7 @@ def write_accuracy(result: Result, folder: Path) -> None:
 def files(result: Result, folder: Path) -> str:
     """Return the names of the files in a folder."""
     names = sorted(p.name for p in folder.iterdir() if not p.name.startswith("."))
-    return f"files in {folder}: {', '.join(names)}"
+    return f"files in {in_line(folder)}: {', '.join(map(in_line, names))}"
 
 
 def _save(fig, stem: Path) -> None:

@@ -12,6 +12,7 @@ from geomech.run.progress import progress as progress_bar
 from geomech.scenes.model import Scene
 from geomech.studies.motion import Motion, Trajectory
 from geomech.systems.base import length_unit, shape_labels
+from rft.refusal import in_line
 
 
 def question(scene: Scene, path: Path | None, cycles: int | None) -> Trajectory:
@@ -40,7 +41,7 @@ def check_format(path: Path) -> None:
 
 def message(result: Result, path: Path) -> str:
     """Return the line that names the file."""
-    return f"{'table' if is_table(path) else 'film' if animate.is_film(path) else 'pictures'} in {path}"
+    return f"{'table' if is_table(path) else 'film' if animate.is_film(path) else 'pictures'} in {in_line(path)}"
 
 
 def write(result: Result, path: Path) -> None:

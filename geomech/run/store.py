@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import re
 import sqlite3
 import sys
 import time
@@ -28,6 +29,8 @@ DAMAGED = (
 )  # the last where tables are not ours
 ARRAY = 1  # code of arrays in a value
 KINDS = "fiubcU"  # of dtypes of arrays
+DTYPE = re.compile(f"[<>|][{KINDS}][0-9]{{1,9}}")  # as arrays are stored
+UNREADABLE = (ValueError, TypeError, OverflowError, RecursionError, MemoryError)
 T = TypeVar("T")
 
 
@@ -37,6 +40,10 @@ class Busy(Refusal):
 
 class Foreign(sqlite3.DatabaseError):
     """A file of another program."""
+
+
+class Damaged(sqlite3.DatabaseError):
+    """A file of ours with a value that we do not write."""
 
 
 def encoded(value: Any) -> bytes:
@@ -67,9 +74,10 @@ def _checked(kind: type, x: Any) -> Any:
 
 
 def _array(code: int, raw: memoryview) -> np.ndarray:
-    dtype, shape, values = msgspec.msgpack.decode(raw)
-    dtype = np.dtype(dtype)
-    if code != ARRAY or dtype.kind not in KINDS:
+    dtype, shape, values = msgspec.msgpack.decode(
+        raw, type=tuple[str, list[int], bytes]
+    )
+    if code != ARRAY or not DTYPE.fullmatch(dtype):
         raise Refusal("it is no array")
     return np.frombuffer(values, dtype).reshape(shape).copy()
 
@@ -98,7 +106,7 @@ class Store:
             return None
         try:
             return (decoded(row[0], kind),)
-        except (ValueError, TypeError):  # msgspec's errors among them
+        except UNREADABLE:  # msgspec's errors among them
             return None
 
     def put(self, key: bytes, value: Any, kind: Any) -> None:
@@ -143,9 +151,12 @@ class Store:
                 step()  # an open file goes under its lock, but on Windows, where it must be closed first
 
     def _row(self, key: bytes) -> tuple | None:
-        return self.db.execute(
+        row = self.db.execute(
             "SELECT value, checksum FROM result WHERE key = ?", (key,)
         ).fetchone()
+        if row and not all(isinstance(x, bytes) for x in row):
+            raise Damaged
+        return row
 
     def _write(self) -> None:
         if not self.db.in_transaction:
@@ -185,7 +196,10 @@ class Store:
         if self.db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
             if self.db.execute("PRAGMA application_id").fetchone()[0] != OURS:
                 raise Foreign("it is of another program")
-            (self.mark,) = self.db.execute("PRAGMA user_version").fetchone()
+            (mark,) = self.db.execute("PRAGMA user_version").fetchone()
+            if mark < 0:
+                raise Damaged
+            self.mark = mark
             (self.written,) = self.db.execute("SELECT count(*) FROM result").fetchone()
             self.size = self.path.stat().st_size
 
@@ -218,7 +232,12 @@ class Store:
                         f"another computation has {self.path} open",
                         instead="wait for it, stop it, or name another",
                     ) from None
-            elif isinstance(error, Foreign | UnicodeError) or code in DAMAGED:
+            elif (
+                isinstance(error, Foreign | Damaged | UnicodeError)
+                or code in DAMAGED
+                # the header of a damaged file can forbid to write what may be written
+                or (code == sqlite3.SQLITE_READONLY and os.access(self.path, os.W_OK))
+            ):
                 self._disconnect()
                 self._begin_anew(
                     str(error) if isinstance(error, Foreign) else "it is damaged"

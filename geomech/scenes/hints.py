@@ -13,6 +13,7 @@ EXPECTED = {
     "float": "a number", "int": "a whole number without a point", "str": 'text in "quotes"', "bool": "true or false",
     "array": "a list in [ ]", "object": "a table",
 }  # fmt: skip
+LONGEST = 1000  # letters of a line in which a cure is looked for
 RULES = (
     (r"[“”„«»‘’]", 'put text in straight "quotes"'),
     (r"=\s*[-+]?\.\d", "a number has a digit before its point"),
@@ -35,7 +36,7 @@ def line_hint(text: str, error: Exception) -> str:
     lines = text.split("\n")
     if not match or int(match[1]) > len(lines):
         return ""
-    line = lines[int(match[1]) - 1].partition("#")[0]
+    line = lines[int(match[1]) - 1][:LONGEST].partition("#")[0]
     cure = next((f", {cure}" for rule, cure in RULES if re.search(rule, line)), "")
     return f": {formatted(line.strip())}{cure}"
 

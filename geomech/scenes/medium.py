@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,6 +11,7 @@ import numpy as np
 from geomech.io.files import read_text
 from geomech.io.rows import Rows
 from geomech.io.rows import read as read_rows
+from geomech.io.toml import tables_of
 from geomech.scenes.drag import LARGEST_FILE, header
 from geomech.scenes.key import Word
 from geomech.scenes.reader import Source, read_section
@@ -62,18 +62,7 @@ class MediumFile:
 def _medium(place: str, path: Path) -> dict:
     """Return the table of a medium's TOML file, which may stand under [medium] or alone."""
     try:
-        tables = tomllib.loads(read_text(path, LARGEST))
-    except tomllib.TOMLDecodeError as error:
-        raise Refusal(
-            f"{path.name} is not TOML",
-            where=place,
-            because=str(error),
-            instead=_table_instead(path),
-        ) from None
-    except RecursionError:
-        raise Refusal(
-            f"{path.name} is not TOML", where=place, because="it is nested too deep"
-        ) from None
+        text = read_text(path, LARGEST)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is not text"
         raise Refusal(
@@ -81,6 +70,15 @@ def _medium(place: str, path: Path) -> dict:
             where=place,
             because=reason,
             instead="geomech fit-medium writes such files",
+        ) from None
+    try:
+        tables = tables_of(text)
+    except ValueError as error:
+        raise Refusal(
+            f"{path.name} is not TOML",
+            where=place,
+            because=str(error),
+            instead=_table_instead(path),
         ) from None
     table = tables.get("medium", tables)
     if not isinstance(table, dict) or (table is not tables and len(tables) > 1):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from importlib import resources
 from importlib.resources.abc import Traversable
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from geomech.core.errors import choose
 from geomech.io.files import note, read_text
+from geomech.io.toml import tables_of
 from geomech.scenes import hints, reader, swimming
 from geomech.scenes.medium import MEDIUM
 from geomech.scenes.model import Scene, checked_scene
@@ -207,11 +207,8 @@ def parse(text: str, name: str = "scene") -> Scene | Any:
     if not isinstance(text, str):
         raise Refusal("a scene is a TOML text", value=text, where=formatted(name))
     try:
-        tables = tomllib.loads(text)
-    except (
-        ValueError,
-        RecursionError,
-    ) as error:  # a ValueError may be an integer of too many digits
+        tables = tables_of(text)
+    except ValueError as error:  # or an integer of too many digits
         raise Refusal(
             f"{name} is not TOML", because=f"{error}{hints.line_hint(text, error)}"
         ) from None

@@ -4,7 +4,6 @@ their numbers, or from files."""
 from __future__ import annotations
 
 import dataclasses
-import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 
 from geomech.core.errors import choose
 from geomech.io.files import read_text
+from geomech.io.toml import tables_of
 from geomech.scenes.columns import columns
 from geomech.scenes.key import Word
 from geomech.scenes.reader import Source, build
@@ -237,8 +237,8 @@ def _read_stress(source: Source, place: str, file: str) -> PlateStress:
     if path.suffix == ".csv":
         return plate_drags(place, file)
     try:
-        tables = tomllib.loads(read_text(path, LARGEST))
-    except (OSError, ValueError, RecursionError) as error:
+        tables = tables_of(read_text(path, LARGEST))
+    except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is not TOML"
         cure = f"give a TOML or CSV file or one of {', '.join(VERTICAL)}"
         raise Refusal(

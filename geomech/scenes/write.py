@@ -10,7 +10,7 @@ import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from geomech.gaits import Gait
+from geomech.gaits import Circle, Gait
 from geomech.scenes.key import angles_of
 from geomech.scenes.medium import MEDIUM
 from geomech.scenes.model import SWIMMER, Scene, checked_scene
@@ -43,7 +43,7 @@ def toml(scene: Scene | Intruding | WalkerScene) -> str:
     ratio = 3.0
     """
     self_contained = not isinstance(_checked(scene), Scene) or not (
-        scene.files or _names_relative_file(scene.text)
+        scene.files or _names_relative_file(tomllib.loads(scene.text))
     )
     if (
         scene.text
@@ -51,7 +51,7 @@ def toml(scene: Scene | Intruding | WalkerScene) -> str:
         and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene
     ):
         return scene.text
-    return _text(_written_tables(scene))
+    return text_of(_written_tables(scene))
 
 
 def _checked(scene: Scene | Intruding | WalkerScene) -> Scene | Intruding | WalkerScene:
@@ -59,16 +59,15 @@ def _checked(scene: Scene | Intruding | WalkerScene) -> Scene | Intruding | Walk
     return scene if hasattr(type(scene), "example") else checked_scene(scene)
 
 
-def _names_relative_file(text: str) -> bool:
-    """Return whether a scene's text names a file by its place relative to the scene's own."""
-    tables = tomllib.loads(text)
+def _names_relative_file(tables: dict) -> bool:
+    """Return whether tables name a file by its place relative to the scene's own."""
     files = [tables.get(place, {}).get("file", "") for place in ("gait", "system")]
     return any(file and not Path(file).is_absolute() for file in files)
 
 
 def table(name: str, values: dict) -> str:
     """Return one table as TOML."""
-    return _text({name: values})
+    return text_of({name: values})
 
 
 def gait_table(gait: Gait) -> dict:
@@ -129,6 +128,33 @@ def tables(scene: Scene | Intruding | WalkerScene) -> dict:
         and from_tables(read, scene.name, scene.text) == scene
         else _written_tables(scene)
     )
+
+
+def without_gait(scene: Scene, spell_out: bool = False) -> dict:
+    """Return the tables of a scene but for its gait, which hold in any folder: those of
+    its text where these do, else newly written ones. Refusal if no file can name one of
+    its parts; the gait may be one that none can. spell_out: the medium by its law and
+    parameters, in place of its name.
+
+    Examples
+    --------
+    >>> from geomech.scenes import load
+    >>> from geomech.scenes.write import without_gait
+    >>> list(without_gait(load("three-link-viscous")))
+    ['medium', 'body']
+    """
+    stand_in = Circle(frequency=getattr(checked_scene(scene).gait, "frequency", None))
+    plain = scene.changed(gait=stand_in)
+    read = tomllib.loads(scene.text) | {"gait": gait_table(stand_in)}
+    holds = (
+        scene.text
+        and not (scene.files or _names_relative_file(read))
+        and from_tables(read, scene.name, scene.text) == plain
+    )
+    found = read if holds else _written_tables(plain)
+    if spell_out:
+        found = spelled_out(found, scene)
+    return {name: table for name, table in found.items() if name != "gait"}
 
 
 def spelled_out(tables: dict, scene: Scene) -> dict:
@@ -246,7 +272,8 @@ def _plain(value):
     return [_plain(x) for x in value] if isinstance(value, (tuple, list)) else value
 
 
-def _text(tables: dict) -> str:
+def text_of(tables: dict) -> str:
+    """Return the tables of a scene as TOML."""
     lines = [
         f"{key} = {_value(x)}"
         for key, x in tables.items()
@@ -271,4 +298,7 @@ def _value(x) -> str:
         return f"[{', '.join(map(_value, x))}]"
     if isinstance(x, dict):
         return f"{{ {', '.join(f'{key} = {_value(y)}' for key, y in x.items())} }}"
-    return json.dumps(x, ensure_ascii=False) if isinstance(x, (str, bool)) else repr(x)
+    if isinstance(x, (str, bool)):
+        # TOML allows no DEL as it is, JSON does
+        return json.dumps(x, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(x)

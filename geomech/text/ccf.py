@@ -10,6 +10,7 @@ from geomech.core.summary import POSE, grid, spans, zero_words
 from geomech.core.variables import Result
 from geomech.geometry.field import Field
 from geomech.studies.shape_space import Space
+from rft.refusal import in_line
 
 ROUNDING = 1e-12  # largest size of a component that is nothing but roundoff
 RAYS, STEPS = (
@@ -23,7 +24,7 @@ def text(result: Result) -> str:
     space: Space = result.subject
     scene = space.study.scene
     lines = [
-        f"{scene.name}: CCF in the frame {scene.frame}, positive for counter-clockwise loops"
+        f"{in_line(scene.name)}: CCF in the frame {scene.frame}, positive for counter-clockwise loops"
     ]
     if space.planes:
         axes = space.planes[0].ccf.axes

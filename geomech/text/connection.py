@@ -10,6 +10,7 @@ from geomech.geometry.connection import Connection
 from geomech.studies.shape_space import Space
 from geomech.systems.base import System, shape_labels
 from geomech.systems.capabilities import stored_table
+from rft.refusal import in_line
 
 ROWS = 16  # joints in a table
 
@@ -19,7 +20,7 @@ def text(result: Result) -> str:
     space: Space = result.subject
     scene, fitted = space.study.scene, space.study.fitted
     lines = [
-        f"{scene.name}: local connection A, xi = A alphadot, in the frame {scene.frame}"
+        f"{in_line(scene.name)}: local connection A, xi = A alphadot, in the frame {scene.frame}"
     ]
     lines += [f"grid: {grid(fitted.axes)}"]
     lines += [

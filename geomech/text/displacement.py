@@ -12,6 +12,7 @@ import numpy as np
 from geomech.core.summary import POSE, WIDTH, zero_words
 from geomech.core.variables import Result, Variable
 from geomech.studies import tables, uncertainty
+from rft.refusal import in_line
 
 numbers = tables.table
 MORE = "--all prints every tier, the net distance and the seconds"
@@ -32,7 +33,7 @@ def text(result: Result, title: str = "", rows: int = ROWS) -> str:
 
 def gait_lines(result: Result, title: str = "", rows: int = ROWS) -> list[str]:
     """Return the lines of `text`, without the one that tells x from y."""
-    facts, title = result.attributes, title or result.attributes["name"]
+    facts, title = result.attributes, title or in_line(result.attributes["name"])
     tier, unit, shown = (
         exact_tier(result),
         result["x"].unit,
@@ -181,7 +182,7 @@ def _amplitude(result: Result) -> str:
 def full(result: Result, title: str = "") -> str:
     """Return x, y, heading and net distance per cycle by tier, each with its error in its own unit. title: the beginning of
     lines, by default the scene's name."""
-    facts, title = result.attributes, title or result.attributes["name"]
+    facts, title = result.attributes, title or in_line(result.attributes["name"])
     lines = [f"{title}: {facts['note']}"] if "note" in facts else []
     for variable, headline, by, places in _blocks(result):
         lines += [f"{title}: {headline}", *_block(result, variable, by, places)]

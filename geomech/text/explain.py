@@ -13,7 +13,7 @@ from geomech.text.system import described, engine
 from geomech.tiers import TIERS
 from geomech.tiers.base import solved_phases
 from rft.premise import ALL
-from rft.refusal import printable
+from rft.refusal import in_line, printable
 
 if TYPE_CHECKING:
     from geomech.scenes.intruding import Intruding
@@ -37,7 +37,7 @@ def explain(scene: Scene | Intruding | WalkerScene) -> str:
         type(scene.gait).__name__,
     )
     timed = "" if scene.frequency is None else f" at {scene.frequency:g} Hz"
-    lines = [f"{scene.name}: {first}, {gait} gait{timed}", *rest]
+    lines = [f"{in_line(scene.name)}: {first}, {gait} gait{timed}", *rest]
     lines.append(f"engine: {engine(system)}")
     phases = scene.numerics.phases
     if (count := solved_phases(system, scene.gait, phases)) < phases:

@@ -9,6 +9,7 @@ import numpy as np
 from geomech.core.variables import Result, Variable
 from geomech.studies.forces import PARTS
 from geomech.systems.base import length_unit
+from rft.refusal import in_line
 
 PLACES = (0.25, 0.5, 0.75)  # of the body, at which the lag of activation is printed
 
@@ -59,7 +60,7 @@ def _digits(x: float, error: float) -> str:
 
 
 def _travel(result: Result) -> str:
-    run, name = result.subject, result.attributes["name"]
+    run, name = result.subject, in_line(result.attributes["name"])
     if not run.travels:
         return f"{name}: no net displacement; forwards is where the frame points to at phase 0"
     distance, angle = np.hypot(*run.net[:2]), np.degrees(run.direction)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from geomech.core.variables import Result
+from rft.refusal import in_line
 
 
 def numbers(result: Result) -> dict[str, Any]:
@@ -96,4 +97,4 @@ def command(result: Result) -> str:
     """Return the command that gives the result, without its output."""
     question, _ = result.subject
     sizes = f"--length {result.attributes['size']:g} --radius {result.attributes['radius']:g}"
-    return f"geomech grains {question.scene.name} --cycles {question.cycles} --seed {question.seed} {sizes}"
+    return f"geomech grains {in_line(question.scene.name)} --cycles {question.cycles} --seed {question.seed} {sizes}"

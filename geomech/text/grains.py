@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from geomech.core.summary import part
 from rft.ground import GROUND_EFFECTS, GroundEffect
 from rft.premise import negated
+from rft.refusal import in_line
 
 if TYPE_CHECKING:
     from geomech.scenes.intruding import Intruding
@@ -33,7 +34,7 @@ def described(scene: Intruding | WalkerScene) -> list[str]:
     )
     off = [kind for kind in known if kind not in [e.kind for e in scene.effects]]
     return [
-        f"{scene.name}: {body}"
+        f"{in_line(scene.name)}: {body}"
         + ("" if walks else f" of {scene.count:,} {scene.parts}"),
         *lines,
         *effect_lines(scene.effects),

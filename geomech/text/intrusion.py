@@ -9,6 +9,7 @@ import numpy as np
 from geomech.core.variables import Result
 from geomech.studies.intrusion import Estimate
 from geomech.text.grains import effect_lines
+from rft.refusal import in_line
 
 ROUNDING = 1e-12  # over the largest force or moment
 UNITS = {"t": "s", "angle": "degrees", "x": "m", "y": "m", "z": "m"}
@@ -35,7 +36,7 @@ def text(result: Result) -> str:
     columns = {v.name: v.values for v in result.variables}
     kinds = type(scene.intruder).__name__, type(scene.motion).__name__
     lines = [
-        f"{scene.name}: {kinds[0]} of {scene.count:,} {scene.parts}, {kinds[1]} in {len(found.t)} steps"
+        f"{in_line(scene.name)}: {kinds[0]} of {scene.count:,} {scene.parts}, {kinds[1]} in {len(found.t)} steps"
     ]
     if matched := getattr(scene, "matched", ""):
         lines.append(matched)

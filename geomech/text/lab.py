@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from geomech.core.variables import Result
+from rft.refusal import in_line
 
 
 def text(result: Result) -> str:
     """Return a line a scene, and one for a family."""
-    names = result["scene"].values
+    names = [in_line(name) for name in result["scene"].values]
     wide = max(map(len, names))
     lines = [
         f"{name:{wide}}  {shapes} shapes, harmonics to {highest}"

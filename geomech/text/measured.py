@@ -10,6 +10,7 @@ from geomech.core.variables import Result
 from geomech.measured.fit import PRINTED_PHASES, Fitted
 from geomech.measured.results import status
 from geomech.scenes.write import gait_table
+from rft.refusal import in_line
 
 
 def numbers(result: Result) -> dict[str, Any]:
@@ -82,7 +83,8 @@ def described(fit: Fitted) -> str:
     )
     residual, wide = np.sqrt(((fit.measured - fit.predicted) ** 2).mean(0)), reach(fit)
     lines = [
-        f"{fit.log.name}: {len(fit.measured)} whole cycles of {', '.join(fit.log.joints)}, {fit.frequency:.6g} per unit of t",
+        f"{in_line(fit.log.name)}: {len(fit.measured)} whole cycles of "
+        f"{', '.join(fit.log.joints)}, {fit.frequency:.6g} per unit of t",
         f"phase within {fit.irregular:.2g} rad of a uniform run through each",
         f"displacement per cycle, with intervals of {fit.known.level:.3g} of cases:",
         f"{'':10}{'mean of the log':>19}   {'by the connection':>19}   rms of their difference",

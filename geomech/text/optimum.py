@@ -9,6 +9,7 @@ from geomech.core.summary import moved
 from geomech.core.variables import Result
 from geomech.optimisation import Optimum
 from geomech.scenes.write import gait_table, toml
+from rft.refusal import in_line
 
 SHOWN = 6  # answers that a table led to, of those that nobody finished
 
@@ -99,7 +100,7 @@ def _headline(result: Result) -> str:
         if optimum.request.objective.direction
         else ""
     )
-    return f"{optimum.scene.name}: {value.label}{towards} {value.values:.6g} {value.unit}, error {value.error:.1g}"
+    return f"{in_line(optimum.scene.name)}: {value.label}{towards} {value.values:.6g} {value.unit}, error {value.error:.1g}"
 
 
 def _answers(optimum: Optimum) -> list[str]:

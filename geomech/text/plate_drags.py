@@ -7,6 +7,7 @@ from typing import Any
 
 from geomech.core.variables import Result
 from geomech.text.rod_drag import MOST_ROWS, RESIDUALS
+from rft.refusal import in_line
 
 OF_COEFFICIENTS = "coefficient", "value", "interval", "resolution"
 
@@ -50,7 +51,7 @@ def full(result: Result) -> str:
 def _lines(result: Result, most: int) -> str:
     facts, zeta, beta = result.attributes, result.subject.zeta, result["beta"].values
     lines = [
-        f"stress map fitted to {facts['name']}: {beta.size} plate drags",
+        f"stress map fitted to {in_line(facts['name'])}: {beta.size} plate drags",
         "         N/cm^3   95 % interval        from the data   generic set times zeta",
     ]
     for name, x, (low, high), share, y in zip(

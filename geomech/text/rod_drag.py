@@ -9,6 +9,7 @@ import numpy as np
 
 from geomech.core.variables import Result
 from geomech.scenes.write import table
+from rft.refusal import in_line
 
 UNITS = {"axial_stress": "Pa", "axial_force": "N", "gamma0_deg": "degrees"}
 SIZES = {"radius": "m", "length": "m", "depth": "m", "density": "kg/m^3"}
@@ -63,7 +64,7 @@ def full(result: Result) -> str:
 def _lines(result: Result, most: int) -> str:
     f, facts = result.subject, result.attributes
     lines = [
-        f"{f.law} law fitted to {facts['name']}: {f.data.n_forces} forces at {f.data.n_angles} angles"
+        f"{f.law} law fitted to {in_line(facts['name'])}: {f.data.n_forces} forces at {f.data.n_angles} angles"
     ]
     for name, x, (low, high) in zip(
         *(result[v].values for v in ("parameter", "value", "interval"))

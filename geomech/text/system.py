@@ -18,7 +18,7 @@ from rft.laws import LAWS
 from rft.laws.records import is_compilable, record
 from rft.premise import SHAPE_ALONE, negated
 from rft.quadrature import QUADRATURE
-from rft.refusal import formatted
+from rft.refusal import formatted, in_line
 
 NO_PAST = "nothing remembers, places are alike, no mass"
 
@@ -105,7 +105,7 @@ def _swimmer(system: Swimmer) -> list[str]:
 
 def _table(system: Table) -> list[str]:
     held = system.stored
-    lines = [f"table ({system.file}: {held.connection!r})"]
+    lines = [f"table ({in_line(system.file)}: {held.connection!r})"]
     if system.tube is not None:
         lines.append(
             f"known near a measured gait alone; errors are those of {system.tube.taylor.level:.3g} of cases"

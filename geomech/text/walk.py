@@ -9,6 +9,7 @@ import numpy as np
 from geomech.core.variables import Result
 from geomech.studies import walking
 from geomech.studies.walking import Walked
+from rft.refusal import in_line
 
 SERIES = "t", "x", "z", "pitch"  # of the table, that JSON has
 
@@ -51,7 +52,8 @@ def text(result: Result) -> str:
         else ""
     )
     return "\n".join([
-        f"{scene.name}: {w.status} at {w.speed:.4g} +- {found.estimate:.1g} m/s at {f:g} Hz ({_regular(w)}{_settling(w)})",
+        f"{in_line(scene.name)}: {w.status} at {w.speed:.4g} +- "
+        f"{found.estimate:.1g} m/s at {f:g} Hz ({_regular(w)}{_settling(w)})",
         f"of the error {found.elements:.1g} m/s are of the elements, from twice as many",
         *_turning(found),
         f"t = 0 to {w.t[-1]:.4g} s: x to {w.pose[-1, 0]:.4g} m, z {w.pose[:, 1].min():.4g} to {w.pose[:, 1].max():.4g} m, "

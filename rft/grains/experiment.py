@@ -10,7 +10,6 @@ import json
 import math
 import os
 import time
-import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import astuple, dataclass
 from pathlib import Path
@@ -18,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rft.checks import in_range
+from rft.checks import in_range, is_number
 from rft.grains.bed import Bed
 from rft.grains.contacts import contacts, motion_energy
 from rft.grains.engine import Engine, Forces, write_data
@@ -438,13 +437,12 @@ def settle(
         ) from None
     file = _bed_file(folder, _settled_key(bed, body, height))
     sheet = file.with_suffix(".json")
-    with contextlib.suppress(OSError, ValueError, KeyError):
-        known = json.loads(sheet.read_text())
-        if known["sha256"] == hashlib.sha256(file.read_bytes()).hexdigest():
-            return Settled(
-                file, known["facts"], known["facts"]["packing"] * bed.density
-            )
-        os.replace(file, file.with_suffix(".damaged"))
+    facts = _known_facts(file, sheet)
+    if facts is not None:
+        return Settled(file, facts, facts["packing"] * bed.density)
+    if sheet.exists():
+        with contextlib.suppress(OSError):
+            os.replace(file, file.with_suffix(".damaged"))
     clock, zero = time.process_time(), np.zeros(body.joints)
     links = body.links(zero, zero)
     middle = body.half_lengths @ links.centres / body.half_lengths.sum()
@@ -467,11 +465,37 @@ def settle(
                 {
                     "facts": facts,
                     "sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
+                    "sha256_of_facts": _digest_of(facts),
                 }
             )
             + "\n"
         )
     return Settled(file, facts, facts["packing"] * bed.density)
+
+
+def _known_facts(file: Path, sheet: Path) -> dict[str, float] | None:
+    """Return the facts of a bed that is kept; None if it is not, or damaged."""
+    try:
+        known = json.loads(sheet.read_text())
+        facts = known["facts"]
+        digest_of_facts = _digest_of(facts)
+        # sheets of older versions have none of the facts
+        is_whole = known.get("sha256_of_facts", digest_of_facts) == digest_of_facts
+        is_whole = is_whole and file.exists() and known["sha256"] == _digest(file)
+        return facts if is_whole and is_number(facts["packing"]) else None
+    except (
+        OSError,
+        ValueError,
+        LookupError,
+        TypeError,
+        AttributeError,
+        RecursionError,
+    ):
+        return None
+
+
+def _digest_of(facts: dict[str, float]) -> str:
+    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
 
 
 def _settle(
@@ -551,9 +575,10 @@ def _rows(place: Path, block: int) -> Block:
     """Return the rows of a block; {} if they are not there, or damaged."""
     try:
         with _rows_file(place, block).open("rb") as file, np.load(file) as rows:
-            return {name: rows[name] for name in rows.files}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile):
+            found = {name: rows[name] for name in rows.files}
+    except Exception:  # of NumPy, zipfile and zlib, which have many for a damaged file
         return {}
+    return found if {*found} == {*SERIES, "state", "cpu", "after"} else {}
 
 
 def _blocks_done(place: Path, n: int) -> list[Block]:

@@ -14,6 +14,7 @@ import numpy as np
 from geomech.io.tables.matlab import DEEPEST, LARGEST
 from rft.refusal import Refusal
 
+MOST_NODES = 20_000  # some seconds of reading; files of sysplotter have some hundreds
 CURE = "pip install 'geomech[hdf5]', or save it in MATLAB by save(FILE, ..., '-v7')"
 ANEW = "save it in MATLAB again, by save(FILE, ..., '-v7')"
 
@@ -46,10 +47,11 @@ def arrays(raw: bytes, names: Collection[str]) -> dict[str, Any]:
 
 
 class Reader:
-    """Reader of the nodes of one file. bytes_left: what may still be read of it, inflated."""
+    """Reader of the nodes of one file. bytes_left: what may still be read of it, inflated.
+    nodes_left: groups, arrays and references, each of which can be named many times."""
 
     def __init__(self, file: Any):
-        self.file, self.bytes_left = file, LARGEST
+        self.file, self.bytes_left, self.nodes_left = file, LARGEST, MOST_NODES
 
     def member(self, group: Any, name: str, depth: int) -> Any:
         """Return the value of a node in a group; Refusal, which says where, if it cannot be read."""
@@ -69,6 +71,10 @@ class Reader:
         """Return an array, a text, a cell or a struct; None for anything else."""
         import h5py
 
+        self.nodes_left -= 1
+        if self.nodes_left < 0:
+            reason = f"it has more than {MOST_NODES:,} cells and fields"
+            raise Refusal("is too large, or damaged", because=reason, instead=ANEW)
         if not depth:
             raise Refusal(
                 f"is damaged at {place}", because="it lies in itself", instead=ANEW

@@ -41,6 +41,37 @@ OPAQUE = 17  # class of an instance of a class, which has no dimensions
 COMPLEX = 0x0800  # among an array's flags
 MOST_DIMENSIONS = 32
 DEEPEST = 32  # cells and structs within one another
+MOST = 200_000  # elements, or nodes of HDF5: files of sysplotter have some hundreds
+
+
+class Source:
+    """The bytes of a file under way. order: of their bytes. left: elements that it may
+    still have, which can be far more than its compressed bytes."""
+
+    def __init__(self, order: str):
+        self.order, self.left = order, MOST
+
+    def elements(self, data: memoryview) -> Iterator[tuple[int, memoryview]]:
+        """Yield (type, bytes) of the elements that fill ``data``; Refusal if one is longer
+        than the rest of it, or the file has too many."""
+        k = 0
+        while k < len(data):
+            self.left -= 1
+            if self.left < 0:
+                raise Refusal(f"it has more than {MOST:,} parts")
+            if k + 8 > len(data):
+                raise Refusal("cut short")
+            kind, size = struct.unpack_from(f"{self.order}II", data, k)
+            small = kind >> 16
+            if small:  # up to four bytes, in the place of the size
+                kind, size, start, step = kind & 0xFFFF, small, k + 4, 8
+            else:
+                padding = 0 if kind == COMPRESSED else -size % 8
+                start, step = k + 8, 8 + size + padding
+            if (small and small > 4) or start + size > len(data):
+                raise Refusal("cut short")
+            yield kind, data[start : start + size]
+            k += step
 
 
 def arrays(raw: bytes) -> dict[str, Any]:
@@ -49,73 +80,55 @@ def arrays(raw: bytes) -> dict[str, Any]:
     marks = {b"\x00\x01IM": "<", b"\x01\x00MI": ">"}
     if (order := marks.get(raw[124:HEADER])) is None:
         raise Refusal("no MATLAB file of version 5 to 7")
-    variables, bytes_left = {}, LARGEST
-    for kind, data in _elements(raw[HEADER:], order):
+    variables, bytes_left, source = {}, LARGEST, Source(order)
+    for kind, data in source.elements(memoryview(raw)[HEADER:]):
         if kind == COMPRESSED:
             stream = zlib.decompressobj()
             try:
-                data = stream.decompress(data, bytes_left)
+                data = memoryview(stream.decompress(data, bytes_left))
             except zlib.error:
                 raise Refusal("damaged") from None
             bytes_left -= len(data)
             if not stream.eof or bytes_left <= 0:
                 raise Refusal("cut short, or too large")
-            ((kind, data),) = _elements(data, order)
+            ((kind, data),) = source.elements(data)
         if kind == MATRIX and data:
-            name, values = _matrix(data, order, DEEPEST)
+            name, values = _matrix(data, source, DEEPEST)
             variables[name] = values
     return variables
 
 
-def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
-    """Yield (type, bytes) of the elements that fill ``data``; Refusal if one is longer than the rest of it."""
-    k = 0
-    while k < len(data):
-        if k + 8 > len(data):
-            raise Refusal("cut short")
-        kind, size = struct.unpack_from(f"{order}II", data, k)
-        small = kind >> 16
-        if small:  # up to four bytes, in the place of the size
-            kind, size, start, step = kind & 0xFFFF, small, k + 4, 8
-        else:
-            start, step = k + 8, 8 + size + (-size % 8 if kind != COMPRESSED else 0)
-        if (small and small > 4) or start + size > len(data):
-            raise Refusal("cut short")
-        yield kind, data[start : start + size]
-        k += step
-
-
-def _matrix(data: bytes, order: str, depth: int) -> tuple[str, Any]:
+def _matrix(data: memoryview, source: Source, depth: int) -> tuple[str, Any]:
     """Return (name, values) of a matrix; Refusal if its parts do not fit each other. depth: of cells and structs within
     it."""
-    parts = list(_elements(data, order))
+    parts, order = list(source.elements(data)), source.order
     if len(parts) < 3 or len(parts[0][1]) != 8 or not depth:
         raise Refusal("damaged")
     (flags,) = struct.unpack_from(f"{order}I", parts[0][1])
     kind = flags & 0xFF
     if kind == OPAQUE:
-        return parts[1][1].decode("latin-1"), None
+        return bytes(parts[1][1]).decode("latin-1"), None
     if len(parts[1][1]) % 4:
         raise Refusal("damaged")
     shape = tuple(np.frombuffer(parts[1][1], f"{order}i4").tolist())
-    name, parts = parts[2][1].decode("latin-1"), parts[3:]
+    name, parts = bytes(parts[2][1]).decode("latin-1"), parts[3:]
     if flags & COMPLEX or not 2 <= len(shape) <= MOST_DIMENSIONS or min(shape) < 0:
         return name, None
     if kind in (CELL, STRUCT):
         return name, (_cell if kind == CELL else _struct)(
-            parts, shape, order, depth - 1
+            parts, shape, source, depth - 1
         )
     return name, _array(kind, shape, *parts[0], order) if len(parts) == 1 else None
 
 
 def _array(
-    kind: int, shape: tuple[int, ...], stored_as: int, raw: bytes, order: str
+    kind: int, shape: tuple[int, ...], stored_as: int, raw: memoryview, order: str
 ) -> np.ndarray | str | None:
     """Return an array of numbers of a shape, or a text, from the bytes of its element; None for another class."""
     if kind == CHAR and stored_as in TEXTS:
         wide = TEXTS[stored_as].startswith("utf-") and TEXTS[stored_as] != "utf-8"
         end = "-le" if order == "<" else "-be"
-        return raw.decode(
+        return bytes(raw).decode(
             f"{TEXTS[stored_as]}{end}" if wide else TEXTS[stored_as], "replace"
         )
     if kind not in REAL or stored_as not in NUMBERS:
@@ -134,23 +147,25 @@ def _count(shape: tuple[int, ...]) -> int:
     return size
 
 
-def _cell(parts: list, shape: tuple[int, ...], order: str, depth: int) -> np.ndarray:
+def _cell(
+    parts: list, shape: tuple[int, ...], source: Source, depth: int
+) -> np.ndarray:
     """Return the contents of a cell, an array of objects."""
     if _count(shape) != len(parts):
         raise Refusal("damaged")
     values = np.empty(len(parts), object)
-    values[:] = [_value(part, order, depth) for part in parts]
+    values[:] = [_value(part, source, depth) for part in parts]
     return values.reshape(shape, order="F")
 
 
 def _struct(
-    parts: list, shape: tuple[int, ...], order: str, depth: int
+    parts: list, shape: tuple[int, ...], source: Source, depth: int
 ) -> dict[str, Any] | None:
     """Return the fields of a struct by name; None of an array of structs."""
     if len(parts) < 2 or len(parts[0][1]) != 4:
         raise Refusal("damaged")
-    (width,) = struct.unpack_from(f"{order}i", parts[0][1])
-    names, values = parts[1][1], parts[2:]
+    (width,) = struct.unpack_from(f"{source.order}i", parts[0][1])
+    names, values = bytes(parts[1][1]), parts[2:]
     if (
         width <= 0
         or len(names) % width
@@ -163,12 +178,12 @@ def _struct(
         names[k : k + width].partition(b"\0")[0].decode("latin-1")
         for k in range(0, len(names), width)
     ]
-    return {name: _value(part, order, depth) for name, part in zip(fields, values)}
+    return {name: _value(part, source, depth) for name, part in zip(fields, values)}
 
 
-def _value(part: tuple[int, bytes], order: str, depth: int) -> Any:
+def _value(part: tuple[int, memoryview], source: Source, depth: int) -> Any:
     """Return the values of a matrix within another one; an empty array for an empty one."""
     kind, data = part
     if kind != MATRIX:
         raise Refusal("damaged")
-    return _matrix(data, order, depth)[1] if data else np.zeros((0, 0))
+    return _matrix(data, source, depth)[1] if data else np.zeros((0, 0))

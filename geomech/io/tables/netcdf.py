@@ -51,7 +51,7 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     try:  # what is damaged makes SciPy raise whatever comes first
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            file = netcdf_file(io.BytesIO(raw), mmap=False)
+            file = netcdf_file(_OnceRead(raw), mmap=False)
             variables = {
                 name: (tuple(v.dimensions), np.array(v[:]))
                 for name, v in file.variables.items()
@@ -75,6 +75,22 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     shapes = [f"alpha_{k + 1}" for k in range(len(stored.connection.axes))]
     called = [_called(x, names[x]) for x in shapes]
     return replace(stored, shapes=checked_names(called, shapes))
+
+
+class _OnceRead(io.BytesIO):
+    """The bytes of a file of which none need be read twice: in one that says so, many
+    variables lie in the same place."""
+
+    def __init__(self, raw: bytes):
+        super().__init__(raw)
+        self.left = 2 * len(raw)
+
+    def read(self, size: int | None = -1) -> bytes:
+        found = super().read(size)
+        self.left -= len(found)
+        if self.left < 0:
+            raise EOFError
+        return found
 
 
 def _other_format(raw: bytes) -> str:

@@ -20,16 +20,20 @@ import numpy as np
 
 from geomech.core.variables import Result
 from geomech.core.version import VERSION
+from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Gait, Points
+from geomech.geometry.gait import LARGEST
 from geomech.io.files import atomic_file
-from geomech.scenes import toml
+from geomech.scenes.key import keys_of
+from geomech.scenes.write import text_of, without_gait
 from geomech.studies.charts import SHARES, Chart, series_of
 from geomech.systems.base import length_unit, shape_labels
-from rft.refusal import Refusal
+from rft.refusal import Refusal, in_line
 
 FOLDER = Path(__file__).parent
 SCRIPTS = (
     "numbers",
+    "toml",
     "loops",
     "chart",
     "state",
@@ -39,6 +43,13 @@ SCRIPTS = (
     "curve",
     "page",
 )  # in this order
+READ = (
+    "circle",
+    "ellipse",
+    "butterfly",
+    "fourier",
+    "points",
+)  # kinds of gaits of files that the page opens
 COLOURS = 65  # of the map's scale
 ESCAPED = {
     "<": "\\u003c",
@@ -58,7 +69,7 @@ def check_format(path: Path) -> None:
 
 
 def message(result: Result, path: Path) -> str:
-    return f"page in {path}"
+    return f"page in {in_line(path)}"
 
 
 @contextmanager
@@ -105,6 +116,12 @@ def _hash(text: str) -> str:
     return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
 
 
+def _checksum(text: str) -> str:
+    # a name of a file may hold bytes that are no text
+    raw = text.encode(errors="backslashreplace")
+    return hashlib.sha256(raw).hexdigest()[:12]
+
+
 def _json(values: Any) -> str:
     text = json.dumps(values, separators=(",", ":"), allow_nan=False)
     for letter, escaped in ESCAPED.items():
@@ -125,6 +142,8 @@ def data(charts: list[Chart]) -> dict[str, Any]:
         "version": VERSION,
         "colours": colours,
         "shares": SHARES,
+        "gaits": _declared(),
+        "largest": LARGEST,
         "scenes": scenes,
         "tables": tables,
     }
@@ -133,10 +152,9 @@ def data(charts: list[Chart]) -> dict[str, Any]:
 def _scene(chart: Chart, tables: dict[str, str]) -> dict[str, Any]:
     scene, system = chart.scene, chart.scene.system
     family = chart.family
-    text = toml(
-        scene if family is None else scene.changed(text="")
-    )  # of a family every key is spelled out
-    first = toml(scene).split("\n", 1)[0]
+    is_varied = family is not None and family.key.startswith("medium.")
+    text = text_of(without_gait(scene, spell_out=is_varied))
+    first = scene.text.split("\n", 1)[0]
 
     def stored(values: np.ndarray) -> str:
         text = base64.b64encode(np.ascontiguousarray(values, "<f4").tobytes()).decode()
@@ -154,8 +172,8 @@ def _scene(chart: Chart, tables: dict[str, str]) -> dict[str, Any]:
     return {
         "name": scene.name,
         "about": first.lstrip("# ") if first.startswith("#") else "",
-        "toml": _without_gait(text),
-        "checksum": hashlib.sha256(text.encode()).hexdigest()[:12],
+        "toml": [text] if family is None else _around_value(text, family.key),
+        "checksum": _checksum(text),
         "unit": length_unit(system),
         "length": system.length,
         "labels": [list(label) for label in shape_labels(system)],
@@ -189,15 +207,32 @@ def _gait(gait: Gait) -> dict[str, Any]:
     return {**shared, "cos": cos.tolist(), "sin": sin.tolist()}
 
 
-def _without_gait(text: str) -> str:
-    """Return the text of a scene without its [gait]; the page writes the loop in its place."""
-    sections = [[]]
-    for line in text.splitlines():
-        sections += [[]] if line.startswith("[") else []
-        sections[-1].append(line)
-    rest = [
-        "\n".join(lines).rstrip()
-        for lines in sections
-        if not lines or not lines[0].startswith("[gait")
-    ]
-    return "\n\n".join(part for part in rest if part) + "\n"
+def _declared() -> dict[str, dict[str, Any]]:
+    """Return what the [gait] of each kind that the page reads may say, by kind and key,
+    as the scenes' reader has it. degrees: the key may be given as KEY_deg."""
+    return {
+        kind: {
+            key.name: {
+                "schema": key.schema,
+                "required": key.required,
+                "default": key.default,
+                "degrees": key.degrees,
+            }
+            for key in keys_of(GAITS[kind])
+        }
+        for kind in READ
+    }
+
+
+def _around_value(text: str, name: str) -> list[str]:
+    """Return a scene's text before and after the value of ``SECTION.KEY``. The text is
+    of our own writer, which puts each key of a section on a line."""
+    section, _, key = name.partition(".")
+    lines = text.split("\n")
+    first = lines.index(f"[{section}]") + 1
+    place = next(
+        k for k in range(first, len(lines)) if lines[k].startswith(f"{key} = ")
+    )
+    before = "\n".join([*lines[:place], f"{key} = "])
+    after = "\n".join(["", *lines[place + 1 :]])
+    return [before, after]

@@ -1,6 +1,8 @@
 // The state as files and lines for Python, and loops from files.
 
-const literal = (x) => (Number.isInteger(x) ? `${x}.0` : String(x));
+const LONGEST_FILE = 1e6, MOST_TERMS = 200;  // characters of a scene, harmonics of a loop in it
+const SEEN = 1e-3;  // rad: of the width of a line on the map
+const literal = (x) => (/^-?\d+$/.test(String(x)) ? `${x}.0` : String(x));
 const row = (values) => `[${values.map(literal).join(", ")}]`;
 const rows = (values) => `[${values.map(row).join(", ")}]`;
 
@@ -15,15 +17,15 @@ function described() {
 function asToml() {
   const chart = chartOf(), [kind, own] = described();
   const keys = { kind: `"${kind}"`, ...own, amplitude: literal(state.amplitude), centre: row(state.centre), reverse: String(state.reverse) };
-  if (player.stated) keys.frequency = literal(player.frequency);
+  if (state.frequency !== null) keys.frequency = literal(state.frequency);
   const lines = Object.entries(keys).map(([name, value]) => `${name} = ${value}`);
-  return `${chart.family ? withValue(chart.toml, chart.family.key, state.value) : chart.toml}\n[gait]\n${lines.join("\n")}\n`;
+  const rest = chart.family ? chart.toml.join(literal(state.value)) : chart.toml[0];
+  return `${rest}\n[gait]\n${lines.join("\n")}\n`;
 }
 
-/** Return the text of a scene with another value of the key of a section. */
-function withValue(text, name, value) {
-  const [section, key] = name.split("."), start = text.indexOf(`[${section}]`), place = text.indexOf(`\n${key} = `, start) + 1;
-  return `${text.slice(0, place)}${key} = ${literal(value)}${text.slice(text.indexOf("\n", place))}`;
+/** Return a text as a string of Python, in which all that is no ASCII is an escape. */
+function quoted(text) {
+  return JSON.stringify(text).replace(/[^ -~]/g, (letter) => `\\u${letter.charCodeAt(0).toString(16).padStart(4, "0")}`);
 }
 
 /** Return lines of Python that repeat what the page shows, and the force balance beside it. */
@@ -35,8 +37,8 @@ function asPython() {
   return [
     "import geomech",
     `from geomech.gaits import ${name}`,
-    varied ? `study = geomech.study("loop.toml")  # the saved scene: ${chart.family.key} = ${state.value}` : `study = geomech.study(${JSON.stringify(chart.name)})`,
-    ...(state.frame === chart.frame ? [] : [`study = study.in_frame(${JSON.stringify(state.frame)})`]),
+    varied ? `study = geomech.study("loop.toml")  # the saved scene: ${chart.family.key} = ${state.value}` : `study = geomech.study(${quoted(chart.name)})`,
+    ...(state.frame === chart.frame ? [] : [`study = study.in_frame(${quoted(state.frame)})`]),
     `gait = ${name}(${call})`,
     "print(study.displacement(gait=gait))",
   ].join("\n");
@@ -58,28 +60,31 @@ function asCsv() {
   return lines.join("\n") + "\n";
 }
 
-/** Return the state with the loop of a file, and the frequency that it gives or null. An Error says what is wrong. */
+/**
+ * Return the state with the loop of a file, and what the page changes in it, in words. An Error says what is wrong.
+ */
 function opened(text) {
-  if (text.length > 1e6) throw new Error("the file is too long for a scene");
-  const keys = gaitOf(text), s = JSON.parse(JSON.stringify(state));
-  const allowed = { circle: [], butterfly: [], ellipse: ["semi_axes", "tilt"], fourier: ["cos", "sin"], points: ["points"] };
-  if (!Object.hasOwn(allowed, keys.kind)) throw new Error(`a loop is one of ${Object.keys(allowed).join(", ")}, not ${JSON.stringify(keys.kind)}`);
-  for (const key of Object.keys(keys)) {
-    if (!["kind", "amplitude", "centre", "reverse", "frequency", ...allowed[keys.kind]].includes(key)) {
-      throw new Error(`cannot use ${key}: give angles in radians, and keys of a ${keys.kind}`);
-    }
-  }
-  s.amplitude = number(keys.amplitude ?? 1);
-  s.centre = (keys.centre ?? [0, 0]).map((x) => number(x));
+  const tables = tablesOf(text);
+  if (tables.gait === undefined) throw new Error("no [gait] in it");
+  const [kind, keys] = gaitOf(tables.gait), s = JSON.parse(JSON.stringify(state));
+  const { amplitude, centre, reverse } = keys;
+  Object.assign(s, { loop: kind, points: [], amplitude, reverse, centre: centre.length ? centre : [0, 0] });
+  s.frequency = keys.frequency ?? state.frequency;
   if (s.centre.length !== 2) throw new Error("centre has two angles");
-  s.reverse = keys.reverse === true;
-  [s.loop, s.points] = [keys.kind, []];
-  if (keys.kind === "points") s.points = checkPoints((keys.points ?? []).map((p) => p.map((x) => number(x))));
-  if (keys.kind === "ellipse" || keys.kind === "fourier") {
-    const series = keys.kind === "ellipse" ? ellipse(keys) : checkedSeries(keys);
-    [s.loop, s.points] = nameOf(series) ? [nameOf(series), []] : ["points", around(series)];
+  let change = "";
+  if (kind === "points") s.points = checkPoints(withoutRepeat(keys.points));
+  if (kind === "ellipse" || kind === "fourier") {
+    const series = kind === "ellipse" ? ellipse(keys) : checkedSeries(keys), name = nameOf(series);
+    s.loop = name || "points";
+    if (!name) [s.points, change] = around(series, amplitude);
   }
-  return [s, keys.frequency === undefined ? null : number(keys.frequency, 1e4)];
+  return [s, change];
+}
+
+/** Return points without the last where it is the first again. */
+function withoutRepeat(points) {
+  const last = points.length - 1;
+  return last > 0 && JSON.stringify(points[0]) === JSON.stringify(points[last]) ? points.slice(0, last) : points;
 }
 
 /** Return the name of the loop of this page that a series is, if it is one. */
@@ -88,43 +93,82 @@ function nameOf(series) {
   return presetOf(series) || (same ? "own" : null);
 }
 
-/** Return points of a series, close enough for the spline through them to be that curve to 1e-4 of its size. */
-function around(series) {
+/** Return points of a series, and how far the spline through them is from it, in words where that is seen. */
+function around(series, amplitude) {
   const count = Math.min(MOST_POINTS, Math.max(24, 10 * series.cos[0].length)), at = curve(series);
-  return Array.from({ length: count }, (_, i) => at(TAU * i / count).slice(0, 2));
+  const points = checkPoints(Array.from({ length: count }, (_, i) => at(TAU * i / count).slice(0, 2)));
+  const spline = sampled({ points }, 8 * count, false).alpha, truth = sampled(series, 8 * Math.max(count, series.cos[0].length), false).alpha;
+  const off = distance(truth, spline) * Math.abs(amplitude);
+  return [points, off > SEEN ? ` It is a spline through ${count} points here, which leaves the curve by up to ${off.toPrecision(1)} rad.` : ""];
 }
 
-function ellipse({ semi_axes = [1, 0.5], tilt = 0 }) {
-  const [a, b] = semi_axes.map((x) => number(x)), c = Math.cos(number(tilt)), s = Math.sin(number(tilt));
+/** Return the largest distance of the points of one closed line, (2 N), from another. */
+function distance(line, other) {
+  let largest = 0;
+  for (let i = 0; i < line.length; i += 2) {
+    let least = Infinity;
+    for (let k = 0; k < other.length; k += 2) {
+      const next = (k + 2) % other.length, [u, v] = [other[next] - other[k], other[next + 1] - other[k + 1]], [a, b] = [line[i] - other[k], line[i + 1] - other[k + 1]];
+      const share = Math.min(1, Math.max(0, (a * u + b * v) / (u * u + v * v || 1)));
+      least = Math.min(least, Math.hypot(a - share * u, b - share * v));
+    }
+    largest = Math.max(largest, least);
+  }
+  return largest;
+}
+
+function ellipse({ semi_axes: [a, b], tilt }) {
+  const c = Math.cos(tilt), s = Math.sin(tilt);
   return { cos: [[a * c], [a * s]], sin: [[-b * s], [b * c]] };
 }
 
 function checkedSeries({ cos, sin }) {
-  const good = (x) => Array.isArray(x) && x.length === 2 && x.every((r) => Array.isArray(r) && r.length === cos[0].length && r.length);
-  if (!good(cos) || !good(sin)) throw new Error("cos and sin have two rows of one length");
-  return { cos: cos.map((r) => r.map((x) => number(x))), sin: sin.map((r) => r.map((x) => number(x))) };
+  const rows = [...cos, ...sin], terms = rows.length ? rows[0].length : 0;
+  if (cos.length !== 2 || sin.length !== 2 || !terms || rows.some((row) => row.length !== terms)) throw new Error("cos and sin have two rows of one length");
+  if (terms > MOST_TERMS) throw new Error(`cos and sin have at most ${MOST_TERMS} terms here`);
+  return { cos, sin };
 }
 
-/** Return the keys of the [gait] of a scene. Its values are numbers, words, true, false, and lists of numbers. */
-function gaitOf(text) {
-  const lines = text.split(/\r?\n/), start = lines.findIndex((line) => /^\s*\[gait\]\s*(#.*)?$/.test(line));
-  if (start < 0) throw new Error("no [gait] in it");
-  const length = lines.slice(start + 1).findIndex((line) => /^\s*\[{1,2}[a-z]/i.test(line));
-  const body = lines.slice(start + 1, length < 0 ? undefined : start + 1 + length).map((line) => line.replace(/#.*$/, ""));
-  const keys = {};
-  for (const [, key, value] of body.join("\n").matchAll(/^\s*([A-Za-z_]\w*)\s*=\s*([\s\S]*?)(?=^\s*[A-Za-z_]\w*\s*=|$(?![\s\S]))/gm)) {
-    keys[key] = valueOf(key, value.trim());
+/** Return the kind of a [gait], and all keys that its declaration has: those given, checked, in radians, else their defaults. */
+function gaitOf(table) {
+  if (!isTable(table)) throw new Error("[gait] is no table");
+  const { kind } = table, kinds = Object.keys(PAGE.gaits);
+  if (!kinds.includes(kind)) throw new Error(`a loop is one of ${kinds.join(", ")}, not ${shortly(kind)}`);
+  const declared = PAGE.gaits[kind], keys = {};
+  for (const [spelling, value] of Object.entries(table)) {
+    if (spelling === "kind") continue;
+    const name = Object.keys(declared).find((one) => one === spelling || (declared[one].degrees && `${one}_deg` === spelling));
+    if (name === undefined) throw new Error(`cannot use ${shortly(spelling)}: a ${kind} has ${Object.keys(declared).join(", ")}`);
+    if (Object.hasOwn(keys, name)) throw new Error(`${name} is given twice`);
+    keys[name] = checkedValue(spelling === name ? value : inRadians(value), declared[name].schema, name);
   }
-  return keys;
+  for (const [name, { required, default: usual }] of Object.entries(declared)) {
+    if (Object.hasOwn(keys, name)) continue;
+    if (required) throw new Error(`a ${kind} has no ${name}`);
+    keys[name] = usual;
+  }
+  return [kind, keys];
 }
 
-function valueOf(key, text) {
-  const json = text.replace(/'/g, '"').replace(/,(\s*\])/g, "$1").replace(/\+(?=[\d.])/g, "").replace(/(^|[[,\s-])\.(?=\d)/g, "$10.");
-  try {
-    return JSON.parse(json.replace(/(\d)\.(?=[\s,\]eE]|$)/g, "$1.0").replace(/(\d)_(?=\d)/g, "$1"));
-  } catch {
-    throw new Error(`cannot read the value of ${key}`);
+const isTable = (value) => typeof value === "object" && !Array.isArray(value) && !(value instanceof Moment);
+const shortly = (value) => (JSON.stringify(value) ?? "nothing").slice(0, 40);
+
+function inRadians(value) {
+  if (Array.isArray(value)) return value.map(inRadians);
+  return typeof value === "number" ? value * Math.PI / 180 : value;
+}
+
+/** Return a value of a key; an Error unless it is of the type and within the bounds of its JSON Schema. */
+function checkedValue(value, schema, name) {
+  const { type, minimum = -PAGE.largest, maximum = PAGE.largest } = schema;
+  if (type === "number" && !(typeof value === "number" && minimum <= value && value <= maximum)) {
+    throw new Error(`${name} is a number from ${minimum} to ${maximum}, not ${typeof value === "number" ? value : shortly(value)}`);
   }
+  if (type === "boolean" && typeof value !== "boolean") throw new Error(`${name} is true or false, not ${shortly(value)}`);
+  if (type !== "array") return value;
+  const { minItems = 0, maxItems = Infinity, prefixItems, items } = schema;
+  if (!Array.isArray(value) || value.length < minItems || value.length > maxItems) throw new Error(`${name} is a list${prefixItems ? ` of ${prefixItems.length}` : ""}, not ${shortly(value)}`);
+  return value.map((one, k) => checkedValue(one, prefixItems ? prefixItems[k] : items, name));
 }
 
 /** Let the browser save a text or a blob. */

@@ -13,6 +13,7 @@ const PRESETS = {
 };
 const HANDLES = { circle: 8, ellipse: 8, butterfly: 16, "figure-eight": 12 };
 const MOST_POINTS = 60;
+const SAME = 1e-12;  // of a loop's length: points within it are one
 
 /** Return a function t -> [alpha_1, alpha_2, and their rates] of the unit curve. */
 function curve(loop) {
@@ -93,10 +94,9 @@ function checkPoints(points) {
   if (!Array.isArray(points) || points.length < 3 || points.length > MOST_POINTS) {
     throw new Error(`a loop has 3 to ${MOST_POINTS} points`);
   }
-  points.forEach((p, i) => {
-    if (!Array.isArray(p) || p.length !== 2) throw new Error("a point has two angles");
-    const next = points[(i + 1) % points.length];
-    if (Math.hypot(p[0] - next[0], p[1] - next[1]) < 1e-6) throw new Error("neighbouring points are the same");
-  });
+  if (points.some((p) => !Array.isArray(p) || p.length !== 2)) throw new Error("a point has two angles");
+  const steps = points.map((p, i) => Math.hypot(...points[(i + 1) % points.length].map((x, d) => x - p[d])));
+  const length = steps.reduce((a, b) => a + b);
+  if (!steps.every((step) => step > SAME * length)) throw new Error("neighbouring points are the same");
   return points;
 }

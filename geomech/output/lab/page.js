@@ -8,6 +8,7 @@ const CLIMB_PHASES = 128;
 /** Compute and draw all that follows from the loop. */
 function update() {
   const chart = chartOf();
+  player.frequency = state.frequency ?? USUAL;
   shown.curve = curve(loopOf());
   shown.loop = scaled(sampled(loopOf(), PHASES, state.reverse), state.amplitude, state.centre);
   shown.prediction = chart.predict(shown.loop, state.frame, true);
@@ -30,8 +31,8 @@ function redraw() {
 
 function describeScene() {
   const chart = chartOf(), { family } = chart;
-  $("about").textContent = chart.about;
-  $("foot").textContent = `geomech ${PAGE.version}. Scene ${chart.name}, checksum ${chart.checksum}: ${chart.axes.map((axis) => axis.length).join(" × ")} shapes, odd harmonics to ${chart.harmonics.width / 3 - 1}, ${PHASES} phases a cycle.`;
+  $("about").textContent = visible(chart.about);
+  $("foot").textContent = `geomech ${PAGE.version}. Scene ${visible(chart.name)}, checksum ${chart.checksum}: ${chart.axes.map((axis) => axis.length).join(" × ")} shapes, odd harmonics to ${chart.harmonics.width / 3 - 1}, ${PHASES} phases a cycle.`;
   $("frame").replaceChildren(...Object.keys(chart.frames).map((name) => new Option(name, name, false, name === state.frame)));
   $("family").hidden = !family;
   if (!family) return;
@@ -65,19 +66,32 @@ function showControls() {
   $("command").textContent = asCommand();
 }
 
+/** Return a text that others wrote with escapes in place of letters that are not seen or turn the order of others. */
+const visible = (text) => text.replace(/[^\P{C}\t]|[\u2028\u2029]/gu, (letter) => `\\u{${letter.codePointAt(0).toString(16)}}`);
+
 const say = (text) => { $("said").textContent = text; };
 
-/** Change the state, after remembering it for undo, and draw. */
+/** Change the state, unless that raises an Error, which is said; remember the one before for undo, and draw. */
 function change(kind, act, draw = update) {
   stopClimb();
-  remember(kind);
-  act();
+  const before = JSON.stringify(state);
+  attempt(act);
+  remember(before, kind);
   draw();
+}
+
+/** Do something to the state, or say why it cannot be done. */
+function attempt(act) {
+  try {
+    act();
+  } catch (error) {
+    say(`${error.message[0].toUpperCase()}${error.message.slice(1)}.`);
+  }
 }
 
 // Dragging ---------------------------------------------------------------------------------------------------------------------
 
-let dragged = null, waiting = false;
+let dragged = null, waiting = false, atStart = "";
 
 function placeOf(event) {
   const box = map.svg.getBoundingClientRect(), k = map.svg.viewBox.baseVal.width / box.width;
@@ -88,19 +102,16 @@ function placeOf(event) {
 function move(handle, shape) {
   const { low, high } = chartOf(), within = shape.map((x, d) => rounded(Math.min(high[d], Math.max(low[d], x))));
   if (handle === "centre") state.centre = within;
-  else { loosen(); state.points[handle] = toPoint(within); }
+  else takePoints(handles().map((p, k) => (k === handle ? toPoint(within) : [...p])));
 }
 
 function insert(after, shape) {
-  loosen();
-  if (state.points.length >= MOST_POINTS) return say(`A loop has at most ${MOST_POINTS} points.`);
-  state.points.splice(after + 1, 0, toPoint(shape));
+  const all = handles();
+  takePoints([...all.slice(0, after + 1), toPoint(shape), ...all.slice(after + 1)]);
 }
 
 function remove(handle) {
-  loosen();
-  if (state.points.length <= 3) return say("A loop needs three points.");
-  state.points.splice(handle, 1);
+  takePoints(handles().filter((p, k) => k !== handle));
 }
 
 /** Return the number of the handle after which a new one comes for a shape next to the line. */
@@ -124,21 +135,20 @@ function startDrag(event) {
   event.preventDefault();
   map.svg.setPointerCapture(event.pointerId);
   stopClimb();
-  remember();
+  atStart = JSON.stringify(state);
   if (handle) {
     dragged = handle.dataset.handle === "centre" ? "centre" : Number(handle.dataset.handle);
     handle.focus();
   } else {
-    const shape = placeOf(event), after = before(shape), count = handles().length;
-    insert(after, shape);
-    dragged = state.points.length > count ? after + 1 : null;
+    const shape = placeOf(event), after = before(shape);
+    attempt(() => { insert(after, shape); dragged = after + 1; });
     update();
   }
 }
 
 function drag(event) {
   if (dragged === null) return;
-  move(dragged, placeOf(event));
+  attempt(() => move(dragged, placeOf(event)));
   if (!waiting) {
     waiting = true;
     requestAnimationFrame(() => { waiting = false; update(); });
@@ -148,6 +158,7 @@ function drag(event) {
 function endDrag() {
   if (dragged === null) return;
   dragged = null;
+  remember(atStart);
   update();
 }
 
@@ -161,7 +172,10 @@ function pressed(event) {
     change(`arrow ${name}`, () => move(k, now.map((x, d) => x + arrows[event.key][d])));
   } else if (event.key === "Insert" && k !== "centre") {
     change("", () => { const all = handles(), next = all[(k + 1) % all.length]; insert(k, toShape(all[k].map((x, d) => (x + next[d]) / 2))); });
-  } else if ((event.key === "Delete" || event.key === "Backspace") && k !== "centre") change("", () => remove(k));
+  } else if ((event.key === "Delete" || event.key === "Backspace") && k !== "centre") {
+    change("", () => remove(k));
+    map.parts.handles.children[Math.min(k + 1, handles().length)].focus();  // the last one may be gone
+  }
   else return;
   event.preventDefault();
 }
@@ -179,8 +193,10 @@ function gained(points, sign) {
 function toggleClimb() {
   if (climbing) { stopClimb(); return showControls(); }
   if (!shown.prediction) return say("Bring the loop onto the map first.");
-  remember();
-  loosen();
+  if (Math.abs(state.amplitude) < REST) return say("All points lie at the centre: raise the amplitude first.");
+  const before = JSON.stringify(state);
+  takePoints(handles().map((p) => [...p]));
+  remember(before);
   climbing = { sign: shown.prediction.own[state.component] < 0 ? -1 : 1, step: 0.05 };
   requestAnimationFrame(climb);
 }
@@ -190,14 +206,14 @@ function stopClimb() { climbing = null; }
 /** Move all points a step along the gradient of the displacement, and go on until steps are short. */
 function climb() {
   if (!climbing) return;
-  const { sign } = climbing, now = gained(state.points, sign), h = 1e-4;
+  const { sign } = climbing, now = gained(state.points, sign), scale = Math.max(1, Math.abs(state.amplitude)), h = 1e-4 / scale;
   const slopes = state.points.map((p, i) => [0, 1].map((d) => {
     const at = (x) => gained(state.points.map((q, j) => (j === i ? q.map((v, e) => v + (e === d ? x : 0)) : q)), sign);
     const [up, down] = [at(h), at(-h)];
     return Number.isFinite(up - down) ? (up - down) / (2 * h) : 0;
   }));
   const size = Math.max(...slopes.flat().map(Math.abs), 1e-12);
-  const next = state.points.map((p, i) => p.map((x, d) => rounded(x + climbing.step * slopes[i][d] / size)));
+  const next = state.points.map((p, i) => p.map((x, d) => rounded(x + climbing.step / scale * slopes[i][d] / size, scale)));
   if (gained(next, sign) > now) {
     state.points = next;
     climbing.step = Math.min(0.1, 1.3 * climbing.step);
@@ -213,8 +229,8 @@ function climb() {
 // Controls ---------------------------------------------------------------------------------------------------------------------
 
 function controls() {
-  PAGE.scenes.forEach((scene, k) => $("scene").append(new Option(scene.name, k)));
-  $("scene").addEventListener("change", () => change("", () => { state = initial(Number($("scene").value)); play(chartOf().gait.frequency); }, redraw));
+  PAGE.scenes.forEach((scene, k) => $("scene").append(new Option(visible(scene.name), k)));
+  $("scene").addEventListener("change", () => change("", () => { state = initial(Number($("scene").value)); }, redraw));
   DIRECTIONS.forEach((direction, k) => {
     const button = Object.assign(document.createElement("button"), { type: "button", textContent: direction });
     button.addEventListener("click", () => change("", () => { state.component = k; }, () => { drawMap(); update(); }));
@@ -227,7 +243,7 @@ function controls() {
   $("amplitude").addEventListener("input", () => change("amplitude", () => { state.amplitude = Number($("amplitude").value); }));
   [0, 1].forEach((d) => $(`centre-${d + 1}`).addEventListener("input", (event) => change(`centre-${d + 1}`, () => { state.centre[d] = Number(event.target.value); })));
   $("reverse").addEventListener("change", () => change("", () => { state.reverse = $("reverse").checked; }, () => { restart(); update(); }));
-  $("frequency").addEventListener("input", () => { play(Number($("frequency").value)); showControls(); });
+  $("frequency").addEventListener("input", () => change("frequency", () => { state.frequency = Number($("frequency").value); }));
   $("value").addEventListener("input", () => change("value", () => { state.value = Number($("value").value); }, () => { chartOf().choose(state.value); drawMap(); update(); }));
   $("undo").addEventListener("click", () => { stopClimb(); step(past, future); redraw(); });
   $("redo").addEventListener("click", () => { stopClimb(); step(future, past); redraw(); });
@@ -273,12 +289,12 @@ function saving() {
 
 async function read(file) {
   try {
-    const [next, frequency] = opened(await file.text());
-    if (frequency) play(frequency);
+    if (file.size > LONGEST_FILE) throw new Error("the file is too long for a scene");
+    const [next, changed] = opened(await file.text());
     change("", () => { state = next; }, redraw);
-    say(`Read the loop of ${file.name}.`);
+    say(`Read the loop of ${visible(file.name)}.${changed}`);
   } catch (error) {
-    say(`Cannot use ${file.name}: ${error.message}.`);
+    say(`Cannot use ${visible(file.name)}: ${visible(error.message)}.`);
   }
 }
 
@@ -310,12 +326,16 @@ function savePicture() {
 /** Take the state of an address; one that cannot be read leaves the first scene, and says why. */
 function take(address) {
   if (address === addressOf(state)) return;
+  stopClimb();
+  const before = JSON.stringify(state);
+  say("");
   try {
     state = stateOf(address);
   } catch (error) {
     state = initial(0);
-    say(`The address is not used: ${error.message}.`);
+    say(`The address is not used: ${visible(error.message)}.`);
   }
+  if (shown.loop) remember(before);
   redraw();
 }
 
@@ -333,11 +353,9 @@ player.playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
 controls();
 if (location.hash.length > 1) take(location.hash.slice(1));
 if (!shown.loop) redraw();
-play(chartOf().gait.frequency);
-showControls();
 requestAnimationFrame(frame);
 window.lab = {  // for tests, and for whoever opens the console
-  state: () => addressOf(state), update, player,
+  state: () => addressOf(state), update, player, opened, tables: tablesOf,
   predict: (name, frame, points, amplitude, centre, reverse, value) => {
     const chart = CHARTS.find((one) => one.name === name), before = chart.value;
     if (chart.family) chart.choose(value ?? chart.family.own);

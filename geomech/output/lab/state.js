@@ -3,7 +3,9 @@
 const PAGE = JSON.parse(document.getElementById("data").textContent);
 const CHARTS = PAGE.scenes.map((scene) => new Chart(scene, PAGE.tables, PAGE.shares));
 const COMPONENTS = ["x", "y", "heading"], DIRECTIONS = ["forward", "sideways", "turning"];
-const PHASES = 256, LARGEST = 10, MOST_UNDONE = 200;
+const PHASES = 256, MOST_UNDONE = 200;
+const DIGITS = /^[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?$/;
+const REST = 1e-3;  // amplitude below which a point is not found from its shape
 
 let state = initial(0);
 const chartOf = (s = state) => CHARTS[s.scene];
@@ -12,14 +14,14 @@ const chartOf = (s = state) => CHARTS[s.scene];
 function initial(scene) {
   const { gait, frame, family } = CHARTS[scene];
   return {
-    scene, loop: presetOf(gait) || "own", points: gait.points || [], amplitude: gait.amplitude, centre: [...gait.centre],
-    reverse: gait.reverse, component: 0, frame, value: family ? family.own : null,
+    scene, loop: presetOf(gait) || "own", points: presetOf(gait) === "points" ? gait.points : [], amplitude: gait.amplitude, centre: [...gait.centre],
+    reverse: gait.reverse, frequency: gait.frequency, component: 0, frame, value: family ? family.own : null,
   };
 }
 
 /** Return the name of the preset that a gait is, if it is one. */
 function presetOf(gait) {
-  if (gait.points) return "points";
+  if (gait.points) return gait.points.length > MOST_POINTS ? undefined : "points";
   return Object.keys(PRESETS).find((name) => JSON.stringify(PRESETS[name]) === JSON.stringify({ cos: gait.cos, sin: gait.sin }));
 }
 
@@ -37,20 +39,22 @@ function addressOf(s) {
     amplitude: s.amplitude, centre: s.centre.join(","), reverse: Number(s.reverse), component: COMPONENTS[s.component], frame: s.frame,
   });
   if (s.value !== null) parts.value = s.value;
-  const plain = (text) => encodeURIComponent(text).replace(/%2C/g, ",").replace(/%3B/g, ";");
+  if (s.frequency !== null) parts.frequency = s.frequency;
+  const plain = (text) => encodeURIComponent(wellFormed(text)).replace(/%2C/g, ",").replace(/%3B/g, ";");
   return Object.entries(parts).map(([name, value]) => `${name}=${plain(value)}`).join("&");
 }
 
-function number(text, most = LARGEST) {
-  const value = Number(text);
-  if (text === "" || text === null || !Number.isFinite(value) || Math.abs(value) > most) {
-    throw new Error(`${JSON.stringify(String(text).slice(0, 20))} is no number from -${most} to ${most}`);
-  }
+/** Return a text without halves of letters, which a name of a file may have and no address can. */
+const wellFormed = (text) => String(text).replace(/[\uD800-\uDFFF]/gu, "\uFFFD");
+
+function number(text, most = PAGE.largest) {
+  const value = DIGITS.test(text) ? Number(text) : NaN;
+  if (!(Math.abs(value) <= most)) throw new Error(`${JSON.stringify(text.slice(0, 20))} is no number from -${most} to ${most}`);
   return value;
 }
 
 function pair(text) {
-  const values = String(text).split(",").map((x) => number(x));
+  const values = text.split(",").map((x) => number(x));
   if (values.length !== 2) throw new Error("a shape has two angles");
   return values;
 }
@@ -58,7 +62,7 @@ function pair(text) {
 /** Return the state of an address. Unknown names in it are left out; an Error says what cannot be read. */
 function stateOf(address) {
   const given = new URLSearchParams(address.replace(/\+/g, "%2B")), name = given.get("scene");
-  const scene = name === null ? 0 : CHARTS.findIndex((chart) => chart.name === name);
+  const scene = name === null ? 0 : CHARTS.findIndex((chart) => wellFormed(chart.name) === name);
   if (scene < 0) throw new Error(`no scene ${JSON.stringify(name.slice(0, 40))} in this page`);
   const s = initial(scene), { frames, family } = CHARTS[scene];
   if (given.has("loop")) s.loop = chosen(given.get("loop"), ["own", "points", ...Object.keys(PRESETS)], "loop");
@@ -66,10 +70,11 @@ function stateOf(address) {
   if (s.loop === "points") checkPoints(s.points);
   if (given.has("amplitude")) s.amplitude = number(given.get("amplitude"));
   if (given.has("centre")) s.centre = pair(given.get("centre"));
-  if (given.has("reverse")) s.reverse = given.get("reverse") === "1";
+  if (given.has("reverse")) s.reverse = chosen(given.get("reverse"), ["0", "1"], "reverse") === "1";
   if (given.has("component")) s.component = COMPONENTS.indexOf(chosen(given.get("component"), COMPONENTS, "component"));
   if (given.has("frame")) s.frame = chosen(given.get("frame"), Object.keys(frames), "frame");
-  if (family && given.has("value")) s.value = withinFamily(family, number(given.get("value"), 1e9));
+  if (family && given.has("value")) s.value = withinFamily(family, number(given.get("value"), Number.MAX_VALUE));
+  if (given.has("frequency")) s.frequency = checkedValue(number(given.get("frequency")), PAGE.gaits.circle.frequency.schema, "frequency");
   return s;
 }
 
@@ -93,11 +98,12 @@ function showAddress() {
 const past = [], future = [];
 let running = "";
 
-/** Remember the state before a change. Changes of one `kind` that follow each other are taken back together. */
-function remember(kind = "") {
+/** Remember the state `before` a change, if it has changed. Changes of one `kind` that follow each other are taken back together. */
+function remember(before, kind = "") {
+  if (before === JSON.stringify(state)) return;
   if (kind && kind === running) return;
   running = kind;
-  past.push(JSON.stringify(state));
+  past.push(before);
   if (past.length > MOST_UNDONE) past.shift();
   future.length = 0;
 }
@@ -116,19 +122,21 @@ function step(from, to) {
 function handles() {
   if (state.loop === "points") return state.points;
   const at = curve(loopOf()), count = HANDLES[state.loop] || 16;
-  return Array.from({ length: count }, (_, i) => at(TAU * i / count).slice(0, 2).map(rounded));
+  return Array.from({ length: count }, (_, i) => at(TAU * i / count).slice(0, 2).map((x) => rounded(x, Math.abs(state.amplitude))));
 }
 
-const rounded = (x) => Number(x.toFixed(4));
+/** Return a number to 1e-4, and one of the unit curve to as much of an angle. */
+const rounded = (x, size = 1) => Number(x.toFixed(4 + Math.max(0, Math.ceil(Math.log10(size)))));
 const toShape = (p) => p.map((x, d) => state.centre[d] + state.amplitude * x);
 
-/** Return the point of the unit curve that is at a shape. */
+/** Return the point of the unit curve that is at a shape; an Error at rest, where all points are. */
 function toPoint(shape) {
-  const size = Math.abs(state.amplitude) > 1e-3 ? state.amplitude : 1e-3;
-  return shape.map((x, d) => rounded((x - state.centre[d]) / size));
+  const size = Math.abs(state.amplitude);
+  if (size < REST) throw new Error("all points lie at the centre: raise the amplitude first");
+  return shape.map((x, d) => rounded((x - state.centre[d]) / state.amplitude, size));
 }
 
-/** Make the loop one through points, which can be moved one by one. */
-function loosen() {
-  if (state.loop !== "points") Object.assign(state, { points: handles().map((p) => [...p]), loop: "points" });
+/** Take points for those of the loop, and make it one through points; an Error, and the loop as it was, unless they make one. */
+function takePoints(points) {
+  Object.assign(state, { points: checkPoints(points), loop: "points" });
 }

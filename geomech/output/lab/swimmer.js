@@ -1,6 +1,7 @@
 // The swimmer on its track, in real time, by the harmonic tier.
 
-const player = { phase: 0, cycle: 0, start: [0, 0, 0], playing: true, frequency: 0.5, stated: false, last: 0 };  // stated: not by this page alone
+const player = { phase: 0, cycle: 0, start: [0, 0, 0], playing: true, frequency: 0.5, last: 0 };
+const USUAL = 0.5;  // Hz, where nobody gives a frequency
 const HEIGHT = 280, SHOWN = 2.9;  // body lengths across
 
 /** Return the pose of the scene's frame at a phase of the cycle, in [0, 2 pi). */
@@ -20,11 +21,6 @@ function bodyAt(phase, start) {
 const curveNow = (phase) => shown.curve((state.reverse ? -1 : 1) * phase).slice(0, 2);
 
 const world = { trail: [], ghosts: [], width: 560 };
-
-/** Take a frequency, Hz, of a scene, a file or the slider; without one the page chooses it. */
-function play(frequency) {
-  Object.assign(player, { frequency: frequency || 0.5, stated: Boolean(frequency) });
-}
 
 /** Begin again at the origin. */
 function restart() {
