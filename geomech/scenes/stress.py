@@ -178,11 +178,7 @@ def matched_strength(stress: PlateStress) -> float:
 
 def plate_rows(place: str, file) -> np.ndarray:
     """Return plate drags of a CSV file, (4, N): beta, gamma in degrees, alpha_x, alpha_z in N/cm^3."""
-    drags = columns(
-        place,
-        file,
-        (("beta", "beta_deg"), ("gamma", "gamma_deg"), "alpha_x", "alpha_z"),
-    )
+    drags = columns(place, file, ("beta", "gamma", "alpha_x", "alpha_z"))
     rows = np.stack(list(drags.values()))
     if rows.size and np.abs(rows[:2]).max() < RADIANS:
         raise Refusal(
