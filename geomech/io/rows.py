@@ -37,6 +37,7 @@ from geomech.io.foreign import refuse_foreign
 from rft.refusal import Refusal, formatted, located
 
 LARGEST_NUMBER = 1e12
+ENDINGS = (".csv", ".tsv", ".txt", ".dat")  # of the names of tables
 SAMPLE = 400  # lines that separator and header are looked for in
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
 STACKED = ("scorer", "individuals", "bodyparts", "coords")  # DeepLabCut's header rows
@@ -63,12 +64,7 @@ UNITS: dict[str, dict[str, float]] = {  # by what is measured, in SI
     "stress per depth": {"N/cm3": 1e6, "N/m3": 1.0, "N/mm3": 1e9},
 }  # fmt: skip
 PIXELS = ("px", "pixel", "pixels")
-EPOCHS = (  # a time above the first number is since 1970, in this unit
-    (1e17, "ns", 1e-9),
-    (1e14, "us", 1e-6),
-    (1e11, "ms", 1e-3),
-)
-SINCE_1970 = 1e9  # s, in 2001: above, a time in s is taken since 1970
+EPOCH = (9.4e8, 4.2e9)  # s since 1970, from 1999 to 2103: times within are such
 
 
 class Column(NamedTuple):
@@ -128,9 +124,10 @@ def split_unit(word: str) -> tuple[str, str]:
     word = word.strip()
     if match := re.fullmatch(r"(.+?)[\s_]*[(\[]\s*([^()\[\]]*?)\s*[)\]]", word):
         return match[1], unit_of(match[2]) or match[2]
-    if match := re.fullmatch(r"(.+?)(?:\s*/\s*|[\s_]+in[\s_]+|[\s_]+)([^\s_]+)", word):
-        if unit := unit_of(match[2]):
-            return match[1], unit
+    match = re.fullmatch(r"(.+?)(?:\s*/\s*|[\s_]+in[\s_]+|[\s_]+)([^\s_]+)", word)
+    unit = unit_of(match[2]) if match else ""
+    if match and unit:
+        return match[1], unit
     return word, ""
 
 
@@ -257,24 +254,28 @@ class Rows:
                     instead="give the time in s as a number",
                 )
             cells.append(cell)
+        word = self.words[index]
         first = self.number(cells[0]) if cells else 0.0
-        scale = UNITS["time"].get(unit, 1.0)
-        if unit == "":
-            for least, guess, its_scale in EPOCHS:
-                if first > least:
-                    unit, scale = guess, its_scale
-                    break
-        if abs(first * scale) < SINCE_1970:
+        units = [unit] if unit else ["s", "ms", "us", "ns"]
+        since = [
+            x for x in units if EPOCH[0] < first * UNITS["time"].get(x, 0.0) < EPOCH[1]
+        ]
+        if not since:
+            if first > LARGEST_NUMBER and not unit:
+                raise Refusal(
+                    f"{word} is {first:g}, in no unit that is known",
+                    where=f"{self.name}, line {self.lines[0]}",
+                    instead=f"name it, for example {word}_ns",
+                )
             values = np.array([self.number(cell) for cell in cells], float)
-            return values * scale, ""
+            return values * UNITS["time"].get(unit, 1.0), ""
         if all(re.fullmatch("[0-9]+", cell) for cell in cells):
             start = int(cells[0])
             values = np.array([int(cell) - start for cell in cells], float)
         else:
             values = np.array([self.number(cell) for cell in cells], float) - first
-        word = self.words[index]
-        note = f"{word} is in {unit or 's'} since 1970, counted from the first row"
-        return values * scale, note
+        note = f"{word} is in {since[0]} since 1970, counted from the first row"
+        return values * UNITS["time"][since[0]], note
 
     def find(
         self, columns: Sequence[Column], others: Sequence[Column] = ()
@@ -460,9 +461,10 @@ def split(text: str, separator: str) -> list[str]:
     return [cell.strip(' \t"') for cell in cells]
 
 
-def _is_number(cell: str, separator: str) -> bool:
-    comma = separator != "," and WITH_COMMA.fullmatch(cell)
-    return bool(comma or NUMBER.fullmatch(cell))
+def _is_number(cell: str) -> bool:
+    """Return whether a cell looks like a number, with whatever decimal mark. A comma
+    in a cell is one of a number or a text, as those that part cells are gone."""
+    return any(form.fullmatch(cell) for form in (NUMBER, WITH_COMMA, THOUSANDS))
 
 
 def _separator(lines: list[str]) -> str:
@@ -477,10 +479,7 @@ def _separator(lines: list[str]) -> str:
             continue
         width, count = max(widths.items(), key=lambda item: (item[1], item[0]))
         numbers = sum(
-            _is_number(cell, separator)
-            for row in rows
-            if len(row) == width
-            for cell in row
+            _is_number(cell) for row in rows if len(row) == width for cell in row
         )
         if (numbers, count) > most:
             best = separator
@@ -503,11 +502,11 @@ def _headed(
     if stacked:
         line, _ = filled[stacked[0]]
         return line, cells[stacked[0]], filled[stacked[0] + 1 :]
-    body = _first_row(cells, separator)
+    body = _first_row(cells)
     if body == 0:
         return _commented(filled, comments, separator, notes)
     above = range(len(cells) if body is None else body)
-    words = [k for k in above if len(cells[k]) > 1 and _is_words(cells[k], separator)]
+    words = [k for k in above if len(cells[k]) > 1 and _is_words(cells[k])]
     if body is None or not words:
         head = 0
     else:
@@ -531,7 +530,7 @@ def _headed(
     return line, header, filled[below:]
 
 
-def _first_row(cells: list[list[str]], separator: str) -> int | None:
+def _first_row(cells: list[list[str]]) -> int | None:
     """Return the index of the first line that has as many cells, and words in the same
     ones, as most lines with numbers; None if no line has a number."""
     kinds = []
@@ -539,9 +538,9 @@ def _first_row(cells: list[list[str]], separator: str) -> int | None:
         words = [
             k
             for k, cell in enumerate(row)
-            if cell.lower() not in MISSING and not _is_number(cell, separator)
+            if cell.lower() not in MISSING and not _is_number(cell)
         ]
-        has_number = any(_is_number(cell, separator) for cell in row)
+        has_number = any(_is_number(cell) for cell in row)
         is_row = has_number and len(row) > 1
         kinds.append((len(row), tuple(words)) if is_row else None)
     counts = Counter(kind for kind in kinds if kind is not None)
@@ -551,9 +550,9 @@ def _first_row(cells: list[list[str]], separator: str) -> int | None:
     return kinds.index(usual)
 
 
-def _is_words(row: list[str], separator: str) -> bool:
+def _is_words(row: list[str]) -> bool:
     """Return whether a line may be a header: words, and no number."""
-    return any(row) and not any(_is_number(cell, separator) for cell in row)
+    return any(row) and not any(_is_number(cell) for cell in row)
 
 
 def _is_units(row: list[str]) -> bool:
@@ -587,7 +586,7 @@ def _commented(
     for line, text in reversed(comments):
         if line < filled[0][0]:
             words = split(text, separator)
-            if len(words) == width and _is_words(words, separator):
+            if len(words) == width and _is_words(words):
                 notes.append(f"the comment in line {line} is its header")
                 comments.remove((line, text))
                 return line, words, filled
@@ -622,9 +621,7 @@ def _without_end(
     while end > 1:
         cells = split(rows[end - 1][1], separator)
         is_cut = end == len(rows) and len(cells) < width
-        if not is_cut and (
-            len(cells) == width or any(_is_number(x, separator) for x in cells)
-        ):
+        if not is_cut and (len(cells) == width or any(_is_number(x) for x in cells)):
             break
         end -= 1
     whole = [

@@ -23,6 +23,10 @@ OF_MIDLINES = (
     "individual",
     "mend",
 )
+WHAT = (
+    "give a CSV file with a header such as t,alpha_1,alpha_2,x,y,heading for joint "
+    "angles, or t,point,x,y or t,x1,y1,x2,y2 for points along a body"
+)
 LOG, MIDLINES = "a log of joint angles", "midlines"
 
 
@@ -36,7 +40,7 @@ def question(file: Path, scene: Path | None = None, **options: Any) -> Fit | Mid
     }
     of_logs = [x for x in OF_LOGS if x in given or (x == "scene" and scene is not None)]
     of_midlines = [x for x in OF_MIDLINES if x in given]
-    header = _header(file)
+    header = read_rows(file, reader.LARGEST_FILE, WHAT).header[1]
     kind = reader.kind_of(header)
     if not kind and of_logs and of_midlines:
         raise Refusal(
@@ -55,11 +59,3 @@ def question(file: Path, scene: Path | None = None, **options: Any) -> Fit | Mid
             instead="drop it, or rename the columns",
         )
     return Midlines(file, **given) if is_midlines else Fit(file, **given)
-
-
-def _header(file: Path) -> tuple[str, ...]:
-    """Return the words of a file's header; none of a file that cannot be read, which its question refuses."""
-    try:
-        return read_rows(file, reader.LARGEST_FILE, reader.WHAT).header[1]
-    except ValueError:
-        return ()

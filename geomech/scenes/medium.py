@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from geomech.io.files import read_text
-from geomech.io.rows import Column
+from geomech.io.rows import ENDINGS, Column
 from geomech.io.rows import read as read_rows
 from geomech.scenes.drag import ACROSS, ALONG, ANGLE, LARGEST_FILE
 from geomech.scenes.key import Word
@@ -96,7 +96,9 @@ def _medium(place: str, path: Path) -> dict:
 
 def _table_instead(path: Path) -> str:
     return (
-        'for a table of drag add law = "table"' if path.suffix.lower() == ".csv" else ""
+        'for a table of drag add law = "table"'
+        if path.suffix.lower() in ENDINGS
+        else ""
     )
 
 

@@ -39,9 +39,11 @@ class Penetration(NamedTuple):
 def read(source: Rows) -> Penetration:
     """Return the test in a file; Refusal if it has none.
 
-    Columns, in any order: depth and force, and area if wanted, each in the SI unit or with another behind its name, as
-    depth_mm, force_N or area_cm2, and sinkage for depth; others are ignored. In place of depth may stand z, upwards, and force_z for force. A
-    header line may give the area: ``# plate area = 9.5 cm^2``, ``# plate 38 x 25 mm``, or ``# plate diameter 4 cm``."""
+    Columns, in any order: depth and force, and area if wanted, each in the SI unit or
+    with another behind its name, as depth_mm, force_N or area_cm2; others are ignored.
+    In place of depth may stand sinkage, or z, upwards, and force_z for force. A header
+    line may give the area: ``# plate area = 9.5 cm^2``, ``# plate 38 x 25 mm``, or
+    ``# plate diameter 4 cm``."""
     found = source.find((), (DEPTH, HEIGHT, FORCE, AREA))
     if "depth" in found and "z" in found:
         raise Refusal(

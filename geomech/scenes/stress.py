@@ -14,6 +14,7 @@ import numpy as np
 
 from geomech.core.errors import choose
 from geomech.io.files import read_text
+from geomech.io.rows import ENDINGS
 from geomech.scenes.columns import columns
 from geomech.scenes.key import Word
 from geomech.scenes.reader import Source, build
@@ -214,15 +215,15 @@ def medium(name: str) -> PlateStress:
     name = str(name)
     if name in VERTICAL:
         return VERTICAL[name].stress
-    if Path(name).suffix not in (".toml", ".csv") and not Path(name).exists():
+    if Path(name).suffix.lower() not in (".toml", *ENDINGS) and not Path(name).exists():
         choose("medium", name, VERTICAL)
     return _read_stress(Source("medium"), "medium", name)
 
 
 def _read_stress(source: Source, place: str, file: str) -> PlateStress:
-    """Return the stress map of a TOML file, if its name does not end in .csv, or of a CSV file of plate drags."""
+    """Return the stress map of a TOML file, or of plate drags if its name ends as that of a table (`ENDINGS`)."""
     path = Path(file)
-    if path.suffix == ".csv":
+    if path.suffix.lower() in ENDINGS:
         return plate_drags(place, file)
     try:
         tables = tomllib.loads(read_text(path, LARGEST))
@@ -240,7 +241,7 @@ def _read_stress(source: Source, place: str, file: str) -> PlateStress:
         )
     if isinstance(table.get("file"), str):
         table = {**table, "file": str(path.absolute().parent / table["file"])}
-        if not table["file"].endswith(".csv"):
+        if Path(table["file"]).suffix.lower() not in ENDINGS:
             raise Refusal(
                 f"{path.name} names another file, {Path(table['file']).name}",
                 where=place,

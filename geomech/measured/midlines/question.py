@@ -64,7 +64,8 @@ class Midlines(Question):
     def answer(self, progress: Progress, allow: Allow) -> Result:
         fit = fit_midlines(
             self.midlines, columns=self.columns, units=self.units, scale=self.scale, fps=self.fps, y=self.y, head=self.head,
-            least_score=self.least_score, individual=self.individual, body_length=self.body_length, mend=self.mend, level=self.level,
+            least_score=self.least_score, individual=self.individual, body_length=self.body_length, mend=self.mend,
+            level=self.level,
         )  # fmt: skip
         return result_of(
             fit, None if self.medium is None else compare(fit, medium_of(self.medium))

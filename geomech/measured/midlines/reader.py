@@ -568,7 +568,7 @@ def _chosen(
     for _, text in source.rows:
         cells = source.cells(text)
         filled |= {k for k, cell in enumerate(cells) if cell.lower() not in MISSING}
-    points = {name: 0 for name in names}
+    points = dict.fromkeys(names, 0)
     for k, name in enumerate(animals):
         points[name] += k + 1 in filled
     with_points = [name for name in names if points[name] and name != SINGLE]
