@@ -89,6 +89,39 @@ def test_a_table_in_any_form_has_the_same_numbers_and_one_note(form, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("size", "head", "radius"),
+    [
+        ("8,5 mm", "psi_deg;F_parallel_N;F_perpendicular_N\n0;1,5;2\n90;2;3\n", 0.0085),
+        ("8,5 mm", "psi_deg,F_parallel_N,F_perpendicular_N\n0,1,2\n90,2,3\n", None),
+        ("8, long 80 mm", "psi_deg,F_parallel_N,F_perpendicular_N\n0,1,2\n90,2,3\n", 8),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::geomech.core.errors.Note")
+def test_sizes_with_a_comma_are_no_metres(size, head, radius, tmp_path):
+    path = written(tmp_path / "rod.csv", f"# radius = {size}\n{head}")
+    if radius is None:
+        with pytest.raises(Refusal, match="8,5 in the header lines"):
+            drag.read(path)
+    else:
+        assert drag.read(path).sizes["radius"] == pytest.approx(radius)
+
+
+@pytest.mark.parametrize(
+    ("head", "said"),
+    [
+        ("time,joint_1,joint_2,x,y,yaw,theta", "yaw and theta|theta and yaw"),
+        ("time,joint_1_deg,joint_2,x,y,yaw,more", "joint_2 has no unit beside joints"),
+        ("time,t,joint_1,joint_2,x,y,yaw", "time and t may both be the column t"),
+    ],
+)
+def test_columns_of_a_log_that_leave_a_choice_are_refused(head, said, tmp_path):
+    text = log_text([str(k) for k in range(120)], head)
+    text = "\n".join(x + ",0" * (i > 0) for i, x in enumerate(text.splitlines()))
+    with pytest.raises(Refusal, match=said):
+        logs.read(written(tmp_path / "log.csv", text))
+
+
+@pytest.mark.parametrize(
     ("cell", "place"),
     [
         ("1_5", "line 3, column|line 3: a row"),
@@ -313,6 +346,9 @@ def test_animals_without_a_track_and_labelled_frames_are_told_as_such(tmp_path):
     )
     with pytest.raises(Refusal, match="line 5: .*labelled frames"):
         reader.read(written(path, labelled))
+    spatial = deeplabcut({"a": tracks()}).replace("likelihood", "z")
+    with pytest.raises(Refusal, match="three dimensions"):
+        reader.read(written(path, spatial))
 
 
 WCON = {"units": {"t": "s", "x": "mm", "y": "mm"}, "data": [{"id": "1", "t": [0.0]}]}

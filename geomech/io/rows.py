@@ -88,11 +88,22 @@ class Column(NamedTuple):
         bare, unit = split_unit(word)
         return unit if plain(bare) in self.names else None
 
+    def taken(self, word: str, unit: str) -> str:
+        """Return a note if a word has no unit where the column's usual name has one."""
+        if unit or not self.unit or split_unit(self.name)[1] != self.unit:
+            return ""
+        return f"{word} is taken to be in {self.unit}"
+
     def factor(self, word: str, unit: str) -> float:
         """Return what one of a unit is in the column's own; Refusal for another kind."""
         known = UNITS.get(self.kind, {})
         if unit == "":
             return 1.0
+        if unit == "MN" and word.isupper():
+            raise Refusal(
+                f"column {word} may be in mN or in MN",
+                instead="write the unit as it is",
+            )
         if unit not in known:
             raise Refusal(
                 f"column {word} is in {formatted(unit, 30)}",
@@ -105,12 +116,13 @@ class Column(NamedTuple):
 
 class Found(NamedTuple):
     """Where a column is: its index and unit in the file, the factor to the unit that is
-    wanted, and whether it is a time."""
+    wanted, whether it is a time, and a note on what was taken for granted, or ""."""
 
     index: int
     unit: str
     factor: float
     is_time: bool = False
+    note: str = ""
 
 
 def plain(word: str) -> str:
@@ -203,7 +215,13 @@ class Rows:
             if "." in cell:
                 return None
             cell = cell.replace(",", ".")
-        return float(cell) if NUMBER.fullmatch(cell) else None
+        if "_" in cell or not cell.isascii():
+            return None
+        try:
+            value = float(cell)
+        except ValueError:
+            return None
+        return value if math.isfinite(value) else None
 
     def numbers(
         self, columns: Sequence[str], selected: Sequence[str] | None = None
@@ -301,7 +319,13 @@ class Rows:
                 index, unit = matches[0]
                 with located(self.place):
                     factor = column.factor(self.words[index], unit)
-                found[column.name] = Found(index, unit, factor, column.kind == "time")
+                found[column.name] = Found(
+                    index,
+                    unit,
+                    factor,
+                    is_time=column.kind == "time",
+                    note=column.taken(self.words[index], unit),
+                )
             elif column in columns:
                 needed = ",".join(x.name for x in columns)
                 raise Refusal(
@@ -326,7 +350,7 @@ class Rows:
         self, found: Mapping[str, Found]
     ) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
         """Return the values (N,) of columns by name, and what was decided of them."""
-        notes = list(self.notes)
+        notes = [*self.notes, *(x.note for x in found.values() if x.note)]
         values = {}
         picks = [x.index for x in found.values() if not x.is_time]
         rest = iter(self._picked(picks).T)
@@ -368,7 +392,8 @@ def read(path: str | Path, largest: int, what: str) -> Rows:
     separator = _separator([line for _, line in filled[:SAMPLE]])
     if separator != ",":
         notes.append(f"columns are parted by {SEPARATORS[separator]}")
-    filled = [x for x in filled if any(split(x[1], separator))]
+    nothing = separator + ' "\t'
+    filled = [(line, x) for line, x in filled if x.strip(nothing)]
     with located(Path(path).name):
         line, words, rows = _headed(filled, comments, separator, notes)
     if line is None:
@@ -389,7 +414,7 @@ def read(path: str | Path, largest: int, what: str) -> Rows:
         line,
         tuple(words),
         rows,
-        [comment for _, comment in comments],
+        [_with_points(comment, decimal) for _, comment in comments],
         separator,
         decimal,
         tuple(notes),
@@ -444,6 +469,13 @@ def _without_comments(
     return filled, comments
 
 
+def _with_points(comment: str, decimal: str) -> str:
+    """Return a comment with decimal points, where the numbers have decimal commas."""
+    if decimal == ",":
+        return re.sub(r"(?<=[0-9]),(?=[0-9])", ".", comment)
+    return comment
+
+
 def split(text: str, separator: str) -> list[str]:
     """Return the cells of a line, without blanks and quotes around them. Many blanks
     part as one does, and none before a unit in parentheses."""
@@ -472,15 +504,17 @@ def _separator(lines: list[str]) -> str:
     lines with the number of cells that most lines have, which must be two or more."""
     best = ","
     most = (0, 0)
+    is_parted = False  # all lines alike, by another one than blanks
     for separator in SEPARATORS:
         rows = [split(line, separator) for line in lines]
         widths = Counter(len(row) for row in rows if len(row) > 1)
-        if not widths:
+        if not widths or (separator == " " and is_parted):
             continue
         width, count = max(widths.items(), key=lambda item: (item[1], item[0]))
         numbers = sum(
             _is_number(cell) for row in rows if len(row) == width for cell in row
         )
+        is_parted = is_parted or count == len(lines)
         if (numbers, count) > most:
             best = separator
             most = (numbers, count)
@@ -598,7 +632,10 @@ def _without_empty_column(
     words: list[str], rows: list[tuple[int, str]], separator: str
 ) -> tuple[list[str], list[tuple[int, str]]]:
     """Return header and rows without a last column in which nothing stands, as of lines
-    that end with a separator."""
+    that end with a separator, or of LabVIEW's comments."""
+    if len(words) > 2 and words[-1].lower() == "comment":
+        widths = {len(split(text, separator)) for _, text in rows}
+        return (words[:-1], rows) if widths == {len(words) - 1} else (words, rows)
     width = len(words) + bool(words[-1])
     if separator == " " or not rows or width < 2:
         return words, rows

@@ -131,6 +131,8 @@ def _read(source: Rows, picked: tuple[str, ...], degrees: bool) -> Log:
     clock = header.index(picked[0])
     t, note = source.times(clock, unit_of_time(picked[0]))
     notes += [note] if note else []
+    if turns[-1] != turns[0] and not split_unit(picked[-1])[1]:
+        notes.append(f"{picked[-1]} is taken to be in rad")
     unit, size = _length(picked, source.place)
     rows = source.numbers(header, picked[1:])
     alpha = rows[:, :-3] * turns[:-1]
@@ -175,6 +177,13 @@ def _turns(picked: tuple[str, ...], degrees: bool, place: str) -> np.ndarray:
             )
         in_degrees = unit == "" and degrees
         turns.append(UNITS["angle"]["deg" if in_degrees else unit or "rad"])
+    named = [bool(split_unit(name)[1]) for name in picked[1:-3]]
+    if any(named) and not all(named):
+        raise Refusal(
+            f"{picked[1 + named.index(False)]} has no unit beside joints that have one",
+            where=place,
+            instead="give all of them their unit, as in alpha_1_deg",
+        )
     return np.array(turns)
 
 
@@ -229,10 +238,16 @@ def _picked(
             "no header of columns", where=f"{name}, line {line}", instead=WHAT
         )
     bare = {c: plain(split_unit(c)[0]) for c in header}
-    roles = {
-        role: next((c for c in header if bare[c] in names), None)
-        for role, names in POSE.items()
-    }
+    roles = {}
+    for role, names in POSE.items():
+        candidates = [c for c in header if bare[c] in names]
+        if len(candidates) > 1:
+            raise Refusal(
+                f"{' and '.join(candidates)} may both be the column {role}",
+                where=f"{name}, line {line}",
+                instead="list those to take in ``columns``",
+            )
+        roles[role] = candidates[0] if candidates else None
     roles["t"] = roles["t"] or ("phase" if "phase" in header else None)
     matches = [(int(m[2]), m[1], c) for c in header if (m := JOINT.fullmatch(bare[c]))]
     kind = next((m[1] for m in matches), None)

@@ -55,6 +55,8 @@ SIZES = {  # words of a header line, and the share of the number beside them tha
     "length": (("length", 1.0), ("long", 1.0)),
     "depth": (("depth", 1.0), ("deep", 1.0)),
 }
+COMMA = re.compile(r"(?<![\d,])(\d+,\d{1,2})\s*(?:um|mm|cm|m|kg|g/|%)")  # 8,5 mm
+SIZE_WORDS = re.compile("radius|diameter|length|long|depth|deep|density|packing", re.I)
 OWNERS = {  # what a size belongs to, by the nearest of these words
     "rod": r"\b(?:rod|cylinder|intruder|axis)s?\b",
     "grain": r"\b(?:grain|particle|bead|sphere)s?\b",
@@ -128,6 +130,14 @@ def sizes(source: Rows) -> dict[str, float]:
     one."""
     values_by_name: dict[str, set[float]] = {}
     bulk = False
+    for line in source.comments[:MOST_COMMENTS]:
+        comma = COMMA.search(line[:LONGEST_COMMENT])
+        if comma and SIZE_WORDS.search(line[:LONGEST_COMMENT]):
+            raise Refusal(
+                f"{comma[1]} in the header lines may be one number or two",
+                where=source.name,
+                instead="write a decimal point, or a blank after the comma",
+            )
     for part, before in _parts(
         [line[:LONGEST_COMMENT] for line in source.comments[:MOST_COMMENTS]]
     ):

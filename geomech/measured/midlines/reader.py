@@ -39,7 +39,7 @@ from rft.refusal import Refusal, formatted
 LARGEST_FILE = 200_000_000  # bytes
 FEWEST_FRAMES, FEWEST_POINTS, MOST_POINTS = 12, 5, 1000
 TIMES = ("t", "time", "timestamp", "seconds", "sec")
-FRAMES = ("frame", "frames", "frame_idx", "frame_number", "index", "")
+FRAMES = ("frame", "frames", "frame_idx", "frame_number", "fnum", "index", "")
 POINTS = ("point", "bodypart", "node", "id", "point_id", "keypoint")
 ANIMALS = (
     "track",
@@ -52,7 +52,7 @@ ANIMALS = (
 )
 LIKELIHOOD = "likelihood"
 SCORES = (LIKELIHOOD, "score", "confidence")
-LAST = re.compile(rf"(.+?)[_. -]?(x|y|{'|'.join(SCORES)})")
+LAST = re.compile(rf"(.+?)[_. /-]?(x|y|{'|'.join(SCORES)})")
 FIRST = re.compile(rf"(x|y|{'|'.join(SCORES)})[_. -]?(.+)")
 IMAGE = re.compile(r"labeled-data|\.(png|jpe?g|tiff?|bmp)$", re.I)
 LENGTHS = UNITS["length"]
@@ -356,11 +356,11 @@ def _cells(source: Rows, picks: Sequence[int]) -> np.ndarray:
 
 
 def _number(cell: str, source: Rows, line: int, column: int) -> float:
-    if cell.lower() in MISSING:
-        return math.nan
     number = source.number(cell)
     if number is not None and abs(number) <= LARGEST_NUMBER:
         return number
+    if cell.lower() in MISSING:
+        return math.nan
     raise Refusal(
         f"{formatted(cell, 30)} is no number up to {LARGEST_NUMBER:g}",
         where=f"{source.name}, line {line}, column {source.header[1][column]}",
@@ -539,6 +539,12 @@ def _deeplabcut(source: Rows, individual: str | None) -> Table:
             "a file of DeepLabCut has header rows scorer, bodyparts and coords of equal length",
             where=source.place,
             instead="give the file as DeepLabCut writes it, or one header row such as frame,nose_x,nose_y",
+        )
+    if "z" in heads["coords"]:
+        raise Refusal(
+            "it has points in three dimensions, and midlines are plane",
+            where=source.place,
+            instead="give the file of one camera, or x and y as frame,nose_x,nose_y",
         )
     source = replace(source, rows=source.rows[len(heads) - 1 :])
     parts = list(zip(heads["bodyparts"], heads["coords"]))
