@@ -424,10 +424,10 @@ CURVE, POINTS = "t,s,curvature\n", "t,x,y\n"
 BAD = {
     "missing": (lambda path: None, "", "cannot read .*No such file"),
     "folder": (lambda path: path.mkdir(), "", "cannot read .*no ordinary file"),
-    "bytes": (text(b"\xff\xfe\x00\x01"), "", "cannot read .*not text"),
+    "bytes": (text(b"\x89\xfe\x00\x01"), "", "cannot read .*not text"),
     "huge": (huge, "", "cannot read .*larger than 100 MB"),
     "empty": (text(""), "", "swim.csv, line 1: the header must be t,s,curvature or"),
-    "header": (text("# mm\n\ntime,x,y\n0,0,0\n"), "", "line 3: the header must be .*got 'time,x,y'"),
+    "header": (text("# mm\n\ntime,x,z\n0,0,0\n"), "", "line 3: the header must be .*it has 'time, x, z'"),
     "no rows": (text(CURVE), "", "4 to 10000 frames .*got 0"),
     "word": (text(CURVE + "0,0,1\n0,one,2\n"), "", "line 3: a row must be 3 finite numbers .*got '0,one,2'"),
     "nan": (text(POINTS + "0,0,nan\n"), "", "line 2: a row must be 3 finite numbers"),
@@ -655,5 +655,5 @@ def test_files_that_do_not_look_like_ours_are_not_quoted(line, tmp_path):
         Centreline(file=str(path))
     assert "secret" not in str(caught.value)
     path.write_text("t,s,kappa\n0,0,0\n")
-    with pytest.raises(ValueError, match="got 't,s,kappa'"):
+    with pytest.raises(ValueError, match="it has 't, s, kappa'"):
         Centreline(file=str(path))

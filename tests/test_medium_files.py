@@ -148,7 +148,7 @@ BAD = {
     "no such table": (TABLE, {}, "No such file"),
     "columns": (TABLE, {"T_csv": csv("psi_deg,f_t,lift")}, "T.csv, line 2: the header has no column f_n"),
     "nan": (TABLE, {"T_csv": csv().replace("90.0,", "nan,")}, "T.csv, line 15: a row must be 3 finite numbers"),
-    "truncated": (TABLE, {"T_csv": csv()[:-25]}, "T.csv, line 15: a row must be 3"),
+    "short row": (TABLE, {"T_csv": csv().replace("82.5,", "82.5 ")}, "T.csv, line 14: a row must be 3"),
     "swapped": (TABLE, {"T_csv": csv("psi_deg,f_n,f_t")}, "the columns are exchanged"),
     "radians": (TABLE, {"T_csv": csv("psi,f_t,f_n").replace("psi,", "psi_deg,")}, "look like radians"),
     "degrees": (TABLE, {"T_csv": csv().replace("psi_deg,", "psi,")}, "write psi_deg for degrees"),

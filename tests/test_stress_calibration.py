@@ -632,7 +632,7 @@ BAD = {
     ),
     "inches": (
         ["depth_inch,force_N", "1,2"],
-        "line 1: the header has no column depth: it must have depth_m,force_N",
+        "line 1: the header has no column depth: it has 'depth_inch, force_N'; it must have depth_m,force_N",
     ),
     "few": (
         ["beta,gamma,alpha_x,alpha_z", "0,90,0,1"],
@@ -657,7 +657,7 @@ BAD = {
     ),
     "two depths": (
         ["depth_mm,depth_m,force", "1,2,3"],
-        "p.csv, line 1: the header has two columns of depth: keep one",
+        "p.csv, line 1: the header has 2 columns depth: it has 'depth_mm, depth_m, force'; keep one",
     ),
     "text": (
         ["depth,force", "0.01,soft"],

@@ -103,7 +103,8 @@ def fit_midlines(midlines: Any, medium: Any = None, **options: Any) -> FittedMid
         CSV file of points along the body over whole cycles.
     medium : medium, name or file
         In which the motion of the measured shapes is predicted; none if left out.
-    **options : columns, units, scale, fps, y, head, least_score, body_length, mend, level
+    **options : columns, units, scale, fps, y, head, least_score, individual, body_length,
+        mend, level
         See `geomech.measured.midlines.fit.fit_midlines`.
     """
     fitted = FittedMidlines(

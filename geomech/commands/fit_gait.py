@@ -102,8 +102,12 @@ def fit_gait(
         Optional[float],
         typer.Option(
             metavar="P",
-            help="likelihood from which on points are taken, 0.6 if left out",
+            help="score from which on points are taken; of a likelihood 0.6 if left out",
         ),
+    ] = None,
+    individual: Annotated[
+        Optional[str],
+        typer.Option(metavar="NAME", help="animal to take, of several in the file"),
     ] = None,
     mend: Annotated[
         bool,
@@ -123,7 +127,7 @@ def fit_gait(
     request = question(
         file, scene, columns=column_names(columns), degrees=degrees, level=level, harmonics=harmonics, limits=limits,
         body_length=body_length, medium=medium, units=units, scale=scale, fps=fps, y=y, head=head, least_score=least_score,
-        mend=mend,
+        individual=individual, mend=mend,
     )  # fmt: skip
     field = Output(out, parts.write_measured, formats.netcdf)
     figure = Output(plot, drawing("pictures.measured"), drawing("pictures.check"))

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from geomech.io.rows import Rows
+from geomech.io.rows import Column, Rows
 from geomech.io.rows import read as read_rows
 from rft.refusal import Refusal
 
 HEADERS = (("t", "s", "curvature"), ("t", "point", "x", "y"), ("t", "x", "y"))
+COLUMNS = {  # of curvature, s and points a unit would be another than that of the gait
+    "t": Column("t", "time", "s", ("t", "time")),
+    "s": Column("s"),
+    "curvature": Column("curvature"),
+    "point": Column("point"),
+    "x": Column("x", "length", "m", ("x",)),
+    "y": Column("y", "length", "m", ("y",)),
+}
 UNTIMED = ("frame", "phase")  # names that may stand for t, and are no s
 LARGEST_FILE = 100_000_000  # bytes, a few million rows
 SMALLEST_NUMBER = 1e-300  # that a period may be
@@ -55,13 +62,20 @@ class Frames:
 def read(path: str | Path) -> Frames:
     """Return the frames of a CSV file; Refusal if it has none that can be used."""
     source = read_rows(path, LARGEST_FILE, "file must be a CSV file of one period")
-    columns = _header(source)
-    rows = source.numbers(columns)
+    columns, clock = _columns(source)
+    found = source.find([clock, *(COLUMNS[name] for name in columns[1:])])
+    values, notes = source.values(found)
+    if {"x", "y"} <= {*columns} and found["x"].unit != found["y"].unit:
+        raise Refusal(
+            "x and y are in two units", where=source.place, instead="keep one"
+        )
+    source.tell(notes)
+    rows = np.stack([*values.values()], -1)
     keyed = columns[1] in ("s", "point")
     order = np.lexsort((rows[:, 1] if keyed else np.arange(len(rows)), rows[:, 0]))
     rows, numbers = rows[order], source.lines[order]
     t, starts = np.unique(rows[:, 0], return_index=True)
-    timed = source.header[1][0] not in UNTIMED
+    timed = clock.name not in UNTIMED
     frames = Frames(
         source.name, source.sha256, columns, rows, numbers, t, starts, timed
     )
@@ -71,23 +85,19 @@ def read(path: str | Path) -> Frames:
     return frames
 
 
-def _header(rows: Rows) -> tuple[str, ...]:
-    """Return the columns, with t for the column in its place. A wrong header is quoted only if it has two of their
-    names: another file's first line may be private."""
-    line, columns = rows.header
-    columns = ("t", *columns[1:]) if columns[0] in UNTIMED else columns
-    if columns not in HEADERS:
-        headers = " or ".join(",".join(h) for h in HEADERS)
-        quoted = rows.filled[0][1][:40] if rows.filled else ""
-        received = (
-            f", got {quoted!r}"
-            if len(set(itertools.chain(*HEADERS)) & set(columns)) > 1
-            else ""
-        )
-        raise Refusal(
-            f"the header must be {headers}{received}", where=f"{rows.name}, line {line}"
-        )
-    return columns
+def _columns(source: Rows) -> tuple[tuple[str, ...], Column]:
+    """Return the columns in the order of one of `HEADERS`, and that of the time."""
+    candidates = (COLUMNS["t"], *(Column(name) for name in UNTIMED))
+    clocks = source.find((), candidates)
+    for header in HEADERS:
+        rest = source.find((), [COLUMNS[name] for name in header[1:]])
+        if len(clocks) == 1 and len(rest) == len(header) - 1 == len(source.words) - 1:
+            clock = next(x for x in candidates if x.name in clocks)
+            return header, clock
+    headers = " or ".join(",".join(header) for header in HEADERS)
+    raise Refusal(
+        f"the header must be {headers}", where=source.place, because=source.found
+    )
 
 
 def _check_counts(frames: Frames) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 
 from geomech.io.files import read as read_bytes
 from geomech.io.files import reason_of
+from geomech.io.foreign import refuse_program
 from geomech.io.tables import mat
 from geomech.io.tables.base import LARGEST_ANGLE, numbers
 from rft.refusal import Refusal
@@ -40,6 +41,7 @@ class Curve(NamedTuple):
 
 def read(path: str | Path, number: int) -> Curve:
     """Return a gait of a file, of several the one of this number, from 1; Refusal if there is none."""
+    refuse_program(path)
     try:
         raw = read_bytes(Path(path), LARGEST)
     except (OSError, ValueError) as error:

@@ -9,40 +9,53 @@ from geomech.io.rows import read as read_rows
 from geomech.measured.midlines import reader
 from geomech.measured.midlines.question import Midlines
 from geomech.measured.results import Fit
-from rft.refusal import Refusal, line
+from rft.refusal import Refusal, formatted, line
 
 OF_LOGS = "degrees", "harmonics", "limits", "scene"
-OF_MIDLINES = "medium", "units", "scale", "fps", "y", "head", "least_score", "mend"
+OF_MIDLINES = (
+    "medium",
+    "units",
+    "scale",
+    "fps",
+    "y",
+    "head",
+    "least_score",
+    "individual",
+    "mend",
+)
+WHAT = (
+    "give a CSV file with a header such as t,alpha_1,alpha_2,x,y,heading for joint "
+    "angles, or t,point,x,y or t,x1,y1,x2,y2 for points along a body"
+)
+LOG, MIDLINES = "a log of joint angles", "midlines"
 
 
 def question(file: Path, scene: Path | None = None, **options: Any) -> Fit | Midlines:
-    """Return the question of a file; Refusal for options of the other kind. options: those that are None or False are left
-    out."""
+    """Return the question of a file: its header says which, else the options do. Refusal for options of the other kind.
+    options: those that are None or False are left out."""
     given = {
         name: value
         for name, value in options.items()
         if value is not None and value is not False and value != ()
     }
-    midlines = _is_midlines(file)
-    wrong = [
-        x
-        for x in (OF_LOGS if midlines else OF_MIDLINES)
-        if x in given or (x == "scene" and scene is not None)
-    ]
-    if wrong:
-        what = "a log of joint angles" if midlines else "midlines"
+    of_logs = [x for x in OF_LOGS if x in given or (x == "scene" and scene is not None)]
+    of_midlines = [x for x in OF_MIDLINES if x in given]
+    header = read_rows(file, reader.LARGEST_FILE, WHAT).header[1]
+    kind = reader.kind_of(header)
+    if not kind and of_logs and of_midlines:
         raise Refusal(
-            f"``{wrong[0]}`` is that of {what}",
+            f"``{of_logs[0]}`` belongs to {LOG}, and ``{of_midlines[0]}`` to {MIDLINES}",
             where=line(file.name),
-            instead="drop it",
+            instead="drop one",
         )
-    return Midlines(file, **given) if midlines else Fit(file, **given)
-
-
-def _is_midlines(file: Path) -> bool:
-    try:
-        return reader.is_midlines(
-            read_rows(file, reader.LARGEST_FILE, reader.WHAT).header[1]
+    is_midlines = kind == "midlines" or (not kind and bool(of_midlines))
+    wrong = of_logs if is_midlines else of_midlines
+    if wrong:
+        theirs, ours = (LOG, MIDLINES) if is_midlines else (MIDLINES, LOG)
+        raise Refusal(
+            f"``{wrong[0]}`` belongs to {theirs}",
+            where=line(file.name),
+            because=f"by its header this is a file of {ours}: {formatted(', '.join(header), 120)}",
+            instead="drop it, or rename the columns",
         )
-    except ValueError:
-        return False
+    return Midlines(file, **given) if is_midlines else Fit(file, **given)

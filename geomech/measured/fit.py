@@ -134,8 +134,8 @@ def fit_log(
 
     columns, degrees: as in `geomech.measured.log.read`. level: share of cases in which an interval should contain the
     truth. harmonics: of the connection in the phase; by cross-validation if None. limits (rad): distance from the mean
-    gait up to which the connection is given; as far as the data extend if None. body_length (m): of a log in m; 1 for
-    one in body lengths.
+    gait up to which the connection is given; as far as the data extend if None. body_length: in the unit
+    of x and y; 1 for a log in body lengths.
 
     Examples
     --------
@@ -157,6 +157,8 @@ def fit_log(
     if limits is not None:
         in_range("``limits``", limits, 1e-6, 10)
     log = log if isinstance(log, Log) else read(log, columns, degrees)
+    if body_length != 1.0:
+        body_length *= log.size
     period = cycles.period(log)
     joints, pose = (smooth.smoothed(log.t, x, period) for x in (log.alpha, log.pose))
     rows = len(log.t) * period / (log.t[-1] - log.t[0])

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from geomech.core.errors import UnitWarning
+from geomech.io.rows import UNITS, Rows, plain, split_unit
 from geomech.io.rows import read as read_rows
 from geomech.io.tables.base import LARGEST_ANGLE
 from rft.refusal import Refusal, formatted
@@ -19,13 +20,13 @@ from rft.refusal import Refusal, formatted
 LARGEST_FILE = 100_000_000  # bytes
 MOST_ROWS, FEWEST_ROWS = 500_000, 100
 MOST_JOINTS = 6  # the columns of the regression grow with their cube
-POSE = {
-    "t": ("t", "time", "time_s", "t_s"),
-    "x": ("x", "x_m"),
-    "y": ("y", "y_m"),
+POSE = {  # names without their units
+    "t": ("t", "time"),
+    "x": ("x",),
+    "y": ("y",),
     "heading": ("heading", "theta", "yaw"),
 }
-JOINT = re.compile(r"(alpha|joint|angle|a|q)_?(\d+)(_rad|_deg)?")
+JOINT = re.compile(r"(alpha|joint|angle|a|q)_?([0-9]+)")
 UNTIMED = (
     "phase",
     "frame",
@@ -33,9 +34,6 @@ UNTIMED = (
     "sample",
     "index",
 )  # columns in place of t that are no times
-ELSEWHERE = re.compile(
-    r".*_(mm|cm|km|px|pixels?|ms)"
-)  # units that are not those of t, x and y
 SPIKE = 20.0  # deviation from neighbouring rows over that of nine in ten rows
 LARGE = 0.05  # of a column's range: least deviation of an outlier
 WHAT = "give a CSV file with a header such as t,alpha_1,alpha_2,x,y,heading"
@@ -47,7 +45,7 @@ class Log:
 
     name: of the file. t: (N,), ascending. alpha: (N, d), rad, and the heading have no jumps by a full turn. pose: (N,
     3), x, y, heading. joints: names of their columns. lines: (N,), line of each row in the file. seconds: t is a time.
-    metres: x and y are in m, by the names of their columns.
+    metres: x and y are in m. size: what the unit of x and y in the file is in m, where it names one, else 1.
 
     Examples
     --------
@@ -70,6 +68,7 @@ class Log:
     lines: np.ndarray
     seconds: bool = True
     metres: bool = False
+    size: float = 1.0
 
     def wrong(self, what: str, row: int | None = None, **facts: Any) -> Refusal:
         """Return a Refusal about a row, or about the whole file. facts: keywords of `Refusal`."""
@@ -84,8 +83,8 @@ def read(path: str | Path, columns: Sequence[str] = (), degrees: bool = False) -
     """Return the log in a file; Refusal for one that cannot be used.
 
     columns: names of the time, of all joint angles, of x, y and the heading, in this order; by default those with known
-    names (`POSE`, `JOINT`; "phase" in place of a time). degrees: joint angles and heading are in degrees, as are
-    columns whose names end in _deg.
+    names (`POSE`, `JOINT`; "phase" in place of a time). degrees: joint angles and heading are in degrees where their
+    columns name no unit.
 
     Examples
     --------
@@ -106,38 +105,108 @@ def read(path: str | Path, columns: Sequence[str] = (), degrees: bool = False) -
         picked = _picked(
             source.name, line, header, [c.strip().lower() for c in columns]
         )
-        if len(source.filled) - 1 > MOST_ROWS:
+        if len(source.rows) > MOST_ROWS:
             raise Refusal(
-                f"{len(source.filled) - 1} rows, more than {MOST_ROWS}",
+                f"{len(source.rows)} rows, more than {MOST_ROWS}",
                 where=source.name,
                 instead="thin them out",
             )
-        rows = source.numbers(header, picked)
+        log = _read(source, picked, degrees)
     except ValueError as error:
         if "a row must be" in error.what:
             error.instead = "mend that row, or drop it"
         raise
-    turn = np.where(
-        [degrees or name.endswith("_deg") for name in picked], np.pi / 180, 1.0
-    )
-    turn[[0, -3, -2]] = 1.0
-    rows = rows * turn
-    flags = {
-        "seconds": picked[0] not in UNTIMED,
-        "metres": all(name.endswith("_m") for name in picked[-3:-1]),
-    }
-    log = Log(
-        source.name,
-        rows[:, 0],
-        rows[:, 1:-3],
-        rows[:, -3:],
-        picked[1:-3],
-        source.lines,
-        **flags,
-    )
+    turn = np.ones(len(picked))
+    turn[[*range(1, len(picked) - 3), -1]] = _turns(picked, degrees, source.place)
     _check_times(log)
     _check_units(log, picked, turn)
     return _checked(log)
+
+
+def _read(source: Rows, picked: tuple[str, ...], degrees: bool) -> Log:
+    """Return the log in the picked columns, in s or as the file counts, rad and m."""
+    header = source.header[1]
+    notes = list(source.notes)
+    turns = _turns(picked, degrees, source.place)
+    clock = header.index(picked[0])
+    t, note = source.times(clock, unit_of_time(picked[0]))
+    notes += [note] if note else []
+    if turns[-1] != turns[0] and not split_unit(picked[-1])[1]:
+        notes.append(f"{picked[-1]} is taken to be in rad")
+    unit, size = _length(picked, source.place)
+    rows = source.numbers(header, picked[1:])
+    alpha = rows[:, :-3] * turns[:-1]
+    xy = rows[:, -3:-1] * size
+    heading = rows[:, -1] * turns[-1]
+    source.tell(notes)
+    return Log(
+        source.name,
+        t,
+        alpha,
+        np.column_stack([xy, heading]),
+        picked[1:-3],
+        source.lines,
+        seconds=picked[0] not in UNTIMED,
+        metres=unit in UNITS["length"],
+        size=size,
+    )
+
+
+def unit_of_time(name: str) -> str:
+    """Return the unit of time that a column names, "" without one."""
+    unit = split_unit(name)[1]
+    return unit if unit in UNITS["time"] else ""
+
+
+def _turns(picked: tuple[str, ...], degrees: bool, place: str) -> np.ndarray:
+    """Return rad per unit of the joints and the heading; Refusal for other units."""
+    turns = []
+    for name in (*picked[1:-3], picked[-1]):
+        unit = split_unit(name)[1]
+        if unit not in UNITS["angle"] and unit != "":
+            raise Refusal(
+                f"{name} is in {unit} by its name",
+                where=place,
+                instead="give angles in rad, or in degrees",
+            )
+        if degrees and unit in ("rad", "radians"):
+            raise Refusal(
+                f"{name} is in rad by its name",
+                where=place,
+                instead="drop ``degrees``, or rename the column",
+            )
+        in_degrees = unit == "" and degrees
+        turns.append(UNITS["angle"]["deg" if in_degrees else unit or "rad"])
+    named = [bool(split_unit(name)[1]) for name in picked[1:-3]]
+    if any(named) and not all(named):
+        raise Refusal(
+            f"{picked[1 + named.index(False)]} has no unit beside joints that have one",
+            where=place,
+            instead="give all of them their unit, as in alpha_1_deg",
+        )
+    return np.array(turns)
+
+
+def _length(picked: tuple[str, ...], place: str) -> tuple[str, float]:
+    """Return the unit of x and y, "" where none is named, and what it is in m; Refusal
+    for two units, or pixels."""
+    units = [split_unit(name)[1] for name in picked[-3:-1]]
+    unit = units[0]
+    if units[1] != unit:
+        raise Refusal(
+            f"{picked[-3]} and {picked[-2]} are in two units",
+            where=place,
+            instead="give both in one",
+        )
+    if unit in ("", "BL"):
+        return unit, 1.0
+    if unit not in UNITS["length"]:
+        raise Refusal(
+            f"{picked[-3]} is in {unit} by its name",
+            where=place,
+            instead="give x and y in body lengths, or in m with ``body_length``",
+        )
+    return unit, UNITS["length"][unit]
 
 
 def _picked(
@@ -152,6 +221,7 @@ def _picked(
             instead="rename one",
         )
     if columns:
+        columns = [c.removeprefix("%") for c in columns]
         if missing := [c for c in columns if c not in header]:
             raise Refusal(
                 f"no column {formatted(missing[0])}; it has {formatted(', '.join(header), 200)}",
@@ -164,29 +234,30 @@ def _picked(
             )
         return _of_joints(name, columns)
     if len(header) < 2:
-        other = (
-            "; columns must be parted by commas"
-            if re.search("[;\\t]", header[0])
-            else ""
-        )
         raise Refusal(
-            f"no header of columns{other}", where=f"{name}, line {line}", instead=WHAT
+            "no header of columns", where=f"{name}, line {line}", instead=WHAT
         )
-    bare = {c: re.sub("_(rad|deg)$", "", c) for c in header}
-    roles = {
-        role: next((c for c in header if bare[c] in names), None)
-        for role, names in POSE.items()
-    }
+    bare = {c: plain(split_unit(c)[0]) for c in header}
+    roles = {}
+    for role, names in POSE.items():
+        candidates = [c for c in header if bare[c] in names]
+        if len(candidates) > 1:
+            raise Refusal(
+                f"{' and '.join(candidates)} may both be the column {role}",
+                where=f"{name}, line {line}",
+                instead="list those to take in ``columns``",
+            )
+        roles[role] = candidates[0] if candidates else None
     roles["t"] = roles["t"] or ("phase" if "phase" in header else None)
-    matches = [(int(m[2]), m[1], c) for c in header if (m := JOINT.fullmatch(c))]
+    matches = [(int(m[2]), m[1], c) for c in header if (m := JOINT.fullmatch(bare[c]))]
     kind = next((m[1] for m in matches), None)
     joints = [c for _, k, c in sorted(matches) if k == kind]
     missing = [role for role, c in roles.items() if c is None]
     if missing or len(joints) < 2:
         few = f"{'one column' if joints else 'no columns'} of joint angles, and a gait is a loop of two or more"
         what = f"no column {missing[0]}" if missing else few
-        cure = "name them t,alpha_1,alpha_2,x,y,heading, or say ``columns``"
-        known = f"it has {formatted(', '.join(header), 120)}"
+        cure = "name them t,alpha_1,alpha_2,x,y,heading, or list those in ``columns``"
+        known = f"it has {formatted(', '.join(header), 240)}"
         raise Refusal(what, where=f"{name}, line {line}", because=known, instead=cure)
     return _of_joints(
         name, [roles["t"], *joints, roles["x"], roles["y"], roles["heading"]]
@@ -199,14 +270,6 @@ def _of_joints(name: str, columns: list[str]) -> tuple[str, ...]:
             f"{len(columns) - 4} joint angles, more than {MOST_JOINTS}",
             where=name,
             instead="give the shape in a few modes as columns",
-        )
-    if other := [
-        m for c in (columns[0], *columns[-3:-1]) if (m := ELSEWHERE.fullmatch(c))
-    ]:
-        raise Refusal(
-            f"{other[0][0]} is in {other[0][1]} by its name",
-            where=name,
-            instead="give t in s, x and y in body lengths, or in m with ``body_length``",
         )
     return tuple(columns)
 

@@ -8,39 +8,65 @@ from pathlib import Path
 import numpy as np
 
 from geomech.io import rows
-from rft.refusal import Refusal, located
+from geomech.io.rows import Column
+from rft.refusal import Refusal, formatted, located
 
 LARGEST_FILE = 20_000_000  # bytes
+KINDS = {  # of columns by their names, with the unit that a scene has them in
+    "t": ("time", "s"),
+    "x": ("length", "m"),
+    "y": ("length", "m"),
+    "z": ("length", "m"),
+    "angle": ("angle", "rad"),
+    "rx": ("angle", "rad"),
+    "ry": ("angle", "rad"),
+    "rz": ("angle", "rad"),
+    "beta": ("angle", "deg"),
+    "gamma": ("angle", "deg"),
+    "alpha_x": ("stress per depth", "N/cm3"),
+    "alpha_z": ("stress per depth", "N/cm3"),
+}
+OTHER_NAMES = {"t": ("t", "time")}
+
+
+def column(name: str) -> Column:
+    """Return the column of a name in `KINDS`."""
+    kind, unit = KINDS[name]
+    return Column(name, kind, unit, OTHER_NAMES.get(name, (name,)))
 
 
 def columns(
-    place: str, path, required: tuple, optional: tuple[str, ...] = ()
+    place: str, path, required: tuple[str, ...], optional: tuple[str, ...] = ()
 ) -> dict[str, np.ndarray]:
-    """Return the columns ``required``, and those of ``optional`` that the file has. A required column may be a tuple of
-    names for the same, returned under the first. Refusal, with ``place`` and the line, for any other file."""
+    """Return the columns ``required``, and those of ``optional`` that the file has, in
+    the units of `KINDS`. Refusal, with ``place`` and the line, for any other file."""
     if not isinstance(path, (str, Path)):
         raise Refusal("file must be the name of a CSV file", value=path, where=place)
-    words = [(w,) if isinstance(w, str) else w for w in required]
-    header = ",".join(w[0] for w in words)
+    header = ",".join(required)
+    needed = [column(name) for name in required]
+    wanted = [column(name) for name in optional]
     with located(place):
         source = rows.read(
             path, LARGEST_FILE, f"give a CSV file with the header {header}"
         )
-        line, names = source.header
-        allowed = [n for w in words for n in w] + [*optional]
-        if (
-            [n for n in names if n not in allowed]
-            or len({*names}) < len(names)
-            or any(not {*w} & {*names} for w in words)
-        ):
+        found = source.find((), [*needed, *wanted])
+        used = {x.index for x in found.values()}
+        unknown = [x for k, x in enumerate(source.words) if k not in used]
+        if unknown or not {*required} <= {*found}:
             more = f", and {','.join(optional)} if wanted" if optional else ""
+            because = source.found
+            if unknown and because:
+                because = (
+                    f"{because}, of which {formatted(unknown[0])} is none of these"
+                )
             raise Refusal(
                 f"the header must be {header}{more}",
-                where=f"{source.name}, line {line}",
+                where=source.place,
+                because=because,
             )
-        values = dict(zip(names, source.numbers(names).T))
-    result = {w[0]: next(values[n] for n in w if n in values) for w in words}
-    return result | {n: values[n] for n in optional if n in values}
+        values, notes = source.values(found)
+        source.tell(notes)
+    return {name: values[name] for name in (*required, *optional) if name in values}
 
 
 def columns_reader(
@@ -55,7 +81,8 @@ def columns_reader(
 def rows_reader(
     key: str, required: tuple[str, ...]
 ) -> Callable[[str, str], dict[str, list]]:
-    """Return a function (place, file) that reads columns of a CSV file as the rows of one key."""
+    """Return a function (place, file) that reads columns of a CSV file as the rows of
+    one key."""
     return lambda place, file: {
         key: np.stack([*columns(place, file, required).values()], -1).tolist()
     }

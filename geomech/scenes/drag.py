@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from geomech.core.errors import choose
-from geomech.io.rows import Rows
+from geomech.io.rows import Column, Rows
 from geomech.io.rows import read as read_rows
 from rft.refusal import Refusal
 
@@ -21,12 +21,15 @@ MOST_COMMENTS, LONGEST_COMMENT = (
     100,
     1000,
 )  # lines, and letters of each, that are looked through for sizes
-ANGLE, ALONG, ACROSS, WEIGHT = "psi_deg", "F_parallel_N", "F_perpendicular_N", "weight"
+ANGLE = Column("psi_deg", "angle", "deg", ("psi", "attack_angle"))
+ALONG = Column("F_parallel_N", "force", "N", ("f_parallel", "f_par"))
+ACROSS = Column("F_perpendicular_N", "force", "N", ("f_perpendicular", "f_perp"))
+WEIGHT = Column("weight")
 NEEDED = (ANGLE, ALONG, ACROSS)
-ENDS = (
-    "end_parallel_N",
-    "end_perpendicular_N",
-)  # where the others are those on a flank as long as the rod
+ENDS = (  # where the others are those on a flank as long as the rod
+    Column("end_parallel_N", "force", "N", ("end_parallel", "end_par")),
+    Column("end_perpendicular_N", "force", "N", ("end_perpendicular", "end_perp")),
+)
 SAMPLES = {  # that ship with the package
     "short-rod-drag": "short_rod_drag.csv",
     "flank-drag": "flank_drag.csv",
@@ -52,6 +55,8 @@ SIZES = {  # words of a header line, and the share of the number beside them tha
     "length": (("length", 1.0), ("long", 1.0)),
     "depth": (("depth", 1.0), ("deep", 1.0)),
 }
+COMMA = re.compile(r"(?<![\d,])(\d+,\d{1,2})\s*(?:um|mm|cm|m|kg|g/|%)")  # 8,5 mm
+SIZE_WORDS = re.compile("radius|diameter|length|long|depth|deep|density|packing", re.I)
 OWNERS = {  # what a size belongs to, by the nearest of these words
     "rod": r"\b(?:rod|cylinder|intruder|axis)s?\b",
     "grain": r"\b(?:grain|particle|bead|sphere)s?\b",
@@ -91,57 +96,33 @@ def read(path: str | Path) -> Measured:
         choose("drag", str(path), [*SAMPLES, "a CSV file"])
     return _measured(
         read_rows(
-            path, LARGEST_FILE, f"give a CSV file with columns {','.join(NEEDED)}"
+            path,
+            LARGEST_FILE,
+            "give a CSV file with columns psi_deg,F_parallel_N,F_perpendicular_N",
         )
     )
 
 
 def _measured(source: Rows) -> Measured:
-    columns = header(source, NEEDED)
-    weighed, lowered = WEIGHT in columns, tuple(x.lower() for x in ENDS)
-    ends = None
-    if any(name in columns for name in lowered):
-        header(source, ENDS)
-        ends = source.numbers(columns, lowered).T
-    rows = source.numbers(
-        columns, tuple(x.lower() for x in NEEDED) + (WEIGHT,) * weighed
-    ).T
-    if not 0 < rows.shape[1] <= MOST_ROWS:
+    has_ends = bool(source.find((), ENDS))
+    needed = (*NEEDED, *ENDS) if has_ends else NEEDED
+    columns = source.take(needed, (WEIGHT,))
+    values = [columns[x.name] for x in NEEDED]
+    count = len(values[0])
+    if not 0 < count <= MOST_ROWS:
         raise Refusal(
-            f"it must have 1 to {MOST_ROWS} rows of drag, got {rows.shape[1]}",
+            f"it must have 1 to {MOST_ROWS} rows of drag, got {count}",
             where=source.name,
         )
-    if (far := np.flatnonzero(np.abs(rows[0]) > 360)).size:
+    if (far := np.flatnonzero(np.abs(values[0]) > 360)).size:
         line = source.lines[far[0]]
         raise Refusal(
-            f"{ANGLE} must be from -360 to 360, got {rows[0, far[0]]:g}",
+            f"{ANGLE.name} must be from -360 to 360, got {values[0][far[0]]:g}",
             where=f"{source.name}, line {line}",
         )
-    rows = rows if weighed else np.vstack([rows, np.ones(rows.shape[1])])
-    return Measured(rows, sizes(source), source.name, ends)
-
-
-def header(source: Rows, needed: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the columns of a file, in small letters; Refusal if one that is needed is missing, or occurs twice."""
-    line, columns = source.header
-    for name in needed:
-        if (count := columns.count(name.lower())) != 1:
-            # What is found is quoted only if it is near: another file's first line may be nobody's business.
-            resembles = any(word.startswith(("psi", "f_")) for word in columns)
-            received = (
-                f", got {source.filled[0][1][:60]!r}"
-                if resembles and source.filled
-                else ""
-            )
-            problem = (
-                f"has no column {name}" if not count else f"has {count} columns {name}"
-            )
-            raise Refusal(
-                f"the header {problem}",
-                where=f"{source.name}, line {line}",
-                because=f"it must have {','.join(needed)}{received}",
-            )
-    return columns
+    weight = columns.get(WEIGHT.name, np.ones(count))
+    ends = np.stack([columns[x.name] for x in ENDS]) if has_ends else None
+    return Measured(np.stack([*values, weight]), sizes(source), source.name, ends)
 
 
 def sizes(source: Rows) -> dict[str, float]:
@@ -149,6 +130,14 @@ def sizes(source: Rows) -> dict[str, float]:
     one."""
     values_by_name: dict[str, set[float]] = {}
     bulk = False
+    for line in source.comments[:MOST_COMMENTS]:
+        comma = COMMA.search(line[:LONGEST_COMMENT])
+        if comma and SIZE_WORDS.search(line[:LONGEST_COMMENT]):
+            raise Refusal(
+                f"{comma[1]} in the header lines may be one number or two",
+                where=source.name,
+                instead="write a decimal point, or a blank after the comma",
+            )
     for part, before in _parts(
         [line[:LONGEST_COMMENT] for line in source.comments[:MOST_COMMENTS]]
     ):

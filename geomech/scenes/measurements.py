@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import re
 from pathlib import Path
 
 import numpy as np
 
 from geomech.io import rows
+from geomech.io.rows import plain, split_unit
 from geomech.scenes.columns import LARGEST_FILE
 from geomech.scenes.key import angles_of
 from geomech.scenes.model import Scene
@@ -27,33 +27,30 @@ def read(path: str | Path, scene: Scene, angle: bool = False) -> dict[str, np.nd
     The header names the columns amplitude and value, and error if wanted, in any order, with the unit behind it where that
     is another, as amplitude_deg, value_mm or error_BL. angle: values are headings. Refusal, with the line, for any other."""
     source = rows.read(path, LARGEST_FILE, f"give a CSV file with the header {HEADER}")
-    line, words = source.header
     units, found = _units(scene, angle), {}
-    for word in words:
-        match = re.fullmatch(
-            r"(amplitude|value|error)(?:[ _]*[\(\[]?([a-z]+)[\)\]]?)?", word
-        )
-        if match is None or match[1] in found:
+    for word in source.words:
+        name, unit = split_unit(word)
+        name = plain(name)
+        if name not in COLUMNS or name in found:
             raise Refusal(
-                f"the header must be {HEADER}",
-                value=word,
-                where=f"{source.name}, line {line}",
+                f"the header must be {HEADER}", value=word, where=source.place
             )
-        with located(f"{source.name}, line {line}"):
-            found[match[1]] = _scale(match[1], match[2] or "", units[match[1]], scene)
+        with located(source.place):
+            found[name] = _scale(name, unit, units[name], scene)
     if not {"amplitude", "value"} <= {*found}:
         raise Refusal(
             f"the header must be {HEADER}",
-            value=",".join(words),
-            where=f"{source.name}, line {line}",
+            value=",".join(source.words),
+            where=source.place,
         )
-    table = source.numbers(words)
+    table = source.numbers(source.words)
     if not len(table):
         raise Refusal(
             "it has no measurement",
             where=source.name,
             instead=f"add rows below the header {HEADER}",
         )
+    source.tell()
     columns = {name: scale * x for (name, scale), x in zip(found.items(), table.T)}
     if (columns.get("error", np.zeros(1)) < 0).any():
         bad = int(source.lines[int((columns["error"] < 0).argmax())])
@@ -66,7 +63,7 @@ def read(path: str | Path, scene: Scene, angle: bool = False) -> dict[str, np.nd
 def _units(scene: Scene, angle: bool) -> dict[str, dict[str, float]]:
     """Return, by column, the units that it may have, in that of the scene's results."""
     amplitude = ANGLES if "amplitude" in angles_of(type(scene.gait)) else {"": 1.0}
-    lengths = {"": 1.0, "bl": scene.system.length}
+    lengths = {"": 1.0, "BL": scene.system.length}
     lengths |= METRES if length_unit(scene.system) == "m" else {}
     value = ANGLES if angle else lengths
     return {"amplitude": amplitude, "value": value, "error": value}
@@ -76,10 +73,10 @@ def _scale(name: str, unit: str, units: dict[str, float], scene: Scene) -> float
     """Return the factor from the unit of a column to that of the results; Refusal for a unit that the column cannot have."""
     if unit in units:
         return units[unit]
-    such = [f"{name}_{'BL' if x == 'bl' else x}" for x in units if x]
+    such = [f"{name}_{x}" for x in units if x]
     why = (
         f"lengths of {scene.name} are in body lengths"
-        if unit in METRES and "bl" in units
+        if unit in METRES and "BL" in units
         else ""
     )
     instead = (

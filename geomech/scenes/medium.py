@@ -9,10 +9,10 @@ from typing import Annotated, Any
 import numpy as np
 
 from geomech.io.files import read_text
-from geomech.io.rows import Rows
+from geomech.io.rows import ENDINGS, Column
 from geomech.io.rows import read as read_rows
 from geomech.io.toml import tables_of
-from geomech.scenes.drag import LARGEST_FILE, header
+from geomech.scenes.drag import ACROSS, ALONG, ANGLE, LARGEST_FILE
 from geomech.scenes.key import Word
 from geomech.scenes.reader import Source, read_section
 from geomech.scenes.sections import FromFile, OneOf
@@ -20,10 +20,8 @@ from geomech.systems.swimmer import MEDIA, PARTS
 from rft.refusal import Refusal, located
 
 LARGEST = 1_000_000  # bytes of a medium's file
-FORCES = (
-    ("f_t", "f_n"),
-    ("F_parallel_N", "F_perpendicular_N"),
-)  # columns of a table, under either names
+ANGLE_RAD = Column("psi", "angle", "rad")
+FORCES = (Column("f_t"), Column("f_n"))  # of a table, in place of those of a rod
 
 
 @dataclass(frozen=True)
@@ -96,7 +94,9 @@ def _medium(place: str, path: Path) -> dict:
 
 def _table_instead(path: Path) -> str:
     return (
-        'for a table of drag add law = "table"' if path.suffix.lower() == ".csv" else ""
+        'for a table of drag add law = "table"'
+        if path.suffix.lower() in ENDINGS
+        else ""
     )
 
 
@@ -106,21 +106,15 @@ def _rows(place: str, file: str) -> dict[str, list]:
         source = read_rows(
             file, LARGEST_FILE, "give a CSV file with columns psi_deg,f_t,f_n"
         )
-        angle, forces = _columns(source)
-        psi, *f = source.numbers(
-            header(source, (angle, *forces)), (angle, *(x.lower() for x in forces))
-        ).T
-    psi = np.radians(psi) if angle == "psi_deg" else psi
-    return {"psi": psi.tolist(), "f_t": f[0].tolist(), "f_n": f[1].tolist()}
-
-
-def _columns(source: Rows) -> tuple[str, tuple[str, str]]:
-    """Return the names of the angle and the forces that a file uses."""
-    present = source.header[1]
-    angle = "psi" if "psi" in present and "psi_deg" not in present else "psi_deg"
-    return angle, next(
-        (names for names in FORCES if names[0].lower() in present), FORCES[0]
-    )
+        is_bare = bool(source.find((), (ANGLE_RAD,)))
+        angle = ANGLE_RAD if is_bare else ANGLE
+        is_of_rod = bool(source.find((), (ALONG, ACROSS)))
+        forces = (ALONG, ACROSS) if is_of_rod else FORCES
+        columns = source.take((angle, *forces))
+    psi = columns[angle.name]
+    psi = psi if is_bare else np.radians(psi)
+    f_t, f_n = (columns[x.name].tolist() for x in forces)
+    return {"psi": psi.tolist(), "f_t": f_t, "f_n": f_n}
 
 
 DRAG = FromFile(

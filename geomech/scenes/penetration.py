@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import NamedTuple
 
 import numpy as np
 
-from geomech.io.rows import Rows
+from geomech.io.rows import Column, Rows, plain, split_unit
 from geomech.scenes.drag import (
     CONNECTIVE,
     LENGTHS,
@@ -17,18 +18,11 @@ from geomech.scenes.drag import (
 )
 from rft.refusal import Refusal
 
-UNITS = {  # in small letters; without one it is the SI unit
-    "depth": {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3},
-    "z": {"": -1.0, "m": -1.0, "cm": -1e-2, "mm": -1e-3},
-    "force": {"": 1.0, "n": 1.0, "kn": 1e3, "mn": 1e-3},
-    "area": {"": 1.0, "m2": 1.0, "cm2": 1e-4, "mm2": 1e-6},
-}
-WORDS = {
-    "depth": "(?:penetration[ _])?depth",
-    "z": "z",
-    "force": "(?:force|f)(?:[ _]?z)?",
-    "area": "(?:plate[ _])?area",
-}
+DEPTHS = ("depth", "penetration_depth", "sinkage", "penetration")
+DEPTH = Column("depth", "length", "m", DEPTHS)
+HEIGHT = Column("z", "length", "m", ("z",))  # upwards
+FORCE = Column("force", "force", "N", ("force", "force_z", "f", "fz", "f_z"))
+AREA = Column("area", "area", "m2", ("area", "plate_area"))
 SQUARE = r"(um|mm|cm|m)\s*(?:\^|\*\*)?\s*[2²]"
 
 
@@ -45,35 +39,33 @@ class Penetration(NamedTuple):
 def read(source: Rows) -> Penetration:
     """Return the test in a file; Refusal if it has none.
 
-    Columns, in any order: depth and force, and area if wanted, each in the SI unit or with another behind its name, as
-    depth_mm, force_N or area_cm2; others are ignored. In place of depth may stand z, upwards, and force_z for force. A
-    header line may give the area: ``# plate area = 9.5 cm^2``, or ``# plate 38 x 25 mm``."""
-    line, words = source.header
-    columns = {}
-    for word in words:
-        named = quantity(word)
-        if named and named[0] in columns:
-            raise Refusal(
-                f"the header has two columns of {named[0]}",
-                where=f"{source.name}, line {line}",
-                instead="keep one",
-            )
-        if named:
-            columns[named[0]] = (word, named[1])
-    for name in ("depth", "force"):
-        if name not in columns:
-            instead = (
-                "it must have depth_m,force_N (or depth_mm, depth_cm; z_m, force_z)"
-            )
+    Columns, in any order: depth and force, and area if wanted, each in the SI unit or
+    with another behind its name, as depth_mm, force_N or area_cm2; others are ignored.
+    In place of depth may stand sinkage, or z, upwards, and force_z for force. A header
+    line may give the area: ``# plate area = 9.5 cm^2``, ``# plate 38 x 25 mm``, or
+    ``# plate diameter 4 cm``."""
+    found = source.find((), (DEPTH, HEIGHT, FORCE, AREA))
+    if "depth" in found and "z" in found:
+        raise Refusal(
+            "the header has two columns of depth",
+            where=source.place,
+            instead="keep one",
+        )
+    for name, present in (("depth", {"depth", "z"}), ("force", {"force"})):
+        if not present & {*found}:
             raise Refusal(
                 f"the header has no column {name}",
-                where=f"{source.name}, line {line}",
-                instead=instead,
+                where=source.place,
+                because=source.found,
+                instead="it must have depth_m,force_N (or depth_mm, depth_cm; z_m, "
+                "force_z)",
             )
-    rows = source.numbers(words, tuple(word for word, _ in columns.values())).T
-    values = {
-        name: scale * row for (name, (_, scale)), row in zip(columns.items(), rows)
-    }
+    values, notes = source.values(found)
+    word = split_unit(source.words[found["depth"].index])[0] if "depth" in found else ""
+    if plain(word) not in ("", "depth", "penetration_depth"):
+        notes = (*notes, f"{word} is taken for the depth")
+    source.tell(notes)
+    depth = values["depth"] if "depth" in values else -values["z"]
     written = _area(source)
     if written is not None and "area" in values:
         raise Refusal(
@@ -82,19 +74,19 @@ def read(source: Rows) -> Penetration:
             instead="keep one",
         )
     area = values.get("area", None if written is None else np.array([written]))
-    return Penetration(values["depth"], values["force"], area, source.name)
+    return Penetration(depth, values["force"], area, source.name)
 
 
-def quantity(word: str) -> tuple[str, float] | None:
-    """Return (depth, force or area; its unit in SI) of a column, None if it is none of them."""
-    for name, words in WORDS.items():
-        match = re.fullmatch(words + r"[ _]*[\(\[]?([a-z]*)\s*\^?([2²]?)[\)\]]?", word)
-        scale = (
-            UNITS[name].get(match[1] + match[2].replace("²", "2")) if match else None
-        )
-        if scale is not None:
-            return ("depth" if name == "z" else name), scale
-    return None
+def is_penetration(source: Rows) -> bool:
+    """Return whether a file has a depth, in whatever unit, or z and a force."""
+    if any(plain(word).startswith(DEPTHS) for word in source.words):
+        return True
+    matched = [
+        column
+        for column in (HEIGHT, FORCE)
+        if any(column.matches(word) is not None for word in source.words)
+    ]
+    return len(matched) == 2
 
 
 def _area(source: Rows) -> float | None:
@@ -122,6 +114,13 @@ def _area(source: Rows) -> float | None:
         areas |= {
             _rounded(float(a) * LENGTHS[ua or ub] * float(b) * LENGTHS[ub])
             for a, ua, b, ub in sides
+        }
+        round_plate = (
+            r"\bplate\b[^\d,;]*\bdiameter" + CONNECTIVE + NUMBER + r"\s*(um|mm|cm|m)\b"
+        )
+        areas |= {
+            _rounded(math.pi / 4 * (float(x) * LENGTHS[unit]) ** 2)
+            for x, unit in re.findall(round_plate, text)
         }
     if len(areas) > 1:
         listed = " and ".join(f"{x:g}" for x in sorted(areas))

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from geomech.core.errors import choose
 from geomech.io.files import note, read_text
+from geomech.io.foreign import refuse_program
+from geomech.io.rows import ENDINGS
 from geomech.io.toml import tables_of
 from geomech.scenes import hints, reader, swimming
 from geomech.scenes.medium import MEDIUM
@@ -98,6 +100,7 @@ def load(scene: str | Path) -> Scene | Any:
     if (text := builtin_text(str(scene))) is not None:
         return parse(text, str(scene))
     path, names = Path(scene), builtin_names()
+    refuse_program(path)
     try:
         if path.suffix != ".toml" and not path.exists():
             choose("scene", str(scene), names + intruder_names() + walker_names())
@@ -144,7 +147,7 @@ def in_medium(scene: Scene, file: str | Path) -> Scene:
 
 def medium_of(name: str | Path) -> Any:
     """Return the medium of a name of the catalogue, or of a file as `in_medium` takes it. Refusal for neither."""
-    if isinstance(name, Path) or name.endswith((".toml", ".csv")):
+    if isinstance(name, Path) or name.lower().endswith((".toml", *ENDINGS)):
         return _medium_file(name, "medium")[0]
     return MEDIA[choose("medium", name, MEDIA)]
 
@@ -152,7 +155,7 @@ def medium_of(name: str | Path) -> Any:
 def _medium_file(file: str | Path, place: str) -> tuple[Any, tuple[str, ...]]:
     """Return the medium of a file, and the files that it was read from. place: what a refusal names."""
     table = {"file": str(Path(file).absolute())}
-    if Path(file).suffix.lower() == ".csv":
+    if Path(file).suffix.lower() in ENDINGS:
         table["law"] = "table"
     source = reader.Source(place)
     return reader.read_section(source, "medium", table, MEDIUM), tuple(source.files)

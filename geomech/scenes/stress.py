@@ -13,6 +13,7 @@ import numpy as np
 
 from geomech.core.errors import choose
 from geomech.io.files import read_text
+from geomech.io.rows import ENDINGS
 from geomech.io.toml import tables_of
 from geomech.scenes.columns import columns
 from geomech.scenes.key import Word
@@ -186,11 +187,7 @@ def matched_strength(stress: PlateStress) -> float:
 
 def plate_rows(place: str, file) -> np.ndarray:
     """Return plate drags of a CSV file, (4, N): beta, gamma in degrees, alpha_x, alpha_z in N/cm^3."""
-    drags = columns(
-        place,
-        file,
-        (("beta", "beta_deg"), ("gamma", "gamma_deg"), "alpha_x", "alpha_z"),
-    )
+    drags = columns(place, file, ("beta", "gamma", "alpha_x", "alpha_z"))
     rows = np.stack(list(drags.values()))
     if rows.size and np.abs(rows[:2]).max() < RADIANS:
         raise Refusal(
@@ -226,15 +223,15 @@ def medium(name: str) -> PlateStress:
     name = str(name)
     if name in VERTICAL:
         return VERTICAL[name].stress
-    if Path(name).suffix not in (".toml", ".csv") and not Path(name).exists():
+    if Path(name).suffix.lower() not in (".toml", *ENDINGS) and not Path(name).exists():
         choose("medium", name, VERTICAL)
     return _read_stress(Source("medium"), "medium", name)
 
 
 def _read_stress(source: Source, place: str, file: str) -> PlateStress:
-    """Return the stress map of a TOML file, if its name does not end in .csv, or of a CSV file of plate drags."""
+    """Return the stress map of a TOML file, or of plate drags if its name ends as that of a table (`ENDINGS`)."""
     path = Path(file)
-    if path.suffix == ".csv":
+    if path.suffix.lower() in ENDINGS:
         return plate_drags(place, file)
     try:
         tables = tables_of(read_text(path, LARGEST))
@@ -252,7 +249,7 @@ def _read_stress(source: Source, place: str, file: str) -> PlateStress:
         )
     if isinstance(table.get("file"), str):
         table = {**table, "file": str(path.absolute().parent / table["file"])}
-        if not table["file"].endswith(".csv"):
+        if Path(table["file"]).suffix.lower() not in ENDINGS:
             raise Refusal(
                 f"{path.name} names another file, {Path(table['file']).name}",
                 where=place,

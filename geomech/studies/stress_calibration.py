@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from geomech.core.variables import Result, Variable
+from geomech.io.rows import plain
 from geomech.io.rows import read as read_rows
 from geomech.scenes import penetration
 from geomech.scenes.drag import LARGEST_FILE
@@ -152,13 +153,12 @@ def _refuse(
 def law_of(source: str) -> str:
     """Return the law that the columns of a file determine; "granular" for a file that cannot be read."""
     try:
-        header = read_rows(source, LARGEST_FILE, "").header[1]
+        rows = read_rows(source, LARGEST_FILE, "")
     except ValueError:
         return "granular"
-    begins = lambda *words: any(word.startswith(words) for word in header)
-    if begins("psi"):
+    words = [plain(word) for word in rows.words]
+    if any(word.startswith("psi") for word in words):
         return "granular"
-    if begins("alpha_", "beta"):
+    if any(word.startswith(("alpha_", "beta")) for word in words):
         return "stress-map"
-    quantities = {named[0] for word in header if (named := penetration.quantity(word))}
-    return "zeta" if begins("depth") or {"depth", "force"} <= quantities else "granular"
+    return "zeta" if penetration.is_penetration(rows) else "granular"

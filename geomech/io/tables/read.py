@@ -7,6 +7,7 @@ from pathlib import Path
 
 from geomech.core.errors import choose
 from geomech.io.files import read, reason_of
+from geomech.io.foreign import refuse_program
 from geomech.io.tables.base import FORMATS, ORDERS, SIGNS, Stored
 from rft.refusal import Refusal
 
@@ -21,6 +22,7 @@ def load(path: str | Path, sign: str = "", order: str = "") -> Stored:
     if not isinstance(path, (str, Path)):
         raise Refusal("a table is a .nc or .mat file", value=path)
     path = Path(path)
+    refuse_program(path)
     if path.suffix.lower() not in FORMATS:
         raise Refusal(
             f"cannot read the table {path}",

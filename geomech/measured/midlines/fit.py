@@ -60,8 +60,8 @@ class Kinematics:
 
 def fit_midlines(
     midlines: str | Path | Trial, *, columns: Sequence[str] = (), units: str | None = None, scale: float | None = None,
-    fps: float | None = None, y: str | None = None, head: str | None = None, least_score: float = reader.LEAST_SCORE,
-    body_length: float | None = None, mend: bool = False, level: float = 0.95,
+    fps: float | None = None, y: str | None = None, head: str | None = None, least_score: float | None = None,
+    individual: str | None = None, body_length: float | None = None, mend: bool = False, level: float = 0.95,
 ) -> Kinematics:  # fmt: skip
     """Return the kinematics of a trial; Refusal, with its place, for data that do not give it.
 
@@ -82,7 +82,9 @@ def fit_midlines(
     head : "first" or "last"
         Which of the points is the head; by default as the motion shows.
     least_score : number
-        Points of a lower likelihood are taken for missing.
+        Points of a lower score are taken for missing; by default of a likelihood below 0.6, and of no other score.
+    individual : name
+        The animal to take, of several.
     body_length : number
         In ``units``, where the points do not reach both ends.
     mend : bool
@@ -100,6 +102,7 @@ def fit_midlines(
         "fps": fps,
         "y": y,
         "least_score": least_score,
+        "individual": individual,
     }
     trial = midlines
     if not isinstance(trial, Trial):

@@ -13,7 +13,6 @@ from geomech.measured.midlines import kinematics
 from geomech.measured.midlines.fit import Kinematics, fit_midlines
 from geomech.measured.midlines.kinematics import PARTS, QUANTITIES
 from geomech.measured.midlines.predicted import COMPARED, Comparison, compare
-from geomech.measured.midlines.reader import LEAST_SCORE
 from geomech.scenes.read import medium_of
 from geomech.studies.question import Allow, Progress, Question
 from rft.checks import in_range
@@ -47,7 +46,8 @@ class Midlines(Question):
     fps: float | None = None
     y: str | None = None
     head: str | None = None
-    least_score: float = LEAST_SCORE
+    least_score: float | None = None
+    individual: str | None = None
     body_length: float | None = None
     mend: bool = False
     level: float = 0.95
@@ -64,7 +64,8 @@ class Midlines(Question):
     def answer(self, progress: Progress, allow: Allow) -> Result:
         fit = fit_midlines(
             self.midlines, columns=self.columns, units=self.units, scale=self.scale, fps=self.fps, y=self.y, head=self.head,
-            least_score=self.least_score, body_length=self.body_length, mend=self.mend, level=self.level,
+            least_score=self.least_score, individual=self.individual, body_length=self.body_length, mend=self.mend,
+            level=self.level,
         )  # fmt: skip
         return result_of(
             fit, None if self.medium is None else compare(fit, medium_of(self.medium))

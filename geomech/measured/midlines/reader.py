@@ -6,44 +6,74 @@
     scorer / bodyparts / coords       three header rows, then a row for each frame (DeepLabCut)
 
 frame may stand for t. A name may end in a unit: x_mm, y (px), time_ms. Empty cells and nan are points that the tracker
-did not find."""
+did not find. DeepLabCut and SLEAP count pixels, and y downwards. The score of SLEAP, and whatever is not called
+likelihood, is no probability, and has no limit unless one is asked for."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from geomech.core.errors import choose
-from geomech.io.rows import LARGEST_NUMBER, Rows
+from geomech.io.rows import (
+    LARGEST_NUMBER,
+    MISSING,
+    STACKED,
+    UNITS,
+    Rows,
+    plain,
+    split_unit,
+)
 from geomech.io.rows import read as read_rows
 from geomech.measured.log import JOINT
-from geomech.measured.midlines.trial import UNITS, Trial
+from geomech.measured.midlines.trial import Trial
 from rft.checks import in_range
 from rft.refusal import Refusal, formatted
 
 LARGEST_FILE = 200_000_000  # bytes
 FEWEST_FRAMES, FEWEST_POINTS, MOST_POINTS = 12, 5, 1000
-TIMES = {"t": 1.0, "time": 1.0, "seconds": 1.0, "sec": 1.0}
-FRAMES = ("frame", "frames", "frame_idx", "frame_number", "index", "")
+TIMES = ("t", "time", "timestamp", "seconds", "sec")
+FRAMES = ("frame", "frames", "frame_idx", "frame_number", "fnum", "index", "")
 POINTS = ("point", "bodypart", "node", "id", "point_id", "keypoint")
-SCORES = ("likelihood", "score", "confidence")
-HEADS = ("scorer", "individuals", "bodyparts", "coords")  # rows of DeepLabCut
-UNIT = re.compile(r"(?<![ _])[ _]*(?:_(mm|cm|m|px|bl|ms|s)|[\[(] *(\w+) *[\])])$")
-LAST = re.compile(rf"(.+?)[_. -]?(x|y|{'|'.join(SCORES)})")
+ANIMALS = (
+    "track",
+    "individual",
+    "individuals",
+    "animal",
+    "animal_id",
+    "track_id",
+    "scorer",
+)
+LIKELIHOOD = "likelihood"
+SCORES = (LIKELIHOOD, "score", "confidence")
+LAST = re.compile(rf"(.+?)[_. /-]?(x|y|{'|'.join(SCORES)})")
 FIRST = re.compile(rf"(x|y|{'|'.join(SCORES)})[_. -]?(.+)")
-MISSING = ("", "nan", "na", "none", "null")
-LEAST_SCORE = 0.6  # below which DeepLabCut itself draws no point
+IMAGE = re.compile(r"labeled-data|\.(png|jpe?g|tiff?|bmp)$", re.I)
+LENGTHS = UNITS["length"]
+LEAST_SCORE = 0.6  # likelihood below which DeepLabCut itself draws no point
+MANY = (
+    0.1  # of the points that the tracker found: more that are dropped are told loudly
+)
+SEVERAL = 0.1  # of the times: more with several rows are those of several animals
+SINGLE = "single"  # DeepLabCut's name for points that belong to no animal
+DEEPLABCUT, SLEAP = "DeepLabCut", "SLEAP"
+UNTRACKED = {  # what to do about animals that a file does not tell apart
+    SLEAP: "track them in SLEAP and export again, or export one of them",
+    "": "add a column track with the name of each, or give each a file",
+}
 WHAT = "give a CSV file with a header such as t,point,x,y or t,x1,y1,x2,y2, or one of DeepLabCut"
 
 
 class Table(NamedTuple):
     """A file as a table of frames: t (F,), values (F, P, 3) of x, y and score, names and lines (F, P), the unit that the
-    header says, whether t is a time, and columns that are not used."""
+    header says, whether t is a time, columns that are not used, the program that wrote it, "" if none is known, the
+    least score that it takes for a point, and notes."""
 
     t: np.ndarray
     values: np.ndarray
@@ -52,13 +82,28 @@ class Table(NamedTuple):
     unit: str
     timed: bool
     unused: tuple[str, ...] = ()
+    program: str = ""
+    least_score: float = -math.inf
+    notes: tuple[str, ...] = ()
 
 
-def is_midlines(header: tuple[str, ...]) -> bool:
+def kind_of(header: Sequence[str]) -> str:
+    """Return "midlines" for the header of points along a body, "log" for that of joint angles, "" where it does not
+    say."""
+    bare = {split_unit(name)[0] for name in header}
+    joints = [name for name in bare if JOINT.fullmatch(plain(name))]
+    if is_midlines(header):
+        return "midlines"
+    if joints or {"heading", "theta", "yaw"} & bare:
+        return "log"
+    return ""
+
+
+def is_midlines(header: Sequence[str]) -> bool:
     """Return whether the header of a file is that of points along a body, not of a log of joint angles."""
-    bare = {_split(name)[0] for name in header}
+    bare = {split_unit(name)[0] for name in header}
     if (
-        {*header[:1]} & {*HEADS}
+        {*header[:1]} & {*STACKED}
         or {"s", "curvature"} <= bare
         or {*POINTS[:2]} & bare
         or len(_pairs(header)) > 1
@@ -73,30 +118,34 @@ def is_midlines(header: tuple[str, ...]) -> bool:
 
 def read(
     path: str | Path, *, points: Sequence[str] = (), units: str | None = None, scale: float | None = None,
-    fps: float | None = None, y: str | None = None, least_score: float = LEAST_SCORE, body_length: float | None = None,
+    fps: float | None = None, y: str | None = None, least_score: float | None = None, body_length: float | None = None,
+    individual: str | None = None,
 ) -> Trial:  # fmt: skip
     """Return the trial in a file; Refusal, with the line, for one that cannot be read.
 
-    points: names of the points to take, in the order of the body. units: of x and y, m, cm, mm, px or BL, where the
-    header does not say. scale: mm per pixel. fps: frames per second, of a file that counts frames. least_score: points
-    of a lower likelihood are taken for missing. y: up, or down as in images, which pixels are taken for. body_length:
-    in ``units``, where the points do not reach both ends."""
+    points: names of the points to take, in the order of the body. units: of x and y, m, cm, mm, um, px or BL, where
+    the header does not say. scale: mm per pixel. fps: frames per second, of a file that counts frames. least_score:
+    points of a lower score are taken for missing; by default of a likelihood below `LEAST_SCORE`, and no other score.
+    y: up, or down as in images, which pixels are taken for. body_length: in ``units``, where the points do not reach
+    both ends. individual: the animal to take, of several."""
     for name, value, low, high in (
         ("scale", scale, 1e-9, 1e6),
         ("fps", fps, 1e-6, 1e6),
+        ("least_score", least_score, 0, 1),
     ):
         if value is not None:
             in_range(f"``{name}``", value, low, high)
-    in_range("``least_score``", least_score, 0, 1)
     if units is not None:
-        choose("``units``", units, (*UNITS, "px", "BL"))
+        choose("``units``", units, (*LENGTHS, "px", "BL"))
     source = read_rows(path, LARGEST_FILE, WHAT)
-    table = _selected(_table(source), source.name, points)
+    table = _selected(_table(source, individual), source.name, points)
     _check(table, source.name)
     unit, size, notes = _unit(table, source.name, units, scale)
     t, timed, timing = _time(table, fps)
     xy = table.values[..., :2] * size
-    low = table.values[..., 2] < least_score
+    least = table.least_score if least_score is None else least_score
+    low = (table.values[..., 2] < least) & ~np.isnan(xy).any(-1)
+    found = (~np.isnan(xy).any(-1)).sum()
     xy[low] = np.nan
     pixels = "px" in (table.unit, units) or scale is not None
     if y is not None:
@@ -105,10 +154,22 @@ def read(
         notes.append(
             "y is taken to run down, as in images, else heading and turn have the other sign: say y up"
         )
+    else:
+        notes.append(
+            "y is taken to run up, else heading and turn have the other sign: say y down"
+        )
     if y == "down" or (y is None and pixels):
         xy[..., 1] *= -1
     xy[np.isnan(xy).any(-1)] = np.nan
-    notes = [*timing, *notes, *_missing_note(xy, low)]
+    notes = [
+        *_dropped_note(low, found, least),
+        *timing,
+        *notes,
+        *_missing_note(xy, low),
+    ]
+    if source.notes:
+        notes.append("; ".join(source.notes))
+    notes += table.notes
     if table.unused:
         notes.append(f"columns that are not used: {', '.join(table.unused[:6])}")
     length = (
@@ -127,6 +188,16 @@ def read(
     )
 
 
+def _dropped_note(low: np.ndarray, found: int, least: float) -> list[str]:
+    """Return a note, which comes first, if many points are dropped by their score."""
+    if low.sum() <= MANY * found:
+        return []
+    return [
+        f"MANY POINTS ARE DROPPED: {low.sum() / found:.2g} of those that the tracker found have a score below {least:g}; "
+        "if they are good, say a lower least_score"
+    ]
+
+
 def _missing_note(xy: np.ndarray, low: np.ndarray) -> list[str]:
     lost = np.isnan(xy[..., 0])
     if not lost.any():
@@ -137,45 +208,102 @@ def _missing_note(xy: np.ndarray, low: np.ndarray) -> list[str]:
     ]
 
 
-def _table(source: Rows) -> Table:
+def _table(source: Rows, individual: str | None = None) -> Table:
     """Return the table of a file, whichever form it has."""
-    line, header = source.header
-    where = f"{source.name}, line {line}"
-    if header and header[0] in HEADS:
-        return _deeplabcut(source)
-    bare = {_split(name)[0]: k for k, name in enumerate(header)}
+    header = source.header[1]
+    _refuse_labelled(source)
+    if header and header[0] in STACKED:
+        return _deeplabcut(source, individual)
+    bare = {split_unit(name)[0]: k for k, name in enumerate(header)}
     if {"s", "curvature"} <= {*bare}:
         raise Refusal(
             "curvature alone says nothing of where the body went",
-            where=where,
+            where=source.place,
             instead='give points of the midline, or take the file for [gait] kind = "centreline"',
         )
     if twice := [c for k, c in enumerate(header) if c in header[:k]]:
         raise Refusal(
             f"the column {formatted(twice[0])} is there twice",
-            where=where,
+            where=source.place,
             instead="rename one",
         )
+    is_sleap = "instance.score" in header or {"track", "frame_idx"} <= {*header}
+    program = SLEAP if is_sleap else ""
+    source = _of_one_animal(source, individual)
     if {"x", "y"} <= {*bare}:
-        return _long(source, header, bare)
-    return _wide(source, header, _pairs(header))
-
-
-def _split(name: str) -> tuple[str, str]:
-    """Return the name of a column without its unit, and the unit."""
-    match = UNIT.search(name)
-    return (
-        (name[: match.start()], match[1] or match[2])
-        if match and match.start()
-        else (name, "")
+        table = _long(source, header, bare)
+    else:
+        table = _wide(source, header, _pairs(header), program)
+    if is_sleap and not table.unit:
+        table = table._replace(unit="px")
+    is_likelihood = any(LIKELIHOOD in name for name in header)
+    return table._replace(
+        program=program, least_score=LEAST_SCORE if is_likelihood else -math.inf
     )
+
+
+def _refuse_labelled(source: Rows) -> None:
+    """Refuse frames that were picked from films to train a tracker."""
+    for line, text in source.rows[:5]:
+        images = [cell for cell in source.cells(text)[:3] if IMAGE.search(cell)]
+        if images:
+            raise Refusal(
+                f"{formatted(images[-1], 40)} is an image: these are labelled frames, picked to train a tracker, not a film",
+                where=f"{source.name}, line {line}",
+                instead="give the file that DeepLabCut writes when it analyses the film, or number the frames of one film "
+                "in a column frame",
+            )
+
+
+def _of_one_animal(source: Rows, individual: str | None) -> Rows:
+    """Return the rows of one animal, where a column names animals; Refusal if there are several and none is named."""
+    header = source.header[1]
+    columns = [k for k, name in enumerate(header) if plain(name) in ANIMALS]
+    if not columns:
+        if individual is not None:
+            raise Refusal(
+                "no column names animals",
+                where=source.place,
+                because=f"it has {formatted(', '.join(header), 120)}",
+                instead="drop ``individual``, or add a column track",
+            )
+        return source
+    rows = []
+    animals: dict[str, None] = {}
+    for line, text in source.rows:
+        cells = source.cells(text)
+        names = [cells[k] for k in columns if k < len(cells)]
+        animal = " ".join(name for name in names if name)
+        animals[animal or "(no name)"] = None
+        if individual is None or individual in names:
+            rows.append((line, text))
+    if individual is None and len(animals) > 1:
+        raise Refusal(
+            f"{len(animals)} animals are in it: {', '.join([*animals][:6])}",
+            where=source.name,
+            instead="name one by ``individual``",
+        )
+    if not rows:
+        choose("``individual``", individual, animals)
+    return replace(source, rows=rows)
+
+
+def _refuse_animals(source: Rows, frame: np.ndarray, program: str = "") -> None:
+    """Refuse several rows of one kind in many frames. frame: (N,), number of each."""
+    counts = np.bincount(frame)
+    if (counts > 1).mean() > SEVERAL:
+        raise Refusal(
+            f"{int(counts.max())} animals without a track: {(counts > 1).mean():.2g} of the times have several rows",
+            where=source.name,
+            instead=UNTRACKED[program or ""],
+        )
 
 
 def _pairs(header: Sequence[str]) -> dict[str, dict[str, int]]:
     """Return the columns of x, y and likelihood by the names of points that have both x and y."""
     found: dict[str, dict[str, int]] = {}
     for k, name in enumerate(header):
-        bare = _split(name)[0]
+        bare = split_unit(name)[0]
         if match := FIRST.fullmatch(bare):
             coordinate, point = match[1], match[2]
         elif match := LAST.fullmatch(bare):
@@ -188,126 +316,111 @@ def _pairs(header: Sequence[str]) -> dict[str, dict[str, int]]:
     }
 
 
-def _clock(header: Sequence[str], name: str, line: int) -> tuple[int, float, bool]:
-    """Return the column of the time, its unit in s (1 of frames), and whether it is a time."""
+def _clock(header: Sequence[str], place: str) -> tuple[int, str, bool]:
+    """Return the column of the time, its unit, and whether it is a time and not a count of frames."""
     for k, word in enumerate(header):
-        bare, unit = _split(word)
-        if bare in TIMES:
-            if unit not in ("", "s", "ms"):
+        bare, unit = split_unit(word)
+        if plain(bare) in TIMES:
+            if unit != "" and unit not in UNITS["time"]:
                 raise Refusal(
-                    f"{word} is in {unit}",
-                    where=f"{name}, line {line}",
-                    instead="give t in s or ms",
+                    f"{word} is in {unit}", where=place, instead="give t in s or ms"
                 )
-            return k, 1e-3 if unit == "ms" else 1.0, True
+            return k, unit, True
     for k, word in enumerate(header):
-        if word in FRAMES:
-            return k, 1.0, False
+        if plain(word) in FRAMES:
+            return k, "frame", False
     raise Refusal(
         "no column t or frame",
-        where=f"{name}, line {line}",
+        where=place,
         because=f"it has {formatted(', '.join(header), 120)}",
         instead="name the column of the time t",
     )
 
 
-def _cells(source: Rows, first: int, columns: Sequence[str]) -> np.ndarray:
-    """Return the numbers of the rows from number ``first`` on (N, columns), nan where a cell is empty; Refusal with line
-    and column of anything else."""
-    rows = np.full((len(source.filled) - first, len(columns)), np.nan)
-    for k, (line, text) in enumerate(source.filled[first:]):
-        cells = text.split(",")
-        if len(cells) != len(columns):
+def _cells(source: Rows, picks: Sequence[int]) -> np.ndarray:
+    """Return the numbers of columns (N, picks), nan where a cell is empty; Refusal with line and column of anything
+    else."""
+    width = len(source.words)
+    values = np.full((len(source.rows), len(picks)), np.nan)
+    for k, (line, text) in enumerate(source.rows):
+        cells = source.cells(text)
+        if len(cells) != width:
             raise Refusal(
-                f"{len(cells)} cells under {len(columns)} columns",
+                f"{len(cells)} cells under {width} columns",
                 where=f"{source.name}, line {line}",
-                instead="mend that row; a point that was not found is an empty cell between two commas",
+                instead="mend that row; a point that was not found is an empty cell between two separators",
             )
-        for j, cell in enumerate(cells):
-            rows[k, j] = _number(cell, source.name, line, columns[j])
-    return rows
+        for j, pick in enumerate(picks):
+            values[k, j] = _number(cells[pick], source, line, pick)
+    return values
 
 
-def _number(cell: str, name: str, line: int, column: str) -> float:
-    cell = cell.strip(' "')
+def _number(cell: str, source: Rows, line: int, column: int) -> float:
+    number = source.number(cell)
+    if number is not None and abs(number) <= LARGEST_NUMBER:
+        return number
     if cell.lower() in MISSING:
         return math.nan
-    try:
-        if abs(number := float(cell)) <= LARGEST_NUMBER:
-            return number
-    except ValueError:
-        pass
     raise Refusal(
         f"{formatted(cell, 30)} is no number up to {LARGEST_NUMBER:g}",
-        where=f"{name}, line {line}, column {column}",
+        where=f"{source.name}, line {line}, column {source.header[1][column]}",
         instead="mend it, or leave the cell empty where the point was not found",
     )
 
 
 def _common_unit(names: Sequence[str], where: str) -> str:
-    units = {_split(name)[1] for name in names}
+    units = {split_unit(name)[1] for name in names}
     if len(units) > 1:
         raise Refusal(
             f"columns in {' and in '.join(sorted(u or 'no unit' for u in units))}",
             where=where,
             instead="give all x and y in one unit",
         )
-    return {"pixel": "px", "pixels": "px", "bl": "BL"}.get(unit := units.pop(), unit)
+    unit = units.pop()
+    if unit not in ("", "px", "BL", *LENGTHS):
+        raise Refusal(
+            f"x and y are in {formatted(unit, 20)}",
+            where=where,
+            instead="give them in m, cm, mm, px or BL",
+        )
+    return unit
 
 
 def _long(source: Rows, header: tuple[str, ...], bare: dict[str, int]) -> Table:
     """Return the table of a file with a row for each point."""
-    line = source.header[0]
-    clock, second, timed = _clock(header, source.name, line)
+    clock, second, timed = _clock(header, source.place)
     key = next((bare[name] for name in POINTS if name in bare), None)
     score = next((bare[name] for name in SCORES if name in bare), None)
-    unit = _common_unit(
-        [header[bare["x"]], header[bare["y"]]], f"{source.name}, line {line}"
-    )
-    if key is not None:  # names need not be numbers
-        labels = [
-            text.split(",")[key].strip(' "') if text.count(",") >= key else ""
-            for _, text in source.filled[1:]
-        ]
-        blank = [
-            (n, ",".join("0" if k == key else c for k, c in enumerate(x.split(","))))
-            for n, x in source.filled
-        ]
-        source = Rows(
-            source.name, source.sha256, [source.filled[0], *blank[1:]], source.comments
-        )
-    rows = _cells(source, 1, header)
-    moments = _moments(rows[:, clock] * second, source)
-    t, frame = np.unique(moments, return_inverse=True)
+    unit = _common_unit([header[bare["x"]], header[bare["y"]]], source.place)
+    columns = [bare["x"], bare["y"], *([] if score is None else [score])]
+    rows = _cells(source, columns)
+    times, note = source.times(clock, second)
+    t, frame = np.unique(times, return_inverse=True)
     if key is None:
         names, point = _unnamed(t, frame, source)
     else:
-        numeric = all(re.fullmatch(r"\d+(\.0*)?", label) for label in labels)
+        labels = [source.cells(text)[key] for _, text in source.rows]
+        numeric = all(re.fullmatch(r"[0-9]+(\.0*)?", label) for label in labels)
         names = sorted({*labels}, key=float) if numeric else list(dict.fromkeys(labels))
-        point = np.array([names.index(label) for label in labels])
+        number = {name: k for k, name in enumerate(names)}
+        point = np.array([number[label] for label in labels])
         _check_once(t, frame, point, names, source)
     values, lines = (
         np.full((len(t), len(names), 3), np.nan),
         np.zeros((len(t), len(names)), int),
     )
     values[..., 2] = np.inf
-    columns = [bare["x"], bare["y"], *([] if score is None else [score])]
-    values[frame, point, : len(columns)] = rows[:, columns]
+    values[frame, point, : len(columns)] = rows
     lines[frame, point] = source.lines
     lines = np.where(lines, lines, lines.max(1, keepdims=True))
     used = {clock, key, *columns}
-    unused = tuple(name for k, name in enumerate(header) if k not in used)
-    return Table(t, values, tuple(names), lines, unit, timed, unused)
-
-
-def _moments(t: np.ndarray, source: Rows) -> np.ndarray:
-    if (bad := np.flatnonzero(np.isnan(t))).size:
-        raise Refusal(
-            "no time",
-            where=f"{source.name}, line {source.lines[bad[0]]}",
-            instead="give every row its t or frame",
-        )
-    return t
+    unused = tuple(
+        name
+        for k, name in enumerate(header)
+        if k not in used and plain(name) not in ANIMALS
+    )
+    notes = (note,) if note else ()
+    return Table(t, values, tuple(names), lines, unit, timed, unused, notes=notes)
 
 
 def _unnamed(
@@ -329,95 +442,71 @@ def _unnamed(
 
 def _check_once(t, frame, point, names, source: Rows) -> None:
     keys = frame * len(names) + point
+    _, number = np.unique(keys, return_inverse=True)
+    _refuse_animals(source, number)
     _, first, count = np.unique(keys, return_index=True, return_counts=True)
     if (count > 1).any():
         again = np.flatnonzero(keys == keys[first[count > 1][0]])[1]
         raise Refusal(
             f"point {names[point[again]]} is given twice at t = {t[frame[again]]:g}",
             where=f"{source.name}, line {source.lines[again]}",
-            instead="keep one, or give each animal a file",
+            instead="keep one, or name animals in a column track",
         )
 
 
 def _wide(
-    source: Rows, header: tuple[str, ...], pairs: dict[str, dict[str, int]]
+    source: Rows,
+    header: tuple[str, ...],
+    pairs: dict[str, dict[str, int]],
+    program: str,
 ) -> Table:
     """Return the table of a file with a row for each frame."""
-    line = source.header[0]
     if len(pairs) < 2:
-        other = (
-            "; columns must be parted by commas"
-            if re.search("[;\\t]", ",".join(header))
-            else ""
-        )
         raise Refusal(
-            f"no columns of points{other}",
-            where=f"{source.name}, line {line}",
+            "no columns of points",
+            where=source.place,
             because=f"it has {formatted(', '.join(header), 120)}",
             instead=WHAT,
         )
-    clock, second, timed = _clock(header, source.name, line)
+    clock, second, timed = _clock(header, source.place)
     names = [header[columns[c]] for columns in pairs.values() for c in "xy"]
-    unit = _common_unit(names, f"{source.name}, line {line}")
-    return _framed(source, 1, header, pairs, clock, second, timed, unit)
+    unit = _common_unit(names, source.place)
+    return _framed(source, header, pairs, (clock, second, timed), unit, program)
 
 
 def _framed(
     source: Rows,
-    first: int,
-    header,
-    pairs,
-    clock: int,
-    second: float,
-    timed: bool,
+    header: Sequence[str],
+    pairs: dict[str, dict[str, int]],
+    clock: tuple[int, str, bool],
     unit: str,
+    program: str,
 ) -> Table:
-    texts = [
-        k for k, name in enumerate(header) if name in ("track", "individual", "scorer")
-    ]
-    used = {clock, *(k for columns in pairs.values() for k in columns.values())}
-    if texts:  # names of tracks are no numbers
-        numbers = lambda text: ",".join(
-            "0" if k in texts else c for k, c in enumerate(text.split(","))
-        )
-        many = {
-            text.split(",")[k]
-            for _, text in source.filled[first:]
-            for k in texts
-            if text.count(",") >= k
-        }
-        if len(many) > 1:
-            raise Refusal(
-                f"{len(many)} animals are in it: {', '.join(sorted(many)[:4])}",
-                where=source.name,
-                instead="give each a file",
-            )
-        filled = [
-            *source.filled[:first],
-            *((n, numbers(x)) for n, x in source.filled[first:]),
-        ]
-        source = Rows(source.name, source.sha256, filled, source.comments)
-    rows = _cells(source, first, header)
-    t = rows[:, clock] * second
-    lines = np.array([k for k, _ in source.filled[first:]], int)
-    for k in np.flatnonzero(~(np.diff(t, prepend=-np.inf) > 0)):
-        what = (
-            "no time"
-            if np.isnan(t[k])
-            else f"t = {t[k]:.6g} comes after {t[k - 1]:.6g}"
-        )
-        raise Refusal(
-            what,
-            where=f"{source.name}, line {lines[k]}",
-            instead="sort the rows by time, one for each",
-        )
+    """Return the table of rows of frames. clock: as `_clock` returns it."""
+    index, second, timed = clock
+    picks = [k for columns in pairs.values() for k in columns.values()]
+    rows = _cells(source, picks)
+    t, note = source.times(index, second)
+    lines = source.lines
+    _, frame = np.unique(t, return_inverse=True)
+    _refuse_animals(source, frame, program)
+    for k in np.flatnonzero(np.diff(t, prepend=-np.inf) <= 0):
+        if t[k] == t[k - 1]:
+            what, cure = f"t = {t[k]:.6g} is given twice", "keep one of the rows"
+        else:
+            what = f"t = {t[k]:.6g} comes after {t[k - 1]:.6g}"
+            cure = "sort the rows by time, one for each"
+        raise Refusal(what, where=f"{source.name}, line {lines[k]}", instead=cure)
     values = np.full((len(t), len(pairs), 3), np.inf)
+    place = {pick: j for j, pick in enumerate(picks)}
     for p, columns in enumerate(pairs.values()):
         for j, coordinate in enumerate(("x", "y", "score")):
             if coordinate in columns:
-                values[:, p, j] = rows[:, columns[coordinate]]
+                values[:, p, j] = rows[:, place[columns[coordinate]]]
     unused = tuple(
-        name for k, name in enumerate(header) if k not in used and k not in texts
+        name
+        for k, name in enumerate(header)
+        if k not in (index, *picks) and plain(name) not in ANIMALS
     )
     return Table(
         t,
@@ -427,15 +516,20 @@ def _framed(
         unit,
         timed,
         unused,
+        program,
+        notes=(note,) if note else (),
     )
 
 
-def _deeplabcut(source: Rows) -> Table:
-    """Return the table of a file of DeepLabCut: the first cell of each header row says what it holds."""
-    heads = {}
-    for _, text in source.filled[:4]:
-        words = [word.strip(' "') for word in text.split(",")]
-        if words[0].lower() in HEADS:
+def _deeplabcut(source: Rows, individual: str | None) -> Table:
+    """Return the table of a file of DeepLabCut: the first cell of each header row says what it holds.
+
+    Individuals without a point, and what it calls single, points that belong to no animal, are left out unless they
+    are named."""
+    heads = {source.words[0].lower(): list(source.words[1:])}
+    for _, text in source.rows[:3]:
+        words = source.cells(text)
+        if words[0].lower() in STACKED:
             heads[words[0].lower()] = words[1:]
     if (
         not {"bodyparts", "coords"} <= {*heads}
@@ -443,24 +537,59 @@ def _deeplabcut(source: Rows) -> Table:
     ):
         raise Refusal(
             "a file of DeepLabCut has header rows scorer, bodyparts and coords of equal length",
-            where=f"{source.name}, line {source.filled[0][0]}",
+            where=source.place,
             instead="give the file as DeepLabCut writes it, or one header row such as frame,nose_x,nose_y",
         )
-    animals = list(dict.fromkeys(heads.get("individuals", ())))
-    if len(animals) > 1:
+    if "z" in heads["coords"]:
         raise Refusal(
-            f"{len(animals)} individuals are in it: {', '.join(animals[:4])}",
-            where=source.name,
-            instead="give each a file",
+            "it has points in three dimensions, and midlines are plane",
+            where=source.place,
+            instead="give the file of one camera, or x and y as frame,nose_x,nose_y",
         )
-    header = (
-        "frame",
-        *(
-            f"{part}.{c.lower()}"
-            for part, c in zip(heads["bodyparts"], heads["coords"])
-        ),
+    source = replace(source, rows=source.rows[len(heads) - 1 :])
+    parts = list(zip(heads["bodyparts"], heads["coords"]))
+    animals = heads.get("individuals", [""] * len(parts))
+    header = ["frame", *(f"{part}.{c.lower()}" for part, c in parts)]
+    animal, notes = _chosen(source, animals, individual)
+    columns = [k for k, name in enumerate(animals) if name == animal]
+    kept = ["frame", *("" for _ in animals)]
+    for k in columns:
+        kept[k + 1] = header[k + 1]
+    table = _framed(source, kept, _pairs(kept), (0, "frame", False), "px", DEEPLABCUT)
+    return table._replace(
+        unused=(), least_score=LEAST_SCORE, notes=(*table.notes, *notes)
     )
-    return _framed(source, len(heads), header, _pairs(header), 0, 1.0, False, "px")
+
+
+def _chosen(
+    source: Rows, animals: Sequence[str], individual: str | None
+) -> tuple[str, list[str]]:
+    """Return the individual to take, and a note on those that are left out. animals: of each column but the first."""
+    names = list(dict.fromkeys(animals))
+    if individual is not None:
+        return choose("``individual``", individual, names), []
+    if len(names) == 1:
+        return names[0], []
+    filled: set[int] = set()
+    for _, text in source.rows:
+        cells = source.cells(text)
+        filled |= {k for k, cell in enumerate(cells) if cell.lower() not in MISSING}
+    points = dict.fromkeys(names, 0)
+    for k, name in enumerate(animals):
+        points[name] += k + 1 in filled
+    with_points = [name for name in names if points[name] and name != SINGLE]
+    if len(with_points) != 1:
+        raise Refusal(
+            f"{len(with_points)} individuals are in it: {', '.join(with_points[:6])}",
+            where=source.name,
+            instead="name one by ``individual``",
+        )
+    out = [
+        f"{name} (points of no animal)" if name == SINGLE else f"{name} (no point)"
+        for name in names
+        if name != with_points[0]
+    ]
+    return with_points[0], [f"{', '.join(out)} left out: say individual to take it"]
 
 
 def _selected(table: Table, name: str, points: Sequence[str]) -> Table:
@@ -518,8 +647,8 @@ def _unit(
         )
     if scale is not None:
         return "m", scale * 1e-3, []
-    if unit in UNITS:
-        return "m", UNITS[unit], []
+    if unit in LENGTHS:
+        return "m", LENGTHS[unit], []
     if unit == "BL":
         return "BL", 1.0, []
     return "", 1.0, ["lengths are in body lengths alone: nobody says how long a pixel is" if unit == "px" else

@@ -1,0 +1,78 @@
+"""Files of other programs that are no tables of text: what they are, and what to export."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from rft.refusal import Refusal
+
+TRACKS = (
+    "SLEAP writes CSV by File > Export Analysis CSV, DeepLabCut by "
+    "deeplabcut.analyze_videos_converth5_to_csv(folder); else write rows t,point,x,y"
+)
+SPREADSHEET = "save the sheet as CSV"
+BAG = "export its topic as CSV, for example by rostopic echo -p"
+MATLAB = "write its columns as CSV by writematrix or writetable"
+TEXT = "write its columns as CSV, for example by pandas.DataFrame.to_csv"
+SIGNATURES = (  # the first bytes of a file, what it is, and the cure
+    (b"\x89HDF\r\n\x1a\n", "an HDF5 file", TRACKS),
+    (b"PK\x03\x04", "a spreadsheet, or another zip file", SPREADSHEET),
+    (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an Excel workbook", SPREADSHEET),
+    (b"MATLAB 5.0 MAT-file", "a MATLAB file", MATLAB),
+    (b"#ROSBAG", "a ROS bag", BAG),
+    (b"\x89MCAP", "a ROS bag (MCAP)", BAG),
+    (b"SQLite format 3\x00", "a database, as of ROS 2 bags", BAG),
+    (b"\x93NUMPY", "a NumPy array", "write it by numpy.savetxt, with header and comments=''"),
+    (b"PAR1", "a Parquet file", TEXT),
+    (b"\x1f\x8b", "a gzip file", "unpack it"),
+)  # fmt: skip
+PROGRAMS = {  # of MATLAB files of sysplotter, by the start of their names
+    "sysf": "run sys_calcsystem on it and give the _calc.mat that this saves, or write "
+    "a scene with its s.geometry (linklengths, baseframe, length) and "
+    "s.physics.drag_ratio",
+    "shchf": 'give its XV to [gait] kind = "shchf", or save alpha1, alpha2, ... and t '
+    "of its gait in a .mat file",
+    "": "run it in MATLAB, and give the .mat file or the table that it saves",
+}
+
+
+def refuse_program(path: str | Path) -> None:
+    """Raise Refusal for a program of MATLAB, which is never run, with the values to
+    take from it if it is one of sysplotter's."""
+    path = Path(path)
+    if path.suffix.lower() != ".m":
+        return
+    start = next(x for x in PROGRAMS if path.name.lower().startswith(x))
+    raise Refusal(
+        f"{path.name} is a program of MATLAB, not its result",
+        instead=PROGRAMS[start],
+    )
+
+
+def refuse_foreign(path: str | Path, raw: bytes) -> None:
+    """Raise Refusal for the bytes of a file that is known, and no table of text."""
+    refuse_program(path)
+    what, cure = "", ""
+    for start, name, remedy in SIGNATURES:
+        if raw.startswith(start):
+            what, cure = name, remedy
+            break
+    if not what and raw.lstrip()[:1] in (b"{", b"["):
+        what, cure = _json(path, raw)
+    if what:
+        raise Refusal(f"it is {what}", where=Path(path).name, instead=cure)
+
+
+def _json(path: str | Path, raw: bytes) -> tuple[str, str]:
+    """Return what a file of JSON is, and the cure; "" for both if it is none."""
+    try:
+        content = json.loads(raw)
+    except (ValueError, RecursionError):
+        return "", ""
+    if isinstance(content, dict) and {"units", "data"} <= {*content}:
+        each = "write a row t,point,x,y for each point of t, x, y in its data"
+        return "a WCON file (JSON)", each
+    if Path(path).suffix.lower() == ".wcon":
+        return "a WCON file (JSON)", "write its points as rows t,point,x,y"
+    return "JSON", "write its values as a CSV file, a row for each time"
