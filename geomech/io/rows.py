@@ -45,6 +45,7 @@ MISSING = ("", "nan", "na", "n/a", "none", "null", "-")  # of a cell without a n
 NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 WITH_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")  # 1,234 or 1,234,567
+LONGEST_NAME = 200  # letters of a column's name that may have a unit
 CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")  # letters that no text has
 
 UNITS: dict[str, dict[str, float]] = {  # by what is measured, in SI
@@ -132,8 +133,10 @@ def plain(word: str) -> str:
 
 def split_unit(word: str) -> tuple[str, str]:
     """Return the name of a column and its unit: x_mm, "x mm", "x (mm)", "x [mm]", x/mm;
-    "" without one."""
+    "" without one, as in names that no person writes."""
     word = word.strip()
+    if len(word) > LONGEST_NAME:  # the patterns below take its square in steps
+        return word, ""
     if match := re.fullmatch(r"(.+?)[\s_]*[(\[]\s*([^()\[\]]*?)\s*[)\]]", word):
         return match[1], unit_of(match[2]) or match[2]
     match = re.fullmatch(r"(.+?)(?:\s*/\s*|[\s_]+in[\s_]+|[\s_]+)([^\s_]+)", word)
