@@ -179,7 +179,7 @@ def test_sizes_stand_once():
         (PLAIN + SIZES + MASS + "radius = 0.07", r"\[\[effects\]\] radius = 0.07, but \[physical\] radius = 0.06: keep one"),
         (PLAIN + "[physical]\nmass = 1.0", r"\[physical\] mass: nothing in this scene has one"),
         (PLAIN + "[physical]\nmas = 1.0", r"\[physical\] key: 'mas' is unknown: did you mean 'mass'"),
-        (PLAIN + '[physical]\nlength = "x"', r"\[body\] Expected `float`, got `str`"),
+        (PLAIN + '[physical]\nlength = "x"', r"\[body\] Expected `float \| null`, got `str`"),
         ("frame = 3" + PLAIN, r"\[body\] Expected `str`, got `int`"),
         ('frame = "link-1"' + PLAIN.replace('"chain"', '"chain"\nframe = "link-2"'), "but the scene's frame = 'link-1'"),
         (PLAIN + '[system]\nkind = "no-slip-snake"', "a no-slip-snake takes no 'body'"),

@@ -27,6 +27,7 @@ from rft import (
     time_steps,
     work_done,
 )
+from rft.bodies.base import body_size
 from rft.bodies.pieces import Pieces, subdivide
 from rft.contact import NO_MEMORY, assemble
 from rft.effects.base import Site
@@ -720,7 +721,7 @@ def test_a_towed_sled_by_an_independent_sum_of_forces(frame):
             (counts * heading).sum(),
         )
         onto = np.exp(1j * (t * xi[2] - turn))
-        at = lambda z: (z - origin) * onto + t * (xi[0] + 1j * xi[1]) / body.length
+        at = lambda z: (z - origin) * onto + t * (xi[0] + 1j * xi[1]) / body_size(body)
         return at(np.array(-sled.distance)), at(links), np.exp(1j * heading) * onto
 
     (ahead, links_ahead, _), (before, links_before, _), (place, links, along) = (
@@ -738,10 +739,10 @@ def test_a_towed_sled_by_an_independent_sum_of_forces(frame):
     assert abs(force.sum() + pull) < 2e-4
     assert abs((links.conj() * force).imag.sum() + (place.conj() * pull).imag) < 2e-4
     done = work_done(GLASS, body, alpha, alphadot, xi, effects=(sled,))
-    assert done.bending_moment @ alphadot * body.length == pytest.approx(
+    assert done.bending_moment @ alphadot * body_size(body) == pytest.approx(
         done.power, rel=1e-6
     )
-    assert done.power / body.length == pytest.approx(
+    assert done.power / body_size(body) == pytest.approx(
         (force.conj() * (u * along[:, None])).real.sum() + sled.pull * abs(v), rel=1e-4
     )
 

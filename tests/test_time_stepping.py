@@ -33,7 +33,7 @@ from rft import (
     work_done,
 )
 from rft.balance.solver import Accuracy
-from rft.bodies.base import half_lengths
+from rft.bodies.base import body_size, half_lengths
 from rft.contact import assemble
 from rft.refusal import Refusal
 from rft.se2 import compose, exp
@@ -443,7 +443,7 @@ def test_estimates_of_marches_cover_the_truth(truths):
         a = np.array([0.12, 0.22, 0.35])
         found, error = estimate.direct(scene, scene.gait, a, 64)
         truth = truths("marches", periodic, (effect,), scene.gait, Backbone(30), 256, a)
-        off = estimate.pose_distance(found, truth, scene.system.body.length)
+        off = estimate.pose_distance(found, truth, body_size(scene.system.body))
         assert (off <= error).all(), type(effect)
         assert (error[:, 0] <= 100 * off[:, 0] + 1e-4).all(), type(effect)
         assert error[:, 1].max() <= 100 * off[:, 1].max() + 1e-4, type(

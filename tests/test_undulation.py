@@ -29,6 +29,7 @@ from rft import (
     body_velocity,
     work_done,
 )
+from rft.bodies.base import body_size
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
@@ -114,7 +115,7 @@ def test_internal_moments_do_the_work():
             GLASS, body, alpha, alphadot, effects=effects, tolerance=1e-13
         )
         done = work_done(GLASS, body, alpha, alphadot, solution.xi, effects=effects)
-        put_in = (done.bending_moment * alphadot).sum(-1) * body.length
+        put_in = (done.bending_moment * alphadot).sum(-1) * body_size(body)
         np.testing.assert_allclose(put_in, done.power, rtol=1e-5)
         assert (done.power > 0).all()
 

@@ -13,6 +13,7 @@ from geomech.scenes.columns import LARGEST_FILE
 from geomech.scenes.key import angles_of
 from geomech.scenes.model import Scene
 from geomech.systems.base import length_unit
+from rft.bodies.base import body_size
 from rft.refusal import Refusal, located
 
 COLUMNS = ("amplitude", "value", "error")
@@ -66,7 +67,7 @@ def read(path: str | Path, scene: Scene, angle: bool = False) -> dict[str, np.nd
 def _units(scene: Scene, angle: bool) -> dict[str, dict[str, float]]:
     """Return, by column, the units that it may have, in that of the scene's results."""
     amplitude = ANGLES if "amplitude" in angles_of(type(scene.gait)) else {"": 1.0}
-    lengths = {"": 1.0, "bl": scene.system.length}
+    lengths = {"": 1.0, "bl": body_size(scene.system)}
     lengths |= METRES if length_unit(scene.system) == "m" else {}
     value = ANGLES if angle else lengths
     return {"amplitude": amplitude, "value": value, "error": value}

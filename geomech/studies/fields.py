@@ -37,6 +37,7 @@ from geomech.systems.capabilities import (
     stored_table,
 )
 from geomech.systems.framed import Framed
+from rft.bodies.base import body_size
 from rft.refusal import Refusal
 
 WHOLE, A_ALONE, STRUCT = "whole", "A", "struct"  # contents of files
@@ -488,7 +489,7 @@ def about(scene: Scene) -> dict:
         "Conventions": "xi = + A alphadot; CCF = dA + [A, A], positive for counter-clockwise loops",
         "frame": scene.frame,
         "frame_meaning": f"body frame: {meaning}",
-        "body_length": float(system.length),
+        "body_length": float(body_size(system)),
         "length_unit": unit_name(length_unit(system)),
         **recorded(system),
         **({"body": text} if (text := body_text(_body(system))) else {}),

@@ -84,7 +84,7 @@ class GrainSwim(Question):
         )
         size = self.size
         if size is None:
-            size = SIZE if body.length == 1.0 else body.length
+            size = SIZE if body.length is None else body.length
         require(0 < size < np.inf, "length must be > 0", value=size)
         radius = self.radius
         if radius is None:

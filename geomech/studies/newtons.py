@@ -13,6 +13,7 @@ from typing import Annotated, NamedTuple
 from geomech.scenes.model import Scene
 from geomech.systems.base import length_unit
 from geomech.systems.capabilities import Loaded
+from rft.bodies.base import body_size
 from rft.checks import Number, check_numbers
 from rft.refusal import Refusal
 
@@ -104,7 +105,7 @@ def _merged(scene: Scene, sizes: Sizes) -> dict[str, float | None]:
         (getattr(e, name) for e in effects if hasattr(e, name)), None
     )
     length = (
-        scene.system.length
+        body_size(scene.system)
         if length_unit(scene.system) == "m"
         else of_effects("length")
     )

@@ -34,6 +34,7 @@ from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.systems.framed import in_frame
 from geomech.tiers import TIERS, fitted, harmonic
 from geomech.tiers.base import Plan, Table, Tier, in_groups
+from rft.bodies.base import body_size
 from rft.checks import real_array
 from rft.refusal import Refusal, located
 
@@ -313,7 +314,7 @@ class Study:
         if medium:
             seconds["medium"] = took
         poses, errors, spreads, reference = {}, {}, {}, None
-        size = [self.scene.system.length, 1.0]  # estimates are in body lengths
+        size = [body_size(self.scene.system), 1.0]  # estimates are in body lengths
         order = [*TIERS]
         for tier in sorted(
             chosen, key=lambda m: (not chosen[m].exact, -order.index(m))

@@ -14,6 +14,7 @@ from geomech.geometry.symmetry import zero_components
 from geomech.io.results import unit_name
 from geomech.scenes.model import Scene, frequency_of
 from geomech.systems.base import length_unit
+from rft.bodies.base import body_size
 
 COMPONENTS = ("x", "y", "theta")
 ERRORS = ("estimate", "estimate_heading")
@@ -87,7 +88,7 @@ def result(
     system, tiers = scene.system, tuple(poses)
     unit, length, frequency = (
         length_unit(system),
-        system.length,
+        body_size(system),
         frequency_of(system, gait),
     )
     stacked = lambda by, width: np.array([by[t] for t in tiers], float).reshape(

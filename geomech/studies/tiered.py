@@ -27,6 +27,7 @@ from geomech.systems.capabilities import (
 from geomech.tiers import TIERS
 from geomech.tiers.base import Plan
 from geomech.tiers.direct import DIRECT
+from rft.bodies.base import body_size
 from rft.refusal import Refusal, located
 
 FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
@@ -152,7 +153,9 @@ class Settings:
     def errors(
         self, numbers: list[np.ndarray], truth: list[np.ndarray]
     ) -> dict[str, float]:
-        distances = estimate.distance(numbers[0], truth[0]) / self.scene.system.length
+        distances = estimate.distance(numbers[0], truth[0]) / body_size(
+            self.scene.system
+        )
         return {"error": float(np.sqrt(np.mean(distances**2)))}
 
     def describe(self, setting: Setting, measure: str) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from geomech.studies.tables import QUANTITIES, of_pose
 from geomech.systems import System
 from geomech.systems.capabilities import Uncertain, capability, gaits_per_batch
 from geomech.tiers.base import in_groups
+from rft.bodies.base import body_size
 from rft.refusal import Refusal, located
 
 PHASES = 64  # of a cycle: enough for changes of displacement to a per cent
@@ -112,7 +113,7 @@ def of_medium(
         sum((d * d for d in changes), np.zeros((len(mid), 4)))
         for changes in (slopes, bends)
     )
-    size = np.array([system.length, system.length, 1.0])
+    size = np.array([body_size(system), body_size(system), 1.0])
     bent = (linear + more > NONLINEAR**2 * linear)[:, :3] & (
         np.sqrt((linear + more)[:, :3]) / size > SEEN
     )

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from geomech.geometry.traits import Traits
 from geomech.systems.base import SYSTEMS, integrated
 from rft.bodies import Chain
-from rft.bodies.base import Length
+from rft.bodies.base import Length, body_size
 from rft.refusal import Refusal
 
 
@@ -38,7 +38,7 @@ class NoSlipSnake:
     """
 
     lengths: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    length: Length = 1.0
+    length: Length = None
     frame: str = "mean"
 
     kind = "no-slip-snake"
@@ -97,13 +97,14 @@ class NoSlipSnake:
         xi = np.linalg.solve(
             np.where(good[..., None, None], rows, np.eye(3)), -side[..., None]
         )[..., 0]
-        return np.where(good[..., None], xi, np.nan) * [self.length, self.length, 1.0]
+        scale = [body_size(self), body_size(self), 1.0]
+        return np.where(good[..., None], xi, np.nan) * scale
 
     def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
         from geomech.symbolic import connections
 
         A, alpha = connections.no_slip_snake(self.lengths, self.frame)
-        return connections.in_length(self.length, A), alpha
+        return connections.in_length(body_size(self), A), alpha
 
     @classmethod
     def examples(cls) -> dict[str, NoSlipSnake]:

@@ -21,6 +21,7 @@ from geomech.systems.premises import refuse
 from geomech.systems.solver import Solver
 from rft.bodies import BODIES
 from rft.bodies.base import (
+    body_size,
     checked_body,
     half_lengths,
     is_reversible,
@@ -104,11 +105,10 @@ class Swimmer:
 
     def _agree(self) -> None:
         """Raise Refusal if effects, or the body, contradict each other about the swimmer's frequency or length."""
-        sized = self.body.length != 1.0
-        for quantity, values in (
-            ("frequency", []),
-            ("length", [("[body]", self.body.length)] if sized else []),
-        ):
+        lengths = []
+        if self.body.length is not None:
+            lengths.append(("[body]", self.body.length))
+        for quantity, values in (("frequency", []), ("length", lengths)):
             values += [
                 (e.kind, getattr(e, quantity))
                 for e in self.effects
@@ -288,10 +288,10 @@ class Swimmer:
         A, alpha = connections.viscous_chain(
             self.body.lengths, self.medium.ratio, self.body.frame
         )
-        return connections.in_length(self.body.length, A), alpha
+        return connections.in_length(body_size(self), A), alpha
 
     def power(self, alpha: ArrayLike, alphadot: ArrayLike, xi: ArrayLike) -> np.ndarray:
-        return self.work(alpha, alphadot, xi).power / self.length
+        return self.work(alpha, alphadot, xi).power / body_size(self)
 
     def work(self, alpha: ArrayLike, alphadot: ArrayLike, xi: ArrayLike) -> rft.Work:
         """Return power, internal moments and slip of a solution of `solve`; see `rft.work_done`."""

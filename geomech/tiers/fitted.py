@@ -21,6 +21,7 @@ from geomech.systems.base import System, WrappedSystem, length_unit, shape_label
 from geomech.systems.capabilities import stored_table
 from geomech.systems.framed import Framed
 from geomech.tiers.base import Numerics, Table
+from rft.bodies.base import body_size
 from rft.premise import ALL
 from rft.refusal import Refusal
 
@@ -105,7 +106,7 @@ def _build(system: System, numerics: Numerics, progress: Callable | None) -> Con
         return (
             stored
             if stored.length
-            else replace(stored, unit=length_unit(system), length=system.length)
+            else replace(stored, unit=length_unit(system), length=body_size(system))
         )
     if isinstance(system, Framed):
         return system.fitted(progress)
@@ -113,7 +114,7 @@ def _build(system: System, numerics: Numerics, progress: Callable | None) -> Con
     options: dict[str, Any] = {
         "traits": system.traits,
         "unit": length_unit(system),
-        "length": system.length,
+        "length": body_size(system),
     }
     return connection.fit(
         system.velocity,
@@ -161,7 +162,7 @@ def plane(
     options: dict[str, Any] = {
         "traits": system.traits,
         "unit": length_unit(system),
-        "length": system.length,
+        "length": body_size(system),
     }
     return fit_plane(
         system.velocity,

@@ -36,7 +36,7 @@ class Backbone:
     elements: Annotated[
         int, Number(3, 2000, "-", "elements of the body, 3 to 2000", whole=True)
     ] = 100
-    length: Length = 1.0
+    length: Length = None
     frame: str = "mean"
     kind = "backbone"
 

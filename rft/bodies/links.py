@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rft.bodies.base import Elements
+from rft.bodies.base import Elements, body_size
 from rft.checks import real_array
 from rft.refusal import require
 from rft.se2 import rotated
@@ -22,7 +22,7 @@ class Links:
     and give `_links`."""
 
     lengths: tuple[float, ...]
-    length: float
+    length: float | None
     frame: str
     joints: Any  # a number, or a property
 
@@ -118,7 +118,7 @@ class Links:
         rotation, centre, velocity, theta = (
             self._frame_value(x, link).reshape(alpha.shape[:-1]) for x in links
         )
-        centre, velocity = self.length * centre, self.length * velocity
+        centre, velocity = body_size(self) * centre, body_size(self) * velocity
         h, hdot = (
             (centre.real, centre.imag, theta),
             (velocity.real, velocity.imag, rotation),
@@ -142,7 +142,7 @@ class Links:
         flat = alpha.reshape(-1, self.joints).T
         heading, _, centre, *_ = self._links(flat, np.zeros_like(flat))
         half = self._half_lengths * heading
-        ends = self.length * np.concatenate(
+        ends = body_size(self) * np.concatenate(
             [centre - half, (centre + half)[-1:]]
         ).T.reshape(*alpha.shape[:-1], -1)
         x, y, theta = np.moveaxis(pose[..., None], -2, 0)

@@ -25,6 +25,7 @@ from geomech.io.files import atomic_file
 from geomech.scenes import toml
 from geomech.studies.charts import SHARES, Chart, series_of
 from geomech.systems.base import length_unit, shape_labels
+from rft.bodies.base import body_size
 from rft.refusal import Refusal
 
 FOLDER = Path(__file__).parent
@@ -157,7 +158,7 @@ def _scene(chart: Chart, tables: dict[str, str]) -> dict[str, Any]:
         "toml": _without_gait(text),
         "checksum": hashlib.sha256(text.encode()).hexdigest()[:12],
         "unit": length_unit(system),
-        "length": system.length,
+        "length": body_size(system),
         "labels": [list(label) for label in shape_labels(system)],
         "frame": scene.frame,
         "gait": _gait(scene.gait),
