@@ -79,16 +79,17 @@ class GrainSwim(Question):
     @cached_property
     def experiment(self) -> Experiment:
         body = self.swimmer.body
-        caps = next(
-            (e.radius for e in self.swimmer.effects if isinstance(e, EndCaps)), None
-        )
+        caps = next((e for e in self.swimmer.effects if isinstance(e, EndCaps)), None)
         size = self.size
         if size is None:
             size = SIZE if body.length is None else body.length
         require(0 < size < np.inf, "length must be > 0", value=size)
         radius = self.radius
         if radius is None:
-            radius = RADIUS if caps is None else caps * size
+            radius = RADIUS
+            if caps is not None:
+                own_size = body.length  # None where the radius is in body lengths
+                radius = caps.in_body_lengths(own_size).radius * size
         require(
             0 < radius < size / 2,
             "radius must be > 0 and below half of the length",
@@ -181,11 +182,13 @@ def predictions(question: GrainSwim) -> Predictions:
     found = dict(_predicted(scene))
     body = question.experiment.body
     law = Calibration(FLANK, end_caps="fitted").ask().subject
+    caps = law.caps(body.half_width / body.size)
+    caps = caps.in_metres(question.swimmer.body.length)
     others = tuple(e for e in question.swimmer.effects if not isinstance(e, EndCaps))
     system = replace(
         question.swimmer,
         medium=law.medium,
-        effects=(*others, law.caps(body.half_width / body.size)),
+        effects=(*others, caps),
     )
     found[GRAINS_LAW] = dict(_predicted(scene.changed(system=system), ("direct",)))[
         "direct"

@@ -109,11 +109,11 @@ def _merged(scene: Scene, sizes: Sizes) -> dict[str, float | None]:
         if length_unit(scene.system) == "m"
         else of_effects("length")
     )
-    radius = next(
-        (e.radius for e in effects if e.kind == "end-caps"), None
-    )  # body lengths
+    caps = next((e for e in effects if e.kind == "end-caps"), None)
+    radius = None if caps is None else caps.radius_m
     known = sizes.length if length is None else length
-    radius = None if radius is None or known is None else radius * known
+    if caps is not None and radius is None and known is not None:
+        radius = caps.radius * known
     own = {
         "length": length,
         "radius": radius,

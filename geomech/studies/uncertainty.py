@@ -22,6 +22,7 @@ from geomech.systems import System
 from geomech.systems.capabilities import Uncertain, capability, gaits_per_batch
 from geomech.tiers.base import in_groups
 from rft.bodies.base import body_size
+from rft.checks import unmasked
 from rft.refusal import Refusal, located
 
 PHASES = 64  # of a cycle: enough for changes of displacement to a per cent
@@ -37,7 +38,7 @@ def root(covariance) -> np.ndarray:
     """Return standard deviations along the principal directions as columns (n, m): root @ root.T = covariance (n, n).
 
     Directions are those of the correlations, so that units do not matter; those without any spread are left out."""
-    covariance = np.asarray(covariance, float)
+    covariance = unmasked("covariance", covariance)
     spread = np.sqrt(np.diag(covariance))
     unit = np.where(spread > 0, spread, 1.0)
     variances, directions = np.linalg.eigh(covariance / unit[:, None] / unit)

@@ -15,7 +15,7 @@ from geomech.core.errors import check_angle
 from geomech.geometry.reconstruct import displacement
 from geomech.geometry.traits import NOTHING, Traits, unit_of
 from geomech.geometry.velocity import evaluate, in_batches
-from rft.checks import in_range
+from rft.checks import in_range, unmasked
 from rft.refusal import Refusal
 from rft.registry import Registry, classes_with
 
@@ -152,7 +152,7 @@ class WrappedSystem:
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
         alpha, alphadot = np.broadcast_arrays(
-            np.asarray(alpha, float), np.asarray(alphadot, float)
+            unmasked("alpha", alpha), unmasked("alphadot", alphadot)
         )
         return evaluate(
             self._batched, alpha, alphadot, masked=self.traits.singularity is not None

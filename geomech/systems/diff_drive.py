@@ -17,7 +17,7 @@ from geomech.core.errors import choose
 from geomech.geometry.traits import Traits
 from geomech.systems.base import SYSTEMS, integrated
 from rft.bodies.base import body_size
-from rft.checks import Number, check_numbers
+from rft.checks import Number, check_numbers, unmasked
 
 
 @SYSTEMS.register
@@ -62,7 +62,7 @@ class DifferentialDrive:
     def velocity(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
         """Return xi (..., 3), (track/time, track/time, rad/time): (r (w_1 + w_2) / 2, 0, r (w_2 - w_1) / track)."""
         _, rates = np.broadcast_arrays(
-            np.asarray(alpha, float), np.asarray(alphadot, float)
+            unmasked("alpha", alpha), unmasked("alphadot", alphadot)
         )
         return rates @ self._matrix.T
 

@@ -22,7 +22,7 @@ from geomech.systems.base import integrated
 from rft.balance.newton import to_element
 from rft.bodies import Chain
 from rft.bodies.base import Elements, Length, body_size
-from rft.checks import check_numbers, real_array
+from rft.checks import check_numbers, real_array, unmasked
 from rft.refusal import Refusal
 
 
@@ -124,7 +124,7 @@ class Momentum:
 
     def _flat(self, alpha, alphadot) -> tuple[np.ndarray, np.ndarray, tuple[int, ...]]:
         alpha, alphadot = np.broadcast_arrays(
-            np.asarray(alpha, float), np.asarray(alphadot, float)
+            unmasked("alpha", alpha), unmasked("alphadot", alphadot)
         )
         return (
             alpha.reshape(-1, self.joints),

@@ -16,6 +16,7 @@ from geomech.geometry.traits import Traits
 from geomech.systems.base import SYSTEMS, integrated
 from rft.bodies import Chain
 from rft.bodies.base import Length, body_size
+from rft.checks import unmasked
 from rft.refusal import Refusal
 
 
@@ -74,7 +75,7 @@ class NoSlipSnake:
         """Return rows (..., 3, 3) and sides (..., 3): velocity across each link's centre = row . xi + side, body
         lengths."""
         alpha, alphadot = np.broadcast_arrays(
-            np.asarray(alpha, float), np.asarray(alphadot, float)
+            unmasked("alpha", alpha), unmasked("alphadot", alphadot)
         )
         m = self._chain.motion(*(x.reshape(-1, 2).T for x in (alpha, alphadot)))
         rows, shape = np.stack([-m.s, m.c, m.r_n], -1).swapaxes(0, 1), alpha.shape[:-1]

@@ -10,7 +10,7 @@ from geomech.io.tables.sysplotter import compared
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import System, WrappedSystem, kind_of
 from geomech.systems.framed import NAME, Framed
-from geomech.systems.swimmer import name_in
+from geomech.systems.swimmer import effect_sizes, name_in
 from rft.bodies import BODIES
 from rft.effects import EFFECTS, ENGINES
 from rft.effects import engine as engine_of
@@ -92,6 +92,8 @@ def _swimmer(system: Swimmer) -> list[str]:
         lines.append(
             f"on:  {summary.part(effect.kind, effect)}; {premises}{cost}{limit}"
         )
+        if sizes := effect_sizes(effect, system.body):
+            lines.append(f"     {sizes}")
         if assumed := effect.assumes(system.medium):
             lines.append(f"     assumes {assumed}")
     off = [name for name in EFFECTS if name not in [e.kind for e in system.effects]]

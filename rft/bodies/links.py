@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rft.bodies.base import Elements, body_size
-from rft.checks import real_array
+from rft.checks import real_array, unmasked
 from rft.refusal import require
 from rft.se2 import rotated
 
@@ -109,7 +109,7 @@ class Links:
         connections.
         """
         alpha, alphadot = np.broadcast_arrays(
-            np.asarray(alpha, float), np.asarray(alphadot, float)
+            unmasked("alpha", alpha), unmasked("alphadot", alphadot)
         )
         _, *links = self._links(
             *(x.reshape(-1, self.joints).T for x in (alpha, alphadot))
@@ -132,7 +132,7 @@ class Links:
 
         alpha: (..., joints), rad. pose: (..., 3), pose of the body frame in the world, (x, y) in length units, theta in
         rad."""
-        alpha, pose = np.asarray(alpha, float), np.asarray(pose, float)
+        alpha, pose = unmasked("alpha", alpha), unmasked("pose", pose)
         require(
             alpha.shape[-1:] == (self.joints,),
             f"alpha must have {self.joints} angles last",
