@@ -56,7 +56,10 @@ CALLS = {
 }  # fmt: skip
 CALLS |= {f"shape of {name}": lambda gait=gait: gait.shape(ANGLES) for name, gait in GAITS.examples().items()}  # fmt: skip
 CALLS |= {f"rate of {name}": lambda gait=gait: gait.rate(ANGLES) for name, gait in GAITS.examples().items()}  # fmt: skip
-CALLS |= {f"traction of {name}": lambda law=law: law.traction(ANGLES, 0.0) for name, law in LAWS.examples().items()}  # fmt: skip
+CALLS |= {
+    f"traction of {name}": lambda law=law: law.traction(ANGLES, 0.0)
+    for name, law in LAWS.examples().items()
+}
 CALLS |= {
     f"velocity of {name}": lambda x=x: x.velocity(np.ma.array(np.full(x.joints, 0.1), mask=True), np.ones(x.joints))
     for name, x in SYSTEMS.examples().items()

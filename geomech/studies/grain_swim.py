@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from geomech.core.variables import Result, Variable
+from geomech.run.backend import suiting
 from geomech.scenes.model import Scene
 from geomech.studies.calibration import Calibration
 from geomech.studies.grains import GrainSteps, price, store_folder
@@ -120,9 +121,10 @@ class GrainSwim(Question):
         return price([self.experiment], store_folder(self.store))
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        tiers = predictions(
-            self
-        )  # before the grains: a scene that no tier takes is refused at once
+        # Before the grains: a scene that no tier takes is refused at once.
+        balances = Study(self.scene).cost([self.scene.gait.amplitude]).as_balances
+        with suiting(balances):
+            tiers = predictions(self)
         return result(
             self, self.experiment.run(store_folder(self.store), progress), tiers
         )
