@@ -29,6 +29,13 @@ def question(file: Path, scene: Path | None = None, **options: Any) -> Fit | Mid
         for x in (OF_LOGS if midlines else OF_MIDLINES)
         if x in given or (x == "scene" and scene is not None)
     ]
+    if midlines and wrong[:1] == ["scene"]:
+        raise Refusal(
+            "``scene`` is that of a log of joint angles",
+            where=line(file.name),
+            instead="give one cycle of the midlines to a scene whose [gait] has kind = "
+            "'centreline' and file = ...",
+        )
     if wrong:
         what = "a log of joint angles" if midlines else "midlines"
         raise Refusal(

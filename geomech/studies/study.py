@@ -70,11 +70,14 @@ class Study:
         with located(s.name):
             if frame == s.frame:
                 raise Refusal(f"the frame is {frame!r} already", instead="name another")
-            system = (
-                framed(s.system, s.numerics)
-                if frame == MINIMUM_PERTURBATION
-                else in_frame(s.system, frame)
-            )
+            if frame == MINIMUM_PERTURBATION:
+                system = framed(s.system, s.numerics)
+            else:
+                try:
+                    system = in_frame(s.system, frame)
+                except Refusal as refusal:
+                    refusal.instead = f"or take {MINIMUM_PERTURBATION!r}"
+                    raise
             return self._of(s.changed(system=system))
 
     def _of(self, scene: Scene) -> Self:
