@@ -49,6 +49,13 @@ from rft.premise import Premise
 from rft.vectors import formula, sqrt
 
 BODY = Chain((1, 1.4, 0.8), frame="link-1", length=0.3)
+
+
+def sized(effects, body=BODY):
+    """Effects with their lengths in metres, as a body with a length takes them."""
+    return tuple(effect.in_metres(body.length) for effect in effects)
+
+
 GAIT = Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2))
 BOTH = ("numpy", "numba")
 
@@ -67,7 +74,7 @@ def test_the_same_marches(name, monkeypatch):
     monkeypatch.setattr("rft.stepping.solve", counted)
     alpha, alphadot = GAIT.cycle(8, np.array([0.4, 1.0]))
     effects = EFFECTS[name][0](0.2), EndCaps(radius=0.06, tail=1.0)
-    effects = effects[:1] if name == "end-caps" else effects
+    effects = sized(effects[:1] if name == "end-caps" else effects)
     given = {
         "effects": effects,
         "cycles": 1 + (Premise.MEMORYLESS in effects[0].breaks),
@@ -192,6 +199,7 @@ def test_parameters_of_each_sample_and_threads(monkeypatch):
             frequency=1.2, length=0.4, depth=0.07, strength=1.0
         ).with_parameters(strength=some[0]),
     )
+    effects = sized(effects)
     plain, fast = (
         body_velocity(
             GLASS, BODY, alpha, alphadot, effects=effects, backend=b, threads=3
@@ -234,7 +242,7 @@ def test_a_sample_alone_has_the_digits_that_it_has_among_others(body, effects):
         rng.uniform(-0.4, 0.4, (body.joints, 40)),
         rng.normal(size=(body.joints, 40)),
     )
-    problem = assemble(GLASS, body, effects).problem(alpha, alphadot)
+    problem = assemble(GLASS, body, sized(effects, body)).problem(alpha, alphadot)
     common = balance.QUICK, Limits(1e-6, 1e-10), None
     alone = [solve(problem.take(np.array([i])), *common) for i in range(40)]
     np.testing.assert_array_equal(np.concatenate(alone, 1), solve(problem, *common))
@@ -249,7 +257,9 @@ def test_forces_at_given_velocities_are_those_by_numpy(effects):
     from rft.balance import arrays, compiled
 
     rng = np.random.default_rng(9)
-    problem = assemble(GLASS, BODY, effects).problem(*rng.uniform(-1, 1, (2, 2, 21)))
+    problem = assemble(GLASS, BODY, sized(effects)).problem(
+        *rng.uniform(-1, 1, (2, 2, 21))
+    )
     count = len(problem.sides.station) + len(problem.points.station)
     v, xi, rounding = (
         rng.normal(size=(3, count, 21)),
@@ -272,6 +282,7 @@ def test_compiled_once_for_each_form_of_law():
 
     alpha, alphadot = GAIT.cycle(8)
     every = [make(0.1) for name, (make, _) in EFFECTS.items() if "," not in name]
+    every = sized(every)
     for medium, effects in (
         (GLASS, ()),
         (GLASS, every),
@@ -434,7 +445,7 @@ def test_what_somebody_else_writes_runs_by_both(effects):
             Turtle(),
             alpha,
             alphadot,
-            effects=effects,
+            effects=sized(effects, Turtle()),
             cycles=2,
             with_work=True,
             backend=b,
