@@ -96,3 +96,23 @@ def gather(table, row, column):
 def over_nodes(load):
     """Return a load summed over the nodes of a rule, the first axis of arrays; compiled code takes one node at a time."""
     return type(load)(*(np.sum(x, 0) for x in load))
+
+
+FUNCTIONS = (
+    sqrt,
+    absolute,
+    exp,
+    floor,
+    copysign,
+    maximum,
+    minimum,
+    where,
+    log_ratio,
+    polynomial,
+    combinations,
+    gather,
+)
+ALLOWED = (
+    "a formula takes + - * /, < <= > >= == joined by & and |, numbers of the law, other "
+    f"formulas, and of rft.vectors {', '.join(f.__name__ for f in FUNCTIONS)}"
+)

@@ -6,7 +6,10 @@ import errno
 import hashlib
 import itertools
 import json
+import math
 import os
+import pathlib
+import re
 import resource
 import runpy
 import subprocess
@@ -46,8 +49,10 @@ from rft.effects import Effect
 from rft.laws.base import TermLaw
 from rft.laws.records import record
 from rft.premise import Premise
+from rft.refusal import Refusal
 from rft.vectors import formula, sqrt
 
+ROOT = pathlib.Path(__file__).parents[1]
 BODY = Chain((1, 1.4, 0.8), frame="link-1", length=0.3)
 
 
@@ -768,3 +773,55 @@ def test_a_command_outlives_the_cache(damage, tmp_path, compiled_code):
         again, (note,) = run()
         assert again == first and "is not taken" in note
     assert run() == (first, [])
+
+
+@formula
+def square(x):
+    return x * x
+
+
+def test_what_the_page_says_that_formulas_take_is_what_compiles():
+    """Every expression of the page's table, on eight elements at once and by NumPy."""
+    numba = pytest.importorskip("numba")
+    from rft import simd, vectors
+
+    page = (ROOT / ".docs/how-it-works/balance.md").read_text()
+    rows = [x.split("|", 2)[2] for x in page.splitlines() if x.startswith("| ")]
+    taken = [re.findall(r"`([^`]+)`", row.replace("\\|", "|")) for row in rows]
+    names = {"math", *(f.__name__ for f in vectors.FUNCTIONS)}
+    texts = [t for row in taken for t in row if re.search(r"\bx\b", t)]
+    assert names <= {*re.findall(r"\w+", " ".join(texts))} and len(texts) > 25
+    table = np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]])
+    scope = vars(vectors) | {"math": math, "square": square, "table": table}
+    scope |= {"load": simd.load, "store": simd.store}
+    texts = [t + "[1]" * t.startswith("combinations") for t in texts]  # of several
+    lines = [f"    store(out, {k}, {text})" for k, text in enumerate(texts)]
+    head = ["def run(rows, a, out):", "    x, y = load(rows, 0), load(rows, 1)"]
+    exec("\n".join([*head, *lines]), scope)
+    simd.register_formulas()
+    rows, out = np.linspace(0.1, 1.7, 16).reshape(2, 8), np.zeros((len(texts), 8))
+    rows[0, 3] = rows[1, 3]
+    numba.njit(error_model="numpy")(scope["run"])(rows, 0.5, out)
+    scope |= {"x": rows[0], "y": rows[1], "a": 0.5}
+    expected = [np.broadcast_to(eval(text, scope), 8) for text in texts]
+    np.testing.assert_allclose(out, expected, rtol=1e-14)
+
+
+@dataclasses.dataclass(frozen=True)
+class Slip:
+    """A law whose formula has a power, which does not compile."""
+
+    @formula
+    def traction(self, v_t, v_n, rounding=0.0):
+        speed = sqrt(v_t * v_t + v_n * v_n + rounding * rounding)
+        return v_t / speed, (v_n / speed) ** 3
+
+
+@pytest.mark.usefixtures("compiled_code")
+def test_a_slip_in_a_formula_is_told_by_function_and_line():
+    line = Slip.traction.__code__.co_firstlineno + 3
+    with pytest.raises(Refusal, match=rf"Slip.traction \(.*, line {line}\)") as caught:
+        body_velocity(Slip(), Chain(), [0.4, -0.7], [1.0, 0.3], backend="numba")
+    assert "\n" not in str(caught.value) and "** 3" in str(caught.value)
+    found = body_velocity(Slip(), Chain(), [0.4, -0.7], [1.0, 0.3], backend="numpy")
+    assert found.residual < 1e-9
