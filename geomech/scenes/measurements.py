@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from geomech.gaits import Gait
 from geomech.io import rows
 from geomech.scenes.columns import LARGEST_FILE
 from geomech.scenes.key import angles_of
 from geomech.scenes.model import Scene
 from geomech.systems.base import length_unit
 from rft.bodies.base import body_size
+from rft.checks import unmasked
 from rft.refusal import Refusal, located
 
 COLUMNS = ("amplitude", "value", "error")
@@ -29,25 +32,10 @@ def read(path: str | Path, scene: Scene, angle: bool = False) -> dict[str, np.nd
     is another, as amplitude_deg, value_mm or error_BL. angle: values are headings. Refusal, with the line, for any other."""
     source = rows.read(path, LARGEST_FILE, f"give a CSV file with the header {HEADER}")
     line, words = source.header
-    units, found = _units(scene, angle), {}
-    for word in words:
-        match = re.fullmatch(
-            r"(amplitude|value|error)(?:[ _]*[\(\[]?([a-z]+)[\)\]]?)?", word
-        )
-        if match is None or match[1] in found:
-            raise Refusal(
-                f"the header must be {HEADER}",
-                value=word,
-                where=f"{source.name}, line {line}",
-            )
-        with located(f"{source.name}, line {line}"):
-            found[match[1]] = _scale(match[1], match[2] or "", units[match[1]], scene)
-    if not {"amplitude", "value"} <= {*found}:
-        raise Refusal(
-            f"the header must be {HEADER}",
-            value=",".join(words),
-            where=f"{source.name}, line {line}",
-        )
+    place = f"{source.name}, line {line}"
+    length = body_size(scene.system)
+    units = units_of(scene.gait, length_unit(scene.system), length, angle)
+    found = _scales(words, units, place, scene.name)
     table = source.numbers(words)
     if not len(table):
         raise Refusal(
@@ -64,22 +52,58 @@ def read(path: str | Path, scene: Scene, angle: bool = False) -> dict[str, np.nd
     return columns
 
 
-def _units(scene: Scene, angle: bool) -> dict[str, dict[str, float]]:
-    """Return, by column, the units that it may have, in that of the scene's results."""
-    amplitude = ANGLES if "amplitude" in angles_of(type(scene.gait)) else {"": 1.0}
-    lengths = {"": 1.0, "bl": body_size(scene.system)}
-    lengths |= METRES if length_unit(scene.system) == "m" else {}
+def converted(data: Mapping, units: dict[str, dict[str, float]]) -> dict:
+    """Return amplitude, value and error (N,) of measurements that a caller has, named as
+    the columns of a file are; error may be missing. Refusal for other names."""
+    own = [x for x in data if str(x).lower().startswith(COLUMNS)]  # beside others
+    scales = _scales([str(x).lower() for x in own], units, "data", "the table")
+    names = dict(zip(scales, own))
+    return {
+        name: scale * unmasked(name, data[names[name]])
+        for name, scale in scales.items()
+    }
+
+
+def units_of(
+    gait: Gait | None, unit: str, length: float, angle: bool
+) -> dict[str, dict[str, float]]:
+    """Return, by column, the units that it may have, in those of results in ``unit``, "BL"
+    or "m". gait: of the amplitudes, None where it is not known. length: of the body in
+    that unit. angle: values are headings."""
+    in_angles = gait is None or "amplitude" in angles_of(type(gait))
+    amplitude = ANGLES if in_angles else {"": 1.0}
+    lengths = {"": 1.0, "bl": length} | (METRES if unit == "m" else {})
     value = ANGLES if angle else lengths
     return {"amplitude": amplitude, "value": value, "error": value}
 
 
-def _scale(name: str, unit: str, units: dict[str, float], scene: Scene) -> float:
+def _scales(
+    words: Sequence[str], units: dict[str, dict[str, float]], place: str, name: str
+) -> dict[str, float]:
+    """Return the factor of each column from the unit in its name to that of the results
+    of ``name``; Refusal for a header that is none."""
+    found: dict[str, float] = {}
+    for word in words:
+        match = re.fullmatch(
+            r"(amplitude|value|error)(?:[ _]*[\(\[]?([a-z]+)[\)\]]?)?", word
+        )
+        if match is None or match[1] in found:
+            raise Refusal(f"the header must be {HEADER}", value=word, where=place)
+        with located(place):
+            found[match[1]] = _scale(match[1], match[2] or "", units[match[1]], name)
+    if not {"amplitude", "value"} <= {*found}:
+        given = ",".join(words)
+        raise Refusal(f"the header must be {HEADER}", value=given, where=place)
+    return found
+
+
+def _scale(name: str, unit: str, units: dict[str, float], owner: str) -> float:
     """Return the factor from the unit of a column to that of the results; Refusal for a unit that the column cannot have."""
     if unit in units:
         return units[unit]
     such = [f"{name}_{'BL' if x == 'bl' else x}" for x in units if x]
     why = (
-        f"lengths of {scene.name} are in body lengths"
+        f"lengths of {owner} are in body lengths"
         if unit in METRES and "bl" in units
         else ""
     )
