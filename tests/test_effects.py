@@ -576,7 +576,7 @@ def test_transients_draw(tmp_path):
 
     numbers = transients.compute(shares=(0.0, 0.2, 0.65, 2.1), elements=20, phases=32)
     assert (np.diff(numbers["net"], axis=1) < 0).all()
-    assert numbers["net"][1] == pytest.approx([1, 0.92, 0.75, 0.54], abs=0.01)
+    assert numbers["net"][1] == pytest.approx([1, 0.91, 0.73, 0.50], abs=0.01)
     net, velocity = drawn(transients, numbers, tmp_path).axes
     np.testing.assert_allclose(
         curve(net, r"$A/\lambda$ = 0.4"), [numbers["shares"], numbers["net"][2]]

@@ -312,6 +312,12 @@ def test_fig09c(numbers, tmp_path):
     assert loose["best"]["progress"][0] == pytest.approx(0.295, abs=0.006)
     assert close["best"]["progress"][0] == pytest.approx(0.343, abs=0.006)
     assert not any("efficiency" in found["best"] for found in (loose, close))
+    # Read by the arc length of a wave the optimum of an endless wave is at the animal; read by the wavelength it has none.
+    at = fig09c_efficiency.arc_efficiency(loose, "endless")
+    assert undulation.optimum(loose["amplitude"], at)[0] == pytest.approx(
+        0.211, abs=0.004
+    )
+    assert undulation.optimum(loose["amplitude"], loose["endless"]) is None
     # "both swimmers also minimized their energy use": the best wave is near the cheapest.
     for found in (loose, snake):
         assert found["best"]["progress"][0] == pytest.approx(
