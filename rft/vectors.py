@@ -10,6 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from rft.checks import refuse_mask
+
 FORMULAS: list[
     Callable
 ] = []  # formulas not yet registered with the compiler (`rft.simd.register_formulas`)
@@ -64,6 +66,7 @@ def minimum(x, y):
 
 def where(condition, x, y):
     """Return x where the condition holds, y elsewhere; both are computed."""
+    refuse_mask("a formula", condition)
     return np.where(condition, x, y)
 
 

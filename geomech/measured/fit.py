@@ -20,8 +20,8 @@ from geomech.measured import phase as phase_module
 from geomech.measured.log import Log, read
 from geomech.measured.residual import residual_of
 from geomech.measured.spread import DEVIATIONS, spread
+from geomech.systems.base import body_size
 from rft import se2
-from rft.bodies.base import body_size
 from rft.checks import in_range
 
 HARMONICS = 12  # of the connection and of the gait, at most

@@ -19,7 +19,7 @@ from geomech.studies import fields
 from geomech.studies.fields import INTERVAL_OF_CCF, angles_of
 from geomech.studies.question import Allow, Progress, Question
 from geomech.studies.tables import COMPONENTS
-from rft.bodies.base import body_size
+from geomech.systems.base import body_size
 
 ALONG = "fitted along the gait alone"
 

@@ -10,8 +10,8 @@ from geomech.optimisation.cycles import CycleValues, cycle_values
 from geomech.optimisation.optimum import Evaluation
 from geomech.optimisation.request import Request
 from geomech.studies import estimate
+from geomech.systems.base import body_size
 from geomech.systems.capabilities import OwnMetric, capability
-from rft.bodies.base import body_size
 
 
 def evaluate_gait(r: Request, gait: Gait) -> Evaluation:

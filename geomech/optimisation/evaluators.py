@@ -11,7 +11,7 @@ from geomech.geometry import metric
 from geomech.optimisation.cycles import Phases, Runs
 from geomech.optimisation.request import Request
 from geomech.studies.study import Study
-from rft.bodies.base import body_size
+from geomech.systems.base import body_size
 
 
 def direct(r: Request, phases: int | None = None) -> Phases | Runs:

@@ -19,7 +19,7 @@ from geomech.optimisation.objectives import Objective
 from geomech.optimisation.undulations import Undulations
 from geomech.scenes.model import Scene, checked_scene
 from geomech.studies import cost
-from geomech.systems.base import System, kind_of
+from geomech.systems.base import System, body_size, kind_of
 from geomech.systems.capabilities import (
     Dissipative,
     OwnMetric,
@@ -29,7 +29,6 @@ from geomech.systems.capabilities import (
 )
 from geomech.systems.framed import Framed, in_frame
 from geomech.systems.premises import listed, refuse
-from rft.bodies.base import body_size
 from rft.checks import in_range
 from rft.premise import ALL, Premise
 from rft.refusal import Refusal, located

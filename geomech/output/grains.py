@@ -10,8 +10,8 @@ import numpy as np
 from geomech import plots, text
 from geomech.core.variables import Result
 from geomech.io.files import write_text
+from geomech.systems.base import body_size
 from geomech.text import drag_grains, grain_swim
-from rft.bodies.base import body_size
 
 
 def write_drag(result: Result, folder: Path) -> None:

@@ -11,8 +11,7 @@ from geomech.output import animate
 from geomech.run.progress import progress as progress_bar
 from geomech.scenes.model import Scene
 from geomech.studies.motion import Motion, Trajectory
-from geomech.systems.base import length_unit, shape_labels
-from rft.bodies.base import body_size
+from geomech.systems.base import body_size, length_unit, shape_labels
 
 
 def question(scene: Scene, path: Path | None, cycles: int | None) -> Trajectory:

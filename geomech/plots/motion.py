@@ -12,8 +12,7 @@ from geomech.geometry.field import Field
 from geomech.plots.maps import ccf_map, draw_gait, has, shape_space
 from geomech.plots.style import blank, figure, quantity, styled
 from geomech.studies.motion import Motion
-from geomech.systems.base import length_unit, shape_labels
-from rft.bodies.base import body_size
+from geomech.systems.base import body_size, length_unit, shape_labels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -14,8 +14,7 @@ from geomech.io import rows
 from geomech.scenes.columns import LARGEST_FILE
 from geomech.scenes.key import angles_of
 from geomech.scenes.model import Scene
-from geomech.systems.base import length_unit
-from rft.bodies.base import body_size
+from geomech.systems.base import body_size, length_unit
 from rft.checks import unmasked
 from rft.refusal import Refusal, located
 

@@ -23,11 +23,11 @@ from geomech.geometry.harmonics import Harmonics, basis
 from geomech.geometry.reconstruct import displacement
 from geomech.scenes.model import Scene
 from geomech.studies.study import Study
+from geomech.systems.base import body_size
 from geomech.systems.capabilities import Drawable, capability
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.tiers import harmonic
 from rft import se2
-from rft.bodies.base import body_size
 from rft.refusal import Refusal, located
 
 SMALL = 1e-7  # of the largest coefficient: harmonics below it are left out

@@ -20,10 +20,10 @@ from geomech.studies.estimate import (
 )
 from geomech.studies.results import Displacements
 from geomech.studies.study import Study
+from geomech.systems.base import body_size
 from geomech.systems.capabilities import pieces_per_length, settling, solver_of
 from geomech.tiers.base import solved_phases
 from geomech.tiers.direct import DIRECT
-from rft.bodies.base import body_size
 from rft.checks import is_number, real_array
 from rft.refusal import Refusal
 

@@ -18,9 +18,8 @@ from geomech.studies import estimate, tables, uncertainty
 from geomech.studies.batch import kind, side_by_side
 from geomech.studies.cost import direct, of_medium, price
 from geomech.studies.grid import Grid, at_points
-from geomech.systems.base import length_unit
+from geomech.systems.base import body_size, length_unit
 from geomech.systems.capabilities import gaits_per_batch
-from rft.bodies.base import body_size
 
 POINT_BYTES = 200  # bytes of a point: its row, and copies of it on the way to a file
 MAKING = 6e-4  # s to build a scene from its tables, measured

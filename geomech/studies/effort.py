@@ -25,7 +25,7 @@ from geomech.geometry.metric import Finsler, Metric
 from geomech.scenes.model import Scene
 from geomech.studies import tables
 from geomech.studies.estimate import MOST_PIECES
-from geomech.systems.base import System, kind_of
+from geomech.systems.base import System, body_size, kind_of
 from geomech.systems.capabilities import (
     Dissipative,
     OwnMetric,
@@ -41,7 +41,6 @@ from geomech.tiers import harmonic
 from geomech.tiers.base import Numerics, Table, in_groups
 from geomech.tiers.fitted import axes
 from geomech.tiers.harmonic import HARMONIC
-from rft.bodies.base import body_size
 from rft.checks import in_range, real_array
 from rft.premise import ALL, SHAPE_ALONE
 from rft.refusal import Refusal

@@ -16,6 +16,7 @@ from geomech.gaits import Gait
 from geomech.geometry.reconstruct import displacement
 from geomech.run.jobs import runner
 from geomech.scenes.model import Scene
+from geomech.systems.base import body_size
 from geomech.systems.capabilities import (
     gaits_per_batch,
     is_closed,
@@ -23,7 +24,6 @@ from geomech.systems.capabilities import (
     refined,
     table_error,
 )
-from rft.bodies.base import body_size
 from rft.refusal import located
 
 CHECKED = 33  # amplitudes at which a look-up tier is compared with the direct one; between them the worse neighbour counts

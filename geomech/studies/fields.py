@@ -28,7 +28,7 @@ from geomech.scenes.write import toml
 from geomech.studies import effort
 from geomech.studies.study import Study
 from geomech.studies.tables import COMPONENTS
-from geomech.systems.base import System, length_unit, shape_labels
+from geomech.systems.base import System, body_size, length_unit, shape_labels
 from geomech.systems.capabilities import (
     OwnMetric,
     Recorded,
@@ -37,7 +37,6 @@ from geomech.systems.capabilities import (
     stored_table,
 )
 from geomech.systems.framed import Framed
-from rft.bodies.base import body_size
 from rft.refusal import Refusal
 
 WHOLE, A_ALONE, STRUCT = "whole", "A", "struct"  # contents of files

@@ -20,8 +20,8 @@ from geomech.studies.cost import direct, price
 from geomech.studies.newtons import Newtons, Sizes, newtons
 from geomech.studies.question import Allow, Progress, Question
 from geomech.studies.undulation import activation_of, bends, loaded
+from geomech.systems.base import body_size
 from geomech.systems.capabilities import Stepped, capability, pieces_per_length, refined
-from rft.bodies.base import body_size
 from rft.premise import Premise
 from rft.refusal import located
 

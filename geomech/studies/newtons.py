@@ -11,9 +11,8 @@ from dataclasses import asdict, dataclass
 from typing import Annotated, NamedTuple
 
 from geomech.scenes.model import Scene
-from geomech.systems.base import length_unit
+from geomech.systems.base import body_size, length_unit
 from geomech.systems.capabilities import Loaded
-from rft.bodies.base import body_size
 from rft.checks import Number, check_numbers
 from rft.refusal import Refusal
 

@@ -28,13 +28,12 @@ from geomech.scenes.model import Scene, frequency_of
 from geomech.studies import cost, effort, estimate, tables, uncertainty
 from geomech.studies.available import default_tiers, tiers
 from geomech.studies.results import Displacements
-from geomech.systems.base import refuse_singular, shape_labels
+from geomech.systems.base import body_size, refuse_singular, shape_labels
 from geomech.systems.capabilities import gaits_per_batch, stored_table
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.systems.framed import in_frame
 from geomech.tiers import TIERS, fitted, harmonic
 from geomech.tiers.base import Plan, Table, Tier, in_groups
-from rft.bodies.base import body_size
 from rft.checks import real_array
 from rft.refusal import Refusal, located
 

@@ -13,8 +13,7 @@ from geomech.geometry.field import UNKNOWN_UNIT
 from geomech.geometry.symmetry import zero_components
 from geomech.io.results import unit_name
 from geomech.scenes.model import Scene, frequency_of
-from geomech.systems.base import length_unit
-from rft.bodies.base import body_size
+from geomech.systems.base import body_size, length_unit
 
 COMPONENTS = ("x", "y", "theta")
 ERRORS = ("estimate", "estimate_heading")

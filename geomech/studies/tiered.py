@@ -17,6 +17,7 @@ from geomech.studies import cost as foretold
 from geomech.studies import estimate
 from geomech.studies.available import tiers
 from geomech.studies.study import Study, refuse_outside
+from geomech.systems.base import body_size
 from geomech.systems.capabilities import (
     is_closed,
     pieces_per_length,
@@ -27,7 +28,6 @@ from geomech.systems.capabilities import (
 from geomech.tiers import TIERS
 from geomech.tiers.base import Plan
 from geomech.tiers.direct import DIRECT
-from rft.bodies.base import body_size
 from rft.refusal import Refusal, located
 
 FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude

@@ -19,9 +19,9 @@ from geomech.gaits import Gait
 from geomech.scenes.model import Scene
 from geomech.studies.tables import QUANTITIES, of_pose
 from geomech.systems import System
+from geomech.systems.base import body_size
 from geomech.systems.capabilities import Uncertain, capability, gaits_per_batch
 from geomech.tiers.base import in_groups
-from rft.bodies.base import body_size
 from rft.checks import unmasked
 from rft.refusal import Refusal, located
 

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geomech.gaits import Sine, Wave
-from geomech.systems.base import kind_of
+from geomech.systems.base import body_size, kind_of
 from geomech.systems.capabilities import Loaded, capability
-from rft.bodies.base import body_size
 from rft.checks import real_array
 from rft.refusal import Refusal
 

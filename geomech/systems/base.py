@@ -15,6 +15,7 @@ from geomech.core.errors import check_angle
 from geomech.geometry.reconstruct import displacement
 from geomech.geometry.traits import NOTHING, Traits, unit_of
 from geomech.geometry.velocity import evaluate, in_batches
+from rft.bodies.base import body_size as body_size  # of systems, too
 from rft.checks import in_range, unmasked
 from rft.refusal import Refusal
 from rft.registry import Registry, classes_with

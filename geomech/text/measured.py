@@ -10,7 +10,7 @@ from geomech.core.variables import Result
 from geomech.measured.fit import PRINTED_PHASES, Fitted
 from geomech.measured.results import status
 from geomech.scenes.write import gait_table
-from rft.bodies.base import body_size
+from geomech.systems.base import body_size
 
 
 def numbers(result: Result) -> dict[str, Any]:

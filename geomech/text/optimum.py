@@ -9,7 +9,7 @@ from geomech.core.summary import moved
 from geomech.core.variables import Result
 from geomech.optimisation import Optimum
 from geomech.scenes.write import gait_table, toml
-from rft.bodies.base import body_size
+from geomech.systems.base import body_size
 
 SHOWN = 6  # answers that a table led to, of those that nobody finished
 

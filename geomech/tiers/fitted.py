@@ -17,11 +17,16 @@ from geomech.geometry.plane import Plane, interpolated_plane, plane_shapes
 from geomech.geometry.plane import plane as fit_plane
 from geomech.geometry.traits import Traits
 from geomech.systems import premises
-from geomech.systems.base import System, WrappedSystem, length_unit, shape_labels
+from geomech.systems.base import (
+    System,
+    WrappedSystem,
+    body_size,
+    length_unit,
+    shape_labels,
+)
 from geomech.systems.capabilities import stored_table
 from geomech.systems.framed import Framed
 from geomech.tiers.base import Numerics, Table
-from rft.bodies.base import body_size
 from rft.premise import ALL
 from rft.refusal import Refusal
 

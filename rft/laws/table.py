@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rft.checks import real_array, refuse_mask
+from rft.checks import real_array
 from rft.drag import rod_drag
 from rft.laws.base import LAWS, require_drag
 from rft.laws.granular import Granular
@@ -93,8 +93,6 @@ class Table:
     @formula
     def traction(self, v_t: Any, v_n: Any, rounding: Any = 0.0) -> Any:
         """Return the drag per unit length (f_t, f_n) opposing (v_t, v_n), in units of the axial drag; zero at rest."""
-        refuse_mask("v_t", v_t)
-        refuse_mask("v_n", v_n)
         inverse = inverse_speed(v_t, v_n, rounding)
         f_t, _ = curve(
             v_t * inverse,

@@ -11,7 +11,7 @@ from geomech.io.files import atomic_file
 from geomech.measured.midlines.trial import Trial
 from geomech.measured.synthetic import _integrated as integrated
 from geomech.measured.synthetic import _smooth as smooth_noise
-from rft.bodies.base import body_size
+from geomech.systems.base import body_size
 from rft.checks import in_range
 
 FINER = 3  # steps of the integration between two frames

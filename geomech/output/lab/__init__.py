@@ -24,8 +24,7 @@ from geomech.gaits import Gait, Points
 from geomech.io.files import atomic_file
 from geomech.scenes import toml
 from geomech.studies.charts import SHARES, Chart, series_of
-from geomech.systems.base import length_unit, shape_labels
-from rft.bodies.base import body_size
+from geomech.systems.base import body_size, length_unit, shape_labels
 from rft.refusal import Refusal
 
 FOLDER = Path(__file__).parent
