@@ -15,7 +15,7 @@ from rft.plates import PlateStress
 from rft.refusal import Refusal, formatted, located
 from rft.walking import ROBOTS, Fineness, Mjcf, Robot, Screws, Tripod, Walker
 
-ATTACH = "walk in a loop of your own, with rft.mujoco.attach(model, medium, {} = ...)"
+ATTACH = "use rft.mujoco.attach(model, medium, {} = ...) in a loop of your own"
 ELSEWHERE = {
     "slope": ATTACH.format("slope"),
     "disturbed-ground": ATTACH.format("footprints"),

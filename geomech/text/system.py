@@ -35,8 +35,9 @@ def described(system: System) -> list[str]:
     if isinstance(system, Table):
         return _table(system)
     fields = dataclasses.fields(system) if dataclasses.is_dataclass(system) else ()
+    given = {f.name: getattr(system, f.name) for f in fields}
     numbers = ", ".join(
-        f"{f.name} = {formatted(getattr(system, f.name))}" for f in fields
+        f"{name} = {formatted(x)}" for name, x in given.items() if x is not None
     )
     return [f"{kind_of(system)} ({numbers})" if numbers else kind_of(system)]
 
