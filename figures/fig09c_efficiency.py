@@ -1,6 +1,6 @@
 """Fig. 9(c): what a wave along the body achieves against its curvature: sandfish in loose and close glass, snake in loose.
 
-Rows: progress per cycle over the arc length of a wave; undulation efficiency, progress over the wavelength; slip;
+Rows: progress per cycle over the arc length lambda_s of a wave; the same over its straight wavelength lambda; slip;
 mechanical cost of transport. Left against the mean relative curvature, right against A / lambda, which are one to one.
 Dots mark the best wave where there is one: efficiency and slip go on improving with the amplitude. Solid: the whole
 body, ends and yaw included. Dashed and dotted: the balance of force along an endless wave that slides along its curve,
@@ -8,9 +8,12 @@ without and with the sandfish's head drag; dash-dot-dotted: one whose points mov
 friction set against that of an aluminium rod, 0.2, in place of the 0.15 in the caption of Fig. 5. Last row: the sandfish's
 body velocity through a cycle of its own wave (dash-dotted above).
 
-The paper's text and caption define the efficiency by the wavelength and show its optimum near the animal, A / lambda =
-0.22. In this model that quantity has no optimum. What has one is progress over arc length, for the whole sandfish at 0.295
-(loose) and 0.343 (close), which is not where the animal is; the endless wave's, at 0.21 in loose glass, is.
+The paper defines undulation efficiency as progress "normalized by wavelength" and shows its optimum near the animal, A /
+lambda = 0.22. Its abscissa is curvature times lambda_s, the arc length of a wave, and read with that wavelength the
+efficiency of an endless wave in loose glass has its optimum at A / lambda = 0.21 (the whole sandfish's, with ends and yaw,
+is at 0.295, 0.343 in close glass). Read with the straight wavelength it has none: it grows with the amplitude. Maladen et
+al. (2011) found speed, not wave efficiency, largest near 0.2, and a wave efficiency of 0.5 for the animal; the whole
+sandfish has 0.503 here.
 """
 
 from __future__ import annotations
@@ -47,11 +50,11 @@ AMPLITUDES = np.tan(np.linspace(0.7, 5.2, 46) / 4) / (
     2 * np.pi
 )  # equal steps of relative curvature
 MEASURES = {  # what is best: the largest (1) or the least (-1)
-    "arc_efficiency": (1, "progress per cycle\n" r"over $\lambda_s$"),
+    "arc_efficiency": (1, "efficiency, progress\n" r"over arc length $\lambda_s$"),
     "efficiency": (
         1,
-        "undulation efficiency,\n" r"progress over $\lambda$",
-    ),  # the paper's, which has no optimum here
+        "efficiency, progress\n" r"over straight $\lambda$",
+    ),
     "slip": (-1, "mean slip angle\n(degrees)"),
     "cost_of_transport": (-1, "cost of transport, work\nover drag x distance"),
 }
@@ -108,10 +111,16 @@ def draw(numbers: dict):
             )
             ax.tick_params(labelbottom=key == "cost_of_transport")
         row[0].set_ylabel(MEASURES[key][1])
-    note = "no optimum here;\nthe paper's is\nnear the animal"
-    axes[1, 1].text(
-        0.98, 0.05, note, transform=axes[1, 1].transAxes, ha="right", fontsize=7
+    place, _ = undulation.optimum(
+        numbers["sandfish-loose"]["amplitude"],
+        arc_efficiency(numbers["sandfish-loose"], "endless"),
     )
+    notes = (
+        f"read by arc length:\nendless wave best\nat {place:.2f} in loose glass",
+        "read by straight wavelength:\nno wave is best",
+    )
+    for ax, note in zip(axes[:2, 1], notes):
+        ax.text(0.98, 0.05, note, transform=ax.transAxes, ha="right", fontsize=7)
     axes[-2, 0].set_xlabel(
         r"mean relative curvature $\overline{|\kappa|}\,\lambda_s$ (rad)"
     )
@@ -123,6 +132,11 @@ def draw(numbers: dict):
     fig.align_ylabels(axes[:, 0])
     legend(fig, axes[0, 0], numbers["sandfish-loose"]["animal"])
     return fig
+
+
+def arc_efficiency(found: dict, endless: str) -> np.ndarray:
+    """Return progress over the arc length of a wave (B,) of an endless wave."""
+    return found[endless] * Sine().wavelength(found["amplitude"])
 
 
 def draw_measure(ax, numbers: dict, key: str, against: str):

@@ -69,6 +69,7 @@ def real_array(name: str, x: ArrayLike) -> np.ndarray:
     """Return x as an array of floats; ValueError with its name unless it is an array of real numbers."""
     import numpy as np  # a command that refuses starts without it
 
+    refuse_mask(name, x)
     try:
         array = np.asarray(x)
         if array.dtype.kind in "iuf" or (
@@ -78,6 +79,28 @@ def real_array(name: str, x: ArrayLike) -> np.ndarray:
     except (TypeError, ValueError, OverflowError):
         pass
     raise Refusal(f"{name} must be real numbers in equal rows", value=x)
+
+
+def refuse_mask(name: str, x: object) -> None:
+    """Raise ValueError if x is a masked array, or rows of such, with a masked value,
+    which NumPy would turn into the number under the mask."""
+    import numpy as np
+
+    for row in x if isinstance(x, (list, tuple)) else (x,):
+        if isinstance(row, np.ma.MaskedArray) and np.ma.is_masked(row):
+            raise Refusal(
+                f"{name} has masked values",
+                instead="leave them out, or fill them with nan where nan is taken",
+            )
+
+
+def unmasked(name: str, x: ArrayLike) -> np.ndarray:
+    """Return x as an array of floats, otherwise unchecked; ValueError for a masked
+    value."""
+    import numpy as np
+
+    refuse_mask(name, x)
+    return np.asarray(x, float)
 
 
 def is_number(value: object) -> TypeGuard[float]:

@@ -236,6 +236,7 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
     in_range("pieces", pieces, 1, MOST_PIECES, whole=True)
     if any(effect.varies_along for effect in effects):
         body = subdivide(body, pieces)
+    effects = tuple(effect.in_body_lengths(body.length) for effect in effects)
     for effect in effects:
         effect.check(medium)
     zero = np.zeros((body.joints, 1))

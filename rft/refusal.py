@@ -69,14 +69,20 @@ class Refusal(ValueError):
         if reasons := "; ".join(named(x) for x in (self.because, self.instead) if x):
             text = f"{text}: {reasons}"
         for place in map(named, reversed(self.where)):
-            text = f"{place} {text}" if place.endswith("]") else f"{place}: {text}"
+            text = before(place) + text
         return line(text)
 
     def within(self, place: object) -> Refusal:
         """Return the refusal with a place before its own, unless it names that already."""
-        if not str(self).startswith((f"{place}: ", f"{line(worded(str(place)))}: ")):
+        names = (str(place), line(worded(str(place))))
+        if not str(self).startswith(tuple(map(before, names))):
             self.where = (str(place), *self.where)
         return self
+
+
+def before(place: str) -> str:
+    """Return a place as it stands before what is wrong there."""
+    return f"{place} " if place.endswith("]") else f"{place}: "
 
 
 @contextlib.contextmanager

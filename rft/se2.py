@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rft.checks import refuse_mask
 from rft.refusal import Refusal
 
 
@@ -18,6 +19,7 @@ def _sinc(x: np.ndarray) -> np.ndarray:
 
 def _components(g):
     """Return the three components of poses or velocities (..., 3); ValueError for another shape."""
+    refuse_mask("a pose or velocity of the plane", g)
     try:
         g = np.asarray(g, float)
     except (TypeError, ValueError, OverflowError):

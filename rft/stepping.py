@@ -23,7 +23,7 @@ from rft.balance.backend import check
 from rft.balance.newton import to_element
 from rft.balance.solver import Accuracy, Solved, solve
 from rft.balance.velocity import checked_input
-from rft.bodies.base import Body, half_lengths, joint_speed
+from rft.bodies.base import Body, body_size, half_lengths, joint_speed
 from rft.bodies.pieces import PIECES
 from rft.checks import in_range
 from rft.contact import Assembly, Problem, assemble
@@ -178,7 +178,7 @@ def time_steps(
         half_lengths(body),
     )
     steps = _cycles(stepping, cycles, with_work, with_path, advance or take_steps)
-    return _with_batch_axes(steps, batch, body.length)
+    return _with_batch_axes(steps, batch, body_size(body))
 
 
 def _no_steps(batch: tuple, phases: int) -> TimeSteps:

@@ -10,6 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from rft.checks import refuse_mask
+
 FORMULAS: list[
     Callable
 ] = []  # formulas not yet registered with the compiler (`rft.simd.register_formulas`)
@@ -64,6 +66,7 @@ def minimum(x, y):
 
 def where(condition, x, y):
     """Return x where the condition holds, y elsewhere; both are computed."""
+    refuse_mask("a formula", condition)
     return np.where(condition, x, y)
 
 
@@ -96,3 +99,23 @@ def gather(table, row, column):
 def over_nodes(load):
     """Return a load summed over the nodes of a rule, the first axis of arrays; compiled code takes one node at a time."""
     return type(load)(*(np.sum(x, 0) for x in load))
+
+
+FUNCTIONS = (
+    sqrt,
+    absolute,
+    exp,
+    floor,
+    copysign,
+    maximum,
+    minimum,
+    where,
+    log_ratio,
+    polynomial,
+    combinations,
+    gather,
+)
+ALLOWED = (
+    "a formula takes + - * /, < <= > >= == joined by & and |, numbers of the law, other "
+    f"formulas, and of rft.vectors {', '.join(f.__name__ for f in FUNCTIONS)}"
+)

@@ -12,7 +12,14 @@ from rft.balance.arrays import loads as loads_on
 from rft.balance.arrays import velocities, with_frame_velocity
 from rft.balance.newton import times, to_frame
 from rft.balance.velocity import checked_input
-from rft.bodies.base import Body, Elements, checked_body, half_lengths, joint_speed
+from rft.bodies.base import (
+    Body,
+    Elements,
+    body_size,
+    checked_body,
+    half_lengths,
+    joint_speed,
+)
 from rft.bodies.pieces import PIECES
 from rft.checks import real_array
 from rft.contact import Problem, assemble
@@ -102,13 +109,14 @@ def work_done(
         effects=tuple(e for e in assembly.effects if not e.breaks & SHAPE_ALONE)
     )
     alpha, alphadot = (x.reshape(-1, body.joints).T for x in (alpha, alphadot))
-    xi = xi.reshape(-1, 3).T / np.array([[body.length], [body.length], [1.0]])
+    length = body_size(body)
+    xi = xi.reshape(-1, 3).T / np.array([[length], [length], [1.0]])
     speed = joint_speed(body, alphadot)
     scale = np.where(speed > 0, speed, 1.0)  # of a body at rest any scale will do
     problem = assembly.problem(alpha, alphadot, scale)
     work = element_work(problem, half_lengths(body), xi, regularisation * scale)
     return Work(
-        work.power.reshape(batch) * body.length,
+        work.power.reshape(batch) * length,
         *(x.reshape((*batch, *x.shape[1:])) for x in work[1:]),
     )
 

@@ -6,7 +6,10 @@ import errno
 import hashlib
 import itertools
 import json
+import math
 import os
+import pathlib
+import re
 import resource
 import runpy
 import subprocess
@@ -46,9 +49,18 @@ from rft.effects import Effect
 from rft.laws.base import TermLaw
 from rft.laws.records import record
 from rft.premise import Premise
+from rft.refusal import Refusal
 from rft.vectors import formula, sqrt
 
+ROOT = pathlib.Path(__file__).parents[1]
 BODY = Chain((1, 1.4, 0.8), frame="link-1", length=0.3)
+
+
+def sized(effects, body=BODY):
+    """Effects with their lengths in metres, as a body with a length takes them."""
+    return tuple(effect.in_metres(body.length) for effect in effects)
+
+
 GAIT = Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2))
 BOTH = ("numpy", "numba")
 
@@ -67,7 +79,7 @@ def test_the_same_marches(name, monkeypatch):
     monkeypatch.setattr("rft.stepping.solve", counted)
     alpha, alphadot = GAIT.cycle(8, np.array([0.4, 1.0]))
     effects = EFFECTS[name][0](0.2), EndCaps(radius=0.06, tail=1.0)
-    effects = effects[:1] if name == "end-caps" else effects
+    effects = sized(effects[:1] if name == "end-caps" else effects)
     given = {
         "effects": effects,
         "cycles": 1 + (Premise.MEMORYLESS in effects[0].breaks),
@@ -192,6 +204,7 @@ def test_parameters_of_each_sample_and_threads(monkeypatch):
             frequency=1.2, length=0.4, depth=0.07, strength=1.0
         ).with_parameters(strength=some[0]),
     )
+    effects = sized(effects)
     plain, fast = (
         body_velocity(
             GLASS, BODY, alpha, alphadot, effects=effects, backend=b, threads=3
@@ -234,7 +247,7 @@ def test_a_sample_alone_has_the_digits_that_it_has_among_others(body, effects):
         rng.uniform(-0.4, 0.4, (body.joints, 40)),
         rng.normal(size=(body.joints, 40)),
     )
-    problem = assemble(GLASS, body, effects).problem(alpha, alphadot)
+    problem = assemble(GLASS, body, sized(effects, body)).problem(alpha, alphadot)
     common = balance.QUICK, Limits(1e-6, 1e-10), None
     alone = [solve(problem.take(np.array([i])), *common) for i in range(40)]
     np.testing.assert_array_equal(np.concatenate(alone, 1), solve(problem, *common))
@@ -249,7 +262,9 @@ def test_forces_at_given_velocities_are_those_by_numpy(effects):
     from rft.balance import arrays, compiled
 
     rng = np.random.default_rng(9)
-    problem = assemble(GLASS, BODY, effects).problem(*rng.uniform(-1, 1, (2, 2, 21)))
+    problem = assemble(GLASS, BODY, sized(effects)).problem(
+        *rng.uniform(-1, 1, (2, 2, 21))
+    )
     count = len(problem.sides.station) + len(problem.points.station)
     v, xi, rounding = (
         rng.normal(size=(3, count, 21)),
@@ -272,6 +287,7 @@ def test_compiled_once_for_each_form_of_law():
 
     alpha, alphadot = GAIT.cycle(8)
     every = [make(0.1) for name, (make, _) in EFFECTS.items() if "," not in name]
+    every = sized(every)
     for medium, effects in (
         (GLASS, ()),
         (GLASS, every),
@@ -434,7 +450,7 @@ def test_what_somebody_else_writes_runs_by_both(effects):
             Turtle(),
             alpha,
             alphadot,
-            effects=effects,
+            effects=sized(effects, Turtle()),
             cycles=2,
             with_work=True,
             backend=b,
@@ -757,3 +773,64 @@ def test_a_command_outlives_the_cache(damage, tmp_path, compiled_code):
         again, (note,) = run()
         assert again == first and "is not taken" in note
     assert run() == (first, [])
+
+
+@formula
+def square(x):
+    return x * x
+
+
+def test_what_the_page_says_that_formulas_take_is_what_compiles():
+    """Every expression of the page's table, on eight elements at once and by NumPy."""
+    numba = pytest.importorskip("numba")
+    from rft import simd, vectors
+
+    page = (ROOT / ".docs/how-it-works/balance.md").read_text()
+    rows = [x.split("|", 2)[2] for x in page.splitlines() if x.startswith("| ")]
+    taken = [re.findall(r"`([^`]+)`", row.replace("\\|", "|")) for row in rows]
+    names = {"math", *(f.__name__ for f in vectors.FUNCTIONS)}
+    texts = [t for row in taken for t in row if re.search(r"\bx\b", t)]
+    assert names <= {*re.findall(r"\w+", " ".join(texts))} and len(texts) > 25
+    table = np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]])
+    scope = vars(vectors) | {"math": math, "square": square, "table": table}
+    scope |= {"load": simd.load, "store": simd.store}
+    texts = [t + "[1]" * t.startswith("combinations") for t in texts]  # of several
+    lines = [f"    store(out, {k}, {text})" for k, text in enumerate(texts)]
+    head = ["def run(rows, a, out):", "    x, y = load(rows, 0), load(rows, 1)"]
+    exec("\n".join([*head, *lines]), scope)
+    simd.register_formulas()
+    rows, out = np.linspace(0.1, 1.7, 16).reshape(2, 8), np.zeros((len(texts), 8))
+    rows[0, 3] = rows[1, 3]
+    numba.njit(error_model="numpy")(scope["run"])(rows, 0.5, out)
+    scope |= {"x": rows[0], "y": rows[1], "a": 0.5}
+    expected = [np.broadcast_to(eval(text, scope), 8) for text in texts]
+    np.testing.assert_allclose(out, expected, rtol=1e-14)
+
+
+@dataclasses.dataclass(frozen=True)
+class Slip:
+    """A law whose formula has a power, which does not compile."""
+
+    @formula
+    def traction(self, v_t, v_n, rounding=0.0):
+        speed = sqrt(v_t * v_t + v_n * v_n + rounding * rounding)
+        return v_t / speed, (v_n / speed) ** 3
+
+
+def test_a_slip_in_a_formula_is_told_by_function_and_line():
+    numba = pytest.importorskip("numba")
+    from rft import simd
+    from rft.balance.cache import cached
+
+    traction, load, store = Slip.traction, simd.load, simd.store
+
+    def run(rows):
+        _, across = traction(None, load(rows, 0), load(rows, 1))
+        store(rows, 0, across)
+
+    simd.register_formulas()
+    kernel = cached(numba.njit(run), "a test")
+    line = traction.__code__.co_firstlineno + 3
+    with pytest.raises(Refusal, match=rf"Slip.traction \(.*, line {line}\)") as caught:
+        kernel(np.ones((2, 8)))
+    assert "\n" not in str(caught.value) and "** 3" in str(caught.value)

@@ -150,7 +150,7 @@ kind = "circle"
 MASS = (
     '[[effects]]\nkind = "body-inertia"\ndrag = 2.1\n[[effects]]\nkind = "end-caps"\n'
 )
-SIZES = "[physical]\nlength = 0.1\nfrequency = 3\nmass = 0.016\nradius = 0.06\n"
+SIZES = "[physical]\nlength = 0.1\nfrequency = 3\nmass = 0.016\nradius_m = 0.006\n"
 
 
 def test_sizes_stand_once():
@@ -160,12 +160,12 @@ def test_sizes_stand_once():
     )
     assert scene.system.effects == (
         rft.BodyInertia(0.016, 3.0, 0.1, 2.1),
-        rft.EndCaps(0.06),
+        rft.EndCaps(radius_m=0.006),
     )
-    ground = '[[effects]]\nkind = "disturbed-ground"\nradius = 0.2\nweakening = 0.1\n'  # of the track, not the body
+    ground = '[[effects]]\nkind = "disturbed-ground"\nradius_m = 0.02\nweakening = 0.1\n'  # of the track, not the body
     assert scenes.parse(PLAIN + SIZES + MASS + ground).system.effects[
         2
-    ] == rft.DisturbedGround(0.2, 0.1)
+    ] == rft.DisturbedGround(weakening=0.1, radius_m=0.02)
     same = scenes.parse(
         PLAIN.replace('"chain"', '"chain"\nlength = 0.1') + SIZES + MASS
     )
@@ -176,10 +176,10 @@ def test_sizes_stand_once():
     ("text", "said"),
     [
         (PLAIN.replace('"chain"', '"chain"\nlength = 0.2') + SIZES, r"\[body\] length = 0.2, but \[physical\] length = 0.1"),
-        (PLAIN + SIZES + MASS + "radius = 0.07", r"\[\[effects\]\] radius = 0.07, but \[physical\] radius = 0.06: keep one"),
+        (PLAIN + SIZES + MASS + "radius_m = 1.0", r"effects\]\] radius_m = 1.0, but \[physical\] radius_m = 0.006: keep one"),
         (PLAIN + "[physical]\nmass = 1.0", r"\[physical\] mass: nothing in this scene has one"),
         (PLAIN + "[physical]\nmas = 1.0", r"\[physical\] key: 'mas' is unknown: did you mean 'mass'"),
-        (PLAIN + '[physical]\nlength = "x"', r"\[body\] Expected `float`, got `str`"),
+        (PLAIN + '[physical]\nlength = "x"', r"\[body\] Expected `float \| null`, got `str`"),
         ("frame = 3" + PLAIN, r"\[body\] Expected `str`, got `int`"),
         ('frame = "link-1"' + PLAIN.replace('"chain"', '"chain"\nframe = "link-2"'), "but the scene's frame = 'link-1'"),
         (PLAIN + '[system]\nkind = "no-slip-snake"', "a no-slip-snake takes no 'body'"),

@@ -241,3 +241,19 @@ def test_packages_list_their_public_names():
         geomech.studies, "sweeps"
     )
     assert {"Chain", "laws", "walking"} <= set(dir(rft)) and "importlib" not in dir(rft)
+
+
+def four(alpha, alphadot):
+    x = alphadot @ np.array([1.0, 2.0, 3.0, 4.0])
+    return np.stack([x * np.cos(alpha[..., 3]), 0 * x, 0.1 * x], -1)
+
+
+def test_a_velocity_of_four_joints_is_not_taken_for_one_of_two():
+    scene = geomech.study(four, joints=4, phases=16).scene
+    assert (scene.system.joints, scene.gait.joints) == (4, 4)
+    with pytest.raises(Refusal, match="takes 4 joints.*joints = 4"):
+        geomech.study(four)
+    with pytest.raises(Refusal, match="joints"):
+        geomech.study("three-link-viscous", joints=2)
+    with pytest.raises(Refusal, match=r"moves 2 joints but .* has 4"):
+        geomech.study(four, geomech.gaits.Circle(), joints=4)

@@ -30,6 +30,7 @@ from rft import (
     Transient,
     Viscous,
 )
+from rft.bodies.base import body_size
 from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -92,7 +93,7 @@ def places(scene, s):
     """Points s of the body in the world, complex (N, n), with the headings there, at the phases of a scene, by its drawing."""
     alpha, _ = scene.gait.cycle(scene.numerics.phases)
     pose = poses(scene.cycle().xi)[:-1]
-    ends = scene.system.body.points(alpha, pose) @ [1, 1j] / scene.system.length
+    ends = scene.system.body.points(alpha, pose) @ [1, 1j] / body_size(scene.system)
     along = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(ends[0])))])
     place = np.stack(
         [
@@ -177,7 +178,7 @@ def test_forces_laid_out_in_the_plane_hold_the_moments_and_do_the_power(found, n
     )
     alpha, rate = scene.gait.cycle(24)
     xi, pose = (
-        scene.cycle().xi / [scene.system.length, scene.system.length, 1],
+        scene.cycle().xi / [body_size(scene.system), body_size(scene.system), 1],
         poses(scene.cycle().xi)[:-1],
     )
     frame = np.exp(1j * pose[:, 2])[:, None]
@@ -186,7 +187,7 @@ def test_forces_laid_out_in_the_plane_hold_the_moments_and_do_the_power(found, n
         ends = (
             scene.system.body.points(alpha + step * rate)
             @ [1, 1j]
-            / scene.system.length
+            / body_size(scene.system)
         )
         along = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(ends[0])))])
         s = result["s"].values

@@ -13,6 +13,7 @@ from rft import CATALOGUE, Chain, Coulomb, Granular, Viscous, body_velocity, se2
 from rft.balance import backend
 from rft.balance.newton import Descent, to_element
 from rft.balance.solver import QUICK, Accuracy, solve
+from rft.bodies.base import body_size
 from rft.contact import assemble
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -89,7 +90,9 @@ def hard(joints, ill):
 def apart(one, other, alphadot, body):
     """(...,): how far body velocities differ, over the joints' speed."""
     speed = np.linalg.norm(alphadot, axis=-1, keepdims=True) + 1e-300
-    return (np.abs(one.xi - other.xi) / [body.length, body.length, 1.0] / speed).max(-1)
+    return (
+        np.abs(one.xi - other.xi) / [body_size(body), body_size(body), 1.0] / speed
+    ).max(-1)
 
 
 ILL_CONDITIONED = ("a millionth of a link", "twelve")
@@ -112,7 +115,7 @@ def test_hard_cases(name):
         fastest = (
             3
             * np.linalg.norm(alphadot, axis=-1, keepdims=True)
-            * [body.length, body.length, 1]
+            * [body_size(body), body_size(body), 1]
             + 1e-300
         )
         for regularisation in (1e-6, 1e-3)[: 1 + ill]:

@@ -282,10 +282,10 @@ def test_studies_resume_to_the_last_digit(tmp_path, monkeypatch):
 
 
 EFFECTS = {
-    "transient": [Transient(travel=0.03)],
+    "transient": [Transient(travel_m=0.009)],
     "heavy and disturbed": [
         Heavy(mass=0.4, frequency=0.7, length=0.3, drag=2.1),
-        DisturbedGround(0.08, 0.6),
+        DisturbedGround(weakening=0.6, radius_m=0.024),
     ],
     "heavy": [Heavy(mass=0.4, frequency=0.7, length=0.3, drag=2.1)],
 }

@@ -243,6 +243,15 @@ def both(valid, scene, table, k, part):
     return read
 
 
+SIZED = """[medium]
+name = "glass-0.3mm-loose"
+[physical]
+length = 0.3
+[[effects]]
+kind = "end-caps"
+"""
+
+
 @pytest.mark.parametrize(
     ("toml", "good"),
     [
@@ -276,6 +285,15 @@ def both(valid, scene, table, k, part):
         ),
         (
             '[medium]\nlaw = "coulomb"\n[physical]\nradius = 0.1\n[[effects]]\nkind = "disturbed-ground"\nweakening = 1',
+            False,
+        ),
+        (SIZED + "radius_m = 0.01", True),
+        (SIZED + "radius_m = 0.01\nradius = 0.1", False),
+        (SIZED.replace("0.3\n[[", "0.3\nradius_m = 0.01\n[["), True),
+        (SIZED.replace("end-caps", "towed-sled") + "pull = 1\ndistance_m = 0.1", True),
+        (
+            SIZED.replace("end-caps", "towed-sled")
+            + "pull = 1\ndistance = 0\ndistance_m = 0.1",
             False,
         ),
         (

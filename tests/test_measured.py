@@ -1963,7 +1963,8 @@ def test_right_handed_poses_are_told_from_mirrored_ones():
         (0.5, 2.02, 1.0, 1.0, {}, ("the heading turns 4.04 times as fast as the joints",)),
         (2.9, 0.0, 1.0, 3.0, {"metres": True}, ()), (0.5, 0.0, 301.0, 1.0, {"seconds": False}, ()),
         (3.1, 0.0, 301.0, 3.0, {}, ("x and y move by 2.07", "the joints repeat every 301, and t is")),
-        (0.5, 0.0, 1.0, 1.0, {"metres": True}, ("x and y are in m by the names",)),
+        (0.5, 0.0, 1.0, None, {"metres": True}, ("x and y are in m by the names",)),
+        (0.5, 0.0, 1.0, 1.0, {"metres": True}, ()),
     ],
 )  # fmt: skip
 def test_units_are_noted_beyond_what_bodies_do(

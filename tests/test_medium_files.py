@@ -3,6 +3,7 @@ behind it."""
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -322,3 +323,17 @@ def test_every_command_takes_a_table(folder):
             for tier in ("direct", "path", "area"):
                 want = Study(plain).poses(tier, amplitudes=[0.5, 0.9])
                 np.testing.assert_allclose(table[tier], want, atol=3e-6)
+
+
+@pytest.mark.parametrize("inner", ["nowhere.toml", "bad.toml", "to.toml"])
+@pytest.mark.parametrize("name", ["three-link-glass", "c-leg", "xplorer"])
+def test_a_file_within_a_scene_is_refused_with_its_place_once(name, inner, tmp_path):
+    (tmp_path / "bad.toml").write_text("[medium]\nzeta = -1.0\nlaw = 'granular'\n")
+    (tmp_path / "to.toml").write_text('[medium]\nfile = "nowhere.toml"\n')
+    medium = f'[medium]\nfile = "{tmp_path / inner}"\n'
+    text = re.sub(r"\[medium\][^\[]*", medium, scene.load(name).text)
+    with pytest.raises(Refusal) as caught:
+        scene.parse(text)
+    told = str(caught.value)
+    assert told.startswith("scene: [medium] ") and told.count("scene: ") == 1
+    assert "::" not in told

@@ -15,6 +15,7 @@ from geomech.systems import DifferentialDrive, FloatingChain, IdealFluidSwimmer
 from geomech.systems.capabilities import OwnMetric, capability
 from geomech.systems.framed import in_frame
 from geomech.tiers.base import Numerics
+from rft.bodies.base import body_size
 from rft.refusal import Refusal
 
 OVAL = Ellipse(semi_axes=(0.9, 0.5), centre=(0.7, -0.2), tilt=0.3)
@@ -117,18 +118,18 @@ def impulses(motion, masses, inertia):
 
 def own(system):
     """Masses, and inertia of each link in the world's units, written out anew from the fields."""
-    x = system.length * np.array(system.lengths) / sum(system.lengths)
+    x = body_size(system) * np.array(system.lengths) / sum(system.lengths)
     if isinstance(system, FloatingChain):
         m = np.array(system.masses) / sum(system.masses)
         return (
             m,
             np.stack([m, m, np.array(system.inertias) * m * x**2], -1),
-            system.length**2,
+            body_size(system) ** 2,
         )
     a, b = x / 2, system.aspect * x / 2
     m = np.array(system.masses) * a * b
     about = np.array(system.inertias) * m * x**2 + (a**2 - b**2) ** 2 / 8
-    return m, np.stack([m + b**2, m + a**2, about], -1), system.length**4
+    return m, np.stack([m + b**2, m + a**2, about], -1), body_size(system) ** 4
 
 
 @pytest.mark.parametrize("frame", ["mean", "link-1", "link-3"])

@@ -38,6 +38,7 @@ from geomech.text import optimum as optima
 from geomech.tiers.base import Numerics
 from rft import Chain, Granular, Viscous
 from rft.bodies import ConstantCurvature, Serpenoid
+from rft.bodies.base import body_size
 from rft.effects import SkinFriction
 from rft.refusal import Refusal
 
@@ -90,10 +91,10 @@ def test_slopes_of_a_cycle_are_those_of_differences_of_whole_gaits(joints, mediu
     loops, p = some_loop(joints=joints)
     degree = 2.0 if medium is FLUID else 1.0
     power = lambda alpha, alphadot, xi: (
-        system.work(alpha, alphadot, xi).power / system.length
+        system.work(alpha, alphadot, xi).power / body_size(system)
     )
     by_phase = Phases(loops, system.velocity, power, degree)(p)
-    by_run = Runs(loops, system.run, True, degree, system.length, step=1e-6)(p)
+    by_run = Runs(loops, system.run, True, degree, body_size(system), step=1e-6)(p)
     for name in ("net", "swing", "length", "power"):
         (value, found), (same, rise) = getattr(by_phase, name), getattr(by_run, name)
         assert value == pytest.approx(same, rel=1e-9), name

@@ -11,7 +11,7 @@ import rft
 from geomech import scenes
 from geomech.studies.available import default_tiers
 from geomech.studies.study import Study
-from geomech.systems.base import length_unit
+from geomech.systems.base import as_system, length_unit
 from rft import Chain, Granular, Viscous
 from rft.refusal import Refusal
 
@@ -36,6 +36,39 @@ tilt_deg = 45
 [numerics]
 grid = 21
 """
+
+
+@pytest.mark.parametrize(
+    ("section", "key"),
+    [('[body]\nkind = "chain"', "length"), ('[body]\nkind = "backbone"', "length"), ('[body]\nkind = "serpenoid"', "length")]
+    + [(f'[system]\nkind = "{kind}"', "length") for kind in ("no-slip-snake", "floating-chain", "ideal-fluid-swimmer")]
+    + [('[system]\nkind = "differential-drive"', "track")],
+)  # fmt: skip
+def test_a_body_of_one_metre_is_no_body_without_a_length(section, key):
+    gait = '[gait]\nkind = "circle"\namplitude = 0.3\n'
+    if "backbone" in section:
+        section, gait = (
+            section + "\nelements = 9",
+            '[gait]\nkind = "sine"\nelements = 9\n',
+        )
+    medium = '[medium]\nlaw = "viscous"\n' if "[body]" in section else ""
+    units = [
+        length_unit(scenes.parse(medium + gait + section + size).system)
+        for size in ("", f"\n{key} = 1.0", f"\n{key} = 2.0")
+    ]
+    assert units == ["BL", "m", "m"]
+
+
+def test_a_class_of_ones_own_is_in_metres_where_it_has_a_length():
+    class Wheel:
+        joints = 1
+
+        def velocity(self, alpha, alphadot):
+            return alphadot[..., :1] * [1.0, 0.0, 0.0]
+
+    assert length_unit(as_system(Wheel())) == "BL"
+    Wheel.length = 1.0
+    assert length_unit(as_system(Wheel())) == "m"
 
 
 @pytest.mark.parametrize(

@@ -293,7 +293,7 @@ def test_what_leaves_the_library_has_one_unit_and_says_it():
     """Of a body of another length than 1: every number of a table, of a sweep and of their data sets is in the unit that is
     told beside it, and these units are one, but for speeds in body lengths; so are pictures and what a notebook shows."""
     length = 7.5
-    (one, plain), (made, table) = of_length(1.0), of_length(length)
+    (one, plain), (made, table) = of_length(None), of_length(length)
     units, no_units = (
         table["units"],
         {"units", "seconds", "kept", "zero_by_symmetry", "medium_error_rule"},

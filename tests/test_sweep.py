@@ -21,7 +21,7 @@ def test_every_point_is_the_scene_there():
     )
     assert results["displacement"].shape == (3, 2, 3)
     alone = scenes.parse(
-        GLASS.text.replace("length = 1.0 ", "length = 2.0 ")
+        GLASS.text.replace("lengths", "length = 2.0\nlengths")
     ).with_numerics(phases=32)
     poses, error = estimate.direct(
         alone, alone.gait, np.array([1.5]), alone.numerics.phases

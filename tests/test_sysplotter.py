@@ -26,6 +26,7 @@ from geomech.systems import (
 )
 from geomech.systems.table import LENGTHS
 from geomech.text.system import described
+from rft.bodies.base import body_size
 from rft.refusal import Refusal
 
 SWIMMER = Swimmer(rft.Viscous(2.0), rft.Chain((1, 1, 1), frame="link-2"))
@@ -513,7 +514,7 @@ def test_systems_of_other_kinds_are_exported_with_what_is_known_of_them(
     assert s["system_type"] == kind
     np.testing.assert_allclose(
         again.fitted.A,
-        source.fitted.A / [[[[system.length]]], [[[system.length]]], [[[1.0]]]],
+        source.fitted.A / [[[[body_size(system)]]], [[[body_size(system)]]], [[[1.0]]]],
     )
     metric = again.scene.system.stored.metric
     if kind == "inertia":

@@ -37,6 +37,7 @@ from geomech.systems.table import LENGTHS
 from geomech.text import accuracy as text
 from geomech.text.explain import explain
 from geomech.text.system import described
+from rft.bodies.base import body_size
 from rft.laws import CATALOGUE
 from rft.refusal import Refusal
 
@@ -150,7 +151,7 @@ def test_a_mat_round_trip_keeps_every_digit(sign, order, made, tmp_path):
     np.testing.assert_array_equal(again.fitted.residual, s.fitted.residual)
     assert (
         length_unit(again.scene.system),
-        again.scene.system.length,
+        body_size(again.scene.system),
         again.scene.frame,
     ) == ("m", 0.3, "link-1")
     fields.save_connection(tmp_path / "b.mat", again, sign=sign, order=order)
@@ -239,7 +240,7 @@ def test_intervals_of_a_table_of_ones_own_are_kept_and_part_of_its_error(
     low, high = (
         np.sqrt(2) * 0.01 * k * path_length for k in (1.0, 2.0)
     )  # of the heading, and of x and y in body lengths
-    assert low < more[1] < high and more[0] * table.scene.system.length > low
+    assert low < more[1] < high and more[0] * body_size(table.scene.system) > low
 
 
 @pytest.mark.parametrize(
@@ -363,7 +364,7 @@ def test_a_table_predicts_what_its_scene_predicts_within_its_error(
     source = study(medium, BODIES[body], grid=21, extent=2.3, harmonics=9)
     fields.save_connection(tmp_path / f"a{ending}", source)
     table = Study(Scene(Table(tmp_path / f"a{ending}"), GAIT))
-    ratios, length = [], source.scene.system.length  # of the body, m in one of them
+    ratios, length = [], body_size(source.scene.system)  # of the body, m in one of them
     for gait in GAITS:
         amplitudes = [0.3, 0.8, 1.2]
         true = source.poses("direct", gait, amplitudes)
@@ -443,7 +444,7 @@ def test_errors_of_tables_of_random_scenes_cover(tmp_path):
     ratios = {".nc": [], ".mat": []}
     for seed in range(100):
         source = Study(random_scene(np.random.default_rng(seed)))
-        gait, length = source.scene.gait, source.scene.system.length
+        gait, length = source.scene.gait, body_size(source.scene.system)
         amplitudes = gait.amplitude * np.array([0.3, 0.7, 1.0])
         for ending in ratios:
             fields.save_connection(tmp_path / f"a{ending}", source)

@@ -20,6 +20,7 @@ from geomech.tiers import TIERS, Plan, Tier, fitted
 from geomech.tiers.direct import direct
 from rft import BodyInertia, Chain, Granular, Viscous, se2
 from rft.balance.listening import listening
+from rft.bodies.base import body_size
 from rft.effects import DepthProfile
 from rft.refusal import Refusal
 
@@ -274,7 +275,7 @@ def test_direct_estimates_cover_the_truth(truths):
         true = truths(
             "estimates", exact, some.system.medium, some.system.body, some.gait, a, 1e-9
         )
-        errors.append(estimate.pose_distance(poses, true, some.system.body.length))
+        errors.append(estimate.pose_distance(poses, true, body_size(some.system.body)))
     coverage, excess = judged(estimates, errors)
     assert (coverage >= 0.95).all()
     assert (excess <= 10).all()

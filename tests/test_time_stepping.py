@@ -33,7 +33,7 @@ from rft import (
     work_done,
 )
 from rft.balance.solver import Accuracy
-from rft.bodies.base import half_lengths
+from rft.bodies.base import body_size, half_lengths
 from rft.contact import assemble
 from rft.refusal import Refusal
 from rft.se2 import compose, exp
@@ -200,15 +200,16 @@ def test_order_two_in_the_step(effect, fewest, truths):
 
 
 def test_transients_slow_the_sandfish():
-    """A travel of a fifth of the wave's amplitude costs 8 % of the speed; that resistive force theory exceeds
-    discrete-element simulation by 30 %, the most there is, takes 0.6 of it (paper Secs. III B, IV A)."""
+    """A travel of a fifth of the wave's amplitude costs 9 % of the speed; that resistive force theory exceeds
+    discrete-element simulation by 30 %, the most there is, takes half of it (paper Secs. III B, IV A)."""
     wave = SANDFISH.gait.amplitude * float(SANDFISH.gait.wavelength())
-    effects = [Transient(travel=share * wave) for share in (0.0, 0.1, 0.2, 0.4, 0.6)]
-    slowed = [SANDFISH.changed(effects=(effect,)) for effect in effects]
+    effects = [Transient(travel=share * wave) for share in (0.0, 0.1, 0.2, 0.4, 0.525)]
+    head = SANDFISH.system.effects
+    slowed = [SANDFISH.changed(effects=(*head, effect)) for effect in effects]
     net = np.hypot(*side_by_side(slowed).cycle(phases=64).net.T[:2])
     lost = 1 - net / net[0]
     assert (np.diff(lost) > 0).all()
-    assert lost[2] == pytest.approx(0.085, abs=0.003)
+    assert lost[2] == pytest.approx(0.090, abs=0.003)
     assert lost[4] == pytest.approx(1 - 1 / 1.3, abs=0.02)
 
 
@@ -443,7 +444,7 @@ def test_estimates_of_marches_cover_the_truth(truths):
         a = np.array([0.12, 0.22, 0.35])
         found, error = estimate.direct(scene, scene.gait, a, 64)
         truth = truths("marches", periodic, (effect,), scene.gait, Backbone(30), 256, a)
-        off = estimate.pose_distance(found, truth, scene.system.body.length)
+        off = estimate.pose_distance(found, truth, body_size(scene.system.body))
         assert (off <= error).all(), type(effect)
         assert (error[:, 0] <= 100 * off[:, 0] + 1e-4).all(), type(effect)
         assert error[:, 1].max() <= 100 * off[:, 1].max() + 1e-4, type(

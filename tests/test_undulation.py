@@ -29,6 +29,7 @@ from rft import (
     body_velocity,
     work_done,
 )
+from rft.bodies.base import body_size
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
@@ -114,7 +115,7 @@ def test_internal_moments_do_the_work():
             GLASS, body, alpha, alphadot, effects=effects, tolerance=1e-13
         )
         done = work_done(GLASS, body, alpha, alphadot, solution.xi, effects=effects)
-        put_in = (done.bending_moment * alphadot).sum(-1) * body.length
+        put_in = (done.bending_moment * alphadot).sum(-1) * body_size(body)
         np.testing.assert_allclose(put_in, done.power, rtol=1e-5)
         assert (done.power > 0).all()
 
@@ -311,6 +312,12 @@ def test_fig09c(numbers, tmp_path):
     assert loose["best"]["progress"][0] == pytest.approx(0.295, abs=0.006)
     assert close["best"]["progress"][0] == pytest.approx(0.343, abs=0.006)
     assert not any("efficiency" in found["best"] for found in (loose, close))
+    # Read by the arc length of a wave the optimum of an endless wave is at the animal; read by the wavelength it has none.
+    at = fig09c_efficiency.arc_efficiency(loose, "endless")
+    assert undulation.optimum(loose["amplitude"], at)[0] == pytest.approx(
+        0.211, abs=0.004
+    )
+    assert undulation.optimum(loose["amplitude"], loose["endless"]) is None
     # "both swimmers also minimized their energy use": the best wave is near the cheapest.
     for found in (loose, snake):
         assert found["best"]["progress"][0] == pytest.approx(

@@ -42,7 +42,8 @@ class Study(studies.Study):
     effects : list of effects
         Those of a medium and a body.
     **numerics :
-        Other settings than the scene's, such as grid=21, phases=64.
+        Other settings than the scene's, such as grid=21, phases=64; and joints=4, of a
+        velocity that comes without a gait.
 
     Examples
     --------

@@ -15,7 +15,7 @@ from geomech.core.errors import Note, UnitWarning
 from geomech.gaits import frames, midline
 from geomech.geometry.gait import GAITS, LARGEST, Gait
 from geomech.io.rows import LARGEST_NUMBER
-from rft.checks import Number
+from rft.checks import Number, unmasked
 from rft.refusal import Refusal
 
 LARGEST_GAP = 0.25  # of the period, between neighbouring frames
@@ -207,10 +207,10 @@ class Centreline(Gait):
             )
 
     def unit(self, t: ArrayLike) -> np.ndarray:
-        return self._curve(np.asarray(t, float), 0)
+        return self._curve(unmasked("t", t), 0)
 
     def unit_rate(self, t: ArrayLike) -> np.ndarray:
-        return self._curve(np.asarray(t, float), 1)
+        return self._curve(unmasked("t", t), 1)
 
     @classmethod
     def examples(cls) -> dict[str, Centreline]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geomech.geometry.gait import GAITS, LARGEST, Gait, Scale, finite_array
-from rft.checks import Number
+from rft.checks import Number, unmasked
 from rft.refusal import Refusal
 
 
@@ -33,13 +33,13 @@ class Series(Gait):
 
     def unit(self, t: ArrayLike) -> np.ndarray:
         cos, sin = self.coefficients()
-        kt = np.asarray(t, float)[..., None] * np.arange(1, cos.shape[1] + 1)
+        kt = unmasked("t", t)[..., None] * np.arange(1, cos.shape[1] + 1)
         return np.cos(kt) @ cos.T + np.sin(kt) @ sin.T
 
     def unit_rate(self, t: ArrayLike) -> np.ndarray:
         cos, sin = self.coefficients()
         k = np.arange(1, cos.shape[1] + 1)
-        kt = np.asarray(t, float)[..., None] * k
+        kt = unmasked("t", t)[..., None] * k
         return np.cos(kt) @ (k * sin).T - np.sin(kt) @ (k * cos).T
 
 

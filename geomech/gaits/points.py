@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geomech.geometry.gait import GAITS, Gait, finite_array
+from rft.checks import unmasked
 from rft.refusal import Refusal
 
 
@@ -57,10 +58,10 @@ class Points(Gait):
         return CubicSpline(2 * np.pi * length / length[-1], loop, bc_type="periodic")
 
     def unit(self, t: ArrayLike) -> np.ndarray:
-        return self._spline()(np.asarray(t, float))
+        return self._spline()(unmasked("t", t))
 
     def unit_rate(self, t: ArrayLike) -> np.ndarray:
-        return self._spline()(np.asarray(t, float), 1)
+        return self._spline()(unmasked("t", t), 1)
 
     @classmethod
     def examples(cls) -> dict[str, Points]:

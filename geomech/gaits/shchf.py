@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from geomech.gaits.fourier import Fourier
 from geomech.geometry.gait import GAITS, Gait, Scale, finite_array
 from geomech.io import shchf
-from rft.checks import Number
+from rft.checks import Number, unmasked
 from rft.refusal import Refusal
 
 
@@ -107,14 +107,14 @@ class Shchf(Gait):
         return (
             self._curve.unit(t)
             if isinstance(self._curve, Fourier)
-            else self._curve(np.asarray(t, float))
+            else self._curve(unmasked("t", t))
         )
 
     def unit_rate(self, t: ArrayLike) -> np.ndarray:
         return (
             self._curve.unit_rate(t)
             if isinstance(self._curve, Fourier)
-            else self._curve(np.asarray(t, float), 1)
+            else self._curve(unmasked("t", t), 1)
         )
 
     @classmethod

@@ -23,7 +23,7 @@ from geomech.geometry.field import UNKNOWN_UNIT, Field, as_axes, half_grid
 from geomech.geometry.images import Image, images, to_solve
 from geomech.geometry.traits import NOTHING, Traits
 from geomech.geometry.velocity import Reporting, Velocity, checked_velocity, evaluate
-from rft.checks import in_range, is_whole, real_array
+from rft.checks import in_range, is_whole, real_array, unmasked
 from rft.refusal import Refusal
 
 EVEN_DIRECTIONS, EVEN_SHAPES = 4, 16  # a joint, and in all, at which `even_part` looks
@@ -346,7 +346,7 @@ def even_part(
     >>> even_part(DifferentialDrive().velocity, grid(2, 5)) is None  # it changes sign with alphadot
     True
     """
-    axes = tuple(np.asarray(a, float) for a in axes)
+    axes = tuple(unmasked("axes", a) for a in axes)
     unit = directions(len(axes), EVEN_DIRECTIONS * len(axes))
     rng = np.random.default_rng(0)
     shapes = np.stack([rng.uniform(a[0], a[-1], (EVEN_SHAPES, 1)) for a in axes], -1)

@@ -11,12 +11,13 @@ import numpy as np
 
 from geomech.geometry.connection import Velocity
 from rft import se2
+from rft.checks import unmasked
 
 
 def frame_velocity(h, hdot) -> np.ndarray:
     """Return h^-1 dh/dt (..., 3): the second frame's velocity relative to the first, in the second. h, hdot: (...,
     3)."""
-    h, hdot = np.asarray(h, float), np.asarray(hdot, float)
+    h, hdot = unmasked("h", h), unmasked("hdot", hdot)
     x, y = se2.rotated(-h[..., 2], hdot[..., 0], hdot[..., 1])
     return np.stack([x, y, hdot[..., 2]], -1)
 
@@ -24,7 +25,7 @@ def frame_velocity(h, hdot) -> np.ndarray:
 def change_velocity(xi, h, hdot) -> np.ndarray:
     """Return the body velocity (..., 3) of the frame g h from that of the frame g."""
     carried = np.einsum(
-        "...ij,...j->...i", se2.adjoint(se2.inverse(h)), np.asarray(xi, float)
+        "...ij,...j->...i", se2.adjoint(se2.inverse(h)), unmasked("xi", xi)
     )
     return carried + frame_velocity(h, hdot)
 

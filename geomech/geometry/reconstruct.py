@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rft import se2
-from rft.checks import real_array
+from rft.checks import real_array, unmasked
 from rft.refusal import Refusal
 
 
@@ -109,7 +109,7 @@ def trajectory(xi: ArrayLike, phases: ArrayLike) -> np.ndarray:
     reach = span * np.exp(0.5j * turns * span) * np.sinc(turns * span / (2 * np.pi))
     z = (s.wave[..., None, :] * reach).sum(-1)
     waves = _waves(np.shape(xi)[-2])
-    swing = waves.integral * waves.coefficients(np.asarray(xi, float)[..., 2])
+    swing = waves.integral * waves.coefficients(unmasked("xi", xi)[..., 2])
     swing = (swing[..., None, :] * np.expm1(1j * s.k * span)).sum(-1).real
     return np.stack([z.real, z.imag, s.mean_turn * t + swing], -1)
 

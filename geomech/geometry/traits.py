@@ -30,7 +30,7 @@ class Traits:
     singular : where that is, in words that follow "where".
     joint_angles : shape variables are angles of joints, so that one beyond a full turn is likely a slip of unit.
     frame : name of the body frame that xi is the velocity of.
-    unit : of lengths in xi; if left out "BL", body lengths, for a body of length 1, else "m".
+    unit : of lengths in xi, "BL" (body lengths) or "m"; if left out by the system's ``length`` (`unit_of`).
     labels : (name, unit) of each shape variable; alpha_1, alpha_2 ... in rad if left out.
     frequency : cycles per second, where xi depends on it.
     """
@@ -62,3 +62,9 @@ class Traits:
 
 
 NOTHING = Traits()
+
+
+def unit_of(length: float | None) -> str:
+    """Return the unit of lengths of a body with a length, m, or without one: "m" or
+    "BL", body lengths."""
+    return "BL" if length is None else "m"

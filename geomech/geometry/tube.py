@@ -18,7 +18,7 @@ from geomech.geometry.connection import Connection
 from geomech.geometry.field import inside
 from geomech.geometry.reconstruct import displacement
 from rft import se2
-from rft.checks import real_array
+from rft.checks import real_array, unmasked
 from rft.refusal import Refusal
 
 BEYOND = "nan, where the data of the log do not reach"
@@ -31,7 +31,7 @@ SHAPES_TOGETHER = 256  # whose distances from all places, 1 MB, are held at a ti
 
 def waves(t, harmonics: int, order: int = 0) -> np.ndarray:
     """Return (..., 2 harmonics + 1): 1, cos t, sin t, cos 2t, sin 2t ... or their derivatives of that order."""
-    turn = np.exp(1j * np.asarray(t, float))[..., None]
+    turn = np.exp(1j * unmasked("t", t))[..., None]
     turns = np.cumprod(np.broadcast_to(turn, (*np.shape(t), harmonics)), -1)
     turns *= (1j * np.arange(1.0, harmonics + 1)) ** order
     found = np.empty((*np.shape(t), 2 * harmonics + 1))
@@ -110,7 +110,7 @@ class Loop:
         if rate.shape[-1] == 2:
             tangent = rate / np.linalg.norm(rate, axis=-1, keepdims=True)
             return np.stack([-tangent[..., 1], tangent[..., 0]], -1)[..., None]
-        place = np.asarray(t, float) % (2 * np.pi) * PLACES / (2 * np.pi)
+        place = unmasked("t", t) % (2 * np.pi) * PLACES / (2 * np.pi)
         k = np.minimum(place.astype(int), PLACES - 1)
         part = (place - k)[..., None, None]
         return (1 - part) * self._normals[k] + part * self._normals[k + 1]

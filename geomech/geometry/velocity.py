@@ -132,9 +132,10 @@ def evaluate(
         raise Refusal(
             "velocity must be a function of alpha and alphadot", value=velocity
         )
-    xi = real_array(
-        "what velocity returns", velocity(*np.broadcast_arrays(alpha, alphadot))
-    )
+    xi = velocity(*np.broadcast_arrays(alpha, alphadot))
+    if masked and isinstance(xi, np.ma.MaskedArray):
+        xi = xi.astype(float).filled(np.nan)
+    xi = real_array("what velocity returns", xi)
     if xi.shape != shape and broadcasts_to(xi, shape):
         xi = np.broadcast_to(xi, shape).copy()
     if xi.shape != shape:

@@ -50,6 +50,13 @@ def question(file: Path, scene: Path | None = None, **options: Any) -> Fit | Mid
         )
     is_midlines = kind == "midlines" or (not kind and bool(of_midlines))
     wrong = of_logs if is_midlines else of_midlines
+    if is_midlines and wrong[:1] == ["scene"]:
+        raise Refusal(
+            f"``scene`` belongs to {LOG}",
+            where=line(file.name),
+            instead="give one cycle of the midlines to a scene whose [gait] has kind = "
+            "'centreline' and file = ...",
+        )
     if wrong:
         theirs, ours = (LOG, MIDLINES) if is_midlines else (MIDLINES, LOG)
         raise Refusal(

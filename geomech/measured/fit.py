@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from geomech.gaits import Fourier
 from geomech.geometry.reconstruct import displacement
+from geomech.geometry.traits import unit_of
 from geomech.geometry.tube import Loop, TaylorSeries, Tube, covering_grid, series, tube
 from geomech.io.tables.base import LARGEST_ENTRY
 from geomech.measured import cycles, plausibility, regression, smooth, unknowns
@@ -19,6 +20,7 @@ from geomech.measured import phase as phase_module
 from geomech.measured.log import Log, read
 from geomech.measured.residual import residual_of
 from geomech.measured.spread import DEVIATIONS, spread
+from geomech.systems.base import body_size
 from rft import se2
 from rft.checks import in_range
 
@@ -41,7 +43,7 @@ class Fitted:
     misfit of xi, over that of the joint rates; explained: (3,), share of the squares of xi that the fit explains.
     noise: (d + 3,), of the rows' joint angles, x, y and heading. across: whether the cycles vary enough to determine A
     across the gait. combined: joints that are linear combinations of others, factors (d,) by number, where these are
-    why they do not. length: of the body in m; 1 for a log in body lengths.
+    why they do not. length: of the body in m; None for a log in body lengths.
 
     Examples
     --------
@@ -69,10 +71,10 @@ class Fitted:
     noise: np.ndarray
     across: bool
     combined: dict[int, np.ndarray]
-    length: float
+    length: float | None
     samples: regression.Samples
 
-    unit = property(lambda self: "BL" if self.length == 1.0 else "m")
+    unit = property(lambda self: unit_of(self.length))
 
     @cached_property
     def gait(self) -> Fourier:
@@ -108,7 +110,7 @@ class Fitted:
             covering_grid(self.known, points),
             self.residual,
             self.unit,
-            self.length,
+            body_size(self),
         )
 
     def along(self, t: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
@@ -128,14 +130,14 @@ class Fitted:
 
 def fit_log(
     log: str | Path | Log, *, columns: Sequence[str] = (), degrees: bool = False, level: float = 0.95,
-    harmonics: int | None = None, limits: float | None = None, body_length: float = 1.0,
+    harmonics: int | None = None, limits: float | None = None, body_length: float | None = None,
 ) -> Fitted:  # fmt: skip
     """Fit the connection near the mean gait of a log; Refusal for a log that does not determine it.
 
     columns, degrees: as in `geomech.measured.log.read`. level: share of cases in which an interval should contain the
     truth. harmonics: of the connection in the phase; by cross-validation if None. limits (rad): distance from the mean
     gait up to which the connection is given; as far as the data extend if None. body_length: in the unit
-    of x and y; 1 for a log in body lengths.
+    of x and y; None for a log in body lengths.
 
     Examples
     --------
@@ -151,7 +153,8 @@ def fit_log(
     (2, 18)
     """
     in_range("``level``", level, 0.5, 0.999)
-    in_range("``body_length``", body_length, 1e-9, 1e9)
+    if body_length is not None:
+        in_range("``body_length``", body_length, 1e-9, 1e9)
     if harmonics is not None:
         in_range("``harmonics``", harmonics, 1, HARMONICS, whole=True)
     if limits is not None:

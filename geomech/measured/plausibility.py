@@ -20,13 +20,13 @@ MIRRORED = 0.5  # residual of the mirror image over that of the velocity in a le
 
 
 def note_units(
-    log: Log, joints: Smoothed, pose: Smoothed, period: float, length: float
+    log: Log, joints: Smoothed, pose: Smoothed, period: float, length: float | None
 ) -> None:
-    """Warn of numbers that are likely in another unit. length: of the body, in the unit of x and y."""
+    """Warn of numbers that are likely in another unit. length: of the body, m; None for a log in body lengths."""
     rms = lambda rates: float(np.sqrt((rates**2).sum(-1).mean()))
     joint_speed, speed, turning = (
         rms(joints.rates),
-        rms(pose.rates[:, :2]) / length,
+        rms(pose.rates[:, :2]) / (1.0 if length is None else length),
         rms(pose.rates[:, 2:]),
     )
     notes = []
@@ -40,7 +40,7 @@ def note_units(
         notes.append(
             f"x and y move by {speed / joint_speed:.3g} body lengths where the joints turn by 1 rad: {cure}"
         )
-    if length == 1.0 and log.metres:
+    if length is None and log.metres:
         notes.append(
             "x and y are in m by the names of their columns, and are taken for body lengths: say ``body_length``"
         )

@@ -19,6 +19,7 @@ from geomech.studies import fields
 from geomech.studies.fields import INTERVAL_OF_CCF, angles_of
 from geomech.studies.question import Allow, Progress, Question
 from geomech.studies.tables import COMPONENTS
+from geomech.systems.base import body_size
 
 ALONG = "fitted along the gait alone"
 
@@ -56,7 +57,7 @@ class Fit(Question):
     level: float = 0.95
     harmonics: int | None = None
     limits: float | None = None
-    body_length: float = 1.0
+    body_length: float | None = None
 
     def inputs(self) -> list[Path]:
         return [self.log]
@@ -124,7 +125,7 @@ def _about(fit: Fitted) -> dict:
         "Hatton and Revzen, Nonlinear Dynamics 94, 1933 (2018))",
         "frame": "that of the log",
         "frame_meaning": "body frame: the one whose x, y and heading were logged",
-        "body_length": float(fit.length),
+        "body_length": float(body_size(fit)),
         "length_unit": unit_name(fit.unit),
         "components": "x, y, theta of the body velocity xi: along the heading, to the left, counter-clockwise",
         "sign_of_A": "xi = + A alphadot",

@@ -10,6 +10,7 @@ from geomech.optimisation.cycles import CycleValues, cycle_values
 from geomech.optimisation.optimum import Evaluation
 from geomech.optimisation.request import Request
 from geomech.studies import estimate
+from geomech.systems.base import body_size
 from geomech.systems.capabilities import OwnMetric, capability
 
 
@@ -59,7 +60,7 @@ def evaluate_gait(r: Request, gait: Gait) -> Evaluation:
 def _power(r: Request, run, alpha, alphadot) -> np.ndarray | None:
     """Return the power (N,) of a gait that was run, in body drag x body length / time; None where it is not known."""
     if run.work is not None:
-        return np.maximum(run.work.power / r.system.length, 0.0)
+        return np.maximum(run.work.power / body_size(r.system), 0.0)
     return (
         None if r.power is None else np.maximum(r.power(alpha, alphadot, run.xi), 0.0)
     )

@@ -11,6 +11,7 @@ from geomech.geometry import metric
 from geomech.optimisation.cycles import Phases, Runs
 from geomech.optimisation.request import Request
 from geomech.studies.study import Study
+from geomech.systems.base import body_size
 
 
 def direct(r: Request, phases: int | None = None) -> Phases | Runs:
@@ -18,7 +19,7 @@ def direct(r: Request, phases: int | None = None) -> Phases | Runs:
     degree = r.degree if r.objective.costs else 1.0
     loops = r.loops if phases is None else dataclasses.replace(r.loops, phases=phases)
     if r.by_runs:
-        return Runs(loops, r.system.run, r.objective.costs, degree, r.system.length)
+        return Runs(loops, r.system.run, r.objective.costs, degree, body_size(r.system))
     velocity = (
         _inside(r.system.velocity, r.loops.box) if r.stored else r.system.velocity
     )

@@ -19,7 +19,7 @@ from geomech.optimisation.objectives import Objective
 from geomech.optimisation.undulations import Undulations
 from geomech.scenes.model import Scene, checked_scene
 from geomech.studies import cost
-from geomech.systems.base import System, kind_of
+from geomech.systems.base import System, body_size, kind_of
 from geomech.systems.capabilities import (
     Dissipative,
     OwnMetric,
@@ -243,7 +243,7 @@ def checked(
                 because=f"A is known near {near_gait(system)} alone",
                 instead="measure more varied cycles",
             )
-        maximised = Objective(objective, towards, system.length, **pace)
+        maximised = Objective(objective, towards, body_size(system), **pace)
         if maximised.timed:
             if system.traits.lacks & Premise.RATE_INDEPENDENT:
                 refuse(
@@ -259,7 +259,7 @@ def checked(
                     if waves
                     else {"rate": _own_rate(scene)}
                 )
-                maximised = Objective(objective, towards, system.length, **own)
+                maximised = Objective(objective, towards, body_size(system), **own)
         loops = _loops(scene, harmonics, limits)
         if isinstance(loops, Undulations) and not maximised.straight:
             raise Refusal(
@@ -334,7 +334,8 @@ def _stays(system: System) -> bool:
     rng = np.random.default_rng(0)
     xi = evaluate(system.velocity, *rng.normal(size=(2, 16, system.joints)))
     return bool(
-        np.nanmax(np.abs(xi[:, :2])) <= STILL * system.length * np.nanmax(np.abs(xi))
+        np.nanmax(np.abs(xi[:, :2]))
+        <= STILL * body_size(system) * np.nanmax(np.abs(xi))
     )
 
 
@@ -374,7 +375,7 @@ def _own_power(scene: Scene) -> float:
     return (
         float(
             np.maximum(work.power, 0.0).mean()
-            / system.length
+            / body_size(system)
             * per_second**system.traits.power_degree
         )
         or 1.0

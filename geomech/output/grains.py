@@ -10,6 +10,7 @@ import numpy as np
 from geomech import plots, text
 from geomech.core.variables import Result
 from geomech.io.files import write_text
+from geomech.systems.base import body_size
 from geomech.text import drag_grains, grain_swim
 
 
@@ -40,7 +41,7 @@ def draw_swim(result: Result):
     fig, axes = plots.figure(7.2, 3.0, 2, 1)
     left, right = axes[0]
     size, body = result.attributes["size"], question.swimmer.body
-    unit = size / body.length
+    unit = size / body_size(body)
     starts = [0.0, *((0.5 + np.arange(question.cycles + 1)) / question.frequency)]
     left.plot(*(run.pose[:, :2].T / size), color="0.5", lw=0.6)
     for k, t in enumerate(starts):

@@ -11,7 +11,7 @@ from geomech.output import animate
 from geomech.run.progress import progress as progress_bar
 from geomech.scenes.model import Scene
 from geomech.studies.motion import Motion, Trajectory
-from geomech.systems.base import length_unit, shape_labels
+from geomech.systems.base import body_size, length_unit, shape_labels
 from rft.refusal import in_line
 
 
@@ -93,7 +93,7 @@ def about(motion: Motion) -> list[str]:
         "phase (rad): of the gait, 2 pi a cycle"
         + ("; time (s)" if "time" in columns else ""),
         f"x ({unit}), y ({unit}), theta (rad): pose of the frame {scene.frame}, seen from where it is at phase 0"
-        f"; the body's length: {system.length:g} {unit}",
+        f"; the body's length: {body_size(system):g} {unit}",
         shapes + (" ..." if len(shape_labels(system)) > 8 else ""),
     ]
     if "end_0_x" in columns:

@@ -12,6 +12,7 @@ from geomech.core.summary import listed
 from geomech.gaits import Gait
 from geomech.geometry.symmetry import zero_components
 from geomech.plots.style import axes_of, figure, shared_legend, styled
+from geomech.scenes.measurements import converted, units_of
 from geomech.studies.tables import ERRORS, QUANTITIES, error_of, of_pose, unit_of
 from geomech.systems.base import System
 from geomech.tiers import TIERS
@@ -46,8 +47,9 @@ def displacement(
     """Draw one of QUANTITIES per cycle against amplitude, a line for each tier; ``table`` as `Study.study` returns it.
 
     errors: with a band of each tier's estimated error, in its colour; an uncertain medium has an outlined band of its own. The
-    table's own units are those of the axis. data: measurements to draw as points, "amplitude", "value" and "error" (N,) in the
-    units of the axes, such as a data frame of pandas; the error may be missing.
+    table's own units are those of the axis. data: measurements to draw as points, "amplitude", "value" and "error" (N,), such
+    as a data frame of pandas; the error may be missing. A name may end in a unit, as those of a file: "amplitude_deg",
+    "value_cm"; without it the unit is that of the axis.
 
     Examples
     --------
@@ -57,6 +59,10 @@ def displacement(
     'net distance per cycle (BL)'
     """
     ax, amplitudes = axes_of(ax, 4.4, 3.8), np.asarray(table["amplitude"], float)
+    if data is not None:
+        unit, length = unit_of(table, "x"), table.get("body_length", 1.0)
+        units = units_of(gait, unit, length, angle=quantity == "heading")
+        data = converted(data, units)
     errors = errors and all(key in table for key in ERRORS)
     shown = [name for name in TIERS if name in table]
     span = np.ptp(np.append(amplitudes, [] if data is None else data["amplitude"]))
@@ -162,8 +168,7 @@ def medium_band(ax: Axes, x: Any, values: Any, error: Any) -> None:
 
 def measured(ax, data: Mapping) -> None:
     """Draw measurements as points with bars of their errors."""
-    x, values = (np.asarray(data[name], float) for name in ("amplitude", "value"))
-    error = np.asarray(data["error"], float) if "error" in data else None
+    x, values, error = data["amplitude"], data["value"], data.get("error")
     look = {
         "fmt": "D",
         "ms": 4,

@@ -12,7 +12,7 @@ from geomech.geometry.field import Field
 from geomech.plots.maps import ccf_map, draw_gait, has, shape_space
 from geomech.plots.style import blank, figure, quantity, styled
 from geomech.studies.motion import Motion
-from geomech.systems.base import length_unit, shape_labels
+from geomech.systems.base import body_size, length_unit, shape_labels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,7 +29,7 @@ def reach(motion: Motion, rows) -> tuple[np.ndarray, np.ndarray]:
     """Return (lowest, highest) x and y of all that is seen in these rows, with a margin."""
     places = [motion.pose[:, :2], _bodies(motion, rows).reshape(-1, 2)]
     low, high = np.concatenate(places).min(0), np.concatenate(places).max(0)
-    room = ROOM * max(*(high - low), 1e-9 * motion.scene.system.length)
+    room = ROOM * max(*(high - low), 1e-9 * body_size(motion.scene.system))
     return low - room, high + room
 
 
@@ -39,7 +39,7 @@ def _bodies(motion: Motion, rows) -> np.ndarray:
     if points is not None:
         return points
     x, y, theta = motion.pose[rows].T[..., None]
-    along = motion.scene.system.length * np.array([-0.5, 0.5])
+    along = body_size(motion.scene.system) * np.array([-0.5, 0.5])
     return np.stack([x + np.cos(theta) * along, y + np.sin(theta) * along], -1)
 
 

@@ -60,6 +60,8 @@ def value_hint(message: str, table: Mapping, kind: type) -> str:
             )
         return f"give {EXPECTED.get(expected, expected)} in place of {formatted(value)}"
     key = message.partition(" must ")[0]
+    if key == "frame":
+        return "name one of these, or 'minimum-perturbation'"
     given = is_number(table.get(key)) and abs(table[key]) < float("inf")
     return (
         f"{key} is in rad, write {key}_deg for degrees"

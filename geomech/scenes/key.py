@@ -79,6 +79,7 @@ def keys_of(kind: type) -> list[Key]:
     for field in dataclasses.fields(kind):
         if field.init and field.name != "solver":
             required = field.default is field.default_factory is dataclasses.MISSING
+            required = required or field.name in getattr(kind, "required", ())
             default = None if required else _default(field)
             schema, (unit, meaning) = (
                 _plain(schemas.get(field.name, {})),

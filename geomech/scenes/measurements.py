@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from geomech.gaits import Gait
 from geomech.io import rows
 from geomech.io.rows import plain, split_unit
 from geomech.scenes.columns import LARGEST_FILE
 from geomech.scenes.key import angles_of
 from geomech.scenes.model import Scene
-from geomech.systems.base import length_unit
+from geomech.systems.base import body_size, length_unit
+from rft.checks import unmasked
 from rft.refusal import Refusal, located
 
 COLUMNS = ("amplitude", "value", "error")
@@ -27,22 +30,9 @@ def read(path: str | Path, scene: Scene, angle: bool = False) -> dict[str, np.nd
     The header names the columns amplitude and value, and error if wanted, in any order, with the unit behind it where that
     is another, as amplitude_deg, value_mm or error_BL. angle: values are headings. Refusal, with the line, for any other."""
     source = rows.read(path, LARGEST_FILE, f"give a CSV file with the header {HEADER}")
-    units, found = _units(scene, angle), {}
-    for word in source.words:
-        name, unit = split_unit(word)
-        name = plain(name)
-        if name not in COLUMNS or name in found:
-            raise Refusal(
-                f"the header must be {HEADER}", value=word, where=source.place
-            )
-        with located(source.place):
-            found[name] = _scale(name, unit, units[name], scene)
-    if not {"amplitude", "value"} <= {*found}:
-        raise Refusal(
-            f"the header must be {HEADER}",
-            value=",".join(source.words),
-            where=source.place,
-        )
+    length = body_size(scene.system)
+    units = units_of(scene.gait, length_unit(scene.system), length, angle)
+    found = _scales(source.words, units, source.place, scene.name)
     table = source.numbers(source.words)
     if not len(table):
         raise Refusal(
@@ -60,22 +50,57 @@ def read(path: str | Path, scene: Scene, angle: bool = False) -> dict[str, np.nd
     return columns
 
 
-def _units(scene: Scene, angle: bool) -> dict[str, dict[str, float]]:
-    """Return, by column, the units that it may have, in that of the scene's results."""
-    amplitude = ANGLES if "amplitude" in angles_of(type(scene.gait)) else {"": 1.0}
-    lengths = {"": 1.0, "BL": scene.system.length}
-    lengths |= METRES if length_unit(scene.system) == "m" else {}
+def converted(data: Mapping, units: dict[str, dict[str, float]]) -> dict:
+    """Return amplitude, value and error (N,) of measurements that a caller has, named as
+    the columns of a file are; error may be missing. Refusal for other names."""
+    own = [x for x in data if str(x).lower().startswith(COLUMNS)]  # beside others
+    scales = _scales([str(x) for x in own], units, "data", "the table")
+    names = dict(zip(scales, own))
+    return {
+        name: scale * unmasked(name, data[names[name]])
+        for name, scale in scales.items()
+    }
+
+
+def units_of(
+    gait: Gait | None, unit: str, length: float, angle: bool
+) -> dict[str, dict[str, float]]:
+    """Return, by column, the units that it may have, in those of results in ``unit``, "BL"
+    or "m". gait: of the amplitudes, None where it is not known. length: of the body in
+    that unit. angle: values are headings."""
+    in_angles = gait is None or "amplitude" in angles_of(type(gait))
+    amplitude = ANGLES if in_angles else {"": 1.0}
+    lengths = {"": 1.0, "BL": length} | (METRES if unit == "m" else {})
     value = ANGLES if angle else lengths
     return {"amplitude": amplitude, "value": value, "error": value}
 
 
-def _scale(name: str, unit: str, units: dict[str, float], scene: Scene) -> float:
+def _scales(
+    words: Sequence[str], units: dict[str, dict[str, float]], place: str, owner: str
+) -> dict[str, float]:
+    """Return the factor of each column from the unit in its name to that of the results
+    of ``owner``; Refusal for a header that is none."""
+    found: dict[str, float] = {}
+    for word in words:
+        name, unit = split_unit(word)
+        name = plain(name).lower()
+        if name not in COLUMNS or name in found:
+            raise Refusal(f"the header must be {HEADER}", value=word, where=place)
+        with located(place):
+            found[name] = _scale(name, unit, units[name], owner)
+    if not {"amplitude", "value"} <= {*found}:
+        given = ",".join(words)
+        raise Refusal(f"the header must be {HEADER}", value=given, where=place)
+    return found
+
+
+def _scale(name: str, unit: str, units: dict[str, float], owner: str) -> float:
     """Return the factor from the unit of a column to that of the results; Refusal for a unit that the column cannot have."""
     if unit in units:
         return units[unit]
     such = [f"{name}_{x}" for x in units if x]
     why = (
-        f"lengths of {scene.name} are in body lengths"
+        f"lengths of {owner} are in body lengths"
         if unit in METRES and "BL" in units
         else ""
     )

@@ -29,7 +29,7 @@ from geomech.systems.base import (
     unwrapped,
 )
 from geomech.systems.capabilities import solver_of, with_solver
-from geomech.systems.swimmer import PARTS
+from geomech.systems.swimmer import PARTS, Swimmer, note_radius
 from geomech.tiers.base import Numerics
 from rft.refusal import Refusal, formatted, located, printable
 
@@ -109,6 +109,8 @@ class Scene(Displayed):
             frequency_of(self.system, self.gait)
             object.__setattr__(self, "system", reframed(self.system, self.numerics))
             self.note_turns(self.gait)
+            if isinstance(self.system, Swimmer):
+                note_radius(self.system)
 
     def note_turns(self, gait: Gait, amplitudes: ArrayLike | None = None) -> None:
         """Warn (`UnitWarning`) if a gait turns a joint by more than a full turn."""

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from geomech.gaits import Circle, Gait, Wave
 from geomech.scenes.model import Scene
 from geomech.scenes.read import load, medium_of
@@ -21,18 +23,22 @@ JOINTS = 12  # up to which a wave is the gait of a system without one
 LONG = 24  # letters that a refusal prints of each part
 
 
-def as_scene(*parts: Any, effects: Sequence = (), **numerics: Any) -> Any:
+def as_scene(
+    *parts: Any, effects: Sequence = (), joints: int | None = None, **numerics: Any
+) -> Any:
     """Return a scene from a name, a file or a scene, from an object that has a ``scene``, or from parts.
 
     Parts are a medium and a body, or a system, or a function velocity(alpha, alphadot), and a gait, each by its kind; a
     tuple stands for its members. A medium may be its name or its file. Without a gait two joints run a circle of 1 rad,
-    and other bodies of few joints a wave of 0.5 rad. effects: of a medium and a body. numerics: other [numerics].
-    Refusal for anything else."""
+    and other bodies of few joints a wave of 0.5 rad. effects: of a medium and a body. joints: of a velocity that comes
+    without a gait, 2 if left out. numerics: other [numerics]. Refusal for anything else."""
     if len(parts) == 1 and isinstance(parts[0], tuple):
         parts = parts[0]
     scene = _whole(parts[0]) if len(parts) == 1 else None
     if scene is None:
-        scene = _assembled(parts, tuple(effects))
+        scene = _assembled(parts, tuple(effects), joints)
+    elif joints is not None:
+        raise Refusal("``joints`` are those of a velocity", instead="drop it")
     elif effects:
         raise Refusal(
             "effects are those of a medium and a body",
@@ -51,7 +57,7 @@ def _whole(part: Any) -> Any:
     )  # of any kind, with a gait or without
 
 
-def _assembled(parts: Sequence, effects: tuple) -> Scene:
+def _assembled(parts: Sequence, effects: tuple, joints: int | None) -> Scene:
     """Return the scene of a medium and a body, a system or a velocity, and a gait where there is one."""
     gaits = [p for p in parts if _is_gait(p)]
     media = [
@@ -62,6 +68,8 @@ def _assembled(parts: Sequence, effects: tuple) -> Scene:
     bodies = [p for p in parts if _is_body(p)]
     others = [p for p in parts if not (_is_gait(p) or _is_medium(p) or _is_body(p))]
     if (len(media), len(bodies), len(others)) == (1, 1, 0) and len(gaits) <= 1:
+        if joints is not None:
+            raise Refusal("``joints`` are those of a velocity", instead="drop it")
         system: System = Swimmer(media[0], bodies[0], effects)
     elif (
         (media, bodies, effects) == ([], [], ())
@@ -69,11 +77,43 @@ def _assembled(parts: Sequence, effects: tuple) -> Scene:
         and len(gaits) <= 1
         and _moves(others[0])
     ):
-        system = as_system(others[0], gaits[0].joints if gaits else 2)
+        system = as_system(others[0], _joints_of(others[0], gaits, joints))
+        if joints not in (None, system.joints):
+            raise Refusal(
+                f"``joints`` is {joints}, but the velocity has {system.joints}",
+                instead="drop it",
+            )
     else:
         given = ", ".join(formatted(p, LONG) for p in parts) or "nothing"
         raise Refusal(f"no scene of {given}", instead=FORMS)
     return Scene(system, gaits[0] if gaits else _usual_gait(system.joints))
+
+
+def _joints_of(velocity: Any, gaits: Sequence, joints: int | None) -> int:
+    """Return the number of joints of a velocity: the given one, that of its gait, or 2.
+    Refusal if it takes no two, but another number."""
+    if joints is not None or gaits:
+        return gaits[0].joints if joints is None else joints
+    if hasattr(velocity, "joints") or _takes(velocity, 2):
+        return 2
+    others = [n for n in range(1, JOINTS + 1) if _takes(velocity, n)]
+    if others:
+        raise Refusal(
+            f"the velocity takes {others[0]} joints",
+            because="without a gait it is taken for one of two",
+            instead=f"give ``joints`` = {others[0]}, or a gait",
+        )
+    return 2
+
+
+def _takes(velocity: Any, joints: int) -> bool:
+    """Return whether a velocity takes a shape of so many joints."""
+    function = getattr(velocity, "velocity", velocity)
+    alpha = np.full(joints, 0.1)
+    try:
+        return np.shape(function(alpha, alpha.copy())) == (3,)
+    except Exception:  # whatever a function of somebody else raises
+        return False
 
 
 def _is_gait(part: Any) -> bool:

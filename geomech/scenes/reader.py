@@ -157,12 +157,16 @@ def _read_one(source: Source, path: str, table: Mapping, section: Section) -> An
     return build(source, place, table, variant.kind, inner, label)
 
 
-def _choose(place: str, word: object, kinds: Mapping[str, Any]) -> str:
-    return (
-        choose_part(kinds, place, word)
-        if isinstance(kinds, Registry)
-        else choose(place, word, kinds)
-    )
+def _choose(place: str, word: object, section: OneOf) -> str:
+    if isinstance(section.kinds, Registry):
+        return choose_part(section.kinds, place, word)
+    if isinstance(word, str) and word in section.elsewhere:
+        raise Refusal(
+            f"{word!r} is not among {', '.join(section.kinds)}",
+            where=place,
+            instead=section.elsewhere[word],
+        )
+    return choose(place, word, section.kinds)
 
 
 def _chosen(place: str, table: dict, section: Keys | OneOf) -> tuple[Variant, dict]:
@@ -170,7 +174,7 @@ def _chosen(place: str, table: dict, section: Keys | OneOf) -> tuple[Variant, di
     if isinstance(section, Keys):
         return Variant({}, section.kind), table
     if section.key in table:
-        name = _choose(f"{place} {section.key}", table[section.key], section.kinds)
+        name = _choose(f"{place} {section.key}", table[section.key], section)
         table = {key: value for key, value in table.items() if key != section.key}
         if not isinstance(section.kinds[name], OneOf):
             return variant_of(section, name), table

@@ -145,6 +145,8 @@ def _variant(
     if short not in variant.named.values():
         needed += variant.needed
     rules = [_spelled(key) for key in keys if len(key.spellings) > 1]
+    for names in _either(variant.kind):
+        rules.append(_once(names, names[0] not in elsewhere and _lacks(keys, names)))
     if alternatives:
         rules.append(
             _alternatives(alternatives, {key.alias or key.name: key for key in keys})
@@ -153,6 +155,23 @@ def _variant(
         first_sentence(variant.kind), {**named, **_properties(keys), **inner}, needed
     )
     return table | ({"allOf": rules} if rules else {})
+
+
+def _either(kind: type) -> list[tuple[str, str]]:
+    """Return the pairs of keys of which one is in body lengths and the other in m."""
+    metres = getattr(kind, "metres", {})  # of an effect
+    return [(name, other.name) for name, other in metres.items()]
+
+
+def _lacks(keys: list[Key], names: tuple[str, str]) -> bool:
+    """Return whether neither of two keys has a value where both are left out."""
+    return all(key.default is None for key in keys if key.name in names)
+
+
+def _once(names: Collection[str], required: bool) -> dict[str, Any]:
+    """Return the rule that one of several keys is given, if it must be, and not two."""
+    given = [{"required": [name]} for name in names]
+    return {"oneOf": given} if required else {"not": {"allOf": given}}
 
 
 def _properties(keys: list[Key]) -> dict[str, Any]:
@@ -187,8 +206,7 @@ def _properties(keys: list[Key]) -> dict[str, Any]:
 
 def _spelled(key: Key) -> dict[str, Any]:
     """Return the rule that a key is given once, if it must be given, and not twice."""
-    given = [{"required": [name]} for name in key.spellings]
-    return {"oneOf": given} if key.required else {"not": {"allOf": given}}
+    return _once(key.spellings, key.required)
 
 
 def _alternatives(alternatives: Alternatives, keys: dict[str, Key]) -> dict[str, Any]:
@@ -233,19 +251,27 @@ def _sizes_needed(name: str, section: Section | Key) -> Iterator[dict[str, Any]]
     for variant in (
         all_variants(section) if isinstance(section, OneOf) and section.sized else ()
     ):
-        for size in keys_of(variant.kind):
-            if size.required and size.name in _shared(variant):
-                given = {
-                    "required": ["physical"],
-                    "properties": {"physical": {"required": [size.name]}},
-                }
-                named = {key: {"const": kind} for key, kind in variant.named.items()}
-                rule = {
-                    "if": {"required": [*named], "properties": named},
-                    "then": {"required": [size.name]},
-                }
-                within = {"items": rule} if isinstance(section, Each) else rule
-                yield {"if": {"not": given}, "then": {"properties": {name: within}}}
+        keys = keys_of(variant.kind)
+        sizes = [
+            {"required": [key.name]}
+            for key in keys
+            if key.required and key.name in _shared(variant)
+        ]
+        for names in _either(variant.kind):
+            if names[0] in _shared(variant) and _lacks(keys, names):
+                sizes.append({"anyOf": [{"required": [name]} for name in names]})
+        for size in sizes:
+            given = {
+                "required": ["physical"],
+                "properties": {"physical": size},
+            }
+            named = {key: {"const": kind} for key, kind in variant.named.items()}
+            rule = {
+                "if": {"required": [*named], "properties": named},
+                "then": size,
+            }
+            within = {"items": rule} if isinstance(section, Each) else rule
+            yield {"if": {"not": given}, "then": {"properties": {name: within}}}
 
 
 def _table(about: str, values: dict[str, Any], required: list[str]) -> dict[str, Any]:

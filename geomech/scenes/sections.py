@@ -56,6 +56,7 @@ class OneOf:
     by kind and field. files: that stand in place of keys, by kind. sized: keys that the scene gives once for all its
     parts are put in. short: the kind whose inner sections may stand alone, in place of the section. implied: names that a
     file may leave out. owner: as `Keys.owner`. meaning: of the key, where other sections' lists of keys have the rest.
+    elsewhere: by names that it does not take, where these are to be had.
     """
 
     kinds: Mapping[str, Any]
@@ -68,6 +69,7 @@ class OneOf:
     implied: tuple[str, ...] = ()
     owner: str = ""
     meaning: str = ""
+    elsewhere: Mapping[str, str] = field(default_factory=dict)
 
 
 class Each(OneOf):

@@ -8,9 +8,8 @@ from collections.abc import Mapping
 from geomech.core.errors import choose
 from rft.refusal import Refusal
 
-NOT_OF_THE_BODY = {
-    "radius": ("disturbed-ground",)
-}  # that one is of the track it leaves
+OF_THE_TRACK = ("disturbed-ground",)
+NOT_OF_THE_BODY = {"radius": OF_THE_TRACK, "radius_m": OF_THE_TRACK}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -18,12 +17,14 @@ class Physical:
     """Sizes that a body and its effects share, given once for all that have them.
 
     length (m): of the body. frequency (1/s): cycles per second. mass (kg): of the body. radius (body lengths): of the body.
+    radius_m (m): of a body with a length, in place of radius.
     """
 
     length: float | None = None
     frequency: float | None = None
     mass: float | None = None
     radius: float | None = None
+    radius_m: float | None = None
 
 
 class Sizes:

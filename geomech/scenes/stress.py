@@ -23,7 +23,7 @@ from rft.checks import Number
 from rft.meshes import Spatial
 from rft.plates import VERTICAL, PlateDrags, PlateStress, StressMap
 from rft.plates.stress import COEFFICIENTS
-from rft.refusal import Refusal, located
+from rft.refusal import Refusal, before, located
 
 LARGEST = 10_000_000  # bytes of a TOML file
 RADIANS = 3.2  # a table of angles within this is likely not in degrees
@@ -206,7 +206,7 @@ def plate_rows(place: str, file) -> np.ndarray:
 def plate_drags(place: str, file) -> PlateDrags:
     """Return the stress map through the plate drags of a CSV file (`plate_rows`)."""
     beta, gamma, a_x, a_z = plate_rows(place, file)
-    with located(f"{place}: {Path(file).name}"):
+    with located(f"{before(place)}{Path(file).name}"):
         return PlateDrags(*map(tuple, (np.radians(beta), np.radians(gamma), a_x, a_z)))
 
 
@@ -255,4 +255,4 @@ def _read_stress(source: Source, place: str, file: str) -> PlateStress:
                 where=place,
                 instead="copy the coefficients",
             )
-    return build(source, f"{place}: {path.name}:", table, StressKeys)
+    return build(source, f"{before(place)}{path.name}", table, StressKeys)

@@ -15,6 +15,11 @@ from rft.plates import PlateStress
 from rft.refusal import Refusal, formatted, located
 from rft.walking import ROBOTS, Fineness, Mjcf, Robot, Screws, Tripod, Walker
 
+ATTACH = "use rft.mujoco.attach(model, medium, {} = ...) in a loop of your own"
+ELSEWHERE = {
+    "slope": ATTACH.format("slope"),
+    "disturbed-ground": ATTACH.format("footprints"),
+}
 KINDS = {kind: effect for kind, effect in GROUND_EFFECTS.items() if effect.walks}
 LAWS = {"planar": StressKeys, "3d": SpatialKeys}
 OF_THREE = {
@@ -55,7 +60,7 @@ class WalkerScene:
         ),
     ]
     gait: Annotated[Tripod, Keys(Tripod, owner=OWNER)]
-    effects: Annotated[tuple[GroundEffect, ...], Each(KINDS)] = ()
+    effects: Annotated[tuple[GroundEffect, ...], Each(KINDS, elsewhere=ELSEWHERE)] = ()
     numerics: Annotated[Fineness, Keys(Fineness, owner=OWNER)] = field(
         default_factory=Fineness
     )
@@ -99,6 +104,16 @@ def spelled_out(tables: Mapping, name: str) -> dict:
         key: dict(table) if isinstance(table, Mapping) else table
         for key, table in tables.items()
     }
+    for section, table in tables.items():
+        keys = table if isinstance(table, Mapping) else (section,)
+        if {"slope", "slope_deg"} & {*keys}:
+            place = f"[{section}] slope" if isinstance(table, Mapping) else "slope"
+            raise Refusal(
+                place,
+                where=name,
+                because="a walking scene has level ground",
+                instead=ELSEWHERE["slope"],
+            )
     medium, robot = (
         tables.get(key) if isinstance(tables.get(key), dict) else {}
         for key in ("medium", "robot")

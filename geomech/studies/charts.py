@@ -23,6 +23,7 @@ from geomech.geometry.harmonics import Harmonics, basis
 from geomech.geometry.reconstruct import displacement
 from geomech.scenes.model import Scene
 from geomech.studies.study import Study
+from geomech.systems.base import body_size
 from geomech.systems.capabilities import Drawable, capability
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.tiers import harmonic
@@ -99,7 +100,7 @@ class Chart:
         if self.family is None:
             raise Refusal("this chart is that of one scene, and not of a family")
         f = self.family
-        between = 0.0 if value in f.values else f.error * self.scene.system.length
+        between = 0.0 if value in f.values else f.error * body_size(self.scene.system)
         return _mapped(
             replace(self, family=None, between=between),
             lambda x: _spline((f.knots,), (f.degree,), x)([[value]])[0],
@@ -391,7 +392,7 @@ def _off(one: Chart, other: Chart) -> float:
     ]
     return float(
         np.hypot(*(np.array(nets[0]) - nets[1])[:, :2].T).max()
-        / one.scene.system.length
+        / body_size(one.scene.system)
     )
 
 

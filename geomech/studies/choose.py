@@ -20,6 +20,7 @@ from geomech.studies.estimate import (
 )
 from geomech.studies.results import Displacements
 from geomech.studies.study import Study
+from geomech.systems.base import body_size
 from geomech.systems.capabilities import pieces_per_length, settling, solver_of
 from geomech.tiers.base import solved_phases
 from geomech.tiers.direct import DIRECT
@@ -111,7 +112,7 @@ def cheapest(
             checked = study.poses(tier, gait, amplitudes[sampled])
         except ValueError:  # the gait leaves the field or the family of this tier
             continue
-        if (pose_distance(checked, pilot[0], system.length) + pilot[1])[
+        if (pose_distance(checked, pilot[0], body_size(system)) + pilot[1])[
             :, 0
         ].max() <= tol:
             poses = study.poses(tier, gait, amplitudes)
@@ -120,7 +121,7 @@ def cheapest(
                 study.spread(tier, gait, amplitudes),
             )
             if spread is not None:
-                error = np.maximum(error, spread / [system.length, 1.0])
+                error = np.maximum(error, spread / [body_size(system), 1.0])
             if error[:, 0].max() <= tol:
                 return answer(tier, poses, error, {"grid": scene.numerics.grid})
     (poses, error), settings = _refined(scene, gait, amplitudes, tol, phases, ask)

@@ -18,7 +18,7 @@ from geomech.studies import estimate, tables, uncertainty
 from geomech.studies.batch import kind, side_by_side
 from geomech.studies.cost import direct, of_medium, price
 from geomech.studies.grid import Grid, at_points
-from geomech.systems.base import length_unit
+from geomech.systems.base import body_size, length_unit
 from geomech.systems.capabilities import gaits_per_batch
 
 POINT_BYTES = 200  # bytes of a point: its row, and copies of it on the way to a file
@@ -100,9 +100,8 @@ class Cycles:
     ) -> tuple[list[Variable], dict]:
         """Return net poses with their errors, the body's length, and frequency and speed where there is a frequency."""
         scene, length = grid.scene, _lengths(grid)
-        unit = (
-            length_unit(scene.system) if np.all(length == scene.system.length) else "m"
-        )  # BL where no point has a size
+        first = grid.at([x[0] for x in grid.values.values()])
+        unit = length_unit(first.system)  # a swept length gives every point a size
         errors = np.stack([length * rows[..., 3], rows[..., 4]], -1)
         sizes = [length, length, np.ones_like(length), length]
         spread = {
@@ -178,8 +177,8 @@ def _lengths(grid: Grid) -> np.ndarray:
     change it."""
     values = grid.values
     first = {name: x[0] for name, x in values.items()}
-    of = lambda name, x: grid.at([*{**first, name: x}.values()]).system.length
-    length = grid.at([*first.values()]).system.length
+    of = lambda name, x: body_size(grid.at([*{**first, name: x}.values()]).system)
+    length = body_size(grid.at([*first.values()]).system)
     lengths = np.array(length)
     for name in grid.over:
         other = next((x for x in values[name] if x != first[name]), first[name])
@@ -229,7 +228,7 @@ def _doubt(joined: Scene) -> np.ndarray:
     """Return the standard deviations of QUANTITIES by the medium's uncertainty, (N, 4), body lengths and rad."""
     deviations, length = (
         uncertainty.of_medium(joined, joined.gait, None),
-        joined.system.length,
+        body_size(joined.system),
     )
     return np.column_stack(
         [deviations[q] / (1.0 if q == "heading" else length) for q in tables.QUANTITIES]

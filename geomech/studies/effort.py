@@ -25,7 +25,7 @@ from geomech.geometry.metric import Finsler, Metric
 from geomech.scenes.model import Scene
 from geomech.studies import tables
 from geomech.studies.estimate import MOST_PIECES
-from geomech.systems.base import System, kind_of
+from geomech.systems.base import System, body_size, kind_of
 from geomech.systems.capabilities import (
     Dissipative,
     OwnMetric,
@@ -278,7 +278,11 @@ def _rates(system: System, alpha, alphadot) -> np.ndarray:
         square = np.asarray(own.squared_speed(alpha, alphadot))
         return np.stack([_norm(square, 2.0), np.full_like(square, np.nan)], 1)
     work = system.run(alpha, alphadot, True).work
-    P = power(system, alpha, alphadot) if work is None else work.power / system.length
+    P = (
+        power(system, alpha, alphadot)
+        if work is None
+        else work.power / body_size(system)
+    )
     return np.stack(
         [np.full_like(P, np.nan) if degree is None else _norm(P, degree), P], 1
     )
@@ -292,7 +296,7 @@ def with_effort(result: Result) -> Result:
     efforts, unit = effort(scene, gait, result["amplitude"].values), units(scene.system)
     degree, distance = (
         scene.system.traits.power_degree,
-        result["net_distance"].values / scene.system.length,
+        result["net_distance"].values / body_size(scene.system),
     )
     with np.errstate(divide="ignore", invalid="ignore"):
         towed = (

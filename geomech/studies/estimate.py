@@ -16,6 +16,7 @@ from geomech.gaits import Gait
 from geomech.geometry.reconstruct import displacement
 from geomech.run.jobs import runner
 from geomech.scenes.model import Scene
+from geomech.systems.base import body_size
 from geomech.systems.capabilities import (
     gaits_per_batch,
     is_closed,
@@ -100,7 +101,7 @@ def _direct(
         full = run.net
     error = _remaining(
         *(
-            pose_distance(*pair, scene.system.length)
+            pose_distance(*pair, body_size(scene.system))
             for pair in ((coarse, eighth), (half, coarse), (full, half))
         ),
         stepping or not system.traits.smooth,
@@ -110,7 +111,7 @@ def _direct(
         difference = pose_distance(
             finer.run(*strided[1], start=run.xi[..., ::4, :]).net,
             coarse,
-            scene.system.length,
+            body_size(scene.system),
         )
         error += (
             SEEN * difference
@@ -145,7 +146,7 @@ def pieces_error(scene: Scene, shapes, fewer, coarse: np.ndarray) -> np.ndarray:
     net = lambda n, cycle: (
         scene.with_numerics(pieces=min(max(1, n), MOST_PIECES)).system.run(*cycle).net
     )
-    length = scene.system.length
+    length = body_size(scene.system)
     doubled = pose_distance(net(2 * cut, fewer), coarse, length)
     chance = pose_distance(net(cut // 2, shapes), net(cut // 4, shapes), length) / 8
     return 2.0 * np.maximum(doubled, chance)
@@ -178,7 +179,8 @@ def against_direct(
     else:
         checked = np.arange(len(amplitudes))
     checked_errors = (
-        pose_distance(poses[checked], reference[0], scene.system.length) + reference[1]
+        pose_distance(poses[checked], reference[0], body_size(scene.system))
+        + reference[1]
     )
     lower = np.searchsorted(checked, np.arange(len(amplitudes)), side="right") - 1
     upper = np.minimum(

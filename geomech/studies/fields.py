@@ -28,7 +28,7 @@ from geomech.scenes.write import toml
 from geomech.studies import effort
 from geomech.studies.study import Study
 from geomech.studies.tables import COMPONENTS
-from geomech.systems.base import System, length_unit, shape_labels
+from geomech.systems.base import System, body_size, length_unit, shape_labels
 from geomech.systems.capabilities import (
     OwnMetric,
     Recorded,
@@ -488,7 +488,7 @@ def about(scene: Scene) -> dict:
         "Conventions": "xi = + A alphadot; CCF = dA + [A, A], positive for counter-clockwise loops",
         "frame": scene.frame,
         "frame_meaning": f"body frame: {meaning}",
-        "body_length": float(system.length),
+        "body_length": float(body_size(system)),
         "length_unit": unit_name(length_unit(system)),
         **recorded(system),
         **({"body": text} if (text := body_text(_body(system))) else {}),

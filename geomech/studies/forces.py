@@ -20,6 +20,7 @@ from geomech.studies.cost import direct, price
 from geomech.studies.newtons import Newtons, Sizes, newtons
 from geomech.studies.question import Allow, Progress, Question
 from geomech.studies.undulation import activation_of, bends, loaded
+from geomech.systems.base import body_size
 from geomech.systems.capabilities import Stepped, capability, pieces_per_length, refined
 from rft.premise import Premise
 from rft.refusal import located
@@ -76,7 +77,7 @@ class Run(NamedTuple):
     @property
     def travels(self) -> bool:
         """Whether there is a direction of travel; else forwards is where the frame points to at phase 0."""
-        return bool(np.hypot(*self.net[:2]) > STILL * self.scene.system.length)
+        return bool(np.hypot(*self.net[:2]) > STILL * body_size(self.scene.system))
 
 
 def with_errors(result: Result) -> Result:

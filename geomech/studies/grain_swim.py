@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from geomech.core.variables import Result, Variable
+from geomech.run.backend import suiting
 from geomech.scenes.model import Scene
 from geomech.studies.calibration import Calibration
 from geomech.studies.grains import GrainSteps, price, store_folder
@@ -79,16 +80,17 @@ class GrainSwim(Question):
     @cached_property
     def experiment(self) -> Experiment:
         body = self.swimmer.body
-        caps = next(
-            (e.radius for e in self.swimmer.effects if isinstance(e, EndCaps)), None
-        )
+        caps = next((e for e in self.swimmer.effects if isinstance(e, EndCaps)), None)
         size = self.size
         if size is None:
-            size = SIZE if body.length == 1.0 else body.length
+            size = SIZE if body.length is None else body.length
         require(0 < size < np.inf, "length must be > 0", value=size)
         radius = self.radius
         if radius is None:
-            radius = RADIUS if caps is None else caps * size
+            radius = RADIUS
+            if caps is not None:
+                own_size = body.length  # None where the radius is in body lengths
+                radius = caps.in_body_lengths(own_size).radius * size
         require(
             0 < radius < size / 2,
             "radius must be > 0 and below half of the length",
@@ -119,9 +121,10 @@ class GrainSwim(Question):
         return price([self.experiment], store_folder(self.store))
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        tiers = predictions(
-            self
-        )  # before the grains: a scene that no tier takes is refused at once
+        # Before the grains: a scene that no tier takes is refused at once.
+        balances = Study(self.scene).cost([self.scene.gait.amplitude]).as_balances
+        with suiting(balances):
+            tiers = predictions(self)
         return result(
             self, self.experiment.run(store_folder(self.store), progress), tiers
         )
@@ -181,11 +184,13 @@ def predictions(question: GrainSwim) -> Predictions:
     found = dict(_predicted(scene))
     body = question.experiment.body
     law = Calibration(FLANK, end_caps="fitted").ask().subject
+    caps = law.caps(body.half_width / body.size)
+    caps = caps.in_metres(question.swimmer.body.length)
     others = tuple(e for e in question.swimmer.effects if not isinstance(e, EndCaps))
     system = replace(
         question.swimmer,
         medium=law.medium,
-        effects=(*others, law.caps(body.half_width / body.size)),
+        effects=(*others, caps),
     )
     found[GRAINS_LAW] = dict(_predicted(scene.changed(system=system), ("direct",)))[
         "direct"

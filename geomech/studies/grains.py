@@ -33,6 +33,10 @@ TRAVEL = 7.5  # half widths that a rod is dragged, the first 2.5 of them not cou
 class GrainSteps(Cost):
     """Cost of grains; balances counts the steps of all grains."""
 
+    # Grains solve no balances of forces. What is left of them depends on the store, and
+    # with it would the back end of the tiers beside them, and their last digits.
+    as_balances = 0.0
+
     def __str__(self) -> str:
         return f"{self.balances:.1e} steps of grains, about {duration(self.seconds)} of computing"
 

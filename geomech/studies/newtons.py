@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from typing import Annotated, NamedTuple
 
 from geomech.scenes.model import Scene
-from geomech.systems.base import length_unit
+from geomech.systems.base import body_size, length_unit
 from geomech.systems.capabilities import Loaded
 from rft.checks import Number, check_numbers
 from rft.refusal import Refusal
@@ -104,15 +104,15 @@ def _merged(scene: Scene, sizes: Sizes) -> dict[str, float | None]:
         (getattr(e, name) for e in effects if hasattr(e, name)), None
     )
     length = (
-        scene.system.length
+        body_size(scene.system)
         if length_unit(scene.system) == "m"
         else of_effects("length")
     )
-    radius = next(
-        (e.radius for e in effects if e.kind == "end-caps"), None
-    )  # body lengths
+    caps = next((e for e in effects if e.kind == "end-caps"), None)
+    radius = None if caps is None else caps.radius_m
     known = sizes.length if length is None else length
-    radius = None if radius is None or known is None else radius * known
+    if caps is not None and radius is None and known is not None:
+        radius = caps.radius * known
     own = {
         "length": length,
         "radius": radius,

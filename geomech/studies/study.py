@@ -28,7 +28,7 @@ from geomech.scenes.model import Scene, frequency_of
 from geomech.studies import cost, effort, estimate, tables, uncertainty
 from geomech.studies.available import default_tiers, tiers
 from geomech.studies.results import Displacements
-from geomech.systems.base import refuse_singular, shape_labels
+from geomech.systems.base import body_size, refuse_singular, shape_labels
 from geomech.systems.capabilities import gaits_per_batch, stored_table
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.systems.framed import in_frame
@@ -69,11 +69,14 @@ class Study:
         with located(s.name):
             if frame == s.frame:
                 raise Refusal(f"the frame is {frame!r} already", instead="name another")
-            system = (
-                framed(s.system, s.numerics)
-                if frame == MINIMUM_PERTURBATION
-                else in_frame(s.system, frame)
-            )
+            if frame == MINIMUM_PERTURBATION:
+                system = framed(s.system, s.numerics)
+            else:
+                try:
+                    system = in_frame(s.system, frame)
+                except Refusal as refusal:
+                    refusal.instead = f"or take {MINIMUM_PERTURBATION!r}"
+                    raise
             return self._of(s.changed(system=system))
 
     def _of(self, scene: Scene) -> Self:
@@ -313,7 +316,7 @@ class Study:
         if medium:
             seconds["medium"] = took
         poses, errors, spreads, reference = {}, {}, {}, None
-        size = [self.scene.system.length, 1.0]  # estimates are in body lengths
+        size = [body_size(self.scene.system), 1.0]  # estimates are in body lengths
         order = [*TIERS]
         for tier in sorted(
             chosen, key=lambda m: (not chosen[m].exact, -order.index(m))

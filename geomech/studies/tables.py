@@ -13,7 +13,7 @@ from geomech.geometry.field import UNKNOWN_UNIT
 from geomech.geometry.symmetry import zero_components
 from geomech.io.results import unit_name
 from geomech.scenes.model import Scene, frequency_of
-from geomech.systems.base import length_unit
+from geomech.systems.base import body_size, length_unit
 
 COMPONENTS = ("x", "y", "theta")
 ERRORS = ("estimate", "estimate_heading")
@@ -87,7 +87,7 @@ def result(
     system, tiers = scene.system, tuple(poses)
     unit, length, frequency = (
         length_unit(system),
-        system.length,
+        body_size(system),
         frequency_of(system, gait),
     )
     stacked = lambda by, width: np.array([by[t] for t in tiers], float).reshape(

@@ -17,6 +17,7 @@ from geomech.studies import cost as foretold
 from geomech.studies import estimate
 from geomech.studies.available import tiers
 from geomech.studies.study import Study, refuse_outside
+from geomech.systems.base import body_size
 from geomech.systems.capabilities import (
     is_closed,
     pieces_per_length,
@@ -152,7 +153,9 @@ class Settings:
     def errors(
         self, numbers: list[np.ndarray], truth: list[np.ndarray]
     ) -> dict[str, float]:
-        distances = estimate.distance(numbers[0], truth[0]) / self.scene.system.length
+        distances = estimate.distance(numbers[0], truth[0]) / body_size(
+            self.scene.system
+        )
         return {"error": float(np.sqrt(np.mean(distances**2)))}
 
     def describe(self, setting: Setting, measure: str) -> dict[str, Any]:

@@ -19,8 +19,10 @@ from geomech.gaits import Gait
 from geomech.scenes.model import Scene
 from geomech.studies.tables import QUANTITIES, of_pose
 from geomech.systems import System
+from geomech.systems.base import body_size
 from geomech.systems.capabilities import Uncertain, capability, gaits_per_batch
 from geomech.tiers.base import in_groups
+from rft.checks import unmasked
 from rft.refusal import Refusal, located
 
 PHASES = 64  # of a cycle: enough for changes of displacement to a per cent
@@ -36,7 +38,7 @@ def root(covariance) -> np.ndarray:
     """Return standard deviations along the principal directions as columns (n, m): root @ root.T = covariance (n, n).
 
     Directions are those of the correlations, so that units do not matter; those without any spread are left out."""
-    covariance = np.asarray(covariance, float)
+    covariance = unmasked("covariance", covariance)
     spread = np.sqrt(np.diag(covariance))
     unit = np.where(spread > 0, spread, 1.0)
     variances, directions = np.linalg.eigh(covariance / unit[:, None] / unit)
@@ -112,7 +114,7 @@ def of_medium(
         sum((d * d for d in changes), np.zeros((len(mid), 4)))
         for changes in (slopes, bends)
     )
-    size = np.array([system.length, system.length, 1.0])
+    size = np.array([body_size(system), body_size(system), 1.0])
     bent = (linear + more > NONLINEAR**2 * linear)[:, :3] & (
         np.sqrt((linear + more)[:, :3]) / size > SEEN
     )

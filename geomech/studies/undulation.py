@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geomech.gaits import Sine, Wave
-from geomech.systems.base import kind_of
+from geomech.systems.base import body_size, kind_of
 from geomech.systems.capabilities import Loaded, capability
 from rft.checks import real_array
 from rft.refusal import Refusal
@@ -58,7 +58,7 @@ def performance(scene: Scene, amplitudes: ArrayLike) -> dict[str, np.ndarray]:
     if amplitudes.ndim != 1:
         raise Refusal("amplitudes must be a list of numbers", value=amplitudes.tolist())
     alpha, alphadot = gait.cycle(scene.numerics.phases, amplitudes)
-    run, length = scene.system.run(alpha, alphadot, work=True), scene.system.length
+    run, length = scene.system.run(alpha, alphadot, work=True), body_size(scene.system)
     spent = run.work
     progress = np.hypot(run.net[:, 0], run.net[:, 1]) / length
     wave = _known_wave(scene, amplitudes) or _moving_wave(system, alpha, alphadot)

@@ -8,6 +8,7 @@ from typing import Any
 import sympy as sp
 
 from geomech.symbolic.waves import Waves
+from rft.checks import unmasked
 
 
 def bracket(X: sp.Matrix, Y: sp.Matrix) -> sp.Matrix:
@@ -59,7 +60,7 @@ def velocity(A: sp.Matrix, alpha: Sequence[sp.Symbol]) -> Callable[..., Any]:
     rows, columns = A.shape
 
     def xi(a, adot):
-        a, adot = np.broadcast_arrays(np.asarray(a, float), np.asarray(adot, float))
+        a, adot = np.broadcast_arrays(unmasked("a", a), unmasked("adot", adot))
         flat = [
             np.broadcast_to(e, a.shape[:-1]) for e in entries(*np.moveaxis(a, -1, 0))
         ]

@@ -13,9 +13,10 @@ import numpy as np
 from geomech.core import summary
 from geomech.core.errors import check_angle
 from geomech.geometry.reconstruct import displacement
-from geomech.geometry.traits import NOTHING, Traits
+from geomech.geometry.traits import NOTHING, Traits, unit_of
 from geomech.geometry.velocity import evaluate, in_batches
-from rft.checks import in_range
+from rft.bodies.base import body_size as body_size  # of systems, too
+from rft.checks import in_range, unmasked
 from rft.refusal import Refusal
 from rft.registry import Registry, classes_with
 
@@ -79,8 +80,8 @@ class System(Protocol):
         """Number d of shape variables."""
 
     @property
-    def length(self) -> float:
-        """Length of the body in the unit of displacements; 1 for body lengths."""
+    def length(self) -> float | None:
+        """Length of the body, m; None where lengths are in body lengths."""
 
     @property
     def traits(self) -> Traits:
@@ -124,12 +125,13 @@ class WrappedSystem:
 
     wrapped: Any
     joints: int
-    length: float = 1.0
+    length: float | None = None
     traits: Traits = NOTHING
 
     def __post_init__(self):
         in_range("joints", self.joints, 1, 10_000, whole=True)
-        in_range("length", self.length, 1e-9, 1e9)
+        if self.length is not None:
+            in_range("length", self.length, 1e-9, 1e9)
         if not isinstance(self.traits, Traits):
             raise Refusal("traits must be Traits(...)", value=self.traits)
         if not _accepts_two(self._velocity):
@@ -151,7 +153,7 @@ class WrappedSystem:
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
         alpha, alphadot = np.broadcast_arrays(
-            np.asarray(alpha, float), np.asarray(alphadot, float)
+            unmasked("alpha", alpha), unmasked("alphadot", alphadot)
         )
         return evaluate(
             self._batched, alpha, alphadot, masked=self.traits.singularity is not None
@@ -195,8 +197,8 @@ def as_system(system: Any, joints: int | None = None) -> System:
     ...     return np.stack([alphadot[..., 0] * np.sin(alpha[..., 1]), 0 * alpha[..., 0], 0 * alpha[..., 0]], -1)
     ...
     >>> system = as_system(drift, joints=2)
-    >>> system.joints, system.length
-    (2, 1.0)
+    >>> system.joints, system.length  # in body lengths
+    (2, None)
     """
     if not isinstance(system, type) and all(hasattr(system, name) for name in MEMBERS):
         refuse_mutable(system)
@@ -217,7 +219,7 @@ def as_system(system: Any, joints: int | None = None) -> System:
     return WrappedSystem(
         system,
         joints,
-        getattr(system, "length", 1.0),
+        getattr(system, "length", None),
         getattr(system, "traits", NOTHING),
     )
 
@@ -245,7 +247,7 @@ SYSTEMS = Registry("geomech.systems", "kind", "a system", classes_with("velocity
 
 def length_unit(system: System) -> str:
     """Return the unit of a system's lengths: body lengths, or metres where its body has a size."""
-    return system.traits.unit or ("BL" if system.length == 1.0 else "m")
+    return system.traits.unit or unit_of(system.length)
 
 
 def shape_labels(system: System) -> tuple[tuple[str, str], ...]:

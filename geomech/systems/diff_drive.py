@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 from geomech.core.errors import choose
 from geomech.geometry.traits import Traits
 from geomech.systems.base import SYSTEMS, integrated
-from rft.checks import Number, check_numbers
+from rft.bodies.base import body_size
+from rft.checks import Number, check_numbers, unmasked
 
 
 @SYSTEMS.register
@@ -29,22 +30,17 @@ class DifferentialDrive:
     Examples
     --------
     >>> from geomech.systems import DifferentialDrive
-    >>> DifferentialDrive(wheel_radius=0.5, track=1.0).velocity([0.0, 0.0], [1.0, 1.0])
+    >>> DifferentialDrive(wheel_radius=0.5).velocity([0.0, 0.0], [1.0, 1.0])
     array([0.5, 0. , 0. ])
     """
 
     wheel_radius: Annotated[
-        float, Number(1e-9, 1e9, "m", "of both, in the unit of track")
+        float, Number(1e-9, 1e9, "m", "of both; in tracks without a track")
     ] = 0.5
     track: Annotated[
-        float,
-        Number(
-            1e-9,
-            1e9,
-            "m",
-            "between the wheels, in the unit wanted for displacement; 1 for body lengths",
-        ),
-    ] = 1.0
+        float | None,
+        Number(1e-9, 1e9, "m", "between the wheels; lengths are in tracks if left out"),
+    ] = None
     frame: str = "mean"
 
     kind = "differential-drive"
@@ -60,13 +56,13 @@ class DifferentialDrive:
 
     @property
     def _matrix(self) -> np.ndarray:
-        half, turn = self.wheel_radius / 2, self.wheel_radius / self.track
+        half, turn = self.wheel_radius / 2, self.wheel_radius / body_size(self)
         return np.array([[half, half], [0.0, 0.0], [-turn, turn]])
 
     def velocity(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
         """Return xi (..., 3), (track/time, track/time, rad/time): (r (w_1 + w_2) / 2, 0, r (w_2 - w_1) / track)."""
         _, rates = np.broadcast_arrays(
-            np.asarray(alpha, float), np.asarray(alphadot, float)
+            unmasked("alpha", alpha), unmasked("alphadot", alphadot)
         )
         return rates @ self._matrix.T
 
@@ -74,7 +70,7 @@ class DifferentialDrive:
         """Return A (3, 2) as a sympy Matrix, and the wheels' angles (`geomech.symbolic`)."""
         from geomech.symbolic import connections
 
-        return connections.differential_drive(self.wheel_radius, self.track)
+        return connections.differential_drive(self.wheel_radius, body_size(self))
 
     @classmethod
     def examples(cls) -> dict[str, DifferentialDrive]:

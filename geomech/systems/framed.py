@@ -31,6 +31,7 @@ from geomech.systems.capabilities import (
 )
 from geomech.systems.premises import refuse
 from rft import se2
+from rft.checks import unmasked
 from rft.premise import SHAPE_ALONE
 from rft.refusal import Refusal
 
@@ -159,7 +160,7 @@ class Framed:
         inner = np.einsum(
             "...ij,...j->...i",
             se2.adjoint(h),
-            np.asarray(xi, float) - frame_velocity(h, hdot),
+            unmasked("xi", xi) - frame_velocity(h, hdot),
         )
         return capability(self.inner, Dissipative).power(alpha, alphadot, inner)
 

@@ -21,8 +21,8 @@ from geomech.geometry.traits import Traits
 from geomech.systems.base import integrated
 from rft.balance.newton import to_element
 from rft.bodies import Chain
-from rft.bodies.base import Elements, Length
-from rft.checks import check_numbers, real_array
+from rft.bodies.base import Elements, Length, body_size
+from rft.checks import check_numbers, real_array, unmasked
 from rft.refusal import Refusal
 
 
@@ -46,7 +46,7 @@ class Momentum:
     """
 
     lengths: tuple[float, ...] = (1.0, 1.0, 1.0)
-    length: Length = 1.0
+    length: Length = None
     frame: str = "mean"
 
     run = integrated
@@ -124,7 +124,7 @@ class Momentum:
 
     def _flat(self, alpha, alphadot) -> tuple[np.ndarray, np.ndarray, tuple[int, ...]]:
         alpha, alphadot = np.broadcast_arrays(
-            np.asarray(alpha, float), np.asarray(alphadot, float)
+            unmasked("alpha", alpha), unmasked("alphadot", alphadot)
         )
         return (
             alpha.reshape(-1, self.joints),
@@ -135,11 +135,8 @@ class Momentum:
     def velocity(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
         """Return xi (..., 3) in the frame, (length/time, length/time, rad/time)."""
         alpha, alphadot, shape = self._flat(alpha, alphadot)
-        return self._moving(alpha, alphadot)[2].T.reshape(*shape, 3) * [
-            self.length,
-            self.length,
-            1.0,
-        ]
+        xi = self._moving(alpha, alphadot)[2].T.reshape(*shape, 3)
+        return xi * [body_size(self), body_size(self), 1.0]
 
     def squared_speed(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
         """Return alphadot^T M alphadot (...,): twice the kinetic energy, in the unit of `inertia` and body lengths."""
@@ -163,4 +160,4 @@ class Momentum:
         A, alpha = connections.chain_connection(
             self.lengths, inertia, self.frame, masses
         )
-        return connections.in_length(self.length, A), alpha
+        return connections.in_length(body_size(self), A), alpha

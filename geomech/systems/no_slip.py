@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 from geomech.geometry.traits import Traits
 from geomech.systems.base import SYSTEMS, integrated
 from rft.bodies import Chain
-from rft.bodies.base import Length
+from rft.bodies.base import Length, body_size
+from rft.checks import unmasked
 from rft.refusal import Refusal
 
 
@@ -38,7 +39,7 @@ class NoSlipSnake:
     """
 
     lengths: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    length: Length = 1.0
+    length: Length = None
     frame: str = "mean"
 
     kind = "no-slip-snake"
@@ -74,7 +75,7 @@ class NoSlipSnake:
         """Return rows (..., 3, 3) and sides (..., 3): velocity across each link's centre = row . xi + side, body
         lengths."""
         alpha, alphadot = np.broadcast_arrays(
-            np.asarray(alpha, float), np.asarray(alphadot, float)
+            unmasked("alpha", alpha), unmasked("alphadot", alphadot)
         )
         m = self._chain.motion(*(x.reshape(-1, 2).T for x in (alpha, alphadot)))
         rows, shape = np.stack([-m.s, m.c, m.r_n], -1).swapaxes(0, 1), alpha.shape[:-1]
@@ -97,13 +98,14 @@ class NoSlipSnake:
         xi = np.linalg.solve(
             np.where(good[..., None, None], rows, np.eye(3)), -side[..., None]
         )[..., 0]
-        return np.where(good[..., None], xi, np.nan) * [self.length, self.length, 1.0]
+        scale = [body_size(self), body_size(self), 1.0]
+        return np.where(good[..., None], xi, np.nan) * scale
 
     def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
         from geomech.symbolic import connections
 
         A, alpha = connections.no_slip_snake(self.lengths, self.frame)
-        return connections.in_length(self.length, A), alpha
+        return connections.in_length(body_size(self), A), alpha
 
     @classmethod
     def examples(cls) -> dict[str, NoSlipSnake]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import rft
+from geomech.core.errors import UnitWarning
 from geomech.core.work import iterate
 from geomech.geometry.images import cycle_images
 from geomech.geometry.reconstruct import displacement, poses, repeated
@@ -21,6 +23,7 @@ from geomech.systems.premises import refuse
 from geomech.systems.solver import Solver
 from rft.bodies import BODIES
 from rft.bodies.base import (
+    body_size,
     checked_body,
     half_lengths,
     is_reversible,
@@ -28,6 +31,7 @@ from rft.bodies.base import (
     joint_speed,
 )
 from rft.bodies.pieces import PIECES, subdivide
+from rft.checks import unmasked
 from rft.contact import assemble
 from rft.effects import EFFECTS
 from rft.laws import (
@@ -95,7 +99,7 @@ class Swimmer:
                     f"[[effects]] {effect.kind} is asked for twice", instead="keep one"
                 )
             with located("[[effects]]"):
-                effect.check(self.medium)
+                effect.in_body_lengths(self.body.length).check(self.medium)
 
     def __getstate__(self) -> dict:
         return {
@@ -104,11 +108,10 @@ class Swimmer:
 
     def _agree(self) -> None:
         """Raise Refusal if effects, or the body, contradict each other about the swimmer's frequency or length."""
-        sized = self.body.length != 1.0
-        for quantity, values in (
-            ("frequency", []),
-            ("length", [("[body]", self.body.length)] if sized else []),
-        ):
+        lengths = []
+        if self.body.length is not None:
+            lengths.append(("[body]", self.body.length))
+        for quantity, values in (("frequency", []), ("length", lengths)):
             values += [
                 (e.kind, getattr(e, quantity))
                 for e in self.effects
@@ -219,7 +222,7 @@ class Swimmer:
                 solver.pieces, int(np.ceil(0.5 / half_lengths(self.body).max() - 1e-9))
             )
         batched = any(np.ndim(getattr(e, name)) for e in effects for name in e.batched)
-        memory = sum(e.memory_size for e in effects)
+        memory = sum(e.memory_size for e in assembly.effects)
         return BalanceSize(
             assembly.n_elements, assembly.n_law_points, pieces, memory, batched
         )
@@ -288,10 +291,10 @@ class Swimmer:
         A, alpha = connections.viscous_chain(
             self.body.lengths, self.medium.ratio, self.body.frame
         )
-        return connections.in_length(self.body.length, A), alpha
+        return connections.in_length(body_size(self), A), alpha
 
     def power(self, alpha: ArrayLike, alphadot: ArrayLike, xi: ArrayLike) -> np.ndarray:
-        return self.work(alpha, alphadot, xi).power / self.length
+        return self.work(alpha, alphadot, xi).power / body_size(self)
 
     def work(self, alpha: ArrayLike, alphadot: ArrayLike, xi: ArrayLike) -> rft.Work:
         """Return power, internal moments and slip of a solution of `solve`; see `rft.work_done`."""
@@ -300,7 +303,7 @@ class Swimmer:
         )
 
     def elements(self, alpha: ArrayLike, alphadot: ArrayLike) -> rft.bodies.Elements:
-        return self.body.motion(*(np.asarray(x, float).T for x in (alpha, alphadot)))
+        return self.body.motion(*(unmasked("x", x).T for x in (alpha, alphadot)))
 
     def subdivided(self) -> Swimmer:
         return dataclasses.replace(
@@ -441,6 +444,50 @@ class Swimmer:
                 rft.Chain((0.7, 1.4, 0.9), frame="link-1", length=0.3),
             )
         }
+
+
+def effect_sizes(effect: rft.effects.Effect, body: rft.Body) -> str:
+    """Return the lengths of an effect in mm and in body lengths, as text; "" for one
+    without, and for a body without a length."""
+    if body.length is None:
+        return ""
+    own = effect.in_body_lengths(body.length)
+    texts = []
+    for name, metres in effect.metres.items():
+        value = getattr(own, name)
+        if metres.power == 1 and np.ndim(value) == 0:
+            mm = 1e3 * body.length * value
+            texts.append(f"{name} {mm:.4g} mm, {value:.4g} body lengths")
+    return "; ".join(texts)
+
+
+def note_radius(swimmer: Swimmer) -> None:
+    """Warn (`UnitWarning`) of end caps whose radius is likely in another unit: longer
+    than the link that they close, or less than a fiftieth of it. A continuous body has
+    no links; there the limits are a quarter and 1/500 of its length (all assumed)."""
+    body = swimmer.body
+    for effect in swimmer.effects:
+        if not isinstance(effect, rft.EndCaps):
+            continue
+        radius = effect.in_body_lengths(body.length).radius
+        fractions = getattr(body, "fractions", np.array([0.25]))
+        low, what = (0.02, "link") if hasattr(body, "fractions") else (0.008, "body")
+        ends = (effect.tail, fractions[0]), (effect.head, fractions[-1])
+        links = [fraction for e, fraction in ends if e > 0]
+        if radius == 0 or not links:
+            continue
+        size, unit = 1.0, "body lengths"
+        if body.length is not None:
+            size, unit = 1e3 * body.length, "mm"
+        if not low * max(links) <= radius <= min(links):
+            link = min(links) if radius > min(links) else max(links)
+            length = size * link if what == "link" else size
+            warnings.warn(
+                f"end-caps have a radius of {size * radius:.3g} {unit}, on a {what} of "
+                f"{length:.3g} {unit}: is it in another unit?",
+                UnitWarning,
+                stacklevel=4,
+            )
 
 
 def _has_joint_angles(body: rft.Body) -> bool:

@@ -37,12 +37,12 @@ THREE_LINKS = [
 
 def _chain(stored: tables.Stored) -> Chain | None:
     """Return the body of a table, with its length; None where nothing says it, or no chain."""
+    in_body_lengths = (stored.unit, stored.length) == ("BL", 1.0)
+    length = None if in_body_lengths else stored.length
     try:
-        chain = (
-            None
-            if stored.body is None
-            else Chain(**{**stored.body, "length": stored.length})
-        )
+        chain = None
+        if stored.body is not None:
+            chain = Chain(**{**stored.body, "length": length})
     except (ValueError, TypeError):
         return None
     return chain if chain and chain.joints == len(stored.connection.axes) else None
@@ -145,7 +145,7 @@ class Table:
                 f"the body has {self.body.joints} shape variables, {self.file} {joints}",
                 instead="mend one",
             )
-        if self.body.length != 1.0:
+        if self.body.length is not None:
             raise Refusal(
                 "the body of a table has no length",
                 value=self.body.length,

@@ -10,6 +10,7 @@ from geomech.core.variables import Result
 from geomech.measured.fit import PRINTED_PHASES, Fitted
 from geomech.measured.results import status
 from geomech.scenes.write import gait_table
+from geomech.systems.base import body_size
 from rft.refusal import in_line
 
 
@@ -55,7 +56,7 @@ def fit_numbers(fit: Fitted) -> dict[str, Any]:
             "predicted": fit.predicted.tolist(),
             "rms": np.sqrt((residual**2).mean(0)).tolist(),
         },
-        "body_length": fit.length,
+        "body_length": body_size(fit),
         "units": {"displacement": [fit.unit, fit.unit, "rad"], "frequency": "cycles per unit of t", "phase_residual": "rad",
                   "residual": rates, "misfit": rates, "A": rates, "reach": "rad", "body_length": fit.unit},
         "status": status(fit),

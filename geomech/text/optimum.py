@@ -9,6 +9,7 @@ from geomech.core.summary import moved
 from geomech.core.variables import Result
 from geomech.optimisation import Optimum
 from geomech.scenes.write import gait_table, toml
+from geomech.systems.base import body_size
 from rft.refusal import in_line
 
 SHOWN = 6  # answers that a table led to, of those that nobody finished
@@ -37,7 +38,7 @@ def numbers(result: Result) -> dict[str, Any]:
         "active": list(optimum.active),
         "answers": [list(x) for x in optimum.answers + optimum.others],
         "estimate": float(value.error),
-        "body_length": float(optimum.scene.system.length),
+        "body_length": float(body_size(optimum.scene.system)),
         "zero_by_symmetry": result.attributes["zero_by_symmetry"],
         "units": {
             **dict.fromkeys(("value", "start_value", "estimate"), value.unit),

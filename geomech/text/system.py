@@ -10,7 +10,7 @@ from geomech.io.tables.sysplotter import compared
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import System, WrappedSystem, kind_of
 from geomech.systems.framed import NAME, Framed
-from geomech.systems.swimmer import name_in
+from geomech.systems.swimmer import effect_sizes, name_in
 from rft.bodies import BODIES
 from rft.effects import EFFECTS, ENGINES
 from rft.effects import engine as engine_of
@@ -35,8 +35,9 @@ def described(system: System) -> list[str]:
     if isinstance(system, Table):
         return _table(system)
     fields = dataclasses.fields(system) if dataclasses.is_dataclass(system) else ()
+    given = {f.name: getattr(system, f.name) for f in fields}
     numbers = ", ".join(
-        f"{f.name} = {formatted(getattr(system, f.name))}" for f in fields
+        f"{name} = {formatted(x)}" for name, x in given.items() if x is not None
     )
     return [f"{kind_of(system)} ({numbers})" if numbers else kind_of(system)]
 
@@ -92,6 +93,8 @@ def _swimmer(system: Swimmer) -> list[str]:
         lines.append(
             f"on:  {summary.part(effect.kind, effect)}; {premises}{cost}{limit}"
         )
+        if sizes := effect_sizes(effect, system.body):
+            lines.append(f"     {sizes}")
         if assumed := effect.assumes(system.medium):
             lines.append(f"     assumes {assumed}")
     off = [name for name in EFFECTS if name not in [e.kind for e in system.effects]]

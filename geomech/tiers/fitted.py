@@ -17,7 +17,13 @@ from geomech.geometry.plane import Plane, interpolated_plane, plane_shapes
 from geomech.geometry.plane import plane as fit_plane
 from geomech.geometry.traits import Traits
 from geomech.systems import premises
-from geomech.systems.base import System, WrappedSystem, length_unit, shape_labels
+from geomech.systems.base import (
+    System,
+    WrappedSystem,
+    body_size,
+    length_unit,
+    shape_labels,
+)
 from geomech.systems.capabilities import stored_table
 from geomech.systems.framed import Framed
 from geomech.tiers.base import Numerics, Table
@@ -105,7 +111,7 @@ def _build(system: System, numerics: Numerics, progress: Callable | None) -> Con
         return (
             stored
             if stored.length
-            else replace(stored, unit=length_unit(system), length=system.length)
+            else replace(stored, unit=length_unit(system), length=body_size(system))
         )
     if isinstance(system, Framed):
         return system.fitted(progress)
@@ -113,7 +119,7 @@ def _build(system: System, numerics: Numerics, progress: Callable | None) -> Con
     options: dict[str, Any] = {
         "traits": system.traits,
         "unit": length_unit(system),
-        "length": system.length,
+        "length": body_size(system),
     }
     return connection.fit(
         system.velocity,
@@ -161,7 +167,7 @@ def plane(
     options: dict[str, Any] = {
         "traits": system.traits,
         "unit": length_unit(system),
-        "length": system.length,
+        "length": body_size(system),
     }
     return fit_plane(
         system.velocity,

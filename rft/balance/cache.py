@@ -6,10 +6,14 @@ the versions of numba and LLVM, and the processor. A file that is damaged, or ca
 
 from __future__ import annotations
 
+import ast
 import contextlib
+import functools
 import hashlib
+import linecache
 import os
 import pickle
+import re
 import secrets
 import sys
 import types
@@ -26,6 +30,7 @@ from numba.misc.appdirs import user_cache_dir
 
 from rft import simd, vectors
 from rft.balance.backend import Note
+from rft.refusal import Refusal
 
 KNOWN = {
     "math",
@@ -123,9 +128,65 @@ def cached(kernel, purpose: str):
     """Return a kernel whose compiled code is stored on disk; print one line with its purpose if it has yet to be
     compiled."""
     kernel._cache = Cache(kernel.py_func)
+    kernel.compile = _naming_faults(kernel.compile)
     if not kernel._cache.path.exists():
         print(f"compiling {purpose}: some seconds, once", file=sys.stderr)
     return kernel
+
+
+def _naming_faults(compile_):
+    """Return a kernel's ``compile`` that refuses a formula with a slip in one line, in
+    place of the compiler's report."""
+
+    @functools.wraps(compile_)
+    def compiled(signature):
+        try:
+            return compile_(signature)
+        except numba.core.errors.NumbaError as error:
+            place, words = _fault(str(error))
+        raise Refusal(
+            f"{place} cannot be compiled",
+            because=words,
+            instead=f"{vectors.ALLOWED}; without @formula NumPy computes it",
+        )
+
+    return compiled
+
+
+def _fault(report: str) -> tuple[str, str]:
+    """Return the place of the innermost fault that a report of the compiler names, of a
+    formula that is not ours if there is one, and the text of its line."""
+    places = []
+    for file, number in re.findall(r'File "([^"<]+)", line (\d+)', report):
+        path = Path(file).absolute().resolve()
+        ours = path.is_relative_to(Path(vectors.__file__).parent)
+        places.append((ours, str(path), int(number)))
+    if not places:
+        return "a formula", report.strip().partition("\n")[0]
+    _, path, number = min(places, key=lambda place: place[0])
+    lines = linecache.getlines(path)
+    text = lines[number - 1].strip() if number <= len(lines) else ""
+    name = _function_at("".join(lines), number)
+    return f"{name} ({Path(path).name}, line {number})", text
+
+
+def _function_at(source: str, number: int) -> str:
+    """Return the name of the function around a line, with that of its class."""
+    names: list[str] = []
+
+    def visit(node: ast.AST, outer: tuple[str, ...]) -> None:
+        for child in ast.iter_child_nodes(node):
+            kinds = ast.FunctionDef | ast.ClassDef
+            inside = isinstance(child, kinds) and (
+                child.lineno <= number <= (child.end_lineno or child.lineno)
+            )
+            if inside:
+                names[:] = [*outer, child.name]
+                visit(child, tuple(names))
+
+    with contextlib.suppress(SyntaxError):
+        visit(ast.parse(source), ())
+    return ".".join(names) or "a formula"
 
 
 def note(text: str) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from rft.balance.backend import check
 from rft.balance.solver import Accuracy, Solved, solve
-from rft.bodies.base import Body, joint_speed
+from rft.bodies.base import Body, body_size, joint_speed
 from rft.bodies.pieces import PIECES
 from rft.checks import in_range, real_array
 from rft.contact import assemble
@@ -125,7 +125,7 @@ def body_velocity(
     if threads is not None:
         in_range("threads", threads, 1, 1024, whole=True)
     batch = alpha.shape[:-1]
-    guess = None if start is None else _guess(start, batch, body.length)
+    guess = None if start is None else _guess(start, batch, body_size(body))
     alpha, alphadot = (
         np.ascontiguousarray(x.reshape(-1, body.joints).T) for x in (alpha, alphadot)
     )
@@ -158,9 +158,11 @@ def body_velocity(
         guess,
     )
     xi, residual, iterations, stuck, limit = _with_samples_at_rest(solved, moving)
-    xi = (
-        xi.T if body.length == 1.0 else xi.T * [body.length, body.length, 1.0]
-    ).reshape(*batch, 3)
+    length = body_size(body)
+    if length == 1.0:
+        xi = xi.T.reshape(*batch, 3)
+    else:
+        xi = (xi.T * [length, length, 1.0]).reshape(*batch, 3)
     status = STATUSES[np.where(residual <= limit, stuck, UNCONVERGED)]
     return Solution(xi, *(x.reshape(batch) for x in (residual, status, iterations)))
 

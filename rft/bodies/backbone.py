@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from rft.bodies.base import BODIES, Elements, Length, numbered_labels
 from rft.bodies.chain import Chain
-from rft.checks import Number, check_numbers
+from rft.checks import Number, check_numbers, unmasked
 from rft.refusal import require
 
 
@@ -36,7 +36,7 @@ class Backbone:
     elements: Annotated[
         int, Number(3, 2000, "-", "elements of the body, 3 to 2000", whole=True)
     ] = 100
-    length: Length = 1.0
+    length: Length = None
     frame: str = "mean"
     kind = "backbone"
 
@@ -75,7 +75,9 @@ class Backbone:
         if self.bends is None:
             return self.chain.frame_pose(frame, alpha, alphadot)
         return self.chain.frame_pose(
-            frame, np.asarray(alpha) @ self.bends.T, np.asarray(alphadot) @ self.bends.T
+            frame,
+            unmasked("alpha", alpha) @ self.bends.T,
+            unmasked("alphadot", alphadot) @ self.bends.T,
         )
 
     def points(
@@ -83,7 +85,7 @@ class Backbone:
     ) -> np.ndarray:
         """Return the ends of the elements in the world, (..., elements + 1, 2), as `Chain.points` does."""
         return self.chain.points(
-            alpha if self.bends is None else np.asarray(alpha, float) @ self.bends.T,
+            alpha if self.bends is None else unmasked("alpha", alpha) @ self.bends.T,
             pose,
         )
 

@@ -15,12 +15,12 @@ from rft.registry import Registry, classes_with
 BODIES = Registry("geomech.bodies", "kind", "a body", classes_with("motion"))
 
 Length = Annotated[
-    float,
+    float | None,
     Number(
         1e-15,
         1e15,
         "m",
-        "length of the body, in the unit wanted for displacement; 1 for body lengths",
+        "length of the body; lengths are in body lengths if left out",
     ),
 ]
 
@@ -106,9 +106,9 @@ class Elements(NamedTuple):
 class Body(Protocol):
     """A body of straight elements whose shape is ``joints`` numbers.
 
-    joints: number of shape variables. length: of the body, in the unit wanted for displacement. motion(alpha, alphadot):
-    its `Elements` at shapes and rates (joints, B), with the frame held. A body that is drawn also has ``points``, and
-    ``shape_labels`` if its shape variables are no joint angles: see `rft.Chain`.
+    joints: number of shape variables. length: of the body, m, None where lengths are in body lengths.
+    motion(alpha, alphadot): its `Elements` at shapes and rates (joints, B), with the frame held. A body that is drawn
+    also has ``points``, and ``shape_labels`` if its shape variables are no joint angles: see `rft.Chain`.
 
     Examples
     --------
@@ -120,12 +120,26 @@ class Body(Protocol):
     """
 
     @property
-    def length(self) -> float: ...
+    def length(self) -> float | None: ...
 
     @property
     def joints(self) -> int: ...
 
     def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Elements: ...
+
+
+def body_size(body: Any) -> float:
+    """Return the length of a body or a system in the unit of displacements: m, or 1
+    body length where it has no ``length``.
+
+    Examples
+    --------
+    >>> from rft import Chain
+    >>> from rft.bodies.base import body_size
+    >>> body_size(Chain()), body_size(Chain(length=0.3))
+    (1.0, 0.3)
+    """
+    return 1.0 if body.length is None else body.length
 
 
 def checked_body(body) -> Body:
@@ -181,7 +195,7 @@ class WrappedBody:
     inner: Body
 
     @property
-    def length(self) -> float:
+    def length(self) -> float | None:
         return self.inner.length
 
     @property

@@ -41,7 +41,7 @@ class Chain(Links):
     """
 
     lengths: tuple[float, ...] = (1.0, 1.0, 1.0)
-    length: Length = 1.0
+    length: Length = None
     frame: str = "mean"
     modes: tuple[tuple[float, ...], ...] | str | None = None
     waves: Annotated[

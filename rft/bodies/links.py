@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rft.bodies.base import Elements
-from rft.checks import real_array
+from rft.bodies.base import Elements, body_size
+from rft.checks import real_array, unmasked
 from rft.refusal import require
 from rft.se2 import rotated
 
@@ -22,7 +22,7 @@ class Links:
     and give `_links`."""
 
     lengths: tuple[float, ...]
-    length: float
+    length: float | None
     frame: str
     joints: Any  # a number, or a property
 
@@ -109,7 +109,7 @@ class Links:
         connections.
         """
         alpha, alphadot = np.broadcast_arrays(
-            np.asarray(alpha, float), np.asarray(alphadot, float)
+            unmasked("alpha", alpha), unmasked("alphadot", alphadot)
         )
         _, *links = self._links(
             *(x.reshape(-1, self.joints).T for x in (alpha, alphadot))
@@ -118,7 +118,7 @@ class Links:
         rotation, centre, velocity, theta = (
             self._frame_value(x, link).reshape(alpha.shape[:-1]) for x in links
         )
-        centre, velocity = self.length * centre, self.length * velocity
+        centre, velocity = body_size(self) * centre, body_size(self) * velocity
         h, hdot = (
             (centre.real, centre.imag, theta),
             (velocity.real, velocity.imag, rotation),
@@ -132,7 +132,7 @@ class Links:
 
         alpha: (..., joints), rad. pose: (..., 3), pose of the body frame in the world, (x, y) in length units, theta in
         rad."""
-        alpha, pose = np.asarray(alpha, float), np.asarray(pose, float)
+        alpha, pose = unmasked("alpha", alpha), unmasked("pose", pose)
         require(
             alpha.shape[-1:] == (self.joints,),
             f"alpha must have {self.joints} angles last",
@@ -142,7 +142,7 @@ class Links:
         flat = alpha.reshape(-1, self.joints).T
         heading, _, centre, *_ = self._links(flat, np.zeros_like(flat))
         half = self._half_lengths * heading
-        ends = self.length * np.concatenate(
+        ends = body_size(self) * np.concatenate(
             [centre - half, (centre + half)[-1:]]
         ).T.reshape(*alpha.shape[:-1], -1)
         x, y, theta = np.moveaxis(pose[..., None], -2, 0)

@@ -121,7 +121,7 @@ class Positions(Posed):
 
     positions: function of shapes alpha (..., joints), or of one shape, that returns poses (..., n, 3) of the links, tail to
     head: x, y of the centre in the unit of ``lengths`` and heading theta (rad), in any frame. lengths: of the n links.
-    length: of the body, in the unit wanted for displacement. frame: "mean" or "link-1", "link-2" ...
+    length: of the body, m; without it lengths are in body lengths. frame: "mean" or "link-1", "link-2" ...
 
     Examples
     --------
@@ -141,6 +141,6 @@ class Positions(Posed):
     positions: Callable[[np.ndarray], np.ndarray]
     joints: int
     lengths: tuple[float, ...]
-    length: Length = 1.0
+    length: Length = None
     frame: str = "mean"
     kind = "positions"

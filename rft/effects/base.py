@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
+from rft.checks import in_range, number_fields
 from rft.contact import Problem
 from rft.premise import NONE, SHAPE_ALONE, Premise
-from rft.refusal import Refusal, require
+from rft.refusal import Refusal, located, require
 from rft.registry import Registry, subclasses
 
 # Engines and what they solve, the cheapest first.
@@ -22,6 +23,18 @@ ENGINES = {
     "dynamic": "the equation of motion phase after phase, implicit in time",
 }
 PAST = Premise.MEMORYLESS | Premise.QUASI_STATIC
+
+
+class InMetres(NamedTuple):
+    """The other spelling of a field in body lengths: the name of a field in metres, and
+    the power of a length in both: 1, or -1 for a number per length."""
+
+    name: str
+    power: int = 1
+
+    @property
+    def unit(self) -> str:
+        return "in m" if self.power == 1 else "per m"
 
 
 class Site(NamedTuple):
@@ -63,6 +76,8 @@ class Effect:
     memory_size : numbers that time stepping stores for each sample, beside a few for each element.
     varies_along : whether the effect varies along an element; it then acts by its mean over each piece of an element.
     odd : whether the loads that it adds change sign with all velocities (assumed, not proven).
+    metres : fields in body lengths, and for each the field that gives it in metres, of a body with a ``length``.
+    required : fields without a default that follow one with.
 
     Examples
     --------
@@ -81,6 +96,91 @@ class Effect:
     drift_tolerance = 1e-6
     memory_size = 0
     varies_along = odd = False
+    metres: ClassVar[Mapping[str, InMetres]] = {}
+    required = ()
+
+    def check_lengths(self) -> None:
+        """Raise ValueError unless each length is given once, in body lengths or in
+        metres, where it has no default, and all of ``required`` are given."""
+        defaults = {f.name: f.default for f in fields(self)}
+        for name in self.required:
+            if getattr(self, name) is None:
+                raise Refusal(f"{self.kind} has no {name}", instead=f"give {name}")
+        for name, other in self.metres.items():
+            given = getattr(self, name)
+            left_out = given is None or given is defaults[name]
+            cure = (
+                f"give {name}, in body lengths, or {other.name} of a body with a "
+                "length in m"
+            )
+            if getattr(self, other.name) is not None:
+                require(left_out, f"{name} is given twice", instead=cure)
+            elif given is None:
+                raise Refusal(f"{self.kind} has no {name}", instead=cure)
+
+    def in_body_lengths(self, length: float | None) -> Self:
+        """Return the effect with its lengths in body lengths, on a body of a length (m),
+        None for one without.
+
+        Raises ValueError for metres on a body without a length, for body lengths on a
+        body that has one, where they are easily taken for metres, and for values out
+        of bounds. 0 is the same in both.
+
+        Examples
+        --------
+        >>> from rft.effects import EndCaps
+        >>> EndCaps(radius_m=0.012).in_body_lengths(0.24).radius
+        0.05
+        """
+        values = {}
+        for name, other in self.metres.items():
+            number = number_fields(type(self))[name]
+            own, in_metres = getattr(self, name), getattr(self, other.name)
+            if in_metres is None:
+                if length is not None and np.any(own):
+                    largest = np.max(own)
+                    scaled = largest * length**other.power
+                    raise Refusal(
+                        f"{name} = {largest:.6g} is in {number.unit}",
+                        where=self.kind,
+                        because=f"the body has a length, {length:g} m",
+                        instead=f"give {other.name}, {largest:.6g} if that is "
+                        f"{other.unit}, {scaled:.6g} if not",
+                    )
+                continue
+            if length is None:
+                raise Refusal(
+                    other.name,
+                    where=self.kind,
+                    because="the body has no length",
+                    instead=f"give it one, in m, or {name} in {number.unit}",
+                )
+            values[other.name] = None
+            values[name] = in_metres / length**other.power
+            with located(f"{self.kind} {other.name} of a body of {length:g} m"):
+                for bound in (np.min(values[name]), np.max(values[name])):
+                    limits = number.low, number.high
+                    in_range(name, float(bound), *limits, unit=number.unit)
+        return self.with_parameters(**values)
+
+    def in_metres(self, length: float | None) -> Self:
+        """Return the effect with its lengths in metres, for a body of a length (m);
+        unchanged for None.
+
+        Examples
+        --------
+        >>> from rft.effects import EndCaps
+        >>> EndCaps(radius=0.05).in_metres(0.24).radius_m
+        0.012
+        """
+        defaults = {f.name: f.default for f in fields(self)}
+        values = {}
+        for name, other in self.metres.items():
+            own = getattr(self, name)
+            if length is not None and own is not None and np.any(own):
+                values[other.name] = own * length**other.power
+                values[name] = defaults[name]
+        return self.with_parameters(**values)
 
     def check(self, medium: Any) -> None:
         """Raise ValueError for a medium that the effect does not take."""

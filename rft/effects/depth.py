@@ -9,7 +9,7 @@ import numpy as np
 
 from rft.checks import Number, check_numbers, real_array
 from rft.contact import Contact, Problem
-from rft.effects.base import EFFECTS, Effect, Site
+from rft.effects.base import EFFECTS, Effect, InMetres, Site
 from rft.premise import NONE, Premise
 from rft.refusal import Refusal, require
 
@@ -36,7 +36,10 @@ class DepthProfile(Effect):
     slope: Annotated[
         float,
         Number(
-            0, 1000, "per body length", "rise of |z| over that depth along the ground"
+            0,
+            1000,
+            "per body length",
+            "rise of |z| over that depth along the ground; or slope_per_m",
         ),
     ] = 0.0
     towards: Annotated[
@@ -48,12 +51,17 @@ class DepthProfile(Effect):
             "direction of the rise, from the frame's heading at the start",
         ),
     ] = 0.0
+    slope_per_m: Annotated[
+        float | None,
+        Number(0, 1e9, "per m", "slope under a body with a length, in place of slope"),
+    ] = None
 
     kind = "depth-profile"
+    metres = {"slope": InMetres("slope_per_m", -1)}
     odd = True
     limit = "along all 1 and slope = 0"
     cost = "one multiplication an element; with a slope, a step at a time in place of all phases at once"
-    batched = ("slope", "towards")
+    batched = ("slope", "towards", "slope_per_m")
     varies_along = True
 
     def __post_init__(self):
@@ -67,10 +75,15 @@ class DepthProfile(Effect):
         )
         object.__setattr__(self, "along", tuple(along.tolist()))
         check_numbers(self)
+        self.check_lengths()
+
+    @property
+    def _slopes(self) -> bool:
+        return any(x is not None and np.any(x) for x in (self.slope, self.slope_per_m))
 
     @property
     def breaks(self) -> Premise:
-        return Premise.SE2_SYMMETRIC if np.any(self.slope) else NONE
+        return Premise.SE2_SYMMETRIC if self._slopes else NONE
 
     def apply(self, problem: Problem, site: Site | None, state: Any = None) -> Problem:
         def with_depths(contact):

@@ -9,7 +9,7 @@ import numpy as np
 
 from rft.checks import Number, check_numbers
 from rft.contact import Problem
-from rft.effects.base import EFFECTS, Effect, Site
+from rft.effects.base import EFFECTS, Effect, InMetres, Site
 from rft.premise import Premise
 
 # The map of the ground is a square that moves with the body, in tiles of cells.
@@ -46,16 +46,26 @@ class DisturbedGround(Effect):
     """
 
     radius: Annotated[
-        float,
+        float | None,
         Number(
-            0.01, 0.25, "body lengths", "half width of the track that the body leaves"
+            0.01,
+            0.25,
+            "body lengths",
+            "half width of the track that the body leaves; or radius_m",
         ),
-    ]
+    ] = None
     weakening: Annotated[
-        float, Number(0, 1, "-", "share of the drag lost in fully disturbed ground")
-    ]
+        float | None,
+        Number(0, 1, "-", "share of the drag lost in fully disturbed ground"),
+    ] = None
+    radius_m: Annotated[
+        float | None,
+        Number(0, 1e6, "m", "radius for a body with a length, in place of radius"),
+    ] = None
 
     kind = "disturbed-ground"
+    metres = {"radius": InMetres("radius_m")}
+    required = ("weakening",)
     breaks = Premise.MEMORYLESS
     limit = "weakening = 0"
     cost = "a map of the ground, two look-ups and some thirty marks an element and step"
@@ -65,6 +75,7 @@ class DisturbedGround(Effect):
 
     def __post_init__(self):
         check_numbers(self)
+        self.check_lengths()
 
     @property
     def memory_size(self) -> int:

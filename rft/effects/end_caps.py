@@ -8,9 +8,9 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from rft.checks import Number, check_numbers
+from rft.checks import Number, check_numbers, unmasked
 from rft.contact import Contact, Problem
-from rft.effects.base import EFFECTS, Effect
+from rft.effects.base import EFFECTS, Effect, InMetres
 from rft.laws.granular import Granular
 from rft.link import dry_point
 from rft.refusal import require
@@ -35,7 +35,9 @@ class EndCaps(Effect):
     array([ 0.0151,  0.0128, -0.1833])
     """
 
-    radius: Annotated[float, Number(0, 1, "body lengths", "radius of the body")]
+    radius: Annotated[
+        float | None, Number(0, 1, "body lengths", "radius of the body; or radius_m")
+    ] = None
     head: Annotated[
         float, Number(0, 100, "-", "factor e of the head: 0 none, 1 flat, 4 hemisphere")
     ] = 1.0
@@ -51,14 +53,20 @@ class EndCaps(Effect):
             "q of the axial force: sin gamma0 if not given, 1 for one as cos psi",
         ),
     ] = None
+    radius_m: Annotated[
+        float | None,
+        Number(0, 1e6, "m", "radius of a body with a length, in place of radius"),
+    ] = None
 
     kind = "end-caps"
+    metres = {"radius": InMetres("radius_m")}
     adds_points = odd = True
     limit = "radius = 0"
     cost = "one point load an end"
 
     def __post_init__(self):
         check_numbers(self)
+        self.check_lengths()
 
     def check(self, medium: Any) -> None:
         require(
@@ -80,9 +88,14 @@ class EndCaps(Effect):
         self, medium: Granular, v_t: Any, v_n: Any, rounding: Any = 0.0
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the force (along, across) of both ends together at velocities (v_t, v_n), in units of the body's axial
-        drag."""
+        drag; ValueError unless the radius is in body lengths."""
+        require(
+            self.radius is not None,
+            "the traction of end caps takes their radius in body lengths",
+            instead="say ``in_body_lengths`` with the body's length",
+        )
         load = dry_point(
-            *(np.asarray(v, float) for v in (v_t, v_n)),
+            *(unmasked("v", v) for v in (v_t, v_n)),
             rounding,
             np.array(self.terms(medium)),
         )

@@ -9,7 +9,7 @@ import numpy as np
 
 from rft.checks import Number, check_numbers
 from rft.contact import Contact, Problem
-from rft.effects.base import EFFECTS, Effect
+from rft.effects.base import EFFECTS, Effect, InMetres
 from rft.laws.base import speed_exponent
 from rft.laws.coulomb import Coulomb
 from rft.refusal import require
@@ -42,10 +42,18 @@ class TowedSled(Effect):
         ),
     ]
     distance: Annotated[
-        float, Number(0, 10, "body lengths", "distance of the sled behind the tail")
+        float,
+        Number(
+            0, 10, "body lengths", "distance of the sled behind the tail; or distance_m"
+        ),
     ] = 0.0
+    distance_m: Annotated[
+        float | None,
+        Number(0, 1e6, "m", "distance for a body with a length, in place of distance"),
+    ] = None
 
     kind = "towed-sled"
+    metres = {"distance": InMetres("distance_m")}
     adds_points = odd = True
     limit = "pull = 0"
     cost = "one point load"
@@ -53,6 +61,7 @@ class TowedSled(Effect):
 
     def __post_init__(self):
         check_numbers(self)
+        self.check_lengths()
 
     def check(self, medium: Any) -> None:
         name = type(medium).__name__

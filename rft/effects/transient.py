@@ -9,7 +9,7 @@ import numpy as np
 
 from rft.checks import Number, check_numbers
 from rft.contact import Problem
-from rft.effects.base import EFFECTS, Effect, Site
+from rft.effects.base import EFFECTS, Effect, InMetres, Site
 from rft.link import Memory, developed_direction, find_pivot
 from rft.premise import Premise
 
@@ -52,14 +52,14 @@ class Transient(Effect):
     """
 
     travel: Annotated[
-        float,
+        float | None,
         Number(
             0,
             10,
             "body lengths",
-            "travel over which 95 % of the drag across comes back",
+            "travel over which 95 % of the drag across comes back; or travel_m",
         ),
-    ]
+    ] = None
     at_once: Annotated[
         float, Number(0, 1, "-", "share of the drag across that is there at once")
     ] = AT_ONCE
@@ -69,18 +69,24 @@ class Transient(Effect):
     at_once_along: Annotated[
         float, Number(0, 1, "-", "share of the drag along that is there at once")
     ] = AT_ONCE_ALONG
+    travel_m: Annotated[
+        float | None,
+        Number(0, 1e6, "m", "travel for a body with a length, in place of travel"),
+    ] = None
 
     kind = "transient"
+    metres = {"travel": InMetres("travel_m")}
     breaks = Premise.MEMORYLESS
     limit = "travel = 0"
     cost = (
         "two directions an element, one link integral more where its pivot lies inside"
     )
-    batched = ("travel", "at_once", "ratio", "at_once_along")
+    batched = ("travel", "at_once", "ratio", "at_once_along", "travel_m")
     varies_along = True
 
     def __post_init__(self):
         check_numbers(self)
+        self.check_lengths()
 
     def begin(self, problem: Problem, site: Site) -> np.ndarray:
         """Return the mean directions (2, n, B) of travel along and across; the first step replaces them by its own."""

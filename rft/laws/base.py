@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from rft.checks import unmasked
 from rft.refusal import Refusal, require
 from rft.registry import Registry, classes_with
 from rft.vectors import formula, sqrt, where
@@ -110,12 +111,12 @@ class TermLaw:
         self, v_t: Any, v_n: Any, rounding: Any = 0.0
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the drag per unit length (f_t, f_n) opposing (v_t, v_n), in units of the axial drag; zero at rest."""
-        v_t, v_n = np.asarray(v_t, float), np.asarray(v_n, float)
+        v_t, v_n = unmasked("v_t", v_t), unmasked("v_n", v_n)
         return terms_traction(term_numbers(self), v_t, v_n, rounding)
 
     def slopes(self, v_t: Any, v_n: Any, rounding: Any = 0.0) -> tuple[np.ndarray, ...]:
         """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n); infinite slopes at rest are returned as 0."""
-        v_t, v_n = np.broadcast_arrays(np.asarray(v_t, float), np.asarray(v_n, float))
+        v_t, v_n = np.broadcast_arrays(unmasked("v_t", v_t), unmasked("v_n", v_n))
         return terms_slopes(term_numbers(self), v_t, v_n, rounding)
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.checks import real_array
+from rft.checks import real_array, unmasked
 from rft.ground import Ground, GroundEffect, ground_of
 from rft.meshes.contact import Motion, Part, load, velocity_of_middle
 from rft.meshes.law import Spatial
@@ -212,7 +212,8 @@ def bearing(
     1.56
     """
     rotation, place, velocity, spin = (
-        np.asarray(x, float) for x in (rotation, place, velocity, spin)
+        unmasked("rotation, place, velocity and spin", x)
+        for x in (rotation, place, velocity, spin)
     )
     world = mesh.vertices @ rotation.T + place
     parts, triangle = below(world[mesh.faces], world[mesh.faces, 2])

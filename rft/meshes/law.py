@@ -24,7 +24,7 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, in_range
+from rft.checks import Number, check_numbers, in_range, unmasked
 from rft.ground.lead import jump, smoothstep
 from rft.meshes.triples import UP, dot, minus, plus, times
 from rft.metres import GRAVITY
@@ -78,7 +78,7 @@ def alpha(n, v) -> np.ndarray:
 
 def _by_rows(law, n, v) -> np.ndarray:
     """Return law(n, v), a function of triples of arrays (N,), for n and v (..., 3)."""
-    n, v = np.broadcast_arrays(np.asarray(n, float), np.asarray(v, float))
+    n, v = np.broadcast_arrays(unmasked("n", n), unmasked("v", v))
     return np.stack(law(n.reshape(-1, 3).T, v.reshape(-1, 3).T), -1).reshape(n.shape)
 
 
@@ -214,7 +214,7 @@ def alpha_of_angles(beta, gamma, psi) -> np.ndarray:
     """Return alpha (..., 3) along r, theta, z of a plate tilted by beta that moves gamma below the horizontal, with its
     normal at the angle psi from that direction about the vertical; rad."""
     beta, gamma, psi = np.broadcast_arrays(
-        *(np.asarray(x, float) for x in (beta, gamma, psi))
+        *(unmasked("beta, gamma and psi", x) for x in (beta, gamma, psi))
     )
     n = np.stack(
         [np.sin(beta) * np.cos(psi), np.sin(beta) * np.sin(psi), -np.cos(beta)], -1

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rft.checks import unmasked
 from rft.vectors import formula, where
 
 
@@ -59,5 +60,5 @@ def submerged(heights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
     share: of the area below the surface. The middle of the part below is sum_i middle_i x_i, with x_i the corners. The
     integral over it of depth times x is area times sum_i moments_i x_i, so that of depth is area times sum_i moments_i."""
-    share, middle, moments = part_of_triangle(*-np.asarray(heights, float))
+    share, middle, moments = part_of_triangle(*-unmasked("heights", heights))
     return share, np.stack(middle), np.stack(moments)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.balance.backend import check, compiles
-from rft.checks import real_array
+from rft.checks import real_array, unmasked
 from rft.ground import Ground, GroundEffect, ground_of
 from rft.plates.contact import (
     Element,
@@ -55,7 +55,7 @@ class Loads(NamedTuple):
 
     def power(self, twist) -> np.ndarray:
         """Return the power (...,), W, of the grains on a body with twists (..., 3); negative where they dissipate."""
-        twist = np.asarray(twist, float)
+        twist = unmasked("twist", twist)
         return (self.force * twist[..., :2]).sum(-1) + self.moment * twist[..., 2]
 
 

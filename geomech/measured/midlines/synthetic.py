@@ -11,6 +11,7 @@ from geomech.io.files import atomic_file
 from geomech.measured.midlines.trial import Trial
 from geomech.measured.synthetic import _integrated as integrated
 from geomech.measured.synthetic import _smooth as smooth_noise
+from geomech.systems.base import body_size
 from rft.checks import in_range
 
 FINER = 3  # steps of the integration between two frames
@@ -72,7 +73,7 @@ def made(
     pose = integrated(system.velocity(alpha, alphadot), t[1]) + [0.0, 0.0, heading]
     pose[:, :2] = pose[:, :2] @ _turn(heading).T
     ends = system.body.points(alpha[::FINER], pose[::FINER])
-    exact = _at(ends, np.linspace(0, 1, points)) / system.length
+    exact = _at(ends, np.linspace(0, 1, points)) / body_size(system)
     return SyntheticTrial(
         t[::FINER], exact + noise * rng.normal(size=exact.shape), exact
     )

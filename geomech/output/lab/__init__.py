@@ -27,7 +27,7 @@ from geomech.io.files import atomic_file
 from geomech.scenes.key import keys_of
 from geomech.scenes.write import text_of, without_gait
 from geomech.studies.charts import SHARES, Chart, series_of
-from geomech.systems.base import length_unit, shape_labels
+from geomech.systems.base import body_size, length_unit, shape_labels
 from rft.refusal import Refusal, in_line
 
 FOLDER = Path(__file__).parent
@@ -175,7 +175,7 @@ def _scene(chart: Chart, tables: dict[str, str]) -> dict[str, Any]:
         "toml": [text] if family is None else _around_value(text, family.key),
         "checksum": _checksum(text),
         "unit": length_unit(system),
-        "length": system.length,
+        "length": body_size(system),
         "labels": [list(label) for label in shape_labels(system)],
         "frame": scene.frame,
         "gait": _gait(scene.gait),
