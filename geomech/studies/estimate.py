@@ -2,8 +2,8 @@
 
 Every estimate is a refinement, never a constant: the direct tier against itself at half, a quarter and an eighth of the
 phases and, on the quarter, with the regularisation ten times smaller and exact link integrals, or with pieces of half
-the length; a table against half of its grid, and by the residual of its fit (`System.table_error`); every other tier
-against the direct tier. Errors come in pairs: the distance between net positions, in body lengths, and between net
+the length; a continuous body against half and a quarter of its elements (`geomech.studies.elements`); a table against
+half of its grid, and by the residual of its fit (`System.table_error`); every other tier against the direct tier. Errors come in pairs: the distance between net positions, in body lengths, and between net
 headings, in rad."""
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from geomech.gaits import Gait
 from geomech.geometry.reconstruct import displacement
 from geomech.run.jobs import runner
 from geomech.scenes.model import Scene
+from geomech.studies import elements
 from geomech.systems.capabilities import (
     gaits_per_batch,
     is_closed,
@@ -61,8 +62,8 @@ def direct(
 def in_groups(
     scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int
 ) -> tuple[np.ndarray, ...]:
-    """Return poses, errors without those of the pieces of body, and errors of these, of the direct tier. amplitudes:
-    None for the gait's own."""
+    """Return poses, errors without those of the pieces and the elements of the body, and errors of either, of the direct
+    tier. amplitudes: None for the gait's own."""
     size = gaits_per_batch(scene.system, phases)
     groups = (
         [None]
@@ -81,8 +82,8 @@ def in_groups(
 
 def _direct(
     scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return poses, errors without those of the pieces of body, and errors of these, of the direct tier."""
+) -> tuple[np.ndarray, ...]:
+    """Return what `in_groups` does, of one group."""
     phases = max(32, 8 * -(-phases // 8))
     system, stepping = scene.system, scene.system.traits.steps
     shapes = gait.cycle(max(FEWEST_STEPS, phases) if stepping else phases, amplitudes)
@@ -119,7 +120,8 @@ def _direct(
             * np.maximum(difference, difference.max(-1, keepdims=True) / 2)
         )
     error += np.asarray(run.to_come)[..., None] + table_error(system, *strided[2])
-    return full, error, pieces_error(scene, shapes, strided[1], coarse)
+    pieces = pieces_error(scene, shapes, strided[1], coarse)
+    return full, error, pieces, elements_error(system, strided[1], coarse)
 
 
 def _with_fewer(system, alpha, alphadot) -> np.ndarray:
@@ -130,6 +132,28 @@ def _with_fewer(system, alpha, alphadot) -> np.ndarray:
         raise RuntimeError(
             f"at {alpha.shape[-2]} phases, for the estimate of the error, {error}, or raise [numerics] phases"
         ) from None
+
+
+def elements_error(system, fewer, coarse: np.ndarray) -> np.ndarray:
+    """Return (B, 2), body lengths and rad: error from the finite number of elements of a continuous body; 0 of others.
+
+    fewer: a quarter of the phases, where bodies of fewer elements are compared with ``coarse``, the poses there."""
+    alpha, alphadot = fewer
+
+    def net(other, *shapes):
+        poses = _with_fewer(other, *shapes) if system.traits.steps else other.run(*shapes).net
+        return elements.mean_poses(other, poses, shapes[0][..., 0, :])
+
+    if not elements.elements_of(system):
+        return np.zeros((*coarse.shape[:-1], 2))
+    return elements.change(
+        system,
+        alpha,
+        alphadot,
+        elements.mean_poses(system, coarse, alpha[..., 0, :]),
+        net,
+        partial(pose_distance, length=system.length),
+    )
 
 
 def pieces_error(scene: Scene, shapes, fewer, coarse: np.ndarray) -> np.ndarray:
