@@ -299,7 +299,5 @@ def of_effort(scene: Scene, count: int, gait: Gait | None = None) -> list[Job]:
     weights = [1.0 / other.ratio for other in coarser(system)]
     weights += [2.0] if pieces_per_length(system) else []
     return jobs + [
-        job._replace(weight=weight)
-        for weight in weights
-        for job in once(phases // 4)
+        job._replace(weight=weight) for weight in weights for job in once(phases // 4)
     ]

@@ -265,7 +265,9 @@ def effort(
     )
 
 
-def change_by_elements(system: System, alpha, alphadot, values: np.ndarray) -> np.ndarray:
+def change_by_elements(
+    system: System, alpha, alphadot, values: np.ndarray
+) -> np.ndarray:
     """Return the errors (B, 2) of path length and work, ``values``, that the elements of a continuous body cause."""
 
     def integrals(other, *shapes):

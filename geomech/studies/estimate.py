@@ -141,7 +141,11 @@ def elements_error(system, fewer, coarse: np.ndarray) -> np.ndarray:
     alpha, alphadot = fewer
 
     def net(other, *shapes):
-        poses = _with_fewer(other, *shapes) if system.traits.steps else other.run(*shapes).net
+        poses = (
+            _with_fewer(other, *shapes)
+            if system.traits.steps
+            else other.run(*shapes).net
+        )
         return elements.mean_poses(other, poses, shapes[0][..., 0, :])
 
     if not elements.elements_of(system):
