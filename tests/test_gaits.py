@@ -88,7 +88,7 @@ def side_by_side(system, corners, nodes=32):
     pose = np.zeros(3)
     for corner, side in zip(corners, np.roll(corners, -1, 0) - corners):
         for k in range(nodes):
-            at = lambda u, k=k: corner + (k + u) / nodes * side  # noqa: B023
+            at = lambda u, k=k: corner + (k + u) / nodes * side
             a, b, c = (system.velocity(at(u), side / nodes) for u in (0.0, 0.5, 1.0))
             # Magnus' expansion, of order 4
             step = (a + 4 * b + c) / 6 + se2.bracket(a, c) / 12

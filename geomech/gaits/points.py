@@ -12,7 +12,6 @@ from geomech.core.errors import Note
 from geomech.geometry.gait import GAITS, Gait, finite_array
 from rft.refusal import Refusal
 
-
 FAR = 1 / 20  # of the size of a polygon, from which a spline may lie as far unnoted
 
 

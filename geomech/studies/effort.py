@@ -218,9 +218,10 @@ def effort(
     direct tier.
 
     Each error is the change with half of the phases; in time stepping at least a quarter of the change from half to a
-    quarter of them; twice the change with twice the pieces into which effects cut the body; and what half and a quarter of
-    the elements of a continuous body show (`geomech.studies.elements`). Changes by later cycles are not included. Path lengths are nan where power has no one degree in the rate. Refusal where the cost of moving
-    is not known."""
+    quarter of them; twice the change with twice the pieces into which effects cut the body; and what half and a
+    quarter of the elements of a continuous body show (`geomech.studies.elements`). Changes by later cycles are not
+    included. Path lengths are nan where power has no one degree in the rate. Refusal where the cost of moving is not
+    known."""
     system, gait = scene.system, checked_gait(scene.gait if gait is None else gait)
     amplitudes = real_array(
         "amplitudes", [gait.amplitude] if amplitudes is None else amplitudes
