@@ -659,6 +659,26 @@ def test_heavy_bodies_know_how_far_they_are(truths):
     np.testing.assert_allclose(limit.xi, xi, atol=2e-6)
 
 
+# Net displacements of 800 plain cycles, by which they change by less than 1e-11.
+FORGETS_SLOWLY = {
+    (0.05, 0.3, 1.8): (-5.864540457e-05, 2.912377523e-05, -8.750617274e-05),
+    (0.1, 1.0, 1.8): (-2.23546018e-04, 1.07231935e-04, -3.95975078e-04),
+}
+
+
+@pytest.mark.parametrize("case", FORGETS_SLOWLY)
+def test_small_strokes_with_a_long_transient_reach_their_limit(case):
+    """Sixty plain cycles leave 1e-5 to 1e-4."""
+    size, travel, C = case
+    circle = Circle(size, centre=(0.5, 0.0)).cycle(32)
+    steps = time_steps(
+        Granular(C, 0.24), Chain(), *circle, effects=[Transient(travel=travel)]
+    )
+    assert (steps.checked().status == "periodic").all()
+    off = np.abs(steps.displacement - FORGETS_SLOWLY[case]).max()
+    assert off < steps.drift + 1e-8
+
+
 def test_estimates_hold_what_is_left_of_the_way(monkeypatch):
     scene = Scene(
         Swimmer(Viscous(2.0), Chain((1, 2, 1.5)), (heavy(5.0),)), HEAVY
