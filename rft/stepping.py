@@ -100,8 +100,7 @@ class TimeSteps(NamedTuple):
         if (self.status == "not periodic").any():
             raise RuntimeError(
                 f"after {self.cycles} cycles displacement is still {np.max(self.drift):.1e} body lengths from its limit: "
-                "give 'cycles' to take it as it is, or lower what remembers: a mass, the weakening of the ground, or the "
-                "travel of a transient"
+                "give 'cycles' to take it as it is, or lower the mass, the ground's weakening or the travel of a transient"
             )
         return self
 

@@ -20,11 +20,10 @@ class Polygon(Gait):
     points (rad): the corners, three rows of joint angles or more.
 
     Each side takes a share of the phase by its length and is run from rest to rest, by the
-    share 10 u^3 - 15 u^4 + 6 u^5 of it at the share u of its time, of minimum jerk. So the
-    rates have no jumps, and the displacement converges with the phases as for a smooth
-    gait, of order 4 or more in a fluid. It does not depend on the timing but through effects that
-    depend on the speed; the highest joint speed is 1.875 times the mean of its side.
-    Source: Flash and Hogan, J. Neurosci. 5, 1688 (1985).
+    share 35 u^4 - 84 u^5 + 70 u^6 - 20 u^7 of it at the share u of its time: speed,
+    acceleration and jerk are 0 at its ends. So the gait is smooth at its corners, and the
+    displacement converges with order 4 in a fluid. It does not depend on the timing but through effects that depend on
+    the speed; the highest joint speed is 2.19 times the mean of its side.
 
     Examples
     --------
@@ -67,12 +66,12 @@ class Polygon(Gait):
 
     def unit(self, t: ArrayLike) -> np.ndarray:
         corner, side, _, u = self._along(t)
-        share = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+        share = u**4 * (35.0 - 84.0 * u + 70.0 * u**2 - 20.0 * u**3)
         return corner + share[..., None] * side
 
     def unit_rate(self, t: ArrayLike) -> np.ndarray:
         _, side, duration, u = self._along(t)
-        return (30.0 * (u * (1.0 - u)) ** 2 / duration)[..., None] * side
+        return (140.0 * (u * (1.0 - u)) ** 3 / duration)[..., None] * side
 
     @classmethod
     def examples(cls) -> dict[str, Polygon]:

@@ -37,8 +37,8 @@ class Connection:
     ..., N_d), rms over the fitted directions of xi - A alphadot for |alphadot| = 1; speed: (3, N_1, ..., N_d), rms of
     xi itself. degree: of the interpolating spline. All are nan at grid points that are singular, or have a neighbour
     beyond singular shapes. direction_error: (3, d, N_1, ..., N_d), estimated error of A from the finite number of
-    directions; None where it is not known. unit: of lengths, "BL" (body lengths) or "m". length: of the body in that unit; None where
-    it is unknown.
+    directions; None where it is not known. unit: of lengths, "BL" (body lengths) or "m". length: of the body in that
+    unit; None where it is unknown.
 
     Examples
     --------
