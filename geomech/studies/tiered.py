@@ -172,7 +172,7 @@ class Settings:
         shapes = self.scene.gait.cycle(self.scene.numerics.phases, self.amplitudes)
         error = table_error(system, *shapes)[..., 0]
         if estimate.elements.elements_of(system):
-            fewer = [x[:, ::4] for x in shapes]
+            fewer = shapes[0][:, ::4], shapes[1][:, ::4]
             net = system.run(*fewer).net
             error = error + estimate.elements_error(system, fewer, net)[..., 0]
         return float(error.max())
