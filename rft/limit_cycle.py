@@ -6,7 +6,11 @@ end are random: they alternate in sign and do not add up.
 
 A heavy body takes many cycles, but its state is only the three velocities at the start of a cycle. The map from these to
 the velocities at the next start is affine near its fixed point, and the last few cycles determine it in the directions in
-which they differ (Anderson's mixing). Only the velocities are changed; the memory of the ground follows by itself."""
+which they differ (Anderson's mixing). Only the velocities are changed; the memory of the ground follows by itself.
+
+Where a body without mass forgets slowly, as with strokes far shorter than the travel of a transient, its memory at the
+start of a cycle is mixed likewise. It has as many numbers as pieces, each with a factor of its own by which its distance
+from the limit falls per cycle. Two changes tell these factors, and each number is scaled by 1 / (1 - factor)."""
 
 from __future__ import annotations
 
@@ -17,7 +21,15 @@ import numpy as np
 HISTORY = 6  # cycles that the limit is computed from; a velocity has three numbers, but the map is not quite affine
 SINGULAR = 1e-6  # of the largest singular value, below which cycles count as linearly dependent
 FIRST_RATIO = 0.5  # of the second change of displacement to the first, assumed
-LARGEST_RATIO = 0.95  # of a change to the previous one, where changes hardly decrease
+LARGEST_RATIO = 0.99  # of a change to the previous one, where changes hardly decrease
+MEMORY_HISTORY = (
+    11  # cycles whose memory is mixed; fewer, or more, converge more slowly
+)
+MEMORY_SINGULAR = 1e-3  # as SINGULAR, of a map with kinks
+SLOWEST_MEMORY = (
+    0.9995  # factor of a number of memory per cycle, beyond which it is held
+)
+LEAST_CHANGE = 1e-13  # of memory from cycle to cycle, above roundoff
 N_RATIOS = 3  # last ratios that are averaged
 DIVERGED = 5.0  # times the least change of velocity so far: an extrapolation that led away from the limit
 MOST_FAILURES = (
@@ -113,6 +125,53 @@ def after_heavy_cycle(
     return c._replace(
         drift=drift, extrapolation=np.where(extrapolates, extrapolation, 0.0)
     )
+
+
+class MemoryCycle(NamedTuple):
+    """A cycle of a body without mass. start, end: memory (M, B) at its start and its end. displacement: (3, B)."""
+
+    start: np.ndarray
+    end: np.ndarray
+    displacement: np.ndarray
+
+
+def memory_gain(cycles: list[MemoryCycle]) -> np.ndarray:
+    """Return the distance of memory from its limit over its change in a cycle, (M, B), from two plain cycles."""
+    before, last = (c.end - c.start for c in cycles[-2:])
+    large = np.abs(before) > LEAST_CHANGE
+    ratio = np.where(large, last / np.where(large, before, 1.0), 0.0)
+    return 1.0 / (1.0 - np.clip(ratio, 0.0, SLOWEST_MEMORY))
+
+
+def mixed_memory(
+    cycles: list[MemoryCycle], gain: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the memory (M, B) at the limit by Anderson's mixing of the last cycles, and the drift (B,).
+
+    The drift is the largest of four: the change of displacement that the mixing predicts, the last change, and what
+    displacement changes per change of memory times the change to the limit, with the largest such ratio of the cycles,
+    or times gain x the last change of memory, with their median. Where the mixing stalls, the first two are small."""
+    last = cycles[-1]
+    starts = np.stack([c.start for c in cycles])
+    changes = np.stack([c.end - c.start for c in cycles])
+    displacements = np.stack([c.displacement for c in cycles])
+    start_slope, slope, moves = (
+        np.diff(x, axis=0) for x in (starts, changes, displacements)
+    )
+    matrix = np.moveaxis(gain * slope, (0, 1, 2), (2, 1, 0))
+    inverse = np.linalg.pinv(matrix, MEMORY_SINGULAR)
+    weights = -np.einsum("bkm,mb->kb", inverse, gain * changes[-1])[:, None]
+    remaining = changes[-1] + (slope * weights).sum(0)
+    step = (start_slope * weights).sum(0) + gain * remaining
+    size = np.maximum(np.linalg.norm(start_slope, axis=1), LEAST_CHANGE)
+    effect = np.abs(moves).max(1) / size  # of memory on displacement
+    drifts = (
+        np.abs((moves * weights).sum(0)).max(0),
+        np.abs(moves[-1]).max(0),
+        effect.max(0) * np.linalg.norm(step, axis=0),
+        np.median(effect, 0) * np.linalg.norm(gain * changes[-1], axis=0),
+    )
+    return last.start + step, np.maximum.reduce(drifts)
 
 
 def _appended(cycles: np.ndarray, cycle: np.ndarray) -> np.ndarray:

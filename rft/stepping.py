@@ -34,6 +34,7 @@ from rft.refusal import require
 from rft.work import Work, element_work
 
 MOST_CYCLES = 60
+PLAIN_CYCLES = 12  # before the memory of a body without mass is led to its limit
 MOST_STORED = 100_000  # elements x nodes at all phases, up to which their balances are stored: some 8 MB
 PAUSE = 1e-9  # of the rms joint speed, below which the joints pause and that speed is the scale
 
@@ -99,7 +100,7 @@ class TimeSteps(NamedTuple):
         if (self.status == "not periodic").any():
             raise RuntimeError(
                 f"after {self.cycles} cycles displacement is still {np.max(self.drift):.1e} body lengths from its limit: "
-                "give 'cycles' to take it as it is, or lower the mass or the ground's weakening"
+                "give 'cycles' to take it as it is, or lower the mass, the ground's weakening or the travel of a transient"
             )
         return self
 
@@ -215,14 +216,32 @@ def _cycles(
 ) -> TimeSteps:
     """Return the last of ``cycles`` cycles, or by default the first one that repeats; samples on the last axis."""
     path, state = [], stepping.begin()
+    mixes = cycles is None and not stepping.heavy and stepping.memory(state).size > 0
+    memories: list[limit_cycle.MemoryCycle] = []
+    gain = np.zeros(0)
     for cycle in itertools.count(1):
+        start = stepping.memory(state)
         state, rows = advance(stepping, state, stepping.phases, with_work)
         pose = np.stack([*(row.pose for row in rows), stepping.site(state).pose])
         path += [pose[:-1]] if with_path else []
+        if mixes and cycle > 1:  # before the first step there is no memory
+            moved = _relative_pose(pose[0], pose[-1])
+            memories = memories[1 - limit_cycle.MEMORY_HISTORY :]
+            memories.append(
+                limit_cycle.MemoryCycle(start, stepping.memory(state), moved)
+            )
+        if mixes and cycle > PLAIN_CYCLES:
+            memory, drift = limit_cycle.mixed_memory(memories, gain)
+            state = state._replace(cycles=state.cycles._replace(drift=drift))
         if cycle == (cycles or MOST_CYCLES) or (
             cycles is None and stepping.is_periodic(state)
         ):
             break
+        if mixes and cycle >= PLAIN_CYCLES:
+            if cycle == PLAIN_CYCLES:
+                gain = limit_cycle.memory_gain(memories)
+                memory, _ = limit_cycle.mixed_memory(memories, gain)
+            state = stepping.with_memory(state, memory)
     xi, residual, limit = (np.stack([x[i] for x in rows]) for i in (0, 2, 3))
     work = Work(*map(np.stack, zip(*(row.work for row in rows)))) if with_work else None
     worst, drift = np.max(residual, 0), state.cycles.drift
@@ -468,6 +487,27 @@ class Stepping:
         return s._replace(
             xi=s.xi + change, xi_before=s.xi_before + change, v=v, effect_states=states
         )
+
+    def memory(self, s: State) -> np.ndarray:
+        """Return the numbers (M, B) of the memories that may be mixed."""
+        samples = self.alpha.shape[-1]
+        numbers = [
+            np.reshape(state, (-1, samples))
+            for e, state in zip(self.effects, s.effect_states)
+            if e.memory_bounds is not None
+        ]
+        return np.concatenate(numbers) if numbers else np.zeros((0, samples))
+
+    def with_memory(self, s: State, memory: np.ndarray) -> State:
+        """Return the state with other numbers (M, B) in its memories, within their bounds."""
+        states, used = [], 0
+        for effect, state in zip(self.effects, s.effect_states):
+            if effect.memory_bounds is not None:
+                count = state.size // memory.shape[-1]
+                numbers = np.clip(memory[used : used + count], *effect.memory_bounds)
+                state, used = numbers.reshape(state.shape), used + count
+            states.append(state)
+        return s._replace(effect_states=tuple(states))
 
     def _drag(self, problem: Problem, xi: np.ndarray) -> np.ndarray:
         """Return force and moment of undisturbed ground on the frame at a velocity, (3, B)."""

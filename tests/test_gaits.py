@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from registry import GAITS
 
-from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Points
+from geomech.core.errors import Note
+from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Points, Polygon
+from geomech.scenes import load
+from geomech.scenes.model import Scene
+from geomech.studies import estimate
+from rft import se2
 
 T = np.linspace(0, 2 * np.pi, 33)
 
@@ -75,9 +80,57 @@ def test_points_are_reached_as_their_chords_are_run():
     np.testing.assert_allclose(found, points, atol=1e-14)
 
 
+CORNERS = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]])
+
+
+def side_by_side(system, corners, nodes=32):
+    """The pose after the sides of a polygon, each integrated by Runge-Kutta steps."""
+    pose = np.zeros(3)
+    for corner, side in zip(corners, np.roll(corners, -1, 0) - corners):
+        for k in range(nodes):
+            at = lambda u, k=k: corner + (k + u) / nodes * side
+            a, b, c = (system.velocity(at(u), side / nodes) for u in (0.0, 0.5, 1.0))
+            # Magnus' expansion, of order 4
+            step = (a + 4 * b + c) / 6 + se2.bracket(a, c) / 12
+            pose = se2.compose(pose, se2.exp(step))
+    return pose
+
+
+def test_a_polygon_is_purcells_square():
+    """Against an integration side by side, with errors that cover it and fall fast."""
+    scene = load("three-link-viscous")
+    true = side_by_side(scene.system, CORNERS)
+    assert round(float(np.hypot(*true[:2])) / scene.system.length, 4) == 0.0602
+    for phases, most in ((64, 1e-4), (256, 5e-8)):
+        gait = Polygon(CORNERS.tolist())
+        (net,), (error,) = estimate.direct(scene, gait, np.array([1.0]), phases)
+        off = np.hypot(*(net - true)[:2])
+        assert off < error[0] < most
+
+
+def test_a_polygon_has_straight_sides_and_no_jump_of_its_rates():
+    gait = Polygon([[0.0, 0.0], [3.0, 0.0], [3.0, 4.0], [0.0, 0.0]])
+    t = np.linspace(0, 2 * np.pi, 1201)
+    np.testing.assert_allclose(gait.shape(t[[0, 300, 700]]), gait.points, atol=1e-12)
+    assert (gait.shape(t[:301])[:, 1] == 0).all()
+    assert np.abs(gait.rate(t[[0, 300, 700]])).max() < 1e-12
+    rates = (gait.shape(t + 1e-6) - gait.shape(t - 1e-6)) / 2e-6
+    np.testing.assert_allclose(gait.rate(t), rates, atol=1e-6)
+
+
+def test_a_curve_that_is_far_from_its_polygon_is_noted():
+    system = load("three-link-viscous").system
+    with pytest.warns(Note, match="polygon"):
+        Scene(system, Points(CORNERS.tolist()))
+    t = np.arange(12) * np.pi / 6
+    Scene(system, Points(np.stack([np.cos(t), np.sin(t)], -1).tolist()))
+    Scene(system, Polygon(CORNERS.tolist()))
+
+
 @pytest.mark.parametrize(
     ("make", "said"),
     [
+        (lambda: Polygon(points=((0, 0), (1, 1))), "at least 3 shapes"),
         (lambda: Circle(amplitude=float("nan")), "amplitude must be a number from"),
         (lambda: Circle(centre=(1.0,)), "centre must have 2 angles"),
         (lambda: Ellipse(semi_axes=(1.0,)), "two semi_axes"),

@@ -14,6 +14,7 @@ from geomech.gaits import Circle, Ellipse, Fourier
 from geomech.geometry import connection, coordinates, curvature, reconstruct
 from geomech.geometry.field import Field
 from geomech.geometry.traits import Traits
+from geomech.scenes import load
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
 from geomech.tiers.path import path
@@ -413,3 +414,16 @@ def test_bad_shapes_are_refused():
                 (np.linspace(0, 1, 9),),
             )
         )
+
+
+@pytest.mark.parametrize("name", ["three-link-glass", "three-link-coulomb"])
+@pytest.mark.parametrize("count", [8, 16])
+def test_a_connection_knows_the_error_of_its_directions(name, count):
+    """Against 64 directions, as rms of each row."""
+    velocity, axes = load(name).system.velocity, connection.grid(2, 9)
+    few, many = (connection.fit(velocity, axes, n) for n in (count, 64))
+    off, error = (
+        np.sqrt((x**2).mean((1, 2, 3))) for x in (few.A - many.A, few.direction_error)
+    )
+    assert (off < error).all()
+    assert (error < 5 * off).all()

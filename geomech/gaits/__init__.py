@@ -3,6 +3,7 @@
 from geomech.gaits.centreline import Centreline
 from geomech.gaits.fourier import Butterfly, Circle, Ellipse, Fourier
 from geomech.gaits.points import Points
+from geomech.gaits.polygon import Polygon
 from geomech.gaits.shchf import Shchf
 from geomech.gaits.waves import Sine, Wave
 from geomech.geometry.gait import GAITS, Gait
@@ -21,6 +22,7 @@ __all__ = [
     "Fourier",
     "Gait",
     "Points",
+    "Polygon",
     "Shchf",
     "Sine",
     "Wave",

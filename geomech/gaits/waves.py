@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -172,6 +172,10 @@ class Sine(Gait):
     @property
     def joints(self) -> int:
         return self.elements - 1
+
+    def with_elements(self, count: int) -> Sine:
+        """Return the gait of a body of ``count`` elements."""
+        return replace(self, elements=count)
 
     @property
     def amplitude_label(self) -> str:

@@ -36,8 +36,9 @@ class Connection:
     """A connection on a grid: xi = + A alphadot, in the velocity's frame. A: (3, d, N_1, ..., N_d). residual: (3, N_1,
     ..., N_d), rms over the fitted directions of xi - A alphadot for |alphadot| = 1; speed: (3, N_1, ..., N_d), rms of
     xi itself. degree: of the interpolating spline. All are nan at grid points that are singular, or have a neighbour
-    beyond singular shapes. unit: of lengths, "BL" (body lengths) or "m". length: of the body in that unit; None where
-    it is unknown.
+    beyond singular shapes. direction_error: (3, d, N_1, ..., N_d), estimated error of A from the finite number of
+    directions; None where it is not known. unit: of lengths, "BL" (body lengths) or "m". length: of the body in that
+    unit; None where it is unknown.
 
     Examples
     --------
@@ -58,6 +59,7 @@ class Connection:
     _: KW_ONLY
     unit: str = UNKNOWN_UNIT
     length: float | None = None
+    direction_error: np.ndarray | None = None
 
     def __repr__(self) -> str:
         singular = summary.masked(self.A.reshape(-1, *self.A.shape[2:]))
@@ -436,10 +438,13 @@ def fit(
     rates = directions(len(axes), count)
     if callable(velocity) and not trusted and all(a.ndim == 1 and a.size for a in axes):
         velocity = checked_velocity(velocity, axes, traits.singularity is not None)
-    fields = sampled(
-        velocity, axes, rates, least_squares(rates), degree, progress, traits, map
+    reduce = _with_direction_error(rates)
+    *fields, error = sampled(
+        velocity, axes, rates, reduce, degree, progress, traits, map
     )
-    return Connection(axes, *fields, degree, unit=unit, length=length)
+    return Connection(
+        axes, *fields, degree, unit=unit, length=length, direction_error=error
+    )
 
 
 def connection_function(
@@ -477,6 +482,29 @@ def connection_function(
         return np.moveaxis(values, -1, 0).reshape(*alpha.shape[:-1], 3, joints)
 
     return A
+
+
+def _with_direction_error(unit: np.ndarray) -> Callable:
+    """Return the ``reduce`` of `least_squares` with the error of A (3, d, s) from the finite number of directions.
+
+    Half of the directions change A by more than the others leave: three times, of two joints, whose directions are
+    equally spaced, by theory for kinks; here half of that change is taken, of more joints all of it. The error is nan
+    where there are too few directions for half of them to determine A."""
+    reduce, joints = least_squares(unit), unit.shape[1]
+    half = unit[::2]
+    inverse = np.linalg.pinv(half)
+    share = 0.5 if joints == 2 else 1.0
+    if joints == 1:
+        share = 0.0  # one direction is all there is
+    elif len(half) < 2 * joints:
+        share = np.nan
+
+    def with_error(xi):
+        A, residual, speed = reduce(xi)
+        fewer = np.einsum("jc,sci->ijs", inverse, xi[:, ::2])
+        return A, residual, speed, share * np.abs(A - fewer)
+
+    return with_error
 
 
 def least_squares(unit: np.ndarray) -> Callable:

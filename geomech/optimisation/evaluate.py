@@ -10,6 +10,8 @@ from geomech.optimisation.cycles import CycleValues, cycle_values
 from geomech.optimisation.optimum import Evaluation
 from geomech.optimisation.request import Request
 from geomech.studies import estimate
+from geomech.studies.effort import change_by_elements
+from geomech.studies.elements import elements_of
 from geomech.systems.base import body_size
 from geomech.systems.capabilities import OwnMetric, capability
 
@@ -36,7 +38,13 @@ def evaluate_gait(r: Request, gait: Gait) -> Evaluation:
     length = b.length and b.length[0]
     if objective.name == "efficiency":
         coarse = 2 * np.pi * (P[::2] ** (1 / degree)).mean()
-        error = (error + value * abs(length - coarse)) / (length or 1.0)
+        of_length = abs(length - coarse)
+        if elements_of(system):
+            quarter = (x[None, ::4] for x in (alpha, alphadot))
+            path = 2 * np.pi * (P[::4] ** (1 / degree)).mean()
+            values = np.array([[path, np.nan]])
+            of_length += change_by_elements(system, *quarter, values)[0, 0]
+        error = (error + value * of_length) / (length or 1.0)
     if objective.timed:
         error = error / (2 * np.pi * (period or 1.0))
     work = (

@@ -113,9 +113,11 @@ class Scene(Displayed):
                 note_radius(self.system)
 
     def note_turns(self, gait: Gait, amplitudes: ArrayLike | None = None) -> None:
-        """Warn (`UnitWarning`) if a gait turns a joint by more than a full turn."""
+        """Warn (`Note`) of a joint that a gait turns by more than a full turn, and of a curve far from its points."""
         if hasattr(gait, "largest"):
             note_angles(self.system, gait.largest(amplitudes))
+        if hasattr(gait, "note"):
+            gait.note()
 
     frame = property(
         lambda self: self.system.traits.frame,

@@ -11,6 +11,13 @@ from geomech.gaits import Gait
 from geomech.geometry.gait import checked_gait
 from geomech.scenes.model import Scene
 from geomech.studies import cost, tables, uncertainty
+from geomech.studies.elements import (
+    MOST,
+    elements_of,
+    gait_with,
+    is_refinable,
+    with_elements,
+)
 from geomech.studies.estimate import (
     CHECKED,
     FEWEST_STEPS,
@@ -143,47 +150,55 @@ def cheapest(
 def _refined(
     scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask: Callable
 ):
-    """Return (poses, errors) of the direct tier with twice the phases, or pieces of body where these cause the larger
-    error, again and again, and {"phases": ..., "pieces": ... if any}.
+    """Return (poses, errors) of the direct tier with twice the phases, or the pieces or elements of the body where these
+    cause the largest error, again and again, and {"phases": ..., "pieces": ..., "elements": ... if any}.
 
     Only amplitudes that need it are refined, until all positions are within ``tol`` or doubling no longer helps."""
     ask(cost.direct(scene, gait, len(amplitudes), phases))
-    poses, error, of_pieces = in_groups(scene, gait, amplitudes, phases)
-    error, open_, pieces = (
-        error + of_pieces,
-        np.arange(len(amplitudes)),
-        getattr(solver_of(scene.system), "pieces", 0),
-    )
-    while (worse := open_[error[open_, 0] > tol]).size:
-        coarse_pieces = of_pieces[worse, 0].max() > 0.5 * error[worse, 0].max()
-        if (
-            (2 * pieces > FINEST_PIECES)
-            if coarse_pieces
-            else (2 * phases > MOST_PHASES)
-        ):
-            break
-        pieces, phases = (2 * pieces, phases) if coarse_pieces else (pieces, 2 * phases)
-        finer_scene = (
-            scene.with_numerics(pieces=pieces)
-            if pieces_per_length(scene.system)
-            else scene
-        )
-        ask(cost.direct(finer_scene, gait, len(worse), phases))
-        finer, finer_error, finer_pieces = in_groups(
-            finer_scene, gait, amplitudes[worse], phases
-        )
-        stalled = (finer_error + finer_pieces > 0.9 * error[worse])[
-            :, 0
-        ].all() and phases > 1024
-        poses[worse], error[worse], of_pieces[worse], open_ = (
-            finer,
-            finer_error + finer_pieces,
-            finer_pieces,
-            worse,
-        )
-        if stalled:
-            break
-    return (poses, error), {
+    poses, *errors = in_groups(scene, gait, amplitudes, phases)
+    shares = np.array(errors)  # of phases and rounding, of pieces, of elements
+    counts = {
         "phases": phases,
-        **({"pieces": pieces} if pieces_per_length(scene.system) else {}),
+        "pieces": getattr(solver_of(scene.system), "pieces", 0),
+        "elements": elements_of(scene.system),
     }
+    most = {"phases": MOST_PHASES, "pieces": FINEST_PIECES, "elements": MOST}
+    if not is_refinable(scene.system):
+        most["elements"] = 0
+    open_ = np.arange(len(amplitudes))
+    while (worse := open_[shares.sum(0)[open_, 0] > tol]).size:
+        largest = shares[1:, worse, 0].max(-1)
+        coarse = [*counts][1 + int(largest.argmax())]
+        if largest.max() <= 0.5 * shares.sum(0)[worse, 0].max():
+            coarse = "phases"
+        if 2 * counts[coarse] > most[coarse]:
+            break
+        counts[coarse] *= 2
+        finer_scene, finer_gait = _finer(scene, gait, counts)
+        ask(cost.direct(finer_scene, finer_gait, len(worse), counts["phases"]))
+        finer, *finer_errors = in_groups(
+            finer_scene, finer_gait, amplitudes[worse], counts["phases"]
+        )
+        finer_shares = np.array(finer_errors)
+        before = shares.sum(0)[worse, 0]
+        stalled = (finer_shares.sum(0)[:, 0] > 0.9 * before).all()
+        poses[worse], shares[:, worse], open_ = finer, finer_shares, worse
+        if stalled and counts["phases"] > 1024:
+            break
+    needed = {
+        "phases": True,
+        "pieces": pieces_per_length(scene.system) > 0,
+        "elements": counts["elements"] > 0,
+    }
+    return (poses, shares.sum(0)), {n: k for n, k in counts.items() if needed[n]}
+
+
+def _finer(scene: Scene, gait: Gait, counts: dict[str, int]) -> tuple[Scene, Gait]:
+    """Return a scene and a gait with so many pieces and elements of the body."""
+    if pieces_per_length(scene.system):
+        scene = scene.with_numerics(pieces=counts["pieces"])
+    count, system = counts["elements"], scene.system
+    if count == elements_of(system):
+        return scene, gait
+    gait = gait_with(gait, system, count)
+    return scene.changed(system=with_elements(system, count), gait=gait), gait

@@ -19,6 +19,7 @@ from geomech.run.backend import suiting
 from geomech.run.cost import BASE, Cost, assumed
 from geomech.scenes.model import Scene
 from geomech.studies import effort, estimate, uncertainty
+from geomech.studies.elements import coarser
 from geomech.systems.base import System
 from geomech.systems.capabilities import (
     balance_size,
@@ -207,8 +208,9 @@ def cycles_of(system: System) -> int:
 
 def _runs(scene: Scene, phases: int) -> list[tuple[int, float]]:
     """Return (phases, weight of a balance) of the runs of `estimate.direct`: time stepping again at a half, a quarter and an
-    eighth of the phases, a quarter with a finer model where there is one, and where effects cut the body, twice as many
-    pieces at a quarter of the phases, and half and a quarter of them at all."""
+    eighth of the phases, a quarter with a finer model where there is one, with half and a quarter of the elements of a
+    continuous body likewise, and where effects cut the body, twice as many pieces at a quarter of the phases, and half and
+    a quarter of them at all."""
     quarter, system = phases // 4, scene.system
     runs = [(phases, 1.0)]
     runs += [(phases // k, 1.0) for k in (2, 4, 8)] if system.traits.steps else []
@@ -217,6 +219,7 @@ def _runs(scene: Scene, phases: int) -> list[tuple[int, float]]:
         if pieces_per_length(system)
         else []
     )
+    runs += [(quarter, 1.0 / other.ratio) for other in coarser(system)]
     return runs + ([(quarter, 1.0)] if refined(system) else [])
 
 
@@ -288,13 +291,13 @@ def of_metric(scene: Scene) -> list[Job]:
 
 def of_effort(scene: Scene, count: int, gait: Gait | None = None) -> list[Job]:
     """Return the jobs of path length and work of ``count`` amplitudes (`effort.effort`): for time stepping again at
-    half and a quarter of the phases, and with twice the pieces at a quarter."""
+    half and a quarter of the phases, and at a quarter with twice the pieces, or fewer elements of a continuous body."""
     phases, system = effort.phases_of(scene), scene.system
     once = lambda n: direct(scene, gait or scene.gait, count, n, checked=False)
     jobs = once(phases)
     jobs += once(phases // 2) + once(phases // 4) if system.traits.steps else []
-    return jobs + (
-        [job._replace(weight=2.0) for job in once(phases // 4)]
-        if pieces_per_length(system)
-        else []
-    )
+    weights = [1.0 / other.ratio for other in coarser(system)]
+    weights += [2.0] if pieces_per_length(system) else []
+    return jobs + [
+        job._replace(weight=weight) for weight in weights for job in once(phases // 4)
+    ]

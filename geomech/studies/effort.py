@@ -24,6 +24,7 @@ from geomech.geometry.harmonics import Harmonics
 from geomech.geometry.metric import Finsler, Metric
 from geomech.scenes.model import Scene
 from geomech.studies import tables
+from geomech.studies.elements import change, elements_of
 from geomech.studies.estimate import MOST_PIECES
 from geomech.systems.base import System, body_size, kind_of
 from geomech.systems.capabilities import (
@@ -217,9 +218,10 @@ def effort(
     direct tier.
 
     Each error is the change with half of the phases; in time stepping at least a quarter of the change from half to a
-    quarter of them; and twice the change with twice the pieces into which effects cut the body. Changes by later cycles
-    are not included. Path lengths are nan where power has no one degree in the rate. Refusal where the cost of moving
-    is not known."""
+    quarter of them; twice the change with twice the pieces into which effects cut the body; and what half and a
+    quarter of the elements of a continuous body show (`geomech.studies.elements`). Changes by later cycles are not
+    included. Path lengths are nan where power has no one degree in the rate. Refusal where the cost of moving is not
+    known."""
     system, gait = scene.system, checked_gait(scene.gait if gait is None else gait)
     amplitudes = real_array(
         "amplitudes", [gait.amplitude] if amplitudes is None else amplitudes
@@ -251,6 +253,8 @@ def effort(
             error = np.abs(fine - half)
         if finer:
             error += 2 * np.abs(integral(_rates(finer, *fewer[1])) - quarter)
+        if elements_of(system):
+            error += change_by_elements(system, *fewer[1], quarter)
         return np.concatenate([fine, error], 1)
 
     names = ("path_length", "work", "path_length_error", "work_error")
@@ -260,6 +264,20 @@ def effort(
             in_groups(integrals, amplitudes, gaits_per_batch(system, phases))[:, :4].T,
         )
     )
+
+
+def change_by_elements(
+    system: System, alpha, alphadot, values: np.ndarray
+) -> np.ndarray:
+    """Return the errors (B, 2) of path length and work, ``values``, that the elements of a continuous body cause."""
+
+    def integrals(other, *shapes):
+        return 2 * np.pi * _rates(other, *shapes).mean(-1)
+
+    def apart(a, b):
+        return np.abs(a - b)
+
+    return change(system, alpha, alphadot, values, integrals, apart)
 
 
 def phases_of(scene: Scene, phases: int | None = None) -> int:

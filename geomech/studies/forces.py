@@ -17,6 +17,7 @@ from geomech.geometry.reconstruct import poses
 from geomech.run.cost import Cost
 from geomech.scenes.model import Scene
 from geomech.studies.cost import direct, price
+from geomech.studies.elements import coarser, elements_of, gait_with
 from geomech.studies.newtons import Newtons, Sizes, newtons
 from geomech.studies.question import Allow, Progress, Question
 from geomech.studies.undulation import activation_of, bends, loaded
@@ -130,16 +131,13 @@ def _variants(scene: Scene) -> list[Scene]:
 
 
 def _with_fewer_elements(scene: Scene) -> list[Scene]:
-    """Return the scene of half as many elements, of a backbone and its gait, where they allow it."""
-    body, gait = getattr(scene.system, "body", None), scene.gait
-    if (count := getattr(body, "elements", None)) is None:
+    """Return the scene of about half as many elements, of a continuous body and its gait, where it allows it."""
+    system = scene.system
+    other = next(iter(coarser(system)), None)
+    if other is None or other.ratio < 1:
         return []
-    try:
-        body = replace(body, elements=count // 2)
-        gait = replace(gait, elements=count // 2) if hasattr(gait, "elements") else gait
-        return [scene.changed(system=replace(scene.system, body=body), gait=gait)]
-    except ValueError:  # such as arcs that no longer divide the elements
-        return []
+    gait = gait_with(scene.gait, system, elements_of(other.system))
+    return [scene.changed(system=other.system, gait=gait)]
 
 
 def _divided(scene: Scene) -> Scene:

@@ -171,8 +171,14 @@ class Settings:
     @property
     def own_error(self) -> float:
         """Largest error of the system itself, body lengths, which no setting reduces; the cheapest settings include it."""
+        system = self.scene.system
         shapes = self.scene.gait.cycle(self.scene.numerics.phases, self.amplitudes)
-        return float(table_error(self.scene.system, *shapes)[..., 0].max())
+        error = table_error(system, *shapes)[..., 0]
+        if estimate.elements.elements_of(system):
+            fewer = shapes[0][:, ::4], shapes[1][:, ::4]
+            net = system.run(*fewer).net
+            error = error + estimate.elements_error(system, fewer, net)[..., 0]
+        return float(error.max())
 
     def cheapest(self, lines: list[dict], tolerance: float) -> dict[str, Any]:
         return cheapest(lines, tolerance, self.own_error)

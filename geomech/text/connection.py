@@ -27,6 +27,7 @@ def text(result: Result) -> str:
         *_ranges(fitted, shape_labels(scene.system)),
         f"fit: {_fit(scene.system, fitted)}",
     ]
+    lines += _directions(scene.system, fitted)
     lines += [f"symmetry: {line}" for line in symmetries(scene.system)]
     if space.balances:
         lines.append(f"cost: {space.balances:,} force balances, {space.seconds:.2g} s")
@@ -48,6 +49,24 @@ def _ranges(fitted: Connection, labels: list[tuple[str, str]]) -> list[str]:
             + "".join(f"{low:>11.4g} to {high:>8.4g}" for low, high in both)
         )
     return lines + [f"and {len(labels) - ROWS} joints more"] * (len(labels) > ROWS)
+
+
+def _directions(system: System, fitted: Connection) -> list[str]:
+    """Return the error of A from the number of directions, of each row over that row."""
+    error = fitted.direction_error
+    if system.traits.linear or error is None or not np.isfinite(error).any():
+        return []
+    axes = tuple(range(1, error.ndim))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.sqrt(np.nanmean(error**2, axes) / np.nanmean(fitted.A**2, axes))
+    told = ", ".join(
+        f"{row} {100 * share:.2g} %"
+        for row, share in zip(("x", "y", "theta"), shares)
+        if np.isfinite(share)
+    )
+    return [
+        f"directions of alphadot: with more of them A changes by about {told} (rms)"
+    ]
 
 
 def _fit(system: System, fitted: Connection) -> str:

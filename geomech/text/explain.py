@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from geomech.gaits import KINDS as GAITS
 from geomech.scenes.model import Scene, checked_scene
 from geomech.studies.available import tiers
+from geomech.studies.elements import coarser, elements_of
 from geomech.systems.premises import listed
 from geomech.text import grains
 from geomech.text.system import described, engine
@@ -43,6 +44,13 @@ def explain(scene: Scene | Intruding | WalkerScene) -> str:
     if (count := solved_phases(system, scene.gait, phases)) < phases:
         lines.append(
             f"by symmetry: {count} of {phases} phases of the gait are solved, the others are images of these"
+        )
+    if (count := elements_of(system)) and (fewer := coarser(system)):
+        share = sum(1 / other.ratio for other in fewer) / 4
+        numbers = " and ".join(f"{elements_of(other.system)}" for other in fewer)
+        lines.append(
+            f"errors: contain the change from {count} to {numbers} elements, at a quarter of the phases: {share:.0%} of "
+            "the cost of the displacement"
         )
     by_name = [
         m

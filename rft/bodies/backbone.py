@@ -5,7 +5,7 @@ The elements are chords of the curve; errors are of order 2 in 1/elements.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated
 
@@ -16,6 +16,11 @@ from rft.bodies.base import BODIES, Elements, Length, numbered_labels
 from rft.bodies.chain import Chain
 from rft.checks import Number, check_numbers, unmasked
 from rft.refusal import require
+
+
+def _centres(count: int) -> np.ndarray:
+    """Return the centres of ``count`` equal elements, 0 at the tail to 1 at the head."""
+    return (np.arange(count) + 0.5) / count
 
 
 @BODIES.register
@@ -61,6 +66,24 @@ class Backbone:
         """Bends at the points between elements for a unit of each shape variable, (elements - 1, joints); None where the
         bends are the shape variables themselves."""
         return None
+
+    def with_elements(self, count: int) -> Backbone:
+        """Return the body of ``count`` elements, in the frame "mean"; Refusal if there is
+        none."""
+        return replace(self, elements=count, frame="mean")
+
+    def resampled(self, shape: ArrayLike, count: int) -> np.ndarray:
+        """Return shapes, or rates, (..., joints) as those of `with_elements`.
+
+        Headings of elements are headings of the curve at their centres: a spline through
+        them, of order 4, gives those at other centres."""
+        if self.bends is not None:
+            return np.asarray(shape, float)
+        from scipy.interpolate import CubicSpline
+
+        heading = np.insert(np.cumsum(shape, -1), 0, 0.0, -1)
+        spline = CubicSpline(_centres(self.elements), heading, axis=-1)
+        return np.diff(spline(_centres(count)), axis=-1)
 
     def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Elements:
         """Return the elements at shapes and rates (joints, B), with the body frame held."""

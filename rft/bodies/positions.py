@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rft.bodies.base import Length, numbered_labels
 from rft.bodies.links import Links
@@ -18,6 +19,10 @@ WEIGHTS = (
     np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
 )  # of values at -3 to 3 steps
 SHAPES = 5, 7  # batch on which a function shows whether it takes many shapes
+# Links that are taken for pieces of a curve where the body does not say (assumed): so
+# many, and so many times the shape variables.
+PIECES_OF_A_CURVE, PIECES_PER_VARIABLE = 10, 3
+JOINED = 1e-9  # of the body's length, between links that meet
 
 
 class Posed(Links):
@@ -25,9 +30,14 @@ class Posed(Links):
     poses (..., n, 3) of the links: x, y of the centre, in the unit of ``lengths``, and heading theta, rad.
 
     Where the function sees the body from does not matter: poses are taken relative to the body frame. Velocities are
-    differences of order 6 in the shape."""
+    differences of order 6 in the shape.
+
+    continuous: whether the links are pieces of a curve, whose number is a numerical setting;
+    None: they are where there are at least 10, and three times as many as shape
+    variables."""
 
     positions: Callable[[np.ndarray], np.ndarray]
+    continuous: bool | None = None
 
     def __post_init__(self) -> None:
         in_range("joints", self.joints, 1, 10_000, whole=True)
@@ -46,6 +56,24 @@ class Posed(Links):
     @property
     def shape_labels(self) -> tuple[tuple[str, str], ...]:
         return numbered_labels(self.joints)
+
+    @property
+    def elements(self) -> int | None:
+        """Number of pieces of a curve; None of rigid links."""
+        links = len(self.lengths)
+        continuous = self.continuous
+        if continuous is None:
+            enough = links >= PIECES_PER_VARIABLE * self.joints
+            continuous = enough and links >= PIECES_OF_A_CURVE
+        return links if continuous else None
+
+    def with_elements(self, count: int) -> Resampled:
+        """Return the body of ``count`` equal links on the same curve, in the frame "mean"."""
+        return Resampled(self, count)
+
+    def resampled(self, shape: ArrayLike, count: int) -> np.ndarray:
+        """Return shapes, or rates, (..., joints) as those of `with_elements`: the same."""
+        return np.asarray(shape, float)
 
     @cached_property
     def _takes_batches(self) -> bool:
@@ -121,7 +149,9 @@ class Positions(Posed):
 
     positions: function of shapes alpha (..., joints), or of one shape, that returns poses (..., n, 3) of the links, tail to
     head: x, y of the centre in the unit of ``lengths`` and heading theta (rad), in any frame. lengths: of the n links.
-    length: of the body, m; without it lengths are in body lengths. frame: "mean" or "link-1", "link-2" ...
+    length: of the body, m; without it lengths are in body lengths. frame: "mean" or "link-1", "link-2" ... continuous:
+    whether the links are pieces of a curve, so that errors contain the change with half of them; None: where there are
+    at least 10, and three times as many as shape variables.
 
     Examples
     --------
@@ -143,4 +173,58 @@ class Positions(Posed):
     lengths: tuple[float, ...]
     length: Length = None
     frame: str = "mean"
+    continuous: bool | None = None
     kind = "positions"
+
+
+@dataclass(frozen=True)
+class Resampled(Posed):
+    """``count`` equal links on the curve through the links of a body, by splines: of their
+    headings where links join, so that these join too, else of their poses."""
+
+    inner: Posed
+    count: int
+    frame: str = "mean"
+
+    def __post_init__(self) -> None:
+        in_range("elements", self.count, 3, 10_000, whole=True)
+        super().__post_init__()
+
+    @property
+    def joints(self) -> int:
+        return self.inner.joints
+
+    @property
+    def length(self) -> float | None:  # type: ignore[override]  # of most it is a field
+        return self.inner.length
+
+    @property
+    def lengths(self) -> tuple[float, ...]:  # type: ignore[override]
+        return (1.0 / self.count,) * self.count
+
+    def _check_lengths(self) -> None:
+        """The inner body's are checked."""
+
+    @cached_property
+    def _joined(self) -> bool:
+        """Whether links of the inner body meet at their ends, at a few random shapes."""
+        alpha = np.random.default_rng(0).uniform(-1.0, 1.0, (5, self.joints))
+        poses = self.inner._at(alpha)
+        centre = poses[..., 0] + 1j * poses[..., 1]
+        half = self.inner.fractions / 2 * np.exp(1j * poses[..., 2])
+        gap = (centre - half)[..., 1:] - (centre + half)[..., :-1]
+        return bool(np.abs(gap).max() < JOINED)
+
+    def positions(self, alpha: np.ndarray) -> np.ndarray:
+        from scipy.interpolate import CubicSpline
+
+        poses = self.inner._at(np.asarray(alpha, float))
+        poses[..., 2] = np.unwrap(poses[..., 2], axis=-1)
+        ends = np.cumsum(self.inner.fractions)
+        spline = CubicSpline(ends - self.inner.fractions / 2, poses, axis=-2)
+        poses = spline((np.arange(self.count) + 0.5) / self.count)
+        if self._joined:
+            link = np.exp(1j * poses[..., 2]) / self.count
+            centre = np.cumsum(link, -1) - link / 2
+            poses[..., 0], poses[..., 1] = centre.real, centre.imag
+        return poses

@@ -73,6 +73,8 @@ class Effect:
     cost : work beyond that of the plain force law, as text.
     batched : names of parameters that may be arrays (B,), one number for each sample of a batch.
     drift_tolerance : change of displacement from cycle to cycle, body lengths, below which cycles are periodic.
+    memory_bounds : least and largest number of a state that is an array of memory, of which those at the starts of cycles
+        may be mixed to reach the limit cycle sooner; None for a state of another kind.
     memory_size : numbers that time stepping stores for each sample, beside a few for each element.
     varies_along : whether the effect varies along an element; it then acts by its mean over each piece of an element.
     odd : whether the loads that it adds change sign with all velocities (assumed, not proven).
@@ -94,6 +96,7 @@ class Effect:
     cost = ""
     batched = ()
     drift_tolerance = 1e-6
+    memory_bounds: ClassVar[tuple[float, float] | None] = None
     memory_size = 0
     varies_along = odd = False
     metres: ClassVar[Mapping[str, InMetres]] = {}

@@ -82,6 +82,7 @@ class Transient(Effect):
         "two directions an element, one link integral more where its pivot lies inside"
     )
     batched = ("travel", "at_once", "ratio", "at_once_along", "travel_m")
+    memory_bounds = (-1.0, 1.0)
     varies_along = True
 
     def __post_init__(self):
