@@ -144,13 +144,13 @@ class Averages(NamedTuple):
     """What is averaged over cycles, the first axis of each.
 
     numbers: (C, 7): time, own length, distance, drift, mean heading of all cycles, turn, mean cosine of headings. first:
-    (C, NODES), first harmonic of headings over the cycle, complex. slip: (C, NODES), mean over the cycle. lateral:
-    (C, PHASES, NODES), place across the path."""
+    (C, NODES), first harmonic of headings over the cycle, complex. slip: (C, NODES), mean over the cycle. width:
+    (C, NODES), range across the path."""
 
     numbers: np.ndarray
     first: np.ndarray
     slip: np.ndarray
-    lateral: np.ndarray
+    width: np.ndarray
 
     def weighted(self, weights: np.ndarray) -> Averages:
         """Return averages with weights (R, C)."""
@@ -177,7 +177,10 @@ def averages(c: Cycles) -> Averages:
     lateral = ((c.place - path[..., None]) * np.exp(-1j * course)[..., None]).imag
     slip = np.minimum(slip, np.pi - slip).mean(1)
     return Averages(
-        np.stack(numbers, -1), np.exp(-2j * np.pi * _share()) @ relative, slip, lateral
+        np.stack(numbers, -1),
+        np.exp(-2j * np.pi * _share()) @ relative,
+        slip,
+        np.ptp(lateral, axis=1),
     )
 
 
@@ -190,18 +193,15 @@ def quantities(
     lengths. frequency: 1/time. stride: distance of the mean frame per cycle in body lengths. drift: direction of the
     way less the mean heading of the body. heading: direction of the way in the world, drift and mean heading of all
     cycles; how the body wanders between cycles is no error of it. turn: of the body in a cycle. slip: mean angle
-    between body and velocity. efficiency: distance over wavelength. amplitude: half the range across the path, mean
-    over the body. wavelength: along the path; arc_wavelength: along the body; body lengths."""
+    between body and velocity. efficiency: distance over wavelength. amplitude: half the range across the path of each
+    cycle, mean over the body. wavelength: along the path; arc_wavelength: along the body; body lengths."""
     time, own, distance, drift, axis, turn, cosine = a.numbers.T
     body = own if length is None else np.full_like(own, length)
     arc = own * arc_waves(a.first)
     wavelength = arc * cosine
     slip = a.slip.reshape(len(a.slip), PARTS, -1).mean(-1)
-    amplitude = (
-        np.ptp(a.lateral, axis=1).reshape(slip.shape[0], PARTS, -1).mean(-1)
-        / 2
-        / body[:, None]
-    )
+    width = a.width.reshape(len(a.width), PARTS, -1).mean(-1)
+    amplitude = width / 2 / body[:, None]
     numbers = np.stack(
         [
             1 / time, body, distance / time / (1.0 if absolute else body), distance / body, axis + drift,

@@ -24,6 +24,8 @@ DEGREE = (
 KNOTS = (6, 7, 8, 10, 12, 14, 16, 20, 24, 32)  # per cycle, that are tried
 MODES = 4, 14  # of x and of y along the body, that are tried
 SAFE = 2.2  # times the root of the number of points: more modes through equal distances oscillate at the ends (Runge)
+EVEN = 0.95  # of the polynomials' argument where more modes are needed: with it 18 modes through 22 points are stable
+MOST_EVEN = 0.85, 30  # modes over points, and modes, at most, of polynomials of that argument
 MORE = 3  # modes than by cross-validation
 CLOSER = 1.5  # ratio of its distance between knots to the one taken
 PASSES = 3  # of finding where along the body the points lie
@@ -35,7 +37,8 @@ NODES = 30  # places along the body at which a curve is evaluated
 class Curve:
     """Smooth midlines x(s, t) of a trial.
 
-    s: (P,), places of the points, 0 to 1. modes, step: the number of modes, and of rows between knots. knots: (K,).
+    s: (P,), places of the points, 0 to 1. modes, step: the number of modes, and of rows between knots. even: as of
+    `_polynomials`. knots: (K,).
     coefficients: (K - DEGREE - 1, modes, 2). residual: (F, modes, 2), noise of the modes in the rows, orthonormal over
     the points. noise: standard deviation of x and y of a point. alike: correlation of noise between frames. triangle:
     (modes, modes), from Legendre coefficients to orthonormal ones. solver: of the least squares in time."""
@@ -44,6 +47,7 @@ class Curve:
     s: np.ndarray
     modes: int
     step: int
+    even: float
     knots: np.ndarray
     coefficients: np.ndarray
     residual: np.ndarray
@@ -60,7 +64,9 @@ class Curve:
 
     def basis(self, s: np.ndarray, order: int = 0) -> np.ndarray:
         """Return what multiplies orthonormal coefficients at places s (S, modes), or its derivative by s."""
-        return _legendre(s, self.modes, order) @ np.linalg.inv(self.triangle)
+        return _polynomials(s, self.modes, order, self.even) @ np.linalg.inv(
+            self.triangle
+        )
 
     @cached_property
     def places(self) -> np.ndarray:
@@ -94,12 +100,25 @@ def placed(basis: np.ndarray, z: np.ndarray) -> np.ndarray:
     return (z @ [1.0, 1j]) @ basis.T
 
 
-def _legendre(s: np.ndarray, modes: int, order: int) -> np.ndarray:
-    """Return Legendre polynomials (S, modes) of 2 s - 1, or their derivatives by s."""
+def _polynomials(
+    s: np.ndarray, modes: int, order: int, even: float = 0.0
+) -> np.ndarray:
+    """Return Legendre polynomials (S, modes) of u at places s, or their derivatives by s.
+
+    u = 2 s - 1, or, if ``even`` is above 0, sin(a (2 s - 1)) / even with a = arcsin(even): equal distances in s are
+    then small at the ends in u, as those of stable polynomials are, and a wave needs three modes in place of four and
+    more. Source: Kosloff and Tal-Ezer, J. Comput. Phys. 104, 457 (1993)."""
     identity = np.eye(modes)
-    if order:
-        identity = legendre.legder(identity, order, axis=0) * 2.0**order
-    return legendre.legvander(2 * s - 1, len(identity) - 1) @ identity
+    u = 2 * s - 1
+    rate = np.full_like(u, 2.0)
+    if even:
+        angle = np.arcsin(even) * u
+        u = np.sin(angle) / even
+        rate = 2 * np.arcsin(even) / even * np.cos(angle)
+    if not order:
+        return legendre.legvander(u, modes - 1)
+    slopes = legendre.legder(identity, 1, axis=0)
+    return rate[:, None] * (legendre.legvander(u, modes - 2) @ slopes)
 
 
 class Solver:
@@ -142,7 +161,8 @@ def crude(trial: Trial) -> np.ndarray:
     s = _chord_places(trial.points)
     z, triangle, _ = projected(trial.points, s, min(6, len(s) - 1))
     places = (np.arange(8) + 0.5) / 8
-    tangent = placed(_legendre(places, len(triangle), 1) @ np.linalg.inv(triangle), z)
+    slope = _polynomials(places, len(triangle), 1) @ np.linalg.inv(triangle)
+    tangent = placed(slope, z)
     heading = np.unwrap(np.angle(tangent), axis=1)
     return heading - heading.mean(1, keepdims=True)
 
@@ -154,11 +174,11 @@ def _chord_places(points: np.ndarray) -> np.ndarray:
 
 
 def projected(
-    points: np.ndarray, s: np.ndarray, modes: int
+    points: np.ndarray, s: np.ndarray, modes: int, even: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return orthonormal coefficients (F, modes, 2) of frames, what makes them from Legendre's, and what they leave of
-    the frames (F, P, 2)."""
-    q, triangle = np.linalg.qr(_legendre(s, modes, 0))
+    """Return orthonormal coefficients (F, modes, 2) of frames, what makes them from those of `_polynomials`, and what
+    they leave of the frames (F, P, 2)."""
+    q, triangle = np.linalg.qr(_polynomials(s, modes, 0, even))
     z = q.T @ points
     return z, triangle, points - q @ z
 
@@ -184,19 +204,24 @@ def fitted(trial: Trial, period: float) -> tuple[Curve, Trial]:
     midlines where points were missing."""
     s = _chord_places(trial.points)
     rows = len(trial.t) * period / (trial.t[-1] - trial.t[0])
-    most = min(MODES[1], int(SAFE * np.sqrt(len(s))), len(s) - 1)
     solvers = {
         k: Solver(trial.t, k) for k in sorted({max(2, round(rows / n)) for n in KNOTS})
     }
-    modes, step = _chosen(trial, s, most, solvers)
+    even, modes, step = _chosen(trial, s, solvers)
     for _ in range(PASSES):
-        curve = _curve(trial, s, modes, step, solvers[step])
+        curve = _curve(trial, s, modes, step, solvers[step], even)
         trial = _completed(trial, curve)
         s = _arc_places(curve, s)
-    modes, step = _chosen(trial, s, most, solvers)
-    return curve_of(
-        trial, s, min(modes + MORE, most), max(2, round(step / CLOSER))
-    ), trial
+    even, modes, step = _chosen(trial, s, solvers)
+    modes = min(modes + MORE, _most(len(s))[even])
+    return curve_of(trial, s, modes, max(2, round(step / CLOSER)), even), trial
+
+
+def _most(points: int) -> dict[float, int]:
+    """Return how many modes so many points bear, by the argument ``even`` of `_polynomials`."""
+    plain = min(MODES[1], int(SAFE * np.sqrt(points)), points - 1)
+    share, most = MOST_EVEN
+    return {0.0: plain, EVEN: max(plain, min(most, int(share * points)))}
 
 
 def _completed(trial: Trial, curve: Curve) -> Trial:
@@ -212,35 +237,44 @@ def _completed(trial: Trial, curve: Curve) -> Trial:
 def coarser(trial: Trial, curve: Curve) -> Curve:
     """Return the curve with fewer modes and knots, whose difference from it shows what smoothing cuts off."""
     modes = max(curve.modes - MORE, min(MODES[0], curve.modes - 1))
-    return curve_of(trial, curve.s, modes, round(CLOSER * curve.step))
+    return curve_of(trial, curve.s, modes, round(CLOSER * curve.step), curve.even)
 
 
-def curve_of(trial: Trial, s: np.ndarray, modes: int, step: int) -> Curve:
-    """Return the curve with these places of points (P,), modes, and rows between knots."""
-    return _curve(trial, s, modes, step, Solver(trial.t, step))
+def curve_of(
+    trial: Trial, s: np.ndarray, modes: int, step: int, even: float = 0.0
+) -> Curve:
+    """Return the curve with these places of points (P,), modes, and rows between knots. even: as of `_polynomials`."""
+    return _curve(trial, s, modes, step, Solver(trial.t, step), even)
 
 
 def _chosen(
-    trial: Trial, s: np.ndarray, most: int, solvers: dict[int, Solver]
-) -> tuple[int, int]:
-    """Return modes and rows between knots of the least generalised cross-validation."""
-    z, _, left = projected(trial.points, s, most)
+    trial: Trial, s: np.ndarray, solvers: dict[int, Solver]
+) -> tuple[float, int, int]:
+    """Return the argument of the polynomials, modes and rows between knots of the least generalised cross-validation.
+
+    Modes of an even argument are tried beyond those which plain ones bear: they are for shapes that plain ones leave."""
     count = trial.known
     scores = {}
-    for step, solver in solvers.items():
-        square = (
-            (z - solver.smoothed(z.reshape(len(z), -1)).reshape(z.shape)) ** 2
-        ).sum((0, 2))
-        for modes in range(min(MODES[0], most), most + 1):
-            residual = (
-                (left**2).sum() + square[:modes].sum() + (z[:, modes:] ** 2).sum()
-            )
-            scores[modes, step] = residual / (1 - 2 * modes * solver.count / count) ** 2
+    fewest = MODES[0]
+    for even, most in _most(len(s)).items():
+        z, _, left = projected(trial.points, s, most, even)
+        for step, solver in solvers.items():
+            smoothed = solver.smoothed(z.reshape(len(z), -1)).reshape(z.shape)
+            square = ((z - smoothed) ** 2).sum((0, 2))
+            for modes in range(min(fewest, most), most + 1):
+                residual = (
+                    (left**2).sum() + square[:modes].sum() + (z[:, modes:] ** 2).sum()
+                )
+                share = 2 * modes * solver.count / count
+                scores.setdefault((even, modes, step), residual / (1 - share) ** 2)
+        fewest = most + 1
     return min(scores, key=scores.get)
 
 
-def _curve(trial: Trial, s: np.ndarray, modes: int, step: int, solver: Solver) -> Curve:
-    z, triangle, left = projected(trial.points, s, modes)
+def _curve(
+    trial: Trial, s: np.ndarray, modes: int, step: int, solver: Solver, even: float
+) -> Curve:
+    z, triangle, left = projected(trial.points, s, modes, even)
     coefficients = solver(z)
     residual = z - (solver.design @ coefficients.reshape(solver.count, -1)).reshape(
         z.shape
@@ -261,6 +295,7 @@ def _curve(trial: Trial, s: np.ndarray, modes: int, step: int, solver: Solver) -
         s,
         modes,
         step,
+        even,
         solver.knots,
         coefficients,
         residual,
