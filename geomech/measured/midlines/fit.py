@@ -131,7 +131,7 @@ def fit_midlines(
         )
         return kinematics.pseudo_values(weighted, len(used))
 
-    sample = intervals.sampled(curve, coarse, values)
+    sample = intervals.sampled(curve, coarse, values, clock.of_frames(curve))
     constant = np.full(len(sample.value), intervals.CONSTANT)
     constant[kinematics.QUANTITIES.index("length")] = STRETCHLESS
     found = intervals.intervals(sample, level, constant)

@@ -23,7 +23,8 @@ TRIED = np.geomspace(
 )  # variances of cycles over that of the pseudo-values, and over that of noise
 REPEATING = 0.5  # prior probability that all cycles repeat exactly, as a robot's
 CONSTANT = 0.2  # prior probability that a quantity repeats exactly where others do not; found by coverage
-ALIKE = -0.5, 0.0, 0.5  # correlations of neighbouring cycles
+ALIKE = -0.5, 0.0, 0.5, 0.8  # correlations of neighbouring cycles
+UNSURE = 0.125  # of the bias by noise, which is found from midlines with noise; found by coverage
 TINY = 1e-30  # variance below which there is rounding alone
 FURTHEST = 12.0  # standard deviations of the largest variance: more than half a width
 
@@ -67,7 +68,8 @@ def intervals(
     from scipy.special import ndtr, ndtri
 
     by_noise = sample.noisy - sample.value
-    noise = by_noise.var(0, ddof=1)
+    bias = by_noise.mean(0)
+    noise = by_noise.var(0, ddof=1) + (UNSURE * bias) ** 2
     unbiased = 2 * sample.change - sample.noisy_change.mean(0)
     cut_off = np.maximum(unbiased**2 - sample.noisy_change.var(0, ddof=1), 0.0)
     known = np.maximum(noise + cut_off, 1e-300)
@@ -84,7 +86,7 @@ def intervals(
             low, high = np.where(inside, middle, low), np.where(inside, high, middle)
         half_width = high
     cycles = np.maximum((half_width / ndtri((1 + level) / 2)) ** 2 - known, 0.0)
-    value = sample.value - by_noise.mean(0)
+    value = sample.value - bias
     return Intervals(
         value, *np.sqrt((cycles, noise, cut_off)), half_width, sample.pseudo
     )
@@ -158,28 +160,36 @@ def sampled(
     curve: smooth.Curve,
     coarse: smooth.Curve,
     values: Values,
+    phase: np.ndarray,
     resampled: int | None = None,
     seed: int = 0,
 ) -> Sample:
     """Return the quantities of a curve, and the same with noise put on once more, as often as ``resampled`` or RESAMPLED.
 
-    coarse: the same `smooth.coarser`. values: returns quantities (Q,) and pseudo-values (C, Q) of a curve."""
-    (value, pseudo), noisy, changes = values(curve), [], []
-    rest = 1 / (
-        2 ** (curve.modes - coarse.modes) - 1
-    )  # of a series that halves with each mode
+    coarse: the same `smooth.coarser`. values: returns quantities (Q,) and pseudo-values (C, Q) of a curve. phase: (F,),
+    of the frames, rad."""
+    value, pseudo = values(curve)
+    coarse_value = values(coarse)[0]
+    # Noise is put on a curve with little of it, as on one with noise it does more than it did to the body: the slip, an
+    # absolute value, is raised by little where the body slips by more than noise.
+    base = curve.repeating(phase)
+    base_value, base_pseudo = values(base)
+    # What is left of a series that halves with each mode.
+    rest = 1 / (2 ** (curve.modes - coarse.modes) - 1)
+    change = rest * (value - coarse_value)
+    noisy, noisy_pseudo, noisy_change = [], [], []
     for k in range(RESAMPLED if resampled is None else resampled):
-        one, other = (
-            c.noisy(np.random.default_rng((seed, k))) for c in (curve, coarse)
-        )
-        noisy.append(values(one))
-        changes.append(rest * (noisy[-1][0] - values(other)[0]))
-    each, every = (np.array([x[k] for x in noisy]) for k in (0, 1))
+        each, each_pseudo = values(base.noisy(np.random.default_rng((seed, k))))
+        by_noise = each - base_value
+        other = values(coarse.noisy(np.random.default_rng((seed, k))))[0] - coarse_value
+        noisy.append(value + by_noise)
+        noisy_pseudo.append(pseudo + each_pseudo - base_pseudo)
+        noisy_change.append(change + rest * (by_noise - other))
     return Sample(
         value,
         pseudo,
-        each,
-        every,
-        rest * (value - values(coarse)[0]),
-        np.array(changes),
+        np.array(noisy),
+        np.array(noisy_pseudo),
+        change,
+        np.array(noisy_change),
     )

@@ -51,6 +51,11 @@ class Clock:
             else near + np.angle(z * np.exp(-1j * near))
         )
 
+    def of_frames(self, curve: Curve) -> np.ndarray:
+        """Return the phase (F,) of a curve at the frames, rad, which grows."""
+        phase = np.maximum.accumulate(self.phase(curve))
+        return np.interp(curve.t, self.t, phase)
+
 
 def relative_headings(curve: Curve, t: np.ndarray) -> np.ndarray:
     """Return headings (T, PLACES) along the body at times t, less their mean, rad."""

@@ -76,7 +76,10 @@ def compare(fit: Kinematics, medium: Any, effects: tuple = ()) -> Comparison:
 
         return of
 
-    sample = intervals.sampled(fit.curve, fit.coarse, values(swimmer), RESAMPLED)
+    phase = fit.clock.of_frames(fit.curve)
+    sample = intervals.sampled(
+        fit.curve, fit.coarse, values(swimmer), phase, RESAMPLED
+    )
     found = intervals.intervals(sample, fit.level)
     finer = (
         values(Swimmer(medium, Backbone(2 * ELEMENTS), effects))(fit.curve)[0]

@@ -30,6 +30,7 @@ MORE = 3  # modes than by cross-validation
 CLOSER = 1.5  # ratio of its distance between knots to the one taken
 PASSES = 3  # of finding where along the body the points lie
 ALIKE = 0.9  # correlation of noise between frames, at most
+HARMONICS = 10  # of a motion that repeats
 NODES = 30  # places along the body at which a curve is evaluated
 
 
@@ -83,6 +84,25 @@ class Curve:
         return replace(
             self, coefficients=self.coefficients + self.solver(_alike(rows, self.alike))
         )
+
+    def repeating(self, phase: np.ndarray) -> Curve:
+        """Return the curve with little of the noise: the part of its motion that follows the phase (F,) of the frames, rad.
+
+        Its mean over a cycle and its first harmonic may vary from one cycle to the next; the HARMONICS above repeat."""
+        from scipy.interpolate import BSpline
+
+        turns = max(1, round((phase[-1] - phase[0]) / (2 * np.pi)))
+        inner = np.linspace(phase.min(), phase.max(), turns + 1)
+        knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
+        slow = BSpline.design_matrix(phase, knots, 3).toarray()
+        most = int(min(HARMONICS, len(phase) / turns / 2 - 1))
+        at = np.arange(2, most + 1) * phase[:, None]
+        first = [slow * np.cos(phase)[:, None], slow * np.sin(phase)[:, None]]
+        columns = np.hstack([slow, *first, np.cos(at), np.sin(at)])
+        rows = self.at(self.t).reshape(len(phase), -1)
+        found = columns @ np.linalg.lstsq(columns, rows, rcond=None)[0]
+        found = found.reshape(len(phase), self.modes, 2)
+        return replace(self, coefficients=self.solver(found))
 
 
 def _alike(rows: np.ndarray, correlation: float) -> np.ndarray:
