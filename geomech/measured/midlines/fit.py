@@ -52,6 +52,11 @@ class Kinematics:
         """Return the used cycles of a curve. near: as of `kinematics.Clock.phase`."""
         return used_cycles(curve, self.clock, self.marks, self.used, near)
 
+    @property
+    def own_length(self) -> float:
+        """Length of the piece of the body from its first point to its last, in the trial's unit."""
+        return float(kinematics.averages(self.cycles(self.curve)).numbers[:, 1].mean())
+
     def value(self, name: str) -> tuple[float, float]:
         """Return a quantity and half the width of its interval."""
         k = kinematics.QUANTITIES.index(name)
