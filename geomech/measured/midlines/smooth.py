@@ -25,6 +25,7 @@ KNOTS = (6, 7, 8, 10, 12, 14, 16, 20, 24, 32)  # per cycle, that are tried
 MODES = 4, 14  # of x and of y along the body, that are tried
 SAFE = 2.2  # times the root of the number of points: more modes through equal distances oscillate at the ends (Runge)
 EVEN = 0.95  # of the polynomials' argument where more modes are needed: with it 18 modes through 22 points are stable
+EVENER = 2  # modes more of that argument, which are as fine for one wave as plain ones
 MOST_EVEN = 0.85, 30  # modes over points, and modes, at most, of polynomials of that argument
 MORE = 3  # modes than by cross-validation
 CLOSER = 1.5  # ratio of its distance between knots to the one taken
@@ -233,7 +234,12 @@ def fitted(trial: Trial, period: float) -> tuple[Curve, Trial]:
         trial = _completed(trial, curve)
         s = _arc_places(curve, s)
     even, modes, step = _chosen(trial, s, solvers)
-    modes = min(modes + MORE, _most(len(s))[even])
+    most = _most(len(s))
+    if not even and modes + MORE > most[even] and most[EVEN] > most[even]:
+        # Plain ones oscillate at the ends; as fine ones of an even argument are EVENER more.
+        even = EVEN
+        modes += EVENER
+    modes = min(modes + MORE, most[even])
     return curve_of(trial, s, modes, max(2, round(step / CLOSER)), even), trial
 
 
