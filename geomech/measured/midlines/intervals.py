@@ -23,8 +23,14 @@ TRIED = np.geomspace(
 )  # variances of cycles over that of the pseudo-values, and over that of noise
 REPEATING = 0.5  # prior probability that all cycles repeat exactly, as a robot's
 CONSTANT = 0.2  # prior probability that a quantity repeats exactly where others do not; found by coverage
-ALIKE = -0.5, 0.0, 0.5, 0.8  # correlations of neighbouring cycles
+ALIKE = {
+    -0.5: 1.0,
+    0.0: 1.0,
+    0.5: 1.0,
+    0.8: 0.6,
+}  # correlations of neighbouring cycles, and their prior shares; found by coverage
 UNSURE = 0.125  # of the bias by noise, which is found from midlines with noise; found by coverage
+FREE = 3.0  # deviations of a wave (size, length, pace), which move all quantities, assumed
 TINY = 1e-30  # variance below which there is rounding alone
 FURTHEST = 12.0  # standard deviations of the largest variance: more than half a width
 
@@ -99,7 +105,7 @@ def _of_cycles(
 
     The weights are the likelihood of the contrasts between cycles times a prior: v = 0 if `_repeating` or ``constant``,
     else the density of the cycles' variance v is 1/(v + noise); neighbours are correlated by one of ALIKE, as cycles k
-    apart by its k-th power. Noise is correlated between neighbours, too: what ends one cycle too far begins the next
+    apart by its k-th power, and which one all quantities tell together. Noise is correlated between neighbours, too: what ends one cycle too far begins the next
     too late."""
     count = len(values)
     apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
@@ -126,7 +132,7 @@ def _of_cycles(
     prior = variances[1:] / (variances[1:] + same)  # times v, as TRIED is geometric
     prior = np.vstack([exact + 0 * scatter, (1 - exact) * prior / prior.sum(0)])
     likelihood, by_cycles = [], []
-    for correlation in np.power.outer(ALIKE, apart):
+    for correlation in np.power.outer([*ALIKE], apart):
         sizes, axes = np.linalg.eigh(
             whitening @ correlation @ whitening.transpose(0, 2, 1)
         )
@@ -134,7 +140,14 @@ def _of_cycles(
         spread = 1 + variances[..., None] * sizes
         likelihood.append(-0.5 * (np.log(spread) + square / spread).sum(-1))
         by_cycles.append(variances * correlation.mean())
-    weights = prior * np.exp(likelihood - np.max(likelihood, (0, 1)))
+    likelihood = np.array(likelihood)
+    weights = prior * np.exp(likelihood - likelihood.max((0, 1)))
+    weights *= np.reshape([*ALIKE.values()], (-1, 1, 1))
+    # How alike neighbours are, all quantities show together, as few deviations move all of them.
+    evidence = np.log(weights.sum(1))
+    others = evidence.sum(1, keepdims=True) - evidence
+    pooled = (FREE - 1) / max(len(scatter) - 1, 1) * others
+    weights = weights * np.exp(pooled - pooled.max(0))[:, None]
     return tuple(
         x.reshape(-1, len(scatter))
         for x in (weights / weights.sum((0, 1)), np.array(by_cycles))
