@@ -27,7 +27,7 @@ ALIKE = {
     -0.5: 1.0,
     0.0: 1.0,
     0.5: 1.0,
-    0.8: 0.6,
+    0.8: 0.2,
 }  # correlations of neighbouring cycles, and their prior shares; found by coverage
 UNSURE = 0.125  # of the bias by noise, which is found from midlines with noise; found by coverage
 FREE = 3.0  # deviations of a wave (size, length, pace), which move all quantities, assumed
@@ -105,8 +105,8 @@ def _of_cycles(
 
     The weights are the likelihood of the contrasts between cycles times a prior: v = 0 if `_repeating` or ``constant``,
     else the density of the cycles' variance v is 1/(v + noise); neighbours are correlated by one of ALIKE, as cycles k
-    apart by its k-th power, and which one all quantities tell together. Noise is correlated between neighbours, too: what ends one cycle too far begins the next
-    too late."""
+    apart by its k-th power, and which one all quantities tell together. Noise is correlated between neighbours, too:
+    what ends one cycle too far begins the next too late."""
     count = len(values)
     apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
     contrasts = np.linalg.qr(np.column_stack([np.ones(count), np.eye(count)[:, 1:]]))[
@@ -142,12 +142,12 @@ def _of_cycles(
         by_cycles.append(variances * correlation.mean())
     likelihood = np.array(likelihood)
     weights = prior * np.exp(likelihood - likelihood.max((0, 1)))
-    weights *= np.reshape([*ALIKE.values()], (-1, 1, 1))
     # How alike neighbours are, all quantities show together, as few deviations move all of them.
-    evidence = np.log(weights.sum(1))
+    evidence = np.log(np.maximum(weights.sum(1), 1e-300))
     others = evidence.sum(1, keepdims=True) - evidence
     pooled = (FREE - 1) / max(len(scatter) - 1, 1) * others
-    weights = weights * np.exp(pooled - pooled.max(0))[:, None]
+    shares = np.array([*ALIKE.values()])[:, None]
+    weights = weights * (shares * np.exp(pooled - pooled.max(0)))[:, None]
     return tuple(
         x.reshape(-1, len(scatter))
         for x in (weights / weights.sum((0, 1)), np.array(by_cycles))
