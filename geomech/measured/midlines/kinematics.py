@@ -14,7 +14,7 @@ import numpy as np
 from geomech.measured.midlines.smooth import NODES, Curve, placed
 
 PHASES = 48  # of a cycle
-PLACES = 12  # along the body, whose headings make the phase
+PLACES = 12  # along the MIDDLE of the body, whose headings make the phase
 QUANTITIES = (
     "frequency", "length", "speed", "stride", "heading", "drift", "turn", "slip", "efficiency", "amplitude", "wavelength",
     "arc_wavelength",
@@ -24,7 +24,7 @@ WAVES = np.arange(0.3, 8.001, 0.05)  # wave numbers that are tried, per body
 MIDDLE = (
     0.1,
     0.9,
-)  # of the body, where the wave is fitted: slopes at its ends have most noise
+)  # of the body, where wave and phase are found: slopes at its ends have most noise
 STANDING = (
     0.15  # second over first principal size of the headings, below which a wave stands
 )
@@ -58,13 +58,11 @@ class Clock:
 
 
 def relative_headings(curve: Curve, t: np.ndarray) -> np.ndarray:
-    """Return headings (T, PLACES) along the body at times t, less their mean, rad."""
-    heading = np.unwrap(
-        np.angle(
-            placed(curve.basis((np.arange(PLACES) + 0.5) / PLACES, 1), curve.at(t))
-        ),
-        axis=1,
-    )
+    """Return headings (T, PLACES) along the MIDDLE of the body at times t, less their mean, rad."""
+    first, last = MIDDLE
+    places = first + (last - first) * (np.arange(PLACES) + 0.5) / PLACES
+    tangent = placed(curve.basis(places, 1), curve.at(t))
+    heading = np.unwrap(np.angle(tangent), axis=1)
     return heading - heading.mean(1, keepdims=True)
 
 
