@@ -24,6 +24,7 @@ EVEN = 0.7  # rad, by which the phase of few cycles may stray from a line
 LONGEST, SHORTEST = 30.0, 1e-4  # m: bodies beyond are in another unit
 MOVES = 0.02  # body lengths per cycle: below it nobody sees where a body goes
 STRETCHLESS = 0.6  # prior probability that a body keeps its length where its motion varies, assumed
+WHOLE = 0.995  # of the body's length, from which on points are taken to reach both ends
 AGREED = 1.4  # ratio of the points' length to a body length that is given, at most
 
 
@@ -125,7 +126,7 @@ def fit_midlines(
         curve, trial = smooth.fitted(trial.reversed(), repeat)
         clock = kinematics.clock(curve, repeat)
         marks, used = full_cycles(trial, curve, clock)
-    trial = trial.with_notes(*_notes(used))
+    trial = trial.with_notes(*_notes(used), *_ends_note(trial, curve))
     coarse = smooth.coarser(trial, curve)
     near = clock.phase(curve)
 
@@ -308,6 +309,19 @@ def _head(
         else "the wave runs away from it; the body hardly moves"
     )
     return wave < 0, f"{ends[wave > 0]}, by the motion: {shown}"
+
+
+def _ends_note(trial: Trial, curve: smooth.Curve) -> list[str]:
+    """Note that a body has ends beyond its points."""
+    if trial.length is None:
+        return []
+    tangent = smooth.placed(curve.basis(curve.places, 1), curve.at(curve.t))
+    share = float(np.abs(tangent).mean()) / trial.length
+    if share > WHOLE:
+        return []
+    return [
+        f"the points cover {share:.0%} of the body: slip, amplitude, heading and turn are those of that piece"
+    ]
 
 
 def _notes(used: np.ndarray) -> list[str]:

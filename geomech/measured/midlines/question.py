@@ -75,10 +75,17 @@ def units_of(fit: Kinematics) -> dict[str, str]:
     """Return the unit of each quantity."""
     time, length = fit.trial.unit_of_time, fit.trial.unit
     return {
-        "frequency": "Hz" if time == "s" else "1/frame", "length": length, "speed": f"{'m' if length == 'm' else 'BL'}/{time}",
+        "frequency": "Hz" if time == "s" else "1/frame", "length": fit.trial.unit_of_length, "speed": f"{'m' if length == 'm' else 'BL'}/{time}",
         "stride": "BL", "heading": "rad", "drift": "rad", "turn": "rad", "slip": "rad", "efficiency": "1", "amplitude": "BL",
         "wavelength": "BL", "arc_wavelength": "BL",
     }  # fmt: skip
+
+
+def with_unit(words: str, unit: str) -> str:
+    """Return a value in words with its unit; a pure number has none."""
+    if unit in ("", "1", "-"):
+        return words
+    return f"{words} {unit}"
 
 
 def result_of(fit: Kinematics, comparison: Comparison | None = None) -> Result:
