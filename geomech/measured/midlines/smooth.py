@@ -29,6 +29,7 @@ EVENER = 2  # modes more of that argument, which are as fine for one wave as pla
 MOST_EVEN = 0.85, 30  # modes over points, and modes, at most, of polynomials of that argument
 MORE = 3  # modes than by cross-validation
 CLOSER = 1.5  # ratio of its distance between knots to the one taken
+CERTAIN = 4.0  # standard deviations of a correlation by noise, beyond which it is none
 PASSES = 3  # of finding where along the body the points lie
 ALIKE = 0.9  # correlation of noise between frames, at most
 HARMONICS = 10  # of a motion that repeats
@@ -228,12 +229,13 @@ def fitted(trial: Trial, period: float) -> tuple[Curve, Trial]:
     solvers = {
         k: Solver(trial.t, k) for k in sorted({max(2, round(rows / n)) for n in KNOTS})
     }
-    even, modes, step = _chosen(trial, s, solvers)
+    even, modes, step = _chosen(trial, s, solvers, period)
+    plain = min(modes, _most(len(s))[0.0])
     for _ in range(PASSES):
-        curve = _curve(trial, s, modes, step, solvers[step], even)
-        trial = _completed(trial, curve)
-        s = _arc_places(curve, s)
-    even, modes, step = _chosen(trial, s, solvers)
+        trial = _completed(trial, _curve(trial, s, modes, step, solvers[step], even))
+        # Slopes of many modes are noise at the ends, which would lengthen the arc there.
+        s = _arc_places(_curve(trial, s, plain, step, solvers[step], 0.0), s)
+    even, modes, step = _chosen(trial, s, solvers, period)
     most = _most(len(s))
     if not even and modes + MORE > most[even] and most[EVEN] > most[even]:
         # Plain ones oscillate at the ends; as fine ones of an even argument are EVENER more.
@@ -274,27 +276,68 @@ def curve_of(
 
 
 def _chosen(
-    trial: Trial, s: np.ndarray, solvers: dict[int, Solver]
+    trial: Trial, s: np.ndarray, solvers: dict[int, Solver], period: float
 ) -> tuple[float, int, int]:
-    """Return the argument of the polynomials, modes and rows between knots of the least generalised cross-validation.
+    """Return the argument of the polynomials, modes and rows between knots.
 
-    Modes of an even argument are tried beyond those which plain ones bear: they are for shapes that plain ones leave."""
+    They are those of the least generalised cross-validation among plain polynomials, unless what these leave of the
+    frames repeats: then as many of an even argument as leave nothing that repeats. Noise that is alike from frame to
+    frame would have cross-validation take all modes."""
+    plain, most = _most(len(s)).values()
+    _, modes, step = _least(trial, s, solvers, 0.0, range(min(MODES[0], plain), plain + 1))
+    if not _repeats(trial, projected(trial.points, s, plain)[2], plain, period):
+        return 0.0, modes, step
+    modes = plain
+    while modes < most:
+        modes += 1
+        left = projected(trial.points, s, modes, EVEN)[2]
+        if not _repeats(trial, left, modes, period):
+            break
+    return EVEN, *_least(trial, s, solvers, EVEN, range(modes, modes + 1))[1:]
+
+
+def _least(
+    trial: Trial, s: np.ndarray, solvers: dict[int, Solver], even: float, tried: range
+) -> tuple[float, int, int]:
+    """Return the least score of generalised cross-validation, its modes, and its rows between knots."""
+    z, _, left = projected(trial.points, s, tried[-1], even)
     count = trial.known
-    scores = {}
-    fewest = MODES[0]
-    for even, most in _most(len(s)).items():
-        z, _, left = projected(trial.points, s, most, even)
-        for step, solver in solvers.items():
-            smoothed = solver.smoothed(z.reshape(len(z), -1)).reshape(z.shape)
-            square = ((z - smoothed) ** 2).sum((0, 2))
-            for modes in range(min(fewest, most), most + 1):
-                residual = (
-                    (left**2).sum() + square[:modes].sum() + (z[:, modes:] ** 2).sum()
-                )
-                share = 2 * modes * solver.count / count
-                scores.setdefault((even, modes, step), residual / (1 - share) ** 2)
-        fewest = most + 1
-    return min(scores, key=scores.get)
+    scores = []
+    for step, solver in solvers.items():
+        smoothed = solver.smoothed(z.reshape(len(z), -1)).reshape(z.shape)
+        square = ((z - smoothed) ** 2).sum((0, 2))
+        for modes in tried:
+            residual = (
+                (left**2).sum() + square[:modes].sum() + (z[:, modes:] ** 2).sum()
+            )
+            share = 2 * modes * solver.count / count
+            scores.append((residual / (1 - share) ** 2, modes, step))
+    return min(scores)
+
+
+def _repeats(trial: Trial, left: np.ndarray, modes: int, period: float) -> bool:
+    """Return whether what modes leave of the frames (F, P, 2) is like itself a period later, beyond what noise is."""
+    first = np.flatnonzero(trial.t + period <= trial.t[-1])
+    free = left.shape[1] - modes
+    if len(first) < 2 or free < 1:
+        return False
+    later = np.clip(np.searchsorted(trial.t, trial.t[first] + period), 1, None)
+    share = (trial.t[later] - trial.t[first] - period) / (
+        trial.t[later] - trial.t[later - 1]
+    )
+    share = share[:, None, None]
+    after = share * left[later - 1] + (1 - share) * left[later]
+    size = np.sqrt((left[first] ** 2).sum() * (after**2).sum())
+    # Neighbouring frames that are alike are fewer; of independent ones a correlation varies by the root of their number.
+    alike = _correlation(left)
+    number = 2 * free * len(first) * (1 - alike**2) / (1 + alike**2)
+    return (left[first] * after).sum() > CERTAIN * size / np.sqrt(number)
+
+
+def _correlation(left: np.ndarray) -> float:
+    """Return how alike what modes leave of the frames (F, P, 2) is from one to the next, up to ALIKE."""
+    like = (left[1:] * left[:-1]).sum() / max((left**2).sum(), 1e-300)
+    return float(np.clip(like, 0.0, ALIKE))
 
 
 def _curve(
@@ -307,9 +350,7 @@ def _curve(
     )
     # What modes leave of the frames shows how alike noise is from one to the next; the more it is, the more of it a
     # spline takes along.
-    alike = float(
-        np.clip((left[1:] * left[:-1]).sum() / max((left**2).sum(), 1e-300), 0.0, ALIKE)
-    )
+    alike = _correlation(left)
     drawn = np.random.default_rng(0).normal(size=(len(trial.t), 2 * NODES))
     kept, white = (
         ((x - solver.smoothed(x)) ** 2).sum() for x in (_alike(drawn, alike), drawn)
