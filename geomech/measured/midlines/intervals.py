@@ -4,7 +4,7 @@ The value is that of all cycles, less its mean change by noise. Its variance has
 the smooth midlines is put on them again and again, and everything is computed anew. Cycles: leaving out one after
 another gives pseudo-values, whose scatter is that of the cycles and that which noise explains; all variances of the
 former count by their likelihood. Smoothing: the change from fewer modes and fewer knots, less the part that noise
-explains, and as a series goes on that each mode more halves."""
+explains, and as a series goes on that each mode more halves (`smooth.Curve.falls`)."""
 
 from __future__ import annotations
 
@@ -29,8 +29,10 @@ ALIKE = {
     0.5: 1.0,
     0.8: 0.2,
 }  # correlations of neighbouring cycles, and their prior shares; found by coverage
-UNSURE = 0.125  # of the bias by noise, which is found from midlines with noise; found by coverage
-FREE = 3.0  # deviations of a wave (size, length, pace), which move all quantities, assumed
+UNSURE = 0.15  # of the bias by noise, which is found from midlines with noise; found by coverage
+FREE = (
+    3.0  # deviations of a wave (size, length, pace), which move all quantities, assumed
+)
 TINY = 1e-30  # variance below which there is rounding alone
 FURTHEST = 12.0  # standard deviations of the largest variance: more than half a width
 
@@ -187,8 +189,8 @@ def sampled(
     # absolute value, is raised by little where the body slips by more than noise.
     base = curve.repeating(phase)
     base_value, base_pseudo = values(base)
-    # What is left of a series that halves with each mode.
-    rest = 1 / (2 ** (curve.modes - coarse.modes) - 1)
+    # What is left of a geometric series.
+    rest = 1 / (curve.falls ** (curve.modes - coarse.modes) - 1)
     change = rest * (value - coarse_value)
     noisy, noisy_pseudo, noisy_change = [], [], []
     for k in range(RESAMPLED if resampled is None else resampled):

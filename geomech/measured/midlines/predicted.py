@@ -58,7 +58,7 @@ class Comparison:
     predicted_error: np.ndarray
     per_cycle: np.ndarray
     closing: tuple[Closing, ...]
-    ends: np.ndarray
+    ends: np.ndarray | None = None
     notes: tuple[str, ...] = ()
 
 
@@ -82,9 +82,7 @@ def compare(fit: Kinematics, medium: Any, effects: tuple = ()) -> Comparison:
         return of
 
     phase = fit.clock.of_frames(fit.curve)
-    sample = intervals.sampled(
-        fit.curve, fit.coarse, values(swimmer), phase, RESAMPLED
-    )
+    sample = intervals.sampled(fit.curve, fit.coarse, values(swimmer), phase, RESAMPLED)
     found = intervals.intervals(sample, fit.level)
     finer = (
         values(Swimmer(medium, Backbone(2 * ELEMENTS), effects))(fit.curve)[0]
@@ -125,9 +123,7 @@ def _predicted(
     each = kinematics.averages(cycles).weighted(weights)
     time, own, _, _, axis, _, cosine = each.numbers.T
     body = own if fit.trial.length is None else np.full_like(own, fit.trial.length)
-    alpha, alphadot = _bends(
-        cycles, weights, swimmer.joints + 1, tail, head, straight
-    )
+    alpha, alphadot = _bends(cycles, weights, swimmer.joints + 1, tail, head, straight)
     xi = swimmer.velocity(alpha, alphadot)
     net = displacement(xi)
     slip = swimmer.work(alpha, alphadot, xi).slip.mean(-1)
@@ -167,9 +163,7 @@ def _by_ends(fit: Kinematics, swimmer: Swimmer, piece: np.ndarray) -> np.ndarray
         for straight in (False, True):
             tail = at_tail * missing
             head = (1 - at_tail) * missing
-            longer = _predicted(
-                swimmer, cycles, weights, fit, tail, head, straight
-            )
+            longer = _predicted(swimmer, cycles, weights, fit, tail, head, straight)
             changes.append(np.abs(longer[0] - piece))
     return np.max(changes, 0)
 

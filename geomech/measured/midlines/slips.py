@@ -39,7 +39,9 @@ def _median(values: np.ndarray, axis: int) -> np.ndarray:
     ordered = np.sort(values, axis)  # nan comes last
     known = np.expand_dims((~np.isnan(values)).sum(axis), axis)
     low = np.take_along_axis(ordered, np.maximum(known - 1, 0) // 2, axis)
-    high = np.take_along_axis(ordered, np.minimum(known // 2, values.shape[axis] - 1), axis)
+    high = np.take_along_axis(
+        ordered, np.minimum(known // 2, values.shape[axis] - 1), axis
+    )
     return ((low + high) / 2).squeeze(axis)
 
 

@@ -26,7 +26,14 @@ MODES = 4, 14  # of x and of y along the body, that are tried
 SAFE = 2.2  # times the root of the number of points: more modes through equal distances oscillate at the ends (Runge)
 EVEN = 0.95  # of the polynomials' argument where more modes are needed: with it 18 modes through 22 points are stable
 EVENER = 2  # modes more of that argument, which are as fine for one wave as plain ones
-MOST_EVEN = 0.85, 30  # modes over points, and modes, at most, of polynomials of that argument
+FALLS = 2.0  # factor by which each mode more lessens what is cut off, assumed
+FALLS_EVEN = (
+    1.5  # the same of that argument; measured on slopes of one wave, 10 to 18 modes
+)
+MOST_EVEN = (
+    0.85,
+    30,
+)  # modes over points, and modes, at most, of polynomials of that argument
 MORE = 3  # modes than by cross-validation
 CLOSER = 1.5  # ratio of its distance between knots to the one taken
 CERTAIN = 4.0  # standard deviations of a correlation by noise, beyond which it is none
@@ -70,6 +77,11 @@ class Curve:
         return _polynomials(s, self.modes, order, self.even) @ np.linalg.inv(
             self.triangle
         )
+
+    @property
+    def falls(self) -> float:
+        """Factor by which each mode more lessens what is cut off."""
+        return FALLS_EVEN if self.even else FALLS
 
     @cached_property
     def places(self) -> np.ndarray:
@@ -230,11 +242,10 @@ def fitted(trial: Trial, period: float) -> tuple[Curve, Trial]:
         k: Solver(trial.t, k) for k in sorted({max(2, round(rows / n)) for n in KNOTS})
     }
     even, modes, step = _chosen(trial, s, solvers, period)
-    plain = min(modes, _most(len(s))[0.0])
     for _ in range(PASSES):
-        trial = _completed(trial, _curve(trial, s, modes, step, solvers[step], even))
-        # Slopes of many modes are noise at the ends, which would lengthen the arc there.
-        s = _arc_places(_curve(trial, s, plain, step, solvers[step], 0.0), s)
+        curve = _curve(trial, s, modes, step, solvers[step], even)
+        trial = _completed(trial, curve)
+        s = _arc_places(curve, s)
     even, modes, step = _chosen(trial, s, solvers, period)
     most = _most(len(s))
     if not even and modes + MORE > most[even] and most[EVEN] > most[even]:
@@ -284,7 +295,9 @@ def _chosen(
     frames repeats: then as many of an even argument as leave nothing that repeats. Noise that is alike from frame to
     frame would have cross-validation take all modes."""
     plain, most = _most(len(s)).values()
-    _, modes, step = _least(trial, s, solvers, 0.0, range(min(MODES[0], plain), plain + 1))
+    _, modes, step = _least(
+        trial, s, solvers, 0.0, range(min(MODES[0], plain), plain + 1)
+    )
     if not _repeats(trial, projected(trial.points, s, plain)[2], plain, period):
         return 0.0, modes, step
     modes = plain
