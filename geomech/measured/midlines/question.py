@@ -28,7 +28,7 @@ LABELS = {
     "turn": "turn of the body per cycle",
     "slip": "mean angle between body and velocity",
     "efficiency": "wave efficiency: distance per cycle over wavelength",
-    "amplitude": "half the range across the way, mean over the body",
+    "amplitude": "half the range across the way of each cycle, mean over the body",
     "wavelength": "along the way",
     "arc_wavelength": "along the body",
 }
@@ -74,11 +74,21 @@ class Midlines(Question):
 def units_of(fit: Kinematics) -> dict[str, str]:
     """Return the unit of each quantity."""
     time, length = fit.trial.unit_of_time, fit.trial.unit
+    speed = "m" if length == "m" else "BL"
     return {
-        "frequency": "Hz" if time == "s" else "1/frame", "length": fit.trial.unit_of_length, "speed": f"{'m' if length == 'm' else 'BL'}/{time}",
-        "stride": "BL", "heading": "rad", "drift": "rad", "turn": "rad", "slip": "rad", "efficiency": "1", "amplitude": "BL",
-        "wavelength": "BL", "arc_wavelength": "BL",
-    }  # fmt: skip
+        "frequency": "Hz" if time == "s" else "1/frame",
+        "length": fit.trial.unit_of_length,
+        "speed": f"{speed}/{time}",
+        "stride": "BL",
+        "heading": "rad",
+        "drift": "rad",
+        "turn": "rad",
+        "slip": "rad",
+        "efficiency": "1",
+        "amplitude": "BL",
+        "wavelength": "BL",
+        "arc_wavelength": "BL",
+    }
 
 
 def with_unit(words: str, unit: str) -> str:
