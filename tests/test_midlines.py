@@ -41,6 +41,7 @@ from rft.refusal import Refusal
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = Swimmer(MEDIA["glass-0.3mm-loose"], Backbone(40))
 USUAL, REPEATING = {"spread": 0.05, "jitter": 0.02}, {"spread": 0.0, "jitter": 0.0}
+SLOW = {"spread": 0.05, "jitter": 0.02, "memory": 0.75}  # cycles alike by .68
 VARYING = {"spread": 0.1, "jitter": 0.05, "swing": 0.7, "waves": 1.5}
 
 
@@ -702,10 +703,10 @@ def test_a_piece_of_a_body_is_predicted_in_its_own_unit(noisy):
 
 @pytest.mark.soak
 @pytest.mark.parametrize("cycles", [3.5, 8.4])
-@pytest.mark.parametrize("options", [REPEATING, USUAL, VARYING])
-def test_intervals_cover_the_truth_in_90_to_98_percent(options, cycles):
-    """Of 200 trials a share of 95 % has a standard error of 1.5 %. Turns of cycles that vary share their ends, as heading
-    is what turns: few cycles do not show that, and their intervals are too wide."""
+@pytest.mark.parametrize("options", [REPEATING, USUAL, SLOW, VARYING])
+def test_intervals_cover_the_truth_in_90_to_99_percent(options, cycles):
+    """Of 200 trials a share of 95 % has a standard error of 1.5 %. That few cycles may be alike makes intervals of others
+    too wide, and those of turns, whose ends two cycles share."""
     error, width = covered(
         GLASS, truth(GLASS, **options), range(40000, 40200), cycles, **options
     )
@@ -714,9 +715,7 @@ def test_intervals_cover_the_truth_in_90_to_98_percent(options, cycles):
         np.median(width, 0) / 1.96 / np.sqrt((error**2).mean(0)),
     )
     print(options, cycles, *zip(QUANTITIES, share.round(3), size.round(2)), sep="\n")
-    turn = QUANTITIES.index("turn")
-    assert (share >= 0.9).all() and (np.delete(share, turn) <= 0.99).all()
-    assert share[turn] <= 0.98 or (options["spread"] and size[turn] < 2.5)
+    assert (share >= 0.9).all() and ((share <= 0.99) | (size < 3)).all()
 
 
 # Prediction.
