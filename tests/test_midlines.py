@@ -41,6 +41,7 @@ from rft.refusal import Refusal
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = Swimmer(MEDIA["glass-0.3mm-loose"], Backbone(40))
 USUAL, REPEATING = {"spread": 0.05, "jitter": 0.02}, {"spread": 0.0, "jitter": 0.0}
+SLOW = {"spread": 0.05, "jitter": 0.02, "memory": 0.75}  # cycles alike by .68
 VARYING = {"spread": 0.1, "jitter": 0.05, "swing": 0.7, "waves": 1.5}
 
 
@@ -134,7 +135,7 @@ def test_cycles_that_repeat_without_noise_have_small_errors(exact):
         f.intervals.half_width[:n],
         (f.intervals.value - noiseless(exact))[:n],
     )
-    assert (np.abs(error) <= width + 2e-4).all() and width.max() < 0.04
+    assert (np.abs(error) <= width + 1e-3).all() and width.max() < 0.04
 
 
 # Files.
@@ -350,7 +351,7 @@ ALSO_REFUSED = {
     "10 frames have most of their points": at(np.indices((133, 30)).sum(0) % 2 * (np.arange(133) > 9)[:, None] > 0, np.nan),
     "line 542 .t = 0.6.: no frames for 0.2 after this one, and so in every cycle":
         lambda t: without(t, (np.arange(len(t.t)) >= 19) & ((np.arange(len(t.t)) - 19) % 30 < 5)),
-    "the cycle from t = 1.168 to 3.542 takes 1.8 times as long as most":
+    "the cycle from t = 1.16 to 3.499 takes 1.7 times as long as most":
         lambda t: dataclasses.replace(t, t=t.t + 2 * np.clip(t.t - 1.5, 0, 1)),
     "the body moves towards its point 1, and so does its wave": backwards,
 }  # fmt: skip
@@ -471,9 +472,10 @@ def truth(system, **options):
     return noiseless(synthetic.made(system, cycles, seed=99, noise=0.0, **options))
 
 
-def noiseless(made):
+def noiseless(made, modes=14, even=0.0):
     trial = smooth.filled(made._replace(points=made.exact).trial())
-    curve = smooth.curve_of(trial, np.linspace(0, 1, trial.points.shape[1]), 14, 2)
+    places = np.linspace(0, 1, trial.points.shape[1])
+    curve = smooth.curve_of(trial, places, modes, 2, even)
     clock = kinematics.clock(curve, fit.period(trial))
     marks, used = fit.full_cycles(trial, curve, clock)
     each = kinematics.averages(fit.used_cycles(curve, clock, marks, used))
@@ -508,7 +510,13 @@ def test_cycles_too_few_to_show_how_they_vary_are_noted():
 
 @pytest.mark.parametrize(
     ("variance", "alike", "width"),
-    [(0.0, 0.0, 1.0), (0.3, 0.0, 1.32), (3.0, 0.0, 1.55), (30.0, 0.3, 1.6)],
+    [
+        (0.0, 0.0, 1.0),
+        (0.3, 0.0, 1.5),
+        (3.0, 0.0, 1.87),
+        (30.0, 0.3, 1.99),
+        (30.0, 0.68, 1.94),
+    ],
 )
 def test_intervals_of_samples_whose_truth_is_zero(variance, alike, width):
     """Noise that ends one cycle too far begins the next too late: it is less in the mean than its scatter says."""
@@ -528,7 +536,7 @@ def test_intervals_of_samples_whose_truth_is_zero(variance, alike, width):
         pseudo.mean(0), pseudo, noisy.mean(1), noisy, none, np.zeros((40, 400))
     )
     found = intervals.intervals(sample, 0.95)
-    assert 0.92 < (np.abs(found.value) <= found.half_width).mean() < 0.98
+    assert 0.89 < (np.abs(found.value) <= found.half_width).mean() < 0.99
     assert np.median(found.noise) == pytest.approx(sigma * np.sqrt(2) / count, rel=0.05)
     deviation = np.sqrt(2 * sigma**2 / count**2 + variance / count)
     assert np.median(found.half_width) == pytest.approx(
@@ -586,7 +594,7 @@ def test_bodies_are_taken_to_keep_their_length(fitted):
     )
     assert (
         alike[1] > 1.02
-        and (np.delete(alike, 1) == 1).all()
+        and (np.abs(np.delete(alike, 1) - 1) < 0.01).all()
         and QUANTITIES[1] == "length"
     )
 
@@ -609,12 +617,96 @@ def test_intervals_cover_the_truth_in_a_few_trials():
     assert (np.abs(error) <= width).mean() > 0.8
 
 
+def two_waves(points, noise=0.003, **options):
+    """A trial whose wave of 1.5 lengths has a third harmonic of 30 %, and what it is without noise at 100 points."""
+    form = {"swing": 0.7, "waves": 1.5, "third": 0.3, "seed": 5, **REPEATING, **options}
+    swimmer = Swimmer(Viscous(4.0), Backbone(40))
+    exact = synthetic.made(swimmer, 4.4, 40, 100, noise=0.0, **form)
+    return synthetic.made(swimmer, 4.4, 40, points, noise=noise, **form), exact
+
+
+def test_modes_cover_a_third_harmonic_that_the_points_resolve():
+    """With 22 points its waves have 4.9 points each."""
+    trial, exact = two_waves(22)
+    f, known = fit.fit_midlines(trial.trial()), noiseless(exact, 30, smooth.EVEN)
+    along = slice(len(QUANTITIES), None)
+    error = np.abs(f.intervals.value - known)
+    assert (error <= f.intervals.half_width)[along].mean() > 0.8
+    for name, most in (("slip", 0.02), ("amplitude", 0.01)):
+        k = QUANTITIES.index(name)
+        assert error[k] < most * known[k] and error[k] < f.intervals.half_width[k]
+
+
+def test_noise_alone_takes_no_more_modes(fitted):
+    assert not fitted.curve.even or fitted.curve.modes < 18
+
+
+def test_amplitude_is_the_mean_of_the_ranges_of_cycles():
+    """Of a point that swings by 1 and 2 in turn, at other phases of the cycle: 1.5 in the mean."""
+    t = 2 * np.pi * np.arange(96) / 48
+    size, late = np.repeat([[1.0, 2.0], [0.0, 2.0]], 48, 1)
+    wave = (size * np.sin(t + late)).reshape(2, 48, 1) * np.ones(kinematics.NODES)
+    along = np.linspace(0, 1, kinematics.NODES) + 0 * wave
+    x = along + np.arange(96).reshape(2, 48, 1) / 480
+    starts = np.array([[0.0, 0, 0], [0.1, 0, 0]])
+    cycles = kinematics.Cycles(
+        t.reshape(2, 48), x + 1j * wave, np.ones_like(x, complex), np.ones_like(x, complex),
+        starts, starts + [0.1, 0, 0], np.ones(2),
+    )  # fmt: skip
+    mean = kinematics.averages(cycles).weighted(np.full((1, 2), 0.5))
+    found = kinematics.quantities(mean, 1.0)[0, QUANTITIES.index("amplitude")]
+    assert found == pytest.approx(1.5, rel=0.005)
+
+
+def test_a_point_missing_for_many_frames_is_bridged_without_a_warning(noisy, recwarn):
+    points = noisy.points.copy()
+    points[30:37, 5] = np.nan
+    points[60:90, 11:13] = np.nan
+    fit.fit_midlines(dataclasses.replace(noisy.trial(), points=points))
+    assert not recwarn.list
+
+
+def inner(trial, first, last):
+    """The points ``first`` to ``last`` of a trial whose body has length 1."""
+    some = slice(first, last)
+    return dataclasses.replace(
+        trial.trial(), points=trial.points[:, some], names=trial.trial().names[some],
+        lines=trial.trial().lines[:, some], unit="m", length=1.0,
+    )  # fmt: skip
+
+
+def test_a_piece_of_a_body_is_predicted_in_its_own_unit(noisy):
+    """With and without the body's length the piece goes as far, and its interval covers what the whole body does."""
+    piece = inner(noisy, 3, 27)
+    medium = MEDIA["glass-0.3mm-loose"]
+    fits = [
+        fit.fit_midlines(x) for x in (piece, dataclasses.replace(piece, length=None))
+    ]
+    long, short = (predicted.compare(f, medium) for f in fits)
+    speed, stride = (predicted.COMPARED.index(x) for x in ("speed", "stride"))
+    assert long.predicted[speed] == pytest.approx(short.predicted[speed], rel=1e-9)
+    own = fits[1].value("length")[0]
+    for of in ("predicted", "measured"):
+        values = getattr(long, of)[stride], getattr(short, of)[stride]
+        assert values[0] == pytest.approx(own * values[1], rel=0.002)
+    efficiency = predicted.COMPARED.index("efficiency")
+    np.testing.assert_allclose(
+        long.predicted[efficiency], short.predicted[efficiency], rtol=1e-9
+    )
+    whole = fit.fit_midlines(dataclasses.replace(noisy.trial(), unit="m"))
+    k = QUANTITIES.index("speed")
+    difference = abs(long.predicted[speed] - whole.intervals.value[k])
+    assert difference < long.predicted_error[speed]
+    assert difference > short.predicted_error[speed] and not short.notes
+    assert long.ends[stride] > 0 and "80%" in long.notes[0]
+
+
 @pytest.mark.soak
 @pytest.mark.parametrize("cycles", [3.5, 8.4])
-@pytest.mark.parametrize("options", [REPEATING, USUAL, VARYING])
-def test_intervals_cover_the_truth_in_90_to_98_percent(options, cycles):
-    """Of 200 trials a share of 95 % has a standard error of 1.5 %. Turns of cycles that vary share their ends, as heading
-    is what turns: few cycles do not show that, and their intervals are too wide."""
+@pytest.mark.parametrize("options", [REPEATING, USUAL, SLOW, VARYING])
+def test_intervals_cover_the_truth_in_90_to_99_percent(options, cycles):
+    """Of 200 trials a share of 95 % has a standard error of 1.5 %. That few cycles may be alike makes intervals of others
+    too wide, and those of turns, whose ends two cycles share."""
     error, width = covered(
         GLASS, truth(GLASS, **options), range(40000, 40200), cycles, **options
     )
@@ -623,9 +715,7 @@ def test_intervals_cover_the_truth_in_90_to_98_percent(options, cycles):
         np.median(width, 0) / 1.96 / np.sqrt((error**2).mean(0)),
     )
     print(options, cycles, *zip(QUANTITIES, share.round(3), size.round(2)), sep="\n")
-    turn = QUANTITIES.index("turn")
-    assert (share >= 0.9).all() and (np.delete(share, turn) <= 0.99).all()
-    assert share[turn] <= 0.98 or (options["spread"] and size[turn] < 2.5)
+    assert (share >= 0.9).all() and ((share <= 0.99) | (size < 3)).all()
 
 
 # Prediction.
@@ -650,7 +740,7 @@ def test_the_medium_of_the_trial_predicts_it_and_another_does_not(fitted):
         and 1.5 < C.value < 2.0
         and np.isnan(gamma0.value)
     )
-    assert 0.01 < C.error < 0.3
+    assert 0.01 < C.error < 0.5
     closed = predicted.compare(fitted, dataclasses.replace(other.medium, C=C.value))
     assert closed.predicted[speed] == pytest.approx(closed.measured[speed], rel=0.02)
 
@@ -901,7 +991,7 @@ def test_the_variances_of_cycles_have_their_likelihood(constant):
         )
         prior = intervals.TRIED * scatter / (intervals.TRIED * scatter + same)
         prior = [exact, *((1 - exact) * prior / prior.sum())]
-        for correlation in (-0.5, 0.0, 0.5):
+        for correlation in intervals.ALIKE:
             alike = correlation ** apart.astype(float)
             for v, p in zip([0.0, *(intervals.TRIED * scatter)], prior):
                 covariance = contrasts.T @ (known + v * alike) @ contrasts
@@ -912,7 +1002,11 @@ def test_the_variances_of_cycles_have_their_likelihood(constant):
                     )
                 )
                 variances.append(v * alike.mean())
-    weights = np.reshape(weights, (2, -1)).T
+    weights = np.reshape(weights, (2, len(intervals.ALIKE), -1))
+    # Each quantity has the evidence of the other twice, as three deviations move both.
+    evidence = weights.sum(-1)
+    share = np.array([*intervals.ALIKE.values()]) * evidence[::-1] ** 2
+    weights = (weights * share[..., None]).reshape(2, -1).T
     np.testing.assert_allclose(found, weights / weights.sum(0), atol=1e-7)
     np.testing.assert_allclose(by_cycles, np.reshape(variances, (2, -1)).T, rtol=1e-9)
 
@@ -930,12 +1024,13 @@ def test_an_interval_has_its_share_of_the_mixture_of_normals():
     for level in (0.9, 0.95):
         found = intervals.intervals(sample, level)
         np.testing.assert_allclose(found.value, 2 * value - noisy.mean(0), rtol=1e-12)
-        np.testing.assert_allclose(found.noise, noisy.std(0, ddof=1), rtol=1e-12)
+        by_noise = noisy.var(0, ddof=1) + (0.15 * (noisy.mean(0) - value)) ** 2
+        np.testing.assert_allclose(found.noise, np.sqrt(by_noise), rtol=1e-12)
         left = np.maximum((2 * change - moved.mean(0)) ** 2 - moved.var(0, ddof=1), 0)
         np.testing.assert_allclose(found.smoothing, np.sqrt(left), rtol=1e-12)
         assert (found.smoothing > 0).sum() == 2
         weights, by_cycles = intervals._of_cycles(pseudo, noise, 0.2)
-        known = noisy.var(0, ddof=1) + left
+        known = by_noise + left
         inside = 2 * norm.cdf(found.half_width / np.sqrt(by_cycles + known)) - 1
         np.testing.assert_allclose((weights * inside).sum(0), level, atol=1e-9)
         np.testing.assert_allclose(
@@ -1497,7 +1592,7 @@ def test_a_trial_is_told_in_lines(fitted):
     )
     assert [question.units_of(pixels)[x] for x in ("frequency", "length", "speed")] == [
         "1/frame",
-        "",
+        "the file's unit",
         "BL/frame",
     ]
     metres = dataclasses.replace(

@@ -10,7 +10,7 @@ import numpy as np
 from geomech.core.variables import Result
 from geomech.measured.midlines.kinematics import QUANTITIES
 from geomech.measured.midlines.predicted import COMPARED, Closing
-from geomech.measured.midlines.question import SOURCES, units_of
+from geomech.measured.midlines.question import SOURCES, units_of, with_unit
 
 SHOWN = tuple(name for name in QUANTITIES if name not in ("drift", "arc_wavelength"))
 MORE = "per cycle, along the body and by source of error: --json, or -o FILE.nc"
@@ -87,7 +87,8 @@ def text(result: Result) -> str:
         f"with intervals of {100 * about['level']:.3g} % of cases:",
     ]
     lines += [
-        f"  {name:<12}{pair(result[name].values, result[name].error)} {units[name]}"
+        f"  {name:<12}"
+        + with_unit(pair(result[name].values, result[name].error), units[name])
         for name in SHOWN
     ]
     return "\n".join(
@@ -98,7 +99,7 @@ def text(result: Result) -> str:
 def pair(value: float, error: float) -> str:
     """Return a value and its error with as many digits as the error's first two."""
     value, error = float(value), float(error)
-    if not (math.isfinite(error) and error > 0):
+    if not (math.isfinite(error) and error > 1e-12 * abs(value)):  # rounding
         return f"{value:>10.4g}"
     digits = int(np.clip(1 - math.floor(math.log10(error)), 0, 9))
     return f"{value:>10.{digits}f} +- {error:.{digits}f}"
@@ -112,16 +113,20 @@ def _compared(c: Any, units: dict[str, str]) -> list[str]:
         apart = abs(x[0] - x[2]) / math.hypot(x[1], x[3])
         said = "they agree" if apart <= 1 else "they differ"
         lines.append(
-            f"  {name:<10}{pair(x[0], x[1]):<23} {pair(x[2], x[3]):<20} {units[name]}: {said}"
+            f"  {name:<10}{pair(x[0], x[1]):<23} "
+            + with_unit(f"{pair(x[2], x[3]):<20}", units[name]).rstrip()
+            + f": {said}"
         )
     return [*lines, *map(closing_line, c.closing)]
 
 
 def closing_line(x: Closing) -> str:
     """Return which value of a parameter gives the measured distance."""
-    scale, unit = (180 / math.pi, " deg") if x.unit == "rad" else (1.0, "")
-    present = f"{x.name} = {x.present * scale:.4g}{unit}"
+    scale, unit = (180 / math.pi, "deg") if x.unit == "rad" else (1.0, x.unit)
+    present = f"{x.name} = " + with_unit(f"{x.present * scale:.4g}", unit)
     if not math.isfinite(x.value):
         low, high = (float(f"{v * scale:.3g}") for v in (x.low, x.high))
-        return f"{present}: none from {low:g} to {high:g}{unit} gives the measured distance"
-    return f"{present}: {pair(x.value * scale, x.error * scale).strip()}{unit} gives the measured distance"
+        tried = with_unit(f"{low:g} to {high:g}", unit)
+        return f"{present}: none from {tried} gives the measured distance"
+    value = with_unit(pair(x.value * scale, x.error * scale).strip(), unit)
+    return f"{present}: {value} gives the measured distance"

@@ -24,6 +24,7 @@ EVEN = 0.7  # rad, by which the phase of few cycles may stray from a line
 LONGEST, SHORTEST = 30.0, 1e-4  # m: bodies beyond are in another unit
 MOVES = 0.02  # body lengths per cycle: below it nobody sees where a body goes
 STRETCHLESS = 0.6  # prior probability that a body keeps its length where its motion varies, assumed
+WHOLE = 0.995  # of the body's length, from which on points are taken to reach both ends
 AGREED = 1.4  # ratio of the points' length to a body length that is given, at most
 
 
@@ -51,6 +52,11 @@ class Kinematics:
     ) -> kinematics.Cycles:
         """Return the used cycles of a curve. near: as of `kinematics.Clock.phase`."""
         return used_cycles(curve, self.clock, self.marks, self.used, near)
+
+    @property
+    def own_length(self) -> float:
+        """Length of the piece of the body from its first point to its last, in the trial's unit."""
+        return float(kinematics.averages(self.cycles(self.curve)).numbers[:, 1].mean())
 
     def value(self, name: str) -> tuple[float, float]:
         """Return a quantity and half the width of its interval."""
@@ -123,7 +129,7 @@ def fit_midlines(
         curve, trial = smooth.fitted(trial.reversed(), repeat)
         clock = kinematics.clock(curve, repeat)
         marks, used = full_cycles(trial, curve, clock)
-    trial = trial.with_notes(*_notes(used))
+    trial = trial.with_notes(*_notes(used), *_ends_note(trial, curve))
     coarse = smooth.coarser(trial, curve)
     near = clock.phase(curve)
 
@@ -134,7 +140,7 @@ def fit_midlines(
         )
         return kinematics.pseudo_values(weighted, len(used))
 
-    sample = intervals.sampled(curve, coarse, values)
+    sample = intervals.sampled(curve, coarse, values, clock.of_frames(curve))
     constant = np.full(len(sample.value), intervals.CONSTANT)
     constant[kinematics.QUANTITIES.index("length")] = STRETCHLESS
     found = intervals.intervals(sample, level, constant)
@@ -306,6 +312,19 @@ def _head(
         else "the wave runs away from it; the body hardly moves"
     )
     return wave < 0, f"{ends[wave > 0]}, by the motion: {shown}"
+
+
+def _ends_note(trial: Trial, curve: smooth.Curve) -> list[str]:
+    """Note that a body has ends beyond its points."""
+    if trial.length is None:
+        return []
+    tangent = smooth.placed(curve.basis(curve.places, 1), curve.at(curve.t))
+    share = float(np.abs(tangent).mean()) / trial.length
+    if share > WHOLE:
+        return []
+    return [
+        f"the points cover {share:.0%} of the body: slip, amplitude, heading and turn are those of that piece"
+    ]
 
 
 def _notes(used: np.ndarray) -> list[str]:

@@ -4,7 +4,7 @@ The value is that of all cycles, less its mean change by noise. Its variance has
 the smooth midlines is put on them again and again, and everything is computed anew. Cycles: leaving out one after
 another gives pseudo-values, whose scatter is that of the cycles and that which noise explains; all variances of the
 former count by their likelihood. Smoothing: the change from fewer modes and fewer knots, less the part that noise
-explains, and as a series goes on that each mode more halves."""
+explains, and as a series goes on that each mode more halves (`smooth.Curve.falls`)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,16 @@ TRIED = np.geomspace(
 )  # variances of cycles over that of the pseudo-values, and over that of noise
 REPEATING = 0.5  # prior probability that all cycles repeat exactly, as a robot's
 CONSTANT = 0.2  # prior probability that a quantity repeats exactly where others do not; found by coverage
-ALIKE = -0.5, 0.0, 0.5  # correlations of neighbouring cycles
+ALIKE = {
+    -0.5: 1.0,
+    0.0: 1.0,
+    0.5: 1.0,
+    0.8: 0.2,
+}  # correlations of neighbouring cycles, and their prior shares; found by coverage
+UNSURE = 0.15  # of the bias by noise, which is found from midlines with noise; found by coverage
+FREE = (
+    3.0  # deviations of a wave (size, length, pace), which move all quantities, assumed
+)
 TINY = 1e-30  # variance below which there is rounding alone
 FURTHEST = 12.0  # standard deviations of the largest variance: more than half a width
 
@@ -67,7 +76,8 @@ def intervals(
     from scipy.special import ndtr, ndtri
 
     by_noise = sample.noisy - sample.value
-    noise = by_noise.var(0, ddof=1)
+    bias = by_noise.mean(0)
+    noise = by_noise.var(0, ddof=1) + (UNSURE * bias) ** 2
     unbiased = 2 * sample.change - sample.noisy_change.mean(0)
     cut_off = np.maximum(unbiased**2 - sample.noisy_change.var(0, ddof=1), 0.0)
     known = np.maximum(noise + cut_off, 1e-300)
@@ -84,7 +94,7 @@ def intervals(
             low, high = np.where(inside, middle, low), np.where(inside, high, middle)
         half_width = high
     cycles = np.maximum((half_width / ndtri((1 + level) / 2)) ** 2 - known, 0.0)
-    value = sample.value - by_noise.mean(0)
+    value = sample.value - bias
     return Intervals(
         value, *np.sqrt((cycles, noise, cut_off)), half_width, sample.pseudo
     )
@@ -97,8 +107,8 @@ def _of_cycles(
 
     The weights are the likelihood of the contrasts between cycles times a prior: v = 0 if `_repeating` or ``constant``,
     else the density of the cycles' variance v is 1/(v + noise); neighbours are correlated by one of ALIKE, as cycles k
-    apart by its k-th power. Noise is correlated between neighbours, too: what ends one cycle too far begins the next
-    too late."""
+    apart by its k-th power, and which one all quantities tell together. Noise is correlated between neighbours, too:
+    what ends one cycle too far begins the next too late."""
     count = len(values)
     apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
     contrasts = np.linalg.qr(np.column_stack([np.ones(count), np.eye(count)[:, 1:]]))[
@@ -124,7 +134,7 @@ def _of_cycles(
     prior = variances[1:] / (variances[1:] + same)  # times v, as TRIED is geometric
     prior = np.vstack([exact + 0 * scatter, (1 - exact) * prior / prior.sum(0)])
     likelihood, by_cycles = [], []
-    for correlation in np.power.outer(ALIKE, apart):
+    for correlation in np.power.outer([*ALIKE], apart):
         sizes, axes = np.linalg.eigh(
             whitening @ correlation @ whitening.transpose(0, 2, 1)
         )
@@ -132,7 +142,14 @@ def _of_cycles(
         spread = 1 + variances[..., None] * sizes
         likelihood.append(-0.5 * (np.log(spread) + square / spread).sum(-1))
         by_cycles.append(variances * correlation.mean())
-    weights = prior * np.exp(likelihood - np.max(likelihood, (0, 1)))
+    likelihood = np.array(likelihood)
+    weights = prior * np.exp(likelihood - likelihood.max((0, 1)))
+    # How alike neighbours are, all quantities show together, as few deviations move all of them.
+    evidence = np.log(np.maximum(weights.sum(1), 1e-300))
+    others = evidence.sum(1, keepdims=True) - evidence
+    pooled = (FREE - 1) / max(len(scatter) - 1, 1) * others
+    shares = np.array([*ALIKE.values()])[:, None]
+    weights = weights * (shares * np.exp(pooled - pooled.max(0)))[:, None]
     return tuple(
         x.reshape(-1, len(scatter))
         for x in (weights / weights.sum((0, 1)), np.array(by_cycles))
@@ -158,28 +175,36 @@ def sampled(
     curve: smooth.Curve,
     coarse: smooth.Curve,
     values: Values,
+    phase: np.ndarray,
     resampled: int | None = None,
     seed: int = 0,
 ) -> Sample:
     """Return the quantities of a curve, and the same with noise put on once more, as often as ``resampled`` or RESAMPLED.
 
-    coarse: the same `smooth.coarser`. values: returns quantities (Q,) and pseudo-values (C, Q) of a curve."""
-    (value, pseudo), noisy, changes = values(curve), [], []
-    rest = 1 / (
-        2 ** (curve.modes - coarse.modes) - 1
-    )  # of a series that halves with each mode
+    coarse: the same `smooth.coarser`. values: returns quantities (Q,) and pseudo-values (C, Q) of a curve. phase: (F,),
+    of the frames, rad."""
+    value, pseudo = values(curve)
+    coarse_value = values(coarse)[0]
+    # Noise is put on a curve with little of it, as on one with noise it does more than it did to the body: the slip, an
+    # absolute value, is raised by little where the body slips by more than noise.
+    base = curve.repeating(phase)
+    base_value, base_pseudo = values(base)
+    # What is left of a geometric series.
+    rest = 1 / (curve.falls ** (curve.modes - coarse.modes) - 1)
+    change = rest * (value - coarse_value)
+    noisy, noisy_pseudo, noisy_change = [], [], []
     for k in range(RESAMPLED if resampled is None else resampled):
-        one, other = (
-            c.noisy(np.random.default_rng((seed, k))) for c in (curve, coarse)
-        )
-        noisy.append(values(one))
-        changes.append(rest * (noisy[-1][0] - values(other)[0]))
-    each, every = (np.array([x[k] for x in noisy]) for k in (0, 1))
+        each, each_pseudo = values(base.noisy(np.random.default_rng((seed, k))))
+        by_noise = each - base_value
+        other = values(coarse.noisy(np.random.default_rng((seed, k))))[0] - coarse_value
+        noisy.append(value + by_noise)
+        noisy_pseudo.append(pseudo + each_pseudo - base_pseudo)
+        noisy_change.append(change + rest * (by_noise - other))
     return Sample(
         value,
         pseudo,
-        each,
-        every,
-        rest * (value - values(coarse)[0]),
-        np.array(changes),
+        np.array(noisy),
+        np.array(noisy_pseudo),
+        change,
+        np.array(noisy_change),
     )

@@ -14,7 +14,7 @@ import numpy as np
 from geomech.measured.midlines.smooth import NODES, Curve, placed
 
 PHASES = 48  # of a cycle
-PLACES = 12  # along the body, whose headings make the phase
+PLACES = 12  # along the MIDDLE of the body, whose headings make the phase
 QUANTITIES = (
     "frequency", "length", "speed", "stride", "heading", "drift", "turn", "slip", "efficiency", "amplitude", "wavelength",
     "arc_wavelength",
@@ -24,7 +24,7 @@ WAVES = np.arange(0.3, 8.001, 0.05)  # wave numbers that are tried, per body
 MIDDLE = (
     0.1,
     0.9,
-)  # of the body, where the wave is fitted: slopes at its ends have most noise
+)  # of the body, where wave and phase are found: slopes at its ends have most noise
 STANDING = (
     0.15  # second over first principal size of the headings, below which a wave stands
 )
@@ -51,15 +51,18 @@ class Clock:
             else near + np.angle(z * np.exp(-1j * near))
         )
 
+    def of_frames(self, curve: Curve) -> np.ndarray:
+        """Return the phase (F,) of a curve at the frames, rad, which grows."""
+        phase = np.maximum.accumulate(self.phase(curve))
+        return np.interp(curve.t, self.t, phase)
+
 
 def relative_headings(curve: Curve, t: np.ndarray) -> np.ndarray:
-    """Return headings (T, PLACES) along the body at times t, less their mean, rad."""
-    heading = np.unwrap(
-        np.angle(
-            placed(curve.basis((np.arange(PLACES) + 0.5) / PLACES, 1), curve.at(t))
-        ),
-        axis=1,
-    )
+    """Return headings (T, PLACES) along the MIDDLE of the body at times t, less their mean, rad."""
+    first, last = MIDDLE
+    places = first + (last - first) * (np.arange(PLACES) + 0.5) / PLACES
+    tangent = placed(curve.basis(places, 1), curve.at(t))
+    heading = np.unwrap(np.angle(tangent), axis=1)
     return heading - heading.mean(1, keepdims=True)
 
 
@@ -144,13 +147,13 @@ class Averages(NamedTuple):
     """What is averaged over cycles, the first axis of each.
 
     numbers: (C, 7): time, own length, distance, drift, mean heading of all cycles, turn, mean cosine of headings. first:
-    (C, NODES), first harmonic of headings over the cycle, complex. slip: (C, NODES), mean over the cycle. lateral:
-    (C, PHASES, NODES), place across the path."""
+    (C, NODES), first harmonic of headings over the cycle, complex. slip: (C, NODES), mean over the cycle. width:
+    (C, NODES), range across the path."""
 
     numbers: np.ndarray
     first: np.ndarray
     slip: np.ndarray
-    lateral: np.ndarray
+    width: np.ndarray
 
     def weighted(self, weights: np.ndarray) -> Averages:
         """Return averages with weights (R, C)."""
@@ -177,7 +180,10 @@ def averages(c: Cycles) -> Averages:
     lateral = ((c.place - path[..., None]) * np.exp(-1j * course)[..., None]).imag
     slip = np.minimum(slip, np.pi - slip).mean(1)
     return Averages(
-        np.stack(numbers, -1), np.exp(-2j * np.pi * _share()) @ relative, slip, lateral
+        np.stack(numbers, -1),
+        np.exp(-2j * np.pi * _share()) @ relative,
+        slip,
+        np.ptp(lateral, axis=1),
     )
 
 
@@ -190,18 +196,15 @@ def quantities(
     lengths. frequency: 1/time. stride: distance of the mean frame per cycle in body lengths. drift: direction of the
     way less the mean heading of the body. heading: direction of the way in the world, drift and mean heading of all
     cycles; how the body wanders between cycles is no error of it. turn: of the body in a cycle. slip: mean angle
-    between body and velocity. efficiency: distance over wavelength. amplitude: half the range across the path, mean
-    over the body. wavelength: along the path; arc_wavelength: along the body; body lengths."""
+    between body and velocity. efficiency: distance over wavelength. amplitude: half the range across the path of each
+    cycle, mean over the body. wavelength: along the path; arc_wavelength: along the body; body lengths."""
     time, own, distance, drift, axis, turn, cosine = a.numbers.T
     body = own if length is None else np.full_like(own, length)
     arc = own * arc_waves(a.first)
     wavelength = arc * cosine
     slip = a.slip.reshape(len(a.slip), PARTS, -1).mean(-1)
-    amplitude = (
-        np.ptp(a.lateral, axis=1).reshape(slip.shape[0], PARTS, -1).mean(-1)
-        / 2
-        / body[:, None]
-    )
+    width = a.width.reshape(len(a.width), PARTS, -1).mean(-1)
+    amplitude = width / 2 / body[:, None]
     numbers = np.stack(
         [
             1 / time, body, distance / time / (1.0 if absolute else body), distance / body, axis + drift,

@@ -48,7 +48,8 @@ class Closing:
 class Comparison:
     """Quantities of COMPARED, measured and predicted, with half widths of intervals, (Q,) each, and what would close the gap.
 
-    per_cycle: predicted (C, Q), pseudo-values."""
+    per_cycle: predicted (C, Q), pseudo-values. ends: (Q,), what ends of the body that have no points may change of the
+    prediction at most; the intervals contain it. notes: what was taken for granted."""
 
     medium: Any
     measured: np.ndarray
@@ -57,11 +58,15 @@ class Comparison:
     predicted_error: np.ndarray
     per_cycle: np.ndarray
     closing: tuple[Closing, ...]
+    ends: np.ndarray | None = None
+    notes: tuple[str, ...] = ()
 
 
 def compare(fit: Kinematics, medium: Any, effects: tuple = ()) -> Comparison:
-    """Return the measured motion beside that of the measured shapes in a medium. effects: of the scene, such as drag on
-    the head."""
+    """Return the measured motion beside that of the measured shapes in a medium.
+
+    The body that moves is the piece from the first point to the last, and its motion is told in the unit of the
+    measured one. effects: of the scene, such as drag on the head; their lengths are in lengths of that piece."""
     swimmer = Swimmer(medium, Backbone(ELEMENTS), effects)
     near = fit.clock.phase(fit.curve)
 
@@ -76,39 +81,58 @@ def compare(fit: Kinematics, medium: Any, effects: tuple = ()) -> Comparison:
 
         return of
 
-    sample = intervals.sampled(fit.curve, fit.coarse, values(swimmer), RESAMPLED)
+    phase = fit.clock.of_frames(fit.curve)
+    sample = intervals.sampled(fit.curve, fit.coarse, values(swimmer), phase, RESAMPLED)
     found = intervals.intervals(sample, fit.level)
     finer = (
         values(Swimmer(medium, Backbone(2 * ELEMENTS), effects))(fit.curve)[0]
         - sample.value
     )
+    ends = _by_ends(fit, swimmer, sample.value)
     k = [QUANTITIES.index(name) for name in COMPARED]
-    predicted_error = np.hypot(found.half_width, finer)
+    predicted_error = np.sqrt(found.half_width**2 + finer**2 + ends**2)
     measured, error = fit.intervals.value[k], fit.intervals.half_width[k]
     value = found.value + 4 / 3 * finer  # elements are chords: errors of order 2
     comparison = Comparison(
-        medium, measured, error, value, predicted_error, found.per_cycle, ()
+        medium,
+        measured,
+        error,
+        value,
+        predicted_error,
+        found.per_cycle,
+        (),
+        ends,
+        _notes(fit, value, ends),
     )
     return replace(comparison, closing=_closing(comparison, swimmer, fit, effects))
 
 
 def _predicted(
-    swimmer: Swimmer, cycles: kinematics.Cycles, weights: np.ndarray, fit: Kinematics
+    swimmer: Swimmer,
+    cycles: kinematics.Cycles,
+    weights: np.ndarray,
+    fit: Kinematics,
+    tail: float = 0.0,
+    head: float = 0.0,
+    straight: bool = False,
 ) -> np.ndarray:
-    """Return COMPARED (R, Q) of the mean cycles with weights (R, C)."""
-    each = kinematics.averages(cycles)
-    time, own, _, _, axis, _, cosine = each.weighted(weights).numbers.T
+    """Return COMPARED (R, Q) of the mean cycles with weights (R, C).
+
+    tail, head: lengths of the ends without points that the body has beyond the piece, over that of the piece. straight:
+    they follow the piece's ends, else they go on with its wave."""
+    each = kinematics.averages(cycles).weighted(weights)
+    time, own, _, _, axis, _, cosine = each.numbers.T
     body = own if fit.trial.length is None else np.full_like(own, fit.trial.length)
-    alpha, alphadot = _bends(cycles, weights, swimmer.joints + 1)
+    alpha, alphadot = _bends(cycles, weights, swimmer.joints + 1, tail, head, straight)
     xi = swimmer.velocity(alpha, alphadot)
     net = displacement(xi)
     slip = swimmer.work(alpha, alphadot, xi).slip.mean(-1)
     net_in_mean_axis = _about_mean(xi, net)
-    stride = np.hypot(net[:, 0], net[:, 1])
-    wavelength = (
-        own / body * cosine * kinematics.arc_waves(each.weighted(weights).first)
-    )
-    speed = stride / time * (body if fit.trial.unit == "m" else 1.0)
+    # The balance is that of a body of length 1, the piece with its ends.
+    distance = np.hypot(net[:, 0], net[:, 1]) * own * (1 + tail + head)
+    stride = distance / body
+    wavelength = own / body * cosine * kinematics.arc_waves(each.first)
+    speed = distance / time / (1.0 if fit.trial.unit == "m" else body)
     return np.stack(
         [speed, stride, axis + net_in_mean_axis, net[:, 2], slip, stride / wavelength],
         -1,
@@ -124,18 +148,70 @@ def _about_mean(xi: np.ndarray, net: np.ndarray) -> np.ndarray:
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
+def _by_ends(fit: Kinematics, swimmer: Swimmer, piece: np.ndarray) -> np.ndarray:
+    """Return how much ends of the body without points may change the prediction (Q,) of the piece between them.
+
+    The missing length is put at the tail, at the head, or half at each, and it goes on with the wave or is straight:
+    the largest change of these six."""
+    missing = _missing(fit)
+    if not missing:
+        return np.zeros_like(piece)
+    cycles = fit.cycles(fit.curve)
+    weights = np.full((1, len(fit.used)), 1 / len(fit.used))
+    changes = []
+    for at_tail in (0.0, 0.5, 1.0):
+        for straight in (False, True):
+            tail = at_tail * missing
+            head = (1 - at_tail) * missing
+            longer = _predicted(swimmer, cycles, weights, fit, tail, head, straight)
+            changes.append(np.abs(longer[0] - piece))
+    return np.max(changes, 0)
+
+
+def _missing(fit: Kinematics) -> float:
+    """Return the length of the body beyond its points, over that of the piece between them."""
+    if fit.trial.length is None:
+        return 0.0
+    return max(0.0, fit.trial.length / fit.own_length - 1)
+
+
+def _notes(fit: Kinematics, predicted: np.ndarray, ends: np.ndarray) -> tuple[str, ...]:
+    missing = _missing(fit)
+    if not missing:
+        return ()
+    stride = COMPARED.index("stride")
+    change = ends[stride] / predicted[stride]
+    return (
+        f"the prediction is that of the piece of the body that has points, {1 / (1 + missing):.0%} of it: "
+        f"the ends may change the distance by {change:.1%} at most, which its interval contains",
+    )
+
+
 def _bends(
-    cycles: kinematics.Cycles, weights: np.ndarray, elements: int
+    cycles: kinematics.Cycles,
+    weights: np.ndarray,
+    elements: int,
+    tail: float = 0.0,
+    head: float = 0.0,
+    straight: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return bends and their rates (R, PHASES, elements - 1) of mean cycles, by HARMONICS harmonics."""
-    spectrum = np.fft.rfft(np.tensordot(weights, cycles.headings, 1), axis=1)[
-        :, : HARMONICS + 1
-    ]
+    """Return bends and their rates (R, PHASES, elements - 1) of mean cycles, by HARMONICS harmonics.
+
+    tail, head, straight: as of `_predicted`; a wave that goes on has the time course of the end, later by its length."""
+    headings = np.tensordot(weights, cycles.headings, 1)
+    spectrum = np.fft.rfft(headings, axis=1)[:, : HARMONICS + 1]
     wave = np.arange(HARMONICS + 1)[:, None]
-    restored = lambda s: np.fft.irfft(s, PHASES, axis=1)
-    places = (np.arange(elements) + 0.5) / elements
-    between = lambda x: np.diff(_at(x, places), axis=-1)
-    return between(restored(spectrum)), between(restored(1j * wave * spectrum))
+    places = (np.arange(elements) + 0.5) / elements * (1 + tail + head) - tail
+    inside = np.clip(places, 0.0, 1.0)
+    spectrum = _at(spectrum, inside)
+    if (tail or head) and not straight:
+        first = kinematics.averages(cycles).weighted(weights).first
+        turns = kinematics.wave_sign(first.mean(0)) / kinematics.arc_waves(first)
+        later = 2j * np.pi * turns[:, None, None] * wave * (places - inside)
+        spectrum = spectrum * np.exp(later)
+    alpha = np.fft.irfft(np.diff(spectrum), PHASES, axis=1)
+    alphadot = np.fft.irfft(np.diff(1j * wave * spectrum), PHASES, axis=1)
+    return alpha, alphadot
 
 
 def _at(headings: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -163,11 +239,14 @@ def _closing(
     present, wanted = comparison.predicted[1], comparison.measured[1]
     error = math.hypot(comparison.measured_error[1], comparison.predicted_error[1])
 
+    # The balance is in lengths of the piece that has points.
+    share = 1.0 if fit.trial.length is None else fit.own_length / fit.trial.length
+
     def stride(medium: Any) -> float:
         net = displacement(
             Swimmer(medium, swimmer.body, effects).velocity(alpha, alphadot)
         )
-        return float(np.hypot(net[0, 0], net[0, 1]))
+        return share * float(np.hypot(net[0, 0], net[0, 1]))
 
     offset = present - stride(swimmer.medium)  # of elements and noise, the same for all
     found = []

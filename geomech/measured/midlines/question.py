@@ -27,7 +27,7 @@ LABELS = {
     "turn": "turn of the body per cycle",
     "slip": "mean angle between body and velocity",
     "efficiency": "wave efficiency: distance per cycle over wavelength",
-    "amplitude": "half the range across the way, mean over the body",
+    "amplitude": "half the range across the way of each cycle, mean over the body",
     "wavelength": "along the way",
     "arc_wavelength": "along the body",
 }
@@ -75,11 +75,28 @@ class Midlines(Question):
 def units_of(fit: Kinematics) -> dict[str, str]:
     """Return the unit of each quantity."""
     time, length = fit.trial.unit_of_time, fit.trial.unit
+    speed = "m" if length == "m" else "BL"
     return {
-        "frequency": "Hz" if time == "s" else "1/frame", "length": length, "speed": f"{'m' if length == 'm' else 'BL'}/{time}",
-        "stride": "BL", "heading": "rad", "drift": "rad", "turn": "rad", "slip": "rad", "efficiency": "1", "amplitude": "BL",
-        "wavelength": "BL", "arc_wavelength": "BL",
-    }  # fmt: skip
+        "frequency": "Hz" if time == "s" else "1/frame",
+        "length": fit.trial.unit_of_length,
+        "speed": f"{speed}/{time}",
+        "stride": "BL",
+        "heading": "rad",
+        "drift": "rad",
+        "turn": "rad",
+        "slip": "rad",
+        "efficiency": "1",
+        "amplitude": "BL",
+        "wavelength": "BL",
+        "arc_wavelength": "BL",
+    }
+
+
+def with_unit(words: str, unit: str) -> str:
+    """Return a value in words with its unit; a pure number has none."""
+    if unit in ("", "1", "-"):
+        return words
+    return f"{words} {unit}"
 
 
 def result_of(fit: Kinematics, comparison: Comparison | None = None) -> Result:
@@ -201,4 +218,5 @@ def _about(fit: Kinematics, comparison: Comparison | None) -> dict[str, Any]:
     }
     if comparison is not None:
         about["medium"] = type(comparison.medium).__name__.lower()
-    return {**about, "notes": trial.notes}
+    notes = trial.notes if comparison is None else trial.notes + comparison.notes
+    return {**about, "notes": notes}

@@ -31,7 +31,18 @@ def checked(trial: Trial, mend: bool) -> Trial:
 
 def usual_chords(points: np.ndarray) -> np.ndarray:
     """Return the usual distances (P - 1,) between neighbouring points."""
-    return np.nanmedian(np.hypot(*np.moveaxis(np.diff(points, axis=1), -1, 0)), 0)
+    return _median(np.hypot(*np.moveaxis(np.diff(points, axis=1), -1, 0)), 0)
+
+
+def _median(values: np.ndarray, axis: int) -> np.ndarray:
+    """Return the median of what is not nan; nan, without a warning of NumPy's, where there is nothing else."""
+    ordered = np.sort(values, axis)  # nan comes last
+    known = np.expand_dims((~np.isnan(values)).sum(axis), axis)
+    low = np.take_along_axis(ordered, np.maximum(known - 1, 0) // 2, axis)
+    high = np.take_along_axis(
+        ordered, np.minimum(known // 2, values.shape[axis] - 1), axis
+    )
+    return ((low + high) / 2).squeeze(axis)
 
 
 def _check_points(trial: Trial) -> None:
@@ -106,7 +117,7 @@ def _check_order(trial: Trial) -> None:
         np.diff(trial.points, axis=1)[..., 0]
         + 1j * np.diff(trial.points, axis=1)[..., 1]
     )
-    forth = np.nanmedian(np.cos(np.angle(chord[:, 1:]) - np.angle(chord[:, :-1])), 0)
+    forth = _median(np.cos(np.angle(chord[:, 1:]) - np.angle(chord[:, :-1])), 0)
     if forth.min() < -0.5:
         k = int(forth.argmin())
         raise trial.wrong(
@@ -121,7 +132,9 @@ def _rotated(trial: Trial, mend: bool) -> Trial:
     x = trial.points
     distance = np.nanmean(np.hypot(*np.moveaxis(x[1:] - x[:-1], -1, 0)), 1)
     other = np.nanmean(np.hypot(*np.moveaxis(x[1:, ::-1] - x[:-1], -1, 0)), 1)
-    flips = (other < REVERSED * distance) & (distance > 0.2 * usual_chords(x).sum())
+    flips = (other < REVERSED * distance) & (
+        distance > 0.2 * np.nansum(usual_chords(x))
+    )
     state = np.concatenate([[False], np.cumsum(flips) % 2 == 1])
     if state.mean() > 0.5:
         state = ~state
@@ -150,12 +163,11 @@ def _without_jumps(trial: Trial, mend: bool) -> Trial:
         neighbour[
             np.abs(np.roll(trial.t, k) - trial.t) > NEAR * np.median(np.diff(trial.t))
         ] = np.nan
-    with np.errstate(all="ignore"):
-        expected = np.nanmedian(around, 0)
-        moves = np.nanmedian(np.hypot(*np.moveaxis(around - expected, -1, 0)), 0)
+    expected = _median(around, 0)
+    moves = _median(np.hypot(*np.moveaxis(around - expected, -1, 0)), 0)
     distance = np.hypot(*np.moveaxis(x - expected, -1, 0))
-    usual = np.nanmedian(distance, 0)
-    least = LEAST_JUMP * usual_chords(x).sum()
+    usual = _median(distance, 0)
+    least = LEAST_JUMP * np.nansum(usual_chords(x))
     bad = distance > np.maximum(np.maximum(JUMP * usual, least), MOVES * moves)
     if not bad.any():
         return trial
@@ -195,7 +207,7 @@ def _jump(
                 point,
                 instead=cure,
             )
-    size = distance[frame, point] / usual_chords(trial.points).sum()
+    size = distance[frame, point] / np.nansum(usual_chords(trial.points))
     return trial.wrong(
         f"it jumps by {size:.2g} body lengths from where it is in the frames around",
         frame,

@@ -24,10 +24,22 @@ DEGREE = (
 KNOTS = (6, 7, 8, 10, 12, 14, 16, 20, 24, 32)  # per cycle, that are tried
 MODES = 4, 14  # of x and of y along the body, that are tried
 SAFE = 2.2  # times the root of the number of points: more modes through equal distances oscillate at the ends (Runge)
+EVEN = 0.95  # of the polynomials' argument where more modes are needed: with it 18 modes through 22 points are stable
+EVENER = 2  # modes more of that argument, which are as fine for one wave as plain ones
+FALLS = 2.0  # factor by which each mode more lessens what is cut off, assumed
+FALLS_EVEN = (
+    1.5  # the same of that argument; measured on slopes of one wave, 10 to 18 modes
+)
+MOST_EVEN = (
+    0.85,
+    30,
+)  # modes over points, and modes, at most, of polynomials of that argument
 MORE = 3  # modes than by cross-validation
 CLOSER = 1.5  # ratio of its distance between knots to the one taken
+CERTAIN = 4.0  # standard deviations of a correlation by noise, beyond which it is none
 PASSES = 3  # of finding where along the body the points lie
 ALIKE = 0.9  # correlation of noise between frames, at most
+HARMONICS = 10  # of a motion that repeats
 NODES = 30  # places along the body at which a curve is evaluated
 
 
@@ -35,7 +47,8 @@ NODES = 30  # places along the body at which a curve is evaluated
 class Curve:
     """Smooth midlines x(s, t) of a trial.
 
-    s: (P,), places of the points, 0 to 1. modes, step: the number of modes, and of rows between knots. knots: (K,).
+    s: (P,), places of the points, 0 to 1. modes, step: the number of modes, and of rows between knots. even: as of
+    `_polynomials`. knots: (K,).
     coefficients: (K - DEGREE - 1, modes, 2). residual: (F, modes, 2), noise of the modes in the rows, orthonormal over
     the points. noise: standard deviation of x and y of a point. alike: correlation of noise between frames. triangle:
     (modes, modes), from Legendre coefficients to orthonormal ones. solver: of the least squares in time."""
@@ -44,6 +57,7 @@ class Curve:
     s: np.ndarray
     modes: int
     step: int
+    even: float
     knots: np.ndarray
     coefficients: np.ndarray
     residual: np.ndarray
@@ -60,7 +74,14 @@ class Curve:
 
     def basis(self, s: np.ndarray, order: int = 0) -> np.ndarray:
         """Return what multiplies orthonormal coefficients at places s (S, modes), or its derivative by s."""
-        return _legendre(s, self.modes, order) @ np.linalg.inv(self.triangle)
+        return _polynomials(s, self.modes, order, self.even) @ np.linalg.inv(
+            self.triangle
+        )
+
+    @property
+    def falls(self) -> float:
+        """Factor by which each mode more lessens what is cut off."""
+        return FALLS_EVEN if self.even else FALLS
 
     @cached_property
     def places(self) -> np.ndarray:
@@ -78,6 +99,25 @@ class Curve:
             self, coefficients=self.coefficients + self.solver(_alike(rows, self.alike))
         )
 
+    def repeating(self, phase: np.ndarray) -> Curve:
+        """Return the curve with little of the noise: the part of its motion that follows the phase (F,) of the frames, rad.
+
+        Its mean over a cycle and its first harmonic may vary from one cycle to the next; the HARMONICS above repeat."""
+        from scipy.interpolate import BSpline
+
+        turns = max(1, round((phase[-1] - phase[0]) / (2 * np.pi)))
+        inner = np.linspace(phase.min(), phase.max(), turns + 1)
+        knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
+        slow = BSpline.design_matrix(phase, knots, 3).toarray()
+        most = int(min(HARMONICS, len(phase) / turns / 2 - 1))
+        at = np.arange(2, most + 1) * phase[:, None]
+        first = [slow * np.cos(phase)[:, None], slow * np.sin(phase)[:, None]]
+        columns = np.hstack([slow, *first, np.cos(at), np.sin(at)])
+        rows = self.at(self.t).reshape(len(phase), -1)
+        found = columns @ np.linalg.lstsq(columns, rows, rcond=None)[0]
+        found = found.reshape(len(phase), self.modes, 2)
+        return replace(self, coefficients=self.solver(found))
+
 
 def _alike(rows: np.ndarray, correlation: float) -> np.ndarray:
     """Return rows (F, ...) of the variance of independent ones, k apart correlated by the k-th power of a number."""
@@ -94,12 +134,25 @@ def placed(basis: np.ndarray, z: np.ndarray) -> np.ndarray:
     return (z @ [1.0, 1j]) @ basis.T
 
 
-def _legendre(s: np.ndarray, modes: int, order: int) -> np.ndarray:
-    """Return Legendre polynomials (S, modes) of 2 s - 1, or their derivatives by s."""
+def _polynomials(
+    s: np.ndarray, modes: int, order: int, even: float = 0.0
+) -> np.ndarray:
+    """Return Legendre polynomials (S, modes) of u at places s, or their derivatives by s.
+
+    u = 2 s - 1, or, if ``even`` is above 0, sin(a (2 s - 1)) / even with a = arcsin(even): equal distances in s are
+    then small at the ends in u, as those of stable polynomials are, and a wave needs three modes in place of four and
+    more. Source: Kosloff and Tal-Ezer, J. Comput. Phys. 104, 457 (1993)."""
     identity = np.eye(modes)
-    if order:
-        identity = legendre.legder(identity, order, axis=0) * 2.0**order
-    return legendre.legvander(2 * s - 1, len(identity) - 1) @ identity
+    u = 2 * s - 1
+    rate = np.full_like(u, 2.0)
+    if even:
+        angle = np.arcsin(even) * u
+        u = np.sin(angle) / even
+        rate = 2 * np.arcsin(even) / even * np.cos(angle)
+    if not order:
+        return legendre.legvander(u, modes - 1)
+    slopes = legendre.legder(identity, 1, axis=0)
+    return rate[:, None] * (legendre.legvander(u, modes - 2) @ slopes)
 
 
 class Solver:
@@ -142,7 +195,8 @@ def crude(trial: Trial) -> np.ndarray:
     s = _chord_places(trial.points)
     z, triangle, _ = projected(trial.points, s, min(6, len(s) - 1))
     places = (np.arange(8) + 0.5) / 8
-    tangent = placed(_legendre(places, len(triangle), 1) @ np.linalg.inv(triangle), z)
+    slope = _polynomials(places, len(triangle), 1) @ np.linalg.inv(triangle)
+    tangent = placed(slope, z)
     heading = np.unwrap(np.angle(tangent), axis=1)
     return heading - heading.mean(1, keepdims=True)
 
@@ -154,11 +208,11 @@ def _chord_places(points: np.ndarray) -> np.ndarray:
 
 
 def projected(
-    points: np.ndarray, s: np.ndarray, modes: int
+    points: np.ndarray, s: np.ndarray, modes: int, even: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return orthonormal coefficients (F, modes, 2) of frames, what makes them from Legendre's, and what they leave of
-    the frames (F, P, 2)."""
-    q, triangle = np.linalg.qr(_legendre(s, modes, 0))
+    """Return orthonormal coefficients (F, modes, 2) of frames, what makes them from those of `_polynomials`, and what
+    they leave of the frames (F, P, 2)."""
+    q, triangle = np.linalg.qr(_polynomials(s, modes, 0, even))
     z = q.T @ points
     return z, triangle, points - q @ z
 
@@ -184,19 +238,29 @@ def fitted(trial: Trial, period: float) -> tuple[Curve, Trial]:
     midlines where points were missing."""
     s = _chord_places(trial.points)
     rows = len(trial.t) * period / (trial.t[-1] - trial.t[0])
-    most = min(MODES[1], int(SAFE * np.sqrt(len(s))), len(s) - 1)
     solvers = {
         k: Solver(trial.t, k) for k in sorted({max(2, round(rows / n)) for n in KNOTS})
     }
-    modes, step = _chosen(trial, s, most, solvers)
+    even, modes, step = _chosen(trial, s, solvers, period)
     for _ in range(PASSES):
-        curve = _curve(trial, s, modes, step, solvers[step])
+        curve = _curve(trial, s, modes, step, solvers[step], even)
         trial = _completed(trial, curve)
         s = _arc_places(curve, s)
-    modes, step = _chosen(trial, s, most, solvers)
-    return curve_of(
-        trial, s, min(modes + MORE, most), max(2, round(step / CLOSER))
-    ), trial
+    even, modes, step = _chosen(trial, s, solvers, period)
+    most = _most(len(s))
+    if not even and modes + MORE > most[even] and most[EVEN] > most[even]:
+        # Plain ones oscillate at the ends; as fine ones of an even argument are EVENER more.
+        even = EVEN
+        modes += EVENER
+    modes = min(modes + MORE, most[even])
+    return curve_of(trial, s, modes, max(2, round(step / CLOSER)), even), trial
+
+
+def _most(points: int) -> dict[float, int]:
+    """Return how many modes so many points bear, by the argument ``even`` of `_polynomials`."""
+    plain = min(MODES[1], int(SAFE * np.sqrt(points)), points - 1)
+    share, most = MOST_EVEN
+    return {0.0: plain, EVEN: max(plain, min(most, int(share * points)))}
 
 
 def _completed(trial: Trial, curve: Curve) -> Trial:
@@ -212,44 +276,94 @@ def _completed(trial: Trial, curve: Curve) -> Trial:
 def coarser(trial: Trial, curve: Curve) -> Curve:
     """Return the curve with fewer modes and knots, whose difference from it shows what smoothing cuts off."""
     modes = max(curve.modes - MORE, min(MODES[0], curve.modes - 1))
-    return curve_of(trial, curve.s, modes, round(CLOSER * curve.step))
+    return curve_of(trial, curve.s, modes, round(CLOSER * curve.step), curve.even)
 
 
-def curve_of(trial: Trial, s: np.ndarray, modes: int, step: int) -> Curve:
-    """Return the curve with these places of points (P,), modes, and rows between knots."""
-    return _curve(trial, s, modes, step, Solver(trial.t, step))
+def curve_of(
+    trial: Trial, s: np.ndarray, modes: int, step: int, even: float = 0.0
+) -> Curve:
+    """Return the curve with these places of points (P,), modes, and rows between knots. even: as of `_polynomials`."""
+    return _curve(trial, s, modes, step, Solver(trial.t, step), even)
 
 
 def _chosen(
-    trial: Trial, s: np.ndarray, most: int, solvers: dict[int, Solver]
-) -> tuple[int, int]:
-    """Return modes and rows between knots of the least generalised cross-validation."""
-    z, _, left = projected(trial.points, s, most)
+    trial: Trial, s: np.ndarray, solvers: dict[int, Solver], period: float
+) -> tuple[float, int, int]:
+    """Return the argument of the polynomials, modes and rows between knots.
+
+    They are those of the least generalised cross-validation among plain polynomials, unless what these leave of the
+    frames repeats: then as many of an even argument as leave nothing that repeats. Noise that is alike from frame to
+    frame would have cross-validation take all modes."""
+    plain, most = _most(len(s)).values()
+    _, modes, step = _least(
+        trial, s, solvers, 0.0, range(min(MODES[0], plain), plain + 1)
+    )
+    if not _repeats(trial, projected(trial.points, s, plain)[2], plain, period):
+        return 0.0, modes, step
+    modes = plain
+    while modes < most:
+        modes += 1
+        left = projected(trial.points, s, modes, EVEN)[2]
+        if not _repeats(trial, left, modes, period):
+            break
+    return EVEN, *_least(trial, s, solvers, EVEN, range(modes, modes + 1))[1:]
+
+
+def _least(
+    trial: Trial, s: np.ndarray, solvers: dict[int, Solver], even: float, tried: range
+) -> tuple[float, int, int]:
+    """Return the least score of generalised cross-validation, its modes, and its rows between knots."""
+    z, _, left = projected(trial.points, s, tried[-1], even)
     count = trial.known
-    scores = {}
+    scores = []
     for step, solver in solvers.items():
-        square = (
-            (z - solver.smoothed(z.reshape(len(z), -1)).reshape(z.shape)) ** 2
-        ).sum((0, 2))
-        for modes in range(min(MODES[0], most), most + 1):
+        smoothed = solver.smoothed(z.reshape(len(z), -1)).reshape(z.shape)
+        square = ((z - smoothed) ** 2).sum((0, 2))
+        for modes in tried:
             residual = (
                 (left**2).sum() + square[:modes].sum() + (z[:, modes:] ** 2).sum()
             )
-            scores[modes, step] = residual / (1 - 2 * modes * solver.count / count) ** 2
-    return min(scores, key=scores.get)
+            share = 2 * modes * solver.count / count
+            scores.append((residual / (1 - share) ** 2, modes, step))
+    return min(scores)
 
 
-def _curve(trial: Trial, s: np.ndarray, modes: int, step: int, solver: Solver) -> Curve:
-    z, triangle, left = projected(trial.points, s, modes)
+def _repeats(trial: Trial, left: np.ndarray, modes: int, period: float) -> bool:
+    """Return whether what modes leave of the frames (F, P, 2) is like itself a period later, beyond what noise is."""
+    first = np.flatnonzero(trial.t + period <= trial.t[-1])
+    free = left.shape[1] - modes
+    if len(first) < 2 or free < 1:
+        return False
+    later = np.clip(np.searchsorted(trial.t, trial.t[first] + period), 1, None)
+    share = (trial.t[later] - trial.t[first] - period) / (
+        trial.t[later] - trial.t[later - 1]
+    )
+    share = share[:, None, None]
+    after = share * left[later - 1] + (1 - share) * left[later]
+    size = np.sqrt((left[first] ** 2).sum() * (after**2).sum())
+    # Neighbouring frames that are alike are fewer; of independent ones a correlation varies by the root of their number.
+    alike = _correlation(left)
+    number = 2 * free * len(first) * (1 - alike**2) / (1 + alike**2)
+    return (left[first] * after).sum() > CERTAIN * size / np.sqrt(number)
+
+
+def _correlation(left: np.ndarray) -> float:
+    """Return how alike what modes leave of the frames (F, P, 2) is from one to the next, up to ALIKE."""
+    like = (left[1:] * left[:-1]).sum() / max((left**2).sum(), 1e-300)
+    return float(np.clip(like, 0.0, ALIKE))
+
+
+def _curve(
+    trial: Trial, s: np.ndarray, modes: int, step: int, solver: Solver, even: float
+) -> Curve:
+    z, triangle, left = projected(trial.points, s, modes, even)
     coefficients = solver(z)
     residual = z - (solver.design @ coefficients.reshape(solver.count, -1)).reshape(
         z.shape
     )
     # What modes leave of the frames shows how alike noise is from one to the next; the more it is, the more of it a
     # spline takes along.
-    alike = float(
-        np.clip((left[1:] * left[:-1]).sum() / max((left**2).sum(), 1e-300), 0.0, ALIKE)
-    )
+    alike = _correlation(left)
     drawn = np.random.default_rng(0).normal(size=(len(trial.t), 2 * NODES))
     kept, white = (
         ((x - solver.smoothed(x)) ** 2).sum() for x in (_alike(drawn, alike), drawn)
@@ -261,6 +375,7 @@ def _curve(trial: Trial, s: np.ndarray, modes: int, step: int, solver: Solver) -
         s,
         modes,
         step,
+        even,
         solver.knots,
         coefficients,
         residual,

@@ -15,7 +15,7 @@ from geomech.systems.base import body_size
 from rft.checks import in_range
 
 FINER = 3  # steps of the integration between two frames
-MEMORY = 0.25  # correlation time of the wave's deviations, cycles
+MEMORY = 0.25  # correlation time of the wave's deviations, cycles, if none is given
 LONGER = 8  # times the trial, over which deviations have no mean: over the trial theirs varies as that of free ones
 
 
@@ -43,18 +43,19 @@ class SyntheticTrial(NamedTuple):
 def made(
     system: Any, cycles: float = 8.0, frames: int = 40, points: int = 30, *, swing: float = 0.9, waves: float = 1.1,
     frequency: float = 1.0, noise: float = 0.01, spread: float = 0.05, jitter: float = 0.02, heading: float = 0.5,
-    bend: float = 0.0, seed: int = 0,
+    bend: float = 0.0, third: float = 0.0, memory: float = MEMORY, seed: int = 0,
 ) -> SyntheticTrial:  # fmt: skip
     """Return a trial of a swimmer of many equal elements (`rft.Backbone`) in its medium.
 
     Headings along the body are swing sin(phase + 2 pi waves s), a wave from head to tail. frames: per cycle. points: at
     equal distances from tail to head. noise: standard deviation of x and y, body lengths. spread, jitter: relative
-    standard deviations of swing and waves, and of the rate of the phase, which vary over MEMORY of a cycle. heading
-    (rad): at the start. bend (rad): of the resting body, which makes it turn."""
+    standard deviations of swing and waves, and of the rate of the phase, which vary over ``memory`` of a cycle. heading
+    (rad): at the start. bend (rad): of the resting body, which makes it turn. third: third harmonic of the wave, over
+    its swing."""
     in_range("frames", frames, 8, 1e6, whole=True)
     rng, count = np.random.default_rng(seed), int(cycles * frames * FINER) + 1
     t = np.arange(count) / (frames * FINER * frequency)
-    varying = smooth_noise(rng, LONGER * count, MEMORY * frames * FINER, 3)[0][:count]
+    varying = smooth_noise(rng, LONGER * count, memory * frames * FINER, 3)[0][:count]
     rate = 2 * np.pi * frequency * (1 + jitter * varying[:, 0])
     phase = rng.uniform(0, 2 * np.pi) + np.concatenate(
         [[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2) * t[1]]
@@ -65,9 +66,9 @@ def made(
     )
     elements = system.joints + 1
     s = (np.arange(elements) + 0.5) / elements
-    headings = swings[:, None] * np.sin(
-        phase[:, None] + wavenumbers[:, None] * (s - 0.5)
-    ) + bend * (s - 0.5)
+    at = phase[:, None] + wavenumbers[:, None] * (s - 0.5)
+    wave = np.sin(at) + third * np.sin(3 * at)
+    headings = swings[:, None] * wave + bend * (s - 0.5)
     alpha = np.diff(headings, axis=-1)
     alphadot = _rates(t, alpha)
     pose = integrated(system.velocity(alpha, alphadot), t[1]) + [0.0, 0.0, heading]

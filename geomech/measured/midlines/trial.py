@@ -24,7 +24,7 @@ class Trial:
     tracker has none. names: (P,), of the points. lines: (F, P), of the file. unit: m, BL, or "" where nobody says.
     length: of the body, in ``unit``; None where the points are the whole body. filled: (F, P), which points were
     missing and are now those of the smooth midlines; None where they are still nan. notes: what was taken for
-    granted."""
+    granted. file_unit: of the file, such as px, where ``unit`` is ""; "" where it is not known."""
 
     name: str
     t: np.ndarray
@@ -36,6 +36,7 @@ class Trial:
     length: float | None = None
     filled: np.ndarray | None = None
     notes: tuple[str, ...] = ()
+    file_unit: str = ""
 
     def wrong(
         self,
@@ -62,6 +63,11 @@ class Trial:
     @property
     def unit_of_time(self) -> str:
         return "s" if self.timed else "frame"
+
+    @property
+    def unit_of_length(self) -> str:
+        """Unit of the points, in words where nobody says which."""
+        return self.unit or self.file_unit or "the file's unit"
 
     def with_notes(self, *notes: str, **changes: Any) -> Trial:
         """Return the trial with more notes, and other fields."""
