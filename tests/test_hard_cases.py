@@ -279,6 +279,33 @@ def test_the_status_is_that_of_the_limit(medium):
     assert np.mean(near.status != limit.status) < 0.005
 
 
+@pytest.mark.parametrize("ratio", [1e4, 1e6])
+def test_velocities_keep_digits_at_large_ratios(ratio):
+    """Forces cancel to 1e-14 of the largest, so residuals grow with the ratio; velocities
+    of the mirrored body, of other roundoff, stay equal."""
+    rng = np.random.default_rng(1)
+    alpha, alphadot = rng.uniform(-2.8, 2.8, (2, 200, 2))
+    medium = Granular(ratio, 0.24)
+    solution = body_velocity(medium, Chain(), alpha, alphadot)
+    mirrored = body_velocity(medium, Chain(), -alpha, -alphadot)
+    assert (solution.status != "unconverged").all()
+    assert (solution.residual <= 1e-10 + 1e-14 * ratio * 5).all()
+    assert np.abs(solution.xi - mirrored.xi * [1, -1, -1]).max() < 1e-12
+
+
+@pytest.mark.parametrize("medium", [GLASS, Coulomb()], ids=lambda m: type(m).__name__)
+def test_sliding_velocities_are_near_their_limit(medium):
+    """Within 250 times the regularisation at random shapes, and most within its own."""
+    rng = np.random.default_rng(5)
+    alpha, alphadot = rng.uniform(-2.8, 2.8, (2, 2000, 2))
+    solution = body_velocity(medium, Chain(), alpha, alphadot, regularisation=1e-6)
+    limit = body_velocity(medium, Chain(), alpha, alphadot, regularisation=1e-8)
+    change = np.abs(solution.xi - limit.xi).max(-1) / np.linalg.norm(alphadot, axis=-1)
+    change = change[solution.status == "sliding"] / 1e-6
+    assert change.max() < 250
+    assert (change > 10).mean() < 0.01
+
+
 @pytest.mark.parametrize("medium", DRY)
 def test_regularisation_is_reported_by_what_it_changes(medium):
     """Where all links slide, ten times less regularisation changes next to nothing."""

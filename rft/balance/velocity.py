@@ -27,13 +27,21 @@ LEAST_RATE = 1e-100  # other than 0
 class Solution(NamedTuple):
     """Body velocities.
 
-    xi: (..., 3), in the body frame, (length/time, length/time, rad/time). residual: (...), the larger of force and of
-    moment about the body's mean place, over the axial yield force of the whole body (its drag at unit speed in a viscous
-    medium) and over that times the body's length. status: (...), "sliding", "stuck" (an element is at rest) or
-    "unconverged", where the residual exceeds the tolerance plus 1e-14 times the drag across the whole body over that along
-    it, if that is above 1. So with drag across 1e8 times as large a residual of 1e-6 is "sliding", and the velocity
-    along the body, which the small forces along it determine, is off by some 1e-6 of the speed of the joints: more than
-    the regularisation may be. iterations: (...), number of evaluations of the load.
+    xi: (..., 3), in the body frame, (length/time, length/time, rad/time). residual:
+    (...), the larger of force and of moment about the body's mean place, over the axial
+    yield force of the whole body (its drag at unit speed in a viscous medium) and over
+    that times the body's length. status: (...), "sliding", "stuck" (both ends of an
+    element are slower than 10 times the regularisation) or "unconverged". iterations:
+    (...), number of evaluations of the load.
+
+    A sample is unconverged where its residual exceeds the tolerance plus 1e-14 of the
+    largest force, the drag across the whole body over that along it: forces so large
+    cancel to that many digits. With drag across 1e6 times as large, residuals reach
+    1e-8 and velocities keep 13 digits.
+
+    The residual is that of the regularised law. Near sticking, the regularisation moves
+    velocities whose status is "sliding" by up to some 200 times itself, and those of one
+    random shape in 300 by more than 10 times: a smaller regularisation shows by how much.
 
     Examples
     --------
@@ -96,8 +104,8 @@ def body_velocity(
     loads : average of the law over an element, "exact", "midpoint:N" or "gauss:N" (`rft.quadrature`).
     regularisation : speed, body lengths per radian of joint motion |alphadot|, below which dry friction is rounded off
         (v^2 -> v^2 + rounding^2); an element at rest creeps at about this speed.
-    tolerance : largest residual of a solution, to which 1e-14 of the largest force is added: roundoff, which exceeds a
-        tolerance of 1e-10 where drag across the body is more than 1e4 times that along it. See `Solution`.
+    tolerance : largest residual of a solution, to which roundoff is added, 1e-14 of the
+        largest force (`Solution`).
     threads : most threads, by default one a core.
     effects : effects of `rft.effects` of the algebraic engine.
     pieces : number to a body length of the pieces into which effects that vary along an element cut it.

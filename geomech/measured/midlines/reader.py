@@ -185,6 +185,7 @@ def read(
         timed,
         length,
         notes=tuple(notes),
+        file_unit="px" if pixels else "",
     )
 
 
