@@ -160,7 +160,7 @@ def fit_log(
     if limits is not None:
         in_range("``limits``", limits, 1e-6, 10)
     log = log if isinstance(log, Log) else read(log, columns, degrees)
-    if body_length != 1.0:
+    if body_length is not None:
         body_length *= log.size
     period = cycles.period(log)
     joints, pose = (smooth.smoothed(log.t, x, period) for x in (log.alpha, log.pose))
