@@ -322,7 +322,7 @@ def test_a_metric_of_the_systems_own_has_lengths_and_no_work(name, capsys):
 def test_phases_of_a_cost_are_fours_and_its_errors_are_what_half_of_them_change():
     fluid, past = (
         scene(Swimmer(FLUID, UNEVEN)),
-        scene(Swimmer(SAND, UNEVEN, (Transient(travel=0.1),))),
+        scene(Swimmer(SAND, UNEVEN, (Transient(travel_m=0.03),))),
     )
     assert [effort.phases_of(fluid, n) for n in (8, 9, 12, 13)] == [8, 12, 12, 16]
     assert [effort.phases_of(past, n) for n in (8, 32, 33)] == [32, 32, 36]

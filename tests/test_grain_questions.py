@@ -337,7 +337,9 @@ def test_a_swim_stands_beside_the_tiers(monkeypatch, tmp_path):
     assert not np.isclose(result["x"].values[k], result["x"].values[k + 1])
     # Ends that both push half as much are one end that pushes, to 1 %.
     flank = Calibration("flank-drag", end_caps="fitted").ask().subject
-    one = dataclasses.replace(flank.caps(0.03), head=flank.end_caps, tail=0.0)
+    one = dataclasses.replace(
+        flank.caps(0.03), head=flank.end_caps, tail=0.0
+    ).in_metres(0.3)
     ahead = dataclasses.replace(scene.system, medium=flank.medium, effects=(one,))
     one_end = Study(scene.changed(system=ahead)).study([0.9], ("direct",))
     assert result["x"].values[k + 1] == pytest.approx(
@@ -639,10 +641,11 @@ def test_sizes_of_a_swimmer_are_those_given_or_the_scenes():
     """Its length in metres, the radius of its caps, and a bed that is wide and deep enough."""
     chain = '[medium]\nname = "glass-0.3mm-loose"\n[body]\nkind = "chain"\n{}[gait]\nkind = "circle"\n'
     caps = '[[effects]]\nkind = "end-caps"\nradius_m = 0.01\n'
+    bare = caps.replace("radius_m = 0.01", "radius = 0.05")
     for text_, given, size, radius in (
         (chain.format(""), {}, 0.162, 6e-3), (chain.format("length = 0.2\n"), {}, 0.2, 6e-3),
-        (chain.format("length = 0.2\n") + caps, {}, 0.2, 0.01), (chain.format("") + caps, {"size": 0.3}, 0.3, 0.015),
-        (chain.format("") + caps, {"size": 0.3, "radius": 0.02}, 0.3, 0.02),
+        (chain.format("length = 0.2\n") + caps, {}, 0.2, 0.01), (chain.format("") + bare, {"size": 0.3}, 0.3, 0.015),
+        (chain.format("") + bare, {"size": 0.3, "radius": 0.02}, 0.3, 0.02),
     ):  # fmt: skip
         question = grain_swim.GrainSwim(scenes.parse(text_), 3, 7, **given)
         one = question.experiment

@@ -146,7 +146,7 @@ def test_a_scene_takes_its_medium_from_a_file(tmp_path):
     (tmp_path / "own.toml").write_text("zetta = 1\n")
     with pytest.raises(
         Refusal,
-        match=r"s.toml: \[medium\]: own.toml: key: 'zetta' is unknown: did you mean 'zeta'",
+        match=r"s.toml: \[medium\] own.toml key: 'zetta' is unknown: did you mean 'zeta'",
     ):
         scenes.load(tmp_path / "s.toml")
     (tmp_path / "own.toml").write_text("[medium\n")

@@ -30,7 +30,10 @@ from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.text import lab as lines
 from rft.refusal import Refusal
 
-pytestmark = pytest.mark.usefixtures("fastest")
+pytestmark = [
+    pytest.mark.usefixtures("fastest"),
+    pytest.mark.filterwarnings("ignore:.*leaves the polygon"),
+]
 OFF_CENTRE = Circle(amplitude=0.7, centre=(0.3, -0.4))
 ALLOWED = {
     "profile.default_content_setting_values.automatic_downloads": 1

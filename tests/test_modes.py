@@ -41,7 +41,7 @@ SHAPE, RATE = RNG.uniform(-0.7, 0.7, (2, 30, 2))
 
 
 def test_body_velocity_and_work_are_those_of_the_plain_chain():
-    effects = SkinFriction(0.1, 0.15, 0.2), EndCaps(0.06)
+    effects = SkinFriction(0.1, 0.15, 0.2), EndCaps(radius_m=0.018)
     settings = {"effects": effects, "pieces": 7}
     found = rft.body_velocity(SAND, MODES, SHAPE, RATE, **settings).checked()
     wanted = rft.body_velocity(
@@ -61,7 +61,7 @@ def test_body_velocity_and_work_are_those_of_the_plain_chain():
 
 @pytest.mark.parametrize(
     "effects",
-    [(), (EndCaps(0.06),), (Transient(0.1),)],
+    [(), (EndCaps(radius_m=0.018),), (Transient(travel_m=0.03),)],
     ids=["plain", "caps", "transient"],
 )
 @pytest.mark.parametrize("tier", ["direct", "adapted"])

@@ -151,12 +151,12 @@ HEAVY = BodyInertia(mass=0.4, frequency=0.8, length=0.3, drag=1.3)
 SCENES = {
     "swimmer": Scene(SYSTEMS["swimmer"], OVAL, Numerics(phases=33)),
     "no-slip": Scene(NoSlipSnake((0.8, 1.3, 1.0), 0.4, "link-1"), ZIGZAG, Numerics(phases=64)),
-    "transient": Scene(Swimmer(SAND, UNEVEN, (Transient(0.02),), Solver(pieces=3)), OVAL, Numerics(phases=16)),
+    "transient": Scene(Swimmer(SAND, UNEVEN, (Transient(travel_m=0.006),), Solver(pieces=3)), OVAL, Numerics(phases=16)),
     "heavy": Scene(Swimmer(SAND, UNEVEN, (HEAVY,)), OVAL, Numerics(phases=32)),
     "first cycle": Scene(Swimmer(SAND, UNEVEN, (HEAVY,), Solver(cycles=1)), OVAL, Numerics(phases=32)),
-    "slope": Scene(Swimmer(SAND, UNEVEN, (DepthProfile(slope=1.5, towards=0.4),), Solver(pieces=6)), OVAL, Numerics(phases=32)),
+    "slope": Scene(Swimmer(SAND, UNEVEN, (DepthProfile(slope_per_m=5.0, towards=0.4),), Solver(pieces=6)), OVAL, Numerics(phases=32)),
     "second on a slope": Scene(
-        Swimmer(SAND, UNEVEN, (DepthProfile(slope=1.5, towards=0.4),), Solver(pieces=6, cycles=2)), OVAL, Numerics(phases=32)
+        Swimmer(SAND, UNEVEN, (DepthProfile(slope_per_m=5.0, towards=0.4),), Solver(pieces=6, cycles=2)), OVAL, Numerics(phases=32)
     ),
 }  # fmt: skip
 
@@ -450,7 +450,7 @@ OTHERS = {
     "two links": Scene(Swimmer(SAND, Chain((1, 2))), Fourier(cos=((0.0,),), sin=((0.8,),)), Numerics(phases=16)),
     "four links": Scene(Swimmer(SAND, Chain((1, 2, 1, 1))), WAVE, Numerics(phases=16)),
     "backbone": Scene(Swimmer(SAND, Backbone(12, length=0.3)), Sine(elements=12), Numerics(phases=32)),
-    "memory": Scene(Swimmer(SAND, UNEVEN, (Transient(0.05),), Solver(cycles=1, pieces=8)), OVAL, Numerics(phases=16)),
+    "memory": Scene(Swimmer(SAND, UNEVEN, (Transient(travel_m=0.015),), Solver(cycles=1, pieces=8)), OVAL, Numerics(phases=16)),
 }  # fmt: skip
 
 

@@ -278,7 +278,10 @@ def test_sweeps_give_it(tmp_path):
 
 def test_performance_speaks_the_scenes_own_unit():
     fish = scenes.load("sandfish-loose").with_numerics(phases=32)
-    small = fish.changed(body=dataclasses.replace(fish.system.body, length=0.1))
+    small = fish.changed(
+        body=dataclasses.replace(fish.system.body, length=0.1),
+        effects=tuple(effect.in_metres(0.1) for effect in fish.system.effects),
+    )
     plain = undulation.performance(small, [0.1, 0.22])
     timed = undulation.performance(
         small.changed(gait=dataclasses.replace(fish.gait, frequency=3)), [0.1, 0.22]

@@ -100,7 +100,9 @@ def test_effects(name, medium):
         ]
     if not isinstance(medium, Granular):
         effects = [e for e in effects if e.kind not in ("end-caps", "towed-sled")]
-    problem = at_one_step(effects, BODIES["uneven"], medium, samples, rng)
+    body = BODIES["uneven"]
+    effects = [effect.in_metres(body.length) for effect in effects]
+    problem = at_one_step(effects, body, medium, samples, rng)
     n = len(problem.sides.station) + len(problem.points.station)
     v, eps = rng.normal(size=(3, n, samples)), rng.uniform(0.05, 0.2, samples)
     v[0] = np.sign(v[0]) * (

@@ -645,7 +645,7 @@ def test_what_is_to_come_of_further_phases_is_a_geometric_series(r):
     sum_from = lambda first, ratio: (
         estimate.SAFETY * first * (ratio ** np.arange(1, 100)).sum()
     )
-    assert estimate._remaining(*changes, False) == pytest.approx(
+    assert estimate._remaining(*changes, 0.0) == pytest.approx(
         sum_from(changes[2], min(r, 0.5))
     )
     slowest = (
@@ -653,10 +653,10 @@ def test_what_is_to_come_of_further_phases_is_a_geometric_series(r):
         if r <= 0.5
         else sum_from(changes[2], 0.5)
     )
-    assert estimate._remaining(*changes, True) == pytest.approx(slowest)
+    assert estimate._remaining(*changes, 0.25) == pytest.approx(slowest)
     scattered = (
-        estimate._remaining(1e-6, 4e-3, 1e-5, True),
-        estimate._remaining(1e-6, 4e-3, 3e-3, True),
+        estimate._remaining(1e-6, 4e-3, 1e-5, 0.25),
+        estimate._remaining(1e-6, 4e-3, 3e-3, 0.25),
     )
     assert scattered == pytest.approx((sum_from(2e-3, 0.5), sum_from(3e-3, 0.5)))
 

@@ -226,9 +226,9 @@ def test_work_is_done_by_the_joints_in_time_stepping_too():
     """Without mass, what the joints put in goes into the ground at every phase, memories and caps included."""
     alpha, alphadot = Butterfly(amplitude=0.8).cycle(32)
     effects = (
-        Transient(travel=0.05),
-        EndCaps(radius=0.05),
-        DisturbedGround(radius=0.05, weakening=0.2),
+        Transient(travel_m=0.01),
+        EndCaps(radius_m=0.01),
+        DisturbedGround(radius_m=0.01, weakening=0.2),
     )
     found = time_steps(
         GLASS,

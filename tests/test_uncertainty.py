@@ -255,7 +255,7 @@ def test_every_tier_has_it_beside_its_own_error():
 def test_effects_and_time_stepping_feel_it(monkeypatch):
     """By central differences of the whole cycle in the ratio, the one parameter of a viscous medium."""
     monkeypatch.setattr(uncertainty, "PHASES", 16)
-    for effects in ((SkinFriction(0.1, 0.15),), (Transient(0.1),)):
+    for effects in ((SkinFriction(0.1, 0.15),), (Transient(travel_m=0.03),)):
         sand = (
             scene(Viscous(2.5, ((0.04**2,),)))
             .changed(effects=effects)

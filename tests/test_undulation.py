@@ -473,7 +473,8 @@ def test_body_velocity_through_the_cycle():
     np.testing.assert_allclose(
         np.hypot(*displacement(velocity)[:, :2].T), found["progress"], rtol=1e-12
     )
-    large = SANDFISH.changed(body=Backbone(100, length=20.0))
+    effects = tuple(effect.in_metres(20.0) for effect in SANDFISH.system.effects)
+    large = SANDFISH.changed(body=Backbone(100, length=20.0), effects=effects)
     np.testing.assert_allclose(
         undulation.performance(large, [0.1, 0.22])["velocity"], velocity, atol=1e-8
     )

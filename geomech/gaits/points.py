@@ -107,4 +107,6 @@ class Points(Gait):
 
     @classmethod
     def examples(cls) -> dict[str, Points]:
-        return {"points": cls(points=((1, 0), (0.4, 0.8), (-0.7, 0.2), (-0.1, -0.9)))}
+        right = ((1, 0), (0.75, 0.59), (0.15, 0.83), (-0.47, 0.56))
+        left = ((-0.73, -0.03), (-0.47, -0.66), (0.09, -0.91), (0.7, -0.61))
+        return {"points": cls(points=right + left)}
