@@ -877,7 +877,7 @@ def test_limits_of_each_joint_and_side():
     ],
 )  # fmt: skip
 def test_limits_as_they_are_typed(text, limits):
-    from geomech.commands.options import joint_limits
+    from geomech.questions.texts import joint_limits
 
     found = joint_limits(text, viscous())
     assert (

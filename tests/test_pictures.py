@@ -12,13 +12,13 @@ from matplotlib.quiver import Quiver
 from PIL import Image
 
 from geomech import plots, scenes
-from geomech.commands.options import colour_limit
 from geomech.gaits import Butterfly, Circle, Ellipse
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
 from geomech.plots.displacements import ERROR, MEASURED, MEDIUM, TO_ROUNDING
 from geomech.plots.precision import PANELS
 from geomech.plots.precision import SETTINGS as PRECISION
+from geomech.questions.texts import colour_limit
 from geomech.scenes.measurements import read
 from geomech.studies.study import Study
 from geomech.studies.tiered import SETTINGS

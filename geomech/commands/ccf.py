@@ -6,7 +6,6 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.loading import load_scene
 from geomech.commands.options import (
     ClimOption,
     ComponentOption,
@@ -18,13 +17,12 @@ from geomech.commands.options import (
     SceneArgument,
     SliceOption,
     YesOption,
-    angles,
-    colour_limit,
-    components,
     refuse_without_figure,
     with_workers,
 )
 from geomech.commands.pipeline import Output, execute
+from geomech.questions.loading import load_scene
+from geomech.questions.texts import angles, colour_limit, components
 
 
 @with_workers

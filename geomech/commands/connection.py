@@ -7,7 +7,6 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.loading import load_scene
 from geomech.commands.options import (
     ClimOption,
     ComponentOption,
@@ -19,12 +18,11 @@ from geomech.commands.options import (
     SceneArgument,
     SliceOption,
     YesOption,
-    angles,
-    colour_limit,
-    components,
     with_workers,
 )
 from geomech.commands.pipeline import Output, execute
+from geomech.questions.loading import load_scene
+from geomech.questions.texts import angles, colour_limit, components
 
 
 @with_workers

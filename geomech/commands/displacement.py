@@ -6,9 +6,7 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.loading import load_scene
 from geomech.commands.options import (
-    CURVES,
     AllOption,
     ComponentOption,
     DataOption,
@@ -19,14 +17,18 @@ from geomech.commands.options import (
     PlotOption,
     SceneArgument,
     YesOption,
-    amplitude_kind,
-    components,
-    measurements,
     refuse_without_figure,
-    spread,
     with_workers,
 )
 from geomech.commands.pipeline import Output, drawing, execute
+from geomech.questions.loading import load_scene
+from geomech.questions.texts import (
+    CURVES,
+    amplitude_kind,
+    components,
+    measurements,
+    spread,
+)
 
 
 @with_workers

@@ -7,7 +7,6 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.loading import load_scene
 from geomech.commands.options import (
     ClimOption,
     JsonOption,
@@ -15,11 +14,11 @@ from geomech.commands.options import (
     PlotOption,
     SceneArgument,
     YesOption,
-    colour_limit,
-    components,
     refuse_without_figure,
 )
 from geomech.commands.pipeline import Output, drawing, execute
+from geomech.questions.loading import load_scene
+from geomech.questions.texts import colour_limit, components
 
 PANELS = ("forward", "normal", "tangential", "power", "moment", "phase", "place")
 

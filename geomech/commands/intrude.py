@@ -8,9 +8,9 @@ from typing import Annotated, Optional
 import typer
 
 from geomech.commands import formats
-from geomech.commands.loading import load_intruder
 from geomech.commands.options import IntruderArgument, JsonOption, PlotOption
 from geomech.commands.pipeline import Output, drawing, execute
+from geomech.questions.loading import load_intruder
 
 
 def intrude(

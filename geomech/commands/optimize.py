@@ -8,19 +8,18 @@ from typing import Annotated, Optional
 import typer
 
 from geomech.commands import formats
-from geomech.commands.loading import load_scene
 from geomech.commands.options import (
     ClimOption,
     JsonOption,
     PlotOption,
     SceneArgument,
     YesOption,
-    colour_limit,
-    joint_limits,
     refuse_without_figure,
     with_workers,
 )
 from geomech.commands.pipeline import Output, execute
+from geomech.questions.loading import load_scene
+from geomech.questions.texts import colour_limit, joint_limits
 
 
 @with_workers

@@ -6,9 +6,9 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.names import medium_names
 from geomech.commands.options import JsonOption, PlotOption
 from geomech.commands.pipeline import Output, drawing, execute
+from geomech.questions.names import medium_names
 
 
 def stress(

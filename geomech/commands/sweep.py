@@ -8,15 +8,10 @@ from typing import Annotated, Optional
 import typer
 
 from geomech.commands import formats
-from geomech.commands.loading import load_moving
-from geomech.commands.options import (
-    PlotOption,
-    SceneArgument,
-    YesOption,
-    parameters,
-    with_workers,
-)
+from geomech.commands.options import PlotOption, SceneArgument, YesOption, with_workers
 from geomech.commands.pipeline import Output, drawing, execute, path_message
+from geomech.questions.loading import load_moving
+from geomech.questions.texts import parameters
 
 
 @with_workers

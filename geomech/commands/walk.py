@@ -7,9 +7,9 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.loading import load_walker
 from geomech.commands.options import JsonOption, WalkerArgument, YesOption, folder
 from geomech.commands.pipeline import Output, drawing, execute
+from geomech.questions.loading import load_walker
 from rft.refusal import Refusal
 
 
