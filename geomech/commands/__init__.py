@@ -3,7 +3,7 @@ is the function of that name, with _ for -, in the module of that name."""
 
 COMMANDS = {  # by the headings of `geomech --help`, in its order
     "Analyse": (
-        "run", "displacement", "ccf", "connection", "symbolic", "sweep", "accuracy", "lab"
+        "run", "ccf", "connection", "symbolic", "accuracy", "lab"
     ),
     "Gaits": ("trajectory", "forces", "optimize"),
     "Grains and robots": ("stress", "intrude", "walk", "grains", "drag_grains"),

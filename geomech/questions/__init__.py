@@ -13,7 +13,9 @@ from typing import Any
 # that the list of commands loads no question.
 GROUPS = {
     "Analyse": {
+        "displacement": "Compute the displacement of a gait by each tier.",
         "velocity": "Compute the body velocity of one shape and its rate.",
+        "sweep": "Compute displacement or speed over a grid of parameters.",
     },
 }
 SUMMARIES = {name: line for lines in GROUPS.values() for name, line in lines.items()}

@@ -78,6 +78,13 @@ class Run:
     limited: bool = False
     tables: Any = None
 
+    @property
+    def shown_progress(self) -> Progress | None:
+        """The progress that is shown; None where what computes shows its own."""
+        if self.progress is ignore:
+            return None
+        return self.progress
+
     def tables_of(self, scene: Any) -> "Study":
         """Return the tables of a scene: those that are given, or new ones."""
         from geomech.studies.study import Study
@@ -94,7 +101,7 @@ Declared = dict[str, tuple[Option, Any, Any]]
 @dataclasses.dataclass(frozen=True)
 class Question(Plain):
     """A question. Subclasses are frozen dataclasses of all data on which their answers
-    depend; the first field is the question's `Subject`.
+    depend; the first of their fields is the question's `Subject`.
 
     The class itself presents every result of its kind, computed or read from a file:
     `headline`, `summary`, `remarks`, `draw`, `files`.
@@ -114,10 +121,16 @@ class Question(Plain):
         """Name of the computation, shown during it."""
         return f"{self.name} of {self.subject_name}"
 
+    # Called with the fraction done; of Python alone, as a command shows its own.
+    progress: Progress | None = dataclasses.field(
+        default=None, kw_only=True, repr=False, compare=False
+    )
+
     @property
     def subject(self) -> Any:
-        """What the question is about: the value of its first field."""
-        return getattr(self, dataclasses.fields(self)[0].name)
+        """What the question is about: the value of its field marked `Subject`."""
+        name, _ = subject_field(type(self))
+        return getattr(self, name)
 
     @property
     def subject_name(self) -> str:
@@ -159,10 +172,11 @@ class Question(Plain):
         facts = {**subject_facts(self.subject), **result.attributes}
         return dataclasses.replace(result, attributes=facts, question=self)
 
-    def ask(self, tables: Any = None, progress: Progress = ignore) -> "Result":
-        """Return the answer without limits of cost, as from Python."""
+    def ask(self, tables: Any = None) -> "Result":
+        """Return the answer without limits of cost, as from Python. tables: of the scene,
+        if there are some already."""
         self.check()
-        return self.answer(Run(progress, tables=tables))
+        return self.answer(Run(self.progress or ignore, tables=tables))
 
     def _set(self, **values: Any) -> None:
         """Set fields in `__post_init__`."""
@@ -185,9 +199,12 @@ def subject_facts(subject: Any) -> dict[str, str]:
 
 
 def subject_field(question: type[Question]) -> tuple[str, Subject]:
-    """Return the name of a question's first field and what it is."""
-    field = dataclasses.fields(question)[0]
-    return field.name, marked(field.type, Subject)
+    """Return the name of the field that a question is about, and what it is."""
+    for field in dataclasses.fields(question):
+        subject = marked(field.type, Subject)
+        if subject is not None:
+            return field.name, subject
+    raise TypeError(f"{question.__name__} has no field marked Subject")
 
 
 def options(question: type[Question]) -> Declared:

@@ -70,11 +70,10 @@ class Report(Question):
             study.compute_field(progress)
         tables = {}
         for gait, values in zip(gaits, amplitudes):
-            result = study.study(values, gait=gait).result
+            result = study.displacements(values, gait=gait)
             if gait is not scene.gait:
-                result = replace(
-                    result, attributes={**result.attributes, "note": ADDED}
-                )
+                facts = {**result.attributes, "note": ADDED}
+                result = replace(result, attributes=facts)
             tables[type(gait).__name__.lower()] = result
         pairs = combinations(range(3), 2) if mapped and scene.system.joints == 3 else ()
         planes = [study.plane(pair) for pair in pairs]

@@ -205,7 +205,7 @@ class ShapeSpace(Question):
         stretched = stretch_to_metric(study.metric) if self.stretch else None
         amplitude = self.scene.gait.amplitude
         enclosed = (
-            study.study([amplitude], [AREA.name]).result if self._enclosed else None
+            study.displacements([amplitude], [AREA.name]) if self._enclosed else None
         )
         spent = self.cost().balances, time.perf_counter() - start
         space = Space(

@@ -14,7 +14,6 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from geomech.core.setting import Setting
-from geomech.core.summary import span
 from geomech.core.variables import Result, Variable
 from geomech.run import jobs
 from geomech.run.backend import suiting
@@ -318,37 +317,7 @@ class Walks:
             Variable("status", dims, np.array(STATUSES)[kinds.astype(int)]),
             Variable("cycles", dims, cycles, "1"),
         ]
-        title = f"Mean speed of the walking robot {grid.scene.name}"
-        return variables, {"title": title, "scene": written.toml(grid.scene)}
-
-    def as_stored(self, result: Result) -> Result:
-        """Return a sweep as data for a file: the error as estimate, the status as a number explained by its label."""
-        speed, status = result["speed"], result["status"]
-        meanings = ", ".join(f"{k}: {name}" for k, name in enumerate(STATUSES))
-        index = np.argmax(np.array(STATUSES) == status.values[..., None], -1).astype(
-            float
-        )
-        stored = [v for v in result.variables if v.is_coordinate]
-        stored += [
-            dataclasses.replace(speed, error=None),
-            Variable("estimate", speed.dims, speed.error, "m/s"),
-        ]
-        stored += [
-            result["cycles"],
-            Variable("status", speed.dims, index, "1", meanings),
-        ]
-        return dataclasses.replace(result, variables=tuple(stored))
-
-    def table(self, result: Result) -> dict:
-        """Return {"speed", "estimate": (N_1, ...), m/s, "status": (N_1, ...), "cycles": (N_1, ...)}."""
-        arrays = {name: result[name].values for name in ("speed", "status", "cycles")}
-        return {"speed": arrays["speed"], "estimate": result["speed"].error, **arrays}
-
-    def summary(self, table: Mapping) -> str:
-        worst = np.max(table["estimate"], initial=0.0)
-        return (
-            f"speed {span(table['speed'])} m/s; estimated error up to {worst:.1e} m/s"
-        )
+        return variables, {}
 
 
 @dataclass(frozen=True)
