@@ -17,6 +17,9 @@ GROUPS = {
         "velocity": "Compute the body velocity of one shape and its rate.",
         "sweep": "Compute displacement or speed over a grid of parameters.",
     },
+    "Gaits": {
+        "forces": "Compute force, power and bending moment along the body.",
+    },
 }
 SUMMARIES = {name: line for lines in GROUPS.values() for name, line in lines.items()}
 
