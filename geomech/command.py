@@ -193,11 +193,11 @@ def request(
         options = of_files.get(path.suffix.lower(), {})
         outputs.append(output(declared.question, path, options))
     picture = parsed(declared.picture, given, subject)
+    question = question.for_files(paths, parsed(declared.of_files, given, subject))
     if plot is not None:
         question.check_draw(**picture)
         outputs.append(figure(plot, picture))
         question = question.for_picture(**picture)
-    question = question.for_files(paths, parsed(declared.of_files, given, subject))
     return question, outputs
 
 

@@ -5,7 +5,7 @@ COMMANDS = {  # by the headings of `geomech --help`, in its order
     "Analyse": (
         "run", "ccf", "connection", "symbolic", "accuracy", "lab"
     ),
-    "Gaits": ("trajectory", "optimize"),
+    "Gaits": ("trajectory",),
     "Grains and robots": ("stress", "intrude", "walk", "grains", "drag_grains"),
     "Your own data": ("fit_medium", "fit_gait"),
     "Reference": ("scenes", "reference", "explain"),

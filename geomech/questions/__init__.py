@@ -19,6 +19,7 @@ GROUPS = {
     },
     "Gaits": {
         "forces": "Compute force, power and bending moment along the body.",
+        "optimize": "Find the best gait for an objective.",
     },
 }
 SUMMARIES = {name: line for lines in GROUPS.values() for name, line in lines.items()}

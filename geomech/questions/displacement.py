@@ -176,11 +176,12 @@ class Displacement(Question):
 
         On Axes that are given draw one quantity; return the Axes."""
         from geomech import plots
+        from geomech.results.scenes import scene_of
 
         if ax is not None:
             return plots.displacement(result, ax=ax, quantity=quantity, data=data)
         if isinstance(data, str):
-            data = points(data, tools.scene_of(result), component)
+            data = points(data, scene_of(result), component)
         name = result.attributes["scene"]
         return plots.displacement_figure(
             {name: result}, components=component, data=data

@@ -6,7 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from geomech.questions import loading, names, parsing, tools
+from geomech.questions import loading, names, parsing
 from geomech.questions.base import Option, Question, Run, Subject
 from rft.refusal import Refusal
 
@@ -86,5 +86,6 @@ class Sweep(Question):
     def draw(result: "Result") -> Any:
         """Draw curves over one parameter, or maps over two; return the Figure."""
         from geomech import plots
+        from geomech.results.scenes import scene_of
 
-        return plots.sweep_figure(tools.scene_of(result), result)
+        return plots.sweep_figure(scene_of(result), result)

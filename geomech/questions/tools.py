@@ -5,10 +5,8 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from rft.refusal import Refusal
-
 if TYPE_CHECKING:
-    from geomech.core.variables import Result, Variable
+    from geomech.core.variables import Variable
 
 
 def numbers(values: Any) -> Any:
@@ -73,18 +71,3 @@ def by_symmetry(name: str, zero: Iterable[str]) -> str:
 def with_units(variable: "Variable", lengths: str, angles: str) -> "Variable":
     """Return a variable over components with a unit for each: of x and y, and theta."""
     return replace(variable, unit=(lengths, lengths, angles))
-
-
-def scene_of(result: "Result") -> Any:
-    """Return the scene of a result: that of its question, or the one that its file spells
-    out; Refusal for a file without one."""
-    if result.question is not None:
-        return result.question.scene
-    if "scene_toml" not in result.attributes:
-        raise Refusal(
-            "the file of this result does not have its scene",
-            instead="compute it again to draw it",
-        )
-    from geomech.scenes.read import parse
-
-    return parse(result.attributes["scene_toml"], result.attributes["scene"])

@@ -17,6 +17,7 @@ from geomech.geometry.field import Field
 from geomech.geometry.harmonics import Harmonics
 from geomech.geometry.metric import Finsler, Metric
 from geomech.geometry.minimum_perturbation import minimum_perturbation
+from geomech.geometry.stretch import Stretch
 from geomech.geometry.tube import TaylorSeries, Tube
 from geomech.geometry.two_form import TwoForm
 from geomech.io.results import unit_name
@@ -194,9 +195,7 @@ def of_even_part(study: Study) -> list[Variable]:
     """Return the part of the velocity that is even in alphadot, if there is one."""
     if (even := study.even_part) is None:
         return []
-    units = (
-        f"{unit_name(length_unit(study.scene.system))} rad-1 (x, y), rad rad-1 (theta)"
-    )
+    units = of_components(length_unit(study.scene.system), "rad")
     name = "rms over directions of xi(alphadot) + xi(-alphadot), |alphadot| = 1, which A takes for 0"
     return [
         Variable(
@@ -210,7 +209,7 @@ def of_connection(
 ) -> list[Variable]:
     """Return A, its fit residual, and the rms of xi. error: half widths (3, d, N_1, ...) of intervals of A."""
     angles = angles_of(fitted.axes)
-    units = f"{unit_name(fitted.unit)} rad-1 (x, y), rad rad-1 (theta)"
+    units = of_components(fitted.unit, "rad")
     residual = "rms of xi - A alphadot over directions of alphadot, |alphadot| = 1"
     speed = "rms of xi over directions of alphadot, |alphadot| = 1"
     return [
@@ -226,8 +225,13 @@ def of_connection(
         Variable(
             "fit_residual", ("component", *angles), fitted.residual, units, residual
         ),
-        Variable("speed", ("component", *angles), fitted.speed, units, speed),
+        Variable("xi_rms", ("component", *angles), fitted.speed, units, speed),
     ]
+
+
+def of_components(unit: str, per: str) -> tuple[str, str, str]:
+    """Return the units of x, y and theta of a field. unit: of lengths."""
+    return (f"{unit}/{per}", f"{unit}/{per}", f"rad/{per}")
 
 
 def of_reach(tube: Tube) -> Variable:
@@ -279,7 +283,7 @@ def of_ccf(
     name: str = "ccf",
 ) -> Variable:
     """Return a CCF as a variable. what: text on the kind of its error."""
-    units = f"{unit_name(field.unit)} rad-2 (x, y), rad rad-2 (theta)"
+    units = of_components(field.unit, "rad2")
     label, dims = (
         "curvature constraint function of joints 1 and 2",
         ("component", *angles_of(field.axes)),
@@ -326,7 +330,7 @@ def of_pairs(form: TwoForm, error: TwoForm) -> list[Variable]:
 
 def of_frame(pose: Field) -> Variable:
     """Return the pose of a minimum-perturbation frame in the original frame."""
-    units = f"{unit_name(pose.unit)} (x, y), rad (theta)"
+    units = (pose.unit, pose.unit, "rad")
     name = "pose of this frame in the mean frame of the body, h with g_this = g_mean h"
     return Variable(
         "frame_pose", ("component", *angles_of(pose.axes)), pose.values, units, name
@@ -336,7 +340,7 @@ def of_frame(pose: Field) -> Variable:
 def of_harmonics(table: Harmonics, unit: str) -> list[Variable]:
     """Return the coefficients of the odd harmonics of xi, and their residual."""
     angles = angles_of(table.axes)
-    units = f"{unit_name(unit)} rad-1 (x, y), rad rad-1 (theta)"
+    units = of_components(unit, "rad")
     name = "coefficients of cos(k beta), sin(k beta), k = 1, 3, 5 ..., of xi for alphadot = (cos beta, sin beta)"
     residual = "rms over directions of alphadot of what the harmonics leave of xi, |alphadot| = 1"
     return [
@@ -393,6 +397,29 @@ def of_metric(metric: Metric | Finsler, power: bool = True) -> list[Variable]:
             f"{name}(cos beta, sin beta); {size}",
         ),
         Variable("norm_residual", angles, metric.residual, units, residual),
+    ]
+
+
+def of_stretch(stretch: Stretch, unit: str) -> list[Variable]:
+    """Return shape space redrawn to equal effort. unit: of path lengths."""
+    dims = ("stretched_alpha_1", "stretched_alpha_2")
+    shapes = stretch.field
+    rms = "rms of the relative errors of lengths on paper"
+    folded = "share of cells that are turned over"
+    return [
+        *(Variable(name, (name,), x, "rad") for name, x in zip(dims, shapes.axes)),
+        Variable(
+            "stretched_shape",
+            ("axis", *dims),
+            shapes.values,
+            unit,
+            "place of a shape where equal lengths take equal effort",
+        ),
+        Variable("stretch_distortion", dims, stretch.distortion, "1", rms),
+        Variable("stretch_rms", (), stretch.rms, "1", f"{rms}, of all"),
+        Variable("stretch_largest", (), stretch.largest, "1", "largest of them"),
+        Variable("stretch_folded", (), stretch.folded, "1", folded),
+        Variable("stretch_interpolation", (), shapes.degree, "1", "degree of splines"),
     ]
 
 

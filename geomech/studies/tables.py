@@ -14,6 +14,7 @@ from geomech.geometry.symmetry import zero_components
 from geomech.scenes.model import Scene, frequency_of
 from geomech.systems.base import length_unit
 
+COMPONENTS = ("x", "y", "theta")  # of a velocity in the body frame
 QUANTITIES = ("x", "y", "heading", "net_distance")  # of a pose
 POSE = QUANTITIES[:3]
 SURFACE = ("surface_spread", "surface_spread_heading")
