@@ -21,6 +21,9 @@ GROUPS = {
         "forces": "Compute force, power and bending moment along the body.",
         "optimize": "Find the best gait for an objective.",
     },
+    "Grains and robots": {
+        "walk": "Compute how a robot walks on grains.",
+    },
 }
 SUMMARIES = {name: line for lines in GROUPS.values() for name, line in lines.items()}
 

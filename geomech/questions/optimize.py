@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from geomech.questions import loading, names, parsing
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.common import ColourLimit
+from rft.refusal import Refusal
 
 if TYPE_CHECKING:
     from geomech.core.variables import Result
@@ -186,4 +187,11 @@ class Optimize(Question):
         Figure."""
         from geomech import plots
 
+        if "loop" not in result:
+            raise Refusal("its loop was not computed", instead="say ``mapped``")
+        if stretch and "stretched_shape" not in result:
+            raise Refusal(
+                "the stretched shape space was not computed",
+                instead="say ``stretched``",
+            )
         return plots.optimum_figure(result, clim=clim)
