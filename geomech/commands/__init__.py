@@ -3,7 +3,7 @@ is the function of that name, with _ for -, in the module of that name."""
 
 COMMANDS = {  # by the headings of `geomech --help`, in its order
     "Analyse": (
-        "run", "ccf", "connection", "symbolic", "accuracy", "lab"
+        "run", "symbolic", "accuracy", "lab"
     ),
     "Gaits": ("trajectory",),
     "Grains and robots": ("stress", "intrude", "grains", "drag_grains"),

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from geomech.core.variables import Result, Variable
-from geomech.geometry.field import Field
+from geomech.core.variables import Result
 from geomech.plots.maps import ccf_map, shape_space
-from geomech.plots.stretched import stretch_of, stretched_map
+from geomech.plots.stretched import stretched_map
 from geomech.plots.style import axes_of, figure, quantity, styled
+from geomech.results.fields import field_of, stretch_of
 from geomech.results.scenes import best_scene
 from geomech.studies.effort import units
 from geomech.systems.base import shape_labels
@@ -58,7 +58,7 @@ def optimum_map(
         shape_space(ax, [np.linspace(-1, 1, 2) * extent] * 2, labels)
         ax.set_title("no CCF: the velocity does not follow\nfrom shape alone")
     else:
-        field = gained(result)
+        field, _ = field_of(result, "gained_ccf")
         ccf_map(field, component_of(result), ax=ax, labels=labels, clim=clim)
         frame = "minimum-perturbation frame"
         if field.masked:
@@ -67,19 +67,6 @@ def optimum_map(
     draw_start_and_best(result, ax, lambda curve: curve, not scene.system.traits.linear)
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=1)
     return ax
-
-
-def gained(result: Result) -> Field:
-    """Return the CCF that the best gait gains."""
-    variable = result["gained_ccf"]
-    axes = tuple(result[dim].values for dim in variable.dims[1:])
-    degree = int(result.attributes["interpolation"])
-    return Field(axes, variable.values, degree, unit=length_of(variable))
-
-
-def length_of(variable: Variable) -> str:
-    """Return the unit of lengths in the unit of a field."""
-    return variable.unit[0].partition("/")[0]
 
 
 def component_of(result: Result) -> int:
@@ -101,7 +88,8 @@ def stretched_optimum(
         "unit": units(system)["path_length"],
         "clim": clim,
     }
-    stretched_map(gained(result), plane, component_of(result), ax=ax, **look)
+    field, _ = field_of(result, "gained_ccf")
+    stretched_map(field, plane, component_of(result), ax=ax, **look)
     share = 100 * plane.rms
     ax.set_title(
         f"the same, stretched to path lengths\n(lengths off by {share:.2g} % rms)"

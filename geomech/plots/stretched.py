@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from geomech.core.variables import Result
 from geomech.gaits import Gait
 from geomech.geometry.field import Field
 from geomech.geometry.stretch import Stretch
@@ -32,19 +31,6 @@ from geomech.plots.style import axes_of, figure, quantity, styled
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-
-def stretch_of(result: Result) -> Stretch:
-    """Return the stretched shape space of a result (`geomech.studies.fields.of_stretch`)."""
-    shape = result["stretched_shape"]
-    axes = tuple(result[dim].values for dim in shape.dims[1:])
-    return Stretch(
-        Field(axes, shape.values, int(result["stretch_interpolation"].values)),
-        result["stretch_distortion"].values,
-        float(result["stretch_rms"]),
-        float(result["stretch_largest"]),
-        float(result["stretch_folded"]),
-    )
 
 
 @styled

@@ -14,6 +14,8 @@ from typing import Any
 GROUPS = {
     "Analyse": {
         "displacement": "Compute the displacement of a gait by each tier.",
+        "ccf": "Compute the CCF and its integral over the scene's gait.",
+        "connection": "Compute the local connection on a grid.",
         "velocity": "Compute the body velocity of one shape and its rate.",
         "sweep": "Compute displacement or speed over a grid of parameters.",
     },

@@ -71,3 +71,14 @@ def by_symmetry(name: str, zero: Iterable[str]) -> str:
 def with_units(variable: "Variable", lengths: str, angles: str) -> "Variable":
     """Return a variable over components with a unit for each: of x and y, and theta."""
     return replace(variable, unit=(lengths, lengths, angles))
+
+
+def component_number(components: Any) -> int:
+    """Return the number of one component, x, y or theta; x if none is named."""
+    from geomech.core.errors import choose
+
+    known = ("x", "y", "theta")
+    if isinstance(components, str):
+        components = (components,)
+    names = [*components] or ["x"]
+    return known.index(choose("component", names[0], known))

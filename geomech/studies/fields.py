@@ -20,12 +20,10 @@ from geomech.geometry.minimum_perturbation import minimum_perturbation
 from geomech.geometry.stretch import Stretch
 from geomech.geometry.tube import TaylorSeries, Tube
 from geomech.geometry.two_form import TwoForm
-from geomech.io.results import unit_name
 from geomech.io.tables import FORMATS, LAYOUTS
 from geomech.io.tables.base import UNKNOWN_FRAME, body_text
 from geomech.io.tables.netcdf import SHAPE
 from geomech.scenes.model import Scene
-from geomech.scenes.write import toml
 from geomech.studies import effort
 from geomech.studies.study import Study
 from geomech.studies.tables import COMPONENTS
@@ -58,8 +56,36 @@ def of_study(study: Study) -> Result:
         "connection",
         (*coordinates(study.fitted.axes, labels), *variables(study)),
         attributes(study),
-        study,
     )
+
+
+def of_fitted_study(study: Study) -> Result:
+    """Return A, its fit residual and the rms of xi, with the conventions of a study."""
+    labels = shape_labels(study.scene.system)
+    found = of_connection(study.fitted, stored_table(study.scene.system, "A_error"))
+    axes = coordinates(study.fitted.axes, labels)
+    return Result("connection", (*axes, *found), attributes(study))
+
+
+def of_fit(study: Study) -> list[Variable]:
+    """Return the share of the rms of xi that the linear fit leaves, by component, and the
+    number of singular shapes."""
+    fitted = study.fitted
+    with np.errstate(invalid="ignore"):
+        shares = []
+        for residual, speed in zip(fitted.residual, fitted.speed):
+            known = np.isfinite(residual)
+            share = np.nan
+            if known.any():
+                size = max(np.nanmean(speed**2), 1e-300)
+                share = np.sqrt(np.nanmean(residual**2) / size)
+            shares.append(share)
+    singular = int(np.isnan(fitted.A).any((0, 1)).sum())
+    label = "rms of what the fit leaves, over the rms of xi"
+    return [
+        Variable("fit_share", ("component",), shares, "1", label),
+        Variable("singular_shapes", (), singular, "1", "points of the grid"),
+    ]
 
 
 def of_connection_alone(study: Study) -> Result:
@@ -76,7 +102,6 @@ def of_connection_alone(study: Study) -> Result:
         "connection",
         (*coordinates(study.fitted.axes, labels), *variables),
         attributes(study),
-        study,
     )
 
 
@@ -98,7 +123,7 @@ def of_struct(study: Study) -> Result:
                 name=f"exterior{ending}",
             )
         )
-    return Result(alone.kind, (*alone.variables, *variables), alone.attributes, study)
+    return Result(alone.kind, (*alone.variables, *variables), alone.attributes)
 
 
 CONTENTS = {WHOLE: of_study, A_ALONE: of_connection_alone, STRUCT: of_struct}
@@ -155,9 +180,8 @@ def attributes(study: Study) -> dict:
         else f"{scene.numerics}, {solver_of(scene.system)}"
     )
     return {
-        "title": f"Local connection and curvature constraint function of the scene {scene.name}",
         **about(scene),
-        "scene": toml(scene),
+        "scene": scene.name,
         "numerics": numerics,
         "interpolation": int(study.fitted.degree),
         **(
@@ -246,7 +270,7 @@ def of_reach(tube: Tube) -> Variable:
 def of_known(known: TaylorSeries, unit: str) -> list[Variable]:
     """Return the arrays of a connection near one gait (`geomech.geometry.tube`)."""
     units, order = (
-        f"{unit_name(unit)} rad-1 (x, y), rad rad-1 (theta)",
+        f"{unit}/rad (x, y), rad/rad (theta)",
         "Fourier coefficients, 1, cos t, sin t, cos 2t ..., of",
     )
     lead, row = ("component", "joint"), "harmonic_of_A"
@@ -266,7 +290,7 @@ def of_known(known: TaylorSeries, unit: str) -> list[Variable]:
             "at equally spaced phases: the data reach deviations d with d . inverse . d up to 1",
         ),
         Variable(
-            "gait_beyond", ("component",), known.beyond, f"{unit_name(unit)} (x, y), rad (theta)",
+            "gait_beyond", ("component",), known.beyond, f"{unit} (x, y), rad (theta)",
             "what the variation of the cycles changes in the net pose beyond the first order, part of its error",
         ),
         Variable(
@@ -301,7 +325,8 @@ def of_ccf(
 
 def of_pairs(form: TwoForm, error: TwoForm) -> list[Variable]:
     """Return the CCF of all pairs of joints, its error, and the pairs."""
-    units = f"{unit_name(form.field.unit)} rad-2 (x, y), rad rad-2 (theta)"
+    u = form.field.unit
+    units = f"{u}/rad2 (x, y), rad/rad2 (theta)"
     pairs, over = (
         np.array(form.pairs) + 1.0,
         ("pair", "component", *angles_of(form.field.axes)),
@@ -454,16 +479,14 @@ def of_fitted(fitted: Connection, shapes: Sequence[str] = ()) -> Result:
         if fitted.length is None
         else {
             "body_length": float(fitted.length),
-            "length_unit": unit_name(fitted.unit),
+            "length_unit": fitted.unit,
         }
     )
     variables = (
         *coordinates(fitted.axes, _labels(fitted.axes, shapes)),
         *of_connection(fitted),
     )
-    return Result(
-        "connection", variables, {"sign_of_A": "xi = + A alphadot", **sized}, fitted
-    )
+    return Result("connection", variables, {"sign_of_A": "xi = + A alphadot", **sized})
 
 
 def of_field(values: Field, name: str, shapes: Sequence[str] = ()) -> Result:
@@ -479,7 +502,6 @@ def of_field(values: Field, name: str, shapes: Sequence[str] = ()) -> Result:
         "field",
         (*coordinates(values.axes, _labels(values.axes, shapes)), field),
         {},
-        values,
     )
 
 
@@ -516,7 +538,7 @@ def about(scene: Scene) -> dict:
         "frame": scene.frame,
         "frame_meaning": f"body frame: {meaning}",
         "body_length": float(system.length),
-        "length_unit": unit_name(length_unit(system)),
+        "length_unit": length_unit(system),
         **recorded(system),
         **({"body": text} if (text := body_text(_body(system))) else {}),
         "components": "x, y, theta of the body velocity xi: forward (tail to head), to the left, counter-clockwise",
