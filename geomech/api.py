@@ -12,8 +12,14 @@ from typing import Any, Concatenate, ParamSpec
 
 from geomech.core.variables import Result
 from geomech.questions.base import Question, plain_type
+from geomech.questions.ccf import Ccf
+from geomech.questions.connection import Connection
 from geomech.questions.displacement import Displacement
+from geomech.questions.forces import Forces
+from geomech.questions.optimize import Optimize
+from geomech.questions.sweep import Sweep
 from geomech.questions.velocity import Velocity
+from geomech.questions.walk import Walk
 from geomech.scenes.parts import as_scene
 from geomech.studies import study as studies
 from rft.refusal import Refusal
@@ -141,7 +147,33 @@ class Study:
         return self._tables
 
     displacement = asks(Displacement)
+    ccf = asks(Ccf)
+    connection = asks(Connection)
     velocity = asks(Velocity)
+    sweep = asks(Sweep)
+    forces = asks(Forces)
+    optimise = optimize = asks(Optimize)
+    walk = asks(Walk)
+
+    def animate(self, path: str | Path = "swim.gif", *, cycles: int = 1) -> Path:
+        """Write a film of the body beside its gait on the CCF, .gif or .mp4, or a strip of
+        it, .png, .pdf or .svg; return its path.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import geomech
+        >>> study = geomech.study("three-link-viscous", grid=15, phases=16)
+        >>> study.animate(pathlib.Path(tempfile.mkdtemp()) / "swim.png").name
+        'swim.png'
+        """
+        from geomech.output import animate
+        from geomech.studies.motion import Trajectory
+
+        path = Path(path)
+        animate.check_format(path)
+        animate.write(Trajectory(self.scene, cycles, drawn=True).ask(), path)
+        return path
 
 
 def study(*parts: Any, effects: Sequence = (), **numerics: Any) -> Study:
@@ -181,4 +213,9 @@ def load_result(path: str | Path) -> Result:
 
 
 displacement = asked_of_scene(Displacement)
+ccf = asked_of_scene(Ccf)
 velocity = asked_of_scene(Velocity)
+sweep = asked_of_scene(Sweep)
+forces = asked_of_scene(Forces)
+optimise = optimize = asked_of_scene(Optimize)
+walk = asked_of_scene(Walk)

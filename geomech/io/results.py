@@ -96,7 +96,8 @@ def variable_of(
     """Return the variable of a file."""
     unit: Any = facts.get("units", "")
     parts = tuple(unit.split(", "))
-    if len(parts) > 1 and dims and len(parts) == values.shape[0]:
+    plain_words = "(" not in facts.get("units", "")
+    if len(parts) > 1 and plain_words and dims and len(parts) == values.shape[0]:
         unit = parts
     return Variable(
         name, dims, values, unit, facts.get("long_name", ""), zero=facts.get("zero", "")

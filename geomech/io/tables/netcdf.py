@@ -53,7 +53,7 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
             warnings.simplefilter("ignore")
             file = netcdf_file(io.BytesIO(raw), mmap=False)
             variables = {
-                name: (tuple(v.dimensions), np.array(v[:]))
+                name: (tuple(v.dimensions), np.array(v.data))
                 for name, v in file.variables.items()
             }
             units = {
