@@ -38,6 +38,7 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.api import ccf as ccf
     from geomech.api import displacement as displacement
     from geomech.api import forces as forces
+    from geomech.api import intrude as intrude
     from geomech.api import load_result as load_result
     from geomech.api import optimise as optimise
     from geomech.api import optimize as optimize
@@ -92,6 +93,7 @@ _OBJECTS = {
             "ccf",
             "displacement",
             "forces",
+            "intrude",
             "load_result",
             "optimise",
             "optimize",

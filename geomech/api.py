@@ -16,6 +16,7 @@ from geomech.questions.ccf import Ccf
 from geomech.questions.connection import Connection
 from geomech.questions.displacement import Displacement
 from geomech.questions.forces import Forces
+from geomech.questions.intrude import Intrude
 from geomech.questions.optimize import Optimize
 from geomech.questions.sweep import Sweep
 from geomech.questions.velocity import Velocity
@@ -154,6 +155,7 @@ class Study:
     forces = asks(Forces)
     optimise = optimize = asks(Optimize)
     walk = asks(Walk)
+    intrude = asks(Intrude)
 
     def animate(self, path: str | Path = "swim.gif", *, cycles: int = 1) -> Path:
         """Write a film of the body beside its gait on the CCF, .gif or .mp4, or a strip of
@@ -219,3 +221,4 @@ sweep = asked_of_scene(Sweep)
 forces = asked_of_scene(Forces)
 optimise = optimize = asked_of_scene(Optimize)
 walk = asked_of_scene(Walk)
+intrude = asked_of_scene(Intrude)

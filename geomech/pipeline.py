@@ -48,6 +48,7 @@ def execute(
 
     yes: whatever it costs. everything: all of the result is printed, not only what its
     kind shows first."""
+    yes = yes or question.unlimited
     inputs = question.inputs()
     question.check()
     refuse_unwritable(outputs, inputs)

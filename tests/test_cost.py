@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from commands import geomech as run
 from scipy.io import netcdf_file
+from tabled import swept_table
 
 from geomech import plots, scenes, terminal
 from geomech.geometry import connection, harmonics
@@ -271,7 +272,7 @@ def test_a_sweep_over_amplitude_goes_in_groups(tmp_path, monkeypatch):
         "medium.ratio": [2.0, 3.0],
         "gait.amplitude": np.linspace(0.2, 1.5, 7).tolist(),
     }
-    whole, kept = sweep.sweep(VISCOUS, over), tmp_path / ".s.partial"
+    whole, kept = swept_table(sweep.sweep(VISCOUS, over)), tmp_path / ".s.partial"
     monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", 3)
     rows, calls = cycles._rows, []
 
@@ -283,8 +284,8 @@ def test_a_sweep_over_amplitude_goes_in_groups(tmp_path, monkeypatch):
 
     monkeypatch.setattr(cycles, "_rows", stopping)
     with pytest.raises(terminal.Stopped):
-        sweep.sweep(VISCOUS, over, kept)
-    again = sweep.sweep(VISCOUS, over, kept)
+        swept_table(sweep.sweep(VISCOUS, over, kept))
+    again = swept_table(sweep.sweep(VISCOUS, over, kept))
     assert calls == [
         (2.0, 3),
         (2.0, 3),

@@ -5,6 +5,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from tabled import swept_table, tabled
 
 from geomech import scenes
 from geomech.gaits import Fourier
@@ -92,7 +93,7 @@ FOUND = {
 def test_the_balances_foretold_are_those_solved(name, solved):
     scene, tiers = FOUND[name]
     foretold = Study(scene).cost([0.1, 0.2, 0.3], tiers).balances
-    Study(scene).study([0.1, 0.2, 0.3], tiers)
+    tabled(Study(scene).displacements([0.1, 0.2, 0.3], tiers))
     assert foretold == sum(solved)
 
 
@@ -156,7 +157,7 @@ def test_accuracy_and_sweep_say_what_they_cost(solved):
     ):
         foretold = sweep.Sweep(scene, over).cost().balances
         solved.clear()
-        sweep.sweep(scene, over)
+        swept_table(sweep.sweep(scene, over))
         assert foretold == sum(solved)
 
 
@@ -207,7 +208,7 @@ def test_memory_is_foretold_too_large_rather_than_too_small():
     told = cost.direct(scene, scene.gait, len(amplitudes), 4096)[0].memory - BASE
     tracemalloc.start()
     try:
-        Study(scene).study(amplitudes, ["direct"])
+        tabled(Study(scene).displacements(amplitudes, ["direct"]))
         used = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()

@@ -4,6 +4,8 @@ import json
 
 import numpy as np
 import pytest
+from geomech.studies.results import Displacements
+from tabled import tabled
 
 import geomech
 from geomech.gaits import Circle, Ellipse
@@ -11,7 +13,6 @@ from geomech.geometry import metric
 from geomech.geometry.connection import Connection
 from geomech.scenes.frames import framed
 from geomech.studies import cost, effort, fields
-from geomech.studies.results import Displacements
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from geomech.systems.capabilities import refined, velocity_and_power
 from rft import (
@@ -106,7 +107,7 @@ def test_work_and_cost_of_transport_of_known_motions():
     )
     assert found["work"] * 2 * np.pi >= found["path_length"] ** 2
     study = geomech.Study(scene(Swimmer(SAND, UNEVEN)))
-    table = study.study([0.5, 1.0], ["direct", "path"])
+    table = tabled(study.displacements([0.5, 1.0], ["direct", "path"]))
     table = Displacements(effort.with_effort(table.result))
     distance = np.array(table["net_distance"]["path"]) / 0.3
     assert table["cost_of_transport"]["path"] == pytest.approx(
@@ -121,7 +122,7 @@ def test_work_and_cost_of_transport_of_known_motions():
 
 def test_viscous_circle_is_as_efficient_as_published():
     study = geomech.Study(scene(Swimmer(Viscous(2.0), Chain()), Circle()))
-    table = study.study([1.0, 1.3], ["direct"])
+    table = tabled(study.displacements([1.0, 1.3], ["direct"]))
     table = Displacements(effort.with_effort(table.result))
     assert table["path_length"][0] == pytest.approx(0.512235, abs=1e-6)
     assert table["efficiency"]["direct"] == pytest.approx([0.1001, 0.1088], abs=6e-5)

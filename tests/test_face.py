@@ -8,6 +8,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tabled import swept_table
 
 import geomech
 import rft
@@ -170,7 +171,7 @@ def test_functions_take_whatever_makes_a_scene(study):
         "scene: displacement 3.14"
     )
     assert best.plot().get_xlabel() == r"$\alpha_{1}$ (rad)"
-    swept = geomech.sweep(study, {"medium.C": [1.0, 2.0]})
+    swept = swept_table(geomech.sweep(study, {"medium.C": [1.0, 2.0]}))
     assert_allclose(
         swept["displacement"], study.sweep({"medium.C": [1.0, 2.0]})["displacement"]
     )

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from commands import geomech
+from geomech.optimisation.question import result_of
 from tasks import doubled, who
 from test_store import HARD, same
 
@@ -18,7 +19,6 @@ from geomech import cli, plots, scenes, terminal, text
 from geomech.commands.pipeline import allow, storing
 from geomech.geometry import connection
 from geomech.optimisation import checked, search
-from geomech.optimisation.question import result_of
 from geomech.run import jobs, store
 from geomech.run.digest import Undigestible
 from geomech.run.jobs import Runner, context_of, runner

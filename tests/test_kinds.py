@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from commands import geomech
 from registry import EFFECTS
+from tabled import tabled
 
 from geomech import cli
 from geomech.core.entry_points import installed_entries
@@ -323,7 +324,7 @@ def test_one_of_each_family_runs_everywhere_and_round_trips(name):
     assert toml(parse(anew)) == anew
     assert name in explain(scene)
     study = Study(scene)
-    table = study.study([0.4, 0.7])
+    table = tabled(study.displacements([0.4, 0.7]))
     assert np.isfinite(table["direct"]).all()
     with pytest.raises(ValueError, match="car|hinge|peanut|slick"):
         register(

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from commands import geomech
 from registry import MEDIA
+from tabled import tabled
 
 import geomech as geomech_package
 from geomech import scenes
@@ -45,8 +46,10 @@ def test_effects_in_a_list_are_those_in_a_tuple():
         and listed.effects == (EndCaps(0.06),)
     )
     found = [
-        Study(Scene(s, Circle(), Numerics(grid=7, phases=16))).study(
-            [0.5], ["path", "direct"]
+        tabled(
+            Study(Scene(s, Circle(), Numerics(grid=7, phases=16))).displacements(
+                [0.5], ["path", "direct"]
+            )
         )
         for s in (listed, made)
     ]
@@ -197,7 +200,7 @@ def test_from_python_units_are_warned_of_by_name():
         lambda: Scene(VISCOUS.system, Circle(amplitude=30)),
         lambda: Scene(NoSlipSnake(), Ellipse(centre=(7, 0))),
         lambda: Study(VISCOUS).poses("direct", amplitudes=[1, -30]),
-        lambda: Study(VISCOUS).study([30], ["direct"]),
+        lambda: tabled(Study(VISCOUS).displacements([30], ["direct"])),
         lambda: cheapest(VISCOUS, [30.0], 1.0),
         lambda: single_of(VISCOUS.system, [30, 17], [1, 0]),
         lambda: single_of(NoSlipSnake(), [30, 17], [1, 0]),

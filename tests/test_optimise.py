@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from geomech.optimisation.question import result_of
 
 import geomech
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Sine
@@ -25,7 +26,6 @@ from geomech.optimisation.gain import Gained, limiting
 from geomech.optimisation.loops import Loops
 from geomech.optimisation.objectives import Objective
 from geomech.optimisation.problem import Enough, Problem
-from geomech.optimisation.question import result_of
 from geomech.optimisation.search import _Search
 from geomech.optimisation.stroke import Stroke
 from geomech.optimisation.undulations import Undulations

@@ -9,6 +9,7 @@ import sys
 import numpy as np
 import pytest
 from commands import geomech
+from tabled import tabled
 
 import geomech as library
 from geomech import plots
@@ -240,7 +241,8 @@ def test_what_was_loaded_is_in_its_registry_and_in_scenes(folder):
         assert library.toml(parse(again)) == again
         study = Study(scene)
         assert (
-            np.isfinite(study.study([0.3])["direct"]).all() and "leading" in study.tiers
+            np.isfinite(tabled(study.displacements([0.3]))["direct"]).all()
+            and "leading" in study.tiers
         )
     assert (
         library.load(folder / "skate.toml").changed(grip=0.7).system.wrapped.grip == 0.7
@@ -282,7 +284,7 @@ def test_five_members_and_functions_go_through_everything(system, tmp_path):
     )
     study = Study(scene)
     assert study.tiers[-1] == "direct" and {"area", "adapted", "path"} <= {*study.tiers}
-    table = study.study([0.3, 0.5], study.tiers)
+    table = tabled(study.displacements([0.3, 0.5], study.tiers))
     truth = np.array(table["direct"])
     assert np.abs(truth[:, 0]).min() > 0.01
     for tier in study.tiers:

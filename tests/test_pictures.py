@@ -10,6 +10,7 @@ from matplotlib.collections import QuadMesh
 from matplotlib.colors import to_rgba
 from matplotlib.quiver import Quiver
 from PIL import Image
+from tabled import tabled
 
 from geomech import plots, scenes
 from geomech.gaits import Butterfly, Circle, Ellipse
@@ -291,7 +292,11 @@ def band(collection):
 
 
 def test_tiers_of_one_amplitude_stand_side_by_side():
-    table = Study(scenes.load("three-link-viscous").with_numerics(grid=9)).study([0.5])
+    table = tabled(
+        Study(scenes.load("three-link-viscous").with_numerics(grid=9)).displacements(
+            [0.5]
+        )
+    )
     ax = plots.displacement(table)
     points = [line.get_xdata().item() for line in ax.lines if line.get_marker() == "o"]
     bars = [bar.get_segments()[0][0, 0] for bar in ax.collections]
@@ -392,7 +397,7 @@ def test_measurements_are_read_in_the_units_of_the_results(
 
 def test_four_quantities_and_the_speed():
     glass = scenes.load("three-link-viscous").changed(gait=Ellipse(frequency=2.5))
-    table = Study(glass).study([0.5, 1.0], ["direct"])
+    table = tabled(Study(glass).displacements([0.5, 1.0], ["direct"]))
     names = ("x", "y", "theta", "distance")
     fig = plots.displacement_figure({"ellipse": table}, [glass.gait], components=names)
     assert [ax.get_ylabel() for ax in fig.axes] == [f"{q} per cycle ({u})" for q, u in (

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from commands import geomech
+from tabled import tabled
 
 from geomech import Numerics, Scene, Study, plots
 from geomech.gaits import Circle, Fourier, Wave
@@ -145,14 +146,14 @@ def test_the_area_of_three_joints_is_the_integral_over_a_surface():
     sizes = np.array([0.4, 1.0])
     flat = Study(Scene(Cubic(turns=0.0), LOOP, Numerics(grid=7, extent=1.2)))
     along = (flat.scene.system.velocity(*LOOP.cycle(64, sizes))).mean(1) * 2 * np.pi
-    table = flat.study(sizes, ["area", "direct"])
+    table = tabled(flat.displacements(sizes, ["area", "direct"]))
     np.testing.assert_allclose(table["area"], along, atol=1e-12)
     assert (
         np.abs(along[:, :2]).min() > 1e-3
         and np.max(table["surface_spread"]["area"]) < 1e-12
     )
     study = Study(Scene(Cubic(), LOOP, Numerics(grid=7, extent=1.2)))
-    table = study.study(sizes, ["area", "direct"])
+    table = tabled(study.displacements(sizes, ["area", "direct"]))
     spread, turned = (
         np.array(table[key]["area"])
         for key in ("surface_spread", "surface_spread_heading")
@@ -164,7 +165,7 @@ def test_the_area_of_three_joints_is_the_integral_over_a_surface():
         table["estimate"]["area"], np.hypot(*off[:, :2].T), rtol=1e-6
     )
     np.testing.assert_allclose(off[:, 2], 0.0, atol=1e-12)
-    small = study.study([0.05, 0.1], ["area"])["estimate"]["area"]
+    small = tabled(study.displacements([0.05, 0.1], ["area"]))["estimate"]["area"]
     assert np.log2(small[1] / small[0]) == pytest.approx(3.0, abs=0.15)
 
 
@@ -344,11 +345,11 @@ def test_beyond_the_field_tiers_solve_around_the_gait(monkeypatch):
         Sandy(), gait, Numerics(grid=10, extent=1.0, interpolation=5, directions=64)
     )
     tabulated, asked = Study(scene), ([0.5, 0.9], ["area", "path", "direct"])
-    found = tabulated.study(*asked)
+    found = tabled(tabulated.displacements(*asked))
     assert "field" in found["seconds"]
     monkeypatch.setattr("geomech.tiers.fitted.FIELD", 9_999)
     study = Study(scene)
-    around = study.study(*asked)
+    around = tabled(study.displacements(*asked))
     assert "field" not in around["seconds"] and not any(
         key[0] == "connection" for key in study.computed
     )
@@ -420,7 +421,7 @@ def test_what_hangs_on_the_surface_is_part_of_every_estimate(monkeypatch):
         TIERS._parts, "area", planned(TIERS["area"], spread=lambda *asked: spread)
     )
     scene = Scene(Cubic(), LOOP, Numerics(grid=7, extent=1.2))
-    table = Study(scene).study([0.4, 0.5], ["area"])
+    table = tabled(Study(scene).displacements([0.4, 0.5], ["area"]))
     assert (
         table["estimate"]["area"][0] == 0.3
         and 1e-6 < table["estimate"]["area"][1] < 0.3

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import xarray
 from registry import SYSTEMS
+from tabled import swept_table, tabled
 
 import geomech
 import rft
@@ -46,13 +47,15 @@ def study():
 
 @pytest.fixture(scope="module")
 def table(study):
-    return study.study([0.5, 1.0, 1.5], ["area", "direct"])
+    return tabled(study.displacements([0.5, 1.0, 1.5], ["area", "direct"]))
 
 
 @pytest.fixture(scope="module")
 def swept(study):
-    return geomech.sweep(
-        study.scene, {"gait.amplitude": [0.5, 1.0, 1.2], "body.length": [0.3, 0.6]}
+    return swept_table(
+        geomech.sweep(
+            study.scene, {"gait.amplitude": [0.5, 1.0, 1.2], "body.length": [0.3, 0.6]}
+        )
     )
 
 
@@ -267,7 +270,7 @@ def of_length(length):
     made = Study(
         Scene(Swimmer(sand, body), gait, Numerics(grid=7, extent=2.0, phases=32))
     )
-    return made, made.study([0.5, 1.0], ["area", "path", "direct"])
+    return made, tabled(made.displacements([0.5, 1.0], ["area", "path", "direct"]))
 
 
 def law_of_units(values, units, plain, length, key=""):
@@ -338,7 +341,7 @@ def test_what_leaves_the_library_has_one_unit_and_says_it():
     assert drawn.get_ylabel() == "x per cycle (m)"
 
     over = {"gait.amplitude": [0.5, 1.0], "medium.C": [1.5]}
-    swept, unswept = (geomech.sweep(s.scene, over) for s in (made, one))
+    swept, unswept = (swept_table(geomech.sweep(s.scene, over)) for s in (made, one))
     assert (
         swept["units"]["estimate"] == "m"
         and (swept["length"] == length).all()
@@ -346,8 +349,10 @@ def test_what_leaves_the_library_has_one_unit_and_says_it():
     )
     for key, unit in swept["units"].items():
         law_of_units(swept[key], unit, unswept[key], length)
-    every = geomech.sweep(
-        one.scene, {"body.length": [1.0, length], "gait.amplitude": [0.5]}
+    every = swept_table(
+        geomech.sweep(
+            one.scene, {"body.length": [1.0, length], "gait.amplitude": [0.5]}
+        )
     )
     assert every["units"]["displacement"] == [
         "m",
@@ -501,8 +506,10 @@ def test_plots_draw_where_they_stand(study, table):
 def test_speeds_and_what_the_medium_does_are_shown_too():
     sand = rft.Granular(C=1.5, gamma0=0.22, covariance=((0.02, 0.001), (0.001, 0.002)))
     gait = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.3, -0.2), frequency=2.5)
-    made = Study(Scene(Swimmer(sand, UNEVEN), gait, Numerics(phases=32))).study(
-        [0.5, 1.0], ["direct"]
+    made = tabled(
+        Study(Scene(Swimmer(sand, UNEVEN), gait, Numerics(phases=32))).displacements(
+            [0.5, 1.0], ["direct"]
+        )
     )
     data = made.to_xarray()
     for key, units in (

@@ -9,6 +9,7 @@ import pytest
 import xarray
 from commands import geomech
 from registry import GAITS
+from tabled import swept_table, tabled
 
 from geomech import scenes
 from geomech.core.variables import Result, Variable
@@ -112,14 +113,19 @@ def test_from_python_too():
     scene = scenes.parse(CHAIN + GRAINS)
     for contradict in (
         lambda: scene.changed(gait=Circle(frequency=2.0)),
-        lambda: Study(scene).study([0.5], ["direct"], Circle(frequency=2.0)),
+        lambda: tabled(
+            Study(scene).displacements([0.5], ["direct"], Circle(frequency=2.0))
+        ),
     ):
         with pytest.raises(
             Refusal,
             match=r"\[gait\] frequency = 2, but the effects of the swimmer have 2.5",
         ):
             contradict()
-    assert Study(scene).study([0.5], ["direct"], Circle())["frequency"] == 2.5
+    assert (
+        tabled(Study(scene).displacements([0.5], ["direct"], Circle()))["frequency"]
+        == 2.5
+    )
     assert [g.frequency for g in report._gaits(scene)] == [
         2.5
     ] * 3  # those that `run` adds, too
@@ -127,7 +133,10 @@ def test_from_python_too():
 
 def test_every_displacement_is_a_speed():
     scene = scenes.parse(CHAIN)
-    table, amplitudes = Study(scene).study([0.5, 1.0], ["area", "direct"]), [0.5, 1.0]
+    table, amplitudes = (
+        tabled(Study(scene).displacements([0.5, 1.0], ["area", "direct"])),
+        [0.5, 1.0],
+    )
     for tier in ("area", "direct"):
         poses = np.array(table[tier])
         assert (np.abs(poses) > 1e-4).any(0).all()  # it moves along, sideways and turns
@@ -143,8 +152,10 @@ def test_every_displacement_is_a_speed():
         "estimate": "m", "estimate_heading": "rad", "body_length": "m", "seconds": "s",
         "frequency": "Hz", "speed": "m/s", "speed_body_lengths": "BL/s", "turning_rate": "rad/s",
     }  # fmt: skip
-    plain = Study(scenes.parse(CHAIN.replace("frequency = 2.5", ""))).study(
-        amplitudes, ["area", "direct"]
+    plain = tabled(
+        Study(scenes.parse(CHAIN.replace("frequency = 2.5", ""))).displacements(
+            amplitudes, ["area", "direct"]
+        )
     )
     assert {k: plain[k] for k in ("area", "direct", "estimate")} == {
         k: table[k] for k in ("area", "direct", "estimate")
@@ -177,7 +188,7 @@ def test_every_displacement_is_a_speed():
 
 def test_tables_have_one_unit_a_row():
     scene = scenes.parse(CHAIN)
-    table = Study(scene).study([1.0], ["direct"])
+    table = tabled(Study(scene).displacements([1.0], ["direct"]))
     lines = displacement.full(table.result, "s").splitlines()
     found = {}
     for head, _, row in zip(lines[::3], lines[1::3], lines[2::3]):
@@ -202,7 +213,9 @@ def test_tables_have_one_unit_a_row():
 
 
 def test_what_is_nothing_but_its_error_is_zero():
-    result = Study(scenes.parse(CHAIN)).study([0.5, 1.0], ["direct"]).result
+    result = tabled(
+        Study(scenes.parse(CHAIN)).displacements([0.5, 1.0], ["direct"])
+    ).result
     y = dataclasses.replace(result["y"], values=[[1e-8, -1e-8]], error=[[2e-8, 3e-8]])
     lines = displacement.text(
         dataclasses.replace(
@@ -214,8 +227,10 @@ def test_what_is_nothing_but_its_error_is_zero():
 
 def test_sweeps_give_it(tmp_path):
     scene = scenes.parse(CHAIN + GRAINS)
-    found = sweep.sweep(
-        scene, {"gait.amplitude": [0.5, 1.0], "gait.frequency": [1.0, 2.5, 4.0]}
+    found = swept_table(
+        sweep.sweep(
+            scene, {"gait.amplitude": [0.5, 1.0], "gait.frequency": [1.0, 2.5, 4.0]}
+        )
     )
     assert (
         np.diff(found["displacement"][..., 0]) != 0
@@ -225,9 +240,11 @@ def test_sweeps_give_it(tmp_path):
         found["speed"],
         np.hypot(*np.moveaxis(found["displacement"], -1, 0)[:2]) * [1.0, 2.5, 4.0],
     )
-    alone = Study(
-        scene.changed(gait=dataclasses.replace(scene.gait, amplitude=1.0))
-    ).study([1.0], ["direct"])
+    alone = tabled(
+        Study(
+            scene.changed(gait=dataclasses.replace(scene.gait, amplitude=1.0))
+        ).displacements([1.0], ["direct"])
+    )
     np.testing.assert_allclose(
         found["speed"][1, 1], alone["speed"]["direct"][0], rtol=1e-6
     )
@@ -251,9 +268,11 @@ def test_sweeps_give_it(tmp_path):
             seen.append(len(alpha)) or run(self, alpha, *rest, **more)
         ),
     ):
-        plain = sweep.sweep(
-            scenes.parse(CHAIN),
-            {"gait.frequency": [1.0, 2.0, 4.0], "gait.amplitude": [0.5, 1.0]},
+        plain = swept_table(
+            sweep.sweep(
+                scenes.parse(CHAIN),
+                {"gait.frequency": [1.0, 2.0, 4.0], "gait.amplitude": [0.5, 1.0]},
+            )
         )
         each = len(seen), sum(seen)
         assert plain["displacement"].shape == (3, 2, 3) and plain["estimate"].shape == (
@@ -261,7 +280,9 @@ def test_sweeps_give_it(tmp_path):
             2,
         )
         seen.clear()
-        one = sweep.sweep(scenes.parse(CHAIN), {"gait.amplitude": [0.5, 1.0]})
+        one = swept_table(
+            sweep.sweep(scenes.parse(CHAIN), {"gait.amplitude": [0.5, 1.0]})
+        )
     assert (
         len(seen),
         sum(seen),
@@ -270,8 +291,11 @@ def test_sweeps_give_it(tmp_path):
     np.testing.assert_allclose(
         plain["speed"][:, 1], one["speed"][1] * np.array([0.4, 0.8, 1.6])
     )
-    timeless = sweep.sweep(
-        scenes.parse(CHAIN.replace("frequency = 2.5", "")), {"gait.amplitude": [0.5]}
+    timeless = swept_table(
+        sweep.sweep(
+            scenes.parse(CHAIN.replace("frequency = 2.5", "")),
+            {"gait.amplitude": [0.5]},
+        )
     )
     assert "speed" not in timeless
 

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from commands import geomech
+from tabled import tabled
 
 from geomech.gaits import Fourier
 from geomech.geometry import connection, harmonics
@@ -100,7 +101,7 @@ def test_three_joints_in_sand_within_a_few_percent():
         "harmonic" not in default_tiers(chain)
         and harmonic.directions(chain, study.scene.numerics) == 110
     )
-    table = study.study([0.4], ["harmonic", "path", "direct"])
+    table = tabled(study.displacements([0.4], ["harmonic", "path", "direct"]))
     off = {
         m: np.hypot(*(np.array(table[m]) - table["direct"])[0, :2])
         for m in ("harmonic", "path")

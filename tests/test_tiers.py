@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from registry import GAITS, MEDIA
+from tabled import tabled
 
 from geomech import plots, scenes
 from geomech.gaits import Butterfly, Circle, Fourier, Wave
@@ -349,7 +350,9 @@ def test_look_up_estimates_cover_the_truth(truths):
         true = truths(
             "estimates", exact, some.system.medium, some.system.body, some.gait, a
         )
-        table = Study(some).study(a, [m for m in TIERS if m != "direct"])
+        table = tabled(
+            Study(some).displacements(a, [m for m in TIERS if m != "direct"])
+        )
         for tier, error in table["estimate"].items():
             estimates.append(np.stack([error, table["estimate_heading"][tier]], -1))
             errors.append(estimate.pose_distance(np.array(table[tier]), true, 1.0))
@@ -428,7 +431,7 @@ def test_a_tier_is_one_expression(monkeypatch):
     study = Study(scene)
     foretold = study.cost([0.05, 1.0], ["path", "leading", "direct"]).balances
     with listening(lambda samples, points, linear: counts.append(samples)):
-        table = study.study([0.05, 1.0], ["path", "leading", "direct"])
+        table = tabled(study.displacements([0.05, 1.0], ["path", "leading", "direct"]))
     assert foretold == sum(counts) and [*table["seconds"]] == [
         "field",
         "direct",
@@ -585,7 +588,10 @@ def test_estimates_are_in_body_lengths_and_in_tables_in_the_unit_of_their_poses(
     )
     np.testing.assert_allclose(same, error, rtol=1e-6)
     np.testing.assert_allclose(small[:, :2], 1e-6 * poses[:, :2], rtol=1e-9)
-    tables = [Study(s.with_numerics(grid=9)).study(a, ["path"]) for s in (GLASS, tiny)]
+    tables = [
+        tabled(Study(s.with_numerics(grid=9)).displacements(a, ["path"]))
+        for s in (GLASS, tiny)
+    ]
     for key, size in (
         ("estimate", 1e-6),
         ("estimate_heading", 1.0),

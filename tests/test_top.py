@@ -14,6 +14,7 @@ import tomllib
 
 import pytest
 from commands import geomech as run
+from tabled import tabled
 
 import geomech
 import rft
@@ -51,7 +52,9 @@ def test_parts_are_reached_from_the_top():
     study = geomech.Study(geomech.load("three-link-viscous").with_numerics(grid=7))
     assert study.poses("path").shape == (3,)
     axes = geomech.plots.figure(3, 3)[1]
-    geomech.plots.displacement(study.study([0.5], ["path"]), ax=axes[0, 0])
+    geomech.plots.displacement(
+        tabled(study.displacements([0.5], ["path"])), ax=axes[0, 0]
+    )
     with pytest.raises(
         AttributeError, match="module 'geomech' has no attribute 'lode'"
     ):

@@ -10,6 +10,7 @@ import pickle
 import numpy as np
 import pytest
 from registry import GAITS, OUTLINES, STRESSES, SYSTEMS
+from tabled import swept_table
 
 import rft
 from geomech import scenes
@@ -209,9 +210,9 @@ def geometries(value):
     ):
         yield "a scene", lambda of=of: of(value)
     yield "a scene", lambda: cheapest(value, [1.0], 0.1)
-    yield "a scene", lambda: sweep.sweep(value, {"gait.amplitude": [1.0]})
-    yield "over", lambda: sweep.sweep(plain, value)
-    yield "a list", lambda: sweep.sweep(plain, {"gait.amplitude": value})
+    yield "a scene", lambda: swept_table(sweep.sweep(value, {"gait.amplitude": [1.0]}))
+    yield "over", lambda: swept_table(sweep.sweep(plain, value))
+    yield "a list", lambda: swept_table(sweep.sweep(plain, {"gait.amplitude": value}))
     yield "a list", lambda: cheapest(plain, value, 0.1)
     yield "gait of the scene", lambda: cheapest(plain, [1.0], 0.1, value)
     yield "gait of the scene", lambda: Study(plain).table("adapted", value)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray
 from commands import geomech
+from tabled import swept_table, tabled
 
 from geomech import plots, scenes
 from geomech.gaits import Butterfly, Ellipse
@@ -176,7 +177,7 @@ def test_wide_media_shift_the_mean_and_it_is_told(monkeypatch):
         assert told["shift"]["net_distance"][0] == pytest.approx(
             shift, abs=0.03 * nets.std()
         )
-        tables[share] = Study(sand).study([1.2], ["direct"])
+        tables[share] = tabled(Study(sand).displacements([1.2], ["direct"]))
         errors[share] = told["shift"]["net_distance"][0] / told["net_distance"][0]
     assert errors[1.0] < -0.3 and -uncertainty.SHIFTED < errors[0.1] < 0
     wide, narrow = (
@@ -221,7 +222,7 @@ def test_roots():
 
 def test_every_tier_has_it_beside_its_own_error():
     sand = scene(granular()).with_numerics(grid=7, phases=64)
-    table = Study(sand).study([0.5, 1.0], ["area", "direct"])
+    table = tabled(Study(sand).displacements([0.5, 1.0], ["area", "direct"]))
     told = uncertainty.of_medium(sand, GAIT, np.array([0.5, 1.0]))
     for tier in ("area", "direct"):
         np.testing.assert_allclose(table["medium_error"][tier], told["position"])
@@ -229,8 +230,10 @@ def test_every_tier_has_it_beside_its_own_error():
     assert {q: table["medium_error_of"][q] for q in QUANTITIES} == {
         q: told[q].tolist() for q in QUANTITIES
     }
-    plain = Study(sand.changed(medium=Granular(1.49, 0.22))).study(
-        [0.5, 1.0], ["area", "direct"]
+    plain = tabled(
+        Study(sand.changed(medium=Granular(1.49, 0.22))).displacements(
+            [0.5, 1.0], ["area", "direct"]
+        )
     )
     assert {k: plain[k] for k in ("area", "direct", "x")} == {
         k: table[k] for k in ("area", "direct", "x")
@@ -297,13 +300,13 @@ def test_a_covariance_that_reaches_no_medium_is_refused_before_computing(
         Refusal,
         match=r"sand: \[medium\] covariance: a standard deviation away there is no medium \(C ",
     ):
-        Study(wide).study([1.0], ["direct"])
+        tabled(Study(wide).displacements([1.0], ["direct"]))
     with pytest.raises(Refusal, match="there is no medium"):
         cheapest(wide, [1.0], 1e-2)
     with pytest.raises(Refusal, match="there is no medium"):
-        sweep.sweep(wide, {"gait.amplitude": [1.0]})
+        swept_table(sweep.sweep(wide, {"gait.amplitude": [1.0]}))
     with pytest.raises(Refusal, match="there is no medium"):  # at one end only
-        sweep.sweep(scene(granular()), {"medium.C": [2.0, 1.0, 0.05]})
+        swept_table(sweep.sweep(scene(granular()), {"medium.C": [2.0, 1.0, 0.05]}))
 
 
 def test_the_command_gives_it(tmp_path):
@@ -338,7 +341,7 @@ def test_sweeps_have_it(tmp_path):
         .changed(gait=dataclasses.replace(GAIT, frequency=2.0))
     )
     over = {"body.length": [0.3, 0.6], "gait.amplitude": [0.5, 1.0]}
-    found = sweep.sweep(sand, over)
+    found = swept_table(sweep.sweep(sand, over))
     told = uncertainty.of_medium(sand, GAIT, np.array([0.5, 1.0]))
     np.testing.assert_allclose(
         found["medium_error"], [told["position"], 2 * told["position"]], rtol=1e-6
@@ -346,8 +349,8 @@ def test_sweeps_have_it(tmp_path):
     np.testing.assert_allclose(
         found["medium_error_heading"], [told["heading"]] * 2, rtol=1e-6
     )
-    again = sweep.sweep(
-        sand, {"gait.tilt": [0.4, 0.5], "gait.amplitude": [1.0]}
+    again = swept_table(
+        sweep.sweep(sand, {"gait.tilt": [0.4, 0.5], "gait.amplitude": [1.0]})
     )  # two gaits in one batch
     np.testing.assert_allclose(
         again["medium_error"][0, 0], told["position"][1], rtol=1e-6
@@ -355,8 +358,8 @@ def test_sweeps_have_it(tmp_path):
     turned = dataclasses.replace(GAIT, tilt=0.5)
     told = uncertainty.of_medium(sand, turned, np.array([1.0]))["position"]
     np.testing.assert_allclose(again["medium_error"][1], told, rtol=1e-6)
-    many = sweep.sweep(
-        sand, {"gait.amplitude": np.linspace(0.1, 1.0, 70).tolist()}
+    many = swept_table(
+        sweep.sweep(sand, {"gait.amplitude": np.linspace(0.1, 1.0, 70).tolist()})
     )  # more than go together
     np.testing.assert_allclose(
         many["medium_error"][-1], found["medium_error"][0, 1], rtol=1e-6
@@ -365,7 +368,7 @@ def test_sweeps_have_it(tmp_path):
     with xarray.open_dataset(tmp_path / "s.nc") as data:
         np.testing.assert_allclose(data.medium_error, found["medium_error"])
         assert data.medium_error.attrs["units"] == "m"
-    one = sweep.sweep(sand, {"gait.frequency": [1.0, 3.0]})
+    one = swept_table(sweep.sweep(sand, {"gait.frequency": [1.0, 3.0]}))
     (_, band) = plots.sweep_figure(sand, one).axes[0].collections
     net, _, medium, _ = plots.sweeps.drawn(sand, one)
     np.testing.assert_allclose(medium, one["frequency"] * one["medium_error"])
@@ -374,8 +377,8 @@ def test_sweeps_have_it(tmp_path):
         pytest.approx((net - medium).min()),
         pytest.approx((net + medium).max()),
     )
-    assert "medium_error" not in sweep.sweep(
-        sand.changed(medium=Viscous()), {"gait.amplitude": [0.5]}
+    assert "medium_error" not in swept_table(
+        sweep.sweep(sand.changed(medium=Viscous()), {"gait.amplitude": [0.5]})
     )
     more = (
         sweep.Sweep(sand, over).cost().balances

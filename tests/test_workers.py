@@ -15,6 +15,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from geomech.optimisation.question import result_of
+from tabled import swept_table
 from tasks import (
     always_dies,
     dies,
@@ -31,7 +33,6 @@ from geomech import scenes, terminal, text
 from geomech.core.errors import Note, UnitWarning
 from geomech.geometry import connection, metric
 from geomech.optimisation import checked, search
-from geomech.optimisation.question import result_of
 from geomech.run import executors, jobs
 from geomech.run.jobs import Runner, runner, running
 from geomech.run.workers import using
@@ -236,7 +237,9 @@ def test_a_sweep_has_the_same_digits_whoever_computes(
     at_once, two, given_away, monkeypatch
 ):
     monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", at_once)
-    here, shared = both(two, lambda: sweep.sweep(GLASS, OVER), at_once < 64)
+    here, shared = both(
+        two, lambda: swept_table(sweep.sweep(GLASS, OVER)), at_once < 64
+    )
     for key in ("displacement", "estimate", "estimate_heading"):
         np.testing.assert_array_equal(shared[key], here[key])
 
@@ -350,7 +353,7 @@ def test_plugins_are_known_to_workers(power, two, given_away, monkeypatch):
         GLASS.changed(medium=power(1.0)),
         {"medium.power": [0.8, 0.9, 1.0, 1.1, 1.2]},
     )
-    here, shared = both(two, lambda: sweep.sweep(scene, over))
+    here, shared = both(two, lambda: swept_table(sweep.sweep(scene, over)))
     np.testing.assert_array_equal(shared["displacement"], here["displacement"])
 
 

@@ -6,7 +6,7 @@ COMMANDS = {  # by the headings of `geomech --help`, in its order
         "run", "symbolic", "accuracy", "lab"
     ),
     "Gaits": ("trajectory",),
-    "Grains and robots": ("stress", "intrude", "grains", "drag_grains"),
+    "Grains and robots": ("grains", "drag_grains"),
     "Your own data": ("fit_medium", "fit_gait"),
     "Reference": ("scenes", "reference", "explain"),
 }  # fmt: skip

@@ -15,16 +15,6 @@ CALIBRATIONS = {
 }
 
 
-def intrusion(result: Result, path: Path) -> None:
-    """Draw forces along a motion."""
-    plots.save(plots.intrusion_figure(*result.subject), path)
-
-
-def stress(result: Result, path: Path) -> None:
-    """Draw a stress map."""
-    plots.save(plots.stress_figure(*result.subject), path)
-
-
 def measured(result: Result, path: Path) -> None:
     """Draw a measured gait, or midlines."""
     figure = (

@@ -24,6 +24,8 @@ GROUPS = {
         "optimize": "Find the best gait for an objective.",
     },
     "Grains and robots": {
+        "stress": "Compute the stress of grains on a plate per unit depth.",
+        "intrude": "Compute force and moment of grains on a moving body.",
         "walk": "Compute how a robot walks on grains.",
     },
 }

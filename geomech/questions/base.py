@@ -108,13 +108,15 @@ class Question(Plain):
 
     less: advice where it costs too much. worth_saying: seconds of computing from which on
     a command prints the cost. parallel: whether other processes can take a part. folder:
-    whether its command fills a folder, which must be given."""
+    whether its command fills a folder, which must be given. unlimited: whether it is
+    computed whatever it costs."""
 
     name: ClassVar[str]
     less: ClassVar[str] = "ask for less"
     worth_saying: ClassVar[float] = 5.0
     parallel: ClassVar[bool] = False
     folder: ClassVar[bool] = False
+    unlimited: ClassVar[bool] = False
 
     @property
     def title(self) -> str:
