@@ -46,7 +46,7 @@ def declaration(question: type[Question]) -> Declaration:
     """Return what the command of a question takes."""
     _, subject = base.subject_field(question)
     files = {}
-    for ending, write in question.files().items():
+    for ending, write in question.own_files().items():
         files[ending] = base.keyword_options(write)
     return Declaration(
         question,
@@ -123,7 +123,7 @@ def output_parameter(question: type[Question]) -> inspect.Parameter:
             "-o", "--output", metavar="DIR", help="folder to write the results to"
         )
         return parameter("out", Annotated[list[Path], folder])
-    endings = ", ".join(dict.fromkeys((*question.files(), *ENDINGS)))
+    endings = ", ".join(dict.fromkeys((*question.own_files(), *ENDINGS)))
     file = typer.Option(
         "-o",
         "--output",

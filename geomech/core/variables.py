@@ -64,6 +64,8 @@ class Variable:
             array = getattr(self, name)
             if array is not None:
                 object.__setattr__(self, name, _read_only(array))
+        if self.error is None and self.error_label:
+            object.__setattr__(self, "error_label", "")
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         return np.array(self.values, dtype=dtype)

@@ -63,10 +63,9 @@ def joined(
             if name + ending in by_name:
                 more[field] = by_name[name + ending].values
         variable = replace(variable, **more)
-        if variable.error is not None:
-            label = by_name[f"{name}_error"].label
-            if label != described(variable, "error"):
-                variable = replace(variable, error_label=label)
+        error = by_name.get(f"{name}_error")
+        if error is not None and error.label != described(variable, "error"):
+            variable = replace(variable, error_label=error.label)
         whole.append(variable)
     return Result(kind, tuple(whole), attributes)
 
@@ -130,7 +129,8 @@ def to_dict(result: Result) -> dict[str, Any]:
             "attrs": facts(variable),
             "data": plain(variable.values),
         }
-    return {"attrs": about(result), "dims": result.sizes, **parts}
+    order = [variable.name for variable in flat(result)]
+    return {"attrs": about(result), "dims": result.sizes, **parts, "order": order}
 
 
 def plain(values: np.ndarray) -> Any:
@@ -142,7 +142,9 @@ def plain(values: np.ndarray) -> Any:
 def of_dict(data: dict[str, Any]) -> Result:
     """Return the result of `to_dict`."""
     variables = []
-    for name, part in {**data["coords"], **data["data_vars"]}.items():
+    parts = {**data["coords"], **data["data_vars"]}
+    for name in data.get("order", parts):
+        part = parts[name]
         values = np.array(part["data"])
         if values.dtype == object:
             values = values.astype(float)

@@ -202,11 +202,15 @@ class Connection(Question):
         """Return the formats of tables: MATLAB's, and those of plug-ins."""
         from geomech.io.tables import FORMATS
 
-        found: dict[str, Callable] = {".mat": write_matlab}
+        found = Connection.own_files()
         for ending, known in FORMATS.items():
             if ending not in (".nc", ".mat") and hasattr(known, "write"):
                 found[ending] = write_table
         return found
+
+    @classmethod
+    def own_files(cls) -> dict[str, Callable]:
+        return {".mat": write_matlab}
 
     @staticmethod
     def headline(result: "Result") -> list[str]:
