@@ -2,6 +2,9 @@
 
 import numpy as np
 
+from geomech.core.variables import Result, Variable
+from geomech.tiers import TIERS
+
 QUANTITIES = ("x", "y", "heading", "net_distance")
 
 
@@ -33,6 +36,11 @@ def tabled(result):
         if name in result:
             found[name] = result[name].values.tolist()
             found[f"{name}_error"] = result[name].error.tolist()
+    if result["x"].spread is not None:
+        found["medium_error_of"] = {q: result[q].spread[0].tolist() for q in QUANTITIES}
+        both = np.hypot(result["x"].spread, result["y"].spread)
+        found["medium_error"] = by_tier(both)
+        found["medium_error_heading"] = by_tier(result["heading"].spread)
     if "seconds" in result:
         parts = result["part"].values.tolist()
         found["seconds"] = dict(zip(parts, result["seconds"].values.tolist()))
@@ -54,6 +62,63 @@ def swept_table(result):
         found["displacement"] = np.stack(poses, -1)
         found["estimate"] = result["net_distance"].error
         found["estimate_heading"] = result["heading"].error
+        if result["x"].spread is not None:
+            both = np.hypot(result["x"].spread, result["y"].spread)
+            found["medium_error"] = both
+            found["medium_error_heading"] = result["heading"].spread
     else:
         found["estimate"] = result["speed"].error
     return found
+
+
+def of_table(table, unit="length", label="", zero=None, **facts):
+    """Return the result of displacements that a dict as of `tabled` is of."""
+    tiers = [name for name in TIERS if name in table]
+    over = ("tier", "amplitude")
+    poses = np.array([table[tier] for tier in tiers], float)
+    values = {**dict(zip(QUANTITIES, np.moveaxis(poses, -1, 0)))}
+    values["net_distance"] = np.hypot(values["x"], values["y"])
+    variables = [
+        Variable("tier", ("tier",), tiers),
+        Variable("amplitude", ("amplitude",), table["amplitude"], label=label),
+    ]
+    spreads = table.get("medium_error_of", {})
+    for name, x in values.items():
+        of, error = unit, None
+        errors = table.get("estimate")
+        if name == "heading":
+            of, errors = "rad", table.get("estimate_heading")
+        if errors is not None:
+            error = [errors[tier] for tier in tiers]
+        spread = spreads.get(name)
+        if spread is not None:
+            spread = np.broadcast_to(spread, x.shape)
+        why = (zero or {}).get(name, "")
+        variables.append(Variable(name, over, x, of, "", error, spread, zero=why))
+    if "body_length" in table:
+        facts["body_length"] = table["body_length"]
+    return Result("displacement", tuple(variables), facts)
+
+
+def of_swept(table, unit="m"):
+    """Return the result of a sweep that a dict as of `swept_table` is of."""
+    names = {label: label.replace(".", "_") for label in table["over"]}
+    dims = tuple(names.values())
+    variables = [
+        Variable(names[label], (names[label],), np.array(x, float), "", label)
+        for label, x in table["over"].items()
+    ]
+    error = table["estimate"]
+    if "displacement" in table:
+        x, y, heading = np.moveaxis(np.array(table["displacement"], float), -1, 0)
+        variables.append(Variable("x", dims, x, unit, "", error))
+        variables.append(Variable("y", dims, y, unit, "", error))
+        variables.append(Variable("heading", dims, heading, "rad", "", 0 * heading))
+        net = np.hypot(x, y)
+        variables.append(Variable("net_distance", dims, net, unit, "", error))
+    else:
+        variables.append(Variable("speed", dims, table["speed"], "m/s", "", error))
+    for name in ("frequency", "status"):
+        if name in table:
+            variables.append(Variable(name, dims, table[name]))
+    return Result("sweep", tuple(variables))

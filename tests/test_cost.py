@@ -178,7 +178,7 @@ def test_yes_computes_and_says_what_is_to_come(large, monkeypatch):
 
 def test_a_field_of_four_joints_is_written(large, monkeypatch):
     """Said before it begins once it takes a second; least squares over the same directions at one of its shapes."""
-    monkeypatch.setattr("geomech.studies.shape_space.ShapeSpace.worth_saying", 0.0)
+    monkeypatch.setattr("geomech.questions.connection.Connection.worth_saying", 0.0)
     code, out, err = run(
         "connection", "five.toml", "--grid", "4", "--extent", "1.2", "-o", "out.nc"
     )

@@ -9,8 +9,9 @@ from tabled import swept_table, tabled
 
 from geomech import scenes
 from geomech.gaits import Fourier
+from geomech.questions.ccf import Ccf
 from geomech.run.cost import BASE
-from geomech.studies import accuracy, cost, effort, motion, report, shape_space, sweep
+from geomech.studies import accuracy, cost, effort, motion, report, sweep
 from geomech.studies.study import Study
 from geomech.tiers import TIERS
 from rft import Chain, body_velocity
@@ -181,8 +182,8 @@ def test_a_balance_that_is_tried_twice_is_one(solved):
 @pytest.mark.parametrize(
     "question",
     [
-        lambda s: shape_space.ccf(s, None, None, "link-1", False, False),
-        lambda s: shape_space.ccf(s, "1,2", None, None, False, False),
+        lambda s: Ccf(s, compare_frame="link-1"),
+        lambda s: Ccf(s, "1,2"),
     ],
     ids=["map with gait and another frame", "slice"],
 )
@@ -191,7 +192,7 @@ def test_a_map_takes_the_balances_foretold(scene, question, solved):
     asked.check()
     foretold = asked.cost().balances
     solved.clear()
-    asked.answer(lambda done: None, lambda cost: None)
+    asked.ask()
     assert foretold == sum(solved)
 
 

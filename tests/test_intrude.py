@@ -14,7 +14,7 @@ from test_fuzz import VALUES, mutated
 import geomech.scenes as scenes
 from geomech import medium, plots
 from geomech.scenes.intruder import IntruderScene
-from geomech.studies.intrusion import Settings, estimate
+from geomech.studies.intrusion import Settings, answer, estimate
 from geomech.studies.study import Study
 from rft.plates import (
     VERTICAL,
@@ -601,7 +601,7 @@ def test_accuracy_of_the_number_of_elements(geomech, tmp_path, monkeypatch):
 def test_pictures_show_what_was_computed():
     scene = scenes.load("c-leg")
     found = scene.run()
-    fig = plots.intrusion_figure(scene, found)
+    fig = plots.intrusion_figure(scene, answer(scene))
     bodies, forces, moment = fig.axes
     drawn = bodies.lines[0].get_xydata()
     a = found.pose[0, 2]

@@ -19,6 +19,7 @@ import geomech.scenes as scenes
 from figures import meshes
 from geomech import plots
 from geomech.scenes import MeshScene
+from geomech.studies.intrusion import answer
 from geomech.text.explain import explain
 from rft.meshes import (
     SOLIDS,
@@ -624,7 +625,7 @@ def test_accuracy_of_the_number_of_triangles(geomech, tmp_path, monkeypatch):
 def test_pictures_show_the_stress_on_the_mesh():
     scene = scenes.parse(MADE.replace("distance = 0.05", "distance = 0.001"))
     found = scene.run()
-    fig = plots.intrusion_figure(scene, found)
+    fig = plots.intrusion_figure(scene, answer(scene))
     step = np.linalg.norm(found.force, axis=-1).argmax()
     faces, above = scene.faces(found, step)
     solid = next(ax for ax in fig.axes if ax.name == "3d")
@@ -659,7 +660,7 @@ def test_a_body_in_the_air_is_drawn_without_stress(tmp_path):
     )
     found = scene.run()
     assert not found.force.any()
-    fig = plots.intrusion_figure(scene, found)
+    fig = plots.intrusion_figure(scene, answer(scene))
     plots.save(fig, tmp_path / "a.png")
     faces, above = scene.faces(found, 0)
     assert len(faces.triangle) == 0 and len(above) == scene.count

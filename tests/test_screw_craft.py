@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from artists import curve, curves, drawn
 from scipy.spatial.transform import Rotation
+from tabled import of_swept
 
 from geomech import plots, scenes
 from geomech.studies.grid import changed
@@ -188,7 +189,9 @@ def test_sizes_of_screws_are_swept():
         "speed": np.ones(2),
         "estimate": np.zeros(2),
     }
-    (ax,) = plots.sweep_figure(SCENE, results | {"status": np.full(2, "walking")}).axes
+    (ax,) = plots.sweep_figure(
+        SCENE, of_swept(results | {"status": np.full(2, "walking")})
+    ).axes
     assert ax.get_xlabel() == "pitch (m)"
 
 

@@ -5,20 +5,18 @@ import json
 
 import numpy as np
 import pytest
-import xarray
 from commands import geomech
 from tabled import swept_table, tabled
 
 from geomech import plots, scenes
 from geomech.gaits import Butterfly, Ellipse
-from geomech.io.results import write_netcdf
+from geomech.io.results import of_dict
 from geomech.scenes import Scene
 from geomech.studies import sweep, uncertainty
 from geomech.studies.choose import cheapest
 from geomech.studies.study import Study
 from geomech.studies.tables import QUANTITIES, of_pose
 from geomech.systems import Swimmer
-from geomech.text import displacement
 from rft import Chain, Granular, SkinFriction, Transient, Viscous
 from rft.refusal import Refusal
 
@@ -177,19 +175,15 @@ def test_wide_media_shift_the_mean_and_it_is_told(monkeypatch):
         assert told["shift"]["net_distance"][0] == pytest.approx(
             shift, abs=0.03 * nets.std()
         )
-        tables[share] = tabled(Study(sand).displacements([1.2], ["direct"]))
+        tables[share] = Study(sand).displacements([1.2], ["direct"])
         errors[share] = told["shift"]["net_distance"][0] / told["net_distance"][0]
     assert errors[1.0] < -0.3 and -uncertainty.SHIFTED < errors[0.1] < 0
-    wide, narrow = (
-        displacement.full(tables[share].result, "sand") for share in (1.0, 0.1)
-    )
-    row = next(x for x in wide.splitlines() if x.startswith("      1.2"))
-    assert row.endswith(
-        f"  mean {tables[1.0]['medium_shift_of']['net_distance'][0]:+.1e}"
-    )
-    assert "\nmean: how far the mean over the media" in wide and "mean" not in narrow
-    assert tables[1.0].result["quantity"].values.tolist() == list(QUANTITIES)
-    assert tables[1.0]["units"]["medium_shift_of"] == "that of the quantity"
+    wide, narrow = (str(tables[share]) for share in (1.0, 0.1))
+    size = abs(tables[1.0]["medium_shift"].values[3, 0])
+    assert f"mean over the media: net distance shifted by up to {size:.1e}" in wide
+    assert "mean over the media: net distance" not in narrow
+    assert tables[1.0]["quantity"].values.tolist() == list(QUANTITIES)
+    assert tables[1.0]["medium_shift"].unit == ("BL", "BL", "rad", "BL")
 
 
 def test_media_that_end_before_the_points_are_carried_on_from_nearer_ones():
@@ -240,19 +234,12 @@ def test_every_tier_has_it_beside_its_own_error():
     }
     assert not [key for key in plain if key.startswith("medium")]
     answer = cheapest(sand, [0.5, 1.0], 1e-2)
-    np.testing.assert_allclose(answer["medium_error"][answer["tier"]], told["position"])
-    text = displacement.full(table.result, "sand").splitlines()
-    row = text[text.index(next(x for x in text if x.endswith(": y"))) + 3].split()
-    assert row[0] == "1" and row[-1] == f"+-{told['y'][1]:.1e}"
-    assert (
-        [x for x in text if x.startswith("medium: one standard deviation")]
-        and "second order" in text[-4]
-        and text[-3].startswith("mean: ")
-    )
-    short = displacement.text(table.result, "sand", rows=2)
-    assert short.count("+- medium") > 1 and ", 1 of 2" not in short, (
-        "tables below each other keep both amplitudes"
-    )
+    spread = np.hypot(answer["x"].spread, answer["y"].spread)
+    np.testing.assert_allclose(spread[0], told["position"])
+    shown = str(Study(sand).displacements([0.5, 1.0], ["area", "direct"]))
+    assert shown.count("+- medium") > 1
+    assert "medium: one standard deviation by its covariance" in shown
+    assert "mean over the media: " in shown
 
 
 def test_effects_and_time_stepping_feel_it(monkeypatch):
@@ -327,10 +314,10 @@ def test_the_command_gives_it(tmp_path):
     )
     code, out, err = geomech(*args, cwd=tmp_path)
     assert (code, err) == (0, "")
-    table, loaded = json.loads(out), scenes.load(tmp_path / "s.toml")
+    found, loaded = of_dict(json.loads(out)), scenes.load(tmp_path / "s.toml")
     told = uncertainty.of_medium(loaded, loaded.gait, np.array([1.0]))
-    assert table["medium_error"]["direct"] == pytest.approx(told["position"])
-    assert table["units"]["medium_error"] == "BL"
+    spread = np.hypot(found["x"].spread, found["y"].spread)
+    assert spread[0] == pytest.approx(told["position"])
     assert "medium, one standard deviation" in (tmp_path / "d.svg").read_text()
 
 
@@ -364,13 +351,10 @@ def test_sweeps_have_it(tmp_path):
     np.testing.assert_allclose(
         many["medium_error"][-1], found["medium_error"][0, 1], rtol=1e-6
     )
-    write_netcdf(tmp_path / "s.nc", sweep.as_stored(found.result))
-    with xarray.open_dataset(tmp_path / "s.nc") as data:
-        np.testing.assert_allclose(data.medium_error, found["medium_error"])
-        assert data.medium_error.attrs["units"] == "m"
-    one = swept_table(sweep.sweep(sand, {"gait.frequency": [1.0, 3.0]}))
-    (_, band) = plots.sweep_figure(sand, one).axes[0].collections
-    net, _, medium, _ = plots.sweeps.drawn(sand, one)
+    result = sweep.sweep(sand, {"gait.frequency": [1.0, 3.0]})
+    one = swept_table(result)
+    (_, band) = plots.sweep_figure(sand, result).axes[0].collections
+    net, _, medium, _ = plots.sweeps.drawn(result)
     np.testing.assert_allclose(medium, one["frequency"] * one["medium_error"])
     box = band.get_datalim(band.axes.transData)
     assert (box.y0, box.y1) == (
@@ -381,7 +365,7 @@ def test_sweeps_have_it(tmp_path):
         sweep.sweep(sand.changed(medium=Viscous()), {"gait.amplitude": [0.5]})
     )
     more = (
-        sweep.Sweep(sand, over).cost().balances
+        sweep.Plan(sand, over).cost.balances
         - sweep.Sweep(sand.changed(medium=Granular(1.49, 0.22)), over).cost().balances
     )
     assert more == 6 * 4 * uncertainty.PHASES
