@@ -45,9 +45,7 @@ class Declaration(NamedTuple):
 def declaration(question: type[Question]) -> Declaration:
     """Return what the command of a question takes."""
     _, subject = base.subject_field(question)
-    files = {}
-    for ending, write in question.own_files().items():
-        files[ending] = base.keyword_options(write)
+    files = file_options(question.own_files())
     return Declaration(
         question,
         subject,
@@ -55,6 +53,11 @@ def declaration(question: type[Question]) -> Declaration:
         base.keyword_options(question.draw),
         files,
     )
+
+
+def file_options(writers: dict[str, Callable]) -> dict[str, Declared]:
+    """Return the options of functions that write files, by ending."""
+    return {end: base.keyword_options(write) for end, write in writers.items()}
 
 
 def command(question: type[Question]) -> Callable[..., None]:
@@ -181,6 +184,8 @@ def request(
     """Return the question and the outputs that the values of a command ask for."""
     paths = given["out"] or []
     plot = given.get("plot")
+    if paths:
+        declared = declared._replace(files=file_options(declared.question.files()))
     refuse_unused(declared, given)
     changes = {name: given[name] for name in declared.subject.changes}
     subject = declared.subject.load(given[SUBJECT], **changes)

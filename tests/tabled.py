@@ -1,8 +1,11 @@
 """Results of displacements and sweeps as dicts of lists, as tests compare them."""
 
+import json
+
 import numpy as np
 
 from geomech.core.variables import Result, Variable
+from geomech.io.results import of_dict
 from geomech.tiers import TIERS
 
 QUANTITIES = ("x", "y", "heading", "net_distance")
@@ -36,6 +39,16 @@ def tabled(result):
         if name in result:
             found[name] = result[name].values.tolist()
             found[f"{name}_error"] = result[name].error.tolist()
+    if "tolerance" in result.attributes:
+        (found["tier"],) = tiers
+        settings = [name for name in result if name.startswith("chosen_")]
+        found["settings"] = {
+            name.removeprefix("chosen_"): int(result[name].values) for name in settings
+        }
+    for name in ("surface_spread", "surface_spread_heading"):
+        if name in result:
+            rows = by_tier(result[name].values)
+            found[name] = {t: x for t, x in rows.items() if not np.isnan(x).any()}
     if result["x"].spread is not None:
         found["medium_error_of"] = {q: result[q].spread[0].tolist() for q in QUANTITIES}
         both = np.hypot(result["x"].spread, result["y"].spread)
@@ -122,3 +135,13 @@ def of_swept(table, unit="m"):
         if name in table:
             variables.append(Variable(name, dims, table[name]))
     return Result("sweep", tuple(variables))
+
+
+def of_json(out):
+    """Return the result that a command printed as JSON."""
+    return of_dict(json.loads(out))
+
+
+def tabled_json(out):
+    """Return the displacements that a command printed as JSON by tier (`tabled`)."""
+    return tabled(of_json(out))

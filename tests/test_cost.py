@@ -1,7 +1,6 @@
 """Large requests: foretold, refused without --yes, stopped at once, kept as far as they got, and bounded in memory."""
 
 import contextlib
-import json
 import os
 import signal
 import subprocess
@@ -12,7 +11,7 @@ import numpy as np
 import pytest
 from commands import geomech as run
 from scipy.io import netcdf_file
-from tabled import swept_table
+from tabled import swept_table, tabled_json
 
 from geomech import plots, scenes, terminal
 from geomech.geometry import connection, harmonics
@@ -166,7 +165,7 @@ def test_yes_computes_and_says_what_is_to_come(large, monkeypatch):
     assert err.startswith(
         "three-link-viscous: 65 force balances, about 1 s of computing and 16"
     )
-    assert np.hypot(*json.loads(out)["direct"][0][:2]) == pytest.approx(
+    assert np.hypot(*tabled_json(out)["direct"][0][:2]) == pytest.approx(
         0.0512808, abs=1e-6
     )
     for args in (

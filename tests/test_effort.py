@@ -1,10 +1,8 @@
 """What moving costs: tables of metric and norm, path length, work and cost of transport of gaits, on file and by command."""
 
-import json
-
 import numpy as np
 import pytest
-from tabled import tabled
+from tabled import of_json, tabled
 
 import geomech
 from geomech.gaits import Circle, Ellipse
@@ -269,11 +267,12 @@ def test_by_command(capsys):
                 "--json",
             ]
         )
-    told = json.loads(capsys.readouterr().out)
+    told = of_json(capsys.readouterr().out)
     assert ended.value.code == 0
-    assert told["path_length"] == pytest.approx([0.0, 0.512235], abs=1e-6)
-    assert told["efficiency"]["direct"] == [None, pytest.approx(0.1001, abs=6e-5)]
-    assert told["cost_of_transport"]["direct"][0] is None
+    assert told["path_length"].values == pytest.approx([0.0, 0.512235], abs=1e-6)
+    none, efficiency = told["efficiency"][0]
+    assert np.isnan(none) and efficiency == pytest.approx(0.1001, abs=6e-5)
+    assert np.isnan(told["cost_of_transport"][0, 0])
     with pytest.raises(SystemExit) as ended:
         main(["displacement", "no-slip-snake", "--amplitudes", "1", "--effort"])
     assert (

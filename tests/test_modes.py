@@ -1,12 +1,10 @@
 """Chains that move in modes, and waves of joint angles: the plain chain along the same angles, circles and backbones."""
 
-import json
-
 import numpy as np
 import pytest
 from commands import geomech
 from scipy.io import netcdf_file
-from tabled import swept_table, tabled
+from tabled import swept_table, tabled, tabled_json
 
 import rft
 from geomech import scenes
@@ -356,7 +354,7 @@ def test_a_wave_is_swept_and_asked_for(tmp_path):
         "displacement", "seven-link-wave", "--amplitudes", "0.87", "--json"
     )
     assert code == 0
-    net = np.hypot(*json.loads(out)["direct"][0][:2])
+    net = np.hypot(*tabled_json(out)["direct"][0][:2])
     # Wave efficiency 0.34 +- 0.02 in grains (Maladen et al. 2011); a wave of A / lambda = 0.2 is 0.757 body lengths long.
     assert net / 0.757 == pytest.approx(0.34, abs=0.02)
 

@@ -1,11 +1,11 @@
 """Bodies from a function of shape that returns the poses of links: against chains and backbones that are built in."""
 
-import json
 import pickle
 
 import numpy as np
 import pytest
 from commands import geomech as run
+from tabled import tabled_json
 
 import geomech
 from geomech.gaits import Circle
@@ -155,7 +155,7 @@ def test_scenes_name_a_function_of_a_file(tmp_path):
     (tmp_path / "chain.toml").write_text(SCENE.replace("bent", "chain"))
     expected = run("displacement", "chain.toml", *given, cwd=tmp_path)[1]
     np.testing.assert_allclose(
-        *(json.loads(x)["direct"] for x in (text, expected)), atol=1e-11
+        *(tabled_json(x)["direct"] for x in (text, expected)), atol=1e-11
     )
     assert load_file(tmp_path / "bent.py") == ["bent"]
     (tmp_path / "rest.toml").write_text(

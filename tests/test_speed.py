@@ -13,6 +13,7 @@ from tabled import swept_table, tabled
 
 from geomech import scenes
 from geomech.gaits import Circle
+from geomech.io.results import of_dict
 from geomech.studies import report, sweep, undulation
 from geomech.studies.choose import cheapest
 from geomech.studies.study import Study

@@ -1,11 +1,9 @@
 """Odd harmonics of the velocity on the sphere of directions, of three joint rates and more."""
 
-import json
-
 import numpy as np
 import pytest
 from commands import geomech
-from tabled import tabled
+from tabled import tabled, tabled_json
 
 from geomech.gaits import Fourier
 from geomech.geometry import connection, harmonics
@@ -147,7 +145,7 @@ def test_too_many_are_refused(tmp_path):
         "tiers: adapted, direct; by name: area, path\n" in told
         and "harmonic tier" in told
     )
-    assert json.loads(
+    assert tabled_json(
         geomech("displacement", "s.toml", "--amplitudes", "1", "--json", cwd=tmp_path)[
             1
         ]

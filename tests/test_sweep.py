@@ -272,7 +272,7 @@ def test_three_parameters_are_swept_but_not_drawn(tmp_path):
     code, out, err = geomech(
         "sweep", "three-link-viscous", *args, "-o", "s.nc", cwd=tmp_path
     )
-    assert (code, err) == (0, "") and out.startswith("2 points")
+    assert (code, err) == (0, "") and "2 points" in out
     code, out, err = geomech(
         "sweep", "three-link-viscous", *args, "--plot", "s.png", cwd=tmp_path
     )
@@ -295,7 +295,7 @@ def test_the_command_writes_netcdf_and_a_plot(tmp_path):
     ]
     code, out, err = geomech("sweep", "three-link-viscous", *args, cwd=tmp_path)
     assert (code, err) == (0, "")
-    assert out.startswith("6 points")
+    assert "6 points" in out
     assert {p.name for p in tmp_path.iterdir()} == {"s.nc", "s.png"}
     with xarray.open_dataset(tmp_path / "s.nc") as data:
         assert data.displacement.dims == ("gait_amplitude", "medium_ratio", "component")

@@ -18,7 +18,7 @@ import xarray
 from commands import geomech
 from registry import SYSTEMS
 from scipy.io import loadmat, netcdf_file, savemat
-from tabled import tabled
+from tabled import of_json, tabled
 
 import rft
 from geomech import Study, plots, scenes
@@ -539,7 +539,7 @@ def test_every_command_works_on_a_table_or_says_why_not(made, tmp_path, monkeypa
             xi = tables.load(folder / "a.nc").harmonics.velocity(
                 np.array([0.5, 0.3]), np.array([1.0, 0.0])
             )
-            np.testing.assert_allclose(json.loads(out)["xi"], xi)
+            np.testing.assert_allclose(of_json(out)["xi"].values, xi)
     same(Connection.load("b.nc"), s.fitted)
     assert geomech("displacement", "t/t.toml", "--amplitudes", "5")[0] == 2
     before = (tmp_path / "t" / "a.nc").read_bytes()

@@ -17,7 +17,7 @@ from geomech import plots, scenes
 from geomech.core.variables import Result
 from geomech.io.results import of_dict
 from geomech.output import walks
-from geomech.questions.walk import Walk
+from geomech.questions import walk as questions_walk
 from geomech.scenes import WalkerScene
 from geomech.studies import walking
 from geomech.studies.sweep import Plan
@@ -419,7 +419,9 @@ def told_of(scene, found):
     """What is printed of a walk, on one line, and its result."""
     found = Result("walk", tuple(walking.variables(scene, found)))
     facts = {"scene": scene.name}
-    result = dataclasses.replace(found, attributes=facts, question=Walk(scene))
+    result = dataclasses.replace(
+        found, attributes=facts, question=questions_walk.Walk(scene)
+    )
     return " ".join(str(result).split()), result
 
 
@@ -805,6 +807,7 @@ SMALL = XPLORER.text + "\n[numerics]\nsteps = 16\nelements = 8\nduration = 2.0\n
 
 def test_walk_as_a_command(geomech, tmp_path):
     (tmp_path / "small.toml").write_text(SMALL)
+    (tmp_path / "out").mkdir()
     code, out, err = geomech(
         "walk", "small.toml", "--json", "-o", "out", "--plot", "walk.png", "--strip"
     )

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 SHOWN = ("A",)
 
 
-def write_matlab(
+def write_table(
     path: Path,
     result: "Result",
     *,
@@ -41,23 +41,19 @@ def write_matlab(
         ),
     ] = None,
 ) -> None:
-    """Write the connection in sysplotter's layouts."""
+    """Write the connection in a layout of sysplotter's, or in a format of a plug-in
+    (`geomech.io.tables.FORMATS`)."""
     from geomech.io.files import note
     from geomech.io.tables import FORMATS, LAYOUTS, SIGNS
 
+    ending = path.suffix.lower()
+    file = FORMATS[ending]
     given = {"sign": sign, "order": order, "layout": layout}
     settings = {name: word for name, word in given.items() if word}
-    FORMATS[".mat"].write(path, with_contents(result, ".mat", layout), **settings)
-    if not sign and layout != LAYOUTS[1]:
+    file.write(path, with_contents(result, ending, layout), **settings)
+    has_sign = "sign" in getattr(file, "settings", ())
+    if has_sign and not sign and layout != LAYOUTS[1]:
         note(f"{path} has {SIGNS['+']}; --sign - gives the other")
-
-
-def write_table(path: Path, result: "Result") -> None:
-    """Write the connection in a format of a plug-in."""
-    from geomech.io.tables import FORMATS
-
-    ending = path.suffix.lower()
-    FORMATS[ending].write(path, with_contents(result, ending))
 
 
 def with_contents(result: "Result", ending: str, layout: str | None = None) -> "Result":
@@ -143,9 +139,7 @@ class Connection(Question):
             ending = path.suffix.lower()
             if ending in self.files() or ending == ".nc":
                 check_settings(self.scene, ending, options)
-                layout = None
-                if ending == ".mat":
-                    layout = options.get("layout")
+                layout = options.get("layout")
                 wanted.append(fields.contents(FORMATS[ending], layout))
         return replace(self, contents=tuple(dict.fromkeys(wanted)))
 
@@ -210,7 +204,7 @@ class Connection(Question):
 
     @classmethod
     def own_files(cls) -> dict[str, Callable]:
-        return {".mat": write_matlab}
+        return {".mat": write_table}
 
     @staticmethod
     def headline(result: "Result") -> list[str]:
@@ -283,12 +277,23 @@ def check_settings(scene: Any, ending: str, options: dict[str, Any]) -> None:
     from geomech.io.tables import FORMATS, LAYOUTS, ORDERS, SIGNS
     from geomech.studies import fields
 
-    fields.check_joints(scene, FORMATS[ending])
-    if ending != ".mat":
-        return
+    file = FORMATS[ending]
+    fields.check_joints(scene, file)
+    taken = getattr(file, "settings", ())
     for name, known in (("sign", SIGNS), ("order", ORDERS), ("layout", LAYOUTS)):
-        if name in options:
-            choose(f"--{name}", options[name], known)
+        if name not in options:
+            continue
+        choose(f"--{name}", options[name], known)
+        if name not in taken:
+            others = [
+                other
+                for other, one in FORMATS.items()
+                if name in getattr(one, "settings", ())
+            ]
+            raise Refusal(
+                f"--{name} is that of a {' or '.join(others)} file",
+                instead=f"drop it, a {ending} file says what it has",
+            )
     struct = options.get("layout") == LAYOUTS[1]
     if struct and ("sign" in options or "order" in options):
         raise Refusal(

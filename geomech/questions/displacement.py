@@ -124,7 +124,10 @@ class Displacement(Question):
     def headline(result: "Result") -> list[str]:
         facts = result.attributes
         first = f"{facts['scene']}: displacement per cycle, {tier_words(result)}"
-        return [first, f"amplitude: {amplitude_words(result)}; {FRAME}"]
+        lines = [first, f"amplitude: {amplitude_words(result)}; {FRAME}"]
+        if "note" in facts:
+            lines.append(f"{facts['scene']}: {facts['note']}")
+        return lines
 
     @staticmethod
     def summary(result: "Result") -> "Result":

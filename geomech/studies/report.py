@@ -71,10 +71,11 @@ class Report(Question):
         tables = {}
         for gait, values in zip(gaits, amplitudes):
             result = study.displacements(values, gait=gait)
+            title = type(gait).__name__.lower()
+            facts = {**result.attributes, "scene": f"{scene.name}, {title}"}
             if gait is not scene.gait:
-                facts = {**result.attributes, "note": ADDED}
-                result = replace(result, attributes=facts)
-            tables[type(gait).__name__.lower()] = result
+                facts["note"] = ADDED
+            tables[title] = replace(result, attributes=facts)
         pairs = combinations(range(3), 2) if mapped and scene.system.joints == 3 else ()
         planes = [study.plane(pair) for pair in pairs]
         first = next(iter(tables.values()))
