@@ -9,10 +9,11 @@ from commands import geomech
 from scipy.special import ellipe
 from tabled import swept_table, tabled
 
-from geomech import Study, scenes
+from geomech import scenes
 from geomech.core.errors import Note, UnitWarning
 from geomech.gaits import Centreline, Sine
 from geomech.gaits.waves import arc_to_phase
+from geomech.studies.study import Study
 from geomech.studies.sweep import Sweep
 from rft import Backbone
 from rft.refusal import Refusal

@@ -7,7 +7,7 @@ import pytest
 from commands import geomech
 from tabled import of_json, tabled, tabled_json
 
-from geomech import Numerics, Scene, Study, plots
+from geomech import Numerics, Scene, plots
 from geomech.gaits import Circle, Fourier, Wave
 from geomech.geometry import connection
 from geomech.geometry.plane import Plane, ProjectedGait, interpolated_plane, plane
@@ -16,6 +16,7 @@ from geomech.geometry.two_form import spanned, spanned_by, two_form
 from geomech.scenes.frames import framed
 from geomech.studies.choose import cheapest
 from geomech.studies.shape_space import through as _held
+from geomech.studies.study import Study
 from geomech.systems import Swimmer
 from geomech.tiers import TIERS
 from geomech.tiers.fitted import finest_grid, is_too_large

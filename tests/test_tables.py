@@ -21,7 +21,7 @@ from scipy.io import loadmat, netcdf_file, savemat
 from tabled import of_json, tabled
 
 import rft
-from geomech import Study, plots, scenes
+from geomech import plots, scenes
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
@@ -32,6 +32,7 @@ from geomech.io.tables.mat import ERROR
 from geomech.scenes import Numerics, Scene
 from geomech.studies import accuracy, choose, estimate, fields, tiered
 from geomech.studies.single import single
+from geomech.studies.study import Study
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from geomech.systems.base import length_unit
 from geomech.systems.table import LENGTHS
