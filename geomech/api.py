@@ -207,7 +207,7 @@ def load_result(path: str | Path) -> Result:
     >>> study = geomech.study("three-link-viscous", grid=15)
     >>> study.displacement([0.5, 1.0], "direct").save(path)
     >>> geomech.load_result(path)["x"].values.round(4)
-    array([[-0.0153, -0.0495]])
+    array([[-0.0152, -0.0495]])
     """
     from geomech.results.files import load
 

@@ -74,6 +74,12 @@ def loaded(name: str) -> Any:
     return typer.main.get_command(single)
 
 
+def all_commands() -> dict[str, Any]:
+    """Return all commands by their names as they are typed."""
+    names = [name for group in headings().values() for name in group]
+    return {typed(name): loaded(name) for name in names}
+
+
 def function(name: str) -> Any:
     """Return the function of a command."""
     if name not in questions.SUMMARIES:

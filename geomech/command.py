@@ -125,7 +125,7 @@ def output_parameter(question: type[Question]) -> inspect.Parameter:
         folder = typer.Option(
             "-o", "--output", metavar="DIR", help="folder to write the results to"
         )
-        return parameter("out", Annotated[list[Path], folder])
+        return parameter("out", Annotated[list[str], folder])
     endings = ", ".join(dict.fromkeys((*question.own_files(), *ENDINGS)))
     file = typer.Option(
         "-o",
@@ -133,7 +133,7 @@ def output_parameter(question: type[Question]) -> inspect.Parameter:
         metavar="FILE",
         help=f"write {endings}, or all into a folder; repeatable",
     )
-    return parameter("out", Annotated[Optional[list[Path]], file], None)
+    return parameter("out", Annotated[Optional[list[str]], file], None)
 
 
 def parameter(
@@ -182,11 +182,11 @@ def request(
     declared: Declaration, given: dict[str, Any]
 ) -> tuple[Question, list[pipeline.Output]]:
     """Return the question and the outputs that the values of a command ask for."""
-    paths = given["out"] or []
+    paths = [path_of(name) for name in given["out"] or ()]
     plot = given.get("plot")
     if paths:
         declared = declared._replace(files=file_options(declared.question.files()))
-    refuse_unused(declared, given)
+    refuse_unused(declared, given, paths)
     changes = {name: given[name] for name in declared.subject.changes}
     subject = declared.subject.load(given[SUBJECT], **changes)
     question = declared.question(subject, **parsed(declared.fields, given, subject))
@@ -219,11 +219,20 @@ def parsed(options: Declared, given: dict[str, Any], subject: Any) -> dict[str, 
     return values
 
 
-def refuse_unused(declared: Declaration, given: dict[str, Any]) -> None:
+def path_of(name: str) -> Path:
+    """Return the path of an output; an empty name is refused."""
+    if not name:
+        raise Refusal("an empty name", instead="name a file or a folder, '.' for this")
+    return Path(name)
+
+
+def refuse_unused(
+    declared: Declaration, given: dict[str, Any], paths: list[Path]
+) -> None:
     """Refuse options of figures and files that are not written."""
     if given.get("plot") is None:
         refuse_given(declared.picture, given, "for a figure", "say --plot FILE, too")
-    written = {path.suffix.lower() for path in given["out"] or []}
+    written = {path.suffix.lower() for path in paths}
     taken: set[str] = set()
     for ending in written:
         taken |= {*declared.files.get(ending, {})}
@@ -254,8 +263,6 @@ def output(
     command fills one."""
     from geomech.results.files import save, writer
 
-    if not path.name and str(path) == "." and not path.is_dir():
-        raise Refusal("an empty name", instead="name a file or a folder")
     if question.folder:
         return pipeline.Output(path, question.fill, folder=True)
     if path.is_dir():

@@ -113,7 +113,7 @@ def test_the_smallest_grid_has_an_error_too():
     assert Study(small).curvature_error.values.max() > 0.01
 
 
-@pytest.mark.parametrize(("length", "unit"), [(1.0, "body length"), (0.4, "m")])
+@pytest.mark.parametrize(("length", "unit"), [(1.0, "BL"), (0.4, "m")])
 def test_files_have_values_units_and_conventions(tmp_path, length, unit):
     """All of the file against the objects: an uneven body in a frame of its own, off the defaults."""
     body = dataclasses.replace(
@@ -124,8 +124,8 @@ def test_files_have_values_units_and_conventions(tmp_path, length, unit):
     )
     study = Study(scene)
     fields.save_connection(tmp_path / "a.nc", study)
-    per = f"{unit} rad-1 (x, y), rad rad-1 (theta)"
-    per2 = f"{unit} rad-2 (x, y), rad rad-2 (theta)"
+    per = f"{unit}/rad, {unit}/rad, rad/rad"
+    per2 = f"{unit}/rad2, {unit}/rad2, rad/rad2"
     with xarray.open_dataset(tmp_path / "a.nc") as data:
         for name, values, units in (
             ("A", study.fitted.A, per),

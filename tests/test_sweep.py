@@ -298,12 +298,11 @@ def test_the_command_writes_netcdf_and_a_plot(tmp_path):
     assert "6 points" in out
     assert {p.name for p in tmp_path.iterdir()} == {"s.nc", "s.png"}
     with xarray.open_dataset(tmp_path / "s.nc") as data:
-        assert data.displacement.dims == ("gait_amplitude", "medium_ratio", "component")
-        found = data.displacement.sel(gait_amplitude=1.0, medium_ratio=2.0)
-        assert float(np.hypot(*found[:2])) == pytest.approx(0.0512808243, abs=1e-9)
+        assert data.x.dims == ("gait_amplitude", "medium_ratio")
+        found = data.net_distance.sel(gait_amplitude=1.0, medium_ratio=2.0)
+        assert float(found) == pytest.approx(0.0512808243, abs=1e-9)
         units = {name: data[name].attrs["units"] for name in data.data_vars}
-    assert units["displacement"] == "body length (x, y), rad (theta)"
-    assert (units["estimate"], units["estimate_heading"]) == ("body length", "rad")
+    assert (units["x"], units["x_error"], units["heading_error"]) == ("BL", "BL", "rad")
 
 
 @pytest.mark.parametrize(

@@ -366,6 +366,6 @@ def test_sweeps_have_it(tmp_path):
     )
     more = (
         sweep.Plan(sand, over).cost.balances
-        - sweep.Sweep(sand.changed(medium=Granular(1.49, 0.22)), over).cost().balances
+        - sweep.Plan(sand.changed(medium=Granular(1.49, 0.22)), over).cost.balances
     )
     assert more == 6 * 4 * uncertainty.PHASES

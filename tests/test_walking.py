@@ -961,7 +961,7 @@ def test_other_refusals(geomech, tmp_path):
             "engine must be one of planar, mujoco",
         ),
         (("walk", "three-link-glass"), "does not walk"),
-        (("walk", "small.toml", "--animate", "film.avi"), "end the name in"),
+        (("walk", "small.toml", "-o", "film.avi"), "end the name in"),
         (("walk", "small.toml", "-o", ""), "empty name"),
         (("displacement", "xplorer", "--amplitudes", "1"), "no shape space"),
         (("intrude", "xplorer"), "no [intruder]"),

@@ -136,7 +136,7 @@ def scenes() -> list[Any]:
         told,
         more,
         asked,
-        (numbers.tiers, drawn),
+        (numbers["tier"].values, drawn),
     ]
 
 

@@ -201,6 +201,8 @@ def write_variable(file: Any, variable: Variable) -> None:
         code = "i4"
     stored = file.createVariable(variable.name, code, dims)
     stored[...] = values
+    if variable.is_text:
+        stored._Encoding = "utf-8"  # xarray reads text, not bytes
     for key, text in facts(variable).items():
         setattr(stored, key, encoded(text))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from typing import Any
 
@@ -29,8 +30,9 @@ def attributes(optimum: Optimum) -> dict[str, Any]:
         "objective": objective.name,
         "starts": optimum.request.starts,
         "body_length": float(optimum.scene.system.length),
-        "best_scene_toml": toml(optimum.scene),
     }
+    with contextlib.suppress(Refusal):  # parts of Python alone have no text
+        facts["best_scene_toml"] = toml(optimum.scene)
     if objective.direction:
         facts["direction"] = objective.direction
     if objective.rate:

@@ -11,7 +11,7 @@ from geomech.plots.maps import ccf_map, shape_space
 from geomech.plots.stretched import stretched_map
 from geomech.plots.style import axes_of, figure, quantity, styled
 from geomech.results.fields import field_of, stretch_of
-from geomech.results.scenes import best_scene
+from geomech.results.scenes import scene_of
 from geomech.studies.effort import units
 from geomech.systems.base import shape_labels
 
@@ -51,7 +51,7 @@ def optimum_map(
     >>> best = geomech.optimise("three-link-viscous", harmonics=1, starts=1)
     >>> ax = geomech.plots.optimum_map(best)
     """
-    ax, scene = axes_of(ax, 4.6, 5.2), best_scene(result)
+    ax, scene = axes_of(ax, 4.6, 5.2), scene_of(result)
     labels = shape_labels(scene.system)
     if "gained_ccf" not in result:
         extent = scene.numerics.extent
@@ -81,7 +81,7 @@ def stretched_optimum(
 ) -> Axes:
     """Draw `optimum_map` on shape space redrawn so that equal lengths are equal path
     lengths. result: with ``stretched_shape``."""
-    ax, system = axes_of(ax), best_scene(result).system
+    ax, system = axes_of(ax), scene_of(result).system
     plane = stretch_of(result)
     look = {
         "labels": shape_labels(system),
@@ -144,7 +144,7 @@ def optimum_angles(result: Result, ax: Axes | None = None) -> Axes:
     """
     ax = axes_of(ax, 4.0, 3.4)
     t, curves = result["phase"].values, result["loop"].values.T
-    names = shape_labels(best_scene(result).system)
+    names = shape_labels(scene_of(result).system)
     step = max(1, len(curves) // 6)
     for k, curve in list(enumerate(curves))[step // 2 :: step]:
         ax.plot(t, curve, label=quantity(names[k][0]))

@@ -35,7 +35,7 @@ class Option:
     """What a field means, and how a command line gives it.
 
     help: a line. metavar: what stands for its value. parse: returns the value of a text;
-    without it the type of the field is read. flag: as it is typed, by default --NAME.
+    without it the type of the field is read. flag: its name there, if it is another.
     repeated: it may be given more than once, and a list of texts is parsed."""
 
     help: str
@@ -156,7 +156,7 @@ class Question(Plain):
     def check(self) -> None:
         """Refuse a question that makes no sense, before anything is computed."""
 
-    def check_draw(self, **options: Any) -> None:
+    def check_draw(self, *args: Any, **options: Any) -> None:
         """Refuse options of `draw` that make no sense together, before anything is
         computed."""
 
@@ -259,7 +259,7 @@ def is_required(default: Any) -> bool:
 
 def flag(name: str, option: Option) -> str:
     """Return an option as it is typed."""
-    return option.flag or "--" + name.replace("_", "-")
+    return "--" + (option.flag or name.replace("_", "-"))
 
 
 JSON_TYPES = {

@@ -114,14 +114,16 @@ class Ccf(Question):
         from geomech.core.errors import choose
 
         parsing.one_limit(clim, component)
-        choose("--style", style, plots.CCF_STYLES)
+        choose("``style``", style, plots.CCF_STYLES)
         if stretch and (self.metric or self.compare_frame or style != "map"):
             raise Refusal(
-                "--stretch is a map of its own",
-                instead="drop --style, --metric and --compare-frame",
+                "``stretch`` is a map of its own",
+                instead="drop ``style``, ``metric`` and ``compare_frame``",
             )
         if self.metric and style != "map":
-            raise Refusal("--metric draws on a map", instead=f"drop --style {style}")
+            raise Refusal(
+                "``metric`` draws on a map", instead=f"drop ``style`` {style}"
+            )
 
     def compute(self, run: Run) -> "Result":
         from geomech.core.variables import Result
@@ -158,7 +160,7 @@ class Ccf(Question):
             found += shape_space.enclosed_area(space.enclosed)
         if self.metric:
             found += fields.of_metric(tables.metric)
-        if self.stretched:
+        if space.stretch is not None:
             found += fields.of_stretch(
                 space.stretch, units(self.scene.system)["path_length"]
             )

@@ -53,7 +53,7 @@ def write_table(
     file.write(path, with_contents(result, ending, layout), **settings)
     has_sign = "sign" in getattr(file, "settings", ())
     if has_sign and not sign and layout != LAYOUTS[1]:
-        note(f"{path} has {SIGNS['+']}; --sign - gives the other")
+        note(f"{path} has {SIGNS['+']}; ``sign`` - gives the other")
 
 
 def with_contents(result: "Result", ending: str, layout: str | None = None) -> "Result":
@@ -164,7 +164,7 @@ class Connection(Question):
         from geomech.core.errors import choose
 
         parsing.one_limit(clim, component)
-        choose("--style", style, plots.CONNECTION_STYLES)
+        choose("``style``", style, plots.CONNECTION_STYLES)
 
     def compute(self, run: Run) -> "Result":
         from geomech.core.variables import Result
@@ -283,7 +283,7 @@ def check_settings(scene: Any, ending: str, options: dict[str, Any]) -> None:
     for name, known in (("sign", SIGNS), ("order", ORDERS), ("layout", LAYOUTS)):
         if name not in options:
             continue
-        choose(f"--{name}", options[name], known)
+        choose(f"``{name}``", options[name], known)
         if name not in taken:
             others = [
                 other
@@ -291,14 +291,14 @@ def check_settings(scene: Any, ending: str, options: dict[str, Any]) -> None:
                 if name in getattr(one, "settings", ())
             ]
             raise Refusal(
-                f"--{name} is that of a {' or '.join(others)} file",
+                f"``{name}`` is that of a {' or '.join(others)} file",
                 instead=f"drop it, a {ending} file says what it has",
             )
     struct = options.get("layout") == LAYOUTS[1]
     if struct and ("sign" in options or "order" in options):
         raise Refusal(
             "a struct s has its own sign and order",
-            instead="drop --sign and --order",
+            instead="drop ``sign`` and ``order``",
         )
 
 

@@ -4,7 +4,7 @@ that is accurate enough."""
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, cast
 
 from geomech.questions import loading, names, parsing, tools
 from geomech.questions.base import Option, Question, Run, Subject
@@ -46,9 +46,7 @@ class Displacement(Question):
     ] = None
     tolerance: Annotated[
         float | None,
-        Option(
-            "use the cheapest tier with an error of at most E BL", "E", flag="--tol"
-        ),
+        Option("use the cheapest tier with an error of at most E BL", "E", flag="tol"),
     ] = None
     effort: Annotated[bool, Option("add path length, work and cost of transport")] = (
         False
@@ -69,6 +67,11 @@ class Displacement(Question):
             tiers = tools.words(tiers)
         self._set(amplitudes=tools.numbers(amplitudes), tiers=tiers)
 
+    @property
+    def values(self) -> Sequence[float]:
+        """The amplitudes as a list."""
+        return cast(Sequence[float], self.amplitudes)
+
     def check(self) -> None:
         from geomech.studies.effort import refuse_costless
 
@@ -82,10 +85,10 @@ class Displacement(Question):
 
         jobs = []
         if self.effort:
-            jobs = cost.of_effort(self.scene, len(self.amplitudes))
+            jobs = cost.of_effort(self.scene, len(self.values))
         if self.tolerance is None:
             tables = Run().tables_of(self.scene)
-            return tables.cost(self.amplitudes, self.tiers, self.gait, more=jobs)
+            return tables.cost(self.values, self.tiers, self.gait, more=jobs)
         # The cost of a tolerance is known only once a tier has run: `allow` is called
         # before each.
         return cost.price(jobs)
@@ -96,7 +99,7 @@ class Displacement(Question):
         if self.tolerance is None:
             tables = run.tables_of(self.scene)
             found = tables.displacements(
-                self.amplitudes, self.tiers, self.gait, run.shown_progress
+                self.values, self.tiers, self.gait, run.shown_progress
             )
         else:
             found = self._cheapest(run)
@@ -110,12 +113,13 @@ class Displacement(Question):
 
         effort = []
         if self.effort:
-            effort = cost.of_effort(self.scene, len(self.amplitudes))
+            effort = cost.of_effort(self.scene, len(self.values))
 
         def ask(jobs: list) -> None:
             run.allow(cost.price([*jobs, *effort]))
 
-        return cheapest(self.scene, self.amplitudes, self.tolerance, self.gait, ask)
+        tolerance = cast(float, self.tolerance)
+        return cheapest(self.scene, self.values, tolerance, self.gait, ask)
 
     def check_draw(self, component: Sequence[str] = (), data: Any = None) -> None:
         points(data, self.scene, component)

@@ -27,6 +27,11 @@ def write_scene(path: Path, result: "Result") -> None:
     """Write the scene with the best gait, behind a comment with its value."""
     from geomech.io.files import write_text
 
+    if "best_scene_toml" not in result.attributes:
+        raise Refusal(
+            "the scene has parts that no file can name",
+            instead="write the result to another format, such as .nc",
+        )
     first, second, *_ = Optimize.headline(result)
     about = textwrap.wrap(f"{first} ({second})", COMMENT)
     comment = "".join(f"# {line}\n" for line in about)
@@ -149,7 +154,7 @@ class Optimize(Question):
 
     @staticmethod
     def summary(result: "Result") -> "Result":
-        shown = SHOWN
+        shown: tuple[str, ...] = SHOWN
         if result.attributes["starts"] > 1:
             shown = (*SHOWN, *ANSWERS)
         return result.only(*shown)

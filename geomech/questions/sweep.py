@@ -54,7 +54,7 @@ class Sweep(Question):
         if len(self.over) > DRAWN:
             raise Refusal(
                 f"cannot draw {len(self.over)} parameters",
-                instead="sweep one or two, or leave --plot out",
+                instead="sweep one or two, or leave ``plot`` out",
             )
 
     def cost(self) -> "Cost":

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rft.refusal import Refusal, located
 
@@ -60,7 +61,7 @@ def joint_limits(text: str | None, scene) -> float | list[tuple[float, float]] |
     1,-0.5:2."""
     if text is None:
         return None
-    pairs = []
+    pairs: list[Any] = []
     for part in text.split(","):
         ends = [
             number
@@ -79,11 +80,16 @@ def joint_limits(text: str | None, scene) -> float | list[tuple[float, float]] |
     return pairs
 
 
+def kind_of(part: Any) -> Any:
+    """Return the class of a part."""
+    return type(part)
+
+
 def amplitude_kind(scene) -> str | None:
     """Return the ``angle`` of `numbers` for an amplitude of the scene's gait."""
     from geomech.scenes.key import angles_of
 
-    if "amplitude" in angles_of(type(scene.gait)):
+    if "amplitude" in angles_of(kind_of(scene.gait)):
         return None
     return f"the amplitude of a {type(scene.gait).__name__.lower()} is none"
 
@@ -99,7 +105,7 @@ def parameter_kind(scene, parameter: str) -> str | None:
             "gait": scene.gait,
             "medium": scene.medium,
         }.get(section)
-        angle = key in angles_of(type(of))
+        angle = key in angles_of(kind_of(of))
         return (
             None
             if angle
@@ -117,7 +123,7 @@ def parameter_kind(scene, parameter: str) -> str | None:
     }
     of = owners.get(section, [getattr(system, section, None)])
     if parameter == "numerics.extent" or any(
-        key in angles_of(type(owner)) for owner in of
+        key in angles_of(kind_of(owner)) for owner in of
     ):
         return None
     return "this key takes degrees as they are" if key.endswith("_deg") else NO_ANGLE

@@ -94,7 +94,7 @@ class Walk(Question):
         shown = ["total_work", "total_loss", "cost_of_transport"]
         if str(result["status"].values) != WALKING:
             shown.remove("cost_of_transport")
-        if "states" in result:
+        if "yaw" in result:
             shown = ["lateral_speed", "yaw_rate", *shown]
         return result.only(*shown)
 
@@ -105,12 +105,12 @@ class Walk(Question):
         lines = [
             motion_words(result),
             f"of the error {elements:.1g} m/s are of the elements, from twice as many",
-            f"not accounted for, by the steps: {share:.1g} % of the work",
+            f"not accounted for, by the steps: {share:.2g} % of the work",
         ]
         unsolved = int(result["unsolved"].values)
         if unsolved:
             residual = float(result["residual"])
-            moved = float(result["unsolved_error"])
+            moved = float(result["speed_error_of_unsolved"])
             lines.append(
                 f"{unsolved} steps were taken unsolved, off by up to {residual:.1g} m/s, "
                 f"which moves the speed by {moved:.1g} m/s: "

@@ -90,8 +90,8 @@ class Plan:
         axes = []
         for parameter, values in grid.over.items():
             name = parameter.replace(".", "_").replace("-", "_")
-            values = np.array(values, float)
-            axes.append(Variable(name, (name,), values, "", parameter))
+            axis = np.array(values, float)
+            axes.append(Variable(name, (name,), axis, "", parameter))
         dims = tuple(axis.name for axis in axes)
         arranged = grid.arranged(np.concatenate(rows))
         variables, facts = self.question.variables(grid, arranged, dims)

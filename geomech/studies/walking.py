@@ -209,7 +209,7 @@ def totals(scene: WalkerScene, run: Walked) -> list[Variable]:
     transport = cost_of_transport(scene, walk)
     of_weight = "work over weight times distance, from rest"
     share = "share of the work that the steps do not account for"
-    unsolved_error = "part of the error of speed, from unsolved steps"
+    unsolved = "part of the error of speed, from unsolved steps"
     return [
         Variable("total_work", (), walk.work[-1], "J", "of the motors"),
         Variable("total_loss", (), walk.loss[-1], "J", "into the ground"),
@@ -217,7 +217,7 @@ def totals(scene: WalkerScene, run: Walked) -> list[Variable]:
         Variable("unaccounted", (), walk.unaccounted, "1", share),
         Variable("unsolved", (), walk.unsolved, "1", "steps that were taken unsolved"),
         Variable("residual", (), walk.residual, "m/s", "largest of a step"),
-        Variable("unsolved_error", (), walk.unsolved_error, "m/s", unsolved_error),
+        Variable("speed_error_of_unsolved", (), walk.unsolved_error, "m/s", unsolved),
     ]
 
 
