@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import functools
 import sys
+from collections.abc import Iterator, Mapping
 from contextvars import copy_context
 from importlib import import_module
 from typing import Annotated, Any
@@ -22,16 +23,30 @@ from geomech.commands.options import (
 )
 
 
+class Commands(Mapping[str, Any]):
+    """All commands by their names as they are typed; each is loaded at its first use."""
+
+    def __iter__(self) -> Iterator[str]:
+        return (typed(name) for names in headings().values() for name in names)
+
+    def __len__(self) -> int:
+        return sum(map(len, headings().values()))
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in iter(self):
+            raise KeyError(name)
+        return loaded(name.replace("-", "_"))
+
+
 class Group(TyperGroup):
     """Commands that are loaded when they are called, listed under headings."""
 
-    def list_commands(self, ctx: Any) -> list[str]:
-        return [typed(name) for names in headings().values() for name in names]
+    def __init__(self, **settings: Any):
+        super().__init__(**settings)
+        self.commands = Commands()  # type: ignore[assignment]
 
-    def get_command(self, ctx: Any, name: str) -> Any:
-        if name in self.list_commands(ctx):
-            return loaded(name.replace("-", "_"))
-        return None
+    def list_commands(self, ctx: Any) -> list[str]:
+        return [*self.commands]
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         wide = max(map(len, self.list_commands(ctx)))
@@ -72,12 +87,6 @@ def loaded(name: str) -> Any:
     )
     single.command(typed(name))(with_plugins(function(name)))
     return typer.main.get_command(single)
-
-
-def all_commands() -> dict[str, Any]:
-    """Return all commands by their names as they are typed."""
-    names = [name for group in headings().values() for name in group]
-    return {typed(name): loaded(name) for name in names}
 
 
 def function(name: str) -> Any:

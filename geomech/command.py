@@ -222,7 +222,11 @@ def parsed(options: Declared, given: dict[str, Any], subject: Any) -> dict[str, 
 def path_of(name: str) -> Path:
     """Return the path of an output; an empty name is refused."""
     if not name:
-        raise Refusal("an empty name", instead="name a file or a folder, '.' for this")
+        raise Refusal(
+            "an empty name",
+            where="``output``",
+            instead="name a file or a folder, '.' for this one",
+        )
     return Path(name)
 
 
@@ -261,11 +265,11 @@ def output(
 
     Refusal for another ending, or without one, unless it is a folder or the question's
     command fills one."""
-    from geomech.results.files import save, writer
+    from geomech.results.files import formats, save, writer
 
     if question.folder:
         return pipeline.Output(path, question.fill, folder=True)
-    if path.is_dir():
+    if path.is_dir() and path.suffix.lower() not in formats(question):
         return pipeline.Output(path, fill, folder=True)
     writer(path, question)  # refuses an ending that is no format
     return pipeline.Output(path, partial(save, **options))

@@ -35,7 +35,7 @@ SHIPPED = {
     *VERTICAL,
     *drag.SAMPLES,
 }
-COMMANDS = cli.all_commands()
+COMMANDS = cli.Commands()
 NUMBER = r"-?\d+(?:\.\d+)?(?:e[+-]\d+)?"
 
 

@@ -37,7 +37,7 @@ def test_lists_fit_a_screen(command):
 def test_every_option_and_argument_says_what_it_is_for():
     every = [
         (name, x)
-        for name, command in cli.all_commands().items()
+        for name, command in cli.Commands().items()
         for x in command.params
     ]
     assert (

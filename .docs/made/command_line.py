@@ -10,7 +10,7 @@ from geomech import cli
 
 def page() -> str:
     """Return a heading for each group of `geomech --help`, and for each command its usage, text and options."""
-    commands = cli.all_commands()
+    commands = cli.Commands()
     parts = []
     for heading, names in cli.headings().items():
         parts += [
