@@ -1,11 +1,14 @@
 """Geometric mechanics of locomotion: from a force law to the displacement of a gait.
 
-    study = geomech.study("three-link-glass")  # or a TOML file, or study(medium, body, gait)
-    study.displacement([0.5, 1.0])            # a table with errors, which plots itself: .plot()
-    study.plot_ccf()                          # also .ccf(), .animate("swim.gif"), .optimise()
+    study = geomech.study("three-link-glass")  # or a TOML file, or its parts
+    table = study.displacement([0.5, 1.0])    # with errors; .plot(), .save("a.nc")
+    study.ccf().plot()                        # also .connection(), .optimise()
 
-study, Study, tiers, workers            what is computed of a scene; methods of prediction; processes
-optimise (or optimize), sweep, accuracy the best gait; a grid of parameters; error against time
+study, Study                            a scene, and methods that ask questions of it
+displacement, ccf, sweep, optimise, forces, velocity, walk
+                                        the same of any scene; results that print themselves
+load_result, best_scene                 results from files; the scene with the best gait
+tiers, workers, accuracy                methods of prediction; processes; error against time
 load, Scene, Swimmer, Numerics, toml    scenes: read, built and written
 medium                                  a medium of the vertical plane, by name or from a file
 media, bodies, gaits, effects, systems  the parts of scenes; `register` adds custom ones
@@ -31,18 +34,26 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech import plots as plots
     from geomech import systems as systems
     from geomech import tiers as tiers
-    from geomech.app import Study as Study
+    from geomech.api import Study as Study
+    from geomech.api import ccf as ccf
+    from geomech.api import displacement as displacement
+    from geomech.api import forces as forces
+    from geomech.api import intrude as intrude
+    from geomech.api import load_result as load_result
+    from geomech.api import optimise as optimise
+    from geomech.api import optimize as optimize
+    from geomech.api import study as study
+    from geomech.api import sweep as sweep
+    from geomech.api import velocity as velocity
+    from geomech.api import walk as walk
     from geomech.app import accuracy as accuracy
     from geomech.app import fit_medium as fit_medium
     from geomech.app import fit_midlines as fit_midlines
-    from geomech.app import optimise as optimise
-    from geomech.app import optimize as optimize
-    from geomech.app import sweep as sweep
-    from geomech.app.study import study as study
     from geomech.geometry import connection as connection
     from geomech.geometry import curvature as curvature
     from geomech.geometry import reconstruct as reconstruct
     from geomech.measured import fit_log as fit_log
+    from geomech.results.scenes import best_scene as best_scene
     from geomech.run import workers as workers
     from geomech.scenes import Numerics as Numerics
     from geomech.scenes import Scene as Scene
@@ -79,16 +90,22 @@ _OBJECTS = {
     **dict.fromkeys(
         (
             "Study",
-            "accuracy",
-            "fit_medium",
-            "fit_midlines",
+            "ccf",
+            "displacement",
+            "forces",
+            "intrude",
+            "load_result",
             "optimise",
             "optimize",
             "study",
             "sweep",
+            "velocity",
+            "walk",
         ),
-        "geomech.app",
+        "geomech.api",
     ),
+    **dict.fromkeys(("accuracy", "fit_medium", "fit_midlines"), "geomech.app"),
+    "best_scene": "geomech.results.scenes",
     **dict.fromkeys(("load", "toml", "Scene", "Numerics"), "geomech.scenes"),
     "medium": "geomech.scenes.stress",
     "Swimmer": "geomech.systems",

@@ -1,29 +1,110 @@
-"""The command line: the commands of `geomech.commands`."""
+"""The command line: the commands of `geomech.questions`, and those of `geomech.commands`
+that ask none."""
 
 from __future__ import annotations
 
+import functools
 import sys
+from collections.abc import Iterator, Mapping
 from contextvars import copy_context
 from importlib import import_module
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
-from geomech import __version__, terminal
+from geomech import __version__, questions, renamed, terminal
 from geomech.commands import COMMANDS
-from geomech.commands.group import Group
-from geomech.commands.options import PluginOption, load_plugins, with_plugins
+from geomech.commands.options import (
+    PluginOption,
+    load_plugins,
+    with_plugins,
+    with_workers,
+)
+
+
+class Commands(Mapping[str, Any]):
+    """All commands by their names as they are typed; each is loaded at its first use."""
+
+    def __iter__(self) -> Iterator[str]:
+        return (typed(name) for names in headings().values() for name in names)
+
+    def __len__(self) -> int:
+        return sum(map(len, headings().values()))
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in iter(self):
+            raise KeyError(name)
+        return loaded(name.replace("-", "_"))
+
+
+class Group(TyperGroup):
+    """Commands that are loaded when they are called, listed under headings."""
+
+    def __init__(self, **settings: Any):
+        super().__init__(**settings)
+        self.commands = Commands()  # type: ignore[assignment]
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return [*self.commands]
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        wide = max(map(len, self.list_commands(ctx)))
+        for heading, names in headings().items():
+            rows = [(typed(name).ljust(wide), summary(name)) for name in names]
+            with formatter.section(heading):
+                formatter.write_dl(rows)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> tuple:
+        return super().resolve_command(ctx, renamed.current(args))
+
+
+def headings() -> dict[str, list[str]]:
+    """Return the names of all commands by their headings."""
+    found = {}
+    for heading, names in COMMANDS.items():
+        found[heading] = [*questions.GROUPS.get(heading, ()), *names]
+    return found
+
+
+def typed(name: str) -> str:
+    """Return the name of a command as it is typed."""
+    return name.replace("_", "-")
+
+
+def summary(name: str) -> str:
+    """Return the line of a command in the list of all."""
+    if name in questions.SUMMARIES:
+        return questions.SUMMARIES[name]
+    return loaded(name).get_short_help_str(60)
+
+
+@functools.cache
+def loaded(name: str) -> Any:
+    """Return a command: that of its question, or one of those that ask none."""
+    single = typer.Typer(
+        pretty_exceptions_enable=False, rich_markup_mode=None, add_completion=False
+    )
+    single.command(typed(name))(with_plugins(function(name)))
+    return typer.main.get_command(single)
+
+
+def function(name: str) -> Any:
+    """Return the function of a command."""
+    if name not in questions.SUMMARIES:
+        return getattr(import_module(f"geomech.commands.{name}"), name)
+    from geomech.command import command
+
+    question = questions.question(name)
+    if question.parallel:
+        return with_workers(command(question))
+    return command(question)
+
 
 app = typer.Typer(cls=Group, pretty_exceptions_enable=False, rich_markup_mode=None)
-for heading, names in COMMANDS.items():
-    for name in names:
-        function = getattr(import_module(f"geomech.commands.{name}"), name)
-        app.command(name.replace("_", "-"), rich_help_panel=heading)(
-            with_plugins(function)
-        )
 
 
-def _version(requested: bool) -> None:
+def print_version(requested: bool) -> None:
     if requested:
         print(f"geomech {__version__}")
         raise typer.Exit
@@ -35,7 +116,7 @@ def geomech(
         bool,
         typer.Option(
             "--version",
-            callback=_version,
+            callback=print_version,
             is_eager=True,
             help="print the version and exit",
         ),
@@ -45,16 +126,15 @@ def geomech(
     """Geometric mechanics of locomotion: from a force law to displacement."""
     from geomech.run.backend import prefer
 
-    prefer(
-        "numpy"
-    )  # its first call takes half a second less; `commands.pipeline` knows who has much to do
+    # NumPy's first call takes half a second less; the pipeline knows who has much to do.
+    prefer("numpy")
     load_plugins(plugin)
 
 
 def main(argv: list[str] | None = None) -> None:
-    """Run a command and exit: one line on standard error and code 2 for a mistake, 128 + its number for a signal."""
+    """Run a command and exit: one line on standard error and code 2 for a mistake, 128 +
+    its number for a signal."""
     terminal.limit_threads()
     arguments = (sys.argv[1:] if argv is None else argv) or ["--help"]
-    sys.exit(
-        copy_context().run(terminal.exit_code, app, arguments)
-    )  # what the command prefers ends with it
+    # What the command prefers ends with its context.
+    sys.exit(copy_context().run(terminal.exit_code, app, arguments))

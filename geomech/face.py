@@ -1,4 +1,4 @@
-"""Implementations of methods of connections and fields that take the layers of files and words.
+"""Implementations of methods of values that take the layers of files and words.
 
 They are imported at their first use, so that the package starts fast.
 """
@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from geomech.core.face import implements
+from rft.refusal import Refusal, printable
 
 
 @implements("Connection._repr_html_")
@@ -52,3 +53,72 @@ def field_to_xarray(field: Any, name: str, shapes: Sequence[str]) -> Any:
     from geomech.studies.fields import of_field
 
     return to_xarray(of_field(field, name, shapes))[name]
+
+
+@implements("Result.__repr__")
+def result_text(result: Any) -> str:
+    """Return a result as a terminal shows it."""
+    from geomech.results.show import text
+
+    return printable(text(result))
+
+
+@implements("Result._repr_html_")
+def result_html(result: Any) -> str:
+    """Return a result as a notebook shows it."""
+    from geomech.results.html import html
+
+    return html(result)
+
+
+@implements("Result.to_dict")
+def result_to_dict(result: Any) -> dict[str, Any]:
+    """Return a result as plain data."""
+    from geomech.results.files import to_dict
+
+    return to_dict(result)
+
+
+@implements("Result.to_xarray")
+def result_to_xarray(result: Any) -> Any:
+    """Return a result as a Dataset."""
+    from geomech.results.files import to_xarray
+
+    return to_xarray(result)
+
+
+@implements("Result.to_dataframe")
+def result_to_dataframe(result: Any, dims: tuple[str, ...]) -> Any:
+    """Return a result as a data frame."""
+    from geomech.results.files import to_dataframe
+
+    return to_dataframe(result, dims)
+
+
+@implements("Result.save")
+def save_result(result: Any, path: Path, **options: Any) -> None:
+    """Write a result."""
+    from geomech.results.files import save
+
+    save(result, path, **options)
+
+
+@implements("Result.plot")
+def plot_result(result: Any, **options: Any) -> Any:
+    """Draw a result."""
+    from geomech.results.kinds import kind_of
+
+    draw = kind_of(result).draw
+    if draw is None:
+        raise Refusal(f"there is no picture of {result.kind or 'this result'}")
+    return draw(result, **options)
+
+
+@implements("Result.kind")
+def kind_of_result(name: str) -> Any:
+    """Return the class of the question of that name; None if there is none."""
+    from geomech import questions
+
+    if name not in questions.SUMMARIES:
+        return None
+    return questions.question(name)

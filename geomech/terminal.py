@@ -31,6 +31,7 @@ LONGEST = 2000  # characters of an error
 PRINTING = (
     "geomech.cli",
     "geomech.commands",
+    "geomech.pipeline",
     "geomech.terminal",
     "click",
     "typer",

@@ -20,6 +20,7 @@ import re
 import sys
 import tempfile
 
+import former
 import frozen
 import numpy as np
 import pytest
@@ -33,7 +34,6 @@ from registry import (
     STRESSES,
     WALKERS,
 )
-from scipy.io import netcdf_file
 from scipy.spatial.transform import Rotation
 
 import geomech
@@ -115,7 +115,7 @@ def tiers():
             if solver_of(scene.system)
             else {k: v for k, v in COARSE.items() if k in GEOMETRY}
         )
-        study = geomech.Study(scene.with_numerics(**own))
+        study = geomech.Study(scene.with_numerics(**own)).tables
         amplitudes = scene.gait.amplitude * np.array([0.6, 1.0])
         for tier in study.tiers:
             yield f"tier, {name}, {tier}", study.poses(tier, None, amplitudes)
@@ -176,20 +176,14 @@ def shipped(kind: str) -> list[str]:
     return [line.split()[0] for line in own]
 
 
-def read(file: pathlib.Path) -> dict[str, np.ndarray]:
-    with netcdf_file(file, mmap=False) as data:
-        return {name: variable[:].copy() for name, variable in data.variables.items()}
-
-
 def commands():
     with tempfile.TemporaryDirectory() as folder:
         here = pathlib.Path(folder)
         (here / "scene.toml").write_text(SCENE)
         scene, file = str(here / "scene.toml"), str(here / "out.nc")
         command("connection", scene, "-o", file)
-        for name, values in read(here / "out.nc").items():
-            if values.dtype.kind == "f":
-                yield f"connection, {name}", values
+        for name, values in former.connection(here / "out.nc").items():
+            yield f"connection, {name}", values
         command(
             "sweep",
             scene,
@@ -200,9 +194,9 @@ def commands():
             "-o",
             file,
         )
-        found = read(here / "out.nc")
-        yield "sweep", found["displacement"]
-        yield "sweep, estimate", found["estimate"]
+        poses, errors = former.sweep(here / "out.nc")
+        yield "sweep", poses
+        yield "sweep, estimate", errors
         told = json.loads(
             command(
                 "velocity",
@@ -214,8 +208,8 @@ def commands():
                 "--json",
             )
         )
-        yield "command, velocity", told["xi"]
-        told = json.loads(
+        yield "command, velocity", told["data_vars"]["xi"]["data"]
+        told = former.displacement(
             command("displacement", scene, "--amplitudes", "0.5,1.0", "--json")
         )
         for tier, errors in told["estimate"].items():
@@ -325,7 +319,8 @@ def intruders():
                 f"{command('scenes', '--show', name)}\n[numerics]\n{numerics}\n"
             )
             yield from of_json(
-                f"intruder, {name}", json.loads(command("intrude", str(file), "--json"))
+                f"intruder, {name}",
+                former.intrusion(command("intrude", str(file), "--json")),
             )
 
 
@@ -336,7 +331,7 @@ def walkers():
         for name in shipped("walker"):
             text = re.sub(r"\[numerics\][^[]*", "", command("scenes", "--show", name))
             (pathlib.Path(folder) / f"{name}.toml").write_text(f"{text}\n{coarse}")
-            told = json.loads(command("walk", f"{folder}/{name}.toml", "--json"))
+            told = former.walk(command("walk", f"{folder}/{name}.toml", "--json"))
             yield from of_json(f"walker, {name}", told)
 
 
@@ -353,9 +348,11 @@ def measurements():
     }
     with frozen.place():
         for name, line in lines.items():
-            told = json.loads(command(*line.split()))
-            if "--amplitudes" in line:  # the rest says these numbers again
-                told = {key: told[key] for key in (*told["estimate"], "estimate")}
+            out = command(*line.split())
+            if "--amplitudes" in line:
+                told = former.displacement(out)
+            else:
+                told = json.loads(out)
             yield from of_json(f"measured, {name}", told)
 
 

@@ -5,7 +5,6 @@ import dataclasses
 import errno
 import hashlib
 import itertools
-import json
 import math
 import os
 import pathlib
@@ -21,6 +20,7 @@ import numpy as np
 import pytest
 from commands import geomech
 from registry import EFFECTS, MEDIA
+from tabled import tabled_json
 from test_hard_cases import GLASS, apart
 
 from geomech import scenes
@@ -758,7 +758,7 @@ def test_a_command_outlives_the_cache(damage, tmp_path, compiled_code):
             preexec_fn=small_files,
         )
         assert done.returncode == 0, done.stderr
-        return json.loads(done.stdout)["direct"], [
+        return tabled_json(done.stdout)["direct"], [
             x
             for x in done.stderr.splitlines()
             if " under way for " not in x and "compiling" not in x

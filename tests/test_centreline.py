@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 from commands import geomech
 from scipy.special import ellipe
+from tabled import swept_table, tabled
 
-from geomech import Study, scenes
+from geomech import scenes
 from geomech.core.errors import Note, UnitWarning
 from geomech.gaits import Centreline, Sine
 from geomech.gaits.waves import arc_to_phase
+from geomech.studies.study import Study
 from geomech.studies.sweep import Sweep
 from rft import Backbone
 from rft.refusal import Refusal
@@ -366,18 +368,20 @@ def test_sweeps_are_taken_up_only_with_the_same_file(tmp_path, monkeypatch):
     toml, partial = scene_in(tmp_path, 12), tmp_path / "partial"
     write(tmp_path / "data", "points", count=12, places=20)
     over = {"body.length": [1.0, 2.0]}
-    sweep.sweep(scenes.load(toml), over, partial)
+    swept_table(sweep.sweep(scenes.load(toml), over, partial))
     calls, solve = [], cycles._rows
     monkeypatch.setattr(
         cycles, "_rows", lambda *some: calls.append(some) or solve(*some)
     )
-    sweep.sweep(scenes.load(toml), over, partial)
+    swept_table(sweep.sweep(scenes.load(toml), over, partial))
     assert calls == []
     write(tmp_path / "data", "points", count=12, places=20, amplitude=0.11)
-    sweep.sweep(scenes.load(toml), over, partial)
+    swept_table(sweep.sweep(scenes.load(toml), over, partial))
     assert calls
-    swept = sweep.sweep(
-        scenes.load(toml), {"body.length": [1.0, 2.0], "gait.amplitude": [0.5, 1.0]}
+    swept = swept_table(
+        sweep.sweep(
+            scenes.load(toml), {"body.length": [1.0, 2.0], "gait.amplitude": [0.5, 1.0]}
+        )
     )
     assert np.isfinite(swept["displacement"]).all()
 
@@ -570,14 +574,16 @@ def test_what_an_estimate_leaves_out_is_told(tmp_path):
     for more in ([], ["--json"]):
         told = geomech("displacement", toml, "--amplitudes", "1", *more)[1]
         assert (
-            json.loads(told)["estimate_is"] == said
+            json.loads(told)["attrs"]["error_is"] == said
             if more
             else f" estimated error: {said} " in " ".join(told.split())
         )
     measured = Study(scenes.load(toml))
     swept = lambda scene: Sweep(scene, {"gait.amplitude": [1.0]}).ask().attributes
-    assert measured.study([1.0], ["direct"]).to_xarray().attrs["estimate_is"] == said
-    assert said in measured.study([1.0], ["direct"])._repr_html_()
+    assert (
+        measured.displacements([1.0], ["direct"]).to_xarray().attrs["error_is"] == said
+    )
+    assert said in tabled(measured.displacements([1.0], ["direct"]))._repr_html_()
     assert swept(measured.scene)["estimate_is"] == said
     plain = scenes.load("sandfish-loose").with_numerics(phases=32)
     assert "estimate_is" not in swept(plain)

@@ -9,6 +9,7 @@ import tempfile
 import numpy as np
 import pytest
 from commands import geomech
+from tabled import swept_table
 from tasks import always_dies, dies, fails
 from test_workers import OVER, power  # noqa: F401  power is a fixture
 
@@ -52,9 +53,9 @@ def test_the_cluster_gives_the_same_digits(address, power, monkeypatch):  # noqa
         (GLASS, OVER),
         (GLASS.changed(medium=power(1.0)), {"medium.power": [0.9, 1.0]}),
     ):
-        alone, told = sweep.sweep(scene, over), []
+        alone, told = swept_table(sweep.sweep(scene, over)), []
         with using(scheduler=address):
-            shared = sweep.sweep(scene, over, progress=told.append)
+            shared = swept_table(sweep.sweep(scene, over, progress=told.append))
         for key in ("displacement", "estimate", "estimate_heading"):
             np.testing.assert_array_equal(shared[key], alone[key])
         assert told == sorted(told) and told[-1] == 1.0

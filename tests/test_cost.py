@@ -1,7 +1,6 @@
 """Large requests: foretold, refused without --yes, stopped at once, kept as far as they got, and bounded in memory."""
 
 import contextlib
-import json
 import os
 import signal
 import subprocess
@@ -12,6 +11,7 @@ import numpy as np
 import pytest
 from commands import geomech as run
 from scipy.io import netcdf_file
+from tabled import swept_table, tabled_json
 
 from geomech import plots, scenes, terminal
 from geomech.geometry import connection, harmonics
@@ -165,7 +165,7 @@ def test_yes_computes_and_says_what_is_to_come(large, monkeypatch):
     assert err.startswith(
         "three-link-viscous: 65 force balances, about 1 s of computing and 16"
     )
-    assert np.hypot(*json.loads(out)["direct"][0][:2]) == pytest.approx(
+    assert np.hypot(*tabled_json(out)["direct"][0][:2]) == pytest.approx(
         0.0512808, abs=1e-6
     )
     for args in (
@@ -177,7 +177,7 @@ def test_yes_computes_and_says_what_is_to_come(large, monkeypatch):
 
 def test_a_field_of_four_joints_is_written(large, monkeypatch):
     """Said before it begins once it takes a second; least squares over the same directions at one of its shapes."""
-    monkeypatch.setattr("geomech.studies.shape_space.ShapeSpace.worth_saying", 0.0)
+    monkeypatch.setattr("geomech.questions.connection.Connection.worth_saying", 0.0)
     code, out, err = run(
         "connection", "five.toml", "--grid", "4", "--extent", "1.2", "-o", "out.nc"
     )
@@ -271,7 +271,7 @@ def test_a_sweep_over_amplitude_goes_in_groups(tmp_path, monkeypatch):
         "medium.ratio": [2.0, 3.0],
         "gait.amplitude": np.linspace(0.2, 1.5, 7).tolist(),
     }
-    whole, kept = sweep.sweep(VISCOUS, over), tmp_path / ".s.partial"
+    whole, kept = swept_table(sweep.sweep(VISCOUS, over)), tmp_path / ".s.partial"
     monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", 3)
     rows, calls = cycles._rows, []
 
@@ -283,8 +283,8 @@ def test_a_sweep_over_amplitude_goes_in_groups(tmp_path, monkeypatch):
 
     monkeypatch.setattr(cycles, "_rows", stopping)
     with pytest.raises(terminal.Stopped):
-        sweep.sweep(VISCOUS, over, kept)
-    again = sweep.sweep(VISCOUS, over, kept)
+        swept_table(sweep.sweep(VISCOUS, over, kept))
+    again = swept_table(sweep.sweep(VISCOUS, over, kept))
     assert calls == [
         (2.0, 3),
         (2.0, 3),

@@ -5,11 +5,13 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from tabled import swept_table, tabled
 
 from geomech import scenes
 from geomech.gaits import Fourier
+from geomech.questions.ccf import Ccf
 from geomech.run.cost import BASE
-from geomech.studies import accuracy, cost, effort, motion, report, shape_space, sweep
+from geomech.studies import accuracy, cost, effort, motion, report, sweep
 from geomech.studies.study import Study
 from geomech.tiers import TIERS
 from rft import Chain, body_velocity
@@ -92,7 +94,7 @@ FOUND = {
 def test_the_balances_foretold_are_those_solved(name, solved):
     scene, tiers = FOUND[name]
     foretold = Study(scene).cost([0.1, 0.2, 0.3], tiers).balances
-    Study(scene).study([0.1, 0.2, 0.3], tiers)
+    tabled(Study(scene).displacements([0.1, 0.2, 0.3], tiers))
     assert foretold == sum(solved)
 
 
@@ -156,7 +158,7 @@ def test_accuracy_and_sweep_say_what_they_cost(solved):
     ):
         foretold = sweep.Sweep(scene, over).cost().balances
         solved.clear()
-        sweep.sweep(scene, over)
+        swept_table(sweep.sweep(scene, over))
         assert foretold == sum(solved)
 
 
@@ -180,8 +182,8 @@ def test_a_balance_that_is_tried_twice_is_one(solved):
 @pytest.mark.parametrize(
     "question",
     [
-        lambda s: shape_space.ccf(s, None, None, "link-1", False, False),
-        lambda s: shape_space.ccf(s, "1,2", None, None, False, False),
+        lambda s: Ccf(s, compare_frame="link-1"),
+        lambda s: Ccf(s, "1,2"),
     ],
     ids=["map with gait and another frame", "slice"],
 )
@@ -190,7 +192,7 @@ def test_a_map_takes_the_balances_foretold(scene, question, solved):
     asked.check()
     foretold = asked.cost().balances
     solved.clear()
-    asked.answer(lambda done: None, lambda cost: None)
+    asked.ask()
     assert foretold == sum(solved)
 
 
@@ -207,7 +209,7 @@ def test_memory_is_foretold_too_large_rather_than_too_small():
     told = cost.direct(scene, scene.gait, len(amplitudes), 4096)[0].memory - BASE
     tracemalloc.start()
     try:
-        Study(scene).study(amplitudes, ["direct"])
+        tabled(Study(scene).displacements(amplitudes, ["direct"]))
         used = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()

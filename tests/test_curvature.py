@@ -1,7 +1,6 @@
 """The CCF of any pair of joints, its estimated error near kinks, and what a file says of both."""
 
 import dataclasses
-import types
 
 import numpy as np
 import pytest
@@ -12,9 +11,11 @@ from geomech import scenes, symbolic
 from geomech.core.variables import Result, Variable
 from geomech.geometry import connection, curvature
 from geomech.geometry.field import Field
+from geomech.questions.ccf import zero_line_words
+from geomech.results import show
 from geomech.studies import fields
+from geomech.studies.shape_space import zero_line
 from geomech.studies.study import Study
-from geomech.text import ccf as words
 from geomech.tiers import fitted
 from rft import se2
 
@@ -112,7 +113,7 @@ def test_the_smallest_grid_has_an_error_too():
     assert Study(small).curvature_error.values.max() > 0.01
 
 
-@pytest.mark.parametrize(("length", "unit"), [(None, "body length"), (0.4, "m")])
+@pytest.mark.parametrize(("length", "unit"), [(None, "BL"), (0.4, "m")])
 def test_files_have_values_units_and_conventions(tmp_path, length, unit):
     """All of the file against the objects: an uneven body in a frame of its own, off the defaults."""
     body = dataclasses.replace(
@@ -123,8 +124,8 @@ def test_files_have_values_units_and_conventions(tmp_path, length, unit):
     )
     study = Study(scene)
     fields.save_connection(tmp_path / "a.nc", study)
-    per = f"{unit} rad-1 (x, y), rad rad-1 (theta)"
-    per2 = f"{unit} rad-2 (x, y), rad rad-2 (theta)"
+    per = f"{unit}/rad, {unit}/rad, rad/rad"
+    per2 = f"{unit}/rad2, {unit}/rad2, rad/rad2"
     with xarray.open_dataset(tmp_path / "a.nc") as data:
         for name, values, units in (
             ("A", study.fitted.A, per),
@@ -185,93 +186,31 @@ def test_the_zero_line_is_looked_for_around_the_gaits_middle(x, middle, said):
     field = dataclasses.replace(
         field, values=np.where(np.isnan(field.values[0]), np.nan, field.values)
     )
-    assert words._zero_line(field, np.array(middle)) == (
-        [] if said is None else [f"zero line of x: {said}"]
-    )
+    found = zero_line(field, np.array(middle))
+    if said is None:
+        assert found == []
+        return
+    ccf = Variable("ccf", (), field.values)
+    result = Result("ccf", (*found, ccf))
+    assert zero_line_words(result) == f"zero line of x: {said}"
 
 
 def test_extremes_of_a_ccf_are_told_with_their_places_and_the_larger_error():
     field = field_of(
         lambda a, b: 2 * a - b, lambda a, b: -5e-13 + 0 * a, lambda a, b: a * b
     )
-    error = dataclasses.replace(
-        field, values=1e-3 * np.arange(3 * 132.0).reshape(3, 11, 12)
-    )
-    head, x, y, theta = words._extremes(field, error)
-    assert head.split() == [
-        "component",
-        "least",
-        "at",
-        "(rad)",
-        "largest",
-        "at",
-        "(rad)",
-        "+-",
-        "error",
+    errors = 1e-3 * np.arange(3 * 132.0).reshape(3, 11, 12)
+    error = dataclasses.replace(field, values=errors)
+    axes = [
+        Variable(f"alpha_{k}", (f"alpha_{k}",), x, "rad") for k, x in enumerate(AXES, 1)
     ]
-    assert x.split() == [
-        "x",
-        "(m/rad2)",
-        "-3",
-        "-1.00,",
-        "1.00",
-        "4.2",
-        "1.50,",
-        "-1.20",
-        "1.2e-01",
-    ]
-    assert y.split() == ["y", "(m/rad2)", "zero"]
-    assert theta.split() == [
-        "theta",
-        "(rad/rad2)",
-        "-1.8",
-        "1.50,",
-        "-1.20",
-        "1.5",
-        "1.50,",
-        "1.00",
-        "4.0e-01",
-    ]
-    seen = dataclasses.replace(
-        field, values=np.where(field.values[0] > 4, np.nan, 3 * field.values)
-    )
-    assert list(words._extremes(seen, error))[1].split()[5:] == [
-        "12",
-        "1.50,",
-        "-1.00",
-        "1.2e-01",
-    ]
-    assert list(words._extremes(seen, error))[2].split()[:3] == [
-        "y",
-        "(m/rad2)",
-        "-1.5e-12",
-    ]
-
-
-@pytest.mark.parametrize(
-    ("zero", "said"),
-    [
-        ((), "  x 0.1235 +- 0.002 m, y -0.02 +- 0.0003 m, heading 0 +- 0.04 rad"),
-        (("x", "heading"), "  y -0.02 +- 0.0003 m; x and heading: zero by symmetry"),
-        (("x", "y", "heading"), "  x, y and heading: zero by symmetry"),
-    ],
-)  # fmt: skip
-def test_what_a_gait_encloses_is_told_with_its_error(zero, said):
-    numbers = (
-        ("x", 0.123456, 2e-3, "m"),
-        ("y", -0.02, 3e-4, "m"),
-        ("heading", -1e-12, 0.04, "rad"),
-    )
-    moved = [
-        Variable(name, ("tier", "amplitude"), [[x]], unit, error=[[e]])
-        for name, x, e, unit in numbers
-    ]
-    table = Result(
-        "displacement",
-        (*moved, Variable("amplitude", ("amplitude",), [0.75])),
-        {"zero_by_symmetry": list(zero)},
-    )
-    first, second = words._integral(types.SimpleNamespace(enclosed=table))
-    assert first == "integral over the scene's gait, of amplitude 0.75 (the area tier):"
-    assert second == said
-    assert [*words._integral(types.SimpleNamespace(enclosed=None))] == []
+    component = Variable("component", ("component",), ["x", "y", "theta"])
+    result = Result("", (component, *axes, fields.of_ccf(field, error)))
+    (table,) = (part for part in show.parts(result) if isinstance(part, show.Table))
+    rows = [*zip(table.first, *(column for (column,) in table.blocks))]
+    head, x, y, theta = rows
+    assert head == ("component", "least", "at", "largest", "at", "+- error")
+    assert x == ("x (m/rad2)", "-3", "-1, 1", "4.2", "1.5, -1.2", "1.2e-01")
+    assert y[:4] == ("y (m/rad2)", "zero", "", "zero")
+    assert theta[:3] == ("theta (rad/rad2)", "-1.8", "1.5, -1.2")
+    assert theta[3:] == ("1.5", "1.5, 1", "4.0e-01")

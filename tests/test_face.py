@@ -11,8 +11,7 @@ from numpy.testing import assert_allclose
 
 import geomech
 import rft
-from geomech import Refusal, plots
-from geomech.app import Study
+from geomech import Refusal, Study, plots
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Points, Sine, Wave
 from geomech.scenes.parts import as_scene
 
@@ -101,80 +100,75 @@ def test_what_makes_no_scene_is_refused(parts, says):
 
 def test_a_table_of_displacements_prints_and_plots_itself(study):
     table = study.displacement([0.5, 1.0], "direct")
-    assert_allclose(
-        table["direct"], study.poses("direct", amplitudes=[0.5, 1.0]), atol=1e-5
-    )
-    assert (
-        "displacement per cycle (BL), direct tier" in repr(table)
-        and "<table" in table._repr_html_()
-    )
-    (line, *_), ax = table.plot().lines, table.plot()
-    assert_allclose(line.get_ydata(), table["net_distance"]["direct"])
-    assert (ax.get_ylabel(), ax.get_xlabel()) == (
-        "net distance per cycle (BL)",
-        "radius of the circle (rad)",
-    )
-    assert study.displacement(tiers="direct")["amplitude"] == [
-        study.scene.gait.amplitude
-    ]
+    poses = study.tables.poses("direct", amplitudes=[0.5, 1.0])
+    for name, values in zip(("x", "y", "heading"), poses.T):
+        assert_allclose(table[name].values[0], values, atol=1e-5)
+    assert "displacement per cycle, direct tier" in repr(table)
+    assert "<table" in table._repr_html_()
+    _, axes = plots.figure(3.0, 3.0)
+    ax = table.plot(ax=axes[0, 0])
+    assert_allclose(ax.lines[0].get_ydata(), table["net_distance"].values[0])
+    assert ax.get_ylabel() == "net distance per cycle (BL)"
+    assert ax.get_xlabel() == "radius of the circle (rad)"
+    own = study.displacement(tiers="direct")["amplitude"].values
+    assert own.tolist() == [study.scene.gait.amplitude]
     cheap = study.displacement(0.5, tolerance=1e-2)
-    assert max(cheap["estimate"][cheap["tier"]]) <= 1e-2
+    assert cheap["x"].error.max() <= 1e-2 and cheap.sizes["tier"] == 1
     with pytest.raises(Refusal, match="tolerance chooses the tier: drop tiers"):
         study.displacement(0.5, "direct", tolerance=1e-2)
 
 
+def test_tables_are_computed_once(study):
+    fitted = study.tables.fitted
+    again = study.displacement([0.5], ["path"])
+    before = dict(zip(again["part"].values, again["computed_before"].values))
+    assert before["field"] == 1 and study.tables.fitted is fitted
+
+
 def test_a_study_draws_and_films(study, tmp_path):
-    assert study.plot_ccf("theta").get_title().endswith("turning")
-    assert study.plot_connection("y").get_title().endswith("sideways")
-    assert (
-        len(study.plot_displacement(tiers=["path"], quantity="x").lines[0].get_xdata())
-        == 10
-    )
+    _, axes = plots.figure(3.0, 3.0, 2)
+    first, second = axes[0]
+    ccf = study.ccf().plot(component="theta", ax=first)
+    assert ccf.get_title().endswith("turning")
+    A = study.connection().plot(component="y", ax=second)
+    assert A.get_title().endswith("sideways")
     assert study.animate(tmp_path / "a.gif").read_bytes().startswith(b"GIF")
     with pytest.raises(Refusal, match="component: 'z' is unknown"):
-        study.plot_ccf("z")
+        study.ccf().plot(component="z")
     with pytest.raises(Refusal, match="end the name in"):
         study.animate("a.txt")
 
 
 def test_maps_of_many_joints_are_slices():
     four = geomech.study("viscous-2", rft.Chain((1, 1, 1, 1)), grid=5)
-    assert_allclose(four.ccf((1, 3)).values, four.plane((0, 2)).ccf.values)
-    ax = four.plot_ccf("x", (2, 3))
-    assert (ax.get_xlabel(), ax.get_ylabel()) == (
-        r"$\alpha_{2}$ (rad)",
-        r"$\alpha_{3}$ (rad)",
-    )
-    with pytest.raises(Refusal, match=r"3 joints has no one map: give pair=\(1, 2\)"):
-        four.ccf()
-
-
-def test_a_study_with_other_numerics_or_frame_is_one_too(study):
-    assert (
-        type(study.with_numerics(phases=64)) is type(study.in_frame("link-1")) is Study
-    )
-    assert study.with_numerics(phases=64).fitted is study.fitted
+    found = four.ccf((1, 3))
+    assert_allclose(found["ccf_1_3"].values, four.tables.plane((0, 2)).ccf.values)
+    assert found["ccf_1_3"].dims == ("component", "alpha_1", "alpha_3")
+    assert {"ccf_1_2", "ccf_1_3", "ccf_2_3"} <= set(four.ccf())
+    fig = four.ccf((2, 3)).plot(component=("x",))
+    assert fig.axes[0].get_xlabel() == r"$\alpha_{2}$ (rad)"
+    with pytest.raises(Refusal, match="pair must be two different joints|different"):
+        four.ccf((1, 1))
 
 
 def test_functions_take_whatever_makes_a_scene(study):
-    assert_allclose(
-        geomech.study(slide, Circle(0.5), **SMALL).displacement(tiers="direct")["y"][
-            "direct"
-        ],
-        np.pi / 4,
-    )
-    best = geomech.study(slide, grid=7).optimize(
-        "displacement", limits=1.0, harmonics=1
-    )
-    assert best.value == pytest.approx(np.pi, rel=1e-3) and repr(best).startswith(
-        "scene: displacement 3.14"
-    )
-    assert best.plot().get_xlabel() == r"$\alpha_{1}$ (rad)"
-    swept = geomech.sweep(study, {"medium.C": [1.0, 2.0]})
-    assert_allclose(
-        swept["displacement"], study.sweep({"medium.C": [1.0, 2.0]})["displacement"]
-    )
+    moved = geomech.study(slide, Circle(0.5), **SMALL).displacement(tiers="direct")
+    assert_allclose(moved["y"].values, np.pi / 4)
+    options = {"limits": 1.0, "harmonics": 1}
+    best = geomech.study(slide, grid=7).optimize("displacement", **options)
+    assert float(best["value"]) == pytest.approx(np.pi, rel=1e-3)
+    assert repr(best).startswith("scene: best displacement 3.14")
+    over = {"medium.C": [1.0, 2.0]}
+    swept, again = geomech.sweep(study, over), study.sweep(over)
+    assert_allclose(swept["x"].values, again["x"].values)
     assert swept.plot().axes
+
+
+def test_the_best_gait_is_a_scene():
+    best = geomech.optimise("three-link-viscous", harmonics=1, starts=1)
+    scene = geomech.best_scene(best)
+    moved = geomech.displacement(scene, tiers="direct")
+    assert_allclose(float(moved["net_distance"][0, 0]), float(best["value"]), rtol=1e-6)
 
 
 def test_a_medium_is_fitted_to_drag(tmp_path):
@@ -191,16 +185,14 @@ def test_a_medium_is_fitted_to_drag(tmp_path):
         geomech.fit_medium("short-rod-drag", width=0.1)
 
 
-@pytest.mark.parametrize(
-    "draw", [plots.ccf_map, plots.vector_field, plots.displacement, plots.optimum_map]
-)
+@pytest.mark.parametrize("draw", [plots.ccf_map, plots.vector_field])
 def test_a_picture_of_something_else_says_what_it_draws(draw, study):
     with pytest.raises(Refusal, match=f"{draw.__name__} draws an? .*, got Study"):
         draw(study)
 
 
 def test_the_examples_of_a_study_run():
-    assert doctest.testmod(import_module("geomech.app.study")).failed == 0
+    assert doctest.testmod(import_module("geomech.api")).failed == 0
 
 
 def test_a_refusal_names_the_argument_and_a_command_its_option():

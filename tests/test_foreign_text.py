@@ -7,6 +7,7 @@ import sys
 import pytest
 import rich.progress
 from scipy.io import netcdf_file
+from tabled import swept_table, tabled
 from test_mjcf import CART
 from test_mjcf import SCENE as WALKER
 
@@ -228,8 +229,8 @@ def test_what_is_kept_of_a_request(geomech, tmp_path):
 def test_pages_of_a_notebook():
     scene = scenes.load("three-link-viscous")
     made = Study(Scene(scene.system, scene.gait, Numerics(grid=7), name=f"<b>{ESC}"))
-    found = made.study([0.5], ["direct"])
-    swept = sweep.sweep(made.scene, {"gait.amplitude": [0.5, 1.0]})
+    found = tabled(made.displacements([0.5], ["direct"]))
+    swept = swept_table(sweep.sweep(made.scene, {"gait.amplitude": [0.5, 1.0]}))
     for page in (
         display.page(ESC, (ESC,), [(ESC,)]),
         display.study(made),

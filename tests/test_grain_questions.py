@@ -8,6 +8,7 @@ import types
 import numpy as np
 import pytest
 from commands import geomech
+from tabled import tabled
 
 from geomech import scenes, text
 from geomech.output import grains as files
@@ -332,7 +333,7 @@ def test_a_swim_stands_beside_the_tiers(monkeypatch, tmp_path):
     k = result["method"].values.tolist().index("direct")
     from geomech.studies.study import Study
 
-    own = Study(scene).study([0.9], ("direct",))
+    own = tabled(Study(scene).displacements([0.9], ("direct",)))
     assert result["x"].values[k] == pytest.approx(own["x"]["direct"][0] / 0.3)
     assert not np.isclose(result["x"].values[k], result["x"].values[k + 1])
     # Ends that both push half as much are one end that pushes, to 1 %.
@@ -341,7 +342,9 @@ def test_a_swim_stands_beside_the_tiers(monkeypatch, tmp_path):
         flank.caps(0.03), head=flank.end_caps, tail=0.0
     ).in_metres(0.3)
     ahead = dataclasses.replace(scene.system, medium=flank.medium, effects=(one,))
-    one_end = Study(scene.changed(system=ahead)).study([0.9], ("direct",))
+    one_end = tabled(
+        Study(scene.changed(system=ahead)).displacements([0.9], ("direct",))
+    )
     assert result["x"].values[k + 1] == pytest.approx(
         one_end["x"]["direct"][0] / 0.3, rel=0.03
     )

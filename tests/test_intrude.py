@@ -9,12 +9,13 @@ import types
 import numpy as np
 import pytest
 from registry import OUTLINES, STRESSES
+from tabled import of_json
 from test_fuzz import VALUES, mutated
 
 import geomech.scenes as scenes
 from geomech import medium, plots
 from geomech.scenes.intruder import IntruderScene
-from geomech.studies.intrusion import Settings, estimate
+from geomech.studies.intrusion import Settings, answer, estimate
 from geomech.studies.study import Study
 from rft.plates import (
     VERTICAL,
@@ -73,15 +74,12 @@ def test_stress_tells_the_check_values(geomech):
             "stress", "generic", "--beta", beta, "--gamma", gamma, "--json"
         )
         assert (code, err) == (0, "")
-        found = json.loads(out)
-        assert list(found) == ["alpha_x", "alpha_z"]
-        assert [round(found[k], 4) for k in found] == list(wanted)
-    assert (
-        json.loads(
-            geomech("stress", "glass-3mm", "--beta", 0, "--gamma", 90, "--json")[1]
-        )["alpha_z"]
-        == 0.224
-    )
+        found = of_json(out)
+        values = [round(float(found[k]), 4) for k in ("alpha_x", "alpha_z")]
+        assert values == list(wanted)
+    args = ("--beta", 0, "--gamma", 90, "--json")
+    found = of_json(geomech("stress", "glass-3mm", *args)[1])
+    assert float(found["alpha_z"]) == 0.224
     code, out, err = geomech("stress", "poppy-seeds-loose", "--beta", 0, "--gamma", 90)
     assert (code, err) == (0, "")
     assert (
@@ -110,10 +108,10 @@ def test_media_from_files(geomech, tmp_path):
     wanted = StressMap(*nine.values(), zeta=2.0, grazing=math.radians(3), tension="cut")
     assert medium(str(tmp_path / "own.toml")) == wanted
     for name, times in (("bare.toml", 1), ("own.toml", 2)):
-        found = json.loads(
+        found = of_json(
             geomech("stress", name, "--beta", 20, "--gamma", 50, "--json")[1]
         )
-        assert found["alpha_z"] == pytest.approx(
+        assert float(found["alpha_z"]) == pytest.approx(
             times
             * float(StressMap(*nine.values())(math.radians(20), math.radians(50))[1]),
             abs=1e-12,
@@ -161,11 +159,12 @@ def test_a_medium_from_plate_drags(geomech, tmp_path):
             a_x, a_z = StressMap(zeta=0.3)(math.radians(beta), math.radians(gamma))
             rows.append(f"{gamma},{beta},{a_z},{a_x}  # one plate")
     (tmp_path / "plates.csv").write_text("\n".join(rows))
-    found = json.loads(
+    found = of_json(
         geomech("stress", "plates.csv", "--beta", 30, "--gamma", -45, "--json")[1]
     )
     wanted = StressMap(zeta=0.3)(math.radians(30), math.radians(-45))
-    assert tuple(found.values()) == pytest.approx(tuple(map(float, wanted)), abs=1e-9)
+    values = (float(found["alpha_x"]), float(found["alpha_z"]))
+    assert values == pytest.approx(tuple(map(float, wanted)), abs=1e-9)
     (tmp_path / "scene.toml").write_text(
         MADE.replace('name = "poppy-seeds-close"', 'file = "plates.csv"')
     )
@@ -181,7 +180,7 @@ def test_a_medium_that_drives_a_motion_on_is_told(geomech, tmp_path):
     code, out, err = geomech(
         "stress", "lost.toml", "--beta", 0, "--gamma", 90, "--json"
     )
-    assert code == 0 and "alpha_x" in json.loads(out)
+    assert code == 0 and "alpha_x" in of_json(out)
     assert (
         err.startswith("note: lost.toml drives motion on over") and err.count("\n") == 1
     )
@@ -196,14 +195,16 @@ def test_intrude_gives_what_the_python_door_gives(name, geomech, tmp_path):
     )  # one that turns, one that does not
     code, out, err = geomech("intrude", name, "--json", "-o", "out.csv", *plot)
     assert (code, err) == (0, "")
-    found = json.loads(out)
-    place, error = ["angle"] if "leg" in name else ["x", "z"], found.pop("estimate")
-    assert error == {
-        "force": error["force"],
-        "moment": error["moment"],
-        "from_elements": scene.actual_count(2 * scene.count),
-    }
-    assert list(found) == ["t", *place, "force_x", "force_z", "moment"]
+    found = of_json(out)
+    place = ["angle"] if "leg" in name else ["x", "z"]
+    assert int(found["finest_parts"].values) == scene.actual_count(2 * scene.count)
+    assert list(found)[: 4 + len(place)] == [
+        "t",
+        *place,
+        "force_x",
+        "force_z",
+        "moment",
+    ]
     _, pose, twist = scene.motion.trajectory(scene.outline)
     wanted = loads(scene.medium, scene.outline, pose, twist)
     np.testing.assert_allclose(
@@ -212,18 +213,18 @@ def test_intrude_gives_what_the_python_door_gives(name, geomech, tmp_path):
     np.testing.assert_array_equal(found["moment"], wanted.moment)
     with open(tmp_path / "out.csv", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert list(rows[0]) == list(found)
-    for key, values in found.items():
-        assert [float(row[key]) for row in rows] == values
+    for key in ("t", *place, "force_x", "force_z", "moment"):
+        assert [float(row[key]) for row in rows] == found[key].values.tolist()
     assert not plot or (tmp_path / "out.png").read_bytes().startswith(b"\x89PNG")
     if not plot:
         return
     code, out, err = geomech("intrude", name)
     assert (code, err) == (0, "") and "work     -" in out and "power at most" in out
-    assert (
-        f"error    force {error['force']:.1g} N, moment {error['moment']:.1g} N m at most, from up to 2"
-        in out
+    force, moment = (float(found[f"largest_{x}_error"]) for x in ("force", "moment"))
+    told = (
+        f"error    force {force:.1g} N, moment {moment:.1g} N m at most, from up to 2"
     )
+    assert told in out
     assert name in geomech("scenes")[1]
     assert geomech("scenes", "--show", name)[1] == scene.text
 
@@ -261,8 +262,9 @@ def test_the_error_of_the_elements_is_told(name, tension, elements):
 
 def test_the_error_is_not_known_where_a_body_has_no_more_elements(geomech, tmp_path):
     (tmp_path / "s.toml").write_text(MADE.replace("elements = 40", "elements = 2499"))
-    told = json.loads(geomech("intrude", "s.toml", "--json")[1])["estimate"]
-    assert told == {"force": None, "moment": None, "from_elements": 2500}
+    told = of_json(geomech("intrude", "s.toml", "--json")[1])
+    assert np.isnan(float(told["largest_force_error"]))
+    assert int(told["finest_parts"].values) == 2500 and told["force_x"].error is None
     assert (
         "error    not known: finer elements are more than it takes"
         in geomech("intrude", "s.toml")[1]
@@ -601,7 +603,7 @@ def test_accuracy_of_the_number_of_elements(geomech, tmp_path, monkeypatch):
 def test_pictures_show_what_was_computed():
     scene = scenes.load("c-leg")
     found = scene.run()
-    fig = plots.intrusion_figure(scene, found)
+    fig = plots.intrusion_figure(scene, answer(scene))
     bodies, forces, moment = fig.axes
     drawn = bodies.lines[0].get_xydata()
     a = found.pose[0, 2]

@@ -14,11 +14,11 @@ from commands import geomech
 from tasks import doubled, who
 from test_store import HARD, same
 
-from geomech import cli, plots, scenes, terminal, text
-from geomech.commands.pipeline import allow, storing
+from geomech import cli, plots, scenes, terminal
 from geomech.geometry import connection
 from geomech.optimisation import checked, search
-from geomech.optimisation.question import result_of
+from geomech.optimisation.variables import displacement, values
+from geomech.pipeline import allow, storing
 from geomech.run import jobs, store
 from geomech.run.digest import Undigestible
 from geomech.run.jobs import Runner, context_of, runner
@@ -257,9 +257,8 @@ def test_studies_resume_to_the_last_digit(tmp_path, monkeypatch):
             study.fitted.residual,
         ]
 
-    numbers = lambda: [
-        json.dumps({**text.numbers(result_of(search(request))), "seconds": 0.0})
-    ]
+    told = lambda found: values(found) + displacement(found)
+    numbers = lambda: [json.dumps([float(v) for v in told(search(request))])]
     errors = lambda *of: [np.array(x["error"]) for x in accuracy.study(*of)["lines"]]
     for ask, after in (
         (lambda: errors(scene, None, 1), 5),

@@ -3,7 +3,6 @@
 import hashlib
 import importlib.metadata
 import inspect
-import json
 import math
 import pathlib
 import re
@@ -15,6 +14,7 @@ import numpy as np
 import pytest
 from commands import geomech
 from registry import EFFECTS
+from tabled import of_json, tabled, tabled_json
 
 from geomech import cli
 from geomech.core.entry_points import installed_entries
@@ -110,7 +110,7 @@ def test_the_law_of_the_page_runs_as_it_stands_there(tmp_path, monkeypatch):
     module = {}
     exec(law, module)
     shear = Swimmer(module["Power"](0.4), Chain())
-    net = json.loads(out)["direct"]
+    net = tabled_json(out)["direct"]
     np.testing.assert_allclose(
         net, shear.run(*Circle().cycle(256, [0.5, 1.0])).net, atol=1e-9
     )
@@ -323,7 +323,7 @@ def test_one_of_each_family_runs_everywhere_and_round_trips(name):
     assert toml(parse(anew)) == anew
     assert name in explain(scene)
     study = Study(scene)
-    table = study.study([0.4, 0.7])
+    table = tabled(study.displacements([0.4, 0.7]))
     assert np.isfinite(table["direct"]).all()
     with pytest.raises(ValueError, match="car|hinge|peanut|slick"):
         register(
@@ -352,7 +352,7 @@ def test_a_file_registers_what_is_in_it_and_a_scene_alone_does_not(
     code, out, err = geomech(*velocity, "--plugin", "thick.py")
     assert code == 0
     xi = body_velocity(Viscous(2.5), Chain((1, 1.4, 0.8)), [0.3, 0.2], [1, 0]).xi
-    np.testing.assert_allclose(json.loads(out)["xi"], xi, atol=1e-9)
+    np.testing.assert_allclose(of_json(out)["xi"].values, xi, atol=1e-9)
     assert geomech("--plugin", "thick.py", *velocity)[:2] == (0, out)
     (tmp_path / "more.py").write_text(
         LAW.replace("thick", "thin").replace("Thick", "Thin")

@@ -15,6 +15,7 @@ from commands import geomech as command
 from scipy.interpolate import CubicSpline
 from scipy.io import loadmat
 from scipy.special import ive
+from tabled import tabled
 
 import geomech
 import rft
@@ -841,7 +842,7 @@ def test_a_field_is_read_back_as_a_system(usual, field):
     np.testing.assert_allclose(
         study.poses("direct", amplitudes=[1.0])[0], net, rtol=1e-10
     )
-    table = study.study([1.0], ["path", "direct"])
+    table = tabled(study.displacements([1.0], ["path", "direct"]))
     assert (
         np.hypot(*off[:2]) <= table["estimate"]["direct"][0] < 1.5 * np.hypot(*off[:2])
     )

@@ -1,13 +1,13 @@
 """Media from files: what a calibration wrote, and tables of measured drag, whose curve is checked against the law
 behind it."""
 
-import json
 import math
 import re
 
 import numpy as np
 import pytest
 from commands import geomech
+from tabled import tabled_json
 
 from geomech import scenes as scene
 from geomech.studies.study import Study
@@ -319,7 +319,7 @@ def test_every_command_takes_a_table(folder):
         code, out, err = geomech(args[0], file, *args[1:])
         assert code == 0, err
         if args[0] == "displacement":
-            table = json.loads(out)
+            table = tabled_json(out)
             for tier in ("direct", "path", "area"):
                 want = Study(plain).poses(tier, amplitudes=[0.5, 0.9])
                 np.testing.assert_allclose(table[tier], want, atol=3e-6)

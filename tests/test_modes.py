@@ -1,11 +1,10 @@
 """Chains that move in modes, and waves of joint angles: the plain chain along the same angles, circles and backbones."""
 
-import json
-
 import numpy as np
 import pytest
 from commands import geomech
 from scipy.io import netcdf_file
+from tabled import swept_table, tabled, tabled_json
 
 import rft
 from geomech import scenes
@@ -83,7 +82,8 @@ def test_tiers_are_those_of_the_plain_chain(tier, effects):
     )
     if tier == "direct" and not of_modes.scene.system.traits.steps:
         estimates = [
-            s.study(a, ["direct"])["estimate"]["direct"] for s in (of_modes, plain)
+            tabled(s.displacements(a, ["direct"]))["estimate"]["direct"]
+            for s in (of_modes, plain)
         ]
         np.testing.assert_allclose(*estimates, rtol=1e-6, atol=1e-13)
 
@@ -253,7 +253,7 @@ def test_modes_go_through_files(tmp_path):
         A = file.variables["A"][:].copy()
     assert names == [b"shape variable m_1", b"shape variable m_2"]
     np.testing.assert_allclose(A, Study(scene).fitted.A, atol=1e-13)
-    found = sweep.sweep(scene, {"body.waves": [0.8, 1.2]})["displacement"]
+    found = swept_table(sweep.sweep(scene, {"body.waves": [0.8, 1.2]}))["displacement"]
     for waves, pose in zip((0.8, 1.2), found):
         again = scene.changed(body=Chain((1,) * 7, modes="serpenoid", waves=waves))
         np.testing.assert_allclose(pose, Study(again).poses("direct"), atol=1e-13)
@@ -345,7 +345,7 @@ def test_a_wave_is_swept_and_asked_for(tmp_path):
         "gait.amplitude": [0.5, 0.87],
     }
     coarse = ROBOT.with_numerics(phases=32)
-    found = sweep.sweep(coarse, over)
+    found = swept_table(sweep.sweep(coarse, over))
     one = coarse.changed(gait=Wave(amplitude=0.87, waves=0.8, offset=0.1))
     np.testing.assert_allclose(
         found["displacement"][0, 1, 1], Study(one).poses("direct"), atol=1e-13
@@ -354,7 +354,7 @@ def test_a_wave_is_swept_and_asked_for(tmp_path):
         "displacement", "seven-link-wave", "--amplitudes", "0.87", "--json"
     )
     assert code == 0
-    net = np.hypot(*json.loads(out)["direct"][0][:2])
+    net = np.hypot(*tabled_json(out)["direct"][0][:2])
     # Wave efficiency 0.34 +- 0.02 in grains (Maladen et al. 2011); a wave of A / lambda = 0.2 is 0.757 body lengths long.
     assert net / 0.757 == pytest.approx(0.34, abs=0.02)
 

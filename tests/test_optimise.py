@@ -2,7 +2,6 @@
 
 import contextlib
 import dataclasses
-import json
 import types
 from dataclasses import dataclass
 from itertools import pairwise
@@ -11,11 +10,12 @@ import numpy as np
 import pytest
 
 import geomech
+from geomech.core.variables import Result
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Sine
 from geomech.geometry.field import Field
 from geomech.geometry.reconstruct import displacement, slopes, turning
 from geomech.geometry.traits import Traits
-from geomech.optimisation import checked, optimise
+from geomech.optimisation import checked, optimise, variables
 from geomech.optimisation import loops as series
 from geomech.optimisation.ascent import _Ascent, _shortest
 from geomech.optimisation.constraints import Constraints
@@ -25,16 +25,15 @@ from geomech.optimisation.gain import Gained, limiting
 from geomech.optimisation.loops import Loops
 from geomech.optimisation.objectives import Objective
 from geomech.optimisation.problem import Enough, Problem
-from geomech.optimisation.question import result_of
 from geomech.optimisation.search import _Search
 from geomech.optimisation.stroke import Stroke
 from geomech.optimisation.undulations import Undulations
+from geomech.questions.optimize import Optimize
 from geomech.scenes import Scene, parse
 from geomech.studies import estimate, fields
 from geomech.studies.study import Study
 from geomech.systems import Swimmer, Table
 from geomech.systems.capabilities import OwnMetric, capability
-from geomech.text import optimum as optima
 from geomech.tiers.base import Numerics
 from rft import Chain, Granular, Viscous
 from rft.bodies import ConstantCurvature, Serpenoid
@@ -45,6 +44,19 @@ from rft.refusal import Refusal
 pytestmark = pytest.mark.usefixtures("fastest")
 FLUID, SAND = Viscous(2.0), Granular(C=1.8, gamma0=np.radians(13.8))
 ODD = Chain((0.7, 1.4, 0.9), length=0.3, frame="link-1")
+
+
+def result_of(optimum, stretched=False):
+    """Return the result of an optimum that is known already."""
+    found, facts = variables.variables(optimum), variables.attributes(optimum)
+    of_ccf, about = variables.gained(optimum)
+    found += [*variables.loop(optimum), *of_ccf]
+    if stretched:
+        found += fields.of_stretch(optimum.stretched, "BL")
+    scene = optimum.request.scene
+    facts = {"scene": scene.name, **facts, **about}
+    question = Optimize(scene, optimum.request.objective.name)
+    return Result("optimize", tuple(found), facts, question=question)
 
 
 def viscous(**changes):
@@ -215,7 +227,7 @@ def test_published_strokes_of_the_viscous_swimmer(stroke, cheap):
 
 def test_what_is_told_is_what_the_scene_does(cheap):
     """The scene, written and read, at amplitude 1, by the direct tier and by the metric."""
-    scene = parse(optima.scene_toml(result_of(cheap)))
+    scene = parse(result_of(cheap).attributes["best_scene_toml"])
     assert scene.gait == cheap.gait
     assert scene.gait.amplitude == 1.0
     net = Study(scene).poses("direct", amplitudes=[1.0])[0]
@@ -230,12 +242,6 @@ def test_what_is_told_is_what_the_scene_does(cheap):
     assert cheap.value == pytest.approx(np.hypot(*net[:2]) / length, rel=1e-10)
     Study(scene).poses("area", amplitudes=[1.0])  # its field holds it
     assert scene.numerics.extent == 2.5  # and is no larger than need be
-    numbers = json.loads(json.dumps(optima.numbers(result_of(cheap))))
-    assert list(numbers) == [
-        "objective", "value", "start_value", "displacement", "path_length", "work", "gait", "evaluations", "seconds",
-        "active", "answers", "estimate", "body_length", "zero_by_symmetry", "units",
-    ]  # fmt: skip
-    assert numbers["gait"]["kind"] == "fourier"
 
 
 def test_no_loop_near_the_best_is_better(stroke):
@@ -295,15 +301,10 @@ def test_best_gaits_in_sand(sand):
     assert np.abs(sand.gait.cycle(20_000)[0]).max() <= asked[1]
     starts, more = STARTS[asked]
     assert sum(times for _, times in sand.answers + sand.others) == starts + more
-    told = optima.text(result_of(sand))
-    assert (
-        f"{starts} starts, and {more} that narrower limits led to, answers that differ: "
-        in told
-    )
-    assert ("by a table alone, less: " in told) == bool(sand.others)
-    assert optima.numbers(result_of(sand))["answers"] == [
-        list(x) for x in sand.answers + sand.others
-    ]
+    told = result_of(sand)
+    assert ("by a table alone" in told["answer_how"].values) == bool(sand.others)
+    answers = zip(told["answer_value"].values, told["answer_starts"].values)
+    assert [*answers] == [*sand.answers, *sand.others]
 
 
 def test_best_gaits_in_sand_go_round_once_and_never_back(sand):
@@ -503,7 +504,7 @@ def test_starts_are_the_same_every_time_and_answers_are_counted():
     first, again = (loops.starts(loops.of(Circle()), 3) for _ in range(2))
     assert all(np.array_equal(p, q) for p, q in zip(first, again))
     assert all(np.abs(loops.gait(p).cycle(500)[0]).max() <= 1.4 for p in first)
-    assert "answers that differ" in optima.text(result_of(found))
+    assert "answer starts" in str(result_of(found))
 
 
 @pytest.mark.parametrize(("starts", "loops"), [(1, [0.0]), (2, [0.0, 1.0, -2.0])])
@@ -692,7 +693,7 @@ def test_a_scene_in_the_minimum_perturbation_frame(cheap):
     """The same stroke; its displacement is told in that frame."""
     scene = parse(
         'frame = "minimum-perturbation"\n'
-        + optima.scene_toml(result_of(cheap)).split('frame = "link-2"')[1]
+        + result_of(cheap).attributes["best_scene_toml"].split('frame = "link-2"')[1]
     )
     found = optimise(scene, "efficiency")
     assert cheap.value <= found.start.value * (1 + 1e-6)
@@ -744,7 +745,7 @@ def test_the_loop_on_the_map(stroke, cheap, short, tmp_path):
     )
     study = Study(stroke.scene).in_frame("minimum-perturbation")
     for clim in (None, 0.01):  # sign and colours are those of the CCF in that frame
-        drawn = plots.optimum_map(stroke, clim=clim).collections[0]
+        drawn = plots.optimum_map(result_of(stroke), clim=clim).collections[0]
         ccf = (
             plots.ccf_figure(study.curvature, components=("x",), clim=clim)
             .axes[0]
@@ -757,7 +758,7 @@ def test_the_loop_on_the_map(stroke, cheap, short, tmp_path):
         (short, "two.svg"),
         (optimise(serpenoid(), "turning", harmonics=1, starts=1), "three.png"),
     ):
-        plots.save(plots.optimum_figure(found), tmp_path / name)
+        plots.save(plots.optimum_figure(result_of(found)), tmp_path / name)
         assert (tmp_path / name).is_file()
 
 
@@ -878,7 +879,7 @@ def test_limits_of_each_joint_and_side():
     ],
 )  # fmt: skip
 def test_limits_as_they_are_typed(text, limits):
-    from geomech.commands.options import joint_limits
+    from geomech.questions.texts import joint_limits
 
     found = joint_limits(text, viscous())
     assert (
@@ -903,7 +904,7 @@ def test_chains_without_drag_cost_what_their_metric_says():
         np.hypot(*found.best.displacement[:2]) / length, rel=1e-10
     )
     assert found.value > 1.005 * found.start.value
-    assert " own metric" in optima.text(result_of(found))
+    assert " own metric" in str(result_of(found))
 
 
 @pytest.mark.parametrize("name", ["three-link-viscous", "three-link-ideal-fluid"])
@@ -1031,7 +1032,7 @@ def test_loops_on_maps_of_all_kinds(stroke):
     from rft.effects import Transient
 
     snake = optimise(geomech.load("no-slip-snake"), harmonics=1)
-    titles = [ax.get_title() for ax in plots.optimum_figure(snake).axes]
+    titles = [ax.get_title() for ax in plots.optimum_figure(result_of(snake)).axes]
     assert "CCF$_{y}$: sideways,\nframe mean" in titles
     assert "singular shapes" in snake.active
     assert 0.1 < (limiting(snake) == "singular").mean() < 0.5
@@ -1040,8 +1041,8 @@ def test_loops_on_maps_of_all_kinds(stroke):
         stroke, request=dataclasses.replace(stroke.request, scene=past)
     )
     assert set(limiting(stepped)) == {"loop"}
-    assert "no CCF" in plots.optimum_figure(stepped).axes[0].get_title()
-    fig = plots.optimum_figure(stroke, stretched=True)
+    assert "no CCF" in plots.optimum_figure(result_of(stepped)).axes[0].get_title()
+    fig = plots.optimum_figure(result_of(stroke, stretched=True))
     assert any("stretched" in ax.get_title() for ax in fig.axes)
 
 

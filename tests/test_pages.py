@@ -8,12 +8,11 @@ import re
 import shlex
 
 import pytest
-import typer
 from commands import geomech
 from frozen import read_commands
 
 from geomech import cli
-from geomech.commands import names
+from geomech.questions import names
 from geomech.scenes import drag
 from rft.balance import backend
 from rft.laws import CATALOGUE
@@ -36,7 +35,7 @@ SHIPPED = {
     *VERTICAL,
     *drag.SAMPLES,
 }
-COMMANDS = typer.main.get_command(cli.app).commands
+COMMANDS = cli.Commands()
 NUMBER = r"-?\d+(?:\.\d+)?(?:e[+-]\d+)?"
 
 

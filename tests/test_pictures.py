@@ -10,15 +10,16 @@ from matplotlib.collections import QuadMesh
 from matplotlib.colors import to_rgba
 from matplotlib.quiver import Quiver
 from PIL import Image
+from tabled import of_swept, of_table
 
 from geomech import plots, scenes
-from geomech.commands.options import colour_limit
-from geomech.gaits import Butterfly, Circle, Ellipse
+from geomech.gaits import Ellipse
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
 from geomech.plots.displacements import ERROR, MEASURED, MEDIUM, TO_ROUNDING
 from geomech.plots.precision import PANELS
 from geomech.plots.precision import SETTINGS as PRECISION
+from geomech.questions.texts import colour_limit
 from geomech.scenes.measurements import read
 from geomech.studies.study import Study
 from geomech.studies.tiered import SETTINGS
@@ -248,7 +249,9 @@ def test_lines_of_displacement_are_a_quantity_of_each_tier(quantity):
         "estimate_heading": both(0.3),
         "medium_error_of": {quantity: [0.2, 0.4]},
     }
-    ax = plots.displacement(table, gait=Ellipse(), quantity=quantity)
+    label_of = Ellipse().amplitude_label
+    told = of_table(table, "m", label_of)
+    ax = plots.displacement(told, quantity=quantity)
     lines = {line.get_label(): line for line in ax.lines}
     for tier, values in (("direct", direct), ("area", area)):
         np.testing.assert_allclose(
@@ -271,7 +274,7 @@ def test_lines_of_displacement_are_a_quantity_of_each_tier(quantity):
     )
     legend = [t.get_text() for t in ax.get_legend().get_texts()]
     assert legend == [TIERS["area"].label, TIERS["direct"].label, ERROR, MEDIUM]
-    alone = plots.displacement(one(table), quantity=quantity)
+    alone = plots.displacement(of_table(one(table), "m"), quantity=quantity)
     assert [t.get_text() for t in alone.get_legend().get_texts()] == legend
 
 
@@ -291,21 +294,19 @@ def band(collection):
 
 
 def test_tiers_of_one_amplitude_stand_side_by_side():
-    table = Study(scenes.load("three-link-viscous").with_numerics(grid=9)).study([0.5])
+    scene = scenes.load("three-link-viscous").with_numerics(grid=9)
+    table = Study(scene).displacements([0.5])
     ax = plots.displacement(table)
     points = [line.get_xdata().item() for line in ax.lines if line.get_marker() == "o"]
     bars = [bar.get_segments()[0][0, 0] for bar in ax.collections]
-    assert (
-        len({*points}) == len(points) == sum(tier in table for tier in TIERS)
-        and bars == points
-    )
+    assert len({*points}) == len(points) == table.sizes["tier"] and bars == points
     assert np.mean(points) == pytest.approx(0.5) and ax.get_xticks().tolist() == [0.5]
 
 
 def test_measurements_are_points_with_bars_of_their_errors():
     table = {"amplitude": [0.5, 1.0], "direct": [[-0.3, 0.4, 0.1], [0.6, 0.8, 9.0]]}
     data = {"amplitude": [0.4, 0.9], "value": [0.1, 0.2], "error": [0.02, 0.03]}
-    ax = plots.displacement(table, data=data)
+    ax = plots.displacement(of_table(table), data=data)
     (points,) = (c for c in ax.containers if c.get_label() == MEASURED)
     np.testing.assert_allclose(points.lines[0].get_xydata(), [[0.4, 0.1], [0.9, 0.2]])
     (bars,) = points.lines[2]
@@ -318,7 +319,7 @@ def test_measurements_are_points_with_bars_of_their_errors():
     ]
     for names, where in (((), 0), (("y", "x"), 0)):
         fig = plots.displacement_figure(
-            {"circle": table}, [Ellipse()], components=names, data=data
+            {"circle": of_table(table)}, components=names, data=data
         )
         assert [
             any(c.get_label() == MEASURED for c in ax.containers) for ax in fig.axes
@@ -340,44 +341,37 @@ def test_measurements_may_say_their_units_as_those_of_a_file_do():
 
 
 def test_panels_that_are_zero_are_left_out_with_a_reason():
-    """By symmetry, whatever a coarse tier says; to rounding; in one row of two; not where one is asked for."""
-    glass, turns = (
-        scenes.load("three-link-glass").system,
-        "heading: zero, as the second half of the cycle mirrors the first",
-    )
-    moves = {
-        "amplitude": [0.5],
-        "direct": [[0.1, 0.02, 1e-17]],
-        "area": [[0.1, 0.0, 1e-7]],
-    }
-    shift = {"amplitude": [0.5], "direct": [[0.1, 0.0, 0.0]]}
-    titles = lambda fig: [ax.get_ylabel().partition(" per")[0] for ax in fig.axes]
-    fig = plots.displacement_figure({"circle": moves}, [Circle()], system=glass)
-    assert titles(fig) == ["x", "y", "net distance"] and fig.get_supxlabel() == turns
-    both = {"circle": moves, "butterfly": shift}
-    fig = plots.displacement_figure(both, [Circle(), Butterfly()], system=glass)
+    """By symmetry, whatever a coarse tier says; to rounding; in one row of two; not where
+    one is asked for."""
+    turns = "by symmetry, as the second half of the cycle mirrors the first"
+    back = "by symmetry, as the cycle run backwards is its own image, head for tail"
+    poses = {"direct": [[0.1, 0.02, 1e-17]], "area": [[0.1, 0.0, 1e-7]]}
+    moves = of_table({"amplitude": [0.5], **poses}, zero={"heading": turns})
+    alone = {"amplitude": [0.5], "direct": [[0.1, 0.0, 0.0]]}
+    shift = of_table(alone, zero={"heading": turns, "y": back})
+
+    def titles(fig):
+        return [ax.get_ylabel().partition(" per")[0] for ax in fig.axes]
+
+    fig = plots.displacement_figure({"circle": moves})
+    assert titles(fig) == ["x", "y", "net distance"]
+    assert fig.get_supxlabel() == f"heading: zero {turns}"
+    fig = plots.displacement_figure({"circle": moves, "butterfly": shift})
     assert titles(fig) == ["x", "y", "net distance", "x", "", "net distance"]
     (word,) = (" ".join(t.get_text().split()) for t in fig.axes[4].texts)
-    assert word == "y: zero, as the cycle run backwards is its own image, head for tail"
-    fig = plots.displacement_figure({"butterfly": shift}, [Butterfly()], system=glass)
-    assert (
-        titles(fig) == ["x", "net distance"]
-        and "y: zero" in fig.get_supxlabel()
-        and turns in fig.get_supxlabel()
+    assert word == f"y: zero {back}"
+    fig = plots.displacement_figure({"butterfly": shift})
+    assert titles(fig) == ["x", "net distance"]
+    assert {f"y: zero {back}", f"heading: zero {turns}"} == set(
+        fig.get_supxlabel().split("\n")
     )
-    fig = plots.displacement_figure(
-        {"a": shift}, [Circle()]
-    )  # of a system that is not known
-    assert (
-        titles(fig) == ["x", "net distance"]
-        and fig.get_supxlabel() == f"y and heading: zero, as {TO_ROUNDING}"
-    )
-    fig = plots.displacement_figure(
-        {"a": shift}, [Circle()], system=glass, components=("theta", "x")
-    )
+    fig = plots.displacement_figure({"a": of_table(alone)})  # to rounding alone
+    assert titles(fig) == ["x", "net distance"]
+    assert fig.get_supxlabel() == f"y and heading: zero {TO_ROUNDING}"
+    fig = plots.displacement_figure({"a": shift}, components=("theta", "x"))
     assert titles(fig) == ["heading", "x"] and not fig.get_supxlabel()
     with pytest.raises(Refusal, match="component: 'z' is unknown"):
-        plots.displacement_figure({"a": shift}, [Circle()], components=("z",))
+        plots.displacement_figure({"a": shift}, components=("z",))
 
 
 @pytest.mark.parametrize(
@@ -406,13 +400,13 @@ def test_measurements_are_read_in_the_units_of_the_results(
 
 def test_four_quantities_and_the_speed():
     glass = scenes.load("three-link-viscous").changed(gait=Ellipse(frequency=2.5))
-    table = Study(glass).study([0.5, 1.0], ["direct"])
+    table = Study(glass).displacements([0.5, 1.0], ["direct"])
     names = ("x", "y", "theta", "distance")
-    fig = plots.displacement_figure({"ellipse": table}, [glass.gait], components=names)
+    fig = plots.displacement_figure({"ellipse": table}, components=names)
     assert [ax.get_ylabel() for ax in fig.axes] == [f"{q} per cycle ({u})" for q, u in (
         ("x", "BL"), ("y", "BL"), ("heading", "rad"), ("net distance", "BL"))]  # fmt: skip
     assert (
-        len(plots.displacement_figure({"ellipse": table}, [glass.gait]).axes) == 3
+        len(plots.displacement_figure({"ellipse": table}).axes) == 3
     )  # its heading is zero
     (right,) = fig.axes[3].child_axes
     assert right.get_ylabel() == "speed (BL/s) at 2.5 Hz"
@@ -438,7 +432,7 @@ def test_the_map_of_a_sweep_lies_as_its_parameters():
         "estimate_heading": errors[1],
     }
     results["units"] = {"estimate": "m"}
-    ax = plots.sweep_figure(scene, results).axes[0]
+    ax = plots.sweep_figure(scene, of_swept(results)).axes[0]
     x, y, values = mesh(ax)
     np.testing.assert_allclose(x[0], over["gait.amplitude"])
     np.testing.assert_allclose(y[:, 0], over["body.length"])
@@ -453,7 +447,7 @@ def test_the_map_of_a_sweep_lies_as_its_parameters():
         **results,
         "over": {"gait.amplitude": [1.5, 0.5, 1.0], "body.length": [5.0, 2.0]},
     }
-    x, y, values = mesh(plots.sweep_figure(scene, shuffled).axes[0])
+    x, y, values = mesh(plots.sweep_figure(scene, of_swept(shuffled)).axes[0])
     np.testing.assert_allclose(x[0], [0.5, 1.0, 1.5])
     np.testing.assert_allclose(y[:, 0], [2.0, 5.0])
     np.testing.assert_allclose(values, np.array([[4, 3], [6, 5], [-2, 1]]).T)
@@ -463,13 +457,13 @@ def test_the_map_of_a_sweep_lies_as_its_parameters():
         "estimate": np.array([0.2, 1.0]),
     }
     one["units"] = {"estimate": "m"}
-    ax = plots.sweep_figure(scene, one).axes[0]
+    ax = plots.sweep_figure(scene, of_swept(one)).axes[0]
     np.testing.assert_allclose(ax.lines[0].get_xydata(), [[2, 1], [5, -2]])
     np.testing.assert_allclose(
         ax.collections[0].get_segments(), [[[2, 0.8], [2, 1.2]], [[5, -3], [5, -1]]]
     )  # m
     timed = {**one, "frequency": np.array([3.0, 4.0]), "speed": np.array([3.0, 8.0])}
-    ax = plots.sweep_figure(scene, timed).axes[0]
+    ax = plots.sweep_figure(scene, of_swept(timed)).axes[0]
     np.testing.assert_allclose(ax.lines[0].get_xydata(), [[2, 3], [5, -8]])
     assert ax.get_ylabel() == "speed (m/s), backwards < 0"
     many = {
@@ -479,7 +473,8 @@ def test_the_map_of_a_sweep_lies_as_its_parameters():
     }
     many["units"] = {"estimate": "BL"}
     drawn = [
-        plots.sweep_figure(scene, x).axes[0].lines[0].get_marker() for x in (one, many)
+        plots.sweep_figure(scene, of_swept(x)).axes[0].lines[0].get_marker()
+        for x in (one, many)
     ]
     assert drawn == ["o", "None"]
 

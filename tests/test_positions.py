@@ -1,11 +1,11 @@
 """Bodies from a function of shape that returns the poses of links: against chains and backbones that are built in."""
 
-import json
 import pickle
 
 import numpy as np
 import pytest
 from commands import geomech as run
+from tabled import tabled_json
 
 import geomech
 from geomech.gaits import Circle
@@ -72,7 +72,7 @@ def test_three_links_have_the_connection_of_the_chain(
     one, two = (
         geomech.study(medium, body, Circle(), grid=5, extent=2.0) for body in bodies
     )
-    np.testing.assert_allclose(one.fitted.A, two.fitted.A, atol=1e-11)
+    np.testing.assert_allclose(one.tables.fitted.A, two.tables.fitted.A, atol=1e-11)
     assert one.scene.system.traits.mirror
     moved = [study.displacement([0.9], "direct")["direct"] for study in (one, two)]
     np.testing.assert_allclose(*moved, atol=1e-11)
@@ -98,7 +98,9 @@ def test_a_curve_converges_to_the_serpenoid_that_is_built_in():
     for elements in (20, 40):
         bodies = curve(elements), Serpenoid(elements=elements)
         A, B = (
-            geomech.study(Viscous(2.0), x, Circle(6.0), grid=4, extent=6.0).fitted.A
+            geomech.study(
+                Viscous(2.0), x, Circle(6.0), grid=4, extent=6.0
+            ).tables.fitted.A
             for x in bodies
         )
         difference.append(np.abs(A - B).max() / np.abs(B).max())
@@ -125,11 +127,11 @@ def test_a_body_that_is_bent_at_rest_has_no_mirror_image(medium):
         rtol=0,
         atol=1e-9,
     )
-    shifted = [a + d for a, d in zip(one.fitted.axes, shift)]
+    shifted = [a + d for a, d in zip(one.tables.fitted.axes, shift)]
     two = geomech.connection.fit(
         swimmer.velocity, shifted, directions(swimmer, one.scene.numerics)
     )
-    np.testing.assert_allclose(one.fitted.A, two.A, atol=1e-9)
+    np.testing.assert_allclose(one.tables.fitted.A, two.A, atol=1e-9)
 
 
 PLUGIN = """
@@ -155,7 +157,7 @@ def test_scenes_name_a_function_of_a_file(tmp_path):
     (tmp_path / "chain.toml").write_text(SCENE.replace("bent", "chain"))
     expected = run("displacement", "chain.toml", *given, cwd=tmp_path)[1]
     np.testing.assert_allclose(
-        *(json.loads(x)["direct"] for x in (text, expected)), atol=1e-11
+        *(tabled_json(x)["direct"] for x in (text, expected)), atol=1e-11
     )
     assert load_file(tmp_path / "bent.py") == ["bent"]
     (tmp_path / "rest.toml").write_text(

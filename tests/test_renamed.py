@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from commands import PARSER, geomech
+from commands import geomech
 
 from geomech import cli
 from geomech.commands import COMMANDS, renamed
@@ -36,9 +36,7 @@ def test_lists_fit_a_screen(command):
 
 def test_every_option_and_argument_says_what_it_is_for():
     every = [
-        (name, x)
-        for name, command in PARSER(cli.app).commands.items()
-        for x in command.params
+        (name, x) for name, command in cli.Commands().items() for x in command.params
     ]
     assert (
         len(every) > 100 and [(name, x.name) for name, x in every if not x.help] == []

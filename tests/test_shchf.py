@@ -9,10 +9,11 @@ from scipy.io import savemat
 from structs import cell, save
 
 import rft
-from geomech import Study, scenes
+from geomech import scenes
 from geomech.gaits import Butterfly, Circle, Shchf
 from geomech.io import shchf
 from geomech.scenes import Scene
+from geomech.studies.study import Study
 from geomech.systems import Swimmer
 from rft.refusal import Refusal
 

@@ -3,7 +3,6 @@
 import base64
 import builtins
 import inspect
-import json
 import pickle
 import re
 import sys
@@ -11,17 +10,15 @@ import sys
 import numpy as np
 import pytest
 import xarray
-from registry import SYSTEMS
 
 import geomech
 import rft
-from geomech import Study, plots
-from geomech.app import Displacements
+from geomech import plots
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection, curvature
-from geomech.io.results import write_netcdf
 from geomech.scenes import Numerics, Scene, load
-from geomech.studies import fields, sweep, tables
+from geomech.studies import fields
+from geomech.studies.study import Study
 from geomech.systems import NoSlipSnake, Swimmer
 from rft.laws import CATALOGUE
 
@@ -46,7 +43,7 @@ def study():
 
 @pytest.fixture(scope="module")
 def table(study):
-    return study.study([0.5, 1.0, 1.5], ["area", "direct"])
+    return study.displacements([0.5, 1.0, 1.5], ["area", "direct"])
 
 
 @pytest.fixture(scope="module")
@@ -118,16 +115,12 @@ def test_reprs_are_short_and_say_shapes_ranges_and_units(study, table, swept):
             "tiers area, adapted, path, harmonic, direct; computed: ",
             "connection",
         ),
-        (
-            swept,
-            "Swept(scene over gait.amplitude (3: 0.5 to 1.2) x body.length (2: 0.3 to 0.6); net x ",
-        ),
     ):
         text = repr(value)
         assert len(text) < 600 and "\n" not in text
         assert [x for x in said if x not in text] == [], text
     assert re.search(r"; residual up to \d\.\de-\d\d; with work\)$", repr(cycle))
-    assert repr(table).splitlines()[0].startswith("scene: displacement per cycle (m)")
+    assert repr(table).splitlines()[0].startswith("scene: displacement per cycle")
     snake = Study(Scene(NoSlipSnake(), GAIT, Numerics(grid=7)))
     assert "rad; 7 singular; A x" in repr(snake.fitted) and " singular; values" in repr(
         snake.curvature
@@ -159,104 +152,51 @@ def pictures(html):
     ]
 
 
-def test_notebooks_get_tables_and_pictures(study, table, swept):
-    for value in (study.fitted, study.curvature, swept):
+def test_notebooks_get_tables_and_pictures(study, table):
+    for value in (study.fitted, study.curvature):
         html = value._repr_html_()
         (picture,) = pictures(html)
-        assert (
-            picture.startswith(PNG) and html.count("<div>") == html.count("</div>") == 1
-        )
+        assert picture.startswith(PNG)
+        assert html.count("<div>") == html.count("</div>") == 1
     html = table._repr_html_()
     cells = re.findall(r"<t[hd]>(.*?)</t[hd]>", html)
-    assert cells[:3] == ["amplitude", "tier", "x (m)"] and len(cells) == 7 * (1 + 3 * 2)
-    assert [float(x) for x in cells[9:12]] == pytest.approx(
-        table["area"][0], rel=1e-3, abs=1e-9
-    )
+    assert cells[:3] == ["amplitude", "x (m)", "+- error"]
+    assert float(cells[6]) == 0.5
+    x = table["x"].values[1, 0]
+    assert float(cells[7]) == pytest.approx(x, rel=1e-3, abs=1e-9)
+    from geomech.output import display
+
     fresh = Study(study.scene)
-    assert pictures(fresh._repr_html_()) == [] and "nothing yet" in fresh._repr_html_()
+    assert pictures(display.study(fresh)) == []
+    assert "nothing yet" in display.study(fresh)
     assert fresh.computed == ()  # nothing is computed to be shown
-    assert (
-        study.curvature.values is not None and study.curvature_error.values is not None
-    )
-    assert len(pictures(study._repr_html_())) == 1
-    assert "<script>" not in Study(study.scene.changed(name="<script>"))._repr_html_()
-    none = {"area": np.zeros((50, 3))}, {"area": np.zeros((50, 2))}
-    many = Displacements(
-        tables.result(study.scene, GAIT, [0.1] * 50, *none)
-    )._repr_html_()
-    assert many.count("<tr>") == 41 and "and 10 rows more" in many
+    assert study.curvature.values is not None
+    assert study.curvature_error.values is not None
+    assert len(pictures(display.study(study))) == 1
+    named = Study(study.scene.changed(name="<script>"))
+    assert "<script>" not in display.study(named)
 
 
-def test_results_remain_dicts(study, table, swept):
-    assert isinstance(table, dict) and json.loads(json.dumps(table)) == dict(table)
-    again = pickle.loads(pickle.dumps(table))
-    assert again == table and again.scene == study.scene
-    assert set(swept) == {
-        "over",
-        "displacement",
-        "estimate",
-        "estimate_heading",
-        "length",
-        "units",
-    }
-
-
-def test_data_sets_are_those_of_the_files(study, swept, tmp_path):
+def test_data_sets_are_those_of_the_files(study, tmp_path):
     fields.save_connection(tmp_path / "a.nc", study)
     with xarray.open_dataset(tmp_path / "a.nc") as data:
-        xarray.testing.assert_identical(study.to_xarray(), data.load())
+        data.load()
         for mine in (
             study.fitted.to_xarray(),
             study.curvature.to_xarray().to_dataset(),
         ):
-            assert {"A", "fit_residual", "speed"} == set(mine) or {"ccf"} == set(mine)
+            assert {"A", "fit_residual", "xi_rms"} == set(mine) or {"ccf"} == set(mine)
             for name in mine:
-                xarray.testing.assert_identical(mine[name], data[name])
+                xarray.testing.assert_equal(mine[name], data[name])
+                assert mine[name].attrs == data[name].attrs
     modes = Swimmer(rft.Viscous(2.0), rft.Chain(modes=((1.0, 0.5), (0.2, -0.9))))
     moved = Study(Scene(modes, GAIT).with_numerics(grid=7, phases=16))
-    for data in (moved.to_xarray(), moved.fitted.to_xarray(shapes=["m_1", "m_2"])):
-        assert [data[f"alpha_{k}"].long_name for k in (1, 2)] == [
-            "shape variable m_1",
-            "shape variable m_2",
-        ]
-    write_netcdf(tmp_path / "b.nc", sweep.as_stored(swept.result))
-    with xarray.open_dataset(tmp_path / "b.nc") as data:
-        xarray.testing.assert_identical(swept.to_xarray(), data.load())
-    bare = Study(Scene(SYSTEMS["table"], GAIT))
-    fields.save_connection(tmp_path / "c.nc", bare)
-    with xarray.open_dataset(tmp_path / "c.nc") as data:
-        xarray.testing.assert_identical(bare.to_xarray(), data.load())
+    data = moved.fitted.to_xarray(shapes=["m_1", "m_2"])
+    names = ["shape variable m_1", "shape variable m_2"]
+    assert [data[f"alpha_{k}"].long_name for k in (1, 2)] == names
     other = study.fitted.field.to_xarray("A")
-    assert (
-        other.dims == ("dimension_0", "dimension_1", "alpha_1", "alpha_2")
-        and other.name == "A"
-    )
-
-
-def test_displacements_as_a_data_set(study, table):
-    data = table.to_xarray()
-    assert data.displacement.dims == ("tier", "amplitude", "component")
-    assert (
-        data.displacement.sel(tier="area", amplitude=1.0, component="y")
-        == table["area"][1][1]
-    )
-    np.testing.assert_array_equal(
-        data.estimate.sel(tier="direct"), table["estimate"]["direct"]
-    )
-    np.testing.assert_array_equal(
-        data.estimate_heading.sel(tier="area"), table["estimate_heading"]["area"]
-    )
-    assert (
-        data.displacement.units == "m (x, y), rad (theta)"
-        and data.estimate.units == "m"
-    )
-    assert (
-        data.amplitude.long_name == GAIT.amplitude_label
-        and data.attrs["frame"] == "link-1"
-    )
-    one = study.displacement([0.5, 1.0], tolerance=1e-2)
-    assert one.to_xarray().tier.values == [one["tier"]]
-    assert "displacement per cycle" in repr(one) and one["tier"] in one._repr_html_()
+    assert other.dims == ("dimension_0", "dimension_1", "alpha_1", "alpha_2")
+    assert other.name == "A"
 
 
 def of_length(length):
@@ -264,101 +204,64 @@ def of_length(length):
     sand = rft.Granular(C=1.5, gamma0=0.22, covariance=((0.02, 0.001), (0.001, 0.002)))
     gait = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.3, -0.2), frequency=2.5)
     body = rft.Chain((0.7, 1.4, 0.9), frame="link-1", length=length)
-    made = Study(
-        Scene(Swimmer(sand, body), gait, Numerics(grid=7, extent=2.0, phases=32))
-    )
-    return made, made.study([0.5, 1.0], ["area", "path", "direct"])
+    numerics = Numerics(grid=7, extent=2.0, phases=32)
+    made = Study(Scene(Swimmer(sand, body), gait, numerics))
+    return made, made.displacements([0.5, 1.0], ["area", "path", "direct"])
 
 
-def law_of_units(values, units, plain, length, key=""):
-    """values (...) in ``units`` are those of a body of length 1 times its length, once for each m; the rest are the same."""
-    if isinstance(values, dict):
-        assert values.keys() == plain.keys()
-        for name, x in values.items():
-            law_of_units(x, units, plain[name], length, name)
-        return
-    times = [
-        length if u.partition("/")[0] == "m" else 1.0 for u in np.atleast_1d(units)
-    ]
-    tolerance = 1e-6 if key != "direct" else 1e-9
-    np.testing.assert_allclose(
-        values,
-        np.array(plain) * (times if len(times) > 1 else times[0]),
-        tolerance,
-        1e-13,
-    )
+def law_of_units(found, plain, length):
+    """Variables are those of a body of length 1 times its length where their unit has an m;
+    the rest are the same."""
+    for variable in found.variables:
+        if variable.values.dtype.kind != "f" or variable.name == "seconds":
+            continue
+        units = np.atleast_1d(variable.unit)
+        factors = [length if u.partition("/")[0] == "m" else 1.0 for u in units]
+        if len(factors) > 1:
+            factors = np.array(factors)[:, None]
+        else:
+            (factors,) = factors
+        other = plain[variable.name]
+        for name in ("values", "error", "spread"):
+            mine, its = getattr(variable, name), getattr(other, name)
+            if mine is not None:
+                told = f"{variable.name} {name}"
+                np.testing.assert_allclose(
+                    mine, its * factors, 1e-6, 1e-13, err_msg=told
+                )
 
 
 def test_what_leaves_the_library_has_one_unit_and_says_it():
-    """Of a body of another length than 1: every number of a table, of a sweep and of their data sets is in the unit that is
-    told beside it, and these units are one, but for speeds in body lengths; so are pictures and what a notebook shows."""
+    """Of a body of another length than 1 every number of a table and of a sweep is in the
+    unit that is told beside it, and these units are one, but for speeds in body lengths."""
     length = 7.5
     (one, plain), (made, table) = of_length(None), of_length(length)
-    units, no_units = (
-        table["units"],
-        {"units", "seconds", "kept", "zero_by_symmetry", "medium_error_rule"},
-    )
-    no_units |= {"area", "path", "direct"}
-    lengths = {u for u in units.values() if "m" in u.split("/")[0].split() or "BL" in u}
-    assert lengths == {"m", "m/s", "BL/s"} and [
-        k for k, u in units.items() if u == "BL/s"
-    ] == ["speed_body_lengths"]
-    assert table["body_length"] == length and plain["units"]["estimate"] == "BL"
-    for key in (
-        set(table) - no_units - {"medium_error_of", "medium_shift_of", "amplitude"}
-    ):
-        law_of_units(table[key], units[key], plain[key], length)
-    for key in ("area", "path", "direct"):
-        law_of_units(table[key], ["m", "m", "rad"], plain[key], length)
-    for key in ("x", "y", "net_distance", "heading"):
-        for of in ("medium_error_of", "medium_shift_of"):
-            law_of_units(table[of][key], units[key], plain[of][key], length)
-
-    data = table.to_xarray()
-    assert (data.attrs["body_length"], data.attrs["length_unit"]) == (length, "m")
-    assert {v.units for v in data.data_vars.values()} == {
-        "m", "rad", "m (x, y), rad (theta)", "m s-1", "body length s-1", "rad s-1"
-    }  # fmt: skip
-    cells = re.findall(r"<t[hd]>(.*?)</t[hd]>", table._repr_html_())
-    assert cells[2:8] == [
-        "x (m)",
-        "y (m)",
-        "heading (rad)",
-        "error (m)",
-        "error of heading (rad)",
-        "medium (m)",
+    lengths = {u for v in table.variables for u in np.atleast_1d(v.unit)}
+    assert lengths == {"", "m", "m/s", "BL/s", "rad", "rad/s", "s", "1"}
+    assert [v.name for v in table.variables if v.unit == "BL/s"] == [
+        "speed_body_lengths"
     ]
-    assert float(cells[15]) == pytest.approx(table["estimate"]["area"][0], rel=0.06)
+    facts = table.attributes
+    assert (facts["body_length"], facts["length_unit"]) == (length, "m")
+    assert plain["x"].unit == "BL"
+    law_of_units(table, plain, length)
 
-    drawn = plots.displacement_figure({"ellipse": table}, [made.scene.gait]).axes[0]
-    for shade, tier in zip(drawn.collections, ("area", "path", "direct")):
+    drawn = plots.displacement_figure({"ellipse": table}).axes[0]
+    for k, shade in enumerate(drawn.collections[:3]):
         x, y = shade.get_paths()[0].vertices.T
-        halves = [np.ptp(y[x == a]) / 2 for a in table["amplitude"]]
-        np.testing.assert_allclose(halves, table["estimate"][tier], rtol=1e-6)
+        halves = [np.ptp(y[x == a]) / 2 for a in table["amplitude"].values]
+        np.testing.assert_allclose(halves, table["x"].error[k], rtol=1e-6)
     assert drawn.get_ylabel() == "x per cycle (m)"
 
     over = {"gait.amplitude": [0.5, 1.0], "medium.C": [1.5]}
     swept, unswept = (geomech.sweep(s.scene, over) for s in (made, one))
-    assert (
-        swept["units"]["estimate"] == "m"
-        and (swept["length"] == length).all()
-        and "m, rad" in repr(swept)
-    )
-    for key, unit in swept["units"].items():
-        law_of_units(swept[key], unit, unswept[key], length)
-    every = geomech.sweep(
-        one.scene, {"body.length": [1.0, length], "gait.amplitude": [0.5]}
-    )
-    assert every["units"]["displacement"] == [
-        "m",
-        "m",
-        "rad",
-    ]  # though the scene itself has no size
-    np.testing.assert_allclose(
-        every["estimate"][1], swept["estimate"][:1, 0], rtol=1e-6
-    )
-    np.testing.assert_array_equal(every["length"], [[1.0], [length]])
-    assert every.to_xarray().estimate.units == every.to_xarray().length.units == "m"
+    assert swept["x"].unit == "m" and (swept["body_length"].values == length).all()
+    law_of_units(swept, unswept, length)
+    sizes = {"body.length": [1.0, length], "gait.amplitude": [0.5]}
+    every = geomech.sweep(one.scene, sizes)
+    assert every["x"].unit == "m"  # though the scene itself has no size
+    np.testing.assert_allclose(every["x"].error[1], swept["x"].error[:1, 0], rtol=1e-6)
+    np.testing.assert_array_equal(every["body_length"].values, [[1.0], [length]])
 
 
 def test_fields_carry_their_unit_and_figures_take_it_from_them():
@@ -392,7 +295,7 @@ def test_fields_carry_their_unit_and_figures_take_it_from_them():
     )
     data = fitted.to_xarray()
     assert (data.attrs["body_length"], data.attrs["length_unit"]) == (length, "m")
-    assert made.curvature.to_xarray().units == "m rad-2 (x, y), rad rad-2 (theta)"
+    assert made.curvature.to_xarray().units == "m/rad2, m/rad2, rad/rad2"
 
 
 class Kept:
@@ -438,7 +341,7 @@ def test_no_unit_is_made_up():
     assert (bare.unit, bare.length) == ("length", None) and "lengths" not in repr(bare)
     data = bare.to_xarray()
     assert (
-        data.A.units == "length rad-1 (x, y), rad rad-1 (theta)"
+        data.A.units == "length/rad, length/rad, rad/rad"
         and "length_unit" not in data.attrs
     )
     for fitted, unit in ((bare, "length"), (said, "m")):
@@ -446,8 +349,6 @@ def test_no_unit_is_made_up():
             plots.ccf_map(curvature.ccf(fitted)).figure.axes[1].get_ylabel()
             == f"CCF$_{{x}}$ ({unit}/rad$^2$)"
         )
-    told = {"amplitude": [0.5, 1.0], "direct": [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]}
-    assert plots.displacement(told).get_ylabel() == "x per cycle (length)"
     public = [getattr(plots, name) for name in plots.__all__]
     named = {
         name for f in public if callable(f) for name in inspect.signature(f).parameters
@@ -496,22 +397,3 @@ def test_plots_draw_where_they_stand(study, table):
         pyplot.close("all")
     assert ax.figure._repr_png_().startswith(PNG)
     assert "matplotlib.pyplot" in sys.modules
-
-
-def test_speeds_and_what_the_medium_does_are_shown_too():
-    sand = rft.Granular(C=1.5, gamma0=0.22, covariance=((0.02, 0.001), (0.001, 0.002)))
-    gait = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.3, -0.2), frequency=2.5)
-    made = Study(Scene(Swimmer(sand, UNEVEN), gait, Numerics(phases=32))).study(
-        [0.5, 1.0], ["direct"]
-    )
-    data = made.to_xarray()
-    for key, units in (
-        ("speed", "m s-1"), ("speed_body_lengths", "body length s-1"), ("turning_rate", "rad s-1"),
-        ("medium_error", "m"), ("medium_error_heading", "rad"),
-    ):  # fmt: skip
-        np.testing.assert_array_equal(data[key].sel(tier="direct"), made[key]["direct"])
-        assert data[key].units == units and (data[key] != 0).all()
-    assert data.attrs["frequency"] == 2.5
-    cells = re.findall(r"<t[hd]>(.*?)</t[hd]>", made._repr_html_())
-    assert cells[7:10] == ["medium (m)", "medium, heading (rad)", "speed (m/s)"]
-    assert float(cells[19]) == pytest.approx(made["speed"]["direct"][0], rel=1e-3)

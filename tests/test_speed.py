@@ -9,15 +9,15 @@ import pytest
 import xarray
 from commands import geomech
 from registry import GAITS
+from tabled import swept_table, tabled
 
 from geomech import scenes
-from geomech.core.variables import Result, Variable
 from geomech.gaits import Circle
+from geomech.io.results import of_dict
 from geomech.studies import report, sweep, undulation
 from geomech.studies.choose import cheapest
 from geomech.studies.study import Study
 from geomech.systems import Swimmer
-from geomech.text import displacement
 from rft import BodyInertia, GrainInertia
 from rft.refusal import Refusal
 
@@ -112,14 +112,19 @@ def test_from_python_too():
     scene = scenes.parse(CHAIN + GRAINS)
     for contradict in (
         lambda: scene.changed(gait=Circle(frequency=2.0)),
-        lambda: Study(scene).study([0.5], ["direct"], Circle(frequency=2.0)),
+        lambda: tabled(
+            Study(scene).displacements([0.5], ["direct"], Circle(frequency=2.0))
+        ),
     ):
         with pytest.raises(
             Refusal,
             match=r"\[gait\] frequency = 2, but the effects of the swimmer have 2.5",
         ):
             contradict()
-    assert Study(scene).study([0.5], ["direct"], Circle())["frequency"] == 2.5
+    assert (
+        tabled(Study(scene).displacements([0.5], ["direct"], Circle()))["frequency"]
+        == 2.5
+    )
     assert [g.frequency for g in report._gaits(scene)] == [
         2.5
     ] * 3  # those that `run` adds, too
@@ -127,7 +132,10 @@ def test_from_python_too():
 
 def test_every_displacement_is_a_speed():
     scene = scenes.parse(CHAIN)
-    table, amplitudes = Study(scene).study([0.5, 1.0], ["area", "direct"]), [0.5, 1.0]
+    table, amplitudes = (
+        tabled(Study(scene).displacements([0.5, 1.0], ["area", "direct"])),
+        [0.5, 1.0],
+    )
     for tier in ("area", "direct"):
         poses = np.array(table[tier])
         assert (np.abs(poses) > 1e-4).any(0).all()  # it moves along, sideways and turns
@@ -138,13 +146,10 @@ def test_every_displacement_is_a_speed():
             table["speed_body_lengths"][tier], np.array(table["speed"][tier]) / 0.3
         )
         np.testing.assert_allclose(table["turning_rate"][tier], 2.5 * poses[:, 2])
-    assert table["units"] == {
-        "amplitude": "amplitude of the ellipse (scale)", "x": "m", "y": "m", "net_distance": "m", "heading": "rad",
-        "estimate": "m", "estimate_heading": "rad", "body_length": "m", "seconds": "s",
-        "frequency": "Hz", "speed": "m/s", "speed_body_lengths": "BL/s", "turning_rate": "rad/s",
-    }  # fmt: skip
-    plain = Study(scenes.parse(CHAIN.replace("frequency = 2.5", ""))).study(
-        amplitudes, ["area", "direct"]
+    plain = tabled(
+        Study(scenes.parse(CHAIN.replace("frequency = 2.5", ""))).displacements(
+            amplitudes, ["area", "direct"]
+        )
     )
     assert {k: plain[k] for k in ("area", "direct", "estimate")} == {
         k: table[k] for k in ("area", "direct", "estimate")
@@ -156,66 +161,24 @@ def test_every_displacement_is_a_speed():
         "turning_rate",
     }
     answer = cheapest(scene, amplitudes, 1e-2)
-    np.testing.assert_allclose(
-        answer["speed"][answer["tier"]],
-        2.5 * np.array(answer["net_distance"][answer["tier"]]),
-    )
-    lines = displacement.full(table.result, "s").splitlines()
-    for unit, length in (("m", 1.0), ("BL", 0.3)):
-        (at,) = [
-            k
-            for k, x in enumerate(lines)
-            if x.startswith(f"s: speed ({unit}/s) at 2.5 Hz")
-        ]
-        a, *_, direct, error = lines[at + 3].split()
-        assert (float(a), float(direct)) == (
-            1.0,
-            pytest.approx(table["speed"]["direct"][1] / length, abs=1e-6),
-        )
-        assert error == f"+-{table['estimate']['direct'][1] * 2.5 / length:.1e}"
-
-
-def test_tables_have_one_unit_a_row():
-    scene = scenes.parse(CHAIN)
-    table = Study(scene).study([1.0], ["direct"])
-    lines = displacement.full(table.result, "s").splitlines()
-    found = {}
-    for head, _, row in zip(lines[::3], lines[1::3], lines[2::3]):
-        if head.startswith("s: "):
-            found[head] = [float(x.removeprefix("+-")) for x in row.split()[1:]]
-    x, y, heading = table["direct"][0]
-    estimate, turned = (
-        table["estimate"]["direct"][0],
-        table["estimate_heading"]["direct"][0],
-    )
-    wanted = [(v, estimate) for v in (np.hypot(x, y), x, y)] + [(heading, turned)]
-    for (head, row), (value, error), unit in zip(
-        found.items(), wanted, ["(m)", "(m)", "(m)", "(rad)"]
-    ):
-        assert row == [pytest.approx(value, abs=1e-6), pytest.approx(error, rel=0.05)]
-        assert unit in head
-    assert [head.rpartition(": ")[2] for head in found][:3] == [
-        "net distance, sqrt(x^2 + y^2)",
-        "x",
-        "y",
-    ]
+    distance = answer["net_distance"].values
+    np.testing.assert_allclose(answer["speed"].values, 2.5 * distance)
 
 
 def test_what_is_nothing_but_its_error_is_zero():
-    result = Study(scenes.parse(CHAIN)).study([0.5, 1.0], ["direct"]).result
+    study = Study(scenes.parse(CHAIN))
+    result = study.displacements([0.5, 1.0], ["direct"])
     y = dataclasses.replace(result["y"], values=[[1e-8, -1e-8]], error=[[2e-8, 3e-8]])
-    lines = displacement.text(
-        dataclasses.replace(
-            result, variables=(y, *(v for v in result.values() if v.name != "y"))
-        )
-    )
-    assert "y: zero within its error, 3e-08 m" in lines.splitlines()
+    lines = str(result.with_variables(y)).splitlines()
+    assert "y: zero within its error, 3.0e-08 m" in lines
 
 
 def test_sweeps_give_it(tmp_path):
     scene = scenes.parse(CHAIN + GRAINS)
-    found = sweep.sweep(
-        scene, {"gait.amplitude": [0.5, 1.0], "gait.frequency": [1.0, 2.5, 4.0]}
+    found = swept_table(
+        sweep.sweep(
+            scene, {"gait.amplitude": [0.5, 1.0], "gait.frequency": [1.0, 2.5, 4.0]}
+        )
     )
     assert (
         np.diff(found["displacement"][..., 0]) != 0
@@ -225,9 +188,11 @@ def test_sweeps_give_it(tmp_path):
         found["speed"],
         np.hypot(*np.moveaxis(found["displacement"], -1, 0)[:2]) * [1.0, 2.5, 4.0],
     )
-    alone = Study(
-        scene.changed(gait=dataclasses.replace(scene.gait, amplitude=1.0))
-    ).study([1.0], ["direct"])
+    alone = tabled(
+        Study(
+            scene.changed(gait=dataclasses.replace(scene.gait, amplitude=1.0))
+        ).displacements([1.0], ["direct"])
+    )
     np.testing.assert_allclose(
         found["speed"][1, 1], alone["speed"]["direct"][0], rtol=1e-6
     )
@@ -237,12 +202,9 @@ def test_sweeps_give_it(tmp_path):
     assert (code, err) == (0, "") and "speed" in out
     with xarray.open_dataset(tmp_path / "s.nc") as data:
         assert (
-            data.speed.attrs["units"] == "m s-1"
-            and data.frequency.attrs["units"] == "Hz"
+            data.speed.attrs["units"] == "m/s" and data.frequency.attrs["units"] == "Hz"
         )
-        np.testing.assert_allclose(
-            data.speed, np.hypot(data.displacement[:, 0], data.displacement[:, 1]) * 2.5
-        )
+        np.testing.assert_allclose(data.speed, np.hypot(data.x, data.y) * 2.5)
     run, seen = Swimmer.run, []
     with mock.patch.object(
         Swimmer,
@@ -251,9 +213,11 @@ def test_sweeps_give_it(tmp_path):
             seen.append(len(alpha)) or run(self, alpha, *rest, **more)
         ),
     ):
-        plain = sweep.sweep(
-            scenes.parse(CHAIN),
-            {"gait.frequency": [1.0, 2.0, 4.0], "gait.amplitude": [0.5, 1.0]},
+        plain = swept_table(
+            sweep.sweep(
+                scenes.parse(CHAIN),
+                {"gait.frequency": [1.0, 2.0, 4.0], "gait.amplitude": [0.5, 1.0]},
+            )
         )
         each = len(seen), sum(seen)
         assert plain["displacement"].shape == (3, 2, 3) and plain["estimate"].shape == (
@@ -261,7 +225,9 @@ def test_sweeps_give_it(tmp_path):
             2,
         )
         seen.clear()
-        one = sweep.sweep(scenes.parse(CHAIN), {"gait.amplitude": [0.5, 1.0]})
+        one = swept_table(
+            sweep.sweep(scenes.parse(CHAIN), {"gait.amplitude": [0.5, 1.0]})
+        )
     assert (
         len(seen),
         sum(seen),
@@ -270,8 +236,11 @@ def test_sweeps_give_it(tmp_path):
     np.testing.assert_allclose(
         plain["speed"][:, 1], one["speed"][1] * np.array([0.4, 0.8, 1.6])
     )
-    timeless = sweep.sweep(
-        scenes.parse(CHAIN.replace("frequency = 2.5", "")), {"gait.amplitude": [0.5]}
+    timeless = swept_table(
+        sweep.sweep(
+            scenes.parse(CHAIN.replace("frequency = 2.5", "")),
+            {"gait.amplitude": [0.5]},
+        )
     )
     assert "speed" not in timeless
 
@@ -306,10 +275,10 @@ def test_performance_speaks_the_scenes_own_unit():
 def test_the_command_gives_it(tmp_path):
     (tmp_path / "s.toml").write_text(CHAIN)
     args = ("--amplitudes", "1", "--tiers", "direct", "--json")
-    table = json.loads(geomech("displacement", "s.toml", *args, cwd=tmp_path)[1])
-    assert table["speed"]["direct"][0] == pytest.approx(
-        2.5 * table["net_distance"]["direct"][0]
-    )
+    out = geomech("displacement", "s.toml", *args, cwd=tmp_path)[1]
+    found = of_dict(json.loads(out))
+    distance = float(found["net_distance"][0, 0])
+    assert float(found["speed"][0, 0]) == pytest.approx(2.5 * distance)
 
 
 @pytest.mark.parametrize("top", [0.03, 0.22, 1.0, 1.3247, 2.5, 7.0, 999.0, 1e-5, 4e5])
@@ -326,185 +295,4 @@ def test_amplitudes_of_tables_are_round(top):
         "2.",
         "2.5",
         "5.",
-    )
-
-
-def by_hand(parts=(), **facts):
-    """Displacements of a body 0.02 m long by two tiers at three amplitudes."""
-    over, x = (
-        ("tier", "amplitude"),
-        np.array([[0.00123456789, -0.002, 0.003], [0.0012, -0.0021, 0.0031]]),
-    )
-
-    def of(name, values, error, unit):
-        return Variable(
-            name, over, np.zeros((2, 3)) + values, unit, "", np.zeros((2, 3)) + error
-        )
-
-    error = [[1.2e-6, 3e-6, 5e-6], [4e-6, 2e-6, 4e-6]]
-    variables = {v.name: v for v in (
-        Variable("tier", ("tier",), np.array(["path", "direct"])),
-        Variable("amplitude", ("amplitude",), [0.5, 1.0, 1.5], "1", "amplitude of the $circle$ (rad)"),
-        of("x", x, error, "m"), of("y", 0.9e-8, 1e-8, "m"), of("heading", [0.1, 0.2, 0.3], 1e-3, "rad"),
-        of("net_distance", np.abs(x), error, "m"), *(of(*x) for x in parts),
-    )}  # fmt: skip
-    facts = {
-        "name": "s.toml",
-        "zero_by_symmetry": [],
-        "body_length": 0.02,
-        "seconds": {"path": 0.5, "direct": 1.25},
-        "kept": ("path",),
-    } | facts
-    return Result("displacement", tuple(variables.values()), facts)
-
-
-BY_HAND = """\
-s.toml: a note
-s.toml: displacement per cycle (m), direct tier, cheapest within 0.001 BL
-amplitude               x   +- error
-      0.5      0.00120000  +-4.0e-06
-        1     -0.00210000  +-2.0e-06
-      1.5      0.00310000  +-4.0e-06
-heading: zero by symmetry
-y: zero within its error, 1e-08 m
-x by tier                path
-      0.5  0.00123457 +-1e-06
-        1 -0.00200000 +-3e-06
-      1.5  0.00300000 +-5e-06
-amplitude: amplitude of the circle (rad)
-estimated error: of halves
-x ahead, y to the left, as the body frame points at the start of the cycle"""
-OF_ALL = """\
-s.toml: speed (m/s) at 2 Hz +- estimated error: net distance times frequency
-amplitude                   path                 direct
-      0.5    0.00246914 +-2.4e-06    0.00240000 +-8.0e-06
-        1    0.00400000 +-6.0e-06    0.00420000 +-4.0e-06
-      1.5    0.00600000 +-1.0e-05    0.00620000 +-8.0e-06
-s.toml: speed (BL/s) at 2 Hz +- estimated error: net distance times frequency
-amplitude                 path               direct
-      0.5    0.123457 +-1.2e-04    0.120000 +-4.0e-04
-        1    0.200000 +-3.0e-04    0.210000 +-2.0e-04
-      1.5    0.300000 +-5.0e-04    0.310000 +-4.0e-04
-amplitude: amplitude of the circle (rad); x, y, heading: the pose after a cycle, in the frame at its start
-seconds: path 0.5 (built before), direct 1.25 with the search for it
-"""
-
-
-def test_displacements_are_told_to_a_millionth_of_the_body():
-    facts = {
-        "zero_by_symmetry": ["heading"],
-        "note": "a note",
-        "estimate_is": "of halves",
-        "tolerance": 1e-3,
-    }
-    assert displacement.text(by_hand(**facts)) == BY_HAND
-    lines = displacement.text(by_hand()).splitlines()
-    assert lines[:2] == [
-        "s.toml: displacement per cycle (m), direct tier, most exact of 2",
-        "amplitude               x   +- error  heading (rad)   +- error",
-    ]
-    assert lines[3] == "        1     -0.00210000  +-2.0e-06       0.200000  +-1.0e-03"
-    assert displacement.full(by_hand(frequency=2.0, tier="direct")).endswith(OF_ALL)
-    for length, decimals in (
-        (0.02, 8),
-        (0.0999, 8),
-        (0.1, 7),
-        (0.3, 7),
-        (1.0, 6),
-        (25.0, 6),
-        (0.001, 9),
-    ):
-        assert displacement._decimals(by_hand(body_length=length)) == decimals
-
-
-@pytest.mark.parametrize(
-    ("value", "error", "length", "zero"),
-    [
-        (8e-9, 8.001e-9, 0.02, True), (8e-9, 7.999e-9, 0.02, False), (0.99e-8, 1e-7, 0.02, True),
-        (1.01e-8, 1e-7, 0.02, False),
-        (-1.01e-8, 1e-7, 0.02, False), (4.9e-7, 1e-6, 1.0, True), (5.1e-7, 1e-6, 1.0, False),
-    ],
-)  # fmt: skip
-def test_a_component_is_zero_within_its_error_and_below_the_last_digit(
-    value, error, length, zero
-):
-    lines, moving = displacement._zeros(
-        by_hand([("y", [0.0, value, 0.0], error, "m")], body_length=length), 1
-    )
-    assert ("y" not in moving) == zero == bool(lines) and moving[0] == "x"
-    _, moving = displacement._zeros(
-        by_hand([("heading", [0.0, value, 0.0], error, "rad")], body_length=length), 1
-    )
-    assert ("heading" not in moving) == (abs(value) <= error and abs(value) < 5e-7)
-
-
-def test_the_most_exact_tier_is_that_of_the_least_largest_error():
-    of = lambda *errors: displacement.exact_tier(
-        by_hand([("x", 0.0, np.array(errors), "m")])
-    )
-    assert (
-        of([1, 2, 3], [1, 1, 4]) == 0
-        and of([1, 2, 3], [3, 1, 1]) == 1
-        and of([1, 2, np.nan], [9, 9, 9]) == 1
-    )
-    assert displacement.shown_rows(3, 14).tolist() == [
-        0,
-        1,
-        2,
-    ] and displacement.shown_rows(30, 4).tolist() == [
-        0,
-        10,
-        19,
-        29,
-    ]
-
-
-def test_columns_stand_together_as_far_as_a_screen_is_wide():
-    of = lambda *wide: [
-        len(group) - 1
-        for group in displacement._side_by_side(
-            [[" " * w] for w in wide], by_hand(), np.arange(3)
-        )
-    ]
-    assert (
-        of(35, 36) == [2]
-        and of(35, 37) == [1, 1]
-        and of(20, 20, 20, 20) == [3, 1]
-        and of(90, 90) == [1, 1]
-    )
-
-
-def test_other_tiers_are_told_by_x_where_they_fit():
-    others = lambda result, shown: list(
-        displacement._others(result, 1, np.array(shown))
-    )
-    assert others(by_hand(), [0, 1, 2])[0] == "x by tier" + "path".rjust(20)
-    assert (
-        others(by_hand(), [0, 1])
-        == others(by_hand(zero_by_symmetry=["x"]), [0, 1, 2])
-        == ["other tiers, largest error (m): path 5.0e-06"]
-    )
-
-
-def test_a_shift_of_the_mean_is_told_where_it_is_a_tenth_of_the_deviation():
-    spread = np.array([[1e-4, 1e-4, 1e-9]] * 2)
-    shift = Variable(
-        "medium_shift",
-        ("quantity", "amplitude"),
-        [
-            [0.0] * 3,
-            [1.01e-5, -0.99e-5, 2.1e-8],
-            [1.01e-5, -1.01e-5, 0.9e-6],
-            [0.0] * 3,
-        ],
-    )
-    result = by_hand([("y", 0.0, 1e-8, "m"), ("heading", 0.0, 1e-8, "rad")])
-    result = dataclasses.replace(result, variables=(*result.variables, shift))
-    of = lambda name: displacement._shifts(
-        result, dataclasses.replace(result[name], spread=spread)
-    )
-    assert (
-        of("y") == {0: 1.01e-5, 2: 2.1e-8}
-        and of("heading") == {0: 1.01e-5, 1: -1.01e-5}
-        and of("x") == {}
     )

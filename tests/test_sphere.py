@@ -1,10 +1,9 @@
 """Odd harmonics of the velocity on the sphere of directions, of three joint rates and more."""
 
-import json
-
 import numpy as np
 import pytest
 from commands import geomech
+from tabled import tabled, tabled_json
 
 from geomech.gaits import Fourier
 from geomech.geometry import connection, harmonics
@@ -100,7 +99,7 @@ def test_three_joints_in_sand_within_a_few_percent():
         "harmonic" not in default_tiers(chain)
         and harmonic.directions(chain, study.scene.numerics) == 110
     )
-    table = study.study([0.4], ["harmonic", "path", "direct"])
+    table = tabled(study.displacements([0.4], ["harmonic", "path", "direct"]))
     off = {
         m: np.hypot(*(np.array(table[m]) - table["direct"])[0, :2])
         for m in ("harmonic", "path")
@@ -146,7 +145,7 @@ def test_too_many_are_refused(tmp_path):
         "tiers: adapted, direct; by name: area, path\n" in told
         and "harmonic tier" in told
     )
-    assert json.loads(
+    assert tabled_json(
         geomech("displacement", "s.toml", "--amplitudes", "1", "--json", cwd=tmp_path)[
             1
         ]

@@ -7,6 +7,7 @@ import mpmath
 import numpy as np
 import pytest
 from commands import geomech
+from tabled import of_json
 
 from geomech import scenes as scene
 from geomech import text as texts
@@ -390,12 +391,12 @@ def test_plate_drags_become_a_medium_that_commands_read(tmp_path):
     assert (
         len(found["residuals"]["alpha_x"]) == len(found["residuals"]["beta_deg"]) == 42
     )
-    told = json.loads(
-        geomech("stress", out, "--beta", "30", "--gamma", "50", "--json")[1]
-    )
+    told = of_json(geomech("stress", out, "--beta", "30", "--gamma", "50", "--json")[1])
     medium = StressMap(*(found[name.replace("m", "-")] for name in COEFFICIENTS))
     np.testing.assert_allclose(
-        [told["alpha_x"], told["alpha_z"]], medium(30 * RAD, 50 * RAD), atol=1e-9
+        [float(told["alpha_x"]), float(told["alpha_z"])],
+        medium(30 * RAD, 50 * RAD),
+        atol=1e-9,
     )
     text = (
         '[medium]\nfile = "m.toml"\n[intruder]\nkind = "plate"\nlength = 0.03\nwidth = 0.02\n'

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from registry import GAITS, SYSTEMS
+from tabled import tabled
 
 from geomech.gaits import Butterfly, Circle, Fourier, Wave
 from geomech.geometry.symmetry import (
@@ -94,8 +95,10 @@ def test_displacements_have_the_zeros_that_are_claimed(name):
             continue
         small = dataclasses.replace(gait, amplitude=0.5 * gait.amplitude)
         try:
-            table = Study(Scene(system, small, name="s")).study(
-                [small.amplitude], ["direct"]
+            table = tabled(
+                Study(Scene(system, small, name="s")).displacements(
+                    [small.amplitude], ["direct"]
+                )
             )
         except Refusal:
             continue

@@ -6,7 +6,6 @@ from scipy.io import loadmat
 from structs import cell, computed, save, struct
 
 import rft
-from geomech import Study
 from geomech.gaits import Circle
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
@@ -17,6 +16,7 @@ from geomech.io.tables import sysplotter
 from geomech.io.tables.base import Stored
 from geomech.scenes import Scene
 from geomech.studies import fields
+from geomech.studies.study import Study
 from geomech.systems import (
     DifferentialDrive,
     IdealFluidSwimmer,

@@ -7,6 +7,7 @@ import pytest
 import sympy as sp
 import xarray
 from registry import GAITS, SYSTEMS
+from tabled import tabled
 
 from geomech import scenes, symbolic
 from geomech.gaits import Circle, Ellipse
@@ -105,7 +106,7 @@ def test_tiers_of_the_snake_agree_with_its_closed_form():
         np.testing.assert_allclose(
             study.poses(tier, None, [0.5, 1.0]), exact, atol=error
         )
-    table = study.study([0.5, 1.0], ["path", "direct"])
+    table = tabled(study.displacements([0.5, 1.0], ["path", "direct"]))
     np.testing.assert_allclose(table["direct"], exact, atol=1e-12)
 
 
@@ -169,7 +170,7 @@ def test_singular_shapes_are_refused_by_name_in_integrals():
         ):
             study.poses(tier, crossing)
         with pytest.raises(Refusal, match="meets the singular shape"):
-            study.study([0.9], [tier], crossing)
+            tabled(study.displacements([0.9], [tier], crossing))
         assert np.isfinite(study.poses(tier, crossing, [0.3])).all()
     with pytest.raises(ValueError, match="meets the singular shape"):
         study.scene.cycle(crossing)

@@ -10,13 +10,14 @@ from commands import geomech
 from scipy.io import loadmat, savemat
 
 import rft
-from geomech import Study, plots, scenes
+from geomech import plots, scenes
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection, harmonics
 from geomech.geometry.coordinates import change_velocity
 from geomech.io import tables
 from geomech.scenes import Numerics, Scene
 from geomech.studies import effort, estimate, fields
+from geomech.studies.study import Study
 from geomech.systems import Swimmer, Table
 from geomech.text.system import described
 from rft import se2

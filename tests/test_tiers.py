@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from registry import GAITS, MEDIA
+from tabled import tabled
 
 from geomech import plots, scenes
 from geomech.gaits import Butterfly, Circle, Fourier, Wave
@@ -350,7 +351,9 @@ def test_look_up_estimates_cover_the_truth(truths):
         true = truths(
             "estimates", exact, some.system.medium, some.system.body, some.gait, a
         )
-        table = Study(some).study(a, [m for m in TIERS if m != "direct"])
+        table = tabled(
+            Study(some).displacements(a, [m for m in TIERS if m != "direct"])
+        )
         for tier, error in table["estimate"].items():
             estimates.append(np.stack([error, table["estimate_heading"][tier]], -1))
             errors.append(estimate.pose_distance(np.array(table[tier]), true, 1.0))
@@ -429,7 +432,7 @@ def test_a_tier_is_one_expression(monkeypatch):
     study = Study(scene)
     foretold = study.cost([0.05, 1.0], ["path", "leading", "direct"]).balances
     with listening(lambda samples, points, linear: counts.append(samples)):
-        table = study.study([0.05, 1.0], ["path", "leading", "direct"])
+        table = tabled(study.displacements([0.05, 1.0], ["path", "leading", "direct"]))
     assert foretold == sum(counts) and [*table["seconds"]] == [
         "field",
         "direct",
@@ -439,7 +442,7 @@ def test_a_tier_is_one_expression(monkeypatch):
     off = estimate.distance(np.array(table["leading"]), np.array(table["direct"]))
     assert (off <= table["estimate"]["leading"]).all() and off[1] > 0.01
     assert "leading" in default_tiers(scene.system)
-    assert cheapest(scene, [0.05, 1.0], 1e-4)["tier"] == "direct"
+    assert tabled(cheapest(scene, [0.05, 1.0], 1e-4))["tier"] == "direct"
     with pytest.raises(
         Refusal,
         match="the leading tier takes a body of joints, this body has 4: use direct",
@@ -465,7 +468,7 @@ MANY = np.linspace(0.3, 2.0, 201)
 @pytest.mark.parametrize("every", [100, 2])
 @pytest.mark.parametrize("tol", [1e-2, 1e-3, 1e-5])
 def test_the_cheapest_tier_meets_the_tolerance(tol, every, truths):
-    answer = cheapest(GLASS, MANY[::every], tol)
+    answer = tabled(cheapest(GLASS, MANY[::every], tol))
     (told,) = answer["estimate"].values()
     assert [*answer["estimate"]] == [answer["tier"]] and max(told) <= tol
     true = truths(
@@ -479,7 +482,8 @@ def test_the_cheapest_tier_meets_the_tolerance(tol, every, truths):
 
 def test_a_table_pays_for_many_amplitudes_and_not_for_few():
     few, many = (
-        cheapest(GLASS, np.linspace(0.3, 2.0, n), 2e-3)["tier"] for n in (3, 400)
+        tabled(cheapest(GLASS, np.linspace(0.3, 2.0, n), 2e-3))["tier"]
+        for n in (3, 400)
     )
     assert (few, many) == ("direct", "adapted")
 
@@ -491,7 +495,7 @@ def test_the_position_decides_and_not_the_heading(error, tier, monkeypatch):
     monkeypatch.setattr(
         "geomech.studies.choose.against_direct", lambda *_: np.tile(error, (400, 1))
     )
-    assert cheapest(GLASS, np.linspace(0.3, 2.0, 400), 2e-3)["tier"] == tier
+    assert tabled(cheapest(GLASS, np.linspace(0.3, 2.0, 400), 2e-3))["tier"] == tier
 
 
 def test_errors_of_rules_are_those_of_each_amplitude():
@@ -533,9 +537,9 @@ def test_what_the_solver_left_counts_in_the_estimate():
 
 def test_impossible_tolerances_are_refused():
     with pytest.raises(Refusal, match="no tier gets to 1e-15 body lengths"):
-        cheapest(GLASS.with_numerics(regularisation=1e-4), [1.0], 1e-15)
+        tabled(cheapest(GLASS.with_numerics(regularisation=1e-4), [1.0], 1e-15))
     with pytest.raises(Refusal, match="tolerance must be"):
-        cheapest(GLASS, [1.0], 0.0)
+        tabled(cheapest(GLASS, [1.0], 0.0))
 
 
 def test_the_map_of_a_family_gives_each_shape_its_own_value():
@@ -567,7 +571,7 @@ def test_every_amplitude_must_meet_the_tolerance(monkeypatch):
     with pytest.raises(
         Refusal, match="no tier gets to 1e-09 body lengths .* with 128 phases"
     ):
-        cheapest(GLASS, [0.0, 1.0], 1e-9)
+        tabled(cheapest(GLASS, [0.0, 1.0], 1e-9))
 
 
 @pytest.mark.parametrize(
@@ -575,7 +579,7 @@ def test_every_amplitude_must_meet_the_tolerance(monkeypatch):
 )
 def test_the_search_for_a_tier_starts_with_few_phases(effects, phases):
     scene = GLASS.changed(effects=effects).with_numerics(cycles=1)
-    assert cheapest(scene, [0.5], 10.0)["settings"] == {"phases": phases}
+    assert tabled(cheapest(scene, [0.5], 10.0))["settings"] == {"phases": phases}
 
 
 def test_estimates_are_in_body_lengths_and_in_tables_in_the_unit_of_their_poses():
@@ -586,7 +590,10 @@ def test_estimates_are_in_body_lengths_and_in_tables_in_the_unit_of_their_poses(
     )
     np.testing.assert_allclose(same, error, rtol=1e-6)
     np.testing.assert_allclose(small[:, :2], 1e-6 * poses[:, :2], rtol=1e-9)
-    tables = [Study(s.with_numerics(grid=9)).study(a, ["path"]) for s in (GLASS, tiny)]
+    tables = [
+        tabled(Study(s.with_numerics(grid=9)).displacements(a, ["path"]))
+        for s in (GLASS, tiny)
+    ]
     for key, size in (
         ("estimate", 1e-6),
         ("estimate_heading", 1.0),

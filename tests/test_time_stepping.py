@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from registry import BODIES, MEDIA
 from scipy.integrate import solve_ivp
+from tabled import tabled
 
 from geomech import scenes
 from geomech.gaits import Butterfly, Circle, Ellipse, Sine
@@ -314,7 +315,7 @@ def test_cycles_that_do_not_repeat_are_not_taken_for_periodic():
 def test_a_tolerance_below_what_time_stepping_repeats_to_is_refused():
     slowed = scenes.load("sandfish-transient")
     with pytest.raises(Refusal, match="repeat to 1e-06 only: raise tolerance"):
-        cheapest(slowed, [0.2], 1e-7)
+        tabled(cheapest(slowed, [0.2], 1e-7))
 
 
 def test_pauses_and_empty_batches():
@@ -556,7 +557,7 @@ def test_a_tolerance_refines_pieces_or_is_refused(monkeypatch):
         Circle(amplitude=1.2),
     )
     scene = scene.with_numerics(pieces=5)
-    found = cheapest(scene, [1.2], 1e-5)
+    found = tabled(cheapest(scene, [1.2], 1e-5))
     assert found["settings"]["pieces"] > 5
     truth = Study(scene.with_numerics(pieces=640)).poses("direct", None, [1.2])
     off = estimate.distance(np.array(found[found["tier"]]), truth)
@@ -567,7 +568,7 @@ def test_a_tolerance_refines_pieces_or_is_refused(monkeypatch):
         Refusal,
         match="no tier gets to 1e-08 body lengths .* with .* phases and 40 pieces",
     ):
-        cheapest(scene, [1.2], 1e-8)
+        tabled(cheapest(scene, [1.2], 1e-8))
 
 
 def test_a_setting_for_pieces():

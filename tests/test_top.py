@@ -49,9 +49,9 @@ def test_parts_are_reached_from_the_top():
     assert geomech.media is rft.laws
     assert set(geomech.tiers.TIERS) == {"area", "adapted", "path", "harmonic", "direct"}
     study = geomech.Study(geomech.load("three-link-viscous").with_numerics(grid=7))
-    assert study.poses("path").shape == (3,)
+    assert study.tables.poses("path").shape == (3,)
     axes = geomech.plots.figure(3, 3)[1]
-    geomech.plots.displacement(study.study([0.5], ["path"]), ax=axes[0, 0])
+    geomech.plots.displacement(study.displacement([0.5], ["path"]), ax=axes[0, 0])
     with pytest.raises(
         AttributeError, match="module 'geomech' has no attribute 'lode'"
     ):

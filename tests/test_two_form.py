@@ -9,6 +9,7 @@ from geomech.gaits import Circle, Fourier
 from geomech.geometry import connection, curvature
 from geomech.geometry.connection import Connection
 from geomech.geometry.two_form import spanned, two_form
+from geomech.io.results import to_xarray
 from geomech.studies import fields
 from geomech.systems import Swimmer, Table
 from geomech.tiers.area import area
@@ -139,18 +140,22 @@ def test_the_file_has_all_pairs(form, tmp_path):
     )
     fields.save_connection(tmp_path / "made.nc", study)
     assert np.array_equal(Connection.load(tmp_path / "made.nc").A, study.fitted.A)
-    saved = study.to_xarray()["ccf_pairs"]
+    saved = to_xarray(fields.of_study(study))["ccf_pairs"]
     assert (
         saved.dims[:2] == ("pair", "component") and "1 2, 1 3, 2 3" in saved.long_name
     )
     assert np.array_equal(saved[1], study.two_form.pair(0, 2).values)
-    assert "metric" in study.to_xarray()
-    apart = study.to_xarray()["ccf_pairs_error"]
+    assert "metric" in to_xarray(fields.of_study(study))
+    apart = to_xarray(fields.of_study(study))["ccf_pairs_error"]
     assert (
         np.array_equal(apart[2], curvature.error(study.fitted, 1, 2).values)
         and apart.dims == saved.dims
     )
-    assert study.to_xarray()["pair_joints"].values.tolist() == [[1, 2], [1, 3], [2, 3]]
+    assert to_xarray(fields.of_study(study))["pair_joints"].values.tolist() == [
+        [1, 2],
+        [1, 3],
+        [2, 3],
+    ]
 
 
 @pytest.mark.parametrize(

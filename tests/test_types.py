@@ -10,6 +10,7 @@ import pickle
 import numpy as np
 import pytest
 from registry import GAITS, OUTLINES, STRESSES, SYSTEMS
+from tabled import swept_table, tabled
 
 import rft
 from geomech import scenes
@@ -211,12 +212,12 @@ def geometries(value):
         undulation.activation,
     ):
         yield "a scene", lambda of=of: of(value)
-    yield "a scene", lambda: cheapest(value, [1.0], 0.1)
-    yield "a scene", lambda: sweep.sweep(value, {"gait.amplitude": [1.0]})
-    yield "over", lambda: sweep.sweep(plain, value)
-    yield "a list", lambda: sweep.sweep(plain, {"gait.amplitude": value})
-    yield "a list", lambda: cheapest(plain, value, 0.1)
-    yield "gait of the scene", lambda: cheapest(plain, [1.0], 0.1, value)
+    yield "a scene", lambda: tabled(cheapest(value, [1.0], 0.1))
+    yield "a scene", lambda: swept_table(sweep.sweep(value, {"gait.amplitude": [1.0]}))
+    yield "over", lambda: swept_table(sweep.sweep(plain, value))
+    yield "a list", lambda: swept_table(sweep.sweep(plain, {"gait.amplitude": value}))
+    yield "a list", lambda: tabled(cheapest(plain, value, 0.1))
+    yield "gait of the scene", lambda: tabled(cheapest(plain, [1.0], 0.1, value))
     yield "gait of the scene", lambda: Study(plain).table("adapted", value)
     yield "tier", lambda: Study(plain).plan(value)
     yield "system", lambda: plain.changed(system=value)
@@ -234,7 +235,7 @@ def geometries(value):
     yield "gait of the scene", lambda: Study(plain).poses("direct", value)
     yield "tier", lambda: Study(plain).poses(value)
     yield "amplitudes", lambda: Study(plain).poses("direct", amplitudes=value)
-    for ask in (Study(plain).study, Study(plain).cost):
+    for ask in (Study(plain).displacements, Study(plain).cost):
         yield "gait of the scene", lambda ask=ask: ask([1.0], ["direct"], value)
         yield "amplitudes of a study", lambda ask=ask: ask(value, ["direct"])
         yield "tiers", lambda ask=ask: ask([1.0], value)
@@ -250,7 +251,7 @@ def geometries(value):
     yield "file", lambda: Centreline(file=value)
     for name in ("loads", "grid", "phases", "extent"):
         yield "a change", lambda name=name: plain.with_numerics(**{name: value})
-    yield "tolerance", lambda: cheapest(plain, [1.0], value)
+    yield "tolerance", lambda: tabled(cheapest(plain, [1.0], value))
 
 
 TAKEN = {

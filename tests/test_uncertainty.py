@@ -5,19 +5,18 @@ import json
 
 import numpy as np
 import pytest
-import xarray
 from commands import geomech
+from tabled import swept_table, tabled
 
 from geomech import plots, scenes
 from geomech.gaits import Butterfly, Ellipse
-from geomech.io.results import write_netcdf
+from geomech.io.results import of_dict
 from geomech.scenes import Scene
 from geomech.studies import sweep, uncertainty
 from geomech.studies.choose import cheapest
 from geomech.studies.study import Study
 from geomech.studies.tables import QUANTITIES, of_pose
 from geomech.systems import Swimmer
-from geomech.text import displacement
 from rft import Chain, Granular, SkinFriction, Transient, Viscous
 from rft.refusal import Refusal
 
@@ -176,19 +175,15 @@ def test_wide_media_shift_the_mean_and_it_is_told(monkeypatch):
         assert told["shift"]["net_distance"][0] == pytest.approx(
             shift, abs=0.03 * nets.std()
         )
-        tables[share] = Study(sand).study([1.2], ["direct"])
+        tables[share] = Study(sand).displacements([1.2], ["direct"])
         errors[share] = told["shift"]["net_distance"][0] / told["net_distance"][0]
     assert errors[1.0] < -0.3 and -uncertainty.SHIFTED < errors[0.1] < 0
-    wide, narrow = (
-        displacement.full(tables[share].result, "sand") for share in (1.0, 0.1)
-    )
-    row = next(x for x in wide.splitlines() if x.startswith("      1.2"))
-    assert row.endswith(
-        f"  mean {tables[1.0]['medium_shift_of']['net_distance'][0]:+.1e}"
-    )
-    assert "\nmean: how far the mean over the media" in wide and "mean" not in narrow
-    assert tables[1.0].result["quantity"].values.tolist() == list(QUANTITIES)
-    assert tables[1.0]["units"]["medium_shift_of"] == "that of the quantity"
+    wide, narrow = (str(tables[share]) for share in (1.0, 0.1))
+    size = abs(tables[1.0]["medium_shift"].values[3, 0])
+    assert f"mean over the media: net distance shifted by up to {size:.1e}" in wide
+    assert "mean over the media: net distance" not in narrow
+    assert tables[1.0]["quantity"].values.tolist() == list(QUANTITIES)
+    assert tables[1.0]["medium_shift"].unit == ("BL", "BL", "rad", "BL")
 
 
 def test_media_that_end_before_the_points_are_carried_on_from_nearer_ones():
@@ -221,7 +216,7 @@ def test_roots():
 
 def test_every_tier_has_it_beside_its_own_error():
     sand = scene(granular()).with_numerics(grid=7, phases=64)
-    table = Study(sand).study([0.5, 1.0], ["area", "direct"])
+    table = tabled(Study(sand).displacements([0.5, 1.0], ["area", "direct"]))
     told = uncertainty.of_medium(sand, GAIT, np.array([0.5, 1.0]))
     for tier in ("area", "direct"):
         np.testing.assert_allclose(table["medium_error"][tier], told["position"])
@@ -229,27 +224,22 @@ def test_every_tier_has_it_beside_its_own_error():
     assert {q: table["medium_error_of"][q] for q in QUANTITIES} == {
         q: told[q].tolist() for q in QUANTITIES
     }
-    plain = Study(sand.changed(medium=Granular(1.49, 0.22))).study(
-        [0.5, 1.0], ["area", "direct"]
+    plain = tabled(
+        Study(sand.changed(medium=Granular(1.49, 0.22))).displacements(
+            [0.5, 1.0], ["area", "direct"]
+        )
     )
     assert {k: plain[k] for k in ("area", "direct", "x")} == {
         k: table[k] for k in ("area", "direct", "x")
     }
     assert not [key for key in plain if key.startswith("medium")]
     answer = cheapest(sand, [0.5, 1.0], 1e-2)
-    np.testing.assert_allclose(answer["medium_error"][answer["tier"]], told["position"])
-    text = displacement.full(table.result, "sand").splitlines()
-    row = text[text.index(next(x for x in text if x.endswith(": y"))) + 3].split()
-    assert row[0] == "1" and row[-1] == f"+-{told['y'][1]:.1e}"
-    assert (
-        [x for x in text if x.startswith("medium: one standard deviation")]
-        and "second order" in text[-4]
-        and text[-3].startswith("mean: ")
-    )
-    short = displacement.text(table.result, "sand", rows=2)
-    assert short.count("+- medium") > 1 and ", 1 of 2" not in short, (
-        "tables below each other keep both amplitudes"
-    )
+    spread = np.hypot(answer["x"].spread, answer["y"].spread)
+    np.testing.assert_allclose(spread[0], told["position"])
+    shown = str(Study(sand).displacements([0.5, 1.0], ["area", "direct"]))
+    assert shown.count("+- medium") > 1
+    assert "medium: one standard deviation by its covariance" in shown
+    assert "mean over the media: " in shown
 
 
 def test_effects_and_time_stepping_feel_it(monkeypatch):
@@ -297,13 +287,13 @@ def test_a_covariance_that_reaches_no_medium_is_refused_before_computing(
         Refusal,
         match=r"sand: \[medium\] covariance: a standard deviation away there is no medium \(C ",
     ):
-        Study(wide).study([1.0], ["direct"])
+        tabled(Study(wide).displacements([1.0], ["direct"]))
     with pytest.raises(Refusal, match="there is no medium"):
         cheapest(wide, [1.0], 1e-2)
     with pytest.raises(Refusal, match="there is no medium"):
-        sweep.sweep(wide, {"gait.amplitude": [1.0]})
+        swept_table(sweep.sweep(wide, {"gait.amplitude": [1.0]}))
     with pytest.raises(Refusal, match="there is no medium"):  # at one end only
-        sweep.sweep(scene(granular()), {"medium.C": [2.0, 1.0, 0.05]})
+        swept_table(sweep.sweep(scene(granular()), {"medium.C": [2.0, 1.0, 0.05]}))
 
 
 def test_the_command_gives_it(tmp_path):
@@ -324,10 +314,10 @@ def test_the_command_gives_it(tmp_path):
     )
     code, out, err = geomech(*args, cwd=tmp_path)
     assert (code, err) == (0, "")
-    table, loaded = json.loads(out), scenes.load(tmp_path / "s.toml")
+    found, loaded = of_dict(json.loads(out)), scenes.load(tmp_path / "s.toml")
     told = uncertainty.of_medium(loaded, loaded.gait, np.array([1.0]))
-    assert table["medium_error"]["direct"] == pytest.approx(told["position"])
-    assert table["units"]["medium_error"] == "BL"
+    spread = np.hypot(found["x"].spread, found["y"].spread)
+    assert spread[0] == pytest.approx(told["position"])
     assert "medium, one standard deviation" in (tmp_path / "d.svg").read_text()
 
 
@@ -338,7 +328,7 @@ def test_sweeps_have_it(tmp_path):
         .changed(gait=dataclasses.replace(GAIT, frequency=2.0))
     )
     over = {"body.length": [0.3, 0.6], "gait.amplitude": [0.5, 1.0]}
-    found = sweep.sweep(sand, over)
+    found = swept_table(sweep.sweep(sand, over))
     told = uncertainty.of_medium(sand, GAIT, np.array([0.5, 1.0]))
     np.testing.assert_allclose(
         found["medium_error"], [told["position"], 2 * told["position"]], rtol=1e-6
@@ -346,8 +336,8 @@ def test_sweeps_have_it(tmp_path):
     np.testing.assert_allclose(
         found["medium_error_heading"], [told["heading"]] * 2, rtol=1e-6
     )
-    again = sweep.sweep(
-        sand, {"gait.tilt": [0.4, 0.5], "gait.amplitude": [1.0]}
+    again = swept_table(
+        sweep.sweep(sand, {"gait.tilt": [0.4, 0.5], "gait.amplitude": [1.0]})
     )  # two gaits in one batch
     np.testing.assert_allclose(
         again["medium_error"][0, 0], told["position"][1], rtol=1e-6
@@ -355,30 +345,27 @@ def test_sweeps_have_it(tmp_path):
     turned = dataclasses.replace(GAIT, tilt=0.5)
     told = uncertainty.of_medium(sand, turned, np.array([1.0]))["position"]
     np.testing.assert_allclose(again["medium_error"][1], told, rtol=1e-6)
-    many = sweep.sweep(
-        sand, {"gait.amplitude": np.linspace(0.1, 1.0, 70).tolist()}
+    many = swept_table(
+        sweep.sweep(sand, {"gait.amplitude": np.linspace(0.1, 1.0, 70).tolist()})
     )  # more than go together
     np.testing.assert_allclose(
         many["medium_error"][-1], found["medium_error"][0, 1], rtol=1e-6
     )
-    write_netcdf(tmp_path / "s.nc", sweep.as_stored(found.result))
-    with xarray.open_dataset(tmp_path / "s.nc") as data:
-        np.testing.assert_allclose(data.medium_error, found["medium_error"])
-        assert data.medium_error.attrs["units"] == "m"
-    one = sweep.sweep(sand, {"gait.frequency": [1.0, 3.0]})
-    (_, band) = plots.sweep_figure(sand, one).axes[0].collections
-    net, _, medium, _ = plots.sweeps.drawn(sand, one)
+    result = sweep.sweep(sand, {"gait.frequency": [1.0, 3.0]})
+    one = swept_table(result)
+    (_, band) = plots.sweep_figure(sand, result).axes[0].collections
+    net, _, medium, _ = plots.sweeps.drawn(result)
     np.testing.assert_allclose(medium, one["frequency"] * one["medium_error"])
     box = band.get_datalim(band.axes.transData)
     assert (box.y0, box.y1) == (
         pytest.approx((net - medium).min()),
         pytest.approx((net + medium).max()),
     )
-    assert "medium_error" not in sweep.sweep(
-        sand.changed(medium=Viscous()), {"gait.amplitude": [0.5]}
+    assert "medium_error" not in swept_table(
+        sweep.sweep(sand.changed(medium=Viscous()), {"gait.amplitude": [0.5]})
     )
     more = (
-        sweep.Sweep(sand, over).cost().balances
-        - sweep.Sweep(sand.changed(medium=Granular(1.49, 0.22)), over).cost().balances
+        sweep.Plan(sand, over).cost.balances
+        - sweep.Plan(sand.changed(medium=Granular(1.49, 0.22)), over).cost.balances
     )
     assert more == 6 * 4 * uncertainty.PHASES

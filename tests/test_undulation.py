@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from artists import curve, curves, drawn
 from scipy.optimize import brentq
+from tabled import tabled
 
 import rft
 from figures import fig09c_efficiency, fig10_neuromechanics
@@ -267,7 +268,7 @@ def test_long_bodies_approach_the_endless_wave():
 
 def test_serpenoid_has_a_connection_and_a_ccf():
     swimmer = scenes.load("serpenoid-glass").with_numerics(grid=15)
-    table = Study(swimmer).study([6.0])
+    table = tabled(Study(swimmer).displacements([6.0]))
     direct = np.hypot(*table["direct"][0][:2])
     assert direct > 0.1
     assert np.hypot(*table["harmonic"][0][:2]) == pytest.approx(direct, rel=0.05)

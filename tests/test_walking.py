@@ -10,14 +10,17 @@ import pytest
 from artists import curve, drawn
 from PIL import Image, ImageSequence
 from scipy.io import netcdf_file
+from tabled import of_swept
 
 from figures.walking_sensitivity import Sheet
 from geomech import plots, scenes
+from geomech.core.variables import Result
+from geomech.io.results import of_dict
 from geomech.output import walks
+from geomech.questions import walk as questions_walk
 from geomech.scenes import WalkerScene
 from geomech.studies import walking
-from geomech.studies.sweep import Sweep
-from geomech.text import walk as walk_text
+from geomech.studies.sweep import Plan
 from geomech.text.explain import explain
 from rft.balance.backend import preferring
 from rft.ground import Aeration, GrainInertia, Slope
@@ -413,9 +416,13 @@ def test_a_walk_tells_when_it_is_near_its_limit_cycle():
 
 
 def told_of(scene, found):
-    """What is printed of a walk, and what JSON has of it."""
-    result = walking.of_walk(scene, found)
-    return walk_text.text(result), json.loads(json.dumps(walk_text.numbers(result)))
+    """What is printed of a walk, on one line, and its result."""
+    found = Result("walk", tuple(walking.variables(scene, found)))
+    facts = {"scene": scene.name}
+    result = dataclasses.replace(
+        found, attributes=facts, question=questions_walk.Walk(scene)
+    )
+    return " ".join(str(result).split()), result
 
 
 def test_what_is_told_of_a_walk():
@@ -439,18 +446,14 @@ def test_what_is_told_of_a_walk():
     one = walking.Walked(Walk(*fields, settling_time=1.5), 0.01)
     said, found = told_of(XPLORER, one)
     assert said.startswith(
-        "xplorer: walking at 0.25 +- 0.01 m/s at 2 Hz (limit cycle; from rest within 5 % of it after 1.5 s)"
+        "xplorer: walking at 0.250 +- 1.0e-02 m/s at 2 Hz "
+        "(limit cycle; from rest within 5 % of it after 1.5 s)"
     )
     cost = 0.6 / (0.15 * 9.81 * 0.25)
-    assert (
-        f"2.4 J, cost of transport {cost:.3g} (work over weight times distance, from rest)"
-        in said
-    )
-    assert (
-        "14" not in said
-        and "turning" not in said
-        and (found["settled"], found["cycles"]) == (1.5, 14.0)
-    )
+    assert "total work 2.4 J" in said
+    assert f"cost of transport {cost:.6g} work over weight times distance" in said
+    assert "14" not in said and "turning" not in said
+    assert float(found["settling_time"]) == 1.5 and float(found["cycles"]) == 14.0
     for settled, words in (
         (0.0, "within 5 % of it from the start)"),
         (np.inf, "does not come within 5 %"),
@@ -458,7 +461,7 @@ def test_what_is_told_of_a_walk():
     ):
         other = one._replace(walk=one.walk._replace(settling_time=settled))
         said, found = told_of(XPLORER, other)
-        assert words in said and found["settled"] == (0.0 if settled == 0.0 else None)
+        assert words in said and ("settling_time" in found) != np.isnan(settled)
     y = 0.25 * (1 - np.cos(0.1 * t)) / 0.1
     arc = np.stack([0.25 * np.sin(0.1 * t) / 0.1, pose[:, 1], 0 * t], -1)
     more = {"y": y, "roll": zero, "yaw": 0.1 * t}
@@ -470,13 +473,13 @@ def test_what_is_told_of_a_walk():
         lateral=0.003,
     )
     said, found = told_of(XPLORER, turns)
-    assert (
-        "\nturning at 5.7 +- 0.6 degrees/s, drifting aside at -0.02 +- 0.003 m/s (positive: to the left"
-        in said
-    )
-    assert f"cost of transport {cost:.3g} " in said  # along the arc
-    names = "turning", "estimate_turning", "aside", "estimate_aside"
-    assert [found[x] for x in names] == [0.1, 0.01, -0.02, 0.003]
+    assert "yaw rate 0.100 +- 1.0e-02 rad/s" in said
+    assert f"cost of transport {cost:.6g}" in said  # along the arc
+    for name, value, error in (
+        ("yaw_rate", 0.1, 0.01),
+        ("lateral_speed", -0.02, 0.003),
+    ):
+        assert (float(found[name]), float(found[name].error)) == (value, error)
 
 
 def test_robots_side_by_side_walk_as_alone():
@@ -632,9 +635,8 @@ def test_a_sweep_takes_the_strides_until_robots_walk_steadily_and_no_more():
         scene = dataclasses.replace(
             XPLORER, numerics=dataclasses.replace(QUICK, duration=duration)
         )
-        return Sweep(
-            scene, {"gait.frequency": [1.0, 2.0]}
-        ).cost().balances, walking.price(scene).balances
+        over = {"gait.frequency": [1.0, 2.0]}
+        return Plan(scene, over).cost.balances, walking.price(scene).balances
 
     (brief, one), (long, whole) = costs(0.5), costs(20.0)
     assert brief == long and whole > one > 2 * walking.LIMIT * QUICK.steps
@@ -651,12 +653,9 @@ def test_a_walk_may_be_over_before_its_first_step():
         ),
         walking.Walked(found, 0.01),
     )
-    assert "cost of transport" not in told_of(scene, one)[0] and walks.draw(
-        scene, one
-    ).axes[0].get_xlim() == (
-        0.0,
-        1e-3,
-    )
+    said, result = told_of(scene, one)
+    assert "cost of transport inf" not in said
+    assert walks.draw(result).axes[0].get_xlim() == (0.0, 1e-3)
 
 
 def test_the_estimate_covers_the_error():
@@ -808,31 +807,24 @@ SMALL = XPLORER.text + "\n[numerics]\nsteps = 16\nelements = 8\nduration = 2.0\n
 
 def test_walk_as_a_command(geomech, tmp_path):
     (tmp_path / "small.toml").write_text(SMALL)
+    (tmp_path / "out").mkdir()
     code, out, err = geomech(
-        "walk", "small.toml", "--json", "-o", "out", "--animate", "walk.png"
+        "walk", "small.toml", "--json", "-o", "out", "--plot", "walk.png", "--strip"
     )
     assert (code, err) == (0, "")
-    found = json.loads(out)
-    assert list(found)[:8] == [
-        "speed",
-        "status",
-        "t",
-        "x",
-        "z",
-        "pitch",
-        "cycles",
-        "estimate",
-    ]
-    t, x = np.array(found["t"]), np.array(found["x"])
-    assert t[0] == 0 and t[-1] == pytest.approx(2.0) and found["status"] == "walking"
+    found = of_dict(json.loads(out))
+    t, x = found["t"].values, found["x"].values
+    assert t[0] == 0 and t[-1] == pytest.approx(2.0)
+    assert str(found["status"].values) == "walking"
     late = np.searchsorted(t, [1.0, 2.0 - 1e-9])
     assert np.diff(x[late])[0] / np.diff(t[late])[0] == pytest.approx(
-        found["speed"], rel=0.01
+        float(found["speed"]), rel=0.01
     )
-    assert 0 < found["estimate"] < 0.1 * found["speed"]
+    assert 0 < found["speed"].error < 0.1 * float(found["speed"])
     assert {p.name for p in (tmp_path / "out").iterdir()} == {
         "walk.csv",
         "walk.json",
+        "walk.nc",
         "walk.txt",
         "walk.png",
     }
@@ -853,17 +845,18 @@ def test_films_of_a_walk_follow_the_robot_and_tell_their_speed(tmp_path):
         XPLORER, numerics=dataclasses.replace(QUICK, duration=0.3), gait=Tripod(3.0)
     )
     found = walking.run(scene)
+    _, result = told_of(scene, found)
     x, rows, limits = found.walk.pose[:, 0], [0, 5, len(found.walk.t) - 1], {}
     for follow in (False, True):
         ax = plots.figure(4, 2)[1][0, 0]
-        update = walks._stage(ax, scene, found, np.array(rows), follow)
+        update = walks._stage(ax, result, np.array(rows), follow)
         limits[follow] = np.array([update(row) or ax.get_xlim() for row in rows])
     assert (np.ptp(limits[False], axis=0) == 0).all()
     assert (limits[False][0, 0] < x[rows].min()) and (
         x[rows].max() < limits[False][0, 1]
     )
     np.testing.assert_allclose(limits[True].mean(1), x[rows])
-    walks.film(walking.of_walk(scene, found), tmp_path / "film.gif", follow=True)
+    walks.film(result, tmp_path / "film.gif", follow=True)
     with Image.open(tmp_path / "film.gif") as film:
         shown = (
             sum(frame.info["duration"] for frame in ImageSequence.Iterator(film)) / 1000
@@ -894,16 +887,15 @@ def test_sweep_and_accuracy_of_a_walk(geomech, tmp_path, monkeypatch):
     code, out, err = geomech(
         "sweep", "small.toml", *over, "-o", "s.nc", "--plot", "s.png"
     )
-    assert (code, err) == (0, "") and "2 points (2 walking)" in out
+    assert (code, err) == (0, "") and "2 points" in out and "walking" in out
     with netcdf_file(tmp_path / "s.nc", mmap=False) as file:
         speed = file.variables["speed"][:]
         assert file.variables["gait_frequency"][:].tolist() == [
             2,
             3,
         ] and speed.shape == (1, 2)
-        assert (np.diff(speed, axis=1) > 0).all() and (
-            file.variables["status"][:] == 0
-        ).all()
+        assert (np.diff(speed, axis=1) > 0).all()
+        assert file.variables["status"].data.tobytes() == 2 * b"walking"
     few = {"steps": (16,), "elements": (6,), "rounding": (4e-3,)}
     settings = tuple(
         dataclasses.replace(setting, values=few[setting.name])
@@ -969,7 +961,7 @@ def test_other_refusals(geomech, tmp_path):
             "engine must be one of planar, mujoco",
         ),
         (("walk", "three-link-glass"), "does not walk"),
-        (("walk", "small.toml", "--animate", "film.avi"), "end the name in"),
+        (("walk", "small.toml", "-o", "film.avi"), "end the name in"),
         (("walk", "small.toml", "-o", ""), "empty name"),
         (("displacement", "xplorer", "--amplitudes", "1"), "no shape space"),
         (("intrude", "xplorer"), "no [intruder]"),
@@ -1200,7 +1192,8 @@ def test_axes_of_a_sweep_have_units():
         "status": np.full((2, 3), "walking"),
     }
     over = {"gait.frequency": [1.0, 2.0], "robot.mass": [0.1, 0.2, 0.3]}
-    (ax,) = plots.sweep_figure(scenes.load("xplorer"), {"over": over, **many}).axes
+    table = of_swept({"over": over, **many})
+    (ax,) = plots.sweep_figure(scenes.load("xplorer"), table).axes
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("frequency (Hz)", "mean speed (m/s)")
     assert [t.get_text() for t in ax.get_legend().get_texts()] == [
         "mass (kg): 0.1",
@@ -1211,7 +1204,7 @@ def test_axes_of_a_sweep_have_units():
         "over": {"robot.legs.relative_curvature": [0.0, 1.0]},
         **{k: v[:, 0] for k, v in many.items()},
     }
-    (ax,) = plots.sweep_figure(scenes.load("xplorer"), one).axes
+    (ax,) = plots.sweep_figure(scenes.load("xplorer"), of_swept(one)).axes
     assert ax.get_xlabel() == "relative_curvature (-)" and ax.get_legend() is None
 
 

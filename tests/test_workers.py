@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tabled import swept_table
 from tasks import (
     always_dies,
     dies,
@@ -27,11 +28,11 @@ from tasks import (
     who,
 )
 
-from geomech import scenes, terminal, text
+from geomech import scenes, terminal
 from geomech.core.errors import Note, UnitWarning
 from geomech.geometry import connection, metric
 from geomech.optimisation import checked, search
-from geomech.optimisation.question import result_of
+from geomech.optimisation.variables import answers, displacement, values
 from geomech.run import executors, jobs
 from geomech.run.jobs import Runner, runner, running
 from geomech.run.workers import using
@@ -236,7 +237,9 @@ def test_a_sweep_has_the_same_digits_whoever_computes(
     at_once, two, given_away, monkeypatch
 ):
     monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", at_once)
-    here, shared = both(two, lambda: sweep.sweep(GLASS, OVER), at_once < 64)
+    here, shared = both(
+        two, lambda: swept_table(sweep.sweep(GLASS, OVER)), at_once < 64
+    )
     for key in ("displacement", "estimate", "estimate_heading"):
         np.testing.assert_array_equal(shared[key], here[key])
 
@@ -310,7 +313,10 @@ def test_searches_have_the_same_digits_whoever_computes(two, given_away, monkeyp
     scene, told = GLASS.with_numerics(grid=5), []
     request = checked(scene, "efficiency", harmonics=1, starts=2)
     here, shared = both(two, lambda: search(request, told.append))
-    numbers = lambda optimum: text.numbers(result_of(optimum)) | {"seconds": 0.0}
+    numbers = lambda optimum: [
+        v.values.tolist()
+        for v in (*values(optimum), *displacement(optimum), *answers(optimum))
+    ]
     assert numbers(here) == numbers(shared)
     assert here.best.gait == shared.best.gait and here.answers == shared.answers
     assert all(0 < x < 1 for x in told) and len(set(told)) > 2
@@ -350,7 +356,7 @@ def test_plugins_are_known_to_workers(power, two, given_away, monkeypatch):
         GLASS.changed(medium=power(1.0)),
         {"medium.power": [0.8, 0.9, 1.0, 1.1, 1.2]},
     )
-    here, shared = both(two, lambda: sweep.sweep(scene, over))
+    here, shared = both(two, lambda: swept_table(sweep.sweep(scene, over)))
     np.testing.assert_array_equal(shared["displacement"], here["displacement"])
 
 

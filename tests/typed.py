@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 import geomech
 import rft
 from geomech import connection, curvature, plots, reconstruct, symbolic
-from geomech.app import Displacements
+from geomech.core.variables import Result, Variable
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Gait, Points, Sine
 from geomech.geometry import family, harmonics
 from geomech.geometry.traits import Traits
@@ -71,9 +71,13 @@ def geometry() -> list[Any]:
     fitted = connection.fit(velocity, connection.grid(joints=2, points=5))
     ccf = curvature.ccf(fitted)
     figure, axes = geomech.plots.figure(3.0, 3.0)
-    plots.displacement(
-        {"amplitude": [0.5, 1.0], "area": np.zeros((2, 3))}, ax=axes[0, 0]
+    over = ("tier", "amplitude")
+    x = Variable("x", over, np.zeros((1, 2)), "BL")
+    coordinates = (
+        Variable("tier", over[:1], ["area"]),
+        Variable("amplitude", over[1:], [0.5, 1.0]),
     )
+    plots.displacement(Result("displacement", (*coordinates, x)), ax=axes[0, 0])
     plots.ccf_figure(ccf, [Circle()])
     nets: list[Array] = [
         area(ccf, Circle(), [0.5]),
@@ -95,13 +99,14 @@ def geometry() -> list[Any]:
 def scenes() -> list[Any]:
     scene: Scene = geomech.load("three-link-viscous").with_numerics(grid=7, phases=32)
     text: str = toml(scene.changed(gait=Circle(amplitude=0.3)))
-    study: Study = geomech.Study(scene)
+    study: Study = geomech.Study(scene).tables
     net: Array = study.poses("area", amplitudes=[0.5])
-    face = geomech.study("three-link-viscous").with_numerics(grid=7, phases=32)
-    numbers: Displacements = face.displacement([0.5], tiers="area")
-    drawn: Axes = plots.ccf_map(face.ccf(), gaits=[Circle()])
+    face = geomech.study("three-link-viscous", grid=7, phases=32)
+    numbers: Result = face.displacement([0.5], tiers="area")
+    numbers = geomech.displacement("three-link-viscous", [0.5], tolerance=1e-3)
+    drawn: Axes = plots.ccf_map(face.tables.curvature, gaits=[Circle()])
     told = (
-        study.study([0.5, 1.0], ["direct"]),
+        study.displacements([0.5, 1.0], ["direct"]),
         study.cost([0.5], ["direct"]),
         study.with_numerics(phases=64),
     )
@@ -131,7 +136,7 @@ def scenes() -> list[Any]:
         told,
         more,
         asked,
-        (numbers.tiers, drawn),
+        (numbers["tier"].values, drawn),
     ]
 
 

@@ -5,17 +5,14 @@ from __future__ import annotations
 import inspect
 import re
 
-import typer
-
 from geomech import cli
-from geomech.commands import COMMANDS
 
 
 def page() -> str:
     """Return a heading for each group of `geomech --help`, and for each command its usage, text and options."""
-    commands = typer.main.get_command(cli.app).commands
+    commands = cli.Commands()
     parts = []
-    for heading, names in COMMANDS.items():
+    for heading, names in cli.headings().items():
         parts += [
             f"## {heading}",
             *(_command(commands[name.replace("_", "-")]) for name in names),

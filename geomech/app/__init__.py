@@ -1,34 +1,9 @@
-"""The Python face: a study of a scene that computes, prints itself and draws."""
+"""Questions of measurements and of accuracy from Python."""
 
-from geomech.app.questions import accuracy, fit_medium, fit_midlines, optimise, sweep
-from geomech.app.results import (
-    Displacements,
-    FittedMedium,
-    FittedMidlines,
-    Forces,
-    Optimum,
-    Swept,
-)
-from geomech.app.study import Study, study
+from geomech.app.questions import accuracy, fit_medium, fit_midlines
+from geomech.app.results import FittedMedium, FittedMidlines
 
-optimize = optimise
-
-__all__ = [
-    "Displacements",
-    "FittedMedium",
-    "FittedMidlines",
-    "Forces",
-    "Optimum",
-    "Study",
-    "Swept",
-    "accuracy",
-    "fit_medium",
-    "fit_midlines",
-    "optimise",
-    "optimize",
-    "study",
-    "sweep",
-]
+__all__ = ["FittedMedium", "FittedMidlines", "accuracy", "fit_medium", "fit_midlines"]
 
 
 def __dir__() -> list[str]:

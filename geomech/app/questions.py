@@ -2,80 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from typing import Any
 
-from geomech import optimisation
-from geomech.app.results import FittedMedium, FittedMidlines, Optimum, Swept
+from geomech.app.results import FittedMedium, FittedMidlines
 from geomech.core.errors import choose
 from geomech.measured.midlines import fit
 from geomech.measured.midlines import question as of_midlines
-from geomech.optimisation.limits import LimitsArgument
 from geomech.scenes.parts import as_scene
 from geomech.studies import accuracy as accuracies
-from geomech.studies import sweep as sweeps
 from geomech.studies.calibration import SIZES, Calibration
-
-
-def optimise(
-    scene: Any, objective: str = "displacement", *, direction: str | None = None, harmonics: int | None = None,
-    limits: LimitsArgument = None, starts: int | None = None, rate: float | None = None, power: float | None = None,
-    progress: Callable | None = None,
-) -> Optimum:  # fmt: skip
-    """Return the gait of a scene with the largest displacement, efficiency, turning or speed.
-
-    Parameters
-    ----------
-    scene : anything that `geomech.study` takes
-        Its gait is the first start of the search.
-    objective : "displacement", "efficiency", "turning" or "speed"
-        Distance, distance over path length, net turn, or distance over time, per cycle.
-    direction : "x" or "y"
-        Only that component of the displacement counts; by default the distance.
-    harmonics : int
-        Harmonics of the Fourier series that is searched, 5 by default. A sine is searched among sines.
-    limits : number, or (lowest, highest) for each joint
-        Largest joint angles, rad; by default the extent of the scene's field.
-    starts : int
-        Loops from which the search starts; by default 1, or about 9 for two joints in dry media.
-    rate, power : number
-        Limits of "speed": largest joint rate, rad/s; mean power, in drag x BL/s.
-    progress : function of the fraction done
-
-    Examples
-    --------
-    >>> import geomech
-    >>> best = geomech.optimise("three-link-viscous", harmonics=1, starts=1)
-    >>> round(best.value, 3), best.estimate < 1e-3  # body lengths per cycle, and its error
-    (0.101, True)
-    """
-    found = optimisation.optimise(
-        as_scene(scene),
-        objective,
-        direction,
-        harmonics,
-        limits,
-        starts,
-        rate=rate,
-        power=power,
-        progress=progress,
-    )
-    return Optimum(**vars(found))
-
-
-def sweep(scene: Any, over: Mapping[str, Sequence[float]], **options: Any) -> Swept:
-    """Return the displacement of a scene's gait, or the speed of its robot, over a grid of parameters such as
-    {"medium.C": [1, 2, 3]}; see `geomech.studies.sweep.sweep`.
-
-    Examples
-    --------
-    >>> import geomech
-    >>> table = geomech.sweep("three-link-viscous", {"medium.ratio": [1.5, 2.0], "gait.amplitude": [0.5, 1.0]})
-    >>> table["displacement"][..., 1].round(3)  # y, by ratio and amplitude
-    array([[0.001, 0.007],
-           [0.002, 0.013]])
-    """
-    return Swept(sweeps.sweep(as_scene(scene), over, **options).result)
 
 
 def accuracy(

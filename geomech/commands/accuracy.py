@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from geomech.commands.loading import load_any
 from geomech.commands.options import (
     EitherArgument,
     FolderOption,
@@ -13,6 +12,7 @@ from geomech.commands.options import (
     with_workers,
 )
 from geomech.commands.pipeline import Output, execute
+from geomech.questions.loading import load_any
 
 
 @with_workers

@@ -7,14 +7,9 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.options import (
-    FolderOption,
-    JsonOption,
-    folder,
-    spread,
-    with_workers,
-)
+from geomech.commands.options import FolderOption, JsonOption, folder, with_workers
 from geomech.commands.pipeline import Output, drawing, execute
+from geomech.questions.texts import spread
 
 StoreOption = Annotated[
     Optional[Path],

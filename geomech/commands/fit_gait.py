@@ -8,8 +8,9 @@ from typing import Annotated, Optional
 import typer
 
 from geomech.commands import formats
-from geomech.commands.options import JsonOption, PlotOption, an_angle, column_names
+from geomech.commands.options import JsonOption, PlotOption, an_angle
 from geomech.commands.pipeline import Output, drawing, execute
+from geomech.questions.texts import column_names
 
 
 def fit_gait(

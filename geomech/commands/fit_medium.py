@@ -7,8 +7,9 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.options import AllOption, JsonOption, PlotOption, parse_end_caps
+from geomech.commands.options import AllOption, JsonOption, PlotOption
 from geomech.commands.pipeline import Output, execute
+from geomech.questions.texts import parse_end_caps
 
 Size = Optional[float]
 

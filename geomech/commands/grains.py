@@ -8,7 +8,6 @@ from typing import Annotated, Optional
 import typer
 
 from geomech.commands.drag_grains import ConsentOption, StoreOption
-from geomech.commands.loading import load_scene
 from geomech.commands.options import (
     FolderOption,
     JsonOption,
@@ -16,6 +15,7 @@ from geomech.commands.options import (
     SceneArgument,
 )
 from geomech.commands.pipeline import Output, drawing, execute
+from geomech.questions.loading import load_scene
 
 
 def grains(

@@ -7,10 +7,11 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.loading import load_scenes
-from geomech.commands.names import scene_names
-from geomech.commands.options import YesOption, parameters
+from geomech.commands.options import YesOption
 from geomech.commands.pipeline import Output, execute
+from geomech.questions.loading import load_scenes
+from geomech.questions.names import scene_names
+from geomech.questions.texts import parameters
 
 
 def lab(

@@ -6,9 +6,9 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.names import section_names
 from geomech.commands.options import PluginOption, load_plugins
 from geomech.commands.pipeline import show
+from geomech.questions.names import section_names
 
 
 def reference(

@@ -8,8 +8,6 @@ from typing import Annotated
 
 import typer
 
-from geomech.commands.loading import load_scene
-from geomech.commands.names import scene_names
 from geomech.commands.options import (
     AllOption,
     ClimOption,
@@ -18,12 +16,12 @@ from geomech.commands.options import (
     FolderOption,
     MediumOption,
     YesOption,
-    colour_limit,
-    components,
-    measurements,
     with_workers,
 )
 from geomech.commands.pipeline import Output, execute
+from geomech.questions.loading import load_scene
+from geomech.questions.names import scene_names
+from geomech.questions.texts import colour_limit, components, measurements
 
 DEFAULT_SCENE = "three-link-glass"
 SceneOrOurs = Annotated[

@@ -6,8 +6,8 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.names import printable_names
 from geomech.commands.pipeline import show as print_lines
+from geomech.questions.names import printable_names
 
 
 def scenes(

@@ -6,9 +6,9 @@ from typing import Annotated
 
 import typer
 
-from geomech.commands.loading import load_scene
 from geomech.commands.options import SceneArgument
 from geomech.commands.pipeline import show
+from geomech.questions.loading import load_scene
 
 
 def symbolic(

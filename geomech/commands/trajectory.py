@@ -7,9 +7,9 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.loading import load_scene
 from geomech.commands.options import SceneArgument, YesOption
 from geomech.commands.pipeline import Output, execute
+from geomech.questions.loading import load_scene
 
 
 def trajectory(

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from rft.premise import negated
 from rft.refusal import formatted
 
 ROWS = ("x", "y", "theta")
@@ -145,3 +146,16 @@ def wrapped(lines: Iterable[str], indent: int = 2) -> list[str]:
         for line in lines
         for part in (fill.wrap(line) if len(line) > WIDTH else [line])
     ]
+
+
+def effect_lines(effects: Sequence) -> list[str]:
+    """Return a line for each effect on the ground, and one more for what it assumes."""
+    lines = []
+    for effect in effects:
+        lines.append(
+            f"on:  {part(effect.kind, effect)}; {negated(effect.breaks) or 'keeps every premise'}; costs {effect.cost}; "
+            f"gone at {effect.limit}, order {effect.order}"
+        )
+        if effect.assumes:
+            lines.append(f"     assumes {effect.assumes}")
+    return lines

@@ -1,10 +1,14 @@
-"""Results as NetCDF files (classic format, which every NetCDF library opens) and as data sets of xarray.
+"""Results as files and as plain data: NetCDF (classic format, which every NetCDF library
+opens), JSON, CSV, MAT, and data sets of xarray.
 
-Both are functions of a list of variables, and give the same names, dimensions, units and attributes."""
+All have the names of the variables; errors and spreads are NAME_error and NAME_spread in
+all of them. `geomech.results.files` knows which kind has which of these formats.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,107 +18,325 @@ import numpy as np
 from geomech.core.variables import Result, Variable
 from geomech.io.files import atomic_file, write_text
 
-UNITS = {"BL": "body length"}  # of lengths, as files name them
-ENDINGS = "_error", "_spread"  # of the names under which files have errors and spreads
+ENDINGS = {"_error": "error", "_spread": "spread"}
+KIND = "kind"
+FORMAT = "geomech_format"
+VERSION = 1
+ORDER = "order_of_variables"  # SciPy writes variables in an order of its own
+LARGEST_INTEGER = 2**31 - 1  # of a NetCDF file of the classic format
 
 
-def unit_name(unit: str) -> str:
-    """Return a unit of lengths as it is written in files."""
-    return UNITS.get(unit, unit)
-
-
-def file_variables(result: Result) -> Iterator[Variable]:
-    """Yield the variables of a file: errors and spreads follow their values as NAME_error and NAME_spread."""
-    for v in result.variables:
-        yield replace(v, error=None, spread=None)
-        labels = (
-            v.error_label or f"estimated error of {v.name}",
-            f"standard deviation of {v.name}",
-        )
-        for values, ending, label in zip((v.error, v.spread), ENDINGS, labels):
+def flat(result: Result) -> Iterator[Variable]:
+    """Yield the variables of a file: errors and spreads follow their values."""
+    for variable in result.variables:
+        yield replace(variable, error=None, spread=None)
+        for ending, name in ENDINGS.items():
+            values = getattr(variable, name)
             if values is not None:
-                yield Variable(v.name + ending, v.dims, values, v.unit, label)
+                yield Variable(
+                    variable.name + ending,
+                    variable.dims,
+                    values,
+                    variable.unit,
+                    described(variable, name),
+                )
 
 
-def write_netcdf(path: str | Path, result: Result) -> None:
-    """Write a result; the file appears whole or not at all."""
-    from scipy.io import netcdf_file
-
-    with atomic_file(path) as part, netcdf_file(part, "w", version=2) as file:
-        for key, value in result.attributes.items():
-            value = "; ".join(value) if isinstance(value, tuple) else value
-            if isinstance(value, str) and not value:
-                continue
-            # SciPy keeps but seven digits of a float of Python's
-            number = np.float64(value) if isinstance(value, float) else value
-            setattr(file, key, _encoded(value) if isinstance(value, str) else number)
-        for v in file_variables(result):
-            for dim, size in zip(v.dims, v.values.shape):
-                if dim not in file.dimensions:
-                    file.createDimension(dim, size)
-            _write(file, v)
+def described(variable: Variable, name: str) -> str:
+    """Return the label of an error or a spread in a file."""
+    if name == "spread":
+        return f"standard deviation of {variable.name}"
+    return variable.error_label or f"estimated error of {variable.name}"
 
 
-def _write(file: Any, v: Variable) -> None:
-    if v.is_text:
-        width = v.values.dtype.itemsize // 4
-        file.createDimension(f"{v.name}_length", width)
-        variable = file.createVariable(v.name, "c", (*v.dims, f"{v.name}_length"))
-        variable[:] = np.array(
-            [list(word.ljust(width, "\0")) for word in v.values.tolist()], "S1"
-        )
-        variable._Encoding = "ascii"
-    else:
-        variable = file.createVariable(
-            v.name, "i4" if v.values.dtype.kind == "i" else "f8", v.dims
-        )
-        variable[...] = v.values
-    for key, text in _described(v).items():
-        setattr(variable, key, _encoded(text))
+def joined(
+    kind: str, variables: Iterable[Variable], attributes: dict[str, Any]
+) -> Result:
+    """Return the result of the variables of a file."""
+    by_name = {v.name: v for v in variables}
+    whole = []
+    for name, variable in by_name.items():
+        if owner_of(name, by_name) is not None:
+            continue
+        more: dict[str, Any] = {}
+        for ending, field in ENDINGS.items():
+            if name + ending in by_name:
+                more[field] = by_name[name + ending].values
+        variable = replace(variable, **more)
+        error = by_name.get(f"{name}_error")
+        if error is not None and error.label != described(variable, "error"):
+            variable = replace(variable, error_label=error.label)
+        whole.append(variable)
+    return Result(kind, tuple(whole), attributes)
 
 
-def _described(v: Variable) -> dict[str, str]:
-    return {
-        key: text for key, text in (("units", v.unit), ("long_name", v.label)) if text
+def owner_of(name: str, by_name: dict[str, Variable]) -> str | None:
+    """Return the name of the variable of which this one is the error or the spread."""
+    for ending in ENDINGS:
+        owner = name.removesuffix(ending)
+        if owner != name and owner in by_name:
+            return owner
+    return None
+
+
+def facts(variable: Variable) -> dict[str, str]:
+    """Return the attributes of a variable in a file."""
+    named = {
+        "units": variable.units,
+        "long_name": variable.label,
+        "zero": variable.zero,
     }
+    return {key: text for key, text in named.items() if text}
 
 
-def _encoded(text: str) -> bytes:
-    """Return text in UTF-8; bytes of file names that are no text are escaped."""
-    return text.encode("utf-8", "backslashreplace")
+def variable_of(
+    name: str, dims: tuple[str, ...], values: np.ndarray, facts: dict[str, str]
+) -> Variable:
+    """Return the variable of a file."""
+    unit: Any = facts.get("units", "")
+    parts = tuple(unit.split(", "))
+    plain_words = "(" not in facts.get("units", "")
+    if len(parts) > 1 and plain_words and dims and len(parts) == values.shape[0]:
+        unit = parts
+    return Variable(
+        name, dims, values, unit, facts.get("long_name", ""), zero=facts.get("zero", "")
+    )
 
 
-def write_csv(path: str | Path, result: Result) -> None:
-    """Write the variables over the first one's dimension as columns under their names, with all digits; the file appears
-    whole or not at all."""
-    columns = [v for v in result.variables if v.dims == result.variables[0].dims]
-    rows = np.stack([v.values for v in columns], -1).tolist()
-    lines = [
-        ",".join(v.name for v in columns),
-        *(",".join(map(repr, row)) for row in rows),
-    ]
-    write_text(path, "\n".join(lines) + "\n")
+def about(result: Result) -> dict[str, Any]:
+    """Return the attributes of a file."""
+    return {KIND: result.kind, FORMAT: VERSION, **result.attributes}
 
 
-def xarray() -> Any:
-    """Return the package; ImportError that says how to install it."""
+def split(attributes: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+    """Return the kind and the attributes of a result from those of a file."""
+    kept = {
+        key: value for key, value in attributes.items() if key not in (KIND, FORMAT)
+    }
+    return str(attributes.get(KIND, "")), kept
+
+
+# Plain data, JSON and xarray
+
+
+def to_dict(result: Result) -> dict[str, Any]:
+    """Return plain data in the layout of `xarray.Dataset.from_dict`; nan is None."""
+    parts: dict[str, dict] = {"coords": {}, "data_vars": {}}
+    for variable in flat(result):
+        part = parts["coords" if variable.is_coordinate else "data_vars"]
+        part[variable.name] = {
+            "dims": list(variable.dims),
+            "attrs": facts(variable),
+            "data": plain(variable.values),
+        }
+    order = [variable.name for variable in flat(result)]
+    return {"attrs": about(result), "dims": result.sizes, **parts, "order": order}
+
+
+def plain(values: np.ndarray) -> Any:
+    if values.dtype.kind != "f":
+        return values.tolist()
+    return np.where(np.isfinite(values), values, None).tolist()
+
+
+def of_dict(data: dict[str, Any]) -> Result:
+    """Return the result of `to_dict`."""
+    variables = []
+    parts = {**data["coords"], **data["data_vars"]}
+    for name in data.get("order", parts):
+        part = parts[name]
+        values = np.array(part["data"])
+        if values.dtype == object:
+            values = values.astype(float)
+        variables.append(variable_of(name, tuple(part["dims"]), values, part["attrs"]))
+    kind, attributes = split(data["attrs"])
+    return joined(kind, variables, attributes)
+
+
+def to_xarray(result: Result) -> Any:
+    """Return a Dataset; ImportError that says how to install xarray."""
     try:
         import xarray
     except ImportError:
         raise ImportError(
             "to_xarray needs the package xarray: pip install xarray"
         ) from None
-    return xarray
+    coordinates, variables = {}, {}
+    for variable in flat(result):
+        array = (variable.dims, np.array(variable.values), facts(variable))
+        if variable.is_coordinate:
+            coordinates[variable.name] = array
+        else:
+            variables[variable.name] = array
+    return xarray.Dataset(variables, coordinates, about(result))
 
 
-def to_xarray(result: Result) -> Any:
-    """Return a Dataset. Its coordinates are those whose dimension some variable has."""
-    variables = list(file_variables(result))
-    arrays = {v.name: (v.dims, np.array(v.values), _described(v)) for v in variables}
-    used = {dim for v in variables if not v.is_coordinate for dim in v.dims}
-    axes = {v.name for v in variables if v.is_coordinate}
-    return xarray().Dataset(
-        {name: x for name, x in arrays.items() if name not in axes},
-        {name: x for name, x in arrays.items() if name in axes & used},
-        dict(result.attributes),
+# Files
+
+
+def write_netcdf(path: str | Path, result: Result) -> None:
+    from scipy.io import netcdf_file
+
+    with atomic_file(path) as part, netcdf_file(part, "w", version=2) as file:
+        order = " ".join(variable.name for variable in flat(result))
+        for key, value in {**about(result), ORDER: order}.items():
+            if value != "":
+                setattr(file, key, encoded(value))
+        for variable in flat(result):
+            for dim, size in zip(variable.dims, variable.values.shape):
+                if dim not in file.dimensions:
+                    file.createDimension(dim, size)
+            write_variable(file, variable)
+
+
+def write_variable(file: Any, variable: Variable) -> None:
+    """Write a variable of an open NetCDF file; text is an array of bytes over one dimension more."""
+    dims, values = variable.dims, variable.values
+    code = "f8"
+    if variable.is_text:
+        values, code = letters(values), "c"
+        dims = (*dims, f"{variable.name}_length")
+        file.createDimension(dims[-1], values.shape[-1])
+    elif fits_integers(values):
+        code = "i4"
+    stored = file.createVariable(variable.name, code, dims)
+    stored[...] = values
+    if variable.is_text:
+        stored._Encoding = "utf-8"  # xarray reads text, not bytes
+    for key, text in facts(variable).items():
+        setattr(stored, key, encoded(text))
+
+
+def fits_integers(values: np.ndarray) -> bool:
+    """Return whether values are whole numbers that the classic format can hold."""
+    if values.dtype.kind not in "biu":
+        return False
+    return bool((np.abs(values) <= LARGEST_INTEGER).all())
+
+
+def encoded(value: Any) -> Any:
+    """Return an attribute as NetCDF has it: text in UTF-8, with bytes of file names that
+    are no text escaped."""
+    if isinstance(value, str):
+        return value.encode("utf-8", "backslashreplace")
+    if isinstance(value, int):
+        return np.int32(value)
+    # SciPy keeps but seven digits of a float of Python's.
+    return np.float64(value)
+
+
+def letters(values: np.ndarray) -> np.ndarray:
+    """Return text as an array of bytes with one dimension more."""
+    encoded = np.char.encode(np.atleast_1d(values), "utf-8")
+    width = max(1, encoded.dtype.itemsize)
+    letters = np.ascontiguousarray(encoded, f"S{width}").view("S1")
+    return letters.reshape(*values.shape, width)
+
+
+def read_netcdf(path: str | Path) -> tuple[list[Variable], dict[str, Any]]:
+    """Return the variables of a file, errors and spreads among them, and its
+    attributes."""
+    from scipy.io import netcdf_file
+
+    with netcdf_file(path, "r", mmap=False) as file:
+        found = {key: decoded(value) for key, value in file._attributes.items()}
+        order = found.pop(ORDER, " ".join(file.variables)).split()
+        variables = [read_variable(name, file.variables[name]) for name in order]
+    return variables, found
+
+
+def read_variable(name: str, stored: Any) -> Variable:
+    values, dims = stored.data, stored.dimensions
+    if stored.typecode() == "c":
+        words = np.ascontiguousarray(values).view(f"S{values.shape[-1]}")
+        values = np.char.decode(words, "utf-8").reshape(values.shape[:-1])
+        dims = dims[:-1]
+    elif values.dtype.byteorder == ">":
+        values = values.astype(values.dtype.newbyteorder("="))
+    facts = {key: decoded(value) for key, value in stored._attributes.items()}
+    return variable_of(name, tuple(dims), values, facts)
+
+
+def decoded(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return value.decode()
+    return np.asarray(value).item()
+
+
+def write_json(path: Path, result: Result) -> None:
+    write_text(path, json.dumps(to_dict(result)) + "\n")
+
+
+def read_json(path: Path) -> Result:
+    return of_dict(json.loads(path.read_text(encoding="utf-8")))
+
+
+def columns(result: Result, dims: Sequence[str]) -> dict[str, np.ndarray]:
+    """Return the variables over some dimensions as columns by name, behind those of their
+    coordinates."""
+    dims = tuple(dims)
+    shape = [result.sizes[dim] for dim in dims]
+    places = np.indices(shape).reshape(len(dims), -1)
+    found = {}
+    for dim, place in zip(dims, places):
+        found[dim] = place
+        if dim in result:
+            found[dim] = result[dim].values[place]
+    for variable in flat(result):
+        if variable.dims == dims and not variable.is_coordinate:
+            found[variable.name] = variable.values.ravel()
+    return found
+
+
+def write_csv(path: Path, result: Result, dims: Sequence[str]) -> None:
+    """Write the variables over some dimensions as columns, with all digits."""
+    found = columns(result, dims)
+    rows = zip(*(values.tolist() for values in found.values()))
+    text = [",".join(found), *(",".join(map(cell, row)) for row in rows)]
+    write_text(path, "\n".join(text) + "\n")
+
+
+def cell(value: Any) -> str:
+    return value if isinstance(value, str) else repr(value)
+
+
+def read_csv(path: Path) -> Result:
+    """Return the columns of a table over its rows; units and coordinates are not in such a file."""
+    table = np.genfromtxt(
+        path, delimiter=",", names=True, dtype=None, encoding="utf-8", ndmin=1
     )
+    variables = [Variable(name, ("row",), table[name]) for name in table.dtype.names]
+    return joined("", variables, {})
+
+
+def write_mat(path: Path, result: Result) -> None:
+    """Write variables under their names, and their dimensions and facts in a struct ABOUT."""
+    from scipy.io import savemat
+
+    arrays, dims = {}, {}
+    for variable in flat(result):
+        arrays[variable.name] = variable.values
+        dims[variable.name] = {"dims": " ".join(variable.dims), **facts(variable)}
+    texts = {"about": json.dumps(about(result)), "variables": json.dumps(dims)}
+    with atomic_file(path) as part:
+        savemat(part, {**arrays, "geomech": texts}, long_field_names=True)
+
+
+def read_mat(path: Path) -> Result:
+    from scipy.io import loadmat
+
+    file = loadmat(path, simplify_cells=True)
+    dims = json.loads(str(file["geomech"]["variables"]))
+    variables = []
+    for name, known in dims.items():
+        over = tuple(known["dims"].split())
+        values = np.asarray(file[name])
+        if values.dtype.kind == "U":
+            values = np.char.rstrip(values)
+        variables.append(
+            variable_of(
+                name, over, values.reshape(values.shape or (1,) * len(over)), known
+            )
+        )
+    kind, attributes = split(json.loads(str(file["geomech"]["about"])))
+    return joined(kind, variables, attributes)

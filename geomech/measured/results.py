@@ -12,7 +12,6 @@ from geomech.core.variables import Result, Variable
 from geomech.geometry.curvature import ccf
 from geomech.geometry.curvature import error as curvature_error
 from geomech.geometry.tube import BEYOND
-from geomech.io.results import unit_name
 from geomech.measured.fit import Fitted, fit_log
 from geomech.scenes.write import gait_table, table
 from geomech.studies import fields
@@ -126,7 +125,7 @@ def _about(fit: Fitted) -> dict:
         "frame": "that of the log",
         "frame_meaning": "body frame: the one whose x, y and heading were logged",
         "body_length": float(body_size(fit)),
-        "length_unit": unit_name(fit.unit),
+        "length_unit": fit.unit,
         "components": "x, y, theta of the body velocity xi: along the heading, to the left, counter-clockwise",
         "sign_of_A": "xi = + A alphadot",
         "sign_of_ccf": "CCF = dA + [A, A] with [X, Y] = XY - YX, positive for counter-clockwise loops",

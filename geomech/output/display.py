@@ -10,13 +10,9 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from geomech import plots
-from geomech.core.summary import zero_words
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
-from geomech.studies.results import Displacements
 from geomech.studies.study import Study
-from geomech.studies.sweep import Swept
-from geomech.studies.tables import position_spread
 from geomech.text.system import described
 from rft.refusal import printable
 
@@ -90,56 +86,3 @@ def study(bench: Study) -> str:
         bench.curvature, [scene.gait], error=bench.curvature_error
     )
     return page(f"Study of {scene.name}", (), rows, maps() if drawn else None)
-
-
-def displacements(table: Displacements) -> str:
-    """Return a table with a row for each amplitude and tier."""
-    result = table.result
-    net, heading = result["net_distance"], result["heading"]
-    zero = result.attributes["zero_by_symmetry"]
-    moving = [q for q in ("x", "y", "heading") if q not in zero]
-    columns = {
-        f"error ({net.unit})": net.error,
-        "error of heading (rad)": heading.error,
-    }
-    if net.spread is not None:
-        columns |= {
-            f"medium ({net.unit})": position_spread(result),
-            "medium, heading (rad)": heading.spread,
-        }
-    columns = {
-        name: x
-        for name, x in columns.items()
-        if "heading" not in name or "heading" in moving
-    }
-    styles = dict.fromkeys(columns, ".1e")
-    if "speed" in result:
-        columns[f"speed ({result['speed'].unit})"] = result["speed"].values
-    rows = []
-    for k, amplitude in enumerate(result["amplitude"].values.tolist()):
-        for j, tier in enumerate(result["tier"].values.tolist()):
-            pose = (float(np.round(result[q].values[j, k], 12)) + 0.0 for q in moving)
-            rows.append(
-                (
-                    amplitude,
-                    tier,
-                    *pose,
-                    *(f"{x[j, k]:{styles.get(n, '.4g')}}" for n, x in columns.items()),
-                )
-            )
-    units = {"x": net.unit, "y": net.unit, "heading": "rad"}
-    head = ("amplitude", "tier", *(f"{q} ({units[q]})" for q in moving), *columns)
-    note = "".join(f"; {line}" for line in zero_words(zero))
-    note += (
-        f"; estimated error: {table['estimate_is']}" if "estimate_is" in table else ""
-    )
-    return page(f"Net displacement per cycle of {table.scene.name}{note}", head, rows)
-
-
-def swept(results: Swept) -> str:
-    """Return a picture against one parameter, or a map over two; a line for more."""
-    drawn = len(results["over"]) <= 2
-    return page(
-        repr(results),
-        picture=plots.sweep_figure(results.scene, results) if drawn else None,
-    )

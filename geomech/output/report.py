@@ -15,7 +15,7 @@ from geomech.io.results import write_netcdf
 from geomech.scenes import inputs
 from geomech.scenes.model import Scene
 from geomech.scenes.write import toml
-from geomech.studies import accuracy, fields, tables
+from geomech.studies import accuracy, fields
 from geomech.studies.report import Reported
 from geomech.systems.base import shape_labels
 from geomech.systems.framed import Framed
@@ -66,16 +66,10 @@ def write(result: Result, folder: Path, drawn: Drawn = ALL) -> None:
     if found.mapped:
         write_netcdf(folder / "connection.nc", fields.of_study(found.study))
         _maps(found, folder, drawn)
-    numbers = {title: tables.table(table) for title, table in found.tables.items()}
-    options = {
-        "system": scene.system,
-        "components": drawn.components,
-        "data": drawn.data,
-    }
-    _save(
-        plots.displacement_figure(numbers, found.gaits, **options),
-        folder / "displacement",
-    )
+    numbers = {title: table.to_dict() for title, table in found.tables.items()}
+    options = {"components": drawn.components, "data": drawn.data}
+    figure = plots.displacement_figure(found.tables, **options)
+    _save(figure, folder / "displacement")
     (folder / TABLES).write_text(json.dumps(numbers, indent=1) + "\n")
     (folder / SCENE).write_text(toml(scene), encoding="utf-8")
 

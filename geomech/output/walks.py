@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 from matplotlib.colors import to_rgba
 
-from geomech import plots, text
+from geomech import plots
 from geomech.core.variables import Result
-from geomech.io.files import atomic_file, write_text
-from geomech.io.results import write_csv
+from geomech.io.files import atomic_file
 from geomech.output import animate
-from geomech.scenes.walker import WalkerScene
+from geomech.results.scenes import scene_of
 from geomech.studies import walking
-from geomech.studies.walking import Walked
 
 TRIPODS = ("0.2", "C0")  # colours of the legs in step
 FRAMES, STRIP = 100, 6  # pictures of a film, at most, and of a strip
@@ -25,77 +22,69 @@ LABELS = 0.95  # in, of these, for the labels
 ROOM = 2.4  # robots to either side of one that is followed
 
 
-def write(result: Result, folder: Path) -> None:
-    """Write walk.json, walk.csv, walk.txt and walk.png."""
-    write_csv(folder / "walk.csv", result)
-    write_text(folder / "walk.json", json.dumps(text.numbers(result)) + "\n")
-    write_text(folder / "walk.txt", text.text(result) + "\n")
-    plots.save(draw(*result.subject), folder / "walk.png")
-
-
 @plots.styled
-def draw(scene: WalkerScene, found: Walked):
+def draw(result: Result):
     """Draw forward speed, height and pitch in time, and the robot at its end."""
-    w = found.walk
+    t = result["t"].values
     fig, axes = plots.figure(7.2, 4.6, 2, 2)
     lines = (
-        (r"forward speed (m/s)", w.twist[:, 0]),
-        (r"height $z$ (m)", w.pose[:, 1]),
-        ("pitch (degrees)", np.degrees(w.pose[:, 2])),
+        ("forward speed (m/s)", result["v_x"].values),
+        (r"height $z$ (m)", result["z"].values),
+        ("pitch (degrees)", np.degrees(result["pitch"].values)),
     )
     for ax, (label, values) in zip(axes.ravel(), lines):
-        ax.plot(w.t, values, color="black", lw=0.8)
-        ax.set(
-            xlabel="$t$ (s)", ylabel=label, xlim=(0, w.t[-1] or scene.numerics.duration)
-        )
-    axes[0, 0].axhline(w.speed, color="C3", lw=1.0, ls="--")
-    axes[0, 0].set_title(f"mean {w.speed:.3g} m/s, {w.status}", color="C3")
-    _stage(axes[1, 1], scene, found, np.array([len(w.t) - 1]))(len(w.t) - 1)
+        ax.plot(t, values, color="black", lw=0.8)
+        end = t[-1] or scene_of(result).numerics.duration
+        ax.set(xlabel="$t$ (s)", ylabel=label, xlim=(0, end))
+    speed = float(result["speed"])
+    axes[0, 0].axhline(speed, color="C3", lw=1.0, ls="--")
+    status = str(result["status"].values)
+    axes[0, 0].set_title(f"mean {speed:.3g} m/s, {status}", color="C3")
+    _stage(axes[1, 1], result, np.array([len(t) - 1]))(len(t) - 1)
     return fig
 
 
 def film(result: Result, path: Path, follow: bool = False) -> None:
-    """Write a film (.gif, .mp4) of a walk, or a strip of its last cycle (.png, .pdf, .svg); whole or not at all. follow: the
-    camera goes with the robot."""
-    scene, found = result.subject
-    if not animate.is_film(path):
-        plots.save(strip(scene, found), path)
-        return
-    at = animate.pace(scene.gait.frequency)
+    """Write a film (.gif, .mp4) of a walk; whole or not at all. follow: the camera goes
+    with the robot."""
+    at = animate.pace(scene_of(result).gait.frequency)
     with atomic_file(path) as part:
-        animate.encode(
-            part, _frames(scene, found, at, follow), at.rate, path.suffix.lower()
-        )
+        frames = _frames(result, at, follow)
+        animate.encode(part, frames, at.rate, path.suffix.lower())
 
 
 @plots.styled
-def strip(scene: WalkerScene, found: Walked):
+def strip(result: Result):
     """Draw the last cycle in pictures."""
-    w = found.walk
-    times = np.linspace(max(0.0, w.t[-1] - 1 / scene.gait.frequency), w.t[-1], STRIP)
-    rows = np.searchsorted(w.t, times - 1e-9).clip(0, len(w.t) - 1)
+    t = result["t"].values
+    begin = max(0.0, t[-1] - 1 / float(result["frequency"]))
+    rows = _rows(t, np.linspace(begin, t[-1], STRIP))
     fig, axes = plots.figure(2.3 * 3, 1.9 * 2, 3, 2, layout="compressed")
     for ax, row in zip(axes.ravel(), rows):
-        _stage(ax, scene, found, np.array([row]))(row)
+        _stage(ax, result, np.array([row]))(row)
         ax.label_outer(remove_inner_ticks=False)
         ax.tick_params(labelbottom=True)
     return fig
 
 
-def _frames(
-    scene: WalkerScene, found: Walked, at: animate.Pace, follow: bool
-) -> Iterator[np.ndarray]:
-    """Yield pictures (height, width, 3), bytes, at the rate of the film: by MuJoCo for a walk of three dimensions where there
-    is a GL to draw with."""
-    w, speed = found.walk, 1 / (scene.gait.frequency * at.cycle)
-    times = np.arange(min(FRAMES, 1 + int(w.t[-1] / speed * at.rate))) * speed / at.rate
-    rows = np.searchsorted(w.t, times - 1e-9).clip(0, len(w.t) - 1)
-    pictures = w.spatial and walking.view(scene).pictures(w.spatial["states"][rows])
-    return (
-        _captioned(pictures, w.t[rows], at.caption)
-        if pictures
-        else _drawn(scene, found, rows, at.caption, follow)
-    )
+def _rows(t: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return the rows of a walk at some times."""
+    return np.searchsorted(t, times - 1e-9).clip(0, len(t) - 1)
+
+
+def _frames(result: Result, at: animate.Pace, follow: bool) -> Iterator[np.ndarray]:
+    """Yield pictures (height, width, 3), bytes, at the rate of the film: by MuJoCo for a
+    walk of three dimensions where there is a GL to draw with."""
+    t, frequency = result["t"].values, float(result["frequency"])
+    speed = 1 / (frequency * at.cycle)
+    count = min(FRAMES, 1 + int(t[-1] / speed * at.rate))
+    rows = _rows(t, np.arange(count) * speed / at.rate)
+    if "states" in result:
+        states = result["states"].values[rows]
+        pictures = walking.view(scene_of(result)).pictures(states)
+        if pictures:
+            return _captioned(pictures, t[rows], at.caption)
+    return _drawn(result, rows, at.caption, follow)
 
 
 def _captioned(
@@ -118,13 +107,13 @@ def _captioned(
 
 @plots.styled
 def _drawn(
-    scene: WalkerScene, found: Walked, rows: np.ndarray, caption: str, follow: bool
+    result: Result, rows: np.ndarray, caption: str, follow: bool
 ) -> Iterator[np.ndarray]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     fig, axes = plots.figure(WIDE, TALL[1])
     ax = axes[0, 0]
-    update = _stage(ax, scene, found, rows, follow)
+    update = _stage(ax, result, rows, follow)
     (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
     fig.set_figheight(
         float(np.clip((WIDE - LABELS) * (high - low) / (right - left) + LABELS, *TALL))
@@ -139,28 +128,30 @@ def _drawn(
         yield np.array(canvas.buffer_rgba())[..., :3]
 
 
-def _stage(
-    ax, scene: WalkerScene, found: Walked, rows: np.ndarray, follow: bool = False
-):
-    """Draw the ground on axes that hold the robot at these rows of its walk; return a function that draws it at one. follow:
-    the axes move with the robot."""
-    robot = _Solid(scene, found) if found.walk.spatial else _Flat(scene, found)
+def _stage(ax, result: Result, rows: np.ndarray, follow: bool = False):
+    """Draw the ground on axes that hold the robot at these rows of its walk; return a
+    function that draws it at one. follow: the axes move with the robot."""
+    robot = (_Solid if "states" in result else _Flat)(result)
     room, reach = robot.room * (ROOM if follow else 1.1), robot.reach
-    x = found.walk.pose[rows, 0]
+    t, x = result["t"].values, result["x"].values
     ax.axhspan(-3 * reach, 0.0, color="peru", alpha=0.35, lw=0)
-    seen = x[:1] if follow else x
-    limits = {
-        "xlim": (seen.min() - room, seen.max() + room),
-        "ylim": (-1.2 * reach, 3.2 * reach),
-    }
-    ax.set(**limits, aspect="equal", xlabel="$x$ (m)", ylabel="$z$ (m)")
+    seen = x[rows]
+    if follow:
+        seen = seen[:1]
+    ax.set(
+        xlim=(seen.min() - room, seen.max() + room),
+        ylim=(-1.2 * reach, 3.2 * reach),
+        aspect="equal",
+        xlabel="$x$ (m)",
+        ylabel="$z$ (m)",
+    )
     draw, label = robot.on(ax), ax.set_title("", loc="left", fontsize=8)
 
     def update(row):
         draw(row)
-        label.set_text(f"t = {found.walk.t[row]:.2f} s")
+        label.set_text(f"t = {t[row]:.2f} s")
         if follow:
-            ax.set_xlim(found.walk.pose[row, 0] - room, found.walk.pose[row, 0] + room)
+            ax.set_xlim(x[row] - room, x[row] + room)
 
     return update
 
@@ -168,8 +159,11 @@ def _stage(
 class _Flat:
     """Outlines of a robot in the vertical plane. room: that it takes to both sides; reach: of its legs, m."""
 
-    def __init__(self, scene: WalkerScene, found: Walked):
-        self.robot, self.gait, self.walk = scene.robot, scene.gait, found.walk
+    def __init__(self, result: Result):
+        scene = scene_of(result)
+        self.robot, self.gait = scene.robot, scene.gait
+        self.t = result["t"].values
+        self.pose = np.stack([result[name].values for name in ("x", "z", "pitch")], -1)
         self.leg, self.belly = scene.robot.leg(40).points, scene.robot.belly(8)
         self.reach, self.hips = (
             np.abs(self.leg).max(),
@@ -191,7 +185,7 @@ class _Flat:
         box = ax.plot([], [], color="black", lw=1.2)[0]
 
         def draw(row):
-            pose, t = self.walk.pose[row], self.walk.t[row]
+            pose, t = self.pose[row], self.t[row]
             for line, (k, at) in zip(lines, legs):
                 phase = (
                     self.gait.frequency * t + (k * self.robot.hip_phases[-1] + at) % 1.0
@@ -214,10 +208,12 @@ class _Flat:
 class _Solid:
     """Triangles of a robot in three dimensions, seen from its right. room, reach: as for `_Flat`."""
 
-    def __init__(self, scene: WalkerScene, found: Walked):
-        self.view, self.walk = walking.view(scene), found.walk
-        first = self.view.triangles(self.walk.spatial["states"][0]).reshape(-1, 3)
-        self.room = float(np.abs(first[:, [0, 1]] - [self.walk.pose[0, 0], 0.0]).max())
+    def __init__(self, result: Result):
+        self.view = walking.view(scene_of(result))
+        self.states = result["states"].values
+        first = self.view.triangles(self.states[0]).reshape(-1, 3)
+        start = [float(result["x"].values[0]), 0.0]
+        self.room = float(np.abs(first[:, [0, 1]] - start).max())
         self.reach = max(float(np.ptp(first[:, 2])), self.room / 4) / 2
 
     def on(self, ax):
@@ -229,7 +225,7 @@ class _Solid:
         )  # sheets are seen by their edges
 
         def draw(row):
-            triangles = self.view.triangles(self.walk.spatial["states"][row])
+            triangles = self.view.triangles(self.states[row])
             order = np.argsort(
                 -triangles[..., 1].mean(1), kind="stable"
             )  # what is farther off first

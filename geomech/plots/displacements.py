@@ -9,12 +9,11 @@ import numpy as np
 
 from geomech.core.errors import choose
 from geomech.core.summary import listed
-from geomech.gaits import Gait
-from geomech.geometry.symmetry import zero_components
+from geomech.core.variables import Result
+from geomech.geometry.field import UNKNOWN_UNIT
 from geomech.plots.style import axes_of, figure, shared_legend, styled
 from geomech.scenes.measurements import converted, units_of
-from geomech.studies.tables import ERRORS, QUANTITIES, error_of, of_pose, unit_of
-from geomech.systems.base import System
+from geomech.studies.tables import QUANTITIES, of_pose
 from geomech.tiers import TIERS
 
 if TYPE_CHECKING:
@@ -36,64 +35,103 @@ PANELS = {
 }  # by the words of --component
 SPAN, APART = 1.0, 0.04  # of the axis about one amplitude; of it, between tiers there
 ROUNDING = 1e-9  # body lengths or rad: below it a displacement is nothing
-TO_ROUNDING = "every tier has less than 1e-9"
+TO_ROUNDING = "to rounding, every tier has less than 1e-9"
+
+
+def _data_units(result: Result, quantity: str) -> dict[str, dict[str, float]]:
+    """Return the units that columns of measurements may have beside a result."""
+    return units_of(
+        "(rad)" in result["amplitude"].label,
+        result["x"].unit,
+        result.attributes["body_length"],
+        angle=quantity == "heading",
+    )
 
 
 @styled
 def displacement(
-    table: Mapping, *, ax: Axes | None = None, label: str = "", gait: Gait | None = None, quantity: str = "x",
-    legend: bool = True, errors: bool = True, data: Mapping | None = None, **style: Any,
-) -> Axes:  # fmt: skip
-    """Draw one of QUANTITIES per cycle against amplitude, a line for each tier; ``table`` as `Study.study` returns it.
+    result: Result,
+    *,
+    ax: Axes | None = None,
+    label: str = "",
+    quantity: str = "x",
+    legend: bool = True,
+    errors: bool = True,
+    data: Mapping | None = None,
+    **style: Any,
+) -> Axes:
+    """Draw one of QUANTITIES per cycle against amplitude, a line for each tier of a
+    result of displacements; return the Axes.
 
-    errors: with a band of each tier's estimated error, in its colour; an uncertain medium has an outlined band of its own. The
-    table's own units are those of the axis. data: measurements to draw as points, "amplitude", "value" and "error" (N,), such
-    as a data frame of pandas; the error may be missing. A name may end in a unit, as those of a file: "amplitude_deg",
-    "value_cm"; without it the unit is that of the axis.
+    errors: with a band of each tier's estimated error, in its colour; an uncertain medium
+    has an outlined band of its own. data: measurements to draw as points, "amplitude",
+    "value" and "error" (N,), such as a data frame of pandas; the error may be missing. A
+    name may end in a unit, as those of a file: "amplitude_deg", "value_cm"; without it the
+    unit is that of the axis.
 
     Examples
     --------
     >>> import geomech
-    >>> table = geomech.study("three-link-viscous", grid=15).displacement([0.5, 1.0], ["path", "direct"])
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> table = study.displacement([0.5, 1.0], ["path", "direct"])
     >>> geomech.plots.displacement(table, quantity="net_distance").get_ylabel()
     'net distance per cycle (BL)'
     """
-    ax, amplitudes = axes_of(ax, 4.4, 3.8), np.asarray(table["amplitude"], float)
+    ax = axes_of(ax, 4.4, 3.8)
+    variable = result[choose("quantity", quantity, QUANTITIES)]
+    amplitudes = result["amplitude"].values
+    tiers = result["tier"].values.tolist()
+    shown = [name for name in TIERS if name in tiers]
+    errors = errors and variable.error is not None
+    drawn = amplitudes
     if data is not None:
-        unit, length = unit_of(table, "x"), table.get("body_length", 1.0)
-        units = units_of(gait, unit, length, angle=quantity == "heading")
-        data = converted(data, units)
-    errors = errors and all(key in table for key in ERRORS)
-    shown = [name for name in TIERS if name in table]
-    span = np.ptp(np.append(amplitudes, [] if data is None else data["amplitude"]))
+        data = converted(data, _data_units(result, quantity))
+        drawn = np.append(amplitudes, data["amplitude"])
+    span = np.ptp(drawn)
     places = _side_by_side(amplitudes, len(shown), span or SPAN)
     for name, x in zip(shown, places):
-        tier, values = TIERS[name], of_pose(table[name])[quantity]
+        tier, row = TIERS[name], tiers.index(name)
+        values = variable.values[row]
         title = f"{label}, {tier.label}" if label else tier.label
-        point = (
-            {"marker": "o", "ms": 5} if len(amplitudes) == 1 else {}
-        )  # one point is no line
+        # One point is no line.
+        point = {"marker": "o", "ms": 5} if len(amplitudes) == 1 else {}
         ax.plot(x, values, label=title, **{**tier.style, **point, **style})
         if errors:
-            _error_band(ax, x, values, error_of(table, quantity, name), tier.colour)
+            _error_band(ax, x, values, variable.error[row], tier.colour)
     if errors:
         ax.plot([], [], color="0.5", alpha=0.3, lw=7, label=ERROR)
-    if shown:
-        _band(ax, table, quantity, shown[-1], places[-1])
+    if shown and variable.spread is not None:
+        best = tiers.index(shown[-1])
+        centre = variable.values[best] + _shift(result, quantity)
+        medium_band(ax, places[-1], centre, variable.spread[best])
     if data is not None:
         measured(ax, data)
     if not span:
         ax.set(xlim=amplitudes + [-SPAN / 2, SPAN / 2], xticks=amplitudes)
     ax.axhline(0.0, color="0.7", lw=0.6, zorder=0)
-    _widen(
-        ax, LEAST * (1.0 if quantity == "heading" else table.get("body_length", 1.0))
-    )
+    _widen(ax, LEAST * _scale(result, quantity))
     what = quantity.replace("_", " ")
-    ax.set(xlabel=gait.amplitude_label if gait else "amplitude")
-    ax.set_ylabel(f"{what} per cycle ({unit_of(table, quantity)})")
+    ax.set(xlabel=result["amplitude"].label or "amplitude")
+    ax.set_ylabel(f"{what} per cycle ({variable.unit or UNKNOWN_UNIT})")
     if legend:
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=1)
     return ax
+
+
+def _scale(result: Result, quantity: str) -> float:
+    """Return the size of a quantity by which it is large or small: the body's length, or
+    1 rad."""
+    if quantity == "heading":
+        return 1.0
+    return float(result.attributes.get("body_length", 1.0))
+
+
+def _shift(result: Result, quantity: str) -> Any:
+    """Return how far an uncertain medium shifts the mean of a quantity, (B,) or 0."""
+    if "medium_shift" not in result:
+        return 0.0
+    row = result["quantity"].values.tolist().index(quantity)
+    return result["medium_shift"].values[row]
 
 
 def _side_by_side(amplitudes: np.ndarray, count: int, span: float) -> np.ndarray:
@@ -122,21 +160,6 @@ def _error_band(ax, x, values, error, colour: str) -> None:
             "zorder": 0.5,
         }
         ax.fill_between(x, values - error, values + error, **look)
-
-
-def _band(ax, table: Mapping, quantity: str, best: str, x) -> None:
-    """Draw the uncertainty by the medium about the best tier, shifted as far as the medium shifts the mean."""
-    if "medium_error_of" in table:
-        values, error = (
-            of_pose(table[best])[quantity],
-            np.array(table["medium_error_of"][quantity]),
-        )
-        shift = (
-            np.array(table["medium_shift_of"][quantity])
-            if "medium_shift_of" in table
-            else 0.0
-        )
-        medium_band(ax, x, values + shift, error)
 
 
 def medium_band(ax: Axes, x: Any, values: Any, error: Any) -> None:
@@ -188,34 +211,31 @@ def _widen(ax, least: float) -> None:
 
 @styled
 def displacement_figure(
-    tables: Mapping[str, Mapping], gaits: Sequence[Gait], *, system: System | None = None,
-    components: Sequence[str] = (), data: Mapping | None = None,
-) -> Figure:  # fmt: skip
-    """Draw QUANTITIES side by side, a row for each gait's table, without those that are zero; a line says which and why.
+    tables: Mapping[str, Result],
+    *,
+    components: Sequence[str] = (),
+    data: Mapping | None = None,
+) -> Figure:
+    """Draw QUANTITIES side by side, a row for each result of displacements, without those
+    that are zero; a line says which and why.
 
-    system: whose symmetry makes quantities zero; that of the tables' scene if left out. components: of PANELS, drawn even where
-    they are zero; all of them if left out. data: measurements of the first gait, drawn as `displacement` does on the first of
-    the components, else on x.
+    components: of PANELS, drawn even where they are zero; all of them if left out. data:
+    measurements of the first gait, drawn as `displacement` does on the first of the
+    components, else on x.
 
     Examples
     --------
     >>> import geomech
     >>> from geomech.plots import displacement_figure
     >>> study = geomech.study("three-link-viscous", grid=15)
-    >>> fig = displacement_figure({"circle": study.displacement([0.5, 1.0])}, [study.scene.gait])
+    >>> fig = displacement_figure({"circle": study.displacement([0.5, 1.0])})
     """
     wanted = [PANELS[choose("component", name, PANELS)] for name in components]
-    zero = [
-        {} if wanted else _zeros(table, gait, system)
-        for table, gait in zip(tables.values(), gaits)
-    ]
+    zero = [{} if wanted else _zeros(table) for table in tables.values()]
     if data is not None and not wanted:
         zero[0].pop("x", None)
-    panels = (
-        wanted
-        or [q for q in QUANTITIES if not all(q in one for one in zero)]
-        or [*QUANTITIES]
-    )
+    moving = [q for q in QUANTITIES if not all(q in one for one in zero)]
+    panels = wanted or moving or [*QUANTITIES]
     alone = len(panels) == 1  # with its legend at the right
     fig, axes = figure(
         2.7 * (len(panels) + alone) + 0.3,
@@ -223,77 +243,57 @@ def displacement_figure(
         len(panels),
         len(tables),
     )
-    for row, (name, table), gait, absent in zip(axes, tables.items(), gaits, zero):
+    for row, (name, table), absent in zip(axes, tables.items(), zero):
         for ax, quantity in zip(row, panels):
             if quantity in absent and len(absent) < len(QUANTITIES):
                 _say_zero(ax, quantity, absent[quantity])
                 continue
-            measurements = (
-                data if ax is axes[0, 0] else None
-            )  # x is never left out beside them
+            # x is never left out beside measurements.
+            points = data if ax is axes[0, 0] else None
             displacement(
-                table,
-                ax=ax,
-                gait=gait,
-                quantity=quantity,
-                legend=False,
-                data=measurements,
-                marker="o",
+                table, ax=ax, quantity=quantity, legend=False, data=points, marker="o"
             )
-        row[0].set_title(
-            f"{name} (not in the scene)" if "note" in table else name, loc="left"
-        )
-        if table.get("frequency") and panels[-1] == "net_distance":
-            _speed_axis(row[-1], table["frequency"], unit_of(table, "x"))
-    fig.get_layout_engine().set(
-        rect=(0.0, 0.0, 0.985, 1.0)
-    )  # the last labels are wider than their axes
+        title = f"{name} (not in the scene)" if "note" in table.attributes else name
+        row[0].set_title(title, loc="left")
+        frequency = table.attributes.get("frequency")
+        if frequency and panels[-1] == "net_distance":
+            _speed_axis(row[-1], frequency, table["x"].units)
+    # The last labels are wider than their axes.
+    fig.get_layout_engine().set(rect=(0.0, 0.0, 0.985, 1.0))
     shared_legend(fig, "outside right center" if alone else "outside upper center")
     if not wanted:
-        fig.supxlabel(
-            _left_out({q: why for q, why in zero[0].items() if q not in panels}),
-            fontsize=8,
-            color="0.3",
-        )
+        left_out = {q: why for q, why in zero[0].items() if q not in panels}
+        fig.supxlabel(_left_out(left_out), fontsize=8, color="0.3")
     return fig
 
 
 def _left_out(zero: Mapping[str, str]) -> str:
     """Return lines that say which quantities are zero, and why."""
-    reasons = dict.fromkeys(zero.values())
-    names = {
-        why: [q.replace("_", " ") for q in QUANTITIES if zero.get(q) == why]
-        for why in reasons
-    }
-    return "\n".join(f"{listed(some)}: zero, as {why}" for why, some in names.items())
+    lines = []
+    for why in dict.fromkeys(zero.values()):
+        names = [q.replace("_", " ") for q in QUANTITIES if zero.get(q) == why]
+        lines.append(f"{listed(names)}: zero {why}")
+    return "\n".join(lines)
 
 
-def _zeros(table: Mapping, gait: Gait, system: System | None) -> dict[str, str]:
-    """Return why quantities of a table are zero, by symmetry or to rounding; none that is not."""
-    scene: Any = getattr(table, "scene", None)
-    system, poses = (
-        system or (scene and scene.system),
-        np.concatenate([table[t] for t in TIERS if t in table]),
-    )
-    least = {
-        q: ROUNDING * (1.0 if q == "heading" else table.get("body_length", 1.0))
-        for q in QUANTITIES
-    }
-    nothing = {
-        q: TO_ROUNDING
-        for q, x in of_pose(poses).items()
-        if np.all(np.abs(x) <= least[q])
-    }
-    return nothing | (
-        zero_components(system.traits, gait, table["amplitude"]) if system else {}
-    )
+def _zeros(table: Result) -> dict[str, str]:
+    """Return why quantities of a table are zero, by symmetry or to rounding; none that is
+    not."""
+    found = {}
+    for quantity in QUANTITIES:
+        variable = table[quantity]
+        if variable.zero:
+            found[quantity] = variable.zero
+        elif np.all(np.abs(variable.values) <= ROUNDING * _scale(table, quantity)):
+            found[quantity] = TO_ROUNDING
+    return found
 
 
 def _say_zero(ax, quantity: str, why: str) -> None:
     """Write in place of a panel why it is zero."""
     import textwrap
 
-    lines = "\n".join(textwrap.wrap(f"{quantity}: zero, as {why}", 26))
+    lines = "\n".join(textwrap.wrap(f"{quantity}: zero {why}", 26))
     ax.text(
         0.5,
         0.5,

@@ -35,6 +35,7 @@ from geomech.plots.styles import (
     CONNECTION_STYLES,
     MINUS_SIGN,
 )
+from geomech.results.fields import Slice
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -155,8 +156,8 @@ def ccf_figure(
 
 @styled
 def planes_figure(
-    planes: Sequence[Plane], gait: Gait | None = None, *, labels: Labels | None = None, style: str = "map",
-    beside: Plane | None = None, names: Sequence[str] = (), components: Sequence[str] = (),
+    planes: Sequence[Plane | Slice], gait: Gait | None = None, *, labels: Labels | None = None, style: str = "map",
+    beside: Plane | Slice | None = None, names: Sequence[str] = (), components: Sequence[str] = (),
     clim: float | str | None = None,
 ) -> Figure:  # fmt: skip
     """Draw the CCF of pairs of joints on planes of shape space, a row for each pair, as `ccf_figure` does.
@@ -190,7 +191,7 @@ def planes_figure(
 
 @styled
 def plane_connection_figure(
-    planes: Sequence[Plane], *, labels: Labels | None = None, style: str = "quiver", components: Sequence[str] = (),
+    planes: Sequence[Plane | Slice], *, labels: Labels | None = None, style: str = "quiver", components: Sequence[str] = (),
     clim: float | str | None = None,
 ) -> Figure:  # fmt: skip
     """Draw the rows of A of the two joints that move, on planes of shape space, a row for each pair, as `connection_figure`
@@ -235,12 +236,12 @@ def plane_connection_figure(
     return fig
 
 
-def _angles(planes: Sequence[Plane]) -> Labels:
+def _angles(planes: Sequence[Plane | Slice]) -> Labels:
     """Return the labels of shape variables that are joint angles."""
     return [(f"alpha_{k + 1}", "rad") for k in range(len(planes[0].at))]
 
 
-def plane_title(plane: Plane, labels: Labels) -> str:
+def plane_title(plane: Plane | Slice, labels: Labels) -> str:
     """Return the angles of the fixed joints of a plane as a title."""
     angles = ", ".join(
         f"{quantity(labels[k][0])} = {plane.at[k]:.3g}".replace("-", MINUS_SIGN)

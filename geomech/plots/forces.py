@@ -50,7 +50,8 @@ def forces_figure(
     Examples
     --------
     >>> import geomech
-    >>> fig = geomech.plots.forces_figure(geomech.study("seven-link-wave", phases=32).forces().result, ["power"])
+    >>> forces = geomech.study("seven-link-wave", phases=32).forces()
+    >>> fig = geomech.plots.forces_figure(forces, ["power"])
     """
     names = [choose("panel", name, (*MAPS, *STACKS)) for name in panels or DEFAULT]
     columns = min(COLUMNS, len(names))

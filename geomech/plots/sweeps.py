@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from geomech.plots.displacements import medium_band, net
+from geomech.core.variables import Result
+from geomech.plots.displacements import medium_band
 from geomech.plots.style import MARKED, figure, quantity, styled
 from geomech.scenes.model import Scene
 from geomech.studies.cycles import AMPLITUDE
+from geomech.studies.tables import position_spread
 from rft.refusal import Refusal
 
 if TYPE_CHECKING:
@@ -32,65 +34,68 @@ OF_ROBOTS = {  # likewise, of scenes of robots
 }  # fmt: skip
 
 
-def sweep_figure(scene: Any, results: Mapping) -> Figure:
-    """Draw a sweep (`geomech.studies.sweep`) over one parameter or two: net distance or speed, or the speed of a robot.
-    Refusal for more.
+def sweep_figure(scene: Any, result: Result) -> Figure:
+    """Draw a sweep over one parameter or two: net distance or speed, or the speed of a
+    robot. Refusal for more.
 
     Examples
     --------
     >>> import geomech
     >>> swept = geomech.sweep("three-link-viscous", {"medium.ratio": [1.5, 2.0]})
-    >>> fig = geomech.plots.sweep_figure(swept.scene, swept)
+    >>> fig = geomech.plots.sweep_figure(swept.question.scene, swept)
     """
-    if len(over := results["over"]) > 2:
+    over = parameters(result)
+    if len(over) > 2:
         raise Refusal(
             f"cannot draw {len(over)} parameters",
             instead="sweep one or two, or leave ``plot`` out",
         )
-    return (_speed_figure if "status" in results else _net_figure)(scene, results)
+    if "status" in result:
+        return _speed_figure(scene, result)
+    return _net_figure(scene, result)
 
 
-def _net_figure(scene: Scene, results: Mapping):
+def parameters(result: Result) -> dict[str, np.ndarray]:
+    """Return the values of the parameters of a sweep by their names in a scene."""
+    return {v.label: v.values for v in result.variables if v.is_coordinate}
+
+
+def _net_figure(scene: Scene, result: Result):
     """Draw the values of `drawn` against one parameter, or a map over two."""
-    over = results["over"]
-    values, error, medium, label = drawn(scene, results)
+    over = parameters(result)
+    values, error, medium, label = drawn(result)
     fig, axes = figure(4.0, 3.0)
     ax, named = axes[0, 0], dict(zip(over, labels(scene, list(over))))
     order = np.ix_(*(np.argsort(x, kind="stable") for x in over.values()))
     rising = [np.sort(x) for x in over.values()]
     if len(over) == 1:
-        _line(
-            ax,
-            *rising,
-            values[order],
-            error[order],
-            None if medium is None else medium[order],
-            label,
-        )
+        if medium is not None:
+            medium = medium[order]
+        _line(ax, *rising, values[order], error[order], medium, label)
     else:
         _map(ax, *rising, values[order], label)
     ax.set(**{f"{axis}label": named[name] for axis, name in zip("xy", over)})
     return fig
 
 
-def drawn(scene: Scene, results: Mapping):
-    """Return (values, their errors, the medium's or None, a label): the net distance per cycle or, where the frequency differs
-    from point to point, the speed; negative where it is backwards."""
-    distance, frequency = net(results["displacement"]), results.get("frequency")
-    unit, timed = (
-        results["units"]["estimate"],
-        frequency is not None and np.ptp(frequency) > 0,
-    )
-    factor = frequency if timed else 1.0
-    medium = results["medium_error"] * factor if "medium_error" in results else None
+def drawn(result: Result):
+    """Return (values, their errors, the medium's or None, a label): the net distance per
+    cycle or, where the frequency differs from point to point, the speed; negative where
+    it is backwards."""
+    net = result["net_distance"]
+    distance = np.copysign(net.values, result["x"].values)
+    factor: Any = 1.0
+    label = f"net distance per cycle ({net.unit})"
+    if "frequency" in result and np.ptp(result["frequency"].values) > 0:
+        factor = result["frequency"].values
+        label = f"speed ({net.unit}/s)"
+    medium = None
+    if net.spread is not None:
+        medium = position_spread(result) * factor
     distance = distance * factor
-    label = f"speed ({unit}/s)" if timed else f"net distance per cycle ({unit})"
-    return (
-        distance,
-        results["estimate"] * factor,
-        medium,
-        label + ", backwards < 0" * bool((distance < 0).any()),
-    )
+    if (distance < 0).any():
+        label += ", backwards < 0"
+    return distance, net.error * factor, medium, label
 
 
 @styled
@@ -151,30 +156,30 @@ def labels(
 
 
 @styled
-def _speed_figure(scene: Any, results: Mapping):
-    """Draw speed against one parameter, or against the first for every value of a second; open markers: not walking."""
-    over = results["over"]
+def _speed_figure(scene: Any, result: Result):
+    """Draw speed against one parameter, or against the first for every value of a second;
+    open markers: not walking."""
+    over = parameters(result)
     name, *second = labels(scene, list(over), OF_ROBOTS)
     values, *others = over.values()
+    names = [""]
+    if others:
+        names = [f"{second[0]}: {v:g}" for v in others[0]]
     fig, axes = figure(4.6, 3.2)
-    curves(
-        axes[0, 0],
-        values,
-        results,
-        [f"{second[0]}: {v:g}" for v in others[0]] if others else [""],
-    )
+    curves(axes[0, 0], values, result, names)
     axes[0, 0].set(xlabel=name, ylabel="mean speed (m/s)")
     return fig
 
 
-def curves(ax: Axes, values: Any, results: Mapping, names: Any) -> None:
-    """Draw speed (N, ...) over ``values``, a curve for each name, with its error; open markers: not walking."""
+def curves(ax: Axes, values: Any, result: Result, names: Any) -> None:
+    """Draw speed (N, ...) over ``values``, a curve for each name, with its error; open
+    markers: not walking."""
     from cmcrameri import cm
 
-    speed, error, status = (
-        np.asarray(results[x]).reshape(len(values), -1)
-        for x in ("speed", "estimate", "status")
-    )
+    rows = len(values)
+    speed = result["speed"].values.reshape(rows, -1)
+    error = result["speed"].error.reshape(rows, -1)
+    status = result["status"].values.reshape(rows, -1)
     for k, label in enumerate(names):
         colour = cm.batlow(0.85 * k / max(1, len(names) - 1))
         ax.errorbar(

@@ -104,33 +104,38 @@ def _point_on_map(beta: float, gamma: float) -> tuple[float, float]:
 
 
 @styled
-def intrusion_figure(scene: Any, found: Any) -> Any:
-    """Draw an intruder scene and its run: the body, and force and moment along the motion. An outline is drawn at a few of its
-    poses, a mesh where the force is largest, with the stress on its faces.
+def intrusion_figure(scene: Any, result: Any) -> Any:
+    """Draw an intruder scene and the result of its motion: the body, and force and moment
+    along the motion. An outline is drawn at a few of its poses, a mesh where the force is
+    largest, with the stress on its faces.
 
     Examples
     --------
     >>> import geomech
-    >>> from geomech.scenes import load
-    >>> scene = load("c-leg")
-    >>> fig = geomech.plots.intrusion_figure(scene, scene.run())
+    >>> forces = geomech.study("c-leg").intrude()
+    >>> fig = geomech.plots.intrusion_figure(geomech.load("c-leg"), forces)
     """
     fig, axes = figure(10.2, 3.2, 3)
-    columns = scene.table(found)
-    if hasattr(found, "trajectory"):
-        step = int(np.linalg.norm(found.force, axis=-1).argmax())
+    columns = {name: v.values for name, v in result.items() if v.dims == ("t",)}
+    if hasattr(scene, "mesh"):
+        from geomech.scenes.solid import Passed
+
+        force = np.stack([columns[f"force_{axis}"] for axis in "xyz"], -1)
+        step = int(np.linalg.norm(force, axis=-1).argmax())
         axes[0, 0].remove()
         ax = fig.add_subplot(1, 3, 1, projection="3d")
-        draw_stress(ax, *scene.faces(found, step))
-        ax.set_title(
-            f"where the force is largest, t = {found.t[step]:.3g} s", fontsize=8
-        )
+        trajectory = scene.motion.trajectory(scene.mesh)
+        run = Passed(trajectory, force, columns["moment"], columns["power"])
+        draw_stress(ax, *scene.faces(run, step))
+        title = f"where the force is largest, t = {columns['t'][step]:.3g} s"
+        ax.set_title(title, fontsize=8)
         names = {
             "force": [f"force_{a}" for a in "xyz"],
             "moment": [f"moment_{a}" for a in "xyz"],
         }
     else:
-        _poses(axes[0, 0], scene.outline.points, found.pose)
+        _, pose, _ = scene.motion.trajectory(scene.outline)
+        _poses(axes[0, 0], scene.outline.points, pose)
         names = {"force": ["force_x", "force_z"], "moment": ["moment"]}
     place, label, scale = _abscissa(columns)
     for ax, (what, unit), letter in zip(

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.gaits import Gait
 from geomech.io import rows
 from geomech.io.rows import plain, split_unit
 from geomech.scenes.columns import LARGEST_FILE
@@ -31,7 +30,8 @@ def read(path: str | Path, scene: Scene, angle: bool = False) -> dict[str, np.nd
     is another, as amplitude_deg, value_mm or error_BL. angle: values are headings. Refusal, with the line, for any other."""
     source = rows.read(path, LARGEST_FILE, f"give a CSV file with the header {HEADER}")
     length = body_size(scene.system)
-    units = units_of(scene.gait, length_unit(scene.system), length, angle)
+    in_angles = "amplitude" in angles_of(type(scene.gait))
+    units = units_of(in_angles, length_unit(scene.system), length, angle)
     found = _scales(source.words, units, source.place, scene.name)
     table = source.numbers(source.words)
     if not len(table):
@@ -63,13 +63,14 @@ def converted(data: Mapping, units: dict[str, dict[str, float]]) -> dict:
 
 
 def units_of(
-    gait: Gait | None, unit: str, length: float, angle: bool
+    in_angles: bool, unit: str, length: float, angle: bool
 ) -> dict[str, dict[str, float]]:
     """Return, by column, the units that it may have, in those of results in ``unit``, "BL"
-    or "m". gait: of the amplitudes, None where it is not known. length: of the body in
-    that unit. angle: values are headings."""
-    in_angles = gait is None or "amplitude" in angles_of(type(gait))
-    amplitude = ANGLES if in_angles else {"": 1.0}
+    or "m". in_angles: amplitudes are angles. length: of the body in that unit. angle:
+    values are headings."""
+    amplitude = {"": 1.0}
+    if in_angles:
+        amplitude = ANGLES
     lengths = {"": 1.0, "BL": length} | (METRES if unit == "m" else {})
     value = ANGLES if angle else lengths
     return {"amplitude": amplitude, "value": value, "error": value}

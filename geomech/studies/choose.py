@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from geomech.core.variables import Result, Variable
 from geomech.gaits import Gait
 from geomech.geometry.gait import checked_gait
 from geomech.scenes.model import Scene
@@ -25,7 +26,6 @@ from geomech.studies.estimate import (
     in_groups,
     pose_distance,
 )
-from geomech.studies.results import Displacements
 from geomech.studies.study import Study
 from geomech.systems.base import body_size
 from geomech.systems.capabilities import pieces_per_length, settling, solver_of
@@ -44,9 +44,10 @@ def cheapest(
     tol: float,
     gait: Gait | None = None,
     ask: Callable = lambda jobs: None,
-) -> Displacements:
-    """Return a table as of `Study.study` for the cheapest tier with errors of position of at most ``tol`` body lengths,
-    with {"tier", "tolerance", "settings"} besides.
+) -> Result:
+    """Return displacements as `Study.displacements` does for the cheapest tier with errors
+    of position of at most ``tol`` body lengths, with the settings chosen_phases,
+    chosen_pieces or chosen_grid.
 
     For the direct tier, the fewest phases are found. Its seconds include the search. Look-up tiers are tried in the
     order of their cost, as long as that is below the direct tier's. ask: called with the jobs to come
@@ -72,23 +73,21 @@ def cheapest(
     ask(cost.of_medium(scene, gait, len(amplitudes)))
     medium = uncertainty.of_medium(scene, gait, amplitudes)
 
-    def answer(tier: str, poses, error, settings: dict) -> Displacements:
-        attributes = {
-            "tier": tier,
-            "tolerance": float(tol),
-            "settings": settings,
-            "seconds": {tier: time.perf_counter() - start},
-        }
-        return Displacements(
-            tables.result(
-                scene,
-                gait,
-                amplitudes,
-                {tier: poses},
-                {tier: error},
-                medium,
-                **attributes,
-            )
+    def answer(tier: str, poses, error, settings: dict) -> Result:
+        took = {tier: time.perf_counter() - start}
+        more = tables.timings(took, ())
+        for name, value in settings.items():
+            label = "chosen for the tolerance"
+            more.append(Variable(f"chosen_{name}", (), value, "1", label))
+        return tables.result(
+            scene,
+            gait,
+            amplitudes,
+            {tier: poses},
+            {tier: error},
+            medium,
+            more=more,
+            tolerance=float(tol),
         )
 
     sampled = np.unique(

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geomech.core.summary import poses
-from geomech.core.variables import Result, Variable
-from geomech.io.results import unit_name
+from geomech.core.variables import Variable
 from geomech.run.cost import Cost
 from geomech.scenes import write as written
 from geomech.scenes.model import Scene, checked_scene
@@ -114,62 +112,13 @@ class Cycles:
         out = tables.pose_variables(
             dims, rows[..., :3], errors, unit, spread or None, frequency
         )
-        out.append(Variable("length", dims, length, unit, "of the body"))
+        out.append(Variable("body_length", dims, length, unit, "length of the body"))
         out += (
             [] if frequency is None else [Variable("frequency", dims, frequency, "Hz")]
         )
-        note = getattr(scene.gait, "estimate_is", "")
-        title = {
-            "title": f"Net displacement per cycle of the scene {scene.name}",
-            "scene": written.toml(scene),
-        }
-        return out, {**title, **({"estimate_is": note} if note else {})}
-
-    def as_stored(self, result: Result) -> Result:
-        """Return a sweep as data for a file."""
-        variables = tables.poses_as_stored(result)
-        unit = unit_name(result["length"].unit)
-        variables.append(
-            Variable(
-                "length",
-                result["length"].dims,
-                result["length"].values,
-                unit,
-                result["length"].label,
-            )
-        )
-        variables += [result["frequency"]] if "frequency" in result else []
-        return Result(result.kind, tuple(variables), result.attributes, result.subject)
-
-    def table(self, result: Result) -> dict:
-        """Return {"displacement": (N_1, ..., 3), "estimate": (N_1, ...), "estimate_heading": (N_1, ...)}, with
-        estimates of `estimate.direct` in the unit of the displacement and rad, "length": (N_1, ...), of the body, and
-        "units": {key: unit}.
-
-        Where the swimmer has a frequency also "frequency", Hz, and "speed", the net distance times it; where the medium
-        is uncertain "medium_error", of the position, and "medium_error_heading", rad (`geomech.studies.uncertainty`)."""
-        unit, variables = (
-            result["net_distance"].unit,
-            {v.name: v for v in self.as_stored(result).variables},
-        )
-        units = {
-            "displacement": [unit, unit, "rad"],
-            "estimate": unit,
-            "estimate_heading": "rad",
-            "length": unit,
-        }
-        units |= {
-            "frequency": "Hz",
-            "speed": f"{unit}/s",
-            "medium_error": unit,
-            "medium_error_heading": "rad",
-        }
-        units = {key: unit for key, unit in units.items() if key in variables}
-        return {**{key: variables[key].values for key in units}, "units": units}
-
-    def summary(self, table: Mapping) -> str:
-        unit, worst = table["units"]["estimate"], np.max(table["estimate"], initial=0.0)
-        return f"net {poses(table['displacement'])} ({unit}, rad); estimated error up to {worst:.1e} {unit}"
+        error_is = getattr(scene.gait, "estimate_is", "")
+        facts = {"error_is": error_is} if error_is else {}
+        return out, facts
 
 
 def _lengths(grid: Grid) -> np.ndarray:

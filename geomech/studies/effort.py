@@ -306,11 +306,10 @@ def _rates(system: System, alpha, alphadot) -> np.ndarray:
     )
 
 
-def with_effort(result: Result) -> Result:
+def with_effort(result: Result, scene: Scene, gait: Gait | None = None) -> Result:
     """Return net displacements with path length and work of a cycle, their errors, and by tier the efficiency (net
     distance in body lengths over path length) and the cost of transport (work over that of towing the body as far); nan
     where undefined."""
-    scene, gait = result.subject
     efforts, unit = effort(scene, gait, result["amplitude"].values), units(scene.system)
     degree, distance = (
         scene.system.traits.power_degree,

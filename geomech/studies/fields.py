@@ -17,14 +17,13 @@ from geomech.geometry.field import Field
 from geomech.geometry.harmonics import Harmonics
 from geomech.geometry.metric import Finsler, Metric
 from geomech.geometry.minimum_perturbation import minimum_perturbation
+from geomech.geometry.stretch import Stretch
 from geomech.geometry.tube import TaylorSeries, Tube
 from geomech.geometry.two_form import TwoForm
-from geomech.io.results import unit_name
 from geomech.io.tables import FORMATS, LAYOUTS
 from geomech.io.tables.base import UNKNOWN_FRAME, body_text
 from geomech.io.tables.netcdf import SHAPE
 from geomech.scenes.model import Scene
-from geomech.scenes.write import toml
 from geomech.studies import effort
 from geomech.studies.study import Study
 from geomech.studies.tables import COMPONENTS
@@ -57,8 +56,48 @@ def of_study(study: Study) -> Result:
         "connection",
         (*coordinates(study.fitted.axes, labels), *variables(study)),
         attributes(study),
-        study,
     )
+
+
+def of_fitted_study(study: Study) -> Result:
+    """Return A, its fit residual and the rms of xi, with the conventions of a study."""
+    labels = shape_labels(study.scene.system)
+    found = of_connection(study.fitted, stored_table(study.scene.system, "A_error"))
+    axes = coordinates(study.fitted.axes, labels)
+    return Result("connection", (*axes, *found), attributes(study))
+
+
+def of_fit(study: Study) -> list[Variable]:
+    """Return the share of the rms of xi that the linear fit leaves and the share of A that
+    more directions change, by component, and the number of singular shapes."""
+    fitted = study.fitted
+    with np.errstate(invalid="ignore"):
+        shares = []
+        for residual, speed in zip(fitted.residual, fitted.speed):
+            known = np.isfinite(residual)
+            share = np.nan
+            if known.any():
+                size = max(np.nanmean(speed**2), 1e-300)
+                share = np.sqrt(np.nanmean(residual**2) / size)
+            shares.append(share)
+    singular = int(np.isnan(fitted.A).any((0, 1)).sum())
+    label = "rms of what the fit leaves, over the rms of xi"
+    found = [Variable("fit_share", ("component",), shares, "1", label)]
+    if not study.scene.system.traits.linear and fitted.direction_error is not None:
+        label = "rms of what more directions change A by, over the rms of A"
+        changes = _row_shares(fitted.direction_error, fitted.A)
+        found.append(Variable("direction_share", ("component",), changes, "1", label))
+    return [
+        *found,
+        Variable("singular_shapes", (), singular, "1", "points of the grid"),
+    ]
+
+
+def _row_shares(error: np.ndarray, A: np.ndarray) -> np.ndarray:
+    """Return the rms of an error of A over the rms of A (3,), row by row."""
+    axes = tuple(range(1, A.ndim))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.sqrt(np.nanmean(error**2, axes) / np.nanmean(A**2, axes))
 
 
 def of_connection_alone(study: Study) -> Result:
@@ -75,7 +114,6 @@ def of_connection_alone(study: Study) -> Result:
         "connection",
         (*coordinates(study.fitted.axes, labels), *variables),
         attributes(study),
-        study,
     )
 
 
@@ -97,7 +135,7 @@ def of_struct(study: Study) -> Result:
                 name=f"exterior{ending}",
             )
         )
-    return Result(alone.kind, (*alone.variables, *variables), alone.attributes, study)
+    return Result(alone.kind, (*alone.variables, *variables), alone.attributes)
 
 
 CONTENTS = {WHOLE: of_study, A_ALONE: of_connection_alone, STRUCT: of_struct}
@@ -154,9 +192,8 @@ def attributes(study: Study) -> dict:
         else f"{scene.numerics}, {solver_of(scene.system)}"
     )
     return {
-        "title": f"Local connection and curvature constraint function of the scene {scene.name}",
         **about(scene),
-        "scene": toml(scene),
+        "scene": scene.name,
         "numerics": numerics,
         "interpolation": int(study.fitted.degree),
         **(
@@ -194,9 +231,7 @@ def of_even_part(study: Study) -> list[Variable]:
     """Return the part of the velocity that is even in alphadot, if there is one."""
     if (even := study.even_part) is None:
         return []
-    units = (
-        f"{unit_name(length_unit(study.scene.system))} rad-1 (x, y), rad rad-1 (theta)"
-    )
+    units = of_components(length_unit(study.scene.system), "rad")
     name = "rms over directions of xi(alphadot) + xi(-alphadot), |alphadot| = 1, which A takes for 0"
     return [
         Variable(
@@ -210,7 +245,7 @@ def of_connection(
 ) -> list[Variable]:
     """Return A, its fit residual, and the rms of xi. error: half widths (3, d, N_1, ...) of intervals of A."""
     angles = angles_of(fitted.axes)
-    units = f"{unit_name(fitted.unit)} rad-1 (x, y), rad rad-1 (theta)"
+    units = of_components(fitted.unit, "rad")
     residual = "rms of xi - A alphadot over directions of alphadot, |alphadot| = 1"
     speed = "rms of xi over directions of alphadot, |alphadot| = 1"
     return [
@@ -226,8 +261,13 @@ def of_connection(
         Variable(
             "fit_residual", ("component", *angles), fitted.residual, units, residual
         ),
-        Variable("speed", ("component", *angles), fitted.speed, units, speed),
+        Variable("xi_rms", ("component", *angles), fitted.speed, units, speed),
     ]
+
+
+def of_components(unit: str, per: str) -> tuple[str, str, str]:
+    """Return the units of x, y and theta of a field. unit: of lengths."""
+    return (f"{unit}/{per}", f"{unit}/{per}", f"rad/{per}")
 
 
 def of_reach(tube: Tube) -> Variable:
@@ -242,7 +282,7 @@ def of_reach(tube: Tube) -> Variable:
 def of_known(known: TaylorSeries, unit: str) -> list[Variable]:
     """Return the arrays of a connection near one gait (`geomech.geometry.tube`)."""
     units, order = (
-        f"{unit_name(unit)} rad-1 (x, y), rad rad-1 (theta)",
+        f"{unit}/rad (x, y), rad/rad (theta)",
         "Fourier coefficients, 1, cos t, sin t, cos 2t ..., of",
     )
     lead, row = ("component", "joint"), "harmonic_of_A"
@@ -262,7 +302,7 @@ def of_known(known: TaylorSeries, unit: str) -> list[Variable]:
             "at equally spaced phases: the data reach deviations d with d . inverse . d up to 1",
         ),
         Variable(
-            "gait_beyond", ("component",), known.beyond, f"{unit_name(unit)} (x, y), rad (theta)",
+            "gait_beyond", ("component",), known.beyond, f"{unit} (x, y), rad (theta)",
             "what the variation of the cycles changes in the net pose beyond the first order, part of its error",
         ),
         Variable(
@@ -279,7 +319,7 @@ def of_ccf(
     name: str = "ccf",
 ) -> Variable:
     """Return a CCF as a variable. what: text on the kind of its error."""
-    units = f"{unit_name(field.unit)} rad-2 (x, y), rad rad-2 (theta)"
+    units = of_components(field.unit, "rad2")
     label, dims = (
         "curvature constraint function of joints 1 and 2",
         ("component", *angles_of(field.axes)),
@@ -297,7 +337,8 @@ def of_ccf(
 
 def of_pairs(form: TwoForm, error: TwoForm) -> list[Variable]:
     """Return the CCF of all pairs of joints, its error, and the pairs."""
-    units = f"{unit_name(form.field.unit)} rad-2 (x, y), rad rad-2 (theta)"
+    u = form.field.unit
+    units = f"{u}/rad2 (x, y), rad/rad2 (theta)"
     pairs, over = (
         np.array(form.pairs) + 1.0,
         ("pair", "component", *angles_of(form.field.axes)),
@@ -326,7 +367,7 @@ def of_pairs(form: TwoForm, error: TwoForm) -> list[Variable]:
 
 def of_frame(pose: Field) -> Variable:
     """Return the pose of a minimum-perturbation frame in the original frame."""
-    units = f"{unit_name(pose.unit)} (x, y), rad (theta)"
+    units = (pose.unit, pose.unit, "rad")
     name = "pose of this frame in the mean frame of the body, h with g_this = g_mean h"
     return Variable(
         "frame_pose", ("component", *angles_of(pose.axes)), pose.values, units, name
@@ -336,7 +377,7 @@ def of_frame(pose: Field) -> Variable:
 def of_harmonics(table: Harmonics, unit: str) -> list[Variable]:
     """Return the coefficients of the odd harmonics of xi, and their residual."""
     angles = angles_of(table.axes)
-    units = f"{unit_name(unit)} rad-1 (x, y), rad rad-1 (theta)"
+    units = of_components(unit, "rad")
     name = "coefficients of cos(k beta), sin(k beta), k = 1, 3, 5 ..., of xi for alphadot = (cos beta, sin beta)"
     residual = "rms over directions of alphadot of what the harmonics leave of xi, |alphadot| = 1"
     return [
@@ -396,6 +437,29 @@ def of_metric(metric: Metric | Finsler, power: bool = True) -> list[Variable]:
     ]
 
 
+def of_stretch(stretch: Stretch, unit: str) -> list[Variable]:
+    """Return shape space redrawn to equal effort. unit: of path lengths."""
+    dims = ("stretched_alpha_1", "stretched_alpha_2")
+    shapes = stretch.field
+    rms = "rms of the relative errors of lengths on paper"
+    folded = "share of cells that are turned over"
+    return [
+        *(Variable(name, (name,), x, "rad") for name, x in zip(dims, shapes.axes)),
+        Variable(
+            "stretched_shape",
+            ("axis", *dims),
+            shapes.values,
+            unit,
+            "place of a shape where equal lengths take equal effort",
+        ),
+        Variable("stretch_distortion", dims, stretch.distortion, "1", rms),
+        Variable("stretch_rms", (), stretch.rms, "1", f"{rms}, of all"),
+        Variable("stretch_largest", (), stretch.largest, "1", "largest of them"),
+        Variable("stretch_folded", (), stretch.folded, "1", folded),
+        Variable("stretch_interpolation", (), shapes.degree, "1", "degree of splines"),
+    ]
+
+
 def angles_of(axes) -> tuple[str, ...]:
     """Return the names of the axes of shape space."""
     return tuple(f"alpha_{k + 1}" for k in range(len(axes)))
@@ -427,16 +491,14 @@ def of_fitted(fitted: Connection, shapes: Sequence[str] = ()) -> Result:
         if fitted.length is None
         else {
             "body_length": float(fitted.length),
-            "length_unit": unit_name(fitted.unit),
+            "length_unit": fitted.unit,
         }
     )
     variables = (
         *coordinates(fitted.axes, _labels(fitted.axes, shapes)),
         *of_connection(fitted),
     )
-    return Result(
-        "connection", variables, {"sign_of_A": "xi = + A alphadot", **sized}, fitted
-    )
+    return Result("connection", variables, {"sign_of_A": "xi = + A alphadot", **sized})
 
 
 def of_field(values: Field, name: str, shapes: Sequence[str] = ()) -> Result:
@@ -452,7 +514,6 @@ def of_field(values: Field, name: str, shapes: Sequence[str] = ()) -> Result:
         "field",
         (*coordinates(values.axes, _labels(values.axes, shapes)), field),
         {},
-        values,
     )
 
 
@@ -489,7 +550,7 @@ def about(scene: Scene) -> dict:
         "frame": scene.frame,
         "frame_meaning": f"body frame: {meaning}",
         "body_length": float(body_size(system)),
-        "length_unit": unit_name(length_unit(system)),
+        "length_unit": length_unit(system),
         **recorded(system),
         **({"body": text} if (text := body_text(_body(system))) else {}),
         "components": "x, y, theta of the body velocity xi: forward (tail to head), to the left, counter-clockwise",

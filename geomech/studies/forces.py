@@ -7,7 +7,7 @@ cycle, it turns evenly with the phase, as on a circle. Without mass and slope al
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,14 +19,14 @@ from geomech.scenes.model import Scene
 from geomech.studies.cost import direct, price
 from geomech.studies.elements import coarser, elements_of, gait_with
 from geomech.studies.newtons import Newtons, Sizes, newtons
-from geomech.studies.question import Allow, Progress, Question
 from geomech.studies.undulation import activation_of, bends, loaded
-from geomech.systems.base import body_size
+from geomech.systems.base import body_size, length_unit
 from geomech.systems.capabilities import Stepped, capability, pieces_per_length, refined
 from rft.premise import Premise
 from rft.refusal import located
 
 FLANK, PARTS = ("normal", "tangential"), ("normal", "tangential", "ends")
+PLACES = (0.25, 0.5, 0.75)  # of the body, at which the lag of activation is shown
 SEEN = 1.2  # times a change: that to a law computed more exactly is nearly all of the error (`geomech.studies.estimate`)
 NEAR = 1 / 32  # cycle
 LEAST_STEPS = 8  # of time stepping
@@ -36,32 +36,123 @@ WORK = "drag x BL/rad"
 UNKNOWN = Sizes()
 
 
-@dataclass(frozen=True)
-class Forces(Question):
-    """Force of the medium along the body, power, bending moment and activation at the phases of the scene's gait. sizes: for
-    newtons and watts, of a body whose scene does not have them."""
+def check(scene: Scene, sizes: Sizes) -> None:
+    """Refuse sizes that contradict the scene, and a system without a body in a medium."""
+    with located(scene.name):
+        newtons(scene, loaded(scene, WHAT), sizes)
 
-    scene: Scene
-    sizes: Sizes = UNKNOWN
 
-    @property
-    def title(self) -> str:
-        return f"forces on {self.scene.name}"
+def cost(scene: Scene) -> Cost:
+    """Return the cost of `answer`."""
+    jobs = []
+    for one in (scene, *_variants(scene)):
+        phases = one.numerics.phases
+        jobs += direct(_divided(one), one.gait, 1, phases, checked=False)
+    return price(jobs)
 
-    def check(self) -> None:
-        with located(self.scene.name):
-            newtons(self.scene, loaded(self.scene, WHAT), self.sizes)
 
-    def cost(self) -> Cost:
-        scenes = [self.scene, *_variants(self.scene)]
-        once = lambda scene: direct(
-            _divided(scene), scene.gait, 1, scene.numerics.phases, checked=False
-        )
-        return price([job for scene in scenes for job in once(scene)])
+def answer(scene: Scene, sizes: Sizes) -> Result:
+    """Return `forces` with errors, means over the cycle and largest values; the unit of
+    force in words and whether the body travels as attributes."""
+    with located(scene.name):
+        found, run = forces(scene, sizes)
+        found = with_errors(found, run)
+    facts = {"travels": int(run.travels), "drag_is": unit_words(run.newtons)}
+    more = [
+        *travel(run),
+        *means(found),
+        *powers(found),
+        *largest_moment(found),
+        *activation(found),
+    ]
+    return Result("forces", (*more, *found.variables), facts)
 
-    def answer(self, progress: Progress, allow: Allow) -> Result:
-        with located(self.scene.name):
-            return with_errors(forces(self.scene, self.sizes))
+
+def unit_words(unit: Newtons) -> str:
+    """Return what the unit of force is."""
+    if unit.drag is None:
+        sizes = ", ".join(unit.lacks)
+        return f"drag of the straight body along itself; give {sizes} for newtons"
+    words = f"drag of the straight body along itself {unit.drag:.4g} N, {unit.how}"
+    if unit.frequency:
+        return words
+    return f"{words}; give frequency for watts"
+
+
+def travel(run: Run) -> list[Variable]:
+    """Return the net distance of a cycle and its direction."""
+    unit = length_unit(run.scene.system)
+    distance = np.hypot(*run.net[:2])
+    label = "of travel at mid-cycle, from the frame's heading at phase 0"
+    return [
+        Variable("net_distance", (), distance, unit, "net distance per cycle"),
+        Variable("direction", (), run.direction, "rad", label),
+    ]
+
+
+def mean(variable: Variable) -> tuple[float, float]:
+    """Return the mean of a variable and that of its error, 0 without one."""
+    if variable.error is None:
+        return float(variable.values.mean()), 0.0
+    return float(variable.values.mean()), float(variable.error.mean())
+
+
+def means(found: Result) -> list[Variable]:
+    """Return the means over the cycle of thrust and drag, by part of the force and their
+    sum."""
+    variables = [Variable("part", ("part",), [*PARTS, "sum"])]
+    for side in SIDES:
+        of_parts = [found[f"{side}_{part}"] for part in PARTS]
+        values, errors = zip(*map(mean, of_parts))
+        values = (*values, sum(values))
+        errors = (*errors, sum(errors))
+        label = f"mean {side} over the cycle"
+        unit = of_parts[0].unit
+        variables.append(Variable(side, ("part",), values, unit, label, errors))
+    return variables
+
+
+def powers(found: Result) -> list[Variable]:
+    """Return the mean and the largest power into the medium, and the mean at the
+    joints."""
+    power, joints = found["medium_power"], found["joint_power"]
+    value, error = mean(power)
+    largest = power.values.max()
+    at_joints = joints.values.mean()
+    unit = power.unit
+    return [
+        Variable("mean_power", (), value, unit, "into the medium", error),
+        Variable("largest_power", (), largest, unit, "into the medium"),
+        Variable("mean_joint_power", (), at_joints, unit, "of the joints"),
+    ]
+
+
+def largest_moment(found: Result) -> list[Variable]:
+    """Return the largest bending moment, its place and its phase."""
+    moment = found["bending_moment"]
+    sizes = np.abs(moment.values)
+    phase, point = np.unravel_index(sizes.argmax(), sizes.shape)
+    s = found["point"].values[point]
+    at = found["phase"].values[phase]
+    return [
+        Variable("largest_moment", (), sizes[phase, point], moment.unit, "bending"),
+        Variable("largest_moment_s", (), s, "BL", "its place, from tail 0 to head 1"),
+        Variable("largest_moment_phase", (), at, "rad", "its phase"),
+    ]
+
+
+def activation(found: Result) -> list[Variable]:
+    """Return by how much activation is ahead of bending at some places of the body."""
+    joint, lag = found["joint"].values, found["fundamental_lag"].values
+    places = joint
+    if joint.size > len(PLACES):
+        places = np.array(PLACES)
+    ahead = np.interp(places, joint, lag)
+    label = "phase by which activation is ahead of curvature"
+    return [
+        Variable("place", ("place",), places, "BL", "from tail 0 to head 1"),
+        Variable("lag_of_activation", ("place",), ahead, "rad", label),
+    ]
 
 
 class Run(NamedTuple):
@@ -81,16 +172,18 @@ class Run(NamedTuple):
         return bool(np.hypot(*self.net[:2]) > STILL * body_size(self.scene.system))
 
 
-def with_errors(result: Result) -> Result:
-    """Return forces with errors: the changes with half the elements of a backbone, with half the pieces into which effects cut
-    a body, with a law computed more exactly, and in time stepping with half the phases; the largest of each within NEAR of a
-    phase, as changes pass through zero. Errors of order 2 are a third of these changes; near stuck links they scatter."""
-    scene, unit = result.subject.scene, result.subject.newtons
-    others = [forces(other, unit=unit) for other in _variants(scene)]
-    return replace(
-        result,
-        variables=tuple(_with_error(v, result, others) for v in result.variables),
-    )
+def with_errors(result: Result, run: Run) -> Result:
+    """Return forces with errors: the changes with half the elements of a backbone, with
+    half the pieces into which effects cut a body, with a law computed more exactly, and in
+    time stepping with half the phases; the largest of each within NEAR of a phase, as
+    changes pass through zero. Errors of order 2 are a third of these changes; near stuck
+    links they scatter."""
+    others = []
+    for other in _variants(run.scene):
+        found, _ = forces(other, unit=run.newtons)
+        others.append(found)
+    variables = [_with_error(v, result, others) for v in result.variables]
+    return replace(result, variables=tuple(variables))
 
 
 def _with_error(v: Variable, result: Result, others: list[Result]) -> Variable:
@@ -145,8 +238,11 @@ def _divided(scene: Scene) -> Scene:
     return scene.changed(system=loaded(scene, WHAT).subdivided())
 
 
-def forces(scene: Scene, sizes: Sizes = UNKNOWN, unit: Newtons | None = None) -> Result:
-    """Return forces, power, bending moments and activation over a cycle of the scene's gait, at its N phases.
+def forces(
+    scene: Scene, sizes: Sizes = UNKNOWN, unit: Newtons | None = None
+) -> tuple[Result, Run]:
+    """Return forces, power, bending moments and activation over a cycle of the scene's
+    gait, at its N phases, and the cycle.
 
     Over the n elements, at least 40, or the n - 1 points between them, or the joints: positions s, 0 at the tail to 1 at the
     head. `forward` and its two parts are components in the direction of travel, `normal` and `tangential` components to the
@@ -185,14 +281,8 @@ def forces(scene: Scene, sizes: Sizes = UNKNOWN, unit: Newtons | None = None) ->
         *_by_place(parts, length),
         *_of_joints(run.activation),
     ]
-    facts = {
-        "name": scene.name,
-        "axial_drag": run.newtons.how,
-        "direction": run.direction,
-    }
-    return Result(
-        "forces", tuple(_converted(v, run.newtons) for v in variables), facts, run
-    )
+    converted = tuple(_converted(v, run.newtons) for v in variables)
+    return Result("forces", converted), run
 
 
 def _poses(

@@ -201,7 +201,7 @@ def predictions(question: GrainSwim) -> Predictions:
 def _predicted(scene: Scene, tiers: tuple[str, ...] | None = None):
     """Yield (tier, ((x, y, heading), errors)) of a scene's own gait. The error of a position has that of an uncertain
     medium."""
-    of_study = Study(scene).study([scene.gait.amplitude], tiers).result
+    of_study = Study(scene).displacements([scene.gait.amplitude], tiers)
     length = of_study.attributes["body_length"]
     for k, tier in enumerate(of_study["tier"].values.tolist()):
         values, errors = [], []

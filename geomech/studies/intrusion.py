@@ -9,10 +9,10 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from geomech.core.setting import ROUNDING, Setting
+from geomech.core.summary import effect_lines
 from geomech.core.variables import Result, Variable
 from geomech.run.cost import BASE, Cost
 from geomech.scenes.intruding import Intruding
-from geomech.studies.question import Allow, Progress, Question
 
 UNITS = {
     "t": "s",
@@ -23,32 +23,58 @@ UNITS = {
     "force": "N",
     "moment": "N m",
 }  # by the first part of names
+LABELS = {
+    "force": "on the body, with the weight of effects that have one",
+    "moment": "on the body, about the frame's origin",
+}
 MARGIN = 1.125  # factor on the extrapolation by order: covers the error of 95 of 100 motions of outlines, measured
 
 
-@dataclass(frozen=True)
-class Intrusion(Question):
-    """Force and moment along a scene's motion, with errors from finer parts."""
+def cost(scene: Intruding) -> Elements:
+    """Return the cost of `answer`."""
+    return price(scene, sum((1, *scene.finer)) * scene.count)
 
-    scene: Intruding
 
-    def cost(self) -> Elements:
-        return price(self.scene, sum((1, *self.scene.finer)) * self.scene.count)
-
-    def answer(self, progress: Progress, allow: Allow) -> Result:
-        scene = self.scene
-        run = scene.run()
-        error, columns = estimate(scene, run), scene.table(run)
-        table = [
-            Variable(name, ("t",), values, UNITS[name.partition("_")[0]])
-            for name, values in columns.items()
-        ]
-        return Result(
-            "intrusion",
-            tuple(table),
-            {"name": scene.name, "error": error},
-            (scene, run),
-        )
+def answer(scene: Intruding) -> Result:
+    """Return force and moment along a scene's motion, with errors from finer parts."""
+    run = scene.run()
+    error = estimate(scene, run)
+    bounds = {"force": error.force, "moment": error.moment}
+    variables = []
+    for name, values in scene.table(run).items():
+        kind = name.partition("_")[0]
+        bound = None
+        if kind in bounds and np.isfinite(bounds[kind]):
+            bound = np.full_like(values, bounds[kind])
+        label = LABELS.get(kind, "")
+        unit = UNITS[kind]
+        variables.append(Variable(name, ("t",), values, unit, label, bound))
+    mean_power = (run.power[1:] + run.power[:-1]) / 2
+    work = float(np.sum(mean_power * np.diff(run.t)))
+    largest = "largest error along the motion, nan where it is not known"
+    finest = f"number of {scene.parts} from which the errors come"
+    grains = "of the grains on the body"
+    variables += [
+        Variable("power", ("t",), run.power, "W", grains),
+        Variable("work", (), work, "J", grains),
+        Variable("largest_power", (), run.power.max(), "W", grains),
+        Variable("largest_force_error", (), error.force, "N", largest),
+        Variable("largest_moment_error", (), error.moment, "N m", largest),
+        Variable("finest_parts", (), error.count, "1", finest),
+    ]
+    lines = effect_lines(scene.effects)
+    if lines:
+        variables.append(Variable("effect", ("line",), lines))
+    kinds = type(scene.intruder).__name__, type(scene.motion).__name__
+    size = f"{scene.count:,} {scene.parts}"
+    facts = {
+        "about": f"{kinds[0]} of {size}, {kinds[1]} in {len(run.t)} steps",
+        "parts": scene.parts,
+    }
+    matched = getattr(scene, "matched", "")
+    if matched:
+        facts["matched"] = matched
+    return Result("intrude", tuple(variables), facts)
 
 
 class Estimate(NamedTuple):

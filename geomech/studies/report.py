@@ -70,12 +70,12 @@ class Report(Question):
             study.compute_field(progress)
         tables = {}
         for gait, values in zip(gaits, amplitudes):
-            result = study.study(values, gait=gait).result
+            result = study.displacements(values, gait=gait)
+            title = type(gait).__name__.lower()
+            facts = {**result.attributes, "scene": f"{scene.name}, {title}"}
             if gait is not scene.gait:
-                result = replace(
-                    result, attributes={**result.attributes, "note": ADDED}
-                )
-            tables[type(gait).__name__.lower()] = result
+                facts["note"] = ADDED
+            tables[title] = replace(result, attributes=facts)
         pairs = combinations(range(3), 2) if mapped and scene.system.joints == 3 else ()
         planes = [study.plane(pair) for pair in pairs]
         first = next(iter(tables.values()))

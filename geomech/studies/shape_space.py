@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from geomech.core.variables import Result, Variable
+from geomech.geometry.field import Field
 from geomech.geometry.plane import Plane
 from geomech.geometry.stretch import Stretch
 from geomech.geometry.stretch import stretch as stretch_to_metric
@@ -31,13 +32,13 @@ from geomech.studies.cost import connection as fitted
 from geomech.studies.cost import study as displacement
 from geomech.studies.effort import shared, why_none
 from geomech.studies.fields import WHOLE, has_matrix
-from geomech.studies.question import Allow, Progress, Question
 from geomech.studies.study import Study, refuse_outside
-from geomech.systems.base import shape_labels
+from geomech.studies.tables import COMPONENTS, POSE
 from geomech.systems.capabilities import stored_table
 from geomech.tiers.area import AREA
 from geomech.tiers.fitted import finest_grid, refuse
 from geomech.tiers.harmonic import is_looked_up
+from rft.checks import is_whole
 from rft.refusal import Refusal, located
 
 NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
@@ -45,70 +46,64 @@ MOST_PAIRS = 10  # of joints in a figure: as many as five joints have
 
 
 class Space(NamedTuple):
-    """Subject of texts and pictures of shape space. other, other_planes: the study and its planes in another body frame.
-    stretch: of shape space, to equal effort. enclosed: the displacement of the scene's gait by the area tier. balances,
+    """What is computed over shape space.
+
+    study: the tables of the scene. other, other_planes: the tables and the planes in
+    another body frame. planes: where two joints move. stretch: of shape space, to equal
+    effort. enclosed: the displacement of the scene's gait by the area tier. balances,
     seconds: of the computation."""
 
     study: Study
-    other: Study | None = None
-    planes: tuple[Plane, ...] = ()
-    other_planes: tuple[Plane, ...] = ()
-    stretch: Stretch | None = None
-    enclosed: Result | None = None
-    balances: int = 0
-    seconds: float = 0.0
+    other: Study | None
+    planes: tuple[Plane, ...]
+    other_planes: tuple[Plane, ...]
+    stretch: Stretch | None
+    enclosed: Result | None
+    balances: int
+    seconds: float
 
 
 @dataclass(frozen=True)
-class ShapeSpace(Question):
-    """The connection or the CCF of a scene.
+class Plan:
+    """The computation of a connection or a CCF.
 
-    kind: "connection" or "ccf", of the result.
+    study: the tables of the scene. file: contents of a file, one of `fields.CONTENTS`; ""
+    for none. field: computed on the scene's grid. mapped: drawn on that grid. planes:
+    drawn where two joints move, of ``pair``, such as "1,3" or (1, 3), or of all pairs;
+    held: angles of the other joints, rad, the gait's middle if None. metric: with the cost
+    of changes of shape. stretch: with shape space stretched to that cost. gait: the
+    scene's gait is drawn, and must lie within. other_frame: name of another body frame."""
 
-    file: contents of a file, one of `fields.CONTENTS`; "" for none. field: computed on the scene's grid.
-    map: drawn on that grid. planes: drawn where two joints move, of ``pair``, such as "1,3", or of all pairs; slice_angles:
-    angles of the other joints, rad, the gait's middle if None. metric: with the cost of changes of shape. stretch: with shape
-    space stretched to that cost. gait: the scene's gait is drawn, and must lie within. other_frame: name of another body frame,
-    drawn below."""
-
-    scene: Scene
-    kind: str = "ccf"
+    study: Study
     file: str = ""
     field: bool = True
-    map: bool = False
+    mapped: bool = False
     planes: bool = False
-    pair: str | None = None
-    slice_angles: tuple[float, ...] | None = None
+    pair: Any = None
+    held: tuple[float, ...] | None = None
     metric: bool = False
     stretch: bool = False
     gait: bool = False
     other_frame: str | None = None
 
-    worth_saying: ClassVar[float] = 1.0
-
     @property
-    def title(self) -> str:
-        return f"{'field' if self.field else 'planes'} of {self.scene.name}"
+    def scene(self) -> Scene:
+        return self.study.scene
 
     @property
     def less(self) -> str:
+        """Advice where it costs too much."""
         joints = self.scene.system.joints
-        return (
-            f"lower ``grid``, to {finest_grid(joints)} or less"
-            if joints > 2 and self.field
-            else "ask for less"
-        )
-
-    @cached_property
-    def study(self) -> Study:
-        return Study(self.scene)
+        if joints > 2 and self.field:
+            return f"lower ``grid``, to {finest_grid(joints)} or less"
+        return "ask for less"
 
     @cached_property
     def other(self) -> Study | None:
-        """Study in the other frame."""
-        return (
-            None if self.other_frame is None else self.study.in_frame(self.other_frame)
-        )
+        """Tables in the other frame."""
+        if self.other_frame is None:
+            return None
+        return self.study.in_frame(self.other_frame)
 
     @property
     def _costed(self) -> bool:
@@ -127,37 +122,35 @@ class ShapeSpace(Question):
         return self.file == WHOLE and is_looked_up(self.scene.system)
 
     @cached_property
-    def _at(self) -> list[tuple[tuple[int, int], np.ndarray]]:
-        """Pairs of joints of the planes, from 0, and the shape through which each plane goes."""
+    def at(self) -> list[tuple[tuple[int, int], np.ndarray]]:
+        """Pairs of joints of the planes, from 0, and the shape through which each plane
+        goes."""
         if not self.planes:
             return []
         joints = self.scene.system.joints
-        pairs = (
-            [_pair(self.pair, joints)]
-            if self.pair is not None
-            else list(combinations(range(joints), 2))
-        )
+        pairs = list(combinations(range(joints), 2))
+        if self.pair is not None:
+            pairs = [_pair(self.pair, joints)]
         if len(pairs) > MOST_PAIRS:
             raise Refusal(
                 f"{joints} joints have {len(pairs)} pairs",
-                instead=f"say which, such as ``pair`` 1,{joints}, or give a chain [body] modes",
+                instead=f"say which, such as ``pair`` 1,{joints}, or give a chain [body] "
+                "modes",
             )
-        return [
-            (one, through(self.scene, one, self.slice_angles, self.pair is not None))
-            for one in pairs
-        ]
+        alone = self.pair is not None
+        return [(one, through(self.scene, one, self.held, alone)) for one in pairs]
 
     def check(self) -> None:
         system, name = self.scene.system, self.scene.name
         with located(name):
             refuse(system)
-            if (self.map or self.planes) and system.joints == 1:
+            if (self.mapped or self.planes) and system.joints == 1:
                 raise Refusal(NO_MAP)
             if self.gait:
                 refuse_outside(self.scene)
             if self.metric and (reason := why_none(system)):
                 raise Refusal(reason, where=name)
-            if self.other_frame is not None and len(self._at) > 1:
+            if self.other_frame is not None and len(self.at) > 1:
                 raise Refusal(
                     "``compare_frame`` draws one pair of joints",
                     instead="say which with ``pair``",
@@ -176,7 +169,7 @@ class ShapeSpace(Question):
 
     def _jobs(self, study: Study) -> list[Job]:
         scene = study.scene
-        jobs = [*of_planes(scene, *zip(*self._at)), *frame(scene)] if self._at else []
+        jobs = [*of_planes(scene, *zip(*self.at)), *frame(scene)] if self.at else []
         if not self.field:
             return jobs
         if self._enclosed and study is self.study:
@@ -194,58 +187,40 @@ class ShapeSpace(Question):
             )
         return jobs
 
-    def answer(self, progress: Progress, allow: Allow) -> Result:
+    def compute(self, progress: Callable) -> Space:
+        """Return what is computed."""
         study, parts, start = self.study, self._parts(), time.perf_counter()
         values = [
             part(lambda done, k=k: progress((k + done) / len(parts)))
             for k, part in enumerate(parts)
         ]
-        count = len(self._at)
-        other_planes = tuple(values[count : 2 * count]) if self.other else ()
+        count = len(self.at)
+        other_planes = ()
+        if self.other:
+            other_planes = tuple(values[count : 2 * count])
         stretched = stretch_to_metric(study.metric) if self.stretch else None
-        amplitude = self.scene.gait.amplitude
-        enclosed = (
-            study.study([amplitude], [AREA.name]).result if self._enclosed else None
-        )
-        spent = self.cost().balances, time.perf_counter() - start
-        space = Space(
+        enclosed = None
+        if self._enclosed:
+            amplitude = self.scene.gait.amplitude
+            enclosed = study.displacements([amplitude], [AREA.name])
+        return Space(
             study,
             self.other,
             tuple(values[:count]),
             other_planes,
             stretched,
             enclosed,
-            *spent,
-        )
-        if self.file:
-            file = fields.CONTENTS[self.file](study)
-            return Result(file.kind, file.variables, file.attributes, space)
-        if not self.field:
-            return Result(
-                self.kind,
-                tuple(_of_plane(*x) for x in zip(self._at, space.planes)),
-                {},
-                space,
-            )
-        axes = fields.coordinates(study.fitted.axes, shape_labels(self.scene.system))
-        if self.kind == "connection":
-            return Result(
-                self.kind, (*axes, *fields.of_connection(study.fitted)), {}, space
-            )
-        return Result(
-            self.kind,
-            (*axes, fields.of_ccf(study.curvature, study.curvature_error)),
-            {},
-            space,
+            self.cost().balances,
+            time.perf_counter() - start,
         )
 
-    def _parts(self) -> list[Callable[[Progress], Any]]:
+    def _parts(self) -> list[Callable]:
         """Return the parts of the computation, in order: planes first."""
         studies = [self.study, *filter(None, [self.other])]
         parts: list[Callable] = [
             lambda progress, s=s, pair=pair, at=at: s.plane(pair, at, progress=progress)
             for s in studies
-            for pair, at in self._at
+            for pair, at in self.at
         ]
         if not self.field:
             return parts
@@ -253,35 +228,127 @@ class ShapeSpace(Question):
         parts += [self.study.compute_metric] if self._costed else []
         parts += [self.study.compute_harmonics] if self._harmonics else []
         return parts + (
-            [self.other.compute_field] if self.other and not self._at else []
+            [self.other.compute_field] if self.other and not self.at else []
         )
 
 
-def _of_plane(at: tuple[tuple[int, int], np.ndarray], plane: Plane) -> Variable:
-    """Return the CCF of a plane, over its two joints."""
-    (i, j), _ = at
-    ccf = fields.of_ccf(plane.ccf)
-    dims = ("component", f"alpha_{i + 1}", f"alpha_{j + 1}")
-    return Variable(
-        f"ccf_{i + 1}_{j + 1}",
-        dims,
-        ccf.values,
-        ccf.unit,
-        f"CCF of joints {i + 1} and {j + 1}",
-    )
+def plane_ccfs(name: str, planes: Sequence[Plane]) -> list[Variable]:
+    """Return the CCFs of planes as variables NAME_1_3, with their errors, and the shapes
+    through which the planes go, as slice_1_3."""
+    found = []
+    for plane in planes:
+        dims, ending = dims_of(plane), ending_of(plane)
+        units = fields.of_components(plane.ccf.unit, "rad2")
+        label = f"CCF of joints {plane.pair[0] + 1} and {plane.pair[1] + 1}"
+        error = plane.error.values
+        values = plane.ccf.values
+        found.append(Variable(name + ending, dims, values, units, label, error))
+    return found
 
 
-def _pair(text: str, joints: int) -> tuple[int, int]:
-    """Return the joints, counted from 0, of a text such as 1,3."""
-    names = text.split(",")
-    if len(names) != 2 or not all(x.strip().isdecimal() for x in names):
-        raise Refusal(
-            f"{text!r} is not two joints such as 1,{joints}", where="``pair``"
-        )
+def plane_connections(planes: Sequence[Plane]) -> list[Variable]:
+    """Return the connections of the two joints of planes as variables A_1_3."""
+    found = []
+    for plane in planes:
+        component, *angles = dims_of(plane)
+        dims = (component, "moving_joint", *angles)
+        units = fields.of_components(plane.connection.unit, "rad")
+        label = "columns of A of the joints that move"
+        values = plane.connection.A
+        found.append(Variable(f"A{ending_of(plane)}", dims, values, units, label))
+    return found
+
+
+def slices(planes: Sequence[Plane]) -> list[Variable]:
+    """Return the axes of planes, and the shapes through which they go."""
+    axes, shapes = {}, []
+    for plane in planes:
+        _, *angles = dims_of(plane)
+        axes.update(zip(angles, plane.connection.axes))
+        name = f"slice{ending_of(plane)}"
+        label = "shape through which the plane goes"
+        shapes.append(Variable(name, ("joint",), plane.at, "rad", label))
+    coordinates = [Variable(name, (name,), axis, "rad") for name, axis in axes.items()]
+    joints = np.arange(1, len(planes[0].at) + 1)
+    component = Variable("component", ("component",), [*COMPONENTS])
+    joint = Variable("joint", ("joint",), joints)
+    return [component, joint, *coordinates, *shapes]
+
+
+def ending_of(plane: Plane) -> str:
+    i, j = plane.pair
+    return f"_{i + 1}_{j + 1}"
+
+
+def dims_of(plane: Plane) -> tuple[str, str, str]:
+    i, j = plane.pair
+    return ("component", f"alpha_{i + 1}", f"alpha_{j + 1}")
+
+
+ROUNDING = 1e-12  # largest size of a component that is nothing but roundoff
+RAYS = 72  # directions from the gait's middle in which the zero line is looked for
+STEPS = 200  # places along each
+FIRST = 0.02  # place on a ray, of its length
+
+
+def zero_line(ccf: Field, middle: np.ndarray) -> list[Variable]:
+    """Return how far from the gait's middle the x component changes sign: the nearest and
+    the farthest place, and the share of directions in which there is one; nan without
+    any. Nothing for a field with gaps, or one that is zero."""
+    x = Field(ccf.axes, ccf.values[0], ccf.degree)
+    if x.masked or np.abs(x.values).max() < ROUNDING:
+        return []
+    reach = min(min(a[-1] - m, m - a[0]) for a, m in zip(x.axes, middle))
+    angles = 2 * np.pi * np.arange(RAYS) / RAYS
+    steps = np.linspace(FIRST, 1, STEPS) * reach
+    rays = np.stack([np.cos(angles), np.sin(angles)], -1)[:, None] * steps[:, None]
+    changed = np.zeros((RAYS, STEPS - 1), bool)
+    if x.values.min() < 0 < x.values.max():
+        changed = np.diff(np.sign(x(middle + rays)), axis=1) != 0
+    some = changed.any(1)
+    nearest = farthest = np.nan
+    if some.any():
+        first = steps[changed.argmax(1)[some]]
+        nearest, farthest = first.min(), first.max()
+    place = "from the gait's middle to the zero line of x"
+    share = "share of directions from the gait's middle with a zero line of x"
+    return [
+        Variable("zero_line_nearest", (), nearest, "rad", f"least distance {place}"),
+        Variable(
+            "zero_line_farthest", (), farthest, "rad", f"largest distance {place}"
+        ),
+        Variable("zero_line_share", (), some.mean(), "1", share),
+        Variable("zero_line_reach", (), reach, "rad", "distance that was looked at"),
+    ]
+
+
+def enclosed_area(area: Result) -> list[Variable]:
+    """Return the displacement of the scene's gait by the area that it encloses."""
+    amplitude = area["amplitude"]
+    value, label = amplitude.values[0], amplitude.label
+    variables = [Variable("gait_amplitude", (), value, label=label)]
+    for name in POSE:
+        one = area[name].at("tier", 0).at("amplitude", 0)
+        label = f"{name} by the area tier, over the scene's gait"
+        variables.append(replace(one, label=label))
+    return variables
+
+
+def _pair(pair: Any, joints: int) -> tuple[int, int]:
+    """Return the joints, counted from 0, of a text such as 1,3 or of two numbers."""
+    names = pair
+    if isinstance(pair, str):
+        names = pair.split(",")
+        if len(names) != 2 or not all(x.strip().isdecimal() for x in names):
+            raise Refusal(
+                f"{pair!r} is not two joints such as 1,{joints}", where="``pair``"
+            )
+    elif np.ndim(pair) != 1 or len(pair) != 2 or not all(map(is_whole, pair)):
+        raise Refusal("pair must be two joints such as (1, 2)", value=pair)
     i, j = (int(x) - 1 for x in names)
     if i == j or not all(0 <= k < joints for k in (i, j)):
         raise Refusal(
-            f"{text!r} must be two different joints from 1 to {joints}",
+            f"{pair!r} must be two different joints from 1 to {joints}",
             where="``pair``",
         )
     return i, j
@@ -323,68 +390,3 @@ def through(
         )
     at[fixed] = angles
     return at
-
-
-def ccf(
-    scene: Scene,
-    pair: str | None,
-    slice_angles: tuple[float, ...] | None,
-    other_frame: str | None,
-    metric: bool,
-    stretch: bool,
-) -> ShapeSpace:
-    """Return the question of a CCF. metric, stretch: its picture needs the metric."""
-    sliced = scene.system.joints > 2 or pair is not None or slice_angles is not None
-    if sliced and (metric or stretch):
-        raise Refusal(
-            "``metric`` and ``stretch`` are those of two joints",
-            instead="drop them for slices",
-        )
-    if sliced:
-        return ShapeSpace(
-            scene,
-            field=False,
-            planes=True,
-            pair=pair,
-            slice_angles=slice_angles,
-            other_frame=other_frame,
-        )
-    return ShapeSpace(
-        scene,
-        map=True,
-        gait=True,
-        metric=metric or stretch,
-        stretch=stretch,
-        other_frame=other_frame,
-    )
-
-
-def connection(
-    scene: Scene,
-    file: Callable | None,
-    layout: str | None,
-    drawn: bool,
-    pair: str | None,
-    slice_angles: tuple[float, ...] | None,
-    other_frame: str | None,
-) -> ShapeSpace:
-    """Return the question of a connection. file: the format of its file (`geomech.io.tables.FORMATS`), or None. layout: that
-    of the file, None for its first. drawn: its picture is, too."""
-    fields.check_joints(scene, file)
-    sliced = drawn and (
-        scene.system.joints > 2 or pair is not None or slice_angles is not None
-    )
-    if sliced and other_frame is not None:
-        raise Refusal(
-            "``compare_frame`` draws maps of two joints",
-            instead="drop it, or see ``Study.ccf(pair=...)``",
-        )
-    picture = {
-        "map": drawn and not sliced,
-        "planes": sliced,
-        "pair": pair,
-        "slice_angles": slice_angles,
-        "other_frame": other_frame,
-    }
-    contents = "" if file is None else fields.contents(file, layout)
-    return ShapeSpace(scene, "connection", contents, **picture)

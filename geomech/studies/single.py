@@ -4,15 +4,42 @@ from __future__ import annotations
 
 import numpy as np
 
+from geomech.core.variables import Variable
 from geomech.geometry.velocity import evaluate
-from geomech.systems.base import System, note_angles
+from geomech.systems.base import System, length_unit, note_angles
 from geomech.systems.capabilities import Diagnosed, capability
 from rft.checks import real_array
 from rft.refusal import Refusal, formatted
 
 
+def velocity(system: System, alpha, alphadot) -> list[Variable]:
+    """Return the body velocity xi (3,) for one shape (joints,) and its rate, with the
+    residual and the status of the balance of forces; nan where a residual is unknown."""
+    solution = single(system, alpha, alphadot)
+    unit = length_unit(system)
+    residual = solution["residual"]
+    if residual is None:
+        residual = np.nan
+    variables = [
+        Variable(
+            "xi",
+            ("component",),
+            solution["xi"],
+            (unit, unit, "rad"),
+            "body velocity per unit of time",
+        ),
+        Variable("status", (), solution["status"], label="of the balance of forces"),
+        Variable("residual", (), residual, "1", "of the balance of forces"),
+    ]
+    if "iterations" in solution:
+        steps = solution["iterations"]
+        variables.append(Variable("iterations", (), steps, "1", "of the solver"))
+    return variables
+
+
 def single(system: System, alpha, alphadot) -> dict:
-    """Return {"xi", "status", "residual"} for one shape (joints,) and its rate; ValueError if it is singular."""
+    """Return {"xi", "status", "residual"} for one shape (joints,) and its rate;
+    ValueError if it is singular."""
     alpha, alphadot = (
         _checked_numbers(system, name, x)
         for name, x in (("alpha", alpha), ("alphadot", alphadot))

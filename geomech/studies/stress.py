@@ -3,73 +3,90 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from geomech.core.variables import Result, Variable
 from geomech.scenes.stress import medium as load_medium
-from geomech.studies.question import Allow, Progress, Question
-from rft.plates import survey
+from rft.plates import Survey, survey
 from rft.refusal import Refusal
 
 LARGEST_ANGLE = 1e6  # degrees
+UNIT = "N/cm^3"
+MAPS = ("map_x", "map_z", "map_normal", "map_power")  # of a survey, by its fields
+OVER = ("tilt", "direction")
 
 
-@dataclass(frozen=True)
-class Stress(Question):
-    """Stress per unit depth at one tilt and direction, degrees, or, for a picture, over all of them."""
-
-    medium: str
-    beta: float | None = None
-    gamma: float | None = None
-    drawn: bool = False
-
-    def inputs(self) -> list[Path]:
-        return [Path(self.medium)]
-
-    def check(self) -> None:
-        if (self.beta is None) != (self.gamma is None) or (
-            self.beta is None and not self.drawn
-        ):
-            raise Refusal(
-                "give both ``beta`` and ``gamma``, in degrees, or ``drawn`` for all angles"
-            )
-        if not all(
-            x is None or abs(x) <= LARGEST_ANGLE for x in (self.beta, self.gamma)
-        ):
-            raise Refusal(
-                "``beta`` and ``gamma`` must be finite angles in degrees, of at most 1e6"
-            )
-
-    def answer(self, progress: Progress, allow: Allow) -> Result:
-        law = load_medium(self.medium)
-        overview = survey(law)
-        description = f"{self.medium} {overview.description()}" + (
-            ", which is cut" if law.tension == "cut" else ""
+def check(beta: float | None, gamma: float | None, mapped: bool) -> None:
+    """Refuse one angle without the other, none where no map is wanted, and angles that
+    are none."""
+    alone = (beta is None) != (gamma is None)
+    if alone or (beta is None and not mapped):
+        raise Refusal(
+            "give both ``beta`` and ``gamma``, in degrees, or ``drawn`` for all angles"
         )
-        facts, angles = (
-            {
-                "description": description,
-                "notes": [description] if overview.pushing else [],
-            },
-            None,
+    if not all(x is None or abs(x) <= LARGEST_ANGLE for x in (beta, gamma)):
+        raise Refusal(
+            "``beta`` and ``gamma`` must be finite angles in degrees, of at most 1e6"
         )
-        if self.beta is None:
-            variables = [
-                Variable(name, (), getattr(overview, name), "1")
-                for name in ("pulling", "pushing")
-            ]
-        else:
-            angles = self.beta, self.gamma
-            values = [
-                np.round(float(x), 12) + 0.0 for x in law(*map(math.radians, angles))
-            ]
-            labels = "against the motion's x", "upwards"
-            names = "alpha_x", "alpha_z"
-            variables = [
-                Variable(*x, "N/cm^3", label)
-                for *x, label in zip(names, ((), ()), values, labels)
-            ]
-        return Result("stress", tuple(variables), facts, (overview, angles))
+
+
+def answer(
+    medium: str, beta: float | None, gamma: float | None, mapped: bool
+) -> Result:
+    """Return the stress per unit depth at one tilt and direction, degrees, the shares of
+    the plane of angles in which the map pulls and pushes, and the map itself."""
+    law = load_medium(medium)
+    overview = survey(law)
+    description = f"{medium} {overview.description()}"
+    if law.tension == "cut":
+        description = f"{description}, which is cut"
+    variables = []
+    if beta is not None:
+        variables += at_angles(law, beta, gamma)
+    pulling = "share of angles in which it pulls on the leading face"
+    pushing = "share of angles in which it drives motion on"
+    variables.append(Variable("pulling", (), overview.pulling, "1", pulling))
+    variables.append(Variable("pushing", (), overview.pushing, "1", pushing))
+    if overview.pushing:
+        variables.append(Variable("note", ("line",), [description]))
+    if mapped:
+        variables += of_map(overview)
+    facts = {"medium": medium, "description": description}
+    return Result("stress", tuple(variables), facts)
+
+
+def at_angles(law, beta: float, gamma: float) -> list[Variable]:
+    """Return the stress at one tilt and direction, degrees."""
+    values = law(math.radians(beta), math.radians(gamma))
+    alpha_x, alpha_z = (np.round(float(x), 12) + 0.0 for x in values)
+    return [
+        Variable("beta", (), beta, "degrees", "tilt of the plate"),
+        Variable("gamma", (), gamma, "degrees", "direction below the horizontal"),
+        Variable("alpha_x", (), alpha_x, UNIT, "against the motion's x"),
+        Variable("alpha_z", (), alpha_z, UNIT, "upwards"),
+    ]
+
+
+def of_map(overview: Survey) -> list[Variable]:
+    """Return a survey as variables over tilt and direction."""
+    arrays = (overview.alpha_x, overview.alpha_z, overview.normal, overview.power)
+    units = (UNIT, UNIT, UNIT, f"{UNIT} x speed")
+    maps = [Variable(*one) for one in zip(MAPS, (OVER,) * 4, arrays, units)]
+    return [
+        Variable("tilt", ("tilt",), overview.beta, "rad"),
+        Variable("direction", ("direction",), overview.gamma, "rad"),
+        *maps,
+    ]
+
+
+def drawn(result: Result) -> tuple[Survey, tuple[float, float] | None]:
+    """Return the survey of a result, and the angles that were asked for."""
+    if "map_x" not in result:
+        raise Refusal("its map was not computed", instead="say ``drawn``")
+    maps = [result[name].values for name in MAPS]
+    point = None
+    if "beta" in result:
+        point = (float(result["beta"]), float(result["gamma"]))
+    axes = (result[dim].values for dim in OVER)
+    return Survey(*axes, *maps), point

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geomech.core.errors import choose
+from geomech.core.variables import Result
 from geomech.gaits import Gait
 from geomech.geometry.connection import Connection, even_part
 from geomech.geometry.curvature import ccf
@@ -27,7 +28,6 @@ from geomech.scenes.frames import framed
 from geomech.scenes.model import Scene, frequency_of
 from geomech.studies import cost, effort, estimate, tables, uncertainty
 from geomech.studies.available import default_tiers, tiers
-from geomech.studies.results import Displacements
 from geomech.systems.base import body_size, refuse_singular, shape_labels
 from geomech.systems.capabilities import gaits_per_batch, stored_table
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
@@ -38,7 +38,7 @@ from rft.checks import real_array
 from rft.refusal import Refusal, located
 
 FEW_PHASES = 4096  # that tell whether a gait is far from leaving the field
-SAMPLES = 64, FEW_PHASES  # amplitudes and phases that `cost` checks; `study` checks all
+SAMPLES = 64, FEW_PHASES  # amplitudes and phases that `cost` checks, of all
 
 
 class Study:
@@ -293,21 +293,21 @@ class Study:
                 a = plan.table.amplitudes
             refuse_singular(system, gait.cycle(phases, a)[0])
 
-    def study(
+    def displacements(
         self,
         amplitudes: Sequence[float],
         tiers: Sequence[str] | None = None,
         gait: Gait | None = None,
         progress: Callable | None = None,
-    ) -> Displacements:
-        """Return a table (`geomech.studies.tables.table`) of the net poses by tiers of TIERS (`default_tiers` if
-        None), with their errors, and {"seconds": {...}, "kept": [...]} besides.
+    ) -> Result:
+        """Return the net poses (`geomech.studies.tables.result`) by tiers of TIERS
+        (`default_tiers` if None), with their errors (`geomech.studies.estimate`).
 
-        estimate, estimate_heading: errors (`geomech.studies.estimate`), in the unit of the poses, and rad. seconds: time
-        to build each table, by its name ("field", "harmonic table" ...), even if it was built before, and time of each
-        tier from there, of the direct one with its errors; "errors" of the others, without the direct tier; "medium" of
-        the errors of an uncertain one. kept: the tables that were stored before, whose seconds are not part of this
-        call."""
+        seconds, by part: time to build each table ("field", "harmonic table" ...), even
+        if it was built before, and time of each tier from there, of the direct one with
+        its errors; "errors" of the others, without the direct tier; "medium" of the
+        errors of an uncertain one. computed_before: of tables that were stored, whose
+        seconds are not part of this call."""
         gait, values, chosen = self._checked(gait, amplitudes, tiers)
         medium, took = timed(
             lambda: uncertainty.of_medium(self.scene, gait, values)
@@ -343,11 +343,9 @@ class Study:
                 if reference is None:
                     seconds["errors"] = seconds.get("errors", 0.0) + took
         poses, errors = ({m: x[m] for m in chosen} for x in (poses, errors))
-        facts = {"seconds": seconds, "kept": stored}
-        return Displacements(
-            tables.result(
-                self.scene, gait, values, poses, errors, medium, spreads, **facts
-            )
+        more = tables.timings(seconds, stored)
+        return tables.result(
+            self.scene, gait, values, poses, errors, medium, spreads, more
         )
 
     def _build_all(
@@ -375,7 +373,7 @@ class Study:
         gait: Gait | None = None,
         more: Sequence[cost.Job] = (),
     ) -> cost.Cost:
-        """Return the cost of `study`, and of ``more`` jobs: force balances, seconds on this machine and memory; see
+        """Return the cost of `displacements`, and of ``more`` jobs: force balances, seconds on this machine and memory; see
         `geomech.studies.cost`."""
         gait, amplitudes, plans = self._checked(gait, amplitudes, tiers, *SAMPLES)
         with located(self.scene.name):

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
@@ -13,38 +13,16 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from geomech.core.summary import span
 from geomech.core.variables import Result, Variable
 from geomech.run.cost import Cost
 from geomech.run.jobs import context_of, runner, storing
 from geomech.scenes.read import inputs
 from geomech.studies.grid import Grid, listed
-from geomech.studies.question import Allow, Progress, Question
-from rft.refusal import Refusal, printable
-
-
-class Swept(dict):
-    """Result of a sweep as a table that users index: {"over": {parameter: values}, name: array (N_1, ...)}."""
-
-    def __init__(self, result: Result):
-        self.result, self.scene = result, result.subject
-        over = {v.label: v.values.tolist() for v in result.variables if v.is_coordinate}
-        super().__init__({"over": over, **batched(self.scene).table(result)})
-
-    def __repr__(self) -> str:
-        over = " x ".join(
-            f"{name} ({len(v)}: {span(v)})" for name, v in self["over"].items()
-        )
-        return f"Swept({printable(self.scene.name)} over {over}; {batched(self.scene).summary(self)})"
-
-
-def as_stored(result: Result) -> Result:
-    """Return the result of a sweep as data for a file."""
-    return batched(result.subject).as_stored(result)
+from rft.refusal import Refusal
 
 
 class Batched(Protocol):
-    """A question about many scenes at once: the subject of a sweep.
+    """A question about many scenes at once: that of a sweep.
 
     It knows its scenes and how to batch them; the sweep knows the grid, the order and the runner."""
 
@@ -65,15 +43,6 @@ class Batched(Protocol):
     ) -> tuple[list[Variable], dict]:
         """Return the answer from rows (N_1, ..., width) as variables, and attributes of the whole sweep."""
 
-    def as_stored(self, result: Result) -> Result:
-        """Return the result of a sweep as data for a file."""
-
-    def table(self, result: Result) -> dict:
-        """Return the result of a sweep as arrays by name."""
-
-    def summary(self, table: Mapping) -> str:
-        """Return the ranges of a table in words."""
-
 
 def batched(scene: Any) -> Batched:
     """Return the question of sweeps over a scene: the displacement of a gait, or the speed of a robot."""
@@ -86,13 +55,11 @@ def batched(scene: Any) -> Batched:
 
 
 @dataclass(frozen=True)
-class Sweep(Question):
-    """A question over a grid. Its result has the parameters as leading dimensions. seconds: of computing, if known, so
-    that other processes start sooner."""
+class Plan:
+    """A question over a grid of parameters of a scene."""
 
     scene: Any
     over: Mapping[str, Sequence[float]]
-    seconds: float | None = field(default=None, compare=False)
 
     @cached_property
     def question(self) -> Batched:
@@ -100,42 +67,35 @@ class Sweep(Question):
 
     @cached_property
     def grid(self) -> Grid:
+        """The grid; Refusal if a point of it makes no scene."""
         return self.question.grid(self.scene, listed(self.over))
 
     @cached_property
-    def _cost(self) -> Cost:
+    def cost(self) -> Cost:
         return self.question.cost(self.grid)
 
-    def check(self) -> None:
-        _ = self.grid  # refuses points that make no scene
+    def result(self, progress: Callable, seconds: float | None = None) -> Result:
+        """Return the answer, with the parameters as leading dimensions.
 
-    def cost(self) -> Cost:
-        return self._cost
-
-    def answer(self, progress: Progress, allow: Allow) -> Result:
-        grid, completed, parts_ = self.grid, 0, []
-        seconds = self.seconds if "_cost" not in vars(self) else self._cost.seconds
+        seconds: of computing, if known, so that other processes start sooner."""
+        grid = self.grid
         parts = -(-grid.total // self.question.together(self.scene))
-        for rows in runner().map(
-            answered,
-            (self.question, grid.at),
-            batches(self.question, grid),
-            parts,
-            seconds,
-        ):
-            parts_.append(rows)
-            completed += len(rows)
+        common = (self.question, grid.at)
+        arguments = batches(self.question, grid)
+        rows, completed = [], 0
+        for part in runner().map(answered, common, arguments, parts, seconds):
+            rows.append(part)
+            completed += len(part)
             progress(completed / grid.total)
-        names = {name: name.replace(".", "_").replace("-", "_") for name in grid.over}
-        axes = [
-            Variable(names[p], (names[p],), np.array(v, float), "", p)
-            for p, v in grid.over.items()
-        ]
-        rows = grid.arranged(np.concatenate(parts_))
-        variables, attributes = self.question.variables(
-            grid, rows, tuple(names.values())
-        )
-        return Result("sweep", (*axes, *variables), attributes, self.scene)
+        axes = []
+        for parameter, values in grid.over.items():
+            name = parameter.replace(".", "_").replace("-", "_")
+            axis = np.array(values, float)
+            axes.append(Variable(name, (name,), axis, "", parameter))
+        dims = tuple(axis.name for axis in axes)
+        arranged = grid.arranged(np.concatenate(rows))
+        variables, facts = self.question.variables(grid, arranged, dims)
+        return Result("sweep", (*axes, *variables), facts)
 
 
 def batches(question: Batched, grid: Grid) -> Iterator[tuple]:
@@ -167,23 +127,28 @@ def sweep(
     over: Mapping[str, Sequence[float]],
     partial: Path | None = None,
     progress: Callable | None = None,
-) -> Swept:
-    """Return the displacement of a scene's gait by the direct tier, or the speed of its robot, over a grid of
-    parameters: a table {"over": {parameter: values}, ...} of arrays (N_1, ...) with their "units".
+) -> Result:
+    """Return the displacement of a scene's gait by the direct tier, or the speed of its
+    robot, over a grid of parameters.
 
-    Points that differ only in the gait or in batched fields of effects (`batched` in rft/effects), and robots, are
-    solved in batches. partial: a file that stores finished batches, so that the same sweep resumes; the caller removes
-    it after saving the results. Executors: see `geomech.run.workers`. Refusal if a point of the grid makes no scene."""
-    question = Sweep(scene, over)
-    question.check()
-    with _stored_in(partial, scene):
-        return Swept(
-            question.answer(progress or (lambda done: None), lambda cost: None)
-        )
+    Points that differ only in the gait or in batched fields of effects (`batched` in
+    rft/effects), and robots, are solved in batches. partial: a file that stores finished
+    batches, so that the same sweep resumes; the caller removes it after saving the
+    results. Executors: see `geomech.run.workers`. Refusal if a point of the grid makes no
+    scene."""
+    plan = Plan(scene, over)
+    _ = plan.grid  # refused before anything is stored
+    with stored_in(partial, scene):
+        return plan.result(progress or ignore)
 
 
-def _stored_in(partial: Path | None, scene: Any) -> contextlib.AbstractContextManager:
-    """Store finished batches in a file, if one is given; it stays until the caller removes it."""
+def ignore(_: float) -> None:
+    """Take no notice of progress."""
+
+
+def stored_in(partial: Path | None, scene: Any) -> contextlib.AbstractContextManager:
+    """Store finished batches in a file, if one is given; it stays until the caller removes
+    it."""
     if partial is None:
         return contextlib.nullcontext()
     if not (isinstance(partial, (str, Path)) and str(partial)):

@@ -14,15 +14,13 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from geomech.core.setting import Setting
-from geomech.core.summary import span
-from geomech.core.variables import Result, Variable
+from geomech.core.variables import Variable
 from geomech.run import jobs
 from geomech.run.backend import suiting
-from geomech.run.cost import BASE, LONGEST, Cost, duration
+from geomech.run.cost import BASE, Cost, duration
 from geomech.scenes import write as written
 from geomech.scenes.walker import WalkerScene
 from geomech.studies.grid import Grid
-from geomech.studies.question import Allow, Progress, Question
 from rft.metres import GRAVITY
 from rft.refusal import Refusal, located
 from rft.walking import Mjcf, Rhex, Roller, Walk, engine
@@ -45,6 +43,12 @@ UNITS = {  # of a walk's table; a positive pitch is nose down
     "t": "s", "x": "m", "z": "m", "pitch": "rad", "v_x": "m/s", "v_z": "m/s", "rate": "rad/s", "work": "J", "loss": "J",
     "energy": "J", "y": "m", "roll": "rad", "yaw": "rad",
 }  # fmt: skip
+LABELS = {
+    "pitch": "nose down",
+    "states": "of the engine in three dimensions",
+    "roll": "left side up",
+    "yaw": "to the left",
+}
 LIMIT = 3  # cycles up to the limit cycle, and half as many for each of two errors
 SETTINGS = (
     Setting("steps", (12, 16, 24, 32, 48, 64, 96), 2, against="limit"),
@@ -166,59 +170,69 @@ def run(
         return walked([scene], by, progress=report)[0]
 
 
-@dataclass(frozen=True)
-class Walking(Question):
-    """The walk of a robot. engine: in place of the scene's. limited: with at most `LONGEST` seconds of computing, see `run`."""
-
-    scene: WalkerScene
-    engine: str | None = None
-    limited: bool = field(default=False, compare=False)
-
-    @property
-    def title(self) -> str:
-        return f"walk of {self.scene.name}"
-
-    def check(self) -> None:
-        refuse_engine(self.scene, self.engine)
-
-    def cost(self) -> Steps:
-        return price(self.scene, by=self.engine)
-
-    def answer(self, progress: Progress, allow: Allow) -> Result:
-        return of_walk(
-            self.scene,
-            run(
-                self.scene, self.engine, progress, LONGEST if self.limited else math.inf
-            ),
-        )
+def variables(scene: WalkerScene, run: Walked) -> list[Variable]:
+    """Return the means of a walk with their errors, what it took, and its motion."""
+    return [*means(scene, run), *totals(scene, run), *motion(run)]
 
 
-def of_walk(scene: WalkerScene, run: Walked) -> Result:
-    """Return the table of a walk, and its speed, drift and turning with their errors."""
-    w, over = run.walk, ("t",)
-    more = {
-        name: values for name, values in (w.spatial or {}).items() if values.ndim == 1
-    }
-    columns = (
-        dict(zip(UNITS, (w.t, *w.pose.T, *w.twist.T, w.work, w.loss, w.energy))) | more
-    )
-    table = [
-        Variable(name, over, values, UNITS.get(name, ""))
-        for name, values in columns.items()
+def means(scene: WalkerScene, run: Walked) -> list[Variable]:
+    """Return the means over the limit cycle."""
+    walk = run.walk
+    along = "mean over the limit cycle, along the heading"
+    part = "part of the error of speed, from twice as many elements"
+    ended = "1 if the limit cycle was found"
+    found = [
+        Variable("status", (), walk.status, label="how the walk ended"),
+        Variable("periodic", (), int(walk.periodic), "1", ended),
+        Variable("speed", (), walk.speed, "m/s", along, run.estimate),
+        Variable("speed_error_of_elements", (), run.elements, "m/s", part),
+        Variable("frequency", (), scene.gait.frequency, "Hz", "of the gait"),
+        Variable("cycles", (), walk.cycles, "1", "computed"),
     ]
-    table += [
-        Variable("speed", (), w.speed, "m/s", "mean speed", run.estimate),
-        Variable(
-            "aside",
-            (),
-            w.lateral_speed,
-            "m/s",
-            "to the left of its heading",
-            run.lateral,
-        ),
-        Variable("turning", (), w.yaw_rate, "rad/s", "to the left", run.turning),
+    flat = "" if walk.spatial else "in the plane"
+    to_the_left = "mean, to the left of the heading"
+    for name, value, unit, error in (
+        ("lateral_speed", walk.lateral_speed, "m/s", run.lateral),
+        ("yaw_rate", walk.yaw_rate, "rad/s", run.turning),
+    ):
+        found.append(Variable(name, (), value, unit, to_the_left, error, zero=flat))
+    if not math.isnan(walk.settling_time):
+        share = f"{100 * NEAR:g} %"
+        label = f"from rest until within {share} of the limit cycle, inf for never"
+        found.append(Variable("settling_time", (), walk.settling_time, "s", label))
+    return found
+
+
+def totals(scene: WalkerScene, run: Walked) -> list[Variable]:
+    """Return what the whole walk took, and how well its steps were solved."""
+    walk = run.walk
+    transport = cost_of_transport(scene, walk)
+    of_weight = "work over weight times distance, from rest"
+    share = "share of the work that the steps do not account for"
+    unsolved = "part of the error of speed, from unsolved steps"
+    return [
+        Variable("total_work", (), walk.work[-1], "J", "of the motors"),
+        Variable("total_loss", (), walk.loss[-1], "J", "into the ground"),
+        Variable("cost_of_transport", (), transport, "1", of_weight),
+        Variable("unaccounted", (), walk.unaccounted, "1", share),
+        Variable("unsolved", (), walk.unsolved, "1", "steps that were taken unsolved"),
+        Variable("residual", (), walk.residual, "m/s", "largest of a step"),
+        Variable("speed_error_of_unsolved", (), walk.unsolved_error, "m/s", unsolved),
     ]
-    return Result("walk", tuple(table), {"name": scene.name}, (scene, run))
+
+
+def motion(run: Walked) -> list[Variable]:
+    """Return the motion in time: pose, velocity and energies, in three dimensions also
+    y, roll, yaw and the states of the engine, from which it is drawn."""
+    walk = run.walk
+    pose_and_twist = (walk.t, *walk.pose.T, *walk.twist.T)
+    columns = dict(zip(UNITS, (*pose_and_twist, walk.work, walk.loss, walk.energy)))
+    found = []
+    for name, values in {**columns, **(walk.spatial or {})}.items():
+        dims = ("t",) if values.ndim == 1 else ("t", "state")
+        label = LABELS.get(name, "")
+        found.append(Variable(name, dims, values, UNITS.get(name, ""), label))
+    return found
 
 
 class Steps(Cost):
@@ -318,37 +332,7 @@ class Walks:
             Variable("status", dims, np.array(STATUSES)[kinds.astype(int)]),
             Variable("cycles", dims, cycles, "1"),
         ]
-        title = f"Mean speed of the walking robot {grid.scene.name}"
-        return variables, {"title": title, "scene": written.toml(grid.scene)}
-
-    def as_stored(self, result: Result) -> Result:
-        """Return a sweep as data for a file: the error as estimate, the status as a number explained by its label."""
-        speed, status = result["speed"], result["status"]
-        meanings = ", ".join(f"{k}: {name}" for k, name in enumerate(STATUSES))
-        index = np.argmax(np.array(STATUSES) == status.values[..., None], -1).astype(
-            float
-        )
-        stored = [v for v in result.variables if v.is_coordinate]
-        stored += [
-            dataclasses.replace(speed, error=None),
-            Variable("estimate", speed.dims, speed.error, "m/s"),
-        ]
-        stored += [
-            result["cycles"],
-            Variable("status", speed.dims, index, "1", meanings),
-        ]
-        return dataclasses.replace(result, variables=tuple(stored))
-
-    def table(self, result: Result) -> dict:
-        """Return {"speed", "estimate": (N_1, ...), m/s, "status": (N_1, ...), "cycles": (N_1, ...)}."""
-        arrays = {name: result[name].values for name in ("speed", "status", "cycles")}
-        return {"speed": arrays["speed"], "estimate": result["speed"].error, **arrays}
-
-    def summary(self, table: Mapping) -> str:
-        worst = np.max(table["estimate"], initial=0.0)
-        return (
-            f"speed {span(table['speed'])} m/s; estimated error up to {worst:.1e} m/s"
-        )
+        return variables, {}
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from geomech.core.summary import part
-from rft.ground import GROUND_EFFECTS, GroundEffect
-from rft.premise import negated
+from geomech.core.summary import effect_lines, part
+from rft.ground import GROUND_EFFECTS
 from rft.refusal import in_line
 
 if TYPE_CHECKING:
@@ -40,16 +38,3 @@ def described(scene: Intruding | WalkerScene) -> list[str]:
         *effect_lines(scene.effects),
         "off, not evaluated: " + (", ".join(off) or "none"),
     ]
-
-
-def effect_lines(effects: Sequence[GroundEffect]) -> list[str]:
-    """Return a line for each effect on the ground, and one more for what it assumes."""
-    lines = []
-    for effect in effects:
-        lines.append(
-            f"on:  {part(effect.kind, effect)}; {negated(effect.breaks) or 'keeps every premise'}; costs {effect.cost}; "
-            f"gone at {effect.limit}, order {effect.order}"
-        )
-        if effect.assumes:
-            lines.append(f"     assumes {effect.assumes}")
-    return lines

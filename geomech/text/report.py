@@ -3,27 +3,18 @@
 from __future__ import annotations
 
 from geomech.core.variables import Result
-from geomech.text import displacement
+from geomech.results import show
 
-MORE = displacement.MORE
-ROWS = 10  # amplitudes of all gaits together, so that they fit a screen
+MORE = "--all prints all variables and rows"
 
 
 def text(result: Result) -> str:
     """Return displacements by the most exact tier, gait by gait."""
-    found = result.subject.tables
-    rows = ROWS // len(found)
-    lines = [
-        line
-        for title, table in found.items()
-        for line in displacement.gait_lines(table, title, rows)
-    ]
-    return "\n".join([*lines, displacement.FRAME])
+    tables = result.subject.tables.values()
+    return "\n".join(show.text(table) for table in tables)
 
 
 def full(result: Result) -> str:
     """Return the table of every gait by every tier."""
-    return "\n".join(
-        displacement.full(table, title)
-        for title, table in result.subject.tables.items()
-    )
+    tables = result.subject.tables.values()
+    return "\n".join(show.text(table, everything=True) for table in tables)

@@ -34,7 +34,7 @@ from rft.refusal import Refusal
 
 SOURCE = "write it anew with 'geomech connection SCENE -o FILE.nc'"
 FITTED = "write it anew with 'geomech fit-gait LOG.csv -o FILE.nc'"
-UNITS = {"body length": "BL", "m": "m"}
+UNITS = {"body length": "BL", "BL": "BL", "m": "m"}
 ANGLES = ("rad", "radian", "radians")
 SHAPE = "shape variable "  # before the name of one that is no angle between links
 
@@ -53,7 +53,7 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
             warnings.simplefilter("ignore")
             file = netcdf_file(_OnceRead(raw), mmap=False)
             variables = {
-                name: (tuple(v.dimensions), np.array(v[:]))
+                name: (tuple(v.dimensions), np.array(v.data))
                 for name, v in file.variables.items()
             }
             units = {
@@ -132,7 +132,12 @@ def _stored(
     masks("A", A, masked, attributes)
     unknown = np.isnan(residual).all() and not masked.all()
     masks("fit_residual", np.where(unknown, 0.0, residual), masked, attributes)
-    speed = pick("speed", "component") if "speed" in variables else rms(A, residual)
+    # Files of the first versions called it speed.
+    rms_name = "xi_rms" if "xi_rms" in variables else "speed"
+    if rms_name in variables:
+        speed = pick(rms_name, "component")
+    else:
+        speed = rms(A, residual)
     sized = "length_unit" in attributes
     length, unit = (
         attributes.get("body_length", 1.0),

@@ -1,0 +1,224 @@
+"""What ``import geomech`` offers beside the parts: the study of a scene, whose methods ask
+questions."""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Concatenate, ParamSpec
+
+from geomech.core.variables import Result
+from geomech.questions.base import Question, plain_type
+from geomech.questions.ccf import Ccf
+from geomech.questions.connection import Connection
+from geomech.questions.displacement import Displacement
+from geomech.questions.forces import Forces
+from geomech.questions.intrude import Intrude
+from geomech.questions.optimize import Optimize
+from geomech.questions.sweep import Sweep
+from geomech.questions.velocity import Velocity
+from geomech.questions.walk import Walk
+from geomech.scenes.parts import as_scene
+from geomech.studies import study as studies
+from rft.refusal import Refusal
+
+Fields = ParamSpec("Fields")
+
+
+def asks(
+    question: Callable[Concatenate[Any, Fields], Question],
+) -> Callable[Concatenate[Study, Fields], Result]:
+    """Return the method that asks a question of a study's scene.
+
+    Its parameters are the fields of the question; unknown ones are refused."""
+
+    def ask(self: Study, *values: Fields.args, **options: Fields.kwargs) -> Result:
+        refuse_unknown(question, options)
+        return question(self.scene, *values, **options).ask(self._tables)
+
+    described(ask, question, "self")
+    return ask
+
+
+def asked_of_scene(
+    question: Callable[Concatenate[Any, Fields], Question],
+) -> Callable[Concatenate[Any, Fields], Result]:
+    """Return the function that asks a question of whatever `study` takes for a scene."""
+
+    def ask(scene: Any, *values: Fields.args, **options: Fields.kwargs) -> Result:
+        refuse_unknown(question, options)
+        return question(as_scene(scene), *values, **options).ask()
+
+    described(ask, question, "scene")
+    return ask
+
+
+def described(ask: Any, question: Any, first: str) -> None:
+    """Give a function the name, the documentation and the parameters of a question."""
+    _, *fields = inspect.signature(question).parameters.values()
+    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+    shown = [inspect.Parameter(first, kind)]
+    for field in fields:
+        annotation = field.annotation
+        if hasattr(annotation, "__metadata__"):
+            annotation = plain_type(annotation)
+        shown.append(field.replace(annotation=annotation))
+    ask.__signature__ = inspect.Signature(shown, return_annotation=Result)
+    ask.__name__ = question.name
+    ask.__qualname__ = question.name
+    ask.__doc__ = documentation(question)
+
+
+def documentation(question: Any) -> str:
+    """Return what a question computes, and what its fields mean."""
+    from geomech.questions.base import options
+
+    lines = [inspect.cleandoc(question.__doc__), "", "Parameters", "----------"]
+    for name, (option, _, _) in options(question).items():
+        lines += [name, f"    {option.help}"]
+    return "\n".join(lines)
+
+
+def refuse_unknown(question: Any, options: dict[str, Any]) -> None:
+    """Refuse keywords that are no fields of a question, with the nearest that is."""
+    _, *known = inspect.signature(question).parameters
+    for name in options:
+        if name not in known:
+            nearest = difflib.get_close_matches(name, known, 1)
+            instead = f"use one of {', '.join(known)}"
+            if nearest:
+                instead = f"did you mean {nearest[0]!r}?"
+            raise Refusal(f"{question.name} has no {name!r}", instead=instead)
+
+
+class Study:
+    """A scene and all that is computed of it; each table is computed once.
+
+    Its methods ask questions. Their results print themselves, and have `.plot()`,
+    `.save(path)`, `.to_xarray()` and `.to_dataframe()`.
+
+    Parameters
+    ----------
+    *parts :
+        The name of a built-in scene, a TOML file, a Scene, or its parts: a medium and a
+        body, or a system, or a function velocity(alpha, alphadot) -> xi (..., 3), and a
+        gait.
+    effects : list of effects
+        Those of a medium and a body.
+    **numerics :
+        Other settings than the scene's, such as grid=21, phases=64.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("three-link-glass", phases=64)
+    >>> table = study.displacement([0.5, 1.0], "direct")
+    >>> table.at(tier="direct")["net_distance"].values.round(4)
+    array([0.0121, 0.0638])
+    """
+
+    def __init__(self, *parts: Any, effects: Sequence = (), **numerics: Any):
+        self.scene = as_scene(*parts, effects=effects, **numerics)
+
+    def __repr__(self) -> str:
+        if self._tables is None:
+            return f"Study({self.scene!r})"
+        return repr(self.tables)
+
+    def _repr_html_(self) -> str:
+        from geomech.output import display
+
+        return display.study(self.tables)
+
+    @cached_property
+    def _tables(self) -> studies.Study | None:
+        """The tables of a scene with a gait in shape space; None of another."""
+        if not hasattr(self.scene, "system"):
+            return None
+        return studies.Study(self.scene)
+
+    @property
+    def tables(self) -> studies.Study:
+        """What is computed of the scene: connection, CCF, metric, poses by tier."""
+        if self._tables is None:
+            raise Refusal("this scene has no shape space", where=self.scene.name)
+        return self._tables
+
+    displacement = asks(Displacement)
+    ccf = asks(Ccf)
+    connection = asks(Connection)
+    velocity = asks(Velocity)
+    sweep = asks(Sweep)
+    forces = asks(Forces)
+    optimise = optimize = asks(Optimize)
+    walk = asks(Walk)
+    intrude = asks(Intrude)
+
+    def animate(self, path: str | Path = "swim.gif", *, cycles: int = 1) -> Path:
+        """Write a film of the body beside its gait on the CCF, .gif or .mp4, or a strip of
+        it, .png, .pdf or .svg; return its path.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import geomech
+        >>> study = geomech.study("three-link-viscous", grid=15, phases=16)
+        >>> study.animate(pathlib.Path(tempfile.mkdtemp()) / "swim.png").name
+        'swim.png'
+        """
+        from geomech.output import animate
+        from geomech.studies.motion import Trajectory
+
+        path = Path(path)
+        animate.check_format(path)
+        animate.write(Trajectory(self.scene, cycles, drawn=True).ask(), path)
+        return path
+
+
+def study(*parts: Any, effects: Sequence = (), **numerics: Any) -> Study:
+    """Return the study of a scene: `study("three-link-glass")`, of a TOML file, a Scene,
+    or its parts: `study(medium, body, gait)`, `study(system, gait)`, `study(velocity,
+    gait)`. See `Study`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> from geomech import bodies, gaits, media
+    >>> study = geomech.study(media.Viscous(), bodies.Chain(), gaits.Circle(0.5))
+    >>> table = study.displacement(tiers="direct")
+    >>> table["net_distance"].values.round(5)
+    array([[0.0153]])
+    """
+    return Study(*parts, effects=effects, **numerics)
+
+
+def load_result(path: str | Path) -> Result:
+    """Return the result in a file: of .nc, .json and .mat as it was saved, of .csv the
+    columns. Files of former versions have the names of today.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import geomech
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "moved.nc"
+    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> study.displacement([0.5, 1.0], "direct").save(path)
+    >>> geomech.load_result(path)["x"].values.round(4)
+    array([[-0.0152, -0.0495]])
+    """
+    from geomech.results.files import load
+
+    return load(path)
+
+
+displacement = asked_of_scene(Displacement)
+ccf = asked_of_scene(Ccf)
+velocity = asked_of_scene(Velocity)
+sweep = asked_of_scene(Sweep)
+forces = asked_of_scene(Forces)
+optimise = optimize = asked_of_scene(Optimize)
+walk = asked_of_scene(Walk)
+intrude = asked_of_scene(Intrude)

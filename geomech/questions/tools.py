@@ -1,0 +1,84 @@
+"""What several questions make their results with."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from geomech.core.variables import Variable
+
+
+def numbers(values: Any) -> Any:
+    """Return a number or a list of numbers as a tuple; anything else as it is, for its
+    reader to refuse."""
+    import numpy as np
+
+    from rft.checks import is_number
+
+    if is_number(values):
+        return (float(values),)
+    if isinstance(values, (str, bytes)) or np.ndim(values) != 1:
+        return values
+    return tuple(np.asarray(values).tolist())
+
+
+def words(names: Any) -> Any:
+    """Return a name or a list of names as a tuple, none for None."""
+    if names is None:
+        return ()
+    if isinstance(names, str):
+        return (names,)
+    return tuple(names)
+
+
+def component() -> "Variable":
+    """Return the coordinate of x, y and theta."""
+    from geomech.core.variables import Variable
+
+    return Variable("component", ("component",), ["x", "y", "theta"])
+
+
+def seconds(took: Mapping[str, float], kept: Iterable[str]) -> "list[Variable]":
+    """Return the seconds that parts of a computation took, and whether they were computed
+    before."""
+    import numpy as np
+
+    from geomech.core.variables import Variable
+
+    before = [int(part in kept) for part in took]
+    return [
+        Variable("part", ("part",), np.array([*took], dtype="U")),
+        Variable("seconds", ("part",), [*took.values()], "s", "of computing"),
+        Variable("computed_before", ("part",), before, "1", "1 if it was"),
+    ]
+
+
+def selected(variable: "Variable", dim: str, mask: list[bool]) -> "Variable":
+    """Return a variable at some places of a dimension."""
+    import numpy as np
+
+    axis = variable.dims.index(dim)
+    return variable.with_arrays(partial(np.compress, mask, axis=axis))
+
+
+def by_symmetry(name: str, zero: Iterable[str]) -> str:
+    """Return why a variable is zero, of those that a symmetry makes zero; "" for
+    another."""
+    return "by symmetry" if name in zero else ""
+
+
+def with_units(variable: "Variable", lengths: str, angles: str) -> "Variable":
+    """Return a variable over components with a unit for each: of x and y, and theta."""
+    return replace(variable, unit=(lengths, lengths, angles))
+
+
+def component_number(components: Any) -> int:
+    """Return the number of one component, x, y or theta; x if none is named."""
+    from geomech.core.errors import choose
+
+    known = ("x", "y", "theta")
+    if isinstance(components, str):
+        components = (components,)
+    names = [*components] or ["x"]
+    return known.index(choose("component", names[0], known))

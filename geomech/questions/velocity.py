@@ -1,0 +1,49 @@
+"""The body velocity at one shape, for one rate of change of shape."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+from geomech.questions import loading, names, parsing, tools
+from geomech.questions.base import Option, Question, Run, Subject
+
+if TYPE_CHECKING:
+    from geomech.core.variables import Result
+    from geomech.scenes.model import Scene
+
+
+@dataclass(frozen=True)
+class Velocity(Question):
+    """Compute the body velocity of one shape and its rate. The answer has a residual and
+    a status."""
+
+    scene: Annotated["Scene", Subject(loading.load_with_gait, names.scene_names)]
+    alpha: Annotated[
+        tuple[float, ...],
+        Option(
+            "joint angles in rad, as 0.5,0.3 or 30deg,20deg", "ANGLES", parsing.angles
+        ),
+    ]
+    alphadot: Annotated[
+        tuple[float, ...],
+        Option("joint rates in rad per unit of time, as 1,0", "RATES", parsing.angles),
+    ]
+
+    name: ClassVar[str] = "velocity"
+
+    def __post_init__(self) -> None:
+        self._set(
+            alpha=tools.numbers(self.alpha), alphadot=tools.numbers(self.alphadot)
+        )
+
+    def compute(self, run: Run) -> "Result":
+        from geomech.core.variables import Result
+        from geomech.studies.single import velocity
+        from rft.refusal import located
+
+        with located(self.scene.name):
+            found = velocity(self.scene.system, self.alpha, self.alphadot)
+        return Result("velocity", (tools.component(), *found))
+
+    @staticmethod
+    def headline(result: "Result") -> list[str]:
+        return [f"{result.attributes['scene']}: body velocity xi per unit of time"]
