@@ -35,6 +35,9 @@ from rft.mujoco.media import law_of  # noqa: E402
 from rft.mujoco.sand import meshes  # noqa: E402
 from rft.mujoco.steps import needed_rounding  # noqa: E402
 
+needs_numba = pytest.mark.skipif(
+    not backend.installed(), reason="needs the extra: pip install 'geomech[fast]'"
+)
 SPATIAL = Spatial(3e5, surface_friction=0.6, grazing=math.radians(5))
 MAP = StressMap(zeta=0.3, grazing=math.radians(5))
 GEOMS = (
@@ -554,12 +557,114 @@ def test_elements_are_as_long_as_asked_for(geom):
         assert edges.max() < 1.75 * element and 0.45 * element < np.median(edges)
 
 
+def slender(kind, ratio):
+    """A geom of a kind whose longest side is ``ratio`` times its shortest."""
+    if kind == "mesh":
+        points = Rotation.random(60, random_state=3).as_matrix()[:, 0]
+        points = 0.03 * points * [1.0, ratio**-0.5, 1 / ratio]
+        numbers = " ".join(f"{x:.6g}" for x in points.ravel())
+        asset = f'<asset><mesh name="m" vertex="{numbers}"/></asset>'
+        return mujoco.MjModel.from_xml_string(
+            f"<mujoco>{asset}<worldbody><body><freejoint/>"
+            '<geom type="mesh" mesh="m"/></body></worldbody></mujoco>'
+        )
+    sizes = {
+        "capsule": (0.01, 0.01 * max(ratio - 1.0, 0.1)),
+        "cylinder": (0.01, 0.01 * ratio),
+        "disc": (0.01, 0.01 / ratio),
+    }.get(kind, (0.03, 0.03 * ratio**-0.5, 0.03 / ratio))
+    kind = kind.replace("disc", "cylinder")
+    size = " ".join(map(str, sizes))
+    return model_of(f'<body><freejoint/><geom type="{kind}" size="{size}"/></body>')
+
+
+@needs_numba
+@pytest.mark.parametrize("ratio", [1.0, 4.0, 20.0])
+@pytest.mark.parametrize(
+    "kind", ["box", "ellipsoid", "capsule", "cylinder", "disc", "mesh"]
+)
+def test_elements_follow_the_shape_of_each_geom(kind, ratio):
+    """Of 200 random poses and motions that bear a tenth of the most, 90 % are within 3 % and none is beyond 8 %."""
+    law = law_of("poppy-seeds-loose")
+    model = slender(kind, ratio)
+    mesh = mesh_of_elements(model, 0)
+    reach = np.linalg.norm(np.ptp(mesh.vertices, axis=0)) / 2
+    rng = np.random.default_rng(1)
+    turn = Rotation.random(200, random_state=1).as_matrix()
+    velocity = rng.normal(size=(200, 3)) - [0.0, 0.0, 1.0]
+    spin = rng.normal(size=(200, 3)) * 0.5 / reach
+    along_axes = lambda x: np.einsum("cij,ci->cj", turn, x)[None]
+    height = reach * rng.uniform(-1.5, 0.5, (1, 200))
+    up, ahead = turn[None, :, 2], turn[None, :, 0]
+    motion = Motion(
+        along_axes(velocity), along_axes(spin), 0 * height, up, ahead, height
+    )
+    ground = Ground(rounding=1e-5, grazing_sine=law.grazing_sine)
+
+    def forces(mesh):
+        block = Blocks([faces(mesh.vertices[mesh.faces], mesh.middle_normals)])
+        return block.loads(law, ground, motion)[0, :, :3]
+
+    finest = 12 if kind == "mesh" else 30
+    true = forces(mesh_of_elements(model, 0, reach / finest))
+    size = np.linalg.norm(true, axis=1)
+    kept = size > 0.1 * size.max()
+    errors = np.linalg.norm(forces(mesh) - true, axis=1)[kept] / size[kept]
+    assert np.quantile(errors, 0.9) < 0.03 and errors.max() < 0.08, errors.max()
+
+
+TWINS = """<body name="shank" pos="0 0 0.1"><freejoint/><geom {both} contype="0" conaffinity="0" group="2"/>
+<geom name="calf" {both} group="3"/><geom name="foot" type="sphere" size="0.022" group="3"/></body>"""
+
+
+def test_what_can_touch_nothing_is_not_in_the_sand():
+    """A visual twin counts only where it is named, or where all are of its kind; geoms of a body that overlap are told."""
+    model = model_of(TWINS.format(both='type="capsule" size="0.02 0.1"'))
+    with rft.mujoco.attach(model, MAP) as sand:
+        assert sand.geoms == ("calf", "foot")
+        left_out, overlap = own_notes(sand)[:2]
+        assert left_out.startswith("the geom 0, of the body 'shank' in group 2, which")
+        assert "overlap, where the sand acts on both: 'calf' and 'foot'" in overlap
+    for geoms, expected in (
+        ("shank", ("calf", "foot")),
+        (2, ("geom 0",)),
+        (["geom 0", "foot"], ("geom 0", "foot")),
+        ("*", ("calf", "foot")),
+    ):
+        with rft.mujoco.attach(model, MAP, geoms=geoms) as sand:
+            assert sand.geoms == expected
+
+
+def test_an_open_mesh_may_stand_for_its_convex_hull():
+    """As MuJoCo's contacts take it; the refusal names the geom, its body and group, and the option."""
+    faces = "0 2 1 0 1 3 0 3 2"
+    corners = "0 0 0 .06 0 0 0 .04 0 0 0 .1"
+    asset = '<asset><mesh name="{}" inertia="shell" vertex="{}" face="{}"/></asset>'
+    body = '<body name="leg"><freejoint/><geom type="mesh" mesh="m" mass="1"/></body>'
+    models = [
+        mujoco.MjModel.from_xml_string(
+            f"<mujoco>{asset.format('m', corners, own)}<worldbody>{body}</worldbody></mujoco>"
+        )
+        for own in (faces, f"{faces} 1 2 3")
+    ]
+    with pytest.raises(
+        rft.Refusal,
+        match=r"^the geom 0, of the body 'leg' in group 0: .*open.*: hulls = True",
+    ):
+        rft.mujoco.attach(models[0], MAP)
+    forces = []
+    for model, hulls in zip(models, (True, False)):
+        data = mujoco.MjData(model)
+        data.qvel[:] = [0.1, 0.2, -0.3, 1, 2, 3]
+        with rft.mujoco.attach(model, MAP, hulls=hulls, level=0.08) as sand:
+            mujoco.mj_forward(model, data)
+            forces.append(sand.forces(data)[0])
+    np.testing.assert_allclose(*forces, rtol=1e-6)  # corners of single precision
+
+
 PLATE = """<body pos="0 0 0.04"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>
 <geom type="box" size="0.005 0.046 0.06" mass="1e6"/></body>"""
 REMEMBERS = '<size nuserdata="30000"/><option gravity="0 0 0" timestep="{}"/>'
-needs_numba = pytest.mark.skipif(
-    not backend.installed(), reason="needs the extra: pip install 'geomech[fast]'"
-)
 
 
 def moved(sand, model, data, velocity, seconds):
@@ -1477,7 +1582,7 @@ def test_a_name_is_the_stress_map_of_the_catalogue():
     block = model_of('<body><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>')
     with pytest.raises(
         rft.Refusal,
-        match=r"^the geom 'geom 0': the geom has 480000 elements, .*: make element longer",
+        match=r"^the geom 0, of a body without name in group 0: the geom has 480000 elements, .*: make element longer",
     ):
         rft.mujoco.attach(block, MAP, element=1e-3)
 

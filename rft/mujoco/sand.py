@@ -22,27 +22,29 @@ from rft.mujoco import installed
 from rft.mujoco.bed import Bed
 from rft.mujoco.floor import Apart, apart, floors, part, rejoin
 from rft.mujoco.footprints import FORM, Footprints, Prints
-from rft.mujoco.geoms import chosen_geoms, geom_name, mesh_of_elements
+from rft.mujoco.geoms import described, geom_name, mesh_of_elements
 from rft.mujoco.hills import FLAT, Hills, hills_of
 from rft.mujoco.media import Media, law_of, one_form, sample
 from rft.mujoco.regions import zones_of
 from rft.mujoco.rest import ROUNDING, Rest
+from rft.mujoco.selection import chosen_geoms, overlap_note
 from rft.mujoco.steps import needed_rounding, sinkage, step_note
 from rft.plates import StressMap
 from rft.refusal import Refusal, formatted, located, require
 
 __all__ = ["Footprints", "Sand", "attach", "sample"]
 
-PER_GEOM = 4  # elements along the mean radius of the geoms, if no length is given
+MANY_ELEMENTS = 20_000  # whose steps of 2 ms take half a millisecond and more
 SLOWER = 60  # times that a step takes by NumPy over compiled code, measured: pytest -m benchmark -k hexapod
 
 
 class Sand:
     """Sand that is attached to a model; `attach` makes it. As a context manager it is detached at the end.
 
-    geoms: names of the geoms in the sand, in the order of `forces`. element: length of the elements' edges, m. rounding: m/s;
-    an element of speed v bears v / sqrt(v^2 + rounding^2) of its stress. elements: number of elements. notes: lines about
-    what was changed and what is inexact. media: of the simulations of the last batch that was given some; None else.
+    geoms: names of the geoms in the sand, in the order of `forces`. element: length of the elements' edges, m; None for
+    lengths by geom. rounding: m/s; an element of speed v bears v / sqrt(v^2 + rounding^2) of its stress. elements: number
+    of elements. notes: lines about what was changed and what is inexact. media: of the simulations of the last batch that
+    was given some; None else.
 
     All that is read from data holds for data whose positions and velocities are up to date, as after ``mj_forward``.
     """
@@ -51,7 +53,7 @@ class Sand:
         self,
         model: mujoco.MjModel,
         bed: Bed,
-        element: float,
+        element: float | None,
         notes: Sequence[str],
         separation: Apart | None,
     ):
@@ -77,7 +79,7 @@ class Sand:
     def __repr__(self) -> str:
         state = "" if self.is_attached else ", detached"
         return (
-            f"Sand({len(self.geoms)} geoms, {self.elements} elements of {self.element:.3g} m, rounding"
+            f"Sand({len(self.geoms)} geoms, {self.elements} elements, rounding"
             f" {self.rounding:.3g} m/s at a time step of {1e3 * self._step:.3g} ms{state})"
         )
 
@@ -247,6 +249,7 @@ def attach(
     regions: Mapping[str, Any] | None = None,
     footprints: Footprints | None = None,
     rest: bool = False,
+    hulls: bool = False,
 ) -> Sand:
     """Put sand under geoms of a MuJoCo model, until `Sand.detach` or until the model is gone.
 
@@ -259,14 +262,16 @@ def attach(
         Name in `rft.plates.VERTICAL` or a stress map of the vertical plane, which acts in three dimensions as
         `rft.meshes.extruded` has it; or a law of three dimensions.
     geoms : str, int or list of these
-        Names, patterns such as "leg*" and groups of the geoms in the sand; by default all that move.
+        Names of the geoms in the sand or of their bodies, patterns such as "leg*" and groups; by default all that move.
+        Geoms that can touch nothing are left out, unless they are named or nothing else is meant.
     level : float, m, or str
         Height of the surface at x = 0; or the name of a height field, which is the surface then. Each geom sees the plane
         that touches it below the geom; the ground there is as strong as where it is level.
     slope : float, rad
         Angle by which the surface rises along x; the ground is weaker as `rft.ground.Slope` has it.
     element : float, m
-        Length of the edges of the triangles that geoms are cut into; by default a quarter of the mean radius of the geoms.
+        Length of the edges of the triangles that geoms are cut into; by default as many as the shape of each geom asks for
+        (`rft.mujoco.geoms.mesh_of_elements`).
     rounding : float, m/s
         Speed below which the stress on an element falls off in proportion to its speed; by default what the time step asks
         for, `rft.mujoco.steps.needed_rounding`.
@@ -279,6 +284,8 @@ def attach(
         Grid on which the ground remembers what geoms press down and heap up; None for ground that remembers nothing.
     rest : bool
         Whether bodies come to rest, held by what `rft.mujoco.rest` remembers; otherwise they creep, and chatter at last.
+    hulls : bool
+        Whether meshes without an inside, such as open ones, stand for their convex hulls, as in MuJoCo's contacts.
 
     Returns
     -------
@@ -307,10 +314,8 @@ def attach(
     in_range("level", level, -1e6, 1e6, unit="m")
     regions = {} if regions is None else regions
     zones = zones_of(regions)
-    laws, chosen = (
-        one_form((*map(law_of, regions.values()), law_of(medium))),
-        chosen_geoms(model, geoms),
-    )
+    laws = one_form((*map(law_of, regions.values()), law_of(medium)))
+    chosen, notes = chosen_geoms(model, geoms)
     taken = {int(g) for bed in installed.beds(model) for g in bed.geoms} & {*chosen}
     names = ", ".join(formatted(geom_name(model, g)) for g in sorted(taken)[:3])
     require(
@@ -319,9 +324,11 @@ def attach(
         instead="detach it, or name other geoms",
     )
     _require_passive(model)
-    if element is None:
-        element = float(np.mean(model.geom_rbound[chosen])) / PER_GEOM
-    in_range("element", element, 1e-6, 1e3, unit="m")
+    if element is not None:
+        in_range("element", element, 1e-6, 1e3, unit="m")
+    require(
+        isinstance(hulls, bool | np.bool_), "hulls must be True or False", value=hulls
+    )
     if rounding is not None:
         in_range("rounding", rounding, 1e-7, 10, unit="m/s")
     needed = needed_rounding(model, chosen)
@@ -332,7 +339,7 @@ def attach(
     bed = Bed.under(
         model,
         chosen,
-        meshes(model, chosen, element),
+        meshes(model, chosen, element, bool(hulls)),
         laws,
         zones,
         ground,
@@ -341,15 +348,17 @@ def attach(
         hills,
     )
     if footprints is not None or rest:
-        bed = remembering(model, bed, footprints, rest)
+        bed = remembering(model, bed, footprints, rest, bool(hulls))
     planes = [
         g for g in field or floors(model, bed.up, bed.level) if _touch(model, chosen, g)
     ]
     separation = apart(model, chosen, planes) if planes else None
-    notes = [_contact_note(model, chosen, planes)] if planes else []
+    notes += [_contact_note(model, chosen, planes)] if planes else []
     notes += [
         line
         for line in (
+            overlap_note(model, chosen),
+            _elements_note(model, bed),
             step_note(model, chosen, max(rounding, needed * rest)),
             _python_note(),
         )
@@ -363,7 +372,11 @@ def attach(
 
 
 def remembering(
-    model: mujoco.MjModel, bed: Bed, footprints: Footprints | None, rest: bool
+    model: mujoco.MjModel,
+    bed: Bed,
+    footprints: Footprints | None,
+    rest: bool,
+    hulls: bool = False,
 ) -> Bed:
     """Return a bed that remembers footprints, and what holds bodies at rest; Refusal where there is no memory for that."""
     what = "footprints need" if footprints is not None else "rest needs"
@@ -379,7 +392,7 @@ def remembering(
         instead="attach all geoms at once",
     )
     if footprints is not None:
-        bed = replace(bed, prints=prints_under(model, bed, footprints))
+        bed = replace(bed, prints=prints_under(model, bed, footprints, hulls))
     if rest:
         inverse = model.body_invweight0[bed.bodies, 0]
         robots = np.array(
@@ -394,16 +407,17 @@ def remembering(
     return bed
 
 
-def prints_under(model: mujoco.MjModel, bed: Bed, footprints: Footprints) -> Prints:
+def prints_under(
+    model: mujoco.MjModel, bed: Bed, footprints: Footprints, hulls: bool
+) -> Prints:
     """Return what footprints in a bed follow from."""
     require(
         isinstance(footprints, Footprints),
         "footprints must be rft.mujoco.Footprints",
         value=footprints,
     )
-    points = [
-        mesh.vertices for mesh in meshes(model, list(bed.geoms), footprints.spacing / 2)
-    ]
+    half = footprints.spacing / 2
+    points = [mesh.vertices for mesh in meshes(model, list(bed.geoms), half, hulls)]
     places = np.stack(np.meshgrid(*footprints.middles), -1).reshape(-1, 2)
     up, level = bed.surface(np.concatenate([places, np.zeros((len(places), 1))], 1))
     heights = (level - (up[:, :2] * places).sum(-1)) / up[:, 2]
@@ -425,12 +439,18 @@ def _field(model: mujoco.MjModel, name: str, slope: float) -> tuple[Hills, list[
     return hills, [geom]
 
 
-def meshes(model: mujoco.MjModel, geoms: Sequence[int], element: float) -> list[Mesh]:
-    """Return the meshes of geoms in their frames, with edges of about ``element``, m."""
+def meshes(
+    model: mujoco.MjModel,
+    geoms: Sequence[int],
+    element: float | None = None,
+    hulls: bool = False,
+) -> list[Mesh]:
+    """Return the meshes of geoms in their frames, with edges of about ``element``, m, or as each geom's shape asks for.
+    hulls: whether meshes without an inside stand for their convex hulls."""
     out = []
     for geom in geoms:
-        with located(f"the geom {formatted(geom_name(model, geom))}"):
-            out.append(mesh_of_elements(model, geom, element))
+        with located(f"the geom {described(model, geom)}"):
+            out.append(mesh_of_elements(model, geom, element, hulls))
     return out
 
 
@@ -459,6 +479,19 @@ def _contact_note(
         else "the geom no longer touches"
     )
     return f"{count} the floor {names}, which lies in the surface of the sand"
+
+
+def _elements_note(model: mujoco.MjModel, bed: Bed) -> str:
+    """Return a line about more elements than steps in real time allow, or "" for few."""
+    counts = np.diff(bed.blocks.first)
+    if counts.sum() <= MANY_ELEMENTS:
+        return ""
+    most = int(np.argmax(counts))
+    return (
+        f"the sand has {counts.sum():,} elements, {counts[most]:,} of them on the geom"
+        f" {described(model, bed.geoms[most])}: steps take long; give fewer geoms, or"
+        " meshes of fewer triangles"
+    )
 
 
 def _python_note() -> str:
