@@ -33,11 +33,12 @@ from rft.mujoco.geoms import mesh_of_elements  # noqa: E402
 from rft.mujoco.hills import hills_of, tangent_plane  # noqa: E402
 from rft.mujoco.media import law_of  # noqa: E402
 from rft.mujoco.sand import meshes  # noqa: E402
-from rft.mujoco.steps import needed_rounding  # noqa: E402
 
 needs_numba = pytest.mark.skipif(
     not backend.installed(), reason="needs the extra: pip install 'geomech[fast]'"
 )
+# Steps so short that forces are those of the velocities in the data.
+AT_ONCE = '<option timestep="1e-12" gravity="0 0 0"/>'
 SPATIAL = Spatial(3e5, surface_friction=0.6, grazing=math.radians(5))
 MAP = StressMap(zeta=0.3, grazing=math.radians(5))
 GEOMS = (
@@ -119,7 +120,7 @@ def test_forces_are_those_of_the_meshes_and_do_their_virtual_work(name, law, sol
     """Of random motions of chains: each geom against the force on its mesh alone, qfrc_passive against mj_applyFT."""
     rng = np.random.default_rng(len(name))
     more = "" if name == "free root" else MORE  # empty arrays of MuJoCo's, or none
-    model = model_of(chain(rng, CHAINS[name]), '<option gravity="0 0 0"/>', more)
+    model = model_of(chain(rng, CHAINS[name]), AT_ONCE, more)
     data, plain = mujoco.MjData(model), mujoco.MjData(model)
     holes = (
         DisturbedGround((0.05, -0.3), 0.2, 0.4),
@@ -213,7 +214,7 @@ BALL = '<body name="ball" pos="0 0 0.01"><freejoint/><geom name="ball" type="sph
 def test_a_geom_bears_what_its_mesh_does(solved_by):
     """Of `rft.meshes.wrench`, which has no rounding, on the same triangles; and about the origin of the body."""
     model = model_of(
-        BALL.replace("<geom", '<geom pos="0.01 0.02 -0.01" euler="20 30 40"')
+        BALL.replace("<geom", '<geom pos="0.01 0.02 -0.01" euler="20 30 40"'), AT_ONCE
     )
     data = mujoco.MjData(model)
     data.qvel[:] = [0.4, 0.3, -0.5, 3.0, -2.0, 1.0]
@@ -274,7 +275,8 @@ def test_a_geom_that_hardly_dips_in_bears(geom, solved_by):
 def test_a_long_rod_bears_what_the_plane_says():
     """A stress map on a cylinder dragged across its axis and down, against the outline of the vertical plane."""
     model = model_of(
-        '<body pos="0 0 -0.1" euler="90 0 0"><freejoint/><geom type="cylinder" size="0.02 0.05"/></body>'
+        '<body pos="0 0 -0.1" euler="90 0 0"><freejoint/><geom type="cylinder" size="0.02 0.05"/></body>',
+        AT_ONCE,
     )
     data = mujoco.MjData(model)
     data.qvel[:3] = [0.3, 0.0, -0.2]
@@ -293,7 +295,8 @@ def hilly(heights, pose="", geoms=f"<geom {GEOMS[1]}/>"):
     size = f'nrow="{len(heights)}" ncol="{len(heights[0])}" size="1 0.5 1 0.1"'
     asset = f'<asset><hfield name="hills" {size} elevation="{rows}"/></asset>'
     field = f'<geom name="hills" type="hfield" hfield="hills" {pose}/>'
-    return model_of(f'{field}<body pos="0 0 0"><freejoint/>{geoms}</body>', more=asset)
+    body = f'{field}<body pos="0 0 0"><freejoint/>{geoms}</body>'
+    return model_of(body, AT_ONCE, asset)
 
 
 def test_a_height_field_is_the_surface(solved_by):
@@ -301,7 +304,7 @@ def test_a_height_field_is_the_surface(solved_by):
     along = np.linspace(0.0, 1.0, 5) * np.ones((4, 1))  # rises by 1 m in 2 m
     model = hilly(along, 'pos="0 0 -0.5" euler="0 0 30"')
     flat, angle = (
-        model_of(f"<body><freejoint/><geom {GEOMS[1]}/></body>"),
+        model_of(f"<body><freejoint/><geom {GEOMS[1]}/></body>", AT_ONCE),
         math.atan(0.5),
     )
     turn, place = Rotation.from_euler("z", 30, degrees=True), np.array([0.2, 0.1, 0.11])
@@ -411,7 +414,7 @@ def test_media_by_region(solved_by):
     body = "".join(
         f'<body pos="0 0 -0.02"><freejoint/><geom {geom}/></body>' for geom in GEOMS
     )
-    model = model_of(body, '<option gravity="0 0 0"/>')
+    model = model_of(body, AT_ONCE)
     data, rng = mujoco.MjData(model), np.random.default_rng(5)
     poses = data.qpos.reshape(-1, 7)
     poses[:, 3:] = Rotation.random(6, random_state=6).as_quat()
@@ -532,7 +535,7 @@ def test_forces_converge_with_the_length_of_elements():
     body = "".join(
         f'<body pos="0 0 -0.02"><freejoint/><geom {geom}/></body>' for geom in GEOMS
     )
-    model = model_of(body, '<option gravity="0 0 0"/>')
+    model = model_of(body, AT_ONCE)
     data = mujoco.MjData(model)
     data.qvel[:] = np.random.default_rng(3).normal(size=model.nv)
     values = []
@@ -643,7 +646,7 @@ def test_an_open_mesh_may_stand_for_its_convex_hull():
     body = '<body name="leg"><freejoint/><geom type="mesh" mesh="m" mass="1"/></body>'
     models = [
         mujoco.MjModel.from_xml_string(
-            f"<mujoco>{asset.format('m', corners, own)}<worldbody>{body}</worldbody></mujoco>"
+            f"<mujoco>{AT_ONCE}{asset.format('m', corners, own)}<worldbody>{body}</worldbody></mujoco>"
         )
         for own in (faces, f"{faces} 1 2 3")
     ]
@@ -970,7 +973,8 @@ def test_footprints_that_cannot_be_are_refused():
 
 def test_forces_turn_and_mirror_with_the_motion():
     model = model_of(
-        f'<body pos="0 0 0.01"><freejoint/><geom {GEOMS[0]}/><geom {GEOMS[1]} pos="0.03 0 0"/></body>'
+        f'<body pos="0 0 0.01"><freejoint/><geom {GEOMS[0]}/><geom {GEOMS[1]} pos="0.03 0 0"/></body>',
+        AT_ONCE,
     )
     data, rng = mujoco.MjData(model), np.random.default_rng(2)
     tilt, twist = Rotation.random(random_state=4), rng.normal(size=(2, 3))
@@ -1041,120 +1045,6 @@ def test_a_body_at_rest_creeps_as_its_sinkage_says():
         )
     with rft.mujoco.attach(model, Spatial(1.0)) as sand:
         assert sand.sinkage(data) == (math.inf, math.inf)
-
-
-DROPPED = """<body pos="0.01 0.02 0.05" euler="3 5 10"><freejoint/><geom type="box" size="0.1 0.05 0.03" mass="1"/>
-<body pos="0.02 0.06 0"><joint axis="0 1 0" stiffness="2" damping="0.01" armature="0.001"/>
-<geom type="capsule" size="0.012" fromto="0 0 0 0 0 -0.05" mass="0.05"/></body></body>"""
-
-
-@needs_numba
-@pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast", "RK4"])
-def test_a_body_comes_to_rest(integrator):
-    """At 2 ms: it chatters at 5 mm/s and more without memory, and creeps by 0.03 mm/s at most with it, borne by the grains."""
-    options = (
-        f'<option timestep="0.002" integrator="{integrator}"/><size nuserdata="19"/>'
-    )
-    model = model_of(DROPPED, options)
-    for rest in (False, True):
-        data, fastest, model.opt.timestep = mujoco.MjData(model), 0.0, 0.0005
-        with rft.mujoco.attach(model, MAP, rest=rest) as sand:
-            model.opt.timestep = 0.002
-            mujoco.mj_step(model, data, 1000)
-            for _ in range(200):
-                mujoco.mj_step(model, data)
-                fastest = max(fastest, np.abs(data.qvel).max())
-            mujoco.mj_forward(model, data)
-            if not rest:
-                assert fastest > 5e-3
-                continue
-            assert fastest < 1e-4 and np.abs(data.qvel[:3]).max() < 3e-5
-            assert sand.forces(data)[:, 2].sum() == pytest.approx(1.05 * 9.81, rel=1e-3)
-            np.testing.assert_allclose(
-                data.qfrc_passive[:3], sand.forces(data).sum(0), atol=1e-9
-            )
-            before = data.userdata.copy()
-            mujoco.mj_forward(model, data)
-            np.testing.assert_array_equal(data.userdata, before)
-            depth = -sand.sinkage(data, 9.0)[0]
-            assert (
-                sand.sinkage(data, 9.0)[1] == -depth and 0.0 < depth < 0.03
-            )  # the fall carried it below
-
-
-@needs_numba
-def test_what_holds_at_rest_changes_no_force_at_speed():
-    """Within 0.5 % at ten times the speed e; and nothing is held out of the sand, or after a reset."""
-    model = model_of(
-        BALL.replace('mass="0.2"', 'mass="0.2" euler="10 20 30"'),
-        '<size nuserdata="10"/>',
-    )
-    forces = []
-    for rest in (False, True):
-        with rft.mujoco.attach(model, SPATIAL, rounding=1e-3, rest=rest) as sand:
-            data = mujoco.MjData(model)
-            for velocity in ([0.5, 0.0, -0.2], [-0.4, 0.3, 0.1]):
-                for _ in range(60):
-                    data.qpos[:3], data.qvel[:] = (
-                        [0.0, 0.0, 0.005],
-                        [*velocity, 1, 2, 3],
-                    )
-                    mujoco.mj_step(model, data)
-                forces.append(sand.forces(data)[0])
-    assert np.linalg.norm(forces[0]) > 1.0 and data.userdata[7] < 0.05
-    np.testing.assert_allclose(
-        forces[2:], forces[:2], atol=5e-3 * np.linalg.norm(forces[0])
-    )
-    with rft.mujoco.attach(model, SPATIAL, rest=True) as sand:
-        data.qpos[2] = 1.0
-        mujoco.mj_step(model, data)
-        assert not sand.forces(data).any()
-        if int(mujoco.__version__.partition(".")[0]) >= 4:
-            batch = sand.batch(2, 2)
-            batch.step(nstep=300)
-            mujoco.mj_resetData(model, data)
-            mujoco.mj_step(model, data, 300)
-            np.testing.assert_allclose(
-                batch.bind("qpos"), [data.qpos] * 2, rtol=0, atol=1e-13
-            )
-    with pytest.raises(
-        rft.Refusal,
-        match="rest needs 10 numbers of userdata, the model has 0: write <size nuserdata",
-    ):
-        rft.mujoco.attach(model_of(BALL), SPATIAL, rest=True)
-
-
-def test_the_time_step_and_the_masses_ask_for_a_rounding():
-    """h g / 2 of a free body; the step that a rounding allows is told, and a geom that runs away is, once."""
-    model = model_of(BALL, '<option timestep="0.002"/>')
-    with rft.mujoco.attach(model, MAP) as sand:
-        assert (
-            sand.rounding == pytest.approx(0.002 * 9.81 / 2) and own_notes(sand) == []
-        )
-        assert "rounding 0.00981 m/s at a time step of 2 ms" in repr(sand)
-    with pytest.warns(
-        Note, match=r"asks for a rounding of 0\.0098 m/s, .* steps of 0\.2 ms would not"
-    ):
-        rft.mujoco.attach(model, MAP, rounding=9.81e-4).detach()
-    model.opt.timestep = 0.05
-    with pytest.warns(Note, match=r"the rounding of 0\.25 m/s, .* creep"):
-        sand = rft.mujoco.attach(model, MAP)
-    data = mujoco.MjData(model)
-    data.qpos[2], data.qvel[0] = 0.0, 200.0
-    if installed.serves_compiled():
-        with pytest.warns(
-            Note, match="a geom in the sand is faster than 100 m/s"
-        ) as caught:
-            mujoco.mj_step(model, data, 3)
-        assert len(caught) == 1 and installed.times_too_fast(sand._row) == 3
-    model.opt.timestep = 0.1
-    with pytest.warns(
-        Note,
-        match=r"100 ms asks for a rounding of 0\.49 m/s, the sand has 0\.25: .*; steps of 50 ms",
-    ) as caught:
-        sand.forces(data), sand.forces(data)
-    assert len(caught) == 1
-    sand.detach()
 
 
 FLOORED = """<geom name="floor" type="plane" size="1 1 1" {}/><geom name="rock" type="box" size=".1 .1 .1" pos="3 0 .1"/>
@@ -1458,7 +1348,7 @@ def test_a_fault_inside_the_callback_of_python_detaches_the_sand(monkeypatch):
     data = mujoco.MjData(model)
     with preferring("numpy"):
         sand = rft.mujoco.attach(model, MAP)
-    monkeypatch.setattr("rft.mujoco.bed.Bed.wrenches", lambda *_: 1 / 0)
+    monkeypatch.setattr("rft.mujoco.bed.Bed.frames", lambda *_: 1 / 0)
     with pytest.warns(Note, match="the sand is detached: ZeroDivisionError"):
         mujoco.mj_step(model, data)
     assert not sand.is_attached
@@ -1512,7 +1402,7 @@ REFUSED = {
     "rounding": ({"rounding": 0.0}, "rounding must be"),
     "level": ({"level": math.nan}, "level must be"),
     "slope": ({"slope": 1.2}, "slides by itself"),
-    "rest": ({"rest": "no"}, "rest must be True or False, got 'no'"),
+    "hulls": ({"hulls": "no"}, "hulls must be True or False, got 'no'"),
     "effects": ({"effects": ["aeration"]}, "effects must be a list of effects"),
 }
 
@@ -1577,8 +1467,6 @@ def test_a_name_is_the_stress_map_of_the_catalogue():
         law_of("poppy-seeds-loose") == Extruded(VERTICAL["poppy-seeds-loose"].stress)
         and law_of(SPATIAL) == SPATIAL
     )
-    model = model_of(BALL)
-    assert needed_rounding(model, [0]) == pytest.approx(9.81e-3)
     block = model_of('<body><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>')
     with pytest.raises(
         rft.Refusal,

@@ -26,15 +26,15 @@ from rft.mujoco.geoms import described, geom_name, mesh_of_elements
 from rft.mujoco.hills import FLAT, Hills, hills_of
 from rft.mujoco.media import Media, law_of, one_form, sample
 from rft.mujoco.regions import zones_of
-from rft.mujoco.rest import ROUNDING, Rest
 from rft.mujoco.selection import chosen_geoms, overlap_note
-from rft.mujoco.steps import needed_rounding, sinkage, step_note
+from rft.mujoco.sinkage import sinkage
 from rft.plates import StressMap
 from rft.refusal import Refusal, formatted, located, require
 
 __all__ = ["Footprints", "Sand", "attach", "sample"]
 
 MANY_ELEMENTS = 20_000  # whose steps of 2 ms take half a millisecond and more
+ROUNDING = 1e-5  # m/s, assumed: bodies at rest on slopes creep at up to that speed
 SLOWER = 60  # times that a step takes by NumPy over compiled code, measured: pytest -m benchmark -k hexapod
 
 
@@ -60,7 +60,7 @@ class Sand:
         self._model, self._bed, self.element = weakref.ref(model), bed, element
         self.geoms = tuple(geom_name(model, g) for g in bed.geoms)
         self.rounding, self.elements = bed.ground.rounding, len(bed.blocks.owner)
-        self._form, self._step = _form(model, bed.geoms), model.opt.timestep
+        self._form = _form(model, bed.geoms)
         self._row = installed.install(model, bed)
         self.notes, self.media, self._parted = (
             tuple(notes),
@@ -80,7 +80,7 @@ class Sand:
         state = "" if self.is_attached else ", detached"
         return (
             f"Sand({len(self.geoms)} geoms, {self.elements} elements, rounding"
-            f" {self.rounding:.3g} m/s at a time step of {1e3 * self._step:.3g} ms{state})"
+            f" {self.rounding:.3g} m/s{state})"
         )
 
     @property
@@ -99,8 +99,7 @@ class Sand:
 
     def forces(self, data: mujoco.MjData) -> np.ndarray:
         """Return the force of the grains on each geom, (G, 3), N, in the world."""
-        self._check(data)
-        return self._bed.wrenches(data)[:, :3]
+        return self._wrenches(data)[0][:, :3]
 
     def wrench(self, data: mujoco.MjData, body: str | int) -> np.ndarray:
         """Return force, N, and moment about the body's origin, N m, of the grains on a body, (6,), in the world."""
@@ -112,15 +111,28 @@ class Sand:
         )
         require(0 <= number < model.nbody, f"the model has no body {formatted(body)}")
         own = self._bed.bodies == number
-        force, moment = np.split(self._bed.wrenches(data)[own], 2, axis=1)
+        force, moment = np.split(self._wrenches(data)[0][own], 2, axis=1)
         arm = data.geom_xpos[self._bed.geoms[own]] - data.xpos[number]
         return np.concatenate([force.sum(0), (moment + np.cross(arm, force)).sum(0)])
 
     def power(self, data: mujoco.MjData) -> float:
-        """Return the power of the grains on the geoms, W; negative where they dissipate."""
-        self._check(data)
-        twist = np.concatenate(self._bed.twists(data), axis=1)
-        return float((self._bed.wrenches(data) * twist).sum())
+        """Return the power of the grains on the geoms, W, at the velocities of the end of the step; negative where they
+        dissipate."""
+        wrenches, twists = self._wrenches(data)
+        return float((wrenches * twists).sum())
+
+    def _wrenches(self, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
+        """Return wrenches and twists of the geoms in the step that begins at data, (G, 6), in the world."""
+        model = self._check(data)
+        seen = installed.see(self._row, model, data)
+        turn = data.geom_xmat[self._bed.geoms].reshape(-1, 3, 3)
+        both = np.stack([seen.wrenches, seen.twists]).reshape(2, -1, 2, 3)
+        return tuple(np.einsum("gij,kgpj->kgpi", turn, both).reshape(2, -1, 6))
+
+    @property
+    def effort(self) -> installed.Effort:
+        """What the steps have cost so far, and how many of them were not solved (`rft.mujoco.installed.Effort`)."""
+        return installed.effort(self._row)
 
     def ground(
         self, data: mujoco.MjData | np.ndarray
@@ -156,7 +168,7 @@ class Sand:
         robot: until the grains bear it, and a ``time``, s, later, as the rounding lets them creep."""
         model = self._check(data)
         in_range("time", time, 0, 1e6, unit="s")
-        return sinkage(model, data, self._bed, 0.0 if self._bed.rest else time)
+        return sinkage(model, data, self._bed, time)
 
     def batch(
         self,
@@ -225,15 +237,6 @@ class Sand:
             f"the geom {formatted(self.geoms[changed[0]] if changed.size else '')} changed after attach",
             instead="detach the sand and attach it anew",
         )
-        if model.opt.timestep != self._step:
-            self._step = model.opt.timestep
-            line = (
-                ""
-                if self._bed.rest
-                else step_note(model, list(self._bed.geoms), self.rounding)
-            )
-            if line:
-                warnings.warn(line, Note, stacklevel=3)
         return model
 
 
@@ -248,7 +251,6 @@ def attach(
     effects: Sequence[GroundEffect] = (),
     regions: Mapping[str, Any] | None = None,
     footprints: Footprints | None = None,
-    rest: bool = False,
     hulls: bool = False,
 ) -> Sand:
     """Put sand under geoms of a MuJoCo model, until `Sand.detach` or until the model is gone.
@@ -273,8 +275,7 @@ def attach(
         Length of the edges of the triangles that geoms are cut into; by default as many as the shape of each geom asks for
         (`rft.mujoco.geoms.mesh_of_elements`).
     rounding : float, m/s
-        Speed below which the stress on an element falls off in proportion to its speed; by default what the time step asks
-        for, `rft.mujoco.steps.needed_rounding`.
+        Speed below which the stress on an element falls off in proportion to its speed; by default 1e-5 m/s.
     effects : list of GroundEffect
         Effects on the ground, such as `rft.ground.GrainInertia`.
     regions : dict
@@ -282,8 +283,6 @@ def attach(
         and y in m in the world. A place belongs to the first region that holds it, or else to ``medium``.
     footprints : Footprints
         Grid on which the ground remembers what geoms press down and heap up; None for ground that remembers nothing.
-    rest : bool
-        Whether bodies come to rest, held by what `rft.mujoco.rest` remembers; otherwise they creep, and chatter at last.
     hulls : bool
         Whether meshes without an inside, such as open ones, stand for their convex hulls, as in MuJoCo's contacts.
 
@@ -305,7 +304,6 @@ def attach(
     require(
         isinstance(model, mujoco.MjModel), "model must be a mujoco.MjModel", value=model
     )
-    require(isinstance(rest, bool | np.bool_), "rest must be True or False", value=rest)
     require(model.nv > 0, "nothing in the model can move", because="it has no joints")
     hills, field = (
         (FLAT, []) if not isinstance(level, str) else _field(model, level, slope)
@@ -329,11 +327,8 @@ def attach(
     require(
         isinstance(hulls, bool | np.bool_), "hulls must be True or False", value=hulls
     )
-    if rounding is not None:
-        in_range("rounding", rounding, 1e-7, 10, unit="m/s")
-    needed = needed_rounding(model, chosen)
-    if rounding is None:
-        rounding = ROUNDING if rest else max(needed, 1e-6)
+    rounding = ROUNDING if rounding is None else rounding
+    in_range("rounding", rounding, 1e-7, 10, unit="m/s")
     effects = (*effects, Slope(slope)) if slope else tuple(effects)
     ground = ground_of(effects, Ground(rounding=rounding))
     bed = Bed.under(
@@ -347,8 +342,8 @@ def attach(
         level,
         hills,
     )
-    if footprints is not None or rest:
-        bed = remembering(model, bed, footprints, rest, bool(hulls))
+    if footprints is not None:
+        bed = remembering(model, bed, footprints, bool(hulls))
     planes = [
         g for g in field or floors(model, bed.up, bed.level) if _touch(model, chosen, g)
     ]
@@ -359,7 +354,6 @@ def attach(
         for line in (
             overlap_note(model, chosen),
             _elements_note(model, bed),
-            step_note(model, chosen, max(rounding, needed * rest)),
             _python_note(),
         )
         if line
@@ -372,17 +366,12 @@ def attach(
 
 
 def remembering(
-    model: mujoco.MjModel,
-    bed: Bed,
-    footprints: Footprints | None,
-    rest: bool,
-    hulls: bool = False,
+    model: mujoco.MjModel, bed: Bed, footprints: Footprints, hulls: bool = False
 ) -> Bed:
-    """Return a bed that remembers footprints, and what holds bodies at rest; Refusal where there is no memory for that."""
-    what = "footprints need" if footprints is not None else "rest needs"
+    """Return a bed that remembers footprints; Refusal where there is no memory for that."""
     require(
         installed.serves_compiled(),
-        f"{what} compiled code",
+        "footprints need compiled code",
         instead="pip install 'geomech[fast]'",
     )
     others = any(other.remembered for other in installed.beds(model))
@@ -391,18 +380,9 @@ def remembering(
         "another sand under the model remembers",
         instead="attach all geoms at once",
     )
-    if footprints is not None:
-        bed = replace(bed, prints=prints_under(model, bed, footprints, hulls))
-    if rest:
-        inverse = model.body_invweight0[bed.bodies, 0]
-        robots = np.array(
-            [np.flatnonzero(bed.roots == root)[0] for root in bed.roots], np.int64
-        )
-        bed = replace(bed, rest=Rest(inverse, bed.spheres[:, 3], robots))
+    bed = replace(bed, prints=prints_under(model, bed, footprints, hulls))
     cure = f'write <size nuserdata="{bed.remembered}"/> in its MJCF, or spec.nuserdata'
-    what = (
-        f"{what} {bed.remembered} numbers of userdata, the model has {model.nuserdata}"
-    )
+    what = f"footprints need {bed.remembered} numbers of userdata, the model has {model.nuserdata}"
     require(model.nuserdata >= bed.remembered, what, instead=cure)
     return bed
 
