@@ -3,6 +3,7 @@
 import gc
 import importlib
 import math
+import pickle
 import sys
 import threading
 import warnings
@@ -1402,6 +1403,7 @@ REFUSED = {
     "rounding": ({"rounding": 0.0}, "rounding must be"),
     "level": ({"level": math.nan}, "level must be"),
     "slope": ({"slope": 1.2}, "slides by itself"),
+    "no effects": ({"effects": None}, "effects must be a list of effects .* got None"),
     "hulls": ({"hulls": "no"}, "hulls must be True or False, got 'no'"),
     "effects": ({"effects": ["aeration"]}, "effects must be a list of effects"),
 }
@@ -1425,6 +1427,8 @@ def test_what_changes_after_attach_is_refused():
     model = model_of(BALL)
     data = mujoco.MjData(model)
     with rft.mujoco.attach(model, MAP) as sand:
+        with pytest.raises(rft.Refusal, match="a Sand cannot be pickled or copied"):
+            pickle.dumps(sand)
         with pytest.raises(
             rft.Refusal, match="sand is attached to 'ball' already: detach it"
         ):

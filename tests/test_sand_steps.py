@@ -346,3 +346,34 @@ def test_forces_and_steps_agree_at_any_speed():
         assert np.isfinite(force).all()
         np.testing.assert_allclose(data.qfrc_passive[:3], force, rtol=1e-6, atol=1e-9)
         assert (force[0] < 0.0) == (speed < 1e100)
+
+
+def test_a_geom_that_changes_stops_the_sand_with_a_line(solved_by):
+    model = model_of(free(0.0, '<geom name="ball" type="sphere" size="0.03"/>'), 0.002)
+    data = mujoco.MjData(model)
+    with rft.mujoco.attach(model, StressMap(zeta=0.3)) as sand:
+        mujoco.mj_step(model, data)
+        model.geom_size[0, 0] = 0.05
+        line = "detached: the geom 'ball' changed after attach: attach it anew"
+        with pytest.warns(Note, match=line) as caught:
+            mujoco.mj_step(model, data, 3)
+        assert len(caught) == 1 and not sand.is_attached
+
+
+@needs_numba
+def test_the_error_of_a_run_covers_steps_and_elements():
+    """Of a ball that is thrown into the sand, against a run with steps and elements an eighth as long; data stay."""
+    ball = '<geom type="sphere" size=".03" mass=".2"/>'
+    errors = []
+    for step, element in ((0.002, 0.02), (0.00025, 0.0025)):
+        model = model_of(free(0.05, ball), step)
+        data = mujoco.MjData(model)
+        data.qvel[0] = 1.0
+        with rft.mujoco.attach(model, LOOSE, element=element) as sand:
+            if not errors:
+                error = sand.error(data, 0.5, lambda model, data: None)
+                assert data.time == 0.0 and data.qvel[0] == 1.0
+            errors.append(after(model, data, 0.5)[:3])
+    true = np.linalg.norm(errors[0] - errors[1])
+    assert 0.5 * true < error.step + error.elements < 4.0 * true
+    assert error.moved > 0.1 and min(error.step, error.elements) > 0.0

@@ -134,8 +134,24 @@ def _frames(row, fields, levels):
 @register_jitable
 def _is_sane(velocity):
     """Return whether no velocity is beyond what MuJoCo calls bad."""
-    for v in velocity:
-        if not abs(v) < FASTEST:
+    return (np.abs(velocity) < FASTEST).all()
+
+
+@register_jitable
+def _is_unchanged(row):
+    """Return whether the geoms are as their elements were made for."""
+    count = row[AT.n_geoms]
+    geoms = integers_at(row[AT.geoms], (count, 3))
+    form = numbers_at(row[AT.form], (count, 5))
+    sizes = numbers_at(row[AT.geom_size], (row[AT.ngeom], 3))
+    kinds = short_integers_at(row[AT.geom_type], row[AT.ngeom])
+    meshes = short_integers_at(row[AT.geom_dataid], row[AT.ngeom])
+    for g in range(count):
+        geom = geoms[g, 0]
+        same = kinds[geom] == form[g, 3] and meshes[geom] == form[g, 4]
+        for i in range(3):
+            same = same and sizes[geom, i] == form[g, i]
+        if not same:
             return False
     return True
 
@@ -270,7 +286,7 @@ def _implicit_terms(row, data, fields, effective, step):
     """Add what the integrator takes implicitly to the inertia, and return whether there is any."""
     integrator = short_integers_at(row[AT.integrator], 1)[0]
     flags = short_integers_at(row[AT.disableflags], 1)[0]
-    if integrator == IMPLICIT or integrator == IMPLICIT_FAST:
+    if integrator in (IMPLICIT, IMPLICIT_FAST):
         with_bias = np.int32(integrator == IMPLICIT)
         call(row[AT.mjd_smooth_vel], (pointer_to(row[AT.model]), data, with_bias))
     elif flags & row[AT.no_euler_damping] != 0:
@@ -334,6 +350,9 @@ def kernel() -> CFunc:
         for i in range(AT.qfrc_passive, AT.efc_frictionloss + 1):
             fields[i] = words[row[i]] if row[i] >= 0 else 0
         fields[AT.contact_pointer] = words[row[AT.contact_pointer]]
+        if not _is_unchanged(row):
+            call(row[AT.report_changed], (data, layout))
+            return
         nv, n_geoms, n_zones = row[AT.nv], row[AT.n_geoms], row[AT.n_zones]
         levels = np.zeros(0)
         if row[AT.recorder] != 0:

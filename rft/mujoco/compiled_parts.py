@@ -146,9 +146,10 @@ def handle_at(address):
 
 @register_jitable
 def grains_of(codes, sizes, laws, ground, disturbed, cache, first, frames):
-    """Return the grains of a step. codes: (2,), addresses of C functions. sizes: (2,), numbers of geoms and of zones. laws: (Z, n + 1), numbers of the laws of all
-    zones, and the sines of their grazing angles. ground: (5,), its numbers. first: (Z G + 1,), the first part of each geom
-    in each zone. frames: `rft.mujoco.parts.Frames`."""
+    """Return the grains of a step. codes: (2,), addresses of C functions. sizes: (2,), numbers of geoms and of zones.
+
+    laws: (Z, n + 1), numbers of the laws of all zones, and the sines of their grazing angles. ground: (5,), its numbers.
+    first: (Z G + 1,), the first part of each geom in each zone. frames: `rft.mujoco.parts.Frames`."""
     handle = np.empty(12, np.int64)
     handle[AT.n_geoms], handle[AT.n_zones] = sizes
     handle[AT.laws], handle[AT.ground] = laws.ctypes.data, ground.ctypes.data

@@ -85,7 +85,7 @@ def add_implicit_terms(
     damping: (n,), of the joints. derivative: (k,), of the smooth forces by the velocities, in the rows and columns
     ``row_of`` and ``column_of`` (k,)."""
     is_damped = False
-    if integrator == IMPLICIT or integrator == IMPLICIT_FAST:
+    if integrator in (IMPLICIT, IMPLICIT_FAST):
         for k in range(len(derivative)):
             if derivative[k] == 0.0:
                 continue

@@ -11,11 +11,13 @@ take h / 2. The w_g become passive forces. MuJoCo's own equations of the step th
 so that nothing of MuJoCo changes: its motors, constraints and grains act together, and no force outlives the velocity that
 it resists.
 
-Newton's method, by slopes in closed form, starts at the last acceleration. A full step that does not lessen the
-residual, |r|^2 = r . M^-1 r, goes to where the residual along it changes its sign, across the jump of the stress at rest.
-If that fails, dampers that bear as much as the elements are added, which limits the step to a share of each element's
-speed. If that fails, the equations are solved at wider and wider roundings, and from there back towards the required one
-along the curve of solutions, by steps in the logarithm of the rounding. Compiled code takes these functions, too.
+Newton's method, by slopes in closed form, starts at the last acceleration. Where a full step does not lessen the residual,
+|r|^2 = r . M^-1 r, a step d goes downhill instead: to where d . r, negative at its start, changes its sign. Were the
+grains' forces the slopes of a potential, as those of dry friction nearly are, this would be its least value along d. So the
+search crosses the jump of the stress at rest, and it leaves folds behind, where a face that begins to lead is pulled along
+and the residual has a least value that is no solution: there the tangent is not positive, and dampers that bear as much as
+the elements are added to it until d goes downhill. If that fails, the equations are solved at a wider rounding first.
+Compiled code takes these functions, too.
 """
 
 from __future__ import annotations
@@ -38,15 +40,17 @@ from rft.mujoco.parts import add_dampers, loads, loads_with_slopes
 from rft.mujoco.rows import add_row_slopes, row_forces
 
 ACCURACY = 1e-5  # residual, over the forces that act without the grains
-MOST = 12  # iterations of Newton's method at one rounding
+MOST = 40  # iterations of Newton's method at one rounding
 ENOUGH = 0.25  # of the square of the residual, that a full step leaves at most
-LEAST = 1e-3  # share of the square of the residual that any step must take away
+LEAST = 1e-3  # share of the square of the residual that a step along Newton's line takes away
 TRIALS = 12  # along a line
 FLAT = 0.1  # slope along a line, over that at its start, where the search ends
 NARROW = 1e-7  # share of a line at which its search ends
-DAMPING, STRONGER, STRONGEST = 0.1, 10.0, 1e5  # of the elements
-WIDER = 10.0  # factor of the rounding from one level to the next
-LEVELS = 4  # of rounding above the required one
+DAMPING, STRONGER, STRONGEST = 0.1, 10.0, 1e6  # of the elements
+WIDER, LEVELS = (
+    10.0,
+    4,
+)  # factor of the rounding from one level to the next, where the method fails
 SOLVED, COARSER, UNSOLVED = 0, 1, 2  # at the required rounding, at a wider one, at none
 
 
@@ -135,27 +139,37 @@ def tangent_at(system, rows, grains, rounding, point) -> np.ndarray:
     return matrix
 
 
-def newton(system, rows, grains, rounding, point, left, tolerance) -> tuple[float, int]:
-    """Solve at one rounding from a point, whose |r|^2 is ``left``; return |r|^2 and the number of iterations."""
+def newton(system, rows, grains, rounding, point, tolerance) -> tuple[float, int]:
+    """Solve at one rounding from the change of a point, which is left at the best that was found; return |r|^2 there and
+    the number of iterations."""
+    left = evaluate(system, rows, grains, rounding, point)
     trial = point_at(point.change.copy(), len(point.wrenches))
+    best, least = point_at(point.change.copy(), len(point.wrenches)), left
+    copy_point(point, best)
     for iteration in range(MOST):
         if left <= tolerance:
             return left, iteration
         matrix = tangent_at(system, rows, grains, rounding, point)
         step = solve_linear(matrix.copy(), -point.residual)
-        now = move(system, rows, grains, rounding, point, step, 1.0, trial)
+        trial.change[:] = point.change + step
+        now = evaluate(system, rows, grains, rounding, trial)
         if not (now <= ENOUGH * left or now <= tolerance):
-            first = dot(step, point.residual), dot(step, trial.residual)
-            now = along_line(
-                system, rows, grains, rounding, point, step, first, now, trial
-            )
-        if not now <= (1.0 - LEAST) * left:
-            now = damped(system, rows, grains, rounding, point, matrix, left, trial)
-        if not now <= (1.0 - LEAST) * left:
-            return left, iteration + 1
+            now = along_line(system, rows, grains, rounding, point, step, now, trial)
+            if not now <= (1.0 - LEAST) * left:
+                step = downhill(system, grains, rounding, point, matrix)
+                trial.change[:] = point.change + step
+                now = evaluate(system, rows, grains, rounding, trial)
+                if not now <= ENOUGH * left:
+                    now = along_line(
+                        system, rows, grains, rounding, point, step, now, trial
+                    )
         copy_point(trial, point)
         left = now
-    return left, MOST
+        if left < least:
+            copy_point(point, best)
+            least = left
+    copy_point(best, point)
+    return least, MOST
 
 
 def copy_point(source, target) -> None:
@@ -165,35 +179,24 @@ def copy_point(source, target) -> None:
     target.residual[:] = source.residual
 
 
-def move(system, rows, grains, rounding, point, step, share, trial) -> float:
-    """Set a trial to a share of a step from a point, and return its |r|^2."""
-    trial.change[:] = point.change + share * step
-    return evaluate(system, rows, grains, rounding, trial)
-
-
-def along_line(
-    system, rows, grains, rounding, point, step, first, full, trial
-) -> float:
-    """Set a trial to where the residual along a step changes its sign, and return its |r|^2.
-
-    first: step . r at the start and at the end of the step. full: |r|^2 at its end. False position, halved on the side
-    that stays (the Illinois method)."""
+def along_line(system, rows, grains, rounding, point, step, full, trial) -> float:
+    """Set a trial, which is at the end of a step from a point, to where step . r changes its sign, and return its |r|^2; it
+    stays at the end where there is no such place. full: |r|^2 at the end. False position, halved on the side that stays
+    (the Illinois method)."""
+    start = dot(step, point.residual)
     low, high = 0.0, 1.0
-    slope_low, slope_high = first
-    best, best_share, share = full, 1.0, 1.0
-    last = 0
+    slope_low, slope_high = start, dot(step, trial.residual)
+    now, last = full, 0
+    if not slope_low < 0.0 < slope_high:
+        return now
     for _ in range(TRIALS):
-        if slope_low < 0.0 < slope_high:
-            share = low - slope_low * (high - low) / (slope_high - slope_low)
-            edge = 0.05 * (high - low)
-            share = min(max(share, low + edge), high - edge)
-        else:
-            share *= 0.25
-        now = move(system, rows, grains, rounding, point, step, share, trial)
+        share = low - slope_low * (high - low) / (slope_high - slope_low)
+        edge = 0.05 * (high - low)
+        share = min(max(share, low + edge), high - edge)
+        trial.change[:] = point.change + share * step
+        now = evaluate(system, rows, grains, rounding, trial)
         slope = dot(step, trial.residual)
-        if now < best or not np.isfinite(best):
-            best, best_share = now, share
-        if abs(slope) < -FLAT * first[0] or high - low < NARROW:
+        if abs(slope) < -FLAT * start or high - low < NARROW:
             break
         if slope < 0.0:
             slope_high *= 0.5 if last == -1 else 1.0
@@ -201,27 +204,24 @@ def along_line(
         else:
             slope_low *= 0.5 if last == 1 else 1.0
             high, slope_high, last = share, slope, 1
-    if best_share != share:
-        best = move(system, rows, grains, rounding, point, step, best_share, trial)
-    return best
+    return now
 
 
-def damped(system, rows, grains, rounding, point, matrix, left, trial) -> float:
-    """Set a trial to a step that dampers shorten, the weakest with which it lessens the residual; return its |r|^2."""
+def downhill(system, grains, rounding, point, matrix) -> np.ndarray:
+    """Return a step (n,) with step . r < 0: Newton's, with the weakest dampers that make it so."""
     end = system.velocity + system.step * point.change
     dampers = np.zeros((len(point.wrenches), 6, 6))
     twists = twists_of(system.motion, end)
     add_dampers(grains, system.motion.members, rounding, twists, dampers)
-    damping, now = DAMPING, np.inf
+    damping, step = DAMPING, np.zeros(len(point.residual))
     while damping < STRONGEST:
-        stiffened = matrix.copy()
-        add_projected(stiffened, system.step * damping, system.motion, dampers)
-        step = solve_linear(stiffened, -point.residual)
-        now = move(system, rows, grains, rounding, point, step, 1.0, trial)
-        if now <= (1.0 - LEAST) * left:
-            return now
+        damped = matrix.copy()
+        add_projected(damped, system.step * damping, system.motion, dampers)
+        step = solve_linear(damped, -point.residual)
+        if dot(step, point.residual) < 0.0:
+            break
         damping *= STRONGER
-    return now
+    return step
 
 
 def solve_block(system, rows, grains, rounding, accuracy, point) -> Result:
@@ -234,62 +234,27 @@ def solve(system, rows, grains, rounding, accuracy, point) -> Result:
     scale = multiply(system.inertia, system.velocity) / system.step + system.force
     size = square_over(system.lower, scale) + 1e-12
     tolerance = accuracy * accuracy * size
-    left = evaluate(system, rows, grains, rounding, point)
-    left, iterations = newton(system, rows, grains, rounding, point, left, tolerance)
-    if left <= tolerance:
-        return Result((left / size) ** 0.5, SOLVED, rounding, iterations)
     best = point_at(point.change.copy(), len(point.wrenches))
-    copy_point(point, best)
-    wide, count = widened(system, rows, grains, rounding, point, tolerance)
-    iterations += count
-    narrow, count = narrowed(system, rows, grains, wide, rounding, point, tolerance)
-    iterations += count
-    now = evaluate(system, rows, grains, rounding, point)
-    if now <= tolerance:
-        return Result((now / size) ** 0.5, SOLVED, rounding, iterations)
-    if narrow < np.inf:
-        now = evaluate(system, rows, grains, narrow, point)
-        return Result((now / size) ** 0.5, COARSER, narrow, iterations)
+    known, left, status, reached = rounding, np.inf, UNSOLVED, rounding
+    total = 0
+    for level in range(2 * LEVELS + 1):
+        # At the required rounding; then at a wider one and from its solution at the required one, and so on.
+        is_wide = level % 2 == 1
+        if is_wide:
+            known *= WIDER
+        now, count = newton(
+            system, rows, grains, known if is_wide else rounding, point, tolerance
+        )
+        total += count
+        if now <= tolerance and not is_wide:
+            return Result((now / size) ** 0.5, SOLVED, rounding, total)
+        if status == UNSOLVED and (now <= tolerance or now < left):
+            copy_point(point, best)
+            left = now
+            if is_wide and now <= tolerance:
+                status, reached = COARSER, known
     copy_point(best, point)
-    return Result((left / size) ** 0.5, UNSOLVED, rounding, iterations)
-
-
-def widened(system, rows, grains, rounding, point, tolerance) -> tuple[float, int]:
-    """Solve at wider roundings until that succeeds; return the rounding, infinite if none does, and the iterations."""
-    total, wide = 0, rounding
-    for _ in range(LEVELS):
-        wide *= WIDER
-        left = evaluate(system, rows, grains, wide, point)
-        left, count = newton(system, rows, grains, wide, point, left, tolerance)
-        total += count
-        if left <= tolerance:
-            return wide, total
-    return np.inf, total
-
-
-def narrowed(
-    system, rows, grains, wide, rounding, point, tolerance
-) -> tuple[float, int]:
-    """Follow the solution at a wide rounding down to the required one; return the rounding that is reached."""
-    if not wide < np.inf:
-        return wide, 0
-    factor, total = WIDER**0.5, 0
-    known = point_at(point.change.copy(), len(point.wrenches))
-    copy_point(point, known)
-    reached = wide
-    while reached > rounding and factor > 1.05:
-        target = max(reached / factor, rounding)
-        left = evaluate(system, rows, grains, target, point)
-        left, count = newton(system, rows, grains, target, point, left, tolerance)
-        total += count
-        if left <= tolerance:
-            reached = target
-            copy_point(point, known)
-            factor = min(factor * factor, WIDER)
-        else:
-            copy_point(known, point)
-            factor = factor**0.5
-    return reached, total
+    return Result((left / size) ** 0.5, status, reached, total)
 
 
 COMPILED = (
@@ -300,10 +265,7 @@ COMPILED = (
     tangent_at,
     newton,
     copy_point,
-    move,
     along_line,
-    damped,
+    downhill,
     solve,
-    widened,
-    narrowed,
 )

@@ -82,11 +82,12 @@ class Seen(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """A bed in a row of the table. parts: of its model. bed: the sand. layout: for compiled code. counts: (N_COUNTS,), of
-    steps. end: removes the bed when the model is gone."""
+    """A bed in a row of the table. parts: of its model. bed: the sand. form: (G, 5), of its geoms as their elements were
+    made for. layout: for compiled code. counts: (N_COUNTS,), of steps. end: removes the bed when the model is gone."""
 
     parts: ModelParts
     bed: Bed
+    form: np.ndarray
     layout: Layout | None
     counts: np.ndarray
     end: weakref.finalize
@@ -114,7 +115,8 @@ def install(model: mujoco.MjModel, bed: Bed) -> int:
         require(row < ROWS, f"{ROWS} beds of sand are in use", instead="detach some")
         end = weakref.finalize(model, remove, row)
         end.atexit = False
-        _entries[row] = Entry(parts, bed, layout, counts, end)
+        form = parts.form(bed.geoms)
+        _entries[row] = Entry(parts, bed, form, layout, counts, end)
         if layout:
             from rft.mujoco.compiled import kernel
 
@@ -254,6 +256,11 @@ def _by_python(model: int, data: int) -> None:
 
 def _add_by_python(row: int, entry: Entry, data: int) -> None:
     """Add the forces of a bed, and keep what is seen of them or count the step."""
+    now = entry.parts.form(entry.bed.geoms)
+    if not np.array_equal(now, entry.form):
+        remove(row)
+        _warn_changed(entry.bed, now, entry.form)
+        return
     found = numpy_step.add_forces(entry.bed, entry.parts, data)
     if found is None:
         return
@@ -283,6 +290,26 @@ def _tell_unsolved(_data: int, unsolved: int) -> None:
         if layout and layout.arrays["unsolved"].ctypes.data == unsolved:
             said = layout.arrays["unsolved"]
             _tell(said[TIME], said[RESIDUAL], entry.bed.names[int(said[GEOM])])
+
+
+@ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
+def _tell_changed(_data: int, layout: int) -> None:
+    """Detach a bed with a geom that has changed; compiled code calls this with the address of its layout."""
+    for row, entry in [*_entries.items()]:
+        if entry.layout and entry.layout.numbers.ctypes.data == layout:
+            remove(row)
+            now, before = entry.parts.form(entry.bed.geoms), entry.layout.arrays["form"]
+            _warn_changed(entry.bed, now, before)
+
+
+def _warn_changed(bed: Bed, now: np.ndarray, before: np.ndarray) -> None:
+    """Warn that a bed is detached since a geom has changed."""
+    first = int(np.flatnonzero((now != before).any(1))[0])
+    line = (
+        f"the sand is detached: the geom {bed.names[first]} changed after attach:"
+        " attach it anew"
+    )
+    warnings.warn(line, Note, stacklevel=2)
 
 
 def _tell(time: float, residual: float, geom: str) -> None:
@@ -315,6 +342,7 @@ def layout_of(parts: ModelParts, bed: Bed, counts: np.ndarray) -> Layout:
         "parents": parts.parents,
         "trees": parts.trees,
         "laws": _laws(bed),
+        "form": parts.form(bed.geoms),
         "ground": np.array([*ground[:5], ground.rounding, ACCURACY]),
         "disturbed": np.array(ground.disturbed, float),
         "surface": np.array([*bed.up, *bed.ahead, bed.level]),
@@ -356,7 +384,11 @@ def layout_of(parts: ModelParts, bed: Bed, counts: np.ndarray) -> Layout:
         "damping": parts.damping,
         "full_takes_data": takes_data(),
         "no_euler_damping": int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP),
+        "geom_size": parts.geom_size,
+        "geom_type": parts.geom_type,
+        "geom_dataid": parts.geom_dataid,
         "report": ctypes.cast(_tell_unsolved, ctypes.c_void_p).value,
+        "report_changed": ctypes.cast(_tell_changed, ctypes.c_void_p).value,
         "time": where.time,
     }
     values |= {name: x.ctypes.data for name, x in arrays.items()}

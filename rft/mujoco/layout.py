@@ -15,11 +15,15 @@ COUNTED = ("n_zones", "n_planes", "n_numbers")
 OWN = (
     "table", "first", "geoms", "spheres", "dofs", "first_dof", "bodies", "parents", "trees",
     "laws", "ground", "disturbed", "surface", "hills", "hill_frame", "planes", "first_plane",
-    "derivative_rows", "derivative_columns", "counts", "watch", "watched", "unsolved",
+    "derivative_rows", "derivative_columns", "form", "counts", "watch", "watched", "unsolved",
 )  # fmt: skip
-MODEL = ("model", "timestep", "integrator", "disableflags", "damping")
+MODEL = (
+    "model", "timestep", "integrator", "disableflags", "damping", "geom_size", "geom_type",
+    "geom_dataid",
+)  # fmt: skip
 FLAGS = (
-    "is_sparse", "full_takes_data", "no_euler_damping", "report", "element_code", "solver_code",
+    "is_sparse", "full_takes_data", "no_euler_damping", "report",
+    "report_changed", "element_code", "solver_code",
 )  # fmt: skip
 PRINTS = (
     "recorder", "memory_start", "print_rows", "print_columns", "print_grid", "print_surface",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from typing import NamedTuple
 
 import mujoco
@@ -14,7 +15,7 @@ class ModelParts(NamedTuple):
     """Parts of a model, without a reference to it. address: of the model. sizes: `sizes_of`, and whether matrices are
     sparse. bodies: (nbody, 2), the last degree of freedom that moves each body, -1 for none, and its root. parents, trees:
     (nv,), of each degree of freedom. derivative_rows, derivative_columns: (nD,), of qDeriv. timestep, integrator,
-    disableflags, damping: addresses in the model's own memory."""
+    disableflags, damping, geom_size, geom_type, geom_dataid: addresses in the model's own memory."""
 
     address: int
     sizes: dict[str, int]
@@ -27,6 +28,9 @@ class ModelParts(NamedTuple):
     integrator: int
     disableflags: int
     damping: int
+    geom_size: int
+    geom_type: int
+    geom_dataid: int
 
     @classmethod
     def of(cls, model: mujoco.MjModel) -> ModelParts:
@@ -48,7 +52,20 @@ class ModelParts(NamedTuple):
             integrator,
             flags,
             _address(model.dof_damping),
+            _address(model.geom_size),
+            _address(model.geom_type),
+            _address(model.geom_dataid),
         )
+
+    def form(self, geoms: np.ndarray) -> np.ndarray:
+        """Return the numbers that the elements of geoms follow from, as they are now, (G, 5)."""
+        count = self.sizes["ngeom"]
+        sizes = (ctypes.c_double * (3 * count)).from_address(self.geom_size)
+        kinds = (ctypes.c_int32 * count).from_address(self.geom_type)
+        meshes = (ctypes.c_int32 * count).from_address(self.geom_dataid)
+        size = np.ctypeslib.as_array(sizes).reshape(count, 3)[geoms]
+        rest = [np.ctypeslib.as_array(x)[geoms, None] for x in (kinds, meshes)]
+        return np.concatenate([size, *rest], axis=1)
 
 
 def last_dof(model: mujoco.MjModel, body: int) -> int:

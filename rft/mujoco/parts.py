@@ -99,8 +99,12 @@ def _moving(zone: Zone, rounding: float, twists: np.ndarray):
 
 
 def _add_by_owner(out: np.ndarray, owner: np.ndarray, values) -> None:
-    """Add values (..., T) of parts to those of their geoms (G, ...)."""
-    np.add.at(out, owner, np.moveaxis(np.asarray(values), -1, 0))
+    """Add values (..., T) of parts to those of their geoms (G, ...). owner: (T,), geom after geom."""
+    if not len(owner):
+        return
+    begin = np.flatnonzero(np.diff(owner, prepend=-1))
+    sums = np.add.reduceat(np.asarray(values), begin, axis=-1)
+    out[owner[begin]] += np.moveaxis(sums, -1, 0)
 
 
 def loads(grains, members, rounding, twists, wrenches) -> None:

@@ -51,7 +51,7 @@ def row_forces(rows, u) -> np.ndarray:
         kind, own = rows.kinds[i], -rows.weight[i] * u[i]
         if kind == EQUALITY:
             f[i] = own
-        elif kind == FRICTION_OF_DOF or kind == FRICTION_OF_TENDON:
+        elif kind in (FRICTION_OF_DOF, FRICTION_OF_TENDON):
             f[i] = min(max(own, -rows.limits[i]), rows.limits[i])
         elif kind != ELLIPTIC and u[i] < 0.0:
             f[i] = own
@@ -93,7 +93,7 @@ def add_row_slopes(matrix, rows, u) -> None:
     for i in range(len(u)):
         kind, weight = rows.kinds[i], rows.weight[i]
         rigid = kind == EQUALITY
-        sticks = (kind == FRICTION_OF_DOF or kind == FRICTION_OF_TENDON) and (
+        sticks = (kind in (FRICTION_OF_DOF, FRICTION_OF_TENDON)) and (
             abs(weight * u[i]) < rows.limits[i]
         )
         presses = kind > FRICTION_OF_TENDON and kind != ELLIPTIC and u[i] < 0.0

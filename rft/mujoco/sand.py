@@ -14,12 +14,19 @@ import numpy as np
 
 from rft.balance.backend import Note
 from rft.checks import in_range
-from rft.ground import Ground, GroundEffect, Slope, ground_of
+from rft.ground import (
+    Ground,
+    GroundEffect,
+    Slope,
+    checked_effects,
+    ground_of,
+)
 from rft.meshes.extruded import Extruded
 from rft.meshes.law import Spatial
 from rft.meshes.mesh import Mesh
 from rft.mujoco import installed
 from rft.mujoco.bed import Bed
+from rft.mujoco.errors import Control, RunError, error_of_run
 from rft.mujoco.floor import Apart, apart, floors, part, rejoin
 from rft.mujoco.footprints import FORM, Footprints, Prints
 from rft.mujoco.geoms import described, geom_name, mesh_of_elements
@@ -56,11 +63,12 @@ class Sand:
         element: float | None,
         notes: Sequence[str],
         separation: Apart | None,
+        hulls: bool = False,
     ):
         self._model, self._bed, self.element = weakref.ref(model), bed, element
         self.geoms = tuple(geom_name(model, g) for g in bed.geoms)
         self.rounding, self.elements = bed.ground.rounding, len(bed.blocks.owner)
-        self._form = _form(model, bed.geoms)
+        self._form, self._hulls = _form(model, bed.geoms), hulls
         self._row = installed.install(model, bed)
         self.notes, self.media, self._parted = (
             tuple(notes),
@@ -76,11 +84,19 @@ class Sand:
     def __exit__(self, *_: object) -> None:
         self.detach()
 
+    def __reduce__(self):
+        raise Refusal(
+            "a Sand cannot be pickled or copied",
+            because="it belongs to a model of this process",
+            instead="attach it anew there",
+        )
+
     def __repr__(self) -> str:
         state = "" if self.is_attached else ", detached"
+        within = "" if self.element else ", by which forces are within 3 %"
         return (
-            f"Sand({len(self.geoms)} geoms, {self.elements} elements, rounding"
-            f" {self.rounding:.3g} m/s{state})"
+            f"Sand({len(self.geoms)} geoms, {self.elements} elements{within}; rounding"
+            f" {self.rounding:.3g} m/s; error() tells that of a run{state})"
         )
 
     @property
@@ -128,6 +144,20 @@ class Sand:
         turn = data.geom_xmat[self._bed.geoms].reshape(-1, 3, 3)
         both = np.stack([seen.wrenches, seen.twists]).reshape(2, -1, 2, 3)
         return tuple(np.einsum("gij,kgpj->kgpi", turn, both).reshape(2, -1, 6))
+
+    def error(
+        self,
+        data: mujoco.MjData,
+        seconds: float,
+        control: Control | None = None,
+    ) -> RunError:
+        """Return the errors, m, that time step and elements leave in where the geoms are ``seconds`` later, by a run with
+        steps half as long and one with elements half as long. The data stay as they are.
+
+        control: function (model, data) that sets controls before each step."""
+        model = self._check(data)
+        in_range("seconds", seconds, 0, 1e6, unit="s")
+        return error_of_run(model, self._bed, data, seconds, control, self._hulls)
 
     @property
     def effort(self) -> installed.Effort:
@@ -329,7 +359,8 @@ def attach(
     )
     rounding = ROUNDING if rounding is None else rounding
     in_range("rounding", rounding, 1e-7, 10, unit="m/s")
-    effects = (*effects, Slope(slope)) if slope else tuple(effects)
+    effects = checked_effects(effects)
+    effects = (*effects, Slope(slope)) if slope else effects
     ground = ground_of(effects, Ground(rounding=rounding))
     bed = Bed.under(
         model,
@@ -362,7 +393,7 @@ def attach(
         line
     ) in notes:  # before anything is changed: a filter may turn warnings into errors
         warnings.warn(line, Note, stacklevel=2)
-    return Sand(model, bed, element, notes, separation)
+    return Sand(model, bed, element, notes, separation, bool(hulls))
 
 
 def remembering(
