@@ -51,7 +51,8 @@ WIDER, LEVELS = (
     10.0,
     4,
 )  # factor of the rounding from one level to the next, where the method fails
-SOLVED, COARSER, UNSOLVED = 0, 1, 2  # at the required rounding, at a wider one, at none
+LOOSE = 30.0  # residual, over the accuracy, that is taken where the search goes round in a fold
+SOLVED, COARSER, UNSOLVED = 0, 1, 2  # as required; loosely, or at a wider rounding; not
 
 
 class Motion(NamedTuple):
@@ -248,6 +249,8 @@ def solve(system, rows, grains, rounding, accuracy, point) -> Result:
         total += count
         if now <= tolerance and not is_wide:
             return Result((now / size) ** 0.5, SOLVED, rounding, total)
+        if now <= LOOSE * LOOSE * tolerance and not is_wide:
+            return Result((now / size) ** 0.5, COARSER, rounding, total)
         if status == UNSOLVED and (now <= tolerance or now < left):
             copy_point(point, best)
             left = now

@@ -59,9 +59,10 @@ class Layout(NamedTuple):
 
 
 class Effort(NamedTuple):
-    """What the steps of a bed have cost so far. steps: with a geom in the ground. iterations: of Newton's method, and
-    most_iterations in a step. coarser: steps that were solved at a wider rounding alone. unsolved: steps that were not
-    solved."""
+    """What the steps of a bed have cost so far.
+
+    steps: with a geom in the ground. iterations: of Newton's method, and most_iterations in a step. coarser: steps that
+    were solved loosely, within 3e-4, or at a wider rounding alone. unsolved: steps that were not solved."""
 
     steps: int
     iterations: int
