@@ -147,6 +147,7 @@ def test_cycles_follow_one_another():
 OVAL = Ellipse(semi_axes=(0.9, 0.5), centre=(0.2, -0.1), tilt=0.3)
 ZIGZAG = Circle(amplitude=0.4, centre=(1.0, -1.0))
 UNEVEN = Chain((0.7, 1.4, 0.9), frame="link-1", length=0.3)
+SLOPED = DepthProfile(slope_per_m=5.0, towards=0.4)
 HEAVY = BodyInertia(mass=0.4, frequency=0.8, length=0.3, drag=1.3)
 SCENES = {
     "swimmer": Scene(SYSTEMS["swimmer"], OVAL, Numerics(phases=33)),
@@ -154,9 +155,9 @@ SCENES = {
     "transient": Scene(Swimmer(SAND, UNEVEN, (Transient(travel_m=0.006),), Solver(pieces=3)), OVAL, Numerics(phases=16)),
     "heavy": Scene(Swimmer(SAND, UNEVEN, (HEAVY,)), OVAL, Numerics(phases=32)),
     "first cycle": Scene(Swimmer(SAND, UNEVEN, (HEAVY,), Solver(cycles=1)), OVAL, Numerics(phases=32)),
-    "slope": Scene(Swimmer(SAND, UNEVEN, (DepthProfile(slope_per_m=5.0, towards=0.4),), Solver(pieces=6)), OVAL, Numerics(phases=32)),
+    "slope": Scene(Swimmer(SAND, UNEVEN, (SLOPED,), Solver(pieces=6)), OVAL, Numerics(phases=32)),
     "second on a slope": Scene(
-        Swimmer(SAND, UNEVEN, (DepthProfile(slope_per_m=5.0, towards=0.4),), Solver(pieces=6, cycles=2)), OVAL, Numerics(phases=32)
+        Swimmer(SAND, UNEVEN, (SLOPED,), Solver(pieces=6, cycles=2)), OVAL, Numerics(phases=32)
     ),
 }  # fmt: skip
 
