@@ -51,10 +51,15 @@ with preferring("numba"):
             faces.Motion(still, still, still[..., 0], still, still, still[..., 0]),
         )
         if importlib.util.find_spec("mujoco"):
-            from rft.mujoco import compiled as in_mujoco
+            from rft.mujoco.compiled import kernel as kernel_of_mujoco
+            from rft.mujoco.compiled import recorder
+            from rft.mujoco.compiled_parts import element_code
+            from rft.mujoco.compiled_solver import solver_code
 
-            in_mujoco.kernel(type(faces.record(form)))
-            in_mujoco.recorder()
+            solver_code()
+            kernel_of_mujoco()
+            recorder()
+            element_code(type(faces.record(form)))
 
 from rft.balance.compiled import kernel  # noqa: E402  # after the check, for the import loads numba
 

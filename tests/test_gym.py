@@ -86,3 +86,35 @@ def test_many_robots_go_as_each_alone():
         and seen[0, 0] == pytest.approx(0.09)
     )
     many.close()
+
+
+def test_what_is_no_number_truncates_an_episode():
+    env = geomech.gym.HexapodSand()
+    env.reset(seed=1)
+    seen, reward, ended, cut, info = env.step(np.full(6, np.nan))
+    assert cut and not ended and reward == 0.0 and np.isfinite(seen).all()
+    assert info["reason"] == "the action is no number"
+    env.reset(seed=1)
+    env.data.qvel[0] = np.nan
+    seen, _, ended, cut, info = env.step(np.zeros(6))
+    assert cut and not ended and "the motion is no number" in info["reason"]
+    env.close()
+    for call in (env.reset, lambda: env.step(np.zeros(6))):
+        with pytest.raises(ValueError, match="the environment is closed: make it anew"):
+            call()
+
+
+@needs_batch
+def test_what_is_no_number_truncates_one_of_many_episodes():
+    env = geomech.gym.HexapodSands(3)
+    env.reset(seed=1)
+    actions = np.zeros((3, 6))
+    actions[1] = np.nan
+    seen, reward, ended, cut, info = env.step(actions)
+    assert cut.tolist() == [False, True, False] and not ended.any()
+    assert [*info["reason"]] == ["", "the action is no number", ""]
+    assert np.isfinite(seen).all() and np.isfinite(reward).all()
+    env.qvel[2, 0] = np.nan
+    _, _, _, cut, info = env.step(np.zeros((3, 6)))
+    assert cut.tolist() == [False, False, True]
+    env.close()

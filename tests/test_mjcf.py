@@ -1,6 +1,7 @@
 """Robots of MJCF files, and the engine of three dimensions from the command line."""
 
 import dataclasses
+import os
 import pickle
 import sys
 from types import SimpleNamespace
@@ -286,6 +287,31 @@ def test_a_machine_is_known_by_what_it_includes_too(cart):
     one, same = (Mjcf(str(cart / "parts" / "cart.xml"), NAMES) for _ in range(2))
     part.write_text(whole.format(0.05))
     assert one == same and dataclasses.replace(one) != one
+
+
+HUGE = {
+    "replicate": (
+        '<worldbody><replicate count="9999"><replicate count="9999"><geom size="1"/>'
+        "</replicate></replicate></worldbody>",
+        "99,980,001 geoms or copies, more than 20,000: give <replicate> a smaller",
+    ),
+    "hfield": (
+        '<asset><hfield name="h" nrow="90000" ncol="90000" size="1 1 1 1"/></asset>',
+        "height fields have 8,100,000,000 nodes, more than",
+    ),
+    "pipe": ('<include file="pipe"/>', "pipe is no ordinary file"),
+    "circle": ('<include file="cart.xml"/>', "cart.xml is included too deep"),
+}
+
+
+@pytest.mark.parametrize("name", HUGE)
+def test_what_would_keep_mujoco_busy_is_refused_beforehand(name, cart):
+    inner, message = HUGE[name]
+    os.mkfifo(cart / "parts" / "pipe")
+    file = cart / "parts" / "cart.xml"
+    file.write_text(f"<mujoco>{inner}</mujoco>")
+    with pytest.raises(ValueError, match=message):
+        Mjcf(str(file), NAMES)
 
 
 def test_machines_that_may_take_long_say_so_before_they_walk(cart, geomech):

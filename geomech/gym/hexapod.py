@@ -14,8 +14,8 @@ from gymnasium.vector.utils import batch_space
 from rft.balance.backend import Note
 from rft.mujoco import Sand, attach
 from rft.mujoco.example import hexapod
+from rft.refusal import require
 
-ELEMENT = 0.03  # m
 STEPS = 10  # time steps for one action
 FASTEST_LEG = 20.0  # rad/s, for the action 1
 EFFORT = 0.02  # reward for a power of -1 W
@@ -23,6 +23,8 @@ FALL = 2.0  # reward lost by turning over
 NOISE = 0.3  # rad, of the angles at the start
 SIZE = 28  # of an observation
 PARTS = "forward", "effort", "fall"
+NO_ACTION = "the action is no number"
+NO_MOTION = "the motion is no number: MuJoCo began anew"
 
 
 def _sand(medium: Any) -> tuple[mujoco.MjModel, Sand]:
@@ -32,7 +34,19 @@ def _sand(medium: Any) -> tuple[mujoco.MjModel, Sand]:
         warnings.simplefilter(
             "ignore", Note
         )  # that the legs do not touch the floor is what it is for
-        return model, attach(model, medium, element=ELEMENT)
+        return model, attach(model, medium)
+
+
+def _require_open(sand: Sand) -> None:
+    """Raise Refusal for an environment that is closed."""
+    require(sand.is_attached, "the environment is closed", instead="make it anew")
+
+
+def _is_sound(passed, seconds: float, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
+    """Return whether states are numbers and the time of an action has passed; MuJoCo begins anew, at time 0, where a motion
+    is no number."""
+    finite = np.isfinite(qpos).all(-1) & np.isfinite(qvel).all(-1)
+    return finite & (np.abs(passed - seconds) < 1e-6)
 
 
 def observation(qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
@@ -74,7 +88,8 @@ class HexapodSand(gymnasium.Env):
     """A hexapod in sand. An action is the rates of its six legs, over 20 rad/s; it lasts 20 ms.
 
     medium: name, stress map or law, as of `rft.mujoco.attach`. The reward is the sum of its parts, which stand in ``info``:
-    "forward", m/s, "effort" and "fall". An episode ends when the robot turns over."""
+    "forward", m/s, "effort" and "fall". An episode ends when the robot turns over; it is truncated, with a "reason" in
+    ``info``, by an action that is no number, or by a motion that is none."""
 
     metadata = {"render_modes": []}
 
@@ -95,6 +110,7 @@ class HexapodSand(gymnasium.Env):
         self, *, seed: int | None = None, options: dict | None = None
     ) -> tuple[np.ndarray, dict]:
         super().reset(seed=seed)
+        _require_open(self.sand)
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[7:] = self.data.ctrl[:] = self.np_random.uniform(
             -NOISE, NOISE, self.model.nu
@@ -103,9 +119,18 @@ class HexapodSand(gymnasium.Env):
         return observation(self.data.qpos, self.data.qvel), {}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
+        _require_open(self.sand)
+        if not np.isfinite(action).all():
+            return self._truncated(NO_ACTION)
+        if not _is_sound(0.0, 0.0, self.data.qpos, self.data.qvel):
+            return self._truncated(NO_MOTION)
         before, seconds = self.data.qpos[0], STEPS * self.model.opt.timestep
+        time = self.data.time
         self.data.ctrl[:] += FASTEST_LEG * seconds * np.clip(action, -1.0, 1.0)
         mujoco.mj_step(self.model, self.data, STEPS)
+        passed = self.data.time - time
+        if not _is_sound(passed, seconds, self.data.qpos, self.data.qvel):
+            return self._truncated(NO_MOTION)
         seen, force = (
             observation(self.data.qpos, self.data.qvel),
             self.data.actuator_force,
@@ -115,6 +140,11 @@ class HexapodSand(gymnasium.Env):
         )
         parts = {name: float(x) for name, x in parts.items()}
         return seen, sum(parts.values()), bool(seen[3] < 0.0), False, parts
+
+    def _truncated(self, reason: str) -> tuple[np.ndarray, float, bool, bool, dict]:
+        """Return a step that truncates the episode, with what is left of the state."""
+        seen = np.nan_to_num(observation(self.data.qpos, self.data.qvel))
+        return seen, 0.0, False, True, dict.fromkeys(PARTS, 0.0) | {"reason": reason}
 
     def close(self) -> None:
         self.sand.detach()
@@ -149,6 +179,7 @@ class HexapodSands(gymnasium.vector.VectorEnv):
         self.qpos, self.qvel, self.ctrl, self.force = map(
             self.batch.bind, ("qpos", "qvel", "ctrl", "actuator_force")
         )
+        self.time = self.batch.bind("time")
         self.single_action_space = gymnasium.spaces.Box(
             -1.0, 1.0, (self.model.nu,), np.float32
         )
@@ -163,6 +194,7 @@ class HexapodSands(gymnasium.vector.VectorEnv):
         self, *, seed: int | None = None, options: dict | None = None
     ) -> tuple[np.ndarray, dict]:
         super().reset(seed=seed)
+        _require_open(self.sand)
         self._begin(np.arange(self.num_envs))
         return observation(self.qpos, self.qvel), {}
 
@@ -178,30 +210,43 @@ class HexapodSands(gymnasium.vector.VectorEnv):
     def step(
         self, actions: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict]:
+        _require_open(self.sand)
         before, begun, seconds = (
             self.qpos[:, 0].copy(),
             self.ended.copy(),
             STEPS * self.model.opt.timestep,
         )
-        going = np.flatnonzero(~begun)
+        times = np.array(self.time).reshape(-1)
+        able = np.isfinite(actions).all(-1)
+        sound = _is_sound(0.0, 0.0, self.qpos, self.qvel)
+        going = np.flatnonzero(~begun & able & sound)
         self.ctrl[going] += FASTEST_LEG * seconds * np.clip(actions[going], -1.0, 1.0)
         if len(going):
             self.batch.step(going, STEPS)
+        passed = np.array(self.time).reshape(-1) - times
+        sound &= _is_sound(passed, seconds, self.qpos, self.qvel)
+        lost = ~begun & ~(able & sound)
         if begun.any():
             self._begin(np.flatnonzero(begun))
         self.age[going] += 1
-        seen = observation(self.qpos, self.qvel)
+        seen = np.nan_to_num(observation(self.qpos, self.qvel))
         parts = rewards(
             self.qpos[:, 0] - before, seconds, self.force, self.qvel[:, 6:], seen[:, 3]
         )
-        parts = {name: np.where(begun, 0.0, x) for name, x in parts.items()}
+        none = begun | lost
+        parts = {name: np.where(none, 0.0, x) for name, x in parts.items()}
+        total = sum(parts.values())
         fallen, late = seen[:, 3] < 0.0, self.age >= self.max_episode_steps
-        self.ended = (fallen | late) & ~begun
+        fallen &= ~lost
+        self.ended = (fallen | late | lost) & ~begun
+        if lost.any():
+            reason = np.where(able, NO_MOTION, NO_ACTION).astype(object)
+            parts["reason"] = np.where(lost, reason, "")
         return (
             seen,
-            sum(parts.values()),
+            total,
             fallen & ~begun,
-            late & ~fallen & ~begun,
+            (late | lost) & ~fallen & ~begun,
             parts,
         )
 

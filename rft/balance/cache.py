@@ -48,8 +48,8 @@ class Cache(_Cache):
     """The compiled code of one function in one file, with the interface of numba's cache; no fault of the file keeps the
     function from running."""
 
-    def __init__(self, function):
-        self.key = digest(function)
+    def __init__(self, function, *modules):
+        self.key = digest(function, *modules)
         self.path = folder() / f"{self.key}.code"
 
     @property
@@ -194,12 +194,12 @@ def note(text: str) -> None:
     warnings.warn(text, Note, stacklevel=1)
 
 
-def digest(function) -> str:
-    """Return a digest of the code and the constants of a function and, recursively, of every function that it names."""
-    parts, seen = (
-        [Path(module.__file__).read_bytes() for module in (vectors, simd)],
-        set(),
-    )
+def digest(function, *modules) -> str:
+    """Return a digest of the code and the constants of a function and, recursively, of every function that it names.
+    modules: those whose whole source counts, as they define functions a second time for compiled code."""
+    sources = vectors, simd, *modules
+    parts = [Path(module.__file__).read_bytes() for module in sources]
+    seen = set()
 
     def visit(x):
         x = getattr(x, "py_func", x)

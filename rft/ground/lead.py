@@ -24,11 +24,26 @@ def smoothstep(n_dot_v, grazing_sine):
 
 
 @formula
+def smoothstep_slope(n_dot_v, grazing_sine):
+    """Return the slope of `smoothstep` by n_dot_v."""
+    share = minimum(maximum(n_dot_v / grazing_sine, 0.0), 1.0)
+    return 6.0 * share * (1.0 - share) / grazing_sine
+
+
+@formula
 def rounded(n_dot_v, grazing_sine):
     """Return n_dot_v / sqrt(n_dot_v^2 + grazing_sine^2), and 0 where a face trails."""
     return maximum(n_dot_v, 0.0) / maximum(
         sqrt(n_dot_v * n_dot_v + grazing_sine * grazing_sine), TINY
     )
+
+
+@formula
+def rounded_slope(n_dot_v, grazing_sine):
+    """Return the slope of `rounded` by n_dot_v."""
+    size = maximum(sqrt(n_dot_v * n_dot_v + grazing_sine * grazing_sine), TINY)
+    slope = grazing_sine * grazing_sine / (size * size * size)
+    return where(n_dot_v > 0.0, slope, 0.0)
 
 
 @formula

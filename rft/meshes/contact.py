@@ -13,7 +13,7 @@ import numpy as np
 from rft.ground import inverse_speed, strength_at
 from rft.laws.records import law_numbers, record_class
 from rft.meshes.submerged import part_of_triangle
-from rft.meshes.triples import AHEAD, UP, cross, dot, minus, plus, times, weighted
+from rft.meshes.triples import AHEAD, AXES, UP, cross, dot, minus, plus, times, weighted
 from rft.vectors import absolute, formula, maximum, sqrt, where
 
 
@@ -27,6 +27,14 @@ class FaceLaw(Protocol):
     def traction(self, n, v, up=UP) -> tuple:
         """Return the force per area and depth, N/m^3, on faces with outward unit normals n and unit velocities v, whether
         or not they lead; ``up`` is the unit vector upwards."""
+        ...
+
+    def traction_slope(self, n, v, up, k) -> tuple:
+        """Return the slope of ``traction`` by the component of v along k, linear in k."""
+        ...
+
+    def lead_slope(self, n_dot_v, grazing_sine, sheet=False) -> Any:
+        """Return the slope of ``lead`` by n_dot_v."""
         ...
 
     def lead(self, n_dot_v, grazing_sine, sheet=False) -> Any:
@@ -140,9 +148,81 @@ def load(law, ground, part, motion, v, sheet):
     return force, moment, stress
 
 
+class Stressed(NamedTuple):
+    """What the slopes of the stress on a part follow from. unit: of the velocity. full: the traction with the strength, N/m^3.
+    by_unit, by_n: slopes of its share, s/m, along the velocity and the normal. turned: of its direction, s/m. strength,
+    loss: of the ground and, relative, by motion ahead. flow: flux x area x speed across, kg/s."""
+
+    unit: tuple
+    full: tuple
+    by_unit: float
+    by_n: float
+    turned: float
+    strength: float
+    loss: float
+    flow: float
+
+
+@formula
+def _slopes_along(law, part, motion, state, k):
+    """Return the slopes of force and moment by the component of the velocity along the unit vector k."""
+    u_k, n_k = dot(state.unit, k), dot(part.n, k)
+    sideways = minus(k, times(u_k, state.unit))
+    share = state.by_unit * u_k + state.by_n * n_k
+    share = share - state.turned * state.loss * dot(motion.ahead, sideways)
+    turning = law.traction_slope(part.n, state.unit, motion.up, sideways)
+    slope = plus(
+        times(share, state.full), times(state.turned * state.strength, turning)
+    )
+    push = times(2.0 * state.flow * n_k, part.n)
+    return (
+        minus(times(part.depth, slope), push),
+        minus(cross(part.arms, slope), cross(part.middle, push)),
+    )
+
+
+@formula
+def load_with_slopes(law, ground, part, motion, v, sheet):
+    """Return force and moment of `load`, and their slopes by the components x, y, z of v: three triples each.
+
+    With s = 1 / sqrt(v^2 + rounding^2), the unit vector u of v and x = s n . v, the stress is S = |v| s lead(x) T(u), so
+    that dS = T (lead s (1 - |v|^2 s^2) u . dv + |v| s lead' dx) + s lead dT (dv - u u . dv),   dx = s (n - x |v| s u) . dv.
+    """
+    n, speed, across = part.n, sqrt(dot(v, v)), dot(part.n, v)
+    slowness = inverse_speed(ground, speed)
+    unit = times(1.0 / where(speed == 0.0, 1.0, speed), v)
+    moved, leading = speed * slowness, across * slowness
+    lead = law.lead(leading, ground.grazing_sine, sheet)
+    lead_slope = law.lead_slope(leading, ground.grazing_sine, sheet)
+    strength, loss = ground.strength, 0.0
+    if not (ground.downhill_loss == 0.0 and len(ground.disturbed) == 0):
+        along = dot(motion.ahead, unit)
+        strength = strength_at(ground, motion.x + dot(motion.ahead, part.middle), along)
+        lost = maximum(ground.downhill_loss * along, 0.0)
+        loss = where(lost > 0.0, ground.downhill_loss / (1.0 - lost), 0.0)
+    traction = times(strength, law.traction(n, unit, motion.up))
+    stress = times(moved * lead, traction)
+    force, moment = times(part.depth, stress), cross(part.arms, stress)
+    by_n = moved * lead_slope * slowness
+    by_unit = lead * slowness * (1.0 - moved * moved) - by_n * leading * moved
+    flow = 0.0 * across
+    if ground.flux != 0.0:
+        flow = ground.flux * part.area * where(sheet, across, maximum(across, 0.0))
+        push = times(flow * absolute(across), n)
+        force, moment = minus(force, push), minus(moment, cross(part.middle, push))
+    state = Stressed(
+        unit, traction, by_unit, by_n, lead * slowness, strength, loss, absolute(flow)
+    )
+    fx, mx = _slopes_along(law, part, motion, state, AXES[0])
+    fy, my = _slopes_along(law, part, motion, state, AXES[1])
+    fz, mz = _slopes_along(law, part, motion, state, AXES[2])
+    return force, moment, (fx, fy, fz), (mx, my, mz)
+
+
 def record(law: FaceLaw):
     """Return the record of a law for compiled code: its numbers and its formulas."""
-    formulas = ("traction", type(law).traction), ("lead", type(law).lead)
+    names = "traction", "traction_slope", "lead", "lead_slope"
+    formulas = tuple((name, getattr(type(law), name)) for name in names)
     numbers = law_numbers(law)
     return record_class(type(law).__name__, tuple(numbers), formulas)(*numbers.values())
 

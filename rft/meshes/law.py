@@ -25,7 +25,7 @@ from typing import Annotated
 import numpy as np
 
 from rft.checks import Number, check_numbers, in_range, unmasked
-from rft.ground.lead import jump, smoothstep
+from rft.ground.lead import jump, smoothstep, smoothstep_slope
 from rft.meshes.triples import UP, dot, minus, plus, times
 from rft.metres import GRAVITY
 from rft.refusal import require
@@ -64,6 +64,41 @@ def fitted(n, v, up):
         ),
     )  # fmt: skip
     return minus(plus(times(f1 * down, n), times(f2, v)), times(f3, up))
+
+
+# The slopes of f1, f2, f3 by x1 and by x3: coefficients of 1, x1, x2, x3, a, b, c, x1 x2, x2 x3, x3 x1.
+BY_X1 = tuple(
+    (c[1], 2 * c[4], c[7], c[9], 3 * c[10], c[13], c[18], 2 * c[14], c[19], 2 * c[17])
+    for c in COEFFICIENTS
+)
+BY_X3 = tuple(
+    (c[3], c[9], c[8], 2 * c[6], c[17], c[16], 3 * c[12], c[19], 2 * c[15], 2 * c[18])
+    for c in COEFFICIENTS
+)
+
+
+@formula
+def fitted_slope(n, v, up, k):
+    """Return the slope of `fitted` by the component k of v. k: a unit vector along that component."""
+    height, along = dot(up, n), dot(n, v)
+    down = where(
+        (height > UPRIGHT) | ((absolute(height) <= UPRIGHT) & (along < 0.0)), -1.0, 1.0
+    )
+    x1, x2, x3 = -dot(up, v), -(down * height), down * along
+    a, b, c = x1 * x1, x2 * x2, x3 * x3
+    terms = (
+        x1, x2, x3, a, b, c, x1 * x2, x2 * x3, x3 * x1,
+        x1 * a, x2 * b, x3 * c, x1 * b, x2 * a, x2 * c, x3 * b, x3 * a, x1 * c, x1 * x2 * x3,
+    )  # fmt: skip
+    _, f2, _ = combinations(COEFFICIENTS, terms)
+    f1_1, f2_1, f3_1 = combinations(BY_X1, terms[:9])
+    f1_3, f2_3, f3_3 = combinations(BY_X3, terms[:9])
+    dx1, dx3 = -dot(up, k), down * dot(n, k)
+    along_n = (f1_1 * dx1 + f1_3 * dx3) * down
+    along_v = f2_1 * dx1 + f2_3 * dx3
+    along_up = f3_1 * dx1 + f3_3 * dx3
+    sideways = plus(times(along_v, v), times(f2, k))
+    return minus(plus(times(along_n, n), sideways), times(along_up, up))
 
 
 def alpha(n, v) -> np.ndarray:
@@ -200,6 +235,38 @@ class Spatial:
         size, most = sqrt(dot(along, along)), self.surface_friction * absolute(across)
         share = minimum(1.0, most / where(size > 0.0, size, 1.0))
         return times(self.xi_n, plus(times(across, n), times(share, along)))
+
+    @formula
+    def traction_slope(self, n, v, up, k):
+        """Return the slope of `traction` by the component k of v. k: a unit vector along that component."""
+        a, da = fitted(n, v, up), fitted_slope(n, v, up, k)
+        across, d_across = dot(a, n), dot(da, n)
+        along, d_along = minus(a, times(across, n)), minus(da, times(d_across, n))
+        if self.cut == 1.0:
+            d_across = where(across < 0.0, d_across, 0.0)
+            across = minimum(across, 0.0)
+        elif self.pushed == 1.0:
+            d_across = where(across < 0.0, d_across, -d_across)
+            across = -absolute(across)
+        size, most = sqrt(dot(along, along)), self.surface_friction * absolute(across)
+        size = where(size > 0.0, size, 1.0)
+        share = minimum(1.0, most / size)
+        d_most = -self.surface_friction * d_across  # across is at most 0 ...
+        if self.cut == 0.0 and self.pushed == 0.0:
+            d_most = where(across < 0.0, d_most, -d_most)  # ... but where tension stays
+        d_share = (d_most - share * dot(along, d_along) / size) / size
+        d_share = where(most < size, d_share, 0.0)
+        shifted = plus(times(d_share, along), times(share, d_along))
+        return times(self.xi_n, plus(times(d_across, n), shifted))
+
+    @formula
+    def lead_slope(self, n_dot_v, grazing_sine, sheet=False):
+        """Return the slope of `lead` by n_dot_v."""
+        size = where(sheet, absolute(n_dot_v), n_dot_v)
+        if grazing_sine > 0.0:
+            slope = smoothstep_slope(size, grazing_sine)
+            return where(sheet & (n_dot_v < 0.0), -slope, slope)
+        return 0.0 * n_dot_v
 
     @formula
     def lead(self, n_dot_v, grazing_sine, sheet=False):

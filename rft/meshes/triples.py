@@ -5,6 +5,7 @@ from __future__ import annotations
 from rft.vectors import formula
 
 UP, AHEAD = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
+AXES = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
 @formula

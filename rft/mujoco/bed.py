@@ -15,12 +15,11 @@ from rft.meshes.extruded import Extruded
 from rft.meshes.law import Spatial
 from rft.meshes.mesh import Mesh
 from rft.meshes.zones import Place, Zones, share_in
-from rft.mujoco.addresses import Arrays
 from rft.mujoco.footprints import Prints
+from rft.mujoco.geoms import described
 from rft.mujoco.hills import FLAT, Hills, tangent_plane
-from rft.mujoco.rest import Held, Rest, damping, held_of
-
-FASTEST = 100.0  # m/s, assumed: a geom that is faster is the result of a time step that is too long, and bears nothing
+from rft.mujoco.model_parts import last_dof
+from rft.mujoco.parts import Frames
 
 
 @dataclass(frozen=True)
@@ -31,8 +30,7 @@ class Bed:
     geoms, their bodies and these bodies' roots. dofs: (G,), the last degree of freedom of each body; parents: (nv,), that of
     each degree of freedom, -1 for none. spheres: (G, 4), middle of a sphere around each geom in its frame, and radius, m.
     hills: the surface in place of a plane, where its grid is not empty. laws: one for each of the zones. prints: what
-    footprints follow from; None for ground that remembers nothing. rest: what holding a body at rest follows from; None for
-    forces that depend on the motion alone."""
+    footprints follow from; None for ground that remembers nothing. names: of the geoms."""
 
     laws: tuple[Extruded | Spatial, ...]
     zones: Zones
@@ -49,7 +47,7 @@ class Bed:
     spheres: np.ndarray
     hills: Hills = FLAT
     prints: Prints | None = None
-    rest: Rest | None = None
+    names: tuple[str, ...] = ()
 
     @classmethod
     def under(
@@ -76,62 +74,66 @@ class Bed:
         return cls(
             laws, zones, ground, up, ahead, float(level * up[2]), blocks,
             np.array(geoms, np.int64), bodies, model.body_rootid[bodies].astype(np.int64),
-            np.array([_last_dof(model, b) for b in bodies], np.int64), model.dof_parentid.astype(np.int64),
-            np.array(spheres), hills,
+            np.array([last_dof(model, b) for b in bodies], np.int64), model.dof_parentid.astype(np.int64),
+            np.array(spheres), hills, names=tuple(described(model, g) for g in geoms),
         )  # fmt: skip
 
     def rounded(self, rounding: float) -> Bed:
         """Return the bed with another rounding, m/s."""
         return replace(self, ground=self.ground._replace(rounding=rounding))
 
-    def twists(self, data: mujoco.MjData | Arrays) -> tuple[np.ndarray, np.ndarray]:
+    def twists(self, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
         """Return velocities of the geoms' origins, m/s, and angular velocities, rad/s, (G, 3), in the world."""
         twist = data.cvel[self.bodies]
         arm = data.geom_xpos[self.geoms] - data.subtree_com[self.roots]
         return twist[:, 3:] + _cross(twist[:, :3], arm), twist[:, :3]
 
-    def wrenches(
-        self, data: mujoco.MjData | Arrays, velocity=None, spin=None, sunk: float = 0.0
-    ) -> np.ndarray:
-        """Return force, N, and moment about the geom's origin, N m, on each geom, (G, 6), in the world.
-
-        velocity, spin: (G, 3), by default those of the data. sunk: m, by which all geoms lie deeper than in the data."""
-        holds = velocity is None and self.rest is not None
-        if velocity is None:
-            velocity, spin = self.twists(data)
-        turn, place = (
-            data.geom_xmat[self.geoms].reshape(-1, 3, 3),
-            data.geom_xpos[self.geoms],
-        )
-        along_axes = lambda x: np.einsum(
-            "gij,gi->gj", turn, np.broadcast_to(x, place.shape)
-        )[:, None]
-        up, level = self.surface(
-            place + np.einsum("gij,gj->gi", turn, self.spheres[:, :3])
-        )
+    def frames(self, data) -> Frames:
+        """Return where the geoms are, by an MjData or `rft.mujoco.addresses.Arrays`."""
+        turn = data.geom_xmat[self.geoms].reshape(-1, 3, 3)
+        place = data.geom_xpos[self.geoms]
+        middles = place + np.einsum("gij,gj->gi", turn, self.spheres[:, :3])
+        up, level = self.surface(middles)
         if self.prints:
             level = level + up[:, 2] * self.prints.memory(data.userdata).levels
+        along_axes = lambda x: np.einsum(
+            "gij,gi->gj", turn, np.broadcast_to(x, place.shape)
+        )
+        return Frames(
+            along_axes(up),
+            along_axes(self.ahead),
+            place @ self.ahead,
+            (place * up).sum(-1) - level,
+            turn,
+            place,
+        )
+
+    def wrenches(
+        self, data: mujoco.MjData, velocity=None, spin=None, sunk: float = 0.0
+    ) -> np.ndarray:
+        """Return force, N, and moment about the geom's origin, N m, on each geom at given velocities, (G, 6), in the world.
+
+        velocity, spin: (G, 3), by default those of the data. sunk: m, by which all geoms lie deeper than in the data."""
+        if velocity is None:
+            velocity, spin = self.twists(data)
+        frames = self.frames(data)
+        turn = frames.turn
+        along_axes = lambda x: np.einsum("gij,gi->gj", turn, x)[:, None]
         motions = Motion(
-            along_axes(velocity), along_axes(spin), (place @ self.ahead)[:, None], along_axes(up),
-            along_axes(self.ahead), ((place * up).sum(-1) - level - sunk)[:, None],
-        )  # fmt: skip
-        loads = self._loads(motions, turn, place).reshape(-1, 2, 3)
-        wrenches = np.einsum("gij,gpj->gpi", turn, loads).reshape(-1, 6)
-        if holds:
-            held, radii = self.held(data.userdata), self.spheres[:, 3]
-            speed = np.sqrt((velocity**2).sum(-1) + (spin**2).sum(-1) * radii**2)
-            wrenches *= damping(speed, held.speeds, self.ground.rounding)[:, None]
-            wrenches += held.wrenches
-        return wrenches
+            along_axes(np.asarray(velocity)),
+            along_axes(np.asarray(spin)),
+            frames.x[:, None],
+            frames.up[:, None],
+            frames.ahead[:, None],
+            frames.height[:, None] - sunk,
+        )
+        loads = self._loads(motions, turn, frames.place).reshape(-1, 2, 3)
+        return np.einsum("gij,gpj->gpi", turn, loads).reshape(-1, 6)
 
     @property
     def remembered(self) -> int:
         """How many numbers of userdata a simulation takes."""
-        return sum(x.numbers for x in (self.rest, self.prints) if x is not None)
-
-    def held(self, userdata: np.ndarray) -> Held:
-        """Return what holds the geoms, from the userdata (N,) of a simulation."""
-        return held_of(userdata[len(userdata) - self.remembered :], len(self.geoms))
+        return self.prints.numbers if self.prints else 0
 
     def _loads(
         self, motions: Motion, turn: np.ndarray, place: np.ndarray
@@ -171,27 +173,10 @@ class Bed:
                 row[dof], dof = True, self.parents[dof]
         return moved
 
-    def add_forces(self, data: Arrays) -> None:
-        """Add the forces of the grains to qfrc_passive."""
-        wrench, arm = (
-            self.wrenches(data),
-            data.geom_xpos[self.geoms] - data.subtree_com[self.roots],
-        )
-        moment = wrench[:, 3:] + _cross(arm, wrench[:, :3])
-        along = moment @ data.cdof[:, :3].T + wrench[:, :3] @ data.cdof[:, 3:].T
-        data.qfrc_passive[:] += (along * self.moved_by).sum(0)
-
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return a x b of arrays (N, 3); `numpy.cross` takes five times as long for a few rows."""
     return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
-
-
-def _last_dof(model: mujoco.MjModel, body: int) -> int:
-    """Return the last degree of freedom that moves a body, its own or that of the body it is welded to; -1 for none."""
-    while body and not model.body_dofnum[body]:
-        body = model.body_parentid[body]
-    return int(model.body_dofadr[body] + model.body_dofnum[body] - 1) if body else -1
 
 
 def _sphere(mesh: Mesh) -> list[float]:

@@ -6,24 +6,42 @@ its law with its `Layout` and the model's and the data's addresses."""
 from __future__ import annotations
 
 import functools
-import math
-import sys
 
 import numpy as np
-from llvmlite import ir
 from numba import carray, types
-from numba.core import sigutils
 from numba.core.ccallback import CFunc
-from numba.extending import intrinsic, register_jitable
-from numba.np.unsafe.ndarray import to_fixed_tuple
+from numba.extending import register_jitable
 
-from rft.balance.cache import Cache
-from rft.ground import Ground
-from rft.meshes.compiled import on_faces
-from rft.meshes.contact import Motion
-from rft.meshes.triples import cross, dot, minus, plus, times
-from rft.meshes.zones import NOWHERE, PARTLY, Place, Zones, extent_in
+from rft.meshes.zones import Zones
+from rft.mujoco import (
+    c_calls,
+    compiled_algebra,
+    compiled_parts,
+    compiled_solver,
+    equations,
+)
 from rft.mujoco.addresses import FARTHEST
+from rft.mujoco.c_calls import (
+    address_of,
+    call,
+    compiled_c,
+    integers_at,
+    numbers_at,
+    pointer_to,
+    short_integers_at,
+)
+from rft.mujoco.compiled_parts import cut, grains_of
+from rft.mujoco.equations import (
+    FASTEST,
+    IMPLICIT,
+    IMPLICIT_FAST,
+    RUNGE_KUTTA,
+    Inputs,
+    add_body_forces,
+    add_implicit_terms,
+    elliptic_rows,
+    solve_blocks,
+)
 from rft.mujoco.footprints import (
     COMPILED,
     HEAD,
@@ -33,222 +51,393 @@ from rft.mujoco.footprints import (
     remember,
 )
 from rft.mujoco.hills import tangent_plane
-from rft.mujoco.rest import COMPILED as HOLDING
-from rft.mujoco.rest import PER_GEOM as NUMBERS
-from rft.mujoco.rest import Rest, begin, damping, held_of, hold, let_go
+from rft.mujoco.implicit import COARSER, UNSOLVED
+from rft.mujoco.layout import (
+    AT,
+    COARSER_STEPS,
+    GEOM,
+    ITERATIONS,
+    MOST_ITERATIONS,
+    N_COUNTS,
+    NAMES,
+    RESIDUAL,
+    STEPS,
+    TIME,
+    UNSOLVED_STEPS,
+    WATCHED_HEAD,
+    WATCHED_RESIDUAL,
+    WATCHED_ROUNDING,
+    WATCHED_STATUS,
+)
+from rft.mujoco.parts import Frames
+from rft.mujoco.rows import Rows
 from rft.simd import WIDTH, register_formulas
 
-LAYOUT = 48  # numbers that `rft.mujoco.installed.layout_of` writes
-for function in (tangent_plane, *COMPILED, *HOLDING):
+LAYOUT = len(NAMES)
+for function in (
+    tangent_plane,
+    *COMPILED,
+    *equations.COMPILED,
+):
     register_jitable(function)
-OPTIONS = {"nopython": True, "nogil": True, "error_model": "numpy"}
 
 
-@intrinsic
-def _pointer(context, address):
-    """Return an address as a pointer."""
+@register_jitable
+def _frames(row, fields, levels):
+    """Return the frames of all geoms, the middles (G, 3) and radii (G,) of spheres around them, and which of them may be in
+    the ground. levels: (G,), of the ground that footprints have left, or empty."""
+    count = row[AT.n_geoms]
+    geoms = integers_at(row[AT.geoms], (count, 3))
+    spheres = numbers_at(row[AT.spheres], (count, 4))
+    xpos = numbers_at(fields[AT.geom_xpos], (row[AT.ngeom], 3))
+    xmat = numbers_at(fields[AT.geom_xmat], (row[AT.ngeom], 3, 3))
+    surface = numbers_at(row[AT.surface], 7)
+    hills = numbers_at(row[AT.hills], (row[AT.hill_rows], row[AT.hill_columns], 3))
+    hill_frame = numbers_at(row[AT.hill_frame], 7)
+    ups, aheads = np.empty((count, 3)), np.empty((count, 3))
+    xs, heights, middles = np.empty(count), np.empty(count), np.empty((count, 3))
+    turns, places = np.empty((count, 3, 3)), np.empty((count, 3))
+    in_reach = np.zeros(count, np.bool_)
+    up, level = (surface[0], surface[1], surface[2]), surface[6]
+    for g in range(count):
+        turn, place, sphere = xmat[geoms[g, 0]], xpos[geoms[g, 0]], spheres[g]
+        turns[g], places[g] = turn, place
+        for i in range(3):
+            middles[g, i] = place[i]
+            for j in range(3):
+                middles[g, i] += turn[i, j] * sphere[j]
+        if row[AT.hill_rows] > 0:
+            up, level = tangent_plane(hills, hill_frame, middles[g, 0], middles[g, 1])
+        heights[g], xs[g], distance = -level, 0.0, -level
+        if len(levels) > 0:
+            heights[g] -= up[2] * levels[g]
+            distance = heights[g]
+        for i in range(3):
+            heights[g] += up[i] * place[i]
+            distance += up[i] * middles[g, i]
+            xs[g] += surface[3 + i] * place[i]
+            ups[g, i] = turn[0, i] * up[0] + turn[1, i] * up[1] + turn[2, i] * up[2]
+            aheads[g, i] = (
+                turn[0, i] * surface[3]
+                + turn[1, i] * surface[4]
+                + turn[2, i] * surface[5]
+            )
+        in_reach[g] = distance < sphere[3]
+    if fields[AT.body_awake] > 0:
+        awake = short_integers_at(fields[AT.body_awake], row[AT.nbody])
+        for g in range(count):
+            in_reach[g] &= awake[geoms[g, 1]] != 0  # what sleeps needs no force
+    frames = Frames(ups, aheads, xs, heights, turns, places)
+    return frames, middles, spheres[:, 3], in_reach
 
-    def emit(context, builder, sig, args):
-        return builder.inttoptr(args[0], context.get_value_type(types.voidptr))
 
-    return types.voidptr(types.int64), emit
-
-
-@intrinsic
-def _address(context, pointer):
-    """Return a pointer as an address."""
-
-    def emit(context, builder, sig, args):
-        return builder.ptrtoint(args[0], ir.IntType(64))
-
-    return types.int64(types.voidptr), emit
+@register_jitable
+def _is_sane(velocity):
+    """Return whether no velocity is beyond what MuJoCo calls bad."""
+    return (np.abs(velocity) < FASTEST).all()
 
 
-@intrinsic
-def _call(context, function, data, layout):
-    """Call the C function at an address, void (void *data, void *layout)."""
+@register_jitable
+def _is_unchanged(row):
+    """Return whether the geoms are as their elements were made for."""
+    count = row[AT.n_geoms]
+    geoms = integers_at(row[AT.geoms], (count, 3))
+    form = numbers_at(row[AT.form], (count, 5))
+    sizes = numbers_at(row[AT.geom_size], (row[AT.ngeom], 3))
+    kinds = short_integers_at(row[AT.geom_type], row[AT.ngeom])
+    meshes = short_integers_at(row[AT.geom_dataid], row[AT.ngeom])
+    for g in range(count):
+        geom = geoms[g, 0]
+        same = kinds[geom] == form[g, 3] and meshes[geom] == form[g, 4]
+        for i in range(3):
+            same = same and sizes[geom, i] == form[g, i]
+        if not same:
+            return False
+    return True
 
-    def emit(context, builder, sig, args):
-        pointer = context.get_value_type(types.voidptr)
-        kind = ir.FunctionType(ir.VoidType(), [pointer, pointer])
-        called = builder.inttoptr(args[0], kind.as_pointer())
-        builder.call(called, [args[1], builder.inttoptr(args[2], pointer)])
-        return context.get_dummy_value()
 
-    return types.void(types.int64, types.voidptr, types.int64), emit
+@register_jitable
+def _jacobians(row, fields, in_ground):
+    """Return the Jacobians (G, 6, nv) of the geoms in the ground along their own axes."""
+    count, nv = row[AT.n_geoms], row[AT.nv]
+    geoms = integers_at(row[AT.geoms], (count, 3))
+    xpos = numbers_at(fields[AT.geom_xpos], (row[AT.ngeom], 3))
+    xmat = numbers_at(fields[AT.geom_xmat], (row[AT.ngeom], 3, 3))
+    centers = numbers_at(fields[AT.subtree_com], (row[AT.nbody], 3))
+    cdof = numbers_at(fields[AT.cdof], (nv, 6))
+    dofs = integers_at(row[AT.dofs], row[AT.n_dofs])
+    first = integers_at(row[AT.first_dof], count + 1)
+    jacobian = np.zeros((count, 6, nv))
+    for g in range(count):
+        if not in_ground[g]:
+            continue
+        turn, place = xmat[geoms[g, 0]], xpos[geoms[g, 0]]
+        center = centers[geoms[g, 2]]
+        x, y, z = place[0] - center[0], place[1] - center[1], place[2] - center[2]
+        for c in dofs[first[g] : first[g + 1]]:
+            d = cdof[c]
+            v0 = d[3] + d[1] * z - d[2] * y
+            v1 = d[4] + d[2] * x - d[0] * z
+            v2 = d[5] + d[0] * y - d[1] * x
+            for i in range(3):
+                jacobian[g, i, c] = turn[0, i] * v0 + turn[1, i] * v1 + turn[2, i] * v2
+                jacobian[g, 3 + i, c] = (
+                    turn[0, i] * d[0] + turn[1, i] * d[1] + turn[2, i] * d[2]
+                )
+    return jacobian, dofs, first
+
+
+@register_jitable
+def _inertia(row, data, fields):
+    """Return the inertia (nv, nv)."""
+    matrix = np.zeros((row[AT.nv], row[AT.nv]))
+    model, address = pointer_to(row[AT.model]), pointer_to(matrix.ctypes.data)
+    if row[AT.full_takes_data] != 0:
+        call(row[AT.mj_fullM], (model, data, address))
+    else:
+        call(row[AT.mj_fullM], (model, address, pointer_to(fields[AT.qM])))
+    return matrix
+
+
+@register_jitable
+def _known_force(row, data, fields):
+    """Return all smooth forces (nv,) of this step but those of the grains."""
+    nv, nbody = row[AT.nv], row[AT.nbody]
+    model = pointer_to(row[AT.model])
+    force = np.empty(nv)
+    call(row[AT.mj_rne], (model, data, np.int32(0), pointer_to(force.ctypes.data)))
+    call(row[AT.mj_fwdActuation], (model, data))
+    passive = numbers_at(fields[AT.qfrc_passive], nv)
+    applied = numbers_at(fields[AT.qfrc_applied], nv)
+    motors = numbers_at(fields[AT.qfrc_actuator], nv)
+    for i in range(nv):
+        force[i] = passive[i] - force[i] + applied[i] + motors[i]
+    bodies = integers_at(row[AT.bodies], (nbody, 2))
+    add_body_forces(
+        force,
+        numbers_at(fields[AT.xfrc_applied], (nbody, 6)),
+        numbers_at(fields[AT.xipos], (nbody, 3)),
+        numbers_at(fields[AT.subtree_com], (nbody, 3)),
+        numbers_at(fields[AT.cdof], (nv, 6)),
+        bodies[:, 0],
+        bodies[:, 1],
+        integers_at(row[AT.parents], nv),
+    )
+    return force
+
+
+@register_jitable
+def _constraint_rows(row, data, fields):
+    """Return MuJoCo's constraint rows, by all degrees of freedom."""
+    nv = row[AT.nv]
+    count = short_integers_at(address_of(data), FARTHEST // 4)[row[AT.nefc]]
+    jacobian = np.zeros((count, nv))
+    kinds, weight, reference = (
+        np.empty(count, np.int64),
+        np.empty(count),
+        np.empty(count),
+    )
+    limits = np.empty(count)
+    cones, scales = np.zeros((0, 2), np.int64), np.zeros((0, 6))
+    if count > 0:
+        call(row[AT.mj_referenceConstraint], (pointer_to(row[AT.model]), data))
+        _fill_jacobian(row, fields, jacobian)
+        kinds[:] = short_integers_at(fields[AT.efc_type], count)
+        weight[:] = numbers_at(fields[AT.efc_D], count)
+        reference[:] = numbers_at(fields[AT.efc_aref], count)
+        limits[:] = numbers_at(fields[AT.efc_frictionloss], count)
+        cones, scales = _cones(row, data, fields, kinds)
+    return Rows(jacobian, jacobian, weight, reference, kinds, limits, cones, scales)
+
+
+@register_jitable
+def _fill_jacobian(row, fields, jacobian):
+    """Write the constraints' Jacobian (r, nv)."""
+    count, nv = jacobian.shape
+    if row[AT.is_sparse] == 0:
+        jacobian[:] = numbers_at(fields[AT.efc_J], (count, nv))
+        return
+    numbers = short_integers_at(fields[AT.efc_J_rownnz], count)
+    first = short_integers_at(fields[AT.efc_J_rowadr], count)
+    size = first[count - 1] + numbers[count - 1]
+    values = numbers_at(fields[AT.efc_J], size)
+    columns = short_integers_at(fields[AT.efc_J_colind], size)
+    for i in range(count):
+        for j in range(first[i], first[i] + numbers[i]):
+            jacobian[i, columns[j]] = values[j]
+
+
+@register_jitable
+def _cones(row, data, fields, kinds):
+    """Return first rows and numbers of rows (c, 2), and mu and friction (c, 6), of elliptic contacts."""
+    count = short_integers_at(address_of(data), FARTHEST // 4)[row[AT.ncon]]
+    cones, scales = np.zeros((count, 2), np.int64), np.zeros((count, 6))
+    for c in range(count):
+        at = fields[AT.contact_pointer] + c * row[AT.contact_size]
+        cones[c, 0] = short_integers_at(at + row[AT.contact_address], 1)[0]
+        cones[c, 1] = short_integers_at(at + row[AT.contact_dim], 1)[0]
+        scales[c, 0] = numbers_at(at + row[AT.contact_mu], 1)[0]
+        scales[c, 1:] = numbers_at(at + row[AT.contact_friction], 5)
+    return elliptic_rows(kinds, cones, scales)
+
+
+@register_jitable
+def _implicit_terms(row, data, fields, effective, step):
+    """Add what the integrator takes implicitly to the inertia, and return whether there is any."""
+    integrator = short_integers_at(row[AT.integrator], 1)[0]
+    flags = short_integers_at(row[AT.disableflags], 1)[0]
+    if integrator in (IMPLICIT, IMPLICIT_FAST):
+        with_bias = np.int32(integrator == IMPLICIT)
+        call(row[AT.mjd_smooth_vel], (pointer_to(row[AT.model]), data, with_bias))
+    elif flags & row[AT.no_euler_damping] != 0:
+        return False
+    return add_implicit_terms(
+        effective,
+        step,
+        integrator,
+        numbers_at(row[AT.damping], row[AT.nv]),
+        numbers_at(fields[AT.qDeriv], row[AT.n_derivative]),
+        integers_at(row[AT.derivative_rows], row[AT.n_derivative]),
+        integers_at(row[AT.derivative_columns], row[AT.n_derivative]),
+    )
+
+
+@register_jitable
+def _count(row, data, result, geom, time):
+    """Count a step, and report the first that is not solved."""
+    counts = integers_at(row[AT.counts], N_COUNTS)
+    counts[STEPS] += 1
+    counts[ITERATIONS] += result.iterations
+    counts[MOST_ITERATIONS] = max(counts[MOST_ITERATIONS], result.iterations)
+    if result.status == COARSER:
+        counts[COARSER_STEPS] += 1
+    if result.status == UNSOLVED:
+        counts[UNSOLVED_STEPS] += 1
+        if counts[UNSOLVED_STEPS] == 1:
+            unsolved = numbers_at(row[AT.unsolved], 3)
+            unsolved[TIME], unsolved[RESIDUAL], unsolved[GEOM] = (
+                time,
+                result.residual,
+                geom,
+            )
+            call(row[AT.report], (data, pointer_to(row[AT.unsolved])))
+
+
+@register_jitable
+def _watch(row, result, wrenches, twists):
+    """Write what the grains do in this step where it is asked for."""
+    count = row[AT.n_geoms]
+    watched = numbers_at(row[AT.watched], WATCHED_HEAD + 12 * count)
+    watched[WATCHED_RESIDUAL] = result.residual
+    watched[WATCHED_STATUS] = result.status
+    watched[WATCHED_ROUNDING] = result.rounding
+    for g in range(count):
+        begin = WATCHED_HEAD + 12 * g
+        watched[begin : begin + 6] = wrenches[g]
+        watched[begin + 6 : begin + 12] = twists[g]
 
 
 @functools.cache
-def kernel(Law: type, has_regions: bool = False) -> CFunc:
-    """Return the C function (data, layout) that adds the forces of the grains to qfrc_passive, for laws whose records have
-    one class, in one medium or in several regions. layout: int64 numbers and addresses, in the order in which
-    `rft.mujoco.installed.layout_of` writes them."""
+def kernel() -> CFunc:
+    """Return the C function (data, layout) that adds the forces of the grains to qfrc_passive. layout: int64 numbers and
+    addresses, by the names of `rft.mujoco.layout`."""
     register_formulas()
-    count = len(Law._fields)
 
     def add_forces(data, layout):
         row = carray(layout, LAYOUT, np.int64)
-        fields = carray(data, FARTHEST // 8, np.int64)
-        nv, ngeom, nbody, rows, groups = row[6], row[7], row[8], row[9], row[10]
-        qfrc = carray(_pointer(fields[row[0]]), nv, np.float64)
-        xpos = carray(_pointer(fields[row[1]]), (ngeom, 3), np.float64)
-        xmat = carray(_pointer(fields[row[2]]), (ngeom, 3, 3), np.float64)
-        cvel = carray(_pointer(fields[row[3]]), (nbody, 6), np.float64)
-        cdof = carray(_pointer(fields[row[4]]), (nv, 6), np.float64)
-        com = carray(_pointer(fields[row[5]]), (nbody, 3), np.float64)
-        table = carray(_pointer(row[11]), (rows, 14, WIDTH), np.float64)
-        first = carray(_pointer(row[12]), groups + 1, np.int64)
-        numbers = carray(_pointer(row[13]), (groups, 4), np.int64)
-        spheres = carray(_pointer(row[14]), (groups, 4), np.float64)
-        parents = carray(_pointer(row[15]), nv, np.int64)
+        words = carray(data, FARTHEST // 8, np.int64)
+        fields = np.zeros(LAYOUT, np.int64)
+        for i in range(AT.qfrc_passive, AT.efc_frictionloss + 1):
+            fields[i] = words[row[i]] if row[i] >= 0 else 0
+        fields[AT.contact_pointer] = words[row[AT.contact_pointer]]
+        if not _is_unchanged(row):
+            call(row[AT.report_changed], (data, layout))
+            return
+        nv, n_geoms, n_zones = row[AT.nv], row[AT.n_geoms], row[AT.n_zones]
+        levels = np.zeros(0)
+        if row[AT.recorder] != 0:
+            call(row[AT.recorder], (data, layout))
+            begin = fields[AT.userdata] + 8 * (row[AT.memory_start] + HEAD)
+            levels = numbers_at(begin, n_geoms)
+        velocity = numbers_at(fields[AT.qvel], nv)
+        frames, middles, radii, in_reach = _frames(row, fields, levels)
+        if not in_reach.any() or not _is_sane(velocity):
+            return
         zones = Zones(
-            carray(_pointer(row[27]), (row[29], 3), np.float64),
-            carray(_pointer(row[28]), row[30] + 1, np.int64),
+            numbers_at(row[AT.planes], (row[AT.n_planes], 3)),
+            integers_at(row[AT.first_plane], n_zones + 1),
         )
-        laws = carray(_pointer(row[16]), (row[30], count + 1), np.float64)
-        g = carray(_pointer(row[17]), 13, np.float64)
-        disturbed = carray(_pointer(row[18]), (row[19], row[20]), np.float64)
-        up, ahead, level, fastest = (
-            (g[5], g[6], g[7]),
-            (g[8], g[9], g[10]),
-            g[11],
-            g[12],
+        laws = numbers_at(row[AT.laws], (n_zones, row[AT.n_numbers]))
+        first_part = np.zeros(n_zones * n_geoms + 1, np.int64)
+        cache = cut(
+            numbers_at(row[AT.table], (row[AT.n_table], 14, WIDTH)),
+            integers_at(row[AT.first], n_geoms + 1),
+            zones,
+            n_zones,
+            (frames, middles, radii),
+            first_part,
+            in_reach,
         )
-        grid = carray(_pointer(row[23]), (row[24], row[25], 3), np.float64)
-        field = carray(_pointer(row[26]), 7, np.float64)
-        fast = carray(_pointer(row[21]), 1, np.int64)
-        levels = g[:0]
-        if row[31] != 0:
-            _call(row[31], data, _address(layout))
-            levels = carray(
-                _pointer(fields[row[32]] + 8 * (row[33] + HEAD)), groups, np.float64
-            )
-        only_law = Law(*to_fixed_tuple(laws[0, :count], count))
-        only_ground = Ground(g[0], g[1], g[2], laws[0, count], g[4], disturbed)
-        passed, holds = 0.0, row[41] != 0
-        if holds:
-            held = held_of(
-                carray(
-                    _pointer(fields[row[42]] + 8 * row[43]),
-                    1 + NUMBERS * groups,
-                    np.float64,
-                ),
-                groups,
-            )
-            holding = Rest(
-                carray(_pointer(row[44]), groups, np.float64),
-                carray(_pointer(row[45]), groups, np.float64),
-                carray(_pointer(row[46]), groups, np.int64),
-                carray(_pointer(row[47]), 1, np.float64),
-            )
-            passed = begin(
-                held,
-                holding,
-                carray(_pointer(_address(data) + 8 * row[41]), 1, np.float64)[0],
-            )
-        for k in range(groups):
-            geom, body, root, dof = (
-                numbers[k, 0],
-                numbers[k, 1],
-                numbers[k, 2],
-                numbers[k, 3],
-            )
-            turn, place = xmat[geom], (xpos[geom, 0], xpos[geom, 1], xpos[geom, 2])
-            x_axis = (turn[0, 0], turn[1, 0], turn[2, 0])
-            y_axis = (turn[0, 1], turn[1, 1], turn[2, 1])
-            z_axis = (turn[0, 2], turn[1, 2], turn[2, 2])
-            center, radius = (
-                (spheres[k, 0], spheres[k, 1], spheres[k, 2]),
-                spheres[k, 3],
-            )
-            middle = plus(
-                plus(times(center[0], x_axis), times(center[1], y_axis)),
-                times(center[2], z_axis),
-            )
-            middle = plus(place, middle)
-            if row[24] > 0:
-                up, level = tangent_plane(grid, field, middle[0], middle[1])
-            height = dot(up, place) - level
-            if row[31] != 0:
-                height -= up[2] * levels[k]
-            local_up = (dot(x_axis, up), dot(y_axis, up), dot(z_axis, up))
-            if not height + dot(local_up, center) < radius:
-                if holds:
-                    let_go(held, k)
-                continue
-            spin = (cvel[body, 0], cvel[body, 1], cvel[body, 2])
-            arm = minus(place, (com[root, 0], com[root, 1], com[root, 2]))
-            velocity = plus(
-                (cvel[body, 3], cvel[body, 4], cvel[body, 5]), cross(spin, arm)
-            )
-            if (
-                not dot(velocity, velocity) + dot(spin, spin) * radius**2
-                < fastest * fastest
-            ):
-                if holds:
-                    let_go(held, k)
-                fast[0] += 1
-                if fast[0] == 1:
-                    _call(row[22], data, _address(layout))
-                continue
-            motion = Motion(
-                (dot(x_axis, velocity), dot(y_axis, velocity), dot(z_axis, velocity)),
-                (dot(x_axis, spin), dot(y_axis, spin), dot(z_axis, spin)),
-                dot(ahead, place),
-                local_up,
-                (dot(x_axis, ahead), dot(y_axis, ahead), dot(z_axis, ahead)),
-                height,
-            )
-            f, m = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-            if has_regions:  # a branch that the compiler drops
-                for zone in range(row[30]):
-                    extent = extent_in(zones, zone, middle[0], middle[1], radius)
-                    if extent == NOWHERE:
-                        continue
-                    law = Law(*to_fixed_tuple(laws[zone, :count], count))
-                    ground = Ground(
-                        g[0], g[1], g[2], laws[zone, count], g[4], disturbed
-                    )
-                    only, at = zone if extent == PARTLY else -1, Place(turn, place)
-                    df, dm = on_faces(
-                        law,
-                        ground,
-                        table,
-                        first[k],
-                        first[k + 1],
-                        motion,
-                        zones,
-                        only,
-                        at,
-                    )
-                    f, m = plus(f, df), plus(m, dm)
-            else:
-                f, m = on_faces(
-                    only_law, only_ground, table, first[k], first[k + 1], motion
-                )
-            force = plus(
-                plus(times(f[0], x_axis), times(f[1], y_axis)), times(f[2], z_axis)
-            )
-            moment = plus(
-                plus(times(m[0], x_axis), times(m[1], y_axis)), times(m[2], z_axis)
-            )
-            if holds:
-                speed = math.sqrt(dot(velocity, velocity) + dot(spin, spin) * radius**2)
-                hold(held, holding, k, passed, speed, g[2], (*force, *moment))
-                own, share = held.wrenches[k], damping(speed, held.speeds[k], g[2])
-                force = plus((own[0], own[1], own[2]), times(share, force))
-                moment = plus((own[3], own[4], own[5]), times(share, moment))
-            moment = plus(moment, cross(arm, force))
-            while dof >= 0:
-                c = cdof[dof]
-                qfrc[dof] += dot((c[0], c[1], c[2]), moment) + dot(
-                    (c[3], c[4], c[5]), force
-                )
-                dof = parents[dof]
+        in_ground = np.zeros(n_geoms, np.bool_)
+        for k in range(n_zones * n_geoms):
+            in_ground[k % n_geoms] |= first_part[k + 1] > first_part[k]
+        if not in_ground.any():
+            return
+        numbers = numbers_at(row[AT.ground], 7)
+        rounding, accuracy = numbers[5], numbers[6]
+        shape = (row[AT.disturbed_rows], row[AT.disturbed_columns])
+        grains = grains_of(
+            (row[AT.element_code], row[AT.solver_code]),
+            (n_geoms, n_zones),
+            laws,
+            numbers,
+            numbers_at(row[AT.disturbed], shape),
+            cache,
+            first_part,
+            frames,
+        )
+        step = numbers_at(row[AT.timestep], 1)[0]
+        if short_integers_at(row[AT.integrator], 1)[0] == RUNGE_KUTTA:
+            step *= 0.5
+        jacobian, dofs, first = _jacobians(row, fields, in_ground)
+        force = _known_force(row, data, fields)
+        inertia = _inertia(row, data, fields)
+        effective = inertia.copy()
+        is_damped = _implicit_terms(row, data, fields, effective, step)
+        inputs = Inputs(
+            inertia,
+            effective,
+            is_damped,
+            force,
+            velocity,
+            numbers_at(fields[AT.qacc_warmstart], nv),
+            step,
+            jacobian,
+            dofs,
+            first,
+            in_ground,
+            _constraint_rows(row, data, fields),
+            integers_at(row[AT.trees], nv),
+        )
+        wrenches, twists = np.zeros((n_geoms, 6)), np.zeros((n_geoms, 6))
+        result, geom = solve_blocks(
+            inputs, grains, rounding, accuracy, wrenches, twists
+        )
+        passive = numbers_at(fields[AT.qfrc_passive], nv)
+        for g in range(n_geoms):
+            if in_ground[g]:
+                for c in dofs[first[g] : first[g + 1]]:
+                    for i in range(6):
+                        passive[c] += jacobian[g, i, c] * wrenches[g, i]
+        if integers_at(row[AT.watch], 1)[0] == address_of(data):
+            _watch(row, result, wrenches, twists)
+        else:
+            time = numbers_at(address_of(data) + 8 * row[AT.time], 1)[0]
+            _count(row, data, result, geom, time)
 
-    return _compiled(
-        add_forces, f"the forces of grains in MuJoCo of the form {Law.__name__}"
-    )
+    purpose = "the callback of grains in MuJoCo"
+    modules = compiled_algebra, compiled_parts, compiled_solver, c_calls
+    return compiled_c(add_forces, (types.voidptr, types.voidptr), purpose, *modules)
 
 
 @functools.cache
@@ -257,43 +446,39 @@ def recorder() -> CFunc:
 
     def record(data, layout):
         row = carray(layout, LAYOUT, np.int64)
-        fields = carray(data, FARTHEST // 8, np.int64)
-        ngeom, nbody, groups, g = (
-            row[7],
-            row[8],
-            row[10],
-            carray(_pointer(row[17]), 13, np.float64),
-        )
-        shape, first = (
-            (row[34], row[35]),
-            carray(_pointer(row[39]), groups + 1, np.int64),
-        )
-        size = HEAD + PER_GEOM * groups + PER_CELL * shape[0] * shape[1]
-        numbers = carray(_pointer(fields[row[32]] + 8 * row[33]), size, np.float64)
+        words = carray(data, FARTHEST // 8, np.int64)
+        ngeom, nbody, n_geoms = row[AT.ngeom], row[AT.nbody], row[AT.n_geoms]
+        shape = (row[AT.print_rows], row[AT.print_columns])
+        first = integers_at(row[AT.print_first], n_geoms + 1)
+        size = HEAD + PER_GEOM * n_geoms + PER_CELL * shape[0] * shape[1]
+        begin = words[row[AT.userdata]] + 8 * row[AT.memory_start]
         prints = (
-            carray(_pointer(row[36]), 6, np.float64),
-            carray(_pointer(row[37]), shape, np.float64),
-            carray(_pointer(row[38]), (first[groups], 3), np.float64),
+            numbers_at(row[AT.print_grid], 6),
+            numbers_at(row[AT.print_surface], shape),
+            numbers_at(row[AT.print_points], (first[n_geoms], 3)),
             first,
         )
         bodies = (
-            carray(_pointer(row[13]), (groups, 4), np.int64),
-            carray(_pointer(row[14]), (groups, 4), np.float64),
+            integers_at(row[AT.geoms], (n_geoms, 3)),
+            numbers_at(row[AT.spheres], (n_geoms, 4)),
         )
         poses = (
-            carray(_pointer(fields[row[1]]), (ngeom, 3), np.float64),
-            carray(_pointer(fields[row[2]]), (ngeom, 3, 3), np.float64),
-            carray(_pointer(fields[row[3]]), (nbody, 6), np.float64),
-            carray(_pointer(fields[row[5]]), (nbody, 3), np.float64),
+            numbers_at(words[row[AT.geom_xpos]], (ngeom, 3)),
+            numbers_at(words[row[AT.geom_xmat]], (ngeom, 3, 3)),
+            numbers_at(words[row[AT.cvel]], (nbody, 6)),
+            numbers_at(words[row[AT.subtree_com]], (nbody, 3)),
         )
-        hills = (
-            carray(_pointer(row[23]), (row[24], row[25], 3), np.float64),
-            carray(_pointer(row[26]), 7, np.float64),
+        surface = numbers_at(row[AT.surface], 7)
+        hill_shape = (row[AT.hill_rows], row[AT.hill_columns], 3)
+        slopes = (
+            numbers_at(row[AT.hills], hill_shape),
+            numbers_at(row[AT.hill_frame], 7),
+            (surface[0], surface[1], surface[2]),
+            surface[6],
         )
-        time = carray(_pointer(_address(data) + 8 * row[40]), 1, np.float64)[0]
-        slopes = hills[0], hills[1], (g[5], g[6], g[7]), g[11]
+        time = numbers_at(address_of(data) + 8 * row[AT.time], 1)[0]
         remember(
-            memory_of(numbers, groups, shape[0], shape[1]),
+            memory_of(numbers_at(begin, size), n_geoms, shape[0], shape[1]),
             time,
             prints,
             bodies,
@@ -301,18 +486,8 @@ def recorder() -> CFunc:
             slopes,
         )
 
-    return _compiled(record, "footprints in the ground of MuJoCo")
-
-
-def _compiled(function, purpose: str) -> CFunc:
-    """Return a C function (pointer, pointer), stored on disk; print one line if it has yet to be compiled."""
-    signature = sigutils.normalize_signature(types.void(types.voidptr, types.voidptr))
-    compiled = CFunc(function, signature, {}, OPTIONS)
-    compiled._cache = Cache(function)
-    if not compiled._cache.path.exists():
-        print(f"compiling {purpose}: some seconds, once", file=sys.stderr)
-    compiled.compile()
-    return compiled
+    purpose = "footprints in the ground of MuJoCo"
+    return compiled_c(record, (types.voidptr, types.voidptr), purpose, c_calls)
 
 
 def dispatcher(table: np.ndarray) -> CFunc:
@@ -320,22 +495,15 @@ def dispatcher(table: np.ndarray) -> CFunc:
     model's address the kernel in the second column with the layout in the third. A row that begins with 0 ends the table.
 
     table: int64; the function reads its memory, which must outlive it."""
-    address, rows = table.ctypes.data, len(table)
+    address, rows_ = table.ctypes.data, len(table)
 
     def passive(model, data):
-        entries = carray(_pointer(address), (rows, 3), np.int64)
-        wanted = _address(model)
-        for k in range(rows):
+        entries = carray(pointer_to(address), (rows_, 3), np.int64)
+        wanted = address_of(model)
+        for k in range(rows_):
             if entries[k, 0] == 0:
                 return
             if entries[k, 0] == wanted:
-                _call(entries[k, 1], data, entries[k, 2])
+                call(entries[k, 1], (data, pointer_to(entries[k, 2])))
 
-    compiled = CFunc(
-        passive,
-        sigutils.normalize_signature(types.void(types.voidptr, types.voidptr)),
-        {},
-        OPTIONS,
-    )
-    compiled.compile()
-    return compiled
+    return compiled_c(passive, (types.voidptr, types.voidptr), "")

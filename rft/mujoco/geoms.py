@@ -1,18 +1,16 @@
-"""Geoms of a MuJoCo model as triangles, and the geoms that a name, a pattern or a group means."""
+"""Geoms of a MuJoCo model: their kinds and names, and their surfaces as triangles."""
 
 from __future__ import annotations
 
-import difflib
-import fnmatch
 import math
 import warnings
-from collections.abc import Iterable, Sequence
 
 import mujoco
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 from rft.balance.backend import Note
-from rft.meshes import shapes
+from rft.meshes import shapes, widened
 from rft.meshes.mesh import Mesh, quartered
 from rft.meshes.smooth import smooth
 from rft.meshes.sound import size_note, sound
@@ -24,7 +22,9 @@ ALONG_Z = np.array(
     [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]
 )  # rows of vectors times this: from y to z
 ICOSAHEDRON = 1.0515  # edge of an icosahedron over its radius
-FEWEST_AROUND = 8  # edges around round geoms
+FEWEST_AROUND = 8  # edges around round geoms of a given length of edges
+PER_REACH = 4  # edges of boxes and meshes along half of the diagonal, by default
+MOST_PIECES = 12  # of a slender round geom, by default
 
 
 def geom_mesh(model: mujoco.MjModel, geom: int, elements: int) -> Mesh:
@@ -60,36 +60,75 @@ def geom_mesh(model: mujoco.MjModel, geom: int, elements: int) -> Mesh:
     )
 
 
-def mesh_of_elements(model: mujoco.MjModel, geom: int, length: float) -> Mesh:
-    """Return the mesh of a geom in its own frame, of triangles with edges of about ``length``, m; the triangles of a mesh
-    geom are cut in four until they are that small."""
+def mesh_of_elements(
+    model: mujoco.MjModel,
+    geom: int,
+    length: float | None = None,
+    hulls: bool = False,
+) -> Mesh:
+    """Return the mesh of a geom in its own frame.
+
+    length: m, of the edges, about; None for as many triangles as the shape of the geom asks for, with which 90 % of
+    random motions have an error of the force below 3 %. The triangles of a mesh geom are cut in four until they are small
+    enough, and stay as they are where they are smaller. hulls: whether a mesh without an inside stands for its convex
+    hull."""
     kind, size = geom_kind(model, geom), np.array(model.geom_size[geom])
-    pieces = lambda x, fewest=1: int(
-        np.clip(math.ceil(x / length - 1e-9), fewest, 4096)
-    )
-    around, across = pieces(2 * math.pi * size[0], FEWEST_AROUND), pieces(size[0])
     if kind == "box":
-        a, b, c = (pieces(2 * x) for x in size)
-        _require_few(4 * (a * b + b * c + c * a))
-        return shapes.box(2 * size, (a, b, c))
+        cuts = _pieces(2 * size, length or np.linalg.norm(size) / PER_REACH)
+        cuts = cuts if length else np.maximum(cuts, 2)
+        _require_few(4 * int(cuts @ np.roll(cuts, 1)))
+        return shapes.box(2 * size, cuts.tolist())
     if kind == "capsule":
-        _require_few(2 * around * (pieces(2 * size[1]) + around // 2))
-        return smooth(shapes.capsule(size[0], size[1], around, pieces(2 * size[1])))
+        quarter, along = _cuts_of_capsule(size[0], size[1], length)
+        _require_few(8 * quarter * (quarter + along))
+        return widened.capsule(size[0], size[1], quarter, along)
     if kind == "cylinder":
-        _require_few(2 * around * (pieces(2 * size[1]) + 2 * across))
-        rod = shapes.cylinder(size[0], 2 * size[1], around, pieces(2 * size[1]), across)
-        return smooth(Mesh(rod.vertices @ ALONG_Z, rod.faces))
+        around, along, across = _cuts_of_cylinder(size[0], size[1], length)
+        _require_few(2 * around * (along + 2 * across))
+        return widened.cylinder(size[0], size[1], around, along, across)
     if kind == "mesh":
-        mesh = smooth(_model_mesh(model, int(model.geom_dataid[geom])))
-        while _longest_edge(mesh) > 1.5 * length:
+        mesh = smooth(_solid_mesh(model, int(model.geom_dataid[geom]), hulls))
+        reach = np.linalg.norm(np.ptp(mesh.vertices, axis=0)) / 2
+        while _longest_edge(mesh) > 1.5 * (length or reach / PER_REACH):
             _require_few(4 * len(mesh.faces))
             mesh = quartered(mesh)
         return mesh
     radii = size if kind == "ellipsoid" else size[[0, 0, 0]]
-    fineness = max(1, round(math.log2(ICOSAHEDRON * radii.max() / length)))
+    fineness = 2
+    if length:
+        fineness = max(1, round(math.log2(ICOSAHEDRON * radii.max() / length)))
     _require_few(20 * 4**fineness)
-    ball = shapes.sphere(1.0, fineness)
-    return smooth(Mesh(ball.vertices * radii, ball.faces))
+    return widened.ellipsoid(radii, fineness)
+
+
+def _pieces(sides, length: float, fewest: int = 1) -> np.ndarray:
+    """Return the numbers of pieces of a length, m, at most, that sides, m, are cut into."""
+    counts = np.ceil(np.atleast_1d(sides) / length - 1e-9)
+    return np.clip(counts, fewest, 4096).astype(int)
+
+
+def _cuts_of_capsule(radius: float, half: float, length: float | None):
+    """Return the edges along a quarter of the rim, and the pieces of the rod."""
+    if length:
+        (quarter,) = _pieces(np.pi / 2 * radius, length, FEWEST_AROUND // 4)
+        (along,) = _pieces(2 * half, length)
+        return quarter, along
+    quarter = 5 if half < 2 * radius else 4
+    along = math.ceil(half / radius - 1e-9)
+    return quarter, int(np.clip(along, 2, MOST_PIECES))
+
+
+def _cuts_of_cylinder(radius: float, half: float, length: float | None):
+    """Return the edges around, the pieces along, and those from the rim to the middle of an end."""
+    if length:
+        (around,) = _pieces(2 * np.pi * radius, length, FEWEST_AROUND)
+        (along,) = _pieces(2 * half, length)
+        (across,) = _pieces(radius, length)
+        return around, along, across
+    if half < 0.3 * radius:
+        return 16, 2, 3
+    along = math.ceil(half / radius - 1e-9)
+    return 16, int(np.clip(along, 4, MOST_PIECES)), 2 if half <= radius else 1
 
 
 def _require_few(count: int) -> None:
@@ -114,86 +153,24 @@ def geom_name(model: mujoco.MjModel, geom: int) -> str:
     return mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom) or f"geom {geom}"
 
 
+def described(model: mujoco.MjModel, geom: int) -> str:
+    """Return what tells a geom from others: its name, or its number with its body and group."""
+    name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom)
+    if name:
+        return formatted(name)
+    body = mujoco.mj_id2name(
+        model, mujoco.mjtObj.mjOBJ_BODY, int(model.geom_bodyid[geom])
+    )
+    owner = f"the body {formatted(body)}" if body else "a body without name"
+    return f"{geom}, of {owner} in group {model.geom_group[geom]}"
+
+
 def is_movable(model: mujoco.MjModel, geom: int) -> bool:
     """Return whether a joint moves a geom."""
     body = model.geom_bodyid[geom]
     while body and not model.body_dofnum[body]:
         body = model.body_parentid[body]
     return bool(body)
-
-
-SOLID = ("sphere", "ellipsoid", "cylinder", "capsule", "box", "mesh")
-
-
-def chosen_geoms(
-    model: mujoco.MjModel, geoms: str | int | Sequence[str | int] | None
-) -> list[int]:
-    """Return the numbers of geoms given by name, by a pattern such as "leg*" or by group, a whole number; None for all that
-    joints move. Refusal for unknown ones, those without an inside and those that nothing moves."""
-    if geoms is None:
-        able = [
-            g
-            for g in range(model.ngeom)
-            if is_movable(model, g) and geom_kind(model, g) in SOLID
-        ]
-        require(
-            len(able) > 0,
-            "the model has no geom that moves and has an inside",
-            instead="give it joints",
-        )
-        return able
-    found: list[int] = []
-    given = [geoms] if isinstance(geoms, str | int) else geoms
-    require(
-        isinstance(given, Iterable),
-        "``geoms`` must be names, patterns or groups",
-        value=geoms,
-    )
-    for one in given:
-        found += [g for g in _matching(model, one) if g not in found]
-    require(len(found) > 0, "``geoms`` names none", value=geoms)
-    for geom in found:
-        name, kind = formatted(geom_name(model, geom)), geom_kind(model, geom)
-        cure = f"give a {', '.join(SOLID[:-1])} or {SOLID[-1]}"
-        require(
-            kind in SOLID,
-            f"the geom {name} is a {kind} and has no inside",
-            instead=cure,
-        )
-        require(
-            is_movable(model, geom),
-            f"the geom {name} is fixed to the world",
-            instead="name geoms that move",
-        )
-    return found
-
-
-def _matching(model: mujoco.MjModel, one: str | int) -> list[int]:
-    """Return the numbers of the geoms that a name, a pattern or a group means."""
-    if isinstance(one, int) and not isinstance(one, bool):
-        group = np.flatnonzero(model.geom_group == one)
-        require(
-            len(group) > 0,
-            f"no geom is in group {one}",
-            instead=f"groups are {sorted({*model.geom_group.tolist()})}",
-        )
-        return [int(g) for g in group if is_movable(model, g)] or group.tolist()
-    require(
-        isinstance(one, str), "``geoms`` must be names, patterns or groups", value=one
-    )
-    names = {geom_name(model, g): g for g in range(model.ngeom)}
-    if one in names:
-        return [names[one]]
-    if matches := fnmatch.filter(names, one):
-        return [names[name] for name in matches if is_movable(model, names[name])] or [
-            names[x] for x in matches
-        ]
-    near = difflib.get_close_matches(one, names, 3, 0.5)
-    few = ", ".join(map(formatted, near or [*names][:8]))
-    cure = (
-        f"did you mean {few}?" if near else f"it has {few}" if names else "it has none"
-    )
-    raise Refusal(f"the model has no geom {formatted(one)}", instead=cure)
 
 
 def _model_mesh(model: mujoco.MjModel, k: int) -> Mesh:
@@ -218,3 +195,34 @@ def _model_mesh(model: mujoco.MjModel, k: int) -> Mesh:
     if notes:
         warnings.warn(f"mesh {formatted(name)}: {'; '.join(notes)}", Note, stacklevel=2)
     return mesh
+
+
+def _solid_mesh(model: mujoco.MjModel, k: int, hulls: bool) -> Mesh:
+    """Return mesh number k of a model, or its convex hull where ``hulls`` and the mesh has no inside."""
+    try:
+        return _model_mesh(model, k)
+    except Refusal as refusal:
+        if hulls:
+            return _hull(model, k)
+        raise Refusal(
+            refusal.what,
+            where=refusal.where,
+            because=refusal.because,
+            instead="close it, or let its convex hull stand for it: ``hulls`` = True",
+        ) from None
+
+
+def _hull(model: mujoco.MjModel, k: int) -> Mesh:
+    """Return the convex hull of mesh number k of a model, as MuJoCo's contacts take it."""
+    first = model.mesh_vertadr[k]
+    points = np.array(model.mesh_vert[first : first + model.mesh_vertnum[k]], float)
+    try:
+        hull = ConvexHull(points)
+    except QhullError:
+        raise Refusal("the mesh is flat", because="it has no convex hull") from None
+    triangles = hull.simplices
+    a, b, c = points[triangles].swapaxes(0, 1)
+    inwards = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(1) < 0.0
+    triangles = np.where(inwards[:, None], triangles[:, ::-1], triangles)
+    known, index = np.unique(triangles, return_inverse=True)
+    return Mesh(points[known], index.reshape(triangles.shape))

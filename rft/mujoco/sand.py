@@ -14,35 +14,44 @@ import numpy as np
 
 from rft.balance.backend import Note
 from rft.checks import in_range
-from rft.ground import Ground, GroundEffect, Slope, ground_of
+from rft.ground import (
+    Ground,
+    GroundEffect,
+    Slope,
+    checked_effects,
+    ground_of,
+)
 from rft.meshes.extruded import Extruded
 from rft.meshes.law import Spatial
 from rft.meshes.mesh import Mesh
 from rft.mujoco import installed
 from rft.mujoco.bed import Bed
+from rft.mujoco.errors import Control, RunError, error_of_run
 from rft.mujoco.floor import Apart, apart, floors, part, rejoin
 from rft.mujoco.footprints import FORM, Footprints, Prints
-from rft.mujoco.geoms import chosen_geoms, geom_name, mesh_of_elements
+from rft.mujoco.geoms import described, geom_name, mesh_of_elements
 from rft.mujoco.hills import FLAT, Hills, hills_of
 from rft.mujoco.media import Media, law_of, one_form, sample
 from rft.mujoco.regions import zones_of
-from rft.mujoco.rest import ROUNDING, Rest
-from rft.mujoco.steps import needed_rounding, sinkage, step_note
+from rft.mujoco.selection import chosen_geoms, overlap_note
+from rft.mujoco.sinkage import sinkage
 from rft.plates import StressMap
 from rft.refusal import Refusal, formatted, located, require
 
 __all__ = ["Footprints", "Sand", "attach", "sample"]
 
-PER_GEOM = 4  # elements along the mean radius of the geoms, if no length is given
+MANY_ELEMENTS = 20_000  # whose steps of 2 ms take half a millisecond and more
+ROUNDING = 1e-5  # m/s, assumed: bodies at rest on slopes creep at up to that speed
 SLOWER = 60  # times that a step takes by NumPy over compiled code, measured: pytest -m benchmark -k hexapod
 
 
 class Sand:
     """Sand that is attached to a model; `attach` makes it. As a context manager it is detached at the end.
 
-    geoms: names of the geoms in the sand, in the order of `forces`. element: length of the elements' edges, m. rounding: m/s;
-    an element of speed v bears v / sqrt(v^2 + rounding^2) of its stress. elements: number of elements. notes: lines about
-    what was changed and what is inexact. media: of the simulations of the last batch that was given some; None else.
+    geoms: names of the geoms in the sand, in the order of `forces`. element: length of the elements' edges, m; None for
+    lengths by geom. rounding: m/s; an element of speed v bears v / sqrt(v^2 + rounding^2) of its stress. elements: number
+    of elements. notes: lines about what was changed and what is inexact. media: of the simulations of the last batch that
+    was given some; None else.
 
     All that is read from data holds for data whose positions and velocities are up to date, as after ``mj_forward``.
     """
@@ -51,14 +60,15 @@ class Sand:
         self,
         model: mujoco.MjModel,
         bed: Bed,
-        element: float,
+        element: float | None,
         notes: Sequence[str],
         separation: Apart | None,
+        hulls: bool = False,
     ):
         self._model, self._bed, self.element = weakref.ref(model), bed, element
         self.geoms = tuple(geom_name(model, g) for g in bed.geoms)
         self.rounding, self.elements = bed.ground.rounding, len(bed.blocks.owner)
-        self._form, self._step = _form(model, bed.geoms), model.opt.timestep
+        self._form, self._hulls = _form(model, bed.geoms), hulls
         self._row = installed.install(model, bed)
         self.notes, self.media, self._parted = (
             tuple(notes),
@@ -74,11 +84,19 @@ class Sand:
     def __exit__(self, *_: object) -> None:
         self.detach()
 
+    def __reduce__(self):
+        raise Refusal(
+            "a Sand cannot be pickled or copied",
+            because="it belongs to a model of this process",
+            instead="attach it anew there",
+        )
+
     def __repr__(self) -> str:
         state = "" if self.is_attached else ", detached"
+        within = "" if self.element else ", by which forces are within 3 %"
         return (
-            f"Sand({len(self.geoms)} geoms, {self.elements} elements of {self.element:.3g} m, rounding"
-            f" {self.rounding:.3g} m/s at a time step of {1e3 * self._step:.3g} ms{state})"
+            f"Sand({len(self.geoms)} geoms, {self.elements} elements{within}; rounding"
+            f" {self.rounding:.3g} m/s; error() tells that of a run{state})"
         )
 
     @property
@@ -97,8 +115,7 @@ class Sand:
 
     def forces(self, data: mujoco.MjData) -> np.ndarray:
         """Return the force of the grains on each geom, (G, 3), N, in the world."""
-        self._check(data)
-        return self._bed.wrenches(data)[:, :3]
+        return self._wrenches(data)[0][:, :3]
 
     def wrench(self, data: mujoco.MjData, body: str | int) -> np.ndarray:
         """Return force, N, and moment about the body's origin, N m, of the grains on a body, (6,), in the world."""
@@ -110,15 +127,42 @@ class Sand:
         )
         require(0 <= number < model.nbody, f"the model has no body {formatted(body)}")
         own = self._bed.bodies == number
-        force, moment = np.split(self._bed.wrenches(data)[own], 2, axis=1)
+        force, moment = np.split(self._wrenches(data)[0][own], 2, axis=1)
         arm = data.geom_xpos[self._bed.geoms[own]] - data.xpos[number]
         return np.concatenate([force.sum(0), (moment + np.cross(arm, force)).sum(0)])
 
     def power(self, data: mujoco.MjData) -> float:
-        """Return the power of the grains on the geoms, W; negative where they dissipate."""
-        self._check(data)
-        twist = np.concatenate(self._bed.twists(data), axis=1)
-        return float((self._bed.wrenches(data) * twist).sum())
+        """Return the power of the grains on the geoms, W, at the velocities of the end of the step; negative where they
+        dissipate."""
+        wrenches, twists = self._wrenches(data)
+        return float((wrenches * twists).sum())
+
+    def _wrenches(self, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
+        """Return wrenches and twists of the geoms in the step that begins at data, (G, 6), in the world."""
+        model = self._check(data)
+        seen = installed.see(self._row, model, data)
+        turn = data.geom_xmat[self._bed.geoms].reshape(-1, 3, 3)
+        both = np.stack([seen.wrenches, seen.twists]).reshape(2, -1, 2, 3)
+        return tuple(np.einsum("gij,kgpj->kgpi", turn, both).reshape(2, -1, 6))
+
+    def error(
+        self,
+        data: mujoco.MjData,
+        seconds: float,
+        control: Control | None = None,
+    ) -> RunError:
+        """Return the errors, m, that time step and elements leave in where the geoms are ``seconds`` later, by a run with
+        steps half as long and one with elements half as long. The data stay as they are.
+
+        control: function (model, data) that sets controls before each step."""
+        model = self._check(data)
+        in_range("seconds", seconds, 0, 1e6, unit="s")
+        return error_of_run(model, self._bed, data, seconds, control, self._hulls)
+
+    @property
+    def effort(self) -> installed.Effort:
+        """What the steps have cost so far, and how many of them were not solved (`rft.mujoco.installed.Effort`)."""
+        return installed.effort(self._row)
 
     def ground(
         self, data: mujoco.MjData | np.ndarray
@@ -154,7 +198,7 @@ class Sand:
         robot: until the grains bear it, and a ``time``, s, later, as the rounding lets them creep."""
         model = self._check(data)
         in_range("time", time, 0, 1e6, unit="s")
-        return sinkage(model, data, self._bed, 0.0 if self._bed.rest else time)
+        return sinkage(model, data, self._bed, time)
 
     def batch(
         self,
@@ -223,15 +267,6 @@ class Sand:
             f"the geom {formatted(self.geoms[changed[0]] if changed.size else '')} changed after attach",
             instead="detach the sand and attach it anew",
         )
-        if model.opt.timestep != self._step:
-            self._step = model.opt.timestep
-            line = (
-                ""
-                if self._bed.rest
-                else step_note(model, list(self._bed.geoms), self.rounding)
-            )
-            if line:
-                warnings.warn(line, Note, stacklevel=3)
         return model
 
 
@@ -246,7 +281,7 @@ def attach(
     effects: Sequence[GroundEffect] = (),
     regions: Mapping[str, Any] | None = None,
     footprints: Footprints | None = None,
-    rest: bool = False,
+    hulls: bool = False,
 ) -> Sand:
     """Put sand under geoms of a MuJoCo model, until `Sand.detach` or until the model is gone.
 
@@ -259,17 +294,18 @@ def attach(
         Name in `rft.plates.VERTICAL` or a stress map of the vertical plane, which acts in three dimensions as
         `rft.meshes.extruded` has it; or a law of three dimensions.
     geoms : str, int or list of these
-        Names, patterns such as "leg*" and groups of the geoms in the sand; by default all that move.
+        Names of the geoms in the sand or of their bodies, patterns such as "leg*" and groups; by default all that move.
+        Geoms that can touch nothing are left out, unless they are named or nothing else is meant.
     level : float, m, or str
         Height of the surface at x = 0; or the name of a height field, which is the surface then. Each geom sees the plane
         that touches it below the geom; the ground there is as strong as where it is level.
     slope : float, rad
         Angle by which the surface rises along x; the ground is weaker as `rft.ground.Slope` has it.
     element : float, m
-        Length of the edges of the triangles that geoms are cut into; by default a quarter of the mean radius of the geoms.
+        Length of the edges of the triangles that geoms are cut into; by default as many as the shape of each geom asks for
+        (`rft.mujoco.geoms.mesh_of_elements`).
     rounding : float, m/s
-        Speed below which the stress on an element falls off in proportion to its speed; by default what the time step asks
-        for, `rft.mujoco.steps.needed_rounding`.
+        Speed below which the stress on an element falls off in proportion to its speed; by default 1e-5 m/s.
     effects : list of GroundEffect
         Effects on the ground, such as `rft.ground.GrainInertia`.
     regions : dict
@@ -277,8 +313,8 @@ def attach(
         and y in m in the world. A place belongs to the first region that holds it, or else to ``medium``.
     footprints : Footprints
         Grid on which the ground remembers what geoms press down and heap up; None for ground that remembers nothing.
-    rest : bool
-        Whether bodies come to rest, held by what `rft.mujoco.rest` remembers; otherwise they creep, and chatter at last.
+    hulls : bool
+        Whether meshes without an inside, such as open ones, stand for their convex hulls, as in MuJoCo's contacts.
 
     Returns
     -------
@@ -298,7 +334,6 @@ def attach(
     require(
         isinstance(model, mujoco.MjModel), "model must be a mujoco.MjModel", value=model
     )
-    require(isinstance(rest, bool | np.bool_), "rest must be True or False", value=rest)
     require(model.nv > 0, "nothing in the model can move", because="it has no joints")
     hills, field = (
         (FLAT, []) if not isinstance(level, str) else _field(model, level, slope)
@@ -307,10 +342,8 @@ def attach(
     in_range("level", level, -1e6, 1e6, unit="m")
     regions = {} if regions is None else regions
     zones = zones_of(regions)
-    laws, chosen = (
-        one_form((*map(law_of, regions.values()), law_of(medium))),
-        chosen_geoms(model, geoms),
-    )
+    laws = one_form((*map(law_of, regions.values()), law_of(medium)))
+    chosen, notes = chosen_geoms(model, geoms)
     taken = {int(g) for bed in installed.beds(model) for g in bed.geoms} & {*chosen}
     names = ", ".join(formatted(geom_name(model, g)) for g in sorted(taken)[:3])
     require(
@@ -319,20 +352,20 @@ def attach(
         instead="detach it, or name other geoms",
     )
     _require_passive(model)
-    if element is None:
-        element = float(np.mean(model.geom_rbound[chosen])) / PER_GEOM
-    in_range("element", element, 1e-6, 1e3, unit="m")
-    if rounding is not None:
-        in_range("rounding", rounding, 1e-7, 10, unit="m/s")
-    needed = needed_rounding(model, chosen)
-    if rounding is None:
-        rounding = ROUNDING if rest else max(needed, 1e-6)
-    effects = (*effects, Slope(slope)) if slope else tuple(effects)
+    if element is not None:
+        in_range("element", element, 1e-6, 1e3, unit="m")
+    require(
+        isinstance(hulls, bool | np.bool_), "hulls must be True or False", value=hulls
+    )
+    rounding = ROUNDING if rounding is None else rounding
+    in_range("rounding", rounding, 1e-7, 10, unit="m/s")
+    effects = checked_effects(effects)
+    effects = (*effects, Slope(slope)) if slope else effects
     ground = ground_of(effects, Ground(rounding=rounding))
     bed = Bed.under(
         model,
         chosen,
-        meshes(model, chosen, element),
+        meshes(model, chosen, element, bool(hulls)),
         laws,
         zones,
         ground,
@@ -340,17 +373,18 @@ def attach(
         level,
         hills,
     )
-    if footprints is not None or rest:
-        bed = remembering(model, bed, footprints, rest)
+    if footprints is not None:
+        bed = remembering(model, bed, footprints, bool(hulls))
     planes = [
         g for g in field or floors(model, bed.up, bed.level) if _touch(model, chosen, g)
     ]
     separation = apart(model, chosen, planes) if planes else None
-    notes = [_contact_note(model, chosen, planes)] if planes else []
+    notes += [_contact_note(model, chosen, planes)] if planes else []
     notes += [
         line
         for line in (
-            step_note(model, chosen, max(rounding, needed * rest)),
+            overlap_note(model, chosen),
+            _elements_note(model, bed),
             _python_note(),
         )
         if line
@@ -359,17 +393,16 @@ def attach(
         line
     ) in notes:  # before anything is changed: a filter may turn warnings into errors
         warnings.warn(line, Note, stacklevel=2)
-    return Sand(model, bed, element, notes, separation)
+    return Sand(model, bed, element, notes, separation, bool(hulls))
 
 
 def remembering(
-    model: mujoco.MjModel, bed: Bed, footprints: Footprints | None, rest: bool
+    model: mujoco.MjModel, bed: Bed, footprints: Footprints, hulls: bool = False
 ) -> Bed:
-    """Return a bed that remembers footprints, and what holds bodies at rest; Refusal where there is no memory for that."""
-    what = "footprints need" if footprints is not None else "rest needs"
+    """Return a bed that remembers footprints; Refusal where there is no memory for that."""
     require(
         installed.serves_compiled(),
-        f"{what} compiled code",
+        "footprints need compiled code",
         instead="pip install 'geomech[fast]'",
     )
     others = any(other.remembered for other in installed.beds(model))
@@ -378,32 +411,24 @@ def remembering(
         "another sand under the model remembers",
         instead="attach all geoms at once",
     )
-    if footprints is not None:
-        bed = replace(bed, prints=prints_under(model, bed, footprints))
-    if rest:
-        inverse = model.body_invweight0[bed.bodies, 0]
-        robots = np.array(
-            [np.flatnonzero(bed.roots == root)[0] for root in bed.roots], np.int64
-        )
-        bed = replace(bed, rest=Rest(inverse, bed.spheres[:, 3], robots))
+    bed = replace(bed, prints=prints_under(model, bed, footprints, hulls))
     cure = f'write <size nuserdata="{bed.remembered}"/> in its MJCF, or spec.nuserdata'
-    what = (
-        f"{what} {bed.remembered} numbers of userdata, the model has {model.nuserdata}"
-    )
+    what = f"footprints need {bed.remembered} numbers of userdata, the model has {model.nuserdata}"
     require(model.nuserdata >= bed.remembered, what, instead=cure)
     return bed
 
 
-def prints_under(model: mujoco.MjModel, bed: Bed, footprints: Footprints) -> Prints:
+def prints_under(
+    model: mujoco.MjModel, bed: Bed, footprints: Footprints, hulls: bool
+) -> Prints:
     """Return what footprints in a bed follow from."""
     require(
         isinstance(footprints, Footprints),
         "footprints must be rft.mujoco.Footprints",
         value=footprints,
     )
-    points = [
-        mesh.vertices for mesh in meshes(model, list(bed.geoms), footprints.spacing / 2)
-    ]
+    half = footprints.spacing / 2
+    points = [mesh.vertices for mesh in meshes(model, list(bed.geoms), half, hulls)]
     places = np.stack(np.meshgrid(*footprints.middles), -1).reshape(-1, 2)
     up, level = bed.surface(np.concatenate([places, np.zeros((len(places), 1))], 1))
     heights = (level - (up[:, :2] * places).sum(-1)) / up[:, 2]
@@ -425,12 +450,18 @@ def _field(model: mujoco.MjModel, name: str, slope: float) -> tuple[Hills, list[
     return hills, [geom]
 
 
-def meshes(model: mujoco.MjModel, geoms: Sequence[int], element: float) -> list[Mesh]:
-    """Return the meshes of geoms in their frames, with edges of about ``element``, m."""
+def meshes(
+    model: mujoco.MjModel,
+    geoms: Sequence[int],
+    element: float | None = None,
+    hulls: bool = False,
+) -> list[Mesh]:
+    """Return the meshes of geoms in their frames, with edges of about ``element``, m, or as each geom's shape asks for.
+    hulls: whether meshes without an inside stand for their convex hulls."""
     out = []
     for geom in geoms:
-        with located(f"the geom {formatted(geom_name(model, geom))}"):
-            out.append(mesh_of_elements(model, geom, element))
+        with located(f"the geom {described(model, geom)}"):
+            out.append(mesh_of_elements(model, geom, element, hulls))
     return out
 
 
@@ -459,6 +490,19 @@ def _contact_note(
         else "the geom no longer touches"
     )
     return f"{count} the floor {names}, which lies in the surface of the sand"
+
+
+def _elements_note(model: mujoco.MjModel, bed: Bed) -> str:
+    """Return a line about more elements than steps in real time allow, or "" for few."""
+    counts = np.diff(bed.blocks.first)
+    if counts.sum() <= MANY_ELEMENTS:
+        return ""
+    most = int(np.argmax(counts))
+    return (
+        f"the sand has {counts.sum():,} elements, {counts[most]:,} of them on the geom"
+        f" {described(model, bed.geoms[most])}: steps take long; give fewer geoms, or"
+        " meshes of fewer triangles"
+    )
 
 
 def _python_note() -> str:

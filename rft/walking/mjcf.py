@@ -6,15 +6,19 @@ import difflib
 import hashlib
 from dataclasses import dataclass, field
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 
 from rft.checks import in_range, real_array
-from rft.refusal import Refusal, formatted, require
+from rft.refusal import Refusal, formatted, located, require
 from rft.walking.facets import Surface
 from rft.walking.robot import Robot
 
 LARGEST_FILE = 20_000_000  # bytes of XML
+MOST_PARTS = 20_000  # geoms, or copies by <replicate>
+MOST_NODES = 4_000_000  # of height fields
+MOST_INCLUDES = 20  # files within files
 MOST_NAMES = 200  # of geoms, and of actuators
 MISSING = "an MJCF needs MuJoCo: pip install 'geomech[mujoco]'"
 
@@ -218,6 +222,76 @@ class Mjcf(Robot):
         self.surfaces(elements)
 
 
+def require_bounded(path: Path) -> None:
+    """Raise Refusal for an MJCF that would keep MuJoCo busy for long, or wait: copies by <replicate>, nodes of height fields,
+    and files that are included but no ordinary ones. What is no XML is left to MuJoCo."""
+    try:
+        _count_parts(path, _Counted(1, 0, 0), [path.parent])
+    except RecursionError:
+        raise Refusal("its elements are nested too deep") from None
+
+
+@dataclass
+class _Counted:
+    """Parts of an MJCF so far. copies: of a part, by the <replicate> around it. geoms, nodes: of height fields."""
+
+    copies: int
+    geoms: int
+    nodes: int
+
+
+def _count_parts(path: Path, counted: _Counted, within: list[Path]) -> None:
+    """Add the parts of a file and of those that it includes. within: folders of the files around it."""
+    name = path.name
+    require(path.is_file(), f"{name} is no ordinary file")
+    require(
+        path.stat().st_size <= LARGEST_FILE and len(within) < MOST_INCLUDES,
+        f"{name} is included too deep, or larger than {LARGEST_FILE / 1e6:.0f} MB",
+    )
+    try:
+        root = ElementTree.parse(path).getroot()
+    except (ElementTree.ParseError, ValueError, LookupError, OSError):
+        return
+    _count_element(root, counted, [*within, path.parent])
+
+
+def _count_element(element, counted: _Counted, within: list[Path]) -> None:
+    """Add the parts of an element and of those within it."""
+    copies = counted.copies
+    if element.tag == "replicate":
+        counted.copies *= max(1, _whole(element.get("count")))
+    elif element.tag == "geom":
+        counted.geoms += counted.copies
+    elif element.tag == "hfield":
+        counted.nodes += _whole(element.get("nrow")) * _whole(element.get("ncol"))
+    elif element.tag == "include":
+        for folder in dict.fromkeys((within[0], within[-1])):
+            other = folder / (element.get("file") or "")
+            if other.exists():
+                _count_parts(other, counted, within)
+    most = max(counted.geoms, counted.copies)
+    require(
+        most <= MOST_PARTS,
+        f"the MJCF has {most:,} geoms or copies, more than {MOST_PARTS:,}",
+        instead="give <replicate> a smaller count",
+    )
+    require(
+        counted.nodes <= MOST_NODES,
+        f"its height fields have {counted.nodes:,} nodes, more than {MOST_NODES:,}",
+    )
+    for child in element:
+        _count_element(child, counted, within)
+    counted.copies = copies
+
+
+def _whole(text: str | None) -> int:
+    """Return the whole number in an attribute, 0 where there is none."""
+    try:
+        return int(text or 0)
+    except ValueError:
+        return 0
+
+
 def _compiled(file: str):
     """Return the model of a file and its digest; ValueError of one line if MuJoCo cannot read the file."""
     try:
@@ -242,6 +316,8 @@ def _compiled(file: str):
         path.open("rb").close()
     except OSError as error:
         raise Refusal(f"cannot read MJCF {file}", because=error.strerror) from None
+    with located(file):
+        require_bounded(path)
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except (
