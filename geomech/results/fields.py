@@ -1,0 +1,117 @@
+"""Variables over shape space as the objects that pictures take."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from geomech.core.variables import Result, Variable
+from geomech.geometry.connection import Connection
+from geomech.geometry.field import Field
+from geomech.geometry.metric import Finsler, Metric
+from geomech.geometry.stretch import Stretch
+
+
+@dataclass(frozen=True, eq=False)
+class Slice:
+    """A plane of shape space as a result has it (`geomech.geometry.plane.Plane`)."""
+
+    pair: tuple[int, int]
+    at: tuple[float, ...]
+    ccf: Field | None = None
+    error: Field | None = None
+    connection: Connection | None = None
+
+    @property
+    def fixed(self) -> list[int]:
+        """The joints that do not move, from 0."""
+        return [k for k in range(len(self.at)) if k not in self.pair]
+
+
+def length_unit(variable: Variable) -> str:
+    """Return the unit of lengths in the unit of a variable over components."""
+    return variable.unit[0].partition("/")[0]
+
+
+def axes_of(result: Result, dims: Sequence[str]) -> tuple[np.ndarray, ...]:
+    return tuple(result[dim].values for dim in dims)
+
+
+def degree_of(result: Result) -> int:
+    """Return the degree of the splines through the fields of a result."""
+    return int(result.attributes["interpolation"])
+
+
+def field_of(result: Result, name: str) -> tuple[Field, Field | None]:
+    """Return a variable over components and shape space as a field, and its error."""
+    variable = result[name]
+    axes = axes_of(result, variable.dims[1:])
+    degree, unit = degree_of(result), length_unit(variable)
+    error = None
+    if variable.error is not None:
+        error = Field(axes, variable.error, degree, unit=unit)
+    return Field(axes, variable.values, degree, unit=unit), error
+
+
+def connection_of(result: Result, name: str = "A") -> Connection:
+    """Return a variable over components, joints and shape space as a connection; its
+    residual is nan."""
+    variable = result[name]
+    axes = axes_of(result, variable.dims[2:])
+    unknown = np.full_like(variable.values[:, 0], np.nan)
+    degree, unit = degree_of(result), length_unit(variable)
+    return Connection(axes, variable.values, unknown, unknown, degree, unit=unit)
+
+
+def metric_of(result: Result) -> Metric | Finsler:
+    """Return the metric of a result."""
+    degree = degree_of(result)
+    if "metric" in result:
+        metric = result["metric"]
+        return Metric(axes_of(result, metric.dims[2:]), metric.values, degree)
+    norm = result["norm"]
+    axes, residual = axes_of(result, norm.dims[1:]), result["norm_residual"].values
+    return Finsler(axes, norm.values, residual, degree)
+
+
+def slices_of(result: Result, name: str) -> list[Slice]:
+    """Return the planes of variables such as ccf_1_3, or A_1_3 for connections."""
+    found = []
+    for ending, pair in pairs_of(result, name):
+        at = tuple(result[f"slice{ending}"].values.tolist())
+        parts: dict[str, Any] = {}
+        if name == "A":
+            parts["connection"] = connection_of(result, f"A{ending}")
+        else:
+            parts["ccf"], parts["error"] = field_of(result, f"{name}{ending}")
+        found.append(Slice(pair, at, **parts))
+    return found
+
+
+def pairs_of(result: Result, name: str) -> list[tuple[str, tuple[int, int]]]:
+    """Return the endings of names such as ccf_1_3, and their joints from 0."""
+    found = []
+    for other in result:
+        ending = other.removeprefix(name)
+        numbers = ending.split("_")[1:]
+        if other.startswith(name) and len(numbers) == 2 and all(map(str.isdigit, numbers)):
+            i, j = map(int, numbers)
+            found.append((ending, (i - 1, j - 1)))
+    return found
+
+
+def stretch_of(result: Result) -> Stretch:
+    """Return the stretched shape space of a result
+    (`geomech.studies.fields.of_stretch`)."""
+    shape = result["stretched_shape"]
+    degree = int(result["stretch_interpolation"].values)
+    return Stretch(
+        Field(axes_of(result, shape.dims[1:]), shape.values, degree),
+        result["stretch_distortion"].values,
+        float(result["stretch_rms"]),
+        float(result["stretch_largest"]),
+        float(result["stretch_folded"]),
+    )

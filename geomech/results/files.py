@@ -1,0 +1,129 @@
+"""Any result as a file, and back. The kind of a result may add formats of its own.
+
+`geomech.io.results` writes and reads the formats.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from geomech.core.variables import Result
+from geomech.io import results as io
+from geomech.io.files import write_text
+from geomech.results.kinds import kind_of
+from geomech.results.old import translated
+from rft.refusal import Refusal
+
+to_dict = io.to_dict
+to_xarray = io.to_xarray
+flat = io.flat
+
+
+def table_dims(result: Result) -> tuple[str, ...]:
+    """Return the dimensions of a result's CSV file and data frame: those of its kind, or
+    of its first variable that is no coordinate."""
+    dims = kind_of(result).table
+    if dims:
+        return dims
+    for variable in result.variables:
+        if not variable.is_coordinate and variable.dims:
+            return variable.dims
+    return ()
+
+
+def to_dataframe(result: Result, dims: tuple[str, ...] = ()) -> Any:
+    """Return a data frame with the coordinates as its index; ImportError that says how to
+    install pandas."""
+    try:
+        import pandas
+    except ImportError:
+        raise ImportError(
+            "to_dataframe needs the package pandas: pip install pandas"
+        ) from None
+    found = io.columns(result, dims or table_dims(result))
+    names = [name for name in found if name in result.sizes]
+    frame = pandas.DataFrame(found)
+    if not names:
+        return frame
+    return frame.set_index(names)
+
+
+def write_csv(path: Path, result: Result) -> None:
+    """Write the variables over the dimensions of the kind's table."""
+    io.write_csv(path, result, table_dims(result))
+
+
+def write_txt(path: Path, result: Result) -> None:
+    """Write all variables as a terminal shows them."""
+    from geomech.results.show import text
+
+    write_text(path, text(result, everything=True) + "\n")
+
+
+def read_netcdf(path: Path) -> Result:
+    """Return the result in a file; of former versions under the names of today."""
+    variables, attributes = io.read_netcdf(path)
+    if io.FORMAT not in attributes:
+        variables = translated(variables)
+    kind, facts = io.split(attributes)
+    return io.joined(kind, variables, facts)
+
+
+WRITERS: dict[str, Callable] = {
+    ".nc": io.write_netcdf,
+    ".json": io.write_json,
+    ".csv": write_csv,
+    ".mat": io.write_mat,
+    ".txt": write_txt,
+}
+READERS: dict[str, Callable] = {
+    ".nc": read_netcdf,
+    ".json": io.read_json,
+    ".csv": io.read_csv,
+    ".mat": io.read_mat,
+}
+
+
+def formats(kind: Any) -> dict[str, Callable]:
+    """Return the writers of a kind by ending: those of every kind, and those of its own in
+    their place."""
+    return {**WRITERS, **kind.files()}
+
+
+def writer(path: Path, kind: Any) -> Callable:
+    """Return the writer (path, result) of a name; Refusal if its ending is no format of
+    the kind."""
+    known = formats(kind)
+    ending = path.suffix.lower()
+    if ending not in known:
+        raise Refusal(
+            f"cannot write {path}",
+            instead=f"end the name in one of {', '.join(known)}",
+        )
+    return known[ending]
+
+
+def save(result: Result, path: Path, **options: Any) -> None:
+    """Write a result in the format that the ending names."""
+    writer(path, kind_of(result))(path, result, **options)
+
+
+def load(path: str | Path) -> Result:
+    """Return the result in a file: of .nc, .json and .mat as it was written, of .csv the
+    columns. Refusal for another ending, or a file without a result."""
+    path = Path(path)
+    if path.suffix.lower() not in READERS:
+        raise Refusal(
+            f"cannot read {path}",
+            instead=f"end the name in one of {', '.join(READERS)}",
+        )
+    try:
+        return READERS[path.suffix.lower()](path)
+    except OSError:
+        raise
+    except Exception as error:  # a damaged file raises whatever comes first
+        raise Refusal(
+            f"{path} holds no result", because=str(error), instead="write it anew"
+        ) from None
