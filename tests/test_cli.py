@@ -216,8 +216,9 @@ def test_run_leaves_everything(undrawn, tmp_path):
         "scene.toml", "connection.nc", "displacement.json",
         *(f"{stem}.{end}" for stem in ("connection", "ccf", "displacement") for end in ("png", "pdf")),
     }  # fmt: skip
-    assert "s.toml, circle: displacement per cycle, direct tier" in out
-    assert "s.toml, butterfly: displacement per cycle" in out
+    said = " ".join(out.split())
+    assert "s.toml, circle: displacement per cycle, direct tier" in said
+    assert "s.toml, butterfly: displacement per cycle" in said
     assert [p.name for p in (tmp_path / "deep").iterdir()] == ["dir"]
     tables = json.loads((tmp_path / "deep" / "dir" / "displacement.json").read_text())
     assert set(tables) == {"circle", "butterfly"}
@@ -307,7 +308,7 @@ def test_letters_of_any_alphabet_are_kept(tmp_path):
     (tmp_path / "schön.toml").write_text(text, encoding="utf-8")
     assert geomech("connection", "schön.toml", "-o", "ö.nc", cwd=tmp_path)[0] == 0
     with xarray.open_dataset(tmp_path / "ö.nc") as data:
-        kept = data.attrs["scene"]
+        kept = data.attrs["scene_toml"]
     assert (kept.decode() if isinstance(kept, bytes) else kept) == text
 
 
@@ -499,7 +500,7 @@ def test_names_that_are_not_text_are_kept(tmp_path):
         ) as data:  # netCDF4, if it is there, takes text alone
             assert data.attrs["title"].startswith(start)
             assert data.attrs["title"].endswith("of the scene caf\\udce9.toml")
-            said = scenes.parse(data.attrs["scene"], "three-link-viscous")
+            said = scenes.parse(data.attrs["scene_toml"], "three-link-viscous")
             wanted = scenes.load("three-link-viscous")
             assert said == (
                 wanted
@@ -589,7 +590,7 @@ def test_a_scene_comes_through_a_pipe(tmp_path):
         sweep, input=text, capture_output=True, cwd=tmp_path, timeout=60
     )
     assert (done.returncode, done.stderr) == (0, b"")
-    assert done.stdout.startswith(b"2 points")
+    assert b"2 points" in done.stdout
 
 
 def test_the_command_starts_without_the_heavy_libraries():

@@ -97,7 +97,11 @@ def pairs_of(result: Result, name: str) -> list[tuple[str, tuple[int, int]]]:
     for other in result:
         ending = other.removeprefix(name)
         numbers = ending.split("_")[1:]
-        if other.startswith(name) and len(numbers) == 2 and all(map(str.isdigit, numbers)):
+        if (
+            other.startswith(name)
+            and len(numbers) == 2
+            and all(map(str.isdigit, numbers))
+        ):
             i, j = map(int, numbers)
             found.append((ending, (i - 1, j - 1)))
     return found
