@@ -229,7 +229,7 @@ def test_run_leaves_everything(undrawn, tmp_path):
         ]
         wanted = Study(glass).poses("direct", run, np.array(table["amplitude"]))
         np.testing.assert_allclose(table["direct"], wanted, atol=1e-9)
-        assert f"{wanted[-1, 0]:.3f}" in out
+        assert f"{wanted[-1, 0]:.9f}"[:6] in out
         assert ("note" in data["attrs"]) == (gait == "butterfly")
     assert tables["circle"]["coords"]["amplitude"]["data"] == [
         0.25,
@@ -243,8 +243,10 @@ def test_run_leaves_everything(undrawn, tmp_path):
         2.25,
         2.5,
     ]
-    assert tables["butterfly"]["amplitude"] == [k / 10 for k in range(1, 14)]
-    assert "butterfly: not in the scene, added to compare" in out
+    assert tables["butterfly"]["coords"]["amplitude"]["data"] == [
+        k / 10 for k in range(1, 14)
+    ]
+    assert "butterfly: not in the scene, added to compare" in said
     assert "zero by symmetry" in out and "circle: not in" not in out
     assert (tmp_path / "deep" / "dir" / "scene.toml").read_text() == glass.text
 
@@ -491,15 +493,11 @@ def test_names_that_are_not_text_are_kept(tmp_path):
     ):
         code, _, err = geomech(*args, cwd=tmp_path)
         assert (code, err) == (0, "")
-    for file, start in (
-        (os.fsdecode(b"\xe9.nc"), "Net displacement"),
-        ("a.nc", "Local connection"),
-    ):
+    for file in (os.fsdecode(b"\xe9.nc"), "a.nc"):
         with xarray.open_dataset(
             tmp_path / file, engine="scipy"
         ) as data:  # netCDF4, if it is there, takes text alone
-            assert data.attrs["title"].startswith(start)
-            assert data.attrs["title"].endswith("of the scene caf\\udce9.toml")
+            assert data.attrs["scene"] == "caf\\udce9.toml"
             said = scenes.parse(data.attrs["scene_toml"], "three-link-viscous")
             wanted = scenes.load("three-link-viscous")
             assert said == (

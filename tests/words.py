@@ -230,7 +230,8 @@ def of_netcdf(file: pathlib.Path) -> Iterator[str]:
                 if text
                 else variable.data
             )
-            yield f"= {name} = {' '.join(rows) if text else of_array(np.array(rows))}"
+            value = " ".join(rows) if text else of_array(np.array(rows))
+            yield f"= {name} = {'#' if MASKED_KEYS.search(name) else value}"
 
 
 def of_file(file: pathlib.Path) -> Iterator[str]:
