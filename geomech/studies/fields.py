@@ -24,6 +24,7 @@ from geomech.io.tables import FORMATS, LAYOUTS
 from geomech.io.tables.base import UNKNOWN_FRAME, body_text
 from geomech.io.tables.netcdf import SHAPE
 from geomech.scenes.model import Scene
+from geomech.scenes import toml
 from geomech.studies import effort
 from geomech.studies.study import Study
 from geomech.studies.tables import COMPONENTS
@@ -182,6 +183,7 @@ def attributes(study: Study) -> dict:
     return {
         **about(scene),
         "scene": scene.name,
+        **text_of(scene),
         "numerics": numerics,
         "interpolation": int(study.fitted.degree),
         **(
@@ -191,6 +193,14 @@ def attributes(study: Study) -> dict:
             else {"power_degree": degree}
         ),
     }
+
+
+def text_of(scene: Scene) -> dict[str, str]:
+    """Return the text of a scene as an attribute; none if it has parts of Python alone."""
+    try:
+        return {"scene_toml": toml(scene)}
+    except Refusal:
+        return {}
 
 
 def variables(study: Study) -> list[Variable]:
