@@ -23,8 +23,8 @@ from geomech.geometry.two_form import TwoForm
 from geomech.io.tables import FORMATS, LAYOUTS
 from geomech.io.tables.base import UNKNOWN_FRAME, body_text
 from geomech.io.tables.netcdf import SHAPE
-from geomech.scenes.model import Scene
 from geomech.scenes import toml
+from geomech.scenes.model import Scene
 from geomech.studies import effort
 from geomech.studies.study import Study
 from geomech.studies.tables import COMPONENTS
