@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from commands import geomech
 from scipy.special import ellipe
-from tabled import swept_table, tabled
+from tabled import swept_table
 
 from geomech import scenes
 from geomech.core.errors import Note, UnitWarning
@@ -583,7 +583,7 @@ def test_what_an_estimate_leaves_out_is_told(tmp_path):
     assert (
         measured.displacements([1.0], ["direct"]).to_xarray().attrs["error_is"] == said
     )
-    assert said in tabled(measured.displacements([1.0], ["direct"]))._repr_html_()
+    assert said in measured.displacements([1.0], ["direct"])._repr_html_()
     assert swept(measured.scene)["error_is"] == said
     plain = scenes.load("sandfish-loose").with_numerics(phases=32)
     assert "error_is" not in swept(plain)
