@@ -20,11 +20,12 @@ AMPLITUDES = {
 
 
 def compute(scene: str = "three-link-glass", amplitudes: dict | None = None) -> dict:
-    """Return a table for each gait, as `Study.study` gives it."""
+    """Return the displacements of each gait, by amplitude and tier."""
     loaded, amplitudes = load(scene), amplitudes or AMPLITUDES
     study = Study(loaded)
     tables = {
-        name: study.study(a, [*TIERS], GAITS[name]) for name, a in amplitudes.items()
+        name: study.displacements(a, [*TIERS], GAITS[name])
+        for name, a in amplitudes.items()
     }
     return {"tables": tables}
 
@@ -32,7 +33,7 @@ def compute(scene: str = "three-link-glass", amplitudes: dict | None = None) -> 
 def curves(axes, tables: dict) -> None:
     """Draw the displacements of each gait on axes of its own, without a legend."""
     for ax, (name, table) in zip(axes, tables.items()):
-        plots.displacement(table, ax=ax, gait=GAITS[name], errors=False, legend=False)
+        plots.displacement(table, ax=ax, errors=False, legend=False)
         ax.set_title(name)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from figures import main, style
 from geomech import plots
 from geomech.plots import curves
+from geomech.plots.sweeps import parameters
 from geomech.scenes import load
 from geomech.studies import walking
 from geomech.studies.sweep import sweep
@@ -56,7 +57,7 @@ def draw(numbers: dict):
         (legs, "legs", "Hz", 1.0),
         (flow, "flow", "rad/s", 2 * np.pi),
     ):
-        values, second = numbers[name]["over"].values()
+        values, second = parameters(numbers[name]).values()
         curves(
             ax, list(values), numbers[name], [f"{scale * f:.3g} {unit}" for f in second]
         )
@@ -76,16 +77,17 @@ def table(numbers: dict) -> str:
     """Return mean speeds, m/s, and what became of those that do not walk."""
     tables = []
     for name, of in (("legs", "leg curvature"), ("flow", "air speed (m/s)")):
-        values, frequencies = numbers[name]["over"].values()
-        status = np.where(
-            numbers[name]["status"] == "walking", "", numbers[name]["status"]
-        )
+        values, frequencies = parameters(numbers[name]).values()
+        status = numbers[name]["status"].values
+        status = np.where(status == "walking", "", status)
         rows = [
             [
                 f"at {f:.3g} Hz",
                 *(f"{speed:.3f} {kind}".strip() for speed, kind in zip(speeds, kinds)),
             ]
-            for f, speeds, kinds in zip(frequencies, numbers[name]["speed"].T, status.T)
+            for f, speeds, kinds in zip(
+                frequencies, numbers[name]["speed"].values.T, status.T
+            )
         ]
         tables.append(style.table((of, *(f"{x:.3g}" for x in values)), rows))
     return "\n\n".join(tables)

@@ -87,13 +87,9 @@ def predicted(scene_name: str, amplitudes, travels=TRAVELS) -> dict:
     )
     caps = law.caps(RADIUS / SIZE)
     medium = replace(law.medium, covariance=None)
-    study = lambda medium, tiers, *effects: (
-        Study(
-            scene.changed(system=replace(scene.system, medium=medium, effects=effects))
-        )
-        .study(list(amplitudes), tiers)
-        .result["net_distance"]
-    )
+    study = lambda medium, tiers, *effects: Study(
+        scene.changed(system=replace(scene.system, medium=medium, effects=effects))
+    ).displacements(list(amplitudes), tiers)["net_distance"]
     none = np.zeros(len(amplitudes))
     net = study(law.medium, TIERS, caps)
     curves = {

@@ -5,7 +5,7 @@
     study.ccf().plot()                        # also .connection(), .optimise()
 
 study, Study                            a scene, and methods that ask questions of it
-displacement, ccf, sweep, optimise, forces, velocity, walk
+displacement, ccf, sweep, optimise (optimize), forces, velocity, walk, intrude
                                         the same of any scene; results that print themselves
 load_result, best_scene                 results from files; the scene with the best gait
 tiers, workers, accuracy                methods of prediction; processes; error against time

@@ -60,7 +60,7 @@ def described(ask: Any, question: Any, first: str) -> None:
     """Give a function the name, the documentation and the parameters of a question."""
     _, *fields = inspect.signature(question).parameters.values()
     kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
-    shown = [inspect.Parameter(first, kind)]
+    shown = [inspect.Parameter(first, kind, annotation=Any)]
     for field in fields:
         annotation = field.annotation
         if hasattr(annotation, "__metadata__"):

@@ -22,7 +22,6 @@ import numpy as np
 
 FILE = pathlib.Path(__file__).parent / "data" / "answers.json"
 TOLERANCE = 1e-12  # relative, of the largest number of a digest
-LOOSE = 1e-8  # of errors, which contain the residual of a balance, and of walks
 SOME = 7  # numbers of a large array that are recorded as they are
 
 CASES = {  # command lines in a copy of data/frozen, by kind

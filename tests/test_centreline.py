@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from commands import geomech
 from scipy.special import ellipe
-from tabled import swept_table, tabled
+from tabled import swept_table
 
 from geomech import scenes
 from geomech.core.errors import Note, UnitWarning
 from geomech.gaits import Centreline, Sine
 from geomech.gaits.waves import arc_to_phase
 from geomech.studies.study import Study
-from geomech.studies.sweep import Sweep
+from geomech.studies.sweep import sweep
 from rft import Backbone
 from rft.refusal import Refusal
 
@@ -579,14 +579,14 @@ def test_what_an_estimate_leaves_out_is_told(tmp_path):
             else f" estimated error: {said} " in " ".join(told.split())
         )
     measured = Study(scenes.load(toml))
-    swept = lambda scene: Sweep(scene, {"gait.amplitude": [1.0]}).ask().attributes
+    swept = lambda scene: sweep(scene, {"gait.amplitude": [1.0]}).attributes
     assert (
         measured.displacements([1.0], ["direct"]).to_xarray().attrs["error_is"] == said
     )
-    assert said in tabled(measured.displacements([1.0], ["direct"]))._repr_html_()
-    assert swept(measured.scene)["estimate_is"] == said
+    assert said in measured.displacements([1.0], ["direct"])._repr_html_()
+    assert swept(measured.scene)["error_is"] == said
     plain = scenes.load("sandfish-loose").with_numerics(phases=32)
-    assert "estimate_is" not in swept(plain)
+    assert "error_is" not in swept(plain)
 
 
 @pytest.mark.parametrize("elements", [2, 2001, 3.5, "x"])

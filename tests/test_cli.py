@@ -216,8 +216,9 @@ def test_run_leaves_everything(undrawn, tmp_path):
         "scene.toml", "connection.nc", "displacement.json",
         *(f"{stem}.{end}" for stem in ("connection", "ccf", "displacement") for end in ("png", "pdf")),
     }  # fmt: skip
-    assert "s.toml, circle: displacement per cycle, direct tier" in out
-    assert "s.toml, butterfly: displacement per cycle" in out
+    said = " ".join(out.split())
+    assert "s.toml, circle: displacement per cycle, direct tier" in said
+    assert "s.toml, butterfly: displacement per cycle" in said
     assert [p.name for p in (tmp_path / "deep").iterdir()] == ["dir"]
     tables = json.loads((tmp_path / "deep" / "dir" / "displacement.json").read_text())
     assert set(tables) == {"circle", "butterfly"}
@@ -228,7 +229,7 @@ def test_run_leaves_everything(undrawn, tmp_path):
         ]
         wanted = Study(glass).poses("direct", run, np.array(table["amplitude"]))
         np.testing.assert_allclose(table["direct"], wanted, atol=1e-9)
-        assert f"{wanted[-1, 0]:.3f}" in out
+        assert f"{wanted[-1, 0]:.9f}"[:6] in out
         assert ("note" in data["attrs"]) == (gait == "butterfly")
     assert tables["circle"]["coords"]["amplitude"]["data"] == [
         0.25,
@@ -242,8 +243,10 @@ def test_run_leaves_everything(undrawn, tmp_path):
         2.25,
         2.5,
     ]
-    assert tables["butterfly"]["amplitude"] == [k / 10 for k in range(1, 14)]
-    assert "butterfly: not in the scene, added to compare" in out
+    assert tables["butterfly"]["coords"]["amplitude"]["data"] == [
+        k / 10 for k in range(1, 14)
+    ]
+    assert "butterfly: not in the scene, added to compare" in said
     assert "zero by symmetry" in out and "circle: not in" not in out
     assert (tmp_path / "deep" / "dir" / "scene.toml").read_text() == glass.text
 
@@ -307,7 +310,7 @@ def test_letters_of_any_alphabet_are_kept(tmp_path):
     (tmp_path / "schön.toml").write_text(text, encoding="utf-8")
     assert geomech("connection", "schön.toml", "-o", "ö.nc", cwd=tmp_path)[0] == 0
     with xarray.open_dataset(tmp_path / "ö.nc") as data:
-        kept = data.attrs["scene"]
+        kept = data.attrs["scene_toml"]
     assert (kept.decode() if isinstance(kept, bytes) else kept) == text
 
 
@@ -490,16 +493,12 @@ def test_names_that_are_not_text_are_kept(tmp_path):
     ):
         code, _, err = geomech(*args, cwd=tmp_path)
         assert (code, err) == (0, "")
-    for file, start in (
-        (os.fsdecode(b"\xe9.nc"), "Net displacement"),
-        ("a.nc", "Local connection"),
-    ):
+    for file in (os.fsdecode(b"\xe9.nc"), "a.nc"):
         with xarray.open_dataset(
             tmp_path / file, engine="scipy"
         ) as data:  # netCDF4, if it is there, takes text alone
-            assert data.attrs["title"].startswith(start)
-            assert data.attrs["title"].endswith("of the scene caf\\udce9.toml")
-            said = scenes.parse(data.attrs["scene"], "three-link-viscous")
+            assert data.attrs["scene"] == "caf\\udce9.toml"
+            said = scenes.parse(data.attrs["scene_toml"], "three-link-viscous")
             wanted = scenes.load("three-link-viscous")
             assert said == (
                 wanted
@@ -589,7 +588,7 @@ def test_a_scene_comes_through_a_pipe(tmp_path):
         sweep, input=text, capture_output=True, cwd=tmp_path, timeout=60
     )
     assert (done.returncode, done.stderr) == (0, b"")
-    assert done.stdout.startswith(b"2 points")
+    assert b"2 points" in done.stdout
 
 
 def test_the_command_starts_without_the_heavy_libraries():

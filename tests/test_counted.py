@@ -156,7 +156,7 @@ def test_accuracy_and_sweep_say_what_they_cost(solved):
         (VISCOUS, media),
         (SKIN, {"effects.skin-friction.backward": [0.2, 0.3]}),
     ):
-        foretold = sweep.Sweep(scene, over).cost().balances
+        foretold = sweep.Plan(scene, over).cost.balances
         solved.clear()
         swept_table(sweep.sweep(scene, over))
         assert foretold == sum(solved)

@@ -55,10 +55,7 @@ def ended(tmp_path, monkeypatch):
 
 
 def test_every_command_has_its_answers_its_help_and_refusals():
-    commands = {
-        command.name or command.callback.__name__
-        for command in cli.app.registered_commands
-    }
+    commands = set(cli.Commands())
     ends = frozen.read_commands()
     well = {
         line.split()[0]

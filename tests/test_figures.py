@@ -23,7 +23,6 @@ from figures import (
     optimal_gaits,
     style,
 )
-from geomech import plots
 from geomech.scenes import load
 from geomech.studies.study import Study
 from rft import CATALOGUE, Granular
@@ -134,16 +133,20 @@ def test_fig11e(tmp_path):
     numbers = fig11e_displacement.compute(amplitudes=amplitudes)
     tables = numbers["tables"]
     np.testing.assert_allclose(
-        plots.net(tables["circle"]["direct"]), [0.0121, 0.0638, 0.1378], rtol=0.01
+        tables["circle"].at(tier="direct")["net_distance"].values,
+        [0.0121, 0.0638, 0.1378],
+        rtol=0.01,
     )
     # The butterfly is the better gait (Fig. 11(e)): at its published size it outdoes every circle.
-    assert plots.net(tables["butterfly"]["direct"])[1] > 1.5 * 0.1378
+    assert (
+        tables["butterfly"].at(tier="direct")["net_distance"].values[1] > 1.5 * 0.1378
+    )
     for ax, (name, table) in zip(
         drawn(fig11e_displacement, numbers, tmp_path).axes, tables.items()
     ):
         np.testing.assert_allclose(
             curve(ax, "force balance"),
-            [amplitudes[name], np.array(table["direct"])[:, 0]],
+            [amplitudes[name], table.at(tier="direct")["x"].values],
         )
 
 

@@ -84,8 +84,7 @@ def cases(folder):
 def found(tmp_path_factory):
     scenes = cases(tmp_path_factory.mktemp("midline"))
     return {
-        name: forces(scene.with_numerics(phases=24))[0]
-        for name, scene in scenes.items()
+        name: forces(scene.with_numerics(phases=24)) for name, scene in scenes.items()
     }
 
 
@@ -247,7 +246,7 @@ class Doubled:
 
 def test_forces_are_in_axial_drags_whatever_the_unit_of_a_law():
     one, two = (
-        forces(Scene(Swimmer(law, Chain()), Circle(0.7)).with_numerics(phases=8))
+        forces(Scene(Swimmer(law, Chain()), Circle(0.7)).with_numerics(phases=8))[0]
         for law in (FLUID, Doubled())
     )
     for name in ("forward", "bending_moment", "medium_power"):

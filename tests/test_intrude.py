@@ -558,7 +558,7 @@ def test_options_of_stress_and_intrude_are_refused_before_anything_is_written(
     )
     refused(geomech("stress", "generic", "--plot", "a.gif"), "end the name in .png")
     refused(
-        geomech("intrude", "c-leg", "-o", "a.txt"), "end the name of a table in .csv"
+        geomech("intrude", "c-leg", "-o", "a.gif"), "end the name in one of .nc, .json"
     )
     refused(geomech("intrude", "c-leg", "--plot", "a.gif"), "end the name in .png")
     refused(geomech("intrude", "c-leg", "-o", "no/a.csv"), "cannot write no/a.csv")

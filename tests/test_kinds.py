@@ -549,7 +549,7 @@ cycles.SAMPLES_TOGETHER = 1
 if sys.argv[1:]:
     rows, cycles._rows = cycles._rows, interrupted
 found = sweep.sweep(Scene(SYSTEMS["drift"](), Circle()), {"gait.amplitude": [0.5, 1.0]}, ".kept")
-print(*found["displacement"][:, 0].round(9))
+print(*found["x"].values.round(9))
 """
 
 

@@ -5,8 +5,7 @@ import re
 import pytest
 from commands import geomech
 
-from geomech import cli
-from geomech.commands import COMMANDS, renamed
+from geomech import cli, renamed
 
 SUMMARIES = re.compile(r"^  ([a-z][a-z-]*)  +(\S.*)$", re.M)
 
@@ -14,7 +13,7 @@ SUMMARIES = re.compile(r"^  ([a-z][a-z-]*)  +(\S.*)$", re.M)
 def test_help_has_every_command_under_its_heading_with_its_whole_summary():
     _, out, _ = geomech("--help")
     found = {part.split(":")[0]: SUMMARIES.findall(part) for part in out.split("\n\n")}
-    for heading, names in COMMANDS.items():
+    for heading, names in cli.headings().items():
         assert [name for name, _ in found[heading]] == [
             name.replace("_", "-") for name in names
         ]

@@ -227,6 +227,7 @@ SPEAK_OF_OPTIONS = (
     "questions/base.py",
     "questions/loading.py",
     "questions/texts.py",
+    "renamed.py",
     "text/",
     "cli.py",
     "terminal.py",

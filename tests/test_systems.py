@@ -203,7 +203,7 @@ def test_files_and_words_say_what_is_singular(tmp_path):
         assert data.attrs["singular_shapes"].startswith(
             "nan, where the wheels' axles meet"
         )
-        assert scenes.parse(data.attrs["scene"]) == study.scene
+        assert scenes.parse(data.attrs["scene_toml"]) == study.scene
     told = explain(scenes.load("no-slip-snake"))
     assert (
         "tiers: adapted, path, direct\n" in told

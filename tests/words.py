@@ -178,6 +178,8 @@ def flat(value, path: str = "") -> Iterator[str]:
     if isinstance(value, dict) and value:
         for key, inner in value.items():
             yield from flat(inner, f"{path}.{key}" if path else str(key))
+    elif path.endswith("scene_toml"):
+        return  # in files of NetCDF it is looked at key by key
     elif MASKED_KEYS.search(path):
         yield f"{path} = #"
     elif isinstance(value, list) and not is_array(value):
@@ -228,7 +230,8 @@ def of_netcdf(file: pathlib.Path) -> Iterator[str]:
                 if text
                 else variable.data
             )
-            yield f"= {name} = {' '.join(rows) if text else of_array(np.array(rows))}"
+            value = " ".join(rows) if text else of_array(np.array(rows))
+            yield f"= {name} = {'#' if MASKED_KEYS.search(name) else value}"
 
 
 def of_file(file: pathlib.Path) -> Iterator[str]:

@@ -15,6 +15,7 @@ from geomech.plots.style import axes_of, figure, shared_legend, styled
 from geomech.scenes.measurements import converted, units_of
 from geomech.studies.tables import QUANTITIES, of_pose
 from geomech.tiers import TIERS
+from rft.refusal import printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -253,7 +254,9 @@ def displacement_figure(
             displacement(
                 table, ax=ax, quantity=quantity, legend=False, data=points, marker="o"
             )
-        title = f"{name} (not in the scene)" if "note" in table.attributes else name
+        title = printable(name)
+        if "note" in table.attributes:
+            title = f"{title} (not in the scene)"
         row[0].set_title(title, loc="left")
         frequency = table.attributes.get("frequency")
         if frequency and panels[-1] == "net_distance":

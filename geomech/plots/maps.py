@@ -415,8 +415,12 @@ def limit_of(values: np.ndarray, clim: float | str | None = None) -> float:
     return float(np.abs(ends).max()) or largest(values)
 
 
-def panels_of(components: Sequence[str], drawn: Sequence[Sequence[bool]]) -> list[int]:
+def panels_of(
+    components: str | Sequence[str], drawn: Sequence[Sequence[bool]]
+) -> list[int]:
     """Return the components to draw: those named; else those that are more than rounding in a row, or all if there are none."""
+    if isinstance(components, str):
+        components = (components,)
     if components:
         return [WORDS.index(choose("component", name, WORDS)) for name in components]
     return [k for k in range(3) if any(row[k] for row in drawn)] or [0, 1, 2]

@@ -23,6 +23,7 @@ from geomech.geometry.two_form import TwoForm
 from geomech.io.tables import FORMATS, LAYOUTS
 from geomech.io.tables.base import UNKNOWN_FRAME, body_text
 from geomech.io.tables.netcdf import SHAPE
+from geomech.scenes import toml
 from geomech.scenes.model import Scene
 from geomech.studies import effort
 from geomech.studies.study import Study
@@ -194,6 +195,7 @@ def attributes(study: Study) -> dict:
     return {
         **about(scene),
         "scene": scene.name,
+        **text_of(scene),
         "numerics": numerics,
         "interpolation": int(study.fitted.degree),
         **(
@@ -203,6 +205,14 @@ def attributes(study: Study) -> dict:
             else {"power_degree": degree}
         ),
     }
+
+
+def text_of(scene: Scene) -> dict[str, str]:
+    """Return the text of a scene as an attribute; none if it has parts of Python alone."""
+    try:
+        return {"scene_toml": toml(scene)}
+    except Refusal:
+        return {}
 
 
 def variables(study: Study) -> list[Variable]:

@@ -95,7 +95,9 @@ class Plan:
         dims = tuple(axis.name for axis in axes)
         arranged = grid.arranged(np.concatenate(rows))
         variables, facts = self.question.variables(grid, arranged, dims)
-        return Result("sweep", (*axes, *variables), facts)
+        # A length that is swept is an axis already.
+        others = [v for v in variables if v.name not in dims]
+        return Result("sweep", (*axes, *others), facts)
 
 
 def batches(question: Batched, grid: Grid) -> Iterator[tuple]:
