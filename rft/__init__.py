@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rft.stepping import TimeSteps, time_steps
     from rft.work import Work, work_done
 
-SOLVER = 11  # version of the numbers, raised with every change of one; results of other versions are not resumed
+SOLVER = 12  # version of the numbers, raised with every change of one; results of other versions are not resumed
 _NAMES = {
     "rft.balance.velocity": "Solution body_velocity",
     "rft.bodies": "Backbone Body Chain ConstantCurvature Serpenoid",
