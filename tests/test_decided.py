@@ -8,9 +8,9 @@ import pytest
 import tasks
 
 from geomech import scenes
+from geomech.questions.sweep import Sweep
 from geomech.run import cost as run_cost
 from geomech.run import jobs
-from geomech.studies import sweep
 from geomech.studies.study import Study
 from rft.balance.backend import preferring
 from rft.balance.listening import listener, listening, nobody
@@ -35,16 +35,16 @@ def test_seconds_are_assumed_for_places_of_the_body_and_for_batches():
     few, many = (
         {"medium.ratio": np.linspace(1, 3, n).tolist()} for n in (10, 100)
     )  # each medium is a batch
-    assert sweep.Sweep(VISCOUS, many).cost().seconds == pytest.approx(
-        10 * sweep.Sweep(VISCOUS, few).cost().seconds, rel=0.01
+    assert Sweep(VISCOUS, many).cost().seconds == pytest.approx(
+        10 * Sweep(VISCOUS, few).cost().seconds, rel=0.01
     )
     together = {
         "medium.ratio": many["medium.ratio"][:10],
         "gait.amplitude": np.linspace(0.1, 1, 10).tolist(),
     }
     assert (
-        sweep.Sweep(VISCOUS, together).cost().seconds
-        < 0.4 * sweep.Sweep(VISCOUS, many).cost().seconds
+        Sweep(VISCOUS, together).cost().seconds
+        < 0.4 * Sweep(VISCOUS, many).cost().seconds
     )
 
 

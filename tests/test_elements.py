@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-import geomech
 import rft
 from geomech.gaits import Circle, Fourier, Sine
 from geomech.optimisation.evaluate import evaluate_gait
@@ -12,6 +11,7 @@ from geomech.scenes.model import Scene
 from geomech.studies import estimate
 from geomech.studies.choose import cheapest
 from geomech.studies.effort import effort
+from geomech.studies.study import Study
 from geomech.systems import Swimmer
 from geomech.systems.swimmer import MEDIA
 from rft.bodies import Backbone, ConstantCurvature, Positions, Serpenoid
@@ -83,11 +83,11 @@ def test_errors_of_all_tiers_contain_it():
     coarse, fine = (Scene(Swimmer(FLUID, Serpenoid(elements=n)), Circle(2.0))
                     for n in (12, FINE))  # fmt: skip
     (true,), _ = estimate.direct(fine, fine.gait, np.array([2.0]), 64)
-    study = geomech.study(coarse).with_numerics(grid=9, phases=64)
-    found = study.study([2.0], ["area", "path", "direct"])
-    for tier in ("area", "path", "direct"):
-        off = estimate.distance(np.array(found[tier][0]), true)
-        assert off < found["estimate"][tier][0]
+    tables = Study(coarse.with_numerics(grid=9, phases=64))
+    found = tables.displacements([2.0], ["area", "path", "direct"])
+    for k in range(3):
+        net = [found[name].values[k, 0] for name in ("x", "y", "heading")]
+        assert estimate.distance(np.array(net), true) < found["x"].error[k, 0]
 
 
 def test_errors_of_time_stepping_contain_it():
@@ -105,10 +105,9 @@ def test_a_tolerance_refines_elements():
     found = cheapest(swimmer, [0.2], 1e-3)
     fine = Scene(Swimmer(FLUID, Backbone(elements=FINE)), Sine(0.2, elements=FINE))
     (true,), _ = estimate.direct(fine, fine.gait, np.array([0.2]), 128)
-    settings = found.result.attributes["settings"]
-    assert settings["elements"] in (40, 80)
-    net = np.array(found["direct"][0])
-    assert estimate.distance(net, true) < 1e-3
+    assert found["chosen_elements"].values in (40, 80)
+    net = [found[name].values[0, 0] for name in ("x", "y", "heading")]
+    assert estimate.distance(np.array(net), true) < 1e-3
 
 
 def test_path_length_work_and_efficiency_contain_it():

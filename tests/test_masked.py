@@ -45,7 +45,7 @@ CALLS = {
     "poses": lambda: reconstruct.poses(POSES),
     "displacement": lambda: reconstruct.displacement(POSES),
     "frame of a velocity": lambda: coordinates.change_velocity(POSES, POSES, POSES),
-    "amplitudes": lambda: Study(STUDY).study(ANGLES),
+    "amplitudes": lambda: Study(STUDY).displacements(ANGLES),
     "cycle": lambda: STUDY.cycle(amplitudes=ANGLES),
     "poses of a tier": lambda: Study(STUDY).poses("direct", amplitudes=ANGLES),
     "data": lambda: rod_drag(ANGLES, [1.0, 1.0], [1.0, 1.0]),

@@ -315,7 +315,7 @@ def test_its_file_and_pictures(tmp_path):
         pose = file.variables["frame_pose"]
         assert np.array(pose[:]) == pytest.approx(scene.system.field.field.values)
         assert (pose.units, file.frame) == (
-            b"m (x, y), rad (theta)",
+            b"m, m, rad",
             b"minimum-perturbation",
         )
     fig = plots.frame_figure(scene.system.field.field)

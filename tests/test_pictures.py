@@ -328,16 +328,16 @@ def test_measurements_are_points_with_bars_of_their_errors():
 
 def test_measurements_may_say_their_units_as_those_of_a_file_do():
     table = {"amplitude": [0.5, 1.0], "direct": [[-0.3, 0.4, 0.1], [0.6, 0.8, 9.0]]}
-    table |= {"units": {"x": "m"}, "body_length": 2.0}
+    result = of_table(table, "m", label="radius (rad)", body_length=2.0)
     for name, size in (("value_cm", 0.01), ("value_BL", 2.0), ("value (mm)", 1e-3)):
         data = {"amplitude_deg": [30.0, 60.0], name: [1.0, 3.0], "trial": ["a", "b"]}
-        ax = plots.displacement(table, data=data)
+        ax = plots.displacement(result, data=data)
         (points,) = (c for c in ax.containers if c.get_label() == MEASURED)
         expected = np.transpose([np.radians([30, 60]), [size, 3 * size]])
         np.testing.assert_allclose(points.lines[0].get_xydata(), expected)
     for wrong in ({"amplitude": [1.0]}, {"amplitude": [1.0], "value_kg": [1.0]}):
         with pytest.raises(Refusal, match="data"):
-            plots.displacement(table, data=wrong)
+            plots.displacement(result, data=wrong)
 
 
 def test_panels_that_are_zero_are_left_out_with_a_reason():

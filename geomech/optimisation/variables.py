@@ -17,7 +17,7 @@ from geomech.scenes.write import toml
 from geomech.studies import fields
 from geomech.studies.effort import units, why_none
 from geomech.studies.tables import COMPONENTS, zero_words
-from geomech.systems.base import length_unit, shape_labels
+from geomech.systems.base import body_size, length_unit, shape_labels
 from rft.refusal import Refusal
 
 HOW = ("refined", "by a table alone")  # local optima were searched
@@ -29,7 +29,7 @@ def attributes(optimum: Optimum) -> dict[str, Any]:
     facts: dict[str, Any] = {
         "objective": objective.name,
         "starts": optimum.request.starts,
-        "body_length": float(optimum.scene.system.length),
+        "body_length": float(body_size(optimum.scene.system)),
     }
     with contextlib.suppress(Refusal):  # parts of Python alone have no text
         facts["best_scene_toml"] = toml(optimum.scene)

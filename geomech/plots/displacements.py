@@ -44,7 +44,7 @@ def _data_units(result: Result, quantity: str) -> dict[str, dict[str, float]]:
     return units_of(
         "(rad)" in result["amplitude"].label,
         result["x"].unit,
-        result.attributes["body_length"],
+        result.attributes.get("body_length", 1.0),
         angle=quantity == "heading",
     )
 

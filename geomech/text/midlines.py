@@ -44,7 +44,7 @@ def numbers(result: Result) -> dict[str, Any]:
         for key, value in result.attributes.items()
         if key not in ("title", "frame_meaning", "notes")
     }
-    facts["notes"] = list(result.attributes["notes"])
+    facts["notes"] = result.attributes["notes"].splitlines()
     out = {
         **facts,
         "quantities": quantities,

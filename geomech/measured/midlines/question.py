@@ -219,4 +219,4 @@ def _about(fit: Kinematics, comparison: Comparison | None) -> dict[str, Any]:
     if comparison is not None:
         about["medium"] = type(comparison.medium).__name__.lower()
     notes = trial.notes if comparison is None else trial.notes + comparison.notes
-    return {**about, "notes": notes}
+    return {**about, "notes": "\n".join(notes)}
