@@ -81,10 +81,8 @@ class Registry(Mapping[str, Any]):
         """Add a part under a name; ValueError as `register`."""
         who = f"{self.noun} of one's own, {getattr(part, '__name__', name)},"
         if isinstance(part, type):
-            if (
-                not dataclasses.is_dataclass(part)
-                or not part.__dataclass_params__.frozen
-            ):  # type: ignore[attr-defined]
+            parameters = getattr(part, "__dataclass_params__", None)
+            if parameters is None or not parameters.frozen:
                 raise Refusal(
                     f"{who} must be a value",
                     instead="put @dataclass(frozen=True) above it",

@@ -143,7 +143,7 @@ def test_files_have_values_units_and_conventions(tmp_path, length, unit):
     assert (said["frame"], said["length_unit"], said["body_length"]) == (
         "link-2",
         unit,
-        length,
+        length or 1.0,
     )
     assert (said["loads"], said["regularisation"]) == ("exact", 1e-5)
     assert said["sign_of_A"] == "xi = + A alphadot"

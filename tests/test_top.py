@@ -208,11 +208,10 @@ def public(tree):
             yield node.name, node
 
 
-FORMULAS = {
-    "vectors",
-    "simd",
-    "compiled",
-}  # whose functions take numbers, arrays and vectors alike
+# Files whose functions take numbers, arrays and vectors alike.
+FORMULAS = {"vectors", "simd", "compiled", "equations"}
+# Decorators of functions that numba compiles by the types of a call.
+COMPILED = {"formula", "register_jitable", "intrinsic"}
 
 
 def test_public_functions_are_annotated():
@@ -224,7 +223,7 @@ def test_public_functions_are_annotated():
             if path.stem in FORMULAS:
                 continue
             for name, f in public(ast.parse(path.read_text())):
-                if any(getattr(d, "id", "") == "formula" for d in f.decorator_list):
+                if any(getattr(d, "id", "") in COMPILED for d in f.decorator_list):
                     continue
                 asked = [
                     *f.args.posonlyargs,
