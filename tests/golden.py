@@ -336,7 +336,9 @@ def walkers():
         for name in shipped("walker"):
             text = re.sub(r"\[numerics\][^[]*", "", command("scenes", "--show", name))
             (pathlib.Path(folder) / f"{name}.toml").write_text(f"{text}\n{coarse}")
-            told = json.loads(command("walk", f"{folder}/{name}.toml", "--json", "--yes"))
+            told = json.loads(
+                command("walk", f"{folder}/{name}.toml", "--json", "--yes")
+            )
             yield from of_json(f"walker, {name}", told)
 
 
