@@ -39,7 +39,7 @@ needs_numba = pytest.mark.skipif(
     not backend.installed(), reason="needs the extra: pip install 'geomech[fast]'"
 )
 # Steps so short that forces are those of the velocities in the data.
-AT_ONCE = '<option timestep="1e-12" gravity="0 0 0"/>'
+AT_ONCE = '<option timestep="1e-15" gravity="0 0 0"/>'  # no velocity changes in it
 SPATIAL = Spatial(3e5, surface_friction=0.6, grazing=math.radians(5))
 MAP = StressMap(zeta=0.3, grazing=math.radians(5))
 GEOMS = (
@@ -158,10 +158,10 @@ def test_forces_are_those_of_the_meshes_and_do_their_virtual_work(name, law, sol
                 )
             assert np.abs(expected).max() > 0.1
             np.testing.assert_allclose(
-                found, expected, rtol=0, atol=1e-12 * np.abs(expected).max()
+                found, expected, rtol=0, atol=3e-12 * np.abs(expected).max()
             )
             np.testing.assert_allclose(
-                data.qfrc_passive, work, rtol=0, atol=1e-12 * np.abs(work).max()
+                data.qfrc_passive, work, rtol=0, atol=3e-12 * np.abs(work).max()
             )
             power = float(work @ data.qvel)
             assert (

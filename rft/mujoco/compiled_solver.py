@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 from collections import namedtuple
+from collections.abc import Callable
 
 import numpy as np
 from numba import carray, types
@@ -41,7 +42,7 @@ for function in (*implicit.COMPILED, *rows.COMPILED):
 
 
 @functools.cache
-def solver_code():
+def solver_code() -> Callable:
     """Return the C function (block, numbers) that solves a block. block: int64, by the names of `AT`. numbers: (N_NUMBERS,),
     step, rounding and accuracy, and where the `Result` goes."""
 
