@@ -73,7 +73,7 @@ def fit_medium(
     >>> round(sand.medium.C, 2), round(sand.medium.gamma0, 2)
     (1.49, 0.22)
     >>> study = geomech.study(sand.medium, geomech.bodies.Chain(), geomech.gaits.Circle(1.0))
-    >>> round(study.displacement(tiers="direct")["net_distance"]["direct"][0], 3)
+    >>> float(study.displacement(tiers="direct")["net_distance"].values[0, 0].round(3))
     0.05
     """
     for name in sizes:

@@ -135,8 +135,8 @@ class Result(Mapping[str, Variable]):
     >>> table = study.displacement([0.5, 1.0], "direct")
     >>> table["net_distance"].values.round(4), table["net_distance"].unit
     (array([[0.0153, 0.0513]]), 'BL')
-    >>> table.at(tier="direct", amplitude=0.5)["y"].values.round(4)
-    array(0.0009)
+    >>> float(table.at(tier="direct", amplitude=0.5)["y"].values.round(4))
+    0.002
     """
 
     kind: str

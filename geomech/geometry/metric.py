@@ -37,7 +37,7 @@ class Metric:
     Examples
     --------
     >>> import geomech
-    >>> M = geomech.study("three-link-viscous", grid=15).metric
+    >>> M = geomech.study("three-link-viscous", grid=15).tables.metric
     >>> round(float(M.norm([0.0, 0.0], [1.0, 0.0])), 4)  # path length per rad of alpha_1, straight
     0.0855
     """
@@ -71,7 +71,7 @@ class Finsler:
     Examples
     --------
     >>> import geomech
-    >>> F = geomech.study("three-link-glass", grid=15).metric
+    >>> F = geomech.study("three-link-glass", grid=15).tables.metric
     >>> round(float(F.norm([0.0, 0.0], [1.0, 0.0])), 3)  # path length per rad of alpha_1, straight
     0.134
     """

@@ -59,7 +59,7 @@ def connection_figure(
     Examples
     --------
     >>> import geomech
-    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> study = geomech.study("three-link-viscous", grid=15).tables
     >>> fig = geomech.plots.connection_figure(study.fitted, components=["x", "theta"])
     """
     draw = CONNECTION_STYLES[choose("style", style, CONNECTION_STYLES)]
@@ -145,8 +145,8 @@ def ccf_figure(
     Examples
     --------
     >>> import geomech
-    >>> study = geomech.study("three-link-viscous", grid=15)
-    >>> fig = geomech.plots.ccf_figure(study.ccf(), gaits=[study.scene.gait], error=study.ccf_error(), components=["x"])
+    >>> study = geomech.study("three-link-viscous", grid=15).tables
+    >>> fig = geomech.plots.ccf_figure(study.curvature, gaits=[study.scene.gait], error=study.curvature_error, components=["x"])
     """
     rows = [Row(field, error, gaits, labels)] + (
         [] if beside is None else [Row(*beside, gaits, labels)]
@@ -169,7 +169,7 @@ def planes_figure(
     Examples
     --------
     >>> import geomech
-    >>> study = geomech.study("seven-link-wave", grid=7)
+    >>> study = geomech.study("seven-link-wave", grid=7).tables
     >>> fig = geomech.plots.planes_figure([study.plane((0, 5))], study.scene.gait)
     """
     labels, rows = labels or _angles(planes), []
@@ -202,7 +202,7 @@ def plane_connection_figure(
     Examples
     --------
     >>> import geomech
-    >>> study = geomech.study("seven-link-wave", grid=7)
+    >>> study = geomech.study("seven-link-wave", grid=7).tables
     >>> fig = geomech.plots.plane_connection_figure([study.plane((0, 5))])
     """
     draw = CONNECTION_STYLES[choose("style", style, CONNECTION_STYLES)]

@@ -76,7 +76,7 @@ def vector_field(
     Examples
     --------
     >>> import geomech
-    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> study = geomech.study("three-link-viscous", grid=15).tables
     >>> ax = geomech.plots.vector_field(study.fitted, component=0)
     """
     ax = axes_of(ax)
@@ -195,8 +195,8 @@ def ccf_map(
     Examples
     --------
     >>> import geomech
-    >>> study = geomech.study("three-link-viscous", grid=15)
-    >>> ax = geomech.plots.ccf_map(study.ccf(), component=0, gaits=[study.scene.gait], error=study.ccf_error())
+    >>> study = geomech.study("three-link-viscous", grid=15).tables
+    >>> ax = geomech.plots.ccf_map(study.curvature, component=0, gaits=[study.scene.gait], error=study.curvature_error)
     """
     from cmcrameri import cm
 
@@ -287,8 +287,8 @@ def indicatrices(
     --------
     >>> import geomech
     >>> from geomech.plots import ccf_map, indicatrices
-    >>> study = geomech.study("three-link-viscous", grid=15)
-    >>> rings = indicatrices(study.metric, ccf_map(study.ccf()), study.ccf().axes)
+    >>> study = geomech.study("three-link-viscous", grid=15).tables
+    >>> rings = indicatrices(study.metric, ccf_map(study.curvature), study.curvature.axes)
     """
     from matplotlib.lines import Line2D
 

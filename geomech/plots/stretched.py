@@ -49,8 +49,8 @@ def stretched_map(
     --------
     >>> import geomech
     >>> from geomech.geometry.stretch import stretch
-    >>> study = geomech.study("three-link-viscous", grid=15)
-    >>> ax = geomech.plots.stretched_map(study.ccf(), stretch(study.metric), gaits=[study.scene.gait])
+    >>> study = geomech.study("three-link-viscous", grid=15).tables
+    >>> ax = geomech.plots.stretched_map(study.curvature, stretch(study.metric), gaits=[study.scene.gait])
     >>> ax.get_xlabel()
     'path length (BL)'
     """
@@ -189,8 +189,8 @@ def stretched_figure(
     --------
     >>> import geomech
     >>> from geomech.geometry.stretch import stretch
-    >>> study = geomech.study("three-link-viscous", grid=15)
-    >>> fig = geomech.plots.stretched_figure(study.ccf(), stretch(study.metric), components=["x"])
+    >>> study = geomech.study("three-link-viscous", grid=15).tables
+    >>> fig = geomech.plots.stretched_figure(study.curvature, stretch(study.metric), components=["x"])
     """
     panels = panels_of(components, [[has(field, k) for k in range(3)]])
     fig, axes = figure(0.3 + 3.7 * len(panels), 3.5, len(panels), layout="compressed")

@@ -72,7 +72,7 @@ def streamlines(
     Examples
     --------
     >>> import geomech
-    >>> study = geomech.study("three-link-viscous", grid=15)
+    >>> study = geomech.study("three-link-viscous", grid=15).tables
     >>> ax = geomech.plots.streamlines(study.fitted, 0)
     """
     from matplotlib.colors import Normalize
@@ -121,8 +121,8 @@ def ccf_contours(
     Examples
     --------
     >>> import geomech
-    >>> study = geomech.study("three-link-viscous", grid=15)
-    >>> ax = geomech.plots.ccf_contours(study.ccf(), 0)
+    >>> study = geomech.study("three-link-viscous", grid=15).tables
+    >>> ax = geomech.plots.ccf_contours(study.curvature, 0)
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -230,7 +230,7 @@ def ccf_surface(
     Examples
     --------
     >>> import geomech
-    >>> ax = geomech.plots.ccf_surface(geomech.study("three-link-viscous", grid=15).ccf(), 0)
+    >>> ax = geomech.plots.ccf_surface(geomech.study("three-link-viscous", grid=15).tables.curvature, 0)
     """
     from cmcrameri import cm
 

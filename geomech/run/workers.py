@@ -34,7 +34,7 @@ def using(count: int | None = None, scheduler: str | None = None) -> Iterator[No
     --------
     >>> import geomech
     >>> with geomech.workers.using(1):
-    ...     A = geomech.study("three-link-viscous", grid=9).fitted
+    ...     A = geomech.study("three-link-viscous", grid=9).tables.fitted
     ...
     >>> A.A.shape
     (3, 2, 9, 9)

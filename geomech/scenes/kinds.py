@@ -47,8 +47,8 @@ def register(part: Any = None, /, **members: Any) -> Any:
     ...     return np.stack([alphadot[..., 0] * np.sin(alpha[..., 1]), 0 * alpha[..., 0], 0 * alpha[..., 0]], -1)
     ...
     >>> table = geomech.study(drift, geomech.gaits.Circle(0.5)).displacement(tiers="direct")
-    >>> [round(x, 3) for x in table["net_distance"]["direct"]]
-    [0.761]
+    >>> table["net_distance"].values.round(3)
+    array([[0.761]])
     """
     if part is None and members:
         return lambda function: register(function, **members)

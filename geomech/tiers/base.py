@@ -32,7 +32,7 @@ class Numerics:
     Examples
     --------
     >>> import geomech
-    >>> study = geomech.study("three-link-viscous").with_numerics(grid=15, phases=64)
+    >>> study = geomech.study("three-link-viscous", grid=15, phases=64)
     >>> study.scene.numerics.grid
     15
     """
