@@ -42,8 +42,8 @@ class Points(Gait):
     Examples
     --------
     >>> from geomech.gaits import Points
-    >>> square = Points(((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5)))
-    >>> square.shape(0.0).round(6)
+    >>> loop = Points(((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5)))
+    >>> loop.shape(0.0).round(6)
     array([0.5, 0.5])
     """
 

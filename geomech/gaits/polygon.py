@@ -22,8 +22,8 @@ class Polygon(Gait):
     Each side takes a share of the phase by its length and is run from rest to rest, by the
     share 35 u^4 - 84 u^5 + 70 u^6 - 20 u^7 of it at the share u of its time: speed,
     acceleration and jerk are 0 at its ends. So the gait is smooth at its corners, and the
-    displacement converges with order 4 in a fluid. It does not depend on the timing but through effects that depend on
-    the speed; the highest joint speed is 2.19 times the mean of its side.
+    displacement converges with order 4 in a fluid. The timing matters only to effects
+    that depend on speed; the highest joint speed is 2.19 times the mean of its side.
 
     Examples
     --------
