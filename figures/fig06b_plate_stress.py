@@ -15,7 +15,7 @@ import numpy as np
 
 from figures import main, style
 from geomech import plots
-from rft.plates import VERTICAL, Plate, loads
+from rft.terradynamics.plates import VERTICAL, Plate, loads
 
 LENGTH, WIDTH = 0.038, 0.025  # m, assumed
 DEEPEST = 0.08  # m, assumed

@@ -3,7 +3,7 @@
 The first panel is the convention of plate, motion and stress (Fig. 6(a)), the second the coefficients of media that have
 nine of their own, each over the medium's zeta, beside the generic set M0: one number, the strength, takes one medium to the
 other. The maps are of M0, hatched where the grains would pull on the face that leads. Coefficients and zeta are those of
-`rft.plates.VERTICAL`; the other media of the published panel have only their zeta there.
+`rft.terradynamics.plates.VERTICAL`; the other media of the published panel have only their zeta there.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import numpy as np
 
 from figures import main, style
 from geomech import plots
-from rft.plates import VERTICAL, survey
-from rft.plates.stress import COEFFICIENTS
+from rft.terradynamics.plates import VERTICAL, survey
+from rft.terradynamics.plates.stress import COEFFICIENTS
 
 SCALED = {
     "poppy-seeds-loose": "poppy seeds, loose",

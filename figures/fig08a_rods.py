@@ -24,7 +24,14 @@ import numpy as np
 
 from figures import main, style
 from geomech import plots
-from rft.plates import VERTICAL, HalfCylinder, RoundRod, SquareRod, loads, parts
+from rft.terradynamics.plates import (
+    VERTICAL,
+    HalfCylinder,
+    RoundRod,
+    SquareRod,
+    loads,
+    parts,
+)
 
 RADIUS, WIDTH = 0.0127, 0.1  # m, assumed
 RODS = {

@@ -23,7 +23,7 @@ from figures.campaigns import grains
 from figures.fig08a_rods import on_face
 from figures.grains import over_beds
 from geomech import plots
-from rft.plates import Polygon, StressMap, loads
+from rft.terradynamics.plates import Polygon, StressMap, loads
 
 RULES = "keep", "cut"
 BETA = np.radians(np.arange(181.0))

@@ -28,7 +28,7 @@ from geomech.studies.calibration import Calibration
 from geomech.studies.study import Study
 from rft import EndCaps, Transient
 from rft.grains.reversal import Recovery, recovery
-from rft.plates import VERTICAL, HalfCylinder, RoundRod
+from rft.terradynamics.plates import VERTICAL, HalfCylinder, RoundRod
 
 RADIUS, SIZE = 6e-3, 0.162  # m, of the swimmer
 AMPLITUDES = np.linspace(0.25, 2.1, 14)

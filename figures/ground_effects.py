@@ -15,8 +15,8 @@ import numpy as np
 from figures import main, style
 from geomech import plots
 from geomech.scenes import load
-from rft.ground import Aeration, DisturbedGround, GrainInertia, Slope
-from rft.ground.slope import REPOSE
+from rft.terradynamics.ground import Aeration, DisturbedGround, GrainInertia, Slope
+from rft.terradynamics.ground.slope import REPOSE
 
 SEEN = 230.0  # rpm
 SHARE = 0.1  # of the force, from which an effect counts as seen; assumed

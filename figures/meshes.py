@@ -12,8 +12,8 @@ import numpy as np
 from figures import main, style
 from geomech import plots
 from geomech.scenes import load
-from rft.meshes import Cylinder, Spatial, Sphere, law, wrench
-from rft.plates import VERTICAL
+from rft.terradynamics.meshes import Cylinder, Spatial, Sphere, law, wrench
+from rft.terradynamics.plates import VERTICAL
 
 SCENES = ("sphere", "cylinder", "screw", "extruded-c-leg")
 BODIES = {"sphere": Sphere(0.02), "cylinder": Cylinder(0.02, 0.06)}

@@ -10,7 +10,7 @@ import numpy as np
 
 from figures import main, style
 from geomech import plots
-from rft.walking import Tripod
+from rft.terradynamics.walking import Tripod
 
 PHASES = 0.5 * np.array([0, 1, 1, 0, 0, 1])  # of the legs, cycles: a tripod
 MEDIUM = "poppy-seeds-loose"

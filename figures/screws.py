@@ -1,8 +1,9 @@
 """Screws in sand by the law of three dimensions: what one pulls against slip, and how craft on two of them go.
 
-The craft is that of the built-in scene ``screws``; it and its sand are assumed. Lines are the balance in the mean over a turn,
-without inertia (`rft.walking.cruise`); circles and paths are MuJoCo's. Axes are a third of the blade's radius out of the
-ground, at the surface, or so far under it.
+The craft is that of the built-in scene ``screws``; it and its sand are assumed. Lines
+are the balance in the mean over a turn, without inertia
+(`rft.terradynamics.walking.cruise`); circles and paths are MuJoCo's. Axes are a third
+of the blade's radius out of the ground, at the surface, or so far under it.
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ import numpy as np
 from figures import main, style
 from geomech import plots
 from geomech.scenes import load
-from rft import se2
-from rft.walking import Fineness, Walker, cruise, engine, turning
-from rft.walking.craft import PER_SQUARE
+from rft.formulas import se2
+from rft.terradynamics.walking import Fineness, Walker, cruise, engine, turning
+from rft.terradynamics.walking.craft import PER_SQUARE
 
 HEIGHTS = (0.01, 0.0, -0.01, -0.03)  # m, of the axis over the surface
 MASSES = (0.5, 1.0, 2.0)  # kg

@@ -1,7 +1,9 @@
 """The engine of three dimensions: its step-size study, and its speeds against those of the planar engine. Needs MuJoCo.
 
-Xplorer's progress in a stride of its limit cycle at 2 Hz by implicit steps (`rft.walking.multibody`), and by MuJoCo's own, with
-the grains' forces held as they are at the start of each: these are of order 1, and go astray below some 200 steps a cycle.
+Xplorer's progress in a stride of its limit cycle at 2 Hz by implicit steps
+(`rft.terradynamics.walking.multibody`), and by MuJoCo's own, with the grains' forces
+held as they are at the start of each: these are of order 1, and go astray below some
+200 steps a cycle.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ import numpy as np
 from figures import main, style
 from geomech import plots
 from geomech.scenes import load
-from rft.walking import Tripod, Walker, engine
+from rft.terradynamics.walking import Tripod, Walker, engine
 
 STEPS = {
     "implicit": (12, 16, 24, 32, 48, 64, 96, 128),
@@ -30,7 +32,7 @@ FREQUENCIES = {
 
 def _simulation(steps: int):
     """Return the walk of Xplorer by so many steps a cycle, not begun yet."""
-    from rft.walking.mujoco_walk import Simulation
+    from rft.terradynamics.walking.mujoco_walk import Simulation
 
     scene = load("xplorer")
     walker = Walker(scene.robot, Tripod(FREQUENCY), scene.medium)

@@ -16,10 +16,10 @@ from figures import main, style
 from geomech import plots
 from geomech.scenes import load
 from geomech.studies import walking
-from rft.ground import Aeration
-from rft.plates import Polygon
-from rft.plates.outline import Outline
-from rft.walking import Rhex
+from rft.terradynamics.ground import Aeration
+from rft.terradynamics.plates import Polygon
+from rft.terradynamics.plates.outline import Outline
+from rft.terradynamics.walking import Rhex
 
 FACTORS = (0.7, 1.0, 1.4)
 NAMES = {

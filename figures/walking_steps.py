@@ -12,10 +12,10 @@ import numpy as np
 from figures import main, style
 from geomech import plots
 from geomech.scenes import load
-from rft.walking import Tripod, Walker
-from rft.walking.march import step
-from rft.walking.planar import State
-from rft.walking.planar_walk import _strides
+from rft.terradynamics.walking import Tripod, Walker
+from rft.terradynamics.walking.march import step
+from rft.terradynamics.walking.planar import State
+from rft.terradynamics.walking.planar_walk import _strides
 
 STEPS = {
     "implicit": (12, 24, 48, 96, 192, 384),

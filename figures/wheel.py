@@ -10,9 +10,9 @@ import numpy as np
 
 from figures import main, style
 from geomech import plots
-from rft.ground import GrainInertia
-from rft.plates import VERTICAL, Wheel
-from rft.walking import rolling
+from rft.terradynamics.ground import GrainInertia
+from rft.terradynamics.plates import VERTICAL, Wheel
+from rft.terradynamics.walking import rolling
 
 RATES = (1.0, 10.0, 30.0, 60.0)  # rad/s
 WHEELS = {"smooth": Wheel(0.1, 0.1), "12 lugs": Wheel(0.1, 0.1, 12, 0.015, 0.006)}

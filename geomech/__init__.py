@@ -66,7 +66,7 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from rft import bodies as bodies
     from rft import effects as effects
     from rft import laws as _laws
-    from rft.refusal import Refusal as Refusal
+    from rft.core.refusal import Refusal as Refusal
 
     media = _laws
 
@@ -111,7 +111,7 @@ _OBJECTS = {
     "Swimmer": "geomech.systems",
     "fit_log": "geomech.measured",
     "register": "geomech.scenes.kinds",
-    "Refusal": "rft.refusal",
+    "Refusal": "rft.core.refusal",
 }
 
 

@@ -23,7 +23,7 @@ from geomech.questions.velocity import Velocity
 from geomech.questions.walk import Walk
 from geomech.scenes.parts import as_scene
 from geomech.studies import study as studies
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 Fields = ParamSpec("Fields")
 

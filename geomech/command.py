@@ -14,7 +14,7 @@ from geomech import pipeline
 from geomech.commands.options import ExtentOption, GridOption, MediumOption
 from geomech.questions import base
 from geomech.questions.base import Declared, Option, Question
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 CHANGES = {"grid": GridOption, "extent": ExtentOption, "medium": MediumOption}
 ENDINGS = (".nc", ".json", ".csv", ".mat", ".txt")  # of `geomech.results.files.WRITERS`

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from geomech.core.face import implements
-from rft.refusal import Refusal, printable
+from rft.core.refusal import Refusal, printable
 
 
 @implements("Connection._repr_html_")

@@ -15,7 +15,7 @@ from geomech import terminal
 from geomech.core.errors import Note
 from geomech.io.files import atomic_file, atomic_folder, note, refuse_inputs
 from geomech.questions.base import Run, ignore
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:  # commands start without NumPy
     from geomech.core.variables import Result

@@ -23,7 +23,7 @@ import typer
 from geomech.core.errors import Note
 from geomech.run import BELOW
 from geomech.run.progress import progress
-from rft.refusal import Refusal, line, printable, worded
+from rft.core.refusal import Refusal, line, printable, worded
 
 __all__ = ["Stopped", "exit_code", "progress", "report", "stoppable"]
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rft.balance.velocity import Solution, body_velocity
     from rft.bodies import Backbone, Body, Chain, ConstantCurvature, Serpenoid
+    from rft.core.refusal import Refusal
     from rft.effects import (
         BodyInertia,
         DepthProfile,
@@ -19,9 +20,8 @@ if TYPE_CHECKING:
         Transient,
     )
     from rft.laws import CATALOGUE, Coulomb, Granular, Medium, Surface, Table, Viscous
-    from rft.refusal import Refusal
-    from rft.stepping import TimeSteps, time_steps
-    from rft.work import Work, work_done
+    from rft.motion.stepping import TimeSteps, time_steps
+    from rft.motion.work import Work, work_done
 
 SOLVER = 12  # version of the numbers, raised with every change of one; results of other versions are not resumed
 _NAMES = {
@@ -29,9 +29,9 @@ _NAMES = {
     "rft.bodies": "Backbone Body Chain ConstantCurvature Serpenoid",
     "rft.effects": "BodyInertia DepthProfile DisturbedGround EndCaps GrainInertia SkinFriction Slope TowedSled Transient",
     "rft.laws": "CATALOGUE Coulomb Granular Medium Surface Table Viscous",
-    "rft.refusal": "Refusal",
-    "rft.stepping": "TimeSteps time_steps",
-    "rft.work": "Work work_done",
+    "rft.core.refusal": "Refusal",
+    "rft.motion.stepping": "TimeSteps time_steps",
+    "rft.motion.work": "Work work_done",
 }
 _MODULES = {name: module for module, names in _NAMES.items() for name in names.split()}
 

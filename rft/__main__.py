@@ -9,14 +9,14 @@ import numpy as np
 
 from rft import CATALOGUE, Chain, Granular, body_velocity
 from rft.balance.backend import check, preferring
-from rft.ground import Ground
 from rft.laws.records import record
-from rft.meshes import Spatial, shapes
-from rft.meshes import contact as faces
-from rft.meshes.blocks import Blocks
-from rft.meshes.extruded import Extruded
-from rft.plates import VERTICAL, CLeg, loads
-from rft.walking import Fineness, Rhex, Tripod, Walker, engine
+from rft.terradynamics.ground import Ground
+from rft.terradynamics.meshes import Spatial, shapes
+from rft.terradynamics.meshes import contact as faces
+from rft.terradynamics.meshes.blocks import Blocks
+from rft.terradynamics.meshes.extruded import Extruded
+from rft.terradynamics.plates import VERTICAL, CLeg, loads
+from rft.terradynamics.walking import Fineness, Rhex, Tripod, Walker, engine
 
 try:
     check("numba")

@@ -15,7 +15,7 @@ from geomech import cli
 from geomech.run import backend
 from geomech.scenes import kinds
 from rft.balance.backend import preferring
-from rft.registry import REGISTRIES
+from rft.core.registry import REGISTRIES
 
 PARSER = functools.cache(
     typer.main.get_command

@@ -75,12 +75,12 @@ DOORS = [
 ]
 DOORS += [
     "rft.grains",
-    "rft.ground",
+    "rft.terradynamics.ground",
     "rft.laws",
-    "rft.meshes",
+    "rft.terradynamics.meshes",
     "rft.mujoco",
-    "rft.plates",
-    "rft.walking",
+    "rft.terradynamics.plates",
+    "rft.terradynamics.walking",
 ]
 
 

@@ -41,9 +41,9 @@ import rft
 from geomech.run import cost
 from geomech.systems.capabilities import solver_of
 from rft.balance import backend
-from rft.meshes import Spatial, wrench
-from rft.plates import loads
-from rft.walking import Fineness, engine
+from rft.terradynamics.meshes import Spatial, wrench
+from rft.terradynamics.plates import loads
+from rft.terradynamics.walking import Fineness, engine
 
 FILE = pathlib.Path(__file__).parent / "data" / "golden.json"
 TOLERANCE, OF_ESTIMATES = (

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from rft.formulas.link import Load
 from rft.laws.records import record
-from rft.link import Load
 
 
 def as_array(load: Load, like: np.ndarray) -> np.ndarray:

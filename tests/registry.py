@@ -10,12 +10,12 @@ from geomech.systems import SYSTEMS as kinds_of_systems
 from geomech.systems import Table
 from rft.bodies import BODIES as kinds_of_bodies
 from rft.effects import EFFECTS as kinds_of_effects
-from rft.ground import GROUND_EFFECTS as kinds_of_ground_effects
-from rft.ground import Aeration
-from rft.ground import GrainInertia as GrainPressure
 from rft.laws import CATALOGUE, LAWS, is_closed
-from rft.meshes import Cylinder, Leg, Screw, Sphere
-from rft.plates import (
+from rft.terradynamics.ground import GROUND_EFFECTS as kinds_of_ground_effects
+from rft.terradynamics.ground import Aeration
+from rft.terradynamics.ground import GrainInertia as GrainPressure
+from rft.terradynamics.meshes import Cylinder, Leg, Screw, Sphere
+from rft.terradynamics.plates import (
     VERTICAL,
     CLeg,
     FlatLeg,
@@ -29,7 +29,7 @@ from rft.plates import (
     StressMap,
     Wheel,
 )
-from rft.walking import Rhex, Roller, Tripod, Walker
+from rft.terradynamics.walking import Rhex, Roller, Tripod, Walker
 
 DATA = pathlib.Path(__file__).parent / "data"
 

@@ -10,7 +10,7 @@ from geomech.geometry import connection, metric
 from geomech.geometry.connection import Connection
 from geomech.geometry.minimum_perturbation import minimum_perturbation
 from geomech.systems import Swimmer
-from rft import se2
+from rft.formulas import se2
 
 
 def cell(values, lead):

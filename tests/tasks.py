@@ -9,8 +9,8 @@ from pathlib import Path
 from geomech.core.errors import UnitWarning
 from geomech.run.jobs import runner
 from rft.balance import backend
-from rft.refusal import Refusal
-from rft.threads import thread_count
+from rft.core.refusal import Refusal
+from rft.core.threads import thread_count
 
 
 def doubled(by, x):

@@ -42,15 +42,15 @@ from rft import (
 from rft.balance import backend
 from rft.balance import solver as balance
 from rft.balance.backend import Note
-from rft.balance.newton import Limits
 from rft.bodies import Elements
-from rft.contact import assemble
+from rft.core.premise import Premise
+from rft.core.refusal import Refusal
 from rft.effects import Effect
+from rft.effects.contact import assemble
+from rft.formulas.newton import Limits
+from rft.formulas.vectors import formula, sqrt
 from rft.laws.base import TermLaw
 from rft.laws.records import record
-from rft.premise import Premise
-from rft.refusal import Refusal
-from rft.vectors import formula, sqrt
 
 ROOT = pathlib.Path(__file__).parents[1]
 BODY = Chain((1, 1.4, 0.8), frame="link-1", length=0.3)
@@ -76,7 +76,7 @@ def test_the_same_marches(name, monkeypatch):
         taken.append(solved.iterations)
         return solved
 
-    monkeypatch.setattr("rft.stepping.solve", counted)
+    monkeypatch.setattr("rft.motion.stepping.solve", counted)
     alpha, alphadot = GAIT.cycle(8, np.array([0.4, 1.0]))
     effects = EFFECTS[name][0](0.2), EndCaps(radius=0.06, tail=1.0)
     effects = sized(effects[:1] if name == "end-caps" else effects)
@@ -502,7 +502,7 @@ def test_parameters_of_a_law_are_no_part_of_its_code():
 
 LAW = """
 from dataclasses import dataclass
-from rft.vectors import formula, sqrt
+from rft.formulas.vectors import formula, sqrt
 
 FACTOR = {factor}
 
@@ -783,7 +783,7 @@ def square(x):
 def test_what_the_page_says_that_formulas_take_is_what_compiles():
     """Every expression of the page's table, on eight elements at once and by NumPy."""
     numba = pytest.importorskip("numba")
-    from rft import simd, vectors
+    from rft.formulas import simd, vectors
 
     page = (ROOT / ".docs/how-it-works/balance.md").read_text()
     rows = [x.split("|", 2)[2] for x in page.splitlines() if x.startswith("| ")]
@@ -819,8 +819,8 @@ class Slip:
 
 def test_a_slip_in_a_formula_is_told_by_function_and_line():
     numba = pytest.importorskip("numba")
-    from rft import simd
     from rft.balance.cache import cached
+    from rft.formulas import simd
 
     traction, load, store = Slip.traction, simd.load, simd.store
 

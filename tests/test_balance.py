@@ -20,10 +20,10 @@ from rft import (
 )
 from rft.balance import backend
 from rft.balance.arrays import nets, solve
-from rft.balance.newton import Descent, Limits, plus, to_element, to_frame
 from rft.balance.path import _to_elements, _with_slope
 from rft.balance.solver import QUICK, SLOW
-from rft.contact import assemble, mapped
+from rft.effects.contact import assemble, mapped
+from rft.formulas.newton import Descent, Limits, plus, to_element, to_frame
 from rft.laws.base import TermLaw
 
 GLASS = MEDIA["glass-0.3mm-loose"]

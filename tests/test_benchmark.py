@@ -278,7 +278,7 @@ def test_sand_under_a_hexapod():
     mujoco = pytest.importorskip("mujoco")
     from rft import mujoco as sands
     from rft.balance.backend import preferring
-    from rft.meshes import Spatial
+    from rft.terradynamics.meshes import Spatial
 
     hips = [(x, y) for x in (-0.08, 0.0, 0.08) for y in (-0.07, 0.07)]
     legs = "".join(LEG.format(x, y, k) for k, (x, y) in enumerate(hips))

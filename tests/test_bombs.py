@@ -11,7 +11,7 @@ from geomech.io import tables
 from geomech.io.rows import split_unit
 from geomech.io.tables import matlab
 from geomech.scenes.hints import line_hint
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 
 def element(kind, data):

@@ -14,8 +14,8 @@ from geomech.io.rows import Rows
 from geomech.scenes import drag
 from geomech.studies import calibration
 from rft import Coulomb, Granular, Viscous
-from rft.calibrate import Fit, fit
-from rft.drag import Rod, rod_drag
+from rft.fits.rods import Fit, fit
+from rft.laws.drag import Rod, rod_drag
 
 PSI = np.array([0.0, 4, 9, 15, 30, 48, 60, 75, 90])
 ROD = Rod(0.007, 0.09, 0.04, 640.0)

@@ -16,7 +16,7 @@ from geomech.gaits.waves import arc_to_phase
 from geomech.studies.study import Study
 from geomech.studies.sweep import sweep
 from rft import Backbone
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 T = np.linspace(0, 2 * np.pi, 97)

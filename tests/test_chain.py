@@ -5,8 +5,8 @@ import pytest
 from registry import BODIES
 
 from rft import Chain
-from rft.balance.newton import element_net, to_element, to_frame
-from rft.link import Load
+from rft.formulas.link import Load
+from rft.formulas.newton import element_net, to_element, to_frame
 
 
 def by_hand(body, alpha):

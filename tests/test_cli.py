@@ -24,7 +24,7 @@ from geomech.output import report
 from geomech.studies.report import Report, _gaits, reachable, steps
 from geomech.studies.study import Study
 from geomech.text import accuracy
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 SMALL = ["--grid", "9"]
 
@@ -629,8 +629,8 @@ def test_commands_load_what_they_use_and_no_more(tmp_path):
         "distributed",
     )
     heavy += (
-        "rft.walking",
-        "rft.meshes",
+        "rft.terradynamics.walking",
+        "rft.terradynamics.meshes",
         "geomech.scenes.walker",
         "concurrent.futures.process",
         "rich.progress",

@@ -19,7 +19,7 @@ from geomech.run.executors import Cluster
 from geomech.run.jobs import runner
 from geomech.run.workers import using
 from geomech.studies import cycles, sweep
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 distributed = pytest.importorskip(
     "distributed", reason="the extra 'distributed' is not installed"

@@ -17,7 +17,7 @@ from geomech.studies import fields
 from geomech.studies.shape_space import zero_line
 from geomech.studies.study import Study
 from geomech.tiers import fitted
-from rft import se2
+from rft.formulas import se2
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = scenes.load("three-link-glass")

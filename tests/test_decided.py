@@ -14,8 +14,8 @@ from geomech.run import jobs
 from geomech.studies.study import Study
 from rft.balance.backend import preferring
 from rft.balance.listening import listener, listening, nobody
-from rft.refusal import Refusal
-from rft.threads import run_shares
+from rft.core.refusal import Refusal
+from rft.core.threads import run_shares
 
 GLASS = scenes.load("three-link-glass")
 VISCOUS = scenes.load("three-link-viscous")

@@ -29,12 +29,10 @@ from rft import (
 )
 from rft.bodies.base import body_size
 from rft.bodies.pieces import Pieces, subdivide
-from rft.contact import NO_MEMORY, assemble
 from rft.effects.base import Site
+from rft.effects.contact import NO_MEMORY, assemble
 from rft.effects.transient import part_velocities
-from rft.grains.reversal import mean_direction
-from rft.laws.records import record
-from rft.link import (
+from rft.formulas.link import (
     Factor,
     Incline,
     Memory,
@@ -44,6 +42,8 @@ from rft.link import (
     scaled_load,
     two_sided_load,
 )
+from rft.grains.reversal import mean_direction
+from rft.laws.records import record
 
 pytestmark = pytest.mark.usefixtures("fastest")
 

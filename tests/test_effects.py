@@ -28,12 +28,12 @@ from rft import (
     body_velocity,
     time_steps,
 )
-from rft.contact import assemble
+from rft.core.premise import ALL, negated
+from rft.core.refusal import Refusal
 from rft.effects import EFFECTS as KINDS
 from rft.effects import batched_effect, engine
-from rft.link import quadratic_load
-from rft.premise import ALL, negated
-from rft.refusal import Refusal
+from rft.effects.contact import assemble
+from rft.formulas.link import quadratic_load
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium

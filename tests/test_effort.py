@@ -25,7 +25,7 @@ from rft import (
     Viscous,
 )
 from rft.balance.listening import listening
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 FLUID, SAND = Viscous(2.7), Granular(C=1.8, gamma0=np.radians(13.8))

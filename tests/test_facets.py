@@ -7,13 +7,21 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rft.ground import Ground
-from rft.meshes import Cylinder, Screw, Spatial, Sphere, below, shapes, wrench
-from rft.meshes.extruded import Extruded
-from rft.meshes.submerged import submerged
-from rft.plates import CLeg, Polygon, RoundRod, StressMap
-from rft.walking.elements import Elements, Outlines
-from rft.walking.facets import Facets, Grains, Poses, Surface
+from rft.terradynamics.ground import Ground
+from rft.terradynamics.meshes import (
+    Cylinder,
+    Screw,
+    Spatial,
+    Sphere,
+    below,
+    shapes,
+    wrench,
+)
+from rft.terradynamics.meshes.extruded import Extruded
+from rft.terradynamics.meshes.submerged import submerged
+from rft.terradynamics.plates import CLeg, Polygon, RoundRod, StressMap
+from rft.terradynamics.walking.elements import Elements, Outlines
+from rft.terradynamics.walking.facets import Facets, Grains, Poses, Surface
 
 SAND = StressMap(zeta=0.3, grazing=math.radians(5))
 SPATIAL = Spatial(3e5, surface_friction=0.6)
@@ -95,7 +103,8 @@ def poses(count):
 
 
 def test_loads_are_those_of_each_mesh_alone():
-    """Of two geoms on one body and one on another, against the sums of `rft.meshes.wrench` about the bodies' origins."""
+    """Of two geoms on one body and one on another, against the sums of
+    `rft.terradynamics.meshes.wrench` about the bodies' origins."""
     meshes = [
         Sphere(0.02).mesh(80),
         Screw(0.03, 0.02, 0.05, 0.1).mesh(600),

@@ -10,7 +10,7 @@ import time
 import pytest
 
 from geomech.io import files
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 KILLED = """
 import os, signal, sys

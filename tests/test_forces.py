@@ -30,7 +30,7 @@ from rft import (
     Viscous,
 )
 from rft.bodies.base import body_size
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 PARTS = "normal", "tangential", "ends"

@@ -21,7 +21,7 @@ from geomech.scenes import Numerics, Scene
 from geomech.studies import fields
 from geomech.studies.study import Study
 from geomech.text.explain import explain
-from rft import refusal as errors
+from rft.core import refusal as errors
 
 ESC = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202e\r"  # sets a title, rings, clears, in red, backwards, over what stood there
 TOML = "\\u001b]0;owned\\u0007\\u001b[2J\\u009b31m\\u202e\\r"  # in a string of TOML, which holds none as it is

@@ -9,7 +9,7 @@ from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Points, Polygon
 from geomech.scenes import load
 from geomech.scenes.model import Scene
 from geomech.studies import estimate
-from rft import se2
+from rft.formulas import se2
 
 T = np.linspace(0, 2 * np.pi, 33)
 

@@ -18,7 +18,8 @@ from geomech.scenes import load
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
 from geomech.tiers.path import path
-from rft import Chain, Serpenoid, Viscous, body_velocity, se2
+from rft import Chain, Serpenoid, Viscous, body_velocity
+from rft.formulas import se2
 
 A_MIDDLE, ALPHA = symbolic.viscous_chain((1, 1, 1), 2, "link-2")
 MIDDLE = symbolic.velocity(A_MIDDLE, ALPHA)

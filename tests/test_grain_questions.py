@@ -19,12 +19,12 @@ from geomech.studies.calibration import Calibration
 from geomech.text import drag_grains
 from geomech.text import grain_swim as swim_text
 from rft import EndCaps, Granular
-from rft.calibrate import fit
-from rft.drag import Rod, rod_drag
 from rft.effects.transient import AT_ONCE, AT_ONCE_ALONG, RATIO
+from rft.fits.rods import fit
 from rft.grains import Experiment, Run
 from rft.grains.reversal import recovery
-from rft.plates import StressMap
+from rft.laws.drag import Rod, rod_drag
+from rft.terradynamics.plates import StressMap
 
 pytestmark = pytest.mark.usefixtures("fastest")
 

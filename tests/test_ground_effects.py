@@ -12,10 +12,16 @@ from registry import GROUND_EFFECTS, OUTLINES, STRESSES
 from figures import ground_effects
 from geomech import scenes
 from geomech.text.explain import explain
-from rft.ground import GROUND_EFFECTS as KINDS
-from rft.ground import Aeration, DisturbedGround, GrainInertia, Slope, ground_of
-from rft.meshes import Spatial, bearing, shapes, wrench
-from rft.plates import Plate, Polygon, loads
+from rft.terradynamics.ground import GROUND_EFFECTS as KINDS
+from rft.terradynamics.ground import (
+    Aeration,
+    DisturbedGround,
+    GrainInertia,
+    Slope,
+    ground_of,
+)
+from rft.terradynamics.meshes import Spatial, bearing, shapes, wrench
+from rft.terradynamics.plates import Plate, Polygon, loads
 
 POSE = [(0.0, -0.01, 0.7), (0.1, -0.2, -1.2), (-0.03, -0.04, 2.5)]
 TWIST = [(0.02, -0.3, 4.0), (0.0, 0.0, -9.0), (-0.5, 0.2, 0.3)]

@@ -12,7 +12,7 @@ gymnasium = pytest.importorskip(
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
 import geomech.gym  # noqa: E402
-from rft.plates import VERTICAL  # noqa: E402
+from rft.terradynamics.plates import VERTICAL  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("fastest")
 NAME = "geomech/HexapodSand-v0"

@@ -9,12 +9,13 @@ from registry import BODIES, CLOSED, DRY, LINEAR, MEDIA
 from geomech.gaits import Butterfly, Circle, Fourier
 from geomech.geometry import coordinates
 from geomech.tiers.direct import direct
-from rft import CATALOGUE, Chain, Coulomb, Granular, Viscous, body_velocity, se2
+from rft import CATALOGUE, Chain, Coulomb, Granular, Viscous, body_velocity
 from rft.balance import backend
-from rft.balance.newton import Descent, to_element
 from rft.balance.solver import QUICK, Accuracy, solve
 from rft.bodies.base import body_size
-from rft.contact import assemble
+from rft.effects.contact import assemble
+from rft.formulas import se2
+from rft.formulas.newton import Descent, to_element
 
 pytestmark = pytest.mark.usefixtures("fastest")
 

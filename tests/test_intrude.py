@@ -17,7 +17,8 @@ from geomech import medium, plots
 from geomech.scenes.intruder import IntruderScene
 from geomech.studies.intrusion import Settings, answer, estimate
 from geomech.studies.study import Study
-from rft.plates import (
+from rft.core.refusal import Refusal
+from rft.terradynamics.plates import (
     VERTICAL,
     CLeg,
     Drag,
@@ -28,7 +29,6 @@ from rft.plates import (
     StressMap,
     loads,
 )
-from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 FLAT = [

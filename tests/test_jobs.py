@@ -32,11 +32,11 @@ from geomech.systems.capabilities import with_solver
 from rft import Backbone, DisturbedGround, Granular, Transient
 from rft import BodyInertia as Heavy
 from rft.balance import backend
+from rft.core.premise import Premise
+from rft.core.refusal import Refusal
 from rft.effects import Effect
 from rft.laws import LAWS
-from rft.premise import Premise
-from rft.refusal import Refusal
-from rft.stepping import Stepping
+from rft.motion.stepping import Stepping
 
 GLASS, VISCOUS = scenes.load("three-link-glass"), scenes.load("three-link-viscous")
 ASKED = Trajectory(VISCOUS)

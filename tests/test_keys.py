@@ -25,9 +25,9 @@ from geomech.scenes.model import Scene
 from geomech.scenes.schema import schema
 from geomech.scenes.sections import file_sections, keys_in
 from rft import CATALOGUE
+from rft.core.refusal import Refusal
 from rft.laws import LAWS
-from rft.plates import VERTICAL
-from rft.refusal import Refusal
+from rft.terradynamics.plates import VERTICAL
 
 TABLES = file_sections(Scene)
 EVERY = {  # section and name of every class that a scene may name, by kind of scene

@@ -31,10 +31,10 @@ from geomech.systems import Premise, Solver, Swimmer
 from geomech.text.explain import explain
 from geomech.text.system import notes
 from rft import Backbone, Chain, Coulomb, EndCaps, Granular, Viscous, body_velocity
+from rft.core.refusal import Refusal
+from rft.core.registry import REGISTRIES
 from rft.effects import Effect
 from rft.laws.base import TermLaw, is_rate_independent
-from rft.refusal import Refusal
-from rft.registry import REGISTRIES
 
 PAGE = (
     pathlib.Path(__file__).parents[1] / ".docs" / "how-it-works" / "extending.md"

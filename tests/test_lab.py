@@ -28,7 +28,7 @@ from geomech.studies.lab import GALLERY, Lab
 from geomech.studies.study import Study
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.text import lab as lines
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 pytestmark = [
     pytest.mark.usefixtures("fastest"),

@@ -36,13 +36,13 @@ from rft import (
     Viscous,
     body_velocity,
 )
-from rft.drag import Rod
-from rft.meshes import Spatial
-from rft.meshes.shapes import leg
+from rft.laws.drag import Rod
 from rft.mujoco.media import sample
-from rft.plates import CLeg
-from rft.walking import Rhex
-from rft.walking.facets import Grains
+from rft.terradynamics.meshes import Spatial
+from rft.terradynamics.meshes.shapes import leg
+from rft.terradynamics.plates import CLeg
+from rft.terradynamics.walking import Rhex
+from rft.terradynamics.walking.facets import Grains
 
 pytestmark = pytest.mark.filterwarnings("ignore::geomech.core.errors.UnitWarning")
 

@@ -7,8 +7,8 @@ from loads import element_load
 from registry import CLOSED, MEDIA
 
 from rft import Granular
+from rft.formulas.link import k_function
 from rft.laws.records import record
-from rft.link import k_function
 
 mp.mp.dps = 50
 GLASS = MEDIA["glass-0.3mm-loose"]

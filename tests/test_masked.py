@@ -9,10 +9,11 @@ from geomech.gaits import GAITS
 from geomech.geometry import connection, coordinates, curvature, reconstruct
 from geomech.studies.study import Study
 from geomech.systems import SYSTEMS, as_system
-from rft import meshes, plates, se2
-from rft.drag import rod_drag
+from rft.core.refusal import Refusal
+from rft.formulas import se2
 from rft.laws import LAWS
-from rft.refusal import Refusal
+from rft.laws.drag import rod_drag
+from rft.terradynamics import meshes, plates
 
 ANGLES = np.ma.array([0.5, 0.3], mask=[True, False])
 ROWS = np.ma.array(np.full((4, 2), 0.3), mask=np.eye(4, 2, dtype=bool))

@@ -53,8 +53,8 @@ from geomech.systems import Swimmer, Table
 from geomech.systems.base import length_unit
 from geomech.text import measured as texts
 from geomech.text.explain import explain
-from rft import se2
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
+from rft.formulas import se2
 
 GAIT = gaits.Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.2, -0.1))
 BODY = rft.Chain((1, 1.3, 0.8))

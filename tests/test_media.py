@@ -22,9 +22,9 @@ from rft import (
     time_steps,
 )
 from rft.balance.arrays import solve
-from rft.balance.newton import RESIDUAL, Limits
 from rft.balance.solver import QUICK
-from rft.contact import assemble
+from rft.effects.contact import assemble
+from rft.formulas.newton import RESIDUAL, Limits
 from rft.laws import base
 from rft.laws.base import TermLaw, require_drag
 from rft.laws.catalogue import SURFACE_ALONG, SURFACE_ALONG_RANGE

@@ -13,8 +13,8 @@ from geomech import scenes as scene
 from geomech.studies.study import Study
 from geomech.studies.sweep import sweep
 from rft import Chain, Granular, Table, body_velocity
+from rft.core.refusal import Refusal
 from rft.laws.base import require_drag
-from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 

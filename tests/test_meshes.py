@@ -22,7 +22,8 @@ from geomech import plots
 from geomech.scenes import MeshScene
 from geomech.studies.intrusion import answer
 from geomech.text.explain import explain
-from rft.meshes import (
+from rft.core.refusal import Refusal
+from rft.terradynamics.meshes import (
     SOLIDS,
     Cylinder,
     Drag,
@@ -40,8 +41,7 @@ from rft.meshes import (
     solids,
     wrench,
 )
-from rft.plates import VERTICAL
-from rft.refusal import Refusal
+from rft.terradynamics.plates import VERTICAL
 
 pytestmark = pytest.mark.usefixtures("fastest")
 
@@ -591,7 +591,7 @@ def test_a_scene_made_in_python_says_what_is_wrong():
     for part, said in (
         ("medium", "a medium such as"),
         ("intruder", "a solid such as"),
-        ("motion", "a motion of rft.meshes"),
+        ("motion", "a motion of rft.terradynamics.meshes"),
     ):
         with pytest.raises(ValueError, match=said):
             dataclasses.replace(scene, **{part: VERTICAL["generic"].stress})

@@ -36,7 +36,7 @@ from geomech.systems import Swimmer
 from geomech.systems.swimmer import MEDIA
 from geomech.text import midlines as texts
 from rft import Backbone, Viscous
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = Swimmer(MEDIA["glass-0.3mm-loose"], Backbone(40))

@@ -16,9 +16,10 @@ from geomech.systems import NoSlipSnake, Swimmer
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
 from geomech.tiers.path import path
-from rft import Chain, ConstantCurvature, Granular, Serpenoid, Viscous, se2
+from rft import Chain, ConstantCurvature, Granular, Serpenoid, Viscous
 from rft.bodies.base import body_size
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
+from rft.formulas import se2
 
 pytestmark = pytest.mark.usefixtures("fastest")
 FLUID = Viscous(2.0)

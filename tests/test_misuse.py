@@ -26,7 +26,7 @@ from geomech.studies.study import Study
 from geomech.systems import NoSlipSnake, Swimmer
 from geomech.text.explain import explain
 from rft import Backbone, Chain, Coulomb, EndCaps, Serpenoid, Viscous
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 VISCOUS, GLASS = scenes.load("three-link-viscous"), MEDIA["glass-0.3mm-loose"]

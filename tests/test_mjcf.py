@@ -15,18 +15,18 @@ from geomech import scenes
 from geomech.core.setting import Setting
 from geomech.studies import accuracy, walking
 from geomech.studies.sweep import sweep
-from rft.meshes import Spatial
-from rft.refusal import Refusal
-from rft.walking import Fineness, Mjcf, Tripod, Walker, engine
+from rft.core.refusal import Refusal
+from rft.terradynamics.meshes import Spatial
+from rft.terradynamics.walking import Fineness, Mjcf, Tripod, Walker, engine
 
 mujoco = pytest.importorskip(
     "mujoco", reason="needs the extra: pip install 'geomech[mujoco]'"
 )
 pytestmark = pytest.mark.usefixtures("fastest")
-from rft.walking import geoms  # noqa: E402
-from rft.walking.facets import Facets  # noqa: E402
-from rft.walking.machine import Clock, machine  # noqa: E402
-from rft.walking.mujoco_walk import Simulation  # noqa: E402
+from rft.terradynamics.walking import geoms  # noqa: E402
+from rft.terradynamics.walking.facets import Facets  # noqa: E402
+from rft.terradynamics.walking.machine import Clock, machine  # noqa: E402
+from rft.terradynamics.walking.mujoco_walk import Simulation  # noqa: E402
 
 ACTUATOR = '<position name="{0}" joint="{0}" kp="40" kv="0.4"/>'
 NAMES = ("fl", "fr", "rl", "rr")
@@ -431,7 +431,9 @@ def test_pictures_are_those_of_a_gl_or_none(cart):
 
 def test_without_the_extra_there_is_one_line_with_the_cure(cart, geomech, monkeypatch):
     for name in [
-        x for x in sys.modules if x == "mujoco" or x.startswith("rft.walking.mu")
+        x
+        for x in sys.modules
+        if x == "mujoco" or x.startswith("rft.terradynamics.walking.mu")
     ]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "mujoco", None)

@@ -16,7 +16,7 @@ from geomech.systems.capabilities import OwnMetric, capability
 from geomech.systems.framed import in_frame
 from geomech.tiers.base import Numerics
 from rft.bodies.base import body_size
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 OVAL = Ellipse(semi_axes=(0.9, 0.5), centre=(0.7, -0.2), tilt=0.3)
 AFLOAT = FloatingChain((0.8, 1.3, 1.0), 0.4, "mean", (1.0, 0.5, 2.0), (0.1, 0.2, 0.05))

@@ -31,10 +31,10 @@ from rft import (
     Granular,
     Serpenoid,
     Transient,
-    se2,
     time_steps,
 )
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
+from rft.formulas import se2
 
 pytestmark = pytest.mark.usefixtures("fastest")
 SAND = Granular(1.8, 0.24)

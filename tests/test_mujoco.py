@@ -12,20 +12,20 @@ from scipy.spatial.transform import Rotation
 from geomech import scenes
 from geomech.scenes import WalkerScene
 from geomech.studies.walking import walked
-from rft.ground import Aeration, GrainInertia
-from rft.meshes import Spatial, wrench
-from rft.metres import GRAVITY
-from rft.plates import VERTICAL, CLeg, RoundRod, StressMap, Wheel
-from rft.walking import Fineness, Rhex, Roller, Tripod, Walker, rolling
-from rft.walking.facets import Grains, Surface
-from rft.walking.planar_walk import walk as planar_walk
+from rft.core.metres import GRAVITY
+from rft.terradynamics.ground import Aeration, GrainInertia
+from rft.terradynamics.meshes import Spatial, wrench
+from rft.terradynamics.plates import VERTICAL, CLeg, RoundRod, StressMap, Wheel
+from rft.terradynamics.walking import Fineness, Rhex, Roller, Tripod, Walker, rolling
+from rft.terradynamics.walking.facets import Grains, Surface
+from rft.terradynamics.walking.planar_walk import walk as planar_walk
 
 mujoco = pytest.importorskip(
     "mujoco", reason="needs the extra: pip install 'geomech[mujoco]'"
 )
 pytestmark = pytest.mark.usefixtures("fastest")
-from rft.walking import geoms, hexapod  # noqa: E402
-from rft.walking.mujoco_walk import (  # noqa: E402
+from rft.terradynamics.walking import geoms, hexapod  # noqa: E402
+from rft.terradynamics.walking.mujoco_walk import (  # noqa: E402
     ROW,
     Simulation,
     Start,
@@ -35,7 +35,7 @@ from rft.walking.mujoco_walk import (  # noqa: E402
     rerun,
     walk,
 )
-from rft.walking.multibody import Multibody  # noqa: E402
+from rft.terradynamics.walking.multibody import Multibody  # noqa: E402
 
 SAND = StressMap(zeta=0.3, grazing=math.radians(5))
 SPATIAL = Spatial(3e5, surface_friction=0.6)

@@ -38,8 +38,8 @@ from geomech.tiers.base import Numerics
 from rft import Chain, Granular, Viscous
 from rft.bodies import ConstantCurvature, Serpenoid
 from rft.bodies.base import body_size
+from rft.core.refusal import Refusal
 from rft.effects import SkinFriction
-from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 FLUID, SAND = Viscous(2.0), Granular(C=1.8, gamma0=np.radians(13.8))

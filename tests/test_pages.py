@@ -16,7 +16,7 @@ from geomech.questions import names
 from geomech.scenes import drag
 from rft.balance import backend
 from rft.laws import CATALOGUE
-from rft.plates import VERTICAL
+from rft.terradynamics.plates import VERTICAL
 
 pytestmark = pytest.mark.usefixtures("fastest")
 ROOT = pathlib.Path(__file__).parents[1]

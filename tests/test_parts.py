@@ -23,8 +23,8 @@ from geomech.studies.single import single
 from geomech.studies.study import Study
 from geomech.systems.base import Cycle, integrated
 from geomech.text.explain import explain
-from rft.refusal import Refusal
-from rft.registry import REGISTRIES
+from rft.core.refusal import Refusal
+from rft.core.registry import REGISTRIES
 
 HEAD = "from dataclasses import dataclass\nimport numpy as np\nimport geomech\n"
 FILES = {
@@ -105,7 +105,7 @@ def skate(alpha, alphadot, grip=0.5):
     "tier": """
 from geomech.geometry.curvature import ccf
 from geomech.tiers import Plan, Tier, fitted
-from rft import se2
+from rft.formulas import se2
 
 def plan(system, numerics, gait, amplitudes):
     def predict(table, some):
@@ -376,7 +376,7 @@ class Knee:
 """,
     "effects/tired.py": """
 from rft.effects.base import EFFECTS, Effect
-from rft.premise import Premise
+from rft.core.premise import Premise
 
 @EFFECTS.register
 @dataclass(frozen=True)
@@ -397,8 +397,8 @@ class Tired(Effect):
     def after(self, problem, site, state, v):
         return state + 0.1
 """,
-    "ground/frost.py": """
-from rft.ground.base import GROUND_EFFECTS, GroundEffect
+    "terradynamics/ground/frost.py": """
+from rft.terradynamics.ground.base import GROUND_EFFECTS, GroundEffect
 
 @GROUND_EFFECTS.register
 @dataclass(frozen=True)
@@ -420,7 +420,7 @@ sys.path[:0] = [sys.argv[1], sys.argv[2]]
 import numpy as np
 import rft
 from registry import BODIES, EFFECTS, GROUND_EFFECTS, MEDIA
-from rft.ground import ground_of
+from rft.terradynamics.ground import ground_of
 from rft.laws.base import require_drag
 
 assert rft.__file__.startswith(sys.argv[1])

@@ -25,7 +25,7 @@ from geomech.studies.study import Study
 from geomech.studies.tiered import SETTINGS
 from geomech.systems.base import shape_labels
 from geomech.tiers import TIERS
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 AXES = np.linspace(-1.0, 1.5, 11), np.linspace(-0.5, 2.0, 9)
 SHAPES = np.meshgrid(*AXES, indexing="ij")

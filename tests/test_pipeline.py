@@ -13,7 +13,7 @@ from geomech.questions.base import Question
 from geomech.run import jobs
 from geomech.run.cost import Cost
 from geomech.studies.accuracy import slope
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 PHASE = Variable("phase", ("phase",), np.array([0.0, 1.5, 3.0]), "rad", "of the gait")
 SPEED = Variable(

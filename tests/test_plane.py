@@ -20,7 +20,8 @@ from geomech.studies.study import Study
 from geomech.systems import Swimmer
 from geomech.tiers import TIERS
 from geomech.tiers.fitted import finest_grid, is_too_large
-from rft import CATALOGUE, Chain, Viscous, se2
+from rft import CATALOGUE, Chain, Viscous
+from rft.formulas import se2
 
 pytestmark = pytest.mark.usefixtures("fastest")
 

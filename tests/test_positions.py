@@ -14,7 +14,7 @@ from geomech.scenes.kinds import load_file
 from geomech.tiers.fitted import directions
 from rft import Backbone, Chain, Coulomb, Granular, Serpenoid, Viscous
 from rft.bodies import BODIES, Positions
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest", "own_parts")
 SAND = Granular(C=1.8, gamma0=0.24)

@@ -17,7 +17,7 @@ from geomech.io import rows, tables
 from geomech.measured import log as logs
 from geomech.measured.midlines import reader
 from geomech.scenes import drag, penetration
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 from tests.commands import geomech
 
 DEPTH = np.array([0.0, 0.5, 1.25, 2.0, 3.5])  # mm

@@ -17,23 +17,23 @@ from scipy.spatial.transform import Rotation
 import rft
 from rft.balance import backend
 from rft.balance.backend import Note, preferring
-from rft.ground import DisturbedGround, GrainInertia, Ground, Slope
-from rft.meshes import Spatial, wrench
-from rft.meshes.blocks import Blocks
-from rft.meshes.contact import Motion, faces
-from rft.meshes.extruded import Extruded
-from rft.plates import VERTICAL, PlateDrags, RoundRod, StressMap, loads
-from rft.plates.calibrate import ZetaFit, fit_stress
-from rft.plates.stress import COEFFICIENTS
+from rft.fits.plates import ZetaFit, fit_stress
+from rft.terradynamics.ground import DisturbedGround, GrainInertia, Ground, Slope
+from rft.terradynamics.meshes import Spatial, wrench
+from rft.terradynamics.meshes.blocks import Blocks
+from rft.terradynamics.meshes.contact import Motion, faces
+from rft.terradynamics.meshes.extruded import Extruded
+from rft.terradynamics.plates import VERTICAL, PlateDrags, RoundRod, StressMap, loads
+from rft.terradynamics.plates.stress import COEFFICIENTS
 
 mujoco = pytest.importorskip(
     "mujoco", reason="needs the extra: pip install 'geomech[mujoco]'"
 )
 from rft.mujoco import installed  # noqa: E402
-from rft.mujoco.geoms import mesh_of_elements  # noqa: E402
 from rft.mujoco.hills import hills_of, tangent_plane  # noqa: E402
 from rft.mujoco.media import law_of  # noqa: E402
 from rft.mujoco.sand import meshes  # noqa: E402
+from rft.terradynamics.meshes.geoms import mesh_of_elements  # noqa: E402
 
 needs_numba = pytest.mark.skipif(
     not backend.installed(), reason="needs the extra: pip install 'geomech[fast]'"
@@ -213,7 +213,7 @@ BALL = '<body name="ball" pos="0 0 0.01"><freejoint/><geom name="ball" type="sph
 
 
 def test_a_geom_bears_what_its_mesh_does(solved_by):
-    """Of `rft.meshes.wrench`, which has no rounding, on the same triangles; and about the origin of the body."""
+    """Of `rft.terradynamics.meshes.wrench`, which has no rounding, on the same triangles; and about the origin of the body."""
     model = model_of(
         BALL.replace("<geom", '<geom pos="0.01 0.02 -0.01" euler="20 30 40"'), AT_ONCE
     )

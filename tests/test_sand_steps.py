@@ -9,11 +9,11 @@ from scipy.spatial.transform import Rotation
 import rft
 from rft.balance import backend
 from rft.balance.backend import Note, preferring
-from rft.ground import GrainInertia, Ground, Slope, ground_of
-from rft.meshes import Spatial
-from rft.meshes.contact import Motion, Part, load, load_with_slopes
-from rft.meshes.extruded import Extruded
-from rft.plates import StressMap
+from rft.terradynamics.ground import GrainInertia, Ground, Slope, ground_of
+from rft.terradynamics.meshes import Spatial
+from rft.terradynamics.meshes.contact import Motion, Part, load, load_with_slopes
+from rft.terradynamics.meshes.extruded import Extruded
+from rft.terradynamics.plates import StressMap
 
 mujoco = pytest.importorskip(
     "mujoco", reason="needs the extra: pip install 'geomech[mujoco]'"

@@ -14,7 +14,7 @@ from geomech.studies.available import default_tiers
 from geomech.studies.study import Study
 from geomech.systems.base import as_system, length_unit
 from rft import Chain, Granular, Viscous
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GOOD = """

@@ -12,10 +12,10 @@ from tabled import of_json, of_swept
 
 from geomech import plots, scenes
 from geomech.studies.grid import changed
-from rft.plates import StressMap
-from rft.refusal import Refusal
-from rft.walking import Fineness, Screws, Tripod, Walker, cruise
-from rft.walking.craft import PER_SQUARE
+from rft.core.refusal import Refusal
+from rft.terradynamics.plates import StressMap
+from rft.terradynamics.walking import Fineness, Screws, Tripod, Walker, cruise
+from rft.terradynamics.walking.craft import PER_SQUARE
 
 pytestmark = pytest.mark.usefixtures("fastest")
 
@@ -56,7 +56,7 @@ def test_mujoco_goes_on_as_the_balance_says(pair):
     """From the pose and velocity of the balance, a turn to settle, one to look at. Alike, the craft is so heavy that it
     screws forwards and does not roll aside."""
     pytest.importorskip("mujoco")
-    from rft.walking.mujoco_walk import Simulation, Start
+    from rft.terradynamics.walking.mujoco_walk import Simulation, Start
 
     robot = dataclasses.replace(SCENE.robot, mass=2.5, pair=pair)
     steady = cruise(SCENE.medium, robot, 0.7, PER_SQUARE * COARSE.elements**2, 8)
@@ -96,7 +96,7 @@ def test_mujoco_goes_on_as_the_balance_says(pair):
 def test_a_craft_walks_as_a_command(geomech, tmp_path, monkeypatch):
     """Few strides: of a walk that has not settled yet, whose speed is that of the last ones."""
     pytest.importorskip("mujoco")
-    from rft.walking import mujoco_walk
+    from rft.terradynamics.walking import mujoco_walk
 
     monkeypatch.setattr(mujoco_walk, "MOST_STRIDES", 1)
     monkeypatch.setattr(mujoco_walk, "FEW_STRIDES", 1)
@@ -200,7 +200,7 @@ def test_the_figure_of_screws_is_drawn(tmp_path, monkeypatch):
     """Of few points and turns."""
     pytest.importorskip("mujoco")
     from figures import screws
-    from rft.walking import mujoco_walk
+    from rft.terradynamics.walking import mujoco_walk
 
     monkeypatch.setattr(mujoco_walk, "MOST_STRIDES", 1)
     for name, less in (("HEIGHTS", (0.0,)), ("MASSES", (1.0,)), ("PATHS", {})):

@@ -6,9 +6,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rft.meshes import Screw, Spatial, wrench
-from rft.walking.craft import Screws
-from rft.walking.screws import _solve, _Steady, cruise, free_turning, turning
+from rft.terradynamics.meshes import Screw, Spatial, wrench
+from rft.terradynamics.walking.craft import Screws
+from rft.terradynamics.walking.screws import (
+    _solve,
+    _Steady,
+    cruise,
+    free_turning,
+    turning,
+)
 
 pytestmark = pytest.mark.usefixtures("fastest")
 

@@ -6,7 +6,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from rft import se2
+from rft.formulas import se2
 
 mp.mp.dps = 50
 CORNERS = np.array(

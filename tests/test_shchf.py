@@ -15,7 +15,7 @@ from geomech.io import shchf
 from geomech.scenes import Scene
 from geomech.studies.study import Study
 from geomech.systems import Swimmer
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 T = np.linspace(0, 2 * np.pi, 201)
 CIRCLE = Circle(amplitude=0.8, centre=(0.3, -0.2))

@@ -11,9 +11,17 @@ from scipy.spatial.transform import Rotation
 import geomech
 from geomech import scenes
 from rft.balance.backend import Note
-from rft.meshes import Mesh, MeshFile, Spatial, read, shapes, sound, wrench
-from rft.mujoco.geoms import geom_mesh
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
+from rft.terradynamics.meshes import (
+    Mesh,
+    MeshFile,
+    Spatial,
+    read,
+    shapes,
+    sound,
+    wrench,
+)
+from rft.terradynamics.meshes.geoms import geom_mesh
 
 BALL = shapes.sphere(0.02, 2)
 BOX = shapes.box((0.02, 0.02, 0.02), 2)

@@ -4,11 +4,21 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rft.ground import Aeration, GrainInertia, Slope, ground_of
-from rft.meshes import Mesh, Screw, Spatial, Sphere, bearing, law, read, shapes, wrench
-from rft.meshes.mesh import below, quartered
-from rft.meshes.smooth import smooth
-from rft.plates import VERTICAL
+from rft.terradynamics.ground import Aeration, GrainInertia, Slope, ground_of
+from rft.terradynamics.meshes import (
+    Mesh,
+    Screw,
+    Spatial,
+    Sphere,
+    bearing,
+    law,
+    read,
+    shapes,
+    wrench,
+)
+from rft.terradynamics.meshes.mesh import below, quartered
+from rft.terradynamics.meshes.smooth import smooth
+from rft.terradynamics.plates import VERTICAL
 
 pytestmark = pytest.mark.usefixtures("fastest")
 

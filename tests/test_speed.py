@@ -19,7 +19,7 @@ from geomech.studies.choose import cheapest
 from geomech.studies.study import Study
 from geomech.systems import Swimmer
 from rft import BodyInertia, GrainInertia
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 

@@ -17,7 +17,7 @@ import pytest
 
 from geomech.run import jobs, store
 from geomech.run.store import Store, decoded, encoded, in_cache, partial_file
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 
 class Row(NamedTuple):

@@ -15,8 +15,8 @@ from geomech.io import rows
 from geomech.scenes import penetration
 from geomech.studies import stress_calibration
 from geomech.studies.calibration import Calibration
-from rft.plates import VERTICAL, StressMap, calibrate
-from rft.plates.calibrate import (
+from rft.fits import plates as calibrate
+from rft.fits.plates import (
     COEFFICIENTS,
     GENERIC,
     MISTAKES,
@@ -24,7 +24,8 @@ from rft.plates.calibrate import (
     fit_stress,
     fit_zeta,
 )
-from rft.plates.survey import survey
+from rft.terradynamics.plates import VERTICAL, StressMap
+from rft.terradynamics.plates.survey import survey
 
 RAD = np.pi / 180
 FAR = StressMap(

@@ -10,7 +10,7 @@ from geomech import scenes
 from geomech.studies import cycles, estimate, grid, sweep
 from geomech.studies.study import Study
 from rft import CATALOGUE, Granular
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = scenes.load("three-link-glass").with_numerics(phases=32)

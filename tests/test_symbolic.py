@@ -20,7 +20,8 @@ from geomech.systems import (
 )
 from geomech.systems.framed import formula
 from geomech.tiers.base import Numerics
-from rft import Backbone, Chain, Coulomb, SkinFriction, Viscous, se2
+from rft import Backbone, Chain, Coulomb, SkinFriction, Viscous
+from rft.formulas import se2
 
 UNEVEN = Chain((1.0, 2.0, 1.5), 0.3, "link-1")
 EXACT = {

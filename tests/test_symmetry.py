@@ -20,8 +20,8 @@ from geomech.geometry.traits import Traits
 from geomech.scenes.model import Scene
 from geomech.studies.study import Study
 from rft.bodies.base import body_size
-from rft.premise import Premise
-from rft.refusal import Refusal
+from rft.core.premise import Premise
+from rft.core.refusal import Refusal
 
 BOTH = Traits(mirror=True, reversible=True)
 # Two harmonics, of which the second half of the cycle is the image of the first head for tail, and of nothing else.

@@ -27,7 +27,7 @@ from geomech.systems import (
 from geomech.systems.table import LENGTHS
 from geomech.text.system import described
 from rft.bodies.base import body_size
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 SWIMMER = Swimmer(rft.Viscous(2.0), rft.Chain((1, 1, 1), frame="link-2"))
 VERSIONS = [5, 7.3]

@@ -26,9 +26,10 @@ from geomech.systems.framed import in_frame
 from geomech.systems.swimmer import Solver, is_three_link
 from geomech.text.explain import explain
 from geomech.tiers.direct import direct
-from rft import Backbone, Chain, Coulomb, Serpenoid, Transient, se2
-from rft.balance.newton import to_element
-from rft.refusal import Refusal
+from rft import Backbone, Chain, Coulomb, Serpenoid, Transient
+from rft.core.refusal import Refusal
+from rft.formulas import se2
+from rft.formulas.newton import to_element
 
 AWAY = Ellipse(
     semi_axes=(0.6, 0.4), tilt=0.3, centre=(1.0, -0.7)

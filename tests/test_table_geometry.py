@@ -20,8 +20,8 @@ from geomech.studies import effort, estimate, fields
 from geomech.studies.study import Study
 from geomech.systems import Swimmer, Table
 from geomech.text.system import described
-from rft import se2
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
+from rft.formulas import se2
 
 pytestmark = pytest.mark.usefixtures("fastest")
 UNEVEN = rft.Chain((0.7, 1.4, 0.9), frame="link-1", length=0.3)

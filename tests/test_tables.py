@@ -40,8 +40,8 @@ from geomech.text import accuracy as text
 from geomech.text.explain import explain
 from geomech.text.system import described
 from rft.bodies.base import body_size
+from rft.core.refusal import Refusal
 from rft.laws import CATALOGUE
-from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS, CLOSE = (CATALOGUE[f"glass-0.3mm-{x}"].medium for x in ("loose", "close"))

@@ -10,11 +10,11 @@ from test_loads import CubicDrag
 
 from rft import Granular
 from rft.balance.arrays import loads, row
-from rft.balance.newton import Net, plus, to_element, with_momentum
 from rft.balance.solver import Accuracy, _limits
-from rft.contact import assemble
 from rft.effects.base import Site, stepwise_effects
-from rft.momentum import element_momentum_rates, frame_inertia
+from rft.effects.contact import assemble
+from rft.formulas.momentum import element_momentum_rates, frame_inertia
+from rft.formulas.newton import Net, plus, to_element, with_momentum
 
 LAWS = {**MEDIA, "mud": Mud(), "no closed form": CubicDrag()}
 RULES = [(name, how) for name in LAWS for how in ("exact", "gauss:5", "midpoint:4")]

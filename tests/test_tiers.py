@@ -19,11 +19,12 @@ from geomech.studies.study import Study
 from geomech.systems import Swimmer
 from geomech.tiers import TIERS, Plan, Tier, fitted
 from geomech.tiers.direct import direct
-from rft import BodyInertia, Chain, Granular, Viscous, se2
+from rft import BodyInertia, Chain, Granular, Viscous
 from rft.balance.listening import listening
 from rft.bodies.base import body_size
+from rft.core.refusal import Refusal
 from rft.effects import DepthProfile
-from rft.refusal import Refusal
+from rft.formulas import se2
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = scenes.load("three-link-glass")

@@ -29,16 +29,16 @@ from rft import (
     Transient,
     Viscous,
     body_velocity,
-    limit_cycle,
     time_steps,
     work_done,
 )
 from rft.balance.solver import Accuracy
 from rft.bodies.base import body_size, half_lengths
-from rft.contact import assemble
-from rft.refusal import Refusal
-from rft.se2 import compose, exp
-from rft.stepping import Stepping
+from rft.core.refusal import Refusal
+from rft.effects.contact import assemble
+from rft.formulas.se2 import compose, exp
+from rft.motion import limit_cycle
+from rft.motion.stepping import Stepping
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
@@ -895,7 +895,7 @@ def test_what_does_not_change_is_not_built_again(kept, monkeypatch):
         counted = lambda *args, f=original, what=what: made.append(what) or f(*args)
         monkeypatch.setattr(owner, what, counted)
     if not kept:
-        monkeypatch.setattr("rft.stepping.MOST_STORED", 0)
+        monkeypatch.setattr("rft.motion.stepping.MOST_STORED", 0)
     for phases in (8, 16):
         made.clear()
         found = time_steps(

@@ -16,7 +16,7 @@ from geomech.systems import Swimmer, Table
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
 from rft import Chain, Viscous
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 SYSTEM = Swimmer(Viscous(2.3), Chain((0.7, 1.4, 0.9, 0.6)))

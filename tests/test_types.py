@@ -27,10 +27,12 @@ from geomech.text.explain import explain
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
 from geomech.tiers.path import path
-from rft import Chain, Coulomb, Granular, Viscous, body_velocity, ground, meshes, se2
-from rft.plates import SHAPES, Drag, Path, Penetrate, Rotate
-from rft.refusal import Refusal, located
-from rft.walking import Fineness, Rhex, Roller, Screws, Tripod, Walker
+from rft import Chain, Coulomb, Granular, Viscous, body_velocity
+from rft.core.refusal import Refusal, located
+from rft.formulas import se2
+from rft.terradynamics import ground, meshes
+from rft.terradynamics.plates import SHAPES, Drag, Path, Penetrate, Rotate
+from rft.terradynamics.walking import Fineness, Rhex, Roller, Screws, Tripod, Walker
 
 WRONG = {
     "None": None, "text": "x", "digits": "12", "bytes": b"1", "empty": [], "list": [1.0, 2.0, 3.0, 4.0, 5.0], "deep": [[1.0]],

@@ -18,7 +18,7 @@ from geomech.studies.study import Study
 from geomech.studies.tables import QUANTITIES, of_pose
 from geomech.systems import Swimmer
 from rft import Chain, Granular, SkinFriction, Transient, Viscous
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GAIT = Ellipse(

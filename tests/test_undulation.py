@@ -132,8 +132,9 @@ def drawn_out(body, alpha):
 
 @pytest.mark.parametrize("medium", [GLASS, Viscous(2.0)])
 def test_internal_moments_by_quadrature(medium):
-    """The medium's moment on the tail's side of a joint, from `traction` at many points and velocities by differences;
-    that on the head's side is the opposite. No part of `rft.link`, of the body's motion or of `rft.work_done` is used."""
+    """The medium's moment on the tail's side of a joint, from `traction` at many points
+    and velocities by differences; that on the head's side is the opposite. No part of
+    `rft.formulas.link`, of the body's motion or of `rft.work_done` is used."""
     rng, pieces, h = np.random.default_rng(2), 4000, 1e-6
     body = Chain((2.0, 1.0, 3.0, 1.0, 2.0))
     for _ in range(3):

@@ -9,8 +9,15 @@ import pytest
 from registry import OUTLINES, STRESSES
 from scipy.integrate import quad
 
-from rft.ground import Aeration, DisturbedGround, GrainInertia, Ground, Slope
-from rft.plates import (
+from rft.formulas.vectors import formula
+from rft.terradynamics.ground import (
+    Aeration,
+    DisturbedGround,
+    GrainInertia,
+    Ground,
+    Slope,
+)
+from rft.terradynamics.plates import (
     SHAPES,
     VERTICAL,
     CLeg,
@@ -33,8 +40,7 @@ from rft.plates import (
     loads,
     survey,
 )
-from rft.plates.loads import ORDER
-from rft.vectors import formula
+from rft.terradynamics.plates.loads import ORDER
 
 pytestmark = pytest.mark.usefixtures("fastest")
 

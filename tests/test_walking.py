@@ -23,12 +23,20 @@ from geomech.studies import walking
 from geomech.studies.sweep import Plan
 from geomech.text.explain import explain
 from rft.balance.backend import preferring
-from rft.ground import Aeration, GrainInertia, Slope
-from rft.metres import GRAVITY
-from rft.plates import VERTICAL, CLeg, RoundRod, StressMap, Wheel, loads
-from rft.refusal import Refusal
-from rft.walking import Fineness, Rhex, Roller, Tripod, Walker, engine, rolling
-from rft.walking.limit import (
+from rft.core.metres import GRAVITY
+from rft.core.refusal import Refusal
+from rft.terradynamics.ground import Aeration, GrainInertia, Slope
+from rft.terradynamics.plates import VERTICAL, CLeg, RoundRod, StressMap, Wheel, loads
+from rft.terradynamics.walking import (
+    Fineness,
+    Rhex,
+    Roller,
+    Tripod,
+    Walker,
+    engine,
+    rolling,
+)
+from rft.terradynamics.walking.limit import (
     Limit,
     LimitCycles,
     _Search,
@@ -37,11 +45,17 @@ from rft.walking.limit import (
     predicted_progress,
     solve,
 )
-from rft.walking.march import march, step
-from rft.walking.planar import State
-from rft.walking.planar_walk import _limit_fields, _rows, _strides, rerun, walk
-from rft.walking.robot import intervals, walking_rounding
-from rft.walking.sdirk import (
+from rft.terradynamics.walking.march import march, step
+from rft.terradynamics.walking.planar import State
+from rft.terradynamics.walking.planar_walk import (
+    _limit_fields,
+    _rows,
+    _strides,
+    rerun,
+    walk,
+)
+from rft.terradynamics.walking.robot import intervals, walking_rounding
+from rft.terradynamics.walking.sdirk import (
     EFFORT,
     Effort,
     end_of_part,
@@ -50,7 +64,7 @@ from rft.walking.sdirk import (
     next_part,
     start_of_step,
 )
-from rft.walking.stride import (
+from rft.terradynamics.walking.stride import (
     Walk,
     cycles_to_settle,
     from_rest,
@@ -597,7 +611,7 @@ def test_a_walker_that_speeds_up_slowly_is_not_yet_periodic():
 def test_what_is_to_come_is_asked_for_the_cycles_that_are_left(monkeypatch):
     left = []
     monkeypatch.setattr(
-        "rft.walking.stride.remaining_change",
+        "rft.terradynamics.walking.stride.remaining_change",
         lambda *x: left.append(x[2].tolist()) or np.ones(1),
     )
     walk([xplorer(1.0, 4.0)], Fineness(steps=8, elements=4, duration=0.5))
@@ -1102,7 +1116,7 @@ def test_figures_of_walking_are_drawn(tmp_path, monkeypatch):
 def test_compiled_steps_are_those_by_numpy(tension, effort, monkeypatch):
     """Robots side by side on legs and a belly, of which one comes to an end, and a wheel."""
     pytest.importorskip("numba")
-    monkeypatch.setattr("rft.walking.march.EFFORT", effort)
+    monkeypatch.setattr("rft.terradynamics.walking.march.EFFORT", effort)
     medium, air = (
         dataclasses.replace(SAND, tension=tension),
         (Aeration(0.01, 0.03), GrainInertia(2.0, 700.0)),
@@ -1149,7 +1163,8 @@ def test_steps_that_are_not_solved_are_told(monkeypatch):
     ) and 0 < right.residual <= 1e-3 * QUICK.rounding
     for tries in (2.0, 4.0):
         monkeypatch.setattr(
-            "rft.walking.march.EFFORT", Effort(np.ones((1, 1)), tries, 0.5)
+            "rft.terradynamics.walking.march.EFFORT",
+            Effort(np.ones((1, 1)), tries, 0.5),
         )
         (found,) = walk([robot], QUICK, 1)
         assert found.unsolved > 0 and found.residual > 0.01

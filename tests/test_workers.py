@@ -39,11 +39,11 @@ from geomech.run.workers import using
 from geomech.scenes import kinds
 from geomech.studies import accuracy, cycles, sweep, tiered
 from geomech.studies.study import Study
-from rft import threads as threaded
 from rft.balance import backend
+from rft.core import threads as threaded
+from rft.core.refusal import Refusal
+from rft.core.threads import cores, thread_count
 from rft.laws import LAWS
-from rft.refusal import Refusal
-from rft.threads import cores, thread_count
 
 GLASS = scenes.load("three-link-glass").with_numerics(phases=32)
 

@@ -10,7 +10,7 @@ import re
 from pathlib import Path
 
 from geomech.scenes.key import first_sentence
-from rft.checks import number_fields
+from rft.core.checks import number_fields
 
 PACKAGES = {
     "From scene to result": [
@@ -39,12 +39,12 @@ PACKAGES = {
         "rft.laws",
         "rft.bodies",
         "rft.effects",
-        "rft.calibrate",
-        "rft.drag",
-        "rft.plates",
-        "rft.meshes",
-        "rft.ground",
-        "rft.walking",
+        "rft.fits.rods",
+        "rft.laws.drag",
+        "rft.terradynamics.plates",
+        "rft.terradynamics.meshes",
+        "rft.terradynamics.ground",
+        "rft.terradynamics.walking",
         "rft.mujoco",
         "rft.grains",
     ],

@@ -20,7 +20,7 @@ from geomech.studies import undulation
 from geomech.symbolic import velocity, viscous_chain
 from geomech.symbolic.connections import links
 from geomech.tiers.area import area
-from rft.plates import VERTICAL
+from rft.terradynamics.plates import VERTICAL
 
 
 def table() -> str:

@@ -33,8 +33,8 @@ from geomech.io.files import write_text
 from geomech.studies.calibration import Calibration
 from geomech.studies.grain_swim import FLANK, RAMP, GrainSwim
 from geomech.systems.swimmer import Swimmer
-from rft.calibrate import Fit
 from rft.effects import EndCaps
+from rft.fits.rods import Fit
 from rft.grains.drag import END
 from rft.grains.experiment import Run
 

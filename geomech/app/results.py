@@ -14,7 +14,7 @@ from geomech.measured.midlines import predicted
 from geomech.measured.midlines import question as midlines
 from geomech.output import parts, pictures
 from geomech.scenes.read import medium_of
-from rft.refusal import printable
+from rft.core.refusal import printable
 
 
 class FittedMidlines:

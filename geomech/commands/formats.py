@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 
 def netcdf(path: Path) -> None:

@@ -12,7 +12,7 @@ import typer
 
 from geomech.questions import texts
 from geomech.questions.names import intruder_names, scene_names, walker_names
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 
 def _scene(names: Callable[[], list[str]]):

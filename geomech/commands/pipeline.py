@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from geomech.io.files import atomic_folder, note
 from geomech.pipeline import allow, computing, refuse_unwritable
-from rft.refusal import in_line
+from rft.core.refusal import in_line
 
 if TYPE_CHECKING:  # commands start without NumPy
     from geomech.core.variables import Result

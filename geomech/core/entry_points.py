@@ -1,4 +1,4 @@
-"""Parts that installed packages offer to the registries (`rft.registry`) by entry points, loaded when first asked for."""
+"""Parts that installed packages offer to the registries (`rft.core.registry`) by entry points, loaded when first asked for."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import importlib.metadata
 from importlib.metadata import EntryPoint, EntryPoints
 
 from geomech.core.errors import choose
-from rft.refusal import Refusal, located
-from rft.registry import Registry
+from rft.core.refusal import Refusal, located
+from rft.core.registry import Registry
 
 
 def installed_entries(

@@ -7,7 +7,7 @@ import math
 import warnings
 from collections.abc import Iterable
 
-from rft.refusal import Refusal, formatted, worded
+from rft.core.refusal import Refusal, formatted, worded
 
 
 class Note(UserWarning):

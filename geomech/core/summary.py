@@ -8,8 +8,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from rft.premise import negated
-from rft.refusal import formatted
+from rft.core.premise import negated
+from rft.core.refusal import formatted
 
 ROWS = ("x", "y", "theta")
 POSE = "x", "y", "heading"

@@ -7,7 +7,7 @@ from geomech.gaits.polygon import Polygon
 from geomech.gaits.shchf import Shchf
 from geomech.gaits.waves import Sine, Wave
 from geomech.geometry.gait import GAITS, Gait
-from rft.registry import load_all
+from rft.core.registry import load_all
 
 load_all(__name__, __path__)
 KINDS = GAITS

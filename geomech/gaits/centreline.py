@@ -15,8 +15,8 @@ from geomech.core.errors import Note, UnitWarning
 from geomech.gaits import frames, midline
 from geomech.geometry.gait import GAITS, LARGEST, Gait
 from geomech.io.rows import LARGEST_NUMBER
-from rft.checks import Number, unmasked
-from rft.refusal import Refusal
+from rft.core.checks import Number, unmasked
+from rft.core.refusal import Refusal
 
 LARGEST_GAP = 0.25  # of the period, between neighbouring frames
 UNEQUAL = (

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geomech.geometry.gait import GAITS, LARGEST, Gait, Scale, finite_array
-from rft.checks import Number, unmasked
-from rft.refusal import Refusal
+from rft.core.checks import Number, unmasked
+from rft.core.refusal import Refusal
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ import numpy as np
 
 from geomech.io.rows import Column, Rows
 from geomech.io.rows import read as read_rows
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 HEADERS = (("t", "s", "curvature"), ("t", "point", "x", "y"), ("t", "x", "y"))
 COLUMNS = {  # of curvature, s and points a unit would be another than that of the gait

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from geomech.core.errors import Note
 from geomech.geometry.gait import GAITS, Gait, finite_array
-from rft.checks import unmasked
-from rft.refusal import Refusal
+from rft.core.checks import unmasked
+from rft.core.refusal import Refusal
 
 FAR = 1 / 20  # of the size of a polygon, from which a spline may lie as far unnoted
 

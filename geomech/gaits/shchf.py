@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from geomech.gaits.fourier import Fourier
 from geomech.geometry.gait import GAITS, Gait, Scale, finite_array
 from geomech.io import shchf
-from rft.checks import Number, unmasked
-from rft.refusal import Refusal
+from rft.core.checks import Number, unmasked
+from rft.core.refusal import Refusal
 
 
 @GAITS.register

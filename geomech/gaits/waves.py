@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from geomech.gaits.fourier import Series
 from geomech.geometry.gait import GAITS, LARGEST, Gait
-from rft.checks import Number, in_range, real_array
-from rft.refusal import Refusal
+from rft.core.checks import Number, in_range, real_array
+from rft.core.refusal import Refusal
 
 
 @GAITS.register

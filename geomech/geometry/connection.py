@@ -23,8 +23,8 @@ from geomech.geometry.field import UNKNOWN_UNIT, Field, as_axes, half_grid
 from geomech.geometry.images import Image, images, to_solve
 from geomech.geometry.traits import NOTHING, Traits
 from geomech.geometry.velocity import Reporting, Velocity, checked_velocity, evaluate
-from rft.checks import in_range, is_whole, real_array, unmasked
-from rft.refusal import Refusal
+from rft.core.checks import in_range, is_whole, real_array, unmasked
+from rft.core.refusal import Refusal
 
 EVEN_DIRECTIONS, EVEN_SHAPES = 4, 16  # a joint, and in all, at which `even_part` looks
 EVEN = 1e-6  # of the largest velocity: a solver's rounding is below it

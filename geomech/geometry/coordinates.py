@@ -10,8 +10,8 @@ from collections.abc import Callable
 import numpy as np
 
 from geomech.geometry.connection import Velocity
-from rft import se2
-from rft.checks import unmasked
+from rft.core.checks import unmasked
+from rft.formulas import se2
 
 
 def frame_velocity(h, hdot) -> np.ndarray:

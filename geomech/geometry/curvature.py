@@ -17,9 +17,9 @@ import numpy as np
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field, every_second
 from geomech.geometry.tube import Tube
-from rft import se2
-from rft.checks import is_whole
-from rft.refusal import Refusal, formatted
+from rft.core.checks import is_whole
+from rft.core.refusal import Refusal, formatted
+from rft.formulas import se2
 
 
 def _checked(connection, i, j) -> None:

@@ -26,9 +26,9 @@ from geomech.core.work import Map, each
 from geomech.geometry.connection import SAMPLES_TOGETHER, Velocity, evaluate
 from geomech.geometry.gait import Gait, checked_gait
 from geomech.geometry.reconstruct import displacement, turning
-from rft import se2
-from rft.checks import in_range, real_array
-from rft.refusal import Refusal
+from rft.core.checks import in_range, real_array
+from rft.core.refusal import Refusal
+from rft.formulas import se2
 
 
 @dataclass(frozen=True, eq=False)

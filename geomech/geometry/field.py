@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from geomech.core import summary
 from geomech.core.face import implementation
-from rft.checks import in_range, real_array
-from rft.refusal import Refusal
+from rft.core.checks import in_range, real_array
+from rft.core.refusal import Refusal
 
 UNKNOWN_UNIT = "length"  # stands for the unit of lengths where nothing says it
 

@@ -9,9 +9,9 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rft.checks import Number, check_numbers, is_whole, real_array
-from rft.refusal import Refusal
-from rft.registry import Registry, subclasses
+from rft.core.checks import Number, check_numbers, is_whole, real_array
+from rft.core.refusal import Refusal
+from rft.core.registry import Registry, subclasses
 
 LARGEST = 1e6  # rad or scale: beyond it an angle has few digits left
 FASTEST = 1e4  # Hz, as of the effects that have a frequency

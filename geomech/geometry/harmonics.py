@@ -28,8 +28,8 @@ from geomech.core.work import Map, each
 from geomech.geometry.connection import Velocity, check_fit_options, directions, sampled
 from geomech.geometry.field import Field, as_axes, half_grid
 from geomech.geometry.traits import NOTHING, Traits
-from rft.checks import in_range, is_whole, real_array
-from rft.refusal import Refusal
+from rft.core.checks import in_range, is_whole, real_array
+from rft.core.refusal import Refusal
 
 VALUES_TOGETHER = 1 << 21  # coefficients of one component looked up in one call
 

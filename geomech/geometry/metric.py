@@ -24,8 +24,8 @@ from geomech.core.work import Map, each
 from geomech.geometry.connection import SAMPLES_TOGETHER, directions
 from geomech.geometry.field import Field, as_axes
 from geomech.geometry.gait import Gait, checked_gait
-from rft.checks import is_whole, real_array
-from rft.refusal import Refusal
+from rft.core.checks import is_whole, real_array
+from rft.core.refusal import Refusal
 
 Power = Callable[[np.ndarray, np.ndarray], np.ndarray]
 

@@ -21,9 +21,9 @@ import numpy as np
 from geomech.geometry.connection import Connection
 from geomech.geometry.coordinates import change_connection
 from geomech.geometry.field import Field
-from rft import se2
-from rft.checks import real_array
-from rft.refusal import Refusal
+from rft.core.checks import real_array
+from rft.core.refusal import Refusal
+from rft.formulas import se2
 
 ROUNDING = 1e-10  # of A^theta: above what the linear solve leaves of a gradient
 TOLERANCE, STEPS = (

@@ -24,8 +24,8 @@ from geomech.geometry.gait import Gait
 from geomech.geometry.images import mirrored
 from geomech.geometry.traits import NOTHING, Traits
 from geomech.geometry.tube import Tube
-from rft.checks import is_whole, real_array
-from rft.refusal import Refusal, formatted
+from rft.core.checks import is_whole, real_array
+from rft.core.refusal import Refusal, formatted
 
 IN_PLANE = 1e-9  # rad that the joints which are held may move
 

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rft import se2
-from rft.checks import real_array, unmasked
-from rft.refusal import Refusal
+from rft.core.checks import real_array, unmasked
+from rft.core.refusal import Refusal
+from rft.formulas import se2
 
 
 class _Waves(NamedTuple):

@@ -15,8 +15,8 @@ import numpy as np
 
 from geomech.geometry.field import Field
 from geomech.geometry.metric import Finsler, Metric
-from rft.checks import in_range
-from rft.refusal import Refusal
+from rft.core.checks import in_range
+from rft.core.refusal import Refusal
 
 POINTS = 61  # an axis, at most: what a picture shows
 STEPS, TOLERANCE = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from rft.premise import NONE, SHAPE_ALONE, Premise
+from rft.core.premise import NONE, SHAPE_ALONE, Premise
 
 MEAN = "mean"  # the frame at the centre of mass, with the mean heading
 

@@ -17,9 +17,9 @@ from numpy.typing import ArrayLike
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import inside
 from geomech.geometry.reconstruct import displacement
-from rft import se2
-from rft.checks import real_array, unmasked
-from rft.refusal import Refusal
+from rft.core.checks import real_array, unmasked
+from rft.core.refusal import Refusal
+from rft.formulas import se2
 
 BEYOND = "nan, where the data of the log do not reach"
 PLACES = (

@@ -27,9 +27,9 @@ from geomech.geometry.curvature import ccf
 from geomech.geometry.curvature import error as ccf_error
 from geomech.geometry.field import Field
 from geomech.geometry.gait import Gait, checked_gait
-from rft import se2
-from rft.checks import in_range, real_array
-from rft.refusal import Refusal
+from rft.core.checks import in_range, real_array
+from rft.core.refusal import Refusal
+from rft.formulas import se2
 
 RADII = 6  # nodes of Gauss's rule along a cone
 

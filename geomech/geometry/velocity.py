@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geomech.core.errors import VelocityWarning
-from rft.checks import real_array
-from rft.refusal import Refusal
+from rft.core.checks import real_array
+from rft.core.refusal import Refusal
 
 Velocity = Callable[[np.ndarray, np.ndarray], np.ndarray]
 

@@ -12,9 +12,9 @@ import numpy as np
 from gymnasium.vector.utils import batch_space
 
 from rft.balance.backend import Note
+from rft.core.refusal import require
 from rft.mujoco import Sand, attach
 from rft.mujoco.example import hexapod
-from rft.refusal import require
 
 STEPS = 10  # time steps for one action
 FASTEST_LEG = 20.0  # rad/s, for the action 1

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-from rft.refusal import Refusal, printable
+from rft.core.refusal import Refusal, printable
 
 try:
     import fcntl

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 TRACKS = (
     "SLEAP writes CSV by File > Export Analysis CSV, DeepLabCut by "

@@ -34,7 +34,7 @@ import numpy as np
 from geomech.core.errors import Note
 from geomech.io import files
 from geomech.io.foreign import refuse_foreign
-from rft.refusal import Refusal, formatted, located
+from rft.core.refusal import Refusal, formatted, located
 
 LARGEST_NUMBER = 1e12
 ENDINGS = (".csv", ".tsv", ".txt", ".dat")  # of the names of tables

@@ -20,7 +20,7 @@ from geomech.io.files import reason_of
 from geomech.io.foreign import refuse_program
 from geomech.io.tables import mat
 from geomech.io.tables.base import LARGEST_ANGLE, numbers
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 LARGEST = 100_000_000  # bytes
 MOST_JOINTS = 100

@@ -9,7 +9,7 @@ from geomech.io.rows import read as read_rows
 from geomech.measured.midlines import reader
 from geomech.measured.midlines.question import Midlines
 from geomech.measured.results import Fit
-from rft.refusal import Refusal, formatted, line
+from rft.core.refusal import Refusal, formatted, line
 
 OF_LOGS = "degrees", "harmonics", "limits", "scene"
 OF_MIDLINES = (

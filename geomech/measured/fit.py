@@ -21,8 +21,8 @@ from geomech.measured.log import Log, read
 from geomech.measured.residual import residual_of
 from geomech.measured.spread import DEVIATIONS, spread
 from geomech.systems.base import body_size
-from rft import se2
-from rft.checks import in_range
+from rft.core.checks import in_range
+from rft.formulas import se2
 
 HARMONICS = 12  # of the connection and of the gait, at most
 PHASES = 128  # of the mean gait, at which it is integrated

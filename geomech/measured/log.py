@@ -15,7 +15,7 @@ from geomech.core.errors import UnitWarning
 from geomech.io.rows import UNITS, Rows, plain, split_unit
 from geomech.io.rows import read as read_rows
 from geomech.io.tables.base import LARGEST_ANGLE
-from rft.refusal import Refusal, formatted
+from rft.core.refusal import Refusal, formatted
 
 LARGEST_FILE = 100_000_000  # bytes
 MOST_ROWS, FEWEST_ROWS = 500_000, 100

@@ -10,7 +10,7 @@ import numpy as np
 
 from geomech.gaits import Gait
 from geomech.io.files import atomic_file
-from rft.checks import in_range
+from rft.core.checks import in_range
 
 FINER = 4  # steps of the integration between two rows
 MEMORY = 0.25  # correlation time of the joints' deviations, cycles

@@ -11,8 +11,8 @@ from geomech.scenes.model import Scene
 from geomech.systems.base import System
 from geomech.systems.capabilities import stored_table
 from geomech.systems.framed import Framed
-from rft.checks import in_range, is_number, real_array
-from rft.refusal import Refusal, formatted
+from rft.core.checks import in_range, is_number, real_array
+from rft.core.refusal import Refusal, formatted
 
 LEAST, MOST = 1e-6, 100.0  # rad: of the range between two limits, and of a limit
 Limits = float | tuple[tuple[float, float], ...]

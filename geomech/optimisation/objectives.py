@@ -8,8 +8,8 @@ import numpy as np
 
 from geomech.core.errors import choose
 from geomech.optimisation.cycles import CycleValues
-from rft.checks import in_range
-from rft.refusal import Refusal
+from rft.core.checks import in_range
+from rft.core.refusal import Refusal
 
 OBJECTIVES = ("displacement", "efficiency", "turning", "speed")
 DIRECTIONS = ("x", "y")

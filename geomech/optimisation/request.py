@@ -29,9 +29,9 @@ from geomech.systems.capabilities import (
 )
 from geomech.systems.framed import Framed, in_frame
 from geomech.systems.premises import listed, refuse
-from rft.checks import in_range
-from rft.premise import ALL, Premise
-from rft.refusal import Refusal, located
+from rft.core.checks import in_range
+from rft.core.premise import ALL, Premise
+from rft.core.refusal import Refusal, located
 
 JOINTS = 12  # with more, loops have too many parameters for this search
 PHASES = 128  # of a cycle in the search

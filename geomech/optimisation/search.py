@@ -39,7 +39,7 @@ from geomech.optimisation.request import (
 )
 from geomech.run.jobs import runner
 from geomech.scenes.model import Scene
-from rft.refusal import Refusal, located
+from rft.core.refusal import Refusal, located
 
 NEAR_TOLERANCE, TOLERANCE = (
     1e-7,

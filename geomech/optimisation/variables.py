@@ -18,7 +18,7 @@ from geomech.studies import fields
 from geomech.studies.effort import units, why_none
 from geomech.studies.tables import COMPONENTS, zero_words
 from geomech.systems.base import body_size, length_unit, shape_labels
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 HOW = ("refined", "by a table alone")  # local optima were searched
 

@@ -18,7 +18,7 @@ from geomech.run.cost import Cost
 from geomech.run.progress import counted
 from geomech.run.progress import progress as progress_bar
 from geomech.studies.motion import Motion
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 FILMS, STRIPS = (".gif", ".mp4"), (".png", ".pdf", ".svg")
 RATE, SLOW_RATE = 25, 10  # frames a second; of cycles that take long

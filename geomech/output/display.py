@@ -14,7 +14,7 @@ from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
 from geomech.studies.study import Study
 from geomech.text.system import described
-from rft.refusal import printable
+from rft.core.refusal import printable
 
 MOST_ROWS = 40
 DPI = 90

@@ -11,7 +11,7 @@ from geomech.core.variables import Result
 from geomech.io.files import write_text
 from geomech.io.results import write_netcdf
 from geomech.measured import results
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 
 def write_measured(result: Result, path: Path) -> None:

@@ -19,7 +19,7 @@ from geomech.studies import accuracy, fields
 from geomech.studies.report import Reported
 from geomech.systems.base import shape_labels
 from geomech.systems.framed import Framed
-from rft.refusal import Refusal, in_line
+from rft.core.refusal import Refusal, in_line
 
 SCENE, TABLES = "scene.toml", "displacement.json"
 

@@ -12,7 +12,7 @@ from geomech.run.progress import progress as progress_bar
 from geomech.scenes.model import Scene
 from geomech.studies.motion import Motion, Trajectory
 from geomech.systems.base import body_size, length_unit, shape_labels
-from rft.refusal import in_line
+from rft.core.refusal import in_line
 
 
 def question(scene: Scene, path: Path | None, cycles: int | None) -> Trajectory:

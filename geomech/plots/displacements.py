@@ -15,7 +15,7 @@ from geomech.plots.style import axes_of, figure, shared_legend, styled
 from geomech.scenes.measurements import converted, units_of
 from geomech.studies.tables import QUANTITIES, of_pose
 from geomech.tiers import TIERS
-from rft.refusal import printable
+from rft.core.refusal import printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, get_origin
 
 from geomech.io.files import atomic_file
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -29,7 +29,7 @@ from geomech.plots.maps import (
     vector_field,
 )
 from geomech.plots.style import axes_of, quantity, styled
-from rft.registry import Registry, functions_with
+from rft.core.registry import Registry, functions_with
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

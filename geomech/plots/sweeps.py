@@ -13,7 +13,7 @@ from geomech.plots.style import MARKED, figure, quantity, styled
 from geomech.scenes.model import Scene
 from geomech.studies.cycles import AMPLITUDE
 from geomech.studies.tables import position_spread
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

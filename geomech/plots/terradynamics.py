@@ -20,15 +20,15 @@ COLOURS = {"x": "C0", "y": "C2", "z": "C3"}
 
 @styled
 def stress_figure(survey: Any, point: tuple[float, float] | None = None) -> Figure:
-    """Draw alpha_z and alpha_x of an `rft.plates.Survey` over tilt and direction of motion (Fig. 7(c) and (d)), hatched where
-    the map pulls.
+    """Draw alpha_z and alpha_x of an `rft.terradynamics.plates.Survey` over tilt and
+    direction of motion (Fig. 7(c) and (d)), hatched where the map pulls.
 
     point: (beta, gamma) in degrees to mark.
 
     Examples
     --------
     >>> from geomech.plots import stress_figure
-    >>> from rft.plates import StressMap, survey
+    >>> from rft.terradynamics.plates import StressMap, survey
     >>> fig = stress_figure(survey(StressMap(), cells=30))
     """
     fig, axes = figure(8.6, 3.5, 2)
@@ -50,13 +50,14 @@ def stress_figure(survey: Any, point: tuple[float, float] | None = None) -> Figu
 
 
 def stress_map(ax: Axes, survey: Any, name: str) -> Axes:
-    """Draw alpha_x or alpha_z (``name`` "x" or "z") of an `rft.plates.Survey` for motion forwards, hatched where it pulls.
-    Both have one scale of colours.
+    """Draw alpha_x or alpha_z (``name`` "x" or "z") of an
+    `rft.terradynamics.plates.Survey` for motion forwards, hatched where it pulls. Both
+    have one scale of colours.
 
     Examples
     --------
     >>> from geomech.plots import figure, stress_map
-    >>> from rft.plates import StressMap, survey
+    >>> from rft.terradynamics.plates import StressMap, survey
     >>> fig, axes = figure(3.5, 3.5)
     >>> ax = stress_map(axes[0, 0], survey(StressMap(), cells=30), "z")
     """
@@ -167,8 +168,9 @@ def intrusion_figure(scene: Any, result: Any) -> Any:
 
 
 def draw_stress(ax: Any, faces: Any, above: np.ndarray, unit: float = 1e3) -> None:
-    """Draw the faces below the surface (`rft.meshes.Faces`) on 3-D axes, coloured by the size of the stress on them, and the
-    triangles ``above`` it (Q, 3, 3) in grey."""
+    """Draw the faces below the surface (`rft.terradynamics.meshes.Faces`) on 3-D axes,
+    coloured by the size of the stress on them, and the triangles ``above`` it (Q, 3, 3)
+    in grey."""
     from cmcrameri import cm
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize

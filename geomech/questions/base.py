@@ -190,7 +190,7 @@ def subject_facts(subject: Any) -> dict[str, str]:
     """Return what every result says of its subject: its name and, of a scene, its text,
     from which pictures are drawn again. A scene with parts of Python alone has none."""
     from geomech.scenes import toml
-    from rft.refusal import Refusal
+    from rft.core.refusal import Refusal
 
     if not hasattr(subject, "name"):
         return {}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from geomech.questions import loading, names, parsing, tools
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.common import ColourLimit, OtherFrame, Pair, Panels, Slice
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
     from geomech.core.variables import Result

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from geomech.questions import loading, names, parsing
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.common import ColourLimit
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
     from geomech.core.variables import Result

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rft.refusal import Refusal, located
+from rft.core.refusal import Refusal, located
 
 NO_ANGLE = "this is no angle"
 

@@ -14,7 +14,7 @@ def numbers(values: Any) -> Any:
     reader to refuse."""
     import numpy as np
 
-    from rft.checks import is_number
+    from rft.core.checks import is_number
 
     if is_number(values):
         return (float(values),)

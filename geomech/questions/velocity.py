@@ -38,7 +38,7 @@ class Velocity(Question):
     def compute(self, run: Run) -> "Result":
         from geomech.core.variables import Result
         from geomech.studies.single import velocity
-        from rft.refusal import located
+        from rft.core.refusal import located
 
         with located(self.scene.name):
             found = velocity(self.scene.system, self.alpha, self.alphadot)

@@ -14,7 +14,7 @@ from geomech.io import results as io
 from geomech.io.files import write_text
 from geomech.results.kinds import kind_of
 from geomech.results.old import translated
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 to_dict = io.to_dict
 to_xarray = io.to_xarray

@@ -10,7 +10,7 @@ from typing import Any
 from geomech.core.variables import Result
 from geomech.results.kinds import kind_of
 from geomech.results.show import Table, parts
-from rft.refusal import Refusal, printable
+from rft.core.refusal import Refusal, printable
 
 DPI = 90
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from geomech.core.variables import Result
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 
 def scene_of(result: Result) -> Any:

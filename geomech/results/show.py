@@ -18,7 +18,7 @@ from geomech.core.summary import WIDTH, wrapped
 from geomech.core.variables import Result, Variable
 from geomech.results.kinds import kind_of
 from geomech.results.numbers import decimals, number, size, with_error
-from rft.refusal import in_line
+from rft.core.refusal import in_line
 
 ROWS = 14  # of a table; of more the first, the last and some between are shown
 COLUMNS = 8  # places of outer dimensions side by side; of more the extremes are shown

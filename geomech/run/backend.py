@@ -11,7 +11,7 @@ from rft import SOLVER
 from rft.balance import backend
 from rft.balance.backend import prefer, preferred, preferring
 from rft.balance.listening import listen, listener, nobody
-from rft.threads import cores, one_thread
+from rft.core.threads import cores, one_thread
 
 __all__ = [
     "BACKENDS", "VERSION", "at_most", "cores", "fastest", "listen", "listener", "nobody", "one_thread", "prefer",

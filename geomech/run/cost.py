@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from geomech.run.backend import listen, listener, nobody, preferred
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 LONGEST = 60.0  # s of computing that a command begins without consent
 LARGEST = 2e9  # bytes of memory, likewise

@@ -13,7 +13,7 @@ from concurrent.futures import BrokenExecutor, Future
 
 from geomech.io.files import note
 from geomech.run.backend import BACKENDS, VERSION, fastest
-from rft.refusal import Refusal, formatted, worded
+from rft.core.refusal import Refusal, formatted, worded
 
 AHEAD = 4  # tasks for each worker that are submitted before the oldest is back
 LONGEST_END = 2.0  # s for a pool to notice that its processes were killed

@@ -33,7 +33,7 @@ from geomech.run.digest import Undigestible, digest
 from geomech.run.executors import undisturbed
 from geomech.run.store import CHECKPOINT, Busy, Store
 from geomech.run.tasks import Alone, Order, compute_here, opened, packed, perform
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 WORTH = 3.0  # s of computing, below which other processes are not worth their start of a second each
 TRIES = 3  # of a task whose process is ended from outside

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextvars import ContextVar
 
-from rft.refusal import printable
+from rft.core.refusal import printable
 
 EVERY = 10.0  # s between lines
 REDRAWN = 0.5  # s between drawings of a notebook's bar, and before the first

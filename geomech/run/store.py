@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 
 from geomech.io.files import hidden, note
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 CHECKPOINT = 2.0  # s between writes; a request that takes less writes nothing
 LARGEST = 6_000_000_000  # bytes of results in a file, as of the largest sweep; further ones are not stored

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 from geomech.run.backend import VERSION, one_thread, preferring
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 
 class Order(NamedTuple):

@@ -14,8 +14,8 @@ from collections.abc import Iterator
 
 from geomech.run.backend import at_most, cores, fastest
 from geomech.run.jobs import Executor, runner, running
-from rft.checks import in_range
-from rft.refusal import Refusal
+from rft.core.checks import in_range
+from rft.core.refusal import Refusal
 
 __all__ = ["using"]
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from geomech.io import rows
 from geomech.io.rows import Column
-from rft.refusal import Refusal, formatted, located
+from rft.core.refusal import Refusal, formatted, located
 
 LARGEST_FILE = 20_000_000  # bytes
 KINDS = {  # of columns by their names, with the unit that a scene has them in

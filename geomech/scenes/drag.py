@@ -13,7 +13,7 @@ import numpy as np
 from geomech.core.errors import choose
 from geomech.io.rows import Column, Rows
 from geomech.io.rows import read as read_rows
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 LARGEST_FILE = 10_000_000  # bytes
 MOST_ROWS = 100_000

@@ -8,7 +8,7 @@ from geomech.systems.framed import NAME, Framed
 from geomech.systems.table import Table
 from geomech.tiers.base import Numerics
 from geomech.tiers.fitted import FIELD, LARGEST_GRID, directions
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 
 def framed(system: System, numerics: Numerics) -> System:

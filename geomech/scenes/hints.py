@@ -6,8 +6,8 @@ import re
 from collections.abc import Mapping
 
 from geomech.scenes.key import angles_of, meanings
-from rft.checks import is_number
-from rft.refusal import formatted
+from rft.core.checks import is_number
+from rft.core.refusal import formatted
 
 EXPECTED = {
     "float": "a number", "int": "a whole number without a point", "str": 'text in "quotes"', "bool": "true or false",

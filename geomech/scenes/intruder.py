@@ -12,9 +12,10 @@ from geomech.scenes.columns import columns_reader, rows_reader
 from geomech.scenes.intruding import Intruding
 from geomech.scenes.sections import Each, FromFile, Keys, OneOf, Within
 from geomech.scenes.stress import StressKeys
-from rft.checks import Number
-from rft.ground import GROUND_EFFECTS, GroundEffect
-from rft.plates import (
+from rft.core.checks import Number
+from rft.core.refusal import located
+from rft.terradynamics.ground import GROUND_EFFECTS, GroundEffect
+from rft.terradynamics.plates import (
     MOTIONS,
     SHAPES,
     Loads,
@@ -24,8 +25,7 @@ from rft.plates import (
     Shape,
     loads,
 )
-from rft.plates.loads import ORDER
-from rft.refusal import located
+from rft.terradynamics.plates.loads import ORDER
 
 POINTS = FromFile(
     rows_reader("points", ("x", "z")),
@@ -41,9 +41,10 @@ OUTLINES = OneOf(SHAPES, files={"polygon": POINTS, "spline": POINTS})
 
 
 class Intrusion(NamedTuple):
-    """Forces along a motion. t (T,) s; pose and twist (T, 3) as `rft.plates.loads` has them; force (T, 2) N; moment (T,) N m
-    about the frame's origin; power (T,) W of the grains on the body. With effects that have a weight the
-    force is that of both."""
+    """Forces along a motion. t (T,) s; pose and twist (T, 3) as
+    `rft.terradynamics.plates.loads` has them; force (T, 2) N; moment (T,) N m about the
+    frame's origin; power (T,) W of the grains on the body. With effects that have a
+    weight the force is that of both."""
 
     t: np.ndarray
     pose: np.ndarray

@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rft.checks import check_numbers
-from rft.ground import GroundEffect, checked_effects, weight
-from rft.refusal import Refusal, located
+from rft.core.checks import check_numbers
+from rft.core.refusal import Refusal, located
+from rft.terradynamics.ground import GroundEffect, checked_effects, weight
 
 
 class Intruding:

@@ -1,6 +1,6 @@
 """Keys of a section of a scene file, from the class that the section is read into.
 
-A class declares them in the annotations of its fields (`rft.checks.Number`, `Word`), else in its docstring: ``name
+A class declares them in the annotations of its fields (`rft.core.checks.Number`, `Word`), else in its docstring: ``name
 (unit): meaning``, or ``name, other (unit): meaning``, up to the next key or the end of the paragraph. The unit is -
 where there is none; a key in rad may be given in degrees, as ``name_deg``. Types and defaults are those of its
 fields.
@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, get_args, get_type_hints
 
 import msgspec
 
-from rft.checks import number_fields
+from rft.core.checks import number_fields
 
 MARK = re.compile(r"(?<![\w`.])((?:[A-Za-z_]\w*, )*[A-Za-z_]\w*) \(([^()]*)\):\s+")
 

@@ -27,7 +27,7 @@ from geomech.scenes.solid import MeshScene
 from geomech.scenes.swimming import solvers
 from geomech.scenes.walker import WalkerScene
 from geomech.tiers.base import Numerics
-from rft.registry import Registry
+from rft.core.registry import Registry
 
 SCENES = {
     "gaits": Scene,

@@ -19,8 +19,8 @@ from geomech import gaits, systems, tiers  # noqa: F401  which have registries
 from geomech.io.files import read_text
 from geomech.scenes import sources
 from geomech.systems.functions import class_from_function
-from rft.refusal import Refusal, formatted, located
-from rft.registry import REGISTRIES, Registry, home, place
+from rft.core.refusal import Refusal, formatted, located
+from rft.core.registry import REGISTRIES, Registry, home, place
 
 LARGEST = 1_000_000  # bytes of a file of one's own
 PLUGIN = "geomech_plugin_"  # begins the names of modules made of such files

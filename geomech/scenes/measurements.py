@@ -14,8 +14,8 @@ from geomech.scenes.columns import LARGEST_FILE
 from geomech.scenes.key import angles_of
 from geomech.scenes.model import Scene
 from geomech.systems.base import body_size, length_unit
-from rft.checks import unmasked
-from rft.refusal import Refusal, located
+from rft.core.checks import unmasked
+from rft.core.refusal import Refusal, located
 
 COLUMNS = ("amplitude", "value", "error")
 ANGLES = {"": 1.0, "rad": 1.0, "deg": math.pi / 180}

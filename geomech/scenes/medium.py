@@ -17,7 +17,7 @@ from geomech.scenes.key import Word
 from geomech.scenes.reader import Source, read_section
 from geomech.scenes.sections import FromFile, OneOf
 from geomech.systems.swimmer import MEDIA, PARTS
-from rft.refusal import Refusal, located
+from rft.core.refusal import Refusal, located
 
 LARGEST = 1_000_000  # bytes of a medium's file
 ANGLE_RAD = Column("psi", "angle", "rad")

@@ -31,7 +31,7 @@ from geomech.systems.base import (
 from geomech.systems.capabilities import solver_of, with_solver
 from geomech.systems.swimmer import PARTS, Swimmer, note_radius
 from geomech.tiers.base import Numerics
-from rft.refusal import Refusal, formatted, located, printable
+from rft.core.refusal import Refusal, formatted, located, printable
 
 FRAME = (
     "of all velocities and displacements, in place of the body's own key; 'minimum-perturbation', here or there: the one in "

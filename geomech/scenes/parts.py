@@ -13,7 +13,7 @@ from geomech.scenes.model import Scene
 from geomech.scenes.read import load, medium_of
 from geomech.systems.base import System, as_system
 from geomech.systems.swimmer import Swimmer
-from rft.refusal import Refusal, formatted
+from rft.core.refusal import Refusal, formatted
 
 FORMS = (
     "give the name of a scene, a TOML file, a Scene, (medium, body, gait), (system, gait), or a function "

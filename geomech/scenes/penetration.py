@@ -16,7 +16,7 @@ from geomech.scenes.drag import (
     MOST_COMMENTS,
     NUMBER,
 )
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 DEPTHS = ("depth", "penetration_depth", "sinkage", "penetration")
 DEPTH = Column("depth", "length", "m", DEPTHS)

@@ -18,7 +18,7 @@ from geomech.scenes.medium import MEDIUM
 from geomech.scenes.model import Scene, checked_scene
 from geomech.systems.base import kind_of
 from geomech.systems.swimmer import MEDIA, Swimmer
-from rft.refusal import Refusal, formatted
+from rft.core.refusal import Refusal, formatted
 
 if TYPE_CHECKING:
     from geomech.scenes.intruding import Intruding

@@ -27,8 +27,8 @@ from geomech.scenes.sections import (
     variant_of,
 )
 from geomech.scenes.sizes import Sizes
-from rft.refusal import Refusal, located
-from rft.registry import Registry
+from rft.core.refusal import Refusal, located
+from rft.core.registry import Registry
 
 FILES = (
     "file",

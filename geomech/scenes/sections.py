@@ -24,7 +24,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, get_args, get_type_hints
 
 from geomech.scenes.key import Key, keys_of, text_key
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 
 class FromFile(NamedTuple):

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 
 from geomech.core.errors import choose
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 OF_THE_TRACK = ("disturbed-ground",)
 NOT_OF_THE_BODY = {"radius": OF_THE_TRACK, "radius_m": OF_THE_TRACK}

@@ -13,9 +13,10 @@ from geomech.scenes.columns import columns_reader
 from geomech.scenes.intruding import Intruding
 from geomech.scenes.sections import Each, FromFile, Keys, OneOf, Within
 from geomech.scenes.stress import MatchedKeys
-from rft.checks import Number
-from rft.ground import GROUND_EFFECTS, GroundEffect
-from rft.meshes import (
+from rft.core.checks import Number
+from rft.core.refusal import located
+from rft.terradynamics.ground import GROUND_EFFECTS, GroundEffect
+from rft.terradynamics.meshes import (
     MOTIONS,
     SOLIDS,
     Faces,
@@ -29,7 +30,6 @@ from rft.meshes import (
     below,
     wrench,
 )
-from rft.refusal import located
 
 KINDS = {
     **{k: v for k, v in SOLIDS.items() if k != "c-leg"},
@@ -105,7 +105,7 @@ class MeshScene(Intruding):
         "intruder": (Solid, "a solid such as Sphere(radius=0.02)"),
         "motion": (
             tuple(MOTIONS.values()),
-            "a motion of rft.meshes such as Drag(depth=0.05)",
+            "a motion of rft.terradynamics.meshes such as Drag(depth=0.05)",
         ),
         "matched": (str, "text"),
     }

@@ -19,11 +19,11 @@ from geomech.scenes.columns import columns
 from geomech.scenes.key import Word
 from geomech.scenes.reader import Source, build
 from geomech.scenes.sections import Alternatives
-from rft.checks import Number
-from rft.meshes import Spatial
-from rft.plates import VERTICAL, PlateDrags, PlateStress, StressMap
-from rft.plates.stress import COEFFICIENTS
-from rft.refusal import Refusal, before, located
+from rft.core.checks import Number
+from rft.core.refusal import Refusal, before, located
+from rft.terradynamics.meshes import Spatial
+from rft.terradynamics.plates import VERTICAL, PlateDrags, PlateStress, StressMap
+from rft.terradynamics.plates.stress import COEFFICIENTS
 
 LARGEST = 10_000_000  # bytes of a TOML file
 RADIANS = 3.2  # a table of angles within this is likely not in degrees

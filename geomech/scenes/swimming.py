@@ -17,7 +17,7 @@ from geomech.systems.base import System
 from geomech.systems.capabilities import solver_of
 from geomech.systems.framed import NAME as FITTED
 from geomech.tiers.base import Numerics
-from rft.refusal import Refusal, located
+from rft.core.refusal import Refusal, located
 
 
 @dataclasses.dataclass(frozen=True)

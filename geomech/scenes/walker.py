@@ -9,11 +9,19 @@ from typing import Annotated, ClassVar
 from geomech.scenes.intruder import OUTLINES
 from geomech.scenes.sections import Each, Keys, OneOf
 from geomech.scenes.stress import SpatialKeys, StressKeys
-from rft.ground import GROUND_EFFECTS, GroundEffect
-from rft.meshes import Screw, Spatial
-from rft.plates import PlateStress
-from rft.refusal import Refusal, formatted, located
-from rft.walking import ROBOTS, Fineness, Mjcf, Robot, Screws, Tripod, Walker
+from rft.core.refusal import Refusal, formatted, located
+from rft.terradynamics.ground import GROUND_EFFECTS, GroundEffect
+from rft.terradynamics.meshes import Screw, Spatial
+from rft.terradynamics.plates import PlateStress
+from rft.terradynamics.walking import (
+    ROBOTS,
+    Fineness,
+    Mjcf,
+    Robot,
+    Screws,
+    Tripod,
+    Walker,
+)
 
 ATTACH = "use rft.mujoco.attach(model, medium, {} = ...) in a loop of your own"
 ELSEWHERE = {

@@ -21,7 +21,7 @@ from geomech.systems.capabilities import solver_of
 from geomech.systems.framed import Framed
 from geomech.systems.swimmer import Swimmer, name_in
 from geomech.systems.table import Table
-from rft.refusal import Refusal, located
+from rft.core.refusal import Refusal, located
 
 if TYPE_CHECKING:
     from geomech.scenes.intruding import Intruding
@@ -91,11 +91,11 @@ def medium_toml(name: str, entry) -> str:
 
 
 def vertical_toml(name: str, entry) -> str:
-    """Return the table of a medium of intruder scenes (`rft.plates.VerticalEntry`), with its source above."""
+    """Return the table of a medium of intruder scenes (`rft.terradynamics.plates.VerticalEntry`), with its source above."""
     head = "".join(
         f"# {line}\n" for line in textwrap.wrap(f"{name}: {entry.source}", 110)
     )
-    from rft.plates.stress import COEFFICIENTS
+    from rft.terradynamics.plates.stress import COEFFICIENTS
 
     stress = dataclasses.asdict(entry.stress)
     values = {

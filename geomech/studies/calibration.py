@@ -16,9 +16,9 @@ from geomech.core.variables import Result, Variable
 from geomech.scenes import drag
 from geomech.studies.question import Allow, Progress, Question
 from geomech.studies.stress_calibration import law_of, penetration_test, plate_drags
-from rft.calibrate import FITS, Fit, fit
-from rft.drag import Rod, rod_drag
-from rft.refusal import Refusal, located
+from rft.core.refusal import Refusal, located
+from rft.fits.rods import FITS, Fit, fit
+from rft.laws.drag import Rod, rod_drag
 
 SIZES = (
     "radius",
@@ -32,7 +32,7 @@ CURVE = np.linspace(0.0, np.pi / 2, 181)  # attack angles at which a law is draw
 def rod_drags(
     law: str, source: str, sizes: Mapping[str, float], end_caps: float | str
 ) -> Result:
-    """Return a law fitted to the drag on a rod (`rft.calibrate`), from a file or the sample ``source``.
+    """Return a law fitted to the drag on a rod (`rft.fits.rods`), from a file or the sample ``source``.
 
     sizes: those of `SIZES` that overrule the header lines. Refusal, one line that names the file, if the data are bad or
     do not determine the law."""

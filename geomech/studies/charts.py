@@ -27,8 +27,8 @@ from geomech.systems.base import body_size
 from geomech.systems.capabilities import Drawable, capability
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.tiers import harmonic
-from rft import se2
-from rft.refusal import Refusal, located
+from rft.core.refusal import Refusal, located
+from rft.formulas import se2
 
 SMALL = 1e-7  # of the largest coefficient: harmonics below it are left out
 ENDS = 33  # points of a body's outline at most

@@ -31,8 +31,8 @@ from geomech.systems.base import body_size
 from geomech.systems.capabilities import pieces_per_length, settling, solver_of
 from geomech.tiers.base import solved_phases
 from geomech.tiers.direct import DIRECT
-from rft.checks import is_number, real_array
-from rft.refusal import Refusal
+from rft.core.checks import is_number, real_array
+from rft.core.refusal import Refusal
 
 MOST_PHASES = 1 << 16
 FINEST_PIECES = 640  # of body, for a tolerance

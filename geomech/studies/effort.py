@@ -42,9 +42,9 @@ from geomech.tiers import harmonic
 from geomech.tiers.base import Numerics, Table, in_groups
 from geomech.tiers.fitted import axes
 from geomech.tiers.harmonic import HARMONIC
-from rft.checks import in_range, real_array
-from rft.premise import ALL, SHAPE_ALONE
-from rft.refusal import Refusal
+from rft.core.checks import in_range, real_array
+from rft.core.premise import ALL, SHAPE_ALONE
+from rft.core.refusal import Refusal
 
 DEPENDS_ON = ("grid", "extent", "interpolation")  # of [numerics]
 HIGHEST = (

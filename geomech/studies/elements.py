@@ -16,7 +16,7 @@ import numpy as np
 from geomech.gaits import Gait
 from geomech.systems.base import System
 from geomech.systems.framed import Framed
-from rft import se2
+from rft.formulas import se2
 
 MOST = 2000  # elements of a body
 FEWEST = 3

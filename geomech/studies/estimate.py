@@ -27,8 +27,8 @@ from geomech.systems.capabilities import (
     refined,
     table_error,
 )
-from rft.premise import Premise
-from rft.refusal import located
+from rft.core.premise import Premise
+from rft.core.refusal import located
 
 CHECKED = 33  # amplitudes at which a look-up tier is compared with the direct one; between them the worse neighbour counts
 FEWEST_STEPS = (

@@ -37,7 +37,7 @@ from geomech.systems.capabilities import (
     stored_table,
 )
 from geomech.systems.framed import Framed
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 WHOLE, A_ALONE, STRUCT = "whole", "A", "struct"  # contents of files
 ERROR_OF_CCF = "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"

@@ -22,8 +22,8 @@ from geomech.studies.newtons import Newtons, Sizes, newtons
 from geomech.studies.undulation import activation_of, bends, loaded
 from geomech.systems.base import body_size, length_unit
 from geomech.systems.capabilities import Stepped, capability, pieces_per_length, refined
-from rft.premise import Premise
-from rft.refusal import located
+from rft.core.premise import Premise
+from rft.core.refusal import located
 
 FLANK, PARTS = ("normal", "tangential"), ("normal", "tangential", "ends")
 PLACES = (0.25, 0.5, 0.75)  # of the body, at which the lag of activation is shown

@@ -18,13 +18,13 @@ from geomech.studies.question import Allow, Progress, Question
 from geomech.studies.study import Study
 from geomech.systems.swimmer import Swimmer
 from rft.bodies.links import Links
+from rft.core.refusal import Refusal, located, require
 from rft.effects import EndCaps
 from rft.grains.bed import Bed
 from rft.grains.engine import lammps
 from rft.grains.experiment import Experiment, Run
 from rft.grains.motions import Swim
 from rft.grains.spheres import chain
-from rft.refusal import Refusal, located, require
 
 RAMP = 0.5  # cycles in which the gait grows from the straight body
 SIZE, RADIUS, FREQUENCY = (

@@ -15,15 +15,15 @@ from geomech.run import jobs
 from geomech.run.cost import BASE, Cost, TooLong, duration
 from geomech.run.store import cache_folder
 from geomech.studies.question import Allow, Progress, Question
-from rft.calibrate import Fit, fit
-from rft.drag import Rod, rod_drag
+from rft.core.refusal import Refusal, require
+from rft.fits.rods import Fit, fit
 from rft.grains.bed import Bed
 from rft.grains.drag import Drag, flank_and_ends
 from rft.grains.engine import lammps
 from rft.grains.experiment import SETTLING, Experiment, Run, settle
 from rft.grains.motions import Tow
 from rft.grains.spheres import Spheres, rod
-from rft.refusal import Refusal, require
+from rft.laws.drag import Rod, rod_drag
 
 RATE = 1.8e6  # steps of a grain a second; 1.9e6 measured on one core of the machine that this was written on
 LONGEST = 600.0  # s of computing that a command begins without consent

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from geomech.scenes.read import from_tables
-from rft.checks import real_array
-from rft.refusal import Refusal
+from rft.core.checks import real_array
+from rft.core.refusal import Refusal
 
 LARGEST = 100_000_000  # points
 MOST = (

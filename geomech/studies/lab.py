@@ -17,7 +17,7 @@ from geomech.studies.charts import Chart
 from geomech.studies.cycles import Cycles
 from geomech.studies.grid import Grid, listed
 from geomech.studies.question import Allow, Progress, Question
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 GALLERY = (  # in which a page shows them
     "three-link-glass", "three-link-glass-close", "three-link-coulomb", "three-link-viscous", "serpenoid-glass",

@@ -26,9 +26,9 @@ from geomech.systems.capabilities import (
     settling,
 )
 from geomech.tiers.path import PATH
-from rft.checks import is_whole
-from rft.premise import Premise
-from rft.refusal import Refusal, located
+from rft.core.checks import is_whole
+from rft.core.premise import Premise
+from rft.core.refusal import Refusal, located
 
 MOST_CYCLES = 10_000
 WORDS = (

@@ -13,8 +13,8 @@ from typing import Annotated, NamedTuple
 from geomech.scenes.model import Scene
 from geomech.systems.base import body_size, length_unit
 from geomech.systems.capabilities import Loaded
-from rft.checks import Number, check_numbers
-from rft.refusal import Refusal
+from rft.core.checks import Number, check_numbers
+from rft.core.refusal import Refusal
 
 UNITS = {  # power of the body's length in a unit of drag, BL and rad of phase; that unit in SI, with a frequency, without
     "drag": (0, "N", "N"),

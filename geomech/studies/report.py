@@ -26,7 +26,7 @@ from geomech.tiers.area import AREA
 from geomech.tiers.fitted import axes as field_axes
 from geomech.tiers.fitted import is_too_large
 from geomech.tiers.path import PATH
-from rft.refusal import Refusal, located
+from rft.core.refusal import Refusal, located
 
 AMPLITUDES = 10  # or so, for each gait
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)  # of round amplitudes, times a power of ten

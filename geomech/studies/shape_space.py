@@ -38,8 +38,8 @@ from geomech.systems.capabilities import stored_table
 from geomech.tiers.area import AREA
 from geomech.tiers.fitted import finest_grid, refuse
 from geomech.tiers.harmonic import is_looked_up
-from rft.checks import is_whole
-from rft.refusal import Refusal, located
+from rft.core.checks import is_whole
+from rft.core.refusal import Refusal, located
 
 NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
 MOST_PAIRS = 10  # of joints in a figure: as many as five joints have

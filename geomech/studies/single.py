@@ -8,8 +8,8 @@ from geomech.core.variables import Variable
 from geomech.geometry.velocity import evaluate
 from geomech.systems.base import System, length_unit, note_angles
 from geomech.systems.capabilities import Diagnosed, capability
-from rft.checks import real_array
-from rft.refusal import Refusal, formatted
+from rft.core.checks import real_array
+from rft.core.refusal import Refusal, formatted
 
 
 def velocity(system: System, alpha, alphadot) -> list[Variable]:

@@ -8,8 +8,8 @@ import numpy as np
 
 from geomech.core.variables import Result, Variable
 from geomech.scenes.stress import medium as load_medium
-from rft.plates import Survey, survey
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
+from rft.terradynamics.plates import Survey, survey
 
 LARGEST_ANGLE = 1e6  # degrees
 UNIT = "N/cm^3"

@@ -13,7 +13,8 @@ from geomech.io.rows import read as read_rows
 from geomech.scenes import penetration
 from geomech.scenes.drag import LARGEST_FILE
 from geomech.scenes.stress import plate_rows
-from rft.plates.calibrate import (
+from rft.core.refusal import Refusal, located
+from rft.fits.plates import (
     COEFFICIENTS,
     GENERIC,
     StressFit,
@@ -21,8 +22,7 @@ from rft.plates.calibrate import (
     fit_stress,
     fit_zeta,
 )
-from rft.plates.survey import survey
-from rft.refusal import Refusal, located
+from rft.terradynamics.plates.survey import survey
 
 KEYS = tuple(
     name.replace("m", "-") for name in COEFFICIENTS

@@ -34,8 +34,8 @@ from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.systems.framed import in_frame
 from geomech.tiers import TIERS, fitted, harmonic
 from geomech.tiers.base import Plan, Table, Tier, in_groups
-from rft.checks import real_array
-from rft.refusal import Refusal, located
+from rft.core.checks import real_array
+from rft.core.refusal import Refusal, located
 
 FEW_PHASES = 4096  # that tell whether a gait is far from leaving the field
 SAMPLES = 64, FEW_PHASES  # amplitudes and phases that `cost` checks, of all

@@ -18,7 +18,7 @@ from geomech.run.cost import Cost
 from geomech.run.jobs import context_of, runner, storing
 from geomech.scenes.read import inputs
 from geomech.studies.grid import Grid, listed
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 
 class Batched(Protocol):

@@ -28,7 +28,7 @@ from geomech.systems.capabilities import (
 from geomech.tiers import TIERS
 from geomech.tiers.base import Plan
 from geomech.tiers.direct import DIRECT
-from rft.refusal import Refusal, located
+from rft.core.refusal import Refusal, located
 
 FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
 TRUTH_PHASES = 4096

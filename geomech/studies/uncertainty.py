@@ -22,8 +22,8 @@ from geomech.systems import System
 from geomech.systems.base import body_size
 from geomech.systems.capabilities import Uncertain, capability, gaits_per_batch
 from geomech.tiers.base import in_groups
-from rft.checks import unmasked
-from rft.refusal import Refusal, located
+from rft.core.checks import unmasked
+from rft.core.refusal import Refusal, located
 
 PHASES = 64  # of a cycle: enough for changes of displacement to a per cent
 NONLINEAR = (

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from geomech.gaits import Sine, Wave
 from geomech.systems.base import body_size, kind_of
 from geomech.systems.capabilities import Loaded, capability
-from rft.checks import real_array
-from rft.refusal import Refusal
+from rft.core.checks import real_array
+from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
     from geomech.scenes.model import Scene

@@ -21,11 +21,11 @@ from geomech.run.cost import BASE, Cost, duration
 from geomech.scenes import write as written
 from geomech.scenes.walker import WalkerScene
 from geomech.studies.grid import Grid
-from rft.metres import GRAVITY
-from rft.refusal import Refusal, located
-from rft.walking import Mjcf, Rhex, Roller, Walk, engine
-from rft.walking.stride import MOST_STRIDES
-from rft.walking.stride import NEAR as NEAR
+from rft.core.metres import GRAVITY
+from rft.core.refusal import Refusal, located
+from rft.terradynamics.walking import Mjcf, Rhex, Roller, Walk, engine
+from rft.terradynamics.walking.stride import MOST_STRIDES
+from rft.terradynamics.walking.stride import NEAR as NEAR
 
 PILOT = 0.05  # s of time steps that are timed
 STATUSES = ("walking", "stuck", "sunk", "flipped", "airborne")
@@ -412,7 +412,7 @@ def refuse_engine(scene: WalkerScene, by: str | None = None) -> None:
 
 
 def view(scene: WalkerScene):
-    """Return the view that draws a walk of three dimensions (`rft.walking.view.View`)."""
-    from rft.walking.view import View
+    """Return the view that draws a walk of three dimensions (`rft.terradynamics.walking.view.View`)."""
+    from rft.terradynamics.walking.view import View
 
     return View(scene.walker, scene.numerics)

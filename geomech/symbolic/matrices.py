@@ -8,11 +8,11 @@ from typing import Any
 import sympy as sp
 
 from geomech.symbolic.waves import Waves
-from rft.checks import unmasked
+from rft.core.checks import unmasked
 
 
 def bracket(X: sp.Matrix, Y: sp.Matrix) -> sp.Matrix:
-    """Return [X, Y] on se(2), columns (x, y, theta), as `rft.se2.bracket`.
+    """Return [X, Y] on se(2), columns (x, y, theta), as `rft.formulas.se2.bracket`.
 
     Examples
     --------

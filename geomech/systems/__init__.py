@@ -10,8 +10,8 @@ from geomech.systems.no_slip import NoSlipSnake
 from geomech.systems.solver import Solver
 from geomech.systems.swimmer import Swimmer
 from geomech.systems.table import Table
-from rft.premise import Premise
-from rft.registry import load_all
+from rft.core.premise import Premise
+from rft.core.registry import load_all
 
 load_all(__name__, __path__)
 KINDS = SYSTEMS

@@ -16,9 +16,9 @@ from geomech.geometry.reconstruct import displacement
 from geomech.geometry.traits import NOTHING, Traits, unit_of
 from geomech.geometry.velocity import evaluate, in_batches
 from rft.bodies.base import body_size as body_size  # of systems, too
-from rft.checks import in_range, unmasked
-from rft.refusal import Refusal
-from rft.registry import Registry, classes_with
+from rft.core.checks import in_range, unmasked
+from rft.core.refusal import Refusal
+from rft.core.registry import Registry, classes_with
 
 MEMBERS = ("joints", "length", "traits", "velocity", "run")
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geomech.systems.base import System, kind_of
-from rft.premise import Premise
-from rft.refusal import Refusal
+from rft.core.premise import Premise
+from rft.core.refusal import Refusal
 
 T = TypeVar("T")
 # Of gaits run side by side, angles and velocities, a batch of which takes some 120 MB with what is made of them: more take

@@ -17,7 +17,7 @@ from geomech.core.errors import choose
 from geomech.geometry.traits import Traits
 from geomech.systems.base import SYSTEMS, integrated
 from rft.bodies.base import body_size
-from rft.checks import Number, check_numbers, unmasked
+from rft.core.checks import Number, check_numbers, unmasked
 
 
 @SYSTEMS.register

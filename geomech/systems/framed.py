@@ -30,10 +30,10 @@ from geomech.systems.capabilities import (
     stored_table,
 )
 from geomech.systems.premises import refuse
-from rft import se2
-from rft.checks import unmasked
-from rft.premise import SHAPE_ALONE
-from rft.refusal import Refusal
+from rft.core.checks import unmasked
+from rft.core.premise import SHAPE_ALONE
+from rft.core.refusal import Refusal
+from rft.formulas import se2
 
 NAME = "minimum-perturbation"
 

@@ -12,7 +12,7 @@ from geomech.systems.base import SYSTEMS
 from rft.bodies import BODIES
 from rft.bodies.base import Length
 from rft.bodies.positions import Posed
-from rft.registry import REGISTRIES
+from rft.core.registry import REGISTRIES
 
 
 def class_from_function(function: Callable) -> type:

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 from geomech.systems.base import SYSTEMS
 from geomech.systems.momentum import Momentum
-from rft.checks import Number
+from rft.core.checks import Number
 
 
 @SYSTEMS.register

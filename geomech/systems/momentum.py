@@ -19,11 +19,11 @@ from numpy.typing import ArrayLike
 
 from geomech.geometry.traits import Traits
 from geomech.systems.base import integrated
-from rft.balance.newton import to_element
 from rft.bodies import Chain
 from rft.bodies.base import Elements, Length, body_size
-from rft.checks import check_numbers, real_array, unmasked
-from rft.refusal import Refusal
+from rft.core.checks import check_numbers, real_array, unmasked
+from rft.core.refusal import Refusal
+from rft.formulas.newton import to_element
 
 
 @dataclass(frozen=True)

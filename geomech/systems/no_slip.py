@@ -16,8 +16,8 @@ from geomech.geometry.traits import Traits
 from geomech.systems.base import SYSTEMS, integrated
 from rft.bodies import Chain
 from rft.bodies.base import Length, body_size
-from rft.checks import unmasked
-from rft.refusal import Refusal
+from rft.core.checks import unmasked
+from rft.core.refusal import Refusal
 
 
 @SYSTEMS.register

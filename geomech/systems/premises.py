@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from geomech.systems.base import System, kind_of
 from geomech.systems.capabilities import Composite, Part, capability
-from rft.premise import Premise, negated
-from rft.refusal import Refusal
+from rft.core.premise import Premise, negated
+from rft.core.refusal import Refusal
 
 CURES = {"law": ", or take another law", "effect": ", or drop the effect"}
 

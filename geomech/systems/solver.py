@@ -7,18 +7,19 @@ from typing import Annotated
 
 from rft.balance.backend import check, installed
 from rft.bodies.pieces import PIECES
-from rft.checks import Number, check_numbers
-from rft.contact import MOST_PIECES
-from rft.quadrature import parse
+from rft.core.checks import Number, check_numbers
+from rft.effects.contact import MOST_PIECES
+from rft.formulas.quadrature import parse
 
 
 @dataclass(frozen=True)
 class Solver:
     """How the balance of forces is solved; part of [numerics].
 
-    loads (-): "exact", "midpoint:N", "gauss:N" (rft.quadrature). backend (-): what computes, "numpy", "numba" (compiled
-    code, where numba is installed) or "auto": compiled code where numba is installed (`rft.balance.backend`). Answers
-    are the same but for rounding.
+    loads (-): "exact", "midpoint:N", "gauss:N" (rft.formulas.quadrature). backend (-):
+    what computes, "numpy", "numba" (compiled code, where numba is installed) or "auto":
+    compiled code where numba is installed (`rft.balance.backend`). Answers are the same
+    but for rounding.
 
     Examples
     --------

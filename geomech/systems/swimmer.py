@@ -31,9 +31,13 @@ from rft.bodies.base import (
     joint_speed,
 )
 from rft.bodies.pieces import PIECES, subdivide
-from rft.checks import unmasked
-from rft.contact import assemble
+from rft.core.checks import unmasked
+from rft.core.premise import NONE, SHAPE_ALONE, Premise
+from rft.core.refusal import Refusal, located
 from rft.effects import EFFECTS
+from rft.effects.contact import assemble
+from rft.formulas import se2
+from rft.formulas.quadrature import QUADRATURE
 from rft.laws import (
     CATALOGUE,
     LAWS,
@@ -46,10 +50,7 @@ from rft.laws import (
 from rft.laws.base import is_odd, require_law
 from rft.laws.catalogue import DEPTH
 from rft.laws.records import record, rule_for
-from rft.premise import NONE, SHAPE_ALONE, Premise
-from rft.quadrature import QUADRATURE
-from rft.refusal import Refusal, located
-from rft.stepping import Row, State, Stepping
+from rft.motion.stepping import Row, State, Stepping
 
 PARTS = {"medium": LAWS, "body": BODIES, "effects": EFFECTS}  # of a scene's tables
 RATES = Premise.RATE_INDEPENDENT
@@ -419,7 +420,7 @@ class Swimmer:
                 return repeated(poses(steps.xi), cycles)
         steps = self.time_steps(alpha, alphadot, before + cycles, path=True).checked()
         poses_after = steps.path[before * len(alpha) :]
-        return rft.se2.compose(rft.se2.inverse(poses_after[:1]), poses_after)
+        return se2.compose(se2.inverse(poses_after[:1]), poses_after)
 
     def refined(self) -> Swimmer | None:
         rule, count = rule_for(self.medium, self.solver.loads)

@@ -26,8 +26,8 @@ from geomech.systems.capabilities import Dissipative, OwnMetric
 from geomech.systems.misread import misread
 from geomech.systems.swimmer import Swimmer
 from rft.bodies import Chain
-from rft.checks import Number, check_numbers
-from rft.refusal import Refusal
+from rft.core.checks import Number, check_numbers
+from rft.core.refusal import Refusal
 
 LENGTHS = "its lengths are taken for body lengths; say body_length = 1 if they are, 3 if one is a link of three equal ones"
 THREE_LINKS = [

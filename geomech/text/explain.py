@@ -13,8 +13,8 @@ from geomech.text import grains
 from geomech.text.system import described, engine
 from geomech.tiers import TIERS
 from geomech.tiers.base import solved_phases
-from rft.premise import ALL
-from rft.refusal import in_line, printable
+from rft.core.premise import ALL
+from rft.core.refusal import in_line, printable
 
 if TYPE_CHECKING:
     from geomech.scenes.intruding import Intruding

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from geomech import symbolic
 from geomech.scenes.model import Scene
 from geomech.systems.framed import formula
-from rft.refusal import located
+from rft.core.refusal import located
 
 ROWS = ("x", "y", "theta")
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from geomech.core.variables import Result
-from rft.refusal import in_line
+from rft.core.refusal import in_line
 
 
 def numbers(result: Result) -> dict[str, Any]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from geomech.core.summary import effect_lines, part
-from rft.ground import GROUND_EFFECTS
-from rft.refusal import in_line
+from rft.core.refusal import in_line
+from rft.terradynamics.ground import GROUND_EFFECTS
 
 if TYPE_CHECKING:
     from geomech.scenes.intruding import Intruding

@@ -6,7 +6,7 @@ import json
 
 from geomech.scenes import keys
 from geomech.scenes.schema import schema
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 
 def reference(section: str | None, json_schema: bool) -> str:

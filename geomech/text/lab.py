@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from geomech.core.variables import Result
-from rft.refusal import in_line
+from rft.core.refusal import in_line
 
 
 def text(result: Result) -> str:

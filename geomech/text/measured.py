@@ -11,7 +11,7 @@ from geomech.measured.fit import PRINTED_PHASES, Fitted
 from geomech.measured.results import status
 from geomech.scenes.write import gait_table
 from geomech.systems.base import body_size
-from rft.refusal import in_line
+from rft.core.refusal import in_line
 
 
 def numbers(result: Result) -> dict[str, Any]:

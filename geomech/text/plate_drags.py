@@ -7,7 +7,7 @@ from typing import Any
 
 from geomech.core.variables import Result
 from geomech.text.rod_drag import MOST_ROWS, RESIDUALS
-from rft.refusal import in_line
+from rft.core.refusal import in_line
 
 OF_COEFFICIENTS = "coefficient", "value", "interval", "resolution"
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from geomech.core.variables import Result
 from geomech.scenes.write import table
-from rft.refusal import in_line
+from rft.core.refusal import in_line
 
 UNITS = {"axial_stress": "Pa", "axial_force": "N", "gamma0_deg": "degrees"}
 SIZES = {"radius": "m", "length": "m", "depth": "m", "density": "kg/m^3"}

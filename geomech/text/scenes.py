@@ -10,7 +10,7 @@ from geomech.core.summary import wrapped
 from geomech.scenes import builtin_names, intruder_names, walker_names
 from geomech.scenes.read import builtin_text
 from geomech.scenes.write import medium_toml, vertical_toml
-from rft.plates import VERTICAL
+from rft.terradynamics.plates import VERTICAL
 
 
 def lines(name: str | None) -> Iterator[str]:

@@ -12,13 +12,13 @@ from geomech.systems.base import System, WrappedSystem, kind_of
 from geomech.systems.framed import NAME, Framed
 from geomech.systems.swimmer import effect_sizes, name_in
 from rft.bodies import BODIES
+from rft.core.premise import SHAPE_ALONE, negated
+from rft.core.refusal import formatted, in_line
 from rft.effects import EFFECTS, ENGINES
 from rft.effects import engine as engine_of
+from rft.formulas.quadrature import QUADRATURE
 from rft.laws import LAWS
 from rft.laws.records import is_compilable, record
-from rft.premise import SHAPE_ALONE, negated
-from rft.quadrature import QUADRATURE
-from rft.refusal import formatted, in_line
 
 NO_PAST = "nothing remembers, places are alike, no mass"
 

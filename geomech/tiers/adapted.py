@@ -11,8 +11,8 @@ from geomech.core.setting import Setting
 from geomech.geometry import family
 from geomech.geometry.family import Family
 from geomech.tiers.base import Plan, Table, Tier, solved_phases
-from rft.checks import real_array
-from rft.premise import SHAPE_ALONE
+from rft.core.checks import real_array
+from rft.core.premise import SHAPE_ALONE
 
 
 def table(system, numerics, gait, amplitudes) -> Table:

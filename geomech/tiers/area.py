@@ -14,9 +14,9 @@ from geomech.geometry.gait import checked_gait
 from geomech.geometry.two_form import RADII, spanned, spanned_by, two_form
 from geomech.tiers import fitted
 from geomech.tiers.base import Plan, Tier, in_groups
-from rft import se2
-from rft.checks import in_range
-from rft.refusal import Refusal
+from rft.core.checks import in_range
+from rft.core.refusal import Refusal
+from rft.formulas import se2
 
 TIPS, AROUND = (
     2,

@@ -19,10 +19,10 @@ from geomech.geometry.images import solved_count
 from geomech.systems.base import System, kind_of
 from geomech.systems.capabilities import Costed, capability, near_gait
 from geomech.systems.premises import refuse
-from rft.checks import Number, check_numbers, real_array
-from rft.premise import ALL, Premise
-from rft.refusal import Refusal
-from rft.registry import Registry
+from rft.core.checks import Number, check_numbers, real_array
+from rft.core.premise import ALL, Premise
+from rft.core.refusal import Refusal
+from rft.core.registry import Registry
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from geomech.geometry.gait import checked_gait
 from geomech.geometry.reconstruct import displacement
 from geomech.systems.capabilities import gaits_per_batch
 from geomech.tiers.base import Plan, Tier, in_groups, solved_phases
-from rft.checks import in_range
-from rft.premise import NONE
+from rft.core.checks import in_range
+from rft.core.premise import NONE
 
 COUNTS = 2, 4, 8, 16, 32, 64  # of segments or nodes of a link
 NOTHING = "nothing that exact link integrals do not give for less"

@@ -27,8 +27,8 @@ from geomech.systems.base import (
 from geomech.systems.capabilities import stored_table
 from geomech.systems.framed import Framed
 from geomech.tiers.base import Numerics, Table
-from rft.premise import ALL
-from rft.refusal import Refusal
+from rft.core.premise import ALL
+from rft.core.refusal import Refusal
 
 INSTEAD = "draw slices by ``Study.ccf(pair=...)``, or use tiers such as path and direct, which need no field"
 

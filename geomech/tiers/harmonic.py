@@ -15,7 +15,7 @@ from geomech.tiers import fitted
 from geomech.tiers.base import Plan, Table, Tier
 from geomech.tiers.direct import direct_plan
 from geomech.tiers.path import path
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 HIGHEST = {2: 15, 3: 9}  # by joints, if [numerics] harmonics is left out
 FEW = 5  # of more: 56 coefficients of each component of four joints, 126 of five

@@ -6,7 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from rft.balance.newton import (
+from rft.effects.contact import Problem, mapped, take
+from rft.formulas.link import point_load, side_load
+from rft.formulas.momentum import frame_inertia
+from rft.formulas.newton import (
     RESULT_ROWS,
     Descent,
     Limits,
@@ -20,9 +23,6 @@ from rft.balance.newton import (
     to_element,
     with_momentum,
 )
-from rft.contact import Problem, mapped, take
-from rft.link import point_load, side_load
-from rft.momentum import frame_inertia
 
 # Samples that have ended leave the arrays where less than COMPACT_BELOW of them are active, and where the arrays have more
 # than COMPACT_ABOVE elements x samples: smaller arrays take as long.
@@ -79,8 +79,8 @@ def loads(problem: Problem, v, rounding) -> list:
 def frame_net(problem: Problem, v, rounding, x, y, theta, mass=None) -> Net:
     """Return the sum of loads, and of the rate of change of momentum, on the frame; entries (B,).
 
-    v, (x, y, theta): velocities of elements and of the frame, over the scale of speed. mass: `rft.momentum.frame_inertia`,
-    computed by default."""
+    v, (x, y, theta): velocities of elements and of the frame, over the scale of speed.
+    mass: `rft.formulas.momentum.frame_inertia`, computed by default."""
     speed = problem.law_speed_scale
     net, *of_points = (
         sum_elements(element_net(e, f, u, speed))
@@ -132,7 +132,7 @@ def row(record) -> Any:
 def solve(
     problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray | None
 ) -> np.ndarray:
-    """Return the results of all samples after one descent, the rows (6, B) of `rft.balance.newton.result`.
+    """Return the results of all samples after one descent, the rows (6, B) of `rft.formulas.newton.result`.
 
     guess: (3, B) or None. Velocities are over the scale of speed."""
     size, fresh = problem.n_samples, guess is None

@@ -12,8 +12,8 @@ import importlib.util
 from collections.abc import Iterator
 from contextvars import ContextVar
 
+from rft.core.refusal import Refusal, require
 from rft.laws.records import is_compilable
-from rft.refusal import Refusal, require
 
 BACKENDS = ("auto", "numpy", "numba")
 

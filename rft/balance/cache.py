@@ -28,10 +28,11 @@ from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 from numba.misc.appdirs import user_cache_dir
 
-from rft import simd, vectors
 from rft.balance.backend import Note
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
+from rft.formulas import simd, vectors
 
+PACKAGE = Path(__file__).parents[1]  # all of rft
 KNOWN = {
     "math",
     "numba",
@@ -159,7 +160,7 @@ def _fault(report: str) -> tuple[str, str]:
     places = []
     for file, number in re.findall(r'File "([^"<]+)", line (\d+)', report):
         path = Path(file).absolute().resolve()
-        ours = path.is_relative_to(Path(vectors.__file__).parent)
+        ours = path.is_relative_to(PACKAGE)
         places.append((ours, str(path), int(number)))
     if not places:
         return "a formula", report.strip().partition("\n")[0]

@@ -2,7 +2,7 @@
 
 A sample that has ended gives its place to the next, so that no sample waits for the slowest. Elements are summed in their
 order either way, so that the digits of a sample do not depend on the others. A kernel is compiled once for each class of
-law records, from the formulas of `rft.link`, `rft.balance.newton` and the law. Importing this module loads numba.
+law records, from the formulas of `rft.formulas.link`, `rft.formulas.newton` and the law. Importing this module loads numba.
 """
 
 from __future__ import annotations
@@ -14,7 +14,11 @@ from numba import njit
 from numba.extending import register_jitable
 
 from rft.balance.cache import cached
-from rft.balance.newton import (
+from rft.bodies.base import Elements
+from rft.effects.contact import NO_FACTOR, Problem, mapped
+from rft.formulas.link import Factor, Incline, Memory, point_load, side_load
+from rft.formulas.momentum import frame_inertia
+from rft.formulas.newton import (
     RESULT_ROWS,
     Descent,
     Frame,
@@ -30,11 +34,7 @@ from rft.balance.newton import (
     to_element,
     with_momentum,
 )
-from rft.bodies.base import Elements
-from rft.contact import NO_FACTOR, Problem, mapped
-from rft.link import Factor, Incline, Memory, point_load, side_load
-from rft.momentum import frame_inertia
-from rft.simd import (
+from rft.formulas.simd import (
     WIDTH,
     add_lanes,
     add_vector,
@@ -44,7 +44,7 @@ from rft.simd import (
     register_formulas,
     store,
 )
-from rft.vectors import absolute, minimum, where
+from rft.formulas.vectors import absolute, minimum, where
 
 # First rows of the records of an element: `Elements`, `Factor`, quadratic drag, `Memory`, `Incline`; of the records of a
 # sample: `Iterate`, `Frame`, scale of speed, `Inertia`. Rows of sums: `Net`, then the square of the slowest speed.

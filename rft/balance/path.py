@@ -21,7 +21,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.balance.arrays import row, velocities
-from rft.balance.newton import (
+from rft.effects.contact import Problem
+from rft.formulas.newton import (
     VISCOUS,
     Limits,
     is_possible,
@@ -30,7 +31,6 @@ from rft.balance.newton import (
     to_element,
     to_frame,
 )
-from rft.contact import Problem
 
 WIDEST = (
     10.0  # rounding to start from, over the scale of speed: no element is that fast
@@ -181,7 +181,7 @@ def follow(
     problem: Problem, limits: Limits, nets: Callable, correction: float, budget: int
 ) -> Iterator[tuple]:
     """Solve all samples of a problem. Yields their indices and their results, rows (6, b) as those of
-    `rft.balance.newton.result`, as they end, with an infinite residual where the budget is spent.
+    `rft.formulas.newton.result`, as they end, with an infinite residual where the budget is spent.
 
     nets: `rft.balance.arrays.nets` or that of `rft.balance.compiled`. correction: intended size of the first correction
     of a step, by which the length of steps is chosen. budget: most evaluations."""

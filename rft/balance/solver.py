@@ -1,6 +1,6 @@
 """Body velocities of many samples: descents in the rounding, then walks along the curve of solutions.
 
-Samples that a descent (`rft.balance.newton`) leaves unsolved are followed along their curve of solutions, which may fold
+Samples that a descent (`rft.formulas.newton`) leaves unsolved are followed along their curve of solutions, which may fold
 (`rft.balance.path`); samples that the walks leave unsolved take slower descents."""
 
 from __future__ import annotations
@@ -16,7 +16,10 @@ import numpy as np
 from rft.balance import arrays
 from rft.balance.backend import compiles
 from rft.balance.listening import listener
-from rft.balance.newton import (
+from rft.balance.path import follow
+from rft.core.threads import keep_freed_memory, run_shares, split, thread_count
+from rft.effects.contact import Assembly, Problem
+from rft.formulas.newton import (
     EVALUATIONS,
     RESIDUAL,
     RESULT_ROWS,
@@ -24,9 +27,6 @@ from rft.balance.newton import (
     Limits,
     is_possible,
 )
-from rft.balance.path import follow
-from rft.contact import Assembly, Problem
-from rft.threads import keep_freed_memory, run_shares, split, thread_count
 
 STUCK_BELOW = 10.0  # an element whose ends are slower than this many times the rounding is at rest
 ELEMENTS_TOGETHER = 24576  # elements x nodes x samples in one batch of NumPy

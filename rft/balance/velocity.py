@@ -12,12 +12,12 @@ from rft.balance.backend import check
 from rft.balance.solver import Accuracy, Solved, solve
 from rft.bodies.base import Body, body_size, joint_speed
 from rft.bodies.pieces import PIECES
-from rft.checks import in_range, real_array
-from rft.contact import assemble
+from rft.core.checks import in_range, real_array
+from rft.core.premise import negated
+from rft.core.refusal import Refusal
 from rft.effects.base import Effect, broken_premises, engine
+from rft.effects.contact import assemble
 from rft.laws.base import Medium
-from rft.premise import negated
-from rft.refusal import Refusal
 
 STATUSES = np.array(["sliding", "stuck", "unconverged"])
 UNCONVERGED = 2
@@ -101,7 +101,7 @@ def body_velocity(
     medium : a force law of `rft.laws`, or any `rft.laws.base.Medium`.
     body : a body of `rft.bodies`, or any `rft.bodies.base.Body`.
     alpha, alphadot : arrays (..., joints) that broadcast, shapes in rad and their rates in rad/time.
-    loads : average of the law over an element, "exact", "midpoint:N" or "gauss:N" (`rft.quadrature`).
+    loads : average of the law over an element, "exact", "midpoint:N" or "gauss:N" (`rft.formulas.quadrature`).
     regularisation : speed, body lengths per radian of joint motion |alphadot|, below which dry friction is rounded off
         (v^2 -> v^2 + rounding^2); an element at rest creeps at about this speed.
     tolerance : largest residual of a solution, to which roundoff is added, 1e-14 of the

@@ -4,7 +4,7 @@ from rft.bodies.backbone import Backbone, ConstantCurvature, Serpenoid
 from rft.bodies.base import BODIES, Body, Elements
 from rft.bodies.chain import Chain
 from rft.bodies.positions import Positions
-from rft.registry import load_all
+from rft.core.registry import load_all
 
 load_all(__name__, __path__)
 

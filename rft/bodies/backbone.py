@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 from rft.bodies.base import BODIES, Elements, Length, numbered_labels
 from rft.bodies.chain import Chain
-from rft.checks import Number, check_numbers, unmasked
-from rft.refusal import require
+from rft.core.checks import Number, check_numbers, unmasked
+from rft.core.refusal import require
 
 
 def _centres(count: int) -> np.ndarray:

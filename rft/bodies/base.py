@@ -7,10 +7,10 @@ from typing import Annotated, Any, NamedTuple, Protocol
 
 import numpy as np
 
-from rft.checks import Number
+from rft.core.checks import Number
+from rft.core.refusal import require
+from rft.core.registry import Registry, classes_with
 from rft.laws.base import cached_if_immutable
-from rft.refusal import require
-from rft.registry import Registry, classes_with
 
 BODIES = Registry("geomech.bodies", "kind", "a body", classes_with("motion"))
 

@@ -11,7 +11,7 @@ import numpy as np
 from rft.bodies.base import BODIES, Length, numbered_labels
 from rft.bodies.links import Links
 from rft.bodies.modes import checked_modes, mode_rows
-from rft.checks import Number, check_numbers
+from rft.core.checks import Number, check_numbers
 
 
 @BODIES.register

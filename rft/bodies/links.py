@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rft.bodies.base import Elements, body_size
-from rft.checks import real_array, unmasked
-from rft.refusal import require
-from rft.se2 import rotated
+from rft.core.checks import real_array, unmasked
+from rft.core.refusal import require
+from rft.formulas.se2 import rotated
 
 
 class Links:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rft.checks import in_range, real_array
-from rft.refusal import Refusal, require
+from rft.core.checks import in_range, real_array
+from rft.core.refusal import Refusal, require
 
 LARGEST = 1e3  # of an entry: angles of larger modes have few digits left
 ROUNDOFF = 1e-12  # of the largest mode: a smaller mode is roundoff

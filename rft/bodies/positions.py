@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from rft.bodies.base import Length, numbered_labels
 from rft.bodies.links import Links
-from rft.checks import check_numbers, in_range, real_array
-from rft.refusal import Refusal, require
+from rft.core.checks import check_numbers, in_range, real_array
+from rft.core.refusal import Refusal, require
 
 STEP = 0.01  # of the shape variables, of differences of order 6: errors of 1e-14 for functions that vary over 1 rad
 WEIGHTS = (

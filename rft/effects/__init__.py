@@ -1,5 +1,6 @@
 """Effects beyond the plain force law, one a file; only those that a scene lists are computed."""
 
+from rft.core.registry import load_all
 from rft.effects.base import (
     EFFECTS,
     ENGINES,
@@ -19,7 +20,6 @@ from rft.effects.skin import SkinFriction
 from rft.effects.slope import Slope
 from rft.effects.towed import TowedSled
 from rft.effects.transient import Transient
-from rft.registry import load_all
 
 load_all(__name__, __path__)
 

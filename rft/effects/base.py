@@ -10,11 +10,11 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from rft.checks import in_range, number_fields
-from rft.contact import Problem
-from rft.premise import NONE, SHAPE_ALONE, Premise
-from rft.refusal import Refusal, located, require
-from rft.registry import Registry, subclasses
+from rft.core.checks import in_range, number_fields
+from rft.core.premise import NONE, SHAPE_ALONE, Premise
+from rft.core.refusal import Refusal, located, require
+from rft.core.registry import Registry, subclasses
+from rft.effects.contact import Problem
 
 # Engines and what they solve, the cheapest first.
 ENGINES = {
@@ -61,7 +61,7 @@ class Site(NamedTuple):
 
 @dataclass(frozen=True)
 class Effect:
-    """Base of all effects; an effect is one change of a `rft.contact.Problem`, and any two effects commute.
+    """Base of all effects; an effect is one change of a `rft.effects.contact.Problem`, and any two effects commute.
 
     Attributes
     ----------
@@ -195,7 +195,7 @@ class Effect:
 
     def apply(self, problem: Problem, site: Site | None, state: Any) -> Problem:
         """Return the problem with this effect; site and state are None unless the effect breaks a premise of
-        `rft.premise.SHAPE_ALONE`."""
+        `rft.core.premise.SHAPE_ALONE`."""
         raise NotImplementedError
 
     def begin(self, problem: Problem, site: Site) -> Any:

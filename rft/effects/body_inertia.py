@@ -1,4 +1,4 @@
-"""Mass of the body: the balance of forces becomes an equation of motion (`rft.momentum`)."""
+"""Mass of the body: the balance of forces becomes an equation of motion (`rft.formulas.momentum`)."""
 
 from __future__ import annotations
 
@@ -7,13 +7,18 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from rft.balance.newton import to_element
-from rft.checks import Number, check_numbers
-from rft.contact import Problem
+from rft.core.checks import Number, check_numbers
+from rft.core.premise import Premise
+from rft.core.refusal import require
 from rft.effects.base import EFFECTS, Effect, Site
-from rft.momentum import MomentumRate, element_momenta, frame_to_ground, ground_to_frame
-from rft.premise import Premise
-from rft.refusal import require
+from rft.effects.contact import Problem
+from rft.formulas.momentum import (
+    MomentumRate,
+    element_momenta,
+    frame_to_ground,
+    ground_to_frame,
+)
+from rft.formulas.newton import to_element
 
 
 @EFFECTS.register

@@ -7,11 +7,11 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, real_array
-from rft.contact import Contact, Problem
+from rft.core.checks import Number, check_numbers, real_array
+from rft.core.premise import NONE, Premise
+from rft.core.refusal import Refusal, require
 from rft.effects.base import EFFECTS, Effect, InMetres, Site
-from rft.premise import NONE, Premise
-from rft.refusal import Refusal, require
+from rft.effects.contact import Contact, Problem
 
 
 @EFFECTS.register

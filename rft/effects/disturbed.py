@@ -7,10 +7,10 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from rft.checks import Number, check_numbers
-from rft.contact import Problem
+from rft.core.checks import Number, check_numbers
+from rft.core.premise import Premise
 from rft.effects.base import EFFECTS, Effect, InMetres, Site
-from rft.premise import Premise
+from rft.effects.contact import Problem
 
 # The map of the ground is a square that moves with the body, in tiles of cells.
 PATCH = 4.0  # body lengths, least side of the square

@@ -8,12 +8,12 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, unmasked
-from rft.contact import Contact, Problem
+from rft.core.checks import Number, check_numbers, unmasked
+from rft.core.refusal import require
 from rft.effects.base import EFFECTS, Effect, InMetres
+from rft.effects.contact import Contact, Problem
+from rft.formulas.link import dry_point
 from rft.laws.granular import Granular
-from rft.link import dry_point
-from rft.refusal import require
 
 
 @EFFECTS.register

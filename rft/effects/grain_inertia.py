@@ -7,13 +7,13 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from rft.checks import Number, check_numbers
-from rft.contact import Problem
+from rft.core.checks import Number, check_numbers
+from rft.core.metres import GRAVITY
+from rft.core.premise import Premise
+from rft.core.refusal import require
 from rft.effects.base import EFFECTS, Effect
+from rft.effects.contact import Problem
 from rft.laws.base import is_linear
-from rft.metres import GRAVITY
-from rft.premise import Premise
-from rft.refusal import require
 
 ASSUMED_K = 2.5  # k of Eq. 2 for loosely packed 0.3 mm glass (Zhang and Goldman 2014); assumed where k is unknown
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from rft.checks import Number, check_numbers
-from rft.contact import Problem
+from rft.core.checks import Number, check_numbers
 from rft.effects.base import EFFECTS, Effect
+from rft.effects.contact import Problem
 
 
 @EFFECTS.register

@@ -8,14 +8,14 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from rft.checks import Number, check_numbers
-from rft.contact import Problem
+from rft.core.checks import Number, check_numbers
+from rft.core.premise import Premise
+from rft.core.refusal import require
 from rft.effects.base import EFFECTS, Effect, Site
+from rft.effects.contact import Problem
+from rft.formulas.link import Incline
 from rft.laws.base import is_linear
 from rft.laws.catalogue import REPOSE
-from rft.link import Incline
-from rft.premise import Premise
-from rft.refusal import require
 
 
 @EFFECTS.register

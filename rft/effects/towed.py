@@ -7,12 +7,12 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from rft.checks import Number, check_numbers
-from rft.contact import Contact, Problem
+from rft.core.checks import Number, check_numbers
+from rft.core.refusal import require
 from rft.effects.base import EFFECTS, Effect, InMetres
+from rft.effects.contact import Contact, Problem
 from rft.laws.base import speed_exponent
 from rft.laws.coulomb import Coulomb
-from rft.refusal import require
 
 
 @EFFECTS.register

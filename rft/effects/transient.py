@@ -7,11 +7,11 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import Number, check_numbers
-from rft.contact import Problem
+from rft.core.checks import Number, check_numbers
+from rft.core.premise import Premise
 from rft.effects.base import EFFECTS, Effect, InMetres, Site
-from rft.link import Memory, developed_direction, find_pivot
-from rft.premise import Premise
+from rft.effects.contact import Problem
+from rft.formulas.link import Memory, developed_direction, find_pivot
 
 SHORTEST = (
     1e-6  # body lengths, least travel: an element at rest creeps at the regularisation

@@ -8,9 +8,9 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import Number, check_numbers
-from rft.metres import GRAVITY
-from rft.refusal import require
+from rft.core.checks import Number, check_numbers
+from rft.core.metres import GRAVITY
+from rft.core.refusal import require
 
 PACKING = 0.56  # of all the bed, voids at floor and surface included, assumed to count grains; 0.6 within, measured
 SHARE = 0.2  # of the Rayleigh time: the largest time step (Otsubo et al., Comput. Geotech. 86, 67 (2017), discuss it)

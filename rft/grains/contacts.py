@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rft.core.metres import GRAVITY
 from rft.grains.bed import Bed
-from rft.metres import GRAVITY
 
 
 class Contacts(NamedTuple):

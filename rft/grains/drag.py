@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rft.core.refusal import require
 from rft.grains.experiment import Run
-from rft.refusal import require
 
 END = 2.5  # half widths at either end that count as no flank: what a cap stirs up reaches so far
 SETTLED = 2.5  # half widths of travel after which the drag is taken for steady; the first 10 mm of a 12 mm rod are not

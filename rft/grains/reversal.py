@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rft.core.refusal import require
 from rft.effects.transient import E_FOLDINGS
 from rft.grains.drag import END
 from rft.grains.experiment import Run
 from rft.grains.motions import Stroke
-from rft.refusal import require
 
 
 class Drags(NamedTuple):

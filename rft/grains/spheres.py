@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rft.bodies.base import Elements
-from rft.checks import in_range
-from rft.refusal import Refusal, require
+from rft.core.checks import in_range
+from rft.core.refusal import Refusal, require
 
 SPACING = 0.25  # of neighbouring spheres, in radii: between them the surface dips by 1 - sqrt(1 - 1/64) = 0.8 % of one
 MOST_SPHERES = 1e5  # of a bar or plate: more take minutes to place

@@ -1,5 +1,6 @@
 """Force laws, one a file, and the catalogue of named media."""
 
+from rft.core.registry import load_all
 from rft.laws.base import (
     LAWS,
     Medium,
@@ -16,7 +17,6 @@ from rft.laws.granular import Granular
 from rft.laws.surface import Surface
 from rft.laws.table import Table
 from rft.laws.viscous import Viscous
-from rft.registry import load_all
 
 load_all(__name__, __path__)
 

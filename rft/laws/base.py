@@ -8,10 +8,10 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from rft.checks import unmasked
-from rft.refusal import Refusal, require
-from rft.registry import Registry, classes_with
-from rft.vectors import formula, sqrt, where
+from rft.core.checks import unmasked
+from rft.core.refusal import Refusal, require
+from rft.core.registry import Registry, classes_with
+from rft.formulas.vectors import formula, sqrt, where
 
 LAWS = Registry("geomech.media", "law", "a law", classes_with("traction"))
 
@@ -24,7 +24,7 @@ class Medium(Protocol):
         f_t = k_t v_t / R,   f_n = k_n v_n / R,   R = sqrt(q^2 v_t^2 + v_n^2 + rounding^2),
 
     and ``viscous`` the coefficients (c_t, c_n) of f_t = c_t v_t, f_n = c_n v_n. Together they give
-    the exact averages of `rft.link`. A law of another form has neither (or None) and is averaged by quadrature.
+    the exact averages of `rft.formulas.link`. A law of another form has neither (or None) and is averaged by quadrature.
 
     Only `traction` is required. Optional members:
 
@@ -33,7 +33,7 @@ class Medium(Protocol):
     k: the factor k of Eq. 2.
     covariance: (n, n), of the parameters named in ``uncertain``; it changes no force.
 
-    A law runs in compiled code if its traction, and its slopes if it has them, are formulas (`rft.vectors.formula`) of
+    A law runs in compiled code if its traction, and its slopes if it has them, are formulas (`rft.formulas.vectors.formula`) of
     its number fields.
 
     Examples

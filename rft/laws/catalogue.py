@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from rft.core.metres import GRAVITY
 from rft.laws.base import Medium
 from rft.laws.coulomb import Coulomb
 from rft.laws.granular import Granular
 from rft.laws.surface import Surface
 from rft.laws.viscous import Viscous
-from rft.metres import GRAVITY
 
 
 @dataclass(frozen=True)

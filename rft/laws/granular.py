@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from rft.checks import Number, check_numbers, checked_covariance
+from rft.core.checks import Number, check_numbers, checked_covariance
+from rft.core.refusal import require
 from rft.laws.base import LAWS, TermLaw
-from rft.refusal import require
 
 
 @LAWS.register
@@ -24,7 +24,7 @@ class Granular(TermLaw):
     k is part of the unit of force; only effects measured against the weight of grains use it (grain inertia).
 
     covariance (-): of C and gamma0 (in rad), and of k as a third parameter if k is given and has one; it changes no
-    force and is what drag measurements leave open (`rft.calibrate`).
+    force and is what drag measurements leave open (`rft.fits.rods`).
 
     Examples
     --------

@@ -2,7 +2,7 @@
 
 The record of a law is a NamedTuple of arrays whose class holds the formulas `traction`, `slopes` and `average`. A
 closed form, a sum of viscous and dry terms, has exact averages over an element; any other law is averaged by a
-quadrature rule. A law whose traction is no formula (`rft.vectors.formula`) is computed by NumPy alone."""
+quadrature rule. A law whose traction is no formula (`rft.formulas.vectors.formula`) is computed by NumPy alone."""
 
 from __future__ import annotations
 
@@ -13,7 +13,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rft.checks import is_number
+from rft.core.checks import is_number
+from rft.formulas.link import dry, sum_loads, viscous
+from rft.formulas.quadrature import (
+    QUADRATURE,
+    by_nodes,
+    nodes_and_weights,
+    parse,
+    slopes_by_differences,
+)
+from rft.formulas.vectors import formula, is_formula
 from rft.laws.base import (
     cached_if_immutable,
     is_closed,
@@ -22,15 +31,6 @@ from rft.laws.base import (
     terms_slopes,
     terms_traction,
 )
-from rft.link import dry, sum_loads, viscous
-from rft.quadrature import (
-    QUADRATURE,
-    by_nodes,
-    nodes_and_weights,
-    parse,
-    slopes_by_differences,
-)
-from rft.vectors import formula, is_formula
 
 
 @formula
@@ -124,7 +124,7 @@ def is_compilable(law_record) -> bool:
 
 
 def rule_for(law, rule: str) -> tuple[str, int]:
-    """Return the rule as `rft.quadrature.parse` does, but QUADRATURE in place of "exact" for a law without a closed
+    """Return the rule as `rft.formulas.quadrature.parse` does, but QUADRATURE in place of "exact" for a law without a closed
     form."""
     kind, count = parse(rule)
     return (kind, count) if kind != "exact" or is_closed(law) else parse(QUADRATURE)

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from rft.checks import Number, check_numbers, checked_covariance
+from rft.core.checks import Number, check_numbers, checked_covariance
+from rft.core.refusal import require
 from rft.laws.base import LAWS, TermLaw
-from rft.refusal import require
 
 
 @LAWS.register

@@ -7,12 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from rft.checks import real_array
-from rft.drag import rod_drag
+from rft.core.checks import real_array
+from rft.core.refusal import require
+from rft.formulas.vectors import (
+    absolute,
+    copysign,
+    floor,
+    formula,
+    gather,
+    minimum,
+    sqrt,
+    where,
+)
 from rft.laws.base import LAWS, require_drag
+from rft.laws.drag import rod_drag
 from rft.laws.granular import Granular
-from rft.refusal import require
-from rft.vectors import absolute, copysign, floor, formula, gather, minimum, sqrt, where
 
 MOST_ROWS = 10_000
 MOST_CELLS = 4096  # of a curve on [0, 1]
@@ -27,7 +36,7 @@ class Table:
     """Rate-independent drag (f_t, f_n) measured at attack angles psi between velocity and body axis, in any one unit.
 
     psi (rad): at least three different angles that come within 15 degrees of 0 and of pi/2; other angles are mapped to 0
-    to pi/2 by symmetry, and forces at equal angles averaged (`rft.drag.rod_drag`). f_t, f_n (-): as many forces per
+    to pi/2 by symmetry, and forces at equal angles averaged (`rft.laws.drag.rod_drag`). f_t, f_n (-): as many forces per
     length along and across, in one unit of any kind, positive against the motion.
 
     With the unit velocity v, f_t is a function of v.t = cos psi and f_n a function of v.n = sin psi, as in Eq. 3 of

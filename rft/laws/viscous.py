@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from rft.checks import Number, check_numbers, checked_covariance
+from rft.core.checks import Number, check_numbers, checked_covariance
 from rft.laws.base import LAWS, TermLaw
 
 
@@ -17,7 +17,7 @@ class Viscous(TermLaw):
     A ratio of 2 is the slender-body limit of Gray and Hancock, J. Exp. Biol. 32, 802 (1955).
 
     covariance (-): of the ratio, 1 x 1; it changes no force and is what drag measurements leave open
-    (`rft.calibrate`).
+    (`rft.fits.rods`).
 
     Examples
     --------

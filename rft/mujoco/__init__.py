@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
     from rft.mujoco.sand import Footprints, Sand, attach, sample

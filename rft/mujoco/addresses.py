@@ -12,7 +12,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from rft.refusal import require
+from rft.core.refusal import require
 
 UNKNOWN = f"MuJoCo {mujoco.__version__} is unknown"
 FARTHEST = (

@@ -8,18 +8,18 @@ from functools import cached_property
 import mujoco
 import numpy as np
 
-from rft.ground import Ground
-from rft.meshes.blocks import Blocks
-from rft.meshes.contact import Motion, faces
-from rft.meshes.extruded import Extruded
-from rft.meshes.law import Spatial
-from rft.meshes.mesh import Mesh
-from rft.meshes.zones import Place, Zones, share_in
 from rft.mujoco.footprints import Prints
-from rft.mujoco.geoms import described
 from rft.mujoco.hills import FLAT, Hills, tangent_plane
 from rft.mujoco.model_parts import last_dof
 from rft.mujoco.parts import Frames
+from rft.terradynamics.ground import Ground
+from rft.terradynamics.meshes.blocks import Blocks
+from rft.terradynamics.meshes.contact import Motion, faces
+from rft.terradynamics.meshes.extruded import Extruded
+from rft.terradynamics.meshes.geoms import described
+from rft.terradynamics.meshes.law import Spatial
+from rft.terradynamics.meshes.mesh import Mesh
+from rft.terradynamics.meshes.zones import Place, Zones, share_in
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from numba import carray, types
 from numba.core.ccallback import CFunc
 from numba.extending import register_jitable
 
-from rft.meshes.zones import Zones
+from rft.formulas.simd import WIDTH, register_formulas
 from rft.mujoco import (
     c_calls,
     compiled_algebra,
@@ -71,7 +71,7 @@ from rft.mujoco.layout import (
 )
 from rft.mujoco.parts import Frames
 from rft.mujoco.rows import Rows
-from rft.simd import WIDTH, register_formulas
+from rft.terradynamics.meshes.zones import Zones
 
 LAYOUT = len(NAMES)
 for function in (

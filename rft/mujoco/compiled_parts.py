@@ -11,9 +11,21 @@ from numba import carray, types
 from numba.extending import overload, register_jitable
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
-from rft.ground import Ground
-from rft.meshes.compiled import read_face
-from rft.meshes.contact import (
+from rft.formulas.simd import (
+    WIDTH,
+    add_vector,
+    any_of,
+    register_formulas,
+    store,
+    sum_of,
+)
+from rft.formulas.simd import load as read
+from rft.formulas.vectors import sqrt
+from rft.mujoco import parts
+from rft.mujoco.c_calls import call, compiled_c, integers_at, numbers_at, pointer_to
+from rft.terradynamics.ground import Ground
+from rft.terradynamics.meshes.compiled import read_face
+from rft.terradynamics.meshes.contact import (
     Motion,
     Part,
     corner_heights,
@@ -22,13 +34,15 @@ from rft.meshes.contact import (
     part_below,
     velocity_of_middle,
 )
-from rft.meshes.triples import dot, plus
-from rft.meshes.zones import NOWHERE, PARTLY, Place, extent_in, share_in, shared
-from rft.mujoco import parts
-from rft.mujoco.c_calls import call, compiled_c, integers_at, numbers_at, pointer_to
-from rft.simd import WIDTH, add_vector, any_of, register_formulas, store, sum_of
-from rft.simd import load as read
-from rft.vectors import sqrt
+from rft.terradynamics.meshes.triples import dot, plus
+from rft.terradynamics.meshes.zones import (
+    NOWHERE,
+    PARTLY,
+    Place,
+    extent_in,
+    share_in,
+    shared,
+)
 
 FIELDS = 12  # vectors of eight that hold a part of eight faces
 SUMS, DAMPERS = 36, 10  # sums that the slopes of loads, and of dampers, follow from

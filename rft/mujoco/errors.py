@@ -10,11 +10,11 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from rft.meshes.blocks import Blocks
-from rft.meshes.contact import faces
 from rft.mujoco import installed
 from rft.mujoco.bed import Bed
-from rft.mujoco.geoms import mesh_of_elements
+from rft.terradynamics.meshes.blocks import Blocks
+from rft.terradynamics.meshes.contact import faces
+from rft.terradynamics.meshes.geoms import mesh_of_elements
 
 # A difference d of runs at lengths h and h / 2 leaves the error d / (1 - 2^-p) of the first, p the order.
 ORDER_OF_STEPS, ORDER_OF_ELEMENTS = 1, 2

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from rft.mujoco.geoms import geom_name
-from rft.refusal import formatted, require
+from rft.core.refusal import formatted, require
+from rft.terradynamics.meshes.geoms import geom_name
 
 NEAR = 1e-3  # m: planes that near the surface are the floor of the sand
 PARALLEL = 1e-3  # rad

@@ -22,11 +22,11 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from rft.checks import Number, check_numbers
+from rft.core.checks import Number, check_numbers
+from rft.core.metres import GRAVITY
+from rft.core.refusal import require
 from rft.laws.catalogue import REPOSE
-from rft.metres import GRAVITY
 from rft.mujoco.hills import tangent_plane
-from rft.refusal import require
 
 MOST_CELLS = 1_000_000
 EVERY = 256.0  # steps: how often the highest ground is looked for again
@@ -45,7 +45,7 @@ class Footprints:
     """Ground that remembers, on a grid of cells.
 
     spacing: of the cells, m. length, width: of the grid along x and y, m, around the place ``x``, ``y``; the ground beyond it
-    remembers nothing. repose: rad; the default is that of `rft.ground.Slope`.
+    remembers nothing. repose: rad; the default is that of `rft.terradynamics.ground.Slope`.
 
     Examples
     --------

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from rft.mujoco.geoms import geom_kind, geom_name
-from rft.refusal import formatted, require
+from rft.core.refusal import formatted, require
+from rft.terradynamics.meshes.geoms import geom_kind, geom_name
 
 UPRIGHT = 1e-6  # rad: tilt of a height field that counts as none
 

@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 
 from rft.balance.backend import Note, compiles
-from rft.meshes.contact import record
+from rft.core.refusal import require
 from rft.mujoco import numpy_step
 from rft.mujoco.addresses import check_places, functions, places, takes_data
 from rft.mujoco.bed import Bed
@@ -41,7 +41,7 @@ from rft.mujoco.layout import (
     WATCHED_STATUS,
 )
 from rft.mujoco.model_parts import ModelParts
-from rft.refusal import require
+from rft.terradynamics.meshes.contact import record
 
 ROWS = 4096  # beds of sand at one time
 RETIRED = 64  # layouts of detached beds that are kept, for a step of another thread that is still under way

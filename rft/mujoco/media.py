@@ -11,16 +11,16 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from rft.checks import in_range
+from rft.core.checks import in_range
+from rft.core.refusal import Refusal, formatted, require
+from rft.fits.plates import StressFit, ZetaFit
 from rft.laws import CATALOGUE
-from rft.meshes.extruded import Extruded
-from rft.meshes.law import Spatial
 from rft.mujoco import installed
 from rft.mujoco.bed import Bed
-from rft.plates import VERTICAL, PlateStress, StressMap
-from rft.plates.calibrate import StressFit, ZetaFit
-from rft.plates.stress import COEFFICIENTS
-from rft.refusal import Refusal, formatted, require
+from rft.terradynamics.meshes.extruded import Extruded
+from rft.terradynamics.meshes.law import Spatial
+from rft.terradynamics.plates import VERTICAL, PlateStress, StressMap
+from rft.terradynamics.plates.stress import COEFFICIENTS
 
 MOST_DRAWS = (
     100  # times n; draws that do not bear a plate pushed straight down are drawn again
@@ -47,7 +47,7 @@ def law_of(medium: object) -> Extruded | Spatial:
         return medium
     if isinstance(medium, PlateStress):
         return Extruded(medium)  # refuses all but nine coefficients
-    cure = "give a name of rft.plates.VERTICAL, a StressMap or a Spatial"
+    cure = "give a name of rft.terradynamics.plates.VERTICAL, a StressMap or a Spatial"
     raise Refusal(
         "the medium has no vertical law in three dimensions", value=medium, instead=cure
     )
@@ -61,7 +61,7 @@ def sample(
 ) -> list[StressMap | Spatial]:
     """Return n media within the uncertainty of one, the same for the same seed.
 
-    medium: a fit of `rft.plates.calibrate`, whose coefficients are drawn from its covariance, or whose strength from its
+    medium: a fit of `rft.fits.plates`, whose coefficients are drawn from its covariance, or whose strength from its
     error; or any other medium, the logarithm of whose strength then has the standard deviation ``spread``. A drawn map that
     does not bear a plate pushed straight down is drawn again."""
     in_range("n", n, 1, 1_000_000, whole=True)

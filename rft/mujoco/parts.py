@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.ground import Ground
-from rft.meshes.blocks import Blocks
-from rft.meshes.contact import (
+from rft.terradynamics.ground import Ground
+from rft.terradynamics.meshes.blocks import Blocks
+from rft.terradynamics.meshes.contact import (
     Motion,
     Part,
     corner_heights,
@@ -21,8 +21,8 @@ from rft.meshes.contact import (
     part_below,
     velocity_of_middle,
 )
-from rft.meshes.law import Spatial
-from rft.meshes.zones import Place, Zones, share_in, shared
+from rft.terradynamics.meshes.law import Spatial
+from rft.terradynamics.meshes.zones import Place, Zones, share_in, shared
 
 
 class Frames(NamedTuple):

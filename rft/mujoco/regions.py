@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from rft.meshes.zones import EVERYWHERE, Zones
-from rft.refusal import Refusal, formatted, require
+from rft.core.refusal import Refusal, formatted, require
+from rft.terradynamics.meshes.zones import EVERYWHERE, Zones
 
 MOST = 100  # planes of all regions
 CURE = "write it like 'x > 0.5' or '0 < x < 1 and y > 0.2 * x', x and y in m"

@@ -13,30 +13,30 @@ import mujoco
 import numpy as np
 
 from rft.balance.backend import Note
-from rft.checks import in_range
-from rft.ground import (
+from rft.core.checks import in_range
+from rft.core.refusal import Refusal, formatted, located, require
+from rft.mujoco import installed
+from rft.mujoco.bed import Bed
+from rft.mujoco.errors import Control, RunError, error_of_run
+from rft.mujoco.floor import Apart, apart, floors, part, rejoin
+from rft.mujoco.footprints import FORM, Footprints, Prints
+from rft.mujoco.hills import FLAT, Hills, hills_of
+from rft.mujoco.media import Media, law_of, one_form, sample
+from rft.mujoco.regions import zones_of
+from rft.mujoco.selection import chosen_geoms, overlap_note
+from rft.mujoco.sinkage import sinkage
+from rft.terradynamics.ground import (
     Ground,
     GroundEffect,
     Slope,
     checked_effects,
     ground_of,
 )
-from rft.meshes.extruded import Extruded
-from rft.meshes.law import Spatial
-from rft.meshes.mesh import Mesh
-from rft.mujoco import installed
-from rft.mujoco.bed import Bed
-from rft.mujoco.errors import Control, RunError, error_of_run
-from rft.mujoco.floor import Apart, apart, floors, part, rejoin
-from rft.mujoco.footprints import FORM, Footprints, Prints
-from rft.mujoco.geoms import described, geom_name, mesh_of_elements
-from rft.mujoco.hills import FLAT, Hills, hills_of
-from rft.mujoco.media import Media, law_of, one_form, sample
-from rft.mujoco.regions import zones_of
-from rft.mujoco.selection import chosen_geoms, overlap_note
-from rft.mujoco.sinkage import sinkage
-from rft.plates import StressMap
-from rft.refusal import Refusal, formatted, located, require
+from rft.terradynamics.meshes.extruded import Extruded
+from rft.terradynamics.meshes.geoms import described, geom_name, mesh_of_elements
+from rft.terradynamics.meshes.law import Spatial
+from rft.terradynamics.meshes.mesh import Mesh
+from rft.terradynamics.plates import StressMap
 
 __all__ = ["Footprints", "Sand", "attach", "sample"]
 
@@ -291,8 +291,8 @@ def attach(
         Compiled model, z up. Its MjData, ``mj_step``, ``mj_forward``, ``rollout`` and the viewer feel the sand; a copy of
         the model does not, so a ``Batch`` is made by `Sand.batch`.
     medium : str, StressMap or Spatial
-        Name in `rft.plates.VERTICAL` or a stress map of the vertical plane, which acts in three dimensions as
-        `rft.meshes.extruded` has it; or a law of three dimensions.
+        Name in `rft.terradynamics.plates.VERTICAL` or a stress map of the vertical plane, which acts in three dimensions as
+        `rft.terradynamics.meshes.extruded` has it; or a law of three dimensions.
     geoms : str, int or list of these
         Names of the geoms in the sand or of their bodies, patterns such as "leg*" and groups; by default all that move.
         Geoms that can touch nothing are left out, unless they are named or nothing else is meant.
@@ -300,14 +300,14 @@ def attach(
         Height of the surface at x = 0; or the name of a height field, which is the surface then. Each geom sees the plane
         that touches it below the geom; the ground there is as strong as where it is level.
     slope : float, rad
-        Angle by which the surface rises along x; the ground is weaker as `rft.ground.Slope` has it.
+        Angle by which the surface rises along x; the ground is weaker as `rft.terradynamics.ground.Slope` has it.
     element : float, m
         Length of the edges of the triangles that geoms are cut into; by default as many as the shape of each geom asks for
-        (`rft.mujoco.geoms.mesh_of_elements`).
+        (`rft.terradynamics.meshes.geoms.mesh_of_elements`).
     rounding : float, m/s
         Speed below which the stress on an element falls off in proportion to its speed; by default 1e-5 m/s.
     effects : list of GroundEffect
-        Effects on the ground, such as `rft.ground.GrainInertia`.
+        Effects on the ground, such as `rft.terradynamics.ground.GrainInertia`.
     regions : dict
         Other media by the regions where they lie, such as ``{"x > 0.5": "poppy-seeds-close", "0 < y < x": other}``, with x
         and y in m in the world. A place belongs to the first region that holds it, or else to ``medium``.

@@ -10,8 +10,8 @@ from collections.abc import Iterable, Sequence
 import mujoco
 import numpy as np
 
-from rft.mujoco.geoms import described, geom_kind, geom_name, is_movable
-from rft.refusal import Refusal, formatted, require
+from rft.core.refusal import Refusal, formatted, require
+from rft.terradynamics.meshes.geoms import described, geom_kind, geom_name, is_movable
 
 SOLID = ("sphere", "ellipsoid", "cylinder", "capsule", "box", "mesh")
 OVERLAP = 0.05  # depth, over the smaller geom's radius, from which an overlap is told

@@ -4,7 +4,7 @@ checked."""
 from geomech.io.tables.base import FORMATS, LAYOUTS, ORDERS, SIGNS, Stored, scaled
 from geomech.io.tables.frames import in_frame
 from geomech.io.tables.read import load
-from rft.registry import load_all
+from rft.core.registry import load_all
 
 load_all(__name__, __path__)
 

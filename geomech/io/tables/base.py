@@ -15,8 +15,8 @@ from geomech.geometry.harmonics import Harmonics
 from geomech.geometry.metric import Finsler, Metric
 from geomech.geometry.reconstruct import displacement
 from geomech.geometry.tube import Tube
-from rft.refusal import Refusal, printable
-from rft.registry import Registry, functions_with
+from rft.core.refusal import Refusal, printable
+from rft.core.registry import Registry, functions_with
 
 LONGEST_NAME = 60  # characters of what a file calls a frame, or a shape variable
 MINIMUM_PERTURBATION = "minimum-perturbation"

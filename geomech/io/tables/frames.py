@@ -18,8 +18,8 @@ from geomech.geometry.harmonics import Harmonics, basis
 from geomech.geometry.minimum_perturbation import minimum_perturbation
 from geomech.geometry.tube import Tube
 from geomech.io.tables.base import MINIMUM_PERTURBATION, Stored, rms
-from rft import se2
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
+from rft.formulas import se2
 
 
 def in_frame(stored: Stored, frame: str, chain: Any = None) -> Stored:

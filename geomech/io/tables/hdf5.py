@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from geomech.io.tables.matlab import DEEPEST, LARGEST
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 MOST_NODES = 20_000  # some seconds of reading; files of sysplotter have some hundreds
 CURE = "pip install 'geomech[hdf5]', or save it in MATLAB by save(FILE, ..., '-v7')"

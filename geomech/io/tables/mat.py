@@ -43,7 +43,7 @@ from geomech.io.tables.base import (
 )
 from geomech.io.tables.calc import write_struct
 from geomech.io.tables.netcdf import UNITS, shape_name
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 ANGLES = ("alpha1", "alpha2")
 ENTRIES = tuple(f"A{row}{joint}" for row in ("x", "y", "theta") for joint in (1, 2))

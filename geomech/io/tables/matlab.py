@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 LARGEST = 500_000_000  # bytes of a file, inflated
 HEADER = 128  # bytes before the first element

@@ -30,7 +30,7 @@ from geomech.io.tables.base import (
     numbers,
     rms,
 )
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 SOURCE = "write it anew with 'geomech connection SCENE -o FILE.nc'"
 FITTED = "write it anew with 'geomech fit-gait LOG.csv -o FILE.nc'"

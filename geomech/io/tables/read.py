@@ -9,7 +9,7 @@ from geomech.core.errors import choose
 from geomech.io.files import read, reason_of
 from geomech.io.foreign import refuse_program
 from geomech.io.tables.base import FORMATS, ORDERS, SIGNS, Stored
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 LARGEST = 2_000_000_000  # bytes of a file: the finest field there is
 

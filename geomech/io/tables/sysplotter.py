@@ -35,7 +35,7 @@ from geomech.io.tables.base import (
     numbers,
     rms,
 )
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 CALC = "save it by sys_calcsystem, in a file whose name ends in _calc.mat"
 CONTENT = "vecfield.eval.content"

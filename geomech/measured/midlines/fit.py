@@ -12,7 +12,7 @@ from geomech.core.errors import choose
 from geomech.measured import phase
 from geomech.measured.midlines import intervals, kinematics, reader, slips, smooth
 from geomech.measured.midlines.trial import Trial
-from rft.checks import in_range
+from rft.core.checks import in_range
 
 GAP = 1 / 8  # of a cycle without a frame, at most
 ROWS = 10  # frames a cycle, at least

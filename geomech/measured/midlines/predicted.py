@@ -15,8 +15,8 @@ from geomech.measured.midlines.fit import Kinematics
 from geomech.measured.midlines.kinematics import PHASES, QUANTITIES
 from geomech.systems import Swimmer
 from rft import Backbone
-from rft.checks import number_fields
-from rft.refusal import Refusal
+from rft.core.checks import number_fields
+from rft.core.refusal import Refusal
 
 HARMONICS = 5  # of the mean cycle's headings
 ELEMENTS = smooth.NODES  # of the body; twice as many tell the error

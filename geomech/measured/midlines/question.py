@@ -15,7 +15,7 @@ from geomech.measured.midlines.kinematics import PARTS, QUANTITIES
 from geomech.measured.midlines.predicted import COMPARED, Comparison, compare
 from geomech.scenes.read import medium_of
 from geomech.studies.question import Allow, Progress, Question
-from rft.checks import in_range
+from rft.core.checks import in_range
 
 LABELS = {
     "frequency": "cycles per time",

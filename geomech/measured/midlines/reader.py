@@ -33,8 +33,8 @@ from geomech.io.rows import (
 from geomech.io.rows import read as read_rows
 from geomech.measured.log import JOINT
 from geomech.measured.midlines.trial import Trial
-from rft.checks import in_range
-from rft.refusal import Refusal, formatted
+from rft.core.checks import in_range
+from rft.core.refusal import Refusal, formatted
 
 LARGEST_FILE = 200_000_000  # bytes
 FEWEST_FRAMES, FEWEST_POINTS, MOST_POINTS = 12, 5, 1000

@@ -12,7 +12,7 @@ from geomech.measured.midlines.trial import Trial
 from geomech.measured.synthetic import _integrated as integrated
 from geomech.measured.synthetic import _smooth as smooth_noise
 from geomech.systems.base import body_size
-from rft.checks import in_range
+from rft.core.checks import in_range
 
 FINER = 3  # steps of the integration between two frames
 MEMORY = 0.25  # correlation time of the wave's deviations, cycles, if none is given

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 UNITS = {
     "m": 1.0,

@@ -28,7 +28,7 @@ from geomech.scenes.key import keys_of
 from geomech.scenes.write import text_of, without_gait
 from geomech.studies.charts import SHARES, Chart, series_of
 from geomech.systems.base import body_size, length_unit, shape_labels
-from rft.refusal import Refusal, in_line
+from rft.core.refusal import Refusal, in_line
 
 FOLDER = Path(__file__).parent
 SCRIPTS = (

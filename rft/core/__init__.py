@@ -1,0 +1,1 @@
+"""Checks, refusals, registries and threads, which know no mechanics."""

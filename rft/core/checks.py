@@ -1,0 +1,160 @@
+"""Checks of arguments: numbers within bounds, arrays of real numbers, covariances. All raise ValueError with one line.
+
+The bounds, the unit and the meaning of a number field of a class stand in its annotation (`Number`):
+
+    radius: Annotated[float, Number(0, 1, "body lengths", "of the body")]
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import numbers
+from dataclasses import fields, is_dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeGuard, get_args, get_type_hints
+
+from rft.core.refusal import Refusal, require
+
+if TYPE_CHECKING:
+    import numpy as np
+from numpy.typing import ArrayLike
+
+
+class Number(NamedTuple):
+    """Bounds, unit and meaning of a number field.
+
+    low, high: smallest and largest allowed value. unit: "-" for none. meaning: as lists of keys print it. whole: whether
+    the number must be an integer."""
+
+    low: float
+    high: float
+    unit: str
+    meaning: str
+    whole: bool = False
+
+
+@functools.cache
+def number_fields(kind: Any) -> dict[str, Number]:
+    """Return the `Number` annotations of a class by field."""
+    try:
+        hints = get_type_hints(kind, include_extras=True)
+    except (
+        NameError,
+        TypeError,
+    ):  # annotations of a user's class may name what is not importable
+        return {}
+    numbers = {
+        name: [x for x in get_args(hint) if isinstance(x, Number)]
+        for name, hint in hints.items()
+    }
+    return {
+        name: annotations[0] for name, annotations in numbers.items() if annotations
+    }
+
+
+def check_numbers(owner: Any) -> None:
+    """Raise ValueError unless the number fields of an object lie within the bounds of their annotations, or are None where
+    that is the default; store integers as int."""
+    defaults = {f.name: f.default for f in fields(owner)} if is_dataclass(owner) else {}
+    kind: Any = type(owner)
+    for name, number in number_fields(kind).items():
+        value = getattr(owner, name)
+        if value is not None or defaults.get(name) is not None:
+            in_range(name, value, number.low, number.high, number.whole, number.unit)
+            if number.whole:
+                object.__setattr__(owner, name, int(value))
+
+
+def real_array(name: str, x: ArrayLike) -> np.ndarray:
+    """Return x as an array of floats; ValueError with its name unless it is an array of real numbers."""
+    import numpy as np  # a command that refuses starts without it
+
+    refuse_mask(name, x)
+    try:
+        array = np.asarray(x)
+        if array.dtype.kind in "iuf" or (
+            array.dtype.kind == "O" and all(map(is_number, array.flat))
+        ):
+            return array.astype(float, copy=False)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise Refusal(f"{name} must be real numbers in equal rows", value=x)
+
+
+def refuse_mask(name: str, x: object) -> None:
+    """Raise ValueError if x is a masked array, or rows of such, with a masked value,
+    which NumPy would turn into the number under the mask."""
+    import numpy as np
+
+    for row in x if isinstance(x, (list, tuple)) else (x,):
+        if isinstance(row, np.ma.MaskedArray) and np.ma.is_masked(row):
+            raise Refusal(
+                f"{name} has masked values",
+                instead="leave them out, or fill them with nan where nan is taken",
+            )
+
+
+def unmasked(name: str, x: ArrayLike) -> np.ndarray:
+    """Return x as an array of floats, otherwise unchecked; ValueError for a masked
+    value."""
+    import numpy as np
+
+    refuse_mask(name, x)
+    return np.asarray(x, float)
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Return whether value is one real number; True and False are not."""
+    return isinstance(value, numbers.Real) and not isinstance(value, bool)
+
+
+def is_whole(value: object) -> bool:
+    """Return whether value is an integer, as an int or a float."""
+    return is_number(value) and (
+        isinstance(value, numbers.Integral)
+        or (math.isfinite(value) and value == int(value))
+    )
+
+
+def in_range(
+    name: str, value: Any, low: float, high: float, whole: bool = False, unit: str = "-"
+) -> None:
+    """Raise ValueError with the name unless value is a number, if ``whole`` an integer, from low to high."""
+    exact = (
+        getattr(value, "item", lambda: value)() if is_number(value) else value
+    )  # float32 has no 1e-50
+    if not ((is_whole if whole else is_number)(value) and low <= exact <= high):
+        bounds = f"{low:g} to {high:g}" + (f" {unit}" if unit != "-" else "")
+        raise Refusal(
+            f"{name} must be a {'whole ' * whole}number from {bounds}", value=value
+        )
+
+
+def checked_covariance(value, *sizes: int) -> tuple[tuple[float, ...], ...] | None:
+    """Return a covariance matrix as rows of floats, None as it is; ValueError unless it is finite, n x n for an n among
+    ``sizes``, symmetric and, to roundoff, without a negative eigenvalue."""
+    if value is None:
+        return None
+    import numpy as np
+
+    matrix, allowed = (
+        real_array("covariance", value),
+        " or ".join(f"{n} x {n}" for n in sizes),
+    )
+    require(
+        matrix.shape in [(n, n) for n in sizes] and bool(np.isfinite(matrix).all()),
+        f"covariance must be {allowed} finite numbers",
+        value=value,
+    )
+    deviation = np.sqrt(np.maximum(np.diag(matrix), 0.0))
+    scale = np.where(deviation > 0, deviation, 1.0)
+    correlation = matrix / scale[:, None] / scale
+    is_symmetric = bool((np.abs(correlation - correlation.T) <= 1e-9).all())
+    require(
+        is_symmetric
+        and bool(np.linalg.eigvalsh(correlation)[0] >= -1e-9)
+        and bool((matrix[:, deviation == 0] == 0).all()),
+        "covariance must be symmetric and without negative eigenvalues",
+        value=value,
+    )
+    return tuple(tuple(row) for row in matrix.tolist())

@@ -1,0 +1,1 @@
+"""Force laws and stress maps fitted to measured drag."""

@@ -1,0 +1,1 @@
+"""Formulas for numbers, arrays and the vectors of compiled code alike."""

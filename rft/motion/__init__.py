@@ -1,0 +1,1 @@
+"""Bodies in motion: time steps, limit cycles and the work that is done."""

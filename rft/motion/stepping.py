@@ -1,0 +1,526 @@
+"""Time stepping through a gait, for swimmers whose motion depends on place, past or mass.
+
+At every phase the balance of forces is solved for the body velocity. Steps are implicit: memory is that at the end of the
+step, momentum follows BDF2, the backward difference of order 2, which damps errors at any step. Without memory, slope and
+mass the result is that of `rft.body_velocity` at every phase, and with them it converges to that as they go to zero. All
+samples (amplitudes, parameters) take each step together. Time stepping starts from that result on undisturbed ground, and
+repeats the gait until the displacement per cycle no longer changes.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rft.balance.arrays import frame_net, velocities, with_frame_velocity
+from rft.balance.backend import check
+from rft.balance.solver import Accuracy, Solved, solve
+from rft.balance.velocity import checked_input
+from rft.bodies.base import Body, body_size, half_lengths, joint_speed
+from rft.bodies.pieces import PIECES
+from rft.core.checks import in_range
+from rft.core.premise import Premise
+from rft.core.refusal import require
+from rft.effects.base import PAST, Effect, Site, broken_premises, stepwise_effects
+from rft.effects.contact import Assembly, Problem, assemble
+from rft.formulas.newton import to_element
+from rft.laws.base import Medium
+from rft.motion import limit_cycle
+from rft.motion.work import Work, element_work
+
+MOST_CYCLES = 60
+PLAIN_CYCLES = 12  # before the memory of a body without mass is led to its limit
+MOST_STORED = 100_000  # elements x nodes at all phases, up to which their balances are stored: some 8 MB
+PAUSE = 1e-9  # of the rms joint speed, below which the joints pause and that speed is the scale
+
+
+class TimeSteps(NamedTuple):
+    """The last cycle of time stepping at N phases.
+
+    xi: (..., N, 3), body velocity in the body frame, length/rad, length/rad, 1. pose: (..., N + 1, 3), of the body frame
+    on the ground, whose origin and x axis are those of the frame at the first step. residual: (...), the largest, as in
+    `rft.Solution`. status: (...), "periodic", "running" (the requested number of cycles, not yet periodic), "not
+    periodic" or "unconverged". drift: (...), largest component of the sum of all changes of displacement, body lengths
+    and rad, in cycles to come. cycles: their number. work: (..., N) each, or None. path: (..., cycles N + 1, 3), all
+    poses since the first step, or None.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft import Chain, Granular, time_steps
+    >>> from rft.effects import Transient
+    >>> t = 2 * np.pi * np.arange(32) / 32
+    >>> alpha, alphadot = np.stack([np.cos(t), np.sin(t)], -1), np.stack([-np.sin(t), np.cos(t)], -1)
+    >>> steps = time_steps(Granular(1.8, 0.24), Chain(), alpha, alphadot, effects=[Transient(travel=0.12)])
+    >>> steps.xi.shape, steps.pose.shape, steps.cycles > 1
+    ((32, 3), (33, 3), True)
+    """
+
+    xi: np.ndarray
+    pose: np.ndarray
+    residual: np.ndarray
+    status: np.ndarray
+    drift: np.ndarray
+    cycles: int
+    work: Work | None
+    path: np.ndarray | None = None
+
+    def __repr__(self) -> str:
+        kinds = ", ".join(
+            f"{n} {kind}"
+            for kind, n in zip(*np.unique(self.status, return_counts=True))
+        )
+        count = np.size(self.status)
+        size = f"{count} gait{'s' * (count != 1)} of {np.shape(self.xi)[-2]} phases, {self.cycles} cycles: {kinds}"
+        return f"TimeSteps({size}; residual up to {np.max(self.residual, initial=0.0):.1e})"
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Pose after the cycle in the frame at its start, (..., 3)."""
+        return np.moveaxis(
+            _relative_pose(
+                *(np.moveaxis(self.pose[..., k, :], -1, 0) for k in (0, -1))
+            ),
+            0,
+            -1,
+        )
+
+    def checked(self) -> TimeSteps:
+        """Return these steps; RuntimeError if any sample is unconverged or not periodic."""
+        if (self.status == "unconverged").any():
+            raise RuntimeError(
+                f"a force balance did not converge in time stepping (residual {np.max(self.residual):.1e}): "
+                "raise 'regularisation', or report the scene"
+            )
+        if (self.status == "not periodic").any():
+            raise RuntimeError(
+                f"after {self.cycles} cycles displacement is still {np.max(self.drift):.1e} body lengths from its limit: "
+                "give 'cycles' to take it as it is, or lower the mass, the ground's weakening or the travel of a transient"
+            )
+        return self
+
+
+def time_steps(
+    medium: Medium,
+    body: Body,
+    alpha: ArrayLike,
+    alphadot: ArrayLike,
+    *,
+    effects: Sequence[Effect] = (),
+    cycles: int | None = None,
+    loads: str = "exact",
+    regularisation: float = 1e-6,
+    tolerance: float = 1e-10,
+    pieces: int = PIECES,
+    with_work: bool = False,
+    with_path: bool = False,
+    backend: str = "auto",
+    advance: Callable | None = None,
+) -> TimeSteps:
+    """Return body velocities through a gait, of order 2 in 1/N.
+
+    Parameters
+    ----------
+    alpha, alphadot : arrays (..., N, joints), one cycle at N >= 8 equally spaced phases, rad and per rad of phase.
+    effects : effects of `rft.effects` of any engine.
+    cycles : number of cycles; by default as many as it takes to reach the limit cycle, and one where effects break
+        symmetry, since no two cycles are alike there.
+    with_work, with_path : whether to compute `TimeSteps.work` and `TimeSteps.path`.
+    advance : function that takes the steps of a cycle, by default `take_steps`; another function may store states and
+        resume from them.
+
+    Other parameters as in `rft.body_velocity`.
+
+    Raises
+    ------
+    ValueError
+        For arguments of another shape or out of bounds, and for a medium that pushes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rft import Chain, Granular, time_steps
+    >>> from rft.effects import Transient
+    >>> t = 2 * np.pi * np.arange(32) / 32
+    >>> alpha, alphadot = np.stack([np.cos(t), np.sin(t)], -1), np.stack([-np.sin(t), np.cos(t)], -1)
+    >>> steps = time_steps(Granular(1.8, 0.24), Chain(), alpha, alphadot, effects=[Transient(travel=0.12)])
+    >>> steps.pose[-1, :2].round(3)  # x, y after the cycle, body lengths
+    array([-0.245, -0.033])
+    """
+    broken = broken_premises(effects)
+    assembly = assemble(medium, body, effects, loads, pieces)
+    alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
+    check(backend)
+    require(
+        alpha.ndim >= 2 and alpha.shape[-2] >= 8,
+        f"time stepping takes 8 phases or more, got alpha {alpha.shape}",
+    )
+    if cycles is not None:
+        in_range("cycles", cycles, 1, 10_000, whole=True)
+    batch, (phases, joints) = alpha.shape[:-2], alpha.shape[-2:]
+    if 0 in batch:
+        return _no_steps(batch, phases)
+    if cycles is None and broken & Premise.SE2_SYMMETRIC:
+        cycles = 1
+    shapes = (
+        np.moveaxis(x.reshape(-1, phases, joints), 0, -1) for x in (alpha, alphadot)
+    )  # (N, joints, B)
+    stepping = Stepping(
+        assembly,
+        *shapes,
+        Accuracy(regularisation, tolerance),
+        backend,
+        cycles is None,
+        half_lengths(body),
+    )
+    steps = _cycles(stepping, cycles, with_work, with_path, advance or take_steps)
+    return _with_batch_axes(steps, batch, body_size(body))
+
+
+def _no_steps(batch: tuple, phases: int) -> TimeSteps:
+    """Return the steps of an empty batch."""
+    none = np.zeros(batch)
+    return TimeSteps(
+        np.zeros((*batch, phases, 3)),
+        np.zeros((*batch, phases + 1, 3)),
+        none,
+        none.astype(str),
+        none,
+        0,
+        None,
+    )
+
+
+def take_steps(
+    stepping: Stepping, state: State, count: int, with_work: bool = False
+) -> tuple[State, list[Row]]:
+    """Return the state after ``count`` steps, and their rows."""
+    rows = []
+    for _ in range(count):
+        state, row = stepping.step(state, with_work)
+        rows.append(row)
+    return state, rows
+
+
+def _cycles(
+    stepping: Stepping,
+    cycles: int | None,
+    with_work: bool,
+    with_path: bool,
+    advance: Callable,
+) -> TimeSteps:
+    """Return the last of ``cycles`` cycles, or by default the first one that repeats; samples on the last axis."""
+    path, state = [], stepping.begin()
+    mixes = cycles is None and not stepping.heavy and stepping.memory(state).size > 0
+    memories: list[limit_cycle.MemoryCycle] = []
+    gain = np.zeros(0)
+    for cycle in itertools.count(1):
+        start = stepping.memory(state)
+        state, rows = advance(stepping, state, stepping.phases, with_work)
+        pose = np.stack([*(row.pose for row in rows), stepping.site(state).pose])
+        path += [pose[:-1]] if with_path else []
+        if mixes and cycle > 1:  # before the first step there is no memory
+            moved = _relative_pose(pose[0], pose[-1])
+            memories = memories[1 - limit_cycle.MEMORY_HISTORY :]
+            memories.append(
+                limit_cycle.MemoryCycle(start, stepping.memory(state), moved)
+            )
+        if mixes and cycle > PLAIN_CYCLES:
+            memory, drift = limit_cycle.mixed_memory(memories, gain)
+            state = state._replace(cycles=state.cycles._replace(drift=drift))
+        if cycle == (cycles or MOST_CYCLES) or (
+            cycles is None and stepping.is_periodic(state)
+        ):
+            break
+        if mixes and cycle >= PLAIN_CYCLES:
+            if cycle == PLAIN_CYCLES:
+                gain = limit_cycle.memory_gain(memories)
+                memory, _ = limit_cycle.mixed_memory(memories, gain)
+            state = stepping.with_memory(state, memory)
+    xi, residual, limit = (np.stack([x[i] for x in rows]) for i in (0, 2, 3))
+    work = Work(*map(np.stack, zip(*(row.work for row in rows)))) if with_work else None
+    worst, drift = np.max(residual, 0), state.cycles.drift
+    status = np.where(
+        drift <= stepping.drift_tolerance,
+        "periodic",
+        "not periodic" if cycles is None else "running",
+    )
+    status = np.where(worst <= limit.max(), status, "unconverged")
+    full_path = np.concatenate([*path, pose[-1:]]) if with_path else None
+    return TimeSteps(xi, pose, worst, status, drift, cycle, work, full_path)
+
+
+def _relative_pose(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return pose b (3, B) in the frame at pose a."""
+    z = ((b[0] - a[0]) + 1j * (b[1] - a[1])) * np.exp(-1j * a[2])
+    return np.stack([z.real, z.imag, b[2] - a[2]])
+
+
+def _integrated(pose: np.ndarray, xi: np.ndarray, dt: float) -> np.ndarray:
+    """Return the pose (3, B) reached from a pose at a constant body velocity xi (3, B) after dt."""
+    half = 0.5 * dt * xi[2]
+    z = (
+        dt
+        * np.sinc(half / np.pi)
+        * np.exp(1j * (pose[2] + half))
+        * (xi[0] + 1j * xi[1])
+    )
+    return pose + np.array([z.real, z.imag, dt * xi[2]])
+
+
+def _with_batch_axes(steps: TimeSteps, batch: tuple, length: float) -> TimeSteps:
+    """Return steps with their samples on leading axes, and lengths in the body's unit."""
+    units = np.array([length, length, 1.0])
+
+    def samples_first(x):
+        return np.moveaxis(x, -1, 0).reshape(*batch, -1, 3) * units
+
+    xi, pose = map(samples_first, steps[:2])
+    path = None if steps.path is None else samples_first(steps.path)
+    work = steps.work
+    if work is not None:  # (N, B, ...)
+        work = Work(
+            *(
+                np.moveaxis(x, 1, 0).reshape((*batch, len(x), *x.shape[2:]))
+                for x in work
+            )
+        )
+        work = work._replace(power=work.power * length)
+    residual, status, drift = (x.reshape(batch) for x in steps[2:5])
+    return TimeSteps(xi, pose, residual, status, drift, steps.cycles, work, path)
+
+
+class State(NamedTuple):
+    """State of time stepping between two steps: arrays, samples on the last axis.
+
+    count: (1, 1), number of steps so far. pose: (3, B), of the frame on the ground. xi, xi_before: (3, B), velocities at
+    the last step and at the previous one. v: (v_t, v_n, v_w) of the body's elements at the last step, (n, B) each.
+    effect_states: of the effects that depend on the past. cycles: the record of `rft.motion.limit_cycle`."""
+
+    count: np.ndarray
+    pose: np.ndarray
+    xi: np.ndarray
+    xi_before: np.ndarray
+    v: tuple
+    effect_states: tuple
+    cycles: Any
+
+
+class Row(NamedTuple):
+    """Results of one step. xi, pose: (3, B). residual: (B,). limit: (1,), largest residual of a solved sample. work: of
+    the step, or None."""
+
+    xi: np.ndarray
+    pose: np.ndarray
+    residual: np.ndarray
+    limit: np.ndarray
+    work: Work | None
+
+
+class Stepping:
+    """Steps through gaits: `begin` returns the state before the first step, `step` the state after the next one.
+
+    alpha, alphadot: (N, joints, B). to_limit: whether to extrapolate a heavy body to its limit cycle. body_halves: (n,),
+    half lengths of the body's elements before these were cut into pieces."""
+
+    def __init__(
+        self,
+        assembly: Assembly,
+        alpha,
+        alphadot,
+        accuracy: Accuracy,
+        backend: str,
+        to_limit: bool,
+        body_halves,
+    ):
+        self.effects = stepwise_effects(assembly.effects)
+        self.assembly = assembly._replace(
+            effects=tuple(e for e in assembly.effects if e not in self.effects)
+        )
+        self.alpha, self.alphadot, self.accuracy, self.backend = (
+            alpha,
+            alphadot,
+            accuracy,
+            backend,
+        )
+        self.to_limit, self.body_halves, self.phases = to_limit, body_halves, len(alpha)
+        self.dt = 2 * np.pi / self.phases
+        self.heavy = bool(broken_premises(self.effects) & Premise.QUASI_STATIC)
+        self.drift_tolerance = max(
+            [1e-6, *(e.drift_tolerance for e in assembly.effects)]
+        )
+
+    @cached_property
+    def scales(self) -> np.ndarray:
+        """Scales of speed at all phases, (N, B)."""
+        speed = np.stack(
+            [joint_speed(self.assembly.body, rates) for rates in self.alphadot]
+        )
+        rms = np.sqrt((speed**2).mean(0))
+        rms = np.where(rms > 0, rms, 1.0)
+        if self.heavy:  # a heavy body moves while its joints pause
+            return np.broadcast_to(rms, speed.shape)
+        return np.where(speed > PAUSE * rms, speed, rms)
+
+    @cached_property
+    def _stored_problems(self) -> list[Problem]:
+        return [self._problem(k) for k in range(self.phases)]
+
+    def _problem(self, k: int) -> Problem:
+        return self.assembly.problem(self.alpha[k], self.alphadot[k], self.scales[k])
+
+    def problem(self, k: int) -> Problem:
+        """Return the balance at the phase 2 pi k / N, without effects that depend on the past or the place."""
+        stored = (
+            self.assembly.n_law_points * self.phases * self.alpha.shape[-1]
+            <= MOST_STORED
+        )
+        return self._stored_problems[k] if stored else self._problem(k)
+
+    def guess(self, s: State) -> np.ndarray:
+        """Return a guess of the velocity (3, B) at the next step, by linear extrapolation."""
+        return 2 * s.xi - s.xi_before if s.count[0, 0] > 1 else s.xi
+
+    def site(self, s: State) -> Site:
+        """Return the predicted site of the next step."""
+        count = int(s.count[0, 0])
+        dt = self.dt if count else 0.0
+        return Site(count, dt, _integrated(s.pose, (s.xi + self.guess(s)) / 2, dt), s.v)
+
+    def begin(self) -> State:
+        """Return the state before the first step, on undisturbed ground."""
+        problem, zero = self.problem(0), np.zeros((3, self.alpha.shape[-1]))
+        v = (np.zeros_like(problem.sides.elements.c),) * 3
+        states = tuple(e.begin(problem, Site(0, 0.0, zero, v)) for e in self.effects)
+        return State(
+            np.zeros((1, 1), int),
+            zero,
+            zero,
+            zero,
+            v,
+            states,
+            limit_cycle.begin(zero.shape[-1]),
+        )
+
+    def step(self, s: State, with_work: bool = False) -> tuple[State, Row]:
+        """Return the state after the next step, and its row."""
+        site, first = self.site(s), s.count[0, 0] == 0
+        k = site.count % self.phases
+        undisturbed = problem = self.problem(k)
+        for effect, state in zip(self.effects, s.effect_states):
+            if (
+                not first or not effect.breaks & PAST
+            ):  # memory and mass have no effect at the first step
+                problem = effect.apply(problem, site, state)
+        solved = self._solved(problem, self.scales[k], None if first else self.guess(s))
+        xi = solved.xi
+        pose = s.pose if first else _integrated(s.pose, (s.xi + xi) / 2, self.dt)
+        v = _velocities(problem, xi)
+        states = tuple(
+            e.after(problem, site, state, v)
+            for e, state in zip(self.effects, s.effect_states)
+        )
+        rounding = self.accuracy.rounding * self.scales[k]
+        work = (
+            element_work(problem, self.body_halves, xi, rounding) if with_work else None
+        )
+        after = State(s.count + 1, pose, xi, s.xi, v, states, s.cycles)
+        if k == 0:
+            after = after._replace(
+                cycles=s.cycles._replace(
+                    pose=pose, start=s.xi + np.where(first, np.nan, 0.0)
+                )
+            )
+        if k == self.phases - 1:
+            after = self._after_cycle(after, undisturbed, site)
+        return after, Row(xi, pose, solved.residual, np.array([solved.limit]), work)
+
+    def _solved(
+        self, problem: Problem, scale: np.ndarray, guess: np.ndarray | None
+    ) -> Solved:
+        def problem_at(index):
+            return problem if index.size == scale.size else problem.take(index)
+
+        return solve(
+            problem_at, scale, self.accuracy, self.assembly, self.backend, 1, guess
+        )
+
+    def _after_cycle(self, s: State, problem: Problem, site: Site) -> State:
+        """Return the state at the end of a cycle with a new record of cycles, extrapolated if cycles are to repeat."""
+        displacement = _relative_pose(s.cycles.pose, self.site(s).pose)
+        if not self.heavy:
+            return s._replace(
+                cycles=limit_cycle.after_massless_cycle(s.cycles, displacement)
+            )
+        cycles = limit_cycle.after_heavy_cycle(
+            s.cycles, displacement, s.xi, self.drift_tolerance
+        )
+        s = s._replace(cycles=cycles)
+        return (
+            self.with_velocity_change(s, problem, site)
+            if self.to_limit and not self.is_periodic(s)
+            else s
+        )
+
+    def is_periodic(self, s: State) -> bool:
+        """Return whether the cycles of all samples repeat."""
+        return bool((s.cycles.drift <= self.drift_tolerance).all())
+
+    def with_velocity_change(self, s: State, problem: Problem, site: Site) -> State:
+        """Return the state as if the body had moved faster in the last steps, by the extrapolation to the limit cycle."""
+        change = s.cycles.extrapolation
+        v = tuple(
+            a + b for a, b in zip(s.v, to_element(problem.sides.elements, *change))
+        )
+        drag = (
+            self._drag(problem, s.xi + change) - self._drag(problem, s.xi)
+        ) / problem.axial_drag
+        states = tuple(
+            e.with_velocity_change(problem, site, state, change, drag)
+            for e, state in zip(self.effects, s.effect_states)
+        )
+        return s._replace(
+            xi=s.xi + change, xi_before=s.xi_before + change, v=v, effect_states=states
+        )
+
+    def memory(self, s: State) -> np.ndarray:
+        """Return the numbers (M, B) of the memories that may be mixed."""
+        samples = self.alpha.shape[-1]
+        numbers = [
+            np.reshape(state, (-1, samples))
+            for e, state in zip(self.effects, s.effect_states)
+            if e.memory_bounds is not None
+        ]
+        return np.concatenate(numbers) if numbers else np.zeros((0, samples))
+
+    def with_memory(self, s: State, memory: np.ndarray) -> State:
+        """Return the state with other numbers (M, B) in its memories, within their bounds."""
+        states, used = [], 0
+        for effect, state in zip(self.effects, s.effect_states):
+            if effect.memory_bounds is not None:
+                count = state.size // memory.shape[-1]
+                numbers = np.clip(memory[used : used + count], *effect.memory_bounds)
+                state, used = numbers.reshape(state.shape), used + count
+            states.append(state)
+        return s._replace(effect_states=tuple(states))
+
+    def _drag(self, problem: Problem, xi: np.ndarray) -> np.ndarray:
+        """Return force and moment of undisturbed ground on the frame at a velocity, (3, B)."""
+        scaled = xi / problem.frame.speed_scale
+        v = with_frame_velocity(problem, velocities(problem), *scaled)
+        return np.stack(
+            frame_net(
+                problem, v, np.full(xi.shape[1], self.accuracy.rounding), *scaled
+            ).force
+        )
+
+
+def _velocities(problem: Problem, xi: np.ndarray) -> tuple:
+    """Return the velocities (v_t, v_n, v_w) of the body's elements, (n, B) each, at a body velocity xi (3, B)."""
+    e = problem.sides.elements
+    return tuple(a + b for a, b in zip((e.v_t, e.v_n, e.v_w), to_element(e, *xi)))

@@ -1,0 +1,28 @@
+"""The ground under plates and triangles: its strength and rounding, the lead of faces, and effects, one file each."""
+
+from rft.core.registry import load_all
+from rft.terradynamics.ground.aeration import Aeration
+from rft.terradynamics.ground.base import (
+    GROUND_EFFECTS,
+    Ground,
+    GroundEffect,
+    checked_effects,
+    ground_of,
+    inverse_speed,
+    strength_at,
+    weight,
+)
+from rft.terradynamics.ground.disturbed import DisturbedGround
+from rft.terradynamics.ground.grain_inertia import GrainInertia
+from rft.terradynamics.ground.slope import Slope
+
+load_all(__name__, __path__)
+
+__all__ = [
+    "GROUND_EFFECTS", "Aeration", "DisturbedGround", "GrainInertia", "Ground", "GroundEffect", "Slope", "checked_effects",
+    "ground_of", "inverse_speed", "strength_at", "weight",
+]  # fmt: skip
+
+
+def __dir__() -> list[str]:
+    return __all__

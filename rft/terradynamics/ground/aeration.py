@@ -1,0 +1,64 @@
+"""Air that rises through the grains weakens them; where it fluidises them they bear nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from rft.core.checks import Number, check_numbers
+from rft.core.refusal import require
+from rft.terradynamics.ground.base import GROUND_EFFECTS, Ground, GroundEffect
+
+
+@GROUND_EFFECTS.register
+@dataclass(frozen=True)
+class Aeration(GroundEffect):
+    """The strength is 1 - air_speed / fluidisation times that of still ground; the stress map keeps its shape.
+
+    An air speed of fluidisation, or more, is refused: no resistive force theory is known there. Strength falls
+    linearly with air speed by measurements of alpha_z(0, 90 degrees). The same fall at all angles, down to nothing, is
+    assumed.
+
+    Examples
+    --------
+    >>> from rft.terradynamics.ground import Aeration, ground_of
+    >>> ground_of([Aeration(air_speed=0.1, fluidisation=0.25)]).strength
+    0.6
+    """
+
+    air_speed: Annotated[
+        float,
+        Number(
+            0, 1e3, "m/s", "upward speed of the air over the bed's whole cross section"
+        ),
+    ]
+    fluidisation: Annotated[
+        float, Number(1e-6, 1e3, "m/s", "air speed from which the ground is fluidised")
+    ]
+
+    kind = "aeration"
+    limit = "air_speed = 0"
+    cost = "one multiplication an element"
+    walks = True
+
+    def __post_init__(self):
+        check_numbers(self)
+        message = f"air_speed = {self.air_speed:g} m/s: the ground is fluidised from {self.fluidisation:g} m/s on"
+        require(
+            self.air_speed < self.fluidisation,
+            f"{message}, and no longer bears as this law says",
+            instead="give less",
+        )
+
+    def apply(self, ground: Ground) -> Ground:
+        return ground._replace(
+            strength=ground.strength * (1.0 - self.air_speed / self.fluidisation)
+        )
+
+    @property
+    def assumes(self) -> str:
+        return "that strength falls to nothing at fluidisation, at all angles alike"
+
+    @classmethod
+    def examples(cls, x: float = 0.3) -> dict[str, Aeration]:
+        return {"aeration": cls(air_speed=0.03 * x, fluidisation=0.03)}

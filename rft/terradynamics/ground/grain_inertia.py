@@ -1,0 +1,71 @@
+"""Inertia of the grains that a fast body pushes away: a pressure on leading faces that grows as their speed squared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from rft.core.checks import Number, check_numbers
+from rft.core.premise import Premise
+from rft.terradynamics.ground.base import GROUND_EFFECTS, Ground, GroundEffect
+
+POPPY_SEEDS = 638.0  # kg/m^3, loosely packed; Agarwal et al. (2021)
+
+
+@GROUND_EFFECTS.register
+@dataclass(frozen=True)
+class GrainInertia(GroundEffect):
+    """A stress of strength x density x v_n^2 against the normal of leading faces, at any depth, where v_n is the speed of
+    a face along its normal: the momentum of grains that are swept up (Agarwal et al. 2021; paper Sec. IV C).
+
+    The paper's other finding, a surface that sinks behind a fast body, is not modelled.
+
+    Examples
+    --------
+    >>> from rft.terradynamics.ground import GrainInertia, ground_of
+    >>> ground_of([GrainInertia(strength=2.0)]).flux  # kg/m^3
+    1276.0
+    """
+
+    strength: Annotated[
+        float, Number(0, 1e6, "-", "lambda, 1 to 4 by grains and body; 1 is assumed")
+    ] = 1.0
+    density: Annotated[
+        float,
+        Number(
+            0,
+            1e5,
+            "kg/m^3",
+            "density of the packed grains; that of loose poppy seeds if left out",
+        ),
+    ] = POPPY_SEEDS
+
+    kind = "grain-inertia"
+    breaks = Premise.RATE_INDEPENDENT
+    limit = "strength = 0"  # of the rate of the motion = 0 the order is 2
+    cost = "five operations an element"
+    walks = True
+
+    def __post_init__(self):
+        check_numbers(self)
+
+    def apply(self, ground: Ground) -> Ground:
+        return ground._replace(flux=ground.flux + self.strength * self.density)
+
+    @property
+    def assumes(self) -> str:
+        defaults = {
+            "strength": self.strength == 1.0,
+            "density": self.density == POPPY_SEEDS,
+        }
+        descriptions = {
+            "strength": "lambda = 1 (1 to 4 are known)",
+            "density": f"{POPPY_SEEDS:g} kg/m^3, of loose poppy seeds",
+        }
+        return ", ".join(
+            descriptions[name] for name, is_default in defaults.items() if is_default
+        )
+
+    @classmethod
+    def examples(cls, x: float = 0.3) -> dict[str, GrainInertia]:
+        return {"grain-inertia": cls(strength=2 * x, density=700.0)}

@@ -1,0 +1,256 @@
+"""The contact of triangles with the ground: meshes, hulls, legs and geoms of three dimensions.
+
+On the part of a face below the surface the stress is that of
+`rft.terradynamics.ground.base` with one alpha, that of the velocity of the part's
+middle; |z| and its moments are integrated exactly. Vectors are triples along any axes.
+All functions but the last two are formulas (`rft.formulas.vectors`): they take numbers,
+arrays that broadcast, and the vectors of compiled code."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from rft.formulas.vectors import absolute, formula, maximum, sqrt, where
+from rft.laws.records import law_numbers, record_class
+from rft.terradynamics.ground import inverse_speed, strength_at
+from rft.terradynamics.meshes.submerged import part_of_triangle
+from rft.terradynamics.meshes.triples import (
+    AHEAD,
+    AXES,
+    UP,
+    cross,
+    dot,
+    minus,
+    plus,
+    times,
+    weighted,
+)
+
+
+class FaceLaw(Protocol):
+    """A law of three dimensions. grazing_sine: sine of the grazing angle. traction and lead are formulas; numbers: those
+    that they read."""
+
+    grazing_sine: float
+    numbers: dict[str, float]
+
+    def traction(self, n, v, up=UP) -> tuple:
+        """Return the force per area and depth, N/m^3, on faces with outward unit normals n and unit velocities v, whether
+        or not they lead; ``up`` is the unit vector upwards."""
+        ...
+
+    def traction_slope(self, n, v, up, k) -> tuple:
+        """Return the slope of ``traction`` by the component of v along k, linear in k."""
+        ...
+
+    def lead_slope(self, n_dot_v, grazing_sine, sheet=False) -> Any:
+        """Return the slope of ``lead`` by n_dot_v."""
+        ...
+
+    def lead(self, n_dot_v, grazing_sine, sheet=False) -> Any:
+        """Return the share of the traction that faces bear, 0 to 1
+        (`rft.terradynamics.ground.lead`). sheet: whether either side may lead."""
+        ...
+
+
+class Face(NamedTuple):
+    """Corners (x, y, z) of a triangle and its outward unit normal, in the frame of its body, m; its area, m^2, negative
+    where the corners run clockwise about the normal; 1 for a face of a thin sheet, of which either side may lead, else 0."""
+
+    x1: float
+    y1: float
+    z1: float
+    x2: float
+    y2: float
+    z2: float
+    x3: float
+    y3: float
+    z3: float
+    nx: float
+    ny: float
+    nz: float
+    area: float
+    sheet: float
+
+
+class Part(NamedTuple):
+    """The parts of faces below the surface. n: outward unit normal. middle: from the origin, m. area: m^2. depth:
+    integral of |z| over the part, m^3. arms: integral of |z| times the vector from the origin, m^4."""
+
+    n: tuple
+    middle: tuple
+    area: float
+    depth: float
+    arms: tuple
+
+
+class Motion(NamedTuple):
+    """Motion of a body. velocity: of the origin, m/s. spin: angular velocity, rad/s. x, height: of the origin along the
+    world's x axis and above the surface, m. up, ahead: unit vectors upwards and along the world's x axis. All vectors are
+    along the same axes."""
+
+    velocity: tuple
+    spin: tuple
+    x: float = 0.0
+    up: tuple = UP
+    ahead: tuple = AHEAD
+    height: float = 0.0
+
+
+@formula
+def corner_heights(face, motion):
+    """Return the heights, m, of a face's corners above the surface."""
+    up, height = motion.up, motion.height
+    return (
+        height + dot(up, (face.x1, face.y1, face.z1)),
+        height + dot(up, (face.x2, face.y2, face.z2)),
+        height + dot(up, (face.x3, face.y3, face.z3)),
+    )
+
+
+@formula
+def part_below(face, heights):
+    """Return the `Part` of a face below the surface, from the heights of its corners, m."""
+    share, middle, moments = part_of_triangle(-heights[0], -heights[1], -heights[2])
+    a, b, c = (
+        (face.x1, face.y1, face.z1),
+        (face.x2, face.y2, face.z2),
+        (face.x3, face.y3, face.z3),
+    )
+    depth = face.area * (moments[0] + moments[1] + moments[2])
+    arms = times(face.area, weighted(moments, a, b, c))
+    return Part(
+        (face.nx, face.ny, face.nz),
+        weighted(middle, a, b, c),
+        face.area * share,
+        depth,
+        arms,
+    )
+
+
+@formula
+def velocity_of_middle(part, motion):
+    """Return the velocity of a part's middle, m/s."""
+    return plus(motion.velocity, cross(motion.spin, part.middle))
+
+
+@formula
+def load(law, ground, part, motion, v, sheet):
+    """Return force, N, moment about the origin, N m, and stress per depth, N/m^3, of the grains on a part of a face.
+
+    v: `velocity_of_middle`. sheet: whether the face is one of a thin sheet, of which either side may lead."""
+    n, speed, across = part.n, sqrt(dot(v, v)), dot(part.n, v)
+    slowness = inverse_speed(ground, speed)
+    unit = times(1.0 / where(speed == 0.0, 1.0, speed), v)
+    share = speed * slowness * law.lead(across * slowness, ground.grazing_sine, sheet)
+    if ground.downhill_loss == 0.0 and len(ground.disturbed) == 0:
+        share = share * ground.strength
+    else:
+        share = share * strength_at(
+            ground, motion.x + dot(motion.ahead, part.middle), dot(motion.ahead, unit)
+        )
+    stress = times(share, law.traction(n, unit, motion.up))
+    force, moment = times(part.depth, stress), cross(part.arms, stress)
+    if ground.flux != 0.0:
+        across = where(sheet, across, maximum(across, 0.0))
+        push = times(ground.flux * across * absolute(across) * part.area, n)
+        force, moment = minus(force, push), minus(moment, cross(part.middle, push))
+    return force, moment, stress
+
+
+class Stressed(NamedTuple):
+    """What the slopes of the stress on a part follow from. unit: of the velocity. full: the traction with the strength, N/m^3.
+    by_unit, by_n: slopes of its share, s/m, along the velocity and the normal. turned: of its direction, s/m. strength,
+    loss: of the ground and, relative, by motion ahead. flow: flux x area x speed across, kg/s."""
+
+    unit: tuple
+    full: tuple
+    by_unit: float
+    by_n: float
+    turned: float
+    strength: float
+    loss: float
+    flow: float
+
+
+@formula
+def _slopes_along(law, part, motion, state, k):
+    """Return the slopes of force and moment by the component of the velocity along the unit vector k."""
+    u_k, n_k = dot(state.unit, k), dot(part.n, k)
+    sideways = minus(k, times(u_k, state.unit))
+    share = state.by_unit * u_k + state.by_n * n_k
+    share = share - state.turned * state.loss * dot(motion.ahead, sideways)
+    turning = law.traction_slope(part.n, state.unit, motion.up, sideways)
+    slope = plus(
+        times(share, state.full), times(state.turned * state.strength, turning)
+    )
+    push = times(2.0 * state.flow * n_k, part.n)
+    return (
+        minus(times(part.depth, slope), push),
+        minus(cross(part.arms, slope), cross(part.middle, push)),
+    )
+
+
+@formula
+def load_with_slopes(law, ground, part, motion, v, sheet):
+    """Return force and moment of `load`, and their slopes by the components x, y, z of v: three triples each.
+
+    With s = 1 / sqrt(v^2 + rounding^2), the unit vector u of v and x = s n . v, the stress is S = |v| s lead(x) T(u), so
+    that dS = T (lead s (1 - |v|^2 s^2) u . dv + |v| s lead' dx) + s lead dT (dv - u u . dv),   dx = s (n - x |v| s u) . dv.
+    """
+    n, speed, across = part.n, sqrt(dot(v, v)), dot(part.n, v)
+    slowness = inverse_speed(ground, speed)
+    unit = times(1.0 / where(speed == 0.0, 1.0, speed), v)
+    moved, leading = speed * slowness, across * slowness
+    lead = law.lead(leading, ground.grazing_sine, sheet)
+    lead_slope = law.lead_slope(leading, ground.grazing_sine, sheet)
+    strength, loss = ground.strength, 0.0
+    if not (ground.downhill_loss == 0.0 and len(ground.disturbed) == 0):
+        along = dot(motion.ahead, unit)
+        strength = strength_at(ground, motion.x + dot(motion.ahead, part.middle), along)
+        lost = maximum(ground.downhill_loss * along, 0.0)
+        loss = where(lost > 0.0, ground.downhill_loss / (1.0 - lost), 0.0)
+    traction = times(strength, law.traction(n, unit, motion.up))
+    stress = times(moved * lead, traction)
+    force, moment = times(part.depth, stress), cross(part.arms, stress)
+    by_n = moved * lead_slope * slowness
+    by_unit = lead * slowness * (1.0 - moved * moved) - by_n * leading * moved
+    flow = 0.0 * across
+    if ground.flux != 0.0:
+        flow = ground.flux * part.area * where(sheet, across, maximum(across, 0.0))
+        push = times(flow * absolute(across), n)
+        force, moment = minus(force, push), minus(moment, cross(part.middle, push))
+    state = Stressed(
+        unit, traction, by_unit, by_n, lead * slowness, strength, loss, absolute(flow)
+    )
+    fx, mx = _slopes_along(law, part, motion, state, AXES[0])
+    fy, my = _slopes_along(law, part, motion, state, AXES[1])
+    fz, mz = _slopes_along(law, part, motion, state, AXES[2])
+    return force, moment, (fx, fy, fz), (mx, my, mz)
+
+
+def record(law: FaceLaw):
+    """Return the record of a law for compiled code: its numbers and its formulas."""
+    names = "traction", "traction_slope", "lead", "lead_slope"
+    formulas = tuple((name, getattr(type(law), name)) for name in names)
+    numbers = law_numbers(law)
+    return record_class(type(law).__name__, tuple(numbers), formulas)(*numbers.values())
+
+
+def faces(
+    corners: np.ndarray, normals: np.ndarray, sheet: np.ndarray | bool = False
+) -> Face:
+    """Return the faces (T,) with corners (T, 3, 3), m, and outward unit normals (T, 3)."""
+    a, b, c = corners.swapaxes(0, 1)
+    across = np.cross(b - a, c - a)
+    area = np.copysign(np.linalg.norm(across, axis=1) / 2, (across * normals).sum(1))
+    return Face(
+        *a.T,
+        *b.T,
+        *c.T,
+        *normals.T,
+        area,
+        np.broadcast_to(sheet, area.shape).astype(float),
+    )

@@ -1,0 +1,146 @@
+"""The stress map of the vertical plane for faces that point and move in any direction.
+
+In the plane the nine-term map (`rft.terradynamics.plates.stress.StressMap`) has
+trigonometric functions of the tilt beta and of the direction of motion gamma. With n
+the normal of a face, v the unit vector of its velocity, both cut into a part along the
+vertical, n_z and v_z, and a horizontal vector, n_h and v_h, they read
+
+    cos 2 beta = n_z^2 - n_h^2,    sin 2 beta = -2 n_z n_h,    sin gamma = -v_z,    cos gamma = v_h,
+    sin 2 beta cos gamma = -2 n_z n_h . v_h,    cos 2 beta cos gamma = n_z^2 v_h - n_h (n_h . v_h).
+
+In these terms the map needs no plane. It rotates with n and v about the vertical, takes either normal of a face, and equals
+the map of the vertical plane wherever n and v lie in one. Out of the plane the form is chosen so that an upright face that
+moves along itself bears nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rft.core.refusal import formatted, require
+from rft.formulas.vectors import formula, maximum, minimum, sqrt, where
+from rft.terradynamics.ground.lead import rounded, rounded_slope
+from rft.terradynamics.meshes.triples import UP, dot, minus, plus, times
+from rft.terradynamics.plates.stress import COEFFICIENTS, PER_CUBIC_METRE, StressMap
+
+CUT = 0.05  # width, in n . v times the cosine between stress and n, over which a cut of tension is rounded
+SHARPEST = 2e-3  # least sine of the angle over which stress rises: implicit time steps cannot solve a jump
+NUMBERS = (*COEFFICIENTS, "zeta", "cut")
+
+
+@formula
+def uncut_traction(s, n, v, up):
+    """Return `traction_of_map` with all of its tension."""
+    n_z, v_z, along = dot(up, n), dot(up, v), dot(n, v)
+    n_h, v_h, inner = (
+        minus(n, times(n_z, up)),
+        minus(v, times(v_z, up)),
+        along - n_z * v_z,
+    )
+    cos_2b = n_z * n_z - dot(n_h, n_h)
+    total, difference = s.C11 + s.Cm11, s.Cm11 - s.C11
+    a_z = (
+        s.A00
+        + s.A10 * cos_2b
+        - (s.B11 + s.Bm11) * cos_2b * v_z
+        - (s.B11 - s.Bm11) * 2.0 * n_z * inner
+        - s.B01 * v_z
+    )
+    a_h = plus(
+        times((s.C01 + total) * n_z * n_z, v_h),
+        times((s.C01 - total) * inner + 2.0 * n_z * (difference * v_z - s.D10), n_h),
+    )
+    return times(PER_CUBIC_METRE * s.zeta, minus(times(a_z, up), a_h))
+
+
+@formula
+def traction_of_map(s, n, v, up=UP):
+    """Return the force per area and depth, N/m^3, by the numbers of a stress map on faces with unit normals n and unit
+    velocities v, whether or not they lead; ``up`` is the unit vector upwards."""
+    traction, along = uncut_traction(s, n, v, up), dot(n, v)
+    if s.cut == 0.0:
+        return traction
+    push = -(dot(traction, n) * along) / maximum(sqrt(dot(traction, traction)), 1e-300)
+    return times(minimum(maximum(0.5 + push / CUT, 0.0), 1.0), traction)
+
+
+@formula
+def slope_of_map(s, n, v, up, k):
+    """Return the slope of `traction_of_map` by the component k of v, for stress maps that keep their tension. k: a unit
+    vector along that component."""
+    n_z, k_z = dot(up, n), dot(up, k)
+    n_h = minus(n, times(n_z, up))
+    k_h = minus(k, times(k_z, up))
+    inner = dot(n, k) - n_z * k_z
+    cos_2b = n_z * n_z - dot(n_h, n_h)
+    total, difference = s.C11 + s.Cm11, s.Cm11 - s.C11
+    a_z = (
+        -((s.B11 + s.Bm11) * cos_2b + s.B01) * k_z
+        - (s.B11 - s.Bm11) * 2.0 * n_z * inner
+    )
+    a_h = plus(
+        times((s.C01 + total) * n_z * n_z, k_h),
+        times((s.C01 - total) * inner + 2.0 * n_z * difference * k_z, n_h),
+    )
+    return times(PER_CUBIC_METRE * s.zeta, minus(times(a_z, up), a_h))
+
+
+@formula
+def slope_of_cut_map(s, n, v, up, k):
+    """Return the slope of `traction_of_map` by the component k of v, for stress maps whose tension is cut."""
+    slope = slope_of_map(s, n, v, up, k)
+    if s.cut == 0.0:
+        return slope
+    whole = uncut_traction(s, n, v, up)
+    size = maximum(sqrt(dot(whole, whole)), 1e-300)
+    across, along = dot(whole, n) / size, dot(n, v)
+    share = 0.5 - across * along / CUT
+    by_k = (
+        dot(slope, n) * along / size
+        + across * dot(n, k)
+        - across * along * dot(whole, slope) / (size * size)
+    )
+    varies = (share > 0.0) & (share < 1.0)
+    kept = minimum(maximum(share, 0.0), 1.0)
+    return plus(times(kept, slope), times(where(varies, -by_k / CUT, 0.0), whole))
+
+
+@dataclass(frozen=True)
+class Extruded:
+    """A stress map of the vertical plane as a law of three dimensions."""
+
+    stress: StressMap
+
+    def __post_init__(self):
+        message = f"stress must be a StressMap, nine coefficients, got {formatted(self.stress)}: fit some to plate drags"
+        require(isinstance(self.stress, StressMap), message)
+
+    def __getattr__(self, name: str) -> float:
+        """Return a number of the map; the formulas read these."""
+        if name in NUMBERS:
+            return getattr(self.stress, name)
+        raise AttributeError(name)
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Numbers that the formulas read (`rft.laws.records.law_numbers`)."""
+        return {name: float(getattr(self.stress, name)) for name in NUMBERS}
+
+    traction = traction_of_map
+    traction_slope = slope_of_cut_map
+
+    @property
+    def grazing_sine(self) -> float:
+        """Sine of the grazing angle (`rft.terradynamics.plates.stress.PlateStress`), at least `SHARPEST`."""
+        return max(math.sin(self.stress.grazing), SHARPEST)
+
+    @formula
+    def lead(self, n_dot_v, grazing_sine, sheet=False):
+        """Return the share of the traction that faces bear, 0 to 1; 1 on a thin sheet, of which either side leads."""
+        return where(sheet, 1.0, rounded(n_dot_v, grazing_sine))
+
+    @formula
+    def lead_slope(self, n_dot_v, grazing_sine, sheet=False):
+        """Return the slope of `lead` by n_dot_v."""
+        return where(sheet, 0.0, rounded_slope(n_dot_v, grazing_sine))

@@ -1,0 +1,331 @@
+"""Solid bodies as meshes, one class a kind; sizes in m."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from rft.core.checks import Number, check_numbers, in_range
+from rft.core.metres import metres
+from rft.core.refusal import require
+from rft.terradynamics.meshes import shapes
+from rft.terradynamics.meshes.blade import blade
+from rft.terradynamics.meshes.files import read
+from rft.terradynamics.meshes.mesh import MOST_TRIANGLES, Mesh, mirrored, quartered
+from rft.terradynamics.meshes.smooth import smooth
+
+FINEST = (
+    327_680  # triangles of the mesh that stands for the truth in studies of accuracy
+)
+HANDS = ("right", "left")
+MOST_TURNS = 100  # of a thread: more turns need more than `MOST_TRIANGLES` triangles
+
+
+class Solid:
+    """Base of bodies that have a mesh.
+
+    Examples
+    --------
+    >>> from rft.terradynamics.meshes import Solid, Sphere
+    >>> isinstance(Sphere(0.02), Solid)
+    True
+    """
+
+    def __post_init__(self):
+        check_numbers(self)
+
+    def mesh(self, triangles: int = 5000) -> Mesh:
+        """Return the mesh of about ``triangles`` triangles, at least as many as the body needs, with smooth normals."""
+        in_range("triangles", triangles, 1, MOST_TRIANGLES, whole=True)
+        mesh = self.build(int(triangles))
+        return smooth(mesh) if mesh.smooth_normals is None else mesh
+
+    def build(self, triangles: int) -> Mesh:
+        """Return the mesh, of flat triangles or with the normals of the body's exact surface."""
+        raise NotImplementedError
+
+    @property
+    def ladder(self) -> tuple[int, ...]:
+        """Numbers of triangles that a study of accuracy computes with, the last of them for the truth."""
+        return (*(80 * 4**k for k in range(5)), FINEST)
+
+
+@dataclass(frozen=True)
+class Sphere(Solid):
+    """A ball about the origin, of 20, 80, 320, ..., or 327680 triangles: the least that are enough for ``triangles``.
+
+    Examples
+    --------
+    >>> from rft.terradynamics.meshes import Sphere
+    >>> Sphere(radius=0.02).mesh(300).faces.shape
+    (320, 3)
+    """
+
+    radius: Annotated[float, metres("radius of the sphere")]
+
+    def mesh(self, triangles: int = 5000) -> Mesh:
+        in_range("triangles", triangles, 1, MOST_TRIANGLES, whole=True)
+        flat = self.build(int(triangles))
+        return dataclasses.replace(
+            flat, smooth_normals=flat.vertices[flat.faces] / self.radius
+        )
+
+    def build(self, triangles: int) -> Mesh:
+        return shapes.sphere(
+            self.radius, min(7, max(0, math.ceil(math.log(triangles / 20, 4) - 0.01)))
+        )
+
+
+@dataclass(frozen=True)
+class Cylinder(Solid):
+    """A rod along y, about the origin, across the plane of x and z.
+
+    Examples
+    --------
+    >>> from rft.terradynamics.meshes import Cylinder
+    >>> Cylinder(radius=0.01, length=0.1).mesh(500).closed
+    True
+    """
+
+    radius: Annotated[float, metres("radius of the rod")]
+    length: Annotated[float, metres("length along y")]
+
+    def build(self, triangles: int) -> Mesh:
+        size = math.sqrt(
+            4 * math.pi * self.radius * (self.length + 2 * self.radius) / triangles
+        )
+        counts = _divisions(
+            size, (2 * math.pi * self.radius, 8), (self.length, 1), (self.radius, 1)
+        )
+        return shapes.cylinder(self.radius, self.length, *counts)
+
+
+@dataclass(frozen=True)
+class Screw(Solid):
+    """An Archimedean screw along x, about the origin: a core with one thread, which is a blade or has a smooth profile.
+
+    handed (-): "right", which drives to +x as it turns about +x by the right hand, or "left", its mirror image.
+
+    Examples
+    --------
+    >>> from rft.terradynamics.meshes import Screw
+    >>> Screw(radius=0.03, core=0.02, pitch=0.06, length=0.2, thickness=0.004).mesh(2000).closed
+    True
+    """
+
+    radius: Annotated[float, metres("radius of the thread")]
+    core: Annotated[float, metres("radius of the core, less than that of the thread")]
+    pitch: Annotated[float, metres("length along x of one turn of the thread")]
+    length: Annotated[float, metres("length of core and thread along x")]
+    thickness: Annotated[
+        float,
+        metres(
+            "thickness of the blade along x, less than the pitch; 0 for a thread of a smooth profile",
+            0,
+        ),
+    ] = 0.0
+    nose: Annotated[
+        float,
+        metres(
+            "length of a cone at either end of the core, beyond the thread; 0 for flat ends",
+            0,
+        ),
+    ] = 0.0
+    handed: str = "right"
+
+    def __post_init__(self):
+        super().__post_init__()
+        require(
+            self.core < self.radius,
+            f"core must be less than the radius, got {self.core:g} and {self.radius:g}",
+        )
+        message = (
+            "thickness must be 0, or from a thousandth of the pitch to less than that"
+        )
+        within = self.thickness == 0 or 1e-3 * self.pitch <= self.thickness < self.pitch
+        require(within, f"{message}, got {self.thickness:g} and {self.pitch:g}")
+        require(
+            self.handed in HANDS,
+            f"handed must be one of {', '.join(HANDS)}",
+            value=self.handed,
+        )
+        require(
+            self.turns <= MOST_TURNS,
+            f"the thread has {self.turns:.4g} turns, beyond {MOST_TURNS}",
+            because="length / pitch",
+        )
+
+    @property
+    def turns(self) -> float:
+        """Number of turns of the thread from end to end."""
+        return self.length / self.pitch
+
+    @property
+    def sense(self) -> float:
+        """Sign, 1 or -1, of the rate about x at which the screw drives to +x."""
+        return 1.0 if self.handed == "right" else -1.0
+
+    @property
+    def mirrored(self) -> Screw:
+        """The screw of the other hand."""
+        return dataclasses.replace(
+            self, handed="left" if self.handed == "right" else "right"
+        )
+
+    def build(self, triangles: int) -> Mesh:
+        right = self._bladed(triangles) if self.thickness else self._smooth(triangles)
+        return right if self.handed == "right" else mirrored(right)
+
+    def _smooth(self, triangles: int) -> Mesh:
+        """Return the right-handed screw with a thread of a smooth profile."""
+        size = math.sqrt(
+            4 * math.pi * self.core * (self.length + 2 * self.core) / triangles
+        )
+        counts = _divisions(
+            size,
+            (2 * math.pi * self.core, 12),
+            (self.length, 4),
+            (math.hypot(self.core, self.nose), 1),
+        )
+        return shapes.screw(
+            self.radius, self.core, self.pitch, self.length, *counts, self.nose
+        )
+
+    def _bladed(self, triangles: int) -> Mesh:
+        """Return the right-handed screw whose thread is a blade."""
+        high, slope = self.radius - self.core, 2 * math.pi * self.radius / self.pitch
+        edge, slant = (
+            self.length * math.hypot(1.0, slope),
+            math.hypot(self.core, self.nose),
+        )
+        sides = (
+            edge * (2 * math.pi * self.core + 2 * high + self.thickness)
+            + 2 * math.pi * self.core * slant
+        )
+        lengths = (
+            (2 * math.pi * self.core, 8),
+            (edge, 8),
+            (slant, 1),
+            (high, 1),
+            (self.thickness * slope, 1),
+        )
+        counts = _divisions(math.sqrt(2 * sides / triangles), *lengths)
+        return blade(
+            self.radius,
+            self.core,
+            self.pitch,
+            self.length,
+            self.thickness,
+            self.nose,
+            *counts,
+        )
+
+
+@dataclass(frozen=True)
+class Leg(Solid):
+    """The c-leg of the vertical plane, extruded across it: hip at the origin, free end at z = -2 R.
+
+    Examples
+    --------
+    >>> from rft.terradynamics.meshes import Leg
+    >>> Leg(radius=0.038, width=0.02, thickness=0.002).mesh(500).closed
+    True
+    """
+
+    radius: Annotated[float, metres("R, half the distance from hip to free end")]
+    width: Annotated[float, metres("width across the plane, along y")]
+    thickness: Annotated[float, metres("thickness of the strip, less than the radius")]
+    relative_curvature: Annotated[
+        float,
+        Number(
+            -1, 1, "-",
+            "R / r, -1 to 1, 1 for half a circle with its bulge to -x, ahead where a positive rate about y sweeps the leg "
+            "backwards",
+        ),
+    ] = 1.0  # fmt: skip
+
+    def __post_init__(self):
+        super().__post_init__()
+        message = f"thickness must be less than the radius, got {self.thickness:g} and {self.radius:g}"
+        require(self.thickness < self.radius, message)
+
+    def build(self, triangles: int) -> Mesh:
+        bend = math.asin(abs(self.relative_curvature))
+        length = 2 * self.radius * (bend / math.sin(bend) if bend else 1.0)
+        size = math.sqrt(4 * length * (self.width + self.thickness) / triangles)
+        counts = _divisions(size, (length, 4), (self.width, 1), (self.thickness, 1))
+        return shapes.leg(
+            self.radius, -self.relative_curvature, self.thickness, self.width, *counts
+        )
+
+
+@dataclass(frozen=True)
+class MeshFile(Solid):
+    """The mesh of an STL, OBJ or PLY file (needs trimesh), in its own frame.
+
+    file (-): name of the file; in a scene file, from the scene's folder. closed (-): whether the mesh must have an inside;
+    of an open one either side may lead. smooth (-): whether the triangles stand for a curved surface, with edges where they
+    meet at more than 40 degrees.
+
+    For more triangles than the file has, each is cut in four; the form stays.
+    """
+
+    file: str
+    scale: Annotated[
+        float,
+        Number(1e-9, 1e9, "m", "length of a unit of the file, 0.001 if that is in mm"),
+    ] = 1.0
+    closed: bool = True
+    smooth: bool = False
+
+    def __post_init__(self):
+        require(
+            isinstance(self.file, str),
+            "file must be the name of a mesh",
+            value=self.file,
+        )
+        check_numbers(self)
+        require(
+            isinstance(self.closed, bool),
+            "closed must be true or false",
+            value=self.closed,
+        )
+        require(
+            isinstance(self.smooth, bool),
+            "smooth must be true or false",
+            value=self.smooth,
+        )
+        mesh = read(self.file, self.closed, self.scale)
+        mesh = smooth(mesh) if self.smooth else mesh
+        object.__setattr__(self, "_mesh", mesh if self.closed else mesh.two_sided)
+
+    def mesh(self, triangles: int = 5000) -> Mesh:
+        in_range("triangles", triangles, 1, MOST_TRIANGLES, whole=True)
+        mesh = self._mesh
+        while 4 * len(mesh.faces) <= triangles:
+            mesh = quartered(mesh)
+        return mesh
+
+    @property
+    def ladder(self) -> tuple[int, ...]:
+        coarsest = len(self._mesh.faces)
+        ladder = [
+            coarsest * 4**k
+            for k in range(8)
+            if coarsest * 4**k <= max(FINEST, coarsest)
+        ]
+        return tuple(ladder) if len(ladder) > 1 else (coarsest, coarsest)
+
+
+SOLIDS = {"sphere": Sphere, "cylinder": Cylinder, "screw": Screw, "c-leg": Leg}
+
+
+def _divisions(size: float, *lengths: tuple[float, int]) -> list[int]:
+    """Return the number of pieces of about ``size``, m, in each length, at least the number given with it."""
+    return [
+        int(np.clip(round(length / size), fewest, 4096)) for length, fewest in lengths
+    ]

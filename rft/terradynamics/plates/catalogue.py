@@ -1,0 +1,56 @@
+"""Named media of the vertical plane, each with the source of its numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rft.terradynamics.plates.stress import StressMap
+
+LI = "Li, Zhang and Goldman, Science 339, 1408 (2013), Table S2"
+
+
+@dataclass(frozen=True)
+class VerticalEntry:
+    """A named medium of the vertical plane and the source of its numbers.
+
+    Examples
+    --------
+    >>> from rft.terradynamics.plates import VERTICAL
+    >>> VERTICAL["glass-3mm"].stress.zeta
+    0.224
+    """
+
+    stress: StressMap
+    source: str
+
+
+def _scaled(zeta: float, grains: str) -> VerticalEntry:
+    """Return the generic set times zeta, fitted to some grains."""
+    return VerticalEntry(
+        StressMap(zeta=zeta),
+        f"generic set M0 times zeta = {zeta:g}, fitted to {grains}; {LI}",
+    )
+
+
+LOOSE = StressMap(0.051, 0.047, 0.053, 0.083, 0.020, -0.026, 0.057, 0.0, 0.025)
+CLOSE = StressMap(0.094, 0.092, 0.092, 0.151, 0.035, -0.039, 0.086, 0.018, 0.046)
+
+# In three dimensions the strength xi_n is matched to what a level plate bears.
+OWN = f"its own nine coefficients; {LI}; a level plate bears"
+
+VERTICAL = {
+    "generic": VerticalEntry(
+        StressMap(), f"the generic set M0, zeta = 1 (1 N/cm^3 straight down); {LI}"
+    ),
+    "poppy-seeds-loose": VerticalEntry(
+        LOOSE,
+        f"{OWN} 6 % more than by poppy-seeds-loose-scaled, in three dimensions too",
+    ),
+    "poppy-seeds-close": VerticalEntry(
+        CLOSE,
+        f"{OWN} 10 % more than by poppy-seeds-close-scaled, in three dimensions too",
+    ),
+    "glass-3mm": _scaled(0.224, "3 mm glass spheres"),
+    "poppy-seeds-loose-scaled": _scaled(0.240, "loose poppy seeds"),
+    "poppy-seeds-close-scaled": _scaled(0.422, "close-packed poppy seeds"),
+}

@@ -1,0 +1,189 @@
+"""Engines that compute walks, by name. An engine is one module with the functions of `Engine`, and a line in `ENGINES`."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Protocol
+
+from rft.core.checks import Number, check_numbers
+from rft.core.refusal import Refusal, formatted, require
+from rft.terradynamics.ground import Ground, GroundEffect, checked_effects, ground_of
+from rft.terradynamics.meshes.law import Spatial
+from rft.terradynamics.plates.stress import PlateStress
+from rft.terradynamics.walking.robot import SMALLEST, Robot, Tripod
+from rft.terradynamics.walking.stride import Walk, compute_stride
+
+
+@dataclass(frozen=True)
+class Walker:
+    """A robot, its clock and its ground. stress: a stress map of the vertical plane, or a law of three dimensions. effects:
+    aeration and grain inertia.
+
+    Examples
+    --------
+    >>> from rft.terradynamics.plates import CLeg, StressMap
+    >>> from rft.terradynamics.walking import Fineness, Rhex, Tripod, Walker, engine
+    >>> robot = Rhex(0.15, 0.13, 0.02, 0.03, CLeg(0.02, 0.01), hips=(-0.05, 0.0, 0.05))
+    >>> walker = Walker(robot, Tripod(frequency=2.0), StressMap(zeta=0.6))
+    >>> (walk,) = engine("planar").walk([walker], Fineness(steps=16))
+    >>> walk.status, round(walk.speed, 3)
+    ('walking', 0.305)
+    """
+
+    robot: Robot
+    gait: Tripod
+    stress: PlateStress | Spatial
+    effects: tuple[GroundEffect, ...] = ()
+
+    def __post_init__(self):
+        for name, kind in (
+            ("robot", Robot),
+            ("gait", Tripod),
+            ("stress", PlateStress | Spatial),
+        ):
+            value, kinds = (
+                getattr(self, name),
+                getattr(kind, "__name__", "PlateStress or Spatial"),
+            )
+            require(isinstance(value, kind), f"{name} must be a {kinds}", value=value)
+        object.__setattr__(self, "effects", checked_effects(self.effects))
+        for effect in self.effects:
+            require(
+                effect.walks,
+                f"walking takes the effects aeration and grain-inertia, not {effect.kind}",
+                instead="drop it",
+            )
+
+    @property
+    def ground(self) -> Ground:
+        """Ground with all effects."""
+        return ground_of(self.effects)
+
+
+@dataclass(frozen=True)
+class Fineness:
+    """Numerical settings of a walk.
+
+    engine (-): planar or mujoco; by default planar, but mujoco for robots and ground of three dimensions.
+
+    Examples
+    --------
+    >>> from rft.terradynamics.walking import Fineness
+    >>> Fineness(steps=64).elements  # of each leg, where none are given
+    12
+    """
+
+    steps: Annotated[
+        int, Number(8, 10_000, "-", "time steps of a cycle", whole=True)
+    ] = 32
+    elements: Annotated[
+        int,
+        Number(
+            4,
+            1000,
+            "-",
+            "elements of a leg's outline; the belly has as many",
+            whole=True,
+        ),
+    ] = 12
+    rounding: Annotated[
+        float,
+        Number(
+            SMALLEST, 0.1, "m/s",
+            "speed below which drag falls off in proportion to speed; of slow legs it is no more than 5 % of the speed of "
+            "their ends",
+        ),
+    ] = 3e-3  # fmt: skip
+    duration: Annotated[
+        float, Number(1e-3, 1e4, "s", "time of walking from rest, at most")
+    ] = 10.0
+    engine: str | None = None
+
+    def __post_init__(self):
+        valid = self.engine is None or (
+            isinstance(self.engine, str) and self.engine in ENGINES
+        )
+        require(valid, f"engine must be one of {', '.join(ENGINES)}", value=self.engine)
+        check_numbers(self)
+
+
+class Engine(Protocol):
+    """A module that computes walks."""
+
+    def refuse(self, walker: Walker) -> None:
+        """Raise ValueError for a walker that this engine cannot compute."""
+        ...
+
+    def walk(
+        self,
+        walkers: Sequence[Walker],
+        numerics: Fineness,
+        cycles: int | None = None,
+        progress: Callable | None = None,
+        advance: Callable = compute_stride,
+    ) -> list[Walk]:
+        """Return the walks of walkers from rest, with their speeds at the limit cycle.
+
+        A walk lasts ``cycles`` cycles, by default the duration of the numerics, or until the robot's end. progress:
+        receives the finished fraction. advance: computes a stride, as `rft.terradynamics.walking.stride.compute_stride`."""
+        ...
+
+    def rerun(
+        self,
+        walkers: Sequence[Walker],
+        numerics: Fineness,
+        walks: Sequence[Walk],
+        cycles: int | None = None,
+        advance: Callable = compute_stride,
+    ) -> list[Walk]:
+        """Return known walks with other numerics. A walk with a limit cycle starts near it, and only the fields of the limit
+        cycle change; others are computed from rest."""
+        ...
+
+    def step_cost(
+        self, walkers: Sequence[Walker], numerics: Fineness, seconds: float
+    ) -> tuple[float, float]:
+        """Return s of computing in a time step of equal walkers side by side, and number of evaluations of forces for one,
+        from the first steps of their walks: those of a stride, or as many as ``seconds`` s of computing allow."""
+        ...
+
+
+def engine(name: str) -> Engine:
+    """Return the engine of a name; ValueError for unknown engines and those that are not installed.
+
+    Examples
+    --------
+    >>> from rft.terradynamics.walking import ENGINES, engine
+    >>> list(ENGINES), callable(engine("planar").walk)
+    (['planar', 'mujoco'], True)
+    """
+    require(
+        isinstance(name, str) and name in ENGINES,
+        f"engine must be one of {', '.join(ENGINES)}",
+        value=name,
+    )
+    try:
+        return importlib.import_module(ENGINES[name])
+    except ModuleNotFoundError as error:
+        if error.name != name:
+            raise
+        raise Refusal(
+            f"the {name} engine is not installed",
+            instead=f"pip install 'geomech[{name}]'",
+        ) from None
+    except (
+        Exception
+    ) as error:  # importing MuJoCo loads the library that MUJOCO_GL names
+        raise Refusal(
+            f"the {name} engine cannot be loaded",
+            because=formatted(str(error)),
+            instead="is MUJOCO_GL right?",
+        ) from None
+
+
+ENGINES = {
+    "planar": "rft.terradynamics.walking.planar_walk",
+    "mujoco": "rft.terradynamics.walking.mujoco_walk",
+}

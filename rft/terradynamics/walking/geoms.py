@@ -1,0 +1,34 @@
+"""Geoms of a MuJoCo model as triangles that touch the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+
+from rft.core.refusal import formatted, require
+from rft.terradynamics.meshes.geoms import geom_mesh
+from rft.terradynamics.meshes.mesh import Mesh
+from rft.terradynamics.walking.facets import Surface
+
+__all__ = ["geom_mesh", "surface", "surfaces"]
+
+
+def surfaces(model: mujoco.MjModel, meshes: Mapping[str, Mesh]) -> list[Surface]:
+    """Return surfaces by the names of their geoms, from meshes in the geoms' frames; a mesh may differ from its geom."""
+    out = []
+    for name, mesh in meshes.items():
+        geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)
+        require(geom >= 0, f"there is no geom {formatted(name)} in the model")
+        out.append(surface(model, geom, mesh))
+    return out
+
+
+def surface(model: mujoco.MjModel, geom: int, mesh: Mesh) -> Surface:
+    """Return the surface of a geom from a mesh in the geom's frame."""
+    rotation = np.zeros(9)
+    mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
+    return Surface.from_mesh(
+        int(model.geom_bodyid[geom]), mesh, rotation, model.geom_pos[geom]
+    )._replace(geom=geom)
