@@ -34,20 +34,23 @@ PACKAGES = {
         "geomech.geometry.metric",
         "geomech.symbolic",
     ],
-    "Mechanics": [
+    "Mechanics of the horizontal plane": [
         "rft",
         "rft.laws",
         "rft.bodies",
         "rft.effects",
-        "rft.fits.rods",
         "rft.laws.drag",
+        "rft.fits.rods",
+    ],
+    "Terradynamics": [
         "rft.terradynamics.plates",
         "rft.terradynamics.meshes",
         "rft.terradynamics.ground",
         "rft.terradynamics.walking",
+        "rft.fits.plates",
         "rft.mujoco",
-        "rft.grains",
     ],
+    "Simulated grains": ["rft.grains"],
 }
 
 
