@@ -157,18 +157,18 @@ def storing(
 ) -> Iterator[None]:
     """Store the results of tasks that run in the body of the statement; at its end they
     are removed. Refusal while another computation for the output is running."""
-    from geomech.run import jobs, store
+    from geomech.run import runner, store
     from geomech.run.digest import digest
 
     scene = Path(question.scene.name)
-    context = jobs.context_of([x for x in inputs if x != scene])
+    context = runner.digest_context([x for x in inputs if x != scene])
     if output is None:
-        path = store.in_cache(digest(context, question))
+        path = store.cache_file(digest(context, question))
     else:
         path = store.partial_file(output)
     if path is not None:
         refuse_inputs([path], inputs)
-    with jobs.storing(path, context, output):
+    with runner.store_results(path, context, output):
         yield
 
 

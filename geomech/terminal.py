@@ -21,7 +21,7 @@ from pathlib import Path
 import typer
 
 from geomech.core.errors import Note
-from geomech.run import BELOW
+from geomech.run import THREAD_VARIABLES
 from geomech.run.progress import progress
 from rft.core.refusal import Refusal, line, printable, worded
 
@@ -84,7 +84,7 @@ def stoppable() -> Iterator[None]:
 def limit_threads() -> None:
     """Let the libraries below NumPy, which loads later, take one thread: small matrices gain nothing from more, their threads
     wait by turning in circles, and sums that are shared out end in other digits."""
-    os.environ.update(dict.fromkeys(BELOW, "1"))
+    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
 
 
 def exit_code(app: typer.Typer, argv: list[str]) -> int:

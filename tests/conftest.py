@@ -145,7 +145,7 @@ def no_lines_of_progress(monkeypatch):
     """What a command says does not hang on how busy the machine is."""
     from geomech.run import progress
 
-    monkeypatch.setattr(progress, "EVERY", 1e9)
+    monkeypatch.setattr(progress, "PRINT_INTERVAL", 1e9)
 
 
 @pytest.fixture(autouse=True)

@@ -16,7 +16,7 @@ from test_workers import OVER, power  # noqa: F401  power is a fixture
 from geomech import scenes
 from geomech.run import executors
 from geomech.run.executors import Cluster
-from geomech.run.jobs import runner
+from geomech.run.runner import runner
 from geomech.run.workers import using
 from geomech.studies import cycles, sweep
 from rft.core.refusal import Refusal
@@ -111,7 +111,7 @@ def test_a_worker_that_is_ended_loses_nothing(processes, tmp_path, monkeypatch):
     """By its own id, with SIGKILL; then the other one, by a part that ends whoever does it."""
     local, both = processes
     monkeypatch.setattr(executors, "WAIT", 30.0)
-    monkeypatch.setattr(executors, "SEEN", 0.2)
+    monkeypatch.setattr(executors, "COUNT_INTERVAL", 0.2)
     with using(scheduler=local.scheduler_address):
         monkeypatch.setattr(
             executors, "WAIT", 3.0
@@ -130,7 +130,9 @@ def test_a_worker_with_other_code_is_refused(address, monkeypatch):
     monkeypatch.setattr(
         executors, "VERSION", "geomech 9.9, solver 9"
     )  # of this command; threads share it, parts bear it
-    monkeypatch.setattr(executors, "_probe", lambda: ("geomech 9.8, solver 9", "numpy"))
+    monkeypatch.setattr(
+        executors, "_version_and_back_end", lambda: ("geomech 9.8, solver 9", "numpy")
+    )
     with pytest.raises(
         Refusal,
         match="has geomech 9.8, solver 9, this command geomech 9.9, solver 9: install the same",

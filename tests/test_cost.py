@@ -131,7 +131,7 @@ def large(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", [n for n in LARGE if n != "phases"])
 def test_large_requests_are_refused_without_yes(name, large, monkeypatch):
     monkeypatch.setattr(
-        run_cost, "ENOUGH", 0.05
+        run_cost, "TIMED_SECONDS", 0.05
     )  # what is refused is far beyond what may be
     monkeypatch.setattr(
         connection, "SAMPLES_TOGETHER", 2000

@@ -10,7 +10,7 @@ import tasks
 from geomech import scenes
 from geomech.questions.sweep import Sweep
 from geomech.run import cost as run_cost
-from geomech.run import jobs
+from geomech.run import runner as runners
 from geomech.studies.study import Study
 from rft.balance.backend import preferring
 from rft.balance.listening import listener, listening, nobody
@@ -25,13 +25,15 @@ def test_seconds_are_assumed_for_places_of_the_body_and_for_batches():
     """Ten times as many places, or batches, take ten times as long; a linear medium takes a tenth."""
     with preferring("numpy"):
         one, places, batches = (
-            run_cost.assumed(*x)
+            run_cost.assumed_seconds(*x)
             for x in ((1e6, 3, False, 0), (1e6, 30, False, 0), (0, 0, False, 1e3))
         )
-        assert places == pytest.approx(10 * one) and run_cost.assumed(
+        assert places == pytest.approx(10 * one) and run_cost.assumed_seconds(
             1e6, 3, True, 0
         ) == pytest.approx(one / 10)
-        assert run_cost.assumed(1e6, 3, False, 1e3) == pytest.approx(one + batches)
+        assert run_cost.assumed_seconds(1e6, 3, False, 1e3) == pytest.approx(
+            one + batches
+        )
     few, many = (
         {"medium.ratio": np.linspace(1, 3, n).tolist()} for n in (10, 100)
     )  # each medium is a batch
@@ -153,25 +155,26 @@ class Others:
         future.set_result(task(*arguments))
         return future
 
-    def ahead(self):
+    def max_pending(self):
         return 1
 
 
 def test_others_compute_once_it_is_decided(clock):
     others, found = Others(), []
     run_cost.decide(run_cost.Cost(10**6, 30.0, 1e8), lambda told: None)
-    with jobs.running(dataclasses.replace(jobs.runner(), executor=others)):
-        for x in jobs.runner().map(tasks.doubled, 2.0, range(8), 8):
+    with runners.use_runner(dataclasses.replace(runners.runner(), executor=others)):
+        for x in runners.runner().map(tasks.doubled, 2.0, range(8), 8):
             found.append(x)
             clock.solve(1.0)
     assert (
-        found == [2.0 * x for x in range(8)] and others.given == 8 - 1 - run_cost.FEWEST
+        found == [2.0 * x for x in range(8)]
+        and others.given == 8 - 1 - run_cost.TIMED_BATCHES
     )
 
 
 def test_what_is_refused_leaves_nothing(tmp_path, clock):
     def refused():
-        with jobs.storing(tmp_path / ".a.partial", keep=True) as runner:
+        with runners.store_results(tmp_path / ".a.partial", keep=True) as runner:
             runner.store.put(b"key", 1.0, float)
             runner.store.commit()
             run_cost.decide(

@@ -264,7 +264,7 @@ def test_bars(monkeypatch):
             return super().add_task(title, **more)
 
     monkeypatch.setattr(rich.progress, "Progress", Bars)
-    with progress._on_terminal(progress.Computation(f"{ESC} [red]a[/b].toml")):
+    with progress._show_on_terminal(progress.Computation(f"{ESC} [red]a[/b].toml")):
         (task,) = bars[0].tasks
         (row,) = (bars[0].columns[0].render(task),)
     assert row.plain == errors.printable(ESC) + " [red]a[/b].toml"

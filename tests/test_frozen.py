@@ -36,7 +36,7 @@ def test_commands_give_what_they_gave(tool, monkeypatch):
 @pytest.mark.parametrize("piece", range(PIECES))
 def test_refusals_end_as_they_did_and_name_what_they_named(piece, monkeypatch):
     monkeypatch.setattr(
-        cost, "ENOUGH", 0.05
+        cost, "TIMED_SECONDS", 0.05
     )  # what takes too long does so by far: three small batches tell
     monkeypatch.setattr(connection, "SAMPLES_TOGETHER", 2000)
     with frozen.place():

@@ -10,8 +10,8 @@ from geomech import pipeline, scenes
 from geomech.core.variables import Result, Variable
 from geomech.io.results import write_csv
 from geomech.questions.base import Question
-from geomech.run import jobs
 from geomech.run.cost import Cost
+from geomech.run.runner import runner
 from geomech.studies.accuracy import slope
 from rft.core.refusal import Refusal
 
@@ -55,7 +55,7 @@ class Asked(Question):
 
     def compute(self, run):
         self.note("compute")
-        assert jobs.runner().store.path is not None  # what is done is stored
+        assert runner().store.path is not None  # what is done is stored
         run.allow(Cost(1, 10 * self.seconds, 1.0, 10 * self.seconds))
         run.progress(1.0)
         return RESULT

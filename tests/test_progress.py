@@ -9,7 +9,7 @@ import pytest
 
 from geomech import scenes, terminal
 from geomech.run import progress
-from geomech.run.progress import EVERY, Computation
+from geomech.run.progress import PRINT_INTERVAL, Computation
 from geomech.studies.study import Study
 from geomech.systems import Swimmer
 
@@ -17,8 +17,8 @@ VISCOUS = scenes.load("three-link-viscous").with_numerics(grid=5)
 
 
 def test_lines_in_a_pipe(monkeypatch, capsys):
-    assert EVERY == 10.0
-    monkeypatch.setattr(progress, "EVERY", 0.02)
+    assert PRINT_INTERVAL == 10.0
+    monkeypatch.setattr(progress, "PRINT_INTERVAL", 0.02)
     said = ""
     with terminal.progress("field of <x>") as reached:
         for fraction, line in (
@@ -45,16 +45,16 @@ def test_the_time_to_go(monkeypatch):
     monkeypatch.setattr(progress.time, "monotonic", lambda: clock[0])
     course = Computation("field of x")
     clock[0] += 20.0
-    course.reached(0.25)
+    course.update(0.25)
     assert str(course) == "field of x: 25 % after 20 s, about 60 s to go"
-    course.reached(1.0)
+    course.update(1.0)
     assert str(course) == "field of x: under way for 20 s"
 
 
 def test_a_part_has_its_own_title(monkeypatch):
     seen = []
     monkeypatch.setattr(
-        Computation, "reached", lambda course, f: seen.append((course.title, f))
+        Computation, "update", lambda course, f: seen.append((course.title, f))
     )
     with terminal.progress("displacement") as reached:
         with progress.progress("table") as inner:
@@ -75,7 +75,7 @@ def test_after_a_part_the_whole_goes_on(monkeypatch):
 
 
 def test_an_error_ends_it(capsys, monkeypatch):
-    monkeypatch.setattr(progress, "EVERY", 0.02)
+    monkeypatch.setattr(progress, "PRINT_INTERVAL", 0.02)
     with pytest.raises(terminal.Stopped), terminal.progress("field") as failed:
         raise terminal.Stopped(2)
     time.sleep(0.06)
@@ -105,7 +105,7 @@ def test_a_bar_in_a_notebook(notebook, monkeypatch, capsys):
     with progress.progress("quick") as reached:
         reached(0.5)
     assert notebook == []
-    monkeypatch.setattr(progress, "REDRAWN", 0.0)
+    monkeypatch.setattr(progress, "REDRAW_INTERVAL", 0.0)
     with progress.progress("field of <x>") as reached:
         reached(0.25)
         reached(0.5)
@@ -118,7 +118,7 @@ def test_a_bar_in_a_notebook(notebook, monkeypatch, capsys):
 
 
 def test_a_table_from_python_shows_how_far_it_is(notebook, monkeypatch):
-    monkeypatch.setattr(progress, "REDRAWN", 0.0)
+    monkeypatch.setattr(progress, "REDRAW_INTERVAL", 0.0)
     study = Study(VISCOUS)
     assert np.isfinite(study.fitted.A).all()
     assert (
@@ -131,14 +131,14 @@ def test_a_table_from_python_shows_how_far_it_is(notebook, monkeypatch):
 
 
 def test_progress_may_be_taken_by_the_caller(notebook, monkeypatch):
-    monkeypatch.setattr(progress, "REDRAWN", 0.0)
+    monkeypatch.setattr(progress, "REDRAW_INTERVAL", 0.0)
     told = []
     Study(VISCOUS).compute_field(told.append)
     assert told == [1.0] and notebook == []
 
 
 def test_a_command_in_a_pipe_says_how_far_its_tables_are(monkeypatch, capsys):
-    monkeypatch.setattr(progress, "EVERY", 0.03)
+    monkeypatch.setattr(progress, "PRINT_INTERVAL", 0.03)
     solve = Swimmer.velocity
     monkeypatch.setattr(
         Swimmer, "velocity", lambda self, *x: time.sleep(0.1) or solve(self, *x)

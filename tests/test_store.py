@@ -15,8 +15,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from geomech.run import jobs, store
-from geomech.run.store import Store, decoded, encoded, in_cache, partial_file
+from geomech.run import runner as runners
+from geomech.run import store
+from geomech.run.store import Store, cache_file, decode, encode, partial_file
 from rft.core.refusal import Refusal
 
 
@@ -80,7 +81,7 @@ def found(path, count=20):
 
 @pytest.mark.parametrize("kind", HARD)
 def test_results_come_back_to_the_last_bit(kind, tmp_path):
-    assert same(decoded(encoded(HARD[kind]), kind), HARD[kind])
+    assert same(decode(encode(HARD[kind]), kind), HARD[kind])
     for _ in range(2):
         some = Store(tmp_path / "p")
         some.put(key(1), HARD[kind], kind)
@@ -184,7 +185,7 @@ def test_every_bit_of_the_header_may_be_flipped(place, tmp_path):
         flipped = bytearray(raw)
         flipped[place] ^= 1 << bit
         (tmp_path / "p").write_bytes(flipped)
-        with jobs.storing(tmp_path / "p", keep=True) as runner:
+        with runners.store_results(tmp_path / "p", keep=True) as runner:
             runner.store.put(key(0), value(0), np.ndarray)
             runner.store.commit()
             assert not runner.store.lost
@@ -211,13 +212,13 @@ def test_a_value_that_is_none_of_ours_is_damage(column, other, tmp_path, capsys)
 )  # fmt: skip
 def test_a_value_that_is_no_array_is_not_read(parts):
     raw = msgspec.msgpack.encode(
-        msgspec.msgpack.Ext(store.ARRAY, msgspec.msgpack.encode(parts))
+        msgspec.msgpack.Ext(store.ARRAY_CODE, msgspec.msgpack.encode(parts))
     )
     with pytest.raises(store.UNREADABLE):
-        decoded(raw, np.ndarray)
+        decode(raw, np.ndarray)
     nested = b"\x91" * 100_000 + b"\x01"
     with pytest.raises(store.UNREADABLE):
-        decoded(nested, object)
+        decode(nested, object)
 
 
 @pytest.mark.parametrize(
@@ -233,7 +234,7 @@ def test_a_damaged_or_foreign_file_is_renamed_and_another_begun(
         with sqlite3.connect(path) as other:
             other.execute("CREATE TABLE mine (x)")
             if damage == "other table":
-                other.execute(f"PRAGMA application_id = {store.OURS}")
+                other.execute(f"PRAGMA application_id = {store.APPLICATION_ID}")
         other.close()
         raw = path.read_bytes()
     else:
@@ -403,9 +404,9 @@ def test_names_of_one_file_keep_one_file(tmp_path):
 
 def test_the_cache_is_the_users(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert in_cache(key(0)) == tmp_path / "geomech" / f"{'0' * 16}.partial"
+    assert cache_file(key(0)) == tmp_path / "geomech" / f"{'0' * 16}.partial"
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
-    assert in_cache(key(0)).is_relative_to(tmp_path / "home")
+    assert cache_file(key(0)).is_relative_to(tmp_path / "home")
     monkeypatch.setenv("XDG_CACHE_HOME", "somewhere")
-    assert in_cache(key(0)) is None
+    assert cache_file(key(0)) is None

@@ -26,10 +26,11 @@ pytestmark = pytest.mark.skipif(
 COMMAND = """
 import sys
 from geomech import cli, connection
-from geomech.run import jobs, store
+from geomech.run import pending, store
+from geomech.run import runner as runners
 from geomech.studies import cycles
-store.CHECKPOINT = jobs.CHECKPOINT = 0.05
-jobs.WORTH = 0.2
+store.CHECKPOINT = runners.CHECKPOINT = 0.05
+pending.WORTH_PROCESSES = 0.2
 connection.SAMPLES_TOGETHER, cycles.SAMPLES_TOGETHER = 400, 8
 print("begun", flush=True)
 cli.main()

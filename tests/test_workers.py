@@ -33,8 +33,8 @@ from geomech.core.errors import Note, UnitWarning
 from geomech.geometry import connection, metric
 from geomech.optimisation import checked, search
 from geomech.optimisation.variables import answers, displacement, values
-from geomech.run import executors, jobs
-from geomech.run.jobs import Runner, runner, running
+from geomech.run import executors, pending
+from geomech.run.runner import Runner, runner, use_runner
 from geomech.run.workers import using
 from geomech.scenes import kinds
 from geomech.studies import accuracy, cycles, sweep, tiered
@@ -58,7 +58,7 @@ def two():
 @pytest.fixture
 def given_away(monkeypatch):
     """All work goes to others, however small."""
-    monkeypatch.setattr(jobs, "WORTH", 0.0)
+    monkeypatch.setattr(pending, "WORTH_PROCESSES", 0.0)
 
 
 def each(executor, task, common, items, total=100, seconds=1e9):
@@ -74,10 +74,10 @@ def test_an_executor_is_looked_at_while_nothing_comes():
         def submit(self, task, *arguments):
             return Future()
 
-        def look(self, future):
+        def warn_if_stalled(self, future):
             future.set_result(b"done")
 
-    assert jobs._Part(Slow(2), None, b"").result() == b"done"
+    assert pending.PendingTask(Slow(2), None, b"").result() == b"done"
 
 
 def test_what_is_left_to_do_decides_whether_processes_are_worth_their_start(
@@ -85,7 +85,9 @@ def test_what_is_left_to_do_decides_whether_processes_are_worth_their_start(
 ):
     asked = []
     monkeypatch.setattr(
-        jobs._Queue, "_is_worth_it", lambda self, remaining: asked.append(remaining)
+        pending.TaskQueue,
+        "_is_worth_processes",
+        lambda self, remaining: asked.append(remaining),
     )
     assert each(executors.Processes(2), doubled, 2, range(4), total=4) == [
         0,
@@ -128,7 +130,7 @@ def test_what_is_small_is_done_here(two):
 
 
 def test_what_turns_out_to_take_long_is_given_away(two, monkeypatch):
-    monkeypatch.setattr(jobs, "WORTH", 1e-9)
+    monkeypatch.setattr(pending, "WORTH_PROCESSES", 1e-9)
     found = each(two, who, None, range(6), 6, seconds=None)
     assert [x[-1] for x in found] == [*range(6)]
     assert [x[0] == os.getpid() for x in found] == [
@@ -198,7 +200,7 @@ def test_workers_end_with_whoever_started_them(tmp_path):
         sys.path[:0] = {[str(Path(__file__).parent)]!r}
         from tasks import waits
         from geomech.run.executors import Processes
-        from geomech.run.jobs import Runner
+        from geomech.run.runner import Runner
         list(Runner(executor=Processes(1)).map(waits, {str(tmp_path)!r}, range(4), 4, seconds=1e9))
     """
     with subprocess.Popen([sys.executable, "-c", code]) as process:
@@ -246,7 +248,7 @@ def test_a_sweep_has_the_same_digits_whoever_computes(
 
 def both(two, ask, shared=True):
     """What a request gives here, and by processes, which have done some of it if it is to be shared."""
-    with running(Runner()):  # `two` is there for all tests
+    with use_runner(Runner()):  # `two` is there for all tests
         here, sent = ask(), []
 
     class Counted(executors.Processes):
@@ -254,7 +256,7 @@ def both(two, ask, shared=True):
             sent.append(task)
             return two.submit(task, *arguments)
 
-    with running(Runner(executor=Counted(2))):
+    with use_runner(Runner(executor=Counted(2))):
         there = ask()
     assert (len(sent) > 1) == shared
     return here, there

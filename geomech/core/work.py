@@ -1,5 +1,5 @@
 """Where tasks are computed: in this process, or by the runner of a request, which is set from above
-(`geomech.run.jobs`) and may store and distribute them."""
+(`geomech.run.runner`) and may store and distribute them."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ from geomech.optimisation.request import (
     Request,
     checked,
 )
-from geomech.run.jobs import runner
+from geomech.run.runner import runner
 from geomech.scenes.model import Scene
 from rft.core.refusal import Refusal, located
 

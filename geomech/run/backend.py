@@ -1,4 +1,5 @@
-"""The back end of a request: compiled code where the number of balances is worth its start and all workers have it."""
+"""The back end of a request: compiled code where the number of balances is worth its start
+and all workers have it."""
 
 from __future__ import annotations
 
@@ -14,41 +15,56 @@ from rft.balance.listening import listen, listener, nobody
 from rft.core.threads import cores, one_thread
 
 __all__ = [
-    "BACKENDS", "VERSION", "at_most", "cores", "fastest", "listen", "listener", "nobody", "one_thread", "prefer",
-    "prefer_for", "preferred", "preferring", "suiting",
-]  # fmt: skip
+    "BACKENDS",
+    "VERSION",
+    "at_most",
+    "cores",
+    "fastest",
+    "listen",
+    "listener",
+    "nobody",
+    "one_thread",
+    "prefer",
+    "prefer_backend",
+    "prefer_for",
+    "preferred",
+    "preferring",
+]
 
 VERSION = f"geomech {version.VERSION}, solver {SOLVER}"
-BACKENDS = "numpy", "numba"  # slowest first
-MANY = (
-    100_000  # balances, which take NumPy about as long as compiled code takes to load
-)
+BACKENDS = ("numpy", "numba")  # slowest first
+# Balances that take NumPy about as long as compiled code takes to load.
+WORTH_LOADING = 100_000
 
-_most: ContextVar[str] = ContextVar("most", default="numba")
+_limit: ContextVar[str] = ContextVar("limit", default="numba")
 
 
 def fastest() -> str:
     """Return the fastest back end that a request may take."""
-    return min(backend.fastest(), _most.get(), key=BACKENDS.index)
+    return min(backend.fastest(), _limit.get(), key=BACKENDS.index)
 
 
 @contextlib.contextmanager
 def at_most(name: str) -> Iterator[None]:
     """Use no back end faster than this one in the body of the statement."""
-    token = _most.set(min(name, fastest(), key=BACKENDS.index))
+    token = _limit.set(min(name, fastest(), key=BACKENDS.index))
     try:
         with preferring(min(preferred(), fastest(), key=BACKENDS.index)):
             yield
     finally:
-        _most.reset(token)
+        _limit.reset(token)
 
 
-def suiting(balances: float) -> contextlib.AbstractContextManager[None]:
-    """Let "auto" be the fastest back end in the body of the statement if this number of balances is worth its start."""
-    return preferring(fastest() if balances >= MANY else "")
+def prefer_backend(balances: float) -> contextlib.AbstractContextManager[None]:
+    """Let "auto" be the fastest back end in the body of the statement if this number of
+    balances is worth its start."""
+    if balances < WORTH_LOADING:
+        return preferring("")
+    return preferring(fastest())
 
 
 def prefer_for(balances: float) -> None:
-    """Let "auto" be the fastest back end from here on if this number of balances is worth its start."""
-    if balances >= MANY:
+    """Let "auto" be the fastest back end from here on if this number of balances is worth
+    its start."""
+    if balances >= WORTH_LOADING:
         prefer(fastest())

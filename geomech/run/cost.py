@@ -1,9 +1,10 @@
 """Cost of requests, and the limits beyond which they need consent.
 
-Balances and memory are counted beforehand. Seconds are assumed at first, from the time of balances on the machine that
-this was written on; where the assumption does not decide, the first balances of the request itself are timed. They are
-part of the request: nothing is computed only to be timed. No computed number depends on seconds. Seconds are CPU time,
-so that other work on the machine does not count."""
+Balances and memory are counted beforehand. Seconds are assumed at first, from the time of
+balances on the machine that this was written on. Where the assumption does not decide, the
+first balances of the request itself are timed. They are part of the request: nothing is
+computed only to be timed. No computed number depends on seconds. Seconds are CPU time, so
+that other work on the machine does not count."""
 
 from __future__ import annotations
 
@@ -18,27 +19,24 @@ LONGEST = 60.0  # s of computing that a command begins without consent
 LARGEST = 2e9  # bytes of memory, likewise
 WORTH_SAYING = 5.0  # s
 BASE = 1.6e8  # bytes: Python, its libraries, and a batch of the solver
-SLOW, FAST = (
-    10.0,
-    5.0,
-)  # most and one over the least that balances may take, over the assumed seconds
-ENOUGH, FEWEST = (
-    0.25,
-    3,
-)  # s of computing, and batches of balances, that suffice to time them
-LOADING = (
-    20.0  # times the median: a batch that takes longer has loaded or compiled code
-)
+# Balances may take up to this many times the assumed seconds, ...
+SLOWEST = 10.0
+# ... and no less than one over this of them.
+FASTEST = 5.0
+# s of computing, and number of batches of balances, that suffice to time them.
+TIMED_SECONDS = 0.25
+TIMED_BATCHES = 3
+# Times the median: a batch that takes longer has loaded or compiled code.
+LOADING = 20.0
 
-# Assumed seconds, for each place of the body where forces are evaluated; measured, with the work around a balance, 2e-6 to
-# 5e-6 by NumPy and 0.3e-6 to 1.2e-6 compiled in dry media, 0.8e-6 and 0.5e-6 in a linear one, whose bodies were small; and
-# for each batch of balances, however small.
+# Assumed seconds, for each place of the body where forces are evaluated. Measured with the
+# work around a balance: 2e-6 to 5e-6 by NumPy and 0.3e-6 to 1.2e-6 compiled in dry media,
+# 0.8e-6 and 0.5e-6 in a linear one, whose bodies were small.
 BALANCE = {"numpy": 5e-6, "numba": 0.8e-6}
-LINEAR = 0.1
-BATCH = {"numpy": 2e-3, "numba": 5e-4}
-STEP = (
-    200  # balances of large batches that take NumPy as long as one batch, however small
-)
+LINEAR = 0.1  # times BALANCE, in a linear medium
+BATCH = {"numpy": 2e-3, "numba": 5e-4}  # s for each batch of balances, however small
+# Balances of large batches that take NumPy as long as one small batch.
+STEP = 200
 
 
 class TooLong(Refusal):
@@ -46,8 +44,11 @@ class TooLong(Refusal):
 
 
 class Cost(NamedTuple):
-    """Cost of a request. balances: of force. seconds: of computing, ``besides`` of which are other work. memory: bytes
-    at the peak. steps: of time, in which balances are solved one after the other."""
+    """Cost of a request.
+
+    balances: number of balances of force. seconds: of computing, ``besides`` of which are
+    other work. memory: bytes at the peak. steps: of time, in which balances are solved one
+    after the other."""
 
     balances: int
     seconds: float
@@ -57,7 +58,9 @@ class Cost(NamedTuple):
 
     def __str__(self) -> str:
         balances = f"{self.balances:,} force balances"
-        return f"{balances}, about {duration(self.seconds)} of computing and {_size(self.memory)} of memory"
+        seconds = duration(self.seconds)
+        memory = _size(self.memory)
+        return f"{balances}, about {seconds} of computing and {memory} of memory"
 
     @property
     def as_balances(self) -> float:
@@ -71,9 +74,8 @@ class Cost(NamedTuple):
 
     def scaled(self, factor: float) -> Cost:
         """Return the cost if balances take ``factor`` times as long."""
-        return self._replace(
-            seconds=self.besides + factor * (self.seconds - self.besides)
-        )
+        of_balances = self.seconds - self.besides
+        return self._replace(seconds=self.besides + factor * of_balances)
 
     def check(self, place: str, yes: bool, less: str = "ask for less") -> None:
         """Raise `TooLong` beyond the limits unless ``yes``. less: advice on a smaller request."""
@@ -86,86 +88,95 @@ class Cost(NamedTuple):
             )
 
 
-def assumed(
+def assumed_seconds(
     samples: float, points: int, linear: bool, batches: float, back_end: str = ""
 ) -> float:
-    """Return the assumed seconds of so many balances in so many batches, by the preferred back end or another."""
+    """Return the assumed seconds for balances of ``samples`` with ``points`` each, in a
+    number of batches, by the preferred back end or another."""
     back_end = back_end or preferred()
-    return (
-        samples * points * (LINEAR if linear else 1.0) * BALANCE[back_end]
-        + batches * BATCH[back_end]
-    )
+    of_place = BALANCE[back_end]
+    if linear:
+        of_place *= LINEAR
+    return samples * points * of_place + batches * BATCH[back_end]
 
 
 def decide(cost: Cost, judge: Callable[[Cost], None]) -> None:
-    """Call judge(cost) at once where the assumed seconds decide, else once the first balances have been timed; an
-    exception from it ends the request."""
+    """Call judge(cost) at once where the assumed seconds decide, else once the first
+    balances have been timed. An exception from it ends the request."""
     of_balances = cost.seconds - cost.besides
-    is_clear = (
-        of_balances > FAST * LONGEST
-        or cost.seconds < LONGEST / SLOW
+    is_decided = (
+        of_balances > FASTEST * LONGEST
+        or cost.seconds < LONGEST / SLOWEST
         or cost.besides > LONGEST
+        or cost.memory > LARGEST
     )
-    decided = is_clear or cost.memory > LARGEST
-    listen(
-        nobody if decided else _Watch(cost, judge)
-    )  # times of an earlier part of the request do not apply to this one
-    if decided:
+    if is_decided:
+        # Times of an earlier part of the request do not apply to this one.
+        listen(nobody)
         judge(cost)
+    else:
+        listen(_Stopwatch(cost, judge))
 
 
 def is_undecided() -> bool:
     """Return whether the first balances are still to be timed."""
-    return isinstance(listener(), _Watch) and not listener().over
+    watch = listener()
+    return isinstance(watch, _Stopwatch) and not watch.is_over
 
 
-class _Watch:
+class _Stopwatch:
     """A listener that times the first balances of a request, except those that load code."""
 
     def __init__(self, cost: Cost, judge: Callable[[Cost], None]):
-        self.cost, self.judge, self.over = cost, judge, False
+        self.cost = cost
+        self.judge = judge
+        self.is_over = False
         self.back_end = preferred()  # threads of the solver do not inherit it
         self.last: float | None = None
-        self.batches: list[tuple[float, float]] = []  # (seconds, those assumed)
+        self.measured: list[float] = []  # s, for each batch
+        self.assumed: list[float] = []  # s, for each batch
 
     def __call__(self, samples: int, points: int, linear: bool) -> None:
-        if self.over:
+        if self.is_over:
             return
         now = time.process_time()
         if self.last is not None:
-            self.batches.append(
-                (now - self.last, assumed(samples, points, linear, 1, self.back_end))
-            )
+            seconds = assumed_seconds(samples, points, linear, 1, self.back_end)
+            self.measured.append(now - self.last)
+            self.assumed.append(seconds)
         self.last = now
-        if (
-            len(self.batches) >= FEWEST
-            and sum(took for took, _ in self.batches) >= ENOUGH
-        ):
-            self.over = True
+        if len(self.measured) >= TIMED_BATCHES and sum(self.measured) >= TIMED_SECONDS:
+            self.is_over = True
             self.judge(self.cost.scaled(self._factor()))
 
     def _factor(self) -> float:
-        """Return the seconds of balances over those assumed."""
-        factors = sorted(took / each for took, each in self.batches)
-        most = LOADING * factors[len(factors) // 2]
-        took, expected = map(
-            sum,
-            zip(*((took, each) for took, each in self.batches if took <= most * each)),
-        )
-        return took / expected
+        """Return the seconds of balances over those assumed, without batches that load
+        code."""
+        batches = list(zip(self.measured, self.assumed))
+        factors = sorted(measured / assumed for measured, assumed in batches)
+        largest = LOADING * factors[len(factors) // 2]
+        total_measured = 0.0
+        total_assumed = 0.0
+        for measured, assumed in batches:
+            if measured <= largest * assumed:
+                total_measured += measured
+                total_assumed += assumed
+        return total_measured / total_assumed
 
 
 def duration(seconds: float) -> str:
-    """Return a time in words, at least a second, in the largest unit that makes a few of it."""
+    """Return a time in words: at least a second, in the largest unit of which it has one
+    and a half."""
     for unit, size in (("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
-        if seconds >= 1.5 * size:
-            return (
-                f"{seconds / size:.2g} {unit}"
-                if seconds < 100 * size
-                else f"{seconds / size:,.0f} {unit}"
-            )
+        count = seconds / size
+        if count >= 100:
+            return f"{count:,.0f} {unit}"
+        if count >= 1.5:
+            return f"{count:.2g} {unit}"
     return f"{max(1.0, seconds):.0f} s"
 
 
 def _size(memory: float) -> str:
-    return f"{memory / 1e9:,.2g} GB" if memory >= 1e9 else f"{memory / 1e6:.0f} MB"
+    if memory >= 1e9:
+        return f"{memory / 1e9:,.2g} GB"
+    return f"{memory / 1e6:.0f} MB"

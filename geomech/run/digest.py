@@ -21,10 +21,11 @@ class Undigestible(TypeError):
 
 
 def digest(*values: Any) -> bytes:
-    """Return the SHA-256 of values to the last digit: arrays, numbers, text, containers, functions, objects by their
-    fields.
+    """Return the SHA-256 of values to the last digit: of arrays, numbers, text, containers,
+    functions, and of objects by their fields.
 
-    Dataclass fields that are not compared are left out, as are cached properties. `Undigestible` for other objects."""
+    Dataclass fields that are not compared are left out, as are cached properties.
+    `Undigestible` for other objects."""
     hashed = hashlib.sha256()
     try:
         _feed(hashed.update, values)
@@ -71,7 +72,7 @@ def _feed_items(update: Callable[[bytes], None], x: Any) -> None:
 
 
 def _contents(x: Any) -> tuple:
-    """Return all that a function or an object consists of, its type first."""
+    """Return everything that a function or an object consists of, its type first."""
     if isinstance(x, functools.partial):
         return "partial", x.func, x.args, x.keywords
     if isinstance(x, types.MethodType):
@@ -79,50 +80,42 @@ def _contents(x: Any) -> tuple:
     if isinstance(x, types.FunctionType):
         return _code(x)
     if isinstance(x, types.BuiltinFunctionType | np.ufunc):
-        return (
-            "built in",
-            getattr(x, "__module__", ""),
-            getattr(x, "__self__", None),
-            x.__name__,
-        )
+        module = getattr(x, "__module__", "")
+        owner = getattr(x, "__self__", None)
+        return "built in", module, owner, x.__name__
     if isinstance(x, types.ModuleType):
         return "module", x.__name__
     if isinstance(x, types.CodeType):
         return "code", x.co_code, x.co_names, x.co_consts
     kind = type(x)
     if dataclasses.is_dataclass(kind):
-        return (
-            "object",
-            kind,
-            *(getattr(x, f.name) for f in dataclasses.fields(x) if f.compare),
-        )
+        fields = [f.name for f in dataclasses.fields(x) if f.compare]
+        return "object", kind, *(getattr(x, name) for name in fields)
     if isinstance(vars(kind).get("__reduce__"), types.FunctionType):
         return "object", kind, x.__reduce__()
     if kind.__module__ != "builtins" and hasattr(x, "__dict__"):
-        cached = {
-            name
-            for base in kind.__mro__
-            for name, f in vars(base).items()
-            if _caches(f)
-        }
-        return (
-            "object",
-            kind,
-            {
-                name: value
-                for name, value in sorted(vars(x).items())
-                if name not in cached
-            },
-        )
+        cached = _cached_properties(kind)
+        attributes = {}
+        for name, value in sorted(vars(x).items()):
+            if name not in cached:
+                attributes[name] = value
+        return "object", kind, attributes
     raise Undigestible(f"the content of a {kind.__qualname__} cannot be told")
 
 
-def _caches(attribute: Any) -> bool:
-    return isinstance(attribute, functools.cached_property)
+def _cached_properties(kind: type) -> set[str]:
+    """Return the names of the cached properties of a class."""
+    names = set()
+    for base in kind.__mro__:
+        for name, attribute in vars(base).items():
+            if isinstance(attribute, functools.cached_property):
+                names.add(name)
+    return names
 
 
 def _code(f: types.FunctionType) -> tuple:
-    """Return the name of a function of a module; for a function defined inside another its code and closure, too."""
+    """Return the name of a function of a module; for a function defined inside another also
+    its code and its closure."""
     if "<" not in f.__qualname__:
         return "function", _name(f)
     cells = [cell.cell_contents for cell in f.__closure__ or ()]

@@ -8,6 +8,7 @@ import importlib
 import pickle
 import sys
 import traceback
+import typing
 import warnings
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
@@ -16,11 +17,12 @@ from geomech.run.backend import VERSION, one_thread, preferring
 from rft.core.refusal import Refusal
 
 
-class Order(NamedTuple):
+class TaskPayload(NamedTuple):
     """Data common to all tasks of a request.
 
-    version: of the code. back_end: that "auto" stands for. plugins: (name, text) of plug-in files. classes: (module,
-    name) of registered classes. work: the pickled function and its common argument, which need these classes."""
+    version: of the code. back_end: that "auto" stands for. plugins: (name, text) of
+    plug-in files. classes: (module, name) of registered classes. work: the pickled
+    function and its common argument, which need these classes."""
 
     version: str
     back_end: str
@@ -30,96 +32,111 @@ class Order(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Result of a task: value, or the error that was raised and its traceback (where); notes: warnings (text, category,
-    file, line)."""
+    """Result of a task: its value, or the error that was raised and its traceback.
+
+    notes: warnings (text, category, file, line)."""
 
     value: Any
     error: BaseException | None
-    where: str
+    traceback: str
     notes: tuple
 
 
-class Alone(Exception):
-    """A task that other processes cannot compute, and why. worth_saying: False for a function defined inside another."""
+class NotPicklable(Exception):
+    """A task that other processes cannot load, and the reason.
 
-    def __init__(self, text: str, worth_saying: bool = False):
-        super().__init__(text)
-        self.worth_saying = worth_saying
+    is_told: whether the user hears of it; False for a function defined inside another."""
+
+    def __init__(self, reason: str, is_told: bool = False):
+        super().__init__(reason)
+        self.is_told = is_told
 
 
-def packed(task: Callable, common: Any, back_end: str) -> Order:
-    """Return the order of a task; `Alone` for one that no other process could load."""
+class WorkerTraceback(Exception):
+    """Traceback of an error that was raised in a worker."""
+
+
+@functools.cache
+def result_type(task: Callable) -> Any:
+    """Return the declared type of a task's result."""
+    return typing.get_type_hints(task).get("return", Any)
+
+
+def pack(task: Callable, common: Any, back_end: str) -> TaskPayload:
+    """Return the payload of a task; `NotPicklable` if no other process could load it."""
     from geomech.scenes import kinds
 
     classes = kinds.registered()
-    if own := [
-        name for module, name in classes if module == "__main__" or "<locals>" in name
-    ]:
-        raise Alone(
-            f"the class {own[0]} is of the program that runs, or of a function in it",
-            True,
-        )
+    for module, name in classes:
+        if module == "__main__" or "<locals>" in name:
+            raise NotPicklable(
+                f"the class {name} is of the program that runs, or of a function in it",
+                is_told=True,
+            )
     try:
         work = pickle.dumps((task, common))
     except (pickle.PicklingError, AttributeError, TypeError) as error:
-        raise Alone(str(error)) from None
+        raise NotPicklable(str(error)) from None
     if b"__main__" in work:
-        raise Alone("it has to do with the program that runs", True)
-    return Order(VERSION, back_end, kinds.files(), classes, work)
+        raise NotPicklable("it has to do with the program that runs", is_told=True)
+    return TaskPayload(VERSION, back_end, kinds.files(), classes, work)
 
 
-def compute_here(
+def compute(
     task: Callable, common: Any, item: Any, back_end: str, one_of_many: bool = True
 ) -> Any:
-    """Return task(common, item), computed as in a worker; the only task of a request may use all threads."""
-    with (
-        one_thread() if one_of_many else contextlib.nullcontext(),
-        preferring(back_end),
-    ):
+    """Return task(common, item), computed as in a worker. The only task of a request may
+    use all threads."""
+    with contextlib.ExitStack() as stack:
+        if one_of_many:
+            stack.enter_context(one_thread())
+        stack.enter_context(preferring(back_end))
         return task(common, item)
 
 
 @functools.lru_cache(maxsize=4)
-def _known(order: Order) -> tuple[Callable, Any]:
+def load_task(payload: TaskPayload) -> tuple[Callable, Any]:
     """Return (task, common), after registering all classes that they need."""
-    if order.version != VERSION:
+    if payload.version != VERSION:
         raise Refusal(
-            f"a worker has {VERSION}, this command {order.version}",
+            f"a worker has {VERSION}, this command {payload.version}",
             instead="install the same there",
         )
-    if order.plugins or order.classes:
-        _learn(order)
-    return pickle.loads(order.work)
+    if payload.plugins or payload.classes:
+        register_plugins(payload)
+    return pickle.loads(payload.work)
 
 
-def _learn(order: Order) -> None:
+def register_plugins(payload: TaskPayload) -> None:
     """Register the classes of plug-ins."""
     from geomech.scenes import kinds
 
-    for name, text in order.plugins:
+    for name, text in payload.plugins:
         kinds.load_text(name, text)
-    for module, name in order.classes:
-        kinds.register(
-            functools.reduce(getattr, name.split("."), importlib.import_module(module))
-        )
+    for module, name in payload.classes:
+        path = name.split(".")
+        kinds.register(functools.reduce(getattr, path, importlib.import_module(module)))
 
 
-def perform(order: Order, item: bytes) -> bytes:
-    """Return the `Outcome` of a task, pickled; errors are raised where the command runs."""
+def perform(payload: TaskPayload, item: bytes) -> bytes:
+    """Return the `Outcome` of a task, pickled; errors are raised where the command
+    runs."""
     value, error, where = None, None, ""
-    with _noted() as notes:
+    with _record_warnings() as caught:
         try:
-            task, common = _known(order)
-            value = compute_here(task, common, pickle.loads(item), order.back_end)
+            task, common = load_task(payload)
+            value = compute(task, common, pickle.loads(item), payload.back_end)
         except Exception as raised:
-            error, where = _sendable(raised), traceback.format_exc()
-    notes = tuple(
-        (str(w.message.args[0]), w.category, w.filename, w.lineno) for w in notes or ()
-    )
-    return pickle.dumps(Outcome(value, error, where, notes))
+            error = _picklable(raised)
+            where = traceback.format_exc()
+    notes = []
+    for warning in caught:
+        text = str(warning.message.args[0])
+        notes.append((text, warning.category, warning.filename, warning.lineno))
+    return pickle.dumps(Outcome(value, error, where, tuple(notes)))
 
 
-def _sendable(error: Exception) -> Exception:
+def _picklable(error: Exception) -> Exception:
     """Return the error, or its text where its class cannot be sent."""
     try:
         pickle.loads(pickle.dumps(error))
@@ -129,27 +146,26 @@ def _sendable(error: Exception) -> Exception:
 
 
 @contextlib.contextmanager
-def _noted() -> Iterator[list | None]:
-    """Record warnings; None in a process with other work (a thread of Dask's), whose filters must not change."""
+def _record_warnings() -> Iterator[list]:
+    """Yield the list of warnings that the body of the statement gives; it stays empty in
+    a process with other work (a thread of Dask's), whose filters must not change."""
     if not getattr(sys, "geomech_worker", False):
-        yield None
+        yield []
         return
-    with warnings.catch_warnings(record=True) as notes:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        yield notes
+        yield caught
 
 
-def opened(outcome: bytes, warned: set) -> Any:
-    """Return the value of an outcome; raise and warn as the task did. warned: warnings already passed on."""
-    value, error, where, notes = pickle.loads(outcome)
-    for text, category, file, line in notes:
+def unpack_outcome(raw: bytes, warned: set) -> Any:
+    """Return the value of a pickled outcome; raise and warn as the task did.
+
+    warned: warnings that were passed on before; it is added to."""
+    outcome = pickle.loads(raw)
+    for text, category, file, line in outcome.notes:
         if (text, category) not in warned:
             warned.add((text, category))
             warnings.warn_explicit(text, category, file, line)
-    if error is not None:
-        raise error from Elsewhere(where)
-    return value
-
-
-class Elsewhere(Exception):
-    """Traceback of an error that was raised in a worker."""
+    if outcome.error is not None:
+        raise outcome.error from WorkerTraceback(outcome.traceback)
+    return outcome.value

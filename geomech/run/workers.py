@@ -1,10 +1,12 @@
-"""Executors of large requests: this process, as many others as there are cores, or a Dask cluster.
+"""Executors of large requests: this process, as many others as there are cores, or a Dask
+cluster.
 
-Large requests are computed in tasks whose results do not depend on the executor, to the last digit. `using` is written
-around a computation and is no argument of it:
+Large requests are computed in tasks whose results do not depend on the executor, to the
+last digit. `using` is written around a computation and is no argument of it:
 
     with geomech.workers.using(4):
-        study.compute_field()"""
+        study.compute_field()
+"""
 
 from __future__ import annotations
 
@@ -13,22 +15,24 @@ import dataclasses
 from collections.abc import Iterator
 
 from geomech.run.backend import at_most, cores, fastest
-from geomech.run.jobs import Executor, runner, running
+from geomech.run.executors import Cluster, Executor, Processes
+from geomech.run.runner import runner, use_runner
 from rft.core.checks import in_range
 from rft.core.refusal import Refusal
 
 __all__ = ["using"]
 
-MOST = 1024  # processes
+MOST_PROCESSES = 1024
 
 
 @contextlib.contextmanager
 def using(count: int | None = None, scheduler: str | None = None) -> Iterator[None]:
-    """Compute large requests in the body of the statement by ``count`` processes, by default one per core, or on the
-    Dask cluster of the ``scheduler`` at an address such as "tcp://10.0.0.1:8786".
+    """Compute large requests in the body of the statement by ``count`` processes, by
+    default one per core, or on the Dask cluster of the ``scheduler`` at an address such as
+    "tcp://10.0.0.1:8786".
 
-    Processes start when a request turns out to be worth it. Refusal for wrong arguments, and at once for a scheduler
-    that does not answer.
+    Processes start when a request turns out to be worth it. Refusal for wrong arguments,
+    and at once for a scheduler that does not answer.
 
     Examples
     --------
@@ -40,10 +44,11 @@ def using(count: int | None = None, scheduler: str | None = None) -> Iterator[No
     (3, 2, 9, 9)
     """
     executor = _executor(count, scheduler)
+    back_end = getattr(executor, "back_end", fastest())
     try:
         with (
-            at_most(getattr(executor, "back_end", fastest())),
-            running(dataclasses.replace(runner(), executor=executor)),
+            at_most(back_end),
+            use_runner(dataclasses.replace(runner(), executor=executor)),
         ):
             yield
     finally:
@@ -52,15 +57,17 @@ def using(count: int | None = None, scheduler: str | None = None) -> Iterator[No
 
 
 def _executor(count: int | None, scheduler: str | None) -> Executor | None:
+    """Return the executor of these options; None for this process alone."""
     if count is not None:
-        in_range("``workers``", count, 1, MOST, whole=True)
-    if scheduler is not None and count is not None:
-        raise Refusal(
-            "``workers`` are processes of this machine, ``scheduler`` has its own",
-            instead="give one of the two",
-        )
-    if scheduler is None and (count or cores()) == 1:
+        in_range("``workers``", count, 1, MOST_PROCESSES, whole=True)
+    if scheduler is not None:
+        if count is not None:
+            raise Refusal(
+                "``workers`` are processes of this machine, ``scheduler`` has its own",
+                instead="give one of the two",
+            )
+        return Cluster(scheduler)
+    n_processes = int(count or cores())
+    if n_processes == 1:
         return None
-    from geomech.run.executors import Cluster, Processes
-
-    return Processes(int(count or cores())) if scheduler is None else Cluster(scheduler)
+    return Processes(n_processes)

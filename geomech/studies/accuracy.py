@@ -17,7 +17,7 @@ import numpy as np
 from geomech.core.setting import ROUNDING, Setting
 from geomech.core.variables import Result, Variable
 from geomech.run.cost import Cost
-from geomech.run.jobs import runner
+from geomech.run.runner import runner
 from geomech.studies.question import Allow, Progress, Question
 
 

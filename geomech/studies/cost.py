@@ -15,8 +15,8 @@ import numpy as np
 
 from geomech.gaits import Gait
 from geomech.geometry.connection import EVEN_DIRECTIONS, EVEN_SHAPES, SAMPLES_TOGETHER
-from geomech.run.backend import suiting
-from geomech.run.cost import BASE, Cost, assumed
+from geomech.run.backend import prefer_backend
+from geomech.run.cost import BASE, Cost, assumed_seconds
 from geomech.scenes.model import Scene
 from geomech.studies import effort, estimate, uncertainty
 from geomech.studies.elements import coarser
@@ -69,14 +69,14 @@ def price(jobs: Sequence[Job]) -> Cost:
         sum(job.besides for job in jobs),
     )
     steps = sum(job.batches for job in jobs if job.scene.system.traits.steps)
-    with suiting(Cost(balances, 0.0, 0.0, steps=steps).as_balances):
+    with prefer_backend(Cost(balances, 0.0, 0.0, steps=steps).as_balances):
         for job in jobs:
             system = job.scene.system
             if solver_of(system) is None:
                 besides += CLOSED * job.count
             else:
                 points = balance_size(system).evaluations
-                seconds += assumed(
+                seconds += assumed_seconds(
                     job.weight * job.count, points, system.traits.linear, job.batches
                 )
     return Cost(

@@ -16,7 +16,7 @@ import numpy as np
 
 from geomech.gaits import Gait
 from geomech.geometry.reconstruct import displacement
-from geomech.run.jobs import runner
+from geomech.run.runner import runner
 from geomech.scenes.model import Scene
 from geomech.studies import elements
 from geomech.systems.base import body_size

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from geomech.core.variables import Result, Variable
-from geomech.run.backend import suiting
+from geomech.run.backend import prefer_backend
 from geomech.scenes.model import Scene
 from geomech.studies.calibration import Calibration
 from geomech.studies.grains import GrainSteps, price, store_folder
@@ -123,7 +123,7 @@ class GrainSwim(Question):
     def answer(self, progress: Progress, allow: Allow) -> Result:
         # Before the grains: a scene that no tier takes is refused at once.
         balances = Study(self.scene).cost([self.scene.gait.amplitude]).as_balances
-        with suiting(balances):
+        with prefer_backend(balances):
             tiers = predictions(self)
         return result(
             self, self.experiment.run(store_folder(self.store), progress), tiers

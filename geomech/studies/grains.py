@@ -11,7 +11,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from geomech.core.variables import Result, Variable
-from geomech.run import jobs
+from geomech.run import runner as runners
 from geomech.run.cost import BASE, Cost, TooLong, duration
 from geomech.run.store import cache_folder
 from geomech.studies.question import Allow, Progress, Question
@@ -154,7 +154,7 @@ class DragGrains(Question):
         folder, experiments = store_folder(self.store), self.experiments()
         first, runner, share = (
             experiments[:: len(self.angles)],
-            jobs.runner(),
+            runners.runner(),
             1.0 / (1 + len(self.angles)),
         )
         each = price(experiments, folder).seconds / (len(first) + len(experiments))

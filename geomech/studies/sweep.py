@@ -15,7 +15,7 @@ import numpy as np
 
 from geomech.core.variables import Result, Variable
 from geomech.run.cost import Cost
-from geomech.run.jobs import context_of, runner, storing
+from geomech.run.runner import digest_context, runner, store_results
 from geomech.scenes.read import inputs
 from geomech.studies.grid import Grid, listed
 from rft.core.refusal import Refusal
@@ -155,4 +155,5 @@ def stored_in(partial: Path | None, scene: Any) -> contextlib.AbstractContextMan
         return contextlib.nullcontext()
     if not (isinstance(partial, (str, Path)) and str(partial)):
         raise Refusal("partial must be the path of a file", value=partial)
-    return storing(Path(partial), context_of(inputs(scene)), Path(partial), keep=True)
+    path = Path(partial)
+    return store_results(path, digest_context(inputs(scene)), path, keep=True)

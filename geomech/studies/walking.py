@@ -15,9 +15,9 @@ import numpy as np
 
 from geomech.core.setting import Setting
 from geomech.core.variables import Variable
-from geomech.run import jobs
-from geomech.run.backend import suiting
+from geomech.run.backend import prefer_backend
 from geomech.run.cost import BASE, Cost, duration
+from geomech.run.runner import runner
 from geomech.scenes import write as written
 from geomech.scenes.walker import WalkerScene
 from geomech.studies.grid import Grid
@@ -92,7 +92,7 @@ def walked(
         walkers,
         numerics,
         SETTLING if settling else None,
-        advance=jobs.runner().call,
+        advance=runner().call,
         **callback,
     )
     refinements = [
@@ -108,7 +108,7 @@ def walked(
             finer,
             walks,
             SETTLING if settling else None,
-            advance=jobs.runner().call,
+            advance=runner().call,
         )
         changes.append(
             np.abs([np.subtract(_means(a), _means(b)) for a, b in zip(rerun, walks)])
@@ -263,7 +263,7 @@ def price(
     most = SETTLING if settling else numerics.duration * scene.gait.frequency
     cycles = min(most, 2 * LIMIT + _speeding_up(scene))
     least = (cycles + 2.75 * LIMIT) * numerics.steps * count
-    with located(scene.name), suiting(STEP * least if planar else 0.0):
+    with located(scene.name), prefer_backend(STEP * least if planar else 0.0):
         step_seconds, tries = engine(engine_name).step_cost(
             [scene.walker] * together, numerics, PILOT
         )

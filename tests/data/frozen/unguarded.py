@@ -3,9 +3,9 @@
 import rolling
 
 import geomech
-from geomech.run import jobs
+from geomech.run import pending
 
-jobs.WORTH = 0.0  # s
+pending.WORTH_PROCESSES = 0.0  # s
 print("once")
 with geomech.workers.using(2):
     found = geomech.connection.fit(rolling.velocity, geomech.connection.grid(2, 100))

@@ -19,9 +19,10 @@ from geomech.geometry import connection
 from geomech.optimisation import checked, search
 from geomech.optimisation.variables import displacement, values
 from geomech.pipeline import allow, storing
-from geomech.run import jobs, store
+from geomech.run import pending, store
+from geomech.run import runner as runners
 from geomech.run.digest import Undigestible
-from geomech.run.jobs import Runner, context_of, runner
+from geomech.run.runner import Runner, digest_context, runner
 from geomech.run.store import Store
 from geomech.run.workers import using
 from geomech.scenes import inputs, kinds
@@ -47,7 +48,7 @@ def own_cache(tmp_path_factory, monkeypatch):
     """In place of the user's cache folder, which has compiled code, too."""
     folder = tmp_path_factory.mktemp("cache")
     monkeypatch.setattr(
-        store, "in_cache", lambda question: folder / f"{question.hex()}.partial"
+        store, "cache_file", lambda question: folder / f"{question.hex()}.partial"
     )
     return folder
 
@@ -55,13 +56,13 @@ def own_cache(tmp_path_factory, monkeypatch):
 @pytest.fixture
 def step_by_step(monkeypatch):
     """A piece for each step; written as it comes."""
-    monkeypatch.setattr(jobs, "CHECKPOINT", -1.0)
+    monkeypatch.setattr(runners, "CHECKPOINT", -1.0)
 
 
 @contextlib.contextmanager
 def counted(stop=None):
     """What is computed and stored, in a list; stopped by a signal after so many. Nothing is computed that has no key."""
-    computed, real, digest = [], Store.put, jobs.digest
+    computed, real, digest = [], Store.put, runners.digest
 
     def putting(self, key, value, kind):
         if len(computed) == stop:
@@ -77,13 +78,13 @@ def counted(stop=None):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Store, "put", putting)
-        patch.setattr(jobs, "digest", telling)
+        patch.setattr(runners, "digest", telling)
         yield computed
 
 
 def asked(path, ask, context=()):
     """(what it gives, how many tasks of it are computed), with what is stored."""
-    with counted() as computed, jobs.storing(path, context):
+    with counted() as computed, runners.store_results(path, context):
         return ask(), len(computed)
 
 
@@ -92,7 +93,7 @@ def stopped(path, after, ask, context=()):
     with (
         pytest.raises(terminal.Stopped) as ended,
         counted(after),
-        jobs.storing(path, context),
+        runners.store_results(path, context),
     ):
         ask()
     return "".join(getattr(ended.value, "__notes__", ""))
@@ -171,7 +172,7 @@ def test_results_are_found_by_what_they_follow_from_and_nothing_else(tmp_path):
             1,
         ),
     ):
-        with counted() as done, jobs.storing(path, context, keep=True):
+        with counted() as done, runners.store_results(path, context, keep=True):
             ask()
         assert len(done) == computed
     with backend.preferring("numba"):
@@ -189,8 +190,11 @@ def test_no_faster_back_end_is_taken_than_at_first(tmp_path):
         patch.undo()
     patch = pytest.MonkeyPatch()
     with patch.context() as there:
-        there.setattr(jobs, "fastest", lambda: "numba")
-        with backend.preferring("numba"), jobs.storing(tmp_path / "p", keep=True):
+        there.setattr(runners, "fastest", lambda: "numba")
+        with (
+            backend.preferring("numba"),
+            runners.store_results(tmp_path / "p", keep=True),
+        ):
             assert ask() == 4 * ["numpy"]
             allow(ASKED, cost.Cost(10**6, 1.0, 0.0), yes=True)
             assert ask() == 4 * ["numpy"]
@@ -215,7 +219,7 @@ def test_a_command_begins_with_numpy(monkeypatch, capsys):
 
 def test_others_resume_too(tmp_path, monkeypatch):
     """Two processes what one alone has left, and the other way round."""
-    monkeypatch.setattr(jobs, "WORTH", 0.0)
+    monkeypatch.setattr(pending, "WORTH_PROCESSES", 0.0)
     ask, whole = lambda: calls(of=(8, 8)), calls(of=(8, 8))
     for first, second in ((2, 1), (1, 2)):
         with using(first):
@@ -226,7 +230,7 @@ def test_others_resume_too(tmp_path, monkeypatch):
 
 
 def test_what_has_no_digest_is_computed_and_not_stored(tmp_path):
-    with jobs.storing(tmp_path / "p") as some:
+    with runners.store_results(tmp_path / "p") as some:
         assert list(runner().map(doubled, 2, [8], 1)) == [16]
         assert list(runner().map(lambda by, x: by * next(x), 2, [iter([3])], 1)) == [6]
         assert len(some.store.new) == 1
@@ -267,7 +271,7 @@ def test_studies_resume_to_the_last_digit(tmp_path, monkeypatch):
         (numbers, 1),
     ):
         path = tmp_path / "p"
-        with counted() as every, jobs.storing(path):
+        with counted() as every, runners.store_results(path):
             whole = ask()
         stopped(path, after, ask)
         again, computed = asked(path, ask)
@@ -337,7 +341,7 @@ def test_a_march_resumes_where_it_was(effects, tmp_path, monkeypatch):
     ask = lambda: march(EFFECTS[effects], 3 if "disturbed" in effects else None)
     with steps() as every:
         whole = ask()
-    monkeypatch.setattr(jobs, "CHECKPOINT", -1.0)
+    monkeypatch.setattr(runners, "CHECKPOINT", -1.0)
     for after in (len(every) - 3,):
         said = stopped(tmp_path / str(after), after, ask)
         assert (
@@ -358,13 +362,13 @@ def test_a_march_resumes_where_it_was(effects, tmp_path, monkeypatch):
 def test_a_march_loses_little(tmp_path, monkeypatch):
     """Pieces take two seconds, or a cycle; they are written as soon."""
     clock = [0.0]
-    monkeypatch.setattr(jobs.time, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(runners.time, "monotonic", lambda: clock[0])
 
     def step(state):
         clock[0] += 0.7
         return state + 1, np.array([state])
 
-    with counted() as pieces, jobs.storing(tmp_path / "p", keep=True) as some:
+    with counted() as pieces, runners.store_results(tmp_path / "p", keep=True) as some:
         assert some.iterate(step, 0, 10, ("test",), np.ndarray) == (
             10,
             [np.array([k]) for k in range(10)],
@@ -372,7 +376,7 @@ def test_a_march_loses_little(tmp_path, monkeypatch):
         assert [len(rows) for _, rows in pieces] == [3, 3, 3, 1] and len(
             some.store.new
         ) <= 1
-    with counted() as pieces, jobs.storing(tmp_path / "p"):
+    with counted() as pieces, runners.store_results(tmp_path / "p"):
         assert (
             runner().iterate(step, 0, 10, ("test",), np.ndarray)[0] == 10
             and pieces == []
@@ -432,7 +436,7 @@ def test_a_walk_resumes_where_it_was(engine, tmp_path):
     ask = lambda: walking.walked(
         [dataclasses.replace(scene, numerics=few)], engine, settling=True
     )[0]
-    with counted() as every, jobs.storing(tmp_path / "p"):
+    with counted() as every, runners.store_results(tmp_path / "p"):
         whole = ask()
     assert len(every) > 7  # of the walk and of those that tell its errors
     after = len(every) // 2
@@ -690,10 +694,10 @@ def test_what_is_printed_is_no_obstacle_to_another(own_cache, monkeypatch):
 def test_what_a_scene_is_read_from_belongs_to_what_results_follow_from(tmp_path):
     """What is in other files, that is; a scene itself is an argument."""
     (tmp_path / "m.toml").write_text("ratio = 2.0")
-    first = context_of([tmp_path / "m.toml"])
-    assert context_of([tmp_path / "m.toml", tmp_path / "no.toml"]) == first
+    first = digest_context([tmp_path / "m.toml"])
+    assert digest_context([tmp_path / "m.toml", tmp_path / "no.toml"]) == first
     (tmp_path / "m.toml").write_text("ratio = 3.0")
-    assert context_of([tmp_path / "m.toml"]) != first
+    assert digest_context([tmp_path / "m.toml"]) != first
 
 
 def test_nothing_is_stored_over_an_input(tmp_path):
@@ -709,5 +713,5 @@ def test_nothing_is_stored_over_an_input(tmp_path):
 
 def test_without_a_store_nothing_is_told_apart():
     assert (
-        Runner().call(within, np.array([2.0]), 0.5) == 2.0 and Runner()._key(1) is None
+        Runner().call(within, np.array([2.0]), 0.5) == 2.0 and Runner().key(1) is None
     )
