@@ -26,7 +26,8 @@ from rft.formulas.newton import (
 
 # Samples that have ended leave the arrays where less than COMPACT_BELOW of them are active, and where the arrays have more
 # than COMPACT_ABOVE elements x samples: smaller arrays take as long.
-COMPACT_BELOW, COMPACT_ABOVE = 0.65, 200
+COMPACT_BELOW = 0.65
+COMPACT_ABOVE = 200
 
 
 def velocities(problem: Problem) -> tuple[tuple, tuple]:
@@ -50,14 +51,13 @@ def with_frame_velocity(problem: Problem, v, x, y, theta) -> tuple[tuple, tuple]
 def loads(problem: Problem, v, rounding) -> list:
     """Return pairs of `Elements` and their `Load`, for the sides and, if there are any, for the points, at velocities v
     over the scale of speed."""
-    p, sides, points, speed = (
-        problem,
-        problem.sides,
-        problem.points,
-        problem.law_speed_scale,
-    )
+    p = problem
+    sides = problem.sides
+    points = problem.points
+    speed = problem.law_speed_scale
     v_sides, v_points = (times(speed, u) for u in v)
-    rounding, additions = rounding * speed, p.additions
+    rounding = rounding * speed
+    additions = p.additions
     load = side_load(
         p.law,
         v_sides,
@@ -135,7 +135,8 @@ def solve(
     """Return the results of all samples after one descent, the rows (6, B) of `rft.formulas.newton.result`.
 
     guess: (3, B) or None. Velocities are over the scale of speed."""
-    size, fresh = problem.n_samples, guess is None
+    size = problem.n_samples
+    fresh = guess is None
     iterate = first_iterate(
         *(np.zeros((3, size)) if fresh else guess),
         descent.first,
@@ -146,7 +147,9 @@ def solve(
         if problem.momentum_rate is None
         else frame_inertia(problem.sides.elements, problem.momentum_rate)
     )
-    active, index, v = np.ones(size, bool), np.arange(size), velocities(problem)
+    active = np.ones(size, bool)
+    index = np.arange(size)
+    v = velocities(problem)
     out = np.empty((RESULT_ROWS, size))
     while index.size:
         step = iterate.dx, iterate.dy, iterate.dtheta
@@ -170,6 +173,10 @@ def solve(
                 break
             if count < COMPACT_BELOW * active.size and v[0][0].size > COMPACT_ABOVE:
                 rest = np.flatnonzero(active)
-                problem, index, active = problem.take(rest), index[rest], active[rest]
-                iterate, v, mass = take(iterate, rest), take(v, rest), take(mass, rest)
+                problem = problem.take(rest)
+                index = index[rest]
+                active = active[rest]
+                iterate = take(iterate, rest)
+                v = take(v, rest)
+                mass = take(mass, rest)
     return out

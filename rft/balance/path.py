@@ -32,28 +32,21 @@ from rft.formulas.newton import (
     to_frame,
 )
 
-WIDEST = (
-    10.0  # rounding to start from, over the scale of speed: no element is that fast
-)
+# rounding to start from, over the scale of speed: no element is that fast
+WIDEST = 10.0
 FIRST_STEP = 2.0
 LARGEST_CORRECTION = 1.0  # first correction of a step that is not refused
 # Size of a correction that is the last of a step: over that of the previous correction, or absolute.
-CONVERGED_RATIO, CONVERGED = 0.25, 1e-6
-MOST_CORRECTIONS, MOST_AT_THE_END = (
-    5,
-    8,
-)  # of a step; of the step that reaches the required rounding
-FINE_STEP, MOST_FINE = (
-    1e-5,
-    30,
-)  # steps below this size may take so many corrections, damped
-GROWTH, SHRINKAGE = (
-    3.0,
-    0.5,
-)  # factor of the step, at most after a success, at least after a failure
-LEAST_DAMPING = (
-    2.0**-10
-)  # a correction with so little is accepted though the next one is no smaller
+CONVERGED_RATIO = 0.25
+CONVERGED = 1e-6
+MOST_CORRECTIONS = 5  # of a step
+MOST_AT_THE_END = 8  # of the step that reaches the required rounding
+FINE_STEP = 1e-5  # size of a step below which corrections are damped
+MOST_FINE = 30  # corrections of a step below FINE_STEP
+GROWTH = 3.0  # largest factor of the step after a success
+SHRINKAGE = 0.5  # smallest factor of the step after a failure
+# a correction with so little is accepted though the next one is no smaller
+LEAST_DAMPING = 2.0**-10
 DIFFERENCE = 1e-6  # of the rounding, for the derivative with respect to it
 
 
@@ -104,7 +97,8 @@ def _with_slope(
 
 def solve4(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Return x (4, k, B) with matrix (4, 4, B) x = right; nan where the matrix is singular or no number."""
-    matrix, right = np.moveaxis(matrix, -1, 0), np.moveaxis(right, -1, 0)
+    matrix = np.moveaxis(matrix, -1, 0)
+    right = np.moveaxis(right, -1, 0)
     is_regular = np.abs(np.linalg.det(matrix)) > 0
     x = np.linalg.solve(np.where(is_regular[:, None, None], matrix, np.eye(4)), right)
     return np.moveaxis(np.where(is_regular[:, None, None], x, np.nan), 0, -1)
@@ -215,7 +209,9 @@ def _start(nets: Callable, problem: Problem, last: float) -> _Walk:
     base = _Point(xi, v + _to_elements(problem, xi), np.full(size, max(WIDEST, last)))
     tangent = np.zeros((4, size))
     tangent[3] = -1.0
-    zero, one, none = np.zeros(size), np.ones(size), np.zeros(size, int)
+    zero = np.zeros(size)
+    one = np.ones(size)
+    none = np.zeros(size, int)
     walk = _Walk(np.arange(size), problem, none + 1, base, tangent, tangent, FIRST_STEP * one, base, tangent, one, zero,
                  np.zeros((4, 4, size)), none, zero, none > 0)  # fmt: skip
     _predict(walk, np.ones(size, bool), last)
@@ -237,10 +233,8 @@ def _predict(walk: _Walk, mask: np.ndarray, last: float) -> None:
     walk.point = walk.base.where(mask, walk.point)
     walk.change = np.where(mask, change, walk.change)
     walk.last = np.where(mask, reaches_last, walk.last)
-    walk.damping, walk.corrections = (
-        np.where(mask, 1.0, walk.damping),
-        np.where(mask, 0, walk.corrections),
-    )
+    walk.damping = np.where(mask, 1.0, walk.damping)
+    walk.corrections = np.where(mask, 0, walk.corrections)
 
 
 @np.errstate(
@@ -252,10 +246,12 @@ def _correct(
     """Accept or refuse the new points, and choose the next changes."""
     matrix = _bordered(walk, net, slope)
     right = np.zeros((4, 2, walk.index.size))
-    right[:3, 0], right[3, 1] = -net[:, 0], 1.0
+    right[:3, 0] = -net[:, 0]
+    right[3, 1] = 1.0
     correction, tangent = np.moveaxis(solve4(matrix, right), 1, 0)
     size = new.size(walk.problem, correction)
-    first, fine = walk.corrections == 0, walk.step < FINE_STEP
+    first = walk.corrections == 0
+    fine = walk.step < FINE_STEP
     walk.first_size = np.where(first, size, walk.first_size)
     # Natural monotonicity: with the previous matrix, a correction must be smaller by about half the damping.
     previous_matrix = np.where(first, np.eye(4)[..., None], walk.matrix)
@@ -285,11 +281,10 @@ def _correct(
     walk.change = np.where(accepted, damping * correction, 0.5 * walk.change)
     walk.change[3] = np.clip(walk.change[3], -1.0, 1.0)
     walk.point = new.where(accepted, walk.point)
-    walk.size, walk.matrix = (
-        np.where(accepted, size, walk.size),
-        np.where(accepted, matrix, walk.matrix),
-    )
-    walk.damping, walk.corrections = damping, walk.corrections + 1
+    walk.size = np.where(accepted, size, walk.size)
+    walk.matrix = np.where(accepted, matrix, walk.matrix)
+    walk.damping = damping
+    walk.corrections = walk.corrections + 1
     if on_curve.any():
         _rebase(walk, on_curve, new, correction, tangent)
     factor = np.sqrt(intended / np.fmax(walk.first_size, 1e-9))
@@ -307,7 +302,8 @@ def _bordered(walk: _Walk, net, slope) -> np.ndarray:
     """Return the tangent in (xi, log rounding) over the border, (4, 4, B); in the last step the border is that of a fixed
     rounding."""
     matrix = np.empty((4, 4, walk.index.size))
-    matrix[:3, :3], matrix[:3, 3] = net[:, 1:], slope
+    matrix[:3, :3] = net[:, 1:]
+    matrix[:3, 3] = slope
     matrix[3] = np.where(walk.last, np.eye(4)[3][:, None], walk.border)
     return matrix
 

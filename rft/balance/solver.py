@@ -78,17 +78,24 @@ def solve(
 
     problem_at(index): the `Problem` of the samples ``index``. scale: (B,), its scale of speed. backend: as in
     `rft.balance.backend`. guess: (3, B), tried first except where it is nan, or beyond FASTEST."""
-    size, report, linear = scale.size, listener(), assembly.linear
+    size = scale.size
+    report = listener()
+    linear = assembly.linear
     batch = max(1, ELEMENTS_TOGETHER // assembly.n_law_points)
-    driver, worth = arrays, 2 * batch  # samples that pay for a thread
+    driver = arrays
+    worth = 2 * batch  # samples that pay for a thread
     if compiles(backend, assembly.law):
-        driver, worth, batch = compiled_driver(), COMPILED_WORTH, 4 * batch
-    results, limit = np.zeros((RESULT_ROWS, size)), np.zeros(size)
+        driver = compiled_driver()
+        worth = COMPILED_WORTH
+        batch = 4 * batch
+    results = np.zeros((RESULT_ROWS, size))
+    limit = np.zeros(size)
     results[RESIDUAL] = np.inf
 
     def store(index, new, limits: Limits) -> None:
         new[EVALUATIONS] += results[EVALUATIONS, index]
-        results[:, index], limit[index] = new, limits.residual
+        results[:, index] = new
+        limit[index] = limits.residual
 
     def descend(share, stop) -> None:
         for index in split(share, math.ceil(share.size / batch)):
@@ -166,7 +173,8 @@ def _limits(problem: Problem, accuracy: Accuracy) -> Limits:
         1.0, problem.lateral_drag / problem.axial_drag
     )
     if problem.momentum_rate is not None:
-        frame, m = problem.frame, problem.momentum_rate
+        frame = problem.frame
+        m = problem.momentum_rate
         residual += 1e-14 * np.max(
             m.rate * m.strength * frame.speed_scale / frame.force_scale
         )

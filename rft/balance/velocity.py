@@ -145,12 +145,10 @@ def body_velocity(
     moving = speed > 0
     if not moving.all():  # a body whose joints are at rest is at rest
         index = np.flatnonzero(moving)
-        assembly, alpha, alphadot, speed = (
-            assembly.take(index),
-            alpha[:, index],
-            alphadot[:, index],
-            speed[index],
-        )
+        assembly = assembly.take(index)
+        alpha = alpha[:, index]
+        alphadot = alphadot[:, index]
+        speed = speed[index]
         guess = None if guess is None else guess[:, index]
 
     def problem_at(index):

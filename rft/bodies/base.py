@@ -59,8 +59,10 @@ class Elements(NamedTuple):
         """Return elements from complex numbers (n, B): exp(i theta) of their headings, their centres x + i y and the
         velocities of the centres. rotation: (n, B), rates of theta. half: (n, 1), half lengths."""
         back = heading.conj()
-        v, lever = velocity * back, centre * back
-        c, s = heading.real.copy(), heading.imag.copy()
+        v = velocity * back
+        lever = centre * back
+        c = heading.real.copy()
+        s = heading.imag.copy()
         return cls(
             c,
             s,
@@ -158,10 +160,8 @@ def is_reversible(body: Body) -> bool:
     The exchange rotates the frame by pi and maps the joints alpha_1 ... alpha_d to -alpha_d ... -alpha_1."""
     rng = np.random.default_rng(0)
     alpha, rates = rng.uniform(-1.5, 1.5, (2, body.joints, 5))
-    elements, exchanged = (
-        body.motion(alpha, rates),
-        body.motion(-alpha[::-1], -rates[::-1]),
-    )
+    elements = body.motion(alpha, rates)
+    exchanged = body.motion(-alpha[::-1], -rates[::-1])
     rotated = elements._replace(
         r_t=-elements.r_t, r_n=-elements.r_n, v_t=-elements.v_t, v_n=-elements.v_n
     )
@@ -176,7 +176,8 @@ def is_symmetric(body: Body) -> bool:
     shapes; a body of one's own may be bent where its shape is zero."""
     rng = np.random.default_rng(0)
     alpha, rates = rng.uniform(-1.5, 1.5, (2, body.joints, 5))
-    elements, other = body.motion(alpha, rates), body.motion(-alpha, -rates)
+    elements = body.motion(alpha, rates)
+    other = body.motion(-alpha, -rates)
     image = other._replace(s=-other.s, r_t=-other.r_t, v_n=-other.v_n, v_w=-other.v_w)
     return all(bool((np.abs(x - y) <= 1e-10).all()) for x, y in zip(elements, image))
 

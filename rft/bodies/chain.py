@@ -86,12 +86,14 @@ class Chain(Links):
         return x
 
     def _links(self, alpha, alphadot):
-        size, link = alpha.shape[1], self._link
+        size = alpha.shape[1]
+        link = self._link
         angles = self._in_frame(
             np.concatenate([self.joint_angles(alpha), self.joint_angles(alphadot)], 1),
             link,
         )
-        theta, rotation = angles[:, :size], angles[:, size:]
+        theta = angles[:, :size]
+        rotation = angles[:, size:]
         heading = np.empty(theta.shape, complex)
         np.cos(theta, out=heading.real)
         np.sin(theta, out=heading.imag)

@@ -75,7 +75,8 @@ class Links:
         text = frame if isinstance(frame, str) else ""
         if text == "mean":
             return None
-        found, n = re.fullmatch(r"link-([1-9]\d{0,6})", text), len(self.lengths)
+        found = re.fullmatch(r"link-([1-9]\d{0,6})", text)
+        n = len(self.lengths)
         number = int(found[1]) if found else 0
         require(
             0 < number <= n,
@@ -118,11 +119,10 @@ class Links:
         rotation, centre, velocity, theta = (
             self._frame_value(x, link).reshape(alpha.shape[:-1]) for x in links
         )
-        centre, velocity = body_size(self) * centre, body_size(self) * velocity
-        h, hdot = (
-            (centre.real, centre.imag, theta),
-            (velocity.real, velocity.imag, rotation),
-        )
+        centre = body_size(self) * centre
+        velocity = body_size(self) * velocity
+        h = (centre.real, centre.imag, theta)
+        hdot = (velocity.real, velocity.imag, rotation)
         return np.stack(h, -1), np.stack(hdot, -1)
 
     def points(
@@ -132,7 +132,8 @@ class Links:
 
         alpha: (..., joints), rad. pose: (..., 3), pose of the body frame in the world, (x, y) in length units, theta in
         rad."""
-        alpha, pose = unmasked("alpha", alpha), unmasked("pose", pose)
+        alpha = unmasked("alpha", alpha)
+        pose = unmasked("pose", pose)
         require(
             alpha.shape[-1:] == (self.joints,),
             f"alpha must have {self.joints} angles last",

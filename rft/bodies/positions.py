@@ -15,13 +15,13 @@ from rft.core.checks import check_numbers, in_range, real_array
 from rft.core.refusal import Refusal, require
 
 STEP = 0.01  # of the shape variables, of differences of order 6: errors of 1e-14 for functions that vary over 1 rad
-WEIGHTS = (
-    np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
-)  # of values at -3 to 3 steps
+# of values at -3 to 3 steps
+WEIGHTS = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
 SHAPES = 5, 7  # batch on which a function shows whether it takes many shapes
 # Links that are taken for pieces of a curve where the body does not say (assumed): so
 # many, and so many times the shape variables.
-PIECES_OF_A_CURVE, PIECES_PER_VARIABLE = 10, 3
+PIECES_OF_A_CURVE = 10
+PIECES_PER_VARIABLE = 3
 JOINED = 1e-9  # of the body's length, between links that meet
 
 
@@ -118,7 +118,8 @@ class Posed(Links):
             self._at(np.moveaxis(alpha + near, 1, -1)), 1, -1
         )  # (7, n, 3, B)
         poses[:, :, 2] = np.unwrap(np.unwrap(poses[:, :, 2], axis=1), axis=0)
-        centres, theta = poses[:, :, 0] + 1j * poses[:, :, 1], poses[:, :, 2]
+        centres = poses[:, :, 0] + 1j * poses[:, :, 1]
+        theta = poses[:, :, 2]
         rate = lambda x: np.tensordot(WEIGHTS, x, 1) * (size / STEP)
         return self._in_frame(centres[3], rate(centres), theta[3], rate(theta))
 
@@ -129,11 +130,9 @@ class Posed(Links):
             for x in (centre, velocity, theta, rotation)
         )
         back = np.exp(-1j * angle)
-        centre, theta, rotation = (
-            back * (centre - origin),
-            theta - angle,
-            rotation - spin,
-        )
+        centre = back * (centre - origin)
+        theta = theta - angle
+        rotation = rotation - spin
         return (
             np.exp(1j * theta),
             rotation,
@@ -226,5 +225,6 @@ class Resampled(Posed):
         if self._joined:
             link = np.exp(1j * poses[..., 2]) / self.count
             centre = np.cumsum(link, -1) - link / 2
-            poses[..., 0], poses[..., 1] = centre.real, centre.imag
+            poses[..., 0] = centre.real
+            poses[..., 1] = centre.imag
         return poses

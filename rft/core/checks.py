@@ -120,9 +120,8 @@ def in_range(
     name: str, value: Any, low: float, high: float, whole: bool = False, unit: str = "-"
 ) -> None:
     """Raise ValueError with the name unless value is a number, if ``whole`` an integer, from low to high."""
-    exact = (
-        getattr(value, "item", lambda: value)() if is_number(value) else value
-    )  # float32 has no 1e-50
+    # float32 has no 1e-50
+    exact = getattr(value, "item", lambda: value)() if is_number(value) else value
     if not ((is_whole if whole else is_number)(value) and low <= exact <= high):
         bounds = f"{low:g} to {high:g}" + (f" {unit}" if unit != "-" else "")
         raise Refusal(
@@ -137,10 +136,8 @@ def checked_covariance(value, *sizes: int) -> tuple[tuple[float, ...], ...] | No
         return None
     import numpy as np
 
-    matrix, allowed = (
-        real_array("covariance", value),
-        " or ".join(f"{n} x {n}" for n in sizes),
-    )
+    matrix = real_array("covariance", value)
+    allowed = " or ".join(f"{n} x {n}" for n in sizes)
     require(
         matrix.shape in [(n, n) for n in sizes] and bool(np.isfinite(matrix).all()),
         f"covariance must be {allowed} finite numbers",

@@ -28,7 +28,8 @@ WORDS = {
     Premise.MEMORYLESS: "memoryless",
     Premise.QUASI_STATIC: "quasi-static",
 }
-NONE, ALL = Premise(0), ~Premise(0)
+NONE = Premise(0)
+ALL = ~Premise(0)
 # With these a body velocity follows from shape and its rate alone.
 SHAPE_ALONE = Premise.SE2_SYMMETRIC | Premise.MEMORYLESS | Premise.QUASI_STATIC
 

@@ -47,12 +47,10 @@ class Refusal(ValueError):
         instead: str = "",
     ):
         super().__init__(what)
-        self.what, self.value, self.because, self.instead = (
-            what,
-            value,
-            because,
-            instead,
-        )
+        self.what = what
+        self.value = value
+        self.because = because
+        self.instead = instead
         self.where = tuple(map(str, where if isinstance(where, tuple) else (where,)))
 
     def __str__(self) -> str:

@@ -28,7 +28,10 @@ class Registry(Mapping[str, Any]):
     """
 
     def __init__(self, group: str, key: str, noun: str, admits: Callable[[Any], bool]):
-        self.group, self.key, self.noun, self.admits = group, key, noun, admits
+        self.group = group
+        self.key = key
+        self.noun = noun
+        self.admits = admits
         self._parts: dict[str, Any] = {}
         REGISTRIES[group] = self
 

@@ -66,7 +66,10 @@ def run_shares(function: Callable, shares: list) -> None:
     inside `concurrent.futures` may leave its threads waiting for ever."""
     if len(shares) == 1:
         return function(shares[0], NEVER)
-    stop, results, started, ended = threading.Event(), SimpleQueue(), 0, []
+    stop = threading.Event()
+    results = SimpleQueue()
+    started = 0
+    ended = []
     try:
         for share in shares:
             _thread.start_new_thread(_run, (function, share, stop, results, ended))

@@ -138,7 +138,8 @@ class Effect:
         values = {}
         for name, other in self.metres.items():
             number = number_fields(type(self))[name]
-            own, in_metres = getattr(self, name), getattr(self, other.name)
+            own = getattr(self, name)
+            in_metres = getattr(self, other.name)
             if in_metres is None:
                 if length is not None and np.any(own):
                     largest = np.max(own)

@@ -20,7 +20,8 @@ from rft.laws.base import cached_if_immutable, is_linear, require_drag, speed_ex
 from rft.laws.records import record
 
 MOST_PIECES = 10_000  # to a body length
-ONE, ZERO = np.ones((1, 1)), np.zeros((1, 1))
+ONE = np.ones((1, 1))
+ZERO = np.zeros((1, 1))
 NO_FACTOR = Factor(ONE, ONE, ONE)
 NO_INCLINE = Incline(ONE, ZERO, ONE, ZERO, ZERO)
 NO_MEMORY = Memory(ZERO, ZERO, ZERO, ZERO, ONE, ONE, ONE, ONE, ZERO, ZERO)
@@ -53,7 +54,8 @@ class Contact(NamedTuple):
                 [np.broadcast_to(a, (n, columns)), np.broadcast_to(b, (m, columns))]
             )
 
-        n, m = len(self.station), len(other.station)
+        n = len(self.station)
+        m = len(other.station)
         return mapped(concatenated, self, other) if n else other
 
 
@@ -202,8 +204,10 @@ class Assembly(NamedTuple):
     def without_effects(self, alpha, alphadot, speed) -> Problem:
         """Return the balance without effects."""
         e = self.body.motion(alpha, alphadot)
-        x, y = e.r_t * e.s + e.r_n * e.c, e.r_n * e.s - e.r_t * e.c
-        speed, mean = speed[None], self.fraction.T
+        x = e.r_t * e.s + e.r_n * e.c
+        y = e.r_n * e.s - e.r_t * e.c
+        speed = speed[None]
+        mean = self.fraction.T
         frame = Frame(mean @ x, mean @ y, force_scale(self, speed), speed)
         sides = Contact(e, self.station, self.buried)
         return Problem(
@@ -280,7 +284,8 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
 def force_scale(assembly: Assembly, speed: np.ndarray) -> np.ndarray:
     """Return the unit of residuals (1, B or 1): drag at the samples' speeds, in dry media not below the drag at unit
     speed."""
-    medium, unit = assembly.medium, assembly.axial_drag
+    medium = assembly.medium
+    unit = assembly.axial_drag
     if assembly.homogeneous:
         return unit * ONE
     if assembly.linear:

@@ -16,9 +16,8 @@ from rft.effects.contact import Problem
 PATCH = 4.0  # body lengths, least side of the square
 CELLS = 2.0  # cells to a radius
 TILE = 32  # cells along a side of a tile; a step copies only the tiles that it marks
-LOOK_AHEAD = (
-    2.0  # radii from the body's axis to the ground that an element is about to meet
-)
+# radii from the body's axis to the ground that an element is about to meet
+LOOK_AHEAD = 2.0
 
 
 @EFFECTS.register
@@ -92,14 +91,16 @@ class DisturbedGround(Effect):
         return int(np.ceil(PATCH / self.cell / TILE))
 
     def begin(self, problem: Problem, site: Site) -> Tiles:
-        count, samples = self.tiles_along**2, site.pose.shape[1]
+        count = self.tiles_along**2
+        samples = site.pose.shape[1]
         return Tiles(
             (np.zeros((TILE**2, samples)),) * count,
             np.full((count, samples), -1, np.int64),
         )
 
     def apply(self, problem: Problem, site: Site, state: Tiles) -> Problem:
-        points, m = self.points(problem, site), problem.memory
+        points = self.points(problem, site)
+        m = problem.memory
         offset = 1j * LOOK_AHEAD * self.radius * site.headings(problem.sides.elements)
         left, right = (
             1 - self.weakening * self.disturbance(state, points + x).mean(0)
@@ -142,17 +143,19 @@ class DisturbedGround(Effect):
 
     def disturbance(self, tiles: Tiles, place: np.ndarray) -> np.ndarray:
         """Return the disturbance, 0 to 1, at complex places (..., B), bilinear between cell centres."""
-        x, y = place.real / self.cell - 0.5, place.imag / self.cell - 0.5
-        i, j = np.floor(x), np.floor(y)
-        x, y = x - i, y - j
-        i, j = i.astype(np.int64), j.astype(np.int64)
+        x = place.real / self.cell - 0.5
+        y = place.imag / self.cell - 0.5
+        i = np.floor(x)
+        j = np.floor(y)
+        x = x - i
+        y = y - j
+        i = i.astype(np.int64)
+        j = j.astype(np.int64)
         tile, row, patch = self.location(
             np.stack([i, i + 1])[:, None], np.stack([j, j + 1])
         )  # (2, 2, ..., B)
-        share, sample = (
-            np.stack([1 - x, x])[:, None] * np.stack([1 - y, y]),
-            np.arange(tiles.owner.shape[1]),
-        )
+        share = np.stack([1 - x, x])[:, None] * np.stack([1 - y, y])
+        sample = np.arange(tiles.owner.shape[1])
         _, value, index = tiles.copied(tile)
         return np.where(
             tiles.owner[tile, sample] == patch, share * value[index, row, sample], 0.0
@@ -172,7 +175,8 @@ class DisturbedGround(Effect):
             (i + 0.5) * self.cell - place.real, (j + 0.5) * self.cell - place.imag
         )
         tile, row, patch = self.location(i, j)  # (cells along, cells across, ..., B)
-        owner, sample = tiles.owner.copy(), np.arange(tiles.owner.shape[1])
+        owner = tiles.owner.copy()
+        sample = np.arange(tiles.owner.shape[1])
         owner[tile, sample] = patch
         touched, value, index = tiles.copied(tile)
         value *= (owner == tiles.owner)[touched, None]

@@ -78,16 +78,15 @@ class Slope(Effect):
 
     def __post_init__(self):
         check_numbers(self)
-        angle, repose = math.degrees(self.angle), math.degrees(self.repose)
+        angle = math.degrees(self.angle)
+        repose = math.degrees(self.repose)
         require(
             self.angle < self.repose,
             f"a slope of {angle:.3g} degrees slides by itself",
             because=f"it must be below the angle of repose, {repose:.3g} degrees",
         )
-        pull, drag = (
-            self.weight * math.sin(self.angle),
-            math.sin(self.repose - self.angle) / math.sin(self.repose),
-        )
+        pull = self.weight * math.sin(self.angle)
+        drag = math.sin(self.repose - self.angle) / math.sin(self.repose)
         require(
             pull < drag,
             "a body of this weight slides down",
@@ -106,7 +105,8 @@ class Slope(Effect):
         return f"{repose if np.all(self.repose == REPOSE) else ''}that only what moves downhill meets weaker ground"
 
     def apply(self, problem: Problem, site: Site, state: Any = None) -> Problem:
-        cos, sin = np.cos(self.angle), np.sin(self.angle)
+        cos = np.cos(self.angle)
+        sin = np.sin(self.angle)
 
         def inclined(contact, weight):
             downhill = -np.exp(1j * np.asarray(self.towards)) * np.conj(

@@ -13,9 +13,8 @@ from rft.effects.base import EFFECTS, Effect, InMetres, Site
 from rft.effects.contact import Problem
 from rft.formulas.link import Memory, developed_direction, find_pivot
 
-SHORTEST = (
-    1e-6  # body lengths, least travel: an element at rest creeps at the regularisation
-)
+# body lengths, least travel: an element at rest creeps at the regularisation
+SHORTEST = 1e-6
 SIGN = np.array([1.0, -1.0])[:, None, None]  # of v_n towards the left and the right
 E_FOLDINGS = 3.0  # of a direction over the travel: of what is missing after a reversal exp(-3) = 5 % is still missing
 # Of the flank of a rod 12 mm in diameter that goes to and fro 24.5 mm deep in beds of 6 mm grains, by three amplitudes

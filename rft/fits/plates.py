@@ -20,7 +20,8 @@ from rft.terradynamics.plates.stress import COEFFICIENTS, PER_CUBIC_METRE, Stres
 GENERIC = np.array([getattr(StressMap(), name) for name in COEFFICIENTS])
 SPREAD = 0.2  # N/cm^3 over zeta, assumed: four times the most that named media with own coefficients differ by
 DETERMINED = 0.9  # share of a coefficient that must come from the data, assumed
-FEWEST_DRAGS, FEWEST_DEPTHS = 6, 3
+FEWEST_DRAGS = 6
+FEWEST_DEPTHS = 3
 MOST_ROWS = 100_000
 LARGEST = 1e12  # of any number; numbers below 1 / LARGEST count as 0
 STRENGTHS = (
@@ -120,7 +121,8 @@ def fit_stress(beta, gamma, alpha_x, alpha_z) -> StressFit:
     components, is estimated with it. ValueError for drags that no grains have, with the slip of columns, signs or units
     that explains them."""
     rows = _drags(beta, gamma, alpha_x, alpha_z)
-    design, y = _design(*rows[:2]), rows[2:].ravel()
+    design = _design(*rows[:2])
+    y = rows[2:].ravel()
     zeta, misfit = _generic(design, y)
     _check_mistakes(rows, misfit)
     check_strength(
@@ -132,10 +134,8 @@ def fit_stress(beta, gamma, alpha_x, alpha_z) -> StressFit:
     for _ in range(100):
         values, covariance, resolution = _solve(design, y, prior, noise)
         free = len(y) - np.trace(resolution)
-        last, noise = (
-            noise,
-            max(math.sqrt(np.sum((y - design @ values) ** 2) / free), EXACT * zeta),
-        )
+        last = noise
+        noise = max(math.sqrt(np.sum((y - design @ values) ** 2) / free), EXACT * zeta)
         if abs(noise - last) <= 1e-9 * last:
             break
     residuals = (y - design @ values).reshape(2, -1)
@@ -172,7 +172,9 @@ def fit_zeta(depth, force, area) -> ZetaFit:
     require(
         within, f"{needed}, got {order.size}", because="depth is positive downwards"
     )
-    d, f, a = depth[order], force[order], np.broadcast_to(area, depth.shape)[order]
+    d = depth[order]
+    f = force[order]
+    a = np.broadcast_to(area, depth.shape)[order]
     per_zeta = float(StressMap()(0.0, math.pi / 2)[1]) * PER_CUBIC_METRE * a * d
     zeta = float(per_zeta @ f / (per_zeta @ per_zeta))
     require(

@@ -24,17 +24,15 @@ from rft.laws.drag import Rod, RodDrag
 from rft.laws.granular import Granular
 from rft.laws.viscous import Viscous
 
-CAPS, ACROSS = "end_caps", "end_caps_across"
+CAPS = "end_caps"
+ACROSS = "end_caps_across"
 MOST_CAPS = 10.0  # e of a hemisphere is 4
 AT_BOUND = 1e-6  # of a bound: a parameter that near lies on it
-CONVERGED = (
-    1e-14  # relative change of parameters and of the sum of squares that ends a fit
-)
+# relative change of parameters and of the sum of squares that ends a fit
+CONVERGED = 1e-14
 DEPENDENT = 1e-7  # smallest singular value of the slopes, over the largest, below which parameters are not determined
-LEVEL, ONE_SIGMA = (
-    0.95,
-    0.6827,
-)  # confidence of intervals and bands; of one standard deviation
+LEVEL = 0.95  # confidence of intervals and bands
+ONE_SIGMA = 0.6827  # confidence of one standard deviation
 
 
 def student_factor(degrees_of_freedom: float, level: float = LEVEL) -> float:
@@ -171,7 +169,8 @@ class Fit:
         names = [
             name for name in self.names if name in build.__dataclass_fields__
         ]  # k only where the law has it
-        values, n = dict(zip(self.names, self.values.tolist())), len(names)
+        values = dict(zip(self.names, self.values.tolist()))
+        n = len(names)
         covariance = (
             student_factor(self.degrees_of_freedom, ONE_SIGMA) ** 2
             * self.covariance[:n, :n]
@@ -313,8 +312,11 @@ def _with_ends(flank: Fit) -> Fit:
     has the scatter of these forces, and their covariance with the law what the law leaves uncertain."""
     from scipy.optimize import least_squares
 
-    data, n, n_law = flank.data, len(flank.values), len(FITS[flank.law].names)
-    v, names = (np.cos(data.psi), np.sin(data.psi)), (CAPS, ACROSS)
+    data = flank.data
+    n = len(flank.values)
+    n_law = len(FITS[flank.law].names)
+    v = (np.cos(data.psi), np.sin(data.psi))
+    names = (CAPS, ACROSS)
 
     def caps(values: np.ndarray):
         """Return the least-squares solution of e and ``across`` with parameters of the law."""
@@ -334,7 +336,8 @@ def _with_ends(flank: Fit) -> Fit:
                 data.ends,
             )
 
-        start, bounds = [1.0, 1.0], ([-np.inf, 0.0], [np.inf, MOST_CAPS])
+        start = [1.0, 1.0]
+        bounds = ([-np.inf, 0.0], [np.inf, MOST_CAPS])
         return least_squares(
             residual,
             start,
@@ -397,7 +400,8 @@ def _forces(law: str, rod: Rod, end_caps: float, psi, values) -> np.ndarray:
     place of ``end_caps``."""
     fitted_law = FITS[law]
     n = len(fitted_law.names)
-    medium, v = fitted_law.build(*map(float, values[:n])), (np.cos(psi), np.sin(psi))
+    medium = fitted_law.build(*map(float, values[:n]))
+    v = (np.cos(psi), np.sin(psi))
     force = np.array(medium.traction(*v))
     e = float(values[n + 1]) if len(values) > n + 1 else end_caps
     if e:
@@ -423,7 +427,8 @@ def _starts(
     for values in itertools.product(
         *fitted_law.starts, *([(0.5, 1.0, 3.0)] if fits_caps else [])
     ):
-        law, caps = values[: len(fitted_law.names)], values[len(fitted_law.names) :]
+        law = values[: len(fitted_law.names)]
+        caps = values[len(fitted_law.names) :]
         at_zero, at_one = (
             residual(np.array([*law, force, *caps])) for force in (0.0, 1.0)
         )

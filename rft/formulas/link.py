@@ -36,9 +36,8 @@ from rft.formulas.vectors import (
 )
 
 TINY = 1e-300  # added to divisors, for an element at rest without rounding; far below any speed that can matter
-SERIES_BELOW = (
-    1.0 / 9.0
-)  # t^2 below which k is a polynomial; above it atanh t - t loses at most one digit
+# t^2 below which k is a polynomial; above it atanh t - t loses at most one digit
+SERIES_BELOW = 1.0 / 9.0
 
 
 def _series(count: int = 12) -> tuple[float, ...]:

@@ -38,7 +38,8 @@ def element_momenta(e: Elements, v) -> np.ndarray:
 
 def frame_inertia(e: Elements, m: MomentumRate) -> Inertia:
     """Return the rate of change of momentum of all elements on the frame, strength (M xi + offset)."""
-    zero, one = np.zeros_like(e.c), np.ones_like(e.c)
+    zero = np.zeros_like(e.c)
+    one = np.ones_like(e.c)
     units = (one, zero, zero), (zero, one, zero), (zero, zero, one)
     M = m.rate * np.stack(
         [element_momenta(e, to_element(e, *unit)).sum(1) for unit in units], 1

@@ -22,7 +22,10 @@ FASTEST = 1e30  # velocity, larger than any solution: squares of larger ones ove
 
 # Rows of the result of a driver: the velocity (x, y, theta), the residual, the number of evaluations, and the speed of the
 # slowest element.
-RESIDUAL, EVALUATIONS, SLOWEST, RESULT_ROWS = 3, 4, 5, 6
+RESIDUAL = 3
+EVALUATIONS = 4
+SLOWEST = 5
+RESULT_ROWS = 6
 
 
 class Frame(NamedTuple):
@@ -184,11 +187,9 @@ def element_net(e, f, v, speed):
     """Return the `Net` of an element with load f at velocities v: J^T f, J^T H J and J^T H v, with H the slopes of f.
 
     speed: scale of the velocities that the load is computed at."""
-    t, n, w = (
-        to_frame(e, f.t_t, f.t_n, f.t_w),
-        to_frame(e, f.n_t, f.n_n, f.n_w),
-        to_frame(e, f.w_t, f.w_n, f.w_w),
-    )
+    t = to_frame(e, f.t_t, f.t_n, f.t_w)
+    n = to_frame(e, f.n_t, f.n_n, f.n_w)
+    w = to_frame(e, f.w_t, f.w_n, f.w_w)
     by_speed = to_frame(
         e,
         f.t_t * v[0] + f.t_n * v[1] + f.t_w * v[2],
@@ -208,8 +209,11 @@ def element_net(e, f, v, speed):
 @formula
 def with_momentum(net, x, y, theta, inertia, speed):
     """Return a net with the rate of change of momentum at a velocity (x, y, theta) of the frame."""
-    m, slope = inertia, inertia.strength * speed
-    by_x, by_y, by_theta = (m.xx, m.yx, m.tx), (m.xy, m.yy, m.ty), (m.xt, m.yt, m.tt)
+    m = inertia
+    slope = inertia.strength * speed
+    by_x = (m.xx, m.yx, m.tx)
+    by_y = (m.xy, m.yy, m.ty)
+    by_theta = (m.xt, m.yt, m.tt)
     M_xi = plus(plus(times(x, by_x), times(y, by_y)), times(theta, by_theta))
     return Net(
         plus(
@@ -244,7 +248,8 @@ def newton_step(iterate, net, slowest2, frame, descent, limits):
     slowest2: square of the slowest element's speed after that step.
     """
     last = limits.rounding
-    residual, slowest = residual_norm(net.force, frame), sqrt(slowest2)
+    residual = residual_norm(net.force, frame)
+    slowest = sqrt(slowest2)
     fresh = iterate.fresh > 0.0
     rounding = iterate.rounding_next
     helps = (
@@ -268,7 +273,8 @@ def newton_step(iterate, net, slowest2, frame, descent, limits):
     right = plus(times(prediction, net.by_speed), times(-damping, net.force))
     x, y, theta = solve3(net.by_x, net.by_y, net.by_theta, right)
     fraction = where(fresh, 1.0, step_fraction(x, y, theta, frame, limits.largest_step))
-    new_step, moved = accepted | fresh, where(accepted, 1.0, 0.0)
+    new_step = accepted | fresh
+    moved = where(accepted, 1.0, 0.0)
     evaluations = iterate.evaluations + where(fresh, 0.0, 1.0)
     solved = accepted & (rounding <= last) & (residual <= limits.residual)
     after = Iterate(
@@ -319,7 +325,8 @@ def is_possible(x, y, theta):
 def step_fraction(x, y, theta, frame, largest):
     """Return the fraction of a step that changes the velocity of the body's mean place, and its rotation rate, by no more
     than ``largest``."""
-    mean_x, mean_y = x - frame.y * theta, y + frame.x * theta
+    mean_x = x - frame.y * theta
+    mean_y = y + frame.x * theta
     size = sqrt(mean_x * mean_x + mean_y * mean_y + theta * theta)
     may_exceed = maximum(maximum(absolute(x), absolute(y)), absolute(theta)) > 1.0
     return where(may_exceed, largest / maximum(size, largest), 1.0)

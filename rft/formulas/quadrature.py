@@ -38,8 +38,10 @@ def by_nodes(law, v_t, v_n, v_w, rounding):
     zero = 0.0 * v_t
     load = Load(zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero)
     for j in range(len(law.nodes)):
-        s, w = law.nodes[j, 0], law.weights[j, 0]
-        u_t, u_n = v_t + 0.0 * s, v_n + s * v_w
+        s = law.nodes[j, 0]
+        w = law.weights[j, 0]
+        u_t = v_t + 0.0 * s
+        u_n = v_n + s * v_w
         (t, n), (tt, tn, nt, nn) = (
             law.traction(u_t, u_n, rounding),
             law.slopes(u_t, u_n, rounding),

@@ -61,12 +61,16 @@ class Medium(Protocol):
 @formula
 def terms_traction(law, v_t, v_n, rounding):
     """Return the traction (f_t, f_n) of a law's viscous and dry terms, zero at rest."""
-    f_t, f_n = law.viscous[0, 0] * v_t, law.viscous[0, 1] * v_n
+    f_t = law.viscous[0, 0] * v_t
+    f_n = law.viscous[0, 1] * v_n
     for j in range(len(law.dry)):
-        q, k_t, k_n = law.dry[j, 0], law.dry[j, 1], law.dry[j, 2]
+        q = law.dry[j, 0]
+        k_t = law.dry[j, 1]
+        k_n = law.dry[j, 2]
         R2 = q * q * v_t * v_t + v_n * v_n + rounding * rounding
         R = sqrt(where(R2 > 0.0, R2, 1.0))
-        f_t, f_n = f_t + k_t * v_t / R, f_n + k_n * v_n / R
+        f_t = f_t + k_t * v_t / R
+        f_n = f_n + k_n * v_n / R
     return f_t, f_n
 
 
@@ -75,20 +79,23 @@ def terms_slopes(law, v_t, v_n, rounding):
     """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n) of viscous and dry terms; infinite slopes at rest are
     returned as 0."""
     zero = 0.0 * v_t
-    tt, tn, nt, nn = zero + law.viscous[0, 0], zero, zero, zero + law.viscous[0, 1]
+    tt = zero + law.viscous[0, 0]
+    tn = zero
+    nt = zero
+    nn = zero + law.viscous[0, 1]
     for j in range(len(law.dry)):
-        q, k_t, k_n = law.dry[j, 0], law.dry[j, 1], law.dry[j, 2]
+        q = law.dry[j, 0]
+        k_t = law.dry[j, 1]
+        k_n = law.dry[j, 2]
         R2 = q * q * v_t * v_t + v_n * v_n + rounding * rounding
         inverse = where(R2 > 0.0, 1.0, 0.0) / sqrt(where(R2 > 0.0, R2, 1.0))
-        e_t, e_n, e = v_t * inverse, v_n * inverse, rounding * inverse
-        tt, tn = (
-            tt + k_t * (e_n * e_n + e * e) * inverse,
-            tn - k_t * e_t * e_n * inverse,
-        )
-        nt, nn = (
-            nt - k_n * q * q * e_t * e_n * inverse,
-            nn + k_n * (q * q * e_t * e_t + e * e) * inverse,
-        )
+        e_t = v_t * inverse
+        e_n = v_n * inverse
+        e = rounding * inverse
+        tt = tt + k_t * (e_n * e_n + e * e) * inverse
+        tn = tn - k_t * e_t * e_n * inverse
+        nt = nt - k_n * q * q * e_t * e_n * inverse
+        nn = nn + k_n * (q * q * e_t * e_t + e * e) * inverse
     return tt, tn, nt, nn
 
 
@@ -111,7 +118,8 @@ class TermLaw:
         self, v_t: Any, v_n: Any, rounding: Any = 0.0
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the drag per unit length (f_t, f_n) opposing (v_t, v_n), in units of the axial drag; zero at rest."""
-        v_t, v_n = unmasked("v_t", v_t), unmasked("v_n", v_n)
+        v_t = unmasked("v_t", v_t)
+        v_n = unmasked("v_n", v_n)
         return terms_traction(term_numbers(self), v_t, v_n, rounding)
 
     def slopes(self, v_t: Any, v_n: Any, rounding: Any = 0.0) -> tuple[np.ndarray, ...]:
@@ -201,10 +209,8 @@ def _is_immutable(x) -> bool:
 
 
 # Velocities at which properties of a law are checked: 48 directions at 13 speeds, (13, 48).
-SPEEDS, DIRECTIONS = (
-    np.logspace(-12, 12, 13)[:, None],
-    np.linspace(0.0, 2 * np.pi, 48, endpoint=False),
-)
+SPEEDS = np.logspace(-12, 12, 13)[:, None]
+DIRECTIONS = np.linspace(0.0, 2 * np.pi, 48, endpoint=False)
 VELOCITIES = SPEEDS * np.cos(DIRECTIONS), SPEEDS * np.sin(DIRECTIONS)
 
 
@@ -273,7 +279,8 @@ def require_drag(medium: Medium) -> None:
         cosine = (f_t * v_t + f_n * v_n) / (
             np.hypot(f_t, f_n) * SPEEDS
         )  # 1 straight against the motion
-    name, cosine = type(medium).__name__, np.nan_to_num(cosine)
+    name = type(medium).__name__
+    cosine = np.nan_to_num(cosine)
     require(
         bool((cosine > 0).any()),
         f"{name} has no drag at any velocity",
@@ -337,7 +344,8 @@ def speed_exponent(medium: Medium) -> float | None:
     size = np.sqrt((f**2).sum((0, 2)))
     if not np.isfinite(size).all() or not size.all():
         return None
-    form, growth = f / size[:, None], size[1:] / size[:-1]
+    form = f / size[:, None]
+    growth = size[1:] / size[:-1]
     has_power = (
         np.ptp(form, axis=1).max() < 1e-6 and np.ptp(growth) < 1e-6 * growth.max()
     )

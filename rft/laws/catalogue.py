@@ -40,12 +40,12 @@ def pressure_factor(axial_stress: float, packed: str) -> float:
     return axial_stress / (GLASS * PACKED[packed] * GRAVITY * DEPTH)
 
 
-SURFACE_ACROSS = (
-    0.15  # N, A of the drag across a plate 8 mm deep, Schiebel et al. (2020)
-)
+# N, A of the drag across a plate 8 mm deep, Schiebel et al. (2020)
+SURFACE_ACROSS = 0.15
 # N, drag along that plate, of the assumed form cos psi: about 0.017 in their figure; their fit is not known here. Their
 # snakes move at 0.81 of the speed along their own track (0.74 to 0.89), to which 0.010 (0.78) is nearer than 0.017 (0.74).
-SURFACE_ALONG, SURFACE_ALONG_RANGE = 0.017, (0.010, 0.017)  # assumed
+SURFACE_ALONG = 0.017  # assumed
+SURFACE_ALONG_RANGE = (0.010, 0.017)  # assumed
 
 ZHANG_GOLDMAN = "Zhang and Goldman, Phys. Fluids 26, 101308 (2014)"
 FITTED = (

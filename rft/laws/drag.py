@@ -169,7 +169,8 @@ def _opposing(psi: np.ndarray, forces: np.ndarray) -> np.ndarray:
     )
     opposing = max(_signs(psi) * forces, forces, key=lambda x: x.min())
     component, row = np.unravel_index(np.argmin(opposing), opposing.shape)
-    direction, force = ("along", "across")[component], forces[component, row]
+    direction = ("along", "across")[component]
+    force = forces[component, row]
     require(
         opposing[component, row] >= -PUSHING * largest,
         f"at psi = {psi[row]:g} degrees the force {direction} the rod is {force:g} N and pushes",

@@ -50,16 +50,21 @@ class Terms(NamedTuple):
 
     viscous: np.ndarray
     dry: np.ndarray
-    traction, slopes, average = terms_traction, terms_slopes, closed_form
+    traction = terms_traction
+    slopes = terms_slopes
+    average = closed_form
 
 
 class Uncompiled:
     """The record of a law whose traction is no formula."""
 
-    slopes, average = slopes_by_differences, by_nodes
+    slopes = slopes_by_differences
+    average = by_nodes
 
     def __init__(self, law, nodes: np.ndarray, weights: np.ndarray):
-        self.nodes, self.weights, self.traction = nodes, weights, law.traction
+        self.nodes = nodes
+        self.weights = weights
+        self.traction = law.traction
         if hasattr(law, "slopes"):
             self.slopes = law.slopes
 

@@ -123,14 +123,17 @@ class Table:
     def slopes(self, v_t: Any, v_n: Any, rounding: Any) -> Any:
         """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n); infinite slopes at rest are returned as 0."""
         inverse = inverse_speed(v_t, v_n, rounding)
-        c, s, e = v_t * inverse, v_n * inverse, rounding * inverse
+        c = v_t * inverse
+        s = v_n * inverse
+        e = rounding * inverse
         _, by_c = curve(
             c, self.along, self.along_cells, self.along_knots, self.along_steps
         )
         _, by_s = curve(
             s, self.across, self.across_cells, self.across_knots, self.across_steps
         )
-        by_c, by_s = by_c * inverse, by_s * inverse
+        by_c = by_c * inverse
+        by_s = by_s * inverse
         return (
             by_c * (s * s + e * e),
             -by_c * c * s,
@@ -167,8 +170,10 @@ def curve(x, pieces, cells, knots, steps):
     for _ in range(len(steps)):
         piece = piece + where(a >= gather(knots, piece + 1.0, 0), 1.0, 0.0)
     d = a - gather(knots, piece, 0)
-    c3, c2 = gather(pieces, piece, 0), gather(pieces, piece, 1)
-    c1, c0 = gather(pieces, piece, 2), gather(pieces, piece, 3)
+    c3 = gather(pieces, piece, 0)
+    c2 = gather(pieces, piece, 1)
+    c1 = gather(pieces, piece, 2)
+    c0 = gather(pieces, piece, 3)
     return copysign(c0 + d * (c1 + d * (c2 + d * c3)), x), c1 + d * (
         2.0 * c2 + d * (3.0 * c3)
     )
@@ -177,13 +182,12 @@ def curve(x, pieces, cells, knots, steps):
 def _curve_arrays(name: str, polynomial, unit: float) -> dict[str, np.ndarray]:
     """Return the arrays that `curve` takes, by name, from one of SciPy's odd piecewise polynomials on [-1, 1]."""
     half = polynomial.x >= 0.0
-    knots, pieces = polynomial.x[half], polynomial.c.T[half[:-1]] / unit
+    knots = polynomial.x[half]
+    pieces = polynomial.c.T[half[:-1]] / unit
     count = min(MOST_CELLS, 1 << int(np.ceil(np.log2(1.0 / np.diff(knots).min()))))
     first = np.searchsorted(knots, np.arange(count + 1) / count, side="right") - 1
-    cells, steps = (
-        np.minimum(first, len(pieces) - 1),
-        np.zeros(max(1, np.diff(first).max())),
-    )
+    cells = np.minimum(first, len(pieces) - 1)
+    steps = np.zeros(max(1, np.diff(first).max()))
     columns = {"cells": cells, "knots": [*knots[:-1], 2.0], "steps": steps}
     columns = {
         f"{name}_{key}": np.array(x, float).reshape(-1, 1) for key, x in columns.items()
@@ -198,9 +202,11 @@ def _monotone_curve(x: np.ndarray, f: np.ndarray):
     knots, index = np.unique(np.round(x, 12), return_inverse=True)
     values = np.bincount(index, f) / np.bincount(index)
     positive = knots > 1e-9
-    knots, values = knots[positive], values[positive]
+    knots = knots[positive]
+    values = values[positive]
     if knots[-1] < 1.0:
-        knots, values = np.append(knots, 1.0), np.append(values, values[-1])
+        knots = np.append(knots, 1.0)
+        values = np.append(values, values[-1])
     return PchipInterpolator(
         np.concatenate([-knots[::-1], [0.0], knots]),
         np.concatenate([-values[::-1], [0.0], values]),

@@ -22,19 +22,16 @@ HISTORY = 6  # cycles that the limit is computed from; a velocity has three numb
 SINGULAR = 1e-6  # of the largest singular value, below which cycles count as linearly dependent
 FIRST_RATIO = 0.5  # of the second change of displacement to the first, assumed
 LARGEST_RATIO = 0.99  # of a change to the previous one, where changes hardly decrease
-MEMORY_HISTORY = (
-    11  # cycles whose memory is mixed; fewer, or more, converge more slowly
-)
+# cycles whose memory is mixed; fewer, or more, converge more slowly
+MEMORY_HISTORY = 11
 MEMORY_SINGULAR = 1e-3  # as SINGULAR, of a map with kinks
-SLOWEST_MEMORY = (
-    0.9995  # factor of a number of memory per cycle, beyond which it is held
-)
+# factor of a number of memory per cycle, beyond which it is held
+SLOWEST_MEMORY = 0.9995
 LEAST_CHANGE = 1e-13  # of memory from cycle to cycle, above roundoff
 N_RATIOS = 3  # last ratios that are averaged
 DIVERGED = 5.0  # times the least change of velocity so far: an extrapolation that led away from the limit
-MOST_FAILURES = (
-    10  # extrapolations that led away, after which a sample takes plain cycles
-)
+# extrapolations that led away, after which a sample takes plain cycles
+MOST_FAILURES = 10
 
 
 class Cycles(NamedTuple):
@@ -58,7 +55,8 @@ class Cycles(NamedTuple):
 
 def begin(samples: int) -> Cycles:
     """Return the record before the first cycle."""
-    none, zero = np.full((3, HISTORY, 3, samples), np.nan), np.zeros((3, samples))
+    none = np.full((3, HISTORY, 3, samples), np.nan)
+    zero = np.zeros((3, samples))
     steadiest = np.stack([zero, zero + np.inf, zero])
     return Cycles(
         zero,
@@ -93,19 +91,16 @@ def after_heavy_cycle(
 
     tolerance: drift below which no extrapolation is needed. After an extrapolation that led away from the limit the next
     one leads back to the end of the steadiest cycle."""
-    last, c = (
-        c.displacements[-1],
-        c._replace(displacements=_appended(c.displacements, displacement)),
-    )
+    last = c.displacements[-1]
+    c = c._replace(displacements=_appended(c.displacements, displacement))
     if np.isnan(c.start).any():  # the first cycle starts from rest
         return c
     cycle = np.stack([c.start, end - c.start, displacement])
-    size, least = np.abs(cycle[1]).max(0), np.abs(c.steadiest[1]).max(0)
+    size = np.abs(cycle[1]).max(0)
+    least = np.abs(c.steadiest[1]).max(0)
     diverged = (size > DIVERGED * least) & (c.extrapolation != 0).any(0)
-    steadiest, failures = (
-        np.where(size < least, cycle, c.steadiest),
-        c.failures + diverged,
-    )
+    steadiest = np.where(size < least, cycle, c.steadiest)
+    failures = c.failures + diverged
     history = _appended(c.history, cycle)
     history = np.where(diverged & ~np.isnan(history), steadiest[:, None], history)
     c = c._replace(history=history, steadiest=steadiest, failures=failures)

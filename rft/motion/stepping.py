@@ -215,7 +215,8 @@ def _cycles(
     advance: Callable,
 ) -> TimeSteps:
     """Return the last of ``cycles`` cycles, or by default the first one that repeats; samples on the last axis."""
-    path, state = [], stepping.begin()
+    path = []
+    state = stepping.begin()
     mixes = cycles is None and not stepping.heavy and stepping.memory(state).size > 0
     memories: list[limit_cycle.MemoryCycle] = []
     gain = np.zeros(0)
@@ -244,7 +245,8 @@ def _cycles(
             state = stepping.with_memory(state, memory)
     xi, residual, limit = (np.stack([x[i] for x in rows]) for i in (0, 2, 3))
     work = Work(*map(np.stack, zip(*(row.work for row in rows)))) if with_work else None
-    worst, drift = np.max(residual, 0), state.cycles.drift
+    worst = np.max(residual, 0)
+    drift = state.cycles.drift
     status = np.where(
         drift <= stepping.drift_tolerance,
         "periodic",
@@ -342,13 +344,13 @@ class Stepping:
         self.assembly = assembly._replace(
             effects=tuple(e for e in assembly.effects if e not in self.effects)
         )
-        self.alpha, self.alphadot, self.accuracy, self.backend = (
-            alpha,
-            alphadot,
-            accuracy,
-            backend,
-        )
-        self.to_limit, self.body_halves, self.phases = to_limit, body_halves, len(alpha)
+        self.alpha = alpha
+        self.alphadot = alphadot
+        self.accuracy = accuracy
+        self.backend = backend
+        self.to_limit = to_limit
+        self.body_halves = body_halves
+        self.phases = len(alpha)
         self.dt = 2 * np.pi / self.phases
         self.heavy = bool(broken_premises(self.effects) & Premise.QUASI_STATIC)
         self.drift_tolerance = max(
@@ -394,7 +396,8 @@ class Stepping:
 
     def begin(self) -> State:
         """Return the state before the first step, on undisturbed ground."""
-        problem, zero = self.problem(0), np.zeros((3, self.alpha.shape[-1]))
+        problem = self.problem(0)
+        zero = np.zeros((3, self.alpha.shape[-1]))
         v = (np.zeros_like(problem.sides.elements.c),) * 3
         states = tuple(e.begin(problem, Site(0, 0.0, zero, v)) for e in self.effects)
         return State(
@@ -409,7 +412,8 @@ class Stepping:
 
     def step(self, s: State, with_work: bool = False) -> tuple[State, Row]:
         """Return the state after the next step, and its row."""
-        site, first = self.site(s), s.count[0, 0] == 0
+        site = self.site(s)
+        first = s.count[0, 0] == 0
         k = site.count % self.phases
         undisturbed = problem = self.problem(k)
         for effect, state in zip(self.effects, s.effect_states):
@@ -500,12 +504,14 @@ class Stepping:
 
     def with_memory(self, s: State, memory: np.ndarray) -> State:
         """Return the state with other numbers (M, B) in its memories, within their bounds."""
-        states, used = [], 0
+        states = []
+        used = 0
         for effect, state in zip(self.effects, s.effect_states):
             if effect.memory_bounds is not None:
                 count = state.size // memory.shape[-1]
                 numbers = np.clip(memory[used : used + count], *effect.memory_bounds)
-                state, used = numbers.reshape(state.shape), used + count
+                state = numbers.reshape(state.shape)
+                used += count
             states.append(state)
         return s._replace(effect_states=tuple(states))
 

@@ -97,7 +97,8 @@ def work_done(
     """
     checked_body(body)
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, 1.0)
-    batch, xi = alpha.shape[:-1], real_array("xi", xi)
+    batch = alpha.shape[:-1]
+    xi = real_array("xi", xi)
     require(
         xi.shape == (*batch, 3),
         f"xi must have shape {(*batch, 3)} for these alpha and alphadot",
@@ -130,7 +131,10 @@ def element_work(
     between these elements. rounding: (B,), speed below which dry friction is rounded off."""
     scale = problem.frame.speed_scale
     v = with_frame_velocity(problem, velocities(problem), *(xi / scale))
-    wrenches, stations, forces, powers = [], [], [], []
+    wrenches = []
+    stations = []
+    forces = []
+    powers = []
     for (e, load), u, contact in zip(
         loads_on(problem, v, rounding / scale[0]), v, (problem.sides, problem.points)
     ):
