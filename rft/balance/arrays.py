@@ -1,4 +1,5 @@
-"""The NumPy driver: a batch of samples takes each step together, by the formulas that the compiled driver compiles."""
+"""The NumPy driver: a batch of samples takes each step together, by the formulas that
+the compiled driver compiles."""
 
 from __future__ import annotations
 
@@ -24,14 +25,16 @@ from rft.formulas.newton import (
     with_momentum,
 )
 
-# Samples that have ended leave the arrays where less than COMPACT_BELOW of them are active, and where the arrays have more
-# than COMPACT_ABOVE elements x samples: smaller arrays take as long.
+# Samples that have ended leave the arrays where less than COMPACT_BELOW of them are
+# active, and where the arrays have more than COMPACT_ABOVE elements x samples: smaller
+# arrays take as long.
 COMPACT_BELOW = 0.65
 COMPACT_ABOVE = 200
 
 
 def velocities(problem: Problem) -> tuple[tuple, tuple]:
-    """Return (v_t, v_n, v_w) over the scale of speed, of the body's sides and of its points, with the frame held."""
+    """Return (v_t, v_n, v_w) over the scale of speed, of the body's sides and of its
+    points, with the frame held."""
     speed = problem.frame.speed_scale
     return tuple(
         tuple(x / speed for x in contact.elements[6:])
@@ -40,7 +43,8 @@ def velocities(problem: Problem) -> tuple[tuple, tuple]:
 
 
 def with_frame_velocity(problem: Problem, v, x, y, theta) -> tuple[tuple, tuple]:
-    """Return the velocities v of sides and points plus those due to a velocity (x, y, theta) of the frame."""
+    """Return the velocities v of sides and points plus those due to a velocity
+    (x, y, theta) of the frame."""
     contacts = problem.sides, problem.points
     return tuple(
         plus(u, to_element(contact.elements, x, y, theta))
@@ -49,8 +53,8 @@ def with_frame_velocity(problem: Problem, v, x, y, theta) -> tuple[tuple, tuple]
 
 
 def loads(problem: Problem, v, rounding) -> list:
-    """Return pairs of `Elements` and their `Load`, for the sides and, if there are any, for the points, at velocities v
-    over the scale of speed."""
+    """Return pairs of `Elements` and their `Load`, for the sides and, if there are any,
+    for the points, at velocities v over the scale of speed."""
     p = problem
     sides = problem.sides
     points = problem.points
@@ -77,7 +81,8 @@ def loads(problem: Problem, v, rounding) -> list:
 
 
 def frame_net(problem: Problem, v, rounding, x, y, theta, mass=None) -> Net:
-    """Return the sum of loads, and of the rate of change of momentum, on the frame; entries (B,).
+    """Return the sum of loads, and of the rate of change of momentum, on the frame;
+    entries (B,).
 
     v, (x, y, theta): velocities of elements and of the frame, over the scale of speed.
     mass: `rft.formulas.momentum.frame_inertia`, computed by default."""
@@ -101,8 +106,8 @@ def frame_net(problem: Problem, v, rounding, x, y, theta, mass=None) -> Net:
 def nets(
     problem: Problem, v: np.ndarray, rounding: np.ndarray, xi: np.ndarray
 ) -> np.ndarray:
-    """Return the entries of `Net` (5, 3, B) at velocities v (3, n, B) of elements, those of points last, and xi (3, B)
-    of the frame."""
+    """Return the entries of `Net` (5, 3, B) at velocities v (3, n, B) of elements,
+    those of points last, and xi (3, B) of the frame."""
     n = len(problem.sides.station)
     return np.array(
         frame_net(problem, (tuple(v[:, :n]), tuple(v[:, n:])), rounding, *xi)
@@ -132,7 +137,8 @@ def row(record) -> Any:
 def solve(
     problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray | None
 ) -> np.ndarray:
-    """Return the results of all samples after one descent, the rows (6, B) of `rft.formulas.newton.result`.
+    """Return the results of all samples after one descent, the rows (6, B) of
+    `rft.formulas.newton.result`.
 
     guess: (3, B) or None. Velocities are over the scale of speed."""
     size = problem.n_samples

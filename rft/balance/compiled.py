@@ -1,8 +1,11 @@
-"""The compiled driver: a vector holds one element of eight samples, or, where samples are few, eight elements of one.
+"""The compiled driver: a vector holds one element of eight samples, or, where samples
+are few, eight elements of one.
 
-A sample that has ended gives its place to the next, so that no sample waits for the slowest. Elements are summed in their
-order either way, so that the digits of a sample do not depend on the others. A kernel is compiled once for each class of
-law records, from the formulas of `rft.formulas.link`, `rft.formulas.newton` and the law. Importing this module loads numba.
+A sample that has ended gives its place to the next, so that no sample waits for the
+slowest. Elements are summed in their order either way, so that the digits of a sample
+do not depend on the others. A kernel is compiled once for each class of law records,
+from the formulas of `rft.formulas.link`, `rft.formulas.newton` and the law. Importing
+this module loads numba.
 """
 
 from __future__ import annotations
@@ -84,8 +87,8 @@ NO_TERMS = np.zeros((0, 0, 3))
 
 @register_jitable(forceinline=True)
 def fill(rows, first, record, e, lane, i):
-    """Write element e and sample i of a record's arrays to a lane; a single row or column stands for all, and the last
-    element for those after it."""
+    """Write element e and sample i of a record's arrays to a lane; a single row or
+    column stands for all, and the last element for those after it."""
     for j in range(len(record)):
         x = record[j]
         rows[first + j, lane] = x[min(e, x.shape[0] - 1), min(i, x.shape[1] - 1)]
@@ -99,8 +102,9 @@ def ceil_divide(a, b):
 
 @register_jitable
 def fill_contact(rows, contact, count, first, last, i):
-    """Write the elements of sample i in one contact to the lanes from first to last of the rows of vectors, ``count``
-    elements to a vector; elements in excess have no weight."""
+    """Write the elements of sample i in one contact to the lanes from first to last of
+    the rows of vectors, ``count`` elements to a vector; elements in excess have no
+    weight."""
     elements, factors, ground, incline = contact
     for k in range(len(rows)):
         for lane in range(first, last):
@@ -115,7 +119,8 @@ def fill_contact(rows, contact, count, first, last, i):
 
 @register_jitable(forceinline=True)
 def add_triple(sums, first, triple, by_elements):
-    """Add a triple of vectors to three rows of sums: lane by lane, or, by elements, all lanes in turn to the first."""
+    """Add a triple of vectors to three rows of sums: lane by lane, or, by elements, all
+    lanes in turn to the first."""
     for j in range(3):
         if by_elements:
             add_lanes(sums, first + j, triple[j])
@@ -154,10 +159,12 @@ def evaluator(Law: type):
         by_elements,
         sums,
     ):
-        """Compute the `Net` on the frame after the next step, and the square of the slowest element's speed, as the rows
-        of ``sums``; write the velocities of elements after that step to v_next.
+        """Compute the `Net` on the frame after the next step, and the square of the
+        slowest element's speed, as the rows of ``sums``; write the velocities of
+        elements after that step to v_next.
 
-        n_sides: number of vectors of elements of the sides; those of the points follow."""
+        n_sides: number of vectors of elements of the sides; those of the points
+        follow."""
         rounding = iterate.rounding_next * speed
         slowest2 = 0.0 * speed + np.inf
         sums[:] = 0.0
@@ -308,7 +315,8 @@ def kernel(Law: type):
 
 @functools.cache
 def net_kernel(Law: type):
-    """Return the compiled sum of forces at given velocities of all elements, for one class of law records."""
+    """Return the compiled sum of forces at given velocities of all elements, for one
+    class of law records."""
     evaluate = evaluator(Law)
 
     @njit(nogil=True, error_model="numpy")
@@ -353,7 +361,8 @@ def net_kernel(Law: type):
 
 
 def plain(x) -> np.ndarray:
-    """Return an array as doubles in C order that may be written to, the only form that kernels are compiled for."""
+    """Return an array as doubles in C order that may be written to, the only form that
+    kernels are compiled for."""
     return x if x.dtype is DOUBLE and x.flags.carray else np.array(x, float, order="C")
 
 
@@ -371,16 +380,18 @@ def stacked(record) -> np.ndarray:
 
 
 def kernel_number(x) -> np.ndarray | float:
-    """Return a number of a law as a float, an array as two-dimensional, the nodes of a rule as a column."""
+    """Return a number of a law as a float, an array as two-dimensional, the nodes of a
+    rule as a column."""
     if not isinstance(x, np.ndarray) or x.ndim == 0:
         return float(x)
     return plain(x.reshape(-1, 1) if x.ndim > 2 else x)
 
 
 def load_arguments(problem: Problem) -> tuple:
-    """Return the arguments of kernels that describe the loads of a problem: numbers of the law; elements, factors,
-    quadratic drag and memory of the ground, and incline of sides and of points; dry terms of the points; the frame with
-    the scale of speed; additions. Records that do not apply have no rows, for speed."""
+    """Return the arguments of kernels that describe the loads of a problem: numbers of
+    the law; elements, factors, quadratic drag and memory of the ground, and incline of
+    sides and of points; dry terms of the points; the frame with the scale of speed;
+    additions. Records that do not apply have no rows, for speed."""
     p = problem
     additions = problem.additions
     has_points = len(p.points.station) > 0

@@ -1,15 +1,20 @@
-"""Continuation of solutions of a balance from a wide rounding to the required one, through folds.
+"""Continuation of solutions of a balance from a wide rounding to the required one,
+through folds.
 
-With a wide ``rounding`` a dry law is viscous and has one solution. From there a curve of solutions (xi, rounding) leads
-to any smaller rounding, since drag bounds the velocities. Where a law is not monotone, as granular laws are, the curve
-may fold: the rounding increases again along a stretch of it, three solutions share one rounding, and a descent, which
-only lowers the rounding, fails. Here the curve is followed by its arc length: a step along the tangent predicts, Newton's
-method across the tangent corrects, damped where the natural monotonicity test requires it. (Allgower and Georg, Numerical
-Continuation Methods, 1990, chapters 2 and 6; Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 3.3.)
+With a wide ``rounding`` a dry law is viscous and has one solution. From there a curve
+of solutions (xi, rounding) leads to any smaller rounding, since drag bounds the
+velocities. Where a law is not monotone, as granular laws are, the curve may fold: the
+rounding increases again along a stretch of it, three solutions share one rounding, and
+a descent, which only lowers the rounding, fails. Here the curve is followed by its arc
+length: a step along the tangent predicts, Newton's method across the tangent corrects,
+damped where the natural monotonicity test requires it. (Allgower and Georg, Numerical
+Continuation Methods, 1990, chapters 2 and 6; Deuflhard, Newton Methods for Nonlinear
+Problems, 2004, section 3.3.)
 
-The size of a change of (xi, log rounding) is the largest change of an element's velocity over its speed or the rounding,
-whichever is larger, so that it does not depend on frames, units or scales. Of several solutions the walk returns the first
-on the curve, where the tangent dF/dxi has a positive determinant.
+The size of a change of (xi, log rounding) is the largest change of an element's
+velocity over its speed or the rounding, whichever is larger, so that it does not depend
+on frames, units or scales. Of several solutions the walk returns the first on the
+curve, where the tangent dF/dxi has a positive determinant.
 """
 
 from __future__ import annotations
@@ -36,7 +41,8 @@ from rft.formulas.newton import (
 WIDEST = 10.0
 FIRST_STEP = 2.0
 LARGEST_CORRECTION = 1.0  # first correction of a step that is not refused
-# Size of a correction that is the last of a step: over that of the previous correction, or absolute.
+# Size of a correction that is the last of a step: over that of the previous correction,
+# or absolute.
 CONVERGED_RATIO = 0.25
 CONVERGED = 1e-6
 MOST_CORRECTIONS = 5  # of a step
@@ -51,8 +57,8 @@ DIFFERENCE = 1e-6  # of the rounding, for the derivative with respect to it
 
 
 def _stacked(triples) -> np.ndarray:
-    """Return velocities (3, n, B) of all elements, those of the sides first, from triples of the sides and of the
-    points."""
+    """Return velocities (3, n, B) of all elements, those of the sides first, from
+    triples of the sides and of the points."""
     stacks = [np.array(u) for u in triples]
     return stacks[0] if len(stacks) == 1 else np.concatenate(stacks, 1)
 
@@ -64,14 +70,16 @@ def _contacts(problem: Problem) -> list:
 
 
 def _to_elements(problem: Problem, xi: np.ndarray) -> np.ndarray:
-    """Return the contribution of a velocity xi (3, B) of the frame to the velocities of all elements, (3, n, B)."""
+    """Return the contribution of a velocity xi (3, B) of the frame to the velocities of
+    all elements, (3, n, B)."""
     return _stacked(
         [to_element(contact.elements, *xi) for contact in _contacts(problem)]
     )
 
 
 def _wrench(problem: Problem, force: np.ndarray) -> np.ndarray:
-    """Return force and moment on the frame (3, B) of forces on all elements (3, n, B), with their weights."""
+    """Return force and moment on the frame (3, B) of forces on all elements (3, n, B),
+    with their weights."""
     n = len(problem.sides.station)
     by_contact = [
         (contact.elements, f)
@@ -83,8 +91,9 @@ def _wrench(problem: Problem, force: np.ndarray) -> np.ndarray:
 def _with_slope(
     nets: Callable, problem: Problem, xi, v, rounding
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """Return force and moment on the frame followed by their slopes in xi, (3, 4, B), their slope (3, B) in the logarithm
-    of the rounding, and the number of evaluations."""
+    """Return force and moment on the frame followed by their slopes in xi, (3, 4, B),
+    their slope (3, B) in the logarithm of the rounding, and the number of
+    evaluations."""
     *net, by_speed = nets(problem, v, rounding, xi)
     net = np.array(net).transpose(1, 0, 2)
     if (
@@ -96,7 +105,8 @@ def _with_slope(
 
 
 def solve4(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Return x (4, k, B) with matrix (4, 4, B) x = right; nan where the matrix is singular or no number."""
+    """Return x (4, k, B) with matrix (4, 4, B) x = right; nan where the matrix is
+    singular or no number."""
     matrix = np.moveaxis(matrix, -1, 0)
     right = np.moveaxis(right, -1, 0)
     is_regular = np.abs(np.linalg.det(matrix)) > 0
@@ -105,7 +115,8 @@ def solve4(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 class _Point(NamedTuple):
-    """A velocity and a rounding. xi: (3, B). v: (3, n, B), velocities of the elements at xi. rounding: (B,)."""
+    """A velocity and a rounding. xi: (3, B). v: (3, n, B), velocities of the elements
+    at xi. rounding: (B,)."""
 
     xi: np.ndarray
     v: np.ndarray
@@ -124,7 +135,8 @@ class _Point(NamedTuple):
         return _Point(*(x[..., index] for x in self))
 
     def squared_scale(self) -> np.ndarray:
-        """Return squares of the elements' speeds plus the square of the rounding, (n, B)."""
+        """Return squares of the elements' speeds plus the square of the rounding,
+        (n, B)."""
         return self.squared_speed() + self.rounding**2
 
     def squared_speed(self) -> np.ndarray:
@@ -149,7 +161,9 @@ class _Walk:
     evaluations: np.ndarray
     base: _Point  # the last point on the curve
     tangent: np.ndarray  # (4, B), at the base, of size 1
-    border: np.ndarray  # (4, B), row of the tangent in the metric: corrections do not change its product with a change
+    # (4, B), row of the tangent in the metric: corrections do not change its product
+    # with a change
+    border: np.ndarray
     step: np.ndarray  # length along the tangent
     point: _Point  # before the change that is tried
     change: np.ndarray  # (4, B), tried from the point
@@ -174,11 +188,13 @@ class _Walk:
 def follow(
     problem: Problem, limits: Limits, nets: Callable, correction: float, budget: int
 ) -> Iterator[tuple]:
-    """Solve all samples of a problem. Yields their indices and their results, rows (6, b) as those of
-    `rft.formulas.newton.result`, as they end, with an infinite residual where the budget is spent.
+    """Solve all samples of a problem. Yields their indices and their results, rows
+    (6, b) as those of `rft.formulas.newton.result`, as they end, with an infinite
+    residual where the budget is spent.
 
-    nets: `rft.balance.arrays.nets` or that of `rft.balance.compiled`. correction: intended size of the first correction
-    of a step, by which the length of steps is chosen. budget: most evaluations."""
+    nets: `rft.balance.arrays.nets` or that of `rft.balance.compiled`. correction:
+    intended size of the first correction of a step, by which the length of steps is
+    chosen. budget: most evaluations."""
     walk = _start(nets, problem, limits.rounding)
     while walk.index.size:
         new = walk.point.shifted(walk.problem, walk.change)
@@ -201,7 +217,8 @@ def follow(
 
 
 def _start(nets: Callable, problem: Problem, last: float) -> _Walk:
-    """Return all samples at the viscous solution, with a first step towards less rounding."""
+    """Return all samples at the viscous solution, with a first step towards less
+    rounding."""
     size = problem.n_samples
     v = _stacked([u for u in velocities(problem) if len(u[0])])
     force, *columns, _ = nets(problem, v, np.full(size, VISCOUS), np.zeros((3, size)))
@@ -221,7 +238,8 @@ def _start(nets: Callable, problem: Problem, last: float) -> _Walk:
 def _predict(walk: _Walk, mask: np.ndarray, last: float) -> None:
     """Set the next change of the masked samples to a step along the tangent.
 
-    The step is straight in (xi, rounding), for the velocity of an element at rest is proportional to the rounding."""
+    The step is straight in (xi, rounding), for the velocity of an element at rest is
+    proportional to the rounding."""
     slope = walk.tangent[3]
     rounding = walk.base.rounding * np.exp(np.clip(walk.step * slope, -100.0, 5.0))
     reaches_last = rounding <= last
@@ -253,7 +271,8 @@ def _correct(
     first = walk.corrections == 0
     fine = walk.step < FINE_STEP
     walk.first_size = np.where(first, size, walk.first_size)
-    # Natural monotonicity: with the previous matrix, a correction must be smaller by about half the damping.
+    # Natural monotonicity: with the previous matrix, a correction must be smaller by
+    # about half the damping.
     previous_matrix = np.where(first, np.eye(4)[..., None], walk.matrix)
     simplified = walk.point.size(
         walk.problem, solve4(previous_matrix, right[:, :1])[:, 0]
@@ -299,8 +318,8 @@ def _correct(
 
 
 def _bordered(walk: _Walk, net, slope) -> np.ndarray:
-    """Return the tangent in (xi, log rounding) over the border, (4, 4, B); in the last step the border is that of a fixed
-    rounding."""
+    """Return the tangent in (xi, log rounding) over the border, (4, 4, B); in the last
+    step the border is that of a fixed rounding."""
     matrix = np.empty((4, 4, walk.index.size))
     matrix[:3, :3] = net[:, 1:]
     matrix[:3, 3] = slope
@@ -309,7 +328,8 @@ def _bordered(walk: _Walk, net, slope) -> np.ndarray:
 
 
 def _rebase(walk: _Walk, mask: np.ndarray, new: _Point, correction, tangent) -> None:
-    """Make the corrected points of the masked samples the base, with the tangents there."""
+    """Make the corrected points of the masked samples the base, with the tangents
+    there."""
     base = new.shifted(walk.problem, np.where(mask, correction, 0.0))
     tangent = tangent / base.size(walk.problem, tangent)
     metric = _wrench(

@@ -1,4 +1,5 @@
-"""The base of bodies: straight elements, and their motion when the shape changes and the frame is held."""
+"""The base of bodies: straight elements, and their motion when the shape changes and
+the frame is held."""
 
 from __future__ import annotations
 
@@ -26,12 +27,14 @@ Length = Annotated[
 
 
 class Elements(NamedTuple):
-    """Straight elements of a body in its frame, arrays (n, B) for n elements and B samples, lengths in body lengths.
+    """Straight elements of a body in its frame, arrays (n, B) for n elements and B
+    samples, lengths in body lengths.
 
-    c, s: cosine and sine of the heading. r_t, r_n: velocity of the centre along and across the element at a unit
-    rotation rate of the frame. half: (n, 1), half length, 0 for a point. weight: (n, 1), factor of the drag per length,
-    which is the length of a piece of body. v_t, v_n, v_w: velocity with the frame held, along and across at the centre,
-    and rotation rate times half length.
+    c, s: cosine and sine of the heading. r_t, r_n: velocity of the centre along and
+    across the element at a unit rotation rate of the frame. half: (n, 1), half length,
+    0 for a point. weight: (n, 1), factor of the drag per length, which is the length of
+    a piece of body. v_t, v_n, v_w: velocity with the frame held, along and across at
+    the centre, and rotation rate times half length.
 
     Examples
     --------
@@ -56,8 +59,9 @@ class Elements(NamedTuple):
     def from_complex(
         cls, heading: Any, centre: Any, velocity: Any, rotation: Any, half: Any
     ) -> Elements:
-        """Return elements from complex numbers (n, B): exp(i theta) of their headings, their centres x + i y and the
-        velocities of the centres. rotation: (n, B), rates of theta. half: (n, 1), half lengths."""
+        """Return elements from complex numbers (n, B): exp(i theta) of their headings,
+        their centres x + i y and the velocities of the centres. rotation: (n, B), rates
+        of theta. half: (n, 1), half lengths."""
         back = heading.conj()
         v = velocity * back
         lever = centre * back
@@ -82,14 +86,15 @@ class Elements(NamedTuple):
 
     @property
     def centres(self) -> np.ndarray:
-        """Centres in the frame, complex (n, B): r_t + i r_n = i centre conj(heading)."""
+        """Centres in the frame, complex (n, B): r_t + i r_n = i centre
+        conj(heading)."""
         return (self.r_t + 1j * self.r_n) * (self.c + 1j * self.s) / 1j
 
     def attached_points(
         self, owner: list[int], ahead: np.ndarray, weight: np.ndarray
     ) -> Elements:
-        """Return k points attached to the elements ``owner``, each a distance ``ahead`` (k, 1) before the centre; weight:
-        (k, 1), factors of their drag."""
+        """Return k points attached to the elements ``owner``, each a distance ``ahead``
+        (k, 1) before the centre; weight: (k, 1), factors of their drag."""
         indices = np.array(owner)
         c, s, r_t, r_n, half, _, v_t, v_n, v_w = (x[indices] for x in self)
         return Elements(
@@ -108,9 +113,10 @@ class Elements(NamedTuple):
 class Body(Protocol):
     """A body of straight elements whose shape is ``joints`` numbers.
 
-    joints: number of shape variables. length: of the body, m, None where lengths are in body lengths.
-    motion(alpha, alphadot): its `Elements` at shapes and rates (joints, B), with the frame held. A body that is drawn
-    also has ``points``, and ``shape_labels`` if its shape variables are no joint angles: see `rft.Chain`.
+    joints: number of shape variables. length: of the body, m, None where lengths are in
+    body lengths. motion(alpha, alphadot): its `Elements` at shapes and rates
+    (joints, B), with the frame held. A body that is drawn also has ``points``, and
+    ``shape_labels`` if its shape variables are no joint angles: see `rft.Chain`.
 
     Examples
     --------
@@ -155,9 +161,11 @@ def checked_body(body) -> Body:
 
 @cached_if_immutable
 def is_reversible(body: Body) -> bool:
-    """Return whether exchanging head and tail leaves the body and its frame as they are, from a few random shapes.
+    """Return whether exchanging head and tail leaves the body and its frame as they
+    are, from a few random shapes.
 
-    The exchange rotates the frame by pi and maps the joints alpha_1 ... alpha_d to -alpha_d ... -alpha_1."""
+    The exchange rotates the frame by pi and maps the joints alpha_1 ... alpha_d to
+    -alpha_d ... -alpha_1."""
     rng = np.random.default_rng(0)
     alpha, rates = rng.uniform(-1.5, 1.5, (2, body.joints, 5))
     elements = body.motion(alpha, rates)
@@ -172,8 +180,9 @@ def is_reversible(body: Body) -> bool:
 
 @cached_if_immutable
 def is_symmetric(body: Body) -> bool:
-    """Return whether a body of shape -alpha is its mirror image of shape alpha, left and right exchanged, from a few random
-    shapes; a body of one's own may be bent where its shape is zero."""
+    """Return whether a body of shape -alpha is its mirror image of shape alpha, left
+    and right exchanged, from a few random shapes; a body of one's own may be bent where
+    its shape is zero."""
     rng = np.random.default_rng(0)
     alpha, rates = rng.uniform(-1.5, 1.5, (2, body.joints, 5))
     elements = body.motion(alpha, rates)
@@ -208,13 +217,14 @@ class WrappedBody:
 
 
 def _joint_angles(body: Body, shape: np.ndarray) -> np.ndarray:
-    """Return the joint angles of a shape whose variables are modes; else the shape variables themselves."""
+    """Return the joint angles of a shape whose variables are modes; else the shape
+    variables themselves."""
     return body.joint_angles(shape) if hasattr(body, "joint_angles") else shape
 
 
 def joint_speed(body: Body, alphadot: np.ndarray) -> np.ndarray:
-    """Return the size (B,) of the joint rates at rates (joints, B) of the shape variables, by which velocities are
-    scaled."""
+    """Return the size (B,) of the joint rates at rates (joints, B) of the shape
+    variables, by which velocities are scaled."""
     rates = _joint_angles(body, alphadot)
     return np.sqrt((rates * rates).sum(0))
 

@@ -1,4 +1,5 @@
-"""A chain of straight links joined by hinges: the three-link swimmer and its longer relatives (paper Fig. 11)."""
+"""A chain of straight links joined by hinges: the three-link swimmer and its longer
+relatives (paper Fig. 11)."""
 
 from __future__ import annotations
 
@@ -17,15 +18,18 @@ from rft.core.checks import Number, check_numbers
 @BODIES.register
 @dataclass(frozen=True)
 class Chain(Links):
-    """n straight links, tail to head; alpha_k is the heading of link k+1 minus that of link k, counter-clockwise.
+    """n straight links, tail to head; alpha_k is the heading of link k+1 minus that of
+    link k, counter-clockwise.
 
-    lengths (-): relative link lengths, all > 0, at least two. frame (-): "mean", centre of mass of a uniform body and
-    length-weighted mean heading (the paper's), or "link-1", "link-2" ..., centre and heading of that link.
+    lengths (-): relative link lengths, all > 0, at least two. frame (-): "mean", centre
+    of mass of a uniform body and length-weighted mean heading (the paper's), or
+    "link-1", "link-2" ..., centre and heading of that link.
 
-    modes (-): rows of joint angles; the shape variables are then the amplitudes m_1, m_2 ... of these modes in place of
-    the joint angles, alpha_k = sum over j of m_j modes[j][k]. "serpenoid": the cosine and the sine of ``waves`` waves on
-    the body (`rft.bodies.modes`), whose circle is a travelling wave. Joint speeds, and with them the regularisation,
-    are the same as without modes.
+    modes (-): rows of joint angles; the shape variables are then the amplitudes m_1,
+    m_2 ... of these modes in place of the joint angles, alpha_k = sum over j of m_j
+    modes[j][k]. "serpenoid": the cosine and the sine of ``waves`` waves on the body
+    (`rft.bodies.modes`), whose circle is a travelling wave. Joint speeds, and with them
+    the regularisation, are the same as without modes.
 
     Examples
     --------
@@ -68,7 +72,8 @@ class Chain(Links):
         return mode_rows(self.modes, self.waves, len(self.lengths))
 
     def joint_angles(self, shape: np.ndarray) -> np.ndarray:
-        """Return the joint angles (n - 1, B) of shapes (joints, B), or the joint rates of rates."""
+        """Return the joint angles (n - 1, B) of shapes (joints, B), or the joint rates
+        of rates."""
         return shape if self.modes is None else self._mode_rows.T @ shape
 
     @property
@@ -79,7 +84,8 @@ class Chain(Links):
         )
 
     def _in_frame(self, differences: np.ndarray, link: int | None) -> np.ndarray:
-        """Return values of all links (n, B), less the frame's, from the differences (n - 1, B) between neighbours."""
+        """Return values of all links (n, B), less the frame's, from the differences
+        (n - 1, B) between neighbours."""
         x = np.zeros((len(self.lengths), differences.shape[1]), differences.dtype)
         np.add.accumulate(differences, 0, out=x[1:])
         x -= self._frame_value(x, link)

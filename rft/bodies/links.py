@@ -1,4 +1,5 @@
-"""Bodies of straight links, whatever their poses follow from: frames, motion and drawing."""
+"""Bodies of straight links, whatever their poses follow from: frames, motion and
+drawing."""
 
 from __future__ import annotations
 
@@ -18,8 +19,8 @@ from rft.formulas.se2 import rotated
 
 
 class Links:
-    """Base of bodies of n straight links. Subclasses are frozen dataclasses with lengths (relative), length, frame and joints,
-    and give `_links`."""
+    """Base of bodies of n straight links. Subclasses are frozen dataclasses with
+    lengths (relative), length, frame and joints, and give `_links`."""
 
     lengths: tuple[float, ...]
     length: float | None
@@ -27,7 +28,8 @@ class Links:
     joints: Any  # a number, or a property
 
     def _check_lengths(self) -> None:
-        """Store the lengths as a tuple; ValueError unless they are lengths of two links or more."""
+        """Store the lengths as a tuple; ValueError unless they are lengths of two links
+        or more."""
         lengths = real_array("lengths", self.lengths)
         require(
             lengths.ndim == 1, "lengths must be a list of numbers", value=self.lengths
@@ -55,8 +57,9 @@ class Links:
         return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]  # of subclasses
 
     def _links(self, alpha: np.ndarray, alphadot: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return of the links in the body frame at shapes and rates (joints, B), (n, B) each: exp(i theta), rates of theta,
-        centres x + i y, velocities of the centres, and headings theta."""
+        """Return of the links in the body frame at shapes and rates (joints, B), (n, B)
+        each: exp(i theta), rates of theta, centres x + i y, velocities of the centres,
+        and headings theta."""
         raise NotImplementedError
 
     @cached_property
@@ -71,7 +74,8 @@ class Links:
         return (self.fractions / 2)[:, None]
 
     def _frame_link(self, frame: str) -> int | None:
-        """Return the index of the link that carries a frame, None for "mean"; ValueError for no frame of this body."""
+        """Return the index of the link that carries a frame, None for "mean";
+        ValueError for no frame of this body."""
         text = frame if isinstance(frame, str) else ""
         if text == "mean":
             return None
@@ -90,11 +94,13 @@ class Links:
         return self._frame_link(self.frame)
 
     def _frame_value(self, x: np.ndarray, link: int | None) -> np.ndarray:
-        """Return a frame's value from values of the links (n, ...): its link's, or the length-weighted mean."""
+        """Return a frame's value from values of the links (n, ...): its link's, or the
+        length-weighted mean."""
         return x[link] if link is not None else self.fractions @ x
 
     def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Elements:
-        """Return the links at shapes (rad) and rates (rad per unit time), (joints, B) each, with the body frame held."""
+        """Return the links at shapes (rad) and rates (rad per unit time), (joints, B)
+        each, with the body frame held."""
         heading, rotation, centre, velocity, _ = self._links(alpha, alphadot)
         return Elements.from_complex(
             heading, centre, velocity, rotation, self._half_lengths
@@ -103,11 +109,11 @@ class Links:
     def frame_pose(
         self, frame: str, alpha: np.ndarray, alphadot: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the pose h of another frame of this body in the body frame, and dh/dt: each (..., 3), in length units and
-        rad.
+        """Return the pose h of another frame of this body in the body frame, and dh/dt:
+        each (..., 3), in length units and rad.
 
-        alpha, alphadot: (..., joints). `geomech.geometry.coordinates` uses it to change the frame of velocities and
-        connections.
+        alpha, alphadot: (..., joints). `geomech.geometry.coordinates` uses it to change
+        the frame of velocities and connections.
         """
         alpha, alphadot = np.broadcast_arrays(
             unmasked("alpha", alpha), unmasked("alphadot", alphadot)
@@ -128,10 +134,11 @@ class Links:
     def points(
         self, alpha: np.ndarray, pose: ArrayLike = (0.0, 0.0, 0.0)
     ) -> np.ndarray:
-        """Return the ends of the links in the world, tail to head, (..., links + 1, 2), in length units.
+        """Return the ends of the links in the world, tail to head, (..., links + 1, 2),
+        in length units.
 
-        alpha: (..., joints), rad. pose: (..., 3), pose of the body frame in the world, (x, y) in length units, theta in
-        rad."""
+        alpha: (..., joints), rad. pose: (..., 3), pose of the body frame in the world,
+        (x, y) in length units, theta in rad."""
         alpha = unmasked("alpha", alpha)
         pose = unmasked("pose", pose)
         require(

@@ -14,13 +14,15 @@ PIECES = 40  # to a body length, by default; estimates of errors include theirs
 
 @dataclass(frozen=True, eq=False)
 class Pieces(WrappedBody):
-    """The body ``inner`` with every element cut into equal pieces no longer than ``longest``, in body lengths."""
+    """The body ``inner`` with every element cut into equal pieces no longer than
+    ``longest``, in body lengths."""
 
     longest: float
 
     @cached_property
     def _cuts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Element, centre and half length of each piece; the latter two in the element's coordinate s in [-1, 1]."""
+        """Element, centre and half length of each piece; the latter two in the
+        element's coordinate s in [-1, 1]."""
         counts = np.maximum(
             1, np.ceil(2 * half_lengths(self.inner) / self.longest - 1e-9).astype(int)
         )
@@ -52,8 +54,8 @@ class Pieces(WrappedBody):
 
 
 def subdivide(body: Body, pieces: int) -> Body:
-    """Return the body with at least ``pieces`` elements to its length; the body itself where its elements are short
-    enough."""
+    """Return the body with at least ``pieces`` elements to its length; the body itself
+    where its elements are short enough."""
     longest = 1 / pieces
     return (
         Pieces(body, longest)

@@ -1,4 +1,5 @@
-"""Links whose poses are a function of shape: any body that one can write down, rigid links or the pieces of a curve."""
+"""Links whose poses are a function of shape: any body that one can write down, rigid
+links or the pieces of a curve."""
 
 from __future__ import annotations
 
@@ -14,7 +15,9 @@ from rft.bodies.links import Links
 from rft.core.checks import check_numbers, in_range, real_array
 from rft.core.refusal import Refusal, require
 
-STEP = 0.01  # of the shape variables, of differences of order 6: errors of 1e-14 for functions that vary over 1 rad
+# of the shape variables, of differences of order 6: errors of 1e-14 for functions that
+# vary over 1 rad
+STEP = 0.01
 # of values at -3 to 3 steps
 WEIGHTS = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
 SHAPES = 5, 7  # batch on which a function shows whether it takes many shapes
@@ -26,15 +29,16 @@ JOINED = 1e-9  # of the body's length, between links that meet
 
 
 class Posed(Links):
-    """Base of bodies with a function ``positions`` of shapes alpha (..., joints), or of one shape (joints,), that returns the
-    poses (..., n, 3) of the links: x, y of the centre, in the unit of ``lengths``, and heading theta, rad.
+    """Base of bodies with a function ``positions`` of shapes alpha (..., joints), or of
+    one shape (joints,), that returns the poses (..., n, 3) of the links: x, y of the
+    centre, in the unit of ``lengths``, and heading theta, rad.
 
-    Where the function sees the body from does not matter: poses are taken relative to the body frame. Velocities are
-    differences of order 6 in the shape.
+    Where the function sees the body from does not matter: poses are taken relative to
+    the body frame. Velocities are differences of order 6 in the shape.
 
-    continuous: whether the links are pieces of a curve, whose number is a numerical setting;
-    None: they are where there are at least 10, and three times as many as shape
-    variables."""
+    continuous: whether the links are pieces of a curve, whose number is a numerical
+    setting; None: they are where there are at least 10, and three times as many as
+    shape variables."""
 
     positions: Callable[[np.ndarray], np.ndarray]
     continuous: bool | None = None
@@ -68,11 +72,13 @@ class Posed(Links):
         return links if continuous else None
 
     def with_elements(self, count: int) -> Resampled:
-        """Return the body of ``count`` equal links on the same curve, in the frame "mean"."""
+        """Return the body of ``count`` equal links on the same curve, in the frame
+        "mean"."""
         return Resampled(self, count)
 
     def resampled(self, shape: ArrayLike, count: int) -> np.ndarray:
-        """Return shapes, or rates, (..., joints) as those of `with_elements`: the same."""
+        """Return shapes, or rates, (..., joints) as those of `with_elements`: the
+        same."""
         return np.asarray(shape, float)
 
     @cached_property
@@ -89,7 +95,8 @@ class Posed(Links):
         )
 
     def _at(self, alpha: np.ndarray) -> np.ndarray:
-        """Return the poses (..., n, 3) at shapes (..., joints), in body lengths; ValueError unless they are n poses."""
+        """Return the poses (..., n, 3) at shapes (..., joints), in body lengths;
+        ValueError unless they are n poses."""
         batch = alpha.shape[:-1]
         if self._takes_batches:
             poses = real_array("positions", self.positions(alpha))
@@ -124,7 +131,8 @@ class Posed(Links):
         return self._in_frame(centres[3], rate(centres), theta[3], rate(theta))
 
     def _in_frame(self, centre, velocity, theta, rotation) -> tuple[np.ndarray, ...]:
-        """Return what `_links` does from centres, headings and their rates (n, B) in any one frame."""
+        """Return what `_links` does from centres, headings and their rates (n, B) in
+        any one frame."""
         origin, drift, angle, spin = (
             self._frame_value(x, self._link)
             for x in (centre, velocity, theta, rotation)
@@ -144,13 +152,16 @@ class Posed(Links):
 
 @dataclass(frozen=True)
 class Positions(Posed):
-    """Links whose poses the function ``positions`` gives, such as a backbone function of sysplotter.
+    """Links whose poses the function ``positions`` gives, such as a backbone function
+    of sysplotter.
 
-    positions: function of shapes alpha (..., joints), or of one shape, that returns poses (..., n, 3) of the links, tail to
-    head: x, y of the centre in the unit of ``lengths`` and heading theta (rad), in any frame. lengths: of the n links.
-    length: of the body, m; without it lengths are in body lengths. frame: "mean" or "link-1", "link-2" ... continuous:
-    whether the links are pieces of a curve, so that errors contain the change with half of them; None: where there are
-    at least 10, and three times as many as shape variables.
+    positions: function of shapes alpha (..., joints), or of one shape, that returns
+    poses (..., n, 3) of the links, tail to head: x, y of the centre in the unit of
+    ``lengths`` and heading theta (rad), in any frame. lengths: of the n links. length:
+    of the body, m; without it lengths are in body lengths. frame: "mean" or "link-1",
+    "link-2" ... continuous: whether the links are pieces of a curve, so that errors
+    contain the change with half of them; None: where there are at least 10, and three
+    times as many as shape variables.
 
     Examples
     --------
@@ -178,8 +189,8 @@ class Positions(Posed):
 
 @dataclass(frozen=True)
 class Resampled(Posed):
-    """``count`` equal links on the curve through the links of a body, by splines: of their
-    headings where links join, so that these join too, else of their poses."""
+    """``count`` equal links on the curve through the links of a body, by splines: of
+    their headings where links join, so that these join too, else of their poses."""
 
     inner: Posed
     count: int
@@ -206,7 +217,8 @@ class Resampled(Posed):
 
     @cached_property
     def _joined(self) -> bool:
-        """Whether links of the inner body meet at their ends, at a few random shapes."""
+        """Whether links of the inner body meet at their ends, at a few random
+        shapes."""
         alpha = np.random.default_rng(0).uniform(-1.0, 1.0, (5, self.joints))
         poses = self.inner._at(alpha)
         centre = poses[..., 0] + 1j * poses[..., 1]

@@ -1,6 +1,8 @@
-"""Checks of arguments: numbers within bounds, arrays of real numbers, covariances. All raise ValueError with one line.
+"""Checks of arguments: numbers within bounds, arrays of real numbers, covariances. All
+raise ValueError with one line.
 
-The bounds, the unit and the meaning of a number field of a class stand in its annotation (`Number`):
+The bounds, the unit and the meaning of a number field of a class stand in its
+annotation (`Number`):
 
     radius: Annotated[float, Number(0, 1, "body lengths", "of the body")]
 """
@@ -23,8 +25,8 @@ from numpy.typing import ArrayLike
 class Number(NamedTuple):
     """Bounds, unit and meaning of a number field.
 
-    low, high: smallest and largest allowed value. unit: "-" for none. meaning: as lists of keys print it. whole: whether
-    the number must be an integer."""
+    low, high: smallest and largest allowed value. unit: "-" for none. meaning: as lists
+    of keys print it. whole: whether the number must be an integer."""
 
     low: float
     high: float
@@ -53,8 +55,8 @@ def number_fields(kind: Any) -> dict[str, Number]:
 
 
 def check_numbers(owner: Any) -> None:
-    """Raise ValueError unless the number fields of an object lie within the bounds of their annotations, or are None where
-    that is the default; store integers as int."""
+    """Raise ValueError unless the number fields of an object lie within the bounds of
+    their annotations, or are None where that is the default; store integers as int."""
     defaults = {f.name: f.default for f in fields(owner)} if is_dataclass(owner) else {}
     kind: Any = type(owner)
     for name, number in number_fields(kind).items():
@@ -66,7 +68,8 @@ def check_numbers(owner: Any) -> None:
 
 
 def real_array(name: str, x: ArrayLike) -> np.ndarray:
-    """Return x as an array of floats; ValueError with its name unless it is an array of real numbers."""
+    """Return x as an array of floats; ValueError with its name unless it is an array of
+    real numbers."""
     import numpy as np  # a command that refuses starts without it
 
     refuse_mask(name, x)
@@ -119,7 +122,8 @@ def is_whole(value: object) -> bool:
 def in_range(
     name: str, value: Any, low: float, high: float, whole: bool = False, unit: str = "-"
 ) -> None:
-    """Raise ValueError with the name unless value is a number, if ``whole`` an integer, from low to high."""
+    """Raise ValueError with the name unless value is a number, if ``whole`` an integer,
+    from low to high."""
     # float32 has no 1e-50
     exact = getattr(value, "item", lambda: value)() if is_number(value) else value
     if not ((is_whole if whole else is_number)(value) and low <= exact <= high):
@@ -130,8 +134,9 @@ def in_range(
 
 
 def checked_covariance(value, *sizes: int) -> tuple[tuple[float, ...], ...] | None:
-    """Return a covariance matrix as rows of floats, None as it is; ValueError unless it is finite, n x n for an n among
-    ``sizes``, symmetric and, to roundoff, without a negative eigenvalue."""
+    """Return a covariance matrix as rows of floats, None as it is; ValueError unless it
+    is finite, n x n for an n among ``sizes``, symmetric and, to roundoff, without a
+    negative eigenvalue."""
     if value is None:
         return None
     import numpy as np

@@ -1,4 +1,5 @@
-"""How a refusal is said: in one line that names the place, the value and the cure. The facts stay with the error.
+"""How a refusal is said: in one line that names the place, the value and the cure. The
+facts stay with the error.
 
 Nothing here needs NumPy, so that a command that refuses starts fast.
 """
@@ -15,16 +16,18 @@ ARGUMENT = re.compile("``([^`]+)``")  # in the words of a refusal
 
 
 def worded(words: str, spelled: Callable[[str], str] = str) -> str:
-    """Return words with each argument that they name in double backticks as ``spelled`` returns it, by default bare."""
+    """Return words with each argument that they name in double backticks as ``spelled``
+    returns it, by default bare."""
     return ARGUMENT.sub(lambda match: spelled(match[1]), words)
 
 
 class Refusal(ValueError):
     """A request, scene, file or argument that makes no sense.
 
-    what: says what is wrong. value: what was given, where that tells more. where: the way there, outermost first (file or
-    scene, table, key, argument). because: why it cannot be. instead: what to give or to do. The name of an argument
-    stands in double backticks: Python shows it bare, and a command as its option (`said`).
+    what: says what is wrong. value: what was given, where that tells more. where: the
+    way there, outermost first (file or scene, table, key, argument). because: why it
+    cannot be. instead: what to give or to do. The name of an argument stands in double
+    backticks: Python shows it bare, and a command as its option (`said`).
 
     Examples
     --------
@@ -57,7 +60,8 @@ class Refusal(ValueError):
         return self.said(str)
 
     def said(self, spelled: Callable[[str], str]) -> str:
-        """Return the refusal as a line. spelled: returns what a reader types for the name of an argument."""
+        """Return the refusal as a line. spelled: returns what a reader types for the
+        name of an argument."""
         named = lambda words: worded(words, spelled)
         text = (
             named(self.what)
@@ -71,7 +75,8 @@ class Refusal(ValueError):
         return line(text)
 
     def within(self, place: object) -> Refusal:
-        """Return the refusal with a place before its own, unless it names that already."""
+        """Return the refusal with a place before its own, unless it names that
+        already."""
         names = (str(place), line(worded(str(place))))
         if not str(self).startswith(tuple(map(before, names))):
             self.where = (str(place), *self.where)
@@ -110,8 +115,9 @@ def formatted(value: object, most: int = 60) -> str:
 
 
 def printable(text: str) -> str:
-    """Return text, which may hold what others wrote, as it may be shown: what steers a terminal, or is not seen, stands as its
-    escape. Lines, tabs and blanks stay. All that goes to a terminal or into HTML passes here."""
+    """Return text, which may hold what others wrote, as it may be shown: what steers a
+    terminal, or is not seen, stands as its escape. Lines, tabs and blanks stay. All
+    that goes to a terminal or into HTML passes here."""
     return re.sub(r"[^ -~\n\t]", _escaped, text)
 
 
@@ -135,6 +141,7 @@ def _escaped(match: re.Match[str]) -> str:
 
 
 def line(text: str, most: int = 400) -> str:
-    """Return `printable` text as one line of at most ``most`` characters, cut before its end."""
+    """Return `printable` text as one line of at most ``most`` characters, cut before
+    its end."""
     text = printable(" ".join(text.split()))
     return text if len(text) <= most else text[: most - 100] + " ... " + text[-80:]

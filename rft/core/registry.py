@@ -1,7 +1,9 @@
-"""Registries: parts of one family, such as force laws or gaits, by the names that users give them.
+"""Registries: parts of one family, such as force laws or gaits, by the names that users
+give them.
 
-A part is one file with one decorator, `Registry.register`. Its class has ``examples()``, a class method that returns parts by
-name, or parameters that all have defaults; the tests hold every example to the laws of its family.
+A part is one file with one decorator, `Registry.register`. Its class has
+``examples()``, a class method that returns parts by name, or parameters that all have
+defaults; the tests hold every example to the laws of its family.
 """
 
 from __future__ import annotations
@@ -23,8 +25,9 @@ BUILT_IN = ("geomech", "rft")  # packages whose names nobody else may give
 class Registry(Mapping[str, Any]):
     """Parts of one family by name, in the order in which they were registered.
 
-    group: of entry points with which installed packages offer parts. key: attribute that holds a part's name. noun: what a
-    part is, in words, such as "a gait". admits: whether an object is one.
+    group: of entry points with which installed packages offer parts. key: attribute
+    that holds a part's name. noun: what a part is, in words, such as "a gait". admits:
+    whether an object is one.
     """
 
     def __init__(self, group: str, key: str, noun: str, admits: Callable[[Any], bool]):
@@ -70,9 +73,9 @@ class Registry(Mapping[str, Any]):
     ) -> Callable[[Part], Part]: ...
 
     def register(self, part: Any = None, /, **members: Any) -> Any:
-        """Add a part under its name and return it: a decorator. Of the same module and name it takes the place of the one
-        before. members: attributes that a function is given. ValueError if it is no value, has no name, or its name is
-        taken."""
+        """Add a part under its name and return it: a decorator. Of the same module and
+        name it takes the place of the one before. members: attributes that a function
+        is given. ValueError if it is no value, has no name, or its name is taken."""
         if part is None:
             return lambda function: self.register(function, **members)
         for name, value in members.items():
@@ -124,7 +127,8 @@ class Registry(Mapping[str, Any]):
         self._parts.update(accepted)
 
     def examples(self) -> dict[str, Any]:
-        """Return parts of every class by name: those of its ``examples()``, else one without parameters."""
+        """Return parts of every class by name: those of its ``examples()``, else one
+        without parameters."""
         own_parts: dict[str, Any] = {}
         for name, part in self.items():
             own = getattr(part, "examples", None)
@@ -145,7 +149,8 @@ def subclasses(base: type) -> Callable[[Any], bool]:
 
 
 def functions_with(member: str, value: str | None = None) -> Callable[[Any], bool]:
-    """Return whether an object is a function that has an attribute, of one value if that is given, as a function of it."""
+    """Return whether an object is a function that has an attribute, of one value if
+    that is given, as a function of it."""
 
     def admits(part: Any) -> bool:
         return (

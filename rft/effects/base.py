@@ -1,4 +1,5 @@
-"""The base of effects: additions to the plain force law, computed only where a scene lists them."""
+"""The base of effects: additions to the plain force law, computed only where a scene
+lists them."""
 
 from __future__ import annotations
 
@@ -40,9 +41,10 @@ class InMetres(NamedTuple):
 class Site(NamedTuple):
     """Place and phase of one time step of B samples, in body lengths and rad.
 
-    count: number of steps before this one. dt: phase since the previous step, rad, 0 at the first step. pose: (3, B),
-    predicted pose of the frame on the ground. v_before: velocities (v_t, v_n, v_w) of the body's elements at the
-    previous step, (n, B) each."""
+    count: number of steps before this one. dt: phase since the previous step, rad, 0 at
+    the first step. pose: (3, B), predicted pose of the frame on the ground. v_before:
+    velocities (v_t, v_n, v_w) of the body's elements at the previous step, (n, B)
+    each."""
 
     count: int
     dt: float
@@ -50,35 +52,47 @@ class Site(NamedTuple):
     v_before: tuple[np.ndarray, np.ndarray, np.ndarray]
 
     def centres(self, elements: Any) -> np.ndarray:
-        """Return the centres of elements on the ground as complex numbers x + i y, (n, B)."""
+        """Return the centres of elements on the ground as complex numbers x + i y,
+        (n, B)."""
         x, y, theta = self.pose
         return x + 1j * y + np.exp(1j * theta) * elements.centres
 
     def headings(self, elements: Any) -> np.ndarray:
-        """Return the headings of elements on the ground as complex numbers exp(i theta), (n, B)."""
+        """Return the headings of elements on the ground as complex numbers exp(i
+        theta), (n, B)."""
         return np.exp(1j * self.pose[2]) * (elements.c + 1j * elements.s)
 
 
 @dataclass(frozen=True)
 class Effect:
-    """Base of all effects; an effect is one change of a `rft.effects.contact.Problem`, and any two effects commute.
+    """Base of all effects; an effect is one change of a `rft.effects.contact.Problem`,
+    and any two effects commute.
 
     Attributes
     ----------
     kind : name in scenes and messages.
-    breaks : premises that no longer hold with the effect, and with them an engine or a result.
-    adds_points : whether the effect adds points to the body; other effects then act on these points, too.
+    breaks : premises that no longer hold with the effect, and with them an engine or a
+        result.
+    adds_points : whether the effect adds points to the body; other effects then act on
+        these points, too.
     limit : values of the parameters at which the effect vanishes, as text.
     order : order at which it vanishes there.
     cost : work beyond that of the plain force law, as text.
-    batched : names of parameters that may be arrays (B,), one number for each sample of a batch.
-    drift_tolerance : change of displacement from cycle to cycle, body lengths, below which cycles are periodic.
-    memory_bounds : least and largest number of a state that is an array of memory, of which those at the starts of cycles
-        may be mixed to reach the limit cycle sooner; None for a state of another kind.
-    memory_size : numbers that time stepping stores for each sample, beside a few for each element.
-    varies_along : whether the effect varies along an element; it then acts by its mean over each piece of an element.
-    odd : whether the loads that it adds change sign with all velocities (assumed, not proven).
-    metres : fields in body lengths, and for each the field that gives it in metres, of a body with a ``length``.
+    batched : names of parameters that may be arrays (B,), one number for each sample of
+        a batch.
+    drift_tolerance : change of displacement from cycle to cycle, body lengths, below
+        which cycles are periodic.
+    memory_bounds : least and largest number of a state that is an array of memory, of
+        which those at the starts of cycles may be mixed to reach the limit cycle
+        sooner; None for a state of another kind.
+    memory_size : numbers that time stepping stores for each sample, beside a few for
+        each element.
+    varies_along : whether the effect varies along an element; it then acts by its mean
+        over each piece of an element.
+    odd : whether the loads that it adds change sign with all velocities (assumed, not
+        proven).
+    metres : fields in body lengths, and for each the field that gives it in metres, of
+        a body with a ``length``.
     required : fields without a default that follow one with.
 
     Examples
@@ -122,8 +136,8 @@ class Effect:
                 raise Refusal(f"{self.kind} has no {name}", instead=cure)
 
     def in_body_lengths(self, length: float | None) -> Self:
-        """Return the effect with its lengths in body lengths, on a body of a length (m),
-        None for one without.
+        """Return the effect with its lengths in body lengths, on a body of a length
+        (m), None for one without.
 
         Raises ValueError for metres on a body without a length, for body lengths on a
         body that has one, where they are easily taken for metres, and for values out
@@ -191,20 +205,23 @@ class Effect:
 
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, Self]:
-        """Return effects by name, the one of ``order`` by ``kind`` alone, that vanish as x goes to 0."""
+        """Return effects by name, the one of ``order`` by ``kind`` alone, that vanish
+        as x goes to 0."""
         return {cls.kind: cls()}
 
     def apply(self, problem: Problem, site: Site | None, state: Any) -> Problem:
-        """Return the problem with this effect; site and state are None unless the effect breaks a premise of
-        `rft.core.premise.SHAPE_ALONE`."""
+        """Return the problem with this effect; site and state are None unless the
+        effect breaks a premise of `rft.core.premise.SHAPE_ALONE`."""
         raise NotImplementedError
 
     def begin(self, problem: Problem, site: Site) -> Any:
-        """Return the state of the effect before the first step: a record of arrays, samples on the last axis."""
+        """Return the state of the effect before the first step: a record of arrays,
+        samples on the last axis."""
         return ()
 
     def after(self, problem: Problem, site: Site, state: Any, v: tuple) -> Any:
-        """Return the state after a step that ended with velocities v = (v_t, v_n, v_w) of the body's elements."""
+        """Return the state after a step that ended with velocities v = (v_t, v_n, v_w)
+        of the body's elements."""
         return state
 
     def with_velocity_change(
@@ -215,12 +232,14 @@ class Effect:
         change: np.ndarray,
         drag: np.ndarray,
     ) -> Any:
-        """Return the state as if the body had moved faster by ``change`` (3, B) up to and including the step at
-        ``site``, with an additional ``drag`` (3, B) over the axial drag; the state of the ground stays as it is."""
+        """Return the state as if the body had moved faster by ``change`` (3, B) up to
+        and including the step at ``site``, with an additional ``drag`` (3, B) over the
+        axial drag; the state of the ground stays as it is."""
         return state
 
     def assumes(self, medium: Any) -> str:
-        """Return, as text, what is assumed because neither the effect nor the medium gives it; "" for nothing."""
+        """Return, as text, what is assumed because neither the effect nor the medium
+        gives it; "" for nothing."""
         return ""
 
     def take(self, index: Any) -> Self:
@@ -239,7 +258,8 @@ class Effect:
         )
 
     def with_parameters(self, **values: Any) -> Self:
-        """Return the effect with other parameters, which may be arrays (B,); nothing is checked."""
+        """Return the effect with other parameters, which may be arrays (B,); nothing is
+        checked."""
         if not values:
             return self
         new = object.__new__(type(self))
@@ -251,7 +271,8 @@ EFFECTS = Registry("geomech.effects", "kind", "an effect", subclasses(Effect))
 
 
 def stepwise_effects(effects: Sequence[Effect]) -> list[Effect]:
-    """Return the effects that depend on the past or on the place on the ground, and so take time stepping.
+    """Return the effects that depend on the past or on the place on the ground, and so
+    take time stepping.
 
     Examples
     --------
@@ -263,7 +284,8 @@ def stepwise_effects(effects: Sequence[Effect]) -> list[Effect]:
 
 
 def batched_effect(effects: Sequence[Effect], counts: Sequence[int]) -> Effect:
-    """Return one effect for a batch, made from effects of one kind, each of them for ``count`` samples in a row.
+    """Return one effect for a batch, made from effects of one kind, each of them for
+    ``count`` samples in a row.
 
     Raises ValueError if they differ in a parameter that is not `Effect.batched`.
 

@@ -1,4 +1,5 @@
-"""Mass of the body: the balance of forces becomes an equation of motion (`rft.formulas.momentum`)."""
+"""Mass of the body: the balance of forces becomes an equation of motion
+(`rft.formulas.momentum`)."""
 
 from __future__ import annotations
 
@@ -24,10 +25,11 @@ from rft.formulas.newton import to_element
 @EFFECTS.register
 @dataclass(frozen=True)
 class BodyInertia(Effect):
-    """Mass of the body, uniform along its length: d(momentum)/dt = force of the medium, and likewise for the moment.
+    """Mass of the body, uniform along its length: d(momentum)/dt = force of the medium,
+    and likewise for the moment.
 
-    Only mass x length x (2 pi frequency)^2 / drag matters. In a viscous medium the drag is that at one body length per
-    radian of phase.
+    Only mass x length x (2 pi frequency)^2 / drag matters. In a viscous medium the drag
+    is that at one body length per radian of phase.
 
     Examples
     --------
@@ -70,11 +72,13 @@ class BodyInertia(Effect):
 
     @property
     def inertia(self) -> Any:
-        """Ratio of inertia to drag, mass x length x (2 pi frequency)^2 / drag, without a unit."""
+        """Ratio of inertia to drag, mass x length x (2 pi frequency)^2 / drag, without
+        a unit."""
         return self.mass * self.length * (2 * np.pi * self.frequency) ** 2 / self.drag
 
     def begin(self, problem: Problem, site: Site) -> np.ndarray:
-        """Return the momenta (2, 3, n, B) of the elements on the ground at the last two steps, the older one first."""
+        """Return the momenta (2, 3, n, B) of the elements on the ground at the last two
+        steps, the older one first."""
         return np.zeros((2, 3, *problem.sides.elements.c.shape))
 
     def apply(self, problem: Problem, site: Site, state: np.ndarray) -> Problem:
@@ -107,7 +111,8 @@ class BodyInertia(Effect):
         change: np.ndarray,
         drag: np.ndarray,
     ) -> np.ndarray:
-        # Drag reduced the change of momentum during the last step, so that it was larger one step earlier.
+        # Drag reduced the change of momentum during the last step, so that it was
+        # larger one step earlier.
         e = problem.sides.elements
         last = element_momenta(e, to_element(e, *change))
         loss = site.dt / (self.inertia + site.dt) * drag

@@ -1,7 +1,8 @@
-"""The balance of forces as a value: records of arrays that effects change and both drivers solve.
+"""The balance of forces as a value: records of arrays that effects change and both
+drivers solve.
 
-The last axis of every array is that of the samples, or has one column for all of them. `take` selects samples of any
-record, and `mapped` applies a function to its arrays."""
+The last axis of every array is that of the samples, or has one column for all of them.
+`take` selects samples of any record, and `mapped` applies a function to its arrays."""
 
 from __future__ import annotations
 
@@ -30,8 +31,9 @@ NO_MEMORY = Memory(ZERO, ZERO, ZERO, ZERO, ONE, ONE, ONE, ONE, ZERO, ZERO)
 class Contact(NamedTuple):
     """Elements (n, B) in contact with the ground.
 
-    station: (n, 1), their centres along the body, 0 at its tail, 1 at its head. buried: (n, 1), 1 at the body's depth, 0
-    on the surface. factor: of their drag. incline: slope of the ground."""
+    station: (n, 1), their centres along the body, 0 at its tail, 1 at its head. buried:
+    (n, 1), 1 at the body's depth, 0 on the surface. factor: of their drag. incline:
+    slope of the ground."""
 
     elements: Elements
     station: np.ndarray
@@ -40,7 +42,8 @@ class Contact(NamedTuple):
     incline: Incline = NO_INCLINE
 
     def with_factors(self, forward, backward, across) -> Contact:
-        """Return the contact with its drag multiplied by these factors, numbers or arrays that broadcast to (n, B)."""
+        """Return the contact with its drag multiplied by these factors, numbers or
+        arrays that broadcast to (n, B)."""
         f = self.factor
         products = f.forward * forward, f.backward * backward, f.across * across
         return self._replace(factor=Factor(*(np.atleast_2d(x) for x in products)))
@@ -62,12 +65,14 @@ class Contact(NamedTuple):
 class Problem(NamedTuple):
     """The balance of forces on a body, for a batch of samples.
 
-    medium: the law, as given. law: its record (`rft.laws.records`). axial_drag: unit of force, the drag on the whole
-    straight body along itself at unit speed (across if there is none along). lateral_drag: that drag across.
-    homogeneous, linear: whether drag stays, or doubles, when velocities double. sides: the body's elements, under the
-    law. points: points attached to them, under dry terms that face along the body, point_terms (T, 3, n, 1).
-    quadratic_drag: (1, 1) or (1, B), force over |v_n| v_n. memory: of the ground at the elements. momentum_rate: of the
-    body, None without mass. frame: means and scales of the samples."""
+    medium: the law, as given. law: its record (`rft.laws.records`). axial_drag: unit of
+    force, the drag on the whole straight body along itself at unit speed (across if
+    there is none along). lateral_drag: that drag across. homogeneous, linear: whether
+    drag stays, or doubles, when velocities double. sides: the body's elements, under
+    the law. points: points attached to them, under dry terms that face along the body,
+    point_terms (T, 3, n, 1). quadratic_drag: (1, 1) or (1, B), force over |v_n| v_n.
+    memory: of the ground at the elements. momentum_rate: of the body, None without
+    mass. frame: means and scales of the samples."""
 
     medium: Any
     law: Any
@@ -101,7 +106,8 @@ class Problem(NamedTuple):
 
     @property
     def law_speed_scale(self) -> np.ndarray:
-        """Scale (1, B or 1) of the velocities that loads are computed at; 1 where drag does not depend on the speed."""
+        """Scale (1, B or 1) of the velocities that loads are computed at; 1 where drag
+        does not depend on the speed."""
         a = self.additions
         return (
             ONE
@@ -118,7 +124,8 @@ class Problem(NamedTuple):
     def with_points(
         self, points: Contact, terms: Sequence[tuple[float, float, float]]
     ) -> Problem:
-        """Return the problem with more points, each with all of these dry terms (q, k_t, k_n)."""
+        """Return the problem with more points, each with all of these dry terms
+        (q, k_t, k_n)."""
         new = np.repeat(
             np.array(terms, float)[:, :, None, None], len(points.station), 2
         )
@@ -135,15 +142,16 @@ NO_POINT_TERMS = np.zeros((0, 3, 0, 1))
 
 
 def _padded(terms: np.ndarray, count: int) -> np.ndarray:
-    """Return dry terms (T, 3, n, 1) of points as ``count`` terms, the added ones without drag."""
+    """Return dry terms (T, 3, n, 1) of points as ``count`` terms, the added ones
+    without drag."""
     return np.concatenate(
         [terms, np.broadcast_to(NO_TERM, (count - len(terms), *terms.shape[1:]))]
     )
 
 
 def mapped(function: Callable, *records):
-    """Return the record of function(array, ...) over the arrays of one record, or of several records of one class; the
-    first record itself if no array changes."""
+    """Return the record of function(array, ...) over the arrays of one record, or of
+    several records of one class; the first record itself if no array changes."""
     first = records[0]
     if not isinstance(first, tuple):
         return function(*records) if isinstance(first, np.ndarray) else first
@@ -154,18 +162,22 @@ def mapped(function: Callable, *records):
 
 
 def take(record, index) -> Any:
-    """Return a record with the samples ``index`` of its arrays; arrays of one column stay as they are."""
+    """Return a record with the samples ``index`` of its arrays; arrays of one column
+    stay as they are."""
     return mapped(
         lambda x: x if x.shape[-1] == 1 and x.ndim > 1 else x[..., index], record
     )
 
 
 class Assembly(NamedTuple):
-    """A law, a subdivided body and effects: everything that does not depend on shapes and rates, built by `assemble`.
+    """A law, a subdivided body and effects: everything that does not depend on shapes
+    and rates, built by `assemble`.
 
-    station, fraction: (n, 1), centres of the elements along the body and their fractions of its length. buried: (n, 1),
-    of `Contact`. no_points: an empty contact. n_elements: number of elements and added points. n_law_points: number of
-    points at which the law is evaluated, elements times nodes of the rule. Other fields as in `Problem`."""
+    station, fraction: (n, 1), centres of the elements along the body and their
+    fractions of its length. buried: (n, 1), of `Contact`. no_points: an empty contact.
+    n_elements: number of elements and added points. n_law_points: number of points at
+    which the law is evaluated, elements times nodes of the rule. Other fields as in
+    `Problem`."""
 
     medium: Any
     law: Any
@@ -185,7 +197,8 @@ class Assembly(NamedTuple):
     def problem(
         self, alpha: np.ndarray, alphadot: np.ndarray, speed: np.ndarray | None = None
     ) -> Problem:
-        """Return the balance at shapes and rates (joints, B), with a scale of speed (B,), by default the joint speed."""
+        """Return the balance at shapes and rates (joints, B), with a scale of speed
+        (B,), by default the joint speed."""
         problem = self.without_effects(
             alpha,
             alphadot,
@@ -225,11 +238,13 @@ class Assembly(NamedTuple):
 def assemble(
     medium, body: Body, effects: Sequence = (), rule: str = "exact", pieces: int = 40
 ) -> Assembly:
-    """Return the assembly of a medium, a body and effects, with averages by a rule ("exact", "midpoint:N", "gauss:N") and
-    ``pieces`` to a body length where an effect varies along an element.
+    """Return the assembly of a medium, a body and effects, with averages by a rule
+    ("exact", "midpoint:N", "gauss:N") and ``pieces`` to a body length where an effect
+    varies along an element.
 
-    Raises ValueError unless the body is a `Body`, the medium drags, and every effect takes the medium. Assemblies of
-    immutable arguments are cached, for a small batch takes as long to assemble as to solve."""
+    Raises ValueError unless the body is a `Body`, the medium drags, and every effect
+    takes the medium. Assemblies of immutable arguments are cached, for a small batch
+    takes as long to assemble as to solve."""
     return _assembled(medium, body, tuple(effects), rule, pieces)
 
 
@@ -247,7 +262,8 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
     e = body.motion(zero, zero)
     station = np.cumsum(2 * e.half, 0) - e.half
     no_points = Contact(Elements(*(x[:0] for x in e)), station[:0], station[:0])
-    # Effects that add points act first, so that all others act on these points, whatever their order.
+    # Effects that add points act first, so that all others act on these points,
+    # whatever their order.
     ordered = tuple(sorted(effects, key=lambda effect: not effect.adds_points))
     fraction = e.half / e.half.sum()
     along, across = (
@@ -282,8 +298,8 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
 
 
 def force_scale(assembly: Assembly, speed: np.ndarray) -> np.ndarray:
-    """Return the unit of residuals (1, B or 1): drag at the samples' speeds, in dry media not below the drag at unit
-    speed."""
+    """Return the unit of residuals (1, B or 1): drag at the samples' speeds, in dry
+    media not below the drag at unit speed."""
     medium = assembly.medium
     unit = assembly.axial_drag
     if assembly.homogeneous:

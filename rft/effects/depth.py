@@ -17,11 +17,14 @@ from rft.effects.contact import Contact, Problem
 @EFFECTS.register
 @dataclass(frozen=True)
 class DepthProfile(Effect):
-    """Drag in proportion to depth, 2 k rho g r |z| of Eq. 2; depths are over the reference depth of the medium's drag.
+    """Drag in proportion to depth, 2 k rho g r |z| of Eq. 2; depths are over the
+    reference depth of the medium's drag.
 
-    along (-): |z| over that depth at equally spaced places from tail to head, linear between them; [1, 1] is level.
+    along (-): |z| over that depth at equally spaced places from tail to head, linear
+    between them; [1, 1] is level.
 
-    Each piece of the body has the depth of its centre. With a slope, drag depends on place and heading.
+    Each piece of the body has the depth of its centre. With a slope, drag depends on
+    place and heading.
 
     Examples
     --------
@@ -95,8 +98,9 @@ class DepthProfile(Effect):
         )
 
     def depths(self, contact: Contact, site: Site | None) -> np.ndarray:
-        """Return the depths of a contact's elements over the reference depth, (n, 1), or (n, B) with a slope; ValueError
-        where a buried element comes to the surface."""
+        """Return the depths of a contact's elements over the reference depth, (n, 1),
+        or (n, B) with a slope; ValueError where a buried element comes to the
+        surface."""
         level = np.interp(
             contact.station, np.linspace(0, 1, len(self.along)), self.along
         )

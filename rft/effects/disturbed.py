@@ -1,4 +1,5 @@
-"""Memory of disturbed ground: drag across the body is lower where the body has been before (paper Sec. IV B)."""
+"""Memory of disturbed ground: drag across the body is lower where the body has been
+before (paper Sec. IV B)."""
 
 from __future__ import annotations
 
@@ -23,13 +24,15 @@ LOOK_AHEAD = 2.0
 @EFFECTS.register
 @dataclass(frozen=True)
 class DisturbedGround(Effect):
-    """Drag across times 1 - weakening x disturbance of the ground on the side that an element moves to.
+    """Drag across times 1 - weakening x disturbance of the ground on the side that an
+    element moves to.
 
-    The track of the body is fully disturbed up to half a radius from its axis, undisturbed beyond one and a half radii;
-    disturbance, 0 to 1, never decreases (grains do not settle by themselves). The disturbance on either side of an
-    element is read two radii from its axis, outside its present track. Drag near disturbed ground falls substantially
-    in experiments (paper Sec. IV B); the form, and every number, are assumed. Ground more than two body lengths away
-    may be forgotten.
+    The track of the body is fully disturbed up to half a radius from its axis,
+    undisturbed beyond one and a half radii; disturbance, 0 to 1, never decreases
+    (grains do not settle by themselves). The disturbance on either side of an element
+    is read two radii from its axis, outside its present track. Drag near disturbed
+    ground falls substantially in experiments (paper Sec. IV B); the form, and every
+    number, are assumed. Ground more than two body lengths away may be forgotten.
 
     Examples
     --------
@@ -118,7 +121,8 @@ class DisturbedGround(Effect):
         return self.with_track(state, self.points(problem, site))
 
     def points(self, problem: Problem, site: Site) -> np.ndarray:
-        """Return k points along every element on the ground, complex (k, n, B), at most half a radius apart."""
+        """Return k points along every element on the ground, complex (k, n, B), at most
+        half a radius apart."""
         e = problem.sides.elements
         k = int(np.ceil(4 * e.half.max() / self.radius))
         return site.centres(e) + (
@@ -128,8 +132,8 @@ class DisturbedGround(Effect):
     def location(
         self, i: np.ndarray, j: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the tile and the row in the tile that store the cells (i, j) of the plane, and their patch of the
-        plane."""
+        """Return the tile and the row in the tile that store the cells (i, j) of the
+        plane, and their patch of the plane."""
         (tile_i, i), (tile_j, j) = np.divmod(i, TILE), np.divmod(j, TILE)
         (patch_i, tile_i), (patch_j, tile_j) = (
             np.divmod(tile_i, self.tiles_along),
@@ -142,7 +146,8 @@ class DisturbedGround(Effect):
         )
 
     def disturbance(self, tiles: Tiles, place: np.ndarray) -> np.ndarray:
-        """Return the disturbance, 0 to 1, at complex places (..., B), bilinear between cell centres."""
+        """Return the disturbance, 0 to 1, at complex places (..., B), bilinear between
+        cell centres."""
         x = place.real / self.cell - 0.5
         y = place.imag / self.cell - 0.5
         i = np.floor(x)
@@ -162,8 +167,8 @@ class DisturbedGround(Effect):
         ).sum((0, 1))
 
     def with_track(self, tiles: Tiles, place: np.ndarray) -> Tiles:
-        """Return the map with a track at complex places (..., B): disturbance 1 up to radius / 2, 0 beyond 3 radius /
-        2."""
+        """Return the map with a track at complex places (..., B): disturbance 1 up to
+        radius / 2, 0 beyond 3 radius / 2."""
         reach = int(np.ceil(1.5 * self.radius / self.cell))
         around = np.arange(-reach, reach + 1).reshape(-1, *[1] * place.ndim)
         i, j = (
@@ -194,17 +199,19 @@ class DisturbedGround(Effect):
 
 
 class Tiles(NamedTuple):
-    """A periodic square map of the ground, tile by tile; maps share the tiles in which they do not differ.
+    """A periodic square map of the ground, tile by tile; maps share the tiles in which
+    they do not differ.
 
-    value: disturbance, 0 to 1, (cells, B) for each tile. owner: (tiles, B), the patch of the plane that a tile stores,
-    -1 for none; all other patches are undisturbed there."""
+    value: disturbance, 0 to 1, (cells, B) for each tile. owner: (tiles, B), the patch
+    of the plane that a tile stores, -1 for none; all other patches are undisturbed
+    there."""
 
     value: tuple[np.ndarray, ...]
     owner: np.ndarray
 
     def copied(self, tile: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the K different tiles among ``tile``, copies of their values (K, cells, B), and for each entry of
-        ``tile`` its index into these."""
+        """Return the K different tiles among ``tile``, copies of their values
+        (K, cells, B), and for each entry of ``tile`` its index into these."""
         touched = np.flatnonzero(np.bincount(tile.ravel(), minlength=len(self.value)))
         index = np.zeros(len(self.value), int)
         index[touched] = np.arange(len(touched))

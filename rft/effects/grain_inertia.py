@@ -1,4 +1,5 @@
-"""Inertia of the grains that a fast body accelerates: drag that grows with the square of the speed across the body."""
+"""Inertia of the grains that a fast body accelerates: drag that grows with the square
+of the speed across the body."""
 
 from __future__ import annotations
 
@@ -15,19 +16,23 @@ from rft.effects.base import EFFECTS, Effect
 from rft.effects.contact import Problem
 from rft.laws.base import is_linear
 
-ASSUMED_K = 2.5  # k of Eq. 2 for loosely packed 0.3 mm glass (Zhang and Goldman 2014); assumed where k is unknown
+# k of Eq. 2 for loosely packed 0.3 mm glass (Zhang and Goldman 2014); assumed where k
+# is unknown
+ASSUMED_K = 2.5
 
 
 @EFFECTS.register
 @dataclass(frozen=True)
 class GrainInertia(Effect):
-    """A normal stress strength x rho v_n^2 on the body's width 2 r, added to Eqs. 2-3 (paper Sec. IV C).
+    """A normal stress strength x rho v_n^2 on the body's width 2 r, added to Eqs. 2-3
+    (paper Sec. IV C).
 
-    The form is the momentum flux of grains that the body sweeps up, as in impact laws. In units of the axial drag 2 k
-    rho g r |z| the force is strength v_n^2 / (k g |z|), without radius or density. Dry media only.
+    The form is the momentum flux of grains that the body sweeps up, as in impact laws.
+    In units of the axial drag 2 k rho g r |z| the force is strength v_n^2 / (k g |z|),
+    without radius or density. Dry media only.
 
-    Where neither the medium nor ``k`` gives k of Eq. 2 (2.5 for loose glass, 5.1 for close), that of loose glass is
-    assumed.
+    Where neither the medium nor ``k`` gives k of Eq. 2 (2.5 for loose glass, 5.1 for
+    close), that of loose glass is assumed.
 
     Examples
     --------
@@ -83,7 +88,8 @@ class GrainInertia(Effect):
             * speed_per_rad**2
             / ((ASSUMED_K if k is None else k) * GRAVITY * self.depth)
         )
-        # The flux of momentum does not depend on the pressure of the ground, so the factors of the drag leave it alone.
+        # The flux of momentum does not depend on the pressure of the ground, so the
+        # factors of the drag leave it alone.
         return problem._replace(
             quadratic_drag=problem.quadratic_drag + np.atleast_2d(strength)
         )

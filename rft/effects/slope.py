@@ -1,4 +1,5 @@
-"""Sloping ground: drag is weaker on downhill motion, and the body's weight pulls downhill (paper Sec. IV B)."""
+"""Sloping ground: drag is weaker on downhill motion, and the body's weight pulls
+downhill (paper Sec. IV B)."""
 
 from __future__ import annotations
 
@@ -21,13 +22,16 @@ from rft.laws.catalogue import REPOSE
 @EFFECTS.register
 @dataclass(frozen=True)
 class Slope(Effect):
-    """A plane surface that rises by an angle, and a body that moves along it at a fixed depth.
+    """A plane surface that rises by an angle, and a body that moves along it at a fixed
+    depth.
 
-    The drag is multiplied by cos(angle) - d sin(angle) / tan(repose), where d is the downhill part of the unit velocity
-    of an element's centre, 0 across and uphill. With the default of repose, 37.9 degrees, motion straight downhill at 20
-    degrees has half the drag of level ground, as measured (paper Sec. IV B). Only one direction at one angle has been
-    measured; assumed are a drag that falls in proportion to d, no gain uphill, and the same factor along and across an
-    element. Weight adds the force weight sin(angle) downhill.
+    The drag is multiplied by cos(angle) - d sin(angle) / tan(repose), where d is the
+    downhill part of the unit velocity of an element's centre, 0 across and uphill. With
+    the default of repose, 37.9 degrees, motion straight downhill at 20 degrees has half
+    the drag of level ground, as measured (paper Sec. IV B). Only one direction at one
+    angle has been measured; assumed are a drag that falls in proportion to d, no gain
+    uphill, and the same factor along and across an element. Weight adds the force
+    weight sin(angle) downhill.
 
     Examples
     --------

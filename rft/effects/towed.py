@@ -18,10 +18,12 @@ from rft.laws.coulomb import Coulomb
 @EFFECTS.register
 @dataclass(frozen=True)
 class TowedSled(Effect):
-    """Isotropic Coulomb friction at the end of a stiff bar that continues the tail link.
+    """Isotropic Coulomb friction at the end of a stiff bar that continues the tail
+    link.
 
-    The sled lies on the surface, so that its friction does not depend on the body's depth. Dry media only: beside drag
-    that grows with speed, friction would depend on the unit of time.
+    The sled lies on the surface, so that its friction does not depend on the body's
+    depth. Dry media only: beside drag that grows with speed, friction would depend on
+    the unit of time.
 
     Examples
     --------

@@ -1,8 +1,10 @@
-"""Fits of force laws to the drag on a rod, by least squares (paper Sec. II, Eqs. 2-3, Fig. 5(c)).
+"""Fits of force laws to the drag on a rod, by least squares (paper Sec. II, Eqs. 2-3,
+Fig. 5(c)).
 
-A rod is dragged at the attack angle psi between its velocity and its axis. A law in units of its own axial drag, times the
-rod's axial drag F, gives the forces along and across the rod, F f_t(cos psi, sin psi) and F f_n(cos psi, sin psi). `FITS`
-has the laws with their parameters, bounds and start values; F is fitted beside them.
+A rod is dragged at the attack angle psi between its velocity and its axis. A law in
+units of its own axial drag, times the rod's axial drag F, gives the forces along and
+across the rod, F f_t(cos psi, sin psi) and F f_n(cos psi, sin psi). `FITS` has the laws
+with their parameters, bounds and start values; F is fitted beside them.
 """
 
 from __future__ import annotations
@@ -30,13 +32,16 @@ MOST_CAPS = 10.0  # e of a hemisphere is 4
 AT_BOUND = 1e-6  # of a bound: a parameter that near lies on it
 # relative change of parameters and of the sum of squares that ends a fit
 CONVERGED = 1e-14
-DEPENDENT = 1e-7  # smallest singular value of the slopes, over the largest, below which parameters are not determined
+# smallest singular value of the slopes, over the largest, below which parameters are
+# not determined
+DEPENDENT = 1e-7
 LEVEL = 0.95  # confidence of intervals and bands
 ONE_SIGMA = 0.6827  # confidence of one standard deviation
 
 
 def student_factor(degrees_of_freedom: float, level: float = LEVEL) -> float:
-    """Return half the width of a confidence interval over the standard error, by Student's distribution.
+    """Return half the width of a confidence interval over the standard error, by
+    Student's distribution.
 
     Examples
     --------
@@ -53,9 +58,10 @@ def student_factor(degrees_of_freedom: float, level: float = LEVEL) -> float:
 class FittedLaw:
     """A law with its parameters.
 
-    names: of the parameters. build: class of the law, called with them. granular: whether drag is proportional to the
-    weight of the grains above, with k of Eq. 2. bounds: (low, high) of each parameter. starts: start values of each; the
-    best of all combinations are refined."""
+    names: of the parameters. build: class of the law, called with them. granular:
+    whether drag is proportional to the weight of the grains above, with k of Eq. 2.
+    bounds: (low, high) of each parameter. starts: start values of each; the best of all
+    combinations are refined."""
 
     names: tuple[str, ...]
     build: Callable[..., Medium]
@@ -87,13 +93,16 @@ FITS = {
 class Fit:
     """A law fitted to drag.
 
-    names, values: of the fitted parameters: those of the law (gamma0 in rad), its axial drag, and `CAPS` where the end
-    caps are fitted. The axial drag is, for a granular law, ``k`` of Eq. 2 where radius, length and depth of the rod and
-    the density of the bed are known; else ``axial_stress`` (Pa, over the projected area) where radius and length are;
-    else ``axial_force`` (N, on the whole rod). covariance: (n, n), of the parameters, from the scatter of the forces
-    about the law, taken for independent noise. residuals: (2, N), measured minus fitted forces, N. end_caps: e of both
-    ends together (`EndCaps`), 0 without. Where the data tell the ends from the flank, law and residuals are the flank's, and
-    e follows from the ends with `EndCaps.across`, the last of the parameters.
+    names, values: of the fitted parameters: those of the law (gamma0 in rad), its axial
+    drag, and `CAPS` where the end caps are fitted. The axial drag is, for a granular
+    law, ``k`` of Eq. 2 where radius, length and depth of the rod and the density of the
+    bed are known; else ``axial_stress`` (Pa, over the projected area) where radius and
+    length are; else ``axial_force`` (N, on the whole rod). covariance: (n, n), of the
+    parameters, from the scatter of the forces about the law, taken for independent
+    noise. residuals: (2, N), measured minus fitted forces, N. end_caps: e of both ends
+    together (`EndCaps`), 0 without. Where the data tell the ends from the flank, law
+    and residuals are the flank's, and e follows from the ends with `EndCaps.across`,
+    the last of the parameters.
 
     Examples
     --------
@@ -153,18 +162,20 @@ class Fit:
 
     @property
     def axial_stress(self) -> float | None:
-        """`axial_force` over the projected area 2 r L, Pa; None where the area is not known."""
+        """`axial_force` over the projected area 2 r L, Pa; None where the area is not
+        known."""
         return self.axial_force / self.rod.area if self.rod.area else None
 
     @property
     def k(self) -> float | None:
-        """Factor k of Eq. 2; None where the rod's sizes or the density are not known, and for a fluid."""
+        """Factor k of Eq. 2; None where the rod's sizes or the density are not known,
+        and for a fluid."""
         return float(self.values[self.names.index("k")]) if "k" in self.names else None
 
     @property
     def medium(self) -> Medium:
-        """The law with the covariance of its parameters, widened by Student's distribution so that one standard deviation
-        holds 68 %."""
+        """The law with the covariance of its parameters, widened by Student's
+        distribution so that one standard deviation holds 68 %."""
         build = FITS[self.law].build
         names = [
             name for name in self.names if name in build.__dataclass_fields__
@@ -181,13 +192,14 @@ class Fit:
         )
 
     def caps(self, radius: float) -> EndCaps:
-        """Return the end caps, half of e at each end, of a body of that radius in body lengths."""
+        """Return the end caps, half of e at each end, of a body of that radius in body
+        lengths."""
         across = dict(zip(self.names, self.values.tolist())).get(ACROSS)
         return EndCaps(radius, self.end_caps / 2, self.end_caps / 2, across)
 
     def forces(self, psi, values=None) -> np.ndarray:
-        """Return the forces (2, ...) along and across the rod at attack angles psi (rad), N; values: parameters in place of
-        the fitted ones."""
+        """Return the forces (2, ...) along and across the rod at attack angles psi
+        (rad), N; values: parameters in place of the fitted ones."""
         values = self.values if values is None else values
         values = _in_newton(self.law, self.rod, values)
         if self.data.ends is not None:
@@ -197,8 +209,8 @@ class Fit:
         return _forces(self.law, self.rod, self.end_caps, psi, values)
 
     def band(self, psi) -> np.ndarray:
-        """Return half the width (2, ...) of the 95 % confidence band of the law at angles psi (rad), N, by linear
-        propagation of the covariance."""
+        """Return half the width (2, ...) of the 95 % confidence band of the law at
+        angles psi (rad), N, by linear propagation of the covariance."""
         slopes = []
         for value, error, step in zip(
             self.values, self.errors, np.eye(len(self.values))
@@ -222,12 +234,13 @@ class Fit:
 def fit(
     law: str, data: RodDrag, rod: Rod = UNKNOWN_ROD, end_caps: float | str = 0.0
 ) -> Fit:
-    """Return the law of that name in `FITS` fitted to drag, by weighted least squares of both components.
+    """Return the law of that name in `FITS` fitted to drag, by weighted least squares
+    of both components.
 
-    end_caps: e of both ends together (`EndCaps`; 1 for one flat end), 0 for none, or "fitted"; other than 0 only for the
-    granular law and a rod of known radius and length. Data that tell the ends
-    from the flank take "fitted" or 0. Raises ValueError if the data do not determine the parameters, or
-    if a parameter ends on a bound.
+    end_caps: e of both ends together (`EndCaps`; 1 for one flat end), 0 for none, or
+    "fitted"; other than 0 only for the granular law and a rod of known radius and
+    length. Data that tell the ends from the flank take "fitted" or 0. Raises ValueError
+    if the data do not determine the parameters, or if a parameter ends on a bound.
 
     Examples
     --------
@@ -308,8 +321,9 @@ def fit(
 
 
 def _with_ends(flank: Fit) -> Fit:
-    """Return a fit to the flank with e and ``across`` of the ends, by least squares of the forces on them. Their variance
-    has the scatter of these forces, and their covariance with the law what the law leaves uncertain."""
+    """Return a fit to the flank with e and ``across`` of the ends, by least squares of
+    the forces on them. Their variance has the scatter of these forces, and their
+    covariance with the law what the law leaves uncertain."""
     from scipy.optimize import least_squares
 
     data = flank.data
@@ -319,7 +333,8 @@ def _with_ends(flank: Fit) -> Fit:
     names = (CAPS, ACROSS)
 
     def caps(values: np.ndarray):
-        """Return the least-squares solution of e and ``across`` with parameters of the law."""
+        """Return the least-squares solution of e and ``across`` with parameters of the
+        law."""
         values = _in_newton(flank.law, flank.rod, values)
         medium = FITS[flank.law].build(*map(float, values[:n_law]))
 
@@ -382,7 +397,8 @@ def _with_ends(flank: Fit) -> Fit:
 
 
 def _unit(law: str, rod: Rod) -> tuple[str, float]:
-    """Return the name of the parameter for axial drag, and the force on the whole rod, N, where it is 1."""
+    """Return the name of the parameter for axial drag, and the force on the whole rod,
+    N, where it is 1."""
     if FITS[law].granular and rod.area and rod.pressure:
         return "k", rod.area * rod.pressure
     return ("axial_stress", rod.area) if rod.area else ("axial_force", 1.0)
@@ -396,8 +412,8 @@ def _in_newton(law: str, rod: Rod, values) -> np.ndarray:
 
 
 def _forces(law: str, rod: Rod, end_caps: float, psi, values) -> np.ndarray:
-    """Return the forces (2, ...), N; values: parameters of the law, the axial force (N), and optionally e of the ends in
-    place of ``end_caps``."""
+    """Return the forces (2, ...), N; values: parameters of the law, the axial force
+    (N), and optionally e of the ends in place of ``end_caps``."""
     fitted_law = FITS[law]
     n = len(fitted_law.names)
     medium = fitted_law.build(*map(float, values[:n]))
@@ -414,7 +430,8 @@ def _forces(law: str, rod: Rod, end_caps: float, psi, values) -> np.ndarray:
 def _weighted(
     data: RodDrag, forces: np.ndarray, measured: np.ndarray | None = None
 ) -> np.ndarray:
-    """Return forces minus those measured, by default on the rod, in units of their errors."""
+    """Return forces minus those measured, by default on the rod, in units of their
+    errors."""
     measured = data.forces if measured is None else measured
     return (np.sqrt(data.weight) * (forces - measured))[:, data.weight > 0].ravel()
 
@@ -422,7 +439,8 @@ def _weighted(
 def _starts(
     fitted_law: FittedLaw, data: RodDrag, residual: Callable, fits_caps: bool
 ) -> list[np.ndarray]:
-    """Return the best four of all combinations of start values, each with the axial force that fits it best."""
+    """Return the best four of all combinations of start values, each with the axial
+    force that fits it best."""
     candidates = []
     for values in itertools.product(
         *fitted_law.starts, *([(0.5, 1.0, 3.0)] if fits_caps else [])
@@ -481,8 +499,8 @@ def _degrees(name: str, value: float) -> float:
 
 
 def _covariance(names, best, count: int) -> np.ndarray:
-    """Return the covariance of the parameters, from the slopes of the residuals and their scatter; ValueError if the data
-    do not determine the parameters."""
+    """Return the covariance of the parameters, from the slopes of the residuals and
+    their scatter; ValueError if the data do not determine the parameters."""
     size = np.where(best.x > 0, best.x, 1.0)
     _, s, right = np.linalg.svd(best.jac * size, full_matrices=False)
     if s[-1] < DEPENDENT * s[0]:

@@ -1,4 +1,5 @@
-"""The base of force laws: drag per unit length on a body that slides along and across itself."""
+"""The base of force laws: drag per unit length on a body that slides along and across
+itself."""
 
 from __future__ import annotations
 
@@ -17,24 +18,27 @@ LAWS = Registry("geomech.media", "law", "a law", classes_with("traction"))
 
 
 class Medium(Protocol):
-    """A force law of the horizontal plane. Forces are in units of the medium's own axial drag.
+    """A force law of the horizontal plane. Forces are in units of the medium's own
+    axial drag.
 
     ``dry`` holds rate-independent terms (q, k_t, k_n), each of which adds
 
         f_t = k_t v_t / R,   f_n = k_n v_n / R,   R = sqrt(q^2 v_t^2 + v_n^2 + rounding^2),
 
-    and ``viscous`` the coefficients (c_t, c_n) of f_t = c_t v_t, f_n = c_n v_n. Together they give
-    the exact averages of `rft.formulas.link`. A law of another form has neither (or None) and is averaged by quadrature.
+    and ``viscous`` the coefficients (c_t, c_n) of f_t = c_t v_t, f_n = c_n v_n.
+    Together they give the exact averages of `rft.formulas.link`. A law of another form
+    has neither (or None) and is averaged by quadrature.
 
     Only `traction` is required. Optional members:
 
-    slopes(v_t, v_n, rounding): (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n); by default central differences.
-    mirror: True if f_n is odd and f_t even in v_n, so that left and right are alike.
+    slopes(v_t, v_n, rounding): (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n); by default
+    central differences. mirror: True if f_n is odd and f_t even in v_n, so that left
+    and right are alike.
     k: the factor k of Eq. 2.
     covariance: (n, n), of the parameters named in ``uncertain``; it changes no force.
 
-    A law runs in compiled code if its traction, and its slopes if it has them, are formulas (`rft.formulas.vectors.formula`) of
-    its number fields.
+    A law runs in compiled code if its traction, and its slopes if it has them, are
+    formulas (`rft.formulas.vectors.formula`) of its number fields.
 
     Examples
     --------
@@ -54,7 +58,8 @@ class Medium(Protocol):
     def traction(
         self, v_t: Any, v_n: Any, rounding: Any = 0.0
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the drag per unit length (f_t, f_n) opposing the velocity (v_t, v_n); arrays broadcast together."""
+        """Return the drag per unit length (f_t, f_n) opposing the velocity (v_t, v_n);
+        arrays broadcast together."""
         ...
 
 
@@ -76,8 +81,8 @@ def terms_traction(law, v_t, v_n, rounding):
 
 @formula
 def terms_slopes(law, v_t, v_n, rounding):
-    """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n) of viscous and dry terms; infinite slopes at rest are
-    returned as 0."""
+    """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n) of viscous and dry terms;
+    infinite slopes at rest are returned as 0."""
     zero = 0.0 * v_t
     tt = zero + law.viscous[0, 0]
     tn = zero
@@ -100,7 +105,8 @@ def terms_slopes(law, v_t, v_n, rounding):
 
 
 class TermLaw:
-    """Base of laws that are a sum of dry and viscous terms: `traction` follows from the terms.
+    """Base of laws that are a sum of dry and viscous terms: `traction` follows from the
+    terms.
 
     Examples
     --------
@@ -117,26 +123,30 @@ class TermLaw:
     def traction(
         self, v_t: Any, v_n: Any, rounding: Any = 0.0
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the drag per unit length (f_t, f_n) opposing (v_t, v_n), in units of the axial drag; zero at rest."""
+        """Return the drag per unit length (f_t, f_n) opposing (v_t, v_n), in units of
+        the axial drag; zero at rest."""
         v_t = unmasked("v_t", v_t)
         v_n = unmasked("v_n", v_n)
         return terms_traction(term_numbers(self), v_t, v_n, rounding)
 
     def slopes(self, v_t: Any, v_n: Any, rounding: Any = 0.0) -> tuple[np.ndarray, ...]:
-        """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n); infinite slopes at rest are returned as 0."""
+        """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n); infinite slopes at rest
+        are returned as 0."""
         v_t, v_n = np.broadcast_arrays(unmasked("v_t", v_t), unmasked("v_n", v_n))
         return terms_slopes(term_numbers(self), v_t, v_n, rounding)
 
 
 class TermNumbers(NamedTuple):
-    """Numbers of viscous and dry terms. viscous: (1, 2), coefficients (c_t, c_n). dry: (T, 3), terms (q, k_t, k_n)."""
+    """Numbers of viscous and dry terms. viscous: (1, 2), coefficients (c_t, c_n). dry:
+    (T, 3), terms (q, k_t, k_n)."""
 
     viscous: np.ndarray
     dry: np.ndarray
 
 
 def term_numbers(medium) -> TermNumbers:
-    """Return the terms of a medium in closed form as arrays, those that act along the element first."""
+    """Return the terms of a medium in closed form as arrays, those that act along the
+    element first."""
     terms = sorted(medium.dry, key=lambda term: term[1] == 0.0)
     return TermNumbers(
         np.array([medium.viscous], float), np.array(terms, float).reshape(-1, 3)
@@ -144,12 +154,14 @@ def term_numbers(medium) -> TermNumbers:
 
 
 def dry_terms(medium) -> tuple[tuple[float, float, float], ...] | None:
-    """Return the rate-independent terms (q, k_t, k_n) of a medium's closed form; None without a closed form."""
+    """Return the rate-independent terms (q, k_t, k_n) of a medium's closed form; None
+    without a closed form."""
     return getattr(medium, "dry", None)
 
 
 def viscous_terms(medium) -> tuple[float, float] | None:
-    """Return the viscous coefficients (c_t, c_n) of a medium's closed form; None without a closed form."""
+    """Return the viscous coefficients (c_t, c_n) of a medium's closed form; None
+    without a closed form."""
     return getattr(medium, "viscous", None)
 
 
@@ -166,7 +178,8 @@ def is_closed(medium: Any) -> bool:
 
 
 def is_mirror(medium: Any) -> bool:
-    """Return whether a medium claims that left and right are alike; a field then takes half the balances.
+    """Return whether a medium claims that left and right are alike; a field then takes
+    half the balances.
 
     Examples
     --------
@@ -178,7 +191,8 @@ def is_mirror(medium: Any) -> bool:
 
 
 def is_frozen(value) -> bool:
-    """Return whether a value is a frozen dataclass of hashable fields (an array is not hashable)."""
+    """Return whether a value is a frozen dataclass of hashable fields (an array is not
+    hashable)."""
     parameters = getattr(type(value), "__dataclass_params__", None)
     if parameters is None or not parameters.frozen:
         return False
@@ -190,9 +204,11 @@ def is_frozen(value) -> bool:
 
 
 def cached_if_immutable(function: Callable) -> Callable:
-    """Return the function with a cache of its last 32 calls; calls with an argument that may change are not cached.
+    """Return the function with a cache of its last 32 calls; calls with an argument
+    that may change are not cached.
 
-    Immutable are frozen dataclasses (`is_frozen`), text, integers, and tuples of these."""
+    Immutable are frozen dataclasses (`is_frozen`), text, integers, and tuples of
+    these."""
     cached = functools.lru_cache(maxsize=32)(function)
 
     @functools.wraps(function)
@@ -208,7 +224,8 @@ def _is_immutable(x) -> bool:
     )
 
 
-# Velocities at which properties of a law are checked: 48 directions at 13 speeds, (13, 48).
+# Velocities at which properties of a law are checked: 48 directions at 13 speeds,
+# (13, 48).
 SPEEDS = np.logspace(-12, 12, 13)[:, None]
 DIRECTIONS = np.linspace(0.0, 2 * np.pi, 48, endpoint=False)
 VELOCITIES = SPEEDS * np.cos(DIRECTIONS), SPEEDS * np.sin(DIRECTIONS)
@@ -216,7 +233,8 @@ VELOCITIES = SPEEDS * np.cos(DIRECTIONS), SPEEDS * np.sin(DIRECTIONS)
 
 @cached_if_immutable
 def is_odd(medium: Medium) -> bool:
-    """Return whether f(-v) = -f(v) at VELOCITIES, so that the ends of an element are alike."""
+    """Return whether f(-v) = -f(v) at VELOCITIES, so that the ends of an element are
+    alike."""
     v_t, v_n = VELOCITIES
     with np.errstate(all="ignore"):
         forward, backward = (
@@ -227,7 +245,8 @@ def is_odd(medium: Medium) -> bool:
 
 
 def require_law(medium: Medium) -> None:
-    """Raise ValueError unless a medium has a `traction` that takes and returns arrays."""
+    """Raise ValueError unless a medium has a `traction` that takes and returns
+    arrays."""
     is_law = hasattr(medium, "traction") and not isinstance(medium, type)
     require(
         is_law,
@@ -266,8 +285,8 @@ def _has_only_drags(medium: TermLaw) -> bool:
 
 
 def require_drag(medium: Medium) -> None:
-    """Raise ValueError if the medium pushes at one of VELOCITIES, that is if its force there has a part along the motion,
-    or if it has no drag at all."""
+    """Raise ValueError if the medium pushes at one of VELOCITIES, that is if its force
+    there has a part along the motion, or if it has no drag at all."""
     require_law(medium)
     if getattr(type(medium), "traction", None) is TermLaw.traction and _has_only_drags(
         medium
@@ -296,7 +315,8 @@ def require_drag(medium: Medium) -> None:
 
 
 def is_linear(medium: Medium) -> bool:
-    """Return whether drag is proportional to velocity, and so the body velocity linear in alphadot.
+    """Return whether drag is proportional to velocity, and so the body velocity linear
+    in alphadot.
 
     Examples
     --------
@@ -308,8 +328,8 @@ def is_linear(medium: Medium) -> bool:
 
 
 def is_rate_independent(medium: Medium) -> bool:
-    """Return whether drag grows with one power of the speed in all directions, so that the speed of a gait does not
-    matter.
+    """Return whether drag grows with one power of the speed in all directions, so that
+    the speed of a gait does not matter.
 
     Examples
     --------
@@ -321,8 +341,8 @@ def is_rate_independent(medium: Medium) -> bool:
 
 
 def speed_exponent(medium: Medium) -> float | None:
-    """Return the power of the speed with which drag grows in all directions, 0 for dry media, 1 for viscous ones; None
-    if it differs between speeds or directions.
+    """Return the power of the speed with which drag grows in all directions, 0 for dry
+    media, 1 for viscous ones; None if it differs between speeds or directions.
 
     Examples
     --------

@@ -15,14 +15,16 @@ from rft.laws.viscous import Viscous
 
 @dataclass(frozen=True)
 class Entry:
-    """A named medium. axial_stress: axial drag over projected area in Pa at 7.62 cm depth, or None if unknown."""
+    """A named medium. axial_stress: axial drag over projected area in Pa at 7.62 cm
+    depth, or None if unknown."""
 
     medium: Medium
     source: str
     axial_stress: float | None = None
 
 
-# From the paper's one datum: on a surface tilted by 20 degrees motion downhill has 50 % less drag (Sec. IV B).
+# From the paper's one datum: on a surface tilted by 20 degrees motion downhill has 50 %
+# less drag (Sec. IV B).
 REPOSE = math.atan(
     math.sin(math.radians(20.0)) / (math.cos(math.radians(20.0)) - 0.5)
 )  # rad, 37.9 degrees
@@ -35,15 +37,16 @@ PACKED = {
 
 
 def pressure_factor(axial_stress: float, packed: str) -> float:
-    """Return k of Eq. 2 from an axial stress in Pa at DEPTH, k = stress / (rho g |z|), with rho the density of glass
-    times the volume fraction."""
+    """Return k of Eq. 2 from an axial stress in Pa at DEPTH, k = stress / (rho g |z|),
+    with rho the density of glass times the volume fraction."""
     return axial_stress / (GLASS * PACKED[packed] * GRAVITY * DEPTH)
 
 
 # N, A of the drag across a plate 8 mm deep, Schiebel et al. (2020)
 SURFACE_ACROSS = 0.15
-# N, drag along that plate, of the assumed form cos psi: about 0.017 in their figure; their fit is not known here. Their
-# snakes move at 0.81 of the speed along their own track (0.74 to 0.89), to which 0.010 (0.78) is nearer than 0.017 (0.74).
+# N, drag along that plate, of the assumed form cos psi: about 0.017 in their figure;
+# their fit is not known here. Their snakes move at 0.81 of the speed along their own
+# track (0.74 to 0.89), to which 0.010 (0.78) is nearer than 0.017 (0.74).
 SURFACE_ALONG = 0.017  # assumed
 SURFACE_ALONG_RANGE = (0.010, 0.017)  # assumed
 

@@ -10,7 +10,8 @@ from rft.laws.base import LAWS, TermLaw
 @LAWS.register
 @dataclass(frozen=True)
 class Coulomb(TermLaw):
-    """Isotropic friction: f_t = v.t, f_n = v.n with v the unit velocity, in units of the yield force.
+    """Isotropic friction: f_t = v.t, f_n = v.n with v the unit velocity, in units of
+    the yield force.
 
     The law is that of `Granular` with C = 0.
 

@@ -1,4 +1,5 @@
-"""Measured drag on a rod: attack angles, forces along and across the rod, its sizes and the density of the bed."""
+"""Measured drag on a rod: attack angles, forces along and across the rod, its sizes and
+the density of the bed."""
 
 from __future__ import annotations
 
@@ -10,7 +11,9 @@ from rft.core.checks import in_range, real_array
 from rft.core.metres import GRAVITY
 from rft.core.refusal import require
 
-PUSHING = 0.1  # of the largest force: a force below minus that pushes; a smaller one counts as an error of measurement
+# of the largest force: a force below minus that pushes; a smaller one counts as an
+# error of measurement
+PUSHING = 0.1
 LARGEST_IN_RADIANS = 7.0  # if no angle is larger, the angles are refused as radians
 
 
@@ -18,8 +21,8 @@ LARGEST_IN_RADIANS = 7.0  # if no angle is larger, the angles are refused as rad
 class Rod:
     """A rod and the bed that it was dragged through; None for an unknown number.
 
-    radius, length, depth (of the axis): m. density: kg/m^3, of the bed, which is that of the grains times their volume
-    fraction.
+    radius, length, depth (of the axis): m. density: kg/m^3, of the bed, which is that
+    of the grains times their volume fraction.
 
     Examples
     --------
@@ -67,9 +70,10 @@ class Rod:
 class RodDrag:
     """Forces on a rod, positive where they oppose the velocity.
 
-    psi: (N,), attack angles, rad, from 0 to pi/2. forces: (2, N), along and across the rod, N. weight: (N,), of the squares
-    of residuals, with mean 1. ends: (2, N), forces on both ends together, N, where they are told apart: ``forces`` are then
-    those on a flank as long as the rod; None where they are those on the whole rod.
+    psi: (N,), attack angles, rad, from 0 to pi/2. forces: (2, N), along and across the
+    rod, N. weight: (N,), of the squares of residuals, with mean 1. ends: (2, N), forces
+    on both ends together, N, where they are told apart: ``forces`` are then those on a
+    flank as long as the rod; None where they are those on the whole rod.
 
     Examples
     --------
@@ -96,12 +100,13 @@ class RodDrag:
 
 
 def rod_drag(psi_deg, along, across, weight=None, ends=None) -> RodDrag:
-    """Return measurements at attack angles in degrees, mapped to 0 to 90 by symmetry: the ends of a rod are alike, and so
-    are its sides. ends: (2, N), forces along and across on both ends, where the others are those on the flank.
+    """Return measurements at attack angles in degrees, mapped to 0 to 90 by symmetry:
+    the ends of a rod are alike, and so are its sides. ends: (2, N), forces along and
+    across on both ends, where the others are those on the flank.
 
-    At angles beyond 0 to 90 forces may have the signs of the velocity's components, or all be magnitudes. Equal angles are
-    separate measurements. Raises ValueError for numbers that cannot be drag: forces that push, exchanged columns, angles
-    in radians.
+    At angles beyond 0 to 90 forces may have the signs of the velocity's components, or
+    all be magnitudes. Equal angles are separate measurements. Raises ValueError for
+    numbers that cannot be drag: forces that push, exchanged columns, angles in radians.
 
     Examples
     --------
@@ -152,13 +157,15 @@ def rod_drag(psi_deg, along, across, weight=None, ends=None) -> RodDrag:
 
 
 def _signs(psi: np.ndarray) -> np.ndarray:
-    """Return the signs (2, N) of velocities along and across at angles in degrees, 1 where there is none."""
+    """Return the signs (2, N) of velocities along and across at angles in degrees, 1
+    where there is none."""
     velocity = np.array([np.cos(np.radians(psi)), np.sin(np.radians(psi))])
     return np.where(np.abs(velocity) < 1e-9, 1.0, np.sign(velocity))
 
 
 def _opposing(psi: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """Return the forces, positive where they oppose the motion; ValueError with the angle of a force that pushes."""
+    """Return the forces, positive where they oppose the motion; ValueError with the
+    angle of a force that pushes."""
     largest = np.abs(forces).max()
     require(largest > 0, "all forces are zero", because="there is no drag to fit")
     require(
@@ -180,8 +187,9 @@ def _opposing(psi: np.ndarray, forces: np.ndarray) -> np.ndarray:
 
 
 def _require_not_exchanged(data: RodDrag) -> None:
-    """Raise ValueError if forces along are nearer to a multiple of sin psi, and forces across to one of cos psi, than the
-    other way round, by a factor of 4 in the sum of squares."""
+    """Raise ValueError if forces along are nearer to a multiple of sin psi, and forces
+    across to one of cos psi, than the other way round, by a factor of 4 in the sum of
+    squares."""
     directions = np.array([np.cos(data.psi), np.sin(data.psi)])
 
     def misfit(shape):

@@ -1,8 +1,10 @@
-"""Force laws as records: numbers, and formulas of these numbers, for both drivers of the balance.
+"""Force laws as records: numbers, and formulas of these numbers, for both drivers of
+the balance.
 
-The record of a law is a NamedTuple of arrays whose class holds the formulas `traction`, `slopes` and `average`. A
-closed form, a sum of viscous and dry terms, has exact averages over an element; any other law is averaged by a
-quadrature rule. A law whose traction is no formula (`rft.formulas.vectors.formula`) is computed by NumPy alone."""
+The record of a law is a NamedTuple of arrays whose class holds the formulas `traction`,
+`slopes` and `average`. A closed form, a sum of viscous and dry terms, has exact
+averages over an element; any other law is averaged by a quadrature rule. A law whose
+traction is no formula (`rft.formulas.vectors.formula`) is computed by NumPy alone."""
 
 from __future__ import annotations
 
@@ -71,7 +73,8 @@ class Uncompiled:
 
 @cached_if_immutable
 def record(law, rule: str = "exact") -> Any:
-    """Return the record of a law under a rule ("exact", "midpoint:N", "gauss:N"); ValueError unless it is a law."""
+    """Return the record of a law under a rule ("exact", "midpoint:N", "gauss:N");
+    ValueError unless it is a law."""
     require_law(law)
     kind, count = rule_for(law, rule)
     if is_closed(law):
@@ -103,7 +106,8 @@ def record(law, rule: str = "exact") -> Any:
 
 
 def law_numbers(law) -> dict[str, np.ndarray | float]:
-    """Return the numbers that the formulas of a law read: its ``numbers``, or the numbers among its fields."""
+    """Return the numbers that the formulas of a law read: its ``numbers``, or the
+    numbers among its fields."""
     if hasattr(law, "numbers"):
         return law.numbers
     law_fields = fields(law) if is_dataclass(law) else ()
@@ -116,7 +120,8 @@ def law_numbers(law) -> dict[str, np.ndarray | float]:
 def record_class(
     name: str, names: tuple[str, ...], formulas: tuple[tuple[str, Callable], ...]
 ) -> type:
-    """Return the class of records with these numbers and formulas; a kernel is compiled for each class."""
+    """Return the class of records with these numbers and formulas; a kernel is compiled
+    for each class."""
     cls = NamedTuple(name, [(field, np.ndarray) for field in names])
     for field, function in formulas:
         setattr(cls, field, function)
@@ -129,7 +134,7 @@ def is_compilable(law_record) -> bool:
 
 
 def rule_for(law, rule: str) -> tuple[str, int]:
-    """Return the rule as `rft.formulas.quadrature.parse` does, but QUADRATURE in place of "exact" for a law without a closed
-    form."""
+    """Return the rule as `rft.formulas.quadrature.parse` does, but QUADRATURE in place
+    of "exact" for a law without a closed form."""
     kind, count = parse(rule)
     return (kind, count) if kind != "exact" or is_closed(law) else parse(QUADRATURE)

@@ -1,4 +1,5 @@
-"""A measured law: drag along and across at angles of attack, and monotone curves through the measurements."""
+"""A measured law: drag along and across at angles of attack, and monotone curves
+through the measurements."""
 
 from __future__ import annotations
 
@@ -33,16 +34,20 @@ LARGEST_GAP = np.radians(
 @LAWS.register
 @dataclass(frozen=True)
 class Table:
-    """Rate-independent drag (f_t, f_n) measured at attack angles psi between velocity and body axis, in any one unit.
+    """Rate-independent drag (f_t, f_n) measured at attack angles psi between velocity
+    and body axis, in any one unit.
 
-    psi (rad): at least three different angles that come within 15 degrees of 0 and of pi/2; other angles are mapped to 0
-    to pi/2 by symmetry, and forces at equal angles averaged (`rft.laws.drag.rod_drag`). f_t, f_n (-): as many forces per
-    length along and across, in one unit of any kind, positive against the motion.
+    psi (rad): at least three different angles that come within 15 degrees of 0 and of
+    pi/2; other angles are mapped to 0 to pi/2 by symmetry, and forces at equal angles
+    averaged (`rft.laws.drag.rod_drag`). f_t, f_n (-): as many forces per length along
+    and across, in one unit of any kind, positive against the motion.
 
-    With the unit velocity v, f_t is a function of v.t = cos psi and f_n a function of v.n = sin psi, as in Eq. 3 of
-    Zhang and Goldman (2014). Both are odd piecewise cubics through the origin and the measured values, monotone between
-    neighbours and with a continuous derivative (PCHIP), and constant beyond the last measured value. Values of f_n at 0
-    and of f_t at pi/2 are ignored, for they vanish by symmetry. Forces are in units of f_t at psi = 0.
+    With the unit velocity v, f_t is a function of v.t = cos psi and f_n a function of
+    v.n = sin psi, as in Eq. 3 of Zhang and Goldman (2014). Both are odd piecewise
+    cubics through the origin and the measured values, monotone between neighbours and
+    with a continuous derivative (PCHIP), and constant beyond the last measured value.
+    Values of f_n at 0 and of f_t at pi/2 are ignored, for they vanish by symmetry.
+    Forces are in units of f_t at psi = 0.
 
     Examples
     --------
@@ -101,7 +106,8 @@ class Table:
 
     @formula
     def traction(self, v_t: Any, v_n: Any, rounding: Any = 0.0) -> Any:
-        """Return the drag per unit length (f_t, f_n) opposing (v_t, v_n), in units of the axial drag; zero at rest."""
+        """Return the drag per unit length (f_t, f_n) opposing (v_t, v_n), in units of
+        the axial drag; zero at rest."""
         inverse = inverse_speed(v_t, v_n, rounding)
         f_t, _ = curve(
             v_t * inverse,
@@ -121,7 +127,8 @@ class Table:
 
     @formula
     def slopes(self, v_t: Any, v_n: Any, rounding: Any) -> Any:
-        """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n); infinite slopes at rest are returned as 0."""
+        """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n); infinite slopes at rest
+        are returned as 0."""
         inverse = inverse_speed(v_t, v_n, rounding)
         c = v_t * inverse
         s = v_n * inverse
@@ -162,9 +169,10 @@ def inverse_speed(v_t, v_n, rounding):
 def curve(x, pieces, cells, knots, steps):
     """Return value and slope at x, |x| <= 1, of an odd piecewise cubic.
 
-    pieces: (K, 4), coefficients about each knot in [0, 1], the highest power first. cells: (N + 1, 1), the piece at the
-    left end of each of N equal cells of [0, 1]. knots: (K + 1, 1), the last one beyond 1. steps: (S, 1), S the most
-    knots in a cell."""
+    pieces: (K, 4), coefficients about each knot in [0, 1], the highest power first.
+    cells: (N + 1, 1), the piece at the left end of each of N equal cells of [0, 1].
+    knots: (K + 1, 1), the last one beyond 1. steps: (S, 1), S the most knots in a
+    cell."""
     a = minimum(absolute(x), 1.0)
     piece = gather(cells, floor(a * (1.0 * (len(cells) - 1))), 0)
     for _ in range(len(steps)):
@@ -180,7 +188,8 @@ def curve(x, pieces, cells, knots, steps):
 
 
 def _curve_arrays(name: str, polynomial, unit: float) -> dict[str, np.ndarray]:
-    """Return the arrays that `curve` takes, by name, from one of SciPy's odd piecewise polynomials on [-1, 1]."""
+    """Return the arrays that `curve` takes, by name, from one of SciPy's odd piecewise
+    polynomials on [-1, 1]."""
     half = polynomial.x >= 0.0
     knots = polynomial.x[half]
     pieces = polynomial.c.T[half[:-1]] / unit
@@ -196,7 +205,8 @@ def _curve_arrays(name: str, polynomial, unit: float) -> dict[str, np.ndarray]:
 
 
 def _monotone_curve(x: np.ndarray, f: np.ndarray):
-    """Return the odd monotone piecewise cubic on [-1, 1] through the origin and (x, f), the mean of f where x repeats."""
+    """Return the odd monotone piecewise cubic on [-1, 1] through the origin and (x, f),
+    the mean of f where x repeats."""
     from scipy.interpolate import PchipInterpolator
 
     knots, index = np.unique(np.round(x, 12), return_inverse=True)
