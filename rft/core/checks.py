@@ -40,24 +40,23 @@ def number_fields(kind: Any) -> dict[str, Number]:
     """Return the `Number` annotations of a class by field."""
     try:
         hints = get_type_hints(kind, include_extras=True)
-    except (
-        NameError,
-        TypeError,
-    ):  # annotations of a user's class may name what is not importable
+    except (NameError, TypeError):
+        # Annotations of a user's class may name something that cannot be imported.
         return {}
-    numbers = {
-        name: [x for x in get_args(hint) if isinstance(x, Number)]
-        for name, hint in hints.items()
-    }
-    return {
-        name: annotations[0] for name, annotations in numbers.items() if annotations
-    }
+    found = {}
+    for name, hint in hints.items():
+        annotations = [x for x in get_args(hint) if isinstance(x, Number)]
+        if annotations:
+            found[name] = annotations[0]
+    return found
 
 
 def check_numbers(owner: Any) -> None:
     """Raise ValueError unless the number fields of an object lie within the bounds of
     their annotations, or are None where that is the default; store integers as int."""
-    defaults = {f.name: f.default for f in fields(owner)} if is_dataclass(owner) else {}
+    defaults = {}
+    if is_dataclass(owner):
+        defaults = {f.name: f.default for f in fields(owner)}
     kind: Any = type(owner)
     for name, number in number_fields(kind).items():
         value = getattr(owner, name)
@@ -75,9 +74,10 @@ def real_array(name: str, x: ArrayLike) -> np.ndarray:
     refuse_mask(name, x)
     try:
         array = np.asarray(x)
-        if array.dtype.kind in "iuf" or (
-            array.dtype.kind == "O" and all(map(is_number, array.flat))
-        ):
+        has_numbers = array.dtype.kind in "iuf"
+        if array.dtype.kind == "O":
+            has_numbers = all(map(is_number, array.flat))
+        if has_numbers:
             return array.astype(float, copy=False)
     except (TypeError, ValueError, OverflowError):
         pass
@@ -89,7 +89,8 @@ def refuse_mask(name: str, x: object) -> None:
     which NumPy would turn into the number under the mask."""
     import numpy as np
 
-    for row in x if isinstance(x, (list, tuple)) else (x,):
+    rows = x if isinstance(x, (list, tuple)) else (x,)
+    for row in rows:
         if isinstance(row, np.ma.MaskedArray) and np.ma.is_masked(row):
             raise Refusal(
                 f"{name} has masked values",
@@ -124,13 +125,17 @@ def in_range(
 ) -> None:
     """Raise ValueError with the name unless value is a number, if ``whole`` an integer,
     from low to high."""
-    # float32 has no 1e-50
-    exact = getattr(value, "item", lambda: value)() if is_number(value) else value
-    if not ((is_whole if whole else is_number)(value) and low <= exact <= high):
-        bounds = f"{low:g} to {high:g}" + (f" {unit}" if unit != "-" else "")
-        raise Refusal(
-            f"{name} must be a {'whole ' * whole}number from {bounds}", value=value
-        )
+    if is_number(value):
+        # A NumPy number would round the bounds to its own type: float32 has no 1e-50.
+        exact: Any = value.item() if hasattr(value, "item") else value
+        has_kind = is_whole(value) or not whole
+        if has_kind and low <= exact <= high:
+            return
+    kind = "whole number" if whole else "number"
+    bounds = f"{low:g} to {high:g}"
+    if unit != "-":
+        bounds = f"{bounds} {unit}"
+    raise Refusal(f"{name} must be a {kind} from {bounds}", value=value)
 
 
 def checked_covariance(value, *sizes: int) -> tuple[tuple[float, ...], ...] | None:

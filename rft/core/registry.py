@@ -73,8 +73,8 @@ class Registry(Mapping[str, Any]):
     ) -> Callable[[Part], Part]: ...
 
     def register(self, part: Any = None, /, **members: Any) -> Any:
-        """Add a part under its name and return it: a decorator. Of the same module and
-        name it takes the place of the one before. members: attributes that a function
+        """Add a part under its name and return it: a decorator. It replaces a part of
+        the same module and name. members: attributes that a function
         is given. ValueError if it is no value, has no name, or its name is taken."""
         if part is None:
             return lambda function: self.register(function, **members)
@@ -114,8 +114,9 @@ class Registry(Mapping[str, Any]):
                     f"{who} is named {name!r}, as one that is built in",
                     instead="give it another name",
                 )
+            module, other = place(registered)
             raise Refusal(
-                f"{who} is named {name!r}, as the {place(registered)[1]} of {place(registered)[0]}",
+                f"{who} is named {name!r}, as the {other} of {module}",
                 instead="rename one",
             )
         self._parts[name] = part
@@ -129,13 +130,15 @@ class Registry(Mapping[str, Any]):
     def examples(self) -> dict[str, Any]:
         """Return parts of every class by name: those of its ``examples()``, else one
         without parameters."""
-        own_parts: dict[str, Any] = {}
+        parts: dict[str, Any] = {}
         for name, part in self.items():
-            own = getattr(part, "examples", None)
-            own_parts |= (
-                own() if own else {name: part() if isinstance(part, type) else part}
-            )
-        return own_parts
+            if hasattr(part, "examples"):
+                parts |= part.examples()
+            elif isinstance(part, type):
+                parts[name] = part()
+            else:
+                parts[name] = part
+        return parts
 
 
 def classes_with(member: str) -> Callable[[Any], bool]:
@@ -169,10 +172,10 @@ def load_all(package: str, path: Iterable[str]) -> None:
 
 
 def home(part: Any) -> str:
-    """Return the module that a part is of, an object as it says (``home``)."""
+    """Return the module of a part: its ``home`` if it has one."""
     return getattr(part, "home", None) or part.__module__
 
 
 def place(part: Any) -> tuple[str, str]:
-    """Return the module and the name of a part in it; of an object its own name."""
+    """Return the module of a part and its name there; for an object its own name."""
     return home(part), getattr(part, "__qualname__", "") or part.name

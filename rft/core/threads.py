@@ -53,12 +53,16 @@ def one_thread() -> Iterator[None]:
 def thread_count(allowed: int | None, useful: int) -> int:
     """Return the number of threads to take: at most ``useful``, and at most
     ``allowed``, by default one a core."""
-    return 1 if useful < 2 or _one.get() else max(1, min(allowed or cores(), useful))
+    if useful < 2 or _one.get():
+        return 1
+    return max(1, min(allowed or cores(), useful))
 
 
 def split(samples: np.ndarray, count: int) -> list[np.ndarray]:
     """Return ``count`` shares of the samples."""
-    return np.array_split(samples, count) if count > 1 else [samples]
+    if count < 2:
+        return [samples]
+    return np.array_split(samples, count)
 
 
 def run_shares(function: Callable, shares: list) -> None:
@@ -85,9 +89,8 @@ def run_shares(function: Callable, shares: list) -> None:
                 raise error
     except BaseException:
         stop.set()
-        while (
-            len(ended) < started
-        ):  # not by results: a signal may arrive between a `get` and its assignment
+        # Not counted by results: a signal may arrive between a `get` and its assignment.
+        while len(ended) < started:
             time.sleep(POLL_INTERVAL)
         raise
 
