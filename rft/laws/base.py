@@ -23,7 +23,8 @@ class Medium(Protocol):
 
     ``dry`` holds rate-independent terms (q, k_t, k_n), each of which adds
 
-        f_t = k_t v_t / R,   f_n = k_n v_n / R,   R = sqrt(q^2 v_t^2 + v_n^2 + rounding^2),
+        f_t = k_t v_t / R,   f_n = k_n v_n / R,
+        R = sqrt(q^2 v_t^2 + v_n^2 + rounding^2),
 
     and ``viscous`` the coefficients (c_t, c_n) of f_t = c_t v_t, f_n = c_n v_n.
     Together they give the exact averages of `rft.formulas.link`. A law of another form
@@ -154,14 +155,13 @@ def term_numbers(medium) -> TermNumbers:
 
 
 def dry_terms(medium) -> tuple[tuple[float, float, float], ...] | None:
-    """Return the rate-independent terms (q, k_t, k_n) of a medium's closed form; None
-    without a closed form."""
+    """Return the dry terms (q, k_t, k_n) of a medium; None without a closed form."""
     return getattr(medium, "dry", None)
 
 
 def viscous_terms(medium) -> tuple[float, float] | None:
-    """Return the viscous coefficients (c_t, c_n) of a medium's closed form; None
-    without a closed form."""
+    """Return the viscous coefficients (c_t, c_n) of a medium; None without a closed
+    form."""
     return getattr(medium, "viscous", None)
 
 
@@ -213,15 +213,17 @@ def cached_if_immutable(function: Callable) -> Callable:
 
     @functools.wraps(function)
     def call(*args):
-        return (cached if _is_immutable(args) else function)(*args)
+        if _is_immutable(args):
+            return cached(*args)
+        return function(*args)
 
     return call
 
 
 def _is_immutable(x) -> bool:
-    return type(x) in (str, int) or (
-        all(map(_is_immutable, x)) if type(x) is tuple else is_frozen(x)
-    )
+    if type(x) is tuple:
+        return all(map(_is_immutable, x))
+    return type(x) in (str, int) or is_frozen(x)
 
 
 # Velocities at which properties of a law are checked: 48 directions at 13 speeds,
@@ -237,11 +239,14 @@ def is_odd(medium: Medium) -> bool:
     alike."""
     v_t, v_n = VELOCITIES
     with np.errstate(all="ignore"):
-        forward, backward = (
-            np.stack(np.broadcast_arrays(*medium.traction(k * v_t, k * v_n)))
-            for k in (1, -1)
-        )
+        forward = _traction(medium, v_t, v_n)
+        backward = _traction(medium, -v_t, -v_n)
     return bool((np.abs(forward + backward) <= 1e-13 * np.abs(forward).max(0)).all())
+
+
+def _traction(medium: Medium, v_t, v_n) -> np.ndarray:
+    """Return the traction of a medium as one array (2, ...)."""
+    return np.stack(np.broadcast_arrays(*medium.traction(v_t, v_n)))
 
 
 def require_law(medium: Medium) -> None:
@@ -262,25 +267,28 @@ def require_law(medium: Medium) -> None:
             f_t, f_n = medium.traction(np.ones((2, 3)), np.zeros((2, 3)), 1e-6)
     except TypeError as error:
         raise Refusal(
-            f"{name} must take (v_t, v_n, rounding=0.0) and return (f_t, f_n), rounding being "
-            "the speed below which dry friction is rounded off",
+            f"{name} must take (v_t, v_n, rounding=0.0) and return (f_t, f_n), "
+            "rounding being the speed below which dry friction is rounded off",
             because=str(error),
         ) from error
     except Exception as error:
         raise Refusal(
             f"{name} fails", because=f"{type(error).__name__}: {error}"
         ) from error
-    shapes = np.shape(f_t), np.shape(f_n)
-    broadcasts = set(shapes) <= {(), (1,), (2, 3)}
+    shape_t = np.shape(f_t)
+    shape_n = np.shape(f_n)
     require(
-        broadcasts,
-        f"{name} must return arrays of the velocities' shape (2, 3), got {shapes[0]} and {shapes[1]}",
+        {shape_t, shape_n} <= {(), (1,), (2, 3)},
+        f"{name} must return arrays of the velocities' shape (2, 3), "
+        f"got {shape_t} and {shape_n}",
     )
 
 
 def _has_only_drags(medium: TermLaw) -> bool:
     """Return whether no term of a closed form pushes and some term drags."""
-    coefficients = [*(x for _, *k in medium.dry for x in k), *medium.viscous]
+    coefficients = [*medium.viscous]
+    for _, k_t, k_n in medium.dry:
+        coefficients += [k_t, k_n]
     return min(coefficients) >= 0.0 and 0.0 < max(coefficients) < np.inf
 
 
@@ -288,9 +296,8 @@ def require_drag(medium: Medium) -> None:
     """Raise ValueError if the medium pushes at one of VELOCITIES, that is if its force
     there has a part along the motion, or if it has no drag at all."""
     require_law(medium)
-    if getattr(type(medium), "traction", None) is TermLaw.traction and _has_only_drags(
-        medium
-    ):
+    is_term_law = getattr(type(medium), "traction", None) is TermLaw.traction
+    if is_term_law and _has_only_drags(medium):
         return
     v_t, v_n = VELOCITIES
     with np.errstate(all="ignore"):
@@ -308,7 +315,8 @@ def require_drag(medium: Medium) -> None:
     worst = np.unravel_index(np.argmin(cosine), cosine.shape)
     require(
         cosine[worst] > -1e-09,
-        f"{name} pushes instead of drags at velocity ({v_t[worst]:.3g}, {v_n[worst]:.3g}) along and across the body",
+        f"{name} pushes instead of drags at velocity ({v_t[worst]:.3g}, "
+        f"{v_n[worst]:.3g}) along and across the body",
         because="drag is positive in the direction of the motion it opposes",
         instead="change its sign there",
     )
@@ -351,22 +359,19 @@ def speed_exponent(medium: Medium) -> float | None:
     (0.0, 1.0)
     """
     if is_closed(medium):
-        return (None if any(medium.viscous) else 0.0) if medium.dry else 1.0
+        if not medium.dry:
+            return 1.0
+        return None if any(medium.viscous) else 0.0
     speeds = np.logspace(-3, 1, 5)[:, None]
     with np.errstate(all="ignore"):
-        f = np.stack(
-            np.broadcast_arrays(
-                *medium.traction(
-                    speeds * np.cos(DIRECTIONS), speeds * np.sin(DIRECTIONS)
-                )
-            )
-        )
+        f = _traction(medium, speeds * np.cos(DIRECTIONS), speeds * np.sin(DIRECTIONS))
     size = np.sqrt((f**2).sum((0, 2)))
     if not np.isfinite(size).all() or not size.all():
         return None
     form = f / size[:, None]
     growth = size[1:] / size[:-1]
-    has_power = (
-        np.ptp(form, axis=1).max() < 1e-6 and np.ptp(growth) < 1e-6 * growth.max()
-    )
-    return round(float(np.log10(growth.mean())), 6) + 0.0 if has_power else None
+    has_one_form = np.ptp(form, axis=1).max() < 1e-6
+    has_one_growth = np.ptp(growth) < 1e-6 * growth.max()
+    if not (has_one_form and has_one_growth):
+        return None
+    return round(float(np.log10(growth.mean())), 6) + 0.0

@@ -52,15 +52,16 @@ SURFACE_ALONG_RANGE = (0.010, 0.017)  # assumed
 
 ZHANG_GOLDMAN = "Zhang and Goldman, Phys. Fluids 26, 101308 (2014)"
 FITTED = (
-    "f_n = C_S sin(atan(cot g0 sin psi)) + C_F sin psi, f_t = C_F cos psi fitted to rod drag at 7.62 cm depth, "
-    "as written in third-party code; "
+    "f_n = C_S sin(atan(cot g0 sin psi)) + C_F sin psi, f_t = C_F cos psi fitted to rod "
+    "drag at 7.62 cm depth, as written in third-party code; "
 )
 
 CATALOGUE = {
     "glass-0.3mm-loose": Entry(
         Granular(C=1.8, gamma0=math.radians(13.8), k=2.5),
-        f"{ZHANG_GOLDMAN}, Eqs. 2 and 3: C = 1.8, gamma0 = 13.8 degrees, k = 2.5: 2710 Pa at 7.62 cm, where the "
-        "third-party code of glass-0.3mm-loose-fitted has 2770",
+        f"{ZHANG_GOLDMAN}, Eqs. 2 and 3: C = 1.8, gamma0 = 13.8 degrees, k = 2.5: 2710 "
+        "Pa at 7.62 cm, where the third-party code of glass-0.3mm-loose-fitted has "
+        "2770",
         2710.0,
     ),
     "glass-0.3mm-loose-fitted": Entry(
@@ -69,8 +70,8 @@ CATALOGUE = {
             gamma0=math.atan(1 / 4.0587),
             k=pressure_factor(2770.0, "loose"),
         ),
-        FITTED
-        + "C_S = 0.5108, C_F = 0.2770 (1e4 Pa), cot g0 = 4.0587; agrees with glass-0.3mm-loose",
+        FITTED + "C_S = 0.5108, C_F = 0.2770 (1e4 Pa), cot g0 = 4.0587; agrees with "
+        "glass-0.3mm-loose",
         2770.0,
     ),
     "glass-0.3mm-close": Entry(
@@ -80,7 +81,8 @@ CATALOGUE = {
             k=pressure_factor(5900.0, "close"),
         ),
         FITTED
-        + "C_S = 0.77, C_F = 0.59 (1e4 Pa), g0 = 12.21 degrees; that it is the close packing is an inference",
+        + "C_S = 0.77, C_F = 0.59 (1e4 Pa), g0 = 12.21 degrees; that it is the close "
+        "packing is an inference",
         5900.0,
     ),
     "glass-0.3mm-surface": Entry(
@@ -89,8 +91,9 @@ CATALOGUE = {
             gamma0=math.atan(math.sqrt(0.00389)),
             across=SURFACE_ACROSS / SURFACE_ALONG,
         ),
-        "Schiebel et al., eLife 9, e51412 (2020): plate 8 mm deep at the surface of 0.3 mm glass; drag across 0.15 N, "
-        "C = 0.198, tan^2 g0 = 0.00389; drag along of the form 0.017 N cos psi is assumed (0.010 to 0.017 N)",
+        "Schiebel et al., eLife 9, e51412 (2020): plate 8 mm deep at the surface of 0.3 "
+        "mm glass; drag across 0.15 N, C = 0.198, tan^2 g0 = 0.00389; drag along of the "
+        "form 0.017 N cos psi is assumed (0.010 to 0.017 N)",
     ),
     "viscous-2": Entry(
         Viscous(2.0),

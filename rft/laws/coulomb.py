@@ -18,7 +18,7 @@ class Coulomb(TermLaw):
     Examples
     --------
     >>> from rft import Coulomb
-    >>> [float(f) for f in Coulomb().traction(0.6, 0.8)]  # along and across, on a piece that slides obliquely
+    >>> [float(f) for f in Coulomb().traction(0.6, 0.8)]  # along and across
     [0.6, 0.8]
     """
 

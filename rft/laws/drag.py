@@ -11,8 +11,8 @@ from rft.core.checks import in_range, real_array
 from rft.core.metres import GRAVITY
 from rft.core.refusal import require
 
-# of the largest force: a force below minus that pushes; a smaller one counts as an
-# error of measurement
+# Of the largest force: a force below minus that pushes. Smaller negative forces count
+# as errors of measurement.
 PUSHING = 0.1
 LARGEST_IN_RADIANS = 7.0  # if no angle is larger, the angles are refused as radians
 
@@ -39,31 +39,26 @@ class Rod:
     density: float | None = None
 
     def __post_init__(self):
-        for name, high in (
-            ("radius", 1e3),
-            ("length", 1e3),
-            ("depth", 1e3),
-            ("density", 1e6),
-        ):
-            if getattr(self, name) is not None:
-                in_range(
-                    f"the rod's {name}" if name != "density" else name,
-                    getattr(self, name),
-                    1e-9,
-                    high,
-                )
+        for name in ("radius", "length", "depth"):
+            value = getattr(self, name)
+            if value is not None:
+                in_range(f"the rod's {name}", value, 1e-9, 1e3)
+        if self.density is not None:
+            in_range("density", self.density, 1e-9, 1e6)
 
     @property
     def area(self) -> float | None:
         """Projected area 2 r L, m^2."""
-        return 2 * self.radius * self.length if self.radius and self.length else None
+        if self.radius and self.length:
+            return 2 * self.radius * self.length
+        return None
 
     @property
     def pressure(self) -> float | None:
         """Pressure rho g |z| of the grains above the axis, Pa."""
-        return (
-            self.density * GRAVITY * self.depth if self.density and self.depth else None
-        )
+        if self.density and self.depth:
+            return self.density * GRAVITY * self.depth
+        return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,16 +111,17 @@ def rod_drag(psi_deg, along, across, weight=None, ends=None) -> RodDrag:
     (array([0.   , 0.785, 0.785]), array([[1. , 0.8, 0.8],
            [0. , 1.9, 1.9]]))
     """
-    columns = {"psi_deg": psi_deg, "forces along": along, "forces across": across}
-    psi, *forces = (real_array(name, x) for name, x in columns.items())
-    forces = (
-        np.array(forces) if all(x.shape == psi.shape for x in forces) else np.zeros(0)
-    )
-    weight = np.ones(psi.shape) if weight is None else real_array("weights", weight)
+    psi = real_array("psi_deg", psi_deg)
+    along = real_array("forces along", along)
+    across = real_array("forces across", across)
+    if weight is None:
+        weight = np.ones(psi.shape)
+    weight = real_array("weights", weight)
     require(
-        forces.shape == (2, psi.size) and weight.shape == psi.shape,
+        along.shape == across.shape == weight.shape == (psi.size,),
         "angles and forces must be rows of one length",
     )
+    forces = np.array([along, across])
     finite = all(bool(np.isfinite(x).all()) for x in (psi, forces, weight))
     require(
         finite and psi.size > 0,
@@ -180,7 +176,8 @@ def _opposing(psi: np.ndarray, forces: np.ndarray) -> np.ndarray:
     force = forces[component, row]
     require(
         opposing[component, row] >= -PUSHING * largest,
-        f"at psi = {psi[row]:g} degrees the force {direction} the rod is {force:g} N and pushes",
+        f"at psi = {psi[row]:g} degrees the force {direction} the rod is {force:g} N "
+        "and pushes",
         because="drag is positive where it opposes the motion",
     )
     return opposing

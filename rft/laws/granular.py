@@ -57,7 +57,8 @@ class Granular(TermLaw):
         check_numbers(self)
         require(
             0 < self.gamma0 < math.pi / 2,
-            f"gamma0 must lie between 0 and 90 degrees, got {math.degrees(self.gamma0):g} degrees ({self.gamma0:g} rad)",
+            "gamma0 must lie between 0 and 90 degrees, got "
+            f"{math.degrees(self.gamma0):g} degrees ({self.gamma0:g} rad)",
         )
         sizes = (2,) if self.k is None else (2, 3)
         object.__setattr__(

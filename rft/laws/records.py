@@ -77,31 +77,23 @@ def record(law, rule: str = "exact") -> Any:
     ValueError unless it is a law."""
     require_law(law)
     kind, count = rule_for(law, rule)
-    if is_closed(law):
-        numbers = term_numbers(law)._asdict()
-        if kind == "exact":
-            return Terms(**numbers)
-        formulas = {
-            "traction": terms_traction,
-            "slopes": terms_slopes,
-            "average": by_nodes,
-        }
+    if kind == "exact":
+        return Terms(*term_numbers(law))
     nodes, weights = (
         x.reshape(1, 1, -1, 1, 1) for x in nodes_and_weights((kind, count))
     )
-    if not is_closed(law):
-        if not is_formula(type(law).traction):
-            return Uncompiled(law, nodes, weights)
+    if is_closed(law):
+        numbers = term_numbers(law)._asdict()
+        traction = terms_traction
+        slopes = terms_slopes
+    elif is_formula(type(law).traction):
         numbers = law_numbers(law)
+        traction = type(law).traction
         slopes = getattr(type(law), "slopes", slopes_by_differences)
-        formulas = {
-            "traction": type(law).traction,
-            "slopes": slopes,
-            "average": by_nodes,
-        }
-    cls = record_class(
-        type(law).__name__, (*numbers, "nodes", "weights"), tuple(formulas.items())
-    )
+    else:
+        return Uncompiled(law, nodes, weights)
+    formulas = (("traction", traction), ("slopes", slopes), ("average", by_nodes))
+    cls = record_class(type(law).__name__, (*numbers, "nodes", "weights"), formulas)
     return cls(*numbers.values(), nodes, weights)
 
 
@@ -110,10 +102,10 @@ def law_numbers(law) -> dict[str, np.ndarray | float]:
     numbers among its fields."""
     if hasattr(law, "numbers"):
         return law.numbers
-    law_fields = fields(law) if is_dataclass(law) else ()
-    return {
-        f.name: float(x) for f in law_fields if is_number(x := getattr(law, f.name))
-    }
+    if not is_dataclass(law):
+        return {}
+    values = {f.name: getattr(law, f.name) for f in fields(law)}
+    return {name: float(x) for name, x in values.items() if is_number(x)}
 
 
 @functools.cache
@@ -137,4 +129,6 @@ def rule_for(law, rule: str) -> tuple[str, int]:
     """Return the rule as `rft.formulas.quadrature.parse` does, but QUADRATURE in place
     of "exact" for a law without a closed form."""
     kind, count = parse(rule)
-    return (kind, count) if kind != "exact" or is_closed(law) else parse(QUADRATURE)
+    if kind == "exact" and not is_closed(law):
+        return parse(QUADRATURE)
+    return kind, count

@@ -60,7 +60,8 @@ class Surface(TermLaw):
         check_numbers(self)
         require(
             0 < self.gamma0 < math.pi / 2,
-            f"gamma0 must lie between 0 and 90 degrees, got {math.degrees(self.gamma0):g} degrees ({self.gamma0:g} rad)",
+            "gamma0 must lie between 0 and 90 degrees, got "
+            f"{math.degrees(self.gamma0):g} degrees ({self.gamma0:g} rad)",
         )
         object.__setattr__(self, "covariance", checked_covariance(self.covariance, 3))
 

@@ -67,40 +67,43 @@ class Table:
     law = "table"
 
     def __post_init__(self):
-        rows = [real_array(name, getattr(self, name)) for name in ("psi", "f_t", "f_n")]
-        have_one_length = all(x.ndim == 1 and x.size == rows[0].size for x in rows)
+        psi = real_array("psi", self.psi)
+        f_t = real_array("f_t", self.f_t)
+        f_n = real_array("f_n", self.f_n)
         require(
-            have_one_length and 3 <= rows[0].size <= MOST_ROWS,
+            psi.shape == f_t.shape == f_n.shape == (psi.size,)
+            and 3 <= psi.size <= MOST_ROWS,
             f"psi, f_t and f_n must be rows of 3 to {MOST_ROWS} numbers each",
         )
-        for name, x in zip(("psi", "f_t", "f_n"), rows):
+        for name, x in (("psi", psi), ("f_t", f_t), ("f_n", f_n)):
             require(bool(np.isfinite(x).all()), f"{name} must be finite numbers")
             object.__setattr__(self, name, tuple(x.tolist()))
-        largest = np.abs(rows[0]).max()
+        largest = np.abs(psi).max()
         require(
             largest <= 2 * np.pi + 1e-09,
             f"psi is in rad, at most 2 pi, got {largest:g}",
             instead="write psi_deg for degrees",
         )
-        data = rod_drag(np.degrees(rows[0]), *rows[1:])
+        data = rod_drag(np.degrees(psi), f_t, f_n)
         require(
             data.psi.min() <= LARGEST_GAP
             and data.psi.max() >= np.pi / 2 - LARGEST_GAP
             and (len(np.unique(data.psi.round(9))) > 2),
-            "the angles must come within 15 degrees of 0 and of 90, with at least one more between",
+            "the angles must come within 15 degrees of 0 and of 90, with at least one "
+            "more between",
         )
-        along, across = (
-            _monotone_curve(x, f)
-            for x, f in zip((np.cos(data.psi), np.sin(data.psi)), data.forces)
-        )
-        unit = float(along(1.0)) if along(1.0) > 0 else float(across(1.0))
+        along = _monotone_curve(np.cos(data.psi), data.forces[0])
+        across = _monotone_curve(np.sin(data.psi), data.forces[1])
+        unit = float(along(1.0))
+        if unit <= 0:
+            unit = float(across(1.0))
         require(unit > 0, "there is no drag at psi = 0 nor at psi = 90 degrees")
         numbers = {
             **_curve_arrays("along", along, unit),
             **_curve_arrays("across", across, unit),
         }
         object.__setattr__(self, "numbers", numbers)
-        for name, x in self.numbers.items():
+        for name, x in numbers.items():
             object.__setattr__(self, name, x)
         require_drag(self)
 
@@ -182,9 +185,9 @@ def curve(x, pieces, cells, knots, steps):
     c2 = gather(pieces, piece, 1)
     c1 = gather(pieces, piece, 2)
     c0 = gather(pieces, piece, 3)
-    return copysign(c0 + d * (c1 + d * (c2 + d * c3)), x), c1 + d * (
-        2.0 * c2 + d * (3.0 * c3)
-    )
+    value = c0 + d * (c1 + d * (c2 + d * c3))
+    slope = c1 + d * (2.0 * c2 + d * (3.0 * c3))
+    return copysign(value, x), slope
 
 
 def _curve_arrays(name: str, polynomial, unit: float) -> dict[str, np.ndarray]:
