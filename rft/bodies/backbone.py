@@ -114,10 +114,9 @@ class Backbone:
     ) -> np.ndarray:
         """Return the ends of the elements in the world, (..., elements + 1, 2), as
         `Chain.points` does."""
-        return self.chain.points(
-            alpha if self.bends is None else unmasked("alpha", alpha) @ self.bends.T,
-            pose,
-        )
+        if self.bends is None:
+            return self.chain.points(alpha, pose)
+        return self.chain.points(unmasked("alpha", alpha) @ self.bends.T, pose)
 
     @classmethod
     def examples(cls) -> dict[str, Backbone]:
@@ -159,10 +158,9 @@ class Serpenoid(Backbone):
 
     @property
     def shape_labels(self) -> tuple[tuple[str, str], ...]:
-        return ("curvature x length, cosine", "rad"), (
-            "curvature x length, sine",
-            "rad",
-        )
+        cosine = ("curvature x length, cosine", "rad")
+        sine = ("curvature x length, sine", "rad")
+        return cosine, sine
 
     @cached_property
     def bends(self) -> np.ndarray:

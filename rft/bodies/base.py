@@ -123,7 +123,8 @@ class Body(Protocol):
     >>> from rft import Chain
     >>> import numpy as np
     >>> chain = Chain()
-    >>> chain.joints, chain.motion(np.zeros((2, 1)), np.ones((2, 1))).c.shape  # of three elements
+    >>> elements = chain.motion(np.zeros((2, 1)), np.ones((2, 1)))
+    >>> chain.joints, elements.c.shape
     (2, (3, 1))
     """
 
@@ -152,10 +153,12 @@ def body_size(body: Any) -> float:
 
 def checked_body(body) -> Body:
     """Return the body; ValueError unless it has the members of `Body`."""
-    is_body = all(
-        hasattr(body, name) for name in ("joints", "length", "motion")
-    ) and not isinstance(body, type)
-    require(is_body, "body must be a body such as Chain((1, 1, 1))", value=body)
+    has_members = all(hasattr(body, name) for name in ("joints", "length", "motion"))
+    require(
+        has_members and not isinstance(body, type),
+        "body must be a body such as Chain((1, 1, 1))",
+        value=body,
+    )
     return body
 
 
@@ -181,8 +184,8 @@ def is_reversible(body: Body) -> bool:
 @cached_if_immutable
 def is_symmetric(body: Body) -> bool:
     """Return whether a body of shape -alpha is its mirror image of shape alpha, left
-    and right exchanged, from a few random shapes; a body of one's own may be bent where
-    its shape is zero."""
+    and right exchanged, from a few random shapes; a custom body may be bent where its
+    shape is zero."""
     rng = np.random.default_rng(0)
     alpha, rates = rng.uniform(-1.5, 1.5, (2, body.joints, 5))
     elements = body.motion(alpha, rates)
@@ -219,7 +222,9 @@ class WrappedBody:
 def _joint_angles(body: Body, shape: np.ndarray) -> np.ndarray:
     """Return the joint angles of a shape whose variables are modes; else the shape
     variables themselves."""
-    return body.joint_angles(shape) if hasattr(body, "joint_angles") else shape
+    if hasattr(body, "joint_angles"):
+        return body.joint_angles(shape)
+    return shape
 
 
 def joint_speed(body: Body, alphadot: np.ndarray) -> np.ndarray:

@@ -65,7 +65,9 @@ class Chain(Links):
     @property
     def joints(self) -> int:
         """Number of shape variables: joints between links, or modes."""
-        return len(self.lengths) - 1 if self.modes is None else len(self._mode_rows)
+        if self.modes is None:
+            return len(self.lengths) - 1
+        return len(self._mode_rows)
 
     @cached_property
     def _mode_rows(self) -> np.ndarray:
@@ -74,14 +76,15 @@ class Chain(Links):
     def joint_angles(self, shape: np.ndarray) -> np.ndarray:
         """Return the joint angles (n - 1, B) of shapes (joints, B), or the joint rates
         of rates."""
-        return shape if self.modes is None else self._mode_rows.T @ shape
+        if self.modes is None:
+            return shape
+        return self._mode_rows.T @ shape
 
     @property
     def shape_labels(self) -> tuple[tuple[str, str], ...]:
         """(name, unit) of each shape variable, for the axes of pictures."""
-        return numbered_labels(
-            self.joints, "alpha_{}" if self.modes is None else "m_{}"
-        )
+        name = "alpha_{}" if self.modes is None else "m_{}"
+        return numbered_labels(self.joints, name)
 
     def _in_frame(self, differences: np.ndarray, link: int | None) -> np.ndarray:
         """Return values of all links (n, B), less the frame's, from the differences
@@ -94,18 +97,16 @@ class Chain(Links):
     def _links(self, alpha, alphadot):
         size = alpha.shape[1]
         link = self._link
-        angles = self._in_frame(
-            np.concatenate([self.joint_angles(alpha), self.joint_angles(alphadot)], 1),
-            link,
-        )
+        # Angles and their rates are summed as one array.
+        joints = [self.joint_angles(alpha), self.joint_angles(alphadot)]
+        angles = self._in_frame(np.concatenate(joints, 1), link)
         theta = angles[:, :size]
         rotation = angles[:, size:]
         heading = np.empty(theta.shape, complex)
         np.cos(theta, out=heading.real)
         np.sin(theta, out=heading.imag)
-        halves = np.empty(
-            (len(theta), 2 * size), complex
-        )  # half links as vectors, and their velocities
+        # Half links as vectors, and their velocities.
+        halves = np.empty((len(theta), 2 * size), complex)
         np.multiply(self._half_lengths, heading, out=halves[:, :size])
         np.multiply(1j * rotation, halves[:, :size], out=halves[:, size:])
         centres = self._in_frame(halves[:-1] + halves[1:], link)

@@ -40,11 +40,11 @@ class Links:
             "lengths needs at least two links",
             value=len(self.lengths),
         )
-        are_lengths = (
-            all(0 < x < math.inf for x in self.lengths) and sum(self.lengths) < 1e100
-        )
+        are_positive = all(0 < x < math.inf for x in self.lengths)
         require(
-            are_lengths, "lengths must all be finite and > 0", value=list(self.lengths)
+            are_positive and sum(self.lengths) < 1e100,
+            "lengths must all be finite and > 0",
+            value=list(self.lengths),
         )
         shortest = min(self.lengths) / sum(self.lengths)
         require(
@@ -54,12 +54,13 @@ class Links:
 
     def __getstate__(self) -> dict:
         """Return the fields alone for copies and workers, without cached properties."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]  # of subclasses
+        own = fields(self)  # type: ignore[arg-type]  # subclasses are dataclasses
+        return {field.name: getattr(self, field.name) for field in own}
 
     def _links(self, alpha: np.ndarray, alphadot: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return of the links in the body frame at shapes and rates (joints, B), (n, B)
-        each: exp(i theta), rates of theta, centres x + i y, velocities of the centres,
-        and headings theta."""
+        """Return five arrays (n, B) of the links in the body frame at shapes and rates
+        (joints, B): exp(i theta), rates of theta, centres x + i y, velocities of the
+        centres, and headings theta."""
         raise NotImplementedError
 
     @cached_property
@@ -76,12 +77,14 @@ class Links:
     def _frame_link(self, frame: str) -> int | None:
         """Return the index of the link that carries a frame, None for "mean";
         ValueError for no frame of this body."""
-        text = frame if isinstance(frame, str) else ""
-        if text == "mean":
-            return None
-        found = re.fullmatch(r"link-([1-9]\d{0,6})", text)
         n = len(self.lengths)
-        number = int(found[1]) if found else 0
+        number = 0
+        if isinstance(frame, str):
+            if frame == "mean":
+                return None
+            match = re.fullmatch(r"link-([1-9]\d{0,6})", frame)
+            if match:
+                number = int(match[1])
         require(
             0 < number <= n,
             f"frame must be 'mean' or 'link-1' ... 'link-{n}'",
@@ -96,7 +99,9 @@ class Links:
     def _frame_value(self, x: np.ndarray, link: int | None) -> np.ndarray:
         """Return a frame's value from values of the links (n, ...): its link's, or the
         length-weighted mean."""
-        return x[link] if link is not None else self.fractions @ x
+        if link is None:
+            return self.fractions @ x
+        return x[link]
 
     def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Elements:
         """Return the links at shapes (rad) and rates (rad per unit time), (joints, B)
@@ -118,9 +123,9 @@ class Links:
         alpha, alphadot = np.broadcast_arrays(
             unmasked("alpha", alpha), unmasked("alphadot", alphadot)
         )
-        _, *links = self._links(
-            *(x.reshape(-1, self.joints).T for x in (alpha, alphadot))
-        )
+        flat = alpha.reshape(-1, self.joints).T
+        flat_rate = alphadot.reshape(-1, self.joints).T
+        _, *links = self._links(flat, flat_rate)
         link = self._frame_link(frame)
         rotation, centre, velocity, theta = (
             self._frame_value(x, link).reshape(alpha.shape[:-1]) for x in links
@@ -150,9 +155,8 @@ class Links:
         flat = alpha.reshape(-1, self.joints).T
         heading, _, centre, *_ = self._links(flat, np.zeros_like(flat))
         half = self._half_lengths * heading
-        ends = body_size(self) * np.concatenate(
-            [centre - half, (centre + half)[-1:]]
-        ).T.reshape(*alpha.shape[:-1], -1)
+        ends = np.concatenate([centre - half, (centre + half)[-1:]])
+        ends = body_size(self) * ends.T.reshape(*alpha.shape[:-1], -1)
         x, y, theta = np.moveaxis(pose[..., None], -2, 0)
         dx, dy = rotated(theta, ends.real, ends.imag)
         return np.stack([x + dx, y + dy], -1)

@@ -53,7 +53,9 @@ def mode_rows(modes, waves: float | None, links: int) -> np.ndarray:
     joint k, counted from the tail, with one wave on the body by default."""
     if not isinstance(modes, str):
         return np.array(modes)
-    phase = 2 * np.pi * (1.0 if waves is None else waves) * np.arange(1, links) / links
+    if waves is None:
+        waves = 1.0
+    phase = 2 * np.pi * waves * np.arange(1, links) / links
     return np.stack([np.cos(phase), np.sin(phase)])
 
 

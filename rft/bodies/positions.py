@@ -49,7 +49,7 @@ class Posed(Links):
         check_numbers(self)
         self._frame_link(self.frame)
         try:
-            self._at(np.zeros((1, self.joints)))
+            self._poses(np.zeros((1, self.joints)))
         except Refusal:
             raise
         except Exception as error:
@@ -94,7 +94,7 @@ class Posed(Links):
             all_at_once[-1, -1], one, rtol=1e-9
         )
 
-    def _at(self, alpha: np.ndarray) -> np.ndarray:
+    def _poses(self, alpha: np.ndarray) -> np.ndarray:
         """Return the poses (..., n, 3) at shapes (..., joints), in body lengths;
         ValueError unless they are n poses."""
         batch = alpha.shape[:-1]
@@ -121,33 +121,30 @@ class Posed(Links):
         size = np.sqrt((alphadot * alphadot).sum(0))
         direction = alphadot / np.where(size > 0, size, 1.0)
         near = STEP * np.arange(-3, 4)[:, None, None] * direction
-        poses = np.moveaxis(
-            self._at(np.moveaxis(alpha + near, 1, -1)), 1, -1
-        )  # (7, n, 3, B)
+        poses = self._poses(np.moveaxis(alpha + near, 1, -1))
+        poses = np.moveaxis(poses, 1, -1)  # (7, n, 3, B)
         poses[:, :, 2] = np.unwrap(np.unwrap(poses[:, :, 2], axis=1), axis=0)
         centres = poses[:, :, 0] + 1j * poses[:, :, 1]
         theta = poses[:, :, 2]
-        rate = lambda x: np.tensordot(WEIGHTS, x, 1) * (size / STEP)
+
+        def rate(x):
+            return np.tensordot(WEIGHTS, x, 1) * (size / STEP)
+
         return self._in_frame(centres[3], rate(centres), theta[3], rate(theta))
 
     def _in_frame(self, centre, velocity, theta, rotation) -> tuple[np.ndarray, ...]:
         """Return what `_links` does from centres, headings and their rates (n, B) in
         any one frame."""
-        origin, drift, angle, spin = (
+        origin, frame_velocity, frame_theta, frame_rotation = (
             self._frame_value(x, self._link)
             for x in (centre, velocity, theta, rotation)
         )
-        back = np.exp(-1j * angle)
-        centre = back * (centre - origin)
-        theta = theta - angle
-        rotation = rotation - spin
-        return (
-            np.exp(1j * theta),
-            rotation,
-            centre,
-            back * (velocity - drift) - 1j * spin * centre,
-            theta,
-        )
+        to_frame = np.exp(-1j * frame_theta)
+        centre = to_frame * (centre - origin)
+        velocity = to_frame * (velocity - frame_velocity) - 1j * frame_rotation * centre
+        theta = theta - frame_theta
+        rotation = rotation - frame_rotation
+        return np.exp(1j * theta), rotation, centre, velocity, theta
 
 
 @dataclass(frozen=True)
@@ -220,7 +217,7 @@ class Resampled(Posed):
         """Whether links of the inner body meet at their ends, at a few random
         shapes."""
         alpha = np.random.default_rng(0).uniform(-1.0, 1.0, (5, self.joints))
-        poses = self.inner._at(alpha)
+        poses = self.inner._poses(alpha)
         centre = poses[..., 0] + 1j * poses[..., 1]
         half = self.inner.fractions / 2 * np.exp(1j * poses[..., 2])
         gap = (centre - half)[..., 1:] - (centre + half)[..., :-1]
@@ -229,7 +226,7 @@ class Resampled(Posed):
     def positions(self, alpha: np.ndarray) -> np.ndarray:
         from scipy.interpolate import CubicSpline
 
-        poses = self.inner._at(np.asarray(alpha, float))
+        poses = self.inner._poses(np.asarray(alpha, float))
         poses[..., 2] = np.unwrap(poses[..., 2], axis=-1)
         ends = np.cumsum(self.inner.fractions)
         spline = CubicSpline(ends - self.inner.fractions / 2, poses, axis=-2)
