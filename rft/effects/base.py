@@ -20,15 +20,16 @@ from rft.effects.contact import Problem
 # Engines and what they solve, the cheapest first.
 ENGINES = {
     "algebraic": "the balance of forces at every shape, all shapes at once",
-    "time stepping": "the balance of forces step after step through the gait, place and past carried along",
+    "time stepping": "the balance of forces step after step through the gait, place and "
+    "past carried along",
     "dynamic": "the equation of motion phase after phase, implicit in time",
 }
 PAST = Premise.MEMORYLESS | Premise.QUASI_STATIC
 
 
 class InMetres(NamedTuple):
-    """The other spelling of a field in body lengths: the name of a field in metres, and
-    the power of a length in both: 1, or -1 for a number per length."""
+    """The field that gives a length in metres, beside one in body lengths: its name,
+    and the power of the length in both, 1, or -1 for a number per length."""
 
     name: str
     power: int = 1
@@ -176,9 +177,8 @@ class Effect:
             values[other.name] = None
             values[name] = in_metres / length**other.power
             with located(f"{self.kind} {other.name} of a body of {length:g} m"):
-                for bound in (np.min(values[name]), np.max(values[name])):
-                    limits = number.low, number.high
-                    in_range(name, float(bound), *limits, unit=number.unit)
+                for x in (np.min(values[name]), np.max(values[name])):
+                    in_range(name, float(x), number.low, number.high, unit=number.unit)
         return self.with_parameters(**values)
 
     def in_metres(self, length: float | None) -> Self:
@@ -244,18 +244,12 @@ class Effect:
 
     def take(self, index: Any) -> Self:
         """Return the effect with its parameters at the samples ``index``."""
-        arrays = {
-            f.name: x
-            for f in fields(self)
-            if isinstance(x := getattr(self, f.name), np.ndarray)
-        }
-        return self.with_parameters(
-            **{
-                name: x[..., index]
-                for name, x in arrays.items()
-                if x.ndim > 0 and x.shape[-1] != 1
-            }
-        )
+        selected = {}
+        for field in fields(self):
+            x = getattr(self, field.name)
+            if isinstance(x, np.ndarray) and x.ndim > 0 and x.shape[-1] != 1:
+                selected[field.name] = x[..., index]
+        return self.with_parameters(**selected)
 
     def with_parameters(self, **values: Any) -> Self:
         """Return the effect with other parameters, which may be arrays (B,); nothing is
@@ -277,10 +271,11 @@ def stepwise_effects(effects: Sequence[Effect]) -> list[Effect]:
     Examples
     --------
     >>> from rft.effects import SkinFriction, Transient, stepwise_effects
-    >>> [effect.kind for effect in stepwise_effects([SkinFriction(), Transient(travel=0.12)])]
+    >>> effects = [SkinFriction(), Transient(travel=0.12)]
+    >>> [effect.kind for effect in stepwise_effects(effects)]
     ['transient']
     """
-    return [e for e in effects if e.breaks & SHAPE_ALONE]
+    return [effect for effect in effects if effect.breaks & SHAPE_ALONE]
 
 
 def batched_effect(effects: Sequence[Effect], counts: Sequence[int]) -> Effect:
@@ -292,7 +287,8 @@ def batched_effect(effects: Sequence[Effect], counts: Sequence[int]) -> Effect:
     Examples
     --------
     >>> from rft.effects import SkinFriction, batched_effect
-    >>> batched_effect([SkinFriction(0.1, 0.1), SkinFriction(0.1, 0.2)], counts=[1, 2]).backward
+    >>> effects = [SkinFriction(0.1, 0.1), SkinFriction(0.1, 0.2)]
+    >>> batched_effect(effects, counts=[1, 2]).backward
     array([0.1, 0.2, 0.2])
     """
     first = effects[0]
@@ -317,11 +313,9 @@ def broken_premises(effects: Sequence[Effect]) -> Premise:
     >>> broken_premises([Transient(travel=0.12)])
     <Premise.MEMORYLESS: 4>
     """
-    is_list = isinstance(effects, Sequence) and all(
-        isinstance(e, Effect) for e in effects
-    )
+    is_sequence = isinstance(effects, Sequence)
     require(
-        is_list,
+        is_sequence and all(isinstance(e, Effect) for e in effects),
         "effects must be a list of effects such as EndCaps(radius=0.06)",
         value=effects,
     )

@@ -83,25 +83,25 @@ class BodyInertia(Effect):
 
     def apply(self, problem: Problem, site: Site, state: np.ndarray) -> Problem:
         older, last = state
-        first_order = site.count == 1
-        rate = (1.0 if first_order else 1.5) / site.dt
-        past = last / site.dt if first_order else (2 * last - 0.5 * older) / site.dt
-        strength = np.atleast_2d(self.inertia * problem.axial_drag)
-        return problem._replace(
-            momentum_rate=MomentumRate(
-                np.full((1, 1), rate), *ground_to_frame(site.pose, past), strength
-            )
+        if site.count == 1:
+            # Of order 1: only one earlier step is known.
+            rate = 1.0 / site.dt
+            past = last / site.dt
+        else:
+            rate = 1.5 / site.dt
+            past = (2 * last - 0.5 * older) / site.dt
+        momentum_rate = MomentumRate(
+            np.full((1, 1), rate),
+            *ground_to_frame(site.pose, past),
+            strength=np.atleast_2d(self.inertia * problem.axial_drag),
         )
+        return problem._replace(momentum_rate=momentum_rate)
 
     def after(
         self, problem: Problem, site: Site, state: np.ndarray, v: np.ndarray
     ) -> np.ndarray:
-        return np.stack(
-            [
-                state[1],
-                frame_to_ground(site.pose, element_momenta(problem.sides.elements, v)),
-            ]
-        )
+        new = element_momenta(problem.sides.elements, v)
+        return np.stack([state[1], frame_to_ground(site.pose, new)])
 
     def with_velocity_change(
         self,

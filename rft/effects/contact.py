@@ -44,22 +44,28 @@ class Contact(NamedTuple):
     def with_factors(self, forward, backward, across) -> Contact:
         """Return the contact with its drag multiplied by these factors, numbers or
         arrays that broadcast to (n, B)."""
-        f = self.factor
-        products = f.forward * forward, f.backward * backward, f.across * across
-        return self._replace(factor=Factor(*(np.atleast_2d(x) for x in products)))
+        factor = Factor(
+            np.atleast_2d(self.factor.forward * forward),
+            np.atleast_2d(self.factor.backward * backward),
+            np.atleast_2d(self.factor.across * across),
+        )
+        return self._replace(factor=factor)
 
     def joined(self, other: Contact) -> Contact:
         """Return the elements of this contact followed by those of the other."""
 
-        def concatenated(a, b):
-            columns = max(a.shape[-1], b.shape[-1])
-            return np.concatenate(
-                [np.broadcast_to(a, (n, columns)), np.broadcast_to(b, (m, columns))]
-            )
-
         n = len(self.station)
         m = len(other.station)
-        return mapped(concatenated, self, other) if n else other
+        if n == 0:
+            return other
+
+        def concatenated(a, b):
+            columns = max(a.shape[-1], b.shape[-1])
+            a = np.broadcast_to(a, (n, columns))
+            b = np.broadcast_to(b, (m, columns))
+            return np.concatenate([a, b])
+
+        return mapped(concatenated, self, other)
 
 
 class Problem(NamedTuple):
@@ -109,31 +115,26 @@ class Problem(NamedTuple):
         """Scale (1, B or 1) of the velocities that loads are computed at; 1 where drag
         does not depend on the speed."""
         a = self.additions
-        return (
-            ONE
-            if self.homogeneous and not (a.quadratic or a.memory or a.momentum)
-            else self.frame.speed_scale
-        )
+        if self.homogeneous and not (a.quadratic or a.memory or a.momentum):
+            return ONE
+        return self.frame.speed_scale
 
     def take(self, index) -> Problem:
         """Return the problem of the samples ``index``."""
-        return Problem(
-            *self[:6], *take(self[6:], index)
-        )  # the law is the same for all samples
+        # The law, in the first six fields, is the same for all samples.
+        return Problem(*self[:6], *take(self[6:], index))
 
     def with_points(
         self, points: Contact, terms: Sequence[tuple[float, float, float]]
     ) -> Problem:
         """Return the problem with more points, each with all of these dry terms
         (q, k_t, k_n)."""
-        new = np.repeat(
-            np.array(terms, float)[:, :, None, None], len(points.station), 2
-        )
+        new = np.array(terms, float)[:, :, None, None]
+        new = np.repeat(new, len(points.station), 2)
         if len(self.points.station):
-            count = max(len(self.point_terms), len(new))
-            new = np.concatenate(
-                [_padded(x, count) for x in (self.point_terms, new)], 2
-            )
+            old = self.point_terms
+            count = max(len(old), len(new))
+            new = np.concatenate([_padded(old, count), _padded(new, count)], 2)
         return self._replace(points=self.points.joined(points), point_terms=new)
 
 
@@ -153,20 +154,28 @@ def mapped(function: Callable, *records):
     """Return the record of function(array, ...) over the arrays of one record, or of
     several records of one class; the first record itself if no array changes."""
     first = records[0]
+    if isinstance(first, np.ndarray):
+        return function(*records)
     if not isinstance(first, tuple):
-        return function(*records) if isinstance(first, np.ndarray) else first
+        return first
     values = [mapped(function, *fields) for fields in zip(*records)]
     if all(a is b for a, b in zip(values, first)):
         return first
-    return type(first)(*values) if hasattr(first, "_fields") else tuple(values)
+    if hasattr(first, "_fields"):
+        return type(first)(*values)
+    return tuple(values)
 
 
 def take(record, index) -> Any:
     """Return a record with the samples ``index`` of its arrays; arrays of one column
     stay as they are."""
-    return mapped(
-        lambda x: x if x.shape[-1] == 1 and x.ndim > 1 else x[..., index], record
-    )
+
+    def selected(x):
+        if x.shape[-1] == 1 and x.ndim > 1:
+            return x
+        return x[..., index]
+
+    return mapped(selected, record)
 
 
 class Assembly(NamedTuple):
@@ -199,11 +208,9 @@ class Assembly(NamedTuple):
     ) -> Problem:
         """Return the balance at shapes and rates (joints, B), with a scale of speed
         (B,), by default the joint speed."""
-        problem = self.without_effects(
-            alpha,
-            alphadot,
-            joint_speed(self.body, alphadot) if speed is None else speed,
-        )
+        if speed is None:
+            speed = joint_speed(self.body, alphadot)
+        problem = self.without_effects(alpha, alphadot, speed)
         for effect in self.effects:
             problem = effect.apply(problem, None, None)
         return problem
@@ -211,8 +218,9 @@ class Assembly(NamedTuple):
     def take(self, index) -> Assembly:
         """Return the assembly with the effects' parameters at the samples ``index``."""
         effects = tuple(effect.take(index) for effect in self.effects)
-        unchanged = all(a is b for a, b in zip(effects, self.effects))
-        return self if unchanged else self._replace(effects=effects)
+        if all(a is b for a, b in zip(effects, self.effects)):
+            return self
+        return self._replace(effects=effects)
 
     def without_effects(self, alpha, alphadot, speed) -> Problem:
         """Return the balance without effects."""
@@ -266,10 +274,8 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
     # whatever their order.
     ordered = tuple(sorted(effects, key=lambda effect: not effect.adds_points))
     fraction = e.half / e.half.sum()
-    along, across = (
-        abs(float(medium.traction(*v)[i]))
-        for i, v in enumerate(((1.0, 0.0), (0.0, 1.0)))
-    )
+    along = abs(float(medium.traction(1.0, 0.0)[0]))
+    across = abs(float(medium.traction(0.0, 1.0)[1]))
     law_and_units = (
         medium,
         record(medium, rule),
@@ -308,9 +314,8 @@ def force_scale(assembly: Assembly, speed: np.ndarray) -> np.ndarray:
         return unit * speed
     viscous = getattr(medium, "viscous", None)
     if viscous is None:
-        along, across = (
-            np.abs(medium.traction(*v)[k])
-            for k, v in enumerate(((speed, 0 * speed), (0 * speed, speed)))
-        )
+        zero = 0 * speed
+        along = np.abs(medium.traction(speed, zero)[0])
+        across = np.abs(medium.traction(zero, speed)[1])
         return np.where(along > 0, along, across)
     return unit + viscous[0] * np.maximum(speed - 1.0, 0.0)

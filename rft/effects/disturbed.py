@@ -40,9 +40,11 @@ class DisturbedGround(Effect):
     >>> from rft import Chain, Granular, time_steps
     >>> from rft.effects import DisturbedGround
     >>> t = 2 * np.pi * np.arange(32) / 32
-    >>> alpha, alphadot = np.stack([np.cos(t), np.sin(t)], -1), np.stack([-np.sin(t), np.cos(t)], -1)
+    >>> alpha = np.stack([np.cos(t), np.sin(t)], -1)
+    >>> alphadot = np.stack([-np.sin(t), np.cos(t)], -1)
     >>> track = DisturbedGround(radius=0.02, weakening=0.3)
-    >>> steps = time_steps(Granular(1.8, 0.24), Chain(), alpha, alphadot, effects=[track])
+    >>> law = Granular(1.8, 0.24)
+    >>> steps = time_steps(law, Chain(), alpha, alphadot, effects=[track])
     >>> steps.pose[-1, :2].round(3)  # x, y after the cycle, body lengths
     array([-0.119, -0.007])
     """
@@ -105,15 +107,13 @@ class DisturbedGround(Effect):
         points = self.points(problem, site)
         m = problem.memory
         offset = 1j * LOOK_AHEAD * self.radius * site.headings(problem.sides.elements)
-        left, right = (
-            1 - self.weakening * self.disturbance(state, points + x).mean(0)
-            for x in (offset, -offset)
+        left = self.disturbance(state, points + offset).mean(0)
+        right = self.disturbance(state, points - offset).mean(0)
+        memory = m._replace(
+            intact_left=m.intact_left * (1 - self.weakening * left),
+            intact_right=m.intact_right * (1 - self.weakening * right),
         )
-        return problem._replace(
-            memory=m._replace(
-                intact_left=m.intact_left * left, intact_right=m.intact_right * right
-            )
-        )
+        return problem._replace(memory=memory)
 
     def after(self, problem: Problem, site: Site, state: Tiles, v: np.ndarray) -> Tiles:
         if site.count == 0:  # the first step is on undisturbed ground
@@ -125,25 +125,22 @@ class DisturbedGround(Effect):
         half a radius apart."""
         e = problem.sides.elements
         k = int(np.ceil(4 * e.half.max() / self.radius))
-        return site.centres(e) + (
-            np.arange(k)[:, None, None] * 2 + 1 - k
-        ) / k * e.half * site.headings(e)
+        s = (np.arange(k)[:, None, None] * 2 + 1 - k) / k  # of the element, -1 to 1
+        return site.centres(e) + s * e.half * site.headings(e)
 
     def location(
         self, i: np.ndarray, j: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the tile and the row in the tile that store the cells (i, j) of the
         plane, and their patch of the plane."""
-        (tile_i, i), (tile_j, j) = np.divmod(i, TILE), np.divmod(j, TILE)
-        (patch_i, tile_i), (patch_j, tile_j) = (
-            np.divmod(tile_i, self.tiles_along),
-            np.divmod(tile_j, self.tiles_along),
-        )
-        return (
-            tile_i * self.tiles_along + tile_j,
-            i * TILE + j,
-            (patch_i + 2**20) * 2**21 + (patch_j + 2**20),
-        )
+        tile_i, i = np.divmod(i, TILE)
+        tile_j, j = np.divmod(j, TILE)
+        patch_i, tile_i = np.divmod(tile_i, self.tiles_along)
+        patch_j, tile_j = np.divmod(tile_j, self.tiles_along)
+        tile = tile_i * self.tiles_along + tile_j
+        row = i * TILE + j
+        patch = (patch_i + 2**20) * 2**21 + (patch_j + 2**20)
+        return tile, row, patch
 
     def disturbance(self, tiles: Tiles, place: np.ndarray) -> np.ndarray:
         """Return the disturbance, 0 to 1, at complex places (..., B), bilinear between
@@ -156,38 +153,36 @@ class DisturbedGround(Effect):
         y = y - j
         i = i.astype(np.int64)
         j = j.astype(np.int64)
-        tile, row, patch = self.location(
-            np.stack([i, i + 1])[:, None], np.stack([j, j + 1])
-        )  # (2, 2, ..., B)
+        # The four cells around a place, (2, 2, ..., B), and their shares.
+        i = np.stack([i, i + 1])[:, None]
+        j = np.stack([j, j + 1])
+        tile, row, patch = self.location(i, j)
         share = np.stack([1 - x, x])[:, None] * np.stack([1 - y, y])
         sample = np.arange(tiles.owner.shape[1])
         _, value, index = tiles.copied(tile)
-        return np.where(
-            tiles.owner[tile, sample] == patch, share * value[index, row, sample], 0.0
-        ).sum((0, 1))
+        is_stored = tiles.owner[tile, sample] == patch
+        value = share * value[index, row, sample]
+        return np.where(is_stored, value, 0.0).sum((0, 1))
 
     def with_track(self, tiles: Tiles, place: np.ndarray) -> Tiles:
         """Return the map with a track at complex places (..., B): disturbance 1 up to
         radius / 2, 0 beyond 3 radius / 2."""
         reach = int(np.ceil(1.5 * self.radius / self.cell))
         around = np.arange(-reach, reach + 1).reshape(-1, *[1] * place.ndim)
-        i, j = (
-            np.floor(x / self.cell).astype(np.int64) + around
-            for x in (place.real, place.imag)
-        )
+        i = np.floor(place.real / self.cell).astype(np.int64) + around
+        j = np.floor(place.imag / self.cell).astype(np.int64) + around
         i = i[:, None]
-        distance = np.hypot(
-            (i + 0.5) * self.cell - place.real, (j + 0.5) * self.cell - place.imag
-        )
+        x = (i + 0.5) * self.cell - place.real
+        y = (j + 0.5) * self.cell - place.imag
+        distance = np.hypot(x, y)
         tile, row, patch = self.location(i, j)  # (cells along, cells across, ..., B)
         owner = tiles.owner.copy()
         sample = np.arange(tiles.owner.shape[1])
         owner[tile, sample] = patch
         touched, value, index = tiles.copied(tile)
         value *= (owner == tiles.owner)[touched, None]
-        np.maximum.at(
-            value, (index, row, sample), np.clip(1.5 - distance / self.radius, 0.0, 1.0)
-        )
+        disturbance = np.clip(1.5 - distance / self.radius, 0.0, 1.0)
+        np.maximum.at(value, (index, row, sample), disturbance)
         new = list(tiles.value)
         for k, x in zip(touched, value):
             new[k] = x.copy()

@@ -64,15 +64,16 @@ class GrainInertia(Effect):
     def __post_init__(self):
         check_numbers(self)
 
-    def _known_k(self, medium):
-        return getattr(medium, "k", None) if self.k is None else self.k
+    def _given_k(self, medium):
+        """Return k as the effect or the medium gives it; None where neither does."""
+        if self.k is None:
+            return getattr(medium, "k", None)
+        return self.k
 
     def assumes(self, medium: Any) -> str:
-        return (
-            f"k = {ASSUMED_K:g}, that of loose glass"
-            if self._known_k(medium) is None
-            else ""
-        )
+        if self._given_k(medium) is None:
+            return f"k = {ASSUMED_K:g}, that of loose glass"
+        return ""
 
     def check(self, medium: Any) -> None:
         require(
@@ -82,17 +83,14 @@ class GrainInertia(Effect):
 
     def apply(self, problem: Problem, site: Any = None, state: Any = None) -> Problem:
         speed_per_rad = 2 * np.pi * self.frequency * self.length
-        k = self._known_k(problem.medium)
-        strength = (
-            self.strength
-            * speed_per_rad**2
-            / ((ASSUMED_K if k is None else k) * GRAVITY * self.depth)
-        )
+        k = self._given_k(problem.medium)
+        if k is None:
+            k = ASSUMED_K
+        strength = self.strength * speed_per_rad**2 / (k * GRAVITY * self.depth)
         # The flux of momentum does not depend on the pressure of the ground, so the
         # factors of the drag leave it alone.
-        return problem._replace(
-            quadratic_drag=problem.quadratic_drag + np.atleast_2d(strength)
-        )
+        quadratic_drag = problem.quadratic_drag + np.atleast_2d(strength)
+        return problem._replace(quadratic_drag=quadratic_drag)
 
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, GrainInertia]:

@@ -26,8 +26,9 @@ class SkinFriction(Effect):
     --------
     >>> from rft import Chain, Granular, body_velocity
     >>> from rft.effects import SkinFriction
-    >>> solution = body_velocity(Granular(1.8, 0.24), Chain(), [0.5, 0.3], [1.0, 0.0], effects=[SkinFriction()])
-    >>> solution.xi.round(4)
+    >>> law = Granular(1.8, 0.24)
+    >>> skin = SkinFriction()
+    >>> body_velocity(law, Chain(), [0.5, 0.3], [1.0, 0.0], effects=[skin]).xi.round(4)
     array([ 0.0154,  0.0148, -0.1879])
     """
 

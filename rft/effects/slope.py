@@ -39,8 +39,11 @@ class Slope(Effect):
     >>> from rft import Chain, Granular, time_steps
     >>> from rft.effects import Slope
     >>> t = 2 * np.pi * np.arange(32) / 32
-    >>> alpha, alphadot = np.stack([np.cos(t), np.sin(t)], -1), np.stack([-np.sin(t), np.cos(t)], -1)
-    >>> steps = time_steps(Granular(1.8, 0.24), Chain(), alpha, alphadot, effects=[Slope(angle=0.2)])
+    >>> alpha = np.stack([np.cos(t), np.sin(t)], -1)
+    >>> alphadot = np.stack([-np.sin(t), np.cos(t)], -1)
+    >>> slope = Slope(angle=0.2)
+    >>> law = Granular(1.8, 0.24)
+    >>> steps = time_steps(law, Chain(), alpha, alphadot, effects=[slope])
     >>> steps.pose[-1, :2].round(3)  # x, y after the cycle, body lengths
     array([-0.086,  0.002])
     """
@@ -76,7 +79,10 @@ class Slope(Effect):
     kind = "slope"
     breaks = Premise.SE2_SYMMETRIC
     limit = "angle = 0"
-    cost = "two dozen operations an element; a step at a time in place of all phases at once"
+    cost = (
+        "two dozen operations an element; a step at a time in place of all phases at "
+        "once"
+    )
     batched = ("angle", "towards", "repose", "weight")
     varies_along = True
 
@@ -94,8 +100,8 @@ class Slope(Effect):
         require(
             pull < drag,
             "a body of this weight slides down",
-            because=f"its pull along the slope, {pull:.3g} of the drag on level ground, must be below "
-            f"the drag downhill, {drag:.3g}",
+            because=f"its pull along the slope, {pull:.3g} of the drag on level ground, "
+            f"must be below the drag downhill, {drag:.3g}",
         )
 
     def check(self, medium: Any) -> None:
@@ -105,24 +111,32 @@ class Slope(Effect):
         )
 
     def assumes(self, medium: Any) -> str:
-        repose = f"an angle of repose of {math.degrees(REPOSE):.1f} degrees, from half the drag downhill at 20, and "
-        return f"{repose if np.all(self.repose == REPOSE) else ''}that only what moves downhill meets weaker ground"
+        weaker = "that only what moves downhill meets weaker ground"
+        if not np.all(self.repose == REPOSE):
+            return weaker
+        return (
+            f"an angle of repose of {math.degrees(REPOSE):.1f} degrees, from half the "
+            f"drag downhill at 20, and {weaker}"
+        )
 
     def apply(self, problem: Problem, site: Site, state: Any = None) -> Problem:
         cos = np.cos(self.angle)
         sin = np.sin(self.angle)
 
+        uphill = np.exp(1j * np.asarray(self.towards))
+
         def inclined(contact, weight):
-            downhill = -np.exp(1j * np.asarray(self.towards)) * np.conj(
-                site.headings(contact.elements)
+            downhill = -uphill * np.conj(site.headings(contact.elements))
+            incline = Incline(
+                downhill.real,
+                downhill.imag,
+                level_factor=np.atleast_2d(cos),
+                downhill_loss=np.atleast_2d(sin / np.tan(self.repose)),
+                weight=np.atleast_2d(weight),
             )
-            rows = map(np.atleast_2d, (cos, sin / np.tan(self.repose), weight))
-            return contact._replace(
-                incline=Incline(downhill.real, downhill.imag, *rows)
-            )
+            return contact._replace(incline=incline)
 
         weight = self.weight * sin * problem.axial_drag
-
         return problem._replace(
             sides=inclined(problem.sides, weight), points=inclined(problem.points, 0.0)
         )

@@ -12,7 +12,7 @@ from rft.core.checks import Number, check_numbers
 from rft.core.premise import Premise
 from rft.effects.base import EFFECTS, Effect, InMetres, Site
 from rft.effects.contact import Problem
-from rft.formulas.link import Memory, developed_direction, find_pivot
+from rft.formulas.link import developed_direction, find_pivot
 
 # body lengths, least travel: an element at rest creeps at the regularisation
 SHORTEST = 1e-6
@@ -104,16 +104,18 @@ class Transient(Effect):
         return np.zeros((2, *problem.sides.elements.c.shape))
 
     def apply(self, problem: Problem, site: Site, state: np.ndarray) -> Problem:
-        at_once = np.atleast_2d(self.at_once_along), np.atleast_2d(self.at_once)
-        v_before = site.v_before[0], site.v_before[1]
-        m = problem.memory
-        memory = Memory(
-            *state,
-            *v_before,
-            m.intact_left,
-            m.intact_right,
-            *at_once,
-            *self.steps(site.dt),
+        along, across = state
+        v_t_before, v_n_before, _ = site.v_before
+        step_along, step_across = self.steps(site.dt)
+        memory = problem.memory._replace(
+            along=along,
+            across=across,
+            v_t_before=v_t_before,
+            v_n_before=v_n_before,
+            at_once_along=np.atleast_2d(self.at_once_along),
+            at_once_across=np.atleast_2d(self.at_once),
+            step_along=step_along,
+            step_across=step_across,
         )
         return problem._replace(memory=memory)
 
@@ -122,18 +124,17 @@ class Transient(Effect):
     ) -> np.ndarray:
         step_along, step_across = self.steps(site.dt)
         sign = np.where(v[0] >= 0, 1.0, -1.0)
-        along = (
-            sign
-            * developed_direction(
-                sign * state[0], sign * site.v_before[0], np.abs(v[0]), step_along
-            )[0]
+        before = sign * site.v_before[0]
+        along, _ = developed_direction(
+            sign * state[0], before, np.abs(v[0]), step_along
         )
+        along = sign * along
         parts, left = part_velocities(v[1], v[2])
         before = SIGN * site.v_before[1]
-        across = (
-            SIGN
-            * developed_direction(SIGN * state[1], before, SIGN * parts, step_across)[0]
+        across, _ = developed_direction(
+            SIGN * state[1], before, SIGN * parts, step_across
         )
+        across = SIGN * across
         return np.array([along, left * across[0] + (1 - left) * across[1]])
 
     def steps(self, dt: float) -> tuple[np.ndarray, np.ndarray]:
@@ -141,13 +142,12 @@ class Transient(Effect):
         at unit speed; inf without travel, and at the first step: a body begins as if it
         had always moved as it does then."""
         travel = np.atleast_2d(self.travel)
-        along, across = (
-            np.where(
-                (x > 0) & (dt > 0), E_FOLDINGS * dt / np.maximum(x, SHORTEST), np.inf
-            )
-            for x in (self.ratio * travel, travel)
-        )
-        return along, across
+
+        def e_foldings(x):
+            count = E_FOLDINGS * dt / np.maximum(x, SHORTEST)
+            return np.where((x > 0) & (dt > 0), count, np.inf)
+
+        return e_foldings(self.ratio * travel), e_foldings(travel)
 
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, Transient]:
@@ -162,6 +162,5 @@ def part_velocities(v_n: np.ndarray, v_w: np.ndarray) -> tuple[np.ndarray, np.nd
     difference = np.abs(v_w)  # of v_n, between centre and end
     left = np.where(inside, (v_n + difference) / 2, np.maximum(v_n, 0.0))
     right = np.where(inside, (v_n - difference) / 2, np.minimum(v_n, 0.0))
-    return np.array([left, right]), np.where(
-        inside, (1 + v_n / np.where(inside, difference, 1.0)) / 2, v_n > 0
-    )
+    fraction = (1 + v_n / np.where(inside, difference, 1.0)) / 2
+    return np.array([left, right]), np.where(inside, fraction, v_n > 0)
