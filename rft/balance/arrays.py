@@ -1,4 +1,5 @@
-"""The NumPy driver: a batch of samples takes each step together, by the formulas that the compiled driver compiles."""
+"""The NumPy driver: a batch of samples takes each step together, by the formulas that
+the compiled driver compiles."""
 
 from __future__ import annotations
 
@@ -24,13 +25,16 @@ from rft.formulas.newton import (
     with_momentum,
 )
 
-# Samples that have ended leave the arrays where less than COMPACT_BELOW of them are active, and where the arrays have more
-# than COMPACT_ABOVE elements x samples: smaller arrays take as long.
-COMPACT_BELOW, COMPACT_ABOVE = 0.65, 200
+# Samples that have ended leave the arrays where less than COMPACT_BELOW of them are
+# active, and where the arrays have more than COMPACT_ABOVE elements x samples: smaller
+# arrays take as long.
+COMPACT_BELOW = 0.65
+COMPACT_ABOVE = 200
 
 
 def velocities(problem: Problem) -> tuple[tuple, tuple]:
-    """Return (v_t, v_n, v_w) over the scale of speed, of the body's sides and of its points, with the frame held."""
+    """Return (v_t, v_n, v_w) over the scale of speed, of the body's sides and of its
+    points, with the frame held."""
     speed = problem.frame.speed_scale
     return tuple(
         tuple(x / speed for x in contact.elements[6:])
@@ -39,7 +43,8 @@ def velocities(problem: Problem) -> tuple[tuple, tuple]:
 
 
 def with_frame_velocity(problem: Problem, v, x, y, theta) -> tuple[tuple, tuple]:
-    """Return the velocities v of sides and points plus those due to a velocity (x, y, theta) of the frame."""
+    """Return the velocities v of sides and points plus those due to a velocity
+    (x, y, theta) of the frame."""
     contacts = problem.sides, problem.points
     return tuple(
         plus(u, to_element(contact.elements, x, y, theta))
@@ -48,16 +53,15 @@ def with_frame_velocity(problem: Problem, v, x, y, theta) -> tuple[tuple, tuple]
 
 
 def loads(problem: Problem, v, rounding) -> list:
-    """Return pairs of `Elements` and their `Load`, for the sides and, if there are any, for the points, at velocities v
-    over the scale of speed."""
-    p, sides, points, speed = (
-        problem,
-        problem.sides,
-        problem.points,
-        problem.law_speed_scale,
-    )
+    """Return pairs of `Elements` and their `Load`, for the sides and, if there are any,
+    for the points, at velocities v over the scale of speed."""
+    p = problem
+    sides = problem.sides
+    points = problem.points
+    speed = problem.law_speed_scale
     v_sides, v_points = (times(speed, u) for u in v)
-    rounding, additions = rounding * speed, p.additions
+    rounding = rounding * speed
+    additions = p.additions
     load = side_load(
         p.law,
         v_sides,
@@ -77,7 +81,8 @@ def loads(problem: Problem, v, rounding) -> list:
 
 
 def frame_net(problem: Problem, v, rounding, x, y, theta, mass=None) -> Net:
-    """Return the sum of loads, and of the rate of change of momentum, on the frame; entries (B,).
+    """Return the sum of loads, and of the rate of change of momentum, on the frame;
+    entries (B,).
 
     v, (x, y, theta): velocities of elements and of the frame, over the scale of speed.
     mass: `rft.formulas.momentum.frame_inertia`, computed by default."""
@@ -101,8 +106,8 @@ def frame_net(problem: Problem, v, rounding, x, y, theta, mass=None) -> Net:
 def nets(
     problem: Problem, v: np.ndarray, rounding: np.ndarray, xi: np.ndarray
 ) -> np.ndarray:
-    """Return the entries of `Net` (5, 3, B) at velocities v (3, n, B) of elements, those of points last, and xi (3, B)
-    of the frame."""
+    """Return the entries of `Net` (5, 3, B) at velocities v (3, n, B) of elements,
+    those of points last, and xi (3, B) of the frame."""
     n = len(problem.sides.station)
     return np.array(
         frame_net(problem, (tuple(v[:, :n]), tuple(v[:, n:])), rounding, *xi)
@@ -132,10 +137,12 @@ def row(record) -> Any:
 def solve(
     problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray | None
 ) -> np.ndarray:
-    """Return the results of all samples after one descent, the rows (6, B) of `rft.formulas.newton.result`.
+    """Return the results of all samples after one descent, the rows (6, B) of
+    `rft.formulas.newton.result`.
 
     guess: (3, B) or None. Velocities are over the scale of speed."""
-    size, fresh = problem.n_samples, guess is None
+    size = problem.n_samples
+    fresh = guess is None
     iterate = first_iterate(
         *(np.zeros((3, size)) if fresh else guess),
         descent.first,
@@ -146,7 +153,9 @@ def solve(
         if problem.momentum_rate is None
         else frame_inertia(problem.sides.elements, problem.momentum_rate)
     )
-    active, index, v = np.ones(size, bool), np.arange(size), velocities(problem)
+    active = np.ones(size, bool)
+    index = np.arange(size)
+    v = velocities(problem)
     out = np.empty((RESULT_ROWS, size))
     while index.size:
         step = iterate.dx, iterate.dy, iterate.dtheta
@@ -170,6 +179,10 @@ def solve(
                 break
             if count < COMPACT_BELOW * active.size and v[0][0].size > COMPACT_ABOVE:
                 rest = np.flatnonzero(active)
-                problem, index, active = problem.take(rest), index[rest], active[rest]
-                iterate, v, mass = take(iterate, rest), take(v, rest), take(mass, rest)
+                problem = problem.take(rest)
+                index = index[rest]
+                active = active[rest]
+                iterate = take(iterate, rest)
+                v = take(v, rest)
+                mass = take(mass, rest)
     return out

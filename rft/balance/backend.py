@@ -1,8 +1,10 @@
-"""The choice of the driver that solves balances of forces: compiled code, or NumPy by the same formulas.
+"""The choice of the driver that solves balances of forces: compiled code, or NumPy by
+the same formulas.
 
-"auto" is compiled code where numba is installed, else NumPy. A caller with little to compute may prefer NumPy, whose
-first call takes half a second less (`preferring`). Neither a clock nor the state of a cache decides. `python -m rft`
-compiles beforehand."""
+"auto" is compiled code where numba is installed, else NumPy. A caller with little to
+compute may prefer NumPy, whose first call takes half a second less (`preferring`).
+Neither a clock nor the state of a cache decides. `python -m rft` compiles
+beforehand."""
 
 from __future__ import annotations
 
@@ -19,7 +21,8 @@ BACKENDS = ("auto", "numpy", "numba")
 
 
 class Note(UserWarning):
-    """A warning of a fault that changes no result; the command line prints it as one line on standard error."""
+    """A warning of a fault that changes no result; the command line prints it as one
+    line on standard error."""
 
 
 def check(backend: str) -> None:
@@ -58,7 +61,8 @@ def prefer(backend: str) -> None:
 
 
 def fastest() -> str:
-    """Return the fastest back end for many balances: "numba" where it is installed, else "numpy"."""
+    """Return the fastest back end for many balances: "numba" where it is installed,
+    else "numpy"."""
     return "numba" if installed() else "numpy"
 
 
@@ -68,6 +72,7 @@ def preferred() -> str:
 
 
 def compiles(backend: str, law) -> bool:
-    """Return whether compiled code solves the balances of a law, given by its record."""
+    """Return whether compiled code solves the balances of a law, given by its
+    record."""
     chosen = preferred() if backend == "auto" else backend
     return chosen == "numba" and installed() and is_compilable(law)

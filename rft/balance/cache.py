@@ -1,8 +1,10 @@
 """Compiled kernels on disk, each under a digest of everything that it computes with.
 
-numba's own cache depends on the file of the function alone: after a change of a formula in another file, or with another
-law, it would return old code. The digest here covers the code and the constants of every function that a kernel names,
-the versions of numba and LLVM, and the processor. A file that is damaged, or cannot be read or written, is ignored."""
+numba's own cache depends on the file of the function alone: after a change of a formula
+in another file, or with another law, it would return old code. The digest here covers
+the code and the constants of every function that a kernel names, the versions of numba
+and LLVM, and the processor. A file that is damaged, or cannot be read or written, is
+ignored."""
 
 from __future__ import annotations
 
@@ -41,13 +43,14 @@ KNOWN = {
 
 
 def folder() -> Path:
-    """Return the folder of compiled code: NUMBA_CACHE_DIR where that is set, else the user's own."""
+    """Return the folder of compiled code: NUMBA_CACHE_DIR where that is set, else the
+    user's own."""
     return Path(numba.config.CACHE_DIR or user_cache_dir("geomech")) / "rft"
 
 
 class Cache(_Cache):
-    """The compiled code of one function in one file, with the interface of numba's cache; no fault of the file keeps the
-    function from running."""
+    """The compiled code of one function in one file, with the interface of numba's
+    cache; no fault of the file keeps the function from running."""
 
     def __init__(self, function, *modules):
         self.key = digest(function, *modules)
@@ -70,7 +73,8 @@ class Cache(_Cache):
         return raw[32:]
 
     def load_overload(self, sig, target_context) -> CompileResult | None:
-        """Return the compiled code for a signature; None if it has yet to be compiled."""
+        """Return the compiled code for a signature; None if it has yet to be
+        compiled."""
         if (data := self.read()) is None:
             return None
         target_context.refresh()
@@ -81,11 +85,13 @@ class Cache(_Cache):
                 if saved == str(sig)
                 else None
             )
-        except Exception as error:  # an undamaged file may still be one that LLVM or pickle cannot load
+        # an undamaged file may still be one that LLVM or pickle cannot load
+        except Exception as error:
             return self.rename(f"it cannot be loaded ({type(error).__name__})")
 
     def save_overload(self, sig, data) -> None:
-        """Write the compiled code at once (a part is never read); a note if it cannot be written."""
+        """Write the compiled code at once (a part is never read); a note if it cannot
+        be written."""
         body = dumps((str(sig), data._reduce()))
         part = self.path.with_name(f"{self.path.name}.{secrets.token_hex(8)}")
         try:
@@ -126,8 +132,8 @@ class Cache(_Cache):
 
 
 def cached(kernel, purpose: str):
-    """Return a kernel whose compiled code is stored on disk; print one line with its purpose if it has yet to be
-    compiled."""
+    """Return a kernel whose compiled code is stored on disk; print one line with its
+    purpose if it has yet to be compiled."""
     kernel._cache = Cache(kernel.py_func)
     kernel.compile = _naming_faults(kernel.compile)
     if not kernel._cache.path.exists():
@@ -196,8 +202,9 @@ def note(text: str) -> None:
 
 
 def digest(function, *modules) -> str:
-    """Return a digest of the code and the constants of a function and, recursively, of every function that it names.
-    modules: those whose whole source counts, as they define functions a second time for compiled code."""
+    """Return a digest of the code and the constants of a function and, recursively, of
+    every function that it names. modules: those whose whole source counts, as they
+    define functions a second time for compiled code."""
     sources = vectors, simd, *modules
     parts = [Path(module.__file__).read_bytes() for module in sources]
     seen = set()

@@ -1,8 +1,11 @@
-"""The compiled driver: a vector holds one element of eight samples, or, where samples are few, eight elements of one.
+"""The compiled driver: a vector holds one element of eight samples, or, where samples
+are few, eight elements of one.
 
-A sample that has ended gives its place to the next, so that no sample waits for the slowest. Elements are summed in their
-order either way, so that the digits of a sample do not depend on the others. A kernel is compiled once for each class of
-law records, from the formulas of `rft.formulas.link`, `rft.formulas.newton` and the law. Importing this module loads numba.
+A sample that has ended gives its place to the next, so that no sample waits for the
+slowest. Elements are summed in their order either way, so that the digits of a sample
+do not depend on the others. A kernel is compiled once for each class of law records,
+from the formulas of `rft.formulas.link`, `rft.formulas.newton` and the law. Importing
+this module loads numba.
 """
 
 from __future__ import annotations
@@ -46,12 +49,27 @@ from rft.formulas.simd import (
 )
 from rft.formulas.vectors import absolute, minimum, where
 
-# First rows of the records of an element: `Elements`, `Factor`, quadratic drag, `Memory`, `Incline`; of the records of a
-# sample: `Iterate`, `Frame`, scale of speed, `Inertia`. Rows of sums: `Net`, then the square of the slowest speed.
-ELEMENTS, FACTOR, QUADRATIC, MEMORY, INCLINE, ROWS = 0, 9, 12, 13, 23, 28
-ITERATE, FRAME, SPEED, MASS, SAMPLE_ROWS = 0, 13, 17, 18, 31
-SLOWEST2, SUM_ROWS = 15, 16
-WEIGHT, V_T = 5, 6  # places in `Elements`
+# First rows of the records of an element.
+ELEMENTS = 0  # `Elements`
+FACTOR = 9  # `Factor`
+QUADRATIC = 12  # quadratic drag
+MEMORY = 13  # `Memory`
+INCLINE = 23  # `Incline`
+ROWS = 28  # number of rows
+
+# First rows of the records of a sample.
+ITERATE = 0  # `Iterate`
+FRAME = 13  # `Frame`
+SPEED = 17  # scale of speed
+MASS = 18  # `Inertia`
+SAMPLE_ROWS = 31  # number of rows
+
+# Rows of sums: `Net`, then the square of the slowest speed.
+SLOWEST2 = 15
+SUM_ROWS = 16
+
+WEIGHT = 5  # place in `Elements`
+V_T = 6  # place in `Elements`
 SPEED_SCALE = 3  # place in `Frame`
 ROUNDING_NEXT = 7  # place in `Iterate`
 (read_elements, _), (read_factor, _), (read_memory, _), (read_incline, _) = map(
@@ -69,8 +87,8 @@ NO_TERMS = np.zeros((0, 0, 3))
 
 @register_jitable(forceinline=True)
 def fill(rows, first, record, e, lane, i):
-    """Write element e and sample i of a record's arrays to a lane; a single row or column stands for all, and the last
-    element for those after it."""
+    """Write element e and sample i of a record's arrays to a lane; a single row or
+    column stands for all, and the last element for those after it."""
     for j in range(len(record)):
         x = record[j]
         rows[first + j, lane] = x[min(e, x.shape[0] - 1), min(i, x.shape[1] - 1)]
@@ -84,8 +102,9 @@ def ceil_divide(a, b):
 
 @register_jitable
 def fill_contact(rows, contact, count, first, last, i):
-    """Write the elements of sample i in one contact to the lanes from first to last of the rows of vectors, ``count``
-    elements to a vector; elements in excess have no weight."""
+    """Write the elements of sample i in one contact to the lanes from first to last of
+    the rows of vectors, ``count`` elements to a vector; elements in excess have no
+    weight."""
     elements, factors, ground, incline = contact
     for k in range(len(rows)):
         for lane in range(first, last):
@@ -100,7 +119,8 @@ def fill_contact(rows, contact, count, first, last, i):
 
 @register_jitable(forceinline=True)
 def add_triple(sums, first, triple, by_elements):
-    """Add a triple of vectors to three rows of sums: lane by lane, or, by elements, all lanes in turn to the first."""
+    """Add a triple of vectors to three rows of sums: lane by lane, or, by elements, all
+    lanes in turn to the first."""
     for j in range(3):
         if by_elements:
             add_lanes(sums, first + j, triple[j])
@@ -139,11 +159,14 @@ def evaluator(Law: type):
         by_elements,
         sums,
     ):
-        """Compute the `Net` on the frame after the next step, and the square of the slowest element's speed, as the rows
-        of ``sums``; write the velocities of elements after that step to v_next.
+        """Compute the `Net` on the frame after the next step, and the square of the
+        slowest element's speed, as the rows of ``sums``; write the velocities of
+        elements after that step to v_next.
 
-        n_sides: number of vectors of elements of the sides; those of the points follow."""
-        rounding, slowest2 = iterate.rounding_next * speed, 0.0 * speed + np.inf
+        n_sides: number of vectors of elements of the sides; those of the points
+        follow."""
+        rounding = iterate.rounding_next * speed
+        slowest2 = 0.0 * speed + np.inf
         sums[:] = 0.0
         for k in range(len(v)):
             element = read_elements(rows[k], ELEMENTS)
@@ -153,15 +176,11 @@ def evaluator(Law: type):
             store(v_next[k], 1, u[1])
             store(v_next[k], 2, u[2])
             scaled = speed * u[0], speed * u[1], speed * u[2]
-            factor, incline = (
-                read_factor(rows[k], FACTOR),
-                read_incline(rows[k], INCLINE),
-            )
+            factor = read_factor(rows[k], FACTOR)
+            incline = read_incline(rows[k], INCLINE)
             if k < n_sides:
-                quadratic, memory = (
-                    load(rows[k], QUADRATIC),
-                    read_memory(rows[k], MEMORY),
-                )
+                quadratic = load(rows[k], QUADRATIC)
+                memory = read_memory(rows[k], MEMORY)
                 f = side_load(
                     law, scaled, rounding, factor, incline, quadratic, memory, additions
                 )
@@ -199,8 +218,10 @@ def kernel(Law: type):
     @njit(nogil=True, error_model="numpy")
     def solve(loads, mass, guess, descent, limits, out):
         numbers, sides, points, point_terms, frame, additions = loads
-        law, size = Law(*numbers), out.shape[1]
-        n, m = len(sides[0][0]), points[0].shape[1]
+        law = Law(*numbers)
+        size = out.shape[1]
+        n = len(sides[0][0])
+        m = points[0].shape[1]
         by_elements = size * (ceil_divide(n, WIDTH) + m) < ceil_divide(size, WIDTH) * (
             n + m
         )
@@ -209,18 +230,20 @@ def kernel(Law: type):
         )  # samples at once, elements of one in a vector
         n_sides = ceil_divide(n, count)
         rows = np.ones((n_sides + m, ROWS, WIDTH))
-        v, v_next = np.zeros((len(rows), 3, WIDTH)), np.zeros((len(rows), 3, WIDTH))
-        samples, sums, results = (
-            np.ones((SAMPLE_ROWS, WIDTH)),
-            np.zeros((SUM_ROWS, WIDTH)),
-            np.zeros((RESULT_ROWS + 1, WIDTH)),
-        )
-        sample_of_slot, fresh = np.full(slots, -1), guess.shape[1] == 0
-        next_sample, n_ended = 0, 0
+        v = np.zeros((len(rows), 3, WIDTH))
+        v_next = np.zeros((len(rows), 3, WIDTH))
+        samples = np.ones((SAMPLE_ROWS, WIDTH))
+        sums = np.zeros((SUM_ROWS, WIDTH))
+        results = np.zeros((RESULT_ROWS + 1, WIDTH))
+        sample_of_slot = np.full(slots, -1)
+        fresh = guess.shape[1] == 0
+        next_sample = 0
+        n_ended = 0
         while n_ended < size:
             for slot in range(slots):
                 if sample_of_slot[slot] < 0 and next_sample < size:
-                    i, end = next_sample, WIDTH if by_elements else slot + 1
+                    i = next_sample
+                    end = WIDTH if by_elements else slot + 1
                     fill_contact(rows[:n_sides], sides, count, slot, end, i)
                     fill_contact(rows[n_sides:], points, 1, slot, end, i)
                     dx, dy, dtheta = (
@@ -242,8 +265,10 @@ def kernel(Law: type):
                         fill(samples, MASS, mass, 0, lane, i)
                         for j in range(len(first)):
                             samples[ITERATE + j, lane] = first[j]
-                    sample_of_slot[slot], next_sample = i, next_sample + 1
-            iterate, speed = read_iterate(samples, ITERATE), load(samples, SPEED)
+                    sample_of_slot[slot] = i
+                    next_sample += 1
+            iterate = read_iterate(samples, ITERATE)
+            speed = load(samples, SPEED)
             evaluate(
                 law,
                 point_terms,
@@ -259,13 +284,12 @@ def kernel(Law: type):
             )
             net = net_of(sums)
             if additions.momentum:
-                x, y, theta = (
-                    iterate.x + iterate.dx,
-                    iterate.y + iterate.dy,
-                    iterate.theta + iterate.dtheta,
-                )
+                x = iterate.x + iterate.dx
+                y = iterate.y + iterate.dy
+                theta = iterate.theta + iterate.dtheta
                 net = with_momentum(net, x, y, theta, read_mass(samples, MASS), speed)
-            slowest2, scales = load(sums, SLOWEST2), read_frame(samples, FRAME)
+            slowest2 = load(sums, SLOWEST2)
+            scales = read_frame(samples, FRAME)
             iterate, accepted, finished = newton_step(
                 iterate, net, slowest2, scales, descent, limits
             )
@@ -283,29 +307,29 @@ def kernel(Law: type):
                     if i >= 0 and results[RESULT_ROWS, slot] > 0.0:
                         for j in range(RESULT_ROWS):
                             out[j, i] = results[j, slot]
-                        sample_of_slot[slot], n_ended = -1, n_ended + 1
+                        sample_of_slot[slot] = -1
+                        n_ended += 1
 
     return cached(solve, f"the force balance for laws of the form {Law.__name__}")
 
 
 @functools.cache
 def net_kernel(Law: type):
-    """Return the compiled sum of forces at given velocities of all elements, for one class of law records."""
+    """Return the compiled sum of forces at given velocities of all elements, for one
+    class of law records."""
     evaluate = evaluator(Law)
 
     @njit(nogil=True, error_model="numpy")
     def net_at(loads, v, rounding, out):
         numbers, sides, points, point_terms, frame, additions = loads
-        law, n, size = Law(*numbers), len(sides[0][0]), v.shape[2]
-        rows, v_lanes = (
-            np.ones((v.shape[1], ROWS, WIDTH)),
-            np.zeros((v.shape[1], 3, WIDTH)),
-        )
-        v_next, samples, sums = (
-            np.zeros_like(v_lanes),
-            np.zeros((SAMPLE_ROWS, WIDTH)),
-            np.zeros((SUM_ROWS, WIDTH)),
-        )
+        law = Law(*numbers)
+        n = len(sides[0][0])
+        size = v.shape[2]
+        rows = np.ones((v.shape[1], ROWS, WIDTH))
+        v_lanes = np.zeros((v.shape[1], 3, WIDTH))
+        v_next = np.zeros_like(v_lanes)
+        samples = np.zeros((SAMPLE_ROWS, WIDTH))
+        sums = np.zeros((SUM_ROWS, WIDTH))
         samples[SPEED] = 1.0
         for first in range(0, size, WIDTH):
             count = min(WIDTH, size - first)
@@ -316,7 +340,8 @@ def net_kernel(Law: type):
                 fill(samples, FRAME, frame, 0, lane, i)
                 samples[ITERATE + ROUNDING_NEXT, lane] = rounding[i]
                 v_lanes[:, :, lane] = v[:, :, i].T
-            iterate, speed = read_iterate(samples, ITERATE), load(samples, SPEED)
+            iterate = read_iterate(samples, ITERATE)
+            speed = load(samples, SPEED)
             evaluate(
                 law,
                 point_terms,
@@ -336,7 +361,8 @@ def net_kernel(Law: type):
 
 
 def plain(x) -> np.ndarray:
-    """Return an array as doubles in C order that may be written to, the only form that kernels are compiled for."""
+    """Return an array as doubles in C order that may be written to, the only form that
+    kernels are compiled for."""
     return x if x.dtype is DOUBLE and x.flags.carray else np.array(x, float, order="C")
 
 
@@ -354,17 +380,20 @@ def stacked(record) -> np.ndarray:
 
 
 def kernel_number(x) -> np.ndarray | float:
-    """Return a number of a law as a float, an array as two-dimensional, the nodes of a rule as a column."""
+    """Return a number of a law as a float, an array as two-dimensional, the nodes of a
+    rule as a column."""
     if not isinstance(x, np.ndarray) or x.ndim == 0:
         return float(x)
     return plain(x.reshape(-1, 1) if x.ndim > 2 else x)
 
 
 def load_arguments(problem: Problem) -> tuple:
-    """Return the arguments of kernels that describe the loads of a problem: numbers of the law; elements, factors,
-    quadratic drag and memory of the ground, and incline of sides and of points; dry terms of the points; the frame with
-    the scale of speed; additions. Records that do not apply have no rows, for speed."""
-    p, additions = problem, problem.additions
+    """Return the arguments of kernels that describe the loads of a problem: numbers of
+    the law; elements, factors, quadratic drag and memory of the ground, and incline of
+    sides and of points; dry terms of the points; the frame with the scale of speed;
+    additions. Records that do not apply have no rows, for speed."""
+    p = problem
+    additions = problem.additions
     has_points = len(p.points.station) > 0
     ground = (
         stacked((p.quadratic_drag, *p.memory))
@@ -395,7 +424,8 @@ def nets(
     problem: Problem, v: np.ndarray, rounding: np.ndarray, xi: np.ndarray
 ) -> np.ndarray:
     """Return the entries of `Net` as `rft.balance.arrays.nets` does."""
-    p, out = problem, np.empty((SLOWEST2, problem.n_samples))
+    p = problem
+    out = np.empty((SLOWEST2, problem.n_samples))
     net_kernel(type(p.law))(load_arguments(p), plain(v), rounding, out)
     out = out.reshape(5, 3, -1)
     if p.momentum_rate is None:
@@ -410,7 +440,8 @@ def solve(
     problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray | None
 ) -> np.ndarray:
     """Solve all samples by one descent as `rft.balance.arrays.solve` does."""
-    p, out = problem, np.empty((RESULT_ROWS, problem.n_samples))
+    p = problem
+    out = np.empty((RESULT_ROWS, problem.n_samples))
     mass = (
         NO_ROWS
         if p.momentum_rate is None

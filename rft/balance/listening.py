@@ -1,5 +1,5 @@
-"""Listeners to the solver: functions called whenever force balances are solved, to count or time them, or to stop by
-raising."""
+"""Listeners to the solver: functions called whenever force balances are solved, to
+count or time them, or to stop by raising."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ def listener() -> Listener:
 
 
 def listen(new: Listener) -> None:
-    """Call ``new`` from here on, in whatever thread balances are solved, once for each batch."""
+    """Call ``new`` from here on, in whatever thread balances are solved, once for each
+    batch."""
     _listener.set(new)
 
 

@@ -1,15 +1,20 @@
-"""Continuation of solutions of a balance from a wide rounding to the required one, through folds.
+"""Continuation of solutions of a balance from a wide rounding to the required one,
+through folds.
 
-With a wide ``rounding`` a dry law is viscous and has one solution. From there a curve of solutions (xi, rounding) leads
-to any smaller rounding, since drag bounds the velocities. Where a law is not monotone, as granular laws are, the curve
-may fold: the rounding increases again along a stretch of it, three solutions share one rounding, and a descent, which
-only lowers the rounding, fails. Here the curve is followed by its arc length: a step along the tangent predicts, Newton's
-method across the tangent corrects, damped where the natural monotonicity test requires it. (Allgower and Georg, Numerical
-Continuation Methods, 1990, chapters 2 and 6; Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 3.3.)
+With a wide ``rounding`` a dry law is viscous and has one solution. From there a curve
+of solutions (xi, rounding) leads to any smaller rounding, since drag bounds the
+velocities. Where a law is not monotone, as granular laws are, the curve may fold: the
+rounding increases again along a stretch of it, three solutions share one rounding, and
+a descent, which only lowers the rounding, fails. Here the curve is followed by its arc
+length: a step along the tangent predicts, Newton's method across the tangent corrects,
+damped where the natural monotonicity test requires it. (Allgower and Georg, Numerical
+Continuation Methods, 1990, chapters 2 and 6; Deuflhard, Newton Methods for Nonlinear
+Problems, 2004, section 3.3.)
 
-The size of a change of (xi, log rounding) is the largest change of an element's velocity over its speed or the rounding,
-whichever is larger, so that it does not depend on frames, units or scales. Of several solutions the walk returns the first
-on the curve, where the tangent dF/dxi has a positive determinant.
+The size of a change of (xi, log rounding) is the largest change of an element's
+velocity over its speed or the rounding, whichever is larger, so that it does not depend
+on frames, units or scales. Of several solutions the walk returns the first on the
+curve, where the tangent dF/dxi has a positive determinant.
 """
 
 from __future__ import annotations
@@ -32,34 +37,28 @@ from rft.formulas.newton import (
     to_frame,
 )
 
-WIDEST = (
-    10.0  # rounding to start from, over the scale of speed: no element is that fast
-)
+# rounding to start from, over the scale of speed: no element is that fast
+WIDEST = 10.0
 FIRST_STEP = 2.0
 LARGEST_CORRECTION = 1.0  # first correction of a step that is not refused
-# Size of a correction that is the last of a step: over that of the previous correction, or absolute.
-CONVERGED_RATIO, CONVERGED = 0.25, 1e-6
-MOST_CORRECTIONS, MOST_AT_THE_END = (
-    5,
-    8,
-)  # of a step; of the step that reaches the required rounding
-FINE_STEP, MOST_FINE = (
-    1e-5,
-    30,
-)  # steps below this size may take so many corrections, damped
-GROWTH, SHRINKAGE = (
-    3.0,
-    0.5,
-)  # factor of the step, at most after a success, at least after a failure
-LEAST_DAMPING = (
-    2.0**-10
-)  # a correction with so little is accepted though the next one is no smaller
+# Size of a correction that is the last of a step: over that of the previous correction,
+# or absolute.
+CONVERGED_RATIO = 0.25
+CONVERGED = 1e-6
+MOST_CORRECTIONS = 5  # of a step
+MOST_AT_THE_END = 8  # of the step that reaches the required rounding
+FINE_STEP = 1e-5  # size of a step below which corrections are damped
+MOST_FINE = 30  # corrections of a step below FINE_STEP
+GROWTH = 3.0  # largest factor of the step after a success
+SHRINKAGE = 0.5  # smallest factor of the step after a failure
+# a correction with so little is accepted though the next one is no smaller
+LEAST_DAMPING = 2.0**-10
 DIFFERENCE = 1e-6  # of the rounding, for the derivative with respect to it
 
 
 def _stacked(triples) -> np.ndarray:
-    """Return velocities (3, n, B) of all elements, those of the sides first, from triples of the sides and of the
-    points."""
+    """Return velocities (3, n, B) of all elements, those of the sides first, from
+    triples of the sides and of the points."""
     stacks = [np.array(u) for u in triples]
     return stacks[0] if len(stacks) == 1 else np.concatenate(stacks, 1)
 
@@ -71,14 +70,16 @@ def _contacts(problem: Problem) -> list:
 
 
 def _to_elements(problem: Problem, xi: np.ndarray) -> np.ndarray:
-    """Return the contribution of a velocity xi (3, B) of the frame to the velocities of all elements, (3, n, B)."""
+    """Return the contribution of a velocity xi (3, B) of the frame to the velocities of
+    all elements, (3, n, B)."""
     return _stacked(
         [to_element(contact.elements, *xi) for contact in _contacts(problem)]
     )
 
 
 def _wrench(problem: Problem, force: np.ndarray) -> np.ndarray:
-    """Return force and moment on the frame (3, B) of forces on all elements (3, n, B), with their weights."""
+    """Return force and moment on the frame (3, B) of forces on all elements (3, n, B),
+    with their weights."""
     n = len(problem.sides.station)
     by_contact = [
         (contact.elements, f)
@@ -90,8 +91,9 @@ def _wrench(problem: Problem, force: np.ndarray) -> np.ndarray:
 def _with_slope(
     nets: Callable, problem: Problem, xi, v, rounding
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """Return force and moment on the frame followed by their slopes in xi, (3, 4, B), their slope (3, B) in the logarithm
-    of the rounding, and the number of evaluations."""
+    """Return force and moment on the frame followed by their slopes in xi, (3, 4, B),
+    their slope (3, B) in the logarithm of the rounding, and the number of
+    evaluations."""
     *net, by_speed = nets(problem, v, rounding, xi)
     net = np.array(net).transpose(1, 0, 2)
     if (
@@ -103,15 +105,18 @@ def _with_slope(
 
 
 def solve4(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Return x (4, k, B) with matrix (4, 4, B) x = right; nan where the matrix is singular or no number."""
-    matrix, right = np.moveaxis(matrix, -1, 0), np.moveaxis(right, -1, 0)
+    """Return x (4, k, B) with matrix (4, 4, B) x = right; nan where the matrix is
+    singular or no number."""
+    matrix = np.moveaxis(matrix, -1, 0)
+    right = np.moveaxis(right, -1, 0)
     is_regular = np.abs(np.linalg.det(matrix)) > 0
     x = np.linalg.solve(np.where(is_regular[:, None, None], matrix, np.eye(4)), right)
     return np.moveaxis(np.where(is_regular[:, None, None], x, np.nan), 0, -1)
 
 
 class _Point(NamedTuple):
-    """A velocity and a rounding. xi: (3, B). v: (3, n, B), velocities of the elements at xi. rounding: (B,)."""
+    """A velocity and a rounding. xi: (3, B). v: (3, n, B), velocities of the elements
+    at xi. rounding: (B,)."""
 
     xi: np.ndarray
     v: np.ndarray
@@ -130,7 +135,8 @@ class _Point(NamedTuple):
         return _Point(*(x[..., index] for x in self))
 
     def squared_scale(self) -> np.ndarray:
-        """Return squares of the elements' speeds plus the square of the rounding, (n, B)."""
+        """Return squares of the elements' speeds plus the square of the rounding,
+        (n, B)."""
         return self.squared_speed() + self.rounding**2
 
     def squared_speed(self) -> np.ndarray:
@@ -155,7 +161,9 @@ class _Walk:
     evaluations: np.ndarray
     base: _Point  # the last point on the curve
     tangent: np.ndarray  # (4, B), at the base, of size 1
-    border: np.ndarray  # (4, B), row of the tangent in the metric: corrections do not change its product with a change
+    # (4, B), row of the tangent in the metric: corrections do not change its product
+    # with a change
+    border: np.ndarray
     step: np.ndarray  # length along the tangent
     point: _Point  # before the change that is tried
     change: np.ndarray  # (4, B), tried from the point
@@ -180,11 +188,13 @@ class _Walk:
 def follow(
     problem: Problem, limits: Limits, nets: Callable, correction: float, budget: int
 ) -> Iterator[tuple]:
-    """Solve all samples of a problem. Yields their indices and their results, rows (6, b) as those of
-    `rft.formulas.newton.result`, as they end, with an infinite residual where the budget is spent.
+    """Solve all samples of a problem. Yields their indices and their results, rows
+    (6, b) as those of `rft.formulas.newton.result`, as they end, with an infinite
+    residual where the budget is spent.
 
-    nets: `rft.balance.arrays.nets` or that of `rft.balance.compiled`. correction: intended size of the first correction
-    of a step, by which the length of steps is chosen. budget: most evaluations."""
+    nets: `rft.balance.arrays.nets` or that of `rft.balance.compiled`. correction:
+    intended size of the first correction of a step, by which the length of steps is
+    chosen. budget: most evaluations."""
     walk = _start(nets, problem, limits.rounding)
     while walk.index.size:
         new = walk.point.shifted(walk.problem, walk.change)
@@ -207,7 +217,8 @@ def follow(
 
 
 def _start(nets: Callable, problem: Problem, last: float) -> _Walk:
-    """Return all samples at the viscous solution, with a first step towards less rounding."""
+    """Return all samples at the viscous solution, with a first step towards less
+    rounding."""
     size = problem.n_samples
     v = _stacked([u for u in velocities(problem) if len(u[0])])
     force, *columns, _ = nets(problem, v, np.full(size, VISCOUS), np.zeros((3, size)))
@@ -215,7 +226,9 @@ def _start(nets: Callable, problem: Problem, last: float) -> _Walk:
     base = _Point(xi, v + _to_elements(problem, xi), np.full(size, max(WIDEST, last)))
     tangent = np.zeros((4, size))
     tangent[3] = -1.0
-    zero, one, none = np.zeros(size), np.ones(size), np.zeros(size, int)
+    zero = np.zeros(size)
+    one = np.ones(size)
+    none = np.zeros(size, int)
     walk = _Walk(np.arange(size), problem, none + 1, base, tangent, tangent, FIRST_STEP * one, base, tangent, one, zero,
                  np.zeros((4, 4, size)), none, zero, none > 0)  # fmt: skip
     _predict(walk, np.ones(size, bool), last)
@@ -225,7 +238,8 @@ def _start(nets: Callable, problem: Problem, last: float) -> _Walk:
 def _predict(walk: _Walk, mask: np.ndarray, last: float) -> None:
     """Set the next change of the masked samples to a step along the tangent.
 
-    The step is straight in (xi, rounding), for the velocity of an element at rest is proportional to the rounding."""
+    The step is straight in (xi, rounding), for the velocity of an element at rest is
+    proportional to the rounding."""
     slope = walk.tangent[3]
     rounding = walk.base.rounding * np.exp(np.clip(walk.step * slope, -100.0, 5.0))
     reaches_last = rounding <= last
@@ -237,10 +251,8 @@ def _predict(walk: _Walk, mask: np.ndarray, last: float) -> None:
     walk.point = walk.base.where(mask, walk.point)
     walk.change = np.where(mask, change, walk.change)
     walk.last = np.where(mask, reaches_last, walk.last)
-    walk.damping, walk.corrections = (
-        np.where(mask, 1.0, walk.damping),
-        np.where(mask, 0, walk.corrections),
-    )
+    walk.damping = np.where(mask, 1.0, walk.damping)
+    walk.corrections = np.where(mask, 0, walk.corrections)
 
 
 @np.errstate(
@@ -252,12 +264,15 @@ def _correct(
     """Accept or refuse the new points, and choose the next changes."""
     matrix = _bordered(walk, net, slope)
     right = np.zeros((4, 2, walk.index.size))
-    right[:3, 0], right[3, 1] = -net[:, 0], 1.0
+    right[:3, 0] = -net[:, 0]
+    right[3, 1] = 1.0
     correction, tangent = np.moveaxis(solve4(matrix, right), 1, 0)
     size = new.size(walk.problem, correction)
-    first, fine = walk.corrections == 0, walk.step < FINE_STEP
+    first = walk.corrections == 0
+    fine = walk.step < FINE_STEP
     walk.first_size = np.where(first, size, walk.first_size)
-    # Natural monotonicity: with the previous matrix, a correction must be smaller by about half the damping.
+    # Natural monotonicity: with the previous matrix, a correction must be smaller by
+    # about half the damping.
     previous_matrix = np.where(first, np.eye(4)[..., None], walk.matrix)
     simplified = walk.point.size(
         walk.problem, solve4(previous_matrix, right[:, :1])[:, 0]
@@ -285,11 +300,10 @@ def _correct(
     walk.change = np.where(accepted, damping * correction, 0.5 * walk.change)
     walk.change[3] = np.clip(walk.change[3], -1.0, 1.0)
     walk.point = new.where(accepted, walk.point)
-    walk.size, walk.matrix = (
-        np.where(accepted, size, walk.size),
-        np.where(accepted, matrix, walk.matrix),
-    )
-    walk.damping, walk.corrections = damping, walk.corrections + 1
+    walk.size = np.where(accepted, size, walk.size)
+    walk.matrix = np.where(accepted, matrix, walk.matrix)
+    walk.damping = damping
+    walk.corrections = walk.corrections + 1
     if on_curve.any():
         _rebase(walk, on_curve, new, correction, tangent)
     factor = np.sqrt(intended / np.fmax(walk.first_size, 1e-9))
@@ -304,16 +318,18 @@ def _correct(
 
 
 def _bordered(walk: _Walk, net, slope) -> np.ndarray:
-    """Return the tangent in (xi, log rounding) over the border, (4, 4, B); in the last step the border is that of a fixed
-    rounding."""
+    """Return the tangent in (xi, log rounding) over the border, (4, 4, B); in the last
+    step the border is that of a fixed rounding."""
     matrix = np.empty((4, 4, walk.index.size))
-    matrix[:3, :3], matrix[:3, 3] = net[:, 1:], slope
+    matrix[:3, :3] = net[:, 1:]
+    matrix[:3, 3] = slope
     matrix[3] = np.where(walk.last, np.eye(4)[3][:, None], walk.border)
     return matrix
 
 
 def _rebase(walk: _Walk, mask: np.ndarray, new: _Point, correction, tangent) -> None:
-    """Make the corrected points of the masked samples the base, with the tangents there."""
+    """Make the corrected points of the masked samples the base, with the tangents
+    there."""
     base = new.shifted(walk.problem, np.where(mask, correction, 0.0))
     tangent = tangent / base.size(walk.problem, tangent)
     metric = _wrench(

@@ -1,7 +1,9 @@
-"""Body velocities of many samples: descents in the rounding, then walks along the curve of solutions.
+"""Body velocities of many samples: descents in the rounding, then walks along the curve
+of solutions.
 
-Samples that a descent (`rft.formulas.newton`) leaves unsolved are followed along their curve of solutions, which may fold
-(`rft.balance.path`); samples that the walks leave unsolved take slower descents."""
+Samples that a descent (`rft.formulas.newton`) leaves unsolved are followed along their
+curve of solutions, which may fold (`rft.balance.path`); samples that the walks leave
+unsolved take slower descents."""
 
 from __future__ import annotations
 
@@ -28,14 +30,16 @@ from rft.formulas.newton import (
     is_possible,
 )
 
-STUCK_BELOW = 10.0  # an element whose ends are slower than this many times the rounding is at rest
+# an element whose ends are slower than this many times the rounding is at rest
+STUCK_BELOW = 10.0
 ELEMENTS_TOGETHER = 24576  # elements x nodes x samples in one batch of NumPy
 COMPILED_WORTH = 4096  # samples a thread, below which another thread does not pay
 
 QUICK = Descent(0.011, 0.32, 0.08, 4.0, 48.0)
 WARM = Descent(0.0, 0.0, 0.0, np.inf, 12.0)  # from a guess, on the last level alone
-# Walks along a curve: intended size of a step's first correction, most evaluations. A force law alone needs no more than
-# these; the slow descents are for effects and quadrature rules whose kinks are not rounded off.
+# Walks along a curve: intended size of a step's first correction, most evaluations. A
+# force law alone needs no more than these; the slow descents are for effects and
+# quadrature rules whose kinks are not rounded off.
 WALKS = ((0.2, 150), (0.02, 600))
 SLOW = (
     Descent(0.1, 0.1, 1e-4, 1e3, 150.0),
@@ -47,8 +51,9 @@ keep_freed_memory()
 
 
 class Solved(NamedTuple):
-    """Solutions. xi: (3, B), body velocities. residual, iterations, stuck: (B,), residuals, evaluations, and whether an
-    element is at rest. limit: largest residual of a solved sample."""
+    """Solutions. xi: (3, B), body velocities. residual, iterations, stuck: (B,),
+    residuals, evaluations, and whether an element is at rest. limit: largest residual
+    of a solved sample."""
 
     xi: np.ndarray
     residual: np.ndarray
@@ -58,8 +63,8 @@ class Solved(NamedTuple):
 
 
 class Accuracy(NamedTuple):
-    """Required accuracy. rounding: speed, over the scale of speed, below which dry friction is linear. tolerance: residual
-    of a solution."""
+    """Required accuracy. rounding: speed, over the scale of speed, below which dry
+    friction is linear. tolerance: residual of a solution."""
 
     rounding: float
     tolerance: float
@@ -76,19 +81,27 @@ def solve(
 ) -> Solved:
     """Return the body velocities of B samples, in body lengths.
 
-    problem_at(index): the `Problem` of the samples ``index``. scale: (B,), its scale of speed. backend: as in
-    `rft.balance.backend`. guess: (3, B), tried first except where it is nan, or beyond FASTEST."""
-    size, report, linear = scale.size, listener(), assembly.linear
+    problem_at(index): the `Problem` of the samples ``index``. scale: (B,), its scale of
+    speed. backend: as in `rft.balance.backend`. guess: (3, B), tried first except where
+    it is nan, or beyond FASTEST."""
+    size = scale.size
+    report = listener()
+    linear = assembly.linear
     batch = max(1, ELEMENTS_TOGETHER // assembly.n_law_points)
-    driver, worth = arrays, 2 * batch  # samples that pay for a thread
+    driver = arrays
+    worth = 2 * batch  # samples that pay for a thread
     if compiles(backend, assembly.law):
-        driver, worth, batch = compiled_driver(), COMPILED_WORTH, 4 * batch
-    results, limit = np.zeros((RESULT_ROWS, size)), np.zeros(size)
+        driver = compiled_driver()
+        worth = COMPILED_WORTH
+        batch = 4 * batch
+    results = np.zeros((RESULT_ROWS, size))
+    limit = np.zeros(size)
     results[RESIDUAL] = np.inf
 
     def store(index, new, limits: Limits) -> None:
         new[EVALUATIONS] += results[EVALUATIONS, index]
-        results[:, index], limit[index] = new, limits.residual
+        results[:, index] = new
+        limit[index] = limits.residual
 
     def descend(share, stop) -> None:
         for index in split(share, math.ceil(share.size / batch)):
@@ -154,19 +167,22 @@ def compiled_driver() -> ModuleType:
 
 
 def _begin(descent: Descent, linear: bool, limits: Limits) -> Descent:
-    """Return the descent with the rounding of its first level, which is also the last level in a linear medium."""
+    """Return the descent with the rounding of its first level, which is also the last
+    level in a linear medium."""
     return descent._replace(
         first=limits.rounding if linear else max(descent.first, limits.rounding)
     )
 
 
 def _limits(problem: Problem, accuracy: Accuracy) -> Limits:
-    """Return the limits of a problem, whose residual allows for roundoff of the largest forces."""
+    """Return the limits of a problem, whose residual allows for roundoff of the largest
+    forces."""
     residual = accuracy.tolerance + 1e-14 * max(
         1.0, problem.lateral_drag / problem.axial_drag
     )
     if problem.momentum_rate is not None:
-        frame, m = problem.frame, problem.momentum_rate
+        frame = problem.frame
+        m = problem.momentum_rate
         residual += 1e-14 * np.max(
             m.rate * m.strength * frame.speed_scale / frame.force_scale
         )

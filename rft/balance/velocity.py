@@ -1,4 +1,5 @@
-"""Body velocity at a shape and a rate of change of shape: the zero of the medium's force and moment (paper Eq. 5)."""
+"""Body velocity at a shape and a rate of change of shape: the zero of the medium's
+force and moment (paper Eq. 5)."""
 
 from __future__ import annotations
 
@@ -40,8 +41,9 @@ class Solution(NamedTuple):
     1e-8 and velocities keep 13 digits.
 
     The residual is that of the regularised law. Near sticking, the regularisation moves
-    velocities whose status is "sliding" by up to some 200 times itself, and those of one
-    random shape in 300 by more than 10 times: a smaller regularisation shows by how much.
+    velocities whose status is "sliding" by up to some 200 times itself, and those of
+    one random shape in 300 by more than 10 times: a smaller regularisation shows by how
+    much.
 
     Examples
     --------
@@ -94,29 +96,36 @@ def body_velocity(
     backend: str = "auto",
     start: ArrayLike | None = None,
 ) -> Solution:
-    """Return the body velocity at which the medium's net force and moment on the body vanish.
+    """Return the body velocity at which the medium's net force and moment on the body
+    vanish.
 
     Parameters
     ----------
     medium : a force law of `rft.laws`, or any `rft.laws.base.Medium`.
     body : a body of `rft.bodies`, or any `rft.bodies.base.Body`.
-    alpha, alphadot : arrays (..., joints) that broadcast, shapes in rad and their rates in rad/time.
-    loads : average of the law over an element, "exact", "midpoint:N" or "gauss:N" (`rft.formulas.quadrature`).
-    regularisation : speed, body lengths per radian of joint motion |alphadot|, below which dry friction is rounded off
-        (v^2 -> v^2 + rounding^2); an element at rest creeps at about this speed.
+    alpha, alphadot : arrays (..., joints) that broadcast, shapes in rad and their rates
+        in rad/time.
+    loads : average of the law over an element, "exact", "midpoint:N" or "gauss:N"
+        (`rft.formulas.quadrature`).
+    regularisation : speed, body lengths per radian of joint motion |alphadot|, below
+        which dry friction is rounded off (v^2 -> v^2 + rounding^2); an element at rest
+        creeps at about this speed.
     tolerance : largest residual of a solution, to which roundoff is added, 1e-14 of the
         largest force (`Solution`).
     threads : most threads, by default one a core.
     effects : effects of `rft.effects` of the algebraic engine.
-    pieces : number to a body length of the pieces into which effects that vary along an element cut it.
+    pieces : number to a body length of the pieces into which effects that vary along an
+        element cut it.
     backend : "auto", "numpy" or "numba" (`rft.balance.backend`).
-    start : array (..., 3), body velocities to start from in the units of xi, such as those of a shape nearby; nan where
-        none is known. The solution is the same; a good start takes 5 evaluations in place of 10, a bad one 12 more.
+    start : array (..., 3), body velocities to start from in the units of xi, such as
+        those of a shape nearby; nan where none is known. The solution is the same; a
+        good start takes 5 evaluations in place of 10, a bad one 12 more.
 
     Raises
     ------
     ValueError
-        For arguments of another shape or out of bounds, for a medium that pushes, and for effects of another engine.
+        For arguments of another shape or out of bounds, for a medium that pushes, and
+        for effects of another engine.
 
     Examples
     --------
@@ -145,12 +154,10 @@ def body_velocity(
     moving = speed > 0
     if not moving.all():  # a body whose joints are at rest is at rest
         index = np.flatnonzero(moving)
-        assembly, alpha, alphadot, speed = (
-            assembly.take(index),
-            alpha[:, index],
-            alphadot[:, index],
-            speed[index],
-        )
+        assembly = assembly.take(index)
+        alpha = alpha[:, index]
+        alphadot = alphadot[:, index]
+        speed = speed[index]
         guess = None if guess is None else guess[:, index]
 
     def problem_at(index):
@@ -180,7 +187,8 @@ def body_velocity(
 
 
 def _with_samples_at_rest(solved: Solved, moving: np.ndarray) -> Solved:
-    """Return the solution of all samples from that of those which are ``moving`` (B,)."""
+    """Return the solution of all samples from that of those which are ``moving``
+    (B,)."""
     size = moving.size
     if solved.stuck.size == size:
         return solved
@@ -197,7 +205,8 @@ def _with_samples_at_rest(solved: Solved, moving: np.ndarray) -> Solved:
 
 
 def _guess(start, batch: tuple, length: float) -> np.ndarray:
-    """Return ``start`` as a guess (3, B) in body lengths; ValueError if it does not broadcast to xi."""
+    """Return ``start`` as a guess (3, B) in body lengths; ValueError if it does not
+    broadcast to xi."""
     start = real_array("start", start)
     fits = (
         start.shape[-1:] == (3,)
@@ -217,8 +226,8 @@ def _guess(start, batch: tuple, length: float) -> np.ndarray:
 
 
 def checked_input(body, alpha, alphadot, regularisation, tolerance) -> list[np.ndarray]:
-    """Return shapes and rates as arrays of one shape (..., joints); ValueError for arguments of another shape or out of
-    bounds."""
+    """Return shapes and rates as arrays of one shape (..., joints); ValueError for
+    arguments of another shape or out of bounds."""
     in_range("regularisation", regularisation, 1e-15, 1e3)
     in_range("tolerance", tolerance, 1e-15, 1e3)
     arrays = []

@@ -1,4 +1,5 @@
-"""Continuous backbones: many short straight elements whose bends follow from a few shape variables.
+"""Continuous backbones: many short straight elements whose bends follow from a few
+shape variables.
 
 The elements are chords of the curve; errors are of order 2 in 1/elements.
 """
@@ -19,17 +20,19 @@ from rft.core.refusal import require
 
 
 def _centres(count: int) -> np.ndarray:
-    """Return the centres of ``count`` equal elements, 0 at the tail to 1 at the head."""
+    """Return the centres of ``count`` equal elements, 0 at the tail to 1 at the
+    head."""
     return (np.arange(count) + 0.5) / count
 
 
 @BODIES.register
 @dataclass(frozen=True)
 class Backbone:
-    """A body of equal elements whose shape variables are the bends at the ``elements`` - 1 points between them, for
-    waves and measured centrelines.
+    """A body of equal elements whose shape variables are the bends at the ``elements``
+    - 1 points between them, for waves and measured centrelines.
 
-    frame (-): "mean", centre of mass and mean heading, or "link-1", "link-2" ..., centre and heading of that element.
+    frame (-): "mean", centre of mass and mean heading, or "link-1", "link-2" ...,
+    centre and heading of that element.
 
     Examples
     --------
@@ -63,20 +66,21 @@ class Backbone:
 
     @property
     def bends(self) -> np.ndarray | None:
-        """Bends at the points between elements for a unit of each shape variable, (elements - 1, joints); None where the
-        bends are the shape variables themselves."""
+        """Bends at the points between elements for a unit of each shape variable,
+        (elements - 1, joints); None where the bends are the shape variables
+        themselves."""
         return None
 
     def with_elements(self, count: int) -> Backbone:
-        """Return the body of ``count`` elements, in the frame "mean"; Refusal if there is
-        none."""
+        """Return the body of ``count`` elements, in the frame "mean"; Refusal if there
+        is none."""
         return replace(self, elements=count, frame="mean")
 
     def resampled(self, shape: ArrayLike, count: int) -> np.ndarray:
         """Return shapes, or rates, (..., joints) as those of `with_elements`.
 
-        Headings of elements are headings of the curve at their centres: a spline through
-        them, of order 4, gives those at other centres."""
+        Headings of elements are headings of the curve at their centres: a spline
+        through them, of order 4, gives those at other centres."""
         if self.bends is not None:
             return np.asarray(shape, float)
         from scipy.interpolate import CubicSpline
@@ -86,7 +90,8 @@ class Backbone:
         return np.diff(spline(_centres(count)), axis=-1)
 
     def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Elements:
-        """Return the elements at shapes and rates (joints, B), with the body frame held."""
+        """Return the elements at shapes and rates (joints, B), with the body frame
+        held."""
         if self.bends is None:
             return self.chain.motion(alpha, alphadot)
         return self.chain.motion(self.bends @ alpha, self.bends @ alphadot)
@@ -94,7 +99,8 @@ class Backbone:
     def frame_pose(
         self, frame: str, alpha: np.ndarray, alphadot: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the pose of another frame as `Chain.frame_pose` does; "link-k" is the k-th element."""
+        """Return the pose of another frame as `Chain.frame_pose` does; "link-k" is the
+        k-th element."""
         if self.bends is None:
             return self.chain.frame_pose(frame, alpha, alphadot)
         return self.chain.frame_pose(
@@ -106,11 +112,11 @@ class Backbone:
     def points(
         self, alpha: np.ndarray, pose: ArrayLike = (0.0, 0.0, 0.0)
     ) -> np.ndarray:
-        """Return the ends of the elements in the world, (..., elements + 1, 2), as `Chain.points` does."""
-        return self.chain.points(
-            alpha if self.bends is None else unmasked("alpha", alpha) @ self.bends.T,
-            pose,
-        )
+        """Return the ends of the elements in the world, (..., elements + 1, 2), as
+        `Chain.points` does."""
+        if self.bends is None:
+            return self.chain.points(alpha, pose)
+        return self.chain.points(unmasked("alpha", alpha) @ self.bends.T, pose)
 
     @classmethod
     def examples(cls) -> dict[str, Backbone]:
@@ -120,11 +126,11 @@ class Backbone:
 @BODIES.register
 @dataclass(frozen=True)
 class Serpenoid(Backbone):
-    """A backbone of two curvature modes: curvature times length = alpha_1 cos(2 pi waves s) + alpha_2 sin(2 pi waves s),
-    s from 0 at the tail to 1 at the head.
+    """A backbone of two curvature modes: curvature times length = alpha_1 cos(2 pi
+    waves s) + alpha_2 sin(2 pi waves s), s from 0 at the tail to 1 at the head.
 
-    A circle in (alpha_1, alpha_2) is a wave that travels towards the head; the reversed circle is one that travels
-    towards the tail and drives the body head first.
+    A circle in (alpha_1, alpha_2) is a wave that travels towards the head; the reversed
+    circle is one that travels towards the tail and drives the body head first.
 
     Examples
     --------
@@ -152,10 +158,9 @@ class Serpenoid(Backbone):
 
     @property
     def shape_labels(self) -> tuple[tuple[str, str], ...]:
-        return ("curvature x length, cosine", "rad"), (
-            "curvature x length, sine",
-            "rad",
-        )
+        cosine = ("curvature x length, cosine", "rad")
+        sine = ("curvature x length, sine", "rad")
+        return cosine, sine
 
     @cached_property
     def bends(self) -> np.ndarray:
@@ -170,7 +175,8 @@ class Serpenoid(Backbone):
 @BODIES.register
 @dataclass(frozen=True)
 class ConstantCurvature(Backbone):
-    """A backbone of sections of equal length, each an arc; alpha_k is the angle through which section k bends (rad).
+    """A backbone of sections of equal length, each an arc; alpha_k is the angle through
+    which section k bends (rad).
 
     Examples
     --------

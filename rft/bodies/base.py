@@ -1,4 +1,5 @@
-"""The base of bodies: straight elements, and their motion when the shape changes and the frame is held."""
+"""The base of bodies: straight elements, and their motion when the shape changes and
+the frame is held."""
 
 from __future__ import annotations
 
@@ -26,12 +27,14 @@ Length = Annotated[
 
 
 class Elements(NamedTuple):
-    """Straight elements of a body in its frame, arrays (n, B) for n elements and B samples, lengths in body lengths.
+    """Straight elements of a body in its frame, arrays (n, B) for n elements and B
+    samples, lengths in body lengths.
 
-    c, s: cosine and sine of the heading. r_t, r_n: velocity of the centre along and across the element at a unit
-    rotation rate of the frame. half: (n, 1), half length, 0 for a point. weight: (n, 1), factor of the drag per length,
-    which is the length of a piece of body. v_t, v_n, v_w: velocity with the frame held, along and across at the centre,
-    and rotation rate times half length.
+    c, s: cosine and sine of the heading. r_t, r_n: velocity of the centre along and
+    across the element at a unit rotation rate of the frame. half: (n, 1), half length,
+    0 for a point. weight: (n, 1), factor of the drag per length, which is the length of
+    a piece of body. v_t, v_n, v_w: velocity with the frame held, along and across at
+    the centre, and rotation rate times half length.
 
     Examples
     --------
@@ -56,11 +59,14 @@ class Elements(NamedTuple):
     def from_complex(
         cls, heading: Any, centre: Any, velocity: Any, rotation: Any, half: Any
     ) -> Elements:
-        """Return elements from complex numbers (n, B): exp(i theta) of their headings, their centres x + i y and the
-        velocities of the centres. rotation: (n, B), rates of theta. half: (n, 1), half lengths."""
+        """Return elements from complex numbers (n, B): exp(i theta) of their headings,
+        their centres x + i y and the velocities of the centres. rotation: (n, B), rates
+        of theta. half: (n, 1), half lengths."""
         back = heading.conj()
-        v, lever = velocity * back, centre * back
-        c, s = heading.real.copy(), heading.imag.copy()
+        v = velocity * back
+        lever = centre * back
+        c = heading.real.copy()
+        s = heading.imag.copy()
         return cls(
             c,
             s,
@@ -80,14 +86,15 @@ class Elements(NamedTuple):
 
     @property
     def centres(self) -> np.ndarray:
-        """Centres in the frame, complex (n, B): r_t + i r_n = i centre conj(heading)."""
+        """Centres in the frame, complex (n, B): r_t + i r_n = i centre
+        conj(heading)."""
         return (self.r_t + 1j * self.r_n) * (self.c + 1j * self.s) / 1j
 
     def attached_points(
         self, owner: list[int], ahead: np.ndarray, weight: np.ndarray
     ) -> Elements:
-        """Return k points attached to the elements ``owner``, each a distance ``ahead`` (k, 1) before the centre; weight:
-        (k, 1), factors of their drag."""
+        """Return k points attached to the elements ``owner``, each a distance ``ahead``
+        (k, 1) before the centre; weight: (k, 1), factors of their drag."""
         indices = np.array(owner)
         c, s, r_t, r_n, half, _, v_t, v_n, v_w = (x[indices] for x in self)
         return Elements(
@@ -106,16 +113,18 @@ class Elements(NamedTuple):
 class Body(Protocol):
     """A body of straight elements whose shape is ``joints`` numbers.
 
-    joints: number of shape variables. length: of the body, m, None where lengths are in body lengths.
-    motion(alpha, alphadot): its `Elements` at shapes and rates (joints, B), with the frame held. A body that is drawn
-    also has ``points``, and ``shape_labels`` if its shape variables are no joint angles: see `rft.Chain`.
+    joints: number of shape variables. length: of the body, m, None where lengths are in
+    body lengths. motion(alpha, alphadot): its `Elements` at shapes and rates
+    (joints, B), with the frame held. A body that is drawn also has ``points``, and
+    ``shape_labels`` if its shape variables are no joint angles: see `rft.Chain`.
 
     Examples
     --------
     >>> from rft import Chain
     >>> import numpy as np
     >>> chain = Chain()
-    >>> chain.joints, chain.motion(np.zeros((2, 1)), np.ones((2, 1))).c.shape  # of three elements
+    >>> elements = chain.motion(np.zeros((2, 1)), np.ones((2, 1)))
+    >>> chain.joints, elements.c.shape
     (2, (3, 1))
     """
 
@@ -144,24 +153,26 @@ def body_size(body: Any) -> float:
 
 def checked_body(body) -> Body:
     """Return the body; ValueError unless it has the members of `Body`."""
-    is_body = all(
-        hasattr(body, name) for name in ("joints", "length", "motion")
-    ) and not isinstance(body, type)
-    require(is_body, "body must be a body such as Chain((1, 1, 1))", value=body)
+    has_members = all(hasattr(body, name) for name in ("joints", "length", "motion"))
+    require(
+        has_members and not isinstance(body, type),
+        "body must be a body such as Chain((1, 1, 1))",
+        value=body,
+    )
     return body
 
 
 @cached_if_immutable
 def is_reversible(body: Body) -> bool:
-    """Return whether exchanging head and tail leaves the body and its frame as they are, from a few random shapes.
+    """Return whether exchanging head and tail leaves the body and its frame as they
+    are, from a few random shapes.
 
-    The exchange rotates the frame by pi and maps the joints alpha_1 ... alpha_d to -alpha_d ... -alpha_1."""
+    The exchange rotates the frame by pi and maps the joints alpha_1 ... alpha_d to
+    -alpha_d ... -alpha_1."""
     rng = np.random.default_rng(0)
     alpha, rates = rng.uniform(-1.5, 1.5, (2, body.joints, 5))
-    elements, exchanged = (
-        body.motion(alpha, rates),
-        body.motion(-alpha[::-1], -rates[::-1]),
-    )
+    elements = body.motion(alpha, rates)
+    exchanged = body.motion(-alpha[::-1], -rates[::-1])
     rotated = elements._replace(
         r_t=-elements.r_t, r_n=-elements.r_n, v_t=-elements.v_t, v_n=-elements.v_n
     )
@@ -172,11 +183,13 @@ def is_reversible(body: Body) -> bool:
 
 @cached_if_immutable
 def is_symmetric(body: Body) -> bool:
-    """Return whether a body of shape -alpha is its mirror image of shape alpha, left and right exchanged, from a few random
-    shapes; a body of one's own may be bent where its shape is zero."""
+    """Return whether a body of shape -alpha is its mirror image of shape alpha, left
+    and right exchanged, from a few random shapes; a custom body may be bent where its
+    shape is zero."""
     rng = np.random.default_rng(0)
     alpha, rates = rng.uniform(-1.5, 1.5, (2, body.joints, 5))
-    elements, other = body.motion(alpha, rates), body.motion(-alpha, -rates)
+    elements = body.motion(alpha, rates)
+    other = body.motion(-alpha, -rates)
     image = other._replace(s=-other.s, r_t=-other.r_t, v_n=-other.v_n, v_w=-other.v_w)
     return all(bool((np.abs(x - y) <= 1e-10).all()) for x, y in zip(elements, image))
 
@@ -207,13 +220,16 @@ class WrappedBody:
 
 
 def _joint_angles(body: Body, shape: np.ndarray) -> np.ndarray:
-    """Return the joint angles of a shape whose variables are modes; else the shape variables themselves."""
-    return body.joint_angles(shape) if hasattr(body, "joint_angles") else shape
+    """Return the joint angles of a shape whose variables are modes; else the shape
+    variables themselves."""
+    if hasattr(body, "joint_angles"):
+        return body.joint_angles(shape)
+    return shape
 
 
 def joint_speed(body: Body, alphadot: np.ndarray) -> np.ndarray:
-    """Return the size (B,) of the joint rates at rates (joints, B) of the shape variables, by which velocities are
-    scaled."""
+    """Return the size (B,) of the joint rates at rates (joints, B) of the shape
+    variables, by which velocities are scaled."""
     rates = _joint_angles(body, alphadot)
     return np.sqrt((rates * rates).sum(0))
 

@@ -1,4 +1,5 @@
-"""A chain of straight links joined by hinges: the three-link swimmer and its longer relatives (paper Fig. 11)."""
+"""A chain of straight links joined by hinges: the three-link swimmer and its longer
+relatives (paper Fig. 11)."""
 
 from __future__ import annotations
 
@@ -17,15 +18,18 @@ from rft.core.checks import Number, check_numbers
 @BODIES.register
 @dataclass(frozen=True)
 class Chain(Links):
-    """n straight links, tail to head; alpha_k is the heading of link k+1 minus that of link k, counter-clockwise.
+    """n straight links, tail to head; alpha_k is the heading of link k+1 minus that of
+    link k, counter-clockwise.
 
-    lengths (-): relative link lengths, all > 0, at least two. frame (-): "mean", centre of mass of a uniform body and
-    length-weighted mean heading (the paper's), or "link-1", "link-2" ..., centre and heading of that link.
+    lengths (-): relative link lengths, all > 0, at least two. frame (-): "mean", centre
+    of mass of a uniform body and length-weighted mean heading (the paper's), or
+    "link-1", "link-2" ..., centre and heading of that link.
 
-    modes (-): rows of joint angles; the shape variables are then the amplitudes m_1, m_2 ... of these modes in place of
-    the joint angles, alpha_k = sum over j of m_j modes[j][k]. "serpenoid": the cosine and the sine of ``waves`` waves on
-    the body (`rft.bodies.modes`), whose circle is a travelling wave. Joint speeds, and with them the regularisation,
-    are the same as without modes.
+    modes (-): rows of joint angles; the shape variables are then the amplitudes m_1,
+    m_2 ... of these modes in place of the joint angles, alpha_k = sum over j of m_j
+    modes[j][k]. "serpenoid": the cosine and the sine of ``waves`` waves on the body
+    (`rft.bodies.modes`), whose circle is a travelling wave. Joint speeds, and with them
+    the regularisation, are the same as without modes.
 
     Examples
     --------
@@ -61,43 +65,48 @@ class Chain(Links):
     @property
     def joints(self) -> int:
         """Number of shape variables: joints between links, or modes."""
-        return len(self.lengths) - 1 if self.modes is None else len(self._mode_rows)
+        if self.modes is None:
+            return len(self.lengths) - 1
+        return len(self._mode_rows)
 
     @cached_property
     def _mode_rows(self) -> np.ndarray:
         return mode_rows(self.modes, self.waves, len(self.lengths))
 
     def joint_angles(self, shape: np.ndarray) -> np.ndarray:
-        """Return the joint angles (n - 1, B) of shapes (joints, B), or the joint rates of rates."""
-        return shape if self.modes is None else self._mode_rows.T @ shape
+        """Return the joint angles (n - 1, B) of shapes (joints, B), or the joint rates
+        of rates."""
+        if self.modes is None:
+            return shape
+        return self._mode_rows.T @ shape
 
     @property
     def shape_labels(self) -> tuple[tuple[str, str], ...]:
         """(name, unit) of each shape variable, for the axes of pictures."""
-        return numbered_labels(
-            self.joints, "alpha_{}" if self.modes is None else "m_{}"
-        )
+        name = "alpha_{}" if self.modes is None else "m_{}"
+        return numbered_labels(self.joints, name)
 
     def _in_frame(self, differences: np.ndarray, link: int | None) -> np.ndarray:
-        """Return values of all links (n, B), less the frame's, from the differences (n - 1, B) between neighbours."""
+        """Return values of all links (n, B), less the frame's, from the differences
+        (n - 1, B) between neighbours."""
         x = np.zeros((len(self.lengths), differences.shape[1]), differences.dtype)
         np.add.accumulate(differences, 0, out=x[1:])
         x -= self._frame_value(x, link)
         return x
 
     def _links(self, alpha, alphadot):
-        size, link = alpha.shape[1], self._link
-        angles = self._in_frame(
-            np.concatenate([self.joint_angles(alpha), self.joint_angles(alphadot)], 1),
-            link,
-        )
-        theta, rotation = angles[:, :size], angles[:, size:]
+        size = alpha.shape[1]
+        link = self._link
+        # Angles and their rates are summed as one array.
+        joints = [self.joint_angles(alpha), self.joint_angles(alphadot)]
+        angles = self._in_frame(np.concatenate(joints, 1), link)
+        theta = angles[:, :size]
+        rotation = angles[:, size:]
         heading = np.empty(theta.shape, complex)
         np.cos(theta, out=heading.real)
         np.sin(theta, out=heading.imag)
-        halves = np.empty(
-            (len(theta), 2 * size), complex
-        )  # half links as vectors, and their velocities
+        # Half links as vectors, and their velocities.
+        halves = np.empty((len(theta), 2 * size), complex)
         np.multiply(self._half_lengths, heading, out=halves[:, :size])
         np.multiply(1j * rotation, halves[:, :size], out=halves[:, size:])
         centres = self._in_frame(halves[:-1] + halves[1:], link)

@@ -1,4 +1,5 @@
-"""Modes of a chain: rows of joint angles whose amplitudes are its shape variables, as numbers or by name."""
+"""Modes of a chain: rows of joint angles whose amplitudes are its shape variables, as
+numbers or by name."""
 
 from __future__ import annotations
 
@@ -9,14 +10,16 @@ from rft.core.refusal import Refusal, require
 
 LARGEST = 1e3  # of an entry: angles of larger modes have few digits left
 ROUNDOFF = 1e-12  # of the largest mode: a smaller mode is roundoff
-DEPENDENT = 1e-9  # smallest singular value over the largest, of rows of unit length, at which modes are dependent
+# smallest singular value over the largest, of rows of unit length, at which modes are
+# dependent
+DEPENDENT = 1e-9
 
 
 def checked_modes(
     modes, waves, links: int
 ) -> tuple[tuple[float, ...], ...] | str | None:
-    """Return modes as tuples, a name or None as they are; ValueError unless they are modes of a chain of ``links``
-    links."""
+    """Return modes as tuples, a name or None as they are; ValueError unless they are
+    modes of a chain of ``links`` links."""
     if modes is None:
         require(
             waves is None,
@@ -46,11 +49,13 @@ def checked_modes(
 def mode_rows(modes, waves: float | None, links: int) -> np.ndarray:
     """Return the joint angles of each mode at amplitude 1, (modes, joints).
 
-    The modes of a serpenoid are the cosine and the sine of 2 pi waves k / links at joint k, counted from the tail, with
-    one wave on the body by default."""
+    The modes of a serpenoid are the cosine and the sine of 2 pi waves k / links at
+    joint k, counted from the tail, with one wave on the body by default."""
     if not isinstance(modes, str):
         return np.array(modes)
-    phase = 2 * np.pi * (1.0 if waves is None else waves) * np.arange(1, links) / links
+    if waves is None:
+        waves = 1.0
+    phase = 2 * np.pi * waves * np.arange(1, links) / links
     return np.stack([np.cos(phase), np.sin(phase)])
 
 

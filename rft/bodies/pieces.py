@@ -14,23 +14,22 @@ PIECES = 40  # to a body length, by default; estimates of errors include theirs
 
 @dataclass(frozen=True, eq=False)
 class Pieces(WrappedBody):
-    """The body ``inner`` with every element cut into equal pieces no longer than ``longest``, in body lengths."""
+    """The body ``inner`` with every element cut into equal pieces no longer than
+    ``longest``, in body lengths."""
 
     longest: float
 
     @cached_property
     def _cuts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Element, centre and half length of each piece; the latter two in the element's coordinate s in [-1, 1]."""
-        counts = np.maximum(
-            1, np.ceil(2 * half_lengths(self.inner) / self.longest - 1e-9).astype(int)
-        )
+        """Element, centre and half length of each piece; the latter two in the
+        element's coordinate s in [-1, 1]."""
+        exact_counts = 2 * half_lengths(self.inner) / self.longest
+        counts = np.maximum(1, np.ceil(exact_counts - 1e-9).astype(int))
         owner = np.repeat(np.arange(counts.size), counts)
         rank = np.arange(owner.size) - np.repeat(np.cumsum(counts) - counts, counts)
-        return (
-            owner,
-            ((2 * rank + 1) / counts[owner] - 1)[:, None],
-            (1 / counts[owner])[:, None],
-        )
+        centre = (2 * rank + 1) / counts[owner] - 1
+        half = 1 / counts[owner]
+        return owner, centre[:, None], half[:, None]
 
     def motion(self, alpha, alphadot) -> Elements:
         owner, centre, fraction = self._cuts
@@ -52,11 +51,9 @@ class Pieces(WrappedBody):
 
 
 def subdivide(body: Body, pieces: int) -> Body:
-    """Return the body with at least ``pieces`` elements to its length; the body itself where its elements are short
-    enough."""
+    """Return the body with at least ``pieces`` elements to its length; the body itself
+    where its elements are short enough."""
     longest = 1 / pieces
-    return (
-        Pieces(body, longest)
-        if (2 * half_lengths(body) > longest * (1 + 1e-9)).any()
-        else body
-    )
+    if (2 * half_lengths(body) > longest * (1 + 1e-9)).any():
+        return Pieces(body, longest)
+    return body

@@ -1,4 +1,5 @@
-"""Links whose poses are a function of shape: any body that one can write down, rigid links or the pieces of a curve."""
+"""Links whose poses are a function of shape: any body that one can write down, rigid
+links or the pieces of a curve."""
 
 from __future__ import annotations
 
@@ -14,27 +15,30 @@ from rft.bodies.links import Links
 from rft.core.checks import check_numbers, in_range, real_array
 from rft.core.refusal import Refusal, require
 
-STEP = 0.01  # of the shape variables, of differences of order 6: errors of 1e-14 for functions that vary over 1 rad
-WEIGHTS = (
-    np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
-)  # of values at -3 to 3 steps
+# of the shape variables, of differences of order 6: errors of 1e-14 for functions that
+# vary over 1 rad
+STEP = 0.01
+# of values at -3 to 3 steps
+WEIGHTS = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
 SHAPES = 5, 7  # batch on which a function shows whether it takes many shapes
 # Links that are taken for pieces of a curve where the body does not say (assumed): so
 # many, and so many times the shape variables.
-PIECES_OF_A_CURVE, PIECES_PER_VARIABLE = 10, 3
+PIECES_OF_A_CURVE = 10
+PIECES_PER_VARIABLE = 3
 JOINED = 1e-9  # of the body's length, between links that meet
 
 
 class Posed(Links):
-    """Base of bodies with a function ``positions`` of shapes alpha (..., joints), or of one shape (joints,), that returns the
-    poses (..., n, 3) of the links: x, y of the centre, in the unit of ``lengths``, and heading theta, rad.
+    """Base of bodies with a function ``positions`` of shapes alpha (..., joints), or of
+    one shape (joints,), that returns the poses (..., n, 3) of the links: x, y of the
+    centre, in the unit of ``lengths``, and heading theta, rad.
 
-    Where the function sees the body from does not matter: poses are taken relative to the body frame. Velocities are
-    differences of order 6 in the shape.
+    Where the function sees the body from does not matter: poses are taken relative to
+    the body frame. Velocities are differences of order 6 in the shape.
 
-    continuous: whether the links are pieces of a curve, whose number is a numerical setting;
-    None: they are where there are at least 10, and three times as many as shape
-    variables."""
+    continuous: whether the links are pieces of a curve, whose number is a numerical
+    setting; None: they are where there are at least 10, and three times as many as
+    shape variables."""
 
     positions: Callable[[np.ndarray], np.ndarray]
     continuous: bool | None = None
@@ -45,7 +49,7 @@ class Posed(Links):
         check_numbers(self)
         self._frame_link(self.frame)
         try:
-            self._at(np.zeros((1, self.joints)))
+            self._poses(np.zeros((1, self.joints)))
         except Refusal:
             raise
         except Exception as error:
@@ -68,11 +72,13 @@ class Posed(Links):
         return links if continuous else None
 
     def with_elements(self, count: int) -> Resampled:
-        """Return the body of ``count`` equal links on the same curve, in the frame "mean"."""
+        """Return the body of ``count`` equal links on the same curve, in the frame
+        "mean"."""
         return Resampled(self, count)
 
     def resampled(self, shape: ArrayLike, count: int) -> np.ndarray:
-        """Return shapes, or rates, (..., joints) as those of `with_elements`: the same."""
+        """Return shapes, or rates, (..., joints) as those of `with_elements`: the
+        same."""
         return np.asarray(shape, float)
 
     @cached_property
@@ -88,8 +94,9 @@ class Posed(Links):
             all_at_once[-1, -1], one, rtol=1e-9
         )
 
-    def _at(self, alpha: np.ndarray) -> np.ndarray:
-        """Return the poses (..., n, 3) at shapes (..., joints), in body lengths; ValueError unless they are n poses."""
+    def _poses(self, alpha: np.ndarray) -> np.ndarray:
+        """Return the poses (..., n, 3) at shapes (..., joints), in body lengths;
+        ValueError unless they are n poses."""
         batch = alpha.shape[:-1]
         if self._takes_batches:
             poses = real_array("positions", self.positions(alpha))
@@ -114,44 +121,44 @@ class Posed(Links):
         size = np.sqrt((alphadot * alphadot).sum(0))
         direction = alphadot / np.where(size > 0, size, 1.0)
         near = STEP * np.arange(-3, 4)[:, None, None] * direction
-        poses = np.moveaxis(
-            self._at(np.moveaxis(alpha + near, 1, -1)), 1, -1
-        )  # (7, n, 3, B)
+        poses = self._poses(np.moveaxis(alpha + near, 1, -1))
+        poses = np.moveaxis(poses, 1, -1)  # (7, n, 3, B)
         poses[:, :, 2] = np.unwrap(np.unwrap(poses[:, :, 2], axis=1), axis=0)
-        centres, theta = poses[:, :, 0] + 1j * poses[:, :, 1], poses[:, :, 2]
-        rate = lambda x: np.tensordot(WEIGHTS, x, 1) * (size / STEP)
+        centres = poses[:, :, 0] + 1j * poses[:, :, 1]
+        theta = poses[:, :, 2]
+
+        def rate(x):
+            return np.tensordot(WEIGHTS, x, 1) * (size / STEP)
+
         return self._in_frame(centres[3], rate(centres), theta[3], rate(theta))
 
     def _in_frame(self, centre, velocity, theta, rotation) -> tuple[np.ndarray, ...]:
-        """Return what `_links` does from centres, headings and their rates (n, B) in any one frame."""
-        origin, drift, angle, spin = (
+        """Return what `_links` does from centres, headings and their rates (n, B) in
+        any one frame."""
+        origin, frame_velocity, frame_theta, frame_rotation = (
             self._frame_value(x, self._link)
             for x in (centre, velocity, theta, rotation)
         )
-        back = np.exp(-1j * angle)
-        centre, theta, rotation = (
-            back * (centre - origin),
-            theta - angle,
-            rotation - spin,
-        )
-        return (
-            np.exp(1j * theta),
-            rotation,
-            centre,
-            back * (velocity - drift) - 1j * spin * centre,
-            theta,
-        )
+        to_frame = np.exp(-1j * frame_theta)
+        centre = to_frame * (centre - origin)
+        velocity = to_frame * (velocity - frame_velocity) - 1j * frame_rotation * centre
+        theta = theta - frame_theta
+        rotation = rotation - frame_rotation
+        return np.exp(1j * theta), rotation, centre, velocity, theta
 
 
 @dataclass(frozen=True)
 class Positions(Posed):
-    """Links whose poses the function ``positions`` gives, such as a backbone function of sysplotter.
+    """Links whose poses the function ``positions`` gives, such as a backbone function
+    of sysplotter.
 
-    positions: function of shapes alpha (..., joints), or of one shape, that returns poses (..., n, 3) of the links, tail to
-    head: x, y of the centre in the unit of ``lengths`` and heading theta (rad), in any frame. lengths: of the n links.
-    length: of the body, m; without it lengths are in body lengths. frame: "mean" or "link-1", "link-2" ... continuous:
-    whether the links are pieces of a curve, so that errors contain the change with half of them; None: where there are
-    at least 10, and three times as many as shape variables.
+    positions: function of shapes alpha (..., joints), or of one shape, that returns
+    poses (..., n, 3) of the links, tail to head: x, y of the centre in the unit of
+    ``lengths`` and heading theta (rad), in any frame. lengths: of the n links. length:
+    of the body, m; without it lengths are in body lengths. frame: "mean" or "link-1",
+    "link-2" ... continuous: whether the links are pieces of a curve, so that errors
+    contain the change with half of them; None: where there are at least 10, and three
+    times as many as shape variables.
 
     Examples
     --------
@@ -179,8 +186,8 @@ class Positions(Posed):
 
 @dataclass(frozen=True)
 class Resampled(Posed):
-    """``count`` equal links on the curve through the links of a body, by splines: of their
-    headings where links join, so that these join too, else of their poses."""
+    """``count`` equal links on the curve through the links of a body, by splines: of
+    their headings where links join, so that these join too, else of their poses."""
 
     inner: Posed
     count: int
@@ -207,9 +214,10 @@ class Resampled(Posed):
 
     @cached_property
     def _joined(self) -> bool:
-        """Whether links of the inner body meet at their ends, at a few random shapes."""
+        """Whether links of the inner body meet at their ends, at a few random
+        shapes."""
         alpha = np.random.default_rng(0).uniform(-1.0, 1.0, (5, self.joints))
-        poses = self.inner._at(alpha)
+        poses = self.inner._poses(alpha)
         centre = poses[..., 0] + 1j * poses[..., 1]
         half = self.inner.fractions / 2 * np.exp(1j * poses[..., 2])
         gap = (centre - half)[..., 1:] - (centre + half)[..., :-1]
@@ -218,7 +226,7 @@ class Resampled(Posed):
     def positions(self, alpha: np.ndarray) -> np.ndarray:
         from scipy.interpolate import CubicSpline
 
-        poses = self.inner._at(np.asarray(alpha, float))
+        poses = self.inner._poses(np.asarray(alpha, float))
         poses[..., 2] = np.unwrap(poses[..., 2], axis=-1)
         ends = np.cumsum(self.inner.fractions)
         spline = CubicSpline(ends - self.inner.fractions / 2, poses, axis=-2)
@@ -226,5 +234,6 @@ class Resampled(Posed):
         if self._joined:
             link = np.exp(1j * poses[..., 2]) / self.count
             centre = np.cumsum(link, -1) - link / 2
-            poses[..., 0], poses[..., 1] = centre.real, centre.imag
+            poses[..., 0] = centre.real
+            poses[..., 1] = centre.imag
         return poses

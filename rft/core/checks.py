@@ -1,6 +1,8 @@
-"""Checks of arguments: numbers within bounds, arrays of real numbers, covariances. All raise ValueError with one line.
+"""Checks of arguments: numbers within bounds, arrays of real numbers, covariances. All
+raise ValueError with one line.
 
-The bounds, the unit and the meaning of a number field of a class stand in its annotation (`Number`):
+The bounds, the unit and the meaning of a number field of a class stand in its
+annotation (`Number`):
 
     radius: Annotated[float, Number(0, 1, "body lengths", "of the body")]
 """
@@ -23,8 +25,8 @@ from numpy.typing import ArrayLike
 class Number(NamedTuple):
     """Bounds, unit and meaning of a number field.
 
-    low, high: smallest and largest allowed value. unit: "-" for none. meaning: as lists of keys print it. whole: whether
-    the number must be an integer."""
+    low, high: smallest and largest allowed value. unit: "-" for none. meaning: as lists
+    of keys print it. whole: whether the number must be an integer."""
 
     low: float
     high: float
@@ -38,24 +40,23 @@ def number_fields(kind: Any) -> dict[str, Number]:
     """Return the `Number` annotations of a class by field."""
     try:
         hints = get_type_hints(kind, include_extras=True)
-    except (
-        NameError,
-        TypeError,
-    ):  # annotations of a user's class may name what is not importable
+    except (NameError, TypeError):
+        # Annotations of a user's class may name something that cannot be imported.
         return {}
-    numbers = {
-        name: [x for x in get_args(hint) if isinstance(x, Number)]
-        for name, hint in hints.items()
-    }
-    return {
-        name: annotations[0] for name, annotations in numbers.items() if annotations
-    }
+    found = {}
+    for name, hint in hints.items():
+        annotations = [x for x in get_args(hint) if isinstance(x, Number)]
+        if annotations:
+            found[name] = annotations[0]
+    return found
 
 
 def check_numbers(owner: Any) -> None:
-    """Raise ValueError unless the number fields of an object lie within the bounds of their annotations, or are None where
-    that is the default; store integers as int."""
-    defaults = {f.name: f.default for f in fields(owner)} if is_dataclass(owner) else {}
+    """Raise ValueError unless the number fields of an object lie within the bounds of
+    their annotations, or are None where that is the default; store integers as int."""
+    defaults = {}
+    if is_dataclass(owner):
+        defaults = {f.name: f.default for f in fields(owner)}
     kind: Any = type(owner)
     for name, number in number_fields(kind).items():
         value = getattr(owner, name)
@@ -66,15 +67,17 @@ def check_numbers(owner: Any) -> None:
 
 
 def real_array(name: str, x: ArrayLike) -> np.ndarray:
-    """Return x as an array of floats; ValueError with its name unless it is an array of real numbers."""
+    """Return x as an array of floats; ValueError with its name unless it is an array of
+    real numbers."""
     import numpy as np  # a command that refuses starts without it
 
     refuse_mask(name, x)
     try:
         array = np.asarray(x)
-        if array.dtype.kind in "iuf" or (
-            array.dtype.kind == "O" and all(map(is_number, array.flat))
-        ):
+        has_numbers = array.dtype.kind in "iuf"
+        if array.dtype.kind == "O":
+            has_numbers = all(map(is_number, array.flat))
+        if has_numbers:
             return array.astype(float, copy=False)
     except (TypeError, ValueError, OverflowError):
         pass
@@ -86,7 +89,8 @@ def refuse_mask(name: str, x: object) -> None:
     which NumPy would turn into the number under the mask."""
     import numpy as np
 
-    for row in x if isinstance(x, (list, tuple)) else (x,):
+    rows = x if isinstance(x, (list, tuple)) else (x,)
+    for row in rows:
         if isinstance(row, np.ma.MaskedArray) and np.ma.is_masked(row):
             raise Refusal(
                 f"{name} has masked values",
@@ -119,28 +123,31 @@ def is_whole(value: object) -> bool:
 def in_range(
     name: str, value: Any, low: float, high: float, whole: bool = False, unit: str = "-"
 ) -> None:
-    """Raise ValueError with the name unless value is a number, if ``whole`` an integer, from low to high."""
-    exact = (
-        getattr(value, "item", lambda: value)() if is_number(value) else value
-    )  # float32 has no 1e-50
-    if not ((is_whole if whole else is_number)(value) and low <= exact <= high):
-        bounds = f"{low:g} to {high:g}" + (f" {unit}" if unit != "-" else "")
-        raise Refusal(
-            f"{name} must be a {'whole ' * whole}number from {bounds}", value=value
-        )
+    """Raise ValueError with the name unless value is a number, if ``whole`` an integer,
+    from low to high."""
+    if is_number(value):
+        # A NumPy number would round the bounds to its own type: float32 has no 1e-50.
+        exact: Any = value.item() if hasattr(value, "item") else value
+        has_kind = is_whole(value) or not whole
+        if has_kind and low <= exact <= high:
+            return
+    kind = "whole number" if whole else "number"
+    bounds = f"{low:g} to {high:g}"
+    if unit != "-":
+        bounds = f"{bounds} {unit}"
+    raise Refusal(f"{name} must be a {kind} from {bounds}", value=value)
 
 
 def checked_covariance(value, *sizes: int) -> tuple[tuple[float, ...], ...] | None:
-    """Return a covariance matrix as rows of floats, None as it is; ValueError unless it is finite, n x n for an n among
-    ``sizes``, symmetric and, to roundoff, without a negative eigenvalue."""
+    """Return a covariance matrix as rows of floats, None as it is; ValueError unless it
+    is finite, n x n for an n among ``sizes``, symmetric and, to roundoff, without a
+    negative eigenvalue."""
     if value is None:
         return None
     import numpy as np
 
-    matrix, allowed = (
-        real_array("covariance", value),
-        " or ".join(f"{n} x {n}" for n in sizes),
-    )
+    matrix = real_array("covariance", value)
+    allowed = " or ".join(f"{n} x {n}" for n in sizes)
     require(
         matrix.shape in [(n, n) for n in sizes] and bool(np.isfinite(matrix).all()),
         f"covariance must be {allowed} finite numbers",

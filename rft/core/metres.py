@@ -1,4 +1,5 @@
-"""Units of plates, meshes and robots: annotations of lengths in m, and the acceleration of gravity."""
+"""Units of plates, meshes and robots: annotations of lengths in m, and the acceleration
+of gravity."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Premises: assumptions under which the body velocity follows from shape and its rate alone, and a connection exists."""
+"""Premises: assumptions under which the body velocity follows from shape and its rate
+alone, and a connection exists."""
 
 from __future__ import annotations
 
@@ -6,7 +7,8 @@ from enum import Flag, auto
 
 
 class Premise(Flag):
-    """Assumptions that hold for the plain force law and that effects and systems may break."""
+    """Assumptions that hold for the plain force law and that effects and systems may
+    break."""
 
     RATE_INDEPENDENT = auto()  # xi(alpha, c alphadot) = c xi
     SE2_SYMMETRIC = auto()  # xi does not depend on the pose on the ground
@@ -28,11 +30,13 @@ WORDS = {
     Premise.MEMORYLESS: "memoryless",
     Premise.QUASI_STATIC: "quasi-static",
 }
-NONE, ALL = Premise(0), ~Premise(0)
+NONE = Premise(0)
+ALL = ~Premise(0)
 # With these a body velocity follows from shape and its rate alone.
 SHAPE_ALONE = Premise.SE2_SYMMETRIC | Premise.MEMORYLESS | Premise.QUASI_STATIC
 
 
 def negated(broken: Premise) -> str:
-    """Return the description of something that breaks premises, such as "not memoryless, not quasi-static"."""
+    """Return the description of something that breaks premises, such as "not
+    memoryless, not quasi-static"."""
     return ", ".join(f"not {word}" for word in broken.words)

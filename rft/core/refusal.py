@@ -1,4 +1,5 @@
-"""How a refusal is said: in one line that names the place, the value and the cure. The facts stay with the error.
+"""Refusals: errors of one line that name the place, the value and the cure, and keep
+these facts.
 
 Nothing here needs NumPy, so that a command that refuses starts fast.
 """
@@ -15,16 +16,18 @@ ARGUMENT = re.compile("``([^`]+)``")  # in the words of a refusal
 
 
 def worded(words: str, spelled: Callable[[str], str] = str) -> str:
-    """Return words with each argument that they name in double backticks as ``spelled`` returns it, by default bare."""
+    """Return words with each argument that they name in double backticks as ``spelled``
+    returns it, by default bare."""
     return ARGUMENT.sub(lambda match: spelled(match[1]), words)
 
 
 class Refusal(ValueError):
     """A request, scene, file or argument that makes no sense.
 
-    what: says what is wrong. value: what was given, where that tells more. where: the way there, outermost first (file or
-    scene, table, key, argument). because: why it cannot be. instead: what to give or to do. The name of an argument
-    stands in double backticks: Python shows it bare, and a command as its option (`said`).
+    what: what is wrong. value: what was given, where that says more. where: the place,
+    outermost first (file or scene, section, key, argument). because: why it cannot be.
+    instead: what to give or to do. The name of an argument stands in double backticks:
+    Python shows it bare, and a command as its option (`said`).
 
     Examples
     --------
@@ -47,33 +50,32 @@ class Refusal(ValueError):
         instead: str = "",
     ):
         super().__init__(what)
-        self.what, self.value, self.because, self.instead = (
-            what,
-            value,
-            because,
-            instead,
-        )
-        self.where = tuple(map(str, where if isinstance(where, tuple) else (where,)))
+        self.what = what
+        self.value = value
+        self.because = because
+        self.instead = instead
+        places = where if isinstance(where, tuple) else (where,)
+        self.where = tuple(map(str, places))
 
     def __str__(self) -> str:
         return self.said(str)
 
     def said(self, spelled: Callable[[str], str]) -> str:
-        """Return the refusal as a line. spelled: returns what a reader types for the name of an argument."""
-        named = lambda words: worded(words, spelled)
-        text = (
-            named(self.what)
-            if self.value is ...
-            else f"{named(self.what)}, got {formatted(self.value)}"
-        )
-        if reasons := "; ".join(named(x) for x in (self.because, self.instead) if x):
-            text = f"{text}: {reasons}"
-        for place in map(named, reversed(self.where)):
-            text = before(place) + text
+        """Return the refusal as a line. spelled: returns what a reader types for the
+        name of an argument."""
+        text = worded(self.what, spelled)
+        if self.value is not ...:
+            text = f"{text}, got {formatted(self.value)}"
+        reasons = [worded(x, spelled) for x in (self.because, self.instead) if x]
+        if reasons:
+            text = f"{text}: {'; '.join(reasons)}"
+        for place in reversed(self.where):
+            text = before(worded(place, spelled)) + text
         return line(text)
 
     def within(self, place: object) -> Refusal:
-        """Return the refusal with a place before its own, unless it names that already."""
+        """Return the refusal with a place before its own, unless it names that
+        already."""
         names = (str(place), line(worded(str(place))))
         if not str(self).startswith(tuple(map(before, names))):
             self.where = (str(place), *self.where)
@@ -82,7 +84,9 @@ class Refusal(ValueError):
 
 def before(place: str) -> str:
     """Return a place as it stands before what is wrong there."""
-    return f"{place} " if place.endswith("]") else f"{place}: "
+    if place.endswith("]"):
+        return f"{place} "
+    return f"{place}: "
 
 
 @contextlib.contextmanager
@@ -108,18 +112,21 @@ def formatted(value: object, most: int = 60) -> str:
         text = " ".join(repr(value).split())
     except ValueError:  # an integer of more digits than Python prints
         text = "a very long number"
-    return text if len(text) <= most else text[: most - 3] + "..."
+    if len(text) <= most:
+        return text
+    return text[: most - 3] + "..."
 
 
 def printable(text: str) -> str:
-    """Return text, which may hold what others wrote, as it may be shown: what steers a terminal, or is not seen, stands as its
-    escape. Lines, tabs and blanks stay. All that goes to a terminal or into HTML passes here."""
+    """Return text from elsewhere as it may be shown: characters that control a terminal
+    or are invisible become escapes; line ends, tabs and blanks stay. All text that goes
+    to a terminal or into HTML passes here."""
     return re.sub(r"[^ -~\n\t]", _escaped, text)
 
 
 def in_line(name: object) -> str:
-    """Return the name of a file, or another that others chose, as it may stand within a
-    line: `printable`, and lines and tabs in it as escapes.
+    """Return a name from elsewhere, such as that of a file, as it may stand within a
+    line: `printable`, with line ends and tabs as escapes.
 
     Examples
     --------
@@ -132,11 +139,15 @@ def in_line(name: object) -> str:
 
 def _escaped(match: re.Match[str]) -> str:
     letter = match[0]
-    is_shown = letter.isprintable() or unicodedata.category(letter) == "Zs"
-    return letter if is_shown else letter.encode("unicode_escape").decode()
+    if letter.isprintable() or unicodedata.category(letter) == "Zs":
+        return letter
+    return letter.encode("unicode_escape").decode()
 
 
 def line(text: str, most: int = 400) -> str:
-    """Return `printable` text as one line of at most ``most`` characters, cut before its end."""
+    """Return `printable` text as one line of at most ``most`` characters, cut before
+    its end."""
     text = printable(" ".join(text.split()))
-    return text if len(text) <= most else text[: most - 100] + " ... " + text[-80:]
+    if len(text) <= most:
+        return text
+    return text[: most - 100] + " ... " + text[-80:]

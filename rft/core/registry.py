@@ -1,7 +1,9 @@
-"""Registries: parts of one family, such as force laws or gaits, by the names that users give them.
+"""Registries: parts of one family, such as force laws or gaits, by the names that users
+give them.
 
-A part is one file with one decorator, `Registry.register`. Its class has ``examples()``, a class method that returns parts by
-name, or parameters that all have defaults; the tests hold every example to the laws of its family.
+A part is one file with one decorator, `Registry.register`. Its class has
+``examples()``, a class method that returns parts by name, or parameters that all have
+defaults; the tests hold every example to the laws of its family.
 """
 
 from __future__ import annotations
@@ -23,12 +25,16 @@ BUILT_IN = ("geomech", "rft")  # packages whose names nobody else may give
 class Registry(Mapping[str, Any]):
     """Parts of one family by name, in the order in which they were registered.
 
-    group: of entry points with which installed packages offer parts. key: attribute that holds a part's name. noun: what a
-    part is, in words, such as "a gait". admits: whether an object is one.
+    group: of entry points with which installed packages offer parts. key: attribute
+    that holds a part's name. noun: what a part is, in words, such as "a gait". admits:
+    whether an object is one.
     """
 
     def __init__(self, group: str, key: str, noun: str, admits: Callable[[Any], bool]):
-        self.group, self.key, self.noun, self.admits = group, key, noun, admits
+        self.group = group
+        self.key = key
+        self.noun = noun
+        self.admits = admits
         self._parts: dict[str, Any] = {}
         REGISTRIES[group] = self
 
@@ -67,9 +73,9 @@ class Registry(Mapping[str, Any]):
     ) -> Callable[[Part], Part]: ...
 
     def register(self, part: Any = None, /, **members: Any) -> Any:
-        """Add a part under its name and return it: a decorator. Of the same module and name it takes the place of the one
-        before. members: attributes that a function is given. ValueError if it is no value, has no name, or its name is
-        taken."""
+        """Add a part under its name and return it: a decorator. It replaces a part of
+        the same module and name. members: attributes that a function
+        is given. ValueError if it is no value, has no name, or its name is taken."""
         if part is None:
             return lambda function: self.register(function, **members)
         for name, value in members.items():
@@ -108,8 +114,9 @@ class Registry(Mapping[str, Any]):
                     f"{who} is named {name!r}, as one that is built in",
                     instead="give it another name",
                 )
+            module, other = place(registered)
             raise Refusal(
-                f"{who} is named {name!r}, as the {place(registered)[1]} of {place(registered)[0]}",
+                f"{who} is named {name!r}, as the {other} of {module}",
                 instead="rename one",
             )
         self._parts[name] = part
@@ -121,14 +128,17 @@ class Registry(Mapping[str, Any]):
         self._parts.update(accepted)
 
     def examples(self) -> dict[str, Any]:
-        """Return parts of every class by name: those of its ``examples()``, else one without parameters."""
-        own_parts: dict[str, Any] = {}
+        """Return parts of every class by name: those of its ``examples()``, else one
+        without parameters."""
+        parts: dict[str, Any] = {}
         for name, part in self.items():
-            own = getattr(part, "examples", None)
-            own_parts |= (
-                own() if own else {name: part() if isinstance(part, type) else part}
-            )
-        return own_parts
+            if hasattr(part, "examples"):
+                parts |= part.examples()
+            elif isinstance(part, type):
+                parts[name] = part()
+            else:
+                parts[name] = part
+        return parts
 
 
 def classes_with(member: str) -> Callable[[Any], bool]:
@@ -142,7 +152,8 @@ def subclasses(base: type) -> Callable[[Any], bool]:
 
 
 def functions_with(member: str, value: str | None = None) -> Callable[[Any], bool]:
-    """Return whether an object is a function that has an attribute, of one value if that is given, as a function of it."""
+    """Return whether an object is a function that has an attribute, of one value if
+    that is given, as a function of it."""
 
     def admits(part: Any) -> bool:
         return (
@@ -161,10 +172,10 @@ def load_all(package: str, path: Iterable[str]) -> None:
 
 
 def home(part: Any) -> str:
-    """Return the module that a part is of, an object as it says (``home``)."""
+    """Return the module of a part: its ``home`` if it has one."""
     return getattr(part, "home", None) or part.__module__
 
 
 def place(part: Any) -> tuple[str, str]:
-    """Return the module and the name of a part in it; of an object its own name."""
+    """Return the module of a part and its name there; for an object its own name."""
     return home(part), getattr(part, "__qualname__", "") or part.name

@@ -1,4 +1,5 @@
-"""Memory and threads of the solver: freed memory that is not returned, and samples shared between threads."""
+"""Memory and threads of the solver: freed memory that is not returned, and samples
+shared between threads."""
 
 from __future__ import annotations
 
@@ -21,8 +22,9 @@ LARGE_BLOCK = 2**24  # bytes; glibc adapts to blocks of up to 32 MB
 def keep_freed_memory() -> None:
     """Make glibc keep freed memory, by freeing a large block once.
 
-    Until then it returns freed memory to the system, page by page; afterwards it keeps up to twice that much for the next
-    temporaries. This halves the solver's time on Linux and does nothing elsewhere."""
+    Until then it returns freed memory to the system, page by page; afterwards it keeps
+    up to twice that much for the next temporaries. This halves the solver's time on
+    Linux and does nothing elsewhere."""
     np.empty(LARGE_BLOCK, np.uint8)
 
 
@@ -39,7 +41,8 @@ _one: ContextVar[bool] = ContextVar("one thread", default=False)
 
 @contextlib.contextmanager
 def one_thread() -> Iterator[None]:
-    """Let the solver take one thread in the body of the statement, where other processes use the other cores."""
+    """Let the solver take one thread in the body of the statement, where other
+    processes use the other cores."""
     token = _one.set(True)
     try:
         yield
@@ -48,25 +51,34 @@ def one_thread() -> Iterator[None]:
 
 
 def thread_count(allowed: int | None, useful: int) -> int:
-    """Return the number of threads to take: at most ``useful``, and at most ``allowed``, by default one a core."""
-    return 1 if useful < 2 or _one.get() else max(1, min(allowed or cores(), useful))
+    """Return the number of threads to take: at most ``useful``, and at most
+    ``allowed``, by default one a core."""
+    if useful < 2 or _one.get():
+        return 1
+    return max(1, min(allowed or cores(), useful))
 
 
 def split(samples: np.ndarray, count: int) -> list[np.ndarray]:
     """Return ``count`` shares of the samples."""
-    return np.array_split(samples, count) if count > 1 else [samples]
+    if count < 2:
+        return [samples]
+    return np.array_split(samples, count)
 
 
 def run_shares(function: Callable, shares: list) -> None:
-    """Call function(share, stop) for all shares, each in a thread of its own; NumPy and compiled code release the
-    interpreter.
+    """Call function(share, stop) for all shares, each in a thread of its own; NumPy and
+    compiled code release the interpreter.
 
-    An exception in this thread, such as one raised by a signal, sets ``stop``, and the functions return after their next
-    step. Threads are started by `_thread` and report to a queue whose lock no signal leaves locked: a signal that arrives
-    inside `concurrent.futures` may leave its threads waiting for ever."""
+    An exception in this thread, such as one raised by a signal, sets ``stop``, and the
+    functions return after their next step. Threads are started by `_thread` and report
+    to a queue whose lock no signal leaves locked: a signal that arrives inside
+    `concurrent.futures` may leave its threads waiting for ever."""
     if len(shares) == 1:
         return function(shares[0], NEVER)
-    stop, results, started, ended = threading.Event(), SimpleQueue(), 0, []
+    stop = threading.Event()
+    results = SimpleQueue()
+    started = 0
+    ended = []
     try:
         for share in shares:
             _thread.start_new_thread(_run, (function, share, stop, results, ended))
@@ -77,9 +89,8 @@ def run_shares(function: Callable, shares: list) -> None:
                 raise error
     except BaseException:
         stop.set()
-        while (
-            len(ended) < started
-        ):  # not by results: a signal may arrive between a `get` and its assignment
+        # Not counted by results: a signal may arrive between a `get` and its assignment.
+        while len(ended) < started:
             time.sleep(POLL_INTERVAL)
         raise
 

@@ -1,4 +1,5 @@
-"""Effects beyond the plain force law, one a file; only those that a scene lists are computed."""
+"""Effects beyond the plain force law, one a file; only those that a scene lists are
+computed."""
 
 from rft.core.registry import load_all
 from rft.effects.base import (

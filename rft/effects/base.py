@@ -1,4 +1,5 @@
-"""The base of effects: additions to the plain force law, computed only where a scene lists them."""
+"""The base of effects: additions to the plain force law, computed only where a scene
+lists them."""
 
 from __future__ import annotations
 
@@ -19,15 +20,16 @@ from rft.effects.contact import Problem
 # Engines and what they solve, the cheapest first.
 ENGINES = {
     "algebraic": "the balance of forces at every shape, all shapes at once",
-    "time stepping": "the balance of forces step after step through the gait, place and past carried along",
+    "time stepping": "the balance of forces step after step through the gait, place and "
+    "past carried along",
     "dynamic": "the equation of motion phase after phase, implicit in time",
 }
 PAST = Premise.MEMORYLESS | Premise.QUASI_STATIC
 
 
 class InMetres(NamedTuple):
-    """The other spelling of a field in body lengths: the name of a field in metres, and
-    the power of a length in both: 1, or -1 for a number per length."""
+    """The field that gives a length in metres, beside one in body lengths: its name,
+    and the power of the length in both, 1, or -1 for a number per length."""
 
     name: str
     power: int = 1
@@ -40,9 +42,10 @@ class InMetres(NamedTuple):
 class Site(NamedTuple):
     """Place and phase of one time step of B samples, in body lengths and rad.
 
-    count: number of steps before this one. dt: phase since the previous step, rad, 0 at the first step. pose: (3, B),
-    predicted pose of the frame on the ground. v_before: velocities (v_t, v_n, v_w) of the body's elements at the
-    previous step, (n, B) each."""
+    count: number of steps before this one. dt: phase since the previous step, rad, 0 at
+    the first step. pose: (3, B), predicted pose of the frame on the ground. v_before:
+    velocities (v_t, v_n, v_w) of the body's elements at the previous step, (n, B)
+    each."""
 
     count: int
     dt: float
@@ -50,35 +53,47 @@ class Site(NamedTuple):
     v_before: tuple[np.ndarray, np.ndarray, np.ndarray]
 
     def centres(self, elements: Any) -> np.ndarray:
-        """Return the centres of elements on the ground as complex numbers x + i y, (n, B)."""
+        """Return the centres of elements on the ground as complex numbers x + i y,
+        (n, B)."""
         x, y, theta = self.pose
         return x + 1j * y + np.exp(1j * theta) * elements.centres
 
     def headings(self, elements: Any) -> np.ndarray:
-        """Return the headings of elements on the ground as complex numbers exp(i theta), (n, B)."""
+        """Return the headings of elements on the ground as complex numbers exp(i
+        theta), (n, B)."""
         return np.exp(1j * self.pose[2]) * (elements.c + 1j * elements.s)
 
 
 @dataclass(frozen=True)
 class Effect:
-    """Base of all effects; an effect is one change of a `rft.effects.contact.Problem`, and any two effects commute.
+    """Base of all effects; an effect is one change of a `rft.effects.contact.Problem`,
+    and any two effects commute.
 
     Attributes
     ----------
     kind : name in scenes and messages.
-    breaks : premises that no longer hold with the effect, and with them an engine or a result.
-    adds_points : whether the effect adds points to the body; other effects then act on these points, too.
+    breaks : premises that no longer hold with the effect, and with them an engine or a
+        result.
+    adds_points : whether the effect adds points to the body; other effects then act on
+        these points, too.
     limit : values of the parameters at which the effect vanishes, as text.
     order : order at which it vanishes there.
     cost : work beyond that of the plain force law, as text.
-    batched : names of parameters that may be arrays (B,), one number for each sample of a batch.
-    drift_tolerance : change of displacement from cycle to cycle, body lengths, below which cycles are periodic.
-    memory_bounds : least and largest number of a state that is an array of memory, of which those at the starts of cycles
-        may be mixed to reach the limit cycle sooner; None for a state of another kind.
-    memory_size : numbers that time stepping stores for each sample, beside a few for each element.
-    varies_along : whether the effect varies along an element; it then acts by its mean over each piece of an element.
-    odd : whether the loads that it adds change sign with all velocities (assumed, not proven).
-    metres : fields in body lengths, and for each the field that gives it in metres, of a body with a ``length``.
+    batched : names of parameters that may be arrays (B,), one number for each sample of
+        a batch.
+    drift_tolerance : change of displacement from cycle to cycle, body lengths, below
+        which cycles are periodic.
+    memory_bounds : least and largest number of a state that is an array of memory, of
+        which those at the starts of cycles may be mixed to reach the limit cycle
+        sooner; None for a state of another kind.
+    memory_size : numbers that time stepping stores for each sample, beside a few for
+        each element.
+    varies_along : whether the effect varies along an element; it then acts by its mean
+        over each piece of an element.
+    odd : whether the loads that it adds change sign with all velocities (assumed, not
+        proven).
+    metres : fields in body lengths, and for each the field that gives it in metres, of
+        a body with a ``length``.
     required : fields without a default that follow one with.
 
     Examples
@@ -122,8 +137,8 @@ class Effect:
                 raise Refusal(f"{self.kind} has no {name}", instead=cure)
 
     def in_body_lengths(self, length: float | None) -> Self:
-        """Return the effect with its lengths in body lengths, on a body of a length (m),
-        None for one without.
+        """Return the effect with its lengths in body lengths, on a body of a length
+        (m), None for one without.
 
         Raises ValueError for metres on a body without a length, for body lengths on a
         body that has one, where they are easily taken for metres, and for values out
@@ -138,7 +153,8 @@ class Effect:
         values = {}
         for name, other in self.metres.items():
             number = number_fields(type(self))[name]
-            own, in_metres = getattr(self, name), getattr(self, other.name)
+            own = getattr(self, name)
+            in_metres = getattr(self, other.name)
             if in_metres is None:
                 if length is not None and np.any(own):
                     largest = np.max(own)
@@ -161,9 +177,8 @@ class Effect:
             values[other.name] = None
             values[name] = in_metres / length**other.power
             with located(f"{self.kind} {other.name} of a body of {length:g} m"):
-                for bound in (np.min(values[name]), np.max(values[name])):
-                    limits = number.low, number.high
-                    in_range(name, float(bound), *limits, unit=number.unit)
+                for x in (np.min(values[name]), np.max(values[name])):
+                    in_range(name, float(x), number.low, number.high, unit=number.unit)
         return self.with_parameters(**values)
 
     def in_metres(self, length: float | None) -> Self:
@@ -190,20 +205,23 @@ class Effect:
 
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, Self]:
-        """Return effects by name, the one of ``order`` by ``kind`` alone, that vanish as x goes to 0."""
+        """Return effects by name, the one of ``order`` by ``kind`` alone, that vanish
+        as x goes to 0."""
         return {cls.kind: cls()}
 
     def apply(self, problem: Problem, site: Site | None, state: Any) -> Problem:
-        """Return the problem with this effect; site and state are None unless the effect breaks a premise of
-        `rft.core.premise.SHAPE_ALONE`."""
+        """Return the problem with this effect; site and state are None unless the
+        effect breaks a premise of `rft.core.premise.SHAPE_ALONE`."""
         raise NotImplementedError
 
     def begin(self, problem: Problem, site: Site) -> Any:
-        """Return the state of the effect before the first step: a record of arrays, samples on the last axis."""
+        """Return the state of the effect before the first step: a record of arrays,
+        samples on the last axis."""
         return ()
 
     def after(self, problem: Problem, site: Site, state: Any, v: tuple) -> Any:
-        """Return the state after a step that ended with velocities v = (v_t, v_n, v_w) of the body's elements."""
+        """Return the state after a step that ended with velocities v = (v_t, v_n, v_w)
+        of the body's elements."""
         return state
 
     def with_velocity_change(
@@ -214,31 +232,28 @@ class Effect:
         change: np.ndarray,
         drag: np.ndarray,
     ) -> Any:
-        """Return the state as if the body had moved faster by ``change`` (3, B) up to and including the step at
-        ``site``, with an additional ``drag`` (3, B) over the axial drag; the state of the ground stays as it is."""
+        """Return the state as if the body had moved faster by ``change`` (3, B) up to
+        and including the step at ``site``, with an additional ``drag`` (3, B) over the
+        axial drag; the state of the ground stays as it is."""
         return state
 
     def assumes(self, medium: Any) -> str:
-        """Return, as text, what is assumed because neither the effect nor the medium gives it; "" for nothing."""
+        """Return, as text, what is assumed because neither the effect nor the medium
+        gives it; "" for nothing."""
         return ""
 
     def take(self, index: Any) -> Self:
         """Return the effect with its parameters at the samples ``index``."""
-        arrays = {
-            f.name: x
-            for f in fields(self)
-            if isinstance(x := getattr(self, f.name), np.ndarray)
-        }
-        return self.with_parameters(
-            **{
-                name: x[..., index]
-                for name, x in arrays.items()
-                if x.ndim > 0 and x.shape[-1] != 1
-            }
-        )
+        selected = {}
+        for field in fields(self):
+            x = getattr(self, field.name)
+            if isinstance(x, np.ndarray) and x.ndim > 0 and x.shape[-1] != 1:
+                selected[field.name] = x[..., index]
+        return self.with_parameters(**selected)
 
     def with_parameters(self, **values: Any) -> Self:
-        """Return the effect with other parameters, which may be arrays (B,); nothing is checked."""
+        """Return the effect with other parameters, which may be arrays (B,); nothing is
+        checked."""
         if not values:
             return self
         new = object.__new__(type(self))
@@ -250,26 +265,30 @@ EFFECTS = Registry("geomech.effects", "kind", "an effect", subclasses(Effect))
 
 
 def stepwise_effects(effects: Sequence[Effect]) -> list[Effect]:
-    """Return the effects that depend on the past or on the place on the ground, and so take time stepping.
+    """Return the effects that depend on the past or on the place on the ground, and so
+    take time stepping.
 
     Examples
     --------
     >>> from rft.effects import SkinFriction, Transient, stepwise_effects
-    >>> [effect.kind for effect in stepwise_effects([SkinFriction(), Transient(travel=0.12)])]
+    >>> effects = [SkinFriction(), Transient(travel=0.12)]
+    >>> [effect.kind for effect in stepwise_effects(effects)]
     ['transient']
     """
-    return [e for e in effects if e.breaks & SHAPE_ALONE]
+    return [effect for effect in effects if effect.breaks & SHAPE_ALONE]
 
 
 def batched_effect(effects: Sequence[Effect], counts: Sequence[int]) -> Effect:
-    """Return one effect for a batch, made from effects of one kind, each of them for ``count`` samples in a row.
+    """Return one effect for a batch, made from effects of one kind, each of them for
+    ``count`` samples in a row.
 
     Raises ValueError if they differ in a parameter that is not `Effect.batched`.
 
     Examples
     --------
     >>> from rft.effects import SkinFriction, batched_effect
-    >>> batched_effect([SkinFriction(0.1, 0.1), SkinFriction(0.1, 0.2)], counts=[1, 2]).backward
+    >>> effects = [SkinFriction(0.1, 0.1), SkinFriction(0.1, 0.2)]
+    >>> batched_effect(effects, counts=[1, 2]).backward
     array([0.1, 0.2, 0.2])
     """
     first = effects[0]
@@ -294,11 +313,9 @@ def broken_premises(effects: Sequence[Effect]) -> Premise:
     >>> broken_premises([Transient(travel=0.12)])
     <Premise.MEMORYLESS: 4>
     """
-    is_list = isinstance(effects, Sequence) and all(
-        isinstance(e, Effect) for e in effects
-    )
+    is_sequence = isinstance(effects, Sequence)
     require(
-        is_list,
+        is_sequence and all(isinstance(e, Effect) for e in effects),
         "effects must be a list of effects such as EndCaps(radius=0.06)",
         value=effects,
     )

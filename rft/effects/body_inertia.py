@@ -1,4 +1,5 @@
-"""Mass of the body: the balance of forces becomes an equation of motion (`rft.formulas.momentum`)."""
+"""Mass of the body: the balance of forces becomes an equation of motion
+(`rft.formulas.momentum`)."""
 
 from __future__ import annotations
 
@@ -24,10 +25,11 @@ from rft.formulas.newton import to_element
 @EFFECTS.register
 @dataclass(frozen=True)
 class BodyInertia(Effect):
-    """Mass of the body, uniform along its length: d(momentum)/dt = force of the medium, and likewise for the moment.
+    """Mass of the body, uniform along its length: d(momentum)/dt = force of the medium,
+    and likewise for the moment.
 
-    Only mass x length x (2 pi frequency)^2 / drag matters. In a viscous medium the drag is that at one body length per
-    radian of phase.
+    Only mass x length x (2 pi frequency)^2 / drag matters. In a viscous medium the drag
+    is that at one body length per radian of phase.
 
     Examples
     --------
@@ -70,34 +72,36 @@ class BodyInertia(Effect):
 
     @property
     def inertia(self) -> Any:
-        """Ratio of inertia to drag, mass x length x (2 pi frequency)^2 / drag, without a unit."""
+        """Ratio of inertia to drag, mass x length x (2 pi frequency)^2 / drag, without
+        a unit."""
         return self.mass * self.length * (2 * np.pi * self.frequency) ** 2 / self.drag
 
     def begin(self, problem: Problem, site: Site) -> np.ndarray:
-        """Return the momenta (2, 3, n, B) of the elements on the ground at the last two steps, the older one first."""
+        """Return the momenta (2, 3, n, B) of the elements on the ground at the last two
+        steps, the older one first."""
         return np.zeros((2, 3, *problem.sides.elements.c.shape))
 
     def apply(self, problem: Problem, site: Site, state: np.ndarray) -> Problem:
         older, last = state
-        first_order = site.count == 1
-        rate = (1.0 if first_order else 1.5) / site.dt
-        past = last / site.dt if first_order else (2 * last - 0.5 * older) / site.dt
-        strength = np.atleast_2d(self.inertia * problem.axial_drag)
-        return problem._replace(
-            momentum_rate=MomentumRate(
-                np.full((1, 1), rate), *ground_to_frame(site.pose, past), strength
-            )
+        if site.count == 1:
+            # Of order 1: only one earlier step is known.
+            rate = 1.0 / site.dt
+            past = last / site.dt
+        else:
+            rate = 1.5 / site.dt
+            past = (2 * last - 0.5 * older) / site.dt
+        momentum_rate = MomentumRate(
+            np.full((1, 1), rate),
+            *ground_to_frame(site.pose, past),
+            strength=np.atleast_2d(self.inertia * problem.axial_drag),
         )
+        return problem._replace(momentum_rate=momentum_rate)
 
     def after(
         self, problem: Problem, site: Site, state: np.ndarray, v: np.ndarray
     ) -> np.ndarray:
-        return np.stack(
-            [
-                state[1],
-                frame_to_ground(site.pose, element_momenta(problem.sides.elements, v)),
-            ]
-        )
+        new = element_momenta(problem.sides.elements, v)
+        return np.stack([state[1], frame_to_ground(site.pose, new)])
 
     def with_velocity_change(
         self,
@@ -107,7 +111,8 @@ class BodyInertia(Effect):
         change: np.ndarray,
         drag: np.ndarray,
     ) -> np.ndarray:
-        # Drag reduced the change of momentum during the last step, so that it was larger one step earlier.
+        # Drag reduced the change of momentum during the last step, so that it was
+        # larger one step earlier.
         e = problem.sides.elements
         last = element_momenta(e, to_element(e, *change))
         loss = site.dt / (self.inertia + site.dt) * drag

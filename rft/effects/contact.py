@@ -1,7 +1,8 @@
-"""The balance of forces as a value: records of arrays that effects change and both drivers solve.
+"""The balance of forces as a value: records of arrays that effects change and both
+drivers solve.
 
-The last axis of every array is that of the samples, or has one column for all of them. `take` selects samples of any
-record, and `mapped` applies a function to its arrays."""
+The last axis of every array is that of the samples, or has one column for all of them.
+`take` selects samples of any record, and `mapped` applies a function to its arrays."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ from rft.laws.base import cached_if_immutable, is_linear, require_drag, speed_ex
 from rft.laws.records import record
 
 MOST_PIECES = 10_000  # to a body length
-ONE, ZERO = np.ones((1, 1)), np.zeros((1, 1))
+ONE = np.ones((1, 1))
+ZERO = np.zeros((1, 1))
 NO_FACTOR = Factor(ONE, ONE, ONE)
 NO_INCLINE = Incline(ONE, ZERO, ONE, ZERO, ZERO)
 NO_MEMORY = Memory(ZERO, ZERO, ZERO, ZERO, ONE, ONE, ONE, ONE, ZERO, ZERO)
@@ -29,8 +31,9 @@ NO_MEMORY = Memory(ZERO, ZERO, ZERO, ZERO, ONE, ONE, ONE, ONE, ZERO, ZERO)
 class Contact(NamedTuple):
     """Elements (n, B) in contact with the ground.
 
-    station: (n, 1), their centres along the body, 0 at its tail, 1 at its head. buried: (n, 1), 1 at the body's depth, 0
-    on the surface. factor: of their drag. incline: slope of the ground."""
+    station: (n, 1), their centres along the body, 0 at its tail, 1 at its head. buried:
+    (n, 1), 1 at the body's depth, 0 on the surface. factor: of their drag. incline:
+    slope of the ground."""
 
     elements: Elements
     station: np.ndarray
@@ -39,33 +42,43 @@ class Contact(NamedTuple):
     incline: Incline = NO_INCLINE
 
     def with_factors(self, forward, backward, across) -> Contact:
-        """Return the contact with its drag multiplied by these factors, numbers or arrays that broadcast to (n, B)."""
-        f = self.factor
-        products = f.forward * forward, f.backward * backward, f.across * across
-        return self._replace(factor=Factor(*(np.atleast_2d(x) for x in products)))
+        """Return the contact with its drag multiplied by these factors, numbers or
+        arrays that broadcast to (n, B)."""
+        factor = Factor(
+            np.atleast_2d(self.factor.forward * forward),
+            np.atleast_2d(self.factor.backward * backward),
+            np.atleast_2d(self.factor.across * across),
+        )
+        return self._replace(factor=factor)
 
     def joined(self, other: Contact) -> Contact:
         """Return the elements of this contact followed by those of the other."""
 
+        n = len(self.station)
+        m = len(other.station)
+        if n == 0:
+            return other
+
         def concatenated(a, b):
             columns = max(a.shape[-1], b.shape[-1])
-            return np.concatenate(
-                [np.broadcast_to(a, (n, columns)), np.broadcast_to(b, (m, columns))]
-            )
+            a = np.broadcast_to(a, (n, columns))
+            b = np.broadcast_to(b, (m, columns))
+            return np.concatenate([a, b])
 
-        n, m = len(self.station), len(other.station)
-        return mapped(concatenated, self, other) if n else other
+        return mapped(concatenated, self, other)
 
 
 class Problem(NamedTuple):
     """The balance of forces on a body, for a batch of samples.
 
-    medium: the law, as given. law: its record (`rft.laws.records`). axial_drag: unit of force, the drag on the whole
-    straight body along itself at unit speed (across if there is none along). lateral_drag: that drag across.
-    homogeneous, linear: whether drag stays, or doubles, when velocities double. sides: the body's elements, under the
-    law. points: points attached to them, under dry terms that face along the body, point_terms (T, 3, n, 1).
-    quadratic_drag: (1, 1) or (1, B), force over |v_n| v_n. memory: of the ground at the elements. momentum_rate: of the
-    body, None without mass. frame: means and scales of the samples."""
+    medium: the law, as given. law: its record (`rft.laws.records`). axial_drag: unit of
+    force, the drag on the whole straight body along itself at unit speed (across if
+    there is none along). lateral_drag: that drag across. homogeneous, linear: whether
+    drag stays, or doubles, when velocities double. sides: the body's elements, under
+    the law. points: points attached to them, under dry terms that face along the body,
+    point_terms (T, 3, n, 1). quadratic_drag: (1, 1) or (1, B), force over |v_n| v_n.
+    memory: of the ground at the elements. momentum_rate: of the body, None without
+    mass. frame: means and scales of the samples."""
 
     medium: Any
     law: Any
@@ -99,32 +112,29 @@ class Problem(NamedTuple):
 
     @property
     def law_speed_scale(self) -> np.ndarray:
-        """Scale (1, B or 1) of the velocities that loads are computed at; 1 where drag does not depend on the speed."""
+        """Scale (1, B or 1) of the velocities that loads are computed at; 1 where drag
+        does not depend on the speed."""
         a = self.additions
-        return (
-            ONE
-            if self.homogeneous and not (a.quadratic or a.memory or a.momentum)
-            else self.frame.speed_scale
-        )
+        if self.homogeneous and not (a.quadratic or a.memory or a.momentum):
+            return ONE
+        return self.frame.speed_scale
 
     def take(self, index) -> Problem:
         """Return the problem of the samples ``index``."""
-        return Problem(
-            *self[:6], *take(self[6:], index)
-        )  # the law is the same for all samples
+        # The law, in the first six fields, is the same for all samples.
+        return Problem(*self[:6], *take(self[6:], index))
 
     def with_points(
         self, points: Contact, terms: Sequence[tuple[float, float, float]]
     ) -> Problem:
-        """Return the problem with more points, each with all of these dry terms (q, k_t, k_n)."""
-        new = np.repeat(
-            np.array(terms, float)[:, :, None, None], len(points.station), 2
-        )
+        """Return the problem with more points, each with all of these dry terms
+        (q, k_t, k_n)."""
+        new = np.array(terms, float)[:, :, None, None]
+        new = np.repeat(new, len(points.station), 2)
         if len(self.points.station):
-            count = max(len(self.point_terms), len(new))
-            new = np.concatenate(
-                [_padded(x, count) for x in (self.point_terms, new)], 2
-            )
+            old = self.point_terms
+            count = max(len(old), len(new))
+            new = np.concatenate([_padded(old, count), _padded(new, count)], 2)
         return self._replace(points=self.points.joined(points), point_terms=new)
 
 
@@ -133,37 +143,50 @@ NO_POINT_TERMS = np.zeros((0, 3, 0, 1))
 
 
 def _padded(terms: np.ndarray, count: int) -> np.ndarray:
-    """Return dry terms (T, 3, n, 1) of points as ``count`` terms, the added ones without drag."""
+    """Return dry terms (T, 3, n, 1) of points as ``count`` terms, the added ones
+    without drag."""
     return np.concatenate(
         [terms, np.broadcast_to(NO_TERM, (count - len(terms), *terms.shape[1:]))]
     )
 
 
 def mapped(function: Callable, *records):
-    """Return the record of function(array, ...) over the arrays of one record, or of several records of one class; the
-    first record itself if no array changes."""
+    """Return the record of function(array, ...) over the arrays of one record, or of
+    several records of one class; the first record itself if no array changes."""
     first = records[0]
+    if isinstance(first, np.ndarray):
+        return function(*records)
     if not isinstance(first, tuple):
-        return function(*records) if isinstance(first, np.ndarray) else first
+        return first
     values = [mapped(function, *fields) for fields in zip(*records)]
     if all(a is b for a, b in zip(values, first)):
         return first
-    return type(first)(*values) if hasattr(first, "_fields") else tuple(values)
+    if hasattr(first, "_fields"):
+        return type(first)(*values)
+    return tuple(values)
 
 
 def take(record, index) -> Any:
-    """Return a record with the samples ``index`` of its arrays; arrays of one column stay as they are."""
-    return mapped(
-        lambda x: x if x.shape[-1] == 1 and x.ndim > 1 else x[..., index], record
-    )
+    """Return a record with the samples ``index`` of its arrays; arrays of one column
+    stay as they are."""
+
+    def selected(x):
+        if x.shape[-1] == 1 and x.ndim > 1:
+            return x
+        return x[..., index]
+
+    return mapped(selected, record)
 
 
 class Assembly(NamedTuple):
-    """A law, a subdivided body and effects: everything that does not depend on shapes and rates, built by `assemble`.
+    """A law, a subdivided body and effects: everything that does not depend on shapes
+    and rates, built by `assemble`.
 
-    station, fraction: (n, 1), centres of the elements along the body and their fractions of its length. buried: (n, 1),
-    of `Contact`. no_points: an empty contact. n_elements: number of elements and added points. n_law_points: number of
-    points at which the law is evaluated, elements times nodes of the rule. Other fields as in `Problem`."""
+    station, fraction: (n, 1), centres of the elements along the body and their
+    fractions of its length. buried: (n, 1), of `Contact`. no_points: an empty contact.
+    n_elements: number of elements and added points. n_law_points: number of points at
+    which the law is evaluated, elements times nodes of the rule. Other fields as in
+    `Problem`."""
 
     medium: Any
     law: Any
@@ -183,12 +206,11 @@ class Assembly(NamedTuple):
     def problem(
         self, alpha: np.ndarray, alphadot: np.ndarray, speed: np.ndarray | None = None
     ) -> Problem:
-        """Return the balance at shapes and rates (joints, B), with a scale of speed (B,), by default the joint speed."""
-        problem = self.without_effects(
-            alpha,
-            alphadot,
-            joint_speed(self.body, alphadot) if speed is None else speed,
-        )
+        """Return the balance at shapes and rates (joints, B), with a scale of speed
+        (B,), by default the joint speed."""
+        if speed is None:
+            speed = joint_speed(self.body, alphadot)
+        problem = self.without_effects(alpha, alphadot, speed)
         for effect in self.effects:
             problem = effect.apply(problem, None, None)
         return problem
@@ -196,14 +218,17 @@ class Assembly(NamedTuple):
     def take(self, index) -> Assembly:
         """Return the assembly with the effects' parameters at the samples ``index``."""
         effects = tuple(effect.take(index) for effect in self.effects)
-        unchanged = all(a is b for a, b in zip(effects, self.effects))
-        return self if unchanged else self._replace(effects=effects)
+        if all(a is b for a, b in zip(effects, self.effects)):
+            return self
+        return self._replace(effects=effects)
 
     def without_effects(self, alpha, alphadot, speed) -> Problem:
         """Return the balance without effects."""
         e = self.body.motion(alpha, alphadot)
-        x, y = e.r_t * e.s + e.r_n * e.c, e.r_n * e.s - e.r_t * e.c
-        speed, mean = speed[None], self.fraction.T
+        x = e.r_t * e.s + e.r_n * e.c
+        y = e.r_n * e.s - e.r_t * e.c
+        speed = speed[None]
+        mean = self.fraction.T
         frame = Frame(mean @ x, mean @ y, force_scale(self, speed), speed)
         sides = Contact(e, self.station, self.buried)
         return Problem(
@@ -221,11 +246,13 @@ class Assembly(NamedTuple):
 def assemble(
     medium, body: Body, effects: Sequence = (), rule: str = "exact", pieces: int = 40
 ) -> Assembly:
-    """Return the assembly of a medium, a body and effects, with averages by a rule ("exact", "midpoint:N", "gauss:N") and
-    ``pieces`` to a body length where an effect varies along an element.
+    """Return the assembly of a medium, a body and effects, with averages by a rule
+    ("exact", "midpoint:N", "gauss:N") and ``pieces`` to a body length where an effect
+    varies along an element.
 
-    Raises ValueError unless the body is a `Body`, the medium drags, and every effect takes the medium. Assemblies of
-    immutable arguments are cached, for a small batch takes as long to assemble as to solve."""
+    Raises ValueError unless the body is a `Body`, the medium drags, and every effect
+    takes the medium. Assemblies of immutable arguments are cached, for a small batch
+    takes as long to assemble as to solve."""
     return _assembled(medium, body, tuple(effects), rule, pieces)
 
 
@@ -243,13 +270,12 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
     e = body.motion(zero, zero)
     station = np.cumsum(2 * e.half, 0) - e.half
     no_points = Contact(Elements(*(x[:0] for x in e)), station[:0], station[:0])
-    # Effects that add points act first, so that all others act on these points, whatever their order.
+    # Effects that add points act first, so that all others act on these points,
+    # whatever their order.
     ordered = tuple(sorted(effects, key=lambda effect: not effect.adds_points))
     fraction = e.half / e.half.sum()
-    along, across = (
-        abs(float(medium.traction(*v)[i]))
-        for i, v in enumerate(((1.0, 0.0), (0.0, 1.0)))
-    )
+    along = abs(float(medium.traction(1.0, 0.0)[0]))
+    across = abs(float(medium.traction(0.0, 1.0)[1]))
     law_and_units = (
         medium,
         record(medium, rule),
@@ -278,18 +304,18 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
 
 
 def force_scale(assembly: Assembly, speed: np.ndarray) -> np.ndarray:
-    """Return the unit of residuals (1, B or 1): drag at the samples' speeds, in dry media not below the drag at unit
-    speed."""
-    medium, unit = assembly.medium, assembly.axial_drag
+    """Return the unit of residuals (1, B or 1): drag at the samples' speeds, in dry
+    media not below the drag at unit speed."""
+    medium = assembly.medium
+    unit = assembly.axial_drag
     if assembly.homogeneous:
         return unit * ONE
     if assembly.linear:
         return unit * speed
     viscous = getattr(medium, "viscous", None)
     if viscous is None:
-        along, across = (
-            np.abs(medium.traction(*v)[k])
-            for k, v in enumerate(((speed, 0 * speed), (0 * speed, speed)))
-        )
+        zero = 0 * speed
+        along = np.abs(medium.traction(speed, zero)[0])
+        across = np.abs(medium.traction(zero, speed)[1])
         return np.where(along > 0, along, across)
     return unit + viscous[0] * np.maximum(speed - 1.0, 0.0)

@@ -17,18 +17,22 @@ from rft.effects.contact import Contact, Problem
 @EFFECTS.register
 @dataclass(frozen=True)
 class DepthProfile(Effect):
-    """Drag in proportion to depth, 2 k rho g r |z| of Eq. 2; depths are over the reference depth of the medium's drag.
+    """Drag in proportion to depth, 2 k rho g r |z| of Eq. 2; depths are over the
+    reference depth of the medium's drag.
 
-    along (-): |z| over that depth at equally spaced places from tail to head, linear between them; [1, 1] is level.
+    along (-): |z| over that depth at equally spaced places from tail to head, linear
+    between them; [1, 1] is level.
 
-    Each piece of the body has the depth of its centre. With a slope, drag depends on place and heading.
+    Each piece of the body has the depth of its centre. With a slope, drag depends on
+    place and heading.
 
     Examples
     --------
     >>> from rft import Chain, Granular, body_velocity
     >>> from rft.effects import DepthProfile
     >>> tail_down = DepthProfile(along=(1.5, 1.0))
-    >>> body_velocity(Granular(1.8, 0.24), Chain(), [0.5, 0.3], [1.0, 0.0], effects=[tail_down]).xi.round(3)
+    >>> at_shape = Granular(1.8, 0.24), Chain(), [0.5, 0.3], [1.0, 0.0]
+    >>> body_velocity(*at_shape, effects=[tail_down]).xi.round(3)
     array([ 0.009,  0.008, -0.139])
     """
 
@@ -60,7 +64,10 @@ class DepthProfile(Effect):
     metres = {"slope": InMetres("slope_per_m", -1)}
     odd = True
     limit = "along all 1 and slope = 0"
-    cost = "one multiplication an element; with a slope, a step at a time in place of all phases at once"
+    cost = (
+        "one multiplication an element; with a slope, a step at a time in place of all "
+        "phases at once"
+    )
     batched = ("slope", "towards", "slope_per_m")
     varies_along = True
 
@@ -95,18 +102,16 @@ class DepthProfile(Effect):
         )
 
     def depths(self, contact: Contact, site: Site | None) -> np.ndarray:
-        """Return the depths of a contact's elements over the reference depth, (n, 1), or (n, B) with a slope; ValueError
-        where a buried element comes to the surface."""
-        level = np.interp(
-            contact.station, np.linspace(0, 1, len(self.along)), self.along
-        )
+        """Return the depths of a contact's elements over the reference depth, (n, 1),
+        or (n, B) with a slope; ValueError where a buried element comes to the
+        surface."""
+        places = np.linspace(0, 1, len(self.along))
+        level = np.interp(contact.station, places, self.along)
         if not self.breaks:
             return level
-        depth = (
-            level
-            + self.slope
-            * (site.centres(contact.elements) * np.exp(-1j * self.towards)).real
-        )
+        centres = site.centres(contact.elements)
+        distance = (centres * np.exp(-1j * self.towards)).real
+        depth = level + self.slope * distance
         if not (depth > 0).all(where=contact.buried > 0):
             raise Refusal(
                 "the body comes to the surface",

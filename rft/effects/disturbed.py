@@ -1,4 +1,5 @@
-"""Memory of disturbed ground: drag across the body is lower where the body has been before (paper Sec. IV B)."""
+"""Memory of disturbed ground: drag across the body is lower where the body has been
+before (paper Sec. IV B)."""
 
 from __future__ import annotations
 
@@ -16,21 +17,22 @@ from rft.effects.contact import Problem
 PATCH = 4.0  # body lengths, least side of the square
 CELLS = 2.0  # cells to a radius
 TILE = 32  # cells along a side of a tile; a step copies only the tiles that it marks
-LOOK_AHEAD = (
-    2.0  # radii from the body's axis to the ground that an element is about to meet
-)
+# radii from the body's axis to the ground that an element is about to meet
+LOOK_AHEAD = 2.0
 
 
 @EFFECTS.register
 @dataclass(frozen=True)
 class DisturbedGround(Effect):
-    """Drag across times 1 - weakening x disturbance of the ground on the side that an element moves to.
+    """Drag across times 1 - weakening x disturbance of the ground on the side that an
+    element moves to.
 
-    The track of the body is fully disturbed up to half a radius from its axis, undisturbed beyond one and a half radii;
-    disturbance, 0 to 1, never decreases (grains do not settle by themselves). The disturbance on either side of an
-    element is read two radii from its axis, outside its present track. Drag near disturbed ground falls substantially
-    in experiments (paper Sec. IV B); the form, and every number, are assumed. Ground more than two body lengths away
-    may be forgotten.
+    The track of the body is fully disturbed up to half a radius from its axis,
+    undisturbed beyond one and a half radii; disturbance, 0 to 1, never decreases
+    (grains do not settle by themselves). The disturbance on either side of an element
+    is read two radii from its axis, outside its present track. Drag near disturbed
+    ground falls substantially in experiments (paper Sec. IV B); the form, and every
+    number, are assumed. Ground more than two body lengths away may be forgotten.
 
     Examples
     --------
@@ -38,9 +40,11 @@ class DisturbedGround(Effect):
     >>> from rft import Chain, Granular, time_steps
     >>> from rft.effects import DisturbedGround
     >>> t = 2 * np.pi * np.arange(32) / 32
-    >>> alpha, alphadot = np.stack([np.cos(t), np.sin(t)], -1), np.stack([-np.sin(t), np.cos(t)], -1)
+    >>> alpha = np.stack([np.cos(t), np.sin(t)], -1)
+    >>> alphadot = np.stack([-np.sin(t), np.cos(t)], -1)
     >>> track = DisturbedGround(radius=0.02, weakening=0.3)
-    >>> steps = time_steps(Granular(1.8, 0.24), Chain(), alpha, alphadot, effects=[track])
+    >>> law = Granular(1.8, 0.24)
+    >>> steps = time_steps(law, Chain(), alpha, alphadot, effects=[track])
     >>> steps.pose[-1, :2].round(3)  # x, y after the cycle, body lengths
     array([-0.119, -0.007])
     """
@@ -92,24 +96,24 @@ class DisturbedGround(Effect):
         return int(np.ceil(PATCH / self.cell / TILE))
 
     def begin(self, problem: Problem, site: Site) -> Tiles:
-        count, samples = self.tiles_along**2, site.pose.shape[1]
+        count = self.tiles_along**2
+        samples = site.pose.shape[1]
         return Tiles(
             (np.zeros((TILE**2, samples)),) * count,
             np.full((count, samples), -1, np.int64),
         )
 
     def apply(self, problem: Problem, site: Site, state: Tiles) -> Problem:
-        points, m = self.points(problem, site), problem.memory
+        points = self.points(problem, site)
+        m = problem.memory
         offset = 1j * LOOK_AHEAD * self.radius * site.headings(problem.sides.elements)
-        left, right = (
-            1 - self.weakening * self.disturbance(state, points + x).mean(0)
-            for x in (offset, -offset)
+        left = self.disturbance(state, points + offset).mean(0)
+        right = self.disturbance(state, points - offset).mean(0)
+        memory = m._replace(
+            intact_left=m.intact_left * (1 - self.weakening * left),
+            intact_right=m.intact_right * (1 - self.weakening * right),
         )
-        return problem._replace(
-            memory=m._replace(
-                intact_left=m.intact_left * left, intact_right=m.intact_right * right
-            )
-        )
+        return problem._replace(memory=memory)
 
     def after(self, problem: Problem, site: Site, state: Tiles, v: np.ndarray) -> Tiles:
         if site.count == 0:  # the first step is on undisturbed ground
@@ -117,68 +121,68 @@ class DisturbedGround(Effect):
         return self.with_track(state, self.points(problem, site))
 
     def points(self, problem: Problem, site: Site) -> np.ndarray:
-        """Return k points along every element on the ground, complex (k, n, B), at most half a radius apart."""
+        """Return k points along every element on the ground, complex (k, n, B), at most
+        half a radius apart."""
         e = problem.sides.elements
         k = int(np.ceil(4 * e.half.max() / self.radius))
-        return site.centres(e) + (
-            np.arange(k)[:, None, None] * 2 + 1 - k
-        ) / k * e.half * site.headings(e)
+        s = (np.arange(k)[:, None, None] * 2 + 1 - k) / k  # of the element, -1 to 1
+        return site.centres(e) + s * e.half * site.headings(e)
 
     def location(
         self, i: np.ndarray, j: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the tile and the row in the tile that store the cells (i, j) of the plane, and their patch of the
-        plane."""
-        (tile_i, i), (tile_j, j) = np.divmod(i, TILE), np.divmod(j, TILE)
-        (patch_i, tile_i), (patch_j, tile_j) = (
-            np.divmod(tile_i, self.tiles_along),
-            np.divmod(tile_j, self.tiles_along),
-        )
-        return (
-            tile_i * self.tiles_along + tile_j,
-            i * TILE + j,
-            (patch_i + 2**20) * 2**21 + (patch_j + 2**20),
-        )
+        """Return the tile and the row in the tile that store the cells (i, j) of the
+        plane, and their patch of the plane."""
+        tile_i, i = np.divmod(i, TILE)
+        tile_j, j = np.divmod(j, TILE)
+        patch_i, tile_i = np.divmod(tile_i, self.tiles_along)
+        patch_j, tile_j = np.divmod(tile_j, self.tiles_along)
+        tile = tile_i * self.tiles_along + tile_j
+        row = i * TILE + j
+        patch = (patch_i + 2**20) * 2**21 + (patch_j + 2**20)
+        return tile, row, patch
 
     def disturbance(self, tiles: Tiles, place: np.ndarray) -> np.ndarray:
-        """Return the disturbance, 0 to 1, at complex places (..., B), bilinear between cell centres."""
-        x, y = place.real / self.cell - 0.5, place.imag / self.cell - 0.5
-        i, j = np.floor(x), np.floor(y)
-        x, y = x - i, y - j
-        i, j = i.astype(np.int64), j.astype(np.int64)
-        tile, row, patch = self.location(
-            np.stack([i, i + 1])[:, None], np.stack([j, j + 1])
-        )  # (2, 2, ..., B)
-        share, sample = (
-            np.stack([1 - x, x])[:, None] * np.stack([1 - y, y]),
-            np.arange(tiles.owner.shape[1]),
-        )
+        """Return the disturbance, 0 to 1, at complex places (..., B), bilinear between
+        cell centres."""
+        x = place.real / self.cell - 0.5
+        y = place.imag / self.cell - 0.5
+        i = np.floor(x)
+        j = np.floor(y)
+        x = x - i
+        y = y - j
+        i = i.astype(np.int64)
+        j = j.astype(np.int64)
+        # The four cells around a place, (2, 2, ..., B), and their shares.
+        i = np.stack([i, i + 1])[:, None]
+        j = np.stack([j, j + 1])
+        tile, row, patch = self.location(i, j)
+        share = np.stack([1 - x, x])[:, None] * np.stack([1 - y, y])
+        sample = np.arange(tiles.owner.shape[1])
         _, value, index = tiles.copied(tile)
-        return np.where(
-            tiles.owner[tile, sample] == patch, share * value[index, row, sample], 0.0
-        ).sum((0, 1))
+        is_stored = tiles.owner[tile, sample] == patch
+        value = share * value[index, row, sample]
+        return np.where(is_stored, value, 0.0).sum((0, 1))
 
     def with_track(self, tiles: Tiles, place: np.ndarray) -> Tiles:
-        """Return the map with a track at complex places (..., B): disturbance 1 up to radius / 2, 0 beyond 3 radius /
-        2."""
+        """Return the map with a track at complex places (..., B): disturbance 1 up to
+        radius / 2, 0 beyond 3 radius / 2."""
         reach = int(np.ceil(1.5 * self.radius / self.cell))
         around = np.arange(-reach, reach + 1).reshape(-1, *[1] * place.ndim)
-        i, j = (
-            np.floor(x / self.cell).astype(np.int64) + around
-            for x in (place.real, place.imag)
-        )
+        i = np.floor(place.real / self.cell).astype(np.int64) + around
+        j = np.floor(place.imag / self.cell).astype(np.int64) + around
         i = i[:, None]
-        distance = np.hypot(
-            (i + 0.5) * self.cell - place.real, (j + 0.5) * self.cell - place.imag
-        )
+        x = (i + 0.5) * self.cell - place.real
+        y = (j + 0.5) * self.cell - place.imag
+        distance = np.hypot(x, y)
         tile, row, patch = self.location(i, j)  # (cells along, cells across, ..., B)
-        owner, sample = tiles.owner.copy(), np.arange(tiles.owner.shape[1])
+        owner = tiles.owner.copy()
+        sample = np.arange(tiles.owner.shape[1])
         owner[tile, sample] = patch
         touched, value, index = tiles.copied(tile)
         value *= (owner == tiles.owner)[touched, None]
-        np.maximum.at(
-            value, (index, row, sample), np.clip(1.5 - distance / self.radius, 0.0, 1.0)
-        )
+        disturbance = np.clip(1.5 - distance / self.radius, 0.0, 1.0)
+        np.maximum.at(value, (index, row, sample), disturbance)
         new = list(tiles.value)
         for k, x in zip(touched, value):
             new[k] = x.copy()
@@ -190,17 +194,19 @@ class DisturbedGround(Effect):
 
 
 class Tiles(NamedTuple):
-    """A periodic square map of the ground, tile by tile; maps share the tiles in which they do not differ.
+    """A periodic square map of the ground, tile by tile; maps share the tiles in which
+    they do not differ.
 
-    value: disturbance, 0 to 1, (cells, B) for each tile. owner: (tiles, B), the patch of the plane that a tile stores,
-    -1 for none; all other patches are undisturbed there."""
+    value: disturbance, 0 to 1, (cells, B) for each tile. owner: (tiles, B), the patch
+    of the plane that a tile stores, -1 for none; all other patches are undisturbed
+    there."""
 
     value: tuple[np.ndarray, ...]
     owner: np.ndarray
 
     def copied(self, tile: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the K different tiles among ``tile``, copies of their values (K, cells, B), and for each entry of
-        ``tile`` its index into these."""
+        """Return the K different tiles among ``tile``, copies of their values
+        (K, cells, B), and for each entry of ``tile`` its index into these."""
         touched = np.flatnonzero(np.bincount(tile.ravel(), minlength=len(self.value)))
         index = np.zeros(len(self.value), int)
         index[touched] = np.arange(len(touched))

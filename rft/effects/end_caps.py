@@ -19,19 +19,22 @@ from rft.laws.granular import Granular
 @EFFECTS.register
 @dataclass(frozen=True)
 class EndCaps(Effect):
-    """Flat or rounded ends: axial force e pi r^2 C_S sin(atan(cot gamma0 cos psi)), lateral e pi r^2 C_F sin psi.
+    """Flat or rounded ends: axial force e pi r^2 C_S sin(atan(cot gamma0 cos psi)),
+    lateral e pi r^2 C_F sin psi.
 
-    Source: the end forces of the cylinder in granular resistive force theory as written in third-party code, C_S / C_F
-    being C of Eq. 3. Granular media only. The axial force is e pi r^2 C_S cos gamma0 v_t / sqrt(v_t^2 + q^2 v_n^2) with q =
-    sin gamma0; ``across`` is another q. Round ends of rods in simulated grains have q = 1.2 +- 0.3 (sample flank-drag): an
-    axial force nearly as cos psi.
+    Source: the end forces of the cylinder in granular resistive force theory as written
+    in third-party code, C_S / C_F being C of Eq. 3. Granular media only. The axial
+    force is e pi r^2 C_S cos gamma0 v_t / sqrt(v_t^2 + q^2 v_n^2) with q = sin gamma0;
+    ``across`` is another q. Round ends of rods in simulated grains have q = 1.2 +- 0.3
+    (sample flank-drag): an axial force nearly as cos psi.
 
     Examples
     --------
     >>> from rft import Chain, Granular, body_velocity
     >>> from rft.effects import EndCaps
-    >>> solution = body_velocity(Granular(1.8, 0.24), Chain(), [0.5, 0.3], [1.0, 0.0], effects=[EndCaps(radius=0.04)])
-    >>> solution.xi.round(4)
+    >>> law = Granular(1.8, 0.24)
+    >>> caps = EndCaps(radius=0.04)
+    >>> body_velocity(law, Chain(), [0.5, 0.3], [1.0, 0.0], effects=[caps]).xi.round(4)
     array([ 0.0151,  0.0128, -0.1833])
     """
 
@@ -76,36 +79,37 @@ class EndCaps(Effect):
 
     def apply(self, problem: Problem, site: Any = None, state: Any = None) -> Problem:
         e = problem.sides.elements
-        # In units of the whole body's axial drag 2 r C_F L: e pi r^2 C_F / (2 r C_F L) = e pi (r / L) / 2.
+        # In units of the whole body's axial drag 2 r C_F L: e pi r^2 C_F / (2 r C_F L)
+        # = e pi (r / L) / 2.
         weight = math.pi * self.radius / 2 * np.array([[self.tail], [self.head]])
         ends = e.attached_points([0, -1], e.half[[0, -1]] * [[-1.0], [1.0]], weight)
-        return problem.with_points(
-            Contact(ends, np.array([[0.0], [1.0]]), np.ones((2, 1))),
-            self.terms(problem.medium),
-        )
+        station = np.array([[0.0], [1.0]])
+        points = Contact(ends, station, buried=np.ones((2, 1)))
+        return problem.with_points(points, self.terms(problem.medium))
 
     def traction(
         self, medium: Granular, v_t: Any, v_n: Any, rounding: Any = 0.0
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the force (along, across) of both ends together at velocities (v_t, v_n), in units of the body's axial
-        drag; ValueError unless the radius is in body lengths."""
+        """Return the force (along, across) of both ends together at velocities
+        (v_t, v_n), in units of the body's axial drag; ValueError unless the radius is
+        in body lengths."""
         require(
             self.radius is not None,
             "the traction of end caps takes their radius in body lengths",
             instead="say ``in_body_lengths`` with the body's length",
         )
-        load = dry_point(
-            *(unmasked("v", v) for v in (v_t, v_n)),
-            rounding,
-            np.array(self.terms(medium)),
-        )
+        v_t = unmasked("v", v_t)
+        v_n = unmasked("v", v_n)
+        load = dry_point(v_t, v_n, rounding, np.array(self.terms(medium)))
         factor = (self.head + self.tail) * math.pi * self.radius / 2
         return factor * load.t, factor * load.n
 
     def terms(self, medium: Granular) -> list[tuple[float, float, float]]:
-        """Return the dry terms (q, k_t, k_n) of a flat end, whose normal is the body's axis: f_t = C cos gamma0 v_t /
-        sqrt(v_t^2 + q^2 v_n^2), f_n = v_n."""
-        q = math.sin(medium.gamma0) if self.across is None else self.across
+        """Return the dry terms (q, k_t, k_n) of a flat end, whose normal is the body's
+        axis: f_t = C cos gamma0 v_t / sqrt(v_t^2 + q^2 v_n^2), f_n = v_n."""
+        q = self.across
+        if q is None:
+            q = math.sin(medium.gamma0)
         return [(1.0, 1.0, 0.0), (q, 0.0, medium.C * math.cos(medium.gamma0))]
 
     @classmethod

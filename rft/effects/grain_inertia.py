@@ -1,4 +1,5 @@
-"""Inertia of the grains that a fast body accelerates: drag that grows with the square of the speed across the body."""
+"""Inertia of the grains that a fast body accelerates: drag that grows with the square
+of the speed across the body."""
 
 from __future__ import annotations
 
@@ -15,19 +16,23 @@ from rft.effects.base import EFFECTS, Effect
 from rft.effects.contact import Problem
 from rft.laws.base import is_linear
 
-ASSUMED_K = 2.5  # k of Eq. 2 for loosely packed 0.3 mm glass (Zhang and Goldman 2014); assumed where k is unknown
+# k of Eq. 2 for loosely packed 0.3 mm glass (Zhang and Goldman 2014); assumed where k
+# is unknown
+ASSUMED_K = 2.5
 
 
 @EFFECTS.register
 @dataclass(frozen=True)
 class GrainInertia(Effect):
-    """A normal stress strength x rho v_n^2 on the body's width 2 r, added to Eqs. 2-3 (paper Sec. IV C).
+    """A normal stress strength x rho v_n^2 on the body's width 2 r, added to Eqs. 2-3
+    (paper Sec. IV C).
 
-    The form is the momentum flux of grains that the body sweeps up, as in impact laws. In units of the axial drag 2 k
-    rho g r |z| the force is strength v_n^2 / (k g |z|), without radius or density. Dry media only.
+    The form is the momentum flux of grains that the body sweeps up, as in impact laws.
+    In units of the axial drag 2 k rho g r |z| the force is strength v_n^2 / (k g |z|),
+    without radius or density. Dry media only.
 
-    Where neither the medium nor ``k`` gives k of Eq. 2 (2.5 for loose glass, 5.1 for close), that of loose glass is
-    assumed.
+    Where neither the medium nor ``k`` gives k of Eq. 2 (2.5 for loose glass, 5.1 for
+    close), that of loose glass is assumed.
 
     Examples
     --------
@@ -59,15 +64,16 @@ class GrainInertia(Effect):
     def __post_init__(self):
         check_numbers(self)
 
-    def _known_k(self, medium):
-        return getattr(medium, "k", None) if self.k is None else self.k
+    def _given_k(self, medium):
+        """Return k as the effect or the medium gives it; None where neither does."""
+        if self.k is None:
+            return getattr(medium, "k", None)
+        return self.k
 
     def assumes(self, medium: Any) -> str:
-        return (
-            f"k = {ASSUMED_K:g}, that of loose glass"
-            if self._known_k(medium) is None
-            else ""
-        )
+        if self._given_k(medium) is None:
+            return f"k = {ASSUMED_K:g}, that of loose glass"
+        return ""
 
     def check(self, medium: Any) -> None:
         require(
@@ -77,16 +83,14 @@ class GrainInertia(Effect):
 
     def apply(self, problem: Problem, site: Any = None, state: Any = None) -> Problem:
         speed_per_rad = 2 * np.pi * self.frequency * self.length
-        k = self._known_k(problem.medium)
-        strength = (
-            self.strength
-            * speed_per_rad**2
-            / ((ASSUMED_K if k is None else k) * GRAVITY * self.depth)
-        )
-        # The flux of momentum does not depend on the pressure of the ground, so the factors of the drag leave it alone.
-        return problem._replace(
-            quadratic_drag=problem.quadratic_drag + np.atleast_2d(strength)
-        )
+        k = self._given_k(problem.medium)
+        if k is None:
+            k = ASSUMED_K
+        strength = self.strength * speed_per_rad**2 / (k * GRAVITY * self.depth)
+        # The flux of momentum does not depend on the pressure of the ground, so the
+        # factors of the drag leave it alone.
+        quadratic_drag = problem.quadratic_drag + np.atleast_2d(strength)
+        return problem._replace(quadratic_drag=quadratic_drag)
 
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, GrainInertia]:

@@ -13,20 +13,22 @@ from rft.effects.contact import Problem
 @EFFECTS.register
 @dataclass(frozen=True)
 class SkinFriction(Effect):
-    """Axial drag times forward / reference where an element slides towards its head, backward / reference where it
-    slides towards its tail.
+    """Axial drag times forward / reference where an element slides towards its head,
+    backward / reference where it slides towards its tail.
 
-    The defaults are the coefficients of the shovel-nosed snake on 0.3 mm glass, 0.109 forward and 0.137 backward (from
-    the literature on the snake), and about 0.15 for the rod whose drag gave Eqs. 2 and 3 (paper, caption of Fig. 5). For
-    a law measured with an aluminium rod the reference is 0.2 (literature on the snake). Axial drag in proportion to
-    friction is assumed.
+    The defaults are the coefficients of the shovel-nosed snake on 0.3 mm glass, 0.109
+    forward and 0.137 backward (from the literature on the snake), and about 0.15 for
+    the rod whose drag gave Eqs. 2 and 3 (paper, caption of Fig. 5). For a law measured
+    with an aluminium rod the reference is 0.2 (literature on the snake). Axial drag in
+    proportion to friction is assumed.
 
     Examples
     --------
     >>> from rft import Chain, Granular, body_velocity
     >>> from rft.effects import SkinFriction
-    >>> solution = body_velocity(Granular(1.8, 0.24), Chain(), [0.5, 0.3], [1.0, 0.0], effects=[SkinFriction()])
-    >>> solution.xi.round(4)
+    >>> law = Granular(1.8, 0.24)
+    >>> skin = SkinFriction()
+    >>> body_velocity(law, Chain(), [0.5, 0.3], [1.0, 0.0], effects=[skin]).xi.round(4)
     array([ 0.0154,  0.0148, -0.1879])
     """
 

@@ -1,4 +1,5 @@
-"""Sloping ground: drag is weaker on downhill motion, and the body's weight pulls downhill (paper Sec. IV B)."""
+"""Sloping ground: drag is weaker on downhill motion, and the body's weight pulls
+downhill (paper Sec. IV B)."""
 
 from __future__ import annotations
 
@@ -21,13 +22,16 @@ from rft.laws.catalogue import REPOSE
 @EFFECTS.register
 @dataclass(frozen=True)
 class Slope(Effect):
-    """A plane surface that rises by an angle, and a body that moves along it at a fixed depth.
+    """A plane surface that rises by an angle, and a body that moves along it at a fixed
+    depth.
 
-    The drag is multiplied by cos(angle) - d sin(angle) / tan(repose), where d is the downhill part of the unit velocity
-    of an element's centre, 0 across and uphill. With the default of repose, 37.9 degrees, motion straight downhill at 20
-    degrees has half the drag of level ground, as measured (paper Sec. IV B). Only one direction at one angle has been
-    measured; assumed are a drag that falls in proportion to d, no gain uphill, and the same factor along and across an
-    element. Weight adds the force weight sin(angle) downhill.
+    The drag is multiplied by cos(angle) - d sin(angle) / tan(repose), where d is the
+    downhill part of the unit velocity of an element's centre, 0 across and uphill. With
+    the default of repose, 37.9 degrees, motion straight downhill at 20 degrees has half
+    the drag of level ground, as measured (paper Sec. IV B). Only one direction at one
+    angle has been measured; assumed are a drag that falls in proportion to d, no gain
+    uphill, and the same factor along and across an element. Weight adds the force
+    weight sin(angle) downhill.
 
     Examples
     --------
@@ -35,8 +39,11 @@ class Slope(Effect):
     >>> from rft import Chain, Granular, time_steps
     >>> from rft.effects import Slope
     >>> t = 2 * np.pi * np.arange(32) / 32
-    >>> alpha, alphadot = np.stack([np.cos(t), np.sin(t)], -1), np.stack([-np.sin(t), np.cos(t)], -1)
-    >>> steps = time_steps(Granular(1.8, 0.24), Chain(), alpha, alphadot, effects=[Slope(angle=0.2)])
+    >>> alpha = np.stack([np.cos(t), np.sin(t)], -1)
+    >>> alphadot = np.stack([-np.sin(t), np.cos(t)], -1)
+    >>> slope = Slope(angle=0.2)
+    >>> law = Granular(1.8, 0.24)
+    >>> steps = time_steps(law, Chain(), alpha, alphadot, effects=[slope])
     >>> steps.pose[-1, :2].round(3)  # x, y after the cycle, body lengths
     array([-0.086,  0.002])
     """
@@ -72,27 +79,29 @@ class Slope(Effect):
     kind = "slope"
     breaks = Premise.SE2_SYMMETRIC
     limit = "angle = 0"
-    cost = "two dozen operations an element; a step at a time in place of all phases at once"
+    cost = (
+        "two dozen operations an element; a step at a time in place of all phases at "
+        "once"
+    )
     batched = ("angle", "towards", "repose", "weight")
     varies_along = True
 
     def __post_init__(self):
         check_numbers(self)
-        angle, repose = math.degrees(self.angle), math.degrees(self.repose)
+        angle = math.degrees(self.angle)
+        repose = math.degrees(self.repose)
         require(
             self.angle < self.repose,
             f"a slope of {angle:.3g} degrees slides by itself",
             because=f"it must be below the angle of repose, {repose:.3g} degrees",
         )
-        pull, drag = (
-            self.weight * math.sin(self.angle),
-            math.sin(self.repose - self.angle) / math.sin(self.repose),
-        )
+        pull = self.weight * math.sin(self.angle)
+        drag = math.sin(self.repose - self.angle) / math.sin(self.repose)
         require(
             pull < drag,
             "a body of this weight slides down",
-            because=f"its pull along the slope, {pull:.3g} of the drag on level ground, must be below "
-            f"the drag downhill, {drag:.3g}",
+            because=f"its pull along the slope, {pull:.3g} of the drag on level ground, "
+            f"must be below the drag downhill, {drag:.3g}",
         )
 
     def check(self, medium: Any) -> None:
@@ -102,23 +111,32 @@ class Slope(Effect):
         )
 
     def assumes(self, medium: Any) -> str:
-        repose = f"an angle of repose of {math.degrees(REPOSE):.1f} degrees, from half the drag downhill at 20, and "
-        return f"{repose if np.all(self.repose == REPOSE) else ''}that only what moves downhill meets weaker ground"
+        weaker = "that only what moves downhill meets weaker ground"
+        if not np.all(self.repose == REPOSE):
+            return weaker
+        return (
+            f"an angle of repose of {math.degrees(REPOSE):.1f} degrees, from half the "
+            f"drag downhill at 20, and {weaker}"
+        )
 
     def apply(self, problem: Problem, site: Site, state: Any = None) -> Problem:
-        cos, sin = np.cos(self.angle), np.sin(self.angle)
+        cos = np.cos(self.angle)
+        sin = np.sin(self.angle)
+
+        uphill = np.exp(1j * np.asarray(self.towards))
 
         def inclined(contact, weight):
-            downhill = -np.exp(1j * np.asarray(self.towards)) * np.conj(
-                site.headings(contact.elements)
+            downhill = -uphill * np.conj(site.headings(contact.elements))
+            incline = Incline(
+                downhill.real,
+                downhill.imag,
+                level_factor=np.atleast_2d(cos),
+                downhill_loss=np.atleast_2d(sin / np.tan(self.repose)),
+                weight=np.atleast_2d(weight),
             )
-            rows = map(np.atleast_2d, (cos, sin / np.tan(self.repose), weight))
-            return contact._replace(
-                incline=Incline(downhill.real, downhill.imag, *rows)
-            )
+            return contact._replace(incline=incline)
 
         weight = self.weight * sin * problem.axial_drag
-
         return problem._replace(
             sides=inclined(problem.sides, weight), points=inclined(problem.points, 0.0)
         )

@@ -18,17 +18,20 @@ from rft.laws.coulomb import Coulomb
 @EFFECTS.register
 @dataclass(frozen=True)
 class TowedSled(Effect):
-    """Isotropic Coulomb friction at the end of a stiff bar that continues the tail link.
+    """Isotropic Coulomb friction at the end of a stiff bar that continues the tail
+    link.
 
-    The sled lies on the surface, so that its friction does not depend on the body's depth. Dry media only: beside drag
-    that grows with speed, friction would depend on the unit of time.
+    The sled lies on the surface, so that its friction does not depend on the body's
+    depth. Dry media only: beside drag that grows with speed, friction would depend on
+    the unit of time.
 
     Examples
     --------
     >>> from rft import Chain, Granular, body_velocity
     >>> from rft.effects import TowedSled
-    >>> solution = body_velocity(Granular(1.8, 0.24), Chain(), [0.5, 0.3], [1.0, 0.0], effects=[TowedSled(pull=0.2)])
-    >>> solution.xi.round(4)
+    >>> law = Granular(1.8, 0.24)
+    >>> sled = TowedSled(pull=0.2)
+    >>> body_velocity(law, Chain(), [0.5, 0.3], [1.0, 0.0], effects=[sled]).xi.round(4)
     array([ 0.0071, -0.0021, -0.1022])
     """
 
@@ -67,15 +70,15 @@ class TowedSled(Effect):
         name = type(medium).__name__
         require(
             speed_exponent(medium) == 0,
-            f"a towed sled takes a medium without viscous drag, dry as itself, got {name}",
+            "a towed sled takes a medium without viscous drag, dry as itself, "
+            f"got {name}",
         )
 
     def apply(self, problem: Problem, site: Any = None, state: Any = None) -> Problem:
         e = problem.sides.elements
         point = e.attached_points([0], -(e.half[:1] + self.distance), np.ones((1, 1)))
-        sled = Contact(point, np.zeros((1, 1)), np.zeros((1, 1))).with_factors(
-            self.pull, self.pull, self.pull
-        )
+        sled = Contact(point, station=np.zeros((1, 1)), buried=np.zeros((1, 1)))
+        sled = sled.with_factors(self.pull, self.pull, self.pull)
         return problem.with_points(sled, Coulomb().dry)
 
     @classmethod

@@ -1,4 +1,5 @@
-"""Transient response of the ground: after a reversal the drag comes back over some travel (paper Sec. IV A)."""
+"""Transient response of the ground: after a reversal the drag comes back over some
+travel (paper Sec. IV A)."""
 
 from __future__ import annotations
 
@@ -11,15 +12,17 @@ from rft.core.checks import Number, check_numbers
 from rft.core.premise import Premise
 from rft.effects.base import EFFECTS, Effect, InMetres, Site
 from rft.effects.contact import Problem
-from rft.formulas.link import Memory, developed_direction, find_pivot
+from rft.formulas.link import developed_direction, find_pivot
 
-SHORTEST = (
-    1e-6  # body lengths, least travel: an element at rest creeps at the regularisation
-)
+# body lengths, least travel: an element at rest creeps at the regularisation
+SHORTEST = 1e-6
 SIGN = np.array([1.0, -1.0])[:, None, None]  # of v_n towards the left and the right
-E_FOLDINGS = 3.0  # of a direction over the travel: of what is missing after a reversal exp(-3) = 5 % is still missing
-# Of the flank of a rod 12 mm in diameter that goes to and fro 24.5 mm deep in beds of 6 mm grains, by three amplitudes
-# together, with standard errors over three beds (`figures.grains`, topic page on beds of grains).
+# of a direction over the travel: of what is missing after a reversal exp(-3) = 5 % is
+# still missing
+E_FOLDINGS = 3.0
+# Of the flank of a rod 12 mm in diameter that goes to and fro 24.5 mm deep in beds of 6
+# mm grains, by three amplitudes together, with standard errors over three beds
+# (`figures.grains`, topic page on beds of grains).
 AT_ONCE = 0.15  # +- 0.015; 0.035 at a depth of 15 mm
 AT_ONCE_ALONG = 0.49  # +- 0.015
 RATIO = 0.28  # +- 0.02
@@ -28,21 +31,27 @@ RATIO = 0.28  # +- 0.02
 @EFFECTS.register
 @dataclass(frozen=True)
 class Transient(Effect):
-    """Drag that comes back after a reversal: a share of it is there at once, the rest over some travel.
+    """Drag that comes back after a reversal: a share of it is there at once, the rest
+    over some travel.
 
-    Each element has a mean direction m, -1 to 1, of its travel x so far across the body, positive to the left, in which
-    older travel counts exponentially less: dm/dx = 3 (sign(v_n) - m) / travel. The drag across is the steady one times
-    at_once + (1 - at_once) (1 + m sign(v_n)) / 2. So it takes the travel until 95 % of what a long way in one direction
-    took from the other is back, and a short way takes little. Along the body it is the same with numbers of its own.
+    Each element has a mean direction m, -1 to 1, of its travel x so far across the
+    body, positive to the left, in which older travel counts exponentially less: dm/dx =
+    3 (sign(v_n) - m) / travel. The drag across is the steady one times at_once + (1 -
+    at_once) (1 + m sign(v_n)) / 2. So it takes the travel until 95 % of what a long way
+    in one direction took from the other is back, and a short way takes little. Along
+    the body it is the same with numbers of its own.
 
-    The paper says that drag on an oscillating rod needs about a fifth of the amplitude, without more. The form and the
-    default shares are measured in grains, where the travel across is 2.8 diameters of a rod. That motion along leaves
-    the direction across as it is, and the other way about, is assumed. `EndCaps` bear their steady drag.
+    The paper says that drag on an oscillating rod needs about a fifth of the amplitude,
+    without more. The form and the default shares are measured in grains, where the
+    travel across is 2.8 diameters of a rod. That motion along leaves the direction
+    across as it is, and the other way about, is assumed. `EndCaps` bear their steady
+    drag.
 
-    A piece of the body has the mean of its directions. At every step a piece is split at its pivot, and the direction of
-    each part develops with the mean velocity of that part, so that travel = 0 gives the steady drag however long the pieces
-    are. The effect vanishes at order 1 for a body that slides along itself as it reverses, at order 1/2 if links come to
-    rest there, in a dry medium.
+    A piece of the body has the mean of its directions. At every step a piece is split
+    at its pivot, and the direction of each part develops with the mean velocity of that
+    part, so that travel = 0 gives the steady drag however long the pieces are. The
+    effect vanishes at order 1 for a body that slides along itself as it reverses, at
+    order 1/2 if links come to rest there, in a dry medium.
 
     Examples
     --------
@@ -90,20 +99,23 @@ class Transient(Effect):
         self.check_lengths()
 
     def begin(self, problem: Problem, site: Site) -> np.ndarray:
-        """Return the mean directions (2, n, B) of travel along and across; the first step replaces them by its own."""
+        """Return the mean directions (2, n, B) of travel along and across; the first
+        step replaces them by its own."""
         return np.zeros((2, *problem.sides.elements.c.shape))
 
     def apply(self, problem: Problem, site: Site, state: np.ndarray) -> Problem:
-        at_once = np.atleast_2d(self.at_once_along), np.atleast_2d(self.at_once)
-        v_before = site.v_before[0], site.v_before[1]
-        m = problem.memory
-        memory = Memory(
-            *state,
-            *v_before,
-            m.intact_left,
-            m.intact_right,
-            *at_once,
-            *self.steps(site.dt),
+        along, across = state
+        v_t_before, v_n_before, _ = site.v_before
+        step_along, step_across = self.steps(site.dt)
+        memory = problem.memory._replace(
+            along=along,
+            across=across,
+            v_t_before=v_t_before,
+            v_n_before=v_n_before,
+            at_once_along=np.atleast_2d(self.at_once_along),
+            at_once_across=np.atleast_2d(self.at_once),
+            step_along=step_along,
+            step_across=step_across,
         )
         return problem._replace(memory=memory)
 
@@ -112,31 +124,30 @@ class Transient(Effect):
     ) -> np.ndarray:
         step_along, step_across = self.steps(site.dt)
         sign = np.where(v[0] >= 0, 1.0, -1.0)
-        along = (
-            sign
-            * developed_direction(
-                sign * state[0], sign * site.v_before[0], np.abs(v[0]), step_along
-            )[0]
+        before = sign * site.v_before[0]
+        along, _ = developed_direction(
+            sign * state[0], before, np.abs(v[0]), step_along
         )
+        along = sign * along
         parts, left = part_velocities(v[1], v[2])
         before = SIGN * site.v_before[1]
-        across = (
-            SIGN
-            * developed_direction(SIGN * state[1], before, SIGN * parts, step_across)[0]
+        across, _ = developed_direction(
+            SIGN * state[1], before, SIGN * parts, step_across
         )
+        across = SIGN * across
         return np.array([along, left * across[0] + (1 - left) * across[1]])
 
     def steps(self, dt: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the e-foldings of the directions along and across over a step (1, B) at unit speed; inf without travel,
-        and at the first step: a body begins as if it had always moved as it does then."""
+        """Return the e-foldings of the directions along and across over a step (1, B)
+        at unit speed; inf without travel, and at the first step: a body begins as if it
+        had always moved as it does then."""
         travel = np.atleast_2d(self.travel)
-        along, across = (
-            np.where(
-                (x > 0) & (dt > 0), E_FOLDINGS * dt / np.maximum(x, SHORTEST), np.inf
-            )
-            for x in (self.ratio * travel, travel)
-        )
-        return along, across
+
+        def e_foldings(x):
+            count = E_FOLDINGS * dt / np.maximum(x, SHORTEST)
+            return np.where((x > 0) & (dt > 0), count, np.inf)
+
+        return e_foldings(self.ratio * travel), e_foldings(travel)
 
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, Transient]:
@@ -144,12 +155,12 @@ class Transient(Effect):
 
 
 def part_velocities(v_n: np.ndarray, v_w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mean velocities v_n (2, n, B) of the parts of elements that move left and right, 0 where a part is
-    empty, and the left part's fraction of the length (n, B)."""
+    """Return the mean velocities v_n (2, n, B) of the parts of elements that move left
+    and right, 0 where a part is empty, and the left part's fraction of the length
+    (n, B)."""
     _, inside, _ = find_pivot(v_n, v_w)
     difference = np.abs(v_w)  # of v_n, between centre and end
     left = np.where(inside, (v_n + difference) / 2, np.maximum(v_n, 0.0))
     right = np.where(inside, (v_n - difference) / 2, np.minimum(v_n, 0.0))
-    return np.array([left, right]), np.where(
-        inside, (1 + v_n / np.where(inside, difference, 1.0)) / 2, v_n > 0
-    )
+    fraction = (1 + v_n / np.where(inside, difference, 1.0)) / 2
+    return np.array([left, right]), np.where(inside, fraction, v_n > 0)

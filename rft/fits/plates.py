@@ -1,8 +1,10 @@
-"""The stress map of a medium from measurements (Sec. II B): its strength zeta from a plate pushed straight down, or its nine
-coefficients from plates dragged at many tilts and directions.
+"""The stress map of a medium from measurements (Sec. II B): its strength zeta from a
+plate pushed straight down, or its nine coefficients from plates dragged at many tilts
+and directions.
 
-The map is linear in its coefficients, so both are linear least squares. Coefficients that the drags do not determine stay
-near the shape of the generic set: c = s M0 + d with any strength s, and d of about `SPREAD` s.
+The map is linear in its coefficients, so both are linear least squares. Coefficients
+that the drags do not determine stay near the shape of the generic set: c = s M0 + d
+with any strength s, and d of about `SPREAD` s.
 """
 
 from __future__ import annotations
@@ -18,27 +20,31 @@ from rft.fits.rods import student_factor
 from rft.terradynamics.plates.stress import COEFFICIENTS, PER_CUBIC_METRE, StressMap
 
 GENERIC = np.array([getattr(StressMap(), name) for name in COEFFICIENTS])
-SPREAD = 0.2  # N/cm^3 over zeta, assumed: four times the most that named media with own coefficients differ by
+# N/cm^3 over zeta, assumed: four times the most that named media with own coefficients
+# differ by
+SPREAD = 0.2
 DETERMINED = 0.9  # share of a coefficient that must come from the data, assumed
-FEWEST_DRAGS, FEWEST_DEPTHS = 6, 3
+FEWEST_DRAGS = 6
+FEWEST_DEPTHS = 3
 MOST_ROWS = 100_000
 LARGEST = 1e12  # of any number; numbers below 1 / LARGEST count as 0
-STRENGTHS = (
-    0.01,
-    100.0,
-)  # bounds of zeta, more than a factor of 20 beyond all named media: else units are wrong
+# bounds of zeta, more than a factor of 20 beyond all named media: else units are wrong
+STRENGTHS = (0.01, 100.0)
 EXACT = 1e-6  # least noise, over zeta
-STRAY = 0.5  # misfit of the generic shape, rms over that of the drags, from which on slips are looked for
+# misfit of the generic shape, rms over that of the drags, from which on slips are
+# looked for
+STRAY = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class StressFit:
     """Nine coefficients fitted to plate drags.
 
-    values: (9,), the `COEFFICIENTS`, N/cm^3. covariance: (9, 9), with the scatter about the map as noise. resolution:
-    (9,), the share of each coefficient that comes from the data; the rest comes from the generic shape. zeta: strength of
-    the nearest generic set. residuals: (2, N), measured minus fitted alpha_x, alpha_z, N/cm^3. noise: standard deviation
-    of the residuals. free: its degrees of freedom."""
+    values: (9,), the `COEFFICIENTS`, N/cm^3. covariance: (9, 9), with the scatter about
+    the map as noise. resolution: (9,), the share of each coefficient that comes from
+    the data; the rest comes from the generic shape. zeta: strength of the nearest
+    generic set. residuals: (2, N), measured minus fitted alpha_x, alpha_z, N/cm^3.
+    noise: standard deviation of the residuals. free: its degrees of freedom."""
 
     values: np.ndarray
     covariance: np.ndarray
@@ -75,7 +81,8 @@ class StressFit:
         ]
 
     def least_known(self) -> tuple[float, float]:
-        """Return the (beta, gamma), rad in steps of 15 degrees, at which the map has the largest variance."""
+        """Return the (beta, gamma), rad in steps of 15 degrees, at which the map has
+        the largest variance."""
         line = np.radians(np.arange(-90, 91, 15))
         beta, gamma = (x.ravel() for x in np.meshgrid(line[1:], line, indexing="ij"))
         design = _design(beta, gamma).reshape(2, beta.size, -1)
@@ -87,9 +94,10 @@ class StressFit:
 class ZetaFit:
     """Strength fitted to a plate pushed straight down.
 
-    error: standard error of zeta, from the scatter about the law and the correlation of neighbouring residuals. free: its
-    degrees of freedom. depth (m), force, law (N): (N,), the rows below the surface in the order of depth. zero,
-    zero_error: depth where the best straight line of stress against depth is zero, m; the law has 0."""
+    error: standard error of zeta, from the scatter about the law and the correlation of
+    neighbouring residuals. free: its degrees of freedom. depth (m), force, law (N):
+    (N,), the rows below the surface in the order of depth. zero, zero_error: depth
+    where the best straight line of stress against depth is zero, m; the law has 0."""
 
     zeta: float
     error: float
@@ -114,13 +122,15 @@ class ZetaFit:
 
 
 def fit_stress(beta, gamma, alpha_x, alpha_z) -> StressFit:
-    """Return the nine coefficients fitted to (N,) plate drags: angles in radians, stresses per depth in N/cm^3.
+    """Return the nine coefficients fitted to (N,) plate drags: angles in radians,
+    stresses per depth in N/cm^3.
 
-    Least squares with a prior of `SPREAD` on the difference from the generic shape; the noise, one number for both
-    components, is estimated with it. ValueError for drags that no grains have, with the slip of columns, signs or units
-    that explains them."""
+    Least squares with a prior of `SPREAD` on the difference from the generic shape; the
+    noise, one number for both components, is estimated with it. ValueError for drags
+    that no grains have, with the slip of columns, signs or units that explains them."""
     rows = _drags(beta, gamma, alpha_x, alpha_z)
-    design, y = _design(*rows[:2]), rows[2:].ravel()
+    design = _design(*rows[:2])
+    y = rows[2:].ravel()
     zeta, misfit = _generic(design, y)
     _check_mistakes(rows, misfit)
     check_strength(
@@ -132,10 +142,8 @@ def fit_stress(beta, gamma, alpha_x, alpha_z) -> StressFit:
     for _ in range(100):
         values, covariance, resolution = _solve(design, y, prior, noise)
         free = len(y) - np.trace(resolution)
-        last, noise = (
-            noise,
-            max(math.sqrt(np.sum((y - design @ values) ** 2) / free), EXACT * zeta),
-        )
+        last = noise
+        noise = max(math.sqrt(np.sum((y - design @ values) ** 2) / free), EXACT * zeta)
         if abs(noise - last) <= 1e-9 * last:
             break
     residuals = (y - design @ values).reshape(2, -1)
@@ -145,8 +153,9 @@ def fit_stress(beta, gamma, alpha_x, alpha_z) -> StressFit:
 
 
 def fit_zeta(depth, force, area) -> ZetaFit:
-    """Return zeta fitted to (N,) forces, N upwards, on a level plate of ``area``, m^2, one number or (N,), that is pushed
-    straight down to ``depth``, m: F = zeta alpha_z(0, 90 degrees) |z| A. Rows above the surface do not count."""
+    """Return zeta fitted to (N,) forces, N upwards, on a level plate of ``area``, m^2,
+    one number or (N,), that is pushed straight down to ``depth``, m: F = zeta
+    alpha_z(0, 90 degrees) |z| A. Rows above the surface do not count."""
     depth, force, area = (
         np.atleast_1d(real_array(*x))
         for x in (("depth", depth), ("force", force), ("area", area))
@@ -172,7 +181,9 @@ def fit_zeta(depth, force, area) -> ZetaFit:
     require(
         within, f"{needed}, got {order.size}", because="depth is positive downwards"
     )
-    d, f, a = depth[order], force[order], np.broadcast_to(area, depth.shape)[order]
+    d = depth[order]
+    f = force[order]
+    a = np.broadcast_to(area, depth.shape)[order]
     per_zeta = float(StressMap()(0.0, math.pi / 2)[1]) * PER_CUBIC_METRE * a * d
     zeta = float(per_zeta @ f / (per_zeta @ per_zeta))
     require(
@@ -190,14 +201,16 @@ def fit_zeta(depth, force, area) -> ZetaFit:
 
 
 def check_strength(zeta: float, units: str) -> None:
-    """Raise ValueError if no grains have this zeta; the message names the right units."""
+    """Raise ValueError if no grains have this zeta; the message names the right
+    units."""
     low, high = STRENGTHS
     message = f"zeta = {zeta:.3g} is that of no grains ({low:g} to {high:g}): check the units, {units}"
     require(low <= zeta <= high, message)
 
 
 def _drags(beta, gamma, alpha_x, alpha_z) -> np.ndarray:
-    """Return the drags as rows (4, N); ValueError for wrong lengths, too few or too many, or numbers out of range."""
+    """Return the drags as rows (4, N); ValueError for wrong lengths, too few or too
+    many, or numbers out of range."""
     names = ("beta", "gamma", "alpha_x", "alpha_z")
     rows = [
         np.atleast_1d(real_array(name, x))
@@ -222,7 +235,8 @@ def _drags(beta, gamma, alpha_x, alpha_z) -> np.ndarray:
 
 
 def _design(beta, gamma) -> np.ndarray:
-    """Return the derivatives (2 N, 9) of alpha_x, then of alpha_z, by the coefficients, at any angles (N,)."""
+    """Return the derivatives (2 N, 9) of alpha_x, then of alpha_z, by the coefficients,
+    at any angles (N,)."""
     unit_maps = [
         StressMap(**dict.fromkeys(COEFFICIENTS, 0.0) | {name: 1.0})
         for name in COEFFICIENTS
@@ -231,7 +245,8 @@ def _design(beta, gamma) -> np.ndarray:
 
 
 def _generic(design, y) -> tuple[float, float]:
-    """Return zeta of the nearest generic set, and the rms of its residuals over that of the drags ``y``."""
+    """Return zeta of the nearest generic set, and the rms of its residuals over that of
+    the drags ``y``."""
     shape = design @ GENERIC
     zeta = float(shape @ y / (shape @ shape))
     return zeta, float(
@@ -283,7 +298,8 @@ MISTAKES = {
 
 
 def _check_mistakes(rows, misfit: float) -> None:
-    """Raise ValueError if the drags are far from the shape that all grains have (Fig. 7), and a slip explains it."""
+    """Raise ValueError if the drags are far from the shape that all grains have (Fig.
+    7), and a slip explains it."""
     if misfit < STRAY:
         return
     misfits = {}
@@ -298,7 +314,8 @@ def _check_mistakes(rows, misfit: float) -> None:
 
 
 def _solve(design, y, prior, noise: float):
-    """Return values (9,), covariance (9, 9) and resolution (9, 9), the data's share in the values, for a noise."""
+    """Return values (9,), covariance (9, 9) and resolution (9, 9), the data's share in
+    the values, for a noise."""
     rows = np.concatenate([design / noise, prior])
     u, s, vt = np.linalg.svd(rows, full_matrices=False)
     root = vt.T / s
@@ -310,7 +327,8 @@ def _solve(design, y, prior, noise: float):
 
 
 def _correlation_factor(residuals) -> float:
-    """Return the factor of a standard error by which correlated neighbouring residuals widen it."""
+    """Return the factor of a standard error by which correlated neighbouring residuals
+    widen it."""
     size = residuals @ residuals
     correlation = (
         min(max(float(residuals[1:] @ residuals[:-1] / size), 0.0), 0.99)
@@ -321,7 +339,8 @@ def _correlation_factor(residuals) -> float:
 
 
 def _zero(depth, stress) -> tuple[float, float]:
-    """Return the depth at which the best straight line is zero, and its standard error, m; nan if there is no line."""
+    """Return the depth at which the best straight line is zero, and its standard error,
+    m; nan if there is no line."""
     if np.ptp(depth) == 0:
         return math.nan, math.nan
     rows = np.stack([depth, np.ones_like(depth)], -1)

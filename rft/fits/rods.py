@@ -1,8 +1,10 @@
-"""Fits of force laws to the drag on a rod, by least squares (paper Sec. II, Eqs. 2-3, Fig. 5(c)).
+"""Fits of force laws to the drag on a rod, by least squares (paper Sec. II, Eqs. 2-3,
+Fig. 5(c)).
 
-A rod is dragged at the attack angle psi between its velocity and its axis. A law in units of its own axial drag, times the
-rod's axial drag F, gives the forces along and across the rod, F f_t(cos psi, sin psi) and F f_n(cos psi, sin psi). `FITS`
-has the laws with their parameters, bounds and start values; F is fitted beside them.
+A rod is dragged at the attack angle psi between its velocity and its axis. A law in
+units of its own axial drag, times the rod's axial drag F, gives the forces along and
+across the rod, F f_t(cos psi, sin psi) and F f_n(cos psi, sin psi). `FITS` has the laws
+with their parameters, bounds and start values; F is fitted beside them.
 """
 
 from __future__ import annotations
@@ -24,21 +26,22 @@ from rft.laws.drag import Rod, RodDrag
 from rft.laws.granular import Granular
 from rft.laws.viscous import Viscous
 
-CAPS, ACROSS = "end_caps", "end_caps_across"
+CAPS = "end_caps"
+ACROSS = "end_caps_across"
 MOST_CAPS = 10.0  # e of a hemisphere is 4
 AT_BOUND = 1e-6  # of a bound: a parameter that near lies on it
-CONVERGED = (
-    1e-14  # relative change of parameters and of the sum of squares that ends a fit
-)
-DEPENDENT = 1e-7  # smallest singular value of the slopes, over the largest, below which parameters are not determined
-LEVEL, ONE_SIGMA = (
-    0.95,
-    0.6827,
-)  # confidence of intervals and bands; of one standard deviation
+# relative change of parameters and of the sum of squares that ends a fit
+CONVERGED = 1e-14
+# smallest singular value of the slopes, over the largest, below which parameters are
+# not determined
+DEPENDENT = 1e-7
+LEVEL = 0.95  # confidence of intervals and bands
+ONE_SIGMA = 0.6827  # confidence of one standard deviation
 
 
 def student_factor(degrees_of_freedom: float, level: float = LEVEL) -> float:
-    """Return half the width of a confidence interval over the standard error, by Student's distribution.
+    """Return half the width of a confidence interval over the standard error, by
+    Student's distribution.
 
     Examples
     --------
@@ -55,9 +58,10 @@ def student_factor(degrees_of_freedom: float, level: float = LEVEL) -> float:
 class FittedLaw:
     """A law with its parameters.
 
-    names: of the parameters. build: class of the law, called with them. granular: whether drag is proportional to the
-    weight of the grains above, with k of Eq. 2. bounds: (low, high) of each parameter. starts: start values of each; the
-    best of all combinations are refined."""
+    names: of the parameters. build: class of the law, called with them. granular:
+    whether drag is proportional to the weight of the grains above, with k of Eq. 2.
+    bounds: (low, high) of each parameter. starts: start values of each; the best of all
+    combinations are refined."""
 
     names: tuple[str, ...]
     build: Callable[..., Medium]
@@ -89,13 +93,16 @@ FITS = {
 class Fit:
     """A law fitted to drag.
 
-    names, values: of the fitted parameters: those of the law (gamma0 in rad), its axial drag, and `CAPS` where the end
-    caps are fitted. The axial drag is, for a granular law, ``k`` of Eq. 2 where radius, length and depth of the rod and
-    the density of the bed are known; else ``axial_stress`` (Pa, over the projected area) where radius and length are;
-    else ``axial_force`` (N, on the whole rod). covariance: (n, n), of the parameters, from the scatter of the forces
-    about the law, taken for independent noise. residuals: (2, N), measured minus fitted forces, N. end_caps: e of both
-    ends together (`EndCaps`), 0 without. Where the data tell the ends from the flank, law and residuals are the flank's, and
-    e follows from the ends with `EndCaps.across`, the last of the parameters.
+    names, values: of the fitted parameters: those of the law (gamma0 in rad), its axial
+    drag, and `CAPS` where the end caps are fitted. The axial drag is, for a granular
+    law, ``k`` of Eq. 2 where radius, length and depth of the rod and the density of the
+    bed are known; else ``axial_stress`` (Pa, over the projected area) where radius and
+    length are; else ``axial_force`` (N, on the whole rod). covariance: (n, n), of the
+    parameters, from the scatter of the forces about the law, taken for independent
+    noise. residuals: (2, N), measured minus fitted forces, N. end_caps: e of both ends
+    together (`EndCaps`), 0 without. Where the data tell the ends from the flank, law
+    and residuals are the flank's, and e follows from the ends with `EndCaps.across`,
+    the last of the parameters.
 
     Examples
     --------
@@ -155,23 +162,26 @@ class Fit:
 
     @property
     def axial_stress(self) -> float | None:
-        """`axial_force` over the projected area 2 r L, Pa; None where the area is not known."""
+        """`axial_force` over the projected area 2 r L, Pa; None where the area is not
+        known."""
         return self.axial_force / self.rod.area if self.rod.area else None
 
     @property
     def k(self) -> float | None:
-        """Factor k of Eq. 2; None where the rod's sizes or the density are not known, and for a fluid."""
+        """Factor k of Eq. 2; None where the rod's sizes or the density are not known,
+        and for a fluid."""
         return float(self.values[self.names.index("k")]) if "k" in self.names else None
 
     @property
     def medium(self) -> Medium:
-        """The law with the covariance of its parameters, widened by Student's distribution so that one standard deviation
-        holds 68 %."""
+        """The law with the covariance of its parameters, widened by Student's
+        distribution so that one standard deviation holds 68 %."""
         build = FITS[self.law].build
         names = [
             name for name in self.names if name in build.__dataclass_fields__
         ]  # k only where the law has it
-        values, n = dict(zip(self.names, self.values.tolist())), len(names)
+        values = dict(zip(self.names, self.values.tolist()))
+        n = len(names)
         covariance = (
             student_factor(self.degrees_of_freedom, ONE_SIGMA) ** 2
             * self.covariance[:n, :n]
@@ -182,13 +192,14 @@ class Fit:
         )
 
     def caps(self, radius: float) -> EndCaps:
-        """Return the end caps, half of e at each end, of a body of that radius in body lengths."""
+        """Return the end caps, half of e at each end, of a body of that radius in body
+        lengths."""
         across = dict(zip(self.names, self.values.tolist())).get(ACROSS)
         return EndCaps(radius, self.end_caps / 2, self.end_caps / 2, across)
 
     def forces(self, psi, values=None) -> np.ndarray:
-        """Return the forces (2, ...) along and across the rod at attack angles psi (rad), N; values: parameters in place of
-        the fitted ones."""
+        """Return the forces (2, ...) along and across the rod at attack angles psi
+        (rad), N; values: parameters in place of the fitted ones."""
         values = self.values if values is None else values
         values = _in_newton(self.law, self.rod, values)
         if self.data.ends is not None:
@@ -198,8 +209,8 @@ class Fit:
         return _forces(self.law, self.rod, self.end_caps, psi, values)
 
     def band(self, psi) -> np.ndarray:
-        """Return half the width (2, ...) of the 95 % confidence band of the law at angles psi (rad), N, by linear
-        propagation of the covariance."""
+        """Return half the width (2, ...) of the 95 % confidence band of the law at
+        angles psi (rad), N, by linear propagation of the covariance."""
         slopes = []
         for value, error, step in zip(
             self.values, self.errors, np.eye(len(self.values))
@@ -223,12 +234,13 @@ class Fit:
 def fit(
     law: str, data: RodDrag, rod: Rod = UNKNOWN_ROD, end_caps: float | str = 0.0
 ) -> Fit:
-    """Return the law of that name in `FITS` fitted to drag, by weighted least squares of both components.
+    """Return the law of that name in `FITS` fitted to drag, by weighted least squares
+    of both components.
 
-    end_caps: e of both ends together (`EndCaps`; 1 for one flat end), 0 for none, or "fitted"; other than 0 only for the
-    granular law and a rod of known radius and length. Data that tell the ends
-    from the flank take "fitted" or 0. Raises ValueError if the data do not determine the parameters, or
-    if a parameter ends on a bound.
+    end_caps: e of both ends together (`EndCaps`; 1 for one flat end), 0 for none, or
+    "fitted"; other than 0 only for the granular law and a rod of known radius and
+    length. Data that tell the ends from the flank take "fitted" or 0. Raises ValueError
+    if the data do not determine the parameters, or if a parameter ends on a bound.
 
     Examples
     --------
@@ -309,15 +321,20 @@ def fit(
 
 
 def _with_ends(flank: Fit) -> Fit:
-    """Return a fit to the flank with e and ``across`` of the ends, by least squares of the forces on them. Their variance
-    has the scatter of these forces, and their covariance with the law what the law leaves uncertain."""
+    """Return a fit to the flank with e and ``across`` of the ends, by least squares of
+    the forces on them. Their variance has the scatter of these forces, and their
+    covariance with the law what the law leaves uncertain."""
     from scipy.optimize import least_squares
 
-    data, n, n_law = flank.data, len(flank.values), len(FITS[flank.law].names)
-    v, names = (np.cos(data.psi), np.sin(data.psi)), (CAPS, ACROSS)
+    data = flank.data
+    n = len(flank.values)
+    n_law = len(FITS[flank.law].names)
+    v = (np.cos(data.psi), np.sin(data.psi))
+    names = (CAPS, ACROSS)
 
     def caps(values: np.ndarray):
-        """Return the least-squares solution of e and ``across`` with parameters of the law."""
+        """Return the least-squares solution of e and ``across`` with parameters of the
+        law."""
         values = _in_newton(flank.law, flank.rod, values)
         medium = FITS[flank.law].build(*map(float, values[:n_law]))
 
@@ -334,7 +351,8 @@ def _with_ends(flank: Fit) -> Fit:
                 data.ends,
             )
 
-        start, bounds = [1.0, 1.0], ([-np.inf, 0.0], [np.inf, MOST_CAPS])
+        start = [1.0, 1.0]
+        bounds = ([-np.inf, 0.0], [np.inf, MOST_CAPS])
         return least_squares(
             residual,
             start,
@@ -379,7 +397,8 @@ def _with_ends(flank: Fit) -> Fit:
 
 
 def _unit(law: str, rod: Rod) -> tuple[str, float]:
-    """Return the name of the parameter for axial drag, and the force on the whole rod, N, where it is 1."""
+    """Return the name of the parameter for axial drag, and the force on the whole rod,
+    N, where it is 1."""
     if FITS[law].granular and rod.area and rod.pressure:
         return "k", rod.area * rod.pressure
     return ("axial_stress", rod.area) if rod.area else ("axial_force", 1.0)
@@ -393,11 +412,12 @@ def _in_newton(law: str, rod: Rod, values) -> np.ndarray:
 
 
 def _forces(law: str, rod: Rod, end_caps: float, psi, values) -> np.ndarray:
-    """Return the forces (2, ...), N; values: parameters of the law, the axial force (N), and optionally e of the ends in
-    place of ``end_caps``."""
+    """Return the forces (2, ...), N; values: parameters of the law, the axial force
+    (N), and optionally e of the ends in place of ``end_caps``."""
     fitted_law = FITS[law]
     n = len(fitted_law.names)
-    medium, v = fitted_law.build(*map(float, values[:n])), (np.cos(psi), np.sin(psi))
+    medium = fitted_law.build(*map(float, values[:n]))
+    v = (np.cos(psi), np.sin(psi))
     force = np.array(medium.traction(*v))
     e = float(values[n + 1]) if len(values) > n + 1 else end_caps
     if e:
@@ -410,7 +430,8 @@ def _forces(law: str, rod: Rod, end_caps: float, psi, values) -> np.ndarray:
 def _weighted(
     data: RodDrag, forces: np.ndarray, measured: np.ndarray | None = None
 ) -> np.ndarray:
-    """Return forces minus those measured, by default on the rod, in units of their errors."""
+    """Return forces minus those measured, by default on the rod, in units of their
+    errors."""
     measured = data.forces if measured is None else measured
     return (np.sqrt(data.weight) * (forces - measured))[:, data.weight > 0].ravel()
 
@@ -418,12 +439,14 @@ def _weighted(
 def _starts(
     fitted_law: FittedLaw, data: RodDrag, residual: Callable, fits_caps: bool
 ) -> list[np.ndarray]:
-    """Return the best four of all combinations of start values, each with the axial force that fits it best."""
+    """Return the best four of all combinations of start values, each with the axial
+    force that fits it best."""
     candidates = []
     for values in itertools.product(
         *fitted_law.starts, *([(0.5, 1.0, 3.0)] if fits_caps else [])
     ):
-        law, caps = values[: len(fitted_law.names)], values[len(fitted_law.names) :]
+        law = values[: len(fitted_law.names)]
+        caps = values[len(fitted_law.names) :]
         at_zero, at_one = (
             residual(np.array([*law, force, *caps])) for force in (0.0, 1.0)
         )
@@ -476,8 +499,8 @@ def _degrees(name: str, value: float) -> float:
 
 
 def _covariance(names, best, count: int) -> np.ndarray:
-    """Return the covariance of the parameters, from the slopes of the residuals and their scatter; ValueError if the data
-    do not determine the parameters."""
+    """Return the covariance of the parameters, from the slopes of the residuals and
+    their scatter; ValueError if the data do not determine the parameters."""
     size = np.where(best.x > 0, best.x, 1.0)
     _, s, right = np.linalg.svd(best.jac * size, full_matrices=False)
     if s[-1] < DEPENDENT * s[0]:

@@ -1,20 +1,23 @@
-"""Drag on a straight element: averages over its length, and their slopes (paper Eqs. 2-3).
+"""Drag on a straight element: averages over its length, and their slopes (paper Eqs.
+2-3).
 
-An element slides along itself with speed v_t and across itself with u(s) = v_n + s v_w, s from -1 at its tail's end to
-1 at its head's, so that v_w is its rotation rate times its half length. The drag per unit length, positive where it
-opposes a positive velocity, is averaged over s:
+An element slides along itself with speed v_t and across itself with u(s) = v_n + s v_w,
+s from -1 at its tail's end to 1 at its head's, so that v_w is its rotation rate times
+its half length. The drag per unit length, positive where it opposes a positive
+velocity, is averaged over s:
 
     t = <f_t>,    n = <f_n>,    w = <s f_n>.
 
-A dry term is f_t = k_t v_t / R, f_n = k_n u / R with R = sqrt(A^2 + u^2), A^2 = q^2 v_t^2 + rounding^2. Eqs. 2-3 are
-two dry terms (`rft.laws.granular`). The values R1, R2 at the ends and S = R1 + R2 give the elliptic coordinates mu = 2 v_n /
-S, t = 2 v_w / S, in which A^2 = S^2 (1 - mu^2) (1 - t^2) / 4, and every average is elementary in mu, t and k(t) =
-(atanh t - t) / t^3:
+A dry term is f_t = k_t v_t / R, f_n = k_n u / R with R = sqrt(A^2 + u^2), A^2 = q^2
+v_t^2 + rounding^2. Eqs. 2-3 are two dry terms (`rft.laws.granular`). The values R1, R2
+at the ends and S = R1 + R2 give the elliptic coordinates mu = 2 v_n / S, t = 2 v_w / S,
+in which A^2 = S^2 (1 - mu^2) (1 - t^2) / 4, and every average is elementary in mu, t
+and k(t) = (atanh t - t) / t^3:
 
     <1/R> = (2 / S) (1 + t^2 k)    <u/R> = mu    <s u/R> = (1 - mu^2) t h / 2,    h = 1 - (1 - t^2) k.
 
-All functions here are formulas (`rft.formulas.vectors`): they take numbers, arrays that broadcast, and the vectors of compiled
-code."""
+All functions here are formulas (`rft.formulas.vectors`): they take numbers, arrays that
+broadcast, and the vectors of compiled code."""
 
 from __future__ import annotations
 
@@ -35,15 +38,16 @@ from rft.formulas.vectors import (
     where,
 )
 
-TINY = 1e-300  # added to divisors, for an element at rest without rounding; far below any speed that can matter
-SERIES_BELOW = (
-    1.0 / 9.0
-)  # t^2 below which k is a polynomial; above it atanh t - t loses at most one digit
+# added to divisors, for an element at rest without rounding; far below any speed that
+# can matter
+TINY = 1e-300
+# t^2 below which k is a polynomial; above it atanh t - t loses at most one digit
+SERIES_BELOW = 1.0 / 9.0
 
 
 def _series(count: int = 12) -> tuple[float, ...]:
-    """Return the coefficients of k = sum_j t^2j / (2j + 3) in powers of t^2 below SERIES_BELOW, to 1e-17, at
-    Chebyshev's points."""
+    """Return the coefficients of k = sum_j t^2j / (2j + 3) in powers of t^2 below
+    SERIES_BELOW, to 1e-17, at Chebyshev's points."""
 
     def k(t2):
         return sum(t2**j / (2 * j + 3) for j in range(40))
@@ -58,8 +62,8 @@ SERIES = _series()
 
 
 class Load(NamedTuple):
-    """Averages of the drag on an element, t = <f_t>, n = <f_n>, w = <s f_n>, each followed by its slopes in v_t, v_n and
-    v_w."""
+    """Averages of the drag on an element, t = <f_t>, n = <f_n>, w = <s f_n>, each
+    followed by its slopes in v_t, v_n and v_w."""
 
     t: float
     t_t: float
@@ -111,7 +115,8 @@ class EndCoordinates(NamedTuple):
 
 @formula
 def end_coordinates(v_t, v_n, v_w, rounding, q):
-    """Return the elliptic coordinates of an element, with 1 - mu^2 and 1 - t^2 to full precision."""
+    """Return the elliptic coordinates of an element, with 1 - mu^2 and 1 - t^2 to full
+    precision."""
     A2 = q * q * v_t * v_t + rounding * rounding
     margin = absolute(v_n) - absolute(
         v_w
@@ -120,7 +125,8 @@ def end_coordinates(v_t, v_n, v_w, rounding, q):
     R_near, R_far = sqrt(A2 + u_near * u_near), sqrt(A2 + u_far * u_far)
     two_over_S = 2.0 / (R_near + R_far + TINY)
     mu, t = v_n * two_over_S, v_w * two_over_S
-    # 2 - 2 max(|mu|, |t|) as a sum of positive terms: a difference would have no digits left near 1.
+    # 2 - 2 max(|mu|, |t|) as a sum of positive terms: a difference would have no digits
+    # left near 1.
     near, far = (R_near + u_near) * two_over_S, (R_far + u_far) * two_over_S
     excess = A2 * two_over_S * two_over_S * (near + far) / (near * far)
     one_minus_mu2 = (
@@ -132,8 +138,8 @@ def end_coordinates(v_t, v_n, v_w, rounding, q):
 
 @formula
 def k_function(t, one_minus_t2):
-    """Return k = (atanh t - t) / t^3, which is even in t; 1 - t^2 is an argument, for a difference would lose digits near
-    t = 1."""
+    """Return k = (atanh t - t) / t^3, which is even in t; 1 - t^2 is an argument, for a
+    difference would lose digits near t = 1."""
     z = t * t
     far = maximum(z, SERIES_BELOW)
     t = sqrt(far)
@@ -172,10 +178,12 @@ def dry(v_t, v_n, v_w, rounding, q, k_t, k_n):
 
 @formula
 def dry_point(v_t, v_n, rounding, terms):
-    """Return the load of dry terms (q, k_t, k_n), the rows of ``terms``, on a point that faces along the element.
+    """Return the load of dry terms (q, k_t, k_n), the rows of ``terms``, on a point
+    that faces along the element.
 
-    The end of a body pushes grains along the body as its side pushes them across, so that v_t and v_n are exchanged:
-    f_t = k_n v_t / R and f_n = k_t v_n / R with R^2 = q^2 v_n^2 + v_t^2 + rounding^2.
+    The end of a body pushes grains along the body as its side pushes them across, so
+    that v_t and v_n are exchanged: f_t = k_n v_t / R and f_n = k_t v_n / R with R^2 =
+    q^2 v_n^2 + v_t^2 + rounding^2.
     """
     zero = 0.0 * v_t
     load = Load(zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero)
@@ -199,8 +207,9 @@ def dry_point(v_t, v_n, rounding, terms):
 class Additions(NamedTuple):
     """Additions to the law that apply to a problem; the others are not computed.
 
-    factor: `Factor`. quadratic: drag with the square of the speed. memory: `Memory`. incline: `Incline`. momentum: the
-    rate of change of momentum, which is added to the sum over all elements."""
+    factor: `Factor`. quadratic: drag with the square of the speed. memory: `Memory`.
+    incline: `Incline`. momentum: the rate of change of momentum, which is added to the
+    sum over all elements."""
 
     factor: bool
     quadratic: bool
@@ -211,8 +220,8 @@ class Additions(NamedTuple):
 
 @formula
 def find_pivot(v_n, v_w):
-    """Return the pivot s of an element, where u(s) = 0, or -1 without a pivot; whether there is one; and a number with
-    the sign of u on the head's side of it."""
+    """Return the pivot s of an element, where u(s) = 0, or -1 without a pivot; whether
+    there is one; and a number with the sign of u on the head's side of it."""
     inside = absolute(v_w) > absolute(v_n)
     return (
         where(inside, -v_n / where(inside, v_w, 1.0), -1.0),
@@ -223,7 +232,8 @@ def find_pivot(v_n, v_w):
 
 @formula
 def quadratic_load(v_n, v_w, strength):
-    """Return the exact load of f_n = strength |u| u, the flux of momentum into grains that are pushed away."""
+    """Return the exact load of f_n = strength |u| u, the flux of momentum into grains
+    that are pushed away."""
     pivot, _, u_head = find_pivot(v_n, v_w)
     sign = where(u_head == 0.0, 0.0, copysign(strength, u_head))
     p2 = pivot * pivot
@@ -238,7 +248,8 @@ def quadratic_load(v_n, v_w, strength):
 
 
 class Factor(NamedTuple):
-    """Factors of the drag on an element: of f_t where it slides forward and backward, and of f_n."""
+    """Factors of the drag on an element: of f_t where it slides forward and backward,
+    and of f_n."""
 
     forward: float
     backward: float
@@ -247,7 +258,8 @@ class Factor(NamedTuple):
 
 @formula
 def scaled_load(load, v_t, factor):
-    """Return a load with its averages along and across multiplied by the factors of the drag."""
+    """Return a load with its averages along and across multiplied by the factors of the
+    drag."""
     along, across = where(v_t >= 0.0, factor.forward, factor.backward), factor.across
     return Load(
         along * load.t, along * load.t_t, along * load.t_n, along * load.t_w,
@@ -259,9 +271,10 @@ def scaled_load(load, v_t, factor):
 class Incline(NamedTuple):
     """Sloping ground under an element.
 
-    down_t, down_n: unit vector downhill, along and across the element. level_factor: factor of the drag on motion that is
-    not downhill. downhill_loss: decrease of that factor straight downhill. weight: force of gravity downhill per unit
-    length of the body."""
+    down_t, down_n: unit vector downhill, along and across the element. level_factor:
+    factor of the drag on motion that is not downhill. downhill_loss: decrease of that
+    factor straight downhill. weight: force of gravity downhill per unit length of the
+    body."""
 
     down_t: float
     down_n: float
@@ -272,13 +285,15 @@ class Incline(NamedTuple):
 
 @formula
 def inclined_load(load, v, rounding, incline):
-    """Return a load on a slope: the drag times level_factor - downhill_loss max(v . down, 0) / |v|, with v the velocity of
-    the element's centre, less the body's weight along the slope."""
+    """Return a load on a slope: the drag times level_factor - downhill_loss max(v .
+    down, 0) / |v|, with v the velocity of the element's centre, less the body's weight
+    along the slope."""
     down_t, down_n, level_factor, downhill_loss, weight = incline
     inverse = 1.0 / sqrt(v[0] * v[0] + v[1] * v[1] + rounding * rounding + TINY)
     down = down_t * v[0] + down_n * v[1]
     loss = where(down > 0.0, downhill_loss, 0.0) * inverse
-    # With wide rounding drag is viscous and weak, and the full weight would move the body at enormous speeds.
+    # With wide rounding drag is viscous and weak, and the full weight would move the
+    # body at enormous speeds.
     weight = weight / sqrt(1.0 + rounding * rounding)
     factor, cosine = (
         level_factor - loss * down,
@@ -297,16 +312,19 @@ def inclined_load(load, v, rounding, incline):
     )  # fmt: skip
 
 
-# Memory of the ground: shares of the drag by the directions in which an element has moved.
+# Memory of the ground: shares of the drag by the directions in which an element has
+# moved.
 
 
 class Memory(NamedTuple):
     """State of the ground at an element.
 
-    along, across: mean directions of its travel so far, -1 to 1. v_t_before, v_n_before: its velocity one step earlier.
-    intact_left, intact_right: shares, 0 to 1, of the drag across in ground that earlier passes have disturbed.
-    at_once_along, at_once_across: shares of the drag that are there at once after a reversal. step_along, step_across:
-    e-foldings of a mean direction over the step at unit speed, inf where the drag is steady at once."""
+    along, across: mean directions of its travel so far, -1 to 1. v_t_before,
+    v_n_before: its velocity one step earlier. intact_left, intact_right: shares, 0 to
+    1, of the drag across in ground that earlier passes have disturbed. at_once_along,
+    at_once_across: shares of the drag that are there at once after a reversal.
+    step_along, step_across: e-foldings of a mean direction over the step at unit speed,
+    inf where the drag is steady at once."""
 
     along: float
     across: float
@@ -324,8 +342,9 @@ class Memory(NamedTuple):
 def developed_direction(direction, before, now, step):
     """Return the mean direction of travel after a step, and its slope in ``now``.
 
-    The velocity changes linearly from ``before`` to ``now`` >= 0, and the direction decays towards -1 while it is negative,
-    towards 1 while it is positive, exp(-step) at unit speed. With an infinite ``step`` it is 1."""
+    The velocity changes linearly from ``before`` to ``now`` >= 0, and the direction
+    decays towards -1 while it is negative, towards 1 while it is positive, exp(-step)
+    at unit speed. With an infinite ``step`` it is 1."""
     instant, forward = step == np.inf, before >= 0.0
     total = absolute(before) + now
     total = where(total == 0.0, 1.0, total)
@@ -347,8 +366,8 @@ def developed_direction(direction, before, now, step):
 
 @formula
 def developed_share(direction, before, now, at_once, step):
-    """Return the share of the drag on motion with the velocity ``now`` >= 0 after the step of `developed_direction`, and
-    its slope in ``now``."""
+    """Return the share of the drag on motion with the velocity ``now`` >= 0 after the
+    step of `developed_direction`, and its slope in ``now``."""
     after, slope = developed_direction(direction, before, now, step)
     return at_once + (1.0 - at_once) * (0.5 + 0.5 * after), (1.0 - at_once) * (
         0.5 * slope
@@ -357,8 +376,8 @@ def developed_share(direction, before, now, at_once, step):
 
 @formula
 def share_across(sign, intact, v_n, v_w, memory):
-    """Return the share of the drag across on the part of an element that moves left (sign 1) or right (sign -1), and its
-    slopes in v_n and v_w."""
+    """Return the share of the drag across on the part of an element that moves left
+    (sign 1) or right (sign -1), and its slopes in v_n and v_w."""
     _, inside, _ = find_pivot(v_n, v_w)
     now = where(
         inside, 0.5 * (sign * v_n + absolute(v_w)), maximum(sign * v_n, 0.0)
@@ -401,8 +420,8 @@ def select_triple(condition, x, y):
 
 @formula
 def part_load(law, v_t, v_n, v_w, rounding, low, high, share):
-    """Return the load of the part of an element from s = low to high, with a share of the drag across, given as (value,
-    slope in v_n, slope in v_w)."""
+    """Return the load of the part of an element from s = low to high, with a share of
+    the drag across, given as (value, slope in v_n, slope in v_w)."""
     value, by_n, by_w = share
     c, h = 0.5 * (high + low), 0.5 * (high - low)  # centre and half length of the part
     f = law.average(v_t, v_n + v_w * c, h * v_w, rounding)
@@ -422,9 +441,11 @@ def part_load(law, v_t, v_n, v_w, rounding, low, high, share):
 
 @formula
 def two_sided_load(law, v_t, v_n, v_w, rounding, memory):
-    """Return the load of a law with shares of the drag along and, for each side of an element, across, split at its pivot.
+    """Return the load of a law with shares of the drag along and, for each side of an
+    element, across, split at its pivot.
 
-    The drag across vanishes at the pivot, so that its motion does not contribute to the slopes."""
+    The drag across vanishes at the pivot, so that its motion does not contribute to the
+    slopes."""
     pivot, _, u_head = find_pivot(v_n, v_w)
     left = share_across(1.0, memory.intact_left, v_n, v_w, memory)
     right = share_across(-1.0, memory.intact_right, v_n, v_w, memory)
@@ -442,7 +463,8 @@ def two_sided_load(law, v_t, v_n, v_w, rounding, memory):
 def side_load(law, v, rounding, factor, incline, strength, memory, additions):
     """Return the load on an element of the body's sides at v = (v_t, v_n, v_w).
 
-    strength: of the drag with the square of the speed. additions: `Additions`, those of the arguments that apply."""
+    strength: of the drag with the square of the speed. additions: `Additions`, those of
+    the arguments that apply."""
     v_t, v_n, v_w = v
     if additions.memory:
         load = two_sided_load(law, v_t, v_n, v_w, rounding, memory)
@@ -459,6 +481,7 @@ def side_load(law, v, rounding, factor, incline, strength, memory, additions):
 
 @formula
 def point_load(terms, v, rounding, factor, incline, additions):
-    """Return the load on a point attached to the body, of dry terms (q, k_t, k_n) that face along the body."""
+    """Return the load on a point attached to the body, of dry terms (q, k_t, k_n) that
+    face along the body."""
     load = scaled_load(dry_point(v[0], v[1], rounding, terms), v[0], factor)
     return inclined_load(load, v, rounding, incline) if additions.incline else load

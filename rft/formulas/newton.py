@@ -1,11 +1,14 @@
-"""One step of Newton's method on a balance of forces, for numbers, arrays or the vectors of compiled code.
+"""One step of Newton's method on a balance of forces, for numbers, arrays or the
+vectors of compiled code.
 
-The dry friction of a medium is first rounded off widely (``rounding``, a speed), where the problem is easy, then less
-and less, level by level, down to the required rounding; the tangent dx / d(rounding) predicts the solution on the next
-level. On a level the steps are Newton's, halved while the residual does not fall. Element velocities are stored beside
-xi and updated by small steps, so that an element at rest keeps all its digits. Steps are accepted, and ended, by
-measures that are the same in every frame of the body. All velocities here are over a scale of each sample, so that they
-are of size 1.
+The dry friction of a medium is first rounded off widely (``rounding``, a speed), where
+the problem is easy, then less and less, level by level, down to the required rounding;
+the tangent dx / d(rounding) predicts the solution on the next level. On a level the
+steps are Newton's, halved while the residual does not fall. Element velocities are
+stored beside xi and updated by small steps, so that an element at rest keeps all its
+digits. Steps are accepted, and ended, by measures that are the same in every frame of
+the body. All velocities here are over a scale of each sample, so that they are of size
+1.
 
 In the formulas ``e`` are straight elements, `rft.bodies.base.Elements`."""
 
@@ -18,16 +21,21 @@ import numpy as np
 from rft.formulas.vectors import absolute, formula, maximum, minimum, sqrt, where
 
 VISCOUS = 1e8  # rounding at which every law is viscous to the last digit
-FASTEST = 1e30  # velocity, larger than any solution: squares of larger ones overflow, and drag becomes 0
+# velocity, larger than any solution: squares of larger ones overflow, and drag becomes
+# 0
+FASTEST = 1e30
 
-# Rows of the result of a driver: the velocity (x, y, theta), the residual, the number of evaluations, and the speed of the
-# slowest element.
-RESIDUAL, EVALUATIONS, SLOWEST, RESULT_ROWS = 3, 4, 5, 6
+# Rows of the result of a driver: the velocity (x, y, theta), the residual, the number
+# of evaluations, and the speed of the slowest element.
+RESIDUAL = 3
+EVALUATIONS = 4
+SLOWEST = 5
+RESULT_ROWS = 6
 
 
 class Frame(NamedTuple):
-    """Mean and scales of a sample. x, y: mean of the body's centres of mass in the frame. force_scale: unit of residuals.
-    speed_scale: unit of velocities."""
+    """Mean and scales of a sample. x, y: mean of the body's centres of mass in the
+    frame. force_scale: unit of residuals. speed_scale: unit of velocities."""
 
     x: float
     y: float
@@ -36,7 +44,8 @@ class Frame(NamedTuple):
 
 
 class Inertia(NamedTuple):
-    """Rate of change of momentum on the frame, strength (M xi + offset): M by rows, then the offset (x, y, theta)."""
+    """Rate of change of momentum on the frame, strength (M xi + offset): M by rows,
+    then the offset (x, y, theta)."""
 
     xx: float
     xy: float
@@ -56,8 +65,9 @@ class Inertia(NamedTuple):
 class Net(NamedTuple):
     """Force and moment on the frame, as triples (x, y, theta).
 
-    by_x, by_y, by_theta: slopes in the frame's velocity. by_speed: slope in the logarithm of all velocities together, the
-    sum of J^T H v; in a law of degree 0 it is minus the slope in the logarithm of the rounding."""
+    by_x, by_y, by_theta: slopes in the frame's velocity. by_speed: slope in the
+    logarithm of all velocities together, the sum of J^T H v; in a law of degree 0 it is
+    minus the slope in the logarithm of the rounding."""
 
     force: tuple
     by_x: tuple
@@ -69,9 +79,10 @@ class Net(NamedTuple):
 class Descent(NamedTuple):
     """A sequence of levels of rounding.
 
-    first: rounding of the first level, over the scale of speed. ratio: of the rounding from one level to the next.
-    level_residual: residual that ends a level. free_ratio: speed over rounding above which rounding no longer matters to
-    an element. budget: most evaluations."""
+    first: rounding of the first level, over the scale of speed. ratio: of the rounding
+    from one level to the next. level_residual: residual that ends a level. free_ratio:
+    speed over rounding above which rounding no longer matters to an element. budget:
+    most evaluations."""
 
     first: float
     ratio: float
@@ -83,9 +94,10 @@ class Descent(NamedTuple):
 class Limits(NamedTuple):
     """Required accuracy, and limits of the steps.
 
-    rounding: of the last level. residual: largest of a solution. largest_step: change of the velocity of the body's mean
-    place and of its rotation rate; no body moves that fast. least_damping: damping at which a step is accepted though the
-    residual grows. damping_growth: factor of the damping after an accepted step."""
+    rounding: of the last level. residual: largest of a solution. largest_step: change
+    of the velocity of the body's mean place and of its rotation rate; no body moves
+    that fast. least_damping: damping at which a step is accepted though the residual
+    grows. damping_growth: factor of the damping after an accepted step."""
 
     rounding: float
     residual: float
@@ -97,9 +109,11 @@ class Limits(NamedTuple):
 class Iterate(NamedTuple):
     """State of a sample in a descent.
 
-    x, y, theta: velocity of the frame. dx, dy, dtheta: the next step. rounding, rounding_next: of the level before and
-    after it. damping: factor of Newton's step, at most 1. residual: after the last accepted step. slowest: speed of the
-    slowest element then. evaluations: number of them. fresh: 1 before the first step, else 0."""
+    x, y, theta: velocity of the frame. dx, dy, dtheta: the next step. rounding,
+    rounding_next: of the level before and after it. damping: factor of Newton's step,
+    at most 1. residual: after the last accepted step. slowest: speed of the slowest
+    element then. evaluations: number of them. fresh: 1 before the first step, else
+    0."""
 
     x: float
     y: float
@@ -149,7 +163,8 @@ def dot(a, b):
 
 @formula
 def solve3(a, b, c, right):
-    """Return the solution of (a b c) x = right, a, b, c columns, by Cramer's rule; 0 where the matrix is singular."""
+    """Return the solution of (a b c) x = right, a, b, c columns, by Cramer's rule; 0
+    where the matrix is singular."""
     bc = cross(b, c)
     det = dot(a, bc)
     inverse = where(det == 0.0, 0.0, 1.0) / where(det == 0.0, 1.0, det)
@@ -165,7 +180,8 @@ def solve3(a, b, c, right):
 
 @formula
 def to_element(e, x, y, theta):
-    """Return the contribution J xi of the frame's velocity xi = (x, y, theta) to an element's velocity (v_t, v_n, v_w)."""
+    """Return the contribution J xi of the frame's velocity xi = (x, y, theta) to an
+    element's velocity (v_t, v_n, v_w)."""
     return (
         e.c * x + e.s * y + e.r_t * theta,
         e.c * y - e.s * x + e.r_n * theta,
@@ -175,20 +191,20 @@ def to_element(e, x, y, theta):
 
 @formula
 def to_frame(e, t, n, w):
-    """Return force and moment on the frame, J^T f, from averages f = (t, n, w) on an element."""
+    """Return force and moment on the frame, J^T f, from averages f = (t, n, w) on an
+    element."""
     return e.c * t - e.s * n, e.s * t + e.c * n, e.r_t * t + e.r_n * n + e.half * w
 
 
 @formula
 def element_net(e, f, v, speed):
-    """Return the `Net` of an element with load f at velocities v: J^T f, J^T H J and J^T H v, with H the slopes of f.
+    """Return the `Net` of an element with load f at velocities v: J^T f, J^T H J and
+    J^T H v, with H the slopes of f.
 
     speed: scale of the velocities that the load is computed at."""
-    t, n, w = (
-        to_frame(e, f.t_t, f.t_n, f.t_w),
-        to_frame(e, f.n_t, f.n_n, f.n_w),
-        to_frame(e, f.w_t, f.w_n, f.w_w),
-    )
+    t = to_frame(e, f.t_t, f.t_n, f.t_w)
+    n = to_frame(e, f.n_t, f.n_n, f.n_w)
+    w = to_frame(e, f.w_t, f.w_n, f.w_w)
     by_speed = to_frame(
         e,
         f.t_t * v[0] + f.t_n * v[1] + f.t_w * v[2],
@@ -207,9 +223,13 @@ def element_net(e, f, v, speed):
 
 @formula
 def with_momentum(net, x, y, theta, inertia, speed):
-    """Return a net with the rate of change of momentum at a velocity (x, y, theta) of the frame."""
-    m, slope = inertia, inertia.strength * speed
-    by_x, by_y, by_theta = (m.xx, m.yx, m.tx), (m.xy, m.yy, m.ty), (m.xt, m.yt, m.tt)
+    """Return a net with the rate of change of momentum at a velocity (x, y, theta) of
+    the frame."""
+    m = inertia
+    slope = inertia.strength * speed
+    by_x = (m.xx, m.yx, m.tx)
+    by_y = (m.xy, m.yy, m.ty)
+    by_theta = (m.xt, m.yt, m.tt)
     M_xi = plus(plus(times(x, by_x), times(y, by_y)), times(theta, by_theta))
     return Net(
         plus(
@@ -228,7 +248,8 @@ def with_momentum(net, x, y, theta, inertia, speed):
 
 @formula
 def residual_norm(force, frame):
-    """Return the larger of force and moment about the body's mean place, over the scale of force."""
+    """Return the larger of force and moment about the body's mean place, over the scale
+    of force."""
     f_x, f_y, moment = force
     moment = moment - frame.x * f_y + frame.y * f_x
     return maximum(sqrt(f_x * f_x + f_y * f_y), absolute(moment)) / frame.force_scale
@@ -239,12 +260,14 @@ def residual_norm(force, frame):
 
 @formula
 def newton_step(iterate, net, slowest2, frame, descent, limits):
-    """Return the next iterate, whether the step that led to ``net`` is accepted, and whether the sample has ended.
+    """Return the next iterate, whether the step that led to ``net`` is accepted, and
+    whether the sample has ended.
 
     slowest2: square of the slowest element's speed after that step.
     """
     last = limits.rounding
-    residual, slowest = residual_norm(net.force, frame), sqrt(slowest2)
+    residual = residual_norm(net.force, frame)
+    slowest = sqrt(slowest2)
     fresh = iterate.fresh > 0.0
     rounding = iterate.rounding_next
     helps = (
@@ -253,8 +276,9 @@ def newton_step(iterate, net, slowest2, frame, descent, limits):
         | (iterate.damping <= limits.least_damping)
     )
     accepted = where(fresh, 0.0, where(helps, 1.0, 0.0)) > 0.0
-    # Where every element moves much faster than the rounding, its kinks no longer matter and the next level is the last. The
-    # velocity of an element at rest is linear in the rounding, that of a sliding element quadratic.
+    # Where every element moves much faster than the rounding, its kinks no longer
+    # matter and the next level is the last. The velocity of an element at rest is
+    # linear in the rounding, that of a sliding element quadratic.
     ends_level = accepted & (rounding > last) & (residual < descent.level_residual)
     free = slowest > descent.free_ratio * rounding
     lower = where(free, last, maximum(descent.ratio * rounding, last))
@@ -268,7 +292,8 @@ def newton_step(iterate, net, slowest2, frame, descent, limits):
     right = plus(times(prediction, net.by_speed), times(-damping, net.force))
     x, y, theta = solve3(net.by_x, net.by_y, net.by_theta, right)
     fraction = where(fresh, 1.0, step_fraction(x, y, theta, frame, limits.largest_step))
-    new_step, moved = accepted | fresh, where(accepted, 1.0, 0.0)
+    new_step = accepted | fresh
+    moved = where(accepted, 1.0, 0.0)
     evaluations = iterate.evaluations + where(fresh, 0.0, 1.0)
     solved = accepted & (rounding <= last) & (residual <= limits.residual)
     after = Iterate(
@@ -291,8 +316,8 @@ def newton_step(iterate, net, slowest2, frame, descent, limits):
 
 @formula
 def result(iterate, limits):
-    """Return the rows of a sample's result; the residual is infinite unless the rounding is the required one and the
-    velocity is possible."""
+    """Return the rows of a sample's result; the residual is infinite unless the
+    rounding is the required one and the velocity is possible."""
     valid = (iterate.rounding <= limits.rounding) & is_possible(
         iterate.x, iterate.y, iterate.theta
     )
@@ -317,9 +342,10 @@ def is_possible(x, y, theta):
 
 @formula
 def step_fraction(x, y, theta, frame, largest):
-    """Return the fraction of a step that changes the velocity of the body's mean place, and its rotation rate, by no more
-    than ``largest``."""
-    mean_x, mean_y = x - frame.y * theta, y + frame.x * theta
+    """Return the fraction of a step that changes the velocity of the body's mean place,
+    and its rotation rate, by no more than ``largest``."""
+    mean_x = x - frame.y * theta
+    mean_y = y + frame.x * theta
     size = sqrt(mean_x * mean_x + mean_y * mean_y + theta * theta)
     may_exceed = maximum(maximum(absolute(x), absolute(y)), absolute(theta)) > 1.0
     return where(may_exceed, largest / maximum(size, largest), 1.0)
@@ -327,8 +353,8 @@ def step_fraction(x, y, theta, frame, largest):
 
 @formula
 def first_iterate(dx, dy, dtheta, first, fresh):
-    """Return a sample at rest whose first step is (dx, dy, dtheta), or, if fresh is 1, the step to the viscous
-    solution."""
+    """Return a sample at rest whose first step is (dx, dy, dtheta), or, if fresh is 1,
+    the step to the viscous solution."""
     zero = 0.0 * fresh  # not of dx, which may be nan
     return Iterate(
         zero, zero, zero,

@@ -17,7 +17,8 @@ DIFFERENCE = 1e-6  # step of central differences, over the speed
 
 @formula
 def slopes_by_differences(law, v_t, v_n, rounding):
-    """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n) of a law's traction, by central differences."""
+    """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n) of a law's traction, by
+    central differences."""
     h = DIFFERENCE * sqrt(v_t * v_t + v_n * v_n + rounding * rounding) + TINY
     (t1, n1), (t2, n2) = (
         law.traction(v_t + h, v_n, rounding),
@@ -33,13 +34,15 @@ def slopes_by_differences(law, v_t, v_n, rounding):
 
 @formula
 def by_nodes(law, v_t, v_n, v_w, rounding):
-    """Return the load of a law on an element from its traction and slopes at the nodes s in [-1, 1] of its rule, with
-    weights that sum to 1."""
+    """Return the load of a law on an element from its traction and slopes at the nodes
+    s in [-1, 1] of its rule, with weights that sum to 1."""
     zero = 0.0 * v_t
     load = Load(zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero)
     for j in range(len(law.nodes)):
-        s, w = law.nodes[j, 0], law.weights[j, 0]
-        u_t, u_n = v_t + 0.0 * s, v_n + s * v_w
+        s = law.nodes[j, 0]
+        w = law.weights[j, 0]
+        u_t = v_t + 0.0 * s
+        u_n = v_n + s * v_w
         (t, n), (tt, tn, nt, nn) = (
             law.traction(u_t, u_n, rounding),
             law.slopes(u_t, u_n, rounding),
@@ -54,11 +57,11 @@ def by_nodes(law, v_t, v_n, v_w, rounding):
 
 
 def nodes_and_weights(rule: tuple[str, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return nodes and weights of a rule: "gauss" (Gauss-Legendre) or "midpoint" (equal parts with the velocity of their
-    middle).
+    """Return nodes and weights of a rule: "gauss" (Gauss-Legendre) or "midpoint" (equal
+    parts with the velocity of their middle).
 
-    The paper uses midpoints, of order 2. Gauss-Legendre rules converge slowly where the pivot lies in the element, for
-    the law has a kink there."""
+    The paper uses midpoints, of order 2. Gauss-Legendre rules converge slowly where the
+    pivot lies in the element, for the law has a kink there."""
     kind, count = rule
     if kind == "gauss":
         s, weights = np.polynomial.legendre.leggauss(count)
@@ -67,8 +70,8 @@ def nodes_and_weights(rule: tuple[str, int]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def parse(text: str) -> tuple[str, int]:
-    """Return ("exact", 1), ("midpoint", n) or ("gauss", n) from "exact", "midpoint:n", "gauss:n"; ValueError for other
-    text."""
+    """Return ("exact", 1), ("midpoint", n) or ("gauss", n) from "exact", "midpoint:n",
+    "gauss:n"; ValueError for other text."""
     kind, _, count = str(text).partition(":")
     if isinstance(text, str) and text == "exact":
         return "exact", 1

@@ -1,7 +1,8 @@
 """The group SE(2) of planar rigid motions.
 
-Poses g = (x, y, theta) and velocities xi = (xi_x, xi_y, xi_theta) are arrays (..., 3); theta is not wrapped. No formula
-has a threshold: quotients 0/0 are avoided by sinc and half angles."""
+Poses g = (x, y, theta) and velocities xi = (xi_x, xi_y, xi_theta) are arrays (..., 3);
+theta is not wrapped. No formula has a threshold: quotients 0/0 are avoided by sinc and
+half angles."""
 
 from __future__ import annotations
 
@@ -12,13 +13,15 @@ from rft.core.refusal import Refusal
 
 
 def _sinc(x: np.ndarray) -> np.ndarray:
-    """Return sin x / x, 1 at 0, to the last digit or two (np.sinc rounds pi x first)."""
+    """Return sin x / x, 1 at 0, to the last digit or two (np.sinc rounds pi x
+    first)."""
     nonzero = np.where(x == 0.0, 1.0, x)
     return np.where(x == 0.0, 1.0, np.sin(nonzero) / nonzero)
 
 
 def _components(g):
-    """Return the three components of poses or velocities (..., 3); ValueError for another shape."""
+    """Return the three components of poses or velocities (..., 3); ValueError for
+    another shape."""
     refuse_mask("a pose or velocity of the plane", g)
     try:
         g = np.asarray(g, float)
@@ -40,14 +43,16 @@ def rotated(theta, x, y) -> tuple[np.ndarray, np.ndarray]:
 
 
 def exp(xi) -> np.ndarray:
-    """Return the pose reached from the identity after unit time at body velocity xi (..., 3)."""
+    """Return the pose reached from the identity after unit time at body velocity xi
+    (..., 3)."""
     x, y, angle = _components(xi)
     along, across = _sinc(angle), np.sin(angle / 2) * _sinc(angle / 2)
     return np.stack([along * x - across * y, across * x + along * y, angle], -1)
 
 
 def log(g) -> np.ndarray:
-    """Return the body velocity that reaches the pose g (..., 3) in unit time, with |xi_theta| <= pi."""
+    """Return the body velocity that reaches the pose g (..., 3) in unit time, with
+    |xi_theta| <= pi."""
     x, y, theta = _components(g)
     angle = theta - 2 * np.pi * np.round(theta / (2 * np.pi))
     along, across = np.cos(angle / 2) / _sinc(angle / 2), angle / 2
@@ -55,7 +60,8 @@ def log(g) -> np.ndarray:
 
 
 def compose(g, h) -> np.ndarray:
-    """Return g h, the pose in the world of a frame whose pose in the frame at g is h."""
+    """Return g h, the pose in the world of a frame whose pose in the frame at g is
+    h."""
     (gx, gy, gt), (hx, hy, ht) = _components(g), _components(h)
     x, y = rotated(gt, hx, hy)
     return np.stack([gx + x, gy + y, gt + ht], -1)

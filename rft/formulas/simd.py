@@ -50,7 +50,8 @@ class Mask(types.Type):
         return Conversion.safe if isinstance(other, types.Boolean) else None
 
 
-vector, mask = Vector("vector"), Mask("mask")
+vector = Vector("vector")
+mask = Mask("mask")
 
 
 def _register_model(kind, llvm):
@@ -157,7 +158,8 @@ def _intrinsic(name, count):
     """Return a function that emits a call of LLVM's intrinsic of this name with ``count`` arguments."""
 
     def emit(builder, *args):
-        full, module = f"llvm.{name}.v{WIDTH}f64", builder.module
+        full = f"llvm.{name}.v{WIDTH}f64"
+        module = builder.module
         kind = ir.FunctionType(DOUBLES, [DOUBLES] * count)
         return builder.call(
             module.globals.get(full) or ir.Function(module, kind, full), args
@@ -258,8 +260,10 @@ def _log_ratio(a, b):
     def log_ratio(a, b):
         power_a, a = _exponents(a)
         power_b, b = _exponents(b)
-        large, small = a > 1.4142135623730951 * b, b > 1.4142135623730951 * a
-        a, b = a * vectors.where(large, 0.5, 1.0), b * vectors.where(small, 0.5, 1.0)
+        large = a > 1.4142135623730951 * b
+        small = b > 1.4142135623730951 * a
+        a = a * vectors.where(large, 0.5, 1.0)
+        b = b * vectors.where(small, 0.5, 1.0)
         power = (
             power_a
             - power_b
@@ -361,7 +365,8 @@ def add_lanes(context, x, i, value):
         first = builder.bitcast(
             _pointer(context, builder, sig, args), double.as_pointer()
         )
-        name, module = f"llvm.vector.reduce.fadd.v{WIDTH}f64", builder.module
+        name = f"llvm.vector.reduce.fadd.v{WIDTH}f64"
+        module = builder.module
         kind = ir.FunctionType(double, [double, DOUBLES])
         add = module.globals.get(name) or ir.Function(module, kind, name)
         builder.store(builder.call(add, [builder.load(first), args[2]]), first)
@@ -412,10 +417,8 @@ def _gather(context, table, row, column):
     def emit(context, builder, sig, args):
         array = context.make_array(sig.args[0])(context, builder, args[0])
         columns = builder.extract_value(array.shape, 1)
-        rows, column = (
-            builder.fptosi(args[1], INTEGERS),
-            context.cast(builder, args[2], sig.args[2], types.int64),
-        )
+        rows = builder.fptosi(args[1], INTEGERS)
+        column = context.cast(builder, args[2], sig.args[2], types.int64)
         value = ir.Constant(DOUBLES, ir.Undefined)
         for lane in map(ir.IntType(32), range(WIDTH)):
             offset = builder.add(

@@ -1,4 +1,5 @@
-"""The base of force laws: drag per unit length on a body that slides along and across itself."""
+"""The base of force laws: drag per unit length on a body that slides along and across
+itself."""
 
 from __future__ import annotations
 
@@ -17,24 +18,28 @@ LAWS = Registry("geomech.media", "law", "a law", classes_with("traction"))
 
 
 class Medium(Protocol):
-    """A force law of the horizontal plane. Forces are in units of the medium's own axial drag.
+    """A force law of the horizontal plane. Forces are in units of the medium's own
+    axial drag.
 
     ``dry`` holds rate-independent terms (q, k_t, k_n), each of which adds
 
-        f_t = k_t v_t / R,   f_n = k_n v_n / R,   R = sqrt(q^2 v_t^2 + v_n^2 + rounding^2),
+        f_t = k_t v_t / R,   f_n = k_n v_n / R,
+        R = sqrt(q^2 v_t^2 + v_n^2 + rounding^2),
 
-    and ``viscous`` the coefficients (c_t, c_n) of f_t = c_t v_t, f_n = c_n v_n. Together they give
-    the exact averages of `rft.formulas.link`. A law of another form has neither (or None) and is averaged by quadrature.
+    and ``viscous`` the coefficients (c_t, c_n) of f_t = c_t v_t, f_n = c_n v_n.
+    Together they give the exact averages of `rft.formulas.link`. A law of another form
+    has neither (or None) and is averaged by quadrature.
 
     Only `traction` is required. Optional members:
 
-    slopes(v_t, v_n, rounding): (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n); by default central differences.
-    mirror: True if f_n is odd and f_t even in v_n, so that left and right are alike.
+    slopes(v_t, v_n, rounding): (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n); by default
+    central differences. mirror: True if f_n is odd and f_t even in v_n, so that left
+    and right are alike.
     k: the factor k of Eq. 2.
     covariance: (n, n), of the parameters named in ``uncertain``; it changes no force.
 
-    A law runs in compiled code if its traction, and its slopes if it has them, are formulas (`rft.formulas.vectors.formula`) of
-    its number fields.
+    A law runs in compiled code if its traction, and its slopes if it has them, are
+    formulas (`rft.formulas.vectors.formula`) of its number fields.
 
     Examples
     --------
@@ -54,46 +59,55 @@ class Medium(Protocol):
     def traction(
         self, v_t: Any, v_n: Any, rounding: Any = 0.0
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the drag per unit length (f_t, f_n) opposing the velocity (v_t, v_n); arrays broadcast together."""
+        """Return the drag per unit length (f_t, f_n) opposing the velocity (v_t, v_n);
+        arrays broadcast together."""
         ...
 
 
 @formula
 def terms_traction(law, v_t, v_n, rounding):
     """Return the traction (f_t, f_n) of a law's viscous and dry terms, zero at rest."""
-    f_t, f_n = law.viscous[0, 0] * v_t, law.viscous[0, 1] * v_n
+    f_t = law.viscous[0, 0] * v_t
+    f_n = law.viscous[0, 1] * v_n
     for j in range(len(law.dry)):
-        q, k_t, k_n = law.dry[j, 0], law.dry[j, 1], law.dry[j, 2]
+        q = law.dry[j, 0]
+        k_t = law.dry[j, 1]
+        k_n = law.dry[j, 2]
         R2 = q * q * v_t * v_t + v_n * v_n + rounding * rounding
         R = sqrt(where(R2 > 0.0, R2, 1.0))
-        f_t, f_n = f_t + k_t * v_t / R, f_n + k_n * v_n / R
+        f_t = f_t + k_t * v_t / R
+        f_n = f_n + k_n * v_n / R
     return f_t, f_n
 
 
 @formula
 def terms_slopes(law, v_t, v_n, rounding):
-    """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n) of viscous and dry terms; infinite slopes at rest are
-    returned as 0."""
+    """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n) of viscous and dry terms;
+    infinite slopes at rest are returned as 0."""
     zero = 0.0 * v_t
-    tt, tn, nt, nn = zero + law.viscous[0, 0], zero, zero, zero + law.viscous[0, 1]
+    tt = zero + law.viscous[0, 0]
+    tn = zero
+    nt = zero
+    nn = zero + law.viscous[0, 1]
     for j in range(len(law.dry)):
-        q, k_t, k_n = law.dry[j, 0], law.dry[j, 1], law.dry[j, 2]
+        q = law.dry[j, 0]
+        k_t = law.dry[j, 1]
+        k_n = law.dry[j, 2]
         R2 = q * q * v_t * v_t + v_n * v_n + rounding * rounding
         inverse = where(R2 > 0.0, 1.0, 0.0) / sqrt(where(R2 > 0.0, R2, 1.0))
-        e_t, e_n, e = v_t * inverse, v_n * inverse, rounding * inverse
-        tt, tn = (
-            tt + k_t * (e_n * e_n + e * e) * inverse,
-            tn - k_t * e_t * e_n * inverse,
-        )
-        nt, nn = (
-            nt - k_n * q * q * e_t * e_n * inverse,
-            nn + k_n * (q * q * e_t * e_t + e * e) * inverse,
-        )
+        e_t = v_t * inverse
+        e_n = v_n * inverse
+        e = rounding * inverse
+        tt = tt + k_t * (e_n * e_n + e * e) * inverse
+        tn = tn - k_t * e_t * e_n * inverse
+        nt = nt - k_n * q * q * e_t * e_n * inverse
+        nn = nn + k_n * (q * q * e_t * e_t + e * e) * inverse
     return tt, tn, nt, nn
 
 
 class TermLaw:
-    """Base of laws that are a sum of dry and viscous terms: `traction` follows from the terms.
+    """Base of laws that are a sum of dry and viscous terms: `traction` follows from the
+    terms.
 
     Examples
     --------
@@ -110,25 +124,30 @@ class TermLaw:
     def traction(
         self, v_t: Any, v_n: Any, rounding: Any = 0.0
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the drag per unit length (f_t, f_n) opposing (v_t, v_n), in units of the axial drag; zero at rest."""
-        v_t, v_n = unmasked("v_t", v_t), unmasked("v_n", v_n)
+        """Return the drag per unit length (f_t, f_n) opposing (v_t, v_n), in units of
+        the axial drag; zero at rest."""
+        v_t = unmasked("v_t", v_t)
+        v_n = unmasked("v_n", v_n)
         return terms_traction(term_numbers(self), v_t, v_n, rounding)
 
     def slopes(self, v_t: Any, v_n: Any, rounding: Any = 0.0) -> tuple[np.ndarray, ...]:
-        """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n); infinite slopes at rest are returned as 0."""
+        """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n); infinite slopes at rest
+        are returned as 0."""
         v_t, v_n = np.broadcast_arrays(unmasked("v_t", v_t), unmasked("v_n", v_n))
         return terms_slopes(term_numbers(self), v_t, v_n, rounding)
 
 
 class TermNumbers(NamedTuple):
-    """Numbers of viscous and dry terms. viscous: (1, 2), coefficients (c_t, c_n). dry: (T, 3), terms (q, k_t, k_n)."""
+    """Numbers of viscous and dry terms. viscous: (1, 2), coefficients (c_t, c_n). dry:
+    (T, 3), terms (q, k_t, k_n)."""
 
     viscous: np.ndarray
     dry: np.ndarray
 
 
 def term_numbers(medium) -> TermNumbers:
-    """Return the terms of a medium in closed form as arrays, those that act along the element first."""
+    """Return the terms of a medium in closed form as arrays, those that act along the
+    element first."""
     terms = sorted(medium.dry, key=lambda term: term[1] == 0.0)
     return TermNumbers(
         np.array([medium.viscous], float), np.array(terms, float).reshape(-1, 3)
@@ -136,12 +155,13 @@ def term_numbers(medium) -> TermNumbers:
 
 
 def dry_terms(medium) -> tuple[tuple[float, float, float], ...] | None:
-    """Return the rate-independent terms (q, k_t, k_n) of a medium's closed form; None without a closed form."""
+    """Return the dry terms (q, k_t, k_n) of a medium; None without a closed form."""
     return getattr(medium, "dry", None)
 
 
 def viscous_terms(medium) -> tuple[float, float] | None:
-    """Return the viscous coefficients (c_t, c_n) of a medium's closed form; None without a closed form."""
+    """Return the viscous coefficients (c_t, c_n) of a medium; None without a closed
+    form."""
     return getattr(medium, "viscous", None)
 
 
@@ -158,7 +178,8 @@ def is_closed(medium: Any) -> bool:
 
 
 def is_mirror(medium: Any) -> bool:
-    """Return whether a medium claims that left and right are alike; a field then takes half the balances.
+    """Return whether a medium claims that left and right are alike; a field then takes
+    half the balances.
 
     Examples
     --------
@@ -170,7 +191,8 @@ def is_mirror(medium: Any) -> bool:
 
 
 def is_frozen(value) -> bool:
-    """Return whether a value is a frozen dataclass of hashable fields (an array is not hashable)."""
+    """Return whether a value is a frozen dataclass of hashable fields (an array is not
+    hashable)."""
     parameters = getattr(type(value), "__dataclass_params__", None)
     if parameters is None or not parameters.frozen:
         return False
@@ -182,46 +204,54 @@ def is_frozen(value) -> bool:
 
 
 def cached_if_immutable(function: Callable) -> Callable:
-    """Return the function with a cache of its last 32 calls; calls with an argument that may change are not cached.
+    """Return the function with a cache of its last 32 calls; calls with an argument
+    that may change are not cached.
 
-    Immutable are frozen dataclasses (`is_frozen`), text, integers, and tuples of these."""
+    Immutable are frozen dataclasses (`is_frozen`), text, integers, and tuples of
+    these."""
     cached = functools.lru_cache(maxsize=32)(function)
 
     @functools.wraps(function)
     def call(*args):
-        return (cached if _is_immutable(args) else function)(*args)
+        if _is_immutable(args):
+            return cached(*args)
+        return function(*args)
 
     return call
 
 
 def _is_immutable(x) -> bool:
-    return type(x) in (str, int) or (
-        all(map(_is_immutable, x)) if type(x) is tuple else is_frozen(x)
-    )
+    if type(x) is tuple:
+        return all(map(_is_immutable, x))
+    return type(x) in (str, int) or is_frozen(x)
 
 
-# Velocities at which properties of a law are checked: 48 directions at 13 speeds, (13, 48).
-SPEEDS, DIRECTIONS = (
-    np.logspace(-12, 12, 13)[:, None],
-    np.linspace(0.0, 2 * np.pi, 48, endpoint=False),
-)
+# Velocities at which properties of a law are checked: 48 directions at 13 speeds,
+# (13, 48).
+SPEEDS = np.logspace(-12, 12, 13)[:, None]
+DIRECTIONS = np.linspace(0.0, 2 * np.pi, 48, endpoint=False)
 VELOCITIES = SPEEDS * np.cos(DIRECTIONS), SPEEDS * np.sin(DIRECTIONS)
 
 
 @cached_if_immutable
 def is_odd(medium: Medium) -> bool:
-    """Return whether f(-v) = -f(v) at VELOCITIES, so that the ends of an element are alike."""
+    """Return whether f(-v) = -f(v) at VELOCITIES, so that the ends of an element are
+    alike."""
     v_t, v_n = VELOCITIES
     with np.errstate(all="ignore"):
-        forward, backward = (
-            np.stack(np.broadcast_arrays(*medium.traction(k * v_t, k * v_n)))
-            for k in (1, -1)
-        )
+        forward = _traction(medium, v_t, v_n)
+        backward = _traction(medium, -v_t, -v_n)
     return bool((np.abs(forward + backward) <= 1e-13 * np.abs(forward).max(0)).all())
 
 
+def _traction(medium: Medium, v_t, v_n) -> np.ndarray:
+    """Return the traction of a medium as one array (2, ...)."""
+    return np.stack(np.broadcast_arrays(*medium.traction(v_t, v_n)))
+
+
 def require_law(medium: Medium) -> None:
-    """Raise ValueError unless a medium has a `traction` that takes and returns arrays."""
+    """Raise ValueError unless a medium has a `traction` that takes and returns
+    arrays."""
     is_law = hasattr(medium, "traction") and not isinstance(medium, type)
     require(
         is_law,
@@ -237,35 +267,37 @@ def require_law(medium: Medium) -> None:
             f_t, f_n = medium.traction(np.ones((2, 3)), np.zeros((2, 3)), 1e-6)
     except TypeError as error:
         raise Refusal(
-            f"{name} must take (v_t, v_n, rounding=0.0) and return (f_t, f_n), rounding being "
-            "the speed below which dry friction is rounded off",
+            f"{name} must take (v_t, v_n, rounding=0.0) and return (f_t, f_n), "
+            "rounding being the speed below which dry friction is rounded off",
             because=str(error),
         ) from error
     except Exception as error:
         raise Refusal(
             f"{name} fails", because=f"{type(error).__name__}: {error}"
         ) from error
-    shapes = np.shape(f_t), np.shape(f_n)
-    broadcasts = set(shapes) <= {(), (1,), (2, 3)}
+    shape_t = np.shape(f_t)
+    shape_n = np.shape(f_n)
     require(
-        broadcasts,
-        f"{name} must return arrays of the velocities' shape (2, 3), got {shapes[0]} and {shapes[1]}",
+        {shape_t, shape_n} <= {(), (1,), (2, 3)},
+        f"{name} must return arrays of the velocities' shape (2, 3), "
+        f"got {shape_t} and {shape_n}",
     )
 
 
 def _has_only_drags(medium: TermLaw) -> bool:
     """Return whether no term of a closed form pushes and some term drags."""
-    coefficients = [*(x for _, *k in medium.dry for x in k), *medium.viscous]
+    coefficients = [*medium.viscous]
+    for _, k_t, k_n in medium.dry:
+        coefficients += [k_t, k_n]
     return min(coefficients) >= 0.0 and 0.0 < max(coefficients) < np.inf
 
 
 def require_drag(medium: Medium) -> None:
-    """Raise ValueError if the medium pushes at one of VELOCITIES, that is if its force there has a part along the motion,
-    or if it has no drag at all."""
+    """Raise ValueError if the medium pushes at one of VELOCITIES, that is if its force
+    there has a part along the motion, or if it has no drag at all."""
     require_law(medium)
-    if getattr(type(medium), "traction", None) is TermLaw.traction and _has_only_drags(
-        medium
-    ):
+    is_term_law = getattr(type(medium), "traction", None) is TermLaw.traction
+    if is_term_law and _has_only_drags(medium):
         return
     v_t, v_n = VELOCITIES
     with np.errstate(all="ignore"):
@@ -273,7 +305,8 @@ def require_drag(medium: Medium) -> None:
         cosine = (f_t * v_t + f_n * v_n) / (
             np.hypot(f_t, f_n) * SPEEDS
         )  # 1 straight against the motion
-    name, cosine = type(medium).__name__, np.nan_to_num(cosine)
+    name = type(medium).__name__
+    cosine = np.nan_to_num(cosine)
     require(
         bool((cosine > 0).any()),
         f"{name} has no drag at any velocity",
@@ -282,14 +315,16 @@ def require_drag(medium: Medium) -> None:
     worst = np.unravel_index(np.argmin(cosine), cosine.shape)
     require(
         cosine[worst] > -1e-09,
-        f"{name} pushes instead of drags at velocity ({v_t[worst]:.3g}, {v_n[worst]:.3g}) along and across the body",
+        f"{name} pushes instead of drags at velocity ({v_t[worst]:.3g}, "
+        f"{v_n[worst]:.3g}) along and across the body",
         because="drag is positive in the direction of the motion it opposes",
         instead="change its sign there",
     )
 
 
 def is_linear(medium: Medium) -> bool:
-    """Return whether drag is proportional to velocity, and so the body velocity linear in alphadot.
+    """Return whether drag is proportional to velocity, and so the body velocity linear
+    in alphadot.
 
     Examples
     --------
@@ -301,8 +336,8 @@ def is_linear(medium: Medium) -> bool:
 
 
 def is_rate_independent(medium: Medium) -> bool:
-    """Return whether drag grows with one power of the speed in all directions, so that the speed of a gait does not
-    matter.
+    """Return whether drag grows with one power of the speed in all directions, so that
+    the speed of a gait does not matter.
 
     Examples
     --------
@@ -314,8 +349,8 @@ def is_rate_independent(medium: Medium) -> bool:
 
 
 def speed_exponent(medium: Medium) -> float | None:
-    """Return the power of the speed with which drag grows in all directions, 0 for dry media, 1 for viscous ones; None
-    if it differs between speeds or directions.
+    """Return the power of the speed with which drag grows in all directions, 0 for dry
+    media, 1 for viscous ones; None if it differs between speeds or directions.
 
     Examples
     --------
@@ -324,21 +359,19 @@ def speed_exponent(medium: Medium) -> float | None:
     (0.0, 1.0)
     """
     if is_closed(medium):
-        return (None if any(medium.viscous) else 0.0) if medium.dry else 1.0
+        if not medium.dry:
+            return 1.0
+        return None if any(medium.viscous) else 0.0
     speeds = np.logspace(-3, 1, 5)[:, None]
     with np.errstate(all="ignore"):
-        f = np.stack(
-            np.broadcast_arrays(
-                *medium.traction(
-                    speeds * np.cos(DIRECTIONS), speeds * np.sin(DIRECTIONS)
-                )
-            )
-        )
+        f = _traction(medium, speeds * np.cos(DIRECTIONS), speeds * np.sin(DIRECTIONS))
     size = np.sqrt((f**2).sum((0, 2)))
     if not np.isfinite(size).all() or not size.all():
         return None
-    form, growth = f / size[:, None], size[1:] / size[:-1]
-    has_power = (
-        np.ptp(form, axis=1).max() < 1e-6 and np.ptp(growth) < 1e-6 * growth.max()
-    )
-    return round(float(np.log10(growth.mean())), 6) + 0.0 if has_power else None
+    form = f / size[:, None]
+    growth = size[1:] / size[:-1]
+    has_one_form = np.ptp(form, axis=1).max() < 1e-6
+    has_one_growth = np.ptp(growth) < 1e-6 * growth.max()
+    if not (has_one_form and has_one_growth):
+        return None
+    return round(float(np.log10(growth.mean())), 6) + 0.0

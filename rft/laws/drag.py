@@ -1,4 +1,5 @@
-"""Measured drag on a rod: attack angles, forces along and across the rod, its sizes and the density of the bed."""
+"""Measured drag on a rod: attack angles, forces along and across the rod, its sizes and
+the density of the bed."""
 
 from __future__ import annotations
 
@@ -10,7 +11,9 @@ from rft.core.checks import in_range, real_array
 from rft.core.metres import GRAVITY
 from rft.core.refusal import require
 
-PUSHING = 0.1  # of the largest force: a force below minus that pushes; a smaller one counts as an error of measurement
+# Of the largest force: a force below minus that pushes. Smaller negative forces count
+# as errors of measurement.
+PUSHING = 0.1
 LARGEST_IN_RADIANS = 7.0  # if no angle is larger, the angles are refused as radians
 
 
@@ -18,8 +21,8 @@ LARGEST_IN_RADIANS = 7.0  # if no angle is larger, the angles are refused as rad
 class Rod:
     """A rod and the bed that it was dragged through; None for an unknown number.
 
-    radius, length, depth (of the axis): m. density: kg/m^3, of the bed, which is that of the grains times their volume
-    fraction.
+    radius, length, depth (of the axis): m. density: kg/m^3, of the bed, which is that
+    of the grains times their volume fraction.
 
     Examples
     --------
@@ -36,40 +39,36 @@ class Rod:
     density: float | None = None
 
     def __post_init__(self):
-        for name, high in (
-            ("radius", 1e3),
-            ("length", 1e3),
-            ("depth", 1e3),
-            ("density", 1e6),
-        ):
-            if getattr(self, name) is not None:
-                in_range(
-                    f"the rod's {name}" if name != "density" else name,
-                    getattr(self, name),
-                    1e-9,
-                    high,
-                )
+        for name in ("radius", "length", "depth"):
+            value = getattr(self, name)
+            if value is not None:
+                in_range(f"the rod's {name}", value, 1e-9, 1e3)
+        if self.density is not None:
+            in_range("density", self.density, 1e-9, 1e6)
 
     @property
     def area(self) -> float | None:
         """Projected area 2 r L, m^2."""
-        return 2 * self.radius * self.length if self.radius and self.length else None
+        if self.radius and self.length:
+            return 2 * self.radius * self.length
+        return None
 
     @property
     def pressure(self) -> float | None:
         """Pressure rho g |z| of the grains above the axis, Pa."""
-        return (
-            self.density * GRAVITY * self.depth if self.density and self.depth else None
-        )
+        if self.density and self.depth:
+            return self.density * GRAVITY * self.depth
+        return None
 
 
 @dataclass(frozen=True, eq=False)
 class RodDrag:
     """Forces on a rod, positive where they oppose the velocity.
 
-    psi: (N,), attack angles, rad, from 0 to pi/2. forces: (2, N), along and across the rod, N. weight: (N,), of the squares
-    of residuals, with mean 1. ends: (2, N), forces on both ends together, N, where they are told apart: ``forces`` are then
-    those on a flank as long as the rod; None where they are those on the whole rod.
+    psi: (N,), attack angles, rad, from 0 to pi/2. forces: (2, N), along and across the
+    rod, N. weight: (N,), of the squares of residuals, with mean 1. ends: (2, N), forces
+    on both ends together, N, where they are told apart: ``forces`` are then those on a
+    flank as long as the rod; None where they are those on the whole rod.
 
     Examples
     --------
@@ -96,12 +95,13 @@ class RodDrag:
 
 
 def rod_drag(psi_deg, along, across, weight=None, ends=None) -> RodDrag:
-    """Return measurements at attack angles in degrees, mapped to 0 to 90 by symmetry: the ends of a rod are alike, and so
-    are its sides. ends: (2, N), forces along and across on both ends, where the others are those on the flank.
+    """Return measurements at attack angles in degrees, mapped to 0 to 90 by symmetry:
+    the ends of a rod are alike, and so are its sides. ends: (2, N), forces along and
+    across on both ends, where the others are those on the flank.
 
-    At angles beyond 0 to 90 forces may have the signs of the velocity's components, or all be magnitudes. Equal angles are
-    separate measurements. Raises ValueError for numbers that cannot be drag: forces that push, exchanged columns, angles
-    in radians.
+    At angles beyond 0 to 90 forces may have the signs of the velocity's components, or
+    all be magnitudes. Equal angles are separate measurements. Raises ValueError for
+    numbers that cannot be drag: forces that push, exchanged columns, angles in radians.
 
     Examples
     --------
@@ -111,16 +111,17 @@ def rod_drag(psi_deg, along, across, weight=None, ends=None) -> RodDrag:
     (array([0.   , 0.785, 0.785]), array([[1. , 0.8, 0.8],
            [0. , 1.9, 1.9]]))
     """
-    columns = {"psi_deg": psi_deg, "forces along": along, "forces across": across}
-    psi, *forces = (real_array(name, x) for name, x in columns.items())
-    forces = (
-        np.array(forces) if all(x.shape == psi.shape for x in forces) else np.zeros(0)
-    )
-    weight = np.ones(psi.shape) if weight is None else real_array("weights", weight)
+    psi = real_array("psi_deg", psi_deg)
+    along = real_array("forces along", along)
+    across = real_array("forces across", across)
+    if weight is None:
+        weight = np.ones(psi.shape)
+    weight = real_array("weights", weight)
     require(
-        forces.shape == (2, psi.size) and weight.shape == psi.shape,
+        along.shape == across.shape == weight.shape == (psi.size,),
         "angles and forces must be rows of one length",
     )
+    forces = np.array([along, across])
     finite = all(bool(np.isfinite(x).all()) for x in (psi, forces, weight))
     require(
         finite and psi.size > 0,
@@ -152,13 +153,15 @@ def rod_drag(psi_deg, along, across, weight=None, ends=None) -> RodDrag:
 
 
 def _signs(psi: np.ndarray) -> np.ndarray:
-    """Return the signs (2, N) of velocities along and across at angles in degrees, 1 where there is none."""
+    """Return the signs (2, N) of velocities along and across at angles in degrees, 1
+    where there is none."""
     velocity = np.array([np.cos(np.radians(psi)), np.sin(np.radians(psi))])
     return np.where(np.abs(velocity) < 1e-9, 1.0, np.sign(velocity))
 
 
 def _opposing(psi: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """Return the forces, positive where they oppose the motion; ValueError with the angle of a force that pushes."""
+    """Return the forces, positive where they oppose the motion; ValueError with the
+    angle of a force that pushes."""
     largest = np.abs(forces).max()
     require(largest > 0, "all forces are zero", because="there is no drag to fit")
     require(
@@ -169,18 +172,21 @@ def _opposing(psi: np.ndarray, forces: np.ndarray) -> np.ndarray:
     )
     opposing = max(_signs(psi) * forces, forces, key=lambda x: x.min())
     component, row = np.unravel_index(np.argmin(opposing), opposing.shape)
-    direction, force = ("along", "across")[component], forces[component, row]
+    direction = ("along", "across")[component]
+    force = forces[component, row]
     require(
         opposing[component, row] >= -PUSHING * largest,
-        f"at psi = {psi[row]:g} degrees the force {direction} the rod is {force:g} N and pushes",
+        f"at psi = {psi[row]:g} degrees the force {direction} the rod is {force:g} N "
+        "and pushes",
         because="drag is positive where it opposes the motion",
     )
     return opposing
 
 
 def _require_not_exchanged(data: RodDrag) -> None:
-    """Raise ValueError if forces along are nearer to a multiple of sin psi, and forces across to one of cos psi, than the
-    other way round, by a factor of 4 in the sum of squares."""
+    """Raise ValueError if forces along are nearer to a multiple of sin psi, and forces
+    across to one of cos psi, than the other way round, by a factor of 4 in the sum of
+    squares."""
     directions = np.array([np.cos(data.psi), np.sin(data.psi)])
 
     def misfit(shape):

@@ -1,4 +1,5 @@
-"""Dry granular media in the horizontal plane: Eqs. 2 and 3 of Zhang and Goldman (2014)."""
+"""Dry granular media in the horizontal plane: Eqs. 2 and 3 of Zhang and Goldman
+(2014)."""
 
 from __future__ import annotations
 
@@ -14,17 +15,21 @@ from rft.laws.base import LAWS, TermLaw
 @LAWS.register
 @dataclass(frozen=True)
 class Granular(TermLaw):
-    """Resistive force per unit length of a slender body in dry grains, opposing the velocity.
+    """Resistive force per unit length of a slender body in dry grains, opposing the
+    velocity.
 
         f_n = (1 + C / sqrt(tan^2 gamma0 + (v.n)^2)) (v.n),     f_t = v.t,
 
-    v the unit vector of the velocity, both times 2 k rho g r |z| (the axial drag, our unit of force).
+    v the unit vector of the velocity, both times 2 k rho g r |z| (the axial drag, our
+    unit of force).
     Source: Zhang and Goldman, Phys. Fluids 26, 101308 (2014), Eqs. 2-3.
 
-    k is part of the unit of force; only effects measured against the weight of grains use it (grain inertia).
+    k is part of the unit of force; only effects measured against the weight of grains
+    use it (grain inertia).
 
-    covariance (-): of C and gamma0 (in rad), and of k as a third parameter if k is given and has one; it changes no
-    force and is what drag measurements leave open (`rft.fits.rods`).
+    covariance (-): of C and gamma0 (in rad), and of k as a third parameter if k is
+    given and has one; it changes no force and is what drag measurements leave open
+    (`rft.fits.rods`).
 
     Examples
     --------
@@ -52,7 +57,8 @@ class Granular(TermLaw):
         check_numbers(self)
         require(
             0 < self.gamma0 < math.pi / 2,
-            f"gamma0 must lie between 0 and 90 degrees, got {math.degrees(self.gamma0):g} degrees ({self.gamma0:g} rad)",
+            "gamma0 must lie between 0 and 90 degrees, got "
+            f"{math.degrees(self.gamma0):g} degrees ({self.gamma0:g} rad)",
         )
         sizes = (2,) if self.k is None else (2, 3)
         object.__setattr__(

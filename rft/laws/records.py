@@ -1,8 +1,10 @@
-"""Force laws as records: numbers, and formulas of these numbers, for both drivers of the balance.
+"""Force laws as records: numbers, and formulas of these numbers, for both drivers of
+the balance.
 
-The record of a law is a NamedTuple of arrays whose class holds the formulas `traction`, `slopes` and `average`. A
-closed form, a sum of viscous and dry terms, has exact averages over an element; any other law is averaged by a
-quadrature rule. A law whose traction is no formula (`rft.formulas.vectors.formula`) is computed by NumPy alone."""
+The record of a law is a NamedTuple of arrays whose class holds the formulas `traction`,
+`slopes` and `average`. A closed form, a sum of viscous and dry terms, has exact
+averages over an element; any other law is averaged by a quadrature rule. A law whose
+traction is no formula (`rft.formulas.vectors.formula`) is computed by NumPy alone."""
 
 from __future__ import annotations
 
@@ -50,68 +52,68 @@ class Terms(NamedTuple):
 
     viscous: np.ndarray
     dry: np.ndarray
-    traction, slopes, average = terms_traction, terms_slopes, closed_form
+    traction = terms_traction
+    slopes = terms_slopes
+    average = closed_form
 
 
 class Uncompiled:
     """The record of a law whose traction is no formula."""
 
-    slopes, average = slopes_by_differences, by_nodes
+    slopes = slopes_by_differences
+    average = by_nodes
 
     def __init__(self, law, nodes: np.ndarray, weights: np.ndarray):
-        self.nodes, self.weights, self.traction = nodes, weights, law.traction
+        self.nodes = nodes
+        self.weights = weights
+        self.traction = law.traction
         if hasattr(law, "slopes"):
             self.slopes = law.slopes
 
 
 @cached_if_immutable
 def record(law, rule: str = "exact") -> Any:
-    """Return the record of a law under a rule ("exact", "midpoint:N", "gauss:N"); ValueError unless it is a law."""
+    """Return the record of a law under a rule ("exact", "midpoint:N", "gauss:N");
+    ValueError unless it is a law."""
     require_law(law)
     kind, count = rule_for(law, rule)
-    if is_closed(law):
-        numbers = term_numbers(law)._asdict()
-        if kind == "exact":
-            return Terms(**numbers)
-        formulas = {
-            "traction": terms_traction,
-            "slopes": terms_slopes,
-            "average": by_nodes,
-        }
+    if kind == "exact":
+        return Terms(*term_numbers(law))
     nodes, weights = (
         x.reshape(1, 1, -1, 1, 1) for x in nodes_and_weights((kind, count))
     )
-    if not is_closed(law):
-        if not is_formula(type(law).traction):
-            return Uncompiled(law, nodes, weights)
+    if is_closed(law):
+        numbers = term_numbers(law)._asdict()
+        traction = terms_traction
+        slopes = terms_slopes
+    elif is_formula(type(law).traction):
         numbers = law_numbers(law)
+        traction = type(law).traction
         slopes = getattr(type(law), "slopes", slopes_by_differences)
-        formulas = {
-            "traction": type(law).traction,
-            "slopes": slopes,
-            "average": by_nodes,
-        }
-    cls = record_class(
-        type(law).__name__, (*numbers, "nodes", "weights"), tuple(formulas.items())
-    )
+    else:
+        return Uncompiled(law, nodes, weights)
+    formulas = (("traction", traction), ("slopes", slopes), ("average", by_nodes))
+    cls = record_class(type(law).__name__, (*numbers, "nodes", "weights"), formulas)
     return cls(*numbers.values(), nodes, weights)
 
 
 def law_numbers(law) -> dict[str, np.ndarray | float]:
-    """Return the numbers that the formulas of a law read: its ``numbers``, or the numbers among its fields."""
+    """Return the numbers that the formulas of a law read: its ``numbers``, or the
+    numbers among its fields."""
     if hasattr(law, "numbers"):
         return law.numbers
-    law_fields = fields(law) if is_dataclass(law) else ()
-    return {
-        f.name: float(x) for f in law_fields if is_number(x := getattr(law, f.name))
-    }
+    if not is_dataclass(law):
+        return {}
+    values = {f.name: getattr(law, f.name) for f in fields(law)}
+    return {name: float(x) for name, x in values.items() if is_number(x)}
 
 
 @functools.cache
 def record_class(
     name: str, names: tuple[str, ...], formulas: tuple[tuple[str, Callable], ...]
 ) -> type:
-    """Return the class of records with these numbers and formulas; a kernel is compiled for each class."""
+    """Return the class of records with these numbers and formulas; a kernel is compiled
+    for each class."""
     cls = NamedTuple(name, [(field, np.ndarray) for field in names])
     for field, function in formulas:
         setattr(cls, field, function)
@@ -124,7 +126,9 @@ def is_compilable(law_record) -> bool:
 
 
 def rule_for(law, rule: str) -> tuple[str, int]:
-    """Return the rule as `rft.formulas.quadrature.parse` does, but QUADRATURE in place of "exact" for a law without a closed
-    form."""
+    """Return the rule as `rft.formulas.quadrature.parse` does, but QUADRATURE in place
+    of "exact" for a law without a closed form."""
     kind, count = parse(rule)
-    return (kind, count) if kind != "exact" or is_closed(law) else parse(QUADRATURE)
+    if kind == "exact" and not is_closed(law):
+        return parse(QUADRATURE)
+    return kind, count

@@ -1,4 +1,5 @@
-"""Drag of a shallow body at the surface of dry grains: the form of Eq. 3 across, its own strength along."""
+"""Drag of a shallow body at the surface of dry grains: the form of Eq. 3 across, its
+own strength along."""
 
 from __future__ import annotations
 
@@ -14,15 +15,18 @@ from rft.laws.base import LAWS, TermLaw
 @LAWS.register
 @dataclass(frozen=True)
 class Surface(TermLaw):
-    """Resistive force per unit length of a shallow body at the surface of dry grains, opposing the velocity.
+    """Resistive force per unit length of a shallow body at the surface of dry grains,
+    opposing the velocity.
 
         f_n = across (1 + C / sqrt(tan^2 gamma0 + (v.n)^2)) (v.n),     f_t = v.t,
 
-    v the unit vector of the velocity, in units of the axial drag. With across = 1 the law is that of `Granular`. The form
-    of f_n is the one that Schiebel et al. (eLife 9, e51412, 2020) fitted to the drag on a plate; that of f_t, Coulomb
-    friction, is assumed.
+    v the unit vector of the velocity, in units of the axial drag. With across = 1 the
+    law is that of `Granular`. The form of f_n is the one that Schiebel et al. (eLife 9,
+    e51412, 2020) fitted to the drag on a plate; that of f_t, Coulomb friction, is
+    assumed.
 
-    covariance (-): of C, gamma0 (in rad) and across; it changes no force and is what drag measurements leave open.
+    covariance (-): of C, gamma0 (in rad) and across; it changes no force and is what
+    drag measurements leave open.
 
     Examples
     --------
@@ -56,13 +60,15 @@ class Surface(TermLaw):
         check_numbers(self)
         require(
             0 < self.gamma0 < math.pi / 2,
-            f"gamma0 must lie between 0 and 90 degrees, got {math.degrees(self.gamma0):g} degrees ({self.gamma0:g} rad)",
+            "gamma0 must lie between 0 and 90 degrees, got "
+            f"{math.degrees(self.gamma0):g} degrees ({self.gamma0:g} rad)",
         )
         object.__setattr__(self, "covariance", checked_covariance(self.covariance, 3))
 
     @property
     def dry(self) -> tuple[tuple[float, float, float], ...]:
-        # As in `Granular`: C (v.n) / sqrt(tan^2 g0 + (v.n)^2) = C cos g0 v_n / sqrt(sin^2 g0 v_t^2 + v_n^2).
+        # As in `Granular`: C (v.n) / sqrt(tan^2 g0 + (v.n)^2) = C cos g0 v_n /
+        # sqrt(sin^2 g0 v_t^2 + v_n^2).
         extra = self.across * self.C * math.cos(self.gamma0)
         return (1.0, 1.0, float(self.across)), (math.sin(self.gamma0), 0.0, extra)
 

@@ -1,4 +1,5 @@
-"""Low-Reynolds-number drag, the paper's comparison (Fig. 5(c)): linear in the velocity."""
+"""Low-Reynolds-number drag, the paper's comparison (Fig. 5(c)): linear in the
+velocity."""
 
 from __future__ import annotations
 
@@ -12,12 +13,14 @@ from rft.laws.base import LAWS, TermLaw
 @LAWS.register
 @dataclass(frozen=True)
 class Viscous(TermLaw):
-    """Linear drag: f_t = v_t, f_n = ratio v_n per unit length, in units of the axial drag coefficient.
+    """Linear drag: f_t = v_t, f_n = ratio v_n per unit length, in units of the axial
+    drag coefficient.
 
-    A ratio of 2 is the slender-body limit of Gray and Hancock, J. Exp. Biol. 32, 802 (1955).
+    A ratio of 2 is the slender-body limit of Gray and Hancock, J. Exp. Biol. 32, 802
+    (1955).
 
-    covariance (-): of the ratio, 1 x 1; it changes no force and is what drag measurements leave open
-    (`rft.fits.rods`).
+    covariance (-): of the ratio, 1 x 1; it changes no force and is what drag
+    measurements leave open (`rft.fits.rods`).
 
     Examples
     --------

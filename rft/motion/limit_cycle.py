@@ -1,16 +1,22 @@
-"""Distance of time stepping from its limit cycle, and extrapolation of a heavy body to it.
+"""Distance of time stepping from its limit cycle, and extrapolation of a heavy body to
+it.
 
-From cycle to cycle the displacement changes by less and less; its distance from the limit is the sum of all changes to
-come. Without mass that sum follows from the ratio of the last changes. On ground with a map of cells the changes in the
-end are random: they alternate in sign and do not add up.
+From cycle to cycle the displacement changes by less and less; its distance from the
+limit is the sum of all changes to come. Without mass that sum follows from the ratio of
+the last changes. On ground with a map of cells the changes in the end are random: they
+alternate in sign and do not add up.
 
-A heavy body takes many cycles, but its state is only the three velocities at the start of a cycle. The map from these to
-the velocities at the next start is affine near its fixed point, and the last few cycles determine it in the directions in
-which they differ (Anderson's mixing). Only the velocities are changed; the memory of the ground follows by itself.
+A heavy body takes many cycles, but its state is only the three velocities at the start
+of a cycle. The map from these to the velocities at the next start is affine near its
+fixed point, and the last few cycles determine it in the directions in which they differ
+(Anderson's mixing). Only the velocities are changed; the memory of the ground follows
+by itself.
 
-Where a body without mass forgets slowly, as with strokes far shorter than the travel of a transient, its memory at the
-start of a cycle is mixed likewise. It has as many numbers as pieces, each with a factor of its own by which its distance
-from the limit falls per cycle. Two changes tell these factors, and each number is scaled by 1 / (1 - factor)."""
+Where a body without mass forgets slowly, as with strokes far shorter than the travel of
+a transient, its memory at the start of a cycle is mixed likewise. It has as many
+numbers as pieces, each with a factor of its own by which its distance from the limit
+falls per cycle. Two changes tell these factors, and each number is scaled by 1 / (1 -
+factor)."""
 
 from __future__ import annotations
 
@@ -18,33 +24,38 @@ from typing import NamedTuple
 
 import numpy as np
 
-HISTORY = 6  # cycles that the limit is computed from; a velocity has three numbers, but the map is not quite affine
-SINGULAR = 1e-6  # of the largest singular value, below which cycles count as linearly dependent
+# cycles that the limit is computed from; a velocity has three numbers, but the map is
+# not quite affine
+HISTORY = 6
+# of the largest singular value, below which cycles count as linearly dependent
+SINGULAR = 1e-6
 FIRST_RATIO = 0.5  # of the second change of displacement to the first, assumed
 LARGEST_RATIO = 0.99  # of a change to the previous one, where changes hardly decrease
-MEMORY_HISTORY = (
-    11  # cycles whose memory is mixed; fewer, or more, converge more slowly
-)
+# cycles whose memory is mixed; fewer, or more, converge more slowly
+MEMORY_HISTORY = 11
 MEMORY_SINGULAR = 1e-3  # as SINGULAR, of a map with kinks
-SLOWEST_MEMORY = (
-    0.9995  # factor of a number of memory per cycle, beyond which it is held
-)
+# factor of a number of memory per cycle, beyond which it is held
+SLOWEST_MEMORY = 0.9995
 LEAST_CHANGE = 1e-13  # of memory from cycle to cycle, above roundoff
 N_RATIOS = 3  # last ratios that are averaged
-DIVERGED = 5.0  # times the least change of velocity so far: an extrapolation that led away from the limit
-MOST_FAILURES = (
-    10  # extrapolations that led away, after which a sample takes plain cycles
-)
+# times the least change of velocity so far: an extrapolation that led away from the
+# limit
+DIVERGED = 5.0
+# extrapolations that led away, after which a sample takes plain cycles
+MOST_FAILURES = 10
 
 
 class Cycles(NamedTuple):
-    """The last cycles of B samples, the latest last on the axis of HISTORY, nan where there was none.
+    """The last cycles of B samples, the latest last on the axis of HISTORY, nan where
+    there was none.
 
-    pose, start: (3, B), pose and velocity at the start of the present cycle. displacements: (HISTORY, 3, B). history: (3,
-    HISTORY, 3, B), of a heavy body: velocities at the start of cycles, their changes over the cycles, and displacements;
-    steadiest: (3, 3, B), the same of the cycle with the smallest change. failures: (1, B), number of extrapolations that
-    led away from the limit. extrapolation: (3, B), change of velocity to the limit. drift: (B,), largest component of
-    the sum of all changes of displacement to come."""
+    pose, start: (3, B), pose and velocity at the start of the present cycle.
+    displacements: (HISTORY, 3, B). history: (3, HISTORY, 3, B), of a heavy body:
+    velocities at the start of cycles, their changes over the cycles, and displacements;
+    steadiest: (3, 3, B), the same of the cycle with the smallest change. failures:
+    (1, B), number of extrapolations that led away from the limit. extrapolation:
+    (3, B), change of velocity to the limit. drift: (B,), largest component of the sum
+    of all changes of displacement to come."""
 
     pose: np.ndarray
     start: np.ndarray
@@ -58,7 +69,8 @@ class Cycles(NamedTuple):
 
 def begin(samples: int) -> Cycles:
     """Return the record before the first cycle."""
-    none, zero = np.full((3, HISTORY, 3, samples), np.nan), np.zeros((3, samples))
+    none = np.full((3, HISTORY, 3, samples), np.nan)
+    zero = np.zeros((3, samples))
     steadiest = np.stack([zero, zero + np.inf, zero])
     return Cycles(
         zero,
@@ -73,7 +85,8 @@ def begin(samples: int) -> Cycles:
 
 
 def after_massless_cycle(c: Cycles, displacement: np.ndarray) -> Cycles:
-    """Return the record after a cycle of a body without mass, with its displacement (3, B)."""
+    """Return the record after a cycle of a body without mass, with its displacement
+    (3, B)."""
     c = c._replace(displacements=_appended(c.displacements, displacement))
     changes = np.diff(c.displacements, axis=0)[-N_RATIOS - 1 :]
     changes = changes[~np.isnan(changes).any((1, 2))]
@@ -89,23 +102,22 @@ def after_massless_cycle(c: Cycles, displacement: np.ndarray) -> Cycles:
 def after_heavy_cycle(
     c: Cycles, displacement: np.ndarray, end: np.ndarray, tolerance: float
 ) -> Cycles:
-    """Return the record after a cycle of a heavy body that ended with a velocity (3, B).
+    """Return the record after a cycle of a heavy body that ended with a velocity
+    (3, B).
 
-    tolerance: drift below which no extrapolation is needed. After an extrapolation that led away from the limit the next
-    one leads back to the end of the steadiest cycle."""
-    last, c = (
-        c.displacements[-1],
-        c._replace(displacements=_appended(c.displacements, displacement)),
-    )
+    tolerance: drift below which no extrapolation is needed. After an extrapolation that
+    led away from the limit the next one leads back to the end of the steadiest
+    cycle."""
+    last = c.displacements[-1]
+    c = c._replace(displacements=_appended(c.displacements, displacement))
     if np.isnan(c.start).any():  # the first cycle starts from rest
         return c
     cycle = np.stack([c.start, end - c.start, displacement])
-    size, least = np.abs(cycle[1]).max(0), np.abs(c.steadiest[1]).max(0)
+    size = np.abs(cycle[1]).max(0)
+    least = np.abs(c.steadiest[1]).max(0)
     diverged = (size > DIVERGED * least) & (c.extrapolation != 0).any(0)
-    steadiest, failures = (
-        np.where(size < least, cycle, c.steadiest),
-        c.failures + diverged,
-    )
+    steadiest = np.where(size < least, cycle, c.steadiest)
+    failures = c.failures + diverged
     history = _appended(c.history, cycle)
     history = np.where(diverged & ~np.isnan(history), steadiest[:, None], history)
     c = c._replace(history=history, steadiest=steadiest, failures=failures)
@@ -128,7 +140,8 @@ def after_heavy_cycle(
 
 
 class MemoryCycle(NamedTuple):
-    """A cycle of a body without mass. start, end: memory (M, B) at its start and its end. displacement: (3, B)."""
+    """A cycle of a body without mass. start, end: memory (M, B) at its start and its
+    end. displacement: (3, B)."""
 
     start: np.ndarray
     end: np.ndarray
@@ -136,7 +149,8 @@ class MemoryCycle(NamedTuple):
 
 
 def memory_gain(cycles: list[MemoryCycle]) -> np.ndarray:
-    """Return the distance of memory from its limit over its change in a cycle, (M, B), from two plain cycles."""
+    """Return the distance of memory from its limit over its change in a cycle, (M, B),
+    from two plain cycles."""
     before, last = (c.end - c.start for c in cycles[-2:])
     large = np.abs(before) > LEAST_CHANGE
     ratio = np.where(large, last / np.where(large, before, 1.0), 0.0)
@@ -146,11 +160,14 @@ def memory_gain(cycles: list[MemoryCycle]) -> np.ndarray:
 def mixed_memory(
     cycles: list[MemoryCycle], gain: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the memory (M, B) at the limit by Anderson's mixing of the last cycles, and the drift (B,).
+    """Return the memory (M, B) at the limit by Anderson's mixing of the last cycles,
+    and the drift (B,).
 
-    The drift is the largest of four: the change of displacement that the mixing predicts, the last change, and what
-    displacement changes per change of memory times the change to the limit, with the largest such ratio of the cycles,
-    or times gain x the last change of memory, with their median. Where the mixing stalls, the first two are small."""
+    The drift is the largest of four: the change of displacement that the mixing
+    predicts, the last change, and what displacement changes per change of memory times
+    the change to the limit, with the largest such ratio of the cycles, or times gain x
+    the last change of memory, with their median. Where the mixing stalls, the first two
+    are small."""
     last = cycles[-1]
     starts = np.stack([c.start for c in cycles])
     changes = np.stack([c.end - c.start for c in cycles])
@@ -180,7 +197,8 @@ def _appended(cycles: np.ndarray, cycle: np.ndarray) -> np.ndarray:
 
 
 def _mixing_weights(differences: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Return the weights (k, B) of the differences (k, 3, B) whose sum with the change (3, B) is smallest."""
+    """Return the weights (k, B) of the differences (k, 3, B) whose sum with the change
+    (3, B) is smallest."""
     size = np.sqrt((differences**2).sum(1))
     size = np.where(size > 0, size, 1.0)
     matrix = np.moveaxis(differences / size[:, None], (0, 1, 2), (2, 1, 0))

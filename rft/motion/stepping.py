@@ -1,10 +1,13 @@
-"""Time stepping through a gait, for swimmers whose motion depends on place, past or mass.
+"""Time stepping through a gait, for swimmers whose motion depends on place, past or
+mass.
 
-At every phase the balance of forces is solved for the body velocity. Steps are implicit: memory is that at the end of the
-step, momentum follows BDF2, the backward difference of order 2, which damps errors at any step. Without memory, slope and
-mass the result is that of `rft.body_velocity` at every phase, and with them it converges to that as they go to zero. All
-samples (amplitudes, parameters) take each step together. Time stepping starts from that result on undisturbed ground, and
-repeats the gait until the displacement per cycle no longer changes.
+At every phase the balance of forces is solved for the body velocity. Steps are
+implicit: memory is that at the end of the step, momentum follows BDF2, the backward
+difference of order 2, which damps errors at any step. Without memory, slope and mass
+the result is that of `rft.body_velocity` at every phase, and with them it converges to
+that as they go to zero. All samples (amplitudes, parameters) take each step together.
+Time stepping starts from that result on undisturbed ground, and repeats the gait until
+the displacement per cycle no longer changes.
 """
 
 from __future__ import annotations
@@ -35,19 +38,23 @@ from rft.motion.work import Work, element_work
 
 MOST_CYCLES = 60
 PLAIN_CYCLES = 12  # before the memory of a body without mass is led to its limit
-MOST_STORED = 100_000  # elements x nodes at all phases, up to which their balances are stored: some 8 MB
-PAUSE = 1e-9  # of the rms joint speed, below which the joints pause and that speed is the scale
+# elements x nodes at all phases, up to which their balances are stored: some 8 MB
+MOST_STORED = 100_000
+# of the rms joint speed, below which the joints pause and that speed is the scale
+PAUSE = 1e-9
 
 
 class TimeSteps(NamedTuple):
     """The last cycle of time stepping at N phases.
 
-    xi: (..., N, 3), body velocity in the body frame, length/rad, length/rad, 1. pose: (..., N + 1, 3), of the body frame
-    on the ground, whose origin and x axis are those of the frame at the first step. residual: (...), the largest, as in
-    `rft.Solution`. status: (...), "periodic", "running" (the requested number of cycles, not yet periodic), "not
-    periodic" or "unconverged". drift: (...), largest component of the sum of all changes of displacement, body lengths
-    and rad, in cycles to come. cycles: their number. work: (..., N) each, or None. path: (..., cycles N + 1, 3), all
-    poses since the first step, or None.
+    xi: (..., N, 3), body velocity in the body frame, length/rad, length/rad, 1. pose:
+    (..., N + 1, 3), of the body frame on the ground, whose origin and x axis are those
+    of the frame at the first step. residual: (...), the largest, as in `rft.Solution`.
+    status: (...), "periodic", "running" (the requested number of cycles, not yet
+    periodic), "not periodic" or "unconverged". drift: (...), largest component of the
+    sum of all changes of displacement, body lengths and rad, in cycles to come. cycles:
+    their number. work: (..., N) each, or None. path: (..., cycles N + 1, 3), all poses
+    since the first step, or None.
 
     Examples
     --------
@@ -91,7 +98,8 @@ class TimeSteps(NamedTuple):
         )
 
     def checked(self) -> TimeSteps:
-        """Return these steps; RuntimeError if any sample is unconverged or not periodic."""
+        """Return these steps; RuntimeError if any sample is unconverged or not
+        periodic."""
         if (self.status == "unconverged").any():
             raise RuntimeError(
                 f"a force balance did not converge in time stepping (residual {np.max(self.residual):.1e}): "
@@ -126,13 +134,14 @@ def time_steps(
 
     Parameters
     ----------
-    alpha, alphadot : arrays (..., N, joints), one cycle at N >= 8 equally spaced phases, rad and per rad of phase.
+    alpha, alphadot : arrays (..., N, joints), one cycle at N >= 8 equally spaced
+        phases, rad and per rad of phase.
     effects : effects of `rft.effects` of any engine.
-    cycles : number of cycles; by default as many as it takes to reach the limit cycle, and one where effects break
-        symmetry, since no two cycles are alike there.
+    cycles : number of cycles; by default as many as it takes to reach the limit cycle,
+        and one where effects break symmetry, since no two cycles are alike there.
     with_work, with_path : whether to compute `TimeSteps.work` and `TimeSteps.path`.
-    advance : function that takes the steps of a cycle, by default `take_steps`; another function may store states and
-        resume from them.
+    advance : function that takes the steps of a cycle, by default `take_steps`; another
+        function may store states and resume from them.
 
     Other parameters as in `rft.body_velocity`.
 
@@ -214,8 +223,10 @@ def _cycles(
     with_path: bool,
     advance: Callable,
 ) -> TimeSteps:
-    """Return the last of ``cycles`` cycles, or by default the first one that repeats; samples on the last axis."""
-    path, state = [], stepping.begin()
+    """Return the last of ``cycles`` cycles, or by default the first one that repeats;
+    samples on the last axis."""
+    path = []
+    state = stepping.begin()
     mixes = cycles is None and not stepping.heavy and stepping.memory(state).size > 0
     memories: list[limit_cycle.MemoryCycle] = []
     gain = np.zeros(0)
@@ -244,7 +255,8 @@ def _cycles(
             state = stepping.with_memory(state, memory)
     xi, residual, limit = (np.stack([x[i] for x in rows]) for i in (0, 2, 3))
     work = Work(*map(np.stack, zip(*(row.work for row in rows)))) if with_work else None
-    worst, drift = np.max(residual, 0), state.cycles.drift
+    worst = np.max(residual, 0)
+    drift = state.cycles.drift
     status = np.where(
         drift <= stepping.drift_tolerance,
         "periodic",
@@ -262,7 +274,8 @@ def _relative_pose(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _integrated(pose: np.ndarray, xi: np.ndarray, dt: float) -> np.ndarray:
-    """Return the pose (3, B) reached from a pose at a constant body velocity xi (3, B) after dt."""
+    """Return the pose (3, B) reached from a pose at a constant body velocity xi (3, B)
+    after dt."""
     half = 0.5 * dt * xi[2]
     z = (
         dt
@@ -274,7 +287,8 @@ def _integrated(pose: np.ndarray, xi: np.ndarray, dt: float) -> np.ndarray:
 
 
 def _with_batch_axes(steps: TimeSteps, batch: tuple, length: float) -> TimeSteps:
-    """Return steps with their samples on leading axes, and lengths in the body's unit."""
+    """Return steps with their samples on leading axes, and lengths in the body's
+    unit."""
     units = np.array([length, length, 1.0])
 
     def samples_first(x):
@@ -298,9 +312,11 @@ def _with_batch_axes(steps: TimeSteps, batch: tuple, length: float) -> TimeSteps
 class State(NamedTuple):
     """State of time stepping between two steps: arrays, samples on the last axis.
 
-    count: (1, 1), number of steps so far. pose: (3, B), of the frame on the ground. xi, xi_before: (3, B), velocities at
-    the last step and at the previous one. v: (v_t, v_n, v_w) of the body's elements at the last step, (n, B) each.
-    effect_states: of the effects that depend on the past. cycles: the record of `rft.motion.limit_cycle`."""
+    count: (1, 1), number of steps so far. pose: (3, B), of the frame on the ground. xi,
+    xi_before: (3, B), velocities at the last step and at the previous one. v:
+    (v_t, v_n, v_w) of the body's elements at the last step, (n, B) each. effect_states:
+    of the effects that depend on the past. cycles: the record of
+    `rft.motion.limit_cycle`."""
 
     count: np.ndarray
     pose: np.ndarray
@@ -312,8 +328,8 @@ class State(NamedTuple):
 
 
 class Row(NamedTuple):
-    """Results of one step. xi, pose: (3, B). residual: (B,). limit: (1,), largest residual of a solved sample. work: of
-    the step, or None."""
+    """Results of one step. xi, pose: (3, B). residual: (B,). limit: (1,), largest
+    residual of a solved sample. work: of the step, or None."""
 
     xi: np.ndarray
     pose: np.ndarray
@@ -323,10 +339,12 @@ class Row(NamedTuple):
 
 
 class Stepping:
-    """Steps through gaits: `begin` returns the state before the first step, `step` the state after the next one.
+    """Steps through gaits: `begin` returns the state before the first step, `step` the
+    state after the next one.
 
-    alpha, alphadot: (N, joints, B). to_limit: whether to extrapolate a heavy body to its limit cycle. body_halves: (n,),
-    half lengths of the body's elements before these were cut into pieces."""
+    alpha, alphadot: (N, joints, B). to_limit: whether to extrapolate a heavy body to
+    its limit cycle. body_halves: (n,), half lengths of the body's elements before these
+    were cut into pieces."""
 
     def __init__(
         self,
@@ -342,13 +360,13 @@ class Stepping:
         self.assembly = assembly._replace(
             effects=tuple(e for e in assembly.effects if e not in self.effects)
         )
-        self.alpha, self.alphadot, self.accuracy, self.backend = (
-            alpha,
-            alphadot,
-            accuracy,
-            backend,
-        )
-        self.to_limit, self.body_halves, self.phases = to_limit, body_halves, len(alpha)
+        self.alpha = alpha
+        self.alphadot = alphadot
+        self.accuracy = accuracy
+        self.backend = backend
+        self.to_limit = to_limit
+        self.body_halves = body_halves
+        self.phases = len(alpha)
         self.dt = 2 * np.pi / self.phases
         self.heavy = bool(broken_premises(self.effects) & Premise.QUASI_STATIC)
         self.drift_tolerance = max(
@@ -375,7 +393,8 @@ class Stepping:
         return self.assembly.problem(self.alpha[k], self.alphadot[k], self.scales[k])
 
     def problem(self, k: int) -> Problem:
-        """Return the balance at the phase 2 pi k / N, without effects that depend on the past or the place."""
+        """Return the balance at the phase 2 pi k / N, without effects that depend on
+        the past or the place."""
         stored = (
             self.assembly.n_law_points * self.phases * self.alpha.shape[-1]
             <= MOST_STORED
@@ -383,7 +402,8 @@ class Stepping:
         return self._stored_problems[k] if stored else self._problem(k)
 
     def guess(self, s: State) -> np.ndarray:
-        """Return a guess of the velocity (3, B) at the next step, by linear extrapolation."""
+        """Return a guess of the velocity (3, B) at the next step, by linear
+        extrapolation."""
         return 2 * s.xi - s.xi_before if s.count[0, 0] > 1 else s.xi
 
     def site(self, s: State) -> Site:
@@ -394,7 +414,8 @@ class Stepping:
 
     def begin(self) -> State:
         """Return the state before the first step, on undisturbed ground."""
-        problem, zero = self.problem(0), np.zeros((3, self.alpha.shape[-1]))
+        problem = self.problem(0)
+        zero = np.zeros((3, self.alpha.shape[-1]))
         v = (np.zeros_like(problem.sides.elements.c),) * 3
         states = tuple(e.begin(problem, Site(0, 0.0, zero, v)) for e in self.effects)
         return State(
@@ -409,7 +430,8 @@ class Stepping:
 
     def step(self, s: State, with_work: bool = False) -> tuple[State, Row]:
         """Return the state after the next step, and its row."""
-        site, first = self.site(s), s.count[0, 0] == 0
+        site = self.site(s)
+        first = s.count[0, 0] == 0
         k = site.count % self.phases
         undisturbed = problem = self.problem(k)
         for effect, state in zip(self.effects, s.effect_states):
@@ -451,7 +473,8 @@ class Stepping:
         )
 
     def _after_cycle(self, s: State, problem: Problem, site: Site) -> State:
-        """Return the state at the end of a cycle with a new record of cycles, extrapolated if cycles are to repeat."""
+        """Return the state at the end of a cycle with a new record of cycles,
+        extrapolated if cycles are to repeat."""
         displacement = _relative_pose(s.cycles.pose, self.site(s).pose)
         if not self.heavy:
             return s._replace(
@@ -472,7 +495,8 @@ class Stepping:
         return bool((s.cycles.drift <= self.drift_tolerance).all())
 
     def with_velocity_change(self, s: State, problem: Problem, site: Site) -> State:
-        """Return the state as if the body had moved faster in the last steps, by the extrapolation to the limit cycle."""
+        """Return the state as if the body had moved faster in the last steps, by the
+        extrapolation to the limit cycle."""
         change = s.cycles.extrapolation
         v = tuple(
             a + b for a, b in zip(s.v, to_element(problem.sides.elements, *change))
@@ -499,18 +523,22 @@ class Stepping:
         return np.concatenate(numbers) if numbers else np.zeros((0, samples))
 
     def with_memory(self, s: State, memory: np.ndarray) -> State:
-        """Return the state with other numbers (M, B) in its memories, within their bounds."""
-        states, used = [], 0
+        """Return the state with other numbers (M, B) in its memories, within their
+        bounds."""
+        states = []
+        used = 0
         for effect, state in zip(self.effects, s.effect_states):
             if effect.memory_bounds is not None:
                 count = state.size // memory.shape[-1]
                 numbers = np.clip(memory[used : used + count], *effect.memory_bounds)
-                state, used = numbers.reshape(state.shape), used + count
+                state = numbers.reshape(state.shape)
+                used += count
             states.append(state)
         return s._replace(effect_states=tuple(states))
 
     def _drag(self, problem: Problem, xi: np.ndarray) -> np.ndarray:
-        """Return force and moment of undisturbed ground on the frame at a velocity, (3, B)."""
+        """Return force and moment of undisturbed ground on the frame at a velocity,
+        (3, B)."""
         scaled = xi / problem.frame.speed_scale
         v = with_frame_velocity(problem, velocities(problem), *scaled)
         return np.stack(
@@ -521,6 +549,7 @@ class Stepping:
 
 
 def _velocities(problem: Problem, xi: np.ndarray) -> tuple:
-    """Return the velocities (v_t, v_n, v_w) of the body's elements, (n, B) each, at a body velocity xi (3, B)."""
+    """Return the velocities (v_t, v_n, v_w) of the body's elements, (n, B) each, at a
+    body velocity xi (3, B)."""
     e = problem.sides.elements
     return tuple(a + b for a, b in zip((e.v_t, e.v_n, e.v_w), to_element(e, *xi)))

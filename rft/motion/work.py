@@ -33,17 +33,20 @@ from rft.laws.base import Medium
 class Work(NamedTuple):
     """Power, internal moments and slip.
 
-    power: (...), rate of work against the medium, >= 0, in units of (axial drag of the whole body) x (length / time).
-    bending_moment: (..., n - 1), internal moments at the points between the n elements, in axial drag x body length. They
-    balance the medium and, where the body has mass, accelerate it; positive where the body works to bend to the left
-    (counter-clockwise, tail to head), as muscles on its left side do. The sum of bending_moment d(bend)/dt x length is
-    the power, with mass in the mean over a cycle that repeats. slip: (...), mean over the body of the angle between an
+    power: (...), rate of work against the medium, >= 0, in units of (axial drag of the
+    whole body) x (length / time). bending_moment: (..., n - 1), internal moments at the
+    points between the n elements, in axial drag x body length. They balance the medium
+    and, where the body has mass, accelerate it; positive where the body works to bend
+    to the left (counter-clockwise, tail to head), as muscles on its left side do. The
+    sum of bending_moment d(bend)/dt x length is the power, with mass in the mean over a
+    cycle that repeats. slip: (...), mean over the body of the angle between an
     element's direction and the velocity of its centre, 0 to pi/2 rad.
 
-    Of the m elements into which effects cut the n: element_force: (..., 2, m), force of the medium on each, along it
-    towards the head and across it to the left, in axial drag. element_power: (..., m), work against it, in axial drag x
-    body length / time. end_force: (..., 2, 2), the same force on points that effects add at the tail and at the head, by
-    the direction of the element there. end_power: (..., 2).
+    Of the m elements into which effects cut the n: element_force: (..., 2, m), force of
+    the medium on each, along it towards the head and across it to the left, in axial
+    drag. element_power: (..., m), work against it, in axial drag x body length / time.
+    end_force: (..., 2, 2), the same force on points that effects add at the tail and at
+    the head, by the direction of the element there. end_power: (..., 2).
 
     Examples
     --------
@@ -84,8 +87,8 @@ def work_done(
     effects: Sequence[Effect] = (),
     pieces: int = PIECES,
 ) -> Work:
-    """Return power, internal moments and slip at body velocities xi (..., 3) of `body_velocity` for the same
-    arguments.
+    """Return power, internal moments and slip at body velocities xi (..., 3) of
+    `body_velocity` for the same arguments.
 
     Examples
     --------
@@ -97,7 +100,8 @@ def work_done(
     """
     checked_body(body)
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, 1.0)
-    batch, xi = alpha.shape[:-1], real_array("xi", xi)
+    batch = alpha.shape[:-1]
+    xi = real_array("xi", xi)
     require(
         xi.shape == (*batch, 3),
         f"xi must have shape {(*batch, 3)} for these alpha and alphadot",
@@ -126,11 +130,15 @@ def element_work(
 ) -> Work:
     """Return the work of B samples at body velocities xi (3, B), in body lengths.
 
-    body_halves: (n,), half lengths of the body's elements before these were cut into pieces; bending moments are those
-    between these elements. rounding: (B,), speed below which dry friction is rounded off."""
+    body_halves: (n,), half lengths of the body's elements before these were cut into
+    pieces; bending moments are those between these elements. rounding: (B,), speed
+    below which dry friction is rounded off."""
     scale = problem.frame.speed_scale
     v = with_frame_velocity(problem, velocities(problem), *(xi / scale))
-    wrenches, stations, forces, powers = [], [], [], []
+    wrenches = []
+    stations = []
+    forces = []
+    powers = []
     for (e, load), u, contact in zip(
         loads_on(problem, v, rounding / scale[0]), v, (problem.sides, problem.points)
     ):
@@ -173,8 +181,8 @@ def element_work(
 
 
 def _by_end(problem: Problem, values: Sequence[np.ndarray]) -> np.ndarray:
-    """Return sums (..., 2, B) over the points nearer to the tail and nearer to the head, from values (..., n, B) of the
-    sides and of the points, if there are any."""
+    """Return sums (..., 2, B) over the points nearer to the tail and nearer to the
+    head, from values (..., n, B) of the sides and of the points, if there are any."""
     of_points = values[1] if len(values) > 1 else values[0][..., :0, :]
     at_head = problem.points.station[:, 0] > 0.5
     return np.stack(
@@ -185,10 +193,11 @@ def _by_end(problem: Problem, values: Sequence[np.ndarray]) -> np.ndarray:
 def _moments(
     sides: Elements, wrenches: np.ndarray, stations: np.ndarray, body_halves: np.ndarray
 ) -> np.ndarray:
-    """Return the bending moments (B, n - 1) from the wrenches (3, k, B) on the frame that oppose the motion of elements.
+    """Return the bending moments (B, n - 1) from the wrenches (3, k, B) on the frame
+    that oppose the motion of elements.
 
-    The bending moment at a point between two elements balances the moment about that point of the wrenches on all
-    elements between it and the tail.
+    The bending moment at a point between two elements balances the moment about that
+    point of the wrenches on all elements between it and the tail.
     """
     ends = np.cumsum(2 * sides.half[:, 0])
     # The piece before each point between elements of the body.
