@@ -21,7 +21,8 @@ from geomech.optimisation.ascent import _Ascent, _shortest
 from geomech.optimisation.constraints import Constraints
 from geomech.optimisation.cycles import CycleValues, Phases, Runs, cycle_values
 from geomech.optimisation.evaluate import evaluate_gait
-from geomech.optimisation.gain import Gained, limiting
+from geomech.optimisation.gain import Gained
+from geomech.optimisation.limiting import limiting
 from geomech.optimisation.loops import Loops
 from geomech.optimisation.objectives import Objective
 from geomech.optimisation.problem import Enough, Problem
