@@ -1,4 +1,5 @@
-"""Connections, CCFs and metrics of any velocity(alpha, alphadot), over shape space and along gaits."""
+"""Connections, CCFs and metrics of any velocity(alpha, alphadot), over shape space and
+along gaits."""
 
 from geomech.core import modules as _modules
 
