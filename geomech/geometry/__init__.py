@@ -3,4 +3,4 @@ along gaits."""
 
 from geomech.core import modules as _modules
 
-__getattr__, __dir__ = _modules.of_package(__name__, __path__)
+__getattr__, __dir__ = _modules.lazy_modules(__name__, __path__)
