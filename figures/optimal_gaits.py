@@ -19,7 +19,7 @@ import numpy as np
 from figures import main, style
 from geomech import plots
 from geomech.optimisation import optimise
-from geomech.optimisation.gain import PHASES
+from geomech.optimisation.limiting import PHASES
 from geomech.scenes import load
 
 SCENES = {

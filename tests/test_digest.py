@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from geomech import scenes
-from geomech.optimisation import checked
+from geomech.optimisation import build_request
 from geomech.run.digest import Undigestible, digest
 from geomech.studies.effort import _Driven
 from geomech.studies.study import Study
@@ -147,7 +147,7 @@ def test_what_an_object_remembers_is_no_part_of_it():
     driven = _Driven(VISCOUS.system, [])
     driven.receive(A)
     assert digest(driven) == digest(_Driven(VISCOUS.system, []))
-    request = checked(VISCOUS, "displacement")
+    request = build_request(VISCOUS, "displacement")
     before = digest(request)
     assert request.degree == 2.0 and digest(request) == before
     study = Study(VISCOUS).in_frame("minimum-perturbation")

@@ -6,7 +6,7 @@ import pytest
 import rft
 from geomech.gaits import Circle, Fourier, Sine
 from geomech.optimisation.evaluate import evaluate_gait
-from geomech.optimisation.request import checked
+from geomech.optimisation.request import build_request
 from geomech.scenes.model import Scene
 from geomech.studies import estimate
 from geomech.studies.choose import cheapest
@@ -119,7 +119,7 @@ def test_path_length_work_and_efficiency_contain_it():
         assert abs(found[name] - true[name]) < found[f"{name}_error"]
         assert found[f"{name}_error"] < 0.2 * found[name]
     values = [
-        evaluate_gait(checked(s, "efficiency", None, 1, None, 1), CIRCLE)
+        evaluate_gait(build_request(s, "efficiency", None, 1, None, 1), CIRCLE)
         for s in (coarse, fine)
     ]
     assert abs(values[0].value - values[1].value) < values[0].error

@@ -284,7 +284,7 @@ class Late(Fourier):
 @pytest.mark.parametrize("name", symmetric_gaits())
 def test_few_phases_tell_how_many_are_solved(name, monkeypatch):
     """Of gaits that begin anywhere, at numbers of phases of all remainders: images lie on phases of some of these only."""
-    monkeypatch.setattr("geomech.geometry.images.FEW", 32)
+    monkeypatch.setattr("geomech.geometry.images.SAMPLED_PHASES", 32)
     gait, shares = symmetric_gaits()[name], []
     for traits in (NOTHING, MIRROR, BACKWARDS, BOTH):
         share = 0

@@ -15,13 +15,14 @@ from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Sine
 from geomech.geometry.field import Field
 from geomech.geometry.reconstruct import displacement, slopes, turning
 from geomech.geometry.traits import Traits
-from geomech.optimisation import checked, optimise, variables
+from geomech.optimisation import build_request, optimise, variables
 from geomech.optimisation import loops as series
 from geomech.optimisation.ascent import _Ascent, _shortest
 from geomech.optimisation.constraints import Constraints
 from geomech.optimisation.cycles import CycleValues, Phases, Runs, cycle_values
 from geomech.optimisation.evaluate import evaluate_gait
-from geomech.optimisation.gain import Gained, limiting
+from geomech.optimisation.gain import Gained
+from geomech.optimisation.limiting import limiting
 from geomech.optimisation.loops import Loops
 from geomech.optimisation.objectives import Objective
 from geomech.optimisation.problem import Enough, Problem
@@ -247,7 +248,7 @@ def test_what_is_told_is_what_the_scene_does(cheap):
 def test_no_loop_near_the_best_is_better(stroke):
     """A search that knows nothing of slopes: none of 60 loops around it brings more and turns no more."""
     loops, system = Loops(2, 5, 2.5), stroke.scene.system
-    p, rng = loops.of(stroke.gait), np.random.default_rng(0)
+    p, rng = loops.from_gait(stroke.gait), np.random.default_rng(0)
     near = p + rng.choice([0.02, 0.1], (60, 1, 1)) * rng.normal(size=(60, *p.shape)) / (
         1 + np.arange(11)[:, None]
     )
@@ -309,7 +310,7 @@ def test_best_gaits_in_sand(sand):
 
 def test_best_gaits_in_sand_go_round_once_and_never_back(sand):
     """At every phase: the angle about the centre, by itself."""
-    p = sand.request.loops.of(sand.gait)
+    p = sand.request.loops.from_gait(sand.gait)
     u, v = (series.waves(20_000, 5)[:, 1:] @ p[1:]).T
     steps = np.angle((np.roll(u, -1) + 1j * np.roll(v, -1)) * (u - 1j * v))
     steps = steps * np.sign(steps.sum())
@@ -424,7 +425,7 @@ def test_speed_keeps_its_limit(limit, least):
 
 def test_without_a_limit_joints_are_as_fast_as_in_the_gait_of_the_scene():
     gait = Fourier(cos=((0.8,), (0.1,)), sin=((0.2,), (0.5,)), frequency=1.5)
-    limit = checked(viscous(gait=gait), "speed").objective.rate
+    limit = build_request(viscous(gait=gait), "speed").objective.rate
     assert limit == pytest.approx(
         3 * np.pi * np.hypot(0.8, 0.2), rel=1e-4
     )  # of the faster joint
@@ -448,42 +449,46 @@ def test_both_limits_of_speed_hold():
 
 def test_loops_that_are_one():
     loops = Loops(2, 4, 2.5)
-    p = loops.of(Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.1)))
+    p = loops.from_gait(Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.1)))
     other = p.copy()
     other[3] += 0.3
-    assert series.same(p, series.shifted(p, 1.3))
-    assert series.same(p, series.reversed_(series.shifted(p, 4.0)))
-    assert series.same(p, -p)
-    assert not series.same(p, -p, mirror=False)
-    assert not series.same(p, other)
-    assert not series.same(p, 1.1 * p)
-    assert series.same(p, -series.shifted(p, 4.0), odd=False)
-    assert not series.same(p, series.reversed_(series.shifted(p, 4.0)), odd=False)
-    assert not series.same(p, -series.reversed_(p), odd=False)
-    flat = loops.of(Ellipse(semi_axes=(1.0, 0.0)))
-    assert not series.same(
+    assert series.is_same(p, series.shifted(p, 1.3))
+    assert series.is_same(p, series.reversed_loop(series.shifted(p, 4.0)))
+    assert series.is_same(p, -p)
+    assert not series.is_same(p, -p, mirror=False)
+    assert not series.is_same(p, other)
+    assert not series.is_same(p, 1.1 * p)
+    assert series.is_same(p, -series.shifted(p, 4.0), odd=False)
+    assert not series.is_same(
+        p, series.reversed_loop(series.shifted(p, 4.0)), odd=False
+    )
+    assert not series.is_same(p, -series.reversed_loop(p), odd=False)
+    flat = loops.from_gait(Ellipse(semi_axes=(1.0, 0.0)))
+    assert not series.is_same(
         flat, 0.5 * flat
     )  # a part of a curve is not the curve, either way
-    assert not series.same(0.5 * flat, flat)
+    assert not series.is_same(0.5 * flat, flat)
     gait = loops.gait(p)
     t = np.linspace(0, 6, 7)
     assert loops.gait(series.shifted(p, 1.3)).shape(t) == pytest.approx(
         gait.shape(t + 1.3), abs=1e-12
     )
-    assert loops.gait(series.reversed_(p)).shape(t) == pytest.approx(
+    assert loops.gait(series.reversed_loop(p)).shape(t) == pytest.approx(
         gait.shape(-t), abs=1e-12
     )
-    assert loops.of(gait) == pytest.approx(p, abs=1e-12)
+    assert loops.from_gait(gait) == pytest.approx(p, abs=1e-12)
 
 
 def test_starts_go_along_the_limits_where_many_a_loop_is_the_best_near_by():
     """By default: in sand, without those that others are in a mirror; in a fluid the scene's gait alone."""
     lopsided = ((-2.5, 1.0), (-2.5, 2.5))
-    assert checked(viscous(), "displacement").starts == 1
-    assert checked(geomech.load("three-link-glass"), "displacement").starts == 9
-    asked = checked(geomech.load("three-link-glass"), "displacement", limits=lopsided)
+    assert build_request(viscous(), "displacement").starts == 1
+    assert build_request(geomech.load("three-link-glass"), "displacement").starts == 9
+    asked = build_request(
+        geomech.load("three-link-glass"), "displacement", limits=lopsided
+    )
     assert asked.starts == 11
-    _, rim, *others = asked.loops.starts(asked.loops.of(Circle()), 11)
+    _, rim, *others = asked.loops.starts(asked.loops.from_gait(Circle()), 11)
     assert asked.loops.active(rim) == [
         "alpha_1 >= -2.5",
         "alpha_1 <= 1",
@@ -501,7 +506,7 @@ def test_starts_are_the_same_every_time_and_answers_are_counted():
     assert sum(count for _, count in found.answers) == 3
     assert len(found.answers) < 3
     loops = Loops(2, 2, 1.4)
-    first, again = (loops.starts(loops.of(Circle()), 3) for _ in range(2))
+    first, again = (loops.starts(loops.from_gait(Circle()), 3) for _ in range(2))
     assert all(np.array_equal(p, q) for p, q in zip(first, again))
     assert all(np.abs(loops.gait(p).cycle(500)[0]).max() <= 1.4 for p in first)
     assert "answer starts" in str(result_of(found))
@@ -574,8 +579,8 @@ def test_three_joints_and_gaits_that_must_be_run_as_a_whole():
         Circle(amplitude=0.8),
         Numerics(phases=64),
     )
-    assert checked(past, "efficiency").degree == 1.0
-    assert checked(past, "displacement").by_runs
+    assert build_request(past, "efficiency").degree == 1.0
+    assert build_request(past, "displacement").by_runs
 
 
 def test_a_gait_drawn_together_is_kept_clear_of_singular_shapes(monkeypatch):
@@ -642,7 +647,7 @@ def test_a_rate_that_no_gait_can_keep_is_refused_before_the_search():
 )
 def test_requests_that_make_no_sense(name, asked, said):
     with pytest.raises(Refusal, match=said) as caught:
-        checked(geomech.load(name), **{"objective": "displacement", **asked})
+        build_request(geomech.load(name), **{"objective": "displacement", **asked})
     assert "\n" not in str(caught.value)
 
 
@@ -652,9 +657,9 @@ def test_a_table_that_never_turns_is_refused_too(tmp_path):
     with pytest.raises(
         Refusal, match="no gait turns it: the table's file tells a body whose heading"
     ):
-        checked(Scene(Table(tmp_path / "drive.nc"), Circle()), "turning")
+        build_request(Scene(Table(tmp_path / "drive.nc"), Circle()), "turning")
     for name in ("three-link-viscous", "three-link-floating", "no-slip-snake"):
-        assert checked(geomech.load(name), "turning")
+        assert build_request(geomech.load(name), "turning")
 
 
 def test_where_one_sense_brings_more_it_is_the_one_found():
@@ -668,7 +673,7 @@ def test_where_one_sense_brings_more_it_is_the_one_found():
     assert not scene.system.traits.odd
     found = optimise(scene, harmonics=1, limits=1.2, starts=1)
     back = found.request.loops.gait(
-        series.reversed_(found.request.loops.of(found.gait))
+        series.reversed_loop(found.request.loops.from_gait(found.gait))
     )
     assert (
         found.value
@@ -701,7 +706,7 @@ def test_a_scene_in_the_minimum_perturbation_frame(cheap):
     assert abs(found.best.displacement[1]) < 0.3 * abs(cheap.best.displacement[1])
     for limits in (3.0, [(-3.0, 1.0), (-1.0, 1.0)], [(-1.0, 1.0), (-1.0, 3.0)]):
         with pytest.raises(Refusal, match="outside the field that the scene has"):
-            checked(scene, "efficiency", limits=limits)
+            build_request(scene, "efficiency", limits=limits)
 
 
 @pytest.mark.parametrize(
@@ -766,8 +771,8 @@ def test_a_cycle_begun_from_the_last_one_is_the_same():
     system, (loops, p) = Swimmer(SAND, ODD), some_loop()
     power = lambda alpha, alphadot, xi: system.work(alpha, alphadot, xi).power
     warm, cold = (Phases(loops, system.velocity, power) for _ in range(2))
-    cold.warm = False
-    assert warm.warm
+    cold.warm_starts = False
+    assert warm.warm_starts
     warm(0.9 * p)
     for name in ("net", "swing", "length", "power"):
         (value, found), (same, rise) = (getattr(c, name) for c in (warm(p), cold(p)))
@@ -779,7 +784,7 @@ def test_a_cycle_begun_from_the_last_one_is_the_same():
 def test_steepest_way_from_a_gait_that_brings_nothing():
     """At a flat loop the displacement is the tip of a cone, whose slopes have no limit; every way up is one of two sides."""
     objective, (loops, _) = Objective("displacement"), some_loop()
-    flat = loops.of(Ellipse(semi_axes=(0.8, 0.0), tilt=0.5))
+    flat = loops.from_gait(Ellipse(semi_axes=(0.8, 0.0), tilt=0.5))
     cycles = Phases(loops, Swimmer(FLUID, ODD).velocity)
     value, found = objective.value(cycles(flat))
     assert value < 1e-12
@@ -815,11 +820,11 @@ def test_a_gait_at_rest_takes_no_work():
 def test_strokes():
     loops = Loops(2, 3, 2.5)
     round_, back = (
-        loops.of(Ellipse(semi_axes=(1.0, 0.5), centre=(0.4, -0.2))),
-        loops.of(Butterfly()),
+        loops.from_gait(Ellipse(semi_axes=(1.0, 0.5), centre=(0.4, -0.2))),
+        loops.from_gait(Butterfly()),
     )
     assert Stroke.is_one(loops, round_)
-    assert Stroke.is_one(loops, series.reversed_(round_))
+    assert Stroke.is_one(loops, series.reversed_loop(round_))
     twice = np.zeros(loops.shape)
     twice[3], twice[4], twice[1], twice[2] = (
         (1.0, 0.0),
@@ -831,7 +836,7 @@ def test_strokes():
     assert own.swept(twice).min() > 0  # never back, and yet
     assert own.winding(twice) == 2
     assert not Stroke.is_one(loops, twice)
-    assert not Stroke.is_one(loops, loops.of(Ellipse(semi_axes=(1.0, 0.01))))
+    assert not Stroke.is_one(loops, loops.from_gait(Ellipse(semi_axes=(1.0, 0.01))))
     assert not Stroke.is_one(loops, back + twice)
     round_[5] += 0.1  # else its sweep is the same all round, and least nowhere
     way, h = np.random.default_rng(0).normal(size=round_.shape), 1e-6
@@ -853,21 +858,21 @@ def test_limits_of_each_joint_and_side():
     loops = Loops(2, 2, box)
     assert all(
         (loops.extremes(p)[0] >= loops.box[0]).all()
-        for p in loops.starts(loops.of(Circle()), 5)
+        for p in loops.starts(loops.from_gait(Circle()), 5)
     )
     assert all(
         (loops.extremes(p)[1] <= loops.box[1]).all()
-        for p in loops.starts(loops.of(Circle()), 5)
+        for p in loops.starts(loops.from_gait(Circle()), 5)
     )
-    p = loops.of(Circle(amplitude=0.4, centre=(0.8, 0.0)))
+    p = loops.from_gait(Circle(amplitude=0.4, centre=(0.8, 0.0)))
     A, b = loops.limits()
     assert (A @ p.ravel() <= b).all()
-    assert (A @ loops.of(Circle(amplitude=0.4)).ravel() <= b).all()
+    assert (A @ loops.from_gait(Circle(amplitude=0.4)).ravel() <= b).all()
     assert not (
-        A @ loops.of(Circle(amplitude=0.4, centre=(0.8, 0.7))).ravel() <= b
+        A @ loops.from_gait(Circle(amplitude=0.4, centre=(0.8, 0.7))).ravel() <= b
     ).all()
     assert not (
-        A @ loops.of(Circle(amplitude=0.4, centre=(-0.2, 0.0))).ravel() <= b
+        A @ loops.from_gait(Circle(amplitude=0.4, centre=(-0.2, 0.0))).ravel() <= b
     ).all()
 
 
@@ -931,7 +936,7 @@ def test_a_table_is_searched_like_its_scene(name, tmp_path):
     with pytest.raises(
         Refusal, match="outside the field that the scene has: -2.5 to 2.5"
     ):
-        checked(table, "displacement", limits=3.0)
+        build_request(table, "displacement", limits=3.0)
 
 
 @dataclass(frozen=True)
@@ -987,7 +992,7 @@ def test_a_loop_that_cannot_be_run_ends_no_search():
 
     loops = Loops(2, 2, 2.5, 32)
     cycles, objective = Phases(loops, velocity), Objective("displacement")
-    first = loops.of(Circle(amplitude=0.5))
+    first = loops.from_gait(Circle(amplitude=0.5))
     p = ascend(cycles, objective, first, max_steps=40)
     assert 1.09 < np.abs(loops.cycle(p)[0]).max() <= 1.1
     assert objective.value(cycles(p))[0] > 1.5 * objective.value(cycles(first))[0]
@@ -998,7 +1003,7 @@ def test_a_sine_has_the_power_of_its_own_gait_for_speed():
 
     system = Swimmer(SAND, Backbone(elements=24, length=0.1))
     sine = Sine(amplitude=0.2, waves=1.0, elements=24, frequency=2.0)
-    asked = checked(Scene(system, sine), "speed")
+    asked = build_request(Scene(system, sine), "speed")
     alpha, alphadot = (np.array(x) for x in sine.cycle(128))
     per_second = 2 * np.pi * 2.0 * alphadot
     power = system.work(
@@ -1008,7 +1013,7 @@ def test_a_sine_has_the_power_of_its_own_gait_for_speed():
 
 
 def test_other_starts_are_made_one_stroke():
-    loops, first = Loops(2, 3, 2.5), Loops(2, 3, 2.5).of(Circle())
+    loops, first = Loops(2, 3, 2.5), Loops(2, 3, 2.5).from_gait(Circle())
     twice = np.zeros(loops.shape)
     twice[3], twice[4], twice[1], twice[2] = (
         (1.0, 0.0),
@@ -1079,7 +1084,9 @@ def test_a_start_too_small_is_enlarged_and_one_at_rest_is_a_wave():
     loops = Loops(2, 3, LOPSIDED)
     sizes = {0.06: 0.375, 0.0626: 0.0626, 0.4: 0.4}
     for before, after in sizes.items():
-        p = loops.of(Ellipse(semi_axes=(before, 0.7 * before), centre=(0.6, -0.2)))
+        p = loops.from_gait(
+            Ellipse(semi_axes=(before, 0.7 * before), centre=(0.6, -0.2))
+        )
         assert loops.starts(p, 1)[0] == pytest.approx(
             p * np.r_[1.0, np.full(6, after / before)][:, None], abs=1e-12
         )
@@ -1100,7 +1107,7 @@ def test_outlines_go_round_their_corners_at_constant_speed():
         np.array([0.75, -0.1]),
         np.array([1.25, 1.1]),
     )
-    _, *outlines = loops.starts(loops.of(Circle()), 1 + len(series.OUTLINES))
+    _, *outlines = loops.starts(loops.from_gait(Circle()), 1 + len(series.OUTLINES))
     for corners, p in zip(series.OUTLINES, outlines, strict=True):
         ends = [*map(complex, *np.transpose(corners)), complex(*corners[0])]
         way = [0.0, *np.cumsum(np.abs(np.diff(ends)))]
@@ -1118,7 +1125,9 @@ def test_further_starts_are_waves_about_the_middle_of_the_limits():
     """The first is one of 0.7 of the range; the others scatter about such waves, of lags named or any."""
     loops = Loops(3, 2, ((-0.5, 2.0), (-1.2, 1.0), (-1.0, 1.0)))
     own, middle, half = (
-        loops.of(Fourier(cos=((0.4,), (0.1,), (0.2,)), sin=((0.0,), (0.3,), (0.1,)))),
+        loops.from_gait(
+            Fourier(cos=((0.4,), (0.1,), (0.2,)), sin=((0.0,), (0.3,), (0.1,)))
+        ),
         loops.middle,
         loops.half,
     )
@@ -1159,10 +1168,10 @@ def searching(request, **parts):
 def test_loops_tried_besides_have_their_sizes():
     """The first in another size, 0.6 of the range; others near the best by a tenth, and further by a fifth, of a rad."""
     search = searching(
-        checked(viscous(), harmonics=4, limits=5.0, objective="displacement")
+        build_request(viscous(), harmonics=4, limits=5.0, objective="displacement")
     )
     loops = search.request.loops
-    p = loops.of(Ellipse(semi_axes=(0.4, 0.2), tilt=0.3, centre=(0.3, -0.2)))
+    p = loops.from_gait(Ellipse(semi_axes=(0.4, 0.2), tilt=0.3, centre=(0.3, -0.2)))
     larger = search._larger(p)
     assert larger[0] == pytest.approx(p[0]) and np.ptp(larger[1:3] / p[1:3]) < 1e-9
     assert np.abs(
@@ -1189,7 +1198,7 @@ def test_a_loop_that_turns_too_much_is_worth_what_is_left_where_it_does_not(turn
     tier = lambda p: CycleValues(
         (net(p), np.array([by_x, flat, by_theta])), (0.0, flat), None, None, (0.0, flat)
     )
-    search = searching(checked(viscous(), "displacement", "x"))
+    search = searching(build_request(viscous(), "displacement", "x"))
     for p in (rng.normal(size=(3, 2)), 0.01 * by_theta, -rng.normal(size=(3, 2))):
         theta, count = net(p)[2], count + 1
         nearest = (
@@ -1198,7 +1207,7 @@ def test_a_loop_that_turns_too_much_is_worth_what_is_left_where_it_does_not(turn
         assert abs(net(nearest)[2]) <= turn + 1e-12
         assert search._merit(tier, p, turn) == pytest.approx(net(nearest)[0], rel=1e-12)
         assert search.count == count
-    assert searching(checked(viscous(), "turning"))._merit(tier, p, turn) == abs(
+    assert searching(build_request(viscous(), "turning"))._merit(tier, p, turn) == abs(
         net(p)[2]
     )
 
@@ -1214,11 +1223,12 @@ def test_a_loop_that_turns_too_much_is_worth_what_is_left_where_it_does_not(turn
 
 def test_a_direction_is_that_of_the_mean_heading():
     """A loop is begun where the heading crosses its mean, at the crossing next to its start."""
-    search = searching(checked(viscous(), "displacement", "x", harmonics=2))
+    search = searching(build_request(viscous(), "displacement", "x", harmonics=2))
     loops, system = search.request.loops, search.request.system
     for shift in (0.3, 2.9, 5.5):
         p = series.shifted(
-            loops.of(Ellipse(semi_axes=(1.0, 0.5), tilt=0.4, centre=(0.3, 0.1))), shift
+            loops.from_gait(Ellipse(semi_axes=(1.0, 0.5), tilt=0.4, centre=(0.3, 0.1))),
+            shift,
         )
         q = search._started_at_mean_heading(p)
         assert abs(turning(system.run(*loops.cycle(q)).xi)[0]) < 1e-8
@@ -1230,7 +1240,8 @@ def test_a_direction_is_that_of_the_mean_heading():
             series.shifted(p, 2 * np.pi * (k + 0.5) / 2000), abs=5e-3
         )
     assert (
-        searching(checked(viscous(), "displacement"))._started_at_mean_heading(p) is p
+        searching(build_request(viscous(), "displacement"))._started_at_mean_heading(p)
+        is p
     )
 
 
@@ -1244,7 +1255,7 @@ def test_a_direction_is_that_of_the_mean_heading():
 def test_a_gait_that_moves_backwards_is_reversed_unless_that_brings_less(
     direction, net, reverse, turned
 ):
-    search = searching(checked(viscous(), "displacement", direction))
+    search = searching(build_request(viscous(), "displacement", direction))
     evaluation = lambda value: types.SimpleNamespace(
         displacement=np.array(net), value=value
     )
@@ -1252,7 +1263,7 @@ def test_a_gait_that_moves_backwards_is_reversed_unless_that_brings_less(
     search._finished = lambda p, turn: (other, p)
     found, p = search._forwards(own, loop, 0.0)
     assert (found is other, found is own) == (turned, not turned)
-    assert np.array_equal(p, series.reversed_(loop) if turned else loop)
+    assert np.array_equal(p, series.reversed_loop(loop) if turned else loop)
 
 
 def test_a_start_is_a_series_of_as_few_harmonics_as_it_has():
@@ -1261,7 +1272,9 @@ def test_a_start_is_a_series_of_as_few_harmonics_as_it_has():
         (Butterfly(amplitude=0.9), 1, 16),
         (Circle(amplitude=0.9), 3, 3),
     ):
-        search = searching(checked(viscous(gait=gait), "displacement", harmonics=asked))
+        search = searching(
+            build_request(viscous(gait=gait), "displacement", harmonics=asked)
+        )
         found = search._as_series(gait)
         assert (found.amplitude, found.harmonics) == (1.0, harmonics)
         assert found.cycle(64)[0] == pytest.approx(gait.cycle(64)[0], abs=1e-9)
@@ -1282,7 +1295,7 @@ def test_an_evaluation_is_what_the_gait_does_by_itself(objective, pace):
     ratio the sum of the relative ones."""
     gait = Ellipse(semi_axes=(1.2, 0.7), tilt=0.4, centre=(0.3, -0.1), amplitude=0.7)
     scene = Scene(Swimmer(SAND, ODD), gait, Numerics(phases=32))
-    request = checked(scene, objective, **pace)
+    request = build_request(scene, objective, **pace)
     found = evaluate_gait(request, gait)
     (net,), ((error, heading),) = estimate.direct(scene, gait, [0.7], 128)
     alpha, alphadot = gait.cycle(128)
@@ -1331,7 +1344,7 @@ def test_undulations_are_sines_within_their_bounds():
         ((0.01006, 2.487), []), ((0.994, 0.503), []),
     ):  # fmt: skip
         assert sines.active(np.array(p)) == names
-    assert sines.of(Sine(amplitude=-0.4, waves=1.2)).tolist() == [0.4, 1.2]
+    assert sines.from_gait(Sine(amplitude=-0.4, waves=1.2)).tolist() == [0.4, 1.2]
     rows = np.array([[0.2, 1.0], [0.5, 2.2]])
     for found, p in zip(zip(*sines.cycle(rows)), rows):
         one = Sine(elements=30, amplitude=p[0], waves=p[1]).cycle(16)
@@ -1348,7 +1361,7 @@ def test_undulations_are_sines_within_their_bounds():
     assert share.min(0) == pytest.approx([0.05, 0.05], abs=0.01) and share.max(
         0
     ) == pytest.approx([0.5, 0.5], abs=0.01)
-    assert sines.same([0.2, 1.0], [0.2095, 1.0095]) and not sines.same(
+    assert sines.is_same([0.2, 1.0], [0.2095, 1.0095]) and not sines.is_same(
         [0.2, 1.0], [0.2, 1.0105]
     )
 
@@ -1356,7 +1369,7 @@ def test_undulations_are_sines_within_their_bounds():
 def test_loops_about_singular_shapes_are_made_smaller_until_they_are_clear():
     """Singular on a line at 1 rad from the first one's centre: others keep half of its distance, about that centre."""
     loops, centre = Loops(2, 2, 5.0), np.array([0.3, -0.2])
-    circle = lambda size, middle=centre: loops.of(
+    circle = lambda size, middle=centre: loops.from_gait(
         Circle(amplitude=size, centre=tuple(middle))
     )
     singularity = lambda alpha: 1.3 - alpha[..., 0]
@@ -1501,10 +1514,12 @@ def test_without_limits_those_of_the_field_or_the_gait_hold():
     """The larger of the two; a table's own field, and a number where that is the same on all sides."""
     scene = viscous(gait=Ellipse(semi_axes=(0.7, 0.2), centre=(0.1, 0.0)))
     for extent, limit in ((0.5, 0.8), (2.0, 2.0)):
-        assert checked(
+        assert build_request(
             scene.with_numerics(extent=extent), "displacement"
         ).loops.within == pytest.approx(limit, rel=1e-3)
-    within = lambda limits: checked(scene, "displacement", limits=limits).loops.within
+    within = lambda limits: (
+        build_request(scene, "displacement", limits=limits).loops.within
+    )
     assert within([0.9, 0.9]) == 0.9 and within([(-0.4, 0.4), (-0.4, 0.4)]) == 0.4
     assert within([0.9, 0.5]) == ((-0.9, 0.9), (-0.5, 0.5))
     assert within([(-0.4, 0.9), (-0.4, 0.9)]) == ((-0.4, 0.9),) * 2
@@ -1551,16 +1566,16 @@ def test_the_sense_of_any_loop_is_told(seed, joints):
     for q, there in (
         (p, True),
         (-p, True),
-        (series.reversed_(p), False),
-        (-series.reversed_(p), False),
+        (series.reversed_loop(p), False),
+        (-series.reversed_loop(p), False),
     ):
-        assert series.same(p, series.shifted(q, 2.0 + seed), odd=False) is there
+        assert series.is_same(p, series.shifted(q, 2.0 + seed), odd=False) is there
 
 
 def test_a_search_tells_how_far_it_is_and_never_that_it_is_done():
     told = []
     search = searching(
-        checked(viscous(), "displacement"),
+        build_request(viscous(), "displacement"),
         progress=told.append,
         completed=0,
         expected=10.0,
@@ -1573,7 +1588,7 @@ def test_a_search_tells_how_far_it_is_and_never_that_it_is_done():
 def test_a_gait_has_the_frequency_that_its_time_allows_or_that_of_the_scene():
     scene = viscous(gait=Circle(frequency=3.0))
     timed, free = (
-        searching(checked(scene, name)) for name in ("speed", "displacement")
+        searching(build_request(scene, name)) for name in ("speed", "displacement")
     )
     evaluation = lambda time: types.SimpleNamespace(
         time=time, gait=Circle(amplitude=0.5)
@@ -1600,7 +1615,7 @@ def test_a_turn_may_be_off_by_its_error_where_cycles_are_not_those_of_the_search
     framed = Study(viscous()).in_frame("minimum-perturbation").scene
     evaluation = types.SimpleNamespace(heading=0.3)
     slacks = [
-        searching(checked(scene, "displacement"))._slack(evaluation)
+        searching(build_request(scene, "displacement"))._slack(evaluation)
         for scene in (viscous(), past, framed)
     ]
     assert slacks == pytest.approx([1e-7, 0.3 + 1e-7, 0.3 + 1e-7], rel=1e-9)
@@ -1608,7 +1623,7 @@ def test_a_turn_may_be_off_by_its_error_where_cycles_are_not_those_of_the_search
 
 def test_phases_and_fields_of_a_search():
     """Phases are eights, as many as the scene or the search has; a field reaches a little beyond the farthest limit."""
-    asked = lambda phases, **more: checked(
+    asked = lambda phases, **more: build_request(
         viscous().with_numerics(phases=phases), "displacement", **more
     )
     assert [asked(n).phases for n in (64, 128, 129)] == [128, 128, 136]
@@ -1618,15 +1633,18 @@ def test_phases_and_fields_of_a_search():
     )
     rests = viscous(gait=Circle(amplitude=0.0, frequency=2.0))
     assert (
-        checked(rests, "speed").objective.rate
+        build_request(rests, "speed").objective.rate
         == 1.0
-        == checked(viscous(gait=Circle()), "speed").objective.rate
+        == build_request(viscous(gait=Circle()), "speed").objective.rate
     )
 
 
 @pytest.mark.parametrize("pace", [{"rate": 0.5}, {"power": 0.01}])
 def test_a_loop_is_worth_its_speed_in_the_time_that_its_limits_allow(pace):
-    search, (loops, p) = searching(checked(viscous(), "speed", **pace)), some_loop()
+    search, (loops, p) = (
+        searching(build_request(viscous(), "speed", **pace)),
+        some_loop(),
+    )
     system = search.request.system
     power = lambda alpha, alphadot, xi: system.work(alpha, alphadot, xi).power
     alpha, alphadot = loops.cycle(p)

@@ -341,7 +341,7 @@ def test_beyond_the_field_tiers_solve_around_the_gait(monkeypatch):
     tabulated, asked = Study(scene), ([0.5, 0.9], ["area", "path", "direct"])
     found = tabled(tabulated.displacements(*asked))
     assert "field" in found["seconds"]
-    monkeypatch.setattr("geomech.tiers.fitted.FIELD", 9_999)
+    monkeypatch.setattr("geomech.tiers.fitted.LARGEST_FIELD", 9_999)
     study = Study(scene)
     around = tabled(study.displacements(*asked))
     assert "field" not in around["seconds"] and not any(

@@ -16,7 +16,7 @@ from test_store import HARD, same
 
 from geomech import cli, load_result, plots, scenes, terminal
 from geomech.geometry import connection
-from geomech.optimisation import checked, search
+from geomech.optimisation import build_request, search
 from geomech.optimisation.variables import displacement, values
 from geomech.pipeline import allow, storing
 from geomech.run import pending, store
@@ -249,7 +249,7 @@ def test_studies_resume_to_the_last_digit(tmp_path, monkeypatch):
     monkeypatch.setattr(connection, "SAMPLES_TOGETHER", 100)
     monkeypatch.setattr(type(scenes.load("c-leg")), "ladder", (4, 8, 16, 32))
     scene = GLASS.with_numerics(grid=5, phases=16, harmonics=3)
-    request = checked(
+    request = build_request(
         VISCOUS.with_numerics(phases=32), "efficiency", harmonics=1, starts=2
     )
 

@@ -8,7 +8,7 @@ from geomech import plots
 from geomech.gaits import Circle
 from geomech.geometry import connection, curvature, metric
 from geomech.geometry.field import Field
-from geomech.geometry.stretch import _first, _inverted_fraction, stretch
+from geomech.geometry.stretch import _inverted_fraction, _linear_map, stretch
 
 
 def constant(M, points=9, extent=1.5):
@@ -45,7 +45,7 @@ def test_a_constant_metric_becomes_its_root():
 
 def test_what_costs_next_to_nothing_is_drawn_at_first_with_a_width():
     line = np.array([1.0, -0.3])
-    first = _first(
+    first = _linear_map(
         constant(np.outer(line, line)),
         np.moveaxis(shapes(connection.grid(2, 9, 1.5)), 0, -1),
     )

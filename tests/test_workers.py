@@ -31,7 +31,7 @@ from tasks import (
 from geomech import scenes, terminal
 from geomech.core.errors import Note, UnitWarning
 from geomech.geometry import connection, metric
-from geomech.optimisation import checked, search
+from geomech.optimisation import build_request, search
 from geomech.optimisation.variables import answers, displacement, values
 from geomech.run import executors, pending
 from geomech.run.runner import Runner, runner, use_runner
@@ -310,10 +310,10 @@ def test_searches_have_the_same_digits_whoever_computes(two, given_away, monkeyp
         search.__globals__,
         vars(sys.modules["geomech.optimisation.request"]),
     ):
-        monkeypatch.setitem(names, "MORE", 1)  # perturbation of each size
-        monkeypatch.setitem(names, "LED", 1)  # start from narrower limits
+        monkeypatch.setitem(names, "N_PERTURBED", 1)  # perturbation of each size
+        monkeypatch.setitem(names, "N_FROM_NARROWER", 1)  # start from narrower limits
     scene, told = GLASS.with_numerics(grid=5), []
-    request = checked(scene, "efficiency", harmonics=1, starts=2)
+    request = build_request(scene, "efficiency", harmonics=1, starts=2)
     here, shared = both(two, lambda: search(request, told.append))
     numbers = lambda optimum: [
         v.values.tolist()

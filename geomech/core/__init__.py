@@ -1,1 +1,1 @@
-"""Foundations of geomech that know nothing of mechanics: refusals, notes, parts, results."""
+"""Foundations of geomech without mechanics: refusals, notes, parts, results."""

@@ -1,4 +1,7 @@
-"""Parts that installed packages offer to the registries (`rft.core.registry`) by entry points, loaded when first asked for."""
+"""Parts that installed packages offer to the registries (`rft.core.registry`) by entry
+points.
+
+A part is loaded at its first use."""
 
 from __future__ import annotations
 
@@ -13,33 +16,40 @@ from rft.core.registry import Registry
 def installed_entries(
     registry: Registry, entries: EntryPoints | None = None
 ) -> dict[str, list[EntryPoint]]:
-    """Return the entry points that installed packages declare for a registry, by name, not loaded. entries: those of all
-    packages, where they have been read already."""
-    found: dict[str, list] = {}
-    for entry in (
-        importlib.metadata.entry_points() if entries is None else entries
-    ).select(group=registry.group):
-        found.setdefault(entry.name, []).append(entry)
-    return found
+    """Return the entry points that installed packages declare for a registry, by name,
+    not loaded. entries: those of all packages, if they have been read already."""
+    group: EntryPoints
+    if entries is None:
+        group = importlib.metadata.entry_points(group=registry.group)
+    else:
+        group = entries.select(group=registry.group)
+    by_name: dict[str, list[EntryPoint]] = {}
+    for entry in group:
+        by_name.setdefault(entry.name, []).append(entry)
+    return by_name
 
 
 def unloaded(
     registry: Registry, entries: EntryPoints | None = None
 ) -> tuple[dict[str, str], dict[str, str]]:
-    """Return parts of installed packages that are not loaded yet, by name, with their packages: new ones, and those
-    that are refused because a built-in part has their name. entries: as of `installed_entries`."""
-    installed = installed_entries(registry, entries)
-    packages = {
-        name: " and ".join(map(_package, some)) for name, some in installed.items()
-    }
-    new = {name: package for name, package in packages.items() if name not in registry}
-    return new, {
-        name: package for name, package in packages.items() if name in registry.built_in
-    }
+    """Return the packages of parts that are not loaded yet, by the parts' names: of new
+    parts, and of those that are refused because a built-in part has their name.
+
+    entries: as in `installed_entries`."""
+    new = {}
+    refused = {}
+    for name, found in installed_entries(registry, entries).items():
+        packages = " and ".join(map(_package, found))
+        if name not in registry:
+            new[name] = packages
+        if name in registry.built_in:
+            refused[name] = packages
+    return new, refused
 
 
 def choose_part(registry: Registry, where: str, word: object) -> str:
-    """Return word if it names a part, or one of an installed package, which is then loaded; else raise Refusal."""
+    """Return word if it names a part; load the part if an installed package has it.
+    Refusal for any other word."""
     if isinstance(word, str) and word in registry:
         return word
     packages = installed_entries(registry)
@@ -54,6 +64,8 @@ def choose_part(registry: Registry, where: str, word: object) -> str:
 
 
 def _load(registry: Registry, where: str, name: str, entries: list[EntryPoint]) -> None:
+    """Load a part into its registry; Refusal if it is offered twice, or cannot be
+    used."""
     packages = " and ".join(map(_package, entries))
     if len(entries) > 1:
         raise Refusal(
@@ -78,9 +90,8 @@ def _load(registry: Registry, where: str, name: str, entries: list[EntryPoint]) 
         registry.put(part, name)
 
 
-def _package(entry: importlib.metadata.EntryPoint) -> str:
-    return (
-        f"the package {entry.dist.name} {entry.dist.version}"
-        if entry.dist
-        else f"the package of {entry.value}"
-    )
+def _package(entry: EntryPoint) -> str:
+    """Return the name and version of an entry point's package."""
+    if entry.dist:
+        return f"the package {entry.dist.name} {entry.dist.version}"
+    return f"the package of {entry.value}"

@@ -11,9 +11,11 @@ from rft.core.refusal import Refusal, formatted, worded
 
 
 class Note(UserWarning):
-    """A warning that something is likely not meant, though it is done; on the command line a line on standard error.
+    """A warning that something is likely not meant, though it is done; on the command
+    line a line on standard error.
 
-    It names arguments as a `Refusal` does, in double backticks, which ``args[0]`` keeps."""
+    It names arguments as a `Refusal` does, in double backticks, which ``args[0]``
+    keeps."""
 
     def __str__(self) -> str:
         return worded(str(self.args[0]))
@@ -34,22 +36,22 @@ def check_angle(name: str, largest: float) -> None:
     """Warn (`UnitWarning`) if an angle in rad is beyond a full turn."""
     if largest > FULL_TURN:
         warnings.warn(
-            f"{name} of {largest:.4g} rad is beyond a full turn, 2 pi: if that is in degrees, give {largest:.4g}deg on "
-            f"the command line, a key that ends in _deg in a scene, or {math.radians(largest):.4g} rad",
+            f"{name} of {largest:.4g} rad is beyond a full turn, 2 pi: if that is in"
+            f" degrees, give {largest:.4g}deg on the command line, a key that ends in"
+            f" _deg in a scene, or {math.radians(largest):.4g} rad",
             UnitWarning,
             stacklevel=3,
         )
 
 
 def choose(place: str, word: object, choices: Iterable[str]) -> str:
-    """Return word if it is one of the choices; else raise Refusal with the nearest."""
+    """Return word if it is one of the choices; Refusal, with the nearest choice, if
+    not."""
     choices = list(choices)
     if isinstance(word, str) and word in choices:
         return word
+    instead = f"use one of {', '.join(choices)}"
     nearest = difflib.get_close_matches(str(word), choices, 1, 0.5)
-    instead = (
-        f"did you mean {nearest[0]!r}?"
-        if nearest
-        else f"use one of {', '.join(choices)}"
-    )
+    if nearest:
+        instead = f"did you mean {nearest[0]!r}?"
     raise Refusal(f"{formatted(word)} is unknown", where=place, instead=instead)

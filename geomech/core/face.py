@@ -1,7 +1,8 @@
-"""Methods of values that take layers above them: how a notebook shows a value, how it is converted and loaded.
+"""Methods of values that need the layers above them: display in notebooks, conversion,
+loading.
 
-Such a method calls the function that `implementation` returns; `geomech.face`, imported with the package, names it.
-"""
+Such a method calls the function that `implementation` returns. `geomech.face`, imported
+with the package, registers these functions."""
 
 from __future__ import annotations
 
@@ -12,8 +13,13 @@ _functions: dict[str, Callable[..., Any]] = {}  # by method, such as "Field.to_x
 
 
 def implements(method: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Return a decorator that makes a function the implementation of a method, such as "Field.to_xarray"."""
-    return lambda function: _functions.setdefault(method, function)
+    """Return a decorator that makes a function the implementation of a method, such as
+    "Field.to_xarray"."""
+
+    def register(function):
+        return _functions.setdefault(method, function)
+
+    return register
 
 
 def implementation(method: str) -> Callable[..., Any]:

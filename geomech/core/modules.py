@@ -8,7 +8,7 @@ from importlib import import_module
 from types import ModuleType
 
 
-def of_package(
+def lazy_modules(
     name: str, path: Iterable[str]
 ) -> tuple[Callable[[str], ModuleType], Callable[[], list[str]]]:
     """Return (__getattr__, __dir__) of a package from its __name__ and __path__."""
@@ -19,4 +19,7 @@ def of_package(
             raise AttributeError(f"module {name!r} has no attribute {module!r}")
         return import_module(f"{name}.{module}")
 
-    return get, lambda: names
+    def listed() -> list[str]:
+        return names
+
+    return get, listed

@@ -10,9 +10,11 @@ ROUNDING = 1e-13  # errors below this are rounding, and say nothing about a sett
 
 @dataclass(frozen=True)
 class Setting:
-    """A numerical setting that an error study varies from coarse to fine. order: of the error in 1/value, or in value
-    where that falls, as theory gives it. buys: what a finer value improves, to complete a sentence. against: "truth",
-    or "limit" of the setting alone. key: its entry of [numerics], where that has another name; "loads"
+    """A numerical setting that an error study varies from coarse to fine.
+
+    order: of the error in 1/value, or in value where that falls, by theory. buys: what
+    a finer value improves, to complete a sentence. against: "truth", or "limit" of the
+    setting alone. key: its entry of [numerics], where that has another name; "loads"
     for rules, whose prefix is ``rule``. tier: to which it belongs."""
 
     name: str
@@ -26,4 +28,7 @@ class Setting:
 
     @property
     def label(self) -> str:
-        return f"{self.tier}: {self.name}" if self.tier else self.name
+        """Its name, behind the name of its tier."""
+        if self.tier:
+            return f"{self.tier}: {self.name}"
+        return self.name

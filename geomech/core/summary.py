@@ -12,46 +12,44 @@ from rft.core.premise import negated
 from rft.core.refusal import formatted
 
 ROWS = ("x", "y", "theta")
-POSE = "x", "y", "heading"
+POSE = ("x", "y", "heading")
 WIDTH = 80  # characters of a line on a small screen
 
 
 def part(kind: str, thing) -> str:
-    """Return the kind and the numbers of a part of a scene, to six digits, as a scene has them; no key that is None."""
-    names = (
-        [f.name for f in dataclasses.fields(thing)]
-        if dataclasses.is_dataclass(thing)
-        else []
-    )
-    values = [(name, getattr(thing, name)) for name in names]
-    given = [
-        f"{name} = {formatted(_six_digits(value))}"
-        for name, value in values
-        if value is not None
-    ]
-    return f"{kind} ({', '.join(given)})" if given else kind
+    """Return the kind and the numbers of a part of a scene, to six digits, as a scene
+    has them; without keys that are None."""
+    entries = []
+    if dataclasses.is_dataclass(thing):
+        for field in dataclasses.fields(thing):
+            value = getattr(thing, field.name)
+            if value is not None:
+                entries.append(f"{field.name} = {formatted(_six_digits(value))}")
+    if not entries:
+        return kind
+    return f"{kind} ({', '.join(entries)})"
 
 
 def _six_digits(value):
+    """Return a number, or numbers in a tuple or list, with six digits."""
     if isinstance(value, tuple | list):
         return type(value)(map(_six_digits, value))
-    return float(f"{value:.6g}") if isinstance(value, float) else value
+    if isinstance(value, float):
+        return float(f"{value:.6g}")
+    return value
 
 
 def grid(axes: Sequence[np.ndarray], names: Sequence[str] = ()) -> str:
-    """Return the shape of a grid and the ranges of its axes. names: of the axes, alpha_1 ... if left out."""
+    """Return the shape of a grid and the ranges of its axes. names: of the axes,
+    alpha_1 ... if left out."""
+    shape = " x ".join(str(len(a)) for a in axes)
     ranges = [f"{a[0]:.4g} to {a[-1]:.4g}" for a in axes]
-    equal = len(set(ranges)) == 1 and len(ranges) > 1
     names = names or [f"alpha_{k + 1}" for k in range(len(axes))]
-    described = (
-        f"{names[0]}{' and ' if len(names) == 2 else ' to '}{names[-1]} from {ranges[0]}"
-        if equal
-        else ""
-    )
-    described = described or ", ".join(
-        f"{name} from {r}" for name, r in zip(names, ranges)
-    )
-    return f"{' x '.join(str(len(a)) for a in axes)} shapes, {described} rad"
+    if len(axes) > 1 and len(set(ranges)) == 1:
+        link = "and" if len(names) == 2 else "to"
+        return f"{shape} shapes, {names[0]} {link} {names[-1]} from {ranges[0]} rad"
+    text = ", ".join(f"{name} from {x}" for name, x in zip(names, ranges))
+    return f"{shape} shapes, {text} rad"
 
 
 def span(values) -> str:
@@ -60,8 +58,11 @@ def span(values) -> str:
     values = values[np.isfinite(values)]
     if not values.size:
         return "nothing"
-    low, high = f"{values.min():.3g}", f"{values.max():.3g}"
-    return low if low == high else f"{low} to {high}"
+    low = f"{values.min():.3g}"
+    high = f"{values.max():.3g}"
+    if low == high:
+        return low
+    return f"{low} to {high}"
 
 
 def spans(values) -> str:
@@ -70,91 +71,102 @@ def spans(values) -> str:
 
 
 def masked(values) -> str:
-    """Return the number of singular shapes as an addition to a line; empty if none is."""
+    """Return the number of singular shapes as an addition to a line; "" without any."""
     count = int(np.isnan(np.asarray(values)).any(0).sum())
-    return f"; {count} singular" if count else ""
+    if count == 0:
+        return ""
+    return f"; {count} singular"
 
 
 def fit_residual(residual, speed) -> str:
-    """Return the residual of a fit by component, rms over all shapes, over the rms of xi."""
+    """Return the residual of a fit by component, rms over all shapes, over the rms of
+    xi."""
     if np.isnan(residual).all():
         return "fit residual unknown"
-    parts = [
-        np.sqrt(np.nanmean(r**2) / max(np.nanmean(s**2), 1e-300))
-        for r, s in zip(residual, speed)
-    ]
-    return (
-        "fit leaves "
-        + ", ".join(f"{row} {_percent(x)}" for row, x in zip(ROWS, parts))
-        + " of the rms of xi"
-    )
+    parts = []
+    for name, r, s in zip(ROWS, residual, speed):
+        relative = np.sqrt(np.nanmean(r**2) / max(np.nanmean(s**2), 1e-300))
+        parts.append(f"{name} {_percent(relative)}")
+    return f"fit leaves {', '.join(parts)} of the rms of xi"
 
 
 def _percent(x: float) -> str:
-    return f"{100 * x:.2g} %" if x > 1e-8 else "0 %"
+    """Return a share in percent, to two digits; 0 where it is rounding."""
+    if x > 1e-8:
+        return f"{100 * x:.2g} %"
+    return "0 %"
 
 
 def lengths(unit: str, length: float | None) -> str:
-    """Return the unit of lengths and the body's length as an addition to a line; empty where they are unknown."""
+    """Return the unit of lengths and the body's length as an addition to a line; ""
+    where they are unknown."""
     if length is None:
         return ""
-    return f"; lengths in {unit}" + (f", the body's {length:g}" if unit != "BL" else "")
+    if unit == "BL":
+        return f"; lengths in {unit}"
+    return f"; lengths in {unit}, the body's {length:g}"
 
 
 def poses(values) -> str:
     """Return the ranges of x, y and theta of poses or velocities (..., 3)."""
-    return spans(
-        np.moveaxis(np.round(np.asarray(values, float).reshape(-1, 3), 12) + 0.0, -1, 0)
-    )
+    rows = np.asarray(values, float).reshape(-1, 3).T
+    return spans(np.round(rows, 12) + 0.0)  # no -0
 
 
-def moved(pose: Sequence[tuple[float, str]], zero: Sequence[str] = ()) -> str:
-    """Return x, y and heading, each a number and its unit, in words. zero: those of POSE that are 0 by symmetry."""
-    shown = [
-        (n, round(float(x), 9) + 0.0, u)
-        for n, (x, u) in zip(POSE, pose)
-        if n not in zero
-    ]
-    parts = (
-        [", ".join(f"{name} {x:.6g} {unit}" for name, x, unit in shown)]
-        if shown
-        else []
-    )
-    return "; ".join([*parts, *zero_words(zero)])
+def format_pose(pose: Sequence[tuple[float, str]], zero: Sequence[str] = ()) -> str:
+    """Return x, y and heading, each a number and its unit, in words. zero: those of
+    POSE that are 0 by symmetry."""
+    numbers = []
+    for name, (x, unit) in zip(POSE, pose):
+        if name not in zero:
+            x = round(float(x), 9) + 0.0  # no -0
+            numbers.append(f"{name} {x:.6g} {unit}")
+    parts = zero_words(zero)
+    if numbers:
+        parts = [", ".join(numbers), *parts]
+    return "; ".join(parts)
 
 
 def zero_words(zero: Sequence[str]) -> list[str]:
-    """Return what is 0 by symmetry, in words; nothing where nothing is."""
-    return [f"{listed(zero)}: zero by symmetry"] if zero else []
+    """Return the sentence on names that are 0 by symmetry; none without names."""
+    if not zero:
+        return []
+    return [f"{listed(zero)}: zero by symmetry"]
 
 
 def listed(names: Sequence[str]) -> str:
     """Return "x", "x and y" or "x, y and heading"."""
-    return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+    *first, last = names
+    if not first:
+        return last
+    return f"{', '.join(first)} and {last}"
 
 
 def wrapped(lines: Iterable[str], indent: int = 2) -> list[str]:
-    """Return lines of WIDTH at most; of a longer one the rest follows, indented."""
+    """Return lines of WIDTH at most; the rest of a longer line follows, indented."""
     fill = textwrap.TextWrapper(
         WIDTH,
         subsequent_indent=" " * indent,
         break_long_words=False,
         break_on_hyphens=False,
     )
-    return [
-        part
-        for line in lines
-        for part in (fill.wrap(line) if len(line) > WIDTH else [line])
-    ]
+    short = []
+    for line in lines:
+        if len(line) > WIDTH:
+            short += fill.wrap(line)
+        else:
+            short.append(line)
+    return short
 
 
 def effect_lines(effects: Sequence) -> list[str]:
-    """Return a line for each effect on the ground, and one more for what it assumes."""
+    """Return a line for each effect on the ground, and one more for its assumptions."""
     lines = []
     for effect in effects:
+        premises = negated(effect.breaks) or "keeps every premise"
         lines.append(
-            f"on:  {part(effect.kind, effect)}; {negated(effect.breaks) or 'keeps every premise'}; costs {effect.cost}; "
-            f"gone at {effect.limit}, order {effect.order}"
+            f"on:  {part(effect.kind, effect)}; {premises}; costs {effect.cost};"
+            f" gone at {effect.limit}, order {effect.order}"
         )
         if effect.assumes:
             lines.append(f"     assumes {effect.assumes}")

@@ -220,7 +220,8 @@ class Result(Mapping[str, Variable]):
         return replace(self, variables=(*kept, *more))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data in the layout of `xarray.Dataset.from_dict`; nan is None."""
+        """Return plain data in the layout of `xarray.Dataset.from_dict`; nan is
+        None."""
         return implementation("Result.to_dict")(self)
 
     def to_xarray(self) -> Any:

@@ -1,5 +1,6 @@
-"""Where tasks are computed: in this process, or by the runner of a request, which is set from above
-(`geomech.run.runner`) and may store and distribute them."""
+"""The place where tasks are computed: this process, or the runner of a request.
+
+The runner is set from above (`geomech.run.runner`) and may store and distribute tasks."""
 
 from __future__ import annotations
 
@@ -10,9 +11,8 @@ from typing import Any, Protocol, TypeVar
 
 Item = TypeVar("Item")
 Outcome = TypeVar("Outcome")
-Map = Callable[
-    [Callable[[Any], Any], Sequence[Any]], Iterable[Any]
-]  # as the builtin `map`, of one sequence
+# As the builtin `map`, of one sequence.
+Map = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
 
 
 class Worker(Protocol):
@@ -28,6 +28,8 @@ class Worker(Protocol):
 
 
 class _Serial:
+    """A worker that computes tasks in this process, one after the other."""
+
     def each(
         self, function: Callable[[Item], Outcome], items: Sequence[Item]
     ) -> Iterable[Outcome]:
@@ -38,12 +40,13 @@ class _Serial:
     ) -> tuple[Any, list]:
         rows = []
         for _ in range(count):
-            state, one = step(state)
-            rows.append(one)
+            state, last_row = step(state)
+            rows.append(last_row)
         return state, rows
 
 
-_worker: ContextVar[Worker] = ContextVar("worker", default=_Serial())  # noqa: B039  it has no state
+# The default has no state, so that sharing it does no harm.
+_worker: ContextVar[Worker] = ContextVar("worker", default=_Serial())  # noqa: B039
 
 
 def each(
@@ -51,7 +54,8 @@ def each(
 ) -> Iterable[Outcome]:
     """Return function(item) of every item, in their order, as the builtin `map` does.
 
-    `functools.partial` of a module's function and one argument is a task with what all items share."""
+    A `functools.partial` of a module's function and one argument is a task; the
+    argument is shared by all items."""
     return _worker.get().each(function, items)
 
 
@@ -60,8 +64,8 @@ def iterate(
 ) -> tuple[Any, list]:
     """Return the state after ``count`` times step(state) -> (state, row), and the rows.
 
-    context: everything besides the state on which steps depend; the state consists of arrays and numbers. row: the type
-    of a row."""
+    context: everything besides the state on which steps depend. state: arrays and
+    numbers. row: the type of a row."""
     return _worker.get().iterate(step, state, count, context, row)
 
 

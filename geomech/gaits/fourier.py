@@ -1,4 +1,5 @@
-"""Gaits that are finite Fourier series, among them the circle, the ellipse and the butterfly."""
+"""Gaits that are finite Fourier series, among them the circle, the ellipse and the
+butterfly."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ from rft.core.refusal import Refusal
 
 @dataclass(frozen=True, kw_only=True)
 class Series(Gait):
-    """unit_j(t) = sum_k cos_jk cos(k t) + sin_jk sin(k t), k = 1, 2 ...; subclasses give `coefficients`."""
+    """A finite Fourier series: unit_j(t) = sum_k cos_jk cos(k t) + sin_jk sin(k t), k =
+    1, 2 ...; subclasses define `coefficients`."""
 
     def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the coefficients (cos, sin), each (joints, K)."""
@@ -27,7 +29,7 @@ class Series(Gait):
         return self.coefficients()[0].shape[0]
 
     @property
-    def harmonics(self) -> int:  # type: ignore[override]  # of most gaits it is a number of the class
+    def harmonics(self) -> int:  # type: ignore[override]  # a number of most classes
         """The highest harmonic of the series."""
         return self.coefficients()[0].shape[1]
 
@@ -54,7 +56,7 @@ class Circle(Series):
     >>> gait = Circle(0.5, centre=(0.2, 0.0))
     >>> gait.shape(0.0)  # rad, at phase 0
     array([0.7, 0. ])
-    >>> alpha, alphadot = gait.cycle(64)  # at 64 phases, for any velocity(alpha, alphadot)
+    >>> alpha, alphadot = gait.cycle(64)  # at 64 phases
     >>> alpha.shape
     (64, 2)
     """
@@ -78,7 +80,7 @@ class Circle(Series):
 @GAITS.register
 @dataclass(frozen=True)
 class Ellipse(Series):
-    """Counter-clockwise about its centre.
+    """An ellipse, run counter-clockwise about its centre.
 
     semi_axes (rad): at amplitude 1.
 
@@ -111,7 +113,9 @@ class Ellipse(Series):
         super().__post_init__()
 
     def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
-        (a, b), c, s = self.semi_axes, math.cos(self.tilt), math.sin(self.tilt)
+        a, b = self.semi_axes
+        c = math.cos(self.tilt)
+        s = math.sin(self.tilt)
         return np.array([[a * c], [a * s]]), np.array([[-b * s], [b * c]])
 
     @classmethod
@@ -122,9 +126,11 @@ class Ellipse(Series):
 @GAITS.register
 @dataclass(frozen=True)
 class Butterfly(Series):
-    """The butterfly of Fig. 11(e), as distributed with sysplotter (OSU-LRAM/GeometricSystemPlotter):
-    (alpha_1 + alpha_2)/2 = 1.0908 cos t - 0.2508 cos 3t - 0.18 cos 5t, (alpha_1 - alpha_2)/2 = 1.052 sin t + 0.0859 sin 3t
-    at amplitude 1.
+    """The butterfly of Fig. 11(e), as distributed with sysplotter
+    (OSU-LRAM/GeometricSystemPlotter). At amplitude 1:
+
+        (alpha_1 + alpha_2)/2 = 1.0908 cos t - 0.2508 cos 3t - 0.18 cos 5t
+        (alpha_1 - alpha_2)/2 = 1.052 sin t + 0.0859 sin 3t
 
     Examples
     --------
@@ -150,15 +156,16 @@ class Butterfly(Series):
 @GAITS.register
 @dataclass(frozen=True)
 class Fourier(Series):
-    """A Fourier series of one's own.
+    """A custom Fourier series.
 
-    cos, sin (rad): coefficients, a row for each joint, harmonics 1, 2 ... along the row.
+    cos, sin (rad): coefficients, a row for each joint, harmonics 1, 2 ... along the
+    row.
 
     Examples
     --------
     >>> from geomech.gaits import Fourier
-    >>> gait = Fourier(cos=((0.5,), (0.0,)), sin=((0.0,), (0.5,)))  # the circle of 0.5 rad
-    >>> gait.joints, gait.shape(0.0).tolist()
+    >>> circle = Fourier(cos=((0.5,), (0.0,)), sin=((0.0,), (0.5,)))  # of 0.5 rad
+    >>> circle.joints, circle.shape(0.0).tolist()
     (2, [0.5, 0.0])
     """
 
@@ -168,10 +175,12 @@ class Fourier(Series):
     sin: tuple[tuple[float, ...], ...]
 
     def __post_init__(self):
-        cos, sin = finite_array("cos", self.cos, 2), finite_array("sin", self.sin, 2)
+        cos = finite_array("cos", self.cos, 2)
+        sin = finite_array("sin", self.sin, 2)
         if cos.shape != sin.shape:
             raise Refusal(
-                f"cos and sin must have one shape (joints, harmonics), got {cos.shape} and {sin.shape}"
+                "cos and sin must have one shape (joints, harmonics), got"
+                f" {cos.shape} and {sin.shape}"
             )
         for name, x in (("cos", cos), ("sin", sin)):
             object.__setattr__(self, name, tuple(map(tuple, x.tolist())))

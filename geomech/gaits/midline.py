@@ -1,4 +1,5 @@
-"""Bends of a body of equal elements from measured frames: from its curvature, or from points along its midline."""
+"""Bends of a body of equal elements from measured frames: from its curvature, or from
+points along its midline."""
 
 from __future__ import annotations
 
@@ -7,35 +8,46 @@ from numpy.polynomial import legendre
 
 from geomech.gaits.frames import Frames
 
-LARGEST_BEND = (
-    np.pi / 2
-)  # rad, between neighbouring elements, and between neighbouring chords from point to point
-LENGTH_SPREAD = 0.2  # of a frame's length about the mean of all; beyond it the tracking has lost a part of the body
+# Rad, between neighbouring elements, and between neighbouring chords from point to
+# point.
+LARGEST_BEND = np.pi / 2
+# Of a frame's length about the mean: beyond it the tracking has lost a part of the
+# body.
+LENGTH_SPREAD = 0.2
 NODES, WEIGHTS = legendre.leggauss(5)
-PASSES = 3  # of making a spline's parameter its own arc length; 1e-7 rad is left at 30 points along a sandfish
+# Passes that turn a spline's parameter into its arc length: the error is 1e-7 rad at 30
+# points along a sandfish.
+PASSES = 3
 
 
 def bends(frames: Frames, elements: int, modes: int) -> np.ndarray:
-    """Return the heading of each element minus that of the one before, (F, elements - 1), rad. modes: Legendre modes of
-    the curvature along the body, fitted by least squares; 0: splines through the data."""
+    """Return the heading of each element minus the one before, (F, elements - 1), rad.
+
+    modes: Legendre modes of the curvature along the body, fitted by least squares; 0:
+    splines through the data."""
     _check_modes(frames, modes)
     centres = (np.arange(elements) + 0.5) / elements
-    heading = (_from_curvature if "curvature" in frames.columns else _from_points)(
-        frames, centres, modes
-    )
+    if "curvature" in frames.columns:
+        heading = _from_curvature(frames, centres, modes)
+    else:
+        heading = _from_points(frames, centres, modes)
     angles = np.diff(heading)
-    worst = np.unravel_index(np.abs(angles).argmax(), angles.shape)
-    if not abs(angles[worst]) <= LARGEST_BEND:
+    frame, bend = np.unravel_index(np.abs(angles).argmax(), angles.shape)
+    largest = abs(angles[frame, bend])
+    if not largest <= LARGEST_BEND:
         raise frames.wrong(
-            f"at t = {frames.t[worst[0]]:g} and s = {(worst[1] + 1) / elements:.3g} neighbouring "
-            f"elements bend by {abs(angles[worst]):.3g} rad, more than {LARGEST_BEND:.3g}",
+            f"at t = {frames.t[frame]:g} and s = {(bend + 1) / elements:.3g}"
+            f" neighbouring elements bend by {largest:.3g} rad, more than"
+            f" {LARGEST_BEND:.3g}",
             instead="mend that frame, or take more elements",
         )
     return angles
 
 
 def _check_modes(frames: Frames, modes: int) -> None:
-    # Polynomials through equally spaced data are safe up to about twice the root of their number (Runge).
+    """Refuse more modes than the rows of a frame determine."""
+    # Polynomials through n equally spaced data are safe up to a degree of about 2
+    # sqrt(n) (Runge).
     count = int(frames.counts.min())
     most = min(int(2 * np.sqrt(count)), count - 1)
     if modes not in range(most + 1):
@@ -46,7 +58,8 @@ def _check_modes(frames: Frames, modes: int) -> None:
 
 
 def _from_curvature(frames: Frames, centres, modes: int) -> np.ndarray:
-    """Return headings (F, elements) up to a constant each: the exact integral of the spline, or of the modes."""
+    """Return headings (F, elements) up to a constant for each frame: the exact integral
+    of the spline, or of the modes."""
     from scipy.interpolate import CubicSpline
 
     curvature = frames.rows[:, 2].reshape(len(frames.t), -1)
@@ -65,16 +78,16 @@ def _from_points(frames: Frames, centres, modes: int) -> np.ndarray:
     """Return headings (F, elements) of the splines through the points of each frame."""
     from scipy.interpolate import CubicSpline
 
-    heading, lengths = np.empty((len(frames.t), len(centres))), np.empty(len(frames.t))
-    place = frames.rows[:, -2] + 1j * frames.rows[:, -1]
+    heading = np.empty((len(frames.t), len(centres)))
+    lengths = np.empty(len(frames.t))
+    positions = frames.rows[:, -2] + 1j * frames.rows[:, -1]
     for k, (start, count) in enumerate(zip(frames.starts, frames.counts)):
-        points = place[start : start + count]
+        points = positions[start : start + count]
         _check_points(frames, start, points)
         s, tangent, lengths[k] = _arc(points)
         if modes:
-            heading[k] = legendre.legval(
-                2 * centres - 1, legendre.legfit(2 * s - 1, tangent, modes)
-            )
+            coefficients = legendre.legfit(2 * s - 1, tangent, modes)
+            heading[k] = legendre.legval(2 * centres - 1, coefficients)
         else:
             heading[k] = CubicSpline(s, tangent)(centres)
     _check_lengths(frames, lengths)
@@ -82,8 +95,10 @@ def _from_points(frames: Frames, centres, modes: int) -> np.ndarray:
 
 
 def _arc(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return, of the spline through points (P,), complex, the shares s (P,) of its arc length at which it passes them,
-    its headings at these, rad, and its length. Of order 4 in the spacing, but of order 3 at the ends."""
+    """Return the shares s (P,) of arc length at which the spline through complex points
+    (P,) passes them, its headings there, rad, and its length.
+
+    They are of order 4 in the spacing, but of order 3 at the ends."""
     from scipy.interpolate import CubicSpline
 
     step = np.abs(np.diff(points))
@@ -96,6 +111,8 @@ def _arc(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def _check_points(frames: Frames, start: int, points: np.ndarray) -> None:
+    """Refuse points (P,) of a frame that coincide, or between which the midline turns
+    too far."""
     chord = np.diff(points)
     same = np.flatnonzero(np.abs(chord) <= 1e-9 * np.abs(chord).sum())
     if same.size:
@@ -107,19 +124,22 @@ def _check_points(frames: Frames, start: int, points: np.ndarray) -> None:
     turn = np.abs(np.angle(chord[1:] / chord[:-1]))
     if turn.max() > LARGEST_BEND:
         raise frames.wrong(
-            f"the midline turns by {turn.max():.3g} rad at this point, more than {LARGEST_BEND:.3g}",
+            f"the midline turns by {turn.max():.3g} rad at this point, more than"
+            f" {LARGEST_BEND:.3g}",
             int(start + turn.argmax() + 1),
-            instead="order the points from tail to head, mend the frame, or give more points",
+            instead="order the points from tail to head, mend the frame, or give more"
+            " points",
         )
 
 
 def _check_lengths(frames: Frames, lengths: np.ndarray) -> None:
+    """Refuse a frame whose midline (F,) is much longer or shorter than the mean."""
     share = lengths / lengths.mean()
     k = int(np.abs(share - 1).argmax())
     if abs(share[k] - 1) > LENGTH_SPREAD:
         raise frames.wrong(
-            f"the midline at t = {frames.t[k]:g} is {share[k]:.3g} times as long as the mean of "
-            f"all frames, off by more than {LENGTH_SPREAD:.0%}",
+            f"the midline at t = {frames.t[k]:g} is {share[k]:.3g} times as long as the"
+            f" mean of all frames, off by more than {LENGTH_SPREAD:.0%}",
             frames.starts[k],
             instead="mend or drop that frame",
         )

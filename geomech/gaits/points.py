@@ -13,12 +13,12 @@ from geomech.geometry.gait import GAITS, Gait, finite_array
 from rft.core.checks import unmasked
 from rft.core.refusal import Refusal
 
-FAR = 1 / 20  # of the size of a polygon, from which a spline may lie as far unnoted
+LARGEST_BULGE = 1 / 20  # of the size of a polygon: a larger one of the spline is noted
 
 
 def checked_loop(points) -> tuple[tuple[float, ...], ...]:
-    """Return at least three shapes, without the first where it is repeated at the end; Refusal unless neighbours are
-    distinct."""
+    """Return at least three shapes, without the first where it is repeated at the end;
+    Refusal unless neighbours are distinct."""
     loop = finite_array("points", points, 2)
     if np.array_equal(loop[0], loop[-1]):
         loop = loop[:-1]
@@ -34,8 +34,10 @@ def checked_loop(points) -> tuple[tuple[float, ...], ...]:
 @GAITS.register
 @dataclass(frozen=True)
 class Points(Gait):
-    """The periodic cubic spline through given shapes, in order and back to the first, phase running with chord length.
-    Corners become round, and between few points the curve bulges: a `Polygon` has straight sides.
+    """The periodic cubic spline through given shapes, in order and back to the first.
+
+    Phase runs with chord length. Corners become round, and between few points the curve
+    bulges: a `Polygon` has straight sides.
 
     points (rad): three rows of joint angles or more.
 
@@ -60,6 +62,7 @@ class Points(Gait):
         return len(self.points[0])
 
     def _spline(self):
+        """Return the spline, a function of phases and an order of derivative."""
         from scipy.interpolate import CubicSpline
 
         loop = np.array([*self.points, self.points[0]])
@@ -75,26 +78,29 @@ class Points(Gait):
 
     @property
     def bulge(self) -> float:
-        """Largest distance of the spline from the side between its two points, over the diagonal of the box around
-        the points: 0.012 for twelve points of a circle, 0.13 for the four corners of a square."""
-        phases, corners = self._phases, np.array(self.points)
+        """Largest distance of the spline from the side between its two points, over the
+        diagonal of the box around the points: 0.012 for twelve points of a circle, 0.13
+        for the four corners of a square."""
+        phases = self._phases
+        corners = np.array(self.points)
         share = np.linspace(0.0, 1.0, 17)[:, None]
         curve = self._spline()(phases[:-1] + share * np.diff(phases))
         sides = np.roll(corners, -1, 0) - corners
         from_corner = curve - corners
         along = (from_corner * sides).sum(-1) / (sides * sides).sum(-1)
         nearest = np.clip(along, 0.0, 1.0)[..., None] * sides
-        far = np.linalg.norm(from_corner - nearest, axis=-1).max()
-        low, high = corners.min(0), corners.max(0)
-        return float(far / np.linalg.norm(high - low))
+        farthest = np.linalg.norm(from_corner - nearest, axis=-1).max()
+        diagonal = np.linalg.norm(corners.max(0) - corners.min(0))
+        return float(farthest / diagonal)
 
     def note(self) -> None:
         """Warn (`Note`) where the spline leaves the polygon through its points."""
-        if (bulge := self.bulge) > FAR:
+        bulge = self.bulge
+        if bulge > LARGEST_BULGE:
             warnings.warn(
-                f"[gait] points: the spline through {len(self.points)} shapes leaves the polygon through them by "
-                f"{100 * bulge:.0f} % of its size: if straight sides are meant, take kind = 'polygon', else give more "
-                "points",
+                f"[gait] points: the spline through {len(self.points)} shapes leaves"
+                f" the polygon through them by {100 * bulge:.0f} % of its size: if"
+                " straight sides are meant, take kind = 'polygon', else give more points",
                 Note,
                 stacklevel=4,
             )

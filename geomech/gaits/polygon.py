@@ -19,11 +19,12 @@ class Polygon(Gait):
 
     points (rad): the corners, three rows of joint angles or more.
 
-    Each side takes a share of the phase by its length and is run from rest to rest, by the
-    share 35 u^4 - 84 u^5 + 70 u^6 - 20 u^7 of it at the share u of its time: speed,
-    acceleration and jerk are 0 at its ends. So the gait is smooth at its corners, and the
-    displacement converges with order 4 in a fluid. The timing matters only to effects
-    that depend on speed; the highest joint speed is 2.19 times the mean of its side.
+    Each side takes a share of the phase by its length and is run from rest to rest, by
+    the share 35 u^4 - 84 u^5 + 70 u^6 - 20 u^7 of it at the share u of its time: speed,
+    acceleration and jerk are 0 at its ends. So the gait is smooth at its corners, and
+    the displacement converges with order 4 in a fluid. The timing matters only to
+    effects that depend on speed; the highest joint speed is 2.19 times the mean of its
+    side.
 
     Examples
     --------
@@ -47,12 +48,12 @@ class Polygon(Gait):
         return len(self.points[0])
 
     @property
-    def harmonics(self) -> int:  # type: ignore[override]  # of most gaits it is a number of the class
+    def harmonics(self) -> int:  # type: ignore[override]  # a number of most classes
         """The number of sides: a cycle has twice as many phases at least."""
         return len(self.points)
 
     def _along(self, t: ArrayLike) -> tuple[np.ndarray, ...]:
-        """Return of phases t (T...) the corner before (T..., joints), the side from there
+        """Return the corner before phases t (T...), (T..., joints), the side from there
         (T..., joints), its duration (T...) and the share u of it (T...)."""
         corners = np.array(self.points)
         sides = np.roll(corners, -1, 0) - corners

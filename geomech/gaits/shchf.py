@@ -1,4 +1,5 @@
-"""A gait of sysplotter's, by the numbers of a `shchf_` file: six coefficients, or a MATLAB file of points or coefficients."""
+"""A gait of sysplotter, by the numbers of a `shchf_` file: six coefficients, or a
+MATLAB file of points or coefficients."""
 
 from __future__ import annotations
 
@@ -19,13 +20,16 @@ from rft.core.refusal import Refusal
 @GAITS.register
 @dataclass(frozen=True, kw_only=True)
 class Shchf(Gait):
-    """The gait of a shchf file of sysplotter's, in numbers.
+    """The gait of a shchf file of sysplotter, in numbers.
 
-    XV (rad): a1, b1, a3, b3, a5, b5 ... as in its `shchf_LowRe_...` files, for the closed curve u = sum of a_k cos(k t),
-    v = - sum of b_k sin(k t), alpha_1 = (u - v)/sqrt 2, alpha_2 = (u + v)/sqrt 2, which runs as it does there. file (-): a
-    .mat file of points alpha1, alpha2, ... at t, of coefficients A1, B1, A2, B2, ..., or of the paths that sys_calcpath
-    computed; in a scene from a file relative to that file's folder, else to the current one. sha256 (-): of the file,
-    filled in if left out; given, the file must have it. Its centre is the mean that coefficients have, if left out.
+    XV (rad): a1, b1, a3, b3, a5, b5 ... as in its `shchf_LowRe_...` files, for the
+    closed curve u = sum of a_k cos(k t), v = - sum of b_k sin(k t), alpha_1 = (u -
+    v)/sqrt 2, alpha_2 = (u + v)/sqrt 2, in the same direction as there. file (-): a
+    .mat file of points alpha1, alpha2, ... at t, of coefficients A1, B1, A2, B2, ...,
+    or of the paths that sys_calcpath computed; in a scene from a file relative to that
+    file's folder, else to the current one. sha256 (-): of the file, filled in if left
+    out; given, the file must have it. The centre is the mean of the coefficients, if
+    left out.
 
     Examples
     --------
@@ -58,23 +62,25 @@ class Shchf(Gait):
         if self.sha256 and self.file is None:
             raise Refusal("sha256 is that of a file", instead="drop it")
         object.__setattr__(self, "file", self.file and str(self.file))
-        object.__setattr__(
-            self, "_curve", self._of_file() if self.file else self._of_numbers()
-        )
+        curve = self._read_file() if self.file else self._series()
+        object.__setattr__(self, "_curve", curve)
         super().__post_init__()
 
-    def _of_numbers(self) -> Fourier:
+    def _series(self) -> Fourier:
+        """Return the curve of the coefficients."""
         values = finite_array("XV", self.XV, 1)
         if values.size % 2:
             raise Refusal("XV must be pairs a1, b1, a3, b3 ...", value=self.XV)
         object.__setattr__(self, "XV", tuple(values.tolist()))
-        a, b = (
-            np.repeat(x, 2)[:-1] * (np.arange(values.size - 1) % 2 == 0)
-            for x in values.reshape(-1, 2).T / np.sqrt(2)
-        )
-        return Fourier(cos=(a, a), sin=(b, -b))
+        coefficients = np.zeros((2, values.size - 1))  # the even harmonics are 0
+        coefficients[:, ::2] = values.reshape(-1, 2).T / np.sqrt(2)
+        a, b = (tuple(row) for row in coefficients.tolist())
+        minus_b = tuple((-coefficients[1]).tolist())
+        return Fourier(cos=(a, a), sin=(b, minus_b))
 
-    def _of_file(self) -> Any:
+    def _read_file(self) -> Any:
+        """Return the curve in the file: a spline through points, or a Fourier
+        series."""
         from scipy.interpolate import CubicSpline
 
         curve: Any = shchf.read(self.file or "", self.number)
@@ -92,30 +98,26 @@ class Shchf(Gait):
 
     @property
     def joints(self) -> int:
-        return (
-            self._curve.joints
-            if isinstance(self._curve, Fourier)
-            else self._curve.c.shape[-1]
-        )
+        if isinstance(self._curve, Fourier):
+            return self._curve.joints
+        return self._curve.c.shape[-1]
 
     @property
-    def harmonics(self) -> int:  # type: ignore[override]  # of most gaits it is a number of the class
+    def harmonics(self) -> int:  # type: ignore[override]  # a number of most classes
         """The highest harmonic of the series; 1 for a spline, which has no highest."""
-        return self._curve.harmonics if isinstance(self._curve, Fourier) else 1
+        if isinstance(self._curve, Fourier):
+            return self._curve.harmonics
+        return 1
 
     def unit(self, t: ArrayLike) -> np.ndarray:
-        return (
-            self._curve.unit(t)
-            if isinstance(self._curve, Fourier)
-            else self._curve(unmasked("t", t))
-        )
+        if isinstance(self._curve, Fourier):
+            return self._curve.unit(t)
+        return self._curve(unmasked("t", t))
 
     def unit_rate(self, t: ArrayLike) -> np.ndarray:
-        return (
-            self._curve.unit_rate(t)
-            if isinstance(self._curve, Fourier)
-            else self._curve(unmasked("t", t), 1)
-        )
+        if isinstance(self._curve, Fourier):
+            return self._curve.unit_rate(t)
+        return self._curve(unmasked("t", t), 1)
 
     @classmethod
     def examples(cls) -> dict[str, Shchf]:

@@ -1,4 +1,5 @@
-"""Travelling waves: of the joint angles of a chain, and of an inextensible body, the sandfish's gait (paper Sec. III B)."""
+"""Travelling waves of the joint angles of a chain, and of an inextensible body, which
+is the sandfish's gait (paper Sec. III B)."""
 
 from __future__ import annotations
 
@@ -17,12 +18,13 @@ from rft.core.refusal import Refusal
 @GAITS.register
 @dataclass(frozen=True)
 class Wave(Series):
-    """A travelling wave of joint angles: alpha_k = offset + amplitude cos(t + 2 pi waves k / (joints + 1)), k = 1, 2 ... from
-    the tail. It runs from head to tail, which drives the body head first where drag across exceeds that along; with
-    waves < 0, or reverse, from tail to head; with waves = 0 all joints move alike.
+    """A travelling wave of joint angles, k = 1, 2 ... from the tail:
+    alpha_k = offset + amplitude cos(t + 2 pi waves k / (joints + 1)).
 
-    In the two modes of a serpenoid chain of as many waves (`rft.bodies.modes`) it is the circle of that amplitude, run in
-    reverse.
+    It runs from head to tail, which drives the body head first where drag across
+    exceeds drag along; with waves < 0, or reverse, from tail to head; with waves = 0
+    all joints move alike. In the two modes of a serpenoid chain with the same number of
+    waves (`rft.bodies.modes`) it is the circle of that amplitude, run in reverse.
 
     Examples
     --------
@@ -59,15 +61,16 @@ class Wave(Series):
         return "amplitude of the joint angles (rad)"
 
     def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
-        phase = (
-            2 * np.pi * self.waves * np.arange(1, self.joints + 1) / (self.joints + 1)
-        )
+        k = np.arange(1, self.joints + 1)
+        phase = 2 * np.pi * self.waves * k / (self.joints + 1)
         return np.cos(phase)[:, None], -np.sin(phase)[:, None]
 
     def wavelength(self, amplitudes: ArrayLike | None = None) -> np.ndarray:
-        """Return lambda over the body's length (...,), of an endless chain of equal links without offset: the arc
-        length of a wave, 1 / waves, times the mean cosine of headings, which oscillate as a sine: J_0 of their
-        amplitude."""
+        """Return lambda over the body's length (...,), for an endless chain of equal
+        links without offset.
+
+        It is the arc length of a wave, 1 / waves, times the mean cosine of headings,
+        which oscillate as a sine: J_0 of their amplitude."""
         from scipy.special import j0
 
         links = self.joints + 1
@@ -75,16 +78,13 @@ class Wave(Series):
         return np.abs(j0(swing)) / abs(self.waves)
 
     def relative_curvature(self, amplitudes: ArrayLike | None = None) -> np.ndarray:
-        """Return mean of |joint angle| over a wave and a link's length, times the wave's arc length (...,); without
-        offset."""
+        """Return the mean of |joint angle| over a wave and a link's length, times the
+        wave's arc length (...,); without offset."""
         return 2 / np.pi * self._sizes(amplitudes) * (self.joints + 1) / abs(self.waves)
 
     def _sizes(self, amplitudes) -> np.ndarray:
-        return np.abs(
-            real_array(
-                "amplitudes", self.amplitude if amplitudes is None else amplitudes
-            )
-        )
+        """Return |amplitudes| (...,), of the gait itself for None."""
+        return np.abs(self._amplitudes(amplitudes))
 
     @classmethod
     def examples(cls) -> dict[str, Wave]:
@@ -92,41 +92,47 @@ class Wave(Series):
 
 
 def arc_to_phase(u: np.ndarray, slope: np.ndarray) -> np.ndarray:
-    """Return p at which the sine y = sin, of largest slope ``slope``, has covered the share u / 2 pi of its length per
-    wave.
+    """Return the phase p at which a sine of largest slope ``slope`` has covered the
+    share u / 2 pi of its length per wave.
 
-    The length up to p is proportional to E(p | m), m = slope^2 / (1 + slope^2), which is monotone with a slope D between
-    sqrt(1 - m) and 1; Halley's steps from u, each of which leaves about the cube of its size.
-    """
+    The length up to p is proportional to E(p | m), m = slope^2 / (1 + slope^2), which
+    is monotone with a slope D between sqrt(1 - m) and 1. Halley's steps start from u;
+    the error after a step is about the cube of its size."""
     from scipy.special import ellipe, ellipeinc
 
     m = slope**2 / (1 + slope**2)
     length = u / (2 * np.pi) * (4 * ellipe(m))
-    p = np.array(
-        np.broadcast_to(u, np.broadcast_shapes(u.shape, np.shape(slope))), float
-    )
+    shape = np.broadcast_shapes(u.shape, np.shape(slope))
+    p = np.array(np.broadcast_to(u, shape), float)
     for _ in range(50):
         sin = np.sin(p)
         D2 = 1 - m * sin * sin
         newton = (ellipeinc(p, m) - length) / np.sqrt(D2)
-        step = np.clip(
-            newton / (1 + 0.5 * newton * m * sin * np.cos(p) / D2), -0.5, 0.5
-        )
+        halley = newton / (1 + 0.5 * newton * m * sin * np.cos(p) / D2)
+        step = np.clip(halley, -0.5, 0.5)
         p -= step
         if np.abs(step).max() < 1e-6:
             break
     return p
 
 
+def _arc_length(slope: np.ndarray) -> np.ndarray:
+    """Return the arc length of a sine with the largest slope ``slope`` over its
+    wavelength."""
+    from scipy.special import ellipe
+
+    m = slope**2 / (1 + slope**2)
+    return np.sqrt(1 + slope**2) * 4 * ellipe(m) / (2 * np.pi)
+
+
 @GAITS.register
 @dataclass(frozen=True)
 class Sine(Gait):
-    """A body of ``elements`` that lies along an endless sine and moves on along it: with t the wave travels from head to
-    tail. Its arc length is fixed, whatever the amplitude.
+    """A body of ``elements`` that lies along an endless sine and moves along it.
 
-    centre (rad): takes none.
-
-    The bends are those between neighbouring elements, so the gait is of order 2 in 1/elements.
+    With t the wave travels from head to tail. Its arc length is fixed, whatever the
+    amplitude. The bends are angles between neighbouring elements, so the gait is of
+    order 2 in 1/elements. centre (rad): takes none.
 
     Examples
     --------
@@ -182,9 +188,8 @@ class Sine(Gait):
         return r"amplitude over wavelength $A/\lambda$"
 
     def _slopes(self, amplitudes) -> np.ndarray:
-        a = real_array(
-            "amplitudes", self.amplitude if amplitudes is None else amplitudes
-        )
+        """Return the largest slopes (...,) of sines with these amplitudes."""
+        a = self._amplitudes(amplitudes)
         if not (np.abs(a) <= 10).all():
             raise Refusal(
                 f"amplitudes (A / lambda) must lie from -10 to 10, got {a.ravel()[:4]}"
@@ -192,22 +197,20 @@ class Sine(Gait):
         return 2 * np.pi * a
 
     def _headings(self, t, amplitudes):
-        """Return headings of the elements and their rates of change with the wave's phase, (B..., T..., elements)."""
-        from scipy.special import ellipe
-
-        t = real_array("t", t) * (-1.0 if self.reverse else 1.0)
-        slope = self._slopes(amplitudes)[(..., *([None] * (t.ndim + 1)))]
+        """Return headings of the elements and their rates of change with the wave's
+        phase, (B..., T..., elements)."""
+        t = self._direction * real_array("t", t)
+        slope = self._slopes(amplitudes)
+        slope = slope.reshape(*slope.shape, *[1] * (t.ndim + 1))
         s = (np.arange(self.elements) + 0.5) / self.elements
         p = arc_to_phase(2 * np.pi * self.waves * s + t[..., None], slope)
         rise = slope * np.cos(p)
-        m = slope**2 / (1 + slope**2)
-        speed = (
-            np.sqrt(1 + slope**2) * 4 * ellipe(m) / (2 * np.pi) / np.sqrt(1 + rise**2)
-        )  # dp/du
-        return np.arctan(rise), -slope * np.sin(p) / (1 + rise**2) * speed
+        p_by_u = _arc_length(slope) / np.sqrt(1 + rise**2)
+        return np.arctan(rise), -slope * np.sin(p) / (1 + rise**2) * p_by_u
 
     def headings(self, t: ArrayLike, amplitudes: ArrayLike | None = None) -> np.ndarray:
-        """Return headings of the elements against the wave's axis, (B..., T..., elements), rad."""
+        """Return headings of the elements against the wave's axis, (B..., T...,
+        elements), rad."""
         return self._headings(t, amplitudes)[0]
 
     def shape(self, t: ArrayLike, amplitudes: ArrayLike | None = None) -> np.ndarray:
@@ -217,15 +220,15 @@ class Sine(Gait):
         return self._shape_and_rate(t, amplitudes)[1]
 
     def _shape_and_rate(self, t, amplitudes) -> tuple[np.ndarray, np.ndarray]:
-        headings, rates = self._headings(
-            t, amplitudes
-        )  # which takes as long as to solve for the body's motion
-        return np.diff(headings, axis=-1), np.diff(rates, axis=-1) * (
-            -1.0 if self.reverse else 1.0
-        )
+        # Headings are computed once for both: they take as long as the balance of
+        # forces.
+        headings, rates = self._headings(t, amplitudes)
+        bends = np.diff(headings, axis=-1)
+        return bends, np.diff(rates, axis=-1) * self._direction
 
     def largest(self, amplitudes: ArrayLike | None = None) -> float:
-        """Return an upper bound of the joint angles, rad: headings stay between -pi/2 and pi/2."""
+        """Return an upper bound of the joint angles, rad: headings stay between -pi/2
+        and pi/2."""
         return np.pi
 
     def unit(self, t: ArrayLike) -> np.ndarray:
@@ -235,17 +238,13 @@ class Sine(Gait):
         return self.rate(t)
 
     def wavelength(self, amplitudes: ArrayLike | None = None) -> np.ndarray:
-        """Return lambda over the body's length (...,): the arc length of a wave, 1 / waves, laid out straight."""
-        from scipy.special import ellipe
-
-        slope = self._slopes(amplitudes)
-        arc = (
-            np.sqrt(1 + slope**2) * 4 * ellipe(slope**2 / (1 + slope**2)) / (2 * np.pi)
-        )  # of a wave of unit length
-        return 1 / (self.waves * arc)
+        """Return lambda over the body's length (...,): 1 / waves is the arc length of a
+        wave."""
+        return 1 / (self.waves * _arc_length(self._slopes(amplitudes)))
 
     def relative_curvature(self, amplitudes: ArrayLike | None = None) -> np.ndarray:
-        """Return mean of |curvature| over a wave, times the wave's arc length (...,): 4 atan(2 pi A / lambda)."""
+        """Return the mean of |curvature| over a wave, times the wave's arc length
+        (...,): 4 atan(2 pi A / lambda)."""
         return 4 * np.arctan(np.abs(self._slopes(amplitudes)))
 
     @classmethod

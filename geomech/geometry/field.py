@@ -1,4 +1,5 @@
-"""Functions on shape space, known on a grid and interpolated by tensor-product splines."""
+"""Functions on shape space, known on a grid and interpolated by tensor-product
+splines."""
 
 from __future__ import annotations
 
@@ -15,18 +16,22 @@ from geomech.core.face import implementation
 from rft.core.checks import in_range, real_array
 from rft.core.refusal import Refusal
 
-UNKNOWN_UNIT = "length"  # stands for the unit of lengths where nothing says it
+UNKNOWN_UNIT = "length"  # stands for the unit of lengths where it is not known
 
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """Values (..., N_1, ..., N_d) on the grid spanned by d axes of shape angles (rad), all ascending. nan in all
-    components masks a grid point: derivatives come from the points between masks, and nothing is looked up.
+    """Values (..., N_1, ..., N_d) on the grid spanned by d axes of shape angles (rad),
+    all ascending.
 
-    degree: of the spline through them; interpolation is of order degree + 1 in the spacing where the function is
-    smooth, of order 1 to 2 across the kinks that sticking links leave in a dry medium's connection. unit: of the lengths among
-    the values, "BL" (body lengths) or "m". length: of the body in that unit; None where nothing says it.
-    """
+    nan in all components masks a grid point: derivatives come from the points between
+    masks, and such a field is not interpolated.
+
+    degree: of the spline through the values; interpolation is of order degree + 1 in
+    the spacing where the function is smooth, of order 1 to 2 across the kinks that
+    sticking links leave in a dry medium's connection. unit: of the lengths among the
+    values, "BL" (body lengths) or "m". length: of the body in that unit; None where it
+    is not known."""
 
     axes: tuple[np.ndarray, ...]
     values: np.ndarray
@@ -46,24 +51,33 @@ class Field:
             )
         if min(shape) <= self.degree:
             raise Refusal(
-                f"a spline of degree {self.degree} needs more than that many grid points, got {shape}"
+                f"a spline of degree {self.degree} needs more than that many grid"
+                f" points, got {shape}"
             )
 
     def __repr__(self) -> str:
         lead = self.values.shape[: -self.joints]
-        flat = self.values.reshape(-1, *self.values.shape[len(lead) :])
-        size = summary.spans(self.values) if lead == (3,) else summary.span(self.values)
         components = "x".join(map(str, lead)) or "one"
-        described = f"values {size}{summary.lengths(**self.size)}"
-        return f"Field({components} components on {summary.grid(self.axes)}{summary.masked(flat)}; {described})"
+        grid = summary.grid(self.axes)
+        masked = summary.masked(
+            self.values.reshape(-1, *self.values.shape[len(lead) :])
+        )
+        span = summary.spans if lead == (3,) else summary.span
+        lengths = summary.lengths(**self.size)
+        return (
+            f"Field({components} components on {grid}{masked};"
+            f" values {span(self.values)}{lengths})"
+        )
 
     def _repr_html_(self) -> str:
         return implementation("Field._repr_html_")(self)
 
     def to_xarray(self, name: str = "ccf", *, shapes: Sequence[str] = ()) -> Any:
-        """Return a DataArray; with three components it is taken for a CCF, with its units.
+        """Return a DataArray; with three components it is taken for a CCF, with its
+        units.
 
-        shapes: names of the shape variables, where these are no joint angles. ImportError without the package xarray."""
+        shapes: names of the shape variables, where these are no joint angles.
+        ImportError without the package xarray."""
         return implementation("Field.to_xarray")(self, name, shapes)
 
     @property
@@ -73,10 +87,12 @@ class Field:
 
     @property
     def joints(self) -> int:
+        """Number d of axes."""
         return len(self.axes)
 
     def _along(self, axis: int):
-        """Return the one-dimensional spline along a grid axis; that axis comes first."""
+        """Return the one-dimensional spline along a grid axis; that axis comes
+        first."""
         from scipy.interpolate import make_interp_spline
 
         rows = np.moveaxis(self.values, axis - self.joints, 0)
@@ -87,9 +103,8 @@ class Field:
         in_range("axis", axis, 0, self.joints - 1, whole=True)
         if self.masked:
             return self._between_masks(axis)
-        return np.moveaxis(
-            self._along(axis).derivative()(self.axes[axis]), 0, axis - self.joints
-        )
+        slopes = self._along(axis).derivative()(self.axes[axis])
+        return np.moveaxis(slopes, 0, axis - self.joints)
 
     @property
     def masked(self) -> bool:
@@ -97,41 +112,43 @@ class Field:
         return bool(np.isnan(self.values).any())
 
     def _between_masks(self, axis: int) -> np.ndarray:
-        """Return `derivative` by a spline through each run of points without a mask; nan for a run of one."""
+        """Return `derivative` by a spline through each run of points without a mask;
+        nan for a run of one."""
         from scipy.interpolate import make_interp_spline
 
-        x, out = self.axes[axis], np.full(self.values.shape, np.nan)
-        rows, slopes = (
-            np.moveaxis(a, axis - self.joints, -1) for a in (self.values, out)
-        )
+        x = self.axes[axis]
+        derivative = np.full(self.values.shape, np.nan)
+        rows = np.moveaxis(self.values, axis - self.joints, -1)
+        slopes = np.moveaxis(derivative, axis - self.joints, -1)  # a view
         lead = rows.ndim - self.joints
         for place in np.ndindex(rows.shape[lead:-1]):
-            row, slope = (
-                rows[(slice(None),) * lead + place],
-                slopes[(slice(None),) * lead + place],
-            )
+            index = (slice(None),) * lead + place
+            row = rows[index]
+            slope = slopes[index]
             good = np.flatnonzero(np.isfinite(row).all(tuple(range(lead))))
             for run in np.split(good, np.flatnonzero(np.diff(good) > 1) + 1):
                 if len(run) > 1:
                     degree = min(self.degree, len(run) - 1)
-                    slope[..., run] = make_interp_spline(
-                        x[run], row[..., run], degree, axis=-1
-                    ).derivative()(x[run])
-        return out
+                    spline = make_interp_spline(x[run], row[..., run], degree, axis=-1)
+                    slope[..., run] = spline.derivative()(x[run])
+        return derivative
 
     @cached_property
     def spline(self) -> Any:
+        """Tensor-product spline through the values: alpha (..., d) -> (...,
+        components)."""
         self._refuse_masks()
         return _tensor_spline(self)
 
     def antiderivative(self, axis: int) -> Any:
-        """Return the spline whose derivative along ``axis`` is this field's: alpha (..., d) -> (..., components)."""
+        """Return the spline whose derivative along ``axis`` is this field's:
+        alpha (..., d) -> (..., components)."""
         self._refuse_masks()
         return _tensor_spline(self, integrate=axis)
 
     def __call__(self, alpha) -> np.ndarray:
-        """Return values at shapes alpha (..., d), with the components last: (..., *components). ValueError outside the
-        grid."""
+        """Return values at shapes alpha (..., d), with the components last: (...,
+        *components). ValueError outside the grid."""
         return self.spline(self.inside(alpha))
 
     def _refuse_masks(self) -> None:
@@ -142,7 +159,8 @@ class Field:
             )
 
     def inside(self, alpha: ArrayLike) -> np.ndarray:
-        """Return alpha as an array; Refusal names the first angle that leaves the grid."""
+        """Return alpha as an array; Refusal names the first angle that leaves the
+        grid."""
         return inside(self.axes, alpha)
 
 
@@ -160,57 +178,58 @@ def as_axes(axes: Sequence[ArrayLike]) -> tuple[np.ndarray, ...]:
 
 
 def inside(axes, alpha, names: Sequence[str] = ()) -> np.ndarray:
-    """Return alpha (..., d) as an array; Refusal names the first angle that leaves the grid of these axes, by one of
-    ``names`` where given."""
+    """Return alpha (..., d) as an array; Refusal names the first angle that leaves the
+    grid of these axes, by one of ``names`` where given."""
     alpha = real_array("alpha", alpha)
     if alpha.ndim == 0 or alpha.shape[-1] != len(axes) or not np.isfinite(alpha).all():
         raise Refusal(
             f"alpha must be finite and of shape (..., {len(axes)})", value=alpha.shape
         )
     for k, axis in enumerate(axes):
-        low, high = (
-            alpha[..., k].min(initial=np.inf),
-            alpha[..., k].max(initial=-np.inf),
-        )
-        slack = 1e-9 * (axis[-1] - axis[0])
-        if low < axis[0] - slack or high > axis[-1] + slack:
-            worst = low if axis[0] - low > high - axis[-1] else high
-            name = names[k] if names else f"alpha_{k + 1}"
+        first = axis[0]
+        last = axis[-1]
+        low = alpha[..., k].min(initial=np.inf)
+        high = alpha[..., k].max(initial=-np.inf)
+        slack = 1e-9 * (last - first)
+        if low < first - slack or high > last + slack:
+            worst = low if first - low > high - last else high
+            name = f"alpha_{k + 1}"
+            if names:
+                name = names[k]
             raise Refusal(
-                f"{name} = {worst:.4g} rad lies outside the field's {axis[0]:g} to {axis[-1]:g}",
+                f"{name} = {worst:.4g} rad lies outside the field's"
+                f" {first:g} to {last:g}",
                 instead="widen the extent or lower the amplitude",
             )
     return alpha
 
 
 def every_second(axis: np.ndarray, first: int) -> np.ndarray:
-    """Return indices of every second point of an axis from ``first``, and of both ends: half a grid, to estimate errors
-    by."""
+    """Return the indices of every second point of an axis from ``first``, and of both
+    ends: half a grid, for estimates of errors."""
     return np.unique([0, *range(first, len(axis), 2), len(axis) - 1])
 
 
 def half_grid(
     axes: Sequence[np.ndarray], arrays: Sequence[np.ndarray], degree: int, first: int
 ) -> tuple[tuple[np.ndarray, ...], list[np.ndarray], int]:
-    """Return (axes, arrays (..., N_1, ..., N_d), degree) on `every_second` point of each axis; of a lower degree where
-    that leaves too few points for the spline."""
+    """Return (axes, arrays (..., N_1, ..., N_d), degree) on `every_second` point of
+    each axis; of a lower degree where that leaves too few points for the spline."""
     picks = [every_second(axis, first) for axis in axes]
-    coarse = tuple(axis[pick] for axis, pick in zip(axes, picks))
-    return (
-        coarse,
-        [x[(..., *np.ix_(*picks))] for x in arrays],
-        min(degree, min(map(len, picks)) - 1),
-    )
+    coarse_axes = tuple(axis[pick] for axis, pick in zip(axes, picks))
+    coarse_arrays = [x[(..., *np.ix_(*picks))] for x in arrays]
+    return coarse_axes, coarse_arrays, min(degree, min(map(len, picks)) - 1)
 
 
 def _tensor_spline(field: Field, integrate: int | None = None):
-    """Return the tensor-product spline through a field; along the axis ``integrate``, its antiderivative from the lower
-    end."""
+    """Return the tensor-product spline through a field; along the axis ``integrate``,
+    its antiderivative from the lower end."""
     from scipy.interpolate import BSpline, NdBSpline, make_interp_spline
 
     d = field.joints
     c = np.moveaxis(field.values, range(-d, 0), range(d))
-    knots, degrees = [], []
+    knots = []
+    degrees = []
     for i, axis in enumerate(field.axes):
         b = make_interp_spline(axis, np.moveaxis(c, i, 0), field.degree)
         if i == integrate:

@@ -1,4 +1,5 @@
-"""What a gait is: a closed curve in shape space, run once as the phase t goes from 0 to 2 pi."""
+"""Gaits: a gait is a closed curve in shape space, run once as the phase t goes from 0
+to 2 pi."""
 
 from __future__ import annotations
 
@@ -13,27 +14,33 @@ from rft.core.checks import Number, check_numbers, is_whole, real_array
 from rft.core.refusal import Refusal
 from rft.core.registry import Registry, subclasses
 
-LARGEST = 1e6  # rad or scale: beyond it an angle has few digits left
+LARGEST = 1e6  # rad or scale: a larger angle has few significant digits
 FASTEST = 1e4  # Hz, as of the effects that have a frequency
 Scale = Annotated[
     float,
     Number(
-        -LARGEST, LARGEST, "-",
-        "scales the curve about its centre; 0 is rest there, which moves nothing, and a negative one is the curve "
-        "reflected through the centre, alpha - centre -> centre - alpha at every phase",
+        -LARGEST,
+        LARGEST,
+        "-",
+        "scales the curve about its centre; 0 is rest there, which moves nothing, and "
+        "a negative one is the curve reflected through the centre, "
+        "alpha - centre -> centre - alpha at every phase",
     ),
-]  # fmt: skip
+]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gait:
-    """alpha(t) = centre + amplitude * unit(t). Subclasses give `joints`, `unit` and `unit_rate`.
+    """A closed curve alpha(t) = centre + amplitude * unit(t).
 
-    centre (rad): shape angles, the origin if left empty. reverse (-): run the curve backwards, t -> -t, from the same
+    Subclasses define `joints`, `unit` and `unit_rate`. centre (rad): shape angles, the
+    origin if left empty. reverse (-): run the curve backwards, t -> -t, from the same
     start.
 
-    An amplitude of 0 is rest at the centre, and a negative one is the curve reflected through the centre. All gaits and
-    tiers keep to that. estimate_is: what an estimated error leaves out for such a gait, in words; empty for nothing.
+    An amplitude of 0 is rest at the centre, and a negative one is the curve reflected
+    through the centre, for all gaits and tiers. harmonics: the highest of the curve.
+    estimate_is: what an estimated error leaves out for such a gait, in words; empty for
+    nothing.
     """
 
     amplitude: Scale = 1.0
@@ -42,11 +49,13 @@ class Gait:
     frequency: Annotated[
         float | None,
         Number(
-            0, FASTEST, "Hz",
-            "cycles per second, unknown if left out; it makes displacements speeds, and changes them only through effects "
-            "that have a frequency",
+            0,
+            FASTEST,
+            "Hz",
+            "cycles per second, unknown if left out; it makes displacements speeds, "
+            "and changes them only through effects that have a frequency",
         ),
-    ] = None  # fmt: skip
+    ] = None
     harmonics = 1
     estimate_is = ""
 
@@ -66,11 +75,13 @@ class Gait:
 
     @property
     def joints(self) -> int:
+        """Number of shape variables."""
         return 2
 
     @property
     def middle(self) -> np.ndarray:
-        """(joints,): the shape about which the gait moves, which it keeps at amplitude 0."""
+        """Shape (joints,) about which the gait moves, and at which it rests at
+        amplitude 0."""
         return np.array(self.centre or (0.0,) * self.joints)
 
     @property
@@ -79,48 +90,62 @@ class Gait:
         return f"amplitude of the {type(self).__name__.lower()} (scale)"
 
     def unit(self, t: np.ndarray) -> np.ndarray:
+        """Return the curve (T..., joints) of amplitude 1 about 0 at phases t (T...),
+        rad."""
         raise TypeError(f"{type(self).__name__} gives no curve: define unit(t)")
 
     def unit_rate(self, t: np.ndarray) -> np.ndarray:
+        """Return d unit / dt, shaped like `unit`."""
         raise TypeError(f"{type(self).__name__} gives no curve: define unit_rate(t)")
 
     def shape(self, t: ArrayLike, amplitudes: ArrayLike | None = None) -> np.ndarray:
-        """Return alpha at phases t (T...), for amplitudes (B...) or the gait's own: (B..., T..., joints), rad."""
-        return self.middle + self._times(
-            amplitudes, self.unit((-1.0 if self.reverse else 1.0) * real_array("t", t))
-        )
+        """Return alpha (B..., T..., joints), rad, at phases t (T...), for amplitudes
+        (B...) or the gait's own."""
+        t = self._direction * real_array("t", t)
+        return self.middle + self._scaled(amplitudes, self.unit(t))
+
+    @property
+    def _direction(self) -> float:
+        """Sign of t in the curve: -1 for a gait that runs backwards."""
+        return -1.0 if self.reverse else 1.0
+
+    def _amplitudes(self, amplitudes: ArrayLike | None) -> np.ndarray:
+        """Return amplitudes as an array; the gait's own for None."""
+        if amplitudes is None:
+            amplitudes = self.amplitude
+        return real_array("amplitudes", amplitudes)
 
     def largest(self, amplitudes: ArrayLike | None = None) -> float:
-        """Return the largest of its shape variables in size, at 32 phases, for amplitudes (B...) or the gait's own."""
-        a = real_array(
-            "amplitudes", self.amplitude if amplitudes is None else amplitudes
-        ).ravel()
-        ends = (
-            a[[a.argmin(), a.argmax()]] if a.size else a
-        )  # between them no shape is further from the middle
-        return float(
-            np.abs(self.shape(np.linspace(0.0, 2 * np.pi, 32), ends)).max(initial=0.0)
-        )
+        """Return the largest |alpha_k| of all shape variables, at 32 phases, for
+        amplitudes (B...) or the gait's own."""
+        a = self._amplitudes(amplitudes).ravel()
+        if a.size:
+            # Between these two no shape is further from the middle.
+            a = a[[a.argmin(), a.argmax()]]
+        shapes = self.shape(np.linspace(0.0, 2 * np.pi, 32), a)
+        return float(np.abs(shapes).max(initial=0.0))
 
     def rate(self, t: ArrayLike, amplitudes: ArrayLike | None = None) -> np.ndarray:
         """Return d alpha / dt, shaped like `shape`."""
-        sign = -1.0 if self.reverse else 1.0
-        return self._times(amplitudes, sign * self.unit_rate(sign * real_array("t", t)))
+        sign = self._direction
+        unit_rate = self.unit_rate(sign * real_array("t", t))
+        return self._scaled(amplitudes, sign * unit_rate)
 
-    def _times(self, amplitudes, curve):
-        a = real_array(
-            "amplitudes", self.amplitude if amplitudes is None else amplitudes
-        )
+    def _scaled(self, amplitudes: ArrayLike | None, curve: np.ndarray) -> np.ndarray:
+        """Return a curve (T..., joints) times each of the amplitudes (B...)."""
+        a = self._amplitudes(amplitudes)
         if not (np.abs(a) <= LARGEST).all():
             raise Refusal(
-                f"amplitudes must be finite and at most {LARGEST:g}, got {a.ravel()[:4]}"
+                f"amplitudes must be finite and at most {LARGEST:g},"
+                f" got {a.ravel()[:4]}"
             )
         return a[(..., *([None] * curve.ndim))] * curve
 
     def cycle(
         self, phases: int, amplitudes: ArrayLike | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return (alpha, alphadot) at ``phases`` equally spaced phases from 0, each (B..., phases, joints)."""
+        """Return alpha and alphadot at ``phases`` equally spaced phases from 0, (B...,
+        phases, joints) each."""
         least = max(4, 2 * self.harmonics + 1)
         if not (is_whole(phases) and phases >= least):
             raise Refusal(
@@ -138,7 +163,8 @@ GAITS = Registry("geomech.gaits", "kind", "a gait", subclasses(Gait))
 
 
 def finite_array(name: str, values: Sequence, ndim: int) -> np.ndarray:
-    """Return values as a float array of ``ndim`` dimensions; Refusal by ``name`` if they are none."""
+    """Return values as a float array of ``ndim`` dimensions, finite and not empty;
+    Refusal by ``name`` for others."""
     array = real_array(name, values)
     if array.ndim != ndim or not array.size or not (np.abs(array) <= LARGEST).all():
         raise Refusal(
@@ -148,9 +174,8 @@ def finite_array(name: str, values: Sequence, ndim: int) -> np.ndarray:
 
 
 def checked_gait(gait) -> Gait:
-    """Return the gait; Refusal if it is none."""
-    if isinstance(gait, type) or not (
-        hasattr(gait, "joints") and hasattr(gait, "cycle")
-    ):
+    """Return the gait; Refusal for an object that is no gait."""
+    has_curve = hasattr(gait, "joints") and hasattr(gait, "cycle")
+    if isinstance(gait, type) or not has_curve:
         raise Refusal("gait must be a gait such as Circle(amplitude=0.5)", value=gait)
     return gait

@@ -1,17 +1,20 @@
-"""Beyond the connection: the odd harmonics of xi in the direction of alphadot, of which A is the first.
+"""Odd harmonics of xi in the direction of alphadot, of which the connection is the
+first.
 
-In a rate-independent medium xi(alpha, alphadot) = |alphadot| f(alpha, beta), beta the direction of alphadot in the
-plane of two joint rates, f odd under beta -> beta + pi. Its Fourier series has odd harmonics only,
+In a rate-independent medium xi(alpha, alphadot) = |alphadot| f(alpha, beta), beta the
+direction of alphadot in the plane of two joint rates, f odd under beta -> beta + pi.
+Its Fourier series has odd harmonics only,
 
     f = sum over k = 1, 3, 5 ... of a_k cos(k beta) + b_k sin(k beta),
 
-and (a_1, b_1) is the uniform least-squares connection. Kept on a grid up to some k they give the velocity at the cost
-of a look-up. Links that stick put kinks in f, so the coefficients fall off like 1/k^2 there.
+and (a_1, b_1) is the uniform least-squares connection. Stored on a grid up to some k
+they give the velocity at the cost of an interpolation. Links that stick leave kinks in
+f, so the coefficients fall off like 1/k^2 there.
 
-With three and more joints directions are those of a sphere. The odd spherical harmonics up to degree k on it are the
-homogeneous polynomials of degree k, of which there are (k + d - 1 choose d - 1): products of powers, each times the root of its
-multinomial coefficient, are the basis here, fitted by least squares.
-"""
+With three and more joints directions are points of a sphere. The odd spherical
+harmonics up to degree k on it are the homogeneous polynomials of degree k, of which
+there are (k + d - 1 choose d - 1). The basis here is their products of powers, each
+times the root of its multinomial coefficient, fitted by least squares."""
 
 from __future__ import annotations
 
@@ -31,14 +34,17 @@ from geomech.geometry.traits import NOTHING, Traits
 from rft.core.checks import in_range, is_whole, real_array
 from rft.core.refusal import Refusal
 
-VALUES_TOGETHER = 1 << 21  # coefficients of one component looked up in one call
+VALUES_TOGETHER = 1 << 21  # coefficients of one component interpolated in one call
 
 
 @dataclass(frozen=True, eq=False)
 class Harmonics:
-    """Coefficients on a grid. coefficients: (3, 2 K, N_1, N_2), a_1, b_1, a_3, b_3 ... of each component of xi, in the
-    velocity's units and frame; of more joints (3, terms, N_1, ..., N_d), of `powers`. residual: (3, N_1, ..., N_d), rms over
-    directions of what the series leaves."""
+    """Coefficients on a grid.
+
+    coefficients: (3, 2 K, N_1, N_2), a_1, b_1, a_3, b_3 ... of each component of xi, in
+    the velocity's units and frame; for more joints (3, terms, N_1, ..., N_d), of
+    `powers`. residual: (3, N_1, ..., N_d), rms over directions of the misfit of the
+    series."""
 
     axes: tuple[np.ndarray, ...]
     coefficients: np.ndarray
@@ -47,67 +53,69 @@ class Harmonics:
 
     def __repr__(self) -> str:
         speed = np.sqrt((self.coefficients**2).sum(1) / 2)
-        return f"Harmonics({summary.grid(self.axes)}; odd, up to {self.highest}; {summary.fit_residual(self.residual, speed)})"
+        grid = summary.grid(self.axes)
+        residual = summary.fit_residual(self.residual, speed)
+        return f"Harmonics({grid}; odd, up to {self.highest}; {residual})"
 
     @cached_property
     def field(self) -> Field:
+        """The coefficients as a field."""
         return Field(self.axes, self.coefficients, self.degree)
 
     @property
     def highest(self) -> int:
-        count, d = self.coefficients.shape[1], len(self.axes)
-        return (
-            count - 1
-            if d == 2
-            else next(k for k in range(1, count + 1) if terms(d, k) == count)
-        )
+        """Highest harmonic."""
+        count = self.coefficients.shape[1]
+        joints = len(self.axes)
+        if joints == 2:
+            return count - 1
+        return next(k for k in range(1, count + 1) if terms(joints, k) == count)
 
     def half(self, first: int) -> Harmonics:
         """Return the harmonics on half of the grid, as `Connection.half` does."""
-        axes, arrays, degree = half_grid(
-            self.axes, (self.coefficients, self.residual), self.degree, first
-        )
+        arrays = (self.coefficients, self.residual)
+        axes, arrays, degree = half_grid(self.axes, arrays, self.degree, first)
         return Harmonics(axes, *arrays, degree)
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
-        """Return xi (..., 3) at alpha, alphadot (..., d); ValueError outside the grid."""
-        alpha, alphadot = np.broadcast_arrays(
-            self.field.inside(alpha), real_array("alphadot", alphadot)
-        )
-        points = [x.reshape(-1, len(self.axes)) for x in (alpha, alphadot)]
+        """Return xi (..., 3) at alpha, alphadot (..., d); ValueError outside the
+        grid."""
+        alpha = self.field.inside(alpha)
+        alphadot = real_array("alphadot", alphadot)
+        alpha, alphadot = np.broadcast_arrays(alpha, alphadot)
+        shapes = alpha.reshape(-1, len(self.axes))
+        rates = alphadot.reshape(-1, len(self.axes))
+        xi = np.empty((len(shapes), 3))
         step = max(1, VALUES_TOGETHER // self.coefficients.shape[1])
-        parts = [
-            self._velocity(*(x[k : k + step] for x in points))
-            for k in range(0, len(points[0]), step)
-        ]
-        return np.concatenate(parts or [np.zeros((0, 3))]).reshape(*alpha.shape[:-1], 3)
+        for k in range(0, len(shapes), step):
+            part = slice(k, k + step)
+            xi[part] = self._velocity(shapes[part], rates[part])
+        return xi.reshape(*alpha.shape[:-1], 3)
 
     def _velocity(self, alpha, alphadot) -> np.ndarray:
+        """Return xi (n, 3) at shapes and rates (n, d)."""
         speed = np.linalg.norm(alphadot, axis=-1)
         unit = alphadot / np.where(speed > 0, speed, 1.0)[..., None]
-        return (
-            np.einsum("...ij,...j->...i", self.field(alpha), basis(unit, self.highest))
-            * speed[..., None]
-        )
+        functions = basis(unit, self.highest)
+        xi = np.einsum("...ij,...j->...i", self.field(alpha), functions)
+        return xi * speed[..., None]
 
 
 def terms(joints: int, highest: int) -> int:
-    """Return the number of coefficients of the odd harmonics up to ``highest`` of so many joint rates."""
+    """Return the number of coefficients of the odd harmonics up to ``highest``."""
     return comb(highest + joints - 1, joints - 1)
 
 
 @lru_cache(maxsize=16)
 def powers(joints: int, degree: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return (powers (terms, d) of the products, roots (terms,) of their multinomial coefficients)."""
+    """Return the powers (terms, d) of the products, and the roots (terms,) of their
+    multinomial coefficients."""
     bars = np.array(list(combinations(range(degree + joints - 1), joints - 1)))
     ends = np.full((len(bars), 1), degree + joints - 1)
     exponents = np.diff(np.concatenate([-np.ones_like(ends), bars, ends], 1)) - 1
-    return exponents, np.array(
-        [
-            np.sqrt(factorial(degree) / prod(map(factorial, map(int, row))))
-            for row in exponents
-        ]
-    )
+    counts = [prod(map(factorial, row)) for row in exponents.tolist()]
+    roots = [np.sqrt(factorial(degree) / count) for count in counts]
+    return exponents, np.array(roots)
 
 
 def basis(unit: np.ndarray, highest: int) -> np.ndarray:
@@ -115,24 +123,19 @@ def basis(unit: np.ndarray, highest: int) -> np.ndarray:
     if unit.shape[-1] == 2:
         return _basis(np.arctan2(unit[..., 1], unit[..., 0]), highest)
     exponents, roots = powers(unit.shape[-1], highest)
-    powers_of_unit = np.cumprod(
-        np.concatenate([np.ones((1, *unit.shape)), np.repeat(unit[None], highest, 0)]),
-        0,
-    )
-    products = (
-        roots * powers_of_unit[exponents[:, 0], ..., 0].T
-        if unit.ndim == 1
-        else roots * np.moveaxis(powers_of_unit[exponents[:, 0], ..., 0], 0, -1)
-    )
-    for k in range(1, unit.shape[-1]):
-        products = products * np.moveaxis(
-            powers_of_unit[exponents[:, k], ..., k], 0, -1
-        )
+    ones = np.ones((1, *unit.shape))
+    repeated = np.repeat(unit[None], highest, 0)
+    powers_of_unit = np.cumprod(np.concatenate([ones, repeated]), 0)
+    products = roots
+    for k in range(unit.shape[-1]):
+        powers_of_k = powers_of_unit[exponents[:, k], ..., k]
+        products = products * np.moveaxis(powers_of_k, 0, -1)
     return products
 
 
 def _basis(beta: np.ndarray, highest: int) -> np.ndarray:
-    """Return cos beta, sin beta, cos 3 beta, sin 3 beta ... up to ``highest``: (..., highest + 1)."""
+    """Return cos beta, sin beta, cos 3 beta, sin 3 beta ... up to ``highest``:
+    (..., highest + 1)."""
     k = np.arange(1, highest + 1, 2)
     waves = np.exp(1j * k * np.asarray(beta)[..., None])
     return np.stack([waves.real, waves.imag], -1).reshape(*np.shape(beta), -1)
@@ -149,13 +152,14 @@ def fit(
     traits: Traits = NOTHING,
     map: Map = each,
 ) -> Harmonics:
-    """Fit odd harmonics up to ``highest`` from ``count`` uniform directions at each shape; other arguments, and their
-    order, as in `connection.fit`.
+    """Fit odd harmonics up to ``highest`` from ``count`` uniform directions at each
+    shape.
 
-    The series through ``count`` directions is exact up to the harmonic ``count`` - 1, and those above fold back onto
-    it (k onto 2 count - k); so keep ``highest`` well below. Of more than two joints a fit takes as many directions as it has
-    `terms`, and better twice that. ValueError if ``highest`` is even or asks for more directions.
-    """
+    Other arguments, and their order, are those of `connection.fit`. The series through
+    ``count`` directions is exact up to the harmonic ``count`` - 1, and those above fold
+    back onto it (k onto 2 count - k), so keep ``highest`` well below. For more than two
+    joints a fit takes as many directions as it has `terms`, and better twice as many.
+    ValueError if ``highest`` is even or takes more directions."""
     in_range("directions", count, 2, 1e6, whole=True)
     if not is_whole(highest) or highest % 2 == 0 or not 1 <= highest < count:
         raise Refusal(
@@ -169,22 +173,24 @@ def fit(
         raise Refusal("harmonics are those of two joint rates or more, got 1 joint")
     if d > 2 and count < terms(d, highest):
         raise Refusal(
-            f"harmonics of {d} joints up to {highest} take {terms(d, highest)} directions or more, got {count}"
+            f"harmonics of {d} joints up to {highest} take {terms(d, highest)}"
+            f" directions or more, got {count}"
         )
+
     unit = directions(d, count)
     sampled_basis = basis(unit, highest)
-    inverse = (
-        sampled_basis.T * (2.0 / count) if d == 2 else np.linalg.pinv(sampled_basis)
-    )
-    residual_scale = (
-        1.0 if d == 2 else count / max(1, count - sampled_basis.shape[1])
-    )  # what the fit leaves of directions that it has not seen
+    if d == 2:
+        inverse = sampled_basis.T * (2.0 / count)
+        residual_scale = 1.0
+    else:
+        inverse = np.linalg.pinv(sampled_basis)
+        # The misfit in directions that the fit has not seen is larger.
+        residual_scale = count / max(1, count - sampled_basis.shape[1])
 
     def reduce(xi):
         coefficients = np.einsum("jc,sci->ijs", inverse, xi)
-        return coefficients, residual_scale * np.sqrt(
-            ((xi - np.einsum("cj,ijs->sci", sampled_basis, coefficients)) ** 2).mean(1)
-        ).T
+        misfit = xi - np.einsum("cj,ijs->sci", sampled_basis, coefficients)
+        return coefficients, residual_scale * np.sqrt((misfit**2).mean(1)).T
 
     fields = sampled(velocity, axes, unit, reduce, degree, progress, traits, map)
     return Harmonics(axes, *fields, degree)

@@ -1,11 +1,13 @@
-"""Shapes of a grid, and phases of a gait, whose velocities follow from those of others: where left and right, or head and
-tail, of a body are alike.
+"""Shapes of a grid, and phases of a gait, whose velocities follow from others by
+symmetry.
 
-Seen in a mirror a body has the shape -alpha and moves with (xi_x, -xi_y, -xi_theta). With its head taken for its tail it has
-the shape -alpha backwards, alpha_k -> -alpha_(d + 1 - k), and moves with (-xi_x, -xi_y, xi_theta). Rates change as shapes do,
-and velocities turn round with rates. So a gait whose second half is its first seen in a mirror takes half of the balances, and
-one that, head for tail, is itself run backwards, as a circle or a travelling wave is, half of these.
-"""
+A body has such images where its left and right, or its head and tail, are alike. Seen
+in a mirror it has the shape -alpha and moves with (xi_x, -xi_y, -xi_theta). With its
+head taken for its tail it has the shape -alpha backwards, alpha_k -> -alpha_(d + 1 -
+k), and moves with (-xi_x, -xi_y, xi_theta). Rates change as shapes do, and velocities
+change sign with rates. So a gait whose second half is its first seen in a mirror takes
+half of the balances. A gait that with head and tail exchanged is itself run backwards,
+as a circle or a travelling wave is, takes half of these."""
 
 from __future__ import annotations
 
@@ -18,88 +20,102 @@ import numpy as np
 from geomech.geometry.gait import Gait
 from geomech.geometry.traits import Traits
 
-SAME = 1e-12  # difference of two directions that are one, and, over the largest of a gait, of two of its shapes or rates
-FEW = 1024  # phases, at least, from which `solved_count` tells the symmetries of a gait
+# Largest difference of two equal directions and, relative to the largest of a gait, of
+# two equal shapes or rates.
+SAME = 1e-12
+SAMPLED_PHASES = 1024  # at least, for the symmetries of a gait in `solved_count`
+MIRROR = (1.0, -1.0, -1.0)  # signs of the velocity seen in a mirror
 
 
 class Image(NamedTuple):
-    """An image of every shape of a grid. index: (S,), where on the grid, read in C order, the image of every shape is.
-    source: (C,), the direction of which a direction there is the image. factor: (C, 3), of the velocity, which is odd
-    in the rates."""
+    """An image of every shape of a grid.
+
+    index: (S,), where on the grid, read in C order, the image of every shape is.
+    source: (C,), the direction of which a direction there is the image. factor: (C, 3),
+    of the velocity, which is odd in the rates."""
 
     index: np.ndarray
     source: np.ndarray
     factor: np.ndarray
 
     def velocities(self, xi: np.ndarray) -> np.ndarray:
-        """Return the velocities (s, C, 3) at the images of shapes with velocities xi."""
+        """Return the velocities (s, C, 3) at the images of shapes with velocities
+        xi."""
         return self.factor * xi[:, self.source]
 
 
 def images(axes: Sequence[np.ndarray], unit: np.ndarray, traits: Traits) -> list[Image]:
-    """Return the symmetries that a grid and directions (C, d) have, for a body whose left and right
-    (``traits.halved``), head and tail (``traits.reversible``) are alike."""
-    mirror, reversible = traits.halved, traits.reversible
-    index = np.arange(np.prod([len(a) for a in axes])).reshape([len(a) for a in axes])
+    """Return the symmetries that a grid and directions (C, d) have, for a body whose
+    left and right (``traits.halved``), head and tail (``traits.reversible``) are
+    alike."""
+    counts = [len(a) for a in axes]
+    index = np.arange(np.prod(counts)).reshape(counts)
     backwards = axes[::-1]
-    moves = (
-        (mirror, [-a[::-1] for a in axes], np.flip(index), -unit, (1.0, -1.0, -1.0)),
-        (
-            reversible,
-            [-a[::-1] for a in backwards],
-            np.flip(index).T,
-            -unit[:, ::-1],
-            (-1.0, -1.0, 1.0),
-        ),
-        (mirror and reversible, backwards, index.T, unit[:, ::-1], (-1.0, 1.0, -1.0)),
-    )
+
+    # Axes, indices and directions of the image, and the signs of its velocity.
+    moves = []
+    if traits.halved:
+        mirrored_axes = [-a[::-1] for a in axes]
+        moves.append((mirrored_axes, np.flip(index), -unit, MIRROR))
+    if traits.reversible:
+        reversed_axes = [-a[::-1] for a in backwards]
+        reversed_unit = -unit[:, ::-1]
+        moves.append(
+            (reversed_axes, np.flip(index).T, reversed_unit, (-1.0, -1.0, 1.0))
+        )
+    if traits.halved and traits.reversible:
+        moves.append((backwards, index.T, unit[:, ::-1], (-1.0, 1.0, -1.0)))
+
     result = []
-    for holds, image_axes, index_of_image, image_unit, signs in moves:
-        if holds and all(map(np.array_equal, axes, image_axes)):
-            result += [
-                Image(index_of_image.ravel(), source, sign * np.array(signs))
-                for source, sign in _matched(unit, image_unit)
-            ]
+    for image_axes, image_index, image_unit, signs in moves:
+        if not all(map(np.array_equal, axes, image_axes)):
+            continue
+        matched = _matched(unit, image_unit)
+        if matched is not None:
+            source, sign = matched
+            result.append(Image(image_index.ravel(), source, sign * np.array(signs)))
     return result
 
 
 def mirrored(alpha: np.ndarray, count: int) -> list[Image]:
-    """Return the image of shapes (S, d) that mirrors them, which must be these shapes in reverse order, for ``count``
-    directions; [] if they are not."""
+    """Return the image that mirrors shapes (S, d), for ``count`` directions; [] where
+    the mirror images are not the same shapes in reverse order."""
     if not np.array_equal(alpha, -alpha[::-1]):
         return []
-    return [
-        Image(
-            np.arange(len(alpha))[::-1], np.arange(count), np.array([[-1.0, 1.0, 1.0]])
-        )
-    ]
+    index = np.arange(len(alpha))[::-1]
+    return [Image(index, np.arange(count), np.array([[-1.0, 1.0, 1.0]]))]
 
 
 def _matched(
     unit: np.ndarray, image_unit: np.ndarray
-) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return [(source, sign (C, 1))] with unit = sign turned[source], or [] if the turned directions are others."""
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return (source (C,), sign (C, 1)) with unit = sign * image_unit[source]; None if
+    the images are other directions."""
     products = unit @ image_unit.T
     source = np.abs(products).argmax(1)
     sign = np.sign(np.take_along_axis(products, source[:, None], 1))
-    good = np.abs(unit - sign * image_unit[source]).max() < SAME and np.unique(
-        source
-    ).size == len(source)
-    return [(source, sign)] if good else []
+    if np.abs(unit - sign * image_unit[source]).max() >= SAME:
+        return None
+    if np.unique(source).size < len(source):
+        return None
+    return source, sign
 
 
 def to_solve(symmetries: Sequence[Image], size: int) -> np.ndarray:
     """Return a mask (size,) of the shapes that are no later image of another."""
-    first, indices = np.ones(size, bool), np.arange(size)
+    first = np.ones(size, bool)
+    indices = np.arange(size)
     for image in symmetries:
         first &= indices <= image.index
     return first
 
 
 class CycleImages(NamedTuple):
-    """Which phases of a cycle of N phases are solved, and how the others follow. count: of phases solved. solved:
-    which, none a later image of another. source: (N,), for each phase the index among these of the one that it is an
-    image of. factor: (N, 3), of its velocity."""
+    """The phases of a cycle of N phases that are solved, and how the others follow.
+
+    count: number of phases solved. solved: their indices, none a later image of
+    another. source: (N,), for each phase the index among the solved ones of the one
+    that it is an image of. factor: (N, 3), of its velocity."""
 
     count: int
     solved: np.ndarray | slice
@@ -108,103 +124,143 @@ class CycleImages(NamedTuple):
 
     def select(self, x: np.ndarray | None) -> np.ndarray | None:
         """Return x (..., n, k) at the phases that are solved, from (..., N, k)."""
-        return None if x is None else x[..., self.solved, :]
+        if x is None:
+            return None
+        return x[..., self.solved, :]
 
     def expand(self, xi: np.ndarray) -> np.ndarray:
-        """Return velocities (..., N, 3) at all phases from those (..., n, 3) at the phases that are solved."""
+        """Return velocities (..., N, 3) at all phases from those (..., n, 3) at the
+        phases that are solved."""
         return self.factor * xi[..., self.source, :]
 
 
 def cycle_images(
     alpha: np.ndarray, alphadot: np.ndarray, traits: Traits
 ) -> CycleImages:
-    """Return the symmetries that cycles (..., N, d) have in common, for a body whose left and right
-    (``traits.halved``), head and tail (``traits.reversible``) are alike."""
+    """Return the symmetries that cycles (..., N, d) have in common, for a body whose
+    left and right (``traits.halved``), head and tail (``traits.reversible``) are
+    alike."""
     phases, joints = alpha.shape[-2:]
     if not (traits.halved or traits.reversible):
         return _cycle_images(phases, False, ())
-    sizes = [np.abs(x).max((-2, -1), keepdims=True) for x in (alpha, alphadot)]
-    scaled = [
-        x / np.where(size > 0, size, 1.0) for x, size in zip((alpha, alphadot), sizes)
-    ]
-    path = np.concatenate(scaled, -1).reshape(-1, phases, 2 * joints)
-    moving = sizes[1].argmax() if len(path) else 0
-    return _cycle_images(
-        phases,
-        *_symmetries(lambda k: path.take(k, 1, mode="wrap"), phases, 1, moving, traits),
-    )
+    shape_size = np.abs(alpha).max((-2, -1), keepdims=True)
+    rate_size = np.abs(alphadot).max((-2, -1), keepdims=True)
+    shapes = alpha / np.where(shape_size > 0, shape_size, 1.0)
+    rates = alphadot / np.where(rate_size > 0, rate_size, 1.0)
+    samples = np.concatenate([shapes, rates], -1).reshape(-1, phases, 2 * joints)
+
+    def path(k):
+        return samples.take(k, 1, mode="wrap")
+
+    moving = rate_size.argmax() if len(samples) else 0
+    return _cycle_images(phases, *_symmetries(path, phases, 1, moving, traits))
 
 
 def solved_count(gait: Gait, phases: int, traits: Traits) -> int:
-    """Return the count of `cycle_images` for a gait of so many phases, where they are many from the symmetries of a
-    few."""
+    """Return the count of `cycle_images` for a gait at ``phases`` phases; many phases
+    are judged by the symmetries of every few."""
     if not (traits.halved or traits.reversible):
         return phases
-    a, step = gait.amplitude or 1.0, phases // FEW
+    amplitude = gait.amplitude or 1.0
+    step = phases // SAMPLED_PHASES
     if step < 2:
-        return cycle_images(*gait.cycle(phases, a), traits).count
-    t = lambda k: 2 * np.pi * (k % phases) / phases
-    sizes = [
-        np.abs(curve(t(np.arange(0, phases, step)), a)).max() or 1.0
-        for curve in (gait.shape, gait.rate)
-    ]
-    path = lambda k: np.concatenate(
-        [gait.shape(t(k), a) / sizes[0], gait.rate(t(k), a) / sizes[1]], -1
-    )[None]
+        return cycle_images(*gait.cycle(phases, amplitude), traits).count
+    sampled = 2 * np.pi * np.arange(0, phases, step) / phases
+    shape_size = np.abs(gait.shape(sampled, amplitude)).max() or 1.0
+    rate_size = np.abs(gait.rate(sampled, amplitude)).max() or 1.0
+
+    def path(k):
+        t = 2 * np.pi * (k % phases) / phases
+        shapes = gait.shape(t, amplitude) / shape_size
+        rates = gait.rate(t, amplitude) / rate_size
+        return np.concatenate([shapes, rates], -1)[None]
+
     return _orbits(phases, *_symmetries(path, phases, step, 0, traits))
 
 
 def _symmetries(
     path: Callable, phases: int, step: int, moving: int, traits: Traits
 ) -> tuple[bool, tuple]:
-    """Return (shifted, turned), arguments of `_cycle_images`, of cycles path(k) (B, n, 2 d), shapes and rates at phases
-    k (n,), from every ``step``-th of N phases. moving: a cycle that is not at rest."""
-    mirror, sampled = traits.halved, np.arange(0, phases, step)
+    """Return (shifted, backwards), arguments of `_cycle_images`, of cycles path(k) (B,
+    n, 2 d), shapes and rates at phases k (n,), from every ``step``-th of N phases.
+
+    moving: index of a cycle that is not at rest."""
+    sampled = np.arange(0, phases, step)
     samples = path(sampled)
     joints = samples.shape[-1] // 2
-    same = lambda x, y: not x.size or bool(max((d := x - y).max(), -d.min()) <= SAME)
-    nearest = lambda k, x: k[
-        np.einsum("kj,kj->k", d := path(k)[moving] - x, d).argmin()
-    ]
-    shifted = mirror and phases % 2 == 0 and same(path(sampled + phases // 2), -samples)
+
+    def nearest(k, x):
+        difference = path(k)[moving] - x
+        return k[np.einsum("kj,kj->k", difference, difference).argmin()]
+
+    shifted = False
+    if traits.halved and phases % 2 == 0:
+        shifted = _is_equal(path(sampled + phases // 2), -samples)
+    if not traits.reversible or not len(samples):
+        return shifted, ()
+
     # Where the halves are images of each other, one sign follows from the other.
-    signs = (-1.0, 1.0) if mirror and not shifted else (-1.0,)
-    for sign in signs if traits.reversible and len(samples) else ():
-        image = sign * np.concatenate(
-            [samples[..., joints - 1 :: -1], -samples[..., : joints - 1 : -1]], -1
-        )
+    signs = (-1.0, 1.0) if traits.halved and not shifted else (-1.0,)
+    for sign in signs:
+        shapes = samples[..., joints - 1 :: -1]
+        rates = -samples[..., : joints - 1 : -1]
+        image = sign * np.concatenate([shapes, rates], -1)
         closest = nearest(sampled, image[moving, 0])
-        first = (
-            int(nearest(closest + np.arange(1 - step, step), image[moving, 0])) % phases
-        )
-        if same(path(first - sampled), image):
+        around = closest + np.arange(1 - step, step)
+        first = int(nearest(around, image[moving, 0])) % phases
+        if _is_equal(path(first - sampled), image):
             return shifted, (first, sign)
     return shifted, ()
 
 
+def _is_equal(x: np.ndarray, y: np.ndarray) -> bool:
+    """Return whether two arrays, or two empty ones, differ by no more than SAME."""
+    if not x.size:
+        return True
+    difference = x - y
+    return bool(max(difference.max(), -difference.min()) <= SAME)
+
+
 def _orbits(phases: int, shifted: bool, backwards: tuple) -> int:
-    """Return the count of `_cycle_images`, which is the number of orbits: the mean over the symmetries of how many
-    phases each leaves unchanged."""
-    fixed = [phases] + [0] * shifted
-    if backwards:  # which leaves the phases k with 2 k = first (mod N)
-        firsts = (backwards[0], backwards[0] + phases // 2)[: 1 + shifted]
-        fixed += [1 if phases % 2 else 2 * (first % 2 == 0) for first in firsts]
-    return sum(fixed) // len(fixed)
+    """Return the count of `_cycle_images`: the number of orbits, which is the mean over
+    the symmetries of the number of phases that each leaves unchanged."""
+    unchanged = [phases]
+    if shifted:
+        unchanged.append(0)
+    if backwards:
+        firsts = [backwards[0]]
+        if shifted:
+            firsts.append(backwards[0] + phases // 2)
+        for first in firsts:
+            # Unchanged are the phases k with 2 k = first (mod N).
+            if phases % 2:
+                unchanged.append(1)
+            elif first % 2 == 0:
+                unchanged.append(2)
+            else:
+                unchanged.append(0)
+    return sum(unchanged) // len(unchanged)
 
 
 @functools.lru_cache(maxsize=64)
 def _cycle_images(phases: int, shifted: bool, backwards: tuple) -> CycleImages:
-    """Return the images within a cycle. shifted: it is its own mirror image half a cycle later. turned: () or, where it
-    is its own image backwards, head for tail, (phase of the first one's image, sign of its shape: 1 in the mirror
-    too)."""
+    """Return the images within a cycle.
+
+    shifted: it is its own mirror image half a cycle later. backwards: () or, where it
+    is its own image run backwards with head and tail exchanged, (phase of the first
+    one's image, sign of its shape: 1 where it is seen in the mirror as well)."""
     if not (shifted or backwards):
         return CycleImages(phases, slice(None), slice(None), 1.0)
     phase_indices = np.arange(phases)
-    source, factor = phase_indices, np.ones((phases, 3))
-    moves = [((phase_indices + phases // 2) % phases, (1.0, -1.0, -1.0))] * shifted
+    moves = []
+    if shifted:
+        moves.append(((phase_indices + phases // 2) % phases, MIRROR))
     if backwards:
         first, sign = backwards
         moves.append(((first - phase_indices) % phases, (1.0, -sign, sign)))
+
+    source = phase_indices
+    factor = np.ones((phases, 3))
     for index, signs in moves:  # each undoes itself; an image may be one of an image
         earlier = source[index] < source
         factor = np.where(earlier[:, None], np.array(signs) * factor[index], factor)

@@ -1,16 +1,17 @@
-"""The metric of shape space: what it costs to change shape, by the power that the medium takes.
+"""The metric of shape space: the cost of a change of shape, by the power that it takes.
 
-In a linear medium power is quadratic in the rate of shape, P = alphadot^T M(alpha) alphadot with the dissipation metric M,
-and the length of a path, the integral of sqrt(P), is what its fastest run at given mean power takes (R. L. Hatton and
-H. Choset, Eur. Phys. J. Special Topics 224, 3141 (2015)). In a dry one power is homogeneous of degree one in alphadot and
-does not tell slow from fast: F = P(alpha, alphadot) is a Finsler norm, and the length of a path is the work along it. Either
-way
+In a linear medium power is quadratic in the rate of shape, P = alphadot^T M(alpha)
+alphadot with the dissipation metric M. The length of a path, the integral of sqrt(P),
+is the time of its fastest run at given mean power (R. L. Hatton and H. Choset, Eur.
+Phys. J. Special Topics 224, 3141 (2015)). In a dry medium power is homogeneous of
+degree one in alphadot and does not distinguish slow from fast: F = P(alpha, alphadot)
+is a Finsler norm, and the length of a path is the work along it. Either way
 
-    length = integral of F(alpha, alphadot) dt,     F(alpha, c alphadot) = |c| F(alpha, alphadot),
+    length = integral of F(alpha, alphadot) dt,     F(alpha, c alphadot) = |c| F(alpha,
+    alphadot),
 
-of which the gait's pacing is no part. F is in sqrt(drag length / time) x time, or drag length, per rad, drag being the whole
-body's along itself (`rft.work_done`).
-"""
+which does not depend on the gait's pacing. F is in sqrt(drag length / time) x time, or
+drag length, per rad; drag is the axial drag of the whole body (`rft.work_done`)."""
 
 from __future__ import annotations
 
@@ -32,13 +33,15 @@ Power = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 @dataclass(frozen=True, eq=False)
 class Metric:
-    """M on a grid. M: (d, d, N_1, ..., N_d), symmetric. degree: of the interpolating spline.
+    """A dissipation metric on a grid.
+
+    M: (d, d, N_1, ..., N_d), symmetric. degree: of the interpolating spline.
 
     Examples
     --------
     >>> import geomech
     >>> M = geomech.study("three-link-viscous", grid=15).tables.metric
-    >>> round(float(M.norm([0.0, 0.0], [1.0, 0.0])), 4)  # path length per rad of alpha_1, straight
+    >>> round(float(M.norm([0.0, 0.0], [1.0, 0.0])), 4)  # per rad of alpha_1, straight
     0.0855
     """
 
@@ -48,6 +51,7 @@ class Metric:
 
     @cached_property
     def field(self) -> Field:
+        """M as a field."""
         return Field(self.axes, self.M, self.degree)
 
     def norm(self, alpha, alphadot) -> np.ndarray:
@@ -59,20 +63,24 @@ class Metric:
         return np.sqrt(np.maximum(square, 0.0))
 
     def indicatrix(self, alpha, count: int = 64) -> np.ndarray:
-        """Return (..., count, 2): alphadot of unit cost in every direction of the plane of two joints; an ellipse."""
+        """Return alphadot (..., count, 2) of unit cost in every direction of the plane
+        of two joints: an ellipse."""
         return _indicatrix(self, alpha, count)
 
 
 @dataclass(frozen=True, eq=False)
 class Finsler:
-    """F on a grid, for two joints, by its even harmonics in the direction of alphadot. coefficients: (K + 1, N_1, N_2),
-    the mean, then cosine and sine of 2 beta, 4 beta ... K beta. residual: (N_1, N_2), rms over directions of what is left.
+    """A Finsler norm F on a grid, for two joints, by its even harmonics in the
+    direction beta of alphadot.
+
+    coefficients: (K + 1, N_1, N_2), the mean, then cosine and sine of 2 beta, 4 beta
+    ... K beta. residual: (N_1, N_2), rms over directions of the misfit.
 
     Examples
     --------
     >>> import geomech
     >>> F = geomech.study("three-link-glass", grid=15).tables.metric
-    >>> round(float(F.norm([0.0, 0.0], [1.0, 0.0])), 3)  # path length per rad of alpha_1, straight
+    >>> round(float(F.norm([0.0, 0.0], [1.0, 0.0])), 3)  # per rad of alpha_1, straight
     0.134
     """
 
@@ -83,20 +91,19 @@ class Finsler:
 
     @cached_property
     def field(self) -> Field:
+        """The coefficients as a field."""
         return Field(self.axes, self.coefficients, self.degree)
 
     def norm(self, alpha, alphadot) -> np.ndarray:
         """Return F (...,) at alpha, alphadot (..., 2); ValueError outside the grid."""
         alphadot = real_array("alphadot", alphadot)
-        basis = _even(
-            np.arctan2(alphadot[..., 1], alphadot[..., 0]), len(self.coefficients) - 1
-        )
-        return np.maximum((self.field(alpha) * basis).sum(-1), 0.0) * np.hypot(
-            alphadot[..., 0], alphadot[..., 1]
-        )
+        beta = np.arctan2(alphadot[..., 1], alphadot[..., 0])
+        basis = _even(beta, len(self.coefficients) - 1)
+        per_speed = np.maximum((self.field(alpha) * basis).sum(-1), 0.0)
+        return per_speed * np.hypot(alphadot[..., 0], alphadot[..., 1])
 
     def indicatrix(self, alpha, count: int = 64) -> np.ndarray:
-        """Return (..., count, 2): alphadot of unit cost in every direction."""
+        """Return alphadot (..., count, 2) of unit cost in every direction."""
         return _indicatrix(self, alpha, count)
 
 
@@ -123,8 +130,10 @@ def fit(
     progress: Callable | None = None,
     map: Map = each,
 ) -> Metric:
-    """Fit M on the grid spanned by ``axes`` exactly, from d (d + 1) / 2 powers at each shape. power: (...,), quadratic
-    in alphadot.
+    """Fit M on the grid spanned by ``axes`` exactly, from d (d + 1) / 2 powers at each
+    shape.
+
+    power(alpha, alphadot) -> (...,), quadratic in alphadot.
 
     Examples
     --------
@@ -132,7 +141,8 @@ def fit(
     >>> from geomech.geometry.connection import grid
     >>> from geomech.scenes import load
     >>> swimmer = load("three-link-viscous").system
-    >>> power = lambda alpha, alphadot: swimmer.power(alpha, alphadot, swimmer.velocity(alpha, alphadot))
+    >>> def power(alpha, alphadot):
+    ...     return swimmer.power(alpha, alphadot, swimmer.velocity(alpha, alphadot))
     >>> metric.fit(power, grid(2, 9)).M[..., 4, 4].round(5)  # of the straight body
     array([[0.00732, 0.00503],
            [0.00503, 0.00732]])
@@ -140,6 +150,7 @@ def fit(
     axes = as_axes(axes)
     d = len(axes)
     i, j = np.triu_indices(d)
+    # One joint at a time, and each two at once.
     unit = np.eye(d)[i] + np.where(i == j, 0.0, 1.0)[:, None] * np.eye(d)[j]
     P = _sampled(power, axes, unit, progress, map)  # (C, N...)
     M = np.empty((d, d, *P.shape[1:]))
@@ -160,7 +171,8 @@ def fit_norm(
     highest: int = 14,
     map: Map = each,
 ) -> Finsler:
-    """Fit even harmonics up to ``highest`` of a norm (...,), from ``count`` directions at each shape of two joints.
+    """Fit even harmonics up to ``highest`` of a norm(alpha, alphadot) -> (...,), from
+    ``count`` directions at each shape of two joints.
 
     Examples
     --------
@@ -168,7 +180,8 @@ def fit_norm(
     >>> from geomech.geometry.connection import grid
     >>> from geomech.scenes import load
     >>> swimmer = load("three-link-glass").system
-    >>> power = lambda alpha, alphadot: swimmer.power(alpha, alphadot, swimmer.velocity(alpha, alphadot))
+    >>> def power(alpha, alphadot):
+    ...     return swimmer.power(alpha, alphadot, swimmer.velocity(alpha, alphadot))
     >>> metric.fit_norm(power, grid(2, 5)).coefficients.shape
     (15, 5, 5)
     """
@@ -183,15 +196,15 @@ def fit_norm(
             f"harmonics are those of a plane of two joint rates, got {len(axes)} joints"
         )
     unit = directions(2, count)
-    return norm_from_samples(
-        _sampled(norm, axes, unit, progress, map), axes, unit, degree, highest=highest
-    )
+    F = _sampled(norm, axes, unit, progress, map)
+    return norm_from_samples(F, axes, unit, degree, highest=highest)
 
 
 def norm_from_samples(
     F: np.ndarray, axes, unit: np.ndarray, degree: int = 3, *, highest: int = 14
 ) -> Finsler:
-    """Return the series of `fit_norm` from norms F (C, N_1, N_2) of the rates ``unit`` (C, 2).
+    """Return the series of `fit_norm` from norms F (C, N_1, N_2) of the rates ``unit``
+    (C, 2).
 
     Examples
     --------
@@ -199,7 +212,7 @@ def norm_from_samples(
     >>> from geomech.geometry.connection import directions, grid
     >>> from geomech.geometry.metric import norm_from_samples
     >>> unit, axes = directions(2, 24), grid(2, 5)
-    >>> F = norm_from_samples(np.ones((24, 5, 5)), axes, unit)  # of a circle at every shape
+    >>> F = norm_from_samples(np.ones((24, 5, 5)), axes, unit)  # F = |alphadot|
     >>> round(float(F.norm([0.1, 0.2], [3.0, 4.0])), 6)
     5.0
     """
@@ -213,17 +226,19 @@ def norm_from_samples(
 def _sampled(
     power: Power, axes, unit: np.ndarray, progress: Callable | None, map: Map
 ) -> np.ndarray:
-    """Return (C, N_1, ..., N_d): powers at every shape for the rates ``unit`` (C, d)."""
+    """Return (C, N_1, ..., N_d): powers at every shape for the rates ``unit`` (C,
+    d)."""
     alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 1, len(axes))
-    out, step = np.empty((len(unit), len(alpha))), max(1, SAMPLES_TOGETHER // len(unit))
-    parts = [slice(k, min(k + step, len(alpha))) for k in range(0, len(alpha), step)]
-    for part, powers in zip(
-        parts, map(partial(_powers, (power, unit)), [alpha[x] for x in parts])
-    ):
-        out[:, part] = powers.T
+    n = len(alpha)
+    step = max(1, SAMPLES_TOGETHER // len(unit))
+    parts = [slice(k, min(k + step, n)) for k in range(0, n, step)]
+    results = map(partial(_powers, (power, unit)), [alpha[part] for part in parts])
+    P = np.empty((len(unit), n))
+    for part, powers in zip(parts, results):
+        P[:, part] = powers.T
         if progress:
-            progress(part.stop / len(alpha))
-    return out.reshape(len(unit), *map(len, axes))
+            progress(part.stop / n)
+    return P.reshape(len(unit), *[len(axis) for axis in axes])
 
 
 def _powers(shared: tuple, alpha: np.ndarray) -> np.ndarray:
@@ -241,7 +256,9 @@ def _powers(shared: tuple, alpha: np.ndarray) -> np.ndarray:
 def path_length(
     norm: Power, gait: Gait, amplitudes=None, phases: int = 256
 ) -> np.ndarray:
-    """Return length of a gait's cycle, for amplitudes (...,) or the gait's own. norm: F(alpha, alphadot) -> (...,).
+    """Return the length of a gait's cycle, for amplitudes (...,) or the gait's own.
+
+    norm: F(alpha, alphadot) -> (...,).
 
     Examples
     --------

@@ -1,4 +1,5 @@
-"""Facts about a velocity, which fits, images and tiers use to save work, and must know to refuse."""
+"""Facts about a velocity: fits, images and tiers use them to save work and to
+refuse."""
 
 from __future__ import annotations
 
@@ -12,26 +13,40 @@ MEAN = "mean"  # the frame at the centre of mass, with the mean heading
 
 @dataclass(frozen=True)
 class Traits:
-    """Facts about a velocity xi(alpha, alphadot) that algorithms may use; each is an equation that a test can check.
+    """Facts about a velocity xi(alpha, alphadot) that algorithms may use.
 
-    A system that claims nothing is only taken to be odd and smooth, as every table of a connection takes it.
+    Each is an equation that a test can check. A system that claims nothing is only
+    assumed to be odd and smooth, as every table of a connection assumes.
 
     Attributes
     ----------
     linear : xi(alpha, alphadot) = A(alpha) alphadot, exactly.
     odd : xi(alpha, -alphadot) = -xi(alpha, alphadot).
     mirror : xi(-alpha, -alphadot) = (xi_x, -xi_y, -xi_theta): left and right are alike.
-    reversible : xi(P alpha, P alphadot) = (-xi_x, -xi_y, xi_theta), (P alpha)_k = -alpha_(d + 1 - k): head and tail are alike.
-    smooth : xi has no kinks in shape or direction, so that errors fall faster than with the square of the phases.
-    power_degree : P(alpha, c alphadot) = c^power_degree P(alpha, alphadot) for c > 0; 2 in a fluid, 1 in sand. None where
-        the system has no power, or one of no single degree.
-    lacks : premises that do not hold; without those of SHAPE_ALONE there is no velocity of a single shape, only runs.
-    singularity : a function of shapes (..., d) that passes through 0 where the velocity does not exist, or None.
+    reversible : xi(P alpha, P alphadot) = (-xi_x, -xi_y, xi_theta), (P alpha)_k =
+        -alpha_(d + 1 - k): head and tail are alike.
+    smooth : xi has no kinks in shape or direction, so that errors fall faster than with
+        the
+        square of the phases.
+    power_degree : P(alpha, c alphadot) = c^power_degree P(alpha, alphadot) for c > 0; 2
+        in a
+        fluid, 1 in sand. None where the system has no power, or a power of no single
+        degree.
+    lacks : premises that do not hold. Without those of SHAPE_ALONE a single shape has
+        no
+        velocity; there are only runs.
+    singularity : a function of shapes (..., d) that passes through 0 where the velocity
+        does
+        not exist, or None.
     singular : where that is, in words that follow "where".
-    joint_angles : shape variables are angles of joints, so that one beyond a full turn is likely a slip of unit.
-    frame : name of the body frame that xi is the velocity of.
-    unit : of lengths in xi, "BL" (body lengths) or "m"; if left out by the system's ``length`` (`unit_of`).
-    labels : (name, unit) of each shape variable; alpha_1, alpha_2 ... in rad if left out.
+    joint_angles : shape variables are angles of joints, so that one beyond a full turn
+        is
+        likely in the wrong unit.
+    frame : name of the body frame whose velocity xi is.
+    unit : of lengths in xi, "BL" (body lengths) or "m"; if left out by the system's
+        ``length`` (`unit_of`).
+    labels : (name, unit) of each shape variable; alpha_1, alpha_2 ... in rad if left
+        out.
     frequency : cycles per second, where xi depends on it.
     """
 
@@ -52,12 +67,14 @@ class Traits:
 
     @property
     def halved(self) -> bool:
-        """Whether velocities at one half of a symmetric grid give those at the other."""
+        """Whether velocities at one half of a symmetric grid give those at the
+        other."""
         return self.mirror and self.odd
 
     @property
     def steps(self) -> bool:
-        """Whether a cycle is run phase after phase, as no velocity follows from shape alone."""
+        """Whether a cycle is run phase after phase, as no velocity follows from shape
+        alone."""
         return bool(self.lacks & SHAPE_ALONE)
 
 

@@ -1,8 +1,12 @@
-"""A connection that is known near one gait: its first-order Taylor series in the shape's deviation from it.
+"""A connection that is known near one gait, by its first-order Taylor series.
 
-With theta(phi) the gait, phi the phase of its point nearest to a shape and delta = alpha - theta(phi), which is normal to it,
-A(alpha) = A(phi) + sum_k dA/dn_k(phi) (n_k . delta), n_k orthonormal along the gait (Bittner, Hatton and Revzen, Nonlinear
-Dynamics 94, 1933 (2018), here with the phase of the nearest point). All are Fourier series in phi.
+With theta(phi) the gait, phi the phase of its point nearest to a shape and
+delta = alpha - theta(phi), which is normal to it,
+
+    A(alpha) = A(phi) + sum_k dA/dn_k(phi) (n_k . delta),
+
+n_k orthonormal along the gait (Bittner, Hatton and Revzen, Nonlinear Dynamics 94, 1933
+(2018), here with the phase of the nearest point). All are Fourier series in phi.
 """
 
 from __future__ import annotations
@@ -22,33 +26,33 @@ from rft.core.refusal import Refusal
 from rft.formulas import se2
 
 BEYOND = "nan, where the data of the log do not reach"
-PLACES = (
-    512  # of the gait, at which the nearest one is looked for, and normals are kept
-)
-NEWTON = 6  # steps to the nearest point from there
-SHAPES_TOGETHER = 256  # whose distances from all places, 1 MB, are held at a time: a fourth of the time that 4096 take
+# Places on the gait: the search for the nearest point begins at one, and normals are
+# stored there.
+PLACES = 512
+NEWTON_STEPS = 6  # to the nearest point from there
+# Shapes whose distances from all places, 1 MB, are held at a time: this takes a fourth
+# of the time of 4096 shapes.
+SHAPES_TOGETHER = 256
 
 
 def waves(t, harmonics: int, order: int = 0) -> np.ndarray:
-    """Return (..., 2 harmonics + 1): 1, cos t, sin t, cos 2t, sin 2t ... or their derivatives of that order."""
+    """Return (..., 2 harmonics + 1): 1, cos t, sin t, cos 2t, sin 2t ... or their
+    derivatives of an order, at phases t (...)."""
     turn = np.exp(1j * unmasked("t", t))[..., None]
     turns = np.cumprod(np.broadcast_to(turn, (*np.shape(t), harmonics)), -1)
     turns *= (1j * np.arange(1.0, harmonics + 1)) ** order
-    found = np.empty((*np.shape(t), 2 * harmonics + 1))
-    found[..., 0], found[..., 1::2], found[..., 2::2] = (
-        float(order == 0),
-        turns.real,
-        turns.imag,
-    )
-    return found
+    values = np.empty((*np.shape(t), 2 * harmonics + 1))
+    values[..., 0] = 1.0 if order == 0 else 0.0
+    values[..., 1::2] = turns.real
+    values[..., 2::2] = turns.imag
+    return values
 
 
 def series(coefficients: np.ndarray, t, order: int = 0) -> np.ndarray:
-    """Return (..., *lead): a Fourier series with coefficients (*lead, 2 K + 1) as in `waves`, or a derivative, at
-    phases t (...)."""
-    return np.tensordot(
-        waves(t, coefficients.shape[-1] // 2, order), coefficients, (-1, -1)
-    )
+    """Return (..., *lead): a Fourier series with coefficients (*lead, 2 K + 1) as in
+    `waves`, or a derivative of an order, at phases t (...)."""
+    harmonics = coefficients.shape[-1] // 2
+    return np.tensordot(waves(t, harmonics, order), coefficients, (-1, -1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,109 +63,109 @@ class Loop:
 
     @property
     def harmonics(self) -> int:
+        """Highest harmonic K."""
         return self.coefficients.shape[1] // 2
 
     def shape(self, t, order: int = 0) -> np.ndarray:
-        """Return (..., d) at phases t (...), or its derivative."""
+        """Return shapes (..., d) at phases t (...), or their derivatives of an
+        order."""
         return series(self.coefficients, t, order)
 
     @cached_property
     def _twice_differentiated(self) -> np.ndarray:
         """Coefficients (3, d, 2 K + 1) of the shape and its first two derivatives."""
-        found = [self.coefficients]
+        k = np.arange(1, self.harmonics + 1)
+        orders = [self.coefficients]
         for _ in range(2):
-            cos, sin = found[-1][:, 1::2], found[-1][:, 2::2]
-            k = np.arange(1, self.harmonics + 1)
+            cos = orders[-1][:, 1::2]
+            sin = orders[-1][:, 2::2]
             rate = np.zeros_like(self.coefficients, float)
-            rate[:, 1::2], rate[:, 2::2] = k * sin, -k * cos
-            found.append(rate)
-        return np.array(found)
+            rate[:, 1::2] = k * sin
+            rate[:, 2::2] = -k * cos
+            orders.append(rate)
+        return np.array(orders)
 
     @cached_property
     def _places(self) -> tuple[np.ndarray, np.ndarray]:
-        """Phases (P,) and shapes (P, d) at which the nearest point is first looked for."""
+        """Phases (P,) and shapes (P, d) at which the search for the nearest point
+        begins."""
         t = 2 * np.pi * np.arange(PLACES) / PLACES
         return t, self.shape(t)
 
     @cached_property
     def _normals(self) -> np.ndarray:
-        """Normals (P + 1, d, d - 1) of more than two joints, at the places and at the first once more. They rotate about
-        the curve as little as they can and close after a cycle: parallel transport, whose holonomy is spread over all of
-        it."""
+        """Normals (P + 1, d, d - 1) for more than two joints, at the places and at the
+        first once more.
+
+        They rotate about the curve as little as they can and close after a cycle:
+        parallel transport, whose holonomy is spread over the cycle."""
         from scipy.linalg import expm, logm
 
         rate = self.shape(self._places[0], 1)
         tangent = rate / np.linalg.norm(rate, axis=1, keepdims=True)
-        frames_along = [_complement(tangent[0])]
+        normals = [_complement(tangent[0])]
         for t in [*tangent[1:], tangent[0]]:
-            u, _, v = np.linalg.svd(
-                frames_along[-1] - np.outer(t, t @ frames_along[-1]),
-                full_matrices=False,
-            )
-            frames_along.append(u @ v)
-        holonomy = np.real(logm(frames_along[0].T @ frames_along[-1]))
-        return np.array(
-            [n @ expm(-k / PLACES * holonomy) for k, n in enumerate(frames_along)]
-        )
+            projected = normals[-1] - np.outer(t, t @ normals[-1])
+            u, _, v = np.linalg.svd(projected, full_matrices=False)
+            normals.append(u @ v)
+        holonomy = np.real(logm(normals[0].T @ normals[-1]))
+        rotations = [expm(-k / PLACES * holonomy) for k in range(len(normals))]
+        return np.array([n @ rotation for n, rotation in zip(normals, rotations)])
 
     def normals(self, t) -> np.ndarray:
-        """Return (..., d, d - 1): orthonormal, and normal to the curve, at phases t (...)."""
+        """Return orthonormal normals (..., d, d - 1) of the curve at phases t (...)."""
         rate = self.shape(t, 1)
         if rate.shape[-1] == 2:
             tangent = rate / np.linalg.norm(rate, axis=-1, keepdims=True)
             return np.stack([-tangent[..., 1], tangent[..., 0]], -1)[..., None]
         place = unmasked("t", t) % (2 * np.pi) * PLACES / (2 * np.pi)
         k = np.minimum(place.astype(int), PLACES - 1)
-        part = (place - k)[..., None, None]
-        return (1 - part) * self._normals[k] + part * self._normals[k + 1]
+        share = (place - k)[..., None, None]
+        return (1 - share) * self._normals[k] + share * self._normals[k + 1]
 
     def nearest(self, alpha) -> np.ndarray:
-        """Return phases (...,) of the points of the curve nearest to shapes alpha (..., d)."""
+        """Return phases (...,) of the points of the curve nearest to shapes alpha (...,
+        d)."""
         flat = np.reshape(alpha, (-1, np.shape(alpha)[-1]))
-        t, places = self._places
-        rows = [
-            flat[k : k + SHAPES_TOGETHER] for k in range(0, len(flat), SHAPES_TOGETHER)
-        ]
-        half_square = (places**2).sum(
-            1
-        ) / 2  # of the distance, less that of the shape and its product with the place
-        nearest_places = [
-            t[(half_square - shapes @ places.T).argmin(1)] for shapes in rows
-        ]
-        start = np.concatenate(nearest_places) if rows else np.zeros(0)
-        return self.projected(
-            alpha, start.reshape(np.shape(alpha)[:-1]), np.pi / PLACES
-        )
+        phases, places = self._places
+        half_square = (places**2).sum(1) / 2
+        start = np.zeros(len(flat))
+        for k in range(0, len(flat), SHAPES_TOGETHER):
+            shapes = flat[k : k + SHAPES_TOGETHER]
+            # Half of the squared distance, less half of the shape's own square.
+            distance = half_square - shapes @ places.T
+            start[k : k + SHAPES_TOGETHER] = phases[distance.argmin(1)]
+        start = start.reshape(np.shape(alpha)[:-1])
+        return self.projected(alpha, start, np.pi / PLACES)
 
     def projected(self, alpha, t, step: float = 0.1) -> np.ndarray:
-        """Return phases (...,) near t at which alpha - theta is normal to the curve: Newton, at most ``step`` rad at a
-        time."""
-        for _ in range(NEWTON):
-            shape, rate, bend = np.moveaxis(
-                series(self._twice_differentiated, t), -2, 0
-            )
+        """Return phases (...,) near t at which alpha - theta is normal to the curve, by
+        Newton's method with steps of at most ``step`` rad."""
+        for _ in range(NEWTON_STEPS):
+            orders = series(self._twice_differentiated, t)
+            shape, rate, bend = np.moveaxis(orders, -2, 0)
             deviation = alpha - shape
             square = (rate**2).sum(-1)
-            slope = np.maximum(
-                square - (deviation * bend).sum(-1), 0.2 * square
-            )  # beyond the centre of curvature Gauss-Newton
+            # Beyond the centre of curvature the slope is Gauss-Newton's.
+            slope = np.maximum(square - (deviation * bend).sum(-1), 0.2 * square)
             t = t + np.clip((deviation * rate).sum(-1) / slope, -step, step)
         return t
 
 
 def _between(values: np.ndarray, t) -> np.ndarray:
-    """Return (..., *lead): values (*lead, P) at equally spaced phases, at phases t (...) between them."""
+    """Return (..., *lead): values (*lead, P) at equally spaced phases, interpolated at
+    phases t (...)."""
     count = values.shape[-1]
     places = 2 * np.pi * np.arange(count + 1) / count
     closed = np.concatenate([values, values[..., :1]], -1).reshape(-1, count + 1)
-    values_at = np.stack(
-        [np.interp(np.asarray(t) % (2 * np.pi), places, row) for row in closed], -1
-    )
-    return values_at.reshape(*np.shape(t), *values.shape[:-1])
+    t = np.asarray(t) % (2 * np.pi)
+    interpolated = np.stack([np.interp(t, places, row) for row in closed], -1)
+    return interpolated.reshape(*np.shape(t), *values.shape[:-1])
 
 
 def _complement(unit: np.ndarray) -> np.ndarray:
-    """Return (d, d - 1): orthonormal and normal to a unit vector, by a reflection that takes the first axis there."""
+    """Return (d, d - 1): orthonormal vectors normal to a unit vector, by a reflection
+    that takes the first axis there."""
     first = np.zeros_like(unit)
     first[0] = -1.0 if unit[0] > 0 else 1.0
     v = unit - first
@@ -170,15 +174,19 @@ def _complement(unit: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class TaylorSeries:
-    """The Taylor series of a connection about a gait, coefficients of Fourier series in its phase.
+    """The Taylor series of a connection about a gait, coefficients of Fourier series in
+    its phase.
 
-    A: (3, d, 2 K + 1). slope: (3, d, d - 1, 2 K + 1), dA/dn_k. errors: (E, 3, d, d, 2 K + 1), of A and then of its slopes,
-    independent: the squares of what each does to a result add up to its variance. spread: (d, d, P), at equally spaced
-    phases: the data reach a shape where delta . spread^-1 delta <= 1. beyond: (3,), of a net pose: what the variation of the
-    cycles changes in it beyond the first order; where links begin and cease to stick, a Taylor series may be off by as much.
-    standard_error: (3, 2, P), at equally spaced phases, of A along the gait and across it: for the residual of xi and for the
-    harmonics that the series omit.
-    factor: an error is this many standard deviations. level: share of cases in which it is meant to cover the truth."""
+    A: (3, d, 2 K + 1). slope: (3, d, d - 1, 2 K + 1), dA/dn_k. errors: (E, 3, d, d, 2 K
+    + 1), of A and then of its slopes, independent: the squares of their effects on a
+    result add up to its variance. spread: (d, d, P), at equally spaced phases: the data
+    reach a shape where delta . spread^-1 delta <= 1. beyond: (3,), of a net pose: its
+    change beyond the first order with the variation of the cycles. Where links begin
+    and cease to stick, a Taylor series may have an error of that size. standard_error:
+    (3, 2, P), at equally spaced phases, of A along the gait and across it, for the
+    residual of xi and for the harmonics that the series omit. factor: an error is this
+    many standard deviations. level: share of cases in which it should cover the
+    truth."""
 
     loop: Loop
     A: np.ndarray
@@ -191,7 +199,8 @@ class TaylorSeries:
     level: float
 
     def _deviation(self, alpha) -> tuple[np.ndarray, np.ndarray]:
-        """Return the phases (...,) of the nearest points and the deviations (..., d) of shapes (..., d)."""
+        """Return the phases (...,) of the nearest points and the deviations (..., d)
+        from them, for shapes (..., d)."""
         t = self.loop.nearest(alpha)
         return t, alpha - self.loop.shape(t)
 
@@ -200,32 +209,30 @@ class TaylorSeries:
         return _between(self.spread, t)
 
     def standard_error_at(self, t) -> np.ndarray:
-        """Return the standard errors (..., 3, d) of A at phases t (...), as `standard_error`."""
+        """Return the standard errors (..., 3, d) of A at phases t (...)."""
         rate = self.loop.shape(t, 1)
         along = rate**2 / (rate**2).sum(-1, keepdims=True)
-        return np.sqrt(
-            _between(self.standard_error**2, t) @ np.stack([along, 1 - along], -2)
-        )
+        variance = _between(self.standard_error**2, t)
+        return np.sqrt(variance @ np.stack([along, 1 - along], -2))
 
     def reach(self, alpha) -> np.ndarray:
-        """Return the distances (...,) of shapes (..., d) from the gait, 1 where the data end."""
+        """Return the distances (...,) of shapes (..., d) from the gait, 1 where the
+        data end."""
         t, delta = self._deviation(real_array("alpha", alpha))
-        return np.sqrt(
-            np.einsum(
-                "...i,...ij,...j->...", delta, np.linalg.inv(self.spread_at(t)), delta
-            )
-        )
+        inverse = np.linalg.inv(self.spread_at(t))
+        return np.sqrt(np.einsum("...i,...ij,...j->...", delta, inverse, delta))
 
     def terms(self, t, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
-        """Return (waves (..., 2 K + 1), terms (..., d, d)), such that xi_i = sum of combined_i,j,m,k terms_j,m waves_k,
-        at shapes and rates (..., d) whose nearest points of the gait have phases t (...)."""
-        normal = np.einsum(
-            "...ik,...i->...k", self.loop.normals(t), alpha - self.loop.shape(t)
-        )
-        one = np.concatenate([np.ones((*normal.shape[:-1], 1)), normal], -1)
-        return waves(t, self.A.shape[-1] // 2), alphadot[..., :, None] * one[
-            ..., None, :
-        ]
+        """Return waves (..., 2 K + 1) and terms (..., d, d), such that
+        xi_i = sum of combined_i,j,m,k terms_j,m waves_k.
+
+        alpha, alphadot: shapes and rates (..., d) whose nearest points of the gait have
+        phases t (...)."""
+        deviation = alpha - self.loop.shape(t)
+        normal = np.einsum("...ik,...i->...k", self.loop.normals(t), deviation)
+        factors = np.concatenate([np.ones((*normal.shape[:-1], 1)), normal], -1)
+        terms = alphadot[..., :, None] * factors[..., None, :]
+        return waves(t, self.A.shape[-1] // 2), terms
 
     @cached_property
     def combined(self) -> np.ndarray:
@@ -233,7 +240,8 @@ class TaylorSeries:
         return np.concatenate([self.A[:, :, None], self.slope], 2)
 
     def connection(self, alpha) -> np.ndarray:
-        """Return A (..., 3, d) at shapes (..., d), wherever these are."""
+        """Return A (..., 3, d) at shapes (..., d), whether the data reach them or
+        not."""
         w, terms = self.terms(self.loop.nearest(alpha), alpha, np.ones(np.shape(alpha)))
         return np.einsum("ijmk,...k,...jm->...ij", self.combined, w, terms)
 
@@ -248,10 +256,11 @@ class TaylorSeries:
         """Return the errors (..., 3, d) of `connection`."""
         t = self.loop.nearest(alpha)
         w, terms = self.terms(t, alpha, np.ones(np.shape(alpha)))
-        squares = (
-            np.einsum("ijmk,...k,...jm->...ij", x, w, terms) ** 2 for x in self.errors
-        )
-        return self.factor * np.sqrt(sum(squares) + self.standard_error_at(t) ** 2)
+        variance = 0
+        for error in self.errors:
+            change = np.einsum("ijmk,...k,...jm->...ij", error, w, terms)
+            variance = variance + change**2
+        return self.factor * np.sqrt(variance + self.standard_error_at(t) ** 2)
 
     def ccf(self, alpha) -> np.ndarray:
         """Return the CCF (..., 3) of two joints at shapes (..., 2)."""
@@ -259,105 +268,114 @@ class TaylorSeries:
 
     def ccf_error(self, alpha) -> np.ndarray:
         """Return the errors (..., 3) of `ccf`."""
-        of = self._ccf_at(alpha)
-        value = of(self.combined)
-        return self.factor * np.sqrt(
-            sum((of(self.combined + x) - value) ** 2 for x in self.errors)
-        )
+        ccf = self._ccf_at(alpha)
+        value = ccf(self.combined)
+        variance = sum((ccf(self.combined + x) - value) ** 2 for x in self.errors)
+        return self.factor * np.sqrt(variance)
 
     def _ccf_at(self, alpha) -> Callable:
-        """Return a function that gives the CCF (..., 3) at shapes (..., 2) of any connection along the gait, from its
-        coefficients as `combined`.
+        """Return a function of coefficients as `combined`: the CCF (..., 3) at shapes
+        (..., 2) of the connection with these coefficients.
 
-        alpha = theta(phi) + s n(phi) has d alpha / d phi = theta' (1 - curvature s), and dA/ds is the slope."""
+        alpha = theta(phi) + s n(phi) has d alpha / d phi = theta' (1 - curvature s),
+        and dA/ds is the slope."""
         t, delta = self._deviation(alpha)
-        rate, bend, n = (
-            self.loop.shape(t, 1),
-            self.loop.shape(t, 2),
-            self.loop.normals(t)[..., 0],
-        )
-        speed, s = np.linalg.norm(rate, axis=-1), (n * delta).sum(-1)
-        ahead = speed - s * (bend * n).sum(-1) / speed  # |d alpha / d phi|
-        waves_at, rates_at = (
-            waves(t, self.A.shape[-1] // 2, order) for order in (0, 1)
-        )
+        rate = self.loop.shape(t, 1)
+        bend = self.loop.shape(t, 2)
+        n = self.loop.normals(t)[..., 0]
+        speed = np.linalg.norm(rate, axis=-1)
+        tangent = rate / speed[..., None]
+        s = (n * delta).sum(-1)
+        alpha_by_phi = speed - s * (bend * n).sum(-1) / speed
+        s = s[..., None, None]
+        harmonics = self.A.shape[-1] // 2
+        w = waves(t, harmonics)
+        dw = waves(t, harmonics, 1)
 
         def ccf(combined: np.ndarray) -> np.ndarray:
-            (A, slope), (A_on, slope_on) = (
-                [np.tensordot(w, combined[:, :, m], (-1, -1)) for m in (0, 1)]
-                for w in (waves_at, rates_at)
-            )
-            along = (A_on + slope_on * s[..., None, None]) / ahead[..., None, None]
-            derivative = np.einsum("...ij,...j->...i", along, n) - np.einsum(
-                "...ij,...j->...i", slope, rate / speed[..., None]
-            )
-            A_here = A + slope * s[..., None, None]
-            return derivative + se2.bracket(A_here[..., 0], A_here[..., 1])
+            A = np.tensordot(w, combined[:, :, 0], (-1, -1))
+            slope = np.tensordot(w, combined[:, :, 1], (-1, -1))
+            A_by_phi = np.tensordot(dw, combined[:, :, 0], (-1, -1))
+            slope_by_phi = np.tensordot(dw, combined[:, :, 1], (-1, -1))
+
+            along = (A_by_phi + slope_by_phi * s) / alpha_by_phi[..., None, None]
+            derivative = np.einsum("...ij,...j->...i", along, n)
+            derivative = derivative - np.einsum("...ij,...j->...i", slope, tangent)
+            A = A + slope * s
+            return derivative + se2.bracket(A[..., 0], A[..., 1])
 
         return ccf
 
     def error(self, alpha, alphadot) -> np.ndarray:
-        """Return the errors (..., 3) of the net pose of gaits alpha, alphadot (..., N, d)."""
+        """Return the errors (..., 3) of the net pose of gaits alpha, alphadot (..., N,
+        d)."""
         w, terms = self.terms(self.loop.nearest(alpha), alpha, alphadot)
-        velocity = lambda x: np.einsum("ijmk,...nk,...njm->...ni", x, w, terms)
-        net = displacement(velocity(self.combined))
-        differences = [
-            displacement(velocity(self.combined + x)) - net for x in self.errors
-        ]
-        return np.hypot(
-            self.factor * np.sqrt(np.sum(np.square(differences), 0)), self.beyond
-        )
+
+        def net(combined):
+            xi = np.einsum("ijmk,...nk,...njm->...ni", combined, w, terms)
+            return displacement(xi)
+
+        net_pose = net(self.combined)
+        changes = [net(self.combined + x) - net_pose for x in self.errors]
+        deviation = np.sqrt(np.sum(np.square(changes), 0))
+        return np.hypot(self.factor * deviation, self.beyond)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Tube(Connection):
-    """A connection that is evaluated near a gait; its grid, nan where the data do not reach, is for pictures and
-    files."""
+    """A connection that is evaluated near a gait.
+
+    Its grid, nan where the data do not reach, is for pictures and files."""
 
     taylor: TaylorSeries | None = None
 
     def reach(self, alpha: ArrayLike) -> np.ndarray:
-        """Return the distances (...,) of shapes from the gait, as `TaylorSeries.reach`."""
+        """Return the distances (...,) of shapes (..., d) from the gait
+        (`TaylorSeries.reach`)."""
         return self.taylor.reach(alpha)
 
     def checked(self, alpha: ArrayLike) -> np.ndarray:
         """Return alpha; Refusal names the first shape that the data do not reach."""
         alpha = inside(self.axes, alpha)
         reach = self.reach(alpha)
-        if (reach > 1 + 1e-9).any():
-            shape = ", ".join(f"{x:.3g}" for x in alpha[reach > 1 + 1e-9][0])
+        beyond = reach > 1 + 1e-9
+        if beyond.any():
+            shape = ", ".join(f"{x:.3g}" for x in alpha[beyond][0])
             raise Refusal(
-                f"the data do not reach alpha = ({shape}), {reach.max():.2g} times as far from the mean gait as they go",
+                f"the data do not reach alpha = ({shape}), {reach.max():.2g} times as"
+                " far from the mean gait as they go",
                 instead="keep near that gait, or measure more varied cycles",
             )
         return alpha
 
-    def at_grid(self, function: Callable) -> np.ndarray:
-        """Return (..., N_1, ..., N_d): a function of shapes (n, d), which gives (n, ...), on the grid; nan where A
-        is."""
+    def on_grid(self, function: Callable) -> np.ndarray:
+        """Return (..., N_1, ..., N_d): the values on the grid of a function of shapes
+        (n, d), which returns (n, ...); nan where A is nan."""
+        d = len(self.axes)
         shapes = np.stack(np.meshgrid(*self.axes, indexing="ij"), -1)
-        reached, d = ~np.isnan(self.A[0, 0]), len(self.axes)
+        reached = ~np.isnan(self.A[0, 0])
         values = function(shapes[reached])
         fields = np.full((*reached.shape, *values.shape[1:]), np.nan)
         fields[reached] = values
         return np.moveaxis(fields, range(d), range(-d, 0))
 
     def __call__(self, alpha) -> np.ndarray:
-        """Return A (..., 3, d) at shapes alpha (..., d); ValueError where the data do not reach."""
+        """Return A (..., 3, d) at shapes alpha (..., d); ValueError where the data do
+        not reach."""
         return self.taylor.connection(self.checked(alpha))
 
 
 def covering_grid(taylor: TaylorSeries, points: int) -> tuple[np.ndarray, ...]:
-    """Return axes of ``points`` points each that span all that the data reach."""
+    """Return axes of ``points`` points each that span all shapes that the data
+    reach."""
     t = 2 * np.pi * np.arange(PLACES) / PLACES
-    step = (
-        np.abs(taylor.loop.shape(t, 2)).max(0) * (np.pi / PLACES) ** 2 / 2
-    )  # what a curve may do between two places
-    wide = np.sqrt(np.einsum("tii->ti", taylor.spread_at(t))) + step
-    low, high = (
-        (taylor.loop.shape(t) - wide).min(0),
-        (taylor.loop.shape(t) + wide).max(0),
-    )
+    shapes = taylor.loop.shape(t)
+    # Between two places a curve may leave their chord by its bend.
+    bend = np.abs(taylor.loop.shape(t, 2)).max(0)
+    step = bend * (np.pi / PLACES) ** 2 / 2
+    width = np.sqrt(np.einsum("tii->ti", taylor.spread_at(t))) + step
+    low = (shapes - width).min(0)
+    high = (shapes + width).max(0)
     return tuple(np.linspace(a, b, points) for a, b in zip(low, high))
 
 
@@ -368,17 +386,17 @@ def tube(
     unit: str,
     length: float,
 ) -> Tube:
-    """Return the connection on a grid, nan where the data do not reach. residual: (3,), of the fit of xi for |alphadot|
-    = 1. unit, length: as of `Connection`."""
+    """Return the connection on a grid, nan where the data do not reach.
+
+    residual: (3,), of the fit of xi for |alphadot| = 1. unit, length: as in
+    `Connection`."""
     axes = tuple(axes)
     shapes = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
     A = np.moveaxis(taylor.connection_within_reach(shapes), (-2, -1), (0, 1))
     masked = np.isnan(A[:, 0])
     masked_residual = np.where(masked, np.nan, residual.reshape(3, *[1] * len(axes)))
-    speed, degree = (
-        np.sqrt((A**2).mean(1) + masked_residual**2),
-        min(3, min(map(len, axes)) - 1),
-    )
+    speed = np.sqrt((A**2).mean(1) + masked_residual**2)
+    degree = min(3, min(map(len, axes)) - 1)
     return Tube(
         axes, A, masked_residual, speed, degree, taylor, unit=unit, length=length
     )

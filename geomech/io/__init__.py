@@ -2,4 +2,4 @@
 
 from geomech.core import modules as _modules
 
-__getattr__, __dir__ = _modules.of_package(__name__, __path__)
+__getattr__, __dir__ = _modules.lazy_modules(__name__, __path__)

@@ -100,7 +100,7 @@ def of_fit(fit: Fitted) -> Result:
 
     `Connection.load` and [system] kind = "table" read it from NetCDF."""
     tube, unit = fit.tube, fit.unit
-    error = tube.at_grid(tube.taylor.connection_error)
+    error = tube.on_grid(tube.taylor.connection_error)
     variables = [
         *fields.of_connection(tube, error),
         *fields.of_known(tube.taylor, unit),

@@ -1,12 +1,13 @@
-"""Search for the gaits of a scene with the largest displacement, efficiency, turning or speed."""
+"""Search for the gaits of a scene with the largest displacement, efficiency, turning or
+speed."""
 
 from geomech.optimisation.optimum import Optimum
-from geomech.optimisation.request import Request, checked
+from geomech.optimisation.request import Request, build_request
 from geomech.optimisation.search import optimise, search
 
 optimize = optimise  # both spellings are in use
 
-__all__ = ["Optimum", "Request", "checked", "optimise", "optimize", "search"]
+__all__ = ["Optimum", "Request", "build_request", "optimise", "optimize", "search"]
 
 
 def __dir__() -> list[str]:

@@ -14,44 +14,59 @@ from geomech.studies.study import Study
 from geomech.systems.base import body_size
 
 
-def direct(r: Request, phases: int | None = None) -> Phases | Runs:
+def direct(request: Request, phases: int | None = None) -> Phases | Runs:
     """Return cycles by the direct tier, at the phases of the loops or at others."""
-    degree = r.degree if r.objective.costs else 1.0
-    loops = r.loops if phases is None else dataclasses.replace(r.loops, phases=phases)
-    if r.by_runs:
-        return Runs(loops, r.system.run, r.objective.costs, degree, body_size(r.system))
-    velocity = (
-        _inside(r.system.velocity, r.loops.box) if r.stored else r.system.velocity
-    )
-    return Phases(loops, velocity, r.power if r.objective.costs else None, degree)
+    system = request.system
+    costs = request.objective.costs
+    degree = request.degree if costs else 1.0
+    loops = request.loops
+    if phases is not None:
+        loops = dataclasses.replace(loops, phases=phases)
+    if request.by_runs:
+        return Runs(loops, system.run, costs, degree, body_size(system))
+    velocity = system.velocity
+    if request.table is not None:
+        velocity = _clipped(velocity, request.loops.box)
+    power = request.power if costs else None
+    return Phases(loops, velocity, power, degree)
 
 
-def build_tables(r: Request) -> tuple:
-    """Return the harmonics of the velocity on a grid, and the norm of the cost of moving; None if the objective has no cost."""
-    study = Study(r.scene.changed(system=r.system)).with_numerics(extent=r.extent)
+def build_tables(request: Request) -> tuple:
+    """Return the harmonics of the velocity on a grid, and the norm of the cost of
+    moving; None in its place if the objective has no cost."""
+    scene = request.scene.changed(system=request.system)
+    study = Study(scene).with_numerics(extent=request.extent)
     harmonics = study.compute_harmonics()
-    if not r.objective.costs:
+    if not request.objective.costs:
         return harmonics, None
-    run = lambda alpha, alphadot: (
-        r.power(alpha, alphadot, r.system.velocity(alpha, alphadot)) ** (1 / r.degree)
-    )
-    return harmonics, metric.fit_norm(run, harmonics.axes)
+
+    def norm(alpha, alphadot):
+        xi = request.system.velocity(alpha, alphadot)
+        return request.power(alpha, alphadot, xi) ** (1 / request.degree)
+
+    return harmonics, metric.fit_norm(norm, harmonics.axes)
 
 
-def from_tables(r: Request, harmonics, norm) -> Phases:
+def from_tables(request: Request, harmonics, norm) -> Phases:
     """Return cycles by interpolation in the tables of `build_tables`."""
-    power, box = None, (-r.extent, r.extent)
-    if norm is not None:
-        cost = _inside(norm.norm, box)
-        power = lambda alpha, alphadot, xi: cost(alpha, alphadot) ** r.degree
-    return Phases(
-        r.loops,
-        _inside(harmonics.velocity, box),
-        power,
-        r.degree if r.objective.costs else 1.0,
-    )
+    box = (-request.extent, request.extent)
+    velocity = _clipped(harmonics.velocity, box)
+    degree = request.degree if request.objective.costs else 1.0
+    if norm is None:
+        return Phases(request.loops, velocity, None, degree)
+    cost = _clipped(norm.norm, box)
+
+    def power(alpha, alphadot, xi):
+        return cost(alpha, alphadot) ** request.degree
+
+    return Phases(request.loops, velocity, power, degree)
 
 
-def _inside(look_up: Callable, box) -> Callable:
-    """Return a look-up that moves shapes outside its field to the edge of the field."""
-    return lambda alpha, alphadot: look_up(np.clip(alpha, *box), alphadot)
+def _clipped(function: Callable, box) -> Callable:
+    """Return a function(alpha, alphadot) that moves shapes outside the box, (lowest,
+    highest), to its edge."""
+
+    def clipped(alpha, alphadot):
+        return function(np.clip(alpha, *box), alphadot)
+
+    return clipped

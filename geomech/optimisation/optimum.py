@@ -9,6 +9,7 @@ import numpy as np
 
 from geomech.gaits import Gait, Sine
 from geomech.geometry.stretch import Stretch, stretch
+from geomech.optimisation.evaluate import Evaluation
 from geomech.optimisation.gain import Gained, gained_ccf
 from geomech.optimisation.request import Request
 from geomech.scenes.model import Scene
@@ -17,32 +18,13 @@ from geomech.systems.capabilities import stored_table
 
 
 @dataclass(frozen=True, eq=False)
-class Evaluation:
-    """A gait as evaluated by the direct tier.
-
-    value, error: of the objective. heading: error of the net turn, rad. displacement: net pose (3,) in the frame at the
-    start, in the system's unit. length: of the path; work: of a cycle at a rad of phase per unit of time, in body drag
-    x body length; None where these are not known, and for the work of a metric that is not one of drag. time: of a rad
-    of phase. limits: names of those that set the time."""
-
-    gait: Gait
-    value: float
-    error: float
-    heading: float
-    displacement: np.ndarray
-    length: float | None
-    work: float | None
-    time: float
-    limits: tuple[str, ...]
-
-
-@dataclass(frozen=True, eq=False)
 class Optimum:
     """Result of `optimise`.
 
-    best, start: evaluated by the direct tier. active: limits that the best touches. answers: value and number of starts
-    of every different local optimum, best first; others: the same of those that only a table led to, by the direct
-    tier, unfinished. seconds: duration of the search.
+    best, start: evaluated by the direct tier. active: limits that the best touches.
+    answers: value and number of starts of every different local optimum, best first;
+    others: the same of those that only a table led to, by the direct tier, unfinished.
+    evaluations: number of cycles. seconds: duration of the search.
 
     Examples
     --------
@@ -62,21 +44,31 @@ class Optimum:
     evaluations: int
     seconds: float
 
-    value = property(lambda self: self.best.value)
-    estimate = property(lambda self: self.best.error)
-    gait = property(lambda self: self.best.gait)
+    @property
+    def value(self) -> float:
+        """Value of the objective for the best gait."""
+        return self.best.value
+
+    @property
+    def estimate(self) -> float:
+        """Error estimate of the value."""
+        return self.best.error
+
+    @property
+    def gait(self) -> Gait:
+        """The best gait."""
+        return self.best.gait
 
     @cached_property
     def scene(self) -> Scene:
         """Scene with the best gait, and with a field that is large enough for it."""
-        scene, gait = self.request.scene, self.best.gait
-        scene = scene.changed(gait=gait)
+        gait = self.best.gait
+        scene = self.request.scene.changed(gait=gait)
         if isinstance(gait, Sine) or stored_table(scene.system, "connection"):
             return scene
-        largest = np.abs(gait.shape(np.linspace(0, 2 * np.pi, 721))).max()
-        return scene.with_numerics(
-            extent=max(scene.numerics.extent, 1.0001 * float(largest))
-        )
+        largest = float(np.abs(gait.shape(np.linspace(0, 2 * np.pi, 721))).max())
+        extent = max(scene.numerics.extent, 1.0001 * largest)
+        return scene.with_numerics(extent=extent)
 
     @cached_property
     def study(self) -> Study:
@@ -84,10 +76,15 @@ class Optimum:
 
     @cached_property
     def gained(self) -> Gained | None:
-        """CCF whose area the best gait gains; None where the velocity does not follow from shape alone."""
-        return None if self.scene.system.traits.steps else gained_ccf(self)
+        """CCF whose area the best gait gains; None where the velocity does not follow
+        from shape alone."""
+        if self.scene.system.traits.steps:
+            return None
+        is_turning = self.request.objective.name == "turning"
+        return gained_ccf(self.study.fitted, self.best, is_turning)
 
     @cached_property
     def stretched(self) -> Stretch:
-        """Coordinates of shape space in which equal lengths take equal effort. Refusal for a system without a metric."""
+        """Coordinates of shape space in which equal lengths take equal effort. Refusal
+        for a system without a metric."""
         return stretch(self.study.metric)

@@ -1,4 +1,6 @@
-"""The search for the best gait of a scene: with tables where these are near and cheap, finished by the direct tier."""
+"""The search for the best gait of a scene.
+
+Tables are used where these are near and cheap; the direct tier finishes the search."""
 
 from __future__ import annotations
 
@@ -18,56 +20,65 @@ from geomech.optimisation import evaluators
 from geomech.optimisation import loops as series
 from geomech.optimisation.ascent import TRIES, ascend, project
 from geomech.optimisation.constraints import NEARLY, Constraints
-from geomech.optimisation.evaluate import evaluate_gait
+from geomech.optimisation.evaluate import Evaluation, evaluate_gait
 from geomech.optimisation.limits import LimitsArgument
 from geomech.optimisation.loops import Loops
-from geomech.optimisation.optimum import Evaluation, Optimum
+from geomech.optimisation.optimum import Optimum
 from geomech.optimisation.problem import EVEN
 from geomech.optimisation.request import (
-    ASCENT,
-    FINISH,
-    FINISHED,
-    LED,
-    MORE,
-    NEAR,
+    DIRECT_STEPS,
+    LAST_STEPS,
+    N_FROM_NARROWER,
+    N_IMPROVED,
+    N_PERTURBED,
+    NARROWER_LIMITS,
     PERTURBATIONS,
-    POLISH,
-    RUNS,
-    SHARE,
+    RUN_STEPS,
+    SECONDS_PER_ASCENT,
+    TABLE_STEPS,
     Request,
-    checked,
+    build_request,
 )
 from geomech.run.runner import runner
 from geomech.scenes.model import Scene
 from rft.core.refusal import Refusal, located
 
-NEAR_TOLERANCE, TOLERANCE = (
-    1e-7,
-    1e-5,
-)  # change of the value in a step at which an ascent ends
+# Change of the value in a step at which an ascent ends: in tables, by the direct tier,
+# and at last by the direct tier at the phases of evaluations.
+TABLE_TOLERANCE = 1e-7
+DIRECT_TOLERANCE = 1e-5
+LAST_TOLERANCE = 1e-7
+LAST_EVEN = EVEN / 10  # weight of even pacing in the last ascent
 NO_TURN = 1e-7  # rad: smaller net turns count as 0
-AS_MUCH = 1e-3  # of the value: a reverse that loses less counts as good
+REVERSE_LOSS = 1e-3  # of the value: a reverse that loses less counts as good
 LARGER = 0.6  # of the range: size of the scene's gait as a second start
-POLISHED, EVEN_AT_LAST = (
-    1e-7,
-    EVEN / 10,
-)  # tolerance and weight of the last ascent, at the phases of evaluations
-FINISHING = 1.0  # s of other work per ascent by the direct tier, likewise
-ENOUGH = 64  # harmonics that suffice for any initial gait
+SECONDS_PER_DIRECT_ASCENT = 1.0  # of other work, likewise
+SERIES_HARMONICS = 64  # suffice for any initial gait
+SERIES_ERROR = 1e-9  # rad: of a series that stands for a gait
+Ranked = tuple[np.ndarray, int, float]  # a loop, its number of starts, its value
 
 
 def optimise(
-    scene: Scene, objective: str = "displacement", direction: str | None = None, harmonics: int | None = None,
-    limits: LimitsArgument = None, starts: int | None = None, *, rate: float | None = None, power: float | None = None,
+    scene: Scene,
+    objective: str = "displacement",
+    direction: str | None = None,
+    harmonics: int | None = None,
+    limits: LimitsArgument = None,
+    starts: int | None = None,
+    *,
+    rate: float | None = None,
+    power: float | None = None,
     progress: Callable | None = None,
-) -> Optimum:  # fmt: skip
-    """Return the gait of a scene with the largest displacement, efficiency, turning or speed (`Objective`).
+) -> Optimum:
+    """Return the gait of a scene with the largest displacement, efficiency, turning or
+    speed (`Objective`).
 
-    It is searched among Fourier series of ``harmonics`` (5) with every shape variable within ``limits`` (the field's extent)
-    of 0, or between (lowest, highest) for each, from the scene's own gait and ``starts`` - 1 others. By default there
-    are no others, except for two joints in a dry medium, which have many local optima: there the `OUTLINES` of the
-    limits are used. For a sine, sines are searched. rate, power: limits for the objective "speed". Refusal for what makes no
-    sense.
+    It is searched among Fourier series of ``harmonics`` (5) with every shape variable
+    within ``limits`` (the field's extent) of 0, or between (lowest, highest) for each,
+    from the scene's own gait and ``starts`` - 1 others. By default there are no others,
+    except for two joints in a dry medium, which have many local optima: there the
+    `OUTLINES` of the limits are used. For a sine, sines are searched. rate, power:
+    limits for the objective "speed". Refusal for a request that makes no sense.
 
     Examples
     --------
@@ -77,7 +88,7 @@ def optimise(
     >>> round(best.value, 3)  # displacement over path length
     0.11
     """
-    request = checked(
+    request = build_request(
         scene, objective, direction, harmonics, limits, starts, rate, power
     )
     return search(request, progress)
@@ -88,9 +99,10 @@ def search(request: Request, progress: Callable | None = None) -> Optimum:
 
     Examples
     --------
-    >>> from geomech.optimisation import checked, search
+    >>> from geomech.optimisation import build_request, search
     >>> from geomech.scenes import load
-    >>> found = search(checked(load("three-link-viscous"), "efficiency", harmonics=1, starts=1))
+    >>> scene = load("three-link-viscous")
+    >>> found = search(build_request(scene, "efficiency", harmonics=1, starts=1))
     >>> round(found.value, 3)  # displacement over path length
     0.11
     """
@@ -103,141 +115,157 @@ class _Search:
     """One search, with its number of cycles."""
 
     def __init__(self, request: Request, progress: Callable | None):
-        self.request, self.progress, self.began, self.count = (
-            request,
-            progress,
-            time.perf_counter(),
-            0,
-        )
+        self.request = request
+        self.progress = progress
+        self.began = time.perf_counter()
+        self.count = 0
         self.completed = 0
         ascents = request.ascents + self._rough
-        self.cycles_per_ascent = TRIES * (
-            RUNS if request.by_runs else FINISH
-        )  # a rough estimate
+        steps = RUN_STEPS if request.by_runs else DIRECT_STEPS
+        self.cycles_per_ascent = TRIES * steps  # a rough estimate
         self.expected = ascents * self.cycles_per_ascent
 
     @property
     def _rough(self) -> bool:
         """Whether there are many local optima."""
-        return (
-            self.request.looks_up or self.request.system.traits.singularity is not None
-        )
+        request = self.request
+        return request.uses_tables or request.system.traits.singularity is not None
 
     def optimum(self) -> Optimum:
-        r = self.request
-        own = r.loops.of(r.scene.gait)
-        self.origin, *others = r.loops.starts(own, r.starts)
-        self.constraints = Constraints(
-            r.loops, r.system.traits.singularity, self.origin
-        )
+        """Return the result of the search."""
+        request = self.request
+        singularity = request.system.traits.singularity
+        own = request.loops.from_gait(request.scene.gait)
+        self.origin, *more_starts = request.loops.starts(own, request.starts)
+        self.constraints = Constraints(request.loops, singularity, self.origin)
+
         start = self._evaluated(self._start())
         self._timed(start)  # refuses impossible frequencies
         turn = abs(float(start.displacement[2]))
-        loops, others = self._ascended(
-            [self.constraints.first, *map(self.constraints.feasible, others)], turn
-        )
-        best, answers, p = start, [], None
-        for q, times in loops:
-            if self.constraints.meets_singular(q, NEARLY):
+        starts = [self.constraints.first]
+        starts += [self.constraints.feasible(p) for p in more_starts]
+        loops, others = self._ascended(starts, turn)
+
+        best = start
+        best_loop = None
+        answers = []
+        for p, times in loops:
+            if self.constraints.meets_singular(p, NEARLY):
                 continue
-            evaluation, q = self._forwards(*self._finished(q, turn), turn)
+            evaluation, p = self._finished(p, turn)
+            evaluation, p = self._forwards(evaluation, p, turn)
             answers.append((evaluation.value, times))
-            straight = not r.objective.straight or abs(
-                evaluation.displacement[2]
-            ) <= turn + self._slack(evaluation)
-            if straight and evaluation.value > best.value:
-                best, p = evaluation, q
-        if p is None:
-            best, p = (
-                dataclasses.replace(start, gait=self._as_series(start.gait)),
-                r.loops.fitted(own),
-            )
-        active = [
-            *r.loops.active(p),
-            *["singular shapes"] * self.constraints.meets_singular(p, 1 / NEARLY),
-            *best.limits,
-        ]
+            is_allowed = self._turns_no_more(evaluation, turn)
+            if is_allowed and evaluation.value > best.value:
+                best = evaluation
+                best_loop = p
+        if best_loop is None:
+            best = dataclasses.replace(start, gait=self._as_series(start.gait))
+            best_loop = request.loops.fitted(own)
+
+        active = request.loops.active(best_loop)
+        if self.constraints.meets_singular(best_loop, 1 / NEARLY):
+            active.append("singular shapes")
+        active += best.limits
         best = dataclasses.replace(best, gait=self._timed(best))
         return Optimum(
-            r, best, start, tuple(active), tuple(sorted(answers, reverse=True)), others, self.count,
+            request,
+            best,
+            start,
+            tuple(active),
+            tuple(sorted(answers, reverse=True)),
+            others,
+            self.count,
             time.perf_counter() - self.began,
-        )  # fmt: skip
+        )
+
+    def _turns_no_more(self, evaluation: Evaluation, turn: float) -> bool:
+        """Return whether a gait turns no more than ``turn``, where that is asked
+        for."""
+        if not self.request.objective.straight:
+            return True
+        return abs(evaluation.displacement[2]) <= turn + self._slack(evaluation)
 
     def _ascended(self, starts: list[np.ndarray], turn: float) -> tuple[list, tuple]:
-        """Return the different loops that the starts lead to, each with its number of starts, and (value, starts) of
-        those that a table led to and the direct tier did not finish."""
-        r, tier = self.request, evaluators.direct(self.request)
-        if not r.looks_up:
-            return self._different(
-                self._optima(tier, starts, turn, None, RUNS if r.by_runs else NEAR)
-            ), ()
-        tables = evaluators.build_tables(r)
-        optima = self._optima(
-            evaluators.from_tables(r, *tables),
-            starts + self._from_narrower(tables, starts, turn),
-            turn,
-            tables,
-            NEAR,
-        )
-        if (
-            not r.system.traits.odd
-        ):  # the table is odd and so does not distinguish the senses
-            optima += [series.reversed_(p) for p in optima]
+        """Return the different loops that the starts lead to, each with its number of
+        starts, and (value, starts) of the optima that a table led to and the direct
+        tier did not finish."""
+        request = self.request
+        tier = evaluators.direct(request)
+        if not request.uses_tables:
+            steps = RUN_STEPS if request.by_runs else TABLE_STEPS
+            optima = self._optima(tier, starts, turn, None, steps)
+            return self._different(optima), ()
+
+        # Optima by tables: from the starts, and from the optima within narrower limits.
+        tables = evaluators.build_tables(request)
+        table_tier = evaluators.from_tables(request, *tables)
+        starts = starts + self._from_narrower(tables, starts, turn)
+        optima = self._optima(table_tier, starts, turn, tables, TABLE_STEPS)
+        if not request.system.traits.odd:
+            # The table is odd and so does not distinguish the senses.
+            optima += [series.reversed_loop(p) for p in optima]
         ranked = self._ranked(tier, optima, turn)
-        improved = self._each(
-            [p for p, *_ in ranked[:FINISHED]], turn, None, FINISH, TOLERANCE
-        )
+
+        # The direct tier improves the first few, and the best of them once more.
+        first = [p for p, *_ in ranked[:N_IMPROVED]]
+        improved = self._each(first, turn, None, DIRECT_STEPS, DIRECT_TOLERANCE)
         better = self._better(turn)
-        finished = [(better(q, p), times) for q, (p, times, _) in zip(improved, ranked)]
-        k = max(
-            range(len(finished)), key=lambda k: self._merit(tier, finished[k][0], turn)
-        )
-        finished[k] = (
-            better(*self._polished(tier, tables, finished[k][0], turn)),
-            finished[k][1],
-        )
-        return finished, tuple((worth, times) for _, times, worth in ranked[FINISHED:])
+        loops = [better(q, p) for q, p in zip(improved, first)]
+        times = [times for _, times, _ in ranked[:N_IMPROVED]]
+        k = max(range(len(loops)), key=lambda k: self._merit(tier, loops[k], turn))
+        loops[k] = better(*self._polished(tier, tables, loops[k], turn))
+
+        unfinished = tuple((value, times) for _, times, value in ranked[N_IMPROVED:])
+        return list(zip(loops, times)), unfinished
 
     def _polished(
         self, tier, tables: tuple, p: np.ndarray, turn: float
     ) -> tuple[np.ndarray, ...]:
-        """Return p and the loop it leads to at the phases of evaluations; with several starts from the best
-        perturbation of p."""
+        """Return p, the best loop near it, and the loop that an ascent at the phases of
+        evaluations reaches from there; with several starts the loops near p include
+        those reached from its perturbations."""
+        request = self.request
         loops = [p]
-        if self.request.starts > 1:
+        if request.starts > 1:
             near, further = self._perturbed(p)
-            near += self._each(further, turn, tables, NEAR, NEAR_TOLERANCE)
-            loops += self._each(near, turn, None, 2 * FINISH, TOLERANCE / 10)
+            near += self._each(further, turn, tables, TABLE_STEPS, TABLE_TOLERANCE)
+            tolerance = DIRECT_TOLERANCE / 10
+            loops += self._each(near, turn, None, 2 * DIRECT_STEPS, tolerance)
         best = max(loops, key=lambda q: self._merit(tier, q, turn))
-        return (
-            p,
-            best,
-            *self._each(
-                [best], turn, None, POLISH, POLISHED, phases=self.request.phases
-            ),
+        last = self._each(
+            [best], turn, None, LAST_STEPS, LAST_TOLERANCE, phases=request.phases
         )
+        return (p, best, *last)
 
     def _better(self, turn: float) -> Callable:
-        """Return a function that projects loops onto the constraints and returns the best."""
+        """Return a function that projects loops onto the constraints and returns the
+        best."""
         tier = evaluators.direct(self.request, self.request.phases)
-        return lambda *loops: max(
-            (self._projected(p, turn) for p in loops),
-            key=lambda p: self._merit(tier, p, turn),
-        )
+
+        def better(*loops):
+            projected = [self._projected(p, turn) for p in loops]
+            return max(projected, key=lambda p: self._merit(tier, p, turn))
+
+        return better
 
     def _perturbed(self, p: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
         """Return loops next to p, and others further off, without its symmetry.
 
-        An ascent from a symmetric loop ends at the best symmetric one, which may be a saddle; and there are other
-        optima about the best."""
-        rng, loops = np.random.default_rng(0), self.request.loops
-        falling = 1 / np.repeat(np.arange(loops.harmonics + 1), 2)[1:].clip(1)[:, None]
-        perturbed = lambda size: self.constraints.feasible(
-            loops.fitted(p + size * loops.unit * falling * rng.normal(size=p.shape))
-        )
-        near, further = (
-            [perturbed(size) for _ in range(MORE)] for size in PERTURBATIONS
-        )
+        An ascent from a symmetric loop ends at the best symmetric one, which may be a
+        saddle; and there are other optima about the best."""
+        loops = self.request.loops
+        rng = np.random.default_rng(0)
+        order = np.repeat(np.arange(loops.harmonics + 1), 2)[1:].clip(1)
+        falling = 1 / order[:, None]
+
+        def perturbed(size):
+            change = size * loops.unit * falling * rng.normal(size=p.shape)
+            return self.constraints.feasible(loops.fitted(p + change))
+
+        near_size, further_size = PERTURBATIONS
+        near = [perturbed(near_size) for _ in range(N_PERTURBED)]
+        further = [perturbed(further_size) for _ in range(N_PERTURBED)]
         return near, further
 
     def _from_narrower(
@@ -245,67 +273,67 @@ class _Search:
     ) -> list[np.ndarray]:
         """Return the best loops within narrower limits, or none for one start.
 
-        The best one there is so far from other optima that a search within the wider limits alone may miss it."""
-        if self.request.starts == 1:
+        The best one there is so far from other optima that a search within the wider
+        limits alone may miss it."""
+        request = self.request
+        if request.starts == 1:
             return []
-        narrow = dataclasses.replace(
-            self.request, loops=self.request.loops.narrower(SHARE)
-        )
-        starts_inside = [
-            self.constraints.feasible(narrow.loops.fitted(p)) for p in starts
-        ]
-        optima = self._each(starts_inside, turn, tables, NEAR, NEAR_TOLERANCE, narrow)
-        return [
-            p
-            for p, *_ in self._ranked(
-                evaluators.from_tables(narrow, *tables), optima, turn
-            )[:LED]
-        ]
+        loops = request.loops.narrower(NARROWER_LIMITS)
+        narrow = dataclasses.replace(request, loops=loops)
+        inside = [self.constraints.feasible(loops.fitted(p)) for p in starts]
+        optima = self._each(inside, turn, tables, TABLE_STEPS, TABLE_TOLERANCE, narrow)
+        tier = evaluators.from_tables(narrow, *tables)
+        ranked = self._ranked(tier, optima, turn)
+        return [p for p, *_ in ranked[:N_FROM_NARROWER]]
 
-    def _ranked(
-        self, tier, loops: list[np.ndarray], turn: float
-    ) -> list[tuple[np.ndarray, int, float]]:
-        """Return the different loops, the number of starts that led to each and their worth, best first."""
-        worth = [
+    def _ranked(self, tier, loops: list[np.ndarray], turn: float) -> list[Ranked]:
+        """Return the different loops, the number of starts that led to each and their
+        values, best first."""
+        ranked = [
             (p, times, self._merit(tier, p, turn))
             for p, times in self._different(loops)
         ]
-        return sorted(worth, key=lambda x: x[2], reverse=True)
+        return sorted(ranked, key=lambda row: row[2], reverse=True)
 
     def _optima(
         self, cycles, starts: list[np.ndarray], turn: float, tables, max_steps: int
     ) -> list[np.ndarray]:
-        """Return the loop that each start leads to; where there are many optima, the first start is tried in two sizes."""
-        other_size = [self._larger(starts[0])] if self._rough else []
-        optima = self._each(
-            [*starts, *other_size], turn, tables, max_steps, NEAR_TOLERANCE
+        """Return the loop that each start leads to; where there are many optima, the
+        first start is tried in two sizes."""
+        if not self._rough:
+            return self._each(starts, turn, tables, max_steps, TABLE_TOLERANCE)
+        starts = [*starts, self._larger(starts[0])]
+        first, *others, larger = self._each(
+            starts, turn, tables, max_steps, TABLE_TOLERANCE
         )
-        if other_size:
-            optima[0] = max(
-                optima[0], optima.pop(), key=lambda p: self._merit(cycles, p, turn)
-            )
-        return optima
+        best = max(first, larger, key=lambda p: self._merit(cycles, p, turn))
+        return [best, *others]
 
     def _larger(self, p: np.ndarray) -> np.ndarray:
         """Return the loop in another size: a small one may lead to a poor optimum."""
-        size = np.abs(self.request.loops.cycle(p)[0] - p[0]).max()
-        return self.constraints.feasible(
-            self.request.loops.fitted(
-                np.concatenate(
-                    [p[:1], p[1:] * LARGER * self.request.loops.half.max() / size]
-                )
-            )
-        )
+        loops = self.request.loops
+        size = np.abs(loops.cycle(p)[0] - p[0]).max()
+        resized = p[1:] * LARGER * loops.half.max() / size
+        larger = loops.fitted(np.concatenate([p[:1], resized]))
+        return self.constraints.feasible(larger)
 
     def _each(
-        self, starts: list[np.ndarray], turn: float, tables, max_steps: int, tolerance: float, r: Request | None = None,
+        self,
+        starts: list[np.ndarray],
+        turn: float,
+        tables,
+        max_steps: int,
+        tolerance: float,
+        request: Request | None = None,
         phases: int | None = None,
-    ) -> list[np.ndarray]:  # fmt: skip
-        """Return the loop that each start leads to, by tables or else by the direct tier. r, phases: another request,
-        other phases."""
+    ) -> list[np.ndarray]:
+        """Return the loop that each start leads to, by tables or else by the direct
+        tier.
+
+        request, phases: another request, other phases."""
         is_single = len(starts) == 1 and not getattr(runner().executor, "remote", False)
         ascent = Ascent(
-            r or self.request,
+            request or self.request,
             self.origin,
             turn,
             tables,
@@ -314,52 +342,48 @@ class _Search:
             self._report if is_single else None,
             phases,
         )
-        results, done_before, seconds = (
-            [],
-            self.completed,
-            len(starts) * (ASCENT if tables else FINISHING),
+        seconds = SECONDS_PER_ASCENT if tables else SECONDS_PER_DIRECT_ASCENT
+        ascents = runner().map(
+            _ascend_from, ascent, starts, len(starts), len(starts) * seconds
         )
-        for p, count in runner().map(
-            _ascend_from, ascent, starts, len(starts), seconds
-        ):
-            results.append(p)
+        completed_before = self.completed
+        loops = []
+        for p, count in ascents:
+            loops.append(p)
             self.count += count
-            self._report(
-                max(
-                    0,
-                    done_before
-                    + len(results) * self.cycles_per_ascent
-                    - self.completed,
-                )
-            )  # the same by any executor, however soon it ended
-        return results
+            # An ascent counts the same by any executor, however soon it ended.
+            completed = completed_before + len(loops) * self.cycles_per_ascent
+            self._report(max(0, completed - self.completed))
+        return loops
 
     def _merit(self, tier, p, turn: float) -> float:
-        """Return the value of a loop, less a linear estimate of the loss by turning no more than ``turn``."""
+        """Return the value of a loop, less a linear estimate of the loss by turning no
+        more than ``turn``; -inf for a loop that cannot be run."""
+        objective = self.request.objective
         try:
-            b = tier(p)
+            cycle = tier(p)
         except RuntimeError:  # the loop cannot be run
             return -np.inf
         finally:
             self.count += 1
-        power = b.power[0] if b.power else None
-        timed = self.request.objective.timed
-        period = (
-            self.request.objective.time(
-                np.abs(tier.loops.cycle(p)[1]).max(), power, tier.degree
-            )[0]
-            if timed
-            else 1.0
-        )
-        value, by = self.request.objective.value(b, period)
-        if self.request.objective.straight:
-            theta, by_theta = b.net[0][2], b.net[1][2]
-            more = theta - np.clip(theta, -turn, turn)
-            value -= more * (by * by_theta).sum() / ((by_theta**2).sum() or 1.0)
+
+        period = 1.0
+        if objective.timed:
+            fastest = np.abs(tier.loops.cycle(p)[1]).max()
+            power = cycle.power[0] if cycle.power else None
+            period, _ = objective.time(fastest, power, tier.degree)
+        value, by_p = objective.value(cycle, period)
+        if objective.straight:
+            theta = cycle.net[0][2]
+            theta_by_p = cycle.net[1][2]
+            excess = theta - np.clip(theta, -turn, turn)
+            square = (theta_by_p**2).sum() or 1.0
+            value -= excess * (by_p * theta_by_p).sum() / square
         return float(value) if np.isfinite(value) else -np.inf
 
     def _ascend(self, cycles, p, ascent: Ascent) -> np.ndarray:
-        before = cycles.count
+        """Return the loop that an ascent from p reaches, and count its cycles."""
+        count_before = cycles.count
         p = ascend(
             cycles,
             self.request.objective,
@@ -371,12 +395,12 @@ class _Search:
             singularity=self.request.system.traits.singularity,
             away=self.constraints.away,
             on_cycle=ascent.on_cycle or (lambda: None),
-            even=EVEN_AT_LAST if ascent.phases else EVEN,
+            even=LAST_EVEN if ascent.phases else EVEN,
         )
-        self.count += cycles.count - before
-        return (
-            p if isinstance(self.request.loops, Loops) else self.request.loops.fitted(p)
-        )  # loops are projected later
+        self.count += cycles.count - count_before
+        if isinstance(self.request.loops, Loops):
+            return p  # projected later
+        return self.request.loops.fitted(p)
 
     def _finished(self, p: np.ndarray, turn: float) -> tuple[Evaluation, np.ndarray]:
         """Return the evaluation of the projected loop, and the loop."""
@@ -384,131 +408,137 @@ class _Search:
         return self._evaluated(self.request.loops.gait(p)), p
 
     def _projected(self, p: np.ndarray, turn: float) -> np.ndarray:
-        """Return a loop near p that satisfies all constraints at the phases of evaluations, and between them."""
-        r = self.request
-        if not isinstance(r.loops, Loops):
+        """Return a loop near p that satisfies all constraints at the phases of
+        evaluations, and between them."""
+        request = self.request
+        if not isinstance(request.loops, Loops):
             return p
-        cycles = evaluators.direct(r, r.phases)
-        with contextlib.suppress(
-            RuntimeError
-        ):  # raised for a loop nearby that cannot be run
+        cycles = evaluators.direct(request, request.phases)
+        # A loop nearby that cannot be run raises RuntimeError.
+        with contextlib.suppress(RuntimeError):
             p = project(
-                cycles, r.objective, p, turn=turn, stroke=self.constraints.stroke, singularity=r.system.traits.singularity,
+                cycles,
+                request.objective,
+                p,
+                turn=turn,
+                stroke=self.constraints.stroke,
+                singularity=request.system.traits.singularity,
                 away=self.constraints.away,
-            )  # fmt: skip
+            )
         self.count += cycles.count
-        return r.loops.fitted(p)  # unchanged, unless no loop nearby is feasible
+        return request.loops.fitted(p)  # unchanged, unless no loop nearby is feasible
 
     def _slack(self, evaluation: Evaluation) -> float:
-        """Return the allowed excess of a net turn, rad: roundoff and, where cycles are not those of the search, their
-        error."""
-        return NO_TURN + (
-            evaluation.heading
-            if self.request.by_runs
-            or self.request.system is not self.request.scene.system
-            else 0.0
-        )
+        """Return the allowed excess of a net turn, rad: roundoff and, where cycles are
+        not those of the search, their error."""
+        request = self.request
+        if request.by_runs or request.system is not request.scene.system:
+            return NO_TURN + evaluation.heading
+        return NO_TURN
 
     def _report(self, cycles: int = 1) -> None:
+        """Report the progress after more cycles."""
         self.completed += cycles
         self.expected = max(self.expected, 1.1 * self.completed)
         if self.progress:
             self.progress(self.completed / self.expected)
 
     def _different(self, loops: list[np.ndarray]) -> list[tuple[np.ndarray, int]]:
+        """Return the loops that differ, the first of each, and how often each
+        occurs."""
         groups: list[list] = []
         for p in loops:
             for group in groups:
-                if self._same(p, group[0]):
+                if self._is_same(p, group[0]):
                     group[1] += 1
                     break
             else:
                 groups.append([p, 1])
         return [tuple(group) for group in groups]
 
-    def _same(self, p, q) -> bool:
-        loops, system = self.request.loops, self.request.system
-        return (
-            series.same(p, q, system.traits.mirror, system.traits.odd)
-            if isinstance(loops, Loops)
-            else loops.same(p, q)
-        )
+    def _is_same(self, p, q) -> bool:
+        """Return whether two loops have the same value by their shape."""
+        loops = self.request.loops
+        if not isinstance(loops, Loops):
+            return loops.is_same(p, q)
+        traits = self.request.system.traits
+        return series.is_same(p, q, traits.mirror, traits.odd)
 
     def _start(self) -> Gait:
         """Return the initial gait, with a note where it is not the scene's."""
-        r = self.request
-        if r.gait is not r.scene.gait:
-            limit = (
-                f"{r.loops.within:g} rad"
-                if np.ndim(r.loops.within) == 0
-                else "its limits"
-            )
-            note(
-                f"{r.scene.name}: its gait reaches beyond {limit}: the search starts from a smaller one"
-            )
-            return r.loops.gait(self.constraints.first)
-        return r.gait
+        request = self.request
+        if request.gait is request.scene.gait:
+            return request.gait
+        limit = "its limits"
+        if np.ndim(request.loops.within) == 0:
+            limit = f"{request.loops.within:g} rad"
+        note(
+            f"{request.scene.name}: its gait reaches beyond {limit}:"
+            " the search starts from a smaller one"
+        )
+        return request.loops.gait(self.constraints.first)
 
     def _started_at_mean_heading(self, p: np.ndarray) -> np.ndarray:
-        """Return the loop; for an objective with a direction, started at the phase where the heading equals its mean."""
-        r = self.request
-        if not (r.objective.direction and isinstance(r.loops, Loops)) or r.by_runs:
+        """Return the loop; for an objective with a direction, started at the phase
+        where the heading equals its mean."""
+        request = self.request
+        if not request.objective.direction or not isinstance(request.loops, Loops):
+            return p
+        if request.by_runs:
             return p
         for _ in range(3):  # the crossing nearest to the start, refined
-            ahead = turning(r.scene.system.run(*r.loops.cycle(p)).xi)
-            n, after = len(ahead), np.roll(ahead, -1)
-            places = np.flatnonzero(ahead * after <= 0)
-            k = places[np.argmin(np.minimum(places, n - places))]
-            share = ahead[k] / ((ahead[k] - after[k]) or 1.0)
+            alpha, alphadot = request.loops.cycle(p)
+            heading = turning(request.scene.system.run(alpha, alphadot).xi)
+            following = np.roll(heading, -1)
+            n = len(heading)
+            crossings = np.flatnonzero(heading * following <= 0)
+            k = crossings[np.argmin(np.minimum(crossings, n - crossings))]
+            share = heading[k] / ((heading[k] - following[k]) or 1.0)
             p = series.shifted(p, 2 * np.pi / n * (k + share))
         return p
 
     def _forwards(
         self, evaluation: Evaluation, p: np.ndarray, turn: float
     ) -> tuple[Evaluation, np.ndarray]:
-        """Return the gait, or its reverse where it moves against the direction and the reverse is about as good."""
-        k = "xy".find(self.request.objective.direction or "-")
-        if (
-            k < 0
-            or evaluation.displacement[k] >= 0
-            or not isinstance(self.request.loops, Loops)
-        ):
+        """Return the gait, or its reverse where it moves against the direction and the
+        reverse is about as good."""
+        direction = self.request.objective.direction
+        if not direction or not isinstance(self.request.loops, Loops):
             return evaluation, p
-        reverse, q = self._finished(series.reversed_(p), turn)
-        return (
-            (reverse, q)
-            if reverse.value >= evaluation.value * (1 - AS_MUCH)
-            else (evaluation, p)
-        )
+        if evaluation.displacement["xy".index(direction)] >= 0:
+            return evaluation, p
+        reverse, q = self._finished(series.reversed_loop(p), turn)
+        if reverse.value >= evaluation.value * (1 - REVERSE_LOSS):
+            return reverse, q
+        return evaluation, p
 
     def _timed(self, evaluation: Evaluation) -> Gait:
         """Return the gait with the frequency that its limits allow."""
-        if self.request.objective.timed and 0 < evaluation.time < 1 / (
-            2 * np.pi * FASTEST
-        ):
-            raise Refusal(
-                f"its limits let a gait repeat more than {FASTEST:g} times a second",
-                instead="lower ``rate``, or ``power``",
-            )
-        frequency = (
-            1 / (2 * np.pi * evaluation.time)
-            if self.request.objective.timed and evaluation.time
-            else self.request.scene.gait.frequency
-        )
+        frequency = self.request.scene.gait.frequency
+        if self.request.objective.timed and evaluation.time:
+            if 0 < evaluation.time < 1 / (2 * np.pi * FASTEST):
+                raise Refusal(
+                    f"its limits let a gait repeat more than {FASTEST:g}"
+                    " times a second",
+                    instead="lower ``rate``, or ``power``",
+                )
+            frequency = 1 / (2 * np.pi * evaluation.time)
         return dataclasses.replace(evaluation.gait, frequency=frequency)
 
     def _as_series(self, gait: Gait) -> Gait:
         """Return the initial gait as a Fourier series of amplitude 1."""
-        if isinstance(self.request.loops, Loops):
-            for harmonics in (self.request.loops.harmonics, 16, ENOUGH):
-                loops = dataclasses.replace(self.request.loops, harmonics=harmonics)
-                series_gait = loops.gait(loops.of(gait))
-                if np.abs(series_gait.cycle(512)[0] - gait.cycle(512)[0]).max() < 1e-9:
-                    break
-            return series_gait
-        return gait
+        if not isinstance(self.request.loops, Loops):
+            return gait
+        for harmonics in (self.request.loops.harmonics, 16, SERIES_HARMONICS):
+            loops = dataclasses.replace(self.request.loops, harmonics=harmonics)
+            as_series = loops.gait(loops.from_gait(gait))
+            error = np.abs(as_series.cycle(512)[0] - gait.cycle(512)[0]).max()
+            if error < SERIES_ERROR:
+                break
+        return as_series
 
     def _evaluated(self, gait: Gait) -> Evaluation:
+        """Return the evaluation of a gait, and count it."""
         self.count += 1
         return evaluate_gait(self.request, gait)
 
@@ -517,9 +547,10 @@ class _Search:
 class Ascent:
     """Settings of an ascent.
 
-    origin: the first start. turn (rad): largest net turn of a cycle. tables: from `evaluators.build_tables`, or None
-    for the direct tier. on_cycle: called after every cycle, where only one start is computed. phases: of the direct
-    tier, where they differ from those of the loops, as in the last ascent."""
+    origin: the first start. turn (rad): largest net turn of a cycle. tables: from
+    `evaluators.build_tables`, or None for the direct tier. on_cycle: called after every
+    cycle, where only one start is computed. phases: of the direct tier, where they
+    differ from those of the loops, as in the last ascent."""
 
     request: Request
     origin: np.ndarray
@@ -533,13 +564,12 @@ class Ascent:
 
 def _ascend_from(ascent: Ascent, p: np.ndarray) -> tuple[np.ndarray, int]:
     """Return the loop that a start leads to, and the number of cycles."""
-    search = _Search(ascent.request, None)
-    search.constraints = Constraints(
-        ascent.request.loops, ascent.request.system.traits.singularity, ascent.origin
-    )
-    cycles = (
-        evaluators.from_tables(ascent.request, *ascent.tables)
-        if ascent.tables
-        else evaluators.direct(ascent.request, ascent.phases)
-    )
+    request = ascent.request
+    singularity = request.system.traits.singularity
+    search = _Search(request, None)
+    search.constraints = Constraints(request.loops, singularity, ascent.origin)
+    if ascent.tables:
+        cycles = evaluators.from_tables(request, *ascent.tables)
+    else:
+        cycles = evaluators.direct(request, ascent.phases)
     return search._ascend(cycles, p, ascent), search.count

@@ -10,7 +10,7 @@ import numpy as np
 
 from geomech.core.variables import Variable
 from geomech.geometry.symmetry import zero_components
-from geomech.optimisation.gain import PHASES, limiting
+from geomech.optimisation.limiting import PHASES, limiting
 from geomech.optimisation.optimum import Optimum
 from geomech.scenes.model import Scene
 from geomech.scenes.write import toml
@@ -20,11 +20,12 @@ from geomech.studies.tables import COMPONENTS, zero_words
 from geomech.systems.base import body_size, length_unit, shape_labels
 from rft.core.refusal import Refusal
 
-HOW = ("refined", "by a table alone")  # local optima were searched
+# How far local optima were searched.
+HOW = ("refined", "by a table alone")
 
 
 def attributes(optimum: Optimum) -> dict[str, Any]:
-    """Return what was sought, and the scene with the best gait as its text."""
+    """Return the objective with its limits, and the scene with the best gait as text."""
     objective = optimum.request.objective
     facts: dict[str, Any] = {
         "objective": objective.name,
@@ -44,7 +45,7 @@ def attributes(optimum: Optimum) -> dict[str, Any]:
 
 def variables(optimum: Optimum) -> list[Variable]:
     """Return the value of the best gait, its displacement and effort, the local optima
-    that the starts led to, the limits that the best touches, and what the search took.
+    that the starts led to, the limits that the best touches, and the search's cost.
 
     The value of a distance is over the body's length, the displacement is not."""
     return [
@@ -58,12 +59,13 @@ def variables(optimum: Optimum) -> list[Variable]:
 
 
 def values(optimum: Optimum) -> list[Variable]:
-    """Return the value of the best gait and that of the scene's own."""
+    """Return the values of the best gait and of the scene's own."""
     objective = optimum.request.objective
     unit = objective.unit
     if objective.name == "efficiency":
         unit = units(optimum.scene.system)["efficiency"]
-    best, start = optimum.best, optimum.start
+    best = optimum.best
+    start = optimum.start
     own = f"{objective.name} of the scene's gait"
     return [
         Variable("value", (), best.value, unit, objective.name, best.error),
@@ -74,22 +76,24 @@ def values(optimum: Optimum) -> list[Variable]:
 def displacement(optimum: Optimum) -> list[Variable]:
     """Return the pose after a cycle, path length and work where they are known, and the
     frequency of a gait that is timed."""
-    system, best = optimum.scene.system, optimum.best
-    unit = length_unit(system)
-    why = zero_components(system.traits, optimum.gait)
+    system = optimum.scene.system
+    best = optimum.best
+    length = length_unit(system)
+    reasons = zero_components(system.traits, optimum.gait)
     found = []
-    for name, value, of in zip(
-        ("x", "y", "heading"), best.displacement, (unit, unit, "rad")
+    for name, value, unit in zip(
+        ("x", "y", "heading"), best.displacement, (length, length, "rad")
     ):
         zero = ""
-        if name in why:
-            zero = zero_words(why[name])
+        if name in reasons:
+            zero = zero_words(reasons[name])
         label = "net displacement per cycle"
-        found.append(Variable(name, (), value, of, label, zero=zero))
-    of_effort = units(system)
+        found.append(Variable(name, (), value, unit, label, zero=zero))
+
+    effort_units = units(system)
     for name, value in (("path_length", best.length), ("work", best.work)):
         if value is not None:
-            unit = of_effort.get(name, "")
+            unit = effort_units.get(name, "")
             found.append(Variable(name, (), value, unit, "per cycle"))
     if optimum.request.objective.timed:
         frequency = optimum.gait.frequency
@@ -100,8 +104,8 @@ def displacement(optimum: Optimum) -> list[Variable]:
 def answers(optimum: Optimum) -> list[Variable]:
     """Return the local optima that the starts led to, best first."""
     found = []
-    for how, some in zip(HOW, (optimum.answers, optimum.others)):
-        found += [(value, starts, how) for value, starts in some]
+    for how, optima in zip(HOW, (optimum.answers, optimum.others)):
+        found += [(value, starts, how) for value, starts in optima]
     if not found:
         return []
     values, starts, how = zip(*found)
@@ -124,12 +128,13 @@ def limits(optimum: Optimum) -> list[Variable]:
 
 
 def loop(optimum: Optimum) -> list[Variable]:
-    """Return the best loop and the start, phase by phase, what limits the best there, and
-    the joint limits, where it was searched within any."""
+    """Return the best loop and the start, phase by phase, what limits the best there,
+    and the joint limits, where it was searched within any."""
     phase = np.linspace(0, 2 * np.pi, PHASES)
     joints = np.arange(1, optimum.gait.joints + 1)
     dims = ("phase", "joint")
-    best, start = optimum.gait.shape(phase), optimum.start.gait.shape(phase)
+    best = optimum.gait.shape(phase)
+    start = optimum.start.gait.shape(phase)
     found = [
         Variable("phase", ("phase",), phase, "rad", "phase of the gait"),
         Variable("joint", ("joint",), joints),

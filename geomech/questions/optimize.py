@@ -84,9 +84,9 @@ class Optimize(Question):
 
     @cached_property
     def request(self) -> "Request":
-        from geomech.optimisation.request import checked
+        from geomech.optimisation.request import build_request
 
-        return checked(
+        return build_request(
             self.scene,
             self.objective,
             self.direction,

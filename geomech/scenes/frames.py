@@ -7,7 +7,7 @@ from geomech.systems.base import System
 from geomech.systems.framed import NAME, Framed
 from geomech.systems.table import Table
 from geomech.tiers.base import Numerics
-from geomech.tiers.fitted import FIELD, LARGEST_GRID, directions
+from geomech.tiers.fitted import LARGEST_FIELD, LARGEST_GRID, directions
 from rft.core.refusal import Refusal
 
 
@@ -18,7 +18,7 @@ def framed(system: System, numerics: Numerics) -> System:
         return system.in_frame(NAME)  # on the grid of its file
     inner = system.inner if isinstance(system, Framed) else system
     if (count := numerics.grid**inner.joints) > LARGEST_GRID or (
-        inner.joints > 3 and count > FIELD
+        inner.joints > 3 and count > LARGEST_FIELD
     ):
         raise Refusal(
             f"a frame on a grid of {numerics.grid}^{inner.joints} shapes is too large",

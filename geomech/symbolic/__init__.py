@@ -1,6 +1,7 @@
-"""Connections and curvatures in closed form, as sympy matrices: formulas that simplify, for papers and for `velocity`.
+"""Connections and CCFs in closed form, as sympy matrices, for papers and for
+`velocity`.
 
-A, alpha = formula(system)              # or symbolic.viscous_chain(lengths, ratio), with symbols
+A, alpha = symbolic.viscous_chain(lengths, ratio)  # with numbers or symbols
 A = symbolic.simplified(A, alpha)
 print(symbolic.latex(symbolic.ccf(A, alpha)))
 """

@@ -28,7 +28,8 @@ def bracket(X: sp.Matrix, Y: sp.Matrix) -> sp.Matrix:
 
 
 def ccf(A: sp.Matrix, alpha: Sequence[sp.Symbol], i: int = 0, j: int = 1) -> sp.Matrix:
-    """Return d_i A_j - d_j A_i + [A_i, A_j] of a connection A (3, d), a column of three.
+    """Return d_i A_j - d_j A_i + [A_i, A_j] of a connection A (3, d), a column of
+    three.
 
     Examples
     --------
@@ -44,8 +45,8 @@ def ccf(A: sp.Matrix, alpha: Sequence[sp.Symbol], i: int = 0, j: int = 1) -> sp.
 
 
 def velocity(A: sp.Matrix, alpha: Sequence[sp.Symbol]) -> Callable[..., Any]:
-    """Return a function velocity(alpha, alphadot) -> xi, as `geomech.geometry.connection.fit` and
-    `geomech.tiers.direct.direct` take it.
+    """Return a function velocity(alpha, alphadot) -> xi, as
+    `geomech.geometry.connection.fit` and `geomech.tiers.direct.direct` take it.
 
     Examples
     --------
@@ -61,9 +62,8 @@ def velocity(A: sp.Matrix, alpha: Sequence[sp.Symbol]) -> Callable[..., Any]:
 
     def xi(a, adot):
         a, adot = np.broadcast_arrays(unmasked("a", a), unmasked("adot", adot))
-        flat = [
-            np.broadcast_to(e, a.shape[:-1]) for e in entries(*np.moveaxis(a, -1, 0))
-        ]
+        values = entries(*np.moveaxis(a, -1, 0))
+        flat = [np.broadcast_to(value, a.shape[:-1]) for value in values]
         matrix = np.stack(flat, -1).reshape(*a.shape[:-1], rows, columns)
         return np.einsum("...ij,...j->...i", matrix, adot)
 
@@ -71,9 +71,11 @@ def velocity(A: sp.Matrix, alpha: Sequence[sp.Symbol]) -> Callable[..., Any]:
 
 
 def simplified(A: sp.Matrix, alpha: Sequence[sp.Symbol]) -> sp.Matrix:
-    """Return the matrix with every entry one fraction in lowest terms, of sums of cosines and sines of sums of angles.
-    Two formulas of one function come out equal. An entry that is no rational function of sines and cosines, or neither
-    even nor odd in alpha, is unchanged.
+    """Return the matrix with every entry one fraction in lowest terms, of sums of
+    cosines and sines of sums of angles.
+
+    Two formulas of one function become equal. An entry that is no rational function of
+    sines and cosines, or neither even nor odd in alpha, is unchanged.
 
     Examples
     --------
@@ -88,8 +90,9 @@ def simplified(A: sp.Matrix, alpha: Sequence[sp.Symbol]) -> sp.Matrix:
 
 
 def latex(A: sp.Matrix, name: str = "A") -> str:
-    """Return LaTeX of a matrix, an entry a line, with its denominator in front if all entries have the same, up to a number.
-    It needs amsmath.
+    """Return LaTeX of a matrix, with one entry on each line; it needs amsmath.
+
+    The denominator stands in front if all entries have the same, up to a number.
 
     Examples
     --------
@@ -97,29 +100,28 @@ def latex(A: sp.Matrix, name: str = "A") -> str:
     >>> A, alpha = differential_drive(radius=1, track=1)
     >>> text = latex(A)  # a matrix of amsmath
     """
-    below = lambda x: sp.Mul(
-        *(
-            f
-            for f in sp.Mul.make_args(x)
-            if f.is_Pow and f.exp.is_negative and not f.is_number
-        )
-    )
-    common = {below(x) for x in A if x != 0}
-    if len(common) != 1 or common == {1}:
+    inverses = {_inverse_denominator(x) for x in A if x != 0}
+    if len(inverses) != 1 or inverses == {1}:
         return f"{name} = {_pmatrix(A)}"
-    (one_over,) = common
-    above = A.applyfunc(
-        lambda x: sp.Mul(
-            *(
-                f
-                for f in sp.Mul.make_args(x)
-                if f not in one_over.args and f != one_over
-            )
-        )
-    )
-    return f"{name} = \\frac{{1}}{{D}} {_pmatrix(above)},\n\\qquad D = {sp.latex(1 / one_over)}"
+    (inverse,) = inverses
+
+    def numerator(x):
+        factors = sp.Mul.make_args(x)
+        return sp.Mul(*[f for f in factors if f not in (*inverse.args, inverse)])
+
+    matrix = _pmatrix(A.applyfunc(numerator))
+    denominator = sp.latex(1 / inverse)
+    return f"{name} = \\frac{{1}}{{D}} {matrix},\n\\qquad D = {denominator}"
+
+
+def _inverse_denominator(x) -> sp.Expr:
+    """Return the product of the factors of an entry with negative powers, but for
+    numbers."""
+    powers = [f for f in sp.Mul.make_args(x) if f.is_Pow and not f.is_number]
+    return sp.Mul(*[f for f in powers if f.exp.is_negative])
 
 
 def _pmatrix(M: sp.Matrix) -> str:
-    rows = (" &\n".join(map(sp.latex, M.row(k))) for k in range(M.rows))
+    """Return a matrix in LaTeX."""
+    rows = [" &\n".join(map(sp.latex, M.row(k))) for k in range(M.rows)]
     return "\\begin{pmatrix}\n" + " \\\\\n".join(rows) + "\n\\end{pmatrix}"

@@ -266,7 +266,7 @@ class Table:
         """Half widths (3, joints, N_1, ...) of intervals of A on the file's grid, from the file, else from the Taylor
         series about a measured gait; None where there are none."""
         if self.stored.A_error is None and self.tube is not None:
-            return self.tube.at_grid(self.tube.taylor.connection_error)
+            return self.tube.on_grid(self.tube.taylor.connection_error)
         return self.stored.A_error
 
     def velocity(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from geomech.core.summary import moved
+from geomech.core.summary import format_pose
 from geomech.core.variables import Result
 from geomech.geometry.symmetry import zero_components
 
@@ -13,7 +13,7 @@ def text(result: Result) -> str:
     zero = [*zero_components(motion.scene.system.traits, motion.scene.gait)]
     if "heading" not in zero:  # else x and y of one cycle are those of all
         zero = zero if motion.cycles == 1 else []
-    pose = moved(
+    pose = format_pose(
         [
             (v.values[-1], v.unit)
             for v in (result[name] for name in ("x", "y", "theta"))

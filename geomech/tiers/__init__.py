@@ -1,4 +1,6 @@
-"""Tiers: ways to predict the displacement of a gait, one a file, each nearer to the truth and dearer than the one before."""
+"""Tiers: methods to predict the displacement of a gait, one in each file.
+
+Each is nearer to the truth than the one before, and costs more."""
 
 from geomech.tiers.adapted import ADAPTED
 from geomech.tiers.area import AREA

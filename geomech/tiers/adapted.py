@@ -1,4 +1,5 @@
-"""The adapted tier: a connection made for one family of gaits, exact up to its table (`geomech.geometry.family`)."""
+"""The adapted tier: a connection for one family of gaits, exact up to its table
+(`geomech.geometry.family`)."""
 
 from __future__ import annotations
 
@@ -16,40 +17,51 @@ from rft.core.premise import SHAPE_ALONE
 
 
 def table(system, numerics, gait, amplitudes) -> Table:
-    """Return the family of scaled copies of a gait up to these amplitudes, as a table to build."""
-    a = real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes)
-    least, largest = float(a.min(initial=0.0)), float(a.max(initial=0.0))
-    count, phases = numerics.curves, numerics.phases // 2
-    sides = np.array([a for a in (least, largest) if a])
+    """Return the family of scaled copies of a gait up to these amplitudes, as a table
+    to build."""
+    if amplitudes is None:
+        amplitudes = gait.amplitude
+    a = real_array("amplitudes", amplitudes)
+    least = float(a.min(initial=0.0))
+    largest = float(a.max(initial=0.0))
+    count = numerics.curves
+    phases = numerics.phases // 2
+    ends = np.array([a for a in (least, largest) if a])
+    curves = np.outer(ends, np.arange(1, count + 1) / count).ravel()
     return Table(
         "family",
-        (numerics.curves, numerics.phases, gait, least, largest),
-        len(sides) * count * solved_phases(system, gait, phases),
-        len(sides) * count * phases * 3,
-        partial(_build, system, gait, least, largest, count, phases),
-        amplitudes=np.outer(sides, np.arange(1, count + 1) / count).ravel(),
+        key=(numerics.curves, numerics.phases, gait, least, largest),
+        balances=len(curves) * solved_phases(system, gait, phases),
+        numbers=len(curves) * phases * 3,
+        build=partial(_build, system, gait, least, largest, count, phases),
+        amplitudes=curves,
     )
 
 
 def _build(
     system, gait, least, largest, count, phases, progress: Callable | None
 ) -> Family:
-    if least == largest:  # rest, and nothing else
+    """Return the family of a gait from the amplitude least to largest."""
+    if least == largest:  # both are 0: rest alone
         return Family(gait, np.zeros(1), np.zeros((1, phases, 3)))
-    return family.fit(
-        partial(_run, system), gait, largest, count, phases, progress, least=least
-    )
+    velocity = partial(_run, system)
+    return family.fit(velocity, gait, largest, count, phases, progress, least=least)
 
 
 def _run(system, alpha, alphadot) -> np.ndarray:
+    """Return xi (..., N, 3) of the cycles of a system."""
     return system.run(alpha, alphadot).xi
 
 
 def _plan(system, numerics, gait, amplitudes) -> Plan:
-    area = lambda curves, batch: curves.area(
-        np.asarray(gait.amplitude if batch is None else batch, float)
-    )
-    return Plan(area, table(system, numerics, gait, amplitudes))
+    """Return the plan of the tier."""
+
+    def predict(curves, amplitudes):
+        if amplitudes is None:
+            amplitudes = gait.amplitude
+        return curves.area(np.asarray(amplitudes, float))
+
+    return Plan(predict, table(system, numerics, gait, amplitudes))
 
 
 ADAPTED = Tier(

@@ -1,5 +1,7 @@
-"""The area tier: exp of the CCF's integral over the area enclosed; winding numbers count, so figure-eights cancel. A
-loop of three and more joints encloses no area but spans surfaces; how much depends on their choice is reported."""
+"""The area tier: exp of the CCF's integral over the enclosed area.
+
+Winding numbers count, so figure-eights cancel. A loop of three and more joints encloses
+no area but spans surfaces; how much the result depends on their choice is reported."""
 
 from __future__ import annotations
 
@@ -18,19 +20,17 @@ from rft.core.checks import in_range
 from rft.core.refusal import Refusal
 from rft.formulas import se2
 
-TIPS, AROUND = (
-    2,
-    64,
-)  # surfaces besides the one that is taken; phases on one where there is no field
+TIPS = 2  # surfaces besides the one that is taken
+AROUND = 64  # phases on a surface where there is no field
 
 
 def area(field: Field, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
-    """Return exp of the integral of a CCF (joints 1 and 2), (..., 3), for amplitudes (...,) or the gait's own. Refusal
-    off the grid.
+    """Return exp of the integral of a CCF (joints 1 and 2), (..., 3), for amplitudes
+    (...,) or the gait's own. Refusal off the grid.
 
-    By Green's theorem the integral is that of P d(alpha_2) along the gait, dP/d(alpha_1) = CCF. Order 3 in the gait's
-    size in a generic frame, 4 where A vanishes at its centre.
-    """
+    By Green's theorem it is the integral of P d(alpha_2) along the gait, with
+    dP/d(alpha_1) = CCF. The estimate is of order 3 in the gait's size in a generic
+    frame, 4 where A vanishes at its centre."""
     checked_gait(gait)
     in_range("phases", phases, 1, 1e9, whole=True)
     if not isinstance(field, Field):
@@ -39,67 +39,85 @@ def area(field: Field, gait: Gait, amplitudes=None, phases: int = 256) -> np.nda
         )
     if field.joints != 2 or gait.joints != 2:
         raise Refusal(
-            f"the area tier needs two joints, got a field of {field.joints} and a gait of {gait.joints}"
+            "the area tier needs two joints, got a field of"
+            f" {field.joints} and a gait of {gait.joints}"
         )
+    if amplitudes is None:
+        amplitudes = gait.amplitude
     potential = field.antiderivative(0)
 
     def enclosed(batch):
         alpha, alphadot = gait.cycle(phases, batch)
-        return se2.exp(
-            (potential(field.inside(alpha)) * alphadot[..., 1:]).mean(-2) * 2 * np.pi
-        )
+        integrand = potential(field.inside(alpha)) * alphadot[..., 1:]
+        return se2.exp(integrand.mean(-2) * 2 * np.pi)
 
-    return in_groups(
-        enclosed,
-        gait.amplitude if amplitudes is None else amplitudes,
-        SAMPLES_TOGETHER // phases,
-    )
+    return in_groups(enclosed, amplitudes, SAMPLES_TOGETHER // phases)
 
 
 def _plan(system, numerics, gait, amplitudes) -> Plan:
-    d, phases = system.joints, numerics.phases
-    read = (
-        3
-        * (d * (d - 1) // 2)
-        * (numerics.interpolation + 1) ** d
-        * (1 if d == 2 else RADII)
-    )
-    memory = {"numbers": 3 * (d * (d - 1) // 2) * numerics.grid**d, "read": read}
+    """Return the plan of the tier: by the enclosed area of two joints, by surfaces of
+    more."""
+    d = system.joints
+    phases = numerics.phases
+    components = 3 * (d * (d - 1) // 2)
+    read = components * (numerics.interpolation + 1) ** d
+    numbers = components * numerics.grid**d
+
     if d == 2:
-        enclosed = lambda table, batch: area(ccf(table), gait, batch, phases)
-        return Plan(enclosed, fitted.table(system, numerics), **memory)
-    if not fitted.is_too_large(system, numerics):
-        surfaces = lambda table, batch, tips: spanned(
-            two_form(table), gait, batch, phases, tips
-        )
-        return _surface_plan(
-            surfaces, gait, table=fitted.table(system, numerics), **memory
-        )
+
+        def predict(table, amplitudes):
+            return area(ccf(table), gait, amplitudes, phases)
+
+        table = fitted.table(system, numerics)
+        return Plan(predict, table, numbers=numbers, read=read)
+
+    if fitted.is_too_large(system, numerics):
+        return _plan_without_field(system, numerics, gait)
+
+    def surfaces(table, amplitudes, tips):
+        return spanned(two_form(table), gait, amplitudes, phases, tips)
+
+    return _surface_plan(
+        surfaces,
+        gait,
+        table=fitted.table(system, numerics),
+        numbers=numbers,
+        read=read * RADII,
+    )
+
+
+def _plan_without_field(system, numerics, gait) -> Plan:
+    """Return the plan of a loop of many joints, with A solved on its surfaces alone."""
     A = fitted.without_field(system, numerics)
 
+    def surfaces(table, amplitudes, tips):
+        return spanned_by(A, gait, amplitudes, numerics.phases, tips, AROUND)
+
     def balances(count, phases):
-        on_cones = RADII * max(AROUND, 4 * gait.harmonics + 2)
-        shapes = (
-            2 * phases + (2 + TIPS) * on_cones
-        )  # for the displacement, and once more with its spread
+        # For the displacement, and once more with its spread.
+        on_cone = RADII * max(AROUND, 4 * gait.harmonics + 2)
+        shapes = 2 * phases + (2 + TIPS) * on_cone
         return count * shapes * fitted.balances_per_shape(system, numerics)
 
-    surfaces = lambda table, batch, tips: spanned_by(
-        A, gait, batch, phases, tips, AROUND
-    )
     return _surface_plan(surfaces, gait, balances=balances)
 
 
 def _surface_plan(surfaces, gait, **plan) -> Plan:
-    """Return the plan of a loop of three and more joints. surfaces: function of (table, amplitudes, tips)."""
+    """Return the plan of a loop of three and more joints.
 
-    def net(table, amplitudes):
-        shape = np.shape(gait.amplitude if amplitudes is None else amplitudes)
+    surfaces: function of (table, amplitudes, tips), which returns a
+    `geomech.geometry.two_form.Spanned`. plan: other entries of `Plan`."""
+
+    def predict(table, amplitudes):
+        shape = np.shape(amplitudes)
+        if amplitudes is None:
+            shape = np.shape(gait.amplitude)
         return surfaces(table, amplitudes, 0).net.reshape(*shape, 3)
 
-    return Plan(
-        net, spread=lambda table, batch: surfaces(table, batch, TIPS).spread, **plan
-    )
+    def spread(table, amplitudes):
+        return surfaces(table, amplitudes, TIPS).spread
+
+    return Plan(predict, spread=spread, **plan)
 
 
 AREA = Tier(

@@ -1,8 +1,9 @@
-"""A tier predicts the net pose (..., 3) of a gait's cycle from phase t = 0, in the frame at the start.
+"""A tier predicts the net pose (..., 3) of a gait's cycle from phase t = 0, in the
+frame at the start.
 
-A tier is one expression, `Tier(...)`. Its plan for one system and gait names the table that is computed once, the
-balances that are solved besides, and the function that gives the displacement.
-"""
+A tier is one expression, `Tier(...)`. Its plan for one system and gait has the table
+that is computed once, the number of balances besides, and the function that returns the
+displacement."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ from rft.core.registry import Registry
 
 @dataclass(frozen=True)
 class Numerics:
-    """Numerical settings of the tiers, all optional: the part of [numerics] beside the system's own.
+    """Numerical settings of the tiers, all optional: the part of [numerics] beside the
+    system's own.
 
     Examples
     --------
@@ -40,11 +42,14 @@ class Numerics:
     directions: Annotated[
         int | None,
         Number(
-            2, 4096, "-",
-            "of alphadot in the least-squares fit; if left out 8 for up to two joints, beyond 16 a joint, or 4 where xi is "
-            "linear in alphadot", whole=True,
+            2,
+            4096,
+            "-",
+            "of alphadot in the least-squares fit; if left out 8 for up to two joints, "
+            "beyond 16 a joint, or 4 where xi is linear in alphadot",
+            whole=True,
         ),
-    ] = None  # fmt: skip
+    ] = None
     grid: Annotated[int, Number(4, 4096, "-", "points per joint", whole=True)] = 31
     extent: Annotated[
         float, Number(1e-6, 100, "rad", "of the field, on either side of 0")
@@ -56,10 +61,14 @@ class Numerics:
     harmonics: Annotated[
         int | None,
         Number(
-            1, 999, "-",
-            "the highest kept, odd; if left out 15 of two joint rates, 9 of three, 5 beyond", whole=True,
+            1,
+            999,
+            "-",
+            "the highest kept, odd; if left out 15 of two joint rates, 9 of three, 5 "
+            "beyond",
+            whole=True,
         ),
-    ] = None  # fmt: skip
+    ] = None
     curves: Annotated[
         int, Number(4, 4096, "-", "in the table of a family of gaits", whole=True)
     ] = 24
@@ -81,11 +90,12 @@ class Numerics:
 class Table:
     """Data that are computed once for a system and interpolated from then on.
 
-    name: of its kind. key: all that it depends on besides the system. balances: velocities that building it takes.
-    numbers: in it. build: table(progress), which calls progress with the fraction done. axes: function that returns the
-    axes of a field of shapes, which gaits must not leave, and refuses one too large; None for no field. amplitudes: of
-    the gait from whose cycles it is built, None where it is built from no gait.
-    """
+    name: of its kind. key: all that it depends on besides the system. balances: number
+    of velocities that building it takes. numbers: number of values in it. build:
+    build(progress) returns the data, and calls progress with the fraction done. axes:
+    function that returns the axes of a field of shapes, which gaits must not leave, and
+    refuses a field too large; None for no field. amplitudes: of the gait from whose
+    cycles it is built; None where it is built from no gait."""
 
     name: str
     key: tuple
@@ -109,13 +119,16 @@ def no_spread(table: Any, amplitudes: ArrayLike) -> None:
 class Plan:
     """The prediction of displacements of one gait of one system by a tier.
 
-    predict: net poses (..., 3) by the table, or None, for amplitudes (...,) or the gait's own, None. table: None where
-    nothing is looked up. balances: velocities of a prediction at ``count`` amplitudes and so many phases, beside the
-    table's. exact: the system runs the gait itself, so that refining it tells the error. spread: (B, 2), the system's unit
-    and rad, for a table and amplitudes (B,): how far positions and headings depend on what is no part of the question, such
-    as a spanning surface; None for no such choice. numbers: held beside the table's. read: numbers that a look-up sums for
-    each phase.
-    """
+    predict: predict(table, amplitudes) returns net poses (..., 3), by the table or
+    None, for amplitudes (...,), or None for the gait's own. table: None where nothing
+    is interpolated. balances: balances(count, phases) returns the number of velocities
+    of a prediction at ``count`` amplitudes, beside the table's. exact: the system runs
+    the gait itself, so that its refinement measures the error. spread: spread(table,
+    amplitudes) returns (B, 2), in the system's unit and rad, for amplitudes (B,): how
+    far positions and headings depend on a choice that is no part of the question, such
+    as a spanning surface; None for no such choice. numbers: number of values held
+    beside the table's. read: number of values that an interpolation sums for each
+    phase."""
 
     predict: Callable[[Any, Any], np.ndarray]
     table: Table | None = None
@@ -128,13 +141,15 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class Tier:
-    """A way to predict displacements.
+    """A method to predict displacements.
 
-    name: in scenes, options and tables. label: for legends. style: of its line. plan: of (system, numerics, gait,
-    amplitudes). rests_on: premises without which it says nothing, and no ``result`` exists. joints: shape variables that it
-    takes, in words ``takes``, with ``instead`` for other bodies; offered: those for which it is chosen unless others are
-    named. regular: there must be no singular shapes. common: a plain study takes it.
-    markers: their colour, that of the line if left out. settings: those that an error study sweeps.
+    name: in scenes, options and tables. label: for legends. style: of its line. plan:
+    plan(system, numerics, gait, amplitudes) returns the `Plan`. rests_on: premises
+    without which no ``result`` exists. joints: numbers of shape variables that it
+    takes, in words ``takes``, with ``instead`` for other bodies; offered: the numbers
+    for which it is chosen unless tiers are named. regular: there must be no singular
+    shapes. common: a plain study takes it. markers: their colour; if left out the
+    line's. settings: those that an error study sweeps.
 
     Examples
     --------
@@ -171,7 +186,7 @@ class Tier:
         return self.plan.__module__
 
     def refuse(self, system: System) -> None:
-        """Raise Refusal if the tier does not apply to this system."""
+        """Refuse a system to which the tier does not apply."""
         refuse(system, self.result, self.rests_on, "use the direct tier")
         if system.joints not in self.joints:
             raise Refusal(
@@ -180,11 +195,9 @@ class Tier:
             )
         if self.meets_singular_shapes(system):
             gait = near_gait(system)
-            reason = (
-                f"A is known near {gait} alone"
-                if gait
-                else f"the {kind_of(system)} has singular shapes"
-            )
+            reason = f"the {kind_of(system)} has singular shapes"
+            if gait:
+                reason = f"A is known near {gait} alone"
             raise Refusal(
                 f"the {self.name} tier sums a field up, and {reason}",
                 instead="use path or direct",
@@ -196,39 +209,37 @@ class Tier:
 
     def is_possible(self, system: System) -> bool:
         """Return whether the tier applies to this system."""
-        possible = (
-            system.joints in self.joints and not system.traits.lacks & self.rests_on
-        )
-        return possible and not self.meets_singular_shapes(system)
+        if system.joints not in self.joints or system.traits.lacks & self.rests_on:
+            return False
+        return not self.meets_singular_shapes(system)
 
     def is_offered(self, system: System) -> bool:
-        """Return whether the tier applies to this system and takes no longer than more accurate ones."""
+        """Return whether the tier applies to this system and takes no longer than more
+        accurate ones."""
         return system.joints in self.offered and self.is_possible(system)
 
 
-TIERS = Registry(
-    "geomech.tiers", "name", "a tier", lambda part: isinstance(part, Tier)
-)  # cheapest look-up first
+# In the order of the cost of an interpolation, cheapest first.
+TIERS = Registry("geomech.tiers", "name", "a tier", lambda part: isinstance(part, Tier))
 
 
 def solved_phases(system: System, gait: Gait, phases: int) -> int:
-    """Return at how many phases of a gait the system's velocity is solved; the others are images of these."""
-    if system.traits.steps or phases < max(
-        4, 2 * gait.harmonics + 1
-    ):  # the least that show a gait
-        return phases
+    """Return at how many phases of a gait the system's velocity is solved; the others
+    are images of these."""
+    least = max(4, 2 * gait.harmonics + 1)  # that represent the gait
     costed = capability(system, Costed)
-    return phases if costed is None else solved_count(gait, phases, costed.traits)
+    if system.traits.steps or phases < least or costed is None:
+        return phases
+    return solved_count(gait, phases, costed.traits)
 
 
 def in_groups(f: Callable, amplitudes, size: int) -> np.ndarray:
-    """Return f(batch) (b, ...) for amplitudes (...,), at most ``size`` (or one) at a time, so that memory is bounded:
-    (..., ...)."""
+    """Return f(batch) -> (b, n) for amplitudes (...,), at most ``size`` (or one) at a
+    time, so that memory is bounded: (..., n)."""
     amplitudes = real_array("amplitudes", amplitudes)
-    flat, size = amplitudes.reshape(-1), max(1, size)
+    flat = amplitudes.reshape(-1)
+    if not flat.size:
+        return np.zeros((*amplitudes.shape, 3))
+    size = max(1, size)
     results = [f(flat[k : k + size]) for k in range(0, flat.size, size)]
-    return (
-        np.concatenate(results).reshape(*amplitudes.shape, -1)
-        if results
-        else np.zeros((*amplitudes.shape, 3))
-    )
+    return np.concatenate(results).reshape(*amplitudes.shape, -1)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from geomech.core.setting import Setting
@@ -14,54 +17,67 @@ from geomech.tiers.base import Plan, Tier, in_groups, solved_phases
 from rft.core.checks import in_range
 from rft.core.premise import NONE
 
-COUNTS = 2, 4, 8, 16, 32, 64  # of segments or nodes of a link
+COUNTS = (2, 4, 8, 16, 32, 64)  # of elements or nodes of a link
 NOTHING = "nothing that exact link integrals do not give for less"
 
 
 def direct(
     velocity: Velocity, gait: Gait, amplitudes=None, phases: int = 256
 ) -> np.ndarray:
-    """Return the net poses (..., 3) by the velocity integrated along the gait, for amplitudes (...,) or the gait's own,
-    many phases in one batch."""
+    """Return the net poses (..., 3) by the velocity integrated along the gait, for
+    amplitudes (...,) or the gait's own, many phases in one batch."""
     checked_gait(gait)
-    amplitudes = gait.amplitude if amplitudes is None else amplitudes
+    if amplitudes is None:
+        amplitudes = gait.amplitude
     in_range("phases", phases, 1, 1e9, whole=True)
     step = SAMPLES_TOGETHER // int(phases)
-    return in_groups(
-        lambda batch: _cycle(velocity, gait, batch, phases), amplitudes, step
-    )
+    return in_groups(partial(_net, velocity, gait, phases), amplitudes, step)
 
 
-def _cycle(velocity: Velocity, gait: Gait, amplitudes, phases: int) -> np.ndarray:
+def _net(velocity: Velocity, gait: Gait, phases: int, amplitudes) -> np.ndarray:
+    """Return the net poses (B, 3) for amplitudes (B,)."""
     alpha, alphadot = gait.cycle(phases, amplitudes)
-    parts = (slice(k, k + SAMPLES_TOGETHER) for k in range(0, phases, SAMPLES_TOGETHER))
-    return displacement(
-        np.concatenate(
-            [evaluate(velocity, alpha[:, p], alphadot[:, p]) for p in parts], -2
-        )
-    )
+    xi = []
+    for k in range(0, phases, SAMPLES_TOGETHER):
+        part = slice(k, k + SAMPLES_TOGETHER)
+        xi.append(evaluate(velocity, alpha[:, part], alphadot[:, part]))
+    return displacement(np.concatenate(xi, -2))
 
 
 def direct_plan(system, numerics, gait: Gait) -> Plan:
-    """Return the plan of a tier that integrates the system's own velocity, without a table."""
-    predict = lambda table, batch: direct(system.velocity, gait, batch, numerics.phases)
+    """Return the plan of a tier that integrates the system's own velocity, without a
+    table."""
+
+    def predict(table, amplitudes):
+        return direct(system.velocity, gait, amplitudes, numerics.phases)
+
     return Plan(predict, balances=_balances(system, gait), exact=True)
 
 
-def _balances(system, gait: Gait):
-    return lambda count, phases: count * solved_phases(system, gait, phases)
+def _balances(system, gait: Gait) -> Callable[[int, int], int]:
+    """Return the function of `Plan.balances`: each phase takes one, or follows by
+    symmetry."""
+
+    def balances(count, phases):
+        return count * solved_phases(system, gait, phases)
+
+    return balances
 
 
 def _plan(system, numerics, gait: Gait, amplitudes) -> Plan:
-    """Return the plan by which the system runs the gait (`System.run`), from as few of its phases as symmetry
-    allows."""
+    """Return the plan by which the system runs the gait (`System.run`), from as few of
+    its phases as symmetry allows."""
     phases = numerics.phases
-    run = lambda batch: system.run(*gait.cycle(phases, batch)).net
-    predict = lambda table, batch: (
-        run(None)
-        if batch is None
-        else in_groups(run, batch, gaits_per_batch(system, phases))
-    )
+
+    def run(amplitudes):
+        alpha, alphadot = gait.cycle(phases, amplitudes)
+        return system.run(alpha, alphadot).net
+
+    def predict(table, amplitudes):
+        if amplitudes is None:
+            return run(None)
+        return in_groups(run, amplitudes, gaits_per_batch(system, phases))
+
     return Plan(predict, balances=_balances(system, gait), exact=True)
 
 

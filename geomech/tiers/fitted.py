@@ -1,11 +1,11 @@
-"""The fitted connection: on a grid of shapes, on a plane, or solved at single shapes."""
+"""The fitted connection: on a grid of shapes, on a plane, or solved at single
+shapes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache, partial
-from typing import Any
 
 import numpy as np
 
@@ -30,74 +30,86 @@ from geomech.tiers.base import Numerics, Table
 from rft.core.premise import ALL
 from rft.core.refusal import Refusal
 
-INSTEAD = "draw slices by ``Study.ccf(pair=...)``, or use tiers such as path and direct, which need no field"
-
-LARGEST_GRID = 2_000_000  # shapes; a finer field is a slip of the pen
-FIELD = 30_000  # shapes of four and more joints: tiers do without a larger field
-GRIDS = 7, 11, 15, 21, 31, 45, 61  # that an error study tries
+INSTEAD = (
+    "draw slices by ``Study.ccf(pair=...)``, or use tiers such as path and direct,"
+    " which need no field"
+)
+LARGEST_GRID = 2_000_000  # shapes; a finer field is likely a mistake
+# Shapes of a field of four and more joints: tiers do without a larger one.
+LARGEST_FIELD = 30_000
+FINEST_GRID = 31  # points per joint that are recommended
+BYTES_PER_SHAPE = 24  # and joint: three numbers of A
+GRIDS = (7, 11, 15, 21, 31, 45, 61)  # that an error study tries
 DEPENDS_ON = ("grid", "extent", "directions", "interpolation")  # of [numerics]
 
 
 def refuse(system: System) -> None:
-    """Raise Refusal if the system has no connection."""
+    """Refuse a system that has no connection."""
     premises.refuse(system, "connection or CCF", ALL, "use the direct tier")
 
 
 def directions(system: System, numerics: Numerics) -> int:
     """Return the number of directions of alphadot at each shape."""
-    return numerics.directions or (
-        8 if system.joints <= 2 else (4 if system.traits.linear else 16) * system.joints
-    )
+    if numerics.directions:
+        return numerics.directions
+    if system.joints <= 2:
+        return 8
+    if system.traits.linear:
+        return 4 * system.joints
+    return 16 * system.joints
 
 
 def axes(system: System, numerics: Numerics) -> tuple[np.ndarray, ...]:
-    """Return the axes of the field; Refusal if there is none, or one too large."""
+    """Return the axes of the field; Refusal for a system without a field, or a field
+    too large."""
     refuse(system)
-    if stored := stored_table(system, "connection"):
+    stored = stored_table(system, "connection")
+    if stored:
         return stored.axes
-    d, n = system.joints, numerics.grid
+    d = system.joints
+    n = numerics.grid
     if n**d > LARGEST_GRID:
-        coarse_fits = 4**d <= LARGEST_GRID
-        cost = f" ({24e-9 * d * n**d:.3g} GB for A)" if coarse_fits else ""
-        lower = (
-            f"lower [numerics] grid, to {finest_grid(d)} or less, "
-            if coarse_fits
-            else "give a chain two [body] modes, "
-        )
+        what = f"a field of {n}^{d} shapes is too large"
+        if 4**d > LARGEST_GRID:
+            instead = f"give a chain two [body] modes, {INSTEAD}"
+            raise Refusal(what, instead=instead)
+        gigabytes = 1e-9 * BYTES_PER_SHAPE * d * n**d
         raise Refusal(
-            f"a field of {n}^{d} shapes is too large{cost}", instead=f"{lower}{INSTEAD}"
+            f"{what} ({gigabytes:.3g} GB for A)",
+            instead=f"lower [numerics] grid, to {finest_grid(d)} or less, {INSTEAD}",
         )
-    return connection.grid(system.joints, numerics.grid, numerics.extent)
+    return connection.grid(d, n, numerics.extent)
 
 
 def finest_grid(joints: int) -> int:
-    """Return the finest grid, odd, of which a field of so many joints is quick."""
-    return max(4, next((n for n in range(31, 4, -2) if n**joints <= FIELD), 4))
+    """Return the finest grid, odd and at most FINEST_GRID, whose field is quick; 4 if
+    none is."""
+    for n in range(FINEST_GRID, 4, -2):
+        if n**joints <= LARGEST_FIELD:
+            return n
+    return 4
 
 
 def is_too_large(system: System, numerics: Numerics) -> bool:
-    """Return whether tiers do without the field of so many shapes, and solve for A at those of the gait and of the
-    surfaces that it spans."""
-    return (
-        system.joints > 3
-        and not stored_table(system, "connection")
-        and numerics.grid**system.joints > FIELD
-    )
+    """Return whether tiers do without a field, and solve for A at the shapes of the
+    gait and of the surfaces that it spans."""
+    if system.joints <= 3 or stored_table(system, "connection"):
+        return False
+    return numerics.grid**system.joints > LARGEST_FIELD
 
 
 def table(system: System, numerics: Numerics) -> Table:
     """Return the connection on the scene's grid, as a table to build."""
-    count, d = directions(system, numerics), system.joints
+    d = system.joints
+    count = directions(system, numerics)
+    solved = system.inner if isinstance(system, Framed) else system
     return Table(
         "connection",
-        key(numerics, DEPENDS_ON),
-        solved_shapes(
-            system.inner if isinstance(system, Framed) else system, numerics, count
-        )
-        * count,
-        (d + 3) * 3 * numerics.grid**d,
-        partial(_build, system, numerics),
-        partial(axes, system, numerics),
+        key=key(numerics, DEPENDS_ON),
+        balances=solved_shapes(solved, numerics, count) * count,
+        numbers=(d + 3) * 3 * numerics.grid**d,
+        build=partial(_build, system, numerics),
+        axes=partial(axes, system, numerics),
     )
 
 
@@ -107,28 +119,24 @@ def key(numerics: Numerics, names: tuple[str, ...]) -> tuple:
 
 
 def _build(system: System, numerics: Numerics, progress: Callable | None) -> Connection:
-    if stored := stored_table(system, "connection"):
-        return (
-            stored
-            if stored.length
-            else replace(stored, unit=length_unit(system), length=body_size(system))
-        )
+    """Return the connection: the stored one, or a fit on the scene's grid."""
+    stored = stored_table(system, "connection")
+    if stored:
+        if stored.length:
+            return stored
+        return replace(stored, unit=length_unit(system), length=body_size(system))
     if isinstance(system, Framed):
         return system.fitted(progress)
-    count, trusted = directions(system, numerics), not isinstance(system, WrappedSystem)
-    options: dict[str, Any] = {
-        "traits": system.traits,
-        "unit": length_unit(system),
-        "length": body_size(system),
-    }
     return connection.fit(
         system.velocity,
         axes(system, numerics),
-        count,
+        directions(system, numerics),
         numerics.interpolation,
         progress,
-        trusted=trusted,
-        **options,
+        traits=system.traits,
+        trusted=not isinstance(system, WrappedSystem),
+        unit=length_unit(system),
+        length=body_size(system),
     )
 
 
@@ -144,7 +152,9 @@ def without_field(system: System, numerics: Numerics) -> Callable:
 
 def balances_per_shape(system: System, numerics: Numerics) -> int:
     """Return how many velocities `without_field` takes for each shape."""
-    return system.joints if system.traits.linear else directions(system, numerics)
+    if system.traits.linear:
+        return system.joints
+    return directions(system, numerics)
 
 
 def plane(
@@ -154,30 +164,28 @@ def plane(
     at,
     progress: Callable | None = None,
 ) -> Plane:
-    """Return the plane of shape space on which two joints move (`geomech.geometry.plane`), interpolated in a stored
-    field.
+    """Return the plane of shape space on which two joints move
+    (`geomech.geometry.plane`), interpolated in a stored field.
 
-    Refusal if there is no connection, or if the plane lies outside the field."""
+    Refusal for a system without a connection, or a plane outside the field."""
     refuse(system)
-    if stored := stored_table(system, "connection"):
+    stored = stored_table(system, "connection")
+    if stored:
         return interpolated_plane(stored, pair, at)
     axis = connection.grid(1, numerics.grid, numerics.extent)[0]
-    at = inside((axis,) * system.joints, at, [name for name, _ in shape_labels(system)])
-    count = directions(system, numerics)
-    options: dict[str, Any] = {
-        "traits": system.traits,
-        "unit": length_unit(system),
-        "length": body_size(system),
-    }
+    names = [name for name, _ in shape_labels(system)]
+    at = inside((axis,) * system.joints, at, names)
     return fit_plane(
         system.velocity,
         (axis, axis),
         pair,
         at,
-        count,
+        directions(system, numerics),
         numerics.interpolation,
         progress,
-        **options,
+        traits=system.traits,
+        unit=length_unit(system),
+        length=body_size(system),
     )
 
 
@@ -187,24 +195,18 @@ def plane_balances(
     """Return the velocities that `plane` takes."""
     if stored_table(system, "connection"):
         return 0
-    axis, count = (
-        connection.grid(1, numerics.grid, numerics.extent)[0],
-        directions(system, numerics),
-    )
+    count = directions(system, numerics)
+    axis = connection.grid(1, numerics.grid, numerics.extent)[0]
     alpha = plane_shapes((axis, axis), pair, np.asarray(at)).reshape(-1, system.joints)
-    return (
-        int(
-            to_solve(
-                mirrored(alpha, count) if system.traits.halved else (), len(alpha)
-            ).sum()
-        )
-        * count
-    )
+    symmetries = []
+    if system.traits.halved:
+        symmetries = mirrored(alpha, count)
+    return int(to_solve(symmetries, len(alpha)).sum()) * count
 
 
 def solved_shapes(system: System, numerics: Numerics, count: int) -> int:
-    """Return the number of shapes of the field that are solved, each for ``count`` directions of alphadot; 0 of one that is
-    stored."""
+    """Return the number of shapes of the field that are solved, each for ``count``
+    directions of alphadot; 0 for a stored field."""
     if stored_table(system, "connection"):
         return 0
     return _solved_shapes(
@@ -220,8 +222,12 @@ def solved_shapes(system: System, numerics: Numerics, count: int) -> int:
 def _solved_shapes(
     joints: int, points: int, count: int, mirror: bool, reversible: bool
 ) -> int:
-    if points**joints > LARGEST_GRID:  # which is refused before it is solved
-        return points**joints // (2 if mirror else 1)
-    grid, unit = connection.grid(joints, points), connection.directions(joints, count)
+    """Return `solved_shapes` from the facts that it depends on."""
+    if points**joints > LARGEST_GRID:  # refused before it is solved
+        if mirror:
+            return points**joints // 2
+        return points**joints
+    grid = connection.grid(joints, points)
+    unit = connection.directions(joints, count)
     symmetries = images(grid, unit, Traits(mirror=mirror, reversible=reversible))
     return int(to_solve(symmetries, points**joints).sum())

@@ -1,4 +1,5 @@
-"""The harmonic tier: the odd harmonics of the velocity in the direction of alphadot, looked up along the gait."""
+"""The harmonic tier: the odd harmonics of the velocity in the direction of alphadot,
+interpolated along the gait."""
 
 from __future__ import annotations
 
@@ -18,70 +19,81 @@ from geomech.tiers.path import path
 from rft.core.refusal import Refusal
 
 HIGHEST = {2: 15, 3: 9}  # by joints, if [numerics] harmonics is left out
-FEW = 5  # of more: 56 coefficients of each component of four joints, 126 of five
+# For more joints: 56 coefficients of each component of four joints, 126 of five.
+HIGHEST_BEYOND = 5
 DEPENDS_ON = ("grid", "extent", "harmonics", "interpolation")  # of [numerics]
 
 
 def highest(system, numerics) -> int:
     """Return the highest harmonic of the series."""
-    return numerics.harmonics or HIGHEST.get(system.joints, FEW)
+    return numerics.harmonics or HIGHEST.get(system.joints, HIGHEST_BEYOND)
 
 
 def directions(system, numerics) -> int:
-    """Return the number of directions of alphadot at each shape: enough above the highest harmonic for aliasing to stay
-    small."""
-    most = highest(system, numerics)
-    return (
-        max(24, (8 * most) // 5)
-        if system.joints == 2
-        else 2 * harmonics.terms(system.joints, most)
-    )
+    """Return the number of directions of alphadot at each shape: enough above the
+    highest harmonic for aliasing to stay small."""
+    k = highest(system, numerics)
+    if system.joints == 2:
+        return max(24, (8 * k) // 5)
+    return 2 * harmonics.terms(system.joints, k)
 
 
 def table(system, numerics) -> Table:
     """Return the harmonics on the scene's grid, as a table to build."""
-    d, count = system.joints, directions(system, numerics)
+    d = system.joints
+    count = directions(system, numerics)
+    terms = harmonics.terms(d, highest(system, numerics))
     return Table(
         "harmonics",
-        fitted.key(numerics, DEPENDS_ON),
-        fitted.solved_shapes(system, numerics, count) * count,
-        (harmonics.terms(d, highest(system, numerics)) + 1) * 3 * numerics.grid**d,
-        partial(_build, system, numerics),
-        partial(_axes, system, numerics),
+        key=fitted.key(numerics, DEPENDS_ON),
+        balances=fitted.solved_shapes(system, numerics, count) * count,
+        numbers=(terms + 1) * 3 * numerics.grid**d,
+        build=partial(_build, system, numerics),
+        axes=partial(_axes, system, numerics),
     )
 
 
 def _axes(system, numerics) -> tuple[np.ndarray, ...]:
-    d, n = system.joints, numerics.grid
+    """Return the axes of the field; Refusal for a field too large."""
+    d = system.joints
+    n = numerics.grid
     if fitted.is_too_large(system, numerics):
         raise Refusal(
-            f"harmonics of {d} joint rates need a field, and one of {n}^{d} shapes is too large",
-            instead=f"lower [numerics] grid, to {fitted.finest_grid(d)} or less, "
-            "or use path, adapted or direct, which need none",
+            f"harmonics of {d} joint rates need a field, and one of {n}^{d} shapes"
+            " is too large",
+            instead=f"lower [numerics] grid, to {fitted.finest_grid(d)} or less, or use"
+            " path, adapted or direct, which need none",
         )
     return fitted.axes(system, numerics)
 
 
 def _build(system, numerics, progress: Callable | None) -> Harmonics:
-    if stored := stored_table(system, "harmonics"):
+    """Return the harmonics: the stored ones, or a fit on the scene's grid."""
+    stored = stored_table(system, "harmonics")
+    if stored:
         return stored
-    count, degree = directions(system, numerics), numerics.interpolation
-    options = {"highest": highest(system, numerics), "traits": system.traits}
     return harmonics.fit(
-        system.velocity, _axes(system, numerics), count, degree, progress, **options
+        system.velocity,
+        _axes(system, numerics),
+        directions(system, numerics),
+        numerics.interpolation,
+        progress,
+        highest=highest(system, numerics),
+        traits=system.traits,
     )
 
 
 def _plan(system, numerics, gait, amplitudes) -> Plan:
-    if system.traits.linear:  # there are none beyond the first
+    """Return the plan of the tier."""
+    if system.traits.linear:  # no harmonics beyond the first
         return direct_plan(system, numerics, gait)
     d = system.joints
-    read = (
-        3
-        * harmonics.terms(d, highest(system, numerics))
-        * (numerics.interpolation + 1) ** d
-    )
-    predict = lambda fitted, batch: path(fitted.velocity, gait, batch, numerics.phases)
+    terms = harmonics.terms(d, highest(system, numerics))
+
+    def predict(fitted, amplitudes):
+        return path(fitted.velocity, gait, amplitudes, numerics.phases)
+
+    read = 3 * terms * (numerics.interpolation + 1) ** d
     return Plan(predict, table(system, numerics), read=read)
 
 
@@ -113,5 +125,6 @@ HARMONIC = Tier(
 
 
 def is_looked_up(system) -> bool:
-    """Return whether a plain study takes the harmonics of a system: where the velocity is not linear, and joints are few."""
+    """Return whether a plain study takes the harmonics of a system: where the velocity
+    is not linear, and joints are few."""
     return not system.traits.linear and HARMONIC.is_offered(system)

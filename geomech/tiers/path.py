@@ -15,28 +15,40 @@ from geomech.tiers.direct import direct, direct_plan
 def path(
     A: Connection | Velocity, gait: Gait, amplitudes=None, phases: int = 256
 ) -> np.ndarray:
-    """Return net poses (..., 3) by the connection integrated along the gait, for amplitudes (...,) or the gait's own."""
-    return direct(
-        A.velocity if isinstance(A, Connection) else A, gait, amplitudes, phases
-    )
+    """Return the net poses (..., 3) by the connection integrated along the gait, for
+    amplitudes (...,) or the gait's own."""
+    velocity = A.velocity if isinstance(A, Connection) else A
+    return direct(velocity, gait, amplitudes, phases)
 
 
 def _plan(system, numerics, gait, amplitudes) -> Plan:
+    """Return the plan of the tier."""
     if system.traits.linear:  # xi = A alphadot holds exactly
         return direct_plan(system, numerics, gait)
     if fitted.is_too_large(system, numerics):
-        A = fitted.without_field(system, numerics)
-        xi = lambda alpha, alphadot: np.einsum("...ij,...j->...i", A(alpha), alphadot)
-        balances = lambda count, phases: (
-            count * phases * fitted.balances_per_shape(system, numerics)
-        )
-        return Plan(
-            lambda table, batch: path(xi, gait, batch, numerics.phases),
-            balances=balances,
-        )
+        return _plan_without_field(system, numerics, gait)
+
+    def predict(table, amplitudes):
+        return path(table, gait, amplitudes, numerics.phases)
+
     read = 3 * system.joints * (numerics.interpolation + 1) ** system.joints
-    predict = lambda table, batch: path(table, gait, batch, numerics.phases)
     return Plan(predict, fitted.table(system, numerics), read=read)
+
+
+def _plan_without_field(system, numerics, gait) -> Plan:
+    """Return the plan with A solved at the shapes of the gait alone."""
+    A = fitted.without_field(system, numerics)
+
+    def velocity(alpha, alphadot):
+        return np.einsum("...ij,...j->...i", A(alpha), alphadot)
+
+    def predict(table, amplitudes):
+        return path(velocity, gait, amplitudes, numerics.phases)
+
+    def balances(count, phases):
+        return count * phases * fitted.balances_per_shape(system, numerics)
+
+    return Plan(predict, balances=balances)
 
 
 PATH = Tier(
