@@ -10,7 +10,7 @@ import numpy as np
 
 from figures import main, style
 from geomech import plots
-from geomech.studies.calibration import Calibration
+from geomech.studies.calibration import rod_fit
 from rft import CATALOGUE, Viscous
 
 
@@ -26,7 +26,7 @@ def compute(angles: int = 181) -> dict:
         name: np.array(law.traction(np.cos(psi), np.sin(psi)))
         for name, law in laws.items()
     }
-    fit = Calibration("short-rod-drag", "granular").ask().subject
+    fit = rod_fit("short-rod-drag")
     bed = {
         "psi": fit.data.psi,
         "parallel": fit.data.forces[0],

@@ -24,7 +24,7 @@ from figures.campaigns import grains
 from figures.fig08a_rods import rod_forces
 from geomech import plots
 from geomech.scenes import load
-from geomech.studies.calibration import Calibration
+from geomech.studies.calibration import rod_fit
 from geomech.studies.study import Study
 from rft import EndCaps, Transient
 from rft.grains.reversal import Recovery, recovery
@@ -81,10 +81,7 @@ def compute(amplitudes=AMPLITUDES, others=OTHERS, travels=TRAVELS) -> dict:
 
 def predicted(scene_name: str, amplitudes, travels=TRAVELS) -> dict:
     """Return distances by tier, with flat ends and with transients, and their spread by the medium, body lengths."""
-    law, scene = (
-        Calibration("flank-drag", end_caps="fitted").ask().subject,
-        load(scene_name),
-    )
+    law, scene = rod_fit("flank-drag", end_caps="fitted"), load(scene_name)
     caps = law.caps(RADIUS / SIZE)
     medium = replace(law.medium, covariance=None)
     study = lambda medium, tiers, *effects: Study(

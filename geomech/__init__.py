@@ -7,7 +7,7 @@
 study, Study                            a scene, and methods that ask questions of it
 displacement, ccf, sweep, optimise (optimize), forces, velocity, walk, intrude
                                         the same of any scene; results that print themselves
-load_result, best_scene                 results from files; the scene with the best gait
+load_result, best_scene, fitted_medium  results from files; scenes and media that results have
 tiers, workers, accuracy                methods of prediction; processes; error against time
 load, Scene, Swimmer, Numerics, toml    scenes: read, built and written
 medium                                  a medium of the vertical plane, by name or from a file
@@ -37,6 +37,7 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.api import Study as Study
     from geomech.api import ccf as ccf
     from geomech.api import displacement as displacement
+    from geomech.api import fit_medium as fit_medium
     from geomech.api import forces as forces
     from geomech.api import intrude as intrude
     from geomech.api import load_result as load_result
@@ -47,13 +48,13 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.api import velocity as velocity
     from geomech.api import walk as walk
     from geomech.app import accuracy as accuracy
-    from geomech.app import fit_medium as fit_medium
     from geomech.app import fit_midlines as fit_midlines
     from geomech.geometry import connection as connection
     from geomech.geometry import curvature as curvature
     from geomech.geometry import reconstruct as reconstruct
     from geomech.measured import fit_log as fit_log
     from geomech.results.scenes import best_scene as best_scene
+    from geomech.results.scenes import fitted_medium as fitted_medium
     from geomech.run import workers as workers
     from geomech.scenes import Numerics as Numerics
     from geomech.scenes import Scene as Scene
@@ -92,6 +93,7 @@ _OBJECTS = {
             "Study",
             "ccf",
             "displacement",
+            "fit_medium",
             "forces",
             "intrude",
             "load_result",
@@ -104,8 +106,8 @@ _OBJECTS = {
         ),
         "geomech.api",
     ),
-    **dict.fromkeys(("accuracy", "fit_medium", "fit_midlines"), "geomech.app"),
-    "best_scene": "geomech.results.scenes",
+    **dict.fromkeys(("accuracy", "fit_midlines"), "geomech.app"),
+    **dict.fromkeys(("best_scene", "fitted_medium"), "geomech.results.scenes"),
     **dict.fromkeys(("load", "toml", "Scene", "Numerics"), "geomech.scenes"),
     "medium": "geomech.scenes.stress",
     "Swimmer": "geomech.systems",

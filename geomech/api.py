@@ -15,6 +15,7 @@ from geomech.questions.base import Question, plain_type
 from geomech.questions.ccf import Ccf
 from geomech.questions.connection import Connection
 from geomech.questions.displacement import Displacement
+from geomech.questions.fit_medium import FitMedium
 from geomech.questions.forces import Forces
 from geomech.questions.intrude import Intrude
 from geomech.questions.optimize import Optimize
@@ -53,6 +54,19 @@ def asked_of_scene(
         return question(as_scene(scene), *values, **options).ask()
 
     described(ask, question, "scene")
+    return ask
+
+
+def asked_of_file(
+    question: Callable[Concatenate[Any, Fields], Question],
+) -> Callable[Concatenate[Any, Fields], Result]:
+    """Return the function that asks a question of measurements, mostly those of a file."""
+
+    def ask(file: Any, *values: Fields.args, **options: Fields.kwargs) -> Result:
+        refuse_unknown(question, options)
+        return question(file, *values, **options).ask()
+
+    described(ask, question, "file")
     return ask
 
 
@@ -222,3 +236,4 @@ forces = asked_of_scene(Forces)
 optimise = optimize = asked_of_scene(Optimize)
 walk = asked_of_scene(Walk)
 intrude = asked_of_scene(Intrude)
+fit_medium = asked_of_file(FitMedium)

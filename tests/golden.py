@@ -353,6 +353,8 @@ def measurements():
             out = command(*line.split())
             if "--amplitudes" in line:
                 told = former.displacement(out)
+            elif line.startswith("calibrate"):
+                told = former.medium(out)
             else:
                 told = json.loads(out)
             yield from of_json(f"measured, {name}", told)

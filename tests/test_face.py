@@ -172,17 +172,19 @@ def test_the_best_gait_is_a_scene():
 
 
 def test_a_medium_is_fitted_to_drag(tmp_path):
-    sand = geomech.fit_medium("short-rod-drag")
-    assert sand.medium.C == pytest.approx(1.49, abs=0.01) and "granular law" in repr(
-        sand
-    )
-    sand.save(tmp_path / "sand.toml")
-    assert as_scene(
-        str(tmp_path / "sand.toml"), CHAIN
-    ).system.medium.C == pytest.approx(sand.medium.C)
-    assert sand.plot().axes
-    with pytest.raises(Refusal, match="size: 'width' is unknown"):
-        geomech.fit_medium("short-rod-drag", width=0.1)
+    fit = geomech.fit_medium("short-rod-drag")
+    sand = geomech.fitted_medium(fit)
+    assert sand.C == pytest.approx(1.49, abs=0.01) and "granular law" in repr(fit)
+    fit.save(tmp_path / "sand.toml")
+    read = as_scene(str(tmp_path / "sand.toml"), CHAIN).system.medium
+    fit.save(tmp_path / "fit.nc")
+    again = geomech.fitted_medium(geomech.load_result(tmp_path / "fit.nc"))
+    assert read == again == sand
+    assert fit.plot().axes
+    with pytest.raises(Refusal, match="fit_medium has no 'raduis': .*'radius'"):
+        geomech.fit_medium("short-rod-drag", raduis=0.1)
+    with pytest.raises(Refusal, match="this result has no medium"):
+        geomech.fitted_medium(geomech.displacement("three-link-viscous"))
 
 
 @pytest.mark.parametrize("draw", [plots.ccf_map, plots.vector_field])

@@ -15,7 +15,7 @@ from geomech.output import grains as files
 from geomech.run.backend import prefer, prefer_for, preferred
 from geomech.scenes import drag
 from geomech.studies import grain_swim, grains
-from geomech.studies.calibration import Calibration
+from geomech.studies.calibration import rod_fit
 from geomech.text import drag_grains
 from geomech.text import grain_swim as swim_text
 from rft import EndCaps, Granular
@@ -337,7 +337,7 @@ def test_a_swim_stands_beside_the_tiers(monkeypatch, tmp_path):
     assert result["x"].values[k] == pytest.approx(own["x"]["direct"][0] / 0.3)
     assert not np.isclose(result["x"].values[k], result["x"].values[k + 1])
     # Ends that both push half as much are one end that pushes, to 1 %.
-    flank = Calibration("flank-drag", end_caps="fitted").ask().subject
+    flank = rod_fit("flank-drag", end_caps="fitted")
     one = dataclasses.replace(
         flank.caps(0.03), head=flank.end_caps, tail=0.0
     ).in_metres(0.3)
@@ -394,11 +394,9 @@ def test_scenes_without_rigid_links_are_refused():
 
 
 def test_samples_have_names_that_say_what_they_are():
-    old, short = (
-        Calibration(name).ask().subject for name in ("dem-rod-drag", "short-rod-drag")
-    )
+    old, short = (rod_fit(name) for name in ("dem-rod-drag", "short-rod-drag"))
     np.testing.assert_array_equal(old.values, short.values)
-    flank = Calibration("flank-drag", end_caps="fitted").ask().subject
+    flank = rod_fit("flank-drag", end_caps="fitted")
     assert flank.data.n_angles == 6 and flank.rod.length == 0.162
     np.testing.assert_allclose(
         flank.values, [4.54, 0.260, 0.981, 1.96, 1.21], rtol=3e-3
@@ -496,7 +494,7 @@ def test_the_budget_of_a_swim_finds_which_force_is_another():
     """A body that obeys a law with five times the ends, in place of grains: the difference is theirs."""
     from figures.campaigns import swim_budget as budget
 
-    law = Calibration("flank-drag", end_caps="fitted").ask().subject
+    law = rod_fit("flank-drag", end_caps="fitted")
     question = grain_swim.GrainSwim(
         scenes.load("three-link-glass"), cycles=1, radius=2e-3
     )

@@ -30,7 +30,7 @@ import numpy as np
 
 from figures.campaigns.grains import BEDS, FOLDER, SWIMS, swim
 from geomech.io.files import write_text
-from geomech.studies.calibration import Calibration
+from geomech.studies.calibration import rod_fit
 from geomech.studies.grain_swim import FLANK, RAMP, GrainSwim
 from geomech.systems.swimmer import Swimmer
 from rft.effects import EndCaps
@@ -273,7 +273,7 @@ def recovery(body: Points, swum: Swum, step: float) -> Iterator[float]:
 def rows(store: Path) -> Iterator[tuple]:
     """Yield the distance by the law and in grains, and the shares of parts, body lengths, for swims that are in the store."""
     yield COLUMNS
-    law = Calibration(FLANK, end_caps="fitted").ask().subject
+    law = rod_fit(FLANK, end_caps="fitted")
     for scene, amplitude, frequency in SWIMS:
         questions = [swim(scene, amplitude, frequency, seed) for seed in BEDS]
         for question in questions:

@@ -1,9 +1,9 @@
 """Questions of measurements and of accuracy from Python."""
 
-from geomech.app.questions import accuracy, fit_medium, fit_midlines
-from geomech.app.results import FittedMedium, FittedMidlines
+from geomech.app.questions import accuracy, fit_midlines
+from geomech.app.results import FittedMidlines
 
-__all__ = ["FittedMedium", "FittedMidlines", "accuracy", "fit_medium", "fit_midlines"]
+__all__ = ["FittedMidlines", "accuracy", "fit_midlines"]
 
 
 def __dir__() -> list[str]:

@@ -12,7 +12,6 @@ from geomech.core.variables import Result
 from geomech.io.results import to_xarray, write_netcdf
 from geomech.measured.midlines import predicted
 from geomech.measured.midlines import question as midlines
-from geomech.output import parts, pictures
 from geomech.scenes.read import medium_of
 from rft.core.refusal import printable
 
@@ -54,35 +53,3 @@ class FittedMidlines:
     def to_xarray(self) -> Any:
         """Return a Dataset, as the file of `geomech fit-gait`."""
         return to_xarray(self.result)
-
-
-class FittedMedium:
-    """A medium fitted to measurements. result: parameters, errors and residuals. medium: the law, or stress map.
-
-    Examples
-    --------
-    >>> import geomech
-    >>> sand = geomech.fit_medium("short-rod-drag")
-    >>> print(str(sand).splitlines()[0])
-    granular law fitted to short_rod_drag.csv: 16 forces at 8 angles
-    >>> fig = sand.plot()
-    """
-
-    def __init__(self, result: Result):
-        self.result = result
-        self.medium = (
-            result.subject.medium
-            if result.kind == "rod_drag"
-            else result.subject.stress
-        )
-
-    def __repr__(self) -> str:
-        return printable(text.text(self.result))
-
-    def plot(self) -> Any:
-        """Draw measurements and fit; return the Figure."""
-        return pictures.CALIBRATIONS[self.result.kind](self.result)
-
-    def save(self, path: str | Path) -> None:
-        """Write a medium's file, which a scene names as [medium] file."""
-        parts.write_medium(self.result, Path(path))

@@ -1,4 +1,4 @@
-"""Files that scenes take their parts from: connections, media, and scenes themselves."""
+"""Files that scenes take their parts from: connections, and scenes themselves."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from geomech import text
 from geomech.core.variables import Result
 from geomech.io.files import write_text
 from geomech.io.results import write_netcdf
@@ -40,14 +39,3 @@ def mean_gait(
     return lambda result, path: write_text(
         path, results.scene_toml(result.subject, field, path)
     ), check
-
-
-def write_medium(result: Result, path: Path) -> None:
-    """Write a medium that was calibrated."""
-    write_text(path, text.medium(result))
-
-
-def about_medium(result: Result, path: Path) -> str:
-    """Return the line that says how a scene takes a medium."""
-    scene = "a scene" if result.kind == "rod_drag" else "an intruder scene"
-    return f'medium in {path}: in {scene}, [medium] file = "{path.name}"'

@@ -20,7 +20,7 @@ def drag_figure(result: Result) -> Figure:
     Examples
     --------
     >>> import geomech
-    >>> fig = geomech.plots.drag_figure(geomech.fit_medium("short-rod-drag").result)
+    >>> fig = geomech.plots.drag_figure(geomech.fit_medium("short-rod-drag"))
     """
     fig, axes = figure(4.4, 4.6, 1, 2)
     (top,), (bottom,) = axes
@@ -29,7 +29,7 @@ def drag_figure(result: Result) -> Figure:
     )
     for name, colour, marker in PARTS:
         k = 1 if name == "across" else 0
-        law, band = result["law"].values[k], result["law"].error[k]
+        law, band = result["law_curve"].values[k], result["law_curve"].error[k]
         top.fill_between(angle, law - band, law + band, color=colour, alpha=0.2, lw=0)
         top.plot(angle, law, color=colour, lw=1.2)
         top.plot(psi, forces[k], marker, color=colour, ms=4, label=f"{name} the rod")
@@ -38,12 +38,13 @@ def drag_figure(result: Result) -> Figure:
     largest = 1.15 * max(abs(residuals).max(), 1e-6 * abs(forces).max())
     low = min(0.0, forces.min()) - 0.03 * forces.max()
     top.set(ylabel="drag (N)", xlim=(-2, 92), ylim=(low, None))
-    top.plot([], [], color="0.3", lw=1.2, label=f"{result.subject.law} law,\n95 % band")
+    law_name = result.attributes["law"]
+    top.plot([], [], color="0.3", lw=1.2, label=f"{law_name} law,\n95 % band")
     top.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     bottom.set(
         xlabel=r"attack angle $\psi$ (degrees)", ylabel="data minus law (N)", xlim=(-2, 92), ylim=(-largest, largest),
     )  # fmt: skip
-    bottom.set_title(f"rms {result.subject.rms:.3g} N", loc="left", fontsize=8)
+    bottom.set_title(f"rms {float(result['rms']):.3g} N", loc="left", fontsize=8)
     for ax in (top, bottom):
         ax.set_xticks(range(0, 91, 15))
     fig.get_layout_engine().set(hspace=0.06)

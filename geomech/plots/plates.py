@@ -23,7 +23,7 @@ def plates_figure(result: Result) -> Figure:
     for ax, name, residual in zip(axes[0], "zx", residuals[::-1]):
         _residuals(ax, beta, gamma, residual, np.abs(residuals).max(), name)
     axes[0, 0].set_title(
-        f"rms of both {result.attributes['rms']:.3g} N/cm$^3$",
+        f"rms of both {float(result['rms']):.3g} N/cm$^3$",
         loc="left",
         fontsize=8,
         pad=9,
@@ -65,15 +65,14 @@ def _ahead(beta, gamma):
 
 
 def _coefficients(ax, result: Result) -> None:
-    names, undetermined = (
-        result["coefficient"].values,
-        result.attributes["undetermined"],
-    )
-    at, low, high = np.arange(len(names)), *result["interval"].values.T
+    names, fitted = result["parameter"].values, result["value"]
+    undetermined = result["undetermined"].values > 0
+    low, high = fitted.values - fitted.error, fitted.values + fitted.error
+    at = np.arange(len(names))
     ax.axhline(0.0, color="0.6", lw=0.6)
-    generic = rf"generic set, $\zeta$ = {result.subject.zeta:.3g}"
+    generic = rf"generic set, $\zeta$ = {float(result['zeta']):.3g}"
     ax.plot(at, result["generic"].values, "_", color="#D55E00", ms=12, label=generic)
-    for k, (value, name) in enumerate(zip(result["value"].values, names)):
+    for k, value in enumerate(fitted.values):
         ax.plot([k, k], [low[k], high[k]], color="black", lw=1.0)
         ax.plot(
             k,
@@ -81,10 +80,10 @@ def _coefficients(ax, result: Result) -> None:
             "o",
             color="black",
             ms=4,
-            mfc="white" if name in undetermined else None,
+            mfc="white" if undetermined[k] else None,
         )
     ax.plot([], [], "o-", color="black", ms=4, lw=1.0, label="fitted, with 95 %")
-    if undetermined:
+    if undetermined.any():
         ax.plot(
             [],
             [],
@@ -106,13 +105,10 @@ def penetration_figure(result: Result) -> Figure:
     """Draw the force on a plate against depth with the law and its 95 % interval, and the residuals below."""
     fig, axes = figure(4.4, 4.6, 1, 2)
     (top,), (bottom,) = axes
-    depth, force, law = (
-        1e2 * result["depth"].values,
-        result["force"].values,
-        result["law"].values,
-    )
+    depth, force = 1e2 * result["depth"].values, result["force"].values
+    law = result["fitted"].values
     from_zero = lambda y: np.append(0.0, y)
-    at, centre, half_width = map(from_zero, (depth, law, result["law"].error))
+    at, centre, half_width = map(from_zero, (depth, law, result["fitted"].error))
     top.fill_between(
         at,
         centre - half_width,
@@ -129,6 +125,6 @@ def penetration_figure(result: Result) -> Figure:
     bottom.plot(depth, force - law, "o", color="black", ms=3)
     bottom.axhline(0.0, color="0.7", lw=0.6, zorder=0)
     bottom.set(xlabel="depth (cm)", ylabel="data minus law (N)", xlim=(0, None))
-    bottom.set_title(f"rms {result.attributes['rms']:.3g} N", loc="left", fontsize=8)
+    bottom.set_title(f"rms {float(result['rms']):.3g} N", loc="left", fontsize=8)
     fig.get_layout_engine().set(hspace=0.06)
     return fig

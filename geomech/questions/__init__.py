@@ -28,6 +28,9 @@ GROUPS = {
         "intrude": "Compute force and moment of grains on a moving body.",
         "walk": "Compute how a robot walks on grains.",
     },
+    "Your own data": {
+        "fit_medium": "Fit a medium to your own drag data.",
+    },
 }
 SUMMARIES = {name: line for lines in GROUPS.values() for name, line in lines.items()}
 

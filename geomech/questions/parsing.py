@@ -75,6 +75,11 @@ def one_limit(limit: Any, panels: Any) -> None:
         texts.colour_limit(str(limit), panels)
 
 
+def end_caps(text: str, subject: Any, flag: str) -> float | str:
+    """Return e of the rod's ends, 0 to leave them out, or "fitted"."""
+    return texts.parse_end_caps(text)
+
+
 def path(text: str, subject: Any, flag: str) -> Any:
     """Return the path of a file."""
     from pathlib import Path

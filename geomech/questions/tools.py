@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Variable
+    from geomech.core.variables import Result, Variable
 
 
 def numbers(values: Any) -> Any:
@@ -71,6 +71,17 @@ def by_symmetry(name: str, zero: Iterable[str]) -> str:
 def with_units(variable: "Variable", lengths: str, angles: str) -> "Variable":
     """Return a variable over components with a unit for each: of x and y, and theta."""
     return replace(variable, unit=(lengths, lengths, angles))
+
+
+def warn_of_notes(result: "Result") -> None:
+    """Warn in Python of what a command prints as notes."""
+    import warnings
+
+    from geomech.core.errors import Note
+
+    if "note" in result:
+        for line in result["note"].values.tolist():
+            warnings.warn(line, Note, stacklevel=4)
 
 
 def component_number(components: Any) -> int:

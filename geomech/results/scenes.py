@@ -1,4 +1,4 @@
-"""The scenes that results spell out."""
+"""The scenes and media that results spell out."""
 
 from __future__ import annotations
 
@@ -27,6 +27,28 @@ def best_scene(result: Result) -> Any:
     1
     """
     return _parsed(result, "best_scene_toml")
+
+
+def fitted_medium(result: Result) -> Any:
+    """Return the medium of a result of `fit_medium`: a force law with the covariance of
+    its parameters, or a stress map.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> sand = geomech.fitted_medium(geomech.fit_medium("short-rod-drag"))
+    >>> round(sand.C, 2), round(sand.gamma0, 2)
+    (1.49, 0.22)
+    >>> chain, circle = geomech.bodies.Chain(), geomech.gaits.Circle(1.0)
+    >>> moved = geomech.study(sand, chain, circle).displacement(tiers="direct")
+    >>> moved["net_distance"].values.round(3)
+    array([[0.05]])
+    """
+    from geomech.scenes.read import medium_in
+
+    if "medium_toml" not in result.attributes:
+        raise Refusal("this result has no medium", instead="give one of ``fit_medium``")
+    return medium_in(result.attributes["medium_toml"])
 
 
 def _parsed(result: Result, attribute: str) -> Any:

@@ -126,10 +126,9 @@ def unit_of(variable: Variable) -> str:
 
 def head(variable: Variable) -> str:
     """Return the name of a variable with its unit."""
-    unit = unit_of(variable)
-    if not unit or isinstance(variable.unit, tuple):
+    if isinstance(variable.unit, tuple):
         return title(variable.name)
-    return f"{title(variable.name)} ({unit})"
+    return with_unit(title(variable.name), variable.unit)
 
 
 # Scalars
@@ -286,7 +285,7 @@ def index_column(
         name = head(result[dim])
     cells = [coordinate(result, dim, k) for k in rows]
     if variable is not None and isinstance(variable.unit, tuple):
-        cells = [f"{cell} ({variable.unit[k]})" for cell, k in zip(cells, rows)]
+        cells = [with_unit(cell, variable.unit[k]) for cell, k in zip(cells, rows)]
     return [name + note, *cells]
 
 
@@ -306,8 +305,15 @@ def row_name(
     its values where that differs from place to place."""
     name = ", ".join(coordinate(result, dim, k) for dim, k in zip(dims, place))
     if isinstance(variable.unit, tuple):
-        return f"{name} ({variable.unit[place[0]]})"
+        return with_unit(name, variable.unit[place[0]])
     return name
+
+
+def with_unit(name: str, unit: str) -> str:
+    """Return a name with its unit behind it; that of a pure number is left out."""
+    if unit in ("", "1"):
+        return name
+    return f"{name} ({unit})"
 
 
 # Maps

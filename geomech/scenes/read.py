@@ -152,6 +152,17 @@ def medium_of(name: str | Path) -> Any:
     return MEDIA[choose("medium", name, MEDIA)]
 
 
+def medium_in(text: str) -> Any:
+    """Return the medium in the text of a file as `geomech fit-medium` writes it: a law,
+    or a map of stress in the vertical plane."""
+    from geomech.scenes.stress import StressKeys
+
+    source, table = reader.Source("medium"), tables_of(text)["medium"]
+    if "law" in table:
+        return reader.read_section(source, "medium", table, MEDIUM)
+    return reader.build(source, "medium", table, StressKeys)
+
+
 def _medium_file(file: str | Path, place: str) -> tuple[Any, tuple[str, ...]]:
     """Return the medium of a file, and the files that it was read from. place: what a refusal names."""
     table = {"file": str(Path(file).absolute())}

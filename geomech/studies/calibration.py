@@ -3,128 +3,243 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import cached_property
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from geomech.core.errors import choose
 from geomech.core.variables import Result, Variable
 from geomech.scenes import drag
-from geomech.studies.question import Allow, Progress, Question
-from geomech.studies.stress_calibration import law_of, penetration_test, plate_drags
+from geomech.scenes.write import table
+from geomech.studies.stress_calibration import (
+    INTERVAL,
+    law_of,
+    penetration_test,
+    plate_drags,
+)
 from rft.core.refusal import Refusal, located
-from rft.fits.rods import FITS, Fit, fit
+from rft.fits.rods import FITS, Fit, fit, student_factor
 from rft.laws.drag import Rod, rod_drag
 
-SIZES = (
-    "radius",
-    "length",
-    "depth",
-    "density",
-)  # of the rod and the bed, as options have them
+UNITS = {"axial_stress": "Pa", "axial_force": "N", "gamma0_deg": "degrees"}
+SIZES = {"radius": "m", "length": "m", "depth": "m", "density": "kg/m^3"}
 CURVE = np.linspace(0.0, np.pi / 2, 181)  # attack angles at which a law is drawn, rad
+ROUNDED = 12  # decimal places of forces by a law, N
 
 
-def rod_drags(
-    law: str, source: str, sizes: Mapping[str, float], end_caps: float | str
+def chosen_law(source: str, law: str | None) -> str:
+    """Return the name of the law that is fitted, by the columns of a file if None."""
+    if law is None:
+        law = law_of(source)
+    return choose("``law``", law, CALIBRATIONS)
+
+
+def answer(
+    source: str,
+    law: str | None = None,
+    sizes: Mapping[str, float] | None = None,
+    end_caps: float | str = 0.0,
 ) -> Result:
-    """Return a law fitted to the drag on a rod (`rft.fits.rods`), from a file or the sample ``source``.
+    """Return a law fitted to the measurements of a file, with its medium as text.
 
-    sizes: those of `SIZES` that overrule the header lines. Refusal, one line that names the file, if the data are bad or
-    do not determine the law."""
+    law: one of CALIBRATIONS, by the columns of the file if None. sizes: those of the rod
+    or plate that overrule the file's. end_caps: e of the rod's ends (`rft.EndCaps`), 0 to
+    leave them out, or "fitted". Refusal, one line that names the file, if the data are
+    bad or do not determine the law."""
+    name = chosen_law(source, law)
+    return CALIBRATIONS[name](name, source, sizes or {}, end_caps)
+
+
+def rod_fit(
+    source: str,
+    law: str = "granular",
+    sizes: Mapping[str, float] | None = None,
+    end_caps: float | str = 0.0,
+) -> Fit:
+    """Return a law fitted to the drag on a rod (`rft.fits.rods`), as `answer` does."""
+    return _fit(law, drag.read(source), sizes or {}, end_caps)
+
+
+def _fit(
+    law: str,
+    measured: drag.Measured,
+    sizes: Mapping[str, float],
+    end_caps: float | str,
+) -> Fit:
     if "area" in sizes:
         raise Refusal(
             "``area`` belongs to another measurement",
             instead=f"leave it out for ``law`` {law}",
         )
-    measured = drag.read(source)
     with located(measured.name):
-        f = fit(
-            law,
-            rod_drag(*measured.rows, measured.ends),
-            Rod(**{**measured.sizes, **sizes}),
-            end_caps,
-        )
-        facts = {
-            "name": measured.name,
-            "medium": _medium(
-                f
-            ),  # what no medium can be, such as a k of thousands, is refused here
-            "rod": {name: getattr(f.rod, name) for name in SIZES},
-            "lacks": [
-                name
-                for name in SIZES
-                if FITS[law].granular and not getattr(f.rod, name)
-            ],
-            "repeats_rms": repeats(f.data.psi, f.data.forces),
-        }
-    rows, over = ("component", "row"), ("parameter",)
-    variables = (
-        Variable("parameter", over, np.array([_in_degrees(name) for name in f.names])),
-        Variable("value", over, _displayed(f, f.values), error=_displayed(f, f.errors)),
+        rod = Rod(**{**measured.sizes, **sizes})
+        return fit(law, rod_drag(*measured.rows, measured.ends), rod, end_caps)
+
+
+def rod_drags(
+    law: str, source: str, sizes: Mapping[str, float], end_caps: float | str
+) -> Result:
+    """Return a law fitted to the drag on a rod."""
+    measured = drag.read(source)
+    f = _fit(law, measured, sizes, end_caps)
+    with located(measured.name):  # what no medium can be, such as a k of thousands
+        text = medium_text(f, measured.name)
+    facts = {
+        "file": measured.name,
+        "law": f.law,
+        "forces": f.data.n_forces,
+        "angles": f.data.n_angles,
+        "medium_toml": text,
+    }
+    lacks = [name for name in SIZES if not getattr(f.rod, name)]
+    if FITS[law].granular and lacks:
+        facts["lacks"] = ", ".join(lacks)
+    variables = [*_parameters(f), *_of_rod(f), *_rows(f, measured), *_curve(f)]
+    return Result("fit_medium", tuple(variables), facts)
+
+
+def _parameters(f: Fit) -> list[Variable]:
+    """Return the parameters of a law."""
+    over = ("parameter",)
+    names = [_in_degrees(name) for name in f.names]
+    units = same_or_each([UNITS.get(name, "1") for name in names])
+    half_width = student_factor(f.degrees_of_freedom) * f.errors
+    return [
+        Variable("parameter", over, names),
         Variable(
-            "interval", (*over, "bound"), _displayed(f, f.intervals), label="with 95 %"
+            "value", over, _displayed(f, f.values), units, "fitted",
+            _displayed(f, half_width), error_label=INTERVAL,
         ),
-        Variable("component", ("component",), np.array(["parallel", "perpendicular"])),
+        Variable("standard_error", over, _displayed(f, f.errors), units, "of value"),
+        Variable(
+            "covariance", (*over, "other_parameter"), f.covariance, "",
+            "of the parameters, gamma0 in rad",
+        ),
+    ]  # fmt: skip
+
+
+def _of_rod(f: Fit) -> list[Variable]:
+    """Return what is known of the whole rod."""
+    found = [Variable("axial_force", (), f.axial_force, "N", "on the whole rod")]
+    if f.axial_stress is not None:
+        label = "over the projected area"
+        found.append(Variable("axial_stress", (), f.axial_stress, "Pa", label))
+    found.append(Variable("rms", (), f.rms, "N", "of the residuals"))
+    repeated = repeats(f.data.psi, f.data.forces)
+    if repeated is not None:
+        label = "of forces about their means at equal angles"
+        found.append(Variable("repeats_rms", (), repeated, "N", label))
+    label = "e of both ends together, 0 if they are left out"
+    found.append(Variable("end_caps", (), f.end_caps, "1", label))
+    for name, unit in SIZES.items():
+        size = getattr(f.rod, name)
+        if size is not None:
+            of = "of the bed" if name == "density" else "of the rod"
+            found.append(Variable(f"rod_{name}", (), size, unit, of))
+    return found
+
+
+def _rows(f: Fit, measured: drag.Measured) -> list[Variable]:
+    """Return the measured forces beside those by the law."""
+    over = ("component", "row")
+    folded = "attack angle, folded into 0 to 90 degrees"
+    fitted = np.round(f.data.forces - f.residuals, ROUNDED) + 0.0
+    return [
+        Variable("component", ("component",), ["parallel", "perpendicular"]),
         Variable("psi", ("row",), measured.rows[0], "degrees", "attack angle"),
-        Variable(
-            "folded_psi",
-            ("row",),
-            np.degrees(f.data.psi),
-            "degrees",
-            "attack angle, folded into 0 to 90 degrees",
-        ),
-        Variable("force", rows, f.data.forces, "N"),
-        Variable("residual", rows, f.residuals, "N", "force minus law"),
+        Variable("folded_psi", ("row",), np.degrees(f.data.psi), "degrees", folded),
+        Variable("force", over, f.data.forces, "N", "measured"),
+        Variable("fitted", over, fitted, "N", "by the law"),
+        Variable("residual", over, f.residuals, "N", "force minus law"),
+    ]
+
+
+def _curve(f: Fit) -> list[Variable]:
+    """Return the law against the attack angle."""
+    return [
         Variable("angle", ("angle",), np.degrees(CURVE), "degrees", "attack angle"),
         Variable(
-            "law",
-            ("component", "angle"),
-            f.forces(CURVE),
-            "N",
-            error=f.band(CURVE),
-            error_label="95 %",
+            "law_curve", ("component", "angle"), f.forces(CURVE), "N", "by the law",
+            f.band(CURVE), error_label="half width of the band with 95 %",
         ),
-    )
-    return Result("rod_drag", variables, facts, f)
+    ]  # fmt: skip
 
 
-def _medium(f: Fit) -> dict:
+def same_or_each(units: Sequence[str]) -> str | tuple[str, ...]:
+    """Return the unit that all have, or one for each."""
+    if len({*units}) == 1:
+        return units[0]
+    return tuple(units)
+
+
+def medium_text(f: Fit, name: str) -> str:
+    """Return the text of a file that a scene takes as ``[medium] file``. name: of the
+    file of the measurements."""
+    size = f"{f.data.n_angles} angles, rms residual {f.rms:.3g} N"
+    lines = [f"# Fitted to {json.dumps(name)}: {size}{_uncertain_words(f)}."]
+    if f.data.ends is not None and f.end_caps:
+        parts = []
+        for key, x, error in zip(("e", "across"), f.values[-2:], f.errors[-2:]):
+            parts.append(f"{key} = {x:.3g} +- {error:.2g}")
+        lines.append(
+            "# Of the flank alone. Both ends together, in [[effects]] kind = "
+            f'"end-caps": {", ".join(parts)}.'
+        )
+    return "\n".join([*lines, table("medium", _medium(f))])
+
+
+def _uncertain_words(f: Fit) -> str:
+    """Return which parameters have a covariance; "" for none."""
+    uncertain = getattr(f.medium, "uncertain", ())
+    if not uncertain:
+        return ""
+    words = f"; covariance of {', '.join(uncertain)}"
+    if "gamma0" in uncertain:
+        words = f"{words}, gamma0 in rad"
+    return f"{words}, widened for {f.degrees_of_freedom} degrees of freedom (Student)"
+
+
+def _medium(f: Fit) -> dict[str, Any]:
     """Return the table [medium] of a fitted law."""
-    values = {
-        field.name: getattr(f.medium, field.name)
-        for field in dataclasses.fields(f.medium)
-    }
-    if "gamma0" in values:
-        values = {
-            _in_degrees(k): math.degrees(x) if k == "gamma0" else x
-            for k, x in values.items()
-        }
-    if "covariance" in values:
-        values["covariance"] = [list(row) for row in values["covariance"]]
-    return {"law": f.law, **{k: x for k, x in values.items() if x is not None}}
+    found: dict[str, Any] = {"law": f.law}
+    for field in dataclasses.fields(f.medium):
+        value = getattr(f.medium, field.name)
+        if value is None:
+            continue
+        if field.name == "gamma0":
+            value = math.degrees(value)
+        if field.name == "covariance":
+            value = [list(row) for row in value]
+        found[_in_degrees(field.name)] = value
+    return found
 
 
 def _displayed(f: Fit, values: np.ndarray) -> np.ndarray:
-    """Return values (n, ...) of the parameters with gamma0 in degrees."""
-    return np.array(
-        [np.degrees(x) if name == "gamma0" else x for name, x in zip(f.names, values)]
-    )
+    """Return values (n,) of the parameters with gamma0 in degrees."""
+    shown = np.array(values, float)
+    for k, name in enumerate(f.names):
+        if name == "gamma0":
+            shown[k] = np.degrees(shown[k])
+    return shown
 
 
 def _in_degrees(name: str) -> str:
-    return "gamma0_deg" if name == "gamma0" else name
+    """Return the name of a parameter, of an angle that in degrees."""
+    if name == "gamma0":
+        return "gamma0_deg"
+    return name
 
 
 def repeats(psi: np.ndarray, forces: np.ndarray) -> float | None:
-    """Return the root mean square of forces about their means at equal angles, N, with the degrees of freedom that these
-    leave; None if no angle is repeated. No law can go below it."""
+    """Return the root mean square of forces about their means at equal angles, N, with
+    the degrees of freedom that these leave; None if no angle is repeated. No law can go
+    below it."""
     _, which, counts = np.unique(psi.round(9), return_inverse=True, return_counts=True)
-    if (free := psi.size - counts.size) < 1:
+    free = psi.size - counts.size
+    if free < 1:
         return None
     means = np.array([np.bincount(which, f) / counts for f in forces])
     return float(np.sqrt(((forces - means[:, which]) ** 2).sum() / (2 * free)))
@@ -135,33 +250,3 @@ CALIBRATIONS: dict[str, Callable[..., Result]] = {
     "stress-map": plate_drags,
     "zeta": penetration_test,
 }
-
-
-@dataclass(frozen=True)
-class Calibration(Question):
-    """A law fitted to measurements. law: one of CALIBRATIONS, by the columns of the file if None. sizes: those of the rod or
-    plate that overrule the file's. end_caps: e of the rod's ends (`rft.EndCaps`), 0 to leave them out, or "fitted"."""
-
-    source: str
-    law: str | None = None
-    sizes: tuple[tuple[str, float], ...] = ()
-    end_caps: float | str = 0.0
-
-    def inputs(self) -> list[Path]:
-        return [Path(self.source)]
-
-    @cached_property
-    def chosen(self) -> str:
-        return choose(
-            "``law``",
-            law_of(self.source) if self.law is None else self.law,
-            CALIBRATIONS,
-        )
-
-    def check(self) -> None:
-        _ = self.chosen
-
-    def answer(self, progress: Progress, allow: Allow) -> Result:
-        return CALIBRATIONS[self.chosen](
-            self.chosen, self.source, dict(self.sizes), self.end_caps
-        )

@@ -12,7 +12,7 @@ import numpy as np
 from geomech.core.variables import Result, Variable
 from geomech.run.backend import prefer_backend
 from geomech.scenes.model import Scene
-from geomech.studies.calibration import Calibration
+from geomech.studies.calibration import rod_fit
 from geomech.studies.grains import GrainSteps, price, store_folder
 from geomech.studies.question import Allow, Progress, Question
 from geomech.studies.study import Study
@@ -183,7 +183,7 @@ def predictions(question: GrainSwim) -> Predictions:
     scene = question.scene
     found = dict(_predicted(scene))
     body = question.experiment.body
-    law = Calibration(FLANK, end_caps="fitted").ask().subject
+    law = rod_fit(FLANK, end_caps="fitted")
     caps = law.caps(body.half_width / body.size)
     caps = caps.in_metres(question.swimmer.body.length)
     others = tuple(e for e in question.swimmer.effects if not isinstance(e, EndCaps))

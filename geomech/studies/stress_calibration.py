@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +15,6 @@ from geomech.io.rows import read as read_rows
 from geomech.scenes import penetration
 from geomech.scenes.drag import LARGEST_FILE
 from geomech.scenes.stress import plate_rows
-from rft.core.refusal import Refusal, located
 from rft.fits.plates import (
     COEFFICIENTS,
     GENERIC,
@@ -22,19 +23,23 @@ from rft.fits.plates import (
     fit_stress,
     fit_zeta,
 )
+from rft.fits.rods import student_factor
 from rft.terradynamics.plates.survey import survey
 
 KEYS = tuple(
     name.replace("m", "-") for name in COEFFICIENTS
 )  # as files have them: B-11 for Bm11
 SEEN = 3.0  # standard errors beyond which the depth of zero force is noted
+UNIT = "N/cm^3"
+INTERVAL = "half width of the interval with 95 %"
 GIVEN = "give a CSV file with columns depth_m,force_N"
 
 
 def plate_drags(
     law: str, source: str, sizes: Mapping[str, float], end_caps: float | str
 ) -> Result:
-    """Return nine coefficients fitted to a CSV file of plate drags. Refusal, one line that names the file, for bad ones."""
+    """Return nine coefficients fitted to a CSV file of plate drags. Refusal, one line
+    that names the file, for bad ones."""
     _refuse(law, sizes, end_caps, ())
     beta, gamma, *alpha = plate_rows("plate drags", source)
     name = Path(source).name
@@ -44,29 +49,73 @@ def plate_drags(
     overview, notes = survey(f.stress), _lacking(name, f, undetermined)
     if overview.pushing:
         notes.append(f"{name}: the fitted map {overview.description()}")
+    rms = _rms(f.residuals)
     facts = {
-        "name": name,
-        "undetermined": undetermined,
-        "rms": _rms(f.residuals),
+        "file": name,
+        "law": law,
+        "drags": len(beta),
         "map": overview.description(),
-        "notes": notes,
+        "medium_toml": _coefficients_text(f, name, rms, undetermined),
     }
-    over, rows = ("coefficient",), ("component", "row")
-    variables = (
-        Variable("coefficient", over, np.array(KEYS)),
-        Variable("value", over, f.values, "N/cm^3", error=f.errors),
-        Variable("interval", (*over, "bound"), f.intervals, "N/cm^3", "with 95 %"),
+    over, rows = ("parameter",), ("component", "row")
+    half_width = student_factor(f.free) * f.errors
+    missing = [int(key in undetermined) for key in KEYS]
+    variables = [
+        Variable("parameter", over, list(KEYS)),
         Variable(
-            "resolution", over, f.resolution, "1", "share that comes from the data"
+            "value", over, f.values, UNIT, "fitted", half_width, error_label=INTERVAL
         ),
-        Variable("generic", over, f.zeta * GENERIC, "N/cm^3", "generic set times zeta"),
-        Variable("beta", ("row",), beta, "degrees"),
-        Variable("gamma", ("row",), gamma, "degrees"),
-        Variable("component", ("component",), np.array(["alpha_x", "alpha_z"])),
-        Variable("stress", rows, np.array(alpha), "N/cm^3"),
-        Variable("residual", rows, f.residuals, "N/cm^3", "stress minus map"),
-    )
-    return Result("plate_drags", variables, facts, f)
+        Variable("generic", over, f.zeta * GENERIC, UNIT, "generic set times zeta"),
+        Variable(
+            "share_from_data", over, f.resolution, "1",
+            "of each value; the rest comes from the shape of the generic set",
+        ),
+        Variable("undetermined", over, missing, "1", "1 if the data do not settle it"),
+        Variable("standard_error", over, f.errors, UNIT, "of value"),
+        Variable(
+            "covariance", (*over, "other_parameter"), f.covariance, f"({UNIT})^2",
+            "of the parameters",
+        ),
+        Variable("zeta", (), f.zeta, "1", "of the generic set that comes nearest"),
+        Variable("rms", (), rms, UNIT, "of the residuals"),
+        Variable("pulling", (), overview.pulling, "1", "share of angles in which the map pulls"),
+        Variable("pushing", (), overview.pushing, "1", "share of angles in which it drives motion on"),
+        Variable("component", ("component",), ["alpha_x", "alpha_z"]),
+        Variable("beta", ("row",), beta, "degrees", "tilt"),
+        Variable("gamma", ("row",), gamma, "degrees", "direction of motion"),
+        Variable("stress", rows, np.array(alpha), UNIT, "measured, per depth"),
+        Variable("fitted", rows, np.array(alpha) - f.residuals, UNIT, "by the map"),
+        Variable("residual", rows, f.residuals, UNIT, "stress minus map"),
+        *noted(notes),
+    ]  # fmt: skip
+    return Result("fit_medium", tuple(variables), facts)
+
+
+def noted(notes: list[str]) -> list[Variable]:
+    """Return notes as a variable, if there are any."""
+    if not notes:
+        return []
+    return [Variable("note", ("line",), notes)]
+
+
+def _coefficients_text(
+    f: StressFit, name: str, rms: float, undetermined: list[str]
+) -> str:
+    """Return a file for `geomech stress` and the [medium] of intruder scenes."""
+    count = f.residuals.shape[1]
+    lines = [
+        f"# Fitted to {json.dumps(name)}: {count} plate drags, "
+        f"rms residual {rms:.3g} {UNIT}.",
+        f"[medium]  # {UNIT}; within, with 95 %:",
+    ]
+    for key, x, (low, high), share in zip(
+        KEYS, f.values.tolist(), f.intervals, f.resolution
+    ):
+        line = f"{key} = {x!r}  # {low:.4g} to {high:.4g}"
+        if key in undetermined:
+            line += f"; {100 * (1 - share):.0f} % of it from the generic shape"
+        lines.append(line)
+    return "\n".join(lines) + "\n"
 
 
 def _lacking(name: str, f: StressFit, undetermined: list[str]) -> list[str]:
@@ -96,32 +145,54 @@ def penetration_test(
                 instead="give ``area`` in m^2, or a header line '# plate area = 9.5 cm^2'",
             )
         f = fit_zeta(test.depth, test.force, area)
+    rms = _rms(f.force - f.law)
     facts = {
-        "name": test.name,
-        "rms": _rms(f.force - f.law),
-        "notes": _shifted(test.name, f),
+        "file": test.name,
+        "law": law,
+        "medium_toml": _zeta_text(f, test.name, rms),
     }
-    variables = (
-        Variable("zeta", (), f.zeta, "1", error=f.error),
-        Variable("interval", ("bound",), f.interval, "1", "of zeta, with 95 %"),
+    half_width = f.interval[1] - f.zeta
+    areas = np.unique(area) if np.ptp(area) == 0 else area
+    label = "on a level plate that is pushed down"
+    band = f.law * (f.interval[1] / f.zeta - 1)
+    variables = [
+        Variable("parameter", ("parameter",), ["zeta"]),
         Variable(
-            "area",
-            ("plate",),
-            np.unique(area) if len({*area.tolist()}) == 1 else area,
-            "m^2",
+            "value", ("parameter",), [f.zeta], "1", "fitted", [half_width],
+            error_label=INTERVAL,
         ),
+        Variable("standard_error", ("parameter",), [f.error], "1", "of value"),
+        Variable(
+            "covariance", ("parameter", "other_parameter"), [[f.error**2]], "1",
+            "of the parameters",
+        ),
+        Variable("downward_stress", (), f.zeta, UNIT, label),
+        Variable("rms", (), rms, "N", "of the residuals"),
+        Variable("area", ("plate",), areas, "m^2", "of the plate"),
         Variable("depth", ("row",), f.depth, "m"),
-        Variable("force", ("row",), f.force, "N"),
+        Variable("force", ("row",), f.force, "N", "measured"),
         Variable(
-            "law",
-            ("row",),
-            f.law,
-            "N",
-            error=f.law * (f.interval[1] / f.zeta - 1),
-            error_label="95 %",
+            "fitted", ("row",), f.law, "N", "by zeta", band, error_label=INTERVAL
         ),
+        Variable("residual", ("row",), f.force - f.law, "N", "force minus law"),
+        *noted(_shifted(test.name, f)),
+    ]  # fmt: skip
+    if np.isfinite(f.zero):
+        label = "where a straight line through the forces is zero"
+        zero = Variable("zero_depth", (), f.zero, "m", label, f.zero_error)
+        variables.append(replace(zero, error_label="standard error"))
+    return Result("fit_medium", tuple(variables), facts)
+
+
+def _zeta_text(f: ZetaFit, name: str, rms: float) -> str:
+    """Return a file for `geomech stress` and the [medium] of intruder scenes."""
+    low, high = f.interval
+    return (
+        f"# Fitted to {json.dumps(name)}: {f.depth.size} depths, "
+        f"rms residual {rms:.3g} N.\n"
+        "[medium]  # the generic set times\n"
+        f"zeta = {f.zeta!r}  # {low:.4g} to {high:.4g} with 95 %\n"
     )
-    return Result("penetration", variables, facts, f)
 
 
 def _shifted(name: str, f: ZetaFit) -> list[str]:

@@ -1,7 +1,7 @@
 """Results in words: a kind of result has a module of its name.
 
 Its ``text(result)`` returns lines for a reader, which fit a screen, and ``full(result)`` all of them where there are
-more; ``MORE`` says so in words. ``numbers(result)`` is the JSON, ``medium(result)`` of a calibration a file for scenes."""
+more; ``MORE`` says so in words. ``numbers(result)`` is the JSON."""
 
 from __future__ import annotations
 
@@ -32,16 +32,11 @@ def numbers(result: Result) -> dict[str, Any]:
     return _module(result).numbers(result)
 
 
-def medium(result: Result) -> str:
-    """Return the medium that a calibration found, as TOML."""
-    return _module(result).medium(result)
-
-
 def _module(result: Result) -> Any:
     return import_module(f"geomech.text.{result.kind}")
 
 
-__all__ = ["medium", "numbers", "text"]
+__all__ = ["numbers", "text"]
 
 
 def __dir__() -> list[str]:
