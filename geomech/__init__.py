@@ -35,6 +35,7 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech import systems as systems
     from geomech import tiers as tiers
     from geomech.api import Study as Study
+    from geomech.api import accuracy as accuracy
     from geomech.api import ccf as ccf
     from geomech.api import displacement as displacement
     from geomech.api import forces as forces
@@ -46,7 +47,6 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.api import sweep as sweep
     from geomech.api import velocity as velocity
     from geomech.api import walk as walk
-    from geomech.app import accuracy as accuracy
     from geomech.app import fit_medium as fit_medium
     from geomech.app import fit_midlines as fit_midlines
     from geomech.geometry import connection as connection
@@ -90,6 +90,7 @@ _OBJECTS = {
     **dict.fromkeys(
         (
             "Study",
+            "accuracy",
             "ccf",
             "displacement",
             "forces",
@@ -104,7 +105,7 @@ _OBJECTS = {
         ),
         "geomech.api",
     ),
-    **dict.fromkeys(("accuracy", "fit_medium", "fit_midlines"), "geomech.app"),
+    **dict.fromkeys(("fit_medium", "fit_midlines"), "geomech.app"),
     "best_scene": "geomech.results.scenes",
     **dict.fromkeys(("load", "toml", "Scene", "Numerics"), "geomech.scenes"),
     "medium": "geomech.scenes.stress",

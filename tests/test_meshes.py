@@ -2,7 +2,6 @@
 
 import csv
 import dataclasses
-import json
 import math
 import re
 import sys
@@ -600,15 +599,16 @@ def test_a_scene_made_in_python_says_what_is_wrong():
 def test_accuracy_of_the_number_of_triangles(geomech, tmp_path, monkeypatch):
     monkeypatch.setattr(type(BODIES[0]), "ladder", (80, 320, 1280, 5120))
     (tmp_path / "s.toml").write_text(MADE)
-    code, out, err = geomech("accuracy", "s.toml", "-o", "out", "--json")
+    code, out, err = geomech("accuracy", "s.toml", "--json")
     assert (code, err) == (0, "")
-    found = json.loads(out)
-    assert found["parts"] == "triangles" and found["finest"] == 5120
-    force, moment = found["lines"]
-    assert force["value"] == [80, 320, 1280] and force["order"] == 1
-    assert 0.8 < force["slope"] < 1.3 and moment["error"][-1] < 0.02
-    assert "triangles" in found["cheapest"][0]
-    assert "80 to 1280 triangles" in (tmp_path / "out" / "accuracy.txt").read_text()
+    found = of_json(out)
+    facts = found.attributes
+    assert facts["parts"] == "triangles" and facts["finest"] == 5120
+    assert found["value"].values.tolist() == [[80, 320, 1280]]
+    assert found["order_by_theory"].values.tolist() == ["1"]
+    assert 0.8 < found["force_order"][0] < 1.3 and found["moment_error"][0, -1] < 0.02
+    assert found["best_setting"][0] == "triangles"
+    assert "triangles 80 to 1280: " in str(found)
 
 
 def test_pictures_show_the_stress_on_the_mesh():

@@ -21,7 +21,7 @@ from scipy.io import loadmat, netcdf_file, savemat
 from tabled import of_json, tabled
 
 import rft
-from geomech import plots, scenes
+from geomech import api, plots, scenes
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
@@ -30,13 +30,12 @@ from geomech.io.tables import base, mat, matlab, netcdf
 from geomech.io.tables.base import checked_names
 from geomech.io.tables.mat import ERROR
 from geomech.scenes import Numerics, Scene
-from geomech.studies import accuracy, choose, estimate, fields, tiered
+from geomech.studies import choose, estimate, fields, tiered
 from geomech.studies.single import single
 from geomech.studies.study import Study
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from geomech.systems.base import length_unit
 from geomech.systems.table import LENGTHS
-from geomech.text import accuracy as text
 from geomech.text.explain import explain
 from geomech.text.system import described
 from rft.bodies.base import body_size
@@ -933,17 +932,15 @@ def test_what_accuracy_costs_includes_the_tables_own_error(made, monkeypatch):
     monkeypatch.setattr(
         tiered, "SETTINGS", [k for k in tiered.SETTINGS if k.label == "direct: phases"]
     )
-    found = accuracy.study(scene, runs=1)
-    amplitudes = np.array(found["amplitudes"])
+    found = api.accuracy(scene, runs=1)
+    amplitudes = found["amplitude"].values
     own = scene.system.table_error(*GAIT.cycle(64, amplitudes))[:, 0].max()
-    assert found["own_error"] == own and 1e-4 < own < 0.1
-    assert {c["tier"] is None for c in found["cheapest"] if c["tolerance"] < own} == {
-        True
-    }
-    assert all(
-        own < c["error"] <= c["tolerance"] for c in found["cheapest"] if c["tier"]
-    )
-    assert f"the table's own, {own:.1e} BL" in text.table(found)
+    assert float(found["own_error"]) == own and 1e-4 < own < 0.1
+    tolerances, error = found["tolerance"].values, found["best_error"].values
+    np.testing.assert_array_equal(np.isnan(error), tolerances < own)
+    assert (error[tolerances > own] > own).all()
+    assert (error[tolerances > own] <= tolerances[tolerances > own]).all()
+    assert f"the system's own, {own:.1e} BL" in str(found)
     monkeypatch.setattr(choose, "MOST_PHASES", 256)
     with pytest.raises(
         Refusal,

@@ -12,13 +12,14 @@ import pytest
 from registry import GAITS, OUTLINES, STRESSES, SYSTEMS
 from tabled import swept_table, tabled
 
+import geomech
 import rft
 from geomech import scenes
 from geomech.gaits import KINDS, Centreline, Circle, Sine
 from geomech.geometry import connection, curvature, family, harmonics, reconstruct
 from geomech.geometry.field import Field
 from geomech.scenes import IntruderScene, MeshScene, Numerics, Scene, WalkerScene, kinds
-from geomech.studies import accuracy, sweep, undulation
+from geomech.studies import sweep, undulation
 from geomech.studies.choose import cheapest
 from geomech.studies.single import single
 from geomech.studies.study import Study
@@ -208,7 +209,7 @@ def geometries(value):
         scenes.toml,
         scenes.tables,
         scenes.inputs,
-        accuracy.study,
+        geomech.accuracy,
         undulation.activation,
     ):
         yield "a scene", lambda of=of: of(value)

@@ -10,7 +10,7 @@ import pytest
 from artists import curve, drawn
 from PIL import Image, ImageSequence
 from scipy.io import netcdf_file
-from tabled import of_swept
+from tabled import of_json, of_swept
 
 from figures.walking_sensitivity import Sheet
 from geomech import plots, scenes
@@ -905,11 +905,11 @@ def test_sweep_and_accuracy_of_a_walk(geomech, tmp_path, monkeypatch):
     monkeypatch.setattr(
         walking, "FINEST", {"steps": 24, "elements": 12, "rounding": 2e-3}
     )
-    code, out, err = geomech("accuracy", "small.toml", "-o", "acc", "--json")
+    code, out, err = geomech("accuracy", "small.toml", "--json", "--plot", "a.png")
     assert (code, err) == (0, "")
-    lines = {line["label"]: line for line in json.loads(out)["lines"]}
-    assert list(lines) == ["steps", "elements", "rounding"]
-    assert all(line["error"][-1] < 0.05 for line in lines.values())
+    found = of_json(out)
+    assert found["setting"].values.tolist() == ["steps", "elements", "rounding"]
+    assert (found["error"].values < 0.05).all()
 
 
 WRONG = {

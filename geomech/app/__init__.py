@@ -1,9 +1,9 @@
-"""Questions of measurements and of accuracy from Python."""
+"""Questions of measurements from Python."""
 
-from geomech.app.questions import accuracy, fit_medium, fit_midlines
+from geomech.app.questions import fit_medium, fit_midlines
 from geomech.app.results import FittedMedium, FittedMidlines
 
-__all__ = ["FittedMedium", "FittedMidlines", "accuracy", "fit_medium", "fit_midlines"]
+__all__ = ["FittedMedium", "FittedMidlines", "fit_medium", "fit_midlines"]
 
 
 def __dir__() -> list[str]:
