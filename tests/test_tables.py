@@ -22,6 +22,8 @@ from tabled import of_json, tabled
 
 import rft
 from geomech import api, plots, scenes
+from geomech.describe.explain import explained
+from geomech.describe.system import described
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
@@ -36,8 +38,6 @@ from geomech.studies.study import Study
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from geomech.systems.base import length_unit
 from geomech.systems.table import LENGTHS
-from geomech.text.explain import explain
-from geomech.text.system import described
 from rft.bodies.base import body_size
 from rft.laws import CATALOGUE
 from rft.refusal import Refusal
@@ -485,7 +485,7 @@ def test_what_is_even_in_alphadot_is_part_of_the_error(ending, tmp_path):
     assert study().even_part is None
     fields.save_connection(tmp_path / f"a{ending}", source)
     table = Scene(Table(tmp_path / f"a{ending}"), GAIT)
-    assert ("xi is not odd in alphadot" in explain(table)) == (ending == ".nc")
+    assert ("xi is not odd in alphadot" in explained(table)) == (ending == ".nc")
     for gait in (GAIT, Circle(amplitude=1.2), Butterfly(amplitude=0.8)):
         amplitudes = gait.amplitude * np.array([0.3, 0.8, 1.1])
         poses, errors = estimate.direct(table, gait, amplitudes, 128)
@@ -559,7 +559,7 @@ def test_every_command_works_on_a_table_or_says_why_not(made, tmp_path, monkeypa
         code, out, err = geomech(*args)
         assert (code, out) == (2, "") and said in err and err.count("\n") == 1
     assert (tmp_path / "t" / "a.nc").read_bytes() == before
-    told = explain(scenes.load("t/t.toml"))
+    told = explained(scenes.load("t/t.toml"))
     assert "fit leaves x" in told and "odd harmonics" in told and "frame link-1" in told
     assert [k.label for k in tiered.Settings(scenes.load("t/t.toml")).settings()] == [
         "direct: phases",

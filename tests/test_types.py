@@ -15,6 +15,7 @@ from tabled import swept_table, tabled
 import geomech
 import rft
 from geomech import scenes
+from geomech.describe.explain import explained
 from geomech.gaits import KINDS, Centreline, Circle, Sine
 from geomech.geometry import connection, curvature, family, harmonics, reconstruct
 from geomech.geometry.field import Field
@@ -24,7 +25,6 @@ from geomech.studies.choose import cheapest
 from geomech.studies.single import single
 from geomech.studies.study import Study
 from geomech.systems import Solver, Swimmer
-from geomech.text.explain import explain
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
 from geomech.tiers.path import path
@@ -204,7 +204,7 @@ def geometries(value):
     yield "phases", lambda: area(curvature.ccf(fitted), Circle(), 0.5, value)
     yield "xi", lambda: reconstruct.turning(value)
     yield "pose", lambda: se2.exp(value)
-    yield "a scene", lambda: explain(value)
+    yield "a scene", lambda: explained(value)
     for of in (
         scenes.toml,
         scenes.tables,

@@ -15,13 +15,13 @@ from tabled import of_json, of_swept
 from figures.walking_sensitivity import Sheet
 from geomech import plots, scenes
 from geomech.core.variables import Result
+from geomech.describe.explain import explained
 from geomech.io.results import of_dict
 from geomech.output import walks
 from geomech.questions import walk as questions_walk
 from geomech.scenes import WalkerScene
 from geomech.studies import walking
 from geomech.studies.sweep import Plan
-from geomech.text.explain import explain
 from rft.balance.backend import preferring
 from rft.ground import Aeration, GrainInertia, Slope
 from rft.metres import GRAVITY
@@ -1181,12 +1181,12 @@ def test_walks_as_they_are_built_in_are_solved_and_account_for_their_energy(name
 
 
 def test_explain_tells_the_robot_its_engine_and_effects():
-    told = explain(scenes.load("sandbot"))
+    told = explained(scenes.load("sandbot"))
     assert "sandbot: Rhex (mass = 2.3" in told and "engine: planar" in told
     assert "on:  aeration (air_speed" in told and told.endswith(
         "off, not evaluated: grain-inertia"
     )
-    assert "engine: mujoco" in explain(scenes.load("screws"))
+    assert "engine: mujoco" in explained(scenes.load("screws"))
 
 
 def test_axes_of_a_sweep_have_units():
