@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
+import geomech
 from figures import main
-from geomech import plots
-from geomech.scenes import load
-from geomech.studies import accuracy
+from geomech.core.variables import Result
 
 
-def compute(scene: str = "three-link-glass", runs: int = 2) -> dict:
-    """Return errors and times of every setting, as `accuracy.study` gives them."""
-    return accuracy.study(load(scene), runs=runs)
+def compute(scene: str = "three-link-glass", runs: int = 2) -> Result:
+    """Return errors and times of every setting, as `geomech accuracy` gives them."""
+    return geomech.accuracy(scene, runs=runs)
 
 
-def draw(numbers: dict):
-    return plots.work_precision_figure(numbers)
+def draw(result: Result):
+    return result.plot()
 
 
 if __name__ == "__main__":

@@ -35,6 +35,7 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech import systems as systems
     from geomech import tiers as tiers
     from geomech.api import Study as Study
+    from geomech.api import accuracy as accuracy
     from geomech.api import ccf as ccf
     from geomech.api import displacement as displacement
     from geomech.api import fit_medium as fit_medium
@@ -47,7 +48,6 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.api import sweep as sweep
     from geomech.api import velocity as velocity
     from geomech.api import walk as walk
-    from geomech.app import accuracy as accuracy
     from geomech.app import fit_midlines as fit_midlines
     from geomech.geometry import connection as connection
     from geomech.geometry import curvature as curvature
@@ -91,6 +91,7 @@ _OBJECTS = {
     **dict.fromkeys(
         (
             "Study",
+            "accuracy",
             "ccf",
             "displacement",
             "fit_medium",
@@ -106,8 +107,8 @@ _OBJECTS = {
         ),
         "geomech.api",
     ),
-    **dict.fromkeys(("accuracy", "fit_midlines"), "geomech.app"),
     **dict.fromkeys(("best_scene", "fitted_medium"), "geomech.results.scenes"),
+    "fit_midlines": "geomech.app",
     **dict.fromkeys(("load", "toml", "Scene", "Numerics"), "geomech.scenes"),
     "medium": "geomech.scenes.stress",
     "Swimmer": "geomech.systems",

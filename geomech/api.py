@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Concatenate, ParamSpec
 
 from geomech.core.variables import Result
+from geomech.questions.accuracy import Accuracy
 from geomech.questions.base import Question, plain_type
 from geomech.questions.ccf import Ccf
 from geomech.questions.connection import Connection
@@ -170,6 +171,7 @@ class Study:
     optimise = optimize = asks(Optimize)
     walk = asks(Walk)
     intrude = asks(Intrude)
+    accuracy = asks(Accuracy)
 
     def animate(self, path: str | Path = "swim.gif", *, cycles: int = 1) -> Path:
         """Write a film of the body beside its gait on the CCF, .gif or .mp4, or a strip of
@@ -237,3 +239,4 @@ optimise = optimize = asked_of_scene(Optimize)
 walk = asked_of_scene(Walk)
 intrude = asked_of_scene(Intrude)
 fit_medium = asked_of_file(FitMedium)
+accuracy = asked_of_scene(Accuracy)

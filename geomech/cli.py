@@ -1,5 +1,4 @@
-"""The command line: the commands of `geomech.questions`, and those of `geomech.commands`
-that ask none."""
+"""The command line: the commands of `geomech.questions`, and those that ask none."""
 
 from __future__ import annotations
 
@@ -13,14 +12,9 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from geomech import __version__, questions, renamed, terminal
+from geomech import __version__, describe, questions, renamed, terminal
 from geomech.commands import COMMANDS
-from geomech.commands.options import (
-    PluginOption,
-    load_plugins,
-    with_plugins,
-    with_workers,
-)
+from geomech.options import PluginOption, load_plugins, with_plugins, with_workers
 
 
 class Commands(Mapping[str, Any]):
@@ -61,9 +55,10 @@ class Group(TyperGroup):
 
 def headings() -> dict[str, list[str]]:
     """Return the names of all commands by their headings."""
-    found = {}
-    for heading, names in COMMANDS.items():
-        found[heading] = [*questions.GROUPS.get(heading, ()), *names]
+    found: dict[str, list[str]] = {}
+    for groups in (questions.GROUPS, COMMANDS, describe.GROUPS):
+        for heading, names in groups.items():
+            found.setdefault(heading, []).extend(names)
     return found
 
 
@@ -74,8 +69,9 @@ def typed(name: str) -> str:
 
 def summary(name: str) -> str:
     """Return the line of a command in the list of all."""
-    if name in questions.SUMMARIES:
-        return questions.SUMMARIES[name]
+    for summaries in (questions.SUMMARIES, describe.SUMMARIES):
+        if name in summaries:
+            return summaries[name]
     return loaded(name).get_short_help_str(60)
 
 
@@ -91,6 +87,8 @@ def loaded(name: str) -> Any:
 
 def function(name: str) -> Any:
     """Return the function of a command."""
+    if name in describe.SUMMARIES:
+        return getattr(import_module(f"geomech.describe.{name}"), name)
     if name not in questions.SUMMARIES:
         return getattr(import_module(f"geomech.commands.{name}"), name)
     from geomech.command import command

@@ -11,7 +11,7 @@ from typing import Annotated, Any, NamedTuple, Optional
 import typer
 
 from geomech import pipeline
-from geomech.commands.options import ExtentOption, GridOption, MediumOption
+from geomech.options import ExtentOption, GridOption, MediumOption
 from geomech.questions import base
 from geomech.questions.base import Declared, Option, Question
 from rft.core.refusal import Refusal

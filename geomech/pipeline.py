@@ -143,7 +143,7 @@ def allow(question: Question, cost: Cost, yes: bool) -> None:
 def note_system(scene: Any) -> None:
     """Warn of what is likely not meant, once a command. An intruder scene has no
     system."""
-    from geomech.text.system import notes
+    from geomech.describe.system import notes
 
     if not hasattr(scene, "system"):
         return

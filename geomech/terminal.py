@@ -15,7 +15,7 @@ import threading
 import time
 import traceback
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import typer
@@ -25,12 +25,13 @@ from geomech.run import THREAD_VARIABLES
 from geomech.run.progress import progress
 from rft.core.refusal import Refusal, line, printable, worded
 
-__all__ = ["Stopped", "exit_code", "progress", "report", "stoppable"]
+__all__ = ["Stopped", "exit_code", "progress", "report", "show", "stoppable"]
 
 LONGEST = 2000  # characters of an error
 PRINTING = (
     "geomech.cli",
     "geomech.commands",
+    "geomech.describe",
     "geomech.pipeline",
     "geomech.terminal",
     "click",
@@ -254,6 +255,12 @@ def _pipe_closed() -> int:
     """Return success where the reader left early: `geomech scenes | head -1`. Files are written by then."""
     _discard(sys.stdout)
     return 0
+
+
+def show(lines: Iterable[str]) -> None:
+    """Print lines as they come."""
+    for text in lines:
+        print(text, flush=True)
 
 
 def report(text: str) -> None:

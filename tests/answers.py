@@ -70,7 +70,7 @@ CASES = {  # command lines in a copy of data/frozen, by kind
         "fit-gait trial.csv --medium glass-0.3mm-close -o out.nc",
         "fit-gait log.csv --harmonics 1 -o out.nc",
     ],
-    "accuracy": ["accuracy leg.toml -o out", "accuracy plain.toml -o out"],
+    "accuracy": ["accuracy leg.toml", "accuracy plain.toml"],
     "run": ["run table.toml -o out"],
 }  # fmt: skip
 

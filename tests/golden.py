@@ -363,11 +363,11 @@ def measurements():
 ASKED = {  # lines with costs that are known in some hundredths of a second, by what they are about
     "gait": (
         "displacement {} --amplitudes 0.3,0.9", "ccf {}", "connection {} -o x.nc", "run {} -o d", "lab {} -o x.html",
-        "sweep {} --over gait.amplitude=0.3,0.6 -o x.nc", "trajectory {} --cycles 3", "forces {}", "accuracy {} -o d",
+        "sweep {} --over gait.amplitude=0.3,0.6 -o x.nc", "trajectory {} --cycles 3", "forces {}", "accuracy {}",
         "optimize {} --objective speed", "optimize {} --objective efficiency --starts 3",
     ),
-    "intruder": ("intrude {}", "accuracy {} -o d"),
-    "walker": ("walk {}", "sweep {} --over gait.frequency=1,2 -o x.nc", "accuracy {} -o d"),
+    "intruder": ("intrude {}", "accuracy {}"),
+    "walker": ("walk {}", "sweep {} --over gait.frequency=1,2 -o x.nc", "accuracy {}"),
 }  # fmt: skip
 SLOW = re.compile(
     "(accuracy|optimize) (sandfish|shovel)|sandbot|(walk|sweep) screws|-close|coulomb"

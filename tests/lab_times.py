@@ -12,8 +12,7 @@ from pathlib import Path
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 
-from geomech import scenes
-from geomech.output import lab
+from geomech import lab, scenes
 from geomech.studies.lab import Lab
 
 FRAMES = """

@@ -4,13 +4,15 @@ import numpy as np
 import pytest
 from artists import curve, drawn
 
+import geomech
 from figures import cost_scaling, work_precision
 from geomech import scenes
+from geomech.core.setting import Setting
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection
-from geomech.studies import accuracy, tiered
+from geomech.studies import tiered
+from geomech.studies.settings import Measured, cheapest, padded
 from geomech.studies.study import Study
-from geomech.text import accuracy as text
 from geomech.tiers.direct import direct
 from rft import Chain, Viscous, body_velocity
 
@@ -26,11 +28,14 @@ def glass():
 
 @pytest.fixture(scope="module")
 def viscous():
-    return accuracy.study(scenes.load("three-link-viscous"), runs=1)
+    return geomech.accuracy("three-link-viscous", runs=1)
 
 
-def line(results, label):
-    return next(x for x in results["lines"] if x["label"] == label)
+def line(result, label):
+    """The values, errors and seconds of a setting."""
+    one = result.at(setting=label)
+    is_run = np.isfinite(one["value"].values)
+    return {x: one[x].values[is_run] for x in ("value", "error", "seconds")}
 
 
 def test_errors_are_root_mean_squares_over_amplitudes():
@@ -45,8 +50,9 @@ def test_errors_are_root_mean_squares_over_amplitudes():
 
 def test_every_setting_gets_better(glass):
     """Each setting's finest value beats its coarsest, but for those whose tier has an error of its own."""
+    labels = glass["setting"].values.tolist()
     assert (
-        len(glass["lines"]) == len(tiered.SETTINGS) - 1
+        len(labels) == len(tiered.SETTINGS) - 1
     )  # no effect cuts the body into pieces
     for name, factor in {
         "phases": 2,
@@ -56,17 +62,17 @@ def test_every_setting_gets_better(glass):
     }.items():
         values = line(glass, f"direct: {name}")["value"]
         assert np.divide(values[1:], values[:-1]) == pytest.approx(factor)
-    for found in glass["lines"]:
-        if found["label"] not in ("path: grid", "area: grid"):
-            assert found["error"][-1] < 0.5 * found["error"][0], found["label"]
-        assert all(t > 0 for t in found["seconds"])
+    for label in labels:
+        found = line(glass, label)
+        if label not in ("path: grid", "area: grid"):
+            assert found["error"][-1] < 0.5 * found["error"][0], label
+        assert (found["seconds"] > 0).all()
 
 
 def test_amplitudes_go_up_to_the_gaits_own(glass):
-    assert glass["amplitudes"] == pytest.approx(
-        np.array([0.4, 0.55, 0.7, 0.85, 1.0])
-        * scenes.load(glass["scene"]).gait.amplitude
-    )
+    largest = scenes.load("three-link-glass").gait.amplitude
+    shares = np.array([0.4, 0.55, 0.7, 0.85, 1.0])
+    np.testing.assert_allclose(glass["amplitude"].values, shares * largest)
 
 
 def test_the_truth_has_exact_integrals_whatever_rule_the_scene_takes():
@@ -79,9 +85,9 @@ def test_the_truth_has_exact_integrals_whatever_rule_the_scene_takes():
 
 def test_tiers_rank_as_they_should(glass):
     """What each tier settles at: the direct one below the harmonic one below the path and the area."""
-    floor = {
-        x["tier"]: min(x["error"]) for x in glass["lines"] if x["against"] == "truth"
-    }
+    is_true = glass["against"].values == "truth"
+    least = np.nanmin(glass["error"].values, axis=1)[is_true]
+    floor = dict(zip(glass["tier"].values[is_true].tolist(), least))
     assert floor["direct"] < 1e-6 < floor["harmonic"] < 2e-4 < floor["path"]
     assert floor["adapted"] < 2e-5
     assert floor["area"] > 5e-3
@@ -89,12 +95,18 @@ def test_tiers_rank_as_they_should(glass):
 
 def test_orders_with_kinks(glass):
     """Direct tier on loose glass: about order 2 in phases, its kinks cut at random; order 1 in the regularisation."""
-    assert line(glass, "direct: phases")["slope"] == pytest.approx(2.0, abs=0.5)
-    assert line(glass, "direct: regularisation")["slope"] == pytest.approx(1.0, abs=0.2)
+    assert float(glass.at(setting="direct: phases")["order"]) == pytest.approx(
+        2.0, abs=0.5
+    )
+    assert float(glass.at(setting="direct: regularisation")["order"]) == pytest.approx(
+        1.0, abs=0.2
+    )
 
 
 def test_midpoint_segments_are_of_order_two_where_nothing_kinks(viscous):
-    assert line(viscous, "direct: segments")["slope"] == pytest.approx(2.0, abs=0.1)
+    assert float(viscous.at(setting="direct: segments")["order"]) == pytest.approx(
+        2.0, abs=0.1
+    )
 
 
 @pytest.mark.parametrize(("degree", "order"), [(1, 2.0), (3, 4.0), (5, 6.0)])
@@ -156,67 +168,43 @@ def test_phases_are_of_order_two_across_kinks():
     )
 
 
-def test_table_and_sentences(glass):
-    told = text.table(glass)
-    assert told.count("\n") == len(tiered.Settings.tolerances)
-    assert "direct, phases" in told
-    sentences = text.sentences(glass)
-    assert len(sentences) == len(glass["lines"])
-    assert all(s.endswith(".") and "buys" in s for s in sentences)
-    for cheapest in glass["cheapest"]:
-        assert cheapest["tier"] is None or cheapest["error"] <= cheapest["tolerance"]
-
-
-def test_the_cheapest_setting_is_the_quickest_that_is_good_enough():
-    """Of lines made up here: not the most accurate, not the slowest, and none that is against the setting's own limit."""
-
-    def made(tier, setting, against, *settings):
-        value, error, seconds = zip(*settings)
-        return {
-            "tier": tier,
-            "setting": setting,
-            "against": against,
-            "value": value,
-            "error": error,
-            "seconds": seconds,
-        }
-
-    lines = [
-        made(
-            "direct",
-            "phases",
-            "truth",
-            (16, 3e-2, 1.0),
-            (32, 2e-3, 2.0),
-            (64, 5e-5, 4.0),
+def test_the_best_setting_is_the_quickest_that_is_good_enough():
+    """Of runs made up here: not the most accurate, not the slowest, and none that is against the setting's own limit."""
+    runs = {
+        Setting("phases", (16, 32, 64), 2, tier="direct"): (
+            (3e-2, 2e-3, 5e-5),
+            (1.0, 2.0, 4.0),
         ),
-        made("adapted", "curves", "truth", (6, 4e-3, 3.0), (12, 8e-4, 2.5)),
-        made("direct", "segments", "limit", (4, 1e-9, 0.1)),
-    ]
+        Setting("curves", (6, 12), 4, tier="adapted"): ((4e-3, 8e-4), (3.0, 2.5)),
+        Setting("segments", (4,), 2, against="limit"): ((1e-9,), (0.1,)),
+    }
+    errors, seconds = (padded(rows) for rows in zip(*runs.values()))
+    values = padded([setting.values for setting in runs])
+    measured = Measured([*runs], values, seconds, {"error": errors})
     best = {
-        c["tolerance"]: c
-        for c in (
-            tiered.cheapest(lines, tol) for tol in (0.1, 3e-2, 1e-2, 1e-3, 1e-4, 1e-5)
-        )
+        0.1: ("direct: phases", 16, 1.0),
+        3e-2: ("direct: phases", 16, 1.0),
+        1e-2: ("direct: phases", 32, 2.0),
+        1e-3: ("adapted: curves", 12, 2.5),
+        1e-4: ("direct: phases", 64, 4.0),
+        1e-5: ("none", np.nan, np.nan),
     }
-    assert {
-        tol: (c["tier"], c.get("value"), c.get("seconds")) for tol, c in best.items()
-    } == {
-        0.1: ("direct", 16, 1.0),
-        3e-2: ("direct", 16, 1.0),
-        1e-2: ("direct", 32, 2.0),
-        1e-3: ("adapted", 12, 2.5),
-        1e-4: ("direct", 64, 4.0),
-        1e-5: (None, None, None),
-    }
-    assert (best[1e-3]["setting"], best[1e-3]["error"]) == ("curves", 8e-4)
-    told = text.table({"cheapest": list(best.values())})
-    assert "adapted, curves = 12" in told
-    assert told.splitlines()[-1].split() == ["1e-05", "none", "of", "those", "tried"]
+    tolerances = np.array([*best])
+
+    def choose(tolerance):
+        return tiered.quickest(measured, errors, tolerance)
+
+    found = cheapest(measured, errors, "BL", tolerances, choose)
+    by_name = {v.name: v.values for v in found}
+    names, values, seconds = zip(*best.values())
+    assert tuple(by_name["best_setting"]) == names
+    np.testing.assert_array_equal(by_name["best_value"], values)
+    np.testing.assert_array_equal(by_name["best_seconds"], seconds)
+    assert by_name["best_error"][3] == 8e-4
 
 
 def test_a_linear_medium_has_no_dry_settings(viscous):
-    labels = {x["label"] for x in viscous["lines"]}
+    labels = viscous["setting"].values.tolist()
     assert "direct: phases" in labels
     assert not any(
         "regularisation" in x or "harmonic" in x or "path" in x for x in labels

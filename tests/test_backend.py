@@ -24,10 +24,10 @@ from tabled import tabled_json
 from test_hard_cases import GLASS, apart
 
 from geomech import scenes
+from geomech.describe.explain import explained
+from geomech.describe.system import described
 from geomech.gaits import Ellipse
 from geomech.systems import solver
-from geomech.text.explain import explain
-from geomech.text.system import described
 from rft import (
     Backbone,
     Chain,
@@ -321,7 +321,7 @@ def test_what_stays_with_numpy_and_why():
     assert line(swimmer).endswith(
         "commands take NumPy where there is little to compute"
     )
-    assert line(swimmer) in explain(scene)
+    assert line(swimmer) in explained(scene)
     assert line(scene.with_numerics(backend="numba").system).startswith("compiled code")
     assert line(scene.with_numerics(backend="numpy").system) == "NumPy, as asked for"
     assert line(scene.with_numerics(loads="midpoint:20").system).startswith(
@@ -345,7 +345,7 @@ def test_no_numba(monkeypatch):
     with backend.preferring(""):
         assert not backend.compiles("auto", record(GLASS))
         assert backend.fastest() == "numpy"
-    assert "numba is not installed (pip install 'geomech[fast]')" in explain(
+    assert "numba is not installed (pip install 'geomech[fast]')" in explained(
         scenes.load("three-link-glass")
     )
     with pytest.raises(ValueError, match=r"pip install 'geomech\[fast\]'"):

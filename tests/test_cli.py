@@ -23,7 +23,6 @@ from geomech.io.results import of_dict
 from geomech.output import report
 from geomech.studies.report import Report, _gaits, reachable, steps
 from geomech.studies.study import Study
-from geomech.text import accuracy
 from rft.core.refusal import Refusal
 
 SMALL = ["--grid", "9"]
@@ -177,31 +176,6 @@ def undrawn(monkeypatch):
     )
 
 
-def test_accuracy_leaves_its_study(undrawn, tmp_path):
-    (tmp_path / "s.toml").write_text(scenes.load("three-link-viscous").text)
-    code, out, err = geomech("accuracy", "s.toml", "-o", "out", cwd=tmp_path)
-    assert (code, err) == (0, "")
-    files = {p.name for p in (tmp_path / "out").iterdir()}
-    assert files == {"accuracy.json", "accuracy.txt", "accuracy.png", "accuracy.pdf"}
-    assert "direct: phases 16 to 512" in out
-    found = json.loads((tmp_path / "out" / "accuracy.json").read_text())
-    assert found["scene"] == "s.toml"
-    assert found["amplitudes"] == pytest.approx([0.4, 0.55, 0.7, 0.85, 1.0])
-    assert {x["label"] for x in found["lines"]} == {
-        *(f"direct: {setting}" for setting in ("phases", "segments", "nodes")), "adapted: curves", "area: grid"
-    }  # fmt: skip
-    assert all(
-        len(x["value"]) == len(x["error"]) == len(x["seconds"]) for x in found["lines"]
-    )
-    written = (tmp_path / "out" / "accuracy.txt").read_text()
-    assert written == "\n".join(
-        [accuracy.table(found), "", *accuracy.sentences(found), ""]
-    )
-    assert " ".join(out.split()).startswith(
-        " ".join(written.split())
-    )  # lines are wrapped on a screen
-
-
 def test_run_leaves_everything(undrawn, tmp_path):
     glass = scenes.parse(
         scenes.load("three-link-glass").text + "\n[numerics]\ngrid = 9\n"
@@ -342,7 +316,7 @@ BACKBONE = '[medium]\nname = "coulomb"\n[body]\nkind = "backbone"\nelements = 8\
 
 @pytest.fixture
 def quick(monkeypatch):
-    """`run` and `accuracy` without their numbers."""
+    """`run` without its numbers."""
 
     def write(result, folder, drawn=None):
         for name in (report.SCENE, report.TABLES):
@@ -388,9 +362,8 @@ def test_run_replaces_no_scene_that_it_did_not_leave(quick, tmp_path):
     assert (tmp_path / "scene.toml").read_text() == mine
 
 
-@pytest.mark.parametrize("command", ["run", "accuracy"])
-def test_no_folder_is_not_this_folder(command, tmp_path):
-    code, _, err = geomech(command, "-o", "", cwd=tmp_path)
+def test_no_folder_is_not_this_folder(tmp_path):
+    code, _, err = geomech("run", "-o", "", cwd=tmp_path)
     assert code == 2
     assert "an empty name" in err
     assert list(tmp_path.iterdir()) == []

@@ -103,7 +103,7 @@ LARGE = {
         "--tol",
         "1e-5",
     ],
-    "accuracy": ["accuracy", "phases.toml", "-o", "out"],
+    "accuracy": ["accuracy", "phases.toml", "-o", "out.nc"],
 }
 
 
@@ -170,7 +170,7 @@ def test_yes_computes_and_says_what_is_to_come(large, monkeypatch):
     )
     for args in (
         ["run", "three-link-viscous", "-o", "d"],
-        ["accuracy", "three-link-viscous", "-o", "d"],
+        ["accuracy", "three-link-viscous", "-o", "d.nc"],
     ):
         assert "say --yes" in run(*args)[2]
 

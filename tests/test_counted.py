@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 from tabled import swept_table, tabled
 
+import geomech
 from geomech import scenes
 from geomech.gaits import Fourier
+from geomech.questions.accuracy import Accuracy
 from geomech.questions.ccf import Ccf
 from geomech.run.cost import BASE
-from geomech.studies import accuracy, cost, effort, motion, report, sweep
+from geomech.studies import cost, effort, motion, report, sweep
 from geomech.studies.study import Study
 from geomech.tiers import TIERS
 from rft import Chain, body_velocity
@@ -148,8 +150,8 @@ def test_a_table_takes_the_balances_foretold(scene, grid, name, solved):
 
 def test_accuracy_and_sweep_say_what_they_cost(solved):
     scene = VISCOUS.with_numerics(grid=5)
-    foretold = accuracy.Accuracy(scene).cost().balances
-    accuracy.study(scene)
+    foretold = Accuracy(scene).cost().balances
+    geomech.accuracy(scene)
     assert foretold == sum(solved)
     media = {"medium.ratio": [2.0, 3.0], "gait.amplitude": [0.5, 1.0, 1.5]}
     for scene, over in (

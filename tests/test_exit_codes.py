@@ -23,7 +23,7 @@ SOLVING = {  # what each command that solves for velocities takes beside its sce
     "displacement": ["--amplitudes", "0.5,1.0", "--plot", "out.svg"],
     "trajectory": ["-o", "out.csv", "--cycles", "2"],
     "trajectory --cycles 1": ["-o", "out.gif"],
-    "accuracy": ["-o", "out"],
+    "accuracy": ["-o", "out.nc"],
     "sweep": [
         "--over",
         "gait.amplitude=0.5,1.0",

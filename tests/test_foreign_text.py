@@ -13,6 +13,7 @@ from test_mjcf import SCENE as WALKER
 
 import geomech as package
 from geomech import scenes
+from geomech.describe.explain import explained
 from geomech.io import files, tables
 from geomech.io.tables.mat import ABOUT
 from geomech.output import display
@@ -20,7 +21,6 @@ from geomech.run import progress
 from geomech.scenes import Numerics, Scene
 from geomech.studies import fields
 from geomech.studies.study import Study
-from geomech.text.explain import explain
 from rft.core import refusal as errors
 
 ESC = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202e\r"  # sets a title, rings, clears, in red, backwards, over what stood there
@@ -102,7 +102,7 @@ def test_attributes_of_a_table(kind, stored, geomech, tmp_path):
         code, out, err = geomech(*command)
         assert code == 0
         shown(out, err)
-    shown(explain(scenes.load(tmp_path / "s.toml")))
+    shown(explained(scenes.load(tmp_path / "s.toml")))
 
 
 def text_variable(name, text):
@@ -244,7 +244,7 @@ def test_pages_of_a_notebook():
         repr(made),
         repr(found),
         repr(swept),
-        explain(made.scene),
+        explained(made.scene),
     ):
         shown(text)
 

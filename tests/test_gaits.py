@@ -6,6 +6,7 @@ from registry import GAITS
 
 from geomech.core.errors import Note
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Points, Polygon
+from geomech.geometry.gait import loop_area
 from geomech.scenes import load
 from geomech.scenes.model import Scene
 from geomech.studies import estimate
@@ -150,3 +151,20 @@ def test_a_curve_that_is_far_from_its_polygon_is_noted():
 def test_bad_gaits_are_refused(make, said):
     with pytest.raises(ValueError, match=said):
         make()
+
+
+@pytest.mark.parametrize(
+    ("gait", "amplitudes", "area"),
+    [
+        (Circle(centre=(0.3, -0.2)), [0.5, -0.5, 0.0], [np.pi / 4, np.pi / 4, 0.0]),
+        (Circle(reverse=True), [0.5], [-np.pi / 4]),
+        (Ellipse(semi_axes=(0.3, 0.2), tilt=0.4), [2.0], [0.24 * np.pi]),
+        (Polygon(points=[(0, 0), (2, 0), (2, 1), (0, 1)]), [0.5], [0.5]),
+    ],
+)
+def test_a_loop_encloses_its_area(gait, amplitudes, area):
+    """Of a polygon to the error, which its corners leave."""
+    for phases in (32, 63):
+        found, error = loop_area(gait, phases, amplitudes)
+        assert (np.abs(found - area) <= error + 1e-15).all()
+        assert (error < 1e-3).all()

@@ -2,7 +2,6 @@
 
 import csv
 import dataclasses
-import json
 import math
 import types
 
@@ -14,8 +13,11 @@ from test_fuzz import VALUES, mutated
 
 import geomech.scenes as scenes
 from geomech import medium, plots
+from geomech.core.setting import Setting
 from geomech.scenes.intruder import IntruderScene
+from geomech.studies import intrusion
 from geomech.studies.intrusion import Settings, answer, estimate
+from geomech.studies.settings import Measured
 from geomech.studies.study import Study
 from rft.core.refusal import Refusal
 from rft.terradynamics.plates import (
@@ -568,36 +570,35 @@ def test_options_of_stress_and_intrude_are_refused_before_anything_is_written(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_tolerance_that_is_just_met_is_met():
-    settings, seconds = Settings(scenes.load("c-leg")), [1.0, 2.0]
-    lines = [
-        {"value": [8, 16], "error": error, "seconds": seconds}
-        for error in ([5e-3, 2e-3], [1e-2, 1e-3])
-    ]
-    found = [settings.cheapest(lines, tolerance) for tolerance in (1e-2, 9.9e-3, 1e-3)]
-    assert [(x["elements"], x.get("error")) for x in found] == [
-        (8, 1e-2),
-        (16, 2e-3),
-        (None, None),
-    ]
+def test_a_tolerance_that_is_just_met_is_met(monkeypatch):
+    """By the fewest elements, in force and moment."""
+    monkeypatch.setattr(intrusion, "TOLERANCES", np.array([1e-2, 9.9e-3, 1e-3]))
+    errors = {"force_error": [5e-3, 2e-3], "moment_error": [1e-2, 1e-3]}
+    measured = Measured(
+        [Setting("elements", (8, 16), 2)],
+        np.array([[8.0, 16.0]]),
+        np.array([[1.0, 2.0]]),
+        {name: np.array([values]) for name, values in errors.items()},
+    )
+    found = Settings(scenes.load("c-leg")).choices(measured)
+    by_name = {v.name: v.values for v in found}
+    np.testing.assert_array_equal(by_name["best_value"], [8, 16, np.nan])
+    np.testing.assert_array_equal(by_name["best_error"], [1e-2, 2e-3, np.nan])
 
 
 def test_accuracy_of_the_number_of_elements(geomech, tmp_path, monkeypatch):
     monkeypatch.setattr(IntruderScene, "ladder", (12, 25, 50, 100, 200, 800))
     (tmp_path / "s.toml").write_text(MADE)
-    code, out, err = geomech("accuracy", "s.toml", "-o", "out", "--json")
+    code, out, err = geomech("accuracy", "s.toml", "--json")
     assert (code, err) == (0, "")
-    found = json.loads(out)
-    force, moment = found["lines"]
-    assert (force["label"], moment["label"], force["order"]) == ("force", "moment", 2)
-    assert moment["slope"] > 1.7 and moment["error"][-1] < 1e-5
+    found = of_json(out)
+    error = found["moment_error"].values[0]
+    assert found["order_by_theory"].values.tolist() == ["2"]
+    assert found["moment_order"][0] > 1.7 and error[-1] < 1e-5
     exact = scenes.load(tmp_path / "s.toml").run(800)
-    error = scenes.load(tmp_path / "s.toml").run(12).moment - exact.moment
-    wanted = np.sqrt(np.mean(error**2)) / np.abs(exact.moment).max()
-    assert moment["error"][0] == pytest.approx(wanted, rel=1e-9)
-    assert {p.name for p in (tmp_path / "out").iterdir()} == {
-        f"accuracy.{x}" for x in ("json", "txt", "png", "pdf")
-    }
+    off = scenes.load(tmp_path / "s.toml").run(12).moment - exact.moment
+    wanted = np.sqrt(np.mean(off**2)) / np.abs(exact.moment).max()
+    assert error[0] == pytest.approx(wanted, rel=1e-9)
 
 
 def test_pictures_show_what_was_computed():

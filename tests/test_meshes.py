@@ -2,7 +2,6 @@
 
 import csv
 import dataclasses
-import json
 import math
 import re
 import sys
@@ -19,9 +18,9 @@ from test_intrude import outcome, refused
 import geomech.scenes as scenes
 from figures import meshes
 from geomech import plots
+from geomech.describe.explain import explained
 from geomech.scenes import MeshScene
 from geomech.studies.intrusion import answer
-from geomech.text.explain import explain
 from rft.core.refusal import Refusal
 from rft.terradynamics.meshes import (
     SOLIDS,
@@ -600,15 +599,16 @@ def test_a_scene_made_in_python_says_what_is_wrong():
 def test_accuracy_of_the_number_of_triangles(geomech, tmp_path, monkeypatch):
     monkeypatch.setattr(type(BODIES[0]), "ladder", (80, 320, 1280, 5120))
     (tmp_path / "s.toml").write_text(MADE)
-    code, out, err = geomech("accuracy", "s.toml", "-o", "out", "--json")
+    code, out, err = geomech("accuracy", "s.toml", "--json")
     assert (code, err) == (0, "")
-    found = json.loads(out)
-    assert found["parts"] == "triangles" and found["finest"] == 5120
-    force, moment = found["lines"]
-    assert force["value"] == [80, 320, 1280] and force["order"] == 1
-    assert 0.8 < force["slope"] < 1.3 and moment["error"][-1] < 0.02
-    assert "triangles" in found["cheapest"][0]
-    assert "80 to 1280 triangles" in (tmp_path / "out" / "accuracy.txt").read_text()
+    found = of_json(out)
+    facts = found.attributes
+    assert facts["parts"] == "triangles" and facts["finest"] == 5120
+    assert found["value"].values.tolist() == [[80, 320, 1280]]
+    assert found["order_by_theory"].values.tolist() == ["1"]
+    assert 0.8 < found["force_order"][0] < 1.3 and found["moment_error"][0, -1] < 0.02
+    assert found["best_setting"][0] == "triangles"
+    assert "triangles 80 to 1280: " in str(found)
 
 
 def test_pictures_show_the_stress_on_the_mesh():
@@ -674,7 +674,7 @@ def test_figure_of_meshes(tmp_path):
 
 
 def test_explain_tells_effects_and_what_they_assume():
-    told = explain(scenes.parse(MADE))
+    told = explained(scenes.parse(MADE))
     assert (
         "Sphere (radius = 0.02) of 320 triangles" in told
         and "on:  slope (angle = 0.174" in told
@@ -683,7 +683,7 @@ def test_explain_tells_effects_and_what_they_assume():
     assert "off, not evaluated: aeration, disturbed-ground, grain-inertia" in told
     assert (
         "off, not evaluated: aeration, disturbed-ground, grain-inertia, slope"
-        in explain(scenes.load("c-leg"))
+        in explained(scenes.load("c-leg"))
     )
 
 

@@ -16,6 +16,7 @@ from tabled import of_json, tabled
 import geomech as geomech_package
 from geomech import scenes
 from geomech.core.errors import UnitWarning, VelocityWarning
+from geomech.describe.explain import explained
 from geomech.gaits import Circle, Ellipse, Sine
 from geomech.geometry import connection, curvature
 from geomech.geometry.stretch import stretch
@@ -24,7 +25,6 @@ from geomech.studies.choose import cheapest
 from geomech.studies.single import single as single_of
 from geomech.studies.study import Study
 from geomech.systems import NoSlipSnake, Swimmer
-from geomech.text.explain import explain
 from rft import Backbone, Chain, Coulomb, EndCaps, Serpenoid, Viscous
 from rft.core.refusal import Refusal
 
@@ -368,9 +368,9 @@ def test_explain_names_the_tiers_that_are_lost_and_why():
     ))  # fmt: skip
     assert (
         "tiers: area, adapted, path, direct; by name: harmonic"
-        == explain(three).splitlines()[-1]
+        == explained(three).splitlines()[-1]
     )
-    fish = explain(scenes.load("sandfish-loose")).splitlines()
+    fish = explained(scenes.load("sandfish-loose")).splitlines()
     assert "tiers: adapted, direct; by name: area, path" in fish
     assert (
         "not available: harmonic tier: they take 2 to 5 joints, this body has 99"
@@ -379,14 +379,14 @@ def test_explain_names_the_tiers_that_are_lost_and_why():
     two = PLAIN.replace('kind = "chain"', 'kind = "chain"\nlengths = [1, 1]').replace(
         '"circle"', '"wave"\njoints = 1'
     )
-    one = explain(scenes.parse(two)).splitlines()
+    one = explained(scenes.parse(two)).splitlines()
     assert "not available: CCF maps: a loop of one joint encloses no area" in one
     assert (
         "not available: area tier: they take 2 joints and more, this body has 1" in one
     )
     assert (
         "not available: area and harmonic tiers: the field has singular shapes"
-        in explain(scenes.load("no-slip-snake"))
+        in explained(scenes.load("no-slip-snake"))
     )
 
 

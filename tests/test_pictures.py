@@ -13,6 +13,8 @@ from PIL import Image
 from tabled import of_swept, of_table
 
 from geomech import plots, scenes
+from geomech.core.setting import Setting
+from geomech.core.variables import Result, Variable
 from geomech.gaits import Ellipse
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
@@ -21,6 +23,8 @@ from geomech.plots.precision import PANELS
 from geomech.plots.precision import SETTINGS as PRECISION
 from geomech.questions.texts import colour_limit
 from geomech.scenes.measurements import read
+from geomech.studies.settings import Measured, padded
+from geomech.studies.settings import variables as of_measured
 from geomech.studies.study import Study
 from geomech.studies.tiered import SETTINGS
 from geomech.systems.base import shape_labels
@@ -479,23 +483,26 @@ def test_the_map_of_a_sweep_lies_as_its_parameters():
     assert drawn == ["o", "None"]
 
 
+def studied(rows, amplitudes=1):
+    """An accuracy study of rows (setting, errors, seconds)."""
+    settings, errors, seconds = zip(*rows)
+    measured = Measured(
+        settings,
+        padded([setting.values for setting in settings]),
+        padded(seconds),
+        {"error": padded(errors)},
+    )
+    amplitude = Variable("amplitude", ("amplitude",), np.ones(amplitudes))
+    found = of_measured(measured, "BL", {"error": "rms"})
+    return Result("accuracy", (*found, amplitude), {"about": "the displacement"})
+
+
 def test_a_work_precision_diagram_has_no_empty_axes_and_takes_errors_of_0(tmp_path):
     """As of systems that no setting approximates: warnings are errors here."""
-    line = {
-        "tier": "direct",
-        "setting": "phases",
-        "value": [16, 64, 128],
-        "seconds": [0.1, 0.3, 0.5],
-        "slope": None,
-    }
     for against, title in PANELS.items():
+        phases = Setting("phases", (16, 64, 128), 2, "", against, "direct")
         for error in ([1e-3, 1e-5, 0.0], [0.0, 0.0, 0.0]):
-            fig = plots.work_precision_figure(
-                {
-                    "lines": [{**line, "error": error, "against": against}],
-                    "amplitudes": [1.0],
-                }
-            )
+            fig = plots.accuracy_figure(studied([(phases, error, (0.1, 0.3, 0.5))]))
             fig.canvas.draw()
             (ax,) = fig.axes
             assert (ax.get_title(), ax.get_ylabel(), ax.get_yscale()) == (*title, "log")
@@ -505,45 +512,26 @@ def test_a_work_precision_diagram_has_no_empty_axes_and_takes_errors_of_0(tmp_pa
 
 
 def test_the_work_precision_diagram_says_what_its_lines_are():
-    lines = [
-        {
-            "tier": "direct",
-            "setting": "phases",
-            "value": [16, 64],
-            "error": [1e-3, 1e-5],
-            "seconds": [0.1, 0.3],
-            "slope": 2.26,
-        },
-        {
-            "tier": "area",
-            "setting": "grid",
-            "value": [7, 61],
-            "error": [0.02, 0.01],
-            "seconds": [0.2, 0.4],
-            "slope": 0.04,
-        },
-        {
-            "tier": "path",
-            "setting": "directions",
-            "value": [2, 8],
-            "error": [0.1, 0],
-            "seconds": [1, 2],
-            "slope": None,
-        },
+    phases = Setting("phases", (16, 32, 64), 2, tier="direct")
+    grid = Setting("grid", (7, 31, 61), 4, tier="area")
+    directions = Setting("directions", (2, 8), 2, "", "limit", "path")
+    fine, coarse = 1e-3 * 4.0 ** -np.arange(3), [0.02, 0.0200001, 0.01999]
+    rows = [
+        (phases, fine, [0.1, 0.2, 0.3]),
+        (grid, coarse, [0.2, 0.3, 0.4]),
+        (directions, [0.1, 0], [1, 2]),
     ]
-    for line, against in zip(lines, ("truth", "truth", "limit")):
-        line["against"] = against
-    fig = plots.work_precision_figure({"lines": lines, "amplitudes": [1.0, 2.0, 3.0]})
+    fig = plots.accuracy_figure(studied(rows, amplitudes=3))
     left, right = fig.axes
     assert [t.get_text() for t in left.get_legend().get_texts()] == [
-        "direct: phases a cycle, 16 to 64, order 2.3", "area: points a joint of the grid, 7 to 61, no gain",
+        "direct: phases a cycle, 16 to 64, order 2.0", "area: points a joint of the grid, 7 to 61, no gain",
     ]  # fmt: skip
     assert [t.get_text() for t in right.get_legend().get_texts()] == [
         "path: directions of the fit, 2 to 8"
     ]
     assert [(t.get_text(), t.xy) for t in left.texts[:2]] == [
         ("16", (0.1, 1e-3)),
-        ("64", (0.3, 1e-5)),
+        ("64", (0.3, 6.25e-5)),
     ]
     assert left.get_xlabel() == "time for 3 amplitudes, tables included (s)"
     assert (
@@ -551,7 +539,7 @@ def test_the_work_precision_diagram_says_what_its_lines_are():
         and "the setting leads (BL)" in right.get_ylabel()
     )
     np.testing.assert_array_equal(
-        left.lines[1].get_xydata(), [[0.2, 0.02], [0.4, 0.01]]
+        left.lines[1].get_xydata().T, [[0.2, 0.3, 0.4], coarse]
     )
     assert set(PRECISION) <= {setting.name for setting in SETTINGS}
     assert left.get_title() and right.get_title()

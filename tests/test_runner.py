@@ -14,7 +14,7 @@ from commands import geomech
 from tasks import doubled, who
 from test_store import HARD, same
 
-from geomech import cli, load_result, plots, scenes, terminal
+from geomech import api, cli, load_result, plots, scenes, terminal
 from geomech.geometry import connection
 from geomech.optimisation import build_request, search
 from geomech.optimisation.variables import displacement, values
@@ -26,7 +26,7 @@ from geomech.run.runner import Runner, digest_context, runner
 from geomech.run.store import Store
 from geomech.run.workers import using
 from geomech.scenes import inputs, kinds
-from geomech.studies import accuracy, cost, estimate, tiered, walking
+from geomech.studies import cost, estimate, tiered, walking
 from geomech.studies.motion import Trajectory
 from geomech.studies.study import Study
 from geomech.systems.capabilities import with_solver
@@ -263,9 +263,14 @@ def test_studies_resume_to_the_last_digit(tmp_path, monkeypatch):
 
     told = lambda found: values(found) + displacement(found)
     numbers = lambda: [json.dumps([float(v) for v in told(search(request))])]
-    errors = lambda *of: [np.array(x["error"]) for x in accuracy.study(*of)["lines"]]
+
+    def errors(scene, runs=None):
+        found = api.accuracy(scene, runs=runs)
+        names = [name for name in ("error", "force_error") if name in found]
+        return [found[name].values for name in names]
+
     for ask, after in (
-        (lambda: errors(scene, None, 1), 5),
+        (lambda: errors(scene, 1), 5),
         (lambda: errors(scenes.load("c-leg")), 2),
         (field, 4),
         (numbers, 1),
@@ -484,8 +489,8 @@ COMMANDS = {
     "trajectory march.toml": ["--cycles", "2", "-o", "out.csv"],
     "trajectory march.toml --cycles 1": ["-o", "out.png"],
     "walk walk.toml": ["-o", "out.nc"],
-    "accuracy rod.toml": ["-o", "out"],
-    "accuracy s.toml": ["-o", "out"],
+    "accuracy rod.toml": ["-o", "out.nc"],
+    "accuracy s.toml": ["-o", "out.nc"],
     "ccf s.toml": ["--plot", "out.png"],
     "optimize s.toml": [
         "--objective",

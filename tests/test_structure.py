@@ -10,6 +10,7 @@ import tomllib
 import mutants
 import pytest
 
+from geomech import describe
 from geomech.commands import COMMANDS
 
 ROOT = pathlib.Path(__file__).parents[1]
@@ -20,7 +21,7 @@ ROOT = pathlib.Path(__file__).parents[1]
 # solver to take one thread, and by which back end. Environments for learning stand on sand, and
 # measured midlines are put into a medium.
 KNOW_MECHANICS = {
-    "__init__.py", "gym/hexapod.py", "text/grains.py", "text/scenes.py", "text/system.py", "studies/stress.py",
+    "__init__.py", "gym/hexapod.py", "describe/grains.py", "describe/scenes.py", "describe/system.py", "studies/stress.py",
     "scenes/intruder.py", "scenes/intruding.py", "scenes/solid.py", "scenes/stress.py", "scenes/walker.py",
     "scenes/write.py", "studies/batch.py", "studies/calibration.py", "run/backend.py", "measured/midlines/predicted.py",
     "studies/stress_calibration.py", "studies/walking.py", "studies/grains.py", "studies/grain_swim.py",
@@ -158,6 +159,7 @@ def test_modules_import_from_their_own_layer_or_a_lower_one(imported):
     assert {name for name in folders if layer(name) == len(LAYERS) - 1} == {
         "geomech.app",
         "geomech.commands",
+        "geomech.describe",
         "figures.campaigns",
     }
 
@@ -215,11 +217,15 @@ def test_a_command_is_the_function_of_its_file():
         "pipeline",
     }
     assert files == {name for names in COMMANDS.values() for name in names}
+    files = {p.stem for p in (ROOT / "geomech" / "describe").glob("*.py")}
+    assert files == {*describe.SUMMARIES, "__init__", "grains", "system"}
 
 
 SPEAK_OF_OPTIONS = (
     "command.py",
     "commands/",
+    "describe/",
+    "options.py",
     "output/",
     "pipeline.py",
     "questions/base.py",

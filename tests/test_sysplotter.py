@@ -6,6 +6,7 @@ from scipy.io import loadmat
 from structs import cell, computed, save, struct
 
 import rft
+from geomech.describe.system import described
 from geomech.gaits import Circle
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
@@ -25,7 +26,6 @@ from geomech.systems import (
     Table,
 )
 from geomech.systems.table import LENGTHS
-from geomech.text.system import described
 from rft.bodies.base import body_size
 from rft.core.refusal import Refusal
 

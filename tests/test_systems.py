@@ -10,6 +10,7 @@ from registry import GAITS, SYSTEMS
 from tabled import tabled
 
 from geomech import scenes, symbolic
+from geomech.describe.explain import explained
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection, coordinates
 from geomech.geometry.connection import sign_changes
@@ -24,7 +25,6 @@ from geomech.systems.base import WrappedSystem, kind_of, length_unit
 from geomech.systems.capabilities import stored_table
 from geomech.systems.framed import in_frame
 from geomech.systems.swimmer import Solver, is_three_link
-from geomech.text.explain import explain
 from geomech.tiers.direct import direct
 from rft import Backbone, Chain, Coulomb, Serpenoid, Transient
 from rft.core.refusal import Refusal
@@ -205,7 +205,7 @@ def test_files_and_words_say_what_is_singular(tmp_path):
             "nan, where the wheels' axles meet"
         )
         assert scenes.parse(data.attrs["scene_toml"]) == study.scene
-    told = explain(scenes.load("no-slip-snake"))
+    told = explained(scenes.load("no-slip-snake"))
     assert (
         "tiers: adapted, path, direct\n" in told
         and "gaits that meet one are refused" in told

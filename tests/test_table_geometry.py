@@ -11,6 +11,7 @@ from scipy.io import loadmat, savemat
 
 import rft
 from geomech import plots, scenes
+from geomech.describe.system import described
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection, harmonics
 from geomech.geometry.coordinates import change_velocity
@@ -19,7 +20,6 @@ from geomech.scenes import Numerics, Scene
 from geomech.studies import effort, estimate, fields
 from geomech.studies.study import Study
 from geomech.systems import Swimmer, Table
-from geomech.text.system import described
 from rft.core.refusal import Refusal
 from rft.formulas import se2
 

@@ -21,7 +21,9 @@ from scipy.io import loadmat, netcdf_file, savemat
 from tabled import of_json, tabled
 
 import rft
-from geomech import plots, scenes
+from geomech import api, plots, scenes
+from geomech.describe.explain import explained
+from geomech.describe.system import described
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
@@ -30,15 +32,12 @@ from geomech.io.tables import base, mat, matlab, netcdf
 from geomech.io.tables.base import checked_names
 from geomech.io.tables.mat import ERROR
 from geomech.scenes import Numerics, Scene
-from geomech.studies import accuracy, choose, estimate, fields, tiered
+from geomech.studies import choose, estimate, fields, tiered
 from geomech.studies.single import single
 from geomech.studies.study import Study
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from geomech.systems.base import length_unit
 from geomech.systems.table import LENGTHS
-from geomech.text import accuracy as text
-from geomech.text.explain import explain
-from geomech.text.system import described
 from rft.bodies.base import body_size
 from rft.core.refusal import Refusal
 from rft.laws import CATALOGUE
@@ -486,7 +485,7 @@ def test_what_is_even_in_alphadot_is_part_of_the_error(ending, tmp_path):
     assert study().even_part is None
     fields.save_connection(tmp_path / f"a{ending}", source)
     table = Scene(Table(tmp_path / f"a{ending}"), GAIT)
-    assert ("xi is not odd in alphadot" in explain(table)) == (ending == ".nc")
+    assert ("xi is not odd in alphadot" in explained(table)) == (ending == ".nc")
     for gait in (GAIT, Circle(amplitude=1.2), Butterfly(amplitude=0.8)):
         amplitudes = gait.amplitude * np.array([0.3, 0.8, 1.1])
         poses, errors = estimate.direct(table, gait, amplitudes, 128)
@@ -560,7 +559,7 @@ def test_every_command_works_on_a_table_or_says_why_not(made, tmp_path, monkeypa
         code, out, err = geomech(*args)
         assert (code, out) == (2, "") and said in err and err.count("\n") == 1
     assert (tmp_path / "t" / "a.nc").read_bytes() == before
-    told = explain(scenes.load("t/t.toml"))
+    told = explained(scenes.load("t/t.toml"))
     assert "fit leaves x" in told and "odd harmonics" in told and "frame link-1" in told
     assert [k.label for k in tiered.Settings(scenes.load("t/t.toml")).settings()] == [
         "direct: phases",
@@ -933,17 +932,15 @@ def test_what_accuracy_costs_includes_the_tables_own_error(made, monkeypatch):
     monkeypatch.setattr(
         tiered, "SETTINGS", [k for k in tiered.SETTINGS if k.label == "direct: phases"]
     )
-    found = accuracy.study(scene, runs=1)
-    amplitudes = np.array(found["amplitudes"])
+    found = api.accuracy(scene, runs=1)
+    amplitudes = found["amplitude"].values
     own = scene.system.table_error(*GAIT.cycle(64, amplitudes))[:, 0].max()
-    assert found["own_error"] == own and 1e-4 < own < 0.1
-    assert {c["tier"] is None for c in found["cheapest"] if c["tolerance"] < own} == {
-        True
-    }
-    assert all(
-        own < c["error"] <= c["tolerance"] for c in found["cheapest"] if c["tier"]
-    )
-    assert f"the table's own, {own:.1e} BL" in text.table(found)
+    assert float(found["own_error"]) == own and 1e-4 < own < 0.1
+    tolerances, error = found["tolerance"].values, found["best_error"].values
+    np.testing.assert_array_equal(np.isnan(error), tolerances < own)
+    assert (error[tolerances > own] > own).all()
+    assert (error[tolerances > own] <= tolerances[tolerances > own]).all()
+    assert f"the system's own, {own:.1e} BL" in str(found)
     monkeypatch.setattr(choose, "MOST_PHASES", 256)
     with pytest.raises(
         Refusal,

@@ -12,18 +12,19 @@ import pytest
 from registry import GAITS, OUTLINES, STRESSES, SYSTEMS
 from tabled import swept_table, tabled
 
+import geomech
 import rft
 from geomech import scenes
+from geomech.describe.explain import explained
 from geomech.gaits import KINDS, Centreline, Circle, Sine
 from geomech.geometry import connection, curvature, family, harmonics, reconstruct
 from geomech.geometry.field import Field
 from geomech.scenes import IntruderScene, MeshScene, Numerics, Scene, WalkerScene, kinds
-from geomech.studies import accuracy, sweep, undulation
+from geomech.studies import sweep, undulation
 from geomech.studies.choose import cheapest
 from geomech.studies.single import single
 from geomech.studies.study import Study
 from geomech.systems import Solver, Swimmer
-from geomech.text.explain import explain
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
 from geomech.tiers.path import path
@@ -205,12 +206,12 @@ def geometries(value):
     yield "phases", lambda: area(curvature.ccf(fitted), Circle(), 0.5, value)
     yield "xi", lambda: reconstruct.turning(value)
     yield "pose", lambda: se2.exp(value)
-    yield "a scene", lambda: explain(value)
+    yield "a scene", lambda: explained(value)
     for of in (
         scenes.toml,
         scenes.tables,
         scenes.inputs,
-        accuracy.study,
+        geomech.accuracy,
         undulation.activation,
     ):
         yield "a scene", lambda of=of: of(value)

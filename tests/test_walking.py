@@ -10,18 +10,18 @@ import pytest
 from artists import curve, drawn
 from PIL import Image, ImageSequence
 from scipy.io import netcdf_file
-from tabled import of_swept
+from tabled import of_json, of_swept
 
 from figures.walking_sensitivity import Sheet
 from geomech import plots, scenes
 from geomech.core.variables import Result
+from geomech.describe.explain import explained
 from geomech.io.results import of_dict
 from geomech.output import walks
 from geomech.questions import walk as questions_walk
 from geomech.scenes import WalkerScene
 from geomech.studies import walking
 from geomech.studies.sweep import Plan
-from geomech.text.explain import explain
 from rft.balance.backend import preferring
 from rft.core.metres import GRAVITY
 from rft.core.refusal import Refusal
@@ -919,11 +919,11 @@ def test_sweep_and_accuracy_of_a_walk(geomech, tmp_path, monkeypatch):
     monkeypatch.setattr(
         walking, "FINEST", {"steps": 24, "elements": 12, "rounding": 2e-3}
     )
-    code, out, err = geomech("accuracy", "small.toml", "-o", "acc", "--json")
+    code, out, err = geomech("accuracy", "small.toml", "--json", "--plot", "a.png")
     assert (code, err) == (0, "")
-    lines = {line["label"]: line for line in json.loads(out)["lines"]}
-    assert list(lines) == ["steps", "elements", "rounding"]
-    assert all(line["error"][-1] < 0.05 for line in lines.values())
+    found = of_json(out)
+    assert found["setting"].values.tolist() == ["steps", "elements", "rounding"]
+    assert (found["error"].values < 0.05).all()
 
 
 WRONG = {
@@ -1196,12 +1196,12 @@ def test_walks_as_they_are_built_in_are_solved_and_account_for_their_energy(name
 
 
 def test_explain_tells_the_robot_its_engine_and_effects():
-    told = explain(scenes.load("sandbot"))
+    told = explained(scenes.load("sandbot"))
     assert "sandbot: Rhex (mass = 2.3" in told and "engine: planar" in told
     assert "on:  aeration (air_speed" in told and told.endswith(
         "off, not evaluated: grain-inertia"
     )
-    assert "engine: mujoco" in explain(scenes.load("screws"))
+    assert "engine: mujoco" in explained(scenes.load("screws"))
 
 
 def test_axes_of_a_sweep_have_units():

@@ -24,7 +24,7 @@ from geomech.scenes import (
     tables,
     toml,
 )
-from geomech.studies import accuracy, cost, undulation
+from geomech.studies import cost, undulation
 from geomech.studies.choose import cheapest
 from geomech.studies.study import Study
 from geomech.studies.sweep import sweep
@@ -120,7 +120,7 @@ def scenes() -> list[Any]:
     asked = (
         geomech.fit_log,
         geomech.measured.Fitted,
-        accuracy.study,
+        geomech.accuracy,
         cost.price,
         undulation.performance,
         undulation.activation,

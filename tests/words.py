@@ -58,15 +58,17 @@ MASKS = [
     (r"^back end: .*$", "back end: #"),
     (r"^seconds: .*$", "seconds: #"),
     (r"\d+ cycles evaluated in [\d.]+ s", "# cycles evaluated in # s"),
-    (r"^ +1e-\d\d  .*$", " #"),
-    (r"[\d.]+\s+times\s+the\s+time", "# times the time"),
+    (r"^( *[\d.e-]+ +elements .*) [\d.]+$", r"\1 #"),
+    (r"in\s+[\d.e-]+\s+to\s+[\d.e-]+ s\b", "in # to # s"),
     (r"force balances, [\d.e-]+ s$", "force balances, # s"),
     (r"residual [\d.e+-]+, \d+ iterations", "residual #, # iterations"),
     (r"about [\d.]+ (s|min|h|days|years)\b", "about #"),
     (r"\b[\d,.]+ [kMGT]?B of memory", "# of memory"),
     (rf"(/private)?{re.escape(tempfile.gettempdir())}/tmp\w+", "#"),
 ]
-MASKED_KEYS = re.compile(r"(^|\.)(seconds|evaluations|iterations|residual|kept)($|\.)")
+MASKED_KEYS = re.compile(
+    r"(^|\.)(seconds|best_seconds|evaluations|iterations|residual|kept)($|\.)"
+)
 
 
 def masked(text: str) -> str:

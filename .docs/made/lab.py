@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from geomech import load
-from geomech.output import lab
+from geomech import lab, load
 from geomech.studies.lab import GALLERY, Lab
 
 FILE = Path(__file__).parents[1] / "generated" / "extra" / "gait-lab.html"
@@ -14,7 +13,7 @@ FILE = Path(__file__).parents[1] / "generated" / "extra" / "gait-lab.html"
 def write() -> None:
     """Write the page of the gallery's scenes."""
     FILE.parent.mkdir(parents=True, exist_ok=True)
-    lab.write(Lab(tuple(map(load, GALLERY))).ask(), FILE)
+    lab.write(Lab(tuple(map(load, GALLERY))).charts(lambda done: None), FILE)
 
 
 def frame() -> str:

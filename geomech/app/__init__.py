@@ -1,9 +1,9 @@
-"""Questions of measurements and of accuracy from Python."""
+"""Questions of measurements from Python."""
 
-from geomech.app.questions import accuracy, fit_midlines
+from geomech.app.questions import fit_midlines
 from geomech.app.results import FittedMidlines
 
-__all__ = ["FittedMidlines", "accuracy", "fit_midlines"]
+__all__ = ["FittedMidlines", "fit_midlines"]
 
 
 def __dir__() -> list[str]:

@@ -2,11 +2,8 @@
 is the function of that name, with _ for -, in the module of that name."""
 
 COMMANDS = {  # by the headings of `geomech --help`, in its order
-    "Analyse": (
-        "run", "symbolic", "accuracy", "lab"
-    ),
+    "Analyse": ("run",),
     "Gaits": ("trajectory",),
     "Grains and robots": ("grains", "drag_grains"),
     "Your own data": ("fit_gait",),
-    "Reference": ("scenes", "reference", "explain"),
 }  # fmt: skip

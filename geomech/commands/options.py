@@ -1,48 +1,21 @@
-"""Options that commands share, and their parsers."""
+"""Options of the commands that are no questions yet, beside `geomech.options`."""
 
 from __future__ import annotations
 
-import functools
-import inspect
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Optional
 
 import typer
 
-from geomech.questions import texts
-from geomech.questions.names import intruder_names, scene_names, walker_names
-from rft.core.refusal import Refusal
+from geomech.options import MediumOption as MediumOption
+from geomech.options import SceneArgument as SceneArgument
+from geomech.options import YesOption as YesOption
+from geomech.options import an_angle as an_angle
+from geomech.options import with_workers as with_workers
 
-
-def _scene(names: Callable[[], list[str]]):
-    text = "built-in name (see 'geomech scenes') or TOML file"
-    return typer.Argument(metavar="SCENE", help=text, autocompletion=names)
-
-
-SceneArgument = Annotated[str, _scene(scene_names)]
-IntruderArgument = Annotated[str, _scene(intruder_names)]
-WalkerArgument = Annotated[str, _scene(walker_names)]
-EitherArgument = Annotated[str, _scene(lambda: scene_names() + intruder_names())]
-GridOption = Annotated[
-    Optional[int],
-    typer.Option(
-        "--grid",
-        metavar="N",
-        help="points of the grid per joint, in place of the scene's",
-    ),
-]
 PlotOption = Annotated[
     Optional[Path],
     typer.Option("--plot", metavar="FILE", help="draw a figure to .png, .pdf or .svg"),
-]
-MediumOption = Annotated[
-    Optional[Path],
-    typer.Option(
-        "--medium",
-        metavar="FILE",
-        help="file of a medium or of drag, in place of the scene's",
-    ),
 ]
 
 
@@ -68,20 +41,6 @@ AllOption = Annotated[
     bool,
     typer.Option("--all", help="print all lines, not only those that fit a screen"),
 ]
-YesOption = Annotated[
-    bool,
-    typer.Option("--yes", help="compute even if it takes over a minute or over 2 GB"),
-]
-
-
-OtherFrameOption = Annotated[
-    Optional[str],
-    typer.Option(
-        "--compare-frame",
-        metavar="FRAME",
-        help="draw another body frame below, on the same scales",
-    ),
-]
 ComponentOption = Annotated[
     Optional[str],
     typer.Option(
@@ -104,137 +63,3 @@ DataOption = Annotated[
         help="draw points, of columns amplitude,value,error",
     ),
 ]
-PairOption = Annotated[
-    Optional[str],
-    typer.Option(
-        "--pair",
-        metavar="I,J",
-        help="joints on the axes, as 1,3; all pairs if left out",
-    ),
-]
-SliceOption = Annotated[
-    Optional[str],
-    typer.Option(
-        "--slice",
-        metavar="ANGLES",
-        help="angles of the joints that are held, as 0.3 or 0.3,-20deg",
-    ),
-]
-PluginOption = Annotated[
-    Optional[list[Path]],
-    typer.Option(
-        "--plugin",
-        metavar="FILE.py",
-        help="Python file with parts of your own, such as laws",
-    ),
-]
-
-
-def load_plugins(files: list[Path] | None) -> None:
-    """Let scenes name what is in the files; see `geomech.scenes.kinds.load_file`."""
-    for path in files or ():
-        from geomech.scenes.kinds import load_file
-
-        load_file(path)
-
-
-def with_plugins(command: Callable) -> Callable:
-    """Return a command that also takes ``--plugin`` if it takes a scene; any other as it
-    is."""
-    signature = inspect.signature(command, eval_str=True)
-    if (
-        not {"name", "subject", "plugins"} & {*signature.parameters}
-        or "plugin" in signature.parameters
-    ):
-        return command
-
-    @functools.wraps(command)
-    def run(plugin=None, **arguments):
-        load_plugins(plugin)
-        return command(**arguments)
-
-    more = inspect.Parameter(
-        "plugin", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=PluginOption
-    )
-    run.__signature__ = signature.replace(
-        parameters=[*signature.parameters.values(), more]
-    )
-    run.__annotations__ = {
-        p.name: p.annotation for p in run.__signature__.parameters.values()
-    }
-    return run
-
-
-WorkersOption = Annotated[
-    Optional[int],
-    typer.Option(
-        "--workers",
-        metavar="N",
-        help="processes for long computations, one a core if left out",
-    ),
-]
-SchedulerOption = Annotated[
-    Optional[str],
-    typer.Option(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="Dask cluster to compute on, as tcp://10.0.0.1:8786",
-    ),
-]
-
-
-def with_workers(command: Callable) -> Callable:
-    """Return a command that also takes ``--workers`` and ``--scheduler`` (`geomech.run.workers`)."""
-
-    @functools.wraps(command)
-    def run(workers=None, scheduler=None, **arguments):
-        from geomech.run.workers import using
-
-        with using(workers, scheduler):
-            return command(**arguments)
-
-    signature = inspect.signature(command, eval_str=True)
-    more = {"workers": WorkersOption, "scheduler": SchedulerOption}
-    last = [
-        inspect.Parameter(k, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=a)
-        for k, a in more.items()
-    ]
-    run.__signature__ = signature.replace(
-        parameters=[*signature.parameters.values(), *last]
-    )
-    run.__annotations__ = {
-        p.name: p.annotation for p in run.__signature__.parameters.values()
-    }
-    return run
-
-
-def an_angle(text: str | float) -> float:
-    """Return an option that is an angle, 2.5 or 120deg, in rad."""
-    try:
-        return texts.number(str(text), None)
-    except ValueError:
-        raise typer.BadParameter(
-            f"{text!r} is no angle: give one such as 2.5 (rad) or 120deg"
-        ) from None
-
-
-ExtentOption = Annotated[
-    Optional[float],
-    typer.Option(
-        "--extent",
-        metavar="ANGLE",
-        help="half width of the grid in rad, or as 120deg",
-        parser=an_angle,
-    ),
-]
-
-
-def refuse_without_figure(plot: Path | None, **options: object) -> None:
-    """Refuse options of a figure where none is drawn."""
-    if plot is None and (
-        names := [f"--{name}" for name, value in options.items() if value is not None]
-    ):
-        what = (
-            f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'} for a figure"
-        )
-        raise Refusal(what, instead="say --plot FILE, too")

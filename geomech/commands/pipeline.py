@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -71,12 +71,6 @@ def execute(
     for line in result.attributes.get("notes", ()):
         note(line)
     _print(result, requested, as_json, everything)
-
-
-def show(lines: Iterable[str]) -> None:
-    """Print lines as they come."""
-    for line in lines:
-        print(line, flush=True)
 
 
 def path_message(words: str) -> Callable[[Result, Path], str]:

@@ -10,10 +10,10 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from geomech import plots
+from geomech.describe.system import described
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
 from geomech.studies.study import Study
-from geomech.text.system import described
 from rft.core.refusal import printable
 
 MOST_ROWS = 40

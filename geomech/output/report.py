@@ -1,21 +1,21 @@
-"""The folder that `geomech run` and `geomech accuracy` write: figures, numbers and the scene."""
+"""The folder that `geomech run` writes: figures, numbers and the scene."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from geomech import plots, text
+from geomech import plots
 from geomech.core.variables import Result
 from geomech.io.files import read, refuse_inputs
 from geomech.io.results import write_netcdf
 from geomech.scenes import inputs
 from geomech.scenes.model import Scene
 from geomech.scenes.write import toml
-from geomech.studies import accuracy, fields
+from geomech.studies import fields
 from geomech.studies.report import Reported
 from geomech.systems.base import shape_labels
 from geomech.systems.framed import Framed
@@ -105,17 +105,6 @@ def _maps(found: Reported, folder: Path, drawn: Drawn) -> None:
         **options,
     )
     _save(maps, folder / "ccf")
-
-
-def write_accuracy(result: Result, folder: Path) -> None:
-    """Write an accuracy study into a folder."""
-    numbers = accuracy.table(result)
-    (folder / "accuracy.json").write_text(json.dumps(numbers, indent=1) + "\n")
-    (folder / "accuracy.txt").write_text(
-        text.text(result) + "\n", encoding="utf-8", errors="backslashreplace"
-    )
-    draw: Callable = getattr(plots, result.subject.picture)
-    _save(draw(numbers), folder / "accuracy")
 
 
 def files(result: Result, folder: Path) -> str:

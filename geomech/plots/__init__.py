@@ -44,12 +44,7 @@ from geomech.plots.midlines import midlines_figure
 from geomech.plots.motion import LINES, filmstrip, stage
 from geomech.plots.optimum import optimum_angles, optimum_figure, optimum_map
 from geomech.plots.plates import penetration_figure, plates_figure
-from geomech.plots.precision import (
-    SETTING_MARKER,
-    walk_accuracy_figure,
-    work_precision,
-    work_precision_figure,
-)
+from geomech.plots.precision import SETTING_MARKER, accuracy_figure, work_precision
 from geomech.plots.stretched import stretched_figure, stretched_map
 from geomech.plots.style import (
     MARKED,
@@ -72,7 +67,6 @@ from geomech.plots.styles import (
 from geomech.plots.sweeps import curves, sweep_figure
 from geomech.plots.terradynamics import (
     draw_stress,
-    elements_figure,
     intrusion_figure,
     square_of_angles,
     stress_figure,
@@ -91,6 +85,7 @@ __all__ = [
     "RINGS",
     "SETTING_MARKER",
     "STYLE",
+    "accuracy_figure",
     "ccf_contours",
     "ccf_figure",
     "ccf_map",
@@ -105,7 +100,6 @@ __all__ = [
     "draw_gait",
     "draw_stress",
     "drawable",
-    "elements_figure",
     "figure",
     "filmstrip",
     "force_map",
@@ -143,10 +137,8 @@ __all__ = [
     "sweep_figure",
     "unknown",
     "vector_field",
-    "walk_accuracy_figure",
     "winding",
     "work_precision",
-    "work_precision_figure",
 ]  # fmt: skip
 
 

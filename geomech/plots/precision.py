@@ -1,12 +1,13 @@
-"""Work-precision diagrams: error against seconds."""
+"""Pictures of accuracy studies: error against seconds, or against values of settings."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from geomech.core.variables import Result
 from geomech.plots.style import figure, styled
 from geomech.tiers import TIERS
 
@@ -35,38 +36,106 @@ PANELS = {
         "rms distance from where the setting leads (BL)",
     ),
 }
+OF_ROBOTS = {
+    "steps": "steps of a cycle",
+    "elements": "elements of an outline",
+    "rounding": "rounding (m/s)",
+}
 FLAT = 0.3  # order below which finer settings gain nothing to speak of
+LEAST = 1e-17  # stands for an error of 0 on an axis of logarithms
+LEAST_SPEED = 1e-12  # the same of a speed, m/s
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A setting of a study, from coarse to fine: its values, seconds and errors."""
+
+    varied: str
+    tier: str
+    values: np.ndarray
+    seconds: np.ndarray
+    error: np.ndarray
+    order: float
+    order_by_theory: str
+
+
+def lines_of(result: Result, name: str = "error", against: str = "") -> list[Line]:
+    """Return the settings of a study with an error of that name; ``against`` the truth or
+    a limit alone, or all."""
+    found = []
+    for k, reference in enumerate(result["against"].values.tolist()):
+        if against and reference != against:
+            continue
+        tier = ""
+        if "tier" in result:
+            tier = str(result["tier"][k])
+        is_run = np.isfinite(result["value"][k])
+        found.append(
+            Line(
+                str(result["varied"][k]),
+                tier,
+                result["value"][k][is_run],
+                result["seconds"][k][is_run],
+                result[name][k][is_run],
+                float(result[name.removesuffix("error") + "order"][k]),
+                str(result["order_by_theory"][k]),
+            )
+        )
+    return found
+
+
+def accuracy_figure(result: Result) -> Figure:
+    """Draw an accuracy study: error against seconds of every tier and setting of a gait,
+    against numbers of parts and seconds of forces in grains, or against each setting of a
+    robot.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("three-link-viscous", phases=32, grid=7)
+    >>> fig = geomech.plots.accuracy_figure(study.accuracy(runs=1))
+    """
+    if "parts" in result.attributes:
+        return parts_figure(result)
+    if "speed" in result:
+        return robot_figure(result)
+    return tiers_figure(result)
+
+
+# Of a gait
 
 
 @styled
-def work_precision(results: Mapping, axes: Any = None) -> Any:
-    """Draw error against seconds of `accuracy.study`, a line for each setting of a tier with its first and last value at its
-    ends.
+def tiers_figure(result: Result) -> Figure:
+    """Draw `work_precision` on a figure of its own."""
+    count = len({*result["against"].values.tolist()})
+    fig, axes = figure(5.0 * count, 5.2, count)
+    work_precision(result, axes[0])
+    return fig
 
-    The first of two Axes has the error of the answer, the second the error from the limit of that setting alone. A kind of
-    error that no setting is measured by has no Axes."""
-    found = {
-        against: [x for x in results["lines"] if x["against"] == against]
-        for against in PANELS
-    }
-    found = {against: lines for against, lines in found.items() if lines}
-    axes = figure(5.0 * len(found), 3.8, len(found))[1][0] if axes is None else axes
-    for ax, (against, lines) in zip(axes, found.items()):
+
+@styled
+def work_precision(result: Result, axes: Any = None) -> Any:
+    """Draw error against seconds of a study of a gait, a line for each setting of a tier
+    with its first and last value at its ends.
+
+    The first of two Axes has the error of the answer, the second the error from the limit
+    of that setting alone. A kind of error that no setting is measured by has no Axes."""
+    panels = [name for name in PANELS if name in result["against"].values.tolist()]
+    if axes is None:
+        _, ((*axes,),) = figure(5.0 * len(panels), 3.8, len(panels))
+    count = result["amplitude"].values.size
+    for ax, against in zip(axes, panels):
         title, error = PANELS[against]
-        for line, marker in zip(lines, SETTING_MARKER):
-            colour = (
-                TIERS[line["tier"]].colour
-                if against == "truth"
-                else f"C{SETTING_MARKER.index(marker)}"
-            )
-            _line(ax, line, marker, colour)
-        ax.set(
-            xlabel=f"time for {len(results['amplitudes'])} amplitudes, tables included (s)",
-            ylabel=error,
-        )
+        for k, line in enumerate(lines_of(result, against=against)):
+            colour = f"C{k}"
+            if against == "truth":
+                colour = TIERS[line.tier].colour
+            draw_line(ax, line, SETTING_MARKER[k % len(SETTING_MARKER)], colour)
+        ax.set(xlabel=f"time for {count} amplitudes, tables included (s)", ylabel=error)
         ax.set_title(title)
         for axis in (ax.xaxis, ax.yaxis):
-            _decades(axis)
+            show_decades(axis)
         ax.grid(True, which="major", lw=0.3, color="0.85")
         ax.legend(
             loc="upper center",
@@ -77,80 +146,91 @@ def work_precision(results: Mapping, axes: Any = None) -> Any:
     return axes
 
 
-def _line(ax, line: Mapping, marker: str, colour: str) -> None:
-    error, values = np.maximum(line["error"], 1e-17), line["value"]
-    slope = line["slope"]
-    gain = (
-        ""
-        if slope is None
-        else f", order {slope:.1f}"
-        if slope >= FLAT
-        else ", no gain"
-    )
-    label = f"{line['tier']}: {SETTINGS.get(line['setting'], line['setting'])}, {values[0]:g} to {values[-1]:g}{gain}"
-    ax.loglog(line["seconds"], error, marker=marker, label=label, color=colour, lw=1.0)
+def draw_line(ax: Any, line: Line, marker: str, colour: str) -> None:
+    """Draw error against seconds of a setting, with its values at its ends."""
+    error = np.maximum(line.error, LEAST)
+    about = SETTINGS.get(line.varied, line.varied)
+    label = f"{line.tier}: {about}, {line.values[0]:g} to {line.values[-1]:g}"
+    label += gain_words(line.order)
+    ax.loglog(line.seconds, error, marker=marker, label=label, color=colour, lw=1.0)
     for end, offset, how in (
         (0, (0, 5), {"ha": "center"}),
         (-1, (5, 0), {"ha": "left", "va": "center"}),
     ):
         at = {
-            "xy": (line["seconds"][end], error[end]),
+            "xy": (line.seconds[end], error[end]),
             "xytext": offset,
             "textcoords": "offset points",
         }
-        ax.annotate(f"{values[end]:g}", **at, **how, fontsize=7, color=colour)
+        ax.annotate(f"{line.values[end]:g}", **at, **how, fontsize=7, color=colour)
 
 
-def _decades(axis) -> None:
+def gain_words(order: float) -> str:
+    if np.isnan(order):
+        return ""
+    if order >= FLAT:
+        return f", order {order:.1f}"
+    return ", no gain"
+
+
+def show_decades(axis: Any) -> None:
     """Label powers of ten alone, two of them at least."""
     low, high = axis.get_view_interval()
     if np.floor(np.log10(high)) - np.ceil(np.log10(low)) < 1:
-        axis.axes.set(
-            **{
-                f"{axis.axis_name}lim": (
-                    10.0 ** np.floor(np.log10(low)),
-                    10.0 ** np.ceil(np.log10(high)),
-                )
-            }
-        )
+        ends = 10.0 ** np.floor(np.log10(low)), 10.0 ** np.ceil(np.log10(high))
+        axis.axes.set(**{f"{axis.axis_name}lim": ends})
     axis.set_minor_formatter("")
 
 
-@styled
-def work_precision_figure(results: Mapping) -> Figure:
-    """Draw `work_precision` on a figure of its own; ``results`` as `geomech.accuracy` returns them.
+# Of forces in grains
 
-    Examples
-    --------
-    >>> import geomech
-    >>> table = geomech.accuracy(geomech.study("three-link-viscous", phases=32, grid=7).scene, runs=1)
-    >>> fig = geomech.plots.work_precision_figure(table)
-    """
-    count = len({line["against"] for line in results["lines"]})
-    fig, axes = figure(5.0 * count, 5.2, count)
-    work_precision(results, axes[0])
+
+@styled
+def parts_figure(result: Result) -> Figure:
+    """Draw the errors of force and moment against the number of parts, and against
+    seconds."""
+    fig, ((by_parts, by_seconds),) = figure(7.2, 3.2, 2)
+    facts = result.attributes
+    for name, colour, marker in zip(("force", "moment"), ("C0", "0.2"), "os"):
+        (line,) = lines_of(result, f"{name}_error")
+        label = name
+        if not np.isnan(line.order):
+            label = f"{name}, order {line.order:.1f}"
+        error = np.maximum(line.error, LEAST)
+        for ax, at in ((by_parts, line.values), (by_seconds, line.seconds)):
+            ax.loglog(at, error, color=colour, marker=marker, lw=1.0, label=label)
+    by_parts.set_xlabel(facts["parts"])
+    by_seconds.set_xlabel(f"seconds for {facts['poses']} poses")
+    for ax in (by_parts, by_seconds):
+        ax.set_ylabel("rms error / largest of the motion")
+        ax.grid(True, which="major", lw=0.3, color="0.85")
+    by_parts.set_xticks(line.values, [f"{value:.0f}" for value in line.values])
+    by_parts.minorticks_off()
+    show_decades(by_seconds.xaxis)
+    by_parts.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     return fig
 
 
+# Of a robot
+
+
 @styled
-def walk_accuracy_figure(results: dict) -> Figure:
-    """Draw the error of the speed against each setting of a robot (`geomech.studies.accuracy`)."""
-    fig, axes = figure(8.4, 2.9, len(results["lines"]))
-    labels = {
-        "steps": "steps of a cycle",
-        "elements": "elements of an outline",
-        "rounding": "rounding (m/s)",
-    }
-    for ax, line in zip(axes[0], results["lines"]):
-        value, error = np.array(line["value"], float), np.maximum(line["error"], 1e-12)
-        ax.loglog(value, error, "o-", color="black", lw=1.0)
-        sign = 1 if line["label"] == "rounding" else -1
-        slope = error.max() * (value / value[error.argmax()]) ** (sign * line["order"])
-        ax.loglog(
-            value, slope, color="0.6", ls="--", lw=0.8, label=f"order {line['order']}"
-        )
-        ax.set(xlabel=labels[line["label"]], ylabel="error of the speed (m/s)")
-        ax.set_xticks(value, [f"{v:g}" for v in value], rotation=45)
+def robot_figure(result: Result) -> Figure:
+    """Draw the error of the speed against each setting of a robot, beside the order of
+    theory."""
+    lines = lines_of(result)
+    fig, axes = figure(8.4, 2.9, len(lines))
+    for ax, line in zip(axes[0], lines):
+        error = np.maximum(line.error, LEAST_SPEED)
+        ax.loglog(line.values, error, "o-", color="black", lw=1.0)
+        power = -float(line.order_by_theory)
+        if line.varied == "rounding":  # which is finer where it is less
+            power = -power
+        theory = error.max() * (line.values / line.values[error.argmax()]) ** power
+        label = f"order {line.order_by_theory}"
+        ax.loglog(line.values, theory, color="0.6", ls="--", lw=0.8, label=label)
+        ax.set(xlabel=OF_ROBOTS[line.varied], ylabel="error of the speed (m/s)")
+        ax.set_xticks(line.values, [f"{v:g}" for v in line.values], rotation=45)
         ax.minorticks_off()
         ax.legend(loc="best")
     return fig

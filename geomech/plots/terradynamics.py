@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -276,35 +275,3 @@ def _abscissa(columns) -> tuple[str, str, float]:
     if np.ptp(columns["z"]) > np.ptp(columns["x"]) and not back_and_forth("z"):
         return "z", "height of the origin, z (m)", 1.0
     return ("t", "t (s)", 1.0) if back_and_forth("x") else ("x", "x (m)", 1.0)
-
-
-@styled
-def elements_figure(results: Mapping) -> Figure:
-    """Draw the error of an intruder scene against its number of parts, and against seconds (`geomech.studies.intrusion`)."""
-    from matplotlib.ticker import NullFormatter
-
-    fig, axes = figure(7.2, 3.2, 2)
-    for line, colour, marker in zip(results["lines"], ("C0", "0.2"), "os"):
-        order = "" if line["slope"] is None else f", order {line['slope']:.1f}"
-        for ax, at in zip(axes[0], (line["value"], line["seconds"])):
-            error = np.maximum(line["error"], 1e-17)
-            ax.loglog(
-                at,
-                error,
-                color=colour,
-                marker=marker,
-                lw=1.0,
-                label=line["label"] + order,
-            )
-    for ax, label in zip(
-        axes[0], (results["parts"], f"seconds for {results['poses']} poses")
-    ):
-        ax.set(xlabel=label, ylabel="rms error / largest of the motion")
-        ax.grid(True, which="major", lw=0.3, color="0.85")
-    axes[0, 0].set_xticks(
-        results["lines"][0]["value"], map(str, results["lines"][0]["value"])
-    )
-    axes[0, 0].minorticks_off()
-    axes[0, 1].xaxis.set_minor_formatter(NullFormatter())
-    axes[0, 0].legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
-    return fig

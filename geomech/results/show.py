@@ -153,7 +153,10 @@ def scalar(variable: Variable) -> str:
     """Return the value of a variable without dimensions, with errors and unit."""
     if variable.is_text:
         return str(variable.values)
-    shown = with_error(variable.values, variable.error, unit_of(variable))
+    unit = unit_of(variable)
+    shown = with_error(variable.values, variable.error, unit)
+    if is_error(variable):
+        shown = f"{cell(variable, float(variable))} {unit}".rstrip()
     if variable.spread is not None:
         shown += f", +- {size(float(variable.spread))} by the medium"
     return shown
@@ -260,14 +263,26 @@ def block(variable: Variable, rows: np.ndarray, name: str, place: Places = ()) -
     errors = None
     if variable.error is not None:
         errors = variable.error[place][rows]
-    places = decimals(values, errors)
-    found = [[name, *(number(float(x), places) for x in values)]]
+    cells = [cell(variable, float(x), decimals(values, errors)) for x in values]
+    found = [[name, *cells]]
     if errors is not None:
         found.append(["+- error", *(size(float(x)) for x in errors)])
     if variable.spread is not None:
         spreads = variable.spread[place][rows]
         found.append(["+- medium", *(size(float(x)) for x in spreads)])
     return found
+
+
+def cell(variable: Variable, value: float, places: int | None = None) -> str:
+    """Return a number of a variable; of an error two digits."""
+    if is_error(variable) and np.isfinite(value):
+        return size(value)
+    return number(value, places)
+
+
+def is_error(variable: Variable) -> bool:
+    """Return whether a variable is itself an error, such as of a setting."""
+    return variable.name == "error" or variable.name.endswith("_error")
 
 
 def index_column(

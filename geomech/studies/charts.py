@@ -6,6 +6,7 @@ page of `geomech lab` computes the same."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -92,7 +93,13 @@ class Chart:
     between: float = 0.0
 
     @property
+    def shapes(self) -> int:
+        """Number of shapes of the grid."""
+        return math.prod(map(len, self.axes))
+
+    @property
     def highest(self) -> int:
+        """Highest harmonic of the direction of alphadot."""
         return self.harmonics.shape[-1] // 3 - 1
 
     def at(self, value: float) -> Chart:

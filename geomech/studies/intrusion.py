@@ -13,6 +13,7 @@ from geomech.core.summary import effect_lines
 from geomech.core.variables import Result, Variable
 from geomech.run.cost import BASE, Cost
 from geomech.scenes.intruding import Intruding
+from geomech.studies.settings import Choice, Measured, cheapest
 
 UNITS = {
     "t": "s",
@@ -27,6 +28,7 @@ LABELS = {
     "force": "on the body, with the weight of effects that have one",
     "moment": "on the body, about the frame's origin",
 }
+TOLERANCES = 10.0 ** -np.arange(1, 7)  # over the largest force and moment
 MARGIN = 1.125  # factor on the extrapolation by order: covers the error of 95 of 100 motions of outlines, measured
 
 
@@ -122,9 +124,12 @@ class Settings:
     scene: Intruding
     runs: int = 3
 
-    measures: ClassVar[tuple[str, ...]] = ("force", "moment")
-    tolerances: ClassVar[np.ndarray] = 10.0 ** -np.arange(1, 7)
-    picture: ClassVar[str] = "elements_figure"
+    about: ClassVar[str] = "force and moment"
+    unit: ClassVar[str] = "1"
+    measures: ClassVar[dict[str, str]] = {
+        "force_error": "rms over the motion, over the largest force",
+        "moment_error": "rms over the motion, over the largest moment",
+    }
 
     def check(self) -> None: ...
 
@@ -162,30 +167,26 @@ class Settings:
             errors[what] = float(np.sqrt(np.mean((one - exact) ** 2)) / largest)
         return errors
 
-    def describe(self, setting: Setting, measure: str) -> dict[str, Any]:
-        return {"label": measure, "order": setting.order}
+    def choices(self, measured: Measured) -> list[Variable]:
+        """Return the fewest of the tried parts that meet tolerances in force and
+        moment."""
+        errors = np.maximum(*measured.errors.values())
 
-    def cheapest(self, lines: list[dict], tolerance: float) -> dict[str, Any]:
-        """Return the fewest of the tried parts that meet a tolerance in force and moment."""
-        parts = self.scene.parts
-        for k, count in enumerate(lines[0]["value"]):
-            if (error := max(line["error"][k] for line in lines)) <= tolerance:
-                return {
-                    "tolerance": tolerance,
-                    parts: count,
-                    "error": error,
-                    "seconds": lines[0]["seconds"][k],
-                }
-        return {"tolerance": tolerance, parts: None}
+        def choose(tolerance: float) -> Choice | None:
+            good = np.flatnonzero(errors[0] <= tolerance)
+            if good.size:
+                return Choice(0, int(good[0]))
+            return None
+
+        return cheapest(measured, errors, self.unit, TOLERANCES, choose)
 
     def facts(self) -> dict[str, Any]:
         scene = self.scene
         finest = scene.actual_count(scene.ladder[-1])
         return {
-            "scene": scene.name,
             "parts": scene.parts,
-            "poses": scene.motion.samples,
-            "finest": finest,
+            "poses": int(scene.motion.samples),
+            "finest": int(finest),
         }
 
 

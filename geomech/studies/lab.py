@@ -1,22 +1,18 @@
-"""The gait lab: charts of one scene or several, or of a family of scenes, as a question."""
+"""The gait lab: charts of one scene or several, or of a family of scenes, as a request."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import prod
+from typing import ClassVar
 
-import numpy as np
-
-from geomech.core.variables import Result, Variable
-from geomech.run.cost import Cost
+from geomech.run.cost import WORTH_SAYING, Cost
 from geomech.scenes.model import Scene
 from geomech.studies import charts, cost
 from geomech.studies.charts import Chart
 from geomech.studies.cycles import Cycles
 from geomech.studies.grid import Grid, listed
-from geomech.studies.question import Allow, Progress, Question
 from rft.core.refusal import Refusal
 
 GALLERY = (  # in which a page shows them
@@ -28,15 +24,26 @@ SECTIONS = ("medium", "body", "system", "physical")  # that a family may vary
 
 
 @dataclass(frozen=True)
-class Lab(Question):
-    """Charts of scenes with two shape variables. over: values of one parameter of the first scene, {"medium.C": [...]}, which
-    makes that chart one of a family; the scene's own value is added to them."""
+class Lab:
+    """A request for charts of scenes with two shape variables.
+
+    over: values of one parameter of the first scene, {"medium.C": [...]}, which makes that
+    chart one of a family; the scene's own value is added to them."""
 
     scenes: tuple[Scene, ...]
     over: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
-    scene = property(lambda self: self.scenes[0])
-    title = property(lambda self: f"charts of {', '.join(s.name for s in self.scenes)}")
+    less: ClassVar[str] = "ask for less"
+    worth_saying: ClassVar[float] = WORTH_SAYING
+
+    @property
+    def scene(self) -> Scene:
+        return self.scenes[0]
+
+    @property
+    def title(self) -> str:
+        """Name of the computation, shown during it."""
+        return f"charts of {', '.join(scene.name for scene in self.scenes)}"
 
     def inputs(self) -> list:
         from geomech.scenes import inputs
@@ -101,14 +108,16 @@ class Lab(Question):
         ]
         return cost.price(jobs)
 
-    def answer(self, progress: Progress, allow: Allow) -> Result:
-        made = []
+    def charts(self, progress: Callable[[float], None]) -> list[Chart]:
+        """Return a chart for each scene. progress: called with the fraction done."""
+        found = []
         for k, scene in enumerate(self.scenes):
-            made.append(
-                self._family(progress) if self.over and k == 0 else charts.chart(scene)
-            )
+            if self.over and k == 0:
+                found.append(self._family(progress))
+            else:
+                found.append(charts.chart(scene))
             progress((k + 1) / len(self.scenes))
-        return _result(made)
+        return found
 
     def _family(self, progress: Callable) -> Chart:
         values, between = self._values, charts.middles(self._values)
@@ -136,38 +145,3 @@ def _jobs(scene: Scene) -> list[cost.Job]:
     if scene.frame != charts.MINIMUM_PERTURBATION:
         jobs += cost.connection(scene)  # that of the minimum-perturbation frame
     return jobs
-
-
-def _result(made: list[Chart]) -> Result:
-    """Return what the charts are: shapes, harmonics, errors."""
-    dims, size = ("scene",), lambda k: np.array([x.grid_error[k] for x in made])
-    variables = [
-        Variable("scene", dims, np.array([x.scene.name for x in made])),
-        Variable(
-            "shapes",
-            dims,
-            np.array([prod(map(len, x.axes)) for x in made]),
-            "1",
-            "shapes of the grid",
-        ),
-        Variable(
-            "highest",
-            dims,
-            np.array([x.highest for x in made]),
-            "1",
-            "highest harmonic of alphadot's direction",
-        ),
-        Variable("grid_error", dims, size(0), "BL/rad", "error of the grid, position"),
-        Variable(
-            "grid_error_heading", dims, size(1), "1", "error of the grid, heading"
-        ),
-    ]
-    facts = {}
-    if made[0].family:
-        family = made[0].family
-        facts = {
-            "over": family.key,
-            "members": len(family.values),
-            "between_members": family.error,
-        }
-    return Result("lab", tuple(variables), facts, made)

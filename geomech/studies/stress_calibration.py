@@ -15,6 +15,7 @@ from geomech.io.rows import read as read_rows
 from geomech.scenes import penetration
 from geomech.scenes.drag import LARGEST_FILE
 from geomech.scenes.stress import plate_rows
+from rft.core.refusal import Refusal, located
 from rft.fits.plates import (
     COEFFICIENTS,
     GENERIC,

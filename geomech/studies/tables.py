@@ -10,6 +10,7 @@ import numpy as np
 
 from geomech.core.variables import Result, Variable
 from geomech.gaits import Gait
+from geomech.geometry.gait import loop_area
 from geomech.geometry.symmetry import zero_components
 from geomech.scenes.model import Scene, frequency_of
 from geomech.systems.base import body_size, length_unit
@@ -150,6 +151,11 @@ def result(
         label = "how far surfaces that a loop spans differ"
         for k, (name, of) in enumerate(zip(SURFACE, (unit, "rad"))):
             variables.append(Variable(name, OVER, spread[..., k], of, label))
+    if system.joints == 2:
+        area, area_error = loop_area(gait, scene.numerics.phases, values)
+        label = "in shape space, counter-clockwise positive"
+        over = ("amplitude",)
+        variables.append(Variable("loop_area", over, area, "rad2", label, area_error))
     error_is = getattr(gait, "estimate_is", "")
     if error_is:
         attributes["error_is"] = error_is

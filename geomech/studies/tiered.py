@@ -11,11 +11,13 @@ from typing import Any, ClassVar
 import numpy as np
 
 from geomech.core.setting import Setting
+from geomech.core.variables import Variable
 from geomech.run.cost import Cost
 from geomech.scenes.model import Scene, checked_scene
 from geomech.studies import cost as foretold
 from geomech.studies import estimate
 from geomech.studies.available import tiers
+from geomech.studies.settings import Choice, Measured, cheapest
 from geomech.studies.study import Study, refuse_outside
 from geomech.systems.base import body_size
 from geomech.systems.capabilities import (
@@ -31,6 +33,7 @@ from geomech.tiers.direct import DIRECT
 from rft.core.refusal import Refusal, located
 
 FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
+TOLERANCES = 10.0 ** -np.arange(1, 7)  # BL
 TRUTH_PHASES = 4096
 TRUTH_STEPS = 1024  # of time stepping, which is sequential
 FINE_PIECES = 320  # of body, where effects cut it
@@ -57,9 +60,11 @@ class Settings:
     scene: Scene
     runs: int = 2
 
-    measures: ClassVar[tuple[str, ...]] = ("error",)
-    tolerances: ClassVar[np.ndarray] = 10.0 ** -np.arange(1, 7)
-    picture: ClassVar[str] = "work_precision_figure"
+    about: ClassVar[str] = f"the displacement, rms over {len(FRACTIONS)} amplitudes,"
+    unit: ClassVar[str] = "BL"
+    measures: ClassVar[dict[str, str]] = {
+        "error": "rms distance of positions over the amplitudes"
+    }
 
     def __post_init__(self) -> None:
         if checked_scene(self.scene).system.traits.steps:
@@ -158,19 +163,9 @@ class Settings:
         )
         return {"error": float(np.sqrt(np.mean(distances**2)))}
 
-    def describe(self, setting: Setting, measure: str) -> dict[str, Any]:
-        entry = {
-            "label": setting.label,
-            "tier": setting.tier,
-            "setting": setting.name,
-            "order": setting.order,
-            "against": setting.against,
-        }
-        return {**entry, "buys": setting.buys}
-
     @property
     def own_error(self) -> float:
-        """Largest error of the system itself, body lengths, which no setting reduces; the cheapest settings include it."""
+        """Largest error of the system itself, body lengths, which no setting reduces."""
         system = self.scene.system
         shapes = self.scene.gait.cycle(self.scene.numerics.phases, self.amplitudes)
         error = table_error(system, *shapes)[..., 0]
@@ -180,18 +175,25 @@ class Settings:
             error = error + estimate.elements_error(system, fewer, net)[..., 0]
         return float(error.max())
 
-    def cheapest(self, lines: list[dict], tolerance: float) -> dict[str, Any]:
-        return cheapest(lines, tolerance, self.own_error)
+    def choices(self, measured: Measured) -> list[Variable]:
+        """Return the cheapest values for tolerances, and the system's own error, which
+        their errors include."""
+        own = self.own_error
+        errors = measured.errors["error"] + own
+
+        def choose(tolerance: float) -> Choice | None:
+            return quickest(measured, errors, tolerance)
+
+        found = cheapest(measured, errors, self.unit, TOLERANCES, choose)
+        label = self.scene.gait.amplitude_label
+        found.append(Variable("amplitude", ("amplitude",), self.amplitudes, "", label))
+        if own:
+            about = "of the system, which no setting takes away"
+            found.append(Variable("own_error", (), own, self.unit, about))
+        return found
 
     def facts(self) -> dict[str, Any]:
-        own = self.own_error
-        units = {"error": "BL", "tolerance": "BL", "own_error": "BL", "seconds": "s"}
-        facts = {
-            "scene": self.scene.name,
-            "amplitudes": self.amplitudes.tolist(),
-            "units": units,
-        }
-        return {**facts, **({"own_error": own} if own else {})}
+        return {}
 
 
 def applies(setting: Setting, scene: Scene) -> bool:
@@ -225,24 +227,15 @@ def _truth_phases(scene: Scene) -> int:
     return TRUTH_STEPS if scene.system.traits.steps else TRUTH_PHASES
 
 
-def cheapest(lines: list[dict], tol: float, own: float = 0.0) -> dict[str, Any]:
-    """Return the quickest measured setting whose error against the truth, with the system's own, is at most ``tol``; no
-    tier if there is none."""
-    choices = [
-        (t, line, v, e + own)
-        for line in lines
-        if line["against"] == "truth"
-        for v, e, t in zip(line["value"], line["error"], line["seconds"])
-        if e + own <= tol
-    ]
-    if not choices:
-        return {"tolerance": float(tol), "tier": None}
-    seconds, line, value, error = min(choices, key=lambda f: f[0])
-    return {
-        "tolerance": float(tol),
-        "tier": line["tier"],
-        "setting": line["setting"],
-        "value": value,
-        "error": error,
-        "seconds": seconds,
-    }
+def quickest(measured: Measured, errors: np.ndarray, tolerance: float) -> Choice | None:
+    """Return the quickest value whose error against the truth is at most the tolerance,
+    the first of several; None if there is none."""
+    found = None
+    for k, setting in enumerate(measured.settings):
+        if setting.against != "truth":
+            continue
+        for j in np.flatnonzero(errors[k] <= tolerance):
+            choice = Choice(k, int(j))
+            if found is None or measured.seconds[choice] < measured.seconds[found]:
+                found = choice
+    return found

@@ -21,6 +21,7 @@ from geomech.run.runner import runner
 from geomech.scenes import write as written
 from geomech.scenes.walker import WalkerScene
 from geomech.studies.grid import Grid
+from geomech.studies.settings import Measured
 from rft.core.metres import GRAVITY
 from rft.core.refusal import Refusal, located
 from rft.terradynamics.walking import Mjcf, Rhex, Roller, Walk, engine
@@ -56,6 +57,7 @@ SETTINGS = (
     Setting("rounding", (8e-3, 4e-3, 2e-3, 1e-3, 5e-4), 1, against="limit"),
 )
 FINEST = {"steps": 256, "elements": 96, "rounding": 6.25e-5}
+TOLERANCES = 10.0 ** -np.arange(1, 5)  # of the speed, m/s
 
 
 class Walked(NamedTuple):
@@ -343,9 +345,9 @@ class Settings:
     runs: int = 1
     near: Walk | None = field(default=None, repr=False)
 
-    measures: ClassVar[tuple[str, ...]] = ("error",)
-    tolerances: ClassVar[np.ndarray] = 10.0 ** -np.arange(1, 5)
-    picture: ClassVar[str] = "walk_accuracy_figure"
+    about: ClassVar[str] = "the speed"
+    unit: ClassVar[str] = "m/s"
+    measures: ClassVar[dict[str, str]] = {"error": "of the speed"}
 
     def check(self) -> None:
         refuse_engine(self.scene)
@@ -386,23 +388,28 @@ class Settings:
     ) -> dict[str, float]:
         return {"error": float(abs(numbers[0] - truth[0]))}
 
-    def describe(self, setting: Setting, measure: str) -> dict[str, Any]:
-        return {"label": setting.name, "order": setting.order}
-
-    def cheapest(self, lines: list[dict], tolerance: float) -> dict[str, Any]:
-        """Return for each setting the coarsest value from which on the error is within the tolerance; None if there is none."""
-        out: dict[str, Any] = {"tolerance": tolerance}
-        for line in lines:
-            good = [
-                v
-                for k, v in enumerate(line["value"])
-                if max(line["error"][k:]) <= tolerance
-            ]
-            out[line["label"]] = good[0] if good else None
-        return out
+    def choices(self, measured: Measured) -> list[Variable]:
+        """Return for tolerances the coarsest value of each setting from which on the
+        error is within, nan if there is none, and the speed."""
+        coarsest = np.full((len(measured.settings), len(TOLERANCES)), np.nan)
+        for k, setting in enumerate(measured.settings):
+            errors = measured.errors["error"][k, : len(setting.values)]
+            # From the end: the largest error of a value and all finer ones.
+            largest = np.maximum.accumulate(errors[::-1])[::-1]
+            for j, tolerance in enumerate(TOLERANCES):
+                good = np.flatnonzero(largest <= tolerance)
+                if good.size:
+                    coarsest[k, j] = measured.values[k, good[0]]
+        over = ("setting", "tolerance")
+        label = "from which on the error is within the tolerance"
+        return [
+            Variable("tolerance", ("tolerance",), TOLERANCES, self.unit),
+            Variable("coarsest_value", over, coarsest, "", label),
+            Variable("speed", (), self.near.speed, self.unit, "of the robot"),
+        ]
 
     def facts(self) -> dict[str, Any]:
-        return {"scene": self.scene.name, "speed": self.near.speed}
+        return {}
 
 
 def refuse_engine(scene: WalkerScene, by: str | None = None) -> None:

@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from geomech.core.variables import Result
 from geomech.core.version import VERSION
 from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Gait, Points
@@ -28,7 +27,7 @@ from geomech.scenes.key import keys_of
 from geomech.scenes.write import text_of, without_gait
 from geomech.studies.charts import SHARES, Chart, series_of
 from geomech.systems.base import body_size, length_unit, shape_labels
-from rft.core.refusal import Refusal, in_line
+from rft.core.refusal import Refusal
 
 FOLDER = Path(__file__).parent
 SCRIPTS = (
@@ -68,10 +67,6 @@ def check_format(path: Path) -> None:
         )
 
 
-def message(result: Result, path: Path) -> str:
-    return f"page in {in_line(path)}"
-
-
 @contextmanager
 def opened(path: Path | None) -> Iterator[Path]:
     """Give a path to write the page to: the one named, or one in a temporary folder that a browser then opens."""
@@ -87,10 +82,10 @@ def opened(path: Path | None) -> Iterator[Path]:
     webbrowser.open(page.as_uri())
 
 
-def write(result: Result, path: Path) -> None:
+def write(charts: list[Chart], path: Path) -> None:
     """Write the page."""
     with atomic_file(path) as part:
-        part.write_text(page(result.subject), encoding="utf-8")
+        part.write_text(page(charts), encoding="utf-8")
 
 
 def page(charts: list[Chart]) -> str:

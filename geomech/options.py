@@ -1,0 +1,155 @@
+"""Options of commands besides the fields of their questions: plug-ins, workers, and changes
+of a scene."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any, Optional
+
+import typer
+
+from geomech.questions import texts
+from geomech.questions.base import SCENE_HELP
+from geomech.questions.names import scene_names
+
+SceneArgument = Annotated[
+    str, typer.Argument(metavar="SCENE", help=SCENE_HELP, autocompletion=scene_names)
+]
+YesOption = Annotated[
+    bool,
+    typer.Option("--yes", help="compute even if it takes over a minute or over 2 GB"),
+]
+
+# Changes of a scene
+
+
+def an_angle(text: str | float) -> float:
+    """Return an option that is an angle, 2.5 or 120deg, in rad."""
+    try:
+        return texts.number(str(text), None)
+    except ValueError:
+        raise typer.BadParameter(
+            f"{text!r} is no angle: give one such as 2.5 (rad) or 120deg"
+        ) from None
+
+
+GridOption = Annotated[
+    Optional[int],
+    typer.Option(
+        "--grid",
+        metavar="N",
+        help="points of the grid per joint, in place of the scene's",
+    ),
+]
+ExtentOption = Annotated[
+    Optional[float],
+    typer.Option(
+        "--extent",
+        metavar="ANGLE",
+        help="half width of the grid in rad, or as 120deg",
+        parser=an_angle,
+    ),
+]
+MediumOption = Annotated[
+    Optional[Path],
+    typer.Option(
+        "--medium",
+        metavar="FILE",
+        help="file of a medium or of drag, in place of the scene's",
+    ),
+]
+
+# Plug-ins
+
+
+PluginOption = Annotated[
+    Optional[list[Path]],
+    typer.Option(
+        "--plugin",
+        metavar="FILE.py",
+        help="Python file with parts of your own, such as laws",
+    ),
+]
+ABOUT = {"name", "subject"}  # first arguments of commands that take plug-ins
+
+
+def load_plugins(files: list[Path] | None) -> None:
+    """Let scenes name what is in the files; see `geomech.scenes.kinds.load_file`."""
+    for path in files or ():
+        from geomech.scenes.kinds import load_file
+
+        load_file(path)
+
+
+def with_plugins(command: Callable) -> Callable:
+    """Return a command that also takes ``--plugin`` if it is about a scene; any other as
+    it is."""
+    taken = {*inspect.signature(command).parameters}
+    if not ABOUT & taken or "plugin" in taken:
+        return command
+
+    def run(plugin: list[Path] | None = None, **arguments: Any) -> Any:
+        load_plugins(plugin)
+        return command(**arguments)
+
+    return extended(run, command, {"plugin": PluginOption})
+
+
+# Processes
+
+WorkersOption = Annotated[
+    Optional[int],
+    typer.Option(
+        "--workers",
+        metavar="N",
+        help="processes for long computations, one a core if left out",
+    ),
+]
+SchedulerOption = Annotated[
+    Optional[str],
+    typer.Option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Dask cluster to compute on, as tcp://10.0.0.1:8786",
+    ),
+]
+
+
+def with_workers(command: Callable) -> Callable:
+    """Return a command that also takes ``--workers`` and ``--scheduler``
+    (`geomech.run.workers`)."""
+
+    def run(
+        workers: int | None = None, scheduler: str | None = None, **arguments: Any
+    ) -> Any:
+        from geomech.run.workers import using
+
+        with using(workers, scheduler):
+            return command(**arguments)
+
+    more = {"workers": WorkersOption, "scheduler": SchedulerOption}
+    return extended(run, command, more)
+
+
+def extended(run: Callable, command: Callable, more: dict[str, Any]) -> Callable:
+    """Return ``run`` as a command with the parameters of another one and more options."""
+    functools.update_wrapper(run, command)
+    signature = inspect.signature(command, eval_str=True)
+    parameters = [*signature.parameters.values()]
+    for name, annotation in more.items():
+        parameters.append(
+            inspect.Parameter(
+                name,
+                inspect.Parameter.KEYWORD_ONLY,
+                default=None,
+                annotation=annotation,
+            )
+        )
+    run.__signature__ = signature.replace(  # type: ignore[attr-defined]
+        parameters=parameters
+    )
+    run.__annotations__ = {p.name: p.annotation for p in parameters}
+    return run

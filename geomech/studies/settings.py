@@ -1,0 +1,120 @@
+"""Errors and seconds at the values of settings, and what follows from them: orders, and
+the cheapest values that meet a tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from geomech.core.setting import ROUNDING, Setting
+from geomech.core.variables import Variable
+
+OVER = ("setting", "fineness")
+NONE = "none"  # stands for a setting where none meets a tolerance
+LEAST = 3  # errors above rounding from which an order is measured
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Runs at the values of settings, from coarse to fine.
+
+    values, seconds and errors, by their names: (S, F) of S settings; nan behind the last
+    value of a setting that has fewer than F."""
+
+    settings: Sequence[Setting]
+    values: np.ndarray
+    seconds: np.ndarray
+    errors: Mapping[str, np.ndarray]
+
+
+class Choice(NamedTuple):
+    """A value of a setting, by their numbers."""
+
+    setting: int
+    value: int
+
+
+def padded(rows: Sequence[Sequence[float]]) -> np.ndarray:
+    """Return rows of different lengths as one array, filled with nan."""
+    longest = max(map(len, rows))
+    array = np.full((len(rows), longest), np.nan)
+    for k, row in enumerate(rows):
+        array[k, : len(row)] = row
+    return array
+
+
+def order(values: np.ndarray, errors: np.ndarray) -> float:
+    """Return the measured order of errors in the coarseness, by least squares; nan where
+    fewer than `LEAST` are more than rounding."""
+    is_seen = errors > ROUNDING
+    if is_seen.sum() < LEAST:
+        return np.nan
+    x = np.log(values[np.isfinite(values)])
+    slope = np.polyfit(np.log(values[is_seen]), np.log(errors[is_seen]), 1)[0]
+    if x[0] < x[-1]:
+        return -slope
+    return slope
+
+
+def order_name(error: str) -> str:
+    """Return the name of the order of an error: order, or force_order of force_error."""
+    return error.removesuffix("error") + "order"
+
+
+def variables(
+    measured: Measured, unit: str, labels: Mapping[str, str]
+) -> Iterator[Variable]:
+    """Yield settings, values, seconds, errors in ``unit``, and orders."""
+    settings = measured.settings
+    texts = {
+        "setting": [setting.label for setting in settings],
+        "tier": [setting.tier for setting in settings],
+        "varied": [setting.name for setting in settings],
+        "against": [setting.against for setting in settings],
+        "order_by_theory": [str(setting.order) for setting in settings],
+        "buys": [setting.buys for setting in settings],
+    }
+    for name, words in texts.items():
+        if any(words):
+            yield Variable(name, ("setting",), np.array(words))
+    yield Variable("value", OVER, measured.values, "", "of the setting")
+    yield Variable("seconds", OVER, measured.seconds, "s", "of the quickest run")
+    for name, errors in measured.errors.items():
+        yield Variable(name, OVER, errors, unit, labels[name])
+        orders = [order(*pair) for pair in zip(measured.values, errors)]
+        label = "measured, nan where all is rounding"
+        yield Variable(order_name(name), ("setting",), np.array(orders), "1", label)
+
+
+def cheapest(
+    measured: Measured,
+    errors: np.ndarray,
+    unit: str,
+    tolerances: np.ndarray,
+    choose: Callable[[float], Choice | None],
+) -> list[Variable]:
+    """Return the value that is chosen for each tolerance, its error and its seconds.
+
+    errors: (S, F), those that are held against the tolerances. choose: returns the value
+    for a tolerance, None where none of those tried meets it."""
+    names, rows = [], []
+    for tolerance in tolerances:
+        choice = choose(float(tolerance))
+        if choice is None:
+            names.append(NONE)
+            rows.append((np.nan, np.nan, np.nan))
+            continue
+        names.append(measured.settings[choice.setting].label)
+        rows.append((measured.values[choice], errors[choice], measured.seconds[choice]))
+    values, found_errors, seconds = np.array(rows).T
+    dims = ("tolerance",)
+    return [
+        Variable("tolerance", dims, tolerances, unit),
+        Variable("best_setting", dims, np.array(names)),
+        Variable("best_value", dims, values, "", "of the setting"),
+        Variable("best_error", dims, found_errors, unit),
+        Variable("best_seconds", dims, seconds, "s"),
+    ]
