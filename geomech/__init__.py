@@ -5,7 +5,7 @@
     study.ccf().plot()                        # also .connection(), .optimise()
 
 study, Study                            a scene, and methods that ask questions of it
-displacement, ccf, sweep, optimise (optimize), forces, velocity, walk, intrude
+displacement, ccf, sweep, optimise (optimize), forces, velocity, trajectory, walk, intrude
                                         the same of any scene; results that print themselves
 load_result, best_scene                 results from files; the scene with the best gait
 tiers, workers, accuracy                methods of prediction; processes; error against time
@@ -44,6 +44,7 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.api import optimize as optimize
     from geomech.api import study as study
     from geomech.api import sweep as sweep
+    from geomech.api import trajectory as trajectory
     from geomech.api import velocity as velocity
     from geomech.api import walk as walk
     from geomech.app import accuracy as accuracy
@@ -99,6 +100,7 @@ _OBJECTS = {
             "optimize",
             "study",
             "sweep",
+            "trajectory",
             "velocity",
             "walk",
         ),

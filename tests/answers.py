@@ -107,6 +107,7 @@ def flat(name: str, told):
 RENAMED = {  # names of variables, by the first word of the command
     "connection": {"speed": "xi_rms"},
     "sweep": {"length": "body_length"},
+    "trajectory": {"theta": "heading"},
     "optimize": {"theta": "heading"},
     "walk": {
         "aside": "lateral_speed",

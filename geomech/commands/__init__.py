@@ -5,7 +5,7 @@ COMMANDS = {  # by the headings of `geomech --help`, in its order
     "Analyse": (
         "run", "symbolic", "accuracy", "lab"
     ),
-    "Gaits": ("trajectory",),
+    "Gaits": (),
     "Grains and robots": ("grains", "drag_grains"),
     "Your own data": ("fit_medium", "fit_gait"),
     "Reference": ("scenes", "reference", "explain"),

@@ -78,6 +78,7 @@ from geomech.plots.terradynamics import (
     stress_figure,
     stress_map,
 )
+from geomech.plots.walking import walk_figure, walk_strip
 
 __all__ = [
     "CCF_STYLES",
@@ -144,6 +145,8 @@ __all__ = [
     "unknown",
     "vector_field",
     "walk_accuracy_figure",
+    "walk_figure",
+    "walk_strip",
     "winding",
     "work_precision",
     "work_precision_figure",
