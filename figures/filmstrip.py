@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
+import geomech
 from figures import main
 from geomech import plots
+from geomech.core.variables import Result
 from geomech.scenes import load
-from geomech.studies.motion import motion
-from geomech.studies.study import Study
 
 
-def compute(scene: str = "butterfly-glass", cycles: int = 1, **numerics) -> dict:
-    """Return the motion (`geomech.studies.motion.Motion`), and the CCF with its error."""
-    study = Study(load(scene).with_numerics(**numerics))
-    return {
-        "motion": motion(study.scene, cycles),
-        "ccf": study.curvature,
-        "error": study.curvature_error,
-    }
+def compute(scene: str = "butterfly-glass", cycles: int = 1, **numerics) -> Result:
+    """Return the motion with the CCF (`geomech.trajectory`)."""
+    return geomech.trajectory(load(scene).with_numerics(**numerics), cycles)
 
 
-def draw(numbers: dict):
-    return plots.filmstrip(numbers["motion"], numbers["ccf"], numbers["error"])
+def draw(numbers: Result):
+    return plots.filmstrip(numbers)
 
 
 if __name__ == "__main__":

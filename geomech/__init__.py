@@ -5,7 +5,7 @@
     study.ccf().plot()                        # also .connection(), .optimise()
 
 study, Study                            a scene, and methods that ask questions of it
-displacement, ccf, sweep, optimise (optimize), forces, velocity, walk, intrude
+displacement, ccf, sweep, optimise (optimize), forces, velocity, trajectory, walk, intrude
                                         the same of any scene; results that print themselves
 load_result, best_scene, fitted_medium  results from files; scenes and media that results have
 tiers, workers, accuracy                methods of prediction; processes; error against time
@@ -46,6 +46,7 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.api import optimize as optimize
     from geomech.api import study as study
     from geomech.api import sweep as sweep
+    from geomech.api import trajectory as trajectory
     from geomech.api import velocity as velocity
     from geomech.api import walk as walk
     from geomech.app import fit_midlines as fit_midlines
@@ -102,6 +103,7 @@ _OBJECTS = {
             "optimize",
             "study",
             "sweep",
+            "trajectory",
             "velocity",
             "walk",
         ),

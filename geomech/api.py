@@ -21,6 +21,7 @@ from geomech.questions.forces import Forces
 from geomech.questions.intrude import Intrude
 from geomech.questions.optimize import Optimize
 from geomech.questions.sweep import Sweep
+from geomech.questions.trajectory import Trajectory
 from geomech.questions.velocity import Velocity
 from geomech.questions.walk import Walk
 from geomech.scenes.parts import as_scene
@@ -169,6 +170,7 @@ class Study:
     sweep = asks(Sweep)
     forces = asks(Forces)
     optimise = optimize = asks(Optimize)
+    trajectory = asks(Trajectory)
     walk = asks(Walk)
     intrude = asks(Intrude)
     accuracy = asks(Accuracy)
@@ -185,12 +187,16 @@ class Study:
         >>> study.animate(pathlib.Path(tempfile.mkdtemp()) / "swim.png").name
         'swim.png'
         """
-        from geomech.output import animate
-        from geomech.studies.motion import Trajectory
+        from geomech import films, plots
+        from geomech.questions.tools import is_film
 
         path = Path(path)
-        animate.check_format(path)
-        animate.write(Trajectory(self.scene, cycles, drawn=True).ask(), path)
+        if is_film(path):
+            films.check_format(path)
+            self.trajectory(cycles).save(path)
+        else:
+            plots.check_format(path)
+            plots.save(self.trajectory(cycles).plot(), path)
         return path
 
 
@@ -236,6 +242,7 @@ velocity = asked_of_scene(Velocity)
 sweep = asked_of_scene(Sweep)
 forces = asked_of_scene(Forces)
 optimise = optimize = asked_of_scene(Optimize)
+trajectory = asked_of_scene(Trajectory)
 walk = asked_of_scene(Walk)
 intrude = asked_of_scene(Intrude)
 fit_medium = asked_of_file(FitMedium)

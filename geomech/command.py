@@ -19,6 +19,7 @@ from rft.core.refusal import Refusal
 CHANGES = {"grid": GridOption, "extent": ExtentOption, "medium": MediumOption}
 ENDINGS = (".nc", ".json", ".csv", ".mat", ".txt")  # of `geomech.results.files.WRITERS`
 IN_FOLDER = (".json", ".csv", ".nc", ".txt")  # formats that fill a folder
+PICTURES = (".png", ".pdf", ".svg")  # those of --plot
 SUBJECT = "subject"  # name of the first argument in the function of a command
 
 
@@ -271,6 +272,10 @@ def output(
         return pipeline.Output(path, question.fill, folder=True)
     if path.is_dir() and path.suffix.lower() not in formats(question):
         return pipeline.Output(path, fill, folder=True)
+    if path.suffix.lower() in PICTURES and question.draw is not None:
+        raise Refusal(
+            f"cannot write {path}", instead=f"say --plot {path} for a picture"
+        )
     writer(path, question)  # refuses an ending that is no format
     return pipeline.Output(path, partial(save, **options))
 

@@ -110,6 +110,7 @@ FITS = ("zeta", "zeta_error", "value_error", "interval", "law", "law_error")
 RENAMED = {  # names of variables, by the first word of the command
     "connection": {"speed": "xi_rms"},
     "sweep": {"length": "body_length"},
+    "trajectory": {"theta": "heading"},
     "optimize": {"theta": "heading"},
     "walk": {
         "aside": "lateral_speed",

@@ -1,5 +1,6 @@
 """Bodies in the world, trajectories, films and strips: against kinematics drawn link by link and the direct tier."""
 
+import contextlib
 import os
 import signal
 import stat
@@ -11,12 +12,12 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from PIL import Image, ImageSequence
 from registry import BODIES, SYSTEMS
 
-from geomech import plots, scenes
-from geomech.commands import formats
+from geomech import films, plots, scenes
 from geomech.gaits import Circle, Ellipse, Fourier, Sine
 from geomech.geometry import reconstruct
-from geomech.output import animate, trajectories
+from geomech.io import results as io
 from geomech.plots.style import STYLE
+from geomech.questions.trajectory import Trajectory
 from geomech.scenes import Numerics, Scene
 from geomech.studies import motion as moving
 from geomech.studies.study import Study
@@ -239,63 +240,61 @@ def at_bench(scene, hertz):
 def test_a_table_reads_back_with_every_digit(name, tmp_path):
     pandas = pytest.importorskip("pandas")
     found, path = moving.motion(SCENES[name], 2), tmp_path / "out.csv"
-    trajectories.save(path, found)
-    frame = pandas.read_csv(path, comment="#")
+    Trajectory(SCENES[name], 2).ask().save(path)
+    frame = pandas.read_csv(path)
     numpy = np.genfromtxt(path, delimiter=",", names=True)
-    assert list(frame.columns) == list(numpy.dtype.names) == list(found.columns)
+    assert list(frame.columns) == list(numpy.dtype.names)
     plain = np.loadtxt(path, delimiter=",", skiprows=1)
     np.testing.assert_allclose(frame.to_numpy(), plain, rtol=1e-15, atol=1e-300)
     columns = lambda *names: np.stack([numpy[name] for name in names], -1)
     np.testing.assert_array_equal(columns(*numpy.dtype.names), plain)
-    np.testing.assert_array_equal(columns("x", "y", "theta"), found.pose)
+    np.testing.assert_array_equal(columns("x", "y", "heading"), found.pose)
     np.testing.assert_array_equal(columns("alpha_1", "alpha_2"), found.alpha)
     np.testing.assert_array_equal(numpy["phase"], found.phase)
     ends = columns(*(f"end_{k}_{axis}" for k in range(4) for axis in "xy"))
     np.testing.assert_array_equal(ends.reshape(-1, 4, 2), found.points())
-    comments = [line for line in path.read_text().splitlines() if line.startswith("#")]
-    assert len(comments) == 5 and comments[2].startswith(
-        "# x (m), y (m), theta (rad): pose of the frame "
-    )
-    assert comments[1] == "# phase (rad): of the gait, 2 pi a cycle"
-    assert (
-        comments[3].startswith("# alpha_k (rad): joint angle, heading of link k+1")
-        and "end_k_x" in comments[4]
-    )
-    assert "time" not in found.columns
+    assert "time" not in frame.columns
 
 
 def test_time_where_the_gait_has_a_frequency(tmp_path):
     scene = at_bench(scenes.parse(SCENE.format("")), 2.5)
     found = moving.motion(scene, 3)
     np.testing.assert_allclose(found.time[-1], 3 / 2.5)
-    assert list(found.columns)[:3] == ["phase", "time", "x"]
-    trajectories.save(tmp_path / "out.csv", found)
-    table = np.genfromtxt(tmp_path / "out.csv", delimiter=",", names=True)
-    np.testing.assert_allclose(table["time"], found.phase / (2 * np.pi * 2.5))
-    assert (
-        "# phase (rad): of the gait, 2 pi a cycle; time (s)\n"
-        in (tmp_path / "out.csv").read_text()
-    )
-    assert (
-        plots.filmstrip(found)
-        .axes[1]
-        .get_title("left")
-        .endswith(f"t = {found.time[19]:.3g} s")
-    )
+    result = Trajectory(scene, 3).ask()
+    assert list(result.only("time", "x")) == ["phase", "time", "x"]
+    times = found.phase / (2 * np.pi * 2.5)
+    np.testing.assert_allclose(result["time"].values, times)
+    titles = [ax.get_title("left") for ax in result.plot().axes]
+    assert titles[1].endswith(f"t = {found.time[19]:.3g} s")
 
 
 SCENE = """[medium]\nname = "glass-0.3mm-loose"\n[body]\nkind = "chain"\nlengths = [1, 1.4, 0.8]\n
 [gait]\nkind = "ellipse"\nsemi_axes = [0.8, 0.5]\n[numerics]\ngrid = 9\nphases = 32\n{}"""
 
 
-def test_long_tables_are_written_piece_by_piece(monkeypatch):
-    """Where fewer rows are held at a time than there are the table is the same."""
-    found = moving.motion(SCENES["swimmer"], 2)
-    (whole,) = found.tables()
-    monkeypatch.setattr(moving, "ROWS_TOGETHER", 100)
-    pieces = list(found.tables())
-    assert len(pieces) > 5
-    np.testing.assert_array_equal(np.concatenate(pieces), whole)
+def test_long_tables_are_written_piece_by_piece(monkeypatch, tmp_path):
+    """Where fewer rows are held as text at a time than there are the file is the same."""
+    result = Trajectory(SCENES["swimmer"], 2, mapped=False).ask()
+    result.save(tmp_path / "whole.csv")
+    monkeypatch.setattr(io, "ROWS_TOGETHER", 7)
+    result.save(tmp_path / "pieces.csv")
+    whole = (tmp_path / "whole.csv").read_text()
+    assert whole.count("\n") == 68
+    assert (tmp_path / "pieces.csv").read_text() == whole
+
+
+@pytest.mark.parametrize("cycles", [1, 3])
+def test_the_final_pose_says_what_a_symmetry_makes_zero(cycles):
+    """A mirrored second half turns the body back; then, and after one cycle, x and y are
+    those of all; else each cycle starts in a direction of its own."""
+    mirrored = Trajectory(scenes.load("three-link-viscous"), cycles).ask()
+    assert mirrored["final_heading"].zero.startswith("by symmetry, as")
+    assert abs(float(mirrored["final_heading"])) < 1e-12
+    assert not mirrored["final_x"].zero
+    turning = Trajectory(SCENES["swimmer"], cycles).ask()
+    assert not any(turning[f"final_{name}"].zero for name in ("x", "y", "heading"))
+    for name in ("x", "y", "heading"):
+        assert float(turning[f"final_{name}"]) == turning[name].values[-1]
 
 
 def test_too_much_is_refused_before_it_begins(tmp_path):
@@ -318,32 +317,28 @@ def test_too_much_is_refused_before_it_begins(tmp_path):
             > moving.cost(SCENES[name], 1).seconds
         )
     with pytest.raises(Refusal, match="say yes"):
-        animate.cost(256, 2000).check("scene", False)
-    for name, cure in (
-        ("out.txt", "end the name in .gif or .mp4"),
-        ("out", "end the name"),
-    ):
-        with pytest.raises(Refusal, match=cure):
-            animate.check_format(tmp_path / name)
-    with pytest.raises(Refusal, match="end the name of a table in .csv"):
-        formats.csv(tmp_path / "out.nc")
+        films.cost(256, 2000).check("scene", False)
 
 
 @pytest.fixture(scope="module")
 def chain():
-    scene = scenes.parse(SCENE.format(""))
-    study = Study(scene)
-    return moving.motion(scene), study.curvature, study.curvature_error
+    return Trajectory(scenes.parse(SCENE.format(""))).ask()
 
 
-def test_a_film_shows_body_track_and_shape(chain):
-    found = moving.motion(chain[0].scene, 2)
-    shown = animate.rows(32, 2)
+@pytest.fixture(scope="module")
+def field(chain):
+    return Study(chain.question.scene).curvature
+
+
+def test_a_film_shows_body_track_and_shape(chain, field):
+    scene = chain.question.scene
+    found = moving.motion(scene, 2)
+    shown = films.rows(32, 2)
     np.testing.assert_array_equal(
         shown, np.arange(100) * 32 // 50
     )  # 25 a second, 2 s a cycle
-    np.testing.assert_array_equal(animate.rows(100, 2, 1.0), np.arange(0, 200, 4))
-    fig, put = plots.stage(found, shown, *chain[1:])
+    np.testing.assert_array_equal(films.rows(100, 2, 1.0), np.arange(0, 200, 4))
+    fig, put = plots.stage(Trajectory(scene, 2).ask(), shown)
     world, shapes = fig.axes[:2]
     for row in (0, 20, 51):
         behind, body, head, dot, text = put(row)
@@ -354,9 +349,7 @@ def test_a_film_shows_body_track_and_shape(chain):
         assert text.get_text() == f"cycle {row / 32:.2f}"
         assert body.axes is world and dot.axes is shapes
     (mesh,) = (c for c in shapes.collections if isinstance(c, QuadMesh))
-    np.testing.assert_array_equal(
-        np.ravel(mesh.get_array()), chain[1].values[0].T.ravel()
-    )
+    np.testing.assert_array_equal(np.ravel(mesh.get_array()), field.values[0].T.ravel())
     low, high = np.transpose([world.get_xlim(), world.get_ylim()])
     assert (found.points()[shown] > low).all() and (found.points()[shown] < high).all()
     assert (world.get_xlabel(), world.get_ylabel(), world.get_aspect()) == (
@@ -379,9 +372,9 @@ def test_a_film_shows_body_track_and_shape(chain):
     ],
 )
 def test_films_are_in_real_time_or_tell_their_speed(frequency, cycle, caption):
-    at = animate.pace(frequency)
+    at = films.pace(frequency)
     assert (at.cycle, at.caption) == (pytest.approx(cycle), caption)
-    shown = animate.rows(256, 3, frequency)
+    shown = films.rows(256, 3, frequency)
     assert len(shown) / at.rate == pytest.approx(3 * cycle, abs=1.0 / at.rate)
     np.testing.assert_allclose(
         shown, np.arange(len(shown)) / at.rate / cycle * 256, atol=1.0
@@ -390,13 +383,17 @@ def test_films_are_in_real_time_or_tell_their_speed(frequency, cycle, caption):
 
 
 def test_the_caption_of_a_film_is_beside_its_clock(chain):
-    fig, _ = plots.stage(chain[0], [0], caption="0.5 × real time")
+    fig, _ = plots.stage(chain, [0], caption="0.5 × real time")
     assert fig.axes[0].get_title("right") == "0.5 × real time"
 
 
-def test_a_gif_shows_its_phases_and_takes_as_long_as_it_says(chain, tmp_path):
+def test_a_gif_shows_its_phases_and_takes_as_long_as_it_says(
+    chain, tmp_path, monkeypatch
+):
     told = []
-    animate.save(tmp_path / "out.gif", *chain, progress=told.append)
+    shown = lambda title: contextlib.nullcontext(told.append)
+    monkeypatch.setattr(films, "progress_bar", shown)
+    chain.save(tmp_path / "out.gif")
     with Image.open(tmp_path / "out.gif") as film:
         assert (
             film.n_frames in (32, 33) and len(told) == 50
@@ -420,8 +417,8 @@ def test_a_gif_shows_its_phases_and_takes_as_long_as_it_says(chain, tmp_path):
 
 
 def test_a_strip_numbers_bodies_and_shapes_alike(chain, tmp_path):
-    found = chain[0]
-    fig = plots.filmstrip(found, *chain[1:])
+    found = moving.motion(chain.question.scene)
+    fig = chain.plot()
     rows = np.linspace(0, 32, 6).round().astype(int)
     pictures = [ax for ax in fig.axes if "cycle" in ax.get_title("left")]
     assert len(pictures) == 6
@@ -441,7 +438,7 @@ def test_a_strip_numbers_bodies_and_shapes_alike(chain, tmp_path):
     assert list(numbers) == ["1,6", "2", "3", "4", "5"]
     for k, xy in zip((0, 1, 2, 3, 4), numbers.values()):
         np.testing.assert_allclose(xy, found.alpha[rows[k]], atol=1e-8)
-    animate.save(tmp_path / "out.png", found, *chain[1:])
+    plots.save(fig, tmp_path / "out.png")
     with Image.open(tmp_path / "out.png") as picture:
         assert picture.size[0] == round(7.2 * STYLE["savefig.dpi"])
 
@@ -458,7 +455,8 @@ OTHERS = {
 @pytest.mark.parametrize("name", OTHERS)
 def test_systems_without_a_map_are_shown_all_the_same(name, tmp_path):
     found = moving.motion(OTHERS[name], 2)
-    fig, put = plots.stage(found, animate.rows(found.scene.numerics.phases, 2))
+    result = Trajectory(OTHERS[name], 2).ask()
+    fig, put = plots.stage(result, films.rows(found.scene.numerics.phases, 2))
     shapes, joints = fig.axes[1], found.scene.system.joints
     *_, mark, _ = put(found.scene.numerics.phases + 5)
     if joints == 2:
@@ -496,7 +494,7 @@ def test_systems_without_a_map_are_shown_all_the_same(name, tmp_path):
             mesh.get_coordinates()[:, 0, 1], np.arange(1, joints + 1) / (joints + 1)
         )
         assert fig.axes[2].get_ylabel() == "curvature (rad/m)"
-    animate.save(tmp_path / "out.png", found)
+    plots.save(result.plot(), tmp_path / "out.png")
 
 
 class Sled:
@@ -516,17 +514,14 @@ class Sled:
         )
 
 
-def test_a_system_without_a_body_is_an_arrow(tmp_path):
+def test_a_system_without_a_body_is_an_arrow():
     scene = Scene(Sled(), OVAL, Numerics(phases=24))
     found = moving.motion(scene)
     assert found.points() is None
-    assert list(found.columns) == ["phase", "x", "y", "theta", "alpha_1", "alpha_2"]
-    trajectories.save(tmp_path / "out.csv", found)
-    np.testing.assert_array_equal(
-        np.loadtxt(tmp_path / "out.csv", delimiter=",", skiprows=1)[:, 1:4], found.pose
-    )
-    assert "end_k_x" not in (tmp_path / "out.csv").read_text()
-    _, put = plots.stage(found, animate.rows(24, 1))
+    result = Trajectory(scene, mapped=False).ask()
+    table = result.to_dataframe()
+    assert list(table.columns) == ["x", "y", "heading", "alpha_1", "alpha_2"]
+    _, put = plots.stage(result, films.rows(24, 1))
     body, (x, y, theta) = put(7)[1].get_xydata(), found.pose[7]
     np.testing.assert_allclose(body.mean(0), [x, y], atol=1e-14)
     np.testing.assert_allclose(
@@ -553,18 +548,18 @@ def installed(folder, monkeypatch, does):
 @pytest.fixture
 def brief(monkeypatch):
     """Films of twelve pictures: a gif has all of them."""
-    monkeypatch.setattr(animate, "rows", lambda *_: np.arange(12))
+    monkeypatch.setattr(films, "rows", lambda *_: np.arange(12))
 
 
 @pytest.mark.usefixtures("brief")
 def test_an_mp4_hands_its_pictures_to_ffmpeg(chain, tmp_path, monkeypatch):
     installed(tmp_path, monkeypatch, 'cat > "$last"')
-    animate.check_format(tmp_path / "out.mp4")
+    films.check_format(tmp_path / "out.mp4")
     laid_out = []
     monkeypatch.setattr(
         ConstrainedLayoutEngine, "execute", lambda *_: laid_out.append(True)
     )
-    animate.save(tmp_path / "out.mp4", *chain)
+    chain.save(tmp_path / "out.mp4")
     assert laid_out == [True]  # once, and stays for all pictures
     raw = np.fromfile(tmp_path / "out.mp4", np.uint8).reshape(12, 360, 800, 3)
     assert "-s 800x360" in (tmp_path / "said").read_text()
@@ -576,7 +571,7 @@ def test_an_mp4_says_what_it_lacks(chain, tmp_path, monkeypatch):
     with pytest.raises(
         Refusal, match="takes ffmpeg, which is not installed; end the name in .gif"
     ):
-        animate.check_format(tmp_path / "out.mp4")
+        films.check_format(tmp_path / "out.mp4")
 
 
 @pytest.mark.usefixtures("brief")
@@ -593,7 +588,7 @@ def test_an_mp4_that_ffmpeg_refuses_is_not_left(does, chain, tmp_path, monkeypat
         Refusal,
         match=r"cannot write out.mp4: ffmpeg failed: no such codec; end the name in .gif",
     ):
-        animate.save(tmp_path / "out.mp4", *chain)
+        chain.save(tmp_path / "out.mp4")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bin", "said"]
 
 
@@ -606,12 +601,14 @@ def test_a_film_that_is_stopped_leaves_nothing(ending, chain, tmp_path, monkeypa
         if fraction > 0.3:
             signal.raise_signal(signal.SIGINT)
 
+    shown = lambda title: contextlib.nullcontext(stop)
+    monkeypatch.setattr(films, "progress_bar", shown)
     before = signal.signal(
         signal.SIGINT, signal.default_int_handler
     )  # which a job in the background does not have
     try:
         with pytest.raises(KeyboardInterrupt):
-            animate.save(tmp_path / f"out.{ending}", *chain, progress=stop)
+            chain.save(tmp_path / f"out.{ending}")
     finally:
         signal.signal(signal.SIGINT, before)
     assert {p.name for p in tmp_path.iterdir()} <= {"bin", "said"}

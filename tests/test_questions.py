@@ -55,6 +55,7 @@ ASKED = {
         {"harmonics": 1, "starts": 1},
         {"harmonics": 2, "objective": "efficiency"},
     ),
+    "trajectory": ("three-link-viscous", FIELD, {}, {"cycles": 2}),
     "walk": ("xplorer", {"duration": 0.5, "steps": 8}, {}, {"engine": "planar"}),
     "stress": ("generic", {}, {"beta": 45.0, "gamma": 45.0}, {"beta": 30.0}),
     "intrude": ("c-leg", {"elements": 10}, {}, {}),

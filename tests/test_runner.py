@@ -19,6 +19,7 @@ from geomech.geometry import connection
 from geomech.optimisation import build_request, search
 from geomech.optimisation.variables import displacement, values
 from geomech.pipeline import allow, storing
+from geomech.questions.trajectory import Trajectory
 from geomech.run import pending, store
 from geomech.run import runner as runners
 from geomech.run.digest import Undigestible
@@ -27,7 +28,6 @@ from geomech.run.store import Store
 from geomech.run.workers import using
 from geomech.scenes import inputs, kinds
 from geomech.studies import cost, estimate, tiered, walking
-from geomech.studies.motion import Trajectory
 from geomech.studies.study import Study
 from geomech.systems.capabilities import with_solver
 from rft import Backbone, DisturbedGround, Granular, Transient
@@ -487,7 +487,7 @@ COMMANDS = {
     "displacement march.toml": ["--amplitudes", "0.2", "--tol", "0.1", "--json"],
     "displacement s.toml": ["--amplitudes", "0.5", "--plot", "out.png"],
     "trajectory march.toml": ["--cycles", "2", "-o", "out.csv"],
-    "trajectory march.toml --cycles 1": ["-o", "out.png"],
+    "trajectory march.toml --cycles 1": ["--plot", "out.png"],
     "walk walk.toml": ["-o", "out.nc"],
     "accuracy rod.toml": ["-o", "out.nc"],
     "accuracy s.toml": ["-o", "out.nc"],

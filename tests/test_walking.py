@@ -13,11 +13,11 @@ from scipy.io import netcdf_file
 from tabled import of_json, of_swept
 
 from figures.walking_sensitivity import Sheet
-from geomech import plots, scenes
+from geomech import films, plots, scenes
 from geomech.core.variables import Result
 from geomech.describe.explain import explained
 from geomech.io.results import of_dict
-from geomech.output import walks
+from geomech.plots.walking import walk_stage
 from geomech.questions import walk as questions_walk
 from geomech.scenes import WalkerScene
 from geomech.studies import walking
@@ -669,7 +669,7 @@ def test_a_walk_may_be_over_before_its_first_step():
     )
     said, result = told_of(scene, one)
     assert "cost of transport inf" not in said
-    assert walks.draw(result).axes[0].get_xlim() == (0.0, 1e-3)
+    assert plots.walk_figure(result).axes[0].get_xlim() == (0.0, 1e-3)
 
 
 def test_the_estimate_covers_the_error():
@@ -863,20 +863,20 @@ def test_films_of_a_walk_follow_the_robot_and_tell_their_speed(tmp_path):
     x, rows, limits = found.walk.pose[:, 0], [0, 5, len(found.walk.t) - 1], {}
     for follow in (False, True):
         ax = plots.figure(4, 2)[1][0, 0]
-        update = walks._stage(ax, result, np.array(rows), follow)
+        update = walk_stage(ax, result, np.array(rows), follow)
         limits[follow] = np.array([update(row) or ax.get_xlim() for row in rows])
     assert (np.ptp(limits[False], axis=0) == 0).all()
     assert (limits[False][0, 0] < x[rows].min()) and (
         x[rows].max() < limits[False][0, 1]
     )
     np.testing.assert_allclose(limits[True].mean(1), x[rows])
-    walks.film(result, tmp_path / "film.gif", follow=True)
+    films.write_walk(tmp_path / "film.gif", result, follow=True)
     with Image.open(tmp_path / "film.gif") as film:
         shown = (
             sum(frame.info["duration"] for frame in ImageSequence.Iterator(film)) / 1000
         )
     assert shown == pytest.approx(2 * found.walk.t[-1], abs=0.1)
-    (picture,) = walks._captioned(
+    (picture,) = films.captioned(
         iter([np.zeros((90, 400, 3), np.uint8)]), np.array([1.0]), "0.5 × real time"
     )
     assert (

@@ -23,6 +23,7 @@ KIND = "kind"
 FORMAT = "geomech_format"
 VERSION = 1
 ORDER = "order_of_variables"  # SciPy writes variables in an order of its own
+ROWS_TOGETHER = 10_000  # of a CSV file, as text in memory at a time
 LARGEST_INTEGER = 2**31 - 1  # of a NetCDF file of the classic format
 
 
@@ -291,9 +292,18 @@ def columns(result: Result, dims: Sequence[str]) -> dict[str, np.ndarray]:
 def write_csv(path: Path, result: Result, dims: Sequence[str]) -> None:
     """Write the variables over some dimensions as columns, with all digits."""
     found = columns(result, dims)
-    rows = zip(*(values.tolist() for values in found.values()))
-    text = [",".join(found), *(",".join(map(cell, row)) for row in rows)]
-    write_text(path, "\n".join(text) + "\n")
+    count = max((len(values) for values in found.values()), default=0)
+    with (
+        atomic_file(path) as part,
+        part.open(
+            "w", encoding="utf-8", errors="backslashreplace", newline="\n"
+        ) as file,
+    ):
+        file.write(",".join(found) + "\n")
+        for start in range(0, count, ROWS_TOGETHER):
+            some = slice(start, start + ROWS_TOGETHER)
+            for row in zip(*(values[some].tolist() for values in found.values())):
+                file.write(",".join(map(cell, row)) + "\n")
 
 
 def cell(value: Any) -> str:

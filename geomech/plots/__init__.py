@@ -72,6 +72,7 @@ from geomech.plots.terradynamics import (
     stress_figure,
     stress_map,
 )
+from geomech.plots.walking import walk_figure, walk_strip
 
 __all__ = [
     "CCF_STYLES",
@@ -137,6 +138,8 @@ __all__ = [
     "sweep_figure",
     "unknown",
     "vector_field",
+    "walk_figure",
+    "walk_strip",
     "winding",
     "work_precision",
 ]  # fmt: skip

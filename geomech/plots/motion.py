@@ -1,5 +1,5 @@
-"""A body in motion: its pose on its track and its shape among all shapes, as a film's panels and as a strip of pictures for a
-page."""
+"""A body in motion: its pose on its track and its shape among all shapes, as a film's
+panels and as a strip of pictures for a page."""
 
 from __future__ import annotations
 
@@ -8,10 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from geomech.core.variables import Result
 from geomech.geometry.field import Field
 from geomech.plots.maps import ccf_map, draw_gait, has, shape_space
 from geomech.plots.style import blank, figure, quantity, styled
+from geomech.results.fields import field_of
+from geomech.results.scenes import scene_of
+from geomech.studies.fields import angles_of
 from geomech.studies.motion import Motion
+from geomech.studies.tables import poses
 from geomech.systems.base import body_size, length_unit, shape_labels
 
 if TYPE_CHECKING:
@@ -176,28 +181,39 @@ def clock(motion: Motion, row: int) -> str:
     return f"cycle {motion.phase[row] / (2 * np.pi):.2f}"
 
 
+def motion_of(result: Result) -> Motion:
+    """Return the motion that a result is of."""
+    scene = scene_of(result)
+    names = angles_of(range(scene.system.joints))
+    alpha = np.stack([result[name].values for name in names], -1)
+    frequency = result.attributes.get("frequency")
+    return Motion(scene, result["phase"].values, alpha, poses(result), frequency)
+
+
+def map_of(result: Result) -> tuple[Field | None, Field | None]:
+    """Return the CCF beside a motion, and its error; None without one."""
+    if "ccf" not in result:
+        return None, None
+    return field_of(result, "ccf")
+
+
 @styled
-def stage(
-    motion: Motion,
-    rows: Any,
-    field: Field | None = None,
-    error: Field | None = None,
-    caption: str = "",
-) -> Any:
-    """Return (Figure, function that moves its artists to a row and returns them): the world next to the shapes. caption: of the
-    film, such as its speed."""
+def stage(result: Result, rows: Any, caption: str = "") -> Any:
+    """Return (Figure, function that moves its artists to a row and returns them): the
+    world next to the shapes.
+
+    result: of `geomech.trajectory`. caption: of the film, such as its speed."""
+    motion = motion_of(result)
     fig, axes = figure(8.0, 3.6, 2, width_ratios=[1.25, 1.0])
     track_ax, shape_ax = axes[0]
     if motion.scene.system.joints != 2:
         shape_ax.set_box_aspect(0.8)
-    move_body, move_shape = (
-        world(track_ax, motion, rows),
-        shape(shape_ax, motion, field, error),
-    )
+    move_body = world(track_ax, motion, rows)
+    move_shape = shape(shape_ax, motion, *map_of(result))
     text = track_ax.set_title("", loc="left")
     track_ax.set_title(caption, loc="right", color="0.3")
 
-    def update(row: int):
+    def update(row: int) -> tuple:
         text.set_text(clock(motion, row))
         return *move_body(row), *move_shape(row), text
 
@@ -205,29 +221,26 @@ def stage(
 
 
 @styled
-def filmstrip(
-    motion: Motion,
-    field: Field | None = None,
-    error: Field | None = None,
-    pictures: int = STRIP,
-) -> Figure:
-    """Draw the body at some phases, equally spaced from start to end and to one scale, and its shapes in a panel next to them,
-    with the same numbers.
+def filmstrip(result: Result, pictures: int = STRIP) -> Figure:
+    """Draw the body at some phases, equally spaced from start to end and to one scale, and
+    its shapes in a panel next to them, with the same numbers.
+
+    result: of `geomech.trajectory`; the panel is a map of the CCF where it has that.
 
     Examples
     --------
     >>> import geomech
-    >>> from geomech.studies.motion import motion
-    >>> fig = geomech.plots.filmstrip(motion(geomech.study("three-link-viscous", phases=16).scene), pictures=4)
+    >>> moved = geomech.study("three-link-viscous", grid=15, phases=16).trajectory()
+    >>> fig = geomech.plots.filmstrip(moved, pictures=4)
     """
+    motion = motion_of(result)
     rows = np.linspace(0, len(motion.phase) - 1, pictures).round().astype(int)
     low, high = limits = reach(motion, rows)
     tall = max((high - low)[1] / (high - low)[0], 0.12)  # of a picture, for its width
     columns = min(pictures, max(1, round(1.2 * np.sqrt(tall * pictures))))
     lines = -(-pictures // columns)
-    height = float(
-        np.clip(lines * (tall * (3.9 / columns - 0.15) + 0.3) + 0.45, MAP, 8.0)
-    )
+    room = lines * (tall * (3.9 / columns - 0.15) + 0.3) + 0.45
+    height = float(np.clip(room, MAP, 8.0))
     fig = blank(7.2, height)
     strip_cell, shape_cell = fig.add_gridspec(1, 2, width_ratios=[4.2, 3.0])
     axes = strip_cell.subgridspec(lines, columns).subplots(
@@ -243,7 +256,7 @@ def filmstrip(
     panel = fig.add_subplot(
         shape_cell.subgridspec(3, 1, height_ratios=[around, MAP, around])[1]
     )
-    shape(panel, motion, field, error)
+    shape(panel, motion, *map_of(result))
     _numbers(panel, motion, rows)
     return fig
 

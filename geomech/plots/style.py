@@ -26,7 +26,6 @@ SOURCES = {  # what is drawn, by its class
     "Field": "a Field such as study.ccf()",
     "Fitted": "a measured gait, the result of geomech.fit_log",
     "Mapping": "a table such as study.displacement(...)",
-    "Motion": "a Motion, the result of geomech.studies.motion.motion",
     "Optimum": "an Optimum, the result of study.optimise()",
     "Result": "the Result of a question",
     "TwoForm": "a TwoForm such as study.two_form",

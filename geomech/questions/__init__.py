@@ -23,6 +23,7 @@ GROUPS = {
     "Gaits": {
         "forces": "Compute force, power and bending moment along the body.",
         "optimize": "Find the best gait for an objective.",
+        "trajectory": "Follow the body through its gait.",
     },
     "Grains and robots": {
         "stress": "Compute the stress of grains on a plate per unit depth.",

@@ -6,7 +6,11 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from geomech.core.variables import Result, Variable
+
+FILMS = (".gif", ".mp4")
 
 
 def numbers(values: Any) -> Any:
@@ -93,3 +97,17 @@ def component_number(components: Any) -> int:
         components = (components,)
     names = [*components] or ["x"]
     return known.index(choose("component", names[0], known))
+
+
+def is_film(path: "Path") -> bool:
+    """Return whether a file is a film by its ending."""
+    return path.suffix.lower() in FILMS
+
+
+def check_films(paths: "Iterable[Path]") -> None:
+    """Refuse films that nothing here can write."""
+    for path in paths:
+        if is_film(path):
+            from geomech import films
+
+            films.check_format(path)

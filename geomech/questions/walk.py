@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from geomech.questions import loading, names
 from geomech.questions.base import Option, Question, Run, Subject
+from geomech.questions.tools import FILMS, check_films
 
 if TYPE_CHECKING:
     from geomech.core.variables import Result
     from geomech.run.cost import Cost
     from geomech.scenes.walker import WalkerScene
 
-FILMS = (".gif", ".mp4")
 WALKING = "walking"  # status of a robot that neither sank nor fell
 ANGLES = {"pitch": "nose down", "roll": "left side up", "yaw": "turning left"}
 
@@ -28,9 +28,9 @@ def write_film(
     ),
 ) -> None:
     """Write a film of the walk."""
-    from geomech.output import walks
+    from geomech import films
 
-    walks.film(result, path, follow)
+    films.write_walk(path, result, follow)
 
 
 @dataclass(frozen=True)
@@ -52,11 +52,7 @@ class Walk(Question):
         walking.refuse_engine(self.scene, self.engine)
 
     def for_files(self, paths: list[Path], options: dict[str, Any]) -> Question:
-        for path in paths:
-            if path.suffix.lower() in FILMS:
-                from geomech.output import animate
-
-                animate.check_format(path)
+        check_films(paths)
         return self
 
     def cost(self) -> "Cost":
@@ -126,11 +122,11 @@ class Walk(Question):
     ) -> Any:
         """Draw speed, height and pitch in time, and the robot at its end, or the last
         cycle in pictures; return the Figure."""
-        from geomech.output import walks
+        from geomech import plots
 
         if strip:
-            return walks.strip(result)
-        return walks.draw(result)
+            return plots.walk_strip(result)
+        return plots.walk_figure(result)
 
 
 def settling_words(result: "Result") -> str:

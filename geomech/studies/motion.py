@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cached_property
-from typing import NamedTuple
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from geomech.core.variables import Result, Variable
-from geomech.geometry.field import Field
 from geomech.geometry.reconstruct import poses, repeated
+from geomech.geometry.symmetry import zero_components
 from geomech.run.cost import Cost
 from geomech.scenes.model import Scene
+from geomech.studies import fields
 from geomech.studies.cost import connection, cycles_of, direct, price
-from geomech.studies.question import Allow, Progress, Question
 from geomech.studies.study import Study
-from geomech.systems.base import length_unit, shape_labels
+from geomech.studies.tables import COMPONENTS, POSE, zero_words
+from geomech.systems.base import body_size, length_unit, shape_labels
 from geomech.systems.capabilities import (
     Drawable,
     Stepped,
@@ -31,18 +31,21 @@ from rft.core.premise import Premise
 from rft.core.refusal import Refusal, located
 
 MOST_CYCLES = 10_000
-WORDS = (
-    2e-6  # s to compute and write a number of a table; some two times the measured time
-)
-ROWS_TOGETHER = 1 << 20  # numbers of a table in memory at a time
+# s to compute and write a number of a table; some two times the measured time.
+WORDS = 2e-6
+HELD = 4  # copies of a table, of its numbers or its poses, in memory at a time
+OVER = ("phase",)
+GRID = ("component", "shape_1", "shape_2")  # dimensions of the CCF beside a motion
+FINAL = tuple(f"final_{name}" for name in POSE)
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
     """Poses and shapes, phase after phase, with the end of the last cycle as the last row.
 
-    phase: (P,), rad, growing from cycle to cycle. alpha: (P, joints). pose: (P, 3), of the body frame in the frame at
-    phase 0, on the ground, in the scene's unit and rad. frequency: of the gait, Hz, or None."""
+    phase: (P,), rad, growing from cycle to cycle. alpha: (P, joints). pose: (P, 3), of the
+    body frame in the frame at phase 0, on the ground, in the scene's unit and rad.
+    frequency: of the gait, Hz, or None."""
 
     scene: Scene
     phase: np.ndarray
@@ -57,127 +60,119 @@ class Motion:
     @property
     def time(self) -> np.ndarray | None:
         """Times (P,), s, where the gait has a frequency."""
-        return (
-            None
-            if self.frequency is None
-            else self.phase / (2 * np.pi * self.frequency)
-        )
+        if self.frequency is None:
+            return None
+        return self.phase / (2 * np.pi * self.frequency)
 
-    def points(self, rows=slice(None)) -> np.ndarray | None:
-        """Return ends of the links in the world, (..., links + 1, 2), tail to head, at some of the rows; None for a
-        system without a body to draw."""
+    def points(self, rows: Any = slice(None)) -> np.ndarray | None:
+        """Return ends of the links in the world, (..., links + 1, 2), tail to head, at
+        some of the rows; None for a system without a body to draw."""
         body = capability(self.scene.system, Drawable)
-        return None if body is None else body.points(self.alpha[rows], self.pose[rows])
-
-    @property
-    def columns(self) -> dict[str, str]:
-        """Unit of each column of a table, by name."""
-        system = self.scene.system
-        unit, ends = length_unit(system), self.points(slice(0, 1))
-        timed = {} if self.frequency is None else {"time": "s"}
-        place = {"phase": "rad", **timed, "x": unit, "y": unit, "theta": "rad"}
-        shape = {
-            f"alpha_{k + 1}": unit_of
-            for k, (_, unit_of) in enumerate(shape_labels(system))
-        }
-        count = 0 if ends is None else ends.shape[-2]
-        return {
-            **place,
-            **shape,
-            **{f"end_{k}_{axis}": unit for k in range(count) for axis in "xy"},
-        }
-
-    def tables(self) -> Iterator[np.ndarray]:
-        """Yield the rows of a table, (some, columns) at a time."""
-        size = max(1, ROWS_TOGETHER // len(self.columns))
-        for start in range(0, len(self.phase), size):
-            rows = slice(start, start + size)
-            timed = [] if self.time is None else [self.time[rows, None]]
-            parts, ends = (
-                [self.phase[rows, None], *timed, self.pose[rows], self.alpha[rows]],
-                self.points(rows),
-            )
-            yield np.concatenate(
-                parts + ([] if ends is None else [ends.reshape(len(ends), -1)]), 1
-            )
+        if body is None:
+            return None
+        return body.points(self.alpha[rows], self.pose[rows])
 
 
-class Drawn(NamedTuple):
-    """A motion, and the CCF of its scene with its error where that is drawn beside it."""
-
-    motion: Motion
-    ccf: Field | None = None
-    ccf_error: Field | None = None
+def is_mapped(scene: Scene) -> bool:
+    """Return whether the shapes of a scene are seen on a map of its CCF."""
+    return scene.system.joints == 2 and PATH.is_offered(scene.system)
 
 
-@dataclass(frozen=True)
-class Trajectory(Question):
-    """Pose of the body at every phase of the scene's gait. drawn: whether beside the CCF, where that is a map. drawing: cost
-    of drawing a film."""
+def answer(tables: Study, cycles: int, mapped: bool, progress: Any = None) -> Result:
+    """Return so many cycles of a scene's motion as a result.
 
-    scene: Scene
-    cycles: int = 1
-    drawn: bool = False
-    drawing: Cost | None = None
-
-    @property
-    def title(self) -> str:
-        return f"motion of {self.scene.name}"
-
-    @cached_property
-    def study(self) -> Study:
-        return Study(self.scene)
-
-    @property
-    def _mapped(self) -> bool:
-        return (
-            self.drawn
-            and self.scene.system.joints == 2
-            and PATH.is_offered(self.scene.system)
-        )
-
-    def cost(self) -> Cost:
-        costs = [
-            cost(self.scene, self.cycles),
-            *([price(connection(self.scene))] if self._mapped else []),
-        ]
-        costs += [self.drawing] if self.drawing else []
-        balances, seconds, memory, besides, steps = zip(*costs)
-        return Cost(sum(balances), sum(seconds), max(memory), sum(besides), sum(steps))
-
-    def answer(self, progress: Progress, allow: Allow) -> Result:
-        moved = motion(self.scene, self.cycles)
-        if self._mapped:
-            self.study.compute_field()
-        maps = (
-            (self.study.curvature, self.study.curvature_error) if self._mapped else ()
-        )
-        return _result(Drawn(moved, *maps))
+    mapped: with the CCF, on which a picture shows the shapes, of a scene that has one."""
+    scene = tables.scene
+    moved = motion(scene, cycles)
+    found, facts = variables(moved), attributes(moved)
+    if mapped and is_mapped(scene):
+        tables.compute_field(progress)
+        found += of_map(tables)
+        facts["interpolation"] = tables.curvature.degree
+    return Result("trajectory", tuple(found), facts)
 
 
-def _result(drawn: Drawn) -> Result:
-    """Return pose and shape by phase; the ends of the links, which are many, are in the subject."""
-    motion, dims = drawn.motion, ("phase",)
-    times = {} if motion.time is None else {"time": motion.time}
-    arrays = {
-        "phase": motion.phase,
-        **times,
-        **dict(zip(("x", "y", "theta"), motion.pose.T)),
+def attributes(moved: Motion) -> dict[str, Any]:
+    """Return facts about a motion."""
+    scene = moved.scene
+    facts: dict[str, Any] = {
+        "frame": scene.frame,
+        "cycles": moved.cycles,
+        "body_length": float(body_size(scene.system)),
     }
-    arrays |= {f"alpha_{k + 1}": x for k, x in enumerate(motion.alpha.T)}
-    return Result(
-        "motion",
-        tuple(Variable(n, dims, x, motion.columns[n]) for n, x in arrays.items()),
-        {},
-        drawn,
-    )
+    if moved.frequency is not None:
+        facts["frequency"] = float(moved.frequency)
+    return facts
+
+
+def variables(moved: Motion) -> list[Variable]:
+    """Return the final pose, and time, pose, shape and ends of all links at every
+    phase."""
+    system = moved.scene.system
+    unit = length_unit(system)
+    phase = Variable("phase", OVER, moved.phase, "rad", "of the gait, 2 pi a cycle")
+    found = [*final_pose(moved), phase]
+    if moved.time is not None:
+        found.append(Variable("time", OVER, moved.time, "s", "from phase 0"))
+    label = f"of the frame {moved.scene.frame}, seen from where it is at phase 0"
+    for name, values, of in zip(POSE, moved.pose.T, (unit, unit, "rad")):
+        found.append(Variable(name, OVER, values, of, label))
+    shapes = zip(moved.alpha.T, shape_labels(system), fields.angles_of(moved.alpha.T))
+    for k, (values, (label, of), name) in enumerate(shapes):
+        if label == name:
+            label = (
+                f"angle of joint {k + 1}, heading of link {k + 2} minus link {k + 1}"
+            )
+        found.append(Variable(name, OVER, values, of, label))
+    return found + ends(moved.points(), unit)
+
+
+def final_pose(moved: Motion) -> list[Variable]:
+    """Return the pose after the last cycle, with why it is zero where a symmetry makes it
+    so."""
+    system = moved.scene.system
+    why = zero_components(system.traits, moved.scene.gait)
+    if "heading" not in why and moved.cycles > 1:
+        why = {}  # where the body turns, x and y of one cycle are not those of all
+    unit, found = length_unit(system), []
+    for name, value, of in zip(POSE, moved.pose[-1], (unit, unit, "rad")):
+        zero = ""
+        if name in why:
+            zero = zero_words(why[name])
+        label = "after the last cycle"
+        found.append(Variable(f"final_{name}", (), value, of, label, zero=zero))
+    return found
+
+
+def ends(points: np.ndarray | None, unit: str) -> list[Variable]:
+    """Return the ends of links (P, links + 1, 2), a variable for each coordinate; none
+    without a body to draw."""
+    if points is None:
+        return []
+    found = []
+    for k in range(points.shape[1]):
+        for axis, values in zip("xy", points[:, k].T):
+            label = f"{axis} of end {k} of the links, 0 the tail"
+            found.append(Variable(f"end_{k}_{axis}", OVER, values, unit, label))
+    return found
+
+
+def of_map(tables: Study) -> list[Variable]:
+    """Return the CCF with its error over axes of its own names, as the shapes of a motion
+    are over phase."""
+    ccf = fields.of_ccf(tables.curvature, tables.curvature_error)
+    labels = shape_labels(tables.scene.system)
+    found = [Variable("component", ("component",), [*COMPONENTS])]
+    for name, axis, (label, of) in zip(GRID[1:], tables.curvature.axes, labels):
+        found.append(Variable(name, (name,), axis, of, f"{label} on the map"))
+    return [*found, replace(ccf, dims=GRID)]
 
 
 def motion(scene: Scene, cycles: int = 1) -> Motion:
     """Return so many cycles of the scene's gait at its own phases, by the direct tier.
 
-    Where cycles are run until they repeat, the limit cycle is returned; where the place of the body matters, each cycle
-    continues the one before."""
+    Where cycles are run until they repeat, the limit cycle is returned; where the place of
+    the body matters, each cycle continues the one before."""
     if not isinstance(scene, Scene):
         raise Refusal("a motion is that of a Scene", value=scene)
     checked(cycles)
@@ -190,13 +185,13 @@ def motion(scene: Scene, cycles: int = 1) -> Motion:
         else:
             pose = stepped.path(alpha, alphadot, int(cycles))
     phase = 2 * np.pi * np.arange(len(pose)) / phases
-    return Motion(
-        scene,
-        phase,
-        alpha[np.arange(len(pose)) % phases],
-        pose,
-        getattr(gait, "frequency", None),
-    )
+    again = alpha[np.arange(len(pose)) % phases]
+    return Motion(scene, phase, again, pose, frequency_of(scene))
+
+
+def frequency_of(scene: Scene) -> float | None:
+    """Return the frequency of a scene's gait, Hz, where it has one."""
+    return getattr(scene.gait, "frequency", None)
 
 
 def checked(cycles: int) -> None:
@@ -207,16 +202,30 @@ def checked(cycles: int) -> None:
         )
 
 
-def cost(scene: Scene, cycles: int = 1) -> Cost:
+def cost(scene: Scene, cycles: int = 1, mapped: bool = False) -> Cost:
+    """Return the cost of `answer` and a table of it."""
+    parts = [cost_of_table(scene, cycles)]
+    if mapped and is_mapped(scene):
+        parts.append(price(connection(scene)))
+    return summed(parts)
+
+
+def summed(parts: Sequence[Cost]) -> Cost:
+    """Return the cost of parts, one after the other."""
+    balances, seconds, memory, besides, steps = zip(*parts)
+    return Cost(sum(balances), sum(seconds), max(memory), sum(besides), sum(steps))
+
+
+def cost_of_table(scene: Scene, cycles: int) -> Cost:
     """Return the cost of `motion` and a table of it."""
     checked(cycles)
     system, phases = scene.system, scene.numerics.phases
     jobs = direct(scene, scene.gait, 1, phases, checked=False)
     if system.traits.steps and not settling(system):
         # Each continues the one before; cycles up to the limit cycle are run first.
-        first_cycles = (
-            0 if system.traits.lacks & Premise.SE2_SYMMETRIC else cycles_of(system)
-        )
+        first_cycles = cycles_of(system)
+        if system.traits.lacks & Premise.SE2_SYMMETRIC:
+            first_cycles = 0
         times = (first_cycles + cycles_of(system) - 1 + cycles) / cycles_of(system)
         jobs = [
             job._replace(count=job.count * times, batches=job.batches * times)
@@ -224,9 +233,7 @@ def cost(scene: Scene, cycles: int = 1) -> Cost:
         ]
     total, rows = price(jobs), cycles * phases + 1
     width = 2 * (balance_size(system).elements + 1) + system.joints + 5
-    memory = 8 * (
-        4 * rows * (system.joints + 5) + 4 * min(rows * width, ROWS_TOGETHER + width)
-    )
+    memory = 8 * HELD * rows * (system.joints + 5 + width)
     words = WORDS * rows * width
     return total._replace(
         seconds=total.seconds + words,
