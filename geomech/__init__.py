@@ -6,7 +6,8 @@
 
 study, Study                            a scene, and methods that ask questions of it
 displacement, ccf, sweep, optimise (optimize), forces, velocity, trajectory, walk, intrude
-                                        the same of any scene; results that print themselves
+grains                                  the same of any scene; results that print themselves
+drag_grains                             drag on a rod in beds of grains
 load_result, best_scene, fitted_medium  results from files; scenes and media that results have
 tiers, workers, accuracy                methods of prediction; processes; error against time
 load, Scene, Swimmer, Numerics, toml    scenes: read, built and written
@@ -38,8 +39,10 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.api import accuracy as accuracy
     from geomech.api import ccf as ccf
     from geomech.api import displacement as displacement
+    from geomech.api import drag_grains as drag_grains
     from geomech.api import fit_medium as fit_medium
     from geomech.api import forces as forces
+    from geomech.api import grains as grains
     from geomech.api import intrude as intrude
     from geomech.api import load_result as load_result
     from geomech.api import optimise as optimise
@@ -95,8 +98,10 @@ _OBJECTS = {
             "accuracy",
             "ccf",
             "displacement",
+            "drag_grains",
             "fit_medium",
             "forces",
+            "grains",
             "intrude",
             "load_result",
             "optimise",

@@ -16,8 +16,10 @@ from geomech.questions.base import Question, plain_type
 from geomech.questions.ccf import Ccf
 from geomech.questions.connection import Connection
 from geomech.questions.displacement import Displacement
+from geomech.questions.drag_grains import DragGrains
 from geomech.questions.fit_medium import FitMedium
 from geomech.questions.forces import Forces
+from geomech.questions.grains import Grains
 from geomech.questions.intrude import Intrude
 from geomech.questions.optimize import Optimize
 from geomech.questions.sweep import Sweep
@@ -72,11 +74,29 @@ def asked_of_file(
     return ask
 
 
-def described(ask: Any, question: Any, first: str) -> None:
-    """Give a function the name, the documentation and the parameters of a question."""
-    _, *fields = inspect.signature(question).parameters.values()
-    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
-    shown = [inspect.Parameter(first, kind, annotation=Any)]
+def asked_alone(
+    question: Callable[Fields, Question],
+) -> Callable[Fields, Result]:
+    """Return the function that asks a question that consists of options alone."""
+
+    def ask(*values: Fields.args, **options: Fields.kwargs) -> Result:
+        refuse_unknown(question, options)
+        return question(*values, **options).ask()
+
+    described(ask, question)
+    return ask
+
+
+def described(ask: Any, question: Any, first: str = "") -> None:
+    """Give a function the name, the documentation and the parameters of a question.
+
+    first: name of the parameter that the question is about, "" if there is none."""
+    fields = list(inspect.signature(question).parameters.values())
+    shown = []
+    if first:
+        kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+        shown.append(inspect.Parameter(first, kind, annotation=Any))
+        del fields[0]
     for field in fields:
         annotation = field.annotation
         if hasattr(annotation, "__metadata__"):
@@ -98,9 +118,18 @@ def documentation(question: Any) -> str:
     return "\n".join(lines)
 
 
+def option_names(question: Any) -> list[str]:
+    """Return the names of a question's options."""
+    from geomech.questions.base import subject_field
+
+    subject, _ = subject_field(question)
+    names = inspect.signature(question).parameters
+    return [name for name in names if name != subject]
+
+
 def refuse_unknown(question: Any, options: dict[str, Any]) -> None:
     """Refuse keywords that are no fields of a question, with the nearest that is."""
-    _, *known = inspect.signature(question).parameters
+    known = option_names(question)
     for name in options:
         if name not in known:
             nearest = difflib.get_close_matches(name, known, 1)
@@ -173,6 +202,7 @@ class Study:
     trajectory = asks(Trajectory)
     walk = asks(Walk)
     intrude = asks(Intrude)
+    grains = asks(Grains)
     accuracy = asks(Accuracy)
 
     def animate(self, path: str | Path = "swim.gif", *, cycles: int = 1) -> Path:
@@ -245,5 +275,7 @@ optimise = optimize = asked_of_scene(Optimize)
 trajectory = asked_of_scene(Trajectory)
 walk = asked_of_scene(Walk)
 intrude = asked_of_scene(Intrude)
+grains = asked_of_scene(Grains)
+drag_grains = asked_alone(DragGrains)
 fit_medium = asked_of_file(FitMedium)
 accuracy = asked_of_scene(Accuracy)

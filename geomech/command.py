@@ -29,7 +29,7 @@ class Declaration(NamedTuple):
     files: options of the functions that write a file, by ending."""
 
     question: type[Question]
-    subject: base.Subject
+    subject: base.Subject | None
     fields: Declared
     picture: Declared
     files: dict[str, Declared]
@@ -90,9 +90,13 @@ def parameters(declared: Declaration) -> list[inspect.Parameter]:
     """Return the parameters of a command in the order of its help: the subject, the
     question's own, those that change the subject, those of pictures and files, and those
     of every command."""
-    found = [parameter(SUBJECT, Annotated[str, argument(declared.subject)])]
+    found = []
+    changes: tuple[str, ...] = ()
+    if declared.subject is not None:
+        found.append(parameter(SUBJECT, Annotated[str, argument(declared.subject)]))
+        changes = declared.subject.changes
     found += [typed(name, *one) for name, one in declared.fields.items()]
-    for name in declared.subject.changes:
+    for name in changes:
         found.append(parameter(name, CHANGES[name], None))
     found += [typed(name, *one) for name, one in declared.picture.items()]
     found += [typed(name, *one) for name, one in declared.of_files.items()]
@@ -110,7 +114,7 @@ def common(question: type[Question]) -> list[inspect.Parameter]:
     json = typer.Option("--json", help="print JSON and nothing else")
     everything = typer.Option("--all", help="print all variables and rows")
     yes = typer.Option(
-        "--yes", help="compute even if it takes over a minute or over 2 GB"
+        "--yes", help=f"compute even if it takes over {question.consent_beyond}"
     )
     return [
         *found,
@@ -188,9 +192,12 @@ def request(
     if paths:
         declared = declared._replace(files=file_options(declared.question.files()))
     refuse_unused(declared, given, paths)
-    changes = {name: given[name] for name in declared.subject.changes}
-    subject = declared.subject.load(given[SUBJECT], **changes)
-    question = declared.question(subject, **parsed(declared.fields, given, subject))
+    about = []
+    if declared.subject is not None:
+        changes = {name: given[name] for name in declared.subject.changes}
+        about.append(declared.subject.load(given[SUBJECT], **changes))
+    subject = about[0] if about else None
+    question = declared.question(*about, **parsed(declared.fields, given, subject))
     of_files = {}
     for ending, options in declared.files.items():
         of_files[ending] = parsed(options, given, subject)

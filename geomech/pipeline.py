@@ -102,12 +102,11 @@ def computing(
     printed, in the user's cache folder; the same command resumes from there."""
     with contextlib.ExitStack() as stack:
         progress = ignore
-        scene = scene_of(question)
-        if scene is not None:
+        if takes_time(question):
             progress = stack.enter_context(terminal.progress(question.title))
         cost = question.cost()
         if cost is None:
-            note_system(scene)
+            note_system(question)
         else:
             allow(question, cost, yes)
             first = next((output.path for output in outputs), None)
@@ -115,9 +114,10 @@ def computing(
         yield progress
 
 
-def scene_of(question: Question) -> Any:
-    """Return the scene of a question; None for one that has none."""
-    return getattr(question, "scene", None)
+def takes_time(question: Question) -> bool:
+    """Return whether progress is shown: of questions about measurements and media it is
+    not."""
+    return hasattr(question, "scene") or question.subject is None
 
 
 def allow(question: Question, cost: Cost, yes: bool) -> None:
@@ -128,23 +128,24 @@ def allow(question: Question, cost: Cost, yes: bool) -> None:
     from geomech.run.backend import prefer_for
     from geomech.run.cost import decide
 
-    scene = question.scene
+    name = question.subject_name
 
     def judge(cost: Cost) -> None:
-        cost.check(scene.name, yes, question.less)
+        cost.check(name, yes, question.less)
         if not cost.small or cost.seconds >= question.worth_saying:
-            terminal.report(f"{scene.name}: {cost}")
+            terminal.report(f"{name}: {cost}")
 
     prefer_for(cost.as_balances)
     decide(cost, judge)
-    note_system(scene)
+    note_system(question)
 
 
-def note_system(scene: Any) -> None:
+def note_system(question: Question) -> None:
     """Warn of what is likely not meant, once a command. An intruder scene has no
     system."""
     from geomech.describe.system import notes
 
+    scene = question.subject
     if not hasattr(scene, "system"):
         return
     for line in notes(scene.system):
@@ -160,7 +161,7 @@ def storing(
     from geomech.run import runner, store
     from geomech.run.digest import digest
 
-    scene = Path(question.scene.name)
+    scene = Path(question.subject_name)
     context = runner.digest_context([x for x in inputs if x != scene])
     if output is None:
         path = store.cache_file(digest(context, question))

@@ -234,7 +234,9 @@ def test_packages_list_their_public_names():
     assert {"sweep", "accuracy", "motion"} <= set(dir(geomech.studies)) and not hasattr(
         geomech.studies, "sweeps"
     )
-    assert {"Chain", "laws", "terradynamics"} <= set(dir(rft)) and "importlib" not in dir(rft)
+    assert {"Chain", "laws", "terradynamics"} <= set(
+        dir(rft)
+    ) and "importlib" not in dir(rft)
 
 
 def four(alpha, alphadot):

@@ -2,7 +2,6 @@
 
 import contextvars
 import dataclasses
-import json
 import types
 
 import numpy as np
@@ -10,24 +9,26 @@ import pytest
 from commands import geomech
 from tabled import tabled
 
-from geomech import scenes, text
-from geomech.output import grains as files
+from geomech import load_result, scenes
+from geomech.questions.drag_grains import DragGrains
+from geomech.questions.grains import Grains
+from geomech.results import show
 from geomech.run.backend import prefer, prefer_for, preferred
 from geomech.scenes import drag
 from geomech.studies import grain_swim, grains
 from geomech.studies.calibration import rod_fit
-from geomech.text import drag_grains
-from geomech.text import grain_swim as swim_text
 from rft import EndCaps, Granular
 from rft.effects.transient import AT_ONCE, AT_ONCE_ALONG, RATIO
 from rft.fits.rods import fit
-from rft.grains import Experiment, Run
+from rft.grains import Bed, Experiment, Run
 from rft.grains.reversal import recovery
 from rft.laws.drag import Rod, rod_drag
 from rft.terradynamics.plates import StressMap
 
 pytestmark = pytest.mark.usefixtures("fastest")
 
+# Pure numbers, amplitudes of gaits and covariances have none.
+UNITLESS = {"amplitude", "covariance"}
 PSI = np.array([0.0, 10, 20, 40, 65, 90])
 LAW, ROD = Granular(3.1, 0.3), Rod(0.007, 0.2, 0.03, 600.0)
 
@@ -135,48 +136,36 @@ def towed(monkeypatch):
     monkeypatch.setattr(Experiment, "run", run)
 
 
-def test_a_drag_is_a_file_that_fit_medium_reads(towed, tmp_path):
-    question = grains.DragGrains(0.18, 0.007, tuple(PSI), 2, 0.2, store=tmp_path)
-    question = dataclasses.replace(
-        question, seed=4, bed=dataclasses.replace(question.bed, length=0.3, width=0.3)
+def question(store, **fields):
+    sizes = {"length": 0.18, "radius": 0.007, "beds": 2, "speed": 0.2, "seed": 4}
+    bed = Bed(length=0.3, width=0.3)
+    return DragGrains(
+        **{**sizes, "angles": tuple(PSI), "bed": bed, **fields}, store=store
     )
-    result = question.ask()
-    assert result["flank"].values.shape == (2, 2, 6) and result[
-        "bed"
-    ].values.tolist() == [4, 5]
+
+
+def test_a_drag_is_that_of_the_law_that_the_rod_obeys(towed, tmp_path):
+    result = question(tmp_path).ask()
+    assert result["flank"].values.shape == (2, 2, 6)
+    assert result["bed"].values.tolist() == [4, 5]
     np.testing.assert_allclose(result["flank"].values[0, :, 0], [2.0, 2.1], rtol=1e-6)
     np.testing.assert_allclose(result["lift"].values, 0.5)
-    law = result.subject[1]
-    np.testing.assert_allclose(law.values[[0, 1, 3]], [3.1, 0.3, 1.7], rtol=2e-3)
-    words = text.text(result)
-    assert (
-        "rod 14 x 180 mm, 25.5 mm deep, in 2 beds of 16,225 grains, packing 0.600"
-        in words
-    )
-    rows = words.splitlines()
-    assert max(map(len, rows)) < 100 and len(rows) == 14
-    assert (
-        " ".join(rows[6].split())
-        == "65 0.87 +- 0.02 7.87 +- 0.19 96 +- 2 35 +- 1 500 +- 0"
-    )  # of 2.0 N/m and 5 % more
-    assert " ".join(rows[8].split()) == "C 3.1, 2.91 to 3.29 with 95 %"
-    assert " ".join(rows[9].split()) == "gamma0 17.2, 15.9 to 18.4 degrees with 95 %"
-    assert (
-        rows[13]
-        == "ends: e = 1.70 of both together; largest overlap 0.040 grain diameters"
-    )
-    one_bed = text.text(dataclasses.replace(question, beds=1).ask())
-    assert (
-        "25.5 mm deep, in a bed of 16,225 grains, packing 0.600; +- error in time"
-        in one_bed
-    )
-    numbers = text.numbers(result)
-    assert (
-        numbers["law"]["C"] == pytest.approx(3.1, rel=2e-3)
-        and numbers["law_errors"]["end_caps"] > 0
-    )
-    files.write_drag(result, tmp_path)
-    told = (tmp_path / "drag.csv").read_text().splitlines()
+    law = dict(zip(result["parameter"].values, result["value"].values))
+    found = [law["C"], law["gamma0_deg"], law["end_caps"]]
+    np.testing.assert_allclose(found, [3.1, np.degrees(0.3), 1.7], rtol=2e-3)
+    mean, error = result["mean_flank"].values[:, 4], result["mean_flank"].error[:, 4]
+    two = result["flank"].values[:, :, 4]
+    np.testing.assert_allclose(mean, two.mean(1))
+    np.testing.assert_allclose(error, np.abs(two[:, 1] - two[:, 0]) / 2)
+    alone = question(tmp_path, beds=1).ask()
+    np.testing.assert_allclose(alone["mean_flank"].error, alone["flank"].error[:, 0])
+
+
+def test_a_drag_is_a_file_that_fit_medium_reads(towed, tmp_path):
+    result = question(tmp_path).ask()
+    path = tmp_path / "drag.csv"
+    result.save(path)
+    told = path.read_text().splitlines()
     for line, said in (
         (0, "geomech drag-grains --length 0.18 --radius 0.007 --speed 0.2 --angles 0,10,20,40,65,90 --beds 2 --seed 4"),
         (1, "mean after 17.5 mm of travel"),
@@ -186,26 +175,41 @@ def test_a_drag_is_a_file_that_fit_medium_reads(towed, tmp_path):
         (11, "65,0.1521,1.3824,0.0935,0.0339,0.5000,4,0.0000"), (17, "65,0.1597,1.4516,0.0982,0.0356,0.5000,5,0.0000"),
     ):  # fmt: skip
         assert said in told[line]
-    read = drag.read(tmp_path / "drag.csv")
+    read = drag.read(path)
     assert read.sizes == pytest.approx(
         {"radius": 0.007, "length": 0.18, "depth": 0.0255, "density": 618.0}
     )
-    np.testing.assert_allclose(
-        read.rows[1:3], 0.18 * result["flank"].values.reshape(2, -1), atol=6e-5
-    )
-    code, out, err = geomech(
-        "fit-medium",
-        tmp_path / "drag.csv",
-        "--end-caps",
-        "fitted",
-        "-o",
-        tmp_path / "sand.toml",
-    )
+    flank = 0.18 * result["flank"].values.reshape(2, -1)
+    np.testing.assert_allclose(read.rows[1:3], flank, atol=6e-5)
+    sand = tmp_path / "sand.toml"
+    code, out, err = geomech("fit-medium", path, "--end-caps", "fitted", "-o", sand)
     assert (code, err) == (0, "") and "end_caps" in out
-    assert "Both ends together" in (tmp_path / "sand.toml").read_text()
-    assert drag_grains.command(result).endswith(
-        "--angles 0,10,20,40,65,90 --beds 2 --seed 4"
-    )
+    assert "Both ends together" in sand.read_text()
+    result.save(tmp_path / "drag.nc")  # and from a file of its own
+    load_result(tmp_path / "drag.nc").save(tmp_path / "again.csv")
+    assert (tmp_path / "again.csv").read_text() == path.read_text()
+
+
+def test_results_of_grains_are_complete(towed, tmp_path):
+    """Written, read back, shown within 80 columns, drawn, and each number with its unit."""
+    check_complete(question(tmp_path).ask(), tmp_path)
+
+
+def check_complete(result, folder):
+    for ending in (".nc", ".json"):
+        result.save(folder / f"a{ending}")
+        again = load_result(folder / f"a{ending}")
+        assert list(again) == list(result)
+        for name in result:
+            assert again[name].unit == result[name].unit
+            np.testing.assert_array_equal(again[name].values, result[name].values)
+        assert len(again.plot().axes) == 2
+    assert max(map(len, show.text(result).splitlines())) <= 80
+    for variable in result.variables:
+        is_number = variable.values.dtype.kind == "f"
+        assert not is_number or variable.unit or variable.name in UNITLESS, (
+            variable.name
+        )
 
 
 @pytest.mark.parametrize(
@@ -221,25 +225,25 @@ def test_a_drag_is_a_file_that_fit_medium_reads(towed, tmp_path):
 )
 def test_drags_that_cannot_be_are_refused(change, words, towed, tmp_path):
     with pytest.raises(ValueError, match=words):
-        dataclasses.replace(grains.DragGrains(store=tmp_path), **change).check()
+        dataclasses.replace(DragGrains(store=tmp_path), **change).check()
 
 
 def test_the_cost_is_said_before_and_refused_beyond_ten_minutes(
     towed, monkeypatch, tmp_path
 ):
-    one = grains.DragGrains(beds=1, angles=(0.0, 30.0, 90.0), store=tmp_path)
+    one = DragGrains(beds=1, angles=(0.0, 30.0, 90.0), store=tmp_path)
     cost = one.cost()
-    e = one.experiments()[0]
+    e = one.study.experiments()[0]
     assert cost.balances == pytest.approx(
         (16225 + 102) * (3 * e.n_steps + 0.7 / e.bed.step), rel=1e-3
     )
     assert str(cost).endswith("about 3.2 min of computing")
-    code, _, err = geomech("drag-grains", "-o", tmp_path / "out", "--store", tmp_path)
+    code, _, err = geomech("drag-grains", "-o", tmp_path / "a.csv", "--store", tmp_path)
     assert (
         code == 2
         and "for more than 10 min say --yes, or take fewer --beds or --angles" in err
     )
-    assert not (tmp_path / "out").exists()
+    assert not (tmp_path / "a.csv").exists()
 
 
 def test_a_swim_stands_beside_the_tiers(monkeypatch, tmp_path):
@@ -280,7 +284,7 @@ def test_a_swim_stands_beside_the_tiers(monkeypatch, tmp_path):
         return Run(*series, np.ones((2, 2)), facts)
 
     monkeypatch.setattr(Experiment, "run", run)
-    result = grain_swim.GrainSwim(scene, store=tmp_path).ask()
+    result = Grains(scene, store=tmp_path).ask()
     (experiment,) = asked
     assert experiment.body.size == 0.3 and experiment.body.half_width == pytest.approx(
         0.009
@@ -297,39 +301,23 @@ def test_a_swim_stands_beside_the_tiers(monkeypatch, tmp_path):
         grain_swim.GRAINS_LAW,
         "grains",
     ]
-    words = text.text(result).splitlines()
-    assert words[0] == "scene in 100 grains, seed 1: body 300 mm long, 18 mm wide, 2 Hz"
-    assert (
-        " ".join(words[7].split())
-        == "grains 0.0796 +- 0.0000 0.0080 +- 0.0000 0.2000 +- 0.0000"
+    assert show.text(result).startswith(
+        "scene in 100 grains, seed 1: body 300 mm long, 18 mm wide, 2 Hz"
     )
-    assert " ".join(words[8].split()) == "cycle 1 0.0796 0.0080 0.2000" and words[
-        9
-    ].split()[:2] == ["cycle", "2"]
-    assert (
-        words[-1]
-        == "work 0.25 J a cycle; packing 0.600; largest overlap 1.000 of a grain"
-    )
-    motion = swim_text.csv(result).splitlines()
-    assert (
-        motion[0]
-        == "# geomech grains scene --cycles 2 --seed 1 --length 0.3 --radius 0.009"
-        and len(motion) == 1002
-    )
-    assert motion[1] == "t,x,y,theta,alpha_1,alpha_2,F_x,F_y,F_z,M,work,kinetic"
-    row, theta = np.array(motion[-1].split(","), float), 0.4 * 1.25 + 0.3
+    theta = 0.4 * 1.25 + 0.3
+    last = [result[name][-1] for name in ("t", "frame_x", "frame_heading", "work_done")]
+    expected = [1.25, 0.1201 * np.sin(theta), theta, 0.625]
+    np.testing.assert_allclose(last, expected, rtol=2e-3)
+    shape = [result["alpha_1"][-1], result["alpha_2"][-1]]
     np.testing.assert_allclose(
-        row[[0, 1, 3, 10]], [1.25, 0.1201 * np.sin(theta), theta, 0.625], rtol=2e-3
-    )
-    np.testing.assert_allclose(
-        row[4:6], experiment.motion.joint_angles(1.25)[0], atol=1e-5
+        shape, experiment.motion.joint_angles(1.25)[0], atol=1e-5
     )
     np.testing.assert_allclose(result["cycle_heading"].values, 0.2)
     np.testing.assert_allclose(
         np.hypot(result["cycle_x"].values, result["cycle_y"].values), 0.08, rtol=1e-6
     )
     np.testing.assert_allclose(result["cycle_y"].values, 0.08 * np.sin(0.1), rtol=1e-3)
-    assert result.attributes["work"] == pytest.approx(0.25)
+    assert float(result["work"]) == pytest.approx(0.25)
     k = result["method"].values.tolist().index("direct")
     from geomech.studies.study import Study
 
@@ -348,32 +336,29 @@ def test_a_swim_stands_beside_the_tiers(monkeypatch, tmp_path):
     assert result["x"].values[k + 1] == pytest.approx(
         one_end["x"]["direct"][0] / 0.3, rel=0.03
     )
-    words = text.text(result)
-    assert (
-        "body 300 mm long, 18 mm wide, 2 Hz" in words
-        and "cycle 2" in words
-        and "+-" in words
-    )
-    assert json.dumps(text.numbers(result))
-    files.write_swim(result, tmp_path)
-    head, columns, row, *_ = (tmp_path / "motion.csv").read_text().splitlines()
-    assert (
-        "--cycles 2 --seed 1" in head
-        and len(columns.split(",")) == len(row.split(",")) == 12
-    )
-    assert (tmp_path / "grains.png").is_file()
-    left, right = files.draw_swim(result).axes
-    run, times = result.subject[1], (0.0, 0.25, 0.75, 1.25)
-    for line, row in zip(
-        left.lines[1:], np.minimum(np.searchsorted(run.t, times), 999), strict=True
-    ):
-        points = scene.system.body.points(run.alpha[row], run.pose[row])
+    check_complete(result, tmp_path)
+    result.save(tmp_path / "motion.csv")
+    columns, row, *_ = (tmp_path / "motion.csv").read_text().splitlines()
+    assert {"t", "frame_x", "alpha_2", "force_z"} <= set(columns.split(","))
+    assert len(columns.split(",")) == len(row.split(","))
+    left, right = result.plot().axes
+    rows = np.minimum(np.searchsorted(result["t"].values, (0.0, 0.25, 0.75, 1.25)), 999)
+    alpha = np.column_stack([result["alpha_1"].values, result["alpha_2"].values])
+    pose = np.column_stack([result[f"frame_{x}"].values for x in ("x", "y", "heading")])
+    for line, row in zip(left.lines[1:], rows, strict=True):
+        points = scene.system.body.points(alpha[row], pose[row])
         np.testing.assert_allclose(line.get_xydata(), points / 0.3, atol=1e-12)
     x, y = result["x"], result["y"]
     distance = np.hypot(x.values, y.values)
     np.testing.assert_allclose([bar.get_width() for bar in right.patches], distance)
     ends = np.array([bar[:, 0] for bar in right.collections[0].get_segments()])
-    error = np.nan_to_num(np.hypot(x.values * x.error, y.values * y.error) / distance)
+    squares = 0.0
+    for one in ("error", "spread"):
+        parts = (
+            np.hypot(x.values * getattr(x, one), y.values * getattr(y, one)) / distance
+        )
+        squares = squares + np.nan_to_num(parts) ** 2
+    error = np.sqrt(squares)
     np.testing.assert_allclose(ends, np.transpose([distance - error, distance + error]))
 
 

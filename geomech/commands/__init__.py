@@ -3,6 +3,5 @@ is the function of that name, with _ for -, in the module of that name."""
 
 COMMANDS = {  # by the headings of `geomech --help`, in its order
     "Analyse": ("run",),
-    "Grains and robots": ("grains", "drag_grains"),
     "Your own data": ("fit_gait",),
 }  # fmt: skip

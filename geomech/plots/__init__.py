@@ -23,6 +23,7 @@ from geomech.plots.forces import (
     stacked_by_phase,
     stacked_by_place,
 )
+from geomech.plots.grains import grains_figure
 from geomech.plots.maps import (
     COMPONENTS,
     FINEST,
@@ -106,6 +107,7 @@ __all__ = [
     "force_map",
     "forces_figure",
     "frame_figure",
+    "grains_figure",
     "indicatrices",
     "intrusion_figure",
     "largest",

@@ -29,6 +29,8 @@ GROUPS = {
         "stress": "Compute the stress of grains on a plate per unit depth.",
         "intrude": "Compute force and moment of grains on a moving body.",
         "walk": "Compute how a robot walks on grains.",
+        "grains": "Let rigid links swim in a bed of grains, beside the tiers.",
+        "drag_grains": "Measure the drag of grains on a rod and on its ends.",
     },
     "Your own data": {
         "fit_medium": "Fit a medium to your own drag data.",

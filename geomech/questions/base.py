@@ -101,7 +101,7 @@ Declared = dict[str, tuple[Option, Any, Any]]
 @dataclasses.dataclass(frozen=True)
 class Question(Plain):
     """A question. Subclasses are frozen dataclasses of all data on which their answers
-    depend; the first of their fields is the question's `Subject`.
+    depend; the first of their fields is the question's `Subject`, if it has one.
 
     The class itself presents every result of its kind, computed or read from a file:
     `headline`, `summary`, `remarks`, `draw`, `files`.
@@ -109,7 +109,7 @@ class Question(Plain):
     less: advice where it costs too much. worth_saying: seconds of computing from which on
     a command prints the cost. parallel: whether other processes can take a part. folder:
     whether its command fills a folder, which must be given. unlimited: whether it is
-    computed whatever it costs."""
+    computed whatever it costs. consent_beyond: what its command asks consent for."""
 
     name: ClassVar[str]
     less: ClassVar[str] = "ask for less"
@@ -117,6 +117,7 @@ class Question(Plain):
     parallel: ClassVar[bool] = False
     folder: ClassVar[bool] = False
     unlimited: ClassVar[bool] = False
+    consent_beyond: ClassVar[str] = "a minute or over 2 GB"
 
     @property
     def title(self) -> str:
@@ -130,18 +131,25 @@ class Question(Plain):
 
     @property
     def subject(self) -> Any:
-        """What the question is about: the value of its field marked `Subject`."""
+        """What the question is about: the value of its field marked `Subject`; None of a
+        question that has none."""
         name, _ = subject_field(type(self))
+        if not name:
+            return None
         return getattr(self, name)
 
     @property
     def subject_name(self) -> str:
+        if self.subject is None:
+            return self.title
         return getattr(self.subject, "name", str(self.subject))
 
     def inputs(self) -> list[Path]:
         """Return the files that it reads, which no output may replace."""
         from geomech.scenes import inputs
 
+        if self.subject is None:
+            return []
         return inputs(self.subject)
 
     def for_files(self, paths: list[Path], options: dict[str, Any]) -> "Question":
@@ -200,13 +208,14 @@ def subject_facts(subject: Any) -> dict[str, str]:
     return facts
 
 
-def subject_field(question: type[Question]) -> tuple[str, Subject]:
-    """Return the name of the field that a question is about, and what it is."""
+def subject_field(question: type[Question]) -> tuple[str, Subject | None]:
+    """Return the name of the field that a question is about, and what it is; "" and None
+    of a question that consists of options alone."""
     for field in dataclasses.fields(question):
         subject = marked(field.type, Subject)
         if subject is not None:
             return field.name, subject
-    raise TypeError(f"{question.__name__} has no field marked Subject")
+    return "", None
 
 
 def options(question: type[Question]) -> Declared:
@@ -275,8 +284,11 @@ JSON_TYPES = {
 def schema(question: type[Question]) -> dict[str, Any]:
     """Return the JSON Schema of a question's fields."""
     subject, _ = subject_field(question)
-    properties: dict[str, Any] = {subject: {"type": "string"}}
-    required = [subject]
+    properties: dict[str, Any] = {}
+    required = []
+    if subject:
+        properties[subject] = {"type": "string"}
+        required.append(subject)
     for name, (option, kind, default) in options(question).items():
         properties[name] = {**json_type(kind), "description": option.help}
         if is_required(default):

@@ -1,6 +1,7 @@
 """Options that several questions and pictures share."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 from geomech.questions import parsing
@@ -26,4 +27,12 @@ Slice = Annotated[
 OtherFrame = Annotated[
     str | None,
     Option("draw another body frame below, on the same scales", "FRAME"),
+]
+Store = Annotated[
+    Path | None,
+    Option(
+        "folder of settled beds and runs, the user's cache if left out",
+        "DIR",
+        parsing.folder,
+    ),
 ]

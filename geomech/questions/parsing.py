@@ -4,9 +4,11 @@ subject, and the option as it is typed.
 `texts.py` reads the texts; these know the scene.
 """
 
+from pathlib import Path
 from typing import Any
 
 from geomech.questions import texts
+from rft.core.refusal import Refusal
 
 FORCE_PANELS = ("forward", "normal", "tangential", "power", "moment", "phase", "place")
 
@@ -84,4 +86,18 @@ def path(text: str, subject: Any, flag: str) -> Any:
     """Return the path of a file."""
     from pathlib import Path
 
+    return Path(text)
+
+
+def degrees(text: str, subject: Any, flag: str) -> tuple[float, ...]:
+    """Return the angles in 0,30,90 or START:STOP:COUNT, degrees."""
+    return tuple(texts.spread(flag, text))
+
+
+def folder(text: str, subject: Any, flag: str) -> Path:
+    """Return the folder of a name; an empty name is refused."""
+    if not text:
+        raise Refusal(
+            "an empty name", where=flag, instead="name a folder, '.' for this one"
+        )
     return Path(text)

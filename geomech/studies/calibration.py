@@ -97,8 +97,14 @@ def rod_drags(
     lacks = [name for name in SIZES if not getattr(f.rod, name)]
     if FITS[law].granular and lacks:
         facts["lacks"] = ", ".join(lacks)
-    variables = [*_parameters(f), *_of_rod(f), *_rows(f, measured), *_curve(f)]
+    variables = fit_variables(f, measured.rows[0])
     return Result("fit_medium", tuple(variables), facts)
+
+
+def fit_variables(f: Fit, psi: np.ndarray) -> list[Variable]:
+    """Return the variables of a law fitted to the drag on a rod. psi: (N,), the attack
+    angles of the measurements, degrees."""
+    return [*_parameters(f), *_of_rod(f), *_rows(f, psi), *_curve(f)]
 
 
 def _parameters(f: Fit) -> list[Variable]:
@@ -142,14 +148,14 @@ def _of_rod(f: Fit) -> list[Variable]:
     return found
 
 
-def _rows(f: Fit, measured: drag.Measured) -> list[Variable]:
+def _rows(f: Fit, psi: np.ndarray) -> list[Variable]:
     """Return the measured forces beside those by the law."""
     over = ("component", "row")
     folded = "attack angle, folded into 0 to 90 degrees"
     fitted = np.round(f.data.forces - f.residuals, ROUNDED) + 0.0
     return [
         Variable("component", ("component",), ["parallel", "perpendicular"]),
-        Variable("psi", ("row",), measured.rows[0], "degrees", "attack angle"),
+        Variable("psi", ("row",), psi, "degrees", "attack angle"),
         Variable("folded_psi", ("row",), np.degrees(f.data.psi), "degrees", folded),
         Variable("force", over, f.data.forces, "N", "measured"),
         Variable("fitted", over, fitted, "N", "by the law"),

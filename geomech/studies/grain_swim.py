@@ -1,11 +1,13 @@
-"""A scene's body of rigid links swims in a bed of grains, beside what the tiers of resistive force theory predict."""
+"""A scene's body of rigid links that swims in a bed of grains, beside what the tiers of
+resistive force theory predict."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,8 +16,8 @@ from geomech.run.backend import prefer_backend
 from geomech.scenes.model import Scene
 from geomech.studies.calibration import rod_fit
 from geomech.studies.grains import GrainSteps, price, store_folder
-from geomech.studies.question import Allow, Progress, Question
 from geomech.studies.study import Study
+from geomech.systems.base import body_size
 from geomech.systems.swimmer import Swimmer
 from rft.bodies.links import Links
 from rft.core.refusal import Refusal, located, require
@@ -27,24 +29,48 @@ from rft.grains.motions import Swim
 from rft.grains.spheres import chain
 
 RAMP = 0.5  # cycles in which the gait grows from the straight body
-SIZE, RADIUS, FREQUENCY = (
-    0.162,
-    6e-3,
-    1.0,
-)  # m, m and Hz of a scene that gives none: those of the shipped flank's rod
-ROOM = 0.118, 0.078  # m of bed beyond the body along and across it
+# Of a scene that gives none: those of the rod of the sample `FLANK`.
+SIZE = 0.162  # m
+RADIUS = 6e-3  # m
+FREQUENCY = 1.0  # Hz
+ROOM = (0.118, 0.078)  # m of bed beyond the body along and across it
 DEPTH = 0.049  # m of bed, or as much as a thick body takes
 FLANK = "flank-drag"  # the sample of drag in such beds
 GRAINS_LAW = "direct, law of grains"
+GRAINS = "grains"
+UNITS = {"x": "BL", "y": "BL", "heading": "rad"}
+Progress = Callable[[float], None]
+
+
+class Predicted(NamedTuple):
+    """The displacement of a cycle by a method: x and y in body lengths, heading in rad
+    (3,). error, spread: estimate, and what the uncertain medium or the cycles in grains
+    leave; nan where it is not known."""
+
+    values: np.ndarray
+    error: np.ndarray
+    spread: np.ndarray
+
+    @property
+    def distance(self) -> tuple[float, float, float]:
+        """Net distance with its error and spread, body lengths."""
+        x, y = self.values[:2]
+        distance = np.hypot(x, y)
+        slope = self.values[:2] / distance if distance > 0 else np.ones(2)
+        error = np.hypot(*(slope * self.error[:2]))
+        spread = np.hypot(*(slope * self.spread[:2]))
+        return float(distance), float(error), float(spread)
 
 
 @dataclass(frozen=True)
-class GrainSwim(Question):
-    """A swimmer of rigid links in a bed of grains, for some cycles of its gait after it has grown from the straight body.
+class GrainSwim:
+    """A swimmer of rigid links in a bed of grains, for some cycles of its gait after it has
+    grown from the straight body.
 
-    cycles: how many. seed: of the bed. size, radius (m): of the body; by default the scene's length and the radius of its
-    end caps, or `SIZE` and `RADIUS` where the scene is in body lengths. depth (m): of its axis, half of the bed's if None.
-    store: folder of beds and runs."""
+    cycles: how many. seed: of the bed. size, radius (m): of the body; by default the
+    scene's length and the radius of its end caps, or `SIZE` and `RADIUS` where the scene
+    is in body lengths. depth (m): of its axis, half of the bed's if None. store: folder of
+    beds and runs."""
 
     scene: Scene
     cycles: int = 2
@@ -53,12 +79,6 @@ class GrainSwim(Question):
     radius: float | None = None
     depth: float | None = None
     store: Path | None = field(default=None, compare=False)
-
-    less: ClassVar[str] = "take fewer ``cycles``"
-
-    @property
-    def title(self) -> str:
-        return f"grains around {self.scene.name}"
 
     @property
     def frequency(self) -> float:
@@ -80,37 +100,42 @@ class GrainSwim(Question):
     @cached_property
     def experiment(self) -> Experiment:
         body = self.swimmer.body
-        caps = next((e for e in self.swimmer.effects if isinstance(e, EndCaps)), None)
         size = self.size
         if size is None:
             size = SIZE if body.length is None else body.length
         require(0 < size < np.inf, "length must be > 0", value=size)
-        radius = self.radius
-        if radius is None:
-            radius = RADIUS
-            if caps is not None:
-                own_size = body.length  # None where the radius is in body lengths
-                radius = caps.in_body_lengths(own_size).radius * size
+        radius = self._radius(size)
         require(
             0 < radius < size / 2,
             "radius must be > 0 and below half of the length",
             value=radius,
         )
         bed = Bed(seed=self.seed)
-        depth = max(DEPTH, round(2 * radius + 6 * bed.diameter, 6))
         bed = replace(
             bed,
             length=round(size + ROOM[0], 6),
             width=round(size + ROOM[1], 6),
-            depth=depth,
+            depth=max(DEPTH, round(2 * radius + 6 * bed.diameter, 6)),
         )
-        gait, f = self.scene.gait, self.frequency
+        gait = self.scene.gait
+        f = self.frequency
         swim = Swim(gait.shape, gait.rate, f, RAMP / f, -2 * np.pi * RAMP)
-        return Experiment(
-            bed, chain(body, size, radius), swim, (RAMP + self.cycles) / f, self.depth
-        )
+        seconds = (RAMP + self.cycles) / f
+        return Experiment(bed, chain(body, size, radius), swim, seconds, self.depth)
+
+    def _radius(self, size: float) -> float:
+        """Return the radius, m, of a body of a size, m."""
+        if self.radius is not None:
+            return self.radius
+        for effect in self.swimmer.effects:
+            if isinstance(effect, EndCaps):
+                # None where the radius is in body lengths.
+                own_size = self.swimmer.body.length
+                return effect.in_body_lengths(own_size).radius * size
+        return RADIUS
 
     def check(self) -> None:
+        """Refuse what no bed takes."""
         require(1 <= self.cycles <= 1000, "cycles must be 1 to 1000", value=self.cycles)
         with located(self.scene.name):
             self.experiment.check()
@@ -120,94 +145,169 @@ class GrainSwim(Question):
     def cost(self) -> GrainSteps:
         return price([self.experiment], store_folder(self.store))
 
-    def answer(self, progress: Progress, allow: Allow) -> Result:
+    def answer(self, progress: Progress) -> Result:
+        """Return the displacement by every tier and in grains, and the motion in time."""
         # Before the grains: a scene that no tier takes is refused at once.
         balances = Study(self.scene).cost([self.scene.gait.amplitude]).as_balances
         with prefer_backend(balances):
             tiers = predictions(self)
-        return result(
-            self, self.experiment.run(store_folder(self.store), progress), tiers
-        )
+        run = self.experiment.run(store_folder(self.store), progress)
+        return result(self, run, tiers)
 
 
-Predictions = dict[
-    str, tuple[list[float], list[float]]
-]  # (x, y, heading) in body lengths and rad, and errors, by tier
-
-
-def result(question: GrainSwim, run: Run, tiers: Predictions) -> Result:
-    """Return the displacement by cycle and its mean, in body lengths, beside the tiers of the scene and the direct tier with
-    the law of the sample `FLANK` and its end caps."""
-    scene, experiment = question.scene, question.experiment
+def result(question: GrainSwim, run: Run, tiers: dict[str, Predicted]) -> Result:
+    """Return the displacement by method and by cycle, and the motion in time."""
+    size = question.experiment.body.size
     starts = (RAMP + np.arange(question.cycles + 1)) / question.frequency
-    poses = cycle_poses(run, starts) / [experiment.body.size, experiment.body.size, 1.0]
-    names = [*tiers, "grains"]
-    spread = poses.std(0, ddof=1) if len(poses) > 1 else np.full(3, np.nan)
-    values = np.array([*(x for x, _ in tiers.values()), poses.mean(0)])
-    errors = np.array([*(e for _, e in tiers.values()), spread])
-    columns = [
-        Variable(name, ("method",), values[:, k], unit, error=errors[:, k])
-        for k, (name, unit) in enumerate((("x", "BL"), ("y", "BL"), ("heading", "rad")))
+    poses = cycle_poses(run, starts) / [size, size, 1.0]
+    unknown = np.full(3, np.nan)
+    scatter = poses.std(0, ddof=1) if len(poses) > 1 else unknown
+    methods = {**tiers, GRAINS: Predicted(poses.mean(0), unknown, scatter)}
+    facts = {"seed": question.seed, **run.facts}
+    variables = [
+        *_scalars(question, run, starts),
+        *_methods(methods),
+        *_cycles(poses),
+        *_motion(run),
+        *_outlines(question, run, [0.0, *starts]),
     ]
-    facts = {
-        "name": scene.name, "amplitude": scene.gait.amplitude, "frequency": question.frequency, "seed": question.seed,
-        "size": experiment.body.size, "radius": experiment.body.half_width, "overlap": float(run.overlaps[:, 0].max()),
-        "work": float((np.interp(starts[-1], run.t, run.work) - np.interp(starts[0], run.t, run.work)) / question.cycles),
-        **run.facts,
-    }  # fmt: skip
-    variables = (
-        Variable("method", ("method",), np.array(names)),
-        *columns,
-        Variable("cycle", ("cycle",), np.arange(1, question.cycles + 1)),
+    return Result("grains", tuple(variables), facts)
+
+
+def _scalars(question: GrainSwim, run: Run, starts: np.ndarray) -> list[Variable]:
+    body = question.experiment.body
+    ends = np.interp(starts[[0, -1]], run.t, run.work)
+    work = float((ends[1] - ends[0]) / question.cycles)
+    overlap = float(run.overlaps[:, 0].max())
+    return [
+        Variable("body_length", (), body.size, "m"),
+        Variable("body_radius", (), body.half_width, "m"),
+        Variable("frequency", (), question.frequency, "Hz"),
+        Variable("amplitude", (), question.scene.gait.amplitude, "", "of the gait"),
+        Variable("work", (), work, "J", "of the body on the grains per cycle"),
+        Variable("largest_overlap", (), overlap, "1", "in grain diameters"),
+    ]
+
+
+def _methods(methods: dict[str, Predicted]) -> list[Variable]:
+    """Return the displacement of a cycle by each method."""
+    found = [Variable("method", ("method",), np.array([*methods]))]
+    for k, (name, unit) in enumerate(UNITS.items()):
+        values = [one.values[k] for one in methods.values()]
+        error = [one.error[k] for one in methods.values()]
+        spread = [one.spread[k] for one in methods.values()]
+        found.append(
+            Variable(name, ("method",), values, unit, "per cycle", error, spread)
+        )
+    distance = np.array([one.distance for one in methods.values()]).T
+    found.append(
         Variable(
-            "cycle_x", ("cycle",), poses[:, 0], "BL", "displacement of each cycle"
-        ),
-        Variable("cycle_y", ("cycle",), poses[:, 1], "BL"),
-        Variable("cycle_heading", ("cycle",), poses[:, 2], "rad"),
+            "net_distance", ("method",), distance[0], "BL", "per cycle", *distance[1:]
+        )
     )
-    return Result("grain_swim", variables, facts, (question, run))
+    return found
+
+
+def _cycles(poses: np.ndarray) -> list[Variable]:
+    """Return the displacement of each cycle in grains."""
+    found = [Variable("cycle", ("cycle",), np.arange(1, len(poses) + 1))]
+    for k, (name, unit) in enumerate(UNITS.items()):
+        label = "displacement of each cycle in grains"
+        found.append(Variable(f"cycle_{name}", ("cycle",), poses[:, k], unit, label))
+    return found
+
+
+def _motion(run: Run) -> list[Variable]:
+    """Return the motion in time: pose of the frame, shape, force of the grains, work."""
+    columns = [
+        ("frame_x", run.pose[:, 0], "m", "of the body frame"),
+        ("frame_y", run.pose[:, 1], "m", "of the body frame"),
+        ("frame_heading", run.pose[:, 2], "rad", "of the body frame"),
+    ]
+    for k in range(run.alpha.shape[1]):
+        columns.append((f"alpha_{k + 1}", run.alpha[:, k], "rad", "joint angle"))
+    for k, axis in enumerate("xyz"):
+        label = "of the grains on the body"
+        columns.append((f"force_{axis}", run.force[:, k], "N", label))
+    columns += [
+        ("moment", run.moment, "N m", "about the centre of mass"),
+        ("work_done", run.work, "J", "of the body on the grains so far"),
+        ("kinetic_energy", run.kinetic, "J", "of the body"),
+    ]
+    found = [Variable("t", ("t",), run.t, "s", "time")]
+    for name, values, unit, label in columns:
+        found.append(Variable(name, ("t",), values, unit, label))
+    return found
+
+
+def _outlines(question: GrainSwim, run: Run, times: list[float]) -> list[Variable]:
+    """Return the body at some times, and the track of its frame, in body lengths."""
+    size = question.experiment.body.size
+    body = question.swimmer.body
+    unit = size / body_size(body)  # m, of a length of the body
+    rows = np.minimum(np.searchsorted(run.t, times), len(run.t) - 1)
+    outlines = []
+    for row in rows:
+        pose = run.pose[row] / [unit, unit, 1.0]
+        outlines.append(unit / size * body.points(run.alpha[row], pose))
+    points = np.array(outlines)
+    track = run.pose[:, :2].T / size
+    found = [Variable("picture_t", ("picture_t",), np.array(times), "s", "time")]
+    for k, axis in enumerate("xy"):
+        over = ("picture_t", "point")
+        found.append(
+            Variable(f"body_{axis}", over, points[..., k], "BL", "of the body")
+        )
+        found.append(Variable(f"track_{axis}", ("t",), track[k], "BL", "of the frame"))
+    return found
 
 
 def cycle_poses(run: Run, starts: np.ndarray) -> np.ndarray:
-    """Return the net displacement (cycles, 3) between successive times, x and y in m in the frame at the start of each."""
+    """Return the net displacement (cycles, 3) between successive times, x and y in m in the
+    frame at the start of each."""
     pose = np.column_stack([np.interp(starts, run.t, run.pose[:, k]) for k in range(3)])
-    d, theta = np.diff(pose, axis=0), pose[:-1, 2]
+    dx, dy, dtheta = np.diff(pose, axis=0).T
+    theta = pose[:-1, 2]
     c, s = np.cos(theta), np.sin(theta)
-    return np.column_stack(
-        [c * d[:, 0] + s * d[:, 1], c * d[:, 1] - s * d[:, 0], d[:, 2]]
-    )
+    return np.column_stack([c * dx + s * dy, c * dy - s * dx, dtheta])
 
 
-def predictions(question: GrainSwim) -> Predictions:
-    """Return what the tiers of the scene say, and the direct tier with the law and the ends of the sample `FLANK`."""
+def predictions(question: GrainSwim) -> dict[str, Predicted]:
+    """Return what the tiers of the scene predict, and the direct tier with the law and the
+    ends of the sample `FLANK`."""
     scene = question.scene
     found = dict(_predicted(scene))
     body = question.experiment.body
     law = rod_fit(FLANK, end_caps="fitted")
     caps = law.caps(body.half_width / body.size)
     caps = caps.in_metres(question.swimmer.body.length)
-    others = tuple(e for e in question.swimmer.effects if not isinstance(e, EndCaps))
-    system = replace(
-        question.swimmer,
-        medium=law.medium,
-        effects=(*others, caps),
-    )
-    found[GRAINS_LAW] = dict(_predicted(scene.changed(system=system), ("direct",)))[
-        "direct"
-    ]
+    others = [e for e in question.swimmer.effects if not isinstance(e, EndCaps)]
+    system = replace(question.swimmer, medium=law.medium, effects=(*others, caps))
+    of_grains = dict(_predicted(scene.changed(system=system), ("direct",)))
+    found[GRAINS_LAW] = of_grains["direct"]
     return found
 
 
-def _predicted(scene: Scene, tiers: tuple[str, ...] | None = None):
-    """Yield (tier, ((x, y, heading), errors)) of a scene's own gait. The error of a position has that of an uncertain
-    medium."""
-    of_study = Study(scene).displacements([scene.gait.amplitude], tiers)
-    length = of_study.attributes["body_length"]
-    for k, tier in enumerate(of_study["tier"].values.tolist()):
-        values, errors = [], []
-        for name, unit in (("x", length), ("y", length), ("heading", 1.0)):
-            v = of_study[name]
-            spread = 0.0 if v.spread is None else v.spread[k, 0]
-            values.append(float(v.values[k, 0] / unit))
-            errors.append(float(np.hypot(v.error[k, 0], spread) / unit))
-        yield tier, (values, errors)
+def _predicted(
+    scene: Scene, tiers: tuple[str, ...] | None = None
+) -> Iterator[tuple[str, Predicted]]:
+    """Yield (tier, its prediction) of a scene's own gait."""
+    table = Study(scene).displacements([scene.gait.amplitude], tiers)
+    length = table.attributes["body_length"]
+    units = np.array([length, length, 1.0])
+    for tier in table["tier"].values.tolist():
+        one = table.at(tier=tier, amplitude=scene.gait.amplitude)
+        values, errors, spreads = [], [], []
+        for name in UNITS:
+            values.append(float(one[name].values))
+            errors.append(float(one[name].error))
+            known = one[name].spread is not None
+            spreads.append(float(one[name].spread) if known else 0.0)
+        yield (
+            tier,
+            Predicted(
+                np.array(values) / units,
+                np.array(errors) / units,
+                np.array(spreads) / units,
+            ),
+        )

@@ -1,20 +1,20 @@
-"""Questions to grains (`rft.grains`): the drag on the flank and on the ends of a rod, as a law can be fitted to."""
+"""The drag of grains on the flank and on the ends of a rod (`rft.grains`), and the law that
+is fitted to it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from geomech.core.variables import Result, Variable
-from geomech.run import runner as runners
 from geomech.run.cost import BASE, Cost, TooLong, duration
+from geomech.run.runner import runner
 from geomech.run.store import cache_folder
-from geomech.studies.question import Allow, Progress, Question
+from geomech.studies.calibration import fit_variables
 from rft.core.refusal import Refusal, require
 from rft.fits.rods import Fit, fit
 from rft.grains.bed import Bed
@@ -25,9 +25,12 @@ from rft.grains.motions import Tow
 from rft.grains.spheres import Spheres, rod
 from rft.laws.drag import Rod, rod_drag
 
-RATE = 1.8e6  # steps of a grain a second; 1.9e6 measured on one core of the machine that this was written on
+# Steps of a grain per second; 1.9e6 measured on one core of the machine that this was
+# written on.
+RATE = 1.8e6
 LONGEST = 600.0  # s of computing that a command begins without consent
 TRAVEL = 7.5  # half widths that a rod is dragged, the first 2.5 of them not counted
+Progress = Callable[[float], None]
 
 
 class GrainSteps(Cost):
@@ -38,31 +41,38 @@ class GrainSteps(Cost):
     as_balances = 0.0
 
     def __str__(self) -> str:
-        return f"{self.balances:.1e} steps of grains, about {duration(self.seconds)} of computing"
+        seconds = duration(self.seconds)
+        return f"{self.balances:.1e} steps of grains, about {seconds} of computing"
 
     def check(self, place: str, yes: bool, less: str = "ask for less") -> None:
         if not yes and self.seconds > LONGEST:
-            instead = (
-                f"to compute for more than {duration(LONGEST)} say ``yes``, or {less}"
+            raise TooLong(
+                str(self),
+                where=place,
+                instead=f"to compute for more than {duration(LONGEST)} say ``yes``, "
+                f"or {less}",
             )
-            raise TooLong(str(self), where=place, instead=instead)
 
 
 def price(experiments: Sequence[Experiment], store: Path) -> GrainSteps:
-    """Return the cost of experiments, as far as their settled beds and runs are not in a store."""
-    missing = {e.bed: e for e in experiments if not e.is_settled(store)}
-    settling = sum(
-        e.grain_steps / e.n_steps * sum(SETTLING) / e.bed.step for e in missing.values()
-    )
-    steps = (
-        sum(e.grain_steps * e.steps_left(store) / e.n_steps for e in experiments)
-        + settling
-    )
+    """Return the cost of experiments, as far as their settled beds and runs are not in a
+    store."""
+    steps = 0.0
+    unsettled = {}
+    for experiment in experiments:
+        steps_left = experiment.steps_left(store)
+        steps += experiment.grain_steps * steps_left / experiment.n_steps
+        if not experiment.is_settled(store):
+            unsettled[experiment.bed] = experiment
+    for experiment in unsettled.values():
+        settling = sum(SETTLING) / experiment.bed.step
+        steps += experiment.grain_steps * settling / experiment.n_steps
     return GrainSteps(round(steps), steps / RATE, BASE, steps / RATE)
 
 
 def store_folder(given: Path | None) -> Path:
-    """Return the folder of settled beds and runs: the one given, else that in the user's cache folder."""
+    """Return the folder of settled beds and runs: the one given, else that in the user's
+    cache folder."""
     if given is not None:
         return Path(given)
     folder = cache_folder()
@@ -74,39 +84,22 @@ def store_folder(given: Path | None) -> Path:
     return folder / "grains"
 
 
-class Titled(NamedTuple):
-    """What a cost is said of, where there is no scene."""
-
-    name: str
-
-
 @dataclass(frozen=True)
-class DragGrains(Question):
-    """The drag on a round rod in beds of grains, at several attack angles.
+class DraggedRod:
+    """A round rod that is dragged through beds of grains at several attack angles.
 
-    length, radius (m): of the rod, from end to end. angles: between velocity and axis, degrees, 0 to 90. beds: how many,
-    with seeds from ``seed`` on. speed (m/s). depth (m): of the axis below the surface, half of the bed's if None.
-    store: folder of beds and runs."""
+    length, radius (m): of the rod, from end to end. angles: between velocity and axis,
+    degrees, 0 to 90. beds: how many, with seeds from ``seed`` on. speed (m/s). depth (m):
+    of the axis below the surface, half of the bed's if None."""
 
-    length: float = 0.162
-    radius: float = 6e-3
-    angles: tuple[float, ...] = (0.0, 8.0, 16.0, 30.0, 55.0, 90.0)
-    beds: int = 3
-    speed: float = 0.1
-    depth: float | None = None
-    seed: int = 1
+    length: float
+    radius: float
+    angles: tuple[float, ...]
+    beds: int
+    speed: float
+    depth: float | None
+    seed: int
     bed: Bed = field(default_factory=Bed)
-    store: Path | None = field(default=None, compare=False)
-
-    less: ClassVar[str] = "take fewer ``beds`` or ``angles``"
-    scene: ClassVar[Titled] = Titled("drag in grains")
-
-    @property
-    def title(self) -> str:
-        return self.scene.name
-
-    def inputs(self) -> list[Path]:
-        return []
 
     @property
     def body(self) -> Spheres:
@@ -114,26 +107,24 @@ class DragGrains(Question):
 
     def experiments(self) -> list[Experiment]:
         """Return the experiments, bed by bed."""
-        duration_ = round(TRAVEL * self.radius / self.speed, 9)
-        return [
-            Experiment(
-                replace(self.bed, seed=self.seed + k), self.body, Tow(self.speed, math.radians(psi)), duration_,
-                self.depth,
-            )
-            for k in range(self.beds)
-            for psi in self.angles
-        ]  # fmt: skip
+        seconds = round(TRAVEL * self.radius / self.speed, 9)
+        found = []
+        for k in range(self.beds):
+            bed = replace(self.bed, seed=self.seed + k)
+            for psi in self.angles:
+                tow = Tow(self.speed, math.radians(psi))
+                found.append(Experiment(bed, self.body, tow, seconds, self.depth))
+        return found
 
     def check(self) -> None:
+        """Refuse sizes that make no sense."""
+        angles = list(self.angles)
+        few = len(set(angles)) < 3
+        require(not few, "a law takes three angles or more", value=angles)
         require(
-            len(set(self.angles)) >= 3,
-            "a law takes three angles or more",
-            value=list(self.angles),
-        )
-        require(
-            all(0 <= psi <= 90 for psi in self.angles),
+            all(0 <= psi <= 90 for psi in angles),
             "angles must be 0 to 90 degrees",
-            value=list(self.angles),
+            value=angles,
         )
         require(1 <= self.beds <= 100, "beds must be 1 to 100", value=self.beds)
         require(self.speed > 0, "speed must be > 0", value=self.speed)
@@ -142,107 +133,183 @@ class DragGrains(Question):
             "a rod must be ten times as long as it is wide",
             value=self.length,
         )
-        for experiment in self.experiments()[: len(self.angles)]:
+        for experiment in self.experiments()[: len(angles)]:
             experiment.check()
-        store_folder(self.store)
         lammps()
 
-    def cost(self) -> GrainSteps:
-        return price(self.experiments(), store_folder(self.store))
+    def cost(self, store: Path) -> GrainSteps:
+        return price(self.experiments(), store)
 
-    def answer(self, progress: Progress, allow: Allow) -> Result:
-        folder, experiments = store_folder(self.store), self.experiments()
-        first, runner, share = (
-            experiments[:: len(self.angles)],
-            runners.runner(),
-            1.0 / (1 + len(self.angles)),
-        )
-        each = price(experiments, folder).seconds / (len(first) + len(experiments))
-        settled = list(
-            runner.map(
-                _settle,
-                folder,
-                first,
-                len(first),
-                each * len(first),
-                lambda done: progress(share * done),
-            )
-        )
-        rest = lambda done: progress(share + (1 - share) * done)
-        rows = runner.map(
-            _drag, folder, experiments, len(experiments), each * len(experiments), rest
-        )
-        return self._result(
-            np.array(settled),
-            np.array(list(rows)).reshape(self.beds, len(self.angles), -1),
-        )
+    def answer(self, store: Path, progress: Progress) -> Result:
+        """Return the drag in every bed, its mean, and the law of the flank with the drag on
+        the ends."""
+        experiments = self.experiments()
+        first_of_bed = experiments[:: len(self.angles)]
+        n_tasks = len(first_of_bed) + len(experiments)
+        seconds_each = price(experiments, store).seconds / n_tasks
+        share = 1.0 / (1 + len(self.angles))  # of the settling in the progress
 
-    def _result(self, settled: np.ndarray, rows: np.ndarray) -> Result:
-        """Return the result of settled beds (beds, packing and surface) and rows (beds, angles, numbers of a `Drag`)."""
+        def settled(done: float) -> None:
+            progress(share * done)
+
+        def dragged(done: float) -> None:
+            progress(share + (1 - share) * done)
+
+        beds = runner().map(
+            _settle,
+            store,
+            first_of_bed,
+            len(first_of_bed),
+            seconds_each * len(first_of_bed),
+            settled,
+        )
+        packing, surface = np.array(list(beds)).mean(0)
+        drags = runner().map(
+            _drag,
+            store,
+            experiments,
+            len(experiments),
+            seconds_each * len(experiments),
+            dragged,
+        )
+        rows = np.array(list(drags)).reshape(self.beds, len(self.angles), -1)
+        depth = float(surface - experiments[0].height)
+        return self._result(float(packing), depth, rows)
+
+    def _result(self, packing: float, depth: float, rows: np.ndarray) -> Result:
+        """Return the result. packing, depth (m): means over beds. rows: (beds, angles,
+        numbers of `_drag`)."""
         r = np.moveaxis(rows, -1, 0)
         drags = Drag(r[:2], r[2:4], r[4], r[5:7], r[7:9], r[9])
-        packing, surface = settled.mean(0)
-        height = self.experiments()[0].height
+        overlap = float(r[10].max())
+        law = self.law(drags, packing, depth)
         facts = {
-            "packing": float(packing), "depth": float(surface - height), "overlap": float(rows[..., 10].max()),
-            "lammps": int(rows[0, 0, 11]), "grains": int(rows[0, 0, 12]), "step": self.bed.step,
-        }  # fmt: skip
-        across, over = ("component", "bed", "angle"), ("bed", "angle")
-        variables = (
-            Variable(
-                "angle", ("angle",), np.array(self.angles), "degrees", "attack angle"
-            ),
+            "beds": self.beds,
+            "grains": int(rows[0, 0, 12]),
+            "lammps": int(rows[0, 0, 11]),
+            "law": law.law,
+            "drag_about": self.about(packing, depth, overlap, rows),
+        }
+        over = ("bed", "attack_angle")
+        both = ("component", *over)
+        in_time = "standard error in time"
+        psi = np.tile(self.angles, self.beds)
+        variables = [
             Variable("bed", ("bed",), self.seed + np.arange(self.beds), "1", "seed"),
             Variable(
-                "component", ("component",), np.array(["parallel", "perpendicular"])
+                "attack_angle", ("attack_angle",), np.array(self.angles), "degrees"
             ),
             Variable(
-                "flank",
-                across,
-                drags.flank,
-                "N/m",
-                "drag on the flank",
-                drags.flank_error,
+                "flank", both, drags.flank, "N/m", "drag on the flank",
+                drags.flank_error, error_label=in_time,
             ),
             Variable(
-                "ends",
-                across,
-                drags.ends,
-                "N",
-                "drag on both ends beyond that",
-                drags.ends_error,
+                "ends", both, drags.ends, "N", "drag on both ends beyond that",
+                drags.ends_error, error_label=in_time,
             ),
             Variable(
-                "lift", over, drags.lift, "N", "lift of the whole rod", drags.lift_error
+                "lift", over, drags.lift, "N", "lift of the whole rod",
+                drags.lift_error, error_label=in_time,
             ),
-        )
-        return Result("drag_grains", variables, facts, (self, self.law(drags, facts)))
+        ]  # fmt: skip
+        for variable in variables[2:]:
+            variables.append(mean_over_beds(variable))
+        variables += [
+            Variable("rod_diameter", (), 2 * self.radius, "m"),
+            Variable("speed", (), self.speed, "m/s", "of the rod"),
+            Variable("packing", (), packing, "1", "mean over the beds"),
+            Variable("largest_overlap", (), overlap, "1", "in grain diameters"),
+            *fit_variables(law, psi),
+        ]
+        return Result("drag_grains", tuple(variables), facts)
 
-    def law(self, drags: Drag, facts: dict[str, float]) -> Fit:
+    def law(self, drags: Drag, packing: float, depth: float) -> Fit:
         """Return the granular law of the flank with e of the ends, fitted to all beds."""
         psi = np.tile(self.angles, self.beds)
-        flank, ends = (
-            x.reshape(2, -1) for x in (self.length * drags.flank, drags.ends)
-        )
-        size = Rod(
-            self.radius,
-            self.length,
-            facts["depth"],
-            facts["packing"] * self.bed.density,
-        )
+        flank = self.length * drags.flank.reshape(2, -1)
+        ends = drags.ends.reshape(2, -1)
+        size = Rod(self.radius, self.length, depth, packing * self.bed.density)
         return fit("granular", rod_drag(psi, *flank, ends=ends), size, "fitted")
+
+    def about(
+        self, packing: float, depth: float, overlap: float, rows: np.ndarray
+    ) -> str:
+        """Return what a file of the drag says above its columns, which gives
+        ``fit-medium`` the sizes."""
+        bed, mm = self.bed, 1e3
+        walls = "walled" if bed.walled else "periodic"
+        friction = f"friction {bed.friction:g}"
+        if bed.settling_friction is not None:
+            friction += f", settled with friction {bed.settling_friction:g}"
+        lines = [
+            self.command,
+            "Drag on the flank of a rod, and on both its ends together beyond that, in "
+            f"beds of grains (LAMMPS {int(rows[0, 0, 11])}, Hertz-Mindlin); mean after "
+            f"{mm * 2.5 * self.radius:g} mm of travel",
+            f"grains {mm * bed.diameter:g} mm +-{100 * bed.spread:g} %, density "
+            f"{bed.density:g} kg/m^3, packing {packing:.4f}; rod "
+            f"{2 * mm * self.radius:g} mm diameter x {mm * self.length:g} mm, axis "
+            f"{mm * depth:.2f} mm deep, {self.speed:g} m/s",
+            f"young {bed.young:g} Pa, poisson {bed.poisson:g}, restitution "
+            f"{bed.restitution:g}; {friction}, with the rod {bed.body_friction:g}, with "
+            f"the floor {bed.floor_friction:g}",
+            f"{int(rows[0, 0, 12])} grains in {mm * bed.length:g} mm by "
+            f"{mm * bed.width:g} mm, {walls}; time step {1e6 * bed.step:.3g} us; largest "
+            f"overlap {overlap:.3f} of a grain",
+            "errors: standard errors in time",
+        ]
+        return "\n".join(lines)
+
+    @property
+    def command(self) -> str:
+        """The command that gives the result, without its output; numbers of the bed that
+        no option has stand in the file."""
+        angles = ",".join(f"{x:g}" for x in self.angles)
+        words = [
+            "geomech drag-grains",
+            f"--length {self.length:g} --radius {self.radius:g} --speed {self.speed:g}",
+        ]
+        if self.depth is not None:
+            words.append(f"--depth {self.depth:g}")
+        words.append(f"--angles {angles} --beds {self.beds} --seed {self.seed}")
+        return " ".join(words)
+
+
+def mean_over_beds(variable: Variable) -> Variable:
+    """Return the mean of a drag over beds. Its error is the standard error of that mean, or
+    the one in time where there is one bed."""
+    axis = variable.dims.index("bed")
+    beds = variable.values.shape[axis]
+    if beds > 1:
+        error = variable.values.std(axis, ddof=1) / np.sqrt(beds)
+        words = "standard error over beds"
+    else:
+        error = variable.error.take(0, axis)
+        words = variable.error_label
+    return replace(
+        variable,
+        name=f"mean_{variable.name}",
+        dims=tuple(name for name in variable.dims if name != "bed"),
+        values=variable.values.mean(axis),
+        label=f"{variable.label}, mean over beds",
+        error=error,
+        error_label=words,
+    )
 
 
 def _settle(folder: Path, experiment: Experiment) -> list[float]:
-    """Return packing and surface (m) of the bed of an experiment, settled where it is not in the folder."""
-    facts = settle(experiment.bed, experiment.body, experiment.height, folder).facts
-    return [facts["packing"], facts["surface"]]
+    """Return packing and surface (m) of the bed of an experiment, settled where it is not
+    in the folder."""
+    bed = settle(experiment.bed, experiment.body, experiment.height, folder)
+    return [bed.facts["packing"], bed.facts["surface"]]
 
 
 def _drag(folder: Path, experiment: Experiment) -> list[float]:
-    """Return the numbers of the `Drag` of an experiment, the largest overlap, LAMMPS's version and the number of grains."""
+    """Return the numbers of the `Drag` of an experiment, the largest overlap, LAMMPS's
+    version and the number of grains."""
     run: Run = experiment.run(folder)
-    tow, body = experiment.motion, experiment.body
+    tow = experiment.motion
+    body = experiment.body
     drag = flank_and_ends(run, body.size, body.half_width, tow.angle, tow.speed)
     numbers = np.concatenate([np.atleast_1d(x) for x in drag]).tolist()
     return [
