@@ -7,7 +7,7 @@ import math
 import warnings
 from collections.abc import Iterable
 
-from rft.core.refusal import Refusal, formatted, worded
+from rft.core.refusal import Refusal, formatted, spell_arguments
 
 
 class Note(UserWarning):
@@ -16,7 +16,7 @@ class Note(UserWarning):
     It names arguments as a `Refusal` does, in double backticks, which ``args[0]`` keeps."""
 
     def __str__(self) -> str:
-        return worded(str(self.args[0]))
+        return spell_arguments(str(self.args[0]))
 
 
 class UnitWarning(Note):

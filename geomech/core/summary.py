@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from rft.core.premise import negated
+from rft.core.premise import negation
 from rft.core.refusal import formatted
 
 ROWS = ("x", "y", "theta")
@@ -153,7 +153,7 @@ def effect_lines(effects: Sequence) -> list[str]:
     lines = []
     for effect in effects:
         lines.append(
-            f"on:  {part(effect.kind, effect)}; {negated(effect.breaks) or 'keeps every premise'}; costs {effect.cost}; "
+            f"on:  {part(effect.kind, effect)}; {negation(effect.breaks) or 'keeps every premise'}; costs {effect.cost}; "
             f"gone at {effect.limit}, order {effect.order}"
         )
         if effect.assumes:

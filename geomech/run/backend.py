@@ -10,11 +10,11 @@ from geomech.core import version
 from rft import SOLVER
 from rft.balance import backend
 from rft.balance.backend import prefer, preferred, preferring
-from rft.balance.listening import listen, listener, nobody
+from rft.balance.listening import listen, listener, no_listener
 from rft.core.threads import cores, one_thread
 
 __all__ = [
-    "BACKENDS", "VERSION", "at_most", "cores", "fastest", "listen", "listener", "nobody", "one_thread", "prefer",
+    "BACKENDS", "VERSION", "at_most", "cores", "fastest", "listen", "listener", "no_listener", "one_thread", "prefer",
     "prefer_for", "preferred", "preferring", "suiting",
 ]  # fmt: skip
 

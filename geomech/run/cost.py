@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
-from geomech.run.backend import listen, listener, nobody, preferred
+from geomech.run.backend import listen, listener, no_listener, preferred
 from rft.core.refusal import Refusal
 
 LONGEST = 60.0  # s of computing that a command begins without consent
@@ -108,7 +108,7 @@ def decide(cost: Cost, judge: Callable[[Cost], None]) -> None:
     )
     decided = is_clear or cost.memory > LARGEST
     listen(
-        nobody if decided else _Watch(cost, judge)
+        no_listener if decided else _Watch(cost, judge)
     )  # times of an earlier part of the request do not apply to this one
     if decided:
         judge(cost)

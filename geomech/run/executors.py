@@ -13,7 +13,7 @@ from concurrent.futures import BrokenExecutor, Future
 
 from geomech.io.files import note
 from geomech.run.backend import BACKENDS, VERSION, fastest
-from rft.core.refusal import Refusal, formatted, worded
+from rft.core.refusal import Refusal, formatted, spell_arguments
 
 AHEAD = 4  # tasks for each worker that are submitted before the oldest is back
 LONGEST_END = 2.0  # s for a pool to notice that its processes were killed
@@ -217,7 +217,7 @@ class Cluster:
         """Note, once, that all workers are gone; others may come."""
         if not future.done() and not self._count() and not self.waited:
             note(
-                f"{worded(self.place)}: no workers are left: waiting for others ('dask worker {self.address}')"
+                f"{spell_arguments(self.place)}: no workers are left: waiting for others ('dask worker {self.address}')"
             )
             self.waited = True
 
@@ -236,7 +236,7 @@ class Cluster:
             meaning = "the scheduler, or the connection to it, was lost"
         else:
             meaning = f"{name}: {formatted(str(error), 120)}"
-        return RuntimeError(f"{worded(self.place)}: {meaning}")
+        return RuntimeError(f"{spell_arguments(self.place)}: {meaning}")
 
     def close(self) -> None:
         with contextlib.suppress(Exception):

@@ -50,7 +50,7 @@ SLOW = (
 keep_freed_memory()
 
 
-class Solved(NamedTuple):
+class Solutions(NamedTuple):
     """Solutions. xi: (3, B), body velocities. residual, iterations, stuck: (B,),
     residuals, evaluations, and whether an element is at rest. limit: largest residual
     of a solved sample."""
@@ -78,7 +78,7 @@ def solve(
     backend: str = "auto",
     threads: int | None = None,
     guess: np.ndarray | None = None,
-) -> Solved:
+) -> Solutions:
     """Return the body velocities of B samples, in body lengths.
 
     problem_at(index): the `Problem` of the samples ``index``. scale: (B,), its scale of
@@ -150,7 +150,7 @@ def solve(
         unsolved = np.flatnonzero(~solved)
     residual, evaluations, slowest = results[RESIDUAL:]
     stuck = (slowest < STUCK_BELOW * accuracy.rounding) & (not linear)
-    return Solved(
+    return Solutions(
         results[:3] * scale,
         residual,
         evaluations.astype(int),

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rft.balance.backend import check
-from rft.balance.solver import Accuracy, Solved, solve
+from rft.balance.solver import Accuracy, Solutions, solve
 from rft.bodies.base import Body, body_size, joint_speed
 from rft.bodies.pieces import PIECES
 from rft.core.checks import in_range, real_array
-from rft.core.premise import negated
+from rft.core.premise import negation
 from rft.core.refusal import Refusal, require
 from rft.effects.base import Effect, broken_premises, engine
 from rft.effects.contact import assemble
@@ -140,7 +140,7 @@ def body_velocity(
     (array([ 0.015 ,  0.0161, -0.1929]), 'sliding')
     """
     if effects != () and engine(effects) != "algebraic":
-        broken = negated(broken_premises(effects))
+        broken = negation(broken_premises(effects))
         raise Refusal(
             f"no body velocity follows from shape alone where effects are {broken}",
             instead="use rft.time_steps",
@@ -193,13 +193,13 @@ def body_velocity(
     return Solution(xi, *(x.reshape(batch) for x in (residual, status, iterations)))
 
 
-def _with_samples_at_rest(solved: Solved, moving: np.ndarray) -> Solved:
+def _with_samples_at_rest(solved: Solutions, moving: np.ndarray) -> Solutions:
     """Return the solution of all samples from that of those which are ``moving``
     (B,)."""
     size = moving.size
     if solved.stuck.size == size:
         return solved
-    full = Solved(
+    full = Solutions(
         np.zeros((3, size)),
         np.zeros(size),
         np.zeros(size, int),

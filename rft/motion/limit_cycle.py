@@ -86,7 +86,7 @@ def begin(samples: int) -> Cycles:
 def after_massless_cycle(c: Cycles, displacement: np.ndarray) -> Cycles:
     """Return the record after a cycle of a body without mass, with its displacement
     (3, B)."""
-    c = c._replace(displacements=_appended(c.displacements, displacement))
+    c = c._replace(displacements=_with_cycle(c.displacements, displacement))
     changes = np.diff(c.displacements, axis=0)[-N_RATIOS - 1 :]
     changes = changes[~np.isnan(changes).any((1, 2))]
     if not len(changes):
@@ -110,7 +110,7 @@ def after_heavy_cycle(
     led away from the limit the next one leads back to the end of the steadiest
     cycle."""
     last = c.displacements[-1]
-    c = c._replace(displacements=_appended(c.displacements, displacement))
+    c = c._replace(displacements=_with_cycle(c.displacements, displacement))
     if np.isnan(c.start).any():  # the first cycle starts from rest
         return c
     cycle = np.stack([c.start, end - c.start, displacement])
@@ -119,7 +119,7 @@ def after_heavy_cycle(
     diverged = (size > DIVERGED * least) & (c.extrapolation != 0).any(0)
     steadiest = np.where(size < least, cycle, c.steadiest)
     failures = c.failures + diverged
-    history = _appended(c.history, cycle)
+    history = _with_cycle(c.history, cycle)
     history = np.where(diverged & ~np.isnan(history), steadiest[:, None], history)
     c = c._replace(history=history, steadiest=steadiest, failures=failures)
     differences = np.diff(history, axis=1)
@@ -189,7 +189,7 @@ def mixed_memory(
     return last.start + step, np.maximum.reduce(drifts)
 
 
-def _appended(cycles: np.ndarray, cycle: np.ndarray) -> np.ndarray:
+def _with_cycle(cycles: np.ndarray, cycle: np.ndarray) -> np.ndarray:
     """Return the last cycles without the first of them and with one more."""
     return np.concatenate([cycles[..., 1:, :, :], cycle[..., None, :, :]], -3)
 

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from rft.balance.arrays import frame_net, velocities, with_frame_velocity
 from rft.balance.backend import check
-from rft.balance.solver import Accuracy, Solved, solve
+from rft.balance.solver import Accuracy, Solutions, solve
 from rft.balance.velocity import checked_input
 from rft.bodies.base import Body, body_size, half_lengths, joint_speed
 from rft.bodies.pieces import PIECES
@@ -474,7 +474,7 @@ class Stepping:
 
     def _solved(
         self, problem: Problem, scale: np.ndarray, guess: np.ndarray | None
-    ) -> Solved:
+    ) -> Solutions:
         def problem_at(index):
             if index.size == scale.size:
                 return problem
