@@ -23,7 +23,7 @@ import typer
 from geomech.core.errors import Note
 from geomech.run import THREAD_VARIABLES
 from geomech.run.progress import progress
-from rft.core.refusal import Refusal, line, printable, worded
+from rft.core.refusal import Refusal, line, printable, spell_arguments
 
 __all__ = ["Stopped", "exit_code", "progress", "report", "show", "stoppable"]
 
@@ -145,7 +145,7 @@ def _notes():
                 or category.__module__.partition(".")[0] == "rft"
             ):
                 text = (
-                    worded(message.args[0], _option)
+                    spell_arguments(message.args[0], _option)
                     if isinstance(message, Note)
                     else str(message)
                 )
@@ -216,7 +216,7 @@ OPTIONS = {  # what a reader of a command types where its name is not that of th
 
 def _said(error: Exception) -> str:
     """Return the line of an error, with options for the arguments that it names."""
-    return error.said(_option) if isinstance(error, Refusal) else str(error)
+    return error.as_line(_option) if isinstance(error, Refusal) else str(error)
 
 
 def _option(argument: str) -> str:

@@ -13,7 +13,7 @@ from geomech.run import cost as run_cost
 from geomech.run import runner as runners
 from geomech.studies.study import Study
 from rft.balance.backend import preferring
-from rft.balance.listening import listener, listening, nobody
+from rft.balance.listening import listener, listening, no_listener
 from rft.core.refusal import Refusal
 from rft.core.threads import run_shares
 
@@ -69,7 +69,7 @@ class Clock:
 
 @pytest.fixture
 def clock(monkeypatch):
-    with listening(nobody), preferring("numpy"):
+    with listening(no_listener), preferring("numpy"):
         yield Clock(monkeypatch)
 
 

@@ -28,7 +28,7 @@ from rft import (
     body_velocity,
     time_steps,
 )
-from rft.core.premise import ALL, negated
+from rft.core.premise import ALL, negation
 from rft.core.refusal import Refusal
 from rft.effects import EFFECTS as KINDS
 from rft.effects import batched_effect, engine
@@ -81,7 +81,7 @@ def test_effects_say_what_they_are(name):
     assert (
         f"; costs {effect.cost}; gone at {effect.limit}, order {effect.order}" in told
     )
-    assert f"; {negated(effect.breaks) or 'keeps every premise'};" in told
+    assert f"; {negation(effect.breaks) or 'keeps every premise'};" in told
     assert len(effect.cost) > 10
 
 
@@ -334,7 +334,7 @@ def test_engines(name):
         with pytest.raises(
             ValueError,
             match=re.escape(
-                f"effects are {negated(effect.breaks)}: use rft.time_steps"
+                f"effects are {negation(effect.breaks)}: use rft.time_steps"
             ),
         ):
             body_velocity(GLASS, body, alpha, alphadot, effects=(effect,))

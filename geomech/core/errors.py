@@ -7,7 +7,7 @@ import math
 import warnings
 from collections.abc import Iterable
 
-from rft.core.refusal import Refusal, formatted, worded
+from rft.core.refusal import Refusal, formatted, spell_arguments
 
 
 class Note(UserWarning):
@@ -18,7 +18,7 @@ class Note(UserWarning):
     keeps."""
 
     def __str__(self) -> str:
-        return worded(str(self.args[0]))
+        return spell_arguments(str(self.args[0]))
 
 
 class UnitWarning(Note):

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from rft.core.premise import negated
+from rft.core.premise import negation
 from rft.core.refusal import formatted
 
 ROWS = ("x", "y", "theta")
@@ -163,7 +163,7 @@ def effect_lines(effects: Sequence) -> list[str]:
     """Return a line for each effect on the ground, and one more for its assumptions."""
     lines = []
     for effect in effects:
-        premises = negated(effect.breaks) or "keeps every premise"
+        premises = negation(effect.breaks) or "keeps every premise"
         lines.append(
             f"on:  {part(effect.kind, effect)}; {premises}; costs {effect.cost};"
             f" gone at {effect.limit}, order {effect.order}"

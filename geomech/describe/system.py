@@ -12,7 +12,7 @@ from geomech.systems.base import System, WrappedSystem, kind_of
 from geomech.systems.framed import NAME, Framed
 from geomech.systems.swimmer import effect_sizes, name_in
 from rft.bodies import BODIES
-from rft.core.premise import SHAPE_ALONE, negated
+from rft.core.premise import SHAPE_ALONE, negation
 from rft.core.refusal import formatted, in_line
 from rft.effects import EFFECTS, ENGINES
 from rft.effects import engine as engine_of
@@ -54,7 +54,8 @@ def engine(system: System) -> str:
             if e.breaks & SHAPE_ALONE
         ]
         reasons = [
-            f"with {kind} the scene is {negated(premises)}" for kind, premises in broken
+            f"with {kind} the scene is {negation(premises)}"
+            for kind, premises in broken
         ]
         return f"{name} ({ENGINES[name]}): {'; '.join(reasons) or NO_PAST}"
     if isinstance(system, Table):
@@ -89,7 +90,7 @@ def _swimmer(system: Swimmer) -> list[str]:
         limit = (
             f"; gone at {effect.limit}, order {effect.order}" if effect.limit else ""
         )
-        premises = negated(effect.breaks) or "keeps every premise"
+        premises = negation(effect.breaks) or "keeps every premise"
         lines.append(
             f"on:  {summary.part(effect.kind, effect)}; {premises}{cost}{limit}"
         )

@@ -11,7 +11,7 @@ from geomech.core import version
 from rft import SOLVER
 from rft.balance import backend
 from rft.balance.backend import prefer, preferred, preferring
-from rft.balance.listening import listen, listener, nobody
+from rft.balance.listening import listen, listener, no_listener
 from rft.core.threads import cores, one_thread
 
 __all__ = [
@@ -22,7 +22,7 @@ __all__ = [
     "fastest",
     "listen",
     "listener",
-    "nobody",
+    "no_listener",
     "one_thread",
     "prefer",
     "prefer_backend",

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
-from geomech.run.backend import listen, listener, nobody, preferred
+from geomech.run.backend import listen, listener, no_listener, preferred
 from rft.core.refusal import Refusal
 
 LONGEST = 60.0  # s of computing that a command begins without consent
@@ -112,7 +112,7 @@ def decide(cost: Cost, judge: Callable[[Cost], None]) -> None:
     )
     if is_decided:
         # Times of an earlier part of the request do not apply to this one.
-        listen(nobody)
+        listen(no_listener)
         judge(cost)
     else:
         listen(_Stopwatch(cost, judge))

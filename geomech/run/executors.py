@@ -14,7 +14,7 @@ from typing import Any, Protocol
 
 from geomech.io.files import note
 from geomech.run.backend import BACKENDS, VERSION, fastest
-from rft.core.refusal import Refusal, formatted, worded
+from rft.core.refusal import Refusal, formatted, spell_arguments
 
 PENDING_PER_WORKER = 4  # tasks that are submitted before the oldest is finished
 LONGEST_END = 2.0  # s for a pool to notice that its processes were killed
@@ -268,7 +268,7 @@ class Cluster:
         if future.done() or self.has_warned or self._count_threads():
             return
         note(
-            f"{worded(self.place)}: no workers are left: waiting for others "
+            f"{spell_arguments(self.place)}: no workers are left: waiting for others "
             f"('dask worker {self.address}')"
         )
         self.has_warned = True
@@ -283,7 +283,7 @@ class Cluster:
             meaning = "the scheduler, or the connection to it, was lost"
         else:
             meaning = f"{name}: {formatted(str(error), 120)}"
-        return RuntimeError(f"{worded(self.place)}: {meaning}")
+        return RuntimeError(f"{spell_arguments(self.place)}: {meaning}")
 
     def close(self) -> None:
         with contextlib.suppress(Exception):

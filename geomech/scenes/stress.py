@@ -20,7 +20,7 @@ from geomech.scenes.key import Word
 from geomech.scenes.reader import Source, build
 from geomech.scenes.sections import Alternatives
 from rft.core.checks import Number
-from rft.core.refusal import Refusal, before, located
+from rft.core.refusal import Refusal, located, place_prefix
 from rft.terradynamics.meshes import Spatial
 from rft.terradynamics.plates import VERTICAL, PlateDrags, PlateStress, StressMap
 from rft.terradynamics.plates.stress import COEFFICIENTS
@@ -206,7 +206,7 @@ def plate_rows(place: str, file) -> np.ndarray:
 def plate_drags(place: str, file) -> PlateDrags:
     """Return the stress map through the plate drags of a CSV file (`plate_rows`)."""
     beta, gamma, a_x, a_z = plate_rows(place, file)
-    with located(f"{before(place)}{Path(file).name}"):
+    with located(f"{place_prefix(place)}{Path(file).name}"):
         return PlateDrags(*map(tuple, (np.radians(beta), np.radians(gamma), a_x, a_z)))
 
 
@@ -255,4 +255,4 @@ def _read_stress(source: Source, place: str, file: str) -> PlateStress:
                 where=place,
                 instead="copy the coefficients",
             )
-    return build(source, f"{before(place)}{path.name}", table, StressKeys)
+    return build(source, f"{place_prefix(place)}{path.name}", table, StressKeys)

@@ -11,7 +11,7 @@ from geomech.geometry.traits import NOTHING
 from geomech.systems.base import SYSTEMS
 from rft.bodies import BODIES
 from rft.bodies.base import Length
-from rft.bodies.positions import Posed
+from rft.bodies.positions import PosedLinks
 from rft.core.registry import REGISTRIES
 
 
@@ -70,7 +70,7 @@ def _body_class(function: Callable) -> type:
             ),
         ),
     }
-    return _built(function, fields, members, Posed)
+    return _built(function, fields, members, PosedLinks)
 
 
 def _fields(parameters: list[inspect.Parameter]) -> list[tuple]:

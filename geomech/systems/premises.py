@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from geomech.systems.base import System, kind_of
 from geomech.systems.capabilities import Composite, Part, capability
-from rft.core.premise import Premise, negated
+from rft.core.premise import Premise, negation
 from rft.core.refusal import Refusal
 
 CURES = {"law": ", or take another law", "effect": ", or drop the effect"}
@@ -26,7 +26,7 @@ def because(system: System, premises: Premise) -> str:
     for part in broken(system, premises):
         if part.role == "law":
             return f"the law {part.name}, whose drag is of no one power of the speed"
-        return f"{_named(part)}, which is {negated(part.breaks)}"
+        return f"{_named(part)}, which is {negation(part.breaks)}"
     return ""
 
 

@@ -3,6 +3,7 @@ the compiled driver compiles."""
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -55,27 +56,31 @@ def with_frame_velocity(problem: Problem, v, x, y, theta) -> tuple[tuple, tuple]
 def loads(problem: Problem, v, rounding) -> list:
     """Return pairs of `Elements` and their `Load`, for the sides and, if there are any,
     for the points, at velocities v over the scale of speed."""
-    p = problem
     sides = problem.sides
     points = problem.points
+    additions = problem.additions
     speed = problem.law_speed_scale
     v_sides, v_points = (times(speed, u) for u in v)
     rounding = rounding * speed
-    additions = p.additions
     load = side_load(
-        p.law,
+        problem.law,
         v_sides,
         rounding,
         sides.factor,
         sides.incline,
-        p.quadratic_drag,
-        p.memory,
+        problem.quadratic_drag,
+        problem.memory,
         additions,
     )
     if not len(points.station):
         return [(sides.elements, load)]
     on_points = point_load(
-        p.point_terms, v_points, rounding, points.factor, points.incline, additions
+        problem.point_terms,
+        v_points,
+        rounding,
+        points.factor,
+        points.incline,
+        additions,
     )
     return [(sides.elements, load), (points.elements, on_points)]
 
@@ -94,11 +99,8 @@ def frame_net(problem: Problem, v, rounding, x, y, theta, mass=None) -> Net:
     for other in of_points:
         net = Net(*map(plus, net, other))
     if problem.momentum_rate is not None:
-        mass = (
-            frame_inertia(problem.sides.elements, problem.momentum_rate)
-            if mass is None
-            else mass
-        )
+        if mass is None:
+            mass = frame_inertia(problem.sides.elements, problem.momentum_rate)
         net = with_momentum(net, x, y, theta, row(mass), speed[0])
     return net
 
@@ -109,9 +111,8 @@ def nets(
     """Return the entries of `Net` (5, 3, B) at velocities v (3, n, B) of elements,
     those of points last, and xi (3, B) of the frame."""
     n = len(problem.sides.station)
-    return np.array(
-        frame_net(problem, (tuple(v[:, :n]), tuple(v[:, n:])), rounding, *xi)
-    )
+    v_by_contact = tuple(v[:, :n]), tuple(v[:, n:])
+    return np.array(frame_net(problem, v_by_contact, rounding, *xi))
 
 
 def sum_elements(net: Net) -> Net:
@@ -126,7 +127,9 @@ def slowest2(v) -> np.ndarray:
         for v_t, v_n, v_w in v
         if len(v_t)
     ]
-    return least[0] if len(least) == 1 else np.minimum(*least)
+    if len(least) == 1:
+        return least[0]
+    return np.minimum(*least)
 
 
 def row(record) -> Any:
@@ -143,16 +146,12 @@ def solve(
     guess: (3, B) or None. Velocities are over the scale of speed."""
     size = problem.n_samples
     fresh = guess is None
-    iterate = first_iterate(
-        *(np.zeros((3, size)) if fresh else guess),
-        descent.first,
-        np.full(size, float(fresh)),
-    )
-    mass = (
-        None
-        if problem.momentum_rate is None
-        else frame_inertia(problem.sides.elements, problem.momentum_rate)
-    )
+    if fresh:
+        guess = np.zeros((3, size))
+    iterate = first_iterate(*guess, descent.first, np.full(size, float(fresh)))
+    mass = None
+    if problem.momentum_rate is not None:
+        mass = frame_inertia(problem.sides.elements, problem.momentum_rate)
     active = np.ones(size, bool)
     index = np.arange(size)
     v = velocities(problem)
@@ -165,11 +164,10 @@ def solve(
         iterate, accepted, finished = newton_step(
             iterate, net, slowest2(v_next), row(problem.frame), descent, limits
         )
-        v = (
-            v_next
-            if accepted.all()
-            else mapped(lambda a, b: np.where(accepted, a, b), v_next, v)
-        )
+        if accepted.all():
+            v = v_next
+        else:
+            v = mapped(functools.partial(np.where, accepted), v_next, v)
         ended = finished & active
         if ended.any():
             out[:, index[ended]] = np.stack(result(take(iterate, ended), limits))

@@ -74,5 +74,6 @@ def preferred() -> str:
 def compiles(backend: str, law) -> bool:
     """Return whether compiled code solves the balances of a law, given by its
     record."""
-    chosen = preferred() if backend == "auto" else backend
-    return chosen == "numba" and installed() and is_compilable(law)
+    if backend == "auto":
+        backend = preferred()
+    return backend == "numba" and installed() and is_compilable(law)

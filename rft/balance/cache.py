@@ -75,18 +75,17 @@ class Cache(_Cache):
     def load_overload(self, sig, target_context) -> CompileResult | None:
         """Return the compiled code for a signature; None if it has yet to be
         compiled."""
-        if (data := self.read()) is None:
+        data = self.read()
+        if data is None:
             return None
         target_context.refresh()
         try:
             saved, reduced = pickle.loads(data)
-            return (
-                CompileResult._rebuild(target_context, *reduced)
-                if saved == str(sig)
-                else None
-            )
-        # an undamaged file may still be one that LLVM or pickle cannot load
+            if saved != str(sig):
+                return None
+            return CompileResult._rebuild(target_context, *reduced)
         except Exception as error:
+            # An undamaged file may still be one that LLVM or pickle cannot load.
             return self.rename(f"it cannot be loaded ({type(error).__name__})")
 
     def save_overload(self, sig, data) -> None:
@@ -101,7 +100,8 @@ class Cache(_Cache):
         except OSError as error:
             cure = "make room there, or set NUMBA_CACHE_DIR"
             note(
-                f"compiled code is not kept in {self.path.parent}: {error.strerror}; {cure}"
+                f"compiled code is not kept in {self.path.parent}: {error.strerror}; "
+                f"{cure}"
             )
         finally:
             with contextlib.suppress(OSError):
@@ -117,7 +117,10 @@ class Cache(_Cache):
         except OSError as error:
             action = f"it cannot be renamed ({error.strerror}): remove it"
         else:
-            action = f"renamed {other.name}; it is compiled anew, python -m rft does that at once"
+            action = (
+                f"renamed {other.name}; it is compiled anew, python -m rft does that at "
+                "once"
+            )
         note(f"the compiled code in {self.path} is not taken, {why}: {action}")
 
     def enable(self) -> None:
@@ -172,7 +175,7 @@ def _fault(report: str) -> tuple[str, str]:
         return "a formula", report.strip().partition("\n")[0]
     _, path, number = min(places, key=lambda place: place[0])
     lines = linecache.getlines(path)
-    text = lines[number - 1].strip() if number <= len(lines) else ""
+    text = "".join(lines[number - 1 : number]).strip()
     name = _function_at("".join(lines), number)
     return f"{name} ({Path(path).name}, line {number})", text
 
@@ -212,10 +215,8 @@ def digest(function, *modules) -> str:
     def visit(x):
         x = getattr(x, "py_func", x)
         if isinstance(x, types.FunctionType):
-            if id(x) not in seen and x.__module__ not in (
-                vectors.__name__,
-                simd.__name__,
-            ):
+            is_in_source = x.__module__ in (vectors.__name__, simd.__name__)
+            if id(x) not in seen and not is_in_source:
                 seen.add(id(x))
                 visit_code(x.__code__, x)
                 for cell in x.__closure__ or ():
@@ -223,9 +224,8 @@ def digest(function, *modules) -> str:
                 visit(x.__defaults__)
         elif isinstance(x, type) and issubclass(x, tuple):
             # Compiled code refers to the module of a record's class.
-            parts.append(
-                repr((x.__module__, x.__name__, getattr(x, "_fields", ()))).encode()
-            )
+            identity = x.__module__, x.__name__, getattr(x, "_fields", ())
+            parts.append(repr(identity).encode())
             for name, value in sorted(vars(x).items()):
                 if isinstance(value, types.FunctionType) and not name.startswith("_"):
                     parts.append(name.encode())
@@ -238,9 +238,10 @@ def digest(function, *modules) -> str:
     def visit_code(code, function):
         parts.append(code.co_code)
         for constant in code.co_consts:
-            visit_code(constant, function) if isinstance(
-                constant, types.CodeType
-            ) else parts.append(repr(constant).encode())
+            if isinstance(constant, types.CodeType):
+                visit_code(constant, function)
+            else:
+                parts.append(repr(constant).encode())
         named = [function.__globals__.get(name) for name in code.co_names]
         modules = [
             x

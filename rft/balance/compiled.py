@@ -222,12 +222,12 @@ def kernel(Law: type):
         size = out.shape[1]
         n = len(sides[0][0])
         m = points[0].shape[1]
-        by_elements = size * (ceil_divide(n, WIDTH) + m) < ceil_divide(size, WIDTH) * (
-            n + m
-        )
-        slots, count = (
-            (1, WIDTH) if by_elements else (WIDTH, 1)
-        )  # samples at once, elements of one in a vector
+        vectors_by_elements = size * (ceil_divide(n, WIDTH) + m)
+        vectors_by_samples = ceil_divide(size, WIDTH) * (n + m)
+        by_elements = vectors_by_elements < vectors_by_samples
+        # slots: samples at once. count: elements of one sample in a vector.
+        slots = 1 if by_elements else WIDTH
+        count = WIDTH if by_elements else 1
         n_sides = ceil_divide(n, count)
         rows = np.ones((n_sides + m, ROWS, WIDTH))
         v = np.zeros((len(rows), 3, WIDTH))
@@ -246,14 +246,12 @@ def kernel(Law: type):
                     end = WIDTH if by_elements else slot + 1
                     fill_contact(rows[:n_sides], sides, count, slot, end, i)
                     fill_contact(rows[n_sides:], points, 1, slot, end, i)
-                    dx, dy, dtheta = (
-                        (0.0, 0.0, 0.0)
-                        if fresh
-                        else (guess[0, i], guess[1, i], guess[2, i])
-                    )
-                    first = first_iterate(
-                        dx, dy, dtheta, descent.first, 1.0 if fresh else 0.0
-                    )
+                    if fresh:
+                        first = first_iterate(0.0, 0.0, 0.0, descent.first, 1.0)
+                    else:
+                        first = first_iterate(
+                            guess[0, i], guess[1, i], guess[2, i], descent.first, 0.0
+                        )
                     for lane in range(slot, end):
                         for k in range(len(rows)):
                             for j in range(3):
@@ -363,7 +361,9 @@ def net_kernel(Law: type):
 def plain(x) -> np.ndarray:
     """Return an array as doubles in C order that may be written to, the only form that
     kernels are compiled for."""
-    return x if x.dtype is DOUBLE and x.flags.carray else np.array(x, float, order="C")
+    if x.dtype is DOUBLE and x.flags.carray:
+        return x
+    return np.array(x, float, order="C")
 
 
 def plain_arrays(record) -> tuple[np.ndarray, ...]:
@@ -384,7 +384,9 @@ def kernel_number(x) -> np.ndarray | float:
     rule as a column."""
     if not isinstance(x, np.ndarray) or x.ndim == 0:
         return float(x)
-    return plain(x.reshape(-1, 1) if x.ndim > 2 else x)
+    if x.ndim > 2:
+        x = x.reshape(-1, 1)
+    return plain(x)
 
 
 def load_arguments(problem: Problem) -> tuple:
@@ -395,27 +397,26 @@ def load_arguments(problem: Problem) -> tuple:
     p = problem
     additions = problem.additions
     has_points = len(p.points.station) > 0
-    ground = (
-        stacked((p.quadratic_drag, *p.memory))
-        if additions.quadratic or additions.memory
-        else NO_ROWS
-    )
-    factors = [
-        NO_ROWS if c.factor is NO_FACTOR else stacked(c.factor)
-        for c in (p.sides, p.points)
-    ]
-    inclines = [
-        stacked(c.incline) if additions.incline else NO_ROWS
-        for c in (p.sides, p.points)
-    ]
+    ground = NO_ROWS
+    if additions.quadratic or additions.memory:
+        ground = stacked((p.quadratic_drag, *p.memory))
+
+    factors = [NO_ROWS, NO_ROWS]
+    inclines = [NO_ROWS, NO_ROWS]
+    for k, contact in enumerate((p.sides, p.points)):
+        if contact.factor is not NO_FACTOR:
+            factors[k] = stacked(contact.factor)
+        if additions.incline:
+            inclines[k] = stacked(contact.incline)
+
+    elements = NO_POINTS
+    terms = NO_TERMS
+    if has_points:
+        elements = stacked(p.points.elements)
+        terms = plain(p.point_terms[..., 0].transpose(2, 0, 1))
+
     sides = plain_arrays(p.sides.elements), factors[0], ground, inclines[0]
-    points = (
-        stacked(p.points.elements) if has_points else NO_POINTS,
-        factors[1],
-        NO_ROWS,
-        inclines[1],
-    )
-    terms = plain(p.point_terms[..., 0].transpose(2, 0, 1)) if has_points else NO_TERMS
+    points = elements, factors[1], NO_ROWS, inclines[1]
     frame = (*plain_arrays(p.frame), plain(p.law_speed_scale))
     return tuple(map(kernel_number, p.law)), sides, points, terms, frame, additions
 
@@ -431,9 +432,8 @@ def nets(
     if p.momentum_rate is None:
         return out
     mass = mapped(lambda x: x[0], frame_inertia(p.sides.elements, p.momentum_rate))
-    return np.array(
-        with_momentum(Net(*map(tuple, out)), *xi, mass, p.law_speed_scale[0])
-    )
+    net = Net(*map(tuple, out))
+    return np.array(with_momentum(net, *xi, mass, p.law_speed_scale[0]))
 
 
 def solve(
@@ -442,11 +442,11 @@ def solve(
     """Solve all samples by one descent as `rft.balance.arrays.solve` does."""
     p = problem
     out = np.empty((RESULT_ROWS, problem.n_samples))
-    mass = (
-        NO_ROWS
-        if p.momentum_rate is None
-        else stacked(frame_inertia(p.sides.elements, p.momentum_rate))
-    )
-    guess = NO_GUESS if guess is None else plain(guess)
+    mass = NO_ROWS
+    if p.momentum_rate is not None:
+        mass = stacked(frame_inertia(p.sides.elements, p.momentum_rate))
+    if guess is None:
+        guess = NO_GUESS
+    guess = plain(guess)
     kernel(type(p.law))(load_arguments(p), mass, guess, descent, limits, out)
     return out

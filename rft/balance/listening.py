@@ -12,11 +12,11 @@ Listener = Callable[
 ]  # samples, places of each where the law is evaluated, whether it is linear
 
 
-def nobody(samples: int, points: int, linear: bool) -> None:
+def no_listener(samples: int, points: int, linear: bool) -> None:
     """Hear nothing."""
 
 
-_listener: ContextVar[Listener] = ContextVar("listener", default=nobody)
+_listener: ContextVar[Listener] = ContextVar("listener", default=no_listener)
 
 
 def listener() -> Listener:

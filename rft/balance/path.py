@@ -60,7 +60,9 @@ def _stacked(triples) -> np.ndarray:
     """Return velocities (3, n, B) of all elements, those of the sides first, from
     triples of the sides and of the points."""
     stacks = [np.array(u) for u in triples]
-    return stacks[0] if len(stacks) == 1 else np.concatenate(stacks, 1)
+    if len(stacks) == 1:
+        return stacks[0]
+    return np.concatenate(stacks, 1)
 
 
 def _contacts(problem: Problem) -> list:
@@ -81,11 +83,11 @@ def _wrench(problem: Problem, force: np.ndarray) -> np.ndarray:
     """Return force and moment on the frame (3, B) of forces on all elements (3, n, B),
     with their weights."""
     n = len(problem.sides.station)
-    by_contact = [
-        (contact.elements, f)
-        for contact, f in zip(_contacts(problem), (force[:, :n], force[:, n:]))
-    ]
-    return sum(np.array(to_frame(e, *(e.weight * f))).sum(1) for e, f in by_contact)
+    wrench = 0.0
+    for contact, f in zip(_contacts(problem), (force[:, :n], force[:, n:])):
+        e = contact.elements
+        wrench = wrench + np.array(to_frame(e, *(e.weight * f))).sum(1)
+    return wrench
 
 
 def _with_slope(
@@ -96,9 +98,8 @@ def _with_slope(
     evaluations."""
     *net, by_speed = nets(problem, v, rounding, xi)
     net = np.array(net).transpose(1, 0, 2)
-    if (
-        problem.law_speed_scale.shape[-1] == 1
-    ):  # drag stays if velocities and rounding double
+    if problem.law_speed_scale.shape[-1] == 1:
+        # Drag stays if velocities and rounding double.
         return net, -by_speed, 1
     wider = nets(problem, v, (1.0 + DIFFERENCE) * rounding, xi)[0]
     return net, (wider - net[:, 0]) / DIFFERENCE, 2
@@ -176,13 +177,14 @@ class _Walk:
 
     def take(self, index: np.ndarray) -> _Walk:
         """Return the walk of some of the samples."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
-        return _Walk(
-            **{
-                k: x[..., index] if isinstance(x, np.ndarray) else x.take(index)
-                for k, x in values.items()
-            }
-        )
+        selected = {}
+        for field in fields(self):
+            x = getattr(self, field.name)
+            if isinstance(x, np.ndarray):
+                selected[field.name] = x[..., index]
+            else:
+                selected[field.name] = x.take(index)
+        return _Walk(**selected)
 
 
 def follow(
@@ -226,11 +228,23 @@ def _start(nets: Callable, problem: Problem, last: float) -> _Walk:
     base = _Point(xi, v + _to_elements(problem, xi), np.full(size, max(WIDEST, last)))
     tangent = np.zeros((4, size))
     tangent[3] = -1.0
-    zero = np.zeros(size)
-    one = np.ones(size)
-    none = np.zeros(size, int)
-    walk = _Walk(np.arange(size), problem, none + 1, base, tangent, tangent, FIRST_STEP * one, base, tangent, one, zero,
-                 np.zeros((4, 4, size)), none, zero, none > 0)  # fmt: skip
+    walk = _Walk(
+        index=np.arange(size),
+        problem=problem,
+        evaluations=np.ones(size, int),
+        base=base,
+        tangent=tangent,
+        border=tangent,
+        step=np.full(size, FIRST_STEP),
+        point=base,
+        change=tangent,
+        damping=np.ones(size),
+        size=np.zeros(size),
+        matrix=np.zeros((4, 4, size)),
+        corrections=np.zeros(size, int),
+        first_size=np.zeros(size),
+        last=np.zeros(size, bool),
+    )
     _predict(walk, np.ones(size, bool), last)
     return walk
 

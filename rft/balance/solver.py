@@ -30,7 +30,7 @@ from rft.formulas.newton import (
     is_possible,
 )
 
-# an element whose ends are slower than this many times the rounding is at rest
+# An element whose ends are slower than this many times the rounding is at rest.
 STUCK_BELOW = 10.0
 ELEMENTS_TOGETHER = 24576  # elements x nodes x samples in one batch of NumPy
 COMPILED_WORTH = 4096  # samples a thread, below which another thread does not pay
@@ -50,7 +50,7 @@ SLOW = (
 keep_freed_memory()
 
 
-class Solved(NamedTuple):
+class Solutions(NamedTuple):
     """Solutions. xi: (3, B), body velocities. residual, iterations, stuck: (B,),
     residuals, evaluations, and whether an element is at rest. limit: largest residual
     of a solved sample."""
@@ -78,7 +78,7 @@ def solve(
     backend: str = "auto",
     threads: int | None = None,
     guess: np.ndarray | None = None,
-) -> Solved:
+) -> Solutions:
     """Return the body velocities of B samples, in body lengths.
 
     problem_at(index): the `Problem` of the samples ``index``. scale: (B,), its scale of
@@ -109,14 +109,14 @@ def solve(
                 return
             problem = problem_at(index)
             limits = _limits(problem, accuracy)
-            index = slice(None) if index.size == size else index  # a slice is quicker
-            first = guess[:, index] if method is WARM else None
+            if index.size == size:
+                index = slice(None)  # a slice is quicker
+            first = None
+            if method is WARM:
+                first = guess[:, index]
             n_new = problem.n_samples - np.count_nonzero(results[EVALUATIONS, index])
-            store(
-                index,
-                driver.solve(problem, _begin(method, linear, limits), limits, first),
-                limits,
-            )
+            descent = _begin(method, linear, limits)
+            store(index, driver.solve(problem, descent, limits, first), limits)
             if n_new:
                 report(n_new, assembly.n_law_points, linear)
 
@@ -130,17 +130,18 @@ def solve(
                 results[EVALUATIONS, index[i[~solved]]] += ended[EVALUATIONS, ~solved]
 
     unsolved = np.arange(size)
+    methods: list = [QUICK, *WALKS, *SLOW]
     if guess is not None:
+        methods.insert(0, WARM)
         with np.errstate(over="ignore"):
             guess = guess / scale
-    for method in (WARM,) * (guess is not None) + (QUICK, *WALKS, *SLOW):
-        active = (
-            unsolved[is_possible(*guess[:, unsolved])] if method is WARM else unsolved
-        )
+    for method in methods:
+        active = unsolved
+        if method is WARM:
+            active = unsolved[is_possible(*guess[:, unsolved])]
         if active.size and isinstance(method, Descent):
-            run_shares(
-                descend, split(active, thread_count(threads, active.size // worth))
-            )
+            count = thread_count(threads, active.size // worth)
+            run_shares(descend, split(active, count))
         elif active.size:
             walk(active)
         solved = results[RESIDUAL] <= limit
@@ -149,7 +150,7 @@ def solve(
         unsolved = np.flatnonzero(~solved)
     residual, evaluations, slowest = results[RESIDUAL:]
     stuck = (slowest < STUCK_BELOW * accuracy.rounding) & (not linear)
-    return Solved(
+    return Solutions(
         results[:3] * scale,
         residual,
         evaluations.astype(int),
@@ -169,21 +170,19 @@ def compiled_driver() -> ModuleType:
 def _begin(descent: Descent, linear: bool, limits: Limits) -> Descent:
     """Return the descent with the rounding of its first level, which is also the last
     level in a linear medium."""
-    return descent._replace(
-        first=limits.rounding if linear else max(descent.first, limits.rounding)
-    )
+    if linear:
+        return descent._replace(first=limits.rounding)
+    return descent._replace(first=max(descent.first, limits.rounding))
 
 
 def _limits(problem: Problem, accuracy: Accuracy) -> Limits:
     """Return the limits of a problem, whose residual allows for roundoff of the largest
     forces."""
-    residual = accuracy.tolerance + 1e-14 * max(
-        1.0, problem.lateral_drag / problem.axial_drag
-    )
+    largest = max(1.0, problem.lateral_drag / problem.axial_drag)
+    residual = accuracy.tolerance + 1e-14 * largest
     if problem.momentum_rate is not None:
         frame = problem.frame
         m = problem.momentum_rate
-        residual += 1e-14 * np.max(
-            m.rate * m.strength * frame.speed_scale / frame.force_scale
-        )
+        inertia = m.rate * m.strength * frame.speed_scale / frame.force_scale
+        residual += 1e-14 * np.max(inertia)
     return Limits(float(accuracy.rounding), float(residual))

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rft.balance.backend import check
-from rft.balance.solver import Accuracy, Solved, solve
+from rft.balance.solver import Accuracy, Solutions, solve
 from rft.bodies.base import Body, body_size, joint_speed
 from rft.bodies.pieces import PIECES
 from rft.core.checks import in_range, real_array
-from rft.core.premise import negated
-from rft.core.refusal import Refusal
+from rft.core.premise import negation
+from rft.core.refusal import Refusal, require
 from rft.effects.base import Effect, broken_premises, engine
 from rft.effects.contact import assemble
 from rft.laws.base import Medium
@@ -48,7 +48,8 @@ class Solution(NamedTuple):
     Examples
     --------
     >>> from rft import Chain, Viscous, body_velocity
-    >>> solution = body_velocity(Viscous(), Chain(), [[0.5, 0.3], [0.2, 0.1]], [1.0, 0.0])
+    >>> shapes = [[0.5, 0.3], [0.2, 0.1]]
+    >>> solution = body_velocity(Viscous(), Chain(), shapes, [1.0, 0.0])
     >>> solution.xi.shape, bool((solution.residual < 1e-9).all())
     ((2, 3), True)
     """
@@ -61,7 +62,10 @@ class Solution(NamedTuple):
     def __repr__(self) -> str:
         if np.ndim(self.status) == 0:
             xi = ", ".join(f"{x:.6g}" for x in self.xi)
-            return f"Solution(xi = ({xi}), {self.status}, residual {self.residual:.1e}, {self.iterations} iterations)"
+            return (
+                f"Solution(xi = ({xi}), {self.status}, residual {self.residual:.1e}, "
+                f"{self.iterations} iterations)"
+            )
         kinds = ", ".join(
             f"{n} {kind}"
             for kind, n in zip(*np.unique(self.status, return_counts=True))
@@ -75,7 +79,8 @@ class Solution(NamedTuple):
         if unconverged:
             worst = float(np.max(self.residual))
             raise RuntimeError(
-                f"{unconverged} of {self.status.size} force balances did not converge (worst residual {worst:.1e}): "
+                f"{unconverged} of {self.status.size} force balances did not converge "
+                f"(worst residual {worst:.1e}): "
                 "raise 'regularisation', or report the scene"
             )
         return self
@@ -135,7 +140,7 @@ def body_velocity(
     (array([ 0.015 ,  0.0161, -0.1929]), 'sliding')
     """
     if effects != () and engine(effects) != "algebraic":
-        broken = negated(broken_premises(effects))
+        broken = negation(broken_premises(effects))
         raise Refusal(
             f"no body velocity follows from shape alone where effects are {broken}",
             instead="use rft.time_steps",
@@ -146,10 +151,11 @@ def body_velocity(
     if threads is not None:
         in_range("threads", threads, 1, 1024, whole=True)
     batch = alpha.shape[:-1]
-    guess = None if start is None else _guess(start, batch, body_size(body))
-    alpha, alphadot = (
-        np.ascontiguousarray(x.reshape(-1, body.joints).T) for x in (alpha, alphadot)
-    )
+    guess = None
+    if start is not None:
+        guess = _guess(start, batch, body_size(body))
+    alpha = np.ascontiguousarray(alpha.reshape(-1, body.joints).T)
+    alphadot = np.ascontiguousarray(alphadot.reshape(-1, body.joints).T)
     speed = joint_speed(body, alphadot)
     moving = speed > 0
     if not moving.all():  # a body whose joints are at rest is at rest
@@ -158,7 +164,8 @@ def body_velocity(
         alpha = alpha[:, index]
         alphadot = alphadot[:, index]
         speed = speed[index]
-        guess = None if guess is None else guess[:, index]
+        if guess is not None:
+            guess = guess[:, index]
 
     def problem_at(index):
         if index.size == speed.size:
@@ -186,13 +193,13 @@ def body_velocity(
     return Solution(xi, *(x.reshape(batch) for x in (residual, status, iterations)))
 
 
-def _with_samples_at_rest(solved: Solved, moving: np.ndarray) -> Solved:
+def _with_samples_at_rest(solved: Solutions, moving: np.ndarray) -> Solutions:
     """Return the solution of all samples from that of those which are ``moving``
     (B,)."""
     size = moving.size
     if solved.stuck.size == size:
         return solved
-    full = Solved(
+    full = Solutions(
         np.zeros((3, size)),
         np.zeros(size),
         np.zeros(size, int),
@@ -208,21 +215,24 @@ def _guess(start, batch: tuple, length: float) -> np.ndarray:
     """Return ``start`` as a guess (3, B) in body lengths; ValueError if it does not
     broadcast to xi."""
     start = real_array("start", start)
-    fits = (
+    shape = *batch, 3
+    require(
         start.shape[-1:] == (3,)
-        and not np.isinf(start).any()
-        and start.ndim <= len(batch) + 1
+        and _broadcasts(start.shape, shape)
+        and not np.isinf(start).any(),
+        f"start must be body velocities, {shape}, finite or nan where none is known",
     )
-    try:
-        start = np.broadcast_to(start, (*batch, 3)) if fits else None
-    except ValueError:
-        start = None
-    if start is None:
-        raise Refusal(
-            f"start must be body velocities, {(*batch, 3)}, finite or nan where none is known"
-        )
+    start = np.broadcast_to(start, shape)
     with np.errstate(over="ignore"):
         return start.reshape(-1, 3).T / [[length], [length], [1.0]]
+
+
+def _broadcasts(shape: tuple, to: tuple) -> bool:
+    """Return whether an array of one shape broadcasts to another."""
+    try:
+        return np.broadcast_shapes(shape, to) == to
+    except ValueError:
+        return False
 
 
 def checked_input(body, alpha, alphadot, regularisation, tolerance) -> list[np.ndarray]:
@@ -239,21 +249,16 @@ def checked_input(body, alpha, alphadot, regularisation, tolerance) -> list[np.n
                 value=x.shape,
             )
         size = np.abs(x)
-        if not size.max(initial=0.0) <= largest:
-            if not np.isfinite(x).all():
-                raise Refusal(
-                    f"{name} must be finite, got {float(x[~np.isfinite(x)][0])}"
-                )
+        has_digits = size.max(initial=0.0) <= largest
+        if not has_digits and not np.isfinite(x).all():
+            raise Refusal(f"{name} must be finite, got {float(x[~np.isfinite(x)][0])}")
+        # The second minimum takes longer, and is only needed where some rate is 0.
+        if name == "alphadot" and size.min(initial=1.0) < LEAST_RATE:
+            has_digits &= size.min(initial=1.0, where=size > 0) >= LEAST_RATE
+        if not has_digits:
             raise Refusal(
-                f"{name} must be 0 or of a size that leaves digits to compute with, got {x.ravel()[:4]}"
-            )
-        if (
-            name == "alphadot"
-            and size.min(initial=1.0) < LEAST_RATE
-            and size.min(initial=1.0, where=size > 0) < LEAST_RATE
-        ):
-            raise Refusal(
-                f"{name} must be 0 or of a size that leaves digits to compute with, got {x.ravel()[:4]}"
+                f"{name} must be 0 or of a size that leaves digits to compute with, "
+                f"got {x.ravel()[:4]}"
             )
         arrays.append(x)
     if arrays[0].shape == arrays[1].shape:

@@ -28,7 +28,7 @@ PIECES_PER_VARIABLE = 3
 JOINED = 1e-9  # of the body's length, between links that meet
 
 
-class Posed(Links):
+class PosedLinks(Links):
     """Base of bodies with a function ``positions`` of shapes alpha (..., joints), or of
     one shape (joints,), that returns the poses (..., n, 3) of the links: x, y of the
     centre, in the unit of ``lengths``, and heading theta, rad.
@@ -71,10 +71,10 @@ class Posed(Links):
             continuous = enough and links >= PIECES_OF_A_CURVE
         return links if continuous else None
 
-    def with_elements(self, count: int) -> Resampled:
+    def with_elements(self, count: int) -> ResampledLinks:
         """Return the body of ``count`` equal links on the same curve, in the frame
         "mean"."""
-        return Resampled(self, count)
+        return ResampledLinks(self, count)
 
     def resampled(self, shape: ArrayLike, count: int) -> np.ndarray:
         """Return shapes, or rates, (..., joints) as those of `with_elements`: the
@@ -148,7 +148,7 @@ class Posed(Links):
 
 
 @dataclass(frozen=True)
-class Positions(Posed):
+class Positions(PosedLinks):
     """Links whose poses the function ``positions`` gives, such as a backbone function
     of sysplotter.
 
@@ -185,11 +185,11 @@ class Positions(Posed):
 
 
 @dataclass(frozen=True)
-class Resampled(Posed):
+class ResampledLinks(PosedLinks):
     """``count`` equal links on the curve through the links of a body, by splines: of
     their headings where links join, so that these join too, else of their poses."""
 
-    inner: Posed
+    inner: PosedLinks
     count: int
     frame: str = "mean"
 

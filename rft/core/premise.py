@@ -36,7 +36,7 @@ ALL = ~Premise(0)
 SHAPE_ALONE = Premise.SE2_SYMMETRIC | Premise.MEMORYLESS | Premise.QUASI_STATIC
 
 
-def negated(broken: Premise) -> str:
+def negation(broken: Premise) -> str:
     """Return the description of something that breaks premises, such as "not
     memoryless, not quasi-static"."""
     return ", ".join(f"not {word}" for word in broken.words)

@@ -15,7 +15,7 @@ from typing import Any
 ARGUMENT = re.compile("``([^`]+)``")  # in the words of a refusal
 
 
-def worded(words: str, spelled: Callable[[str], str] = str) -> str:
+def spell_arguments(words: str, spelled: Callable[[str], str] = str) -> str:
     """Return words with each argument that they name in double backticks as ``spelled``
     returns it, by default bare."""
     return ARGUMENT.sub(lambda match: spelled(match[1]), words)
@@ -27,7 +27,7 @@ class Refusal(ValueError):
     what: what is wrong. value: what was given, where that says more. where: the place,
     outermost first (file or scene, section, key, argument). because: why it cannot be.
     instead: what to give or to do. The name of an argument stands in double backticks:
-    Python shows it bare, and a command as its option (`said`).
+    Python shows it bare, and a command as its option (`as_line`).
 
     Examples
     --------
@@ -58,31 +58,33 @@ class Refusal(ValueError):
         self.where = tuple(map(str, places))
 
     def __str__(self) -> str:
-        return self.said(str)
+        return self.as_line(str)
 
-    def said(self, spelled: Callable[[str], str]) -> str:
+    def as_line(self, spelled: Callable[[str], str]) -> str:
         """Return the refusal as a line. spelled: returns what a reader types for the
         name of an argument."""
-        text = worded(self.what, spelled)
+        text = spell_arguments(self.what, spelled)
         if self.value is not ...:
             text = f"{text}, got {formatted(self.value)}"
-        reasons = [worded(x, spelled) for x in (self.because, self.instead) if x]
+        reasons = [
+            spell_arguments(x, spelled) for x in (self.because, self.instead) if x
+        ]
         if reasons:
             text = f"{text}: {'; '.join(reasons)}"
         for place in reversed(self.where):
-            text = before(worded(place, spelled)) + text
+            text = place_prefix(spell_arguments(place, spelled)) + text
         return line(text)
 
     def within(self, place: object) -> Refusal:
         """Return the refusal with a place before its own, unless it names that
         already."""
-        names = (str(place), line(worded(str(place))))
-        if not str(self).startswith(tuple(map(before, names))):
+        names = (str(place), line(spell_arguments(str(place))))
+        if not str(self).startswith(tuple(map(place_prefix, names))):
             self.where = (str(place), *self.where)
         return self
 
 
-def before(place: str) -> str:
+def place_prefix(place: str) -> str:
     """Return a place as it stands before what is wrong there."""
     if place.endswith("]"):
         return f"{place} "

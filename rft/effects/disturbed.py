@@ -159,7 +159,7 @@ class DisturbedGround(Effect):
         tile, row, patch = self.location(i, j)
         share = np.stack([1 - x, x])[:, None] * np.stack([1 - y, y])
         sample = np.arange(tiles.owner.shape[1])
-        _, value, index = tiles.copied(tile)
+        _, value, index = tiles.copies(tile)
         is_stored = tiles.owner[tile, sample] == patch
         value = share * value[index, row, sample]
         return np.where(is_stored, value, 0.0).sum((0, 1))
@@ -179,7 +179,7 @@ class DisturbedGround(Effect):
         owner = tiles.owner.copy()
         sample = np.arange(tiles.owner.shape[1])
         owner[tile, sample] = patch
-        touched, value, index = tiles.copied(tile)
+        touched, value, index = tiles.copies(tile)
         value *= (owner == tiles.owner)[touched, None]
         disturbance = np.clip(1.5 - distance / self.radius, 0.0, 1.0)
         np.maximum.at(value, (index, row, sample), disturbance)
@@ -204,7 +204,7 @@ class Tiles(NamedTuple):
     value: tuple[np.ndarray, ...]
     owner: np.ndarray
 
-    def copied(self, tile: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def copies(self, tile: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the K different tiles among ``tile``, copies of their values
         (K, cells, B), and for each entry of ``tile`` its index into these."""
         touched = np.flatnonzero(np.bincount(tile.ravel(), minlength=len(self.value)))

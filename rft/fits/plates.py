@@ -67,18 +67,14 @@ class StressFit:
     @property
     def intervals(self) -> np.ndarray:
         """Intervals (9, 2) of 95 %, N/cm^3."""
-        return self.values[:, None] + student_factor(self.free) * self.errors[
-            :, None
-        ] * [-1.0, 1.0]
+        half = student_factor(self.free) * self.errors
+        return np.stack([self.values - half, self.values + half], -1)
 
     @property
     def undetermined(self) -> list[str]:
         """Names of the coefficients that the data do not determine."""
-        return [
-            name
-            for name, share in zip(COEFFICIENTS, self.resolution)
-            if share < DETERMINED
-        ]
+        shares = zip(COEFFICIENTS, self.resolution)
+        return [name for name, share in shares if share < DETERMINED]
 
     def least_known(self) -> tuple[float, float]:
         """Return the (beta, gamma), rad in steps of 15 degrees, at which the map has
@@ -116,9 +112,8 @@ class ZetaFit:
     @property
     def interval(self) -> np.ndarray:
         """Interval (2,) of 95 % of zeta."""
-        return self.zeta + student_factor(self.free) * self.error * np.array(
-            [-1.0, 1.0]
-        )
+        half = student_factor(self.free) * self.error
+        return np.array([self.zeta - half, self.zeta + half])
 
 
 def fit_stress(beta, gamma, alpha_x, alpha_z) -> StressFit:
@@ -156,10 +151,9 @@ def fit_zeta(depth, force, area) -> ZetaFit:
     """Return zeta fitted to (N,) forces, N upwards, on a level plate of ``area``, m^2,
     one number or (N,), that is pushed straight down to ``depth``, m: F = zeta
     alpha_z(0, 90 degrees) |z| A. Rows above the surface do not count."""
-    depth, force, area = (
-        np.atleast_1d(real_array(*x))
-        for x in (("depth", depth), ("force", force), ("area", area))
-    )
+    depth = np.atleast_1d(real_array("depth", depth))
+    force = np.atleast_1d(real_array("force", force))
+    area = np.atleast_1d(real_array("area", area))
     require(
         depth.ndim == 1 and depth.shape == force.shape,
         "depth and force must be equally many numbers",
@@ -176,10 +170,11 @@ def fit_zeta(depth, force, area) -> ZetaFit:
     require(bool((area >= 1 / LARGEST).all()), "the area of the plate must be above 0")
     order = np.argsort(depth, kind="stable")
     order = order[depth[order] > 1 / LARGEST]
-    needed = f"{FEWEST_DEPTHS} to {MOST_ROWS} depths below the surface are needed"
-    within = FEWEST_DEPTHS <= order.size <= MOST_ROWS
     require(
-        within, f"{needed}, got {order.size}", because="depth is positive downwards"
+        FEWEST_DEPTHS <= order.size <= MOST_ROWS,
+        f"{FEWEST_DEPTHS} to {MOST_ROWS} depths below the surface are needed, "
+        f"got {order.size}",
+        because="depth is positive downwards",
     )
     d = depth[order]
     f = force[order]
@@ -195,8 +190,16 @@ def fit_zeta(depth, force, area) -> ZetaFit:
     residuals = f - zeta * per_zeta
     error = math.sqrt((residuals @ residuals) / (len(f) - 1) / (per_zeta @ per_zeta))
     error = max(error * _correlation_factor(residuals), EXACT**2 * zeta)
+    zero, zero_error = _zero(d, f / a)
     return ZetaFit(
-        zeta, error, float(len(f) - 1), d, f, zeta * per_zeta, *_zero(d, f / a)
+        zeta,
+        error,
+        free=float(len(f) - 1),
+        depth=d,
+        force=f,
+        law=zeta * per_zeta,
+        zero=zero,
+        zero_error=zero_error,
     )
 
 
@@ -204,20 +207,22 @@ def check_strength(zeta: float, units: str) -> None:
     """Raise ValueError if no grains have this zeta; the message names the right
     units."""
     low, high = STRENGTHS
-    message = f"zeta = {zeta:.3g} is that of no grains ({low:g} to {high:g}): check the units, {units}"
-    require(low <= zeta <= high, message)
+    require(
+        low <= zeta <= high,
+        f"zeta = {zeta:.3g} is that of no grains ({low:g} to {high:g}): "
+        f"check the units, {units}",
+    )
 
 
 def _drags(beta, gamma, alpha_x, alpha_z) -> np.ndarray:
     """Return the drags as rows (4, N); ValueError for wrong lengths, too few or too
     many, or numbers out of range."""
-    names = ("beta", "gamma", "alpha_x", "alpha_z")
-    rows = [
-        np.atleast_1d(real_array(name, x))
-        for name, x in zip(names, (beta, gamma, alpha_x, alpha_z))
-    ]
-    same = all(x.ndim == 1 and x.shape == rows[0].shape for x in rows)
-    require(same, "beta, gamma, alpha_x and alpha_z must be equally many numbers")
+    columns = {"beta": beta, "gamma": gamma, "alpha_x": alpha_x, "alpha_z": alpha_z}
+    rows = [np.atleast_1d(real_array(name, x)) for name, x in columns.items()]
+    require(
+        all(x.shape == (rows[0].size,) for x in rows),
+        "beta, gamma, alpha_x and alpha_z must be equally many numbers",
+    )
     rows = np.stack(rows)
     require(
         bool((np.abs(rows) <= LARGEST).all()),
@@ -249,50 +254,35 @@ def _generic(design, y) -> tuple[float, float]:
     the drags ``y``."""
     shape = design @ GENERIC
     zeta = float(shape @ y / (shape @ shape))
-    return zeta, float(
-        np.sqrt(np.mean((y - max(zeta, 0.0) * shape) ** 2) / np.mean(y * y))
-    )
+    residual = y - max(zeta, 0.0) * shape
+    return zeta, float(np.sqrt(np.mean(residual**2) / np.mean(y * y)))
 
 
+# Slips of columns, signs and angles, and the rows (beta, gamma, alpha_x, alpha_z) that
+# were meant.
 MISTAKES = {
     "alpha_x and alpha_z are swapped": lambda b, g, x, z: (b, g, z, x),
     "beta and gamma are swapped": lambda b, g, x, z: (g, b, x, z),
-    "alpha_x has the other sign: positive is against the motion's x": lambda b, g, x, z: (
-        b,
-        g,
-        -x,
-        z,
+    "alpha_x has the other sign: positive is against the motion's x": (
+        lambda b, g, x, z: (b, g, -x, z)
     ),
-    "alpha_z has the other sign: positive is upwards": lambda b, g, x, z: (b, g, x, -z),
-    "both stresses have the other sign: they are those on the plate": lambda b, g, x, z: (
-        b,
-        g,
-        -x,
-        -z,
+    "alpha_z has the other sign: positive is upwards": (
+        lambda b, g, x, z: (b, g, x, -z)
     ),
-    "gamma has the other sign: positive is below the horizontal": lambda b, g, x, z: (
-        b,
-        -g,
-        x,
-        z,
+    "both stresses have the other sign: they are those on the plate": (
+        lambda b, g, x, z: (b, g, -x, -z)
     ),
-    "beta has the other sign: positive if the forward edge is up": lambda b, g, x, z: (
-        -b,
-        g,
-        x,
-        z,
+    "gamma has the other sign: positive is below the horizontal": (
+        lambda b, g, x, z: (b, -g, x, z)
     ),
-    "beta is from the vertical: 0 is a plate that lies flat": lambda b, g, x, z: (
-        np.pi / 2 - b,
-        g,
-        x,
-        z,
+    "beta has the other sign: positive if the forward edge is up": (
+        lambda b, g, x, z: (-b, g, x, z)
     ),
-    "gamma is from the vertical: 90 degrees is straight down": lambda b, g, x, z: (
-        b,
-        np.pi / 2 - g,
-        x,
-        z,
+    "beta is from the vertical: 0 is a plate that lies flat": (
+        lambda b, g, x, z: (np.pi / 2 - b, g, x, z)
+    ),
+    "gamma is from the vertical: 90 degrees is straight down": (
+        lambda b, g, x, z: (b, np.pi / 2 - g, x, z)
     ),
 }
 
@@ -319,22 +309,21 @@ def _solve(design, y, prior, noise: float):
     rows = np.concatenate([design / noise, prior])
     u, s, vt = np.linalg.svd(rows, full_matrices=False)
     root = vt.T / s
-    return (
-        root @ (u[: len(y)].T @ (y / noise)),
-        root @ root.T,
-        root @ (u[: len(y)].T @ design) / noise,
-    )
+    of_data = u[: len(y)].T
+    values = root @ (of_data @ (y / noise))
+    covariance = root @ root.T
+    resolution = root @ (of_data @ design) / noise
+    return values, covariance, resolution
 
 
 def _correlation_factor(residuals) -> float:
     """Return the factor of a standard error by which correlated neighbouring residuals
     widen it."""
     size = residuals @ residuals
-    correlation = (
-        min(max(float(residuals[1:] @ residuals[:-1] / size), 0.0), 0.99)
-        if size
-        else 0.0
-    )
+    correlation = 0.0
+    if size:
+        correlation = float(residuals[1:] @ residuals[:-1] / size)
+        correlation = min(max(correlation, 0.0), 0.99)
     return math.sqrt((1 + correlation) / (1 - correlation))
 
 
@@ -346,12 +335,9 @@ def _zero(depth, stress) -> tuple[float, float]:
     rows = np.stack([depth, np.ones_like(depth)], -1)
     (slope, intercept), *_ = np.linalg.lstsq(rows, stress, rcond=None)
     residuals = stress - rows @ [slope, intercept]
-    variance = (
-        (residuals @ residuals) / (len(depth) - 2) * np.linalg.inv(rows.T @ rows)[1, 1]
-    )
+    noise = (residuals @ residuals) / (len(depth) - 2)
+    variance = noise * np.linalg.inv(rows.T @ rows)[1, 1]
     error = math.sqrt(variance) * _correlation_factor(residuals)
-    return (
-        (-float(intercept / slope), float(abs(error / slope)))
-        if slope
-        else (math.nan, math.nan)
-    )
+    if not slope:
+        return math.nan, math.nan
+    return -float(intercept / slope), float(abs(error / slope))

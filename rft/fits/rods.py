@@ -108,7 +108,8 @@ class Fit:
     --------
     >>> from rft.fits.rods import fit
     >>> from rft.laws.drag import rod_drag
-    >>> drag = rod_drag([0, 30, 60, 90], [1.0, 0.9, 0.5, 0.0], [0.0, 1.0, 1.7, 2.0])  # degrees, N
+    >>> along, across = [1.0, 0.9, 0.5, 0.0], [0.0, 1.0, 1.7, 2.0]  # N
+    >>> drag = rod_drag([0, 30, 60, 90], along, across)  # at angles in degrees
     >>> found = fit("viscous", drag)
     >>> found.names, found.values.round(2), found.residuals.shape
     (('ratio', 'axial_force'), array([1.96, 1.01]), (2, 4))
@@ -129,7 +130,10 @@ class Fit:
             f"{name} {value:.4g} ({low:.4g} to {high:.4g})"
             for name, value, (low, high) in rows
         )
-        return f"Fit({self.law}, 95 %: {parameters}; {self.data.psi.size} rows, rms {self.rms:.3g} N)"
+        return (
+            f"Fit({self.law}, 95 %: {parameters}; {self.data.psi.size} rows, "
+            f"rms {self.rms:.3g} N)"
+        )
 
     @property
     def rms(self) -> float:
@@ -149,47 +153,45 @@ class Fit:
     @property
     def intervals(self) -> np.ndarray:
         """Confidence intervals of the parameters, 95 %, (n, 2)."""
-        return self.values[:, None] + student_factor(
-            self.degrees_of_freedom
-        ) * self.errors[:, None] * [-1.0, 1.0]
+        half = student_factor(self.degrees_of_freedom) * self.errors
+        return np.stack([self.values - half, self.values + half], -1)
 
     @property
     def axial_force(self) -> float:
         """Drag on the whole rod at psi = 0 without its ends, N."""
-        return (
-            float(self.values[len(FITS[self.law].names)]) * _unit(self.law, self.rod)[1]
-        )
+        _, newton = _unit(self.law, self.rod)
+        return float(self.values[len(FITS[self.law].names)]) * newton
 
     @property
     def axial_stress(self) -> float | None:
         """`axial_force` over the projected area 2 r L, Pa; None where the area is not
         known."""
-        return self.axial_force / self.rod.area if self.rod.area else None
+        if self.rod.area:
+            return self.axial_force / self.rod.area
+        return None
 
     @property
     def k(self) -> float | None:
         """Factor k of Eq. 2; None where the rod's sizes or the density are not known,
         and for a fluid."""
-        return float(self.values[self.names.index("k")]) if "k" in self.names else None
+        if "k" in self.names:
+            return float(self.values[self.names.index("k")])
+        return None
 
     @property
     def medium(self) -> Medium:
         """The law with the covariance of its parameters, widened by Student's
         distribution so that one standard deviation holds 68 %."""
         build = FITS[self.law].build
-        names = [
-            name for name in self.names if name in build.__dataclass_fields__
-        ]  # k only where the law has it
-        values = dict(zip(self.names, self.values.tolist()))
-        n = len(names)
-        covariance = (
-            student_factor(self.degrees_of_freedom, ONE_SIGMA) ** 2
-            * self.covariance[:n, :n]
-        )
-        return build(
-            **{name: values[name] for name in names},
-            **({"covariance": covariance} if names else {}),
-        )
+        values = {}
+        for name, value in zip(self.names, self.values.tolist()):
+            if name in build.__dataclass_fields__:  # k only where the law has it
+                values[name] = value
+        if not values:
+            return build()
+        n = len(values)
+        factor = student_factor(self.degrees_of_freedom, ONE_SIGMA)
+        return build(**values, covariance=factor**2 * self.covariance[:n, :n])
 
     def caps(self, radius: float) -> EndCaps:
         """Return the end caps, half of e at each end, of a body of that radius in body
@@ -200,35 +202,28 @@ class Fit:
     def forces(self, psi, values=None) -> np.ndarray:
         """Return the forces (2, ...) along and across the rod at attack angles psi
         (rad), N; values: parameters in place of the fitted ones."""
-        values = self.values if values is None else values
+        if values is None:
+            values = self.values
         values = _in_newton(self.law, self.rod, values)
         if self.data.ends is not None:
-            return _forces(
-                self.law, self.rod, 0.0, psi, values[: len(FITS[self.law].names) + 1]
-            )
+            of_flank = values[: len(FITS[self.law].names) + 1]
+            return _forces(self.law, self.rod, 0.0, psi, of_flank)
         return _forces(self.law, self.rod, self.end_caps, psi, values)
 
     def band(self, psi) -> np.ndarray:
         """Return half the width (2, ...) of the 95 % confidence band of the law at
         angles psi (rad), N, by linear propagation of the covariance."""
         slopes = []
-        for value, error, step in zip(
-            self.values, self.errors, np.eye(len(self.values))
-        ):
+        steps = np.eye(len(self.values))
+        for value, error, step in zip(self.values, self.errors, steps):
             h = max(1e-3 * error, 1e-9 * abs(value)) or 1e-12
-            slopes.append(
-                (
-                    self.forces(psi, self.values + h * step)
-                    - self.forces(psi, self.values - h * step)
-                )
-                / (2 * h)
-            )
+            above = self.forces(psi, self.values + h * step)
+            below = self.forces(psi, self.values - h * step)
+            slopes.append((above - below) / (2 * h))
         slopes = np.array(slopes)
-        return student_factor(self.degrees_of_freedom) * np.sqrt(
-            np.maximum(
-                np.einsum("i...,ij,j...->...", slopes, self.covariance, slopes), 0.0
-            )
-        )
+        variance = np.einsum("i...,ij,j...->...", slopes, self.covariance, slopes)
+        error = np.sqrt(np.maximum(variance, 0.0))
+        return student_factor(self.degrees_of_freedom) * error
 
 
 def fit(
@@ -284,20 +279,24 @@ def fit(
             instead="leave ``end_caps`` out or say 'fitted'",
         )
         return _with_ends(fit(law, data, rod))
-    names = (*fitted_law.names, "axial_force", *([CAPS] if fits_caps else []))
+    names = (*fitted_law.names, "axial_force")
+    bounds = [*fitted_law.bounds, (0.0, np.inf)]
+    fixed_caps = 0.0
+    if fits_caps:
+        names = (*names, CAPS)
+        bounds.append((0.0, MOST_CAPS))
+    else:
+        fixed_caps = float(end_caps)
     require(
         data.n_forces > len(names),
         f"{data.n_forces} forces are too few for {', '.join(names)}",
         instead="measure at more angles",
     )
-    fixed_caps = 0.0 if fits_caps else float(end_caps)
 
     def residual(values):
         return _weighted(data, _forces(law, rod, fixed_caps, data.psi, values))
 
-    low, high = np.array(
-        [*fitted_law.bounds, (0.0, np.inf), *([(0.0, MOST_CAPS)] if fits_caps else [])]
-    ).T
+    low, high = np.array(bounds).T
     best = _best(residual, _starts(fitted_law, data, residual, fits_caps), low, high)
     require(
         best.success,
@@ -306,17 +305,20 @@ def fit(
     )
     _check_inside(names, best.x, low, high)
     covariance = _covariance(names, best, data.n_forces)
+    # The axial drag in its own unit, in place of a force.
     unit, newton = _unit(law, rod)
-    scale = np.array([1.0] * len(fitted_law.names) + [1.0 / newton] + [1.0] * fits_caps)
+    axial = len(fitted_law.names)
+    scale = np.ones(len(names))
+    scale[axial] = 1.0 / newton
     return Fit(
         law,
         data,
         rod,
-        tuple(unit if name == "axial_force" else name for name in names),
-        best.x * scale,
-        covariance * np.outer(scale, scale),
-        data.forces - _forces(law, rod, fixed_caps, data.psi, best.x),
-        float(best.x[-1]) if fits_caps else fixed_caps,
+        names=(*names[:axial], unit, *names[axial + 1 :]),
+        values=best.x * scale,
+        covariance=covariance * np.outer(scale, scale),
+        residuals=data.forces - _forces(law, rod, fixed_caps, data.psi, best.x),
+        end_caps=float(best.x[-1]) if fits_caps else fixed_caps,
     )
 
 
@@ -339,17 +341,9 @@ def _with_ends(flank: Fit) -> Fit:
         medium = FITS[flank.law].build(*map(float, values[:n_law]))
 
         def residual(x):
-            end = EndCaps(
-                flank.rod.radius / flank.rod.length,
-                head=1.0,
-                tail=0.0,
-                across=float(x[1]),
-            )
-            return _weighted(
-                data,
-                values[n_law] * x[0] * np.array(end.traction(medium, *v)),
-                data.ends,
-            )
+            end = _one_end(flank.rod, across=float(x[1]))
+            force = values[n_law] * x[0] * np.array(end.traction(medium, *v))
+            return _weighted(data, force, data.ends)
 
         start = [1.0, 1.0]
         bounds = ([-np.inf, 0.0], [np.inf, MOST_CAPS])
@@ -370,15 +364,12 @@ def _with_ends(flank: Fit) -> Fit:
         f"the force on the ends is that of {e:.2g} flat ends",
         because=f"e is 0 to {MOST_CAPS:g}",
     )
-    steps = np.diag(
-        1e-4 * np.where(flank.errors > 0, flank.errors, np.abs(flank.values))
-    )
-    slope = np.array(
-        [
-            (caps(flank.values + h).x - caps(flank.values - h).x) / (2 * h.max())
-            for h in steps
-        ]
-    )
+    sizes = np.where(flank.errors > 0, flank.errors, np.abs(flank.values))
+    slopes = []
+    for h in np.diag(1e-4 * sizes):
+        change = caps(flank.values + h).x - caps(flank.values - h).x
+        slopes.append(change / (2 * h.max()))
+    slope = np.array(slopes)
     covariance = np.zeros((n + 2, n + 2))
     covariance[:n, :n] = flank.covariance
     covariance[:n, n:] = flank.covariance @ slope
@@ -396,12 +387,19 @@ def _with_ends(flank: Fit) -> Fit:
     )
 
 
+def _one_end(rod: Rod, across: float | None = None) -> EndCaps:
+    """Return the cap of one flat end of a rod, whose radius is over the length."""
+    return EndCaps(rod.radius / rod.length, head=1.0, tail=0.0, across=across)
+
+
 def _unit(law: str, rod: Rod) -> tuple[str, float]:
     """Return the name of the parameter for axial drag, and the force on the whole rod,
     N, where it is 1."""
     if FITS[law].granular and rod.area and rod.pressure:
         return "k", rod.area * rod.pressure
-    return ("axial_stress", rod.area) if rod.area else ("axial_force", 1.0)
+    if rod.area:
+        return "axial_stress", rod.area
+    return "axial_force", 1.0
 
 
 def _in_newton(law: str, rod: Rod, values) -> np.ndarray:
@@ -419,11 +417,11 @@ def _forces(law: str, rod: Rod, end_caps: float, psi, values) -> np.ndarray:
     medium = fitted_law.build(*map(float, values[:n]))
     v = (np.cos(psi), np.sin(psi))
     force = np.array(medium.traction(*v))
-    e = float(values[n + 1]) if len(values) > n + 1 else end_caps
+    e = end_caps
+    if len(values) > n + 1:
+        e = float(values[n + 1])
     if e:
-        force = force + EndCaps(rod.radius / rod.length, head=1.0, tail=0.0).traction(
-            medium, *v
-        ) * np.array(e)
+        force = force + np.array(_one_end(rod).traction(medium, *v)) * e
     return values[n] * force
 
 
@@ -432,7 +430,8 @@ def _weighted(
 ) -> np.ndarray:
     """Return forces minus those measured, by default on the rod, in units of their
     errors."""
-    measured = data.forces if measured is None else measured
+    if measured is None:
+        measured = data.forces
     return (np.sqrt(data.weight) * (forces - measured))[:, data.weight > 0].ravel()
 
 
@@ -441,19 +440,18 @@ def _starts(
 ) -> list[np.ndarray]:
     """Return the best four of all combinations of start values, each with the axial
     force that fits it best."""
+    starts = list(fitted_law.starts)
+    if fits_caps:
+        starts.append((0.5, 1.0, 3.0))
     candidates = []
-    for values in itertools.product(
-        *fitted_law.starts, *([(0.5, 1.0, 3.0)] if fits_caps else [])
-    ):
+    for values in itertools.product(*starts):
         law = values[: len(fitted_law.names)]
         caps = values[len(fitted_law.names) :]
-        at_zero, at_one = (
-            residual(np.array([*law, force, *caps])) for force in (0.0, 1.0)
-        )
-        slope = at_one - at_zero
-        force = max(
-            -(slope @ at_zero) / (slope @ slope), 1e-9 * np.abs(data.forces).max()
-        )
+        # Residuals are linear in the axial force.
+        at_zero = residual(np.array([*law, 0.0, *caps]))
+        slope = residual(np.array([*law, 1.0, *caps])) - at_zero
+        best = -(slope @ at_zero) / (slope @ slope)
+        force = max(best, 1e-9 * np.abs(data.forces).max())
         start = np.array([*law, force, *caps])
         candidates.append((float(np.sum((at_zero + force * slope) ** 2)), start))
     return [start for _, start in sorted(candidates, key=lambda x: x[0])[:4]]
@@ -465,37 +463,48 @@ def _best(residual: Callable, starts: list[np.ndarray], low, high):
 
     solutions = [
         least_squares(
-            residual, start, jac="3-point", bounds=(low, high), x_scale=start, max_nfev=200, xtol=CONVERGED,
-            ftol=CONVERGED, gtol=CONVERGED,
+            residual,
+            start,
+            jac="3-point",
+            bounds=(low, high),
+            x_scale=start,
+            max_nfev=200,
+            xtol=CONVERGED,
+            ftol=CONVERGED,
+            gtol=CONVERGED,
         )
         for start in starts
-    ]  # fmt: skip
+    ]
     return min(solutions, key=lambda solution: solution.cost)
 
 
 def _check_inside(names, values, low, high) -> None:
     """Raise ValueError if a parameter other than the axial drag ends on a bound."""
     for name, x, *bounds in zip(names, values, low, high):
-        for bound in bounds if name != "axial_force" else ():
-            if abs(x - bound) <= AT_BOUND * max(abs(bound), 1.0):
-                instead = (
-                    "leave the end caps out"
-                    if name == CAPS
-                    else "measure at more angles, or fit another law"
-                )
-                message = f"the fit ends at the edge of {_with_unit(name)}, {_degrees(name, bound):g}"
-                raise Refusal(
-                    message, because="these data do not settle it", instead=instead
-                )
+        if name == "axial_force":
+            continue
+        cure = "measure at more angles, or fit another law"
+        if name == CAPS:
+            cure = "leave the end caps out"
+        for bound in bounds:
+            require(
+                abs(x - bound) > AT_BOUND * max(abs(bound), 1.0),
+                f"the fit ends at the edge of {_with_unit(name)}, "
+                f"{_degrees(name, bound):g}",
+                because="these data do not settle it",
+                instead=cure,
+            )
 
 
 def _with_unit(name: str) -> str:
     """Return the name of a parameter as messages show it, gamma0 in degrees."""
-    return f"{name} (degrees)" if name == "gamma0" else name
+    return "gamma0 (degrees)" if name == "gamma0" else name
 
 
 def _degrees(name: str, value: float) -> float:
-    return math.degrees(value) if name == "gamma0" else value
+    if name == "gamma0":
+        return math.degrees(value)
+    return value
 
 
 def _covariance(names, best, count: int) -> np.ndarray:

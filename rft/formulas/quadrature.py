@@ -20,14 +20,10 @@ def slopes_by_differences(law, v_t, v_n, rounding):
     """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n) of a law's traction, by
     central differences."""
     h = DIFFERENCE * sqrt(v_t * v_t + v_n * v_n + rounding * rounding) + TINY
-    (t1, n1), (t2, n2) = (
-        law.traction(v_t + h, v_n, rounding),
-        law.traction(v_t - h, v_n, rounding),
-    )
-    (t3, n3), (t4, n4) = (
-        law.traction(v_t, v_n + h, rounding),
-        law.traction(v_t, v_n - h, rounding),
-    )
+    t1, n1 = law.traction(v_t + h, v_n, rounding)
+    t2, n2 = law.traction(v_t - h, v_n, rounding)
+    t3, n3 = law.traction(v_t, v_n + h, rounding)
+    t4, n4 = law.traction(v_t, v_n - h, rounding)
     a = 0.5 / h
     return a * (t1 - t2), a * (t3 - t4), a * (n1 - n2), a * (n3 - n4)
 
@@ -43,10 +39,8 @@ def by_nodes(law, v_t, v_n, v_w, rounding):
         w = law.weights[j, 0]
         u_t = v_t + 0.0 * s
         u_n = v_n + s * v_w
-        (t, n), (tt, tn, nt, nn) = (
-            law.traction(u_t, u_n, rounding),
-            law.slopes(u_t, u_n, rounding),
-        )
+        t, n = law.traction(u_t, u_n, rounding)
+        tt, tn, nt, nn = law.slopes(u_t, u_n, rounding)
         k = w * s
         load = sum_loads(load, over_nodes(Load(
             w * t, w * tt, w * tn, k * tn,

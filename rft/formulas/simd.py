@@ -1,8 +1,10 @@
-"""The functions of `rft.formulas.vectors` inside compiled code, on numbers and on eight numbers at once.
+"""The functions of `rft.formulas.vectors` inside compiled code, on numbers and on eight
+numbers at once.
 
-A `Vector` is eight doubles in a register, a `Mask` eight truth values; LLVM splits them where a processor's registers
-are narrower. A formula of one element, compiled for vectors, computes eight elements in the time of one. Importing this
-module loads numba, which takes some 0.2 s."""
+A `Vector` is eight doubles in a register, a `Mask` eight truth values; LLVM splits them
+where a processor's registers are narrower. A formula of one element, compiled for
+vectors, computes eight elements in the time of one. Importing this module loads numba,
+which takes some 0.2 s."""
 
 from __future__ import annotations
 
@@ -155,7 +157,8 @@ def _negative(context, builder, sig, args):
 
 
 def _intrinsic(name, count):
-    """Return a function that emits a call of LLVM's intrinsic of this name with ``count`` arguments."""
+    """Return a function that emits a call of LLVM's intrinsic of this name with
+    ``count`` arguments."""
 
     def emit(builder, *args):
         full = f"llvm.{name}.v{WIDTH}f64"
@@ -173,8 +176,8 @@ def _selected(sign):
 
 
 def _define(function, takes, emit, number):
-    """Define a function of `rft.formulas.vectors` in compiled code: for vectors by ``emit``, for numbers as the function
-    ``number``."""
+    """Define a function of `rft.formulas.vectors` in compiled code: for vectors by
+    ``emit``, for numbers as the function ``number``."""
     result = signature(vector, *takes)
 
     def typed(*args):
@@ -248,7 +251,8 @@ def _exponents(context, x):
 
 
 LN2 = float(np.log(2.0))
-# Coefficients of s^2, s^4 ... in atanh s = s (1 + s^2 / 3 + ...), to roundoff for |s| < 0.172.
+# Coefficients of s^2, s^4 ... in atanh s = s (1 + s^2 / 3 + ...), to roundoff for |s| <
+# 0.172.
 ATANH = tuple(1.0 / (2 * j + 1) for j in range(1, 12))
 
 
@@ -279,7 +283,8 @@ def _log_ratio(a, b):
 
 @overload(vectors.polynomial, inline="never", jit_options={"forceinline": True})
 def _polynomial(z, coefficients):
-    """Return Horner's rule without a loop, for numba would not unroll a loop over a tuple."""
+    """Return Horner's rule without a loop, for numba would not unroll a loop over a
+    tuple."""
     count = len(coefficients)
     lines = [
         f"    value = value * z + coefficients[{j}]" for j in range(count - 2, -1, -1)
@@ -298,9 +303,11 @@ def _polynomial(z, coefficients):
 @overload(vectors.combinations, inline="never", jit_options={"forceinline": True})
 def _combinations(coefficients, terms):
     """Return the sums without loops, for numba would not unroll loops over tuples."""
-    row = lambda i: " + ".join(
-        [f"c[{i}][0]", *(f"c[{i}][{j + 1}] * t[{j}]" for j in range(len(terms)))]
-    )
+
+    def row(i):
+        products = [f"c[{i}][{j + 1}] * t[{j}]" for j in range(len(terms))]
+        return " + ".join([f"c[{i}][0]", *products])
+
     sums = ", ".join(row(i) for i in range(len(coefficients)))
     return _function_from_source(
         "unrolled",
@@ -313,8 +320,8 @@ def _combinations(coefficients, terms):
 
 
 def _function_from_source(name: str, lines: list[str], **names):
-    """Return the function of this name from its source, arguments followed by the lines of its body, with ``names`` for
-    globals."""
+    """Return the function of this name from its source, arguments followed by the lines
+    of its body, with ``names`` for globals."""
     namespace = dict(names)
     exec("\n".join([f"def {name}({lines[0]}):", *lines[1:]]), namespace)
     return namespace[name]
@@ -346,7 +353,8 @@ def store(context, x, i, value):
 
 @intrinsic
 def add_vector(context, x, i, value):
-    """Add a vector to x[i, :] of an array (n, 8), each of its numbers rounded as it is."""
+    """Add a vector to x[i, :] of an array (n, 8), each of its numbers rounded as it
+    is."""
 
     def emit(context, builder, sig, args):
         row = _pointer(context, builder, sig, args)
@@ -412,7 +420,8 @@ def any_of(context, x):
 
 @intrinsic
 def _gather(context, table, row, column):
-    """Return table[row, column] of an array (n, m) for a vector of eight integers ``row``."""
+    """Return table[row, column] of an array (n, m) for a vector of eight integers
+    ``row``."""
 
     def emit(context, builder, sig, args):
         array = context.make_array(sig.args[0])(context, builder, args[0])
@@ -440,8 +449,8 @@ def _gather_overload(table, row, column):
 
 
 def record_access(kind):
-    """Return read(x, first) and write(x, first, record) of a NamedTuple of vectors that is stored in the rows of an array
-    x (rows, 8) from the row ``first`` on."""
+    """Return read(x, first) and write(x, first, record) of a NamedTuple of vectors that
+    is stored in the rows of an array x (rows, 8) from the row ``first`` on."""
     reads = ", ".join(f"load(x, first + {i})" for i in range(len(kind._fields)))
     writes = [
         f"    store(x, first + {i}, record.{name})"
@@ -471,7 +480,8 @@ def register_formulas() -> None:
 
 
 def _register_method(name: str, count: int) -> None:
-    """Let compiled code call the formula ``name`` of a law's class, with ``count`` arguments beside the law."""
+    """Let compiled code call the formula ``name`` of a law's class, with ``count``
+    arguments beside the law."""
     arguments = ", ".join(f"x{i}" for i in range(count))
 
     def implementation(law):

@@ -1,8 +1,11 @@
-"""The functions that formulas use, for numbers, NumPy arrays and the vectors of compiled code.
+"""The functions that formulas use, for numbers, NumPy arrays and the vectors of
+compiled code.
 
-A formula is a plain function of one element, written as in the paper and marked with `formula`. In Python it takes numbers
-and arrays, by NumPy. `rft.formulas.simd` defines the functions below, and every formula, a second time for compiled code, where
-they also take eight elements at once in a register of the processor. This module imports no compiler."""
+A formula is a plain function of one element, written as in the paper and marked with
+`formula`. In Python it takes numbers and arrays, by NumPy. `rft.formulas.simd` defines
+the functions below, and every formula, a second time for compiled code, where they also
+take eight elements at once in a register of the processor. This module imports no
+compiler."""
 
 from __future__ import annotations
 
@@ -12,13 +15,13 @@ import numpy as np
 
 from rft.core.checks import refuse_mask
 
-FORMULAS: list[
-    Callable
-] = []  # formulas not yet registered with the compiler (`rft.formulas.simd.register_formulas`)
+# Formulas not yet registered with the compiler (`rft.formulas.simd.register_formulas`).
+FORMULAS: list[Callable] = []
 
 
 def formula(function: Callable) -> Callable:
-    """Mark a function as a formula, so that compiled code may call it; return it unchanged."""
+    """Mark a function as a formula, so that compiled code may call it; return it
+    unchanged."""
     function.is_formula = True
     FORMULAS.append(function)
     return function
@@ -84,7 +87,8 @@ def polynomial(z, coefficients):
 
 
 def combinations(coefficients, terms):
-    """Return c_0 + sum_j c_j terms[j - 1] for each row c of coefficients, a tuple of tuples."""
+    """Return c_0 + sum_j c_j terms[j - 1] for each row c of coefficients, a tuple of
+    tuples."""
     terms = np.broadcast_arrays(*terms)
     rows = np.stack([np.ones(terms[0].shape), *terms])
     sums = np.array(coefficients) @ rows.reshape(len(rows), rows[0].size)
@@ -97,7 +101,8 @@ def gather(table, row, column):
 
 
 def over_nodes(load):
-    """Return a load summed over the nodes of a rule, the first axis of arrays; compiled code takes one node at a time."""
+    """Return a load summed over the nodes of a rule, the first axis of arrays; compiled
+    code takes one node at a time."""
     return type(load)(*(np.sum(x, 0) for x in load))
 
 

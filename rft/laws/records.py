@@ -57,7 +57,7 @@ class Terms(NamedTuple):
     average = closed_form
 
 
-class Uncompiled:
+class UncompiledLaw:
     """The record of a law whose traction is no formula."""
 
     slopes = slopes_by_differences
@@ -91,7 +91,7 @@ def record(law, rule: str = "exact") -> Any:
         traction = type(law).traction
         slopes = getattr(type(law), "slopes", slopes_by_differences)
     else:
-        return Uncompiled(law, nodes, weights)
+        return UncompiledLaw(law, nodes, weights)
     formulas = (("traction", traction), ("slopes", slopes), ("average", by_nodes))
     cls = record_class(type(law).__name__, (*numbers, "nodes", "weights"), formulas)
     return cls(*numbers.values(), nodes, weights)

@@ -71,31 +71,32 @@ def begin(samples: int) -> Cycles:
     """Return the record before the first cycle."""
     none = np.full((3, HISTORY, 3, samples), np.nan)
     zero = np.zeros((3, samples))
-    steadiest = np.stack([zero, zero + np.inf, zero])
     return Cycles(
-        zero,
-        zero + np.nan,
-        none[0],
-        none,
-        steadiest,
-        zero[:1],
-        zero,
-        np.full(samples, np.inf),
+        pose=zero,
+        start=zero + np.nan,
+        displacements=none[0],
+        history=none,
+        steadiest=np.stack([zero, zero + np.inf, zero]),
+        failures=zero[:1],
+        extrapolation=zero,
+        drift=np.full(samples, np.inf),
     )
 
 
 def after_massless_cycle(c: Cycles, displacement: np.ndarray) -> Cycles:
     """Return the record after a cycle of a body without mass, with its displacement
     (3, B)."""
-    c = c._replace(displacements=_appended(c.displacements, displacement))
+    c = c._replace(displacements=_with_cycle(c.displacements, displacement))
     changes = np.diff(c.displacements, axis=0)[-N_RATIOS - 1 :]
     changes = changes[~np.isnan(changes).any((1, 2))]
     if not len(changes):
         return c
-    ratios = np.clip(
-        changes[1:] / np.where(changes[:-1] == 0, 1.0, changes[:-1]), -1.0, 1.0
-    )
-    ratio = np.clip(ratios.mean(0), 0.0, LARGEST_RATIO) if len(ratios) else FIRST_RATIO
+    if len(changes) == 1:
+        ratio = FIRST_RATIO
+    else:
+        before = np.where(changes[:-1] == 0, 1.0, changes[:-1])
+        ratios = np.clip(changes[1:] / before, -1.0, 1.0)
+        ratio = np.clip(ratios.mean(0), 0.0, LARGEST_RATIO)
     return c._replace(drift=np.max(np.abs(changes[-1]) / (1 - ratio), axis=0))
 
 
@@ -109,7 +110,7 @@ def after_heavy_cycle(
     led away from the limit the next one leads back to the end of the steadiest
     cycle."""
     last = c.displacements[-1]
-    c = c._replace(displacements=_appended(c.displacements, displacement))
+    c = c._replace(displacements=_with_cycle(c.displacements, displacement))
     if np.isnan(c.start).any():  # the first cycle starts from rest
         return c
     cycle = np.stack([c.start, end - c.start, displacement])
@@ -118,25 +119,22 @@ def after_heavy_cycle(
     diverged = (size > DIVERGED * least) & (c.extrapolation != 0).any(0)
     steadiest = np.where(size < least, cycle, c.steadiest)
     failures = c.failures + diverged
-    history = _appended(c.history, cycle)
+    history = _with_cycle(c.history, cycle)
     history = np.where(diverged & ~np.isnan(history), steadiest[:, None], history)
     c = c._replace(history=history, steadiest=steadiest, failures=failures)
     differences = np.diff(history, axis=1)
-    starts, changes, displacements = differences[
-        :, ~np.isnan(differences).any((0, 2, 3))
-    ]
+    are_known = ~np.isnan(differences).any((0, 2, 3))
+    starts, changes, displacements = differences[:, are_known]
     if not len(starts):
         return c
     weights = _mixing_weights(changes, history[1, -1])[:, None]
-    drift = np.maximum(
-        np.abs((displacements * weights).sum(0)), np.abs(displacement - last)
-    ).max(0)
+    predicted = np.abs((displacements * weights).sum(0))
+    drift = np.maximum(predicted, np.abs(displacement - last)).max(0)
     back = steadiest[0] + steadiest[1] - end
     extrapolation = np.where(diverged, back, ((starts + changes) * weights).sum(0))
     extrapolates = (drift > tolerance) & (diverged | (failures[0] < MOST_FAILURES))
-    return c._replace(
-        drift=drift, extrapolation=np.where(extrapolates, extrapolation, 0.0)
-    )
+    extrapolation = np.where(extrapolates, extrapolation, 0.0)
+    return c._replace(drift=drift, extrapolation=extrapolation)
 
 
 class MemoryCycle(NamedTuple):
@@ -172,9 +170,9 @@ def mixed_memory(
     starts = np.stack([c.start for c in cycles])
     changes = np.stack([c.end - c.start for c in cycles])
     displacements = np.stack([c.displacement for c in cycles])
-    start_slope, slope, moves = (
-        np.diff(x, axis=0) for x in (starts, changes, displacements)
-    )
+    start_slope = np.diff(starts, axis=0)
+    slope = np.diff(changes, axis=0)
+    moves = np.diff(displacements, axis=0)
     matrix = np.moveaxis(gain * slope, (0, 1, 2), (2, 1, 0))
     inverse = np.linalg.pinv(matrix, MEMORY_SINGULAR)
     weights = -np.einsum("bkm,mb->kb", inverse, gain * changes[-1])[:, None]
@@ -191,7 +189,7 @@ def mixed_memory(
     return last.start + step, np.maximum.reduce(drifts)
 
 
-def _appended(cycles: np.ndarray, cycle: np.ndarray) -> np.ndarray:
+def _with_cycle(cycles: np.ndarray, cycle: np.ndarray) -> np.ndarray:
     """Return the last cycles without the first of them and with one more."""
     return np.concatenate([cycles[..., 1:, :, :], cycle[..., None, :, :]], -3)
 

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from rft.balance.arrays import frame_net, velocities, with_frame_velocity
 from rft.balance.backend import check
-from rft.balance.solver import Accuracy, Solved, solve
+from rft.balance.solver import Accuracy, Solutions, solve
 from rft.balance.velocity import checked_input
 from rft.bodies.base import Body, body_size, half_lengths, joint_speed
 from rft.bodies.pieces import PIECES
@@ -62,8 +62,10 @@ class TimeSteps(NamedTuple):
     >>> from rft import Chain, Granular, time_steps
     >>> from rft.effects import Transient
     >>> t = 2 * np.pi * np.arange(32) / 32
-    >>> alpha, alphadot = np.stack([np.cos(t), np.sin(t)], -1), np.stack([-np.sin(t), np.cos(t)], -1)
-    >>> steps = time_steps(Granular(1.8, 0.24), Chain(), alpha, alphadot, effects=[Transient(travel=0.12)])
+    >>> alpha = np.stack([np.cos(t), np.sin(t)], -1)
+    >>> alphadot = np.stack([-np.sin(t), np.cos(t)], -1)
+    >>> motion = Granular(1.8, 0.24), Chain(), alpha, alphadot
+    >>> steps = time_steps(*motion, effects=[Transient(travel=0.12)])
     >>> steps.xi.shape, steps.pose.shape, steps.cycles > 1
     ((32, 3), (33, 3), True)
     """
@@ -83,32 +85,35 @@ class TimeSteps(NamedTuple):
             for kind, n in zip(*np.unique(self.status, return_counts=True))
         )
         count = np.size(self.status)
-        size = f"{count} gait{'s' * (count != 1)} of {np.shape(self.xi)[-2]} phases, {self.cycles} cycles: {kinds}"
-        return f"TimeSteps({size}; residual up to {np.max(self.residual, initial=0.0):.1e})"
+        gaits = "1 gait" if count == 1 else f"{count} gaits"
+        residual = np.max(self.residual, initial=0.0)
+        return (
+            f"TimeSteps({gaits} of {np.shape(self.xi)[-2]} phases, {self.cycles} "
+            f"cycles: {kinds}; residual up to {residual:.1e})"
+        )
 
     @property
     def displacement(self) -> np.ndarray:
         """Pose after the cycle in the frame at its start, (..., 3)."""
-        return np.moveaxis(
-            _relative_pose(
-                *(np.moveaxis(self.pose[..., k, :], -1, 0) for k in (0, -1))
-            ),
-            0,
-            -1,
-        )
+        start = np.moveaxis(self.pose[..., 0, :], -1, 0)
+        end = np.moveaxis(self.pose[..., -1, :], -1, 0)
+        return np.moveaxis(_relative_pose(start, end), 0, -1)
 
     def checked(self) -> TimeSteps:
         """Return these steps; RuntimeError if any sample is unconverged or not
         periodic."""
         if (self.status == "unconverged").any():
             raise RuntimeError(
-                f"a force balance did not converge in time stepping (residual {np.max(self.residual):.1e}): "
+                "a force balance did not converge in time stepping (residual "
+                f"{np.max(self.residual):.1e}): "
                 "raise 'regularisation', or report the scene"
             )
         if (self.status == "not periodic").any():
             raise RuntimeError(
-                f"after {self.cycles} cycles displacement is still {np.max(self.drift):.1e} body lengths from its limit: "
-                "give 'cycles' to take it as it is, or lower the mass, the ground's weakening or the travel of a transient"
+                f"after {self.cycles} cycles displacement is still "
+                f"{np.max(self.drift):.1e} body lengths from its limit: "
+                "give 'cycles' to take it as it is, or lower the mass, the ground's "
+                "weakening or the travel of a transient"
             )
         return self
 
@@ -156,8 +161,10 @@ def time_steps(
     >>> from rft import Chain, Granular, time_steps
     >>> from rft.effects import Transient
     >>> t = 2 * np.pi * np.arange(32) / 32
-    >>> alpha, alphadot = np.stack([np.cos(t), np.sin(t)], -1), np.stack([-np.sin(t), np.cos(t)], -1)
-    >>> steps = time_steps(Granular(1.8, 0.24), Chain(), alpha, alphadot, effects=[Transient(travel=0.12)])
+    >>> alpha = np.stack([np.cos(t), np.sin(t)], -1)
+    >>> alphadot = np.stack([-np.sin(t), np.cos(t)], -1)
+    >>> motion = Granular(1.8, 0.24), Chain(), alpha, alphadot
+    >>> steps = time_steps(*motion, effects=[Transient(travel=0.12)])
     >>> steps.pose[-1, :2].round(3)  # x, y after the cycle, body lengths
     array([-0.245, -0.033])
     """
@@ -171,17 +178,16 @@ def time_steps(
     )
     if cycles is not None:
         in_range("cycles", cycles, 1, 10_000, whole=True)
-    batch, (phases, joints) = alpha.shape[:-2], alpha.shape[-2:]
+    *batch, phases, joints = alpha.shape
+    batch = tuple(batch)
     if 0 in batch:
         return _no_steps(batch, phases)
     if cycles is None and broken & Premise.SE2_SYMMETRIC:
         cycles = 1
-    shapes = (
-        np.moveaxis(x.reshape(-1, phases, joints), 0, -1) for x in (alpha, alphadot)
-    )  # (N, joints, B)
     stepping = Stepping(
         assembly,
-        *shapes,
+        np.moveaxis(alpha.reshape(-1, phases, joints), 0, -1),
+        np.moveaxis(alphadot.reshape(-1, phases, joints), 0, -1),
         Accuracy(regularisation, tolerance),
         backend,
         cycles is None,
@@ -195,13 +201,13 @@ def _no_steps(batch: tuple, phases: int) -> TimeSteps:
     """Return the steps of an empty batch."""
     none = np.zeros(batch)
     return TimeSteps(
-        np.zeros((*batch, phases, 3)),
-        np.zeros((*batch, phases + 1, 3)),
-        none,
-        none.astype(str),
-        none,
-        0,
-        None,
+        xi=np.zeros((*batch, phases, 3)),
+        pose=np.zeros((*batch, phases + 1, 3)),
+        residual=none,
+        status=none.astype(str),
+        drift=none,
+        cycles=0,
+        work=None,
     )
 
 
@@ -234,37 +240,39 @@ def _cycles(
         start = stepping.memory(state)
         state, rows = advance(stepping, state, stepping.phases, with_work)
         pose = np.stack([*(row.pose for row in rows), stepping.site(state).pose])
-        path += [pose[:-1]] if with_path else []
+        if with_path:
+            path.append(pose[:-1])
         if mixes and cycle > 1:  # before the first step there is no memory
-            moved = _relative_pose(pose[0], pose[-1])
+            displacement = _relative_pose(pose[0], pose[-1])
+            end = stepping.memory(state)
             memories = memories[1 - limit_cycle.MEMORY_HISTORY :]
-            memories.append(
-                limit_cycle.MemoryCycle(start, stepping.memory(state), moved)
-            )
+            memories.append(limit_cycle.MemoryCycle(start, end, displacement))
         if mixes and cycle > PLAIN_CYCLES:
             memory, drift = limit_cycle.mixed_memory(memories, gain)
             state = state._replace(cycles=state.cycles._replace(drift=drift))
-        if cycle == (cycles or MOST_CYCLES) or (
-            cycles is None and stepping.is_periodic(state)
-        ):
+        if cycle == (cycles or MOST_CYCLES):
+            break
+        if cycles is None and stepping.is_periodic(state):
             break
         if mixes and cycle >= PLAIN_CYCLES:
             if cycle == PLAIN_CYCLES:
                 gain = limit_cycle.memory_gain(memories)
                 memory, _ = limit_cycle.mixed_memory(memories, gain)
             state = stepping.with_memory(state, memory)
-    xi, residual, limit = (np.stack([x[i] for x in rows]) for i in (0, 2, 3))
-    work = Work(*map(np.stack, zip(*(row.work for row in rows)))) if with_work else None
-    worst = np.max(residual, 0)
+    xi = np.stack([row.xi for row in rows])
+    worst = np.max([row.residual for row in rows], 0)
+    limit = np.max([row.limit for row in rows])
+    work = None
+    if with_work:
+        work = Work(*map(np.stack, zip(*(row.work for row in rows))))
     drift = state.cycles.drift
-    status = np.where(
-        drift <= stepping.drift_tolerance,
-        "periodic",
-        "not periodic" if cycles is None else "running",
-    )
-    status = np.where(worst <= limit.max(), status, "unconverged")
-    full_path = np.concatenate([*path, pose[-1:]]) if with_path else None
-    return TimeSteps(xi, pose, worst, status, drift, cycle, work, full_path)
+    other = "not periodic" if cycles is None else "running"
+    status = np.where(drift <= stepping.drift_tolerance, "periodic", other)
+    status = np.where(worst <= limit, status, "unconverged")
+    all_poses = None
+    if with_path:
+        all_poses = np.concatenate([*path, pose[-1:]])
+    return TimeSteps(xi, pose, worst, status, drift, cycle, work, all_poses)
 
 
 def _relative_pose(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -277,12 +285,8 @@ def _integrated(pose: np.ndarray, xi: np.ndarray, dt: float) -> np.ndarray:
     """Return the pose (3, B) reached from a pose at a constant body velocity xi (3, B)
     after dt."""
     half = 0.5 * dt * xi[2]
-    z = (
-        dt
-        * np.sinc(half / np.pi)
-        * np.exp(1j * (pose[2] + half))
-        * (xi[0] + 1j * xi[1])
-    )
+    direction = np.exp(1j * (pose[2] + half))
+    z = dt * np.sinc(half / np.pi) * direction * (xi[0] + 1j * xi[1])
     return pose + np.array([z.real, z.imag, dt * xi[2]])
 
 
@@ -295,15 +299,14 @@ def _with_batch_axes(steps: TimeSteps, batch: tuple, length: float) -> TimeSteps
         return np.moveaxis(x, -1, 0).reshape(*batch, -1, 3) * units
 
     xi, pose = map(samples_first, steps[:2])
-    path = None if steps.path is None else samples_first(steps.path)
+    path = steps.path
+    if path is not None:
+        path = samples_first(path)
     work = steps.work
-    if work is not None:  # (N, B, ...)
-        work = Work(
-            *(
-                np.moveaxis(x, 1, 0).reshape((*batch, len(x), *x.shape[2:]))
-                for x in work
-            )
-        )
+    if work is not None:
+        # From (N, B, ...) to (..., N, ...).
+        first = (np.moveaxis(x, 1, 0) for x in work)
+        work = Work(*(x.reshape((*batch, *x.shape[1:])) for x in first))
         work = work._replace(power=work.power * length)
     residual, status, drift = (x.reshape(batch) for x in steps[2:5])
     return TimeSteps(xi, pose, residual, status, drift, steps.cycles, work, path)
@@ -395,22 +398,24 @@ class Stepping:
     def problem(self, k: int) -> Problem:
         """Return the balance at the phase 2 pi k / N, without effects that depend on
         the past or the place."""
-        stored = (
-            self.assembly.n_law_points * self.phases * self.alpha.shape[-1]
-            <= MOST_STORED
-        )
-        return self._stored_problems[k] if stored else self._problem(k)
+        size = self.assembly.n_law_points * self.phases * self.alpha.shape[-1]
+        if size <= MOST_STORED:
+            return self._stored_problems[k]
+        return self._problem(k)
 
     def guess(self, s: State) -> np.ndarray:
         """Return a guess of the velocity (3, B) at the next step, by linear
         extrapolation."""
-        return 2 * s.xi - s.xi_before if s.count[0, 0] > 1 else s.xi
+        if s.count[0, 0] > 1:
+            return 2 * s.xi - s.xi_before
+        return s.xi
 
     def site(self, s: State) -> Site:
         """Return the predicted site of the next step."""
         count = int(s.count[0, 0])
         dt = self.dt if count else 0.0
-        return Site(count, dt, _integrated(s.pose, (s.xi + self.guess(s)) / 2, dt), s.v)
+        pose = _integrated(s.pose, (s.xi + self.guess(s)) / 2, dt)
+        return Site(count, dt, pose, s.v)
 
     def begin(self) -> State:
         """Return the state before the first step, on undisturbed ground."""
@@ -419,13 +424,13 @@ class Stepping:
         v = (np.zeros_like(problem.sides.elements.c),) * 3
         states = tuple(e.begin(problem, Site(0, 0.0, zero, v)) for e in self.effects)
         return State(
-            np.zeros((1, 1), int),
-            zero,
-            zero,
-            zero,
-            v,
-            states,
-            limit_cycle.begin(zero.shape[-1]),
+            count=np.zeros((1, 1), int),
+            pose=zero,
+            xi=zero,
+            xi_before=zero,
+            v=v,
+            effect_states=states,
+            cycles=limit_cycle.begin(zero.shape[-1]),
         )
 
     def step(self, s: State, with_work: bool = False) -> tuple[State, Row]:
@@ -433,40 +438,47 @@ class Stepping:
         site = self.site(s)
         first = s.count[0, 0] == 0
         k = site.count % self.phases
-        undisturbed = problem = self.problem(k)
+        undisturbed = self.problem(k)
+        problem = undisturbed
         for effect, state in zip(self.effects, s.effect_states):
-            if (
-                not first or not effect.breaks & PAST
-            ):  # memory and mass have no effect at the first step
+            # Memory and mass have no effect at the first step.
+            if not first or not effect.breaks & PAST:
                 problem = effect.apply(problem, site, state)
-        solved = self._solved(problem, self.scales[k], None if first else self.guess(s))
+
+        guess = None
+        if not first:
+            guess = self.guess(s)
+        solved = self._solved(problem, self.scales[k], guess)
         xi = solved.xi
-        pose = s.pose if first else _integrated(s.pose, (s.xi + xi) / 2, self.dt)
+        pose = s.pose
+        if not first:
+            pose = _integrated(pose, (s.xi + xi) / 2, self.dt)
         v = _velocities(problem, xi)
         states = tuple(
             e.after(problem, site, state, v)
             for e, state in zip(self.effects, s.effect_states)
         )
-        rounding = self.accuracy.rounding * self.scales[k]
-        work = (
-            element_work(problem, self.body_halves, xi, rounding) if with_work else None
-        )
-        after = State(s.count + 1, pose, xi, s.xi, v, states, s.cycles)
+        work = None
+        if with_work:
+            rounding = self.accuracy.rounding * self.scales[k]
+            work = element_work(problem, self.body_halves, xi, rounding)
+
+        cycles = s.cycles
         if k == 0:
-            after = after._replace(
-                cycles=s.cycles._replace(
-                    pose=pose, start=s.xi + np.where(first, np.nan, 0.0)
-                )
-            )
+            start = s.xi + np.where(first, np.nan, 0.0)
+            cycles = cycles._replace(pose=pose, start=start)
+        after = State(s.count + 1, pose, xi, s.xi, v, states, cycles)
         if k == self.phases - 1:
             after = self._after_cycle(after, undisturbed, site)
         return after, Row(xi, pose, solved.residual, np.array([solved.limit]), work)
 
     def _solved(
         self, problem: Problem, scale: np.ndarray, guess: np.ndarray | None
-    ) -> Solved:
+    ) -> Solutions:
         def problem_at(index):
-            return problem if index.size == scale.size else problem.take(index)
+            if index.size == scale.size:
+                return problem
+            return problem.take(index)
 
         return solve(
             problem_at, scale, self.accuracy, self.assembly, self.backend, 1, guess
@@ -477,18 +489,15 @@ class Stepping:
         extrapolated if cycles are to repeat."""
         displacement = _relative_pose(s.cycles.pose, self.site(s).pose)
         if not self.heavy:
-            return s._replace(
-                cycles=limit_cycle.after_massless_cycle(s.cycles, displacement)
-            )
+            cycles = limit_cycle.after_massless_cycle(s.cycles, displacement)
+            return s._replace(cycles=cycles)
         cycles = limit_cycle.after_heavy_cycle(
             s.cycles, displacement, s.xi, self.drift_tolerance
         )
         s = s._replace(cycles=cycles)
-        return (
-            self.with_velocity_change(s, problem, site)
-            if self.to_limit and not self.is_periodic(s)
-            else s
-        )
+        if self.to_limit and not self.is_periodic(s):
+            return self.with_velocity_change(s, problem, site)
+        return s
 
     def is_periodic(self, s: State) -> bool:
         """Return whether the cycles of all samples repeat."""
@@ -498,12 +507,10 @@ class Stepping:
         """Return the state as if the body had moved faster in the last steps, by the
         extrapolation to the limit cycle."""
         change = s.cycles.extrapolation
-        v = tuple(
-            a + b for a, b in zip(s.v, to_element(problem.sides.elements, *change))
-        )
-        drag = (
-            self._drag(problem, s.xi + change) - self._drag(problem, s.xi)
-        ) / problem.axial_drag
+        v_change = to_element(problem.sides.elements, *change)
+        v = tuple(a + b for a, b in zip(s.v, v_change))
+        drag = self._drag(problem, s.xi + change) - self._drag(problem, s.xi)
+        drag = drag / problem.axial_drag
         states = tuple(
             e.with_velocity_change(problem, site, state, change, drag)
             for e, state in zip(self.effects, s.effect_states)
@@ -520,7 +527,7 @@ class Stepping:
             for e, state in zip(self.effects, s.effect_states)
             if e.memory_bounds is not None
         ]
-        return np.concatenate(numbers) if numbers else np.zeros((0, samples))
+        return np.concatenate([np.zeros((0, samples)), *numbers])
 
     def with_memory(self, s: State, memory: np.ndarray) -> State:
         """Return the state with other numbers (M, B) in its memories, within their
@@ -541,11 +548,8 @@ class Stepping:
         (3, B)."""
         scaled = xi / problem.frame.speed_scale
         v = with_frame_velocity(problem, velocities(problem), *scaled)
-        return np.stack(
-            frame_net(
-                problem, v, np.full(xi.shape[1], self.accuracy.rounding), *scaled
-            ).force
-        )
+        rounding = np.full(xi.shape[1], self.accuracy.rounding)
+        return np.stack(frame_net(problem, v, rounding, *scaled).force)
 
 
 def _velocities(problem: Problem, xi: np.ndarray) -> tuple:

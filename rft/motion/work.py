@@ -72,7 +72,11 @@ class Work(NamedTuple):
             for name, x in names
             if np.size(x)
         ]
-        return f"Work({np.shape(self.power)} samples of {np.shape(self.bending_moment)[-1]} joints; {', '.join(sizes)})"
+        joints = np.shape(self.bending_moment)[-1]
+        return (
+            f"Work({np.shape(self.power)} samples of {joints} joints; "
+            f"{', '.join(sizes)})"
+        )
 
 
 def work_done(
@@ -112,7 +116,8 @@ def work_done(
     assembly = assembly._replace(
         effects=tuple(e for e in assembly.effects if not e.breaks & SHAPE_ALONE)
     )
-    alpha, alphadot = (x.reshape(-1, body.joints).T for x in (alpha, alphadot))
+    alpha = alpha.reshape(-1, body.joints).T
+    alphadot = alphadot.reshape(-1, body.joints).T
     length = body_size(body)
     xi = xi.reshape(-1, 3).T / np.array([[length], [length], [1.0]])
     speed = joint_speed(body, alphadot)
@@ -139,24 +144,24 @@ def element_work(
     stations = []
     forces = []
     powers = []
-    for (e, load), u, contact in zip(
-        loads_on(problem, v, rounding / scale[0]), v, (problem.sides, problem.points)
-    ):
-        force = [e.weight * x for x in (load.t, load.n, load.w)]
-        weight = [
-            e.weight * contact.incline.weight * x
-            for x in (contact.incline.down_t, contact.incline.down_n)
-        ]
-        drag = (
-            force[0] + weight[0],
-            force[1] + weight[1],
-            force[2],
-        )  # work against gravity is none against the medium
-        powers.append(sum(f * scale * x for f, x in zip(drag, u)))
-        forces.append(np.stack(np.broadcast_arrays(-drag[0], -drag[1])))
-        wrenches.append(np.stack(np.broadcast_arrays(*to_frame(e, *force))))
+    contacts = problem.sides, problem.points
+    loads = loads_on(problem, v, rounding / scale[0])
+    for (e, load), (v_t, v_n, v_w), contact in zip(loads, v, contacts):
+        f_t = e.weight * load.t
+        f_n = e.weight * load.n
+        f_w = e.weight * load.w
+        wrenches.append(np.stack(np.broadcast_arrays(*to_frame(e, f_t, f_n, f_w))))
         stations.append(contact.station[:, 0])
-    e, (v_t, v_n, _) = problem.sides.elements, v[0]
+
+        # Work against gravity is not done against the medium.
+        weight = e.weight * contact.incline.weight
+        drag_t = f_t + weight * contact.incline.down_t
+        drag_n = f_n + weight * contact.incline.down_n
+        forces.append(np.stack(np.broadcast_arrays(-drag_t, -drag_n)))
+        powers.append(drag_t * scale * v_t + drag_n * scale * v_n + f_w * scale * v_w)
+
+    e = problem.sides.elements
+    v_t, v_n, _ = v[0]
     slip = np.average(np.arctan2(np.abs(v_n), np.abs(v_t)), 0, e.half[:, 0])
     if problem.momentum_rate is not None:
         wrenches[0] = wrenches[0] + element_momentum_rates(
@@ -165,29 +170,27 @@ def element_work(
     moment = _moments(
         e, np.concatenate(wrenches, 1), np.concatenate(stations), body_halves
     )
-    end_force, end_power = (
-        np.moveaxis(_by_end(problem, x), -1, 0) for x in (forces, powers)
-    )
-    element_force, element_power = (np.moveaxis(x[0], -1, 0) for x in (forces, powers))
     return Work(
-        sum(x.sum(0) for x in powers),
-        moment,
-        slip,
-        element_force,
-        element_power,
-        end_force,
-        end_power,
+        power=sum(x.sum(0) for x in powers),
+        bending_moment=moment,
+        slip=slip,
+        element_force=np.moveaxis(forces[0], -1, 0),
+        element_power=np.moveaxis(powers[0], -1, 0),
+        end_force=np.moveaxis(_by_end(problem, forces), -1, 0),
+        end_power=np.moveaxis(_by_end(problem, powers), -1, 0),
     )
 
 
 def _by_end(problem: Problem, values: Sequence[np.ndarray]) -> np.ndarray:
     """Return sums (..., 2, B) over the points nearer to the tail and nearer to the
     head, from values (..., n, B) of the sides and of the points, if there are any."""
-    of_points = values[1] if len(values) > 1 else values[0][..., :0, :]
-    at_head = problem.points.station[:, 0] > 0.5
-    return np.stack(
-        [of_points[..., at_end, :].sum(-2) for at_end in (~at_head, at_head)], -2
-    )
+    of_points = values[0][..., :0, :]
+    if len(values) > 1:
+        of_points = values[1]
+    is_at_head = problem.points.station[:, 0] > 0.5
+    tail = of_points[..., ~is_at_head, :].sum(-2)
+    head = of_points[..., is_at_head, :].sum(-2)
+    return np.stack([tail, head], -2)
 
 
 def _moments(
@@ -201,9 +204,8 @@ def _moments(
     """
     ends = np.cumsum(2 * sides.half[:, 0])
     # The piece before each point between elements of the body.
-    last = np.searchsorted(
-        ends, np.cumsum(2 * body_halves)[:-1] - 1e-9 * body_halves[0]
-    )
+    joints = np.cumsum(2 * body_halves)[:-1]
+    last = np.searchsorted(ends, joints - 1e-9 * body_halves[0])
     order = np.argsort(stations, kind="stable")
     cumulative = np.cumsum(wrenches[:, order], 1)
     f_x, f_y, moment = cumulative[:, np.searchsorted(stations[order], ends[last]) - 1]
