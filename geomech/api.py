@@ -130,9 +130,9 @@ class Study:
         return repr(self.tables)
 
     def _repr_html_(self) -> str:
-        from geomech.output import display
+        from geomech import notebook
 
-        return display.study(self.tables)
+        return notebook.study(self.tables)
 
     @cached_property
     def _tables(self) -> studies.Study | None:

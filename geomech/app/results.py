@@ -9,12 +9,18 @@ import numpy as np
 
 from geomech import plots, text
 from geomech.core.variables import Result
+from geomech.io.files import write_text
 from geomech.io.results import to_xarray, write_netcdf
 from geomech.measured.midlines import predicted
 from geomech.measured.midlines import question as midlines
-from geomech.output import parts, pictures
 from geomech.scenes.read import medium_of
 from rft.refusal import printable
+
+CALIBRATIONS = {
+    "rod_drag": plots.drag_figure,
+    "plate_drags": plots.plates_figure,
+    "penetration": plots.penetration_figure,
+}
 
 
 class FittedMidlines:
@@ -81,8 +87,8 @@ class FittedMedium:
 
     def plot(self) -> Any:
         """Draw measurements and fit; return the Figure."""
-        return pictures.CALIBRATIONS[self.result.kind](self.result)
+        return CALIBRATIONS[self.result.kind](self.result)
 
     def save(self, path: str | Path) -> None:
         """Write a medium's file, which a scene names as [medium] file."""
-        parts.write_medium(self.result, Path(path))
+        write_text(path, text.medium(self.result))

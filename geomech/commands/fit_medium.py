@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
 from geomech.commands.options import AllOption, JsonOption, PlotOption
 from geomech.commands.pipeline import Output, execute
 from geomech.questions.texts import parse_end_caps
+
+if TYPE_CHECKING:
+    from geomech.core.variables import Result
 
 Size = Optional[float]
 
@@ -77,7 +80,7 @@ def fit_medium(
     """Fit a medium to your own drag data. Rods, with the columns psi_deg, F_parallel_N, F_perpendicular_N, give a force law;
     plates in the vertical plane, with beta, gamma, alpha_x, alpha_z (degrees, N/cm^3), nine coefficients; a plate that is
     pushed straight down, with depth_m, force_N, the factor zeta."""
-    from geomech.output import parts, pictures
+    from geomech import plots
     from geomech.studies.calibration import Calibration
 
     sizes = {
@@ -88,8 +91,8 @@ def fit_medium(
         "area": area,
     }
     known = tuple((key, x) for key, x in sizes.items() if x is not None)
-    file = Output(out, parts.write_medium, message=parts.about_medium)
-    figure = Output(plot, pictures.calibration, pictures.check)
+    file = Output(out, write_medium, message=about_medium)
+    figure = Output(plot, draw, plots.check_format)
     execute(
         Calibration(drag, law, known, parse_end_caps(end_caps)),
         file,
@@ -97,3 +100,27 @@ def fit_medium(
         as_json=as_json,
         everything=everything,
     )
+
+
+def write_medium(result: Result, path: Path) -> None:
+    """Write a medium that was calibrated."""
+    from geomech import text
+    from geomech.io.files import write_text
+
+    write_text(path, text.medium(result))
+
+
+def about_medium(result: Result, path: Path) -> str:
+    """Return the line that says how a scene takes a medium."""
+    scene = "an intruder scene"
+    if result.kind == "rod_drag":
+        scene = "a scene"
+    return f'medium in {path}: in {scene}, [medium] file = "{path.name}"'
+
+
+def draw(result: Result, path: Path) -> None:
+    """Draw measurements and the law that was fitted to them."""
+    from geomech import plots
+    from geomech.app.results import CALIBRATIONS
+
+    plots.save(CALIBRATIONS[result.kind](result), path)
