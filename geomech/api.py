@@ -18,6 +18,7 @@ from geomech.questions.displacement import Displacement
 from geomech.questions.forces import Forces
 from geomech.questions.intrude import Intrude
 from geomech.questions.optimize import Optimize
+from geomech.questions.run import Run
 from geomech.questions.sweep import Sweep
 from geomech.questions.trajectory import Trajectory
 from geomech.questions.velocity import Velocity
@@ -153,6 +154,7 @@ class Study:
     connection = asks(Connection)
     velocity = asks(Velocity)
     sweep = asks(Sweep)
+    run = asks(Run)
     forces = asks(Forces)
     optimise = optimize = asks(Optimize)
     trajectory = asks(Trajectory)

@@ -3,7 +3,7 @@ is the function of that name, with _ for -, in the module of that name."""
 
 COMMANDS = {  # by the headings of `geomech --help`, in its order
     "Analyse": (
-        "run", "symbolic", "accuracy", "lab"
+        "symbolic", "accuracy", "lab"
     ),
     "Gaits": (),
     "Grains and robots": ("grains", "drag_grains"),
