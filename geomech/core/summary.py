@@ -12,7 +12,6 @@ from rft.premise import negated
 from rft.refusal import formatted
 
 ROWS = ("x", "y", "theta")
-POSE = "x", "y", "heading"
 WIDTH = 80  # characters of a line on a small screen
 
 
@@ -106,26 +105,6 @@ def poses(values) -> str:
     return spans(
         np.moveaxis(np.round(np.asarray(values, float).reshape(-1, 3), 12) + 0.0, -1, 0)
     )
-
-
-def moved(pose: Sequence[tuple[float, str]], zero: Sequence[str] = ()) -> str:
-    """Return x, y and heading, each a number and its unit, in words. zero: those of POSE that are 0 by symmetry."""
-    shown = [
-        (n, round(float(x), 9) + 0.0, u)
-        for n, (x, u) in zip(POSE, pose)
-        if n not in zero
-    ]
-    parts = (
-        [", ".join(f"{name} {x:.6g} {unit}" for name, x, unit in shown)]
-        if shown
-        else []
-    )
-    return "; ".join([*parts, *zero_words(zero)])
-
-
-def zero_words(zero: Sequence[str]) -> list[str]:
-    """Return what is 0 by symmetry, in words; nothing where nothing is."""
-    return [f"{listed(zero)}: zero by symmetry"] if zero else []
 
 
 def listed(names: Sequence[str]) -> str:
