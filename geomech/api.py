@@ -22,6 +22,7 @@ from geomech.questions.forces import Forces
 from geomech.questions.grains import Grains
 from geomech.questions.intrude import Intrude
 from geomech.questions.optimize import Optimize
+from geomech.questions.run import Run
 from geomech.questions.sweep import Sweep
 from geomech.questions.trajectory import Trajectory
 from geomech.questions.velocity import Velocity
@@ -174,9 +175,9 @@ class Study:
         return repr(self.tables)
 
     def _repr_html_(self) -> str:
-        from geomech.output import display
+        from geomech import notebook
 
-        return display.study(self.tables)
+        return notebook.study(self.tables)
 
     @cached_property
     def _tables(self) -> studies.Study | None:
@@ -197,6 +198,7 @@ class Study:
     connection = asks(Connection)
     velocity = asks(Velocity)
     sweep = asks(Sweep)
+    run = asks(Run)
     forces = asks(Forces)
     optimise = optimize = asks(Optimize)
     trajectory = asks(Trajectory)

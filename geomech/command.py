@@ -20,13 +20,15 @@ CHANGES = {"grid": GridOption, "extent": ExtentOption, "medium": MediumOption}
 ENDINGS = (".nc", ".json", ".csv", ".mat", ".txt")  # of `geomech.results.files.WRITERS`
 IN_FOLDER = (".json", ".csv", ".nc", ".txt")  # formats that fill a folder
 PICTURES = (".png", ".pdf", ".svg")  # those of --plot
+FOLDER = ""  # in place of an ending
 SUBJECT = "subject"  # name of the first argument in the function of a command
 
 
 class Declaration(NamedTuple):
     """All that the command of a question takes.
 
-    files: options of the functions that write a file, by ending."""
+    files: options of the functions that write a file, by ending, FOLDER of the one that
+    fills the question's folder."""
 
     question: type[Question]
     subject: base.Subject | None
@@ -46,7 +48,7 @@ class Declaration(NamedTuple):
 def declaration(question: type[Question]) -> Declaration:
     """Return what the command of a question takes."""
     _, subject = base.subject_field(question)
-    files = file_options(question.own_files())
+    files = file_options(question, question.own_files())
     return Declaration(
         question,
         subject,
@@ -56,9 +58,15 @@ def declaration(question: type[Question]) -> Declaration:
     )
 
 
-def file_options(writers: dict[str, Callable]) -> dict[str, Declared]:
-    """Return the options of functions that write files, by ending."""
-    return {end: base.keyword_options(write) for end, write in writers.items()}
+def file_options(
+    question: type[Question], writers: dict[str, Callable]
+) -> dict[str, Declared]:
+    """Return the options of functions that write files, by ending, and of the one that
+    fills the question's folder."""
+    found = {end: base.keyword_options(write) for end, write in writers.items()}
+    if question.folder:
+        found[FOLDER] = base.keyword_options(question.fill)
+    return found
 
 
 def command(question: type[Question]) -> Callable[..., None]:
@@ -93,13 +101,15 @@ def parameters(declared: Declaration) -> list[inspect.Parameter]:
     found = []
     changes: tuple[str, ...] = ()
     if declared.subject is not None:
-        found.append(parameter(SUBJECT, Annotated[str, argument(declared.subject)]))
+        found.append(subject_parameter(declared.subject))
         changes = declared.subject.changes
     found += [typed(name, *one) for name, one in declared.fields.items()]
     for name in changes:
         found.append(parameter(name, CHANGES[name], None))
     found += [typed(name, *one) for name, one in declared.picture.items()]
-    found += [typed(name, *one) for name, one in declared.of_files.items()]
+    for name, one in declared.of_files.items():
+        if name not in declared.picture:
+            found.append(typed(name, *one))
     return found + common(declared.question)
 
 
@@ -130,7 +140,10 @@ def output_parameter(question: type[Question]) -> inspect.Parameter:
         folder = typer.Option(
             "-o", "--output", metavar="DIR", help="folder to write the results to"
         )
-        return parameter("out", Annotated[list[str], folder])
+        annotation = Annotated[list[str], folder]
+        if question.default_folder:
+            return parameter("out", annotation, [question.default_folder])
+        return parameter("out", annotation)
     endings = ", ".join(dict.fromkeys((*question.own_files(), *ENDINGS)))
     file = typer.Option(
         "-o",
@@ -149,10 +162,15 @@ def parameter(
     )
 
 
-def argument(subject: base.Subject) -> Any:
-    return typer.Argument(
+def subject_parameter(subject: base.Subject) -> inspect.Parameter:
+    """Return the first argument of a command."""
+    shown = typer.Argument(
         metavar=subject.metavar, help=subject.help, autocompletion=subject.names
     )
+    annotation = Annotated[str, shown]
+    if subject.default:
+        return parameter(SUBJECT, annotation, subject.default)
+    return parameter(SUBJECT, annotation)
 
 
 def typed(name: str, option: Option, kind: Any, default: Any) -> inspect.Parameter:
@@ -190,7 +208,8 @@ def request(
     paths = [path_of(name) for name in given["out"] or ()]
     plot = given.get("plot")
     if paths:
-        declared = declared._replace(files=file_options(declared.question.files()))
+        writers = declared.question.files()
+        declared = declared._replace(files=file_options(declared.question, writers))
     refuse_unused(declared, given, paths)
     about = []
     if declared.subject is not None:
@@ -204,9 +223,13 @@ def request(
     outputs = []
     for path in paths:
         options = of_files.get(path.suffix.lower(), {})
+        if declared.question.folder:
+            options = of_files[FOLDER]
         outputs.append(output(declared.question, path, options))
     picture = parsed(declared.picture, given, subject)
     question = question.for_files(paths, parsed(declared.of_files, given, subject))
+    if declared.question.folder:
+        question.check_draw(**of_files[FOLDER])
     if plot is not None:
         question.check_draw(**picture)
         outputs.append(figure(plot, picture))
@@ -242,13 +265,17 @@ def refuse_unused(
     declared: Declaration, given: dict[str, Any], paths: list[Path]
 ) -> None:
     """Refuse options of figures and files that are not written."""
+    in_folder = declared.files.get(FOLDER, {})
     if given.get("plot") is None:
-        refuse_given(declared.picture, given, "for a figure", "say --plot FILE, too")
+        unused = {k: one for k, one in declared.picture.items() if k not in in_folder}
+        refuse_given(unused, given, "for a figure", "say --plot FILE, too")
     written = {path.suffix.lower() for path in paths}
     taken: set[str] = set()
     for ending in written:
         taken |= {*declared.files.get(ending, {})}
     for ending, options in declared.files.items():
+        if ending == FOLDER:
+            continue
         unused = {name: one for name, one in options.items() if name not in taken}
         refuse_given(unused, given, f"for a {ending} file", f"say -o FILE{ending}, too")
 
@@ -276,7 +303,8 @@ def output(
     from geomech.results.files import formats, save, writer
 
     if question.folder:
-        return pipeline.Output(path, question.fill, folder=True)
+        write = partial(question.fill, **options)
+        return pipeline.Output(path, write, folder=True)
     if path.is_dir() and path.suffix.lower() not in formats(question):
         return pipeline.Output(path, fill, folder=True)
     if path.suffix.lower() in PICTURES and question.draw is not None:

@@ -16,9 +16,9 @@ from rft.core.refusal import Refusal, printable
 @implements("Connection._repr_html_")
 def connection_html(connection: Any) -> str:
     """Return a connection as a notebook shows it."""
-    from geomech.output import display
+    from geomech import notebook
 
-    return display.connection(connection)
+    return notebook.connection(connection)
 
 
 @implements("Connection.to_xarray")
@@ -41,9 +41,9 @@ def load_connection(path: str | Path, sign: str, order: str) -> Any:
 @implements("Field._repr_html_")
 def field_html(field: Any) -> str:
     """Return a field as a notebook shows it."""
-    from geomech.output import display
+    from geomech import notebook
 
-    return display.field(field)
+    return notebook.field(field)
 
 
 @implements("Field.to_xarray")

@@ -6,7 +6,7 @@ from __future__ import annotations
 import contextlib
 import json
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,7 @@ from geomech import terminal
 from geomech.core.errors import Note
 from geomech.io.files import atomic_file, atomic_folder, note, refuse_inputs
 from geomech.questions.base import Run, ignore
-from rft.core.refusal import Refusal
+from rft.core.refusal import Refusal, in_line
 
 if TYPE_CHECKING:  # commands start without NumPy
     from geomech.core.variables import Result
@@ -65,6 +65,8 @@ def execute(
     for line in notes_of(result):
         note(line)
     print("\n".join(printed(result, as_json, everything)))
+    if question.folder and not as_json:
+        print("\n".join(contents(output.path for output in outputs if output.folder)))
 
 
 def notes_of(result: Result) -> list[str]:
@@ -86,6 +88,17 @@ def printed(result: Result, as_json: bool, everything: bool) -> list[str]:
         return lines
     if show.leaves_out(result):
         lines.append(MORE)
+    return wrapped(lines)
+
+
+def contents(folders: Iterable[Path]) -> list[str]:
+    """Return lines that name the files of folders."""
+    from geomech.core.summary import wrapped
+
+    lines = []
+    for folder in folders:
+        names = sorted(p.name for p in folder.iterdir() if not p.name.startswith("."))
+        lines.append(f"files in {in_line(folder)}: {', '.join(map(in_line, names))}")
     return wrapped(lines)
 
 

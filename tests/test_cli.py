@@ -1,7 +1,6 @@
 """The command line as a user meets it: in the tests' own process, and a few commands in processes of their own."""
 
 import contextlib
-import json
 import math
 import os
 import subprocess
@@ -19,9 +18,9 @@ from geomech.core.variables import Result
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import curvature
 from geomech.io import files
-from geomech.io.results import of_dict
-from geomech.output import report
-from geomech.studies.report import Report, _gaits, reachable, steps
+from geomech.questions import run
+from geomech.results.files import load
+from geomech.studies.report import compared, reachable, steps, tables_of
 from geomech.studies.study import Study
 from rft.core.refusal import Refusal
 
@@ -192,35 +191,26 @@ def test_run_leaves_everything(undrawn, tmp_path):
     }  # fmt: skip
     said = " ".join(out.split())
     assert "s.toml, circle: displacement per cycle, direct tier" in said
-    assert "s.toml, butterfly: displacement per cycle" in said
     assert [p.name for p in (tmp_path / "deep").iterdir()] == ["dir"]
-    tables = json.loads((tmp_path / "deep" / "dir" / "displacement.json").read_text())
+    tables = tables_of(load(tmp_path / "deep" / "dir" / "displacement.json"))
     assert set(tables) == {"circle", "butterfly"}
-    for gait, data in tables.items():
-        table = tabled(of_dict(data))
+    for gait, result in tables.items():
+        table = tabled(result)
         run = {"circle": glass.gait, "butterfly": scenes.load("butterfly-glass").gait}[
             gait
         ]
         wanted = Study(glass).poses("direct", run, np.array(table["amplitude"]))
         np.testing.assert_allclose(table["direct"], wanted, atol=1e-9)
         assert f"{wanted[-1, 0]:.9f}"[:6] in out
-        assert ("note" in data["attrs"]) == (gait == "butterfly")
-    assert tables["circle"]["coords"]["amplitude"]["data"] == [
-        0.25,
-        0.5,
-        0.75,
-        1.0,
-        1.25,
-        1.5,
-        1.75,
-        2.0,
-        2.25,
-        2.5,
-    ]
-    assert tables["butterfly"]["coords"]["amplitude"]["data"] == [
-        k / 10 for k in range(1, 14)
-    ]
-    assert "butterfly: not in the scene, added to compare" in said
+        assert ("note" in result.attributes) == (gait == "butterfly")
+    np.testing.assert_array_equal(
+        tables["circle"]["amplitude"].values, 0.25 * np.arange(1, 11)
+    )
+    np.testing.assert_array_equal(
+        tables["butterfly"]["amplitude"].values, [k / 10 for k in range(1, 14)]
+    )
+    told = "butterfly, direct tier, most exact of 4: not in the scene, added to compare"
+    assert told in said
     assert "zero by symmetry" in out and "circle: not in" not in out
     assert (tmp_path / "deep" / "dir" / "scene.toml").read_text() == glass.text
 
@@ -296,11 +286,12 @@ def test_a_failure_half_way_leaves_nothing(undrawn, tmp_path, monkeypatch):
 
     monkeypatch.setattr(plots, "displacement_figure", fail)
     small = scenes.load("three-link-viscous").with_numerics(grid=5)
+    result = run.Run(small).ask()
     with (
         pytest.raises(ValueError, match="half way"),
         files.atomic_folder(tmp_path / "out") as folder,
     ):
-        report.write(Report(small).ask(), folder)
+        run.Run.fill(result, folder)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -318,17 +309,15 @@ BACKBONE = '[medium]\nname = "coulomb"\n[body]\nkind = "backbone"\nelements = 8\
 def quick(monkeypatch):
     """`run` without its numbers."""
 
-    def write(result, folder, drawn=None):
-        for name in (report.SCENE, report.TABLES):
-            (folder / name).write_text(
-                result.subject.text if name == report.SCENE else "{}"
-            )
+    def fill(result, folder, **options):
+        (folder / run.SCENE).write_text(result.question.scene.text)
+        (folder / run.TABLES).write_text("{}")
 
-    monkeypatch.setattr(report, "write", write)
-    monkeypatch.setattr(
-        Report, "answer", lambda self, *_: Result("report", (), {}, self.scene)
-    )
-    monkeypatch.setattr("geomech.text.report.text", lambda result: "")
+    shown = "headline", "summary", "remarks"
+    for name, value in zip(shown, ([], Result("run", ()), [])):
+        monkeypatch.setattr(run.Run, name, staticmethod(lambda _, value=value: value))
+    monkeypatch.setattr(run.Run, "fill", staticmethod(fill))
+    monkeypatch.setattr(run.Run, "compute", lambda self, _: Result("run", ()))
 
 
 def test_run_says_what_it_replaces(quick, tmp_path):
@@ -653,7 +642,7 @@ def test_amplitudes_of_a_report_fill_the_field():
         assert reachable(moved, gait) == pytest.approx(
             np.sign(amplitude) * np.array(steps(room))
         )
-        own, other = _gaits(moved)
+        own, other = compared(moved)
         assert own is gait and (type(other).__name__, other.frequency) == (
             "Butterfly",
             3.0,

@@ -12,8 +12,9 @@ from geomech import scenes
 from geomech.gaits import Fourier
 from geomech.questions.accuracy import Accuracy
 from geomech.questions.ccf import Ccf
+from geomech.questions.run import Run
 from geomech.run.cost import BASE
-from geomech.studies import cost, effort, motion, report, sweep
+from geomech.studies import cost, effort, motion, sweep
 from geomech.studies.study import Study
 from geomech.tiers import TIERS
 from rft import Chain, body_velocity
@@ -198,11 +199,10 @@ def test_a_map_takes_the_balances_foretold(scene, question, solved):
     assert foretold == sum(solved)
 
 
-def test_a_report_takes_as_much_as_foretold_and_what_its_pictures_take(solved):
+def test_all_of_a_scene_takes_as_much_as_foretold(solved):
     scene = VISCOUS.with_numerics(grid=9, phases=32)
-    report.Report(scene).ask()
-    drawn = cost.price(cost.of_even_part(scene) + cost.of_metric(scene)).balances
-    assert report.cost(scene).balances == sum(solved) + drawn
+    Run(scene).ask()
+    assert Run(scene).cost().balances == sum(solved)
 
 
 def test_memory_is_foretold_too_large_rather_than_too_small():

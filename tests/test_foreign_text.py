@@ -12,11 +12,10 @@ from test_mjcf import CART
 from test_mjcf import SCENE as WALKER
 
 import geomech as package
-from geomech import scenes
+from geomech import notebook, scenes
 from geomech.describe.explain import explained
 from geomech.io import files, tables
 from geomech.io.tables.mat import ABOUT
-from geomech.output import display
 from geomech.run import progress
 from geomech.scenes import Numerics, Scene
 from geomech.studies import fields
@@ -233,8 +232,8 @@ def test_pages_of_a_notebook():
     found = made.displacements([0.5], ["direct"])
     swept = package.sweep(made.scene, {"gait.amplitude": [0.5, 1.0]})
     for page in (
-        display.page(ESC, (ESC,), [(ESC,)]),
-        display.study(made),
+        notebook.page(ESC, [(ESC,)]),
+        notebook.study(made),
         re.sub(r'src="data:[^"]+"', "", found._repr_html_()),
     ):
         assert "&lt;b&gt;" in page or "<b>" not in page

@@ -505,28 +505,26 @@ def test_a_surface_says_what_its_shades_mean():
 
 
 def test_a_run_of_three_joints_has_its_field_and_all_slices(tmp_path, monkeypatch):
-    from geomech.output import report
-    from geomech.studies.report import Report
+    from geomech.questions import run
 
     system = Swimmer(Viscous(2.3), Chain((0.7, 1.4, 0.9, 0.6)))
     drawn, scene = {}, Scene(system, LOOP, Numerics(grid=5, extent=1.2, phases=32))
     monkeypatch.setattr(
-        report, "_save", lambda fig, stem: drawn.update({stem.name: fig})
+        run, "save_figure", lambda fig, stem: drawn.update({stem.name: fig})
     )
     for name in ("plane_connection_figure", "planes_figure"):
         monkeypatch.setattr(
-            report.plots,
+            plots,
             name,
             lambda planes, *gait, **options: [one.pair for one in planes],
         )
     monkeypatch.setattr(
-        report.plots, "displacement_figure", lambda tables, *told, **options: [*tables]
+        plots, "displacement_figure", lambda tables, *told, **options: [*tables]
     )
-    found = Report(scene).ask()
-    report.write(found, tmp_path)
+    found = run.Run(scene).ask()
+    run.Run.fill(found, tmp_path)
     pairs = [(0, 1), (0, 2), (1, 2)]
     assert drawn == {"connection": pairs, "ccf": pairs, "displacement": ["fourier"]}
-    assert (tmp_path / "connection.nc").exists() and {"area", "path", "direct"} <= {
-        *found.subject.tables["fourier"]["tier"].values
-    }
-    assert Report(scene).cost().balances >= 5**3 // 2 * 12 + 3 * 5**2 * 12
+    assert (tmp_path / "connection.nc").exists()
+    assert {"area", "path", "direct"} <= {*found["tier"].values}
+    assert run.Run(scene).cost().balances >= 5**3 // 2 * 12 + 3 * 5**2 * 12

@@ -48,6 +48,7 @@ ASKED = {
         {"over": {"medium.ratio": [1.5, 2.0]}},
         {"over": {"medium.ratio": [1.5, 2.5]}},
     ),
+    "run": ("three-link-ideal-fluid", FIELD, {}, {}),
     "forces": ("seven-link-wave", {"phases": 32}, {}, {"length": 0.1}),
     "optimize": (
         "three-link-viscous",

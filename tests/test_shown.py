@@ -164,17 +164,17 @@ def test_notebooks_get_tables_and_pictures(study, table):
     assert float(cells[7]) == 0.5
     x = table["x"].values[1, 0]
     assert float(cells[8]) == pytest.approx(x, rel=1e-3, abs=1e-9)
-    from geomech.output import display
+    from geomech import notebook
 
     fresh = Study(study.scene)
-    assert pictures(display.study(fresh)) == []
-    assert "nothing yet" in display.study(fresh)
+    assert pictures(notebook.study(fresh)) == []
+    assert "nothing yet" in notebook.study(fresh)
     assert fresh.computed == ()  # nothing is computed to be shown
     assert study.curvature.values is not None
     assert study.curvature_error.values is not None
-    assert len(pictures(display.study(study))) == 1
+    assert len(pictures(notebook.study(study))) == 1
     named = Study(study.scene.changed(name="<script>"))
-    assert "<script>" not in display.study(named)
+    assert "<script>" not in notebook.study(named)
 
 
 def test_data_sets_are_those_of_the_files(study, tmp_path):

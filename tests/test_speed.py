@@ -125,7 +125,7 @@ def test_from_python_too():
         tabled(Study(scene).displacements([0.5], ["direct"], Circle()))["frequency"]
         == 2.5
     )
-    assert [g.frequency for g in report._gaits(scene)] == [
+    assert [g.frequency for g in report.compared(scene)] == [
         2.5
     ] * 3  # those that `run` adds, too
 

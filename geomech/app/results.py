@@ -15,6 +15,12 @@ from geomech.measured.midlines import question as midlines
 from geomech.scenes.read import medium_of
 from rft.core.refusal import printable
 
+CALIBRATIONS = {
+    "rod_drag": plots.drag_figure,
+    "plate_drags": plots.plates_figure,
+    "penetration": plots.penetration_figure,
+}
+
 
 class FittedMidlines:
     """Kinematics of midlines. result: all numbers as variables. kinematics: the fit. comparison: with a prediction, or None."""

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
 from geomech.commands import formats
 from geomech.commands.options import JsonOption, PlotOption, an_angle
-from geomech.commands.pipeline import Output, drawing, execute
+from geomech.commands.pipeline import Output, execute
 from geomech.questions.texts import column_names
+from rft.core.refusal import Refusal
+
+if TYPE_CHECKING:
+    from geomech.core.variables import Result
 
 
 def fit_gait(
@@ -123,15 +128,63 @@ def fit_gait(
     give speed, heading, slip, wave efficiency, amplitude and wavelength, each with an interval, and in a medium the same as
     predicted."""
     from geomech.measured.ask import question
-    from geomech.output import parts
 
     request = question(
         file, scene, columns=column_names(columns), degrees=degrees, level=level, harmonics=harmonics, limits=limits,
         body_length=body_length, medium=medium, units=units, scale=scale, fps=fps, y=y, head=head, least_score=least_score,
         individual=individual, mend=mend,
     )  # fmt: skip
-    field = Output(out, parts.write_measured, formats.netcdf)
-    figure = Output(plot, drawing("pictures.measured"), drawing("pictures.check"))
-    execute(
-        request, field, Output(scene, *parts.mean_gait(out)), figure, as_json=as_json
-    )
+    field = Output(out, write_measured, formats.netcdf)
+    figure = Output(plot, draw, check_figure)
+    execute(request, field, Output(scene, *mean_gait(out)), figure, as_json=as_json)
+
+
+def write_measured(result: Result, path: Path) -> None:
+    """Write the connection near a measured gait, or the kinematics of midlines."""
+    from geomech.io.results import write_netcdf
+    from geomech.measured import results
+
+    if result.kind == "midlines":
+        write_netcdf(path, result)
+    else:
+        write_netcdf(path, results.of_fit(result.subject))
+
+
+def mean_gait(field: Path | None) -> tuple[Callable, Callable]:
+    """Return a function that writes a scene of a measured gait, whose connection is in the
+    file ``field``, and a check of the name of that scene."""
+
+    def check(path: Path) -> None:
+        if path.suffix != ".toml":
+            raise Refusal(
+                f"cannot write {path}", instead="end the name of a scene in .toml"
+            )
+        if field is None:
+            raise Refusal(
+                "--scene names the field's file", instead="say -o FIELD.nc, too"
+            )
+
+    def write(result: Result, path: Path) -> None:
+        from geomech.io.files import write_text
+        from geomech.measured import results
+
+        write_text(path, results.scene_toml(result.subject, field, path))
+
+    return write, check
+
+
+def draw(result: Result, path: Path) -> None:
+    """Draw a measured gait, or midlines."""
+    from geomech import plots
+
+    if result.kind == "midlines":
+        plots.save(plots.midlines_figure(result), path)
+    else:
+        plots.save(plots.measured_figure(result.subject), path)
+
+
+def check_figure(path: Path) -> None:
+    """Refuse the name of a figure that ends in no format."""
+    from geomech import plots
+
+    plots.check_format(path)

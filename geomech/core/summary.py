@@ -12,7 +12,6 @@ from rft.core.premise import negation
 from rft.core.refusal import formatted
 
 ROWS = ("x", "y", "theta")
-POSE = ("x", "y", "heading")
 WIDTH = 80  # characters of a line on a small screen
 
 
@@ -111,27 +110,6 @@ def poses(values) -> str:
     """Return the ranges of x, y and theta of poses or velocities (..., 3)."""
     rows = np.asarray(values, float).reshape(-1, 3).T
     return spans(np.round(rows, 12) + 0.0)  # no -0
-
-
-def format_pose(pose: Sequence[tuple[float, str]], zero: Sequence[str] = ()) -> str:
-    """Return x, y and heading, each a number and its unit, in words. zero: those of
-    POSE that are 0 by symmetry."""
-    numbers = []
-    for name, (x, unit) in zip(POSE, pose):
-        if name not in zero:
-            x = round(float(x), 9) + 0.0  # no -0
-            numbers.append(f"{name} {x:.6g} {unit}")
-    parts = zero_words(zero)
-    if numbers:
-        parts = [", ".join(numbers), *parts]
-    return "; ".join(parts)
-
-
-def zero_words(zero: Sequence[str]) -> list[str]:
-    """Return the sentence on names that are 0 by symmetry; none without names."""
-    if not zero:
-        return []
-    return [f"{listed(zero)}: zero by symmetry"]
 
 
 def listed(names: Sequence[str]) -> str:

@@ -18,6 +18,7 @@ GROUPS = {
         "connection": "Compute the local connection on a grid.",
         "velocity": "Compute the body velocity of one shape and its rate.",
         "sweep": "Compute displacement or speed over a grid of parameters.",
+        "run": "Compute connection, CCF and displacements into a folder.",
         "accuracy": "Measure error against time for every tier and setting.",
     },
     "Gaits": {

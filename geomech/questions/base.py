@@ -51,13 +51,14 @@ class Subject:
 
     load: returns it from its text and from the values of ``changes``, options of the
     command that change it (`geomech.command.CHANGES`). names: returns those that a shell
-    completes."""
+    completes. default: what is taken where nothing is given; "" if it must be."""
 
     load: Callable[..., Any]
     names: Callable[[], list[str]] | None = None
     changes: tuple[str, ...] = ()
     metavar: str = "SCENE"
     help: str = SCENE_HELP
+    default: str = ""
 
 
 def ignore(_: Any) -> None:
@@ -108,7 +109,8 @@ class Question(Plain):
 
     less: advice where it costs too much. worth_saying: seconds of computing from which on
     a command prints the cost. parallel: whether other processes can take a part. folder:
-    whether its command fills a folder, which must be given. unlimited: whether it is
+    whether its command fills a folder by its function `fill`, whose keywords are options
+    of the command; default_folder: its name where none is given. unlimited: whether it is
     computed whatever it costs. consent_beyond: what its command asks consent for."""
 
     name: ClassVar[str]
@@ -116,6 +118,7 @@ class Question(Plain):
     worth_saying: ClassVar[float] = 5.0
     parallel: ClassVar[bool] = False
     folder: ClassVar[bool] = False
+    default_folder: ClassVar[str] = ""
     unlimited: ClassVar[bool] = False
     consent_beyond: ClassVar[str] = "a minute or over 2 GB"
 
@@ -283,12 +286,13 @@ JSON_TYPES = {
 
 def schema(question: type[Question]) -> dict[str, Any]:
     """Return the JSON Schema of a question's fields."""
-    subject, _ = subject_field(question)
+    subject, about = subject_field(question)
     properties: dict[str, Any] = {}
     required = []
-    if subject:
+    if about is not None:
         properties[subject] = {"type": "string"}
-        required.append(subject)
+        if not about.default:
+            required.append(subject)
     for name, (option, kind, default) in options(question).items():
         properties[name] = {**json_type(kind), "description": option.help}
         if is_required(default):

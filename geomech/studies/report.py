@@ -1,23 +1,23 @@
-"""The report of a scene: its connection, and displacements of its gait and of those it is compared with, by all tiers."""
+"""The study of a scene: its connection and CCF, and displacements of its gait and of those
+it is compared with, by all tiers."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+import re
+from collections.abc import Callable
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
-from geomech.core.variables import Result
+from geomech.core.variables import Result, Variable
 from geomech.gaits import Butterfly, Circle, Gait
-from geomech.geometry.plane import Plane
 from geomech.run.cost import Cost
 from geomech.scenes.model import Scene
-from geomech.studies import effort
+from geomech.studies import effort, fields, shape_space
 from geomech.studies.available import default_tiers
 from geomech.studies.cost import Job, of_even_part, of_metric, of_planes, price
 from geomech.studies.cost import study as jobs
-from geomech.studies.question import Allow, Progress, Question
 from geomech.studies.study import Study
 from geomech.systems.base import System, refuse_singular
 from geomech.systems.capabilities import near_gait
@@ -31,73 +31,146 @@ from rft.core.refusal import Refusal, located
 AMPLITUDES = 10  # or so, for each gait
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)  # of round amplitudes, times a power of ten
 ADDED = "not in the scene, added to compare the two gaits of Fig. 11(e)"
+PLANE = re.compile(r"(slice|A|ccf)_\d+_\d+")  # names of variables of planes
+SHARED = ("tier", "quantity")  # coordinates that the tables of all gaits have
+OF_TABLE = ("tier", "quantity", "amplitude", "part")  # dimensions of a table
+# Facts about displacements that a connection does not have.
+OF_GAITS = ("frequency", "error_is", "gait", "other_gaits")
+OF_ALL = ("frame", "body_length", "length_unit", "frequency", "scene_toml")
 
 
-@dataclass(frozen=True)
-class Reported:
-    """Contents of a report. tables: displacements by the gait's kind, each with its ``gaits``. mapped: whether there
-    are maps; for three joints, planes of every pair."""
+def answer(tables: Study, progress: Callable | None = None) -> Result:
+    """Return the study of a scene as a result: displacements of its gait, those of other
+    gaits under names such as circle_x, and the fields of shape space, where all of it can
+    be drawn; of three joints with the planes of every pair."""
+    scene = tables.scene
+    gaits = compared(scene)
+    amplitudes = [reachable(scene, gait) for gait in gaits]
+    mapped = is_mapped(scene.system)
+    if mapped:
+        tables.compute_field(progress)
+    first = tables.displacements(amplitudes[0], gait=gaits[0])
+    found, facts = [*first.variables], {**first.attributes, "gait": title(gaits[0])}
+    for gait, values in zip(gaits[1:], amplitudes[1:]):
+        table = tables.displacements(values, gait=gait)
+        found += [prefixed(v, title(gait)) for v in table.variables if is_own(v)]
+    if len(gaits) > 1:
+        facts["other_gaits"] = " ".join(title(gait) for gait in gaits[1:])
+    if mapped:
+        shapes = fields.of_study(tables)
+        found += shapes.variables
+        facts = {**shapes.attributes, **facts}
+    if mapped and scene.system.joints == 3:
+        found += of_pairs(tables, {v.name for v in found})
+    return Result("run", tuple(found), facts)
 
-    study: Study
-    gaits: list[Gait]
-    tables: dict[str, Result]
-    mapped: bool
-    planes: list[Plane]
+
+def of_pairs(tables: Study, known: set[str]) -> list[Variable]:
+    """Return the planes of all pairs of three joints, without variables that are known."""
+    planes = [tables.plane(pair) for pair in combinations(range(3), 2)]
+    found = [
+        *shape_space.slices(planes),
+        *shape_space.plane_connections(planes),
+        *shape_space.plane_ccfs("ccf", planes),
+    ]
+    return [v for v in found if v.name not in known]
 
 
-@dataclass(frozen=True)
-class Report(Question):
-    """The report of a scene."""
+# Tables of gaits
 
-    scene: Scene
 
-    @property
-    def title(self) -> str:
-        return f"field of {self.scene.name}"
+def title(gait: Gait) -> str:
+    """Return the name of a kind of gait."""
+    return type(gait).__name__.lower()
 
-    @cached_property
-    def study(self) -> Study:
-        return Study(self.scene)
 
-    def cost(self) -> Cost:
-        return cost(self.scene)
+def is_own(variable: Variable) -> bool:
+    """Return whether the table of another gait has a variable of its own."""
+    return variable.name not in SHARED
 
-    def answer(self, progress: Progress, allow: Allow) -> Result:
-        study, scene, gaits = self.study, self.scene, _gaits(self.scene)
-        amplitudes = [reachable(scene, gait) for gait in gaits]
-        mapped = is_mapped(scene.system)
-        if mapped:
-            study.compute_field(progress)
-        tables = {}
-        for gait, values in zip(gaits, amplitudes):
-            result = study.displacements(values, gait=gait)
-            title = type(gait).__name__.lower()
-            facts = {**result.attributes, "scene": f"{scene.name}, {title}"}
-            if gait is not scene.gait:
-                facts["note"] = ADDED
-            tables[title] = replace(result, attributes=facts)
-        pairs = combinations(range(3), 2) if mapped and scene.system.joints == 3 else ()
-        planes = [study.plane(pair) for pair in pairs]
-        first = next(iter(tables.values()))
-        return replace(
-            first, kind="report", subject=Reported(study, gaits, tables, mapped, planes)
-        )
+
+def is_of_own_gait(variable: Variable) -> bool:
+    """Return whether a variable is of the displacements of the scene's gait."""
+    return bool(variable.dims) and set(variable.dims) <= {*OF_TABLE}
+
+
+def prefixed(variable: Variable, gait: str) -> Variable:
+    """Return a variable of displacements under the name that it has for another gait."""
+    dims = tuple(dim if dim in SHARED else f"{gait}_{dim}" for dim in variable.dims)
+    return replace(variable, name=f"{gait}_{variable.name}", dims=dims)
+
+
+def tables_of(result: Result) -> dict[str, Result]:
+    """Return the displacements of each gait, by its name, the scene's own first."""
+    own = result.attributes["gait"]
+    found = {own: table_of(result, own)}
+    for gait in result.attributes.get("other_gaits", "").split():
+        found[gait] = table_of(result, gait)
+    return found
+
+
+def table_of(result: Result, gait: str) -> Result:
+    """Return the displacements of a gait as a result of their own."""
+    known = result.attributes
+    facts = {name: known[name] for name in OF_ALL if name in known}
+    facts["scene"] = f"{known['scene']}, {gait}"
+    if gait == known["gait"]:
+        variables = [v for v in result.variables if is_of_own_gait(v)]
+        if "error_is" in known:
+            facts["error_is"] = known["error_is"]
+        return Result("displacement", tuple(variables), facts)
+    variables = [result[name] for name in SHARED if name in result]
+    start = f"{gait}_"
+    for v in result.variables:
+        if v.name.startswith(start):
+            dims = tuple(dim.removeprefix(start) for dim in v.dims)
+            variables.append(replace(v, name=v.name.removeprefix(start), dims=dims))
+    return Result("displacement", tuple(variables), {**facts, "note": ADDED})
+
+
+def displacements_of(result: Result) -> Result:
+    """Return a result without its fields of shape space."""
+    known = ("scene", *OF_ALL, *OF_GAITS)
+    facts = {k: x for k, x in result.attributes.items() if k in known}
+    return replace(result.only(*names_of_tables(result)), attributes=facts)
+
+
+def names_of_tables(result: Result) -> list[str]:
+    """Return the names of the variables of all tables of displacements."""
+    others = result.attributes.get("other_gaits", "").split()
+    starts = tuple(f"{name}_" for name in others)
+    found = []
+    for v in result.variables:
+        if is_of_own_gait(v) or v.name.startswith(starts):
+            found.append(v.name)
+    return found
+
+
+def connection_of(result: Result) -> Result:
+    """Return the fields of shape space as a result of their own, without planes; without
+    variables if there are none."""
+    tables = {*names_of_tables(result)}
+    variables = []
+    for v in result.variables:
+        if v.name not in tables and not PLANE.fullmatch(v.name):
+            variables.append(v)
+    facts = {k: x for k, x in result.attributes.items() if k not in OF_GAITS}
+    return Result("connection", tuple(variables), facts)
 
 
 def is_mapped(system: System) -> bool:
-    """Return whether all of shape space is drawn; for more joints there is `geomech ccf --pair`."""
-    return (
-        {2: PATH, 3: AREA}[system.joints].is_offered(system)
-        if system.joints in (2, 3)
-        else False
-    )
+    """Return whether all of shape space is drawn; for more joints there is `geomech ccf
+    --pair`."""
+    if system.joints not in (2, 3):
+        return False
+    return {2: PATH, 3: AREA}[system.joints].is_offered(system)
 
 
 def cost(scene: Scene) -> Cost:
     """Return the cost of a report; Refusal as in the report itself."""
     study, system = Study(scene), scene.system
     parts: list[Job] = []
-    for k, gait in enumerate(_gaits(scene)):
+    for k, gait in enumerate(compared(scene)):
         amplitudes = reachable(scene, gait)
         plans = {m: study.plan(m, gait, amplitudes) for m in default_tiers(system)}
         parts += jobs(scene, plans, len(amplitudes), gait, tables=k == 0)
@@ -112,20 +185,16 @@ def cost(scene: Scene) -> Cost:
     return price(parts)
 
 
-def _gaits(scene: Scene) -> list[Gait]:
-    """Return the scene's gait and, for the three-link swimmer, those of Fig. 11(e), at the same frequency."""
+def compared(scene: Scene) -> list[Gait]:
+    """Return the scene's gait and, for the three-link swimmer, those of Fig. 11(e), at the
+    same frequency."""
+    if not is_three_link(scene.system):
+        return [scene.gait]
     more = (
         Circle(reverse=True, frequency=scene.frequency),
         Butterfly(frequency=scene.frequency),
     )
-    return [
-        scene.gait,
-        *(
-            g
-            for g in more
-            if type(g) is not type(scene.gait) and is_three_link(scene.system)
-        ),
-    ]
+    return [scene.gait, *(g for g in more if type(g) is not type(scene.gait))]
 
 
 def reachable(scene: Scene, gait: Gait) -> list[float]:
