@@ -15,6 +15,7 @@ from geomech.questions.base import Question, plain_type
 from geomech.questions.ccf import Ccf
 from geomech.questions.connection import Connection
 from geomech.questions.displacement import Displacement
+from geomech.questions.fit_gait import FitGait
 from geomech.questions.fit_medium import FitMedium
 from geomech.questions.forces import Forces
 from geomech.questions.intrude import Intrude
@@ -237,3 +238,4 @@ optimise = optimize = asked_of_scene(Optimize)
 walk = asked_of_scene(Walk)
 intrude = asked_of_scene(Intrude)
 fit_medium = asked_of_file(FitMedium)
+fit_gait = asked_of_file(FitGait)

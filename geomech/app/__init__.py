@@ -1,9 +1,8 @@
-"""Questions of measurements and of accuracy from Python."""
+"""The question of accuracy from Python."""
 
-from geomech.app.questions import accuracy, fit_midlines
-from geomech.app.results import FittedMidlines
+from geomech.app.questions import accuracy
 
-__all__ = ["FittedMidlines", "accuracy", "fit_midlines"]
+__all__ = ["accuracy"]
 
 
 def __dir__() -> list[str]:

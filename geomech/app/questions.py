@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from geomech.app.results import FittedMidlines
-from geomech.measured.midlines import fit
-from geomech.measured.midlines import question as of_midlines
 from geomech.scenes.parts import as_scene
 from geomech.studies import accuracy as accuracies
 
@@ -26,22 +23,3 @@ def accuracy(
     ['amplitudes', 'cheapest', 'lines', 'scene', 'units']
     """
     return accuracies.study(as_scene(scene), progress, runs)
-
-
-def fit_midlines(midlines: Any, medium: Any = None, **options: Any) -> FittedMidlines:
-    """Return the kinematics of tracked midlines with intervals, as `geomech fit-gait` does.
-
-    Parameters
-    ----------
-    midlines : path, or `geomech.measured.midlines.trial.Trial`
-        CSV file of points along the body over whole cycles.
-    medium : medium, name or file
-        In which the motion of the measured shapes is predicted; none if left out.
-    **options : columns, units, scale, fps, y, head, least_score, individual, body_length,
-        mend, level
-        See `geomech.measured.midlines.fit.fit_midlines`.
-    """
-    fitted = FittedMidlines(
-        of_midlines.result_of(fit.fit_midlines(midlines, **options))
-    )
-    return fitted if medium is None else fitted.against(medium)

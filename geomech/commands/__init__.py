@@ -7,6 +7,6 @@ COMMANDS = {  # by the headings of `geomech --help`, in its order
     ),
     "Gaits": ("trajectory",),
     "Grains and robots": ("grains", "drag_grains"),
-    "Your own data": ("fit_gait",),
+    "Your own data": (),
     "Reference": ("scenes", "reference", "explain"),
 }  # fmt: skip
