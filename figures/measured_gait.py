@@ -11,10 +11,12 @@ import numpy as np
 
 from figures import main
 from geomech import plots
+from geomech.core.variables import Result
 from geomech.gaits import Ellipse
-from geomech.measured import Fitted, Log, fit_log, synthetic
+from geomech.measured import Log, fit_log, synthetic
+from geomech.measured.results import of_fit
+from geomech.results import show
 from geomech.scenes import load
-from geomech.text import measured
 
 GAIT = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.2, -0.1))
 JOINTS = ("alpha_1", "alpha_2")
@@ -22,23 +24,23 @@ JOINTS = ("alpha_1", "alpha_2")
 
 def compute(
     scene: str = "three-link-viscous", cycles: int = 60, seed: int = 1
-) -> Fitted:
+) -> Result:
     """Return the fit of a synthetic log."""
     log = synthetic.made(
         load(scene).system.velocity, GAIT, cycles, spread=0.05, noise=1e-3, seed=seed
     )
-    return fit_log(
-        Log("log.csv", log.t, log.alpha, log.pose, JOINTS, np.arange(len(log.t)) + 2)
-    )
+    lines = np.arange(len(log.t)) + 2
+    fit = fit_log(Log("log.csv", log.t, log.alpha, log.pose, JOINTS, lines))
+    return of_fit(fit, mapped=False)
 
 
-def draw(numbers: Fitted):
+def draw(numbers: Result):
     return plots.measured_figure(numbers)
 
 
-def table(numbers: Fitted) -> str:
+def table(numbers: Result) -> str:
     """Return displacements and the share of the velocity that the connection explains."""
-    return measured.described(numbers)
+    return show.text(numbers)
 
 
 if __name__ == "__main__":

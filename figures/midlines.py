@@ -7,12 +7,13 @@ The trial is computed in loose beads, so that the truth is known: the wave's swi
 from __future__ import annotations
 
 from figures import main
-from geomech import plots, text
+from geomech import plots
 from geomech.core.variables import Result
 from geomech.measured.midlines.fit import fit_midlines
 from geomech.measured.midlines.predicted import compare
-from geomech.measured.midlines.question import result_of
+from geomech.measured.midlines.results import of_trial
 from geomech.measured.midlines.synthetic import made
+from geomech.results import show
 from geomech.systems import Swimmer
 from geomech.systems.swimmer import MEDIA
 from rft import Backbone
@@ -24,7 +25,7 @@ def compute(
     """Return the kinematics of a synthetic trial in loose beads, with the prediction of a medium."""
     swimmer = Swimmer(MEDIA["glass-0.3mm-loose"], Backbone(40))
     fit = fit_midlines(made(swimmer, cycles, seed=seed).trial("trial.csv"))
-    return result_of(fit, compare(fit, MEDIA[medium]))
+    return of_trial(fit, compare(fit, MEDIA[medium]))
 
 
 def draw(numbers: Result):
@@ -33,7 +34,7 @@ def draw(numbers: Result):
 
 def table(numbers: Result) -> str:
     """Return quantities with intervals, measured and predicted."""
-    return text.text(numbers)
+    return show.text(numbers)
 
 
 if __name__ == "__main__":

@@ -14,8 +14,8 @@ load, Scene, Swimmer, Numerics, toml    scenes: read, built and written
 medium                                  a medium of the vertical plane, by name or from a file
 media, bodies, gaits, effects, systems  the parts of scenes; `register` adds custom ones
 connection, curvature, reconstruct      the geometry of any velocity(alpha, alphadot)
-fit_medium, fit_log, fit_midlines       media, connections and kinematics fitted to measurements
-measured                                logs and midlines, stage by stage
+fit_medium, fit_gait, fitted_gait       media and gaits fitted to measurements
+measured, fit_log                       logs and midlines, stage by stage
 plots, undulation                       figures; swimmers that undulate
 Refusal                                 the error for whatever makes no sense: a ValueError with its facts
 On the command line: `geomech --help`; every key of a scene file: `geomech reference`.
@@ -40,6 +40,7 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.api import ccf as ccf
     from geomech.api import displacement as displacement
     from geomech.api import drag_grains as drag_grains
+    from geomech.api import fit_gait as fit_gait
     from geomech.api import fit_medium as fit_medium
     from geomech.api import forces as forces
     from geomech.api import grains as grains
@@ -52,11 +53,11 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.api import trajectory as trajectory
     from geomech.api import velocity as velocity
     from geomech.api import walk as walk
-    from geomech.app import fit_midlines as fit_midlines
     from geomech.geometry import connection as connection
     from geomech.geometry import curvature as curvature
     from geomech.geometry import reconstruct as reconstruct
     from geomech.measured import fit_log as fit_log
+    from geomech.results.measured import fitted_gait as fitted_gait
     from geomech.results.scenes import best_scene as best_scene
     from geomech.results.scenes import fitted_medium as fitted_medium
     from geomech.run import workers as workers
@@ -99,6 +100,7 @@ _OBJECTS = {
             "ccf",
             "displacement",
             "drag_grains",
+            "fit_gait",
             "fit_medium",
             "forces",
             "grains",
@@ -115,7 +117,7 @@ _OBJECTS = {
         "geomech.api",
     ),
     **dict.fromkeys(("best_scene", "fitted_medium"), "geomech.results.scenes"),
-    "fit_midlines": "geomech.app",
+    "fitted_gait": "geomech.results.measured",
     **dict.fromkeys(("load", "toml", "Scene", "Numerics"), "geomech.scenes"),
     "medium": "geomech.scenes.stress",
     "Swimmer": "geomech.systems",

@@ -17,6 +17,7 @@ from geomech.questions.ccf import Ccf
 from geomech.questions.connection import Connection
 from geomech.questions.displacement import Displacement
 from geomech.questions.drag_grains import DragGrains
+from geomech.questions.fit_gait import FitGait
 from geomech.questions.fit_medium import FitMedium
 from geomech.questions.forces import Forces
 from geomech.questions.grains import Grains
@@ -281,3 +282,4 @@ grains = asked_of_scene(Grains)
 drag_grains = asked_alone(DragGrains)
 fit_medium = asked_of_file(FitMedium)
 accuracy = asked_of_scene(Accuracy)
+fit_gait = asked_of_file(FitGait)

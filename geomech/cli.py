@@ -13,7 +13,6 @@ import typer
 from typer.core import TyperGroup
 
 from geomech import __version__, describe, questions, renamed, terminal
-from geomech.commands import COMMANDS
 from geomech.options import PluginOption, load_plugins, with_plugins, with_workers
 
 
@@ -56,7 +55,7 @@ class Group(TyperGroup):
 def headings() -> dict[str, list[str]]:
     """Return the names of all commands by their headings."""
     found: dict[str, list[str]] = {}
-    for groups in (questions.GROUPS, COMMANDS, describe.GROUPS):
+    for groups in (questions.GROUPS, describe.GROUPS):
         for heading, names in groups.items():
             found.setdefault(heading, []).extend(names)
     return found
@@ -69,10 +68,9 @@ def typed(name: str) -> str:
 
 def summary(name: str) -> str:
     """Return the line of a command in the list of all."""
-    for summaries in (questions.SUMMARIES, describe.SUMMARIES):
-        if name in summaries:
-            return summaries[name]
-    return loaded(name).get_short_help_str(60)
+    if name in questions.SUMMARIES:
+        return questions.SUMMARIES[name]
+    return describe.SUMMARIES[name]
 
 
 @functools.cache
@@ -89,8 +87,6 @@ def function(name: str) -> Any:
     """Return the function of a command."""
     if name in describe.SUMMARIES:
         return getattr(import_module(f"geomech.describe.{name}"), name)
-    if name not in questions.SUMMARIES:
-        return getattr(import_module(f"geomech.commands.{name}"), name)
     from geomech.command import command
 
     question = questions.question(name)

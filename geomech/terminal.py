@@ -30,7 +30,6 @@ __all__ = ["Stopped", "exit_code", "progress", "report", "show", "stoppable"]
 LONGEST = 2000  # characters of an error
 PRINTING = (
     "geomech.cli",
-    "geomech.commands",
     "geomech.describe",
     "geomech.pipeline",
     "geomech.terminal",

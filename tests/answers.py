@@ -22,7 +22,7 @@ import numpy as np
 
 FILE = pathlib.Path(__file__).parent / "data" / "answers.json"
 TOLERANCE = 1e-12  # relative, of the largest number of a digest
-SHORT = 20  # numbers of a list of which each is one by itself, too
+SHORT = 40  # numbers of an array of which each is one by itself, too
 SOME = 7  # numbers of a large array that are recorded as they are
 
 CASES = {  # command lines in a copy of data/frozen, by kind
@@ -123,25 +123,30 @@ RENAMED = {  # names of variables, by the first word of the command
         "coefficient": "parameter",
         "resolution": "share_from_data",
     },
+    "fit-gait": {
+        "length": "body_length",
+        "length_error": "body_length_error",
+        "quantity": None,
+        "per_cycle": NUMBERS,
+        "displacement_measured": NUMBERS,
+        "displacement_measured_error": NUMBERS,
+        "displacement_predicted": NUMBERS,
+        "displacement_predicted_error": NUMBERS,
+    },
 }
 NOTHING = [1, -9.9e99]  # digest of a null
 # Numbers of JSON that are no numbers of a result: times, what the text of the scene says,
 # and lists that are variables of text now.
-LEFT_OUT = re.compile(r"seconds|residual|gait\.|answers|evaluations|from_")
+LEFT_OUT = re.compile(r"seconds|residual|unit|gait\.|answers|evaluations|from_")
 
 
 def results(line: str) -> list:
     """Return the results that a command prints, in a copy of data/frozen."""
     from geomech import pipeline
-    from geomech.commands import pipeline as former
 
     found: list = []
 
-    def keep(result, *rest, print_=former._print):
-        found.append(result)
-        print_(result, *rest)
-
-    def keep_new(result, *rest, printed=pipeline.printed):
+    def keep(result, *rest, printed=pipeline.printed):
         found.append(result)
         return printed(result, *rest)
 
@@ -149,8 +154,7 @@ def results(line: str) -> list:
         here = stack.enter_context(frozen.place())
         (here / "uncertain.toml").write_text(uncertain())
         (here / "out").mkdir()
-        stack.enter_context(mock.patch.object(former, "_print", keep))
-        stack.enter_context(mock.patch.object(pipeline, "printed", keep_new))
+        stack.enter_context(mock.patch.object(pipeline, "printed", keep))
         code, _, err = frozen.geomech(*shlex.split(line))
         assert code == "0", f"{line}: {code} {err}"
     return found
@@ -182,16 +186,38 @@ def parts_of(result) -> list:
         arrays += [x for x in (v.values, v.error, v.spread) if x is not None]
         if v.error is not None:
             arrays.append(np.stack([v.values - v.error, v.values + v.error], -1))
+    arrays += stacked_cycles(result)
     if {"x", "y", "heading"} <= set(result):
         arrays.append(np.stack([result[q].values for q in ("x", "y", "heading")], -1))
         if result["x"].spread is not None:
             arrays.append(np.hypot(result["x"].spread, result["y"].spread))
     for array in arrays:
         found.append(digest(array))
-        short = array.ndim == 1 and array.size <= SHORT
-        for lead in range(1, min(array.ndim, 3) + short):
+        most = min(array.ndim, 3)
+        if array.size <= SHORT:
+            most = array.ndim + 1
+        for lead in range(1, most):
             for place in np.ndindex(*array.shape[:lead]):
                 found.append(digest(array[place]))
+    return found
+
+
+def stacked_cycles(result) -> list:
+    """Return what is known of every cycle of a measured gait, and its poses with their
+    errors and intervals, as one array each, as they were before."""
+    names = ["x", "y", "heading"]
+    if "quantity" in result:
+        names = result["quantity"].values.tolist()
+    found = []
+    for ending in ("_per_cycle", "_per_cycle_predicted", "", "_predicted"):
+        parts = [result[f"{x}{ending}"] for x in names if f"{x}{ending}" in result]
+        if len(parts) != len(names) or "form" not in result.attributes:
+            continue
+        found.append(np.stack([part.values for part in parts], -1))
+        if parts[0].error is not None:
+            error = np.stack([part.error for part in parts], -1)
+            found.append(error)
+            found.append(np.stack([found[-2] - error, found[-2] + error], -1))
     return found
 
 
@@ -211,6 +237,8 @@ def differences(line: str, old: dict, result) -> list[str]:
     found = parts_of(result)
     for name, numbers in old["variables"].items():
         today = renamed.get(name, name)
+        if today is None:  # words that were renamed
+            continue
         others = [new[today]] if today in new else []
         if today == NUMBERS:
             others = found

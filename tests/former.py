@@ -142,6 +142,45 @@ def medium(out):
     return {**found, "residuals": rows}
 
 
+def gait(out):
+    """Return the numbers of a fit to a log of joint angles that a command printed."""
+    from geomech.results.measured import fitted_gait
+    from geomech.scenes.write import gait_table
+
+    result = of_json(out)
+    facts, pose = result.attributes, ("x", "y", "heading")
+
+    def stacked(ending):
+        return np.stack([result[f"{name}{ending}"].values for name in pose], -1)
+
+    def bounds(ending):
+        half = np.array([result[f"{name}{ending}"].error for name in pose])
+        return np.stack([stacked(ending) - half, stacked(ending) + half], -1).tolist()
+
+    found = {
+        "rows": facts["rows"],
+        "cycles": facts["cycles"],
+        "gait": gait_table(fitted_gait(result)),
+        "displacement_measured": stacked("").tolist(),
+        "displacement_predicted": stacked("_predicted").tolist(),
+        "interval": bounds("_predicted"),
+        "interval_measured": bounds(""),
+        "coverage_level": facts["level"],
+        "noise": dict(zip(result["recorded"].values.tolist(), result["noise"].values)),
+        "reach": result["reach_along"].values.tolist(),
+        "A": result["A_along"].values.tolist(),
+        "A_error": result["A_along"].error.tolist(),
+        "per_cycle": {
+            "measured": stacked("_per_cycle").tolist(),
+            "predicted": stacked("_per_cycle_predicted").tolist(),
+            "rms": result["difference"].values.tolist(),
+        },
+        "body_length": facts["body_length"],
+    }
+    names = ("frequency", "phase_residual", "harmonics", "explained", "misfit", "phase")
+    return {**found, **plain({name: result[name] for name in names})}
+
+
 def plain(variables):
     """Return the values of variables by name as lists."""
     return {name: v.values.tolist() for name, v in variables.items()}

@@ -355,6 +355,8 @@ def measurements():
                 told = former.displacement(out)
             elif line.startswith("calibrate"):
                 told = former.medium(out)
+            elif line.startswith("fit "):
+                told = former.gait(out)
             else:
                 told = json.loads(out)
             yield from of_json(f"measured, {name}", told)

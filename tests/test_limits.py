@@ -4,6 +4,7 @@ import dataclasses
 import functools
 import math
 
+import frozen
 import numpy as np
 import pytest
 from loads import element_load
@@ -12,8 +13,8 @@ from registry import GAITS
 from geomech.gaits import Butterfly, Circle, Ellipse, Points, Sine
 from geomech.geometry import connection, family, harmonics
 from geomech.geometry.field import Field
-from geomech.measured.midlines.question import Midlines
 from geomech.optimisation.objectives import Objective
+from geomech.questions.fit_gait import FitGait
 from geomech.systems import Swimmer
 from geomech.tiers import fitted
 from geomech.tiers.base import Numerics
@@ -44,6 +45,7 @@ from rft.terradynamics.plates import CLeg
 from rft.terradynamics.walking import Rhex
 from rft.terradynamics.walking.facets import Grains
 
+TRIAL = frozen.FOLDER / "trial.csv"
 pytestmark = pytest.mark.filterwarnings("ignore::geomech.core.errors.UnitWarning")
 
 
@@ -144,7 +146,7 @@ NUMBERS = [
     ),
     (
         "body length of midlines",
-        lambda x: Midlines(midlines="trial.csv", body_length=x).check(),
+        lambda x: FitGait(TRIAL, body_length=x).check(),
         1e-9,
         1e9,
     ),

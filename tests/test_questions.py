@@ -62,6 +62,13 @@ ASKED = {
     "intrude": ("c-leg", {"elements": 10}, {}, {}),
     "fit_medium": ("short-rod-drag", {}, {}, {"law": "viscous", "end_caps": 1.0}),
     "fit_medium of plates": (str(FROZEN / "plates.csv"), {}, {}, {}),
+    "fit_gait": (str(FROZEN / "log.csv"), {}, {"harmonics": 1}, {"level": 0.9}),
+    "fit_gait of midlines": (
+        str(FROZEN / "trial.csv"),
+        {},
+        {"medium": "glass-0.3mm-close", "y": "up"},
+        {},
+    ),
     "fit_medium of a plate": (str(FROZEN / "push.csv"), {}, {}, {"area": 1e-3}),
     "accuracy": ("three-link-viscous", FIELD, {"runs": 1}, {"runs": 2}),
 }
@@ -279,8 +286,11 @@ SPEED = Variable(
     np.ones((3, 2)),
     "half width",
 )
+REACH = Variable("xi_spread", ("tier", "one"), [[1.0], [2.0]], "m")  # no spread of xi
 XI = Variable("xi", ("component",), [0.5, 0.25, 0.0], ("m", "m", "rad"))
-MADE = Result("made", (PHASE, TIER, SPEED, XI), {"title": "t", "scale": 0.1, "n": 3})
+MADE = Result(
+    "made", (PHASE, TIER, SPEED, XI, REACH), {"title": "t", "scale": 0.1, "n": 3}
+)
 
 
 @pytest.mark.parametrize("ending", [".nc", ".json", ".mat"])

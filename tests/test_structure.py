@@ -11,7 +11,6 @@ import mutants
 import pytest
 
 from geomech import describe
-from geomech.commands import COMMANDS
 
 ROOT = pathlib.Path(__file__).parents[1]
 # Beside the systems: commands list the named media and ask a stress map, an intruder scene has a law, a body and effects but no
@@ -157,8 +156,6 @@ def test_modules_import_from_their_own_layer_or_a_lower_one(imported):
         if name.count(".") == 1 and FILES[name].name == "__init__.py"
     }
     assert {name for name in folders if layer(name) == len(LAYERS) - 1} == {
-        "geomech.app",
-        "geomech.commands",
         "geomech.describe",
         "figures.campaigns",
     }
@@ -206,24 +203,13 @@ def test_mutants_are_programs_that_differ():
         assert m.change().startswith("- ")
 
 
-HELPERS = {"__init__", "asked", "formats", "names", "options", "pipeline"}
-
-
-def test_a_command_is_the_function_of_its_file():
-    files = {p.stem for p in (ROOT / "geomech" / "commands").glob("*.py")} - {
-        "__init__",
-        "formats",
-        "options",
-        "pipeline",
-    }
-    assert files == {name for names in COMMANDS.values() for name in names}
+def test_a_command_that_describes_is_the_function_of_its_file():
     files = {p.stem for p in (ROOT / "geomech" / "describe").glob("*.py")}
     assert files == {*describe.SUMMARIES, "__init__", "grains", "system"}
 
 
 SPEAK_OF_OPTIONS = (
     "command.py",
-    "commands/",
     "describe/",
     "options.py",
     "output/",

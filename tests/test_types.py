@@ -347,7 +347,7 @@ def test_refusals_carry_facts_and_go_to_other_processes():
 
 
 PUBLIC = [
-    "geomech", "geomech.app", "geomech.gaits", "geomech.geometry.connection", "geomech.geometry.curvature",
+    "geomech", "geomech.gaits", "geomech.geometry.connection", "geomech.geometry.curvature",
     "geomech.geometry.reconstruct", "geomech.measured", "geomech.optimisation", "geomech.plots", "geomech.scenes",
     "geomech.studies.undulation", "geomech.symbolic", "geomech.systems", "geomech.tiers", "rft", "rft.bodies",
     "rft.effects", "rft.laws",

@@ -15,7 +15,6 @@ from rft.core.checks import number_fields
 PACKAGES = {
     "From scene to result": [
         "geomech",
-        "geomech.app",
         "geomech.scenes",
         "geomech.studies.study",
         "geomech.gaits",

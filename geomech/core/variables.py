@@ -7,7 +7,7 @@ Methods that need the layers above, such as `Result.save`, are found by
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -142,7 +142,6 @@ class Result(Mapping[str, Variable]):
     kind: str
     variables: tuple[Variable, ...]
     attributes: Mapping[str, Any] = field(default_factory=dict)
-    subject: Any = None  # of kinds that are no questions yet; goes with the last
     question: Any = None
 
     def __post_init__(self) -> None:
@@ -171,7 +170,7 @@ class Result(Mapping[str, Variable]):
     def __reduce__(self) -> tuple:
         # A mapping proxy is not pickled.
         facts = dict(self.attributes)
-        return Result, (self.kind, self.variables, facts, self.subject, self.question)
+        return Result, (self.kind, self.variables, facts, self.question)
 
     @property
     def sizes(self) -> dict[str, int]:
@@ -241,6 +240,13 @@ class Result(Mapping[str, Variable]):
     def plot(self, **options: Any) -> Any:
         """Draw the result; return the Figure. options: those of the kind's picture."""
         return implementation("Result.plot")(self, **options)
+
+
+def same_or_each(units: Sequence[str]) -> Unit:
+    """Return the unit that all have, or one for each."""
+    if len({*units}) == 1:
+        return units[0]
+    return tuple(units)
 
 
 def _read_only(array: Any) -> np.ndarray:

@@ -61,22 +61,26 @@ def joined(
             continue
         more: dict[str, Any] = {}
         for ending, field in ENDINGS.items():
-            if name + ending in by_name:
+            if owner_of(name + ending, by_name) == name:
                 more[field] = by_name[name + ending].values
         variable = replace(variable, **more)
-        error = by_name.get(f"{name}_error")
-        if error is not None and error.label != described(variable, "error"):
-            variable = replace(variable, error_label=error.label)
+        if variable.error is not None:
+            label = by_name[f"{name}_error"].label
+            if label != described(variable, "error"):
+                variable = replace(variable, error_label=label)
         whole.append(variable)
     return Result(kind, tuple(whole), attributes)
 
 
 def owner_of(name: str, by_name: dict[str, Variable]) -> str | None:
-    """Return the name of the variable of which this one is the error or the spread."""
+    """Return the name of the variable, over the same dimensions, of which this one is the
+    error or the spread."""
     for ending in ENDINGS:
-        owner = name.removesuffix(ending)
-        if owner != name and owner in by_name:
-            return owner
+        owner, one = by_name.get(name.removesuffix(ending)), by_name.get(name)
+        if owner is None or one is None or owner is one:
+            continue
+        if owner.dims == one.dims:
+            return owner.name
     return None
 
 
@@ -320,13 +324,15 @@ def read_csv(path: Path) -> Result:
 
 
 def write_mat(path: Path, result: Result) -> None:
-    """Write variables under their names, and their dimensions and facts in a struct ABOUT."""
+    """Write variables under their names, and their dimensions, shapes and facts in a struct
+    ABOUT."""
     from scipy.io import savemat
 
     arrays, dims = {}, {}
     for variable in flat(result):
         arrays[variable.name] = variable.values
-        dims[variable.name] = {"dims": " ".join(variable.dims), **facts(variable)}
+        known = {"dims": " ".join(variable.dims), "shape": variable.values.shape}
+        dims[variable.name] = {**known, **facts(variable)}
     texts = {"about": json.dumps(about(result)), "variables": json.dumps(dims)}
     with atomic_file(path) as part:
         savemat(part, {**arrays, "geomech": texts}, long_field_names=True)
@@ -343,10 +349,8 @@ def read_mat(path: Path) -> Result:
         values = np.asarray(file[name])
         if values.dtype.kind == "U":
             values = np.char.rstrip(values)
-        variables.append(
-            variable_of(
-                name, over, values.reshape(values.shape or (1,) * len(over)), known
-            )
-        )
+        # MATLAB has no dimensions of length 1 at the end, and SciPy drops all of them.
+        shape = known.get("shape", values.shape or (1,) * len(over))
+        variables.append(variable_of(name, over, values.reshape(shape), known))
     kind, attributes = split(json.loads(str(file["geomech"]["about"])))
     return joined(kind, variables, attributes)

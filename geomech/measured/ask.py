@@ -1,19 +1,21 @@
-"""The question of a measured file: a log of joint angles, or midlines, as its header says."""
+"""What a measured file holds, by its header: a log of joint angles, or midlines."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from geomech.io.rows import read as read_rows
+from geomech.measured.log import Log
 from geomech.measured.midlines import reader
-from geomech.measured.midlines.question import Midlines
-from geomech.measured.results import Fit
-from rft.core.refusal import Refusal, formatted, line
+from geomech.measured.midlines.trial import Trial
+from rft.refusal import Refusal, formatted, line
 
 OF_LOGS = "degrees", "harmonics", "limits", "scene"
 OF_MIDLINES = (
     "medium",
+    "effects",
     "units",
     "scale",
     "fps",
@@ -27,42 +29,62 @@ WHAT = (
     "give a CSV file with a header such as t,alpha_1,alpha_2,x,y,heading for joint "
     "angles, or t,point,x,y or t,x1,y1,x2,y2 for points along a body"
 )
-LOG, MIDLINES = "a log of joint angles", "midlines"
+LOG, MIDLINES = "log", "midlines"
+WORDS = {LOG: "a log of joint angles", MIDLINES: "midlines"}
+SCENE = (
+    "give one cycle of the midlines to a scene whose [gait] has kind = 'centreline' "
+    "and file = ..."
+)
 
 
-def question(file: Path, scene: Path | None = None, **options: Any) -> Fit | Midlines:
-    """Return the question of a file: its header says which, else the options do. Refusal for options of the other kind.
-    options: those that are None or False are left out."""
-    given = {
-        name: value
-        for name, value in options.items()
-        if value is not None and value is not False and value != ()
-    }
-    of_logs = [x for x in OF_LOGS if x in given or (x == "scene" and scene is not None)]
-    of_midlines = [x for x in OF_MIDLINES if x in given]
+def form_of(measured: str | Path | Log | Trial, options: Mapping[str, Any]) -> str:
+    """Return `LOG` or `MIDLINES`, of a file as its header says, else as the options do.
+
+    Refusal for options of the other form. options: those that are None, False or empty
+    are left out; "scene" stands for a scene that is to be written."""
+    given = [
+        name for name, x in options.items() if x is not None and x not in (False, ())
+    ]
+    of_logs = [name for name in OF_LOGS if name in given]
+    of_midlines = [name for name in OF_MIDLINES if name in given]
+    if isinstance(measured, Log):
+        refuse(measured.name, LOG, of_midlines)
+        return LOG
+    if isinstance(measured, Trial):
+        refuse(measured.name, MIDLINES, of_logs)
+        return MIDLINES
+    file = Path(measured)
     header = read_rows(file, reader.LARGEST_FILE, WHAT).header[1]
-    kind = reader.kind_of(header)
-    if not kind and of_logs and of_midlines:
+    form = reader.kind_of(header)
+    if not form and of_logs and of_midlines:
         raise Refusal(
-            f"``{of_logs[0]}`` belongs to {LOG}, and ``{of_midlines[0]}`` to {MIDLINES}",
+            f"``{of_logs[0]}`` belongs to {WORDS[LOG]}, and ``{of_midlines[0]}`` to "
+            f"{WORDS[MIDLINES]}",
             where=line(file.name),
             instead="drop one",
         )
-    is_midlines = kind == "midlines" or (not kind and bool(of_midlines))
-    wrong = of_logs if is_midlines else of_midlines
-    if is_midlines and wrong[:1] == ["scene"]:
+    if not form:
+        form = MIDLINES if of_midlines else LOG
+    wrong = of_logs if form == MIDLINES else of_midlines
+    refuse(file.name, form, wrong, f"by its header this is a file of {WORDS[form]}: "
+           f"{formatted(', '.join(header), 120)}")  # fmt: skip
+    return form
+
+
+def refuse(name: str, form: str, wrong: Sequence[str], because: str = "") -> None:
+    """Refuse options of the other form, if there are any."""
+    if not wrong:
+        return
+    if wrong[0] == "scene":
         raise Refusal(
-            f"``scene`` belongs to {LOG}",
-            where=line(file.name),
-            instead="give one cycle of the midlines to a scene whose [gait] has kind = "
-            "'centreline' and file = ...",
+            f"a scene is that of {WORDS[LOG]}, and this is one of {WORDS[form]}",
+            where=line(name),
+            instead=SCENE,
         )
-    if wrong:
-        theirs, ours = (LOG, MIDLINES) if is_midlines else (MIDLINES, LOG)
-        raise Refusal(
-            f"``{wrong[0]}`` belongs to {theirs}",
-            where=line(file.name),
-            because=f"by its header this is a file of {ours}: {formatted(', '.join(header), 120)}",
-            instead="drop it, or rename the columns",
-        )
-    return Midlines(file, **given) if is_midlines else Fit(file, **given)
+    other = MIDLINES if form == LOG else LOG
+    raise Refusal(
+        f"``{wrong[0]}`` belongs to {WORDS[other]}",
+        where=line(name),
+        because=because,
+        instead="drop it, or rename the columns",
+    )

@@ -115,11 +115,7 @@ class Fitted:
 
     def along(self, t: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Return A (T, 3, d) at phases t of the mean gait, and half widths of its interval."""
-        known = self.known
-        variance = (series(known.errors[:, :, :, 0], t) ** 2).sum(
-            -3
-        ) + known.standard_error_at(t) ** 2
-        return series(known.A, t), known.factor * np.sqrt(variance)
+        return self.known.along(t)
 
     @property
     def misfit(self) -> np.ndarray:

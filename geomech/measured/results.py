@@ -1,10 +1,9 @@
-"""Results of a measured gait: A, nan where there are no data, and all data of a look-up near the gait."""
+"""Results of a measured gait: displacements as logged and by the connection near it, A along
+it, and all data of a look-up there."""
 
 from __future__ import annotations
 
-import os
-from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,15 +11,15 @@ from geomech.core.variables import Result, Variable
 from geomech.geometry.curvature import ccf
 from geomech.geometry.curvature import error as curvature_error
 from geomech.geometry.tube import BEYOND
-from geomech.measured.fit import Fitted, fit_log
-from geomech.scenes.write import gait_table, table
+from geomech.measured.fit import PRINTED_PHASES, Fitted
 from geomech.studies import fields
 from geomech.studies.fields import INTERVAL_OF_CCF, angles_of
-from geomech.studies.question import Allow, Progress, Question
 from geomech.studies.tables import COMPONENTS
 from geomech.systems.base import body_size
 
 ALONG = "fitted along the gait alone"
+POSE = ("x", "y", "heading")
+DOTS = 4000  # rows of the log, at most, whose shapes a picture shows
 
 
 def status(fit: Fitted) -> str:
@@ -46,78 +45,155 @@ def _sum(fit: Fitted, factors: np.ndarray) -> str:
     return " + ".join(terms).replace("+ -", "- ")
 
 
-@dataclass(frozen=True)
-class Fit(Question):
-    """The connection near a measured gait, see `fit_log`."""
+def of_fit(fit: Fitted, mapped: bool = True) -> Result:
+    """Return all numbers of a measured gait. mapped: with A and its error on a grid, and
+    the CCF of two joints, nan where there are no data.
 
-    log: Path
-    columns: tuple[str, ...] = ()
-    degrees: bool = False
-    level: float = 0.95
-    harmonics: int | None = None
-    limits: float | None = None
-    body_length: float | None = None
-
-    def inputs(self) -> list[Path]:
-        return [self.log]
-
-    def answer(self, progress: Progress, allow: Allow) -> Result:
-        fit = fit_log(
-            self.log,
-            columns=self.columns,
-            degrees=self.degrees,
-            level=self.level,
-            harmonics=self.harmonics,
-            limits=self.limits,
-            body_length=self.body_length,
-        )
-        (net, error), (mean, mean_error) = fit.displacement, fit.mean
-        over, unit = ("component",), f"{fit.unit} (x, y), rad (theta)"
-        variables = (
-            Variable("component", over, np.array(COMPONENTS)),
-            Variable(
-                "displacement_measured",
-                over,
-                mean,
-                unit,
-                "mean of the log's cycles",
-                mean_error,
-            ),
-            Variable(
-                "displacement_predicted",
-                over,
-                net,
-                unit,
-                "of the mean gait, by the connection",
-                error,
-            ),
-        )
-        return Result("measured", variables, {"status": status(fit)}, fit)
-
-
-def of_fit(fit: Fitted) -> Result:
-    """Return A with its error, the CCF of two joints, and all data of a look-up near the gait.
-
-    `Connection.load` and [system] kind = "table" read it from NetCDF."""
-    tube, unit = fit.tube, fit.unit
-    error = tube.on_grid(tube.taylor.connection_error)
+    `Connection.load` and [system] kind = "table" read a file of it that is mapped."""
     variables = [
-        *fields.of_connection(tube, error),
-        *fields.of_known(tube.taylor, unit),
-        fields.of_reach(tube),
+        *_displacements(fit),
+        *_quality(fit),
+        *_along(fit),
+        *_cycles(fit),
+        *fields.of_known(fit.known, fit.unit),
     ]
+    lead = [
+        Variable("component", ("component",), np.array(COMPONENTS)),
+        Variable(
+            "joint", ("joint",), np.arange(1, len(fit.log.joints) + 1, dtype="i4")
+        ),
+    ]
+    facts = _about(fit)
+    if mapped:
+        axes, maps = _maps(fit)
+        lead += axes
+        variables += maps
+        facts["interpolation"] = int(fit.tube.degree)
+        facts["singular_shapes"] = BEYOND
+    return Result("fit_gait", (*lead, *variables), facts)
+
+
+def _units(fit: Fitted) -> tuple[str, str, str]:
+    return (fit.unit, fit.unit, "rad")
+
+
+def _displacements(fit: Fitted) -> list[Variable]:
+    """Return the displacement of a cycle, as logged and of the mean gait."""
+    (net, error), (mean, mean_error) = fit.displacement, fit.mean
+    interval = f"half width of the interval of {fit.known.level:.3g} of cases"
+    found = []
+    for ending, label, values, errors in (
+        ("", "per cycle, mean of the log", mean, mean_error),
+        ("_predicted", "per cycle of the mean gait, by the connection", net, error),
+    ):
+        for name, value, half_width, unit in zip(POSE, values, errors, _units(fit)):
+            variable = Variable(
+                f"{name}{ending}", (), value, unit, label, half_width,
+                error_label=interval,
+            )  # fmt: skip
+            found.append(variable)
+    return found
+
+
+def _quality(fit: Fitted) -> list[Variable]:
+    """Return how well the connection explains the log."""
+    over, rates = ("component",), fields.of_components(fit.unit, "rad")
+    apart = np.sqrt(((fit.measured - fit.predicted) ** 2).mean(0))
+    recorded = (*fit.log.joints, *POSE)
+    of_time = "Hz" if fit.log.seconds else "1/unit of t"
+    noise_units = ("rad",) * len(fit.log.joints) + _units(fit)
+    return [
+        Variable("frequency", (), fit.frequency, of_time, "cycles per unit of t"),
+        Variable(
+            "phase_residual", (), fit.irregular, "rad",
+            "rms of the phase about a uniform run through each cycle",
+        ),
+        Variable(
+            "harmonics", (), fit.known.A.shape[-1] // 2, "1", "of A in the phase"
+        ),
+        Variable(
+            "difference", over, apart, _units(fit),
+            "rms of the difference of cycles as logged and as predicted",
+        ),
+        Variable(
+            "scatter", over, fit.measured.std(0), _units(fit),
+            "standard deviation of the logged cycles",
+        ),
+        Variable("explained", over, fit.explained, "1", "share of the squares of xi"),
+        Variable(
+            "residual", over, fit.residual, rates,
+            "rms misfit of xi over that of the joint rates",
+        ),
+        Variable(
+            "misfit", over, fit.misfit, rates,
+            "rms over the phase of the error of A along the gait by what the fit leaves",
+        ),
+        Variable("recorded", ("recorded",), np.array(recorded)),
+        Variable("noise", ("recorded",), fit.noise, noise_units, "of a row"),
+    ]  # fmt: skip
+
+
+def _along(fit: Fitted) -> list[Variable]:
+    """Return A, its error, and the reach of the data along the mean gait."""
+    t = 2 * np.pi * np.arange(PRINTED_PHASES) / PRINTED_PHASES
+    A, error = (np.moveaxis(x, 0, -1) for x in fit.along(t))
+    rates = fields.of_components(fit.unit, "rad")
+    return [
+        Variable("phase", ("phase",), t, "rad", "of the mean gait"),
+        Variable(
+            "A_along", ("component", "joint", "phase"), A, rates, "A along the mean gait",
+            error, error_label="half width of the interval of A",
+        ),
+        Variable(
+            "reach_along", ("phase",), _reach(fit), "rad",
+            "half width of the data across the gait, where it is least",
+        ),
+    ]  # fmt: skip
+
+
+def _reach(fit: Fitted) -> np.ndarray:
+    """Return the half width of the data across the gait, rad, in the direction in which
+    it is least, at PRINTED_PHASES."""
+    spread = fit.known.spread
+    least = np.sqrt(np.linalg.eigvalsh(np.moveaxis(spread, -1, 0))[:, 0])
+    return least[np.arange(PRINTED_PHASES) * spread.shape[-1] // PRINTED_PHASES]
+
+
+def _cycles(fit: Fitted) -> list[Variable]:
+    """Return the displacement of each cycle, and shapes of rows of the log."""
+    of_time = "s" if fit.log.seconds else "unit of t"
+    starts = "when a cycle begins"
+    found = [Variable("cycle_start", ("cycle",), fit.times[:-1], of_time, starts)]
+    for ending, values, label in (
+        ("", fit.measured, "as logged"),
+        ("_predicted", fit.predicted, "by the connection along its own shapes"),
+    ):
+        for k, (name, unit) in enumerate(zip(POSE, _units(fit))):
+            name = f"{name}_per_cycle{ending}"
+            found.append(Variable(name, ("cycle",), values[:, k], unit, label))
+    shapes = fit.samples.alpha
+    some = shapes[:: max(1, len(shapes) // DOTS)]
+    label = "shapes of rows of the log, smoothed"
+    return [*found, Variable("shapes", ("row", "joint"), some, "rad", label)]
+
+
+def _maps(fit: Fitted) -> tuple[list[Variable], list[Variable]]:
+    """Return the axes of shape space, and fields over them."""
+    tube = fit.tube
+    error = tube.on_grid(tube.taylor.connection_error)
+    labels = [(name, "rad") for name in angles_of(tube.axes)]
+    _, _, *axes = fields.coordinates(tube.axes, labels)
+    maps = [*fields.of_connection(tube, error), fields.of_reach(tube)]
     if len(tube.axes) == 2:
-        variables.append(
-            fields.of_ccf(ccf(tube), curvature_error(tube), INTERVAL_OF_CCF)
-        )
-    axes = fields.coordinates(
-        tube.axes, [(name, "rad") for name in angles_of(tube.axes)]
-    )
-    return Result("connection", (*axes, *variables), _about(fit), fit)
+        curvature = ccf(tube), curvature_error(tube), INTERVAL_OF_CCF
+        maps.append(fields.of_ccf(*curvature))
+    return axes, maps
 
 
-def _about(fit: Fitted) -> dict:
+def _about(fit: Fitted) -> dict[str, Any]:
     return {
+        "form": "log",
+        "file": fit.log.name,
         "title": f"Local connection near the mean gait of the log {fit.log.name}",
         "Conventions": "xi = + A alphadot; CCF = dA + [A, A], positive for counter-clockwise loops",
         "method": "first-order Taylor series of A in the deviation from the mean gait, by regression over all cycles (Bittner, "
@@ -130,25 +206,10 @@ def _about(fit: Fitted) -> dict:
         "sign_of_A": "xi = + A alphadot",
         "sign_of_ccf": "CCF = dA + [A, A] with [X, Y] = XY - YX, positive for counter-clockwise loops",
         "pair_of_ccf": "CCF_12 = dA_2 / dalpha_1 - dA_1 / dalpha_2 + [A_1, A_2]",
-        "interpolation": int(fit.tube.degree),
-        "singular_shapes": BEYOND,
         "level": float(fit.known.level),
         "error_factor": float(fit.known.factor),
         "cycles": len(fit.measured),
-        "frequency": float(fit.frequency),
+        "rows": len(fit.log.t),
         "columns": ", ".join(fit.log.joints),
         "status": status(fit),
     }
-
-
-def scene_toml(fit: Fitted, field: Path, scene: Path) -> str:
-    """Return a scene of the mean gait with the field's file, named relative to the scene."""
-    file = os.path.relpath(field.resolve(), scene.resolve().parent)
-    head = f"# The mean gait of {len(fit.measured)} cycles of {fit.log.name}, and the connection near it.\n"
-    return "\n".join(
-        [
-            head,
-            table("system", {"kind": "table", "file": file}),
-            table("gait", gait_table(fit.gait)),
-        ]
-    )

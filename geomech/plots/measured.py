@@ -1,4 +1,5 @@
-"""A measured gait: its cycles with the tube of the data, the connection along it, and displacements of its cycles."""
+"""A measured gait: its cycles with the tube of the data, the connection along it, and
+displacements of its cycles."""
 
 from __future__ import annotations
 
@@ -6,77 +7,68 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from geomech.measured.fit import Fitted
-from geomech.plots.maps import COMPONENTS, TITLES, unit_of
+from geomech.core.variables import Result, Variable
+from geomech.geometry.tube import TaylorSeries
+from geomech.plots.maps import COMPONENTS, TITLES
 from geomech.plots.style import figure, quantity, styled
+from geomech.results.measured import series_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-DOTS = 4000  # rows that are drawn
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+POSE = ("x", "y", "heading")
 TICKS = {0.0: "0", np.pi: r"$\pi$", 2 * np.pi: r"$2\pi$"}
 
 
 @styled
-def measured_figure(fit: Fitted) -> Figure:
-    """Draw on the left the shapes of the first two joints, in the middle the rows of A along the mean gait, with bands, on the
-    right the net poses of the cycles as logged against those that the connection predicts."""
+def measured_figure(result: Result) -> Figure:
+    """Draw a result of `fit_gait` of a log: on the left the shapes of the first two joints,
+    in the middle the rows of A along the mean gait, with bands, on the right the net poses
+    of the cycles as logged against those that the connection predicts."""
     from geomech.plots.shown import ShownAxes
 
+    series = series_of(result)
     fig, axes = figure(10.8, 6.6, 3, 3, width_ratios=(1.4, 1.2, 1.0))
     for ax in axes[:, 0]:
         ax.remove()
     shapes = fig.add_subplot(axes[0, 0].get_gridspec()[:2, 0], axes_class=ShownAxes)
     axes[0, 2].set_title("cycles", loc="left")
-    _shapes(fit, shapes)
-    _noted(fit, fig.add_subplot(axes[0, 0].get_gridspec()[2, 0]))
+    _shapes(result, series, shapes)
+    _noted(result, fig.add_subplot(axes[0, 0].get_gridspec()[2, 0]))
     for component in range(3):
-        _row(fit, component, axes[component, 1])
-        _cycles(fit, component, axes[component, 2])
-    axes[0, 1].fill_between(
-        [],
-        [],
-        color="0.5",
-        alpha=0.25,
-        lw=0,
-        label=f"{100 * fit.known.level:.3g} % intervals",
-    )
+        _row(result, series, component, axes[component, 1])
+        _cycles(result, component, axes[component, 2])
+    label = f"{100 * series.level:.3g} % intervals"
+    axes[0, 1].fill_between([], [], color="0.5", alpha=0.25, lw=0, label=label)
     axes[0, 1].legend(loc="lower center", bbox_to_anchor=(0.5, 1.12), ncols=4)
     axes[2, 1].set(xlabel=r"phase of the mean gait $\varphi$ (rad)")
     return fig
 
 
-def _shapes(fit: Fitted, ax) -> None:
-    alpha, t = fit.samples.alpha, np.linspace(0, 2 * np.pi, 400)
-    ax.plot(
-        *alpha[:: max(1, len(alpha) // DOTS), :2].T,
-        ".",
-        ms=1.2,
-        color="0.6",
-        label="rows of the log",
-    )
-    loop = fit.known.loop.shape(t)
+def _joints(result: Result) -> list[str]:
+    """Return the names of the columns of joint angles."""
+    return result.attributes["columns"].split(", ")
+
+
+def _shapes(result: Result, series: TaylorSeries, ax) -> None:
+    t, rows = np.linspace(0, 2 * np.pi, 400), result["shapes"].values
+    ax.plot(*rows[:, :2].T, ".", ms=1.2, color="0.6", label="rows of the log")
+    loop = series.loop.shape(t)
     if loop.shape[1] == 2:
-        normal = fit.known.loop.normals(t)[..., 0]
-        wide = np.einsum("tij,ti,tj->t", fit.known.spread_at(t), normal, normal) ** 0.5
+        normal = series.loop.normals(t)[..., 0]
+        wide = np.einsum("tij,ti,tj->t", series.spread_at(t), normal, normal) ** 0.5
         for sign, label in ((1, "where the data end"), (-1, None)):
-            ax.plot(
-                *(loop + sign * wide[:, None] * normal).T,
-                "--",
-                lw=0.8,
-                color=COLOURS[1],
-                label=label,
-            )
+            end = loop + sign * wide[:, None] * normal
+            ax.plot(*end.T, "--", lw=0.8, color=COLOURS[1], label=label)
     ax.plot(*loop[:, :2].T, color="black", lw=1.4, label="mean gait")
     ax.plot(*loop[0, :2], "o", color="black", ms=4)
     arrow = {"arrowstyle": "-|>", "color": "black", "shrinkA": 0, "shrinkB": 0}
     ax.annotate("", loop[58, :2], loop[50, :2], arrowprops=arrow)
-    first, second = (quantity(name, "rad") for name in fit.log.joints[:2])
+    first, second = (quantity(name, "rad") for name in _joints(result)[:2])
     ax.set(xlabel=first, ylabel=second, aspect="equal")
-    ax.set_title(
-        f"{len(fit.measured)} cycles at {fit.frequency:.4g} per unit of t", loc="left"
-    )
+    cycles, frequency = result.attributes["cycles"], float(result["frequency"])
+    ax.set_title(f"{cycles} cycles at {frequency:.4g} per unit of t", loc="left")
     ax.legend(
         loc="upper center",
         bbox_to_anchor=(0.5, -0.16),
@@ -87,59 +79,57 @@ def _shapes(fit: Fitted, ax) -> None:
     )
 
 
-def _noted(fit: Fitted, ax) -> None:
+def _noted(result: Result, ax) -> None:
     """Write the net displacement of the mean gait as a small table."""
-    (net, half_width), (mean, mean_half_width) = fit.displacement, fit.mean
     ax.set_axis_off()
-    head = f"net displacement per cycle, {100 * fit.known.level:.3g} % intervals"
+    level = 100 * float(result.attributes["level"])
+    head = f"net displacement per cycle, {level:.3g} % intervals"
     rows = [("", "mean of the log", "mean gait, predicted")]
-    for name, u, a, b, c, d in zip(
-        ("x", "y", "heading"),
-        (fit.unit, fit.unit, "rad"),
-        mean,
-        mean_half_width,
-        net,
-        half_width,
-    ):
-        pair = lambda value, error: rf"${value:.5f} \pm {error:.5f}$"
-        rows.append((f"{name} ({u})", pair(a, b), pair(c, d)))
+    for name in POSE:
+        logged, predicted = result[name], result[f"{name}_predicted"]
+        rows.append((f"{name} ({logged.unit})", _pair(logged), _pair(predicted)))
     ax.text(0.0, 0.8, head, transform=ax.transAxes)
     for k, row in enumerate(rows):
         for place, word in zip((0.0, 0.26, 0.64), row):
             ax.text(place, 0.62 - 0.17 * k, word, transform=ax.transAxes, fontsize=8)
 
 
-def _row(fit: Fitted, component: int, ax) -> None:
+def _pair(variable: Variable) -> str:
+    return rf"${float(variable):.5f} \pm {float(variable.error):.5f}$"
+
+
+def _row(result: Result, series: TaylorSeries, component: int, ax) -> None:
     t = np.linspace(0, 2 * np.pi, 200)
-    A, error = fit.along(t)
-    for j, (name, colour) in enumerate(zip(fit.log.joints, COLOURS)):
+    A, error = series.along(t)
+    for j, (name, colour) in enumerate(zip(_joints(result), COLOURS)):
         a, e = A[:, component, j], error[:, component, j]
         ax.fill_between(t, a - e, a + e, color=colour, alpha=0.25, lw=0)
         ax.plot(t, a, color=colour, lw=1.2, label=f"by {quantity(name)}")
     ax.axhline(0.0, color="0.7", lw=0.6, zorder=0)
+    unit = result["A_along"].unit[component]
     ax.set(
         xlim=(0, 2 * np.pi),
-        ylabel=rf"$\mathbf{{A}}^{{{COMPONENTS[component]}}}$ ({unit_of(component, fit.unit)}/rad)",
+        ylabel=rf"$\mathbf{{A}}^{{{COMPONENTS[component]}}}$ ({unit})",
     )
     ax.set_xticks(list(TICKS), list(TICKS.values()))
     ax.set_title(TITLES[component], loc="left")
 
 
-def _cycles(fit: Fitted, component: int, ax) -> None:
-    x, y = fit.predicted[:, component], fit.measured[:, component]
+def _cycles(result: Result, component: int, ax) -> None:
+    name = POSE[component]
+    logged = result[f"{name}_per_cycle"]
+    x, y = result[f"{name}_per_cycle_predicted"].values, logged.values
     low, high = min(x.min(), y.min()), max(x.max(), y.max())
     room = 0.05 * (high - low) + 1e-12
     ends = (low - room, high + room)
     ax.plot(ends, ends, color="0.7", lw=0.8, zorder=0)
     ax.plot(x, y, ".", ms=4, color=COLOURS[0])
-    unit = unit_of(component, fit.unit)
-    name = ("x", "y", "heading")[component]
     ax.set(
         xlim=ends,
         ylim=ends,
         aspect="equal",
-        xlabel=f"{name} predicted ({unit})",
-        ylabel=f"{name} logged ({unit})",
+        xlabel=f"{name} predicted ({logged.unit})",
+        ylabel=f"{name} logged ({logged.unit})",
     )
     ax.locator_params(nbins=4)
     ax.tick_params(axis="x", rotation=30)

@@ -7,9 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from geomech.core.variables import Result
-from geomech.measured.midlines.kinematics import Cycles
-from geomech.measured.midlines.predicted import COMPARED, Comparison
-from geomech.measured.midlines.question import units_of
 from geomech.plots.style import figure, styled
 
 if TYPE_CHECKING:
@@ -22,16 +19,17 @@ PANELS = "speed", "heading", "slip"
 
 @styled
 def midlines_figure(result: Result) -> Figure:
-    """Draw the way of the body with the midlines of one cycle, and slip and amplitude along the body with intervals; below, if
-    there is a prediction, speed, heading and slip of each cycle, measured and predicted, with their means and intervals."""
-    comparison = result.subject[1]
-    fig, axes = figure(
-        9.6, 3.2 if comparison is None else 6.0, 3, 1 if comparison is None else 2
-    )
+    """Draw a result of `fit_gait` of midlines: the way of the body with the midlines of one
+    cycle, and slip and amplitude along the body with intervals; below, if there is a
+    prediction, speed, heading and slip of each cycle, measured and predicted, with their
+    means and intervals."""
+    compared = "compared" in result
+    height, rows = (6.0, 2) if compared else (3.2, 1)
+    fig, axes = figure(9.6, height, 3, rows)
     _track(result, axes[0, 0])
     _along(result, "slip", "rad", axes[0, 1])
     _along(result, "amplitude", "BL", axes[0, 2])
-    if comparison is not None:
+    if compared:
         for name, ax in zip(PANELS, axes[1]):
             _compared(result, name, ax)
         axes[1, 0].legend(loc="lower center", bbox_to_anchor=(0.62, 1.0), ncols=2)
@@ -39,59 +37,26 @@ def midlines_figure(result: Result) -> Figure:
 
 
 def _track(result: Result, ax) -> None:
-    fit, unit = result.subject[0], result.subject[0].trial.unit
-    cycles, length = fit.cycles(fit.curve), fit.value("length")[0]
-    size = 1.0 if unit == "m" else length
-    centre = cycles.place.mean(-1) / size
-    for k, path in enumerate(centre):
-        ax.plot(
-            path.real,
-            path.imag,
-            color=MEASURED,
-            lw=1.2,
-            label="mean of the body" if k == 0 else None,
-        )
-    place = cycles.place[0, :: max(1, cycles.place.shape[1] // BODIES)] / size
-    for k, body in enumerate(place):
-        ax.plot(
-            body.real,
-            body.imag,
-            color="0.55",
-            lw=0.8,
-            label="midlines of a cycle" if k == 0 else None,
-        )
-    ax.plot(
-        place[:, -1].real, place[:, -1].imag, "o", color="black", ms=2.5, label="head"
-    )
-    if (comparison := result.subject[1]) is not None:
-        track = _predicted_track(cycles, comparison, length, size)
-        ax.plot(
-            track.real, track.imag, "--", color=PREDICTED, lw=1.2, label="predicted"
-        )
-    ax.set(xlabel=f"x ({unit or 'BL'})", ylabel=f"y ({unit or 'BL'})")
+    x, y = result["track_x"], result["track_y"]
+    label = "mean of the body"
+    for one, other in zip(x.values, y.values):
+        ax.plot(one, other, color=MEASURED, lw=1.2, label=label)
+        label = None
+    every = max(1, result["midline_x"].values.shape[0] // BODIES)
+    bodies = [result[name].values[::every] for name in ("midline_x", "midline_y")]
+    label = "midlines of a cycle"
+    for one, other in zip(*bodies):
+        ax.plot(one, other, color="0.55", lw=0.8, label=label)
+        label = None
+    heads = [body[:, -1] for body in bodies]
+    ax.plot(*heads, "o", color="black", ms=2.5, label="head")
+    if "track_x_predicted" in result:
+        way = (result[f"track_{axis}_predicted"].values for axis in "xy")
+        ax.plot(*way, "--", color=PREDICTED, lw=1.2, label="predicted")
+    ax.set(xlabel=f"x ({x.unit})", ylabel=f"y ({y.unit})")
     ax.set_aspect("equal", adjustable="datalim")
-    ax.set_title(f"{len(fit.used)} cycles", loc="left")
+    ax.set_title(f"{len(x.values)} cycles", loc="left")
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.28), ncols=2)
-
-
-def _predicted_track(
-    cycles: Cycles, comparison: Comparison, length: float, size: float
-) -> np.ndarray:
-    """Return where the body is after each cycle as predicted (C + 1,), x + i y, from where it was at the start. size: unit of
-    the axes in that of the trial."""
-    stride, heading, turn = (
-        comparison.predicted[COMPARED.index(name)]
-        for name in ("stride", "heading", "turn")
-    )
-    count = len(cycles.duration)
-    steps = (
-        stride
-        * length
-        / size
-        * np.exp(1j * (heading + turn * (np.arange(count) - (count - 1) / 2)))
-    )
-    start = complex(*cycles.starts[0, :2]) / size
-    return np.concatenate([[0.0], np.cumsum(steps)]) + start
 
 
 def _along(result: Result, name: str, unit: str, ax) -> None:
@@ -112,17 +77,16 @@ def _along(result: Result, name: str, unit: str, ax) -> None:
 
 
 def _compared(result: Result, name: str, ax) -> None:
-    fit, comparison = result.subject
-    k, number = COMPARED.index(name), np.arange(1, len(fit.used) + 1)
-    pairs = (
-        (result["per_cycle"].values[:, list(result["quantity"].values).index(name)], comparison.measured[k],
-         comparison.measured_error[k], MEASURED, "measured"),
-        (comparison.per_cycle[:, k], comparison.predicted[k], comparison.predicted_error[k], PREDICTED, "predicted"),
-    )  # fmt: skip
-    for each, mean, error, colour, label in pairs:
-        ax.axhspan(mean - error, mean + error, color=colour, alpha=0.2, lw=0)
-        ax.axhline(mean, color=colour, lw=1.2, label=label)
-        ax.plot(number, each, "o", color=colour, ms=3)
-    ax.set(xlabel="cycle", ylabel=f"{name} ({units_of(fit)[name]})")
+    for ending, colour, label in (
+        ("", MEASURED, "measured"),
+        ("_predicted", PREDICTED, "predicted"),
+    ):
+        mean, each = result[f"{name}{ending}"], result[f"{name}_per_cycle{ending}"]
+        value, error = float(mean), float(mean.error)
+        ax.axhspan(value - error, value + error, color=colour, alpha=0.2, lw=0)
+        ax.axhline(value, color=colour, lw=1.2, label=label)
+        number = np.arange(1, len(each.values) + 1)
+        ax.plot(number, each.values, "o", color=colour, ms=3)
+    ax.set(xlabel="cycle", ylabel=f"{name} ({result[name].unit})")
     ax.set_title(name, loc="left")
     ax.xaxis.get_major_locator().set_params(integer=True)

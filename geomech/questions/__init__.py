@@ -35,6 +35,7 @@ GROUPS = {
     },
     "Your own data": {
         "fit_medium": "Fit a medium to your own drag data.",
+        "fit_gait": "Fit a measured gait.",
     },
 }
 SUMMARIES = {name: line for lines in GROUPS.values() for name, line in lines.items()}

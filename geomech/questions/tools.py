@@ -88,6 +88,28 @@ def warn_of_notes(result: "Result") -> None:
             warnings.warn(line, Note, stacklevel=4)
 
 
+def side_by_side(
+    result: "Result", name: str, dim: str, names: Iterable[str]
+) -> "Variable":
+    """Return variables without dimensions as one, over a dimension, with their errors."""
+    from geomech.core.variables import Variable, same_or_each
+
+    parts = [result[each] for each in names]
+    values = [float(part) for part in parts]
+    errors = [float(part.error) for part in parts]
+    units = same_or_each([part.units for part in parts])
+    return Variable(name, (dim,), values, units, error=errors)
+
+
+def in_degrees(variable: "Variable") -> "Variable":
+    """Return an angle in degrees, and any other variable as it is."""
+    import numpy as np
+
+    if variable.unit != "rad":
+        return variable
+    return variable.with_arrays(np.degrees, unit="degrees")
+
+
 def component_number(components: Any) -> int:
     """Return the number of one component, x, y or theta; x if none is named."""
     from geomech.core.errors import choose

@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from geomech.core.errors import choose
-from geomech.core.variables import Result, Variable
+from geomech.core.variables import Result, Variable, same_or_each
 from geomech.scenes import drag
 from geomech.scenes.write import table
 from geomech.studies.stress_calibration import (
@@ -172,13 +172,6 @@ def _curve(f: Fit) -> list[Variable]:
             f.band(CURVE), error_label="half width of the band with 95 %",
         ),
     ]  # fmt: skip
-
-
-def same_or_each(units: Sequence[str]) -> str | tuple[str, ...]:
-    """Return the unit that all have, or one for each."""
-    if len({*units}) == 1:
-        return units[0]
-    return tuple(units)
 
 
 def medium_text(f: Fit, name: str) -> str:

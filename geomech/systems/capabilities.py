@@ -197,7 +197,7 @@ class Symbolic(Protocol):
 
 @runtime_checkable
 class Recorded(Protocol):
-    """Attributes for a file of its connection; read by `geomech.output`."""
+    """Attributes for a file of its connection; read by `geomech.questions`."""
 
     def about(self) -> Mapping[str, Any]:
         """Return the attributes by name."""

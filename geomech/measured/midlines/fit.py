@@ -142,7 +142,7 @@ def fit_midlines(
 
     sample = intervals.sampled(curve, coarse, values, clock.of_frames(curve))
     constant = np.full(len(sample.value), intervals.CONSTANT)
-    constant[kinematics.QUANTITIES.index("length")] = STRETCHLESS
+    constant[kinematics.QUANTITIES.index("body_length")] = STRETCHLESS
     found = intervals.intervals(sample, level, constant)
     return Kinematics(
         trial, curve, coarse, clock, marks, used, sample, found, level, words

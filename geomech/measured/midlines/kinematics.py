@@ -16,7 +16,7 @@ from geomech.measured.midlines.smooth import NODES, Curve, placed
 PHASES = 48  # of a cycle
 PLACES = 12  # along the MIDDLE of the body, whose headings make the phase
 QUANTITIES = (
-    "frequency", "length", "speed", "stride", "heading", "drift", "turn", "slip", "efficiency", "amplitude", "wavelength",
+    "frequency", "body_length", "speed", "stride", "heading", "drift", "turn", "slip", "efficiency", "amplitude", "wavelength",
     "arc_wavelength",
 )  # fmt: skip
 PARTS = 10  # of the body, in which slip and amplitude are told, from tail to head

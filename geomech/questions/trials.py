@@ -1,0 +1,78 @@
+"""The words for results of midlines."""
+
+from typing import TYPE_CHECKING
+
+from geomech.questions import tools
+
+if TYPE_CHECKING:
+    from geomech.core.variables import Result
+
+SHOWN = (
+    "frequency", "body_length", "speed", "stride", "heading", "turn", "slip",
+    "efficiency", "amplitude", "wavelength",
+)  # fmt: skip
+
+
+def headline(result: "Result") -> list[str]:
+    facts, noise = result.attributes, float(result["noise"])
+    first = (
+        f"{facts['file']}: {facts['cycles']} full cycles of {facts['points']} points"
+    )
+    if facts["cycles_left_out"]:
+        first = f"{first}; {facts['cycles_left_out']} with gaps left out"
+    return [
+        first,
+        f"head: {facts['head']}",
+        f"smoothed by {facts['modes']} modes along the body and "
+        f"{facts['knots_per_cycle']:.3g} knots a cycle, more than by cross-validation; "
+        f"noise of a point {noise:.2g} BL",
+        f"with intervals of {100 * facts['level']:.3g} % of cases:",
+    ]
+
+
+def summary(result: "Result") -> "Result":
+    """Return the quantities and, of a prediction, what is measured and what is predicted
+    side by side."""
+    shown = result.only(*SHOWN)
+    if "compared" not in result:
+        return shown
+    names = result["compared"].values.tolist()
+    predicted = [f"{name}_predicted" for name in names]
+    return shown.with_variables(
+        result["compared"],
+        tools.side_by_side(result, "measured", "compared", names),
+        tools.side_by_side(result, "predicted", "compared", predicted),
+    )
+
+
+def remarks(result: "Result") -> list[str]:
+    lines = []
+    if "compared" in result:
+        names = result["compared"].values
+        agree = result["apart"].values <= 1
+        for words, chosen in (("agree", names[agree]), ("differ", names[~agree])):
+            if chosen.size:
+                lines.append(f"measured and predicted {words}: {', '.join(chosen)}")
+    if "parameter" in result:
+        for name in result["parameter"].values.tolist():
+            lines.append(closing_words(result, name))
+    return lines
+
+
+def closing_words(result: "Result", name: str) -> str:
+    """Return which value of a parameter of the medium gives the measured distance."""
+    import math
+
+    from geomech.results.show import scalar
+
+    one = result.at(parameter=name)
+    present, closing = one["parameter_present"], one["parameter_closing"]
+    words = f"{name} = {scalar(tools.in_degrees(present))}"
+    if math.isfinite(float(closing)):
+        value = scalar(tools.in_degrees(closing))
+        return f"{words}: {value} gives the measured distance"
+    tried = tools.in_degrees(one["parameter_tried"])
+    low, high = (float(f"{x:.3g}") for x in tried.values)
+    unit = f" {tried.unit}" if tried.unit != "1" else ""
+    span = f"{low:g} to {high:g}{unit}"
+    return f"{words}: none from {span} gives the measured distance"
