@@ -11,7 +11,7 @@ import numpy as np
 from rft.ground import Ground
 from rft.plates.stress import PlateStress
 from rft.refusal import require
-from rft.walking.engines import Fineness, Walker
+from rft.walking.engines import Fineness, Refined, Walker, with_more_elements
 from rft.walking.limit import Limit, LimitCycles, limit_cycles, predicted_progress
 from rft.walking.march import march
 from rft.walking.planar import Robots, State
@@ -24,6 +24,8 @@ from rft.walking.stride import (
     cycles_to_settle,
     from_rest,
 )
+
+ORDER = 2  # of the time steps
 
 
 def refuse(walker: Walker) -> None:
@@ -38,6 +40,16 @@ def refuse(walker: Walker) -> None:
         isinstance(walker.stress, PlateStress),
         "a law of three dimensions takes ``engine`` mujoco",
     )
+
+
+def refined(numerics: Fineness) -> list[Refined]:
+    """Return half and three quarters of the steps, as one change alone may be small by chance, and twice the elements."""
+    few = [max(8, numerics.steps * quarters // 4) for quarters in (2, 3)]
+    return [
+        Refined(replace(numerics, steps=few[0]), "steps", 1.0, 0.5),
+        Refined(replace(numerics, steps=few[1]), "steps", 1.0, 0.75),
+        with_more_elements(numerics, 1.5),
+    ]
 
 
 def walk(
