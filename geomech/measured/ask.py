@@ -10,7 +10,7 @@ from geomech.io.rows import read as read_rows
 from geomech.measured.log import Log
 from geomech.measured.midlines import reader
 from geomech.measured.midlines.trial import Trial
-from rft.refusal import Refusal, formatted, line
+from rft.core.refusal import Refusal, formatted, line
 
 OF_LOGS = "degrees", "harmonics", "limits", "scene"
 OF_MIDLINES = (

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from geomech.questions import loading, logs, parsing, tools, trials
 from geomech.questions.base import Option, Question, Run, Subject
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
     from geomech.core.variables import Result
@@ -152,7 +152,7 @@ class FitGait(Question):
         )
 
     def check(self) -> None:
-        from rft.checks import in_range
+        from rft.core.checks import in_range
 
         if self.body_length is not None:
             in_range("``body_length``", self.body_length, 1e-9, 1e9)

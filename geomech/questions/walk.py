@@ -96,11 +96,13 @@ class Walk(Question):
 
     @staticmethod
     def remarks(result: "Result") -> list[str]:
+        steps = float(result["speed_error_of_steps"])
         elements = float(result["speed_error_of_elements"])
         share = 100 * float(result["unaccounted"])
         lines = [
             motion_words(result),
-            f"of the error {elements:.1g} m/s are of the elements, from twice as many",
+            f"of the error {steps:.1g} m/s are of the steps, {elements:.1g} m/s of the"
+            " elements",
             f"not accounted for, by the steps: {share:.2g} % of the work",
         ]
         unsolved = int(result["unsolved"].values)

@@ -10,7 +10,7 @@ from geomech.core.variables import Result
 from geomech.gaits import Fourier
 from geomech.geometry.tube import Loop, TaylorSeries
 from geomech.scenes.write import gait_table, table
-from rft.refusal import Refusal
+from rft.core.refusal import Refusal
 
 
 def series_of(result: Result) -> TaylorSeries:

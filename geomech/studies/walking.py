@@ -38,7 +38,6 @@ PUSHED = 0.2  # acceleration of a body by much faster legs over gravity, measure
 IN_VAIN = (
     40  # cycles of a failing search for a limit cycle with its errors, many at once
 )
-TO_COME = 1.5  # error over the change with twice the elements; up to 1.49 measured, 4/3 for order 2
 WALKING = 0.7  # share of the time before the errors are computed
 UNITS = {  # of a walk's table; a positive pitch is nose down
     "t": "s", "x": "m", "z": "m", "pitch": "rad", "v_x": "m/s", "v_z": "m/s", "rate": "rad/s", "work": "J", "loss": "J",
@@ -50,7 +49,7 @@ LABELS = {
     "roll": "left side up",
     "yaw": "to the left",
 }
-LIMIT = 3  # cycles up to the limit cycle, and half as many for each of two errors
+LIMIT = 3  # cycles up to the limit cycle, and as many for each of its errors
 SETTINGS = (
     Setting("steps", (12, 16, 24, 32, 48, 64, 96), 2, against="limit"),
     Setting("elements", (6, 8, 12, 16, 24, 32), 2, against="limit"),
@@ -63,16 +62,16 @@ TOLERANCES = 10.0 ** -np.arange(1, 5)  # of the speed, m/s
 class Walked(NamedTuple):
     """A walk with the errors of its means.
 
-    walk: as computed by rft. estimate: error of its speed, m/s: the larger of the changes with half and with three
-    quarters of the steps, as one alone may be small by chance; `TO_COME` times the change with twice the elements; the
-    distance from the limit cycle; and the effect of unsolved steps. lateral, turning: errors of the lateral speed, m/s,
-    and of the yaw rate, rad/s, by the changes alone. elements: m/s, the part of the estimate that comes from twice the
-    elements."""
+    walk: as computed by rft. estimate: error of its speed, m/s: the larger of the changes with two other numbers of steps
+    and the change with twice the elements, each times the factor of `rft.terradynamics.walking.engines.Refined`; the distance from the
+    limit cycle; and the effect of unsolved steps. lateral, turning: errors of the lateral speed, m/s, and of the yaw rate,
+    rad/s, by the changes alone. steps, elements: m/s, the parts of the estimate that come from each."""
 
     walk: Walk
     estimate: float
     lateral: float = 0.0
     turning: float = 0.0
+    steps: float = 0.0
     elements: float = 0.0
 
 
@@ -97,33 +96,24 @@ def walked(
         advance=runner().call,
         **callback,
     )
-    refinements = [
-        ("steps", max(8, numerics.steps // 2)),
-        ("steps", max(8, 3 * numerics.steps // 4)),
-    ]
-    refinements += [("elements", min(1000, 2 * numerics.elements))]
-    changes = []
-    for k, (name, other) in enumerate(refinements):
-        finer = dataclasses.replace(numerics, **{name: other})
+    refinements, changes = chosen.refined(numerics), {"steps": [], "elements": []}
+    for k, refined in enumerate(refinements):
         rerun = chosen.rerun(
             walkers,
-            finer,
+            refined.numerics,
             walks,
             SETTLING if settling else None,
             advance=runner().call,
         )
-        changes.append(
-            np.abs([np.subtract(_means(a), _means(b)) for a, b in zip(rerun, walks)])
-        )
+        change = [np.subtract(_means(a), _means(b)) for a, b in zip(rerun, walks)]
+        changes[refined.setting].append(refined.factor * np.abs(change))
         if progress:
             progress(WALKING + (1.0 - WALKING) * (k + 1) / len(refinements))
-    half, three_quarters, finer = changes
-    error = np.maximum(half, three_quarters) + TO_COME * finer
+    steps, elements = (np.max(changes[name], axis=0) for name in ("steps", "elements"))
+    error = steps + elements
     error[:, 0] += [w.drift + w.unsolved_error for w in walks]
-    return [
-        Walked(w, *e, TO_COME * float(x))
-        for w, e, x in zip(walks, error.tolist(), finer[:, 0])
-    ]
+    parts = np.stack([steps[:, 0], elements[:, 0]], -1)
+    return [Walked(w, *e, *p) for w, e, p in zip(walks, error.tolist(), parts.tolist())]
 
 
 def _means(walk: Walk) -> tuple[float, float, float]:
@@ -181,13 +171,15 @@ def means(scene: WalkerScene, run: Walked) -> list[Variable]:
     """Return the means over the limit cycle."""
     walk = run.walk
     along = "mean over the limit cycle, along the heading"
-    part = "part of the error of speed, from twice as many elements"
+    of_steps = "part of the error of speed, from other numbers of steps"
+    of_elements = "part of the error of speed, from twice as many elements"
     ended = "1 if the limit cycle was found"
     found = [
         Variable("status", (), walk.status, label="how the walk ended"),
         Variable("periodic", (), int(walk.periodic), "1", ended),
         Variable("speed", (), walk.speed, "m/s", along, run.estimate),
-        Variable("speed_error_of_elements", (), run.elements, "m/s", part),
+        Variable("speed_error_of_steps", (), run.steps, "m/s", of_steps),
+        Variable("speed_error_of_elements", (), run.elements, "m/s", of_elements),
         Variable("frequency", (), scene.gait.frequency, "Hz", "of the gait"),
         Variable("cycles", (), walk.cycles, "1", "computed"),
     ]
@@ -264,14 +256,17 @@ def price(
     own = isinstance(scene.robot, Mjcf)  # custom machines may have no limit cycle
     most = SETTLING if settling else numerics.duration * scene.gait.frequency
     cycles = min(most, 2 * LIMIT + _speeding_up(scene))
-    least = (cycles + 2.75 * LIMIT) * numerics.steps * count
+    with located(scene.name):
+        chosen = engine(engine_name)
+    again = LIMIT * sum(refined.cost for refined in chosen.refined(numerics))
+    least = (cycles + again) * numerics.steps * count
     with located(scene.name), prefer_backend(STEP * least if planar else 0.0):
-        step_seconds, tries = engine(engine_name).step_cost(
+        step_seconds, tries = chosen.step_cost(
             [scene.walker] * together, numerics, PILOT
         )
     vain = IN_VAIN if tries > HARD else MOST_STRIDES if own else 0
     cycles = most + vain if vain else cycles
-    steps = (cycles + 2.75 * LIMIT) * numerics.steps
+    steps = (cycles + again) * numerics.steps
     seconds = step_seconds * steps * -(-count // together)
     return Steps(round(steps * count), seconds, BASE, seconds)
 
@@ -372,7 +367,11 @@ class Settings:
         return dataclasses.replace(self, near=walk)
 
     def settings(self) -> list[Setting]:
-        return list(SETTINGS)
+        order = engine(self.scene.engine).ORDER
+        return [
+            dataclasses.replace(one, order=order) if one.name == "steps" else one
+            for one in SETTINGS
+        ]
 
     def numbers(self, setting: Setting, value: Any) -> list[np.ndarray]:
         """Return the speed with one setting at another value."""

@@ -14,7 +14,7 @@ from rft.mujoco.model_parts import last_dof
 from rft.mujoco.parts import Frames
 from rft.terradynamics.ground import Ground
 from rft.terradynamics.meshes.blocks import Blocks
-from rft.terradynamics.meshes.contact import Motion, faces
+from rft.terradynamics.meshes.contact import Face, Motion, faces
 from rft.terradynamics.meshes.extruded import Extruded
 from rft.terradynamics.meshes.geoms import described
 from rft.terradynamics.meshes.law import Spatial
@@ -64,15 +64,33 @@ class Bed:
     ) -> Bed:
         """Return the bed under geoms with these meshes. slope: rad, by which the surface rises along x. level: m, the height
         of the surface at x = 0. hills: the surface in place of this plane, or `FLAT`."""
+        own = [faces(m.vertices[m.faces], m.middle_normals) for m in meshes]
+        return cls.under_faces(
+            model, geoms, own, laws, zones, ground, slope, level, hills
+        )
+
+    @classmethod
+    def under_faces(
+        cls,
+        model: mujoco.MjModel,
+        geoms: list[int],
+        own: list[Face],
+        laws,
+        zones,
+        ground,
+        slope: float = 0.0,
+        level: float = 0.0,
+        hills: Hills = FLAT,
+    ) -> Bed:
+        """Return the bed as `under`, from the faces of each geom along its own axes, which may be those of sheets."""
         bodies = np.array([model.geom_bodyid[g] for g in geoms], np.int64)
         up, ahead = (
             np.array([-np.sin(slope), 0.0, np.cos(slope)]),
             np.array([np.cos(slope), 0.0, np.sin(slope)]),
         )
-        spheres = [_sphere(mesh) for mesh in meshes]
-        blocks = Blocks([faces(m.vertices[m.faces], m.middle_normals) for m in meshes])
+        spheres = [_sphere(np.stack(one[:9], -1).reshape(-1, 3)) for one in own]
         return cls(
-            laws, zones, ground, up, ahead, float(level * up[2]), blocks,
+            laws, zones, ground, up, ahead, float(level * up[2]), Blocks(own),
             np.array(geoms, np.int64), bodies, model.body_rootid[bodies].astype(np.int64),
             np.array([last_dof(model, b) for b in bodies], np.int64), model.dof_parentid.astype(np.int64),
             np.array(spheres), hills, names=tuple(described(model, g) for g in geoms),
@@ -179,7 +197,7 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
 
 
-def _sphere(mesh: Mesh) -> list[float]:
-    """Return the middle and the radius, m, of a sphere around a mesh."""
-    middle = (mesh.vertices.max(0) + mesh.vertices.min(0)) / 2
-    return [*middle, np.linalg.norm(mesh.vertices - middle, axis=1).max()]
+def _sphere(points: np.ndarray) -> list[float]:
+    """Return the middle and the radius, m, of a sphere around points (N, 3)."""
+    middle = (points.max(0) + points.min(0)) / 2
+    return [*middle, np.linalg.norm(points - middle, axis=1).max()]

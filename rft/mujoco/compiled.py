@@ -309,6 +309,8 @@ def _count(row, data, result, geom, time):
     counts[STEPS] += 1
     counts[ITERATIONS] += result.iterations
     counts[MOST_ITERATIONS] = max(counts[MOST_ITERATIONS], result.iterations)
+    largest = numbers_at(row[AT.largest], 1)
+    largest[0] = max(largest[0], result.residual)
     if result.status == COARSER:
         counts[COARSER_STEPS] += 1
     if result.status == UNSOLVED:

@@ -62,13 +62,15 @@ class Effort(NamedTuple):
     """What the steps of a bed have cost so far.
 
     steps: with a geom in the ground. iterations: of Newton's method, and most_iterations in a step. coarser: steps that
-    were solved loosely, within 3e-4, or at a wider rounding alone. unsolved: steps that were not solved."""
+    were solved loosely, within 3e-4, or at a wider rounding alone. unsolved: steps that were not solved. residual: largest
+    residual of a step, over the forces without grains."""
 
     steps: int
     iterations: int
     most_iterations: int
     coarser: int
     unsolved: int
+    residual: float
 
 
 class Seen(NamedTuple):
@@ -84,13 +86,14 @@ class Seen(NamedTuple):
 
 class Entry(NamedTuple):
     """A bed in a row of the table. parts: of its model. bed: the sand. form: (G, 5), of its geoms as their elements were
-    made for. layout: for compiled code. counts: (N_COUNTS,), of steps. end: removes the bed when the model is gone."""
+    made for. layout: for compiled code. counts: (N_COUNTS,), of steps. largest: (1,), of their residuals. end: removes the bed when the model is gone."""
 
     parts: ModelParts
     bed: Bed
     form: np.ndarray
     layout: Layout | None
     counts: np.ndarray
+    largest: np.ndarray
     end: weakref.finalize
 
 
@@ -110,14 +113,15 @@ def install(model: mujoco.MjModel, bed: Bed) -> int:
         compiled = serves_compiled()
         check_places(mujoco.MjData(model))
         parts, counts = ModelParts.of(model), np.zeros(N_COUNTS, np.int64)
-        layout = layout_of(parts, bed, counts) if compiled else None  # compiles
+        largest = np.zeros(1)
+        layout = layout_of(parts, bed, counts, largest) if compiled else None
         _set_callback(compiled)
         row = next((k for k in range(ROWS) if TABLE[k, 0] in (0, REMOVED)), ROWS)
         require(row < ROWS, f"{ROWS} beds of sand are in use", instead="detach some")
         end = weakref.finalize(model, remove, row)
         end.atexit = False
         form = parts.form(bed.geoms)
-        _entries[row] = Entry(parts, bed, form, layout, counts, end)
+        _entries[row] = Entry(parts, bed, form, layout, counts, largest, end)
         if layout:
             from rft.mujoco.compiled import kernel
 
@@ -164,7 +168,9 @@ def beds(model: mujoco.MjModel) -> list[Bed]:
 def effort(row: int) -> Effort:
     """Return what the steps of the bed of a row have cost so far; zeros for one that is removed."""
     entry = _entries.get(row)
-    return Effort(*(entry.counts.tolist() if entry else [0] * N_COUNTS))
+    if entry is None:
+        return Effort(*[0] * N_COUNTS, residual=0.0)
+    return Effort(*entry.counts.tolist(), residual=float(entry.largest[0]))
 
 
 def see(row: int, model: mujoco.MjModel, data: mujoco.MjData) -> Seen:
@@ -275,6 +281,7 @@ def _add_by_python(row: int, entry: Entry, data: int) -> None:
     counts[STEPS] += 1
     counts[ITERATIONS] += result.iterations
     counts[MOST_ITERATIONS] = max(counts[MOST_ITERATIONS], result.iterations)
+    entry.largest[0] = max(entry.largest[0], result.residual)
     if result.status != SOLVED:
         is_unsolved = result.status == UNSOLVED
         counts[UNSOLVED_STEPS if is_unsolved else COARSER_STEPS] += 1
@@ -323,8 +330,10 @@ def _tell(time: float, residual: float, geom: str) -> None:
     warnings.warn(line, Note, stacklevel=2)
 
 
-def layout_of(parts: ModelParts, bed: Bed, counts: np.ndarray) -> Layout:
-    """Return the layout of a bed under a model."""
+def layout_of(
+    parts: ModelParts, bed: Bed, counts: np.ndarray, largest: np.ndarray
+) -> Layout:
+    """Return the layout of a bed under a model, whose steps write `Entry.counts` and `Entry.largest`."""
     from rft.mujoco.compiled import kernel
     from rft.mujoco.compiled_parts import element_code
     from rft.mujoco.compiled_solver import solver_code
@@ -354,6 +363,7 @@ def layout_of(parts: ModelParts, bed: Bed, counts: np.ndarray) -> Layout:
         "derivative_rows": parts.derivative_rows,
         "derivative_columns": parts.derivative_columns,
         "counts": counts,
+        "largest": largest,
         "watch": np.zeros(1, np.int64),
         "watched": np.zeros(WATCHED_HEAD + 12 * count),
         "unsolved": np.zeros(3),

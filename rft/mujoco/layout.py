@@ -15,7 +15,7 @@ COUNTED = ("n_zones", "n_planes", "n_numbers")
 OWN = (
     "table", "first", "geoms", "spheres", "dofs", "first_dof", "bodies", "parents", "trees",
     "laws", "ground", "disturbed", "surface", "hills", "hill_frame", "planes", "first_plane",
-    "derivative_rows", "derivative_columns", "form", "counts", "watch", "watched", "unsolved",
+    "derivative_rows", "derivative_columns", "form", "counts", "largest", "watch", "watched", "unsolved",
 )  # fmt: skip
 MODEL = (
     "model", "timestep", "integrator", "disableflags", "damping", "geom_size", "geom_type",

@@ -351,7 +351,7 @@ def attach(
         f"sand is attached to {names} already",
         instead="detach it, or name other geoms",
     )
-    _require_passive(model)
+    require_passive(model)
     if element is not None:
         in_range("element", element, 1e-6, 1e3, unit="m")
     require(
@@ -511,7 +511,7 @@ def _python_note() -> str:
     return f"sand by Python's callback, some {SLOWER} times slower: pip install 'geomech[fast]'"
 
 
-def _require_passive(model: mujoco.MjModel) -> None:
+def require_passive(model: mujoco.MjModel) -> None:
     """Raise Refusal if the model's flags switch passive forces off."""
     flag = getattr(mujoco.mjtDisableBit, "mjDSBL_PASSIVE", None)
     disabled = flag is not None and model.opt.disableflags & int(flag)

@@ -19,6 +19,7 @@ from rft.terradynamics.walking.hexapod import (
     DEFLECTION,
     LEG_MASS,
     NO_CONTACT,
+    add_axle,
     add_box,
     add_inertia,
     add_servo,
@@ -44,8 +45,8 @@ def mjcf(robot: Screws) -> str:
             assets, "mesh", name=name, inertia="shell", **_mesh_text(screw.mesh(DRAWN))
         )
         body = ET.SubElement(hull, "body", name=name, pos=text(place))
-        ET.SubElement(
-            body, "joint", name=name, type="hinge", axis=text((screw.sense, 0.0, 0.0))
+        add_axle(
+            body, name, (screw.sense, 0.0, 0.0), robot.mass * robot.screw.radius**2
         )
         mass = robot.mass * LEG_MASS
         add_inertia(body, mass, np.full(3, mass * screw.length**2 / 12))

@@ -1,8 +1,4 @@
-"""Force and moment of grains on many rigid bodies at once, and their slopes by the bodies' velocities.
-
-The surfaces of all bodies are triangles in the frames of their bodies. Forces and moments are about the bodies' origins and
-along the axes of the world, z = 0 the surface and z up. SI units.
-"""
+"""Surfaces of rigid bodies that touch the ground, triangles in the frames of their bodies, and the ground. SI units."""
 
 from __future__ import annotations
 
@@ -16,14 +12,10 @@ import numpy as np
 from rft.core.checks import Number, check_numbers
 from rft.core.refusal import require
 from rft.terradynamics.ground import Ground
-from rft.terradynamics.meshes.blocks import Blocks
-from rft.terradynamics.meshes.contact import Motion, faces
 from rft.terradynamics.meshes.extruded import Extruded
 from rft.terradynamics.meshes.law import Spatial
 from rft.terradynamics.meshes.mesh import Mesh
 from rft.terradynamics.plates.outline import Outline
-
-NUDGE = 1e-3  # change of a velocity for differences, over the rounding
 
 
 @dataclass(frozen=True)
@@ -126,21 +118,12 @@ def _side(outline: Outline, y: float) -> np.ndarray:
     )
 
 
-class Poses(NamedTuple):
-    """Motions of B bodies in the world. rotation: (B, 3, 3). place: (B, 3), m, and velocity: (B, 3), m/s, of the origin. spin:
-    (B, 3), angular velocity, rad/s."""
-
-    rotation: np.ndarray
-    place: np.ndarray
-    velocity: np.ndarray
-    spin: np.ndarray
-
-
 class Facets:
     """All surfaces that touch the ground.
 
-    bodies: (B,), numbers of their bodies, in the order of all arrays over bodies. owner: (T,), index into ``bodies`` of each
-    triangle. blocks: their faces, body after body."""
+    bodies: (B,), numbers of their bodies, in the order of all arrays over bodies. corners: (T, 3, 3), m, of triangles in
+    their bodies' frames. owner: (T,), index into ``bodies`` of each triangle. reach: (B,), m, of the farthest corner from
+    its body's origin."""
 
     def __init__(self, surfaces: Sequence[Surface]):
         require(len(surfaces) > 0, "no geoms that touch the ground")
@@ -148,17 +131,11 @@ class Facets:
         self.bodies, counts = np.unique([s.body for s in surfaces], return_inverse=True)
         sizes = [len(s.corners) for s in surfaces]
         self.corners = np.concatenate([s.corners for s in surfaces])
-        normals = np.concatenate([s.normals for s in surfaces])
-        sheet, self.owner = (
-            np.repeat([s.sheet for s in surfaces], sizes),
-            np.repeat(counts, sizes),
-        )
+        self.owner = np.repeat(counts, sizes)
         first = np.searchsorted(self.owner, np.arange(len(self.bodies)))
         self.reach = np.maximum.reduceat(
             np.linalg.norm(self.corners, axis=2).max(1), first
         )
-        of_bodies = (np.split(x, first[1:]) for x in (self.corners, normals, sheet))
-        self.blocks = Blocks([faces(*one) for one in zip(*of_bodies)])
 
     def heights(self, rotation, place) -> np.ndarray:
         """Return the heights (T, 3), m, of the corners for rotations (B, 3, 3) and places (B, 3) of the bodies."""
@@ -166,52 +143,3 @@ class Facets:
             np.einsum("tcj,tj->tc", self.corners, rotation[self.owner, 2])
             + place[self.owner, 2:]
         )
-
-    def loads(
-        self, grains: Grains, poses: Poses, k: float | None = None
-    ) -> tuple[np.ndarray, np.ndarray | None]:
-        """Return wrenches (B, 6), force, N, and moment, N m, and their slopes (B, 6, 6) by velocity and spin.
-
-        k: time, s, by which a pose changes with its velocity; None for no slopes."""
-        if k is None:
-            return self._wrenches(grains, Poses(*(x[:, None] for x in poses)))[
-                :, 0
-            ], None
-        nudge = (
-            grains.rounding
-            * NUDGE
-            / np.stack([np.ones(len(self.bodies)), self.reach], -1)
-        )
-        velocity, spin = np.zeros((2, len(self.bodies), 7, 3))
-        velocity[:, 1:4], spin[:, 4:7] = (
-            nudge[:, :1, None] * np.eye(3),
-            nudge[:, 1:, None] * np.eye(3),
-        )
-        rotation = poses.rotation[:, None]
-        moved = Poses(
-            rotation + np.cross((k * spin)[..., None], rotation, axis=2),
-            poses.place[:, None] + k * velocity,
-            poses.velocity[:, None] + velocity,
-            poses.spin[:, None] + spin,
-        )
-        wrench = self._wrenches(grains, moved)
-        change = (wrench[:, 1:] - wrench[:, :1]) / np.repeat(nudge, 3, 1)[:, :, None]
-        return wrench[:, 0], change.swapaxes(1, 2)
-
-    def _wrenches(self, grains: Grains, poses: Poses) -> np.ndarray:
-        """Return the wrenches (B, C, 6) in C motions, arrays (B, C, ...), of the bodies."""
-        turn = poses.rotation
-        along_axes = lambda x: np.einsum("bcij,bci->bcj", turn, x)
-        x, _, z = np.moveaxis(poses.place, -1, 0)
-        motions = Motion(
-            along_axes(poses.velocity),
-            along_axes(poses.spin),
-            x,
-            turn[..., 2, :],
-            turn[..., 0, :],
-            z,
-        )
-        loads = self.blocks.loads(grains.law, grains.ground, motions)
-        return np.einsum(
-            "bcij,bcpj->bcpi", turn, loads.reshape(*loads.shape[:2], 2, 3)
-        ).reshape(loads.shape)

@@ -17,8 +17,10 @@ from rft.terradynamics.walking.facets import Surface
 from rft.terradynamics.walking.robot import Robot, Roller
 
 LEG_MASS = 1e-6  # of a leg over the robot's
+MOTOR_INERTIA = 1e-3  # about the axis, over the robot's mass times a reach squared, assumed: without it, light legs exceed
+# the accelerations that MuJoCo allows
 DEFLECTION = 1e-4  # rad, of a leg with the robot's weight at its end
-SERVO_TIME = 1e-3  # s, time constant of a servo
+SERVO_TIME = 1e-2  # s, time constant of a servo; walks set it by their clock
 LEAST_INERTIA = 1e-14  # kg m^2: MuJoCo accepts no moment of inertia below 1e-15
 THICKNESS = 0.02  # of a leg as drawn, over its reach
 NO_CONTACT = {"contype": "0", "conaffinity": "0"}
@@ -48,7 +50,7 @@ def mjcf(robot: Robot, elements: int = 12, planar: bool = False) -> str:
     motors = ET.SubElement(root, "actuator")
     for k, (place, phase) in enumerate(zip(hips(robot), phases(robot))):
         leg = ET.SubElement(hull, "body", name=f"leg{k}", pos=text(place))
-        ET.SubElement(leg, "joint", name=f"leg{k}", type="hinge", axis="0 1 0")
+        add_axle(leg, f"leg{k}", (0.0, 1.0, 0.0), robot.mass * reach**2)
         mass = robot.mass * LEG_MASS
         add_inertia(leg, mass, np.full(3, mass * reach**2 / 3))
         for geom in _leg_geoms(legs, THICKNESS * reach):
@@ -88,6 +90,14 @@ def add_box(hull: ET.Element, sides) -> None:
         size=text(np.array(sides) / 2),
         rgba="0.25 0.3 0.4 1",
         **NO_CONTACT,
+    )
+
+
+def add_axle(body: ET.Element, name: str, axis, inertia: float) -> None:
+    """Add a hinge with the inertia of a motor, which the hull does not feel. inertia: kg m^2, of the robot's mass."""
+    armature = repr(float(MOTOR_INERTIA * inertia))
+    ET.SubElement(
+        body, "joint", name=name, type="hinge", axis=text(axis), armature=armature
     )
 
 

@@ -22,6 +22,9 @@ FREE, SLIDE, HINGE = (
 VERTICAL = (
     0.99  # least cosine of an axis with the vertical, for it to count as vertical
 )
+SERVO_TIME = (
+    0.02  # of the servos of legs and screws, cycles: some ten of MuJoCo's steps
+)
 
 
 class Machine(NamedTuple):
@@ -35,9 +38,11 @@ class Machine(NamedTuple):
     phases: np.ndarray
 
 
-def machine(robot: Robot, elements: int, planar: bool = False) -> Machine:
+def machine(
+    robot: Robot, elements: int, planar: bool = False, pieces: int = 1
+) -> Machine:
     """Return the machine of a robot. elements: number of elements, or of edges, of its surfaces. planar: whether a robot of
-    the vertical plane stays in it."""
+    the vertical plane stays in it. pieces: into which the elements of such a robot are cut."""
     if isinstance(robot, Mjcf):
         surfaces = robot.surfaces(elements)
         root = int(robot.model.body_rootid[surfaces[0].body])
@@ -52,8 +57,20 @@ def machine(robot: Robot, elements: int, planar: bool = False) -> Machine:
     model = mujoco.MjModel.from_xml_string(hexapod.mjcf(robot, elements, planar))
     phases = hexapod.phases(robot)
     return Machine(
-        model, hexapod.surfaces(robot, elements), 1, np.arange(len(phases)), phases
+        model,
+        hexapod.surfaces(robot, pieces * elements),
+        1,
+        np.arange(len(phases)),
+        phases,
     )
+
+
+def pace_servos(machine: Machine, frequency: float) -> None:
+    """Let the servos of legs or screws follow a clock of a frequency, Hz, with the time constant `SERVO_TIME`.
+
+    Angles would swing where this is less than half of a step of MuJoCo, which holds their force by the angle."""
+    bias = machine.model.actuator_biasprm
+    bias[machine.driven, 2] = bias[machine.driven, 1] * SERVO_TIME / frequency
 
 
 class Clock:
@@ -99,6 +116,21 @@ class Clock:
         ]
         return sorted({0.0, 1.0, *(round(e, 12) % 1.0 for e in ends)})
 
+    def set_rates(self, body: Multibody, rate_time: float) -> None:
+        """Give the joints that actuators drive the rates of the clock at a time, s."""
+        _, rates = self.actuator_motion(rate_time, rate_time)
+        for joint, gear, rate in zip(*self._driven_joints(), rates):
+            if gear:
+                body.data.qvel[body.model.jnt_dofadr[joint]] = rate / gear
+
+    def _driven_joints(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the joints (K,) of the driven actuators and their gears, 0 for those that turn or slide no joint."""
+        model, driven = self.machine.model, self.machine.driven
+        joints, gears = model.actuator_trnid[driven, 0], model.actuator_gear[driven, 0]
+        simple = np.isin(model.jnt_type[joints], (SLIDE, HINGE))
+        simple &= model.actuator_trntype[driven] == JOINT
+        return joints, np.where(simple, gears, 0.0)
+
     def set_start(self, body: Multibody) -> None:
         """Set a body to its state at time 0: driven actuators by the clock, all else as in the first keyframe, if there is one,
         at rest, and at the height where the lowest point of all surfaces is on the ground."""
@@ -106,28 +138,20 @@ class Clock:
         if model.nkey:
             mujoco.mj_resetDataKeyframe(model, data, 0)
         data.time, data.qvel[:] = 0.0, 0.0
-        lengths, rates = self.actuator_motion(0.0, 1e-9)
-        for actuator, length, rate in zip(self.machine.driven, lengths, rates):
-            joint, gear = (
-                model.actuator_trnid[actuator, 0],
-                model.actuator_gear[actuator, 0],
-            )
-            if (
-                model.actuator_trntype[actuator] == JOINT
-                and model.jnt_type[joint] in (SLIDE, HINGE)
-                and gear
-            ):
-                if model.actuator_biasprm[actuator, 1]:
-                    data.qpos[model.jnt_qposadr[joint]] = length / gear
-                data.qvel[model.jnt_dofadr[joint]] = rate / gear
-        mujoco.mj_forward(model, data)
+        lengths, _ = self.actuator_motion(0.0, 1e-9)
+        holds = model.actuator_biasprm[self.machine.driven, 1] != 0.0
+        for joint, gear, length, held in zip(*self._driven_joints(), lengths, holds):
+            if gear and held:
+                data.qpos[model.jnt_qposadr[joint]] = length / gear
+        self.set_rates(body, 1e-9)
+        body.update()
         bodies = body.facets.bodies
         lowest = body.facets.heights(
             data.xmat[bodies].reshape(-1, 3, 3), data.xpos[bodies]
         ).min()
         if (height := self._height_index()) is not None:
             data.qpos[height] -= lowest
-            mujoco.mj_forward(model, data)
+            body.update()
 
     def _height_index(self) -> int | None:
         """Return the index in qpos of the machine's height; None if it cannot fall."""

@@ -1,16 +1,16 @@
-"""The engine of three dimensions: robots as MuJoCo models on grains
-(`rft.terradynamics.walking.multibody`), one after the other.
+"""The engine of three dimensions: robots as MuJoCo models in sand (`rft.terradynamics.walking.multibody`), one after the other.
 
-A robot of the vertical plane becomes a hull on legs at both sides that is free to roll, yaw and drift
+MuJoCo's steps are of order 1, and its triangles lead as a whole or not at all. So it takes `SUBSTEPS` for each time step, and
+cuts an element of a leg or belly into `PIECES`, which makes both errors as small as those of the planar engine. A robot of the vertical plane becomes a hull on legs at both sides that is free to roll, yaw and drift
 (`rft.terradynamics.walking.hexapod`); a custom MJCF is used as it is. A walk ends with the stride that repeats the last one.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import mujoco
@@ -19,10 +19,24 @@ import numpy as np
 from rft.motion import limit_cycle
 from rft.terradynamics.meshes.extruded import Extruded
 from rft.terradynamics.meshes.law import Spatial
-from rft.terradynamics.walking.engines import Fineness, Walker
-from rft.terradynamics.walking.facets import Grains
-from rft.terradynamics.walking.machine import FREE, HINGE, JOINT, SLIDE, Clock, machine
-from rft.terradynamics.walking.multibody import Multibody
+from rft.terradynamics.walking.engines import (
+    Fineness,
+    Refined,
+    Walker,
+    with_more_elements,
+)
+from rft.terradynamics.walking.facets import Facets, Grains
+from rft.terradynamics.walking.machine import (
+    FREE,
+    HINGE,
+    JOINT,
+    SLIDE,
+    Clock,
+    machine,
+    pace_servos,
+)
+from rft.terradynamics.walking.mjcf import Mjcf
+from rft.terradynamics.walking.multibody import SUBSTEPS, Multibody
 from rft.terradynamics.walking.robot import intervals, walking_rounding
 from rft.terradynamics.walking.stride import (
     FEW_STRIDES,
@@ -35,6 +49,9 @@ from rft.terradynamics.walking.stride import (
     cycles_to_settle,
 )
 
+ORDER = 1  # of the time steps
+PIECES = 4  # of an element of a leg or belly
+MOST_STEPS = 10_000  # of a cycle
 REPEATED = 1e-2  # largest difference of the starts of strides that repeat, over the speed of the legs' ends
 STRAIGHT = 0.05  # rad, largest turn until the end of a walk whose strides are repeated along a line
 ROW = (
@@ -58,6 +75,18 @@ def refuse(walker: Walker) -> None:
     """Raise ValueError for a walker that this engine cannot compute."""
     if not isinstance(walker.stress, Spatial):
         Extruded(walker.stress)
+
+
+def refined(numerics: Fineness) -> list[Refined]:
+    """Return twice and one and a half times the steps, as one change alone may be small by chance, and twice the elements.
+
+    An error of order 1 is twice and three times these changes."""
+    more = [min(MOST_STEPS, numerics.steps * halves // 2) for halves in (4, 3)]
+    return [
+        Refined(dataclasses.replace(numerics, steps=more[0]), "steps", 2.0, 2.0),
+        Refined(dataclasses.replace(numerics, steps=more[1]), "steps", 3.0, 1.5),
+        with_more_elements(numerics, 1.25),
+    ]
 
 
 def walk(
@@ -119,7 +148,7 @@ def step_cost(
     while steps < numerics.steps and elapsed < seconds:
         body.step(h)
         elapsed, steps = time.process_time() - begin, steps + 1
-    return elapsed / steps, body.evaluations / steps
+    return elapsed / steps, body.iterations / (steps * body.substeps)
 
 
 class Start(NamedTuple):
@@ -143,32 +172,39 @@ class Simulation:
     ):
         refuse(walker)
         self.arguments, self.advance = (walker, numerics, planar), advance
-        self.machine = machine(walker.robot, numerics.elements, planar)
-        self.clock, self.gait = Clock(self.machine, walker.gait), walker.gait
+        self.machine = machine(walker.robot, numerics.elements, planar, PIECES)
+        self.gait = walker.gait
+        # Legs and screws of hardly any mass turn as the clock does, also where its rate jumps.
+        self.prescribed = not isinstance(walker.robot, Mjcf)
+        if self.prescribed:
+            pace_servos(self.machine, walker.gait.frequency)
+        self.clock = Clock(self.machine, walker.gait)
+        root, facets = self.machine.root, Facets(self.machine.surfaces)
+        legs = facets.bodies != root
+        self.reach = float(
+            facets.reach[legs].max() if legs.any() else facets.reach.max()
+        )
         law = (
             walker.stress
             if isinstance(walker.stress, Spatial)
             else Extruded(walker.stress)
         )
         ground = walker.ground
-        grains = Grains(law, ground.strength, ground.flux, numerics.rounding)
+        rounding = numerics.rounding
+        if len(self.machine.driven):
+            rounding = walking_rounding(rounding, walker.gait.frequency, self.reach)
         self.body = Multibody(
-            self.machine.model, self.machine.surfaces, grains, self.clock
+            self.machine.model,
+            self.machine.surfaces,
+            Grains(law, ground.strength, ground.flux, float(rounding)),
+            self.clock,
+            _substeps(walker, self.machine.model),
         )
         self.clock.set_start(self.body)
         self.intervals = intervals(self.clock.kinks(), numerics.steps)
-        facets, data, root = self.body.facets, self.body.data, self.machine.root
+        data = self.body.data
         distance = np.linalg.norm(data.xpos[facets.bodies] - data.xpos[root], axis=1)
-        legs = facets.bodies != root
-        self.reach = float(
-            facets.reach[legs].max() if legs.any() else facets.reach.max()
-        )
         self.ceiling = float((distance + facets.reach).max() + facets.reach.max())
-        if len(self.machine.driven):
-            rounding = float(
-                walking_rounding(numerics.rounding, walker.gait.frequency, self.reach)
-            )
-            self.body.grains = replace(self.body.grains, rounding=rounding)
         self.hull = np.flatnonzero(np.isin(facets.owner, np.flatnonzero(~legs)))
 
     def __reduce__(self) -> tuple:
@@ -186,7 +222,7 @@ class Simulation:
         body = self.body
         if start is not None:
             body.data.qpos[:], body.data.qvel[:] = start
-            mujoco.mj_forward(body.model, body.data)
+            body.update()
         cycles, moves, periodic, drift, before = (
             limit_cycle.begin(1),
             [],
@@ -286,11 +322,12 @@ class Simulation:
         rows, states = [], []
         f, data = self.gait.frequency, self.body.data
         for begin, end, steps in self.intervals:
+            rate_time = (stride + (begin + end) / 2) / f
+            if self.prescribed:
+                self.clock.set_rates(self.body, rate_time)
             for k in range(steps):
                 data.time = (stride + begin + (end - begin) * k / steps) / f
-                self.body.step(
-                    (end - begin) / steps / f, (stride + (begin + end) / 2) / f
-                )
+                self.body.step((end - begin) / steps / f, rate_time)
                 rows.append(self.row())
                 states.append(data.qpos.copy())
                 if self.end_status():
@@ -375,6 +412,15 @@ class Simulation:
             if hinge and gear:
                 qpos[model.jnt_qposadr[joint]] -= 2 * np.pi * strides / gear
         return qpos
+
+
+def _substeps(walker: Walker, model: mujoco.MjModel) -> int:
+    """Return the number of MuJoCo's steps in a time step, such that they are no longer than those of a custom machine's
+    model where a cycle has as many as by default."""
+    if not isinstance(walker.robot, Mjcf):
+        return SUBSTEPS
+    longest = 1 / (walker.gait.frequency * Fineness.steps)
+    return max(SUBSTEPS, math.ceil(longest / model.opt.timestep - 1e-9))
 
 
 def _goes_straight(before, after, duration: float) -> bool:

@@ -1,56 +1,43 @@
-"""Newton's equations of the bodies of a MuJoCo model on grains.
+"""Steps of the bodies of a MuJoCo model in sand.
 
-MuJoCo gives the equations of motion, M(q) dv/dt + c(q, v) = actuators + springs,
-dampers and constraints + J^T w, with the grains' wrenches w(q, v) added. The law
-depends on the direction of a velocity alone, so it is stiff wherever something is
-nearly at rest; bodies chatter where forces are computed at the start of a step and held
-during it. So steps are those of the planar engine (`rft.terradynamics.walking.sdirk`):
-SDIRK2, of order 2, each stage solved to convergence in all of the model's velocities by
-Newton's method. From the state at a stage's end MuJoCo's inverse dynamics compute the
-forces that its accelerations require; the residual is what the grains' forces lack of
-these. The slopes of the grains' forces are differences, body by body. The slopes of all
-other forces, stiff actuators' among them, are differences, too, once a step.
+MuJoCo takes the steps, with the grains' forces of `rft.mujoco`: those of the velocities that a step ends with. They are of
+order 1, so a time step of a walk consists of some of them.
 """
 
 from __future__ import annotations
 
+import copy
+import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import mujoco
 import numpy as np
 
+from rft.balance.backend import Note
 from rft.core.refusal import require
-from rft.terradynamics.walking.facets import Facets, Grains, Poses, Surface
-from rft.terradynamics.walking.sdirk import (
-    FARTHEST,
-    GAMMA,
-    HALVINGS,
-    LEAST_DECREASE,
-    LEAST_SHARE,
-    TOLERANCE,
-)
+from rft.mujoco import installed
+from rft.mujoco.bed import Bed
+from rft.mujoco.sand import require_passive
+from rft.terradynamics.meshes.contact import faces
+from rft.terradynamics.meshes.zones import EVERYWHERE
+from rft.terradynamics.walking.facets import Facets, Grains, Surface
 
-ITERATIONS = 12  # of Newton's method
-WIDTHS = (
-    30.0,
-    8.0,
-    3.0,
-    1.5,
-    1.0,
-)  # factors of the rounding, one after another where Newton's method fails
-NUDGE = 1e-6  # change of a velocity for differences of MuJoCo's forces, m/s
+SUBSTEPS = 16  # steps of MuJoCo in a time step
+IMPLICIT_FAST = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
+ENERGY = int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+NO_RESET = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+ROTATING = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)
 
 
 class Multibody:
-    """A MuJoCo model on grains, step after step.
+    """A MuJoCo model in sand, time step after time step.
 
-    model: compiled; gravity along -z, the surface at z = 0. surfaces: those that touch
-    the ground, from `rft.terradynamics.walking.geoms.surfaces` or `Surface`. Their
-    geoms touch grains and nothing else: the model loses all contacts of theirs, those
-    with a floor, too. grains: the law. control: function (time, rate_time) -> controls
-    (nu,) of the actuators at a time, s, by the rates of a clock at ``rate_time``, which
-    tells the side of a kink; None for the controls in the data.
+    model: compiled; gravity along -z, the surface at z = 0; it stays as it is. surfaces: those that touch the ground, from
+    `rft.terradynamics.walking.geoms.surfaces` or `Surface`. Their geoms touch grains and nothing else, no floor either. grains: the
+    ground. control: function (time, rate_time) -> controls (nu,) of the actuators at a time, s, by the rates of a clock at
+    ``rate_time``, which tells the side of a kink; None for the controls in the data. substeps: steps of MuJoCo, by its
+    integrator implicitfast, in a time step.
 
         craft = Multibody(model, surfaces(model, {"hull": mesh}), Grains(Spatial(xi_n=3e5)))
         while craft.data.time < 10.0:
@@ -58,19 +45,18 @@ class Multibody:
 
     Attributes
     ----------
-    data : MjData
-        qpos, qvel and ctrl may be set before a step; qfrc_applied are the grains' generalised forces at the end of the last.
+    model, data : MjModel, MjData
+        A copy of the model, and its data; qpos, qvel and ctrl may be set before a step. Places and velocities of the bodies
+        in the data are up to date after a step.
     work, loss : float
         Work of the actuators, and loss into the ground, dampers and constraints, J; work = loss + change of `energy`, to the
         order of the steps.
-    wrenches : array (B, 6)
-        Force, N, and moment, N m, of the grains on `Facets.bodies` about their origins at the end of the last step.
     unsolved : int
-        Number of steps that were accepted unsolved, since Newton's method failed even at the shortest length.
+        Number of MuJoCo's steps that were taken unsolved.
     defect, residual : float
-        Sum of the residuals of these steps, and the largest residual of all steps, m/s.
-    evaluations : int
-        How often the grains' forces were computed.
+        Velocity, m/s, that the unsolved steps lack at most, in all, and that any step lacks at most.
+    iterations : int
+        Of Newton's method for the grains' forces, in all.
     """
 
     def __init__(
@@ -79,6 +65,7 @@ class Multibody:
         surfaces: Sequence[Surface],
         grains: Grains,
         control: Callable[[float, float], np.ndarray] | None = None,
+        substeps: int = SUBSTEPS,
     ):
         require(
             model.nv > 0, "nothing in the model can move", because="it has no joints"
@@ -88,24 +75,27 @@ class Multibody:
             "the model has actuators with a state of their own",
             instead="drop their dyntype",
         )
+        require_passive(model)
         mujoco.set_mju_user_warning(_ignore)
+        model = copy.copy(model)
         _remove_contacts(model, surfaces)
-        model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
-        self.model, self.data = model, mujoco.MjData(model)
-        self.facets, self.grains, self.control = Facets(surfaces), grains, control
-        self.work = self.loss = 0.0
-        (
-            self.unsolved,
-            self.residual,
-            self.defect,
-            self._step_residual,
-            self.evaluations,
-        ) = 0, 0.0, 0.0, 0.0, 0
-        self.wrenches = np.zeros((len(self.facets.bodies), 6))
-        self.jacobians = np.zeros((len(self.facets.bodies), 6, model.nv))
-        mujoco.mj_forward(model, self.data)
+        model.opt.enableflags |= ENERGY
+        model.opt.disableflags |= NO_RESET
+        model.opt.integrator = IMPLICIT_FAST
+        self.model, self.data, self.facets = (
+            model,
+            mujoco.MjData(model),
+            Facets(surfaces),
+        )
+        self.control, self.substeps = control, substeps
+        self.work = self.loss = self.defect = self.residual = 0.0
+        self.unsolved = self.iterations = 0
+        self._row = installed.install(model, bed_under(model, surfaces, grains))
+        structure = model if hasattr(model, "D_rownnz") else self.data
+        self._slope_rows = np.repeat(np.arange(model.nv), structure.D_rownnz)
+        self._slope_columns = np.array(structure.D_colind)
+        mujoco.mj_kinematics(model, self.data)
         self.size = self._sizes()
-        self._model_slopes = None
 
     def _sizes(self) -> np.ndarray:
         """Return the speed, m/s, per unit of each velocity (nv,): 1, or a reach, m, for rotations."""
@@ -114,205 +104,117 @@ class Multibody:
         reach = float(
             (np.linalg.norm(places - places.mean(0), axis=1) + self.facets.reach).max()
         )
-        rotating = [
-            int(mujoco.mjtJoint.mjJNT_HINGE),
-            int(mujoco.mjtJoint.mjJNT_BALL),
-        ]  # NumPy compares no enumerations
-        size = np.where(np.isin(model.jnt_type[model.dof_jntid], rotating), reach, 1.0)
+        size = np.where(np.isin(model.jnt_type[model.dof_jntid], ROTATING), reach, 1.0)
         for joint in np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE):
             first = model.jnt_dofadr[joint] + 3
             size[first : first + 3] = reach
         return size
 
-    def energy(self) -> float:
-        """Return the kinetic and potential energy of the data, J, with that of springs."""
+    def update(self) -> None:
+        """Compute places, velocities and energies of the bodies from positions and velocities in the data."""
+        # mj_forward would compute the grains' forces, which takes as long as a step.
         mujoco.mj_fwdPosition(self.model, self.data)
+        mujoco.mj_comVel(self.model, self.data)
         mujoco.mj_energyPos(self.model, self.data)
         mujoco.mj_energyVel(self.model, self.data)
+
+    def energy(self) -> float:
+        """Return the kinetic and potential energy of the data, J, with that of springs."""
+        self.update()
         return float(self.data.energy.sum())
 
     def state(self) -> tuple:
         """Return the numbers that all further steps depend on."""
-        data, sums = self.data, (self.work, self.loss, self.residual, self.defect)
-        return (
-            data.time,
-            data.qpos.copy(),
-            data.qvel.copy(),
-            *map(float, sums),
-            self.unsolved,
-            self.evaluations,
-        )
+        numbers = np.zeros(mujoco.mj_stateSize(self.model, STATE))
+        mujoco.mj_getState(self.model, self.data, numbers, STATE)
+        sums = map(float, (self.work, self.loss, self.residual, self.defect))
+        return (numbers, *sums, self.unsolved, self.iterations)
 
     def restore(self, state: tuple) -> None:
         """Set the body to a `state`."""
-        data = self.data
-        (
-            data.time,
-            data.qpos[:],
-            data.qvel[:],
-            self.work,
-            self.loss,
-            self.residual,
-            self.defect,
-            *counts,
-        ) = state
-        self.unsolved, self.evaluations = counts
-        mujoco.mj_fwdPosition(self.model, data)
+        numbers, self.work, self.loss, self.residual, self.defect, *counts = state
+        self.unsolved, self.iterations = counts
+        mujoco.mj_setState(self.model, self.data, numbers, STATE)
+        self.update()
 
-    def step(
-        self, h: float, rate_time: float | None = None, halvings: int = HALVINGS
-    ) -> None:
-        """Take a time step h, s, with the controls' rates at ``rate_time``, s, by default the middle of the step; a step that
-        cannot be solved is halved."""
-        data = self.data
-        rate_time = data.time + h / 2 if rate_time is None else rate_time
-        start = data.time, data.qpos.copy(), data.qvel.copy(), self.work, self.loss
-        solved = self._step(*start[:3], h, rate_time)
-        if solved and np.isfinite(data.qpos).all():
-            self.residual = max(self.residual, self._step_residual)
-            return
-        if halvings:
-            data.time, data.qpos[:], data.qvel[:], self.work, self.loss = start
-            self.step(h / 2, rate_time, halvings - 1)
-            self.step(h / 2, rate_time, halvings - 1)
-            return
-        finite = (
-            np.isfinite(data.qpos).all() and np.isfinite([self.work, self.loss]).all()
-        )
+    def step(self, h: float, rate_time: float | None = None) -> None:
+        """Take a time step h, s, with the controls' rates at ``rate_time``, s, by default the middle of the step."""
+        model, data = self.model, self.data
+        begin, before = data.time, installed.effort(self._row)
+        rate_time = begin + h / 2 if rate_time is None else rate_time
+        model.opt.timestep = dt = h / self.substeps
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Note)  # unsolved steps are counted
+            for k in range(self.substeps):
+                data.time = begin + k * dt
+                if self.control:
+                    data.ctrl[:] = self.control(data.time, rate_time)
+                velocity = data.qvel.copy()
+                mujoco.mj_step(model, data)
+                self._add_work(velocity, dt)
+        data.time = begin + h
+        sums = [*data.qpos, *data.qvel, self.work, self.loss]
         require(
-            bool(finite),
-            f"the time step at {start[0]:.4g} s cannot be solved",
+            bool(np.isfinite(sums).all()) and installed.is_installed(self._row),
+            f"the time step at {begin:.4g} s cannot be solved",
             instead="make steps shorter",
         )
-        self.unsolved, self.defect = (
-            self.unsolved + 1,
-            self.defect + self._step_residual,
-        )
-        self.residual = max(self.residual, self._step_residual)
+        self.update()
+        self._count(before, dt)
 
-    def _step(self, t, q, v, h, rate_time) -> bool:
-        """Take a time step h from positions q and velocities v, and return whether both stages were solved."""
-        self._model_slopes, self._step_residual = None, 0.0
-        k = GAMMA * h
-        first, solved, *powers = self._stage(q, v, v, k, t + k, rate_time)
-        q_2, v_2 = self._integrated(q, first, h - k), v + (h - k) / k * (first - v)
-        _, solved_2, *powers_2 = self._stage(q_2, v_2, first, k, t + h, rate_time)
-        work, loss = (
-            h * ((1 - GAMMA) * a + GAMMA * b) for a, b in zip(powers, powers_2)
-        )
-        self.work, self.loss = self.work + work, self.loss + loss
-        return solved and solved_2
+    def _add_work(self, before: np.ndarray, dt: float) -> None:
+        """Add what forces have done in a step of MuJoCo, dt, from velocities ``before`` (nv,).
 
-    def _integrated(self, q, v, time) -> np.ndarray:
-        """Return the positions after a time with constant velocities."""
-        q = q.copy()
-        mujoco.mj_integratePos(self.model, q, v, time)
-        return q
+        The step moves bodies by its last velocities, at which forces of motors and dampers act, too."""
+        model, data = self.model, self.data
+        velocity, change = data.qvel, data.qvel - before
+        by_change = data.qDeriv * change[self._slope_columns]
+        implicit = np.bincount(self._slope_rows, by_change, model.nv)
+        damping = model.dof_damping * change
+        motors = data.qfrc_actuator + implicit + damping
+        losses = data.qfrc_passive - data.qfrc_spring - damping + data.qfrc_constraint
+        self.work += dt * float(velocity @ motors)
+        self.loss -= dt * float(velocity @ losses)
 
-    def _stage(self, q, v, guess, k, t, rate_time):
-        """Return velocities V = v + k a(q + k V, V), whether the stage is solved, and power of the actuators and of all losses
-        there, W. Where Newton's method fails, it goes through wider roundings."""
-        data = self.data
-        data.time = t
-        if self.control:
-            data.ctrl[:] = self.control(t, rate_time)
-        velocity, residual = self._newton(q, v, guess, k)
-        if not residual <= TOLERANCE * self.grains.rounding:
-            plain = self.grains
-            for width in WIDTHS:
-                self.grains = replace(plain, rounding=width * plain.rounding)
-                velocity, residual = self._newton(
-                    q, v, velocity if np.isfinite(velocity).all() else guess, k
-                )
-            self.grains = plain
-        self._step_residual = max(self._step_residual, residual)
-        solved = residual <= TOLERANCE * self.grains.rounding
-        motor_power = float(data.qfrc_actuator @ data.qvel)
-        losses = (
-            data.qfrc_applied
-            + data.qfrc_passive
-            - data.qfrc_spring
-            + data.qfrc_constraint
-        )
-        return velocity, solved, motor_power, -float(losses @ data.qvel)
+    def _count(self, before: installed.Effort, dt: float) -> None:
+        """Add what the steps of a time step have cost and lack, from the effort before them."""
+        now = installed.effort(self._row)
+        mass = float(self.model.body_mass.sum())
+        fall = dt * float(np.linalg.norm(self.model.opt.gravity))
+        speed = (2 * float(self.data.energy[1]) / max(mass, 1e-300)) ** 0.5 + fall
+        unsolved = now.unsolved - before.unsolved
+        self.iterations += now.iterations - before.iterations
+        self.unsolved += unsolved
+        self.defect += unsolved * now.residual * speed
+        if now.residual > before.residual:
+            self.residual = max(self.residual, now.residual * speed)
 
-    def _newton(self, q, v, guess, k) -> tuple[np.ndarray, float]:
-        """Return velocities by Newton's method from a guess, and their residual, m/s; the data are those of the velocities."""
-        tolerance, data_match, velocity = TOLERANCE * self.grains.rounding, True, guess
-        farthest = FARTHEST * self.facets.reach.max() / k
 
-        def largest_share(size):
-            return farthest / max(farthest, size)
+def bed_under(
+    model: mujoco.MjModel, surfaces: Sequence[Surface], grains: Grains
+) -> Bed:
+    """Return the sand under surfaces of a model, each in the place of its geom, or of its body's first one."""
+    own: dict[int, list[Surface]] = {}
+    for surface in surfaces:
+        first = model.body_geomadr[surface.body]
+        geom = int(first if surface.geom is None else surface.geom)
+        require(geom >= 0, f"the body {surface.body} of a surface has no geom")
+        own.setdefault(geom, []).append(surface)
+    along = [_faces_of_geom(model, geom, parts) for geom, parts in own.items()]
+    return Bed.under_faces(
+        model, [*own], along, (grains.law,), EVERYWHERE, grains.ground
+    )
 
-        residual, slope = self._residual(q, v, velocity, k)
-        step = _solve(slope, -residual)
-        size = np.abs(step * self.size).max()
-        share = largest_share(size)
-        for _ in range(ITERATIONS):
-            if (
-                size <= tolerance
-                or share < LEAST_SHARE * largest_share(size)
-                or not np.isfinite(size)
-            ):
-                break
-            trial = velocity + share * step
-            residual, trial_slope = self._residual(q, v, trial, k)
-            trial_size = np.abs(_solve(slope, -residual) * self.size).max()
-            if trial_size <= (1.0 - LEAST_DECREASE * share) * size:
-                velocity, slope, data_match = trial, trial_slope, True
-                step = _solve(slope, -residual)
-                size = np.abs(step * self.size).max()
-                share = largest_share(size)
-            else:
-                share, data_match = share / 2, False
-        if not data_match:
-            self._residual(q, v, velocity, k)
-        return velocity, float(size)
 
-    def _residual(self, q, v, velocity, k) -> tuple[np.ndarray, np.ndarray]:
-        """Return the force (nv,) that a stage with these velocities at its end lacks, and its slopes (nv, nv)."""
-        required = self._required_force(q, v, velocity, k)
-        if self._model_slopes is None or self.data.nefc:
-            self._model_slopes = self._slopes(q, v, velocity, k, required)
-            required = self._required_force(q, v, velocity, k)
-        applied, slope = self._loads(k)
-        self.evaluations += 1
-        self.data.qfrc_applied[:] = applied
-        return required - applied, self._model_slopes - slope
-
-    def _required_force(self, q, v, velocity, k) -> np.ndarray:
-        """Return the force (nv,) that the motion of a stage requires beside all forces of MuJoCo's model."""
-        data = self.data
-        data.qpos[:] = q
-        mujoco.mj_integratePos(self.model, data.qpos, velocity, k)
-        data.qvel[:], data.qacc[:] = velocity, (velocity - v) / k
-        mujoco.mj_inverse(self.model, data)
-        mujoco.mj_fwdActuation(self.model, data)
-        return data.qfrc_inverse - data.qfrc_actuator
-
-    def _slopes(self, q, v, velocity, k, required) -> np.ndarray:
-        """Return the slopes (nv, nv) of `_required_force` by the velocities, from differences."""
-        slopes = np.empty((len(velocity), len(velocity)))
-        for j in range(len(velocity)):
-            changed = velocity.copy()
-            changed[j] += NUDGE / self.size[j]
-            slopes[:, j] = (self._required_force(q, v, changed, k) - required) * (
-                self.size[j] / NUDGE
-            )
-        return slopes
-
-    def _loads(self, k) -> tuple[np.ndarray, np.ndarray]:
-        """Return the grains' generalised forces (nv,) and their slopes (nv, nv)."""
-        model, data, facets, j = self.model, self.data, self.facets, self.jacobians
-        for row, body in zip(j, facets.bodies):
-            mujoco.mj_jacBody(model, data, row[:3], row[3:], body)
-        twist = j @ data.qvel
-        rotation = data.xmat[facets.bodies].reshape(-1, 3, 3)
-        poses = Poses(rotation, data.xpos[facets.bodies], twist[:, :3], twist[:, 3:])
-        self.wrenches, slopes = facets.loads(self.grains, poses, k)
-        return np.einsum("bij,bi->j", j, self.wrenches), (
-            j.swapaxes(1, 2) @ slopes @ j
-        ).sum(0)
+def _faces_of_geom(model: mujoco.MjModel, geom: int, surfaces: Sequence[Surface]):
+    """Return the faces of surfaces in the frame of a geom."""
+    turn = np.zeros(9)
+    mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
+    turn = turn.reshape(3, 3)
+    corners = np.concatenate([s.corners for s in surfaces]) - model.geom_pos[geom]
+    normals = np.concatenate([s.normals for s in surfaces])
+    sheet = np.concatenate([np.full(len(s.corners), s.sheet) for s in surfaces])
+    return faces(corners @ turn, normals @ turn, sheet)
 
 
 def _remove_contacts(model: mujoco.MjModel, surfaces: Sequence[Surface]) -> None:
@@ -335,11 +237,3 @@ def _remove_contacts(model: mujoco.MjModel, surfaces: Sequence[Surface]) -> None
 
 def _ignore(_warning: str) -> None:
     """Ignore a warning, which MuJoCo would write to a file in the present folder; unsolved steps are counted."""
-
-
-def _solve(matrix, right) -> np.ndarray:
-    """Return the solution (n,) of linear equations, nan for singular ones."""
-    try:
-        return np.linalg.solve(matrix, right)
-    except np.linalg.LinAlgError:
-        return np.full(len(right), np.nan)

@@ -11,7 +11,12 @@ import numpy as np
 from rft.core.refusal import require
 from rft.terradynamics.ground import Ground
 from rft.terradynamics.plates.stress import PlateStress
-from rft.terradynamics.walking.engines import Fineness, Walker
+from rft.terradynamics.walking.engines import (
+    Fineness,
+    Refined,
+    Walker,
+    with_more_elements,
+)
 from rft.terradynamics.walking.limit import (
     Limit,
     LimitCycles,
@@ -30,6 +35,8 @@ from rft.terradynamics.walking.stride import (
     from_rest,
 )
 
+ORDER = 2  # of the time steps
+
 
 def refuse(walker: Walker) -> None:
     """Raise ValueError for a walker that this engine cannot compute."""
@@ -43,6 +50,16 @@ def refuse(walker: Walker) -> None:
         isinstance(walker.stress, PlateStress),
         "a law of three dimensions takes ``engine`` mujoco",
     )
+
+
+def refined(numerics: Fineness) -> list[Refined]:
+    """Return half and three quarters of the steps, as one change alone may be small by chance, and twice the elements."""
+    few = [max(8, numerics.steps * quarters // 4) for quarters in (2, 3)]
+    return [
+        Refined(replace(numerics, steps=few[0]), "steps", 1.0, 0.5),
+        Refined(replace(numerics, steps=few[1]), "steps", 1.0, 0.75),
+        with_more_elements(numerics, 1.5),
+    ]
 
 
 def walk(
