@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geomech.core.errors import VelocityWarning
-from rft.checks import real_array
+from rft.checks import masked_arrays, real_array
 from rft.refusal import Refusal
 
 Velocity = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -133,7 +133,8 @@ def evaluate(
             "velocity must be a function of alpha and alphadot", value=velocity
         )
     xi = velocity(*np.broadcast_arrays(alpha, alphadot))
-    if masked and isinstance(xi, np.ma.MaskedArray):
+    ma = masked_arrays()
+    if masked and ma is not None and isinstance(xi, ma.MaskedArray):
         xi = xi.astype(float).filled(np.nan)
     xi = real_array("what velocity returns", xi)
     if xi.shape != shape and broadcasts_to(xi, shape):
