@@ -1,20 +1,25 @@
 """What every question keeps: its declaration is its command and its method, and its result
 is the same in every form."""
 
+import ast
 import dataclasses
 import inspect
 import json
 import pickle
+import re
 import subprocess
 import sys
+import types
+from pathlib import Path
 
 import frozen
 import numpy as np
 import pytest
 import xarray
+from commands import geomech as run_geomech
 
 import geomech
-from geomech import Refusal, questions
+from geomech import Refusal, cli, questions
 from geomech.command import command, declaration, parameters
 from geomech.core.summary import wrapped
 from geomech.core.variables import Result, Variable
@@ -380,3 +385,45 @@ def test_a_connection_of_the_first_version_is_read():
     found = geomech.load_result(FROZEN / "field.nc")
     assert found["A"].unit == ("m/rad", "m/rad", "rad/rad")
     assert "xi_rms" in found and found["ccf"].error is not None
+
+
+# The page about adding questions and formats
+
+PAGE = Path(__file__).parents[1] / ".docs" / "how-it-works" / "extending.md"
+
+
+@pytest.fixture
+def added(monkeypatch):
+    """The question of the page, added as it says."""
+    section = PAGE.read_text().partition("## A question\n")[2]
+    (code, line) = re.findall(r"```(?:python|text)\n(.*?)```", section, re.S)[:2]
+    module = types.ModuleType("geomech.questions.loop")
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    exec(code, vars(module))
+    (name, words) = ast.literal_eval(f"{{{line}}}").popitem()
+    monkeypatch.setitem(questions.GROUPS["Analyse"], name, words)
+    monkeypatch.setitem(questions.SUMMARIES, name, words)
+    yield module.Loop
+    cli.loaded.cache_clear()
+
+
+def test_the_question_of_the_page_is_a_command(added, tmp_path):
+    out = tmp_path / "a.nc"
+    line = ["loop", "three-link-viscous", "--amplitude", "0.5", "-o", str(out)]
+    code, told, err = run_geomech(*line)
+    assert (code, err) == (0, "")
+    assert told.startswith("loop area  0.785398 +- ")
+    assert float(geomech.load_result(out)["loop_area"]) == pytest.approx(np.pi / 4)
+    assert "--amplitude A" in run_geomech("loop", "--help")[1]
+    assert added.__doc__.startswith(questions.SUMMARIES["loop"])
+
+
+def test_the_format_of_the_page_is_one_of_every_result(monkeypatch, tmp_path):
+    section = PAGE.read_text().partition("## A format\n")[2]
+    made = {}
+    monkeypatch.chdir(tmp_path)
+    exec(re.search(r"```python\n(.*?)```", section, re.S)[1], made)
+    monkeypatch.setitem(files.WRITERS, ".md", made["write_markdown"])
+    MADE.save("a.md")
+    assert (tmp_path / "a.md").read_text().count("\n") == 2 + 3 * 2
+    assert (tmp_path / "moved.md").read_text().startswith("| tier | amplitude | x |")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geomech.core.errors import VelocityWarning
-from rft.core.checks import real_array
+from rft.core.checks import masked_arrays, real_array
 from rft.core.refusal import Refusal
 
 Velocity = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -149,7 +149,8 @@ def evaluate(
             "velocity must be a function of alpha and alphadot", value=velocity
         )
     xi = velocity(*np.broadcast_arrays(alpha, alphadot))
-    if masked and isinstance(xi, np.ma.MaskedArray):
+    ma = masked_arrays()
+    if masked and ma is not None and isinstance(xi, ma.MaskedArray):
         xi = xi.astype(float).filled(np.nan)
     xi = real_array("what velocity returns", xi)
     if xi.shape != shape and broadcasts_to(xi, shape):

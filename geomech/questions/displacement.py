@@ -73,11 +73,11 @@ class Displacement(Question):
         return cast(Sequence[float], self.amplitudes)
 
     def check(self) -> None:
-        from geomech.studies.effort import refuse_costless
-
         if self.tolerance is not None and self.tiers is not None:
             raise Refusal("``tolerance`` chooses the tier", instead="drop ``tiers``")
         if self.effort:
+            from geomech.studies.effort import refuse_costless
+
             refuse_costless(self.scene)
 
     def cost(self) -> "Cost":
@@ -94,8 +94,6 @@ class Displacement(Question):
         return cost.price(jobs)
 
     def compute(self, run: Run) -> "Result":
-        from geomech.studies.effort import with_effort
-
         if self.tolerance is None:
             tables = run.tables_of(self.scene)
             found = tables.displacements(
@@ -104,6 +102,8 @@ class Displacement(Question):
         else:
             found = self._cheapest(run)
         if self.effort:
+            from geomech.studies.effort import with_effort
+
             found = with_effort(found, self.scene, self.gait)
         return found
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import functools
 import math
 import numbers
+import sys
 from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeGuard, get_args, get_type_hints
 
@@ -87,15 +88,22 @@ def real_array(name: str, x: ArrayLike) -> np.ndarray:
 def refuse_mask(name: str, x: object) -> None:
     """Raise ValueError if x is a masked array, or rows of such, with a masked value,
     which NumPy would turn into the number under the mask."""
-    import numpy as np
-
+    ma = masked_arrays()
+    if ma is None:
+        return
     rows = x if isinstance(x, (list, tuple)) else (x,)
     for row in rows:
-        if isinstance(row, np.ma.MaskedArray) and np.ma.is_masked(row):
+        if isinstance(row, ma.MaskedArray) and ma.is_masked(row):
             raise Refusal(
                 f"{name} has masked values",
                 instead="leave them out, or fill them with nan where nan is taken",
             )
+
+
+def masked_arrays() -> Any:
+    """Return `numpy.ma`; None where nobody has loaded it, so that there is no masked
+    array. NumPy loads it at its first use, which takes as long as a scene."""
+    return sys.modules.get("numpy.ma")
 
 
 def unmasked(name: str, x: ArrayLike) -> np.ndarray:
