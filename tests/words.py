@@ -180,7 +180,7 @@ def flat(value, path: str = "") -> Iterator[str]:
     if isinstance(value, dict) and value:
         for key, inner in value.items():
             yield from flat(inner, f"{path}.{key}" if path else str(key))
-    elif path.endswith("scene_toml"):
+    elif path.endswith(("scene_toml", "medium_toml")):
         return  # in files of NetCDF it is looked at key by key
     elif MASKED_KEYS.search(path):
         yield f"{path} = #"

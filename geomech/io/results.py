@@ -64,7 +64,7 @@ def joined(
             if owner_of(name + ending, by_name) == name:
                 more[field] = by_name[name + ending].values
         variable = replace(variable, **more)
-        if variable.error is not None:
+        if "error" in more:
             label = by_name[f"{name}_error"].label
             if label != described(variable, "error"):
                 variable = replace(variable, error_label=label)
