@@ -12,7 +12,7 @@ from geomech.core.variables import Result
 from geomech.measured.midlines.fit import fit_midlines
 from geomech.measured.midlines.predicted import compare
 from geomech.measured.midlines.question import result_of
-from geomech.measured.midlines.synthetic import made
+from geomech.measured.midlines.synthetic import synthetic_midlines
 from geomech.systems import Swimmer
 from geomech.systems.swimmer import MEDIA
 from rft import Backbone
@@ -23,7 +23,9 @@ def compute(
 ) -> Result:
     """Return the kinematics of a synthetic trial in loose beads, with the prediction of a medium."""
     swimmer = Swimmer(MEDIA["glass-0.3mm-loose"], Backbone(40))
-    fit = fit_midlines(made(swimmer, cycles, seed=seed).trial("trial.csv"))
+    fit = fit_midlines(
+        synthetic_midlines(swimmer, cycles, seed=seed).trial("trial.csv")
+    )
     return result_of(fit, compare(fit, MEDIA[medium]))
 
 

@@ -62,12 +62,14 @@ def trial_of(t, points, name="trial.csv"):
 @pytest.fixture(scope="module")
 def exact():
     """A trial without noise: 3.3 cycles that repeat."""
-    return synthetic.made(GLASS, 3.3, 30, 16, noise=0.0, spread=0.0, jitter=0.0, seed=2)
+    return synthetic.synthetic_midlines(
+        GLASS, 3.3, 30, 16, noise=0.0, spread=0.0, jitter=0.0, seed=2
+    )
 
 
 @pytest.fixture(scope="module")
 def noisy():
-    return synthetic.made(GLASS, 4.4, 30, 30, seed=8)
+    return synthetic.synthetic_midlines(GLASS, 4.4, 30, 30, seed=8)
 
 
 @pytest.fixture(scope="module")
@@ -340,7 +342,9 @@ def without(trial, left_out):
 
 def backwards(_):
     """A swimmer that its wave takes along, as where drag is less across the body than along it."""
-    return synthetic.made(Swimmer(Viscous(0.4), Backbone(20)), 3.4, 30, 20).trial()
+    return synthetic.synthetic_midlines(
+        Swimmer(Viscous(0.4), Backbone(20)), 3.4, 30, 20
+    ).trial()
 
 
 ALSO_REFUSED = {
@@ -364,7 +368,7 @@ def test_trials_of_other_faults_are_refused(noisy, said):
 
 
 def test_another_motion_within_a_trial_is_refused_by_its_times(noisy, fitted):
-    other = synthetic.made(GLASS, 1.5, 30, waves=2.4, swing=0.5, seed=1)
+    other = synthetic.synthetic_midlines(GLASS, 1.5, 30, waves=2.4, swing=0.5, seed=1)
     shift = noisy.points[-1].mean(0) - other.points[0].mean(0)
     points = np.concatenate([noisy.points, other.points + shift])
     with pytest.raises(
@@ -469,7 +473,9 @@ def test_two_animals_in_a_file_are_refused_and_tracks_are_no_points(exact, tmp_p
 def truth(system, **options):
     """Quantities of an animal: of many cycles without noise."""
     cycles = 8.2 if not options["spread"] else 400
-    return noiseless(synthetic.made(system, cycles, seed=99, noise=0.0, **options))
+    return noiseless(
+        synthetic.synthetic_midlines(system, cycles, seed=99, noise=0.0, **options)
+    )
 
 
 def noiseless(made, modes=14, even=0.0):
@@ -489,7 +495,9 @@ def covered(system, known, seeds, cycles=8.4, frames=40, **options):
     animal's drift is added."""
     errors, widths, k = [], [], QUANTITIES.index("heading")
     for seed in seeds:
-        made = synthetic.made(system, cycles, frames, seed=seed, **options)
+        made = synthetic.synthetic_midlines(
+            system, cycles, frames, seed=seed, **options
+        )
         f, own, expected = fit.fit_midlines(made.trial()), noiseless(made), known.copy()
         expected[k] = own[k] - own[k + 1] + known[k + 1]
         errors.append(f.intervals.value - expected)
@@ -612,7 +620,9 @@ def test_what_smoothing_cuts_off_is_judged_from_its_change():
 
 
 def test_intervals_cover_the_truth_in_a_few_trials():
-    known = noiseless(synthetic.made(GLASS, 40, 30, seed=99, noise=0.0, **USUAL))
+    known = noiseless(
+        synthetic.synthetic_midlines(GLASS, 40, 30, seed=99, noise=0.0, **USUAL)
+    )
     error, width = covered(GLASS, known, range(2), 4.4, 30, **USUAL)
     assert (np.abs(error) <= width).mean() > 0.8
 
@@ -621,8 +631,10 @@ def two_waves(points, noise=0.003, **options):
     """A trial whose wave of 1.5 lengths has a third harmonic of 30 %, and what it is without noise at 100 points."""
     form = {"swing": 0.7, "waves": 1.5, "third": 0.3, "seed": 5, **REPEATING, **options}
     swimmer = Swimmer(Viscous(4.0), Backbone(40))
-    exact = synthetic.made(swimmer, 4.4, 40, 100, noise=0.0, **form)
-    return synthetic.made(swimmer, 4.4, 40, points, noise=noise, **form), exact
+    exact = synthetic.synthetic_midlines(swimmer, 4.4, 40, 100, noise=0.0, **form)
+    return synthetic.synthetic_midlines(
+        swimmer, 4.4, 40, points, noise=noise, **form
+    ), exact
 
 
 def test_modes_cover_a_third_harmonic_that_the_points_resolve():
@@ -823,7 +835,7 @@ def test_trials_that_are_made_are_what_they_say():
     swimmer = Swimmer(Viscous(2.0), Backbone(24, length=0.4))
     plain = {"noise": 0.0, "spread": 0.0, "jitter": 0.0, "frequency": 2.0, "seed": 4}
     form = {"swing": 0.6, "waves": 1.3, "heading": 0.7, "bend": 0.3}
-    made = synthetic.made(swimmer, 2.2, 30, 24, **plain, **form)
+    made = synthetic.synthetic_midlines(swimmer, 2.2, 30, 24, **plain, **form)
     np.testing.assert_allclose(made.t, np.arange(67) / 60, atol=1e-12)
     np.testing.assert_array_equal(made.points, made.exact)
     z = made.exact @ [1.0, 1j]
@@ -855,7 +867,9 @@ def test_trials_that_are_made_are_what_they_say():
     np.testing.assert_allclose(np.abs(np.diff(z, axis=1)).sum(1), 1.0, atol=0.01)
 
     swimmer = Swimmer(Viscous(2.0), Backbone(6))
-    many = lambda **other: synthetic.made(swimmer, 40, 8, 6, **{**plain, **other})
+    many = lambda **other: synthetic.synthetic_midlines(
+        swimmer, 40, 8, 6, **{**plain, **other}
+    )
     still, off = many(), many(noise=0.02)
     np.testing.assert_array_equal(still.exact, off.exact)
     assert (off.points - still.points).std() == pytest.approx(0.02, rel=0.03)
@@ -880,7 +894,7 @@ def test_trials_that_are_made_are_what_they_say():
         (found[4:] * found[:-4]).mean(0) / (found**2).mean(0), math.exp(-1), atol=0.2
     )  # half a cycle
     with pytest.raises(Refusal, match="frames"):
-        synthetic.made(swimmer, 3.0, 7, 6, **plain)
+        synthetic.synthetic_midlines(swimmer, 3.0, 7, 6, **plain)
     usual = {
         "swing": 0.9,
         "waves": 1.1,
@@ -890,8 +904,12 @@ def test_trials_that_are_made_are_what_they_say():
         "jitter": 0.02,
         "heading": 0.5,
     }
-    wanted = synthetic.made(swimmer, 8.0, 40, 30, **usual, bend=0.0, seed=0)
-    np.testing.assert_array_equal(synthetic.made(swimmer).points, wanted.points)
+    wanted = synthetic.synthetic_midlines(
+        swimmer, 8.0, 40, 30, **usual, bend=0.0, seed=0
+    )
+    np.testing.assert_array_equal(
+        synthetic.synthetic_midlines(swimmer).points, wanted.points
+    )
 
 
 def one_cycle(swimmer, start, swing, waves, bend):

@@ -40,7 +40,7 @@ class SyntheticTrial(NamedTuple):
         )
 
 
-def made(
+def synthetic_midlines(
     system: Any, cycles: float = 8.0, frames: int = 40, points: int = 30, *, swing: float = 0.9, waves: float = 1.1,
     frequency: float = 1.0, noise: float = 0.01, spread: float = 0.05, jitter: float = 0.02, heading: float = 0.5,
     bend: float = 0.0, third: float = 0.0, memory: float = MEMORY, seed: int = 0,
