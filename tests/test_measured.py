@@ -450,7 +450,7 @@ def test_pieces_of_a_long_spline_are_the_whole(monkeypatch):
         size=(1300, 2)
     )
     whole = smooth.smoothed(t, rows, 1.0)
-    monkeypatch.setattr(smooth, "PIECE", 400)
+    monkeypatch.setattr(smooth, "ROWS_PER_PIECE", 400)
     parts = smooth.smoothed(t, rows, 1.0)
     for a, b in (
         (whole.values, parts.values),
@@ -1078,7 +1078,7 @@ def test_cycles_that_do_not_vary_tell_the_displacement_and_no_more(viscous, tmp_
 def test_cycles_that_differ_in_size_alone_tell_the_slope_along_the_gait(
     viscous, monkeypatch
 ):
-    monkeypatch.setattr(regression, "varied", lambda *_: regression.SHAPES)
+    monkeypatch.setattr(regression, "variation", lambda *_: regression.SHAPES)
     rng, t = np.random.default_rng(1), np.arange(50 * 160 + 1) / 160
     size = CubicSpline(np.arange(52), 1 + 0.1 * rng.normal(size=52))
     unit, rate = (
@@ -2311,7 +2311,7 @@ def test_cycles_are_counted_in_blocks_and_their_errors_by_student(regressed):
 def test_columns_are_known_by_their_names(header, picked):
     header, picked = (tuple(x.split()) for x in (header, picked))
     picked = tuple(x for x in picked if x != "phase") if "time_s" in picked else picked
-    assert measured_log._picked("log.csv", 1, header, []) == picked
+    assert measured_log._pick("log.csv", 1, header, []) == picked
 
 
 @pytest.mark.parametrize(
@@ -2330,5 +2330,5 @@ def test_columns_are_known_by_their_names(header, picked):
 )  # fmt: skip
 def test_columns_that_are_not_there_are_named(header, columns, said):
     with pytest.raises(Refusal) as found:
-        measured_log._picked("log.csv", 3, tuple(header.split()), columns.split())
+        measured_log._pick("log.csv", 3, tuple(header.split()), columns.split())
     assert str(found.value).startswith(said)

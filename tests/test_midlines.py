@@ -1001,7 +1001,7 @@ def test_the_variances_of_cycles_have_their_likelihood(constant):
         np.stack([white[k] @ values[:, k] for k in range(2)]), drawn
     )
     exact += (1 - exact) * constant
-    found, by_cycles = intervals._of_cycles(values, noise, constant)
+    found, by_cycles = intervals._cycle_variances(values, noise, constant)
     for k, known in enumerate(knowns):
         scatter, same = (
             values[:, k].var(ddof=1),
@@ -1009,7 +1009,7 @@ def test_the_variances_of_cycles_have_their_likelihood(constant):
         )
         prior = intervals.TRIED * scatter / (intervals.TRIED * scatter + same)
         prior = [exact, *((1 - exact) * prior / prior.sum())]
-        for correlation in intervals.ALIKE:
+        for correlation in intervals.CORRELATIONS:
             alike = correlation ** apart.astype(float)
             for v, p in zip([0.0, *(intervals.TRIED * scatter)], prior):
                 covariance = contrasts.T @ (known + v * alike) @ contrasts
@@ -1020,10 +1020,10 @@ def test_the_variances_of_cycles_have_their_likelihood(constant):
                     )
                 )
                 variances.append(v * alike.mean())
-    weights = np.reshape(weights, (2, len(intervals.ALIKE), -1))
+    weights = np.reshape(weights, (2, len(intervals.CORRELATIONS), -1))
     # Each quantity has the evidence of the other twice, as three deviations move both.
     evidence = weights.sum(-1)
-    share = np.array([*intervals.ALIKE.values()]) * evidence[::-1] ** 2
+    share = np.array([*intervals.CORRELATIONS.values()]) * evidence[::-1] ** 2
     weights = (weights * share[..., None]).reshape(2, -1).T
     np.testing.assert_allclose(found, weights / weights.sum(0), atol=1e-7)
     np.testing.assert_allclose(by_cycles, np.reshape(variances, (2, -1)).T, rtol=1e-9)
@@ -1047,7 +1047,7 @@ def test_an_interval_has_its_share_of_the_mixture_of_normals():
         left = np.maximum((2 * change - moved.mean(0)) ** 2 - moved.var(0, ddof=1), 0)
         np.testing.assert_allclose(found.smoothing, np.sqrt(left), rtol=1e-12)
         assert (found.smoothing > 0).sum() == 2
-        weights, by_cycles = intervals._of_cycles(pseudo, noise, 0.2)
+        weights, by_cycles = intervals._cycle_variances(pseudo, noise, 0.2)
         known = by_noise + left
         inside = 2 * norm.cdf(found.half_width / np.sqrt(by_cycles + known)) - 1
         np.testing.assert_allclose((weights * inside).sum(0), level, atol=1e-9)

@@ -1,13 +1,18 @@
-"""Files of tracked points, CSV: a row a point, a row a frame, or as DeepLabCut and SLEAP write them.
+"""Files of tracked points, CSV: a row a point, a row a frame, or as DeepLabCut and
+SLEAP write them.
 
-    t,point,x,y[,likelihood]          a row for each point of each frame, in any order of the rows
-    t,x,y                             the same without numbers; every frame has all points, in order
+    t,point,x,y[,likelihood]          a row for each point of each frame, in any order
+    of the rows
+    t,x,y                             the same without numbers; every frame has all
+    points, in order
     t,x1,y1,x2,y2,... (nose_x, nose.y, y_nose, ... likewise)   a row for each frame
-    scorer / bodyparts / coords       three header rows, then a row for each frame (DeepLabCut)
+    scorer / bodyparts / coords       three header rows, then a row for each frame
+    (DeepLabCut)
 
-frame may stand for t. A name may end in a unit: x_mm, y (px), time_ms. Empty cells and nan are points that the tracker
-did not find. DeepLabCut and SLEAP count pixels, and y downwards. The score of SLEAP, and whatever is not called
-likelihood, is no probability, and has no limit unless one is asked for."""
+frame may stand for t. A name may end in a unit: x_mm, y (px), time_ms. Empty cells and
+nan are points that the tracker did not find. DeepLabCut and SLEAP count pixels, and y
+downwards. The score of SLEAP, and whatever is not called likelihood, is no probability,
+and has no limit unless one is asked for."""
 
 from __future__ import annotations
 
@@ -71,9 +76,10 @@ WHAT = "give a CSV file with a header such as t,point,x,y or t,x1,y1,x2,y2, or o
 
 
 class Table(NamedTuple):
-    """A file as a table of frames: t (F,), values (F, P, 3) of x, y and score, names and lines (F, P), the unit that the
-    header says, whether t is a time, columns that are not used, the program that wrote it, "" if none is known, the
-    least score that it takes for a point, and notes."""
+    """A file as a table of frames: t (F,), values (F, P, 3) of x, y and score, names
+    and lines (F, P), the unit that the header says, whether t is a time, columns that
+    are not used, the program that wrote it, "" if none is known, the least score that
+    it takes for a point, and notes."""
 
     t: np.ndarray
     values: np.ndarray
@@ -88,8 +94,8 @@ class Table(NamedTuple):
 
 
 def kind_of(header: Sequence[str]) -> str:
-    """Return "midlines" for the header of points along a body, "log" for that of joint angles, "" where it does not
-    say."""
+    """Return "midlines" for the header of points along a body, "log" for that of joint
+    angles, "" where it does not say."""
     bare = {split_unit(name)[0] for name in header}
     joints = [name for name in bare if JOINT.fullmatch(plain(name))]
     if is_midlines(header):
@@ -100,7 +106,8 @@ def kind_of(header: Sequence[str]) -> str:
 
 
 def is_midlines(header: Sequence[str]) -> bool:
-    """Return whether the header of a file is that of points along a body, not of a log of joint angles."""
+    """Return whether the header of a file is that of points along a body, not of a log
+    of joint angles."""
     bare = {split_unit(name)[0] for name in header}
     if (
         {*header[:1]} & {*STACKED}
@@ -123,11 +130,13 @@ def read(
 ) -> Trial:  # fmt: skip
     """Return the trial in a file; Refusal, with the line, for one that cannot be read.
 
-    points: names of the points to take, in the order of the body. units: of x and y, m, cm, mm, um, px or BL, where
-    the header does not say. scale: mm per pixel. fps: frames per second, of a file that counts frames. least_score:
-    points of a lower score are taken for missing; by default of a likelihood below `LEAST_SCORE`, and no other score.
-    y: up, or down as in images, which pixels are taken for. body_length: in ``units``, where the points do not reach
-    both ends. individual: the animal to take, of several."""
+    points: names of the points to take, in the order of the body. units: of x and y, m,
+    cm, mm, um, px or BL, where the header does not say. scale: mm per pixel. fps:
+    frames per second, of a file that counts frames. least_score: points of a lower
+    score are taken for missing; by default of a likelihood below `LEAST_SCORE`, and no
+    other score. y: up, or down as in images, which pixels are taken for. body_length:
+    in ``units``, where the points do not reach both ends. individual: the animal to
+    take, of several."""
     for name, value, low, high in (
         ("scale", scale, 1e-9, 1e6),
         ("fps", fps, 1e-6, 1e6),
@@ -257,7 +266,8 @@ def _refuse_labelled(source: Rows) -> None:
 
 
 def _of_one_animal(source: Rows, individual: str | None) -> Rows:
-    """Return the rows of one animal, where a column names animals; Refusal if there are several and none is named."""
+    """Return the rows of one animal, where a column names animals; Refusal if there are
+    several and none is named."""
     header = source.header[1]
     columns = [k for k, name in enumerate(header) if plain(name) in ANIMALS]
     if not columns:
@@ -301,7 +311,8 @@ def _refuse_animals(source: Rows, frame: np.ndarray, program: str = "") -> None:
 
 
 def _pairs(header: Sequence[str]) -> dict[str, dict[str, int]]:
-    """Return the columns of x, y and likelihood by the names of points that have both x and y."""
+    """Return the columns of x, y and likelihood by the names of points that have both x
+    and y."""
     found: dict[str, dict[str, int]] = {}
     for k, name in enumerate(header):
         bare = split_unit(name)[0]
@@ -318,7 +329,8 @@ def _pairs(header: Sequence[str]) -> dict[str, dict[str, int]]:
 
 
 def _clock(header: Sequence[str], place: str) -> tuple[int, str, bool]:
-    """Return the column of the time, its unit, and whether it is a time and not a count of frames."""
+    """Return the column of the time, its unit, and whether it is a time and not a count
+    of frames."""
     for k, word in enumerate(header):
         bare, unit = split_unit(word)
         if plain(bare) in TIMES:
@@ -339,8 +351,8 @@ def _clock(header: Sequence[str], place: str) -> tuple[int, str, bool]:
 
 
 def _cells(source: Rows, picks: Sequence[int]) -> np.ndarray:
-    """Return the numbers of columns (N, picks), nan where a cell is empty; Refusal with line and column of anything
-    else."""
+    """Return the numbers of columns (N, picks), nan where a cell is empty; Refusal with
+    line and column of anything else."""
     width = len(source.words)
     values = np.full((len(source.rows), len(picks)), np.nan)
     for k, (line, text) in enumerate(source.rows):
@@ -523,10 +535,11 @@ def _framed(
 
 
 def _deeplabcut(source: Rows, individual: str | None) -> Table:
-    """Return the table of a file of DeepLabCut: the first cell of each header row says what it holds.
+    """Return the table of a file of DeepLabCut: the first cell of each header row says
+    what it holds.
 
-    Individuals without a point, and what it calls single, points that belong to no animal, are left out unless they
-    are named."""
+    Individuals without a point, and what it calls single, points that belong to no
+    animal, are left out unless they are named."""
     heads = {source.words[0].lower(): list(source.words[1:])}
     for _, text in source.rows[:3]:
         words = source.cells(text)
@@ -565,7 +578,8 @@ def _deeplabcut(source: Rows, individual: str | None) -> Table:
 def _chosen(
     source: Rows, animals: Sequence[str], individual: str | None
 ) -> tuple[str, list[str]]:
-    """Return the individual to take, and a note on those that are left out. animals: of each column but the first."""
+    """Return the individual to take, and a note on those that are left out. animals: of
+    each column but the first."""
     names = list(dict.fromkeys(animals))
     if individual is not None:
         return choose("``individual``", individual, names), []
@@ -632,7 +646,8 @@ def _check(table: Table, name: str) -> None:
 def _unit(
     table: Table, name: str, units: str | None, scale: float | None
 ) -> tuple[str, float, list[str]]:
-    """Return the unit of lengths, m or BL or "", that of the file in it, and what was taken for granted."""
+    """Return the unit of lengths, m or BL or "", that of the file in it, and what was
+    taken for granted."""
     if units and table.unit and units != table.unit and table.unit != "px":
         raise Refusal(
             f"x and y are in {table.unit} by the names of their columns",
