@@ -252,10 +252,9 @@ def forces(
     straight body, or in N where its sizes are known. unit: that of forces, in place of sizes. Refusal for a system without a
     body in a medium."""
     system, gait = _divided(scene).system, scene.gait.cycle(scene.numerics.phases)
-    body = loaded(_divided(scene), WHAT)
-    bent, elements = bends(loaded(scene, WHAT), *gait), body.elements(*gait)
+    bent, elements = bends(loaded(scene, WHAT), *gait), system.elements(*gait)
     cycle = system.run(*gait, work=True)
-    work = type(cycle.work)(*(x / body.axial_drag for x in cycle.work))
+    work = type(cycle.work)(*(x / system.axial_drag for x in cycle.work))
     length = 2 * elements.half[:, 0]
     points = np.cumsum(length)[:-1]
     moment = work.bending_moment[:, np.searchsorted(points, bent.s - 1e-9)]

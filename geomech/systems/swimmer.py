@@ -1,6 +1,6 @@
 """A body that swims in a medium by resistive force theory, solved by rft.
 
-Abilities that depend on its parts, such as power along the body or uncertain
+Abilities that depend on its parts, such as uncertain
 parameters, are classes below `Swimmer`; `Swimmer.capability` returns them."""
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ from geomech.systems.capabilities import (
     BalanceSize,
     Diagnosed,
     Drawable,
-    Loaded,
     Part,
     Recorded,
     Stepped,
@@ -201,8 +200,6 @@ class Swimmer:
             return None
         if kind is Stepped:
             return _RepeatedCycles(self) if self.traits.steps else None
-        if kind is Loaded:
-            return _Loads(self)
         if kind in (Diagnosed, Recorded, Symbolic):
             return _Facts(self)
         return self if isinstance(self, kind) else None
@@ -292,6 +289,30 @@ class Swimmer:
         return rft.work_done(
             self.medium, self.body, alpha, alphadot, xi, **self._settings()
         )
+
+    def elements(self, alpha: ArrayLike, alphadot: ArrayLike) -> rft.bodies.Elements:
+        """Return the elements (n, N) of the body at shapes and rates (N, d), in a fixed
+        frame."""
+        return self.body.motion(unmasked("x", alpha).T, unmasked("x", alphadot).T)
+
+    def subdivided(self) -> Swimmer:
+        """Return the swimmer with its body cut into short elements."""
+        pieces = max(PIECES, self.balance_size.pieces)
+        return dataclasses.replace(self, body=subdivide(self.body, pieces))
+
+    @property
+    def axial_drag(self) -> float:
+        """Drag on the whole straight body along itself, in the law's unit of force."""
+        return assemble(self.medium, self.body).axial_drag
+
+    def axial_stress(self, depth: float) -> float | None:
+        """Return the axial drag over projected area, Pa, at a depth, m; None unless the
+        medium is a measured one."""
+        for entry in CATALOGUE.values():
+            if entry.medium == self.medium:
+                stress = entry.axial_stress
+                return None if stress is None else stress * depth / DEPTH
+        return None
 
     def time_steps(
         self,
@@ -482,40 +503,6 @@ class _RepeatedCycles:
         steps = swimmer.time_steps(alpha, alphadot, before + cycles, path=True)
         poses_after = steps.checked().path[before * len(alpha) :]
         return rft.se2.compose(rft.se2.inverse(poses_after[:1]), poses_after)
-
-
-@dataclass(frozen=True)
-class _Loads:
-    """`Loaded`: a swimmer under forces along its body."""
-
-    swimmer: Swimmer
-
-    @property
-    def axial_drag(self) -> float:
-        """Drag on the whole straight body along itself, in the law's unit of force."""
-        return assemble(self.swimmer.medium, self.swimmer.body).axial_drag
-
-    def axial_stress(self, depth: float) -> float | None:
-        """Return the axial drag over projected area, Pa, at a depth, m; None unless the
-        medium is a measured one."""
-        for entry in CATALOGUE.values():
-            if entry.medium == self.swimmer.medium:
-                stress = entry.axial_stress
-                return None if stress is None else stress * depth / DEPTH
-        return None
-
-    def elements(self, alpha: ArrayLike, alphadot: ArrayLike) -> rft.bodies.Elements:
-        """Return the elements (n, N) of the body at shapes and rates (N, d), in a fixed
-        frame."""
-        shapes = unmasked("x", alpha).T
-        rates = unmasked("x", alphadot).T
-        return self.swimmer.body.motion(shapes, rates)
-
-    def subdivided(self) -> Swimmer:
-        """Return the swimmer with its body cut into short elements."""
-        pieces = max(PIECES, self.swimmer.balance_size.pieces)
-        body = subdivide(self.swimmer.body, pieces)
-        return dataclasses.replace(self.swimmer, body=body)
 
 
 @dataclass(frozen=True)

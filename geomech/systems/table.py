@@ -73,8 +73,8 @@ class Table:
     file (-): in a scene from a file relative to that file's folder, else to the current
     one. sign (-): "+" or "-" for xi = + or - A alphadot in the file; order (-):
     "ndgrid" or "meshgrid"; if left out as the file says or shows (`tables.load`).
-    sha256 (-): of the file, filled in if left out; given, the file must have it. frame
-    (-): of xi, "mean", "link-1" ... or "minimum-perturbation", the file's own if left
+    sha256 (-): of the file, filled in if left out; given, the file must have it.
+    frame (-): of xi, "mean", "link-1" ... or "minimum-perturbation", the file's own if left
     out; another frame takes a body, from the file or the scene.
 
     body: the chain of the table, in the frame of its A, where the file does not say it.
