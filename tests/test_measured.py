@@ -17,7 +17,6 @@ from scipy.io import loadmat
 from scipy.special import ive
 from tabled import tabled
 
-import geomech
 import rft
 from figures import measured_gait
 from geomech import gaits, measured
@@ -45,6 +44,7 @@ from geomech.measured import fit as fitted_parts
 from geomech.measured import log as measured_log
 from geomech.measured import residual as measured_residual
 from geomech.measured import spread as measured_spread
+from geomech.optimisation import optimise
 from geomech.scenes import Scene, load
 from geomech.studies import fields
 from geomech.studies.single import single
@@ -872,7 +872,7 @@ def test_what_the_data_do_not_reach_is_refused(field):
     ):
         study.poses("area")
     with pytest.raises(Refusal, match="no gait but one to search"):
-        geomech.optimisation.optimise(scene, "displacement")
+        optimise(scene, "displacement")
     tube = study.fitted
     shapes = np.stack(np.meshgrid(*tube.axes, indexing="ij"), -1)
     np.testing.assert_array_equal(np.isnan(tube.A[0, 0]), tube.reach(shapes) > 1)

@@ -937,7 +937,7 @@ def test_the_value_that_closes_a_gap_is_a_root(
             raise Refusal("beyond the bounds")
         return x**power - level**power
 
-    found = predicted._closed("C", "rad", value, gap, 0.01, None, 1.0)
+    found = predicted._closed("C", "rad", value, gap, 0.01, 1.0)
     assert (found.name, found.unit, found.present) == ("C", "rad", value)
     slope = abs(power) * level ** (power - 1)
     wanted = (root, 0.01 / slope) if math.isfinite(root) else (math.nan, math.nan)
@@ -953,14 +953,14 @@ def test_the_value_that_closes_a_gap_is_a_root(
 
 def test_of_several_roots_the_one_nearest_to_the_present_value_closes_a_gap():
     wave = lambda x: math.sin(math.pi * math.log2(x) / 3)  # zero at powers of 8
-    assert predicted._closed(
-        "C", "-", 3.0, wave, 0.1, None, 1.0
-    ).value == pytest.approx(8.0, rel=2e-3)
-    assert predicted._closed(
-        "C", "-", 2.0, wave, 0.1, None, 1.0
-    ).value == pytest.approx(1.0, rel=2e-3)
+    assert predicted._closed("C", "-", 3.0, wave, 0.1, 1.0).value == pytest.approx(
+        8.0, rel=2e-3
+    )
+    assert predicted._closed("C", "-", 2.0, wave, 0.1, 1.0).value == pytest.approx(
+        1.0, rel=2e-3
+    )
     flat = lambda size: predicted._closed(
-        "C", "-", 2.0, lambda x: size * wave(x), 0.1, None, 0.5
+        "C", "-", 2.0, lambda x: size * wave(x), 0.1, 0.5
     )
     moves = np.ptp([wave(2 * x) for x in predicted.FACTORS])
     assert flat(0.49e-4 / moves) is None and flat(0.51e-4 / moves) is not None
@@ -970,7 +970,7 @@ def test_of_several_roots_the_one_nearest_to_the_present_value_closes_a_gap():
             raise Refusal("beyond the bounds")
         return wave(x)
 
-    assert predicted._closed("C", "-", 2.0, alone, 0.1, None, 1.0) is None
+    assert predicted._closed("C", "-", 2.0, alone, 0.1, 1.0) is None
 
 
 @pytest.mark.parametrize("constant", [0.2, 0.6])
@@ -1235,8 +1235,8 @@ def test_cycles_are_of_one_pace(longer, said):
 def test_a_cycle_has_a_gap_where_an_eighth_of_it_has_no_frame():
     t = np.arange(0, 5, 0.1)
     trial = dataclasses.replace(line_of(50), t=t)
-    assert not fit._gap(trial, 1.02, 1.9)
-    assert fit._gap(trial, 1.02, 1.8)
+    assert not fit._has_gap(trial, 1.02, 1.9)
+    assert fit._has_gap(trial, 1.02, 1.8)
     for out, start, end, gap in (
         (12, 1.02, 2.7, False),
         (12, 1.02, 2.6, True),
@@ -1244,7 +1244,8 @@ def test_a_cycle_has_a_gap_where_an_eighth_of_it_has_no_frame():
         (10, 0.96, 2.0, True),
     ):
         assert (
-            fit._gap(dataclasses.replace(trial, t=np.delete(t, out)), start, end) == gap
+            fit._has_gap(dataclasses.replace(trial, t=np.delete(t, out)), start, end)
+            == gap
         )
 
 
