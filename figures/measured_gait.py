@@ -26,7 +26,7 @@ def compute(
     scene: str = "three-link-viscous", cycles: int = 60, seed: int = 1
 ) -> Result:
     """Return the fit of a synthetic log."""
-    log = synthetic.made(
+    log = synthetic.synthetic_log(
         load(scene).system.velocity, GAIT, cycles, spread=0.05, noise=1e-3, seed=seed
     )
     lines = np.arange(len(log.t)) + 2

@@ -12,7 +12,7 @@ from geomech.core.variables import Result
 from geomech.measured.midlines.fit import fit_midlines
 from geomech.measured.midlines.predicted import compare
 from geomech.measured.midlines.results import of_trial
-from geomech.measured.midlines.synthetic import made
+from geomech.measured.midlines.synthetic import synthetic_midlines
 from geomech.results import show
 from geomech.systems import Swimmer
 from geomech.systems.swimmer import MEDIA
@@ -24,8 +24,10 @@ def compute(
 ) -> Result:
     """Return the kinematics of a synthetic trial in loose beads, with the prediction of a medium."""
     swimmer = Swimmer(MEDIA["glass-0.3mm-loose"], Backbone(40))
-    fit = fit_midlines(made(swimmer, cycles, seed=seed).trial("trial.csv"))
     return of_trial(fit, compare(fit, MEDIA[medium]))
+    fit = fit_midlines(
+        synthetic_midlines(swimmer, cycles, seed=seed).trial("trial.csv")
+    )
 
 
 def draw(numbers: Result):

@@ -13,7 +13,11 @@ from geomech.scenes.frames import framed
 from geomech.studies import cost, effort, fields
 from geomech.studies.study import Study
 from geomech.systems import NoSlipSnake, Swimmer, Table
-from geomech.systems.capabilities import refined, velocity_and_power
+from geomech.systems.capabilities import (
+    refined,
+    stored_table,
+    velocity_and_power,
+)
 from rft import (
     BodyInertia,
     Chain,
@@ -207,7 +211,7 @@ def test_the_file_has_what_a_change_of_shape_costs(medium, tmp_path):
     fields.save_connection(tmp_path / "made.nc", study)
     assert np.array_equal(Connection.load(tmp_path / "made.nc").A, study.fitted.A)
     table = Table(str(tmp_path / "made.nc"))
-    own, back = study.metric, table.table("metric")
+    own, back = study.metric, stored_table(table, "metric")
     name = "M" if medium is FLUID else "coefficients"
     assert np.array_equal(
         getattr(back, name), getattr(own, name)

@@ -29,7 +29,8 @@ from geomech.scenes.kinds import load_file, register
 from geomech.scenes.schema import schema
 from geomech.studies import estimate
 from geomech.studies.study import Study
-from geomech.systems import Premise, Solver, Swimmer
+from geomech.systems import Premise, Solver, Swimmer, capability
+from geomech.systems.capabilities import Recorded
 from rft import Backbone, Chain, Coulomb, EndCaps, Granular, Viscous, body_velocity
 from rft.core.refusal import Refusal
 from rft.core.registry import REGISTRIES
@@ -164,7 +165,7 @@ def test_a_law_of_traction_alone_takes_backbones_and_says_its_rule():
     assert fine.balance_size.evaluations == 24 * exact.balance_size.evaluations
     assert "gauss:24" in explained(Scene(fine, Sine(elements=8), SMALL))
     assert fine.refined().solver.loads == "gauss:48"
-    assert fine.about()["loads"] == "gauss:24"
+    assert capability(fine, Recorded).about()["loads"] == "gauss:24"
     told_otherwise = fine.with_solver(Solver(loads="midpoint:10"))
     assert (notes(told_otherwise), told_otherwise.refined().solver.loads) == (
         (),

@@ -17,7 +17,6 @@ from scipy.io import loadmat
 from scipy.special import ive
 from tabled import of_json, tabled
 
-import geomech
 import rft
 from figures import measured_gait
 from geomech import gaits, measured
@@ -46,6 +45,7 @@ from geomech.measured import fit as fitted_parts
 from geomech.measured import log as measured_log
 from geomech.measured import residual as measured_residual
 from geomech.measured import spread as measured_spread
+from geomech.optimisation import optimise
 from geomech.results.measured import scene_text
 from geomech.scenes import Scene, load
 from geomech.studies import fields
@@ -53,6 +53,7 @@ from geomech.studies.single import single
 from geomech.studies.study import Study
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import length_unit
+from geomech.systems.capabilities import stored_table, table_error
 from rft.core.refusal import Refusal
 from rft.formulas import se2
 
@@ -83,7 +84,7 @@ def log_of(made, name="log.csv"):
 def fitted(velocity, gait=GAIT, fit=None, **asked):
     asked = {"cycles": 40, "samples": 40, **asked}
     return measured.fit_log(
-        log_of(synthetic.made(velocity, gait, **asked)), **(fit or {})
+        log_of(synthetic.synthetic_log(velocity, gait, **asked)), **(fit or {})
     )
 
 
@@ -351,7 +352,7 @@ def test_as_many_harmonics_as_the_connection_asks_for_and_two_more(wave, kept):
         0.2 + 0.1 * alongside(alpha) * np.array([[1.0, 0.4], [0.3, -0.7], [0.5, 0.2]])
     )
     velocity = lambda alpha, alphadot: np.einsum("...ij,...j->...i", A(alpha), alphadot)
-    made = synthetic.made(
+    made = synthetic.synthetic_log(
         velocity,
         gaits.Circle(amplitude=1.0),
         cycles=30,
@@ -365,7 +366,7 @@ def test_as_many_harmonics_as_the_connection_asks_for_and_two_more(wave, kept):
 
 def test_where_and_when_a_log_begins_does_not_matter(viscous):
     """Nor does the unit of time: A is what alphadot is multiplied by."""
-    made = synthetic.made(viscous, GAIT, cycles=20, samples=40, seed=1)
+    made = synthetic.synthetic_log(viscous, GAIT, cycles=20, samples=40, seed=1)
     one = measured.fit_log(log_of(made), harmonics=4)
     there = se2.compose(np.array([3.0, -2.0, 2.5]), made.pose)
     other = measured.fit_log(
@@ -377,7 +378,7 @@ def test_where_and_when_a_log_begins_does_not_matter(viscous):
 
 
 def test_a_backward_log_has_the_same_connection(viscous):
-    made = synthetic.made(viscous, GAIT, cycles=30, samples=32, seed=1)
+    made = synthetic.synthetic_log(viscous, GAIT, cycles=30, samples=32, seed=1)
     back = made._replace(
         t=made.t[-1] - made.t[::-1], alpha=made.alpha[::-1], pose=made.pose[::-1]
     )
@@ -393,11 +394,13 @@ def test_a_backward_log_has_the_same_connection(viscous):
 
 
 def test_the_phase_is_that_of_the_gait_and_grows_evenly(viscous):
-    made = synthetic.made(viscous, GAIT, cycles=40, samples=40, jitter=0.05, seed=4)
+    made = synthetic.synthetic_log(
+        viscous, GAIT, cycles=40, samples=40, jitter=0.05, seed=4
+    )
     log = log_of(made)
     period = cycles.period(log)
     assert abs(period - 1) < 0.02
-    at, loop = cycles.phased(
+    at, loop = cycles.phases(
         log, smooth.smoothed(made.t, made.alpha, period), period, 4
     )
     inner = slice(40, -40)
@@ -447,7 +450,7 @@ def test_pieces_of_a_long_spline_are_the_whole(monkeypatch):
         size=(1300, 2)
     )
     whole = smooth.smoothed(t, rows, 1.0)
-    monkeypatch.setattr(smooth, "PIECE", 400)
+    monkeypatch.setattr(smooth, "ROWS_PER_PIECE", 400)
     parts = smooth.smoothed(t, rows, 1.0)
     for a, b in (
         (whole.values, parts.values),
@@ -464,9 +467,12 @@ def test_errors_of_neighbours_add_up_as_bartlett_has_it():
     wanted = (x**2).sum(0) + 2 * sum(
         (1 - k / lags) * (x[k:] * x[:-k]).sum(0) for k in range(1, lags)
     )
-    np.testing.assert_allclose((regression.lagged(x) ** 2).sum(0), wanted)
-    assert len(regression.lagged(x[:10])) == 10
-    assert len(regression.lagged(np.tile(x, (5, 1)))) == 200 + regression.LAGS - 1
+    np.testing.assert_allclose((regression.newey_west_terms(x) ** 2).sum(0), wanted)
+    assert len(regression.newey_west_terms(x[:10])) == 10
+    assert (
+        len(regression.newey_west_terms(np.tile(x, (5, 1))))
+        == 200 + regression.LAGS - 1
+    )
 
 
 def test_sums_that_noise_makes_negative_are_solved_all_the_same():
@@ -591,7 +597,7 @@ def tied(rows, noise, spread=0.05):
     whole = np.vstack([np.eye(len(rows[0])), rows])
     gait = GAIT if len(rows[0]) == 2 else travelling(len(rows[0]), 2)
     velocity = lambda alpha, rate: bent(len(whole))(alpha @ whole.T, rate @ whole.T)
-    made = synthetic.made(
+    made = synthetic.synthetic_log(
         velocity,
         gait,
         cycles=20,
@@ -652,7 +658,7 @@ def test_joints_that_follow_from_others_are_named(noise, rows, said):
 @pytest.mark.parametrize("spread", [0.05, 0.0])
 def test_a_wave_of_few_harmonics_is_no_such_log(joints, harmonics, spread):
     """Those of one harmonic lie in a plane; what does not vary about them tells A along them, whatever is left out."""
-    made = synthetic.made(
+    made = synthetic.synthetic_log(
         bent(joints), travelling(joints, harmonics), 24, 20, spread, seed=1
     )
     f = measured.fit_log(log_of(made), harmonics=1 if spread else None)
@@ -692,7 +698,7 @@ def test_a_wave_of_few_harmonics_is_no_such_log(joints, harmonics, spread):
 def test_no_more_is_fitted_than_cycles_tell(joints, harmonics, asked, across, wide):
     """Intervals cover the truth, and are no wider than a hundredth or two of a displacement of 0.3."""
     velocity, gait = bent(joints), travelling(joints, harmonics)
-    made = synthetic.made(
+    made = synthetic.synthetic_log(
         velocity,
         gait,
         **{"cycles": 40, "samples": 30, "spread": 0.05, "seed": 1, **asked},
@@ -866,7 +872,7 @@ def test_what_the_data_do_not_reach_is_refused(field):
     ):
         study.poses("area")
     with pytest.raises(Refusal, match="no gait but one to search"):
-        geomech.optimisation.optimise(scene, "displacement")
+        optimise(scene, "displacement")
     tube = study.fitted
     shapes = np.stack(np.meshgrid(*tube.axes, indexing="ij"), -1)
     np.testing.assert_array_equal(np.isnan(tube.A[0, 0]), tube.reach(shapes) > 1)
@@ -965,7 +971,9 @@ def test_what_an_older_file_does_not_have_is_told_all_the_same(field, tmp_path):
     )
     old, now = Table(tmp_path / "old.nc"), Table(field / "field.nc")
     assert old.stored.A_error is None
-    np.testing.assert_allclose(old.table("A_error"), now.table("A_error"), rtol=1e-12)
+    np.testing.assert_allclose(
+        stored_table(old, "A_error"), stored_table(now, "A_error"), rtol=1e-12
+    )
 
 
 def test_lengths_and_signs_of_a_field(usual, short, field, tmp_path):
@@ -980,8 +988,8 @@ def test_lengths_and_signs_of_a_field(usual, short, field, tmp_path):
         rtol=1e-9,
     )
     np.testing.assert_allclose(
-        two.table_error(*cycle),
-        Table(field / "field.nc").table_error(*cycle) * [0.5, 1],
+        table_error(two, *cycle),
+        table_error(Table(field / "field.nc"), *cycle) * [0.5, 1],
     )
     metres = measured.fit_log(log_of(short), body_length=0.3, harmonics=3)
     save_field(tmp_path / "m.nc", metres)
@@ -1070,7 +1078,7 @@ def test_cycles_that_do_not_vary_tell_the_displacement_and_no_more(viscous, tmp_
 def test_cycles_that_differ_in_size_alone_tell_the_slope_along_the_gait(
     viscous, monkeypatch
 ):
-    monkeypatch.setattr(regression, "varied", lambda *_: regression.SHAPES)
+    monkeypatch.setattr(regression, "variation", lambda *_: regression.SHAPES)
     rng, t = np.random.default_rng(1), np.arange(50 * 160 + 1) / 160
     size = CubicSpline(np.arange(52), 1 + 0.1 * rng.normal(size=52))
     unit, rate = (
@@ -1120,7 +1128,7 @@ def written(path, made, names=NAMES, change=None):
 
 @pytest.fixture(scope="module")
 def short(viscous):
-    return synthetic.made(viscous, GAIT, cycles=14, samples=30, seed=1)
+    return synthetic.synthetic_log(viscous, GAIT, cycles=14, samples=30, seed=1)
 
 
 def changed(column, value, rows=slice(None)):
@@ -1304,7 +1312,7 @@ def test_columns_in_any_order_and_unit_tell_the_same(short, tmp_path):
 @pytest.fixture(scope="module")
 def moving():
     """Of a body that is no table, and turns and moves by a fifth of what its joints do."""
-    return synthetic.made(bent(2), GAIT, cycles=14, samples=30, seed=1)
+    return synthetic.synthetic_log(bent(2), GAIT, cycles=14, samples=30, seed=1)
 
 
 def test_a_left_handed_pose_is_refused(moving):
@@ -1415,7 +1423,7 @@ def test_a_table_as_r_writes_it(short, tmp_path):
 
 
 def test_rows_at_uneven_times_tell_the_same(viscous):
-    made = synthetic.made(viscous, GAIT, cycles=40, samples=60, seed=1)
+    made = synthetic.synthetic_log(viscous, GAIT, cycles=40, samples=60, seed=1)
     keep = np.sort(
         np.random.default_rng(0).permutation(len(made.t))[: int(0.7 * len(made.t))]
     )
@@ -1497,7 +1505,7 @@ def test_logs_that_are_made_are_what_they_say():
         "jitter": 0.0,
         "frequency": 2.0,
     }
-    made = synthetic.made(
+    made = synthetic.synthetic_log(
         lambda alpha, rate: rate @ A.T, GAIT, cycles=3, samples=30, **plain
     )
     np.testing.assert_allclose(made.t, np.arange(91) / 60, atol=1e-12)
@@ -1524,10 +1532,11 @@ def test_logs_that_are_made_are_what_they_say():
         "seed": 0,
     }
     for found, wanted in zip(
-        synthetic.made(second, GAIT), synthetic.made(second, GAIT, 60, 60, **usual)
+        synthetic.synthetic_log(second, GAIT),
+        synthetic.synthetic_log(second, GAIT, 60, 60, **usual),
     ):
         np.testing.assert_array_equal(found, wanted)
-    many = lambda **other: synthetic.made(
+    many = lambda **other: synthetic.synthetic_log(
         second, GAIT, cycles=300, samples=8, seed=3, **{**plain, **other}
     )
     still, off = many(), many(noise=0.03, pose_noise=0.07)
@@ -1556,10 +1565,12 @@ def test_logs_that_are_made_are_what_they_say():
 )
 def test_logs_that_cannot_be_made_are_refused(name, least):
     none = lambda alpha, rate: np.zeros((len(rate), 3))
-    synthetic.made(none, GAIT, **{"cycles": 3, "samples": 9, name: least})
+    synthetic.synthetic_log(none, GAIT, **{"cycles": 3, "samples": 9, name: least})
     for wrong in (least - 1, least + 0.5):
         with pytest.raises(Refusal, match=name):
-            synthetic.made(none, GAIT, **{"cycles": 3, "samples": 9, name: wrong})
+            synthetic.synthetic_log(
+                none, GAIT, **{"cycles": 3, "samples": 9, name: wrong}
+            )
 
 
 UNEVEN = Loop(np.array([[0.1, 0.7, 0.2], [-0.2, -0.1, 0.4]]))  # an ellipse
@@ -1586,7 +1597,7 @@ def test_what_is_not_known_across_a_gait_is_as_large_as_what_is_along_it():
         (regression.SHAPES, [(normal, 0, 1), (normal, 1, extent)]),
         (regression.NOTHING, [(normal, 0, 1), (normal, 1, extent), (rate, 1, extent)]),
     ):
-        errors = regression.unknown(UNEVEN, A, varies)
+        errors = regression.undetermined_errors(UNEVEN, A, varies)
         assert errors.shape == (3 * len(kinds), 3, 2, 2, 7)
         for error, (i, (direction, k, by)) in zip(
             errors, itertools.product(range(3), kinds)
@@ -1689,7 +1700,7 @@ def test_what_a_fit_leaves_is_split_into_its_mean_and_its_scatter_beyond_noise()
     xi = rate @ A[:, :, 0].T + mean + scatter[:, None] * sizes
     halves = tuple(xi + x[:, None] * noise for x in (one, other))
     samples = samples_of(EVEN, t, alpha, rate, xi, None, halves)
-    found = measured_residual.residual_of(
+    found = measured_residual.fit_residual(
         series_about(EVEN, A=A), samples, regression.RATES
     )
     square = (2 * 0.6) ** 2 + 0.4**2  # of the rates
@@ -1710,7 +1721,7 @@ def test_what_a_fit_leaves_is_split_into_its_mean_and_its_scatter_beyond_noise()
         found.standard_error, np.repeat(wanted[..., None], 64, -1), atol=1e-9
     )
     assert (wanted[:2] > 0).sum() >= 3
-    found = measured_residual.residual_of(
+    found = measured_residual.fit_residual(
         series_about(EVEN, A=A), samples, regression.SHAPES
     )
     np.testing.assert_allclose(
@@ -1750,7 +1761,7 @@ def test_harmonics_that_a_series_omits_are_as_large_as_its_upper_half():
     samples = samples_of(EVEN, t, EVEN.shape(t), EVEN.shape(t, 1), np.zeros((128, 3)))
     samples = samples._replace(xi=np.einsum("tij,tj->ti", series(A, t), samples.rate))
     samples = samples._replace(xi_halves=(samples.xi, samples.xi))
-    told = measured_residual.residual_of(
+    told = measured_residual.fit_residual(
         series_about(EVEN, A=A, errors=errors), samples, regression.SHAPES
     )
     np.testing.assert_allclose(
@@ -1774,7 +1785,7 @@ def test_the_phase_of_the_nearest_point_makes_a_varied_gait_too_large():
     extent = 2.5**2 * np.diag(variances)[..., None] * np.ones(64)
     turned = np.pi * ((0.6 - variances.mean() / 2 / 0.6) ** 2 - 0.6**2)
     np.testing.assert_allclose(
-        fitted_parts._outward(known, extent), [0, 0, turned], atol=1e-12
+        fitted_parts._outward_change(known, extent), [0, 0, turned], atol=1e-12
     )
     net, alpha, alphadot = fitted_parts._net(known)
     np.testing.assert_allclose(net, [0, 0, np.pi * 0.6**2], atol=1e-12)
@@ -1792,13 +1803,15 @@ def test_the_error_of_the_mean_gait_is_that_of_what_its_cycles_enclose():
     alpha = (1 + sizes[cycle] + 0.03)[:, None] * known.loop.shape(
         t
     )  # a mean gait off by as much in all is no error
-    found = fitted_parts._by_gait(
+    found = fitted_parts._error_by_gait(
         known, regression.Samples(t, cycle, alpha, alpha, alpha, (), ())
     )
     sizes -= sizes.mean()
     turned = np.pi * 0.6**2 * (2 * sizes + 0.1 * sizes**2) / 16
     np.testing.assert_allclose(
-        found, [0, 0, np.sqrt((regression.lagged(turned) ** 2).sum())], atol=1e-9
+        found,
+        [0, 0, np.sqrt((regression.newey_west_terms(turned) ** 2).sum())],
+        atol=1e-9,
     )
 
 
@@ -2276,7 +2289,7 @@ def test_cycles_are_counted_in_blocks_and_their_errors_by_student(regressed):
         (128, 0.95, 2.0687),
         (1, 0.5, 0.8165),
     ):
-        assert regression.factor(count, level) == pytest.approx(
+        assert regression.interval_factor(count, level) == pytest.approx(
             found, abs=1e-4
         )  # tables of Student's t
 
@@ -2295,7 +2308,7 @@ def test_cycles_are_counted_in_blocks_and_their_errors_by_student(regressed):
 def test_columns_are_known_by_their_names(header, picked):
     header, picked = (tuple(x.split()) for x in (header, picked))
     picked = tuple(x for x in picked if x != "phase") if "time_s" in picked else picked
-    assert measured_log._picked("log.csv", 1, header, []) == picked
+    assert measured_log._pick("log.csv", 1, header, []) == picked
 
 
 @pytest.mark.parametrize(
@@ -2314,5 +2327,5 @@ def test_columns_are_known_by_their_names(header, picked):
 )  # fmt: skip
 def test_columns_that_are_not_there_are_named(header, columns, said):
     with pytest.raises(Refusal) as found:
-        measured_log._picked("log.csv", 3, tuple(header.split()), columns.split())
+        measured_log._pick("log.csv", 3, tuple(header.split()), columns.split())
     assert str(found.value).startswith(said)

@@ -63,12 +63,14 @@ def trial_of(t, points, name="trial.csv"):
 @pytest.fixture(scope="module")
 def exact():
     """A trial without noise: 3.3 cycles that repeat."""
-    return synthetic.made(GLASS, 3.3, 30, 16, noise=0.0, spread=0.0, jitter=0.0, seed=2)
+    return synthetic.synthetic_midlines(
+        GLASS, 3.3, 30, 16, noise=0.0, spread=0.0, jitter=0.0, seed=2
+    )
 
 
 @pytest.fixture(scope="module")
 def noisy():
-    return synthetic.made(GLASS, 4.4, 30, 30, seed=8)
+    return synthetic.synthetic_midlines(GLASS, 4.4, 30, 30, seed=8)
 
 
 @pytest.fixture(scope="module")
@@ -341,7 +343,9 @@ def without(trial, left_out):
 
 def backwards(_):
     """A swimmer that its wave takes along, as where drag is less across the body than along it."""
-    return synthetic.made(Swimmer(Viscous(0.4), Backbone(20)), 3.4, 30, 20).trial()
+    return synthetic.synthetic_midlines(
+        Swimmer(Viscous(0.4), Backbone(20)), 3.4, 30, 20
+    ).trial()
 
 
 ALSO_REFUSED = {
@@ -365,7 +369,7 @@ def test_trials_of_other_faults_are_refused(noisy, said):
 
 
 def test_another_motion_within_a_trial_is_refused_by_its_times(noisy, fitted):
-    other = synthetic.made(GLASS, 1.5, 30, waves=2.4, swing=0.5, seed=1)
+    other = synthetic.synthetic_midlines(GLASS, 1.5, 30, waves=2.4, swing=0.5, seed=1)
     shift = noisy.points[-1].mean(0) - other.points[0].mean(0)
     points = np.concatenate([noisy.points, other.points + shift])
     with pytest.raises(
@@ -470,7 +474,9 @@ def test_two_animals_in_a_file_are_refused_and_tracks_are_no_points(exact, tmp_p
 def truth(system, **options):
     """Quantities of an animal: of many cycles without noise."""
     cycles = 8.2 if not options["spread"] else 400
-    return noiseless(synthetic.made(system, cycles, seed=99, noise=0.0, **options))
+    return noiseless(
+        synthetic.synthetic_midlines(system, cycles, seed=99, noise=0.0, **options)
+    )
 
 
 def noiseless(made, modes=14, even=0.0):
@@ -490,7 +496,9 @@ def covered(system, known, seeds, cycles=8.4, frames=40, **options):
     animal's drift is added."""
     errors, widths, k = [], [], QUANTITIES.index("heading")
     for seed in seeds:
-        made = synthetic.made(system, cycles, frames, seed=seed, **options)
+        made = synthetic.synthetic_midlines(
+            system, cycles, frames, seed=seed, **options
+        )
         f, own, expected = fit.fit_midlines(made.trial()), noiseless(made), known.copy()
         expected[k] = own[k] - own[k + 1] + known[k + 1]
         errors.append(f.intervals.value - expected)
@@ -613,7 +621,9 @@ def test_what_smoothing_cuts_off_is_judged_from_its_change():
 
 
 def test_intervals_cover_the_truth_in_a_few_trials():
-    known = noiseless(synthetic.made(GLASS, 40, 30, seed=99, noise=0.0, **USUAL))
+    known = noiseless(
+        synthetic.synthetic_midlines(GLASS, 40, 30, seed=99, noise=0.0, **USUAL)
+    )
     error, width = covered(GLASS, known, range(2), 4.4, 30, **USUAL)
     assert (np.abs(error) <= width).mean() > 0.8
 
@@ -622,8 +632,10 @@ def two_waves(points, noise=0.003, **options):
     """A trial whose wave of 1.5 lengths has a third harmonic of 30 %, and what it is without noise at 100 points."""
     form = {"swing": 0.7, "waves": 1.5, "third": 0.3, "seed": 5, **REPEATING, **options}
     swimmer = Swimmer(Viscous(4.0), Backbone(40))
-    exact = synthetic.made(swimmer, 4.4, 40, 100, noise=0.0, **form)
-    return synthetic.made(swimmer, 4.4, 40, points, noise=noise, **form), exact
+    exact = synthetic.synthetic_midlines(swimmer, 4.4, 40, 100, noise=0.0, **form)
+    return synthetic.synthetic_midlines(
+        swimmer, 4.4, 40, points, noise=noise, **form
+    ), exact
 
 
 def test_modes_cover_a_third_harmonic_that_the_points_resolve():
@@ -795,7 +807,7 @@ def test_trials_that_are_made_are_what_they_say():
     swimmer = Swimmer(Viscous(2.0), Backbone(24, length=0.4))
     plain = {"noise": 0.0, "spread": 0.0, "jitter": 0.0, "frequency": 2.0, "seed": 4}
     form = {"swing": 0.6, "waves": 1.3, "heading": 0.7, "bend": 0.3}
-    made = synthetic.made(swimmer, 2.2, 30, 24, **plain, **form)
+    made = synthetic.synthetic_midlines(swimmer, 2.2, 30, 24, **plain, **form)
     np.testing.assert_allclose(made.t, np.arange(67) / 60, atol=1e-12)
     np.testing.assert_array_equal(made.points, made.exact)
     z = made.exact @ [1.0, 1j]
@@ -827,7 +839,9 @@ def test_trials_that_are_made_are_what_they_say():
     np.testing.assert_allclose(np.abs(np.diff(z, axis=1)).sum(1), 1.0, atol=0.01)
 
     swimmer = Swimmer(Viscous(2.0), Backbone(6))
-    many = lambda **other: synthetic.made(swimmer, 40, 8, 6, **{**plain, **other})
+    many = lambda **other: synthetic.synthetic_midlines(
+        swimmer, 40, 8, 6, **{**plain, **other}
+    )
     still, off = many(), many(noise=0.02)
     np.testing.assert_array_equal(still.exact, off.exact)
     assert (off.points - still.points).std() == pytest.approx(0.02, rel=0.03)
@@ -852,7 +866,7 @@ def test_trials_that_are_made_are_what_they_say():
         (found[4:] * found[:-4]).mean(0) / (found**2).mean(0), math.exp(-1), atol=0.2
     )  # half a cycle
     with pytest.raises(Refusal, match="frames"):
-        synthetic.made(swimmer, 3.0, 7, 6, **plain)
+        synthetic.synthetic_midlines(swimmer, 3.0, 7, 6, **plain)
     usual = {
         "swing": 0.9,
         "waves": 1.1,
@@ -862,8 +876,12 @@ def test_trials_that_are_made_are_what_they_say():
         "jitter": 0.02,
         "heading": 0.5,
     }
-    wanted = synthetic.made(swimmer, 8.0, 40, 30, **usual, bend=0.0, seed=0)
-    np.testing.assert_array_equal(synthetic.made(swimmer).points, wanted.points)
+    wanted = synthetic.synthetic_midlines(
+        swimmer, 8.0, 40, 30, **usual, bend=0.0, seed=0
+    )
+    np.testing.assert_array_equal(
+        synthetic.synthetic_midlines(swimmer).points, wanted.points
+    )
 
 
 def one_cycle(swimmer, start, swing, waves, bend):
@@ -891,7 +909,7 @@ def test_the_value_that_closes_a_gap_is_a_root(
             raise Refusal("beyond the bounds")
         return x**power - level**power
 
-    found = predicted._closed("C", "rad", value, gap, 0.01, None, 1.0)
+    found = predicted._closed("C", "rad", value, gap, 0.01, 1.0)
     assert (found.name, found.unit, found.present) == ("C", "rad", value)
     slope = abs(power) * level ** (power - 1)
     wanted = (root, 0.01 / slope) if math.isfinite(root) else (math.nan, math.nan)
@@ -907,14 +925,14 @@ def test_the_value_that_closes_a_gap_is_a_root(
 
 def test_of_several_roots_the_one_nearest_to_the_present_value_closes_a_gap():
     wave = lambda x: math.sin(math.pi * math.log2(x) / 3)  # zero at powers of 8
-    assert predicted._closed(
-        "C", "-", 3.0, wave, 0.1, None, 1.0
-    ).value == pytest.approx(8.0, rel=2e-3)
-    assert predicted._closed(
-        "C", "-", 2.0, wave, 0.1, None, 1.0
-    ).value == pytest.approx(1.0, rel=2e-3)
+    assert predicted._closed("C", "-", 3.0, wave, 0.1, 1.0).value == pytest.approx(
+        8.0, rel=2e-3
+    )
+    assert predicted._closed("C", "-", 2.0, wave, 0.1, 1.0).value == pytest.approx(
+        1.0, rel=2e-3
+    )
     flat = lambda size: predicted._closed(
-        "C", "-", 2.0, lambda x: size * wave(x), 0.1, None, 0.5
+        "C", "-", 2.0, lambda x: size * wave(x), 0.1, 0.5
     )
     moves = np.ptp([wave(2 * x) for x in predicted.FACTORS])
     assert flat(0.49e-4 / moves) is None and flat(0.51e-4 / moves) is not None
@@ -924,7 +942,7 @@ def test_of_several_roots_the_one_nearest_to_the_present_value_closes_a_gap():
             raise Refusal("beyond the bounds")
         return wave(x)
 
-    assert predicted._closed("C", "-", 2.0, alone, 0.1, None, 1.0) is None
+    assert predicted._closed("C", "-", 2.0, alone, 0.1, 1.0) is None
 
 
 @pytest.mark.parametrize("constant", [0.2, 0.6])
@@ -955,7 +973,7 @@ def test_the_variances_of_cycles_have_their_likelihood(constant):
         np.stack([white[k] @ values[:, k] for k in range(2)]), drawn
     )
     exact += (1 - exact) * constant
-    found, by_cycles = intervals._of_cycles(values, noise, constant)
+    found, by_cycles = intervals._cycle_variances(values, noise, constant)
     for k, known in enumerate(knowns):
         scatter, same = (
             values[:, k].var(ddof=1),
@@ -963,7 +981,7 @@ def test_the_variances_of_cycles_have_their_likelihood(constant):
         )
         prior = intervals.TRIED * scatter / (intervals.TRIED * scatter + same)
         prior = [exact, *((1 - exact) * prior / prior.sum())]
-        for correlation in intervals.ALIKE:
+        for correlation in intervals.CORRELATIONS:
             alike = correlation ** apart.astype(float)
             for v, p in zip([0.0, *(intervals.TRIED * scatter)], prior):
                 covariance = contrasts.T @ (known + v * alike) @ contrasts
@@ -974,10 +992,10 @@ def test_the_variances_of_cycles_have_their_likelihood(constant):
                     )
                 )
                 variances.append(v * alike.mean())
-    weights = np.reshape(weights, (2, len(intervals.ALIKE), -1))
+    weights = np.reshape(weights, (2, len(intervals.CORRELATIONS), -1))
     # Each quantity has the evidence of the other twice, as three deviations move both.
     evidence = weights.sum(-1)
-    share = np.array([*intervals.ALIKE.values()]) * evidence[::-1] ** 2
+    share = np.array([*intervals.CORRELATIONS.values()]) * evidence[::-1] ** 2
     weights = (weights * share[..., None]).reshape(2, -1).T
     np.testing.assert_allclose(found, weights / weights.sum(0), atol=1e-7)
     np.testing.assert_allclose(by_cycles, np.reshape(variances, (2, -1)).T, rtol=1e-9)
@@ -1001,7 +1019,7 @@ def test_an_interval_has_its_share_of_the_mixture_of_normals():
         left = np.maximum((2 * change - moved.mean(0)) ** 2 - moved.var(0, ddof=1), 0)
         np.testing.assert_allclose(found.smoothing, np.sqrt(left), rtol=1e-12)
         assert (found.smoothing > 0).sum() == 2
-        weights, by_cycles = intervals._of_cycles(pseudo, noise, 0.2)
+        weights, by_cycles = intervals._cycle_variances(pseudo, noise, 0.2)
         known = by_noise + left
         inside = 2 * norm.cdf(found.half_width / np.sqrt(by_cycles + known)) - 1
         np.testing.assert_allclose((weights * inside).sum(0), level, atol=1e-9)
@@ -1189,8 +1207,8 @@ def test_cycles_are_of_one_pace(longer, said):
 def test_a_cycle_has_a_gap_where_an_eighth_of_it_has_no_frame():
     t = np.arange(0, 5, 0.1)
     trial = dataclasses.replace(line_of(50), t=t)
-    assert not fit._gap(trial, 1.02, 1.9)
-    assert fit._gap(trial, 1.02, 1.8)
+    assert not fit._has_gap(trial, 1.02, 1.9)
+    assert fit._has_gap(trial, 1.02, 1.8)
     for out, start, end, gap in (
         (12, 1.02, 2.7, False),
         (12, 1.02, 2.6, True),
@@ -1198,7 +1216,8 @@ def test_a_cycle_has_a_gap_where_an_eighth_of_it_has_no_frame():
         (10, 0.96, 2.0, True),
     ):
         assert (
-            fit._gap(dataclasses.replace(trial, t=np.delete(t, out)), start, end) == gap
+            fit._has_gap(dataclasses.replace(trial, t=np.delete(t, out)), start, end)
+            == gap
         )
 
 

@@ -25,6 +25,7 @@ from geomech.systems import (
     Swimmer,
     Table,
 )
+from geomech.systems.capabilities import table_error
 from geomech.systems.table import LENGTHS
 from rft.bodies.base import body_size
 from rft.core.refusal import Refusal
@@ -404,7 +405,7 @@ def test_an_exported_struct_of_sand_keeps_what_its_fit_left(tmp_path):
     np.testing.assert_array_equal(again.fitted.residual, source.fitted.residual)
     assert (
         again.scene.system.stored.metric is None
-        and again.scene.system.table_error(*Circle().cycle(32, 1.0))[0] > 0.05
+        and table_error(again.scene.system, *Circle().cycle(32, 1.0))[0] > 0.05
     )
 
 

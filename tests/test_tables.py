@@ -37,6 +37,7 @@ from geomech.studies.single import single
 from geomech.studies.study import Study
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from geomech.systems.base import length_unit
+from geomech.systems.capabilities import stored_table, table_error
 from geomech.systems.table import LENGTHS
 from rft.bodies.base import body_size
 from rft.core.refusal import Refusal
@@ -221,7 +222,7 @@ def test_intervals_of_a_table_of_ones_own_are_kept_and_part_of_its_error(
             geomech_A_error=error,
             geomech_about=json.dumps({"sign": "+", "level": 0.9}),
         )
-        halves = Table(path, body_length=2.0).table("A_error")
+        halves = stored_table(Table(path, body_length=2.0), "A_error")
         np.testing.assert_allclose(
             halves, error * np.array([0.5, 0.5, 1]).reshape(3, 1, 1, 1)
         )
@@ -234,9 +235,9 @@ def test_intervals_of_a_table_of_ones_own_are_kept_and_part_of_its_error(
         assert again.level == 0.9
     cycle = GAIT.cycle(64, 0.7)
     plain = dataclasses.replace(table.scene.system.stored, A_error=None)
-    whole = table.scene.system.table_error(*cycle)
+    whole = table_error(table.scene.system, *cycle)
     object.__setattr__(table.scene.system, "stored", plain)
-    more = whole - table.scene.system.table_error(*cycle)
+    more = whole - table_error(table.scene.system, *cycle)
     path_length = 2 * np.pi * np.linalg.norm(cycle[1], axis=-1).mean()
     low, high = (
         np.sqrt(2) * 0.01 * k * path_length for k in (1.0, 2.0)

@@ -16,7 +16,8 @@ from geomech.studies import sweep, uncertainty
 from geomech.studies.choose import cheapest
 from geomech.studies.study import Study
 from geomech.studies.tables import QUANTITIES, of_pose
-from geomech.systems import Swimmer
+from geomech.systems import Swimmer, capability
+from geomech.systems.capabilities import Uncertain
 from rft import Chain, Granular, SkinFriction, Transient, Viscous
 from rft.core.refusal import Refusal
 
@@ -38,7 +39,7 @@ def granular(scale=1.0):
 
 def drawn(sand, draws, amplitudes, phases=16):
     """QUANTITIES (draws, B, 4) in media of a scene with parameters off by the rows of ``draws``."""
-    systems = [sand.system.varied(d) for d in draws]
+    systems = [capability(sand.system, Uncertain).varied(d) for d in draws]
     nets = [s.run(*sand.gait.cycle(phases, np.array(amplitudes))).net for s in systems]
     return np.stack([np.stack(list(of_pose(n).values()), -1) for n in nets])
 

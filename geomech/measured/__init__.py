@@ -1,4 +1,5 @@
-"""Measured gaits: from the log of an experiment to the connection near its mean gait, one stage a file."""
+"""Measured gaits: from the log of an experiment to the connection near its mean gait,
+one stage a file."""
 
 from geomech.measured.fit import Fitted, fit_log
 from geomech.measured.log import Log, read

@@ -1,4 +1,5 @@
-"""Logs of an experiment, CSV: time, joint angles and the pose of the body, row by row; read and checked."""
+"""Logs of an experiment, CSV: time, joint angles and the pose of the body, row by
+row."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ from geomech.io.tables.base import LARGEST_ANGLE
 from rft.core.refusal import Refusal, formatted
 
 LARGEST_FILE = 100_000_000  # bytes
-MOST_ROWS, FEWEST_ROWS = 500_000, 100
+MOST_ROWS = 500_000
+FEWEST_ROWS = 100
 MOST_JOINTS = 6  # the columns of the regression grow with their cube
 POSE = {  # names without their units
     "t": ("t", "time"),
@@ -27,13 +29,8 @@ POSE = {  # names without their units
     "heading": ("heading", "theta", "yaw"),
 }
 JOINT = re.compile(r"(alpha|joint|angle|a|q)_?([0-9]+)")
-UNTIMED = (
-    "phase",
-    "frame",
-    "frames",
-    "sample",
-    "index",
-)  # columns in place of t that are no times
+# Columns in place of t that are no times.
+UNTIMED = ("phase", "frame", "frames", "sample", "index")
 SPIKE = 20.0  # deviation from neighbouring rows over that of nine in ten rows
 LARGE = 0.05  # of a column's range: least deviation of an outlier
 WHAT = "give a CSV file with a header such as t,alpha_1,alpha_2,x,y,heading"
@@ -43,9 +40,10 @@ WHAT = "give a CSV file with a header such as t,alpha_1,alpha_2,x,y,heading"
 class Log:
     """Rows of a log, checked.
 
-    name: of the file. t: (N,), ascending. alpha: (N, d), rad, and the heading have no jumps by a full turn. pose: (N,
-    3), x, y, heading. joints: names of their columns. lines: (N,), line of each row in the file. seconds: t is a time.
-    metres: x and y are in m. size: what the unit of x and y in the file is in m, where it names one, else 1.
+    name: of the file. t: (N,), ascending. alpha: (N, d), rad; they and the heading have
+    no jumps by a full turn. pose: (N, 3), x, y, heading. joints: names of their
+    columns. lines: (N,), line of each row in the file. seconds: t is a time. metres: x
+    and y are in m. size: unit of x and y in the file, in m, where it names one, else 1.
 
     Examples
     --------
@@ -55,7 +53,8 @@ class Log:
     >>> from geomech.scenes import load
     >>> velocity = load("three-link-viscous").system.velocity
     >>> file = pathlib.Path(tempfile.mkdtemp()) / "log.csv"
-    >>> synthetic.save(file, synthetic.made(velocity, Circle(0.8), cycles=5))
+    >>> log = synthetic.synthetic_log(velocity, Circle(0.8), cycles=5)
+    >>> synthetic.save(file, log)
     >>> read(file).alpha.shape  # rad
     (301, 2)
     """
@@ -71,20 +70,21 @@ class Log:
     size: float = 1.0
 
     def wrong(self, what: str, row: int | None = None, **facts: Any) -> Refusal:
-        """Return a Refusal about a row, or about the whole file. facts: keywords of `Refusal`."""
-        return Refusal(
-            what,
-            where=self.name if row is None else f"{self.name}, line {self.lines[row]}",
-            **facts,
-        )
+        """Return a Refusal about a row, or about the whole file. facts: keywords of
+        `Refusal`."""
+        where = self.name
+        if row is not None:
+            where = f"{self.name}, line {self.lines[row]}"
+        return Refusal(what, where=where, **facts)
 
 
 def read(path: str | Path, columns: Sequence[str] = (), degrees: bool = False) -> Log:
     """Return the log in a file; Refusal for one that cannot be used.
 
-    columns: names of the time, of all joint angles, of x, y and the heading, in this order; by default those with known
-    names (`POSE`, `JOINT`; "phase" in place of a time). degrees: joint angles and heading are in degrees where their
-    columns name no unit.
+    columns: names of the time, of all joint angles, of x, y and the heading, in this
+    order; by default those with known names (`POSE`, `JOINT`; "phase" in place of a
+    time). degrees: joint angles and heading are in degrees where their columns name no
+    unit.
 
     Examples
     --------
@@ -94,7 +94,8 @@ def read(path: str | Path, columns: Sequence[str] = (), degrees: bool = False) -
     >>> from geomech.scenes import load
     >>> velocity = load("three-link-viscous").system.velocity
     >>> file = pathlib.Path(tempfile.mkdtemp()) / "log.csv"
-    >>> synthetic.save(file, synthetic.made(velocity, Circle(0.8), cycles=20))
+    >>> log = synthetic.synthetic_log(velocity, Circle(0.8), cycles=20)
+    >>> synthetic.save(file, log)
     >>> log = read(file)
     >>> log.joints, log.pose.shape
     (('alpha_1', 'alpha_2'), (1201, 3))
@@ -102,9 +103,8 @@ def read(path: str | Path, columns: Sequence[str] = (), degrees: bool = False) -
     try:
         source = read_rows(path, LARGEST_FILE, WHAT)
         line, header = source.header
-        picked = _picked(
-            source.name, line, header, [c.strip().lower() for c in columns]
-        )
+        names = [c.strip().lower() for c in columns]
+        picked = _pick(source.name, line, header, names)
         if len(source.rows) > MOST_ROWS:
             raise Refusal(
                 f"{len(source.rows)} rows, more than {MOST_ROWS}",
@@ -130,7 +130,8 @@ def _read(source: Rows, picked: tuple[str, ...], degrees: bool) -> Log:
     turns = _turns(picked, degrees, source.place)
     clock = header.index(picked[0])
     t, note = source.times(clock, unit_of_time(picked[0]))
-    notes += [note] if note else []
+    if note:
+        notes.append(note)
     if turns[-1] != turns[0] and not split_unit(picked[-1])[1]:
         notes.append(f"{picked[-1]} is taken to be in rad")
     unit, size = _length(picked, source.place)
@@ -175,8 +176,9 @@ def _turns(picked: tuple[str, ...], degrees: bool, place: str) -> np.ndarray:
                 where=place,
                 instead="drop ``degrees``, or rename the column",
             )
-        in_degrees = unit == "" and degrees
-        turns.append(UNITS["angle"]["deg" if in_degrees else unit or "rad"])
+        if unit == "":
+            unit = "deg" if degrees else "rad"
+        turns.append(UNITS["angle"][unit])
     named = [bool(split_unit(name)[1]) for name in picked[1:-3]]
     if any(named) and not all(named):
         raise Refusal(
@@ -188,7 +190,7 @@ def _turns(picked: tuple[str, ...], degrees: bool, place: str) -> np.ndarray:
 
 
 def _length(picked: tuple[str, ...], place: str) -> tuple[str, float]:
-    """Return the unit of x and y, "" where none is named, and what it is in m; Refusal
+    """Return the unit of x and y, "" where none is named, and its size in m; Refusal
     for two units, or pixels."""
     units = [split_unit(name)[1] for name in picked[-3:-1]]
     unit = units[0]
@@ -209,62 +211,92 @@ def _length(picked: tuple[str, ...], place: str) -> tuple[str, float]:
     return unit, UNITS["length"][unit]
 
 
-def _picked(
+def _pick(
     name: str, line: int, header: tuple[str, ...], columns: list[str]
 ) -> tuple[str, ...]:
-    """Return the names of the columns of the time, the joints, x, y and the heading; Refusal if one is missing or
-    ambiguous."""
-    if twice := [c for k, c in enumerate(header) if c in header[:k]]:
+    """Return the names of the columns of the time, the joints, x, y and the heading;
+    Refusal if one is missing or ambiguous."""
+    where = f"{name}, line {line}"
+    twice = [c for k, c in enumerate(header) if c in header[:k]]
+    if twice:
         raise Refusal(
             f"the column {formatted(twice[0])} is there twice",
-            where=f"{name}, line {line}",
+            where=where,
             instead="rename one",
         )
     if columns:
-        columns = [c.removeprefix("%") for c in columns]
-        if missing := [c for c in columns if c not in header]:
-            raise Refusal(
-                f"no column {formatted(missing[0])}; it has {formatted(', '.join(header), 200)}",
-                where=f"{name}, line {line}",
-            )
-        if len(columns) < 6 or len({*columns}) < len(columns):
-            raise Refusal(
-                "``columns`` are those of t, two joint angles or more, x, y and heading, in this order",
-                where=name,
-            )
-        return _of_joints(name, columns)
+        return _check_columns(name, where, header, columns)
     if len(header) < 2:
-        raise Refusal(
-            "no header of columns", where=f"{name}, line {line}", instead=WHAT
-        )
+        raise Refusal("no header of columns", where=where, instead=WHAT)
+
     bare = {c: plain(split_unit(c)[0]) for c in header}
-    roles = {}
+    roles: dict[str, str] = {}
     for role, names in POSE.items():
         candidates = [c for c in header if bare[c] in names]
         if len(candidates) > 1:
             raise Refusal(
                 f"{' and '.join(candidates)} may both be the column {role}",
-                where=f"{name}, line {line}",
+                where=where,
                 instead="list those to take in ``columns``",
             )
-        roles[role] = candidates[0] if candidates else None
-    roles["t"] = roles["t"] or ("phase" if "phase" in header else None)
-    matches = [(int(m[2]), m[1], c) for c in header if (m := JOINT.fullmatch(bare[c]))]
-    kind = next((m[1] for m in matches), None)
-    joints = [c for _, k, c in sorted(matches) if k == kind]
-    missing = [role for role, c in roles.items() if c is None]
+        if candidates:
+            roles[role] = candidates[0]
+    if "t" not in roles and "phase" in header:
+        roles["t"] = "phase"
+    joints = _joint_columns(header, bare)
+    missing = [role for role in POSE if role not in roles]
     if missing or len(joints) < 2:
-        few = f"{'one column' if joints else 'no columns'} of joint angles, and a gait is a loop of two or more"
-        what = f"no column {missing[0]}" if missing else few
-        cure = "name them t,alpha_1,alpha_2,x,y,heading, or list those in ``columns``"
-        known = f"it has {formatted(', '.join(header), 240)}"
-        raise Refusal(what, where=f"{name}, line {line}", because=known, instead=cure)
-    return _of_joints(
+        few = "one column" if joints else "no columns"
+        what = f"{few} of joint angles, and a gait is a loop of two or more"
+        if missing:
+            what = f"no column {missing[0]}"
+        raise Refusal(
+            what,
+            where=where,
+            because=f"it has {formatted(', '.join(header), 240)}",
+            instead="name them t,alpha_1,alpha_2,x,y,heading, or list those in"
+            " ``columns``",
+        )
+    return _check_joints(
         name, [roles["t"], *joints, roles["x"], roles["y"], roles["heading"]]
     )
 
 
-def _of_joints(name: str, columns: list[str]) -> tuple[str, ...]:
+def _check_columns(
+    name: str, where: str, header: tuple[str, ...], columns: list[str]
+) -> tuple[str, ...]:
+    """Return the columns that a user lists; Refusal if one is missing, or named
+    twice."""
+    columns = [c.removeprefix("%") for c in columns]
+    missing = [c for c in columns if c not in header]
+    if missing:
+        known = formatted(", ".join(header), 200)
+        raise Refusal(f"no column {formatted(missing[0])}; it has {known}", where=where)
+    if len(columns) < 6 or len({*columns}) < len(columns):
+        raise Refusal(
+            "``columns`` are those of t, two joint angles or more, x, y and heading, in"
+            " this order",
+            where=name,
+        )
+    return _check_joints(name, columns)
+
+
+def _joint_columns(header: tuple[str, ...], bare: dict[str, str]) -> list[str]:
+    """Return the columns of joint angles in the order of their numbers: those with the
+    kind of name that comes first in the header."""
+    numbered = []
+    kinds = []
+    for column in header:
+        match = JOINT.fullmatch(bare[column])
+        if match:
+            kind, number = match.groups()
+            kinds.append(kind)
+            numbered.append((int(number), kind, column))
+    return [column for _, kind, column in sorted(numbered) if kind == kinds[0]]
+
+
+def _check_joints(name: str, columns: list[str]) -> tuple[str, ...]:
+    """Return the columns; Refusal for too many joint angles."""
     if len(columns) - 4 > MOST_JOINTS:
         raise Refusal(
             f"{len(columns) - 4} joint angles, more than {MOST_JOINTS}",
@@ -275,13 +307,15 @@ def _of_joints(name: str, columns: list[str]) -> tuple[str, ...]:
 
 
 def _check_times(log: Log) -> None:
+    """Refuse too few rows, and times that do not ascend."""
     if len(log.t) < FEWEST_ROWS:
         raise log.wrong(
             f"{len(log.t)} rows are too few",
             instead=f"give at least {FEWEST_ROWS}, of many cycles",
         )
     step = np.diff(log.t)
-    if (bad := np.flatnonzero(step <= 0)).size:
+    bad = np.flatnonzero(step <= 0)
+    if bad.size:
         k = bad[0]
         if step[k] == 0:
             raise log.wrong(
@@ -299,7 +333,8 @@ def _check_times(log: Log) -> None:
 def _check_units(log: Log, picked: Sequence[str], turn: np.ndarray) -> None:
     """Refuse degrees that are read as radians; warn of radians read as degrees."""
     step = np.abs(np.diff(log.pose[:, 2]))
-    if turn[-1] == 1.0 and (jumps := np.flatnonzero(np.abs(step - 360) < 30)).size:
+    jumps = np.flatnonzero(np.abs(step - 360) < 30)
+    if turn[-1] == 1.0 and jumps.size:
         k = jumps[0] + 1
         raise log.wrong(
             f"{picked[-1]} jumps by {step[k - 1]:.4g}, a turn in degrees",
@@ -308,26 +343,33 @@ def _check_units(log: Log, picked: Sequence[str], turn: np.ndarray) -> None:
         )
     for k, name in enumerate(log.joints):
         row = int(np.abs(log.alpha[:, k]).argmax())
-        if turn[k + 1] == 1.0 and abs(log.alpha[row, k]) > 2 * np.pi:
-            what = (
-                f"{name} reaches {log.alpha[row, k]:.4g} where joint angles are in rad"
-            )
-            raise log.wrong(what, row, instead="say ``degrees`` if these are degrees")
-        if abs(log.alpha[row, k]) > LARGEST_ANGLE:
+        angle = log.alpha[row, k]
+        if turn[k + 1] == 1.0 and abs(angle) > 2 * np.pi:
             raise log.wrong(
-                f"{name} reaches {np.degrees(log.alpha[row, k]):.4g} degrees",
+                f"{name} reaches {angle:.4g} where joint angles are in rad",
+                row,
+                instead="say ``degrees`` if these are degrees",
+            )
+        if abs(angle) > LARGEST_ANGLE:
+            raise log.wrong(
+                f"{name} reaches {np.degrees(angle):.4g} degrees",
                 row,
                 because="no joint turns so far",
             )
-    if (turn[1:-3] != 1.0).all() and (size := np.abs(log.alpha).max()) < np.radians(
-        2 * np.pi
-    ):
-        what = f"joint angles of at most {np.degrees(size):.3g} degrees: drop ``degrees`` if these are rad"
-        warnings.warn(f"{log.name}: {what}", UnitWarning, stacklevel=3)
+    size = np.degrees(np.abs(log.alpha).max())
+    are_degrees = (turn[1:-3] != 1.0).all()
+    if are_degrees and size < 2 * np.pi:
+        warnings.warn(
+            f"{log.name}: joint angles of at most {size:.3g} degrees: drop ``degrees``"
+            " if these are rad",
+            UnitWarning,
+            stacklevel=3,
+        )
 
 
 def _checked(log: Log) -> Log:
-    """Return the log without jumps by a full turn; Refusal for a column that does not move."""
+    """Return the log without jumps by a full turn; Refusal for a column that does not
+    move."""
     pose = np.column_stack([log.pose[:, :2], np.unwrap(log.pose[:, 2])])
     alpha = np.unwrap(log.alpha, axis=0)
     for name, values in zip(log.joints, alpha.T):
@@ -346,16 +388,16 @@ def _checked(log: Log) -> Log:
 def check_rows(log: Log) -> None:
     """Refuse an outlier, and a column that jumps."""
     step = np.diff(log.t)
-    part = step[:-1] / (step[:-1] + step[1:])
-    near = np.maximum(step[:-1], step[1:]) <= 2.5 * np.median(step)
-    for name, v in zip(
-        (*log.joints, "x", "y", "heading"), np.column_stack([log.alpha, log.pose]).T
-    ):
-        deviation = np.where(near, v[1:-1] - (1 - part) * v[:-2] - part * v[2:], 0.0)
+    share = step[:-1] / (step[:-1] + step[1:])
+    is_near = np.maximum(step[:-1], step[1:]) <= 2.5 * np.median(step)
+    names = (*log.joints, "x", "y", "heading")
+    for name, v in zip(names, np.column_stack([log.alpha, log.pose]).T):
+        # From the line between the rows before and after.
+        deviation = v[1:-1] - (1 - share) * v[:-2] - share * v[2:]
+        deviation = np.where(is_near, deviation, 0.0)
         k = int(np.abs(deviation).argmax())
-        if abs(deviation[k]) <= max(
-            SPIKE * np.quantile(np.abs(deviation), 0.9), LARGE * np.ptp(v)
-        ):
+        usual = SPIKE * np.quantile(np.abs(deviation), 0.9)
+        if abs(deviation[k]) <= max(usual, LARGE * np.ptp(v)):
             continue
         if abs(deviation[k]) > abs(v[k + 2] - v[k]):
             raise log.wrong(
@@ -363,15 +405,15 @@ def check_rows(log: Log) -> None:
                 k + 1,
                 instead="mend that row, or drop it",
             )
-        jump = k + 1 if abs(v[k + 1] - v[k]) > abs(v[k + 2] - v[k + 1]) else k + 2
-        what = (
-            "two gaits are in the file, or the tracking slipped"
-            if name in log.joints
-            else "the tracking slipped"
-        )
+        jump = k + 2
+        if abs(v[k + 1] - v[k]) > abs(v[k + 2] - v[k + 1]):
+            jump = k + 1
+        reason = "the tracking slipped"
+        if name in log.joints:
+            reason = "two gaits are in the file, or the tracking slipped"
         raise log.wrong(
             f"{name} jumps by {v[jump] - v[jump - 1]:.3g} to this row",
             jump,
-            because=what,
+            because=reason,
             instead="cut the log there",
         )

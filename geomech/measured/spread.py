@@ -10,27 +10,28 @@ from geomech.measured.regression import Samples
 DEVIATIONS = 2.5  # standard deviations of the samples about the mean gait
 PLACES = 64  # phases of the spread
 WIDTH = 0.3  # rad of phase, over which it is averaged
-LEAST = 0.02  # of the gait's size: range of A at the gait where cycles do not vary
+LEAST_REACH = 0.02  # of the gait's size: reach of A where cycles do not vary
 
 
 def spread(
     loop: Loop, samples: Samples, limits: float | None, varied: bool
 ) -> np.ndarray:
-    """Return the spread (d, d, P) of `tube.TaylorSeries`: DEVIATIONS^2 times the covariance of deviations without noise, by
-    phase; or the square of ``limits``, rad, in all directions.
+    """Return the spread (d, d, P) of `tube.TaylorSeries`: DEVIATIONS^2 times the
+    covariance of deviations without noise, by phase; or the square of ``limits``, rad,
+    in all directions.
 
     Along the gait, where nothing deviates, it is the mean of the spread across it."""
     d = samples.alpha.shape[1]
-    least = LEAST * np.sqrt((loop.coefficients[:, 1:] ** 2).sum() / 2)
+    least = LEAST_REACH * np.sqrt((loop.coefficients[:, 1:] ** 2).sum() / 2)
     if limits is not None or not varied:
-        return np.repeat(
-            (np.eye(d) * (least if limits is None else limits) ** 2)[..., None],
-            PLACES,
-            -1,
-        )
-    (one, _), (other, _) = samples.halves
-    theta, normal = loop.shape(samples.phase), loop.normals(samples.phase)
-    one, other = (np.einsum("nik,ni->nk", normal, x - theta) for x in (one, other))
+        reach = least if limits is None else limits
+        return np.repeat((np.eye(d) * reach**2)[..., None], PLACES, -1)
+
+    (alpha_1, _), (alpha_2, _) = samples.halves
+    theta = loop.shape(samples.phase)
+    normals = loop.normals(samples.phase)
+    one = np.einsum("nik,ni->nk", normals, alpha_1 - theta)
+    other = np.einsum("nik,ni->nk", normals, alpha_2 - theta)
     matrices = []
     for t in 2 * np.pi * np.arange(PLACES) / PLACES:
         weight = np.exp((np.cos(samples.phase - t) - 1) / WIDTH**2)

@@ -41,7 +41,7 @@ def fitted_gait(result: Result) -> Fourier:
     >>> velocity = geomech.load("three-link-viscous").system.velocity
     >>> file = pathlib.Path(tempfile.mkdtemp()) / "log.csv"
     >>> gait = geomech.gaits.Circle(0.8)
-    >>> synthetic.save(file, synthetic.made(velocity, gait, cycles=20, seed=1))
+    >>> synthetic.save(file, synthetic.synthetic_log(velocity, gait, cycles=20, seed=1))
     >>> geomech.fitted_gait(geomech.fit_gait(file, harmonics=2)).joints
     2
     """

@@ -1,4 +1,5 @@
-"""Systems, one file each: whatever has a velocity(alpha, alphadot) and says what it lacks."""
+"""Systems, one in each file: objects with a velocity(alpha, alphadot) and their
+traits."""
 
 from geomech.geometry.traits import Traits
 from geomech.systems.base import SYSTEMS, Cycle, System, as_system, integrated

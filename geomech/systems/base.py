@@ -15,7 +15,7 @@ from geomech.core.errors import check_angle
 from geomech.geometry.reconstruct import displacement
 from geomech.geometry.traits import NOTHING, Traits, unit_of
 from geomech.geometry.velocity import evaluate, in_batches
-from rft.bodies.base import body_size as body_size  # of systems, too
+from rft.bodies.base import body_size as body_size  # of systems as well
 from rft.core.checks import in_range, unmasked
 from rft.core.refusal import Refusal
 from rft.core.registry import Registry, classes_with
@@ -24,11 +24,14 @@ MEMBERS = ("joints", "length", "traits", "velocity", "run")
 
 
 class Cycle(NamedTuple):
-    """A gait run once, for amplitudes (...,). xi: (..., N, 3), body velocity by phase. net: (..., 3), pose after the cycle
-    in the frame at its start. residual: (...), the largest of the cycle. speed: (...), mean |alphadot|, 1. work: power,
-    internal moments and slip, (..., N) each (`rft.work_done`), or None. cycles: how many time stepping took, 1 without it.
-    to_come: (...), change of displacement still to come where cycles go on until they repeat, body lengths or rad; 0
-    elsewhere.
+    """A gait run once, for amplitudes (...,).
+
+    xi: (..., N, 3), body velocity by phase. net: (..., 3), pose after the cycle in the
+    frame at its start. residual: (...), the largest of the cycle. speed: (...), mean
+    |alphadot|, 1. work: power, internal moments and slip, (..., N) each
+    (`rft.work_done`), or None. cycles: number that time stepping took, 1 without it.
+    to_come: (...), change of displacement still to come where cycles go on until they
+    repeat, body lengths or rad; 0 elsewhere.
 
     Examples
     --------
@@ -49,17 +52,22 @@ class Cycle(NamedTuple):
 
     def __repr__(self) -> str:
         count = np.size(self.speed)
-        size = f"{count} gait{'s' * (count != 1)} of {np.shape(self.xi)[-2]} phases, net {summary.poses(self.net)}"
-        more = f"; {self.cycles} cycles" * (self.cycles > 1) + "; with work" * (
-            self.work is not None
-        )
-        return f"Cycle({size}; residual up to {np.max(self.residual, initial=0.0):.1e}{more})"
+        gaits = "1 gait" if count == 1 else f"{count} gaits"
+        parts = [
+            f"{gaits} of {np.shape(self.xi)[-2]} phases, net {summary.poses(self.net)}",
+            f"residual up to {np.max(self.residual, initial=0.0):.1e}",
+        ]
+        if self.cycles > 1:
+            parts.append(f"{self.cycles} cycles")
+        if self.work is not None:
+            parts.append("with work")
+        return f"Cycle({'; '.join(parts)})"
 
 
 class System(Protocol):
     """A body velocity for every shape and every rate of change of shape.
 
-    What only some systems can do besides is in `geomech.systems.capabilities`.
+    Abilities of only some systems are in `geomech.systems.capabilities`.
 
     Examples
     --------
@@ -88,18 +96,20 @@ class System(Protocol):
         """Facts that algorithms may use to save work."""
 
     def velocity(self, alpha: np.ndarray, alphadot: np.ndarray) -> np.ndarray:
-        """Return xi (..., 3) at shapes and rates (..., d), in the body frame; nan at singular shapes."""
+        """Return xi (..., 3) at shapes and rates (..., d), in the body frame; nan at
+        singular shapes."""
 
     def run(self, alpha: np.ndarray, alphadot: np.ndarray, work: bool = False) -> Cycle:
-        """Return the cycle of a gait with shapes and rates (..., N, d) at N equally spaced phases."""
+        """Return the cycle of a gait with shapes and rates (..., N, d) at N equally
+        spaced phases."""
 
 
 def integrated(
     system: System, alpha: np.ndarray, alphadot: np.ndarray, work: bool = False
 ) -> Cycle:
-    """Return the cycle of a velocity that follows from shape alone, by integration. Classes take this as their ``run``.
+    """Return the cycle of a velocity that follows from shape alone, by integration.
 
-    Refusal at a singular shape.
+    Classes use it as their ``run``. Refusal at a singular shape.
 
     Examples
     --------
@@ -110,18 +120,25 @@ def integrated(
     array([0.063, 0.009])
     """
     refuse_singular(system, alpha)
-    xi, speed = (
-        evaluate(system.velocity, alpha, alphadot),
-        np.sqrt((alphadot**2).sum(-1)).mean(-1),
+    xi = evaluate(system.velocity, alpha, alphadot)
+    speed = np.sqrt((alphadot**2).sum(-1)).mean(-1)
+    return Cycle(
+        xi=xi,
+        net=displacement(xi),
+        residual=0.0 * speed,
+        speed=speed,
+        work=None,
+        cycles=1,
+        to_come=0.0 * speed,
     )
-    return Cycle(xi, displacement(xi), 0.0 * speed, speed, None, 1, 0.0 * speed)
 
 
 @dataclass(frozen=True)
 class WrappedSystem:
-    """A system made by `as_system` from a velocity alone, or from an object that lacks some of the five members.
+    """A system that `as_system` builds from a velocity alone, or from an object that
+    lacks some of the five members.
 
-    wrapped: the function, or the object. joints, length, traits: as of `System`."""
+    wrapped: the function, or the object. joints, length, traits: as in `System`."""
 
     wrapped: Any
     joints: int
@@ -147,25 +164,23 @@ class WrappedSystem:
 
     @cached_property
     def _batched(self) -> Callable:
-        """The velocity for many shapes at once, whether or not the wrapped one takes them."""
+        """The velocity for many shapes at once, whether the wrapped one takes them or
+        not."""
         alpha, rates = np.random.default_rng(0).normal(size=(2, 3, self.joints))
         return in_batches(self._velocity, *np.broadcast_arrays(alpha[:, None], rates))
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
-        alpha, alphadot = np.broadcast_arrays(
-            unmasked("alpha", alpha), unmasked("alphadot", alphadot)
-        )
-        return evaluate(
-            self._batched, alpha, alphadot, masked=self.traits.singularity is not None
-        )
+        alpha = unmasked("alpha", alpha)
+        alphadot = unmasked("alphadot", alphadot)
+        alpha, alphadot = np.broadcast_arrays(alpha, alphadot)
+        masked = self.traits.singularity is not None
+        return evaluate(self._batched, alpha, alphadot, masked=masked)
 
     def run(self, alpha, alphadot, work: bool = False) -> Cycle:
         method = getattr(self.wrapped, "run", None)
-        return (
-            integrated(self, alpha, alphadot)
-            if method is None
-            else method(alpha, alphadot)
-        )
+        if method is None:
+            return integrated(self, alpha, alphadot)
+        return method(alpha, alphadot)
 
     def __reduce__(self) -> tuple:
         return WrappedSystem, (self.wrapped, self.joints, self.length, self.traits)
@@ -176,25 +191,29 @@ class WrappedSystem:
 
 
 def _accepts_two(function: Callable) -> bool:
+    """Return whether a function takes two arguments, or does not say what it takes."""
     try:
         inspect.signature(function).bind(None, None)
     except TypeError:
         return False
-    except ValueError:  # it does not say what it takes
+    except ValueError:  # it has no signature
         return True
     return True
 
 
 def as_system(system: Any, joints: int | None = None) -> System:
-    """Return a system from an object with a velocity: the object itself where it has the five members, else with
-    defaults for those it lacks. joints: of a function without an attribute ``joints``. Refusal for anything else.
+    """Return a system from an object with a velocity: the object itself where it has
+    the five members, else with defaults for those it lacks.
+
+    joints: of a function without an attribute ``joints``. Refusal for anything else.
 
     Examples
     --------
     >>> import numpy as np
     >>> from geomech.systems import as_system
     >>> def drift(alpha, alphadot):
-    ...     return np.stack([alphadot[..., 0] * np.sin(alpha[..., 1]), 0 * alpha[..., 0], 0 * alpha[..., 0]], -1)
+    ...     x = alphadot[..., 0] * np.sin(alpha[..., 1])
+    ...     return np.stack([x, 0 * x, 0 * x], -1)
     ...
     >>> system = as_system(drift, joints=2)
     >>> system.joints, system.length  # in body lengths
@@ -212,7 +231,8 @@ def as_system(system: Any, joints: int | None = None) -> System:
     joints = getattr(system, "joints", joints)
     if isinstance(system, type) or not callable(function) or joints is None:
         raise Refusal(
-            "system must be a system such as Swimmer(medium, body), or a function velocity(alpha, alphadot)",
+            "system must be a system such as Swimmer(medium, body), or a function"
+            " velocity(alpha, alphadot)",
             value=system,
         )
     refuse_mutable(system)
@@ -231,13 +251,13 @@ def unwrapped(system: Any) -> Any:
 
 def kind_of(system: Any) -> str:
     """Return the name of a kind of system, for messages."""
-    return getattr(system, "kind", None) or getattr(
-        system, "__name__", type(system).__name__
-    )
+    kind = getattr(system, "kind", None)
+    return kind or getattr(system, "__name__", type(system).__name__)
 
 
 def note_angles(system: System, largest: float) -> None:
-    """Warn (`UnitWarning`) if the largest of some shape variables is a joint angle beyond a full turn."""
+    """Warn (`UnitWarning`) if the largest of some shape variables is a joint angle
+    beyond a full turn."""
     if system.traits.joint_angles:
         check_angle("a joint angle", largest)
 
@@ -246,20 +266,23 @@ SYSTEMS = Registry("geomech.systems", "kind", "a system", classes_with("velocity
 
 
 def length_unit(system: System) -> str:
-    """Return the unit of a system's lengths: body lengths, or metres where its body has a size."""
+    """Return the unit of a system's lengths: body lengths, or metres where its body has
+    a size."""
     return system.traits.unit or unit_of(system.length)
 
 
 def shape_labels(system: System) -> tuple[tuple[str, str], ...]:
     """Return (name, unit) of each shape variable of a system, for axes."""
-    return system.traits.labels or tuple(
-        (f"alpha_{k + 1}", "rad") for k in range(system.joints)
-    )
+    if system.traits.labels:
+        return system.traits.labels
+    return tuple((f"alpha_{k + 1}", "rad") for k in range(system.joints))
 
 
 def refuse_singular(system: System, alpha) -> None:
-    """Raise Refusal naming the first shape at which a closed path alpha (..., N, joints) meets a singular one."""
-    if method := getattr(system, "refuse_singular", None):
+    """Refuse a closed path alpha (..., N, joints) that meets a singular shape, and name
+    the first one."""
+    method = getattr(system, "refuse_singular", None)
+    if method:
         method(alpha)
         return
     singularity = system.traits.singularity
@@ -270,13 +293,15 @@ def refuse_singular(system: System, alpha) -> None:
     if singular.any():
         shape = ", ".join(f"{x:.3g}" for x in np.asarray(alpha)[singular][0])
         raise Refusal(
-            f"the gait meets the singular shape near alpha = ({shape}), where {system.traits.singular}",
+            f"the gait meets the singular shape near alpha = ({shape}),"
+            f" where {system.traits.singular}",
             instead="move its centre, or lower the amplitude",
         )
 
 
 def refuse_mutable(*parts) -> None:
-    """Raise Refusal for a part of a class without a hash: tables are stored under the system that they belong to."""
+    """Refuse a part of a class without a hash: tables are stored by the system's
+    hash."""
     for part in parts:
         if type(part).__hash__ is None:
             raise Refusal(

@@ -1,8 +1,9 @@
-"""Abilities that only some systems have. Each is a protocol with few readers; `capability` asks a system for one.
+"""Abilities that only some systems have.
 
-A class has an ability by having its members. Where it depends on values, as power and covariance of a swimmer do, or on a
-system inside, the class has a method ``capability(kind)`` that returns the object with the ability, or None.
-"""
+Each is a protocol with few readers; `capability` returns the object with an ability. A
+class has an ability by having its members. Where the ability depends on values, as the
+covariance of a swimmer does, or on a system inside, the class has a method
+``capability(kind)`` that returns the object with the ability, or None."""
 
 from __future__ import annotations
 
@@ -19,53 +20,63 @@ from rft.core.premise import Premise
 from rft.core.refusal import Refusal
 
 T = TypeVar("T")
-# Of gaits run side by side, angles and velocities, a batch of which takes some 120 MB with what is made of them: more take
-# no less time each, and the first of a long request is soon done, which tells how long the others take.
+# Angles and velocities of gaits that are run at a time: with all arrays computed from
+# them a batch takes some 120 MB. Larger batches take no less time for each gait; after
+# the first the time of the others is known.
 VALUES_TOGETHER = 1 << 20
-STEPPED_TOGETHER = (
-    1 << 22
-)  # likewise of time steps, each of which takes its time however few gaits take it
+# Likewise for time steps, which take their time however few gaits are stepped.
+STEPPED_TOGETHER = 1 << 22
 
 
 def capability(system: System, kind: type[T]) -> T | None:
-    """Return the object with which a system has an ability, a protocol of this module; None if it has not.
+    """Return the object that has an ability of a system, a protocol of this module;
+    None for a system without it.
 
     Examples
     --------
     >>> from geomech.systems import DifferentialDrive, Swimmer, capability
     >>> from geomech.systems.capabilities import Dissipative
     >>> from rft import Chain, Viscous
-    >>> [capability(x, Dissipative) is None for x in (Swimmer(Viscous(), Chain()), DifferentialDrive())]
-    [False, True]
+    >>> capability(Swimmer(Viscous(), Chain()), Dissipative) is None
+    False
+    >>> capability(DifferentialDrive(), Dissipative) is None
+    True
     """
-    if method := getattr(system, "capability", None):
+    method = getattr(system, "capability", None)
+    if method:
         return method(kind)
     return system if isinstance(system, kind) else None
 
 
 @runtime_checkable
 class Refinable(Protocol):
-    """A velocity with a numerical error; read by `geomech.studies.estimate`, which estimates it."""
+    """A velocity with a numerical error; read by `geomech.studies.estimate`.
 
-    closed: bool  # whether the refined one has exact integrals over elements, else a finer rule
+    closed: whether the refined velocity has exact integrals over elements, else a finer
+    rule."""
+
+    closed: bool
 
     def refined(self) -> System | None:
-        """Return the system with a velocity closer to the exact one, None where it is exact; its `run` takes ``start``,
-        velocities nearby (..., N, 3)."""
+        """Return the system with a velocity closer to the exact one, None where it is
+        exact; its `run` takes ``start``, velocities nearby (..., N, 3)."""
 
 
 @runtime_checkable
 class Dissipative(Protocol):
-    """A body that does work against its medium; read by `geomech.studies.effort` and `geomech.optimisation`."""
+    """A body that does work against its medium; read by `geomech.studies.effort` and
+    `geomech.optimisation`."""
 
     def power(self, alpha, alphadot, xi) -> np.ndarray:
-        """Return the rate of work (...) at shapes, rates (..., d) and the velocity (..., 3) that they lead to, in axial drags
-        of the whole body times body lengths a unit of time."""
+        """Return the rate of work (...) at shapes, rates (..., d) and the velocity
+        (..., 3) that they lead to, in axial drags of the whole body times body lengths
+        a unit of time."""
 
 
 @runtime_checkable
 class OwnMetric(Protocol):
-    """A shape space whose metric M is not one of drag but, say, of kinetic energy; read by `geomech.studies.effort`."""
+    """A shape space whose metric M is not one of drag but, say, of kinetic energy; read
+    by `geomech.studies.effort`."""
 
     def squared_speed(self, alpha, alphadot) -> np.ndarray:
         """Return alphadot^T M(alpha) alphadot (...) at shapes and rates (..., d)."""
@@ -73,18 +84,20 @@ class OwnMetric(Protocol):
 
 @runtime_checkable
 class Loaded(Protocol):
-    """A body under forces along its length, of which its `run` with work tells; read by `geomech.studies.forces` and
-    `undulation`."""
+    """A body under forces along its length; read by `geomech.studies.forces` and
+    `undulation`.
 
-    axial_drag: (
-        float  # on the whole straight body along itself, in the law's unit of force
-    )
+    axial_drag: on the whole straight body along itself, in the law's unit of force."""
+
+    axial_drag: float
 
     def axial_stress(self, depth: float) -> float | None:
-        """Return the axial drag over projected area, Pa, at a depth, m, where the medium is a measured one."""
+        """Return the axial drag over projected area, Pa, at a depth, m, where the
+        medium is a measured one."""
 
     def elements(self, alpha: ArrayLike, alphadot: ArrayLike) -> Any:
-        """Return the `rft.bodies.Elements` (n, N) of the body at shapes and rates (N, d), with the frame held."""
+        """Return the `rft.bodies.Elements` (n, N) of the body at shapes and rates (N,
+        d), in a fixed frame."""
 
     def subdivided(self) -> System:
         """Return the system with its body cut into short elements."""
@@ -95,22 +108,27 @@ class Drawable(Protocol):
     """A body to draw; read by `geomech.studies.motion`."""
 
     def points(self, alpha, pose) -> np.ndarray:
-        """Return the ends of the links (..., links + 1, 2) in the world, tail to head, at shapes (..., d) and poses of the
-        frame (..., 3)."""
+        """Return the ends of the links (..., links + 1, 2) in the world, tail to head,
+        at shapes (..., d) and poses of the frame (..., 3)."""
 
 
 @runtime_checkable
 class Tabulated(Protocol):
-    """A velocity that is interpolated in tables of its own; read wherever a table would be computed."""
+    """A velocity that is interpolated in stored tables; read wherever a table would be
+    computed.
 
-    near_gait: str  # the one gait near which alone it is known, in words; "" where it is known everywhere
+    near_gait: the gait near which alone the velocity is known, in words; "" where it is
+    known everywhere."""
+
+    near_gait: str
 
     def table(self, name: str) -> Any:
-        """Return the table "connection", "harmonics", "metric", "even part" or "A_error"; None without it."""
+        """Return the table "connection", "harmonics", "metric", "even part" or
+        "A_error"; None without it."""
 
     def table_error(self, alpha, alphadot) -> np.ndarray:
-        """Return the errors (..., 2), body lengths and rad, of the net pose of cycles (..., N, d) that the tables
-        cause."""
+        """Return the errors (..., 2), body lengths and rad, of the net pose of cycles
+        (..., N, d) that the tables cause."""
 
 
 @runtime_checkable
@@ -120,25 +138,34 @@ class Uncertain(Protocol):
     covariance: Any  # (n, n)
 
     def varied(self, step) -> System:
-        """Return the system with parameters changed by ``step`` (n,); Refusal if there is no such system."""
+        """Return the system with parameters changed by ``step`` (n,); Refusal if there
+        is no such system."""
 
 
 @runtime_checkable
 class Stepped(Protocol):
-    """Cycles that differ from one another; read by `geomech.studies.motion` and `choose`."""
+    """Cycles that differ from one another; read by `geomech.studies.motion` and
+    `choose`.
 
-    settling: float  # change of displacement at which cycles count as repeating, body lengths or rad; 0 if they are not run on
+    settling: change of displacement at which cycles count as repeating, body lengths or
+    rad; 0 if they are not run until they do."""
+
+    settling: float
 
     def path(self, alpha, alphadot, cycles: int) -> np.ndarray:
-        """Return poses (cycles N + 1, 3) of the frame, seen from the first, of a cycle (N, d) run so many times."""
+        """Return poses (cycles N + 1, 3) of the frame, relative to the first, of a
+        cycle (N, d) repeated ``cycles`` times."""
 
 
 class BalanceSize(NamedTuple):
-    """The size of a balance of forces, of one velocity; the defaults are those of a system that solves none.
+    """The size of the balance of forces of one velocity; the defaults are for a system
+    that solves none.
 
-    elements: straight parts of the body. evaluations: places at which forces are evaluated. pieces: to a body length, into
-    which effects that vary along elements cut these, 0 without such effects. memory: numbers that time stepping remembers.
-    batched: whether there is a parameter for each amplitude, so that gaits belong together."""
+    elements: number of straight parts of the body. evaluations: number of points at
+    which forces are evaluated. pieces: per body length, into which effects that vary
+    along elements cut these; 0 without such effects. memory: number of values that time
+    stepping stores. batched: whether there is a parameter for each amplitude, so that
+    gaits are run together."""
 
     elements: int = 1
     evaluations: int = 1
@@ -156,9 +183,11 @@ class Costed(System, Protocol):
 
 @runtime_checkable
 class Tunable(Protocol):
-    """[numerics] of its own; read by `geomech.scenes`."""
+    """A system with its own part of [numerics]; read by `geomech.scenes`.
 
-    solver: Any  # a dataclass
+    solver: a dataclass."""
+
+    solver: Any
 
     def with_solver(self, solver) -> System:
         """Return the system with another solver."""
@@ -181,10 +210,12 @@ class Composite(Protocol):
 
 @runtime_checkable
 class Diagnosed(Protocol):
-    """A velocity that comes with a status and a residual; read by `geomech velocity`."""
+    """A velocity that comes with a status and a residual; read by `geomech
+    velocity`."""
 
     def diagnosed(self, alpha, alphadot) -> dict:
-        """Return {"xi", "status", "residual"}, and more, for one shape and rate (d,)."""
+        """Return {"xi", "status", "residual"}, and more, for one shape and rate
+        (d,)."""
 
 
 @runtime_checkable
@@ -204,33 +235,40 @@ class Recorded(Protocol):
 
 
 def stored_table(system: System, name: str) -> Any:
-    """Return the table of that name that a system interpolates; None where tables are computed."""
+    """Return the table of that name that a system interpolates; None where tables are
+    computed."""
     tabulated = capability(system, Tabulated)
-    return None if tabulated is None else tabulated.table(name)
+    if tabulated is None:
+        return None
+    return tabulated.table(name)
 
 
 def pieces_per_length(system: System) -> int:
-    """Return the pieces per body length into which effects that vary along elements cut the body; 0 without such
-    effects."""
+    """Return the number of pieces per body length into which effects that vary along
+    elements cut the body; 0 without such effects."""
     return balance_size(system).pieces
 
 
 def refined(system: System) -> System | None:
-    """Return the system with its velocity computed more exactly, None where it is exact."""
+    """Return the system with its velocity computed more exactly, None where it is
+    exact."""
     refinable = capability(system, Refinable)
-    return None if refinable is None else refinable.refined()
+    if refinable is None:
+        return None
+    return refinable.refined()
 
 
 def power(system: System, alpha, alphadot) -> np.ndarray:
-    """Return the power (...) of a dissipative system at shapes and rates (..., d), in the unit of
-    `Dissipative.power`."""
+    """Return the power (...) of a dissipative system at shapes and rates (..., d), in
+    the unit of `Dissipative.power`."""
     return velocity_and_power(system, alpha, alphadot)[1]
 
 
 def velocity_and_power(
     system: System, alpha, alphadot
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return xi (..., 3) and power (...) of the same solutions; Refusal for a system without a power."""
+    """Return xi (..., 3) and power (...) of the same solutions; Refusal for a system
+    without a power."""
     dissipative = capability(system, Dissipative)
     if dissipative is None:
         raise Refusal(
@@ -242,60 +280,66 @@ def velocity_and_power(
 
 
 def settling(system: System) -> float:
-    """Return the change of displacement at which cycles count as repeating; 0 where they are not run until they do."""
+    """Return the change of displacement at which cycles count as repeating; 0 where
+    they are not run until they do."""
     stepped = capability(system, Stepped)
-    return 0.0 if stepped is None else stepped.settling
+    if stepped is None:
+        return 0.0
+    return stepped.settling
 
 
 def solver_of(system: System) -> Any:
     """Return the system's own part of [numerics], a dataclass; None without one."""
     tunable = capability(system, Tunable)
-    return None if tunable is None else tunable.solver
+    if tunable is None:
+        return None
+    return tunable.solver
 
 
 def with_solver(system: System, changes: Mapping[str, Any]) -> System:
     """Return a system with some of its own [numerics] changed."""
-    return (
-        system.with_solver(replace(solver_of(system), **changes)) if changes else system
-    )
+    if not changes:
+        return system
+    return system.with_solver(replace(solver_of(system), **changes))
 
 
 def gaits_per_batch(system: System, phases: int) -> int:
-    """Return how many amplitudes of a gait are run at a time, at least one: more take more memory and no less time."""
+    """Return how many amplitudes of a gait are run at a time, at least one: more take
+    more memory and no less time."""
     size = balance_size(system)
     if size.batched:
         return sys.maxsize
     if not system.traits.steps:
-        return max(
-            1, VALUES_TOGETHER // (phases * max(system.joints + 6, 2 * size.elements))
-        )
-    # Time stepping has some thirty arrays of elements beside what effects hold, where a gait has some ten of angles.
-    return max(
-        1,
-        STEPPED_TOGETHER
-        // max(phases * (system.joints + 6), 4 * size.elements + size.memory // 8),
-    )
+        values = phases * max(system.joints + 6, 2 * size.elements)
+        return max(1, VALUES_TOGETHER // values)
+    # Beside the memory of effects time stepping has some thirty arrays of elements,
+    # where a gait has some ten of angles.
+    stepped = 4 * size.elements + size.memory // 8
+    values = max(phases * (system.joints + 6), stepped)
+    return max(1, STEPPED_TOGETHER // values)
 
 
 def near_gait(system: System) -> str:
-    """Return the one gait near which alone a system is valid, in words; "" where it is valid everywhere."""
+    """Return the gait near which alone a system is valid, in words; "" where it is
+    valid everywhere."""
     tabulated = capability(system, Tabulated)
-    return "" if tabulated is None else tabulated.near_gait
+    if tabulated is None:
+        return ""
+    return tabulated.near_gait
 
 
 def table_error(system: System, alpha, alphadot) -> np.ndarray:
-    """Return the errors (..., 2), body lengths and rad, of the net pose of cycles (..., N, d) that tables cause; 0
-    without tables."""
+    """Return the errors (..., 2), body lengths and rad, of the net pose of cycles (...,
+    N, d) that tables cause; 0 without tables."""
     tabulated = capability(system, Tabulated)
-    return (
-        np.zeros((*np.shape(alpha)[:-2], 2))
-        if tabulated is None
-        else tabulated.table_error(alpha, alphadot)
-    )
+    if tabulated is None:
+        return np.zeros((*np.shape(alpha)[:-2], 2))
+    return tabulated.table_error(alpha, alphadot)
 
 
 def is_closed(system: System) -> bool:
-    """Return whether a system computes its velocity with an error, and `refined` has exact integrals."""
+    """Return whether a system computes its velocity with an error, and `refined` has
+    exact integrals."""
     refinable = capability(system, Refinable)
     return refinable is not None and refinable.closed
 
@@ -303,4 +347,6 @@ def is_closed(system: System) -> bool:
 def balance_size(system: System) -> BalanceSize:
     """Return the size of the balance that a system's velocity takes."""
     costed = capability(system, Costed)
-    return BalanceSize() if costed is None else costed.balance_size
+    if costed is None:
+        return BalanceSize()
+    return costed.balance_size

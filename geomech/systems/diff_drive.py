@@ -1,9 +1,9 @@
-"""The differential drive: a cart on two wheels that roll and do not slip, each turned by itself.
+"""The differential drive: a cart on two driven wheels that roll and do not slip.
 
-Its shape variables are the angles of the wheels, of which nothing depends: A is the same everywhere, dA = 0, and the CCF is
-the bracket of its columns alone, (0, -wheel_radius^2 / track, 0): parallel parking. Source: R. L. Hatton and H. Choset,
-Int. J. Robotics Research 30, 988 (2011), Sec. 2.
-"""
+Its shape variables are the angles of the wheels, and A does not depend on them: dA = 0,
+and the CCF is the bracket of its columns alone, (0, -wheel_radius^2 / track, 0):
+parallel parking. Source: R. L. Hatton and H. Choset, Int. J. Robotics Research 30, 988
+(2011), Sec. 2."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ from rft.core.checks import Number, check_numbers, unmasked
 @SYSTEMS.register
 @dataclass(frozen=True)
 class DifferentialDrive:
-    """Two wheels on one axle. alpha_1 is the angle of the left one, alpha_2 of the right one, positive forwards.
+    """Two wheels on one axle. alpha_1 is the angle of the left wheel, alpha_2 of the
+    right one, positive forwards.
 
     frame (-): "mean", midway between the wheels and heading forwards.
 
@@ -52,22 +53,29 @@ class DifferentialDrive:
         check_numbers(self)
         choose("frame", self.frame, ["mean"])
 
-    length = property(lambda self: self.track)
+    @property
+    def length(self) -> float | None:
+        """The track, m; None where lengths are in tracks."""
+        return self.track
 
     @property
     def _matrix(self) -> np.ndarray:
-        half, turn = self.wheel_radius / 2, self.wheel_radius / body_size(self)
+        """A (3, 2)."""
+        half = self.wheel_radius / 2
+        turn = self.wheel_radius / body_size(self)
         return np.array([[half, half], [0.0, 0.0], [-turn, turn]])
 
     def velocity(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
-        """Return xi (..., 3), (track/time, track/time, rad/time): (r (w_1 + w_2) / 2, 0, r (w_2 - w_1) / track)."""
-        _, rates = np.broadcast_arrays(
-            unmasked("alpha", alpha), unmasked("alphadot", alphadot)
-        )
+        """Return xi (..., 3), (track/time, track/time, rad/time): (r (w_1 + w_2) / 2,
+        0, r (w_2 - w_1) / track)."""
+        alpha = unmasked("alpha", alpha)
+        alphadot = unmasked("alphadot", alphadot)
+        _, rates = np.broadcast_arrays(alpha, alphadot)
         return rates @ self._matrix.T
 
     def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
-        """Return A (3, 2) as a sympy Matrix, and the wheels' angles (`geomech.symbolic`)."""
+        """Return A (3, 2) as a sympy Matrix, and the wheels' angles
+        (`geomech.symbolic`)."""
         from geomech.symbolic import connections
 
         return connections.differential_drive(self.wheel_radius, body_size(self))

@@ -1,9 +1,10 @@
-"""A chain of links afloat: in space, on ice or an air table, where nothing pushes. It turns itself about, and goes nowhere.
+"""A floating chain of links: in space, on ice or on an air table, without outer forces.
 
-Its centre of mass stays where it is, and its angular momentum zero: a cat's righting, a diver's twist. Source: R. M. Murray,
-Z. Li and S. S. Sastry, A Mathematical Introduction to Robotic Manipulation (1994), Ch. 7; the three-link chain is the first
-example of G. C. Walsh and S. S. Sastry, IEEE Trans. Robotics and Automation 11, 139 (1995).
-"""
+It turns, and goes nowhere. Its centre of mass stays in place, and its angular momentum
+zero: a cat's righting, a diver's twist. Source: R. M. Murray, Z. Li and S. S. Sastry, A
+Mathematical Introduction to Robotic Manipulation (1994), Ch. 7; the three-link chain is
+the first example of G. C. Walsh and S. S. Sastry, IEEE Trans. Robotics and Automation
+11, 139 (1995)."""
 
 from __future__ import annotations
 
@@ -17,10 +18,11 @@ from geomech.systems.momentum import Momentum
 @SYSTEMS.register
 @dataclass(frozen=True)
 class FloatingChain(Momentum):
-    """Links joined by hinges, with masses and moments of inertia of their own.
+    """Links joined by hinges, each with its mass and moment of inertia.
 
-    masses (-): of the links, relative; as their lengths if left out. inertias (-): of each link about its centre, over its
-    mass and the square of its length; 1/12, that of a thin rod, if left out.
+    masses (-): of the links, relative; as their lengths if left out. inertias (-): of
+    each link about its centre, over its mass and the square of its length; if left out
+    1/12, of a thin rod.
 
     Examples
     --------
@@ -40,22 +42,30 @@ class FloatingChain(Momentum):
         self.check_per_link("inertias", 1e-6, 1e6)
 
     def inertia(self, number: int = float) -> tuple[list[Any], list[list[Any]]]:
-        """Return masses, as shares of the whole chain's, and inertias of the links (`Momentum.inertia`)."""
-        lengths = [number(x) for x in self.lengths]
-        masses = [number(x) for x in self.masses] or lengths
+        """Return masses, as shares of the whole chain's, and inertias of the links
+        (`Momentum.inertia`)."""
+        lengths = list(map(number, self.lengths))
+        masses = list(map(number, self.masses)) or lengths
         rod = number(1) / 12
-        inertias = [number(x) for x in self.inertias] or [rod] * len(lengths)
-        body, total = sum(lengths), sum(masses)
-        masses = [m / total for m in masses]
-        return masses, [
-            [m, m, k * m * (x / body) ** 2]
-            for m, k, x in zip(masses, inertias, lengths)
-        ]
+        coefficients = list(map(number, self.inertias)) or [rod] * len(lengths)
+        body = sum(lengths)
+        total = sum(masses)
+        shares = []
+        inertias = []
+        for mass, coefficient, length in zip(masses, coefficients, lengths):
+            share = mass / total
+            about = coefficient * share * (length / body) ** 2
+            shares.append(share)
+            inertias.append([share, share, about])
+        return shares, inertias
 
     @classmethod
     def examples(cls) -> dict[str, FloatingChain]:
-        return {
-            "floating-chain": cls(
-                (0.8, 1.3, 1.0), 0.4, "mean", (1.0, 0.5, 2.0), (0.1, 0.2, 0.05)
-            )
-        }
+        chain = cls(
+            lengths=(0.8, 1.3, 1.0),
+            length=0.4,
+            frame="mean",
+            masses=(1.0, 0.5, 2.0),
+            inertias=(0.1, 0.2, 0.05),
+        )
+        return {"floating-chain": chain}

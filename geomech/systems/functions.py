@@ -1,4 +1,5 @@
-"""A function velocity(alpha, alphadot), or positions(alpha), as a class that a scene may name."""
+"""A function velocity(alpha, alphadot), or positions(alpha), as a class that a scene
+may name."""
 
 from __future__ import annotations
 
@@ -16,89 +17,99 @@ from rft.core.registry import REGISTRIES
 
 
 def class_from_function(function: Callable) -> type:
-    """Return a class from a function that has an attribute ``joints``: of bodies if it has ``lengths`` of links, whose poses
-    it then returns for a shape alpha, else of systems, whose velocity it returns for alpha and alphadot. Further parameters
-    are fields of the class."""
-    return (
-        _body_class(function)
-        if hasattr(function, "lengths")
-        else _system_class(function)
-    )
+    """Return a class from a function that has an attribute ``joints``.
+
+    With ``lengths`` of links it is a class of bodies, and the function returns the
+    poses of links for a shape alpha. Else it is a class of systems, and the function
+    returns the velocity for alpha and alphadot. Further parameters are fields of the
+    class."""
+    if hasattr(function, "lengths"):
+        return _body_class(function)
+    return _system_class(function)
 
 
 def _system_class(function: Callable) -> type:
+    """Return a class of systems from a velocity."""
     _, _, *more = inspect.signature(function, eval_str=True).parameters.values()
 
     def velocity(self, alpha, alphadot):
         return function(alpha, alphadot, **_values(self, more))
 
+    def reduce(self):
+        return _rebuild, (SYSTEMS.group, self.kind, _values(self, more))
+
     members = {
         "length": getattr(function, "length", 1.0),
         "traits": getattr(function, "traits", NOTHING),
         "velocity": velocity,
-        "__reduce__": lambda self: (
-            _rebuild,
-            (SYSTEMS.group, self.kind, _values(self, more)),
-        ),
+        "__reduce__": reduce,
     }
     return _built(function, _fields(more), members)
 
 
 def _body_class(function: Callable) -> type:
+    """Return a class of bodies from the poses of links."""
     _, *more = inspect.signature(function, eval_str=True).parameters.values()
-    of_bodies = [
-        ("length", Length, dataclasses.field(default=1.0)),
-        ("frame", str, dataclasses.field(default="mean")),
-    ]
-    fields = [
-        *_fields(more),
-        *(field for field in of_bodies if field[0] not in {p.name for p in more}),
-    ]
+    fields = _fields(more)
+    names = [name for name, *_ in fields]
+    if "length" not in names:
+        fields.append(("length", Length, dataclasses.field(default=1.0)))
+    if "frame" not in names:
+        fields.append(("frame", str, dataclasses.field(default="mean")))
 
     def positions(self, alpha):
         return function(alpha, **_values(self, more))
 
+    def reduce(self):
+        values = {name: getattr(self, name) for name, *_ in fields}
+        return _rebuild, (BODIES.group, self.kind, values)
+
     members = {
         "lengths": tuple(function.lengths),
         "positions": positions,
-        "__reduce__": lambda self: (
-            _rebuild,
-            (
-                BODIES.group,
-                self.kind,
-                {name: getattr(self, name) for name, *_ in fields},
-            ),
-        ),
+        "__reduce__": reduce,
     }
     return _built(function, fields, members, PosedLinks)
 
 
 def _fields(parameters: list[inspect.Parameter]) -> list[tuple]:
-    """Return fields of a dataclass from parameters, with their annotations, else the types of their defaults."""
+    """Return fields of a dataclass from parameters, with their annotations, else the
+    types of their defaults."""
     unset = inspect.Parameter.empty
-    return [
-        (p.name, type(p.default) if p.annotation is unset else p.annotation)
-        + (() if p.default is unset else (dataclasses.field(default=p.default),))
-        for p in parameters
-    ]
+    fields: list[tuple] = []
+    for parameter in parameters:
+        kind = parameter.annotation
+        if kind is unset:
+            kind = type(parameter.default)
+        if parameter.default is unset:
+            fields.append((parameter.name, kind))
+        else:
+            default = dataclasses.field(default=parameter.default)
+            fields.append((parameter.name, kind, default))
+    return fields
 
 
 def _values(part: Any, parameters: list[inspect.Parameter]) -> dict[str, Any]:
+    """Return the values of a part's fields with the names of parameters."""
     return {p.name: getattr(part, p.name) for p in parameters}
 
 
 def _built(
     function: Callable, fields: list[tuple], members: dict[str, Any], *bases: type
 ) -> type:
+    """Return the frozen dataclass with the name, module and docstring of the
+    function."""
     kind = getattr(function, "kind", function.__name__.replace("_", "-"))
     members |= {"kind": kind, "joints": function.joints, "__doc__": function.__doc__}
     built = dataclasses.make_dataclass(
         function.__name__, fields, bases=bases, namespace=members, frozen=True
     )
-    built.__module__, built.__qualname__ = function.__module__, function.__qualname__
+    built.__module__ = function.__module__
+    built.__qualname__ = function.__qualname__
     return built
 
 
 def _rebuild(group: str, kind: str, values: dict[str, Any]) -> Any:
-    """Return a part that was sent to another process, in which its function is registered, too."""
+    """Return a part that was sent to another process, where its function is registered
+    as well."""
     return REGISTRIES[group][kind](**values)

@@ -1,13 +1,15 @@
-"""Chains of links whose momentum is zero and stays so: what moves them is inertia, and no force from outside.
+"""Chains of links whose momentum is zero and stays zero: inertia moves them, without an
+outer force.
 
-Link i has inertia along itself, across itself and about its centre, G_i = diag(m_t, m_n, I). With its velocity v_i = J_i xi +
-B_i alphadot the kinetic energy is T = 1/2 sum v_i^T G_i v_i; momentum, its derivative with respect to xi, is zero if
+Link i has inertia along itself, across itself and about its centre, G_i = diag(m_t,
+m_n, I). With its velocity v_i = J_i xi + B_i alphadot the kinetic energy is T = 1/2 sum
+v_i^T G_i v_i; momentum, its derivative with respect to xi, is zero if
 
     xi = A alphadot,    A = -(sum J_i^T G_i J_i)^-1 sum J_i^T G_i B_i,
 
-the mechanical connection (J. E. Marsden, R. Montgomery and T. S. Ratiu, Memoirs of the AMS 436 (1990)). What is left is
-T = 1/2 alphadot^T M(alpha) alphadot, M being the kinetic-energy metric of shape space.
-"""
+the mechanical connection (J. E. Marsden, R. Montgomery and T. S. Ratiu, Memoirs of the
+AMS 436 (1990)). Then T = 1/2 alphadot^T M(alpha) alphadot, with the kinetic-energy
+metric M of shape space."""
 
 from __future__ import annotations
 
@@ -28,22 +30,24 @@ from rft.formulas.newton import to_element
 
 @dataclass(frozen=True)
 class Linkage(Chain):
-    """A chain whose mean is that of its links' masses: "mean" is the centre of mass and the mean heading by mass."""
+    """A chain whose frame "mean" is the centre of mass and the mean heading by mass."""
 
     masses: tuple[float, ...] = ()
 
     def _frame_value(self, x: np.ndarray, link: int | None) -> np.ndarray:
+        if link is not None:
+            return x[link]
         masses = np.asarray(self.masses)
-        return x[link] if link is not None else masses @ x / masses.sum()
+        return masses @ x / masses.sum()
 
 
 @dataclass(frozen=True)
 class Momentum:
     """Base of chains without momentum.
 
-    lengths (-): relative link lengths, tail to head, all > 0, at least two. frame (-): "mean", centre of mass and
-    mass-weighted mean heading, or "link-1", "link-2" ..., those of that link.
-    """
+    lengths (-): relative link lengths, tail to head, all > 0, at least two. frame (-):
+    "mean", centre of mass and mass-weighted mean heading, or "link-1", "link-2" ...,
+    those of that link."""
 
     lengths: tuple[float, ...] = (1.0, 1.0, 1.0)
     length: Length = None
@@ -53,27 +57,28 @@ class Momentum:
 
     def __post_init__(self):
         check_numbers(self)
-        object.__setattr__(
-            self, "lengths", Chain(self.lengths, self.length, self.frame).lengths
-        )
+        chain = Chain(self.lengths, self.length, self.frame)
+        object.__setattr__(self, "lengths", chain.lengths)
 
     def check_per_link(self, name: str, least: float, most: float) -> None:
-        """Raise Refusal if the field of this name is neither empty nor a number from least to most for each link."""
+        """Refuse a field of this name that is neither empty nor a number from least to
+        most for each link."""
+        links = len(self.lengths)
         x = real_array(name, getattr(self, name))
-        if (
-            x.shape not in ((0,), (len(self.lengths),))
-            or not ((least <= x) & (x <= most)).all()
-        ):
+        in_bounds = (least <= x) & (x <= most)
+        if x.shape not in ((0,), (links,)) or not in_bounds.all():
             raise Refusal(
-                f"{name} must be {len(self.lengths)} numbers from {least:g} to {most:g}, one for each link, or left out",
+                f"{name} must be {links} numbers from {least:g} to {most:g}, one for"
+                " each link, or left out",
                 value=x.tolist(),
             )
         object.__setattr__(self, name, tuple(x.tolist()))
 
     def inertia(self, number: int = float) -> tuple[list[Any], list[list[Any]]]:
-        """Return masses of the links, and [along, across, about the centre] of each: the mass that it moves, its own
-        and the fluid's, in any one unit and body lengths. number: `float`, or `geomech.symbolic.connections.exact` for
-        formulas."""
+        """Return masses of the links, and [along, across, about the centre] of each:
+        its inertia with the fluid's, in any single unit and body lengths.
+
+        number: `float`, or `geomech.symbolic.connections.exact` for formulas."""
         raise NotImplementedError
 
     @property
@@ -86,9 +91,8 @@ class Momentum:
 
     @property
     def _chain(self) -> Linkage:
-        return Linkage(
-            self.lengths, self.length, self.frame, masses=tuple(self.inertia()[0])
-        )
+        masses, _ = self.inertia()
+        return Linkage(self.lengths, self.length, self.frame, masses=tuple(masses))
 
     def points(self, alpha: ArrayLike, pose: ArrayLike = (0.0, 0.0, 0.0)) -> np.ndarray:
         """Return the ends of the links in the world, as `rft.Chain.points`."""
@@ -101,36 +105,38 @@ class Momentum:
         return self._chain.frame_pose(frame, alpha, alphadot)
 
     def _weights(self, motion: Elements) -> np.ndarray:
-        """Return G (3, n, 1) for velocities (v_t, v_n, v_w); v_w is the rotation rate times half the length."""
+        """Return G (3, n, 1) for velocities (v_t, v_n, v_w); v_w is the rotation rate
+        times half the length."""
         along, across, about = np.array(self.inertia()[1]).T
         return np.stack([along, across, about / motion.half[:, 0] ** 2])[..., None]
 
     def _moving(self, alpha, alphadot) -> tuple[Elements, np.ndarray, np.ndarray]:
-        """Return the links, G, and xi (3, B) in body lengths, for shapes (B, joints)."""
+        """Return the links, G, and xi (3, B) in body lengths, for shapes (B,
+        joints)."""
         motion = self._chain.motion(alpha.T, alphadot.T)
         weights = self._weights(motion)
-        zero, one = np.zeros_like(motion.c), np.ones_like(motion.c)
-        J = np.stack(
+        zero = np.zeros_like(motion.c)
+        half = motion.half * np.ones_like(motion.c)
+        J = np.array(  # (v, xi, n, B)
             [
-                np.stack([motion.c, motion.s, motion.r_t]),
-                np.stack([-motion.s, motion.c, motion.r_n]),
-                np.stack([zero, zero, motion.half * one]),
+                [motion.c, motion.s, motion.r_t],
+                [-motion.s, motion.c, motion.r_n],
+                [zero, zero, half],
             ]
-        )  # (v, xi, n, B)
+        )
         weighted = weights[:, None] * J
         locked = np.einsum("vinb,vjnb->bij", weighted, J)
         momentum = np.einsum("vinb,vnb->bi", weighted, motion.v)
-        return motion, weights, -np.linalg.solve(locked, momentum[..., None])[..., 0].T
+        xi = -np.linalg.solve(locked, momentum[..., None])[..., 0].T
+        return motion, weights, xi
 
     def _flat(self, alpha, alphadot) -> tuple[np.ndarray, np.ndarray, tuple[int, ...]]:
-        alpha, alphadot = np.broadcast_arrays(
-            unmasked("alpha", alpha), unmasked("alphadot", alphadot)
-        )
-        return (
-            alpha.reshape(-1, self.joints),
-            alphadot.reshape(-1, self.joints),
-            alpha.shape[:-1],
-        )
+        """Return shapes and rates (B, joints), and their leading axes."""
+        alpha = unmasked("alpha", alpha)
+        alphadot = unmasked("alphadot", alphadot)
+        alpha, alphadot = np.broadcast_arrays(alpha, alphadot)
+        lead = alpha.shape[:-1]
+        return alpha.reshape(-1, self.joints), alphadot.reshape(-1, self.joints), lead
 
     def velocity(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
         """Return xi (..., 3) in the frame, (length/time, length/time, rad/time)."""
@@ -139,21 +145,17 @@ class Momentum:
         return xi * [body_size(self), body_size(self), 1.0]
 
     def squared_speed(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
-        """Return alphadot^T M alphadot (...,): twice the kinetic energy, in the unit of `inertia` and body lengths."""
+        """Return alphadot^T M alphadot (...,): twice the kinetic energy, in the unit of
+        `inertia` and body lengths."""
         alpha, alphadot, shape = self._flat(alpha, alphadot)
         motion, weights, xi = self._moving(alpha, alphadot)
-        return (
-            (
-                weights
-                * (motion.v + np.stack(np.broadcast_arrays(*to_element(motion, *xi))))
-                ** 2
-            )
-            .sum((0, 1))
-            .reshape(shape)
-        )
+        carried = np.stack(np.broadcast_arrays(*to_element(motion, *xi)))
+        velocity = motion.v + carried
+        return (weights * velocity**2).sum((0, 1)).reshape(shape)
 
     def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
-        """Return A (3, joints) as a sympy Matrix, and its angles (`geomech.symbolic`)."""
+        """Return A (3, joints) as a sympy Matrix, and its angles
+        (`geomech.symbolic`)."""
         from geomech.symbolic import connections
 
         masses, inertia = self.inertia(connections.exact)

@@ -1,8 +1,9 @@
-"""The no-slip, or kinematic, snake: three links on wheels that roll along the link and do not slip sideways.
+"""The no-slip, or kinematic, snake: three links on wheels that roll along the link and
+do not slip sideways.
 
-The velocity across the link is zero at every link's centre: three equations for xi, linear in alphadot, no force law.
-Source: the kinematic snake of E. A. Shammas, H. Choset and A. A. Rizzi, Int. J. Robotics Research 26, 1075 (2007).
-"""
+The velocity across the link is zero at every link's centre: three equations for xi,
+linear in alphadot, without a force law. Source: the kinematic snake of E. A. Shammas,
+H. Choset and A. A. Rizzi, Int. J. Robotics Research 26, 1075 (2007)."""
 
 from __future__ import annotations
 
@@ -19,17 +20,21 @@ from rft.bodies.base import Length, body_size
 from rft.core.checks import unmasked
 from rft.core.refusal import Refusal
 
+# The equations count as singular below this determinant; roundoff is smaller.
+SINGULAR = 1e-14
+
 
 @SYSTEMS.register
 @dataclass(frozen=True)
 class NoSlipSnake:
     """Three links, tail to head, with wheels at their centres.
 
-    lengths (-): relative. frame (-): "mean", centre of mass and mean heading, or "link-1", "link-2", "link-3", those of
-    that link.
+    lengths (-): relative. frame (-): "mean", centre of mass and mean heading, or
+    "link-1", "link-2", "link-3", centre and heading of that link.
 
-    Where the wheels' axles meet in one point, or are parallel, the snake can turn about it without rolling any wheel
-    sideways: the shape is singular. For equal links that is alpha_1 = alpha_2, the straight snake and arcs of a circle.
+    Where the wheels' axles meet in one point, or are parallel, the snake can turn about
+    it without a wheel slipping sideways: the shape is singular. For equal links that is
+    alpha_1 = alpha_2, the straight snake and arcs of a circle.
 
     Examples
     --------
@@ -55,12 +60,13 @@ class NoSlipSnake:
 
     @property
     def traits(self) -> Traits:
-        where = {
-            "singularity": self._determinant,
-            "singular": "the wheels' axles meet in one point",
-        }
         return Traits(
-            linear=True, mirror=True, joint_angles=True, frame=self.frame, **where
+            linear=True,
+            mirror=True,
+            joint_angles=True,
+            frame=self.frame,
+            singularity=self._determinant,
+            singular="the wheels' axles meet in one point",
         )
 
     @property
@@ -72,32 +78,37 @@ class NoSlipSnake:
         return self._chain.points(alpha, pose)
 
     def _rolling(self, alpha, alphadot):
-        """Return rows (..., 3, 3) and sides (..., 3): velocity across each link's centre = row . xi + side, body
-        lengths."""
-        alpha, alphadot = np.broadcast_arrays(
-            unmasked("alpha", alpha), unmasked("alphadot", alphadot)
-        )
-        m = self._chain.motion(*(x.reshape(-1, 2).T for x in (alpha, alphadot)))
-        rows, shape = np.stack([-m.s, m.c, m.r_n], -1).swapaxes(0, 1), alpha.shape[:-1]
-        return rows.reshape(*shape, 3, 3), m.v[1].T.reshape(*shape, 3)
+        """Return rows (..., 3, 3) and sides (..., 3): velocity across each link's
+        centre = row . xi + side, body lengths."""
+        alpha = unmasked("alpha", alpha)
+        alphadot = unmasked("alphadot", alphadot)
+        alpha, alphadot = np.broadcast_arrays(alpha, alphadot)
+        motion = self._chain.motion(alpha.reshape(-1, 2).T, alphadot.reshape(-1, 2).T)
+        rows = np.stack([-motion.s, motion.c, motion.r_n], -1).swapaxes(0, 1)
+        sides = motion.v[1].T
+        lead = alpha.shape[:-1]
+        return rows.reshape(*lead, 3, 3), sides.reshape(*lead, 3)
 
     def about(self) -> dict:
-        return {
-            "singular_shapes": f"nan, where {self.traits.singular}, and where they lie between a grid point and the next"
-        }
+        where = (
+            f"nan, where {self.traits.singular}, and where they lie between a grid"
+            " point and the next"
+        )
+        return {"singular_shapes": where}
 
     def _determinant(self, alpha) -> np.ndarray:
-        """Return the determinant of the three equations (...,), 0 at singular shapes; no unit."""
+        """Return the determinant of the three equations (...,), 0 at singular shapes;
+        no unit."""
         det = np.linalg.det(self._rolling(alpha, np.zeros(2))[0])
-        return np.where(np.abs(det) < 1e-14, 0.0, det)
+        return np.where(np.abs(det) < SINGULAR, 0.0, det)
 
     def velocity(self, alpha: ArrayLike, alphadot: ArrayLike) -> np.ndarray:
-        """Return xi (..., 3) in the frame, (length/time, length/time, rad/time); nan at singular shapes."""
+        """Return xi (..., 3) in the frame, (length/time, length/time, rad/time); nan at
+        singular shapes."""
         rows, side = self._rolling(alpha, alphadot)
-        good = np.abs(np.linalg.det(rows)) >= 1e-14
-        xi = np.linalg.solve(
-            np.where(good[..., None, None], rows, np.eye(3)), -side[..., None]
-        )[..., 0]
+        good = np.abs(np.linalg.det(rows)) >= SINGULAR
+        rows = np.where(good[..., None, None], rows, np.eye(3))
+        xi = np.linalg.solve(rows, -side[..., None])[..., 0]
         scale = [body_size(self), body_size(self), 1.0]
         return np.where(good[..., None], xi, np.nan) * scale
 

@@ -16,10 +16,9 @@ from rft.formulas.quadrature import parse
 class Solver:
     """How the balance of forces is solved; part of [numerics].
 
-    loads (-): "exact", "midpoint:N", "gauss:N" (rft.formulas.quadrature). backend (-):
-    what computes, "numpy", "numba" (compiled code, where numba is installed) or "auto":
-    compiled code where numba is installed (`rft.balance.backend`). Answers are the same
-    but for rounding.
+    loads (-): "exact", "midpoint:N", "gauss:N" (rft.formulas.quadrature). backend (-): "numpy",
+    "numba" (compiled code, where numba is installed) or "auto": compiled code where
+    numba is installed (`rft.balance.backend`). Answers are the same but for rounding.
 
     Examples
     --------
@@ -44,19 +43,25 @@ class Solver:
     cycles: Annotated[
         int | None,
         Number(
-            1, 10_000, "-",
-            "cycles of time stepping (rft.time_steps); if left out until they are periodic, one where effects break "
-            "symmetry", whole=True,
+            1,
+            10_000,
+            "-",
+            "cycles of time stepping (rft.time_steps); if left out until they are "
+            "periodic, one where effects break symmetry",
+            whole=True,
         ),
-    ] = None  # fmt: skip
+    ] = None
     pieces: Annotated[
         int,
         Number(
-            1, MOST_PIECES, "-",
-            "pieces to a body length, 1 to 10,000, into which effects that vary along an element cut it (rft.effects)",
+            1,
+            MOST_PIECES,
+            "-",
+            "pieces to a body length, 1 to 10,000, into which effects that vary along "
+            "an element cut it (rft.effects)",
             whole=True,
         ),
-    ] = PIECES  # fmt: skip
+    ] = PIECES
     backend: str = "auto"
 
     def __post_init__(self):
@@ -65,17 +70,18 @@ class Solver:
         check_numbers(self)
 
     def computed(self, compilable: bool, law: str) -> str:
-        """Return what solves the balances, in words, and why not compiled code. compilable: whether compiled code has
-        the law of that name."""
+        """Return the back end in words, and why it is not compiled code.
+
+        compilable: whether compiled code has the law of that name."""
         if self.backend == "numpy":
             return "NumPy, as asked for"
         if not compilable:
-            return f"NumPy: compiled code does not know the law {law}, whose traction is no formula"
+            return (
+                f"NumPy: compiled code does not know the law {law}, whose traction is"
+                " no formula"
+            )
         if not installed():
             return "NumPy: numba is not installed (pip install 'geomech[fast]')"
-        small = (
-            ""
-            if self.backend == "numba"
-            else "; commands take NumPy where there is little to compute"
-        )
-        return f"compiled code{small}"
+        if self.backend == "numba":
+            return "compiled code"
+        return "compiled code; commands take NumPy where there is little to compute"

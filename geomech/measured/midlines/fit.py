@@ -1,7 +1,9 @@
-"""From a trial to kinematics with intervals: checks, period, smoothing, head and tail, cycles."""
+"""From a trial to kinematics with intervals: checks, period, smoothing, head and tail,
+cycles."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,20 +23,24 @@ LEAST_AHEAD = 0.4 * np.pi  # rad of phase in half a cycle
 LIKE = 0.5  # correlation of a cycle with the mean of all, at least
 PACE = 1.6  # ratio of a cycle's duration to the median, at most
 EVEN = 0.7  # rad, by which the phase of few cycles may stray from a line
-LONGEST, SHORTEST = 30.0, 1e-4  # m: bodies beyond are in another unit
-MOVES = 0.02  # body lengths per cycle: below it nobody sees where a body goes
-STRETCHLESS = 0.6  # prior probability that a body keeps its length where its motion varies, assumed
-WHOLE = 0.995  # of the body's length, from which on points are taken to reach both ends
-AGREED = 1.4  # ratio of the points' length to a body length that is given, at most
+LONGEST = 30.0  # m: longer bodies are in another unit
+SHORTEST = 1e-4  # m: shorter bodies are in another unit
+LEAST_STRIDE = 0.02  # body lengths per cycle: less does not show where a body goes
+# Prior probability that a body keeps its length where its motion varies, assumed.
+CONSTANT_LENGTH = 0.6
+WHOLE = 0.995  # of the body's length: such points are taken to reach both ends
+LARGEST_RATIO = 1.4  # of the points' length to a given body length
 
 
 @dataclass(frozen=True, eq=False)
 class Kinematics:
     """Kinematics of a trial.
 
-    trial: points from tail to head. curve, coarse: smooth midlines, and the same with fewer modes and knots. clock:
-    phase. marks: phases that begin and end the full cycles, of which ``used`` (C,) are without gaps. sample, intervals:
-    of `kinematics.QUANTITIES`. level: share of cases in which intervals cover the truth. head: how the head was found."""
+    trial: points from tail to head. curve, coarse: smooth midlines, and the same with
+    fewer modes and knots. clock: phase. marks: phases that begin and end the full
+    cycles, of which ``used`` (C,) are without gaps. sample, intervals: of
+    `kinematics.QUANTITIES`. level: share of cases in which intervals cover the truth.
+    head: how the head was found."""
 
     trial: Trial
     curve: smooth.Curve
@@ -55,7 +61,8 @@ class Kinematics:
 
     @property
     def own_length(self) -> float:
-        """Length of the piece of the body from its first point to its last, in the trial's unit."""
+        """Length of the piece of the body from its first point to its last, in the
+        trial's unit."""
         return float(kinematics.averages(self.cycles(self.curve)).numbers[:, 1].mean())
 
     def value(self, name: str) -> tuple[float, float]:
@@ -65,11 +72,22 @@ class Kinematics:
 
 
 def fit_midlines(
-    midlines: str | Path | Trial, *, columns: Sequence[str] = (), units: str | None = None, scale: float | None = None,
-    fps: float | None = None, y: str | None = None, head: str | None = None, least_score: float | None = None,
-    individual: str | None = None, body_length: float | None = None, mend: bool = False, level: float = 0.95,
-) -> Kinematics:  # fmt: skip
-    """Return the kinematics of a trial; Refusal, with its place, for data that do not give it.
+    midlines: str | Path | Trial,
+    *,
+    columns: Sequence[str] = (),
+    units: str | None = None,
+    scale: float | None = None,
+    fps: float | None = None,
+    y: str | None = None,
+    head: str | None = None,
+    least_score: float | None = None,
+    individual: str | None = None,
+    body_length: float | None = None,
+    mend: bool = False,
+    level: float = 0.95,
+) -> Kinematics:
+    """Return the kinematics of a trial; Refusal, with its place, for data that do not
+    give it.
 
     Parameters
     ----------
@@ -88,31 +106,34 @@ def fit_midlines(
     head : "first" or "last"
         Which of the points is the head; by default as the motion shows.
     least_score : number
-        Points of a lower score are taken for missing; by default of a likelihood below 0.6, and of no other score.
+        Points of a lower score are taken for missing; by default of a likelihood below
+        0.6, and of no other score.
     individual : name
         The animal to take, of several.
     body_length : number
         In ``units``, where the points do not reach both ends.
     mend : bool
-        Leave out points that jump or swap, and turn frames round that run the other way; both are noted.
+        Leave out points that jump or swap, and turn frames round that run the other
+        way; both are noted.
     level : number
         Share of cases in which intervals cover the truth.
     """
     in_range("``level``", level, 0.5, 0.999)
     if head is not None:
         choose("``head``", head, ("first", "last"))
-    options = {
-        "points": columns,
-        "units": units,
-        "scale": scale,
-        "fps": fps,
-        "y": y,
-        "least_score": least_score,
-        "individual": individual,
-    }
     trial = midlines
     if not isinstance(trial, Trial):
-        trial = reader.read(midlines, **options, body_length=body_length)
+        trial = reader.read(
+            midlines,
+            points=columns,
+            units=units,
+            scale=scale,
+            fps=fps,
+            y=y,
+            least_score=least_score,
+            individual=individual,
+            body_length=body_length,
+        )
     trial = smooth.filled(slips.checked(trial, mend))
     repeat = period(trial)
     curve, trial = smooth.fitted(trial, repeat)
@@ -134,15 +155,18 @@ def fit_midlines(
     near = clock.phase(curve)
 
     def values(curve: smooth.Curve) -> tuple[np.ndarray, np.ndarray]:
-        each = kinematics.averages(used_cycles(curve, clock, marks, used, near))
-        weighted = lambda w: kinematics.quantities(
-            each.weighted(w), trial.length, trial.unit == "m"
-        )
+        averages = kinematics.averages(used_cycles(curve, clock, marks, used, near))
+
+        def weighted(weights):
+            return kinematics.quantities(
+                averages.weighted(weights), trial.length, trial.unit == "m"
+            )
+
         return kinematics.pseudo_values(weighted, len(used))
 
     sample = intervals.sampled(curve, coarse, values, clock.of_frames(curve))
     constant = np.full(len(sample.value), intervals.CONSTANT)
-    constant[kinematics.QUANTITIES.index("body_length")] = STRETCHLESS
+    constant[kinematics.QUANTITIES.index("body_length")] = CONSTANT_LENGTH
     found = intervals.intervals(sample, level, constant)
     return Kinematics(
         trial, curve, coarse, clock, marks, used, sample, found, level, words
@@ -153,13 +177,13 @@ def used_cycles(
     curve, clock: kinematics.Clock, marks, used, near=None
 ) -> kinematics.Cycles:
     """Return the cycles that have no gap. near: as of `kinematics.Clock.phase`."""
-    return kinematics.cycles(
-        curve, kinematics.times(clock, clock.phase(curve, near), marks)
-    ).selected(used)
+    times = kinematics.times(clock, clock.phase(curve, near), marks)
+    return kinematics.cycles(curve, times).selected(used)
 
 
 def period(trial: Trial) -> float:
-    """Return the period of the body's bends; Refusal if they do not repeat, or too few frames show them."""
+    """Return the period of the body's bends; Refusal if they do not repeat, or too few
+    frames show them."""
     headings = smooth.crude(trial)
     t = np.linspace(trial.t[0], trial.t[-1], len(trial.t))
     even = np.stack([np.interp(t, trial.t, x) for x in headings.T], -1)
@@ -169,7 +193,8 @@ def period(trial: Trial) -> float:
             "the body does not repeat its motion",
             instead="give one cycle at least, better eight, of one gait",
         )
-    if (rows := repeat / np.median(np.diff(trial.t))) < ROWS:
+    rows = repeat / np.median(np.diff(trial.t))
+    if rows < ROWS:
         raise trial.wrong(
             f"{rows:.2g} frames a cycle are too few",
             instead=f"give at least {ROWS}, better 30",
@@ -178,32 +203,34 @@ def period(trial: Trial) -> float:
 
 
 def _turning(t: np.ndarray, headings: np.ndarray) -> float:
-    """Return the period of headings (T, 8) that turn evenly in the plane of their principal components; 0 if they do not.
-    It serves trials of less than two cycles."""
+    """Return the period of headings (T, 8) that turn evenly in the plane of their
+    principal components; 0 if they do not. It serves trials of less than two cycles."""
     scores = np.linalg.svd(headings - headings.mean(0), full_matrices=False)[0]
     angle = np.unwrap(np.arctan2(scores[:, 1], scores[:, 0]))
     slope, start = np.polyfit(t, angle, 1)
-    return 2 * np.pi / abs(slope) if np.std(angle - slope * t - start) < EVEN else 0.0
+    if np.std(angle - slope * t - start) >= EVEN:
+        return 0.0
+    return 2 * np.pi / abs(slope)
 
 
 def _with_length(trial: Trial, curve: smooth.Curve) -> Trial:
     """Refuse lengths that no body has, or that contradict each other."""
-    length = float(
-        np.abs(smooth.placed(curve.basis(curve.places, 1), curve.at(curve.t))).mean()
-    )
+    tangent = smooth.placed(curve.basis(curve.places, 1), curve.at(curve.t))
+    length = float(np.abs(tangent).mean())
     if trial.unit == "m" and not SHORTEST < length < LONGEST:
         raise trial.wrong(
             f"the body is {length:.3g} m long",
             instead="say the unit of x and y: mm, cm or px by ``units``",
         )
-    if trial.unit == "BL" and not 1 / AGREED < length < AGREED:
+    if trial.unit == "BL" and not 1 / LARGEST_RATIO < length < LARGEST_RATIO:
         raise trial.wrong(
             f"the body is {length:.3g} body lengths long",
             instead="say the unit of x and y by ``units``",
         )
-    if trial.length is not None and length > AGREED * trial.length:
+    if trial.length is not None and length > LARGEST_RATIO * trial.length:
         raise trial.wrong(
-            f"the points lie along {length:.3g} and the body is {trial.length:.3g} long",
+            f"the points lie along {length:.3g} and the body is {trial.length:.3g}"
+            " long",
             instead="give ``body_length`` in the unit of x and y, which ``units`` says",
         )
     return trial
@@ -212,7 +239,8 @@ def _with_length(trial: Trial, curve: smooth.Curve) -> Trial:
 def full_cycles(
     trial: Trial, curve, clock: kinematics.Clock
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the phases that begin and end full cycles, and the numbers of those that have no gap and are like the others."""
+    """Return the phases that begin and end full cycles, and the numbers of those that
+    have no gap and are like the others."""
     phase = clock.phase(curve)
     _check_growing(trial, clock.t, phase)
     marks = kinematics.marks(clock, phase)
@@ -224,14 +252,14 @@ def full_cycles(
         )
     times = kinematics.times(clock, phase, marks)
     _check_pace(trial, times)
-    used = np.array(
-        [k for k in range(len(marks) - 1) if not _gap(trial, times[k], times[k + 1])],
-        int,
-    )
+    spans = itertools.pairwise(times)
+    complete = [k for k, span in enumerate(spans) if not _has_gap(trial, *span)]
+    used = np.array(complete, int)
     if not used.size:
-        widest = int(np.diff(trial.t).argmax())
+        gaps = np.diff(trial.t)
+        widest = int(gaps.argmax())
         raise trial.wrong(
-            f"no frames for {np.diff(trial.t)[widest]:.3g} after this one, and so in every cycle",
+            f"no frames for {gaps[widest]:.3g} after this one, and so in every cycle",
             widest,
             instead="give a trial with one cycle at least that has no gap",
         )
@@ -240,28 +268,33 @@ def full_cycles(
 
 
 def _check_growing(trial: Trial, t: np.ndarray, phase: np.ndarray) -> None:
-    """Refuse a trial whose phase stands or runs back: over half a cycle it must grow by at least a fifth of one."""
+    """Refuse a trial whose phase stands or runs back: over half a cycle it must grow by
+    at least a fifth of one."""
     half = kinematics.PHASES // 2
     ahead = phase[half:] - phase[:-half]
-    if (bad := np.flatnonzero(ahead < LEAST_AHEAD)).size:
+    bad = np.flatnonzero(ahead < LEAST_AHEAD)
+    if bad.size:
         raise trial.wrong(
             f"the motion stands, or is another one, after t = {t[bad[0]]:.4g}",
             instead="cut pauses, starts and other gaits out, and give each its file",
         )
 
 
-def _gap(trial: Trial, start: float, end: float) -> bool:
+def _has_gap(trial: Trial, start: float, end: float) -> bool:
+    """Return whether a cycle has a GAP without a frame."""
     inside = trial.t[(trial.t > start) & (trial.t < end)]
     return np.diff(inside, prepend=start, append=end).max() > GAP * (end - start)
 
 
 def _check_pace(trial: Trial, times: np.ndarray) -> None:
+    """Refuse a cycle that takes much longer or shorter than most."""
     duration = np.diff(times)
     ratio = duration / np.median(duration)
     k = int(np.abs(np.log(np.maximum(ratio, 1e-6))).argmax())
     if not 1 / PACE < ratio[k] < PACE:
         raise trial.wrong(
-            f"the cycle from t = {times[k]:.4g} to {times[k + 1]:.4g} takes {ratio[k]:.2g} times as long as most",
+            f"the cycle from t = {times[k]:.4g} to {times[k + 1]:.4g} takes"
+            f" {ratio[k]:.2g} times as long as most",
             instead="cut pauses, starts and other gaits out, and give each its file",
         )
 
@@ -270,14 +303,14 @@ def _check_alike(trial: Trial, cycles: kinematics.Cycles) -> None:
     """Refuse a cycle whose bends have little in common with the mean of all."""
     headings = cycles.headings - cycles.headings.mean(-1, keepdims=True)
     mean = np.median(headings, 0)
-    like = (headings * mean).sum((1, 2)) / np.sqrt(
-        (headings**2).sum((1, 2)) * (mean**2).sum()
-    )
-    k = int(like.argmin())
-    if like[k] < LIKE:
+    size = np.sqrt((headings**2).sum((1, 2)) * (mean**2).sum())
+    correlation = (headings * mean).sum((1, 2)) / size
+    k = int(correlation.argmin())
+    if correlation[k] < LIKE:
         start, end = cycles.t[k, [0, -1]]
         raise trial.wrong(
-            f"the cycle from t = {start:.4g} to {end:.4g} does not repeat the others (correlation {like[k]:.2g})",
+            f"the cycle from t = {start:.4g} to {end:.4g} does not repeat the others"
+            f" (correlation {correlation[k]:.2g})",
             instead="cut it out, and give each gait a file",
         )
 
@@ -285,33 +318,38 @@ def _check_alike(trial: Trial, cycles: kinematics.Cycles) -> None:
 def _head(
     trial: Trial, cycles: kinematics.Cycles, head: str | None
 ) -> tuple[bool, str]:
-    """Return whether the first point is the head, and how that was found: a body moves head first, and the wave that drives it
-    runs to the tail."""
-    ends = trial.names[0], trial.names[-1]
-    each = kinematics.averages(cycles)
-    length = each.numbers[:, 1].mean()
-    forward = (np.cos(each.numbers[:, 3]) * each.numbers[:, 2]).mean() / length
-    wave = kinematics.wave_sign(each.first.mean(0))
-    motion = int(np.sign(forward)) if abs(forward) > MOVES else 0
+    """Return whether the first point is the head, and how that was found: a body moves
+    head first, and the wave that drives it runs to the tail."""
+    ends = (trial.names[0], trial.names[-1])
+    averages = kinematics.averages(cycles)
+    length = averages.numbers[:, 1].mean()
+    distance = averages.numbers[:, 2]
+    drift = averages.numbers[:, 3]
+    forward = (np.cos(drift) * distance).mean() / length
+    wave = kinematics.wave_sign(averages.first.mean(0))
+    motion = 0
+    if abs(forward) > LEAST_STRIDE:
+        motion = int(np.sign(forward))
     if head is not None:
-        backwards = motion and (motion > 0) == (head == "first")
-        return (
-            head == "first",
-            f"{ends[0] if head == 'first' else ends[1]}, as given"
-            + backwards * "; it moves tail first",
-        )
+        is_first = head == "first"
+        words = f"{ends[0] if is_first else ends[1]}, as given"
+        moves_to_tail = motion < 0
+        if is_first:
+            moves_to_tail = motion > 0
+        if moves_to_tail:
+            words = f"{words}; it moves tail first"
+        return is_first, words
     if motion and motion != wave:
         raise trial.wrong(
-            f"the body moves towards its point {ends[motion > 0]}, and so does its wave",
+            f"the body moves towards its point {ends[motion > 0]}, and so does its"
+            " wave",
             because="most swimmers move head first against their wave",
             instead="say which end is the head, ``head`` first or last",
         )
-    shown = (
-        "it moves there, against its wave"
-        if motion
-        else "the wave runs away from it; the body hardly moves"
-    )
-    return wave < 0, f"{ends[wave > 0]}, by the motion: {shown}"
+    evidence = "the wave runs away from it; the body hardly moves"
+    if motion:
+        evidence = "it moves there, against its wave"
+    return wave < 0, f"{ends[wave > 0]}, by the motion: {evidence}"
 
 
 def _ends_note(trial: Trial, curve: smooth.Curve) -> list[str]:
@@ -323,16 +361,19 @@ def _ends_note(trial: Trial, curve: smooth.Curve) -> list[str]:
     if share > WHOLE:
         return []
     return [
-        f"the points cover {share:.0%} of the body: slip, amplitude, heading and turn are those of that piece"
+        f"the points cover {share:.0%} of the body: slip, amplitude, heading and turn"
+        " are those of that piece"
     ]
 
 
 def _notes(used: np.ndarray) -> list[str]:
-    notes, count = [], len(used)
+    """Return a note on too few cycles."""
+    count = len(used)
     if count == 1:
-        notes.append(
-            "one full cycle does not show how cycles vary: intervals are of the tracking's noise alone"
-        )
-    elif count < FEWEST:
-        notes.append("two full cycles hardly show how cycles vary")
-    return notes
+        return [
+            "one full cycle does not show how cycles vary: intervals are of the"
+            " tracking's noise alone"
+        ]
+    if count < FEWEST:
+        return ["two full cycles hardly show how cycles vary"]
+    return []

@@ -1,16 +1,22 @@
-"""Files of tracked points, CSV: a row a point, a row a frame, or as DeepLabCut and SLEAP write them.
+"""Files of tracked points, CSV: a row a point, a row a frame, or as DeepLabCut and
+SLEAP write them.
 
-    t,point,x,y[,likelihood]          a row for each point of each frame, in any order of the rows
-    t,x,y                             the same without numbers; every frame has all points, in order
+    t,point,x,y[,likelihood]          a row for each point of each frame, in any order
+    of the rows
+    t,x,y                             the same without numbers; every frame has all
+    points, in order
     t,x1,y1,x2,y2,... (nose_x, nose.y, y_nose, ... likewise)   a row for each frame
-    scorer / bodyparts / coords       three header rows, then a row for each frame (DeepLabCut)
+    scorer / bodyparts / coords       three header rows, then a row for each frame
+    (DeepLabCut)
 
-frame may stand for t. A name may end in a unit: x_mm, y (px), time_ms. Empty cells and nan are points that the tracker
-did not find. DeepLabCut and SLEAP count pixels, and y downwards. The score of SLEAP, and whatever is not called
-likelihood, is no probability, and has no limit unless one is asked for."""
+frame may stand for t. A name may end in a unit: x_mm, y (px), time_ms. Empty cells and
+nan are points that the tracker did not find. DeepLabCut and SLEAP count pixels, and y
+downwards. The score of SLEAP, and whatever is not called likelihood, is no probability,
+and has no limit unless one is asked for."""
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Sequence
@@ -37,7 +43,9 @@ from rft.core.checks import in_range
 from rft.core.refusal import Refusal, formatted
 
 LARGEST_FILE = 200_000_000  # bytes
-FEWEST_FRAMES, FEWEST_POINTS, MOST_POINTS = 12, 5, 1000
+FEWEST_FRAMES = 12
+FEWEST_POINTS = 5
+MOST_POINTS = 1000
 TIMES = ("t", "time", "timestamp", "seconds", "sec")
 FRAMES = ("frame", "frames", "frame_idx", "frame_number", "fnum", "index", "")
 POINTS = ("point", "bodypart", "node", "id", "point_id", "keypoint")
@@ -57,23 +65,27 @@ FIRST = re.compile(rf"(x|y|{'|'.join(SCORES)})[_. -]?(.+)")
 IMAGE = re.compile(r"labeled-data|\.(png|jpe?g|tiff?|bmp)$", re.I)
 LENGTHS = UNITS["length"]
 LEAST_SCORE = 0.6  # likelihood below which DeepLabCut itself draws no point
-MANY = (
-    0.1  # of the points that the tracker found: more that are dropped are told loudly
-)
+# Of the points that the tracker found: a larger dropped share is noted first.
+MANY = 0.1
 SEVERAL = 0.1  # of the times: more with several rows are those of several animals
 SINGLE = "single"  # DeepLabCut's name for points that belong to no animal
-DEEPLABCUT, SLEAP = "DeepLabCut", "SLEAP"
+DEEPLABCUT = "DeepLabCut"
+SLEAP = "SLEAP"
 UNTRACKED = {  # what to do about animals that a file does not tell apart
     SLEAP: "track them in SLEAP and export again, or export one of them",
     "": "add a column track with the name of each, or give each a file",
 }
-WHAT = "give a CSV file with a header such as t,point,x,y or t,x1,y1,x2,y2, or one of DeepLabCut"
+WHAT = (
+    "give a CSV file with a header such as t,point,x,y or t,x1,y1,x2,y2, or one of"
+    " DeepLabCut"
+)
 
 
 class Table(NamedTuple):
-    """A file as a table of frames: t (F,), values (F, P, 3) of x, y and score, names and lines (F, P), the unit that the
-    header says, whether t is a time, columns that are not used, the program that wrote it, "" if none is known, the
-    least score that it takes for a point, and notes."""
+    """A file as a table of frames: t (F,), values (F, P, 3) of x, y and score, names
+    and lines (F, P), the unit that the header says, whether t is a time, columns that
+    are not used, the program that wrote it, "" if none is known, the least score that
+    it takes for a point, and notes."""
 
     t: np.ndarray
     values: np.ndarray
@@ -88,8 +100,8 @@ class Table(NamedTuple):
 
 
 def kind_of(header: Sequence[str]) -> str:
-    """Return "midlines" for the header of points along a body, "log" for that of joint angles, "" where it does not
-    say."""
+    """Return "midlines" for the header of points along a body, "log" for a header of
+    joint angles, "" for others."""
     bare = {split_unit(name)[0] for name in header}
     joints = [name for name in bare if JOINT.fullmatch(plain(name))]
     if is_midlines(header):
@@ -100,34 +112,40 @@ def kind_of(header: Sequence[str]) -> str:
 
 
 def is_midlines(header: Sequence[str]) -> bool:
-    """Return whether the header of a file is that of points along a body, not of a log of joint angles."""
+    """Return whether the header of a file names points along a body, not a log of joint
+    angles."""
     bare = {split_unit(name)[0] for name in header}
-    if (
-        {*header[:1]} & {*STACKED}
-        or {"s", "curvature"} <= bare
-        or {*POINTS[:2]} & bare
-        or len(_pairs(header)) > 1
-    ):
+    if {*header[:1]} & {*STACKED} or {*POINTS[:2]} & bare:
         return True
-    return (
-        {"x", "y"} <= bare
-        and not {"heading", "theta", "yaw"} & bare
-        and not any(map(JOINT.fullmatch, bare))
-    )
+    if {"s", "curvature"} <= bare or len(_pairs(header)) > 1:
+        return True
+    if not {"x", "y"} <= bare:
+        return False
+    has_pose = {"heading", "theta", "yaw"} & bare
+    return not has_pose and not any(map(JOINT.fullmatch, bare))
 
 
 def read(
-    path: str | Path, *, points: Sequence[str] = (), units: str | None = None, scale: float | None = None,
-    fps: float | None = None, y: str | None = None, least_score: float | None = None, body_length: float | None = None,
+    path: str | Path,
+    *,
+    points: Sequence[str] = (),
+    units: str | None = None,
+    scale: float | None = None,
+    fps: float | None = None,
+    y: str | None = None,
+    least_score: float | None = None,
+    body_length: float | None = None,
     individual: str | None = None,
-) -> Trial:  # fmt: skip
+) -> Trial:
     """Return the trial in a file; Refusal, with the line, for one that cannot be read.
 
-    points: names of the points to take, in the order of the body. units: of x and y, m, cm, mm, um, px or BL, where
-    the header does not say. scale: mm per pixel. fps: frames per second, of a file that counts frames. least_score:
-    points of a lower score are taken for missing; by default of a likelihood below `LEAST_SCORE`, and no other score.
-    y: up, or down as in images, which pixels are taken for. body_length: in ``units``, where the points do not reach
-    both ends. individual: the animal to take, of several."""
+    points: names of the points to take, in the order of the body. units: of x and y, m,
+    cm, mm, um, px or BL, where the header does not say. scale: mm per pixel. fps:
+    frames per second, of a file that counts frames. least_score: points of a lower
+    score are taken for missing; by default of a likelihood below `LEAST_SCORE`, and no
+    other score. y: up, or down as in images, which pixels are taken for. body_length:
+    in ``units``, where the points do not reach both ends. individual: the animal to
+    take, of several."""
     for name, value, low, high in (
         ("scale", scale, 1e-9, 1e6),
         ("fps", fps, 1e-6, 1e6),
@@ -143,7 +161,9 @@ def read(
     unit, size, notes = _unit(table, source.name, units, scale)
     t, timed, timing = _time(table, fps)
     xy = table.values[..., :2] * size
-    least = table.least_score if least_score is None else least_score
+    least = least_score
+    if least is None:
+        least = table.least_score
     low = (table.values[..., 2] < least) & ~np.isnan(xy).any(-1)
     found = (~np.isnan(xy).any(-1)).sum()
     xy[low] = np.nan
@@ -152,11 +172,13 @@ def read(
         choose("``y``", y, ("up", "down"))
     elif pixels:
         notes.append(
-            "y is taken to run down, as in images, else heading and turn have the other sign: say y up"
+            "y is taken to run down, as in images, else heading and turn have the other"
+            " sign: say y up"
         )
     else:
         notes.append(
-            "y is taken to run up, else heading and turn have the other sign: say y down"
+            "y is taken to run up, else heading and turn have the other sign: say y"
+            " down"
         )
     if y == "down" or (y is None and pixels):
         xy[..., 1] *= -1
@@ -172,18 +194,17 @@ def read(
     notes += table.notes
     if table.unused:
         notes.append(f"columns that are not used: {', '.join(table.unused[:6])}")
-    length = (
-        body_length * size if body_length is not None and unit != "BL" else body_length
-    )
+    if body_length is not None and unit != "BL":
+        body_length = body_length * size
     return Trial(
-        source.name,
-        t,
-        xy,
-        table.names,
-        table.lines,
-        unit,
-        timed,
-        length,
+        name=source.name,
+        t=t,
+        points=xy,
+        names=table.names,
+        lines=table.lines,
+        unit=unit,
+        timed=timed,
+        length=body_length,
         notes=tuple(notes),
         file_unit="px" if pixels else "",
     )
@@ -194,18 +215,23 @@ def _dropped_note(low: np.ndarray, found: int, least: float) -> list[str]:
     if low.sum() <= MANY * found:
         return []
     return [
-        f"MANY POINTS ARE DROPPED: {low.sum() / found:.2g} of those that the tracker found have a score below {least:g}; "
-        "if they are good, say a lower least_score"
+        f"MANY POINTS ARE DROPPED: {low.sum() / found:.2g} of those that the tracker"
+        f" found have a score below {least:g}; if they are good, say a lower"
+        " least_score"
     ]
 
 
 def _missing_note(xy: np.ndarray, low: np.ndarray) -> list[str]:
+    """Return a note if points are missing."""
     lost = np.isnan(xy[..., 0])
     if not lost.any():
         return []
-    score = f", {low.mean():.2g} of all by their likelihood" if low.any() else ""
+    score = ""
+    if low.any():
+        score = f", {low.mean():.2g} of all by their likelihood"
     return [
-        f"{lost.mean():.2g} of all points are missing{score}: modes along the body stand for them"
+        f"{lost.mean():.2g} of all points are missing{score}: modes along the body"
+        " stand for them"
     ]
 
 
@@ -220,9 +246,11 @@ def _table(source: Rows, individual: str | None = None) -> Table:
         raise Refusal(
             "curvature alone says nothing of where the body went",
             where=source.place,
-            instead='give points of the midline, or take the file for [gait] kind = "centreline"',
+            instead="give points of the midline, or take the file for [gait] kind ="
+            ' "centreline"',
         )
-    if twice := [c for k, c in enumerate(header) if c in header[:k]]:
+    twice = [c for k, c in enumerate(header) if c in header[:k]]
+    if twice:
         raise Refusal(
             f"the column {formatted(twice[0])} is there twice",
             where=source.place,
@@ -237,10 +265,10 @@ def _table(source: Rows, individual: str | None = None) -> Table:
         table = _wide(source, header, _pairs(header), program)
     if is_sleap and not table.unit:
         table = table._replace(unit="px")
-    is_likelihood = any(LIKELIHOOD in name for name in header)
-    return table._replace(
-        program=program, least_score=LEAST_SCORE if is_likelihood else -math.inf
-    )
+    least_score = -math.inf
+    if any(LIKELIHOOD in name for name in header):
+        least_score = LEAST_SCORE
+    return table._replace(program=program, least_score=least_score)
 
 
 def _refuse_labelled(source: Rows) -> None:
@@ -249,15 +277,17 @@ def _refuse_labelled(source: Rows) -> None:
         images = [cell for cell in source.cells(text)[:3] if IMAGE.search(cell)]
         if images:
             raise Refusal(
-                f"{formatted(images[-1], 40)} is an image: these are labelled frames, picked to train a tracker, not a film",
+                f"{formatted(images[-1], 40)} is an image: these are labelled frames,"
+                " picked to train a tracker, not a film",
                 where=f"{source.name}, line {line}",
-                instead="give the file that DeepLabCut writes when it analyses the film, or number the frames of one film "
-                "in a column frame",
+                instead="give the file that DeepLabCut writes when it analyses the"
+                " film, or number the frames of one film in a column frame",
             )
 
 
 def _of_one_animal(source: Rows, individual: str | None) -> Rows:
-    """Return the rows of one animal, where a column names animals; Refusal if there are several and none is named."""
+    """Return the rows of one animal, where a column names animals; Refusal if there are
+    several and none is named."""
     header = source.header[1]
     columns = [k for k, name in enumerate(header) if plain(name) in ANIMALS]
     if not columns:
@@ -294,31 +324,40 @@ def _refuse_animals(source: Rows, frame: np.ndarray, program: str = "") -> None:
     counts = np.bincount(frame)
     if (counts > 1).mean() > SEVERAL:
         raise Refusal(
-            f"{int(counts.max())} animals without a track: {(counts > 1).mean():.2g} of the times have several rows",
+            f"{int(counts.max())} animals without a track: {(counts > 1).mean():.2g} of"
+            " the times have several rows",
             where=source.name,
             instead=UNTRACKED[program or ""],
         )
 
 
 def _pairs(header: Sequence[str]) -> dict[str, dict[str, int]]:
-    """Return the columns of x, y and likelihood by the names of points that have both x and y."""
+    """Return the columns of x, y and likelihood by the names of points that have both x
+    and y."""
     found: dict[str, dict[str, int]] = {}
     for k, name in enumerate(header):
         bare = split_unit(name)[0]
-        if match := FIRST.fullmatch(bare):
-            coordinate, point = match[1], match[2]
-        elif match := LAST.fullmatch(bare):
-            point, coordinate = match[1], match[2]
+        coordinate_first = FIRST.fullmatch(bare)
+        coordinate_last = LAST.fullmatch(bare)
+        if coordinate_first:
+            coordinate, point = coordinate_first.groups()
+        elif coordinate_last:
+            point, coordinate = coordinate_last.groups()
         else:
             continue
-        found.setdefault(point, {})["score" if coordinate in SCORES else coordinate] = k
+        if coordinate in SCORES:
+            coordinate = "score"
+        found.setdefault(point, {})[coordinate] = k
     return {
-        point: columns for point, columns in found.items() if {"x", "y"} <= {*columns}
+        name: columns
+        for name, columns in found.items()
+        if "x" in columns and "y" in columns
     }
 
 
 def _clock(header: Sequence[str], place: str) -> tuple[int, str, bool]:
-    """Return the column of the time, its unit, and whether it is a time and not a count of frames."""
+    """Return the column of the time, its unit, and whether it is a time and not a count
+    of frames."""
     for k, word in enumerate(header):
         bare, unit = split_unit(word)
         if plain(bare) in TIMES:
@@ -339,8 +378,8 @@ def _clock(header: Sequence[str], place: str) -> tuple[int, str, bool]:
 
 
 def _cells(source: Rows, picks: Sequence[int]) -> np.ndarray:
-    """Return the numbers of columns (N, picks), nan where a cell is empty; Refusal with line and column of anything
-    else."""
+    """Return the numbers of columns (N, picks), nan where a cell is empty; Refusal with
+    line and column of anything else."""
     width = len(source.words)
     values = np.full((len(source.rows), len(picks)), np.nan)
     for k, (line, text) in enumerate(source.rows):
@@ -349,7 +388,8 @@ def _cells(source: Rows, picks: Sequence[int]) -> np.ndarray:
             raise Refusal(
                 f"{len(cells)} cells under {width} columns",
                 where=f"{source.name}, line {line}",
-                instead="mend that row; a point that was not found is an empty cell between two separators",
+                instead="mend that row; a point that was not found is an empty cell between two"
+                " separators",
             )
         for j, pick in enumerate(picks):
             values[k, j] = _number(cells[pick], source, line, pick)
@@ -370,6 +410,8 @@ def _number(cell: str, source: Rows, line: int, column: int) -> float:
 
 
 def _common_unit(names: Sequence[str], where: str) -> str:
+    """Return the unit that columns have in common, "" without one; Refusal for
+    several."""
     units = {split_unit(name)[1] for name in names}
     if len(units) > 1:
         raise Refusal(
@@ -393,7 +435,9 @@ def _long(source: Rows, header: tuple[str, ...], bare: dict[str, int]) -> Table:
     key = next((bare[name] for name in POINTS if name in bare), None)
     score = next((bare[name] for name in SCORES if name in bare), None)
     unit = _common_unit([header[bare["x"]], header[bare["y"]]], source.place)
-    columns = [bare["x"], bare["y"], *([] if score is None else [score])]
+    columns = [bare["x"], bare["y"]]
+    if score is not None:
+        columns.append(score)
     rows = _cells(source, columns)
     times, note = source.times(clock, second)
     t, frame = np.unique(times, return_inverse=True)
@@ -401,39 +445,51 @@ def _long(source: Rows, header: tuple[str, ...], bare: dict[str, int]) -> Table:
         names, point = _unnamed(t, frame, source)
     else:
         labels = [source.cells(text)[key] for _, text in source.rows]
-        numeric = all(re.fullmatch(r"[0-9]+(\.0*)?", label) for label in labels)
-        names = sorted({*labels}, key=float) if numeric else list(dict.fromkeys(labels))
+        names = list(dict.fromkeys(labels))
+        if all(re.fullmatch(r"[0-9]+(\.0*)?", label) for label in labels):
+            names = sorted(names, key=float)
         number = {name: k for k, name in enumerate(names)}
         point = np.array([number[label] for label in labels])
         _check_once(t, frame, point, names, source)
-    values, lines = (
-        np.full((len(t), len(names), 3), np.nan),
-        np.zeros((len(t), len(names)), int),
-    )
+    values = np.full((len(t), len(names), 3), np.nan)
+    lines = np.zeros((len(t), len(names)), int)
     values[..., 2] = np.inf
     values[frame, point, : len(columns)] = rows
     lines[frame, point] = source.lines
     lines = np.where(lines, lines, lines.max(1, keepdims=True))
-    used = {clock, key, *columns}
-    unused = tuple(
-        name
-        for k, name in enumerate(header)
-        if k not in used and plain(name) not in ANIMALS
+    return Table(
+        t,
+        values,
+        tuple(names),
+        lines,
+        unit,
+        timed,
+        _unused(header, {clock, key, *columns}),
+        notes=(note,) if note else (),
     )
-    notes = (note,) if note else ()
-    return Table(t, values, tuple(names), lines, unit, timed, unused, notes=notes)
+
+
+def _unused(header: Sequence[str], used: set[int | None]) -> tuple[str, ...]:
+    """Return the names of columns that are neither used nor name animals."""
+    rest = [name for k, name in enumerate(header) if k not in used]
+    return tuple(name for name in rest if plain(name) not in ANIMALS)
 
 
 def _unnamed(
     t: np.ndarray, frame: np.ndarray, source: Rows
 ) -> tuple[list[str], np.ndarray]:
+    """Return names of points, 1, 2 ..., and the number (N,) of each row's point, in the
+    order of the rows; Refusal if frames differ in their number."""
     counts = np.bincount(frame)
-    if (bad := np.flatnonzero(counts != np.bincount(counts).argmax())).size:
+    usual = np.bincount(counts).argmax()
+    bad = np.flatnonzero(counts != usual)
+    if bad.size:
         line = source.lines[np.flatnonzero(frame == bad[0])[0]]
         raise Refusal(
-            f"{counts[bad[0]]} points at t = {t[bad[0]]:g}, and {np.bincount(counts).argmax()} at most others",
+            f"{counts[bad[0]]} points at t = {t[bad[0]]:g}, and {usual} at most others",
             where=f"{source.name}, line {line}",
-            instead="number the points in a column `point`, so that missing ones have a place",
+            instead="number the points in a column `point`, so that missing ones have a"
+            " place",
         )
     point = np.zeros(len(frame), int)
     for k in range(len(t)):
@@ -442,6 +498,7 @@ def _unnamed(
 
 
 def _check_once(t, frame, point, names, source: Rows) -> None:
+    """Refuse a point that is given twice in a frame."""
     keys = frame * len(names) + point
     _, number = np.unique(keys, return_inverse=True)
     _refuse_animals(source, number)
@@ -470,7 +527,9 @@ def _wide(
             instead=WHAT,
         )
     clock, second, timed = _clock(header, source.place)
-    names = [header[columns[c]] for columns in pairs.values() for c in "xy"]
+    names = []
+    for columns in pairs.values():
+        names += [header[columns["x"]], header[columns["y"]]]
     unit = _common_unit(names, source.place)
     return _framed(source, header, pairs, (clock, second, timed), unit, program)
 
@@ -485,7 +544,7 @@ def _framed(
 ) -> Table:
     """Return the table of rows of frames. clock: as `_clock` returns it."""
     index, second, timed = clock
-    picks = [k for columns in pairs.values() for k in columns.values()]
+    picks = list(itertools.chain(*[columns.values() for columns in pairs.values()]))
     rows = _cells(source, picks)
     t, note = source.times(index, second)
     lines = source.lines
@@ -493,7 +552,8 @@ def _framed(
     _refuse_animals(source, frame, program)
     for k in np.flatnonzero(np.diff(t, prepend=-np.inf) <= 0):
         if t[k] == t[k - 1]:
-            what, cure = f"t = {t[k]:.6g} is given twice", "keep one of the rows"
+            what = f"t = {t[k]:.6g} is given twice"
+            cure = "keep one of the rows"
         else:
             what = f"t = {t[k]:.6g} comes after {t[k - 1]:.6g}"
             cure = "sort the rows by time, one for each"
@@ -504,11 +564,6 @@ def _framed(
         for j, coordinate in enumerate(("x", "y", "score")):
             if coordinate in columns:
                 values[:, p, j] = rows[:, place[columns[coordinate]]]
-    unused = tuple(
-        name
-        for k, name in enumerate(header)
-        if k not in (index, *picks) and plain(name) not in ANIMALS
-    )
     return Table(
         t,
         values,
@@ -516,30 +571,31 @@ def _framed(
         np.repeat(lines[:, None], len(pairs), 1),
         unit,
         timed,
-        unused,
+        _unused(header, {index, *picks}),
         program,
         notes=(note,) if note else (),
     )
 
 
 def _deeplabcut(source: Rows, individual: str | None) -> Table:
-    """Return the table of a file of DeepLabCut: the first cell of each header row says what it holds.
+    """Return the table of a file of DeepLabCut: the first cell of each header row says
+    what it holds.
 
-    Individuals without a point, and what it calls single, points that belong to no animal, are left out unless they
-    are named."""
+    Individuals without a point, and what it calls single, points that belong to no
+    animal, are left out unless they are named."""
     heads = {source.words[0].lower(): list(source.words[1:])}
     for _, text in source.rows[:3]:
         words = source.cells(text)
         if words[0].lower() in STACKED:
             heads[words[0].lower()] = words[1:]
-    if (
-        not {"bodyparts", "coords"} <= {*heads}
-        or len({len(x) for x in heads.values()}) > 1
-    ):
+    lengths = {len(words) for words in heads.values()}
+    if not {"bodyparts", "coords"} <= {*heads} or len(lengths) > 1:
         raise Refusal(
-            "a file of DeepLabCut has header rows scorer, bodyparts and coords of equal length",
+            "a file of DeepLabCut has header rows scorer, bodyparts and coords of equal"
+            " length",
             where=source.place,
-            instead="give the file as DeepLabCut writes it, or one header row such as frame,nose_x,nose_y",
+            instead="give the file as DeepLabCut writes it, or one header row such as"
+            " frame,nose_x,nose_y",
         )
     if "z" in heads["coords"]:
         raise Refusal(
@@ -565,7 +621,8 @@ def _deeplabcut(source: Rows, individual: str | None) -> Table:
 def _chosen(
     source: Rows, animals: Sequence[str], individual: str | None
 ) -> tuple[str, list[str]]:
-    """Return the individual to take, and a note on those that are left out. animals: of each column but the first."""
+    """Return the individual to take, and a note on those that are left out. animals: of
+    each column but the first."""
     names = list(dict.fromkeys(animals))
     if individual is not None:
         return choose("``individual``", individual, names), []
@@ -585,12 +642,14 @@ def _chosen(
             where=source.name,
             instead="name one by ``individual``",
         )
-    out = [
-        f"{name} (points of no animal)" if name == SINGLE else f"{name} (no point)"
-        for name in names
-        if name != with_points[0]
-    ]
-    return with_points[0], [f"{', '.join(out)} left out: say individual to take it"]
+    chosen = with_points[0]
+    others = []
+    for name in names:
+        if name == SINGLE:
+            others.append(f"{name} (points of no animal)")
+        elif name != chosen:
+            others.append(f"{name} (no point)")
+    return chosen, [f"{', '.join(others)} left out: say individual to take it"]
 
 
 def _selected(table: Table, name: str, points: Sequence[str]) -> Table:
@@ -614,6 +673,7 @@ def _selected(table: Table, name: str, points: Sequence[str]) -> Table:
 
 
 def _check(table: Table, name: str) -> None:
+    """Refuse too few or too many points, and too few frames."""
     frames, points = table.values.shape[:2]
     if not FEWEST_POINTS <= points <= MOST_POINTS:
         raise Refusal(
@@ -632,7 +692,8 @@ def _check(table: Table, name: str) -> None:
 def _unit(
     table: Table, name: str, units: str | None, scale: float | None
 ) -> tuple[str, float, list[str]]:
-    """Return the unit of lengths, m or BL or "", that of the file in it, and what was taken for granted."""
+    """Return the unit of lengths, m or BL or "", the file's unit in it, and
+    assumptions."""
     if units and table.unit and units != table.unit and table.unit != "px":
         raise Refusal(
             f"x and y are in {table.unit} by the names of their columns",
@@ -652,12 +713,16 @@ def _unit(
         return "m", LENGTHS[unit], []
     if unit == "BL":
         return "BL", 1.0, []
-    return "", 1.0, ["lengths are in body lengths alone: nobody says how long a pixel is" if unit == "px" else
-                     "lengths are in body lengths alone: nobody says the unit of x and y, say units"]  # fmt: skip
+    note = (
+        "lengths are in body lengths alone: nobody says the unit of x and y, say units"
+    )
+    if unit == "px":
+        note = "lengths are in body lengths alone: nobody says how long a pixel is"
+    return "", 1.0, [note]
 
 
 def _time(table: Table, fps: float | None) -> tuple[np.ndarray, bool, list[str]]:
-    """Return times (F,), whether they are in s, and what was taken for granted."""
+    """Return times (F,), whether they are in s, and assumptions."""
     if table.timed:
         if fps is not None:
             raise Refusal(

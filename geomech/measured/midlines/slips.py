@@ -1,4 +1,5 @@
-"""Slips of tracking: frames in another unit, bodies that turn end for end, points that swap or jump, points out of order."""
+"""Slips of tracking: frames in another unit, bodies that turn end for end, points that
+swap or jump, points out of order."""
 
 from __future__ import annotations
 
@@ -6,9 +7,7 @@ import numpy as np
 
 from geomech.measured.midlines.trial import Trial
 
-OTHER_SCALE = (
-    4.0  # ratio of a frame's size to the usual, from which on it is in another unit
-)
+OTHER_SCALE = 4.0  # ratio of the size of a frame in another unit to the usual size
 REVERSED = 0.4  # of the distance to the frame before, that a reversed frame has
 JUMP = 8.0  # times the usual distance of a point from where it is in the frames around
 MOVES = 6.0  # times the distance of the frames around from each other
@@ -20,8 +19,9 @@ NAMED = 3  # slips that a note names
 
 
 def checked(trial: Trial, mend: bool) -> Trial:
-    """Return the trial without frames of too few points; Refusal, with its place, for the first slip. mend: leave out points
-    that jump or swap, and turn frames round, and note it."""
+    """Return the trial without frames of too few points; Refusal, with its place, for
+    the first slip. mend: leave out points that jump or swap, and turn frames round, and
+    note it."""
     _check_points(trial)
     trial = _without_poor_frames(trial)
     _check_scale(trial)
@@ -35,7 +35,8 @@ def usual_chords(points: np.ndarray) -> np.ndarray:
 
 
 def _median(values: np.ndarray, axis: int) -> np.ndarray:
-    """Return the median of what is not nan; nan, without a warning of NumPy's, where there is nothing else."""
+    """Return the median of what is not nan; nan, without a warning of NumPy's, where
+    there is nothing else."""
     ordered = np.sort(values, axis)  # nan comes last
     known = np.expand_dims((~np.isnan(values)).sum(axis), axis)
     low = np.take_along_axis(ordered, np.maximum(known - 1, 0) // 2, axis)
@@ -46,6 +47,7 @@ def _median(values: np.ndarray, axis: int) -> np.ndarray:
 
 
 def _check_points(trial: Trial) -> None:
+    """Refuse a point that is missing in most frames, or never moves."""
     lost = np.isnan(trial.points[..., 0]).mean(0)
     if lost.max() > LOST:
         k = int(lost.argmax())
@@ -53,19 +55,18 @@ def _check_points(trial: Trial) -> None:
             f"point {trial.names[k]} is missing in {100 * lost[k]:.3g} % of the frames",
             instead="leave it out with ``columns``, or lower ``least_score``",
         )
-    still = (
-        np.nanmax(np.ptp(trial.points, axis=0), -1)
-        if not lost.any()
-        else np.ones(len(lost))
-    )
-    if still.min() == 0:
+    if lost.any():
+        return
+    ranges = np.nanmax(np.ptp(trial.points, axis=0), -1)
+    if ranges.min() == 0:
         raise trial.wrong(
-            f"point {trial.names[int(still.argmin())]} never moves",
+            f"point {trial.names[int(ranges.argmin())]} never moves",
             instead="leave it out with ``columns``",
         )
 
 
 def _without_poor_frames(trial: Trial) -> Trial:
+    """Return the trial without frames of too few points; Refusal for too few others."""
     known = (~np.isnan(trial.points[..., 0])).mean(1)
     poor = known < KNOWN
     if not poor.any():
@@ -78,32 +79,33 @@ def _without_poor_frames(trial: Trial) -> Trial:
         )
     k = int(np.flatnonzero(poor)[0])
     return trial.with_notes(
-        f"{poor.sum()} frames with fewer than {KNOWN:.0%} of the points are left out, the first at line {trial.lines[k, 0]}",
-        t=trial.t[enough], points=trial.points[enough], lines=trial.lines[enough],
-    )  # fmt: skip
+        f"{poor.sum()} frames with fewer than {KNOWN:.0%} of the points are left out,"
+        f" the first at line {trial.lines[k, 0]}",
+        t=trial.t[enough],
+        points=trial.points[enough],
+        lines=trial.lines[enough],
+    )
 
 
 def _check_scale(trial: Trial) -> None:
     """Refuse frames in another unit than most."""
     chords = np.hypot(*np.moveaxis(np.diff(trial.points, axis=1), -1, 0))
-    if (usual_chords(trial.points) == 0).any():
-        k = int(usual_chords(trial.points).argmin())
+    usual = usual_chords(trial.points)
+    if (usual == 0).any():
+        k = int(usual.argmin())
         raise trial.wrong(
             f"points {trial.names[k]} and {trial.names[k + 1]} are in one place",
             instead="drop one with ``columns``",
         )
-    size = np.nansum(chords, 1) / np.nansum(
-        np.where(np.isnan(chords), np.nan, usual_chords(trial.points)), 1
-    )
+    expected = np.where(np.isnan(chords), np.nan, usual)
+    size = np.nansum(chords, 1) / np.nansum(expected, 1)
     bad = np.flatnonzero((size > OTHER_SCALE) | (size < 1 / OTHER_SCALE))
     if bad.size:
         k = int(bad[0])
-        factor = size[k] if size[k] > 1 else 1 / size[k]
-        like = (
-            ": mm for m, or another such unit"
-            if any(abs(factor / x - 1) < 0.3 for x in (10, 100, 1000))
-            else ""
-        )
+        factor = max(size[k], 1 / size[k])
+        like = ""
+        if any(abs(factor / x - 1) < 0.3 for x in (10, 100, 1000)):
+            like = ": mm for m, or another such unit"
         raise trial.wrong(
             f"the body is {size[k]:.3g} times as long as in most frames{like}",
             k,
@@ -112,29 +114,29 @@ def _check_scale(trial: Trial) -> None:
 
 
 def _check_order(trial: Trial) -> None:
-    """Refuse points that are out of order along the body, as of its left and right sides."""
-    chord = (
-        np.diff(trial.points, axis=1)[..., 0]
-        + 1j * np.diff(trial.points, axis=1)[..., 1]
-    )
+    """Refuse points that are out of order along the body, as of its left and right
+    sides."""
+    difference = np.diff(trial.points, axis=1)
+    chord = difference[..., 0] + 1j * difference[..., 1]
     forth = _median(np.cos(np.angle(chord[:, 1:]) - np.angle(chord[:, :-1])), 0)
     if forth.min() < -0.5:
         k = int(forth.argmin())
         raise trial.wrong(
-            f"from {trial.names[k]} by {trial.names[k + 1]} to {trial.names[k + 2]} the body turns back in most frames",
+            f"from {trial.names[k]} by {trial.names[k + 1]} to {trial.names[k + 2]} the"
+            " body turns back in most frames",
             because="points are out of order, or lie left and right of the midline",
             instead="give points of the midline in their order, with ``columns``",
         )
 
 
 def _rotated(trial: Trial, mend: bool) -> Trial:
-    """Return the trial with frames turned round that run from the other end, or refuse the first."""
+    """Return the trial with frames turned round that run from the other end, or refuse
+    the first."""
     x = trial.points
     distance = np.nanmean(np.hypot(*np.moveaxis(x[1:] - x[:-1], -1, 0)), 1)
     other = np.nanmean(np.hypot(*np.moveaxis(x[1:, ::-1] - x[:-1], -1, 0)), 1)
-    flips = (other < REVERSED * distance) & (
-        distance > 0.2 * np.nansum(usual_chords(x))
-    )
+    is_far = distance > 0.2 * np.nansum(usual_chords(x))
+    flips = (other < REVERSED * distance) & is_far
     state = np.concatenate([[False], np.cumsum(flips) % 2 == 1])
     if state.mean() > 0.5:
         state = ~state
@@ -156,13 +158,14 @@ def _rotated(trial: Trial, mend: bool) -> Trial:
 
 
 def _without_jumps(trial: Trial, mend: bool) -> Trial:
-    """Return the trial without points that jump away for a frame, or refuse the first."""
+    """Return the trial without points that jump away for a frame, or refuse the
+    first."""
     x = trial.points
-    around = np.stack([np.roll(x, k, 0) for k in (-2, -1, 1, 2)])
-    for neighbour, k in zip(around, (-2, -1, 1, 2)):
-        neighbour[
-            np.abs(np.roll(trial.t, k) - trial.t) > NEAR * np.median(np.diff(trial.t))
-        ] = np.nan
+    near = NEAR * np.median(np.diff(trial.t))
+    shifts = (-2, -1, 1, 2)
+    around = np.stack([np.roll(x, k, 0) for k in shifts])
+    for neighbour, k in zip(around, shifts):
+        neighbour[np.abs(np.roll(trial.t, k) - trial.t) > near] = np.nan
     expected = _median(around, 0)
     moves = _median(np.hypot(*np.moveaxis(around - expected, -1, 0)), 0)
     distance = np.hypot(*np.moveaxis(x - expected, -1, 0))
@@ -174,12 +177,12 @@ def _without_jumps(trial: Trial, mend: bool) -> Trial:
     places = np.argwhere(bad)
     if not mend:
         raise _jump(trial, expected, bad, distance, *map(int, places[0]))
-    named = ", ".join(
-        f"{trial.names[p]} at line {trial.lines[f, p]}" for f, p in places[:NAMED]
-    )
-    more = f" and {len(places) - NAMED} more" if len(places) > NAMED else ""
+    named = [f"{trial.names[p]} at line {trial.lines[f, p]}" for f, p in places[:NAMED]]
+    text = ", ".join(named)
+    if len(places) > NAMED:
+        text = f"{text} and {len(places) - NAMED} more"
     return trial.with_notes(
-        f"{len(places)} points that jump or swap are taken for missing: {named}{more}",
+        f"{len(places)} points that jump or swap are taken for missing: {text}",
         points=np.where(bad[..., None], np.nan, x),
     )
 
@@ -192,9 +195,14 @@ def _jump(
     frame: int,
     point: int,
 ):
-    """Return the Refusal of a point that jumps, and with which other one it may have swapped."""
-    x, others = trial.points[frame], np.flatnonzero(bad[frame])
-    cure = "mend them, leave their cells empty, or say ``mend`` to have such points left out"
+    """Return the Refusal of a point that jumps, and with which other one it may have
+    swapped."""
+    x = trial.points[frame]
+    others = np.flatnonzero(bad[frame])
+    cure = (
+        "mend them, leave their cells empty, or say ``mend`` to have such points left"
+        " out"
+    )
     for other in others[others != point]:
         swapped = (
             np.hypot(*(x[point] - expected[frame, other])),
