@@ -24,10 +24,9 @@ def compute(
 ) -> Result:
     """Return the kinematics of a synthetic trial in loose beads, with the prediction of a medium."""
     swimmer = Swimmer(MEDIA["glass-0.3mm-loose"], Backbone(40))
+    trial = synthetic_midlines(swimmer, cycles, seed=seed).trial("trial.csv")
+    fit = fit_midlines(trial)
     return of_trial(fit, compare(fit, MEDIA[medium]))
-    fit = fit_midlines(
-        synthetic_midlines(swimmer, cycles, seed=seed).trial("trial.csv")
-    )
 
 
 def draw(numbers: Result):

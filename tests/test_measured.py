@@ -17,6 +17,7 @@ from scipy.io import loadmat
 from scipy.special import ive
 from tabled import of_json, tabled
 
+import geomech
 import rft
 from figures import measured_gait
 from geomech import gaits, measured

@@ -1,5 +1,5 @@
-"""Questions about scenes of walking robots: a walk with the error of its speed, and the sweeps and accuracy studies of
-walks."""
+"""Questions about scenes of walking robots: a walk with the error of its speed, and the
+sweeps and accuracy studies of walks."""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ STATUSES = ("walking", "stuck", "sunk", "flipped", "airborne")
 TOGETHER = 32  # robots in a batch
 SETTLING = 3  # cycles from rest in a sweep, before the limit cycle is looked for
 STEP = 200.0  # balances that take NumPy as long as a time step
-HARD = 30.0  # evaluations of forces in a step; the first steps of the built-in robots take 7 to 14
+# evaluations of forces in a step; the first steps of the built-in robots take 7 to 14
+HARD = 30.0
 PUSHED = 0.2  # acceleration of a body by much faster legs over gravity, measured
 IN_VAIN = (
     40  # cycles of a failing search for a limit cycle with its errors, many at once
@@ -62,10 +63,12 @@ TOLERANCES = 10.0 ** -np.arange(1, 5)  # of the speed, m/s
 class Walked(NamedTuple):
     """A walk with the errors of its means.
 
-    walk: as computed by rft. estimate: error of its speed, m/s: the larger of the changes with two other numbers of steps
-    and the change with twice the elements, each times the factor of `rft.terradynamics.walking.engines.Refined`; the distance from the
-    limit cycle; and the effect of unsolved steps. lateral, turning: errors of the lateral speed, m/s, and of the yaw rate,
-    rad/s, by the changes alone. steps, elements: m/s, the parts of the estimate that come from each."""
+    walk: as computed by rft. estimate: error of its speed, m/s: the larger of the
+    changes with two other numbers of steps and the change with twice the elements, each
+    times the factor of `rft.terradynamics.walking.engines.Refined`; the distance from
+    the limit cycle; and the effect of unsolved steps. lateral, turning: errors of the
+    lateral speed, m/s, and of the yaw rate, rad/s, by the changes alone. steps,
+    elements: m/s, the parts of the estimate that come from each."""
 
     walk: Walk
     estimate: float
@@ -81,8 +84,9 @@ def walked(
     settling: bool = False,
     progress: Callable | None = None,
 ) -> list[Walked]:
-    """Return the walks of scenes with equal numerics and engines, computed in batches. settling: a few cycles from rest
-    suffice. progress: called with the fraction done."""
+    """Return the walks of scenes with equal numerics and engines, computed in batches.
+    settling: a few cycles from rest suffice. progress: called with the fraction
+    done."""
     numerics, chosen, walkers = (
         scenes[0].numerics,
         engine(by or scenes[0].engine),
@@ -122,8 +126,9 @@ def _means(walk: Walk) -> tuple[float, float, float]:
 
 
 def cost_of_transport(scene: WalkerScene, walk: Walk) -> float:
-    """Return the work of the motors over weight times distance, from rest to the end; the distance is the sum of the
-    chords of the cycles. inf for a robot that does not move."""
+    """Return the work of the motors over weight times distance, from rest to the end;
+    the distance is the sum of the chords of the cycles. inf for a robot that does not
+    move."""
     at = np.append(np.arange(0.0, walk.t[-1], 1 / scene.gait.frequency), walk.t[-1])
     y = walk.spatial["y"] if walk.spatial else np.zeros_like(walk.t)
     path = np.hypot(
@@ -144,8 +149,9 @@ def run(
 ) -> Walked:
     """Return the walk of one scene.
 
-    longest: seconds of computing, after which it is refused if the start from rest is not done yet: that time depends
-    on whether a cycle repeats itself, which is not known beforehand."""
+    longest: seconds of computing, after which it is refused if the start from rest is
+    not done yet: that time depends on whether a cycle repeats itself, which is not
+    known beforehand."""
     begin = time.process_time()
 
     def report(done: float) -> None:
@@ -246,10 +252,12 @@ class Steps(Cost):
 def price(
     scene: WalkerScene, count: int = 1, settling: bool = False, by: str | None = None
 ) -> Steps:
-    """Return the cost of ``count`` scenes like this one, estimated from its first time steps.
+    """Return the cost of ``count`` scenes like this one, estimated from its first time
+    steps.
 
-    Where these take many times as many evaluations as usual, as for robots so light that they bounce or stick at every
-    step, the search for a limit cycle is assumed to fail."""
+    Where these take many times as many evaluations as usual, as for robots so light
+    that they bounce or stick at every step, the search for a limit cycle is assumed to
+    fail."""
     numerics, engine_name = scene.numerics, by or scene.engine
     planar = engine_name == "planar"
     together = min(count, TOGETHER if planar else 1)
@@ -272,7 +280,8 @@ def price(
 
 
 def _speeding_up(scene: WalkerScene) -> float:
-    """Return the number of cycles in which legs bring a body to their speed, at a fraction of gravity."""
+    """Return the number of cycles in which legs bring a body to their speed, at a
+    fraction of gravity."""
     if not isinstance(scene.robot, Rhex | Roller):
         return 0.0
     radius, f = (
@@ -287,8 +296,8 @@ class Walks:
     """Speed of robots, as a question of sweeps."""
 
     def grid(self, scene: WalkerScene, over: Mapping[str, list[float]]) -> Grid:
-        """Return the grid; Refusal if one of some 200 of its points makes no scene, or one that no engine here
-        computes."""
+        """Return the grid; Refusal if one of some 200 of its points makes no scene, or
+        one that no engine here computes."""
         grid = Grid(scene, over, written.tables(scene))
         last = grid.total - 1
         for k in {*range(0, grid.total, max(1, grid.total // 200)), last}:
@@ -334,7 +343,8 @@ class Walks:
 
 @dataclass(frozen=True)
 class Settings:
-    """The speed of a robot, m/s, near a walk of its scene. For every setting the reference has that setting at `FINEST`."""
+    """The speed of a robot, m/s, near a walk of its scene. For every setting the
+    reference has that setting at `FINEST`."""
 
     scene: WalkerScene
     runs: int = 1
@@ -418,7 +428,8 @@ def refuse_engine(scene: WalkerScene, by: str | None = None) -> None:
 
 
 def view(scene: WalkerScene):
-    """Return the view that draws a walk of three dimensions (`rft.terradynamics.walking.view.View`)."""
+    """Return the view that draws a walk of three dimensions
+    (`rft.terradynamics.walking.view.View`)."""
     from rft.terradynamics.walking.view import View
 
     return View(scene.walker, scene.numerics)

@@ -1,7 +1,9 @@
-"""The passive callback of MuJoCo, one for all models of the process, and the beds of sand that it serves.
+"""The passive callback of MuJoCo, one for all models of the process, and the beds of
+sand that it serves.
 
-In compiled code the callback looks a model up by its address in `TABLE`; without numba a function of Python does the same.
-A row is written before its model's address and is never moved, so that other threads may step meanwhile."""
+In compiled code the callback looks a model up by its address in `TABLE`; without numba
+a function of Python does the same. A row is written before its model's address and is
+never moved, so that other threads may step meanwhile."""
 
 from __future__ import annotations
 
@@ -44,15 +46,17 @@ from rft.mujoco.model_parts import ModelParts
 from rft.terradynamics.meshes.contact import record
 
 ROWS = 4096  # beds of sand at one time
-RETIRED = 64  # layouts of detached beds that are kept, for a step of another thread that is still under way
+# layouts of detached beds that are kept, for a step of another thread that is still
+# under way
+RETIRED = 64
 REMOVED = -1  # in place of a model's address
 
 TABLE = np.zeros((ROWS + 1, 3), np.int64)
 
 
 class Layout(NamedTuple):
-    """What compiled code reads of a bed: `numbers`, int64, hold sizes and the addresses of the arrays, which are kept by
-    name (`rft.mujoco.layout`)."""
+    """What compiled code reads of a bed: `numbers`, int64, hold sizes and the addresses
+    of the arrays, which are kept by name (`rft.mujoco.layout`)."""
 
     numbers: np.ndarray
     arrays: dict[str, np.ndarray]
@@ -61,8 +65,9 @@ class Layout(NamedTuple):
 class Effort(NamedTuple):
     """What the steps of a bed have cost so far.
 
-    steps: with a geom in the ground. iterations: of Newton's method, and most_iterations in a step. coarser: steps that
-    were solved loosely, within 3e-4, or at a wider rounding alone. unsolved: steps that were not solved. residual: largest
+    steps: with a geom in the ground. iterations: of Newton's method, and
+    most_iterations in a step. coarser: steps that were solved loosely, within 3e-4, or
+    at a wider rounding alone. unsolved: steps that were not solved. residual: largest
     residual of a step, over the forces without grains."""
 
     steps: int
@@ -74,8 +79,9 @@ class Effort(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What the grains do in a step: residual, status and rounding as of `rft.mujoco.implicit.Result`; wrenches and twists at
-    its end (G, 6), along the geoms' axes."""
+    """What the grains do in a step: residual, status and rounding as of
+    `rft.mujoco.implicit.Result`; wrenches and twists at its end (G, 6), along the
+    geoms' axes."""
 
     residual: float
     status: int
@@ -85,8 +91,10 @@ class Seen(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """A bed in a row of the table. parts: of its model. bed: the sand. form: (G, 5), of its geoms as their elements were
-    made for. layout: for compiled code. counts: (N_COUNTS,), of steps. largest: (1,), of their residuals. end: removes the bed when the model is gone."""
+    """A bed in a row of the table. parts: of its model. bed: the sand. form: (G, 5), of
+    its geoms as their elements were made for. layout: for compiled code. counts:
+    (N_COUNTS,), of steps. largest: (1,), of their residuals. end: removes the bed when
+    the model is gone."""
 
     parts: ModelParts
     bed: Bed
@@ -108,7 +116,8 @@ _seen_by_python: dict[int, np.ndarray] = {}
 
 
 def install(model: mujoco.MjModel, bed: Bed) -> int:
-    """Let the callback serve a bed under a model until `remove`, or until the model is gone; return its row."""
+    """Let the callback serve a bed under a model until `remove`, or until the model is
+    gone; return its row."""
     with _lock:
         compiled = serves_compiled()
         check_places(mujoco.MjData(model))
@@ -166,7 +175,8 @@ def beds(model: mujoco.MjModel) -> list[Bed]:
 
 
 def effort(row: int) -> Effort:
-    """Return what the steps of the bed of a row have cost so far; zeros for one that is removed."""
+    """Return what the steps of the bed of a row have cost so far; zeros for one that is
+    removed."""
     entry = _entries.get(row)
     if entry is None:
         return Effort(*[0] * N_COUNTS, residual=0.0)
@@ -246,8 +256,9 @@ def _compiled_callback() -> tuple:
 
 @ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
 def _by_python(model: int, data: int) -> None:
-    """Add the forces of all beds under the model at an address, without numba. A fault detaches its bed and is told in one
-    line. MuJoCo's own callbacks of Python let no other model be compiled; this one, of addresses alone, does."""
+    """Add the forces of all beds under the model at an address, without numba. A fault
+    detaches its bed and is told in one line. MuJoCo's own callbacks of Python let no
+    other model be compiled; this one, of addresses alone, does."""
     for row, entry in [*_entries.items()]:
         if entry.parts.address == model:
             try:
@@ -292,7 +303,8 @@ def _add_by_python(row: int, entry: Entry, data: int) -> None:
 
 @ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
 def _tell_unsolved(_data: int, unsolved: int) -> None:
-    """Tell once that a step of a bed is not solved; compiled code calls this with the address of what it says."""
+    """Tell once that a step of a bed is not solved; compiled code calls this with the
+    address of what it says."""
     for entry in [*_entries.values()]:
         layout = entry.layout
         if layout and layout.arrays["unsolved"].ctypes.data == unsolved:
@@ -302,7 +314,8 @@ def _tell_unsolved(_data: int, unsolved: int) -> None:
 
 @ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
 def _tell_changed(_data: int, layout: int) -> None:
-    """Detach a bed with a geom that has changed; compiled code calls this with the address of its layout."""
+    """Detach a bed with a geom that has changed; compiled code calls this with the
+    address of its layout."""
     for row, entry in [*_entries.items()]:
         if entry.layout and entry.layout.numbers.ctypes.data == layout:
             remove(row)
@@ -333,7 +346,8 @@ def _tell(time: float, residual: float, geom: str) -> None:
 def layout_of(
     parts: ModelParts, bed: Bed, counts: np.ndarray, largest: np.ndarray
 ) -> Layout:
-    """Return the layout of a bed under a model, whose steps write `Entry.counts` and `Entry.largest`."""
+    """Return the layout of a bed under a model, whose steps write `Entry.counts` and
+    `Entry.largest`."""
     from rft.mujoco.compiled import kernel
     from rft.mujoco.compiled_parts import element_code
     from rft.mujoco.compiled_solver import solver_code
@@ -429,5 +443,6 @@ def _form(bed: Bed) -> type:
 
 
 def _laws(bed: Bed) -> np.ndarray:
-    """Return the numbers of a bed's laws, and the sine of the grazing angle of each in the last column."""
+    """Return the numbers of a bed's laws, and the sine of the grazing angle of each in
+    the last column."""
     return np.array([[*record(law), law.grazing_sine] for law in bed.laws], float)

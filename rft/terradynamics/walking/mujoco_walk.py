@@ -1,8 +1,12 @@
-"""The engine of three dimensions: robots as MuJoCo models in sand (`rft.terradynamics.walking.multibody`), one after the other.
+"""The engine of three dimensions: robots as MuJoCo models in sand
+(`rft.terradynamics.walking.multibody`), one after the other.
 
-MuJoCo's steps are of order 1, and its triangles lead as a whole or not at all. So it takes `SUBSTEPS` for each time step, and
-cuts an element of a leg or belly into `PIECES`, which makes both errors as small as those of the planar engine. A robot of the vertical plane becomes a hull on legs at both sides that is free to roll, yaw and drift
-(`rft.terradynamics.walking.hexapod`); a custom MJCF is used as it is. A walk ends with the stride that repeats the last one.
+MuJoCo's steps are of order 1, and its triangles lead as a whole or not at all. So it
+takes `SUBSTEPS` for each time step, and cuts an element of a leg or belly into
+`PIECES`, which makes both errors as small as those of the planar engine. A robot of the
+vertical plane becomes a hull on legs at both sides that is free to roll, yaw and drift
+(`rft.terradynamics.walking.hexapod`); a custom MJCF is used as it is. A walk ends with
+the stride that repeats the last one.
 """
 
 from __future__ import annotations
@@ -52,8 +56,11 @@ from rft.terradynamics.walking.stride import (
 ORDER = 1  # of the time steps
 PIECES = 4  # of an element of a leg or belly
 MOST_STEPS = 10_000  # of a cycle
-REPEATED = 1e-2  # largest difference of the starts of strides that repeat, over the speed of the legs' ends
-STRAIGHT = 0.05  # rad, largest turn until the end of a walk whose strides are repeated along a line
+# largest difference of the starts of strides that repeat, over the speed of the legs'
+# ends
+REPEATED = 1e-2
+# rad, largest turn until the end of a walk whose strides are repeated along a line
+STRAIGHT = 0.05
 ROW = (
     "t",
     "x",
@@ -78,7 +85,8 @@ def refuse(walker: Walker) -> None:
 
 
 def refined(numerics: Fineness) -> list[Refined]:
-    """Return twice and one and a half times the steps, as one change alone may be small by chance, and twice the elements.
+    """Return twice and one and a half times the steps, as one change alone may be small
+    by chance, and twice the elements.
 
     An error of order 1 is twice and three times these changes."""
     more = [min(MOST_STEPS, numerics.steps * halves // 2) for halves in (4, 3)]
@@ -96,7 +104,8 @@ def walk(
     progress: Callable | None = None,
     advance: Callable = compute_stride,
 ) -> list[Walk]:
-    """Return the walks of walkers; see `rft.terradynamics.walking.engines.Engine.walk`."""
+    """Return the walks of walkers; see
+    `rft.terradynamics.walking.engines.Engine.walk`."""
     walks: list[Walk] = []
     for walker in walkers:
         duration = cycles / walker.gait.frequency if cycles else numerics.duration
@@ -119,8 +128,8 @@ def rerun(
     cycles: int | None = None,
     advance: Callable = compute_stride,
 ) -> list[Walk]:
-    """Return walks with other numerics, by a few strides from the last state of each; see
-    `rft.terradynamics.walking.engines.Engine.rerun`."""
+    """Return walks with other numerics, by a few strides from the last state of each;
+    see `rft.terradynamics.walking.engines.Engine.rerun`."""
     others = []
     for walker, known in zip(walkers, walks):
         if known.limit is None:
@@ -138,7 +147,8 @@ def rerun(
 def step_cost(
     walkers: Sequence[Walker], numerics: Fineness, seconds: float
 ) -> tuple[float, float]:
-    """Return the cost of a time step; see `rft.terradynamics.walking.engines.Engine.step_cost`."""
+    """Return the cost of a time step; see
+    `rft.terradynamics.walking.engines.Engine.step_cost`."""
     (walker,) = walkers
     body, h = (
         Simulation(walker, numerics).body,
@@ -161,7 +171,8 @@ class Start(NamedTuple):
 class Simulation:
     """A walker in MuJoCo, stride after stride.
 
-    reach: m, of the legs. ceiling: m, height of the root above which the robot is airborne. hull: triangles of the root."""
+    reach: m, of the legs. ceiling: m, height of the root above which the robot is
+    airborne. hull: triangles of the root."""
 
     def __init__(
         self,
@@ -174,7 +185,8 @@ class Simulation:
         self.arguments, self.advance = (walker, numerics, planar), advance
         self.machine = machine(walker.robot, numerics.elements, planar, PIECES)
         self.gait = walker.gait
-        # Legs and screws of hardly any mass turn as the clock does, also where its rate jumps.
+        # Legs and screws of hardly any mass turn as the clock does, also where its rate
+        # jumps.
         self.prescribed = not isinstance(walker.robot, Mjcf)
         if self.prescribed:
             pace_servos(self.machine, walker.gait.frequency)
@@ -217,8 +229,8 @@ class Simulation:
         start: Start | None = None,
         progress: Callable | None = None,
     ) -> Walk:
-        """Return a walk of at most ``most`` strides. duration: s, of the walk; after a stride that repeats the last one, the
-        rest consists of its repetitions."""
+        """Return a walk of at most ``most`` strides. duration: s, of the walk; after a
+        stride that repeats the last one, the rest consists of its repetitions."""
         body = self.body
         if start is not None:
             body.data.qpos[:], body.data.qvel[:] = start
@@ -291,8 +303,8 @@ class Simulation:
     def means(
         self, rows, moves, periodic: bool, drift: float, ended: str
     ) -> tuple[list[float], float, str]:
-        """Return speed, lateral speed and yaw rate of a walk whose cycles have moved by (N, 3), the drift of the speed, and the
-        status."""
+        """Return speed, lateral speed and yaw rate of a walk whose cycles have moved by
+        (N, 3), the drift of the speed, and the status."""
         f = self.gait.frequency
         if ended:
             ahead, left, _ = _moved(rows[0], rows[-1])
@@ -309,7 +321,8 @@ class Simulation:
         return (late.mean(0) * f).tolist(), float(drift * f), status
 
     def stride(self, stride: int, rows: list, states: list) -> str:
-        """Compute a stride, append its rows and positions, and return `end_status` after it."""
+        """Compute a stride, append its rows and positions, and return `end_status`
+        after it."""
         new_rows, positions, state = self.advance(self.steps, stride, self.body.state())
         self.body.restore(state)
         rows += new_rows.tolist()
@@ -317,8 +330,9 @@ class Simulation:
         return self.end_status()
 
     def steps(self, stride: int, state: tuple) -> tuple[np.ndarray, np.ndarray, tuple]:
-        """Return rows and positions after each step of a stride, or until the robot's end, and the body's state then. state:
-        that of the body now, on which the result depends."""
+        """Return rows and positions after each step of a stride, or until the robot's
+        end, and the body's state then. state: that of the body now, on which the result
+        depends."""
         rows, states = [], []
         f, data = self.gait.frequency, self.body.data
         for begin, end, steps in self.intervals:
@@ -335,7 +349,8 @@ class Simulation:
         return np.array(rows), np.array(states), self.body.state()
 
     def row(self) -> list[float]:
-        """Return the numbers named in `ROW`, along the world's axes; the rate is about the horizontal axis to the left."""
+        """Return the numbers named in `ROW`, along the world's axes; the rate is about
+        the horizontal axis to the left."""
         body, root = self.body, self.machine.root
         place, rotation = body.data.xpos[root], body.data.xmat[root].reshape(3, 3)
         motion = np.zeros(6)
@@ -373,8 +388,9 @@ class Simulation:
         return "sunk" if top < 0.0 else ""
 
     def scaled_state(self) -> np.ndarray:
-        """Return the numbers at the start of a stride that determine all further motion: heights over the reach, angles, and
-        velocities over the speed of the legs' ends, along and across the heading."""
+        """Return the numbers at the start of a stride that determine all further
+        motion: heights over the reach, angles, and velocities over the speed of the
+        legs' ends, along and across the heading."""
         model, data = self.body.model, self.body.data
         rotation = data.xmat[self.machine.root].reshape(3, 3)
         leg_speed = 2 * np.pi * self.gait.frequency * self.reach
@@ -398,7 +414,8 @@ class Simulation:
         return np.array(numbers)
 
     def unwound(self, strides: int) -> np.ndarray:
-        """Return qpos less the full turns of hinges that the clock drives in ``strides`` strides."""
+        """Return qpos less the full turns of hinges that the clock drives in
+        ``strides`` strides."""
         model, qpos = self.body.model, self.body.data.qpos.copy()
         for actuator in self.machine.driven if strides else ():
             joint, gear = (
@@ -415,8 +432,8 @@ class Simulation:
 
 
 def _substeps(walker: Walker, model: mujoco.MjModel) -> int:
-    """Return the number of MuJoCo's steps in a time step, such that they are no longer than those of a custom machine's
-    model where a cycle has as many as by default."""
+    """Return the number of MuJoCo's steps in a time step, such that they are no longer
+    than those of a custom machine's model where a cycle has as many as by default."""
     if not isinstance(walker.robot, Mjcf):
         return SUBSTEPS
     longest = 1 / (walker.gait.frequency * Fineness.steps)
@@ -424,7 +441,8 @@ def _substeps(walker: Walker, model: mujoco.MjModel) -> int:
 
 
 def _goes_straight(before, after, duration: float) -> bool:
-    """Return whether a robot that repeats its motion between two rows turns by at most `STRAIGHT` until the duration, s."""
+    """Return whether a robot that repeats its motion between two rows turns by at most
+    `STRAIGHT` until the duration, s."""
     t, yaw = ROW.index("t"), ROW.index("yaw")
     repetitions = max(0.0, duration - after[t]) / (after[t] - before[t])
     return bool(
@@ -434,8 +452,8 @@ def _goes_straight(before, after, duration: float) -> bool:
 
 
 def _moved(before, after) -> np.ndarray:
-    """Return the displacement (3,) between two rows, along and to the left of the first one's heading, m, and the angle to the
-    left, rad, less than half a turn."""
+    """Return the displacement (3,) between two rows, along and to the left of the first
+    one's heading, m, and the angle to the left, rad, less than half a turn."""
     x, y, yaw = (ROW.index(n) for n in ("x", "y", "yaw"))
     dx, dy, cos, sin = (
         after[x] - before[x],
@@ -453,7 +471,8 @@ def _moved(before, after) -> np.ndarray:
 
 
 def _until(duration: float, rows, states, steps: int) -> list[np.ndarray]:
-    """Return rows and positions until the duration, s; the last ``steps`` steps, if not 0, are repeated until then."""
+    """Return rows and positions until the duration, s; the last ``steps`` steps, if not
+    0, are repeated until then."""
     count = (
         math.ceil((duration - rows[-1, 0]) / (rows[-1, 0] - rows[-1 - steps, 0]))
         if steps

@@ -1,7 +1,8 @@
 """Steps of the bodies of a MuJoCo model in sand.
 
-MuJoCo takes the steps, with the grains' forces of `rft.mujoco`: those of the velocities that a step ends with. They are of
-order 1, so a time step of a walk consists of some of them.
+MuJoCo takes the steps, with the grains' forces of `rft.mujoco`: those of the velocities
+that a step ends with. They are of order 1, so a time step of a walk consists of some of
+them.
 """
 
 from __future__ import annotations
@@ -33,11 +34,13 @@ ROTATING = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)
 class Multibody:
     """A MuJoCo model in sand, time step after time step.
 
-    model: compiled; gravity along -z, the surface at z = 0; it stays as it is. surfaces: those that touch the ground, from
-    `rft.terradynamics.walking.geoms.surfaces` or `Surface`. Their geoms touch grains and nothing else, no floor either. grains: the
-    ground. control: function (time, rate_time) -> controls (nu,) of the actuators at a time, s, by the rates of a clock at
-    ``rate_time``, which tells the side of a kink; None for the controls in the data. substeps: steps of MuJoCo, by its
-    integrator implicitfast, in a time step.
+    model: compiled; gravity along -z, the surface at z = 0; it stays as it is.
+    surfaces: those that touch the ground, from
+    `rft.terradynamics.walking.geoms.surfaces` or `Surface`. Their geoms touch grains
+    and nothing else, no floor either. grains: the ground. control: function
+    (time, rate_time) -> controls (nu,) of the actuators at a time, s, by the rates of a
+    clock at ``rate_time``, which tells the side of a kink; None for the controls in the
+    data. substeps: steps of MuJoCo, by its integrator implicitfast, in a time step.
 
         craft = Multibody(model, surfaces(model, {"hull": mesh}), Grains(Spatial(xi_n=3e5)))
         while craft.data.time < 10.0:
@@ -46,15 +49,16 @@ class Multibody:
     Attributes
     ----------
     model, data : MjModel, MjData
-        A copy of the model, and its data; qpos, qvel and ctrl may be set before a step. Places and velocities of the bodies
-        in the data are up to date after a step.
+        A copy of the model, and its data; qpos, qvel and ctrl may be set before a step.
+        Places and velocities of the bodies in the data are up to date after a step.
     work, loss : float
-        Work of the actuators, and loss into the ground, dampers and constraints, J; work = loss + change of `energy`, to the
-        order of the steps.
+        Work of the actuators, and loss into the ground, dampers and constraints, J;
+        work = loss + change of `energy`, to the order of the steps.
     unsolved : int
         Number of MuJoCo's steps that were taken unsolved.
     defect, residual : float
-        Velocity, m/s, that the unsolved steps lack at most, in all, and that any step lacks at most.
+        Velocity, m/s, that the unsolved steps lack at most, in all, and that any step
+        lacks at most.
     iterations : int
         Of Newton's method for the grains' forces, in all.
     """
@@ -98,7 +102,8 @@ class Multibody:
         self.size = self._sizes()
 
     def _sizes(self) -> np.ndarray:
-        """Return the speed, m/s, per unit of each velocity (nv,): 1, or a reach, m, for rotations."""
+        """Return the speed, m/s, per unit of each velocity (nv,): 1, or a reach, m, for
+        rotations."""
         model, data = self.model, self.data
         places = data.xpos[self.facets.bodies]
         reach = float(
@@ -111,7 +116,8 @@ class Multibody:
         return size
 
     def update(self) -> None:
-        """Compute places, velocities and energies of the bodies from positions and velocities in the data."""
+        """Compute places, velocities and energies of the bodies from positions and
+        velocities in the data."""
         # mj_forward would compute the grains' forces, which takes as long as a step.
         mujoco.mj_fwdPosition(self.model, self.data)
         mujoco.mj_comVel(self.model, self.data)
@@ -119,7 +125,8 @@ class Multibody:
         mujoco.mj_energyVel(self.model, self.data)
 
     def energy(self) -> float:
-        """Return the kinetic and potential energy of the data, J, with that of springs."""
+        """Return the kinetic and potential energy of the data, J, with that of
+        springs."""
         self.update()
         return float(self.data.energy.sum())
 
@@ -138,7 +145,8 @@ class Multibody:
         self.update()
 
     def step(self, h: float, rate_time: float | None = None) -> None:
-        """Take a time step h, s, with the controls' rates at ``rate_time``, s, by default the middle of the step."""
+        """Take a time step h, s, with the controls' rates at ``rate_time``, s, by
+        default the middle of the step."""
         model, data = self.model, self.data
         begin, before = data.time, installed.effort(self._row)
         rate_time = begin + h / 2 if rate_time is None else rate_time
@@ -163,9 +171,11 @@ class Multibody:
         self._count(before, dt)
 
     def _add_work(self, before: np.ndarray, dt: float) -> None:
-        """Add what forces have done in a step of MuJoCo, dt, from velocities ``before`` (nv,).
+        """Add what forces have done in a step of MuJoCo, dt, from velocities ``before``
+        (nv,).
 
-        The step moves bodies by its last velocities, at which forces of motors and dampers act, too."""
+        The step moves bodies by its last velocities, at which forces of motors and
+        dampers act, too."""
         model, data = self.model, self.data
         velocity, change = data.qvel, data.qvel - before
         by_change = data.qDeriv * change[self._slope_columns]
@@ -177,7 +187,8 @@ class Multibody:
         self.loss -= dt * float(velocity @ losses)
 
     def _count(self, before: installed.Effort, dt: float) -> None:
-        """Add what the steps of a time step have cost and lack, from the effort before them."""
+        """Add what the steps of a time step have cost and lack, from the effort before
+        them."""
         now = installed.effort(self._row)
         mass = float(self.model.body_mass.sum())
         fall = dt * float(np.linalg.norm(self.model.opt.gravity))
@@ -193,7 +204,8 @@ class Multibody:
 def bed_under(
     model: mujoco.MjModel, surfaces: Sequence[Surface], grains: Grains
 ) -> Bed:
-    """Return the sand under surfaces of a model, each in the place of its geom, or of its body's first one."""
+    """Return the sand under surfaces of a model, each in the place of its geom, or of
+    its body's first one."""
     own: dict[int, list[Surface]] = {}
     for surface in surfaces:
         first = model.body_geomadr[surface.body]
@@ -218,7 +230,8 @@ def _faces_of_geom(model: mujoco.MjModel, geom: int, surfaces: Sequence[Surface]
 
 
 def _remove_contacts(model: mujoco.MjModel, surfaces: Sequence[Surface]) -> None:
-    """Remove all contacts of the surfaces' geoms from a model; ValueError where a <pair> names one."""
+    """Remove all contacts of the surfaces' geoms from a model; ValueError where a
+    <pair> names one."""
     own = np.zeros(model.ngeom, bool)
     for surface in surfaces:
         own |= (
@@ -236,4 +249,5 @@ def _remove_contacts(model: mujoco.MjModel, surfaces: Sequence[Surface]) -> None
 
 
 def _ignore(_warning: str) -> None:
-    """Ignore a warning, which MuJoCo would write to a file in the present folder; unsolved steps are counted."""
+    """Ignore a warning, which MuJoCo would write to a file in the present folder;
+    unsolved steps are counted."""
