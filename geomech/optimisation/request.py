@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from geomech.gaits import Gait, Sine
-from geomech.geometry.connection import evaluate
+from geomech.geometry.connection import Connection, evaluate
 from geomech.optimisation.ascent import TRIES
 from geomech.optimisation.limits import LimitsArgument, checked_limits
 from geomech.optimisation.loops import DENSE, N_IN_MIRROR, OUTLINES, Loops
@@ -104,7 +104,7 @@ class Request:
         )
 
     @property
-    def table(self):
+    def table(self) -> Connection | None:
         """Stored table of the connection, or None."""
         return stored_table(self.system, "connection")
 
