@@ -500,8 +500,8 @@ def _elements_note(model: mujoco.MjModel, bed: Bed) -> str:
     most = int(np.argmax(counts))
     return (
         f"the sand has {counts.sum():,} elements, {counts[most]:,} of them on the geom"
-        f" {described(model, bed.geoms[most])}: steps take long; give fewer geoms, or"
-        " meshes of fewer triangles"
+        f" {described(model, bed.geoms[most])}: steps take long; give fewer geoms, or a"
+        " longer element"
     )
 
 
