@@ -95,8 +95,8 @@ def cut_rows(table, spheres, begin, end, motion, zones, zone, place, cache, coun
 def cut(table, spheres, first, zones, n_zones, frames, cache_first, in_reach):
     """Return the cache of all parts below the surface, and write the first part of each geom in each zone.
 
-    spheres: (R, 4), `rft.meshes.blocks.Blocks.row_spheres`. frames: `rft.mujoco.parts.Frames`, with the middle (G, 3), m, and the radius (G,) of a sphere around each geom in
-    place of its height: (frames, middles, radii). in_reach: (G,), whether a geom may be in the ground."""
+    spheres: (R, 4), `rft.meshes.blocks.Blocks.row_spheres`. frames: (frames, middles, radii): `rft.mujoco.parts.Frames`, and
+    middles (G, 3), m, and radii (G,) of spheres around the geoms. in_reach: (G,), whether a geom may be in the ground."""
     frame, middles, radii = frames
     geoms, capacity = len(radii), 0
     for g in range(geoms):
