@@ -1,6 +1,7 @@
 """Ratios measured in one run: pytest -m benchmark -s. Nothing here asserts a wall-clock time."""
 
 import contextlib
+import importlib.util
 import os
 import resource
 import subprocess
@@ -344,3 +345,94 @@ def test_sand_under_a_hexapod():
         for name, x in rates.items():
             print(f"| {name} | {x:,.0f} | {x / rates['NumPy']:.1f} |")
         assert rates["compiled"] > 10 * rates["NumPy"]
+
+
+def test_a_step_in_sand_over_one_without():
+    """Of the hexapod that walks and of a quadruped that stands, at 2 ms, by elements of the geoms' own shapes: a step in sand
+    over one in nothing, NumPy over compiled code, and 64 in a Batch over one after the other."""
+    mujoco = pytest.importorskip("mujoco")
+    from test_sand_steps import STANCE, quadruped, stand
+
+    from rft import mujoco as sands
+    from rft.balance.backend import preferring
+    from rft.mujoco.example import HIPS, hexapod
+
+    tripod = np.array([((k // 2) + k % 2) % 2 * np.pi for k in range(len(HIPS))])
+
+    def legs(data):
+        data.qpos[7:] = data.ctrl[:] = tripod
+
+    def walk(data):
+        data.ctrl[:] = 4 * np.pi * data.time + tripod
+
+    def still(data):
+        data.ctrl[:] = STANCE
+
+    def seconds(model, start, control, steps, runs=5):
+        """The least time of a step: of each twenty of a run the least, summed."""
+        times = np.empty((runs, steps // 20))
+        for row in times:
+            data = mujoco.MjData(model)
+            start(data)
+            for k in range(len(row)):
+                control(data)
+                begin = time.thread_time()
+                mujoco.mj_step(model, data, 20)
+                row[k] = time.thread_time() - begin
+        return times.min(0).sum() / steps
+
+    for name, build, start, control in (
+        ("hexapod", hexapod, legs, walk),
+        ("quadruped", lambda: quadruped(0.002), stand, still),
+    ):
+        model, bare = build(), build()
+        model.opt.timestep = bare.opt.timestep = 0.002
+        bare.geom_contype[:] = bare.geom_conaffinity[:] = 0
+        without = seconds(bare, start, control, 400)
+        took, effort = {}, {}
+        for how, steps, runs in (("numba", 400, 5), ("numpy", 40, 1)):
+            with warnings.catch_warnings(), preferring(how):
+                warnings.simplefilter("ignore")
+                with sands.attach(model, "poppy-seeds-loose") as sand:
+                    took[how] = seconds(model, start, control, steps, runs)
+                    if how == "numba":
+                        took["40"] = seconds(model, start, control, 40)
+                        effort, elements = sand.effort, sand.elements
+                        if importlib.util.find_spec("mujoco.batch"):
+                            took["batch"] = _of_a_batch(sand, model, start)
+        print(
+            f"\n{name}: {elements} elements, {1e6 * took['numba']:.0f} us a step,",
+            end=" ",
+        )
+        print(f"{effort.iterations / effort.steps:.2f} iterations;", end=" ")
+        print(f"in sand over in nothing {took['numba'] / without:.1f},", end=" ")
+        print(f"NumPy over compiled {took['numpy'] / took['40']:.0f}", end="")
+        if "batch" in took:
+            print(
+                f", one after the other over a Batch of 64 on {os.cpu_count()}", end=" "
+            )
+            print(f"cores {took['batch']:.2f}", end="")
+        assert took["numpy"] > 10 * took["40"] and effort.unsolved == 0
+
+
+def _of_a_batch(sand, model, start):
+    """Wall-clock time of steps one after the other, over that of the same steps of 64 in a Batch."""
+    import mujoco
+
+    data = mujoco.MjData(model)
+    start(data)
+    ratios = []
+    for _ in range(3):
+        batch = sand.batch(64, persistent=True)
+        batch.qpos, batch.ctrl = data.qpos, data.ctrl
+        batch.step(nstep=20)
+        begin = time.perf_counter()
+        batch.step(nstep=50)
+        together = (time.perf_counter() - begin) / 64
+        one = mujoco.MjData(model)
+        start(one)
+        mujoco.mj_step(model, one, 20)
+        begin = time.perf_counter()
+        mujoco.mj_step(model, one, 50)
+        ratios.append((time.perf_counter() - begin) / together)
+    return max(ratios)

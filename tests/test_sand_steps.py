@@ -354,6 +354,25 @@ def test_slopes_of_loads_are_their_derivatives(law):
             assert np.quantile(error.max((0, 1)), 0.97) < 1e-6
 
 
+def test_what_sleeps_and_what_weighs_nothing_stays(solved_by):
+    """A box that MuJoCo lets sleep lies as one that is awake; a foot of a milligram hangs in the sand."""
+    if not hasattr(mujoco.MjData, "body_awake"):
+        pytest.skip("MuJoCo 4 lets bodies sleep")
+    heights = []
+    for sleep in ("enable", "disable"):
+        flag = f'<option timestep="0.002"><flag sleep="{sleep}"/></option>'
+        world = f"<worldbody>{free(0.0, BOX)}</worldbody>"
+        model = mujoco.MjModel.from_xml_string(f"<mujoco>{flag}{world}</mujoco>")
+        heights += [*in_loose(model, [0.3])[0][:, 2]]
+    assert heights[0] == pytest.approx(heights[1], abs=1e-5)
+    foot = '<geom type="sphere" size=".02" mass="1e-6"/>'
+    limb = f'<body pos="0 0 -.03"><joint axis="0 1 0" armature="1e-5"/>{foot}</body>'
+    model = model_of(free(0.0, BOX + limb), 0.002)
+    places, speed, effort = in_loose(model, [0.2])
+    assert speed < 1e-3 and abs(places[0, 7]) < 0.1 and effort.unsolved == 0
+
+
+@needs_numba
 def test_forces_and_steps_agree_at_any_speed():
     """Also at speeds that MuJoCo calls bad, where both are nothing."""
     ball = '<geom name="ball" type="sphere" size="0.03" mass="0.2"/>'

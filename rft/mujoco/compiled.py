@@ -373,6 +373,7 @@ def kernel() -> CFunc:
         first_part = np.zeros(n_zones * n_geoms + 1, np.int64)
         cache = cut(
             numbers_at(row[AT.table], (row[AT.n_table], 14, WIDTH)),
+            numbers_at(row[AT.row_spheres], (row[AT.n_table], 4)),
             integers_at(row[AT.first], n_geoms + 1),
             zones,
             n_zones,

@@ -33,6 +33,7 @@ from rft.terradynamics.meshes.contact import (
     load_with_slopes,
     part_below,
     velocity_of_middle,
+    whole_part,
 )
 from rft.terradynamics.meshes.triples import dot, plus
 from rft.terradynamics.meshes.zones import (
@@ -69,24 +70,27 @@ AT = Handle(*range(12))
 
 
 @register_jitable
-def reach_of(table, begin, end, motion):
-    """Return how many rows of eight faces from ``begin`` to ``end`` of a table (R, 14, 8) reach below the surface."""
-    count = 0
-    for k in range(begin, end):
-        z = corner_heights(read_face(table[k], 0), motion)
-        count += any_of((z[0] < 0.0) | (z[1] < 0.0) | (z[2] < 0.0))
-    return count
+def _dips(spheres, k, motion):
+    """Return whether the sphere around row number k of eight faces reaches below the surface."""
+    x, y, z = motion.up
+    height = motion.height + x * spheres[k, 0] + y * spheres[k, 1] + z * spheres[k, 2]
+    return height < spheres[k, 3]
 
 
 @register_jitable
-def cut_rows(table, begin, end, motion, zones, zone, place, cache, count):
+def cut_rows(table, spheres, begin, end, motion, zones, zone, place, cache, count):
     """Keep the parts below the surface of rows of eight faces, in ``cache`` from part ``count`` on; return how many parts it
     has then. zone: of which the parts keep their share, negative for all."""
     for k in range(begin, end):
+        if not _dips(spheres, k, motion):
+            continue
         face = read_face(table[k], 0)
         z = corner_heights(face, motion)
         if any_of((z[0] < 0.0) | (z[1] < 0.0) | (z[2] < 0.0)):
-            part = part_below(face, z)
+            if any_of((z[0] >= 0.0) | (z[1] >= 0.0) | (z[2] >= 0.0)):
+                part = part_below(face, z)
+            else:
+                part = whole_part(face, z)
             if zone >= 0:
                 part = shared(part, share_in(zones, zone, face, place))
             i = FIELDS * count
@@ -102,16 +106,18 @@ def cut_rows(table, begin, end, motion, zones, zone, place, cache, count):
 
 
 @register_jitable
-def cut(table, first, zones, n_zones, frames, cache_first, in_reach):
+def cut(table, spheres, first, zones, n_zones, frames, cache_first, in_reach):
     """Return the cache of all parts below the surface, and write the first part of each geom in each zone.
 
-    frames: `rft.mujoco.parts.Frames`, with the middle (G, 3), m, and the radius (G,) of a sphere around each geom in
-    place of its height: (frames, middles, radii). in_reach: (G,), whether a geom may be in the ground."""
+    spheres: (R, 4), `rft.terradynamics.meshes.blocks.Blocks.row_spheres`. frames: (frames, middles, radii): `rft.mujoco.parts.Frames`, and
+    middles (G, 3), m, and radii (G,) of spheres around the geoms. in_reach: (G,), whether a geom may be in the ground."""
     frame, middles, radii = frames
     geoms, capacity = len(radii), 0
     for g in range(geoms):
         if in_reach[g]:
-            capacity += reach_of(table, first[g], first[g + 1], _resting(frame, g))
+            motion = _resting(frame, g)
+            for k in range(first[g], first[g + 1]):
+                capacity += _dips(spheres, k, motion)
     # A row of eight faces across a boundary is kept once in each of the zones.
     cache = np.empty((FIELDS * max(capacity * n_zones, 1), WIDTH))
     count = 0
@@ -130,6 +136,7 @@ def cut(table, first, zones, n_zones, frames, cache_first, in_reach):
             place = Place(frame.turn[g], frame.place[g])
             count = cut_rows(
                 table,
+                spheres,
                 first[g],
                 first[g + 1],
                 _resting(frame, g),

@@ -357,6 +357,7 @@ def layout_of(
     moved, count = bed.moved_by, len(bed.geoms)
     arrays = {
         "table": table,
+        "row_spheres": bed.blocks.row_spheres,
         "first": first.astype(np.int64),
         "geoms": np.stack([bed.geoms, bed.bodies, bed.roots], -1),
         "spheres": bed.spheres,

@@ -13,7 +13,8 @@ SHAPES = ("disturbed_rows", "disturbed_columns", "hill_rows", "hill_columns")
 COUNTED = ("n_zones", "n_planes", "n_numbers")
 # Addresses of the bed's arrays, and of numbers in the model's own memory.
 OWN = (
-    "table", "first", "geoms", "spheres", "dofs", "first_dof", "bodies", "parents", "trees",
+    "table", "row_spheres", "first", "geoms", "spheres", "dofs", "first_dof", "bodies",
+    "parents", "trees",
     "laws", "ground", "disturbed", "surface", "hills", "hill_frame", "planes", "first_plane",
     "derivative_rows", "derivative_columns", "form", "counts", "largest", "watch", "watched", "unsolved",
 )  # fmt: skip

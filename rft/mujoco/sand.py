@@ -42,7 +42,7 @@ __all__ = ["Footprints", "Sand", "attach", "sample"]
 
 MANY_ELEMENTS = 20_000  # whose steps of 2 ms take half a millisecond and more
 ROUNDING = 1e-5  # m/s, assumed: bodies at rest on slopes creep at up to that speed
-SLOWER = 60  # times that a step takes by NumPy over compiled code, measured: pytest -m benchmark -k hexapod
+SLOWER = 80  # times that a step takes by NumPy over compiled code, measured: pytest -m benchmark -k without
 
 
 class Sand:
@@ -500,8 +500,8 @@ def _elements_note(model: mujoco.MjModel, bed: Bed) -> str:
     most = int(np.argmax(counts))
     return (
         f"the sand has {counts.sum():,} elements, {counts[most]:,} of them on the geom"
-        f" {described(model, bed.geoms[most])}: steps take long; give fewer geoms, or"
-        " meshes of fewer triangles"
+        f" {described(model, bed.geoms[most])}: steps take long; give fewer geoms, or a"
+        " longer element"
     )
 
 

@@ -54,6 +54,14 @@ class Blocks:
         first = np.concatenate([[0], np.cumsum([len(x) for x in tables])])
         return np.ascontiguousarray(np.concatenate(tables)), first
 
+    @cached_property
+    def row_spheres(self) -> np.ndarray:
+        """Middles and radii, m, of spheres around the faces of each row, (R, 4)."""
+        corners = np.moveaxis(self.rows[0][:, :9], 1, 2).reshape(-1, 3 * WIDTH, 3)
+        middle = (corners.max(1) + corners.min(1)) / 2
+        arms = np.linalg.norm(corners - middle[:, None], axis=2)
+        return np.concatenate([middle, arms.max(1, keepdims=True)], 1)
+
     def loads(self, law: FaceLaw, ground: Ground, motions: Motion) -> np.ndarray:
         """Return force, N, and moment about the origin, N m, of the grains on each body along its own axes, (B, C, 6), in C
         motions, along the same axes. motions: of arrays (B, C, 3) and (B, C)."""

@@ -131,6 +131,27 @@ def part_below(face, heights):
 
 
 @formula
+def whole_part(face, heights):
+    """Return `part_below` of a face that is below the surface as a whole."""
+    a, b, c = (
+        (face.x1, face.y1, face.z1),
+        (face.x2, face.y2, face.z2),
+        (face.x3, face.y3, face.z3),
+    )
+    d1, d2, d3 = -heights[0], -heights[1], -heights[2]
+    total, third = d1 + d2 + d3, 1.0 / 3.0
+    moments = (d1 + total) / 12.0, (d2 + total) / 12.0, (d3 + total) / 12.0
+    depth = face.area * (moments[0] + moments[1] + moments[2])
+    return Part(
+        (face.nx, face.ny, face.nz),
+        weighted((third, third, third), a, b, c),
+        face.area,
+        depth,
+        times(face.area, weighted(moments, a, b, c)),
+    )
+
+
+@formula
 def velocity_of_middle(part, motion):
     """Return the velocity of a part's middle, m/s."""
     return plus(motion.velocity, cross(motion.spin, part.middle))

@@ -12,18 +12,21 @@ from scipy.spatial import ConvexHull, QhullError
 from rft.balance.backend import Note
 from rft.core.refusal import Refusal, formatted, located, require
 from rft.terradynamics.meshes import shapes, widened
-from rft.terradynamics.meshes.mesh import Mesh, quartered
+from rft.terradynamics.meshes.merged import resized
+from rft.terradynamics.meshes.mesh import Mesh
 from rft.terradynamics.meshes.smooth import smooth
 from rft.terradynamics.meshes.sound import size_note, sound
 
-MOST_FACES = 20_000  # of a geom's mesh
+MOST_FACES = 200_000  # of a geom's mesh, as in an STL file that MuJoCo takes
 MOST_ELEMENTS = 100_000  # of a geom
 ALONG_Z = np.array(
     [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]
 )  # rows of vectors times this: from y to z
 ICOSAHEDRON = 1.0515  # edge of an icosahedron over its radius
 FEWEST_AROUND = 8  # edges around round geoms of a given length of edges
-PER_REACH = 4  # edges of boxes and meshes along half of the diagonal, by default
+# Edges of boxes and of meshes along half of the diagonal, by default; with fewer, a face that only just leads in part
+# bears up to a tenth too much or too little.
+PER_REACH, PER_REACH_OF_MESH = 5, 6
 MOST_PIECES = 12  # of a slender round geom, by default
 
 
@@ -69,9 +72,9 @@ def mesh_of_elements(
     """Return the mesh of a geom in its own frame.
 
     length: m, of the edges, about; None for as many triangles as the shape of the geom asks for, with which 90 % of
-    random motions have an error of the force below 3 %. The triangles of a mesh geom are cut in four until they are small
-    enough, and stay as they are where they are smaller. hulls: whether a mesh without an inside stands for its convex
-    hull."""
+    random motions have an error of the force below 3 %, and none one above 6 %. Of a mesh geom, triangles that are larger
+    are halved, and those that are smaller are merged (`rft.terradynamics.meshes.merged`). hulls: whether a mesh without an inside
+    stands for its convex hull."""
     kind, size = geom_kind(model, geom), np.array(model.geom_size[geom])
     if kind == "box":
         cuts = _pieces(2 * size, length or np.linalg.norm(size) / PER_REACH)
@@ -89,10 +92,8 @@ def mesh_of_elements(
     if kind == "mesh":
         mesh = smooth(_solid_mesh(model, int(model.geom_dataid[geom]), hulls))
         reach = np.linalg.norm(np.ptp(mesh.vertices, axis=0)) / 2
-        while _longest_edge(mesh) > 1.5 * (length or reach / PER_REACH):
-            _require_few(4 * len(mesh.faces))
-            mesh = quartered(mesh)
-        return mesh
+        length = length or reach / PER_REACH_OF_MESH
+        return resized(mesh, length, MOST_ELEMENTS)
     radii = size if kind == "ellipsoid" else size[[0, 0, 0]]
     fineness = 2
     if length:
@@ -113,9 +114,11 @@ def _cuts_of_capsule(radius: float, half: float, length: float | None):
         (quarter,) = _pieces(np.pi / 2 * radius, length, FEWEST_AROUND // 4)
         (along,) = _pieces(2 * half, length)
         return quarter, along
-    quarter = 5 if half < 2 * radius else 4
+    if half < radius / 2:
+        return 6, 2
+    quarter = 5 if half < 3 * radius else 4
     along = math.ceil(half / radius - 1e-9)
-    return quarter, int(np.clip(along, 2, MOST_PIECES))
+    return quarter, int(np.clip(along, 4, MOST_PIECES))
 
 
 def _cuts_of_cylinder(radius: float, half: float, length: float | None):
@@ -127,20 +130,16 @@ def _cuts_of_cylinder(radius: float, half: float, length: float | None):
         return around, along, across
     if half < 0.3 * radius:
         return 16, 2, 3
+    around = 24 if half < 4 * radius else 16
+    across = 2 if half < 4 * radius else 1
     along = math.ceil(half / radius - 1e-9)
-    return 16, int(np.clip(along, 4, MOST_PIECES)), 2 if half <= radius else 1
+    return around, int(np.clip(along, 4, MOST_PIECES)), across
 
 
 def _require_few(count: int) -> None:
     """Raise Refusal for more elements than a geom may have."""
     what = f"the geom has {count} elements, more than {MOST_ELEMENTS}"
     require(count <= MOST_ELEMENTS, what, instead="make ``element`` longer")
-
-
-def _longest_edge(mesh: Mesh) -> float:
-    """Return the length of the longest edge, m."""
-    corners = mesh.vertices[mesh.faces]
-    return float(np.linalg.norm(corners - np.roll(corners, 1, 1), axis=-1).max())
 
 
 def geom_kind(model: mujoco.MjModel, geom: int) -> str:
@@ -180,11 +179,6 @@ def _model_mesh(model: mujoco.MjModel, k: int) -> Mesh:
         model.mesh_faceadr[k],
         model.mesh_facenum[k],
     )
-    require(
-        faces <= MOST_FACES,
-        f"the mesh has {faces} triangles, more than {MOST_FACES}",
-        instead="give fewer",
-    )
     vertices = np.array(model.mesh_vert[first : first + model.mesh_vertnum[k]], float)
     name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_MESH, k) or k
     with located(f"mesh {formatted(name)}"):
@@ -199,6 +193,12 @@ def _model_mesh(model: mujoco.MjModel, k: int) -> Mesh:
 
 def _solid_mesh(model: mujoco.MjModel, k: int, hulls: bool) -> Mesh:
     """Return mesh number k of a model, or its convex hull where ``hulls`` and the mesh has no inside."""
+    count = model.mesh_facenum[k]
+    require(
+        count <= MOST_FACES,
+        f"the mesh has {count} triangles, more than {MOST_FACES}",
+        instead="give fewer",
+    )
     try:
         return _model_mesh(model, k)
     except Refusal as refusal:
