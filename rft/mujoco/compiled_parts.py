@@ -1,4 +1,5 @@
-"""The loads of `rft.mujoco.parts` for compiled code, eight elements at once. Importing this module loads numba."""
+"""The loads of `rft.mujoco.parts` for compiled code, eight elements at once. Importing
+this module loads numba."""
 
 from __future__ import annotations
 
@@ -51,9 +52,10 @@ LOADS, SLOPES, ADD_DAMPERS = range(3)  # what the C function adds
 
 
 class Grains(NamedTuple):
-    """What the loads of a step follow from. code, solver: addresses of the C functions of `element_code` and of
-    `rft.mujoco.compiled_solver.solver_code`. handle: (12,), numbers and addresses that the first reads, by the names of
-    `AT`. kept: the arrays there, which must outlive it."""
+    """What the loads of a step follow from. code, solver: addresses of the C functions
+    of `element_code` and of `rft.mujoco.compiled_solver.solver_code`. handle: (12,),
+    numbers and addresses that the first reads, by the names of `AT`. kept: the arrays
+    there, which must outlive it."""
 
     code: int
     solver: int
@@ -71,7 +73,8 @@ AT = Handle(*range(12))
 
 @register_jitable
 def _dips(spheres, k, motion):
-    """Return whether the sphere around row number k of eight faces reaches below the surface."""
+    """Return whether the sphere around row number k of eight faces reaches below the
+    surface."""
     x, y, z = motion.up
     height = motion.height + x * spheres[k, 0] + y * spheres[k, 1] + z * spheres[k, 2]
     return height < spheres[k, 3]
@@ -79,8 +82,9 @@ def _dips(spheres, k, motion):
 
 @register_jitable
 def cut_rows(table, spheres, begin, end, motion, zones, zone, place, cache, count):
-    """Keep the parts below the surface of rows of eight faces, in ``cache`` from part ``count`` on; return how many parts it
-    has then. zone: of which the parts keep their share, negative for all."""
+    """Keep the parts below the surface of rows of eight faces, in ``cache`` from part
+    ``count`` on; return how many parts it has then. zone: of which the parts keep their
+    share, negative for all."""
     for k in range(begin, end):
         if not _dips(spheres, k, motion):
             continue
@@ -107,10 +111,13 @@ def cut_rows(table, spheres, begin, end, motion, zones, zone, place, cache, coun
 
 @register_jitable
 def cut(table, spheres, first, zones, n_zones, frames, cache_first, in_reach):
-    """Return the cache of all parts below the surface, and write the first part of each geom in each zone.
+    """Return the cache of all parts below the surface, and write the first part of each
+    geom in each zone.
 
-    spheres: (R, 4), `rft.terradynamics.meshes.blocks.Blocks.row_spheres`. frames: (frames, middles, radii): `rft.mujoco.parts.Frames`, and
-    middles (G, 3), m, and radii (G,) of spheres around the geoms. in_reach: (G,), whether a geom may be in the ground."""
+    spheres: (R, 4), `rft.terradynamics.meshes.blocks.Blocks.row_spheres`. frames:
+    (frames, middles, radii): `rft.mujoco.parts.Frames`, and middles (G, 3), m, and
+    radii (G,) of spheres around the geoms. in_reach: (G,), whether a geom may be in the
+    ground."""
     frame, middles, radii = frames
     geoms, capacity = len(radii), 0
     for g in range(geoms):
@@ -167,10 +174,12 @@ def handle_at(address):
 
 @register_jitable
 def grains_of(codes, sizes, laws, ground, disturbed, cache, first, frames):
-    """Return the grains of a step. codes: (2,), addresses of C functions. sizes: (2,), numbers of geoms and of zones.
+    """Return the grains of a step. codes: (2,), addresses of C functions. sizes: (2,),
+    numbers of geoms and of zones.
 
-    laws: (Z, n + 1), numbers of the laws of all zones, and the sines of their grazing angles. ground: (5,), its numbers.
-    first: (Z G + 1,), the first part of each geom in each zone. frames: `rft.mujoco.parts.Frames`."""
+    laws: (Z, n + 1), numbers of the laws of all zones, and the sines of their grazing
+    angles. ground: (5,), its numbers. first: (Z G + 1,), the first part of each geom in
+    each zone. frames: `rft.mujoco.parts.Frames`."""
     handle = np.empty(12, np.int64)
     handle[AT.n_geoms], handle[AT.n_zones] = sizes
     handle[AT.laws], handle[AT.ground] = laws.ctypes.data, ground.ctypes.data
@@ -198,10 +207,12 @@ def _read_part(cache, k):
 
 @functools.cache
 def element_code(Law: type):
-    """Return the C function (handle, members, count, rounding, twists, out, kind) that adds to ``out`` the wrenches on
-    geoms, their slopes or the slopes of dampers, by kind, for laws whose records have one class.
+    """Return the C function (handle, members, count, rounding, twists, out, kind) that
+    adds to ``out`` the wrenches on geoms, their slopes or the slopes of dampers, by
+    kind, for laws whose records have one class.
 
-    members: geoms, ``count`` of them. twists: (G, 6). out: (G, 6) for wrenches, else (G, 6, 6)."""
+    members: geoms, ``count`` of them. twists: (G, 6). out: (G, 6) for wrenches, else
+    (G, 6, 6)."""
     register_formulas()
     n_numbers = len(Law._fields)
 
@@ -288,7 +299,8 @@ def add_loads(law, ground, cache, begin, end, motion, wrench):
 
 @register_jitable
 def add_slopes(law, ground, cache, begin, end, motion, sums, slopes):
-    """Add the slopes (6, 6) of the wrench of parts by the twist. sums: (SUMS, 8), of which nothing is kept."""
+    """Add the slopes (6, 6) of the wrench of parts by the twist. sums: (SUMS, 8), of
+    which nothing is kept."""
     sums[:] = 0.0
     for k in range(begin, end):
         part, sheet = _read_part(cache, k)
@@ -346,7 +358,8 @@ def add_dampers(law, ground, cache, begin, end, motion, sums, slopes):
 
 @register_jitable
 def _add_damper(slopes, total):
-    """Add the slopes (6, 6) of a damper from sums of its size, times nothing, x, y, z, x^2, y^2, z^2, x y, y z and z x."""
+    """Add the slopes (6, 6) of a damper from sums of its size, times nothing, x, y, z,
+    x^2, y^2, z^2, x y, y z and z x."""
     size, x, y, z = total[0], total[1], total[2], total[3]
     xx, yy, zz, xy, yz, zx = total[4], total[5], total[6], total[7], total[8], total[9]
     for i in range(3):

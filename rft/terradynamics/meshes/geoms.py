@@ -24,15 +24,15 @@ ALONG_Z = np.array(
 )  # rows of vectors times this: from y to z
 ICOSAHEDRON = 1.0515  # edge of an icosahedron over its radius
 FEWEST_AROUND = 8  # edges around round geoms of a given length of edges
-# Edges of boxes and of meshes along half of the diagonal, by default; with fewer, a face that only just leads in part
-# bears up to a tenth too much or too little.
+# Edges of boxes and of meshes along half of the diagonal, by default; with fewer, a
+# face that only just leads in part bears up to a tenth too much or too little.
 PER_REACH, PER_REACH_OF_MESH = 5, 6
 MOST_PIECES = 12  # of a slender round geom, by default
 
 
 def geom_mesh(model: mujoco.MjModel, geom: int, elements: int) -> Mesh:
-    """Return the mesh of a geom in its own frame, with smooth normals, and ``elements`` edges around round geoms; ValueError
-    for a geom that has no inside."""
+    """Return the mesh of a geom in its own frame, with smooth normals, and ``elements``
+    edges around round geoms; ValueError for a geom that has no inside."""
     kind, size = (
         mujoco.mjtGeom(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower(),
         model.geom_size[geom],
@@ -71,10 +71,11 @@ def mesh_of_elements(
 ) -> Mesh:
     """Return the mesh of a geom in its own frame.
 
-    length: m, of the edges, about; None for as many triangles as the shape of the geom asks for, with which 90 % of
-    random motions have an error of the force below 3 %, and none one above 6 %. Of a mesh geom, triangles that are larger
-    are halved, and those that are smaller are merged (`rft.terradynamics.meshes.merged`). hulls: whether a mesh without an inside
-    stands for its convex hull."""
+    length: m, of the edges, about; None for as many triangles as the shape of the geom
+    asks for, with which 90 % of random motions have an error of the force below 3 %,
+    and none one above 6 %. Of a mesh geom, triangles that are larger are halved, and
+    those that are smaller are merged (`rft.terradynamics.meshes.merged`). hulls:
+    whether a mesh without an inside stands for its convex hull."""
     kind, size = geom_kind(model, geom), np.array(model.geom_size[geom])
     if kind == "box":
         cuts = _pieces(2 * size, length or np.linalg.norm(size) / PER_REACH)
@@ -103,7 +104,8 @@ def mesh_of_elements(
 
 
 def _pieces(sides, length: float, fewest: int = 1) -> np.ndarray:
-    """Return the numbers of pieces of a length, m, at most, that sides, m, are cut into."""
+    """Return the numbers of pieces of a length, m, at most, that sides, m, are cut
+    into."""
     counts = np.ceil(np.atleast_1d(sides) / length - 1e-9)
     return np.clip(counts, fewest, 4096).astype(int)
 
@@ -122,7 +124,8 @@ def _cuts_of_capsule(radius: float, half: float, length: float | None):
 
 
 def _cuts_of_cylinder(radius: float, half: float, length: float | None):
-    """Return the edges around, the pieces along, and those from the rim to the middle of an end."""
+    """Return the edges around, the pieces along, and those from the rim to the middle
+    of an end."""
     if length:
         (around,) = _pieces(2 * np.pi * radius, length, FEWEST_AROUND)
         (along,) = _pieces(2 * half, length)
@@ -153,7 +156,8 @@ def geom_name(model: mujoco.MjModel, geom: int) -> str:
 
 
 def described(model: mujoco.MjModel, geom: int) -> str:
-    """Return what tells a geom from others: its name, or its number with its body and group."""
+    """Return what tells a geom from others: its name, or its number with its body and
+    group."""
     name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom)
     if name:
         return formatted(name)
@@ -192,7 +196,8 @@ def _model_mesh(model: mujoco.MjModel, k: int) -> Mesh:
 
 
 def _solid_mesh(model: mujoco.MjModel, k: int, hulls: bool) -> Mesh:
-    """Return mesh number k of a model, or its convex hull where ``hulls`` and the mesh has no inside."""
+    """Return mesh number k of a model, or its convex hull where ``hulls`` and the mesh
+    has no inside."""
     count = model.mesh_facenum[k]
     require(
         count <= MOST_FACES,
@@ -213,7 +218,8 @@ def _solid_mesh(model: mujoco.MjModel, k: int, hulls: bool) -> Mesh:
 
 
 def _hull(model: mujoco.MjModel, k: int) -> Mesh:
-    """Return the convex hull of mesh number k of a model, as MuJoCo's contacts take it."""
+    """Return the convex hull of mesh number k of a model, as MuJoCo's contacts take
+    it."""
     first = model.mesh_vertadr[k]
     points = np.array(model.mesh_vert[first : first + model.mesh_vertnum[k]], float)
     try:
