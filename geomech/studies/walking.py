@@ -111,9 +111,7 @@ def walked(
     error = steps + elements
     error[:, 0] += [w.drift + w.unsolved_error for w in walks]
     parts = np.stack([steps[:, 0], elements[:, 0]], -1)
-    return [
-        Walked(w, *e, *p) for w, e, p in zip(walks, error.tolist(), parts.tolist())
-    ]
+    return [Walked(w, *e, *p) for w, e, p in zip(walks, error.tolist(), parts.tolist())]
 
 
 def _means(walk: Walk) -> tuple[float, float, float]:

@@ -46,7 +46,9 @@ def error_of_run(
     start = _places(model, bed, state, 0.0, 1, None)
     plain = _places(model, bed, state, seconds, 1, control)
     halved = _places(model, bed, state, seconds, 2, control)
-    finer = _places(model, _finer(model, bed, hulls, element), state, seconds, 1, control)
+    finer = _places(
+        model, _finer(model, bed, hulls, element), state, seconds, 1, control
+    )
     return RunError(
         _largest(plain, halved) / (1 - 2.0**-ORDER_OF_STEPS),
         _largest(plain, finer) / (1 - 2.0**-ORDER_OF_ELEMENTS),
@@ -87,9 +89,7 @@ def _places(model, bed: Bed, state, seconds: float, share: int, control) -> np.n
         installed.remove(row)
 
 
-def _finer(
-    model: mujoco.MjModel, bed: Bed, hulls: bool, element: float | None
-) -> Bed:
+def _finer(model: mujoco.MjModel, bed: Bed, hulls: bool, element: float | None) -> Bed:
     """Return the bed with elements half as long on each geom, in all directions. element: m, of edges; None for those that
     the shapes ask for."""
     half, own = element and element / 2, []

@@ -17,6 +17,7 @@ from rft.meshes.mesh import Mesh
 from rft.plates.outline import Outline
 from rft.refusal import require
 
+
 @dataclass(frozen=True)
 class Grains:
     """The ground under the bodies. law: `Extruded`, a map of the vertical plane, or `Spatial`."""

@@ -22,7 +22,9 @@ FREE, SLIDE, HINGE = (
 VERTICAL = (
     0.99  # least cosine of an axis with the vertical, for it to count as vertical
 )
-SERVO_TIME = 0.02  # of the servos of legs and screws, cycles: some ten of MuJoCo's steps
+SERVO_TIME = (
+    0.02  # of the servos of legs and screws, cycles: some ten of MuJoCo's steps
+)
 
 
 class Machine(NamedTuple):
@@ -55,7 +57,11 @@ def machine(
     model = mujoco.MjModel.from_xml_string(hexapod.mjcf(robot, elements, planar))
     phases = hexapod.phases(robot)
     return Machine(
-        model, hexapod.surfaces(robot, pieces * elements), 1, np.arange(len(phases)), phases
+        model,
+        hexapod.surfaces(robot, pieces * elements),
+        1,
+        np.arange(len(phases)),
+        phases,
     )
 
 

@@ -1,7 +1,9 @@
 """The engine of three dimensions: robots as MuJoCo models in sand (`rft.walking.multibody`), one after the other.
 
-MuJoCo's steps are of order 1, and its triangles lead as a whole or not at all. So it takes `SUBSTEPS` for each time step, and
-cuts an element of a leg or belly into `PIECES`, which makes both errors as small as those of the planar engine. A robot of the vertical plane becomes a hull on legs at both sides that is free to roll, yaw and drift
+MuJoCo's steps are of order 1, and its triangles lead as a whole or not at all. So it takes `SUBSTEPS` for each time step,
+and cuts an element of a leg or belly into `PIECES`, which makes both errors as small as those of the planar engine.
+
+A robot of the vertical plane becomes a hull on legs at both sides that is free to roll, yaw and drift
 (`rft.walking.hexapod`); a custom MJCF is used as it is. A walk ends with the stride that repeats the last one.
 """
 

@@ -94,7 +94,7 @@ class Multibody:
         structure = model if hasattr(model, "D_rownnz") else self.data
         self._slope_rows = np.repeat(np.arange(model.nv), structure.D_rownnz)
         self._slope_columns = np.array(structure.D_colind)
-        mujoco.mj_kinematics(model, self.data)
+        self.update()
         self.size = self._sizes()
 
     def _sizes(self) -> np.ndarray:
@@ -201,7 +201,9 @@ def bed_under(
         require(geom >= 0, f"the body {surface.body} of a surface has no geom")
         own.setdefault(geom, []).append(surface)
     along = [_faces_of_geom(model, geom, parts) for geom, parts in own.items()]
-    return Bed.under_faces(model, [*own], along, (grains.law,), EVERYWHERE, grains.ground)
+    return Bed.under_faces(
+        model, [*own], along, (grains.law,), EVERYWHERE, grains.ground
+    )
 
 
 def _faces_of_geom(model: mujoco.MjModel, geom: int, surfaces: Sequence[Surface]):
