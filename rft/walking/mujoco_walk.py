@@ -141,10 +141,11 @@ def step_cost(
         Simulation(walker, numerics).body,
         1 / (walker.gait.frequency * numerics.steps),
     )
-    begin, elapsed, steps = time.process_time(), 0.0, 0
-    while steps < numerics.steps and elapsed < seconds:
-        body.step(h)
-        elapsed, steps = time.process_time() - begin, steps + 1
+    with body.in_sand():
+        begin, elapsed, steps = time.process_time(), 0.0, 0
+        while steps < numerics.steps and elapsed < seconds:
+            body.step(h)
+            elapsed, steps = time.process_time() - begin, steps + 1
     return elapsed / steps, body.iterations / (steps * body.substeps)
 
 
@@ -316,6 +317,11 @@ class Simulation:
     def steps(self, stride: int, state: tuple) -> tuple[np.ndarray, np.ndarray, tuple]:
         """Return rows and positions after each step of a stride, or until the robot's end, and the body's state then. state:
         that of the body now, on which the result depends."""
+        with self.body.in_sand():
+            return self._steps(stride)
+
+    def _steps(self, stride: int) -> tuple[np.ndarray, np.ndarray, tuple]:
+        """Return what `steps` does, in the sand."""
         rows, states = [], []
         f, data = self.gait.frequency, self.body.data
         for begin, end, steps in self.intervals:
